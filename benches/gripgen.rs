@@ -1,0 +1,89 @@
+//! How long things take, on one core. Names are paths: `cargo bench -- tactile` runs the tactile ones.
+
+#![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use gripgen::record::{EncodeOptions, VIEW_RATE_HZ, encode};
+use gripgen::tactile::{Renderer, SimdLevel};
+use gripgen::twin::Jaw;
+use gripgen::twin::config::{ImageStorage, TraceStorage};
+use gripgen::{Location, Project, generate, press_only};
+use std::hint::black_box;
+
+const PARTS: [&str; 4] = ["ball_bearing", "long_shaft", "gear", "roller_bearing"];
+
+/// One sample of a part: 40 N, first grip, 30 degrees.
+fn project(part: &str, images: &str) -> Project {
+    let sets = [
+        ("vary.part", format!("[\"{part}\"]")),
+        ("vary.grip_force_n", "[40]".into()),
+        ("vary.grip_pose", "[0]".into()),
+        ("vary.grip_angle_deg", "[30]".into()),
+        ("images", images.into()),
+    ]
+    .map(|(key, value): (&str, String)| (key.to_string(), value));
+    Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap()
+}
+
+/// `physics/pull/rapier/<part>`: grip, imprint and pull, no images.
+fn physics(c: &mut Criterion) {
+    let mut group = c.benchmark_group("physics/pull/rapier");
+    group.sample_size(20).throughput(Throughput::Elements(1));
+    for part in PARTS {
+        let project = project(part, "none");
+        group.bench_function(part, |b| b.iter(|| black_box(generate(&project, 0, SimdLevel::best()))));
+    }
+}
+
+/// `tactile/<stage>/<vector unit>/<part>`: one image of 320 x 240 pixels.
+fn tactile(c: &mut Criterion) {
+    let mut group = c.benchmark_group("tactile");
+    group.sample_size(30).throughput(Throughput::Elements(1));
+    for part in PARTS {
+        let project = project(part, "png");
+        let scenario = project.sweep.scenario(0, &project.twin).unwrap();
+        let press = press_only(&project.twin, &project.library, &scenario).unwrap().unwrap();
+        let imprint = &press.imprint[Jaw::Left];
+        for level in SimdLevel::available() {
+            let renderer = Renderer { sensor: &press.sensors.left, gel: &project.twin.gel.left, level };
+            let name = format!("{level:?}").to_lowercase();
+            group.bench_function(BenchmarkId::new(format!("surface/{name}"), part), |b| {
+                b.iter(|| black_box(renderer.surface(imprint)));
+            });
+            if level == SimdLevel::best() {
+                group.bench_function(BenchmarkId::new(format!("image/{name}"), part), |b| {
+                    b.iter(|| black_box(renderer.image(Some(imprint), Some(7))));
+                });
+            }
+        }
+        let p = &project.twin.parts[part];
+        let mesh = project.library.mesh(p).unwrap();
+        let pose = gripgen::twin::frames::world_from_gel(Jaw::Left, 0.03).inverse() * p.grips[0];
+        let renderer =
+            Renderer { sensor: &press.sensors.left, gel: &project.twin.gel.left, level: SimdLevel::best() };
+        group.bench_function(BenchmarkId::new("press", part), |b| {
+            b.iter(|| black_box(renderer.press(&mesh, &pose, p.imprint_m3_per_n, 40.0).unwrap()));
+        });
+    }
+}
+
+/// `record/encode/<images>`: a sample into the messages of a shard.
+fn record(c: &mut Criterion) {
+    let mut group = c.benchmark_group("record/encode");
+    group.sample_size(30).throughput(Throughput::Elements(1));
+    let sample = generate(&project("gear", "png"), 0, SimdLevel::best());
+    for (name, images) in [("png", ImageStorage::Png), ("raw", ImageStorage::Raw)] {
+        let options = EncodeOptions {
+            images,
+            trace: TraceStorage::Full,
+            view_rate_hz: Some(VIEW_RATE_HZ),
+            extra_columns: vec![],
+            first_sample: 0,
+            slot_ns: 61_000_000_000,
+        };
+        group.bench_function(name, |b| b.iter(|| black_box(encode(&sample, &options).unwrap())));
+    }
+}
+
+criterion_group!(benches, physics, tactile, record);
+criterion_main!(benches);

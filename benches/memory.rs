@@ -1,0 +1,56 @@
+//! Peak memory of a sweep and of one ten times larger, each in a process of its own.
+//!
+//! `cargo bench --bench memory` prints both. The peak must not depend on the number of samples.
+
+#![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
+
+use gripgen::tactile::SimdLevel;
+use gripgen::{Location, Project, SweepOptions, sweep};
+use std::process::Command;
+use std::sync::atomic::AtomicBool;
+
+/// Set in the child processes: samples and jobs.
+const CHILD: &str = "GRIPGEN_MEMORY_BENCH";
+
+fn main() {
+    if let Ok(task) = std::env::var(CHILD) {
+        return child(&task);
+    }
+    println!("{:>8} {:>5} {:>12} {:>14}", "samples", "jobs", "peak MB", "on disk MB");
+    for jobs in [1, 2] {
+        for samples in [64, 640] {
+            let output = Command::new(std::env::current_exe().unwrap())
+                .env(CHILD, format!("{samples} {jobs}"))
+                .output()
+                .unwrap();
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            let text = String::from_utf8(output.stdout).unwrap();
+            println!("{samples:>8} {jobs:>5} {}", text.trim_end());
+        }
+    }
+}
+
+fn child(task: &str) {
+    let (samples, jobs) = task.split_once(' ').unwrap();
+    let sets = [("design", "random"), ("samples", samples), ("shard_samples", "16")]
+        .map(|(key, value)| (key.to_string(), value.to_string()));
+    let project = Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let options = SweepOptions { jobs: jobs.parse().unwrap(), slice: None, simd: SimdLevel::best() };
+    sweep(&project, out.path(), options, &AtomicBool::new(false), |_| {}).unwrap();
+    let disk: u64 =
+        std::fs::read_dir(out.path()).unwrap().map(|e| e.unwrap().metadata().unwrap().len()).sum();
+    println!(
+        "{:>12} {:>14.1}",
+        peak_mb().map_or("unknown".into(), |mb| format!("{mb:.1}")),
+        disk as f64 * 1e-6
+    );
+}
+
+/// Largest resident size of this process so far, from the kernel.
+fn peak_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kb: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kb * 1024e-6)
+}

@@ -1,0 +1,239 @@
+//! What was typed.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.
+#[derive(Debug, Parser)]
+#[command(name = "gripgen", version, max_term_width = 100, arg_required_else_help = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The verbs.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Write a commented sweep and twin to start from, or those for a part of your own.
+    Init(InitArgs),
+    /// Check a sweep, try out a few samples, and say what it will take.
+    Check(CheckArgs),
+    /// Run a sweep. Running it again continues where it stopped.
+    Sweep(SweepArgs),
+    /// Say what a run folder holds.
+    Info(InfoArgs),
+    /// Read a whole run folder and compare it with its checksums.
+    Verify(VerifyArgs),
+    /// Draw samples of a run: images, height, pressure and the pull curve.
+    Show(ShowArgs),
+    /// Write one sample of a run as a file of its own, with every reading.
+    Export(ExportArgs),
+    /// Print the JSON Schema of a configuration file.
+    Schema(SchemaArgs),
+    /// Print shell completions.
+    Completions(CompletionsArgs),
+}
+
+/// Flags of commands that read a configuration.
+#[derive(Debug, Args)]
+pub struct ConfigArgs {
+    /// The sweep configuration (a TOML file, or `asset:configs/quickstart.toml`).
+    pub config: String,
+    /// Override a key of the sweep or of its twin; may be given many times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+}
+
+/// Flags of commands that can print JSON.
+#[derive(Debug, Args)]
+pub struct JsonArgs {
+    /// Print JSON to standard output, or to FILE.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    pub json: Option<String>,
+}
+
+/// How much is said on standard error.
+#[derive(Debug, Args)]
+pub struct TalkArgs {
+    /// Say nothing but errors.
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Say more.
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
+/// `gripgen init`
+#[derive(Debug, Args)]
+pub struct InitArgs {
+    /// A folder to write into, or a mesh (STL, OBJ) of your part.
+    #[arg(default_value = ".")]
+    pub target: PathBuf,
+    /// Folder to write into, where TARGET is a mesh.
+    #[arg(short, long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Millimetres per unit of the mesh file.
+    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    pub scale_mm_per_unit: f64,
+    /// Replace files that exist.
+    #[arg(long)]
+    pub force: bool,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen check`
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// What to check.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen sweep`
+#[derive(Debug, Args)]
+pub struct SweepArgs {
+    /// What to run.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Run folder; runs/<name of the configuration> where it is left out.
+    #[arg(short, long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Worker threads; one per processor where it is left out.
+    #[arg(short, long, value_name = "N")]
+    pub jobs: Option<usize>,
+    /// Make only piece I of N, for job arrays. I counts from 0, or from 1.
+    #[arg(long, value_name = "I/N", value_parser = slice)]
+    pub slice: Option<(u64, u64)>,
+    /// Only check, like `gripgen check`.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// JSON: one event a line.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+    /// Vector unit of the image pipeline, to compare them; the result is the same.
+    #[arg(long, value_name = "portable|avx2", hide = true)]
+    pub simd: Option<String>,
+}
+
+/// `gripgen info`
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// A run folder.
+    pub run: PathBuf,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonArgs,
+}
+
+/// `gripgen verify`
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// A run folder.
+    pub run: PathBuf,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen show`
+#[derive(Debug, Args)]
+pub struct ShowArgs {
+    /// A run folder.
+    pub run: PathBuf,
+    /// A sample; an overview of the run where it is left out.
+    pub sample: Option<u64>,
+    /// The picture; in the run folder where it is left out.
+    #[arg(short, long, value_name = "FILE.png")]
+    pub out: Option<PathBuf>,
+}
+
+/// `gripgen export`
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// A run folder.
+    pub run: PathBuf,
+    /// The sample.
+    #[arg(long, value_name = "K")]
+    pub sample: u64,
+    /// The file to write.
+    #[arg(short, long, value_name = "FILE.mcap")]
+    pub out: PathBuf,
+}
+
+/// Which configuration file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SchemaKind {
+    /// sweep.toml
+    Sweep,
+    /// twin.toml
+    Twin,
+}
+
+/// `gripgen schema`
+#[derive(Debug, Args)]
+pub struct SchemaArgs {
+    /// Which file.
+    #[arg(default_value = "sweep")]
+    pub kind: SchemaKind,
+}
+
+/// `gripgen completions`
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// Which shell.
+    pub shell: clap_complete::Shell,
+}
+
+fn key_value(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().into(), value.trim().into())),
+        _ => Err("write it as KEY=VALUE, for example parts.gear.mu=0.2".into()),
+    }
+}
+
+fn slice(text: &str) -> Result<(u64, u64), String> {
+    let parsed = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    match parsed {
+        Some((i, n)) if n > 0 && i <= n => Ok((i, n)),
+        Some((i, n)) => {
+            Err(format!("piece {i} of {n} does not exist; pieces count from 0 (or from 1) up to {n}"))
+        }
+        None => Err("write it as I/N, for example 3/8".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn values_are_checked_as_they_are_typed() {
+        assert_eq!(key_value("a.b = 3"), Ok(("a.b".into(), "3".into())));
+        assert!(key_value("nothing").is_err() && key_value("=3").is_err());
+        assert_eq!((slice("0/4"), slice("4/4")), (Ok((0, 4)), Ok((4, 4))));
+        for bad in ["5/4", "1/0", "1", "a/b"] {
+            assert!(slice(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! One file a verb.
+
+pub mod check;
+pub mod completions;
+pub mod export;
+pub mod info;
+pub mod init;
+pub mod schema;
+pub mod show;
+pub mod sweep;
+pub mod verify;
+
+use crate::failure::Failure;
+use gripgen::record::RunFolder;
+use std::path::Path;
+
+/// Opens a run folder for reading.
+fn open_run(path: &Path) -> Result<RunFolder, Failure> {
+    RunFolder::open(path).map_err(Failure::from)
+}

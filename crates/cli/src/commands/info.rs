@@ -1,0 +1,93 @@
+//! `gripgen info`: what a run folder holds.
+
+use crate::args::InfoArgs;
+use crate::commands::open_run;
+use crate::failure::Failure;
+use crate::output::{JsonSink, print, size};
+use gripgen::record::INDEX_COLUMNS;
+use serde_json::json;
+use std::collections::BTreeMap;
+
+/// Labels of a part.
+#[derive(Default)]
+struct PartSummary {
+    samples: u64,
+    labels: u64,
+    sum_n: f64,
+    low_n: Option<f64>,
+    high_n: Option<f64>,
+}
+
+impl PartSummary {
+    fn add(&mut self, label: Option<f64>) {
+        self.samples += 1;
+        if let Some(label) = label {
+            self.labels += 1;
+            self.sum_n += label;
+            self.low_n = Some(self.low_n.map_or(label, |x| x.min(label)));
+            self.high_n = Some(self.high_n.map_or(label, |x| x.max(label)));
+        }
+    }
+
+    fn mean_n(&self) -> Option<f64> {
+        (self.labels > 0).then(|| self.sum_n / self.labels as f64)
+    }
+}
+
+/// Runs the verb.
+pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
+    let folder = open_run(&args.run)?;
+    let info = folder.info();
+    let at = |name: &str| INDEX_COLUMNS.iter().position(|c| *c == name).unwrap_or(0);
+    let (status, part, label) = (at("status"), at("part"), at("max_pull_force_n"));
+    let mut statuses: BTreeMap<String, u64> = BTreeMap::new();
+    let mut parts: BTreeMap<String, PartSummary> = BTreeMap::new();
+    let (mut done, mut shards, mut bytes) = (0, 0, 0);
+    for shard in 0..info.shards {
+        let Some(sidecar) = folder.finished(shard)? else { continue };
+        shards += 1;
+        done += sidecar.samples;
+        bytes += sidecar.bytes;
+        for row in &sidecar.rows {
+            *statuses.entry(row[status].clone()).or_default() += 1;
+            parts.entry(row[part].clone()).or_default().add(row[label].parse().ok());
+        }
+    }
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    if sink.wanted() {
+        let by_part: BTreeMap<_, _> = parts
+            .iter()
+            .map(|(name, p)| {
+                let value = json!({
+                    "samples": p.samples, "mean_max_pull_force_n": p.mean_n(),
+                    "low_n": p.low_n, "high_n": p.high_n,
+                });
+                (name, value)
+            })
+            .collect();
+        sink.document(&json!({
+            "schema": "gripgen.info/1", "name": info.name, "source": info.source,
+            "gripgen_version": info.gripgen_version, "config_sha256": info.config_sha256,
+            "samples": info.samples, "done": done, "shards": info.shards, "shards_done": shards, "bytes": bytes,
+            "status": statuses, "parts": by_part,
+        }))?;
+        if sink.on_stdout() {
+            return Ok(0);
+        }
+    }
+    let mut text = format!("{} ({}), made by gripgen {}\n", info.name, info.source, info.gripgen_version);
+    text += &format!("configuration {}\n", &info.config_sha256[..16.min(info.config_sha256.len())]);
+    text +=
+        &format!("{done} of {} samples, {shards} of {} shards, {}\n", info.samples, info.shards, size(bytes));
+    let counts: Vec<String> = statuses.iter().map(|(name, n)| format!("{n} {name}")).collect();
+    text += &format!("{}\n\n", counts.join(", "));
+    text += &format!("{:<20} {:>8} {:>24}\n", "part", "samples", "max_pull_force_n");
+    text += &format!("{:<20} {:>8} {:>8} {:>7} {:>7}\n", "", "", "mean", "low", "high");
+    let number = |x: Option<f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.2}"));
+    for (name, p) in &parts {
+        let (mean, low, high) = (number(p.mean_n()), number(p.low_n), number(p.high_n));
+        text += &format!("{name:<20} {:>8} {mean:>8} {low:>7} {high:>7}\n", p.samples);
+    }
+    print(&text)?;
+    Ok(0)
+}

@@ -1,0 +1,179 @@
+//! `gripgen sweep`: run it, or what is missing of it.
+
+use crate::args::SweepArgs;
+use crate::commands::check;
+use crate::failure::{Failure, code};
+use crate::interrupt::stop_flag;
+use crate::output::{JsonSink, duration, print, size};
+use crate::progress::Progress;
+use gripgen::record::{RunFolder, status_name};
+use gripgen::tactile::SimdLevel;
+use gripgen::{Location, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet, sweep};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Failures that are printed one by one; the rest are in the index.
+const FAILURES_SHOWN: u64 = 10;
+
+/// Name of the overview picture in a run folder.
+pub const CONTACT_SHEET: &str = "contact-sheet.png";
+
+/// Runs the verb.
+pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
+    if args.dry_run {
+        return check::check(&args.config, args.json.json.as_deref(), &args.talk);
+    }
+    let project = Project::load(&Location::parse(&args.config.config), &args.config.set)?;
+    let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&project.name));
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let options =
+        SweepOptions { jobs: args.jobs.unwrap_or(cores).max(1), slice: args.slice, simd: simd_level(args)? };
+    let mut watch = Watch::new(args, &project)?;
+    let result = sweep(&project, &out, options, stop_flag(), |event| watch.on_event(&event));
+    let summary = result?;
+    watch.finish(&out, &summary)?;
+    if summary.interrupted {
+        return Ok(code::INTERRUPTED);
+    }
+    Ok(if summary.failed > 0 { code::SAMPLES_FAILED } else { 0 })
+}
+
+fn simd_level(args: &SweepArgs) -> Result<SimdLevel, Failure> {
+    let Some(name) = &args.simd else { return Ok(SimdLevel::best()) };
+    let level = SimdLevel::from_name(name).filter(|level| SimdLevel::available().contains(level));
+    level.ok_or_else(|| {
+        Failure::usage(format!("--simd {name}: this processor has {:?}", SimdLevel::available()))
+    })
+}
+
+/// Turns events into progress, warnings and JSON lines.
+struct Watch<'a> {
+    args: &'a SweepArgs,
+    project: &'a Project,
+    json: JsonSink,
+    progress: Option<Progress>,
+    /// A JSON line that could not be written; reported at the end, the run goes on.
+    json_failure: Option<Failure>,
+    failures: u64,
+    bytes: u64,
+    made: u64,
+}
+
+impl<'a> Watch<'a> {
+    fn new(args: &'a SweepArgs, project: &'a Project) -> Result<Self, Failure> {
+        let json = JsonSink::open(args.json.json.as_deref())?;
+        Ok(Self { args, project, json, progress: None, json_failure: None, failures: 0, bytes: 0, made: 0 })
+    }
+
+    fn line(&mut self, value: &Value) {
+        if let Err(e) = self.json.line(value) {
+            self.json_failure.get_or_insert(e);
+        }
+    }
+
+    fn on_event(&mut self, event: &SweepEvent) {
+        match event {
+            SweepEvent::Planned { samples, done, shards } => {
+                self.line(&json!({
+                    "event": "plan", "name": self.project.name, "samples": samples, "done": done, "shards": shards,
+                    "config_sha256": self.project.config_sha256,
+                }));
+                if !self.args.talk.quiet {
+                    if *done > 0 {
+                        eprintln!("{}: {done} of {samples} samples are there already", self.project.name);
+                    } else {
+                        eprintln!("{}: {samples} samples in {shards} shards", self.project.name);
+                    }
+                }
+                self.progress = Some(Progress::start("samples", *done, *samples, &self.args.talk));
+            }
+            SweepEvent::Sample { index, status, failure } => {
+                self.made += 1;
+                if !failure.is_empty() {
+                    self.failures += 1;
+                    self.line(&json!({"event": "sample_failed", "index": index, "reason": failure}));
+                    if self.failures <= FAILURES_SHOWN {
+                        self.say(&format!("warning: sample {index} failed: {failure}"));
+                    }
+                } else if self.args.talk.verbose {
+                    self.say(&format!("sample {index}: {}", status_name(*status)));
+                }
+                if let Some(progress) = &mut self.progress {
+                    progress.step();
+                }
+            }
+            SweepEvent::Shard { shard, bytes, failed } => {
+                self.bytes += bytes;
+                self.line(&json!({"event": "shard", "shard": shard, "bytes": bytes, "failed": failed}));
+            }
+            SweepEvent::Waiting { shards } => {
+                self.line(&json!({"event": "waiting", "shards": shards}));
+                if self.args.talk.verbose {
+                    self.say(&format!("waiting for {shards} shards that another process is writing"));
+                }
+            }
+        }
+    }
+
+    fn say(&self, text: &str) {
+        if self.args.talk.quiet {
+            return;
+        }
+        match &self.progress {
+            Some(progress) => progress.say(text),
+            None => eprintln!("{text}"),
+        }
+    }
+
+    fn finish(mut self, out: &Path, summary: &SweepSummary) -> Result<(), Failure> {
+        let took = self.progress.take().map_or(0.0, |p| p.finish().as_secs_f64());
+        let sheet = out.join(CONTACT_SHEET);
+        if summary.complete && (self.made > 0 || !sheet.exists()) {
+            let folder = RunFolder::open(out)?;
+            folder.publish(CONTACT_SHEET, &contact_sheet(&folder).map_err(Failure::new)?)?;
+        }
+        self.line(&json!({
+            "event": "done", "out": out, "samples": summary.samples, "failed": summary.failed,
+            "interrupted": summary.interrupted, "complete": summary.complete, "seconds": took,
+        }));
+        if !self.args.talk.quiet {
+            self.tell(out, summary, took);
+        }
+        if !self.json.on_stdout() {
+            print(&format!("{}\n", out.display()))?;
+        }
+        self.json_failure.map_or(Ok(()), Err)
+    }
+
+    fn tell(&self, out: &Path, summary: &SweepSummary, took: f64) {
+        if self.failures > FAILURES_SHOWN {
+            eprintln!("warning: {} more samples failed", self.failures - FAILURES_SHOWN);
+        }
+        if self.made > 0 {
+            let rate = self.made as f64 / took.max(1e-9);
+            eprintln!(
+                "{} samples in {} ({rate:.0} per second), {} written",
+                self.made,
+                duration(took),
+                size(self.bytes)
+            );
+        }
+        if summary.failed > 0 {
+            eprintln!(
+                "{} of {} samples failed; why is in the column `failure` of index.csv",
+                summary.failed, summary.samples
+            );
+        }
+        if summary.interrupted {
+            eprintln!("stopped at {} samples; run the same command again to continue", summary.samples);
+        } else if summary.complete {
+            eprintln!(
+                "look at {}, or at one sample with: gripgen show {} 0",
+                out.join(CONTACT_SHEET).display(),
+                out.display()
+            );
+        } else {
+            eprintln!("this piece is done; index.csv follows when all pieces are");
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! `gripgen verify`: is the folder what it says it is?
+
+use crate::args::VerifyArgs;
+use crate::commands::open_run;
+use crate::failure::{Failure, code};
+use crate::output::{JsonSink, print};
+use crate::progress::Progress;
+use gripgen::record::verify;
+use serde_json::json;
+
+/// Runs the verb.
+pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let shards = open_run(&args.run)?.info().shards;
+    let mut progress = Progress::start("shards", 0, shards, &args.talk);
+    let result = verify(&args.run, |_| progress.step())?;
+    progress.finish();
+    let complete = result.missing_shards == 0;
+    let good = result.faults.is_empty();
+    if sink.wanted() {
+        sink.document(&json!({
+            "schema": "gripgen.verification/1", "ok": good, "complete": complete,
+            "good_shards": result.good_shards, "missing_shards": result.missing_shards,
+            "samples": result.samples, "faults": result.faults,
+        }))?;
+    }
+    for fault in &result.faults {
+        eprintln!("error: {fault}");
+    }
+    if !sink.on_stdout() && !args.talk.quiet {
+        let missing = match result.missing_shards {
+            0 => String::new(),
+            n => format!(", {n} shards not made yet"),
+        };
+        let verdict = if good { "ok" } else { "mismatch" };
+        print(&format!("{verdict}: {} shards, {} samples{missing}\n", result.good_shards, result.samples))?;
+    }
+    if !good {
+        eprintln!(
+            "\nhint: running the same sweep again rebuilds shards whose sidecar is missing; delete the sidecar of a bad one first"
+        );
+    }
+    Ok(if good { 0 } else { code::MISMATCH })
+}

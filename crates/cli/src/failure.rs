@@ -1,0 +1,145 @@
+//! What went wrong, for a person: place, both numbers, a hint, and an exit code.
+
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use gripgen::record::{ExportError, FolderError, ReadError};
+use gripgen::twin::config::{ConfigError, Place};
+use gripgen::{LoadError, SweepError};
+use std::fmt::Display;
+
+/// Exit codes.
+pub mod code {
+    /// The work failed.
+    pub const FAILED: u8 = 1;
+    /// Usage or configuration.
+    pub const USAGE: u8 = 2;
+    /// The folder holds another run.
+    pub const ANOTHER_RUN: u8 = 3;
+    /// Finished, but samples failed.
+    pub const SAMPLES_FAILED: u8 = 4;
+    /// Verification found a mismatch.
+    pub const MISMATCH: u8 = 5;
+    /// Interrupted.
+    pub const INTERRUPTED: u8 = 130;
+}
+
+/// An error on its way to the terminal.
+#[derive(Debug)]
+pub struct Failure {
+    message: String,
+    place: Option<Place>,
+    hint: Option<String>,
+    exit_code: u8,
+}
+
+impl Failure {
+    /// A failure of the work (exit code 1).
+    pub fn new(message: impl Display) -> Self {
+        Self { message: message.to_string(), place: None, hint: None, exit_code: code::FAILED }
+    }
+
+    /// A failure of usage or configuration (exit code 2).
+    pub fn usage(message: impl Display) -> Self {
+        Self { exit_code: code::USAGE, ..Self::new(message) }
+    }
+
+    /// Adds what to do about it.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// The process's exit code.
+    pub fn exit_code(&self) -> u8 {
+        self.exit_code
+    }
+
+    /// Prints it to standard error.
+    pub fn print(&self) {
+        anstream::eprintln!("{}", self.rendered());
+        if let Some(hint) = &self.hint {
+            anstream::eprintln!("\nhint: {hint}");
+        }
+    }
+
+    fn rendered(&self) -> String {
+        let title = Level::ERROR.primary_title(&self.message);
+        let group = match &self.place {
+            Some(Place { file, text, span: Some(span) }) => {
+                let at = AnnotationKind::Primary.span(span.clone());
+                title.element(Snippet::source(&**text).path(file.as_str()).annotation(at))
+            }
+            _ => Group::with_title(title),
+        };
+        Renderer::styled().render(&[group])
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(e: ConfigError) -> Self {
+        let place = e.place.map(|place| *place);
+        let where_to = match &place {
+            Some(Place { file, span: None, .. }) => format!("{file}: "),
+            _ => String::new(),
+        };
+        let key = if e.key.is_empty() { String::new() } else { format!("{}: ", e.key) };
+        Self { message: format!("{where_to}{key}{}", e.problem), place, hint: e.hint, exit_code: code::USAGE }
+    }
+}
+
+impl From<LoadError> for Failure {
+    fn from(e: LoadError) -> Self {
+        match e {
+            LoadError::Config(e) => e.into(),
+            LoadError::Read(e) => Failure::usage(e),
+            LoadError::Library(e) => Failure::usage(e),
+            other => Failure::usage(other),
+        }
+    }
+}
+
+impl From<FolderError> for Failure {
+    fn from(e: FolderError) -> Self {
+        match &e {
+            FolderError::AnotherRun { .. } | FolderError::Foreign { .. } => {
+                let failure = Self { exit_code: code::ANOTHER_RUN, ..Self::new(&e) };
+                failure.hint("choose another folder with --out; nothing was touched")
+            }
+            FolderError::Io { path, .. } if path.ends_with("run.json") => {
+                Self::new(&e).hint("a run folder is what `gripgen sweep` writes")
+            }
+            _ => Self::new(&e),
+        }
+    }
+}
+
+impl From<SweepError> for Failure {
+    fn from(e: SweepError) -> Self {
+        match e {
+            SweepError::Folder(e) => e.into(),
+            SweepError::Slice { .. } => Failure::usage(e),
+            other => Failure::new(other),
+        }
+    }
+}
+
+impl From<ReadError> for Failure {
+    fn from(e: ReadError) -> Self {
+        let hint = match &e {
+            ReadError::Mcap { .. } => {
+                Some("`gripgen verify` reads the whole run; sweeping again rebuilds what is broken")
+            }
+            _ => None,
+        };
+        Self { hint: hint.map(String::from), ..Self::new(e) }
+    }
+}
+
+impl From<ExportError> for Failure {
+    fn from(e: ExportError) -> Self {
+        match e {
+            ExportError::Read(e) => e.into(),
+            other => Failure::new(other),
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! The command line of gripgen: arguments in, exit code out.
+//!
+//! Standard output is data, standard error is talk. Exit codes: 0 ok, 1 failed, 2 usage or configuration, 3 the folder
+//! holds another run, 4 finished but samples failed, 5 verification found a mismatch, 130 interrupted.
+
+mod args;
+mod commands;
+mod failure;
+mod interrupt;
+mod output;
+mod progress;
+
+use args::{Cli, Command};
+use clap::Parser;
+use std::ffi::OsString;
+
+/// Runs gripgen with the arguments of a process (the first is its name) and returns its exit code.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(e) => {
+            // Clap prints help and versions to standard output, everything else to standard error.
+            let _ = e.print();
+            return if e.use_stderr() { 2 } else { 0 };
+        }
+    };
+    let result = match &cli.command {
+        Command::Init(args) => commands::init::run(args),
+        Command::Check(args) => commands::check::run(args),
+        Command::Sweep(args) => commands::sweep::run(args),
+        Command::Info(args) => commands::info::run(args),
+        Command::Verify(args) => commands::verify::run(args),
+        Command::Show(args) => commands::show::run(args),
+        Command::Export(args) => commands::export::run(args),
+        Command::Schema(args) => commands::schema::run(args),
+        Command::Completions(args) => commands::completions::run(args),
+    };
+    result.unwrap_or_else(|failure| {
+        failure.print();
+        failure.exit_code()
+    })
+}

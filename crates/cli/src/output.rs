@@ -1,0 +1,126 @@
+//! Data to standard output or a file.
+
+use crate::failure::Failure;
+use serde_json::Value;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+/// Where JSON goes.
+pub enum JsonSink {
+    /// Nowhere: it was not asked for.
+    None,
+    /// Standard output.
+    Stdout,
+    /// A file.
+    File(BufWriter<File>),
+}
+
+impl JsonSink {
+    /// The sink that `--json [FILE]` asks for.
+    pub fn open(asked: Option<&str>) -> Result<Self, Failure> {
+        match asked {
+            None => Ok(JsonSink::None),
+            Some("-") => Ok(JsonSink::Stdout),
+            Some(path) => match File::create(path) {
+                Ok(file) => Ok(JsonSink::File(BufWriter::new(file))),
+                Err(e) => Err(Failure::usage(format!("{path}: {e}")).hint("--json FILE writes to FILE")),
+            },
+        }
+    }
+
+    /// Whether JSON was asked for.
+    pub fn wanted(&self) -> bool {
+        !matches!(self, JsonSink::None)
+    }
+
+    /// Whether standard output belongs to JSON.
+    pub fn on_stdout(&self) -> bool {
+        matches!(self, JsonSink::Stdout)
+    }
+
+    /// Writes a value on one line.
+    pub fn line(&mut self, value: &Value) -> Result<(), Failure> {
+        self.write(&format!("{value}\n"))
+    }
+
+    /// Writes a value for people to read.
+    pub fn document(&mut self, value: &Value) -> Result<(), Failure> {
+        self.write(&format!("{value:#}\n"))
+    }
+
+    fn write(&mut self, text: &str) -> Result<(), Failure> {
+        let written = match self {
+            JsonSink::None => Ok(()),
+            JsonSink::Stdout => return print(text),
+            JsonSink::File(file) => file.write_all(text.as_bytes()).and_then(|()| file.flush()),
+        };
+        written.map_err(|e| Failure::new(format!("writing JSON: {e}")))
+    }
+}
+
+/// Writes to standard output. A reader that hung up (`| head`) is no failure.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.map_err(|e| Failure::new(format!("standard output: {e}"))),
+    }
+}
+
+/// Writes a file, under a temporary name first.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let failed = |e: io::Error| Failure::new(format!("{}: {e}", path.display()));
+    let mut partial = path.as_os_str().to_os_string();
+    partial.push(".partial");
+    std::fs::write(&partial, bytes).map_err(failed)?;
+    std::fs::rename(&partial, path).map_err(failed)
+}
+
+/// A size for people.
+pub fn size(bytes: u64) -> String {
+    let (mut x, mut unit) = (bytes as f64, "B");
+    for next in ["kB", "MB", "GB", "TB", "PB"] {
+        if x < 999.5 {
+            break;
+        }
+        (x, unit) = (x / 1000.0, next);
+    }
+    if unit == "B" || x >= 99.5 { format!("{x:.0} {unit}") } else { format!("{x:.1} {unit}") }
+}
+
+/// A duration for people.
+pub fn duration(seconds: f64) -> String {
+    if seconds < 60.0 {
+        return if seconds < 9.95 { format!("{seconds:.1} s") } else { format!("{seconds:.0} s") };
+    }
+    let s = seconds.round() as u64;
+    match s {
+        0..3600 => format!("{} min {:02} s", s / 60, s % 60),
+        3600..172_800 => format!("{} h {:02} min", s / 3600, s / 60 % 60),
+        _ => format!("{:.1} days", seconds / 86_400.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_durations_read_well() {
+        for (bytes, text) in
+            [(0, "0 B"), (999, "999 B"), (1000, "1.0 kB"), (123_456, "123 kB"), (2_500_000, "2.5 MB")]
+        {
+            assert_eq!(size(bytes), text);
+        }
+        for (s, text) in [
+            (0.04, "0.0 s"),
+            (12.3, "12 s"),
+            (65.0, "1 min 05 s"),
+            (7260.0, "2 h 01 min"),
+            (864_000.0, "10.0 days"),
+        ] {
+            assert_eq!(duration(s), text);
+        }
+    }
+}

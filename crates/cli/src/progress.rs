@@ -1,0 +1,70 @@
+//! Progress on standard error: a bar on a terminal, a line every ten seconds elsewhere.
+
+use crate::args::TalkArgs;
+use crate::output::duration;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// Time between two lines where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// Progress of a known amount of work.
+pub struct Progress {
+    unit: &'static str,
+    total: u64,
+    done_before: u64,
+    done: u64,
+    start: Instant,
+    last_line: Instant,
+    bar: Option<ProgressBar>,
+    silent: bool,
+}
+
+impl Progress {
+    /// Starts at `done` of `total` units.
+    pub fn start(unit: &'static str, done: u64, total: u64, talk: &TalkArgs) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let bar = (terminal && !talk.quiet).then(|| {
+            let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
+            let template = "{bar:32} {human_pos}/{human_len} {prefix}  {per_sec}  {eta} left {msg}";
+            bar.set_style(ProgressStyle::with_template(template).expect("the template is a constant"));
+            bar.set_prefix(unit);
+            bar.set_position(done);
+            bar.reset_eta();
+            bar
+        });
+        let now = Instant::now();
+        Self { unit, total, done_before: done, done, start: now, last_line: now, bar, silent: talk.quiet }
+    }
+
+    /// One more unit is done.
+    pub fn step(&mut self) {
+        self.done += 1;
+        if let Some(bar) = &self.bar {
+            bar.inc(1);
+        } else if !self.silent && self.last_line.elapsed() >= LINE_EVERY {
+            self.last_line = Instant::now();
+            let elapsed = self.start.elapsed().as_secs_f64();
+            let rate = (self.done - self.done_before) as f64 / elapsed;
+            let left = duration((self.total - self.done) as f64 / rate);
+            eprintln!("{}/{} {}, {rate:.1} per second, {left} left", self.done, self.total, self.unit);
+        }
+    }
+
+    /// A line that does not disturb the bar.
+    pub fn say(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.suspend(|| eprintln!("{text}")),
+            None => eprintln!("{text}"),
+        }
+    }
+
+    /// Ends the display; returns the time it took.
+    pub fn finish(self) -> Duration {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+        self.start.elapsed()
+    }
+}

@@ -1,0 +1,217 @@
+//! Closing the jaws on a part.
+
+use crate::contact::{ContactForce, contact_force};
+use crate::session::{JawFriction, PullSession, SessionStart};
+use crate::shape::PartShape;
+use crate::world::World;
+use gripgen_twin::frames::{Pose, world_from_gel};
+use gripgen_twin::random::Stream;
+use gripgen_twin::{Gel, Grasp, Gripper, Jaw, PerJaw, Robot, Wrist};
+use nalgebra::Vector3;
+use rapier3d_f64::parry::query::{ShapeCastOptions, cast_shapes};
+use rapier3d_f64::prelude as rapier;
+use rapier3d_f64::prelude::{
+    CoefficientCombineRule, ColliderBuilder, ColliderHandle, LockedAxes, MassProperties,
+    PrismaticJointBuilder, RigidBodyBuilder, RigidBodyHandle, Shape,
+};
+
+/// A grip has settled when each jaw's normal force is this close to the grip force, as a fraction.
+const SETTLED_FRACTION: f64 = 1e-4;
+
+/// Shortest and longest time a grip settles.
+const SETTLE_S: (f64, f64) = (0.1, 2.0);
+
+/// How the part is held besides the jaws.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mount {
+    /// Fixed to the world, as in the experiment.
+    Fixed,
+    /// Free: only the jaws carry it against gravity.
+    Free {
+        /// Its mass.
+        mass_kg: f64,
+    },
+}
+
+/// All that a grip depends on.
+#[derive(Clone)]
+pub struct GripSetup<'a> {
+    /// The arm.
+    pub robot: Robot,
+    /// The gripper.
+    pub gripper: Gripper,
+    /// The wrist sensor; its step is the time step.
+    pub wrist: Wrist,
+    /// The gels.
+    pub gel: &'a PerJaw<Gel>,
+    /// The part's contact shape.
+    pub shape: &'a PartShape,
+    /// Where the part is.
+    pub world_from_part: Pose,
+    /// Normal force of each jaw.
+    pub grip_force_n: PerJaw<f64>,
+    /// Unit vector of the pull, at right angles to the jaw axis (y of `world`).
+    pub direction: [f64; 3],
+    /// What else holds the part.
+    pub mount: Mount,
+    /// Strength of gravity, along -z of `world`; the arm carries the gripper's own weight.
+    pub gravity_m_per_s2: f64,
+}
+
+/// What became of a grip.
+pub enum Grip {
+    /// Both jaws hold the part.
+    Held(Box<Held>),
+    /// The jaws met without both touching the part.
+    NoContact,
+}
+
+/// Why a grip failed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GripError {
+    /// The part does not fit between the open jaws.
+    #[error("the part reaches beyond the open {jaw} jaw: the gripper opens to {opening_mm:.1} mm")]
+    TooWide {
+        /// Jaw that the part overlaps.
+        jaw: Jaw,
+        /// Opening between the gels.
+        opening_mm: f64,
+    },
+    /// The jaws did not come to rest.
+    #[error(
+        "the grip did not settle in {time_s} s: the {jaw} jaw presses with {normal_n:.4} N instead of {wanted_n} N"
+    )]
+    NotSettled {
+        /// Jaw farthest from its force.
+        jaw: Jaw,
+        /// Its normal force.
+        normal_n: f64,
+        /// Commanded force.
+        wanted_n: f64,
+        /// Time given.
+        time_s: f64,
+    },
+    /// The contact geometry is not supported by the engine.
+    #[error("the contact shape cannot be gripped: {0}")]
+    Shape(String),
+    /// The engine lost a body to a non-finite number.
+    #[error("{bodies} bodies became non-finite {time_s:.3} s into the grip")]
+    NotFinite {
+        /// Bodies concerned.
+        bodies: usize,
+        /// Time since the jaws began to close.
+        time_s: f64,
+    },
+}
+
+/// A part held by settled jaws.
+pub struct Held {
+    /// Where the part lies in each gel and how hard each jaw presses.
+    pub grasp: Grasp,
+    start: SessionStart,
+}
+
+/// Closes the jaws on the part and lets them settle, without friction.
+pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
+    let mut touch = PerJaw { left: 0.0, right: 0.0 };
+    for jaw in Jaw::BOTH {
+        match first_touch(setup, jaw)? {
+            Some(distance) => touch[jaw] = distance,
+            None => return Ok(Grip::NoContact),
+        }
+    }
+    let mut world = World::new(setup.wrist.step_s(), setup.gravity_m_per_s2);
+    let rig = build(&mut world, setup, &touch);
+    settle(&mut world, &rig, setup)?;
+    let distance = PerJaw::from_fn(|jaw| {
+        let centre = world.bodies[rig.jaws[jaw]].translation().y * jaw.side();
+        centre - setup.gel[jaw].thickness_m / 2.0
+    });
+    let grasp = Grasp {
+        gel_from_part: PerJaw::from_fn(|jaw| {
+            world_from_gel(jaw, distance[jaw]).inverse() * setup.world_from_part
+        }),
+        normal_force_n: PerJaw::from_fn(|jaw| rig.contact(&world, jaw).normal_n),
+    };
+    let start = SessionStart {
+        world,
+        rig,
+        robot: setup.robot,
+        wrist: setup.wrist,
+        jaw_mass_kg: setup.gripper.jaw_mass_kg,
+        grip_force_n: setup.grip_force_n,
+        direction: vector(setup.direction),
+        shear_stiffness_n_per_m: setup.gel.left.shear_stiffness_n_per_m
+            + setup.gel.right.shear_stiffness_n_per_m,
+        normal_force_n: grasp.normal_force_n,
+    };
+    Ok(Grip::Held(Box::new(Held { grasp, start })))
+}
+
+impl Held {
+    /// Starts a pull. `friction` is what each jaw can hold, `noise` the randomness of the wrist sensor.
+    pub fn pull(self, friction: &PerJaw<JawFriction>, noise: Stream) -> PullSession {
+        PullSession::new(self.start, friction, noise)
+    }
+}
+
+/// Distance from the grip centre at which the jaw's gel first touches the part; `None` if it never does.
+fn first_touch(setup: &GripSetup<'_>, jaw: Jaw) -> Result<Option<f64>, GripError> {
+    let gel = &setup.gel[jaw];
+    let open = setup.gripper.opening_m / 2.0;
+    let start = open + gel.thickness_m / 2.0;
+    let pad = rapier::Pose::from_translation(rapier::Vector::new(0.0, jaw.side() * start, 0.0));
+    let towards = rapier::Vector::new(0.0, -jaw.side(), 0.0);
+    let hit = cast_shapes(
+        &pad,
+        towards,
+        &pad_shape(gel),
+        &rapier_pose(&setup.world_from_part),
+        rapier::Vector::ZERO,
+        &**setup.shape.shared(),
+        ShapeCastOptions::with_max_time_of_impact(open),
+    )
+    .map_err(|e| GripError::Shape(e.to_string()))?;
+    match hit {
+        None => Ok(None),
+        Some(hit) if hit.time_of_impact <= 0.0 => {
+            Err(GripError::TooWide { jaw, opening_mm: setup.gripper.opening_m * 1e3 })
+        }
+        Some(hit) => Ok(Some(open - hit.time_of_impact)),
+    }
+}
+
+/// Lets the jaws close until each presses with its force.
+fn settle(world: &mut World, rig: &Rig, setup: &GripSetup<'_>) -> Result<(), GripError> {
+    let step_s = setup.wrist.step_s();
+    let mut time_s = 0.0;
+    loop {
+        rig.close_jaws(world, &setup.grip_force_n, setup.gripper.jaw_mass_kg);
+        world.step(step_s, false).map_err(|e| GripError::NotFinite { bodies: e.bodies, time_s })?;
+        time_s += step_s;
+        if time_s < SETTLE_S.0 {
+            continue;
+        }
+        let off = PerJaw::from_fn(|jaw| {
+            // Along the jaw axis: on tilted contacts the sum of the magnitudes is larger than the grip force.
+            let body = &world.bodies[rig.jaws[jaw]];
+            let acceleration_n = body.linvel().y.abs() * setup.gripper.jaw_mass_kg / step_s;
+            let normal = rig.contact(world, jaw).normal_n;
+            let missing = (setup.grip_force_n[jaw] - normal).max(0.0);
+            (missing.max(acceleration_n) / setup.grip_force_n[jaw], normal)
+        });
+        if off.iter().all(|(_, &(off, _))| off <= SETTLED_FRACTION) {
+            return Ok(());
+        }
+        if time_s > SETTLE_S.1 {
+            let jaw = if off.left.0 >= off.right.0 { Jaw::Left } else { Jaw::Right };
+            return Err(GripError::NotSettled {
+                jaw,
+                normal_n: off[jaw].1,
+                wanted_n: setup.grip_force_n[jaw],
+                time_s: SETTLE_S.1,
+            });
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! Gripping and pulling a part, in Rapier.
+//!
+//! [`grip`] closes the jaws on a part and lets them settle; the [`Held`] part says where it lies in each gel.
+//! [`Held::pull`] starts a [`PullSession`], whose [`PullSession::step`] is the one primitive of every pull: the
+//! force staircase ([`pull_staircase`]), a policy or a rig are loops over it.
+//!
+//! What Rapier decides and what it does not: it decides pose, normal forces and motion. How much tangential force
+//! a jaw can hold is decided by the pressure on its contact patch and the friction law, and is written into Rapier
+//! as friction on the jaw total. Gel shear is quasi-static and in series with the jaws: the tool moves by
+//! `F / (k_left + k_right)` before anything slips.
+//!
+//! This crate knows no images and no files.
+
+mod contact;
+mod force_loop;
+mod grip;
+mod session;
+mod shape;
+mod staircase;
+mod world;
+
+pub use grip::{Grip, GripError, GripSetup, Held, Mount, grip};
+pub use session::{Command, JawFriction, PullError, PullSession, PullState};
+pub use shape::{PartShape, ShapeError};
+pub use staircase::{StaircaseResult, pull_staircase, staircase_of};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,136 @@
+//! The bodies of a grip: part, carriage, jaws and pads.
+
+use crate::contact::{ContactForce, contact_force};
+use crate::grip::{GripSetup, Mount};
+use crate::world::World;
+use gripgen_twin::frames::Pose;
+use gripgen_twin::{Gel, Jaw, PerJaw};
+use nalgebra::Vector3;
+use rapier3d_f64::prelude as rapier;
+use rapier3d_f64::prelude::{
+    CoefficientCombineRule, ColliderBuilder, ColliderHandle, LockedAxes, MassProperties,
+    PrismaticJointBuilder, RigidBodyBuilder, RigidBodyHandle,
+};
+
+/// Damping of a closing jaw, per jaw mass: a jaw comes to rest within a few hundredths of a second.
+const CLOSING_DAMPING_PER_S: f64 = 100.0;
+
+/// Gap between pad and part from which a jaw closes under force.
+const CLOSING_GAP_M: f64 = 0.2e-3;
+
+/// The bodies of the scene.
+#[derive(Clone, Copy)]
+pub(crate) struct Rig {
+    part: RigidBodyHandle,
+    part_shape: ColliderHandle,
+    pub(crate) carriage: RigidBodyHandle,
+    pub(crate) jaws: PerJaw<RigidBodyHandle>,
+    pub(crate) pads: PerJaw<ColliderHandle>,
+}
+
+impl Rig {
+    /// Lets a free part go, once the jaws have friction to hold it.
+    pub(crate) fn release_part(&self, world: &mut World) {
+        let part = &mut world.bodies[self.part];
+        part.set_locked_axes(LockedAxes::empty(), true);
+        part.set_gravity_scale(1.0, true);
+    }
+
+    /// Pushes both jaws inwards.
+    pub(crate) fn close_jaws(&self, world: &mut World, grip_force_n: &PerJaw<f64>, jaw_mass_kg: f64) {
+        for (jaw, handle) in self.jaws.iter() {
+            let body = &mut world.bodies[*handle];
+            // Relative to the carriage, whose motion has no component along the jaws.
+            let damping = CLOSING_DAMPING_PER_S * jaw_mass_kg * body.linvel().y;
+            body.reset_forces(false);
+            let force = -jaw.side() * grip_force_n[jaw] - damping;
+            body.add_force(rapier::Vector::new(0.0, force, 0.0), true);
+        }
+    }
+
+    /// What the contact between a jaw's pad and the part carries.
+    pub(crate) fn contact(&self, world: &World, jaw: Jaw) -> ContactForce {
+        contact_force(world, self.pads[jaw], self.part_shape)
+    }
+
+    /// Momentum along `direction` of all that hangs on the arm.
+    pub(crate) fn momentum(&self, world: &World, direction: rapier::Vector) -> f64 {
+        [self.carriage, self.jaws.left, self.jaws.right]
+            .into_iter()
+            .map(|h| world.bodies[h].mass() * world.bodies[h].linvel().dot(direction))
+            .sum()
+    }
+}
+
+/// Puts part, carriage, jaws and pads into the world; the jaws stand [`CLOSING_GAP_M`] off the part.
+fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64>) -> Rig {
+    let direction = vector(setup.direction);
+    let inertia = |mass_kg: f64| {
+        // A compact body of steel density; rotations are locked by the joints, so only its order matters.
+        MassProperties::new(rapier::Vector::ZERO, mass_kg, rapier::Vector::splat(mass_kg * 5e-3))
+    };
+    // The pads alone carry friction: the larger of the two coefficients of a pair counts, the part's is 0.
+    let part_collider = ColliderBuilder::new(setup.shape.shared().clone())
+        .friction(0.0)
+        .friction_combine_rule(CoefficientCombineRule::Max)
+        .density(0.0);
+    let pose = rapier_pose(&setup.world_from_part);
+    let part = match setup.mount {
+        Mount::Fixed => RigidBodyBuilder::fixed().pose(pose),
+        Mount::Free { mass_kg } => {
+            // Held in place while the jaws close, which they do without friction.
+            let everything = LockedAxes::TRANSLATION_LOCKED | LockedAxes::ROTATION_LOCKED;
+            let body = RigidBodyBuilder::dynamic().pose(pose).gravity_scale(0.0);
+            body.additional_mass_properties(inertia(mass_kg)).locked_axes(everything)
+        }
+    };
+    let part = world.add_body(part);
+    let part_shape = world.add_collider(part_collider, part);
+
+    let base = world.add_body(RigidBodyBuilder::fixed());
+    // The arm carries the weight of all that belongs to it.
+    let arm_body = |mass_kg: f64| {
+        RigidBodyBuilder::dynamic().additional_mass_properties(inertia(mass_kg)).gravity_scale(0.0)
+    };
+    let carriage = world.add_body(arm_body(setup.robot.moving_mass_kg + setup.gripper.mass_kg));
+    world.joints.insert(base, carriage, PrismaticJointBuilder::new(direction), true);
+    let mut pads = Vec::with_capacity(2);
+    let jaws = PerJaw::from_fn(|jaw| {
+        let gel = &setup.gel[jaw];
+        let y = jaw.side() * (touch[jaw] + CLOSING_GAP_M + gel.thickness_m / 2.0);
+        let at = rapier::Vector::new(0.0, y, 0.0);
+        let body = world.add_body(arm_body(setup.gripper.jaw_mass_kg).translation(at));
+        let slide = PrismaticJointBuilder::new(rapier::Vector::Y).local_anchor1(at).contacts_enabled(false);
+        world.joints.insert(carriage, body, slide, true);
+        let half = pad_half_extents(gel);
+        let pad = ColliderBuilder::cuboid(half.x, half.y, half.z)
+            .friction(0.0)
+            .friction_combine_rule(CoefficientCombineRule::Max)
+            .density(0.0);
+        pads.push(world.add_collider(pad, body));
+        body
+    });
+    Rig { part, part_shape, carriage, jaws, pads: PerJaw { left: pads[0], right: pads[1] } }
+}
+
+/// Half sides of a pad: the gel's width along x, its thickness along the jaw axis, its height along z.
+fn pad_half_extents(gel: &Gel) -> rapier::Vector {
+    rapier::Vector::new(gel.width_m / 2.0, gel.thickness_m / 2.0, gel.height_m / 2.0)
+}
+
+fn pad_shape(gel: &Gel) -> impl Shape + use<> {
+    rapier::Cuboid::new(pad_half_extents(gel))
+}
+
+fn vector(v: [f64; 3]) -> rapier::Vector {
+    rapier::Vector::new(v[0], v[1], v[2])
+}
+
+fn rapier_pose(pose: &Pose) -> rapier::Pose {
+    let t: Vector3<f64> = pose.translation.vector;
+    let q = pose.rotation.quaternion();
+    rapier::Pose::from_parts(
+        rapier::Vector::new(t.x, t.y, t.z),
+        rapier::Rotation::from_xyzw(q.i, q.j, q.k, q.w),
+    )
+}

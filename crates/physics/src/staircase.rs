@@ -1,0 +1,61 @@
+//! The pull of the experiment: a force staircase until the jaws slip.
+
+use crate::session::{Command, PullError, PullSession};
+use gripgen_twin::random::Stream;
+use gripgen_twin::{PullEnd, PullSettings, PullTrace, Staircase, TraceRow};
+
+/// A finished pull.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StaircaseResult {
+    /// Every reading of the wrist sensor, up to and including the one beyond the displacement stop.
+    pub trace: PullTrace,
+    /// What ended the pull.
+    pub end: PullEnd,
+}
+
+/// The staircase of a pull; `jitter` is asked only if the steps vary.
+pub fn staircase_of(pull: &PullSettings, jitter: &mut Stream) -> Staircase {
+    if pull.step_jitter == 0.0 {
+        return Staircase::constant(pull.increment_n, pull.step_s, pull.max_time_s);
+    }
+    Staircase::from_steps(pull.increment_n, pull.max_time_s, || {
+        pull.step_s * (1.0 + pull.step_jitter * (2.0 * jitter.uniform() - 1.0))
+    })
+}
+
+/// Runs `session` up the staircase until displacement, force or time ends it.
+///
+/// A row holds the command and the reading at its time; the command then acts until the next row. The first row,
+/// at time 0, is the reading before the pull.
+pub fn pull_staircase(
+    session: &mut PullSession,
+    staircase: &Staircase,
+    pull: &PullSettings,
+) -> Result<StaircaseResult, PullError> {
+    let mut trace = PullTrace::default();
+    let rate_hz = session.rate_hz();
+    let mut tick = 0_u64;
+    let end = loop {
+        let time_s = tick as f64 / rate_hz;
+        let desired_force_n = staircase.desired_n(time_s);
+        let state = session.state();
+        trace.push(TraceRow {
+            time_s,
+            desired_force_n,
+            measured_force_n: state.measured_force_n,
+            displacement_m: state.displacement_m,
+        });
+        if state.displacement_m > pull.stop_m {
+            break PullEnd::Displacement;
+        }
+        if pull.max_force_n.is_some_and(|limit| desired_force_n > limit) {
+            break PullEnd::ForceLimit;
+        }
+        if (tick + 1) as f64 / rate_hz > pull.max_time_s {
+            break PullEnd::TimeLimit;
+        }
+        session.step(Command::ForceN(desired_force_n), 1.0 / rate_hz)?;
+        tick += 1;
+    };
+    Ok(StaircaseResult { trace, end })
+}

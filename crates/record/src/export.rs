@@ -1,0 +1,94 @@
+//! One sample as a file of its own, with every reading as a message for viewers.
+
+use crate::encode::{EncodedSample, state_messages, timestamp};
+use crate::proto::foxglove::{CompressedImage, RawImage};
+use crate::proto::gripgen_v1::{PullTrace, Sample};
+use crate::reader::{ReadError, ShardReader, trace_of};
+use crate::shard::{ShardError, ShardInfo, ShardWriter};
+use gripgen_twin::PerJaw;
+use gripgen_twin::config::ImageStorage;
+use prost::Message;
+use std::io::Cursor;
+
+/// Why a sample could not be exported.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// The shard.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The new file.
+    #[error(transparent)]
+    Write(#[from] ShardError),
+}
+
+/// The bytes of a one-sample MCAP file: the messages of the shard, starting at time 0, and every row of the trace as
+/// a `/pull/state` message.
+pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, ExportError> {
+    let raw = reader.raw(index)?;
+    let storage = match (&raw.images, raw.raw_images) {
+        (None, _) => ImageStorage::None,
+        (_, true) => ImageStorage::Raw,
+        (_, false) => ImageStorage::Png,
+    };
+    let zero = Some(timestamp(0));
+    let damaged = |topic: &str, e: prost::DecodeError| reader.damaged(index, topic, &e.to_string());
+    let mut sample = Sample::decode(&raw.sample[..]).map_err(|e| damaged("/sample", e))?;
+    sample.timestamp = zero;
+    let images = raw
+        .images
+        .map(|both| {
+            PerJaw::try_from_fn(|jaw| -> Result<Vec<u8>, ReadError> {
+                let topic = format!("/tactile/{jaw}");
+                Ok(if storage == ImageStorage::Raw {
+                    let mut image = RawImage::decode(&both[jaw][..]).map_err(|e| damaged(&topic, e))?;
+                    image.timestamp = zero;
+                    image.encode_to_vec()
+                } else {
+                    let mut image =
+                        CompressedImage::decode(&both[jaw][..]).map_err(|e| damaged(&topic, e))?;
+                    image.timestamp = zero;
+                    image.encode_to_vec()
+                })
+            })
+        })
+        .transpose()?;
+    let (mut trace, mut states) = (None, Vec::new());
+    if let Some(bytes) = raw.trace {
+        let mut message = PullTrace::decode(&bytes[..]).map_err(|e| damaged("/pull/trace", e))?;
+        message.timestamp = zero;
+        let rows = trace_of(&message).map_err(|problem| reader.damaged(index, "/pull/trace", &problem))?;
+        states = state_messages(&rows, 0, None);
+        trace = Some(message.encode_to_vec());
+    }
+    let encoded = EncodedSample {
+        start_ns: 0,
+        status: sample.status(),
+        sample: sample.encode_to_vec(),
+        images,
+        trace,
+        states,
+        row: vec![],
+    };
+    let mut writer = ShardWriter::new(Cursor::new(Vec::new()), &info(reader, index)?, storage)?;
+    writer.push(&encoded)?;
+    Ok(writer.finish()?.into_inner())
+}
+
+/// What the shard says about itself, for one of its samples.
+fn info(reader: &ShardReader, index: u64) -> Result<ShardInfo, ReadError> {
+    let text = |key: &str| reader.metadata().get(key).cloned().unwrap_or_default();
+    let number = |key: &str| text(key).parse().unwrap_or(0);
+    Ok(ShardInfo {
+        gripgen_version: text("gripgen_version"),
+        config_sha256: text("config_sha256"),
+        name: text("name"),
+        source: text("source"),
+        shard: number("shard"),
+        shards: number("shards"),
+        first_sample: index,
+        samples: 1,
+        slot_ns: number("slot_ns"),
+        config_toml: reader.config_toml()?,
+    })
+}

@@ -1,0 +1,28 @@
+//! Samples and run folders on disk.
+//!
+//! A run folder holds `run.json`, shards (`shard-00000.mcap`) with a sidecar each (`shard-00000.json`, written last),
+//! and `index.csv`. A shard is an MCAP file of protobuf messages with embedded descriptors, so that Foxglove, Rerun
+//! and the stock MCAP libraries read it without knowing gripgen. `docs/format.md` describes all of it.
+//!
+//! This crate does not know how samples are made. Reading holds one sample in memory, writing one as well.
+
+mod encode;
+mod export;
+mod folder;
+mod index;
+mod picture;
+pub mod proto;
+mod reader;
+mod shard;
+mod verify;
+
+pub use encode::{EncodeOptions, EncodedSample, Timed, VIEW_RATE_HZ, encode};
+pub use export::{ExportError, export_sample};
+pub use folder::{
+    FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, Sidecar, hash_file, sha256_hex,
+};
+pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
+pub use picture::{PictureError, decode as decode_picture, encode_png};
+pub use reader::{ReadError, Record, ShardReader};
+pub use shard::{LAYOUT_VERSION, METADATA_NAME, ShardError, ShardInfo, ShardWriter};
+pub use verify::{Verification, verify};

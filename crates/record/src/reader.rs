@@ -1,0 +1,291 @@
+//! Reading a shard: any sample, in any order, one at a time.
+
+use crate::picture::{PictureError, decode};
+use crate::proto::foxglove::{CompressedImage, RawImage};
+use crate::proto::gripgen_v1::{PullTrace, Sample};
+use crate::shard::{LAYOUT_VERSION, METADATA_NAME};
+use gripgen_twin::{Jaw, PerJaw, TactileImage};
+use mcap::{McapError, Summary};
+use memmap2::Mmap;
+use prost::Message;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// A shard opened for reading. The file is mapped into memory; a sample is decoded when it is asked for.
+pub struct ShardReader {
+    path: PathBuf,
+    map: Mmap,
+    summary: Summary,
+    metadata: BTreeMap<String, String>,
+    slot_ns: u64,
+    samples: u64,
+    first_sample: u64,
+}
+
+/// One sample of a shard.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// What was asked and what came out.
+    pub sample: Sample,
+    /// The images, where there are any.
+    pub images: Option<PerJaw<TactileImage>>,
+    /// The force over time, where it is stored.
+    pub trace: Option<gripgen_twin::PullTrace>,
+}
+
+/// The undecoded messages of a sample.
+pub(crate) struct RawRecord {
+    pub(crate) sample: Vec<u8>,
+    pub(crate) images: Option<PerJaw<Vec<u8>>>,
+    pub(crate) raw_images: bool,
+    pub(crate) trace: Option<Vec<u8>>,
+}
+
+/// Why a shard could not be read. Every message names the file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The file cannot be opened.
+    #[error("{path}: {source}")]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Not an MCAP file, cut off, or damaged.
+    #[error("{path}: not a readable MCAP file: {source}")]
+    Mcap {
+        /// The file.
+        path: PathBuf,
+        /// What the format reader says.
+        source: McapError,
+    },
+    /// An MCAP file of somebody else.
+    #[error("{path}: not a gripgen shard: {problem}")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        problem: String,
+    },
+    /// There is no such sample.
+    #[error("{path}: sample {sample} is not in this shard, it holds {first}..{end}")]
+    NoSample {
+        /// The file.
+        path: PathBuf,
+        /// Global index asked for.
+        sample: u64,
+        /// First index.
+        first: u64,
+        /// One past the last index.
+        end: u64,
+    },
+    /// A message is damaged.
+    #[error("{path}: sample {sample}, {topic}: {problem}")]
+    Message {
+        /// The file.
+        path: PathBuf,
+        /// Global index.
+        sample: u64,
+        /// Topic of the message.
+        topic: String,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl ShardReader {
+    /// Opens a shard and checks that it is one.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        let at = |source| ReadError::Open { path: path.into(), source };
+        let file = File::open(path).map_err(at)?;
+        // SAFETY: shards are written once and renamed into place; nothing changes them while they are read.
+        let map = unsafe { Mmap::map(&file) }.map_err(at)?;
+        let bad = |source| ReadError::Mcap { path: path.into(), source };
+        let foreign = |problem: String| ReadError::Foreign { path: path.into(), problem };
+        let summary = Summary::read(&map).map_err(bad)?.ok_or_else(|| foreign("it has no summary".into()))?;
+        let index = summary
+            .metadata_indexes
+            .iter()
+            .find(|m| m.name == METADATA_NAME)
+            .ok_or_else(|| foreign(format!("it has no metadata record `{METADATA_NAME}`")))?;
+        let metadata = mcap::read::metadata(&map, index).map_err(bad)?.metadata;
+        let number = |key: &str| {
+            metadata
+                .get(key)
+                .and_then(|v| v.parse::<u64>().ok())
+                .ok_or_else(|| foreign(format!("its metadata has no number `{key}`")))
+        };
+        let version = number("layout_version")?;
+        if version != u64::from(LAYOUT_VERSION) {
+            return Err(foreign(format!(
+                "its layout is version {version}, this gripgen reads {LAYOUT_VERSION}"
+            )));
+        }
+        let (slot_ns, samples, first_sample) =
+            (number("slot_ns")?, number("samples")?, number("first_sample")?);
+        if slot_ns == 0 {
+            return Err(foreign("its time slots are 0 ns long".into()));
+        }
+        Ok(Self { path: path.into(), map, summary, slot_ns, samples, first_sample, metadata })
+    }
+
+    /// What the shard says about itself.
+    pub fn metadata(&self) -> &BTreeMap<String, String> {
+        &self.metadata
+    }
+
+    /// Global indices of its samples.
+    pub fn indices(&self) -> std::ops::Range<u64> {
+        self.first_sample..self.first_sample + self.samples
+    }
+
+    /// The configuration it was made with.
+    pub fn config_toml(&self) -> Result<String, ReadError> {
+        let foreign = |problem: &str| ReadError::Foreign { path: self.path.clone(), problem: problem.into() };
+        let index = self
+            .summary
+            .attachment_indexes
+            .iter()
+            .find(|a| a.name == "config.toml")
+            .ok_or_else(|| foreign("it has no attachment `config.toml`"))?;
+        let attachment = mcap::read::attachment(&self.map, index)
+            .map_err(|source| ReadError::Mcap { path: self.path.clone(), source })?;
+        String::from_utf8(attachment.data.into_owned()).map_err(|_| foreign("its configuration is not text"))
+    }
+
+    /// The `/sample` message of a sample, without its images and trace.
+    pub fn sample(&self, index: u64) -> Result<Sample, ReadError> {
+        let mut found = None;
+        self.each_message(index, |topic, data| {
+            if topic == "/sample" {
+                found = Some(Sample::decode(data).map_err(|e| e.to_string())?);
+            }
+            Ok(())
+        })?;
+        found.ok_or_else(|| self.damaged(index, "/sample", "it is missing"))
+    }
+
+    /// Everything of a sample.
+    pub fn record(&self, index: u64) -> Result<Record, ReadError> {
+        let raw = self.raw(index)?;
+        let bad = |topic: &str, problem: String| self.damaged(index, topic, &problem);
+        let sample = Sample::decode(&raw.sample[..]).map_err(|e| bad("/sample", e.to_string()))?;
+        let images = raw
+            .images
+            .map(|both| {
+                PerJaw::try_from_fn(|jaw| {
+                    let image = if raw.raw_images { raw_image(&both[jaw]) } else { png_image(&both[jaw]) };
+                    image.map_err(|problem| bad(&format!("/tactile/{jaw}"), problem))
+                })
+            })
+            .transpose()?;
+        let trace = raw
+            .trace
+            .map(|bytes| {
+                let message = PullTrace::decode(&bytes[..]).map_err(|e| e.to_string());
+                message.and_then(|m| trace_of(&m)).map_err(|problem| bad("/pull/trace", problem))
+            })
+            .transpose()?;
+        Ok(Record { sample, images, trace })
+    }
+
+    /// The messages of a sample, as they are stored.
+    pub(crate) fn raw(&self, index: u64) -> Result<RawRecord, ReadError> {
+        let (mut sample, mut left, mut right, mut trace) = (None, None, None, None);
+        self.each_message(index, |topic, data| {
+            match topic {
+                "/sample" => sample = Some(data.to_vec()),
+                "/tactile/left" => left = Some(data.to_vec()),
+                "/tactile/right" => right = Some(data.to_vec()),
+                "/pull/trace" => trace = Some(data.to_vec()),
+                _ => {}
+            }
+            Ok(())
+        })?;
+        let sample = sample.ok_or_else(|| self.damaged(index, "/sample", "it is missing"))?;
+        let images = match (left, right) {
+            (Some(left), Some(right)) => Some(PerJaw { left, right }),
+            (None, None) => None,
+            (left, _) => {
+                let missing = if left.is_none() { Jaw::Left } else { Jaw::Right };
+                return Err(self.damaged(index, &format!("/tactile/{missing}"), "it is missing"));
+            }
+        };
+        let raw_images = self.summary.schemas.values().any(|s| s.name == "foxglove.RawImage");
+        Ok(RawRecord { sample, images, raw_images, trace })
+    }
+
+    /// Calls `visit` with topic and bytes of every core message of a sample.
+    fn each_message(
+        &self,
+        index: u64,
+        mut visit: impl FnMut(&str, &[u8]) -> Result<(), String>,
+    ) -> Result<(), ReadError> {
+        if !self.indices().contains(&index) {
+            let (first, end) = (self.first_sample, self.first_sample + self.samples);
+            return Err(ReadError::NoSample { path: self.path.clone(), sample: index, first, end });
+        }
+        let start = (index - self.first_sample) * self.slot_ns;
+        // Chunks are written in the order of their samples; the core chunk of a slot comes first in it.
+        let chunks = &self.summary.chunk_indexes;
+        let mut at = chunks.partition_point(|c| c.message_start_time < start);
+        while let Some(chunk) = chunks.get(at).filter(|c| c.message_start_time < start + self.slot_ns) {
+            if chunk.message_end_time == start {
+                let messages = self
+                    .summary
+                    .stream_chunk(&self.map, chunk)
+                    .map_err(|source| ReadError::Mcap { path: self.path.clone(), source })?;
+                for message in messages {
+                    let message =
+                        message.map_err(|source| ReadError::Mcap { path: self.path.clone(), source })?;
+                    visit(&message.channel.topic, &message.data)
+                        .map_err(|problem| self.damaged(index, &message.channel.topic, &problem))?;
+                }
+                return Ok(());
+            }
+            at += 1;
+        }
+        Err(self.damaged(index, "/sample", "its chunk is missing"))
+    }
+
+    pub(crate) fn damaged(&self, sample: u64, topic: &str, problem: &str) -> ReadError {
+        ReadError::Message { path: self.path.clone(), sample, topic: topic.into(), problem: problem.into() }
+    }
+}
+
+fn raw_image(data: &[u8]) -> Result<TactileImage, String> {
+    let raw = RawImage::decode(data).map_err(|e| e.to_string())?;
+    let bytes = 3 * raw.width as usize * raw.height as usize;
+    if raw.encoding != "rgb8" || raw.data.len() != bytes {
+        return Err(format!("{} bytes of `{}`, expected {bytes} of `rgb8`", raw.data.len(), raw.encoding));
+    }
+    Ok(TactileImage { width_px: raw.width, height_px: raw.height, rgb: raw.data })
+}
+
+fn png_image(data: &[u8]) -> Result<TactileImage, String> {
+    let compressed = CompressedImage::decode(data).map_err(|e| e.to_string())?;
+    decode(&compressed.data).map_err(|e: PictureError| e.to_string())
+}
+
+/// The columns of a trace message in SI units.
+pub(crate) fn trace_of(message: &PullTrace) -> Result<gripgen_twin::PullTrace, String> {
+    let rows = message.measured_force_n.len();
+    let time_s: Vec<f64> = if message.rate_hz > 0.0 {
+        (0..rows).map(|i| message.start_s + i as f64 / message.rate_hz).collect()
+    } else {
+        message.time_s.clone()
+    };
+    let lengths = [time_s.len(), message.desired_force_n.len(), message.displacement_mm.len()];
+    if lengths.iter().any(|&n| n != rows) {
+        return Err(format!("its columns have {lengths:?} and {rows} rows"));
+    }
+    Ok(gripgen_twin::PullTrace {
+        time_s,
+        desired_force_n: message.desired_force_n.iter().map(|&x| f64::from(x)).collect(),
+        measured_force_n: message.measured_force_n.iter().map(|&x| f64::from(x)).collect(),
+        displacement_m: message.displacement_mm.iter().map(|&x| f64::from(x) * 1e-3).collect(),
+    })
+}

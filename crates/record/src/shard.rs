@@ -1,0 +1,176 @@
+//! Writing a shard: one MCAP file with a number of samples.
+
+use crate::encode::EncodedSample;
+use crate::proto::{COMPRESSED_IMAGE_DESCRIPTOR, PULL_DESCRIPTOR, RAW_IMAGE_DESCRIPTOR};
+use gripgen_twin::PerJaw;
+use gripgen_twin::config::ImageStorage;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, McapError, WriteOptions, Writer};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+/// Version of the layout, in the shard's metadata.
+pub const LAYOUT_VERSION: u32 = 1;
+
+/// Name of the metadata record.
+pub const METADATA_NAME: &str = "gripgen.shard";
+
+/// What a shard says about itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShardInfo {
+    /// Version of gripgen.
+    pub gripgen_version: String,
+    /// Hash of everything the samples depend on.
+    pub config_sha256: String,
+    /// Name of the run.
+    pub name: String,
+    /// `sim` or `rig`.
+    pub source: String,
+    /// Number of this shard.
+    pub shard: u64,
+    /// Number of shards.
+    pub shards: u64,
+    /// Global index of the first sample.
+    pub first_sample: u64,
+    /// Samples in this shard.
+    pub samples: u64,
+    /// Time between the starts of two samples.
+    pub slot_ns: u64,
+    /// The resolved configuration.
+    pub config_toml: String,
+}
+
+impl ShardInfo {
+    fn metadata(&self) -> BTreeMap<String, String> {
+        [
+            ("layout_version", LAYOUT_VERSION.to_string()),
+            ("gripgen_version", self.gripgen_version.clone()),
+            ("config_sha256", self.config_sha256.clone()),
+            ("name", self.name.clone()),
+            ("source", self.source.clone()),
+            ("shard", self.shard.to_string()),
+            ("shards", self.shards.to_string()),
+            ("first_sample", self.first_sample.to_string()),
+            ("samples", self.samples.to_string()),
+            ("slot_ns", self.slot_ns.to_string()),
+        ]
+        .into_iter()
+        .map(|(key, value)| (key.to_string(), value))
+        .collect()
+    }
+}
+
+/// Writes samples in order. [`ShardWriter::finish`] ends the file; without it the file is not readable.
+pub struct ShardWriter<W: Write + Seek> {
+    writer: Writer<W>,
+    channels: Channels,
+    written: u64,
+    expected: u64,
+}
+
+struct Channels {
+    sample: u16,
+    images: Option<PerJaw<u16>>,
+    trace: u16,
+    state: u16,
+}
+
+/// Why a shard could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShardError {
+    /// The file system, or the format's limits.
+    #[error("writing the shard: {0}")]
+    Mcap(#[from] McapError),
+    /// Not as many samples as announced.
+    #[error("the shard was announced with {expected} samples and ended after {written}")]
+    Count {
+        /// Samples announced.
+        expected: u64,
+        /// Samples written.
+        written: u64,
+    },
+}
+
+impl<W: Write + Seek> ShardWriter<W> {
+    /// Starts a file. Nothing in it depends on time, host or path.
+    ///
+    /// Chunks are not compressed: images are PNG already, and no sample depends on a compressor's version.
+    pub fn new(to: W, info: &ShardInfo, images: ImageStorage) -> Result<Self, ShardError> {
+        let options = WriteOptions::new()
+            .profile("")
+            .library(format!("gripgen/{}", info.gripgen_version))
+            .compression(None)
+            .chunk_size(None);
+        let mut writer = Writer::with_options(to, options)?;
+        writer.write_metadata(&Metadata { name: METADATA_NAME.into(), metadata: info.metadata() })?;
+        writer.attach(&Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: "config.toml".into(),
+            media_type: "text/x-toml".into(),
+            data: Cow::Borrowed(info.config_toml.as_bytes()),
+        })?;
+        let none = BTreeMap::new();
+        let mut channel = |schema: &str, descriptor: &[u8], topic: &str| -> Result<u16, McapError> {
+            let schema = writer.add_schema(schema, "protobuf", descriptor)?;
+            writer.add_channel(schema, topic, "protobuf", &none)
+        };
+        let sample = channel("gripgen.v1.Sample", PULL_DESCRIPTOR, "/sample")?;
+        let image_schema = match images {
+            ImageStorage::Png => Some(("foxglove.CompressedImage", COMPRESSED_IMAGE_DESCRIPTOR)),
+            ImageStorage::Raw => Some(("foxglove.RawImage", RAW_IMAGE_DESCRIPTOR)),
+            ImageStorage::None => None,
+        };
+        let images = match image_schema {
+            None => None,
+            Some((name, descriptor)) => Some(PerJaw {
+                left: channel(name, descriptor, "/tactile/left")?,
+                right: channel(name, descriptor, "/tactile/right")?,
+            }),
+        };
+        let trace = channel("gripgen.v1.PullTrace", PULL_DESCRIPTOR, "/pull/trace")?;
+        let state = channel("gripgen.v1.PullState", PULL_DESCRIPTOR, "/pull/state")?;
+        let channels = Channels { sample, images, trace, state };
+        Ok(Self { writer, channels, written: 0, expected: info.samples })
+    }
+
+    /// Appends a sample: one chunk with what training reads, one with what viewers draw.
+    pub fn push(&mut self, sample: &EncodedSample) -> Result<(), ShardError> {
+        let sequence = self.written as u32;
+        let mut write = |channel_id, time_ns, data: &[u8]| {
+            let header = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
+            self.writer.write_to_known_channel(&header, data)
+        };
+        write(self.channels.sample, sample.start_ns, &sample.sample)?;
+        if let (Some(channels), Some(images)) = (&self.channels.images, &sample.images) {
+            for (jaw, &channel) in channels.iter() {
+                write(channel, sample.start_ns, &images[jaw])?;
+            }
+        }
+        if let Some(trace) = &sample.trace {
+            write(self.channels.trace, sample.start_ns, trace)?;
+        }
+        self.writer.flush()?;
+        if !sample.states.is_empty() {
+            for state in &sample.states {
+                let (channel_id, time_ns) = (self.channels.state, state.time_ns);
+                let header = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
+                self.writer.write_to_known_channel(&header, &state.data)?;
+            }
+            self.writer.flush()?;
+        }
+        self.written += 1;
+        Ok(())
+    }
+
+    /// Ends the file and gives back what it was written to.
+    pub fn finish(mut self) -> Result<W, ShardError> {
+        if self.written != self.expected {
+            return Err(ShardError::Count { expected: self.expected, written: self.written });
+        }
+        self.writer.finish()?;
+        Ok(self.writer.into_inner())
+    }
+}

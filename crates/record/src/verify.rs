@@ -1,0 +1,131 @@
+//! Checking a run folder against what it says of itself.
+
+use crate::folder::{FolderError, RunFolder, hash_file};
+use crate::index::{csv_lines, index_header, index_row};
+use crate::reader::ShardReader;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+/// What a check found.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Verification {
+    /// Shards that are done and agree with their sidecar.
+    pub good_shards: u64,
+    /// Shards that are not there yet.
+    pub missing_shards: u64,
+    /// Samples read back.
+    pub samples: u64,
+    /// Faults, each naming its file.
+    pub faults: Vec<String>,
+}
+
+/// Reads every shard of a run: hash and size against the sidecar, checksums, every message, every row of the index.
+///
+/// `progress` is called after each shard.
+pub fn verify(path: &Path, mut progress: impl FnMut(u64)) -> Result<Verification, FolderError> {
+    let folder = RunFolder::open(path)?;
+    let mut result = Verification::default();
+    let mut index = IndexCheck::open(&folder);
+    for shard in 0..folder.info().shards {
+        let sidecar = folder.finished(shard)?;
+        let file = folder.shard_path(shard);
+        match sidecar {
+            None if file.exists() => {
+                let problem = "it has no sidecar that fits it; running the sweep again rebuilds it";
+                result.faults.push(format!("{}: {problem}", file.display()));
+            }
+            None => result.missing_shards += 1,
+            Some(sidecar) => {
+                let before = result.faults.len();
+                let (sha256, _) = hash_file(&file)?;
+                if sha256 != sidecar.sha256 {
+                    let problem = format!("its SHA-256 is {sha256}, the sidecar says {}", sidecar.sha256);
+                    result.faults.push(format!("{}: {problem}", file.display()));
+                }
+                match check_shard(&file, &folder, &sidecar.rows) {
+                    Ok(samples) => result.samples += samples,
+                    Err(fault) => result.faults.push(fault),
+                }
+                if result.faults.len() == before {
+                    result.good_shards += 1;
+                }
+                index.compare(&sidecar.rows);
+            }
+        }
+        progress(shard);
+    }
+    if result.missing_shards == 0 && result.faults.is_empty() {
+        result.faults.extend(index.finish());
+    }
+    Ok(result)
+}
+
+fn check_shard(file: &Path, folder: &RunFolder, rows: &[Vec<String>]) -> Result<u64, String> {
+    let reader = ShardReader::open(file).map_err(|e| e.to_string())?;
+    let hash = reader.metadata().get("config_sha256");
+    if hash != Some(&folder.info().config_sha256) {
+        return Err(format!("{}: it belongs to another configuration ({hash:?})", file.display()));
+    }
+    let indices = reader.indices();
+    let expected = indices.end - indices.start;
+    if expected != rows.len() as u64 {
+        return Err(format!("{}: {expected} samples, its sidecar has {} rows", file.display(), rows.len()));
+    }
+    for (index, row) in indices.zip(rows) {
+        let record = reader.record(index).map_err(|e| e.to_string())?;
+        let found = index_row(&record.sample, &folder.info().extra_columns);
+        // Columns 1 and 2 (shard, in_shard) are filled in by the writer.
+        if let Some(i) = (0..found.len()).find(|&i| !(1..=2).contains(&i) && found[i] != row[i]) {
+            return Err(format!(
+                "{}: sample {index} says `{}`, its sidecar row says `{}`",
+                file.display(),
+                found[i],
+                row[i]
+            ));
+        }
+    }
+    Ok(rows.len() as u64)
+}
+
+/// Compares `index.csv` with the rows of the sidecars, a shard at a time.
+struct IndexCheck {
+    path: PathBuf,
+    reader: Option<BufReader<File>>,
+    fault: Option<String>,
+    line: usize,
+}
+
+impl IndexCheck {
+    fn open(folder: &RunFolder) -> Self {
+        let path = folder.path().join("index.csv");
+        let (reader, fault) = match File::open(&path) {
+            Ok(file) => (Some(BufReader::new(file)), None),
+            Err(e) => (None, Some(e.to_string())),
+        };
+        let mut check = Self { path, reader, fault, line: 1 };
+        check.compare(&[index_header(&folder.info().extra_columns)]);
+        check
+    }
+
+    fn compare(&mut self, rows: &[Vec<String>]) {
+        let (Some(reader), None) = (&mut self.reader, &self.fault) else { return };
+        let wanted = csv_lines(rows);
+        let mut found = vec![0; wanted.len()];
+        let read = reader.read_exact(&mut found);
+        if read.is_err() || found != wanted {
+            let same = found.iter().zip(&wanted).take_while(|(a, b)| a == b).filter(|(a, _)| **a == b'\n');
+            self.fault = Some(format!("line {} differs from the sidecars", self.line + same.count()));
+        }
+        self.line += rows.len();
+    }
+
+    fn finish(mut self) -> Option<String> {
+        if let (Some(reader), None) = (&mut self.reader, &self.fault)
+            && reader.read(&mut [0]).is_ok_and(|n| n > 0)
+        {
+            self.fault = Some(format!("it goes on after line {}", self.line - 1));
+        }
+        self.fault.map(|fault| format!("{}: {fault}", self.path.display()))
+    }
+}

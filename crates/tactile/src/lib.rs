@@ -1,0 +1,35 @@
+//! Tactile images: from a part in front of a gel to what the camera behind it sees.
+//!
+//! One stage a file: [`raster`] (mesh to height map), [`indent`] (press depth and pressure), [`deform`] (the gel
+//! around the contact), [`gradient`], [`shade`] (colour), [`finish`] (noise and rounding). [`Renderer`] runs them.
+//!
+//! Heights are in pixels, relative to the gel surface at rest: deeper contact and steeper slopes do not lose bits to
+//! an offset, and a flat gel is exactly 0. Colours are a change against the frame at rest, so that a grip without
+//! contact gives the rest frame itself. All stages give the same bits on every processor.
+//!
+//! This crate knows no mechanics and no forces over time.
+
+mod colour;
+mod deform;
+mod gradient;
+mod grid;
+mod indent;
+pub mod metrics;
+mod noise;
+pub mod npz;
+mod patch;
+mod raster;
+mod render;
+mod sensor;
+mod simd;
+
+pub use colour::{ColourModel, Lambert, Light, TaximTable, shade};
+pub use deform::deform;
+pub use gradient::gradient;
+pub use grid::{Grid, Plane};
+pub use indent::{Imprint, IndentError, PressedGel, indent};
+pub use noise::finish;
+pub use raster::raster;
+pub use render::Renderer;
+pub use sensor::{SENSOR_VERSION, Sensor, SensorError};
+pub use simd::SimdLevel;

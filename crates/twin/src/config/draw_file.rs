@@ -1,0 +1,135 @@
+//! Reading the values of `[vary]`.
+
+use super::ConfigError;
+use crate::draw::{Distribution, Drawn, VariedKey};
+
+/// Names of the distributions.
+const NAMES: [&str; 4] = ["uniform", "normal", "log_uniform", "from"];
+
+/// Reads all entries of `[vary]`, sorted by key. Nested tables count as dotted keys.
+pub(crate) fn read(vary: &toml::Table) -> Result<Vec<VariedKey>, ConfigError> {
+    let mut keys = Vec::new();
+    collect(vary, "", &mut keys)?;
+    keys.sort_by(|a, b| a.key.cmp(&b.key));
+    Ok(keys)
+}
+
+fn collect(table: &toml::Table, prefix: &str, keys: &mut Vec<VariedKey>) -> Result<(), ConfigError> {
+    for (name, value) in table {
+        let key = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
+        match value {
+            toml::Value::Table(inner) if !is_distribution(inner) => collect(inner, &key, keys)?,
+            _ => keys.push(VariedKey { distribution: distribution(&key, value)?, key }),
+        }
+    }
+    Ok(())
+}
+
+/// Whether a table is meant as a distribution: by its names, by the shape `{ word = [1, 2] }`, or by words that are
+/// customary elsewhere. Other tables are sections of keys.
+fn is_distribution(table: &toml::Table) -> bool {
+    const CUSTOMARY: [&str; 9] = ["min", "max", "low", "high", "mean", "std", "sigma", "choice", "values"];
+    let pair = |v: &toml::Value| {
+        matches!(v, toml::Value::Array(a) if a.len() == 2 && a.iter().all(|x| !x.is_table()))
+    };
+    table.keys().any(|k| NAMES.contains(&k.as_str()) || CUSTOMARY.contains(&k.as_str()))
+        || (table.len() == 1 && table.values().all(pair))
+}
+
+fn distribution(key: &str, value: &toml::Value) -> Result<Distribution, ConfigError> {
+    let place = format!("vary.{key}");
+    match value {
+        toml::Value::Array(items) => {
+            if items.is_empty() {
+                return Err(ConfigError::new(place, "the list of values is empty"));
+            }
+            let values = items
+                .iter()
+                .enumerate()
+                .map(|(i, item)| drawn(&format!("{place}[{i}]"), item))
+                .collect::<Result<_, _>>()?;
+            Ok(Distribution::Choice(values))
+        }
+        toml::Value::Table(table) => {
+            let [(name, argument)] = &table.iter().collect::<Vec<_>>()[..] else {
+                return Err(ConfigError::new(place, "a distribution has exactly one of its names as key")
+                    .hint("write for example { uniform = [20, 80] }"));
+            };
+            named(&place, name, argument)
+        }
+        other => Ok(Distribution::Choice(vec![drawn(&place, other)?])),
+    }
+}
+
+fn named(place: &str, name: &str, argument: &toml::Value) -> Result<Distribution, ConfigError> {
+    match name {
+        "uniform" => {
+            let [low, high] = pair(place, name, argument)?;
+            ordered(place, low, high)?;
+            Ok(Distribution::Uniform { low, high })
+        }
+        "log_uniform" => {
+            let [low, high] = pair(place, name, argument)?;
+            ordered(place, low, high)?;
+            if low <= 0.0 {
+                let problem = format!("the lower end {low} of log_uniform must be more than 0");
+                return Err(ConfigError::new(place, problem));
+            }
+            Ok(Distribution::LogUniform { low, high })
+        }
+        "normal" => {
+            let [mean, deviation] = pair(place, name, argument)?;
+            if deviation < 0.0 {
+                let problem = format!("the standard deviation {deviation} must not be negative");
+                return Err(ConfigError::new(place, problem).hint("normal is [mean, standard deviation]"));
+            }
+            Ok(Distribution::Normal { mean, deviation })
+        }
+        "from" if argument.as_str() == Some("interval") => Ok(Distribution::Interval),
+        "from" => Err(ConfigError::new(place, format!("cannot draw from {argument}"))
+            .hint("the only source is from = \"interval\", the calibrated uncertainty of the key")),
+        other => {
+            let error = ConfigError::new(place, format!("there is no distribution `{other}`"));
+            Err(match super::suggestion(other, NAMES) {
+                Some(close) => error.hint(format!("did you mean `{close}`?")),
+                None => {
+                    error.hint("write a list of values, uniform, normal, log_uniform or from = \"interval\"")
+                }
+            })
+        }
+    }
+}
+
+fn pair(place: &str, name: &str, argument: &toml::Value) -> Result<[f64; 2], ConfigError> {
+    let numbers: Option<Vec<f64>> =
+        argument.as_array().and_then(|items| items.iter().map(number).collect::<Option<_>>());
+    match numbers.as_deref() {
+        Some(&[a, b]) if a.is_finite() && b.is_finite() => Ok([a, b]),
+        _ => Err(ConfigError::new(place, format!("{name} takes two finite numbers, found {argument}"))),
+    }
+}
+
+fn ordered(place: &str, low: f64, high: f64) -> Result<(), ConfigError> {
+    if low <= high {
+        return Ok(());
+    }
+    Err(ConfigError::new(place, format!("the lower end {low} is above the upper end {high}"))
+        .hint("swap the two numbers"))
+}
+
+fn number(value: &toml::Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|i| i as f64))
+}
+
+fn drawn(place: &str, value: &toml::Value) -> Result<Drawn, ConfigError> {
+    match value {
+        toml::Value::String(text) => Ok(Drawn::Text(text.clone())),
+        _ => match number(value) {
+            Some(x) if x.is_finite() => Ok(Drawn::Number(x)),
+            _ => Err(ConfigError::new(
+                place,
+                format!("a value must be a finite number or text, found {value}"),
+            )),
+        },
+    }
+}

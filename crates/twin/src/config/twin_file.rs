@@ -1,0 +1,289 @@
+//! The structs that mirror `twin.toml`.
+
+use crate::effects::OutsideFit;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A twin: the rig, its gels and sensors, the parts, and the effects that act.
+///
+/// Keys left out of `robot`, `gripper`, `wrist`, `gel` and `optics` are those of the shipped baseline twin.
+/// Paths are relative to this file; `asset:...` names a file inside gripgen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TwinFile {
+    /// Format of the file, `gripgen.twin/1`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub schema: Option<String>,
+    /// The arm and its force loop.
+    pub robot: RobotFile,
+    /// The gripper.
+    pub gripper: GripperFile,
+    /// The wrist force sensor.
+    pub wrist: WristFile,
+    /// The gel of each jaw; keys of `right` that are left out are those of `left`.
+    pub gel: PerJawFile<GelFile>,
+    /// The tactile sensor of each jaw; keys of `right` that are left out are those of `left`.
+    pub optics: PerJawFile<OpticsFile>,
+    /// The parts by name.
+    #[serde(default)]
+    pub parts: BTreeMap<String, PartFile>,
+    /// Effects that act beyond the baseline.
+    #[serde(default)]
+    pub effects: Vec<EffectFile>,
+}
+
+/// A section for each jaw.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PerJawFile<T> {
+    /// The left jaw.
+    pub left: T,
+    /// The right jaw; keys that are left out are those of the left one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub right: Option<T>,
+}
+
+/// Which model of the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RobotModel {
+    /// The gripper hangs on a carriage that moves along the pull; the arm is its mass and its force loop.
+    Carriage,
+}
+
+/// What the force loop closes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Feedback {
+    /// The robot's own wrist sensor, noise included.
+    Measured,
+    /// The commanded force itself: the wrist sensor only watches.
+    Independent,
+}
+
+/// `[robot]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RobotFile {
+    /// Model of the arm.
+    pub model: RobotModel,
+    /// Mass that the arm moves along the pull, without the gripper.
+    pub moving_mass_kg: f64,
+    /// Time constant of the force loop.
+    pub lag_s: f64,
+    /// Time before the force loop answers.
+    pub dead_time_s: f64,
+    /// Force per speed that the force loop yields to while it moves.
+    pub damping_n_s_per_m: f64,
+    /// Highest speed of the force loop.
+    pub speed_limit_mm_s: f64,
+    /// What the force loop closes on.
+    pub feedback: Feedback,
+    /// Uncertainty of values in this section.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub calibration: BTreeMap<String, CalibrationFile>,
+}
+
+/// Which model of the gripper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GripperModel {
+    /// Schunk WSG 50-110.
+    Wsg50,
+}
+
+/// What a grip force means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceConvention {
+    /// The normal force of one jaw.
+    PerJaw,
+    /// The sum over both jaws, the WSG's own number.
+    Total,
+}
+
+/// `[gripper]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GripperFile {
+    /// Model of the gripper.
+    pub model: GripperModel,
+    /// What `grip_force_n` means in a sweep with this twin. Files that gripgen writes are per jaw.
+    pub force_convention: ForceConvention,
+    /// Mass of the gripper without its jaws.
+    pub mass_kg: f64,
+    /// Mass of one jaw with finger and sensor.
+    pub jaw_mass_kg: f64,
+    /// Largest opening between the gels.
+    pub opening_mm: f64,
+    /// Largest grip force, per jaw.
+    pub max_force_n: f64,
+}
+
+/// `[wrist]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WristFile {
+    /// Standard deviation of the white noise of one reading.
+    pub noise_n: f64,
+    /// Readings per second.
+    pub rate_hz: f64,
+    /// Uncertainty of values in this section.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub calibration: BTreeMap<String, CalibrationFile>,
+}
+
+/// Model of the gel's deformation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GelModel {
+    /// Volume `V = c F`, pressure of a Winkler bed, and a pyramid of blurs (Taxim; Wucherer et al. 2023).
+    Pyramid,
+}
+
+/// `[gel.left]`, `[gel.right]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GelFile {
+    /// Model of the deformation.
+    pub model: GelModel,
+    /// Thickness; a press deeper than this fails the sample.
+    pub thickness_mm: f64,
+    /// Width of the pad, along image x.
+    pub width_mm: f64,
+    /// Height of the pad, along image y.
+    pub height_mm: f64,
+    /// Tangential force per shear displacement of the pad.
+    pub shear_stiffness_n_per_mm: f64,
+    /// Sizes of the blurs in pixels of the sensor's image, in order; odd numbers.
+    pub kernels_px: Vec<u32>,
+    /// The contact that blurs may not touch begins at this share of the press depth.
+    pub restore_depth_fraction: f64,
+    /// Uncertainty of values in this section.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub calibration: BTreeMap<String, CalibrationFile>,
+}
+
+/// Noise of the tactile images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ImageNoise {
+    /// As measured and stored in the sensor file.
+    Measured,
+    /// None: a grip without contact gives the rest frame of the sensor file, bit for bit.
+    Off,
+}
+
+/// `[optics.left]`, `[optics.right]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OpticsFile {
+    /// Sensor file: gripgen's own npz, or Taxim's `polycalib.npz`.
+    pub sensor: String,
+    /// Millimetres per pixel; needed with `polycalib.npz`, otherwise the sensor file's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mm_per_px: Option<f64>,
+    /// Image without contact (PNG or JPEG); needed with `polycalib.npz` only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub background: Option<String>,
+    /// Noise of the images.
+    pub image_noise: ImageNoise,
+}
+
+/// `[parts.NAME]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartFile {
+    /// Mesh file, STL or OBJ.
+    pub mesh: String,
+    /// Millimetres per unit of the mesh file.
+    #[serde(default = "one")]
+    pub scale_mm_per_unit: f64,
+    /// Where the part is gripped; the mesh frame itself where this is left out.
+    #[serde(default = "plain_grip")]
+    pub grips: Vec<GripFile>,
+    /// Static friction coefficient of part and gel.
+    pub mu: f64,
+    /// Kinetic over static friction; 1 = no loss when sliding.
+    #[serde(default = "one")]
+    pub kinetic_ratio: f64,
+    /// Relative standard deviation of the friction coefficient from grip to grip.
+    #[serde(default)]
+    pub scatter: f64,
+    /// Imprint constant c of `V = c F`: imprint volume per normal force of a jaw.
+    pub imprint_mm3_per_n: f64,
+    /// Where the numbers come from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// Uncertainty of values in this section.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub calibration: BTreeMap<String, CalibrationFile>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn plain_grip() -> Vec<GripFile> {
+    vec![GripFile { name: None, origin_mm: [0.0; 3], orientation_deg: [0.0; 3] }]
+}
+
+/// One entry of `[[parts.NAME.grips]]`: how the mesh lies in the part frame of this grip.
+///
+/// The part frame has +x along the long axis, +y along the jaw axis, +z up at a grip angle of 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GripFile {
+    /// A name for people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// The mesh point (after scaling) that comes to lie midway between the jaws.
+    #[serde(default)]
+    pub origin_mm: [f64; 3],
+    /// Rotations of the mesh about the fixed x, then y, then z axis of the part frame.
+    #[serde(default)]
+    pub orientation_deg: [f64; 3],
+}
+
+/// One entry of `[[effects]]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EffectFile {
+    /// Id of the effect.
+    pub name: String,
+    /// The only part it acts on; all parts where this is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<String>,
+    /// Grip forces per jaw on which the values were fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fitted_grip_force_n: Option<[f64; 2]>,
+    /// What happens outside that range.
+    #[serde(default)]
+    pub outside_fit: OutsideFit,
+    /// Where the numbers come from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// Uncertainty of the parameters.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub calibration: BTreeMap<String, CalibrationFile>,
+    /// The parameters of the effect, by name.
+    #[serde(flatten)]
+    #[schemars(with = "BTreeMap<String, f64>")]
+    pub parameters: BTreeMap<String, toml::Value>,
+}
+
+/// How well a value of the same section is known: `calibration.KEY`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationFile {
+    /// Lower end of the 90 % interval.
+    pub low90: f64,
+    /// Upper end of the 90 % interval.
+    pub high90: f64,
+    /// What the value rests on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<String>,
+    /// SHA-256 of the data it was fitted to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub data_sha256: Option<String>,
+}

@@ -1,0 +1,46 @@
+//! The vocabulary of gripgen: what all its packages talk about.
+//!
+//! One experiment is simulated and measured: a gripper with a tactile sensor in each jaw grips a fixed part, two
+//! images are taken, and the arm pulls with a rising force until the jaws slip. A [`Scenario`] is one such pull,
+//! fully specified; a [`Twin`] is the rig and the parts it is made on; a [`Sweep`] says which scenario belongs to
+//! which sample index; a [`Sample`] is what came out.
+//!
+//! This crate opens no file, reads no clock and starts no thread. Inside, all quantities are in SI units; names in
+//! files carry their unit (`_n`, `_mm`, `_s`, `_deg`). Frames are described in [`frames`].
+
+pub mod config;
+pub mod draw;
+pub mod effects;
+pub mod frames;
+mod friction;
+mod grasp;
+mod image;
+mod jaw;
+mod label;
+mod mesh;
+pub mod parts;
+mod patch;
+mod profile;
+pub mod random;
+mod sample;
+mod scenario;
+mod scenario_keys;
+pub mod sobol;
+mod sweep;
+mod trace;
+mod twin;
+
+pub use friction::{FrictionError, GripFriction, grip_friction};
+pub use grasp::Grasp;
+pub use image::TactileImage;
+pub use jaw::{Jaw, PerJaw};
+pub use label::{LabelError, PullEnd, SlipLabel, slip_label};
+pub use mesh::{EXTENT_RANGE_M, MAX_TRIANGLES, MeshError, TriMesh, write_binary_stl};
+pub use patch::{ContactPatch, PressureCell};
+pub use profile::Staircase;
+pub use sample::{ImprintSummary, Outcome, Pulled, Sample};
+pub use scenario::{Covariates, PullSettings, Scenario};
+pub use scenario_keys::{PULL_KEYS, SCENARIO_KEYS};
+pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep, is_twin_key};
+pub use trace::{PullTrace, TraceRow};
+pub use twin::{DEFAULTED_SECTIONS, Gel, Gripper, Optics, Part, Robot, TWIN_SCHEMA, Twin, Wrist};

@@ -1,0 +1,285 @@
+//! Triangle meshes in metres, and reading them from the bytes of STL and OBJ files.
+
+mod obj;
+mod stl;
+
+pub use stl::write_binary_stl;
+
+use nalgebra::Point3;
+use std::collections::HashMap;
+
+/// Most triangles a mesh may have: 2 million fill a 320 x 240 image 26 times over.
+pub const MAX_TRIANGLES: usize = 2_000_000;
+
+/// Smallest and largest extent of a part, in metres. Beyond them the unit of the file is wrong.
+pub const EXTENT_RANGE_M: (f64, f64) = (0.5e-3, 2.0);
+
+/// An indexed triangle mesh. Coordinates are finite and in metres, indices are in range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TriMesh {
+    vertices_m: Vec<Point3<f64>>,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// Why the bytes of a mesh file could not be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// Nothing in the file.
+    #[error("the file is empty (0 bytes)")]
+    EmptyFile,
+    /// No triangle in an otherwise readable file.
+    #[error("the mesh has no triangles")]
+    NoTriangles,
+    /// Neither the binary size rule nor the ASCII keyword holds.
+    #[error(
+        "not an STL file: {size} bytes are not 84 + 50 x the {count} triangles its header promises, \
+         and it does not begin with `solid`"
+    )]
+    NotStl {
+        /// Bytes in the file.
+        size: usize,
+        /// Triangle count at byte 80.
+        count: u32,
+    },
+    /// Fewer than the 84 bytes of a header.
+    #[error("not an STL file: {size} bytes, a binary header alone has 84")]
+    ShortHeader {
+        /// Bytes in the file.
+        size: usize,
+    },
+    /// The binary file ends early.
+    #[error(
+        "the file is cut off: its header promises {count} triangles ({expected} bytes), it has {size} bytes"
+    )]
+    Truncated {
+        /// Triangle count at byte 80.
+        count: u32,
+        /// Bytes that count needs.
+        expected: u64,
+        /// Bytes in the file.
+        size: usize,
+    },
+    /// A text file breaks the grammar.
+    #[error("line {line}: {problem}")]
+    Syntax {
+        /// 1-based line number.
+        line: usize,
+        /// What is wrong on it.
+        problem: String,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("triangle {triangle}, corner {corner}: coordinate {axis} is {value}, not a finite number")]
+    NotFinite {
+        /// 0-based triangle.
+        triangle: usize,
+        /// 0-based corner.
+        corner: usize,
+        /// `x`, `y` or `z`.
+        axis: char,
+        /// The value.
+        value: f64,
+    },
+    /// More triangles than [`MAX_TRIANGLES`].
+    #[error("the mesh has {triangles} triangles, at most {MAX_TRIANGLES} are allowed")]
+    TooManyTriangles {
+        /// Triangles found or promised.
+        triangles: u64,
+    },
+    /// The part would be microscopic or huge: a unit mistake.
+    #[error(
+        "the part measures {x_mm:.4} x {y_mm:.4} x {z_mm:.4} mm; its largest side must lie between {min} and {max} mm",
+        min = EXTENT_RANGE_M.0 * 1e3, max = EXTENT_RANGE_M.1 * 1e3
+    )]
+    Extent {
+        /// Size along x.
+        x_mm: f64,
+        /// Size along y.
+        y_mm: f64,
+        /// Size along z.
+        z_mm: f64,
+    },
+    /// The file name tells no known format.
+    #[error("`{extension}` is not a known mesh format; known are stl and obj")]
+    UnknownFormat {
+        /// Lower-case extension, empty where there is none.
+        extension: String,
+    },
+}
+
+impl TriMesh {
+    /// Builds a mesh and checks that indices are in range and coordinates finite.
+    ///
+    /// # Panics
+    /// If a triangle names a vertex that does not exist: meshes are built by this crate only.
+    pub fn new(vertices_m: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
+        if triangles.is_empty() {
+            return Err(MeshError::NoTriangles);
+        }
+        if triangles.len() > MAX_TRIANGLES {
+            return Err(MeshError::TooManyTriangles { triangles: triangles.len() as u64 });
+        }
+        for (t, triangle) in triangles.iter().enumerate() {
+            for (corner, &v) in triangle.iter().enumerate() {
+                let p = &vertices_m[v as usize];
+                for (axis, value) in ['x', 'y', 'z'].into_iter().zip(p.iter()) {
+                    if !value.is_finite() {
+                        return Err(MeshError::NotFinite { triangle: t, corner, axis, value: *value });
+                    }
+                }
+            }
+        }
+        Ok(Self { vertices_m, triangles })
+    }
+
+    /// Reads an STL or OBJ file's bytes; `extension` (any case, without the dot) names the format.
+    ///
+    /// `metres_per_unit` is the length of one unit of the file. Equal vertices are merged.
+    pub fn from_file_bytes(bytes: &[u8], extension: &str, metres_per_unit: f64) -> Result<Self, MeshError> {
+        let extension = extension.to_ascii_lowercase();
+        let soup = match extension.as_str() {
+            "stl" => stl::read(bytes)?,
+            "obj" => obj::read(bytes)?,
+            _ => return Err(MeshError::UnknownFormat { extension }),
+        };
+        let mesh = Self::from_soup(&soup, metres_per_unit)?;
+        let size = mesh.extent_m();
+        let largest = size.iter().fold(0.0_f64, |a, &b| a.max(b));
+        if !(EXTENT_RANGE_M.0..=EXTENT_RANGE_M.1).contains(&largest) {
+            let [x_mm, y_mm, z_mm] = size.map(|s| s * 1e3);
+            return Err(MeshError::Extent { x_mm, y_mm, z_mm });
+        }
+        Ok(mesh)
+    }
+
+    /// Merges bitwise equal corners of a list of triangles, keeping the order of first appearance.
+    fn from_soup(soup: &[[[f32; 3]; 3]], metres_per_unit: f64) -> Result<Self, MeshError> {
+        let mut seen: HashMap<[u32; 3], u32> = HashMap::with_capacity(soup.len());
+        let mut vertices_m = Vec::new();
+        let mut triangles = Vec::with_capacity(soup.len());
+        for corners in soup {
+            triangles.push(corners.map(|c| {
+                // +0 and -0 are the same place.
+                let key = c.map(|x| (x + 0.0).to_bits());
+                *seen.entry(key).or_insert_with(|| {
+                    vertices_m.push(Point3::from(c.map(|x| f64::from(x) * metres_per_unit)));
+                    (vertices_m.len() - 1) as u32
+                })
+            }));
+        }
+        Self::new(vertices_m, triangles)
+    }
+
+    /// Vertices, in metres.
+    pub fn vertices_m(&self) -> &[Point3<f64>] {
+        &self.vertices_m
+    }
+
+    /// Triangles as indices into [`TriMesh::vertices_m`], counter-clockwise seen from outside.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The corners of triangle `t`.
+    pub fn corners(&self, t: usize) -> [Point3<f64>; 3] {
+        self.triangles[t].map(|v| self.vertices_m[v as usize])
+    }
+
+    /// Smallest and largest coordinates.
+    pub fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        for p in &self.vertices_m {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(p[axis]);
+                high[axis] = high[axis].max(p[axis]);
+            }
+        }
+        (low, high)
+    }
+
+    /// Size of the bounding box.
+    pub fn extent_m(&self) -> [f64; 3] {
+        let (low, high) = self.bounds_m();
+        [0, 1, 2].map(|axis| high[axis] - low[axis])
+    }
+
+    /// Volume enclosed by a closed mesh, by the divergence theorem; the sign tells the orientation.
+    pub fn signed_volume_m3(&self) -> f64 {
+        (0..self.triangles.len())
+            .map(|t| {
+                let [a, b, c] = self.corners(t);
+                a.coords.dot(&b.coords.cross(&c.coords)) / 6.0
+            })
+            .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TETRAHEDRON: &str = "solid t\n\
+        facet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 10 0\nvertex 10 0 0\nendloop\nendfacet\n\
+        facet normal 0 -1 0\nouter loop\nvertex 0 0 0\nvertex 10 0 0\nvertex 0 0 10\nendloop\nendfacet\n\
+        facet normal -1 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 10\nvertex 0 10 0\nendloop\nendfacet\n\
+        facet normal 1 1 1\nouter loop\nvertex 10 0 0\nvertex 0 10 0\nvertex 0 0 10\nendloop\nendfacet\n\
+        endsolid t\n";
+
+    fn tetrahedron() -> TriMesh {
+        TriMesh::from_file_bytes(TETRAHEDRON.as_bytes(), "STL", 1e-3).unwrap()
+    }
+
+    fn error(bytes: &[u8], extension: &str) -> String {
+        TriMesh::from_file_bytes(bytes, extension, 1e-3).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn ascii_and_binary_stl_and_obj_give_the_same_mesh() {
+        let ascii = tetrahedron();
+        assert_eq!(ascii.vertices_m().len(), 4, "shared corners are merged");
+        assert!((ascii.signed_volume_m3() - 1e-6 / 6.0).abs() < 1e-20);
+        let binary = write_binary_stl(&ascii, "t", 1e-3);
+        assert_eq!(TriMesh::from_file_bytes(&binary, "stl", 1e-3).unwrap(), ascii);
+        let obj = b"v 0 0 0\nv 0 10 0\nv 10 0 0\nv 0 0 10\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 3 2 4\n";
+        let obj = TriMesh::from_file_bytes(obj, "obj", 1e-3).unwrap();
+        assert_eq!(obj.signed_volume_m3(), ascii.signed_volume_m3());
+    }
+
+    #[test]
+    fn an_ascii_header_does_not_fool_a_binary_file() {
+        let mut binary = write_binary_stl(&tetrahedron(), "t", 1e-3);
+        binary[..6].copy_from_slice(b"solid ");
+        assert_eq!(TriMesh::from_file_bytes(&binary, "stl", 1e-3).unwrap(), tetrahedron());
+    }
+
+    #[test]
+    fn broken_files_say_what_and_where() {
+        assert!(error(b"", "stl").contains("empty"));
+        assert!(error(b"hello", "stl").contains("5 bytes"));
+        assert!(error(TETRAHEDRON.as_bytes(), "step").contains("`step`"));
+        let cut = &TETRAHEDRON[..TETRAHEDRON.len() - 60];
+        assert!(error(cut.as_bytes(), "stl").contains("line"), "{}", error(cut.as_bytes(), "stl"));
+        let nan = TETRAHEDRON.replacen("10 0 0", "10 nan 0", 1);
+        assert_eq!(
+            error(nan.as_bytes(), "stl"),
+            "triangle 0, corner 2: coordinate y is NaN, not a finite number"
+        );
+        let word = TETRAHEDRON.replacen("10 0 0", "10 zero 0", 1);
+        assert_eq!(error(word.as_bytes(), "stl"), "line 6: `zero` is not a number");
+        let mut binary = write_binary_stl(&tetrahedron(), "t", 1e-3);
+        binary.truncate(150);
+        assert!(error(&binary, "stl").contains("promises 4 triangles (284 bytes), it has 150 bytes"));
+        binary[80..84].copy_from_slice(&3_000_000u32.to_le_bytes());
+        assert!(error(&binary, "stl").contains("3000000 triangles"));
+        assert!(error(b"solid nothing\nendsolid nothing\n", "stl").contains("no triangles"));
+        assert!(error(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "obj").contains("9"));
+    }
+
+    #[test]
+    fn a_wrong_unit_is_noticed() {
+        let small = TriMesh::from_file_bytes(TETRAHEDRON.as_bytes(), "stl", 1e-6).unwrap_err();
+        assert!(small.to_string().contains("0.0100 x 0.0100 x 0.0100 mm"), "{small}");
+        assert!(TriMesh::from_file_bytes(TETRAHEDRON.as_bytes(), "stl", 1.0).is_err());
+    }
+}

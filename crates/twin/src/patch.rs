@@ -1,0 +1,60 @@
+//! The contact between part and gel as a few pressure cells.
+
+/// One cell of a contact patch, in the `gel` frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PressureCell {
+    /// Where the cell's force acts.
+    pub x_m: f64,
+    /// Where the cell's force acts.
+    pub y_m: f64,
+    /// Area in contact.
+    pub area_m2: f64,
+    /// Normal force on it.
+    pub force_n: f64,
+}
+
+impl PressureCell {
+    /// Mean pressure.
+    pub fn pressure_pa(&self) -> f64 {
+        self.force_n / self.area_m2
+    }
+}
+
+/// The pressure field of one jaw as at most [`ContactPatch::MAX_CELLS`] cells.
+///
+/// The sum of the cells' forces is the jaw's normal force; force, first and second moments equal those of the
+/// full field. Friction uses this patch and the image uses the field it was made from: what the camera sees is
+/// what the friction feels.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ContactPatch {
+    /// The cells, none without contact.
+    pub cells: Vec<PressureCell>,
+}
+
+impl ContactPatch {
+    /// Most cells of a patch.
+    pub const MAX_CELLS: usize = 64;
+
+    /// Normal force of the jaw.
+    pub fn normal_force_n(&self) -> f64 {
+        self.cells.iter().map(|c| c.force_n).sum()
+    }
+
+    /// Area in contact.
+    pub fn area_m2(&self) -> f64 {
+        self.cells.iter().map(|c| c.area_m2).sum()
+    }
+
+    /// Centre of pressure (x, y); the origin without contact.
+    pub fn centre_m(&self) -> (f64, f64) {
+        let f = self.normal_force_n();
+        if f == 0.0 {
+            return (0.0, 0.0);
+        }
+        let (sx, sy) = self
+            .cells
+            .iter()
+            .fold((0.0, 0.0), |(sx, sy), c| (sx + c.force_n * c.x_m, sy + c.force_n * c.y_m));
+        (sx / f, sy / f)
+    }
+}

@@ -1,0 +1,67 @@
+//! The commanded pull: a force staircase.
+
+/// A staircase `F_des(t) = i dF` with steps that need not be equally long.
+///
+/// Step `i` (counted from 1) begins at the end of step `i - 1`; step 1 begins at time 0 and already commands
+/// one increment, as in the measured campaigns. Forces are in newtons along the pull, times in seconds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Staircase {
+    increment_n: f64,
+    /// Start of each step; strictly increasing, the first at 0.
+    starts_s: Vec<f64>,
+}
+
+impl Staircase {
+    /// A staircase of constant steps that covers `duration_s`.
+    pub fn constant(increment_n: f64, step_s: f64, duration_s: f64) -> Self {
+        let steps = (duration_s / step_s).ceil().max(1.0) as usize;
+        Self { increment_n, starts_s: (0..steps).map(|i| i as f64 * step_s).collect() }
+    }
+
+    /// A staircase whose step lengths come from `step_s` (called once per step) until `duration_s` is covered.
+    pub fn from_steps(increment_n: f64, duration_s: f64, mut step_s: impl FnMut() -> f64) -> Self {
+        let mut starts_s = vec![0.0];
+        let mut end = step_s();
+        while end < duration_s {
+            starts_s.push(end);
+            end += step_s();
+        }
+        Self { increment_n, starts_s }
+    }
+
+    /// Height of one step.
+    pub fn increment_n(&self) -> f64 {
+        self.increment_n
+    }
+
+    /// The commanded force at `time_s`: 0 before the pull begins, the last step's force after the last start.
+    pub fn desired_n(&self, time_s: f64) -> f64 {
+        // A start that rounding puts a hair after the tick still belongs to the tick.
+        let begun = self.starts_s.partition_point(|&start| start <= time_s + 1e-9);
+        begun as f64 * self.increment_n
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn desired_force_follows_the_steps() {
+        let s = Staircase::constant(0.5, 0.104, 1.0);
+        for (time, force) in [(-0.1, 0.0), (0.0, 0.5), (0.103, 0.5), (0.104, 1.0), (0.52, 3.0)] {
+            assert_eq!(s.desired_n(time), force, "at {time} s");
+        }
+    }
+
+    #[test]
+    fn uneven_steps_keep_their_lengths_and_never_fall() {
+        let mut lengths = [0.1, 0.3, 0.05].into_iter().cycle();
+        let s = Staircase::from_steps(2.0, 1.0, || lengths.next().unwrap());
+        assert_eq!(s.desired_n(0.09), 2.0);
+        assert_eq!(s.desired_n(0.35), 4.0);
+        assert_eq!(s.desired_n(0.41), 6.0);
+        let forces: Vec<f64> = (0..100).map(|i| s.desired_n(f64::from(i) * 0.01)).collect();
+        assert!(forces.windows(2).all(|w| w[0] <= w[1]));
+    }
+}

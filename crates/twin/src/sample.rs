@@ -1,0 +1,57 @@
+//! The result of simulating one scenario.
+
+use crate::{ContactPatch, Grasp, PerJaw, PullTrace, Scenario, SlipLabel, TactileImage};
+
+/// One sample: what was asked and what came out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// What was asked.
+    pub scenario: Scenario,
+    /// What came out.
+    pub outcome: Outcome,
+}
+
+/// How a sample ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// The jaws gripped and pulled.
+    Pulled(Box<Pulled>),
+    /// The jaws closed without touching the part: the label is 0 and the images are those at rest.
+    NoContact {
+        /// Images without contact, unless the sweep makes none.
+        images: Option<PerJaw<TactileImage>>,
+    },
+    /// The sample could not be simulated; it keeps its place in the data set.
+    Failed {
+        /// Why, with the numbers.
+        reason: String,
+    },
+}
+
+/// A grip and its pull.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pulled {
+    /// The settled grip.
+    pub grasp: Grasp,
+    /// What each gel feels of it.
+    pub imprint: PerJaw<ImprintSummary>,
+    /// What each camera sees of it, unless the sweep makes no images.
+    pub images: Option<PerJaw<TactileImage>>,
+    /// Static friction coefficient of this grip, scatter included.
+    pub mu: f64,
+    /// A friction law was used outside its fitted range.
+    pub outside_fit: bool,
+    /// The force over time.
+    pub trace: PullTrace,
+    /// The label.
+    pub label: SlipLabel,
+}
+
+/// The contact of one jaw in numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImprintSummary {
+    /// Depth of the deepest point below the unloaded gel surface.
+    pub press_depth_m: f64,
+    /// The pressure field as a few cells.
+    pub patch: ContactPatch,
+}

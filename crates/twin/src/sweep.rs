@@ -1,0 +1,197 @@
+//! The checked sweep: which scenario belongs to which sample index.
+
+mod check;
+
+use crate::config::{
+    Backend, ConfigError, DesignFile, ImageStorage, Mechanics, PullFile, SweepFile, TraceStorage, assign,
+    check_part, read_twin_table,
+};
+use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
+use crate::scenario_keys::{self, KeyError};
+use crate::{Covariates, PullSettings, Scenario, Twin, sobol};
+use std::collections::BTreeMap;
+
+/// Grip force per jaw (or in total, as the twin has it) where a sweep does not say: 40 N, the force of the
+/// pull profiles in Wucherer et al. 2023.
+pub const DEFAULT_GRIP_FORCE_N: f64 = 40.0;
+
+/// Most samples of a sweep.
+pub const MAX_SAMPLES: u64 = 1_000_000_000_000;
+
+/// A sweep whose values are checked and whose size is known. Built by [`Sweep::new`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweep {
+    /// Path of the twin, as written.
+    pub twin: String,
+    /// Number of samples, repetitions included.
+    pub samples: u64,
+    /// How values are drawn.
+    pub design: DesignFile,
+    /// Samples of each configuration.
+    pub repetitions: u64,
+    /// Seed of all randomness.
+    pub seed: u64,
+    /// Which mechanics.
+    pub mechanics: Mechanics,
+    /// Where images are computed.
+    pub backend: Backend,
+    /// How images are stored.
+    pub images: ImageStorage,
+    /// Whether traces are stored.
+    pub trace: TraceStorage,
+    /// Samples in one file.
+    pub shard_samples: u64,
+    /// What varies, sorted by key; always contains `part` and `grip_force_n`.
+    pub vary: Vec<VariedKey>,
+    pull: PullFile,
+}
+
+impl Sweep {
+    /// Number of shard files.
+    pub fn shards(&self) -> u64 {
+        self.samples.div_ceil(self.shard_samples)
+    }
+
+    /// The pull settings without what varies.
+    pub fn pull(&self) -> PullSettings {
+        check::pull_settings(&self.pull).expect("checked when the sweep was built")
+    }
+
+    /// Whether keys of the twin vary, so that every sample has a twin of its own.
+    pub fn varies_twin(&self) -> bool {
+        self.vary.iter().any(|v| is_twin_key(&v.key))
+    }
+
+    /// The parts that can be drawn.
+    pub fn drawn_parts(&self) -> Vec<&str> {
+        self.representatives("part")
+            .into_iter()
+            .filter_map(|value| match value {
+                Drawn::Text(name) => Some(name.as_str()),
+                Drawn::Number(_) => None,
+            })
+            .collect()
+    }
+
+    /// The values in the list of a key, none if it is not drawn from a list.
+    pub fn representatives(&self, key: &str) -> Vec<&Drawn> {
+        match self.vary.iter().find(|v| v.key == key).map(|v| &v.distribution) {
+            Some(Distribution::Choice(values)) => values.iter().collect(),
+            _ => vec![],
+        }
+    }
+
+    /// The sweep as a file in which every default and every drawn key stands.
+    pub fn to_file(&self) -> SweepFile {
+        SweepFile {
+            twin: self.twin.clone(),
+            samples: Some(self.samples),
+            design: self.design,
+            repetitions: self.repetitions,
+            seed: self.seed,
+            mechanics: self.mechanics,
+            backend: self.backend,
+            images: self.images,
+            trace: self.trace,
+            shard_samples: self.shard_samples,
+            vary: self.vary.iter().map(|v| (v.key.clone(), v.distribution.to_toml())).collect(),
+            pull: self.pull.clone(),
+        }
+    }
+
+    /// The values drawn for sample `index`, by key.
+    pub fn drawn(&self, index: u64) -> BTreeMap<String, Drawn> {
+        let group = index / self.repetitions;
+        let mut remaining = group;
+        let mut grid = BTreeMap::new();
+        if self.design == DesignFile::Grid {
+            // The last key varies fastest.
+            for varied in self.vary.iter().rev() {
+                if let Distribution::Choice(values) = &varied.distribution {
+                    let n = values.len() as u64;
+                    grid.insert(varied.key.as_str(), &values[(remaining % n) as usize]);
+                    remaining /= n;
+                }
+            }
+        }
+        let value = |dimension: usize, varied: &VariedKey| match self.design {
+            DesignFile::Grid if grid.contains_key(varied.key.as_str()) => grid[varied.key.as_str()].clone(),
+            DesignFile::Sobol => {
+                let shift = (self.seed ^ fnv1a(&varied.key)).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+                varied.distribution.at(sobol::coordinate(group, dimension, shift as u32))
+            }
+            _ => varied.distribution.at(random_coordinate(self.seed, group, &varied.key)),
+        };
+        self.vary.iter().enumerate().map(|(d, varied)| (varied.key.clone(), value(d, varied))).collect()
+    }
+
+    /// The scenario of sample `index`, with forces per jaw by the convention of `twin`, and whether it can be
+    /// simulated. A scenario that cannot still holds what was drawn, for the record.
+    pub fn scenario(&self, index: u64, twin: &Twin) -> (Scenario, Result<(), ConfigError>) {
+        let drawn = self.drawn(index);
+        let mut pull = self.pull.clone();
+        let mut scenario = self.blank();
+        scenario.index = index;
+        (scenario.group, scenario.repetition) = (index / self.repetitions, index % self.repetitions);
+        let mut problem = Ok(());
+        for (key, value) in &drawn {
+            let put = match key.strip_prefix("pull.") {
+                Some(key) => scenario_keys::set_pull(&mut pull, key, value),
+                None if is_twin_key(key) => Ok(()),
+                None => scenario_keys::set(&mut scenario, key, value),
+            };
+            problem = problem.and(put.map_err(KeyError::into_config_error));
+        }
+        match check::pull_settings(&pull) {
+            Ok(settings) => scenario.pull = settings,
+            Err(e) => problem = problem.and(Err(e)),
+        }
+        scenario.grip_force_n = twin.force_per_jaw_n(scenario.grip_force_n);
+        scenario.drawn = drawn;
+        problem = problem.and_then(|()| scenario_keys::check_against_twin(&scenario, twin));
+        (scenario, problem)
+    }
+
+    /// The twin of sample `index`: a copy of `base` with the drawn values put in.
+    pub fn twin_of(&self, index: u64, base: &toml::Table) -> Result<Twin, ConfigError> {
+        let mut table = base.clone();
+        for (key, value) in self.drawn(index) {
+            if is_twin_key(&key) {
+                put(&mut table, &key, &value)?;
+            }
+        }
+        read_twin(&table)
+    }
+
+    /// A scenario in which nothing is drawn yet.
+    fn blank(&self) -> Scenario {
+        Scenario {
+            seed: self.seed,
+            index: 0,
+            group: 0,
+            repetition: 0,
+            part: String::new(),
+            grip_pose: 0,
+            grip_force_n: 1.0,
+            covariates: Covariates::default(),
+            pull: self.pull(),
+            drawn: BTreeMap::new(),
+        }
+    }
+}
+
+/// Whether a key of `[vary]` or `--set` belongs to the twin.
+pub fn is_twin_key(key: &str) -> bool {
+    let section = key.split(['.', '[']).next().unwrap_or_default();
+    ["parts", "effects"].contains(&section) || crate::DEFAULTED_SECTIONS.contains(&section)
+}
+
+fn read_twin(table: &toml::Table) -> Result<Twin, ConfigError> {
+    Twin::new(&read_twin_table(table)?)
+}
+
+/// Puts a drawn value into a twin's table.
+fn put(table: &mut toml::Table, key: &str, value: &Drawn) -> Result<(), ConfigError> {
+    check_part(table, key)?;
+    assign(table, key, value.to_toml()).map(|_| ())
+}

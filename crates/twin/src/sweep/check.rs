@@ -1,0 +1,247 @@
+//! Checking a sweep against the twin it names, before any work is done.
+
+use super::{MAX_SAMPLES, Sweep, is_twin_key, put, read_twin};
+use crate::config::{
+    ConfigError, DesignFile, Document, PullFile, StepFile, SweepFile, in_range, read_vary, suggestion,
+};
+use crate::draw::{Distribution, Drawn, VariedKey};
+use crate::scenario_keys::{self, KeyError, LISTED_KEYS, PULL_KEYS, SCENARIO_KEYS};
+use crate::{PullSettings, Twin, sobol};
+
+impl Sweep {
+    /// Checks a sweep against the twin it names. `twin` is the twin's document with all defaults filled in.
+    pub fn new(file: &SweepFile, twin: &Document) -> Result<Self, ConfigError> {
+        let checked_twin = Twin::new(&twin.read_twin()?).map_err(|e| twin.located(e))?;
+        check_size(file)?;
+        pull_settings(&file.pull)?;
+        let mut vary = read_vary(&file.vary)?;
+        for (key, default) in [
+            ("part", checked_twin.parts.keys().cloned().map(Drawn::Text).collect()),
+            ("grip_force_n", vec![Drawn::Number(super::DEFAULT_GRIP_FORCE_N)]),
+        ] {
+            if vary.iter().all(|v| v.key != key) {
+                vary.push(VariedKey { key: key.into(), distribution: Distribution::Choice(default) });
+            }
+        }
+        vary.sort_by(|a, b| a.key.cmp(&b.key));
+        for varied in &mut vary {
+            if varied.distribution == Distribution::Interval {
+                varied.distribution = calibrated(&varied.key, twin)?;
+            }
+            check_listed(varied)?;
+        }
+        let samples = number_of_samples(file, &vary)?;
+        if file.design == DesignFile::Sobol {
+            check_sobol(samples.div_ceil(file.repetitions), vary.len())?;
+        }
+        let sweep = Self {
+            twin: file.twin.clone(),
+            samples,
+            design: file.design,
+            repetitions: file.repetitions,
+            seed: file.seed,
+            mechanics: file.mechanics,
+            backend: file.backend,
+            images: file.images,
+            trace: file.trace,
+            shard_samples: file.shard_samples,
+            vary,
+            pull: file.pull.clone(),
+        };
+        sweep.check_values(twin, &checked_twin)?;
+        sweep.check_grips(&checked_twin)?;
+        Ok(sweep)
+    }
+
+    /// Tries out representative values of every key, so that a bad range is found before any work is done.
+    fn check_values(&self, twin: &Document, checked: &Twin) -> Result<(), ConfigError> {
+        for varied in &self.vary {
+            let place = format!("vary.{}", varied.key);
+            let listed = matches!(varied.distribution, Distribution::Choice(_));
+            for (i, value) in varied.distribution.extremes().into_iter().enumerate() {
+                let key = if listed { format!("{place}[{i}]") } else { place.clone() };
+                self.check_value(twin, checked, &varied.key, &value).map_err(|e| match e {
+                    KeyError::Unknown => unknown_key(key, &varied.key),
+                    KeyError::Bad(e) => ConfigError { key, place: None, ..e },
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    fn check_value(
+        &self,
+        twin: &Document,
+        checked: &Twin,
+        key: &str,
+        value: &Drawn,
+    ) -> Result<(), KeyError> {
+        if let Some(key) = key.strip_prefix("pull.") {
+            let mut pull = self.pull.clone();
+            scenario_keys::set_pull(&mut pull, key, value)?;
+            pull_settings(&pull)?;
+            return Ok(());
+        }
+        if is_twin_key(key) {
+            let mut table = twin.table().clone();
+            put(&mut table, key, value)?;
+            read_twin(&table)?;
+            return Ok(());
+        }
+        let mut scenario = self.blank();
+        scenario.part = checked.parts.keys().next().cloned().unwrap_or_default();
+        scenario_keys::set(&mut scenario, key, value)?;
+        match key {
+            // Which grips exist depends on the part, see `check_grips`.
+            "grip_pose" => return Ok(()),
+            "grip_force_n" => scenario.grip_force_n = checked.force_per_jaw_n(scenario.grip_force_n),
+            _ => {}
+        }
+        Ok(scenario_keys::check_against_twin(&scenario, checked)?)
+    }
+
+    /// Every drawn grip has to exist for every drawn part.
+    fn check_grips(&self, twin: &Twin) -> Result<(), ConfigError> {
+        for (i, pose) in self.representatives("grip_pose").into_iter().enumerate() {
+            for part in self.representatives("part") {
+                let mut scenario = self.blank();
+                let put = scenario_keys::set(&mut scenario, "part", part)
+                    .and_then(|()| scenario_keys::set(&mut scenario, "grip_pose", pose));
+                put.map_err(KeyError::into_config_error)
+                    .and_then(|()| scenario_keys::check_against_twin(&scenario, twin))
+                    .map_err(|e| ConfigError { key: format!("vary.grip_pose[{i}]"), ..e })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn unknown_key(place: String, key: &str) -> ConfigError {
+    let fixed = ["pull.direction", "pull.max_time_s"];
+    if fixed.contains(&key) {
+        return ConfigError::new(place, format!("`{key}` cannot vary: it is one for the whole sweep"));
+    }
+    let problem = format!("neither the scenario, `pull` nor the twin has a key `{key}`");
+    let known = SCENARIO_KEYS.iter().chain(PULL_KEYS).copied();
+    ConfigError::new(place, problem).hint(match suggestion(key, known) {
+        Some(close) => format!("did you mean `{close}`?"),
+        None => format!("keys of a scenario: {}", SCENARIO_KEYS.join(", ")),
+    })
+}
+
+/// Names and whole numbers are drawn from a list: a distribution would hit no valid value.
+fn check_listed(varied: &VariedKey) -> Result<(), ConfigError> {
+    if !LISTED_KEYS.contains(&varied.key.as_str()) || matches!(varied.distribution, Distribution::Choice(_)) {
+        return Ok(());
+    }
+    let problem = format!("`{}` takes names or whole numbers, which a distribution does not give", varied.key);
+    Err(ConfigError::new(format!("vary.{}", varied.key), problem).hint("list the values: [0, 1, 2]"))
+}
+
+fn check_sobol(groups: u64, keys: usize) -> Result<(), ConfigError> {
+    if keys > sobol::MAX_DIMENSIONS {
+        let problem = format!("{keys} keys vary, a Sobol design has at most {}", sobol::MAX_DIMENSIONS);
+        return Err(ConfigError::new("vary", problem).hint("use design = \"random\""));
+    }
+    if groups > sobol::MAX_POINTS {
+        let problem = format!("{groups} configurations, a Sobol sequence has {}", sobol::MAX_POINTS);
+        return Err(ConfigError::new("samples", problem).hint("use design = \"random\""));
+    }
+    Ok(())
+}
+
+/// The calibrated uncertainty of a twin key as a Gaussian with the value as mean: `low90` and `high90` lie
+/// 2 x 1.645 standard deviations apart.
+fn calibrated(key: &str, twin: &Document) -> Result<Distribution, ConfigError> {
+    let place = format!("vary.{key}");
+    let missing = |what: &str| {
+        ConfigError::new(&place, format!("the twin has no {what}"))
+            .hint("`gripgen calibrate` writes it; or add low90 and high90 there yourself")
+    };
+    let (section, leaf) = key.rsplit_once('.').unwrap_or(("", key));
+    let interval = format!("{section}.calibration.{leaf}");
+    let number =
+        |key: &str| twin.get(key).and_then(|v| v.as_float().or_else(|| v.as_integer().map(|i| i as f64)));
+    let mean = number(key).ok_or_else(|| missing(&format!("number `{key}`")))?;
+    let low = number(&format!("{interval}.low90")).ok_or_else(|| missing(&format!("`{interval}.low90`")))?;
+    let high = number(&format!("{interval}.high90")).ok_or_else(|| missing(&format!("`{interval}.high90`")))?;
+    if low > high {
+        return Err(ConfigError::new(&place, format!("low90 = {low} is above high90 = {high} in the twin")));
+    }
+    Ok(Distribution::Normal { mean, deviation: (high - low) / (2.0 * 1.644_853_626_951_472_2) })
+}
+
+fn check_size(file: &SweepFile) -> Result<(), ConfigError> {
+    for (key, value, low, high) in [
+        ("samples", file.samples.unwrap_or(1), 1, MAX_SAMPLES),
+        ("repetitions", file.repetitions, 1, 1_000_000),
+        ("shard_samples", file.shard_samples, 1, 100_000),
+    ] {
+        if !(low..=high).contains(&value) {
+            let problem = format!("{value} is out of range, it must be at least {low} and at most {high}");
+            return Err(ConfigError::new(key, problem));
+        }
+    }
+    Ok(())
+}
+
+fn number_of_samples(file: &SweepFile, vary: &[VariedKey]) -> Result<u64, ConfigError> {
+    if file.design != DesignFile::Grid {
+        return file.samples.ok_or_else(|| {
+            ConfigError::new("samples", "the key `samples` is missing")
+                .hint("only a grid design knows its own size")
+        });
+    }
+    let size = vary.iter().try_fold(file.repetitions, |n, v| match &v.distribution {
+        Distribution::Choice(values) => n.checked_mul(values.len() as u64),
+        _ => Some(n),
+    });
+    let Some(size) = size.filter(|&n| n <= MAX_SAMPLES) else {
+        return Err(ConfigError::new("vary", format!("the grid has more than {MAX_SAMPLES} samples")));
+    };
+    match file.samples {
+        Some(samples) if samples != size => {
+            let problem = format!("samples = {samples}, but the grid has {size} (repetitions included)");
+            Err(ConfigError::new("samples", problem).hint("leave `samples` out of a grid"))
+        }
+        _ => Ok(size),
+    }
+}
+
+/// Checks `[pull]` and converts it.
+pub(super) fn pull_settings(file: &PullFile) -> Result<PullSettings, ConfigError> {
+    let (step, jitter) = match file.step_s {
+        StepFile::Constant(value) => (value, 0.0),
+        StepFile::Jittered(step) => (step.value, step.jitter),
+    };
+    let [x, y, z] = file.direction;
+    let length = (x * x + y * y + z * z).sqrt();
+    if !(length.is_finite() && length > 1e-9) {
+        return Err(ConfigError::new("pull.direction", format!("[{x}, {y}, {z}] has no direction")));
+    }
+    let direction = [x / length, y / length, z / length];
+    if direction[1].abs() > 1e-9 {
+        let problem = format!("[{x}, {y}, {z}] has a component along y, the jaw axis");
+        return Err(ConfigError::new("pull.direction", problem)
+            .hint("the carriage pulls at right angles to the jaws; set y to 0"));
+    }
+    let max_time_s = in_range("pull.max_time_s", file.max_time_s, 0.1..=3600.0, "s")?;
+    let settings = PullSettings {
+        increment_n: in_range("pull.increment_n", file.increment_n, 0.01..=50.0, "N")?,
+        step_s: in_range("pull.step_s", step, 0.004..=10.0, "s")?,
+        step_jitter: in_range("pull.step_s.jitter", jitter, 0.0..=0.9, "1")?,
+        stop_m: in_range("pull.stop_mm", file.stop_mm, 0.05..=100.0, "mm")? * 1e-3,
+        direction,
+        max_force_n: file
+            .max_force_n
+            .map(|force| in_range("pull.max_force_n", force, 0.1..=10_000.0, "N"))
+            .transpose()?,
+        max_time_s,
+        label_tolerance_n: in_range("pull.label_tolerance_n", file.label_tolerance_n, 0.01..=100.0, "N")?,
+    };
+    if settings.step_s > max_time_s {
+        let problem = format!("one step of {} s is longer than max_time_s = {max_time_s} s", settings.step_s);
+        return Err(ConfigError::new("pull.step_s", problem));
+    }
+    Ok(settings)
+}

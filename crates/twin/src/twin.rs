@@ -1,0 +1,356 @@
+//! The checked twin, in SI units.
+
+use crate::config::{ConfigError, TwinFile};
+use crate::config::{Feedback, ForceConvention, ImageNoise};
+use crate::effects::{self, Effect};
+use crate::frames::{Pose, pose, rotation_from_fixed_xyz};
+use crate::{Jaw, PerJaw};
+use nalgebra::{Point3, Vector3};
+use std::collections::BTreeMap;
+
+/// Format string of a twin file.
+pub const TWIN_SCHEMA: &str = "gripgen.twin/1";
+
+/// The sections that fall back to the shipped baseline twin, key by key.
+pub const DEFAULTED_SECTIONS: &[&str] = &["robot", "gripper", "wrist", "gel", "optics"];
+
+/// Everything the simulation knows of a rig and its parts. Built by [`Twin::new`], which checks it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Twin {
+    /// The arm and its force loop.
+    pub robot: Robot,
+    /// The gripper.
+    pub gripper: Gripper,
+    /// The wrist force sensor.
+    pub wrist: Wrist,
+    /// The gels.
+    pub gel: PerJaw<Gel>,
+    /// The tactile sensors.
+    pub optics: PerJaw<Optics>,
+    /// The parts by name.
+    pub parts: BTreeMap<String, Part>,
+    /// The effects, in the order in which they act.
+    pub effects: Vec<Effect>,
+}
+
+/// The arm, reduced to what it does along the pull.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Robot {
+    /// Mass the arm moves along the pull, without the gripper.
+    pub moving_mass_kg: f64,
+    /// Time constant of the force loop.
+    pub lag_s: f64,
+    /// Time before the force loop answers.
+    pub dead_time_s: f64,
+    /// Force per speed that the force loop yields to.
+    pub damping_n_s_per_m: f64,
+    /// Highest speed of the force loop.
+    pub speed_limit_m_per_s: f64,
+    /// What the loop closes on.
+    pub feedback: Feedback,
+}
+
+/// The gripper.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gripper {
+    /// What a grip force means to the user of this twin.
+    pub force_convention: ForceConvention,
+    /// Mass without jaws.
+    pub mass_kg: f64,
+    /// Mass of one jaw.
+    pub jaw_mass_kg: f64,
+    /// Largest opening between the gels.
+    pub opening_m: f64,
+    /// Largest grip force, per jaw.
+    pub max_force_n: f64,
+}
+
+/// The wrist force sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wrist {
+    /// Standard deviation of the noise of one reading.
+    pub noise_n: f64,
+    /// Readings per second, which is also the rate of the simulation.
+    pub rate_hz: f64,
+}
+
+impl Wrist {
+    /// Time between two readings.
+    pub fn step_s(&self) -> f64 {
+        1.0 / self.rate_hz
+    }
+}
+
+/// A gel pad.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gel {
+    /// Thickness.
+    pub thickness_m: f64,
+    /// Width, along image x.
+    pub width_m: f64,
+    /// Height, along image y.
+    pub height_m: f64,
+    /// Tangential force per shear displacement.
+    pub shear_stiffness_n_per_m: f64,
+    /// Blur kernels, in pixels of the sensor's image.
+    pub kernels_px: Vec<u32>,
+    /// Start of the restored contact, as a share of the press depth.
+    pub restore_depth_fraction: f64,
+}
+
+/// A tactile sensor: which file, and what overrides it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Optics {
+    /// Path as written in the twin.
+    pub sensor: String,
+    /// Pixel size that replaces the file's.
+    pub metres_per_px: Option<f64>,
+    /// Path of the image without contact, as written in the twin.
+    pub background: Option<String>,
+    /// Whether the images carry noise.
+    pub image_noise: ImageNoise,
+}
+
+/// A part that can be gripped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Path of the mesh, as written in the twin.
+    pub mesh: String,
+    /// Length of a mesh unit.
+    pub metres_per_unit: f64,
+    /// `part_from_mesh` of each grip.
+    pub grips: Vec<Pose>,
+    /// Static friction coefficient.
+    pub mu: f64,
+    /// Kinetic over static friction.
+    pub kinetic_ratio: f64,
+    /// Relative scatter of the coefficient from grip to grip.
+    pub scatter: f64,
+    /// Imprint constant c of V = c F.
+    pub imprint_m3_per_n: f64,
+}
+
+impl Twin {
+    /// Checks a file's values and converts them. Errors name the key.
+    pub fn new(file: &TwinFile) -> Result<Self, ConfigError> {
+        use crate::config::in_range;
+        if let Some(schema) = &file.schema
+            && schema != TWIN_SCHEMA
+        {
+            let problem = format!("this is `{schema}`, gripgen reads `{TWIN_SCHEMA}`");
+            return Err(ConfigError::new("schema", problem));
+        }
+        let r = &file.robot;
+        let robot = Robot {
+            moving_mass_kg: in_range("robot.moving_mass_kg", r.moving_mass_kg, 0.1..=200.0, "kg")?,
+            lag_s: in_range("robot.lag_s", r.lag_s, 0.0..=2.0, "s")?,
+            dead_time_s: in_range("robot.dead_time_s", r.dead_time_s, 0.0..=2.0, "s")?,
+            damping_n_s_per_m: in_range("robot.damping_n_s_per_m", r.damping_n_s_per_m, 1.0..=1e5, "N s/m")?,
+            speed_limit_m_per_s: in_range(
+                "robot.speed_limit_mm_s",
+                r.speed_limit_mm_s,
+                0.1..=1500.0,
+                "mm/s",
+            )? * 1e-3,
+            feedback: r.feedback,
+        };
+        let g = &file.gripper;
+        let gripper = Gripper {
+            force_convention: g.force_convention,
+            mass_kg: in_range("gripper.mass_kg", g.mass_kg, 0.05..=20.0, "kg")?,
+            jaw_mass_kg: in_range("gripper.jaw_mass_kg", g.jaw_mass_kg, 0.05..=5.0, "kg")?,
+            opening_m: in_range("gripper.opening_mm", g.opening_mm, 1.0..=500.0, "mm")? * 1e-3,
+            max_force_n: in_range("gripper.max_force_n", g.max_force_n, 0.1..=1000.0, "N")?,
+        };
+        let wrist = Wrist {
+            noise_n: in_range("wrist.noise_n", file.wrist.noise_n, 0.0..=20.0, "N")?,
+            rate_hz: in_range("wrist.rate_hz", file.wrist.rate_hz, 500.0..=4000.0, "Hz")?,
+        };
+        let mass_kg = robot.moving_mass_kg + gripper.mass_kg + 2.0 * gripper.jaw_mass_kg;
+        if robot.damping_n_s_per_m * wrist.step_s() >= mass_kg {
+            let problem = format!(
+                "{} N s/m stop more than the moving {mass_kg} kg within one step of {} s",
+                robot.damping_n_s_per_m,
+                wrist.step_s()
+            );
+            return Err(ConfigError::new("robot.damping_n_s_per_m", problem)
+                .hint("lower the damping, raise robot.moving_mass_kg or raise wrist.rate_hz"));
+        }
+        let gel = PerJaw::try_from_fn(|jaw| {
+            let section = file.gel.right.as_ref().filter(|_| jaw == Jaw::Right).unwrap_or(&file.gel.left);
+            check_gel(section, &format!("gel.{jaw}"))
+        })?;
+        let optics = PerJaw::try_from_fn(|jaw| {
+            let section =
+                file.optics.right.as_ref().filter(|_| jaw == Jaw::Right).unwrap_or(&file.optics.left);
+            let key = format!("optics.{jaw}.mm_per_px");
+            let mm_per_px = section.mm_per_px.map(|x| in_range(&key, x, 1e-4..=1.0, "mm")).transpose()?;
+            Ok(Optics {
+                sensor: section.sensor.clone(),
+                metres_per_px: mm_per_px.map(|x| x * 1e-3),
+                background: section.background.clone(),
+                image_noise: section.image_noise,
+            })
+        })?;
+        if file.parts.is_empty() {
+            return Err(ConfigError::new("parts", "the twin has no parts")
+                .hint("add a section [parts.NAME] with mesh, mu and imprint_mm3_per_n"));
+        }
+        let parts = file
+            .parts
+            .iter()
+            .map(|(name, part)| Ok((name.clone(), check_part(part, &format!("parts.{name}"))?)))
+            .collect::<Result<_, ConfigError>>()?;
+        let effects = (0..file.effects.len()).map(|i| check_effect(file, i)).collect::<Result<_, _>>()?;
+        Ok(Twin { robot, gripper, wrist, gel, optics, parts, effects })
+    }
+
+    /// Grip force per jaw of a force that follows this twin's convention.
+    pub fn force_per_jaw_n(&self, grip_force_n: f64) -> f64 {
+        match self.gripper.force_convention {
+            ForceConvention::PerJaw => grip_force_n,
+            ForceConvention::Total => grip_force_n / 2.0,
+        }
+    }
+}
+
+fn check_gel(gel: &crate::config::GelFile, key: &str) -> Result<Gel, ConfigError> {
+    use crate::config::in_range;
+    for (i, &k) in gel.kernels_px.iter().enumerate() {
+        if k % 2 == 0 || !(3..=255).contains(&k) {
+            let problem = format!("a kernel of {k} pixels, it must be an odd number from 3 to 255");
+            return Err(ConfigError::new(format!("{key}.kernels_px[{i}]"), problem));
+        }
+    }
+    let mm = |name: &str, value: f64, range: std::ops::RangeInclusive<f64>| {
+        in_range(&format!("{key}.{name}"), value, range, "mm").map(|x| x * 1e-3)
+    };
+    Ok(Gel {
+        thickness_m: mm("thickness_mm", gel.thickness_mm, 0.1..=50.0)?,
+        width_m: mm("width_mm", gel.width_mm, 1.0..=200.0)?,
+        height_m: mm("height_mm", gel.height_mm, 1.0..=200.0)?,
+        shear_stiffness_n_per_m: 1e3
+            * in_range(
+                &format!("{key}.shear_stiffness_n_per_mm"),
+                gel.shear_stiffness_n_per_mm,
+                0.1..=1e4,
+                "N/mm",
+            )?,
+        kernels_px: gel.kernels_px.clone(),
+        restore_depth_fraction: in_range(
+            &format!("{key}.restore_depth_fraction"),
+            gel.restore_depth_fraction,
+            0.0..=1.0,
+            "1",
+        )?,
+    })
+}
+
+fn check_part(part: &crate::config::PartFile, key: &str) -> Result<Part, ConfigError> {
+    use crate::config::in_range;
+    let at = |name: &str| format!("{key}.{name}");
+    if part.grips.is_empty() {
+        return Err(ConfigError::new(at("grips"), "the list is empty, a part needs at least one grip"));
+    }
+    let mut grips = Vec::new();
+    for (i, grip) in part.grips.iter().enumerate() {
+        for axis in 0..3 {
+            in_range(&format!("{key}.grips[{i}].origin_mm"), grip.origin_mm[axis], -2000.0..=2000.0, "mm")?;
+            let angle = grip.orientation_deg[axis];
+            in_range(&format!("{key}.grips[{i}].orientation_deg"), angle, -360.0..=360.0, "deg")?;
+        }
+        let rotation = rotation_from_fixed_xyz(grip.orientation_deg.map(f64::to_radians));
+        let origin = Point3::from(grip.origin_mm.map(|x| x * 1e-3));
+        grips.push(pose(&rotation, -(rotation * origin.coords)));
+    }
+    Ok(Part {
+        mesh: part.mesh.clone(),
+        metres_per_unit: in_range(&at("scale_mm_per_unit"), part.scale_mm_per_unit, 1e-6..=1e6, "mm")? * 1e-3,
+        grips,
+        mu: in_range(&at("mu"), part.mu, 0.0..=5.0, "1")?,
+        kinetic_ratio: in_range(&at("kinetic_ratio"), part.kinetic_ratio, 0.05..=1.0, "1")?,
+        scatter: in_range(&at("scatter"), part.scatter, 0.0..=0.5, "1")?,
+        imprint_m3_per_n: in_range(&at("imprint_mm3_per_n"), part.imprint_mm3_per_n, 1e-3..=1e3, "mm3/N")?
+            * 1e-9,
+    })
+}
+
+fn check_effect(file: &TwinFile, index: usize) -> Result<Effect, ConfigError> {
+    use crate::config::{in_range, suggestion};
+    let effect = &file.effects[index];
+    let key = |name: &str| format!("effects[{index}].{name}");
+    let known = || effects::LIBRARY.iter().map(|spec| spec.id);
+    let spec = effects::find(&effect.name).ok_or_else(|| {
+        let error = ConfigError::new(key("name"), format!("there is no effect `{}`", effect.name));
+        match suggestion(&effect.name, known()) {
+            Some(name) => error.hint(format!("did you mean `{name}`?")),
+            None => {
+                error.hint(format!("effects of this version: {}", known().collect::<Vec<_>>().join(", ")))
+            }
+        }
+    })?;
+    if let Some(part) = &effect.part
+        && !file.parts.contains_key(part)
+    {
+        let error = ConfigError::new(key("part"), format!("the twin has no part `{part}`"));
+        return Err(unknown_part_hint(error, part, file.parts.keys()));
+    }
+    let fixed = ["part", "fitted_grip_force_n", "outside_fit", "source", "calibration"];
+    for name in effect.parameters.keys() {
+        if spec.parameters.iter().all(|p| p.name != name) {
+            let names: Vec<&str> = spec.parameters.iter().map(|p| p.name).chain(fixed).collect();
+            let error = ConfigError::new(key(name), format!("`{}` has no parameter `{name}`", spec.id));
+            return Err(match suggestion(name, names.iter().copied()) {
+                Some(close) => error.hint(format!("did you mean `{close}`?")),
+                None => error.hint(format!("its keys: {}", names.join(", "))),
+            });
+        }
+    }
+    let values = spec
+        .parameters
+        .iter()
+        .map(|p| match effect.parameters.get(p.name) {
+            None => Ok(p.neutral),
+            Some(toml::Value::Float(x)) => in_range(&key(p.name), *x, p.bounds.0..=p.bounds.1, p.unit),
+            Some(toml::Value::Integer(i)) => {
+                in_range(&key(p.name), *i as f64, p.bounds.0..=p.bounds.1, p.unit)
+            }
+            Some(other) => Err(ConfigError::new(key(p.name), format!("a number is needed, found {other}"))),
+        })
+        .collect::<Result<_, _>>()?;
+    if let Some([low, high]) = effect.fitted_grip_force_n
+        && !(low.is_finite() && high.is_finite() && low >= 0.0 && low <= high)
+    {
+        let problem = format!("[{low}, {high}] N is not a range from small to large");
+        return Err(ConfigError::new(key("fitted_grip_force_n"), problem));
+    }
+    Ok(Effect {
+        spec,
+        part: effect.part.clone(),
+        values,
+        fitted_grip_force_n: effect.fitted_grip_force_n.map(|[low, high]| (low, high)),
+        outside_fit: effect.outside_fit,
+    })
+}
+
+/// Adds the hint for a part name that the twin does not have.
+pub(crate) fn unknown_part_hint<'a>(
+    error: ConfigError,
+    typed: &str,
+    parts: impl Iterator<Item = &'a String> + Clone,
+) -> ConfigError {
+    match crate::config::suggestion(typed, parts.clone().map(String::as_str)) {
+        Some(name) => error.hint(format!("did you mean `{name}`?")),
+        None => error.hint(format!("its parts: {}", parts.cloned().collect::<Vec<_>>().join(", "))),
+    }
+}
+
+impl Part {
+    /// `world_from_part` for a grip turned by `grip_angle_rad` about the jaw axis and displaced by
+    /// `grip_offset_m` along the part's long axis. Turning the grip by an angle turns the part, seen from the
+    /// gripper, by its negative.
+    pub fn world_from_part(grip_angle_rad: f64, grip_offset_m: f64) -> Pose {
+        let rotation = crate::frames::rotation_about_axis(1, -grip_angle_rad);
+        pose(&rotation, rotation * Vector3::new(-grip_offset_m, 0.0, 0.0))
+    }
+}

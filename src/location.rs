@@ -1,0 +1,141 @@
+//! Where a file is: on disk, or embedded.
+
+use crate::assets::{self, ASSET_PREFIX};
+use std::borrow::Cow;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// A file on disk or an embedded one (`asset:configs/twin.toml`).
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Location {
+    /// A path of the file system.
+    Disk(PathBuf),
+    /// A path inside `assets/`.
+    Asset(String),
+    /// A copy in a run folder of a file that was once called `name`.
+    Copy {
+        /// Where the copy is.
+        path: PathBuf,
+        /// Its path as written in the twin.
+        name: String,
+    },
+}
+
+/// A file could not be read.
+#[derive(Debug, thiserror::Error)]
+#[error("{location}: {problem}")]
+pub struct ReadFileError {
+    /// The file.
+    pub location: Location,
+    /// What the system says.
+    pub problem: String,
+}
+
+impl Location {
+    /// A location as a user writes it.
+    pub fn parse(text: &str) -> Self {
+        match text.strip_prefix(ASSET_PREFIX) {
+            Some(path) => Location::Asset(path.into()),
+            None => Location::Disk(text.into()),
+        }
+    }
+
+    /// The file that `path` names in a configuration that lies here. Relative paths are relative to it.
+    pub fn beside(&self, path: &str) -> Self {
+        if path.starts_with(ASSET_PREFIX) || Path::new(path).is_absolute() {
+            return Location::parse(path);
+        }
+        match self {
+            Location::Disk(file) | Location::Copy { path: file, .. } => {
+                Location::Disk(file.parent().map_or_else(|| path.into(), |folder| folder.join(path)))
+            }
+            Location::Asset(file) => {
+                let mut parts: Vec<&str> = file.split('/').collect();
+                parts.pop();
+                for part in path.split('/') {
+                    match part {
+                        ".." => drop(parts.pop()),
+                        "." => {}
+                        other => parts.push(other),
+                    }
+                }
+                Location::Asset(parts.join("/"))
+            }
+        }
+    }
+
+    /// Reads the file.
+    pub fn read(&self) -> Result<Cow<'static, [u8]>, ReadFileError> {
+        let error = |problem: String| ReadFileError { location: self.clone(), problem };
+        match self {
+            Location::Disk(path) | Location::Copy { path, .. } => {
+                std::fs::read(path).map(Cow::Owned).map_err(|e| error(e.to_string()))
+            }
+            Location::Asset(path) => assets::get(path).map(Cow::Borrowed).ok_or_else(|| {
+                let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
+                let near: Vec<&str> = assets::paths().filter(|p| p.starts_with(folder)).collect();
+                error(format!("gripgen holds no such file; near it: {}", near.join(", ")))
+            }),
+        }
+    }
+
+    /// Reads a text file.
+    pub fn read_text(&self) -> Result<String, ReadFileError> {
+        String::from_utf8(self.read()?.into_owned())
+            .map_err(|e| ReadFileError { location: self.clone(), problem: format!("not text: {e}") })
+    }
+
+    /// Extension of the file name, without the dot.
+    pub fn extension(&self) -> &str {
+        let name = match self {
+            Location::Disk(path) => path.as_path(),
+            Location::Asset(name) | Location::Copy { name, .. } => Path::new(name),
+        };
+        name.extension().and_then(|e| e.to_str()).unwrap_or_default()
+    }
+
+    /// What a run of this configuration is called: the file name without extension, or the folder of a `sweep.toml`.
+    pub fn run_name(&self) -> String {
+        let path = match self {
+            Location::Disk(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
+            Location::Asset(name) | Location::Copy { name, .. } => PathBuf::from(name),
+        };
+        let stem = path.file_stem().map_or_else(|| "run".into(), |s| s.to_string_lossy().into_owned());
+        let folder = path.parent().and_then(|p| p.file_name()).map(|f| f.to_string_lossy().into_owned());
+        match folder {
+            Some(folder) if stem == "sweep" => folder,
+            _ => stem,
+        }
+    }
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Location::Disk(path) => write!(f, "{}", path.display()),
+            Location::Asset(path) => write!(f, "{ASSET_PREFIX}{path}"),
+            Location::Copy { path, name } => write!(f, "{} (copy of {name})", path.display()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_relative_to_the_configuration() {
+        let disk = Location::parse("runs/a/sweep.toml");
+        assert_eq!(disk.beside("twin.toml"), Location::Disk("runs/a/twin.toml".into()));
+        assert_eq!(disk.beside("/x/twin.toml"), Location::Disk("/x/twin.toml".into()));
+        assert_eq!(disk.beside("asset:configs/twin.toml"), Location::Asset("configs/twin.toml".into()));
+        let asset = Location::parse("asset:configs/quickstart.toml");
+        assert_eq!(asset.beside("twin.toml"), Location::Asset("configs/twin.toml".into()));
+        assert_eq!(asset.beside("../parts/x.stl"), Location::Asset("parts/x.stl".into()));
+        assert_eq!((asset.run_name().as_str(), asset.extension()), ("quickstart", "toml"));
+        assert_eq!(disk.run_name(), "a", "many configurations are called sweep.toml");
+        assert!(
+            Location::parse("asset:configs/none.toml").read().unwrap_err().to_string().contains("quickstart")
+        );
+    }
+}

@@ -1,0 +1,13 @@
+//! Pictures for people: what a run, a sample or a part looks like.
+
+mod canvas;
+mod colours;
+mod plot;
+mod sample;
+mod scene;
+mod sheet;
+
+pub(crate) use canvas::{Anchor, Canvas, Rgb, TextStyle};
+pub use sample::{PictureSampleError, sample_picture};
+pub(crate) use scene::{Scene, SceneMesh, View};
+pub use sheet::contact_sheet;

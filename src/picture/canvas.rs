@@ -1,0 +1,162 @@
+//! A drawing surface: lines and areas by tiny-skia, text by a bitmap font.
+
+use gripgen_record::encode_png;
+use gripgen_twin::TactileImage;
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
+
+/// A colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Rgb(pub(crate) u8, pub(crate) u8, pub(crate) u8);
+
+/// Which end of a text its x coordinate names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Anchor {
+    Left,
+    Middle,
+    Right,
+}
+
+/// A drawing surface of whole pixels, origin at the top left.
+pub(crate) struct Canvas {
+    pixmap: Pixmap,
+}
+
+impl Canvas {
+    /// A canvas of one colour.
+    pub(crate) fn new(width: u32, height: u32, background: Rgb) -> Self {
+        let mut pixmap = Pixmap::new(width.max(1), height.max(1)).expect("a picture has a sensible size");
+        pixmap.fill(colour(background));
+        Self { pixmap }
+    }
+
+    /// The picture as PNG.
+    pub(crate) fn into_png(self) -> Vec<u8> {
+        let (width_px, height_px) = (self.pixmap.width(), self.pixmap.height());
+        let rgb = self.pixmap.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
+        encode_png(&TactileImage { width_px, height_px, rgb }).expect("an RGB picture can be encoded")
+    }
+
+    /// A filled rectangle.
+    pub(crate) fn rect(&mut self, x: f64, y: f64, width: f64, height: f64, fill: Rgb) {
+        let Some(rect) = Rect::from_xywh(x as f32, y as f32, width as f32, height as f32) else { return };
+        self.pixmap.fill_rect(rect, &paint(fill), Transform::identity(), None);
+    }
+
+    /// A connected line. Points that are not finite interrupt it.
+    pub(crate) fn line(&mut self, points: &[(f64, f64)], width: f64, ink: Rgb) {
+        self.stroke(points, width, ink, None);
+    }
+
+    /// A dashed line.
+    pub(crate) fn dashed(&mut self, points: &[(f64, f64)], width: f64, ink: Rgb) {
+        self.stroke(points, width, ink, StrokeDash::new(vec![5.0, 4.0], 0.0));
+    }
+
+    fn stroke(&mut self, points: &[(f64, f64)], width: f64, ink: Rgb, dash: Option<StrokeDash>) {
+        let mut path = PathBuilder::new();
+        let mut down = false;
+        for &(x, y) in points {
+            if !(x.is_finite() && y.is_finite()) {
+                down = false;
+            } else if down {
+                path.line_to(x as f32, y as f32);
+            } else {
+                path.move_to(x as f32, y as f32);
+                down = true;
+            }
+        }
+        let Some(path) = path.finish() else { return };
+        let stroke = Stroke { width: width as f32, dash, ..Stroke::default() };
+        self.pixmap.stroke_path(&path, &paint(ink), &stroke, Transform::identity(), None);
+    }
+
+    /// A filled disc with a white rim.
+    pub(crate) fn disc(&mut self, x: f64, y: f64, radius: f64, fill: Rgb) {
+        for (r, ink) in [(radius + 1.5, Rgb(255, 255, 255)), (radius, fill)] {
+            let Some(path) = PathBuilder::from_circle(x as f32, y as f32, r as f32) else { continue };
+            self.pixmap.fill_path(&path, &paint(ink), FillRule::Winding, Transform::identity(), None);
+        }
+    }
+
+    /// One pixel; outside the canvas nothing happens.
+    pub(crate) fn put(&mut self, x: u32, y: u32, ink: Rgb) {
+        if x < self.pixmap.width() && y < self.pixmap.height() {
+            let at = (y * self.pixmap.width() + x) as usize;
+            self.pixmap.pixels_mut()[at] = colour(ink).premultiply().to_color_u8();
+        }
+    }
+
+    /// Text whose top is at `y`. Characters that the font lacks become `?`.
+    pub(crate) fn text(&mut self, text: &str, x: f64, y: f64, anchor: Anchor, style: TextStyle) {
+        let (weight, height) = style.font();
+        let advance = get_raster_width(weight, height) as f64;
+        let width = advance * text.chars().count() as f64;
+        let left = match anchor {
+            Anchor::Left => x,
+            Anchor::Middle => x - width / 2.0,
+            Anchor::Right => x - width,
+        };
+        for (i, c) in text.chars().enumerate() {
+            let glyph = get_raster(c, weight, height).or_else(|| get_raster('?', weight, height));
+            let Some(glyph) = glyph else { continue };
+            let (gx, gy) = ((left + i as f64 * advance).round() as i64, y.round() as i64);
+            for (row, line) in glyph.rows().enumerate() {
+                for (column, &cover) in line.iter().enumerate() {
+                    self.blend(gx + column as i64, gy + row as i64, style.ink, cover);
+                }
+            }
+        }
+    }
+
+    fn blend(&mut self, x: i64, y: i64, ink: Rgb, cover: u8) {
+        let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else { return };
+        if cover == 0 || x >= self.pixmap.width() || y >= self.pixmap.height() {
+            return;
+        }
+        let at = (y * self.pixmap.width() + x) as usize;
+        let below = self.pixmap.pixels()[at];
+        let mix = |over: u8, under: u8| {
+            let c = u32::from(cover);
+            ((u32::from(over) * c + u32::from(under) * (255 - c) + 127) / 255) as u8
+        };
+        let mixed = Rgb(mix(ink.0, below.red()), mix(ink.1, below.green()), mix(ink.2, below.blue()));
+        self.put(x, y, mixed);
+    }
+}
+
+/// How a text looks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TextStyle {
+    pub(crate) ink: Rgb,
+    pub(crate) large: bool,
+    pub(crate) bold: bool,
+}
+
+impl TextStyle {
+    /// 16 pixels high.
+    pub(crate) fn small(ink: Rgb) -> Self {
+        Self { ink, large: false, bold: false }
+    }
+
+    /// 20 pixels high and bold.
+    pub(crate) fn title(ink: Rgb) -> Self {
+        Self { ink, large: true, bold: true }
+    }
+
+    fn font(self) -> (FontWeight, RasterHeight) {
+        let weight = if self.bold { FontWeight::Bold } else { FontWeight::Regular };
+        (weight, if self.large { RasterHeight::Size20 } else { RasterHeight::Size16 })
+    }
+}
+
+fn colour(c: Rgb) -> Color {
+    Color::from_rgba8(c.0, c.1, c.2, 255)
+}
+
+fn paint(c: Rgb) -> Paint<'static> {
+    let mut paint = Paint::default();
+    paint.set_color(colour(c));
+    paint.anti_alias = true;
+    paint
+}

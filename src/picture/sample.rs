@@ -1,0 +1,220 @@
+//! One sample in full: images, height, pressure, pull curve.
+
+use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
+use super::colours::{COMMAND, DISPLACEMENT, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK, scale};
+use super::plot::{Area, Curve, pull_curve};
+use super::sheet::{details, heading};
+use crate::generate::{Press, press_only};
+use crate::project::Project;
+use gripgen_record::proto::gripgen_v1::{JawContact, Sample};
+use gripgen_record::{FolderError, ReadError, Record, RunFolder, ShardReader};
+use gripgen_tactile::Plane;
+use gripgen_twin::{Jaw, TactileImage};
+
+const MARGIN: u32 = 16;
+const IMAGE: (u32, u32) = (400, 300);
+const HEADER: u32 = 64;
+const CAPTION: u32 = 24;
+const CURVE_HEIGHT: u32 = 380;
+
+/// Why a sample could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PictureSampleError {
+    /// The folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A shard.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The shard is not there yet.
+    #[error("sample {index} belongs to shard {shard}, which is not done")]
+    NotDone {
+        /// The sample.
+        index: u64,
+        /// Its shard.
+        shard: u64,
+    },
+}
+
+/// A PNG of one sample of a run. Height and pressure maps are made again from the run's configuration; where that is
+/// not possible (a measured run) the stored pressure cells are drawn instead.
+pub fn sample_picture(folder: &RunFolder, index: u64) -> Result<Vec<u8>, PictureSampleError> {
+    let shard = index / folder.info().shard_samples;
+    if folder.finished(shard)?.is_none() {
+        return Err(PictureSampleError::NotDone { index, shard });
+    }
+    let record = ShardReader::open(&folder.shard_path(shard))?.record(index)?;
+    let press = press_again(folder, index);
+    let columns = 4;
+    let width = columns * (IMAGE.0 + MARGIN) + MARGIN;
+    let height = HEADER + CAPTION + IMAGE.1 + MARGIN + CAPTION + CURVE_HEIGHT + MARGIN;
+    let mut canvas = Canvas::new(width, height, PAPER);
+    let s = &record.sample;
+    canvas.text(&heading(s), f64::from(MARGIN), 10.0, Anchor::Left, TextStyle::title(INK));
+    canvas.text(&second_line(s), f64::from(MARGIN), 36.0, Anchor::Left, TextStyle::small(SOFT_INK));
+    let top = HEADER;
+    for (i, jaw) in Jaw::BOTH.into_iter().enumerate() {
+        let x = MARGIN + 2 * i as u32 * (IMAGE.0 + MARGIN);
+        draw_jaw(&mut canvas, (x, top), jaw, &record, press.as_ref());
+    }
+    draw_curve(&mut canvas, top + CAPTION + IMAGE.1 + MARGIN, width, &record);
+    Ok(canvas.into_png())
+}
+
+/// The imprints of a simulated sample.
+fn press_again(folder: &RunFolder, index: u64) -> Option<Press> {
+    let project = Project::from_run(folder).ok()?;
+    let twin = if project.sweep.varies_twin() {
+        project.sweep.twin_of(index, &project.twin_table).ok()?
+    } else {
+        project.twin.clone()
+    };
+    let scenario = project.sweep.scenario(index, &twin).ok()?;
+    press_only(&twin, &project.library, &scenario).ok()?
+}
+
+fn second_line(s: &Sample) -> String {
+    let mut text = details(s);
+    if let Some(mu) = s.mu {
+        text += &format!(", mu {mu:.4}");
+    }
+    if s.outside_fit {
+        text += ", friction law outside its fitted range";
+    }
+    text
+}
+
+/// Image and height map of a jaw side by side.
+fn draw_jaw(canvas: &mut Canvas, at: (u32, u32), jaw: Jaw, record: &Record, press: Option<&Press>) {
+    let (x, y) = (at.0, at.1 + CAPTION);
+    let small = TextStyle::small(INK);
+    canvas.text(&format!("{jaw} jaw, image"), f64::from(x), f64::from(at.1), Anchor::Left, small);
+    frame(canvas, x, y);
+    if let Some(images) = &record.images {
+        fit(canvas, x, y, (images[jaw].width_px, images[jaw].height_px), |u, v| pixel(&images[jaw], u, v));
+    }
+    let x = x + IMAGE.0 + MARGIN;
+    frame(canvas, x, y);
+    let contact = match jaw {
+        Jaw::Left => &record.sample.left,
+        Jaw::Right => &record.sample.right,
+    };
+    match (press, contact) {
+        (Some(press), Some(_)) => {
+            let imprint = &press.imprint[jaw];
+            let depth_mm = imprint.press_depth_m * 1e3;
+            let unit = press.sensors[jaw].grid.metres_per_px * 1e3;
+            let peak = imprint.patch.cells.iter().map(|c| c.pressure_pa()).fold(0.0, f64::max);
+            let caption = format!("depth to {depth_mm:.2} mm, cells to {:.2} MPa", peak * 1e-6);
+            canvas.text(&caption, f64::from(x), f64::from(at.1), Anchor::Left, small);
+            let plane = &imprint.depth_px;
+            let colour = |u, v| scale(f64::from(plane.at(u as usize, v as usize)) * unit / depth_mm);
+            fit(canvas, x, y, (plane.width as u32, plane.height as u32), colour);
+            draw_cells(canvas, x, y, plane, unit, contact.as_ref());
+        }
+        (None, Some(contact)) => {
+            let caption = format!("pressure cells, depth {:.2} mm", contact.press_depth_mm);
+            canvas.text(&caption, f64::from(x), f64::from(at.1), Anchor::Left, small);
+            draw_cells_alone(canvas, x, y, contact);
+        }
+        _ => canvas.text("no contact", f64::from(x), f64::from(at.1), Anchor::Left, small),
+    }
+}
+
+fn frame(canvas: &mut Canvas, x: u32, y: u32) {
+    canvas.rect(f64::from(x), f64::from(y), f64::from(IMAGE.0), f64::from(IMAGE.1), PANEL);
+}
+
+fn pixel(image: &TactileImage, u: u32, v: u32) -> Rgb {
+    let [r, g, b] = image.pixel(u, v);
+    Rgb(r, g, b)
+}
+
+/// Draws an image into the frame, as large as it fits, centred.
+fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour: impl Fn(u32, u32) -> Rgb) {
+    let (zoom, left, top) = placement(size);
+    let (width, height) = ((f64::from(size.0) * zoom) as u32, (f64::from(size.1) * zoom) as u32);
+    for row in 0..height {
+        for column in 0..width {
+            let u = ((f64::from(column) + 0.5) / zoom) as u32;
+            let v = ((f64::from(row) + 0.5) / zoom) as u32;
+            let ink = colour(u.min(size.0 - 1), v.min(size.1 - 1));
+            canvas.put(x + left + column, y + top + row, ink);
+        }
+    }
+}
+
+/// Zoom and margins of an image of this size in the frame.
+fn placement(size: (u32, u32)) -> (f64, u32, u32) {
+    let zoom = (f64::from(IMAGE.0) / f64::from(size.0)).min(f64::from(IMAGE.1) / f64::from(size.1));
+    let rest = |frame: u32, n: u32| ((f64::from(frame) - f64::from(n) * zoom) / 2.0).max(0.0) as u32;
+    (zoom, rest(IMAGE.0, size.0), rest(IMAGE.1, size.1))
+}
+
+/// The pressure cells over the depth map: a dot each, its area proportional to the force.
+fn draw_cells(
+    canvas: &mut Canvas,
+    x: u32,
+    y: u32,
+    plane: &Plane,
+    mm_per_px: f64,
+    contact: Option<&JawContact>,
+) {
+    let Some(contact) = contact else { return };
+    let size = (plane.width as u32, plane.height as u32);
+    let (zoom, left, top) = placement(size);
+    let largest = contact.cell_force_n.iter().fold(1e-9_f32, |a, &b| a.max(b));
+    for i in 0..contact.cell_force_n.len() {
+        let column = f64::from(contact.cell_x_mm[i]) / mm_per_px + f64::from(size.0) / 2.0;
+        let row = f64::from(contact.cell_y_mm[i]) / mm_per_px + f64::from(size.1) / 2.0;
+        let radius = 4.5 * f64::from(contact.cell_force_n[i] / largest).sqrt();
+        canvas.disc(f64::from(x + left) + column * zoom, f64::from(y + top) + row * zoom, radius, SLIP);
+    }
+}
+
+/// The pressure cells where no depth map can be made: their own extent fills the frame.
+fn draw_cells_alone(canvas: &mut Canvas, x: u32, y: u32, contact: &JawContact) {
+    let reach =
+        contact.cell_x_mm.iter().chain(&contact.cell_y_mm).fold(1e-3_f64, |a, &b| a.max(f64::from(b).abs()));
+    let zoom = 0.45 * f64::from(IMAGE.0.min(IMAGE.1)) / reach;
+    let largest = contact.cell_force_n.iter().fold(1e-9_f32, |a, &b| a.max(b));
+    for i in 0..contact.cell_force_n.len() {
+        let radius = 6.0 * f64::from(contact.cell_force_n[i] / largest).sqrt();
+        let (cx, cy) = (f64::from(x) + f64::from(IMAGE.0) / 2.0, f64::from(y) + f64::from(IMAGE.1) / 2.0);
+        let (dx, dy) = (f64::from(contact.cell_x_mm[i]) * zoom, f64::from(contact.cell_y_mm[i]) * zoom);
+        canvas.disc(cx + dx, cy + dy, radius, SLIP);
+    }
+}
+
+fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Record) {
+    let mut x = f64::from(MARGIN);
+    for (text, ink) in [
+        ("force / N:", INK),
+        ("command", COMMAND),
+        ("measured", MEASURED),
+        ("slip", SLIP),
+        ("displacement / mm (right)", DISPLACEMENT),
+    ] {
+        canvas.text(text, x, f64::from(top), Anchor::Left, TextStyle::small(ink));
+        x += 8.0 * (text.chars().count() + 2) as f64;
+    }
+    let area = Area {
+        x: f64::from(MARGIN),
+        y: f64::from(top + CAPTION),
+        width: f64::from(width - 2 * MARGIN),
+        height: f64::from(CURVE_HEIGHT),
+    };
+    canvas.rect(area.x, area.y, area.width, area.height, PANEL);
+    let s = &record.sample;
+    match &record.trace {
+        Some(trace) => {
+            let slip = s.slip_time_s.zip(s.max_pull_force_n);
+            pull_curve(canvas, area, &Curve { trace, slip, full: true });
+        }
+        None => {
+            let why = if s.failure.is_empty() { "this run stores no traces" } else { &s.failure };
+            canvas.text(why, area.x + 12.0, area.y + 12.0, Anchor::Left, TextStyle::small(SOFT_INK));
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! What a sweep will be: size, time, and whether its first samples work.
+
+use crate::project::Project;
+use crate::sweep::{encode_options, guarded};
+use gripgen_record::{PictureError, encode};
+use gripgen_tactile::SimdLevel;
+use gripgen_twin::Outcome;
+use std::time::{Duration, Instant};
+
+/// Samples that a plan tries out.
+const PROBES: u64 = 6;
+
+/// A sweep before it is run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Number of samples.
+    pub samples: u64,
+    /// Number of shards.
+    pub shards: u64,
+    /// Size on disk, from the samples tried out.
+    pub estimated_bytes: u64,
+    /// Processor time of the whole sweep, from the samples tried out.
+    pub estimated_cpu: Duration,
+    /// Samples tried out, and why they failed if they did.
+    pub probes: Vec<(u64, Option<String>)>,
+}
+
+/// Tries out a few samples spread over the sweep and extrapolates. Writes nothing.
+pub fn plan(project: &Project, simd: SimdLevel) -> Result<Plan, PictureError> {
+    let samples = project.sweep.samples;
+    let probes = PROBES.min(samples);
+    let (mut bytes, mut tried) = (0, Vec::new());
+    // The first sample also builds contact shapes, which later ones share.
+    guarded(project, 0, simd);
+    let start = Instant::now();
+    for i in 0..probes {
+        let index = ((i as f64 + 0.5) / probes as f64 * samples as f64) as u64;
+        let sample = guarded(project, index, simd);
+        let encoded = encode(&sample, &encode_options(project, index))?;
+        bytes += encoded.sample.len()
+            + encoded.images.as_ref().map_or(0, |both| both.left.len() + both.right.len())
+            + encoded.trace.as_ref().map_or(0, Vec::len)
+            + encoded.states.iter().map(|s| s.data.len() + 31).sum::<usize>();
+        let failure = match sample.outcome {
+            Outcome::Failed { reason } => Some(reason),
+            _ => None,
+        };
+        tried.push((index, failure));
+    }
+    let share = samples as f64 / probes as f64;
+    Ok(Plan {
+        samples,
+        shards: project.sweep.shards(),
+        estimated_bytes: (bytes as f64 * share) as u64,
+        estimated_cpu: start.elapsed().mul_f64(share),
+        probes: tried,
+    })
+}

@@ -1,0 +1,228 @@
+//! Data-driven: every file in `configs/invalid` has one fault and says in its head what the answer must contain.
+
+use crate::common::{project, root};
+use gripgen::twin::config::ConfigError;
+use gripgen::twin::draw::Drawn;
+use gripgen::{LoadError, Location, Project};
+use std::path::Path;
+
+struct Expected {
+    kind: String,
+    key: String,
+    says: Vec<String>,
+    hint: Option<String>,
+    at: Option<String>,
+}
+
+fn expected(text: &str) -> Expected {
+    let all = |name: &str| -> Vec<String> {
+        text.lines()
+            .filter_map(|l| l.strip_prefix(&format!("# {name}:")))
+            .map(|v| v.trim().to_string())
+            .collect()
+    };
+    let one = |name: &str| all(name).into_iter().next();
+    Expected {
+        kind: one("kind").unwrap(),
+        key: one("key").unwrap(),
+        says: all("says"),
+        hint: one("hint"),
+        at: one("at"),
+    }
+}
+
+/// Loads a faulty file: a sweep as it is, a twin through a minimal sweep beside it.
+fn load(path: &Path, kind: &str) -> LoadError {
+    let folder = tempfile::tempdir().unwrap();
+    let sweep = match kind {
+        "sweep" => path.to_path_buf(),
+        "twin" => {
+            let sweep = folder.path().join("sweep.toml");
+            std::fs::write(&sweep, format!("twin = {:?}\nsamples = 1\n", path.display().to_string()))
+                .unwrap();
+            sweep
+        }
+        other => panic!("{}: kind {other}", path.display()),
+    };
+    match Project::load(&Location::Disk(sweep), &[]) {
+        Ok(_) => panic!("{} was accepted", path.display()),
+        Err(e) => e,
+    }
+}
+
+fn check(path: &Path) {
+    let text = std::fs::read_to_string(path).unwrap();
+    let expected = expected(&text);
+    let name = path.file_name().unwrap().to_string_lossy();
+    let error = load(path, &expected.kind);
+    let message = error.to_string();
+    for part in &expected.says {
+        assert!(message.contains(part), "{name}: `{message}` does not say `{part}`");
+    }
+    let LoadError::Config(error) = error else {
+        assert!(expected.key.is_empty(), "{name}: `{message}` names no key");
+        return;
+    };
+    let ConfigError { key, hint, place, .. } = error;
+    assert_eq!(key, expected.key, "{name}: {message}");
+    match (&expected.hint, &hint) {
+        (None, _) => {}
+        (Some(part), Some(hint)) => assert!(hint.contains(part), "{name}: hint `{hint}` lacks `{part}`"),
+        (Some(part), None) => panic!("{name}: no hint, expected `{part}`"),
+    }
+    let place = place.unwrap_or_else(|| panic!("{name}: no place"));
+    assert!(place.file.ends_with(&*name), "{name}: placed in {}", place.file);
+    if let Some(at) = &expected.at {
+        let span = place.span.unwrap_or_else(|| panic!("{name}: no span"));
+        let shown = place.text[span].trim_matches('"');
+        assert_eq!(shown, at.trim_matches('"'), "{name}: the caret");
+    }
+}
+
+#[test]
+fn every_invalid_configuration_gets_one_clear_error() {
+    let mut files: Vec<_> =
+        std::fs::read_dir(root().join("tests/configs/invalid")).unwrap().map(|e| e.unwrap().path()).collect();
+    files.sort();
+    assert!(files.len() >= 30, "{} cases", files.len());
+    let failures: Vec<String> = files
+        .iter()
+        .filter_map(|f| {
+            let result = std::panic::catch_unwind(|| check(f));
+            result.err().map(|e| e.downcast_ref::<String>().cloned().unwrap_or_else(|| "?".into()))
+        })
+        .collect();
+    assert!(failures.is_empty(), "{} of {} cases:\n{}", failures.len(), files.len(), failures.join("\n"));
+}
+
+#[test]
+fn valid_and_shipped_configurations_load() {
+    for file in std::fs::read_dir(root().join("tests/configs/valid")).unwrap() {
+        let path = file.unwrap().path();
+        project(path.to_str().unwrap(), &[]);
+    }
+    let quickstart = project("asset:configs/quickstart.toml", &[]);
+    assert_eq!(quickstart.sweep.samples, 200);
+    let on_disk = project(root().join("assets/configs/quickstart.toml").to_str().unwrap(), &[]);
+    assert_eq!(on_disk.config_sha256, quickstart.config_sha256, "embedded and checked out are the same run");
+    assert_eq!(project("asset:configs/paper.toml", &[]).sweep.samples, 4 * 13 * 10);
+}
+
+/// The baseline is the paper's twin without its effects, so the two cannot drift apart.
+#[test]
+fn the_two_shipped_twins_differ_in_effects_only() {
+    let load = |name: &str| -> toml::Table {
+        std::fs::read_to_string(root().join("assets/configs").join(name)).unwrap().parse().unwrap()
+    };
+    let (mut twin, baseline) = (load("twin.toml"), load("twin-baseline.toml"));
+    assert!(twin.remove("effects").is_some());
+    assert_eq!(twin, baseline);
+}
+
+#[test]
+fn overrides_reach_sweep_and_twin_and_are_named_in_errors() {
+    let p = project("asset:configs/quickstart.toml", &["seed=99", "parts.gear.mu=0.3", "images=none"]);
+    assert_eq!((p.sweep.seed, p.twin.parts["gear"].mu), (99, 0.3));
+    let sets = [("parts.gear.mu".to_string(), "-1".to_string())];
+    let error = Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).err().unwrap();
+    assert_eq!(
+        error.to_string(),
+        "command line:1:7: parts.gear.mu: -1 is out of range, it must be at least 0 and at most 5"
+    );
+}
+
+/// With the WSG's own convention a commanded force is the sum over both jaws.
+#[test]
+fn a_total_grip_force_is_half_as_much_per_jaw() {
+    let force = |convention: &str| {
+        let sets = ["vary.grip_force_n=[40]", &format!("gripper.force_convention={convention}")];
+        let p = project("asset:configs/quickstart.toml", &sets);
+        p.sweep.scenario(0, &p.twin).unwrap().grip_force_n
+    };
+    assert_eq!((force("per_jaw"), force("total")), (40.0, 20.0));
+    // And the limit of the gripper is per jaw: 120 N in total are 60 N per jaw.
+    let sets = ["vary.grip_force_n=[120]", "gripper.force_convention=total"];
+    project("asset:configs/quickstart.toml", &sets);
+}
+
+/// A hash names what a sample depends on: contents, not paths or order.
+#[test]
+fn the_hash_covers_contents_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |sub: &str, mesh: &[u8], twin_extra: &str| -> String {
+        let at = folder.path().join(sub);
+        std::fs::create_dir_all(&at).unwrap();
+        std::fs::write(at.join("gear.stl"), mesh).unwrap();
+        let twin =
+            format!("[parts.gear]\nmesh = \"gear.stl\"\nmu = 0.15\nimprint_mm3_per_n = 1.5\n{twin_extra}");
+        std::fs::write(at.join("t.toml"), twin).unwrap();
+        std::fs::write(at.join("s.toml"), "samples = 3\ntwin = \"t.toml\"\n").unwrap();
+        project(at.join("s.toml").to_str().unwrap(), &[]).config_sha256
+    };
+    let mesh = gripgen::assets::get("parts/gear/part.stl").unwrap();
+    let shaft = gripgen::assets::get("parts/long_shaft/part.stl").unwrap();
+    let first = write("a", mesh, "");
+    assert_eq!(first, write("b/c", mesh, ""), "moved");
+    assert_ne!(first, write("d", shaft, ""), "another mesh under the same name");
+    assert_ne!(first, write("e", mesh, "scatter = 0.01\n"), "another twin");
+}
+
+#[test]
+fn draws_follow_the_design() {
+    let grid = project(root().join("tests/configs/valid/grid.toml").to_str().unwrap(), &[]);
+    assert_eq!(grid.sweep.samples, 12);
+    let seen: std::collections::BTreeSet<(String, String)> = (0..12)
+        .map(|i| {
+            let d = grid.sweep.drawn(i);
+            (d["part"].to_string(), d["grip_force_n"].to_string())
+        })
+        .collect();
+    assert_eq!(seen.len(), 4, "every combination");
+    let offset = |i| grid.sweep.drawn(i)["grip_offset_mm"].clone();
+    assert_eq!((offset(0), offset(1)), (offset(2), offset(2)), "repetitions share what was drawn");
+    assert_ne!(offset(0), offset(3));
+
+    let sobol = project(root().join("tests/configs/valid/sobol.toml").to_str().unwrap(), &[]);
+    let mut cells = [0; 16];
+    for i in 0..16 {
+        let Drawn::Number(force) = sobol.sweep.drawn(i)["grip_force_n"] else { panic!("a number") };
+        cells[((force - 20.0) / 60.0 * 16.0) as usize] += 1;
+    }
+    assert_eq!(cells, [1; 16], "16 points of a Sobol sequence fill 16 cells");
+}
+
+/// Adding a key leaves the draws of the others alone, and so does its position in the file.
+#[test]
+fn keys_are_drawn_independently() {
+    let one = project("asset:configs/quickstart.toml", &["design=random", "samples=20"]);
+    let two = project(
+        "asset:configs/quickstart.toml",
+        &["design=random", "samples=20", "vary.dwell_s={ uniform = [1, 9] }"],
+    );
+    for i in 0..20 {
+        let (a, mut b) = (one.sweep.drawn(i), two.sweep.drawn(i));
+        assert!(b.remove("dwell_s").is_some());
+        assert_eq!(a, b);
+    }
+}
+
+#[test]
+fn calibrated_intervals_become_draws() {
+    let folder = tempfile::tempdir().unwrap();
+    let twin = "[parts.gear]\nmesh = \"asset:parts/gear/part.stl\"\nmu = 0.15\nimprint_mm3_per_n = 1.5\n\
+                [parts.gear.calibration.mu]\nlow90 = 0.14\nhigh90 = 0.16\nevidence = \"12 pulls\"\n";
+    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
+    let sweep = "twin = \"twin.toml\"\nsamples = 4000\n[vary]\n\"parts.gear.mu\" = { from = \"interval\" }\n";
+    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
+    let p = project(folder.path().join("sweep.toml").to_str().unwrap(), &[]);
+    let values: Vec<f64> = (0..4000)
+        .map(|i| match p.sweep.drawn(i)["parts.gear.mu"] {
+            Drawn::Number(x) => x,
+            Drawn::Text(_) => panic!("a number"),
+        })
+        .collect();
+    let inside = values.iter().filter(|x| (0.14..=0.16).contains(*x)).count() as f64 / 4000.0;
+    assert!((inside - 0.9).abs() < 0.02, "{inside} of the draws lie in the 90 % interval");
+    let twin = p.sweep.twin_of(3, &p.twin_table).unwrap();
+    assert_eq!(twin.parts["gear"].mu, values[3]);
+}

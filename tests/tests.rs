@@ -1,0 +1,20 @@
+//! The one integration binary of the root package.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
+
+// What several tests share.
+mod common;
+// Every configuration fault is one clear error that names its key.
+mod config;
+// The same bytes for any number of threads, slices, vector units, and after an interruption.
+mod determinism;
+// Numbers that Wucherer et al. 2023 print.
+mod paper;
+// Labels against closed forms, through the whole pipeline.
+mod pull;
+// What is written is what was simulated.
+mod roundtrip;
+// Files of Taxim.
+mod taxim;
+// The repository itself.
+mod tidy;

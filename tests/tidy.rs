@@ -1,0 +1,206 @@
+//! The repository itself.
+
+use crate::common::root;
+use std::path::{Path, PathBuf};
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+/// Files below a folder, without what is built.
+fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if ["target", ".git", "runs", "__pycache__"].contains(&name.as_str()) {
+            continue;
+        }
+        if path.is_dir() {
+            files(&path, found);
+        } else {
+            found.push(path);
+        }
+    }
+}
+
+fn with_extension(extensions: &[&str]) -> Vec<PathBuf> {
+    let mut all = Vec::new();
+    files(&root(), &mut all);
+    all.retain(|p| p.extension().is_some_and(|e| extensions.contains(&&*e.to_string_lossy())));
+    all
+}
+
+/// Every path in backquotes that looks like one of ours exists.
+#[test]
+fn paths_named_in_the_documentation_exist() {
+    let mut checked = 0;
+    for document in ["ARCHITECTURE.md", "README.md", "docs/model.md", "docs/format.md"] {
+        let text = read(document);
+        for word in text.split('`').skip(1).step_by(2) {
+            let ours = ["crates/", "src/", "assets/", "docs/", "tests/", "benches/", "xtask/"];
+            if ours.iter().any(|p| word.starts_with(p)) && !word.contains(['<', '*', ' ']) {
+                checked += 1;
+                assert!(root().join(word.trim_end_matches('/')).exists(), "{document} names `{word}`");
+            }
+        }
+    }
+    assert!(checked > 40, "only {checked} paths checked");
+}
+
+/// Every test that docs/model.md names is there.
+#[test]
+fn tests_named_in_the_model_exist() {
+    let sources: String =
+        with_extension(&["rs", "py"]).iter().map(|p| std::fs::read_to_string(p).unwrap()).collect();
+    let text = read("docs/model.md");
+    let mut named = 0;
+    for word in text.split('`').skip(1).step_by(2) {
+        let is_name =
+            word.len() > 20 && word.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+        if is_name {
+            named += 1;
+            let found =
+                sources.contains(&format!("fn {word}(")) || sources.contains(&format!("def test_{word}("));
+            assert!(found, "docs/model.md names the test `{word}`");
+        }
+    }
+    assert!(named > 25, "only {named} tests named");
+}
+
+/// Code files stay short enough to read at once.
+#[test]
+fn no_code_file_is_longer_than_500_lines() {
+    for path in with_extension(&["rs", "py", "wgsl"]) {
+        let lines = std::fs::read_to_string(&path).unwrap().lines().count();
+        let table = path.ends_with("proto/gripgen.v1.rs");
+        assert!(lines <= 500 || table, "{} has {lines} lines", path.display());
+    }
+}
+
+/// The arrows between packages are those of ARCHITECTURE.md.
+#[test]
+fn packages_depend_on_each_other_as_drawn() {
+    let allowed = [
+        ("crates/twin", &[][..]),
+        ("crates/physics", &["gripgen-twin"][..]),
+        ("crates/tactile", &["gripgen-twin"][..]),
+        ("crates/record", &["gripgen-twin"][..]),
+        (".", &["gripgen-physics", "gripgen-record", "gripgen-tactile", "gripgen-twin"][..]),
+        ("crates/cli", &["gripgen"][..]),
+        ("xtask", &[][..]),
+    ];
+    for (package, arrows) in allowed {
+        let manifest: toml::Table = read(&format!("{package}/Cargo.toml")).parse().unwrap();
+        let dependencies =
+            manifest.get("dependencies").and_then(toml::Value::as_table).cloned().unwrap_or_default();
+        let ours: Vec<&String> = dependencies.keys().filter(|k| k.starts_with("gripgen")).collect();
+        assert_eq!(ours, arrows, "{package}");
+    }
+}
+
+/// `twin` opens no file, reads no clock, starts no thread; only the sweep starts threads.
+#[test]
+fn absences_that_the_architecture_promises() {
+    for path in with_extension(&["rs"]) {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let relative = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
+        if relative.ends_with("/tests.rs") || relative.contains("/examples/") {
+            continue;
+        }
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        let absent: &[&str] = if relative.starts_with("crates/twin/src") {
+            &["std::fs", "std::time", "std::thread", "std::net", "Instant::now"]
+        } else if relative.starts_with("crates/physics/src") || relative.starts_with("crates/tactile/src") {
+            &[
+                "std::fs",
+                "std::time",
+                "std::thread",
+                "std::net",
+                "Instant::now",
+                ".sin()",
+                ".cos()",
+                ".exp()",
+                ".ln()",
+            ]
+        } else {
+            &["std::net"]
+        };
+        for word in absent {
+            assert!(!code.contains(word), "{relative} uses {word}");
+        }
+    }
+}
+
+/// Keys of configuration files carry their unit.
+#[test]
+fn configuration_keys_carry_their_units() {
+    let plain = [
+        "mu",
+        "scatter",
+        "seed",
+        "samples",
+        "repetitions",
+        "value",
+        "jitter",
+        "shard_samples",
+        "a",
+        "low90",
+        "high90",
+        "grip_pose",
+        "kinetic_ratio",
+        "restore_depth_fraction",
+        "direction",
+    ];
+    let units = [
+        "_n",
+        "_mm",
+        "_m",
+        "_s",
+        "_hz",
+        "_deg",
+        "_rad",
+        "_c",
+        "_kg",
+        "_px",
+        "_per_n",
+        "_per_m",
+        "_per_mm",
+        "_per_unit",
+    ];
+    for file in [
+        "assets/configs/twin.toml",
+        "assets/configs/quickstart.toml",
+        "assets/configs/paper.toml",
+        "assets/templates/sweep.toml",
+        "assets/templates/twin.toml",
+    ] {
+        let table: toml::Table = read(file).parse().unwrap();
+        check_units(&toml::Value::Table(table), file, "", &plain, &units);
+    }
+}
+
+fn check_units(value: &toml::Value, file: &str, key: &str, plain: &[&str], units: &[&str]) {
+    match value {
+        toml::Value::Table(t) => t.iter().for_each(|(k, v)| {
+            // The names of distributions are not quantities; the key above them is.
+            let shown = if ["uniform", "normal", "log_uniform"].contains(&k.as_str()) { key } else { k };
+            check_units(v, file, shown, plain, units);
+        }),
+        toml::Value::Array(a) => a.iter().for_each(|v| check_units(v, file, key, plain, units)),
+        toml::Value::Integer(_) | toml::Value::Float(_) => {
+            let leaf = key.rsplit('.').next().unwrap_or(key);
+            let good = plain.contains(&leaf) || units.iter().any(|u| leaf.ends_with(u));
+            assert!(good, "{file}: `{key}` has no unit in its name");
+        }
+        _ => {}
+    }
+}
+
+/// Every asset says where it comes from.
+#[test]
+fn assets_state_their_provenance() {
+    for folder in ["assets", "assets/parts", "assets/sensors/gelsight_r15", "assets/configs"] {
+        let text = read(&format!("{folder}/README.md"));
+        assert!(text.len() > 300, "{folder}/README.md is too short to be of use");
+    }
+}

@@ -1,0 +1,111 @@
+//! Tasks of gripgen's developers. No dependencies, so that it is built in a second.
+//!
+//! `cargo xtask test` sets up what the tests need and runs all of them; `cargo xtask test --all` adds the slow ones;
+//! `cargo xtask assets [--check]` makes the shipped meshes and the shipped sensor from the numbers beside them.
+
+mod python;
+mod vulkan;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::time::Instant;
+
+/// The root of the repository.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new(".")).to_path_buf()
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let result = match words[..] {
+        ["test"] => test(false),
+        ["test", "--all"] => test(true),
+        ["assets"] => assets(false),
+        ["assets", "--check"] => assets(true),
+        _ => Err("usage: cargo xtask test [--all] | assets [--check]".into()),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("xtask: {e}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs a command in the root folder and shows what it is; fails if it fails.
+fn run(what: &str, command: &mut Command) -> Result<(), String> {
+    eprintln!("\n== {what}");
+    let start = Instant::now();
+    let status = command.current_dir(root()).status().map_err(|e| format!("{what}: {e}"))?;
+    let seconds = start.elapsed().as_secs_f64();
+    if status.success() {
+        eprintln!("== {what}: {seconds:.0} s");
+        return Ok(());
+    }
+    Err(format!("{what}: {status} after {seconds:.0} s"))
+}
+
+fn cargo(arguments: &[&str]) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.args(arguments);
+    command
+}
+
+fn test(all: bool) -> Result<(), String> {
+    let start = Instant::now();
+    let vulkan = vulkan::set_up();
+    let python = python::set_up(&root())?;
+    run("format", &mut cargo(&["fmt", "--all", "--check"]))?;
+    let clippy = ["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"];
+    run("clippy", &mut cargo(&clippy))?;
+    let mut rust = cargo(&["test", "--workspace", "--no-fail-fast"]);
+    // Tests that need a GPU are ignored, with this reason, where there is no driver.
+    if let Err(reason) = &vulkan {
+        eprintln!("\nno Vulkan driver ({reason}): GPU tests will read ignored");
+    } else {
+        rust.env("GRIPGEN_VULKAN", "1");
+    }
+    run("Rust tests", &mut rust)?;
+    assets(true)?;
+    let mut checks = python::pytest(&python, &root());
+    if all {
+        checks.env("GRIPGEN_SLOW_TESTS", "1");
+    }
+    run("Python checks", &mut checks)?;
+    eprintln!("\nall tests passed in {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn assets(check: bool) -> Result<(), String> {
+    let mut arguments = vec!["run", "--quiet", "--package", "gripgen-tactile", "--example", "make_assets"];
+    if check {
+        arguments.extend(["--", "--check"]);
+    }
+    run("assets", &mut cargo(&arguments))
+}
+
+/// Whether this process may install packages with apt-get.
+fn can_install() -> bool {
+    let root_user = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.starts_with(b"0\n"));
+    let apt = Command::new("apt-get").arg("--version").output().is_ok_and(|o| o.status.success());
+    root_user && apt
+}
+
+/// Installs a Debian package, saying so.
+fn apt_install(package: &str, why: &str) -> Result<(), String> {
+    eprintln!("installing the Debian package {package}: {why}");
+    for arguments in [&["update", "-qq"][..], &["install", "-y", "-qq", "--no-install-recommends", package]] {
+        let status = Command::new("apt-get")
+            .args(arguments)
+            .env("DEBIAN_FRONTEND", "noninteractive")
+            .stdout(std::process::Stdio::null())
+            .status()
+            .map_err(|e| format!("apt-get: {e}"))?;
+        if !status.success() {
+            return Err(format!("apt-get {}: {status}", arguments[0]));
+        }
+    }
+    Ok(())
+}
