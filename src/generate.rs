@@ -14,10 +14,6 @@ use gripgen_twin::{
 };
 use std::sync::Arc;
 
-/// Standard gravity. The part is fixed and the arm carries the gripper, so it acts on nothing here; it is set so that
-/// the world is the real one.
-const GRAVITY_M_PER_S2: f64 = 9.80665;
-
 /// Why a sample failed. It keeps its place in the data set.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -167,7 +163,6 @@ fn grip_setup<'a>(
         grip_force_n: PerJaw { left: scenario.grip_force_n, right: scenario.grip_force_n },
         direction: scenario.pull.direction.map(|x| x * c.pull_direction),
         mount: Mount::Fixed,
-        gravity_m_per_s2: GRAVITY_M_PER_S2,
     }
 }
 

@@ -28,9 +28,11 @@ impl ForceLoop {
         Self { robot, force_n: 0.0, pending: VecDeque::new(), effective_n: 0.0 }
     }
 
-    /// Starts from a force that already acts, as after a velocity command.
+    /// Starts from a force that already acts, as after a velocity command. Commands still under way are void.
     pub(crate) fn take_over(&mut self, force_n: f64) {
         self.force_n = force_n;
+        self.effective_n = force_n;
+        self.pending.clear();
     }
 
     /// Advances by `step_s` and returns the force before damping. `measured_n` and `contact_n` are those of the

@@ -1,19 +1,14 @@
 //! Closing the jaws on a part.
 
-use crate::contact::{ContactForce, contact_force};
+use crate::scene::{Rig, build, pad_shape, rapier_pose, vector};
 use crate::session::{JawFriction, PullSession, SessionStart};
 use crate::shape::PartShape;
 use crate::world::World;
 use gripgen_twin::frames::{Pose, world_from_gel};
 use gripgen_twin::random::Stream;
 use gripgen_twin::{Gel, Grasp, Gripper, Jaw, PerJaw, Robot, Wrist};
-use nalgebra::Vector3;
 use rapier3d_f64::parry::query::{ShapeCastOptions, cast_shapes};
 use rapier3d_f64::prelude as rapier;
-use rapier3d_f64::prelude::{
-    CoefficientCombineRule, ColliderBuilder, ColliderHandle, LockedAxes, MassProperties,
-    PrismaticJointBuilder, RigidBodyBuilder, RigidBodyHandle, Shape,
-};
 
 /// A grip has settled when each jaw's normal force is this close to the grip force, as a fraction.
 const SETTLED_FRACTION: f64 = 1e-4;
@@ -26,10 +21,12 @@ const SETTLE_S: (f64, f64) = (0.1, 2.0);
 pub enum Mount {
     /// Fixed to the world, as in the experiment.
     Fixed,
-    /// Free: only the jaws carry it against gravity.
+    /// Free: only the jaws carry it against gravity, which acts along -z of `world`.
     Free {
         /// Its mass.
         mass_kg: f64,
+        /// Strength of gravity.
+        gravity_m_per_s2: f64,
     },
 }
 
@@ -52,10 +49,8 @@ pub struct GripSetup<'a> {
     pub grip_force_n: PerJaw<f64>,
     /// Unit vector of the pull, at right angles to the jaw axis (y of `world`).
     pub direction: [f64; 3],
-    /// What else holds the part.
+    /// What else holds the part. The arm carries the gripper's own weight.
     pub mount: Mount,
-    /// Strength of gravity, along -z of `world`; the arm carries the gripper's own weight.
-    pub gravity_m_per_s2: f64,
 }
 
 /// What became of a grip.
@@ -121,7 +116,11 @@ pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
             None => return Ok(Grip::NoContact),
         }
     }
-    let mut world = World::new(setup.wrist.step_s(), setup.gravity_m_per_s2);
+    let gravity_m_per_s2 = match setup.mount {
+        Mount::Fixed => 0.0,
+        Mount::Free { gravity_m_per_s2, .. } => gravity_m_per_s2,
+    };
+    let mut world = World::new(setup.wrist.step_s(), gravity_m_per_s2);
     let rig = build(&mut world, setup, &touch);
     settle(&mut world, &rig, setup)?;
     let distance = PerJaw::from_fn(|jaw| {

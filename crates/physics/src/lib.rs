@@ -14,6 +14,7 @@
 mod contact;
 mod force_loop;
 mod grip;
+mod scene;
 mod session;
 mod shape;
 mod staircase;

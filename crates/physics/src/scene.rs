@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use rapier3d_f64::prelude as rapier;
 use rapier3d_f64::prelude::{
     CoefficientCombineRule, ColliderBuilder, ColliderHandle, LockedAxes, MassProperties,
-    PrismaticJointBuilder, RigidBodyBuilder, RigidBodyHandle,
+    PrismaticJointBuilder, RigidBodyBuilder, RigidBodyHandle, Shape,
 };
 
 /// Damping of a closing jaw, per jaw mass: a jaw comes to rest within a few hundredths of a second.
@@ -63,7 +63,7 @@ impl Rig {
 }
 
 /// Puts part, carriage, jaws and pads into the world; the jaws stand [`CLOSING_GAP_M`] off the part.
-fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64>) -> Rig {
+pub(crate) fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64>) -> Rig {
     let direction = vector(setup.direction);
     let inertia = |mass_kg: f64| {
         // A compact body of steel density; rotations are locked by the joints, so only its order matters.
@@ -77,7 +77,7 @@ fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64>) -> Rig {
     let pose = rapier_pose(&setup.world_from_part);
     let part = match setup.mount {
         Mount::Fixed => RigidBodyBuilder::fixed().pose(pose),
-        Mount::Free { mass_kg } => {
+        Mount::Free { mass_kg, .. } => {
             // Held in place while the jaws close, which they do without friction.
             let everything = LockedAxes::TRANSLATION_LOCKED | LockedAxes::ROTATION_LOCKED;
             let body = RigidBodyBuilder::dynamic().pose(pose).gravity_scale(0.0);
@@ -118,15 +118,15 @@ fn pad_half_extents(gel: &Gel) -> rapier::Vector {
     rapier::Vector::new(gel.width_m / 2.0, gel.thickness_m / 2.0, gel.height_m / 2.0)
 }
 
-fn pad_shape(gel: &Gel) -> impl Shape + use<> {
+pub(crate) fn pad_shape(gel: &Gel) -> impl Shape + use<> {
     rapier::Cuboid::new(pad_half_extents(gel))
 }
 
-fn vector(v: [f64; 3]) -> rapier::Vector {
+pub(crate) fn vector(v: [f64; 3]) -> rapier::Vector {
     rapier::Vector::new(v[0], v[1], v[2])
 }
 
-fn rapier_pose(pose: &Pose) -> rapier::Pose {
+pub(crate) fn rapier_pose(pose: &Pose) -> rapier::Pose {
     let t: Vector3<f64> = pose.translation.vector;
     let q = pose.rotation.quaternion();
     rapier::Pose::from_parts(

@@ -3,14 +3,18 @@
 #[cfg(test)]
 use crate::contact::ContactForce;
 use crate::force_loop::ForceLoop;
-use crate::grip::Rig;
+use crate::scene::Rig;
 use crate::world::World;
 use gripgen_twin::random::Stream;
 use gripgen_twin::{PerJaw, Robot, Wrist};
 use rapier3d_f64::prelude as rapier;
 
-/// Speed above which the jaws count as sliding, so that kinetic friction acts.
+/// Speed above which jaws at their limit count as sliding, so that kinetic friction acts.
 const SLIDING_M_PER_S: f64 = 1e-4;
+
+/// Share of the jaws' static limits that the contact has to carry before they can slide: motion under less is gel
+/// shear and the engine's own pre-slip drift, however fast the force rises.
+const AT_LIMIT: f64 = 0.99;
 
 /// Speed below which sliding jaws stick again.
 const STICKING_M_PER_S: f64 = 1e-5;
@@ -89,6 +93,8 @@ pub struct PullSession {
     shear_stiffness_n_per_m: f64,
     /// Static friction coefficient of each pad: its limit over its settled normal force.
     pad_friction: PerJaw<f64>,
+    /// What both jaws hold together before they slip.
+    limit_n: f64,
     kinetic_ratio: PerJaw<f64>,
     control: ForceLoop,
     noise: Stream,
@@ -97,6 +103,7 @@ pub struct PullSession {
     target_m: Option<f64>,
     momentum_n_s: f64,
     refresh_contacts: bool,
+    has_slid: bool,
     state: PullState,
 }
 
@@ -116,11 +123,13 @@ impl PullSession {
             direction,
             shear_stiffness_n_per_m: start.shear_stiffness_n_per_m,
             pad_friction: friction.map(|jaw, f| f.limit_n / start.normal_force_n[jaw]),
+            limit_n: friction.left.limit_n + friction.right.limit_n,
             kinetic_ratio: friction.map(|_, f| f.kinetic_ratio),
             control: ForceLoop::new(robot),
             noise,
             target_m: None,
             refresh_contacts: false,
+            has_slid: false,
             state: PullState {
                 time_s: 0.0,
                 contact_force_n: 0.0,
@@ -138,6 +147,11 @@ impl PullSession {
     /// The state after the last step.
     pub fn state(&self) -> PullState {
         self.state
+    }
+
+    /// Whether the jaws have slid on the part since the start of the pull.
+    pub fn has_slid(&self) -> bool {
+        self.has_slid
     }
 
     /// Readings of the wrist sensor per second; the time between two of them is the natural step.
@@ -212,7 +226,13 @@ impl PullSession {
         self.momentum_n_s = momentum;
         let speed_m_per_s = self.world.bodies[self.rig.carriage].linvel().dot(self.direction);
         let was_sliding = self.state.sliding;
-        let sliding = speed_m_per_s.abs() > if was_sliding { STICKING_M_PER_S } else { SLIDING_M_PER_S };
+        let speed = speed_m_per_s.abs();
+        let sliding = if was_sliding {
+            speed > STICKING_M_PER_S
+        } else {
+            speed > SLIDING_M_PER_S && contact_force_n.abs() >= AT_LIMIT * self.limit_n
+        };
+        self.has_slid |= sliding;
         self.state = PullState {
             time_s: self.state.time_s + step_s,
             contact_force_n,

@@ -46,7 +46,7 @@ pub fn pull_staircase(
             displacement_m: state.displacement_m,
         });
         if state.displacement_m > pull.stop_m {
-            break PullEnd::Displacement;
+            break if session.has_slid() { PullEnd::Displacement } else { PullEnd::Stretch };
         }
         if pull.max_force_n.is_some_and(|limit| desired_force_n > limit) {
             break PullEnd::ForceLimit;

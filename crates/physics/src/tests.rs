@@ -18,7 +18,6 @@ struct Bench {
     world_from_part: Pose,
     grip_force_n: f64,
     mount: Mount,
-    gravity_m_per_s2: f64,
     kinetic_ratio: f64,
     noise_n: f64,
 }
@@ -47,7 +46,6 @@ impl Bench {
             world_from_part: Pose::identity(),
             grip_force_n,
             mount: Mount::Fixed,
-            gravity_m_per_s2: 0.0,
             kinetic_ratio: 1.0,
             noise_n: 0.0,
         }
@@ -70,7 +68,6 @@ impl Bench {
             grip_force_n: PerJaw { left: self.grip_force_n, right: self.grip_force_n },
             direction: [0.0, 0.0, 1.0],
             mount: self.mount,
-            gravity_m_per_s2: self.gravity_m_per_s2,
         })
     }
 
@@ -222,6 +219,104 @@ fn kinetic_friction_acts_as_soon_as_the_jaws_slide() {
     }
 }
 
+/// A large step moves the jaws fast while the gels shear; that is no sliding, and static friction holds on.
+#[test]
+fn kinetic_friction_waits_for_the_limit_however_fast_the_force_rises() {
+    for (increment_n, lag_s) in [(10.0, 0.05), (19.0, 0.05), (50.0, 0.05), (50.0, 0.0)] {
+        let mut bench = Bench::new(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+        bench.kinetic_ratio = 0.5;
+        bench.robot.lag_s = lag_s;
+        let settings = PullSettings { increment_n, ..settings() };
+        let staircase = Staircase::constant(increment_n, settings.step_s, settings.max_time_s);
+        let result = pull_staircase(&mut bench.session(0.25), &staircase, &settings).unwrap();
+        let peak = result.trace.measured_force_n.iter().fold(0.0_f64, |a, &b| a.max(b));
+        assert!((peak / 20.0 - 1.0).abs() < 0.02, "steps of {increment_n} N, lag {lag_s} s: peak {peak} N");
+        assert_eq!(result.end, PullEnd::Displacement);
+    }
+}
+
+/// Gels so soft that they stretch to the displacement stop: nothing slipped, and the label is a lower bound.
+#[test]
+fn a_stop_that_gel_shear_alone_reaches_is_no_slip() {
+    let mut bench = Bench::new(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+    for jaw in gripgen_twin::Jaw::BOTH {
+        bench.gel[jaw].shear_stiffness_n_per_m = 500.0;
+    }
+    let result = bench.pull(0.25);
+    assert_eq!(result.end, PullEnd::Stretch);
+    let label = slip_label(&result.trace, 3.0, result.end).unwrap();
+    assert!(label.censored && (label.max_pull_force_n - 5.0).abs() < 0.5, "{label:?}");
+    assert_eq!(
+        Bench { gel: bench.gel.map(|_, g| Gel { shear_stiffness_n_per_m: 2e4, ..g.clone() }), ..bench }
+            .pull(0.25)
+            .end,
+        PullEnd::Displacement
+    );
+}
+
+/// Dead time shifts the answer of the whole rig: the measured force follows the staircase by the lag plus the dead
+/// time, and the slip force stays.
+#[test]
+fn dead_time_delays_the_force_and_leaves_the_slip_force() {
+    let trace_of = |dead_time_s: f64| {
+        let mut bench = Bench::new(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+        bench.robot.dead_time_s = dead_time_s;
+        bench.pull(0.168).trace
+    };
+    let (prompt, late) = (trace_of(0.0), trace_of(0.05));
+    let shift = (0.05 / STEP_S) as usize;
+    for i in 200..400 {
+        let (a, b) = (prompt.measured_force_n[i], late.measured_force_n[i + shift]);
+        assert!((a - b).abs() < 1e-3, "row {i}: {a} N and {b} N");
+    }
+    let peak = |t: &gripgen_twin::PullTrace| t.measured_force_n.iter().fold(0.0_f64, |a, &b| a.max(b));
+    assert!((peak(&prompt) - peak(&late)).abs() < 0.01, "{} and {}", peak(&prompt), peak(&late));
+}
+
+/// Uneven steps move when the force rises, not the force at which the jaws slip.
+#[test]
+fn jittered_steps_leave_the_slip_force() {
+    let settings = PullSettings { step_jitter: 0.3, ..settings() };
+    let bench = Bench::new(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+    let even = bench.pull(0.168).trace;
+    let peak = |t: &gripgen_twin::PullTrace| t.measured_force_n.iter().fold(0.0_f64, |a, &b| a.max(b));
+    for seed in 0..3 {
+        let staircase = staircase_of(&settings, &mut Stream::new(seed, 0, Purpose::StepJitter));
+        let result = pull_staircase(&mut bench.session(0.168), &staircase, &settings).unwrap();
+        assert_ne!(result.trace.desired_force_n, even.desired_force_n, "the steps should differ");
+        assert!((peak(&result.trace) - peak(&even)).abs() < 0.01);
+        let steps: Vec<f64> = (1..result.trace.len())
+            .filter(|&i| result.trace.desired_force_n[i] > result.trace.desired_force_n[i - 1])
+            .map(|i| result.trace.time_s[i])
+            .collect();
+        for pair in steps.windows(2) {
+            let length = pair[1] - pair[0];
+            assert!((0.104 * 0.7 - STEP_S..=0.104 * 1.3 + STEP_S).contains(&length), "a step of {length} s");
+        }
+    }
+}
+
+/// A policy may change from speed to force: the force goes on from what acts, and old commands are void.
+#[test]
+fn a_force_command_after_a_velocity_command_starts_from_the_force_that_acts() {
+    let mut bench = Bench::new(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+    bench.robot.dead_time_s = 0.02;
+    let mut session = bench.session(0.3);
+    session.step(Command::ForceN(2.0), 0.01).unwrap();
+    let pulled = session.step(Command::SpeedMPerS(5e-4), 0.5).unwrap();
+    assert!(pulled.contact_force_n > 5.0, "{pulled:?}");
+    for i in 0..60 {
+        let state = session.step(Command::ForceN(pulled.contact_force_n), STEP_S).unwrap();
+        let jump = (state.contact_force_n - pulled.contact_force_n).abs();
+        assert!(
+            jump < 0.1 * pulled.contact_force_n,
+            "step {i}: {} N after {} N",
+            state.contact_force_n,
+            pulled.contact_force_n
+        );
+    }
+}
+
 /// A loaded grip below its limit stays where it is: MuJoCo creeps 0.04 to 4 mm/s here.
 #[test]
 fn a_grip_below_its_limit_does_not_creep() {
@@ -244,8 +339,7 @@ fn a_grip_below_its_limit_does_not_creep() {
 fn a_part_held_at_rest_reads_its_weight() {
     for mass_kg in [0.1, 0.5, 1.5] {
         let mut bench = Bench::new(PartShape::cuboid([0.06, 0.02, 0.03]), 40.0);
-        bench.mount = Mount::Free { mass_kg };
-        bench.gravity_m_per_s2 = 9.80665;
+        bench.mount = Mount::Free { mass_kg, gravity_m_per_s2: 9.80665 };
         let mut session = bench.session(0.5);
         let state = session.step(Command::SpeedMPerS(0.0), 2.0).unwrap();
         let weight = mass_kg * 9.80665;

@@ -11,10 +11,10 @@ mod keys;
 mod sweep_file;
 mod twin_file;
 
-pub use document::{Document, Place};
 pub(crate) use document::read_twin_table;
-pub(crate) use keys::{assign, check_part};
+pub use document::{Document, Place};
 pub(crate) use draw_file::read as read_vary;
+pub(crate) use keys::{assign, check_part};
 pub use sweep_file::{
     Backend, DesignFile, ImageStorage, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,
 };

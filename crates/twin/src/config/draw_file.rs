@@ -29,9 +29,7 @@ fn collect(table: &toml::Table, prefix: &str, keys: &mut Vec<VariedKey>) -> Resu
 /// customary elsewhere. Other tables are sections of keys.
 fn is_distribution(table: &toml::Table) -> bool {
     const CUSTOMARY: [&str; 9] = ["min", "max", "low", "high", "mean", "std", "sigma", "choice", "values"];
-    let pair = |v: &toml::Value| {
-        matches!(v, toml::Value::Array(a) if a.len() == 2 && a.iter().all(|x| !x.is_table()))
-    };
+    let pair = |v: &toml::Value| matches!(v, toml::Value::Array(a) if a.len() == 2 && a.iter().all(|x| !x.is_table()));
     table.keys().any(|k| NAMES.contains(&k.as_str()) || CUSTOMARY.contains(&k.as_str()))
         || (table.len() == 1 && table.values().all(pair))
 }

@@ -59,11 +59,7 @@ pub(crate) fn check_part(table: &toml::Table, key: &str) -> Result<(), ConfigErr
 }
 
 /// Puts `value` at a dotted key, making tables on the way; returns the key as the document records places.
-pub(crate) fn assign(
-    table: &mut toml::Table,
-    key: &str,
-    value: toml::Value,
-) -> Result<String, ConfigError> {
+pub(crate) fn assign(table: &mut toml::Table, key: &str, value: toml::Value) -> Result<String, ConfigError> {
     let segments = segments(key);
     if segments.iter().any(|s| s.is_empty()) {
         return Err(ConfigError::new(key, "a key has an empty part").hint("write it as section.key=value"));
@@ -85,9 +81,7 @@ pub(crate) fn assign(
                     inner.insert(segments[at].into(), value);
                     return Ok(resolved);
                 }
-                current = inner
-                    .entry(segments[at])
-                    .or_insert_with(|| toml::Value::Table(Default::default()));
+                current = inner.entry(segments[at]).or_insert_with(|| toml::Value::Table(Default::default()));
                 at += 1;
             }
             toml::Value::Array(items) => {

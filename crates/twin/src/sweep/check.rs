@@ -69,13 +69,7 @@ impl Sweep {
         Ok(())
     }
 
-    fn check_value(
-        &self,
-        twin: &Document,
-        checked: &Twin,
-        key: &str,
-        value: &Drawn,
-    ) -> Result<(), KeyError> {
+    fn check_value(&self, twin: &Document, checked: &Twin, key: &str, value: &Drawn) -> Result<(), KeyError> {
         if let Some(key) = key.strip_prefix("pull.") {
             let mut pull = self.pull.clone();
             scenario_keys::set_pull(&mut pull, key, value)?;
@@ -134,7 +128,8 @@ fn check_listed(varied: &VariedKey) -> Result<(), ConfigError> {
     if !LISTED_KEYS.contains(&varied.key.as_str()) || matches!(varied.distribution, Distribution::Choice(_)) {
         return Ok(());
     }
-    let problem = format!("`{}` takes names or whole numbers, which a distribution does not give", varied.key);
+    let problem =
+        format!("`{}` takes names or whole numbers, which a distribution does not give", varied.key);
     Err(ConfigError::new(format!("vary.{}", varied.key), problem).hint("list the values: [0, 1, 2]"))
 }
 
@@ -164,7 +159,8 @@ fn calibrated(key: &str, twin: &Document) -> Result<Distribution, ConfigError> {
         |key: &str| twin.get(key).and_then(|v| v.as_float().or_else(|| v.as_integer().map(|i| i as f64)));
     let mean = number(key).ok_or_else(|| missing(&format!("number `{key}`")))?;
     let low = number(&format!("{interval}.low90")).ok_or_else(|| missing(&format!("`{interval}.low90`")))?;
-    let high = number(&format!("{interval}.high90")).ok_or_else(|| missing(&format!("`{interval}.high90`")))?;
+    let high =
+        number(&format!("{interval}.high90")).ok_or_else(|| missing(&format!("`{interval}.high90`")))?;
     if low > high {
         return Err(ConfigError::new(&place, format!("low90 = {low} is above high90 = {high} in the twin")));
     }
