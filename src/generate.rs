@@ -56,19 +56,17 @@ pub struct Press {
 
 /// Simulates sample `index` of a sweep. Depends on the project and the index alone; `level` changes no bit.
 pub fn generate(project: &Project, index: u64, level: SimdLevel) -> Sample {
-    let mut failed = placeholder(project, index);
-    match try_generate(project, index, level, &mut failed) {
-        Ok(sample) => sample,
-        Err(e) => {
-            let reason = format!("{e} (sample {index}, seed {})", project.sweep.seed);
-            Sample { scenario: failed, outcome: Outcome::Failed { reason } }
-        }
-    }
+    let mut scenario = drawn_scenario(project, index);
+    let outcome = try_generate(project, index, level, &mut scenario).unwrap_or_else(|e| {
+        let reason = format!("{e} (sample {index}, seed {})", project.sweep.seed);
+        Outcome::Failed { reason }
+    });
+    Sample { scenario, outcome }
 }
 
-/// What is known of a sample whose drawn values cannot be used.
-pub(crate) fn placeholder(project: &Project, index: u64) -> Scenario {
-    Scenario { drawn: project.sweep.drawn(index), ..project.sweep.placeholder(index) }
+/// What is known of a sample before its own twin is: enough to record one that fails.
+pub(crate) fn drawn_scenario(project: &Project, index: u64) -> Scenario {
+    project.sweep.scenario(index, &project.twin).0
 }
 
 fn try_generate(
@@ -76,19 +74,12 @@ fn try_generate(
     index: u64,
     level: SimdLevel,
     known: &mut Scenario,
-) -> Result<Sample, SampleError> {
-    let sweep = &project.sweep;
-    let own_twin;
-    let twin = if sweep.varies_twin() {
-        own_twin = sweep.twin_of(index, &project.twin_table)?;
-        &own_twin
-    } else {
-        &project.twin
-    };
-    let scenario = sweep.scenario(index, twin)?;
-    *known = scenario.clone();
-    let outcome = simulate(twin, &project.library, &scenario, sweep.images != ImageStorage::None, level)?;
-    Ok(Sample { scenario, outcome })
+) -> Result<Outcome, SampleError> {
+    let twin = project.twin_of(index)?;
+    let (scenario, usable) = project.sweep.scenario(index, &twin);
+    *known = scenario;
+    usable?;
+    simulate(&twin, &project.library, known, project.sweep.images != ImageStorage::None, level)
 }
 
 /// Simulates one scenario on a twin.

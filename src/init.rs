@@ -6,9 +6,11 @@ mod drawing;
 use crate::assets;
 use crate::library::LibraryError;
 use crate::location::Location;
-use antipodal::{Proposal, propose};
+use crate::project::{BASELINE_TWIN, load_twin_document};
+pub use antipodal::Proposal;
+use antipodal::propose;
 use gripgen_physics::PartShape;
-use gripgen_twin::TriMesh;
+use gripgen_twin::{TriMesh, Twin};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -22,10 +24,12 @@ pub struct StarterFile {
 }
 
 /// Files for a part, and what to tell about them.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PartStarter {
     /// The files.
     pub files: Vec<StarterFile>,
+    /// The grips proposed, the best first.
+    pub grips: Vec<Proposal>,
     /// Size of the part and the grips found, a line each.
     pub summary: String,
 }
@@ -79,9 +83,10 @@ pub fn part_starter(path: &Path, folder: &Path, scale_mm_per_unit: f64) -> Resul
     PartShape::hull(&mesh, &gripgen_twin::frames::Pose::identity())
         .map_err(|source| LibraryError::Shape { location, source })?;
     let [x_mm, y_mm, z_mm] = mesh.extent_m().map(|s| s * 1e3);
-    let proposals = propose(&mesh);
+    let twin = baseline();
+    let proposals = propose(&mesh, &twin);
     if proposals.is_empty() {
-        let opening_mm = antipodal::OPENING_M * 1e3;
+        let opening_mm = twin.gripper.opening_m * 1e3;
         return Err(InitError::NoGrip { path: path.display().to_string(), x_mm, y_mm, z_mm, opening_mm });
     }
     let name = part_name(path);
@@ -111,7 +116,14 @@ pub fn part_starter(path: &Path, folder: &Path, scale_mm_per_unit: f64) -> Resul
         );
     }
     summary += "look at grips.png; friction and imprint constant in twin.toml are assumptions\n";
-    Ok(PartStarter { files, summary })
+    Ok(PartStarter { files, grips: proposals, summary })
+}
+
+/// The rig that grips are proposed for.
+fn baseline() -> Twin {
+    let document = load_twin_document(&Location::parse(BASELINE_TWIN), &[]);
+    let file = document.ok().and_then(|d| d.read_twin().ok());
+    file.and_then(|f| Twin::new(&f).ok()).expect("a test loads the baseline twin")
 }
 
 /// The file name as a TOML bare key.

@@ -1,23 +1,26 @@
-//! Meshes, contact shapes and sensors: read once, shared by all samples.
+//! Meshes, contact shapes and sensors: read once, shared by the samples that need them.
 
 use crate::location::Location;
-use crate::project::drawn_parts;
+use crate::resolve::Files;
 use gripgen_physics::{PartShape, ShapeError};
 use gripgen_record::{decode_picture, sha256_hex};
 use gripgen_tactile::{Sensor, SensorError};
-use gripgen_twin::{Gel, MeshError, Optics, Part, Sweep, TriMesh, Twin};
+use gripgen_twin::{Gel, MeshError, Optics, Part, TriMesh};
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The files of a sweep and what was made of them. What it returns depends on its arguments only; it is a cache.
+/// Meshes, shapes and sensors kept at a time. A sweep that draws a scale or a resolution makes a new one a sample.
+const MESHES: usize = 64;
+const SHAPES: usize = 256;
+const SENSORS: usize = 8;
+
+/// The files of a sweep and what was made of them. What it returns depends on its arguments only.
 pub struct Library {
-    files: BTreeMap<String, (Location, Vec<u8>)>,
+    files: Files,
     meshes: Cache<(String, u64), TriMesh>,
-    shapes: Cache<(String, u64, usize, [u64; 7]), PartShape>,
+    shapes: Cache<(String, u64, [u64; 7]), PartShape>,
     sensors: Cache<(String, Option<String>, Option<u64>), Sensor>,
 }
-
-type Cache<K, V> = Mutex<BTreeMap<K, Arc<V>>>;
 
 /// Why a file cannot be used. The message names it.
 #[derive(Debug, thiserror::Error)]
@@ -55,37 +58,48 @@ pub enum LibraryError {
         /// What is wrong.
         problem: String,
     },
-    /// A setting of the twin does not fit the sensor it names.
-    #[error("{0}")]
-    Mismatch(String),
+    /// A file that is not part of the sweep.
+    #[error("`{path}` is none of the files of this sweep")]
+    Unknown {
+        /// Its path.
+        path: String,
+    },
+    /// A blur kernel wider than the image, which it would mirror more than once.
+    #[error(
+        "a blur kernel of {kernel_px} pixels is too large for an image of {image_px} pixels along its shorter side"
+    )]
+    Kernel {
+        /// Width of the kernel.
+        kernel_px: u32,
+        /// Shorter side of the image.
+        image_px: usize,
+    },
 }
 
 impl Library {
-    pub(crate) fn new(files: BTreeMap<String, (Location, Vec<u8>)>) -> Self {
-        Self { files, meshes: Cache::default(), shapes: Cache::default(), sensors: Cache::default() }
+    pub(crate) fn new(files: Files) -> Self {
+        Self { files, meshes: Cache::new(MESHES), shapes: Cache::new(SHAPES), sensors: Cache::new(SENSORS) }
     }
 
-    /// SHA-256 of each file's content, by the path as written.
+    /// SHA-256 of each file's content, by its path in the resolved configuration.
     pub fn files_sha256(&self) -> BTreeMap<String, String> {
         self.files.iter().map(|(path, (_, bytes))| (path.clone(), sha256_hex(bytes))).collect()
     }
 
-    /// Content of the files that gripgen does not hold itself.
-    pub(crate) fn disk_files(&self) -> Vec<&[u8]> {
-        let on_disk = self.files.values().filter(|(at, _)| matches!(at, Location::Disk(_)));
-        on_disk.map(|(_, bytes)| bytes.as_slice()).collect()
+    /// Path and content of the files that gripgen does not hold itself.
+    pub(crate) fn disk_files(&self) -> Vec<(&str, &[u8])> {
+        let on_disk = self.files.iter().filter(|(_, (at, _))| matches!(at, Location::Disk(_)));
+        on_disk.map(|(path, (_, bytes))| (path.as_str(), bytes.as_slice())).collect()
     }
 
     fn file(&self, path: &str) -> Result<&(Location, Vec<u8>), LibraryError> {
-        self.files.get(path).ok_or_else(|| {
-            LibraryError::Mismatch(format!("`{path}` was drawn, but only listed files can vary"))
-        })
+        self.files.get(path).ok_or_else(|| LibraryError::Unknown { path: path.into() })
     }
 
     /// The mesh of a part, in metres.
     pub fn mesh(&self, part: &Part) -> Result<Arc<TriMesh>, LibraryError> {
         let key = (part.mesh.clone(), part.metres_per_unit.to_bits());
-        cached(&self.meshes, key, || {
+        self.meshes.get(key, || {
             let (location, bytes) = self.file(&part.mesh)?;
             TriMesh::from_file_bytes(bytes, location.extension(), part.metres_per_unit)
                 .map_err(|source| LibraryError::Mesh { location: location.clone(), source })
@@ -97,21 +111,18 @@ impl Library {
         let pose = &part.grips[grip_pose];
         let (t, q) = (pose.translation.vector, pose.rotation.coords);
         let bits = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits);
-        let key = (part.mesh.clone(), part.metres_per_unit.to_bits(), grip_pose, bits);
-        let mesh = self.mesh(part)?;
-        cached(&self.shapes, key, || {
-            PartShape::hull(&mesh, pose).map_err(|source| {
-                let location =
-                    self.file(&part.mesh).map_or_else(|_| Location::parse(&part.mesh), |f| f.0.clone());
-                LibraryError::Shape { location, source }
-            })
+        self.shapes.get((part.mesh.clone(), part.metres_per_unit.to_bits(), bits), || {
+            let mesh = self.mesh(part)?;
+            let (location, _) = self.file(&part.mesh)?;
+            PartShape::hull(&mesh, pose)
+                .map_err(|source| LibraryError::Shape { location: location.clone(), source })
         })
     }
 
     /// The tactile sensor that a twin's optics name.
     pub fn sensor(&self, optics: &Optics) -> Result<Arc<Sensor>, LibraryError> {
         let key = (optics.sensor.clone(), optics.background.clone(), optics.metres_per_px.map(f64::to_bits));
-        cached(&self.sensors, key, || {
+        self.sensors.get(key, || {
             let background = match &optics.background {
                 None => None,
                 Some(path) => {
@@ -129,44 +140,83 @@ impl Library {
         })
     }
 
-    /// Reads everything that a sweep can draw, so that a broken file is found before any work is done.
-    pub(crate) fn check(&self, sweep: &Sweep, twin: &Twin) -> Result<(), LibraryError> {
-        for name in drawn_parts(sweep, twin) {
-            let part = &twin.parts[&name];
-            for grip_pose in 0..part.grips.len() {
-                self.shape(part, grip_pose)?;
+    /// Reads a sensor and checks that a gel fits it.
+    pub(crate) fn check_sensor(&self, optics: &Optics, gel: &Gel) -> Result<(), LibraryError> {
+        let sensor = self.sensor(optics)?;
+        let image_px = sensor.grid.width_px.min(sensor.grid.height_px);
+        match gel.kernels_px.iter().find(|&&k| k as usize / 2 >= image_px) {
+            None => Ok(()),
+            Some(&kernel_px) => Err(LibraryError::Kernel { kernel_px, image_px }),
+        }
+    }
+}
+
+/// The values used last. A value is built by the first thread that asks for it; others that want the same wait for
+/// it, those that want another do not.
+struct Cache<K, V> {
+    capacity: usize,
+    /// Most recently used last.
+    slots: Mutex<Vec<(K, Slot<V>)>>,
+}
+
+type Slot<V> = Arc<Mutex<Option<Arc<V>>>>;
+
+impl<K: PartialEq, V> Cache<K, V> {
+    fn new(capacity: usize) -> Self {
+        Self { capacity, slots: Mutex::default() }
+    }
+
+    fn get(&self, key: K, make: impl FnOnce() -> Result<V, LibraryError>) -> Result<Arc<V>, LibraryError> {
+        let slot = self.slot(key);
+        let mut value = lock(&slot);
+        if let Some(value) = &*value {
+            return Ok(value.clone());
+        }
+        let made = Arc::new(make()?);
+        *value = Some(made.clone());
+        Ok(made)
+    }
+
+    fn slot(&self, key: K) -> Slot<V> {
+        let mut slots = lock(&self.slots);
+        let entry = match slots.iter().position(|(k, _)| *k == key) {
+            Some(i) => slots.remove(i),
+            None => {
+                if slots.len() == self.capacity {
+                    slots.remove(0);
+                }
+                (key, Slot::default())
             }
-        }
-        for (jaw, optics) in twin.optics.iter() {
-            let sensor = self.sensor(optics)?;
-            check_kernels(&sensor, &twin.gel[jaw])?;
-        }
-        Ok(())
+        };
+        let slot = entry.1.clone();
+        slots.push(entry);
+        slot
     }
 }
 
-/// A blur kernel that is wider than the image would mirror it more than once.
-fn check_kernels(sensor: &Sensor, gel: &Gel) -> Result<(), LibraryError> {
-    let smallest = sensor.grid.width_px.min(sensor.grid.height_px);
-    match gel.kernels_px.iter().find(|&&k| k as usize / 2 >= smallest) {
-        None => Ok(()),
-        Some(k) => Err(LibraryError::Mismatch(format!(
-            "gel kernels_px has a kernel of {k} pixels, the sensor's image has {smallest} pixels along its shorter side"
-        ))),
-    }
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn cached<K: Ord, V>(
-    cache: &Cache<K, V>,
-    key: K,
-    make: impl FnOnce() -> Result<V, LibraryError>,
-) -> Result<Arc<V>, LibraryError> {
-    // Built under the lock: the first samples wait for one another instead of all building the same thing.
-    let mut map = cache.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(value) = map.get(&key) {
-        return Ok(value.clone());
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cache_keeps_what_was_used_last() {
+        let cache: Cache<u32, u32> = Cache::new(2);
+        let mut made = vec![];
+        let mut ask = |key: u32| {
+            let value = cache.get(key, || {
+                made.push(key);
+                Ok(key * 10)
+            });
+            assert_eq!(*value.unwrap(), key * 10);
+        };
+        [1, 2, 1, 3, 1, 2].map(&mut ask);
+        assert_eq!(made, [1, 2, 3, 2], "3 pushed 2 out, not 1");
+        let unknown = || Err(LibraryError::Unknown { path: "x".into() });
+        assert!(cache.get(9, unknown).is_err());
+        assert_eq!(*cache.get(9, || Ok(90)).unwrap(), 90, "a failure is not kept");
     }
-    let value = Arc::new(make()?);
-    map.insert(key, value.clone());
-    Ok(value)
 }

@@ -12,13 +12,6 @@ pub enum Location {
     Disk(PathBuf),
     /// A path inside `assets/`.
     Asset(String),
-    /// A copy in a run folder of a file that was once called `name`.
-    Copy {
-        /// Where the copy is.
-        path: PathBuf,
-        /// Its path as written in the twin.
-        name: String,
-    },
 }
 
 /// A file could not be read.
@@ -46,7 +39,7 @@ impl Location {
             return Location::parse(path);
         }
         match self {
-            Location::Disk(file) | Location::Copy { path: file, .. } => {
+            Location::Disk(file) => {
                 Location::Disk(file.parent().map_or_else(|| path.into(), |folder| folder.join(path)))
             }
             Location::Asset(file) => {
@@ -68,9 +61,7 @@ impl Location {
     pub fn read(&self) -> Result<Cow<'static, [u8]>, ReadFileError> {
         let error = |problem: String| ReadFileError { location: self.clone(), problem };
         match self {
-            Location::Disk(path) | Location::Copy { path, .. } => {
-                std::fs::read(path).map(Cow::Owned).map_err(|e| error(e.to_string()))
-            }
+            Location::Disk(path) => std::fs::read(path).map(Cow::Owned).map_err(|e| error(e.to_string())),
             Location::Asset(path) => assets::get(path).map(Cow::Borrowed).ok_or_else(|| {
                 let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
                 let near: Vec<&str> = assets::paths().filter(|p| p.starts_with(folder)).collect();
@@ -89,7 +80,7 @@ impl Location {
     pub fn extension(&self) -> &str {
         let name = match self {
             Location::Disk(path) => path.as_path(),
-            Location::Asset(name) | Location::Copy { name, .. } => Path::new(name),
+            Location::Asset(name) => Path::new(name),
         };
         name.extension().and_then(|e| e.to_str()).unwrap_or_default()
     }
@@ -98,7 +89,7 @@ impl Location {
     pub fn run_name(&self) -> String {
         let path = match self {
             Location::Disk(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
-            Location::Asset(name) | Location::Copy { name, .. } => PathBuf::from(name),
+            Location::Asset(name) => PathBuf::from(name),
         };
         let stem = path.file_stem().map_or_else(|| "run".into(), |s| s.to_string_lossy().into_owned());
         let folder = path.parent().and_then(|p| p.file_name()).map(|f| f.to_string_lossy().into_owned());
@@ -114,7 +105,6 @@ impl fmt::Display for Location {
         match self {
             Location::Disk(path) => write!(f, "{}", path.display()),
             Location::Asset(path) => write!(f, "{ASSET_PREFIX}{path}"),
-            Location::Copy { path, name } => write!(f, "{} (copy of {name})", path.display()),
         }
     }
 }

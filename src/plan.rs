@@ -2,6 +2,7 @@
 
 use crate::project::Project;
 use crate::sweep::{encode_options, guarded};
+use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_record::{PictureError, encode};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::Outcome;
@@ -21,8 +22,19 @@ pub struct Plan {
     pub estimated_bytes: u64,
     /// Processor time of the whole sweep, from the samples tried out.
     pub estimated_cpu: Duration,
-    /// Samples tried out, and why they failed if they did.
-    pub probes: Vec<(u64, Option<String>)>,
+    /// Samples tried out.
+    pub probes: Vec<Probe>,
+}
+
+/// A sample that was tried out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Probe {
+    /// Its index.
+    pub index: u64,
+    /// How it ended.
+    pub status: Status,
+    /// Why, if it failed.
+    pub failure: Option<String>,
 }
 
 /// Tries out a few samples spread over the sweep and extrapolates. Writes nothing.
@@ -45,7 +57,7 @@ pub fn plan(project: &Project, simd: SimdLevel) -> Result<Plan, PictureError> {
             Outcome::Failed { reason } => Some(reason),
             _ => None,
         };
-        tried.push((index, failure));
+        tried.push(Probe { index, status: encoded.status, failure });
     }
     let share = samples as f64 / probes as f64;
     Ok(Plan {

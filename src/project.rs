@@ -3,11 +3,12 @@
 use crate::assets;
 use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
+use crate::resolve::{Files, Named, Resolved, config_hash, resolve};
+use crate::sweep::VERSION;
 use gripgen_record::{RunFolder, sha256_hex};
-use gripgen_twin::config::{Backend, ConfigError, Document, Mechanics, SweepFile, TwinFile};
-use gripgen_twin::draw::{Distribution, Drawn};
-use gripgen_twin::{DEFAULTED_SECTIONS, Sweep, Twin, is_twin_key};
-use std::collections::BTreeMap;
+use gripgen_twin::config::{Backend, ConfigError, Document, Mechanics, SweepFile};
+use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, Sweep, Twin, is_twin_key};
+use std::borrow::Cow;
 
 /// The twin whose sections stand in for what a twin leaves out, and the default of `--twin`.
 pub const BASELINE_TWIN: &str = "asset:configs/twin-baseline.toml";
@@ -34,15 +35,28 @@ pub struct Project {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
-    /// A key of a configuration.
+    /// A key of a configuration, or a file that it names.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// A file cannot be read.
+    /// The configuration itself cannot be read.
     #[error(transparent)]
     Read(#[from] ReadFileError),
-    /// A mesh or sensor file is broken.
-    #[error(transparent)]
-    Library(#[from] LibraryError),
+    /// A run folder of another version of gripgen.
+    #[error("the run was made by gripgen {found}, this is {VERSION}")]
+    Version {
+        /// Version that made the run.
+        found: String,
+    },
+    /// A run folder whose content is not what its hash says.
+    #[error("{what} has the hash {found}, run.json says {wanted}")]
+    Changed {
+        /// Which file.
+        what: String,
+        /// Hash of what is there.
+        found: String,
+        /// Hash of what was there.
+        wanted: String,
+    },
 }
 
 /// Loads a twin: its text, the overrides meant for it, and defaults for what it leaves out.
@@ -73,54 +87,90 @@ impl Project {
             ),
             other => other,
         })?;
-        Self::build(location.run_name(), &document, &twin_document, |path| twin_location.beside(path))
+        let sweep = Sweep::new(&file, &twin_document).map_err(|e| document.located(e))?;
+        check_available(&sweep).map_err(|e| document.located(e))?;
+        let locate = |path: &str| twin_location.beside(path);
+        let Resolved { config_toml, files, named } = resolve(&sweep, &twin_document, &document, locate)?;
+        let project = Self::from_resolved(location.run_name(), config_toml, files)?;
+        for file in &named {
+            project.check_file(file).map_err(|e| {
+                let document = if file.key == file.twin_key { &twin_document } else { &document };
+                document.located(ConfigError::new(&file.key, e.to_string()))
+            })?;
+        }
+        Ok(project)
     }
 
-    /// Loads the sweep that made a run folder, from what the folder holds.
+    /// Loads the sweep that made a run folder, from what the folder holds. Refuses what this gripgen would not make
+    /// again bit for bit.
     pub fn from_run(folder: &RunFolder) -> Result<Self, LoadError> {
         let info = folder.info();
-        let name = folder.path().join("run.json").display().to_string();
-        let both: toml::Table = info
-            .config_toml
+        if info.gripgen_version != VERSION {
+            return Err(LoadError::Version { found: info.gripgen_version.clone() });
+        }
+        let changed = |what: &str, found: String, wanted: &str| match found == wanted {
+            true => Ok(()),
+            false => Err(LoadError::Changed { what: what.into(), found, wanted: wanted.into() }),
+        };
+        let beside = Location::Disk(folder.path().join("run.json"));
+        let mut files = Files::new();
+        for (path, sha256) in &info.files_sha256 {
+            let at = beside.beside(path);
+            let bytes = at.read()?.into_owned();
+            changed(path, sha256_hex(&bytes), sha256)?;
+            files.insert(path.clone(), (at, bytes));
+        }
+        let project = Self::from_resolved(info.name.clone(), info.config_toml.clone(), files)?;
+        changed("config_toml", project.config_sha256.clone(), &info.config_sha256)?;
+        Ok(project)
+    }
+
+    /// The twin of sample `index`.
+    pub fn twin_of(&self, index: u64) -> Result<Cow<'_, Twin>, ConfigError> {
+        if !self.sweep.varies_twin() {
+            return Ok(Cow::Borrowed(&self.twin));
+        }
+        self.sweep.twin_of(index, &self.twin_table).map(Cow::Owned)
+    }
+
+    fn from_resolved(name: String, config_toml: String, files: Files) -> Result<Self, LoadError> {
+        let both: toml::Table = config_toml
             .parse()
             .map_err(|e: toml::de::Error| ConfigError::new("config_toml", e.message().to_string()))?;
         let part = |key: &str| -> Result<Document, ConfigError> {
             let table = both.get(key).and_then(toml::Value::as_table).cloned().unwrap_or_default();
-            Document::parse(&format!("{name} ({key})"), &table.to_string())
+            Document::parse(&format!("resolved configuration, {key}"), &table.to_string())
         };
         let (document, twin_document) = (part("sweep")?, part("twin")?);
-        Self::build(info.name.clone(), &document, &twin_document, |path| {
-            match (path.starts_with(assets::ASSET_PREFIX), info.files_sha256.get(path)) {
-                (false, Some(sha256)) => {
-                    Location::Copy { path: folder.input_path(sha256), name: path.to_string() }
-                }
-                _ => Location::parse(path),
-            }
-        })
+        let file: SweepFile = document.read()?;
+        let sweep = Sweep::new(&file, &twin_document).map_err(|e| document.located(e))?;
+        check_available(&sweep)?;
+        let twin = Twin::new(&twin_document.read_twin()?).map_err(|e| twin_document.located(e))?;
+        let config_sha256 = config_hash(&config_toml, &files);
+        let twin_table = twin_document.table().clone();
+        Ok(Self { name, sweep, twin, twin_table, library: Library::new(files), config_toml, config_sha256 })
     }
 
-    fn build(
-        name: String,
-        document: &Document,
-        twin_document: &Document,
-        locate: impl Fn(&str) -> Location,
-    ) -> Result<Self, LoadError> {
-        let file: SweepFile = document.read()?;
-        let sweep = Sweep::new(&file, twin_document).map_err(|e| document.located(e))?;
-        check_available(&sweep).map_err(|e| document.located(e))?;
-        let twin_file: TwinFile = twin_document.read()?;
-        let twin = Twin::new(&twin_file).map_err(|e| twin_document.located(e))?;
-        let library = Library::new(load_files(&sweep, &twin, locate, twin_document)?);
-        library.check(&sweep, &twin)?;
-        Ok(Self {
-            name,
-            sweep,
-            twin,
-            twin_table: twin_document.table().clone(),
-            config_toml: resolved_toml(document.table(), twin_document.table()),
-            config_sha256: config_hash(document.table(), twin_document.table(), &library),
-            library,
-        })
+    /// Reads a mesh or sensor as every sample will, so that a broken file is found before any work is done.
+    fn check_file(&self, file: &Named) -> Result<(), LibraryError> {
+        let segments: Vec<&str> = file.twin_key.split('.').collect();
+        match segments[..] {
+            ["parts", name, "mesh"] => {
+                let Some(part) = self.twin.parts.get(name) else { return Ok(()) };
+                let part = gripgen_twin::Part { mesh: file.path.clone(), ..part.clone() };
+                (0..part.grips.len()).try_for_each(|grip| self.library.shape(&part, grip).map(drop))
+            }
+            ["optics", jaw, leaf] => {
+                let jaw = if jaw == "right" { Jaw::Right } else { Jaw::Left };
+                let mut optics = self.twin.optics[jaw].clone();
+                match leaf {
+                    "sensor" => optics.sensor.clone_from(&file.path),
+                    _ => optics.background = Some(file.path.clone()),
+                }
+                self.library.check_sensor(&optics, &self.twin.gel[jaw])
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -136,101 +186,4 @@ fn check_available(sweep: &Sweep) -> Result<(), ConfigError> {
         );
     }
     Ok(())
-}
-
-/// A file that a twin names: its key in the twin, the path as written.
-struct Named {
-    key: String,
-    path: String,
-}
-
-/// Reads every file that any sample can need.
-fn load_files(
-    sweep: &Sweep,
-    twin: &Twin,
-    locate: impl Fn(&str) -> Location,
-    document: &Document,
-) -> Result<BTreeMap<String, (Location, Vec<u8>)>, LoadError> {
-    let mut named = Vec::new();
-    for part in drawn_parts(sweep, twin) {
-        named.push(Named { key: format!("parts.{part}.mesh"), path: twin.parts[&part].mesh.clone() });
-    }
-    for (jaw, optics) in twin.optics.iter() {
-        named.push(Named { key: format!("optics.{jaw}.sensor"), path: optics.sensor.clone() });
-        if let Some(path) = &optics.background {
-            named.push(Named { key: format!("optics.{jaw}.background"), path: path.clone() });
-        }
-    }
-    for varied in &sweep.vary {
-        let is_file = [".mesh", ".sensor", ".background"].iter().any(|end| varied.key.ends_with(end));
-        if let (true, Distribution::Choice(values)) = (is_file, &varied.distribution) {
-            let key = &varied.key;
-            named.extend(values.iter().map(|v| Named { key: key.clone(), path: v.to_string() }));
-        }
-    }
-    let mut files = BTreeMap::new();
-    for Named { key, path } in named {
-        if files.contains_key(&path) {
-            continue;
-        }
-        let at = locate(&path);
-        let bytes = at.read().map_err(|e| {
-            let error = ConfigError::new(key, e.to_string());
-            document.located(error.hint("paths are relative to the twin; `asset:...` is inside gripgen"))
-        })?;
-        files.insert(path, (at, bytes.into_owned()));
-    }
-    Ok(files)
-}
-
-/// The parts that the sweep can draw.
-pub(crate) fn drawn_parts(sweep: &Sweep, twin: &Twin) -> Vec<String> {
-    let choices = sweep.vary.iter().find(|v| v.key == "part").map(|v| &v.distribution);
-    match choices {
-        Some(Distribution::Choice(values)) => values
-            .iter()
-            .filter_map(|v| match v {
-                Drawn::Text(name) if twin.parts.contains_key(name) => Some(name.clone()),
-                _ => None,
-            })
-            .collect(),
-        _ => twin.parts.keys().cloned().collect(),
-    }
-}
-
-/// Sweep and twin as one TOML text. Paths stand as they were written.
-fn resolved_toml(sweep: &toml::Table, twin: &toml::Table) -> String {
-    let mut both = toml::Table::new();
-    both.insert("sweep".into(), toml::Value::Table(sweep.clone()));
-    both.insert("twin".into(), toml::Value::Table(twin.clone()));
-    both.to_string()
-}
-
-/// Hash of the resolved configuration in which every path is replaced by the hash of the file's content: moving a
-/// folder changes nothing, changing a mesh does.
-fn config_hash(sweep: &toml::Table, twin: &toml::Table, library: &Library) -> String {
-    let mut sweep = sweep.clone();
-    // The path of the twin; its content follows.
-    sweep.remove("twin");
-    let hashes = library.files_sha256();
-    let mut both = toml::Table::new();
-    both.insert("sweep".into(), toml::Value::Table(sweep));
-    both.insert("twin".into(), toml::Value::Table(twin.clone()));
-    let mut value = toml::Value::Table(both);
-    replace_paths(&mut value, &hashes);
-    let canonical = serde_json::to_vec(&value).expect("TOML values are JSON values");
-    sha256_hex(&canonical)
-}
-
-fn replace_paths(value: &mut toml::Value, hashes: &BTreeMap<String, String>) {
-    match value {
-        toml::Value::String(text) => {
-            if let Some(hash) = hashes.get(text) {
-                *text = format!("sha256:{hash}");
-            }
-        }
-        toml::Value::Array(items) => items.iter_mut().for_each(|item| replace_paths(item, hashes)),
-        toml::Value::Table(table) => table.iter_mut().for_each(|(_, item)| replace_paths(item, hashes)),
-        _ => {}
-    }
 }

@@ -1,14 +1,10 @@
 //! Proposing grips: pairs of opposite surfaces that fit between the jaws.
 
-use crate::assets;
 use gripgen_tactile::{Grid, PressedGel, indent, raster};
 use gripgen_twin::frames::{Pose, pose, rotation_from_fixed_xyz, world_from_gel};
 use gripgen_twin::random::{Purpose, Stream};
-use gripgen_twin::{Jaw, TriMesh};
+use gripgen_twin::{Gel, Jaw, TriMesh, Twin};
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
-
-/// Opening of the jaws that a grip has to fit into: that of the WSG 50 in the baseline twin.
-pub(super) const OPENING_M: f64 = 0.110;
 
 /// Points sampled on the surface.
 const SAMPLES: usize = 600;
@@ -28,14 +24,23 @@ const UNLIKE: f64 = 0.6;
 const FORCE_N: f64 = 40.0;
 const IMPRINT_M3_PER_N: f64 = 1.5e-9;
 
-/// A grip of a part, as it stands in a twin.
+/// A grip proposed for a part.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Proposal {
-    pub(super) origin_mm: [f64; 3],
-    pub(super) orientation_deg: [f64; 3],
-    pub(super) width_mm: f64,
-    /// Contact area of the jaw that has less of it.
-    pub(super) contact_mm2: f64,
+pub struct Proposal {
+    /// As in `[[parts.NAME.grips]]`.
+    pub origin_mm: [f64; 3],
+    /// As in `[[parts.NAME.grips]]`.
+    pub orientation_deg: [f64; 3],
+    /// Distance between the gels where they first touch.
+    pub width_mm: f64,
+    /// Contact area of the jaw that has less of it, at 40 N.
+    pub contact_mm2: f64,
+}
+
+/// What a grip has to fit between: the left pad stands for both.
+struct Jaws<'a> {
+    opening_m: f64,
+    gel: &'a Gel,
 }
 
 impl Proposal {
@@ -56,14 +61,15 @@ struct Pair {
 
 /// Grips of a mesh, the best first: a large contact, near the middle of the part, and unlike those before it. The same
 /// mesh gives the same grips.
-pub(super) fn propose(mesh: &TriMesh) -> Vec<Proposal> {
+pub(super) fn propose(mesh: &TriMesh, twin: &Twin) -> Vec<Proposal> {
+    let jaws = Jaws { opening_m: twin.gripper.opening_m, gel: &twin.gel.left };
     let size = mesh.extent_m().iter().fold(0.0_f64, |a, &b| a.max(b));
     let (low, high) = mesh.bounds_m();
     let middle = Point3::from([0, 1, 2].map(|i| (low[i] + high[i]) / 2.0));
-    let mut rest: Vec<(f64, Pair, Proposal)> = spread(pairs(mesh), CANDIDATES, size)
+    let mut rest: Vec<(f64, Pair, Proposal)> = spread(pairs(mesh, jaws.opening_m), CANDIDATES, size)
         .into_iter()
         .filter_map(|pair| {
-            let proposal = evaluate(mesh, &pair)?;
+            let proposal = evaluate(mesh, &jaws, &pair)?;
             let off = 2.0 * (pair.middle - middle).norm() / size;
             Some((proposal.contact_mm2 / (1.0 + off * off), pair, proposal))
         })
@@ -86,7 +92,9 @@ pub(super) fn propose(mesh: &TriMesh) -> Vec<Proposal> {
 }
 
 /// Antipodal pairs from points spread over the surface by area.
-fn pairs(mesh: &TriMesh) -> Vec<Pair> {
+fn pairs(mesh: &TriMesh, opening_m: f64) -> Vec<Pair> {
+    // A mesh that is inside out is turned over.
+    let outwards = if mesh.signed_volume_m3() < 0.0 { -1.0 } else { 1.0 };
     let triangles: Vec<[Point3<f64>; 3]> = (0..mesh.triangles().len()).map(|t| mesh.corners(t)).collect();
     let areas: Vec<f64> = triangles.iter().map(|[a, b, c]| (b - a).cross(&(c - a)).norm() / 2.0).collect();
     let total: f64 = areas.iter().sum();
@@ -101,7 +109,7 @@ fn pairs(mesh: &TriMesh) -> Vec<Pair> {
             t += 1;
         }
         let [a, b, c] = triangles[t];
-        let normal = (b - a).cross(&(c - a));
+        let normal = (b - a).cross(&(c - a)) * outwards;
         if normal.norm() == 0.0 {
             continue;
         }
@@ -109,28 +117,32 @@ fn pairs(mesh: &TriMesh) -> Vec<Pair> {
         if u + v > 1.0 {
             (u, v) = (1.0 - u, 1.0 - v);
         }
-        found.extend(opposite(&triangles, a + (b - a) * u + (c - a) * v, normal.normalize()));
+        let from = a + (b - a) * u + (c - a) * v;
+        let pair = opposite(&triangles, from, normal.normalize(), outwards);
+        found.extend(pair.filter(|p| (1e-4..=LARGEST_WIDTH * opening_m).contains(&p.width_m)));
     }
     found
 }
 
 /// The surface on the other side of the part, if it faces the other way.
-fn opposite(triangles: &[[Point3<f64>; 3]], from: Point3<f64>, normal: Vector3<f64>) -> Option<Pair> {
+fn opposite(
+    triangles: &[[Point3<f64>; 3]],
+    from: Point3<f64>,
+    normal: Vector3<f64>,
+    outwards: f64,
+) -> Option<Pair> {
     let (mut farthest, mut facing) = (0.0, Vector3::zeros());
     for corners in triangles {
         if let Some(distance) = hit(corners, from, -normal)
             && distance > farthest
         {
             let [a, b, c] = corners;
-            (farthest, facing) = (distance, (b - a).cross(&(c - a)).normalize());
+            (farthest, facing) = (distance, (b - a).cross(&(c - a)).normalize() * outwards);
         }
     }
     let opposed = facing.dot(&-normal) > OPPOSITE_RAD.cos();
-    if !opposed || !(1e-4..=LARGEST_WIDTH * OPENING_M).contains(&farthest) {
-        return None;
-    }
     let axis = snapped(normal);
-    Some(Pair { middle: from - normal * (farthest / 2.0), axis, width_m: farthest })
+    opposed.then(|| Pair { middle: from - normal * (farthest / 2.0), axis, width_m: farthest })
 }
 
 /// Distance along a ray to a triangle (Moller & Trumbore 1997).
@@ -175,7 +187,7 @@ fn spread(pairs: Vec<Pair>, wanted: usize, size: f64) -> Vec<Pair> {
 }
 
 /// The contact of both gels in this grip; `None` if one of them finds none or is pressed through.
-fn evaluate(mesh: &TriMesh, pair: &Pair) -> Option<Proposal> {
+fn evaluate(mesh: &TriMesh, jaws: &Jaws<'_>, pair: &Pair) -> Option<Proposal> {
     let rotation = orientation(mesh, pair.axis);
     let mut proposal = Proposal {
         origin_mm: [0, 1, 2].map(|i| hundredths(pair.middle[i] * 1e3)),
@@ -183,23 +195,19 @@ fn evaluate(mesh: &TriMesh, pair: &Pair) -> Option<Proposal> {
         width_mm: pair.width_m * 1e3,
         contact_mm2: 0.0,
     };
-    let baseline: toml::Table = assets::text("configs/twin-baseline.toml").parse().ok()?;
-    let gel_key = |key: &str| baseline.get("gel")?.get("left")?.get(key)?.as_float().map(|mm| mm * 1e-3);
-    let (width_m, height_m, thickness_m) =
-        (gel_key("width_mm")?, gel_key("height_mm")?, gel_key("thickness_mm")?);
     // A coarse grid over the pad is enough to compare grips.
     let metres_per_px = 0.25e-3;
     let grid = Grid {
-        width_px: (width_m / metres_per_px) as usize,
-        height_px: (height_m / metres_per_px) as usize,
+        width_px: (jaws.gel.width_m / metres_per_px) as usize,
+        height_px: (jaws.gel.height_m / metres_per_px) as usize,
         metres_per_px,
     };
-    let gel = PressedGel { thickness_m, imprint_m3_per_n: IMPRINT_M3_PER_N };
+    let gel = PressedGel { thickness_m: jaws.gel.thickness_m, imprint_m3_per_n: IMPRINT_M3_PER_N };
     let mut areas = [0.0; 2];
-    let mut width_m = OPENING_M;
+    let mut width_m = jaws.opening_m;
     for (area, jaw) in areas.iter_mut().zip(Jaw::BOTH) {
-        let gel_from_mesh = world_from_gel(jaw, OPENING_M / 2.0).inverse() * proposal.part_from_mesh();
-        let heights = raster(mesh, &gel_from_mesh, &grid, thickness_m / metres_per_px);
+        let gel_from_mesh = world_from_gel(jaw, jaws.opening_m / 2.0).inverse() * proposal.part_from_mesh();
+        let heights = raster(mesh, &gel_from_mesh, &grid, jaws.gel.thickness_m / metres_per_px);
         *area = indent(&heights, &grid, &gel, FORCE_N).ok()?.patch.area_m2();
         // What the pad touches first need not be the surface of the pair.
         let nearest = heights.values.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
@@ -207,7 +215,7 @@ fn evaluate(mesh: &TriMesh, pair: &Pair) -> Option<Proposal> {
     }
     proposal.width_mm = width_m * 1e3;
     proposal.contact_mm2 = areas[0].min(areas[1]) * 1e6;
-    (width_m > 0.0 && width_m < LARGEST_WIDTH * OPENING_M).then_some(proposal)
+    (width_m > 0.0 && width_m < LARGEST_WIDTH * jaws.opening_m).then_some(proposal)
 }
 
 /// Rounded to hundredths, for files that people read; never -0.
@@ -252,7 +260,18 @@ fn fixed_xyz_deg(rotation: &Rotation3<f64>) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::init::baseline;
     use gripgen_twin::parts::{InvoluteGear, SteppedShaft};
+
+    #[test]
+    fn a_mesh_that_is_inside_out_gets_the_same_kind_of_grips() {
+        let mesh = SteppedShaft::default().mesh();
+        let turned = mesh.triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
+        let turned = TriMesh::new(mesh.vertices_m().to_vec(), turned).unwrap();
+        assert!(turned.signed_volume_m3() < 0.0);
+        let proposals = propose(&turned, &baseline());
+        assert!(proposals.iter().any(|p| (p.width_mm - 20.0).abs() < 0.1), "{proposals:?}");
+    }
 
     #[test]
     fn angles_give_back_their_rotation() {
@@ -265,7 +284,7 @@ mod tests {
 
     #[test]
     fn a_shaft_is_gripped_across_its_axis() {
-        let proposals = propose(&SteppedShaft::default().mesh());
+        let proposals = propose(&SteppedShaft::default().mesh(), &baseline());
         assert!(!proposals.is_empty());
         for p in &proposals {
             let axis = p.part_from_mesh() * Vector3::x();
@@ -276,13 +295,13 @@ mod tests {
 
     #[test]
     fn a_gear_can_be_gripped_on_its_faces() {
-        let proposals = propose(&InvoluteGear::default().mesh());
+        let proposals = propose(&InvoluteGear::default().mesh(), &baseline());
         assert!(proposals.iter().any(|p| (p.width_mm - 12.0).abs() < 0.1), "{proposals:?}");
     }
 
     #[test]
     fn proposals_are_repeatable() {
         let mesh = InvoluteGear::default().mesh();
-        assert_eq!(propose(&mesh), propose(&mesh));
+        assert_eq!(propose(&mesh, &baseline()), propose(&mesh, &baseline()));
     }
 }

@@ -65,12 +65,9 @@ pub fn sample_picture(folder: &RunFolder, index: u64) -> Result<Vec<u8>, Picture
 /// The imprints of a simulated sample.
 fn press_again(folder: &RunFolder, index: u64) -> Option<Press> {
     let project = Project::from_run(folder).ok()?;
-    let twin = if project.sweep.varies_twin() {
-        project.sweep.twin_of(index, &project.twin_table).ok()?
-    } else {
-        project.twin.clone()
-    };
-    let scenario = project.sweep.scenario(index, &twin).ok()?;
+    let twin = project.twin_of(index).ok()?;
+    let (scenario, usable) = project.sweep.scenario(index, &twin);
+    usable.ok()?;
     press_only(&twin, &project.library, &scenario).ok()?
 }
 

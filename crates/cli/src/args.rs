@@ -74,11 +74,14 @@ pub struct InitArgs {
     #[arg(short, long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
     /// Millimetres per unit of the mesh file.
-    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = scale)]
     pub scale_mm_per_unit: f64,
     /// Replace files that exist.
     #[arg(long)]
     pub force: bool,
+    /// JSON: the files and the grips proposed.
+    #[command(flatten)]
+    pub json: JsonArgs,
     /// How much is said.
     #[command(flatten)]
     pub talk: TalkArgs,
@@ -135,6 +138,9 @@ pub struct InfoArgs {
     /// JSON.
     #[command(flatten)]
     pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
 }
 
 /// `gripgen verify`
@@ -160,6 +166,12 @@ pub struct ShowArgs {
     /// The picture; in the run folder where it is left out.
     #[arg(short, long, value_name = "FILE.png")]
     pub out: Option<PathBuf>,
+    /// JSON: the picture's path, and what the sample is.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
 }
 
 /// `gripgen export`
@@ -173,6 +185,12 @@ pub struct ExportArgs {
     /// The file to write.
     #[arg(short, long, value_name = "FILE.mcap")]
     pub out: PathBuf,
+    /// JSON: the file's path and size.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
 }
 
 /// Which configuration file.
@@ -206,6 +224,14 @@ fn key_value(text: &str) -> Result<(String, String), String> {
     }
 }
 
+fn scale(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(mm) if mm.is_finite() && mm > 0.0 => Ok(mm),
+        Ok(mm) => Err(format!("{mm} mm is no scale, it must be more than 0")),
+        Err(_) => Err("a number of millimetres is needed, for example 25.4".into()),
+    }
+}
+
 fn slice(text: &str) -> Result<(u64, u64), String> {
     let parsed = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
     match parsed {
@@ -232,6 +258,8 @@ mod tests {
         assert_eq!(key_value("a.b = 3"), Ok(("a.b".into(), "3".into())));
         assert!(key_value("nothing").is_err() && key_value("=3").is_err());
         assert_eq!((slice("0/4"), slice("4/4")), (Ok((0, 4)), Ok((4, 4))));
+        assert_eq!(scale("25.4"), Ok(25.4));
+        assert!(["0", "-1", "nan", "inf", "x"].iter().all(|bad| scale(bad).is_err()));
         for bad in ["5/4", "1/0", "1", "a/b"] {
             assert!(slice(bad).is_err(), "{bad}");
         }

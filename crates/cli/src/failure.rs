@@ -92,7 +92,6 @@ impl From<LoadError> for Failure {
         match e {
             LoadError::Config(e) => e.into(),
             LoadError::Read(e) => Failure::usage(e),
-            LoadError::Library(e) => Failure::usage(e),
             other => Failure::usage(other),
         }
     }
@@ -101,10 +100,7 @@ impl From<LoadError> for Failure {
 impl From<FolderError> for Failure {
     fn from(e: FolderError) -> Self {
         match &e {
-            FolderError::AnotherRun { .. } | FolderError::Foreign { .. } => {
-                let failure = Self { exit_code: code::ANOTHER_RUN, ..Self::new(&e) };
-                failure.hint("choose another folder with --out; nothing was touched")
-            }
+            FolderError::AnotherRun { .. } | FolderError::Foreign { .. } => another_run(&e),
             FolderError::Io { path, .. } if path.ends_with("run.json") => {
                 Self::new(&e).hint("a run folder is what `gripgen sweep` writes")
             }
@@ -113,10 +109,16 @@ impl From<FolderError> for Failure {
     }
 }
 
+fn another_run(error: &dyn Display) -> Failure {
+    let failure = Failure { exit_code: code::ANOTHER_RUN, ..Failure::new(error) };
+    failure.hint("choose another folder with --out; nothing was touched")
+}
+
 impl From<SweepError> for Failure {
     fn from(e: SweepError) -> Self {
         match e {
             SweepError::Folder(e) => e.into(),
+            SweepError::AnotherConfig { .. } => another_run(&e),
             SweepError::Slice { .. } => Failure::usage(e),
             other => Failure::new(other),
         }

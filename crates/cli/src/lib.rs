@@ -16,6 +16,8 @@ use std::ffi::OsString;
 
 /// Runs gripgen with the arguments of a process (the first is its name) and returns its exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    output::remember_program(arguments.first());
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(e) => {

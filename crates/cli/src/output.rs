@@ -2,9 +2,11 @@
 
 use crate::failure::Failure;
 use serde_json::Value;
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Where JSON goes.
 pub enum JsonSink {
@@ -57,6 +59,20 @@ impl JsonSink {
         };
         written.map_err(|e| Failure::new(format!("writing JSON: {e}")))
     }
+}
+
+static PROGRAM: OnceLock<String> = OnceLock::new();
+
+/// Keeps how gripgen was called, for commands that it proposes.
+pub fn remember_program(name: Option<&OsString>) {
+    if let Some(name) = name {
+        let _ = PROGRAM.set(name.to_string_lossy().into_owned());
+    }
+}
+
+/// How gripgen was called: `gripgen`, or the path of a binary that is not installed.
+pub fn program() -> &'static str {
+    PROGRAM.get().map_or("gripgen", String::as_str)
 }
 
 /// Writes to standard output. A reader that hung up (`| head`) is no failure.

@@ -94,6 +94,12 @@ pub(crate) fn timestamp(time_ns: u64) -> Timestamp {
     Timestamp { seconds: (time_ns / 1_000_000_000) as i64, nanos: (time_ns % 1_000_000_000) as i32 }
 }
 
+/// A setting in the unit of its file, without the last bits that the way to SI and back costs: 30 degrees, not
+/// 29.999999999999996. So that rows of one setting can be grouped by it.
+fn as_written(x: f64) -> f64 {
+    (x * 1e9).round() / 1e9
+}
+
 fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sample {
     let Scenario { covariates: c, pull, .. } = &sample.scenario;
     let s = &sample.scenario;
@@ -114,10 +120,10 @@ fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sampl
         pull_index: c.pull_index,
         time_s: c.time_s,
         temperature_c: c.temperature_c,
-        grip_offset_mm: c.grip_offset_m * 1e3,
-        grip_angle_deg: c.grip_angle_rad.to_degrees(),
+        grip_offset_mm: as_written(c.grip_offset_m * 1e3),
+        grip_angle_deg: as_written(c.grip_angle_rad.to_degrees()),
         pull_direction: c.pull_direction as i32,
-        stop_mm: pull.stop_m * 1e3,
+        stop_mm: as_written(pull.stop_m * 1e3),
         label_tolerance_n: pull.label_tolerance_n,
         ..Default::default()
     };

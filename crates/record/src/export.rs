@@ -82,10 +82,9 @@ fn info(reader: &ShardReader, index: u64) -> Result<ShardInfo, ReadError> {
     Ok(ShardInfo {
         gripgen_version: text("gripgen_version"),
         config_sha256: text("config_sha256"),
-        name: text("name"),
         source: text("source"),
-        shard: number("shard"),
-        shards: number("shards"),
+        shard: number("shard_index"),
+        shards: number("shard_count"),
         first_sample: index,
         samples: 1,
         slot_ns: number("slot_ns"),

@@ -3,10 +3,12 @@
 //! A shard is done when its sidecar is there. The sidecar is written after the shard was renamed into place, so a run
 //! killed at any moment leaves nothing that could be taken for finished, and running it again continues.
 
-use crate::index::{csv_lines, index_header};
+use crate::index::{INDEX_COLUMNS, csv_lines, index_header, status_name};
+use crate::proto::gripgen_v1::Status;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fs::{File, TryLockError};
+use std::hash::{BuildHasher, RandomState};
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -37,7 +39,7 @@ pub struct RunInfo {
     pub shards: u64,
     /// Columns of the index beside the fixed ones.
     pub extra_columns: Vec<String>,
-    /// Content of meshes and sensor files by the path they are named with.
+    /// SHA-256 of meshes and sensor files by their path in the resolved configuration.
     pub files_sha256: std::collections::BTreeMap<String, String>,
     /// The resolved configuration.
     pub config_toml: String,
@@ -69,6 +71,14 @@ pub struct Sidecar {
     pub rows: Vec<Vec<String>>,
 }
 
+impl Sidecar {
+    /// How many of its samples ended like this.
+    pub fn rows_with_status(&self, status: Status) -> u64 {
+        let column = INDEX_COLUMNS.iter().position(|c| *c == "status").expect("a fixed column");
+        self.rows.iter().filter(|row| row[column] == status_name(status)).count() as u64
+    }
+}
+
 /// Why a run folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -88,6 +98,14 @@ pub enum FolderError {
         path: PathBuf,
         /// What the parser says.
         source: serde_json::Error,
+    },
+    /// The numbers of a `run.json` do not fit together.
+    #[error("{path}: {problem}")]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
     },
     /// The folder belongs to another run.
     #[error("{path} holds another run: {what} is {found}, this run has {wanted}")]
@@ -125,6 +143,16 @@ pub struct PartialShard {
     path: PathBuf,
 }
 
+/// What became of starting a shard.
+pub enum ShardStart {
+    /// It is ours to write.
+    Begun(PartialShard),
+    /// Another process is writing it right now.
+    Busy,
+    /// Another process has finished it.
+    Done(Sidecar),
+}
+
 impl PartialShard {
     /// A second handle of the file, for a writer that wants to own one; the lock stays with this one.
     pub fn duplicate(&self) -> Result<File, FolderError> {
@@ -140,18 +168,13 @@ impl PartialShard {
 impl RunFolder {
     /// Opens the folder of a run, or makes it. A folder that holds something else is left untouched.
     ///
-    /// `inputs` are the files that the run depends on and that gripgen does not hold itself; copies of them go into
-    /// `inputs/`, named by their hash, so that the folder can be read and repeated anywhere.
-    pub fn create(path: &Path, info: RunInfo, inputs: &[&[u8]]) -> Result<Self, FolderError> {
+    /// `inputs` are name and content of the files that the run depends on and that gripgen does not hold itself;
+    /// copies of them go into the folder, so that it can be read and repeated anywhere. A run that is there already
+    /// keeps its name.
+    pub fn create(path: &Path, info: RunInfo, inputs: &[(&str, &[u8])]) -> Result<Self, FolderError> {
         let at = io_at(path);
-        match std::fs::read(path.join("run.json")) {
-            Ok(bytes) => {
-                let found = parse(&path.join("run.json"), &bytes)?;
-                check_same(path, &found, &info)?;
-                return Ok(Self { path: path.into(), info });
-            }
-            Err(e) if e.kind() == ErrorKind::NotFound => {}
-            Err(e) => return Err(io_at(&path.join("run.json"))(e)),
+        if let Some(found) = Self::open_same(path, &info)? {
+            return Ok(found);
         }
         match std::fs::read_dir(path) {
             Ok(entries) => {
@@ -170,11 +193,23 @@ impl RunFolder {
         if !inputs.is_empty() {
             std::fs::create_dir_all(path.join("inputs")).map_err(&at)?;
         }
-        for bytes in inputs {
-            folder.publish(&format!("inputs/{}", sha256_hex(bytes)), bytes)?;
+        for (name, bytes) in inputs {
+            folder.publish(name, bytes)?;
         }
-        folder.publish("run.json", &json(&folder.info))?;
-        Ok(folder)
+        // Another process may do the same at this moment: the first run.json stands, and counts for both.
+        if folder.publish_new("run.json", &json(&folder.info))? {
+            return Ok(folder);
+        }
+        Self::open_same(path, &folder.info)?.ok_or_else(|| io_at(path)(ErrorKind::NotFound.into()))
+    }
+
+    /// The run that is there, if it is this one; `None` if there is none.
+    fn open_same(path: &Path, info: &RunInfo) -> Result<Option<Self>, FolderError> {
+        match Self::open(path) {
+            Ok(folder) => check_same(path, &folder.info, info).map(|()| Some(folder)),
+            Err(FolderError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
+            Err(e) => Err(e),
+        }
     }
 
     /// Opens a run folder for reading.
@@ -194,17 +229,13 @@ impl RunFolder {
         &self.path
     }
 
-    /// The copy of an input with this hash.
-    pub fn input_path(&self, sha256: &str) -> PathBuf {
-        self.path.join("inputs").join(sha256)
-    }
-
     /// The file of a shard.
     pub fn shard_path(&self, shard: u64) -> PathBuf {
         self.path.join(format!("shard-{shard:05}.mcap"))
     }
 
-    fn sidecar_path(&self, shard: u64) -> PathBuf {
+    /// The sidecar of a shard.
+    pub fn sidecar_path(&self, shard: u64) -> PathBuf {
         self.path.join(format!("shard-{shard:05}.json"))
     }
 
@@ -219,29 +250,43 @@ impl RunFolder {
         };
         let Ok(sidecar) = serde_json::from_slice::<Sidecar>(&bytes) else { return Ok(None) };
         let size = std::fs::metadata(self.shard_path(shard)).map_or(0, |m| m.len());
+        let columns = INDEX_COLUMNS.len() + self.info.extra_columns.len();
         let same = sidecar.config_sha256 == self.info.config_sha256
             && sidecar.shard == shard
-            && sidecar.bytes == size;
+            && sidecar.bytes == size
+            && sidecar.samples == sidecar.rows.len() as u64
+            && sidecar.rows.iter().all(|row| row.len() == columns);
         Ok(same.then_some(sidecar))
     }
 
-    /// Starts a shard. `None` if another process is writing it right now.
-    pub fn start_shard(&self, shard: u64) -> Result<Option<PartialShard>, FolderError> {
+    /// Starts a shard, unless another process is writing it or has finished it since it was looked for.
+    pub fn start_shard(&self, shard: u64) -> Result<ShardStart, FolderError> {
         let path = self.path.join(format!("shard-{shard:05}.mcap.partial"));
-        let file = File::options()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&path)
-            .map_err(io_at(&path))?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Ok(None),
-            Err(TryLockError::Error(e)) => return Err(io_at(&path)(e)),
+        let at = io_at(&path);
+        loop {
+            let file = File::options()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .open(&path)
+                .map_err(&at)?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Ok(ShardStart::Busy),
+                Err(TryLockError::Error(e)) => return Err(at(e)),
+            }
+            // Between opening and locking, its writer may have renamed the file into place.
+            if !is_at(&file, &path).map_err(&at)? {
+                continue;
+            }
+            if let Some(sidecar) = self.finished(shard)? {
+                std::fs::remove_file(&path).map_err(&at)?;
+                return Ok(ShardStart::Done(sidecar));
+            }
+            file.set_len(0).map_err(&at)?;
+            return Ok(ShardStart::Begun(PartialShard { file, path }));
         }
-        file.set_len(0).map_err(io_at(&path))?;
-        Ok(Some(PartialShard { file, path }))
     }
 
     /// Publishes a written shard: sync, rename, then the sidecar.
@@ -300,17 +345,64 @@ impl RunFolder {
 
     /// Writes a file at once: under a temporary name first, then renamed.
     pub fn publish(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
+        let temporary = self.written(name, bytes)?;
+        std::fs::rename(&temporary, self.path.join(name)).map_err(io_at(&temporary))
+    }
+
+    /// The same for a file that nobody may have written before; returns whether it was ours that was first.
+    fn publish_new(&self, name: &str, bytes: &[u8]) -> Result<bool, FolderError> {
+        let temporary = self.written(name, bytes)?;
+        let linked = std::fs::hard_link(&temporary, self.path.join(name));
+        match linked {
+            Ok(()) => {}
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => {
+                std::fs::remove_file(&temporary).map_err(io_at(&temporary))?;
+                return Ok(false);
+            }
+            // A file system without hard links.
+            Err(_) => {
+                return std::fs::rename(&temporary, self.path.join(name))
+                    .map_err(io_at(&temporary))
+                    .map(|()| true);
+            }
+        }
+        std::fs::remove_file(&temporary).map_err(io_at(&temporary))?;
+        Ok(true)
+    }
+
+    /// A temporary file with this content.
+    fn written(&self, name: &str, bytes: &[u8]) -> Result<PathBuf, FolderError> {
         let temporary = self.temporary(name);
         let at = io_at(&temporary);
         let mut file = File::create(&temporary).map_err(&at)?;
         file.write_all(bytes).map_err(&at)?;
         file.sync_all().map_err(&at)?;
-        std::fs::rename(&temporary, self.path.join(name)).map_err(&at)
+        Ok(temporary)
     }
 
+    /// A name that no other process uses: process numbers repeat across machines and containers.
     fn temporary(&self, name: &str) -> PathBuf {
-        self.path.join(format!("{name}.{}.partial", std::process::id()))
+        let random = RandomState::new().hash_one(std::process::id());
+        self.path.join(format!("{name}.{random:016x}.partial"))
     }
+}
+
+/// Whether an open file is still the one at `path`.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> std::io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    let open = file.metadata()?;
+    match std::fs::metadata(path) {
+        Ok(there) => Ok((open.dev(), open.ino()) == (there.dev(), there.ino())),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
+        Err(e) => Err(e),
+    }
+}
+
+/// Elsewhere an open file cannot be renamed, so it is where it was.
+#[cfg(not(unix))]
+fn is_at(_file: &File, path: &Path) -> std::io::Result<bool> {
+    path.try_exists()
 }
 
 /// SHA-256 and size of a file.
@@ -351,12 +443,21 @@ fn json<T: Serialize>(value: &T) -> Vec<u8> {
 }
 
 fn parse(path: &Path, bytes: &[u8]) -> Result<RunInfo, FolderError> {
-    serde_json::from_slice(bytes).map_err(|source| FolderError::Json { path: path.into(), source })
+    let info: RunInfo =
+        serde_json::from_slice(bytes).map_err(|source| FolderError::Json { path: path.into(), source })?;
+    let invalid = |problem: String| Err(FolderError::Invalid { path: path.into(), problem });
+    if info.schema != RUN_SCHEMA {
+        return invalid(format!("its schema is `{}`, this gripgen reads `{RUN_SCHEMA}`", info.schema));
+    }
+    if info.shard_samples == 0 || info.shards != info.samples.div_ceil(info.shard_samples) {
+        let (samples, size, shards) = (info.samples, info.shard_samples, info.shards);
+        return invalid(format!("{samples} samples in shards of {size} do not make {shards} shards"));
+    }
+    Ok(info)
 }
 
 fn check_same(path: &Path, found: &RunInfo, wanted: &RunInfo) -> Result<(), FolderError> {
     for (what, a, b) in [
-        ("schema", &found.schema, &wanted.schema),
         ("gripgen_version", &found.gripgen_version, &wanted.gripgen_version),
         ("config_sha256", &found.config_sha256, &wanted.config_sha256),
     ] {

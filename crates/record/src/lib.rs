@@ -19,7 +19,8 @@ mod verify;
 pub use encode::{EncodeOptions, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
 pub use folder::{
-    FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, Sidecar, hash_file, sha256_hex,
+    FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
+    sha256_hex,
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
 pub use picture::{PictureError, decode as decode_picture, encode_png};

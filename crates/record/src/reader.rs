@@ -118,14 +118,14 @@ impl ShardReader {
                 .and_then(|v| v.parse::<u64>().ok())
                 .ok_or_else(|| foreign(format!("its metadata has no number `{key}`")))
         };
-        let version = number("layout_version")?;
+        let version = number("schema_version")?;
         if version != u64::from(LAYOUT_VERSION) {
             return Err(foreign(format!(
                 "its layout is version {version}, this gripgen reads {LAYOUT_VERSION}"
             )));
         }
         let (slot_ns, samples, first_sample) =
-            (number("slot_ns")?, number("samples")?, number("first_sample")?);
+            (number("slot_ns")?, number("n_samples")?, number("first_sample")?);
         if slot_ns == 0 {
             return Err(foreign("its time slots are 0 ns long".into()));
         }

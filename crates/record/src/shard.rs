@@ -23,8 +23,6 @@ pub struct ShardInfo {
     pub gripgen_version: String,
     /// Hash of everything the samples depend on.
     pub config_sha256: String,
-    /// Name of the run.
-    pub name: String,
     /// `sim` or `rig`.
     pub source: String,
     /// Number of this shard.
@@ -44,15 +42,14 @@ pub struct ShardInfo {
 impl ShardInfo {
     fn metadata(&self) -> BTreeMap<String, String> {
         [
-            ("layout_version", LAYOUT_VERSION.to_string()),
+            ("schema_version", LAYOUT_VERSION.to_string()),
             ("gripgen_version", self.gripgen_version.clone()),
             ("config_sha256", self.config_sha256.clone()),
-            ("name", self.name.clone()),
             ("source", self.source.clone()),
-            ("shard", self.shard.to_string()),
-            ("shards", self.shards.to_string()),
+            ("shard_index", self.shard.to_string()),
+            ("shard_count", self.shards.to_string()),
             ("first_sample", self.first_sample.to_string()),
-            ("samples", self.samples.to_string()),
+            ("n_samples", self.samples.to_string()),
             ("slot_ns", self.slot_ns.to_string()),
         ]
         .into_iter()

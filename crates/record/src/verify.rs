@@ -31,9 +31,8 @@ pub fn verify(path: &Path, mut progress: impl FnMut(u64)) -> Result<Verification
         let sidecar = folder.finished(shard)?;
         let file = folder.shard_path(shard);
         match sidecar {
-            None if file.exists() => {
-                let problem = "it has no sidecar that fits it; running the sweep again rebuilds it";
-                result.faults.push(format!("{}: {problem}", file.display()));
+            None if file.exists() || folder.sidecar_path(shard).exists() => {
+                result.faults.push(misfit(&folder, shard));
             }
             None => result.missing_shards += 1,
             Some(sidecar) => {
@@ -55,10 +54,25 @@ pub fn verify(path: &Path, mut progress: impl FnMut(u64)) -> Result<Verification
         }
         progress(shard);
     }
+    if result.missing_shards > 0 && folder.path().join("index.csv").exists() {
+        let problem = format!("it is there, but {} shards are not", result.missing_shards);
+        result.faults.push(format!("{}: {problem}", folder.path().join("index.csv").display()));
+    }
     if result.missing_shards == 0 && result.faults.is_empty() {
         result.faults.extend(index.finish());
     }
     Ok(result)
+}
+
+/// Why shard and sidecar do not belong together.
+fn misfit(folder: &RunFolder, shard: u64) -> String {
+    let (file, sidecar) = (folder.shard_path(shard), folder.sidecar_path(shard));
+    let problem = match (file.exists(), sidecar.exists()) {
+        (true, false) => "it has no sidecar",
+        (false, _) => return format!("{}: the shard it describes is missing", sidecar.display()),
+        (true, true) => "its sidecar does not fit it",
+    };
+    format!("{}: {problem}; running the sweep again makes it anew", file.display())
 }
 
 fn check_shard(file: &Path, folder: &RunFolder, rows: &[Vec<String>]) -> Result<u64, String> {

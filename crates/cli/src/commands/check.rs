@@ -3,25 +3,34 @@
 use crate::args::{CheckArgs, ConfigArgs, TalkArgs};
 use crate::failure::{Failure, code};
 use crate::output::{JsonSink, duration, size};
+use gripgen::record::{proto::gripgen_v1::Status, status_name};
 use gripgen::tactile::SimdLevel;
 use gripgen::{Location, Plan, Project, plan};
 use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &CheckArgs) -> Result<u8, Failure> {
-    check(&args.config, args.json.json.as_deref(), &args.talk)
+    check(&args.config, None, args.json.json.as_deref(), &args.talk)
 }
 
 /// Loads, tries out and reports; `sweep --dry-run` is the same.
-pub fn check(config: &ConfigArgs, json: Option<&str>, talk: &TalkArgs) -> Result<u8, Failure> {
+pub fn check(
+    config: &ConfigArgs,
+    jobs: Option<usize>,
+    json: Option<&str>,
+    talk: &TalkArgs,
+) -> Result<u8, Failure> {
     let project = Project::load(&Location::parse(&config.config), &config.set)?;
     let mut sink = JsonSink::open(json)?;
     let plan = plan(&project, SimdLevel::best()).map_err(Failure::new)?;
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let failed: Vec<_> = plan.probes.iter().filter_map(|(i, failure)| Some((i, failure.as_ref()?))).collect();
+    let jobs = jobs.unwrap_or_else(cores).max(1);
+    let failed: Vec<_> = plan.probes.iter().filter(|p| p.failure.is_some()).collect();
     if sink.wanted() {
-        let probes: Vec<_> =
-            plan.probes.iter().map(|(i, failure)| json!({"index": i, "failure": failure})).collect();
+        let probes: Vec<_> = plan
+            .probes
+            .iter()
+            .map(|p| json!({"index": p.index, "status": status_name(p.status), "failure": p.failure}))
+            .collect();
         sink.document(&json!({
             "schema": "gripgen.plan/1",
             "name": project.name,
@@ -30,16 +39,37 @@ pub fn check(config: &ConfigArgs, json: Option<&str>, talk: &TalkArgs) -> Result
             "shards": plan.shards,
             "estimated_bytes": plan.estimated_bytes,
             "estimated_cpu_s": plan.estimated_cpu.as_secs_f64(),
+            "jobs": jobs,
             "probes": probes,
         }))?;
     }
     if !talk.quiet {
-        eprint!("{}", describe(&project, &plan, cores));
-        for (index, failure) in &failed {
-            eprintln!("warning: sample {index} will fail: {failure}");
+        eprint!("{}", describe(&project, &plan, jobs));
+        for probe in &plan.probes {
+            let index = probe.index;
+            match probe.status {
+                Status::Failed => {
+                    eprintln!(
+                        "warning: sample {index} will fail: {}",
+                        probe.failure.as_deref().unwrap_or("")
+                    );
+                }
+                Status::NoContact => {
+                    eprintln!("warning: sample {index} misses the part (label 0, no_contact)")
+                }
+                Status::Censored => {
+                    eprintln!("warning: sample {index} ends before the jaws slip (censored: a lower bound)");
+                }
+                _ => {}
+            }
         }
     }
     Ok(if failed.is_empty() { 0 } else { code::SAMPLES_FAILED })
+}
+
+/// Worker threads where the user names none.
+pub fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// The plan in words.

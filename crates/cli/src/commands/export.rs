@@ -3,8 +3,9 @@
 use crate::args::ExportArgs;
 use crate::commands::open_run;
 use crate::failure::Failure;
-use crate::output::{print, write_file};
+use crate::output::{JsonSink, print, write_file};
 use gripgen::record::{ShardReader, export_sample};
+use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
@@ -24,6 +25,14 @@ pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
     }
     let bytes = export_sample(&ShardReader::open(&folder.shard_path(shard))?, args.sample)?;
     write_file(&args.out, &bytes)?;
-    print(&format!("{}\n", args.out.display()))?;
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    if sink.wanted() {
+        sink.document(&json!({
+            "schema": "gripgen.export/1", "sample": args.sample, "file": args.out, "bytes": bytes.len(),
+        }))?;
+    }
+    if !sink.on_stdout() && !args.talk.quiet {
+        print(&format!("{}\n", args.out.display()))?;
+    }
     Ok(0)
 }

@@ -75,6 +75,9 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
             return Ok(0);
         }
     }
+    if args.talk.quiet {
+        return Ok(0);
+    }
     let mut text = format!("{} ({}), made by gripgen {}\n", info.name, info.source, info.gripgen_version);
     text += &format!("configuration {}\n", &info.config_sha256[..16.min(info.config_sha256.len())]);
     text +=
@@ -83,6 +86,9 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     text += &format!("{}\n\n", counts.join(", "));
     text += &format!("{:<20} {:>8} {:>24}\n", "part", "samples", "max_pull_force_n");
     text += &format!("{:<20} {:>8} {:>8} {:>7} {:>7}\n", "", "", "mean", "low", "high");
+    if args.talk.verbose {
+        text += &format!("{}\n", info.config_toml);
+    }
     let number = |x: Option<f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.2}"));
     for (name, p) in &parts {
         let (mean, low, high) = (number(p.mean_n()), number(p.low_n), number(p.high_n));

@@ -2,8 +2,9 @@
 
 use crate::args::InitArgs;
 use crate::failure::Failure;
-use crate::output::{print, write_file};
+use crate::output::{JsonSink, print, program, write_file};
 use gripgen::{StarterFile, part_starter, starter};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Runs the verb.
@@ -13,24 +14,41 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
         .extension()
         .and_then(|e| e.to_str())
         .is_some_and(|e| ["stl", "obj"].contains(&e.to_ascii_lowercase().as_str()));
-    let (folder, files, talk) = if is_mesh {
+    let (folder, files, talk, grips) = if is_mesh {
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
         let made = part_starter(&args.target, &folder, args.scale_mm_per_unit).map_err(|e| {
             Failure::usage(e).hint("--scale-mm-per-unit 1000 reads a file in metres, 25.4 one in inches")
         })?;
-        (folder, made.files, made.summary)
+        (folder, made.files, made.summary, made.grips)
     } else {
         if let Some(out) = &args.out {
             let problem = format!("--out {} goes with a mesh; a folder is its own target", out.display());
             return Err(Failure::usage(problem));
         }
-        (args.target.clone(), starter(), String::new())
+        (args.target.clone(), starter(), String::new(), vec![])
     };
     write_all(&folder, &files, args.force)?;
     if !args.talk.quiet {
         eprint!("{talk}");
         let sweep = folder.join("sweep.toml");
-        eprintln!("next: gripgen check {0}, then gripgen sweep {0}", sweep.display());
+        eprintln!("next: {1} check {0}, then {1} sweep {0}", sweep.display(), program());
+    }
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    if sink.wanted() {
+        let paths: Vec<PathBuf> = files.iter().map(|f| folder.join(&f.name)).collect();
+        let grips: Vec<_> = grips
+            .iter()
+            .map(|g| {
+                json!({
+                    "origin_mm": g.origin_mm, "orientation_deg": g.orientation_deg, "width_mm": g.width_mm,
+                    "contact_mm2": g.contact_mm2,
+                })
+            })
+            .collect();
+        sink.document(&json!({"schema": "gripgen.init/1", "files": paths, "grips": grips}))?;
+        if sink.on_stdout() {
+            return Ok(0);
+        }
     }
     let listed: String = files.iter().map(|f| format!("{}\n", folder.join(&f.name).display())).collect();
     print(&listed)?;

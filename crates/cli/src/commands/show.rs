@@ -4,8 +4,9 @@ use crate::args::ShowArgs;
 use crate::commands::open_run;
 use crate::commands::sweep::CONTACT_SHEET;
 use crate::failure::Failure;
-use crate::output::{print, write_file};
+use crate::output::{JsonSink, print, write_file};
 use gripgen::{contact_sheet, sample_picture};
+use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &ShowArgs) -> Result<u8, Failure> {
@@ -24,6 +25,14 @@ pub fn run(args: &ShowArgs) -> Result<u8, Failure> {
     };
     let out = args.out.clone().unwrap_or_else(|| args.run.join(name));
     write_file(&out, &bytes)?;
-    print(&format!("{}\n", out.display()))?;
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    if sink.wanted() {
+        sink.document(&json!({
+            "schema": "gripgen.picture/1", "sample": args.sample, "file": out, "bytes": bytes.len(),
+        }))?;
+    }
+    if !sink.on_stdout() && !args.talk.quiet {
+        print(&format!("{}\n", out.display()))?;
+    }
     Ok(0)
 }

@@ -4,7 +4,7 @@ use crate::args::SweepArgs;
 use crate::commands::check;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
-use crate::output::{JsonSink, duration, print, size};
+use crate::output::{JsonSink, duration, print, program, size};
 use crate::progress::Progress;
 use gripgen::record::{RunFolder, status_name};
 use gripgen::tactile::SimdLevel;
@@ -21,13 +21,12 @@ pub const CONTACT_SHEET: &str = "contact-sheet.png";
 /// Runs the verb.
 pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
     if args.dry_run {
-        return check::check(&args.config, args.json.json.as_deref(), &args.talk);
+        return check::check(&args.config, args.jobs, args.json.json.as_deref(), &args.talk);
     }
     let project = Project::load(&Location::parse(&args.config.config), &args.config.set)?;
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&project.name));
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let options =
-        SweepOptions { jobs: args.jobs.unwrap_or(cores).max(1), slice: args.slice, simd: simd_level(args)? };
+    let jobs = args.jobs.unwrap_or_else(check::cores).max(1);
+    let options = SweepOptions { jobs, slice: args.slice, simd: simd_level(args)? };
     let mut watch = Watch::new(args, &project)?;
     let result = sweep(&project, &out, options, stop_flag(), |event| watch.on_event(&event));
     let summary = result?;
@@ -108,9 +107,7 @@ impl<'a> Watch<'a> {
             }
             SweepEvent::Waiting { shards } => {
                 self.line(&json!({"event": "waiting", "shards": shards}));
-                if self.args.talk.verbose {
-                    self.say(&format!("waiting for {shards} shards that another process is writing"));
-                }
+                self.say(&format!("waiting for {shards} shards that another process is writing"));
             }
         }
     }
@@ -134,7 +131,7 @@ impl<'a> Watch<'a> {
         }
         self.line(&json!({
             "event": "done", "out": out, "samples": summary.samples, "failed": summary.failed,
-            "interrupted": summary.interrupted, "complete": summary.complete, "seconds": took,
+            "censored": summary.censored, "no_contact": summary.no_contact, "interrupted": summary.interrupted, "complete": summary.complete, "seconds": took,
         }));
         if !self.args.talk.quiet {
             self.tell(out, summary, took);
@@ -164,12 +161,21 @@ impl<'a> Watch<'a> {
                 summary.failed, summary.samples
             );
         }
+        for (n, what) in [
+            (summary.no_contact, "missed the part (label 0)"),
+            (summary.censored, "ended before the jaws slipped (label is a lower bound)"),
+        ] {
+            if n > 0 {
+                eprintln!("{n} of {} samples {what}", summary.samples);
+            }
+        }
         if summary.interrupted {
             eprintln!("stopped at {} samples; run the same command again to continue", summary.samples);
         } else if summary.complete {
             eprintln!(
-                "look at {}, or at one sample with: gripgen show {} 0",
+                "look at {}, or at one sample with: {} show {} 0",
                 out.join(CONTACT_SHEET).display(),
+                program(),
                 out.display()
             );
         } else {

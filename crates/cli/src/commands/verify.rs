@@ -37,7 +37,8 @@ pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
     }
     if !good {
         eprintln!(
-            "\nhint: running the same sweep again rebuilds shards whose sidecar is missing; delete the sidecar of a bad one first"
+            "\nhint: sweeping again makes anew what has no fitting sidecar; where the content differs, delete the \
+             sidecar (shard-NNNNN.json) first"
         );
     }
     Ok(if good { 0 } else { code::MISMATCH })

@@ -1,0 +1,99 @@
+//! A shard being written, and what stands in it beside the samples.
+
+use super::pipeline::Run;
+use super::{SweepError, SweepEvent, SweepSummary, VERSION, count, samples_of_shard};
+use crate::project::Project;
+use gripgen_record::proto::gripgen_v1::Status;
+use gripgen_record::{
+    EncodeOptions, EncodedSample, INDEX_COLUMNS, PartialShard, ShardInfo, ShardWriter, VIEW_RATE_HZ,
+    extra_columns,
+};
+use std::io::BufWriter;
+
+/// A shard being written.
+pub(super) struct OpenShard {
+    shard: u64,
+    writer: ShardWriter<BufWriter<std::fs::File>>,
+    partial: PartialShard,
+    rows: Vec<Vec<String>>,
+    failed: u64,
+}
+
+impl OpenShard {
+    pub(super) fn new(project: &Project, shard: u64, partial: PartialShard) -> Result<Self, SweepError> {
+        let info = shard_info(project, shard);
+        let file = partial.duplicate()?;
+        let writer = ShardWriter::new(BufWriter::new(file), &info, project.sweep.images)?;
+        Ok(Self { shard, writer, partial, rows: Vec::with_capacity(info.samples as usize), failed: 0 })
+    }
+
+    /// Writes a sample; gives the shard back until its last sample closes it.
+    pub(super) fn push(
+        mut self,
+        run: &Run<'_>,
+        index: u64,
+        encoded: EncodedSample,
+        summary: &mut SweepSummary,
+        on_event: &mut impl FnMut(SweepEvent),
+    ) -> Result<Option<Self>, SweepError> {
+        self.writer.push(&encoded)?;
+        let mut row = encoded.row;
+        row[1] = self.shard.to_string();
+        row[2] = self.rows.len().to_string();
+        let failure =
+            if encoded.status == Status::Failed { failure_of(&row).to_string() } else { String::new() };
+        self.failed += u64::from(encoded.status == Status::Failed);
+        self.rows.push(row);
+        on_event(SweepEvent::Sample { index, status: encoded.status, failure });
+        let samples = samples_of_shard(run.project, self.shard);
+        if (self.rows.len() as u64) < samples {
+            return Ok(Some(self));
+        }
+        let first = self.shard * run.project.sweep.shard_samples;
+        self.writer.finish()?.into_inner().map_err(|e| self.partial.error(e.into_error()))?;
+        let sidecar = run.folder.finish_shard(self.shard, first, self.partial, self.failed, self.rows)?;
+        count(summary, &sidecar);
+        let (bytes, failed) = (sidecar.bytes, sidecar.failed);
+        on_event(SweepEvent::Shard { shard: self.shard, bytes, failed });
+        Ok(None)
+    }
+}
+
+/// The `failure` cell of an index row.
+fn failure_of(row: &[String]) -> &str {
+    let at = INDEX_COLUMNS.iter().position(|c| *c == "failure").expect("a fixed column");
+    &row[at]
+}
+
+/// How sample `index` of a project is encoded into its shard.
+pub(crate) fn encode_options(project: &Project, index: u64) -> EncodeOptions {
+    let sweep = &project.sweep;
+    EncodeOptions {
+        images: sweep.images,
+        trace: sweep.trace,
+        view_rate_hz: Some(VIEW_RATE_HZ),
+        extra_columns: extra_columns(sweep.vary.iter().map(|v| v.key.as_str())),
+        first_sample: index / sweep.shard_samples * sweep.shard_samples,
+        slot_ns: slot_ns(project),
+    }
+}
+
+/// Time between the starts of two samples in a file: longer than any pull, in whole seconds.
+fn slot_ns(project: &Project) -> u64 {
+    (project.sweep.pull().max_time_s.ceil() as u64 + 1) * 1_000_000_000
+}
+
+/// What shard `shard` of a project says about itself.
+fn shard_info(project: &Project, shard: u64) -> ShardInfo {
+    ShardInfo {
+        gripgen_version: VERSION.into(),
+        config_sha256: project.config_sha256.clone(),
+        source: "sim".into(),
+        shard,
+        shards: project.sweep.shards(),
+        first_sample: shard * project.sweep.shard_samples,
+        samples: samples_of_shard(project, shard),
+        slot_ns: slot_ns(project),
+        config_toml: project.config_toml.clone(),
+    }
+}
