@@ -76,6 +76,25 @@ pub enum LibraryError {
     },
 }
 
+impl LibraryError {
+    /// What to do about it, where there is something to say.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            LibraryError::Mesh { source: MeshError::Extent { .. }, .. } => Some(
+                "scale_mm_per_unit of the part is millimetres per unit of the mesh file: 1000 for metres, 25.4 for inches",
+            ),
+            LibraryError::Sensor { source: SensorError::Incomplete { .. }, .. } => {
+                Some("give it in the same section of the twin")
+            }
+            LibraryError::Sensor { .. } => {
+                Some("a sensor file is gripgen's own npz, or Taxim's polycalib.npz")
+            }
+            LibraryError::Kernel { .. } => Some("see kernels_px of the gel"),
+            _ => None,
+        }
+    }
+}
+
 impl Library {
     pub(crate) fn new(files: Files) -> Self {
         Self { files, meshes: Cache::new(MESHES), shapes: Cache::new(SHAPES), sensors: Cache::new(SENSORS) }
@@ -213,7 +232,7 @@ mod tests {
             });
             assert_eq!(*value.unwrap(), key * 10);
         };
-        [1, 2, 1, 3, 1, 2].map(&mut ask);
+        [1, 2, 1, 3, 1, 2].into_iter().for_each(&mut ask);
         assert_eq!(made, [1, 2, 3, 2], "3 pushed 2 out, not 1");
         let unknown = || Err(LibraryError::Unknown { path: "x".into() });
         assert!(cache.get(9, unknown).is_err());

@@ -95,7 +95,8 @@ impl Project {
         for file in &named {
             project.check_file(file).map_err(|e| {
                 let document = if file.key == file.twin_key { &twin_document } else { &document };
-                document.located(ConfigError::new(&file.key, e.to_string()))
+                let error = ConfigError::new(&file.key, e.to_string());
+                document.located(ConfigError { hint: e.hint().map(Into::into), ..error })
             })?;
         }
         Ok(project)

@@ -137,7 +137,7 @@ fn a_total_grip_force_is_half_as_much_per_jaw() {
     let force = |convention: &str| {
         let sets = ["vary.grip_force_n=[40]", &format!("gripper.force_convention={convention}")];
         let p = project("asset:configs/quickstart.toml", &sets);
-        p.sweep.scenario(0, &p.twin).unwrap().grip_force_n
+        p.sweep.scenario(0, &p.twin).0.grip_force_n
     };
     assert_eq!((force("per_jaw"), force("total")), (40.0, 20.0));
     // And the limit of the gripper is per jaw: 120 N in total are 60 N per jaw.
@@ -165,6 +165,54 @@ fn the_hash_covers_contents_and_nothing_else() {
     assert_eq!(first, write("b/c", mesh, ""), "moved");
     assert_ne!(first, write("d", shaft, ""), "another mesh under the same name");
     assert_ne!(first, write("e", mesh, "scatter = 0.01\n"), "another twin");
+    assert_eq!(first, write("f", mesh, "scatter = 0.0\nscale_mm_per_unit = 1\n"), "defaults typed out");
+    assert_eq!(first, write("g", mesh, "[wrist]\nrate_hz = 500\nnoise_n = 0.12\n"), "in another order");
+}
+
+/// What is resolved is a configuration again: split in two files it is the same run.
+#[test]
+fn a_resolved_configuration_resolves_to_itself() {
+    for sets in [&[][..], &["vary.parts.gear.mu={ uniform = [0.1, 0.2] }", "design=random", "samples=9"][..]]
+    {
+        let first = project("asset:configs/quickstart.toml", sets);
+        let both: toml::Table = first.config_toml.parse().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        for (section, file) in [("sweep", "again.toml"), ("twin", "twin.toml")] {
+            std::fs::write(folder.path().join(file), both[section].as_table().unwrap().to_string()).unwrap();
+        }
+        let again = project(folder.path().join("again.toml").to_str().unwrap(), &[]);
+        assert_eq!(again.config_toml, first.config_toml);
+        assert_eq!(again.config_sha256, first.config_sha256);
+    }
+}
+
+/// Broken files are found before any work is done, also those that only some samples draw, and the key is named.
+#[test]
+fn broken_files_are_errors_of_the_key_that_names_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, content: &str| std::fs::write(folder.path().join(name), content).unwrap();
+    write("bad.stl", "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 nan\n");
+    write("bad.npz", "no archive");
+    write(
+        "twin.toml",
+        "[parts.gear]\nmesh = \"asset:parts/gear/part.stl\"\nmu = 0.15\nimprint_mm3_per_n = 1.5\n",
+    );
+    for (vary, key, part) in [
+        (
+            "\"parts.gear.mesh\" = [\"asset:parts/gear/part.stl\", \"bad.stl\"]",
+            "vary.parts.gear.mesh[1]",
+            "bad.stl",
+        ),
+        ("\"parts.gear.mesh\" = [\"none.stl\"]", "vary.parts.gear.mesh[0]", "none.stl"),
+        ("\"optics.left.sensor\" = [\"bad.npz\"]", "vary.optics.left.sensor[0]", "bad.npz"),
+    ] {
+        write("sweep.toml", &format!("twin = \"twin.toml\"\nsamples = 2\n[vary]\n{vary}\n"));
+        let at = Location::Disk(folder.path().join("sweep.toml"));
+        let Err(LoadError::Config(error)) = Project::load(&at, &[]) else { panic!("{vary} was accepted") };
+        assert_eq!(error.key, key);
+        assert!(error.problem.contains(part), "{error}");
+        assert!(error.place.is_some_and(|p| p.span.is_some()), "{vary}: no place");
+    }
 }
 
 #[test]

@@ -97,7 +97,8 @@ fn another_configuration_in_the_same_folder_is_refused_and_touches_nothing() {
     let before = content(folder.path());
     let other = small_project(&["seed=8"]);
     let error = sweep(&other, folder.path(), jobs(1), &AtomicBool::new(false), |_| {}).unwrap_err();
-    assert!(matches!(error, SweepError::Folder(gripgen::record::FolderError::AnotherRun { .. })), "{error}");
+    assert!(matches!(error, SweepError::AnotherConfig { .. }), "{error}");
+    assert!(error.to_string().ends_with("holds another run: sweep.seed is 7 there, 8 here"), "{error}");
     assert_eq!(content(folder.path()), before);
 
     let foreign = tempfile::tempdir().unwrap();
@@ -105,6 +106,39 @@ fn another_configuration_in_the_same_folder_is_refused_and_touches_nothing() {
     let error = sweep(&other, foreign.path(), jobs(1), &AtomicBool::new(false), |_| {}).unwrap_err();
     assert!(error.to_string().contains("thesis.tex"), "{error}");
     assert_eq!(content(foreign.path()).len(), 1);
+}
+
+/// Where a configuration and its files lie, and what it is called, changes no byte; a renamed one continues its run.
+#[test]
+fn paths_and_names_change_no_byte() {
+    let twin = "[parts.gear]\nmesh = \"MESH\"\nmu = 0.15\nimprint_mm3_per_n = 1.5\n";
+    let sweep = "twin = \"TWIN\"\nsamples = 4\nshard_samples = 2\n[vary]\ngrip_force_n = [20, 25]\n";
+    let write = |folder: &std::path::Path, names: [&str; 2], mesh: &std::path::Path| {
+        std::fs::create_dir_all(mesh.parent().unwrap()).unwrap();
+        std::fs::write(mesh, gripgen::assets::get("parts/gear/part.stl").unwrap()).unwrap();
+        let config = folder.join(names[0]);
+        std::fs::write(folder.join(names[1]), twin.replace("MESH", mesh.to_str().unwrap())).unwrap();
+        std::fs::write(&config, sweep.replace("TWIN", names[1])).unwrap();
+        crate::common::project(config.to_str().unwrap(), &[])
+    };
+    let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let first = write(a.path(), ["one.toml", "t.toml"], &a.path().join("part.stl"));
+    let second = write(b.path(), ["two.toml", "u.toml"], &b.path().join("meshes/part.stl"));
+    assert_eq!((first.name.as_str(), second.name.as_str()), ("one", "two"));
+    let (x, y) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    run(&first, x.path(), jobs(2));
+    run(&second, y.path(), jobs(2));
+    let (mut one, mut two) = (content(x.path()), content(y.path()));
+    // The name of the run stands in run.json alone.
+    assert!(one.remove("run.json") != two.remove("run.json"));
+    assert!(one == two);
+
+    std::fs::remove_file(x.path().join("shard-00001.json")).unwrap();
+    let before = content(x.path())["run.json"].clone();
+    assert!(run(&second, x.path(), jobs(1)).complete);
+    let mut after = content(x.path());
+    assert_eq!(after.remove("run.json"), Some(before), "a run keeps its name");
+    assert!(after == two);
 }
 
 /// A sample belongs to its index, not to its shard: cutting shards differently changes files, not samples.

@@ -6,13 +6,14 @@ use gripgen::twin::{Outcome, Pulled, Sample};
 use gripgen::{Project, generate};
 
 /// A twin without effects, scatter and noise: labels are closed forms.
-const QUIET: [&str; 6] = [
+const QUIET: [&str; 7] = [
     "twin=asset:configs/twin-baseline.toml",
     "images=none",
     "wrist.noise_n=0",
     "parts.long_shaft.scatter=0",
     "parts.gear.scatter=0",
     "parts.ball_bearing.scatter=0",
+    "parts.roller_bearing.scatter=0",
 ];
 
 fn quiet(sets: &[&str]) -> Project {
@@ -51,6 +52,50 @@ fn both_shafts_slip_at_twice_mu_times_grip_force() {
             );
         }
     }
+}
+
+/// And so do the other parts in both of their grips, whatever their contact looks like.
+#[test]
+fn gear_and_bearings_slip_at_twice_mu_times_grip_force() {
+    for (part, mu) in [("gear", 0.15), ("ball_bearing", 0.14), ("roller_bearing", 0.14)] {
+        let p = quiet(&[
+            &format!("vary.part=[\"{part}\"]"),
+            "vary.grip_pose=[0, 1]",
+            "vary.grip_angle_deg=[0, 45]",
+            "vary.grip_force_n=[20, 60]",
+        ]);
+        for index in 0..p.sweep.samples {
+            let sample = generate(&p, index, SimdLevel::best());
+            let s = &sample.scenario;
+            let what = format!("{part}, grip {}, {} N", s.grip_pose, s.grip_force_n);
+            let ideal = 2.0 * mu * s.grip_force_n;
+            let off = pulled(sample).label.max_pull_force_n / ideal - 1.0;
+            assert!(off.abs() < 5e-3, "{what}: {:.3} %", 100.0 * off);
+        }
+    }
+}
+
+/// Each jaw has its own gel: stiffnesses add, and a soft right gel shows in its own image alone.
+#[test]
+fn the_gels_of_the_jaws_may_differ() {
+    let sets = ["vary.part=[\"long_shaft\"]", "vary.grip_force_n=[60]", "vary.grip_angle_deg=[0]"];
+    let same = pulled(generate(&quiet(&sets), 0, SimdLevel::best()));
+    let other = ["gel.right.shear_stiffness_n_per_mm=5", "gel.right.kernels_px=[21, 11]"];
+    let with_images = [&["images=png", "optics.left.image_noise=off"], &sets[..2]].concat();
+    let images = |more: &[&str]| {
+        let sets: Vec<&str> = with_images.iter().chain(more).copied().collect();
+        pulled(generate(&quiet(&sets), 0, SimdLevel::best())).images.unwrap()
+    };
+    let different = pulled(generate(&quiet(&[&sets[..], &other[..]].concat()), 0, SimdLevel::best()));
+    let at_10_n = |p: &Pulled| {
+        let i = p.trace.measured_force_n.iter().position(|&f| f > 10.0).unwrap();
+        p.trace.displacement_m[i] / p.trace.measured_force_n[i]
+    };
+    for (found, stiffness) in [(at_10_n(&same), 40e3), (at_10_n(&different), 25e3)] {
+        assert!((found * stiffness - 1.0).abs() < 0.03, "{found} m/N, expected 1 / {stiffness}");
+    }
+    let (a, b) = (images(&[]), images(&other));
+    assert!(a.left == b.left && a.right != b.right);
 }
 
 /// A user's own box, from an OBJ file in inches.
@@ -166,7 +211,7 @@ fn the_two_jaws_see_mirror_images_of_a_symmetric_part() {
             "wrist.noise_n=0",
         ],
     );
-    let scenario = p.sweep.scenario(0, &p.twin).unwrap();
+    let scenario = p.sweep.scenario(0, &p.twin).0;
     let press = gripgen::press_only(&p.twin, &p.library, &scenario).unwrap().unwrap();
     let (left, right) = (&press.imprint.left.depth_px, &press.imprint.right.depth_px);
     let mut worst = 0.0_f32;

@@ -93,6 +93,98 @@ fn verify_finds_what_is_wrong() {
     assert!(faults.len() == 1 && faults[0].contains("line 2"), "{faults:?}");
     std::fs::write(&index, text + "13,\n").unwrap();
     assert!(check().faults[0].contains("goes on after line 13"));
+
+    std::fs::remove_file(&shard).unwrap();
+    let missing = check();
+    assert!(missing.faults.iter().any(|f| f.contains("the shard it describes is missing")), "{missing:?}");
+    std::fs::remove_file(folder.path().join("shard-00001.json")).unwrap();
+    let missing = check();
+    assert_eq!(missing.missing_shards, 1);
+    assert!(missing.faults.iter().any(|f| f.contains("index.csv") && f.contains("1 shards are not")));
+    std::fs::remove_file(&index).unwrap();
+    assert!(check().faults.is_empty(), "a run under way");
+}
+
+/// A `run.json` whose numbers do not fit together is refused, not divided by.
+#[test]
+fn a_damaged_run_json_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    run(&small_project(&[]), folder.path(), jobs(2));
+    let path = folder.path().join("run.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    for (from, to, part) in [
+        ("\"shard_samples\": 5", "\"shard_samples\": 0", "shards of 0 do not make 3"),
+        ("\"shards\": 3", "\"shards\": 4", "do not make 4 shards"),
+        ("gripgen.run/1", "gripgen.run/9", "`gripgen.run/9`"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&path, text.replace(from, to)).unwrap();
+        let error = RunFolder::open(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("run.json") && error.contains(part), "{error}");
+    }
+}
+
+/// Grips that miss and pulls that end early go through encoder, shard, index and reader with their status and label.
+#[test]
+fn grips_that_miss_and_pulls_that_end_early_keep_their_meaning() {
+    let project =
+        small_project(&["vary.part=[\"gear\"]", "vary.grip_offset_mm=[0, 60]", "pull.max_force_n=3"]);
+    let folder = tempfile::tempdir().unwrap();
+    let summary = run(&project, folder.path(), jobs(2));
+    assert_eq!((summary.samples, summary.failed, summary.no_contact, summary.censored), (6, 0, 3, 3));
+    let index = std::fs::read_to_string(folder.path().join("index.csv")).unwrap();
+    for shard in 0..2 {
+        let reader = ShardReader::open(&folder.path().join(format!("shard-{shard:05}.mcap"))).unwrap();
+        for k in reader.indices() {
+            let record = reader.record(k).unwrap();
+            let row = index.lines().nth(k as usize + 1).unwrap();
+            let images = record.images.expect("every grip has images");
+            if record.sample.grip_offset_mm == 60.0 {
+                assert_eq!(record.sample.status(), Status::NoContact);
+                assert_eq!((record.sample.max_pull_force_n, record.sample.mu), (Some(0.0), None));
+                assert!(record.trace.is_none() && record.sample.left.is_none());
+                assert!(row.contains(",no_contact,"), "{row}");
+            } else {
+                assert_eq!(record.sample.status(), Status::Censored);
+                let label = record.sample.max_pull_force_n.unwrap();
+                assert!(record.sample.censored && (2.0..4.5).contains(&label), "{label} N");
+                assert!(record.trace.is_some() && row.contains(",censored,"), "{row}");
+            }
+            assert_eq!(images.left.width_px, 320);
+        }
+    }
+    assert!(verify(folder.path(), |_| {}).unwrap().faults.is_empty());
+}
+
+/// A Gaussian reaches where no grip can follow. Such a sample fails, and its record says what was drawn.
+#[test]
+fn a_draw_that_is_out_of_range_is_recorded_with_its_value() {
+    let project = small_project(&[
+        "design=random",
+        "samples=40",
+        "vary.grip_force_n={ normal = [70, 10] }",
+        "vary.dwell_s={ normal = [1, 2] }",
+        "images=none",
+        "trace=none",
+        "pull.max_force_n=2",
+    ]);
+    let folder = tempfile::tempdir().unwrap();
+    let summary = run(&project, folder.path(), jobs(2));
+    let mut failed = 0;
+    for shard in 0..8 {
+        let reader = ShardReader::open(&folder.path().join(format!("shard-{shard:05}.mcap"))).unwrap();
+        for k in reader.indices() {
+            let s = reader.sample(k).unwrap();
+            let (force, dwell) = (s.drawn_number["grip_force_n"], s.drawn_number["dwell_s"]);
+            assert_eq!((s.grip_force_n, s.dwell_s), (force, dwell));
+            let key = if dwell < 0.0 { "dwell_s" } else { "grip_force_n" };
+            let bad = force > 80.0 || dwell < 0.0;
+            assert_eq!(s.status() == Status::Failed, bad, "{force} N, {dwell} s: {}", s.failure);
+            assert!(!bad || s.failure.contains(key), "{}", s.failure);
+            failed += u64::from(bad);
+        }
+    }
+    assert!(failed > 5 && failed == summary.failed, "{failed}");
 }
 
 /// An export is a file of its own: one sample from time 0, every reading as a message.

@@ -33,6 +33,20 @@ def metadata(path):
         return {m.name: m.metadata for m in make_reader(file, validate_crcs=True).iter_metadata()}
 
 
+def damages(path):
+    """The content of a shard, cut in half and with one bit flipped in the middle of each kind of chunk: what a checksum
+    covers. (Message indexes between the chunks have none.)"""
+    whole = path.read_bytes()
+    found = {"cut": whole[: len(whole) // 2]}
+    with open(path, "rb") as file:
+        chunks = make_reader(file).get_summary().chunk_indexes
+    for name, chunk in [("core", chunks[2]), ("view", chunks[3])]:
+        flipped = bytearray(whole)
+        flipped[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 1
+        found[name] = bytes(flipped)
+    return found
+
+
 def index(run):
     with open(run / "index.csv", newline="") as file:
         return list(csv.DictReader(file))
@@ -56,7 +70,7 @@ def test_every_sample_is_what_the_index_says(run):
 def test_samples_stand_in_their_time_slots(run):
     for path in run.glob("*.mcap"):
         facts = metadata(path)["gripgen.shard"]
-        slot, count = int(facts["slot_ns"]), int(facts["samples"])
+        slot, count = int(facts["slot_ns"]), int(facts["n_samples"])
         with open(path, "rb") as file:
             reader = make_reader(file)
             for k in range(count):
@@ -158,22 +172,15 @@ def test_rerun_finds_nothing_to_complain_about(run, raw_run, tmp_path):
     gripgen("export", run, "--sample", 9, "-o", one)
     assert rerun_accepts(one)
     # And would complain: a damaged file, a cut one.
-    whole = (run / "shard-00000.mcap").read_bytes()
-    damaged = bytearray(whole)
-    damaged[len(damaged) // 2] ^= 0xFF
-    for content in [damaged, whole[: len(whole) // 2]]:
+    for content in damages(run / "shard-00000.mcap").values():
         broken = tmp_path / "broken.mcap"
         broken.write_bytes(content)
         assert not rerun_accepts(broken)
 
 
 def test_damaged_files_are_refused_by_stock_readers_too(run, tmp_path):
-    whole = (run / "shard-00000.mcap").read_bytes()
-    for name, content in [("cut", whole[: len(whole) // 2]), ("flipped", None)]:
+    for name, content in damages(run / "shard-00000.mcap").items():
         path = tmp_path / f"{name}.mcap"
-        if content is None:
-            content = bytearray(whole)
-            content[len(content) // 2] ^= 0xFF
         path.write_bytes(content)
         with pytest.raises((McapError, CRCValidationError)):
             read(path)

@@ -156,7 +156,7 @@ fn another_run_in_the_folder_is_exit_code_3() {
     assert_code(&output, 3);
     let message = text(&output.stderr);
     assert!(
-        message.contains("config_sha256") && message.contains("hint: choose another folder"),
+        message.contains("sweep.seed is 7 there, 8 here") && message.contains("hint: choose another folder"),
         "{message}"
     );
     assert!(content(&out) == before, "nothing was touched");
@@ -280,10 +280,20 @@ fn two_processes_in_one_folder_make_one_run() {
     let expected = content(&out);
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
-    let mut children = [spawn(&out), spawn(&out)];
+    let events = [folder.path().join("a.json"), folder.path().join("b.json")];
+    let mut children = events.clone().map(|file| {
+        let mut command = gripgen();
+        command.args(sweep_args(out.to_str().unwrap(), &["--jobs", "1", "--json", file.to_str().unwrap()]));
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    });
     for child in &mut children {
         assert!(child.wait().unwrap().success());
     }
+    let made: usize = events
+        .iter()
+        .map(|file| std::fs::read_to_string(file).unwrap().matches("\"event\":\"shard\"").count())
+        .sum();
+    assert_eq!(made, 4, "each shard is made once");
     let found = content(&out);
     assert!(found == expected, "{:?}", found.keys());
 }
@@ -303,10 +313,16 @@ fn info_show_and_export_read_a_run() {
     assert_code(&shown, 0);
     assert_eq!(&std::fs::read(&picture).unwrap()[..4], b"\x89PNG");
     assert_code(&run(&["show", out, "24"]), 2);
+    let shown = run(&["show", out, "5", "-o", picture.to_str().unwrap(), "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&shown.stdout).unwrap();
+    assert_eq!((&json["sample"], json["file"].as_str()), (&5.into(), picture.to_str()));
+    assert!(run(&["info", out, "-q"]).stdout.is_empty());
 
     let one = folder.path().join("one.mcap");
     assert_code(&run(&["export", out, "--sample", "7", "-o", one.to_str().unwrap()]), 0);
     assert_eq!(&std::fs::read(&one).unwrap()[1..5], b"MCAP");
+    let quiet = run(&["export", out, "--sample", "7", "-o", one.to_str().unwrap(), "-q"]);
+    assert!(quiet.status.success() && quiet.stdout.is_empty());
     let foreign = run(&["info", folder.path().to_str().unwrap()]);
     assert_code(&foreign, 1);
     assert!(text(&foreign.stderr).contains("hint:"));
@@ -338,6 +354,11 @@ fn init_with_a_mesh_proposes_grips_that_run() {
     assert_eq!(&std::fs::read(at.join("grips.png")).unwrap()[..4], b"\x89PNG");
     let check = run(&["check", at.join("sweep.toml").to_str().unwrap()]);
     assert_code(&check, 0);
+    let again = run(&["init", mesh.to_str().unwrap(), "-o", at.to_str().unwrap(), "--force", "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(json["files"].as_array().unwrap().len(), 3);
+    assert!(json["grips"][0]["contact_mm2"].as_f64().unwrap() > 10.0);
+    assert_code(&run(&["init", mesh.to_str().unwrap(), "--scale-mm-per-unit", "0"]), 2);
 
     let inches = run(&[
         "init",

@@ -10,6 +10,7 @@
 //! This crate knows no mechanics and no forces over time.
 
 mod colour;
+mod convolve;
 mod deform;
 mod gradient;
 mod grid;

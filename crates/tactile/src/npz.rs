@@ -82,8 +82,12 @@ impl<'a> Npz<'a> {
         if file.size() > MAX_BYTES {
             return Err(bad(format!("{} bytes, at most {MAX_BYTES} are read", file.size())));
         }
-        let mut bytes = Vec::with_capacity(file.size() as usize);
-        file.read_to_end(&mut bytes).map_err(|e| bad(e.to_string()))?;
+        // The directory's word for the size is not trusted.
+        let mut bytes = Vec::new();
+        file.by_ref().take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| bad(e.to_string()))?;
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(bad(format!("more than {MAX_BYTES} bytes, which is all that is read")));
+        }
         parse_npy(&bytes).map_err(bad)
     }
 
@@ -121,10 +125,12 @@ fn parse_npy(bytes: &[u8]) -> Result<Array, String> {
     let fortran = header.contains("'fortran_order': True");
     let shape = shape_value(&header).ok_or("the header has no `shape`")?;
     let count = shape.iter().try_fold(1usize, |n, &d| n.checked_mul(d)).ok_or("the shape overflows")?;
-    let (swap, kind) = match descr.split_at(1.min(descr.len())) {
-        (">", kind) => (true, kind),
-        ("<" | "=" | "|", kind) => (false, kind),
-        _ => return Err(format!("element type `{descr}` is not known")),
+    let (swap, kind) = match descr.strip_prefix('>') {
+        Some(kind) => (true, kind),
+        None => match descr.strip_prefix(['<', '=', '|']) {
+            Some(kind) => (false, kind),
+            None => return Err(format!("element type `{descr}` is not known")),
+        },
     };
     let size = kind.get(1..).and_then(|n| n.parse::<usize>().ok()).unwrap_or(0);
     let data = &bytes[data_start..];
@@ -280,6 +286,10 @@ mod tests {
         for (bytes, part) in [
             (&b"\x93NUMPX\x01\x00\x00\x00"[..], "npy format"),
             (b"\x93NUMPY\x09\x00\x00\x00", "version 9"),
+            (
+                b"\x93NUMPY\x01\x00\x3a\x00{'descr': '\xc3\xa4f8', 'fortran_order': False, 'shape': (1,), }\n",
+                "not known",
+            ),
             (b"\x93NUMPY\x01\x00\xff\x00{}", "cut off"),
             (
                 b"\x93NUMPY\x01\x00\x39\x00{'descr': '|O', 'fortran_order': False, 'shape': (1,), } \n",

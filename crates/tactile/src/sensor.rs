@@ -48,6 +48,20 @@ pub enum SensorError {
         /// `background` or `mm_per_px`.
         missing: &'static str,
     },
+    /// The background has not the size of the rest frame that it replaces.
+    #[error("the background is {found:?} pixels, the sensor's rest frame {wanted:?}")]
+    BackgroundSize {
+        /// Width and height of the background.
+        found: (usize, usize),
+        /// Width and height of the rest frame.
+        wanted: (usize, usize),
+    },
+    /// A colour model with an infinite or undefined coefficient.
+    #[error("`{key}` holds a number that is not finite")]
+    NotFinite {
+        /// Key in the file.
+        key: &'static str,
+    },
     /// A value is out of range.
     #[error("`{key}` is {value}, it must be {range}")]
     Value {
@@ -137,10 +151,19 @@ impl Sensor {
         }
         if let Some(image) = background {
             let (w, h) = (image.width_px as usize, image.height_px as usize);
-            if w != self.grid.width_px || h != self.grid.height_px {
-                let (value, range) = (w as f64, "as wide and high as the sensor's rest frame");
-                return Err(SensorError::Value { key: "background width", value, range });
+            let wanted = (self.grid.width_px, self.grid.height_px);
+            if (w, h) != wanted {
+                return Err(SensorError::BackgroundSize { found: (w, h), wanted });
             }
+        }
+        match &self.colour {
+            ColourModel::Lambert(lambert) if !lambert.is_finite() => {
+                return Err(SensorError::NotFinite { key: "lambert" });
+            }
+            ColourModel::Taxim(table) if !table.is_finite() => {
+                return Err(SensorError::NotFinite { key: "grad_r, grad_g, grad_b" });
+            }
+            _ => {}
         }
         if let Some(&sigma) = self.noise_rgb.iter().find(|s| !(0.0..=64.0).contains(*s)) {
             let value = f64::from(sigma);
@@ -179,4 +202,56 @@ fn planes(interleaved: &[f64]) -> [Vec<f32>; 3] {
 
 fn planes_of_image(image: &TactileImage) -> [Vec<f32>; 3] {
     [0, 1, 2].map(|c| image.rgb.iter().skip(c).step_by(3).map(|&x| f32::from(x)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sensor(edit: impl Fn(&str, &mut Vec<f64>)) -> Result<Sensor, SensorError> {
+        let array = |key: &str, shape: &[usize], value: f64| {
+            let mut values = vec![value; shape.iter().product()];
+            edit(key, &mut values);
+            Array { shape: shape.to_vec(), values }
+        };
+        let bytes = write_npz(&[
+            ("gripgen_sensor", array("gripgen_sensor", &[], 1.0), ElementType::F64),
+            ("mm_per_px", array("mm_per_px", &[], 0.1), ElementType::F64),
+            ("rest_rgb", array("rest_rgb", &[16, 20, 3], 90.0), ElementType::F64),
+            ("noise_rgb", array("noise_rgb", &[3], 1.0), ElementType::F64),
+            ("lambert", array("lambert", &[3, 3, 6], 2.0), ElementType::F64),
+        ]);
+        Sensor::from_npz(&bytes.unwrap(), None, None)
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_are_refused_by_name() {
+        assert!(sensor(|_, _| {}).is_ok());
+        for (key, value, part) in [
+            ("gripgen_sensor", 2.0, "version 2"),
+            ("mm_per_px", 0.0, "from 0.0001 to 1"),
+            ("rest_rgb", 256.0, "from 0 to 255"),
+            ("rest_rgb", f64::NAN, "from 0 to 255"),
+            ("noise_rgb", -1.0, "from 0 to 64"),
+            ("lambert", f64::NAN, "`lambert` holds a number that is not finite"),
+            ("lambert", f64::INFINITY, "not finite"),
+        ] {
+            let error = sensor(|k, values| {
+                if k == key {
+                    values[0] = value;
+                }
+            });
+            let error = error.err().map(|e| e.to_string()).unwrap_or_default();
+            assert!(error.contains(part), "{key} = {value}: `{error}`");
+        }
+    }
+
+    #[test]
+    fn a_background_of_another_size_is_refused_with_both_sizes() {
+        let good = sensor(|_, _| {}).unwrap();
+        let bytes = good.to_npz().unwrap().unwrap();
+        let image = TactileImage { width_px: 20, height_px: 17, rgb: vec![80; 20 * 17 * 3] };
+        let error = Sensor::from_npz(&bytes, None, Some(&image)).unwrap_err().to_string();
+        assert_eq!(error, "the background is (20, 17) pixels, the sensor's rest frame (20, 16)");
+    }
 }

@@ -71,6 +71,11 @@ impl Lambert {
         self.fields.iter().flatten().flatten().copied().collect()
     }
 
+    /// Whether all coefficients are.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.fields.iter().flatten().flatten().all(|c| c.is_finite())
+    }
+
     /// Brightness of a flat gel: the fields of the normal's z component.
     pub fn flat(&self, channel: usize, u: f64, v: f64) -> f64 {
         let terms = [1.0, u, v, u * u, u * v, v * v];

@@ -36,6 +36,11 @@ impl TaximTable {
         Ok(Self { bins, rgb: [red, green, blue] })
     }
 
+    /// Whether all coefficients are.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.rgb.iter().flatten().flatten().all(|c| c.is_finite())
+    }
+
     /// Bin of a slope: `floor(atan(|g|) / (pi/2 / (B-1)))`, `floor((atan2(gy, gx) + pi) / (2 pi / (B-1)))`.
     fn bin(&self, gx: f64, gy: f64) -> usize {
         let steps = (self.bins - 1) as f64;
