@@ -1,6 +1,7 @@
 //! Peak memory of a sweep and of one ten times larger, each in a process of its own.
 //!
-//! `cargo bench --bench memory` prints both. The peak must not depend on the number of samples.
+//! `cargo bench --bench memory` prints both, also with a pixel size of its own for every sample, for which no sensor can
+//! be shared. The peak must not depend on the number of samples.
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
 
@@ -16,24 +17,28 @@ fn main() {
     if let Ok(task) = std::env::var(CHILD) {
         return child(&task);
     }
-    println!("{:>8} {:>5} {:>12} {:>14}", "samples", "jobs", "peak MB", "on disk MB");
-    for jobs in [1, 2] {
+    println!("{:>8} {:>5} {:>8} {:>12} {:>14}", "samples", "jobs", "sensors", "peak MB", "on disk MB");
+    for (jobs, sensors) in [(1, "one"), (2, "one"), (2, "varied")] {
         for samples in [64, 640] {
             let output = Command::new(std::env::current_exe().unwrap())
-                .env(CHILD, format!("{samples} {jobs}"))
+                .env(CHILD, format!("{samples} {jobs} {sensors}"))
                 .output()
                 .unwrap();
             assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
             let text = String::from_utf8(output.stdout).unwrap();
-            println!("{samples:>8} {jobs:>5} {}", text.trim_end());
+            println!("{samples:>8} {jobs:>5} {sensors:>8} {}", text.trim_end());
         }
     }
 }
 
 fn child(task: &str) {
-    let (samples, jobs) = task.split_once(' ').unwrap();
-    let sets = [("design", "random"), ("samples", samples), ("shard_samples", "16")]
-        .map(|(key, value)| (key.to_string(), value.to_string()));
+    let words: Vec<&str> = task.split(' ').collect();
+    let [samples, jobs, sensors] = words[..] else { panic!("{task}") };
+    let mut sets = vec![("design", "random"), ("samples", samples), ("shard_samples", "16")];
+    if sensors == "varied" {
+        sets.push(("vary.optics.left.mm_per_px", "{ uniform = [0.08, 0.09] }"));
+    }
+    let sets: Vec<(String, String)> = sets.into_iter().map(|(k, v)| (k.into(), v.into())).collect();
     let project = Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap();
     let out = tempfile::tempdir().unwrap();
     let options = SweepOptions { jobs: jobs.parse().unwrap(), slice: None, simd: SimdLevel::best() };

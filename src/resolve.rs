@@ -50,8 +50,8 @@ pub(crate) fn resolve(
     // The twin stands beside the sweep in the resolved text; split in two files it runs again.
     file.twin = "twin.toml".into();
     let mut both = toml::Table::new();
-    both.insert("sweep".into(), toml::Table::try_from(&file).map_err(unwritable)?.into());
-    both.insert("twin".into(), toml::Table::try_from(&twin).map_err(unwritable)?.into());
+    both.insert("sweep".into(), written(toml::Table::try_from(&file))?);
+    both.insert("twin".into(), written(toml::Table::try_from(&twin))?);
     Ok(Resolved { config_toml: both.to_string(), files: resolver.files, named: resolver.named })
 }
 
@@ -64,8 +64,9 @@ pub(crate) fn config_hash(config_toml: &str, files: &Files) -> String {
     sha256_hex(text.as_bytes())
 }
 
-fn unwritable(e: toml::ser::Error) -> ConfigError {
-    ConfigError::new("", format!("it cannot be written as TOML: {e}"))
+fn written(table: Result<toml::Table, toml::ser::Error>) -> Result<toml::Value, ConfigError> {
+    let unwritable = |e| ConfigError::new("", format!("it cannot be written as TOML: {e}"));
+    table.map(toml::Value::Table).map_err(unwritable)
 }
 
 /// Whether a key of a twin holds a path.

@@ -79,11 +79,10 @@ fn test(all: bool) -> Result<(), String> {
 }
 
 fn assets(check: bool) -> Result<(), String> {
-    let mut arguments = vec!["run", "--quiet", "--package", "gripgen-tactile", "--example", "make_assets"];
-    if check {
-        arguments.extend(["--", "--check"]);
-    }
-    run("assets", &mut cargo(&arguments))
+    // The same selection as in `cargo test --workspace`, so that nothing is built twice.
+    run("build of the asset maker", &mut cargo(&["build", "--quiet", "--workspace", "--examples"]))?;
+    let mut maker = Command::new(python::target(&root()).join("debug/examples/make_assets"));
+    run("assets", maker.args(check.then_some("--check")))
 }
 
 /// Whether this process may install packages with apt-get.

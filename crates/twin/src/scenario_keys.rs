@@ -63,54 +63,47 @@ impl KeyError {
 /// record of a failed sample says what was drawn.
 pub(crate) fn set(scenario: &mut Scenario, key: &str, value: &Drawn) -> Result<(), KeyError> {
     let c = &mut scenario.covariates;
-    let checked = match key {
-        "part" => return Ok(scenario.part = text(key, value)?),
-        "gel_id" => return Ok(c.gel_id = value.to_string()),
-        "session" => return Ok(c.session = value.to_string()),
-        "grip_pose" => {
-            let pose = whole(key, value, 0.0..=1e6)?;
-            return Ok(scenario.grip_pose = pose as usize);
-        }
-        "pull_index" => {
-            let index = whole(key, value, 0.0..=1e12)?;
-            return Ok(c.pull_index = index as u64);
-        }
+    match key {
+        "part" => scenario.part = text(key, value)?,
+        "gel_id" => c.gel_id = value.to_string(),
+        "session" => c.session = value.to_string(),
+        "grip_pose" => scenario.grip_pose = whole(key, value, 0.0..=1e6)? as usize,
+        "pull_index" => c.pull_index = whole(key, value, 0.0..=1e12)? as u64,
         "pull_direction" => {
-            let sign = number(key, value)?;
-            if sign.abs() != 1.0 {
-                return Err(ConfigError::new(key, format!("{sign} is neither 1 (up) nor -1 (down)")).into());
+            c.pull_direction = number(key, value)?;
+            if c.pull_direction.abs() != 1.0 {
+                let problem = format!("{} is neither 1 (up) nor -1 (down)", c.pull_direction);
+                return Err(ConfigError::new(key, problem).into());
             }
-            return Ok(c.pull_direction = sign);
         }
         "grip_force_n" => {
             scenario.grip_force_n = number(key, value)?;
-            in_range(key, scenario.grip_force_n, 0.05..=2000.0, "N")
+            in_range(key, scenario.grip_force_n, 0.05..=2000.0, "N")?;
         }
         "dwell_s" => {
             c.dwell_s = number(key, value)?;
-            in_range(key, c.dwell_s, 0.0..=1e6, "s")
+            in_range(key, c.dwell_s, 0.0..=1e6, "s")?;
         }
         "time_s" => {
             c.time_s = number(key, value)?;
-            in_range(key, c.time_s, 0.0..=1e9, "s")
+            in_range(key, c.time_s, 0.0..=1e9, "s")?;
         }
         "temperature_c" => {
             c.temperature_c = number(key, value)?;
-            in_range(key, c.temperature_c, -40.0..=120.0, "C")
+            in_range(key, c.temperature_c, -40.0..=120.0, "C")?;
         }
         "grip_offset_mm" => {
             let offset_mm = number(key, value)?;
             c.grip_offset_m = offset_mm * 1e-3;
-            in_range(key, offset_mm, -1000.0..=1000.0, "mm")
+            in_range(key, offset_mm, -1000.0..=1000.0, "mm")?;
         }
         "grip_angle_deg" => {
             let angle_deg = number(key, value)?;
             c.grip_angle_rad = angle_deg.to_radians();
-            in_range(key, angle_deg, -3600.0..=3600.0, "deg")
+            in_range(key, angle_deg, -3600.0..=3600.0, "deg")?;
         }
         _ => return Err(KeyError::Unknown),
-    };
-    checked?;
+    }
     Ok(())
 }
 

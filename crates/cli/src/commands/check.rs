@@ -55,7 +55,7 @@ pub fn check(
                     );
                 }
                 Status::NoContact => {
-                    eprintln!("warning: sample {index} misses the part (label 0, no_contact)")
+                    eprintln!("warning: sample {index} misses the part (label 0, no_contact)");
                 }
                 Status::Censored => {
                     eprintln!("warning: sample {index} ends before the jaws slip (censored: a lower bound)");
