@@ -41,7 +41,7 @@ fn tactile(c: &mut Criterion) {
     group.sample_size(30).throughput(Throughput::Elements(1));
     for part in PARTS {
         let project = project(part, "png");
-        let scenario = project.sweep.scenario(0, &project.twin).unwrap();
+        let scenario = project.sweep.scenario(0, &project.twin).0;
         let press = press_only(&project.twin, &project.library, &scenario).unwrap().unwrap();
         let imprint = &press.imprint[Jaw::Left];
         for level in SimdLevel::available() {
