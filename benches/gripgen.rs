@@ -42,7 +42,8 @@ fn tactile(c: &mut Criterion) {
     for part in PARTS {
         let project = project(part, "png");
         let scenario = project.sweep.scenario(0, &project.twin).0;
-        let press = press_only(&project.twin, &project.library, &scenario).unwrap().unwrap();
+        let press =
+            press_only(&project.twin, &project.library, &scenario, project.sweep.mechanics).unwrap().unwrap();
         let imprint = &press.imprint[Jaw::Left];
         for level in SimdLevel::available() {
             let renderer = Renderer { sensor: &press.sensors.left, gel: &project.twin.gel.left, level };

@@ -1,16 +1,16 @@
 //! One sample: from a scenario to images, trace and label.
 
+use crate::gripped::{Contact, Gripped};
+use crate::hold::hold;
 use crate::library::{Library, LibraryError};
 use crate::project::Project;
-use gripgen_physics::{
-    Grip, GripError, GripSetup, JawFriction, Mount, PullError, grip, pull_staircase, staircase_of,
-};
-use gripgen_tactile::{Imprint, IndentError, Renderer, Sensor, SimdLevel};
-use gripgen_twin::config::{ConfigError, ImageNoise, ImageStorage};
+use gripgen_physics::{GripError, PullError, Until, pull_staircase, staircase_of};
+use gripgen_tactile::{Imprint, IndentError, Sensor, SimdLevel};
+use gripgen_twin::config::{ConfigError, ImageStorage, Mechanics, TraceStorage};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    FrictionError, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample, Scenario,
-    TactileImage, Twin, grip_friction, slip_label,
+    FrictionError, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample, Scenario, Twin,
+    grip_friction, slip_label,
 };
 use std::sync::Arc;
 
@@ -54,6 +54,32 @@ pub struct Press {
     pub sensors: PerJaw<Arc<Sensor>>,
 }
 
+/// What a simulation is made with and for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SimulateOptions {
+    /// Which mechanics.
+    pub mechanics: Mechanics,
+    /// Whether images are wanted.
+    pub images: bool,
+    /// Whether the trace is wanted; without it the pull ends as soon as its label is decided, which leaves the label.
+    pub trace: bool,
+    /// The vector unit of the image pipeline; the result does not depend on it.
+    pub level: SimdLevel,
+}
+
+impl SimulateOptions {
+    /// What the samples of a sweep are made with.
+    pub(crate) fn of(project: &Project, level: SimdLevel) -> Self {
+        let sweep = &project.sweep;
+        Self {
+            mechanics: sweep.mechanics,
+            images: sweep.images != ImageStorage::None,
+            trace: sweep.trace == TraceStorage::Full,
+            level,
+        }
+    }
+}
+
 /// Simulates sample `index` of a sweep. Depends on the project and the index alone; `level` changes no bit.
 pub fn generate(project: &Project, index: u64, level: SimdLevel) -> Sample {
     let mut scenario = drawn_scenario(project, index);
@@ -79,7 +105,14 @@ fn try_generate(
     let (scenario, usable) = project.sweep.scenario(index, &twin);
     *known = scenario;
     usable?;
-    simulate(&twin, &project.library, known, project.sweep.images != ImageStorage::None, level)
+    let options = SimulateOptions::of(project, level);
+    let grip = || Gripped::new(&twin, &project.library, known, options);
+    // Repetitions of a configuration share their grip.
+    let gripped = match project.sweep.repetitions {
+        1 => Arc::new(grip()?),
+        _ => project.grips.get((known.group, options), grip)?,
+    };
+    pull(&twin, known, &gripped, options)
 }
 
 /// Simulates one scenario on a twin.
@@ -87,36 +120,38 @@ pub fn simulate(
     twin: &Twin,
     library: &Library,
     scenario: &Scenario,
-    with_images: bool,
-    level: SimdLevel,
+    options: SimulateOptions,
 ) -> Result<Outcome, SampleError> {
-    let part = &twin.parts[&scenario.part];
-    let sensors = PerJaw::try_from_fn(|jaw| library.sensor(&twin.optics[jaw]))?;
-    let renderers = PerJaw::from_fn(|jaw| Renderer { sensor: &sensors[jaw], gel: &twin.gel[jaw], level });
-    let shape = library.shape(part, scenario.grip_pose)?;
-    let Grip::Held(held) = grip(&grip_setup(twin, scenario, &shape))? else {
-        let images = with_images.then(|| images(twin, scenario, &renderers, None));
+    pull(twin, scenario, &Gripped::new(twin, library, scenario, options)?, options)
+}
+
+/// The second half of a sample: friction of this repetition, pull, label, image noise.
+fn pull(
+    twin: &Twin,
+    scenario: &Scenario,
+    gripped: &Gripped,
+    options: SimulateOptions,
+) -> Result<Outcome, SampleError> {
+    let images = options.images.then(|| gripped.images(twin, scenario));
+    let Some(Contact { held, imprint, .. }) = &gripped.contact else {
         return Ok(Outcome::NoContact { images });
     };
-    let imprint = press(library, part, scenario, &held.grasp, &renderers)?;
+    let part = &twin.parts[&scenario.part];
     let law = grip_friction(twin, &scenario.part, part, scenario.grip_force_n)?;
     let mu = law.mu * scatter(part, scenario);
-    // The jaw holds mu times the pressure, summed over its patch.
-    let friction = imprint.map(|_, i| JawFriction {
-        limit_n: i.patch.cells.iter().map(|cell| mu * cell.force_n).sum(),
-        kinetic_ratio: law.kinetic_ratio,
-    });
-    let grasp = held.grasp.clone();
+    let patches = PerJaw::from_fn(|jaw| &imprint[jaw].patch);
+    let cell_mu = patches.map(|_, patch| vec![mu; patch.cells.len()]);
+    let friction = hold(twin, scenario, &patches, &cell_mu, law.kinetic_ratio);
     let stream = |purpose| Stream::new(scenario.seed, scenario.index, purpose);
-    let mut session = held.pull(&friction, stream(Purpose::ForceNoise));
+    let mut session = (**held).clone().pull(&friction, stream(Purpose::ForceNoise));
     let staircase = staircase_of(&scenario.pull, &mut stream(Purpose::StepJitter));
-    let result = pull_staircase(&mut session, &staircase, &scenario.pull)?;
-    let label = slip_label(&result.trace, scenario.pull.label_tolerance_n, result.end)?;
-    let images = with_images.then(|| images(twin, scenario, &renderers, Some(&imprint)));
+    let until = if options.trace { Until::Stopped } else { Until::Decided };
+    let result = pull_staircase(&mut session, &staircase, &scenario.pull, until)?;
+    let label = slip_label(&result.trace, scenario.pull.label_tolerance_n, result.slid)?;
     let summary =
         imprint.map(|_, i| ImprintSummary { press_depth_m: i.press_depth_m, patch: i.patch.clone() });
     Ok(Outcome::Pulled(Box::new(Pulled {
-        grasp,
+        grasp: held.grasp.clone(),
         imprint: summary,
         images,
         mu,
@@ -127,69 +162,15 @@ pub fn simulate(
 }
 
 /// The imprints of a scenario's grip, without pulling; `None` without contact.
-pub fn press_only(twin: &Twin, library: &Library, scenario: &Scenario) -> Result<Option<Press>, SampleError> {
-    let part = &twin.parts[&scenario.part];
-    let sensors = PerJaw::try_from_fn(|jaw| library.sensor(&twin.optics[jaw]))?;
-    let level = SimdLevel::best();
-    let renderers = PerJaw::from_fn(|jaw| Renderer { sensor: &sensors[jaw], gel: &twin.gel[jaw], level });
-    let shape = library.shape(part, scenario.grip_pose)?;
-    let Grip::Held(held) = grip(&grip_setup(twin, scenario, &shape))? else { return Ok(None) };
-    let imprint = press(library, part, scenario, &held.grasp, &renderers)?;
-    Ok(Some(Press { imprint, sensors }))
-}
-
-fn grip_setup<'a>(
-    twin: &'a Twin,
-    scenario: &Scenario,
-    shape: &'a gripgen_physics::PartShape,
-) -> GripSetup<'a> {
-    let c = &scenario.covariates;
-    GripSetup {
-        robot: twin.robot,
-        gripper: twin.gripper,
-        wrist: twin.wrist,
-        gel: &twin.gel,
-        shape,
-        world_from_part: Part::world_from_part(c.grip_angle_rad, c.grip_offset_m),
-        grip_force_n: PerJaw { left: scenario.grip_force_n, right: scenario.grip_force_n },
-        direction: scenario.pull.direction.map(|x| x * c.pull_direction),
-        mount: Mount::Fixed,
-    }
-}
-
-fn press(
-    library: &Library,
-    part: &Part,
-    scenario: &Scenario,
-    grasp: &gripgen_twin::Grasp,
-    renderers: &PerJaw<Renderer<'_>>,
-) -> Result<PerJaw<Imprint>, SampleError> {
-    let mesh = library.mesh(part)?;
-    PerJaw::try_from_fn(|jaw| {
-        let gel_from_mesh = grasp.gel_from_part[jaw] * part.grips[scenario.grip_pose];
-        renderers[jaw]
-            .press(&mesh, &gel_from_mesh, part.imprint_m3_per_n, scenario.grip_force_n)
-            .map_err(|source| SampleError::Indent { jaw, source })
-    })
-}
-
-fn images(
+pub fn press_only(
     twin: &Twin,
+    library: &Library,
     scenario: &Scenario,
-    renderers: &PerJaw<Renderer<'_>>,
-    imprint: Option<&PerJaw<Imprint>>,
-) -> PerJaw<TactileImage> {
-    PerJaw::from_fn(|jaw| {
-        let purpose = match jaw {
-            Jaw::Left => Purpose::ImageNoiseLeft,
-            Jaw::Right => Purpose::ImageNoiseRight,
-        };
-        let key = match twin.optics[jaw].image_noise {
-            ImageNoise::Off => None,
-            ImageNoise::Measured => Some(Stream::new(scenario.seed, scenario.index, purpose).bits()),
-        };
-        renderers[jaw].image(imprint.map(|both| &both[jaw]), key)
-    })
+    mechanics: Mechanics,
+) -> Result<Option<Press>, SampleError> {
+    let options = SimulateOptions { mechanics, images: false, trace: false, level: SimdLevel::best() };
+    let Gripped { sensors, contact } = Gripped::new(twin, library, scenario, options)?;
+    Ok(contact.map(|c| Press { imprint: c.imprint, sensors }))
 }
 
 /// The factor by which this grip's friction differs from the mean, never negative.

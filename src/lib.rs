@@ -41,7 +41,10 @@
 //! A sample depends on (version, resolved configuration, seed, index) and on nothing else.
 
 pub mod assets;
+mod cache;
 mod generate;
+mod gripped;
+mod hold;
 mod init;
 mod library;
 mod location;
@@ -52,7 +55,7 @@ mod resolve;
 mod schema;
 mod sweep;
 
-pub use generate::{Press, SampleError, generate, press_only, simulate};
+pub use generate::{Press, SampleError, SimulateOptions, generate, press_only, simulate};
 pub use gripgen_physics as physics;
 pub use gripgen_record as record;
 pub use gripgen_tactile as tactile;

@@ -1,5 +1,6 @@
 //! Meshes, contact shapes and sensors: read once, shared by the samples that need them.
 
+use crate::cache::Cache;
 use crate::location::Location;
 use crate::resolve::Files;
 use gripgen_physics::{PartShape, ShapeError};
@@ -7,7 +8,7 @@ use gripgen_record::{decode_picture, sha256_hex};
 use gripgen_tactile::{Sensor, SensorError};
 use gripgen_twin::{Gel, MeshError, Optics, Part, TriMesh};
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 /// Meshes, shapes and sensors kept at a time. A sweep that draws a scale or a resolution makes a new one a sample.
 const MESHES: usize = 64;
@@ -167,75 +168,5 @@ impl Library {
             None => Ok(()),
             Some(&kernel_px) => Err(LibraryError::Kernel { kernel_px, image_px }),
         }
-    }
-}
-
-/// The values used last. A value is built by the first thread that asks for it; others that want the same wait for
-/// it, those that want another do not.
-struct Cache<K, V> {
-    capacity: usize,
-    /// Most recently used last.
-    slots: Mutex<Vec<(K, Slot<V>)>>,
-}
-
-type Slot<V> = Arc<Mutex<Option<Arc<V>>>>;
-
-impl<K: PartialEq, V> Cache<K, V> {
-    fn new(capacity: usize) -> Self {
-        Self { capacity, slots: Mutex::default() }
-    }
-
-    fn get(&self, key: K, make: impl FnOnce() -> Result<V, LibraryError>) -> Result<Arc<V>, LibraryError> {
-        let slot = self.slot(key);
-        let mut value = lock(&slot);
-        if let Some(value) = &*value {
-            return Ok(value.clone());
-        }
-        let made = Arc::new(make()?);
-        *value = Some(made.clone());
-        Ok(made)
-    }
-
-    fn slot(&self, key: K) -> Slot<V> {
-        let mut slots = lock(&self.slots);
-        let entry = match slots.iter().position(|(k, _)| *k == key) {
-            Some(i) => slots.remove(i),
-            None => {
-                if slots.len() == self.capacity {
-                    slots.remove(0);
-                }
-                (key, Slot::default())
-            }
-        };
-        let slot = entry.1.clone();
-        slots.push(entry);
-        slot
-    }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_cache_keeps_what_was_used_last() {
-        let cache: Cache<u32, u32> = Cache::new(2);
-        let mut made = vec![];
-        let mut ask = |key: u32| {
-            let value = cache.get(key, || {
-                made.push(key);
-                Ok(key * 10)
-            });
-            assert_eq!(*value.unwrap(), key * 10);
-        };
-        [1, 2, 1, 3, 1, 2].into_iter().for_each(&mut ask);
-        assert_eq!(made, [1, 2, 3, 2], "3 pushed 2 out, not 1");
-        let unknown = || Err(LibraryError::Unknown { path: "x".into() });
-        assert!(cache.get(9, unknown).is_err());
-        assert_eq!(*cache.get(9, || Ok(90)).unwrap(), 90, "a failure is not kept");
     }
 }

@@ -1,17 +1,23 @@
 //! A sweep with everything it needs: twin, meshes, sensors, and the hash over all of it.
 
 use crate::assets;
+use crate::cache::Cache;
+use crate::generate::SimulateOptions;
+use crate::gripped::Gripped;
 use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
 use crate::resolve::{Files, Named, Resolved, config_hash, resolve};
 use crate::sweep::VERSION;
 use gripgen_record::{RunFolder, sha256_hex};
-use gripgen_twin::config::{Backend, ConfigError, Document, Mechanics, SweepFile};
+use gripgen_twin::config::{Backend, ConfigError, Document, SweepFile};
 use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, Sweep, Twin, is_twin_key};
 use std::borrow::Cow;
 
 /// The twin whose sections stand in for what a twin leaves out, and the default of `--twin`.
 pub const BASELINE_TWIN: &str = "asset:configs/twin-baseline.toml";
+
+/// Grips kept for their repetitions, which are made one after another.
+const GRIPS: usize = 8;
 
 /// A loaded sweep.
 pub struct Project {
@@ -25,6 +31,8 @@ pub struct Project {
     pub twin_table: toml::Table,
     /// Meshes, contact shapes and sensors.
     pub library: Library,
+    /// Grips that repetitions share.
+    pub(crate) grips: Cache<(u64, SimulateOptions), Gripped>,
     /// The configuration as it was resolved: sweep and twin with all defaults and overrides.
     pub config_toml: String,
     /// SHA-256 of everything a sample is a function of, beside gripgen's version.
@@ -149,7 +157,9 @@ impl Project {
         let twin = Twin::new(&twin_document.read_twin()?).map_err(|e| twin_document.located(e))?;
         let config_sha256 = config_hash(&config_toml, &files);
         let twin_table = twin_document.table().clone();
-        Ok(Self { name, sweep, twin, twin_table, library: Library::new(files), config_toml, config_sha256 })
+        let library = Library::new(files);
+        let grips = Cache::new(GRIPS);
+        Ok(Self { name, sweep, twin, twin_table, library, grips, config_toml, config_sha256 })
     }
 
     /// Reads a mesh or sensor as every sample will, so that a broken file is found before any work is done.
@@ -177,10 +187,6 @@ impl Project {
 
 /// What the format allows and this version cannot do yet.
 fn check_available(sweep: &Sweep) -> Result<(), ConfigError> {
-    if sweep.mechanics == Mechanics::Reduced {
-        return Err(ConfigError::new("mechanics", "`reduced` is not part of this version")
-            .hint("use mechanics = \"rapier\""));
-    }
     if sweep.backend == Backend::Gpu {
         return Err(
             ConfigError::new("backend", "`gpu` is not part of this version").hint("use backend = \"cpu\"")

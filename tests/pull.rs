@@ -212,7 +212,7 @@ fn the_two_jaws_see_mirror_images_of_a_symmetric_part() {
         ],
     );
     let scenario = p.sweep.scenario(0, &p.twin).0;
-    let press = gripgen::press_only(&p.twin, &p.library, &scenario).unwrap().unwrap();
+    let press = gripgen::press_only(&p.twin, &p.library, &scenario, p.sweep.mechanics).unwrap().unwrap();
     let (left, right) = (&press.imprint.left.depth_px, &press.imprint.right.depth_px);
     let mut worst = 0.0_f32;
     for y in 0..left.height {

@@ -68,7 +68,7 @@ fn press_again(folder: &RunFolder, index: u64) -> Option<Press> {
     let twin = project.twin_of(index).ok()?;
     let (scenario, usable) = project.sweep.scenario(index, &twin);
     usable.ok()?;
-    press_only(&twin, &project.library, &scenario).ok()?
+    press_only(&twin, &project.library, &scenario, project.sweep.mechanics).ok()?
 }
 
 fn second_line(s: &Sample) -> String {

@@ -74,6 +74,7 @@ mod tests {
             damping_n_s_per_m: 2000.0,
             speed_limit_m_per_s: 0.02,
             feedback,
+            twist: gripgen_twin::config::Twist::Stiff,
         }
     }
 

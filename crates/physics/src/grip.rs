@@ -1,9 +1,12 @@
 //! Closing the jaws on a part.
 
+use crate::rapier_pull::{RapierPull, RapierStart};
+use crate::reduced::ReducedPull;
 use crate::scene::{Rig, build, pad_shape, rapier_pose, vector};
-use crate::session::{JawFriction, PullSession, SessionStart};
+use crate::session::{JawFriction, Plant, PullSession};
 use crate::shape::PartShape;
 use crate::world::World;
+use gripgen_twin::config::Mechanics;
 use gripgen_twin::frames::{Pose, world_from_gel};
 use gripgen_twin::random::Stream;
 use gripgen_twin::{Gel, Grasp, Gripper, Jaw, PerJaw, Robot, Wrist};
@@ -33,6 +36,8 @@ pub enum Mount {
 /// All that a grip depends on.
 #[derive(Clone)]
 pub struct GripSetup<'a> {
+    /// What computes grip and pull.
+    pub mechanics: Mechanics,
     /// The arm.
     pub robot: Robot,
     /// The gripper.
@@ -101,13 +106,24 @@ pub enum GripError {
 }
 
 /// A part held by settled jaws.
+#[derive(Clone)]
 pub struct Held {
     /// Where the part lies in each gel and how hard each jaw presses.
     pub grasp: Grasp,
-    start: SessionStart,
+    robot: Robot,
+    wrist: Wrist,
+    start: Start,
+}
+
+#[derive(Clone)]
+enum Start {
+    Rapier(Box<RapierStart>),
+    Reduced { mass_kg: f64, gel: PerJaw<Gel> },
 }
 
 /// Closes the jaws on the part and lets them settle, without friction.
+///
+/// Without an engine the jaws stop where they first touch the part and press with their commanded force.
 pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
     let mut touch = PerJaw { left: 0.0, right: 0.0 };
     for jaw in Jaw::BOTH {
@@ -115,6 +131,17 @@ pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
             Some(distance) => touch[jaw] = distance,
             None => return Ok(Grip::NoContact),
         }
+    }
+    if setup.mechanics == Mechanics::Reduced {
+        return Ok(Grip::Held(Box::new(Held {
+            grasp: grasp(setup, &touch, setup.grip_force_n),
+            robot: setup.robot,
+            wrist: setup.wrist,
+            start: Start::Reduced {
+                mass_kg: setup.robot.moving_mass_kg + setup.gripper.mass_kg + 2.0 * setup.gripper.jaw_mass_kg,
+                gel: setup.gel.clone(),
+            },
+        })));
     }
     let gravity_m_per_s2 = match setup.mount {
         Mount::Fixed => 0.0,
@@ -127,17 +154,10 @@ pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
         let centre = world.bodies[rig.jaws[jaw]].translation().y * jaw.side();
         centre - setup.gel[jaw].thickness_m / 2.0
     });
-    let grasp = Grasp {
-        gel_from_part: PerJaw::from_fn(|jaw| {
-            world_from_gel(jaw, distance[jaw]).inverse() * setup.world_from_part
-        }),
-        normal_force_n: PerJaw::from_fn(|jaw| rig.contact(&world, jaw).normal_n),
-    };
-    let start = SessionStart {
+    let grasp = grasp(setup, &distance, PerJaw::from_fn(|jaw| rig.contact(&world, jaw).normal_n));
+    let start = RapierStart {
         world,
         rig,
-        robot: setup.robot,
-        wrist: setup.wrist,
         jaw_mass_kg: setup.gripper.jaw_mass_kg,
         grip_force_n: setup.grip_force_n,
         direction: vector(setup.direction),
@@ -145,13 +165,26 @@ pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
             + setup.gel.right.shear_stiffness_n_per_m,
         normal_force_n: grasp.normal_force_n,
     };
-    Ok(Grip::Held(Box::new(Held { grasp, start })))
+    let (robot, wrist, start) = (setup.robot, setup.wrist, Start::Rapier(Box::new(start)));
+    Ok(Grip::Held(Box::new(Held { grasp, robot, wrist, start })))
+}
+
+/// The grasp of gels whose surfaces stand at these distances from the grip centre.
+fn grasp(setup: &GripSetup<'_>, distance_m: &PerJaw<f64>, normal_force_n: PerJaw<f64>) -> Grasp {
+    let gel_from_part = distance_m.map(|jaw, &d| world_from_gel(jaw, d).inverse() * setup.world_from_part);
+    Grasp { gel_from_part, normal_force_n }
 }
 
 impl Held {
     /// Starts a pull. `friction` is what each jaw can hold, `noise` the randomness of the wrist sensor.
     pub fn pull(self, friction: &PerJaw<JawFriction>, noise: Stream) -> PullSession {
-        PullSession::new(self.start, friction, noise)
+        let plant = match self.start {
+            Start::Rapier(start) => Plant::Rapier(Box::new(RapierPull::new(*start, friction))),
+            Start::Reduced { mass_kg, gel } => {
+                Plant::Reduced(Box::new(ReducedPull::new(mass_kg, &gel, friction)))
+            }
+        };
+        PullSession::new(plant, self.robot, self.wrist, friction, noise)
     }
 }
 

@@ -14,6 +14,9 @@
 mod contact;
 mod force_loop;
 mod grip;
+mod limit_surface;
+mod rapier_pull;
+mod reduced;
 mod scene;
 mod session;
 mod shape;
@@ -21,9 +24,10 @@ mod staircase;
 mod world;
 
 pub use grip::{Grip, GripError, GripSetup, Held, Mount, grip};
-pub use session::{Command, JawFriction, PullError, PullSession, PullState};
+pub use limit_surface::{LimitCell, free_twist_capacity_n};
+pub use session::{Command, FrictionCell, JawFriction, PullError, PullSession, PullState};
 pub use shape::{PartShape, ShapeError};
-pub use staircase::{StaircaseResult, pull_staircase, staircase_of};
+pub use staircase::{StaircaseResult, Until, pull_staircase, staircase_of};
 
 #[cfg(test)]
 mod tests;

@@ -11,6 +11,17 @@ pub struct StaircaseResult {
     pub trace: PullTrace,
     /// What ended the pull.
     pub end: PullEnd,
+    /// Whether the jaws slid on the part; if not, the label is a lower bound.
+    pub slid: bool,
+}
+
+/// How far a pull goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Until {
+    /// To the displacement stop, for its trace.
+    Stopped,
+    /// Until its label cannot change any more: the same label, about a third of the steps less.
+    Decided,
 }
 
 /// The staircase of a pull; `jitter` is asked only if the steps vary.
@@ -31,6 +42,7 @@ pub fn pull_staircase(
     session: &mut PullSession,
     staircase: &Staircase,
     pull: &PullSettings,
+    until: Until,
 ) -> Result<StaircaseResult, PullError> {
     let mut trace = PullTrace::default();
     let rate_hz = session.rate_hz();
@@ -46,7 +58,12 @@ pub fn pull_staircase(
             displacement_m: state.displacement_m,
         });
         if state.displacement_m > pull.stop_m {
-            break if session.has_slid() { PullEnd::Displacement } else { PullEnd::Stretch };
+            break PullEnd::Displacement;
+        }
+        // The measured force stays below what the jaws hold, the command only rises.
+        let undecided = desired_force_n - pull.label_tolerance_n <= session.largest_reading_n();
+        if until == Until::Decided && session.has_slid() && !undecided {
+            break PullEnd::Decided;
         }
         if pull.max_force_n.is_some_and(|limit| desired_force_n > limit) {
             break PullEnd::ForceLimit;
@@ -57,5 +74,5 @@ pub fn pull_staircase(
         session.step(Command::ForceN(desired_force_n), 1.0 / rate_hz)?;
         tick += 1;
     };
-    Ok(StaircaseResult { trace, end })
+    Ok(StaircaseResult { trace, end, slid: session.has_slid() })
 }

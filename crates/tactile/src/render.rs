@@ -53,10 +53,13 @@ impl Renderer<'_> {
     /// The image of an imprint, or of the gel at rest: stages `deform` to `noise`. `noise_key` chooses the noise;
     /// without it there is none, and the gel at rest gives the rest frame of the sensor.
     pub fn image(&self, imprint: Option<&Imprint>, noise_key: Option<u64>) -> TactileImage {
-        let change = imprint.map(|imprint| {
-            let (along_x, along_y) = gradient(&self.surface(imprint));
-            shade(&self.sensor.colour, &along_x, &along_y)
-        });
-        finish(self.sensor, change.as_ref(), noise_key)
+        finish(self.sensor, imprint.map(|i| self.change(i)).as_ref(), noise_key)
+    }
+
+    /// What an imprint changes in the image, in grey levels of red, green and blue: stages `deform` to `shade`. The
+    /// stage `noise`, [`finish`], makes an image of it.
+    pub fn change(&self, imprint: &Imprint) -> [Plane; 3] {
+        let (along_x, along_y) = gradient(&self.surface(imprint));
+        shade(&self.sensor.colour, &along_x, &along_y)
     }
 }

@@ -20,7 +20,8 @@ pub use sweep_file::{
 };
 pub use twin_file::{
     CalibrationFile, EffectFile, Feedback, ForceConvention, GelFile, GelModel, GripFile, GripperFile,
-    GripperModel, ImageNoise, OpticsFile, PartFile, PerJawFile, RobotFile, RobotModel, TwinFile, WristFile,
+    GripperModel, ImageNoise, OpticsFile, PartFile, PerJawFile, RobotFile, RobotModel, TwinFile, Twist,
+    WristFile,
 };
 
 use std::ops::RangeBounds;

@@ -1,7 +1,7 @@
 //! The checked twin, in SI units.
 
 use crate::config::{ConfigError, TwinFile};
-use crate::config::{Feedback, ForceConvention, ImageNoise};
+use crate::config::{Feedback, ForceConvention, ImageNoise, Twist};
 use crate::effects::{self, Effect};
 use crate::frames::{Pose, pose, rotation_from_fixed_xyz};
 use crate::{Jaw, PerJaw};
@@ -48,6 +48,8 @@ pub struct Robot {
     pub speed_limit_m_per_s: f64,
     /// What the loop closes on.
     pub feedback: Feedback,
+    /// Whether the arm holds the grip's rotation about the jaw axis.
+    pub twist: Twist,
 }
 
 /// The gripper.
@@ -153,6 +155,7 @@ impl Twin {
                 "mm/s",
             )? * 1e-3,
             feedback: r.feedback,
+            twist: r.twist,
         };
         let g = &file.gripper;
         let gripper = Gripper {

@@ -62,6 +62,17 @@ pub enum Feedback {
     Independent,
 }
 
+/// Whether the arm holds the grip's rotation about the jaw axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Twist {
+    /// It does: a pull beside the grip centre slips like a centred one.
+    #[default]
+    Stiff,
+    /// It does not: such a pull turns the grip, and slips as the limit surface says.
+    Free,
+}
+
 /// `[robot]`
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -80,6 +91,9 @@ pub struct RobotFile {
     pub speed_limit_mm_s: f64,
     /// What the force loop closes on.
     pub feedback: Feedback,
+    /// Whether the arm holds the grip's rotation about the jaw axis.
+    #[serde(default)]
+    pub twist: Twist,
     /// Uncertainty of values in this section.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub calibration: BTreeMap<String, CalibrationFile>,

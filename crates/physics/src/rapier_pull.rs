@@ -1,0 +1,133 @@
+//! The pull of a held part in Rapier: one time step of the engine.
+
+#[cfg(test)]
+use crate::contact::ContactForce;
+use crate::scene::Rig;
+use crate::session::{JawFriction, Motion};
+use crate::world::{NotFinite, World};
+#[cfg(test)]
+use gripgen_twin::Jaw;
+use gripgen_twin::PerJaw;
+use rapier3d_f64::prelude as rapier;
+
+/// Speed above which jaws at their limit count as sliding, so that kinetic friction acts.
+const SLIDING_M_PER_S: f64 = 1e-4;
+
+/// Share of the jaws' static limits that the contact has to carry before they can slide: motion under less is gel
+/// shear and the engine's own pre-slip drift, however fast the force rises.
+const AT_LIMIT: f64 = 0.99;
+
+/// Speed below which sliding jaws stick again.
+const STICKING_M_PER_S: f64 = 1e-5;
+
+/// What a grip in Rapier hands over to a pull.
+#[derive(Clone)]
+pub(crate) struct RapierStart {
+    pub(crate) world: World,
+    pub(crate) rig: Rig,
+    pub(crate) jaw_mass_kg: f64,
+    pub(crate) grip_force_n: PerJaw<f64>,
+    pub(crate) direction: rapier::Vector,
+    pub(crate) shear_stiffness_n_per_m: f64,
+    pub(crate) normal_force_n: PerJaw<f64>,
+}
+
+/// A pull in Rapier.
+#[derive(Clone)]
+pub(crate) struct RapierPull {
+    world: World,
+    rig: Rig,
+    jaw_mass_kg: f64,
+    grip_force_n: PerJaw<f64>,
+    direction: rapier::Vector,
+    shear_stiffness_n_per_m: f64,
+    /// Static friction coefficient of each pad: its limit over its settled normal force.
+    pad_friction: PerJaw<f64>,
+    /// What both jaws hold together before they slip.
+    limit_n: f64,
+    kinetic_ratio: PerJaw<f64>,
+    start: rapier::Vector,
+    momentum_n_s: f64,
+    refresh_contacts: bool,
+    sliding: bool,
+}
+
+impl RapierPull {
+    pub(crate) fn new(start: RapierStart, friction: &PerJaw<JawFriction>) -> Self {
+        let RapierStart { mut world, rig, direction, .. } = start;
+        rig.release_part(&mut world);
+        let mut pull = Self {
+            momentum_n_s: rig.momentum(&world, direction),
+            start: world.bodies[rig.carriage].translation(),
+            world,
+            rig,
+            jaw_mass_kg: start.jaw_mass_kg,
+            grip_force_n: start.grip_force_n,
+            direction,
+            shear_stiffness_n_per_m: start.shear_stiffness_n_per_m,
+            pad_friction: friction.map(|jaw, f| f.limit_n() / start.normal_force_n[jaw]),
+            limit_n: friction.left.limit_n() + friction.right.limit_n(),
+            kinetic_ratio: friction.map(|_, f| f.kinetic_ratio),
+            refresh_contacts: false,
+            sliding: false,
+        };
+        pull.write_friction();
+        pull
+    }
+
+    /// Mass that moves along the pull.
+    pub(crate) fn mass_kg(&self) -> f64 {
+        let [l, r] = [self.rig.jaws.left, self.rig.jaws.right].map(|h| self.world.bodies[h].mass());
+        self.world.bodies[self.rig.carriage].mass() + l + r
+    }
+
+    /// Way of the carriage along the pull.
+    pub(crate) fn position_m(&self) -> f64 {
+        (self.world.bodies[self.rig.carriage].translation() - self.start).dot(self.direction)
+    }
+
+    /// Applies a force to the carriage for one time step.
+    ///
+    /// The contact force is a balance of momentum: what the arm applied and did not become momentum went into the
+    /// contact. Gel shear is in series: it adds to the way of the carriage.
+    pub(crate) fn advance(&mut self, applied_n: f64, step_s: f64) -> Result<Motion, NotFinite> {
+        self.rig.close_jaws(&mut self.world, &self.grip_force_n, self.jaw_mass_kg);
+        let carriage = &mut self.world.bodies[self.rig.carriage];
+        carriage.reset_forces(false);
+        carriage.add_force(self.direction * applied_n, true);
+        let refresh = std::mem::take(&mut self.refresh_contacts);
+        self.world.step(step_s, refresh)?;
+        let momentum = self.rig.momentum(&self.world, self.direction);
+        let contact_force_n = applied_n - (momentum - self.momentum_n_s) / step_s;
+        self.momentum_n_s = momentum;
+        let speed_m_per_s = self.world.bodies[self.rig.carriage].linvel().dot(self.direction);
+        let sliding = if self.sliding {
+            speed_m_per_s.abs() > STICKING_M_PER_S
+        } else {
+            speed_m_per_s.abs() > SLIDING_M_PER_S && contact_force_n.abs() >= AT_LIMIT * self.limit_n
+        };
+        if sliding != self.sliding {
+            self.sliding = sliding;
+            if self.kinetic_ratio.iter().any(|(_, &ratio)| ratio != 1.0) {
+                self.write_friction();
+            }
+        }
+        let displacement_m = self.position_m() + contact_force_n / self.shear_stiffness_n_per_m;
+        Ok(Motion { contact_force_n, displacement_m, speed_m_per_s, sliding })
+    }
+
+    /// What the engine's contact of a jaw carries.
+    #[cfg(test)]
+    pub(crate) fn contact(&self, jaw: Jaw) -> ContactForce {
+        self.rig.contact(&self.world, jaw)
+    }
+
+    /// Hands the jaws' friction to the engine. It acts from the next step on, which rebuilds all contacts.
+    fn write_friction(&mut self) {
+        for (jaw, &pad) in self.rig.pads.iter() {
+            let ratio = if self.sliding { self.kinetic_ratio[jaw] } else { 1.0 };
+            self.world.colliders[pad].set_friction(self.pad_friction[jaw] * ratio);
+        }
+        self.refresh_contacts = true;
+    }
+}

@@ -1,0 +1,174 @@
+//! The pull of a held part without an engine: a mass on bristles.
+//!
+//! ```text
+//! m dv/dt = F_applied - F_c,    F_c = sum_i clamp(k_i (x - s_i), -L_i, L_i)
+//! ```
+//!
+//! Each cell i of the contact patches is a bristle: its share of the gel's shear stiffness k_i (by area), its friction
+//! limit L_i, and the place s_i on the part where it stands. A bristle at its limit drags its foot along. Cells with
+//! little pressure reach their limit first, so slip begins at the rim of the contact and runs inwards (incipient slip)
+//! until the last cell slips and the force has reached `sum L_i` (parallel Jenkin elements: Iwan 1966).
+//!
+//! A time step is implicit in the velocity. The force is a non-decreasing, piecewise linear function of it, so Newton's
+//! method ends after finitely many steps, for any stiffness, and momentum balances to rounding.
+
+use crate::session::{JawFriction, Motion};
+use crate::world::NotFinite;
+use gripgen_twin::{Gel, PerJaw};
+
+/// Cells are padded to a multiple of this, so that sums have one fixed order whatever the vector unit.
+const LANES: usize = 8;
+
+/// Newton steps after which a force that still changes its slope is taken as it is.
+const MOST_ITERATIONS: usize = 50;
+
+/// A pull without an engine.
+#[derive(Debug, Clone)]
+pub(crate) struct ReducedPull {
+    mass_kg: f64,
+    position_m: f64,
+    speed_m_per_s: f64,
+    /// Static limits; those of a sliding jaw are multiplied by its kinetic ratio.
+    static_limit_n: Vec<f64>,
+    bristles: Bristles,
+    /// Where the cells of the left jaw end and those of the right one begin.
+    boundary: usize,
+    kinetic_ratio: PerJaw<f64>,
+    sliding: bool,
+}
+
+/// The bristles of both jaws, one column each.
+#[derive(Debug, Clone, Default)]
+struct Bristles {
+    stiffness_n_per_m: Vec<f64>,
+    limit_n: Vec<f64>,
+    foot_m: Vec<f64>,
+}
+
+impl ReducedPull {
+    pub(crate) fn new(mass_kg: f64, gel: &PerJaw<Gel>, friction: &PerJaw<JawFriction>) -> Self {
+        let mut bristles = Bristles::default();
+        let mut boundary = 0;
+        for (jaw, friction) in friction.iter() {
+            boundary = bristles.limit_n.len().max(boundary);
+            let area: f64 = friction.cells.iter().map(|c| c.area_m2).sum();
+            for cell in &friction.cells {
+                bristles.stiffness_n_per_m.push(gel[jaw].shear_stiffness_n_per_m * cell.area_m2 / area);
+                bristles.limit_n.push(cell.limit_n);
+            }
+            // Cells that carry nothing.
+            let padded = bristles.limit_n.len().next_multiple_of(LANES);
+            bristles.stiffness_n_per_m.resize(padded, 0.0);
+            bristles.limit_n.resize(padded, 0.0);
+        }
+        bristles.foot_m = vec![0.0; bristles.limit_n.len()];
+        Self {
+            mass_kg,
+            position_m: 0.0,
+            speed_m_per_s: 0.0,
+            static_limit_n: bristles.limit_n.clone(),
+            bristles,
+            boundary,
+            kinetic_ratio: friction.map(|_, f| f.kinetic_ratio),
+            sliding: false,
+        }
+    }
+
+    pub(crate) fn mass_kg(&self) -> f64 {
+        self.mass_kg
+    }
+
+    pub(crate) fn position_m(&self) -> f64 {
+        self.position_m
+    }
+
+    /// Applies a force to the arm for one time step.
+    pub(crate) fn advance(&mut self, applied_n: f64, step_s: f64) -> Result<Motion, NotFinite> {
+        let inertia = self.mass_kg / step_s;
+        let mut speed = self.speed_m_per_s;
+        let (mut force, mut slope) = self.bristles.force(self.position_m + speed * step_s);
+        for _ in 0..MOST_ITERATIONS {
+            let residual = inertia * (speed - self.speed_m_per_s) - applied_n + force;
+            speed -= residual / (inertia + slope * step_s);
+            let (next_force, next_slope) = self.bristles.force(self.position_m + speed * step_s);
+            // With the same bristles at their limits the force is linear and the step was exact.
+            let done = next_slope == slope;
+            (force, slope) = (next_force, next_slope);
+            if done {
+                break;
+            }
+        }
+        if !speed.is_finite() {
+            return Err(NotFinite { bodies: 1 });
+        }
+        self.position_m += speed * step_s;
+        self.speed_m_per_s = speed;
+        self.bristles.drag(self.position_m);
+        // The jaws slide when no bristle holds any more, and stick again when one does.
+        let sliding = slope == 0.0 && speed != 0.0;
+        if sliding != self.sliding {
+            self.sliding = sliding;
+            self.set_limits();
+        }
+        Ok(Motion { contact_force_n: force, displacement_m: self.position_m, speed_m_per_s: speed, sliding })
+    }
+
+    /// Static limits, or kinetic ones while the jaws slide.
+    fn set_limits(&mut self) {
+        if self.kinetic_ratio.iter().all(|(_, &ratio)| ratio == 1.0) {
+            return;
+        }
+        let limits = self.bristles.limit_n.iter_mut().zip(&self.static_limit_n).enumerate();
+        for (i, (limit, &held)) in limits {
+            let ratio = if i < self.boundary { self.kinetic_ratio.left } else { self.kinetic_ratio.right };
+            *limit = if self.sliding { held * ratio } else { held };
+        }
+    }
+}
+
+impl Bristles {
+    /// Force of all bristles at a tool position, and its slope: the stiffness of those that hold.
+    #[inline]
+    fn force(&self, position_m: f64) -> (f64, f64) {
+        let (mut force, mut slope) = ([0.0; LANES], [0.0; LANES]);
+        let columns = self
+            .stiffness_n_per_m
+            .as_chunks::<LANES>()
+            .0
+            .iter()
+            .zip(self.limit_n.as_chunks::<LANES>().0)
+            .zip(self.foot_m.as_chunks::<LANES>().0);
+        for ((stiffness, limit), foot) in columns {
+            for i in 0..LANES {
+                let elastic = stiffness[i] * (position_m - foot[i]);
+                let held = elastic.min(limit[i]).max(-limit[i]);
+                force[i] += held;
+                slope[i] += if held == elastic { stiffness[i] } else { 0.0 };
+            }
+        }
+        (total(&force), total(&slope))
+    }
+
+    /// Moves the feet of bristles at their limits.
+    #[inline]
+    fn drag(&mut self, position_m: f64) {
+        let columns = self
+            .stiffness_n_per_m
+            .as_chunks::<LANES>()
+            .0
+            .iter()
+            .zip(self.limit_n.as_chunks::<LANES>().0)
+            .zip(self.foot_m.as_chunks_mut::<LANES>().0);
+        for ((stiffness, limit), foot) in columns {
+            for i in 0..LANES {
+                // A padded cell has stiffness 0; its foot may be anywhere.
+                let reach = limit[i] / stiffness[i].max(f64::MIN_POSITIVE);
+                foot[i] = foot[i].max(position_m - reach).min(position_m + reach);
+            }
+        }
+    }
+}
+
+fn total(lanes: &[f64; LANES]) -> f64 {
+    ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
+}

@@ -1,0 +1,206 @@
+//! The reduced mechanics against closed forms, and against Rapier.
+
+use super::*;
+use crate::FrictionCell;
+
+fn bench(shape: PartShape, grip_force_n: f64) -> Bench {
+    Bench { mechanics: Mechanics::Reduced, ..Bench::new(shape, grip_force_n) }
+}
+
+/// A session whose patches have cells of unequal pressure, as under a round part.
+fn session_with_cells(bench: &Bench, mu: f64, cells: usize, kinetic_ratio: f64) -> PullSession {
+    let weight = |i: usize| 1.0 - ((i as f64 + 0.5) / cells as f64 * 2.0 - 1.0).powi(2);
+    let sum: f64 = (0..cells).map(weight).sum();
+    let friction = JawFriction {
+        cells: (0..cells)
+            .map(|i| FrictionCell { limit_n: mu * bench.grip_force_n * weight(i) / sum, area_m2: 1e-6 })
+            .collect(),
+        kinetic_ratio,
+    };
+    let noise = Stream::new(1, 2, Purpose::ForceNoise);
+    bench.held().pull(&PerJaw { left: friction.clone(), right: friction }, noise)
+}
+
+fn pull(session: &mut PullSession, until: Until) -> StaircaseResult {
+    // A cell of twice the mean pressure holds to twice the mean shear: at 160 N that is 8 mm.
+    let settings = PullSettings { stop_m: 20e-3, ..settings() };
+    let staircase = Staircase::constant(settings.increment_n, settings.step_s, settings.max_time_s);
+    pull_staircase(session, &staircase, &settings, until).unwrap()
+}
+
+/// Slip force within 0.1 % of 2 mu F_G, for any number of cells.
+#[test]
+fn jaws_slip_at_twice_mu_times_grip_force() {
+    let shape = PartShape::cuboid([0.06, 0.02, 0.12]);
+    for mu in [0.14, 0.168, 0.3, 0.6, 1.0] {
+        for force in [5.0, 20.0, 40.0, 80.0] {
+            let bench = bench(shape.clone(), force);
+            for cells in [1, 7, 64] {
+                let result = pull(&mut session_with_cells(&bench, mu, cells, 1.0), Until::Stopped);
+                let label = slip_label(&result.trace, 3.0, result.slid).unwrap();
+                let ideal = 2.0 * mu * force;
+                let off = label.max_pull_force_n / ideal - 1.0;
+                assert!(off.abs() < 1e-3 && !label.censored, "mu {mu}, {force} N, {cells} cells: {off}");
+            }
+        }
+    }
+}
+
+/// Cells with little pressure slip first: the load line bends before the force has reached its limit, and follows
+/// sum min(k_i x, L_i).
+#[test]
+fn slip_begins_at_the_rim() {
+    let bench = bench(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+    let cells = 16;
+    let mut session = session_with_cells(&bench, 0.25, cells, 1.0);
+    let weight = |i: usize| 1.0 - ((i as f64 + 0.5) / cells as f64 * 2.0 - 1.0).powi(2);
+    let sum: f64 = (0..cells).map(weight).sum();
+    let mut bent = false;
+    for i in 0..1000 {
+        let state = session.step(Command::ForceN(f64::from(i) * 0.02), STEP_S).unwrap();
+        let x = state.displacement_m;
+        let curve: f64 =
+            (0..cells).map(|i| (2e4 / cells as f64 * x).min(10.0 * weight(i) / sum)).sum::<f64>() * 2.0;
+        assert!(
+            (state.contact_force_n - curve).abs() < 1e-9,
+            "step {i}: {} and {curve}",
+            state.contact_force_n
+        );
+        bent |= state.contact_force_n < 0.95 * 4e4 * x && state.contact_force_n < 19.0;
+    }
+    assert!(bent);
+}
+
+#[test]
+fn a_loaded_grip_does_not_creep() {
+    let bench = bench(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+    let mut session = session_with_cells(&bench, 0.25, 32, 1.0);
+    for i in 0..1000 {
+        session.step(Command::ForceN(18.0 * (f64::from(i) / 900.0).min(1.0)), STEP_S).unwrap();
+    }
+    let start = session.step(Command::ForceN(18.0), 1.0).unwrap().displacement_m;
+    let end = session.step(Command::ForceN(18.0), 2.0).unwrap();
+    assert!((end.displacement_m - start).abs() / 2.0 < 1e-6, "{} m", end.displacement_m - start);
+}
+
+/// What the arm does is stored in the bristles, kept as kinetic energy, or lost in friction: never gained. Momentum
+/// balances to rounding.
+#[test]
+fn energy_and_momentum_balance() {
+    let bench = Bench {
+        robot: Robot { damping_n_s_per_m: 1.0, ..bench(PartShape::ball(0.01), 40.0).robot },
+        ..bench(PartShape::ball(0.01), 40.0)
+    };
+    let mut session = session_with_cells(&bench, 0.25, 32, 1.0);
+    let mass = 8.0 + 1.2 + 0.4;
+    let (mut work, mut lost_before) = (0.0, 0.0);
+    for i in 0..3000 {
+        let before = session.state();
+        // A pull that rises, falls back and rises again.
+        let command = 12.0 + 14.0 * libm::sin(f64::from(i) * 0.004);
+        let state = session.step(Command::ForceN(command), STEP_S).unwrap();
+        let inertia = mass * (state.speed_m_per_s - before.speed_m_per_s) / STEP_S;
+        let applied = state.contact_force_n + inertia;
+        work += applied * (state.displacement_m - before.displacement_m);
+        let kinetic = 0.5 * mass * state.speed_m_per_s.powi(2);
+        // Elastic energy of the bristles is at most that of all of them at the present force.
+        let lost = work - kinetic;
+        assert!(lost > -1e-9, "step {i}: {lost} J gained");
+        lost_before = lost;
+    }
+    assert!(lost_before > 0.0);
+}
+
+#[test]
+fn kinetic_friction_acts_as_soon_as_the_jaws_slide() {
+    let bench = bench(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+    for cells in [1, 32] {
+        let trace = pull(&mut session_with_cells(&bench, 0.25, cells, 0.7), Until::Stopped).trace;
+        let peak = trace.measured_force_n.iter().fold(0.0_f64, |a, &b| a.max(b));
+        let last = trace.measured_force_n[trace.len() - 1];
+        assert!((peak / 20.0 - 1.0).abs() < 1e-3, "{cells} cells: peak {peak} N");
+        assert!((last / 14.0 - 1.0).abs() < 1e-3, "{cells} cells: sliding at {last} N");
+    }
+}
+
+/// A pull that ends when its label is decided has that label, and the same trace up to there.
+#[test]
+fn an_early_end_leaves_the_label() {
+    for mechanics in [Mechanics::Reduced, Mechanics::Rapier] {
+        for (kinetic_ratio, noise_n) in [(1.0, 0.0), (0.8, 0.0), (1.0, 0.3), (0.8, 0.3)] {
+            let mut bench = bench(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+            (bench.mechanics, bench.noise_n) = (mechanics, noise_n);
+            let run = |until| pull(&mut session_with_cells(&bench, 0.2, 32, kinetic_ratio), until);
+            let (full, early) = (run(Until::Stopped), run(Until::Decided));
+            let label = |r: &StaircaseResult| slip_label(&r.trace, 3.0, r.slid).unwrap();
+            assert_eq!(label(&full), label(&early), "{mechanics:?}");
+            assert!(early.trace.len() <= full.trace.len());
+            assert_eq!(early.trace.measured_force_n[..], full.trace.measured_force_n[..early.trace.len()]);
+        }
+    }
+    // And is worth it where the stop is far.
+    let bench = bench(PartShape::cuboid([0.06, 0.02, 0.12]), 5.0);
+    let run = |until| pull(&mut session_with_cells(&bench, 0.14, 8, 1.0), until).trace.len();
+    assert!(run(Until::Decided) < run(Until::Stopped));
+}
+
+/// Halving the time step moves the slip force by less than 0.2 %.
+#[test]
+fn the_step_can_be_halved() {
+    let bench = bench(PartShape::cylinder(0.01, 0.12, 2), 40.0);
+    let slip = |step: f64| {
+        let mut session = session_with_cells(&bench, 0.2, 32, 1.0);
+        let mut peak = 0.0_f64;
+        for i in 0..(3.0 / step) as usize {
+            let state = session.step(Command::ForceN(8.0 * i as f64 * step), step).unwrap();
+            peak = peak.max(state.contact_force_n);
+        }
+        peak
+    };
+    assert!((slip(STEP_S) / slip(STEP_S / 2.0) - 1.0).abs() < 2e-3);
+}
+
+/// Any stiffness is stable: the step is implicit.
+#[test]
+fn stiff_gels_are_stable() {
+    let mut bench = bench(PartShape::ball(0.01), 40.0);
+    for jaw in gripgen_twin::Jaw::BOTH {
+        bench.gel[jaw].shear_stiffness_n_per_m = 1e7;
+    }
+    let result = pull(&mut session_with_cells(&bench, 0.25, 64, 1.0), Until::Stopped);
+    let peak = result.trace.measured_force_n.iter().fold(0.0_f64, |a, &b| a.max(b));
+    assert!((peak / 20.0 - 1.0).abs() < 1e-6, "{peak}");
+}
+
+/// Both mechanics grip at the same place, and label a centred grip alike.
+#[test]
+fn both_mechanics_grip_and_label_alike() {
+    for (name, shape) in shapes() {
+        let rapier = Bench::new(shape.clone(), 40.0);
+        let reduced = bench(shape, 40.0);
+        let (a, b) = (rapier.held().grasp, reduced.held().grasp);
+        for jaw in gripgen_twin::Jaw::BOTH {
+            let apart =
+                (a.gel_from_part[jaw].translation.vector - b.gel_from_part[jaw].translation.vector).norm();
+            assert!(apart < 10e-6, "{name}, {jaw} jaw: {} mm apart", apart * 1e3);
+        }
+        let (x, y) = (rapier.label_n(0.2), reduced.label_n(0.2));
+        assert!((x / y - 1.0).abs() < 1e-3, "{name}: {x} and {y}");
+    }
+    let mut wide = bench(PartShape::cuboid([0.02, 0.02, 0.02]), 40.0);
+    wide.world_from_part = pose(&Rotation3::identity(), Vector3::new(0.06, 0.0, 0.0));
+    assert!(matches!(wide.grip(), Ok(Grip::NoContact)));
+}
+
+#[test]
+fn a_clone_continues_like_the_original() {
+    let mut bench = bench(PartShape::ball(0.01), 40.0);
+    bench.noise_n = 0.1;
+    let mut original = session_with_cells(&bench, 0.1, 32, 0.8);
+    original.step(Command::ForceN(5.0), 0.3).unwrap();
+    let mut copy = original.clone();
+    for i in 0..300 {
+        let command = Command::ForceN(5.0 + f64::from(i) * 0.05);
+        assert_eq!(original.step(command, STEP_S), copy.step(command, STEP_S));
+    }
+}

@@ -1,0 +1,132 @@
+//! Two mechanics, one result: where they agree, how far, and what both share.
+
+use crate::common::project;
+use gripgen::tactile::SimdLevel;
+use gripgen::twin::{Outcome, Pulled};
+use gripgen::{Project, generate};
+
+fn pulled(project: &Project, index: u64) -> Option<Box<Pulled>> {
+    match generate(project, index, SimdLevel::best()).outcome {
+        Outcome::Pulled(pulled) => Some(pulled),
+        Outcome::NoContact { .. } => None,
+        Outcome::Failed { reason } => panic!("{reason}"),
+    }
+}
+
+/// 200 random scenarios without noise: forces, angles, offsets and grips of all parts.
+#[test]
+fn both_mechanics_slip_at_the_same_force() {
+    let load = |mechanics: &str| {
+        let sets = [
+            "twin=asset:configs/twin-baseline.toml",
+            "design=random",
+            "samples=200",
+            "seed=11",
+            "images=none",
+            "trace=none",
+            "wrist.noise_n=0",
+            "vary.grip_force_n={ uniform = [5, 80] }",
+            "vary.grip_angle_deg={ uniform = [-180, 180] }",
+            "vary.grip_offset_mm={ normal = [0, 4] }",
+            "vary.pull_direction=[1, -1]",
+            "vary.pull.increment_n=[0.5, 1, 2]",
+            &format!("mechanics={mechanics}"),
+        ];
+        project("asset:configs/quickstart.toml", &sets)
+    };
+    let (rapier, reduced) = (load("rapier"), load("reduced"));
+    let mut worst = (0.0_f64, String::new());
+    let mut compared = 0;
+    for index in 0..200 {
+        let (a, b) = (pulled(&rapier, index), pulled(&reduced, index));
+        assert_eq!(a.is_some(), b.is_some(), "sample {index}: only one of the two has contact");
+        let (Some(a), Some(b)) = (a, b) else { continue };
+        assert_eq!((a.label.censored, b.label.censored), (false, false), "sample {index}");
+        let (x, y) = (a.label.max_pull_force_n, b.label.max_pull_force_n);
+        let off = (y / x - 1.0).abs();
+        compared += 1;
+        if off > worst.0 {
+            worst = (off, format!("sample {index}: {x} N and {y} N, {:?}", rapier.sweep.drawn(index)));
+        }
+    }
+    println!("worst of {compared}: {:.3} % ({})", 100.0 * worst.0, worst.1);
+    assert!(compared > 180 && worst.0 < 0.01, "{:.3} %, {}", 100.0 * worst.0, worst.1);
+}
+
+/// Without a trace the pull ends as soon as its label is decided: the label is the same, bit for bit.
+#[test]
+fn a_sweep_without_traces_has_the_same_labels() {
+    for mechanics in ["mechanics=reduced", "mechanics=rapier"] {
+        let load = |trace: &str| {
+            let sets = ["images=none", mechanics, trace, "parts.gear.kinetic_ratio=0.8"];
+            project("asset:configs/quickstart.toml", &sets)
+        };
+        let (full, label) = (load("trace=full"), load("trace=none"));
+        for index in (0..200).step_by(9) {
+            let (a, b) = (pulled(&full, index).unwrap(), pulled(&label, index).unwrap());
+            assert_eq!(a.label, b.label, "sample {index}, {mechanics}");
+        }
+    }
+}
+
+/// Repetitions share their grip, and are what they would be alone.
+#[test]
+fn repetitions_differ_in_scatter_and_noise_only() {
+    for mechanics in ["mechanics=reduced", "mechanics=rapier"] {
+        let sets = ["repetitions=5", "vary.grip_force_n=[30]", "vary.grip_angle_deg=[30]", mechanics];
+        let shared = project("asset:configs/quickstart.toml", &sets);
+        let ascending: Vec<_> = (0..10).map(|i| pulled(&shared, i).unwrap()).collect();
+        // In another order, from a project that has gripped nothing yet.
+        let fresh = project("asset:configs/quickstart.toml", &sets);
+        for index in (0..10).rev() {
+            assert!(
+                pulled(&fresh, index).unwrap() == ascending[index as usize],
+                "sample {index}, {mechanics}"
+            );
+        }
+        for pair in ascending[..5].windows(2) {
+            assert_eq!(pair[0].grasp, pair[1].grasp);
+            assert_eq!(pair[0].imprint, pair[1].imprint);
+            assert_ne!(pair[0].mu, pair[1].mu);
+            assert_ne!(pair[0].images, pair[1].images);
+        }
+    }
+}
+
+/// An arm that does not hold the grip's rotation slips earlier beside the grip centre, alike in both mechanics, and not
+/// at all for a lever along the pull.
+#[test]
+fn a_free_twist_falls_with_the_lever() {
+    let label = |mechanics: &str, twist: &str, offset_mm: f64, angle_deg: f64| {
+        let p = project(
+            "asset:configs/quickstart.toml",
+            &[
+                "twin=asset:configs/twin-baseline.toml",
+                "images=none",
+                "wrist.noise_n=0",
+                "parts.long_shaft.scatter=0",
+                "vary.part=[\"long_shaft\"]",
+                "vary.grip_pose=[0]",
+                "vary.grip_force_n=[40]",
+                &format!("vary.grip_offset_mm=[{offset_mm}]"),
+                &format!("vary.grip_angle_deg=[{angle_deg}]"),
+                &format!("mechanics={mechanics}"),
+                &format!("robot.twist={twist}"),
+            ],
+        );
+        pulled(&p, 0).unwrap().label.max_pull_force_n
+    };
+    let straight = 2.0 * 0.168 * 40.0;
+    let mut before = f64::INFINITY;
+    for offset_mm in [0.0, 4.0, 10.0, 20.0] {
+        assert!((label("reduced", "stiff", offset_mm, 0.0) / straight - 1.0).abs() < 1e-3);
+        let (a, b) = (label("reduced", "free", offset_mm, 0.0), label("rapier", "free", offset_mm, 0.0));
+        assert!((a / b - 1.0).abs() < 0.01, "{offset_mm} mm: {a} and {b}");
+        assert!(a < before - 1e-3, "{offset_mm} mm: {a} N after {before} N");
+        before = a;
+    }
+    assert!(before < 0.6 * straight, "{before} N at 20 mm");
+    // Turned by a quarter the shaft's axis lies along the pull, and so does the lever.
+    let along = label("reduced", "free", 20.0, 90.0);
+    assert!((along / straight - 1.0).abs() < 0.01, "{along}");
+}
