@@ -3,35 +3,84 @@
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use gripgen::physics::{
+    FrictionCell, Grip, GripSetup, Held, JawFriction, Mount, Until, grip, pull_staircase,
+};
 use gripgen::record::{EncodeOptions, VIEW_RATE_HZ, encode};
 use gripgen::tactile::{Renderer, SimdLevel};
-use gripgen::twin::Jaw;
 use gripgen::twin::config::{ImageStorage, TraceStorage};
+use gripgen::twin::frames::Pose;
+use gripgen::twin::random::{Purpose, Stream};
+use gripgen::twin::{Jaw, PerJaw, Staircase};
 use gripgen::{Location, Project, generate, press_only};
 use std::hint::black_box;
 
 const PARTS: [&str; 4] = ["ball_bearing", "long_shaft", "gear", "roller_bearing"];
 
 /// One sample of a part: 40 N, first grip, 30 degrees.
-fn project(part: &str, images: &str) -> Project {
+fn project(part: &str, mechanics: &str, images: &str) -> Project {
     let sets = [
         ("vary.part", format!("[\"{part}\"]")),
         ("vary.grip_force_n", "[40]".into()),
         ("vary.grip_pose", "[0]".into()),
         ("vary.grip_angle_deg", "[30]".into()),
+        ("mechanics", mechanics.into()),
         ("images", images.into()),
     ]
     .map(|(key, value): (&str, String)| (key.to_string(), value));
     Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap()
 }
 
-/// `physics/pull/rapier/<part>`: grip, imprint and pull, no images.
+/// `physics/sample/<mechanics>/<part>`: grip, imprint and pull, no images. `physics/pull/<mechanics>`: the pull alone,
+/// the shaft at 40 N with 64 cells a jaw, noise and trace.
 fn physics(c: &mut Criterion) {
-    let mut group = c.benchmark_group("physics/pull/rapier");
+    let mut group = c.benchmark_group("physics");
     group.sample_size(20).throughput(Throughput::Elements(1));
-    for part in PARTS {
-        let project = project(part, "none");
-        group.bench_function(part, |b| b.iter(|| black_box(generate(&project, 0, SimdLevel::best()))));
+    for mechanics in ["rapier", "reduced"] {
+        for part in PARTS {
+            let project = project(part, mechanics, "none");
+            group.bench_function(BenchmarkId::new(format!("sample/{mechanics}"), part), |b| {
+                b.iter(|| black_box(generate(&project, 0, SimdLevel::best())));
+            });
+        }
+        let project = project("long_shaft", mechanics, "none");
+        let pull = project.sweep.pull();
+        let held = held(&project);
+        let staircase = Staircase::constant(pull.increment_n, pull.step_s, pull.max_time_s);
+        let cell = FrictionCell { limit_n: 0.168 * 40.0 / 64.0, area_m2: 1e-6 };
+        let jaw = JawFriction { cells: vec![cell; 64], kinetic_ratio: 1.0 };
+        let friction = PerJaw { left: jaw.clone(), right: jaw };
+        group.bench_function(format!("pull/{mechanics}"), |b| {
+            b.iter(|| {
+                let noise = Stream::new(1, 2, Purpose::ForceNoise);
+                let mut session = held.clone().pull(&friction, noise);
+                black_box(pull_staircase(&mut session, &staircase, &pull, Until::Stopped).unwrap())
+            });
+        });
+    }
+}
+
+/// The part of sample 0, gripped.
+fn held(project: &Project) -> Held {
+    let twin = &project.twin;
+    let scenario = project.sweep.scenario(0, twin).0;
+    let part = &twin.parts[&scenario.part];
+    let shape = project.library.shape(part, scenario.grip_pose).unwrap();
+    let setup = GripSetup {
+        mechanics: project.sweep.mechanics,
+        robot: twin.robot,
+        gripper: twin.gripper,
+        wrist: twin.wrist,
+        gel: &twin.gel,
+        shape: &shape,
+        world_from_part: Pose::identity(),
+        grip_force_n: PerJaw { left: 40.0, right: 40.0 },
+        direction: [0.0, 0.0, 1.0],
+        mount: Mount::Fixed,
+    };
+    match grip(&setup).unwrap() {
+        Grip::Held(held) => *held,
+        Grip::NoContact => panic!("the shaft is between the jaws"),
     }
 }
 
@@ -40,7 +89,7 @@ fn tactile(c: &mut Criterion) {
     let mut group = c.benchmark_group("tactile");
     group.sample_size(30).throughput(Throughput::Elements(1));
     for part in PARTS {
-        let project = project(part, "png");
+        let project = project(part, "rapier", "png");
         let scenario = project.sweep.scenario(0, &project.twin).0;
         let press =
             press_only(&project.twin, &project.library, &scenario, project.sweep.mechanics).unwrap().unwrap();
@@ -72,7 +121,7 @@ fn tactile(c: &mut Criterion) {
 fn record(c: &mut Criterion) {
     let mut group = c.benchmark_group("record/encode");
     group.sample_size(30).throughput(Throughput::Elements(1));
-    let sample = generate(&project("gear", "png"), 0, SimdLevel::best());
+    let sample = generate(&project("gear", "rapier", "png"), 0, SimdLevel::best());
     for (name, images) in [("png", ImageStorage::Png), ("raw", ImageStorage::Raw)] {
         let options = EncodeOptions {
             images,

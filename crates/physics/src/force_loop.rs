@@ -21,11 +21,13 @@ pub(crate) struct ForceLoop {
     /// Commands under way, with the time at which each becomes effective.
     pending: VecDeque<(f64, f64)>,
     effective_n: f64,
+    /// A length of step, and the share of the error that the loop makes up in it.
+    share: (f64, f64),
 }
 
 impl ForceLoop {
     pub(crate) fn new(robot: Robot) -> Self {
-        Self { robot, force_n: 0.0, pending: VecDeque::new(), effective_n: 0.0 }
+        Self { robot, force_n: 0.0, pending: VecDeque::new(), effective_n: 0.0, share: (0.0, 0.0) }
     }
 
     /// Starts from a force that already acts, as after a velocity command. Commands still under way are void.
@@ -54,8 +56,11 @@ impl ForceLoop {
             Feedback::Independent => self.force_n,
         };
         // Exact for a command that is constant over the step.
-        let share = if self.robot.lag_s > 0.0 { -libm::expm1(-step_s / self.robot.lag_s) } else { 1.0 };
-        self.force_n += share * (self.effective_n - closed);
+        if self.share.0 != step_s {
+            let share = if self.robot.lag_s > 0.0 { -libm::expm1(-step_s / self.robot.lag_s) } else { 1.0 };
+            self.share = (step_s, share);
+        }
+        self.force_n += self.share.1 * (self.effective_n - closed);
         let excess = self.robot.damping_n_s_per_m * self.robot.speed_limit_m_per_s;
         self.force_n = self.force_n.clamp(contact_n - excess, contact_n + excess);
         self.force_n

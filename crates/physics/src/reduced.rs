@@ -42,7 +42,11 @@ pub(crate) struct ReducedPull {
 struct Bristles {
     stiffness_n_per_m: Vec<f64>,
     limit_n: Vec<f64>,
+    /// Stretch at which a bristle is at its limit; 0 for padded cells.
+    reach_m: Vec<f64>,
     foot_m: Vec<f64>,
+    /// Stiffness of all of them.
+    total_n_per_m: f64,
 }
 
 impl ReducedPull {
@@ -62,6 +66,8 @@ impl ReducedPull {
             bristles.limit_n.resize(padded, 0.0);
         }
         bristles.foot_m = vec![0.0; bristles.limit_n.len()];
+        bristles.total_n_per_m = bristles.force(0.0).1;
+        bristles.measure();
         Self {
             mass_kg,
             position_m: 0.0,
@@ -103,7 +109,9 @@ impl ReducedPull {
         }
         self.position_m += speed * step_s;
         self.speed_m_per_s = speed;
-        self.bristles.drag(self.position_m);
+        if slope != self.bristles.total_n_per_m {
+            self.bristles.drag(self.position_m);
+        }
         // The jaws slide when no bristle holds any more, and stick again when one does.
         let sliding = slope == 0.0 && speed != 0.0;
         if sliding != self.sliding {
@@ -123,6 +131,7 @@ impl ReducedPull {
             let ratio = if i < self.boundary { self.kinetic_ratio.left } else { self.kinetic_ratio.right };
             *limit = if self.sliding { held * ratio } else { held };
         }
+        self.bristles.measure();
     }
 }
 
@@ -149,22 +158,17 @@ impl Bristles {
         (total(&force), total(&slope))
     }
 
+    /// Finds the reach of every bristle.
+    fn measure(&mut self) {
+        let reach = |(limit, stiffness): (&f64, &f64)| if *stiffness > 0.0 { limit / stiffness } else { 0.0 };
+        self.reach_m = self.limit_n.iter().zip(&self.stiffness_n_per_m).map(reach).collect();
+    }
+
     /// Moves the feet of bristles at their limits.
     #[inline]
     fn drag(&mut self, position_m: f64) {
-        let columns = self
-            .stiffness_n_per_m
-            .as_chunks::<LANES>()
-            .0
-            .iter()
-            .zip(self.limit_n.as_chunks::<LANES>().0)
-            .zip(self.foot_m.as_chunks_mut::<LANES>().0);
-        for ((stiffness, limit), foot) in columns {
-            for i in 0..LANES {
-                // A padded cell has stiffness 0; its foot may be anywhere.
-                let reach = limit[i] / stiffness[i].max(f64::MIN_POSITIVE);
-                foot[i] = foot[i].max(position_m - reach).min(position_m + reach);
-            }
+        for (foot, reach) in self.foot_m.iter_mut().zip(&self.reach_m) {
+            *foot = foot.max(position_m - reach).min(position_m + reach);
         }
     }
 }
