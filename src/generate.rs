@@ -1,16 +1,17 @@
 //! One sample: from a scenario to images, trace and label.
 
-use crate::gripped::{Contact, Gripped};
+use crate::gripped::{Contact, Gripped, grip_point};
 use crate::hold::hold;
 use crate::library::{Library, LibraryError};
 use crate::project::Project;
-use gripgen_physics::{GripError, PullError, Until, pull_staircase, staircase_of};
+use gripgen_physics::{GripError, PullError, Signals, Until, pull_staircase, staircase_of};
 use gripgen_tactile::{Imprint, IndentError, Sensor, SimdLevel};
 use gripgen_twin::config::{ConfigError, ImageStorage, Mechanics, TraceStorage};
+use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    FrictionError, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample, Scenario, Twin,
-    grip_friction, slip_label,
+    FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample, Scenario, Twin,
+    cell_friction, slip_label,
 };
 use std::sync::Arc;
 
@@ -24,6 +25,16 @@ pub enum SampleError {
     /// A file.
     #[error(transparent)]
     Library(#[from] LibraryError),
+    /// An effect leaves no grip force.
+    #[error("the {jaw} jaw presses with {force_n:.4} N of the commanded {commanded_n} N: nothing is gripped")]
+    NoForce {
+        /// Which jaw.
+        jaw: Jaw,
+        /// Its real force.
+        force_n: f64,
+        /// The commanded force.
+        commanded_n: f64,
+    },
     /// The grip.
     #[error(transparent)]
     Grip(#[from] GripError),
@@ -133,17 +144,27 @@ fn pull(
     options: SimulateOptions,
 ) -> Result<Outcome, SampleError> {
     let images = options.images.then(|| gripped.images(twin, scenario));
-    let Some(Contact { held, imprint, .. }) = &gripped.contact else {
+    let Some(Contact { held, imprint, force_n, .. }) = &gripped.contact else {
         return Ok(Outcome::NoContact { images });
     };
     let part = &twin.parts[&scenario.part];
-    let law = grip_friction(twin, &scenario.part, part, scenario.grip_force_n)?;
-    let mu = law.mu * scatter(part, scenario);
     let patches = PerJaw::from_fn(|jaw| &imprint[jaw].patch);
-    let cell_mu = patches.map(|_, patch| vec![mu; patch.cells.len()]);
-    let friction = hold(twin, scenario, &patches, &cell_mu, law.kinetic_ratio);
+    let laws = PerJaw::try_from_fn(|jaw| {
+        let at = grip_point(scenario, jaw, patches[jaw].area_m2());
+        cell_friction(twin, &scenario.part, part, &at, patches[jaw])
+    })?;
+    let scatter = scatter(part, scenario);
+    let cell_mu = laws.map(|_, (cells, _)| cells.iter().map(|mu| mu * scatter).collect());
+    let law = laws.map(|_, (_, law)| *law);
+    let friction = hold(twin, scenario, &patches, &cell_mu, law.left.kinetic_ratio);
     let stream = |purpose| Stream::new(scenario.seed, scenario.index, purpose);
-    let mut session = (**held).clone().pull(&friction, stream(Purpose::ForceNoise));
+    let signals = Signals {
+        noise: stream(Purpose::ForceNoise),
+        sensor: SensorChain::new(twin, &scenario.part, scenario.covariates.time_s)
+            .along(scenario.covariates.pull_direction),
+        command: CommandChain::new(twin, &scenario.part),
+    };
+    let mut session = (**held).clone().pull(&friction, signals);
     let staircase = staircase_of(&scenario.pull, &mut stream(Purpose::StepJitter));
     let until = if options.trace { Until::Stopped } else { Until::Decided };
     let result = pull_staircase(&mut session, &staircase, &scenario.pull, until)?;
@@ -154,8 +175,8 @@ fn pull(
         grasp: held.grasp.clone(),
         imprint: summary,
         images,
-        mu,
-        outside_fit: law.outside_fit,
+        mu: mean_mu(&law, force_n) * scatter,
+        outside_fit: law.left.outside_fit || law.right.outside_fit,
         trace: result.trace,
         label,
     })))
@@ -171,6 +192,15 @@ pub fn press_only(
     let options = SimulateOptions { mechanics, images: false, trace: false, level: SimdLevel::best() };
     let Gripped { sensors, contact } = Gripped::new(twin, library, scenario, options)?;
     Ok(contact.map(|c| Press { imprint: c.imprint, sensors }))
+}
+
+/// Friction coefficient of both jaws together.
+fn mean_mu(law: &PerJaw<GripFriction>, force_n: &PerJaw<f64>) -> f64 {
+    let (left, right) = (law.left.mu, law.right.mu);
+    if left == right {
+        return left;
+    }
+    (left * force_n.left + right * force_n.right) / (force_n.left + force_n.right)
 }
 
 /// The factor by which this grip's friction differs from the mean, never negative.

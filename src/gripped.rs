@@ -7,9 +7,15 @@ use crate::library::Library;
 use gripgen_physics::{Grip, GripSetup, Held, Mount, PartShape, grip};
 use gripgen_tactile::{Imprint, Plane, Renderer, Sensor};
 use gripgen_twin::config::{ImageNoise, Mechanics};
+use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n};
+use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Grasp, Jaw, Part, PerJaw, Scenario, TactileImage, Twin};
+use nalgebra::Vector3;
 use std::sync::Arc;
+
+/// Smallest normal force of a jaw that still grips.
+const LEAST_FORCE_N: f64 = 1e-3;
 
 /// A grip with its imprints.
 pub(crate) struct Gripped {
@@ -22,6 +28,8 @@ pub(crate) struct Gripped {
 pub(crate) struct Contact {
     pub(crate) held: Box<Held>,
     pub(crate) imprint: PerJaw<Imprint>,
+    /// Real normal force of each jaw.
+    pub(crate) force_n: PerJaw<f64>,
     /// What the imprint changes in the image, if there are images.
     change: Option<PerJaw<[Plane; 3]>>,
 }
@@ -36,8 +44,13 @@ impl Gripped {
     ) -> Result<Self, SampleError> {
         let part = &twin.parts[&scenario.part];
         let sensors = PerJaw::try_from_fn(|jaw| library.sensor(&twin.optics[jaw]))?;
+        let force_n = PerJaw::try_from_fn(|jaw| {
+            let force_n = normal_force_n(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
+            let commanded_n = scenario.grip_force_n;
+            if force_n < LEAST_FORCE_N { Err(SampleError::NoForce { jaw, force_n, commanded_n }) } else { Ok(force_n) }
+        })?;
         let shape = library.shape(part, scenario.grip_pose)?;
-        let Grip::Held(held) = grip(&grip_setup(twin, scenario, options.mechanics, &shape))? else {
+        let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, &shape))? else {
             return Ok(Self { sensors, contact: None });
         };
         let renderers = PerJaw::from_fn(|jaw| Renderer {
@@ -45,9 +58,9 @@ impl Gripped {
             gel: &twin.gel[jaw],
             level: options.level,
         });
-        let imprint = press(library, part, scenario, &held.grasp, &renderers)?;
+        let imprint = press(twin, library, scenario, &force_n, &held.grasp, &renderers)?;
         let change = options.images.then(|| imprint.map(|jaw, imprint| renderers[jaw].change(imprint)));
-        Ok(Self { sensors, contact: Some(Contact { held, imprint, change }) })
+        Ok(Self { sensors, contact: Some(Contact { held, imprint, force_n, change }) })
     }
 
     /// The images of one repetition.
@@ -70,6 +83,7 @@ impl Gripped {
 fn grip_setup<'a>(
     twin: &'a Twin,
     scenario: &Scenario,
+    grip_force_n: PerJaw<f64>,
     mechanics: Mechanics,
     shape: &'a PartShape,
 ) -> GripSetup<'a> {
@@ -81,7 +95,7 @@ fn grip_setup<'a>(
         gel: &twin.gel,
         shape,
         world_from_part: world_from_part(scenario),
-        grip_force_n: PerJaw { left: scenario.grip_force_n, right: scenario.grip_force_n },
+        grip_force_n,
         direction: pull_direction(scenario),
         mount: Mount::Fixed,
     }
@@ -98,18 +112,39 @@ pub(crate) fn pull_direction(scenario: &Scenario) -> [f64; 3] {
     scenario.pull.direction.map(|x| x * scenario.covariates.pull_direction)
 }
 
+/// What the effects look at.
+pub(crate) fn grip_point(scenario: &Scenario, jaw: Jaw, contact_area_m2: f64) -> GripPoint<'_> {
+    GripPoint {
+        jaw,
+        grip_force_n: scenario.grip_force_n,
+        contact_area_m2,
+        pull_rate_n_per_s: scenario.pull.increment_n / scenario.pull.step_s,
+        covariates: &scenario.covariates,
+    }
+}
+
 fn press(
+    twin: &Twin,
     library: &Library,
-    part: &Part,
     scenario: &Scenario,
+    force_n: &PerJaw<f64>,
     grasp: &Grasp,
     renderers: &PerJaw<Renderer<'_>>,
 ) -> Result<PerJaw<Imprint>, SampleError> {
+    let part = &twin.parts[&scenario.part];
     let mesh = library.mesh(part)?;
     PerJaw::try_from_fn(|jaw| {
-        let gel_from_mesh = grasp.gel_from_part[jaw] * part.grips[scenario.grip_pose];
+        let mut gel_from_mesh = grasp.gel_from_part[jaw] * part.grips[scenario.grip_pose];
+        let tilt_rad = jaw_tilt_rad(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
+        if tilt_rad != 0.0 {
+            // The gel turns about its own x axis, so the part turns the other way in it.
+            gel_from_mesh = pose(&rotation_about_axis(0, -tilt_rad), Vector3::zeros()) * gel_from_mesh;
+        }
+        let volume_m3 = imprint_volume_m3(twin, &scenario.part, part, force_n[jaw]);
+        let unchanged = volume_m3 == part.imprint_m3_per_n * force_n[jaw];
+        let imprint_m3_per_n = if unchanged { part.imprint_m3_per_n } else { volume_m3 / force_n[jaw] };
         renderers[jaw]
-            .press(&mesh, &gel_from_mesh, part.imprint_m3_per_n, scenario.grip_force_n)
+            .press(&mesh, &gel_from_mesh, imprint_m3_per_n, force_n[jaw])
             .map_err(|source| SampleError::Indent { jaw, source })
     })
 }

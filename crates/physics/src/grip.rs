@@ -3,12 +3,11 @@
 use crate::rapier_pull::{RapierPull, RapierStart};
 use crate::reduced::ReducedPull;
 use crate::scene::{Rig, build, pad_shape, rapier_pose, vector};
-use crate::session::{JawFriction, Plant, PullSession};
+use crate::session::{JawFriction, Plant, PullSession, Signals};
 use crate::shape::PartShape;
 use crate::world::World;
 use gripgen_twin::config::Mechanics;
 use gripgen_twin::frames::{Pose, world_from_gel};
-use gripgen_twin::random::Stream;
 use gripgen_twin::{Gel, Grasp, Gripper, Jaw, PerJaw, Robot, Wrist};
 use rapier3d_f64::parry::query::{ShapeCastOptions, cast_shapes};
 use rapier3d_f64::prelude as rapier;
@@ -176,15 +175,15 @@ fn grasp(setup: &GripSetup<'_>, distance_m: &PerJaw<f64>, normal_force_n: PerJaw
 }
 
 impl Held {
-    /// Starts a pull. `friction` is what each jaw can hold, `noise` the randomness of the wrist sensor.
-    pub fn pull(self, friction: &PerJaw<JawFriction>, noise: Stream) -> PullSession {
+    /// Starts a pull. `friction` is what each jaw can hold, `signals` what arm and sensor make of the mechanics.
+    pub fn pull(self, friction: &PerJaw<JawFriction>, signals: impl Into<Signals>) -> PullSession {
         let plant = match self.start {
             Start::Rapier(start) => Plant::Rapier(Box::new(RapierPull::new(*start, friction))),
             Start::Reduced { mass_kg, gel } => {
                 Plant::Reduced(Box::new(ReducedPull::new(mass_kg, &gel, friction)))
             }
         };
-        PullSession::new(plant, self.robot, self.wrist, friction, noise)
+        PullSession::new(plant, self.robot, self.wrist, friction, signals.into())
     }
 }
 

@@ -25,7 +25,7 @@ mod world;
 
 pub use grip::{Grip, GripError, GripSetup, Held, Mount, grip};
 pub use limit_surface::{LimitCell, free_twist_capacity_n};
-pub use session::{Command, FrictionCell, JawFriction, PullError, PullSession, PullState};
+pub use session::{Command, FrictionCell, JawFriction, PullError, PullSession, PullState, Signals};
 pub use shape::{PartShape, ShapeError};
 pub use staircase::{StaircaseResult, Until, pull_staircase, staircase_of};
 

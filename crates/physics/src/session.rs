@@ -6,6 +6,7 @@ use crate::force_loop::ForceLoop;
 use crate::rapier_pull::RapierPull;
 use crate::reduced::ReducedPull;
 use crate::world::NotFinite;
+use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::random::Stream;
 use gripgen_twin::{PerJaw, Robot, Wrist};
 
@@ -48,6 +49,24 @@ impl JawFriction {
     /// Largest tangential force before the jaw slips: the sum over its cells.
     pub fn limit_n(&self) -> f64 {
         self.cells.iter().map(|c| c.limit_n).sum()
+    }
+}
+
+/// What stands between the mechanics and the numbers that the arm is told and reports.
+#[derive(Debug, Clone)]
+pub struct Signals {
+    /// Noise of the wrist sensor.
+    pub noise: Stream,
+    /// Effects on the wrist sensor, before its noise.
+    pub sensor: SensorChain,
+    /// Effects on the command of the force loop.
+    pub command: CommandChain,
+}
+
+impl From<Stream> for Signals {
+    /// Noise alone.
+    fn from(noise: Stream) -> Self {
+        Self { noise, sensor: SensorChain::default(), command: CommandChain::default() }
     }
 }
 
@@ -123,7 +142,7 @@ pub struct PullSession {
     robot: Robot,
     wrist: Wrist,
     control: ForceLoop,
-    noise: Stream,
+    signals: Signals,
     /// Where a velocity command wants the carriage to be.
     target_m: Option<f64>,
     limit_n: f64,
@@ -137,14 +156,14 @@ impl PullSession {
         robot: Robot,
         wrist: Wrist,
         friction: &PerJaw<JawFriction>,
-        noise: Stream,
+        signals: Signals,
     ) -> Self {
         let mut session = Self {
             plant,
             robot,
             wrist,
             control: ForceLoop::new(robot),
-            noise,
+            signals,
             target_m: None,
             limit_n: friction.left.limit_n() + friction.right.limit_n(),
             has_slid: false,
@@ -157,7 +176,7 @@ impl PullSession {
                 sliding: false,
             },
         };
-        session.state.measured_force_n = session.reading(0.0);
+        session.state.measured_force_n = session.reading(0.0, 0.0, 0.0);
         session
     }
 
@@ -171,9 +190,13 @@ impl PullSession {
         self.has_slid
     }
 
-    /// What the wrist sensor can report at most, as long as the jaws obey their static limits.
+    /// What the wrist sensor can report at most, as long as the jaws obey their static limits; nothing is known of a
+    /// sensor with effects.
     pub(crate) fn largest_reading_n(&self) -> f64 {
-        self.limit_n + LARGEST_NORMAL * self.wrist.noise_n
+        match self.signals.sensor.is_identity() {
+            true => self.limit_n + LARGEST_NORMAL * self.wrist.noise_n,
+            false => f64::INFINITY,
+        }
     }
 
     /// Readings of the wrist sensor per second; the time between two of them is the natural step.
@@ -202,6 +225,7 @@ impl PullSession {
         let applied_n = match command {
             Command::ForceN(desired_n) => {
                 self.target_m = None;
+                let desired_n = self.signals.command.apply(desired_n, before.measured_force_n);
                 let force = self.control.advance(
                     before.time_s,
                     step_s,
@@ -233,7 +257,7 @@ impl PullSession {
         self.state = PullState {
             time_s: time_s + step_s,
             contact_force_n: motion.contact_force_n,
-            measured_force_n: self.reading(motion.contact_force_n),
+            measured_force_n: self.reading(motion.contact_force_n, time_s + step_s, step_s),
             displacement_m: motion.displacement_m,
             speed_m_per_s: motion.speed_m_per_s,
             sliding: motion.sliding,
@@ -243,11 +267,12 @@ impl PullSession {
 
     /// What the wrist sensor reports for a force: a balance of momentum behind it, weight and inertia of the gripper
     /// compensated, as by a robot that knows its payload.
-    fn reading(&mut self, force_n: f64) -> f64 {
+    fn reading(&mut self, force_n: f64, time_s: f64, step_s: f64) -> f64 {
+        let force_n = self.signals.sensor.read(force_n, time_s, step_s);
         if self.wrist.noise_n == 0.0 {
             return force_n;
         }
-        force_n + self.wrist.noise_n * self.noise.normal()
+        force_n + self.wrist.noise_n * self.signals.noise.normal()
     }
 }
 

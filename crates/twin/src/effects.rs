@@ -1,16 +1,86 @@
 //! The effects library: what a twin may be missing, one file an effect.
 //!
-//! An effect is a pure function on one hook of the simulation, with named parameters that have a unit, a
+//! An effect is a pure function on one or two hooks of the simulation, with named parameters that have a unit, a
 //! neutral value and physical bounds. The simulator and the identification use the same function. At the
 //! neutral values an effect gives bitwise the unmodified result, so taking it out of a twin restores the old
-//! data bit for bit.
+//! data bit for bit. Where an effect needs a scale that cannot be told apart from its other parameters or from
+//! the baseline (the rate at which the coefficient was measured, say), that scale is a parameter too, a
+//! *reference*: it has a documented default and is not fitted.
 
+mod anisotropy;
+mod area_saturation;
+mod asymmetric_jaws;
+mod chain;
+mod conditioning;
+mod contamination;
+mod controller_gain;
+mod deadband;
+mod dwell_ageing;
+mod grip_force_loss;
+mod grip_relaxation;
+mod hooks;
+mod imprint_nonlinearity;
+mod jaw_tilt;
 mod load_offset;
+mod load_power_law;
+mod off_centre;
+mod rate_dependence;
+mod regime_transition;
+mod sensor_bias;
+mod sensor_creep;
+mod sensor_drift;
+mod sensor_gain;
+mod sensor_gain_drift;
+mod sensor_hysteresis;
+mod sensor_lowpass;
+mod sensor_quadratic;
+mod sensor_saturation;
+mod temperature;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod wear;
+
+pub use chain::{CommandChain, SensorChain, imprint_volume_m3, jaw_tilt_rad, normal_force_n};
+pub use hooks::{
+    CommandHook, FrictionHook, GripPoint, ImprintHook, NormalForceHook, SensorHook, SensorMemory,
+    SensorPoint, TiltHook,
+};
 
 use std::fmt;
 
-/// The effects of this version, in the order of their ids.
-pub const LIBRARY: &[&EffectSpec] = &[&load_offset::SPEC];
+/// The effects of this version: friction, gel and jaws, sensor and robot.
+pub const LIBRARY: &[&EffectSpec] = &[
+    &load_offset::SPEC,
+    &load_power_law::SPEC,
+    &area_saturation::SPEC,
+    &regime_transition::SPEC,
+    &rate_dependence::SPEC,
+    &dwell_ageing::SPEC,
+    &anisotropy::SPEC,
+    &contamination::SPEC,
+    &wear::SPEC,
+    &conditioning::SPEC,
+    &temperature::SPEC,
+    &grip_relaxation::SPEC,
+    &imprint_nonlinearity::SPEC,
+    &jaw_tilt::SPEC,
+    &off_centre::SPEC,
+    &asymmetric_jaws::SPEC,
+    &grip_force_loss::SPEC,
+    &sensor_gain::SPEC,
+    &sensor_bias::SPEC,
+    &sensor_drift::SPEC,
+    &sensor_gain_drift::SPEC,
+    &sensor_hysteresis::SPEC,
+    &sensor_quadratic::SPEC,
+    &sensor_saturation::SPEC,
+    &sensor_lowpass::SPEC,
+    &sensor_creep::SPEC,
+    &controller_gain::SPEC,
+    &deadband::SPEC,
+];
 
 /// A parameter of an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,23 +89,13 @@ pub struct ParameterSpec {
     pub name: &'static str,
     /// Unit, `1` for a plain number.
     pub unit: &'static str,
-    /// Value at which the effect does nothing.
+    /// Value where a twin leaves it out. With every parameter at this value the effect does nothing.
     pub neutral: f64,
     /// Smallest and largest physical value.
     pub bounds: (f64, f64),
     /// What it means.
     pub about: &'static str,
 }
-
-/// What a friction hook may look at.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrictionPoint {
-    /// Commanded grip force, per jaw.
-    pub grip_force_n: f64,
-}
-
-/// Changes a friction coefficient: (parameters in the order of the spec, coefficient so far, where) -> new one.
-pub type FrictionHook = fn(&[f64], f64, &FrictionPoint) -> f64;
 
 /// The description of an effect.
 #[derive(Clone, Copy)]
@@ -48,12 +108,48 @@ pub struct EffectSpec {
     pub formula: &'static str,
     /// Where the formula comes from.
     pub source: &'static str,
-    /// Its parameters.
+    /// Its parameters, in twin-file units.
     pub parameters: &'static [ParameterSpec],
+    /// Names of those parameters that are references, not fitted.
+    pub references: &'static [&'static str],
     /// Columns of a pull table that it needs.
     pub covariates: &'static [&'static str],
-    /// The friction hook.
+    /// Acts on the friction coefficient of a jaw.
     pub friction: Option<FrictionHook>,
+    /// Acts on the normal force of a jaw, before imprint, friction and mechanics.
+    pub normal_force: Option<NormalForceHook>,
+    /// Acts on the imprint volume of a jaw.
+    pub imprint_volume: Option<ImprintHook>,
+    /// Acts on the angle of a gel.
+    pub tilt_rad: Option<TiltHook>,
+    /// Acts on the readings of the wrist sensor.
+    pub sensor: Option<SensorHook>,
+    /// Acts on the command of the force loop.
+    pub command: Option<CommandHook>,
+}
+
+impl EffectSpec {
+    /// No name and no hook: what the specs fill in.
+    const BARE: EffectSpec = EffectSpec {
+        id: "",
+        about: "",
+        formula: "",
+        source: "",
+        parameters: &[],
+        references: &[],
+        covariates: &[],
+        friction: None,
+        normal_force: None,
+        imprint_volume: None,
+        tilt_rad: None,
+        sensor: None,
+        command: None,
+    };
+
+    /// Whether the effect is a friction law of the grip force, which can be taken per pressure cell.
+    pub fn is_load_law(&self) -> bool {
+        self.friction.is_some() && self.covariates.contains(&"grip_force_n")
+    }
 }
 
 impl fmt::Debug for EffectSpec {
@@ -88,6 +184,26 @@ pub enum OutsideFit {
     Extrapolate,
 }
 
+/// What a friction law is evaluated for.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum Per {
+    /// Once for a jaw, with its normal force.
+    #[default]
+    Jaw,
+    /// For each pressure cell, with its pressure times a reference area as the force.
+    Cell,
+}
+
+impl Per {
+    /// Whether this is the default.
+    pub(crate) fn is_jaw(&self) -> bool {
+        *self == Per::Jaw
+    }
+}
+
 /// An effect with its parameter values, as it stands in a twin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
@@ -97,10 +213,14 @@ pub struct Effect {
     pub part: Option<String>,
     /// Parameter values in the order of the spec.
     pub values: Vec<f64>,
-    /// Grip forces (per jaw) the values were fitted on.
+    /// Grip forces (commanded, per jaw) the values were fitted on.
     pub fitted_grip_force_n: Option<(f64, f64)>,
     /// What happens outside that range.
     pub outside_fit: OutsideFit,
+    /// What its friction law is evaluated for.
+    pub per: Per,
+    /// Area that turns the pressure of a cell into the force of the law; there with [`Per::Cell`].
+    pub reference_area_m2: Option<f64>,
 }
 
 impl Effect {
@@ -108,36 +228,9 @@ impl Effect {
     pub fn acts_on(&self, part: &str) -> bool {
         self.part.as_deref().is_none_or(|p| p == part)
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ids_and_parameter_names_are_unique_and_neutral_values_lie_inside_the_bounds() {
-        for (i, spec) in LIBRARY.iter().enumerate() {
-            assert!(LIBRARY[i + 1..].iter().all(|other| other.id != spec.id), "{} twice", spec.id);
-            assert_eq!(find(spec.id), Some(*spec));
-            for (j, p) in spec.parameters.iter().enumerate() {
-                assert!(spec.parameters[j + 1..].iter().all(|other| other.name != p.name));
-                assert!(p.bounds.0 <= p.neutral && p.neutral <= p.bounds.1, "{}.{}", spec.id, p.name);
-            }
-        }
-    }
-
-    #[test]
-    fn neutral_parameters_change_nothing_bitwise() {
-        for spec in LIBRARY {
-            let neutral: Vec<f64> = spec.parameters.iter().map(|p| p.neutral).collect();
-            for mu in [0.0, 0.14, 0.168, 1.0 / 3.0, 1.7] {
-                for grip_force_n in [0.1, 5.0, 20.0, 33.3, 80.0] {
-                    if let Some(friction) = spec.friction {
-                        let after = friction(&neutral, mu, &FrictionPoint { grip_force_n });
-                        assert_eq!(after.to_bits(), f64::to_bits(mu), "{} at {grip_force_n} N", spec.id);
-                    }
-                }
-            }
-        }
+    /// Reference area of a law that is evaluated per cell.
+    pub fn cell_area_m2(&self) -> Option<f64> {
+        self.reference_area_m2.filter(|_| self.per == Per::Cell)
     }
 }

@@ -30,7 +30,7 @@ mod sweep;
 mod trace;
 mod twin;
 
-pub use friction::{FrictionError, GripFriction, grip_friction};
+pub use friction::{FrictionError, GripFriction, cell_friction, grip_friction};
 pub use grasp::Grasp;
 pub use image::TactileImage;
 pub use jaw::{Jaw, PerJaw};

@@ -2,7 +2,7 @@
 
 use crate::config::{ConfigError, TwinFile};
 use crate::config::{Feedback, ForceConvention, ImageNoise, Twist};
-use crate::effects::{self, Effect};
+use crate::effects::{self, Effect, EffectSpec, Per};
 use crate::frames::{Pose, pose, rotation_from_fixed_xyz};
 use crate::{Jaw, PerJaw};
 use nalgebra::{Point3, Vector3};
@@ -298,7 +298,8 @@ fn check_effect(file: &TwinFile, index: usize) -> Result<Effect, ConfigError> {
         let error = ConfigError::new(key("part"), format!("the twin has no part `{part}`"));
         return Err(unknown_part_hint(error, part, file.parts.keys()));
     }
-    let fixed = ["part", "fitted_grip_force_n", "outside_fit", "source", "calibration"];
+    let fixed =
+        ["part", "fitted_grip_force_n", "outside_fit", "per", "reference_area_mm2", "source", "calibration"];
     for name in effect.parameters.keys() {
         if spec.parameters.iter().all(|p| p.name != name) {
             let names: Vec<&str> = spec.parameters.iter().map(|p| p.name).chain(fixed).collect();
@@ -333,7 +334,34 @@ fn check_effect(file: &TwinFile, index: usize) -> Result<Effect, ConfigError> {
         values,
         fitted_grip_force_n: effect.fitted_grip_force_n.map(|[low, high]| (low, high)),
         outside_fit: effect.outside_fit,
+        per: effect.per,
+        reference_area_m2: check_reference_area(effect, spec, &key)?,
     })
+}
+
+/// The reference area in m2, there exactly for laws of the grip force that are evaluated per cell.
+fn check_reference_area(
+    effect: &crate::config::EffectFile,
+    spec: &EffectSpec,
+    key: &dyn Fn(&str) -> String,
+) -> Result<Option<f64>, ConfigError> {
+    use crate::config::in_range;
+    let area = key("reference_area_mm2");
+    match (effect.per, effect.reference_area_mm2) {
+        (Per::Cell, _) if !spec.is_load_law() => {
+            let problem =
+                format!("`{}` does not depend on the grip force, it has no value per cell", spec.id);
+            let laws = effects::LIBRARY.iter().filter(|s| s.is_load_law()).map(|s| s.id);
+            let hint = format!("leave it out; per cell there are {}", laws.collect::<Vec<_>>().join(", "));
+            Err(ConfigError::new(key("per"), problem).hint(hint))
+        }
+        (Per::Cell, None) => Err(ConfigError::new(area, "per = \"cell\" needs a reference area")
+            .hint("pressure times this area is the grip force of the law; take the contact area of the fit")),
+        (Per::Cell, Some(mm2)) => Ok(Some(in_range(&area, mm2, 1e-3..=1e5, "mm2")? * 1e-6)),
+        (Per::Jaw, Some(_)) => Err(ConfigError::new(area, "it is used with per = \"cell\" only")
+            .hint("add per = \"cell\" or leave it out")),
+        (Per::Jaw, None) => Ok(None),
+    }
 }
 
 /// Adds the hint for a part name that the twin does not have.

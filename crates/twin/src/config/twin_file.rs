@@ -1,6 +1,6 @@
 //! The structs that mirror `twin.toml`.
 
-use crate::effects::OutsideFit;
+use crate::effects::{OutsideFit, Per};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -274,6 +274,12 @@ pub struct EffectFile {
     /// What happens outside that range.
     #[serde(default)]
     pub outside_fit: OutsideFit,
+    /// Whether a friction law of the grip force is evaluated once for a jaw or for each pressure cell.
+    #[serde(default, skip_serializing_if = "Per::is_jaw")]
+    pub per: Per,
+    /// With `per = "cell"`: pressure times this area is the grip force of the law.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_area_mm2: Option<f64>,
     /// Where the numbers come from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,

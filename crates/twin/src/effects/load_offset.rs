@@ -1,6 +1,7 @@
 //! A constant part of the friction force: adhesion, or a force offset that looks like it.
 
-use super::{EffectSpec, FrictionPoint, ParameterSpec};
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, ParameterSpec};
 
 /// `load_offset`: Wucherer et al. 2023 correct the simulated friction with `mu_corr = mu (a + b / F_G)`, that
 /// is, with a friction force `mu a F_G + mu b`. Negative where `b < -a F_G`.
@@ -27,16 +28,19 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &["grip_force_n"],
     friction: Some(friction),
+    ..EffectSpec::BARE
 };
 
-fn friction(parameters: &[f64], mu: f64, at: &FrictionPoint) -> f64 {
-    let [a, b_n] = parameters else { unreachable!("the spec has two parameters") };
-    mu * (a + b_n / at.grip_force_n)
+fn friction(parameters: &[f64], mu: f64, at: &GripPoint<'_>) -> f64 {
+    let [a, b_n] = values(parameters);
+    mu * (a + b_n / at.positive_force_n())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
 
     /// The paper's table: mu, a, b [N] and the ratios that follow from it at 5, 20 and 80 N.
     #[test]
@@ -48,7 +52,7 @@ mod tests {
             (0.14, 1.10, 10.15, [3.13, 1.6075, 1.2269]),
         ] {
             for (force, ratio) in [5.0, 20.0, 80.0].into_iter().zip(ratios) {
-                let corrected = friction(&[a, b], mu, &FrictionPoint { grip_force_n: force });
+                let corrected = friction(&[a, b], mu, &grip(&Covariates::default(), force));
                 assert!((corrected / mu - ratio).abs() < 1e-3, "b = {b} at {force} N");
             }
         }

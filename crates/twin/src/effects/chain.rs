@@ -1,0 +1,95 @@
+//! The effects of a twin on one part, hook by hook, in the order of the twin.
+
+use super::{CommandHook, Effect, GripPoint, SensorHook, SensorMemory, SensorPoint};
+use crate::{Part, Twin};
+
+fn acting<'a>(twin: &'a Twin, part_name: &'a str) -> impl Iterator<Item = &'a Effect> {
+    twin.effects.iter().filter(move |effect| effect.acts_on(part_name))
+}
+
+/// Real normal force of a jaw that is commanded `at.grip_force_n`, never negative.
+pub fn normal_force_n(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> f64 {
+    acting(twin, part_name).fold(at.grip_force_n, |force_n, effect| match effect.spec.normal_force {
+        Some(hook) => hook(&effect.values, force_n, at).max(0.0),
+        None => force_n,
+    })
+}
+
+/// Imprint volume of a jaw whose real normal force is `force_n`: `V = c F`, then the effects.
+pub fn imprint_volume_m3(twin: &Twin, part_name: &str, part: &Part, force_n: f64) -> f64 {
+    acting(twin, part_name).fold(part.imprint_m3_per_n * force_n, |volume_m3, effect| {
+        effect.spec.imprint_volume.map_or(volume_m3, |hook| hook(&effect.values, volume_m3, force_n))
+    })
+}
+
+/// Angle of a gel about its +x axis, 0 without effects. Positive angles bring its lower edge nearer to the part.
+pub fn jaw_tilt_rad(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> f64 {
+    acting(twin, part_name).fold(0.0, |tilt_rad, effect| {
+        effect.spec.tilt_rad.map_or(tilt_rad, |hook| tilt_rad + hook(&effect.values, at))
+    })
+}
+
+/// The wrist sensor as its effects change it, for one pull. The default reads the true force bit for bit.
+#[derive(Debug, Clone)]
+pub struct SensorChain {
+    stages: Vec<(SensorHook, Vec<f64>, SensorMemory)>,
+    clock_start_s: f64,
+    direction: f64,
+}
+
+impl Default for SensorChain {
+    fn default() -> Self {
+        Self { stages: Vec::new(), clock_start_s: 0.0, direction: 1.0 }
+    }
+}
+
+impl SensorChain {
+    /// The sensor effects on `part_name`, for a pull that starts at `clock_start_s` of the campaign.
+    pub fn new(twin: &Twin, part_name: &str, clock_start_s: f64) -> Self {
+        let stages = acting(twin, part_name)
+            .filter_map(|e| Some((e.spec.sensor?, e.values.clone(), SensorMemory::default())))
+            .collect();
+        Self { stages, clock_start_s, direction: 1.0 }
+    }
+
+    /// For a pull of this sign along the sensor's axis. Forces stay magnitudes along the pull: against the axis
+    /// (-1) a bias lowers the reading that it raises along the axis.
+    #[must_use]
+    pub fn along(mut self, pull_direction: f64) -> Self {
+        self.direction = if pull_direction < 0.0 { -1.0 } else { 1.0 };
+        self
+    }
+
+    /// Whether it reads the true force as it is.
+    pub fn is_identity(&self) -> bool {
+        self.stages.is_empty()
+    }
+
+    /// The reading of a true force at `time_s` since the start of the pull, `step_s` after the one before.
+    pub fn read(&mut self, true_n: f64, time_s: f64, step_s: f64) -> f64 {
+        let at = SensorPoint { clock_s: self.clock_start_s + time_s, step_s };
+        let read = self.stages.iter_mut().fold(self.direction * true_n, |force_n, (hook, values, memory)| {
+            hook(values, force_n, memory, &at)
+        });
+        self.direction * read
+    }
+}
+
+/// The command of the force loop as its effects change it. The default passes the desired force bit for bit.
+#[derive(Debug, Clone, Default)]
+pub struct CommandChain {
+    stages: Vec<(CommandHook, Vec<f64>)>,
+}
+
+impl CommandChain {
+    /// The command effects on `part_name`.
+    pub fn new(twin: &Twin, part_name: &str) -> Self {
+        let stages = acting(twin, part_name).filter_map(|e| Some((e.spec.command?, e.values.clone())));
+        Self { stages: stages.collect() }
+    }
+
+    /// What the force loop is told when it measures `measured_n`.
+    pub fn apply(&self, desired_n: f64, measured_n: f64) -> f64 {
+        self.stages.iter().fold(desired_n, |force_n, (hook, values)| hook(values, force_n, measured_n))
+    }
+}

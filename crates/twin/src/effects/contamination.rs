@@ -1,0 +1,53 @@
+//! Oil, dust or wear particles between part and gel, from one pull on.
+
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, ParameterSpec};
+
+/// `contamination`: the coefficient steps at a pull. A negative drop is a cleaning.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "contamination",
+    about: "friction coefficient that steps at one pull",
+    formula: "mu' = mu (1 - drop) from pull at_pull_index on",
+    source: "third bodies take 10 to 60 % of the friction, until they are cleaned off",
+    parameters: &[
+        ParameterSpec {
+            name: "drop",
+            unit: "1",
+            neutral: 0.0,
+            bounds: (-1.5, 0.9),
+            about: "share of the coefficient that is lost",
+        },
+        ParameterSpec {
+            name: "at_pull_index",
+            unit: "1",
+            neutral: 0.0,
+            bounds: (0.0, 1e7),
+            about: "first pull with it",
+        },
+    ],
+    covariates: &["pull_index"],
+    friction: Some(friction),
+    ..EffectSpec::BARE
+};
+
+fn friction(parameters: &[f64], mu: f64, at: &GripPoint<'_>) -> f64 {
+    let [drop, at_pull_index] = values(parameters);
+    if (at.covariates.pull_index as f64) < at_pull_index { mu } else { mu * (1.0 - drop) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
+
+    #[test]
+    fn nothing_before_the_pull_and_all_of_it_from_there_on() {
+        let mu = |pull_index| {
+            let c = Covariates { pull_index, ..Default::default() };
+            friction(&[0.25, 40.0], 0.2, &grip(&c, 40.0))
+        };
+        assert_eq!([mu(0), mu(39)], [0.2, 0.2]);
+        assert!((mu(40) - 0.15).abs() < 1e-15 && mu(40) == mu(4000));
+    }
+}

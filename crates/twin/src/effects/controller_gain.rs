@@ -1,0 +1,36 @@
+//! A force loop that settles at a multiple of its command.
+
+use super::hooks::values;
+use super::{EffectSpec, ParameterSpec};
+
+/// `controller_gain`: the loop follows a share of the desired force.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "controller_gain",
+    about: "factor on the force that the force loop goes for",
+    formula: "F_cmd = gain F_des",
+    source: "UR5e set to 10 N gave 8.95 to 13.26 N over its workspace (Trochimczuk et al. 2026)",
+    parameters: &[ParameterSpec {
+        name: "gain",
+        unit: "1",
+        neutral: 1.0,
+        bounds: (0.5, 1.5),
+        about: "settled over desired force",
+    }],
+    command: Some(command),
+    ..EffectSpec::BARE
+};
+
+fn command(parameters: &[f64], desired_n: f64, _: f64) -> f64 {
+    let [gain] = values(parameters);
+    gain * desired_n
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gap_between_desired_and_commanded_force_grows_with_the_force() {
+        assert_eq!([10.0, 20.0, 40.0].map(|f| f - command(&[0.75], f, 3.0)), [2.5, 5.0, 10.0]);
+    }
+}

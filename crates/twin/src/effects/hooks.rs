@@ -1,0 +1,82 @@
+//! Where an effect acts, and what it may look at there.
+
+use crate::{Covariates, Jaw};
+
+/// Smallest grip force a law is evaluated at, so that `1 / F` and `ln F` stay finite without contact.
+const SMALLEST_FORCE_N: f64 = 1e-6;
+
+/// One jaw of one grip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GripPoint<'a> {
+    /// Which jaw.
+    pub jaw: Jaw,
+    /// Grip force, per jaw: the commanded one where the twin is asked, the real normal force inside a friction
+    /// hook.
+    pub grip_force_n: f64,
+    /// Area in contact; 0 where it is not known.
+    pub contact_area_m2: f64,
+    /// Mean rate of the pull: increment over step time.
+    pub pull_rate_n_per_s: f64,
+    /// Circumstances of the pull.
+    pub covariates: &'a Covariates,
+}
+
+impl GripPoint<'_> {
+    /// The grip force, never 0.
+    pub(super) fn positive_force_n(&self) -> f64 {
+        positive(self.grip_force_n)
+    }
+}
+
+pub(super) fn positive(force_n: f64) -> f64 {
+    force_n.max(SMALLEST_FORCE_N)
+}
+
+/// When a sensor is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SensorPoint {
+    /// Time of the campaign: that of the pull's start plus the time since then.
+    pub clock_s: f64,
+    /// Time since the reading before.
+    pub step_s: f64,
+}
+
+/// What one sensor effect remembers between two readings. Starts as its default.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SensorMemory {
+    /// A reading was made.
+    pub started: bool,
+    /// Input of the reading before.
+    pub previous_n: f64,
+    /// Inner state; each effect says what it is.
+    pub state: f64,
+}
+
+/// Changes a friction coefficient: (parameters in the order of the spec, coefficient so far, where) -> new one.
+/// It may be negative; the caller decides what that means.
+pub type FrictionHook = fn(&[f64], f64, &GripPoint<'_>) -> f64;
+
+/// Changes the normal force of a jaw: (parameters, force so far in N, where) -> new one in N.
+pub type NormalForceHook = fn(&[f64], f64, &GripPoint<'_>) -> f64;
+
+/// Changes the imprint volume: (parameters, volume so far in m3, normal force of the jaw in N) -> new one in m3.
+pub type ImprintHook = fn(&[f64], f64, f64) -> f64;
+
+/// Turns a gel about its +x axis: (parameters, where) -> angle in rad. Positive angles bring its lower edge
+/// nearer to the part.
+pub type TiltHook = fn(&[f64], &GripPoint<'_>) -> f64;
+
+/// Changes a reading of the wrist sensor: (parameters, force so far in N, memory, when) -> new one in N.
+pub type SensorHook = fn(&[f64], f64, &mut SensorMemory, &SensorPoint) -> f64;
+
+/// Changes the command of the force loop: (parameters, desired force in N, measured force in N) -> force in N
+/// that the loop closes on.
+pub type CommandHook = fn(&[f64], f64, f64) -> f64;
+
+/// The parameters of a spec by position.
+pub(super) fn values<const N: usize>(parameters: &[f64]) -> [f64; N] {
+    match parameters.try_into() {
+        Ok(values) => values,
+        Err(_) => panic!("the spec has {N} parameters, {} were given", parameters.len()),
+    }
+}

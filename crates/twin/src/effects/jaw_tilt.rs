@@ -1,0 +1,75 @@
+//! Jaws that are not parallel: the grip is a wedge.
+
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, ParameterSpec};
+
+/// Largest coefficient of a wedge that locks.
+const LOCKED_MU: f64 = 100.0;
+
+/// `jaw_tilt`: on a tilted jaw part of the normal force acts along the pull. It helps one direction and hinders
+/// the other: the weaker one reaches 0 at `tan th = mu`, the stronger one locks at `tan th = 1 / mu` (the
+/// coefficient then is a large finite one). Positive tilt turns both gels about their +x axis, lower edge nearer to
+/// the part, and makes an upward pull harder.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "jaw_tilt",
+    about: "wedge angle of the jaws",
+    formula: "mu' = (mu + s tan(tilt_deg)) / (1 - s mu tan(tilt_deg)), s = pull_direction",
+    source: "statics of a wedge; 3 deg change a coefficient of 0.15 by 35 %",
+    parameters: &[ParameterSpec {
+        name: "tilt_deg",
+        unit: "deg",
+        neutral: 0.0,
+        bounds: (-10.0, 10.0),
+        about: "angle of each jaw against the jaw axis' normal plane",
+    }],
+    covariates: &["pull_direction"],
+    friction: Some(friction),
+    tilt_rad: Some(tilt_rad),
+    ..EffectSpec::BARE
+};
+
+fn friction(parameters: &[f64], mu: f64, at: &GripPoint<'_>) -> f64 {
+    let slope = at.covariates.pull_direction * libm::tan(tilt_rad(parameters, at));
+    let (along, across) = (mu + slope, 1.0 - mu * slope);
+    if along <= 0.0 {
+        0.0
+    } else if along >= LOCKED_MU * across {
+        LOCKED_MU
+    } else {
+        along / across
+    }
+}
+
+fn tilt_rad(parameters: &[f64], _: &GripPoint<'_>) -> f64 {
+    let [tilt_deg] = values(parameters);
+    tilt_deg.to_radians()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
+
+    fn mu(tilt_deg: f64, mu: f64, pull_direction: f64) -> f64 {
+        let c = Covariates { pull_direction, ..Default::default() };
+        friction(&[tilt_deg], mu, &grip(&c, 40.0))
+    }
+
+    /// The angle of friction adds to the angle of the wedge.
+    #[test]
+    fn friction_angles_add_and_reverse_with_the_pull() {
+        for tilt_deg in [-3.0, 1.0, 3.0] {
+            let angle = 0.15_f64.atan() + f64::to_radians(tilt_deg);
+            assert!((mu(tilt_deg, 0.15, 1.0) - angle.tan()).abs() < 1e-12);
+            assert_eq!(mu(tilt_deg, 0.15, 1.0), mu(-tilt_deg, 0.15, -1.0));
+        }
+        assert!((mu(3.0, 0.15, 1.0) / 0.15 - 1.36).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_steep_wedge_slides_by_itself_one_way_and_locks_the_other_way() {
+        assert_eq!(mu(-10.0, 0.15, 1.0), 0.0, "tan 10 deg > 0.15");
+        assert_eq!(mu(10.0, 6.0, 1.0), LOCKED_MU, "tan 10 deg > 1 / 6");
+    }
+}

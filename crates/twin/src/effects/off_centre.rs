@@ -1,0 +1,47 @@
+//! A grip beside the pull line: part of the friction holds the moment.
+
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, ParameterSpec};
+
+/// `off_centre`: on the elliptic limit surface `(F / F0)^2 + (M / M0)^2 = 1` a force with the lever `x` slips at
+/// `F0 / sqrt(1 + (x / m)^2)`, `m = M0 / F0`. The parameter is the inverse of `m`, so that 0 means no fall.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "off_centre",
+    about: "friction that falls with the lever between grip and pull line",
+    formula: "mu' = mu / sqrt(1 + (inverse_lever_per_mm grip_offset)^2)",
+    source: "elliptic limit surface; m = 0.6 to 0.67 times the contact radius. Xydas and Kao 1999",
+    parameters: &[ParameterSpec {
+        name: "inverse_lever_per_mm",
+        unit: "1/mm",
+        neutral: 0.0,
+        bounds: (0.0, 2.0),
+        about: "inverse of the lever at which the friction has fallen to 71 %",
+    }],
+    covariates: &["grip_offset_mm"],
+    friction: Some(friction),
+    ..EffectSpec::BARE
+};
+
+fn friction(parameters: &[f64], mu: f64, at: &GripPoint<'_>) -> f64 {
+    let [inverse_lever_per_mm] = values(parameters);
+    let share = 1e3 * inverse_lever_per_mm * at.covariates.grip_offset_m;
+    mu / (1.0 + share * share).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
+
+    #[test]
+    fn the_limit_surface_is_met_at_every_lever_on_both_sides() {
+        for offset_mm in [-12.0, -3.0, 0.0, 0.5, 4.0, 20.0] {
+            let c = Covariates { grip_offset_m: offset_mm * 1e-3, ..Default::default() };
+            // F0 = 1 and M0 = 4 mm.
+            let force = friction(&[0.25], 1.0, &grip(&c, 40.0));
+            let moment = force * offset_mm;
+            assert!((force.powi(2) + (moment / 4.0).powi(2) - 1.0).abs() < 1e-12, "{offset_mm} mm");
+        }
+    }
+}

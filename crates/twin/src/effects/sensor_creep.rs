@@ -1,0 +1,60 @@
+//! A force sensor that creeps under load.
+
+use super::hooks::{SensorMemory, SensorPoint, values};
+use super::{EffectSpec, ParameterSpec};
+
+/// `sensor_creep`: part of the reading follows the force slowly. Starts settled; the memory's state is the slow
+/// force.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "sensor_creep",
+    about: "measured force that goes on rising under constant load",
+    formula: "F_m = F + fraction F_slow, tau_s dF_slow/dt = F - F_slow",
+    source: "one term of viscoelastic creep of the sensor's body",
+    parameters: &[
+        ParameterSpec {
+            name: "fraction",
+            unit: "1",
+            neutral: 0.0,
+            bounds: (-0.6, 1.5),
+            about: "creep in the end over the first reading of a load",
+        },
+        ParameterSpec {
+            name: "tau_s",
+            unit: "s",
+            neutral: 10.0,
+            bounds: (0.1, 3600.0),
+            about: "time after which 63 % of it are there",
+        },
+    ],
+    sensor: Some(sensor),
+    ..EffectSpec::BARE
+};
+
+fn sensor(parameters: &[f64], true_n: f64, memory: &mut SensorMemory, at: &SensorPoint) -> f64 {
+    let [fraction, tau_s] = values(parameters);
+    if !memory.started {
+        memory.started = true;
+        memory.state = true_n;
+    }
+    memory.state -= libm::expm1(-at.step_s / tau_s) * (true_n - memory.state);
+    if fraction == 0.0 { true_n } else { true_n + fraction * memory.state }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::testing::readings;
+
+    #[test]
+    fn a_held_load_creeps_by_its_fraction_and_the_creep_stays_when_it_is_gone() {
+        let mut forces = vec![20.0; 1101];
+        forces[0] = 0.0;
+        forces.push(0.0);
+        let read = readings(sensor, &[0.05, 10.0], &forces, 0.1);
+        assert!((read[1] - 20.0).abs() < 0.02, "at once the load itself: {}", read[1]);
+        // 20 (1 + 0.05 (1 - 1/e)) after tau
+        assert!((read[100] - 20.632_120_558_8).abs() < 1e-9);
+        assert!((read[1100] - 21.0).abs() < 1e-3);
+        assert!((read[1101] - 0.99).abs() < 1e-3, "1 N exp(-0.01): {}", read[1101]);
+    }
+}

@@ -1,0 +1,37 @@
+//! A force sensor with a wrong gain.
+
+use super::hooks::{SensorMemory, SensorPoint, values};
+use super::{EffectSpec, ParameterSpec};
+
+/// `sensor_gain`: every reading times a factor.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "sensor_gain",
+    about: "factor on the measured force",
+    formula: "F_m = gain F",
+    source: "0.95 to 1.05 is normal; Wucherer et al. 2023 found 0.709 in their simulation",
+    parameters: &[ParameterSpec {
+        name: "gain",
+        unit: "1",
+        neutral: 1.0,
+        bounds: (0.3, 3.0),
+        about: "measured over true force",
+    }],
+    sensor: Some(sensor),
+    ..EffectSpec::BARE
+};
+
+fn sensor(parameters: &[f64], true_n: f64, _: &mut SensorMemory, _: &SensorPoint) -> f64 {
+    let [gain] = values(parameters);
+    gain * true_n
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::testing::readings;
+
+    #[test]
+    fn readings_are_proportional() {
+        assert_eq!(readings(sensor, &[0.75], &[0.0, 8.0, -4.0], 0.002), [0.0, 6.0, -3.0]);
+    }
+}

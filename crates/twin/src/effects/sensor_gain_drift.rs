@@ -1,0 +1,38 @@
+//! A force sensor whose gain wanders with the clock.
+
+use super::hooks::{SensorMemory, SensorPoint, values};
+use super::{EffectSpec, ParameterSpec};
+
+/// `sensor_gain_drift`: a gain that leaves 1 linearly from the start of the campaign on.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "sensor_gain_drift",
+    about: "factor on the measured force that changes with time",
+    formula: "F_m = F (1 + rate_per_h t)",
+    source: "first order of a drifting gain; warm-up of the sensor's electronics",
+    parameters: &[ParameterSpec {
+        name: "rate_per_h",
+        unit: "1/h",
+        neutral: 0.0,
+        bounds: (-1.0, 1.0),
+        about: "change of the gain in an hour",
+    }],
+    covariates: &["time_s"],
+    sensor: Some(sensor),
+    ..EffectSpec::BARE
+};
+
+fn sensor(parameters: &[f64], true_n: f64, _: &mut SensorMemory, at: &SensorPoint) -> f64 {
+    let [rate_per_h] = values(parameters);
+    true_n * (1.0 + rate_per_h * (at.clock_s / 3600.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::testing::readings;
+
+    #[test]
+    fn the_gain_moves_by_the_rate_every_hour_and_the_zero_stays() {
+        assert_eq!(readings(sensor, &[-0.25], &[8.0, 8.0, 8.0, 0.0], 3600.0), [8.0, 6.0, 4.0, 0.0]);
+    }
+}

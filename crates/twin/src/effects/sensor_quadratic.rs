@@ -1,0 +1,43 @@
+//! A force sensor whose line is bent.
+
+use super::hooks::{SensorMemory, SensorPoint, values};
+use super::{EffectSpec, ParameterSpec};
+
+/// `sensor_quadratic`: the second term of the sensor's curve.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "sensor_quadratic",
+    about: "measured force with a quadratic term",
+    formula: "F_m = F + quadratic_per_n F^2",
+    source: "non-linearity of load cells, 0.5 to 3 % of the range",
+    parameters: &[ParameterSpec {
+        name: "quadratic_per_n",
+        unit: "1/N",
+        neutral: 0.0,
+        bounds: (-0.01, 0.01),
+        about: "relative change of the gain for a newton",
+    }],
+    sensor: Some(sensor),
+    ..EffectSpec::BARE
+};
+
+fn sensor(parameters: &[f64], true_n: f64, _: &mut SensorMemory, _: &SensorPoint) -> f64 {
+    let [quadratic_per_n] = values(parameters);
+    true_n * (1.0 + quadratic_per_n * true_n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::testing::readings;
+
+    #[test]
+    fn the_second_difference_is_constant_and_small_loads_read_right() {
+        let forces: Vec<f64> = (0..9).map(|i| f64::from(i) * 5.0).collect();
+        let read = readings(sensor, &[0.001], &forces, 0.002);
+        assert!((read[8] - 41.6).abs() < 1e-12, "40 + 0.001 x 1600");
+        for three in read.windows(3) {
+            // 2 q (5 N)^2
+            assert!((three[2] - 2.0 * three[1] + three[0] - 0.05).abs() < 1e-12);
+        }
+    }
+}
