@@ -10,8 +10,8 @@ use gripgen_twin::config::{ConfigError, ImageStorage, Mechanics, TraceStorage};
 use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample, Scenario, Twin,
-    cell_friction, slip_label,
+    FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample,
+    Scenario, Twin, cell_friction, slip_label,
 };
 use std::sync::Arc;
 

@@ -47,7 +47,11 @@ impl Gripped {
         let force_n = PerJaw::try_from_fn(|jaw| {
             let force_n = normal_force_n(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
             let commanded_n = scenario.grip_force_n;
-            if force_n < LEAST_FORCE_N { Err(SampleError::NoForce { jaw, force_n, commanded_n }) } else { Ok(force_n) }
+            if force_n < LEAST_FORCE_N {
+                Err(SampleError::NoForce { jaw, force_n, commanded_n })
+            } else {
+                Ok(force_n)
+            }
         })?;
         let shape = library.shape(part, scenario.grip_pose)?;
         let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, &shape))? else {

@@ -3,7 +3,8 @@
 use crate::common::project;
 use gripgen::tactile::metrics::{mean_squared_error, psnr_db};
 use gripgen::twin::config::{Document, TwinFile};
-use gripgen::twin::{FrictionError, TactileImage, Twin, grip_friction};
+use gripgen::twin::effects::GripPoint;
+use gripgen::twin::{Covariates, FrictionError, Jaw, TactileImage, Twin, grip_friction};
 
 /// The paper prints MSE and PSNR for six image pairs; one determines the other.
 #[test]
@@ -33,6 +34,18 @@ const TABLE: [(&str, f64, f64, f64); 4] = [
     ("roller_bearing", 0.14, 1.10, 10.15),
 ];
 
+/// A grip in the circumstances of the paper.
+fn at(grip_force_n: f64) -> GripPoint<'static> {
+    static COVARIATES: std::sync::LazyLock<Covariates> = std::sync::LazyLock::new(Covariates::default);
+    GripPoint {
+        jaw: Jaw::Left,
+        grip_force_n,
+        contact_area_m2: 1e-4,
+        pull_rate_n_per_s: 1.0 / 0.104,
+        covariates: &COVARIATES,
+    }
+}
+
 #[test]
 fn the_shipped_twin_holds_the_papers_friction_table() {
     let p = project("asset:configs/quickstart.toml", &[]);
@@ -40,7 +53,7 @@ fn the_shipped_twin_holds_the_papers_friction_table() {
         let part = &p.twin.parts[name];
         assert_eq!(part.mu, mu);
         for force in [20.0, 40.0, 80.0] {
-            let found = grip_friction(&p.twin, name, part, force).unwrap();
+            let found = grip_friction(&p.twin, name, part, &at(force)).unwrap();
             assert!((found.mu - mu * (a + b / force)).abs() < 1e-15, "{name} at {force} N");
             assert!(!found.outside_fit);
         }
@@ -52,7 +65,7 @@ fn the_shipped_twin_holds_the_papers_friction_table() {
 fn laws_refuse_hold_or_extrapolate_outside_their_fit() {
     let p = project("asset:configs/quickstart.toml", &[]);
     let gear = &p.twin.parts["gear"];
-    let error = grip_friction(&p.twin, "gear", gear, 5.0).unwrap_err();
+    let error = grip_friction(&p.twin, "gear", gear, &at(5.0)).unwrap_err();
     assert!(matches!(error, FrictionError::OutsideFit { .. }));
     for part in ["5 N", "20..=80 N", "`gear`"] {
         assert!(error.to_string().contains(part), "{error}");
@@ -62,7 +75,7 @@ fn laws_refuse_hold_or_extrapolate_outside_their_fit() {
             "asset:configs/quickstart.toml",
             &[&format!("effects.load_offset.gear.outside_fit={outside}")],
         );
-        grip_friction(&p.twin, "gear", &p.twin.parts["gear"], 5.0)
+        grip_friction(&p.twin, "gear", &p.twin.parts["gear"], &at(5.0))
     };
     let held = with("hold").unwrap();
     assert!((held.mu - 0.15 * (1.36 - 12.15 / 20.0)).abs() < 1e-15 && held.outside_fit);
@@ -76,6 +89,6 @@ fn laws_refuse_hold_or_extrapolate_outside_their_fit() {
         std::fs::read_to_string(crate::common::root().join("assets/configs/twin-baseline.toml")).unwrap();
     document.fill_from(&baseline.parse().unwrap(), gripgen::twin::DEFAULTED_SECTIONS);
     let twin = Twin::new(&document.read::<TwinFile>().unwrap()).unwrap();
-    let error = grip_friction(&twin, "gear", &twin.parts["gear"], 5.0).unwrap_err();
+    let error = grip_friction(&twin, "gear", &twin.parts["gear"], &at(5.0)).unwrap_err();
     assert!(error.to_string().contains("-0.1605"), "{error}");
 }

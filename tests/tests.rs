@@ -8,6 +8,8 @@ mod common;
 mod config;
 // The same bytes for any number of threads, slices, vector units, and after an interruption.
 mod determinism;
+// Effects of the library, through the whole pipeline.
+mod effects;
 // Two mechanics, one result.
 mod mechanics;
 // Numbers that Wucherer et al. 2023 print.

@@ -1,0 +1,178 @@
+//! Effects of the library, through the whole pipeline and in both mechanics.
+
+use gripgen::tactile::SimdLevel;
+use gripgen::twin::effects::LIBRARY;
+use gripgen::twin::{Outcome, Pulled};
+use gripgen::{Location, Project, generate};
+
+/// A quiet twin of the gear with these effects, gripped with 40 N on its faces.
+fn project(effects: &str, mechanics: &str, vary: &str, images: &str) -> Project {
+    let folder = tempfile::tempdir().unwrap();
+    let twin = format!(
+        "[parts.gear]\nmesh = \"asset:parts/gear/part.stl\"\nmu = 0.2\nimprint_mm3_per_n = 1.5\n\
+         [[parts.gear.grips]]\norientation_deg = [0.0, 0.0, 90.0]\n[wrist]\nnoise_n = 0.0\n{effects}"
+    );
+    let sweep = format!(
+        "twin = \"twin.toml\"\nsamples = 1\nimages = \"{images}\"\nmechanics = \"{mechanics}\"\n\
+         [vary]\ngrip_force_n = [40]\n{vary}"
+    );
+    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
+    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
+    let at = Location::Disk(folder.path().join("sweep.toml"));
+    Project::load(&at, &[]).unwrap_or_else(|e| panic!("{effects}: {e}"))
+}
+
+fn pulled(project: &Project) -> Box<Pulled> {
+    match generate(project, 0, SimdLevel::best()).outcome {
+        Outcome::Pulled(pulled) => pulled,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn peak_n(p: &Pulled) -> f64 {
+    p.trace.measured_force_n.iter().fold(0.0, |a, &b| a.max(b))
+}
+
+/// Circumstances in which no effect is at its reference.
+const ELSEWHERE: &str = "dwell_s = [30]\npull_index = [100]\ntime_s = [3600]\ntemperature_c = [30]\n\
+                         grip_offset_mm = [3]\ngrip_angle_deg = [20]\n";
+
+/// A twin with every effect at its neutral values is the twin without, bit for bit: taking an entry out of a twin
+/// restores the old data.
+#[test]
+fn neutral_effects_change_no_bit_of_a_sample() {
+    let all: String = LIBRARY
+        .iter()
+        .map(|spec| {
+            let values: String =
+                spec.parameters.iter().map(|p| format!("{} = {:?}\n", p.name, p.neutral)).collect();
+            format!("[[effects]]\nname = \"{}\"\n{values}", spec.id)
+        })
+        .collect();
+    for mechanics in ["rapier", "reduced"] {
+        let with = pulled(&project(&all, mechanics, ELSEWHERE, "png"));
+        let without = pulled(&project("", mechanics, ELSEWHERE, "png"));
+        assert!(with == without, "{mechanics}");
+    }
+}
+
+/// Each effect with a size: by what factor, or by how many newtons, it moves the largest measured force of a pull that
+/// slips at 16 N without it. The numbers follow from the formulas by hand.
+#[test]
+fn every_effect_moves_the_force_by_what_its_formula_says() {
+    let e = std::f64::consts::E;
+    let cases: &[(&str, &str, &str, f64, f64)] = &[
+        ("load_offset", "a = 1.1\nb_n = -4.0", "", 1.0, 0.0),
+        ("load_power_law", "n = -0.333333333333333\nf_ref_n = 5.0", "", 0.5, 0.0),
+        ("area_saturation", "saturation_per_n = 0.025", "", 0.5, 0.0),
+        ("regime_transition", "step = 0.3\nf_c_n = 15.0\nwidth_n = 1.0", "", 1.3, 0.0),
+        ("rate_dependence", "k = 0.1\nr0_n_per_s = 1.0", "", 1.0 + 0.1 * (1.0f64 / 0.104).ln(), 0.0),
+        ("dwell_ageing", "beta = 0.05\nt0_s = 1.0", "dwell_s = [100]", 1.0 + 0.05 * 101.0f64.ln(), 0.0),
+        ("anisotropy", "amplitude = 0.2\naxis_deg = 0.0", "grip_angle_deg = [90]", 0.8, 0.0),
+        ("contamination", "drop = 0.4\nat_pull_index = 50.0", "pull_index = [50]", 0.6, 0.0),
+        ("wear", "depth = 0.3\nn0 = 100.0", "pull_index = [100]", 1.0 - 0.3 * (1.0 - 1.0 / e), 0.0),
+        ("temperature", "k_per_k = 0.02\nt0_c = 23.0", "temperature_c = [33]", (-0.2f64).exp(), 0.0),
+        ("grip_relaxation", "depth = 0.2\ntau_s = 10.0", "dwell_s = [10]", 1.0 - 0.2 * (1.0 - 1.0 / e), 0.0),
+        (
+            "jaw_tilt",
+            "tilt_deg = 2.0",
+            "",
+            {
+                let t = 2f64.to_radians().tan();
+                (0.2 + t) / (1.0 - 0.2 * t) / 0.2
+            },
+            0.0,
+        ),
+        ("grip_force_loss", "loss_n = 4.0", "", 0.9, 0.0),
+        ("sensor_gain", "gain = 1.2", "", 1.2, 0.0),
+        ("sensor_bias", "bias_n = 0.7", "", 1.0, 0.7),
+        ("sensor_drift", "rate_n_per_h = 2.0", "time_s = [1800]", 1.0, 1.0),
+        ("sensor_gain_drift", "rate_per_h = 0.1", "time_s = [7200]", 1.2, 0.0),
+        ("sensor_quadratic", "quadratic_per_n = 0.01", "", 1.16, 0.0),
+        ("sensor_saturation", "limit_n = 9.0", "", 9.0 / 16.0, 0.0),
+    ];
+    for mechanics in ["rapier", "reduced"] {
+        let plain = peak_n(&pulled(&project("", mechanics, "", "none")));
+        assert!((plain / 16.0 - 1.0).abs() < 1e-3, "{mechanics}: {plain}");
+        for (name, values, vary, factor, offset_n) in cases {
+            let effect = format!("[[effects]]\nname = \"{name}\"\n{values}\n");
+            let peak = peak_n(&pulled(&project(&effect, mechanics, vary, "none")));
+            let expected = 16.0 * factor + offset_n;
+            assert!(
+                (peak / expected - 1.0).abs() < 3e-3,
+                "{mechanics}, {name}: {peak} N, expected {expected} N"
+            );
+        }
+    }
+}
+
+/// The others show where the force does not tell: in the trace before slip, in one jaw, in the imprint.
+#[test]
+fn effects_that_show_elsewhere_do() {
+    for mechanics in ["rapier", "reduced"] {
+        // With a force loop that does not see its sensor, a sensor effect stays in the reading.
+        let robot = "[robot]\nfeedback = \"independent\"\n";
+        let run =
+            |effect: &str, vary: &str| pulled(&project(&format!("{effect}{robot}"), mechanics, vary, "none"));
+        let plain = run("", "");
+        let at = |p: &Pulled, time_s: f64| p.trace.measured_force_n[(time_s * 500.0) as usize];
+        let effect = |name: &str, values: &str| format!("[[effects]]\nname = \"{name}\"\n{values}\n");
+
+        let slow = run(&effect("sensor_lowpass", "tau_s = 0.05"), "");
+        assert!(at(&slow, 1.0) < at(&plain, 1.0) - 0.3, "a low-pass lags behind a ramp");
+        let creep = run(&effect("sensor_creep", "fraction = 0.1\ntau_s = 1.0"), "");
+        assert!(at(&creep, 1.3) != at(&plain, 1.3));
+        let loop_ = run(&effect("sensor_hysteresis", "amplitude_n = 0.5\nforce_scale_n = 2.0"), "");
+        assert!((at(&loop_, 1.3) - at(&plain, 1.3)).abs() > 0.3);
+        let gain = run(&effect("controller_gain", "gain = 0.9"), "");
+        assert!(
+            (at(&gain, 1.3) / at(&plain, 1.3) - 0.9).abs() < 0.02,
+            "{} {}",
+            at(&gain, 1.3),
+            at(&plain, 1.3)
+        );
+        let seen = |effect: &str| pulled(&project(effect, mechanics, "", "none"));
+        let band = seen(&effect("deadband", "width_n = 2.0"));
+        let behind = at(&seen(""), 1.3) - at(&band, 1.3);
+        assert!((0.5..2.0).contains(&behind), "the loop stays behind by up to its dead band: {behind} N");
+
+        let unequal = run(&effect("asymmetric_jaws", "asymmetry = 0.2"), "");
+        assert!((peak_n(&unequal) / peak_n(&plain) - 1.0).abs() < 2e-3, "what one jaw gains the other loses");
+        let deep = run(&effect("imprint_nonlinearity", "exponent = 1.3\nf_ref_n = 20.0"), "");
+        let volume = |p: &Pulled| p.imprint.left.press_depth_m;
+        assert!(
+            volume(&deep) > volume(&plain),
+            "above the reference force an exponent over 1 presses deeper"
+        );
+        assert_eq!(peak_n(&deep), peak_n(&plain), "and changes no friction");
+        let tilted = run(&effect("jaw_tilt", "tilt_deg = 1.0"), "");
+        let centre = |p: &Pulled| p.imprint.left.patch.centre_m().1;
+        assert!(centre(&tilted) > centre(&plain) + 1e-4, "the lower edge presses harder");
+        let new = run(&effect("conditioning", "depth = 0.3\nn0 = 5.0"), "pull_index = [0]");
+        let run_in = run(&effect("conditioning", "depth = 0.3\nn0 = 5.0"), "pull_index = [60]");
+        assert!(peak_n(&new) < 0.75 * peak_n(&run_in) && (peak_n(&run_in) / 16.0 - 1.0).abs() < 3e-3);
+        let beside = run(&effect("off_centre", "inverse_lever_per_mm = 0.25"), "grip_offset_mm = [4]");
+        assert!((peak_n(&beside) / 16.0 - 0.5f64.sqrt()).abs() < 3e-3, "{}", peak_n(&beside));
+    }
+}
+
+/// A law per cell sees the pressure: with the same grip force a sharp contact holds less than a flat one if friction
+/// falls with pressure.
+#[test]
+fn a_law_per_cell_sees_the_pressure() {
+    for mechanics in ["rapier", "reduced"] {
+        let peak = |per: &str, angle: &str| {
+            let effect = format!("[[effects]]\nname = \"load_power_law\"\nn = -0.3\nf_ref_n = 40.0\n{per}\n");
+            let p = project(&effect, mechanics, angle, "none");
+            peak_n(&pulled(&p))
+        };
+        let jaw = peak("", "");
+        assert!(
+            (jaw / 16.0 - 1.0).abs() < 2e-3,
+            "at the reference force the law per jaw does nothing: {jaw}"
+        );
+        let small = peak("per = \"cell\"\nreference_area_mm2 = 100.0", "");
+        let large = peak("per = \"cell\"\nreference_area_mm2 = 400.0", "");
+        assert!(small > large * 1.3, "{small} N and {large} N");
+    }
+}
