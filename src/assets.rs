@@ -13,6 +13,8 @@ macro_rules! embedded {
 static FILES: &[(&str, &[u8])] = embedded![
     "configs/paper.toml",
     "configs/quickstart.toml",
+    "configs/large.toml",
+    "configs/twin-large.toml",
     "configs/twin-baseline.toml",
     "configs/twin.toml",
     "parts/ball_bearing/part.stl",

@@ -10,6 +10,8 @@ mod config;
 mod determinism;
 // Effects of the library, through the whole pipeline.
 mod effects;
+// What the large set can teach.
+mod large;
 // Two mechanics, one result.
 mod mechanics;
 // Numbers that Wucherer et al. 2023 print.
