@@ -177,6 +177,7 @@ fn pull(
         images,
         mu: mean_mu(&law, force_n) * scatter,
         outside_fit: law.left.outside_fit || law.right.outside_fit,
+        lag_exceeds_tolerance: lag_exceeds_tolerance(twin, scenario),
         trace: result.trace,
         label,
     })))
@@ -192,6 +193,13 @@ pub fn press_only(
     let options = SimulateOptions { mechanics, images: false, trace: false, level: SimdLevel::best() };
     let Gripped { sensors, contact } = Gripped::new(twin, library, scenario, options)?;
     Ok(contact.map(|c| Press { imprint: c.imprint, sensors }))
+}
+
+/// Whether the steady lag error of the force loop, `dF / dt (tau + T)`, is more than half the label tolerance.
+fn lag_exceeds_tolerance(twin: &Twin, scenario: &Scenario) -> bool {
+    let pull = &scenario.pull;
+    let trails_n = pull.increment_n / pull.step_s * (twin.robot.lag_s + twin.robot.dead_time_s);
+    trails_n > 0.5 * pull.label_tolerance_n
 }
 
 /// Friction coefficient of both jaws together.

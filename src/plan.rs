@@ -35,6 +35,8 @@ pub struct Probe {
     pub status: Status,
     /// Why, if it failed.
     pub failure: Option<String>,
+    /// Whether the force loop lags beyond half the label tolerance.
+    pub lag_exceeds_tolerance: bool,
 }
 
 /// Tries out a few samples spread over the sweep and extrapolates. Writes nothing.
@@ -53,11 +55,13 @@ pub fn plan(project: &Project, simd: SimdLevel) -> Result<Plan, PictureError> {
             + encoded.images.as_ref().map_or(0, |both| both.left.len() + both.right.len())
             + encoded.trace.as_ref().map_or(0, Vec::len)
             + encoded.states.iter().map(|s| s.data.len() + 31).sum::<usize>();
-        let failure = match sample.outcome {
-            Outcome::Failed { reason } => Some(reason),
-            _ => None,
-        };
-        tried.push(Probe { index, status: encoded.status, failure });
+        let (mut failure, mut lag_exceeds_tolerance) = (None, false);
+        match sample.outcome {
+            Outcome::Failed { reason } => failure = Some(reason),
+            Outcome::Pulled(pulled) => lag_exceeds_tolerance = pulled.lag_exceeds_tolerance,
+            Outcome::NoContact { .. } => {}
+        }
+        tried.push(Probe { index, status: encoded.status, failure, lag_exceeds_tolerance });
     }
     let share = samples as f64 / probes as f64;
     Ok(Plan {

@@ -242,3 +242,17 @@ fn a_press_through_the_gel_fails_the_sample_with_both_numbers() {
     }
     assert_eq!((sample.scenario.index, sample.scenario.part.as_str()), (1, "gear"));
 }
+
+/// A staircase that climbs faster than the force loop follows is flagged, never refused.
+#[test]
+fn a_lag_beyond_the_label_tolerance_is_flagged() {
+    for (increment_n, flagged) in [("3.0", false), ("3.2", true)] {
+        // 0.05 s of lag at 3.12 N per 0.104 s are 1.5 N, half the tolerance.
+        let p = quiet(&["vary.part=[\"gear\"]", &format!("pull.increment_n={increment_n}")]);
+        assert_eq!(
+            pulled(generate(&p, 0, SimdLevel::best())).lag_exceeds_tolerance,
+            flagged,
+            "{increment_n} N"
+        );
+    }
+}

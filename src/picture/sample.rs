@@ -76,6 +76,9 @@ fn second_line(s: &Sample) -> String {
     if let Some(mu) = s.mu {
         text += &format!(", mu {mu:.4}");
     }
+    if s.lag_exceeds_tolerance {
+        text += ", force loop lags beyond the label tolerance";
+    }
     if s.outside_fit {
         text += ", friction law outside its fitted range";
     }

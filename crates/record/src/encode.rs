@@ -142,6 +142,7 @@ fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sampl
             message.censored = censored;
             message.mu = Some(p.mu);
             message.outside_fit = p.outside_fit;
+            message.lag_exceeds_tolerance = p.lag_exceeds_tolerance;
             let contact = |jaw| {
                 let (force, pose) = (p.grasp.normal_force_n[jaw], &p.grasp.gel_from_part[jaw]);
                 Some(contact_message(force, pose, &p.imprint[jaw]))

@@ -41,6 +41,9 @@ pub struct Pulled {
     pub mu: f64,
     /// A friction law was used outside its fitted range.
     pub outside_fit: bool,
+    /// The force loop trails the staircase by more than half the label tolerance, so that the label rule may take a
+    /// force from before the slip.
+    pub lag_exceeds_tolerance: bool,
     /// The force over time.
     pub trace: PullTrace,
     /// The label.

@@ -29,7 +29,7 @@ pub fn check(
         let probes: Vec<_> = plan
             .probes
             .iter()
-            .map(|p| json!({"index": p.index, "status": status_name(p.status), "failure": p.failure}))
+            .map(|p| json!({"index": p.index, "status": status_name(p.status), "failure": p.failure, "lag_exceeds_tolerance": p.lag_exceeds_tolerance}))
             .collect();
         sink.document(&json!({
             "schema": "gripgen.plan/1",
@@ -47,6 +47,12 @@ pub fn check(
         eprint!("{}", describe(&project, &plan, jobs));
         for probe in &plan.probes {
             let index = probe.index;
+            if probe.lag_exceeds_tolerance {
+                eprintln!(
+                    "warning: sample {index}: the force loop trails the staircase by more than half the label \
+                     tolerance, its label may come before the slip; smaller increments or longer steps help"
+                );
+            }
             match probe.status {
                 Status::Failed => {
                     eprintln!(

@@ -113,6 +113,10 @@ pub struct Sample {
     pub left: ::core::option::Option<JawContact>,
     #[prost(message, optional, tag = "43")]
     pub right: ::core::option::Option<JawContact>,
+    /// The force loop trails the staircase by more than half the label tolerance (increment / step time * (lag + dead
+    /// time)): the label rule may take a force from before the slip.
+    #[prost(bool, tag = "44")]
+    pub lag_exceeds_tolerance: bool,
 }
 /// The force over time, as packed columns of equal length.
 #[derive(Clone, PartialEq, ::prost::Message)]
