@@ -2,12 +2,14 @@
 
 mod canvas;
 mod colours;
+mod paper;
 mod plot;
 mod sample;
 mod scene;
 mod sheet;
 
 pub(crate) use canvas::{Anchor, Canvas, Rgb, TextStyle};
+pub(crate) use paper::paper_picture;
 pub use sample::{PictureSampleError, sample_picture};
 pub(crate) use scene::{Scene, SceneMesh, View};
 pub use sheet::contact_sheet;
