@@ -266,17 +266,20 @@ mod tests {
     #[test]
     fn the_fit_gives_back_a_law_and_states_its_error() {
         let (mu, a, b_n, bias_n) = (0.15, 1.36, -12.15, 0.1);
-        let cells: Vec<Cell> = (4..=16)
-            .map(|i| {
+        let cells = |scatter_n: f64| -> Vec<Cell> {
+            let cell = |i: i32| {
                 let grip_force_n = 5.0 * f64::from(i);
                 let limit = 2.0 * mu * (a * grip_force_n + b_n) + bias_n;
-                Cell { grip_force_n, labels_n: vec![limit - 0.2, limit + 0.2] }
-            })
-            .collect();
-        let fit = offset_fit(mu, &cells, bias_n);
-        assert!((fit.a - a).abs() < 1e-9 && (fit.b_n - b_n).abs() < 1e-9, "{fit:?}");
-        // One cell alone knows a to deviation / sqrt(n) at large F_G; all of them to less than that.
-        assert!(fit.a_error > 0.0 && fit.a_error < 0.2 / (2.0 * mu * 80.0), "{fit:?}");
+                Cell { grip_force_n, labels_n: vec![limit - scatter_n, limit + scatter_n] }
+            };
+            (4..=16).map(cell).collect()
+        };
+        let (wide, narrow) = (offset_fit(mu, &cells(0.2), bias_n), offset_fit(mu, &cells(0.1), bias_n));
+        for fit in [wide, narrow] {
+            assert!((fit.a - a).abs() < 1e-9 && (fit.b_n - b_n).abs() < 1e-9, "{fit:?}");
+        }
+        assert!((wide.a_error / narrow.a_error - 2.0).abs() < 1e-9 && wide.b_error_n > 0.1, "{wide:?}");
+        let cells = cells(0.2);
         let plain = PartCells { name: "gear".into(), mu, cells };
         assert!(error_pct(&plain, a, b_n) < 2.0 && error_pct(&plain, 1.0, 0.0) > 5.0);
     }
