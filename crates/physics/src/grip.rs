@@ -1,5 +1,6 @@
 //! Closing the jaws on a part.
 
+use crate::arm::Arm;
 use crate::rapier_pull::{RapierPull, RapierStart};
 use crate::reduced::ReducedPull;
 use crate::scene::{Rig, build, pad_shape, rapier_pose, vector};
@@ -37,7 +38,9 @@ pub enum Mount {
 pub struct GripSetup<'a> {
     /// What computes grip and pull.
     pub mechanics: Mechanics,
-    /// The arm.
+    /// The arm's body.
+    pub arm: Arm<'a>,
+    /// The arm's force loop.
     pub robot: Robot,
     /// The gripper.
     pub gripper: Gripper,
@@ -218,7 +221,8 @@ fn settle(world: &mut World, rig: &Rig, setup: &GripSetup<'_>) -> Result<(), Gri
     let step_s = setup.wrist.step_s();
     let mut time_s = 0.0;
     loop {
-        rig.close_jaws(world, &setup.grip_force_n, setup.gripper.jaw_mass_kg);
+        let jaws_n = rig.close_jaws(world, &setup.grip_force_n, setup.gripper.jaw_mass_kg);
+        rig.arm.hold(world, jaws_n);
         world.step(step_s, false).map_err(|e| GripError::NotFinite { bodies: e.bodies, time_s })?;
         time_s += step_s;
         if time_s < SETTLE_S.0 {

@@ -9,8 +9,12 @@
 //! as friction on the jaw total. Gel shear is quasi-static and in series with the jaws: the tool moves by
 //! `F / (k_left + k_right)` before anything slips.
 //!
+//! The gripper hangs on a carriage or on a robot arm ([`Arm`]); the arm comes from the text of a URDF ([`ArmModel`]) and
+//! stands in a [`Stance`].
+//!
 //! This crate knows no images and no files.
 
+mod arm;
 mod contact;
 mod force_loop;
 mod grip;
@@ -21,13 +25,20 @@ mod scene;
 mod session;
 mod shape;
 mod staircase;
+mod urdf;
 mod world;
 
+pub use arm::{Arm, ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm, Stance};
 pub use grip::{Grip, GripError, GripSetup, Held, Mount, grip};
 pub use limit_surface::{LimitCell, free_twist_capacity_n};
 pub use session::{Command, FrictionCell, JawFriction, PullError, PullSession, PullState, Signals};
 pub use shape::{PartShape, ShapeError};
 pub use staircase::{StaircaseResult, Until, pull_staircase, staircase_of};
+pub use urdf::UrdfError;
 
 #[cfg(test)]
+mod arm_tests;
+#[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod urdf_tests;

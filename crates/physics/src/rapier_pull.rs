@@ -48,6 +48,7 @@ pub(crate) struct RapierPull {
     kinetic_ratio: PerJaw<f64>,
     start: rapier::Vector,
     momentum_n_s: f64,
+    contact_force_n: f64,
     refresh_contacts: bool,
     sliding: bool,
 }
@@ -58,7 +59,7 @@ impl RapierPull {
         rig.release_part(&mut world);
         let mut pull = Self {
             momentum_n_s: rig.momentum(&world, direction),
-            start: world.bodies[rig.carriage].translation(),
+            start: rig.arm.position(&world),
             world,
             rig,
             jaw_mass_kg: start.jaw_mass_kg,
@@ -68,6 +69,7 @@ impl RapierPull {
             pad_friction: friction.map(|jaw, f| f.limit_n() / start.normal_force_n[jaw]),
             limit_n: friction.left.limit_n() + friction.right.limit_n(),
             kinetic_ratio: friction.map(|_, f| f.kinetic_ratio),
+            contact_force_n: 0.0,
             refresh_contacts: false,
             sliding: false,
         };
@@ -77,30 +79,36 @@ impl RapierPull {
 
     /// Mass that moves along the pull.
     pub(crate) fn mass_kg(&self) -> f64 {
-        let [l, r] = [self.rig.jaws.left, self.rig.jaws.right].map(|h| self.world.bodies[h].mass());
-        self.world.bodies[self.rig.carriage].mass() + l + r
+        self.rig.arm_mass_kg(&self.world, self.direction)
     }
 
-    /// Way of the carriage along the pull.
+    /// Way of the tool along the pull.
     pub(crate) fn position_m(&self) -> f64 {
-        (self.world.bodies[self.rig.carriage].translation() - self.start).dot(self.direction)
+        (self.rig.arm.position(&self.world) - self.start).dot(self.direction)
     }
 
-    /// Applies a force to the carriage for one time step.
+    /// Way of the tool.
+    #[cfg(test)]
+    pub(crate) fn tool_travel_m(&self) -> rapier::Vector {
+        self.rig.arm.position(&self.world) - self.start
+    }
+
+    /// Pulls with a force for one time step.
     ///
     /// The contact force is a balance of momentum: what the arm applied and did not become momentum went into the
-    /// contact. Gel shear is in series: it adds to the way of the carriage.
+    /// contact. Gel shear is in series: it adds to the way of the tool.
     pub(crate) fn advance(&mut self, applied_n: f64, step_s: f64) -> Result<Motion, NotFinite> {
-        self.rig.close_jaws(&mut self.world, &self.grip_force_n, self.jaw_mass_kg);
-        let carriage = &mut self.world.bodies[self.rig.carriage];
-        carriage.reset_forces(false);
-        carriage.add_force(self.direction * applied_n, true);
+        let jaws_n = self.rig.close_jaws(&mut self.world, &self.grip_force_n, self.jaw_mass_kg);
+        let contact_n = self.contact_force_n;
+        self.rig.arm.pull(&mut self.world, self.direction, applied_n, contact_n, jaws_n);
         let refresh = std::mem::take(&mut self.refresh_contacts);
         self.world.step(step_s, refresh)?;
         let momentum = self.rig.momentum(&self.world, self.direction);
         let contact_force_n = applied_n - (momentum - self.momentum_n_s) / step_s;
-        self.momentum_n_s = momentum;
-        let speed_m_per_s = self.world.bodies[self.rig.carriage].linvel().dot(self.direction);
+        self.contact_force_n = contact_force_n;
+        self.rig.arm.follow(&self.world);
+        self.momentum_n_s = self.rig.momentum(&self.world, self.direction);
+        let speed_m_per_s = self.rig.arm.velocity(&self.world).dot(self.direction);
         let sliding = if self.sliding {
             speed_m_per_s.abs() > STICKING_M_PER_S
         } else {

@@ -1,5 +1,6 @@
-//! The bodies of a grip: part, carriage, jaws and pads.
+//! The bodies of a grip: part, arm, jaws and pads.
 
+use crate::arm::ArmRig;
 use crate::contact::{ContactForce, contact_force};
 use crate::grip::{GripSetup, Mount};
 use crate::world::World;
@@ -8,8 +9,8 @@ use gripgen_twin::{Gel, Jaw, PerJaw};
 use nalgebra::Vector3;
 use rapier3d_f64::prelude as rapier;
 use rapier3d_f64::prelude::{
-    CoefficientCombineRule, ColliderBuilder, ColliderHandle, LockedAxes, MassProperties,
-    PrismaticJointBuilder, RigidBodyBuilder, RigidBodyHandle, Shape,
+    CoefficientCombineRule, ColliderBuilder, ColliderHandle, LockedAxes, MassProperties, RigidBodyBuilder,
+    RigidBodyHandle, Shape,
 };
 
 /// Damping of a closing jaw, per jaw mass: a jaw comes to rest within a few hundredths of a second.
@@ -19,11 +20,11 @@ const CLOSING_DAMPING_PER_S: f64 = 100.0;
 const CLOSING_GAP_M: f64 = 0.2e-3;
 
 /// The bodies of the scene.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct Rig {
     part: RigidBodyHandle,
     part_shape: ColliderHandle,
-    pub(crate) carriage: RigidBodyHandle,
+    pub(crate) arm: ArmRig,
     pub(crate) jaws: PerJaw<RigidBodyHandle>,
     pub(crate) pads: PerJaw<ColliderHandle>,
 }
@@ -36,16 +37,19 @@ impl Rig {
         part.set_gravity_scale(1.0, true);
     }
 
-    /// Pushes both jaws inwards.
-    pub(crate) fn close_jaws(&self, world: &mut World, grip_force_n: &PerJaw<f64>, jaw_mass_kg: f64) {
+    /// Pushes both jaws inwards. Returns the sum of the two forces along the jaw axis, for the arm to bear.
+    pub(crate) fn close_jaws(&self, world: &mut World, grip_force_n: &PerJaw<f64>, jaw_mass_kg: f64) -> f64 {
+        let reference = self.arm.jaw_reference_velocity(world);
+        let mut sum = 0.0;
         for (jaw, handle) in self.jaws.iter() {
             let body = &mut world.bodies[*handle];
-            // Relative to the carriage, whose motion has no component along the jaws.
-            let damping = CLOSING_DAMPING_PER_S * jaw_mass_kg * body.linvel().y;
+            let damping = CLOSING_DAMPING_PER_S * jaw_mass_kg * (body.linvel().y - reference);
             body.reset_forces(false);
             let force = -jaw.side() * grip_force_n[jaw] - damping;
             body.add_force(rapier::Vector::new(0.0, force, 0.0), true);
+            sum += force;
         }
+        sum
     }
 
     /// What the contact between a jaw's pad and the part carries.
@@ -53,22 +57,23 @@ impl Rig {
         contact_force(world, self.pads[jaw], self.part_shape)
     }
 
-    /// Momentum along `direction` of all that hangs on the arm.
+    /// Momentum along `direction` of all that hangs on the arm, and of the arm.
     pub(crate) fn momentum(&self, world: &World, direction: rapier::Vector) -> f64 {
-        [self.carriage, self.jaws.left, self.jaws.right]
-            .into_iter()
-            .map(|h| world.bodies[h].mass() * world.bodies[h].linvel().dot(direction))
-            .sum()
+        self.arm.momentum(world, direction, self.jaw_bodies())
+    }
+
+    /// Mass that a pull along `direction` accelerates.
+    pub(crate) fn arm_mass_kg(&self, world: &World, direction: rapier::Vector) -> f64 {
+        self.arm.mass_kg(world, direction, self.jaw_bodies())
+    }
+
+    fn jaw_bodies(&self) -> [RigidBodyHandle; 2] {
+        [self.jaws.left, self.jaws.right]
     }
 }
 
-/// Puts part, carriage, jaws and pads into the world; the jaws stand [`CLOSING_GAP_M`] off the part.
+/// Puts part, arm, jaws and pads into the world; the jaws stand [`CLOSING_GAP_M`] off the part.
 pub(crate) fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64>) -> Rig {
-    let direction = vector(setup.direction);
-    let inertia = |mass_kg: f64| {
-        // A compact body of steel density; rotations are locked by the joints, so only its order matters.
-        MassProperties::new(rapier::Vector::ZERO, mass_kg, rapier::Vector::splat(mass_kg * 5e-3))
-    };
     // The pads alone carry friction: the larger of the two coefficients of a pair counts, the part's is 0.
     let part_collider = ColliderBuilder::new(setup.shape.shared().clone())
         .friction(0.0)
@@ -81,27 +86,24 @@ pub(crate) fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64
             // Held in place while the jaws close, which they do without friction.
             let everything = LockedAxes::TRANSLATION_LOCKED | LockedAxes::ROTATION_LOCKED;
             let body = RigidBodyBuilder::dynamic().pose(pose).gravity_scale(0.0);
-            body.additional_mass_properties(inertia(mass_kg)).locked_axes(everything)
+            body.additional_mass_properties(compact(mass_kg)).locked_axes(everything)
         }
     };
     let part = world.add_body(part);
     let part_shape = world.add_collider(part_collider, part);
 
-    let base = world.add_body(RigidBodyBuilder::fixed());
-    // The arm carries the weight of all that belongs to it.
-    let arm_body = |mass_kg: f64| {
-        RigidBodyBuilder::dynamic().additional_mass_properties(inertia(mass_kg)).gravity_scale(0.0)
-    };
-    let carriage = world.add_body(arm_body(setup.robot.moving_mass_kg + setup.gripper.mass_kg));
-    world.joints.insert(base, carriage, PrismaticJointBuilder::new(direction), true);
+    let mut arm = ArmRig::build(world, setup);
     let mut pads = Vec::with_capacity(2);
     let jaws = PerJaw::from_fn(|jaw| {
         let gel = &setup.gel[jaw];
         let y = jaw.side() * (touch[jaw] + CLOSING_GAP_M + gel.thickness_m / 2.0);
         let at = rapier::Vector::new(0.0, y, 0.0);
-        let body = world.add_body(arm_body(setup.gripper.jaw_mass_kg).translation(at));
-        let slide = PrismaticJointBuilder::new(rapier::Vector::Y).local_anchor1(at).contacts_enabled(false);
-        world.joints.insert(carriage, body, slide, true);
+        // The arm carries the weight of all that belongs to it.
+        let jaw_body = RigidBodyBuilder::dynamic()
+            .additional_mass_properties(compact(setup.gripper.jaw_mass_kg))
+            .gravity_scale(0.0);
+        let body = world.add_body(jaw_body.translation(at));
+        arm.attach_jaw(world, body, at);
         let half = pad_half_extents(gel);
         let pad = ColliderBuilder::cuboid(half.x, half.y, half.z)
             .friction(0.0)
@@ -110,7 +112,13 @@ pub(crate) fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64
         pads.push(world.add_collider(pad, body));
         body
     });
-    Rig { part, part_shape, carriage, jaws, pads: PerJaw { left: pads[0], right: pads[1] } }
+    arm.finish(world);
+    Rig { part, part_shape, arm, jaws, pads: PerJaw { left: pads[0], right: pads[1] } }
+}
+
+/// Mass properties of a compact body of steel density. The carriage locks rotations, so only the order matters.
+pub(crate) fn compact(mass_kg: f64) -> MassProperties {
+    MassProperties::new(rapier::Vector::ZERO, mass_kg, rapier::Vector::splat(mass_kg * 5e-3))
 }
 
 /// Half sides of a pad: the gel's width along x, its thickness along the jaw axis, its height along z.

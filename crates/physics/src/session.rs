@@ -143,7 +143,7 @@ pub struct PullSession {
     wrist: Wrist,
     control: ForceLoop,
     signals: Signals,
-    /// Where a velocity command wants the carriage to be.
+    /// Where a velocity command wants the tool to be.
     target_m: Option<f64>,
     limit_n: f64,
     has_slid: bool,
@@ -218,6 +218,13 @@ impl PullSession {
     pub(crate) fn contact_forces(&self) -> PerJaw<ContactForce> {
         let Plant::Rapier(pull) = &self.plant else { panic!("only the engine has contacts") };
         PerJaw::from_fn(|jaw| pull.contact(jaw))
+    }
+
+    /// Where the tool is, relative to the start of the pull.
+    #[cfg(test)]
+    pub(crate) fn tool_travel_m(&self) -> rapier3d_f64::prelude::Vector {
+        let Plant::Rapier(pull) = &self.plant else { panic!("only the engine has a tool in space") };
+        pull.tool_travel_m()
     }
 
     fn tick(&mut self, command: Command, step_s: f64) -> Result<(), PullError> {

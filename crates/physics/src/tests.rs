@@ -10,23 +10,25 @@ use nalgebra::{Rotation3, Vector3};
 
 mod reduced;
 
-const STEP_S: f64 = 0.002;
+pub(crate) const STEP_S: f64 = 0.002;
 
 /// A rig for tests: no noise, so that results can be compared with closed forms.
-struct Bench {
-    mechanics: Mechanics,
-    robot: Robot,
-    gel: PerJaw<Gel>,
-    shape: PartShape,
-    world_from_part: Pose,
-    grip_force_n: f64,
-    mount: Mount,
-    kinetic_ratio: f64,
-    noise_n: f64,
+pub(crate) struct Bench {
+    pub(crate) mechanics: Mechanics,
+    pub(crate) arm: Option<PlacedArm>,
+    pub(crate) robot: Robot,
+    pub(crate) gel: PerJaw<Gel>,
+    pub(crate) shape: PartShape,
+    pub(crate) world_from_part: Pose,
+    pub(crate) grip_force_n: f64,
+    pub(crate) direction: [f64; 3],
+    pub(crate) mount: Mount,
+    pub(crate) kinetic_ratio: f64,
+    pub(crate) noise_n: f64,
 }
 
 impl Bench {
-    fn new(shape: PartShape, grip_force_n: f64) -> Self {
+    pub(crate) fn new(shape: PartShape, grip_force_n: f64) -> Self {
         let gel = Gel {
             thickness_m: 4e-3,
             width_m: 28e-3,
@@ -37,6 +39,7 @@ impl Bench {
         };
         Self {
             mechanics: Mechanics::Rapier,
+            arm: None,
             robot: Robot {
                 moving_mass_kg: 8.0,
                 lag_s: 0.05,
@@ -50,15 +53,17 @@ impl Bench {
             shape,
             world_from_part: Pose::identity(),
             grip_force_n,
+            direction: [0.0, 0.0, 1.0],
             mount: Mount::Fixed,
             kinetic_ratio: 1.0,
             noise_n: 0.0,
         }
     }
 
-    fn grip(&self) -> Result<Grip, GripError> {
+    pub(crate) fn grip(&self) -> Result<Grip, GripError> {
         grip(&GripSetup {
             mechanics: self.mechanics,
+            arm: self.arm.as_ref().map_or(Arm::Carriage, Arm::Multibody),
             robot: self.robot,
             gripper: Gripper {
                 force_convention: ForceConvention::PerJaw,
@@ -72,37 +77,37 @@ impl Bench {
             shape: &self.shape,
             world_from_part: self.world_from_part,
             grip_force_n: PerJaw { left: self.grip_force_n, right: self.grip_force_n },
-            direction: [0.0, 0.0, 1.0],
+            direction: self.direction,
             mount: self.mount,
         })
     }
 
-    fn held(&self) -> Held {
+    pub(crate) fn held(&self) -> Held {
         match self.grip().unwrap() {
             Grip::Held(held) => *held,
             Grip::NoContact => panic!("the part should be between the jaws"),
         }
     }
 
-    fn session(&self, mu: f64) -> PullSession {
+    pub(crate) fn session(&self, mu: f64) -> PullSession {
         let jaw = JawFriction::uniform(mu * self.grip_force_n, self.kinetic_ratio);
         self.held().pull(&PerJaw { left: jaw.clone(), right: jaw }, Stream::new(1, 2, Purpose::ForceNoise))
     }
 
-    fn pull(&self, mu: f64) -> StaircaseResult {
+    pub(crate) fn pull(&self, mu: f64) -> StaircaseResult {
         let settings = settings();
         let staircase = Staircase::constant(settings.increment_n, settings.step_s, settings.max_time_s);
         pull_staircase(&mut self.session(mu), &staircase, &settings, Until::Stopped).unwrap()
     }
 
-    fn label_n(&self, mu: f64) -> f64 {
+    pub(crate) fn label_n(&self, mu: f64) -> f64 {
         let result = self.pull(mu);
         assert_eq!(result.end, PullEnd::Displacement);
         slip_label(&result.trace, 3.0, result.slid).unwrap().max_pull_force_n
     }
 }
 
-fn settings() -> PullSettings {
+pub(crate) fn settings() -> PullSettings {
     PullSettings {
         increment_n: 1.0,
         step_s: 0.104,
@@ -116,13 +121,13 @@ fn settings() -> PullSettings {
 }
 
 /// A polygonal cylinder as a mesh hull, axis along z.
-fn hull_of_64() -> PartShape {
+pub(crate) fn hull_of_64() -> PartShape {
     let shaft = gripgen_twin::parts::SteppedShaft { segments: 64, ..Default::default() };
     let upright = pose(&rotation_about_axis(1, std::f64::consts::FRAC_PI_2), Vector3::zeros());
     PartShape::hull(&shaft.mesh(), &upright).unwrap()
 }
 
-fn shapes() -> Vec<(&'static str, PartShape)> {
+pub(crate) fn shapes() -> Vec<(&'static str, PartShape)> {
     vec![
         ("box", PartShape::cuboid([0.06, 0.02, 0.12])),
         ("vertical shaft", PartShape::cylinder(0.01, 0.12, 2)),

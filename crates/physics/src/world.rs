@@ -15,7 +15,7 @@ pub(crate) struct World {
     parameters: IntegrationParameters,
     islands: IslandManager,
     broad_phase: BroadPhaseBvh,
-    multibodies: MultibodyJointSet,
+    pub(crate) multibodies: MultibodyJointSet,
     soft_bodies: SoftBodySet,
     ccd: CCDSolver,
     pipeline: PhysicsPipeline,

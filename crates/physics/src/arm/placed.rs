@@ -1,0 +1,161 @@
+//! An arm model in the pose in which it grips.
+
+use crate::arm::model::ArmModel;
+use gripgen_twin::frames::Pose;
+use nalgebra::{Matrix3, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+/// Joints that the task space needs: three translations, three rotations.
+const JOINTS: usize = 6;
+
+/// Smallest singular value of the Jacobian (metres or 1 per radian) of a pose from which the arm can pull.
+const SMALLEST_SINGULAR_VALUE: f64 = 0.02;
+
+/// How an arm stands when it grips.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stance {
+    /// Joint angles, from base to tip.
+    pub joints_rad: Vec<f64>,
+    /// Distance of the grip centre from the tip, along the tip's z axis.
+    pub tip_to_grip_m: f64,
+    /// Inertia of each joint's rotor, seen through its gear.
+    pub rotor_inertia_kg_m2: Vec<f64>,
+}
+
+impl Stance {
+    /// The stance of a UR5e with a WSG 50: elbow up, the gripper level, wrist 2 axis upright.
+    ///
+    /// Angles 180, -100, 110, -10, 90, -90 degrees put the flange at (0.412, 0.133, 0.413) m in the base, its
+    /// approach along +x, the base parallel to `world`. The pull, +z, is then at right angles to the approach, no
+    /// joint is near a limit and no singularity near. Gripper length and rotor inertias are not published:
+    /// 0.17 m is flange to pad centre of a WSG 50 with sensor fingers, 1.5 and 0.3 kg m2 are the order of magnitude
+    /// of a gear ratio of 101 squared times a rotor of that size. Neither enters the slip force.
+    pub fn ur5e() -> Self {
+        use std::f64::consts::PI;
+        let degrees = [180.0, -100.0, 110.0, -10.0, 90.0, -90.0];
+        Self {
+            joints_rad: degrees.iter().map(|d| d * PI / 180.0).collect(),
+            tip_to_grip_m: 0.17,
+            rotor_inertia_kg_m2: vec![1.5, 1.5, 1.5, 0.3, 0.3, 0.3],
+        }
+    }
+}
+
+/// A stance that an arm cannot take.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ArmError {
+    /// A list of numbers does not fit the arm.
+    #[error("the stance has {given} {what}, the arm `{arm}` has {joints} joints; {JOINTS} are needed")]
+    Count {
+        /// What is counted.
+        what: &'static str,
+        /// How many there are.
+        given: usize,
+        /// Name of the arm.
+        arm: String,
+        /// How many joints it has.
+        joints: usize,
+    },
+    /// A joint beyond its limits.
+    #[error("joint `{joint}` stands at {angle_rad} rad, its limits are {lower_rad} to {upper_rad} rad")]
+    Limit {
+        /// The joint.
+        joint: String,
+        /// Its angle.
+        angle_rad: f64,
+        /// Lower limit.
+        lower_rad: f64,
+        /// Upper limit.
+        upper_rad: f64,
+    },
+    /// A number that is none, or negative where it must not be.
+    #[error("{what} is {value}")]
+    Number {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The arm cannot move in every direction.
+    #[error(
+        "the arm is singular in this stance: the smallest singular value of its Jacobian is {smallest:.4}, \
+         at least {SMALLEST_SINGULAR_VALUE} is needed"
+    )]
+    Singular {
+        /// Smallest singular value of the Jacobian at the grip centre.
+        smallest: f64,
+    },
+}
+
+/// An arm in its stance, placed so that the grip centre is the origin of `world`, the tip's z axis (the approach)
+/// along +x and its y axis along +y, the jaw axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacedArm {
+    pub(crate) model: ArmModel,
+    pub(crate) stance: Stance,
+    pub(crate) world_from_base: Pose,
+    /// Frames of the links in `world`.
+    pub(crate) world_from_links: Vec<Pose>,
+}
+
+impl PlacedArm {
+    /// Checks the stance and places the arm.
+    pub fn new(model: ArmModel, stance: Stance) -> Result<Self, ArmError> {
+        let joints = model.joints.len();
+        for (what, given) in
+            [("joint angles", stance.joints_rad.len()), ("rotor inertias", stance.rotor_inertia_kg_m2.len())]
+        {
+            if given != joints || joints != JOINTS {
+                return Err(ArmError::Count { what, given, arm: model.name, joints });
+            }
+        }
+        for (joint, &angle_rad) in model.joints.iter().zip(&stance.joints_rad) {
+            let [lower_rad, upper_rad] = joint.limits_rad.unwrap_or([f64::MIN, f64::MAX]);
+            if !(lower_rad..=upper_rad).contains(&angle_rad) {
+                return Err(ArmError::Limit { joint: joint.name.clone(), angle_rad, lower_rad, upper_rad });
+            }
+        }
+        let numbers = std::iter::once(("tip_to_grip_m", stance.tip_to_grip_m))
+            .chain(stance.rotor_inertia_kg_m2.iter().map(|&i| ("rotor_inertia_kg_m2", i)));
+        for (what, value) in numbers {
+            if !value.is_finite() || value < 0.0 {
+                return Err(ArmError::Number { what, value });
+            }
+        }
+        let tip_from_grip =
+            Pose::from_parts(Translation3::new(0.0, 0.0, stance.tip_to_grip_m), tip_from_world_axes());
+        let base_from_grip = model.base_from_tip(&stance.joints_rad) * tip_from_grip;
+        let world_from_base = base_from_grip.inverse();
+        let base_from_links = model.base_from_links(&stance.joints_rad);
+        let world_from_links = base_from_links.iter().map(|link| world_from_base * link).collect();
+        let placed = Self { model, stance, world_from_base, world_from_links };
+        let smallest = placed.jacobian().singular_values().min();
+        if smallest < SMALLEST_SINGULAR_VALUE {
+            return Err(ArmError::Singular { smallest });
+        }
+        Ok(placed)
+    }
+
+    /// The base in `world`.
+    pub fn world_from_base(&self) -> Pose {
+        self.world_from_base
+    }
+
+    /// Motion of the grip centre (translation, rotation) per motion of each joint.
+    fn jacobian(&self) -> Matrix6<f64> {
+        let mut jacobian = Matrix6::zeros();
+        for (i, (joint, link)) in self.model.joints.iter().zip(&self.world_from_links).enumerate() {
+            let axis = link.rotation * Vector3::from(joint.axis);
+            // The grip centre is the origin.
+            jacobian.fixed_view_mut::<3, 1>(0, i).copy_from(&axis.cross(&-link.translation.vector));
+            jacobian.fixed_view_mut::<3, 1>(3, i).copy_from(&axis);
+        }
+        jacobian
+    }
+}
+
+/// The axes of `world` in the tip: approach z along x, y along y.
+fn tip_from_world_axes() -> UnitQuaternion<f64> {
+    let m = Matrix3::new(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
+    gripgen_twin::frames::pose(&Rotation3::from_matrix_unchecked(m), Vector3::zeros()).rotation
+}
