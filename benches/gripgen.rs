@@ -4,7 +4,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use gripgen::physics::{
-    FrictionCell, Grip, GripSetup, Held, JawFriction, Mount, Until, grip, pull_staircase,
+    Arm, FrictionCell, Grip, GripSetup, Held, JawFriction, Mount, Until, grip, pull_staircase,
 };
 use gripgen::record::{EncodeOptions, VIEW_RATE_HZ, encode};
 use gripgen::tactile::{Renderer, SimdLevel};
@@ -31,8 +31,8 @@ fn project(part: &str, mechanics: &str, images: &str) -> Project {
     Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap()
 }
 
-/// `physics/sample/<mechanics>/<part>`: grip, imprint and pull, no images. `physics/pull/<mechanics>`: the pull alone,
-/// the shaft at 40 N with 64 cells a jaw, noise and trace.
+/// `physics/sample/<mechanics>/<part>`: grip, imprint and pull, no images. `physics/pull/<mechanics>/<arm>`: grip and
+/// pull of the shaft at 40 N with 64 cells a jaw, noise and trace.
 fn physics(c: &mut Criterion) {
     let mut group = c.benchmark_group("physics");
     group.sample_size(20).throughput(Throughput::Elements(1));
@@ -45,29 +45,33 @@ fn physics(c: &mut Criterion) {
         }
         let project = project("long_shaft", mechanics, "none");
         let pull = project.sweep.pull();
-        let held = held(&project);
+        let arm = project.twin.arm.as_ref().map(|arm| project.library.arm(arm).unwrap());
+        let arms = [("carriage", Arm::Carriage), ("ur5e", Arm::Multibody(arm.as_deref().unwrap()))];
         let staircase = Staircase::constant(pull.increment_n, pull.step_s, pull.max_time_s);
         let cell = FrictionCell { limit_n: 0.168 * 40.0 / 64.0, area_m2: 1e-6 };
         let jaw = JawFriction { cells: vec![cell; 64], kinetic_ratio: 1.0 };
         let friction = PerJaw { left: jaw.clone(), right: jaw };
-        group.bench_function(format!("pull/{mechanics}"), |b| {
-            b.iter(|| {
-                let noise = Stream::new(1, 2, Purpose::ForceNoise);
-                let mut session = held.clone().pull(&friction, noise);
-                black_box(pull_staircase(&mut session, &staircase, &pull, Until::Stopped).unwrap())
+        for (name, arm) in arms {
+            group.bench_function(format!("pull/{mechanics}/{name}"), |b| {
+                b.iter(|| {
+                    let noise = Stream::new(1, 2, Purpose::ForceNoise);
+                    let mut session = held(&project, arm).pull(&friction, noise);
+                    black_box(pull_staircase(&mut session, &staircase, &pull, Until::Stopped).unwrap())
+                });
             });
-        });
+        }
     }
 }
 
 /// The part of sample 0, gripped.
-fn held(project: &Project) -> Held {
+fn held(project: &Project, arm: Arm<'_>) -> Held {
     let twin = &project.twin;
     let scenario = project.sweep.scenario(0, twin).0;
     let part = &twin.parts[&scenario.part];
     let shape = project.library.shape(part, scenario.grip_pose).unwrap();
     let setup = GripSetup {
         mechanics: project.sweep.mechanics,
+        arm,
         robot: twin.robot,
         gripper: twin.gripper,
         wrist: twin.wrist,

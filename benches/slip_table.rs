@@ -4,8 +4,8 @@
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
 
 use gripgen::physics::{
-    Command, FrictionCell, Grip, GripSetup, Held, JawFriction, Mount, PartShape, PullSession, Until, grip,
-    pull_staircase,
+    Arm, Command, FrictionCell, Grip, GripSetup, Held, JawFriction, Mount, PartShape, PullSession, Until,
+    grip, pull_staircase,
 };
 use gripgen::twin::config::{Feedback, ForceConvention, Mechanics, Twist};
 use gripgen::twin::frames::{Pose, pose, rotation_about_axis};
@@ -128,6 +128,7 @@ fn held(mechanics: Mechanics, shape: &PartShape, grip_force_n: f64) -> Held {
     };
     let setup = GripSetup {
         mechanics,
+        arm: Arm::Carriage,
         robot: Robot {
             moving_mass_kg: 8.0,
             lag_s: 0.05,

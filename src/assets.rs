@@ -17,6 +17,7 @@ static FILES: &[(&str, &[u8])] = embedded![
     "configs/twin-large.toml",
     "configs/twin-baseline.toml",
     "configs/twin.toml",
+    "robots/ur5e/ur5e.urdf",
     "parts/ball_bearing/part.stl",
     "parts/gear/part.stl",
     "parts/long_shaft/part.stl",

@@ -4,7 +4,7 @@
 
 use crate::generate::{SampleError, SimulateOptions};
 use crate::library::Library;
-use gripgen_physics::{Grip, GripSetup, Held, Mount, PartShape, grip};
+use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, grip};
 use gripgen_tactile::{Imprint, Plane, Renderer, Sensor};
 use gripgen_twin::config::{ImageNoise, Mechanics};
 use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n};
@@ -54,7 +54,10 @@ impl Gripped {
             }
         })?;
         let shape = library.shape(part, scenario.grip_pose)?;
-        let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, &shape))? else {
+        let arm = twin.arm.as_ref().map(|arm| library.arm(arm)).transpose()?;
+        let arm = arm.as_deref().map_or(Arm::Carriage, Arm::Multibody);
+        let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, arm, &shape))?
+        else {
             return Ok(Self { sensors, contact: None });
         };
         let renderers = PerJaw::from_fn(|jaw| Renderer {
@@ -89,10 +92,12 @@ fn grip_setup<'a>(
     scenario: &Scenario,
     grip_force_n: PerJaw<f64>,
     mechanics: Mechanics,
+    arm: Arm<'a>,
     shape: &'a PartShape,
 ) -> GripSetup<'a> {
     GripSetup {
         mechanics,
+        arm,
         robot: twin.robot,
         gripper: twin.gripper,
         wrist: twin.wrist,

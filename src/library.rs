@@ -3,10 +3,10 @@
 use crate::cache::Cache;
 use crate::location::Location;
 use crate::resolve::Files;
-use gripgen_physics::{PartShape, ShapeError};
+use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, Stance, UrdfError};
 use gripgen_record::{decode_picture, sha256_hex};
 use gripgen_tactile::{Sensor, SensorError};
-use gripgen_twin::{Gel, MeshError, Optics, Part, TriMesh};
+use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -14,12 +14,14 @@ use std::sync::Arc;
 const MESHES: usize = 64;
 const SHAPES: usize = 256;
 const SENSORS: usize = 8;
+const ARMS: usize = 8;
 
 /// The files of a sweep and what was made of them. What it returns depends on its arguments only.
 pub struct Library {
     files: Files,
     meshes: Cache<(String, u64), TriMesh>,
     shapes: Cache<(String, u64, [u64; 7]), PartShape>,
+    arms: Cache<RobotArm, PlacedArm>,
     sensors: Cache<(String, Option<String>, Option<u64>), Sensor>,
 }
 
@@ -59,6 +61,17 @@ pub enum LibraryError {
         /// What is wrong.
         problem: String,
     },
+    /// A robot description.
+    #[error("{location}: {source}")]
+    Urdf {
+        /// The file.
+        location: Location,
+        /// What is wrong.
+        source: UrdfError,
+    },
+    /// A stance of the arm.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
     /// A file that is not part of the sweep.
     #[error("`{path}` is none of the files of this sweep")]
     Unknown {
@@ -98,7 +111,13 @@ impl LibraryError {
 
 impl Library {
     pub(crate) fn new(files: Files) -> Self {
-        Self { files, meshes: Cache::new(MESHES), shapes: Cache::new(SHAPES), sensors: Cache::new(SENSORS) }
+        Self {
+            files,
+            meshes: Cache::new(MESHES),
+            shapes: Cache::new(SHAPES),
+            arms: Cache::new(ARMS),
+            sensors: Cache::new(SENSORS),
+        }
     }
 
     /// SHA-256 of each file's content, by its path in the resolved configuration.
@@ -137,6 +156,37 @@ impl Library {
             PartShape::hull(&mesh, pose)
                 .map_err(|source| LibraryError::Shape { location: location.clone(), source })
         })
+    }
+
+    /// An arm in its stance.
+    pub fn arm(&self, arm: &RobotArm) -> Result<Arc<PlacedArm>, LibraryError> {
+        self.arms.get(arm.clone(), || {
+            // Where its meshes are was checked when the configuration was loaded; they are not used.
+            let model = self.arm_model(arm, &|reference| Some(reference.into()))?;
+            let stance = Stance {
+                joints_rad: arm.joints_rad.to_vec(),
+                tip_to_grip_m: arm.tip_to_grip_m,
+                rotor_inertia_kg_m2: arm.rotor_inertia_kg_m2.to_vec(),
+            };
+            Ok(PlacedArm::new(model, stance)?)
+        })
+    }
+
+    /// Reads the robot description of an arm and checks that the files it names are there.
+    pub(crate) fn check_arm(&self, arm: &RobotArm) -> Result<(), LibraryError> {
+        let (location, _) = self.file(&arm.urdf)?;
+        self.arm_model(arm, &|reference| location.ros_file(reference))?;
+        self.arm(arm).map(drop)
+    }
+
+    fn arm_model(
+        &self,
+        arm: &RobotArm,
+        find: &dyn Fn(&str) -> Option<String>,
+    ) -> Result<ArmModel, LibraryError> {
+        let (location, bytes) = self.file(&arm.urdf)?;
+        ArmModel::from_urdf(&String::from_utf8_lossy(bytes), &arm.tip, find)
+            .map_err(|source| LibraryError::Urdf { location: location.clone(), source })
     }
 
     /// The tactile sensor that a twin's optics name.

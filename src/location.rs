@@ -57,6 +57,18 @@ impl Location {
         }
     }
 
+    /// The file that a robot description here refers to: `package://NAME/PATH` in a folder NAME beside or above it,
+    /// other paths relative to it. `None` if there is none.
+    pub fn ros_file(&self, reference: &str) -> Option<String> {
+        let Location::Disk(file) = self else { return None };
+        let plain = reference.strip_prefix("file://").unwrap_or(reference);
+        let found = match plain.strip_prefix("package://") {
+            None => file.parent()?.join(plain),
+            Some(path) => file.ancestors().skip(1).map(|folder| folder.join(path)).find(|p| p.is_file())?,
+        };
+        found.is_file().then(|| found.display().to_string())
+    }
+
     /// Reads the file.
     pub fn read(&self) -> Result<Cow<'static, [u8]>, ReadFileError> {
         let error = |problem: String| ReadFileError { location: self.clone(), problem };

@@ -10,7 +10,7 @@ use crate::resolve::{Files, Named, Resolved, config_hash, resolve};
 use crate::sweep::VERSION;
 use gripgen_record::{RunFolder, sha256_hex};
 use gripgen_twin::config::{Backend, ConfigError, Document, SweepFile};
-use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, Sweep, Twin, is_twin_key};
+use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, RobotArm, Sweep, Twin, is_twin_key};
 use std::borrow::Cow;
 
 /// The twin whose sections stand in for what a twin leaves out, and the default of `--twin`.
@@ -170,6 +170,10 @@ impl Project {
                 let Some(part) = self.twin.parts.get(name) else { return Ok(()) };
                 let part = gripgen_twin::Part { mesh: file.path.clone(), ..part.clone() };
                 (0..part.grips.len()).try_for_each(|grip| self.library.shape(&part, grip).map(drop))
+            }
+            ["robot", "arm", "urdf"] => {
+                let Some(arm) = &self.twin.arm else { return Ok(()) };
+                self.library.check_arm(&RobotArm { urdf: file.path.clone(), ..arm.clone() })
             }
             ["optics", jaw, leaf] => {
                 let jaw = if jaw == "right" { Jaw::Right } else { Jaw::Left };

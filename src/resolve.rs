@@ -6,7 +6,7 @@
 use crate::assets::ASSET_PREFIX;
 use crate::location::Location;
 use gripgen_record::sha256_hex;
-use gripgen_twin::config::{ConfigError, Document, SweepFile, TwinFile};
+use gripgen_twin::config::{ConfigError, Document, RobotModel, SweepFile, TwinFile};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::{Sweep, TWIN_SCHEMA, is_twin_key};
 use std::collections::BTreeMap;
@@ -71,7 +71,7 @@ fn written(table: Result<toml::Table, toml::ser::Error>) -> Result<toml::Value, 
 
 /// Whether a key of a twin holds a path.
 fn is_file_key(key: &str) -> bool {
-    is_twin_key(key) && [".mesh", ".sensor", ".background"].iter().any(|end| key.ends_with(end))
+    is_twin_key(key) && [".mesh", ".sensor", ".background", ".urdf"].iter().any(|end| key.ends_with(end))
 }
 
 struct Resolver<L> {
@@ -90,6 +90,12 @@ impl<L: Fn(&str) -> Location> Resolver<L> {
         for (name, part) in twin.parts.iter_mut().filter(|(name, _)| drawn.contains(&name.as_str())) {
             let key = format!("parts.{name}.mesh");
             self.name(key.clone(), key, &mut part.mesh)?;
+        }
+        if twin.robot.model == RobotModel::Ur5e
+            && let Some(arm) = &mut twin.robot.arm
+        {
+            let key = "robot.arm.urdf".to_string();
+            self.name(key.clone(), key, &mut arm.urdf)?;
         }
         let optics = [("left", Some(&mut twin.optics.left)), ("right", twin.optics.right.as_mut())];
         for (jaw, optics) in optics {

@@ -161,6 +161,7 @@ fn configuration_keys_carry_their_units() {
         "_rad",
         "_c",
         "_kg",
+        "_kg_m2",
         "_px",
         "_per_n",
         "_per_m",

@@ -2,11 +2,12 @@
 
 use super::*;
 use crate::grip::Mount;
-use crate::tests::{Bench, STEP_S, hull_of_64, settings, shapes};
+use crate::tests::{Bench, STEP_S, hull_of_64, shapes};
 use gripgen_twin::config::Feedback;
+use gripgen_twin::config::Mechanics;
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};
-use gripgen_twin::{PullEnd, Staircase};
+use gripgen_twin::PullEnd;
 use nalgebra::Vector3;
 
 pub(crate) const URDF: &str = include_str!("../../../assets/robots/ur5e/ur5e.urdf");
@@ -80,7 +81,6 @@ fn the_arm_slips_at_twice_mu_times_grip_force() {
 
 /// `cargo test --release -p gripgen-physics -- --ignored --nocapture the_whole_grid`
 #[test]
-#[ignore = "120 pulls"]
 fn the_whole_grid_of_friction_and_grip_force() {
     let grid = [0.14, 0.168, 0.3, 0.6, 1.0].map(|mu| [5.0, 20.0, 40.0, 80.0].map(|force| (mu, force)));
     check_slip(grid.as_flattened());
@@ -333,6 +333,19 @@ fn a_clone_continues_like_the_original() {
     });
 }
 
+/// The reduced mechanics pulls the mass that the arm has in the engine, computed apart from it.
+#[test]
+fn the_reduced_arm_weighs_what_the_whole_one_does() {
+    for direction in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.6, 0.0, 0.8]] {
+        let mut bench = bench(brick(), 40.0);
+        bench.direction = direction;
+        let whole = bench.session(0.2).mass_kg();
+        bench.mechanics = Mechanics::Reduced;
+        let reduced = bench.session(0.2).mass_kg();
+        assert!((reduced / whole - 1.0).abs() < 1e-3, "{direction:?}: {reduced} kg and {whole} kg");
+    }
+}
+
 #[test]
 fn a_stance_that_the_arm_cannot_take_is_refused() {
     let model = || ArmModel::from_urdf(URDF, "tool0", &|_| None).unwrap();
@@ -349,40 +362,4 @@ fn a_stance_that_the_arm_cannot_take_is_refused() {
     assert!(singular.contains("singular"), "{singular}");
     let number = refused(&|s| s.tip_to_grip_m = f64::NAN);
     assert!(number.contains("tip_to_grip_m is NaN"), "{number}");
-}
-
-/// `cargo test --release -p gripgen-physics -- --ignored --nocapture speed`
-#[test]
-#[ignore = "measures time"]
-fn speed_of_steps_and_pulls() {
-    for (name, with_arm) in [("carriage", false), ("UR5e", true)] {
-        for (part, shape) in
-            [("box", brick()), ("shaft", PartShape::cylinder(0.01, 0.12, 2)), ("hull", hull_of_64())]
-        {
-            let (mut steps, mut pulls) = (0, 0);
-            let settings = settings();
-            let begin = std::time::Instant::now();
-            let mut settling = 0.0;
-            for (mu, force) in [(0.14, 20.0), (0.168, 40.0), (0.3, 40.0), (0.2, 80.0)] {
-                let bench =
-                    if with_arm { bench(shape.clone(), force) } else { Bench::new(shape.clone(), force) };
-                let start = std::time::Instant::now();
-                let mut session = bench.session(mu);
-                settling += start.elapsed().as_secs_f64();
-                let staircase =
-                    Staircase::constant(settings.increment_n, settings.step_s, settings.max_time_s);
-                steps +=
-                    pull_staircase(&mut session, &staircase, &settings, Until::Stopped).unwrap().trace.len();
-                pulls += 1;
-            }
-            let total = begin.elapsed().as_secs_f64();
-            println!(
-                "{name:8} {part:5}: {:.1} us/step, grip {:.2} ms, {:.1} pulls/s of {:.2} s",
-                (total - settling) / f64::from(steps as u32) * 1e6,
-                settling / f64::from(pulls) * 1e3,
-                f64::from(pulls) / total,
-                f64::from(steps as u32) / f64::from(pulls) * STEP_S
-            );
-        }
-    }
 }

@@ -220,6 +220,12 @@ impl PullSession {
         PerJaw::from_fn(|jaw| pull.contact(jaw))
     }
 
+    /// Mass that moves along the pull.
+    #[cfg(test)]
+    pub(crate) fn mass_kg(&self) -> f64 {
+        self.plant.mass_kg()
+    }
+
     /// Where the tool is, relative to the start of the pull.
     #[cfg(test)]
     pub(crate) fn tool_travel_m(&self) -> rapier3d_f64::prelude::Vector {

@@ -19,9 +19,9 @@ pub use sweep_file::{
     Backend, DesignFile, ImageStorage, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,
 };
 pub use twin_file::{
-    CalibrationFile, EffectFile, Feedback, ForceConvention, GelFile, GelModel, GripFile, GripperFile,
-    GripperModel, ImageNoise, OpticsFile, PartFile, PerJawFile, RobotFile, RobotModel, TwinFile, Twist,
-    WristFile,
+    ArmFile, CalibrationFile, EffectFile, Feedback, ForceConvention, GelFile, GelModel, GripFile,
+    GripperFile, GripperModel, ImageNoise, OpticsFile, PartFile, PerJawFile, RobotFile, RobotModel, TwinFile,
+    Twist, WristFile,
 };
 
 use std::ops::RangeBounds;

@@ -1,6 +1,6 @@
 //! The checked twin, in SI units.
 
-use crate::config::{ConfigError, TwinFile};
+use crate::config::{ArmFile, ConfigError, RobotModel, TwinFile};
 use crate::config::{Feedback, ForceConvention, ImageNoise, Twist};
 use crate::effects::{self, Effect, EffectSpec, Per};
 use crate::frames::{Pose, pose, rotation_from_fixed_xyz};
@@ -17,8 +17,10 @@ pub const DEFAULTED_SECTIONS: &[&str] = &["robot", "gripper", "wrist", "gel", "o
 /// Everything the simulation knows of a rig and its parts. Built by [`Twin::new`], which checks it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Twin {
-    /// The arm and its force loop.
+    /// The force loop of the arm.
     pub robot: Robot,
+    /// The arm's links; without them the gripper hangs on a carriage.
+    pub arm: Option<RobotArm>,
     /// The gripper.
     pub gripper: Gripper,
     /// The wrist force sensor.
@@ -31,6 +33,21 @@ pub struct Twin {
     pub parts: BTreeMap<String, Part>,
     /// The effects, in the order in which they act.
     pub effects: Vec<Effect>,
+}
+
+/// An arm with six joints, and how it stands when it grips.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotArm {
+    /// Path of its URDF, as written.
+    pub urdf: String,
+    /// Link that carries the gripper.
+    pub tip: String,
+    /// Joint angles from base to tip.
+    pub joints_rad: [f64; 6],
+    /// Distance of the grip centre from the tip, along the tip's z axis.
+    pub tip_to_grip_m: f64,
+    /// Inertia of each joint's rotor, seen through its gear.
+    pub rotor_inertia_kg_m2: [f64; 6],
 }
 
 /// The arm, reduced to what it does along the pull.
@@ -157,6 +174,10 @@ impl Twin {
             feedback: r.feedback,
             twist: r.twist,
         };
+        let arm = match r.model {
+            RobotModel::Carriage => None,
+            RobotModel::Ur5e => Some(check_arm(r.arm.as_ref())?),
+        };
         let g = &file.gripper;
         let gripper = Gripper {
             force_convention: g.force_convention,
@@ -205,7 +226,7 @@ impl Twin {
             .map(|(name, part)| Ok((name.clone(), check_part(part, &format!("parts.{name}"))?)))
             .collect::<Result<_, ConfigError>>()?;
         let effects = (0..file.effects.len()).map(|i| check_effect(file, i)).collect::<Result<_, _>>()?;
-        Ok(Twin { robot, gripper, wrist, gel, optics, parts, effects })
+        Ok(Twin { robot, arm, gripper, wrist, gel, optics, parts, effects })
     }
 
     /// Grip force per jaw of a force that follows this twin's convention.
@@ -215,6 +236,28 @@ impl Twin {
             ForceConvention::Total => grip_force_n / 2.0,
         }
     }
+}
+
+fn check_arm(arm: Option<&ArmFile>) -> Result<RobotArm, ConfigError> {
+    use crate::config::in_range;
+    let arm = arm.ok_or_else(|| {
+        ConfigError::new("robot.model", "`ur5e` needs the section [robot.arm]")
+            .hint("`gripgen init` writes one; or use model = \"carriage\"")
+    })?;
+    let (mut joints_rad, mut rotor_inertia_kg_m2) = ([0.0; 6], [0.0; 6]);
+    for i in 0..6 {
+        let key = format!("robot.arm.joints_deg[{i}]");
+        joints_rad[i] = in_range(&key, arm.joints_deg[i], -360.0..=360.0, "deg")?.to_radians();
+        let key = format!("robot.arm.rotor_inertia_kg_m2[{i}]");
+        rotor_inertia_kg_m2[i] = in_range(&key, arm.rotor_inertia_kg_m2[i], 0.0..=1000.0, "kg m2")?;
+    }
+    Ok(RobotArm {
+        urdf: arm.urdf.clone(),
+        tip: arm.tip.clone(),
+        joints_rad,
+        tip_to_grip_m: 1e-3 * in_range("robot.arm.tip_to_grip_mm", arm.tip_to_grip_mm, 0.0..=2000.0, "mm")?,
+        rotor_inertia_kg_m2,
+    })
 }
 
 fn check_gel(gel: &crate::config::GelFile, key: &str) -> Result<Gel, ConfigError> {

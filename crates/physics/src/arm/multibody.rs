@@ -18,9 +18,9 @@
 //! displacement along the pull.
 
 use crate::arm::model::LinkInertia;
-use crate::arm::placed::PlacedArm;
+use crate::arm::placed::{PlacedArm, gripper_inertia};
 use crate::grip::GripSetup;
-use crate::scene::{compact, rapier_pose};
+use crate::scene::rapier_pose;
 use crate::world::World;
 use gripgen_twin::frames::Pose;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
@@ -277,12 +277,9 @@ fn from_engine(m: &Matrix) -> Matrix3<f64> {
 
 /// The last link with the gripper, a compact body half-way between tip and grip centre.
 fn with_gripper(link: &LinkInertia, mass_kg: f64, last_from_grip: &Pose, arm: &PlacedArm) -> LinkInertia {
-    let half_way = Vector3::new(-arm.stance.tip_to_grip_m / 2.0, 0.0, 0.0);
-    let gripper = LinkInertia {
-        mass_kg,
-        centre_m: (last_from_grip * nalgebra::Point3::from(half_way)).coords,
-        about_centre_kg_m2: Matrix3::identity() * compact(mass_kg).principal_inertia().x,
-    };
+    let world = gripper_inertia(mass_kg, arm.stance.tip_to_grip_m);
+    let centre_m = (last_from_grip * nalgebra::Point3::from(world.centre_m)).coords;
+    let gripper = LinkInertia { centre_m, ..world };
     LinkInertia::sum(&[*link, gripper])
 }
 

@@ -1,8 +1,11 @@
 //! An arm model in the pose in which it grips.
 
 use crate::arm::model::ArmModel;
+use crate::arm::model::LinkInertia;
+use crate::scene::compact;
+use gripgen_twin::Gripper;
 use gripgen_twin::frames::Pose;
-use nalgebra::{Matrix3, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
 
 /// Joints that the task space needs: three translations, three rotations.
 const JOINTS: usize = 6;
@@ -141,6 +144,40 @@ impl PlacedArm {
         self.world_from_base
     }
 
+    /// Mass that a pull along `direction` accelerates while the arm holds the other five directions: `d.L d` with the
+    /// task-space inertia `L = J^-T M J^-1` (Khatib 1987) of arm and gripper at the grip centre.
+    pub fn held_mass_kg(&self, gripper: &Gripper, direction: [f64; 3]) -> f64 {
+        let Some(inverse) = self.jacobian().try_inverse() else { return f64::INFINITY };
+        let d = Vector3::from(direction);
+        let joints = inverse * Vector6::new(d.x, d.y, d.z, 0.0, 0.0, 0.0);
+        (joints.transpose() * self.joint_inertia(gripper) * joints).x
+    }
+
+    /// Inertia matrix of the joints: `sum m Jv' Jv + Jw' I Jw` over the links, and the rotors.
+    fn joint_inertia(&self, gripper: &Gripper) -> Matrix6<f64> {
+        let mut mass =
+            Matrix6::from_diagonal(&Vector6::from_iterator(self.stance.rotor_inertia_kg_m2.iter().copied()));
+        let mut add = |links: usize, inertia: &LinkInertia| {
+            let (mut linear, mut angular) = (Matrix3x6::zeros(), Matrix3x6::zeros());
+            let moving = self.model.joints.iter().zip(&self.world_from_links).take(links).enumerate();
+            for (i, (joint, link)) in moving {
+                let axis = link.rotation * Vector3::from(joint.axis);
+                linear.set_column(i, &axis.cross(&(inertia.centre_m - link.translation.vector)));
+                angular.set_column(i, &axis);
+            }
+            mass += linear.transpose() * linear * inertia.mass_kg
+                + angular.transpose() * inertia.about_centre_kg_m2 * angular;
+        };
+        for (i, (joint, link)) in self.model.joints.iter().zip(&self.world_from_links).enumerate() {
+            add(i + 1, &joint.inertia.moved(link));
+        }
+        let links = self.model.joints.len();
+        add(links, &gripper_inertia(gripper.mass_kg, self.stance.tip_to_grip_m));
+        // The jaws stand on both sides of the grip centre; a pull moves them along.
+        add(links, &LinkInertia { mass_kg: 2.0 * gripper.jaw_mass_kg, ..LinkInertia::NOTHING });
+        mass
+    }
+
     /// Motion of the grip centre (translation, rotation) per motion of each joint.
     fn jacobian(&self) -> Matrix6<f64> {
         let mut jacobian = Matrix6::zeros();
@@ -151,6 +188,15 @@ impl PlacedArm {
             jacobian.fixed_view_mut::<3, 1>(3, i).copy_from(&axis);
         }
         jacobian
+    }
+}
+
+/// The gripper as a compact body half-way between tip and grip centre, in `world`.
+pub(crate) fn gripper_inertia(mass_kg: f64, tip_to_grip_m: f64) -> LinkInertia {
+    LinkInertia {
+        mass_kg,
+        centre_m: Vector3::new(-tip_to_grip_m / 2.0, 0.0, 0.0),
+        about_centre_kg_m2: Matrix3::identity() * compact(mass_kg).principal_inertia().x,
     }
 }
 

@@ -50,6 +50,24 @@ pub struct PerJawFile<T> {
 pub enum RobotModel {
     /// The gripper hangs on a carriage that moves along the pull; the arm is its mass and its force loop.
     Carriage,
+    /// The arm of `[robot.arm]`, link by link; its inertia comes from its URDF.
+    Ur5e,
+}
+
+/// `[robot.arm]`: an arm with six joints, and how it stands when it grips. Used with `model = "ur5e"`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ArmFile {
+    /// URDF file.
+    pub urdf: String,
+    /// Link of the URDF on which the gripper is mounted, its z axis out of the flange.
+    pub tip: String,
+    /// Joint angles from base to tip.
+    pub joints_deg: [f64; 6],
+    /// Distance of the grip centre from the tip, along the tip's z axis.
+    pub tip_to_grip_mm: f64,
+    /// Inertia of each joint's rotor, seen through its gear.
+    pub rotor_inertia_kg_m2: [f64; 6],
 }
 
 /// What the force loop closes on.
@@ -79,7 +97,7 @@ pub enum Twist {
 pub struct RobotFile {
     /// Model of the arm.
     pub model: RobotModel,
-    /// Mass that the arm moves along the pull, without the gripper.
+    /// Mass that the arm moves along the pull, without the gripper; used with `model = "carriage"`.
     pub moving_mass_kg: f64,
     /// Time constant of the force loop.
     pub lag_s: f64,
@@ -94,6 +112,9 @@ pub struct RobotFile {
     /// Whether the arm holds the grip's rotation about the jaw axis.
     #[serde(default)]
     pub twist: Twist,
+    /// The arm's links and stance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arm: Option<ArmFile>,
     /// Uncertainty of values in this section.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub calibration: BTreeMap<String, CalibrationFile>,
