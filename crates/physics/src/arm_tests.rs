@@ -3,11 +3,11 @@
 use super::*;
 use crate::grip::Mount;
 use crate::tests::{Bench, STEP_S, hull_of_64, shapes};
+use gripgen_twin::PullEnd;
 use gripgen_twin::config::Feedback;
 use gripgen_twin::config::Mechanics;
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};
-use gripgen_twin::PullEnd;
 use nalgebra::Vector3;
 
 pub(crate) const URDF: &str = include_str!("../../../assets/robots/ur5e/ur5e.urdf");
