@@ -150,7 +150,9 @@ impl Bristles {
         for ((stiffness, limit), foot) in columns {
             for i in 0..LANES {
                 let elastic = stiffness[i] * (position_m - foot[i]);
-                let held = elastic.min(limit[i]).max(-limit[i]);
+                // Two comparisons, without the care for NaN of `clamp`: two instructions for all lanes.
+                let below = if elastic > limit[i] { limit[i] } else { elastic };
+                let held = if below < -limit[i] { -limit[i] } else { below };
                 force[i] += held;
                 slope[i] += if held == elastic { stiffness[i] } else { 0.0 };
             }
@@ -168,7 +170,9 @@ impl Bristles {
     #[inline]
     fn drag(&mut self, position_m: f64) {
         for (foot, reach) in self.foot_m.iter_mut().zip(&self.reach_m) {
-            *foot = foot.max(position_m - reach).min(position_m + reach);
+            let (low, high) = (position_m - reach, position_m + reach);
+            let above = if *foot < low { low } else { *foot };
+            *foot = if above > high { high } else { above };
         }
     }
 }
