@@ -274,3 +274,31 @@ fn calibrated_intervals_become_draws() {
     let twin = p.sweep.twin_of(3, &p.twin_table).unwrap();
     assert_eq!(twin.parts["gear"].mu, values[3]);
 }
+
+/// A robot description of the user's own: `package://` is looked for beside and above it, and a mesh that is not there is
+/// an error that names it.
+#[test]
+fn a_robot_description_finds_its_meshes_or_says_which_it_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let package = folder.path().join("ur_description");
+    std::fs::create_dir_all(package.join("urdf")).unwrap();
+    let own = std::str::from_utf8(gripgen::assets::get("robots/ur5e/ur5e.urdf").unwrap()).unwrap();
+    let visual =
+        "<visual><geometry><mesh filename=\"package://ur_description/meshes/base.stl\"/></geometry></visual>";
+    let at = own.find("</link>").unwrap();
+    std::fs::write(package.join("urdf/arm.urdf"), format!("{}{visual}{}", &own[..at], &own[at..])).unwrap();
+    let load = || {
+        let urdf = package.join("urdf/arm.urdf").display().to_string();
+        Project::load(
+            &Location::parse("asset:configs/quickstart.toml"),
+            &[("robot.arm.urdf".to_string(), urdf)],
+        )
+    };
+    let Err(LoadError::Config(error)) = load() else { panic!("a mesh is missing") };
+    assert_eq!(error.key, "robot.arm.urdf");
+    assert!(error.problem.contains("package://ur_description/meshes/base.stl"), "{error}");
+    std::fs::create_dir_all(package.join("meshes")).unwrap();
+    std::fs::write(package.join("meshes/base.stl"), b"solid x").unwrap();
+    let whole = load().unwrap_or_else(|e| panic!("{e}"));
+    assert!(whole.config_toml.contains("inputs/arm-"), "the description travels with the run");
+}

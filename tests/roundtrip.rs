@@ -22,6 +22,10 @@ fn a_shard_holds_the_samples_that_were_generated() {
             assert_eq!(record.images, pulled.images, "{images}: lossless");
             assert_eq!(record.sample.max_pull_force_n, Some(pulled.label.max_pull_force_n));
             assert_eq!(record.sample.part, sample.scenario.part);
+            assert_eq!(
+                record.sample.grip_angle_deg, 30.0,
+                "as it was written, without the rounding of radians"
+            );
             assert_eq!(record.sample.status(), Status::Slipped);
             let trace = record.trace.unwrap();
             assert_eq!(trace.len(), pulled.trace.len());
@@ -221,6 +225,23 @@ fn a_run_can_be_repeated_from_its_folder() {
     let again = Project::from_run(&RunFolder::open(out.path()).unwrap()).unwrap();
     assert_eq!(again.config_sha256, project.config_sha256);
     assert!(generate(&again, 1, SimdLevel::best()) == generate(&project, 1, SimdLevel::best()));
+
+    // What would not give the same samples is refused: another version, a changed input, a changed configuration.
+    let run_json = out.path().join("run.json");
+    let text = std::fs::read_to_string(&run_json).unwrap();
+    let refused = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&run_json, text.replacen(from, to, 1)).unwrap();
+        let error = Project::from_run(&RunFolder::open(out.path()).unwrap()).err().unwrap().to_string();
+        std::fs::write(&run_json, &text).unwrap();
+        error
+    };
+    assert!(refused("\"gripgen_version\": \"", "\"gripgen_version\": \"9.").contains("gripgen 9."));
+    assert!(refused("mu = 0.15", "mu = 0.16").contains("config_toml"));
+    let input = std::fs::read_dir(out.path().join("inputs")).unwrap().next().unwrap().unwrap().path();
+    std::fs::write(&input, gripgen::assets::get("parts/long_shaft/part.stl").unwrap()).unwrap();
+    let error = Project::from_run(&RunFolder::open(out.path()).unwrap()).err().unwrap().to_string();
+    assert!(error.contains("inputs/gear-"), "{error}");
 }
 
 /// The index has the columns of a measured pull table, under the same names.

@@ -20,6 +20,8 @@ mod paper;
 mod pull;
 // What is written is what was simulated.
 mod roundtrip;
+// The wrist sensor against logs of a real arm.
+mod real_force;
 // Files of Taxim.
 mod taxim;
 // The repository itself.
