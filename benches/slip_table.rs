@@ -19,8 +19,7 @@ const STEP_S: f64 = 0.002;
 const TIMED: [(&str, f64, f64); 2] = [("box", 0.168, 40.0), ("vertical_shaft", 0.6, 80.0)];
 /// Cells of a jaw in the reduced mechanics.
 const CELLS: usize = 64;
-/// The tool moves by the gels' shear before anything slips: 8 mm at 160 N under the peak of a round contact.
-const STOP_M: f64 = 20e-3;
+const STOP_M: f64 = 5e-3;
 
 fn main() {
     let file = std::env::args().skip(1).find(|a| !a.starts_with("--"));

@@ -25,6 +25,18 @@ pub enum SampleError {
     /// A file.
     #[error(transparent)]
     Library(#[from] LibraryError),
+    /// The force loop would be unstable.
+    #[error(
+        "{damping_n_s_per_m} N s/m stop more than the arm's {mass_kg:.1} kg along the pull within one step of {step_s} s"
+    )]
+    Damping {
+        /// Damping of the force loop.
+        damping_n_s_per_m: f64,
+        /// Mass that the arm has along the pull.
+        mass_kg: f64,
+        /// Time step.
+        step_s: f64,
+    },
     /// An effect leaves no grip force.
     #[error("the {jaw} jaw presses with {force_n:.4} N of the commanded {commanded_n} N: nothing is gripped")]
     NoForce {

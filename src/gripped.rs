@@ -4,7 +4,7 @@
 
 use crate::generate::{SampleError, SimulateOptions};
 use crate::library::Library;
-use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, grip};
+use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip};
 use gripgen_tactile::{Imprint, Plane, Renderer, Sensor};
 use gripgen_twin::config::{ImageNoise, Mechanics};
 use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n};
@@ -55,6 +55,9 @@ impl Gripped {
         })?;
         let shape = library.shape(part, scenario.grip_pose)?;
         let arm = twin.arm.as_ref().map(|arm| library.arm(arm)).transpose()?;
+        if let Some(arm) = arm.as_deref() {
+            check_damping(twin, arm, pull_direction(scenario))?;
+        }
         let arm = arm.as_deref().map_or(Arm::Carriage, Arm::Multibody);
         let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, arm, &shape))?
         else {
@@ -119,6 +122,16 @@ pub(crate) fn world_from_part(scenario: &Scenario) -> gripgen_twin::frames::Pose
 /// Unit vector of the pull in `world`.
 pub(crate) fn pull_direction(scenario: &Scenario) -> [f64; 3] {
     scenario.pull.direction.map(|x| x * scenario.covariates.pull_direction)
+}
+
+/// Damping that stops more than the arm's mass within one step of the force loop makes it unstable.
+pub(crate) fn check_damping(twin: &Twin, arm: &PlacedArm, direction: [f64; 3]) -> Result<(), SampleError> {
+    let (damping, step_s) = (twin.robot.damping_n_s_per_m, twin.wrist.step_s());
+    let mass_kg = arm.held_mass_kg(&twin.gripper, direction);
+    if damping * step_s < mass_kg {
+        return Ok(());
+    }
+    Err(SampleError::Damping { damping_n_s_per_m: damping, mass_kg, step_s })
 }
 
 /// What the effects look at.

@@ -104,6 +104,10 @@ impl LibraryError {
                 Some("a sensor file is gripgen's own npz, or Taxim's polycalib.npz")
             }
             LibraryError::Kernel { .. } => Some("see kernels_px of the gel"),
+            LibraryError::Urdf { .. } => Some(
+                "package://NAME/... is looked for in a folder NAME beside or above the URDF; robot.arm.tip names one of its links",
+            ),
+            LibraryError::Arm(_) => Some("see robot.arm.joints_deg of the twin"),
             _ => None,
         }
     }
@@ -175,7 +179,12 @@ impl Library {
     /// Reads the robot description of an arm and checks that the files it names are there.
     pub(crate) fn check_arm(&self, arm: &RobotArm) -> Result<(), LibraryError> {
         let (location, _) = self.file(&arm.urdf)?;
-        self.arm_model(arm, &|reference| location.ros_file(reference))?;
+        // The copy in a run folder was checked where it came from; the meshes are not copied.
+        let copied =
+            matches!(location, Location::Disk(file) if file.parent().is_some_and(|p| p.ends_with("inputs")));
+        self.arm_model(arm, &|reference| {
+            if copied { Some(reference.into()) } else { location.ros_file(reference) }
+        })?;
         self.arm(arm).map(drop)
     }
 

@@ -3,7 +3,7 @@
 use crate::assets;
 use crate::cache::Cache;
 use crate::generate::SimulateOptions;
-use crate::gripped::Gripped;
+use crate::gripped::{Gripped, check_damping};
 use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
 use crate::resolve::{Files, Named, Resolved, config_hash, resolve};
@@ -100,6 +100,7 @@ impl Project {
         let locate = |path: &str| twin_location.beside(path);
         let Resolved { config_toml, files, named } = resolve(&sweep, &twin_document, &document, locate)?;
         let project = Self::from_resolved(location.run_name(), config_toml, files)?;
+        project.check_arms().map_err(|e| twin_document.located(e))?;
         for file in &named {
             project.check_file(file).map_err(|e| {
                 let document = if file.key == file.twin_key { &twin_document } else { &document };
@@ -160,6 +161,40 @@ impl Project {
         let library = Library::new(files);
         let grips = Cache::new(GRIPS);
         Ok(Self { name, sweep, twin, twin_table, library, grips, config_toml, config_sha256 })
+    }
+
+    /// Builds the arm in every stance that its varied keys can draw, and checks the force loop against its mass.
+    fn check_arms(&self) -> Result<(), ConfigError> {
+        let mut twins = vec![(String::new(), self.twin.clone())];
+        for varied in self.sweep.vary.iter().filter(|v| v.key.starts_with("robot.")) {
+            for value in varied.distribution.extremes() {
+                let twin = Sweep::twin_with(&self.twin_table, &varied.key, &value)?;
+                twins.push((format!("vary.{} = {value}: ", varied.key), twin));
+            }
+        }
+        for (drawn, twin) in twins {
+            let Some(arm) = &twin.arm else { continue };
+            let fault = |key: &str, e: &dyn std::fmt::Display, hint: &str| {
+                ConfigError::new(key, format!("{drawn}{e}")).hint(hint)
+            };
+            let placed = self.library.arm(arm).map_err(|e| match &e {
+                LibraryError::Arm(_) => fault(
+                    "robot.arm.joints_deg",
+                    &e,
+                    "the shipped stance is in the baseline twin (`gripgen init` writes it)",
+                ),
+                LibraryError::Urdf { .. } => fault(
+                    "robot.arm.urdf",
+                    &e,
+                    "robot.arm.tip names a link of the URDF; the arm needs six revolute joints",
+                ),
+                _ => fault("robot.arm.urdf", &e, "a file that varies has to stand in the twin or in a list"),
+            })?;
+            check_damping(&twin, &placed, self.sweep.pull().direction).map_err(|e| {
+                fault("robot.damping_n_s_per_m", &e, "lower the damping or raise wrist.rate_hz")
+            })?;
+        }
+        Ok(())
     }
 
     /// Reads a mesh or sensor as every sample will, so that a broken file is found before any work is done.

@@ -15,6 +15,9 @@ use std::path::Path;
 /// Files by the path that names them: where they are, and their content.
 pub(crate) type Files = BTreeMap<String, (Location, Vec<u8>)>;
 
+/// Stands for the path of a file that no sample needs.
+const NOT_USED: &str = "not used";
+
 /// A file that a configuration names.
 pub(crate) struct Named {
     /// Key that names it: `parts.gear.mesh` of the twin, or `vary.parts.gear.mesh[1]` of the sweep.
@@ -51,7 +54,9 @@ pub(crate) fn resolve(
     file.twin = "twin.toml".into();
     let mut both = toml::Table::new();
     both.insert("sweep".into(), written(toml::Table::try_from(&file))?);
-    both.insert("twin".into(), written(toml::Table::try_from(&twin))?);
+    let mut twin = written(toml::Table::try_from(&twin))?;
+    keep_partial(&mut twin, twin_document.table());
+    both.insert("twin".into(), twin);
     Ok(Resolved { config_toml: both.to_string(), files: resolver.files, named: resolver.named })
 }
 
@@ -67,6 +72,17 @@ pub(crate) fn config_hash(config_toml: &str, files: &Files) -> String {
 fn written(table: Result<toml::Table, toml::ser::Error>) -> Result<toml::Value, ConfigError> {
     let unwritable = |e| ConfigError::new("", format!("it cannot be written as TOML: {e}"));
     table.map(toml::Value::Table).map_err(unwritable)
+}
+
+/// A right jaw that names some keys only goes on doing so: what varies on the left then varies on both.
+fn keep_partial(twin: &mut toml::Value, typed: &toml::Table) {
+    for section in ["gel", "optics"] {
+        let typed = typed.get(section).and_then(|s| s.get("right")).and_then(toml::Value::as_table);
+        let right = twin.get_mut(section).and_then(|s| s.get_mut("right"));
+        if let (Some(typed), Some(toml::Value::Table(right))) = (typed, right) {
+            right.retain(|key, _| typed.contains_key(key));
+        }
+    }
 }
 
 /// Whether a key of a twin holds a path.
@@ -86,16 +102,24 @@ impl<L: Fn(&str) -> Location> Resolver<L> {
     fn twin(&mut self, sweep: &Sweep, twin: &mut TwinFile) -> Result<(), ConfigError> {
         twin.schema = Some(TWIN_SCHEMA.into());
         let drawn = sweep.drawn_parts();
-        // A mesh that no sample draws need not be there.
-        for (name, part) in twin.parts.iter_mut().filter(|(name, _)| drawn.contains(&name.as_str())) {
+        for (name, part) in &mut twin.parts {
             let key = format!("parts.{name}.mesh");
-            self.name(key.clone(), key, &mut part.mesh)?;
+            // A mesh that no sample draws need not be there, and its path is nobody's business.
+            if drawn.contains(&name.as_str()) {
+                self.name(key.clone(), key, &mut part.mesh)?;
+            } else {
+                part.mesh = NOT_USED.into();
+            }
         }
-        if twin.robot.model == RobotModel::Ur5e
-            && let Some(arm) = &mut twin.robot.arm
-        {
+        let linked =
+            twin.robot.model == RobotModel::Ur5e || sweep.vary.iter().any(|v| v.key == "robot.model");
+        if let Some(arm) = &mut twin.robot.arm {
             let key = "robot.arm.urdf".to_string();
-            self.name(key.clone(), key, &mut arm.urdf)?;
+            if linked {
+                self.name(key.clone(), key, &mut arm.urdf)?;
+            } else {
+                arm.urdf = NOT_USED.into();
+            }
         }
         let optics = [("left", Some(&mut twin.optics.left)), ("right", twin.optics.right.as_mut())];
         for (jaw, optics) in optics {
@@ -161,10 +185,15 @@ impl<L: Fn(&str) -> Location> Resolver<L> {
 fn input_path(file: &Path, bytes: &[u8]) -> String {
     let plain = |text: Option<&std::ffi::OsStr>| -> String {
         let text = text.map(|t| t.to_string_lossy().into_owned()).unwrap_or_default();
-        text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect()
+        text.chars()
+            .map(|c| if c.is_ascii_alphanumeric() || c == '_' || c == '-' { c } else { '_' })
+            .collect()
     };
     let hash = &sha256_hex(bytes)[..16];
-    format!("inputs/{}-{hash}.{}", plain(file.file_stem()), plain(file.extension()).to_lowercase())
+    let stem = plain(file.file_stem());
+    // A copy of a copy keeps its name.
+    let stem = stem.strip_suffix(&format!("-{hash}")).unwrap_or(&stem);
+    format!("inputs/{stem}-{hash}.{}", plain(file.extension()).to_lowercase())
 }
 
 #[cfg(test)]
@@ -175,5 +204,6 @@ mod tests {
     fn copies_are_named_by_what_they_were_and_what_they_hold() {
         let name = input_path(Path::new("/a b/Übel teil.v2.STL"), b"x");
         assert_eq!(name, "inputs/_bel_teil_v2-2d711642b726b044.stl");
+        assert_eq!(input_path(Path::new(&name), b"x"), name);
     }
 }

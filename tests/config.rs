@@ -302,3 +302,93 @@ fn a_robot_description_finds_its_meshes_or_says_which_it_does_not() {
     let whole = load().unwrap_or_else(|e| panic!("{e}"));
     assert!(whole.config_toml.contains("inputs/arm-"), "the description travels with the run");
 }
+
+/// Overrides that load, or the key and words of the error they give.
+fn refused(sets: &[(&str, &str)]) -> Option<ConfigError> {
+    let sets: Vec<(String, String)> = sets.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
+    match Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets) {
+        Ok(_) => None,
+        Err(LoadError::Config(e)) => Some(e),
+        Err(e) => panic!("{e}"),
+    }
+}
+
+#[test]
+fn settings_that_do_not_go_together_are_refused() {
+    let base = ("twin", "asset:configs/twin-baseline.toml");
+    let cases: &[(&[(&str, &str)], &str, &str)] = &[
+        (&[("robot.damping_n_s_per_m", "20000")], "robot.damping_n_s_per_m", "the arm's 16"),
+        (
+            &[("robot.model", "carriage"), ("robot.damping_n_s_per_m", "5000")],
+            "robot.damping_n_s_per_m",
+            "9.6",
+        ),
+        (
+            &[base, ("effects", "[{name = \"jaw_tilt\", tilt_deg = 3.0}]"), ("pull.direction", "[0, 0, -1]")],
+            "pull.direction",
+            "`jaw_tilt`",
+        ),
+        (
+            &[
+                base,
+                ("effects", "[{name = \"off_centre\", inverse_lever_per_mm = 0.1}]"),
+                ("robot.twist", "free"),
+            ],
+            "effects[0].name",
+            "counted twice",
+        ),
+        (
+            &[base, ("effects", "[{name = \"sensor_gain\", gain = 1.1, outside_fit = \"error\"}]")],
+            "effects[0].outside_fit",
+            "no friction law",
+        ),
+        (&[base, ("effects.wear.depth", "0.1")], "effects.wear.depth", "has no effects"),
+        (&[("vary.robot.arm.joints_deg[2]", "[110, 0]")], "robot.arm.joints_deg", "singular"),
+        (&[("robot.arm.tip", "nope")], "robot.arm.urdf", "nope"),
+    ];
+    for (sets, key, part) in cases {
+        let error = refused(sets).unwrap_or_else(|| panic!("{sets:?} was accepted"));
+        assert_eq!(&error.key, key, "{sets:?}: {error}");
+        assert!(error.problem.contains(part) && error.hint.is_some(), "{sets:?}: {error}, {:?}", error.hint);
+    }
+    // And their neighbours load.
+    for sets in [
+        &[("robot.damping_n_s_per_m", "7000"), ("robot.moving_mass_kg", "0.2")][..],
+        &[base, ("effects", "[{name = \"jaw_tilt\", tilt_deg = 3.0}]"), ("vary.pull_direction", "[-1]")],
+        &[base, ("robot.model", "carriage"), ("vary.robot.model", "[\"carriage\", \"ur5e\"]")],
+        &[("vary.parts.gear.mu", "[0.13, 0.17]"), ("vary.robot.twist", "[\"stiff\", \"free\"]")],
+    ] {
+        assert!(refused(sets).is_none(), "{sets:?}: {:?}", refused(sets));
+    }
+}
+
+/// Paths of files that no sample needs are nobody's business: they change no hash and stand in no run folder.
+#[test]
+fn paths_of_unused_files_stay_at_home() {
+    let hash = |path: &str| {
+        let sets =
+            [("vary.part", "[\"long_shaft\"]"), ("parts.gear.mesh", path), ("robot.model", "carriage")]
+                .map(|(k, v)| (k.to_string(), v.to_string()));
+        let p = Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap();
+        assert!(!p.config_toml.contains(path), "{path}");
+        p.config_sha256
+    };
+    assert_eq!(hash("/home/me/gear.stl"), hash("/elsewhere/gear.stl"));
+}
+
+/// What varies on the left gel varies on a right one that does not name it, before and after resolving.
+#[test]
+fn a_partial_right_jaw_follows_the_left_one() {
+    let p = project(
+        "asset:configs/quickstart.toml",
+        &["gel.right.shear_stiffness_n_per_mm=10", "vary.gel.left.thickness_mm=[3, 5]"],
+    );
+    for index in 0..p.sweep.samples {
+        let twin = p.twin_of(index).unwrap();
+        assert_eq!(twin.gel.left.thickness_m, twin.gel.right.thickness_m);
+        assert_eq!(
+            (twin.gel.left.shear_stiffness_n_per_m, twin.gel.right.shear_stiffness_n_per_m),
+            (2e4, 1e4)
+        );
+    }
+}

@@ -130,3 +130,33 @@ fn a_free_twist_falls_with_the_lever() {
     let along = label("reduced", "free", 20.0, 90.0);
     assert!((along / straight - 1.0).abs() < 0.01, "{along}");
 }
+
+/// The strongest pulls of the grid, at the default stop: both mechanics reach the limit of the friction law.
+#[test]
+fn strong_grips_slip_before_the_stop() {
+    for mechanics in ["rapier", "reduced"] {
+        for (part, mu) in [("long_shaft", 1.0), ("gear", 1.0), ("ball_bearing", 1.0), ("roller_bearing", 1.0)]
+        {
+            let p = project(
+                "asset:configs/quickstart.toml",
+                &[
+                    "twin=asset:configs/twin-baseline.toml",
+                    "images=none",
+                    "wrist.noise_n=0",
+                    &format!("parts.{part}.scatter=0"),
+                    &format!("parts.{part}.mu={mu}"),
+                    &format!("vary.part=[\"{part}\"]"),
+                    "vary.grip_force_n=[80]",
+                    "vary.grip_pose=[0, 1]",
+                    "vary.grip_angle_deg=[0]",
+                    &format!("mechanics={mechanics}"),
+                ],
+            );
+            for index in 0..2 {
+                let label = pulled(&p, index).unwrap().label;
+                let off = label.max_pull_force_n / (2.0 * mu * 80.0) - 1.0;
+                assert!(!label.censored && off.abs() < 1e-3, "{mechanics}, {part}, grip {index}: {label:?}");
+            }
+        }
+    }
+}

@@ -163,6 +163,13 @@ impl Sweep {
         read_twin(&table)
     }
 
+    /// The twin of `base` with one value put in.
+    pub fn twin_with(base: &toml::Table, key: &str, value: &Drawn) -> Result<Twin, ConfigError> {
+        let mut table = base.clone();
+        put(&mut table, key, value)?;
+        read_twin(&table)
+    }
+
     /// A scenario in which nothing is drawn yet.
     fn blank(&self) -> Scenario {
         Scenario {

@@ -2,7 +2,7 @@
 
 use crate::config::{ArmFile, ConfigError, RobotModel, TwinFile};
 use crate::config::{Feedback, ForceConvention, ImageNoise, Twist};
-use crate::effects::{self, Effect, EffectSpec, Per};
+use crate::effects::{self, Effect, EffectSpec, OutsideFit, Per};
 use crate::frames::{Pose, pose, rotation_from_fixed_xyz};
 use crate::{Jaw, PerJaw};
 use nalgebra::{Point3, Vector3};
@@ -191,7 +191,8 @@ impl Twin {
             rate_hz: in_range("wrist.rate_hz", file.wrist.rate_hz, 500.0..=4000.0, "Hz")?,
         };
         let mass_kg = robot.moving_mass_kg + gripper.mass_kg + 2.0 * gripper.jaw_mass_kg;
-        if robot.damping_n_s_per_m * wrist.step_s() >= mass_kg {
+        // The mass of an arm with links is known where its description is read.
+        if arm.is_none() && robot.damping_n_s_per_m * wrist.step_s() >= mass_kg {
             let problem = format!(
                 "{} N s/m stop more than the moving {mass_kg} kg within one step of {} s",
                 robot.damping_n_s_per_m,
@@ -225,7 +226,15 @@ impl Twin {
             .iter()
             .map(|(name, part)| Ok((name.clone(), check_part(part, &format!("parts.{name}"))?)))
             .collect::<Result<_, ConfigError>>()?;
-        let effects = (0..file.effects.len()).map(|i| check_effect(file, i)).collect::<Result<_, _>>()?;
+        let effects =
+            (0..file.effects.len()).map(|i| check_effect(file, i)).collect::<Result<Vec<Effect>, _>>()?;
+        if robot.twist == Twist::Free
+            && let Some(i) = effects.iter().position(|e: &Effect| e.spec.id == "off_centre")
+        {
+            let problem = "`off_centre` and robot.twist = \"free\" are the same loss, counted twice";
+            return Err(ConfigError::new(format!("effects[{i}].name"), problem)
+                .hint("leave the effect out, or set robot.twist = \"stiff\""));
+        }
         Ok(Twin { robot, arm, gripper, wrist, gel, optics, parts, effects })
     }
 
@@ -351,6 +360,15 @@ fn check_effect(file: &TwinFile, index: usize) -> Result<Effect, ConfigError> {
                 Some(close) => error.hint(format!("did you mean `{close}`?")),
                 None => error.hint(format!("its keys: {}", names.join(", "))),
             });
+        }
+    }
+    if spec.friction.is_none() {
+        let range = effect.fitted_grip_force_n.map(|_| "fitted_grip_force_n");
+        let outside = (effect.outside_fit != OutsideFit::default()).then_some("outside_fit");
+        if let Some(name) = range.or(outside) {
+            let problem =
+                format!("`{}` is no friction law, a range of grip forces says nothing about it", spec.id);
+            return Err(ConfigError::new(key(name), problem).hint(format!("leave {name} out")));
         }
     }
     let values = spec

@@ -22,8 +22,7 @@ fn session_with_cells(bench: &Bench, mu: f64, cells: usize, kinetic_ratio: f64) 
 }
 
 fn pull(session: &mut PullSession, until: Until) -> StaircaseResult {
-    // A cell of twice the mean pressure holds to twice the mean shear: at 160 N that is 8 mm.
-    let settings = PullSettings { stop_m: 20e-3, ..settings() };
+    let settings = settings();
     let staircase = Staircase::constant(settings.increment_n, settings.step_s, settings.max_time_s);
     pull_staircase(session, &staircase, &settings, until).unwrap()
 }
@@ -59,14 +58,16 @@ fn slip_begins_at_the_rim() {
     for i in 0..1000 {
         let state = session.step(Command::ForceN(f64::from(i) * 0.02), STEP_S).unwrap();
         let x = state.displacement_m;
-        let curve: f64 =
-            (0..cells).map(|i| (2e4 / cells as f64 * x).min(10.0 * weight(i) / sum)).sum::<f64>() * 2.0;
+        let curve: f64 = (0..cells)
+            .map(|i| (2e4 * (0.25 / cells as f64 + 0.75 * weight(i) / sum) * x).min(10.0 * weight(i) / sum))
+            .sum::<f64>()
+            * 2.0;
         assert!(
             (state.contact_force_n - curve).abs() < 1e-9,
             "step {i}: {} and {curve}",
             state.contact_force_n
         );
-        bent |= state.contact_force_n < 0.95 * 4e4 * x && state.contact_force_n < 19.0;
+        bent |= state.contact_force_n < 0.99 * 4e4 * x && state.contact_force_n < 19.0;
     }
     assert!(bent);
 }
@@ -202,5 +203,29 @@ fn a_clone_continues_like_the_original() {
     for i in 0..300 {
         let command = Command::ForceN(5.0 + f64::from(i) * 0.05);
         assert_eq!(original.step(command, STEP_S), copy.step(command, STEP_S));
+    }
+}
+
+/// A policy may turn its force round at once: every step still balances, however stiff the gel.
+#[test]
+fn sudden_reversals_balance() {
+    for stiffness_n_per_m in [2e4, 2e5, 1e7] {
+        let mut bench = bench(PartShape::ball(0.01), 40.0);
+        bench.robot.damping_n_s_per_m = 1.0;
+        bench.robot.lag_s = 0.0;
+        for jaw in gripgen_twin::Jaw::BOTH {
+            bench.gel[jaw].shear_stiffness_n_per_m = stiffness_n_per_m;
+        }
+        let mut session = session_with_cells(&bench, 0.25, 64, 1.0);
+        for i in 0..400 {
+            let before = session.state();
+            let force = if i / 7 % 2 == 0 { 30.0 } else { -30.0 };
+            let state = session.step(Command::ForceN(force), STEP_S).unwrap();
+            assert!(state.contact_force_n.abs() <= 20.0 + 1e-9, "step {i}: {} N", state.contact_force_n);
+            // Momentum: what the arm applied went into motion or into the contact. The speed limit allows 0.02 N more.
+            let applied = state.contact_force_n + 9.6 * (state.speed_m_per_s - before.speed_m_per_s) / STEP_S;
+            let bound = before.contact_force_n.abs() + 30.0 + 1.0;
+            assert!(applied.abs() <= bound, "step {i}, {stiffness_n_per_m} N/m: {applied} N applied");
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Reading the values of `[vary]`.
 
-use super::ConfigError;
+use super::{ConfigError, suggestion};
 use crate::draw::{Distribution, Drawn, VariedKey};
+use crate::scenario_keys::{PULL_KEYS, SCENARIO_KEYS};
 
 /// Names of the distributions.
 const NAMES: [&str; 4] = ["uniform", "normal", "log_uniform", "from"];
@@ -18,20 +19,25 @@ fn collect(table: &toml::Table, prefix: &str, keys: &mut Vec<VariedKey>) -> Resu
     for (name, value) in table {
         let key = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
         match value {
-            toml::Value::Table(inner) if !is_distribution(inner) => collect(inner, &key, keys)?,
+            toml::Value::Table(inner) if !is_distribution(&key, inner) => collect(inner, &key, keys)?,
             _ => keys.push(VariedKey { distribution: distribution(&key, value)?, key }),
         }
     }
     Ok(())
 }
 
-/// Whether a table is meant as a distribution: by its names, by the shape `{ word = [1, 2] }`, or by words that are
-/// customary elsewhere. Other tables are sections of keys.
-fn is_distribution(table: &toml::Table) -> bool {
+/// Whether a table is meant as a distribution: because its key takes values, by its names, or by words that are close to
+/// them or customary elsewhere. Other tables are sections of keys.
+fn is_distribution(key: &str, table: &toml::Table) -> bool {
     const CUSTOMARY: [&str; 9] = ["min", "max", "low", "high", "mean", "std", "sigma", "choice", "values"];
-    let pair = |v: &toml::Value| matches!(v, toml::Value::Array(a) if a.len() == 2 && a.iter().all(|x| !x.is_table()));
-    table.keys().any(|k| NAMES.contains(&k.as_str()) || CUSTOMARY.contains(&k.as_str()))
-        || (table.len() == 1 && table.values().all(pair))
+    let takes_values =
+        SCENARIO_KEYS.contains(&key) || (PULL_KEYS.contains(&key) && !table.contains_key("jitter"));
+    let pair = |v: &toml::Value| v.as_array().is_some_and(|a| a.len() == 2);
+    takes_values
+        || table.iter().any(|(k, v)| {
+            [&NAMES[..], &CUSTOMARY].concat().contains(&k.as_str())
+                || (pair(v) && suggestion(k, NAMES).is_some())
+        })
 }
 
 fn distribution(key: &str, value: &toml::Value) -> Result<Distribution, ConfigError> {
@@ -88,7 +94,7 @@ fn named(place: &str, name: &str, argument: &toml::Value) -> Result<Distribution
             .hint("the only source is from = \"interval\", the calibrated uncertainty of the key")),
         other => {
             let error = ConfigError::new(place, format!("there is no distribution `{other}`"));
-            Err(match super::suggestion(other, NAMES) {
+            Err(match suggestion(other, NAMES) {
                 Some(close) => error.hint(format!("did you mean `{close}`?")),
                 None => {
                     error.hint("write a list of values, uniform, normal, log_uniform or from = \"interval\"")

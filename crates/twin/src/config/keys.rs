@@ -69,6 +69,11 @@ pub(crate) fn assign(table: &mut toml::Table, key: &str, value: toml::Value) -> 
         table.insert(key.into(), value);
         return Ok(resolved);
     }
+    if segments[0] == "effects" && !table.contains_key("effects") {
+        return Err(ConfigError::new(key, "the twin has no effects").hint(
+            "add one with [[effects]] and its name, here: --set 'effects=[{name=\"wear\", depth=0.1}]'",
+        ));
+    }
     let mut current: &mut toml::Value =
         table.entry(segments[0]).or_insert_with(|| toml::Value::Table(Default::default()));
     let mut at = 1;

@@ -34,6 +34,7 @@ impl Sweep {
         if file.design == DesignFile::Sobol {
             check_sobol(samples.div_ceil(file.repetitions), vary.len())?;
         }
+        check_direction(file.pull.direction, &checked_twin)?;
         let sweep = Self {
             twin: file.twin.clone(),
             samples,
@@ -107,6 +108,24 @@ impl Sweep {
             }
         }
         Ok(())
+    }
+}
+
+/// Effects whose formulas know a pull up (`pull_direction` 1) and down (-1) and no other.
+const UPRIGHT_EFFECTS: [&str; 4] = ["anisotropy", "jaw_tilt", "sensor_bias", "sensor_drift"];
+
+fn check_direction(direction: [f64; 3], twin: &Twin) -> Result<(), ConfigError> {
+    let upright = direction[0] == 0.0 && direction[1] == 0.0 && direction[2] > 0.0;
+    match twin.effects.iter().find(|e| UPRIGHT_EFFECTS.contains(&e.spec.id)) {
+        Some(effect) if !upright => {
+            let problem = format!(
+                "the effect `{}` of the twin knows pulls along z only, not {direction:?}",
+                effect.spec.id
+            );
+            Err(ConfigError::new("pull.direction", problem)
+                .hint("a pull downwards is direction = [0, 0, 1] with pull_direction = [-1] in [vary]"))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -219,7 +238,7 @@ pub(super) fn pull_settings(file: &PullFile) -> Result<PullSettings, ConfigError
     if direction[1].abs() > 1e-9 {
         let problem = format!("[{x}, {y}, {z}] has a component along y, the jaw axis");
         return Err(ConfigError::new("pull.direction", problem)
-            .hint("the carriage pulls at right angles to the jaws; set y to 0"));
+            .hint("the arm pulls at right angles to the jaws; set y to 0"));
     }
     let max_time_s = in_range("pull.max_time_s", file.max_time_s, 0.1..=3600.0, "s")?;
     let settings = PullSettings {
