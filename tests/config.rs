@@ -303,8 +303,11 @@ fn a_robot_description_finds_its_meshes_or_says_which_it_does_not() {
     assert!(whole.config_toml.contains("inputs/arm-"), "the description travels with the run");
 }
 
+/// Overrides `key=value`.
+type Sets<'a> = &'a [(&'a str, &'a str)];
+
 /// Overrides that load, or the key and words of the error they give.
-fn refused(sets: &[(&str, &str)]) -> Option<ConfigError> {
+fn refused(sets: Sets<'_>) -> Option<ConfigError> {
     let sets: Vec<(String, String)> = sets.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
     match Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets) {
         Ok(_) => None,
@@ -316,7 +319,7 @@ fn refused(sets: &[(&str, &str)]) -> Option<ConfigError> {
 #[test]
 fn settings_that_do_not_go_together_are_refused() {
     let base = ("twin", "asset:configs/twin-baseline.toml");
-    let cases: &[(&[(&str, &str)], &str, &str)] = &[
+    let cases: &[(Sets<'_>, &str, &str)] = &[
         (&[("robot.damping_n_s_per_m", "20000")], "robot.damping_n_s_per_m", "the arm's 16"),
         (
             &[("robot.model", "carriage"), ("robot.damping_n_s_per_m", "5000")],
