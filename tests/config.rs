@@ -359,6 +359,7 @@ fn settings_that_do_not_go_together_are_refused() {
         &[("robot.damping_n_s_per_m", "7000"), ("robot.moving_mass_kg", "0.2")][..],
         &[base, ("effects", "[{name = \"jaw_tilt\", tilt_deg = 3.0}]"), ("vary.pull_direction", "[-1]")],
         &[base, ("robot.model", "carriage"), ("vary.robot.model", "[\"carriage\", \"ur5e\"]")],
+        &[("vary.gel.left.kernels_px[0]", "[51, 71]")],
         &[("vary.parts.gear.mu", "[0.13, 0.17]"), ("vary.robot.twist", "[\"stiff\", \"free\"]")],
     ] {
         assert!(refused(sets).is_none(), "{sets:?}: {:?}", refused(sets));

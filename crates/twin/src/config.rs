@@ -14,7 +14,7 @@ mod twin_file;
 pub(crate) use document::read_twin_table;
 pub use document::{Document, Place};
 pub(crate) use draw_file::read as read_vary;
-pub(crate) use keys::{assign, check_part};
+pub(crate) use keys::{assign, check_part, get};
 pub use sweep_file::{
     Backend, DesignFile, ImageStorage, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,
 };

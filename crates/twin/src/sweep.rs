@@ -4,7 +4,7 @@ mod check;
 
 use crate::config::{
     Backend, ConfigError, DesignFile, ImageStorage, Mechanics, PullFile, SweepFile, TraceStorage, assign,
-    check_part, read_twin_table,
+    check_part, get, read_twin_table,
 };
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
 use crate::scenario_keys::{self, KeyError};
@@ -200,5 +200,12 @@ fn read_twin(table: &toml::Table) -> Result<Twin, ConfigError> {
 /// Puts a drawn value into a twin's table.
 fn put(table: &mut toml::Table, key: &str, value: &Drawn) -> Result<(), ConfigError> {
     check_part(table, key)?;
-    assign(table, key, value.to_toml()).map(|_| ())
+    let value = match (value, get(table, key)) {
+        // A whole number stays one where the twin has one, a kernel's size for example.
+        (Drawn::Number(x), Some(toml::Value::Integer(_))) if x.fract() == 0.0 => {
+            toml::Value::Integer(*x as i64)
+        }
+        _ => value.to_toml(),
+    };
+    assign(table, key, value).map(|_| ())
 }
