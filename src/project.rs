@@ -181,7 +181,7 @@ impl Project {
                 LibraryError::Arm(_) => fault(
                     "robot.arm.joints_deg",
                     &e,
-                    "the shipped stance is in the baseline twin (`gripgen init` writes it)",
+                    "the shipped stance stands in asset:configs/twin-baseline.toml",
                 ),
                 LibraryError::Urdf { .. } => fault(
                     "robot.arm.urdf",

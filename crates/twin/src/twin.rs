@@ -251,7 +251,7 @@ fn check_arm(arm: Option<&ArmFile>) -> Result<RobotArm, ConfigError> {
     use crate::config::in_range;
     let arm = arm.ok_or_else(|| {
         ConfigError::new("robot.model", "`ur5e` needs the section [robot.arm]")
-            .hint("`gripgen init` writes one; or use model = \"carriage\"")
+            .hint("the shipped one stands in asset:configs/twin-baseline.toml; or use model = \"carriage\"")
     })?;
     let (mut joints_rad, mut rotor_inertia_kg_m2) = ([0.0; 6], [0.0; 6]);
     for i in 0..6 {
