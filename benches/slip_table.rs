@@ -7,14 +7,14 @@ use gripgen::physics::{
     Arm, Command, FrictionCell, Grip, GripSetup, Held, JawFriction, Mount, PartShape, PullSession, Until,
     grip, pull_staircase,
 };
-use gripgen::twin::config::{Feedback, ForceConvention, Mechanics, Twist};
+use gripgen::twin::config::Mechanics;
 use gripgen::twin::frames::{Pose, pose, rotation_about_axis};
 use gripgen::twin::parts::SteppedShaft;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen::twin::{Gel, Gripper, PerJaw, PullSettings, Robot, Staircase, Wrist, slip_label};
+use gripgen::twin::{PerJaw, PullSettings, Staircase, Twin, slip_label};
+use gripgen::{BASELINE_TWIN, Location, Project};
 use std::time::Instant;
 
-const STEP_S: f64 = 0.002;
 /// The pulls whose speed is stated.
 const TIMED: [(&str, f64, f64); 2] = [("box", 0.168, 40.0), ("vertical_shaft", 0.6, 80.0)];
 /// Cells of a jaw in the reduced mechanics.
@@ -22,6 +22,8 @@ const CELLS: usize = 64;
 const STOP_M: f64 = 5e-3;
 
 fn main() {
+    let sets = [("twin", BASELINE_TWIN), ("wrist.noise_n", "0")].map(|(k, v)| (k.into(), v.into()));
+    let twin = Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap().twin;
     let file = std::env::args().skip(1).find(|a| !a.starts_with("--"));
     let mut rows = Vec::new();
     for (mechanics, name) in [(Mechanics::Rapier, "rapier"), (Mechanics::Reduced, "reduced")] {
@@ -29,7 +31,7 @@ fn main() {
         for (shape_name, shape) in shapes() {
             for mu in [0.14, 0.168, 0.3, 0.6, 1.0] {
                 for grip_force_n in [5.0, 20.0, 40.0, 80.0] {
-                    let row = measure(mechanics, &shape, mu, grip_force_n);
+                    let row = measure(&twin, mechanics, &shape, mu, grip_force_n);
                     worst = worst.max((row.slip_force_n / (2.0 * mu * grip_force_n) - 1.0).abs());
                     let mut json = serde_json::json!({
                         "mechanics": name, "shape": shape_name, "mu": mu, "grip_force_n": grip_force_n,
@@ -73,7 +75,7 @@ fn shapes() -> Vec<(&'static str, PartShape)> {
     ]
 }
 
-fn measure(mechanics: Mechanics, shape: &PartShape, mu: f64, grip_force_n: f64) -> Row {
+fn measure(twin: &Twin, mechanics: Mechanics, shape: &PartShape, mu: f64, grip_force_n: f64) -> Row {
     let limit_n = 2.0 * mu * grip_force_n;
     let settings = PullSettings {
         increment_n: 1.0,
@@ -87,7 +89,7 @@ fn measure(mechanics: Mechanics, shape: &PartShape, mu: f64, grip_force_n: f64) 
     };
     let staircase = Staircase::constant(settings.increment_n, settings.step_s, settings.max_time_s);
     let start = Instant::now();
-    let mut session = session(mechanics, shape, mu, grip_force_n);
+    let mut session = session(twin, mechanics, shape, mu, grip_force_n);
     let result = pull_staircase(&mut session, &staircase, &settings, Until::Stopped).unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let label = slip_label(&result.trace, 3.0, result.slid).unwrap();
@@ -99,7 +101,10 @@ fn measure(mechanics: Mechanics, shape: &PartShape, mu: f64, grip_force_n: f64) 
     Row {
         slip_force_n,
         label_n: label.max_pull_force_n,
-        creep_mm_per_s: creep_mm_per_s(&mut self::session(mechanics, shape, mu, grip_force_n), 0.9 * limit_n),
+        creep_mm_per_s: creep_mm_per_s(
+            &mut self::session(twin, mechanics, shape, mu, grip_force_n),
+            0.9 * limit_n,
+        ),
         us_per_step: 1e6 * seconds / steps as f64,
         steps,
         pulls_per_s: 1.0 / seconds,
@@ -114,45 +119,25 @@ fn creep_mm_per_s(session: &mut PullSession, force_n: f64) -> f64 {
     1e3 * (end - start).abs() / 2.0
 }
 
-fn session(mechanics: Mechanics, shape: &PartShape, mu: f64, grip_force_n: f64) -> PullSession {
+fn session(twin: &Twin, mechanics: Mechanics, shape: &PartShape, mu: f64, grip_force_n: f64) -> PullSession {
     let weight = |i: usize| 1.0 - ((i as f64 + 0.5) / CELLS as f64 * 2.0 - 1.0).powi(2);
     let sum: f64 = (0..CELLS).map(weight).sum();
     let cell = |i| FrictionCell { limit_n: mu * grip_force_n * weight(i) / sum, area_m2: 1e-6 };
     let friction = JawFriction { cells: (0..CELLS).map(cell).collect(), kinetic_ratio: 1.0 };
     let noise = Stream::new(1, 2, Purpose::ForceNoise);
-    held(mechanics, shape, grip_force_n).pull(&PerJaw { left: friction.clone(), right: friction }, noise)
+    held(twin, mechanics, shape, grip_force_n)
+        .pull(&PerJaw { left: friction.clone(), right: friction }, noise)
 }
 
-fn held(mechanics: Mechanics, shape: &PartShape, grip_force_n: f64) -> Held {
-    let gel = Gel {
-        thickness_m: 4e-3,
-        width_m: 28e-3,
-        height_m: 21e-3,
-        shear_stiffness_n_per_m: 2e4,
-        kernels_px: vec![],
-        restore_depth_fraction: 0.4,
-    };
+/// The shipped rig on its carriage, without noise.
+fn held(twin: &Twin, mechanics: Mechanics, shape: &PartShape, grip_force_n: f64) -> Held {
     let setup = GripSetup {
         mechanics,
         arm: Arm::Carriage,
-        robot: Robot {
-            moving_mass_kg: 8.0,
-            lag_s: 0.05,
-            dead_time_s: 0.0,
-            damping_n_s_per_m: 2000.0,
-            speed_limit_m_per_s: 0.02,
-            feedback: Feedback::Measured,
-            twist: Twist::Stiff,
-        },
-        gripper: Gripper {
-            force_convention: ForceConvention::PerJaw,
-            mass_kg: 1.2,
-            jaw_mass_kg: 0.2,
-            opening_m: 0.11,
-            max_force_n: 80.0,
-        },
-        wrist: Wrist { noise_n: 0.0, rate_hz: 1.0 / STEP_S },
-        gel: &PerJaw { left: gel.clone(), right: gel },
+        robot: twin.robot,
+        gripper: twin.gripper,
+        wrist: twin.wrist,
+        gel: &twin.gel,
         shape,
         world_from_part: Pose::identity(),
         grip_force_n: PerJaw { left: grip_force_n, right: grip_force_n },

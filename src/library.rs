@@ -3,7 +3,7 @@
 use crate::cache::Cache;
 use crate::location::Location;
 use crate::resolve::Files;
-use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, Stance, UrdfError};
+use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, UrdfError};
 use gripgen_record::{decode_picture, sha256_hex};
 use gripgen_tactile::{Sensor, SensorError};
 use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh};
@@ -167,12 +167,7 @@ impl Library {
         self.arms.get(arm.clone(), || {
             // Where its meshes are was checked when the configuration was loaded; they are not used.
             let model = self.arm_model(arm, &|reference| Some(reference.into()))?;
-            let stance = Stance {
-                joints_rad: arm.joints_rad.to_vec(),
-                tip_to_grip_m: arm.tip_to_grip_m,
-                rotor_inertia_kg_m2: arm.rotor_inertia_kg_m2.to_vec(),
-            };
-            Ok(PlacedArm::new(model, stance)?)
+            Ok(PlacedArm::new(model, arm)?)
         })
     }
 

@@ -7,14 +7,6 @@ use gripgen_twin::{PullTrace, Twin};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// The paper's table of fits: part, mu_sim, a, b in N.
-pub(crate) const TABLE: [(&str, f64, f64, f64); 4] = [
-    ("ball_bearing", 0.14, 1.20, -4.34),
-    ("long_shaft", 0.168, 1.05, -3.20),
-    ("gear", 0.15, 1.36, -12.15),
-    ("roller_bearing", 0.14, 1.10, 10.15),
-];
-
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -67,6 +59,8 @@ impl Cell {
 pub(crate) struct PartCells {
     pub(crate) name: String,
     pub(crate) mu: f64,
+    /// a and b (in N) of the paper's correction, where the twin has it.
+    pub(crate) law: Option<(f64, f64)>,
     pub(crate) cells: Vec<Cell>,
 }
 
@@ -82,6 +76,9 @@ pub(crate) struct OffsetFit {
 /// Evaluates a run of `paper.toml` beside one of the same sweep on the twin without effects.
 pub fn paper_report(corrected: &RunFolder, plain: &RunFolder) -> Result<PaperReport, PaperError> {
     let (with, without) = (parts(corrected)?, parts(plain)?);
+    if let Some(part) = with.iter().find(|part| part.law.is_none()) {
+        return Err(PaperError::Foreign { what: format!("the correction of {}", part.name) });
+    }
     let profile = profile(corrected)?;
     let mut text = String::from(HEAD);
     cells_table(&mut text, &with);
@@ -109,10 +106,9 @@ fn parts(folder: &RunFolder) -> Result<Vec<PartCells>, PaperError> {
             cells.entry(key).or_default().push(number(label)?);
         }
     }
-    TABLE
+    twin.parts
         .iter()
-        .map(|(name, ..)| {
-            let mu = twin.parts.get(*name).ok_or_else(|| PaperError::Foreign { what: (*name).into() })?.mu;
+        .map(|(name, part)| {
             let cells: Vec<Cell> = cells
                 .iter()
                 .filter(|((part, _), _)| part == name)
@@ -124,7 +120,9 @@ fn parts(folder: &RunFolder) -> Result<Vec<PartCells>, PaperError> {
             if cells.len() < 3 {
                 return Err(PaperError::Foreign { what: format!("three grip forces of {name}") });
             }
-            Ok(PartCells { name: (*name).into(), mu, cells })
+            let law = twin.effects.iter().find(|e| e.spec.id == "load_offset" && e.acts_on(name));
+            let law = law.map(|e| (e.values[0], e.values[1]));
+            Ok(PartCells { name: name.clone(), mu: part.mu, law, cells })
         })
         .collect()
 }
@@ -183,7 +181,7 @@ fn profile(folder: &RunFolder) -> Result<PullTrace, PaperError> {
 fn cells_table(text: &mut String, parts: &[PartCells]) {
     *text += "## Labels\n\nMean and RMS of the repetitions, in N.\n\n| F_G / N |";
     parts.iter().for_each(|p| *text += &format!(" {} |", p.name));
-    *text += "\n|---|---|---|---|---|\n";
+    *text += &format!("\n|---|{}\n", "---|".repeat(parts.len()));
     for i in 0..parts[0].cells.len() {
         let _ = write!(text, "| {} |", parts[0].cells[i].grip_force_n);
         for cell in parts.iter().filter_map(|p| p.cells.get(i)) {
@@ -204,7 +202,8 @@ fn fit_table(text: &mut String, parts: &[PartCells], bias_n: f64) {
     );
     *text += "\
               | part | a, printed | a, found | b / N, printed | b / N, found | off by |\n|---|---|---|---|---|---|\n";
-    for (p, (_, _, a, b)) in parts.iter().zip(TABLE) {
+    for p in parts {
+        let Some((a, b)) = p.law else { continue };
         let f = offset_fit(p.mu, &p.cells, bias_n);
         let off = ((f.a - a) / f.a_error).abs().max(((f.b_n - b) / f.b_error_n).abs());
         let _ = writeln!(
@@ -228,11 +227,12 @@ fn error_table(text: &mut String, with: &[PartCells], without: &[PartCells]) {
     *text += "\n## Error before and after the correction\n\nMean relative distance from the paper's fitted ratios, over \
               grip forces, in percent.\n\n| part | mu_sim alone | mu_corr |\n|---|---|---|\n";
     let (mut before, mut after) = (0.0, 0.0);
-    for ((plain, corrected), (_, _, a, b)) in without.iter().zip(with).zip(TABLE) {
+    for (plain, corrected) in without.iter().zip(with) {
+        let Some((a, b)) = corrected.law else { continue };
         let (x, y) = (error_pct(plain, a, b), error_pct(corrected, a, b));
         let _ = writeln!(text, "| {} | {x:.1} | {y:.1} |", plain.name);
-        before += x / 4.0;
-        after += y / 4.0;
+        before += x / with.len() as f64;
+        after += y / with.len() as f64;
     }
     let _ = writeln!(text, "| all | {before:.1} | {after:.1} |");
 }
@@ -280,7 +280,7 @@ mod tests {
         }
         assert!((wide.a_error / narrow.a_error - 2.0).abs() < 1e-9 && wide.b_error_n > 0.1, "{wide:?}");
         let cells = cells(0.2);
-        let plain = PartCells { name: "gear".into(), mu, cells };
+        let plain = PartCells { name: "gear".into(), mu, law: None, cells };
         assert!(error_pct(&plain, a, b_n) < 2.0 && error_pct(&plain, 1.0, 0.0) > 5.0);
     }
 }

@@ -3,7 +3,7 @@
 use super::canvas::{Anchor, Canvas, TextStyle};
 use super::colours::{COMMAND, GRID, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
 use super::plot::{Area, Curve, pull_curve};
-use crate::paper::{PartCells, TABLE};
+use crate::paper::PartCells;
 use gripgen_twin::PullTrace;
 
 const MARGIN: f64 = 16.0;
@@ -56,7 +56,7 @@ fn ratio_plot(canvas: &mut Canvas, area: Area, part: &PartCells, plain: &PartCel
     }
     let (middle, bottom) = at(50.0, RATIOS.0);
     canvas.text("F_G / N;  up: F_max / (2 mu F_G)", middle, bottom + 20.0, Anchor::Middle, small);
-    if let Some((_, _, a, b)) = TABLE.iter().find(|(name, ..)| *name == part.name) {
+    if let Some((a, b)) = part.law {
         let law: Vec<(f64, f64)> = (0..=60).map(|f| f64::from(f) + 20.0).map(|f| at(f, a + b / f)).collect();
         canvas.line(&law, 1.6, SLIP);
     }

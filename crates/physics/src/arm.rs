@@ -9,7 +9,7 @@ mod multibody;
 mod placed;
 
 pub use model::{ArmJoint, ArmMesh, ArmModel, LinkInertia};
-pub use placed::{ArmError, PlacedArm, Stance};
+pub use placed::{ArmError, PlacedArm};
 
 use crate::grip::GripSetup;
 use crate::world::World;

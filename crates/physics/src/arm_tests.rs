@@ -2,23 +2,29 @@
 
 use super::*;
 use crate::grip::Mount;
-use crate::tests::{Bench, STEP_S, hull_of_64, shapes};
-use gripgen_twin::PullEnd;
-use gripgen_twin::config::Feedback;
-use gripgen_twin::config::Mechanics;
+use crate::tests::{Bench, STEP_S, assert_clones_agree, hull_of_64, shapes};
+use gripgen_twin::config::{Document, Feedback, Mechanics};
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};
+use gripgen_twin::{PullEnd, RobotArm, Twin};
 use nalgebra::Vector3;
 
 pub(crate) const URDF: &str = include_str!("../../../assets/robots/ur5e/ur5e.urdf");
 
-fn ur5e_standing(stance: Stance) -> PlacedArm {
+/// The stance of the shipped twins.
+fn stance() -> RobotArm {
+    let text = include_str!("../../../assets/configs/twin-baseline.toml");
+    let twin = Document::parse("twin-baseline.toml", text).and_then(|d| Twin::new(&d.read_twin()?)).unwrap();
+    twin.arm.unwrap()
+}
+
+fn ur5e_standing(stance: &RobotArm) -> PlacedArm {
     PlacedArm::new(ArmModel::from_urdf(URDF, "tool0", &|_| None).unwrap(), stance).unwrap()
 }
 
 fn bench(shape: PartShape, grip_force_n: f64) -> Bench {
     let mut bench = Bench::new(shape, grip_force_n);
-    bench.arm = Some(ur5e_standing(Stance::ur5e()));
+    bench.arm = Some(ur5e_standing(&stance()));
     bench
 }
 
@@ -261,15 +267,15 @@ fn a_hundred_newtons_do_not_push_the_arm_sideways() {
 /// Neither the gripper's length, nor the rotors, nor another elbow angle enters the slip force.
 #[test]
 fn the_slip_force_does_not_depend_on_the_stance() {
-    let longer = Stance { tip_to_grip_m: 0.22, ..Stance::ur5e() };
-    let lighter = Stance { rotor_inertia_kg_m2: vec![0.75, 0.75, 0.75, 0.15, 0.15, 0.15], ..Stance::ur5e() };
-    let mut lower = Stance::ur5e();
+    let longer = RobotArm { tip_to_grip_m: 0.22, ..stance() };
+    let lighter = RobotArm { rotor_inertia_kg_m2: [0.75, 0.75, 0.75, 0.15, 0.15, 0.15], ..stance() };
+    let mut lower = stance();
     for (joint, degrees) in [(1, -20.0_f64), (2, 10.0), (3, 10.0)] {
         lower.joints_rad[joint] += degrees.to_radians();
     }
     for stance in [longer, lighter, lower] {
         let mut bench = bench(brick(), 40.0);
-        bench.arm = Some(ur5e_standing(stance.clone()));
+        bench.arm = Some(ur5e_standing(&stance));
         let (peak, across, _) = ramp(&bench, 0.168, STEP_S);
         assert!((peak / 13.44 - 1.0).abs() < 2e-3 && across < 0.05e-3, "{stance:?}: {peak} N, {across} m");
     }
@@ -315,22 +321,7 @@ fn a_clone_continues_like_the_original() {
     let mut bench = bench(hull_of_64(), 40.0);
     bench.noise_n = 0.1;
     bench.kinetic_ratio = 0.8;
-    let mut original = bench.session(0.1);
-    original.step(Command::ForceN(5.0), 0.3).unwrap();
-    let copies: Vec<PullSession> = (0..2).map(|_| original.clone()).collect();
-    let run = |mut session: PullSession| {
-        (0..300)
-            .map(|i| session.step(Command::ForceN(5.0 + f64::from(i) * 0.05), STEP_S).unwrap())
-            .map(|s| (s.measured_force_n.to_bits(), s.displacement_m.to_bits()))
-            .collect::<Vec<_>>()
-    };
-    let expected = run(original);
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = copies.into_iter().map(|c| scope.spawn(move || run(c))).collect();
-        for t in threads {
-            assert!(t.join().unwrap() == expected, "a clone went another way");
-        }
-    });
+    assert_clones_agree(&bench);
 }
 
 /// The reduced mechanics pulls the mass that the arm has in the engine, computed apart from it.
@@ -349,13 +340,15 @@ fn the_reduced_arm_weighs_what_the_whole_one_does() {
 #[test]
 fn a_stance_that_the_arm_cannot_take_is_refused() {
     let model = || ArmModel::from_urdf(URDF, "tool0", &|_| None).unwrap();
-    let refused = |change: &dyn Fn(&mut Stance)| {
-        let mut stance = Stance::ur5e();
+    let refused = |change: &dyn Fn(&mut RobotArm)| {
+        let mut stance = stance();
         change(&mut stance);
-        PlacedArm::new(model(), stance).unwrap_err().to_string()
+        PlacedArm::new(model(), &stance).unwrap_err().to_string()
     };
-    let short = refused(&|s| s.joints_rad.truncate(5));
-    assert!(short.contains("5 joint angles") && short.contains("6 joints"), "{short}");
+    let mut five = model();
+    five.joints.pop();
+    let short = PlacedArm::new(five, &stance()).unwrap_err().to_string();
+    assert!(short.contains("5 joints") && short.contains("6 are needed"), "{short}");
     let far = refused(&|s| s.joints_rad[2] = 7.0);
     assert!(far.contains("elbow_joint") && far.contains('7') && far.contains("6.283"), "{far}");
     let singular = refused(&|s| s.joints_rad[2] = 0.0);

@@ -10,7 +10,7 @@
 //! `F / (k_left + k_right)` before anything slips.
 //!
 //! The gripper hangs on a carriage or on a robot arm ([`Arm`]); the arm comes from the text of a URDF ([`ArmModel`]) and
-//! stands in a [`Stance`].
+//! stands as the twin says ([`PlacedArm`]).
 //!
 //! This crate knows no images and no files.
 
@@ -28,7 +28,7 @@ mod staircase;
 mod urdf;
 mod world;
 
-pub use arm::{Arm, ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm, Stance};
+pub use arm::{Arm, ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm};
 pub use grip::{Grip, GripError, GripSetup, Held, Mount, grip};
 pub use limit_surface::{LimitCell, free_twist_capacity_n};
 pub use session::{Command, FrictionCell, JawFriction, PullError, PullSession, PullState, Signals};

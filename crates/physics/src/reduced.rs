@@ -4,9 +4,10 @@
 //! m dv/dt = F_applied - F_c,    F_c = sum_i clamp(k_i (x - s_i), -L_i, L_i)
 //! ```
 //!
-//! Each cell i of the contact patches is a bristle: its share k_i of the gel's shear stiffness, its friction limit L_i, and the place s_i on the part where it stands. A bristle at its limit drags its foot along. Cells with
-//! little pressure reach their limit first, so slip begins at the rim of the contact and runs inwards (incipient slip)
-//! until the last cell slips and the force has reached `sum L_i` (parallel Jenkin elements: Iwan 1966).
+//! Each cell i of the contact patches is a bristle: its share k_i of the gel's shear stiffness, its friction limit L_i, and
+//! the place s_i on the part where it stands. A bristle at its limit drags its foot along. Cells with little pressure
+//! reach their limit first, so slip begins at the rim of the contact and runs inwards (incipient slip) until the last
+//! cell slips and the force has reached `sum L_i` (parallel Jenkin elements: Iwan 1966).
 //!
 //! A time step is implicit in the velocity. The force is a non-decreasing, piecewise linear function of it, so Newton's
 //! method inside a bracket finds the one solution, for any stiffness, and momentum balances to rounding.

@@ -403,11 +403,8 @@ fn a_world_that_leaves_the_numbers_is_an_error() {
     assert!((error.time_s - 0.1).abs() < 1e-9, "{error}");
 }
 
-#[test]
-fn a_clone_continues_like_the_original_and_threads_agree() {
-    let mut bench = Bench::new(hull_of_64(), 40.0);
-    bench.noise_n = 0.1;
-    bench.kinetic_ratio = 0.8;
+/// Clones of a pull under way go on as it does, also in other threads.
+pub(crate) fn assert_clones_agree(bench: &Bench) {
     let mut original = bench.session(0.1);
     original.step(Command::ForceN(5.0), 0.3).unwrap();
     let copies: Vec<PullSession> = (0..3).map(|_| original.clone()).collect();
@@ -424,6 +421,14 @@ fn a_clone_continues_like_the_original_and_threads_agree() {
             assert!(t.join().unwrap() == expected, "a clone went another way");
         }
     });
+}
+
+#[test]
+fn a_clone_continues_like_the_original_and_threads_agree() {
+    let mut bench = Bench::new(hull_of_64(), 40.0);
+    bench.noise_n = 0.1;
+    bench.kinetic_ratio = 0.8;
+    assert_clones_agree(&bench);
 }
 
 /// The label rule on staircase and lag: with feedback from either source the label is the same limit.

@@ -3,81 +3,19 @@
 //! A shard is done when its sidecar is there. The sidecar is written after the shard was renamed into place, so a run
 //! killed at any moment leaves nothing that could be taken for finished, and running it again continues.
 
-use crate::index::{INDEX_COLUMNS, csv_lines, index_header, status_name};
-use crate::proto::gripgen_v1::Status;
-use serde::{Deserialize, Serialize};
+mod documents;
+mod shards;
+
+pub use documents::{RUN_SCHEMA, RunInfo, SHARD_SCHEMA, Sidecar};
+pub use shards::{PartialShard, ShardStart};
+
+use crate::index::{csv_lines, index_header};
+use documents::{check_same, json, parse};
 use sha2::{Digest, Sha256};
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::hash::{BuildHasher, RandomState};
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
-
-/// Format of `run.json`.
-pub const RUN_SCHEMA: &str = "gripgen.run/1";
-/// Format of a sidecar.
-pub const SHARD_SCHEMA: &str = "gripgen.shard/1";
-
-/// `run.json`: what a folder is.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RunInfo {
-    /// [`RUN_SCHEMA`].
-    pub schema: String,
-    /// Version of gripgen that made it.
-    pub gripgen_version: String,
-    /// Name of the run.
-    pub name: String,
-    /// `sim` or `rig`.
-    pub source: String,
-    /// Hash of everything the samples depend on.
-    pub config_sha256: String,
-    /// Number of samples.
-    pub samples: u64,
-    /// Samples in a shard.
-    pub shard_samples: u64,
-    /// Number of shards.
-    pub shards: u64,
-    /// Columns of the index beside the fixed ones.
-    pub extra_columns: Vec<String>,
-    /// SHA-256 of meshes and sensor files by their path in the resolved configuration.
-    pub files_sha256: std::collections::BTreeMap<String, String>,
-    /// The resolved configuration.
-    pub config_toml: String,
-}
-
-/// The file beside a finished shard.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Sidecar {
-    /// [`SHARD_SCHEMA`].
-    pub schema: String,
-    /// Version of gripgen that made it.
-    pub gripgen_version: String,
-    /// Hash of the run's configuration.
-    pub config_sha256: String,
-    /// Number of the shard.
-    pub shard: u64,
-    /// Global index of its first sample.
-    pub first_sample: u64,
-    /// Number of samples.
-    pub samples: u64,
-    /// Samples that failed.
-    pub failed: u64,
-    /// Size of the shard.
-    pub bytes: u64,
-    /// SHA-256 of the shard.
-    pub sha256: String,
-    /// The rows of the index.
-    pub rows: Vec<Vec<String>>,
-}
-
-impl Sidecar {
-    /// How many of its samples ended like this.
-    pub fn rows_with_status(&self, status: Status) -> u64 {
-        let column = INDEX_COLUMNS.iter().position(|c| *c == "status").expect("a fixed column");
-        self.rows.iter().filter(|row| row[column] == status_name(status)).count() as u64
-    }
-}
 
 /// Why a run folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -134,35 +72,6 @@ pub enum FolderError {
 pub struct RunFolder {
     path: PathBuf,
     info: RunInfo,
-}
-
-/// A shard under way: `shard-00000.mcap.partial`, locked against other processes.
-pub struct PartialShard {
-    /// The locked file, empty at first.
-    file: File,
-    path: PathBuf,
-}
-
-/// What became of starting a shard.
-pub enum ShardStart {
-    /// It is ours to write.
-    Begun(PartialShard),
-    /// Another process is writing it right now.
-    Busy,
-    /// Another process has finished it.
-    Done(Sidecar),
-}
-
-impl PartialShard {
-    /// A second handle of the file, for a writer that wants to own one; the lock stays with this one.
-    pub fn duplicate(&self) -> Result<File, FolderError> {
-        self.file.try_clone().map_err(io_at(&self.path))
-    }
-
-    /// An error about this file.
-    pub fn error(&self, source: std::io::Error) -> FolderError {
-        FolderError::Io { path: self.path.clone(), source }
-    }
 }
 
 impl RunFolder {
@@ -239,87 +148,6 @@ impl RunFolder {
         self.path.join(format!("shard-{shard:05}.json"))
     }
 
-    /// The sidecar of a shard; `None` if the shard is not done: no sidecar, a damaged one, or a shard of another
-    /// size than it says.
-    pub fn finished(&self, shard: u64) -> Result<Option<Sidecar>, FolderError> {
-        let path = self.sidecar_path(shard);
-        let bytes = match std::fs::read(&path) {
-            Ok(bytes) => bytes,
-            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(io_at(&path)(e)),
-        };
-        let Ok(sidecar) = serde_json::from_slice::<Sidecar>(&bytes) else { return Ok(None) };
-        let size = std::fs::metadata(self.shard_path(shard)).map_or(0, |m| m.len());
-        let columns = INDEX_COLUMNS.len() + self.info.extra_columns.len();
-        let same = sidecar.config_sha256 == self.info.config_sha256
-            && sidecar.shard == shard
-            && sidecar.bytes == size
-            && sidecar.samples == sidecar.rows.len() as u64
-            && sidecar.rows.iter().all(|row| row.len() == columns);
-        Ok(same.then_some(sidecar))
-    }
-
-    /// Starts a shard, unless another process is writing it or has finished it since it was looked for.
-    pub fn start_shard(&self, shard: u64) -> Result<ShardStart, FolderError> {
-        let path = self.path.join(format!("shard-{shard:05}.mcap.partial"));
-        let at = io_at(&path);
-        loop {
-            let file = File::options()
-                .read(true)
-                .write(true)
-                .create(true)
-                .truncate(false)
-                .open(&path)
-                .map_err(&at)?;
-            match file.try_lock() {
-                Ok(()) => {}
-                Err(TryLockError::WouldBlock) => return Ok(ShardStart::Busy),
-                Err(TryLockError::Error(e)) => return Err(at(e)),
-            }
-            // Between opening and locking, its writer may have renamed the file into place.
-            if !is_at(&file, &path).map_err(&at)? {
-                continue;
-            }
-            if let Some(sidecar) = self.finished(shard)? {
-                std::fs::remove_file(&path).map_err(&at)?;
-                return Ok(ShardStart::Done(sidecar));
-            }
-            file.set_len(0).map_err(&at)?;
-            return Ok(ShardStart::Begun(PartialShard { file, path }));
-        }
-    }
-
-    /// Publishes a written shard: sync, rename, then the sidecar.
-    #[expect(clippy::needless_pass_by_value, reason = "the lock ends with the partial shard")]
-    pub fn finish_shard(
-        &self,
-        shard: u64,
-        first_sample: u64,
-        partial: PartialShard,
-        failed: u64,
-        rows: Vec<Vec<String>>,
-    ) -> Result<Sidecar, FolderError> {
-        let at = io_at(&partial.path);
-        partial.file.sync_all().map_err(&at)?;
-        let (sha256, bytes) = hash_file(&partial.path)?;
-        let path = self.shard_path(shard);
-        std::fs::rename(&partial.path, &path).map_err(&at)?;
-        let sidecar = Sidecar {
-            schema: SHARD_SCHEMA.into(),
-            gripgen_version: self.info.gripgen_version.clone(),
-            config_sha256: self.info.config_sha256.clone(),
-            shard,
-            first_sample,
-            samples: rows.len() as u64,
-            failed,
-            bytes,
-            sha256,
-            rows,
-        };
-        self.publish(&format!("shard-{shard:05}.json"), &json(&sidecar))?;
-        Ok(sidecar)
-    }
-
     /// Writes `index.csv` if every shard is done; returns whether it did.
     pub fn write_index(&self) -> Result<bool, FolderError> {
         if (0..self.info.shards).any(|shard| !self.sidecar_path(shard).exists()) {
@@ -387,24 +215,6 @@ impl RunFolder {
     }
 }
 
-/// Whether an open file is still the one at `path`.
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> std::io::Result<bool> {
-    use std::os::unix::fs::MetadataExt;
-    let open = file.metadata()?;
-    match std::fs::metadata(path) {
-        Ok(there) => Ok((open.dev(), open.ino()) == (there.dev(), there.ino())),
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
-        Err(e) => Err(e),
-    }
-}
-
-/// Elsewhere an open file cannot be renamed, so it is where it was.
-#[cfg(not(unix))]
-fn is_at(_file: &File, path: &Path) -> std::io::Result<bool> {
-    path.try_exists()
-}
-
 /// SHA-256 and size of a file.
 pub fn hash_file(path: &Path) -> Result<(String, u64), FolderError> {
     let at = io_at(path);
@@ -434,41 +244,4 @@ fn hex(bytes: &[u8]) -> String {
 fn io_at(path: &Path) -> impl Fn(std::io::Error) -> FolderError + use<> {
     let path = path.to_path_buf();
     move |source| FolderError::Io { path: path.clone(), source }
-}
-
-fn json<T: Serialize>(value: &T) -> Vec<u8> {
-    let mut text = serde_json::to_vec_pretty(value).expect("these structs have no maps with odd keys");
-    text.push(b'\n');
-    text
-}
-
-fn parse(path: &Path, bytes: &[u8]) -> Result<RunInfo, FolderError> {
-    let info: RunInfo =
-        serde_json::from_slice(bytes).map_err(|source| FolderError::Json { path: path.into(), source })?;
-    let invalid = |problem: String| Err(FolderError::Invalid { path: path.into(), problem });
-    if info.schema != RUN_SCHEMA {
-        return invalid(format!("its schema is `{}`, this gripgen reads `{RUN_SCHEMA}`", info.schema));
-    }
-    if info.shard_samples == 0 || info.shards != info.samples.div_ceil(info.shard_samples) {
-        let (samples, size, shards) = (info.samples, info.shard_samples, info.shards);
-        return invalid(format!("{samples} samples in shards of {size} do not make {shards} shards"));
-    }
-    Ok(info)
-}
-
-fn check_same(path: &Path, found: &RunInfo, wanted: &RunInfo) -> Result<(), FolderError> {
-    for (what, a, b) in [
-        ("gripgen_version", &found.gripgen_version, &wanted.gripgen_version),
-        ("config_sha256", &found.config_sha256, &wanted.config_sha256),
-    ] {
-        if a != b {
-            return Err(FolderError::AnotherRun {
-                path: path.into(),
-                what,
-                found: a.clone(),
-                wanted: b.clone(),
-            });
-        }
-    }
-    Ok(())
 }

@@ -91,8 +91,8 @@ impl ArmBodies {
         Self {
             last: parent,
             joint: joint.expect("a chain of fresh bodies is a tree"),
-            joints_rad: six(&arm.stance.joints_rad),
-            rotor_inertia_kg_m2: six(&arm.stance.rotor_inertia_kg_m2),
+            joints_rad: arm.stance.joints_rad,
+            rotor_inertia_kg_m2: arm.stance.rotor_inertia_kg_m2,
             last_from_grip: rapier_pose(&last_from_grip),
             inertia: Matrix6::identity(),
             inertia_at: Vector::ZERO,
@@ -257,10 +257,6 @@ impl ArmBodies {
             self.inertia_at = at;
         }
     }
-}
-
-fn six(values: &[f64]) -> [f64; 6] {
-    std::array::from_fn(|i| values[i])
 }
 
 fn stack(a: Vector, b: Vector) -> Vector6<f64> {

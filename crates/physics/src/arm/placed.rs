@@ -1,10 +1,9 @@
 //! An arm model in the pose in which it grips.
 
-use crate::arm::model::ArmModel;
-use crate::arm::model::LinkInertia;
+use crate::arm::model::{ArmModel, LinkInertia};
 use crate::scene::compact;
-use gripgen_twin::Gripper;
 use gripgen_twin::frames::Pose;
+use gripgen_twin::{Gripper, RobotArm};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
 
 /// Joints that the task space needs: three translations, three rotations.
@@ -13,47 +12,13 @@ const JOINTS: usize = 6;
 /// Smallest singular value of the Jacobian (metres or 1 per radian) of a pose from which the arm can pull.
 const SMALLEST_SINGULAR_VALUE: f64 = 0.02;
 
-/// How an arm stands when it grips.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Stance {
-    /// Joint angles, from base to tip.
-    pub joints_rad: Vec<f64>,
-    /// Distance of the grip centre from the tip, along the tip's z axis.
-    pub tip_to_grip_m: f64,
-    /// Inertia of each joint's rotor, seen through its gear.
-    pub rotor_inertia_kg_m2: Vec<f64>,
-}
-
-impl Stance {
-    /// The stance of a UR5e with a WSG 50: elbow up, the gripper level, wrist 2 axis upright.
-    ///
-    /// Angles 180, -100, 110, -10, 90, -90 degrees put the flange at (0.412, 0.133, 0.413) m in the base, its
-    /// approach along +x, the base parallel to `world`. The pull, +z, is then at right angles to the approach, no
-    /// joint is near a limit and no singularity near. Gripper length and rotor inertias are not published:
-    /// 0.17 m is flange to pad centre of a WSG 50 with sensor fingers, 1.5 and 0.3 kg m2 are the order of magnitude
-    /// of a gear ratio of 101 squared times a rotor of that size. Neither enters the slip force.
-    pub fn ur5e() -> Self {
-        use std::f64::consts::PI;
-        let degrees = [180.0, -100.0, 110.0, -10.0, 90.0, -90.0];
-        Self {
-            joints_rad: degrees.iter().map(|d| d * PI / 180.0).collect(),
-            tip_to_grip_m: 0.17,
-            rotor_inertia_kg_m2: vec![1.5, 1.5, 1.5, 0.3, 0.3, 0.3],
-        }
-    }
-}
-
 /// A stance that an arm cannot take.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArmError {
-    /// A list of numbers does not fit the arm.
-    #[error("the stance has {given} {what}, the arm `{arm}` has {joints} joints; {JOINTS} are needed")]
-    Count {
-        /// What is counted.
-        what: &'static str,
-        /// How many there are.
-        given: usize,
+    /// Too few or too many joints.
+    #[error("the arm `{arm}` has {joints} joints, {JOINTS} are needed")]
+    Joints {
         /// Name of the arm.
         arm: String,
         /// How many joints it has.
@@ -95,7 +60,7 @@ pub enum ArmError {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacedArm {
     pub(crate) model: ArmModel,
-    pub(crate) stance: Stance,
+    pub(crate) stance: RobotArm,
     pub(crate) world_from_base: Pose,
     /// Frames of the links in `world`.
     pub(crate) world_from_links: Vec<Pose>,
@@ -103,14 +68,10 @@ pub struct PlacedArm {
 
 impl PlacedArm {
     /// Checks the stance and places the arm.
-    pub fn new(model: ArmModel, stance: Stance) -> Result<Self, ArmError> {
+    pub fn new(model: ArmModel, stance: &RobotArm) -> Result<Self, ArmError> {
         let joints = model.joints.len();
-        for (what, given) in
-            [("joint angles", stance.joints_rad.len()), ("rotor inertias", stance.rotor_inertia_kg_m2.len())]
-        {
-            if given != joints || joints != JOINTS {
-                return Err(ArmError::Count { what, given, arm: model.name, joints });
-            }
+        if joints != JOINTS {
+            return Err(ArmError::Joints { arm: model.name, joints });
         }
         for (joint, &angle_rad) in model.joints.iter().zip(&stance.joints_rad) {
             let [lower_rad, upper_rad] = joint.limits_rad.unwrap_or([f64::MIN, f64::MAX]);
@@ -131,7 +92,7 @@ impl PlacedArm {
         let world_from_base = base_from_grip.inverse();
         let base_from_links = model.base_from_links(&stance.joints_rad);
         let world_from_links = base_from_links.iter().map(|link| world_from_base * link).collect();
-        let placed = Self { model, stance, world_from_base, world_from_links };
+        let placed = Self { model, stance: stance.clone(), world_from_base, world_from_links };
         let smallest = placed.jacobian().singular_values().min();
         if smallest < SMALLEST_SINGULAR_VALUE {
             return Err(ArmError::Singular { smallest });

@@ -1,0 +1,111 @@
+//! The JSON files of a run folder: `run.json` and the sidecars.
+
+use super::FolderError;
+use crate::index::{INDEX_COLUMNS, status_name};
+use crate::proto::gripgen_v1::Status;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Format of `run.json`.
+pub const RUN_SCHEMA: &str = "gripgen.run/1";
+/// Format of a sidecar.
+pub const SHARD_SCHEMA: &str = "gripgen.shard/1";
+
+/// `run.json`: what a folder is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunInfo {
+    /// [`RUN_SCHEMA`].
+    pub schema: String,
+    /// Version of gripgen that made it.
+    pub gripgen_version: String,
+    /// Name of the run.
+    pub name: String,
+    /// `sim` or `rig`.
+    pub source: String,
+    /// Hash of everything the samples depend on.
+    pub config_sha256: String,
+    /// Number of samples.
+    pub samples: u64,
+    /// Samples in a shard.
+    pub shard_samples: u64,
+    /// Number of shards.
+    pub shards: u64,
+    /// Columns of the index beside the fixed ones.
+    pub extra_columns: Vec<String>,
+    /// SHA-256 of meshes and sensor files by their path in the resolved configuration.
+    pub files_sha256: std::collections::BTreeMap<String, String>,
+    /// The resolved configuration.
+    pub config_toml: String,
+}
+
+/// The file beside a finished shard.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sidecar {
+    /// [`SHARD_SCHEMA`].
+    pub schema: String,
+    /// Version of gripgen that made it.
+    pub gripgen_version: String,
+    /// Hash of the run's configuration.
+    pub config_sha256: String,
+    /// Number of the shard.
+    pub shard: u64,
+    /// Global index of its first sample.
+    pub first_sample: u64,
+    /// Number of samples.
+    pub samples: u64,
+    /// Samples that failed.
+    pub failed: u64,
+    /// Size of the shard.
+    pub bytes: u64,
+    /// SHA-256 of the shard.
+    pub sha256: String,
+    /// The rows of the index.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Sidecar {
+    /// How many of its samples ended like this.
+    pub fn rows_with_status(&self, status: Status) -> u64 {
+        let column = INDEX_COLUMNS.iter().position(|c| *c == "status").expect("a fixed column");
+        self.rows.iter().filter(|row| row[column] == status_name(status)).count() as u64
+    }
+}
+
+pub(super) fn json<T: Serialize>(value: &T) -> Vec<u8> {
+    let mut text = serde_json::to_vec_pretty(value).expect("these structs have no maps with odd keys");
+    text.push(b'\n');
+    text
+}
+
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<RunInfo, FolderError> {
+    let info: RunInfo =
+        serde_json::from_slice(bytes).map_err(|source| FolderError::Json { path: path.into(), source })?;
+    let invalid = |problem: String| Err(FolderError::Invalid { path: path.into(), problem });
+    if info.schema != RUN_SCHEMA {
+        return invalid(format!("its schema is `{}`, this gripgen reads `{RUN_SCHEMA}`", info.schema));
+    }
+    if info.shard_samples == 0 || info.shards != info.samples.div_ceil(info.shard_samples) {
+        let (samples, size, shards) = (info.samples, info.shard_samples, info.shards);
+        return invalid(format!("{samples} samples in shards of {size} do not make {shards} shards"));
+    }
+    Ok(info)
+}
+
+pub(super) fn check_same(path: &Path, found: &RunInfo, wanted: &RunInfo) -> Result<(), FolderError> {
+    for (what, a, b) in [
+        ("gripgen_version", &found.gripgen_version, &wanted.gripgen_version),
+        ("config_sha256", &found.config_sha256, &wanted.config_sha256),
+    ] {
+        if a != b {
+            return Err(FolderError::AnotherRun {
+                path: path.into(),
+                what,
+                found: a.clone(),
+                wanted: b.clone(),
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,138 @@
+//! Shards under way: who writes which, and when one is done.
+
+use super::documents::{SHARD_SCHEMA, Sidecar, json};
+use super::{FolderError, RunFolder, hash_file, io_at};
+use crate::index::INDEX_COLUMNS;
+use std::fs::{File, TryLockError};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// A shard under way: `shard-00000.mcap.partial`, locked against other processes.
+pub struct PartialShard {
+    /// The locked file, empty at first.
+    file: File,
+    path: PathBuf,
+}
+
+/// What became of starting a shard.
+pub enum ShardStart {
+    /// It is ours to write.
+    Begun(PartialShard),
+    /// Another process is writing it right now.
+    Busy,
+    /// Another process has finished it.
+    Done(Sidecar),
+}
+
+impl PartialShard {
+    /// A second handle of the file, for a writer that wants to own one; the lock stays with this one.
+    pub fn duplicate(&self) -> Result<File, FolderError> {
+        self.file.try_clone().map_err(io_at(&self.path))
+    }
+
+    /// An error about this file.
+    pub fn error(&self, source: std::io::Error) -> FolderError {
+        FolderError::Io { path: self.path.clone(), source }
+    }
+}
+
+impl RunFolder {
+    /// The sidecar of a shard; `None` if the shard is not done: no sidecar, a damaged one, or a shard of another
+    /// size than it says.
+    pub fn finished(&self, shard: u64) -> Result<Option<Sidecar>, FolderError> {
+        let path = self.sidecar_path(shard);
+        let bytes = match std::fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(io_at(&path)(e)),
+        };
+        let Ok(sidecar) = serde_json::from_slice::<Sidecar>(&bytes) else { return Ok(None) };
+        let size = std::fs::metadata(self.shard_path(shard)).map_or(0, |m| m.len());
+        let columns = INDEX_COLUMNS.len() + self.info.extra_columns.len();
+        let same = sidecar.config_sha256 == self.info.config_sha256
+            && sidecar.shard == shard
+            && sidecar.bytes == size
+            && sidecar.samples == sidecar.rows.len() as u64
+            && sidecar.rows.iter().all(|row| row.len() == columns);
+        Ok(same.then_some(sidecar))
+    }
+
+    /// Starts a shard, unless another process is writing it or has finished it since it was looked for.
+    pub fn start_shard(&self, shard: u64) -> Result<ShardStart, FolderError> {
+        let path = self.path.join(format!("shard-{shard:05}.mcap.partial"));
+        let at = io_at(&path);
+        loop {
+            let file = File::options()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .open(&path)
+                .map_err(&at)?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Ok(ShardStart::Busy),
+                Err(TryLockError::Error(e)) => return Err(at(e)),
+            }
+            // Between opening and locking, its writer may have renamed the file into place.
+            if !is_at(&file, &path).map_err(&at)? {
+                continue;
+            }
+            if let Some(sidecar) = self.finished(shard)? {
+                std::fs::remove_file(&path).map_err(&at)?;
+                return Ok(ShardStart::Done(sidecar));
+            }
+            file.set_len(0).map_err(&at)?;
+            return Ok(ShardStart::Begun(PartialShard { file, path }));
+        }
+    }
+
+    /// Publishes a written shard: sync, rename, then the sidecar.
+    #[expect(clippy::needless_pass_by_value, reason = "the lock ends with the partial shard")]
+    pub fn finish_shard(
+        &self,
+        shard: u64,
+        first_sample: u64,
+        partial: PartialShard,
+        failed: u64,
+        rows: Vec<Vec<String>>,
+    ) -> Result<Sidecar, FolderError> {
+        let at = io_at(&partial.path);
+        partial.file.sync_all().map_err(&at)?;
+        let (sha256, bytes) = hash_file(&partial.path)?;
+        let path = self.shard_path(shard);
+        std::fs::rename(&partial.path, &path).map_err(&at)?;
+        let sidecar = Sidecar {
+            schema: SHARD_SCHEMA.into(),
+            gripgen_version: self.info.gripgen_version.clone(),
+            config_sha256: self.info.config_sha256.clone(),
+            shard,
+            first_sample,
+            samples: rows.len() as u64,
+            failed,
+            bytes,
+            sha256,
+            rows,
+        };
+        self.publish(&format!("shard-{shard:05}.json"), &json(&sidecar))?;
+        Ok(sidecar)
+    }
+}
+
+/// Whether an open file is still the one at `path`.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> std::io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    let open = file.metadata()?;
+    match std::fs::metadata(path) {
+        Ok(there) => Ok((open.dev(), open.ino()) == (there.dev(), there.ino())),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
+        Err(e) => Err(e),
+    }
+}
+
+/// Elsewhere an open file cannot be renamed, so it is where it was.
+#[cfg(not(unix))]
+fn is_at(_file: &File, path: &Path) -> std::io::Result<bool> {
+    path.try_exists()
+}

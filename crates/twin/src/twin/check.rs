@@ -1,0 +1,192 @@
+//! Checking the sections of a twin file and converting them to SI units. Errors name the key.
+
+use super::{Gel, Part, RobotArm};
+use crate::config::{ArmFile, ConfigError, GelFile, PartFile, TwinFile, in_range, suggestion};
+use crate::effects::{self, Effect, EffectSpec, OutsideFit, Per};
+use crate::frames::{pose, rotation_from_fixed_xyz};
+use nalgebra::Point3;
+
+pub(super) fn check_arm(arm: Option<&ArmFile>) -> Result<RobotArm, ConfigError> {
+    let arm = arm.ok_or_else(|| {
+        ConfigError::new("robot.model", "`ur5e` needs the section [robot.arm]")
+            .hint("the shipped one stands in asset:configs/twin-baseline.toml; or use model = \"carriage\"")
+    })?;
+    let (mut joints_rad, mut rotor_inertia_kg_m2) = ([0.0; 6], [0.0; 6]);
+    for i in 0..6 {
+        let key = format!("robot.arm.joints_deg[{i}]");
+        joints_rad[i] = in_range(&key, arm.joints_deg[i], -360.0..=360.0, "deg")?.to_radians();
+        let key = format!("robot.arm.rotor_inertia_kg_m2[{i}]");
+        rotor_inertia_kg_m2[i] = in_range(&key, arm.rotor_inertia_kg_m2[i], 0.0..=1000.0, "kg m2")?;
+    }
+    Ok(RobotArm {
+        urdf: arm.urdf.clone(),
+        tip: arm.tip.clone(),
+        joints_rad,
+        tip_to_grip_m: 1e-3 * in_range("robot.arm.tip_to_grip_mm", arm.tip_to_grip_mm, 0.0..=2000.0, "mm")?,
+        rotor_inertia_kg_m2,
+    })
+}
+
+pub(super) fn check_gel(gel: &GelFile, key: &str) -> Result<Gel, ConfigError> {
+    for (i, &k) in gel.kernels_px.iter().enumerate() {
+        if k % 2 == 0 || !(3..=255).contains(&k) {
+            let problem = format!("a kernel of {k} pixels, it must be an odd number from 3 to 255");
+            return Err(ConfigError::new(format!("{key}.kernels_px[{i}]"), problem));
+        }
+    }
+    let mm = |name: &str, value: f64, range: std::ops::RangeInclusive<f64>| {
+        in_range(&format!("{key}.{name}"), value, range, "mm").map(|x| x * 1e-3)
+    };
+    Ok(Gel {
+        thickness_m: mm("thickness_mm", gel.thickness_mm, 0.1..=50.0)?,
+        width_m: mm("width_mm", gel.width_mm, 1.0..=200.0)?,
+        height_m: mm("height_mm", gel.height_mm, 1.0..=200.0)?,
+        shear_stiffness_n_per_m: 1e3
+            * in_range(
+                &format!("{key}.shear_stiffness_n_per_mm"),
+                gel.shear_stiffness_n_per_mm,
+                0.1..=1e4,
+                "N/mm",
+            )?,
+        kernels_px: gel.kernels_px.clone(),
+        restore_depth_fraction: in_range(
+            &format!("{key}.restore_depth_fraction"),
+            gel.restore_depth_fraction,
+            0.0..=1.0,
+            "1",
+        )?,
+    })
+}
+
+pub(super) fn check_part(part: &PartFile, key: &str) -> Result<Part, ConfigError> {
+    let at = |name: &str| format!("{key}.{name}");
+    if part.grips.is_empty() {
+        return Err(ConfigError::new(at("grips"), "the list is empty, a part needs at least one grip"));
+    }
+    let mut grips = Vec::new();
+    for (i, grip) in part.grips.iter().enumerate() {
+        for axis in 0..3 {
+            in_range(&format!("{key}.grips[{i}].origin_mm"), grip.origin_mm[axis], -2000.0..=2000.0, "mm")?;
+            let angle = grip.orientation_deg[axis];
+            in_range(&format!("{key}.grips[{i}].orientation_deg"), angle, -360.0..=360.0, "deg")?;
+        }
+        let rotation = rotation_from_fixed_xyz(grip.orientation_deg.map(f64::to_radians));
+        let origin = Point3::from(grip.origin_mm.map(|x| x * 1e-3));
+        grips.push(pose(&rotation, -(rotation * origin.coords)));
+    }
+    Ok(Part {
+        mesh: part.mesh.clone(),
+        metres_per_unit: in_range(&at("scale_mm_per_unit"), part.scale_mm_per_unit, 1e-6..=1e6, "mm")? * 1e-3,
+        grips,
+        mu: in_range(&at("mu"), part.mu, 0.0..=5.0, "1")?,
+        kinetic_ratio: in_range(&at("kinetic_ratio"), part.kinetic_ratio, 0.05..=1.0, "1")?,
+        scatter: in_range(&at("scatter"), part.scatter, 0.0..=0.5, "1")?,
+        imprint_m3_per_n: in_range(&at("imprint_mm3_per_n"), part.imprint_mm3_per_n, 1e-3..=1e3, "mm3/N")?
+            * 1e-9,
+    })
+}
+
+pub(super) fn check_effect(file: &TwinFile, index: usize) -> Result<Effect, ConfigError> {
+    let effect = &file.effects[index];
+    let key = |name: &str| format!("effects[{index}].{name}");
+    let known = || effects::LIBRARY.iter().map(|spec| spec.id);
+    let spec = effects::find(&effect.name).ok_or_else(|| {
+        let error = ConfigError::new(key("name"), format!("there is no effect `{}`", effect.name));
+        match suggestion(&effect.name, known()) {
+            Some(name) => error.hint(format!("did you mean `{name}`?")),
+            None => {
+                error.hint(format!("effects of this version: {}", known().collect::<Vec<_>>().join(", ")))
+            }
+        }
+    })?;
+    if let Some(part) = &effect.part
+        && !file.parts.contains_key(part)
+    {
+        let error = ConfigError::new(key("part"), format!("the twin has no part `{part}`"));
+        return Err(unknown_part_hint(error, part, file.parts.keys()));
+    }
+    let fixed =
+        ["part", "fitted_grip_force_n", "outside_fit", "per", "reference_area_mm2", "source", "calibration"];
+    for name in effect.parameters.keys() {
+        if spec.parameters.iter().all(|p| p.name != name) {
+            let names: Vec<&str> = spec.parameters.iter().map(|p| p.name).chain(fixed).collect();
+            let error = ConfigError::new(key(name), format!("`{}` has no parameter `{name}`", spec.id));
+            return Err(match suggestion(name, names.iter().copied()) {
+                Some(close) => error.hint(format!("did you mean `{close}`?")),
+                None => error.hint(format!("its keys: {}", names.join(", "))),
+            });
+        }
+    }
+    if spec.friction.is_none() {
+        let range = effect.fitted_grip_force_n.map(|_| "fitted_grip_force_n");
+        let outside = (effect.outside_fit != OutsideFit::default()).then_some("outside_fit");
+        if let Some(name) = range.or(outside) {
+            let problem =
+                format!("`{}` is no friction law, a range of grip forces says nothing about it", spec.id);
+            return Err(ConfigError::new(key(name), problem).hint(format!("leave {name} out")));
+        }
+    }
+    let values = spec
+        .parameters
+        .iter()
+        .map(|p| match effect.parameters.get(p.name) {
+            None => Ok(p.neutral),
+            Some(toml::Value::Float(x)) => in_range(&key(p.name), *x, p.bounds.0..=p.bounds.1, p.unit),
+            Some(toml::Value::Integer(i)) => {
+                in_range(&key(p.name), *i as f64, p.bounds.0..=p.bounds.1, p.unit)
+            }
+            Some(other) => Err(ConfigError::new(key(p.name), format!("a number is needed, found {other}"))),
+        })
+        .collect::<Result<_, _>>()?;
+    if let Some([low, high]) = effect.fitted_grip_force_n
+        && !(low.is_finite() && high.is_finite() && low >= 0.0 && low <= high)
+    {
+        let problem = format!("[{low}, {high}] N is not a range from small to large");
+        return Err(ConfigError::new(key("fitted_grip_force_n"), problem));
+    }
+    Ok(Effect {
+        spec,
+        part: effect.part.clone(),
+        values,
+        fitted_grip_force_n: effect.fitted_grip_force_n.map(|[low, high]| (low, high)),
+        outside_fit: effect.outside_fit,
+        per: effect.per,
+        reference_area_m2: check_reference_area(effect, spec, &key)?,
+    })
+}
+
+/// The reference area in m2, there exactly for laws of the grip force that are evaluated per cell.
+fn check_reference_area(
+    effect: &crate::config::EffectFile,
+    spec: &EffectSpec,
+    key: &dyn Fn(&str) -> String,
+) -> Result<Option<f64>, ConfigError> {
+    let area = key("reference_area_mm2");
+    match (effect.per, effect.reference_area_mm2) {
+        (Per::Cell, _) if !spec.is_load_law() => {
+            let problem =
+                format!("`{}` does not depend on the grip force, it has no value per cell", spec.id);
+            let laws = effects::LIBRARY.iter().filter(|s| s.is_load_law()).map(|s| s.id);
+            let hint = format!("leave it out; per cell there are {}", laws.collect::<Vec<_>>().join(", "));
+            Err(ConfigError::new(key("per"), problem).hint(hint))
+        }
+        (Per::Cell, None) => Err(ConfigError::new(area, "per = \"cell\" needs a reference area")
+            .hint("pressure times this area is the grip force of the law; take the contact area of the fit")),
+        (Per::Cell, Some(mm2)) => Ok(Some(in_range(&area, mm2, 1e-3..=1e5, "mm2")? * 1e-6)),
+        (Per::Jaw, Some(_)) => Err(ConfigError::new(area, "it is used with per = \"cell\" only")
+            .hint("add per = \"cell\" or leave it out")),
+        (Per::Jaw, None) => Ok(None),
+    }
+}
+
+/// Adds the hint for a part name that the twin does not have.
+pub(crate) fn unknown_part_hint<'a>(
+    error: ConfigError,
+    typed: &str,
+    parts: impl Iterator<Item = &'a String> + Clone,
+) -> ConfigError {
+    match suggestion(typed, parts.clone().map(String::as_str)) {
+        Some(name) => error.hint(format!("did you mean `{name}`?")),
+        None => error.hint(format!("its parts: {}", parts.cloned().collect::<Vec<_>>().join(", "))),
+    }
+}
