@@ -2,7 +2,7 @@
 //!
 //! `cargo xtask assets` writes them; `cargo xtask assets --check` only compares.
 
-use gripgen_tactile::{ColourModel, Grid, Lambert, Light, Sensor};
+use gripgen_tactile::{ColourModel, GelShape, Grid, Lambert, Light, Sensor};
 use gripgen_twin::parts::{BallBearing, InvoluteGear, RollerBearing, SteppedShaft};
 use gripgen_twin::write_binary_stl;
 use serde::Deserialize;
@@ -103,6 +103,9 @@ fn sensor_npz(text: &str) -> Vec<u8> {
         rest: [plane(0), plane(1), plane(2)],
         noise_rgb: spec.noise_rgb.map(|x| x as f32),
         colour: ColourModel::Lambert(Box::new(lambert)),
+        gel_shape: GelShape::Flat,
+        pyramid: None,
+        ball_m: None,
     };
     sensor.to_npz().expect("it is our own colour model").expect("arrays fit into an npz")
 }

@@ -32,5 +32,5 @@ pub use indent::{Imprint, IndentError, PressedGel, indent};
 pub use noise::finish;
 pub use raster::raster;
 pub use render::Renderer;
-pub use sensor::{SENSOR_VERSION, Sensor, SensorError};
+pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError};
 pub use simd::SimdLevel;

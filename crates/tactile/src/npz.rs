@@ -201,6 +201,8 @@ fn shape_value(header: &str) -> Option<Vec<usize>> {
 pub enum ElementType {
     /// `|u1`; values are rounded.
     U8,
+    /// `<f4`; values are rounded.
+    F32,
     /// `<f8`
     F64,
 }
@@ -222,6 +224,7 @@ pub fn write_npz(arrays: &[(&str, Array, ElementType)]) -> Result<Vec<u8>, NpzEr
 fn npy_bytes(array: &Array, element: ElementType) -> Vec<u8> {
     let descr = match element {
         ElementType::U8 => "|u1",
+        ElementType::F32 => "<f4",
         ElementType::F64 => "<f8",
     };
     let axes: String = array.shape.iter().map(|n| format!("{n}, ")).collect();
@@ -237,6 +240,7 @@ fn npy_bytes(array: &Array, element: ElementType) -> Vec<u8> {
     for &value in &array.values {
         match element {
             ElementType::U8 => bytes.push(value.round().clamp(0.0, 255.0) as u8),
+            ElementType::F32 => bytes.extend((value as f32).to_le_bytes()),
             ElementType::F64 => bytes.extend(value.to_le_bytes()),
         }
     }
@@ -252,18 +256,21 @@ mod tests {
         let a = Array { shape: vec![2, 3], values: vec![0.0, 1.5, -2.0, 3.0, f64::MAX, 5.0] };
         let b = Array { shape: vec![], values: vec![0.0295] };
         let c = Array { shape: vec![3], values: vec![0.0, 128.0, 255.0] };
+        let d = Array { shape: vec![2], values: vec![0.1f32.into(), -7.25] };
         let arrays = [
             ("a", a.clone(), ElementType::F64),
             ("b", b.clone(), ElementType::F64),
             ("c", c.clone(), ElementType::U8),
+            ("d", d.clone(), ElementType::F32),
         ];
         let bytes = write_npz(&arrays).unwrap();
         assert_eq!(bytes, write_npz(&arrays).unwrap(), "no clock in the bytes");
         let mut npz = Npz::open(&bytes).unwrap();
-        assert_eq!(npz.keys(), ["a", "b", "c"]);
+        assert_eq!(npz.keys(), ["a", "b", "c", "d"]);
+        assert_eq!(npz.array("d").unwrap(), d);
         assert_eq!((npz.array("a").unwrap(), npz.array("b").unwrap(), npz.array("c").unwrap()), (a, b, c));
-        let error = npz.array("d").unwrap_err().to_string();
-        assert_eq!(error, "the archive has no array `d`; it has: a, b, c");
+        let error = npz.array("e").unwrap_err().to_string();
+        assert_eq!(error, "the archive has no array `e`; it has: a, b, c, d");
         let shape = npz.array_of_shape("a", &[None, Some(4)]).unwrap_err().to_string();
         assert_eq!(shape, "array `a`: its shape is [2, 3], it must be (any, 4)");
     }

@@ -1,12 +1,15 @@
 //! A tactile sensor: its pixels, its frame at rest, its colours and its noise.
 
-use crate::colour::{ColourModel, Lambert, TaximTable};
-use crate::grid::Grid;
-use crate::npz::{Array, ElementType, Npz, NpzError, write_npz};
-use gripgen_twin::TactileImage;
+mod file;
+mod gel_shape;
 
-/// Version of the sensor file format, stored under the key `gripgen_sensor`.
-pub const SENSOR_VERSION: f64 = 1.0;
+pub use file::SENSOR_VERSION;
+pub use gel_shape::GelShape;
+
+use crate::colour::ColourModel;
+use crate::grid::Grid;
+use crate::npz::NpzError;
+use gripgen_twin::TactileImage;
 
 /// A tactile sensor, as read from a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +22,21 @@ pub struct Sensor {
     pub noise_rgb: [f32; 3],
     /// From the slope of the gel to colour.
     pub colour: ColourModel,
+    /// The gel surface at rest.
+    pub gel_shape: GelShape,
+    /// The deformation that the colours were calibrated with, where they were calibrated.
+    pub pyramid: Option<Pyramid>,
+    /// Diameter of the ball of the calibration, where there was one.
+    pub ball_m: Option<f64>,
+}
+
+/// The blurs that stand for the deformation of the gel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pyramid {
+    /// Sizes of the kernels in pixels of this sensor, odd.
+    pub kernels_px: Vec<u32>,
+    /// Share of the press below which the gel follows the part.
+    pub restore_depth_fraction: f64,
 }
 
 /// Why a sensor file could not be used.
@@ -75,70 +93,6 @@ pub enum SensorError {
 }
 
 impl Sensor {
-    /// Reads a sensor file: gripgen's own, or Taxim's `polycalib.npz`.
-    ///
-    /// `metres_per_px` replaces the file's pixel size, `background` is the frame without contact; a Taxim
-    /// calibration needs both, since it holds neither.
-    pub fn from_npz(
-        bytes: &[u8],
-        metres_per_px: Option<f64>,
-        background: Option<&TactileImage>,
-    ) -> Result<Self, SensorError> {
-        let mut npz = Npz::open(bytes)?;
-        if npz.has("gripgen_sensor") {
-            return Self::own(&mut npz, metres_per_px, background);
-        }
-        if npz.has("grad_r") {
-            return Self::taxim(&mut npz, metres_per_px, background);
-        }
-        Err(SensorError::Unknown { present: npz.keys().join(", ") })
-    }
-
-    fn own(
-        npz: &mut Npz<'_>,
-        metres_per_px: Option<f64>,
-        background: Option<&TactileImage>,
-    ) -> Result<Self, SensorError> {
-        let version = npz.array_of_shape("gripgen_sensor", &[])?.values[0];
-        if version != SENSOR_VERSION {
-            return Err(SensorError::Version { found: version });
-        }
-        let rest = npz.array_of_shape("rest_rgb", &[None, None, Some(3)])?;
-        let (height_px, width_px) = (rest.shape[0], rest.shape[1]);
-        let mm_per_px = npz.array_of_shape("mm_per_px", &[])?.values[0];
-        let noise = npz.array_of_shape("noise_rgb", &[Some(3)])?.values;
-        let lambert = npz.array_of_shape("lambert", &[Some(3), Some(3), Some(6)])?;
-        let grid = Grid { width_px, height_px, metres_per_px: metres_per_px.unwrap_or(mm_per_px * 1e-3) };
-        let sensor = Self {
-            grid,
-            rest: background.map_or_else(|| planes(&rest.values), planes_of_image),
-            noise_rgb: [noise[0] as f32, noise[1] as f32, noise[2] as f32],
-            colour: ColourModel::Lambert(Box::new(Lambert::new(&lambert.values))),
-        };
-        sensor.checked(background)
-    }
-
-    fn taxim(
-        npz: &mut Npz<'_>,
-        metres_per_px: Option<f64>,
-        background: Option<&TactileImage>,
-    ) -> Result<Self, SensorError> {
-        let background = background.ok_or(SensorError::Incomplete { missing: "background" })?;
-        let metres_per_px = metres_per_px.ok_or(SensorError::Incomplete { missing: "mm_per_px" })?;
-        let table = TaximTable::read(npz)?;
-        let sensor = Self {
-            grid: Grid {
-                width_px: background.width_px as usize,
-                height_px: background.height_px as usize,
-                metres_per_px,
-            },
-            rest: planes_of_image(background),
-            noise_rgb: [0.0; 3],
-            colour: ColourModel::Taxim(Box::new(table)),
-        };
-        sensor.checked(Some(background))
-    }
-
     fn checked(self, background: Option<&TactileImage>) -> Result<Self, SensorError> {
         let mm = self.grid.metres_per_px * 1e3;
         if !(mm.is_finite() && (1e-4..=1.0).contains(&mm)) {
@@ -174,39 +128,30 @@ impl Sensor {
             let range = "from 0 to 255 grey levels";
             return Err(SensorError::Value { key: "rest_rgb", value: f64::from(value), range });
         }
+        self.gel_shape.check(&self.grid)?;
+        if let Some(ball_m) = self.ball_m.filter(|d| !(1e-4..=0.1).contains(d)) {
+            let range = "from 0.1 to 100 mm";
+            return Err(SensorError::Value { key: "ball_mm", value: ball_m * 1e3, range });
+        }
+        if let Some(pyramid) = &self.pyramid {
+            if let Some(&k) = pyramid.kernels_px.iter().find(|&&k| k % 2 == 0 || !(3..=255).contains(&k)) {
+                let range = "odd and from 3 to 255 pixels";
+                return Err(SensorError::Value { key: "kernels_px", value: f64::from(k), range });
+            }
+            let share = pyramid.restore_depth_fraction;
+            if !(0.0..=1.0).contains(&share) {
+                let range = "from 0 to 1";
+                return Err(SensorError::Value { key: "restore_depth_fraction", value: share, range });
+            }
+        }
         Ok(self)
     }
-
-    /// The bytes of a sensor file; only for sensors with gripgen's own colour model.
-    ///
-    /// The rest frame is stored in whole grey levels.
-    pub fn to_npz(&self) -> Option<Result<Vec<u8>, NpzError>> {
-        let ColourModel::Lambert(lambert) = &self.colour else { return None };
-        let scalar = |x: f64| Array { shape: vec![], values: vec![x] };
-        let rest = (0..self.grid.len()).flat_map(|i| [0, 1, 2].map(|c| f64::from(self.rest[c][i]))).collect();
-        let shape = vec![self.grid.height_px, self.grid.width_px, 3];
-        let noise = self.noise_rgb.iter().map(|&x| f64::from(x)).collect();
-        Some(write_npz(&[
-            ("gripgen_sensor", scalar(SENSOR_VERSION), ElementType::F64),
-            ("mm_per_px", scalar(self.grid.metres_per_px * 1e3), ElementType::F64),
-            ("rest_rgb", Array { shape, values: rest }, ElementType::U8),
-            ("noise_rgb", Array { shape: vec![3], values: noise }, ElementType::F64),
-            ("lambert", Array { shape: vec![3, 3, 6], values: lambert.coefficients() }, ElementType::F64),
-        ]))
-    }
-}
-
-fn planes(interleaved: &[f64]) -> [Vec<f32>; 3] {
-    [0, 1, 2].map(|c| interleaved.iter().skip(c).step_by(3).map(|&x| x as f32).collect())
-}
-
-fn planes_of_image(image: &TactileImage) -> [Vec<f32>; 3] {
-    [0, 1, 2].map(|c| image.rgb.iter().skip(c).step_by(3).map(|&x| f32::from(x)).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::npz::{Array, ElementType, write_npz};
 
     fn sensor(edit: impl Fn(&str, &mut Vec<f64>)) -> Result<Sensor, SensorError> {
         let array = |key: &str, shape: &[usize], value: f64| {
@@ -220,6 +165,10 @@ mod tests {
             ("rest_rgb", array("rest_rgb", &[16, 20, 3], 90.0), ElementType::F64),
             ("noise_rgb", array("noise_rgb", &[3], 1.0), ElementType::F64),
             ("lambert", array("lambert", &[3, 3, 6], 2.0), ElementType::F64),
+            ("ball_mm", array("ball_mm", &[], 4.0), ElementType::F64),
+            ("dome_sag_mm", array("dome_sag_mm", &[], 0.5), ElementType::F64),
+            ("kernels_px", array("kernels_px", &[2], 21.0), ElementType::F64),
+            ("restore_depth_fraction", array("restore_depth_fraction", &[], 0.4), ElementType::F64),
         ]);
         Sensor::from_npz(&bytes.unwrap(), None, None)
     }
@@ -233,6 +182,10 @@ mod tests {
             ("rest_rgb", 256.0, "from 0 to 255"),
             ("rest_rgb", f64::NAN, "from 0 to 255"),
             ("noise_rgb", -1.0, "from 0 to 64"),
+            ("ball_mm", 0.01, "from 0.1 to 100 mm"),
+            ("dome_sag_mm", -1.0, "from 0 to 20 mm"),
+            ("kernels_px", 70.0, "odd and from 3 to 255"),
+            ("restore_depth_fraction", 1.5, "from 0 to 1"),
             ("lambert", f64::NAN, "`lambert` holds a number that is not finite"),
             ("lambert", f64::INFINITY, "not finite"),
         ] {
@@ -244,6 +197,14 @@ mod tests {
             let error = error.err().map(|e| e.to_string()).unwrap_or_default();
             assert!(error.contains(part), "{key} = {value}: `{error}`");
         }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let good = sensor(|_, _| {}).unwrap();
+        assert_eq!(good.gel_shape, GelShape::Dome { sag_m: 0.5e-3 });
+        let bytes = good.to_npz().unwrap().unwrap();
+        assert_eq!(Sensor::from_npz(&bytes, None, None).unwrap(), good);
     }
 
     #[test]

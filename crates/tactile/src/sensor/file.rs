@@ -1,0 +1,181 @@
+//! Reading and writing sensor files.
+//!
+//! | key | shape | what |
+//! |---|---|---|
+//! | `gripgen_sensor` | scalar | version of the format |
+//! | `mm_per_px` | scalar | side of a pixel on the gel |
+//! | `rest_rgb` | (H, W, 3) | denoised frame without contact, grey levels |
+//! | `noise_rgb` | (3,) | standard deviation of the noise of a pixel, grey levels |
+//! | `lambert` | (3, 3, 6) | colours as lights: channel, component of the normal, term of the field |
+//! | `dome_sag_mm` | scalar, optional | a domed gel: how much its corners lie below its apex |
+//! | `gel_height_px` | (H, W), optional | a gel of any shape: height at rest, relative to its highest point |
+//! | `kernels_px`, `restore_depth_fraction` | (K,), scalar, optional | the deformation that the colours were calibrated with |
+//! | `ball_mm` | scalar, optional | diameter of the ball of the calibration |
+
+use super::{GelShape, Pyramid, Sensor, SensorError};
+use crate::colour::{ColourModel, Lambert, TaximTable};
+use crate::grid::Grid;
+use crate::npz::{Array, ElementType, Npz, NpzError, write_npz};
+use gripgen_twin::TactileImage;
+
+/// Version of the sensor file format, stored under the key `gripgen_sensor`.
+pub const SENSOR_VERSION: f64 = 1.0;
+
+impl Sensor {
+    /// Reads a sensor file: gripgen's own, or Taxim's `polycalib.npz`.
+    ///
+    /// `metres_per_px` replaces the file's pixel size, `background` is the frame without contact; a Taxim
+    /// calibration needs both, since it holds neither.
+    pub fn from_npz(
+        bytes: &[u8],
+        metres_per_px: Option<f64>,
+        background: Option<&TactileImage>,
+    ) -> Result<Self, SensorError> {
+        let mut npz = Npz::open(bytes)?;
+        if npz.has("gripgen_sensor") {
+            return Self::own(&mut npz, metres_per_px, background);
+        }
+        if npz.has("grad_r") {
+            return Self::taxim(&mut npz, metres_per_px, background);
+        }
+        Err(SensorError::Unknown { present: npz.keys().join(", ") })
+    }
+
+    fn own(
+        npz: &mut Npz<'_>,
+        metres_per_px: Option<f64>,
+        background: Option<&TactileImage>,
+    ) -> Result<Self, SensorError> {
+        let version = npz.array_of_shape("gripgen_sensor", &[])?.values[0];
+        if version != SENSOR_VERSION {
+            return Err(SensorError::Version { found: version });
+        }
+        let rest = npz.array_of_shape("rest_rgb", &[None, None, Some(3)])?;
+        let (height_px, width_px) = (rest.shape[0], rest.shape[1]);
+        let mm_per_px = npz.array_of_shape("mm_per_px", &[])?.values[0];
+        let noise = npz.array_of_shape("noise_rgb", &[Some(3)])?.values;
+        let colour = own_colour(npz)?;
+        let gel_shape = gel_shape(npz, height_px, width_px)?;
+        let pyramid = pyramid(npz)?;
+        let ball_m = scalar(npz, "ball_mm")?.map(|mm| mm * 1e-3);
+        let grid = Grid { width_px, height_px, metres_per_px: metres_per_px.unwrap_or(mm_per_px * 1e-3) };
+        let sensor = Self {
+            grid,
+            rest: background.map_or_else(|| planes(&rest.values), planes_of_image),
+            noise_rgb: [noise[0] as f32, noise[1] as f32, noise[2] as f32],
+            colour,
+            gel_shape,
+            pyramid,
+            ball_m,
+        };
+        sensor.checked(background)
+    }
+
+    fn taxim(
+        npz: &mut Npz<'_>,
+        metres_per_px: Option<f64>,
+        background: Option<&TactileImage>,
+    ) -> Result<Self, SensorError> {
+        let background = background.ok_or(SensorError::Incomplete { missing: "background" })?;
+        let metres_per_px = metres_per_px.ok_or(SensorError::Incomplete { missing: "mm_per_px" })?;
+        let table = TaximTable::read(npz)?;
+        let sensor = Self {
+            grid: Grid {
+                width_px: background.width_px as usize,
+                height_px: background.height_px as usize,
+                metres_per_px,
+            },
+            rest: planes_of_image(background),
+            noise_rgb: [0.0; 3],
+            colour: ColourModel::Taxim(Box::new(table)),
+            gel_shape: GelShape::Flat,
+            pyramid: None,
+            ball_m: None,
+        };
+        sensor.checked(Some(background))
+    }
+
+    /// The bytes of a sensor file; `None` for a colour model that is only read, Taxim's table.
+    pub fn to_npz(&self) -> Option<Result<Vec<u8>, NpzError>> {
+        let ColourModel::Lambert(lambert) = &self.colour else { return None };
+        let scalar = |x: f64| Array { shape: vec![], values: vec![x] };
+        let list = |values: Vec<f64>| Array { shape: vec![values.len()], values };
+        let (rows, columns) = (self.grid.height_px, self.grid.width_px);
+        let rest: Vec<f64> =
+            (0..self.grid.len()).flat_map(|i| [0, 1, 2].map(|c| f64::from(self.rest[c][i]))).collect();
+        // Whole grey levels take a quarter of the space.
+        let whole = rest.iter().all(|x| x.fract() == 0.0);
+        let rest_type = if whole { ElementType::U8 } else { ElementType::F32 };
+        let noise = self.noise_rgb.iter().map(|&x| f64::from(x)).collect();
+        let mut arrays = vec![
+            ("gripgen_sensor", scalar(SENSOR_VERSION), ElementType::F64),
+            ("mm_per_px", scalar(self.grid.metres_per_px * 1e3), ElementType::F64),
+            ("rest_rgb", Array { shape: vec![rows, columns, 3], values: rest }, rest_type),
+            ("noise_rgb", list(noise), ElementType::F64),
+            ("lambert", Array { shape: vec![3, 3, 6], values: lambert.coefficients() }, ElementType::F64),
+        ];
+        match &self.gel_shape {
+            GelShape::Flat => {}
+            GelShape::Dome { sag_m } => arrays.push(("dome_sag_mm", scalar(sag_m * 1e3), ElementType::F64)),
+            GelShape::Map(heights_px) => {
+                let values = heights_px.iter().map(|&h| f64::from(h)).collect();
+                arrays.push((
+                    "gel_height_px",
+                    Array { shape: vec![rows, columns], values },
+                    ElementType::F32,
+                ));
+            }
+        }
+        if let Some(pyramid) = &self.pyramid {
+            let kernels = pyramid.kernels_px.iter().map(|&k| f64::from(k)).collect();
+            arrays.push(("kernels_px", list(kernels), ElementType::F64));
+            let share = pyramid.restore_depth_fraction;
+            arrays.push(("restore_depth_fraction", scalar(share), ElementType::F64));
+        }
+        if let Some(ball_m) = self.ball_m {
+            arrays.push(("ball_mm", scalar(ball_m * 1e3), ElementType::F64));
+        }
+        Some(write_npz(&arrays))
+    }
+}
+
+/// gripgen's own colour model of a file.
+fn own_colour(npz: &mut Npz<'_>) -> Result<ColourModel, NpzError> {
+    let lambert = npz.array_of_shape("lambert", &[Some(3), Some(3), Some(6)])?;
+    Ok(ColourModel::Lambert(Box::new(Lambert::new(&lambert.values))))
+}
+
+fn scalar(npz: &mut Npz<'_>, key: &str) -> Result<Option<f64>, NpzError> {
+    if !npz.has(key) {
+        return Ok(None);
+    }
+    Ok(Some(npz.array_of_shape(key, &[])?.values[0]))
+}
+
+fn gel_shape(npz: &mut Npz<'_>, rows: usize, columns: usize) -> Result<GelShape, NpzError> {
+    if npz.has("gel_height_px") {
+        let heights = npz.array_of_shape("gel_height_px", &[Some(rows), Some(columns)])?;
+        return Ok(GelShape::Map(heights.values.iter().map(|&h| h as f32).collect()));
+    }
+    Ok(match scalar(npz, "dome_sag_mm")? {
+        Some(mm) => GelShape::Dome { sag_m: mm * 1e-3 },
+        None => GelShape::Flat,
+    })
+}
+
+fn pyramid(npz: &mut Npz<'_>) -> Result<Option<Pyramid>, NpzError> {
+    if !npz.has("kernels_px") {
+        return Ok(None);
+    }
+    let kernels_px = npz.array_of_shape("kernels_px", &[None])?.values.iter().map(|&k| k as u32).collect();
+    let restore_depth_fraction = npz.array_of_shape("restore_depth_fraction", &[])?.values[0];
+    Ok(Some(Pyramid { kernels_px, restore_depth_fraction }))
+}
+
+fn planes(interleaved: &[f64]) -> [Vec<f32>; 3] {
+    [0, 1, 2].map(|c| interleaved.iter().skip(c).step_by(3).map(|&x| x as f32).collect())
+}
+
+fn planes_of_image(image: &TactileImage) -> [Vec<f32>; 3] {
+    [0, 1, 2].map(|c| image.rgb.iter().skip(c).step_by(3).map(|&x| f32::from(x)).collect())
+}

@@ -1,0 +1,87 @@
+//! The gel surface at rest: flat, domed, or measured.
+
+use super::SensorError;
+use crate::grid::{Grid, Plane};
+
+/// Deepest rest surface below its highest point.
+const LARGEST_SAG_M: f64 = 20e-3;
+
+/// Shape of the gel without contact. Heights are towards the part, relative to the highest point, so none is above 0.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum GelShape {
+    /// A plane.
+    #[default]
+    Flat,
+    /// A paraboloid with its apex in the middle of the image.
+    Dome {
+        /// How much the corners of the image lie below the apex.
+        sag_m: f64,
+    },
+    /// Any shape: one height a pixel, in pixels, row by row.
+    Map(Vec<f32>),
+}
+
+impl GelShape {
+    /// Heights at rest in pixels, at most 0; `None` for a flat gel.
+    ///
+    /// A dome is `-sag r^2 / r_corner^2`: the paraboloid that a spherical cap is to within `sag / (4 R)` of its sag
+    /// (2 % for Taxim's 1.4 mm on a half diagonal of 11.8 mm).
+    pub fn rest_px(&self, grid: &Grid) -> Option<Plane> {
+        match self {
+            GelShape::Flat => None,
+            GelShape::Dome { sag_m } if *sag_m == 0.0 => None,
+            GelShape::Dome { sag_m } => {
+                let (w, h) = (grid.width_px, grid.height_px);
+                let corner = grid.centre_m(w - 1, h - 1);
+                let scale = -sag_m / grid.metres_per_px / (corner.0 * corner.0 + corner.1 * corner.1);
+                let values = (0..w * h)
+                    .map(|i| {
+                        let (x, y) = grid.centre_m(i % w, i / w);
+                        (scale * (x * x + y * y)) as f32
+                    })
+                    .collect();
+                Some(Plane { width: w, height: h, values })
+            }
+            GelShape::Map(heights) => {
+                Some(Plane { width: grid.width_px, height: grid.height_px, values: heights.clone() })
+            }
+        }
+    }
+
+    pub(super) fn check(&self, grid: &Grid) -> Result<(), SensorError> {
+        let largest_px = LARGEST_SAG_M / grid.metres_per_px;
+        match self {
+            GelShape::Flat => Ok(()),
+            GelShape::Dome { sag_m } if (0.0..=LARGEST_SAG_M).contains(sag_m) => Ok(()),
+            GelShape::Dome { sag_m } => {
+                Err(SensorError::Value { key: "dome_sag_mm", value: sag_m * 1e3, range: "from 0 to 20 mm" })
+            }
+            GelShape::Map(heights) => {
+                match heights.iter().find(|&&h| !(-largest_px..=0.0).contains(&f64::from(h))) {
+                    None => Ok(()),
+                    Some(&h) => Err(SensorError::Value {
+                        key: "gel_height_px",
+                        value: f64::from(h),
+                        range: "from -20 mm in pixels to 0, relative to the highest point",
+                    }),
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dome_sags_at_its_corners_and_not_in_the_middle() {
+        let grid = Grid { width_px: 41, height_px: 31, metres_per_px: 1e-4 };
+        let rest = GelShape::Dome { sag_m: 0.5e-3 }.rest_px(&grid).unwrap();
+        assert_eq!(rest.at(20, 15), 0.0);
+        for (x, y) in [(0, 0), (40, 0), (0, 30), (40, 30)] {
+            assert!((rest.at(x, y) + 5.0).abs() < 1e-5);
+        }
+        assert_eq!(GelShape::Dome { sag_m: 0.0 }.rest_px(&grid), None, "no sag is flat");
+    }
+}
