@@ -19,6 +19,7 @@ pub mod metrics;
 mod noise;
 pub mod npz;
 mod patch;
+pub mod presses;
 mod raster;
 mod render;
 mod sensor;

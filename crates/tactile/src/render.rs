@@ -39,15 +39,14 @@ impl Renderer<'_> {
         indent(&heights, grid, &gel, force_n)
     }
 
-    /// The gel surface around an imprint, in pixels towards the camera: stage `deform`.
+    /// The gel surface around an imprint, in pixels towards the camera: stage `deform`. A calibrated sensor says with
+    /// which kernels; without its word those of the gel are used.
     pub fn surface(&self, imprint: &Imprint) -> Plane {
-        deform(
-            imprint,
-            &self.gel.kernels_px,
-            self.gel.restore_depth_fraction,
-            self.sensor.grid.metres_per_px,
-            self.level,
-        )
+        let (kernels_px, restore_depth_fraction) = match &self.sensor.pyramid {
+            Some(pyramid) => (&pyramid.kernels_px, pyramid.restore_depth_fraction),
+            None => (&self.gel.kernels_px, self.gel.restore_depth_fraction),
+        };
+        deform(imprint, kernels_px, restore_depth_fraction, self.sensor.grid.metres_per_px, self.level)
     }
 
     /// The image of an imprint, or of the gel at rest: stages `deform` to `noise`. `noise_key` chooses the noise;

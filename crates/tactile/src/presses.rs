@@ -1,0 +1,76 @@
+//! Presses of a ball into a sensor, and how well a sensor file predicts their images.
+
+mod compare;
+
+pub use compare::{
+    CROPS_PX, CompareError, PressComparison, PressScore, Scores, compare_presses, crop, predict_press,
+    score_press,
+};
+
+use gripgen_twin::TactileImage;
+
+/// Images of one sensor into which a ball was pressed, in the order in which they were taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressSet {
+    /// Side of a pixel on the gel.
+    pub metres_per_px: f64,
+    /// Diameter of the ball.
+    pub ball_m: f64,
+    /// A frame without contact, where one was taken.
+    pub rest: Option<TactileImage>,
+    /// The presses; all images have one size.
+    pub presses: Vec<Press>,
+}
+
+/// One press.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Press {
+    /// What it is called in a report.
+    pub name: String,
+    /// The image.
+    pub image: TactileImage,
+    /// Where the ball touches, where somebody marked it.
+    pub circle: Option<Circle>,
+}
+
+/// The rim of the contact of a ball, in pixels from the centre of the image's first pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Circle {
+    /// Centre, along the columns.
+    pub x_px: f64,
+    /// Centre, down the rows.
+    pub y_px: f64,
+    /// Radius.
+    pub radius_px: f64,
+}
+
+impl Circle {
+    /// Radius of the circle in which a ball that sinks in by `depth_m` cuts the plane of the gel:
+    /// `sqrt(2 R d - d^2)`, R up to the equator.
+    pub fn radius_px_at_depth(ball_m: f64, depth_m: f64, metres_per_px: f64) -> f64 {
+        let depth_m = depth_m.clamp(0.0, ball_m / 2.0);
+        (depth_m * (ball_m - depth_m)).max(0.0).sqrt() / metres_per_px
+    }
+
+    /// How deep the ball sinks in: `R - sqrt(R^2 - a^2)`; a circle wider than the ball is one of its equator.
+    pub fn depth_m(&self, ball_m: f64, metres_per_px: f64) -> f64 {
+        let (ball_radius, radius) = (ball_m / 2.0, self.radius_px * metres_per_px);
+        ball_radius - (ball_radius * ball_radius - radius * radius).max(0.0).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_and_radius_are_one_another() {
+        for depth_m in [0.1e-3, 1.0e-3, 1.7e-3, 2.0e-3] {
+            let radius_px = Circle::radius_px_at_depth(4e-3, depth_m, 29.5e-6);
+            let circle = Circle { x_px: 0.0, y_px: 0.0, radius_px };
+            assert!((circle.depth_m(4e-3, 29.5e-6) - depth_m).abs() < 1e-12);
+        }
+        // 1 mm of a 4 mm ball: sqrt(3) mm.
+        assert!((Circle::radius_px_at_depth(4e-3, 1e-3, 1e-3) - 3.0_f64.sqrt()).abs() < 1e-12);
+    }
+}
