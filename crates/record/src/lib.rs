@@ -11,6 +11,7 @@ mod export;
 mod folder;
 mod index;
 mod picture;
+mod presses;
 pub mod proto;
 mod reader;
 mod shard;
@@ -24,6 +25,7 @@ pub use folder::{
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
 pub use picture::{PictureError, decode as decode_picture, encode_png};
+pub use presses::{PRESSES_FILE, PressFolder, PressFolderError, PressRecord, read_press_folder};
 pub use reader::{ReadError, Record, ShardReader};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, ShardError, ShardInfo, ShardWriter};
 pub use verify::{Verification, verify};
