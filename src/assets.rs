@@ -25,6 +25,7 @@ static FILES: &[(&str, &[u8])] = embedded![
     "sensors/gelsight_r15/sensor.npz",
     "templates/part-sweep.toml",
     "templates/part-twin.toml",
+    "templates/presses.html",
     "templates/sweep.toml",
     "templates/twin.toml",
 ];
