@@ -1,132 +1,324 @@
-//! Separable convolution with mirrored borders, a few rows at a time in vector registers.
+//! Separable convolution with symmetric kernels and mirrored borders, on the part of an image that is not zero.
+//!
+//! Only columns are ever convolved; between the two axes the image is transposed. For every output row the sum is
+//! `w_0 x_0 + sum_k w_k (x_-k + x_k)` with k growing and a fused multiply-add for each k. Terms whose two rows are
+//! zero are left out, which changes no bit. That is the definition on every vector unit.
+
+mod block;
 
 use crate::grid::Plane;
-#[cfg(target_arch = "x86_64")]
-use crate::simd::Avx2;
-use crate::simd::{Lanes, Portable, SimdLevel};
+use crate::simd::{Kernel, Lanes, SimdLevel};
+use block::Block;
 
-/// Rows computed together, so that a loaded row serves several outputs.
-const ROWS: usize = 4;
+/// Columns and rows are handled in groups of this, the widest vector.
+const GROUP: usize = 16;
 
-/// Columns are padded to a multiple of this, the widest vector.
-const LANE_PADDING: usize = 16;
+/// Rows of an image that lie before its first and after its last, in addition to half the largest kernel: a block of
+/// output rows and a group of rows that only pads.
+const SPARE_ROWS: usize = 2 * GROUP;
 
-/// A plane whose rows are padded to whole vectors.
-#[derive(Debug, Clone)]
-pub(crate) struct Padded {
-    width: usize,
-    height: usize,
-    stride: usize,
-    values: Vec<f32>,
+/// A rectangle of pixels; ends are not part of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Area {
+    pub(crate) x: (usize, usize),
+    pub(crate) y: (usize, usize),
 }
 
-impl Padded {
-    pub(crate) fn zeros(width: usize, height: usize) -> Self {
-        let stride = width.next_multiple_of(LANE_PADDING);
-        Self { width, height, stride, values: vec![0.0; stride * height] }
+impl Area {
+    pub(crate) const EMPTY: Self = Self { x: (0, 0), y: (0, 0) };
+
+    /// The bounding box of the values above 0.
+    pub(crate) fn of_positive(plane: &Plane, level: SimdLevel) -> Self {
+        level.run(Positive { plane })
     }
 
-    pub(crate) fn from_plane(plane: &Plane) -> Self {
-        let mut padded = Self::zeros(plane.width, plane.height);
-        for y in 0..plane.height {
-            padded.values[y * padded.stride..][..plane.width].copy_from_slice(plane.row(y));
-        }
-        padded
+    pub(crate) fn whole(width: usize, height: usize) -> Self {
+        Self { x: (0, width), y: (0, height) }
     }
 
-    pub(crate) fn transposed(&self) -> Self {
-        const BLOCK: usize = 16;
-        let mut out = Self::zeros(self.height, self.width);
-        for by in (0..self.height).step_by(BLOCK) {
-            for bx in (0..self.width).step_by(BLOCK) {
-                for x in bx..(bx + BLOCK).min(self.width) {
-                    for y in by..(by + BLOCK).min(self.height) {
-                        out.values[x * out.stride + y] = self.values[y * self.stride + x];
-                    }
+    pub(crate) fn is_empty(&self) -> bool {
+        self.x.0 >= self.x.1 || self.y.0 >= self.y.1
+    }
+
+    pub(crate) fn transposed(self) -> Self {
+        Self { x: self.y, y: self.x }
+    }
+
+    /// Whole groups of columns and rows around it.
+    pub(crate) fn in_groups(self) -> Self {
+        let groups = |(a, b): (usize, usize)| (a / GROUP * GROUP, b.next_multiple_of(GROUP));
+        Self { x: groups(self.x), y: groups(self.y) }
+    }
+}
+
+struct Positive<'a> {
+    plane: &'a Plane,
+}
+
+impl Kernel for Positive<'_> {
+    type Output = Area;
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> Area {
+        let mut area = Area::EMPTY;
+        let mut columns = vec![0.0f32; self.plane.width];
+        for y in 0..self.plane.height {
+            let row = self.plane.row(y);
+            let top = row.iter().fold(0.0f32, |m, &v| if v > m { v } else { m });
+            if top > 0.0 {
+                area.y = (if area.y.1 == 0 { y } else { area.y.0 }, y + 1);
+                for (most, &v) in columns.iter_mut().zip(row) {
+                    *most = if v > *most { v } else { *most };
                 }
             }
         }
-        out
+        if let (Some(first), Some(last)) =
+            (columns.iter().position(|&v| v > 0.0), columns.iter().rposition(|&v| v > 0.0))
+        {
+            area.x = (first, last + 1);
+        }
+        area
     }
 }
 
-/// A surface that lies upright or transposed: only columns are ever convolved.
-pub(crate) struct Oriented {
-    plane: Padded,
-    transposed: bool,
+/// An image with spare rows before and after, and rows that are whole vectors.
+///
+/// It is memory to be used again: what it holds outside the area that was last written has no meaning.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sheet {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    stride: usize,
+    margin: usize,
+    values: Vec<f32>,
 }
 
-impl Oriented {
-    pub(crate) fn new(plane: &Plane) -> Self {
-        Self { plane: Padded::from_plane(plane), transposed: false }
+impl Sheet {
+    /// Makes room for an image; its content is left undefined. `half` is half of the largest kernel it will meet.
+    pub(crate) fn reshape(&mut self, width: usize, height: usize, half: usize) {
+        self.width = width;
+        self.height = height;
+        // An odd number of cache lines, so that the rows of a column are spread over the whole cache.
+        self.stride = (width.div_ceil(GROUP) | 1) * GROUP;
+        self.margin = half + SPARE_ROWS;
+        let rows = height.next_multiple_of(GROUP) + 2 * self.margin;
+        if self.values.len() < self.stride * rows {
+            self.values.resize(self.stride * rows, 0.0);
+        }
     }
 
-    /// Blurs along both axes, then puts the restored values back. `restore` is upright and transposed.
-    pub(crate) fn blur(&mut self, weights: &[f32], restore: Option<&[Padded; 2]>, level: SimdLevel) {
-        let across = convolve_columns(&self.plane, weights, None, level).transposed();
-        self.transposed = !self.transposed;
-        let restore = restore.map(|both| &both[usize::from(self.transposed)]);
-        self.plane = convolve_columns(&across, weights, restore, level);
+    /// Offset of pixel 0 of row `y`, which may lie in the margin.
+    fn offset(&self, y: isize) -> usize {
+        (y + self.margin as isize) as usize * self.stride
     }
 
-    pub(crate) fn into_plane(self) -> Plane {
-        let upright = if self.transposed { self.plane.transposed() } else { self.plane };
-        let values = (0..upright.height)
-            .flat_map(|y| upright.values[y * upright.stride..][..upright.width].iter().copied())
-            .collect();
-        Plane { width: upright.width, height: upright.height, values }
+    /// Row `y` with what pads it.
+    pub(crate) fn row(&self, y: usize) -> &[f32] {
+        &self.values[self.offset(y as isize)..][..self.stride]
     }
-}
 
-/// Convolves every column with `weights`; borders are mirrored. Where `restore` is a number it replaces the result.
-pub(crate) fn convolve_columns(
-    input: &Padded,
-    weights: &[f32],
-    restore: Option<&Padded>,
-    level: SimdLevel,
-) -> Padded {
-    let mut output = Padded::zeros(input.width, input.height);
-    let half = weights.len() / 2;
-    // Zeros around the weights let ROWS neighbouring outputs share one pass over the inputs; adding 0 * x changes
-    // no bit of a finite sum.
-    let mut padded_weights = vec![0.0; ROWS - 1];
-    padded_weights.extend_from_slice(weights);
-    padded_weights.resize(weights.len() + 2 * (ROWS - 1), 0.0);
-    let mut first_row = 0;
-    while first_row < input.height {
-        let rows = ROWS.min(input.height - first_row);
-        let sources: Vec<usize> = (0..weights.len() + rows - 1)
-            .map(|i| mirrored((first_row + i) as isize - half as isize, input.height) * input.stride)
-            .collect();
-        let block = Block {
-            input: &input.values,
-            sources: &sources,
-            weights: &padded_weights,
-            restore: restore.map(|r| &r.values[..]),
-            first: first_row * input.stride,
-            stride: input.stride,
-        };
-        let out = &mut output.values;
-        // SAFETY: `SimdLevel::available` names only what the processor has; see `Block::run` for the pointers.
-        let done = unsafe {
-            match (rows, level) {
-                #[cfg(target_arch = "x86_64")]
-                (ROWS, SimdLevel::Avx2) => block.run_avx2(out),
-                (ROWS, _) => block.run::<Portable, ROWS, 1>(out, 0),
-                (3, _) => block.run::<Portable, 3, 1>(out, 0),
-                (2, _) => block.run::<Portable, 2, 1>(out, 0),
-                _ => block.run::<Portable, 1, 1>(out, 0),
+    /// Row `y` with what pads it.
+    pub(crate) fn row_mut(&mut self, y: usize) -> &mut [f32] {
+        let at = self.offset(y as isize);
+        &mut self.values[at..][..self.stride]
+    }
+
+    /// Writes `f` of a plane's values into whole groups around an area, and `outside` around it.
+    pub(crate) fn copy_area(&mut self, plane: &Plane, area: Area, outside: f32, f: impl Fn(f32) -> f32) {
+        let groups = area.in_groups();
+        for y in groups.y.0..groups.y.1 {
+            let row = self.row_mut(y);
+            row[groups.x.0..groups.x.1].fill(outside);
+            if (area.y.0..area.y.1).contains(&y) {
+                let from = &plane.row(y)[area.x.0..area.x.1];
+                for (to, &value) in row[area.x.0..area.x.1].iter_mut().zip(from) {
+                    *to = f(value);
+                }
             }
-        };
-        debug_assert_eq!(done, input.stride, "rows are whole vectors");
-        first_row += rows;
+        }
     }
-    output
+
+    /// Copies an area of `from`, in whole groups, with x and y exchanged.
+    pub(crate) fn copy_transposed(&mut self, from: &Sheet, area: Area, level: SimdLevel) {
+        debug_assert_eq!((self.width, self.height), (from.height, from.width));
+        level.run(Transpose { from, to: self, area: area.in_groups() });
+    }
+}
+
+struct Transpose<'a> {
+    from: &'a Sheet,
+    to: &'a mut Sheet,
+    area: Area,
+}
+
+impl Kernel for Transpose<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let (from, to, area) = (self.from, self.to, self.area);
+        for x in (area.x.0..area.x.1).step_by(8) {
+            for y in (area.y.0..area.y.1).step_by(8) {
+                let (source, target) = (from.offset(y as isize) + x, to.offset(x as isize) + y);
+                // SAFETY: areas in groups lie within stride and spare rows of both sheets.
+                unsafe {
+                    L::transpose8(
+                        from.values.as_ptr().add(source),
+                        from.stride,
+                        to.values.as_mut_ptr().add(target),
+                        to.stride,
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// What is put back after a blur: `core` where it is a number, plus `lift` where there is one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Restore<'a> {
+    /// Values to put back, NaN for none; valid in the whole groups around `area`.
+    pub(crate) core: &'a Sheet,
+    /// Where they are.
+    pub(crate) area: Area,
+    /// Added to them.
+    pub(crate) lift: Option<&'a Sheet>,
+}
+
+/// A surface that lies upright or transposed, and the memory to blur it in.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Surface {
+    pub(crate) sheet: Sheet,
+    other: Sheet,
+    pub(crate) transposed: bool,
+    /// Beyond it the surface is 0.
+    pub(crate) area: Area,
+    live: Vec<(isize, isize)>,
+    ranges: Vec<(usize, usize)>,
+}
+
+impl Default for Area {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
+impl Surface {
+    /// Makes room for kernels of up to `2 half + 1` and takes `plane`, which is 0 beyond `area`.
+    pub(crate) fn start(&mut self, plane: &Plane, area: Area, half: usize) {
+        self.sheet.reshape(plane.width, plane.height, half);
+        self.sheet.copy_area(plane, area, 0.0, |v| v);
+        self.transposed = false;
+        self.area = area;
+    }
+
+    /// Blurs along both axes with `weights` (the middle one first), then puts back what `restore` has for this
+    /// orientation. The area grows by half the kernel and `beyond` on every side.
+    pub(crate) fn blur(
+        &mut self,
+        weights: &[f32],
+        restore: Option<&[Restore<'_>; 2]>,
+        beyond: usize,
+        level: SimdLevel,
+    ) {
+        if self.area.is_empty() {
+            return;
+        }
+        self.columns(weights, None, beyond, level);
+        self.transpose(level);
+        let restore = restore.map(|both| both[usize::from(self.transposed)]);
+        self.columns(weights, restore, beyond, level);
+    }
+
+    /// Makes the whole image its area.
+    pub(crate) fn widen(&mut self) {
+        let (area, whole) = (self.area, Area::whole(self.sheet.width, self.sheet.height));
+        for y in 0..self.sheet.height {
+            let row = self.sheet.row_mut(y);
+            if (area.y.0..area.y.1).contains(&y) {
+                row[..area.x.0].fill(0.0);
+                row[area.x.1..].fill(0.0);
+            } else {
+                row.fill(0.0);
+            }
+        }
+        self.area = whole;
+    }
+
+    /// Turns the surface upright.
+    pub(crate) fn upright(&mut self, level: SimdLevel) {
+        if self.transposed {
+            self.transpose(level);
+        }
+    }
+
+    fn transpose(&mut self, level: SimdLevel) {
+        let half = self.sheet.margin - SPARE_ROWS;
+        self.other.reshape(self.sheet.height, self.sheet.width, half);
+        self.other.copy_transposed(&self.sheet, self.area, level);
+        std::mem::swap(&mut self.sheet, &mut self.other);
+        self.area = self.area.transposed();
+        self.transposed = !self.transposed;
+    }
+
+    fn columns(&mut self, weights: &[f32], restore: Option<Restore<'_>>, beyond: usize, level: SimdLevel) {
+        let half = weights.len() - 1;
+        let height = self.sheet.height;
+        self.other.reshape(self.sheet.width, height, self.sheet.margin - SPARE_ROWS);
+        let grown = half + beyond;
+        let out = Area {
+            x: self.area.x,
+            y: (self.area.y.0.saturating_sub(grown), (self.area.y.1 + grown).min(height)),
+        };
+        let groups = out.in_groups();
+        let rows = (groups.y.0, groups.y.1.min(height));
+        self.prepare_rows(rows, half);
+        level.run(Columns {
+            input: &self.sheet,
+            output: &mut self.other,
+            columns: groups.x,
+            rows,
+            live: &self.live,
+            ranges: &mut self.ranges,
+            weights,
+            restore,
+        });
+        std::mem::swap(&mut self.sheet, &mut self.other);
+        self.area = out;
+    }
+
+    /// Makes every row valid that the output `rows` reach, and notes which of them are not zero.
+    fn prepare_rows(&mut self, rows: (usize, usize), half: usize) {
+        let area = self.area;
+        let columns = area.in_groups().x;
+        let sheet = &mut self.sheet;
+        self.live.clear();
+        let first = rows.0 as isize - half as isize;
+        let end = (rows.1 + GROUP + half) as isize;
+        for row in first..end {
+            let source = mirrored(row, sheet.height);
+            let is_live = (area.y.0..area.y.1).contains(&source);
+            if is_live {
+                match self.live.last_mut() {
+                    Some((_, end)) if *end == row => *end += 1,
+                    _ => self.live.push((row, row + 1)),
+                }
+            }
+            let to = sheet.offset(row);
+            if !is_live {
+                sheet.values[to + columns.0..to + columns.1].fill(0.0);
+            } else if source as isize != row {
+                let from = sheet.offset(source as isize);
+                sheet.values.copy_within(from + columns.0..from + columns.1, to + columns.0);
+            }
+        }
+    }
 }
 
 /// Row `i` of an image continued by mirroring at its first and last row, which are not repeated.
 pub(crate) fn mirrored(i: isize, n: usize) -> usize {
     let n = n as isize;
+    if (0..n).contains(&i) {
+        return i as usize;
+    }
     if n == 1 {
         return 0;
     }
@@ -134,68 +326,100 @@ pub(crate) fn mirrored(i: isize, n: usize) -> usize {
     (if i < n { i } else { 2 * (n - 1) - i }) as usize
 }
 
-/// A few output rows and what they are made of.
-struct Block<'a> {
-    input: &'a [f32],
-    /// Offset of each input row, in the order in which they are added.
-    sources: &'a [usize],
-    /// Weights with `ROWS - 1` zeros on both sides.
+/// One pass over the columns of an area.
+struct Columns<'a> {
+    input: &'a Sheet,
+    output: &'a mut Sheet,
+    columns: (usize, usize),
+    rows: (usize, usize),
+    /// Rows that are not zero, counting mirrored ones.
+    live: &'a [(isize, isize)],
+    /// Memory for the range of k of each block of rows.
+    ranges: &'a mut Vec<(usize, usize)>,
+    /// The middle one first.
     weights: &'a [f32],
-    restore: Option<&'a [f32]>,
-    /// Offset of the first output row.
-    first: usize,
-    stride: usize,
+    restore: Option<Restore<'a>>,
 }
 
-impl Block<'_> {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    unsafe fn run_avx2(&self, out: &mut [f32]) -> usize {
-        // SAFETY: forwarded.
-        unsafe {
-            let done = self.run::<Avx2, ROWS, 2>(out, 0);
-            self.run::<Avx2, ROWS, 1>(out, done)
+impl Columns<'_> {
+    /// The k for which rows `k` before or after some of the rows from `first` on are not zero; empty if none are.
+    fn range(&self, first: usize, rows: usize) -> (usize, usize) {
+        let (first, last) = (first as isize, (first + rows - 1) as isize);
+        let half = self.weights.len() as isize - 1;
+        let (mut low, mut high) = (half + 1, 0);
+        for &(from, end) in self.live {
+            let nearest = 0.max(from - last).max(first - (end - 1));
+            if nearest <= half {
+                low = low.min(nearest);
+                high = high.max((last - from).max(end - 1 - first).min(half) + 1);
+            }
         }
+        (low as usize, high as usize)
     }
 
-    /// Computes `R` rows from column `from` on, `C` vectors at a time; returns the first column not done.
-    ///
-    /// # Safety
-    /// The processor must have the instructions of `L`. Every row has `stride` values, a multiple of the vector
-    /// length, so no access leaves `input`, `restore` or `out`.
     #[inline(always)]
-    unsafe fn run<L: Lanes, const R: usize, const C: usize>(&self, out: &mut [f32], from: usize) -> usize {
-        let step = L::COUNT * C;
-        let mut column = from;
-        while column + step <= self.stride {
-            // SAFETY: see above; `column + step <= stride`.
-            unsafe {
-                let mut sums = [[L::splat(0.0); C]; R];
-                for (i, &source) in self.sources.iter().enumerate() {
-                    let at = self.input.as_ptr().add(source + column);
-                    let values: [L::Vector; C] = std::array::from_fn(|c| L::load(at.add(c * L::COUNT)));
-                    for (r, row) in sums.iter_mut().enumerate() {
-                        // Input row i has weight i - r of output row r.
-                        let weight = L::splat(*self.weights.get_unchecked(ROWS - 1 + i - r));
-                        for (sum, &value) in row.iter_mut().zip(&values) {
-                            *sum = L::fused(weight, value, *sum);
-                        }
-                    }
-                }
-                for (r, row) in sums.iter().enumerate() {
-                    let offset = self.first + r * self.stride + column;
-                    for (c, &sum) in row.iter().enumerate() {
-                        let at = offset + c * L::COUNT;
-                        let value = match self.restore {
-                            Some(restore) => L::first_unless_nan(L::load(restore.as_ptr().add(at)), sum),
-                            None => sum,
-                        };
-                        L::store(out.as_mut_ptr().add(at), value);
+    unsafe fn blocks<L: Lanes, const ROWS: usize, const BOTH: bool>(self) {
+        let blocks = (self.rows.0..self.rows.1).step_by(ROWS);
+        let mut ranges = std::mem::take(self.ranges);
+        ranges.clear();
+        ranges.extend(blocks.clone().map(|first| self.range(first, ROWS)));
+        for x in (self.columns.0..self.columns.1).step_by(L::COUNT) {
+            for (first, &range) in blocks.clone().zip(&ranges) {
+                // SAFETY: the rows within reach of the block lie in the sheet, margins included, and columns in
+                // groups lie within its stride.
+                unsafe {
+                    let block = Block {
+                        at: self.input.values.as_ptr().add(self.input.offset(first as isize) + x),
+                        stride: self.input.stride,
+                        weights: self.weights,
+                        range,
+                    };
+                    let sums = block.sums::<L, ROWS, BOTH>();
+                    let rows = ROWS.min(self.rows.1 - first);
+                    for (i, &sum) in sums.iter().enumerate().take(rows) {
+                        let y = first + i;
+                        let value = self.restored::<L>(x, y, sum);
+                        L::store(
+                            self.output.values.as_mut_ptr().add(self.output.offset(y as isize) + x),
+                            value,
+                        );
                     }
                 }
             }
-            column += step;
         }
-        column
+        *self.ranges = ranges;
+    }
+
+    #[inline(always)]
+    unsafe fn restored<L: Lanes>(&self, x: usize, y: usize, sum: L::Vector) -> L::Vector {
+        let Some(restore) = self.restore else { return sum };
+        let area = restore.area;
+        if y < area.y.0 || y >= area.y.1 || x + L::COUNT <= area.x.0 || x >= area.x.1 {
+            return sum;
+        }
+        // SAFETY: the sheets of `restore` have the size of this one and are valid in groups.
+        unsafe {
+            let at = restore.core.offset(y as isize) + x;
+            let mut core = L::load(restore.core.values.as_ptr().add(at));
+            if let Some(lift) = restore.lift {
+                core = L::add(core, L::load(lift.values.as_ptr().add(lift.offset(y as isize) + x)));
+            }
+            L::first_unless_nan(core, sum)
+        }
+    }
+}
+
+impl Kernel for Columns<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        // SAFETY: forwarded.
+        unsafe {
+            if L::MANY_REGISTERS {
+                self.blocks::<L, 8, true>();
+            } else {
+                self.blocks::<L, 6, false>();
+            }
+        }
     }
 }

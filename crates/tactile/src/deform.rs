@@ -1,6 +1,6 @@
 //! Stage `deform`: the gel around a contact, by a pyramid of blurs.
 
-use crate::convolve::{Oriented, Padded};
+use crate::convolve::{Area, Restore, Sheet, Surface};
 use crate::grid::Plane;
 use crate::indent::Imprint;
 use crate::simd::SimdLevel;
@@ -8,32 +8,159 @@ use crate::simd::SimdLevel;
 /// The last blur, which smooths the border of the contact too.
 const FINAL_KERNEL_PX: u32 = 5;
 
+/// Pixels beyond the deformed gel whose neighbours are not flat, and theirs: what the gradient looks at.
+const RIM_PX: usize = 2;
+
 /// The height of the gel surface above its rest state, towards the camera, in pixels.
 ///
 /// Taxim's deformation (Si & Yuan 2022, and its source): the contact map is blurred with each kernel in turn, and
 /// after each blur the core of the contact (deeper than `restore_depth_fraction` of the press) gets its own height
 /// back; a last 5 x 5 blur is not restored. Gaussians are OpenCV's: `sigma = 0.3 ((k - 1) / 2 - 1) + 0.8`,
 /// `[1, 4, 6, 4, 1] / 16` for k = 5, borders mirrored without repeating the edge.
+///
+/// Taxim blurs the height of the whole gel. With the rest surface G (blurred i times: G_i) and the height of the
+/// gel z_i = G_i + E_i, a blur acts on E alone, which is exactly 0 far from the contact; the core is restored to
+/// `E_i = depth + G_0 - G_i`, and the result is `E_n + G_n - G_0`. On a flat gel all G are 0; `rest` holds them for
+/// one that is not.
 pub fn deform(
     imprint: &Imprint,
     kernels_px: &[u32],
     restore_depth_fraction: f64,
     metres_per_px: f64,
+    rest: Option<&BlurredRest>,
     level: SimdLevel,
 ) -> Plane {
-    let contact = &imprint.depth_px;
-    let core = (restore_depth_fraction * imprint.press_depth_m / metres_per_px) as f32;
-    let restored = Plane {
-        values: contact.values.iter().map(|&d| if d > core { d } else { f32::NAN }).collect(),
-        ..*contact
-    };
-    let mut surface = Oriented::new(contact);
-    let restore = [Padded::from_plane(&restored), Padded::from_plane(&restored).transposed()];
-    for &kernel in kernels_px {
-        surface.blur(&gaussian(kernel), Some(&restore), level);
+    let core_px = restore_depth_fraction * imprint.press_depth_m / metres_per_px;
+    let mut scratch = DeformScratch::default();
+    scratch.deform(&imprint.depth_px, core_px, &weights(kernels_px), rest, level);
+    scratch.surface_plane()
+}
+
+/// The halves of all kernels, the last one included.
+pub(crate) fn weights(kernels_px: &[u32]) -> Vec<Vec<f32>> {
+    kernels_px
+        .iter()
+        .chain([&FINAL_KERNEL_PX])
+        .map(|&size| gaussian(size).split_off(size as usize / 2))
+        .collect()
+}
+
+/// How far the blurs of a pyramid lift a gel that is not flat at rest: `G_i - G_0`.
+#[derive(Debug, Clone)]
+pub struct BlurredRest {
+    /// `G_0 - G_i` after each blur whose core is restored, in the orientation that the surface has then.
+    lowered: Vec<Sheet>,
+    /// `G_n - G_0`.
+    raised: Plane,
+}
+
+impl BlurredRest {
+    /// From the surface at rest in pixels towards the part (as [`crate::GelShape::rest_px`] gives it).
+    pub fn new(rest_px: &Plane, kernels_px: &[u32], level: SimdLevel) -> Self {
+        let weights = weights(kernels_px);
+        let half = largest_half(&weights);
+        let whole = Area::whole(rest_px.width, rest_px.height);
+        // Heights in the image are towards the camera.
+        let towards_camera = Plane { values: rest_px.values.iter().map(|&h| -h).collect(), ..*rest_px };
+        let mut surface = Surface::default();
+        surface.start(&towards_camera, whole, half);
+        let mut upright = Sheet::default();
+        upright.reshape(rest_px.width, rest_px.height, half);
+        upright.copy_area(&towards_camera, whole, 0.0, |v| v);
+        let mut lying = Sheet::default();
+        lying.reshape(rest_px.height, rest_px.width, half);
+        lying.copy_transposed(&upright, whole, level);
+        let mut lowered = Vec::new();
+        for kernel in &weights[..weights.len() - 1] {
+            surface.blur(kernel, None, 0, level);
+            let mut difference = if surface.transposed { lying.clone() } else { upright.clone() };
+            for y in 0..difference.height {
+                for (d, &g) in difference.row_mut(y).iter_mut().zip(surface.sheet.row(y)) {
+                    *d -= g;
+                }
+            }
+            lowered.push(difference);
+        }
+        surface.blur(&weights[weights.len() - 1], None, 0, level);
+        surface.upright(level);
+        let mut raised = towards_camera;
+        for y in 0..raised.height {
+            let width = raised.width;
+            for (r, &g) in raised.values[y * width..][..width].iter_mut().zip(surface.sheet.row(y)) {
+                *r = g - *r;
+            }
+        }
+        Self { lowered, raised }
     }
-    surface.blur(&gaussian(FINAL_KERNEL_PX), None, level);
-    surface.into_plane()
+}
+
+fn largest_half(weights: &[Vec<f32>]) -> usize {
+    weights.iter().map(|w| w.len() - 1).max().unwrap_or(0)
+}
+
+/// Memory of the stage, to be used again, and its result.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct DeformScratch {
+    surface: Surface,
+    core: [Sheet; 2],
+}
+
+impl DeformScratch {
+    /// The stage; the result stays here. `weights` are those of [`weights`].
+    pub(crate) fn deform(
+        &mut self,
+        depth_px: &Plane,
+        core_px: f64,
+        weights: &[Vec<f32>],
+        rest: Option<&BlurredRest>,
+        level: SimdLevel,
+    ) {
+        let (width, height) = (depth_px.width, depth_px.height);
+        let half = largest_half(weights);
+        let contact = Area::of_positive(depth_px, level);
+        let core_px = core_px as f32;
+        let [core, lying] = &mut self.core;
+        core.reshape(width, height, half);
+        core.copy_area(depth_px, contact, f32::NAN, |d| if d > core_px { d } else { f32::NAN });
+        lying.reshape(height, width, half);
+        lying.copy_transposed(core, contact, level);
+        let surface = &mut self.surface;
+        surface.start(depth_px, contact, half);
+        let (last, restored) = weights.split_last().expect("the last kernel is always there");
+        for (i, kernel) in restored.iter().enumerate() {
+            let lift = rest.map(|r| &r.lowered[i]);
+            let restore = [
+                Restore { core: &self.core[0], area: contact, lift },
+                Restore { core: &self.core[1], area: contact.transposed(), lift },
+            ];
+            surface.blur(kernel, Some(&restore), 0, level);
+        }
+        surface.blur(last, None, RIM_PX, level);
+        surface.upright(level);
+        if let Some(rest) = rest {
+            surface.widen();
+            for y in 0..height {
+                for (e, &g) in surface.sheet.row_mut(y).iter_mut().zip(rest.raised.row(y)) {
+                    *e += g;
+                }
+            }
+        }
+    }
+
+    /// The rows of the surface, valid in the area beyond which it is 0 and in its rim.
+    pub(crate) fn surface(&self) -> (&Sheet, Area) {
+        (&self.surface.sheet, self.surface.area)
+    }
+
+    pub(crate) fn surface_plane(&self) -> Plane {
+        let (sheet, area) = self.surface();
+        let mut plane = Plane::filled(sheet.width, sheet.height, 0.0);
+        for y in area.y.0..area.y.1 {
+            let to = &mut plane.values[y * sheet.width..][area.x.0..area.x.1];
+            to.copy_from_slice(&sheet.row(y)[area.x.0..area.x.1]);
+        }
+        plane
+    }
 }
 
 /// OpenCV's automatic Gaussian of an odd size.
@@ -110,14 +237,19 @@ mod tests {
 
     #[test]
     fn blurs_match_plain_sums_for_all_sizes_and_shapes() {
-        for (width, height) in [(40, 30), (64, 48), (33, 7), (5, 61), (1, 9)] {
-            for size in [5, 7, 11, 21, 51, 71] {
-                let plane = bumps(width, height);
-                let mut surface = Oriented::new(&plane);
-                surface.blur(&gaussian(size), None, SimdLevel::best());
-                let ours = surface.into_plane();
-                let difference = largest_difference(&ours, &blur_reference(&plane, size));
-                assert!(difference < 2e-5, "{width}x{height}, kernel {size}: {difference}");
+        for level in SimdLevel::available() {
+            for (width, height) in [(40, 30), (64, 48), (33, 7), (5, 61), (1, 9)] {
+                for size in [5, 7, 11, 21, 51, 71] {
+                    let plane = bumps(width, height);
+                    let mut scratch = DeformScratch::default();
+                    let surface = &mut scratch.surface;
+                    surface.start(&plane, Area::of_positive(&plane, level), size as usize / 2);
+                    surface.blur(&gaussian(size)[size as usize / 2..], None, 0, level);
+                    surface.upright(level);
+                    let ours = scratch.surface_plane();
+                    let difference = largest_difference(&ours, &blur_reference(&plane, size));
+                    assert!(difference < 2e-5, "{level:?}, {width}x{height}, kernel {size}: {difference}");
+                }
             }
         }
     }
@@ -134,7 +266,7 @@ mod tests {
     fn every_vector_path_gives_the_same_bits() {
         for (width, height) in [(80, 61), (50, 34)] {
             let (imprint, metres_per_px) = press(width, height);
-            let run = |level| deform(&imprint, &[31, 21, 11, 5], 0.4, metres_per_px, level).values;
+            let run = |level| deform(&imprint, &[31, 21, 11, 5], 0.4, metres_per_px, None, level).values;
             let portable: Vec<u32> = run(SimdLevel::Portable).iter().map(|v| v.to_bits()).collect();
             for level in SimdLevel::available() {
                 let bits: Vec<u32> = run(level).iter().map(|v| v.to_bits()).collect();
@@ -156,7 +288,7 @@ mod tests {
         }
         let imprint = indent(&stamp, &grid, &gel, 5.0).unwrap();
         let depth = (imprint.press_depth_m / 1e-4) as f32;
-        let surface = deform(&imprint, &[21, 11, 5], 0.4, 1e-4, SimdLevel::best());
+        let surface = deform(&imprint, &[21, 11, 5], 0.4, 1e-4, None, SimdLevel::best());
         assert!((surface.at(80, 60) - depth).abs() < 1e-4 * depth);
         assert_eq!(surface.at(5, 5), 0.0);
         let rim = surface.at(103, 60);

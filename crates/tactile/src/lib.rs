@@ -26,7 +26,7 @@ mod sensor;
 mod simd;
 
 pub use colour::{ColourModel, Lambert, Light, TaximTable, shade};
-pub use deform::deform;
+pub use deform::{BlurredRest, deform};
 pub use gradient::gradient;
 pub use grid::{Grid, Plane};
 pub use indent::{Imprint, IndentError, PressedGel, indent};

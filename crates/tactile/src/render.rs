@@ -46,7 +46,8 @@ impl Renderer<'_> {
             Some(pyramid) => (&pyramid.kernels_px, pyramid.restore_depth_fraction),
             None => (&self.gel.kernels_px, self.gel.restore_depth_fraction),
         };
-        deform(imprint, kernels_px, restore_depth_fraction, self.sensor.grid.metres_per_px, self.level)
+        let metres_per_px = self.sensor.grid.metres_per_px;
+        deform(imprint, kernels_px, restore_depth_fraction, metres_per_px, None, self.level)
     }
 
     /// The image of an imprint, or of the gel at rest: stages `deform` to `noise`. `noise_key` chooses the noise;

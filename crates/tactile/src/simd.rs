@@ -1,15 +1,36 @@
-//! The vector units that the blur uses, behind one trait.
+//! The vector units of a processor, behind one trait.
 //!
-//! Every path does the same operations in the same order, with a fused multiply-add, so they agree bit for bit;
-//! only the number of pixels done at once differs. A test compares them.
+//! Two kinds of code run on them. The blur is written with [`Lanes`]. All other stages are plain loops over slices,
+//! compiled once for every unit by [`SimdLevel::run`], so that the compiler may use its instructions. Both give the
+//! same bits on every unit: only operations that IEEE 754 rounds exactly (add, multiply, divide, square root, fused
+//! multiply-add, comparison, conversion) in an order that the source fixes. Tests compare the units.
+
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Avx2, Avx512};
 
 /// A vector unit to compute with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SimdLevel {
-    /// Any processor. Slow on x86-64 before 2013, whose multiply-add is done in software.
+    /// Any processor. Slow on x86-64, where its multiply-add is done in software.
     Portable,
     /// x86-64 with AVX2 and FMA.
     Avx2,
+    /// x86-64 with AVX-512 (F, BW, DQ, VL).
+    Avx512,
+}
+
+/// Work that is compiled for each vector unit.
+pub(crate) trait Kernel {
+    /// What it returns.
+    type Output;
+    /// Does the work. Has to be `#[inline(always)]`, or it is compiled for the portable unit only.
+    ///
+    /// # Safety
+    /// The processor must have the instructions of `L`.
+    unsafe fn run<L: Lanes>(self) -> Self::Output;
 }
 
 impl SimdLevel {
@@ -20,22 +41,52 @@ impl SimdLevel {
 
     /// All units of this processor, narrowest first.
     pub fn available() -> Vec<Self> {
-        let mut levels = vec![SimdLevel::Portable];
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                levels.push(SimdLevel::Avx2);
-            }
-        }
-        levels
+        let all = [SimdLevel::Portable, SimdLevel::Avx2, SimdLevel::Avx512];
+        all.into_iter().filter(|level| level.is_available()).collect()
     }
 
-    /// The unit called `portable` or `avx2`.
+    /// The unit called `portable`, `avx2` or `avx512`.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "portable" => Some(SimdLevel::Portable),
             "avx2" => Some(SimdLevel::Avx2),
+            "avx512" => Some(SimdLevel::Avx512),
             _ => None,
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn is_available(self) -> bool {
+        let avx2 = || is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+        match self {
+            SimdLevel::Portable => true,
+            SimdLevel::Avx2 => avx2(),
+            SimdLevel::Avx512 => {
+                avx2()
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+            }
+        }
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn is_available(self) -> bool {
+        self == SimdLevel::Portable
+    }
+
+    /// Runs a kernel on this unit, or on the portable one where the processor lacks it.
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: a unit is used only where `is_available` found its instructions.
+        unsafe {
+            match self {
+                #[cfg(target_arch = "x86_64")]
+                SimdLevel::Avx2 if self.is_available() => x86::run_avx2(kernel),
+                #[cfg(target_arch = "x86_64")]
+                SimdLevel::Avx512 if self.is_available() => x86::run_avx512(kernel),
+                _ => kernel.run::<Portable>(),
+            }
         }
     }
 }
@@ -48,15 +99,23 @@ impl SimdLevel {
 pub(crate) unsafe trait Lanes {
     /// The vector.
     type Vector: Copy;
-    /// Lanes in it.
+    /// Lanes in it: 8 or 16.
     const COUNT: usize;
+    /// Whether there are 32 registers, not 16.
+    const MANY_REGISTERS: bool;
     unsafe fn splat(x: f32) -> Self::Vector;
     unsafe fn load(from: *const f32) -> Self::Vector;
     unsafe fn store(to: *mut f32, v: Self::Vector);
+    unsafe fn add(a: Self::Vector, b: Self::Vector) -> Self::Vector;
     /// `a * b + c`, rounded once.
     unsafe fn fused(a: Self::Vector, b: Self::Vector, c: Self::Vector) -> Self::Vector;
     /// `first` where it is a number, `second` where it is NaN.
     unsafe fn first_unless_nan(first: Self::Vector, second: Self::Vector) -> Self::Vector;
+    /// Writes the transpose of the 8 x 8 values at `from` (rows `from_stride` apart) to `to`.
+    ///
+    /// # Safety
+    /// Eight values must be valid in each of eight rows of both.
+    unsafe fn transpose8(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize);
 }
 
 /// Plain Rust, eight lanes.
@@ -66,6 +125,7 @@ pub(crate) struct Portable;
 unsafe impl Lanes for Portable {
     type Vector = [f32; 8];
     const COUNT: usize = 8;
+    const MANY_REGISTERS: bool = false;
     #[inline(always)]
     unsafe fn splat(x: f32) -> [f32; 8] {
         [x; 8]
@@ -81,6 +141,10 @@ unsafe impl Lanes for Portable {
         unsafe { to.cast::<[f32; 8]>().write_unaligned(v) }
     }
     #[inline(always)]
+    unsafe fn add(a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        std::array::from_fn(|i| a[i] + b[i])
+    }
+    #[inline(always)]
     unsafe fn fused(a: [f32; 8], b: [f32; 8], c: [f32; 8]) -> [f32; 8] {
         std::array::from_fn(|i| a[i].mul_add(b[i], c[i]))
     }
@@ -88,42 +152,13 @@ unsafe impl Lanes for Portable {
     unsafe fn first_unless_nan(first: [f32; 8], second: [f32; 8]) -> [f32; 8] {
         std::array::from_fn(|i| if first[i].is_nan() { second[i] } else { first[i] })
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-pub(crate) use x86::Avx2;
-
-#[cfg(target_arch = "x86_64")]
-mod x86 {
-    use super::Lanes;
-    use std::arch::x86_64::*;
-
-    /// AVX2 and FMA, eight lanes.
-    pub(crate) struct Avx2;
-
-    // SAFETY: callers guarantee AVX2 and FMA, and valid pointers.
-    unsafe impl Lanes for Avx2 {
-        type Vector = __m256;
-        const COUNT: usize = 8;
-        #[inline(always)]
-        unsafe fn splat(x: f32) -> __m256 {
-            unsafe { _mm256_set1_ps(x) }
-        }
-        #[inline(always)]
-        unsafe fn load(from: *const f32) -> __m256 {
-            unsafe { _mm256_loadu_ps(from) }
-        }
-        #[inline(always)]
-        unsafe fn store(to: *mut f32, v: __m256) {
-            unsafe { _mm256_storeu_ps(to, v) }
-        }
-        #[inline(always)]
-        unsafe fn fused(a: __m256, b: __m256, c: __m256) -> __m256 {
-            unsafe { _mm256_fmadd_ps(a, b, c) }
-        }
-        #[inline(always)]
-        unsafe fn first_unless_nan(first: __m256, second: __m256) -> __m256 {
-            unsafe { _mm256_blendv_ps(second, first, _mm256_cmp_ps::<_CMP_ORD_Q>(first, first)) }
+    #[inline(always)]
+    unsafe fn transpose8(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {
+        for row in 0..8 {
+            for column in 0..8 {
+                // SAFETY: eight values are valid in each of eight rows by the contract.
+                unsafe { *to.add(column * to_stride + row) = *from.add(row * from_stride + column) };
+            }
         }
     }
 }

@@ -1,0 +1,125 @@
+//! The innermost loop of the blur: a few output rows of one vector of columns.
+
+use crate::simd::Lanes;
+
+/// What a block of output rows is made of.
+pub(super) struct Block<'a> {
+    /// First vector of the first row, in the input.
+    pub(super) at: *const f32,
+    /// Distance of rows.
+    pub(super) stride: usize,
+    /// The middle one first.
+    pub(super) weights: &'a [f32],
+    /// The k that count, the end not included.
+    pub(super) range: (usize, usize),
+}
+
+impl Block<'_> {
+    /// `ROWS` sums. With `BOTH` the rows above and below are kept in registers while k grows, so that each k loads
+    /// two new ones (three sets of `ROWS` registers); else only those above, and those below are loaded.
+    ///
+    /// # Safety
+    /// The processor must have the instructions of `L`; rows as far away as the range reaches must be valid.
+    #[inline(always)]
+    pub(super) unsafe fn sums<L: Lanes, const ROWS: usize, const BOTH: bool>(&self) -> [L::Vector; ROWS] {
+        // SAFETY: see above.
+        unsafe {
+            let zero = L::splat(0.0);
+            let mut sums = [zero; ROWS];
+            let (mut k, end) = self.range;
+            if k >= end {
+                return sums;
+            }
+            if k == 0 {
+                let weight = L::splat(*self.weights.get_unchecked(0));
+                for (r, sum) in sums.iter_mut().enumerate() {
+                    *sum = L::fused(weight, L::load(self.at.add(r * self.stride)), zero);
+                }
+                k = 1;
+            }
+            // Rows k above and k below the first one.
+            let mut walk = Walk {
+                above: self.at.wrapping_sub(k * self.stride),
+                below: self.at.wrapping_add(k * self.stride),
+                stride: self.stride,
+                weight: self.weights.as_ptr().wrapping_add(k),
+                up: [zero; ROWS],
+                down: [zero; ROWS],
+            };
+            if k >= end {
+                return sums;
+            }
+            for r in 0..ROWS {
+                walk.up[r] = L::load(walk.above.add(r * self.stride));
+                if BOTH {
+                    walk.down[r] = L::load(walk.below.add(r * self.stride));
+                }
+            }
+            while k + ROWS <= end {
+                walk.phase::<L, BOTH, 0>(&mut sums);
+                walk.phase::<L, BOTH, 1>(&mut sums);
+                walk.phase::<L, BOTH, 2>(&mut sums);
+                walk.phase::<L, BOTH, 3>(&mut sums);
+                walk.phase::<L, BOTH, 4>(&mut sums);
+                walk.phase::<L, BOTH, 5>(&mut sums);
+                walk.phase::<L, BOTH, 6>(&mut sums);
+                walk.phase::<L, BOTH, 7>(&mut sums);
+                k += ROWS;
+            }
+            // The rest, in the same order, moving the rows from register to register.
+            while k < end {
+                walk.phase::<L, BOTH, 0>(&mut sums);
+                walk.up.rotate_right(1);
+                walk.down.rotate_left(1);
+                k += 1;
+            }
+            sums
+        }
+    }
+}
+
+/// Where a block is as k grows.
+struct Walk<V, const ROWS: usize> {
+    above: *const f32,
+    below: *const f32,
+    stride: usize,
+    weight: *const f32,
+    /// The rows above; which one is in which place changes with the phase.
+    up: [V; ROWS],
+    down: [V; ROWS],
+}
+
+impl<V: Copy, const ROWS: usize> Walk<V, ROWS> {
+    /// One k. `PHASE` counts them modulo `ROWS`: the registers stay where they are and their roles move on.
+    ///
+    /// # Safety
+    /// As for [`Block::sums`].
+    #[inline(always)]
+    unsafe fn phase<L: Lanes<Vector = V>, const BOTH: bool, const PHASE: usize>(
+        &mut self,
+        sums: &mut [V; ROWS],
+    ) {
+        if PHASE >= ROWS {
+            return;
+        }
+        // SAFETY: see above; the rows loaded ahead are within the spare rows.
+        unsafe {
+            let weight = L::splat(*self.weight);
+            for r in 0..ROWS {
+                let below = if BOTH {
+                    self.down[(r + PHASE) % ROWS]
+                } else {
+                    L::load(self.below.add(r * self.stride))
+                };
+                sums[r] = L::fused(weight, L::add(self.up[(r + ROWS - PHASE) % ROWS], below), sums[r]);
+            }
+            self.weight = self.weight.wrapping_add(1);
+            self.above = self.above.wrapping_sub(self.stride);
+            self.up[ROWS - 1 - PHASE] = L::load(self.above);
+            if BOTH {
+                self.down[PHASE] = L::load(self.below.add(ROWS * self.stride));
+            }
+            self.below = self.below.wrapping_add(self.stride);
+        }
+    }
+}
