@@ -3,6 +3,7 @@
 mod lambert;
 mod taxim;
 
+pub(crate) use lambert::LambertRow;
 pub use lambert::{Lambert, Light};
 pub use taxim::TaximTable;
 

@@ -36,6 +36,17 @@ impl Area {
         Self { x: (0, width), y: (0, height) }
     }
 
+    /// Makes it hold some pixels of a row.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, columns: (usize, usize), row: usize) {
+        if self.is_empty() {
+            *self = Self { x: columns, y: (row, row + 1) };
+        } else {
+            self.x = (self.x.0.min(columns.0), self.x.1.max(columns.1));
+            self.y = (self.y.0.min(row), self.y.1.max(row + 1));
+        }
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.x.0 >= self.x.1 || self.y.0 >= self.y.1
     }

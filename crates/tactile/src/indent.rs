@@ -2,6 +2,8 @@
 
 use crate::grid::{Grid, Plane};
 use crate::patch::aggregate;
+use crate::raster::{ClusteredMesh, HeightMap};
+use crate::simd::{Kernel, Lanes, SimdLevel};
 use gripgen_twin::ContactPatch;
 
 /// The part pressed into the gel.
@@ -55,7 +57,7 @@ pub enum IndentError {
     },
 }
 
-/// Presses the surface `heights` (in pixels, towards the gel) in with `force_n`.
+/// Presses the surface `heights` (in pixels above the gel at rest, towards it) in with `force_n`.
 ///
 /// The imprint volume is proportional to the force, `V = c F` (taxim_robot; Wucherer et al. 2023), and pressure is
 /// that of a Winkler bed, `p = depth / c`, so that the pressure integrates to the force. The depth d solves
@@ -65,11 +67,78 @@ pub enum IndentError {
 /// ```
 ///
 /// by Newton's method on a convex, piecewise linear function, from the deep side: it converges monotonically and
-/// ends exactly, when the set of pixels in contact no longer changes.
+/// ends exactly, when the set of pixels in contact no longer changes. The result is a function of that set alone.
+///
+/// For a gel that is not flat at rest, `heights` are those above the gel plane plus the rest surface
+/// ([`crate::GelShape::rest_px`]); [`crate::Renderer::press`] adds it.
 pub fn indent(heights: &Plane, grid: &Grid, gel: &PressedGel, force_n: f64) -> Result<Imprint, IndentError> {
+    let level = SimdLevel::best();
+    let map = HeightMap::of(heights);
+    let top = map.top(None, level);
+    finish_press(
+        &map,
+        None,
+        top,
+        gel.thickness_m / grid.metres_per_px,
+        grid,
+        gel,
+        force_n,
+        level,
+        &mut vec![],
+    )
+}
+
+/// Draws a part only as deep as a press reaches, and presses it in.
+///
+/// The press is as deep as the map had been drawn through the whole gel: a piece of it is drawn, and deepened until
+/// the volume above its lower end is that of the force.
+#[expect(clippy::too_many_arguments, reason = "what a press is made of, and memory")]
+pub(crate) fn press(
+    map: &mut HeightMap,
+    mesh: &ClusteredMesh,
+    rest: Option<&Plane>,
+    grid: &Grid,
+    gel: &PressedGel,
+    force_n: f64,
+    level: SimdLevel,
+    below: &mut Vec<f64>,
+) -> Result<Imprint, IndentError> {
     let a = grid.metres_per_px;
     let thickness_px = gel.thickness_m / a;
-    let top = heights.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h));
+    let wanted = gel.imprint_m3_per_n * force_n / (a * a * a);
+    let mut depth_px = FIRST_DEPTH * thickness_px;
+    loop {
+        let top = map.draw_down(mesh, depth_px, rest, level);
+        if top == f32::NEG_INFINITY || depth_px >= thickness_px {
+            return finish_press(map, rest, top, thickness_px, grid, gel, force_n, level, below);
+        }
+        let (volume, count) = map.volume(rest, depth_px - f64::from(top), level);
+        if volume >= wanted {
+            return finish_press(map, rest, top, depth_px, grid, gel, force_n, level, below);
+        }
+        // Deeper than this it cannot be: more pixels only make it shallower.
+        let enough = depth_px + (wanted - volume) / count + 1e-6;
+        depth_px = enough.min(2.0 * depth_px).min(thickness_px);
+    }
+}
+
+/// The first piece drawn, as a share of the gel.
+const FIRST_DEPTH: f64 = 0.125;
+
+/// Solves for the press, which is at most `limit_px`, on a map that is complete as deep as that.
+#[expect(clippy::too_many_arguments, reason = "the tail of two functions")]
+fn finish_press(
+    map: &HeightMap,
+    rest: Option<&Plane>,
+    top: f32,
+    limit_px: f64,
+    grid: &Grid,
+    gel: &PressedGel,
+    force_n: f64,
+    level: SimdLevel,
+    below: &mut Vec<f64>,
+) -> Result<Imprint, IndentError> {
+    let a = grid.metres_per_px;
     if top == f32::NEG_INFINITY {
         let size = |n: usize| n as f64 * a * 1e3;
         return Err(IndentError::NothingInFront {
@@ -78,47 +147,133 @@ pub fn indent(heights: &Plane, grid: &Grid, gel: &PressedGel, force_n: f64) -> R
         });
     }
     let top = f64::from(top);
-    // Only what a press through the whole gel would reach can come into contact.
-    let reachable: Vec<f64> =
-        heights.values.iter().map(|&h| f64::from(h) - top).filter(|&below| below > -thickness_px).collect();
     let wanted = gel.imprint_m3_per_n * force_n / (a * a * a);
-    let Some(press_px) = solve_press(&reachable, wanted, thickness_px) else {
-        let available: f64 = reachable.iter().map(|below| below + thickness_px).sum();
+    // Only what a press as deep as the limit would reach can come into contact.
+    level.run(Reachable { map, rest, top, limit_px, below });
+    let available = level.run(Sum { values: below }) + below.len() as f64 * limit_px;
+    if available < wanted && limit_px >= gel.thickness_m / a {
         return Err(IndentError::ThroughTheGel {
             force_n,
             wanted_mm3: gel.imprint_m3_per_n * force_n * 1e9,
             thickness_mm: gel.thickness_m * 1e3,
             available_mm3: available * a * a * a * 1e9,
         });
-    };
-    let shift = press_px - top;
-    let depth = heights.values.iter().map(|&h| (f64::from(h) + shift).max(0.0) as f32).collect();
-    let depth_px = Plane { width: heights.width, height: heights.height, values: depth };
-    let patch = aggregate(&depth_px, grid, force_n);
+    }
+    let press_px = solve_press(below, wanted, limit_px, level);
+    let mut depth_px = Plane::filled(map.width, map.height, 0.0);
+    level.run(Depths { map, rest, lift: press_px - top, depth_px: &mut depth_px });
+    let patch = aggregate(&depth_px, grid, force_n, level);
     Ok(Imprint { depth_px, press_depth_m: press_px * a, patch })
 }
 
-/// The press at which `sum max(0, below_i + press) = wanted`; `None` if it exceeds `limit`.
-fn solve_press(below: &[f64], wanted: f64, limit: f64) -> Option<f64> {
+/// The press at which `sum max(0, below_i + press) = wanted`. Leaves the values that are in contact.
+fn solve_press(below: &mut Vec<f64>, wanted: f64, limit: f64, level: SimdLevel) -> f64 {
     let mut press = limit;
-    let mut touching = usize::MAX;
     loop {
-        let (mut volume, mut count) = (0.0, 0);
-        for b in below {
-            let depth = b + press;
-            if depth > 0.0 {
-                volume += depth;
-                count += 1;
+        let before = below.len();
+        let next = (wanted - level.run(Sum { values: below })) / before as f64;
+        press = next.min(press);
+        level.run(Keep { values: below, above: -press });
+        if below.len() == before || below.is_empty() {
+            return press;
+        }
+    }
+}
+
+/// Collects `height + rest - top` of the pixels less than `limit_px` below the top, row by row.
+struct Reachable<'a> {
+    map: &'a HeightMap,
+    rest: Option<&'a Plane>,
+    top: f64,
+    limit_px: f64,
+    below: &'a mut Vec<f64>,
+}
+
+impl Kernel for Reachable<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let area = self.map.area;
+        let most = (area.y.1 - area.y.0) * (area.x.1 - area.x.0) + 1;
+        if self.below.len() < most {
+            self.below.resize(most, 0.0);
+        }
+        let mut count = 0;
+        for y in area.y.0..area.y.1 {
+            for h in self.map.above_gel(self.rest, y) {
+                let below = f64::from(h) - self.top;
+                self.below[count] = below;
+                count += usize::from(below > -self.limit_px);
             }
         }
-        if touching == usize::MAX && volume < wanted {
-            return None;
+        self.below.truncate(count);
+    }
+}
+
+/// Keeps the values above a bound, in their order.
+struct Keep<'a> {
+    values: &'a mut Vec<f64>,
+    above: f64,
+}
+
+impl Kernel for Keep<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let mut count = 0;
+        for i in 0..self.values.len() {
+            let value = self.values[i];
+            self.values[count] = value;
+            count += usize::from(value > self.above);
         }
-        if count == touching || count == 0 {
-            return Some(press);
+        self.values.truncate(count);
+    }
+}
+
+/// The sum in eight parts, value i into part i % 8.
+struct Sum<'a> {
+    values: &'a [f64],
+}
+
+impl Kernel for Sum<'_> {
+    type Output = f64;
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> f64 {
+        let mut parts = [0.0; 8];
+        let chunks = self.values.chunks_exact(8);
+        let rest = chunks.remainder();
+        for chunk in chunks {
+            for (part, value) in parts.iter_mut().zip(chunk) {
+                *part += value;
+            }
         }
-        touching = count;
-        press -= (volume - wanted) / count as f64;
+        for (part, value) in parts.iter_mut().zip(rest) {
+            *part += value;
+        }
+        parts.iter().sum()
+    }
+}
+
+/// Writes `height + rest + lift` where that is above 0.
+struct Depths<'a> {
+    map: &'a HeightMap,
+    rest: Option<&'a Plane>,
+    lift: f64,
+    depth_px: &'a mut Plane,
+}
+
+impl Kernel for Depths<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let area = self.map.area;
+        for y in area.y.0..area.y.1 {
+            let row = &mut self.depth_px.values[y * self.map.width..][area.x.0..area.x.1];
+            for (depth, h) in row.iter_mut().zip(self.map.above_gel(self.rest, y)) {
+                let d = f64::from(h) + self.lift;
+                *depth = if d > 0.0 { d as f32 } else { 0.0 };
+            }
+        }
     }
 }
 

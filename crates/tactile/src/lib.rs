@@ -23,6 +23,7 @@ pub mod presses;
 mod raster;
 mod render;
 mod sensor;
+mod shading;
 mod simd;
 
 pub use colour::{ColourModel, Lambert, Light, TaximTable, shade};
@@ -31,7 +32,7 @@ pub use gradient::gradient;
 pub use grid::{Grid, Plane};
 pub use indent::{Imprint, IndentError, PressedGel, indent};
 pub use noise::finish;
-pub use raster::raster;
+pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;
 pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError};
 pub use simd::SimdLevel;

@@ -2,6 +2,7 @@
 
 use crate::grid::Plane;
 use crate::sensor::Sensor;
+use crate::simd::{Kernel, Lanes, SimdLevel};
 use gripgen_twin::TactileImage;
 use gripgen_twin::random::normal_quantile;
 use std::sync::OnceLock;
@@ -20,7 +21,7 @@ fn levels() -> &'static [f32; LEVELS] {
 }
 
 /// The finaliser of MurmurHash3 (Appleby, public domain): every bit of the input reaches every bit of the output.
-#[inline]
+#[inline(always)]
 fn mix(mut h: u32) -> u32 {
     h ^= h >> 16;
     h = h.wrapping_mul(0x85eb_ca6b);
@@ -37,45 +38,87 @@ fn words(key: u64) -> [u32; 2] {
     [first, mix(high ^ mix(low.wrapping_add(first)))]
 }
 
-/// A standard normal number for value `index` of an image: an integer hash of (key, index) chooses a level, so it
-/// depends neither on order nor on threads.
-#[inline]
-fn normal(table: &[f32; LEVELS], words: [u32; 2], index: u32) -> f32 {
-    let hash = mix(mix(index ^ words[0]).wrapping_add(words[1]));
-    table[(hash >> 20) as usize]
+/// The level of the noise of value `index` of an image: an integer hash of (key, index) chooses it, so it depends
+/// neither on order nor on threads.
+#[inline(always)]
+fn level_of(words: [u32; 2], index: u32) -> u32 {
+    mix(mix(index ^ words[0]).wrapping_add(words[1])) >> 20
 }
 
 /// Adds the change of colour to the rest frame, and noise where there is a key, and rounds to 8 bits.
 pub fn finish(sensor: &Sensor, change: Option<&[Plane; 3]>, noise_key: Option<u64>) -> TactileImage {
     let mut rgb = vec![0u8; 3 * sensor.grid.len()];
-    for channel in 0..3 {
-        let rest = &sensor.rest[channel];
-        let change = change.map(|planes| &planes[channel].values);
-        let noise = noise_key
-            .filter(|_| sensor.noise_rgb[channel] > 0.0)
-            .map(|key| (levels(), words(key), sensor.noise_rgb[channel]));
-        for (i, out) in rgb.iter_mut().skip(channel).step_by(3).enumerate() {
-            let mut value = rest[i];
-            if let Some(change) = change {
-                value += change[i];
-            }
-            if let Some((table, words, sigma)) = noise {
-                value += sigma * normal(table, words, (3 * i + channel) as u32);
-            }
-            *out = rounded(value);
-        }
-    }
+    SimdLevel::best().run(Finish { sensor, change, noise_key, rgb: &mut rgb });
     TactileImage { width_px: sensor.grid.width_px as u32, height_px: sensor.grid.height_px as u32, rgb }
 }
 
-#[inline]
+struct Finish<'a> {
+    sensor: &'a Sensor,
+    change: Option<&'a [Plane; 3]>,
+    noise_key: Option<u64>,
+    rgb: &'a mut [u8],
+}
+
+impl Kernel for Finish<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let w = self.sensor.grid.width_px;
+        let noise = self.noise_key.map(|key| (levels(), words(key)));
+        let (mut value, mut hash) = (vec![0.0f32; w], vec![0u32; w]);
+        let mut bytes = [0, 1, 2].map(|_| vec![0u8; w]);
+        for (y, rgb) in self.rgb.chunks_exact_mut(3 * w).enumerate() {
+            let row = y * w..(y + 1) * w;
+            for channel in 0..3 {
+                let sigma = self.sensor.noise_rgb[channel];
+                value.copy_from_slice(&self.sensor.rest[channel][row.clone()]);
+                if let Some(change) = self.change {
+                    add(&mut value, &change[channel].values[row.clone()]);
+                }
+                if let Some((table, words)) = noise.filter(|_| sigma > 0.0) {
+                    let first = (3 * y * w + channel) as u32;
+                    for (i, h) in hash.iter_mut().enumerate() {
+                        *h = level_of(words, first.wrapping_add(3 * i as u32));
+                    }
+                    for (v, &h) in value.iter_mut().zip(&hash) {
+                        *v += sigma * table[h as usize % LEVELS];
+                    }
+                }
+                for (byte, &v) in bytes[channel].iter_mut().zip(&value) {
+                    *byte = rounded(v);
+                }
+            }
+            let [red, green, blue] = &bytes;
+            for (i, pixel) in rgb.chunks_exact_mut(3).enumerate() {
+                pixel.copy_from_slice(&[red[i], green[i], blue[i]]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add(to: &mut [f32], values: &[f32]) {
+    for (a, b) in to.iter_mut().zip(values) {
+        *a += b;
+    }
+}
+
+/// To the nearest of 0 to 255; 0 for what is not a number.
+#[inline(always)]
 fn rounded(value: f32) -> u8 {
-    (value.clamp(0.0, 255.0) + 0.5).floor() as u8
+    let value = if value > 0.0 { value } else { 0.0 };
+    let value = if value < 255.0 { value } else { 255.0 };
+    // SAFETY: from 0.5 to 255.5.
+    unsafe { (value + 0.5).to_int_unchecked::<i32>() as u8 }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn normal(table: &[f32; LEVELS], words: [u32; 2], index: u32) -> f32 {
+        table[level_of(words, index) as usize]
+    }
 
     #[test]
     fn noise_is_standard_normal_and_uncorrelated() {

@@ -1,6 +1,8 @@
 //! From the pressure of every pixel to a few cells with the same force and moments.
 
+use crate::convolve::Area;
 use crate::grid::{Grid, Plane};
+use crate::simd::{Kernel, Lanes, SimdLevel};
 use gripgen_twin::{ContactPatch, PressureCell};
 
 /// Cells along each side of the contact's bounding box.
@@ -27,10 +29,76 @@ impl Moments {
         self.yy += force * y * y;
     }
 
+    fn plus(&self, other: &Self) -> Self {
+        Self {
+            force: self.force + other.force,
+            x: self.x + other.x,
+            y: self.y + other.y,
+            xx: self.xx + other.xx,
+            xy: self.xy + other.xy,
+            yy: self.yy + other.yy,
+        }
+    }
+
     /// Central second moments (xx, xy, yy).
     fn central(&self) -> (f64, f64, f64) {
         let f = self.force;
         (self.xx - self.x * self.x / f, self.xy - self.x * self.y / f, self.yy - self.y * self.y / f)
+    }
+}
+
+/// Sums over the pixels of a cell; u and v count columns and rows from the first of the contact.
+#[derive(Debug, Clone, Copy, Default)]
+struct CellSum {
+    pixels: f64,
+    depth: f64,
+    u: f64,
+    v: f64,
+    uu: f64,
+    uv: f64,
+    vv: f64,
+}
+
+struct CellSums<'a> {
+    depth_px: &'a Plane,
+    area: Area,
+}
+
+impl Kernel for CellSums<'_> {
+    type Output = [CellSum; CELLS_PER_SIDE * CELLS_PER_SIDE];
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> Self::Output {
+        let area = self.area;
+        let (nx, ny) = (area.x.1 - area.x.0, area.y.1 - area.y.0);
+        let mut cells = [CellSum::default(); CELLS_PER_SIDE * CELLS_PER_SIDE];
+        for y in 0..ny {
+            let row = &self.depth_px.row(area.y.0 + y)[area.x.0..area.x.1];
+            let v = y as f64;
+            for column in 0..CELLS_PER_SIDE {
+                // Pixel x is in cell x * 8 / nx.
+                let start = (column * nx).div_ceil(CELLS_PER_SIDE);
+                let end = ((column + 1) * nx).div_ceil(CELLS_PER_SIDE);
+                let (mut pixels, mut depth, mut du, mut duu) = ([0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]);
+                for (i, &d) in row[start..end].iter().enumerate() {
+                    let (d, u, part) = (f64::from(d), f64::from((start + i) as u32), i % 4);
+                    pixels[part] += if d > 0.0 { 1.0 } else { 0.0 };
+                    depth[part] += d;
+                    du[part] += d * u;
+                    duu[part] += d * u * u;
+                }
+                let sum = |parts: [f64; 4]| (parts[0] + parts[1]) + (parts[2] + parts[3]);
+                let (depth, u) = (sum(depth), sum(du));
+                let cell = &mut cells[y * CELLS_PER_SIDE / ny * CELLS_PER_SIDE + column];
+                cell.pixels += sum(pixels);
+                cell.depth += depth;
+                cell.u += u;
+                cell.v += v * depth;
+                cell.uu += sum(duu);
+                cell.uv += v * u;
+                cell.vv += v * v * depth;
+            }
+        }
+        cells
     }
 }
 
@@ -39,44 +107,33 @@ impl Moments {
 /// The contact's bounding box is cut into 8 x 8 cells with a force and a centre of pressure each. Second moments
 /// shrink when pixels are merged; a linear map of the cells about the common centre (the Cholesky factor of the
 /// field's second moments over that of the cells') gives them back exactly.
-pub(crate) fn aggregate(depth_px: &Plane, grid: &Grid, force_n: f64) -> ContactPatch {
-    let (mut low, mut high) = ((usize::MAX, usize::MAX), (0, 0));
-    let mut total = 0.0;
-    for y in 0..depth_px.height {
-        for (x, &d) in depth_px.row(y).iter().enumerate() {
-            if d > 0.0 {
-                low = (low.0.min(x), low.1.min(y));
-                high = (high.0.max(x), high.1.max(y));
-                total += f64::from(d);
-            }
-        }
-    }
-    if total == 0.0 {
+///
+/// Sums run over the pixels of a row within a cell, in four parts, then over rows, then over cells.
+pub(crate) fn aggregate(depth_px: &Plane, grid: &Grid, force_n: f64, level: SimdLevel) -> ContactPatch {
+    let area = Area::of_positive(depth_px, level);
+    if area.is_empty() {
         return ContactPatch::default();
     }
-    let (nx, ny) = (high.0 - low.0 + 1, high.1 - low.1 + 1);
-    let mut all = Moments::default();
-    let mut cells = [(Moments::default(), 0usize); CELLS_PER_SIDE * CELLS_PER_SIDE];
-    for y in low.1..=high.1 {
-        for x in low.0..=high.0 {
-            let depth = depth_px.at(x, y);
-            if depth > 0.0 {
-                let (px, py) = grid.centre_m(x, y);
-                let force = force_n * f64::from(depth) / total;
-                all.add(force, px, py);
-                let cell =
-                    (y - low.1) * CELLS_PER_SIDE / ny * CELLS_PER_SIDE + (x - low.0) * CELLS_PER_SIDE / nx;
-                cells[cell].0.add(force, px, py);
-                cells[cell].1 += 1;
-            }
-        }
-    }
+    let sums = level.run(CellSums { depth_px, area });
+    let total: f64 = sums.iter().map(|cell| cell.depth).sum();
+    // From columns and rows of the contact to places on the gel.
+    let (x0, y0) = grid.centre_m(area.x.0, area.y.0);
+    let (a, per_depth) = (grid.metres_per_px, force_n / total);
+    let cells = sums.map(|s| Moments {
+        force: per_depth * s.depth,
+        x: per_depth * (x0 * s.depth + a * s.u),
+        y: per_depth * (y0 * s.depth + a * s.v),
+        xx: per_depth * (x0 * x0 * s.depth + 2.0 * x0 * a * s.u + a * a * s.uu),
+        xy: per_depth * (x0 * y0 * s.depth + a * (x0 * s.v + y0 * s.u) + a * a * s.uv),
+        yy: per_depth * (y0 * y0 * s.depth + 2.0 * y0 * a * s.v + a * a * s.vv),
+    });
+    let all = cells.iter().fold(Moments::default(), |sum, cell| sum.plus(cell));
     let mut merged = Moments::default();
     let mut patch = ContactPatch::default();
-    for (m, pixels) in cells.iter().filter(|(_, pixels)| *pixels > 0) {
+    for (m, pixels) in cells.iter().zip(sums.map(|s| s.pixels)).filter(|(_, pixels)| *pixels > 0.0) {
         let (x_m, y_m) = (m.x / m.force, m.y / m.force);
         merged.add(m.force, x_m, y_m);
-        let area_m2 = *pixels as f64 * grid.metres_per_px * grid.metres_per_px;
+        let area_m2 = pixels * grid.metres_per_px * grid.metres_per_px;
         patch.cells.push(PressureCell { x_m, y_m, area_m2, force_n: m.force });
     }
     restore_second_moments(&mut patch, &all, &merged);
@@ -165,7 +222,7 @@ mod tests {
                     exact.add(40.0 * f64::from(depth.at(x, y)) / total, px, py);
                 }
             }
-            let patch = aggregate(&depth, &grid, 40.0);
+            let patch = aggregate(&depth, &grid, 40.0, SimdLevel::best());
             assert!(patch.cells.len() <= ContactPatch::MAX_CELLS);
             let m = moments_of_patch(&patch);
             let close = |a: f64, b: f64, scale: f64| (a - b).abs() <= 1e-9 * scale;

@@ -1,18 +1,22 @@
-//! The whole pipeline behind two calls.
+//! The whole pipeline behind a few calls.
 
-use crate::colour::shade;
-use crate::deform::deform;
-use crate::gradient::gradient;
+mod scratch;
+
 use crate::grid::Plane;
-use crate::indent::{Imprint, IndentError, PressedGel, indent};
+use crate::indent::{Imprint, IndentError, PressedGel, press};
 use crate::noise::finish;
-use crate::raster::raster;
+use crate::raster::ClusteredMesh;
 use crate::sensor::Sensor;
+use crate::shading::change;
 use crate::simd::SimdLevel;
 use gripgen_twin::frames::Pose;
-use gripgen_twin::{Gel, TactileImage, TriMesh};
+use gripgen_twin::{Gel, TactileImage};
+use scratch::{Prepared, Scratch, with_scratch};
 
 /// One sensor with its gel.
+///
+/// Each thread keeps the memory of the stages and what they derive from the last few sensors and gels; results do
+/// not depend on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Renderer<'a> {
     /// The sensor.
@@ -27,27 +31,26 @@ impl Renderer<'_> {
     /// Presses a part into the gel: stages `raster` and `indent`.
     pub fn press(
         &self,
-        mesh: &TriMesh,
+        mesh: &ClusteredMesh,
         gel_from_mesh: &Pose,
         imprint_m3_per_n: f64,
         force_n: f64,
     ) -> Result<Imprint, IndentError> {
         let grid = &self.sensor.grid;
-        let depth_px = self.gel.thickness_m / grid.metres_per_px;
-        let heights = raster(mesh, gel_from_mesh, grid, depth_px);
         let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n };
-        indent(&heights, grid, &gel, force_n)
+        with_scratch(self, |scratch, prepared| {
+            let Scratch { map, below, .. } = scratch;
+            map.start(mesh, gel_from_mesh, grid);
+            press(map, mesh, prepared.rest_px.as_ref(), grid, &gel, force_n, self.level, below)
+        })
     }
 
-    /// The gel surface around an imprint, in pixels towards the camera: stage `deform`. A calibrated sensor says with
-    /// which kernels; without its word those of the gel are used.
+    /// The gel surface around an imprint, in pixels towards the camera above its rest: stage `deform`.
     pub fn surface(&self, imprint: &Imprint) -> Plane {
-        let (kernels_px, restore_depth_fraction) = match &self.sensor.pyramid {
-            Some(pyramid) => (&pyramid.kernels_px, pyramid.restore_depth_fraction),
-            None => (&self.gel.kernels_px, self.gel.restore_depth_fraction),
-        };
-        let metres_per_px = self.sensor.grid.metres_per_px;
-        deform(imprint, kernels_px, restore_depth_fraction, metres_per_px, None, self.level)
+        with_scratch(self, |scratch, prepared| {
+            self.deform(imprint, scratch, prepared);
+            scratch.deform.surface_plane()
+        })
     }
 
     /// The image of an imprint, or of the gel at rest: stages `deform` to `noise`. `noise_key` chooses the noise;
@@ -59,7 +62,25 @@ impl Renderer<'_> {
     /// What an imprint changes in the image, in grey levels of red, green and blue: stages `deform` to `shade`. The
     /// stage `noise`, [`finish`], makes an image of it.
     pub fn change(&self, imprint: &Imprint) -> [Plane; 3] {
-        let (along_x, along_y) = gradient(&self.surface(imprint));
-        shade(&self.sensor.colour, &along_x, &along_y)
+        with_scratch(self, |scratch, prepared| {
+            self.deform(imprint, scratch, prepared);
+            let (sheet, area) = scratch.deform.surface();
+            change(&self.sensor.colour, sheet, area, self.level)
+        })
+    }
+
+    /// Kernels and restored share of the deformation. A calibrated sensor says which; without its word those of the
+    /// gel are used.
+    fn pyramid(&self) -> (&[u32], f64) {
+        match &self.sensor.pyramid {
+            Some(pyramid) => (&pyramid.kernels_px, pyramid.restore_depth_fraction),
+            None => (&self.gel.kernels_px, self.gel.restore_depth_fraction),
+        }
+    }
+
+    fn deform(&self, imprint: &Imprint, scratch: &mut Scratch, prepared: &Prepared) {
+        let core_px = self.pyramid().1 * imprint.press_depth_m / self.sensor.grid.metres_per_px;
+        let rest = prepared.blurred_rest.as_ref();
+        scratch.deform.deform(&imprint.depth_px, core_px, &prepared.weights, rest, self.level);
     }
 }

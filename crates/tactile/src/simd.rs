@@ -8,9 +8,6 @@
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-#[cfg(target_arch = "x86_64")]
-pub(crate) use x86::{Avx2, Avx512};
-
 /// A vector unit to compute with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SimdLevel {
@@ -36,7 +33,10 @@ pub(crate) trait Kernel {
 impl SimdLevel {
     /// The widest unit of this processor.
     pub fn best() -> Self {
-        *Self::available().last().expect("the portable path is always there")
+        [SimdLevel::Avx512, SimdLevel::Avx2]
+            .into_iter()
+            .find(|level| level.is_available())
+            .unwrap_or(SimdLevel::Portable)
     }
 
     /// All units of this processor, narrowest first.

@@ -6,6 +6,8 @@
 //! degree. That is the whole model; it has no shadows and no highlights.
 
 use crate::grid::Plane;
+use crate::simd::{Kernel, Lanes, SimdLevel};
+use std::ops::Range;
 
 /// Terms of a field over the image: `1, u, v, u^2, u v, v^2`, with u and v measured from the centre in units of
 /// half the image width.
@@ -84,30 +86,82 @@ impl Lambert {
 
     /// Writes `sum_j field_j (n_j - n0_j)` with `n = (-gx, -gy, 1) / |..|` and the rest normal (0, 0, 1).
     pub(super) fn shade(&self, along_x: &Plane, along_y: &Plane, change: &mut [Plane; 3]) {
-        let (w, h) = (along_x.width, along_x.height);
-        let unit = 2.0 / w as f64;
-        let u: Vec<f32> = (0..w).map(|x| ((x as f64 + 0.5 - w as f64 / 2.0) * unit) as f32).collect();
-        let (mut nx, mut ny, mut nz) = (vec![0.0f32; w], vec![0.0f32; w], vec![0.0f32; w]);
-        for y in 0..h {
-            let (gx, gy) = (along_x.row(y), along_y.row(y));
-            for x in 0..w {
-                let length = (1.0 + gx[x] * gx[x] + gy[x] * gy[x]).sqrt();
-                let inverse = 1.0 / length;
-                nx[x] = -gx[x] * inverse;
-                ny[x] = -gy[x] * inverse;
-                nz[x] = inverse - 1.0;
+        SimdLevel::best().run(Shade {
+            row: self.row(along_x.width, along_x.height),
+            along_x,
+            along_y,
+            change,
+        });
+    }
+
+    /// For images of a size.
+    pub(crate) fn row(&self, width: usize, height: usize) -> LambertRow<'_> {
+        let unit = 2.0 / width as f64;
+        let u = (0..width).map(|x| ((x as f64 + 0.5 - width as f64 / 2.0) * unit) as f32).collect();
+        LambertRow { model: self, height, unit, u, normal: [0, 1, 2].map(|_| vec![0.0; width]) }
+    }
+}
+
+/// The model on rows of an image.
+pub(crate) struct LambertRow<'a> {
+    model: &'a Lambert,
+    height: usize,
+    unit: f64,
+    u: Vec<f32>,
+    /// Memory for normals, less the normal at rest.
+    normal: [Vec<f32>; 3],
+}
+
+impl LambertRow<'_> {
+    /// Writes the change of colour in some columns of row `y`; the slices are whole rows.
+    #[inline(always)]
+    pub(crate) fn shade(
+        &mut self,
+        y: usize,
+        columns: Range<usize>,
+        gx: &[f32],
+        gy: &[f32],
+        change: [&mut [f32]; 3],
+    ) {
+        let n = columns.len();
+        let (gx, gy, u) = (&gx[columns.clone()], &gy[columns.clone()], &self.u[columns.clone()]);
+        let [nx, ny, nz] = self.normal.each_mut().map(|v| &mut v[..n]);
+        for i in 0..n {
+            let length = (1.0 + gx[i] * gx[i] + gy[i] * gy[i]).sqrt();
+            let inverse = 1.0 / length;
+            nx[i] = -gx[i] * inverse;
+            ny[i] = -gy[i] * inverse;
+            nz[i] = inverse - 1.0;
+        }
+        let v = (y as f64 + 0.5 - self.height as f64 / 2.0) * self.unit;
+        for (channel, out) in change.into_iter().enumerate() {
+            // For this row each field is c0 + c1 u + c2 u^2.
+            let f = self.model.fields[channel]
+                .map(|c| [c[0] + v * (c[2] + v * c[5]), c[1] + v * c[4], c[3]].map(|k| k as f32));
+            let out = &mut out[columns.clone()];
+            for i in 0..n {
+                let field = |k: &[f32; 3]| k[0] + u[i] * (k[1] + u[i] * k[2]);
+                out[i] = field(&f[0]) * nx[i] + field(&f[1]) * ny[i] + field(&f[2]) * nz[i];
             }
-            let v = (y as f64 + 0.5 - h as f64 / 2.0) * unit;
-            for (channel, plane) in change.iter_mut().enumerate() {
-                // For this row each field is c0 + c1 u + c2 u^2.
-                let f = self.fields[channel]
-                    .map(|c| [c[0] + v * (c[2] + v * c[5]), c[1] + v * c[4], c[3]].map(|k| k as f32));
-                let out = &mut plane.values[y * w..(y + 1) * w];
-                for x in 0..w {
-                    let field = |k: &[f32; 3]| k[0] + u[x] * (k[1] + u[x] * k[2]);
-                    out[x] = field(&f[0]) * nx[x] + field(&f[1]) * ny[x] + field(&f[2]) * nz[x];
-                }
-            }
+        }
+    }
+}
+
+struct Shade<'a> {
+    row: LambertRow<'a>,
+    along_x: &'a Plane,
+    along_y: &'a Plane,
+    change: &'a mut [Plane; 3],
+}
+
+impl Kernel for Shade<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(mut self) {
+        let w = self.along_x.width;
+        for y in 0..self.along_x.height {
+            let out = self.change.each_mut().map(|plane| &mut plane.values[y * w..(y + 1) * w]);
+            self.row.shade(y, 0..w, self.along_x.row(y), self.along_y.row(y), out);
         }
     }
 }

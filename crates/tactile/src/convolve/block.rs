@@ -55,25 +55,21 @@ impl Block<'_> {
                     walk.down[r] = L::load(walk.below.add(r * self.stride));
                 }
             }
-            while k + ROWS <= end {
-                walk.phase::<L, BOTH, 0>(&mut sums);
-                walk.phase::<L, BOTH, 1>(&mut sums);
-                walk.phase::<L, BOTH, 2>(&mut sums);
-                walk.phase::<L, BOTH, 3>(&mut sums);
-                walk.phase::<L, BOTH, 4>(&mut sums);
-                walk.phase::<L, BOTH, 5>(&mut sums);
-                walk.phase::<L, BOTH, 6>(&mut sums);
-                walk.phase::<L, BOTH, 7>(&mut sums);
-                k += ROWS;
+            let mut left = end - k;
+            loop {
+                // Registers keep their places for `ROWS` steps; a step that is not there is skipped for good.
+                walk.phase::<L, BOTH, 0>(&mut sums, &mut left);
+                walk.phase::<L, BOTH, 1>(&mut sums, &mut left);
+                walk.phase::<L, BOTH, 2>(&mut sums, &mut left);
+                walk.phase::<L, BOTH, 3>(&mut sums, &mut left);
+                walk.phase::<L, BOTH, 4>(&mut sums, &mut left);
+                walk.phase::<L, BOTH, 5>(&mut sums, &mut left);
+                walk.phase::<L, BOTH, 6>(&mut sums, &mut left);
+                walk.phase::<L, BOTH, 7>(&mut sums, &mut left);
+                if left == 0 {
+                    return sums;
+                }
             }
-            // The rest, in the same order, moving the rows from register to register.
-            while k < end {
-                walk.phase::<L, BOTH, 0>(&mut sums);
-                walk.up.rotate_right(1);
-                walk.down.rotate_left(1);
-                k += 1;
-            }
-            sums
         }
     }
 }
@@ -98,10 +94,12 @@ impl<V: Copy, const ROWS: usize> Walk<V, ROWS> {
     unsafe fn phase<L: Lanes<Vector = V>, const BOTH: bool, const PHASE: usize>(
         &mut self,
         sums: &mut [V; ROWS],
+        left: &mut usize,
     ) {
-        if PHASE >= ROWS {
+        if PHASE >= ROWS || *left == 0 {
             return;
         }
+        *left -= 1;
         // SAFETY: see above; the rows loaded ahead are within the spare rows.
         unsafe {
             let weight = L::splat(*self.weight);

@@ -1,0 +1,404 @@
+//! Drawing the clusters of a mesh from the top down, as deep as needed.
+
+use super::clusters::{Cluster, ClusteredMesh, VERTICES};
+use crate::convolve::Area;
+use crate::grid::{Grid, Plane};
+use crate::simd::{Kernel, Lanes, SimdLevel};
+use gripgen_twin::frames::Pose;
+use std::ops::Range;
+
+/// Boxes are this much larger than computed, in pixels: rounding must not lose a cluster.
+const SLACK_PX: f64 = 1e-6;
+
+/// A first look at what is uppermost goes this deep, in pixels.
+const FIRST_LOOK_PX: f64 = 4.0;
+
+/// A triangle corner in pixels; `height_px` grows towards the gel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Corner {
+    pub(super) x_px: f64,
+    pub(super) y_px: f64,
+    pub(super) height_px: f64,
+    /// Grows with the number of the vertex in the mesh.
+    pub(super) number: u32,
+}
+
+/// The map that a mesh is drawn into, and memory for it to be used again.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct HeightMap {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Row by row; `-inf` where nothing was drawn.
+    pub(crate) values: Vec<f32>,
+    /// Where something was drawn.
+    pub(crate) area: Area,
+    view: View,
+    seen: Vec<Seen>,
+    corners: Corners,
+}
+
+/// From mesh coordinates to pixels: the pose's rotation as a quaternion, its translation, pixels per metre and the
+/// place of the origin.
+#[derive(Debug, Clone, Copy, Default)]
+struct View {
+    quaternion: [f64; 4],
+    translation: [f64; 3],
+    scale: f64,
+    origin_px: (f64, f64),
+}
+
+/// A cluster over the window.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    cluster: usize,
+    /// No point of it is higher.
+    top_px: f64,
+    /// The highest triangle that was not drawn yet.
+    left_px: f64,
+}
+
+/// The vertices of the cluster at hand: pixels, and the whole numbers next to them.
+#[derive(Debug, Clone, Default)]
+struct Corners {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    height: Vec<f64>,
+    /// Smallest pixel not before the vertex and largest pixel not after it.
+    columns: Vec<(i32, i32)>,
+    rows: Vec<(i32, i32)>,
+    /// Triangles that can reach a pixel centre.
+    reaching: Vec<[u16; 3]>,
+}
+
+impl HeightMap {
+    /// A map that is all drawn.
+    pub(crate) fn of(plane: &Plane) -> Self {
+        let area = Area::whole(plane.width, plane.height);
+        Self {
+            width: plane.width,
+            height: plane.height,
+            values: plane.values.clone(),
+            area,
+            ..Self::default()
+        }
+    }
+
+    /// Empties the map and finds the clusters over the window.
+    pub(crate) fn start(&mut self, mesh: &ClusteredMesh, gel_from_mesh: &Pose, grid: &Grid) {
+        (self.width, self.height) = (grid.width_px, grid.height_px);
+        self.values.clear();
+        self.values.resize(grid.len(), f32::NEG_INFINITY);
+        self.area = Area::EMPTY;
+        let q = gel_from_mesh.rotation.coords;
+        let t = gel_from_mesh.translation.vector;
+        // Pixel coordinates whose integers are pixel centres.
+        let origin_px = (grid.width_px as f64 / 2.0 - 0.5, grid.height_px as f64 / 2.0 - 0.5);
+        self.view = View {
+            quaternion: [q.x, q.y, q.z, q.w],
+            translation: [t.x, t.y, t.z],
+            scale: 1.0 / grid.metres_per_px,
+            origin_px,
+        };
+        let r = gel_from_mesh.rotation.to_rotation_matrix();
+        let (last_x, last_y) = ((self.width - 1) as f64, (self.height - 1) as f64);
+        let view = self.view;
+        self.seen.clear();
+        for (cluster, c) in mesh.clusters.iter().enumerate() {
+            let p = gel_from_mesh * c.middle_m;
+            let reach = |i: usize| {
+                let half: f64 = (0..3).map(|j| r[(i, j)].abs() * c.half_m[j]).sum();
+                half * view.scale * (1.0 + 1e-9) + SLACK_PX
+            };
+            let (x, y) = (p.x * view.scale + origin_px.0, p.y * view.scale + origin_px.1);
+            let (rx, ry) = (reach(0), reach(1));
+            if x + rx >= 0.0 && x - rx <= last_x && y + ry >= 0.0 && y - ry <= last_y {
+                let top_px = -p.z * view.scale + reach(2);
+                self.seen.push(Seen { cluster, top_px, left_px: f64::INFINITY });
+            }
+        }
+    }
+
+    /// Draws all that can lie less than `depth_px` below the highest pixel, `rest` added to it where there is one
+    /// (at most 0 everywhere). Returns the highest pixel, `-inf` if there is none.
+    pub(crate) fn draw_down(
+        &mut self,
+        mesh: &ClusteredMesh,
+        depth_px: f64,
+        rest: Option<&Plane>,
+        level: SimdLevel,
+    ) -> f32 {
+        let mut top = self.top(rest, level);
+        let highest = self.seen.iter().fold(f64::NEG_INFINITY, |m, s| m.max(s.top_px));
+        let mut look = FIRST_LOOK_PX.min(depth_px);
+        while top == f32::NEG_INFINITY && self.draw_above(mesh, highest - look, level) {
+            top = self.top(rest, level);
+            look *= 2.0;
+        }
+        if top > f32::NEG_INFINITY {
+            self.draw_above(mesh, f64::from(top) - depth_px, level);
+            top = self.top(rest, level);
+        }
+        top
+    }
+
+    /// Draws the triangles that reach above `floor_px`. Returns whether some are left.
+    fn draw_above(&mut self, mesh: &ClusteredMesh, floor_px: f64, level: SimdLevel) -> bool {
+        level.run(Draw { map: self, mesh, floor_px })
+    }
+
+    /// The highest pixel.
+    pub(crate) fn top(&self, rest: Option<&Plane>, level: SimdLevel) -> f32 {
+        level.run(Top { map: self, rest })
+    }
+
+    /// Sum and number of `height + rest + lift` where that is above 0.
+    pub(crate) fn volume(&self, rest: Option<&Plane>, lift: f64, level: SimdLevel) -> (f64, f64) {
+        level.run(Volume { map: self, rest, lift })
+    }
+
+    /// The values of a row within the area, `rest` added.
+    #[inline(always)]
+    pub(crate) fn above_gel(&self, rest: Option<&Plane>, y: usize) -> impl Iterator<Item = f32> {
+        let range = y * self.width + self.area.x.0..y * self.width + self.area.x.1;
+        let rest = rest.map(|r| &r.values[range.clone()]);
+        self.values[range].iter().enumerate().map(move |(i, &h)| rest.map_or(h, |r| h + r[i]))
+    }
+
+    pub(crate) fn into_plane(self) -> Plane {
+        Plane { width: self.width, height: self.height, values: self.values }
+    }
+}
+
+struct Top<'a> {
+    map: &'a HeightMap,
+    rest: Option<&'a Plane>,
+}
+
+impl Kernel for Top<'_> {
+    type Output = f32;
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> f32 {
+        let mut lanes = [f32::NEG_INFINITY; 32];
+        for y in self.map.area.y.0..self.map.area.y.1 {
+            let range = y * self.map.width + self.map.area.x.0..y * self.map.width + self.map.area.x.1;
+            let row = &self.map.values[range.clone()];
+            match self.rest {
+                None => highest(row.iter().copied(), &mut lanes, row.len()),
+                Some(rest) => {
+                    let sums = row.iter().zip(&rest.values[range]).map(|(h, r)| h + r);
+                    highest(sums, &mut lanes, row.len());
+                }
+            }
+        }
+        lanes.iter().fold(f32::NEG_INFINITY, |m, &v| if v > m { v } else { m })
+    }
+}
+
+#[inline(always)]
+fn highest(values: impl Iterator<Item = f32>, lanes: &mut [f32; 32], _count: usize) {
+    for (i, v) in values.enumerate() {
+        let lane = &mut lanes[i % 32];
+        *lane = if v > *lane { v } else { *lane };
+    }
+}
+
+struct Volume<'a> {
+    map: &'a HeightMap,
+    rest: Option<&'a Plane>,
+    lift: f64,
+}
+
+impl Kernel for Volume<'_> {
+    type Output = (f64, f64);
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> (f64, f64) {
+        let (mut sum, mut count) = ([0.0; 8], [0.0; 8]);
+        for y in self.map.area.y.0..self.map.area.y.1 {
+            for (i, h) in self.map.above_gel(self.rest, y).enumerate() {
+                let depth = f64::from(h) + self.lift;
+                let touches = depth > 0.0;
+                sum[i % 8] += if touches { depth } else { 0.0 };
+                count[i % 8] += if touches { 1.0 } else { 0.0 };
+            }
+        }
+        (sum.iter().sum(), count.iter().sum())
+    }
+}
+
+struct Draw<'a> {
+    map: &'a mut HeightMap,
+    mesh: &'a ClusteredMesh,
+    floor_px: f64,
+}
+
+impl Kernel for Draw<'_> {
+    type Output = bool;
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> bool {
+        let Self { map, mesh, floor_px } = self;
+        let mut seen = std::mem::take(&mut map.seen);
+        let mut corners = std::mem::take(&mut map.corners);
+        let mut left = false;
+        for s in &mut seen {
+            if s.top_px >= floor_px && s.left_px >= floor_px {
+                let cluster = &mesh.clusters[s.cluster];
+                corners.transform(mesh, cluster, &map.view);
+                s.left_px = corners.select(mesh, cluster, (map.width, map.height), floor_px);
+                for i in 0..corners.reaching.len() {
+                    let t = corners.reaching[i].map(|v| corners.corner(v));
+                    fill(map, t);
+                }
+            }
+            left |= s.left_px > f64::NEG_INFINITY;
+        }
+        (map.seen, map.corners) = (seen, corners);
+        left
+    }
+}
+
+impl Corners {
+    #[inline(always)]
+    fn corner(&self, number: u16) -> Corner {
+        let i = usize::from(number);
+        Corner { x_px: self.x[i], y_px: self.y[i], height_px: self.height[i], number: u32::from(number) }
+    }
+
+    /// The vertices of a cluster in pixels, with the operations of `gel_from_mesh * vertex` in their order.
+    #[inline(always)]
+    fn transform(&mut self, mesh: &ClusteredMesh, cluster: &Cluster, view: &View) {
+        for values in [&mut self.x, &mut self.y, &mut self.height] {
+            values.resize(VERTICES, 0.0);
+        }
+        self.columns.resize(VERTICES, (0, 0));
+        self.rows.resize(VERTICES, (0, 0));
+        let Range { start, end } = cluster.vertices;
+        let n = end - start;
+        let (x, y, z) = (&mesh.x_m[start..end], &mesh.y_m[start..end], &mesh.z_m[start..end]);
+        let (px, py, ph) = (&mut self.x[..n], &mut self.y[..n], &mut self.height[..n]);
+        let [qx, qy, qz, qw] = view.quaternion;
+        let [tx, ty, tz] = view.translation;
+        for i in 0..n {
+            let (vx, vy, vz) = (x[i], y[i], z[i]);
+            // t = 2 q x v, then q_w t + q x t + v.
+            let (ax, ay, az) =
+                ((qy * vz - qz * vy) * 2.0, (qz * vx - qx * vz) * 2.0, (qx * vy - qy * vx) * 2.0);
+            let (bx, by, bz) = (qy * az - qz * ay, qz * ax - qx * az, qx * ay - qy * ax);
+            px[i] = (ax * qw + bx + vx + tx) * view.scale + view.origin_px.0;
+            py[i] = (ay * qw + by + vy + ty) * view.scale + view.origin_px.1;
+            ph[i] = -(az * qw + bz + vz + tz) * view.scale;
+        }
+        let whole = |v: f64| {
+            let v = v.clamp(-1e9, 1e9);
+            // SAFETY: finite, since meshes and poses are, and within the range of i32.
+            unsafe { (v.ceil().to_int_unchecked::<i32>(), v.floor().to_int_unchecked::<i32>()) }
+        };
+        for i in 0..n {
+            self.columns[i] = whole(px[i]);
+            self.rows[i] = whole(py[i]);
+        }
+    }
+
+    /// Collects the triangles that can reach a pixel centre of the window and lie above the floor. Returns the
+    /// height of the highest one that lies below the floor.
+    #[inline(always)]
+    fn select(
+        &mut self,
+        mesh: &ClusteredMesh,
+        cluster: &Cluster,
+        (width, height): (usize, usize),
+        floor_px: f64,
+    ) -> f64 {
+        let mut left = f64::NEG_INFINITY;
+        let mut count = 0;
+        self.reaching.resize(VERTICES / 3, [0; 3]);
+        for &triangle in &mesh.triangles[cluster.triangles.clone()] {
+            let [a, b, c] = triangle.map(usize::from);
+            let reaches = |v: &[(i32, i32)], n: usize| {
+                let first = v[a].0.min(v[b].0).min(v[c].0).max(0);
+                let last = v[a].1.max(v[b].1).max(v[c].1).min(n as i32 - 1);
+                first <= last
+            };
+            let reaches = reaches(&self.rows, height) & reaches(&self.columns, width);
+            let top = self.height[a].max(self.height[b]).max(self.height[c]);
+            let low = top < floor_px;
+            left = if reaches & low & (top > left) { top } else { left };
+            self.reaching[count] = triangle;
+            count += usize::from(reaches & !low);
+        }
+        self.reaching.truncate(count);
+        left
+    }
+}
+
+/// An edge, seen from the end with the lower number.
+pub(super) struct Edge {
+    x_px: f64,
+    y_px: f64,
+    slope: f64,
+    rows: (f64, f64),
+}
+
+impl Edge {
+    #[inline(always)]
+    pub(super) fn new(a: &Corner, b: &Corner) -> Self {
+        let (a, b) = if a.number <= b.number { (a, b) } else { (b, a) };
+        // A horizontal edge crosses no row.
+        let rows = if a.y_px == b.y_px {
+            (f64::INFINITY, f64::NEG_INFINITY)
+        } else {
+            (a.y_px.min(b.y_px), a.y_px.max(b.y_px))
+        };
+        Self { x_px: a.x_px, y_px: a.y_px, slope: (b.x_px - a.x_px) / (b.y_px - a.y_px), rows }
+    }
+
+    /// Where it crosses row `y`.
+    #[inline(always)]
+    pub(super) fn crossing(&self, y: f64) -> Option<f64> {
+        (y >= self.rows.0 && y <= self.rows.1).then(|| self.x_px + (y - self.y_px) * self.slope)
+    }
+}
+
+/// Writes one triangle into the map where it is nearer than what is there.
+#[inline(always)]
+fn fill(map: &mut HeightMap, t: [Corner; 3]) {
+    // Plane through the corners, relative to the first one so that small triangles far away stay exact.
+    let (ux, uy, uh) = (t[1].x_px - t[0].x_px, t[1].y_px - t[0].y_px, t[1].height_px - t[0].height_px);
+    let (vx, vy, vh) = (t[2].x_px - t[0].x_px, t[2].y_px - t[0].y_px, t[2].height_px - t[0].height_px);
+    let area = ux * vy - uy * vx;
+    if area == 0.0 {
+        return;
+    }
+    let slope_x = (uh * vy - vh * uy) / area;
+    let slope_y = (vh * ux - uh * vx) / area;
+    let top = t[0].height_px.max(t[1].height_px).max(t[2].height_px);
+    let bottom = t[0].height_px.min(t[1].height_px).min(t[2].height_px);
+    let first_row = t[0].y_px.min(t[1].y_px).min(t[2].y_px).ceil().max(0.0);
+    let last_row = t[0].y_px.max(t[1].y_px).max(t[2].y_px).floor().min(map.height as f64 - 1.0);
+    let edges = [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])];
+    for row in first_row as usize..=last_row as usize {
+        let y = row as f64;
+        let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+        for edge in &edges {
+            if let Some(x) = edge.crossing(y) {
+                from = from.min(x);
+                to = to.max(x);
+            }
+        }
+        let from = from.ceil().max(0.0);
+        let to = to.floor().min(map.width as f64 - 1.0);
+        if from > to {
+            continue;
+        }
+        let (from, end) = (from as usize, to as usize + 1);
+        let along_row = t[0].height_px + slope_y * (y - t[0].y_px);
+        let start = row * map.width;
+        for (i, cell) in map.values[start + from..start + end].iter_mut().enumerate() {
+            let column = (from + i) as i32;
+            let height = along_row + slope_x * (f64::from(column) - t[0].x_px);
+            let height = if height < bottom { bottom } else { height };
+            let height = (if height > top { top } else { height }) as f32;
+            *cell = if height > *cell { height } else { *cell };
+        }
+        map.area.add((from, end), row);
+    }
+}

@@ -1,0 +1,109 @@
+//! Stages `gradient` and `shade` in one walk over the part of the surface that is not flat.
+
+use crate::colour::{ColourModel, LambertRow, shade};
+use crate::convolve::{Area, Sheet};
+use crate::grid::Plane;
+use crate::simd::{Kernel, Lanes, SimdLevel};
+use std::ops::Range;
+
+/// Colour change of a surface that is 0 beyond `area` and within its outermost two pixels, with the bits of
+/// [`crate::gradient`] and [`shade`].
+pub(crate) fn change(model: &ColourModel, sheet: &Sheet, area: Area, level: SimdLevel) -> [Plane; 3] {
+    let (w, h) = (sheet.width, sheet.height);
+    let zeros = || Plane::filled(w, h, 0.0);
+    let mut change = [zeros(), zeros(), zeros()];
+    if area.is_empty() || w < 3 || h < 3 {
+        return change;
+    }
+    let inner = |(start, end): (usize, usize), n: usize| {
+        (if start == 0 { 0 } else { start + 1 })..(if end == n { n } else { end - 1 })
+    };
+    let slopes = Slopes { sheet, columns: inner(area.x, w), rows: inner(area.y, h) };
+    match model {
+        ColourModel::Lambert(lambert) => {
+            let row = lambert.row(w, h);
+            level.run(ShadeRows { slopes, row, change: &mut change });
+            change
+        }
+        // Models that work on whole planes.
+        _ => {
+            let [along_x, along_y, _] = &mut change;
+            level.run(SlopePlanes { slopes, along_x, along_y });
+            let [along_x, along_y, _] = change;
+            shade(model, &along_x, &along_y)
+        }
+    }
+}
+
+/// Where slopes are needed.
+struct Slopes<'a> {
+    sheet: &'a Sheet,
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+impl Slopes<'_> {
+    /// The slopes of a row: those of the nearest pixel that has all its neighbours.
+    #[inline(always)]
+    fn row(&self, y: usize, gx: &mut [f32], gy: &mut [f32]) {
+        let (w, h) = (self.sheet.width, self.sheet.height);
+        let inner = y.clamp(1, h - 2);
+        let (here, above, below) =
+            (self.sheet.row(inner), self.sheet.row(inner - 1), self.sheet.row(inner + 1));
+        let (start, end) = (self.columns.start.max(1), self.columns.end.min(w - 1));
+        let n = end - start;
+        let (left, right) = (&here[start - 1..][..n], &here[start + 1..][..n]);
+        let (above, below) = (&above[start..][..n], &below[start..][..n]);
+        let (gx_inner, gy_inner) = (&mut gx[start..][..n], &mut gy[start..][..n]);
+        for i in 0..n {
+            gx_inner[i] = (right[i] - left[i]) * 0.5;
+            gy_inner[i] = (below[i] - above[i]) * 0.5;
+        }
+        if self.columns.start == 0 {
+            (gx[0], gy[0]) = (gx[1], gy[1]);
+        }
+        if self.columns.end == w {
+            (gx[w - 1], gy[w - 1]) = (gx[w - 2], gy[w - 2]);
+        }
+    }
+}
+
+/// Slopes and colours row by row.
+struct ShadeRows<'a> {
+    slopes: Slopes<'a>,
+    row: LambertRow<'a>,
+    change: &'a mut [Plane; 3],
+}
+
+impl Kernel for ShadeRows<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(mut self) {
+        let (w, columns) = (self.slopes.sheet.width, self.slopes.columns.clone());
+        let (mut gx, mut gy) = (vec![0.0; w], vec![0.0; w]);
+        for y in self.slopes.rows.clone() {
+            self.slopes.row(y, &mut gx, &mut gy);
+            let out = self.change.each_mut().map(|plane| &mut plane.values[y * w..(y + 1) * w]);
+            self.row.shade(y, columns.clone(), &gx, &gy, out);
+        }
+    }
+}
+
+/// Slopes as planes.
+struct SlopePlanes<'a> {
+    slopes: Slopes<'a>,
+    along_x: &'a mut Plane,
+    along_y: &'a mut Plane,
+}
+
+impl Kernel for SlopePlanes<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let w = self.slopes.sheet.width;
+        for y in self.slopes.rows.clone() {
+            let row = y * w..(y + 1) * w;
+            self.slopes.row(y, &mut self.along_x.values[row.clone()], &mut self.along_y.values[row]);
+        }
+    }
+}
