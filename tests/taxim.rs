@@ -39,7 +39,12 @@ fn a_slope_gets_the_colour_of_its_bin() {
     let background = decode_picture(&std::fs::read(taxim("taxim_robot/bg.jpg")).unwrap()).unwrap();
     let sensor = Sensor::from_npz(&bytes, Some(0.0295e-3), Some(&background)).unwrap();
     let (gx, gy) = (0.31_f32, -0.12_f32);
-    let change = shade(&sensor.colour, &Plane::filled(640, 480, gx), &Plane::filled(640, 480, gy));
+    let change = shade(
+        &sensor.colour,
+        &Plane::filled(640, 480, 0.0),
+        &Plane::filled(640, 480, gx),
+        &Plane::filled(640, 480, gy),
+    );
     let step = std::f64::consts::FRAC_PI_2 / 124.0;
     let i = (f64::from(gx).hypot(f64::from(gy)).atan() / step).floor() as usize;
     let j = ((f64::from(gy).atan2(f64::from(gx)) + std::f64::consts::PI) / (4.0 * step)).floor() as usize;

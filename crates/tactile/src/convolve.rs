@@ -133,6 +133,16 @@ impl Sheet {
         &mut self.values[at..][..self.stride]
     }
 
+    /// The values of an area, 0 around it.
+    pub(crate) fn plane(&self, area: Area) -> Plane {
+        let mut plane = Plane::filled(self.width, self.height, 0.0);
+        for y in area.y.0..area.y.1 {
+            let to = &mut plane.values[y * self.width..][area.x.0..area.x.1];
+            to.copy_from_slice(&self.row(y)[area.x.0..area.x.1]);
+        }
+        plane
+    }
+
     /// Writes `f` of a plane's values into whole groups around an area, and `outside` around it.
     pub(crate) fn copy_area(&mut self, plane: &Plane, area: Area, outside: f32, f: impl Fn(f32) -> f32) {
         let groups = area.in_groups();

@@ -154,12 +154,7 @@ impl DeformScratch {
 
     pub(crate) fn surface_plane(&self) -> Plane {
         let (sheet, area) = self.surface();
-        let mut plane = Plane::filled(sheet.width, sheet.height, 0.0);
-        for y in area.y.0..area.y.1 {
-            let to = &mut plane.values[y * sheet.width..][area.x.0..area.x.1];
-            to.copy_from_slice(&sheet.row(y)[area.x.0..area.x.1]);
-        }
-        plane
+        sheet.plane(area)
     }
 }
 

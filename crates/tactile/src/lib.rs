@@ -26,7 +26,7 @@ mod sensor;
 mod shading;
 mod simd;
 
-pub use colour::{ColourModel, Lambert, Light, TaximTable, shade};
+pub use colour::{ColourModel, Lambert, Light, Regressor, TaximTable, shade};
 pub use deform::{BlurredRest, deform};
 pub use gradient::gradient;
 pub use grid::{Grid, Plane};

@@ -1,11 +1,17 @@
 //! Presses of a ball into a sensor, and how well a sensor file predicts their images.
 
+mod calibrate;
 mod compare;
+mod data_pack;
 
+pub use calibrate::{
+    CalibrateError, CalibrateOptions, Calibration, FEWEST_PRESSES, Smoothness, calibrate_presses,
+};
 pub use compare::{
     CROPS_PX, CompareError, PressComparison, PressScore, Scores, compare_presses, crop, predict_press,
     score_press,
 };
+pub use data_pack::{DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError};
 
 use gripgen_twin::TactileImage;
 

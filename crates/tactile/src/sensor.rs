@@ -114,6 +114,11 @@ impl Sensor {
             ColourModel::Lambert(lambert) if !lambert.is_finite() => {
                 return Err(SensorError::NotFinite { key: "lambert" });
             }
+            ColourModel::Regressor(model) if !model.is_finite() => {
+                return Err(SensorError::NotFinite {
+                    key: "regressor_near, regressor_around, regressor_limits",
+                });
+            }
             ColourModel::Taxim(table) if !table.is_finite() => {
                 return Err(SensorError::NotFinite { key: "grad_r, grad_g, grad_b" });
             }

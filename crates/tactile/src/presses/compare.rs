@@ -5,7 +5,7 @@ use crate::grid::{Grid, Plane};
 use crate::indent::Imprint;
 use crate::metrics::{MetricError, Score, score};
 use crate::render::Renderer;
-use crate::sensor::{Pyramid, Sensor};
+use crate::sensor::{GelShape, Pyramid, Sensor};
 use crate::simd::SimdLevel;
 use gripgen_twin::{ContactPatch, Gel, TactileImage};
 
@@ -117,21 +117,50 @@ pub fn predict_press(press: &Press, ball_m: f64, sensor: &Sensor) -> Result<Tact
 pub(crate) fn predict_ball(circle: &Circle, ball_m: f64, sensor: &Sensor) -> TactileImage {
     let gel = gel_of(sensor);
     let renderer = Renderer { sensor, gel: &gel, level: SimdLevel::best() };
-    let imprint = ball_imprint(circle, ball_m, &sensor.grid);
+    let imprint = ball_imprint(circle, ball_m, &sensor.grid, &sensor.gel_shape);
     renderer.image(Some(&imprint), None)
 }
 
-/// The imprint of a ball: its cap below the plane of the circle.
-pub(crate) fn ball_imprint(circle: &Circle, ball_m: f64, grid: &Grid) -> Imprint {
+/// The imprint of a ball whose rim of contact is `circle`, relative to the gel at rest.
+///
+/// On a flat gel that is the cap of the ball below the plane of the circle. On a curved one the circle lies on the
+/// slope of the gel under it: the ball's centre stands off the circle's by `sqrt(R^2 - a^2)` along the gel's normal.
+pub(crate) fn ball_imprint(circle: &Circle, ball_m: f64, grid: &Grid, shape: &GelShape) -> Imprint {
     let press_depth_m = circle.depth_m(ball_m, grid.metres_per_px);
     let radius_px = ball_m / 2.0 / grid.metres_per_px;
     let sunk_px = radius_px - press_depth_m / grid.metres_per_px;
-    let mut depth_px = Plane::filled(grid.width_px, grid.height_px, 0.0);
+    let (w, h) = (grid.width_px, grid.height_px);
+    let rest = shape.rest_px(grid);
+    let rest_at = |x: f64, y: f64| {
+        let inside = |v: f64, n: usize| v.round().clamp(0.0, (n - 1) as f64) as usize;
+        rest.as_ref().map_or(0.0, |rest| f64::from(rest.at(inside(x, w), inside(y, h))))
+    };
+    let (cx, cy, a) = (circle.x_px, circle.y_px, circle.radius_px);
+    let slope = [
+        (rest_at(cx + a, cy) - rest_at(cx - a, cy)) / (2.0 * a),
+        (rest_at(cx, cy + a) - rest_at(cx, cy - a)) / (2.0 * a),
+    ];
+    let ball = [cx - sunk_px * slope[0], cy - sunk_px * slope[1]];
+    let rim = [(a, 0.0), (-a, 0.0), (0.0, a), (0.0, -a)];
+    let above_rim = |x: f64, y: f64| {
+        let (dx, dy) = (x - ball[0], y - ball[1]);
+        (radius_px * radius_px - dx * dx - dy * dy).max(0.0).sqrt() - rest_at(x, y)
+    };
+    let level = match &rest {
+        None => sunk_px,
+        Some(_) => rim.iter().map(|(dx, dy)| above_rim(cx + dx, cy + dy)).sum::<f64>() / 4.0,
+    };
+    let mut depth_px = Plane::filled(w, h, 0.0);
     for (i, depth) in depth_px.values.iter_mut().enumerate() {
-        let (x, y) = ((i % grid.width_px) as f64 - circle.x_px, (i / grid.width_px) as f64 - circle.y_px);
-        let below = radius_px * radius_px - x * x - y * y;
-        *depth = (below.max(0.0).sqrt() - sunk_px).max(0.0) as f32;
+        let (x, y) = ((i % w) as f64, (i / w) as f64);
+        // Far from the ball the gel itself falls away; only the ball's own cap counts.
+        let (dx, dy) = (x - ball[0], y - ball[1]);
+        if dx * dx + dy * dy < radius_px * radius_px {
+            *depth = (above_rim(x, y) - level).max(0.0) as f32;
+        }
     }
+    let deepest = depth_px.values.iter().fold(0.0f32, |m, &d| m.max(d));
+    let press_depth_m = if rest.is_some() { f64::from(deepest) * grid.metres_per_px } else { press_depth_m };
     Imprint { depth_px, press_depth_m, patch: ContactPatch { cells: Vec::new() } }
 }
 
@@ -201,7 +230,7 @@ mod tests {
     fn a_ball_is_as_deep_as_its_circle_says() {
         let grid = Grid { width_px: 101, height_px: 81, metres_per_px: 1e-4 };
         let circle = Circle { x_px: 50.0, y_px: 40.0, radius_px: 17.320_508 };
-        let imprint = ball_imprint(&circle, 4e-3, &grid);
+        let imprint = ball_imprint(&circle, 4e-3, &grid, &GelShape::Flat);
         // A circle of sqrt(3) mm is a cap of 1 mm.
         assert!((imprint.press_depth_m - 1e-3).abs() < 1e-9);
         assert!((imprint.depth_px.at(50, 40) - 10.0).abs() < 1e-4);

@@ -7,13 +7,18 @@
 //! | `rest_rgb` | (H, W, 3) | denoised frame without contact, grey levels |
 //! | `noise_rgb` | (3,) | standard deviation of the noise of a pixel, grey levels |
 //! | `lambert` | (3, 3, 6) | colours as lights: channel, component of the normal, term of the field |
+//! | `regressor_near` | (3, 20, 10) | instead of `lambert`: channel, term of a displaced pixel, term of the field |
+//! | `regressor_around` | (3, 40, 6) | with it: channel, feature of the surroundings, term of the field |
+//! | `regressor_limits` | (42,) | with it: largest sine of the slope, height in mm, each feature |
+//! | `regressor_mm_per_px` | scalar | with it: side of a pixel on the gel in the calibration |
 //! | `dome_sag_mm` | scalar, optional | a domed gel: how much its corners lie below its apex |
 //! | `gel_height_px` | (H, W), optional | a gel of any shape: height at rest, relative to its highest point |
 //! | `kernels_px`, `restore_depth_fraction` | (K,), scalar, optional | the deformation that the colours were calibrated with |
 //! | `ball_mm` | scalar, optional | diameter of the ball of the calibration |
 
 use super::{GelShape, Pyramid, Sensor, SensorError};
-use crate::colour::{ColourModel, Lambert, TaximTable};
+use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
+use crate::colour::{ColourModel, Lambert, Regressor, TaximTable};
 use crate::grid::Grid;
 use crate::npz::{Array, ElementType, Npz, NpzError, write_npz};
 use gripgen_twin::TactileImage;
@@ -97,7 +102,7 @@ impl Sensor {
 
     /// The bytes of a sensor file; `None` for a colour model that is only read, Taxim's table.
     pub fn to_npz(&self) -> Option<Result<Vec<u8>, NpzError>> {
-        let ColourModel::Lambert(lambert) = &self.colour else { return None };
+        let mut colour = colour_arrays(&self.colour)?;
         let scalar = |x: f64| Array { shape: vec![], values: vec![x] };
         let list = |values: Vec<f64>| Array { shape: vec![values.len()], values };
         let (rows, columns) = (self.grid.height_px, self.grid.width_px);
@@ -112,8 +117,8 @@ impl Sensor {
             ("mm_per_px", scalar(self.grid.metres_per_px * 1e3), ElementType::F64),
             ("rest_rgb", Array { shape: vec![rows, columns, 3], values: rest }, rest_type),
             ("noise_rgb", list(noise), ElementType::F64),
-            ("lambert", Array { shape: vec![3, 3, 6], values: lambert.coefficients() }, ElementType::F64),
         ];
+        arrays.append(&mut colour);
         match &self.gel_shape {
             GelShape::Flat => {}
             GelShape::Dome { sag_m } => arrays.push(("dome_sag_mm", scalar(sag_m * 1e3), ElementType::F64)),
@@ -139,8 +144,56 @@ impl Sensor {
     }
 }
 
+/// The arrays of a colour model; `None` for Taxim's.
+fn colour_arrays(colour: &ColourModel) -> Option<Vec<(&'static str, Array, ElementType)>> {
+    let array = |shape: &[usize], values: &[f32]| Array {
+        shape: shape.to_vec(),
+        values: values.iter().map(|&x| f64::from(x)).collect(),
+    };
+    match colour {
+        ColourModel::Taxim(_) => None,
+        ColourModel::Lambert(lambert) => {
+            let lambert = Array { shape: vec![3, 3, 6], values: lambert.coefficients() };
+            Some(vec![("lambert", lambert, ElementType::F64)])
+        }
+        ColourModel::Regressor(model) => {
+            let mut limits = vec![model.slope_limit, model.height_limit_mm];
+            limits.extend(&model.around_limit);
+            let mm = Array { shape: vec![], values: vec![model.mm_per_px] };
+            Some(vec![
+                ("regressor_near", array(&[3, NEAR, NEAR_FIELD], &model.near), ElementType::F32),
+                (
+                    "regressor_around",
+                    array(&[3, SURROUNDINGS, AROUND_FIELD], &model.around),
+                    ElementType::F32,
+                ),
+                ("regressor_limits", array(&[2 + SURROUNDINGS], &limits), ElementType::F32),
+                ("regressor_mm_per_px", mm, ElementType::F64),
+            ])
+        }
+    }
+}
+
 /// gripgen's own colour model of a file.
 fn own_colour(npz: &mut Npz<'_>) -> Result<ColourModel, NpzError> {
+    if npz.has("regressor_near") {
+        let mut list = |key: &str, shape: &[usize]| -> Result<Vec<f32>, NpzError> {
+            let wanted: Vec<Option<usize>> = shape.iter().map(|&n| Some(n)).collect();
+            Ok(npz.array_of_shape(key, &wanted)?.values.iter().map(|&x| x as f32).collect())
+        };
+        let near = list("regressor_near", &[3, NEAR, NEAR_FIELD])?;
+        let around = list("regressor_around", &[3, SURROUNDINGS, AROUND_FIELD])?;
+        let limits = list("regressor_limits", &[2 + SURROUNDINGS])?;
+        let mm_per_px = npz.array_of_shape("regressor_mm_per_px", &[])?.values[0];
+        return Ok(ColourModel::Regressor(Box::new(Regressor {
+            mm_per_px,
+            near,
+            around,
+            slope_limit: limits[0],
+            height_limit_mm: limits[1],
+            around_limit: limits[2..].to_vec(),
+        })));
+    }
     let lambert = npz.array_of_shape("lambert", &[Some(3), Some(3), Some(6)])?;
     Ok(ColourModel::Lambert(Box::new(Lambert::new(&lambert.values))))
 }

@@ -1,0 +1,285 @@
+//! Smooth regression from the shape of the gel to the change of colour.
+//!
+//! The change of a pixel is a sum of two linear models, fitted to presses of a ball:
+//!
+//! ```text
+//! near   sum_{t, p} a[t, p] T_t(n_x, n_y, h) u^i v^j    where the gel is displaced
+//! around sum_{f, q} b[f, q] S_f(p) u^i v^j              everywhere
+//! ```
+//!
+//! `T`: monomials of the normal (degrees 1 to 4) and of height times normal (degrees 0 to 2); `S`: the height around
+//! the pixel at four scales with its derivatives up to third order (see `pyramid`), which stands for cast shadows and
+//! for light that the dent throws onto its surroundings. u and v run over the image, -1 to 1 along its width, with
+//! total degrees of at most 3 and 2. Beyond what the presses showed, the normal, the height and each S are held at
+//! their largest values, so that other parts than a ball stay within the colours that the sensor has shown.
+//!
+//! Every term is 0 for a gel at rest: no contact, no change.
+
+mod pyramid;
+
+pub(crate) use pyramid::{SURROUNDINGS, cell_px};
+
+use crate::grid::{Grid, Plane};
+use pyramid::{DERIVATIVES, Surroundings, double, surroundings};
+
+/// Highest degree of the normal alone.
+const NORMAL_DEGREE: usize = 4;
+
+/// Highest degree of the normal beside the height.
+const HEIGHT_DEGREE: usize = 2;
+
+/// Terms of a displaced pixel.
+pub(crate) const NEAR: usize = 14 + 6;
+
+/// Monomials `u^i v^j` of degree at most 3, and of degree at most 2. Order: `1, u, v, u^2, u v, v^2, u^3, ...`.
+pub(crate) const NEAR_FIELD: usize = 10;
+pub(crate) const AROUND_FIELD: usize = 6;
+
+/// Pixels that are computed together.
+const BLOCK: usize = 16;
+
+/// Coefficients of the model; see the module.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Regressor {
+    /// Side of a pixel on the gel, as in the presses.
+    pub(crate) mm_per_px: f64,
+    /// Coefficients by channel, term and monomial of the position: 3 x 20 x 10.
+    pub(crate) near: Vec<f32>,
+    /// Coefficients by channel, feature and monomial of the position: 3 x 40 x 6.
+    pub(crate) around: Vec<f32>,
+    /// Largest sine of the slope that was seen.
+    pub(crate) slope_limit: f32,
+    /// Largest height that was seen, in millimetres.
+    pub(crate) height_limit_mm: f32,
+    /// Largest magnitude of each feature of the surroundings that was seen.
+    pub(crate) around_limit: Vec<f32>,
+}
+
+impl Regressor {
+    /// Whether all coefficients are.
+    pub(crate) fn is_finite(&self) -> bool {
+        let lists = [&self.near, &self.around, &self.around_limit];
+        let limits = [self.slope_limit, self.height_limit_mm];
+        lists.into_iter().flatten().chain(&limits).all(|x| x.is_finite())
+    }
+
+    /// Writes the change that a surface (heights and slopes in pixels) makes.
+    pub(super) fn shade(&self, surface: &Plane, along_x: &Plane, along_y: &Plane, change: &mut [Plane; 3]) {
+        self.shade_around(surface, change);
+        self.shade_near(surface, along_x, along_y, change);
+    }
+
+    /// The part of the surroundings, on cells, then bilinearly between their centres.
+    fn shade_around(&self, surface: &Plane, change: &mut [Plane; 3]) {
+        let cell = cell_px(self.mm_per_px);
+        let Surroundings { fine, coarse } = surroundings(surface, cell, self.mm_per_px);
+        let size = (surface.width, surface.height);
+        for (channel, plane) in change.iter_mut().enumerate() {
+            let on_coarse = self.combine(channel, &coarse, DERIVATIVES, 2 * cell, size);
+            let mut on_fine = self.combine(channel, &fine, 0, cell, size);
+            let doubled = double(&on_coarse, on_fine.width, on_fine.height);
+            on_fine.values.iter_mut().zip(&doubled.values).for_each(|(f, c)| *f += c);
+            spread(&on_fine, cell, plane);
+        }
+    }
+
+    /// The sum over features from `first` on, on their cells of `cell_px` pixels.
+    fn combine(
+        &self,
+        channel: usize,
+        features: &[Plane],
+        first: usize,
+        cell_px: usize,
+        size: (usize, usize),
+    ) -> Plane {
+        let (w, h) = (features[0].width, features[0].height);
+        let place = Place::of(size);
+        let u: Vec<f32> = (0..w).map(|x| place.u(cell_centre_px(x, cell_px))).collect();
+        let mut out = Plane::filled(w, h, 0.0);
+        for y in 0..h {
+            let v = place.v(cell_centre_px(y, cell_px));
+            let row = &mut out.values[y * w..(y + 1) * w];
+            for (i, feature) in features.iter().enumerate() {
+                let at = (channel * SURROUNDINGS + first + i) * AROUND_FIELD;
+                let c = &self.around[at..at + AROUND_FIELD];
+                // 1, u, v, u^2, u v, v^2 for this row as a polynomial in u.
+                let (c0, c1, c2) = (c[0] + v * (c[2] + v * c[5]), c[1] + v * c[4], c[3]);
+                let limit = self.around_limit[first + i];
+                for (x, &f) in feature.row(y).iter().enumerate() {
+                    row[x] += f.clamp(-limit, limit) * (c0 + u[x] * (c1 + u[x] * c2));
+                }
+            }
+        }
+        out
+    }
+
+    /// The part of displaced pixels.
+    fn shade_near(&self, surface: &Plane, along_x: &Plane, along_y: &Plane, change: &mut [Plane; 3]) {
+        let (w, h) = (surface.width, surface.height);
+        let place = Place::of((w, h));
+        let u: Vec<f32> = (0..w.next_multiple_of(BLOCK)).map(|x| place.u(x as f32)).collect();
+        for y in 0..h {
+            let rows = [surface.row(y), along_x.row(y), along_y.row(y)];
+            let moved = |x: &usize| rows.iter().any(|r| r[*x] != 0.0);
+            let Some(first) = (0..w).find(moved) else { continue };
+            let last = (0..w).rev().find(moved).unwrap_or(first);
+            let fields = self.row_fields(place.v(y as f32));
+            for start in (first / BLOCK * BLOCK..=last).step_by(BLOCK) {
+                let n = BLOCK.min(w - start);
+                let mut block = [[0.0f32; BLOCK]; 3];
+                for (b, r) in block.iter_mut().zip(rows) {
+                    b[..n].copy_from_slice(&r[start..start + n]);
+                }
+                let terms = self.terms(&block);
+                let u: &[f32; BLOCK] = u[start..start + BLOCK].try_into().expect("u is padded");
+                for (channel, plane) in change.iter_mut().enumerate() {
+                    let sum = combine_block(&terms, &fields[channel], u);
+                    let out = &mut plane.values[y * w + start..][..n];
+                    out.iter_mut().zip(sum).for_each(|(o, s)| *o += s);
+                }
+            }
+        }
+    }
+
+    /// For one row the fields of each channel and term as polynomials of third degree in u, by powers.
+    fn row_fields(&self, v: f32) -> [[[f32; NEAR]; 4]; 3] {
+        let mut fields = [[[0.0; NEAR]; 4]; 3];
+        for (channel, powers) in fields.iter_mut().enumerate() {
+            for term in 0..NEAR {
+                let at = (channel * NEAR + term) * NEAR_FIELD;
+                let c = &self.near[at..at + NEAR_FIELD];
+                powers[0][term] = c[0] + v * (c[2] + v * (c[5] + v * c[9]));
+                powers[1][term] = c[1] + v * (c[4] + v * c[8]);
+                powers[2][term] = c[3] + v * c[7];
+                powers[3][term] = c[6];
+            }
+        }
+        fields
+    }
+
+    /// The terms of a block of pixels: heights and both slopes in, one row a term out.
+    fn terms(&self, [height, gx, gy]: &[[f32; BLOCK]; 3]) -> [[f32; BLOCK]; NEAR] {
+        let mut terms = [[0.0; BLOCK]; NEAR];
+        let scale = self.mm_per_px as f32;
+        for x in 0..BLOCK {
+            let h = (height[x] * scale).min(self.height_limit_mm);
+            let [nx, ny] = limited_normal(gx[x], gy[x], self.slope_limit);
+            for (row, term) in terms.iter_mut().zip(near_terms(nx, ny, h)) {
+                row[x] = term;
+            }
+        }
+        terms
+    }
+}
+
+/// Horner's rule over the powers of u of sums over terms.
+fn combine_block(terms: &[[f32; BLOCK]; NEAR], powers: &[[f32; NEAR]; 4], u: &[f32; BLOCK]) -> [f32; BLOCK] {
+    let mut sum = [0.0; BLOCK];
+    for power in powers.iter().rev() {
+        let mut of_power = [0.0; BLOCK];
+        for (term, c) in terms.iter().zip(power) {
+            for x in 0..BLOCK {
+                of_power[x] += c * term[x];
+            }
+        }
+        for x in 0..BLOCK {
+            sum[x] = sum[x] * u[x] + of_power[x];
+        }
+    }
+    sum
+}
+
+/// Components along x and y of the unit normal of a surface with these slopes, shortened to `limit`.
+pub(crate) fn limited_normal(gx: f32, gy: f32, limit: f32) -> [f32; 2] {
+    let squared = gx * gx + gy * gy;
+    let inverse = 1.0 / (1.0 + squared).sqrt();
+    let sine = squared.sqrt() * inverse;
+    let shorten = if sine > limit { limit / sine } else { 1.0 };
+    let scale = -inverse * shorten;
+    [gx * scale, gy * scale]
+}
+
+/// The terms of a displaced pixel: `n_x^a n_y^b` by degree, then height times those of degrees 0 to 2.
+pub(crate) fn near_terms(nx: f32, ny: f32, height_mm: f32) -> [f32; NEAR] {
+    let mut terms = [0.0; NEAR];
+    let mut degree = [1.0f32, 0.0, 0.0, 0.0, 0.0];
+    terms[14] = height_mm;
+    let (mut at, mut at_height) = (0, 15);
+    for d in 1..=NORMAL_DEGREE {
+        // nx^d, nx^(d-1) ny, ..., ny^d from the degree before.
+        degree[d] = degree[d - 1] * ny;
+        for monomial in degree[..d].iter_mut() {
+            *monomial *= nx;
+        }
+        for &monomial in &degree[..=d] {
+            terms[at] = monomial;
+            at += 1;
+            if d <= HEIGHT_DEGREE {
+                terms[at_height] = height_mm * monomial;
+                at_height += 1;
+            }
+        }
+    }
+    terms
+}
+
+/// The features of the surroundings of a surface on its finest cells, one plane a feature.
+pub(crate) fn around_planes(surface: &Plane, mm_per_px: f64) -> Vec<Plane> {
+    let Surroundings { mut fine, coarse } = surroundings(surface, cell_px(mm_per_px), mm_per_px);
+    let (w, h) = (fine[0].width, fine[0].height);
+    fine.extend(coarse.iter().map(|plane| double(plane, w, h)));
+    fine
+}
+
+/// Where pixels lie in the image.
+#[derive(Clone, Copy)]
+pub(crate) struct Place {
+    centre: (f32, f32),
+    unit: f32,
+}
+
+impl Place {
+    pub(crate) fn of((w, h): (usize, usize)) -> Self {
+        Self { centre: ((w as f32 - 1.0) / 2.0, (h as f32 - 1.0) / 2.0), unit: 2.0 / w as f32 }
+    }
+
+    pub(crate) fn in_grid(grid: &Grid) -> Self {
+        Self::of((grid.width_px, grid.height_px))
+    }
+
+    pub(crate) fn u(self, x_px: f32) -> f32 {
+        (x_px - self.centre.0) * self.unit
+    }
+
+    pub(crate) fn v(self, y_px: f32) -> f32 {
+        (y_px - self.centre.1) * self.unit
+    }
+}
+
+fn cell_centre_px(index: usize, cell_px: usize) -> f32 {
+    (index as f32 + 0.5) * cell_px as f32 - 0.5
+}
+
+/// The two cells beside a pixel and the weight of the second.
+pub(crate) fn between_cells(pixel: usize, cell_px: usize, cells: usize) -> (usize, usize, f32) {
+    let at = ((pixel as f32 + 0.5) / cell_px as f32 - 0.5).clamp(0.0, (cells - 1) as f32);
+    let first = (at as usize).min(cells - 1);
+    (first, (first + 1).min(cells - 1), at - first as f32)
+}
+
+/// Writes the values of cells into pixels, bilinearly between the centres.
+fn spread(cells: &Plane, cell_px: usize, out: &mut Plane) {
+    let columns: Vec<_> = (0..out.width).map(|x| between_cells(x, cell_px, cells.width)).collect();
+    let mut row = vec![0.0f32; cells.width];
+    for y in 0..out.height {
+        let (above, below, weight) = between_cells(y, cell_px, cells.height);
+        let (above, below) = (cells.row(above), cells.row(below));
+        for x in 0..cells.width {
+            row[x] = above[x] + weight * (below[x] - above[x]);
+        }
+        let to = &mut out.values[y * out.width..(y + 1) * out.width];
+        for (value, &(left, right, weight)) in to.iter_mut().zip(&columns) {
+            *value = row[left] + weight * (row[right] - row[left]);
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! The surroundings of a pixel: the height of the gel, smoothed at four scales, and its derivatives.
+//!
+//! Cells of about a quarter of a millimetre hold the mean height of their pixels. Each level of the pyramid is
+//! smoothed by the binomial kernel of length 9 twice (a standard deviation of 2 cells) and halved for the next one,
+//! so that the levels see 0.5, 1, 2 and 4 mm around them. All values are linear in the height and exactly 0 where
+//! there is no contact anywhere.
+
+use crate::convolve::mirrored;
+use crate::grid::Plane;
+
+/// Levels of the pyramid.
+const LEVELS: usize = 4;
+
+/// Derivatives of a level: `1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy`.
+pub(super) const DERIVATIVES: usize = 10;
+
+/// Features of the surroundings.
+pub(crate) const SURROUNDINGS: usize = LEVELS * DERIVATIVES;
+
+/// Side of a cell that is aimed at, in millimetres.
+const CELL_MM: f64 = 0.24;
+
+/// Binomial coefficients of length 9 over 256: variance 2.
+const SMOOTH: [f32; 9] = [
+    1.0 / 256.0,
+    8.0 / 256.0,
+    28.0 / 256.0,
+    56.0 / 256.0,
+    70.0 / 256.0,
+    56.0 / 256.0,
+    28.0 / 256.0,
+    8.0 / 256.0,
+    1.0 / 256.0,
+];
+
+/// Pixels along the side of a cell for a pixel of this size.
+pub(crate) fn cell_px(mm_per_px: f64) -> usize {
+    ((CELL_MM / mm_per_px).round() as usize).max(1)
+}
+
+/// The features of a surface: the finest level on its own cells, the others on cells of twice that size.
+pub(super) struct Surroundings {
+    pub(super) fine: Vec<Plane>,
+    pub(super) coarse: Vec<Plane>,
+}
+
+/// Features of `surface_px`, a height map in pixels.
+pub(super) fn surroundings(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -> Surroundings {
+    let mut level = smooth(&smooth(&cells(surface_px, cell_px, mm_per_px)));
+    let fine = derivatives(&level);
+    let mut coarse = Vec::new();
+    let mut sizes: Vec<(usize, usize)> = Vec::new();
+    for _ in 1..LEVELS {
+        level = smooth(&smooth(&halve(&level)));
+        sizes.push((level.width, level.height));
+        for mut plane in derivatives(&level) {
+            for &(width, height) in sizes[..sizes.len() - 1].iter().rev() {
+                plane = double(&plane, width, height);
+            }
+            coarse.push(plane);
+        }
+    }
+    Surroundings { fine, coarse }
+}
+
+/// Mean height of each cell in millimetres; cells at the right and lower border may hold fewer pixels.
+fn cells(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -> Plane {
+    let (w, h) = (surface_px.width.div_ceil(cell_px), surface_px.height.div_ceil(cell_px));
+    let mut out = Plane::filled(w, h, 0.0);
+    let mut sums = vec![0.0f32; surface_px.width];
+    for cy in 0..h {
+        let rows = cy * cell_px..((cy + 1) * cell_px).min(surface_px.height);
+        let count = rows.len();
+        sums.fill(0.0);
+        for y in rows {
+            sums.iter_mut().zip(surface_px.row(y)).for_each(|(s, z)| *s += z);
+        }
+        for (cx, chunk) in sums.chunks(cell_px).enumerate() {
+            let scale = mm_per_px as f32 / (count * chunk.len()) as f32;
+            out.values[cy * w + cx] = chunk.iter().sum::<f32>() * scale;
+        }
+    }
+    out
+}
+
+/// The binomial kernel along both axes, borders mirrored.
+fn smooth(plane: &Plane) -> Plane {
+    let (w, h) = (plane.width, plane.height);
+    let half = SMOOTH.len() / 2;
+    let mut across = Plane::filled(w, h, 0.0);
+    let mut padded = vec![0.0f32; w + 2 * half];
+    for y in 0..h {
+        let row = plane.row(y);
+        padded[half..half + w].copy_from_slice(row);
+        for i in 0..half {
+            padded[half - 1 - i] = row[mirrored(-1 - i as isize, w)];
+            padded[half + w + i] = row[mirrored((w + i) as isize, w)];
+        }
+        let out = &mut across.values[y * w..(y + 1) * w];
+        for (k, weight) in SMOOTH.iter().enumerate() {
+            out.iter_mut().zip(&padded[k..k + w]).for_each(|(o, p)| *o += weight * p);
+        }
+    }
+    let mut down = Plane::filled(w, h, 0.0);
+    for y in 0..h {
+        let out = &mut down.values[y * w..(y + 1) * w];
+        for (k, weight) in SMOOTH.iter().enumerate() {
+            let source = mirrored(y as isize + k as isize - half as isize, h);
+            out.iter_mut().zip(across.row(source)).for_each(|(o, p)| *o += weight * p);
+        }
+    }
+    down
+}
+
+/// Means of two by two cells; an odd last column or row counts twice.
+fn halve(plane: &Plane) -> Plane {
+    let (w, h) = (plane.width.div_ceil(2), plane.height.div_ceil(2));
+    let mut out = Plane::filled(w, h, 0.0);
+    for y in 0..h {
+        let (a, b) = (plane.row(2 * y), plane.row((2 * y + 1).min(plane.height - 1)));
+        for x in 0..w {
+            let (left, right) = (2 * x, (2 * x + 1).min(plane.width - 1));
+            out.values[y * w + x] = 0.25 * ((a[left] + a[right]) + (b[left] + b[right]));
+        }
+    }
+    out
+}
+
+/// The inverse of [`halve`] for smooth planes: each cell is three quarters its parent and a quarter the next one.
+pub(super) fn double(plane: &Plane, width: usize, height: usize) -> Plane {
+    let parents = |i: usize, n: usize| {
+        let parent = i / 2;
+        let other = if i.is_multiple_of(2) { parent.saturating_sub(1) } else { (parent + 1).min(n - 1) };
+        (parent, other)
+    };
+    let mut out = Plane::filled(width, height, 0.0);
+    let mut row = vec![0.0f32; plane.width];
+    for y in 0..height {
+        let (near, far) = parents(y, plane.height);
+        let (near, far) = (plane.row(near), plane.row(far));
+        for x in 0..plane.width {
+            row[x] = 0.75 * near[x] + 0.25 * far[x];
+        }
+        for x in 0..width {
+            let (a, b) = parents(x, plane.width);
+            out.values[y * width + x] = 0.75 * row[a] + 0.25 * row[b];
+        }
+    }
+    out
+}
+
+/// The plane and its central differences up to third order, per cell.
+fn derivatives(z: &Plane) -> Vec<Plane> {
+    let (zx, zy) = (along_x(z), along_y(z));
+    let (zxx, zxy, zyy) = (along_x(&zx), along_y(&zx), along_y(&zy));
+    let third = [along_x(&zxx), along_y(&zxx), along_x(&zyy), along_y(&zyy)];
+    let mut all = vec![z.clone(), zx, zy, zxx, zxy, zyy];
+    all.extend(third);
+    all
+}
+
+fn along_x(z: &Plane) -> Plane {
+    let mut out = Plane::filled(z.width, z.height, 0.0);
+    for (from, to) in z.values.chunks_exact(z.width).zip(out.values.chunks_exact_mut(z.width)) {
+        for x in 1..z.width.saturating_sub(1) {
+            to[x] = 0.5 * (from[x + 1] - from[x - 1]);
+        }
+    }
+    out
+}
+
+fn along_y(z: &Plane) -> Plane {
+    let mut out = Plane::filled(z.width, z.height, 0.0);
+    for y in 1..z.height.saturating_sub(1) {
+        let (above, below) = (z.row(y - 1), z.row(y + 1));
+        let to = &mut out.values[y * z.width..(y + 1) * z.width];
+        for x in 0..z.width {
+            to[x] = 0.5 * (below[x] - above[x]);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_levels_see_gaussians_of_half_a_millimetre_and_doubles() {
+        // A pin at a cell's centre: the variance of the smoothed height is that of the kernels.
+        let mut surface = Plane::filled(512, 512, 0.0);
+        for y in 252..260 {
+            for x in 252..260 {
+                surface.values[y * 512 + x] = 1.0;
+            }
+        }
+        let found = surroundings(&surface, 8, 0.03);
+        let variance = |plane: &Plane| {
+            let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
+            for (i, &z) in plane.values.iter().enumerate() {
+                let x = (i % plane.width) as f64;
+                sum += f64::from(z);
+                first += f64::from(z) * x;
+                second += f64::from(z) * x * x;
+            }
+            second / sum - (first / sum) * (first / sum)
+        };
+        // Smoothed twice by variance 2; the pin itself straddles two cells and adds 1/4.
+        assert!((variance(&found.fine[0]) - 4.25).abs() < 1e-3);
+        // A quarter of that in cells of twice the size, plus the pair's own spread, plus 4.
+        assert!((variance(&found.coarse[0]) - (4.25 / 4.0 + 0.0625 + 4.0)).abs() < 1e-2);
+        assert_eq!((found.fine.len(), found.coarse.len()), (DERIVATIVES, SURROUNDINGS - DERIVATIVES));
+    }
+
+    #[test]
+    fn a_slanted_plane_has_its_slope_on_every_level() {
+        let mut surface = Plane::filled(330, 250, 0.0);
+        for (i, z) in surface.values.iter_mut().enumerate() {
+            *z = 0.1 * (i % 330) as f32 - 0.2 * (i / 330) as f32;
+        }
+        let found = surroundings(&surface, 4, 0.06);
+        let middle = |plane: &Plane| plane.at(plane.width / 2, plane.height / 2);
+        // Millimetres per cell: slope times the cell's side, doubled from level to level.
+        let close = |value: f32, exact: f32| assert!((value - exact).abs() < 2e-3, "{value} {exact}");
+        close(middle(&found.fine[1]), 0.1 * 0.24);
+        close(middle(&found.fine[2]), -0.2 * 0.24);
+        close(middle(&found.coarse[1]), 0.2 * 0.24);
+        close(middle(&found.fine[3]), 0.0);
+    }
+}

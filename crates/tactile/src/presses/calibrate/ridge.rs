@@ -1,0 +1,147 @@
+//! Ridge regression on the sums of presses, and the choice of its strength.
+
+use super::moments::{Feature, Moments, exponents};
+use super::samples::INPUTS;
+use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
+use nalgebra::{Cholesky, DMatrix};
+
+/// How freely the colours may vary.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Smoothness {
+    /// Highest degree of the fields of the displaced gel over the image, 0 to 3.
+    pub near_degree: usize,
+    /// Highest degree of the fields of the surroundings, 0 to 2.
+    pub around_degree: usize,
+    /// Ridge, relative to the mean square of each feature.
+    pub ridge: f64,
+}
+
+impl Smoothness {
+    /// What is tried, from stiff to free.
+    pub(super) fn candidates() -> impl Iterator<Item = Self> {
+        [(0, 0), (1, 0), (2, 1), (3, 2)].into_iter().flat_map(|(near_degree, around_degree)| {
+            [1e-2, 1e-3, 1e-4, 1e-5].map(|ridge| Self { near_degree, around_degree, ridge })
+        })
+    }
+
+    /// Where there is no time to choose.
+    pub(super) const USUAL: Self = Self { near_degree: 2, around_degree: 1, ridge: 1e-4 };
+
+    fn features(&self) -> Vec<Feature> {
+        let count = |degree: usize| (degree + 1) * (degree + 2) / 2;
+        (0..INPUTS)
+            .flat_map(|input| {
+                let n = count(if input < NEAR { self.near_degree } else { self.around_degree });
+                exponents(n).map(move |e| (input, e))
+            })
+            .collect()
+    }
+}
+
+/// Coefficients of a fit.
+pub(super) struct Solution {
+    features: Vec<Feature>,
+    coefficients: DMatrix<f64>,
+}
+
+/// The coefficients with the least squared error plus ridge; `None` if the sums hold no information.
+pub(super) fn solve(sums: &Moments, smoothness: &Smoothness) -> Option<Solution> {
+    let features = smoothness.features();
+    let weight = sums.energy_and_weight().1;
+    let scale: Vec<f64> = features.iter().map(|&f| (sums.product(f, f) / weight).max(1e-18).sqrt()).collect();
+    let n = features.len();
+    let mut gram = gram(sums, &features);
+    for (j, mut column) in gram.column_iter_mut().enumerate() {
+        for (i, value) in column.iter_mut().enumerate() {
+            *value /= weight * scale[i] * scale[j];
+        }
+        column[j] += smoothness.ridge;
+    }
+    let right = DMatrix::from_fn(n, 3, |i, c| sums.target(c, features[i]) / (weight * scale[i]));
+    let mut coefficients = Cholesky::new(gram)?.solve(&right);
+    for (i, mut row) in coefficients.row_iter_mut().enumerate() {
+        row /= scale[i];
+    }
+    Some(Solution { features, coefficients })
+}
+
+fn gram(sums: &Moments, features: &[Feature]) -> DMatrix<f64> {
+    let n = features.len();
+    let mut gram = DMatrix::zeros(n, n);
+    for j in 0..n {
+        for i in j..n {
+            let value = sums.product(features[i], features[j]);
+            gram[(i, j)] = value;
+            gram[(j, i)] = value;
+        }
+    }
+    gram
+}
+
+impl Solution {
+    /// Mean squared error over the three channels on the sums of other presses.
+    pub(super) fn error_on(&self, sums: &Moments) -> f64 {
+        let gram = gram(sums, &self.features);
+        let (energy, weight) = sums.energy_and_weight();
+        let mut error = energy;
+        let product = &gram * &self.coefficients;
+        for c in 0..3 {
+            for (i, &feature) in self.features.iter().enumerate() {
+                let w = self.coefficients[(i, c)];
+                error += w * (product[(i, c)] - 2.0 * sums.target(c, feature));
+            }
+        }
+        error / (3.0 * weight)
+    }
+
+    /// Coefficients in the order of a sensor file; fields of lower degree are filled up with zeros.
+    pub(super) fn near_and_around(&self) -> (Vec<f32>, Vec<f32>) {
+        let mut near = vec![0.0; 3 * NEAR * NEAR_FIELD];
+        let mut around = vec![0.0; 3 * SURROUNDINGS * AROUND_FIELD];
+        for (row, &(input, (i, j))) in self.features.iter().enumerate() {
+            let m = super::moments::monomial(i, j);
+            for c in 0..3 {
+                let value = self.coefficients[(row, c)] as f32;
+                match input.checked_sub(NEAR) {
+                    None => near[(c * NEAR + input) * NEAR_FIELD + m] = value,
+                    Some(feature) => around[(c * SURROUNDINGS + feature) * AROUND_FIELD + m] = value,
+                }
+            }
+        }
+        (near, around)
+    }
+}
+
+/// Presses split into those that a fit sees and those that it does not, several times.
+pub(super) struct Folds(Vec<(Moments, Moments)>);
+
+impl Folds {
+    /// Press i is unseen in fold `i % folds`.
+    pub(super) fn split(presses: &[&Moments], folds: usize) -> Self {
+        let folds = folds.min(presses.len()).max(2);
+        let split = |fold: usize| {
+            let (mut seen, mut unseen) = (Moments::zero(), Moments::zero());
+            for (i, press) in presses.iter().enumerate() {
+                if i % folds == fold { unseen.add(press) } else { seen.add(press) }
+            }
+            (seen, unseen)
+        };
+        Self((0..folds).map(split).collect())
+    }
+
+    /// Mean squared error on unseen presses.
+    pub(super) fn error(&self, smoothness: &Smoothness) -> f64 {
+        let error = |(seen, unseen): &(Moments, Moments)| {
+            solve(seen, smoothness).map_or(f64::INFINITY, |solution| solution.error_on(unseen))
+        };
+        self.0.iter().map(error).sum::<f64>() / self.0.len() as f64
+    }
+
+    /// The stiffest choice whose error is within one part in a hundred of the least, and its error.
+    pub(super) fn choose(&self) -> (Smoothness, f64) {
+        let tried: Vec<(Smoothness, f64)> = Smoothness::candidates().map(|s| (s, self.error(&s))).collect();
+        let least = tried.iter().map(|(_, error)| *error).fold(f64::INFINITY, f64::min);
+        let within = |(_, error): &&(Smoothness, f64)| *error <= 1.01 * least;
+        tried.iter().find(within).copied().unwrap_or((Smoothness::USUAL, f64::INFINITY))
+    }
+}

@@ -1,0 +1,140 @@
+//! Pixels of a press and what the regressor sees there.
+
+use super::super::compare::ball_imprint;
+use super::super::{Circle, Press};
+use crate::colour::regressor::{
+    NEAR, Place, SURROUNDINGS, around_planes, between_cells, cell_px, limited_normal, near_terms,
+};
+use crate::deform::{BlurredRest, deform};
+use crate::gradient::gradient;
+use crate::grid::{Grid, Plane};
+use crate::sensor::{GelShape, Pyramid};
+use crate::simd::SimdLevel;
+
+/// Inputs of a pixel: the terms of the displaced gel, then the features of the surroundings.
+pub(super) const INPUTS: usize = NEAR + SURROUNDINGS;
+
+/// Zones around the contact: distance from its rim up to which they reach, and the pixels drawn from them.
+const ZONES_MM: [(f64, usize); 3] = [(0.8, 1500), (4.2, 1000), (f64::INFINITY, 600)];
+
+/// A gel to fit: its shape at rest and its deformation.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct GelModel {
+    pub(super) shape: GelShape,
+    pub(super) pyramid: Pyramid,
+}
+
+impl GelModel {
+    /// Height of the gel surface around a press, above its rest state.
+    pub(super) fn surface(&self, circle: &Circle, ball_m: f64, grid: &Grid) -> Plane {
+        let imprint = ball_imprint(circle, ball_m, grid, &self.shape);
+        let Pyramid { kernels_px, restore_depth_fraction } = &self.pyramid;
+        let level = SimdLevel::best();
+        let rest = self.shape.rest_px(grid).map(|rest| BlurredRest::new(&rest, kernels_px, level));
+        deform(&imprint, kernels_px, *restore_depth_fraction, grid.metres_per_px, rest.as_ref(), level)
+    }
+}
+
+/// Chosen pixels of one press.
+pub(super) struct Samples {
+    /// Row by row from the top left.
+    pub(super) pixels: Vec<usize>,
+    /// Weight of each, so that a zone counts by the root of its area.
+    pub(super) weights: Vec<f32>,
+    /// [`INPUTS`] numbers for each pixel.
+    pub(super) inputs: Vec<f32>,
+    /// Position of each pixel, as the regressor measures it.
+    pub(super) places: Vec<[f32; 2]>,
+    /// Largest magnitudes in the whole image: sine of the slope, height in mm, each feature.
+    pub(super) largest: (f32, f32, Vec<f32>),
+}
+
+impl Samples {
+    /// Draws pixels of press number `index`; the same ones each time.
+    pub(super) fn draw(index: usize, circle: &Circle, ball_m: f64, grid: &Grid, gel: &GelModel) -> Self {
+        let (pixels, weights) = choose(index as u64, circle, grid);
+        let surface = gel.surface(circle, ball_m, grid);
+        let (along_x, along_y) = gradient(&surface);
+        let mm_per_px = grid.metres_per_px * 1e3;
+        let around = around_planes(&surface, mm_per_px);
+        let cell = cell_px(mm_per_px);
+        let place = Place::in_grid(grid);
+        let mut inputs = Vec::with_capacity(pixels.len() * INPUTS);
+        let mut places = Vec::with_capacity(pixels.len());
+        for &pixel in &pixels {
+            let (x, y) = (pixel % grid.width_px, pixel / grid.width_px);
+            let [nx, ny] = limited_normal(along_x.values[pixel], along_y.values[pixel], 1.0);
+            inputs.extend(near_terms(nx, ny, surface.values[pixel] * mm_per_px as f32));
+            let columns = between_cells(x, cell, around[0].width);
+            let rows = between_cells(y, cell, around[0].height);
+            inputs.extend(around.iter().map(|plane| between(plane, columns, rows)));
+            places.push([place.u(x as f32), place.v(y as f32)]);
+        }
+        let slope = along_x.values.iter().zip(&along_y.values).map(|(&gx, &gy)| {
+            let [nx, ny] = limited_normal(gx, gy, 1.0);
+            nx * nx + ny * ny
+        });
+        let largest = (
+            slope.fold(0.0, f32::max).sqrt(),
+            magnitude(&surface) * mm_per_px as f32,
+            around.iter().map(magnitude).collect(),
+        );
+        Self { pixels, weights, inputs, places, largest }
+    }
+
+    /// Colour of each pixel against a rest frame.
+    pub(super) fn targets(&self, press: &Press, rest: &[Vec<f32>; 3]) -> Vec<[f32; 3]> {
+        let change = |p: usize, c: usize| f32::from(press.image.rgb[3 * p + c]) - rest[c][p];
+        self.pixels.iter().map(|&p| [change(p, 0), change(p, 1), change(p, 2)]).collect()
+    }
+}
+
+fn magnitude(plane: &Plane) -> f32 {
+    plane.values.iter().fold(0.0, |m, v| v.abs().max(m))
+}
+
+fn between(plane: &Plane, (x0, x1, wx): (usize, usize, f32), (y0, y1, wy): (usize, usize, f32)) -> f32 {
+    let row = |y: usize| plane.at(x0, y) + wx * (plane.at(x1, y) - plane.at(x0, y));
+    row(y0) + wy * (row(y1) - row(y0))
+}
+
+/// Distance of a pixel from the rim of a contact, negative inside.
+pub(super) fn from_rim_px(pixel: usize, circle: &Circle, width_px: usize) -> f64 {
+    let x = (pixel % width_px) as f64 - circle.x_px;
+    let y = (pixel / width_px) as f64 - circle.y_px;
+    (x * x + y * y).sqrt() - circle.radius_px
+}
+
+fn choose(index: u64, circle: &Circle, grid: &Grid) -> (Vec<usize>, Vec<f32>) {
+    let mm_per_px = grid.metres_per_px * 1e3;
+    let mut zones = [const { Vec::new() }; ZONES_MM.len()];
+    for pixel in 0..grid.len() {
+        let mm = from_rim_px(pixel, circle, grid.width_px) * mm_per_px;
+        let zone = ZONES_MM.iter().position(|&(up_to, _)| mm < up_to).unwrap_or(ZONES_MM.len() - 1);
+        zones[zone].push(pixel);
+    }
+    let mut state = index.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(1);
+    let (mut pixels, mut weights) = (Vec::new(), Vec::new());
+    for (mut zone, (_, wanted)) in zones.into_iter().zip(ZONES_MM) {
+        let area_mm2 = zone.len() as f64 * mm_per_px * mm_per_px;
+        let n = wanted.min(zone.len());
+        for i in 0..n {
+            let j = i + (random(&mut state) % (zone.len() - i) as u64) as usize;
+            zone.swap(i, j);
+        }
+        zone.truncate(n);
+        zone.sort_unstable();
+        weights.extend(std::iter::repeat_n(area_mm2.sqrt() as f32 / n.max(1) as f32, n));
+        pixels.extend(zone);
+    }
+    (pixels, weights)
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014).
+fn random(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}

@@ -1,0 +1,98 @@
+//! Taxim's `dataPack.npz`.
+//!
+//! | key | shape | what |
+//! |---|---|---|
+//! | `imgs` | (N, H, W, 3) u8 | the presses, blue first |
+//! | `touch_center` | (N, 2), optional | centre of each contact (x, y) in pixels |
+//! | `touch_radius` | (N,), optional | its radius in pixels |
+//! | `f0` | (H, W, 3) u8, optional | a frame without contact, blue first |
+//!
+//! Centres and radii may be numbers of any type, NaN or a radius of 0 stand for "not known". `names` is not read:
+//! it is text or a pickle.
+
+use super::{Circle, Press, PressSet};
+use crate::npz::{Npz, NpzError};
+use gripgen_twin::TactileImage;
+
+/// Diameter of the ball of Taxim's own data.
+pub const DATA_PACK_BALL_M: f64 = 4.0e-3;
+
+/// Side of a pixel of Taxim's own data.
+pub const DATA_PACK_METRES_PER_PX: f64 = 0.0295e-3;
+
+/// Why a `dataPack.npz` could not be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DataPackError {
+    /// The archive or one of its arrays.
+    #[error(transparent)]
+    Npz(#[from] NpzError),
+    /// Arrays that do not fit together.
+    #[error("`{key}` has shape {found:?}, `imgs` has {images:?}")]
+    Shape {
+        /// The array.
+        key: &'static str,
+        /// Its shape.
+        found: Vec<usize>,
+        /// Shape of `imgs`.
+        images: Vec<usize>,
+    },
+}
+
+impl PressSet {
+    /// Reads the bytes of a `dataPack.npz`. The file says neither what ball was used nor how large a pixel is.
+    pub fn from_data_pack(bytes: &[u8], ball_m: f64, metres_per_px: f64) -> Result<Self, DataPackError> {
+        let mut npz = Npz::open(bytes)?;
+        let (shape, mut images) = npz.bytes("imgs")?;
+        let &[count, height, width, 3] = &shape[..] else {
+            let problem = format!("its shape is {shape:?}, it must be (any, any, any, 3)");
+            return Err(NpzError::Array { key: "imgs".into(), problem }.into());
+        };
+        let fits = |key: &'static str, found: &[usize], wanted: &[usize]| {
+            if found == wanted {
+                return Ok(());
+            }
+            Err(DataPackError::Shape { key, found: found.to_vec(), images: vec![count, height, width, 3] })
+        };
+        let mut numbers = |key: &'static str, wanted: &[usize]| -> Result<Option<Vec<f64>>, DataPackError> {
+            if !npz.has(key) {
+                return Ok(None);
+            }
+            let array = npz.array(key)?;
+            fits(key, &array.shape, wanted)?;
+            Ok(Some(array.values))
+        };
+        let centres = numbers("touch_center", &[count, 2])?;
+        let radii = numbers("touch_radius", &[count])?;
+        let rest = if npz.has("f0") {
+            let (found, mut values) = npz.bytes("f0")?;
+            fits("f0", &found, &[height, width, 3])?;
+            red_first(&mut values);
+            Some(TactileImage { width_px: width as u32, height_px: height as u32, rgb: values })
+        } else {
+            None
+        };
+        red_first(&mut images);
+        let presses = images
+            .chunks_exact((3 * width * height).max(1))
+            .enumerate()
+            .map(|(i, rgb)| Press {
+                name: i.to_string(),
+                image: TactileImage { width_px: width as u32, height_px: height as u32, rgb: rgb.to_vec() },
+                circle: circle(i, centres.as_deref(), radii.as_deref()),
+            })
+            .collect();
+        Ok(Self { metres_per_px, ball_m, rest, presses })
+    }
+}
+
+fn circle(i: usize, centres: Option<&[f64]>, radii: Option<&[f64]>) -> Option<Circle> {
+    let (centres, radius_px) = (centres?, radii?[i]);
+    let (x_px, y_px) = (centres[2 * i], centres[2 * i + 1]);
+    let known = [x_px, y_px, radius_px].iter().all(|v| v.is_finite()) && radius_px > 0.0;
+    known.then_some(Circle { x_px, y_px, radius_px })
+}
+
+fn red_first(bgr: &mut [u8]) {
+    bgr.chunks_exact_mut(3).for_each(|pixel| pixel.swap(0, 2));
+}
