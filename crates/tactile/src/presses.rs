@@ -1,12 +1,14 @@
 //! Presses of a ball into a sensor, and how well a sensor file predicts their images.
 
 mod calibrate;
+mod circle;
 mod compare;
 mod data_pack;
 
 pub use calibrate::{
     CalibrateError, CalibrateOptions, Calibration, FEWEST_PRESSES, Smoothness, calibrate_presses,
 };
+pub use circle::{find_circle, reference_frame};
 pub use compare::{
     CROPS_PX, CompareError, PressComparison, PressScore, Scores, compare_presses, crop, predict_press,
     score_press,

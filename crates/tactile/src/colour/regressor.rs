@@ -28,8 +28,11 @@ const NORMAL_DEGREE: usize = 4;
 /// Highest degree of the normal beside the height.
 const HEIGHT_DEGREE: usize = 2;
 
+/// Monomials of the normal of degrees 1 to [`NORMAL_DEGREE`].
+const NORMAL_TERMS: usize = (NORMAL_DEGREE + 1) * (NORMAL_DEGREE + 2) / 2 - 1;
+
 /// Terms of a displaced pixel.
-pub(crate) const NEAR: usize = 14 + 6;
+pub(crate) const NEAR: usize = NORMAL_TERMS + (HEIGHT_DEGREE + 1) * (HEIGHT_DEGREE + 2) / 2;
 
 /// Monomials `u^i v^j` of degree at most 3, and of degree at most 2. Order: `1, u, v, u^2, u v, v^2, u^3, ...`.
 pub(crate) const NEAR_FIELD: usize = 10;
@@ -202,9 +205,10 @@ pub(crate) fn limited_normal(gx: f32, gy: f32, limit: f32) -> [f32; 2] {
 /// The terms of a displaced pixel: `n_x^a n_y^b` by degree, then height times those of degrees 0 to 2.
 pub(crate) fn near_terms(nx: f32, ny: f32, height_mm: f32) -> [f32; NEAR] {
     let mut terms = [0.0; NEAR];
-    let mut degree = [1.0f32, 0.0, 0.0, 0.0, 0.0];
-    terms[14] = height_mm;
-    let (mut at, mut at_height) = (0, 15);
+    let mut degree = [0.0f32; NORMAL_DEGREE + 1];
+    degree[0] = 1.0;
+    terms[NORMAL_TERMS] = height_mm;
+    let (mut at, mut at_height) = (0, NORMAL_TERMS + 1);
     for d in 1..=NORMAL_DEGREE {
         // nx^d, nx^(d-1) ny, ..., ny^d from the degree before.
         degree[d] = degree[d - 1] * ny;

@@ -8,34 +8,27 @@ use nalgebra::{Cholesky, DMatrix};
 /// How freely the colours may vary.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Smoothness {
-    /// Highest degree of the fields of the displaced gel over the image, 0 to 3.
-    pub near_degree: usize,
-    /// Highest degree of the fields of the surroundings, 0 to 2.
-    pub around_degree: usize,
     /// Ridge, relative to the mean square of each feature.
     pub ridge: f64,
+    /// Factor on the ridge for each degree by which a field varies over the image.
+    pub stiffness: f64,
 }
 
 impl Smoothness {
     /// What is tried, from stiff to free.
     pub(super) fn candidates() -> impl Iterator<Item = Self> {
-        [(0, 0), (1, 0), (2, 1), (3, 2)].into_iter().flat_map(|(near_degree, around_degree)| {
-            [1e-2, 1e-3, 1e-4, 1e-5].map(|ridge| Self { near_degree, around_degree, ridge })
-        })
+        [100.0, 10.0, 1.0]
+            .into_iter()
+            .flat_map(|stiffness| [1e-2, 1e-3, 1e-4, 1e-5].map(|ridge| Self { ridge, stiffness }))
     }
 
     /// Where there is no time to choose.
-    pub(super) const USUAL: Self = Self { near_degree: 2, around_degree: 1, ridge: 1e-4 };
+    pub(super) const USUAL: Self = Self { ridge: 1e-3, stiffness: 10.0 };
+}
 
-    fn features(&self) -> Vec<Feature> {
-        let count = |degree: usize| (degree + 1) * (degree + 2) / 2;
-        (0..INPUTS)
-            .flat_map(|input| {
-                let n = count(if input < NEAR { self.near_degree } else { self.around_degree });
-                exponents(n).map(move |e| (input, e))
-            })
-            .collect()
-    }
+fn features() -> Vec<Feature> {
+    let fields = |input: usize| exponents(if input < NEAR { NEAR_FIELD } else { AROUND_FIELD });
+    (0..INPUTS).flat_map(|input| fields(input).map(move |e| (input, e))).collect()
 }
 
 /// Coefficients of a fit.
@@ -46,7 +39,7 @@ pub(super) struct Solution {
 
 /// The coefficients with the least squared error plus ridge; `None` if the sums hold no information.
 pub(super) fn solve(sums: &Moments, smoothness: &Smoothness) -> Option<Solution> {
-    let features = smoothness.features();
+    let features = features();
     let weight = sums.energy_and_weight().1;
     let scale: Vec<f64> = features.iter().map(|&f| (sums.product(f, f) / weight).max(1e-18).sqrt()).collect();
     let n = features.len();
@@ -55,7 +48,8 @@ pub(super) fn solve(sums: &Moments, smoothness: &Smoothness) -> Option<Solution>
         for (i, value) in column.iter_mut().enumerate() {
             *value /= weight * scale[i] * scale[j];
         }
-        column[j] += smoothness.ridge;
+        let (i, k) = features[j].1;
+        column[j] += smoothness.ridge * smoothness.stiffness.powi((i + k) as i32);
     }
     let right = DMatrix::from_fn(n, 3, |i, c| sums.target(c, features[i]) / (weight * scale[i]));
     let mut coefficients = Cholesky::new(gram)?.solve(&right);
