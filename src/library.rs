@@ -5,7 +5,7 @@ use crate::location::Location;
 use crate::resolve::Files;
 use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, UrdfError};
 use gripgen_record::{decode_picture, sha256_hex};
-use gripgen_tactile::{Sensor, SensorError};
+use gripgen_tactile::{Sensor, SensorError, SensorFiles};
 use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,8 +22,11 @@ pub struct Library {
     meshes: Cache<(String, u64), TriMesh>,
     shapes: Cache<(String, u64, [u64; 7]), PartShape>,
     arms: Cache<RobotArm, PlacedArm>,
-    sensors: Cache<(String, Option<String>, Option<u64>), Sensor>,
+    sensors: Cache<SensorKey, Sensor>,
 }
+
+/// Files of a sensor (sensor, background, gel map, shadow table) and the bits of its pixel size.
+type SensorKey = ([Option<String>; 4], Option<u64>);
 
 /// Why a file cannot be used. The message names it.
 #[derive(Debug, thiserror::Error)]
@@ -100,6 +103,13 @@ impl LibraryError {
             LibraryError::Sensor { source: SensorError::Incomplete { .. }, .. } => {
                 Some("give it in the same section of the twin")
             }
+            LibraryError::Sensor {
+                source: SensorError::GelMap { .. } | SensorError::GelMapSize { .. },
+                ..
+            } => Some("a gel map is an .npy array with a height in pixels for each pixel of the background"),
+            LibraryError::Sensor { source: SensorError::ShadowTable(_), .. } => Some(
+                "docs/sensors.md has the lines of Python that turn Taxim's shadowTable.npz into plain arrays",
+            ),
             LibraryError::Sensor { .. } => {
                 Some("a sensor file is gripgen's own npz, or Taxim's polycalib.npz")
             }
@@ -195,22 +205,37 @@ impl Library {
 
     /// The tactile sensor that a twin's optics name.
     pub fn sensor(&self, optics: &Optics) -> Result<Arc<Sensor>, LibraryError> {
-        let key = (optics.sensor.clone(), optics.background.clone(), optics.metres_per_px.map(f64::to_bits));
-        self.sensors.get(key, || {
-            let background = match &optics.background {
-                None => None,
-                Some(path) => {
-                    let (location, bytes) = self.file(path)?;
-                    let picture = decode_picture(bytes).map_err(|e| LibraryError::Picture {
-                        location: location.clone(),
-                        problem: e.to_string(),
-                    })?;
-                    Some(picture)
-                }
+        let named = [
+            Some(optics.sensor.clone()),
+            optics.background.clone(),
+            optics.gel_map.clone(),
+            optics.shadow_table.clone(),
+        ];
+        self.sensors.get((named, optics.metres_per_px.map(f64::to_bits)), || {
+            let beside = |path: &Option<String>| path.as_ref().map(|path| self.file(path)).transpose();
+            let picture = beside(&optics.background)?.map(|(location, bytes)| {
+                decode_picture(bytes)
+                    .map_err(|e| LibraryError::Picture { location: location.clone(), problem: e.to_string() })
+            });
+            let background = picture.transpose()?;
+            let (gel_map, shadow_table) = (beside(&optics.gel_map)?, beside(&optics.shadow_table)?);
+            let sensor = self.file(&optics.sensor)?;
+            let files = SensorFiles {
+                sensor: &sensor.1,
+                metres_per_px: optics.metres_per_px,
+                background: background.as_ref(),
+                gel_map: gel_map.map(|(_, bytes)| &bytes[..]),
+                shadow_table: shadow_table.map(|(_, bytes)| &bytes[..]),
             };
-            let (location, bytes) = self.file(&optics.sensor)?;
-            Sensor::from_npz(bytes, optics.metres_per_px, background.as_ref())
-                .map_err(|source| LibraryError::Sensor { location: location.clone(), source })
+            Sensor::from_files(&files).map_err(|source| {
+                let faulty = match &source {
+                    SensorError::GelMap { .. } | SensorError::GelMapSize { .. } => gel_map,
+                    SensorError::ShadowTable(_) => shadow_table,
+                    _ => None,
+                };
+                let location = faulty.unwrap_or(sensor).0.clone();
+                LibraryError::Sensor { location, source }
+            })
         })
     }
 

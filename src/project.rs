@@ -215,6 +215,8 @@ impl Project {
                 let mut optics = self.twin.optics[jaw].clone();
                 match leaf {
                     "sensor" => optics.sensor.clone_from(&file.path),
+                    "gel_map" => optics.gel_map = Some(file.path.clone()),
+                    "shadow_table" => optics.shadow_table = Some(file.path.clone()),
                     _ => optics.background = Some(file.path.clone()),
                 }
                 self.library.check_sensor(&optics, &self.twin.gel[jaw])

@@ -87,7 +87,8 @@ fn keep_partial(twin: &mut toml::Value, typed: &toml::Table) {
 
 /// Whether a key of a twin holds a path.
 fn is_file_key(key: &str) -> bool {
-    is_twin_key(key) && [".mesh", ".sensor", ".background", ".urdf"].iter().any(|end| key.ends_with(end))
+    let ends = [".mesh", ".sensor", ".background", ".gel_map", ".shadow_table", ".urdf"];
+    is_twin_key(key) && ends.iter().any(|end| key.ends_with(end))
 }
 
 struct Resolver<L> {
@@ -126,8 +127,14 @@ impl<L: Fn(&str) -> Location> Resolver<L> {
             let Some(optics) = optics else { continue };
             let key = format!("optics.{jaw}.sensor");
             self.name(key.clone(), key, &mut optics.sensor)?;
-            if let Some(path) = &mut optics.background {
-                let key = format!("optics.{jaw}.background");
+            let beside = [
+                ("background", &mut optics.background),
+                ("gel_map", &mut optics.gel_map),
+                ("shadow_table", &mut optics.shadow_table),
+            ];
+            for (leaf, path) in beside {
+                let Some(path) = path else { continue };
+                let key = format!("optics.{jaw}.{leaf}");
                 self.name(key.clone(), key, path)?;
             }
         }

@@ -24,5 +24,7 @@ mod roundtrip;
 mod real_force;
 // Files of Taxim.
 mod taxim;
+// Taxim's own images, stage by stage.
+mod taxim_stages;
 // The repository itself.
 mod tidy;

@@ -104,6 +104,7 @@ fn sensor_npz(text: &str) -> Vec<u8> {
         noise_rgb: spec.noise_rgb.map(|x| x as f32),
         colour: ColourModel::Lambert(Box::new(lambert)),
         gel_shape: GelShape::Flat,
+        shadow: None,
         pyramid: None,
         ball_m: None,
     };

@@ -1,7 +1,8 @@
 //! Tactile images: from a part in front of a gel to what the camera behind it sees.
 //!
 //! One stage a file: [`raster`] (mesh to height map), [`indent`] (press depth and pressure), [`deform`] (the gel
-//! around the contact), [`gradient`], [`shade`] (colour), [`finish`] (noise and rounding). [`Renderer`] runs them.
+//! around the contact), [`gradient`], [`shade`] (colour), [`shadow()`] (what a contact
+//! keeps from the light), [`finish`] (noise and rounding). [`Renderer`] runs them.
 //!
 //! Heights are in pixels, relative to the gel surface at rest: deeper contact and steeper slopes do not lose bits to
 //! an offset, and a flat gel is exactly 0. Colours are a change against the frame at rest, so that a grip without
@@ -9,6 +10,7 @@
 //!
 //! This crate knows no mechanics and no forces over time.
 
+mod appearance;
 mod colour;
 mod convolve;
 mod deform;
@@ -24,8 +26,10 @@ mod raster;
 mod render;
 mod sensor;
 mod shading;
+mod shadow;
 mod simd;
 
+pub use appearance::appearance;
 pub use colour::{ColourModel, Lambert, Light, Regressor, TaximTable, shade};
 pub use deform::{BlurredRest, deform};
 pub use gradient::gradient;
@@ -34,5 +38,6 @@ pub use indent::{Imprint, IndentError, PressedGel, indent};
 pub use noise::finish;
 pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;
-pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError};
+pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError, SensorFiles};
+pub use shadow::{BallPress, Relief, Shadow, ShadowKind, ShadowTable, shadow, shadow_from_presses};
 pub use simd::SimdLevel;

@@ -165,7 +165,7 @@ fn parse_header(bytes: &[u8]) -> Result<Header, String> {
 }
 
 /// Parses the bytes of a `.npy` file.
-fn parse_npy(bytes: &[u8]) -> Result<Array, String> {
+pub(crate) fn parse_npy(bytes: &[u8]) -> Result<Array, String> {
     let Header { descr, fortran, shape, count, data_start } = parse_header(bytes)?;
     let (swap, kind) = match descr.strip_prefix('>') {
         Some(kind) => (true, kind),

@@ -2,6 +2,8 @@
 
 mod scratch;
 
+use crate::appearance::appearance;
+use crate::colour::ColourModel;
 use crate::grid::Plane;
 use crate::indent::{Imprint, IndentError, PressedGel, press};
 use crate::noise::finish;
@@ -59,14 +61,29 @@ impl Renderer<'_> {
         finish(self.sensor, imprint.map(|i| self.change(i)).as_ref(), noise_key)
     }
 
-    /// What an imprint changes in the image, in grey levels of red, green and blue: stages `deform` to `shade`. The
+    /// What an imprint changes in the image, in grey levels of red, green and blue: stages `deform` to `shadow`. The
     /// stage `noise`, [`finish`], makes an image of it.
     pub fn change(&self, imprint: &Imprint) -> [Plane; 3] {
         with_scratch(self, |scratch, prepared| {
             self.deform(imprint, scratch, prepared);
             let (sheet, area) = scratch.deform.surface();
-            change(&self.sensor.colour, sheet, area, self.level)
+            if self.only_where_raised(prepared) {
+                return change(&self.sensor.colour, sheet, area, self.level);
+            }
+            let core_px = self.core_px(imprint) as f32;
+            let core = |i: usize| imprint.depth_px.values[i] > core_px;
+            appearance(self.sensor, &sheet.plane(area), core, self.level)
         })
+    }
+
+    /// Whether the image changes only where the gel is displaced, as a function of that displacement.
+    fn only_where_raised(&self, prepared: &Prepared) -> bool {
+        let local = match self.sensor.colour {
+            ColourModel::Lambert(_) => prepared.rest_px.is_none(),
+            ColourModel::Regressor(_) => true,
+            ColourModel::Taxim(_) => false,
+        };
+        local && self.sensor.shadow.is_none()
     }
 
     /// Kernels and restored share of the deformation. A calibrated sensor says which; without its word those of the
@@ -78,8 +95,13 @@ impl Renderer<'_> {
         }
     }
 
+    /// Depth from which on the gel follows the part.
+    fn core_px(&self, imprint: &Imprint) -> f64 {
+        self.pyramid().1 * imprint.press_depth_m / self.sensor.grid.metres_per_px
+    }
+
     fn deform(&self, imprint: &Imprint, scratch: &mut Scratch, prepared: &Prepared) {
-        let core_px = self.pyramid().1 * imprint.press_depth_m / self.sensor.grid.metres_per_px;
+        let core_px = self.core_px(imprint);
         let rest = prepared.blurred_rest.as_ref();
         scratch.deform.deform(&imprint.depth_px, core_px, &prepared.weights, rest, self.level);
     }

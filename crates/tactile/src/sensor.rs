@@ -3,12 +3,13 @@
 mod file;
 mod gel_shape;
 
-pub use file::SENSOR_VERSION;
+pub use file::{SENSOR_VERSION, SensorFiles};
 pub use gel_shape::GelShape;
 
 use crate::colour::ColourModel;
 use crate::grid::Grid;
 use crate::npz::NpzError;
+use crate::shadow::Shadow;
 use gripgen_twin::TactileImage;
 
 /// A tactile sensor, as read from a file.
@@ -24,6 +25,8 @@ pub struct Sensor {
     pub colour: ColourModel,
     /// The gel surface at rest.
     pub gel_shape: GelShape,
+    /// The shadows beside a contact, where the sensor has any.
+    pub shadow: Option<Box<Shadow>>,
     /// The deformation that the colours were calibrated with, where they were calibrated.
     pub pyramid: Option<Pyramid>,
     /// Diameter of the ball of the calibration, where there was one.
@@ -73,6 +76,23 @@ pub enum SensorError {
         found: (usize, usize),
         /// Width and height of the rest frame.
         wanted: (usize, usize),
+    },
+    /// A gel map of another size.
+    #[error("the gel map is {found:?} pixels, the sensor's images {wanted:?}")]
+    GelMapSize {
+        /// Width and height of the map.
+        found: (usize, usize),
+        /// Width and height of the images.
+        wanted: (usize, usize),
+    },
+    /// A shadow table beside the sensor file.
+    #[error("shadow table: {0}")]
+    ShadowTable(NpzError),
+    /// A gel map that is no plain array.
+    #[error("gel map: {problem}")]
+    GelMap {
+        /// What is wrong with it.
+        problem: String,
     },
     /// A colour model with an infinite or undefined coefficient.
     #[error("`{key}` holds a number that is not finite")]

@@ -30,7 +30,7 @@ pub(crate) fn change(model: &ColourModel, sheet: &Sheet, area: Area, level: Simd
             let [along_x, along_y, _] = &mut change;
             level.run(SlopePlanes { slopes, along_x, along_y });
             let [along_x, along_y, _] = change;
-            shade(model, &sheet.plane(area), &along_x, &along_y)
+            shade(model, &sheet.plane(area), &along_x, &along_y, None)
         }
     }
 }

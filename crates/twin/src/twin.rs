@@ -129,6 +129,10 @@ pub struct Optics {
     pub metres_per_px: Option<f64>,
     /// Path of the image without contact, as written in the twin.
     pub background: Option<String>,
+    /// Path of the gel map, as written in the twin.
+    pub gel_map: Option<String>,
+    /// Path of the shadow table, as written in the twin.
+    pub shadow_table: Option<String>,
     /// Whether the images carry noise.
     pub image_noise: ImageNoise,
 }
@@ -217,6 +221,8 @@ impl Twin {
                 sensor: section.sensor.clone(),
                 metres_per_px: mm_per_px.map(|x| x * 1e-3),
                 background: section.background.clone(),
+                gel_map: section.gel_map.clone(),
+                shadow_table: section.shadow_table.clone(),
                 image_noise: section.image_noise,
             })
         })?;

@@ -1,11 +1,21 @@
-//! Taxim's colour table, as stored in its `polycalib.npz`.
+//! Taxim's colour table, as stored in its `polycalib.npz`, on its processed background.
+
+mod background;
+mod bins;
+
+pub(crate) use bins::Sectors;
 
 use crate::grid::Plane;
 use crate::npz::{Npz, NpzError};
-use std::f64::consts::{FRAC_PI_2, PI};
+use bins::Steepness;
+use gripgen_twin::TactileImage;
+use std::f64::consts::PI;
 
 /// Width in pixels of the images on which Taxim's tables are calibrated; the polynomials use their coordinates.
 const CALIBRATION_WIDTH_PX: f64 = 640.0;
+
+/// Middle of the calibration's images, from which the polynomials are evaluated so that single precision suffices.
+const MIDDLE_PX: [f64; 2] = [320.0, 240.0];
 
 /// For every bin of slope and direction a polynomial of second degree in the pixel position, for each channel
 /// (Si & Yuan 2022). Channel 0 of the file is blue: its images are in OpenCV's order.
@@ -14,26 +24,50 @@ pub struct TaximTable {
     bins: usize,
     /// Coefficients of `x^2, y^2, x y, x, y, 1` by (slope bin, direction bin), for red, green, blue.
     rgb: [Vec<[f64; 6]>; 3],
+    /// The same about the middle of the image; red, green, blue and nothing side by side.
+    packed: Vec<[[f32; 4]; 6]>,
+    steepness: Steepness,
+    sectors: Sectors,
+    /// Taxim's processed background, in grey levels.
+    background: [Vec<f32>; 3],
+    /// The same minus the frame at rest.
+    offset: [Vec<f32>; 3],
 }
 
 impl TaximTable {
-    /// Reads `grad_b`, `grad_g`, `grad_r`; their first axis tells the number of bins.
-    pub(crate) fn read(npz: &mut Npz<'_>) -> Result<Self, NpzError> {
+    /// Reads `grad_b`, `grad_g`, `grad_r`; their first axis tells the number of bins. `frame` is the image without
+    /// contact, of the size of the images to come.
+    pub(crate) fn read(npz: &mut Npz<'_>, frame: &TactileImage) -> Result<Self, NpzError> {
         let mut bins = 0;
         let mut channel = |key: &str| -> Result<Vec<[f64; 6]>, NpzError> {
             let array = npz.array_of_shape(key, &[None, None, Some(6)])?;
             let n = array.shape[0];
-            let square = array.shape[1] == n && n >= 2 && (bins == 0 || bins == n);
+            let square = array.shape[1] == n && (2..=4096).contains(&n) && (bins == 0 || bins == n);
             if !square {
                 let problem =
-                    format!("its shape is {:?}, it must be (n, n, 6) with one n of at least 2", array.shape);
+                    format!("its shape is {:?}, it must be (n, n, 6) with one n from 2 to 4096", array.shape);
                 return Err(NpzError::Array { key: key.into(), problem });
             }
             bins = n;
             Ok(array.values.chunks_exact(6).map(|c| [c[0], c[1], c[2], c[3], c[4], c[5]]).collect())
         };
         let (blue, green, red) = (channel("grad_r")?, channel("grad_g")?, channel("grad_b")?);
-        Ok(Self { bins, rgb: [red, green, blue] })
+        let rgb = [red, green, blue];
+        let packed = (0..bins * bins).map(|bin| about_the_middle(&rgb, bin)).collect();
+        let background = background::background(frame, CALIBRATION_WIDTH_PX);
+        let offset = [0, 1, 2].map(|c| {
+            let at_rest = frame.rgb.iter().skip(c).step_by(3);
+            background[c].iter().zip(at_rest).map(|(b, &r)| b - f32::from(r)).collect()
+        });
+        Ok(Self {
+            bins,
+            rgb,
+            packed,
+            steepness: Steepness::new(bins),
+            sectors: Sectors::new(2.0 * PI / (bins - 1) as f64, bins),
+            background,
+            offset,
+        })
     }
 
     /// Whether all coefficients are.
@@ -41,38 +75,81 @@ impl TaximTable {
         self.rgb.iter().flatten().flatten().all(|c| c.is_finite())
     }
 
-    /// Bin of a slope: `floor(atan(|g|) / (pi/2 / (B-1)))`, `floor((atan2(gy, gx) + pi) / (2 pi / (B-1)))`.
-    fn bin(&self, gx: f64, gy: f64) -> usize {
-        let steps = (self.bins - 1) as f64;
-        let magnitude = libm::atan((gx * gx + gy * gy).sqrt());
-        let direction = if gx == 0.0 && gy == 0.0 { 0.0 } else { libm::atan2(gy, gx) };
-        let i = (magnitude / (FRAC_PI_2 / steps)).floor().min(steps) as usize;
-        let j = ((direction + PI) / (2.0 * PI / steps)).floor().min(steps) as usize;
-        i * self.bins + j
+    /// The background that Taxim draws on (its `bg_proc`): planes of red, green and blue, in grey levels.
+    pub fn background(&self) -> &[Vec<f32>; 3] {
+        &self.background
     }
 
-    /// Writes the table's value minus its value on a flat gel, so that no slope gives no change.
+    /// [`TaximTable::background`] minus the frame at rest.
+    pub(crate) fn offset(&self) -> &[Vec<f32>; 3] {
+        &self.offset
+    }
+
+    /// Bin of a slope: `floor(atan(|g|) / (pi/2 / (B-1)))`, `floor((atan2(gy, gx) + pi) / (2 pi / (B-1)))`, direction 0
+    /// where it is flat, angles in single precision.
+    #[inline]
+    fn bin(&self, slope: f32, unit_x: f32, unit_y: f32) -> usize {
+        self.steepness.of(slope) * self.bins + self.sectors.of(unit_x, unit_y)
+    }
+
+    /// Writes the table's value plus the background minus the frame at rest: Taxim's image as a change of the rest
+    /// frame. Slopes are those of the whole surface, the shape of the gel at rest included, as Taxim's are.
     pub(super) fn shade(&self, along_x: &Plane, along_y: &Plane, change: &mut [Plane; 3]) {
-        let scale = CALIBRATION_WIDTH_PX / along_x.width as f64;
-        let flat = self.bin(0.0, 0.0);
+        let w = along_x.width;
+        let scale = CALIBRATION_WIDTH_PX / w as f64;
+        let (mut slope, mut unit_x, mut unit_y) = (vec![0.0; w], vec![1.0; w], vec![0.0; w]);
+        let px: Vec<f32> = (0..w).map(|x| (x as f64 * scale - MIDDLE_PX[0]) as f32).collect();
+        let [red, green, blue] = change;
         for y in 0..along_x.height {
-            for x in 0..along_x.width {
-                let at = y * along_x.width + x;
-                let (gx, gy) = (along_x.values[at], along_y.values[at]);
-                if gx == 0.0 && gy == 0.0 {
-                    continue;
-                }
-                let bin = self.bin(f64::from(gx), f64::from(gy));
-                let (px, py) = (x as f64 * scale, y as f64 * scale);
-                let terms = [px * px, py * py, px * py, px, py, 1.0];
-                for (channel, plane) in change.iter_mut().enumerate() {
-                    let (c, c0) = (&self.rgb[channel][bin], &self.rgb[channel][flat]);
-                    let value: f64 = (0..6).map(|i| (c[i] - c0[i]) * terms[i]).sum();
-                    plane.values[at] = value as f32;
+            let (gx, gy) = (along_x.row(y), along_y.row(y));
+            for x in 0..w {
+                let s = (gx[x] * gx[x] + gy[x] * gy[x]).sqrt();
+                slope[x] = s;
+                unit_x[x] = if s > 0.0 { gx[x] / s } else { 1.0 };
+                unit_y[x] = if s > 0.0 { gy[x] / s } else { 0.0 };
+            }
+            let py = (y as f64 * scale - MIDDLE_PX[1]) as f32;
+            let row = y * w..(y + 1) * w;
+            let out =
+                [&mut red.values[row.clone()], &mut green.values[row.clone()], &mut blue.values[row.clone()]];
+            let offset = self.offset.each_ref().map(|plane| &plane[row.clone()]);
+            for x in 0..w {
+                let value = polynomial(&self.packed[self.bin(slope[x], unit_x[x], unit_y[x])], px[x], py);
+                for c in 0..3 {
+                    out[c][x] = value[c] + offset[c][x];
                 }
             }
         }
     }
+}
+
+/// `c0 x^2 + c1 y^2 + c2 x y + c3 x + c4 y + c5`, four at a time.
+#[inline]
+fn polynomial(c: &[[f32; 4]; 6], x: f32, y: f32) -> [f32; 4] {
+    std::array::from_fn(|k| {
+        ((c[0][k] * x + c[2][k] * y + c[3][k]) * x) + ((c[1][k] * y + c[4][k]) * y + c[5][k])
+    })
+}
+
+/// Coefficients of one bin for positions relative to the middle of the image.
+fn about_the_middle(rgb: &[Vec<[f64; 6]>; 3], bin: usize) -> [[f32; 4]; 6] {
+    let [mx, my] = MIDDLE_PX;
+    let mut packed = [[0.0; 4]; 6];
+    for (k, channel) in rgb.iter().enumerate() {
+        let c = channel[bin];
+        let moved = [
+            c[0],
+            c[1],
+            c[2],
+            2.0 * c[0] * mx + c[2] * my + c[3],
+            2.0 * c[1] * my + c[2] * mx + c[4],
+            c[0] * mx * mx + c[1] * my * my + c[2] * mx * my + c[3] * mx + c[4] * my + c[5],
+        ];
+        for (term, value) in packed.iter_mut().zip(moved) {
+            term[k] = value as f32;
+        }
+    }
+    packed
 }
 
 #[cfg(test)]
@@ -80,39 +157,72 @@ mod tests {
     use super::*;
     use crate::npz::{Array, ElementType, write_npz};
 
-    /// A table whose constant term names its bin and channel.
-    fn table(bins: usize) -> TaximTable {
-        let channel = |offset: f64| {
-            let values =
-                (0..bins * bins).flat_map(|k| [0.0, 0.0, 0.0, 0.0, 0.0, offset + k as f64]).collect();
+    fn frame() -> TactileImage {
+        let rgb = (0..64 * 48).flat_map(|i| [100, 90, 80 + (i % 64) as u8]).collect();
+        TactileImage { width_px: 64, height_px: 48, rgb }
+    }
+
+    /// A table of given coefficients of (channel of the file, bin).
+    fn table(bins: usize, coefficients: impl Fn(usize, usize) -> [f64; 6]) -> TaximTable {
+        let channel = |c: usize| {
+            let values = (0..bins * bins).flat_map(|k| coefficients(c, k)).collect();
             Array { shape: vec![bins, bins, 6], values }
         };
         let bytes = write_npz(&[
             ("bins", Array { shape: vec![], values: vec![bins as f64] }, ElementType::F64),
-            ("grad_r", channel(1e6), ElementType::F64),
-            ("grad_g", channel(2e6), ElementType::F64),
-            ("grad_b", channel(3e6), ElementType::F64),
+            ("grad_r", channel(0), ElementType::F64),
+            ("grad_g", channel(1), ElementType::F64),
+            ("grad_b", channel(2), ElementType::F64),
         ])
         .unwrap();
-        TaximTable::read(&mut Npz::open(&bytes).unwrap()).unwrap()
+        TaximTable::read(&mut Npz::open(&bytes).unwrap(), &frame()).unwrap()
+    }
+
+    fn shade(table: &TaximTable, gx: f32, gy: f32) -> [Plane; 3] {
+        let mut change = [0, 1, 2].map(|_| Plane::filled(64, 48, 0.0));
+        table.shade(&Plane::filled(64, 48, gx), &Plane::filled(64, 48, gy), &mut change);
+        change
     }
 
     #[test]
     fn channel_0_of_the_file_is_blue() {
-        let t = table(5);
-        assert_eq!([0, 1, 2].map(|c| t.rgb[c][0][5]), [3e6, 2e6, 1e6]);
+        let t = table(5, |c, _| [0.0, 0.0, 0.0, 0.0, 0.0, 10.0 * (c + 1) as f64]);
+        let change = shade(&t, 0.3, 0.1);
+        let of_table = [0, 1, 2].map(|c| change[c].values[70] - t.offset[c][70]);
+        assert_eq!(of_table, [30.0, 20.0, 10.0]);
+    }
+
+    /// Flat pixels get their bin's value too, and what they are drawn on is the processed background.
+    #[test]
+    fn a_flat_gel_has_the_value_of_its_bin_on_the_processed_background() {
+        let t = table(125, |c, k| [1e-4, 2e-4, -1e-4, 0.01, -0.02, (k + c) as f64 * 1e-2]);
+        let change = shade(&t, 0.0, 0.0);
+        let rest = frame();
+        for (x, y) in [(0_usize, 0_usize), (63, 47), (20, 31)] {
+            let (px, py) = (x as f64 * 10.0, y as f64 * 10.0);
+            let table = |c: f64| {
+                1e-4 * px * px + 2e-4 * py * py - 1e-4 * px * py + 0.01 * px - 0.02 * py + (62.0 + c) * 1e-2
+            };
+            let i = y * 64 + x;
+            for (channel, c) in [2.0, 1.0, 0.0].into_iter().enumerate() {
+                let image = f32::from(rest.rgb[3 * i + channel]) + change[channel].values[i];
+                let exact = table(c) + f64::from(t.background[channel][i]);
+                assert!((f64::from(image) - exact).abs() < 1e-4, "({x}, {y}): {image} and {exact}");
+            }
+        }
     }
 
     #[test]
     fn slopes_fall_into_taxims_bins() {
-        let t = table(125);
+        let t = table(125, |_, k| [0.0, 0.0, 0.0, 0.0, 0.0, k as f64]);
         let steps = 124.0;
-        for (gx, gy) in [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (-0.2, -0.1), (30.0, -40.0)] {
-            let magnitude = f64::atan(f64::hypot(gx, gy));
-            let direction = if gx == 0.0 && gy == 0.0 { 0.0 } else { f64::atan2(gy, gx) };
-            let i = (magnitude / (FRAC_PI_2 / steps)).floor() as usize;
-            let j = ((direction + PI) / (2.0 * PI / steps)).floor() as usize;
-            assert_eq!(t.bin(gx, gy), i * 125 + j, "({gx}, {gy})");
+        for (gx, gy) in [(0.5, 0.02), (0.1, 0.5), (-0.2, -0.1), (0.3, -0.7), (30.0, -40.0)] {
+            let magnitude = f32::hypot(gx, gy).atan();
+            let direction = f32::atan2(gy, gx);
+            let i = (f64::from(magnitude) / (std::f64::consts::FRAC_PI_2 / steps)).floor();
+            let j = ((f64::from(direction) + PI) / (2.0 * PI / steps)).floor();
+            let found = shade(&t, gx, gy)[0].values[0] - t.offset[0][0];
+            assert!((f64::from(found) - (i * 125.0 + j)).abs() < 0.1, "({gx}, {gy}): {found}");
         }
     }
 }

@@ -239,11 +239,12 @@ impl Fit<'_> {
         let change = |i: usize| {
             let surface = candidate.gel.surface(&presses[i].1, self.set.ball_m, &self.grid);
             let (along_x, along_y) = gradient(&surface);
-            Some(shade(&colour, &surface, &along_x, &along_y))
+            Some(shade(&colour, &surface, &along_x, &along_y, None))
         };
         rest = rest_frame(&presses, change, raw, &self.grid);
         colour = self.colours(candidate, &smoothness, seen, &rest)?;
         let sensor = Sensor {
+            shadow: None,
             grid: self.grid,
             noise_rgb: noise_rgb(&presses, &rest, &self.grid),
             rest,

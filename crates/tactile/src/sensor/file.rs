@@ -14,17 +14,35 @@
 //! | `dome_sag_mm` | scalar, optional | a domed gel: how much its corners lie below its apex |
 //! | `gel_height_px` | (H, W), optional | a gel of any shape: height at rest, relative to its highest point |
 //! | `kernels_px`, `restore_depth_fraction` | (K,), scalar, optional | the deformation that the colours were calibrated with |
+//! | `shadow_values`, `shadow_heights_mm`, `shadow_step_mm` | (N, H, L, 3), (2,), scalar, optional | shadows: change of grey level by direction, height of the gel beside the contact (first, step) and distance; NaN after the end of a ray |
 //! | `ball_mm` | scalar, optional | diameter of the ball of the calibration |
 
 use super::{GelShape, Pyramid, Sensor, SensorError};
 use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
 use crate::colour::{ColourModel, Lambert, Regressor, TaximTable};
+use crate::deform::gaussian;
 use crate::grid::Grid;
-use crate::npz::{Array, ElementType, Npz, NpzError, write_npz};
+use crate::npz::{Array, ElementType, Npz, NpzError, parse_npy, write_npz};
+use crate::shadow::{Shadow, ShadowKind, ShadowTable};
 use gripgen_twin::TactileImage;
 
 /// Version of the sensor file format, stored under the key `gripgen_sensor`.
 pub const SENSOR_VERSION: f64 = 1.0;
+
+/// A sensor file and what a twin may name beside it.
+#[derive(Debug, Clone, Copy)]
+pub struct SensorFiles<'a> {
+    /// The bytes of the sensor file: gripgen's own, or Taxim's `polycalib.npz`.
+    pub sensor: &'a [u8],
+    /// Replaces the file's pixel size.
+    pub metres_per_px: Option<f64>,
+    /// The frame without contact.
+    pub background: Option<&'a TactileImage>,
+    /// The bytes of Taxim's gel map: an `.npy` array (H, W) of heights of the gel at rest in pixels.
+    pub gel_map: Option<&'a [u8]>,
+    /// The bytes of a shadow table of Taxim as plain arrays.
+    pub shadow_table: Option<&'a [u8]>,
+}
 
 impl Sensor {
     /// Reads a sensor file: gripgen's own, or Taxim's `polycalib.npz`.
@@ -36,14 +54,33 @@ impl Sensor {
         metres_per_px: Option<f64>,
         background: Option<&TactileImage>,
     ) -> Result<Self, SensorError> {
-        let mut npz = Npz::open(bytes)?;
-        if npz.has("gripgen_sensor") {
-            return Self::own(&mut npz, metres_per_px, background);
+        let (gel_map, shadow_table) = (None, None);
+        Self::from_files(&SensorFiles { sensor: bytes, metres_per_px, background, gel_map, shadow_table })
+    }
+
+    /// Reads a sensor file and what is named beside it. A gel map and a shadow table replace those of the file.
+    pub fn from_files(files: &SensorFiles<'_>) -> Result<Self, SensorError> {
+        let mut npz = Npz::open(files.sensor)?;
+        let mut sensor = if npz.has("gripgen_sensor") {
+            Self::own(&mut npz, files.metres_per_px, files.background)?
+        } else if npz.has("grad_r") {
+            Self::taxim(&mut npz, files.metres_per_px, files.background)?
+        } else {
+            return Err(SensorError::Unknown { present: npz.keys().join(", ") });
+        };
+        if let Some(bytes) = files.gel_map {
+            sensor.gel_shape = taxim_gel_map(bytes, &sensor.grid)?;
         }
-        if npz.has("grad_r") {
-            return Self::taxim(&mut npz, metres_per_px, background);
-        }
-        Err(SensorError::Unknown { present: npz.keys().join(", ") })
+        let mut sensor = sensor.checked(files.background)?;
+        let table = match files.shadow_table {
+            Some(bytes) => Some(ShadowTable::from_npz(bytes).map_err(SensorError::ShadowTable)?),
+            None => ShadowTable::of_sensor(&mut npz)?,
+        };
+        sensor.shadow = table.map(|table| {
+            let grid = &sensor.grid;
+            Box::new(Shadow::new(table, grid.metres_per_px, grid.width_px, &sensor.colour))
+        });
+        Ok(sensor)
     }
 
     fn own(
@@ -64,16 +101,16 @@ impl Sensor {
         let pyramid = pyramid(npz)?;
         let ball_m = scalar(npz, "ball_mm")?.map(|mm| mm * 1e-3);
         let grid = Grid { width_px, height_px, metres_per_px: metres_per_px.unwrap_or(mm_per_px * 1e-3) };
-        let sensor = Self {
+        Ok(Self {
             grid,
             rest: background.map_or_else(|| planes(&rest.values), planes_of_image),
             noise_rgb: [noise[0] as f32, noise[1] as f32, noise[2] as f32],
             colour,
             gel_shape,
+            shadow: None,
             pyramid,
             ball_m,
-        };
-        sensor.checked(background)
+        })
     }
 
     fn taxim(
@@ -83,8 +120,8 @@ impl Sensor {
     ) -> Result<Self, SensorError> {
         let background = background.ok_or(SensorError::Incomplete { missing: "background" })?;
         let metres_per_px = metres_per_px.ok_or(SensorError::Incomplete { missing: "mm_per_px" })?;
-        let table = TaximTable::read(npz)?;
-        let sensor = Self {
+        let table = TaximTable::read(npz, background)?;
+        Ok(Self {
             grid: Grid {
                 width_px: background.width_px as usize,
                 height_px: background.height_px as usize,
@@ -94,10 +131,10 @@ impl Sensor {
             noise_rgb: [0.0; 3],
             colour: ColourModel::Taxim(Box::new(table)),
             gel_shape: GelShape::Flat,
+            shadow: None,
             pyramid: None,
             ball_m: None,
-        };
-        sensor.checked(Some(background))
+        })
     }
 
     /// The bytes of a sensor file; `None` for a colour model that is only read, Taxim's table.
@@ -136,6 +173,9 @@ impl Sensor {
             arrays.push(("kernels_px", list(kernels), ElementType::F64));
             let share = pyramid.restore_depth_fraction;
             arrays.push(("restore_depth_fraction", scalar(share), ElementType::F64));
+        }
+        if let Some(shadow) = self.shadow.as_ref().filter(|s| s.table().kind == ShadowKind::Darkening) {
+            arrays.extend(shadow.table().arrays());
         }
         if let Some(ball_m) = self.ball_m {
             arrays.push(("ball_mm", scalar(ball_m * 1e3), ElementType::F64));
@@ -214,6 +254,26 @@ fn gel_shape(npz: &mut Npz<'_>, rows: usize, columns: usize) -> Result<GelShape,
         Some(mm) => GelShape::Dome { sag_m: mm * 1e-3 },
         None => GelShape::Flat,
     })
+}
+
+/// Taxim's gel map, smoothed as Taxim does it (a 5 x 5 Gaussian), relative to its highest point.
+fn taxim_gel_map(bytes: &[u8], grid: &Grid) -> Result<GelShape, SensorError> {
+    let map = parse_npy(bytes).map_err(|problem| SensorError::GelMap { problem })?;
+    let [rows, columns] = map.shape[..] else {
+        let problem = format!("its shape is {:?}, it must be (height, width)", map.shape);
+        return Err(SensorError::GelMap { problem });
+    };
+    let (found, wanted) = ((columns, rows), (grid.width_px, grid.height_px));
+    if found != wanted {
+        return Err(SensorError::GelMapSize { found, wanted });
+    }
+    if map.values.iter().any(|h| !h.is_finite()) {
+        return Err(SensorError::GelMap { problem: "it holds a number that is not finite".into() });
+    }
+    let mut heights: Vec<f32> = map.values.iter().map(|&h| h as f32).collect();
+    crate::shadow::blur_once(&mut heights, columns, &gaussian(5));
+    let highest = heights.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    Ok(GelShape::Map(heights.iter().map(|h| h - highest).collect()))
 }
 
 fn pyramid(npz: &mut Npz<'_>) -> Result<Option<Pyramid>, NpzError> {

@@ -222,6 +222,14 @@ pub struct OpticsFile {
     /// Image without contact (PNG or JPEG); needed with `polycalib.npz` only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<String>,
+    /// Height map of the gel at rest, an `.npy` array of pixels (Taxim's `gelmap.npy`); the sensor file's shape where
+    /// this is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gel_map: Option<String>,
+    /// Shadow table, an `.npz` of plain arrays (Taxim's `shadowTable.npz` without its pickle); the sensor file's
+    /// shadows where this is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shadow_table: Option<String>,
     /// Noise of the images.
     pub image_noise: ImageNoise,
 }
