@@ -213,6 +213,13 @@ impl Project {
             ["optics", jaw, leaf] => {
                 let jaw = if jaw == "right" { Jaw::Right } else { Jaw::Left };
                 let mut optics = self.twin.optics[jaw].clone();
+                // What stands beside a sensor is checked in turn, so that each fault is told of the key that has it.
+                if matches!(leaf, "sensor" | "background") {
+                    optics.gel_map = None;
+                }
+                if leaf != "shadow_table" {
+                    optics.shadow_table = None;
+                }
                 match leaf {
                     "sensor" => optics.sensor.clone_from(&file.path),
                     "gel_map" => optics.gel_map = Some(file.path.clone()),

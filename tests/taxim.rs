@@ -1,9 +1,11 @@
 //! Files of Taxim load, and look like what they are.
 
-use crate::common::root;
-use gripgen::record::decode_picture;
+use crate::common::{content, jobs, project, root, run};
+use gripgen::record::{RunFolder, decode_picture};
 use gripgen::tactile::npz::Npz;
-use gripgen::tactile::{ColourModel, Plane, Sensor, shade};
+use gripgen::tactile::{ColourModel, Plane, Sensor, SimdLevel, shade};
+use gripgen::twin::Outcome;
+use gripgen::{Project, generate};
 use std::path::PathBuf;
 
 fn taxim(path: &str) -> PathBuf {
@@ -64,4 +66,49 @@ fn a_slope_gets_the_colour_of_its_bin() {
             );
         }
     }
+}
+
+/// A twin that names Taxim's files: they are copied into the run folder, and the run goes on from the copies.
+#[test]
+#[cfg_attr(not(shared_data), ignore = "the folder of shared measured data is not beside this checkout")]
+fn a_run_keeps_the_files_of_a_taxim_sensor() {
+    let folder = tempfile::tempdir().unwrap();
+    for (from, to) in [
+        ("gelsight/polycalib.npz", "polycalib.npz"),
+        ("taxim_robot/bg.jpg", "bg.jpg"),
+        ("gelsight/gelmap.npy", "gelmap.npy"),
+        ("gelsight/shadowTable_dense.npz", "shadow.npz"),
+    ] {
+        std::fs::copy(taxim(from), folder.path().join(to)).unwrap();
+    }
+    let twin = "[parts.gear]\nmesh = \"asset:parts/gear/part.stl\"\nmu = 0.15\nimprint_mm3_per_n = 1.5\n\
+                [optics.left]\nsensor = \"polycalib.npz\"\nbackground = \"bg.jpg\"\nmm_per_px = 0.0295\n\
+                gel_map = \"gelmap.npy\"\nshadow_table = \"shadow.npz\"\n";
+    let sweep = "twin = \"twin.toml\"\nsamples = 1\nmechanics = \"reduced\"\n[vary]\ngrip_force_n = [20]\n";
+    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
+    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
+    let out = folder.path().join("run");
+    let whole = project(folder.path().join("sweep.toml").to_str().unwrap(), &[]);
+    let summary = run(&whole, &out, jobs(1));
+    assert_eq!((summary.samples, summary.failed), (1, 0));
+    let mut inputs: Vec<String> = content(&out.join("inputs")).into_keys().collect();
+    inputs.retain(|name| !name.starts_with("twin"));
+    let stems: Vec<&str> = inputs.iter().map(|name| name.split('-').next().unwrap()).collect();
+    assert_eq!(stems, ["bg", "gelmap", "polycalib", "shadow"]);
+    let again = Project::from_run(&RunFolder::open(&out).unwrap()).unwrap();
+    assert_eq!(again.config_sha256, whole.config_sha256);
+    let (one, two) = (generate(&whole, 0, SimdLevel::best()), generate(&again, 0, SimdLevel::Portable));
+    let images = |sample| match sample {
+        Outcome::Pulled(pulled) => pulled.images.unwrap(),
+        other => panic!("{other:?}"),
+    };
+    let (one, two) = (images(one.outcome), images(two.outcome));
+    assert!(one == two, "other bytes from the copies");
+    // The shadow is drawn: without its table the same grip is brighter beside the contact.
+    let plain = twin.replace("shadow_table = \"shadow.npz\"\n", "");
+    std::fs::write(folder.path().join("twin.toml"), plain).unwrap();
+    let plain = project(folder.path().join("sweep.toml").to_str().unwrap(), &[]);
+    let plain = images(generate(&plain, 0, SimdLevel::best()).outcome);
+    let sum = |image: &gripgen::twin::TactileImage| image.rgb.iter().map(|&v| u64::from(v)).sum::<u64>();
+    assert!(sum(&plain.left) > sum(&one.left));
 }

@@ -233,6 +233,28 @@ mod tests {
     }
 
     #[test]
+    fn a_sensor_keeps_its_shadows() {
+        use crate::shadow::{ShadowKind, ShadowTable};
+        let mut good = sensor(|_, _| {}).unwrap();
+        let table = ShadowTable {
+            kind: ShadowKind::Darkening,
+            directions_rad: (0..8).map(|i| f64::from(i) * std::f64::consts::TAU / 8.0).collect(),
+            first_height_m: 0.1e-3,
+            height_step_m: 0.05e-3,
+            heights: 2,
+            step_m: 0.04e-3,
+            rays: (0..16).map(|i| [vec![-1.5; i % 5], vec![-2.0; i % 3], vec![]]).collect(),
+        };
+        good.shadow = Some(Box::new(Shadow::new(table.clone(), 1e-4, 20, &good.colour)));
+        let bytes = good.to_npz().unwrap().unwrap();
+        let read = Sensor::from_npz(&bytes, None, None).unwrap();
+        let found = read.shadow.unwrap().table().clone();
+        assert_eq!(found.rays, table.rays);
+        assert!((found.step_m - table.step_m).abs() < 1e-12 && found.heights == 2);
+        assert!((found.first_height_m - table.first_height_m).abs() < 1e-12);
+    }
+
+    #[test]
     fn a_background_of_another_size_is_refused_with_both_sizes() {
         let good = sensor(|_, _| {}).unwrap();
         let bytes = good.to_npz().unwrap().unwrap();

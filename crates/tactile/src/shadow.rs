@@ -71,8 +71,7 @@ impl Shadow {
             }));
             blurs.push(last);
         }
-        let rim_px = ((RIM_STEPS * step_px).round() as usize).max(1);
-        Self { rays: Rays::new(&table, metres_per_px), table, rim_px, blurs, base }
+        Self { rays: Rays::new(&table, metres_per_px), table, rim_px: rim_px(step_px), blurs, base }
     }
 
     /// The table.
@@ -97,8 +96,12 @@ pub fn shadow(
     let height = &relief.surface_px.values;
     let lowered = |pixels: &mut Vec<[f32; 4]>| shadow.rays.cast(relief, &rim, pixels);
     if let (Some(base), ColourModel::Taxim(colour)) = (&shadow.base, colour) {
-        let offset = colour.offset();
-        let mut pixels = interleaved(height, |c, i| change[c].values[i] - offset[c][i]);
+        for (plane, offset) in change.iter_mut().zip(colour.offset()) {
+            for (value, offset) in plane.values.iter_mut().zip(offset) {
+                *value -= offset;
+            }
+        }
+        let mut pixels = interleaved(change, height);
         lowered(&mut pixels);
         for (channel, plane) in change.iter_mut().enumerate() {
             for (value, pixel) in plane.values.iter_mut().zip(&pixels) {
@@ -112,7 +115,10 @@ pub fn shadow(
         return;
     }
     let ceiling = shadow.table.kind == ShadowKind::Ceiling;
-    let mut pixels = interleaved(height, |c, i| if ceiling { change[c].values[i] } else { 0.0 });
+    let mut pixels = match shadow.table.kind {
+        ShadowKind::Ceiling => interleaved(change, height),
+        ShadowKind::Darkening => height.iter().map(|&z| [0.0, 0.0, 0.0, z]).collect(),
+    };
     lowered(&mut pixels);
     let mut darkening = vec![0.0; height.len()];
     for (channel, plane) in change.iter_mut().enumerate() {
@@ -126,8 +132,15 @@ pub fn shadow(
     }
 }
 
-fn interleaved(height: &[f32], value: impl Fn(usize, usize) -> f32) -> Vec<[f32; 4]> {
-    height.iter().enumerate().map(|(i, &z)| [value(0, i), value(1, i), value(2, i), z]).collect()
+fn interleaved(change: &[Plane; 3], height: &[f32]) -> Vec<[f32; 4]> {
+    let [red, green, blue] = change.each_ref().map(|plane| &plane.values);
+    let colours = red.iter().zip(green).zip(blue).zip(height);
+    colours.map(|(((&r, &g), &b), &z)| [r, g, b, z]).collect()
+}
+
+/// Width of the rim in pixels for a step of the rays.
+fn rim_px(step_px: f64) -> usize {
+    ((RIM_STEPS * step_px).round() as usize).max(1)
 }
 
 /// Pixels within `reach` pixels of the core along both axes, and not in it (Taxim: two dilations by 5 x 5).

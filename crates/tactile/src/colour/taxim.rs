@@ -98,6 +98,7 @@ impl TaximTable {
         let w = along_x.width;
         let scale = CALIBRATION_WIDTH_PX / w as f64;
         let (mut slope, mut unit_x, mut unit_y) = (vec![0.0; w], vec![1.0; w], vec![0.0; w]);
+        let mut values = vec![[0.0; 4]; w];
         let px: Vec<f32> = (0..w).map(|x| (x as f64 * scale - MIDDLE_PX[0]) as f32).collect();
         let [red, green, blue] = change;
         for y in 0..along_x.height {
@@ -114,9 +115,12 @@ impl TaximTable {
                 [&mut red.values[row.clone()], &mut green.values[row.clone()], &mut blue.values[row.clone()]];
             let offset = self.offset.each_ref().map(|plane| &plane[row.clone()]);
             for x in 0..w {
-                let value = polynomial(&self.packed[self.bin(slope[x], unit_x[x], unit_y[x])], px[x], py);
-                for c in 0..3 {
-                    out[c][x] = value[c] + offset[c][x];
+                let bin = self.bin(slope[x], unit_x[x], unit_y[x]);
+                values[x] = polynomial(&self.packed[bin], px[x], py);
+            }
+            for c in 0..3 {
+                for x in 0..w {
+                    out[c][x] = values[x][c] + offset[c][x];
                 }
             }
         }

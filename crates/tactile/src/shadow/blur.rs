@@ -30,6 +30,9 @@ impl Blur {
 
     /// Index of a line's value `i`, which may lie outside.
     fn index(&self, i: isize, n: usize) -> usize {
+        if (0..n as isize).contains(&i) {
+            return i as usize;
+        }
         let (n, period) = (
             n as isize,
             match self.border {
@@ -80,14 +83,15 @@ fn blur_any(plane: &mut [f32], width: usize, blurs: &[Blur]) {
     let mut strip = vec![0.0f32; height * STRIP];
     for first in (0..width).step_by(STRIP) {
         let columns = STRIP.min(width - first);
-        for y in 0..height {
-            strip[y * STRIP..][..columns].copy_from_slice(&plane[y * width + first..][..columns]);
-        }
-        for blur in blurs {
+        for (pass, blur) in blurs.iter().enumerate() {
             let r = blur.radius();
-            for i in 0..height + 2 * r {
+            for (i, out) in padded.chunks_exact_mut(STRIP).take(height + 2 * r).enumerate() {
                 let y = blur.index(i as isize - r as isize, height);
-                padded[i * STRIP..][..STRIP].copy_from_slice(&strip[y * STRIP..][..STRIP]);
+                if pass == 0 {
+                    out[..columns].copy_from_slice(&plane[y * width + first..][..columns]);
+                } else {
+                    out.copy_from_slice(&strip[y * STRIP..][..STRIP]);
+                }
             }
             sums(&padded[..(height + 2 * r) * STRIP], STRIP, &blur.weights, &mut strip);
         }

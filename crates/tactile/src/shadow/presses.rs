@@ -1,6 +1,6 @@
 //! A shadow table from images of a pressed ball.
 
-use super::RIM_STEPS;
+use super::rim_px;
 use super::table::{ShadowKind, ShadowTable};
 use crate::grid::{Grid, Plane};
 use std::f64::consts::TAU;
@@ -11,8 +11,9 @@ const DIRECTIONS: usize = 63;
 const STEP_M: f64 = 1.25 * 0.0295e-3;
 /// Longest ray.
 const REACH_M: f64 = 3e-3;
-/// Distance of two rows of the table.
-const HEIGHT_STEP_M: f64 = 0.05e-3;
+/// Distance of two rows of the table. The contact must not grow much within one: what lies beside a smaller contact lies
+/// in a larger one.
+const HEIGHT_STEP_M: f64 = 0.02e-3;
 /// A ray ends where it is less dark than this in all channels.
 const LEAST_GREY_LEVELS: f32 = 0.5;
 /// Directions on either side that are averaged with one.
@@ -35,9 +36,10 @@ pub struct BallPress<'a> {
 ///
 /// `restore_depth_fraction` is the share of the press above which the gel follows the part: its edge is where rays
 /// start, and the height of the gel there tells the rows of the table apart. Residuals are averaged by row, direction
-/// and distance from that edge, over neighbouring directions too; brighter than modelled is no shadow; and a shadow
+/// and distance from that edge, over neighbouring directions and distances too; brighter than modelled is no shadow; and a shadow
 /// fades: each ray is the decreasing sequence closest to its means (pool adjacent violators; Ayer et al. 1955). Inside
-/// the contact there is no shadow. Rows and directions that no press has seen are empty.
+/// the contact there is no shadow. Directions that no press has seen are empty; a row without a press between two that have
+/// one is that of the lower one.
 ///
 /// `None` if no press leaves a shadow.
 pub fn shadow_from_presses(
@@ -56,11 +58,18 @@ pub fn shadow_from_presses(
     let heights = (last - first) as usize + 1;
     let steps = (REACH_M / STEP_M) as usize;
     let mut means = Means { sums: vec![[0.0; 4]; DIRECTIONS * heights * steps], heights, steps };
+    let mut seen = vec![false; heights];
     for press in presses {
+        seen[(row_of(press) - first) as usize] = true;
         means.add(press, (row_of(press) - first) as usize, grid, restore_depth_fraction);
     }
-    let rays: Vec<[Vec<f32>; 3]> =
+    let mut rays: Vec<[Vec<f32>; 3]> =
         (0..DIRECTIONS * heights).map(|i| means.ray(i / heights, i % heights)).collect();
+    for i in 0..rays.len() {
+        if i % heights > 0 && !seen[i % heights] {
+            rays[i] = rays[i - 1].clone();
+        }
+    }
     rays.iter().flatten().any(|ray| !ray.is_empty()).then(|| ShadowTable {
         kind: ShadowKind::Darkening,
         directions_rad: (0..DIRECTIONS).map(|i| i as f64 * TAU / DIRECTIONS as f64).collect(),
@@ -84,7 +93,8 @@ impl Means {
         let step_px = STEP_M / grid.metres_per_px;
         // The depth under a ball falls with the square of the distance, and the core ends at its share of the press.
         let core_px = press.radius_px * (1.0 - restore_depth_fraction).max(0.0).sqrt();
-        let origin_px = core_px + 0.5 * RIM_STEPS * step_px;
+        // A shadow fades, so that of all rays that reach a pixel those of the outermost origins count.
+        let origin_px = core_px + rim_px(step_px) as f64 - 0.5;
         for y in 0..grid.height_px {
             for x in 0..grid.width_px {
                 let (dx, dy) = (x as f64 - press.centre_px[0], y as f64 - press.centre_px[1]);
@@ -121,8 +131,13 @@ impl Means {
                 }
             }
         }
+        // Along the ray too, but not into the contact, where nothing was summed.
+        let smoothed = |s: usize, k: usize| {
+            let at = |s: usize| sums.get(s).map_or(0.0, |sum| sum[k]);
+            if sums[s][3] > 0.0 { at(s.wrapping_sub(1)) + 2.0 * at(s) + at(s + 1) } else { 0.0 }
+        };
         let channels = [0, 1, 2].map(|c| {
-            let seen: Vec<(f64, f64)> = sums.iter().map(|s| (s[c], s[3])).collect();
+            let seen: Vec<(f64, f64)> = (0..self.steps).map(|s| (smoothed(s, c), smoothed(s, 3))).collect();
             fading(&seen)
         });
         let dark = |s: &usize| channels.iter().any(|channel| channel[*s] < -LEAST_GREY_LEVELS);

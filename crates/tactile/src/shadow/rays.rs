@@ -24,7 +24,7 @@ struct Target {
 pub(super) struct Rays {
     sectors: Sectors,
     heights: usize,
-    /// Begin and number of rows, in pixels of height; and whether a gel that is higher uses the last one.
+    /// Begin and number of rows, in pixels of height; and whether other heights use the first and the last one.
     first_px: f64,
     per_px: f64,
     clamped: bool,
@@ -66,25 +66,20 @@ impl Rays {
                 let origin = y * w + x;
                 let height = pixels[origin][3];
                 let (x, y, reach) = (x as i32, y as i32, reach + 1);
-                let inside = x >= reach && y >= reach && x + reach < w as i32 && y + reach < h as i32;
-                for target in &self.targets[from..to] {
-                    let at = if inside {
-                        (origin as i32 + target.dy * w as i32 + target.dx) as usize
-                    } else {
-                        // Cutting a position just outside, between -1 and 0, gives pixel 0.
-                        let cut = |at: i32| if at == -1 { 0 } else { at };
-                        let (tx, ty) = (cut(x + target.dx), cut(y + target.dy));
-                        if tx < 0 || ty < 0 || tx >= w as i32 || ty >= h as i32 {
-                            continue;
-                        }
-                        ty as usize * w + tx as usize
-                    };
-                    let pixel = &mut pixels[at];
-                    if height > pixel[3] {
-                        for lane in 0..4 {
-                            let (now, value) = (pixel[lane], target.value[lane]);
-                            pixel[lane] = if value < now { value } else { now };
-                        }
+                let targets = &self.targets[from..to];
+                if x >= reach && y >= reach && x + reach < w as i32 && y + reach < h as i32 {
+                    for target in targets {
+                        let at = origin as i32 + target.dy * w as i32 + target.dx;
+                        lower(&mut pixels[at as usize], height, target);
+                    }
+                    continue;
+                }
+                // Cutting a position just outside, between -1 and 0, gives pixel 0.
+                let cut = |at: i32| if at == -1 { 0 } else { at };
+                for target in targets {
+                    let (tx, ty) = (cut(x + target.dx), cut(y + target.dy));
+                    if tx >= 0 && ty >= 0 && tx < w as i32 && ty < h as i32 {
+                        lower(&mut pixels[ty as usize * w + tx as usize], height, target);
                     }
                 }
             }
@@ -94,7 +89,10 @@ impl Rays {
     fn fan_of(&self, relief: &Relief<'_>, at: usize) -> Option<&(usize, usize, i32)> {
         let row = ((f64::from(relief.raised_px.values[at]) - self.first_px) * self.per_px).floor();
         let last = self.heights as f64 - 1.0;
-        let row = if self.clamped { row.min(last) } else { row };
+        // Taxim's table ends where its rows end. Our own goes on with its last row, and with its first one down to
+        // half of that row's height.
+        let half = 0.5 * self.first_px <= f64::from(relief.raised_px.values[at]);
+        let row = if self.clamped && half { row.clamp(0.0, last) } else { row };
         if !(0.0..=last).contains(&row) {
             return None;
         }
@@ -103,6 +101,16 @@ impl Rays {
         let direction =
             if slope > 0.0 { self.sectors.of(gx / slope, gy / slope) } else { self.sectors.of(1.0, 0.0) };
         self.fans.get(direction * self.heights + row as usize)
+    }
+}
+
+/// Lowers what lies deeper than the origin. Without a branch: whether it does is hard to foresee.
+#[inline(always)]
+fn lower(pixel: &mut [f32; 4], height: f32, target: &Target) {
+    let lower = height > pixel[3];
+    let limit = target.value.map(|value| if lower { value } else { f32::INFINITY });
+    for lane in 0..4 {
+        pixel[lane] = if limit[lane] < pixel[lane] { limit[lane] } else { pixel[lane] };
     }
 }
 

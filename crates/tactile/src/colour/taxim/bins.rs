@@ -11,6 +11,9 @@ const CELLS: usize = 128;
 /// Cells a unit of that sine, which is at most sqrt(1/2).
 const CELLS_PER_UNIT: f32 = 180.0;
 
+/// Marks a guess that the borders have to decide.
+const UNSURE: u16 = 1 << 15;
+
 /// Sectors `floor((angle + pi) / step)` of the full circle, angles rounded to f32. What rounds to below -pi belongs to
 /// the last sector, as an index of -1 does in numpy.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,13 +41,17 @@ impl Sectors {
             .collect();
         sectors.guesses = (0..8 * CELLS)
             .map(|cell| {
-                let small = ((cell % CELLS) as f32 + 0.5) / CELLS_PER_UNIT;
-                let small = small.min(0.707);
-                let large = (1.0 - small * small).sqrt();
-                let (x, y) = if cell & CELLS == 0 { (large, small) } else { (small, large) };
-                let x = if cell & (2 * CELLS) == 0 { x } else { -x };
-                let y = if cell & (4 * CELLS) == 0 { y } else { -y };
-                sectors.by_formula(x, y) as u16
+                let sector = |small: f32| {
+                    let small = small.clamp(0.0, 0.7072);
+                    let large = (1.0 - small * small).sqrt();
+                    let (x, y) = if cell & CELLS == 0 { (large, small) } else { (small, large) };
+                    let x = if cell & (2 * CELLS) == 0 { x } else { -x };
+                    let y = if cell & (4 * CELLS) == 0 { y } else { -y };
+                    sectors.by_formula(x, y)
+                };
+                let low = (cell % CELLS) as f32 / CELLS_PER_UNIT;
+                let (low, high) = (sector(low - 1e-5), sector(low + 1.0 / CELLS_PER_UNIT + 1e-5));
+                if low == high { low as u16 } else { low as u16 | UNSURE }
             })
             .collect();
         sectors
@@ -67,7 +74,11 @@ impl Sectors {
         let (steep, small) = if ay > ax { (CELLS, ax) } else { (0, ay) };
         let quadrant = if x < 0.0 { 2 * CELLS } else { 0 } + if y < 0.0 { 4 * CELLS } else { 0 };
         let cell = steep + quadrant + ((small * CELLS_PER_UNIT) as usize).min(CELLS - 1);
-        let mut sector = usize::from(self.guesses[cell]);
+        let guess = self.guesses[cell];
+        if guess & UNSURE == 0 {
+            return usize::from(guess);
+        }
+        let mut sector = usize::from(guess & !UNSURE);
         let (x, y) = (f64::from(x), f64::from(y));
         let beyond = |border: usize| {
             let [cos, sin] = self.borders[border];
@@ -104,7 +115,8 @@ impl Steepness {
         let formula = |slope: f32| (libm::atan(f64::from(slope)) as f32 / step).floor();
         let mut first: Vec<f32> =
             (0..bins).map(|bin| smallest(0.0, f32::MAX, |slope| formula(slope) >= bin as f32)).collect();
-        let base = first[1].to_bits() >> 16;
+        // One below, so that every smaller slope gets the guess 0.
+        let base = (first[1].to_bits() >> 16) - 1;
         let last = (first[bins - 1].min(1e6).to_bits() >> 16).max(base);
         let guesses = (base..=last)
             .map(|upper| {
