@@ -2,7 +2,7 @@
 
 use crate::common::root;
 use gripgen::record::decode_picture;
-use gripgen::tactile::npz::{Array, ElementType, Npz, write_npz};
+use gripgen::tactile::npz::{Array, Npz};
 use gripgen::tactile::{ColourModel, Plane, Relief, Sensor, SensorFiles, SimdLevel, gradient, shade, shadow};
 use gripgen::twin::TactileImage;
 
@@ -143,8 +143,38 @@ fn images_and_shadows_of_given_heights_are_taxims() {
     }
 }
 
-/// Taxim's published example images, which are JPEGs. A JPEG of the same image by another encoder differs by less than
-/// one grey level; raw pixels by 0.70 to 0.73, which is what JPEG loses.
+/// Core of the contact of an example, of which only the deformed heights are published: both objects have a flat top,
+/// whose pixels keep its height where the last 5 x 5 blur saw nothing else. Also the gel at rest, from the press of 1 mm.
+fn core_and_rest(sensor: &Sensor, surface: &Plane) -> (Vec<u8>, Vec<f32>) {
+    let mut sorted = surface.values.clone();
+    sorted.sort_by(f32::total_cmp);
+    let longest = sorted.chunk_by(|a, b| a == b).max_by_key(|run| run.len()).unwrap();
+    let (top, press_px) = (longest[0], (1.0 / 0.0295) as f32);
+    let gel = sensor.gel_shape.rest_px(&sensor.grid).unwrap();
+    let rest: Vec<f32> = gel.values.iter().map(|g| top - press_px - g).collect();
+    let mut core = vec![0; W * H];
+    for (y, x) in (2..H - 2).flat_map(|y| (2..W - 2).map(move |x| (y, x))) {
+        let at = y * W + x;
+        if (surface.values[at] - top).abs() < 1e-3 && top - rest[at] > 0.4 * press_px {
+            (y - 2..=y + 2).for_each(|y| core[y * W + x - 2..=y * W + x + 2].fill(1));
+        }
+    }
+    (core, rest)
+}
+
+/// Brightness of squares of 16 x 16 pixels, which JPEG keeps.
+fn squares(bgr: &[f64]) -> Vec<f64> {
+    let brightness = |i: usize| 0.114 * bgr[3 * i] + 0.587 * bgr[3 * i + 1] + 0.299 * bgr[3 * i + 2];
+    let square = |k: usize| {
+        let (y, x) = (k / (W / 16) * 16, k % (W / 16) * 16);
+        (0..256).map(|i| brightness((y + i / 16) * W + x + i % 16)).sum::<f64>() / 256.0
+    };
+    (0..W * H / 256).map(square).collect()
+}
+
+/// Taxim's published example images. They are JPEGs, so raw pixels differ by what JPEG loses: 0.7 grey levels, with
+/// shadow 0.5 to 0.6. Once ours have gone through OpenCV's JPEG too, the mean difference is
+/// 0.0005 (square, both images), 0.00004 (cylinder) and 0.008 (cylinder with shadow, whose core is not published).
 #[test]
 #[cfg_attr(not(shared_data), ignore = "the folder of shared measured data is not beside this checkout")]
 fn published_examples_are_reproduced() {
@@ -152,19 +182,33 @@ fn published_examples_are_reproduced() {
     for name in ["square", "cylinder6"] {
         let surface = plane(&array(&format!("examples/{name}_height.npz"), "height"));
         let (along_x, along_y) = gradient(&surface);
-        let change = shade(&sensor.colour, &surface, &along_x, &along_y, None);
-        let ours: Vec<f64> =
-            image_bgr(&sensor, &change).iter().map(|v| v.clamp(0.0, 255.0).round()).collect();
-        let published = decode_picture(&bytes(&format!("examples/{name}_sim.jpg"))).unwrap();
-        let theirs: Vec<f64> =
-            published.rgb.chunks_exact(3).flat_map(|p| [p[2], p[1], p[0]].map(f64::from)).collect();
-        if let Ok(folder) = std::env::var("TAXIM_DUMP") {
-            let pixels = Array { shape: vec![H, W, 3], values: ours.clone() };
-            let file = write_npz(&[("bgr", pixels, ElementType::U8)]).unwrap();
-            std::fs::write(format!("{folder}/{name}.npz"), file).unwrap();
+        let plain = shade(&sensor.colour, &surface, &along_x, &along_y, None);
+        let (core, rest) = core_and_rest(&sensor, &surface);
+        let raised = surface.values.iter().zip(&rest).map(|(h, r)| h - r).collect();
+        let relief = Relief {
+            raised_px: &Plane { width: W, height: H, values: raised },
+            surface_px: &surface,
+            along_x: &along_x,
+            along_y: &along_y,
+            core: &core,
+        };
+        let mut shadowed = plain.clone();
+        let table = sensor.shadow.as_ref().unwrap();
+        shadow(table, &sensor.colour, &relief, &mut shadowed, SimdLevel::best());
+        for (kind, change) in [("sim", plain), ("shadow", shadowed)] {
+            let ours: Vec<f64> =
+                image_bgr(&sensor, &change).iter().map(|v| v.clamp(0.0, 255.0).round()).collect();
+            let published = decode_picture(&bytes(&format!("examples/{name}_{kind}.jpg"))).unwrap();
+            let theirs: Vec<f64> =
+                published.rgb.chunks_exact(3).flat_map(|p| [p[2], p[1], p[0]].map(f64::from)).collect();
+            let (mean, largest, _) = compare(&ours, &theirs);
+            let (square, worst, _) = compare(&squares(&ours), &squares(&theirs));
+            println!(
+                "{name}_{kind}.jpg: raw pixels {mean:.4} (largest {largest:.0}), \
+                 brightness of squares {square:.4} (largest {worst:.3})"
+            );
+            assert!(mean < if kind == "sim" { 0.76 } else { 0.57 }, "{name}_{kind}: {mean}");
+            assert!(square < 0.1, "{name}_{kind}: {square}");
         }
-        let (mean, largest, _) = compare(&ours, &theirs);
-        println!("{name}: raw against the published JPEG, mean {mean:.4}, largest {largest:.1}");
-        assert!((0.6..0.8).contains(&mean), "{name}: {mean}");
     }
 }
