@@ -74,12 +74,15 @@ impl Kernel for Positive<'_> {
         let mut columns = vec![0.0f32; self.plane.width];
         for y in 0..self.plane.height {
             let row = self.plane.row(y);
-            let top = row.iter().fold(0.0f32, |m, &v| if v > m { v } else { m });
-            if top > 0.0 {
+            let mut lanes = [0.0f32; 32];
+            let (chunks, rest) = row.as_chunks::<32>();
+            for chunk in chunks {
+                raise(&mut lanes, chunk);
+            }
+            raise(&mut lanes, rest);
+            if lanes.iter().any(|&v| v > 0.0) {
                 area.y = (if area.y.1 == 0 { y } else { area.y.0 }, y + 1);
-                for (most, &v) in columns.iter_mut().zip(row) {
-                    *most = if v > *most { v } else { *most };
-                }
+                raise(&mut columns, row);
             }
         }
         if let (Some(first), Some(last)) =
@@ -88,6 +91,14 @@ impl Kernel for Positive<'_> {
             area.x = (first, last + 1);
         }
         area
+    }
+}
+
+/// Replaces values by larger ones.
+#[inline(always)]
+pub(crate) fn raise(most: &mut [f32], values: &[f32]) {
+    for (m, &v) in most.iter_mut().zip(values) {
+        *m = if v > *m { v } else { *m };
     }
 }
 

@@ -75,182 +75,104 @@ pub fn indent(heights: &Plane, grid: &Grid, gel: &PressedGel, force_n: f64) -> R
     let level = SimdLevel::best();
     let map = HeightMap::of(heights);
     let top = map.top(None, level);
-    finish_press(
-        &map,
-        None,
-        top,
-        gel.thickness_m / grid.metres_per_px,
-        grid,
-        gel,
-        force_n,
-        level,
-        &mut vec![],
-    )
+    let press = Press { grid, gel, force_n, rest: None, level };
+    press.finish(&map, top, press.thickness_px())
 }
 
-/// Draws a part only as deep as a press reaches, and presses it in.
-///
-/// The press is as deep as the map had been drawn through the whole gel: a piece of it is drawn, and deepened until
-/// the volume above its lower end is that of the force.
-#[expect(clippy::too_many_arguments, reason = "what a press is made of, and memory")]
-pub(crate) fn press(
-    map: &mut HeightMap,
-    mesh: &ClusteredMesh,
-    rest: Option<&Plane>,
-    grid: &Grid,
-    gel: &PressedGel,
-    force_n: f64,
-    level: SimdLevel,
-    below: &mut Vec<f64>,
-) -> Result<Imprint, IndentError> {
-    let a = grid.metres_per_px;
-    let thickness_px = gel.thickness_m / a;
-    let wanted = gel.imprint_m3_per_n * force_n / (a * a * a);
-    let mut depth_px = FIRST_DEPTH * thickness_px;
-    loop {
-        let top = map.draw_down(mesh, depth_px, rest, level);
-        if top == f32::NEG_INFINITY || depth_px >= thickness_px {
-            return finish_press(map, rest, top, thickness_px, grid, gel, force_n, level, below);
-        }
-        let (volume, count) = map.volume(rest, depth_px - f64::from(top), level);
-        if volume >= wanted {
-            return finish_press(map, rest, top, depth_px, grid, gel, force_n, level, below);
-        }
-        // Deeper than this it cannot be: more pixels only make it shallower.
-        let enough = depth_px + (wanted - volume) / count + 1e-6;
-        depth_px = enough.min(2.0 * depth_px).min(thickness_px);
+/// The first piece drawn of a part.
+const FIRST_DEPTH_PX: f64 = 4.0;
+/// What an estimate of the next piece is enlarged by, and how much deeper than before it is at least.
+const MARGIN: f64 = 1.1;
+const LEAST_GROWTH: f64 = 1.5;
+
+fn cube(a: f64) -> f64 {
+    a * a * a
+}
+
+/// A gel and what presses on it.
+pub(crate) struct Press<'a> {
+    pub(crate) grid: &'a Grid,
+    pub(crate) gel: &'a PressedGel,
+    pub(crate) force_n: f64,
+    /// The surface of the gel at rest; `None` if it is flat.
+    pub(crate) rest: Option<&'a Plane>,
+    pub(crate) level: SimdLevel,
+}
+
+impl Press<'_> {
+    fn thickness_px(&self) -> f64 {
+        self.gel.thickness_m / self.grid.metres_per_px
     }
-}
 
-/// The first piece drawn, as a share of the gel.
-const FIRST_DEPTH: f64 = 0.125;
-
-/// Solves for the press, which is at most `limit_px`, on a map that is complete as deep as that.
-#[expect(clippy::too_many_arguments, reason = "the tail of two functions")]
-fn finish_press(
-    map: &HeightMap,
-    rest: Option<&Plane>,
-    top: f32,
-    limit_px: f64,
-    grid: &Grid,
-    gel: &PressedGel,
-    force_n: f64,
-    level: SimdLevel,
-    below: &mut Vec<f64>,
-) -> Result<Imprint, IndentError> {
-    let a = grid.metres_per_px;
-    if top == f32::NEG_INFINITY {
-        let size = |n: usize| n as f64 * a * 1e3;
-        return Err(IndentError::NothingInFront {
-            width_mm: size(grid.width_px),
-            height_mm: size(grid.height_px),
-        });
+    /// Volume of the imprint, in cubic pixels.
+    fn wanted(&self) -> f64 {
+        self.gel.imprint_m3_per_n * self.force_n / cube(self.grid.metres_per_px)
     }
-    let top = f64::from(top);
-    let wanted = gel.imprint_m3_per_n * force_n / (a * a * a);
-    // Only what a press as deep as the limit would reach can come into contact.
-    level.run(Reachable { map, rest, top, limit_px, below });
-    let available = level.run(Sum { values: below }) + below.len() as f64 * limit_px;
-    if available < wanted && limit_px >= gel.thickness_m / a {
-        return Err(IndentError::ThroughTheGel {
-            force_n,
-            wanted_mm3: gel.imprint_m3_per_n * force_n * 1e9,
-            thickness_mm: gel.thickness_m * 1e3,
-            available_mm3: available * a * a * a * 1e9,
-        });
-    }
-    let press_px = solve_press(below, wanted, limit_px, level);
-    let mut depth_px = Plane::filled(map.width, map.height, 0.0);
-    level.run(Depths { map, rest, lift: press_px - top, depth_px: &mut depth_px });
-    let patch = aggregate(&depth_px, grid, force_n, level);
-    Ok(Imprint { depth_px, press_depth_m: press_px * a, patch })
-}
 
-/// The press at which `sum max(0, below_i + press) = wanted`. Leaves the values that are in contact.
-fn solve_press(below: &mut Vec<f64>, wanted: f64, limit: f64, level: SimdLevel) -> f64 {
-    let mut press = limit;
-    loop {
-        let before = below.len();
-        let next = (wanted - level.run(Sum { values: below })) / before as f64;
-        press = next.min(press);
-        level.run(Keep { values: below, above: -press });
-        if below.len() == before || below.is_empty() {
-            return press;
-        }
-    }
-}
-
-/// Collects `height + rest - top` of the pixels less than `limit_px` below the top, row by row.
-struct Reachable<'a> {
-    map: &'a HeightMap,
-    rest: Option<&'a Plane>,
-    top: f64,
-    limit_px: f64,
-    below: &'a mut Vec<f64>,
-}
-
-impl Kernel for Reachable<'_> {
-    type Output = ();
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) {
-        let area = self.map.area;
-        let most = (area.y.1 - area.y.0) * (area.x.1 - area.x.0) + 1;
-        if self.below.len() < most {
-            self.below.resize(most, 0.0);
-        }
-        let mut count = 0;
-        for y in area.y.0..area.y.1 {
-            for h in self.map.above_gel(self.rest, y) {
-                let below = f64::from(h) - self.top;
-                self.below[count] = below;
-                count += usize::from(below > -self.limit_px);
+    /// Draws a part only as deep as the press reaches, and presses it in. `map` has been started.
+    ///
+    /// A piece of the part is drawn, and deepened until the volume above its lower end is that of the force. The
+    /// imprint is that of the part drawn through the whole gel.
+    pub(crate) fn sink(&self, map: &mut HeightMap, mesh: &ClusteredMesh) -> Result<Imprint, IndentError> {
+        let (wanted, thickness_px) = (self.wanted(), self.thickness_px());
+        let mut depth_px = FIRST_DEPTH_PX.min(thickness_px);
+        loop {
+            let top = map.draw_down(mesh, depth_px, self.rest, self.level);
+            if top == f32::NEG_INFINITY || depth_px >= thickness_px {
+                return self.finish(map, top, thickness_px);
             }
-        }
-        self.below.truncate(count);
-    }
-}
-
-/// Keeps the values above a bound, in their order.
-struct Keep<'a> {
-    values: &'a mut Vec<f64>,
-    above: f64,
-}
-
-impl Kernel for Keep<'_> {
-    type Output = ();
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) {
-        let mut count = 0;
-        for i in 0..self.values.len() {
-            let value = self.values[i];
-            self.values[count] = value;
-            count += usize::from(value > self.above);
-        }
-        self.values.truncate(count);
-    }
-}
-
-/// The sum in eight parts, value i into part i % 8.
-struct Sum<'a> {
-    values: &'a [f64],
-}
-
-impl Kernel for Sum<'_> {
-    type Output = f64;
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) -> f64 {
-        let mut parts = [0.0; 8];
-        let chunks = self.values.chunks_exact(8);
-        let rest = chunks.remainder();
-        for chunk in chunks {
-            for (part, value) in parts.iter_mut().zip(chunk) {
-                *part += value;
+            let (below, count) = map.touched(self.rest, f64::from(top), depth_px, self.level);
+            let volume = below + count * depth_px;
+            if volume >= wanted {
+                return self.finish(map, top, depth_px);
             }
+            // Deeper than `enough` it cannot be, since more pixels only make it shallower; and on a round part the
+            // volume grows with the square of the depth.
+            let enough = depth_px + (wanted - volume) / count + 1e-6;
+            let round = (MARGIN * (wanted / volume).sqrt()).max(LEAST_GROWTH);
+            depth_px = enough.min(round * depth_px).min(thickness_px);
         }
-        for (part, value) in parts.iter_mut().zip(rest) {
-            *part += value;
+    }
+
+    /// The imprint of a map with the highest pixel `top`, complete as deep as `limit_px`, which is deep enough or
+    /// the whole gel.
+    fn finish(&self, map: &HeightMap, top: f32, limit_px: f64) -> Result<Imprint, IndentError> {
+        let a = self.grid.metres_per_px;
+        if top == f32::NEG_INFINITY {
+            let size = |n: usize| n as f64 * a * 1e3;
+            return Err(IndentError::NothingInFront {
+                width_mm: size(self.grid.width_px),
+                height_mm: size(self.grid.height_px),
+            });
         }
-        parts.iter().sum()
+        let top = f64::from(top);
+        let wanted = self.wanted();
+        let (mut press_px, mut touching) = (limit_px, f64::INFINITY);
+        loop {
+            let (below, count) = map.touched(self.rest, top, press_px, self.level);
+            let volume = below + count * press_px;
+            if press_px == self.thickness_px() && volume < wanted {
+                return Err(self.through_the_gel(volume));
+            }
+            if count == touching || count == 0.0 {
+                break;
+            }
+            touching = count;
+            press_px = ((wanted - below) / count).min(press_px);
+        }
+        let mut depth_px = Plane::filled(map.width, map.height, 0.0);
+        self.level.run(Depths { map, rest: self.rest, lift: press_px - top, depth_px: &mut depth_px });
+        let patch = aggregate(&depth_px, self.grid, self.force_n, self.level);
+        Ok(Imprint { depth_px, press_depth_m: press_px * a, patch })
+    }
+
+    fn through_the_gel(&self, available: f64) -> IndentError {
+        IndentError::ThroughTheGel {
+            force_n: self.force_n,
+            wanted_mm3: self.gel.imprint_m3_per_n * self.force_n * 1e9,
+            thickness_mm: self.gel.thickness_m * 1e3,
+            available_mm3: available * cube(self.grid.metres_per_px) * 1e9,
+        }
     }
 }
 
@@ -267,9 +189,10 @@ impl Kernel for Depths<'_> {
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
         let area = self.map.area;
+        let mut sums = Vec::new();
         for y in area.y.0..area.y.1 {
             let row = &mut self.depth_px.values[y * self.map.width..][area.x.0..area.x.1];
-            for (depth, h) in row.iter_mut().zip(self.map.above_gel(self.rest, y)) {
+            for (depth, &h) in row.iter_mut().zip(self.map.above_gel(self.rest, y, &mut sums)) {
                 let d = f64::from(h) + self.lift;
                 *depth = if d > 0.0 { d as f32 } else { 0.0 };
             }

@@ -65,28 +65,25 @@ impl Kernel for Finish<'_> {
     unsafe fn run<L: Lanes>(self) {
         let w = self.sensor.grid.width_px;
         let noise = self.noise_key.map(|key| (levels(), words(key)));
-        let (mut value, mut hash) = (vec![0.0f32; w], vec![0u32; w]);
+        let (mut hash, mut noise_row) = (vec![0u32; w], vec![0.0f32; w]);
         let mut bytes = [0, 1, 2].map(|_| vec![0u8; w]);
         for (y, rgb) in self.rgb.chunks_exact_mut(3 * w).enumerate() {
             let row = y * w..(y + 1) * w;
             for channel in 0..3 {
+                let rest = &self.sensor.rest[channel][row.clone()];
+                let change = self.change.map(|planes| &planes[channel].values[row.clone()]);
                 let sigma = self.sensor.noise_rgb[channel];
-                value.copy_from_slice(&self.sensor.rest[channel][row.clone()]);
-                if let Some(change) = self.change {
-                    add(&mut value, &change[channel].values[row.clone()]);
-                }
                 if let Some((table, words)) = noise.filter(|_| sigma > 0.0) {
                     let first = (3 * y * w + channel) as u32;
                     for (i, h) in hash.iter_mut().enumerate() {
                         *h = level_of(words, first.wrapping_add(3 * i as u32));
                     }
-                    for (v, &h) in value.iter_mut().zip(&hash) {
-                        *v += sigma * table[h as usize % LEVELS];
+                    for (n, &h) in noise_row.iter_mut().zip(&hash) {
+                        *n = table[h as usize % LEVELS];
                     }
                 }
-                for (byte, &v) in bytes[channel].iter_mut().zip(&value) {
-                    *byte = rounded(v);
-                }
+                // Without noise the row holds zeros.
+                write_row(&mut bytes[channel], rest, change, sigma, &noise_row);
             }
             let [red, green, blue] = &bytes;
             for (i, pixel) in rgb.chunks_exact_mut(3).enumerate() {
@@ -96,10 +93,22 @@ impl Kernel for Finish<'_> {
     }
 }
 
+/// `rest + change + sigma noise`, rounded.
 #[inline(always)]
-fn add(to: &mut [f32], values: &[f32]) {
-    for (a, b) in to.iter_mut().zip(values) {
-        *a += b;
+fn write_row(bytes: &mut [u8], rest: &[f32], change: Option<&[f32]>, sigma: f32, noise: &[f32]) {
+    let n = bytes.len();
+    let (rest, noise) = (&rest[..n], &noise[..n]);
+    match change.map(|change| &change[..n]) {
+        Some(change) => {
+            for i in 0..n {
+                bytes[i] = rounded(rest[i] + change[i] + sigma * noise[i]);
+            }
+        }
+        None => {
+            for i in 0..n {
+                bytes[i] = rounded(rest[i] + sigma * noise[i]);
+            }
+        }
     }
 }
 

@@ -71,35 +71,44 @@ impl Kernel for CellSums<'_> {
         let area = self.area;
         let (nx, ny) = (area.x.1 - area.x.0, area.y.1 - area.y.0);
         let mut cells = [CellSum::default(); CELLS_PER_SIDE * CELLS_PER_SIDE];
-        for y in 0..ny {
-            let row = &self.depth_px.row(area.y.0 + y)[area.x.0..area.x.1];
-            let v = y as f64;
-            for column in 0..CELLS_PER_SIDE {
-                // Pixel x is in cell x * 8 / nx.
-                let start = (column * nx).div_ceil(CELLS_PER_SIDE);
-                let end = ((column + 1) * nx).div_ceil(CELLS_PER_SIDE);
-                let (mut pixels, mut depth, mut du, mut duu) = ([0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]);
-                for (i, &d) in row[start..end].iter().enumerate() {
-                    let (d, u, part) = (f64::from(d), f64::from((start + i) as u32), i % 4);
-                    pixels[part] += if d > 0.0 { 1.0 } else { 0.0 };
-                    depth[part] += d;
-                    du[part] += d * u;
-                    duu[part] += d * u * u;
+        let [mut pixels, mut depth, mut along_v, mut along_vv] = [0, 1, 2, 3].map(|_| vec![0.0; nx]);
+        for (k, of_row) in cells.chunks_exact_mut(CELLS_PER_SIDE).enumerate() {
+            for sums in [&mut pixels, &mut depth, &mut along_v, &mut along_vv] {
+                sums.fill(0.0);
+            }
+            for y in cell_range(k, ny) {
+                let row = &self.depth_px.row(area.y.0 + y)[area.x.0..area.x.1];
+                let v = y as f64;
+                let (pixels, depth) = (&mut pixels[..nx], &mut depth[..nx]);
+                let (along_v, along_vv) = (&mut along_v[..nx], &mut along_vv[..nx]);
+                for x in 0..nx {
+                    let d = f64::from(row[x]);
+                    pixels[x] += if d > 0.0 { 1.0 } else { 0.0 };
+                    depth[x] += d;
+                    along_v[x] += d * v;
+                    along_vv[x] += d * (v * v);
                 }
-                let sum = |parts: [f64; 4]| (parts[0] + parts[1]) + (parts[2] + parts[3]);
-                let (depth, u) = (sum(depth), sum(du));
-                let cell = &mut cells[y * CELLS_PER_SIDE / ny * CELLS_PER_SIDE + column];
-                cell.pixels += sum(pixels);
-                cell.depth += depth;
-                cell.u += u;
-                cell.v += v * depth;
-                cell.uu += sum(duu);
-                cell.uv += v * u;
-                cell.vv += v * v * depth;
+            }
+            for (column, cell) in of_row.iter_mut().enumerate() {
+                for x in cell_range(column, nx) {
+                    let u = x as f64;
+                    cell.pixels += pixels[x];
+                    cell.depth += depth[x];
+                    cell.u += depth[x] * u;
+                    cell.uu += depth[x] * (u * u);
+                    cell.v += along_v[x];
+                    cell.uv += along_v[x] * u;
+                    cell.vv += along_vv[x];
+                }
             }
         }
         cells
     }
+}
+
+/// The pixels of cell `k` of `n` pixels in a row: pixel i is in cell `8 i / n`.
+fn cell_range(k: usize, n: usize) -> std::ops::Range<usize> {
+    (k * n).div_ceil(CELLS_PER_SIDE)..((k + 1) * n).div_ceil(CELLS_PER_SIDE)
 }
 
 /// Aggregates a depth map, whose pressure is proportional to depth and sums to `force_n`.
@@ -108,7 +117,7 @@ impl Kernel for CellSums<'_> {
 /// shrink when pixels are merged; a linear map of the cells about the common centre (the Cholesky factor of the
 /// field's second moments over that of the cells') gives them back exactly.
 ///
-/// Sums run over the pixels of a row within a cell, in four parts, then over rows, then over cells.
+/// Sums run over the rows of a cell for each column, then over columns, then over cells.
 pub(crate) fn aggregate(depth_px: &Plane, grid: &Grid, force_n: f64, level: SimdLevel) -> ContactPatch {
     let area = Area::of_positive(depth_px, level);
     if area.is_empty() {

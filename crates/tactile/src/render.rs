@@ -5,7 +5,7 @@ mod scratch;
 use crate::appearance::appearance;
 use crate::colour::ColourModel;
 use crate::grid::Plane;
-use crate::indent::{Imprint, IndentError, PressedGel, press};
+use crate::indent::{Imprint, IndentError, Press, PressedGel};
 use crate::noise::finish;
 use crate::raster::ClusteredMesh;
 use crate::sensor::Sensor;
@@ -41,9 +41,10 @@ impl Renderer<'_> {
         let grid = &self.sensor.grid;
         let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n };
         with_scratch(self, |scratch, prepared| {
-            let Scratch { map, below, .. } = scratch;
+            let map = &mut scratch.map;
             map.start(mesh, gel_from_mesh, grid);
-            press(map, mesh, prepared.rest_px.as_ref(), grid, &gel, force_n, self.level, below)
+            let rest = prepared.rest_px.as_ref();
+            Press { grid, gel: &gel, force_n, rest, level: self.level }.sink(map, mesh)
         })
     }
 

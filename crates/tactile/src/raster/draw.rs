@@ -1,7 +1,7 @@
 //! Drawing the clusters of a mesh from the top down, as deep as needed.
 
 use super::clusters::{Cluster, ClusteredMesh, VERTICES};
-use crate::convolve::Area;
+use crate::convolve::{Area, raise};
 use crate::grid::{Grid, Plane};
 use crate::simd::{Kernel, Lanes, SimdLevel};
 use gripgen_twin::frames::Pose;
@@ -55,6 +55,8 @@ struct Seen {
     top_px: f64,
     /// The highest triangle that was not drawn yet.
     left_px: f64,
+    /// All triangles that reach above this were drawn.
+    drawn_px: f64,
 }
 
 /// The vertices of the cluster at hand: pixels, and the whole numbers next to them.
@@ -113,7 +115,8 @@ impl HeightMap {
             let (rx, ry) = (reach(0), reach(1));
             if x + rx >= 0.0 && x - rx <= last_x && y + ry >= 0.0 && y - ry <= last_y {
                 let top_px = -p.z * view.scale + reach(2);
-                self.seen.push(Seen { cluster, top_px, left_px: f64::INFINITY });
+                let never = f64::INFINITY;
+                self.seen.push(Seen { cluster, top_px, left_px: never, drawn_px: never });
             }
         }
     }
@@ -151,17 +154,35 @@ impl HeightMap {
         level.run(Top { map: self, rest })
     }
 
-    /// Sum and number of `height + rest + lift` where that is above 0.
-    pub(crate) fn volume(&self, rest: Option<&Plane>, lift: f64, level: SimdLevel) -> (f64, f64) {
-        level.run(Volume { map: self, rest, lift })
+    /// Sum of `height + rest - top`, and number, of the pixels that a press touches: those above `top - press_px`.
+    ///
+    /// Columns are summed first, then columns from left to right, so that the sum depends on these pixels alone.
+    pub(crate) fn touched(
+        &self,
+        rest: Option<&Plane>,
+        top: f64,
+        press_px: f64,
+        level: SimdLevel,
+    ) -> (f64, f64) {
+        level.run(Touched { map: self, rest, top, press_px })
     }
 
-    /// The values of a row within the area, `rest` added.
+    /// The values of a row within the area, `rest` added in `sums`.
     #[inline(always)]
-    pub(crate) fn above_gel(&self, rest: Option<&Plane>, y: usize) -> impl Iterator<Item = f32> {
+    pub(crate) fn above_gel<'a>(
+        &'a self,
+        rest: Option<&Plane>,
+        y: usize,
+        sums: &'a mut Vec<f32>,
+    ) -> &'a [f32] {
         let range = y * self.width + self.area.x.0..y * self.width + self.area.x.1;
-        let rest = rest.map(|r| &r.values[range.clone()]);
-        self.values[range].iter().enumerate().map(move |(i, &h)| rest.map_or(h, |r| h + r[i]))
+        let row = &self.values[range.clone()];
+        let Some(rest) = rest else { return row };
+        sums.resize(row.len(), 0.0);
+        for ((sum, h), r) in sums.iter_mut().zip(row).zip(&rest.values[range]) {
+            *sum = h + r;
+        }
+        sums
     }
 
     pub(crate) fn into_plane(self) -> Plane {
@@ -179,46 +200,42 @@ impl Kernel for Top<'_> {
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) -> f32 {
         let mut lanes = [f32::NEG_INFINITY; 32];
+        let mut sums = Vec::new();
         for y in self.map.area.y.0..self.map.area.y.1 {
-            let range = y * self.map.width + self.map.area.x.0..y * self.map.width + self.map.area.x.1;
-            let row = &self.map.values[range.clone()];
-            match self.rest {
-                None => highest(row.iter().copied(), &mut lanes, row.len()),
-                Some(rest) => {
-                    let sums = row.iter().zip(&rest.values[range]).map(|(h, r)| h + r);
-                    highest(sums, &mut lanes, row.len());
-                }
+            let row = self.map.above_gel(self.rest, y, &mut sums);
+            let (chunks, rest) = row.as_chunks::<32>();
+            raise(&mut lanes, rest);
+            for chunk in chunks {
+                raise(&mut lanes, chunk);
             }
         }
         lanes.iter().fold(f32::NEG_INFINITY, |m, &v| if v > m { v } else { m })
     }
 }
 
-#[inline(always)]
-fn highest(values: impl Iterator<Item = f32>, lanes: &mut [f32; 32], _count: usize) {
-    for (i, v) in values.enumerate() {
-        let lane = &mut lanes[i % 32];
-        *lane = if v > *lane { v } else { *lane };
-    }
-}
-
-struct Volume<'a> {
+struct Touched<'a> {
     map: &'a HeightMap,
     rest: Option<&'a Plane>,
-    lift: f64,
+    top: f64,
+    press_px: f64,
 }
 
-impl Kernel for Volume<'_> {
+impl Kernel for Touched<'_> {
     type Output = (f64, f64);
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) -> (f64, f64) {
-        let (mut sum, mut count) = ([0.0; 8], [0.0; 8]);
-        for y in self.map.area.y.0..self.map.area.y.1 {
-            for (i, h) in self.map.above_gel(self.rest, y).enumerate() {
-                let depth = f64::from(h) + self.lift;
-                let touches = depth > 0.0;
-                sum[i % 8] += if touches { depth } else { 0.0 };
-                count[i % 8] += if touches { 1.0 } else { 0.0 };
+        let area = self.map.area;
+        let n = area.x.1 - area.x.0;
+        let (mut sum, mut count) = (vec![0.0; n], vec![0.0; n]);
+        let mut sums = Vec::new();
+        for y in area.y.0..area.y.1 {
+            let row = &self.map.above_gel(self.rest, y, &mut sums)[..n];
+            let (sum, count) = (&mut sum[..n], &mut count[..n]);
+            for i in 0..n {
+                let below = f64::from(row[i]) - self.top;
+                let touches = below + self.press_px > 0.0;
+                sum[i] += if touches { below } else { 0.0 };
+                count[i] += if touches { 1.0 } else { 0.0 };
             }
         }
         (sum.iter().sum(), count.iter().sum())
@@ -243,7 +260,9 @@ impl Kernel for Draw<'_> {
             if s.top_px >= floor_px && s.left_px >= floor_px {
                 let cluster = &mesh.clusters[s.cluster];
                 corners.transform(mesh, cluster, &map.view);
-                s.left_px = corners.select(mesh, cluster, (map.width, map.height), floor_px);
+                let heights = (floor_px, s.drawn_px);
+                s.left_px = corners.select(mesh, cluster, (map.width, map.height), heights);
+                s.drawn_px = floor_px;
                 for i in 0..corners.reaching.len() {
                     let t = corners.reaching[i].map(|v| corners.corner(v));
                     fill(map, t);
@@ -298,15 +317,15 @@ impl Corners {
         }
     }
 
-    /// Collects the triangles that can reach a pixel centre of the window and lie above the floor. Returns the
-    /// height of the highest one that lies below the floor.
+    /// Collects the triangles that can reach a pixel centre of the window and whose highest corner lies from the
+    /// floor up to what was drawn before. Returns the height of the highest one that lies below the floor.
     #[inline(always)]
     fn select(
         &mut self,
         mesh: &ClusteredMesh,
         cluster: &Cluster,
         (width, height): (usize, usize),
-        floor_px: f64,
+        (floor_px, drawn_px): (f64, f64),
     ) -> f64 {
         let mut left = f64::NEG_INFINITY;
         let mut count = 0;
@@ -323,7 +342,7 @@ impl Corners {
             let low = top < floor_px;
             left = if reaches & low & (top > left) { top } else { left };
             self.reaching[count] = triangle;
-            count += usize::from(reaches & !low);
+            count += usize::from(reaches & !low & (top < drawn_px));
         }
         self.reaching.truncate(count);
         left

@@ -14,7 +14,6 @@ const PREPARED: usize = 4;
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     pub(super) map: HeightMap,
-    pub(super) below: Vec<f64>,
     pub(super) deform: DeformScratch,
 }
 
