@@ -36,14 +36,13 @@ impl Area {
         Self { x: (0, width), y: (0, height) }
     }
 
-    /// Makes it hold some pixels of a row.
-    #[inline(always)]
-    pub(crate) fn add(&mut self, columns: (usize, usize), row: usize) {
+    /// Makes it hold another area.
+    pub(crate) fn join(&mut self, other: Self) {
         if self.is_empty() {
-            *self = Self { x: columns, y: (row, row + 1) };
-        } else {
-            self.x = (self.x.0.min(columns.0), self.x.1.max(columns.1));
-            self.y = (self.y.0.min(row), self.y.1.max(row + 1));
+            *self = other;
+        } else if !other.is_empty() {
+            let around = |a: (usize, usize), b: (usize, usize)| (a.0.min(b.0), a.1.max(b.1));
+            *self = Self { x: around(self.x, other.x), y: around(self.y, other.y) };
         }
     }
 

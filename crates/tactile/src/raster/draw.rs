@@ -68,8 +68,18 @@ struct Corners {
     /// Smallest pixel not before the vertex and largest pixel not after it.
     columns: Vec<(i32, i32)>,
     rows: Vec<(i32, i32)>,
+    /// Around the triangles below.
+    area: Area,
     /// Triangles that can reach a pixel centre.
-    reaching: Vec<[u16; 3]>,
+    reaching: Vec<Reaching>,
+}
+
+/// A triangle and the rows of the window that it crosses.
+#[derive(Debug, Clone, Copy, Default)]
+struct Reaching {
+    corners: [u16; 3],
+    first_row: i32,
+    last_row: i32,
 }
 
 impl HeightMap {
@@ -255,6 +265,7 @@ impl Kernel for Draw<'_> {
         let Self { map, mesh, floor_px } = self;
         let mut seen = std::mem::take(&mut map.seen);
         let mut corners = std::mem::take(&mut map.corners);
+        let width = map.width;
         let mut left = false;
         for s in &mut seen {
             if s.top_px >= floor_px && s.left_px >= floor_px {
@@ -263,10 +274,11 @@ impl Kernel for Draw<'_> {
                 let heights = (floor_px, s.drawn_px);
                 s.left_px = corners.select(mesh, cluster, (map.width, map.height), heights);
                 s.drawn_px = floor_px;
-                for i in 0..corners.reaching.len() {
-                    let t = corners.reaching[i].map(|v| corners.corner(v));
-                    fill(map, t);
+                for r in &corners.reaching {
+                    let t = r.corners.map(|v| corners.corner(v));
+                    fill(&mut map.values, width, t, (r.first_row as usize, r.last_row as usize));
                 }
+                map.area.join(corners.area);
             }
             left |= s.left_px > f64::NEG_INFINITY;
         }
@@ -327,26 +339,45 @@ impl Corners {
         (width, height): (usize, usize),
         (floor_px, drawn_px): (f64, f64),
     ) -> f64 {
-        let mut left = f64::NEG_INFINITY;
-        let mut count = 0;
-        self.reaching.resize(VERTICES / 3, [0; 3]);
-        for &triangle in &mesh.triangles[cluster.triangles.clone()] {
-            let [a, b, c] = triangle.map(usize::from);
-            let reaches = |v: &[(i32, i32)], n: usize| {
+        let (mut left, mut count) = (f64::NEG_INFINITY, 0);
+        let (mut low, mut high) = ([i32::MAX; 2], [0; 2]);
+        self.reaching.resize(VERTICES / 3, Reaching::default());
+        for &corners in &mesh.triangles[cluster.triangles.clone()] {
+            let [a, b, c] = corners.map(usize::from);
+            let span = |v: &[(i32, i32)], n: usize| {
                 let first = v[a].0.min(v[b].0).min(v[c].0).max(0);
-                let last = v[a].1.max(v[b].1).max(v[c].1).min(n as i32 - 1);
-                first <= last
+                (first, v[a].1.max(v[b].1).max(v[c].1).min(n as i32 - 1))
             };
-            let reaches = reaches(&self.rows, height) & reaches(&self.columns, width);
-            let top = self.height[a].max(self.height[b]).max(self.height[c]);
-            let low = top < floor_px;
-            left = if reaches & low & (top > left) { top } else { left };
-            self.reaching[count] = triangle;
-            count += usize::from(reaches & !low & (top < drawn_px));
+            let ((first_row, last_row), (first_column, last_column)) =
+                (span(&self.rows, height), span(&self.columns, width));
+            let reaches = (first_row <= last_row) & (first_column <= last_column);
+            let top = higher(higher(self.height[a], self.height[b]), self.height[c]);
+            let deep = top < floor_px;
+            left = if reaches & deep & (top > left) { top } else { left };
+            let drawn = reaches & !deep & (top < drawn_px);
+            self.reaching[count] = Reaching { corners, first_row, last_row };
+            count += usize::from(drawn);
+            if drawn {
+                low = [low[0].min(first_column), low[1].min(first_row)];
+                high = [high[0].max(last_column + 1), high[1].max(last_row + 1)];
+            }
         }
         self.reaching.truncate(count);
+        let range = |i: usize| (low[i] as usize, high[i] as usize);
+        self.area = if count == 0 { Area::EMPTY } else { Area { x: range(0), y: range(1) } };
         left
     }
+}
+
+/// The higher of two numbers, in one instruction.
+#[inline(always)]
+fn higher(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn lower(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
 /// An edge, seen from the end with the lower number.
@@ -365,7 +396,7 @@ impl Edge {
         let rows = if a.y_px == b.y_px {
             (f64::INFINITY, f64::NEG_INFINITY)
         } else {
-            (a.y_px.min(b.y_px), a.y_px.max(b.y_px))
+            (lower(a.y_px, b.y_px), higher(a.y_px, b.y_px))
         };
         Self { x_px: a.x_px, y_px: a.y_px, slope: (b.x_px - a.x_px) / (b.y_px - a.y_px), rows }
     }
@@ -377,9 +408,9 @@ impl Edge {
     }
 }
 
-/// Writes one triangle into the map where it is nearer than what is there.
+/// Writes one triangle into a map where it is nearer than what is there.
 #[inline(always)]
-fn fill(map: &mut HeightMap, t: [Corner; 3]) {
+fn fill(map: &mut [f32], width: usize, t: [Corner; 3], rows: (usize, usize)) {
     // Plane through the corners, relative to the first one so that small triangles far away stay exact.
     let (ux, uy, uh) = (t[1].x_px - t[0].x_px, t[1].y_px - t[0].y_px, t[1].height_px - t[0].height_px);
     let (vx, vy, vh) = (t[2].x_px - t[0].x_px, t[2].y_px - t[0].y_px, t[2].height_px - t[0].height_px);
@@ -389,35 +420,33 @@ fn fill(map: &mut HeightMap, t: [Corner; 3]) {
     }
     let slope_x = (uh * vy - vh * uy) / area;
     let slope_y = (vh * ux - uh * vx) / area;
-    let top = t[0].height_px.max(t[1].height_px).max(t[2].height_px);
-    let bottom = t[0].height_px.min(t[1].height_px).min(t[2].height_px);
-    let first_row = t[0].y_px.min(t[1].y_px).min(t[2].y_px).ceil().max(0.0);
-    let last_row = t[0].y_px.max(t[1].y_px).max(t[2].y_px).floor().min(map.height as f64 - 1.0);
+    let top = higher(higher(t[0].height_px, t[1].height_px), t[2].height_px);
+    let bottom = lower(lower(t[0].height_px, t[1].height_px), t[2].height_px);
     let edges = [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])];
-    for row in first_row as usize..=last_row as usize {
-        let y = row as f64;
+    let last_column = (width - 1) as f64;
+    for row in rows.0..=rows.1 {
+        let y = row as i32 as f64;
         let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
         for edge in &edges {
             if let Some(x) = edge.crossing(y) {
-                from = from.min(x);
-                to = to.max(x);
+                from = lower(x, from);
+                to = higher(x, to);
             }
         }
-        let from = from.ceil().max(0.0);
-        let to = to.floor().min(map.width as f64 - 1.0);
+        let from = higher(from.ceil(), 0.0);
+        let to = lower(to.floor(), last_column);
         if from > to {
             continue;
         }
-        let (from, end) = (from as usize, to as usize + 1);
+        // SAFETY: both lie between 0 and the last column.
+        let (from, to) = unsafe { (from.to_int_unchecked::<i32>(), to.to_int_unchecked::<i32>()) };
         let along_row = t[0].height_px + slope_y * (y - t[0].y_px);
-        let start = row * map.width;
-        for (i, cell) in map.values[start + from..start + end].iter_mut().enumerate() {
-            let column = (from + i) as i32;
+        let cells = &mut map[row * width..][from as usize..=to as usize];
+        for (i, cell) in cells.iter_mut().enumerate() {
+            let column = from + i as i32;
             let height = along_row + slope_x * (f64::from(column) - t[0].x_px);
-            let height = if height < bottom { bottom } else { height };
-            let height = (if height > top { top } else { height }) as f32;
+            let height = lower(top, higher(bottom, height)) as f32;
             *cell = if height > *cell { height } else { *cell };
         }
-        map.area.add((from, end), row);
     }
 }
