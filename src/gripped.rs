@@ -154,7 +154,7 @@ fn press(
     renderers: &PerJaw<Renderer<'_>>,
 ) -> Result<PerJaw<Imprint>, SampleError> {
     let part = &twin.parts[&scenario.part];
-    let mesh = library.mesh(part)?;
+    let mesh = library.clustered_mesh(part)?;
     PerJaw::try_from_fn(|jaw| {
         let mut gel_from_mesh = grasp.gel_from_part[jaw] * part.grips[scenario.grip_pose];
         let tilt_rad = jaw_tilt_rad(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));

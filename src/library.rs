@@ -5,7 +5,7 @@ use crate::location::Location;
 use crate::resolve::Files;
 use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, UrdfError};
 use gripgen_record::{decode_picture, sha256_hex};
-use gripgen_tactile::{Sensor, SensorError, SensorFiles};
+use gripgen_tactile::{ClusteredMesh, Sensor, SensorError, SensorFiles};
 use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,6 +20,7 @@ const ARMS: usize = 8;
 pub struct Library {
     files: Files,
     meshes: Cache<(String, u64), TriMesh>,
+    clustered: Cache<(String, u64), ClusteredMesh>,
     shapes: Cache<(String, u64, [u64; 7]), PartShape>,
     arms: Cache<RobotArm, PlacedArm>,
     sensors: Cache<SensorKey, Sensor>,
@@ -128,6 +129,7 @@ impl Library {
         Self {
             files,
             meshes: Cache::new(MESHES),
+            clustered: Cache::new(MESHES),
             shapes: Cache::new(SHAPES),
             arms: Cache::new(ARMS),
             sensors: Cache::new(SENSORS),
@@ -157,6 +159,12 @@ impl Library {
             TriMesh::from_file_bytes(bytes, location.extension(), part.metres_per_unit)
                 .map_err(|source| LibraryError::Mesh { location: location.clone(), source })
         })
+    }
+
+    /// The mesh of a part, prepared for the tactile images.
+    pub fn clustered_mesh(&self, part: &Part) -> Result<Arc<ClusteredMesh>, LibraryError> {
+        let key = (part.mesh.clone(), part.metres_per_unit.to_bits());
+        self.clustered.get(key, || Ok(ClusteredMesh::new(&*self.mesh(part)?)))
     }
 
     /// The contact shape of a part in one of its grips, in the part frame.

@@ -1,6 +1,6 @@
 //! Proposing grips: pairs of opposite surfaces that fit between the jaws.
 
-use gripgen_tactile::{Grid, PressedGel, indent, raster};
+use gripgen_tactile::{ClusteredMesh, Grid, PressedGel, indent};
 use gripgen_twin::frames::{Pose, pose, rotation_from_fixed_xyz, world_from_gel};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Gel, Jaw, TriMesh, Twin};
@@ -66,10 +66,11 @@ pub(super) fn propose(mesh: &TriMesh, twin: &Twin) -> Vec<Proposal> {
     let size = mesh.extent_m().iter().fold(0.0_f64, |a, &b| a.max(b));
     let (low, high) = mesh.bounds_m();
     let middle = Point3::from([0, 1, 2].map(|i| (low[i] + high[i]) / 2.0));
+    let clustered = ClusteredMesh::new(mesh);
     let mut rest: Vec<(f64, Pair, Proposal)> = spread(pairs(mesh, jaws.opening_m), CANDIDATES, size)
         .into_iter()
         .filter_map(|pair| {
-            let proposal = evaluate(mesh, &jaws, &pair)?;
+            let proposal = evaluate(mesh, &clustered, &jaws, &pair)?;
             let off = 2.0 * (pair.middle - middle).norm() / size;
             Some((proposal.contact_mm2 / (1.0 + off * off), pair, proposal))
         })
@@ -187,7 +188,7 @@ fn spread(pairs: Vec<Pair>, wanted: usize, size: f64) -> Vec<Pair> {
 }
 
 /// The contact of both gels in this grip; `None` if one of them finds none or is pressed through.
-fn evaluate(mesh: &TriMesh, jaws: &Jaws<'_>, pair: &Pair) -> Option<Proposal> {
+fn evaluate(mesh: &TriMesh, clustered: &ClusteredMesh, jaws: &Jaws<'_>, pair: &Pair) -> Option<Proposal> {
     let rotation = orientation(mesh, pair.axis);
     let mut proposal = Proposal {
         origin_mm: [0, 1, 2].map(|i| hundredths(pair.middle[i] * 1e3)),
@@ -207,7 +208,7 @@ fn evaluate(mesh: &TriMesh, jaws: &Jaws<'_>, pair: &Pair) -> Option<Proposal> {
     let mut width_m = jaws.opening_m;
     for (area, jaw) in areas.iter_mut().zip(Jaw::BOTH) {
         let gel_from_mesh = world_from_gel(jaw, jaws.opening_m / 2.0).inverse() * proposal.part_from_mesh();
-        let heights = raster(mesh, &gel_from_mesh, &grid, jaws.gel.thickness_m / metres_per_px);
+        let heights = clustered.raster(&gel_from_mesh, &grid, jaws.gel.thickness_m / metres_per_px);
         *area = indent(&heights, &grid, &gel, FORCE_N).ok()?.patch.area_m2();
         // What the pad touches first need not be the surface of the pair.
         let nearest = heights.values.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
