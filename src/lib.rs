@@ -52,6 +52,7 @@ mod paper;
 mod picture;
 mod plan;
 mod press_report;
+mod presses;
 mod project;
 mod resolve;
 mod schema;
@@ -69,6 +70,10 @@ pub use paper::{PaperError, PaperReport, paper_report};
 pub use picture::{PictureSampleError, contact_sheet, sample_picture};
 pub use plan::{Plan, Probe, plan};
 pub use press_report::{PressReportText, press_report};
+pub use presses::{
+    FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_missing_circles, is_press_set,
+    load_presses, load_sensor, load_twin_sensor,
+};
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
 pub use schema::{sweep_schema, twin_schema};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, VERSION, run_info, sweep};

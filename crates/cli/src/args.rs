@@ -29,6 +29,11 @@ pub enum Command {
     Show(ShowArgs),
     /// Write one sample of a run as a file of its own, with every reading.
     Export(ExportArgs),
+    /// Fit a sensor file to measurements.
+    #[command(subcommand)]
+    Calibrate(CalibrateCommand),
+    /// Say how far a sensor file is from measurements.
+    Compare(CompareArgs),
     /// Print the JSON Schema of a configuration file.
     Schema(SchemaArgs),
     /// Print shell completions.
@@ -186,6 +191,60 @@ pub struct ExportArgs {
     #[arg(short, long, value_name = "FILE.mcap")]
     pub out: PathBuf,
     /// JSON: the file's path and size.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen calibrate`
+#[derive(Debug, Subcommand)]
+pub enum CalibrateCommand {
+    /// Fit colours, rest frame, noise and gel shape of a tactile sensor to presses of a ball.
+    Presses(CalibratePressesArgs),
+}
+
+/// `gripgen calibrate presses`
+#[derive(Debug, Args)]
+pub struct CalibratePressesArgs {
+    /// Taxim's dataPack.npz, or a folder with presses.csv and images.
+    pub presses: PathBuf,
+    /// Diameter of the ball; 4.0 for a dataPack.npz.
+    #[arg(long, value_name = "MM")]
+    pub ball_mm: Option<f64>,
+    /// Side of a pixel on the gel; 0.0295 for a dataPack.npz.
+    #[arg(long, value_name = "MM")]
+    pub mm_per_px: Option<f64>,
+    /// The sensor file to write.
+    #[arg(short, long, value_name = "FILE.npz")]
+    pub out: PathBuf,
+    /// The report; beside the sensor file where it is left out.
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
+    /// JSON: what was fitted, and the error on held-out presses.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen compare`
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// Ball presses: Taxim's dataPack.npz, or a folder with presses.csv and images.
+    pub measured: PathBuf,
+    /// A sensor file.
+    #[arg(long, value_name = "FILE.npz")]
+    pub sensor: Option<String>,
+    /// A twin; its left sensor is taken where --sensor is left out.
+    #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
+    pub twin: String,
+    /// Write a page with the error of each press and pictures of the worst.
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
+    /// JSON: the errors.
     #[command(flatten)]
     pub json: JsonArgs,
     /// How much is said.

@@ -1,6 +1,8 @@
 //! One file a verb.
 
+pub mod calibrate_presses;
 pub mod check;
+pub mod compare;
 pub mod completions;
 pub mod export;
 pub mod info;

@@ -10,7 +10,7 @@ mod interrupt;
 mod output;
 mod progress;
 
-use args::{Cli, Command};
+use args::{CalibrateCommand, Cli, Command};
 use clap::Parser;
 use std::ffi::OsString;
 
@@ -34,6 +34,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Verify(args) => commands::verify::run(args),
         Command::Show(args) => commands::show::run(args),
         Command::Export(args) => commands::export::run(args),
+        Command::Calibrate(CalibrateCommand::Presses(args)) => commands::calibrate_presses::run(args),
+        Command::Compare(args) => commands::compare::run(args),
         Command::Schema(args) => commands::schema::run(args),
         Command::Completions(args) => commands::completions::run(args),
     };

@@ -1,0 +1,199 @@
+//! Press sets from disk: Taxim's `dataPack.npz`, or a folder with a table and images.
+
+use crate::location::{Location, ReadFileError};
+use crate::project::{LoadError, load_twin_document};
+use gripgen_record::{PRESSES_FILE, PressFolder, PressFolderError, decode_picture, read_press_folder};
+use gripgen_tactile::presses::{
+    Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, Press, PressSet, find_circle,
+};
+use gripgen_tactile::{Sensor, SensorError};
+use gripgen_twin::Twin;
+use std::path::{Path, PathBuf};
+
+/// Taxim's file inside a folder.
+const DATA_PACK: &str = "dataPack.npz";
+
+/// What a press set does not say itself.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PressGeometry {
+    /// Diameter of the ball.
+    pub ball_m: Option<f64>,
+    /// Side of a pixel on the gel.
+    pub metres_per_px: Option<f64>,
+}
+
+/// Why a press set could not be loaded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadPressesError {
+    /// A file.
+    #[error(transparent)]
+    Read(#[from] ReadFileError),
+    /// A folder of presses.
+    #[error(transparent)]
+    Folder(#[from] PressFolderError),
+    /// Taxim's file.
+    #[error("{}: {source}", .path.display())]
+    DataPack {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: DataPackError,
+    },
+    /// A folder of images says neither how large the ball nor how large a pixel is.
+    #[error("{}: a folder of presses does not say {missing}", .path.display())]
+    Geometry {
+        /// The folder.
+        path: PathBuf,
+        /// What is missing, with the flag.
+        missing: &'static str,
+    },
+    /// A length that cannot be.
+    #[error("{what} is {value_mm} mm, it must be from {least_mm} to {most_mm} mm")]
+    Length {
+        /// Which length.
+        what: &'static str,
+        /// Its value.
+        value_mm: f64,
+        /// Smallest.
+        least_mm: f64,
+        /// Largest.
+        most_mm: f64,
+    },
+    /// No press set.
+    #[error("{}: neither a `dataPack.npz` nor a folder with `{PRESSES_FILE}`", .path.display())]
+    Unknown {
+        /// The path.
+        path: PathBuf,
+    },
+}
+
+/// Whether a path looks like a press set.
+pub fn is_press_set(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e == "npz")
+        || path.join(PRESSES_FILE).is_file()
+        || path.join(DATA_PACK).is_file()
+}
+
+/// Loads a press set. A `dataPack.npz` has Taxim's geometry (4.0 mm, 0.0295 mm per pixel) unless another one is given;
+/// for a folder both have to be.
+pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, LoadPressesError> {
+    let length = |what, value_m: Option<f64>, least_mm: f64, most_mm: f64| match value_m.map(|m| m * 1e3) {
+        Some(value_mm) if !(least_mm..=most_mm).contains(&value_mm) => {
+            Err(LoadPressesError::Length { what, value_mm, least_mm, most_mm })
+        }
+        _ => Ok(value_m),
+    };
+    let ball_m = length("the ball", geometry.ball_m, 0.1, 100.0)?;
+    let metres_per_px = length("a pixel", geometry.metres_per_px, 1e-4, 1.0)?;
+    let pack = if path.is_dir() { path.join(DATA_PACK) } else { path.to_path_buf() };
+    if path.join(PRESSES_FILE).is_file() {
+        let missing = |missing| LoadPressesError::Geometry { path: path.into(), missing };
+        let ball_m = ball_m.ok_or_else(|| missing("how large the ball is (--ball-mm)"))?;
+        let metres_per_px = metres_per_px.ok_or_else(|| missing("how large a pixel is (--mm-per-px)"))?;
+        return Ok(from_folder(read_press_folder(path)?, ball_m, metres_per_px));
+    }
+    if !pack.is_file() {
+        return Err(LoadPressesError::Unknown { path: path.into() });
+    }
+    let bytes = Location::Disk(pack.clone()).read()?;
+    let ball_m = ball_m.unwrap_or(DATA_PACK_BALL_M);
+    let metres_per_px = metres_per_px.unwrap_or(DATA_PACK_METRES_PER_PX);
+    PressSet::from_data_pack(&bytes, ball_m, metres_per_px)
+        .map_err(|source| LoadPressesError::DataPack { path: pack, source })
+}
+
+fn from_folder(folder: PressFolder, ball_m: f64, metres_per_px: f64) -> PressSet {
+    let press = |record: gripgen_record::PressRecord| {
+        let depth = |d| Circle::radius_px_at_depth(ball_m, d, metres_per_px);
+        let radius_px = record.radius_px.or(record.depth_m.map(depth));
+        let circle =
+            record.centre_px.zip(radius_px).map(|((x_px, y_px), radius_px)| Circle { x_px, y_px, radius_px });
+        Press { name: record.name, image: record.image, circle }
+    };
+    PressSet {
+        metres_per_px,
+        ball_m,
+        rest: folder.rest,
+        presses: folder.presses.into_iter().map(press).collect(),
+    }
+}
+
+/// Looks for the contact of every press that nobody marked, against a frame without contact (planes of red, green and
+/// blue in grey levels). Returns the names of those where it was found; the others are taken out of the set.
+pub fn find_missing_circles(set: &mut PressSet, rest: &[Vec<f32>; 3]) -> FoundCircles {
+    let mut circles = FoundCircles::default();
+    let ball_radius_px = set.ball_m / 2.0 / set.metres_per_px;
+    set.presses.retain_mut(|press| {
+        let same_size = press.image.rgb.len() == 3 * rest[0].len();
+        if press.circle.is_some() || !same_size {
+            return true;
+        }
+        press.circle = find_circle(&press.image, rest, ball_radius_px);
+        let names = if press.circle.is_some() { &mut circles.found } else { &mut circles.without_contact };
+        names.push(press.name.clone());
+        press.circle.is_some()
+    });
+    circles
+}
+
+/// What [`find_missing_circles`] found.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FoundCircles {
+    /// Presses whose contact was found.
+    pub found: Vec<String>,
+    /// Presses without a visible contact, which were taken out.
+    pub without_contact: Vec<String>,
+}
+
+/// Why the sensor of a comparison could not be loaded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadSensorError {
+    /// A file.
+    #[error(transparent)]
+    Read(#[from] ReadFileError),
+    /// The twin that names it.
+    #[error(transparent)]
+    Twin(#[from] LoadError),
+    /// The sensor file.
+    #[error("{location}: {source}")]
+    Sensor {
+        /// The file.
+        location: Location,
+        /// What is wrong.
+        source: SensorError,
+    },
+    /// A background image.
+    #[error("{location}: {problem}")]
+    Picture {
+        /// The file.
+        location: Location,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// Reads a sensor file.
+pub fn load_sensor(location: &Location) -> Result<Sensor, LoadSensorError> {
+    Sensor::from_npz(&location.read()?, None, None)
+        .map_err(|source| LoadSensorError::Sensor { location: location.clone(), source })
+}
+
+/// The sensor of a twin's left jaw, with the twin's background and pixel size.
+pub fn load_twin_sensor(twin: &Location) -> Result<Sensor, LoadSensorError> {
+    let document = load_twin_document(twin, &[])?;
+    let read = document.read_twin().map_err(LoadError::from)?;
+    let optics = Twin::new(&read).map_err(|e| LoadError::from(document.located(e)))?.optics.left;
+    let location = twin.beside(&optics.sensor);
+    let background = match &optics.background {
+        None => None,
+        Some(path) => {
+            let location = twin.beside(path);
+            let picture = decode_picture(&location.read()?);
+            Some(picture.map_err(|e| LoadSensorError::Picture { location, problem: e.to_string() })?)
+        }
+    };
+    Sensor::from_npz(&location.read()?, optics.metres_per_px, background.as_ref())
+        .map_err(|source| LoadSensorError::Sensor { location, source })
+}
