@@ -40,3 +40,84 @@ pub fn appearance(
     }
     change
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::colour::{Lambert, Light};
+    use crate::grid::Grid;
+    use crate::sensor::GelShape;
+    use crate::shadow::{Shadow, ShadowKind, ShadowTable};
+
+    fn sensor(gel_shape: GelShape) -> Sensor {
+        let light =
+            Light { azimuth_rad: 0.4, elevation_rad: 0.6, colour: [90.0, 50.0, 20.0], falloff: [0.2, 0.1] };
+        Sensor {
+            grid: Grid { width_px: 64, height_px: 48, metres_per_px: 1e-4 },
+            rest: [0, 1, 2].map(|_| vec![100.0; 64 * 48]),
+            noise_rgb: [0.0; 3],
+            colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&[light]))),
+            gel_shape,
+            shadow: None,
+            pyramid: None,
+            ball_m: None,
+        }
+    }
+
+    fn bump() -> Plane {
+        let height = |i: usize| {
+            let (x, y) = ((i % 64) as f32 - 30.0, (i / 64) as f32 - 25.0);
+            6.0 * (-(x * x + y * y) / 60.0).exp()
+        };
+        Plane { width: 64, height: 48, values: (0..64 * 48).map(height).collect() }
+    }
+
+    fn change(sensor: &Sensor, raised: &Plane) -> [Plane; 3] {
+        appearance(sensor, raised, |i| raised.values[i] > 3.0, SimdLevel::best())
+    }
+
+    /// The rest frame already shows the shape of the gel: only what an imprint adds to it is a change.
+    #[test]
+    fn a_domed_gel_changes_by_what_the_imprint_adds() {
+        let (flat, domed) = (sensor(GelShape::Flat), sensor(GelShape::Dome { sag_m: 1e-3 }));
+        let at_rest = change(&domed, &Plane::filled(64, 48, 0.0));
+        assert!(at_rest.iter().all(|plane| plane.values.iter().all(|&v| v == 0.0)), "no imprint, no change");
+        // By hand: a flat gel of that surface against a flat gel of the surface at rest.
+        let dome = domed.gel_shape.rest_px(&domed.grid).unwrap();
+        let values = dome.values.iter().map(|g| -g).collect();
+        let hollow = Plane { values, ..dome };
+        let both = Plane {
+            values: bump().values.iter().zip(&hollow.values).map(|(a, b)| a + b).collect(),
+            ..bump()
+        };
+        let (whole, rest) = (change(&flat, &both), change(&flat, &hollow));
+        let domed = change(&domed, &bump());
+        for c in 0..3 {
+            for i in 0..64 * 48 {
+                let by_hand = whole[c].values[i] - rest[c].values[i];
+                assert!((domed[c].values[i] - by_hand).abs() < 1e-4);
+            }
+        }
+        assert!(domed[0] != change(&flat, &bump())[0], "the shape of the gel matters");
+    }
+
+    #[test]
+    fn a_sensor_with_shadows_is_darker_beside_the_contact_only() {
+        let mut with = sensor(GelShape::Flat);
+        let table = ShadowTable {
+            kind: ShadowKind::Darkening,
+            directions_rad: (0..63).map(|i| f64::from(i) * std::f64::consts::TAU / 63.0).collect(),
+            first_height_m: 0.1e-3,
+            height_step_m: 0.1e-3,
+            heights: 3,
+            step_m: 1e-4,
+            rays: vec![[vec![-9.0; 8], vec![-9.0; 8], vec![]]; 63 * 3],
+        };
+        with.shadow = Some(Box::new(Shadow::new(table, 1e-4, 64, &with.colour)));
+        let (with, without) = (change(&with, &bump()), change(&sensor(GelShape::Flat), &bump()));
+        let darker = |c: usize, x: usize, y: usize| without[c].at(x, y) - with[c].at(x, y);
+        assert!(darker(0, 43, 25) > 6.0 && darker(1, 30, 37) > 6.0, "beside the contact");
+        assert!(darker(0, 30, 25).abs() < 1e-3 && darker(0, 2, 2).abs() < 1e-3, "in it and far away");
+        assert_eq!(with[2], without[2], "a channel without shadow");
+    }
+}
