@@ -22,6 +22,8 @@ mod pull;
 mod roundtrip;
 // The wrist sensor against logs of a real arm.
 mod real_force;
+// Shadows learnt from real presses.
+mod shadows;
 // Files of Taxim.
 mod taxim;
 // Taxim's own images, stage by stage.
