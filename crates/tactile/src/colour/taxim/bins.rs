@@ -22,12 +22,12 @@ pub(crate) struct Sectors {
     count: usize,
     /// Cosine and sine of the lower border of each sector. Empty for sectors too wide to be told apart by a side.
     borders: Vec<[f64; 2]>,
-    guesses: Vec<u16>,
+    guesses: Option<Box<[u16; 8 * CELLS]>>,
 }
 
 impl Sectors {
     pub(crate) fn new(step_rad: f64, count: usize) -> Self {
-        let mut sectors = Self { step_rad, count, borders: vec![], guesses: vec![] };
+        let mut sectors = Self { step_rad, count, borders: vec![], guesses: None };
         if step_rad > 0.7 {
             return sectors;
         }
@@ -39,21 +39,21 @@ impl Sectors {
                 [libm::cos(border), libm::sin(border)]
             })
             .collect();
-        sectors.guesses = (0..8 * CELLS)
-            .map(|cell| {
-                let sector = |small: f32| {
-                    let small = small.clamp(0.0, 0.7072);
-                    let large = (1.0 - small * small).sqrt();
-                    let (x, y) = if cell & CELLS == 0 { (large, small) } else { (small, large) };
-                    let x = if cell & (2 * CELLS) == 0 { x } else { -x };
-                    let y = if cell & (4 * CELLS) == 0 { y } else { -y };
-                    sectors.by_formula(x, y)
-                };
-                let low = (cell % CELLS) as f32 / CELLS_PER_UNIT;
-                let (low, high) = (sector(low - 1e-5), sector(low + 1.0 / CELLS_PER_UNIT + 1e-5));
-                if low == high { low as u16 } else { low as u16 | UNSURE }
-            })
-            .collect();
+        let guesses = std::array::from_fn(|cell| {
+            let sector = |small: f32| {
+                let small = small.clamp(0.0, 0.7072);
+                let large = (1.0 - small * small).sqrt();
+                let (x, y) = if cell & CELLS == 0 { (large, small) } else { (small, large) };
+                let x = if cell & (2 * CELLS) == 0 { x } else { -x };
+                let y = if cell & (4 * CELLS) == 0 { y } else { -y };
+                sectors.by_formula(x, y)
+            };
+            let middle = (cell % CELLS) as f32;
+            let end = |side: f32| sector((middle + side) / CELLS_PER_UNIT);
+            let (low, high) = (end(-0.501), end(0.501));
+            if low == high { low as u16 } else { low as u16 | UNSURE }
+        });
+        sectors.guesses = Some(Box::new(guesses));
         sectors
     }
 
@@ -67,14 +67,13 @@ impl Sectors {
     /// The sector of a unit vector.
     #[inline]
     pub(crate) fn of(&self, x: f32, y: f32) -> usize {
-        if self.borders.is_empty() {
-            return self.by_formula(x, y);
-        }
+        let Some(guesses) = &self.guesses else { return self.by_formula(x, y) };
         let (ax, ay) = (x.abs(), y.abs());
         let (steep, small) = if ay > ax { (CELLS, ax) } else { (0, ay) };
         let quadrant = if x < 0.0 { 2 * CELLS } else { 0 } + if y < 0.0 { 4 * CELLS } else { 0 };
-        let cell = steep + quadrant + ((small * CELLS_PER_UNIT) as usize).min(CELLS - 1);
-        let guess = self.guesses[cell];
+        // 2^23 leaves the nearest whole number in the last bits.
+        let along = (small * CELLS_PER_UNIT + 8_388_608.0).to_bits() as usize % CELLS;
+        let guess = guesses[steep + quadrant + along];
         if guess & UNSURE == 0 {
             return usize::from(guess);
         }
