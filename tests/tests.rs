@@ -26,6 +26,8 @@ mod real_force;
 mod shadows;
 // Files of Taxim.
 mod taxim;
+// Heights of Taxim.
+mod taxim_heights;
 // Taxim's own images, stage by stage.
 mod taxim_stages;
 // The repository itself.

@@ -23,6 +23,8 @@ pub mod npz;
 mod patch;
 pub mod presses;
 mod raster;
+#[cfg(test)]
+mod reference;
 mod render;
 mod sensor;
 mod shading;

@@ -1,0 +1,259 @@
+//! The stages once more, as plain loops in f64 that follow their definition word by word. The fast ones are checked
+//! against them.
+
+use crate::convolve::mirrored;
+use crate::deform::gaussian;
+use crate::grid::{Grid, Plane};
+use gripgen_twin::TriMesh;
+use gripgen_twin::frames::Pose;
+
+/// Heights above the gel plane: every triangle into every row, with nothing left out.
+fn raster(mesh: &TriMesh, gel_from_mesh: &Pose, grid: &Grid) -> Plane {
+    let mut map = Plane::filled(grid.width_px, grid.height_px, f32::NEG_INFINITY);
+    let scale = 1.0 / grid.metres_per_px;
+    let (x0, y0) = (grid.width_px as f64 / 2.0 - 0.5, grid.height_px as f64 / 2.0 - 0.5);
+    let corner = |v: u32| {
+        let p = gel_from_mesh * mesh.vertices_m()[v as usize];
+        [p.x * scale + x0, p.y * scale + y0, -p.z * scale, f64::from(v)]
+    };
+    for triangle in mesh.triangles() {
+        let t = triangle.map(corner);
+        let [u, v] = [1, 2].map(|i| [0, 1, 2].map(|k| t[i][k] - t[0][k]));
+        let area = u[0] * v[1] - u[1] * v[0];
+        if area == 0.0 {
+            continue;
+        }
+        let slopes = ((u[2] * v[1] - v[2] * u[1]) / area, (v[2] * u[0] - u[2] * v[0]) / area);
+        let all = |k: usize| t.map(|corner| corner[k]);
+        let (bottom, top) = all(2).iter().fold((f64::MAX, f64::MIN), |(a, b), &h| (a.min(h), b.max(h)));
+        for row in 0..grid.height_px {
+            let y = row as f64;
+            // Where edges cross the row, each seen from its end with the lower number.
+            let mut crossings = Vec::new();
+            for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                let (a, b) = if t[a][3] <= t[b][3] { (t[a], t[b]) } else { (t[b], t[a]) };
+                if a[1] != b[1] && y >= a[1].min(b[1]) && y <= a[1].max(b[1]) {
+                    crossings.push(a[0] + (y - a[1]) * ((b[0] - a[0]) / (b[1] - a[1])));
+                }
+            }
+            let from = crossings.iter().fold(f64::INFINITY, |a, &b| a.min(b));
+            let to = crossings.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));
+            for column in (0..grid.width_px).filter(|&c| c as f64 >= from && c as f64 <= to) {
+                let along_row = t[0][2] + slopes.1 * (y - t[0][1]);
+                let height = along_row + slopes.0 * (column as f64 - t[0][0]);
+                let cell = &mut map.values[row * grid.width_px + column];
+                *cell = cell.max(height.clamp(bottom, top) as f32);
+            }
+        }
+    }
+    map
+}
+
+/// The press in pixels, by halving.
+fn press_px(heights: &Plane, wanted_px3: f64, thickness_px: f64) -> f64 {
+    let top = heights.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h));
+    let volume = |press: f64| -> f64 {
+        heights.values.iter().map(|&h| (f64::from(h) - f64::from(top) + press).max(0.0)).sum()
+    };
+    let (mut low, mut high) = (0.0, thickness_px);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if volume(middle) < wanted_px3 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// A blur along both axes as plain sums.
+fn blur(values: &[f64], width: usize, height: usize, size: u32) -> Vec<f64> {
+    let weights: Vec<f64> = gaussian(size).iter().map(|&w| f64::from(w)).collect();
+    let half = size as isize / 2;
+    let pass = |input: &[f64], dx: isize, dy: isize| -> Vec<f64> {
+        let at = |i: isize| {
+            let (x, y) = (i % width as isize, i / width as isize);
+            let sum = |(k, w): (usize, &f64)| {
+                let o = k as isize - half;
+                w * input[mirrored(y + o * dy, height) * width + mirrored(x + o * dx, width)]
+            };
+            weights.iter().enumerate().map(sum).sum()
+        };
+        (0..input.len() as isize).map(at).collect()
+    };
+    pass(&pass(values, 0, 1), 1, 0)
+}
+
+/// Taxim's deformation of the whole gel, whose height towards the camera is `gel` at rest: blur, restore, subtract.
+fn deform(depth: &Plane, gel: &[f64], kernels_px: &[u32], core_px: f64) -> Vec<f64> {
+    let start: Vec<f64> = depth.values.iter().zip(gel).map(|(&d, g)| f64::from(d) + g).collect();
+    let mut z = start.clone();
+    for &kernel in kernels_px {
+        z = blur(&z, depth.width, depth.height, kernel);
+        for i in 0..z.len() {
+            if depth.values[i] > core_px as f32 {
+                z[i] = start[i];
+            }
+        }
+    }
+    blur(&z, depth.width, depth.height, 5).iter().zip(gel).map(|(z, g)| z - g).collect()
+}
+
+mod tests {
+    use super::*;
+    use crate::colour::{ColourModel, Lambert, Light, shade};
+    use crate::sensor::{GelShape, Sensor};
+    use crate::{ClusteredMesh, Imprint, PressedGel, Renderer, SimdLevel, gradient, indent};
+    use gripgen_twin::Gel;
+    use gripgen_twin::frames::{pose, rotation_from_fixed_xyz};
+    use gripgen_twin::parts::{InvoluteGear, SteppedShaft};
+    use nalgebra::Vector3;
+
+    const GRID: Grid = Grid { width_px: 104, height_px: 78, metres_per_px: 0.25e-3 };
+    const KERNELS_PX: [u32; 4] = [31, 21, 11, 5];
+
+    fn scenes() -> Vec<(&'static str, TriMesh, Pose)> {
+        let at = |angles, z| pose(&rotation_from_fixed_xyz(angles), Vector3::new(0.3e-3, -0.2e-3, z));
+        let (shaft, gear) = (SteppedShaft::default().mesh(), InvoluteGear::default().mesh());
+        vec![
+            ("shaft", shaft.clone(), at([0.1, 0.02, 0.3], 12e-3)),
+            ("shaft, upright", shaft, at([0.0, 1.5, 0.2], 30e-3)),
+            ("gear", gear.clone(), at([0.3, 0.1, 0.0], 15e-3)),
+            ("gear, aside", gear, at([1.57, 0.0, 0.4], 20e-3)),
+        ]
+    }
+
+    fn sensor(gel_shape: GelShape) -> Sensor {
+        let light =
+            |azimuth_rad, colour| Light { azimuth_rad, elevation_rad: 0.4, colour, falloff: [0.3, 0.1] };
+        let lights = [light(0.2, [90.0, 0.0, 5.0]), light(2.3, [0.0, 80.0, 4.0])];
+        Sensor {
+            grid: GRID,
+            rest: [0, 1, 2].map(|_| vec![110.0; GRID.len()]),
+            noise_rgb: [1.5; 3],
+            colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&lights))),
+            gel_shape,
+            shadow: None,
+            pyramid: None,
+            ball_m: None,
+        }
+    }
+
+    fn gel() -> Gel {
+        Gel {
+            thickness_m: 4e-3,
+            width_m: 26e-3,
+            height_m: 19.5e-3,
+            shear_stiffness_n_per_m: 4e4,
+            kernels_px: KERNELS_PX.to_vec(),
+            restore_depth_fraction: 0.4,
+        }
+    }
+
+    /// Clusters, culling and the order of drawing change no bit of what is near enough to touch.
+    #[test]
+    fn clusters_draw_what_a_plain_loop_draws() {
+        for (name, mesh, at) in scenes() {
+            let clustered = ClusteredMesh::new(&mesh);
+            let plain = raster(&mesh, &at, &GRID);
+            let top = plain.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h));
+            assert!(top.is_finite(), "{name}");
+            for depth_px in [1.0, 16.0, f64::INFINITY] {
+                let ours = clustered.raster(&at, &GRID, depth_px);
+                let floor = (f64::from(top) - depth_px) as f32;
+                for (i, (&a, &b)) in ours.values.iter().zip(&plain.values).enumerate() {
+                    let expected = if b < floor { f32::NEG_INFINITY } else { b };
+                    assert!(a == expected, "{name}, pixel {i}, depth {depth_px}: {a}, not {b}");
+                }
+            }
+        }
+    }
+
+    /// A press draws no deeper than it must and ends where one of the whole part does.
+    #[test]
+    fn a_press_is_that_of_the_whole_part() {
+        for (name, mesh, at) in scenes() {
+            let clustered = ClusteredMesh::new(&mesh);
+            for shape in [GelShape::Flat, GelShape::Dome { sag_m: 0.6e-3 }] {
+                let (sensor, gel) = (sensor(shape), gel());
+                let rest = sensor.gel_shape.rest_px(&GRID).unwrap_or(Plane::filled(104, 78, 0.0));
+                let whole = raster(&mesh, &at, &GRID);
+                let above: Vec<f32> = whole.values.iter().zip(&rest.values).map(|(h, r)| h + r).collect();
+                let above = Plane { values: above, ..whole };
+                for force_n in [0.5, 10.0, 60.0] {
+                    let pressed = PressedGel { thickness_m: gel.thickness_m, imprint_m3_per_n: 1e-9 };
+                    let once = indent(&above, &GRID, &pressed, force_n).unwrap();
+                    let exact = press_px(&above, 1e-9 * force_n / GRID.metres_per_px.powi(3), 16.0);
+                    let found = once.press_depth_m / GRID.metres_per_px;
+                    assert!((found - exact).abs() < 1e-9, "{name}, {force_n} N: {found}, not {exact}");
+                    for level in SimdLevel::available() {
+                        let renderer = Renderer { sensor: &sensor, gel: &gel, level };
+                        let sunk = renderer.press(&clustered, &at, 1e-9, force_n).unwrap();
+                        assert!(sunk == once, "{name}, {force_n} N, {level:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    fn imprints(sensor: &Sensor) -> Vec<(&'static str, Imprint)> {
+        let (gel, level) = (gel(), SimdLevel::best());
+        let renderer = Renderer { sensor, gel: &gel, level };
+        let press = |(name, mesh, at): (&'static str, TriMesh, Pose)| {
+            (name, renderer.press(&ClusteredMesh::new(&mesh), &at, 1e-9, 20.0).unwrap())
+        };
+        scenes().into_iter().map(press).collect()
+    }
+
+    #[test]
+    fn surfaces_are_those_of_plain_sums() {
+        for shape in [GelShape::Flat, GelShape::Dome { sag_m: 0.6e-3 }] {
+            let (sensor, gel) = (sensor(shape), gel());
+            let rest = sensor.gel_shape.rest_px(&GRID).unwrap_or(Plane::filled(104, 78, 0.0));
+            let at_rest: Vec<f64> = rest.values.iter().map(|&r| -f64::from(r)).collect();
+            for (name, imprint) in imprints(&sensor) {
+                let core_px = 0.4 * imprint.press_depth_m / GRID.metres_per_px;
+                let exact = deform(&imprint.depth_px, &at_rest, &KERNELS_PX, core_px);
+                for level in SimdLevel::available() {
+                    let ours = Renderer { sensor: &sensor, gel: &gel, level }.surface(&imprint);
+                    let worst = ours.values.iter().zip(&exact).map(|(&a, b)| (f64::from(a) - b).abs());
+                    let worst = worst.fold(0.0, f64::max);
+                    assert!(worst < 1e-4, "{name}, {level:?}: {worst} px");
+                }
+            }
+        }
+    }
+
+    /// The fused walk over the part that is not flat gives the bits of the stages one by one, which give Lambert's
+    /// law in f64.
+    #[test]
+    fn colours_are_those_of_the_stages_and_of_the_law() {
+        let (sensor, gel) = (sensor(GelShape::Flat), gel());
+        let ColourModel::Lambert(lambert) = &sensor.colour else { unreachable!() };
+        let fields = lambert.coefficients();
+        for (name, imprint) in imprints(&sensor) {
+            let surface = Renderer { sensor: &sensor, gel: &gel, level: SimdLevel::best() }.surface(&imprint);
+            let (gx, gy) = gradient(&surface);
+            let staged = shade(&sensor.colour, &surface, &gx, &gy, None);
+            for level in SimdLevel::available() {
+                let change = Renderer { sensor: &sensor, gel: &gel, level }.change(&imprint);
+                assert!(change == staged, "{name}, {level:?}");
+            }
+            for i in (0..GRID.len()).step_by(7) {
+                let (x, y) = ((i % GRID.width_px) as f64, (i / GRID.width_px) as f64);
+                let (u, v) = ((x - 51.5) / 52.0, (y - 38.5) / 52.0);
+                let (sx, sy) = (f64::from(gx.values[i]), f64::from(gy.values[i]));
+                let length = (1.0 + sx * sx + sy * sy).sqrt();
+                let normal = [-sx / length, -sy / length, 1.0 / length - 1.0];
+                for channel in 0..3 {
+                    let terms = [1.0, u, v, u * u, u * v, v * v];
+                    let c = &fields[18 * channel..][..18];
+                    let exact: f64 = (0..18).map(|k| c[k] * terms[k % 6] * normal[k / 6]).sum();
+                    let ours = f64::from(staged[channel].values[i]);
+                    assert!((ours - exact).abs() < 1e-3, "{name}, pixel {i}: {ours}, not {exact}");
+                }
+            }
+        }
+    }
+}
