@@ -2,12 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
 
+mod scenes;
+
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use gripgen::physics::{
     Arm, FrictionCell, Grip, GripSetup, Held, JawFriction, Mount, Until, grip, pull_staircase,
 };
 use gripgen::record::{EncodeOptions, VIEW_RATE_HZ, encode};
-use gripgen::tactile::{Renderer, SimdLevel};
+use gripgen::tactile::{ClusteredMesh, Renderer, SimdLevel};
 use gripgen::twin::config::{ImageStorage, TraceStorage};
 use gripgen::twin::frames::Pose;
 use gripgen::twin::random::{Purpose, Stream};
@@ -111,12 +113,37 @@ fn tactile(c: &mut Criterion) {
             }
         }
         let p = &project.twin.parts[part];
-        let mesh = project.library.mesh(p).unwrap();
+        let mesh = project.library.clustered_mesh(p).unwrap();
         let pose = gripgen::twin::frames::world_from_gel(Jaw::Left, 0.03).inverse() * p.grips[0];
         let renderer =
             Renderer { sensor: &press.sensors.left, gel: &project.twin.gel.left, level: SimdLevel::best() };
         group.bench_function(BenchmarkId::new("press", part), |b| {
             b.iter(|| black_box(renderer.press(&mesh, &pose, p.imprint_m3_per_n, 40.0).unwrap()));
+        });
+    }
+}
+
+/// `tactile/ball/<what>/<vector unit>`: a bumpy ball of 50,000 triangles, from mesh to image.
+fn ball(c: &mut Criterion) {
+    let mut group = c.benchmark_group("tactile/ball");
+    group.sample_size(50).throughput(Throughput::Elements(1));
+    let project = project("gear", "rapier", "png");
+    let sensor = project.library.sensor(&project.twin.optics.left).unwrap();
+    let (mesh, at) = (ClusteredMesh::new(&scenes::bumpy_ball()), scenes::gel_from_ball());
+    for level in SimdLevel::available() {
+        let renderer = Renderer { sensor: &sensor, gel: &project.twin.gel.left, level };
+        let press = || renderer.press(&mesh, &at, scenes::IMPRINT_M3_PER_N, scenes::FORCE_N).unwrap();
+        let imprint = press();
+        let name = format!("{level:?}").to_lowercase();
+        group.bench_function(BenchmarkId::new("press", &name), |b| b.iter(|| black_box(press())));
+        group.bench_function(BenchmarkId::new("surface", &name), |b| {
+            b.iter(|| black_box(renderer.surface(&imprint)));
+        });
+        group.bench_function(BenchmarkId::new("change", &name), |b| {
+            b.iter(|| black_box(renderer.change(&imprint)));
+        });
+        group.bench_function(BenchmarkId::new("press_and_image", &name), |b| {
+            b.iter(|| black_box(renderer.image(Some(&press()), Some(7))));
         });
     }
 }
@@ -139,5 +166,5 @@ fn record(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, physics, tactile, record);
+criterion_group!(benches, physics, tactile, ball, record);
 criterion_main!(benches);

@@ -449,7 +449,7 @@ impl Kernel for Columns<'_> {
             if L::MANY_REGISTERS {
                 self.blocks::<L, 8, true>();
             } else {
-                self.blocks::<L, 6, false>();
+                self.blocks::<L, 4, true>();
             }
         }
     }

@@ -59,7 +59,17 @@ impl Renderer<'_> {
     /// The image of an imprint, or of the gel at rest: stages `deform` to `noise`. `noise_key` chooses the noise;
     /// without it there is none, and the gel at rest gives the rest frame of the sensor.
     pub fn image(&self, imprint: Option<&Imprint>, noise_key: Option<u64>) -> TactileImage {
-        finish(self.sensor, imprint.map(|i| self.change(i)).as_ref(), noise_key)
+        let Some(imprint) = imprint else { return finish(self.sensor, None, noise_key) };
+        let lit = with_scratch(self, |scratch, prepared| match &self.sensor.colour {
+            ColourModel::Lambert(lambert) if self.only_where_raised(prepared) => {
+                self.deform(imprint, scratch, prepared);
+                let Scratch { deform, change, .. } = scratch;
+                let done = |change: &[Plane; 3]| finish(self.sensor, Some(change), noise_key);
+                Some(change.with(lambert, deform.surface(), self.level, done))
+            }
+            _ => None,
+        });
+        lit.unwrap_or_else(|| finish(self.sensor, Some(&self.change(imprint)), noise_key))
     }
 
     /// What an imprint changes in the image, in grey levels of red, green and blue: stages `deform` to `shadow`. The

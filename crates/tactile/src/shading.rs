@@ -1,6 +1,6 @@
 //! Stages `gradient` and `shade` in one walk over the part of the surface that is not flat.
 
-use crate::colour::{ColourModel, LambertRow, shade};
+use crate::colour::{ColourModel, Lambert, LambertRow, shade};
 use crate::convolve::{Area, Sheet};
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
@@ -9,20 +9,12 @@ use std::ops::Range;
 /// Colour change of a surface that is 0 beyond `area` and within its outermost two pixels, with the bits of
 /// [`crate::gradient`] and [`shade`].
 pub(crate) fn change(model: &ColourModel, sheet: &Sheet, area: Area, level: SimdLevel) -> [Plane; 3] {
-    let (w, h) = (sheet.width, sheet.height);
-    let zeros = || Plane::filled(w, h, 0.0);
+    let zeros = || Plane::filled(sheet.width, sheet.height, 0.0);
     let mut change = [zeros(), zeros(), zeros()];
-    if area.is_empty() || w < 3 || h < 3 {
-        return change;
-    }
-    let inner = |(start, end): (usize, usize), n: usize| {
-        (if start == 0 { 0 } else { start + 1 })..(if end == n { n } else { end - 1 })
-    };
-    let slopes = Slopes { sheet, columns: inner(area.x, w), rows: inner(area.y, h) };
+    let Some(slopes) = Slopes::of(sheet, area) else { return change };
     match model {
         ColourModel::Lambert(lambert) => {
-            let row = lambert.row(w, h);
-            level.run(ShadeRows { slopes, row, change: &mut change });
+            lambert_change(lambert, slopes, &mut change, level);
             change
         }
         // Models that work on whole planes.
@@ -35,6 +27,45 @@ pub(crate) fn change(model: &ColourModel, sheet: &Sheet, area: Area, level: Simd
     }
 }
 
+/// Memory for the change of colour of one image; zeros between images.
+#[derive(Debug, Default)]
+pub(crate) struct ChangeScratch {
+    planes: Option<[Plane; 3]>,
+}
+
+impl ChangeScratch {
+    /// As [`change`] for lights, without new memory; `f` gets the planes.
+    pub(crate) fn with<T>(
+        &mut self,
+        lambert: &Lambert,
+        (sheet, area): (&Sheet, Area),
+        level: SimdLevel,
+        f: impl FnOnce(&[Plane; 3]) -> T,
+    ) -> T {
+        let zeros = || Plane::filled(sheet.width, sheet.height, 0.0);
+        let size = |planes: &[Plane; 3]| (planes[0].width, planes[0].height);
+        let planes = match self.planes.take().filter(|planes| size(planes) == (sheet.width, sheet.height)) {
+            Some(planes) => self.planes.insert(planes),
+            None => self.planes.insert([zeros(), zeros(), zeros()]),
+        };
+        if let Some(slopes) = Slopes::of(sheet, area) {
+            lambert_change(lambert, slopes, planes, level);
+        }
+        let result = f(planes);
+        for plane in planes {
+            for y in area.y.0..area.y.1 {
+                plane.values[y * sheet.width..][area.x.0..area.x.1].fill(0.0);
+            }
+        }
+        result
+    }
+}
+
+fn lambert_change(lambert: &Lambert, slopes: Slopes<'_>, change: &mut [Plane; 3], level: SimdLevel) {
+    let row = lambert.row(slopes.sheet.width, slopes.sheet.height);
+    level.run(ShadeRows { slopes, row, change });
+}
+
 /// Where slopes are needed.
 struct Slopes<'a> {
     sheet: &'a Sheet,
@@ -42,7 +73,19 @@ struct Slopes<'a> {
     rows: Range<usize>,
 }
 
-impl Slopes<'_> {
+impl<'a> Slopes<'a> {
+    /// Where the slope of a surface that is 0 beyond the inner pixels of an area is not; `None` if nowhere.
+    fn of(sheet: &'a Sheet, area: Area) -> Option<Self> {
+        let (w, h) = (sheet.width, sheet.height);
+        if area.is_empty() || w < 3 || h < 3 {
+            return None;
+        }
+        let inner = |(start, end): (usize, usize), n: usize| {
+            (if start == 0 { 0 } else { start + 1 })..(if end == n { n } else { end - 1 })
+        };
+        Some(Self { sheet, columns: inner(area.x, w), rows: inner(area.y, h) })
+    }
+
     /// The slopes of a row: those of the nearest pixel that has all its neighbours.
     #[inline(always)]
     fn row(&self, y: usize, gx: &mut [f32], gy: &mut [f32]) {

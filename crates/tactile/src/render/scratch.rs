@@ -5,6 +5,7 @@ use crate::deform::{BlurredRest, DeformScratch, weights};
 use crate::grid::{Grid, Plane};
 use crate::raster::HeightMap;
 use crate::sensor::GelShape;
+use crate::shading::ChangeScratch;
 use std::cell::RefCell;
 
 /// Sensors with gels that a thread keeps prepared: those of two jaws, twice.
@@ -15,6 +16,7 @@ const PREPARED: usize = 4;
 pub(super) struct Scratch {
     pub(super) map: HeightMap,
     pub(super) deform: DeformScratch,
+    pub(super) change: ChangeScratch,
 }
 
 /// What depends on sensor and gel only.

@@ -1,0 +1,77 @@
+//! Times of the tactile stages on one core, as the JSON that `benches/peers/tactile.py` reads:
+//! `cargo bench --bench tactile_stages -- FILE`. The press and the surface that belong to it go into FILE.f32, so that
+//! the peers work on the same contact.
+
+#![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
+
+mod scenes;
+
+use gripgen::tactile::{
+    ClusteredMesh, Plane, PressedGel, Renderer, SimdLevel, finish, gradient, indent, shade,
+};
+use gripgen::twin::Jaw;
+use gripgen::{Location, Project};
+use std::hint::black_box;
+use std::time::Instant;
+
+fn main() {
+    let file = std::env::args().skip(1).find(|a| !a.starts_with("--"));
+    let project = Project::load(&Location::parse("asset:configs/quickstart.toml"), &[]).unwrap();
+    let twin = &project.twin;
+    let sensor = project.library.sensor(&twin.optics[Jaw::Left]).unwrap();
+    let (gel, grid) = (&twin.gel[Jaw::Left], sensor.grid);
+    let (mesh, at) = (scenes::bumpy_ball(), scenes::gel_from_ball());
+    let clustered = ClusteredMesh::new(&mesh);
+    let best = Renderer { sensor: &sensor, gel, level: SimdLevel::best() };
+    let press =
+        |r: &Renderer<'_>| r.press(&clustered, &at, scenes::IMPRINT_M3_PER_N, scenes::FORCE_N).unwrap();
+    let imprint = press(&best);
+    let surface = best.surface(&imprint);
+    let depth_px = gel.thickness_m / grid.metres_per_px;
+    let heights = clustered.raster(&at, &grid, depth_px);
+    let pressed = PressedGel { thickness_m: gel.thickness_m, imprint_m3_per_n: scenes::IMPRINT_M3_PER_N };
+    let (along_x, along_y) = gradient(&surface);
+    let change = shade(&sensor.colour, &surface, &along_x, &along_y, None);
+    let contact = imprint.depth_px.values.iter().filter(|&&d| d > 0.0).count() as f64 / grid.len() as f64;
+
+    let mut stages = serde_json::Map::new();
+    let mut stage = |name: String, us: f64| {
+        println!("{name:<28} {us:8.1} us");
+        stages.insert(name, us.into());
+    };
+    stage("raster, whole gel".into(), us(|| clustered.raster(&at, &grid, depth_px)));
+    stage("indent".into(), us(|| indent(&heights, &grid, &pressed, scenes::FORCE_N)));
+    stage("gradient".into(), us(|| gradient(&surface)));
+    stage("shade".into(), us(|| shade(&sensor.colour, &surface, &along_x, &along_y, None)));
+    stage("finish".into(), us(|| finish(&sensor, Some(&change), Some(7))));
+    for level in SimdLevel::available().into_iter().filter(|&l| l != SimdLevel::Portable) {
+        let renderer = Renderer { level, ..best };
+        let name = |stage: &str| format!("{stage}, {}", format!("{level:?}").to_lowercase());
+        stage(name("press"), us(|| press(&renderer)));
+        stage(name("surface"), us(|| renderer.surface(&imprint)));
+        stage(name("change"), us(|| renderer.change(&imprint)));
+        stage(name("image"), us(|| renderer.image(Some(&imprint), Some(7))));
+        stage(name("press and image"), us(|| renderer.image(Some(&press(&renderer)), Some(7))));
+    }
+    println!("{} triangles, {:.1} % of the image in contact", mesh.triangles().len(), 100.0 * contact);
+    let Some(file) = file else { return };
+    let json = serde_json::json!({
+        "width_px": grid.width_px, "height_px": grid.height_px, "triangles": mesh.triangles().len(),
+        "contact_share": contact, "press_px": imprint.press_depth_m / grid.metres_per_px,
+        "kernels_px": gel.kernels_px, "restore_depth_fraction": gel.restore_depth_fraction, "us": stages,
+    });
+    std::fs::write(&file, serde_json::to_string_pretty(&json).unwrap()).unwrap();
+    let bytes = |plane: &Plane| plane.values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    std::fs::write(file + ".f32", [bytes(&imprint.depth_px), bytes(&surface)].concat()).unwrap();
+}
+
+/// The shortest of many runs, which is the one that was not interrupted, in microseconds.
+fn us<T>(mut run: impl FnMut() -> T) -> f64 {
+    let mut best = f64::INFINITY;
+    for _ in 0..300 {
+        let start = Instant::now();
+        black_box(run());
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    1e6 * best
+}
