@@ -17,7 +17,7 @@
 
 mod pyramid;
 
-pub(crate) use pyramid::{SURROUNDINGS, cell_px};
+pub(crate) use pyramid::{AROUND_HEIGHTS, SURROUNDINGS, cell_px};
 
 use crate::grid::{Grid, Plane};
 use pyramid::{DERIVATIVES, Surroundings, double, surroundings};
@@ -33,6 +33,9 @@ const NORMAL_TERMS: usize = (NORMAL_DEGREE + 1) * (NORMAL_DEGREE + 2) / 2 - 1;
 
 /// Terms of a displaced pixel.
 pub(crate) const NEAR: usize = NORMAL_TERMS + (HEIGHT_DEGREE + 1) * (HEIGHT_DEGREE + 2) / 2;
+
+/// The term that is the height alone.
+pub(crate) const HEIGHT_INPUT: usize = NORMAL_TERMS;
 
 /// Monomials `u^i v^j` of degree at most 3, and of degree at most 2. Order: `1, u, v, u^2, u v, v^2, u^3, ...`.
 pub(crate) const NEAR_FIELD: usize = 10;

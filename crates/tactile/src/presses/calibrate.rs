@@ -7,8 +7,10 @@ mod samples;
 
 pub use ridge::Smoothness;
 
+use super::circle::{is_doubtful, reference_frame};
 use super::compare::{CompareError, PressComparison, PressScore, predict_ball, score_press};
 use super::{Circle, Press, PressSet};
+use crate::colour::regressor::AROUND_HEIGHTS;
 use crate::colour::{ColourModel, Regressor, shade};
 use crate::gradient::gradient;
 use crate::grid::Grid;
@@ -24,10 +26,10 @@ use samples::{GelModel, Samples};
 pub const FEWEST_PRESSES: usize = 4;
 
 /// Sizes of the blurs of the deformation, in millimetres.
-const KERNELS_MM: [f64; 5] = [2.1, 1.5, 0.62, 0.32, 0.15];
+const KERNELS_MM: [f64; 3] = [2.1, 1.0, 0.5];
 
 /// Share of the press below which the gel follows the ball.
-const RESTORE_DEPTH_FRACTION: f64 = 0.25;
+const RESTORE_DEPTH_FRACTION: f64 = 0.4;
 
 /// Sags at the corners that are tried for a domed gel.
 const DOME_SAGS_M: [f64; 2] = [0.7e-3, 1.4e-3];
@@ -35,8 +37,14 @@ const DOME_SAGS_M: [f64; 2] = [0.7e-3, 1.4e-3];
 /// A dome has to be better than a flat gel by this factor.
 const DOME_GAIN: f64 = 0.98;
 
+/// Height of a gel pressed flat as a whole, see `Samples::flat`.
+const FLAT_HEIGHT_MM: f32 = 1.0;
+
 /// Features of the surroundings may exceed those of the presses by this factor, since they are sampled on cells.
 const AROUND_MARGIN: f32 = 1.1;
+
+/// Limit of what is not limited.
+const NO_LIMIT: f32 = 1e6;
 
 /// How to calibrate.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +72,10 @@ pub struct Calibration {
     pub predicted: Vec<TactileImage>,
     /// What the last fit, to all presses, chose.
     pub smoothness: Smoothness,
+    /// Where each press was taken to touch: as marked, or as found where nobody marked it.
+    pub circles: Vec<Circle>,
+    /// Presses whose mark shows no contact although the image does: scored, but not fitted to.
+    pub doubtful: Vec<String>,
 }
 
 /// Why presses cannot be calibrated with.
@@ -112,8 +124,8 @@ pub enum CalibrateError {
         /// Radius of the ball.
         ball_mm: f64,
     },
-    /// Nobody marked the contact.
-    #[error("press `{press}` has no centre and radius")]
+    /// Nobody marked the contact, and none is to be seen.
+    #[error("press `{press}` has no centre and radius, and no contact is to be seen in it")]
     NoCircle {
         /// The press.
         press: String,
@@ -143,23 +155,41 @@ pub enum CalibrateError {
 type Marked<'a> = (&'a Press, Circle);
 
 /// Calibrates a sensor, and says how well it predicts presses that it has not seen.
+///
+/// Contacts that nobody marked are looked for.
 pub fn calibrate_presses(set: &PressSet, options: &CalibrateOptions) -> Result<Calibration, CalibrateError> {
     let grid = check(set)?;
+    if set.presses.iter().any(|press| press.circle.is_none()) {
+        let mut marked = set.clone();
+        marked.mark_missing();
+        return calibrate_marked(&marked, options, grid);
+    }
+    calibrate_marked(set, options, grid)
+}
+
+fn calibrate_marked(
+    set: &PressSet,
+    options: &CalibrateOptions,
+    grid: Grid,
+) -> Result<Calibration, CalibrateError> {
     let marked = set.presses.iter().map(|p| marked(p, set, &grid)).collect::<Result<Vec<_>, _>>()?;
+    let trusted = trusted(set, &marked);
     let shapes = match &options.gel_shape {
         Some(shape) => vec![shape.clone()],
-        None => {
-            [GelShape::Flat].into_iter().chain(DOME_SAGS_M.map(|sag_m| GelShape::Dome { sag_m })).collect()
-        }
+        None => std::iter::once(GelShape::Flat)
+            .chain(DOME_SAGS_M.map(|sag_m| GelShape::Dome { sag_m }))
+            .collect(),
     };
     let candidates: Vec<Candidate> =
         shapes.into_iter().map(|shape| Candidate::new(shape, &marked, set.ball_m, &grid)).collect();
-    let fit = Fit { set, grid, marked: &marked, candidates: &candidates };
+    let flat = Moments::of_inputs(&Samples::flat(FLAT_HEIGHT_MM));
+    let fit = Fit { set, grid, marked: &marked, candidates: &candidates, flat };
 
     let folds = options.folds.clamp(2, marked.len());
     let mut predicted = vec![None; marked.len()];
     for fold in 0..folds {
-        let (unseen, seen): (Vec<usize>, Vec<usize>) = (0..marked.len()).partition(|i| i % folds == fold);
+        let (unseen, mut seen): (Vec<usize>, Vec<usize>) = (0..marked.len()).partition(|i| i % folds == fold);
+        seen.retain(|&i| trusted[i]);
         let (sensor, _) = fit.fit(&seen)?;
         for i in unseen {
             predicted[i] = Some(predict_ball(&marked[i].1, set.ball_m, &sensor));
@@ -172,9 +202,24 @@ pub fn calibrate_presses(set: &PressSet, options: &CalibrateOptions) -> Result<C
     });
     let each = scored.collect::<Result<Vec<_>, MetricError>>()?;
     let held_out = PressComparison::from_each(each).ok_or(CompareError::Empty)?;
-    let everything: Vec<usize> = (0..marked.len()).collect();
+    let everything: Vec<usize> = (0..marked.len()).filter(|&i| trusted[i]).collect();
     let (sensor, smoothness) = fit.fit(&everything)?;
-    Ok(Calibration { sensor, held_out, predicted, smoothness })
+    let circles = marked.iter().map(|(_, circle)| *circle).collect();
+    let doubtful = (0..marked.len()).filter(|&i| !trusted[i]).map(|i| marked[i].0.name.clone()).collect();
+    Ok(Calibration { sensor, held_out, predicted, smoothness, circles, doubtful })
+}
+
+/// Which presses are marked where something is to be seen. Should that leave too few of them, it is the search that
+/// fails on this sensor, and all are trusted.
+fn trusted(set: &PressSet, marked: &[Marked<'_>]) -> Vec<bool> {
+    let ball_radius_px = set.ball_m / 2.0 / set.metres_per_px;
+    let Some(rest) = reference_frame(set) else { return vec![true; marked.len()] };
+    let trusted: Vec<bool> = marked
+        .iter()
+        .map(|(press, circle)| !is_doubtful(&press.image, &rest, circle, ball_radius_px))
+        .collect();
+    let count = trusted.iter().filter(|&&t| t).count();
+    if count < FEWEST_PRESSES || 4 * count < 3 * marked.len() { vec![true; marked.len()] } else { trusted }
 }
 
 /// One gel to try, with what the presses look like on it.
@@ -225,6 +270,7 @@ struct Fit<'a> {
     grid: Grid,
     marked: &'a [Marked<'a>],
     candidates: &'a [Candidate],
+    flat: Moments,
 }
 
 impl Fit<'_> {
@@ -243,6 +289,8 @@ impl Fit<'_> {
         };
         rest = rest_frame(&presses, change, raw, &self.grid);
         colour = self.colours(candidate, &smoothness, seen, &rest)?;
+        // A 64th of a grey level is far below the noise, and packs well.
+        rest.iter_mut().flatten().for_each(|v| *v = (*v * 64.0).round() / 64.0);
         let sensor = Sensor {
             shadow: None,
             grid: self.grid,
@@ -258,10 +306,10 @@ impl Fit<'_> {
 
     /// The gel and the smoothness with the least error on presses of `seen` that are held out in turn.
     fn choose(&self, seen: &[usize], rest: &[Vec<f32>; 3]) -> (&Candidate, Smoothness) {
-        let mut best: Option<(&Candidate, Folds, f64)> = None;
+        let mut best: Option<(&Candidate, Folds<'_>, f64)> = None;
         for candidate in self.candidates {
             let moments = candidate.coloured(self.marked, seen, rest);
-            let folds = Folds::split(&moments.iter().collect::<Vec<_>>(), 4);
+            let folds = Folds::split(&moments, &self.flat, 4);
             let error = folds.error(&Smoothness::USUAL);
             if best.as_ref().is_none_or(|(_, _, least)| error < DOME_GAIN * least) {
                 best = Some((candidate, folds, error));
@@ -282,7 +330,7 @@ impl Fit<'_> {
         for moments in candidate.coloured(self.marked, seen, rest) {
             sums.add(&moments);
         }
-        let solution = solve(&sums, smoothness).ok_or(CalibrateError::Nothing)?;
+        let solution = solve(&sums, &self.flat, smoothness).ok_or(CalibrateError::Nothing)?;
         let (near, around) = solution.near_and_around();
         let largest = seen.iter().map(|&i| &candidate.samples[i].largest);
         let (mut slope_limit, mut height_limit_mm) = (0.0f32, 0.0f32);
@@ -292,6 +340,9 @@ impl Fit<'_> {
             height_limit_mm = height_limit_mm.max(*height);
             around_limit.iter_mut().zip(features).for_each(|(l, f)| *l = l.max(AROUND_MARGIN * f));
         }
+        // Heights alone may grow: over a wide flat contact they cancel, see `Samples::flat`.
+        height_limit_mm = NO_LIMIT;
+        AROUND_HEIGHTS.iter().for_each(|&level| around_limit[level] = NO_LIMIT);
         Ok(ColourModel::Regressor(Box::new(Regressor {
             mm_per_px: self.grid.metres_per_px * 1e3,
             near,

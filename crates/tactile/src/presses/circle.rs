@@ -11,6 +11,9 @@ const ANGLES: usize = 72;
 const INSIDE: f64 = 1.0;
 const OUTSIDE: f64 = 1.3;
 
+/// A marked circle is doubtful if it holds less than this share of the contrast that there is.
+const DOUBTFUL: f64 = 0.3;
+
 /// At most so many presses make the frame that a press is compared with, where there is no rest frame.
 const MEDIAN_OF: usize = 15;
 
@@ -23,17 +26,57 @@ const LEAST_CHANGE: f32 = 6.0;
 /// centre of its largest values; the circle found has the largest mean difference between just inside and just
 /// outside. `None` where nothing differs. `rest` has one plane a channel.
 pub fn find_circle(image: &TactileImage, rest: &[Vec<f32>; 3], ball_radius_px: f64) -> Option<Circle> {
-    let change = smoothed(&change(image, rest), ((ball_radius_px / 12.0) as usize).clamp(1, 6));
+    find_in(&smooth_change(image, rest, ball_radius_px), ball_radius_px)
+}
+
+/// Whether a marked circle holds less than [`DOUBTFUL`] of the contrast of the circle that is found.
+pub(super) fn is_doubtful(
+    image: &TactileImage,
+    rest: &[Vec<f32>; 3],
+    marked: &Circle,
+    ball_radius_px: f64,
+) -> bool {
+    let change = smooth_change(image, rest, ball_radius_px);
+    let directions = directions();
+    find_in(&change, ball_radius_px).is_some_and(|found| {
+        contrast(&change, marked, &directions) < DOUBTFUL * contrast(&change, &found, &directions)
+    })
+}
+
+fn smooth_change(image: &TactileImage, rest: &[Vec<f32>; 3], ball_radius_px: f64) -> Plane {
+    smoothed(&change(image, rest), ((ball_radius_px / 12.0) as usize).clamp(1, 6))
+}
+
+fn find_in(change: &Plane, ball_radius_px: f64) -> Option<Circle> {
     let mut sorted = change.values.clone();
     sorted.sort_by(f32::total_cmp);
     let high = sorted[(sorted.len() - 1) * 995 / 1000];
     if high < LEAST_CHANGE {
         return None;
     }
-    let start = start(&change, 0.5 * high, ball_radius_px);
-    let best = climb(&change, start, ball_radius_px);
+    let start = start(change, 0.5 * high, ball_radius_px);
+    let best = climb(change, start, ball_radius_px);
     let inside = |v: f64, n: usize| (-0.5..=n as f64 - 0.5).contains(&v);
     (inside(best.x_px, change.width) && inside(best.y_px, change.height)).then_some(best)
+}
+
+impl PressSet {
+    /// Looks for the contact of each press that nobody marked; how many were found.
+    pub fn mark_missing(&mut self) -> usize {
+        if self.presses.iter().all(|press| press.circle.is_some()) {
+            return 0;
+        }
+        let Some(rest) = reference_frame(self) else { return 0 };
+        let ball_radius_px = self.ball_m / 2.0 / self.metres_per_px;
+        let mut found = 0;
+        for press in self.presses.iter_mut().filter(|press| press.circle.is_none()) {
+            if press.image.rgb.len() == 3 * rest[0].len() {
+                press.circle = find_circle(&press.image, &rest, ball_radius_px);
+                found += usize::from(press.circle.is_some());
+            }
+        }
+        found
+    }
 }
 
 /// A frame to compare presses with: the one without contact, or the median over the presses.
@@ -118,14 +161,14 @@ fn start(change: &Plane, threshold: f32, ball_radius_px: f64) -> Circle {
     Circle { x_px: centre.0, y_px: centre.1, radius_px }
 }
 
+fn directions() -> Vec<(f64, f64)> {
+    let angle = |k: usize| k as f64 / ANGLES as f64 * 2.0 * std::f64::consts::PI;
+    (0..ANGLES).map(|k| (libm::cos(angle(k)), libm::sin(angle(k)))).collect()
+}
+
 /// Pattern search with halving steps.
 fn climb(change: &Plane, start: Circle, ball_radius_px: f64) -> Circle {
-    let directions: Vec<(f64, f64)> = (0..ANGLES)
-        .map(|k| {
-            let angle = k as f64 / ANGLES as f64 * 2.0 * std::f64::consts::PI;
-            (libm::cos(angle), libm::sin(angle))
-        })
-        .collect();
+    let directions = directions();
     let score = |c: &Circle| contrast(change, c, &directions);
     let mut best = start;
     let mut best_score = score(&best);

@@ -29,8 +29,8 @@ pub enum CompareError {
         /// Width and height of the sensor.
         wanted: (u32, u32),
     },
-    /// Nobody marked where the ball touches.
-    #[error("press `{press}` has no centre and radius")]
+    /// Nobody marked where the ball touches, and no contact is to be seen.
+    #[error("press `{press}` has no centre and radius, and no contact is to be seen in it")]
     NoCircle {
         /// The press.
         press: String,
@@ -91,8 +91,14 @@ impl PressComparison {
     }
 }
 
-/// Compares the images that `sensor` predicts for the marked contacts with the real ones.
+/// Compares the images that `sensor` predicts for the contacts with the real ones. Contacts that nobody marked are
+/// looked for.
 pub fn compare_presses(set: &PressSet, sensor: &Sensor) -> Result<PressComparison, CompareError> {
+    let mut completed = None;
+    if set.presses.iter().any(|press| press.circle.is_none()) {
+        completed.insert(set.clone()).mark_missing();
+    }
+    let set = completed.as_ref().unwrap_or(set);
     let mut each = Vec::with_capacity(set.presses.len());
     for press in &set.presses {
         let predicted = predict_press(press, set.ball_m, sensor)?;

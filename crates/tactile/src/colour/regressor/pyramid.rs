@@ -17,6 +17,9 @@ pub(super) const DERIVATIVES: usize = 10;
 /// Features of the surroundings.
 pub(crate) const SURROUNDINGS: usize = LEVELS * DERIVATIVES;
 
+/// The features that are the height itself, one a level.
+pub(crate) const AROUND_HEIGHTS: [usize; LEVELS] = [0, DERIVATIVES, 2 * DERIVATIVES, 3 * DERIVATIVES];
+
 /// Side of a cell that is aimed at, in millimetres.
 const CELL_MM: f64 = 0.24;
 

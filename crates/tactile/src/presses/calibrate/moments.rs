@@ -129,6 +129,13 @@ impl Moments {
         self.weight += other.weight;
     }
 
+    /// Adds the products, and nothing else, of pixels without change of colour.
+    pub(super) fn add_unchanged(&mut self, other: &Self, scale: f64) {
+        for (s, o) in self.pairs.iter_mut().zip(&other.pairs) {
+            s.iter_mut().zip(o).for_each(|(s, o)| *s += scale * o);
+        }
+    }
+
     /// Sum of the products of two features, each an input and exponents of its monomial.
     pub(super) fn product(&self, (a, (i, j)): Feature, (b, (k, l)): Feature) -> f64 {
         self.pairs[pair(a, b)][monomial(i + k, j + l)]

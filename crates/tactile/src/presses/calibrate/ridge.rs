@@ -37,11 +37,18 @@ pub(super) struct Solution {
     coefficients: DMatrix<f64>,
 }
 
+/// Weight of the gel pressed flat, of which nothing is known but that its colour hardly changes, beside all pixels.
+const FLAT_WEIGHT: f64 = 0.001;
+
 /// The coefficients with the least squared error plus ridge; `None` if the sums hold no information.
-pub(super) fn solve(sums: &Moments, smoothness: &Smoothness) -> Option<Solution> {
+pub(super) fn solve(sums: &Moments, flat: &Moments, smoothness: &Smoothness) -> Option<Solution> {
     let features = features();
     let weight = sums.energy_and_weight().1;
-    let scale: Vec<f64> = features.iter().map(|&f| (sums.product(f, f) / weight).max(1e-18).sqrt()).collect();
+    let scale: Vec<f64> =
+        features.iter().map(|&f| (sums.product(f, f) / weight).max(1e-18).sqrt()).collect();
+    let mut all = sums.clone();
+    all.add_unchanged(flat, FLAT_WEIGHT * weight);
+    let sums = &all;
     let n = features.len();
     let mut gram = gram(sums, &features);
     for (j, mut column) in gram.column_iter_mut().enumerate() {
@@ -107,11 +114,14 @@ impl Solution {
 }
 
 /// Presses split into those that a fit sees and those that it does not, several times.
-pub(super) struct Folds(Vec<(Moments, Moments)>);
+pub(super) struct Folds<'a> {
+    folds: Vec<(Moments, Moments)>,
+    flat: &'a Moments,
+}
 
-impl Folds {
+impl<'a> Folds<'a> {
     /// Press i is unseen in fold `i % folds`.
-    pub(super) fn split(presses: &[&Moments], folds: usize) -> Self {
+    pub(super) fn split(presses: &[Moments], flat: &'a Moments, folds: usize) -> Self {
         let folds = folds.min(presses.len()).max(2);
         let split = |fold: usize| {
             let (mut seen, mut unseen) = (Moments::zero(), Moments::zero());
@@ -120,15 +130,15 @@ impl Folds {
             }
             (seen, unseen)
         };
-        Self((0..folds).map(split).collect())
+        Self { folds: (0..folds).map(split).collect(), flat }
     }
 
     /// Mean squared error on unseen presses.
     pub(super) fn error(&self, smoothness: &Smoothness) -> f64 {
         let error = |(seen, unseen): &(Moments, Moments)| {
-            solve(seen, smoothness).map_or(f64::INFINITY, |solution| solution.error_on(unseen))
+            solve(seen, self.flat, smoothness).map_or(f64::INFINITY, |solution| solution.error_on(unseen))
         };
-        self.0.iter().map(error).sum::<f64>() / self.0.len() as f64
+        self.folds.iter().map(error).sum::<f64>() / self.folds.len() as f64
     }
 
     /// The stiffest choice whose error is within one part in a hundred of the least, and its error.

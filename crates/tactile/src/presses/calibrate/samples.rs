@@ -3,7 +3,7 @@
 use super::super::compare::ball_imprint;
 use super::super::{Circle, Press};
 use crate::colour::regressor::{
-    NEAR, Place, SURROUNDINGS, around_planes, between_cells, cell_px, limited_normal, near_terms,
+    AROUND_HEIGHTS, HEIGHT_INPUT, NEAR, Place, SURROUNDINGS, around_planes, between_cells, cell_px, limited_normal, near_terms,
 };
 use crate::deform::{BlurredRest, deform};
 use crate::gradient::gradient;
@@ -16,6 +16,9 @@ pub(super) const INPUTS: usize = NEAR + SURROUNDINGS;
 
 /// Zones around the contact: distance from its rim up to which they reach, and the pixels drawn from them.
 const ZONES_MM: [(f64, usize); 3] = [(0.8, 1500), (4.2, 1000), (f64::INFINITY, 600)];
+
+/// Places along a side at which the gel pressed flat is looked at.
+const FLAT_SIDE: usize = 9;
 
 /// A gel to fit: its shape at rest and its deformation.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,6 +83,26 @@ impl Samples {
             around.iter().map(magnitude).collect(),
         );
         Self { pixels, weights, inputs, places, largest }
+    }
+
+    /// A gel pressed flat as a whole, to `height_mm`: no slope anywhere, so its colour is taken to stay. Balls do not
+    /// show this; without it the fit would make up what a wide flat part looks like.
+    pub(super) fn flat(height_mm: f32) -> Self {
+        let mut input = [0.0; INPUTS];
+        input[HEIGHT_INPUT] = height_mm;
+        for level in AROUND_HEIGHTS {
+            input[NEAR + level] = height_mm;
+        }
+        let places: Vec<[f32; 2]> = (0..FLAT_SIDE * FLAT_SIDE)
+            .map(|i| [i % FLAT_SIDE, i / FLAT_SIDE].map(|k| 2.0 * (k as f32 + 0.5) / FLAT_SIDE as f32 - 1.0))
+            .collect();
+        Self {
+            pixels: (0..places.len()).collect(),
+            weights: vec![1.0 / places.len() as f32; places.len()],
+            inputs: places.iter().flat_map(|_| input).collect(),
+            places,
+            largest: (0.0, 0.0, vec![0.0; SURROUNDINGS]),
+        }
     }
 
     /// Colour of each pixel against a rest frame.
