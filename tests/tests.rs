@@ -16,6 +16,8 @@ mod large;
 mod mechanics;
 // Numbers that Wucherer et al. 2023 print.
 mod paper;
+// Presses of a ball into a real sensor.
+mod presses;
 // Labels against closed forms, through the whole pipeline.
 mod pull;
 // What is written is what was simulated.

@@ -134,7 +134,7 @@ impl Sensor {
             ColourModel::Lambert(lambert) if !lambert.is_finite() => {
                 return Err(SensorError::NotFinite { key: "lambert" });
             }
-            ColourModel::Regressor(model) if !model.is_finite() => {
+            ColourModel::Regressor(model) if !model.is_usable() => {
                 return Err(SensorError::NotFinite {
                     key: "regressor_near, regressor_around, regressor_limits",
                 });

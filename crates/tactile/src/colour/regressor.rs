@@ -16,6 +16,8 @@
 //! Every term is 0 for a gel at rest: no contact, no change.
 
 mod pyramid;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use pyramid::{AROUND_HEIGHTS, SURROUNDINGS, cell_px};
 
@@ -62,11 +64,12 @@ pub struct Regressor {
 }
 
 impl Regressor {
-    /// Whether all coefficients are.
-    pub(crate) fn is_finite(&self) -> bool {
-        let lists = [&self.near, &self.around, &self.around_limit];
-        let limits = [self.slope_limit, self.height_limit_mm];
-        lists.into_iter().flatten().chain(&limits).all(|x| x.is_finite())
+    /// Whether all coefficients are finite, all limits positive or 0, and the side of a pixel sensible.
+    pub(crate) fn is_usable(&self) -> bool {
+        let limits = || self.around_limit.iter().chain([&self.slope_limit, &self.height_limit_mm]);
+        (1e-4..=1.0).contains(&self.mm_per_px)
+            && self.near.iter().chain(&self.around).chain(limits()).all(|x| x.is_finite())
+            && limits().all(|&x| x >= 0.0)
     }
 
     /// Writes the change that a surface (heights and slopes in pixels) makes.
@@ -215,7 +218,7 @@ pub(crate) fn near_terms(nx: f32, ny: f32, height_mm: f32) -> [f32; NEAR] {
     for d in 1..=NORMAL_DEGREE {
         // nx^d, nx^(d-1) ny, ..., ny^d from the degree before.
         degree[d] = degree[d - 1] * ny;
-        for monomial in degree[..d].iter_mut() {
+        for monomial in &mut degree[..d] {
             *monomial *= nx;
         }
         for &monomial in &degree[..=d] {

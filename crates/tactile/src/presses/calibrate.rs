@@ -4,6 +4,8 @@ mod moments;
 mod rest;
 mod ridge;
 mod samples;
+#[cfg(test)]
+mod tests;
 
 pub use ridge::Smoothness;
 
@@ -176,9 +178,9 @@ fn calibrate_marked(
     let trusted = trusted(set, &marked);
     let shapes = match &options.gel_shape {
         Some(shape) => vec![shape.clone()],
-        None => std::iter::once(GelShape::Flat)
-            .chain(DOME_SAGS_M.map(|sag_m| GelShape::Dome { sag_m }))
-            .collect(),
+        None => {
+            std::iter::once(GelShape::Flat).chain(DOME_SAGS_M.map(|sag_m| GelShape::Dome { sag_m })).collect()
+        }
     };
     let candidates: Vec<Candidate> =
         shapes.into_iter().map(|shape| Candidate::new(shape, &marked, set.ball_m, &grid)).collect();
@@ -316,7 +318,7 @@ impl Fit<'_> {
             }
         }
         let (candidate, folds, _) = best.expect("there is at least one candidate");
-        (candidate, folds.choose().0)
+        (candidate, folds.choose())
     }
 
     fn colours(

@@ -96,3 +96,55 @@ fn circle(i: usize, centres: Option<&[f64]>, radii: Option<&[f64]>) -> Option<Ci
 fn red_first(bgr: &mut [u8]) {
     bgr.chunks_exact_mut(3).for_each(|pixel| pixel.swap(0, 2));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::npz::{Array, ElementType, write_npz};
+
+    type Entry = (&'static str, Array, ElementType);
+
+    fn entry(key: &'static str, shape: &[usize], value: impl Fn(usize) -> f64, kind: ElementType) -> Entry {
+        let values = (0..shape.iter().product()).map(value).collect();
+        (key, Array { shape: shape.to_vec(), values }, kind)
+    }
+
+    fn images() -> Entry {
+        entry("imgs", &[2, 4, 5, 3], |i| i as f64, ElementType::U8)
+    }
+
+    fn read(entries: &[Entry]) -> Result<PressSet, DataPackError> {
+        PressSet::from_data_pack(&write_npz(entries).unwrap(), 4e-3, 1e-4)
+    }
+
+    #[test]
+    fn blue_comes_first_in_the_file_and_last_here() {
+        let centres = entry("touch_center", &[2, 2], |i| 1.5 * i as f64, ElementType::F64);
+        let radii = entry("touch_radius", &[2], |i| 3.0 * i as f64, ElementType::U8);
+        let rest = entry("f0", &[4, 5, 3], |i| 100.0 + i as f64, ElementType::U8);
+        let set = read(&[images(), centres, radii, rest]).unwrap();
+        assert_eq!(set.presses.len(), 2);
+        assert_eq!(set.presses[1].image.pixel(0, 0), [62, 61, 60]);
+        assert_eq!(set.rest.unwrap().pixel(1, 0), [105, 104, 103]);
+        assert_eq!(set.presses[0].circle, None, "a radius of 0 is none");
+        assert_eq!(set.presses[1].circle, Some(Circle { x_px: 3.0, y_px: 4.5, radius_px: 3.0 }));
+    }
+
+    #[test]
+    fn only_the_images_are_needed() {
+        let set = read(&[images()]).unwrap();
+        assert!(set.rest.is_none() && set.presses.iter().all(|p| p.circle.is_none()));
+    }
+
+    #[test]
+    fn arrays_that_do_not_fit_are_named() {
+        let centres = entry("touch_center", &[3, 2], |i| i as f64, ElementType::F64);
+        let error = read(&[images(), centres]).unwrap_err().to_string();
+        assert_eq!(error, "`touch_center` has shape [3, 2], `imgs` has [2, 4, 5, 3]");
+        let grey = entry("imgs", &[2, 4, 5], |i| i as f64, ElementType::U8);
+        assert!(read(&[grey]).unwrap_err().to_string().contains("(any, any, any, 3)"));
+        let wide = entry("imgs", &[2, 4, 5, 3], |i| i as f64, ElementType::F64);
+        assert!(read(&[wide]).unwrap_err().to_string().contains("`<f8`, they must be `|u1`"));
+        assert!(read(&[]).unwrap_err().to_string().contains("no array `imgs`"));
+    }
+}

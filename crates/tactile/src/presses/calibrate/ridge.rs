@@ -15,16 +15,13 @@ pub struct Smoothness {
 }
 
 impl Smoothness {
-    /// What is tried, from stiff to free.
-    pub(super) fn candidates() -> impl Iterator<Item = Self> {
-        [100.0, 10.0, 1.0]
-            .into_iter()
-            .flat_map(|stiffness| [1e-2, 1e-3, 1e-4, 1e-5].map(|ridge| Self { ridge, stiffness }))
-    }
-
     /// Where there is no time to choose.
     pub(super) const USUAL: Self = Self { ridge: 1e-3, stiffness: 10.0 };
 }
+
+/// Strengths that are tried, from stiff to free.
+const RIDGES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
+const STIFFNESSES: [f64; 3] = [100.0, 10.0, 1.0];
 
 fn features() -> Vec<Feature> {
     let fields = |input: usize| exponents(if input < NEAR { NEAR_FIELD } else { AROUND_FIELD });
@@ -44,8 +41,7 @@ const FLAT_WEIGHT: f64 = 0.001;
 pub(super) fn solve(sums: &Moments, flat: &Moments, smoothness: &Smoothness) -> Option<Solution> {
     let features = features();
     let weight = sums.energy_and_weight().1;
-    let scale: Vec<f64> =
-        features.iter().map(|&f| (sums.product(f, f) / weight).max(1e-18).sqrt()).collect();
+    let scale: Vec<f64> = features.iter().map(|&f| (sums.product(f, f) / weight).max(1e-18).sqrt()).collect();
     let mut all = sums.clone();
     all.add_unchanged(flat, FLAT_WEIGHT * weight);
     let sums = &all;
@@ -56,7 +52,7 @@ pub(super) fn solve(sums: &Moments, flat: &Moments, smoothness: &Smoothness) -> 
             *value /= weight * scale[i] * scale[j];
         }
         let (i, k) = features[j].1;
-        column[j] += smoothness.ridge * smoothness.stiffness.powi((i + k) as i32);
+        column[j] += smoothness.ridge * libm::pow(smoothness.stiffness, (i + k) as f64);
     }
     let right = DMatrix::from_fn(n, 3, |i, c| sums.target(c, features[i]) / (weight * scale[i]));
     let mut coefficients = Cholesky::new(gram)?.solve(&right);
@@ -141,11 +137,16 @@ impl<'a> Folds<'a> {
         self.folds.iter().map(error).sum::<f64>() / self.folds.len() as f64
     }
 
-    /// The stiffest choice whose error is within one part in a hundred of the least, and its error.
-    pub(super) fn choose(&self) -> (Smoothness, f64) {
-        let tried: Vec<(Smoothness, f64)> = Smoothness::candidates().map(|s| (s, self.error(&s))).collect();
-        let least = tried.iter().map(|(_, error)| *error).fold(f64::INFINITY, f64::min);
-        let within = |(_, error): &&(Smoothness, f64)| *error <= 1.01 * least;
-        tried.iter().find(within).copied().unwrap_or((Smoothness::USUAL, f64::INFINITY))
+    /// A ridge for fields of the usual stiffness, then a stiffness for that ridge: each time the stiffest whose error
+    /// is within one part in a hundred of the least.
+    pub(super) fn choose(&self) -> Smoothness {
+        let pick = |tried: &[Smoothness]| {
+            let errors: Vec<f64> = tried.iter().map(|s| self.error(s)).collect();
+            let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+            let first = errors.iter().position(|&error| error <= 1.01 * least);
+            first.map_or(Smoothness::USUAL, |i| tried[i])
+        };
+        let best = pick(&RIDGES.map(|ridge| Smoothness { ridge, ..Smoothness::USUAL }));
+        pick(&STIFFNESSES.map(|stiffness| Smoothness { stiffness, ..best }))
     }
 }

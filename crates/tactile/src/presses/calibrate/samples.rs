@@ -3,7 +3,8 @@
 use super::super::compare::ball_imprint;
 use super::super::{Circle, Press};
 use crate::colour::regressor::{
-    AROUND_HEIGHTS, HEIGHT_INPUT, NEAR, Place, SURROUNDINGS, around_planes, between_cells, cell_px, limited_normal, near_terms,
+    AROUND_HEIGHTS, HEIGHT_INPUT, NEAR, Place, SURROUNDINGS, around_planes, between_cells, cell_px,
+    limited_normal, near_terms,
 };
 use crate::deform::{BlurredRest, deform};
 use crate::gradient::gradient;

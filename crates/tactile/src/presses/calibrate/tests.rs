@@ -1,0 +1,165 @@
+use super::*;
+use crate::colour::{Lambert, Light};
+use crate::presses::{compare_presses, find_circle};
+
+const GRID: Grid = Grid { width_px: 128, height_px: 96, metres_per_px: 0.15e-3 };
+const NOISE: f32 = 1.5;
+
+/// A sensor that is not a regressor: three coloured lights, a gel of its own, a shaded frame with scratches.
+fn truth() -> Sensor {
+    let light = |degrees: f64, colour: [f64; 3]| Light {
+        azimuth_rad: degrees.to_radians(),
+        elevation_rad: 0.5,
+        colour,
+        falloff: [0.15, 0.0],
+    };
+    let lights =
+        [light(0.0, [70.0, 5.0, 0.0]), light(120.0, [0.0, 60.0, 8.0]), light(240.0, [6.0, 0.0, 65.0])];
+    let rest = [0, 1, 2].map(|c| {
+        let pixel = |i: usize| {
+            let (x, y) = (i % GRID.width_px, i / GRID.width_px);
+            let scratch = if (x + 3 * y) % 31 == 0 { 8.0 } else { 0.0 };
+            90.0 + 0.2 * x as f32 - 0.15 * y as f32 + 10.0 * c as f32 + scratch
+        };
+        (0..GRID.len()).map(pixel).collect()
+    });
+    Sensor {
+        grid: GRID,
+        rest,
+        noise_rgb: [NOISE; 3],
+        colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&lights))),
+        gel_shape: GelShape::Flat,
+        pyramid: Some(Pyramid { kernels_px: vec![13, 9, 5], restore_depth_fraction: 0.3 }),
+        ball_m: None,
+    }
+}
+
+/// Presses of a 4 mm ball all over the frame.
+fn presses(sensor: &Sensor, count: usize) -> PressSet {
+    let press = |i: usize| {
+        // A low-discrepancy sequence (Roberts 2018).
+        let spread = |a: f64, n: usize| 14.0 + (n as f64 - 28.0) * ((i + 1) as f64 * a).fract();
+        let circle = Circle {
+            x_px: spread(0.754_877_666, GRID.width_px),
+            y_px: spread(0.569_840_291, GRID.height_px),
+            radius_px: 9.0 + (i % 4) as f64,
+        };
+        Press { name: i.to_string(), image: noisy(sensor, &circle, i as u64), circle: Some(circle) }
+    };
+    PressSet {
+        metres_per_px: GRID.metres_per_px,
+        ball_m: 4e-3,
+        rest: None,
+        presses: (0..count).map(press).collect(),
+    }
+}
+
+fn noisy(sensor: &Sensor, circle: &Circle, key: u64) -> TactileImage {
+    let clean = predict_ball(circle, 4e-3, sensor);
+    let exact = Sensor { noise_rgb: [0.0; 3], ..sensor.clone() };
+    assert_eq!(clean, predict_ball(circle, 4e-3, &exact), "predictions carry no noise");
+    // The noise of the renderer, on the predicted image as the frame at rest.
+    let rest = [0, 1, 2].map(|c| clean.rgb.iter().skip(c).step_by(3).map(|&v| f32::from(v)).collect());
+    crate::finish(&Sensor { rest, ..sensor.clone() }, None, Some(key))
+}
+
+#[test]
+fn a_sensor_is_found_again_from_its_presses() {
+    let truth = truth();
+    let set = presses(&truth, 16);
+    let found = calibrate_presses(&set, &CalibrateOptions { folds: 3, ..Default::default() }).unwrap();
+    // Two roundings beside the noise: no prediction can be better than this.
+    let floor = f64::from(NOISE * NOISE) + 2.0 / 12.0;
+    let mse = found.held_out.mean.full.mse;
+    println!("held out {mse:.2}, floor {floor:.2}");
+    assert!(mse > 0.9 * floor && mse < 1.5 * floor, "held out {mse}, floor {floor}");
+    assert_eq!(found.held_out.each.len(), 16);
+    assert!(found.doubtful.is_empty());
+    for c in 0..3 {
+        let noise = found.sensor.noise_rgb[c];
+        assert!((noise / NOISE - 1.0).abs() < 0.1, "noise {noise}");
+        let error: f32 =
+            found.sensor.rest[c].iter().zip(&truth.rest[c]).map(|(a, b)| (a - b) * (a - b)).sum();
+        let rms = (error / GRID.len() as f32).sqrt();
+        assert!(rms < 0.7, "rest frame off by {rms}");
+    }
+    // New places, and what a sensor file keeps of it.
+    let fresh = PressSet { presses: presses(&truth, 23).presses.split_off(16), ..set };
+    let scores = compare_presses(&fresh, &found.sensor).unwrap().mean;
+    assert!(scores.full.mse < 1.5 * floor, "fresh presses {}", scores.full.mse);
+    let read = Sensor::from_npz(&found.sensor.to_npz().unwrap().unwrap(), None, None).unwrap();
+    assert_eq!(read, found.sensor);
+    assert_eq!(compare_presses(&fresh, &read).unwrap().mean, scores);
+}
+
+#[test]
+fn the_same_presses_give_the_same_sensor() {
+    let set = presses(&truth(), 6);
+    let options = CalibrateOptions { folds: 2, gel_shape: Some(GelShape::Flat) };
+    assert_eq!(calibrate_presses(&set, &options).unwrap(), calibrate_presses(&set, &options).unwrap());
+}
+
+#[test]
+fn contacts_that_nobody_marked_are_found() {
+    let mut set = presses(&truth(), 12);
+    let marked: Vec<Circle> = set.presses.iter().filter_map(|p| p.circle).collect();
+    set.presses.iter_mut().for_each(|p| p.circle = None);
+    assert_eq!(set.mark_missing(), 12);
+    let off = |of: fn(&Circle, &Circle) -> f64| {
+        let found = set.presses.iter().filter_map(|p| p.circle);
+        let mut all: Vec<f64> = found.zip(&marked).map(|(a, b)| of(&a, b)).collect();
+        all.sort_by(f64::total_cmp);
+        (all[6], all[11])
+    };
+    let centre = off(|a, b| (a.x_px - b.x_px).hypot(a.y_px - b.y_px));
+    let radius = off(|a, b| (a.radius_px - b.radius_px).abs());
+    println!("median and worst: centre {centre:?} px, radius {radius:?} px");
+    assert!(centre.0 < 0.5 && centre.1 < 1.5, "centre off by {centre:?} px");
+    assert!(radius.0 < 1.0 && radius.1 < 2.0, "radius off by {radius:?} px");
+    // Where there is no contact there is no circle.
+    let truth = truth();
+    let empty = crate::finish(&truth, None, Some(7));
+    assert_eq!(find_circle(&empty, &truth.rest, 13.3), None);
+}
+
+#[test]
+fn a_press_marked_in_the_wrong_place_is_left_out() {
+    let mut set = presses(&truth(), 12);
+    let circle = set.presses[5].circle.as_mut().unwrap();
+    (circle.x_px, circle.y_px) = (127.0 - circle.x_px, 95.0 - circle.y_px);
+    let found =
+        calibrate_presses(&set, &CalibrateOptions { folds: 2, gel_shape: Some(GelShape::Flat) }).unwrap();
+    assert_eq!(found.doubtful, ["5"]);
+    let error = |i: usize| found.held_out.each[i].scores.full.mse;
+    assert!(error(5) > 3.0 * error(4), "it is still scored, as marked: {} and {}", error(5), error(4));
+}
+
+#[test]
+fn sets_that_cannot_be_are_refused_with_both_numbers() {
+    let good = presses(&truth(), 4);
+    let error = |edit: &dyn Fn(&mut PressSet)| {
+        let mut set = good.clone();
+        edit(&mut set);
+        calibrate_presses(&set, &CalibrateOptions::default()).unwrap_err().to_string()
+    };
+    let circle = |set: &mut PressSet, x_px: f64, radius_px: f64| {
+        set.presses[2].circle = Some(Circle { x_px, y_px: 40.0, radius_px });
+    };
+    let small = TactileImage { width_px: 20, height_px: 10, rgb: vec![0; 600] };
+    for (text, wanted) in [
+        (error(&|s| s.presses.truncate(3)), "3 presses, a calibration needs at least 4"),
+        (
+            error(&|s| circle(s, 130.0, 9.0)),
+            "press `2`: the centre (130.0, 40.0) lies outside the 128x96 image",
+        ),
+        (error(&|s| circle(s, f64::NAN, 9.0)), "outside the 128x96 image"),
+        (error(&|s| circle(s, 60.0, 20.0)), "press `2`: the radius is 3.000 mm, the ball's 2.000 mm"),
+        (error(&|s| circle(s, 60.0, 0.0)), "the radius is 0.000 mm"),
+        (error(&|s| s.presses[1].image = small.clone()), "press `1` is 20x10 pixels, the first one 128x96"),
+        (error(&|s| s.rest = Some(small.clone())), "press `rest frame` is 20x10 pixels"),
+        (error(&|s| s.ball_m = 4.0), "the ball is 4000 mm, it must be from 0.1 to 100 mm"),
+        (error(&|s| s.metres_per_px = 0.0), "the side of a pixel is 0 mm"),
+    ] {
+        assert!(text.contains(wanted), "`{text}` lacks `{wanted}`");
+    }
+}
