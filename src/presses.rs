@@ -4,7 +4,7 @@ use crate::location::{Location, ReadFileError};
 use crate::project::{LoadError, load_twin_document};
 use gripgen_record::{PRESSES_FILE, PressFolder, PressFolderError, decode_picture, read_press_folder};
 use gripgen_tactile::presses::{
-    Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, Press, PressSet, find_circle,
+    Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, Press, PressSet,
 };
 use gripgen_tactile::{Sensor, SensorError};
 use gripgen_twin::Twin;
@@ -119,22 +119,18 @@ fn from_folder(folder: PressFolder, ball_m: f64, metres_per_px: f64) -> PressSet
     }
 }
 
-/// Looks for the contact of every press that nobody marked, against a frame without contact (planes of red, green and
-/// blue in grey levels). Returns the names of those where it was found; the others are taken out of the set.
-pub fn find_missing_circles(set: &mut PressSet, rest: &[Vec<f32>; 3]) -> FoundCircles {
-    let mut circles = FoundCircles::default();
-    let ball_radius_px = set.ball_m / 2.0 / set.metres_per_px;
-    set.presses.retain_mut(|press| {
-        let same_size = press.image.rgb.len() == 3 * rest[0].len();
-        if press.circle.is_some() || !same_size {
-            return true;
-        }
-        press.circle = find_circle(&press.image, rest, ball_radius_px);
-        let names = if press.circle.is_some() { &mut circles.found } else { &mut circles.without_contact };
-        names.push(press.name.clone());
-        press.circle.is_some()
-    });
-    circles
+/// Looks for the contact of every press that nobody marked. Presses without a visible contact are taken out of the set.
+pub fn find_missing_circles(set: &mut PressSet) -> FoundCircles {
+    let unmarked = unmarked_names(set);
+    set.mark_missing();
+    let without_contact = unmarked_names(set);
+    set.presses.retain(|press| press.circle.is_some());
+    let found = unmarked.into_iter().filter(|name| !without_contact.contains(name)).collect();
+    FoundCircles { found, without_contact }
+}
+
+fn unmarked_names(set: &PressSet) -> Vec<String> {
+    set.presses.iter().filter(|press| press.circle.is_none()).map(|press| press.name.clone()).collect()
 }
 
 /// What [`find_missing_circles`] found.

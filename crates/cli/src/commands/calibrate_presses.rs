@@ -4,9 +4,7 @@ use crate::args::CalibratePressesArgs;
 use crate::commands::compare::{comparison_json, say_circles, table};
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, write_file};
-use gripgen::tactile::presses::{
-    CalibrateError, CalibrateOptions, Calibration, PressSet, calibrate_presses, reference_frame,
-};
+use gripgen::tactile::presses::{CalibrateError, CalibrateOptions, Calibration, PressSet, calibrate_presses};
 use gripgen::tactile::{GelShape, Sensor};
 use gripgen::{
     LoadPressesError, PressGeometry, PressReportText, find_missing_circles, load_presses, press_report,
@@ -15,6 +13,14 @@ use serde_json::{Value, json};
 
 /// Runs the verb.
 pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
+    let folder = args.out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        return Err(Failure::usage(format!(
+            "{}: there is no folder {}",
+            args.out.display(),
+            folder.display()
+        )));
+    }
     let metres = |mm: Option<f64>| mm.map(|mm| mm * 1e-3);
     let geometry = PressGeometry { ball_m: metres(args.ball_mm), metres_per_px: metres(args.mm_per_px) };
     let mut set = load_presses(&args.presses, geometry).map_err(|e| match e {
@@ -23,15 +29,16 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
         }
         other => Failure::usage(other),
     })?;
-    let unmarked = set.presses.iter().any(|p| p.circle.is_none());
-    if let Some(rest) = reference_frame(&set).filter(|_| unmarked) {
-        say_circles(&find_missing_circles(&mut set, &rest), &args.talk);
-    }
+    say_circles(&find_missing_circles(&mut set), &args.talk);
     if !args.talk.quiet {
         eprintln!("{} presses; fitting, and fitting again without each quarter of them", set.presses.len());
     }
     let options = CalibrateOptions::default();
     let calibration = calibrate_presses(&set, &options).map_err(failure)?;
+    if !calibration.doubtful.is_empty() && !args.talk.quiet {
+        let names = calibration.doubtful.join(", ");
+        eprintln!("warning: no contact is visible where {names} are marked; scored, but not fitted to");
+    }
     let bytes = match calibration.sensor.to_npz() {
         Some(bytes) => bytes.map_err(Failure::new)?,
         None => return Err(Failure::new("the fitted colours have no place in a sensor file")),
@@ -51,6 +58,7 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
             "report": report,
             "folds": options.folds,
             "fitted": fitted(&calibration.sensor),
+            "doubtful": calibration.doubtful,
             "held_out": comparison_json(&calibration.held_out),
         }))?;
     }

@@ -3,6 +3,7 @@
 use crate::args::{CompareArgs, TalkArgs};
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, write_file};
+use gripgen::tactile::finish;
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{CompareError, PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
@@ -36,8 +37,10 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
             .hint("a sensor file of `gripgen calibrate presses` holds both; name it with --sensor"),
         other => Failure::usage(other),
     })?;
-    let circles = find_missing_circles(&mut set, &sensor.rest);
-    say_circles(&circles, &args.talk);
+    if set.rest.is_none() {
+        set.rest = Some(finish(&sensor, None, None));
+    }
+    say_circles(&find_missing_circles(&mut set), &args.talk);
     let comparison = compare_presses(&set, &sensor).map_err(|e| match e {
         CompareError::Size { .. } => {
             Failure::usage(e).hint("name the sensor file that belongs to these presses with --sensor")
