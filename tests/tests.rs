@@ -10,6 +10,8 @@ mod config;
 mod determinism;
 // Effects of the library, through the whole pipeline.
 mod effects;
+// The elastic gel, also beside the pyramid on real presses.
+mod elastic;
 // What the large set can teach.
 mod large;
 // Two mechanics, one result.

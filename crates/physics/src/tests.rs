@@ -36,6 +36,8 @@ impl Bench {
             shear_stiffness_n_per_m: 2e4,
             kernels_px: vec![],
             restore_depth_fraction: 0.4,
+            model: gripgen_twin::config::GelModel::Pyramid,
+            elastic: None,
         };
         Self {
             mechanics: Mechanics::Rapier,

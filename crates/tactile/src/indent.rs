@@ -15,6 +15,17 @@ pub struct Imprint {
     pub press_depth_m: f64,
     /// The pressure field as a few cells.
     pub patch: ContactPatch,
+    /// Surface and pressure, if the gel is elastic.
+    pub elastic: Option<ElasticField>,
+}
+
+/// What the contact with an elastic gel gives beyond an imprint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElasticField {
+    /// Height of the gel's surface above its state at rest, towards the camera, in pixels.
+    pub surface_px: Plane,
+    /// Pressure of part and gel.
+    pub pressure_pa: Plane,
 }
 
 /// The gel of a press.
@@ -55,6 +66,25 @@ pub enum IndentError {
         /// Volume at a press as deep as the gel.
         available_mm3: f64,
     },
+    /// The force presses an elastic gel through.
+    #[error(
+        "the press is deeper than the gel: {force_n} N press the elastic gel in by {press_mm:.2} mm, it is \
+         {thickness_mm:.2} mm thick"
+    )]
+    DeeperThanTheGel {
+        /// Normal force.
+        force_n: f64,
+        /// Depth of the press.
+        press_mm: f64,
+        /// Thickness of the gel.
+        thickness_mm: f64,
+    },
+}
+
+/// The error for a window without any surface.
+pub(crate) fn nothing_in_front(grid: &Grid) -> IndentError {
+    let size = |n: usize| n as f64 * grid.metres_per_px * 1e3;
+    IndentError::NothingInFront { width_mm: size(grid.width_px), height_mm: size(grid.height_px) }
 }
 
 /// Presses the surface `heights` (in pixels above the gel at rest, towards it) in with `force_n`.
@@ -139,11 +169,7 @@ impl Press<'_> {
     fn finish(&self, map: &HeightMap, top: f32, limit_px: f64) -> Result<Imprint, IndentError> {
         let a = self.grid.metres_per_px;
         if top == f32::NEG_INFINITY {
-            let size = |n: usize| n as f64 * a * 1e3;
-            return Err(IndentError::NothingInFront {
-                width_mm: size(self.grid.width_px),
-                height_mm: size(self.grid.height_px),
-            });
+            return Err(nothing_in_front(self.grid));
         }
         let top = f64::from(top);
         let wanted = self.wanted();
@@ -163,7 +189,7 @@ impl Press<'_> {
         let mut depth_px = Plane::filled(map.width, map.height, 0.0);
         self.level.run(Depths { map, rest: self.rest, lift: press_px - top, depth_px: &mut depth_px });
         let patch = aggregate(&depth_px, self.grid, self.force_n, self.level);
-        Ok(Imprint { depth_px, press_depth_m: press_px * a, patch })
+        Ok(Imprint { depth_px, press_depth_m: press_px * a, patch, elastic: None })
     }
 
     fn through_the_gel(&self, available: f64) -> IndentError {

@@ -2,7 +2,8 @@
 //!
 //! One stage a file: [`raster`] (mesh to height map), [`indent`] (press depth and pressure), [`deform`] (the gel
 //! around the contact), [`gradient`], [`shade`] (colour), [`shadow()`] (what a contact
-//! keeps from the light), [`finish`] (noise and rounding). [`Renderer`] runs them.
+//! keeps from the light), [`finish`] (noise and rounding). For an elastic gel
+//! [`press_elastic`] takes the place of `indent` and `deform`. [`Renderer`] runs them.
 //!
 //! Heights are in pixels, relative to the gel surface at rest: deeper contact and steeper slopes do not lose bits to
 //! an offset, and a flat gel is exactly 0. Colours are a change against the frame at rest, so that a grip without
@@ -14,9 +15,12 @@ mod appearance;
 mod colour;
 mod convolve;
 mod deform;
+mod elastic;
+mod fft;
 mod gradient;
 mod grid;
 mod indent;
+mod layer;
 pub mod metrics;
 mod noise;
 pub mod npz;
@@ -34,9 +38,10 @@ mod simd;
 pub use appearance::appearance;
 pub use colour::{ColourModel, Lambert, Light, Regressor, TaximTable, shade};
 pub use deform::{BlurredRest, deform};
+pub use elastic::{Base, ElasticGel, press_elastic};
 pub use gradient::gradient;
 pub use grid::{Grid, Plane};
-pub use indent::{Imprint, IndentError, PressedGel, indent};
+pub use indent::{ElasticField, Imprint, IndentError, PressedGel, indent};
 pub use noise::finish;
 pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;

@@ -4,6 +4,7 @@ mod scratch;
 
 use crate::appearance::appearance;
 use crate::colour::ColourModel;
+use crate::elastic::{Base, ElasticGel, press_elastic};
 use crate::grid::Plane;
 use crate::indent::{Imprint, IndentError, Press, PressedGel};
 use crate::noise::finish;
@@ -11,6 +12,7 @@ use crate::raster::ClusteredMesh;
 use crate::sensor::Sensor;
 use crate::shading::change;
 use crate::simd::SimdLevel;
+use gripgen_twin::config::GelModel;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gel, TactileImage};
 use scratch::{Prepared, Scratch, with_scratch};
@@ -30,7 +32,7 @@ pub struct Renderer<'a> {
 }
 
 impl Renderer<'_> {
-    /// Presses a part into the gel: stages `raster` and `indent`.
+    /// Presses a part into the gel: stages `raster` and `indent`. An elastic gel needs no imprint constant.
     pub fn press(
         &self,
         mesh: &ClusteredMesh,
@@ -39,6 +41,13 @@ impl Renderer<'_> {
         force_n: f64,
     ) -> Result<Imprint, IndentError> {
         let grid = &self.sensor.grid;
+        if let Some(gel) = self.elastic_gel() {
+            let mut heights = mesh.raster(gel_from_mesh, grid, gel.thickness_m / grid.metres_per_px);
+            if let Some(rest) = self.sensor.gel_shape.rest_px(grid) {
+                heights.values.iter_mut().zip(&rest.values).for_each(|(h, r)| *h += r);
+            }
+            return press_elastic(&heights, grid, &gel, force_n, self.level);
+        }
         let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n };
         with_scratch(self, |scratch, prepared| {
             let map = &mut scratch.map;
@@ -48,8 +57,12 @@ impl Renderer<'_> {
         })
     }
 
-    /// The gel surface around an imprint, in pixels towards the camera above its rest: stage `deform`.
+    /// The gel surface around an imprint, in pixels towards the camera above its rest: stage `deform`. For an elastic
+    /// gel it is part of the solution.
     pub fn surface(&self, imprint: &Imprint) -> Plane {
+        if let Some(field) = &imprint.elastic {
+            return field.surface_px.clone();
+        }
         with_scratch(self, |scratch, prepared| {
             self.deform(imprint, scratch, prepared);
             scratch.deform.surface_plane()
@@ -61,7 +74,9 @@ impl Renderer<'_> {
     pub fn image(&self, imprint: Option<&Imprint>, noise_key: Option<u64>) -> TactileImage {
         let Some(imprint) = imprint else { return finish(self.sensor, None, noise_key) };
         let lit = with_scratch(self, |scratch, prepared| match &self.sensor.colour {
-            ColourModel::Lambert(lambert) if self.only_where_raised(prepared) => {
+            ColourModel::Lambert(lambert)
+                if imprint.elastic.is_none() && self.only_where_raised(prepared) =>
+            {
                 self.deform(imprint, scratch, prepared);
                 let Scratch { deform, change, .. } = scratch;
                 let done = |change: &[Plane; 3]| finish(self.sensor, Some(change), noise_key);
@@ -75,15 +90,29 @@ impl Renderer<'_> {
     /// What an imprint changes in the image, in grey levels of red, green and blue: stages `deform` to `shadow`. The
     /// stage `noise`, [`finish`], makes an image of it.
     pub fn change(&self, imprint: &Imprint) -> [Plane; 3] {
+        let core_px = self.core_px(imprint) as f32;
+        let core = |i: usize| imprint.depth_px.values[i] > core_px;
+        if let Some(field) = &imprint.elastic {
+            return appearance(self.sensor, &field.surface_px, core, self.level);
+        }
         with_scratch(self, |scratch, prepared| {
             self.deform(imprint, scratch, prepared);
             let (sheet, area) = scratch.deform.surface();
             if self.only_where_raised(prepared) {
                 return change(&self.sensor.colour, sheet, area, self.level);
             }
-            let core_px = self.core_px(imprint) as f32;
-            let core = |i: usize| imprint.depth_px.values[i] > core_px;
             appearance(self.sensor, &sheet.plane(area), core, self.level)
+        })
+    }
+
+    /// The gel of a twin that says `elastic`.
+    fn elastic_gel(&self) -> Option<ElasticGel> {
+        let elastic = self.gel.elastic.filter(|_| self.gel.model == GelModel::Elastic)?;
+        Some(ElasticGel {
+            thickness_m: self.gel.thickness_m,
+            young_modulus_pa: elastic.young_modulus_pa,
+            poisson_ratio: elastic.poisson_ratio,
+            base: Base::Bonded,
         })
     }
 

@@ -43,4 +43,6 @@ pub use scenario::{Covariates, PullSettings, Scenario};
 pub use scenario_keys::{PULL_KEYS, SCENARIO_KEYS};
 pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep, is_twin_key};
 pub use trace::{PullTrace, TraceRow};
-pub use twin::{DEFAULTED_SECTIONS, Gel, Gripper, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist};
+pub use twin::{
+    DEFAULTED_SECTIONS, Elastic, Gel, Gripper, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist,
+};

@@ -2,7 +2,9 @@
 
 mod check;
 
-use crate::config::{ConfigError, Feedback, ForceConvention, ImageNoise, RobotModel, TwinFile, Twist};
+use crate::config::{
+    ConfigError, Feedback, ForceConvention, GelModel, ImageNoise, RobotModel, TwinFile, Twist,
+};
 use crate::effects::Effect;
 use crate::frames::{Pose, pose};
 use crate::{Jaw, PerJaw};
@@ -118,6 +120,19 @@ pub struct Gel {
     pub kernels_px: Vec<u32>,
     /// Start of the restored contact, as a share of the press depth.
     pub restore_depth_fraction: f64,
+    /// How it deforms.
+    pub model: GelModel,
+    /// Elastic constants where they are known; always with the elastic model. Markers move by them in any model.
+    pub elastic: Option<Elastic>,
+}
+
+/// The constants of an elastic gel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Elastic {
+    /// Young's modulus.
+    pub young_modulus_pa: f64,
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
 }
 
 /// A tactile sensor: which file, and what overrides it.
@@ -243,6 +258,14 @@ impl Twin {
             let problem = "`off_centre` and robot.twist = \"free\" are the same loss, counted twice";
             return Err(ConfigError::new(format!("effects[{i}].name"), problem)
                 .hint("leave the effect out, or set robot.twist = \"stiff\""));
+        }
+        if gel.iter().any(|(_, gel)| gel.model == GelModel::Elastic)
+            && let Some(i) = effects.iter().position(|e: &Effect| e.spec.id == "imprint_nonlinearity")
+        {
+            let problem =
+                "`imprint_nonlinearity` changes the imprint constant, which an elastic gel does not use";
+            return Err(ConfigError::new(format!("effects[{i}].name"), problem)
+                .hint("leave the effect out, or set gel.left.model = \"pyramid\""));
         }
         Ok(Twin { robot, arm, gripper, wrist, gel, optics, parts, effects })
     }

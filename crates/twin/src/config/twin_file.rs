@@ -175,6 +175,9 @@ pub struct WristFile {
 pub enum GelModel {
     /// Volume `V = c F`, pressure of a Winkler bed, and a pyramid of blurs (Taxim; Wucherer et al. 2023).
     Pyramid,
+    /// A linear elastic layer on a rigid base: pressure and surface from modulus and thickness. It uses neither the
+    /// imprint constants of the parts nor `kernels_px` and `restore_depth_fraction`.
+    Elastic,
 }
 
 /// `[gel.left]`, `[gel.right]`
@@ -195,6 +198,12 @@ pub struct GelFile {
     pub kernels_px: Vec<u32>,
     /// The contact that blurs may not touch begins at this share of the press depth.
     pub restore_depth_fraction: f64,
+    /// Young's modulus; needed with `model = "elastic"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub young_modulus_mpa: Option<f64>,
+    /// Poisson's ratio; 0.5, incompressible, where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poisson_ratio: Option<f64>,
     /// Uncertainty of values in this section.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub calibration: BTreeMap<String, CalibrationFile>,

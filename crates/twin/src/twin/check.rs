@@ -1,7 +1,7 @@
 //! Checking the sections of a twin file and converting them to SI units. Errors name the key.
 
-use super::{Gel, Part, RobotArm};
-use crate::config::{ArmFile, ConfigError, GelFile, PartFile, TwinFile, in_range, suggestion};
+use super::{Elastic, Gel, Part, RobotArm};
+use crate::config::{ArmFile, ConfigError, GelFile, GelModel, PartFile, TwinFile, in_range, suggestion};
 use crate::effects::{self, Effect, EffectSpec, OutsideFit, Per};
 use crate::frames::{pose, rotation_from_fixed_xyz};
 use nalgebra::Point3;
@@ -55,7 +55,22 @@ pub(super) fn check_gel(gel: &GelFile, key: &str) -> Result<Gel, ConfigError> {
             0.0..=1.0,
             "1",
         )?,
+        model: gel.model,
+        elastic: check_elastic(gel, key)?,
     })
+}
+
+/// The elastic constants, checked wherever they stand and needed with the elastic model.
+fn check_elastic(gel: &GelFile, key: &str) -> Result<Option<Elastic>, ConfigError> {
+    let modulus = format!("{key}.young_modulus_mpa");
+    let mpa = gel.young_modulus_mpa.map(|x| in_range(&modulus, x, 1e-3..=1e3, "MPa")).transpose()?;
+    let ratio = gel.poisson_ratio.unwrap_or(0.5);
+    let poisson_ratio = in_range(&format!("{key}.poisson_ratio"), ratio, 0.0..=0.5, "1")?;
+    if gel.model == GelModel::Elastic && mpa.is_none() {
+        return Err(ConfigError::new(modulus, "model = \"elastic\" needs the modulus of the gel")
+            .hint("the silicones of such gels have 0.1 to 0.3 MPa"));
+    }
+    Ok(mpa.map(|mpa| Elastic { young_modulus_pa: mpa * 1e6, poisson_ratio }))
 }
 
 pub(super) fn check_part(part: &PartFile, key: &str) -> Result<Part, ConfigError> {
