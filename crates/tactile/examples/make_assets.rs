@@ -99,6 +99,7 @@ fn sensor_npz(text: &str) -> Vec<u8> {
             .collect()
     };
     let sensor = Sensor {
+        markers: None,
         grid: Grid { width_px: w, height_px: h, metres_per_px: spec.mm_per_px * 1e-3 },
         rest: [plane(0), plane(1), plane(2)],
         noise_rgb: spec.noise_rgb.map(|x| x as f32),

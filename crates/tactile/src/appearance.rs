@@ -58,6 +58,7 @@ mod tests {
             noise_rgb: [0.0; 3],
             colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&[light]))),
             gel_shape,
+            markers: None,
             shadow: None,
             pyramid: None,
             ball_m: None,

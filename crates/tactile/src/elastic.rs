@@ -125,7 +125,7 @@ pub fn press_elastic(
     Ok(Imprint {
         depth_px: plane(depth),
         press_depth_m: press_px * a,
-        patch: aggregate(&pressure_pa, grid, force_n),
+        patch: aggregate(&pressure_pa, grid, force_n, level),
         elastic: Some(ElasticField { surface_px: plane(surface), pressure_pa }),
     })
 }

@@ -34,6 +34,39 @@ pub(crate) fn normal_ratio(x: f64, poisson_ratio: f64) -> f64 {
     numerator / (kappa * (1.0 + decay * decay) + 2.0 * rest * decay)
 }
 
+/// Displacements in the plane of the layer for a unit load of one wave number; all times `G k`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct InPlane {
+    /// Along the wave, from a pressure `cos(k x)`: the factor of `sin(k x)`.
+    pub(crate) normal: f64,
+    /// Along the wave, from a shear along it.
+    pub(crate) along: f64,
+    /// Across the wave, from a shear across it.
+    pub(crate) across: f64,
+}
+
+/// Displacements `depth` below the surface, both `x = k t` and `depth` in units of the thickness.
+pub(crate) fn in_plane(x: f64, depth: f64, poisson_ratio: f64) -> InPlane {
+    let nu = poisson_ratio;
+    let kappa = 3.0 - 4.0 * nu;
+    // exp(-x) times cosh and sinh, at the surface and at the height of interest.
+    let (once, twice) = (libm::exp(-x * depth), libm::exp(-2.0 * x));
+    let (ch, sh) = (0.5 * (1.0 + twice), 0.5 * (1.0 - twice));
+    let below = twice / once;
+    let (ch_z, sh_z) = (0.5 * (once + below), 0.5 * (once - below));
+    let z = x * (1.0 - depth);
+    let (u1, u2) = (z * sh_z, z * ch_z + kappa * sh_z);
+    // Stresses at the surface of the two functions over 2 G k, and their determinant.
+    let up = [2.0 * (1.0 - nu) * ch - x * sh, -(1.0 - 2.0 * nu) * sh - x * ch];
+    let shear = [-(1.0 - 2.0 * nu) * sh + x * ch, 2.0 * (1.0 - nu) * ch + x * sh];
+    let determinant = up[0] * shear[1] - up[1] * shear[0];
+    InPlane {
+        normal: 0.5 * (-shear[1] * u1 + shear[0] * u2) / determinant,
+        along: 0.5 * (-up[1] * u1 + up[0] * u2) / determinant,
+        across: sh_z / ch,
+    }
+}
+
 /// `integral of f(x) over 0..end` by Simpson's rule on `2 half` intervals.
 pub(crate) fn simpson(end: f64, half: usize, f: impl Fn(f64) -> f64) -> f64 {
     let step = end / (2 * half) as f64;
@@ -135,6 +168,10 @@ mod tests {
         }
         for nu in [0.0, 0.3, 0.5] {
             assert!((normal_ratio(30.0, nu) - 1.0).abs() < 1e-12);
+            let short = in_plane(30.0, 0.0, nu);
+            assert!((short.normal + 0.5 * (1.0 - 2.0 * nu)).abs() < 1e-12, "Johnson 1985, eq. 3.18");
+            assert!((short.along - (1.0 - nu)).abs() < 1e-12);
+            assert!((short.across - 1.0).abs() < 1e-12);
         }
         // A thin incompressible layer is a film that is squeezed sideways: u = k^2 t^3 p / (3 G).
         for x in [1e-3, 0.02] {
@@ -143,6 +180,28 @@ mod tests {
         for nu in [0.0, 0.3, 0.5] {
             let jump = normal_ratio(0.1, nu) / normal_ratio(0.1 - 1e-9, nu) - 1.0;
             assert!(jump.abs() < 2e-7, "the series meets the formula");
+        }
+    }
+
+    /// Elasticity's own equations by finite differences, inside the layer and at its base.
+    #[test]
+    fn displacements_solve_elasticity_inside_the_layer() {
+        for (x, nu) in [(0.3, 0.1), (1.0, 0.3), (2.5, 0.5)] {
+            let (h, depth) = (1e-4, 0.3);
+            // Across the wave: U'' = k^2 U.
+            let u = |d: f64| in_plane(x, d, nu).across;
+            let second = (u(depth + h) - 2.0 * u(depth) + u(depth - h)) / (h * h);
+            assert!((second / (x * x * u(depth)) - 1.0).abs() < 1e-4);
+            // Along the wave U solves the biharmonic equation (D^2 - k^2)^2 U = 0.
+            for part in [|i: InPlane| i.normal, |i: InPlane| i.along] {
+                let h = 0.02;
+                let v = |j: f64| part(in_plane(x, depth + j * h, nu));
+                let fourth = (v(2.0) - 4.0 * v(1.0) + 6.0 * v(0.0) - 4.0 * v(-1.0) + v(-2.0)) / h.powi(4);
+                let second = (v(1.0) - 2.0 * v(0.0) + v(-1.0)) / (h * h);
+                let residual = fourth - 2.0 * x * x * second + x.powi(4) * v(0.0);
+                assert!(residual.abs() < 5e-3 * x.powi(4).max(1.0), "{x}, {nu}: {residual}");
+                assert!(part(in_plane(x, 1.0, nu)).abs() < 1e-15, "the base holds");
+            }
         }
     }
 

@@ -3,7 +3,8 @@
 //! One stage a file: [`raster`] (mesh to height map), [`indent`] (press depth and pressure), [`deform`] (the gel
 //! around the contact), [`gradient`], [`shade`] (colour), [`shadow()`] (what a contact
 //! keeps from the light), [`finish`] (noise and rounding). For an elastic gel
-//! [`press_elastic`] takes the place of `indent` and `deform`. [`Renderer`] runs them.
+//! [`press_elastic`] takes the place of `indent` and `deform`. [`draw_markers`] moves the dots of a gel. [`Renderer`]
+//! runs them.
 //!
 //! Heights are in pixels, relative to the gel surface at rest: deeper contact and steeper slopes do not lose bits to
 //! an offset, and a flat gel is exactly 0. Colours are a change against the frame at rest, so that a grip without
@@ -21,6 +22,7 @@ mod gradient;
 mod grid;
 mod indent;
 mod layer;
+mod markers;
 pub mod metrics;
 mod noise;
 pub mod npz;
@@ -42,6 +44,9 @@ pub use elastic::{Base, ElasticGel, press_elastic};
 pub use gradient::gradient;
 pub use grid::{Grid, Plane};
 pub use indent::{ElasticField, Imprint, IndentError, PressedGel, indent};
+pub use markers::{
+    MarkerGel, Markers, Shear, draw_markers, marker_displacements, print_markers, without_markers,
+};
 pub use noise::finish;
 pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;

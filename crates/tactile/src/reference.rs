@@ -134,6 +134,7 @@ mod tests {
             noise_rgb: [1.5; 3],
             colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&lights))),
             gel_shape,
+            markers: None,
             shadow: None,
             pyramid: None,
             ball_m: None,
@@ -142,6 +143,8 @@ mod tests {
 
     fn gel() -> Gel {
         Gel {
+            model: gripgen_twin::config::GelModel::Pyramid,
+            elastic: None,
             thickness_m: 4e-3,
             width_m: 26e-3,
             height_m: 19.5e-3,

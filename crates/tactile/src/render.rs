@@ -7,6 +7,7 @@ use crate::colour::ColourModel;
 use crate::elastic::{Base, ElasticGel, press_elastic};
 use crate::grid::Plane;
 use crate::indent::{Imprint, IndentError, Press, PressedGel};
+use crate::markers::{MarkerGel, Shear, draw_markers, marker_displacements, without_markers};
 use crate::noise::finish;
 use crate::raster::ClusteredMesh;
 use crate::sensor::Sensor;
@@ -75,7 +76,9 @@ impl Renderer<'_> {
         let Some(imprint) = imprint else { return finish(self.sensor, None, noise_key) };
         let lit = with_scratch(self, |scratch, prepared| match &self.sensor.colour {
             ColourModel::Lambert(lambert)
-                if imprint.elastic.is_none() && self.only_where_raised(prepared) =>
+                if imprint.elastic.is_none()
+                    && self.sensor.markers.is_none()
+                    && self.only_where_raised(prepared) =>
             {
                 self.deform(imprint, scratch, prepared);
                 let Scratch { deform, change, .. } = scratch;
@@ -90,6 +93,25 @@ impl Renderer<'_> {
     /// What an imprint changes in the image, in grey levels of red, green and blue: stages `deform` to `shadow`. The
     /// stage `noise`, [`finish`], makes an image of it.
     pub fn change(&self, imprint: &Imprint) -> [Plane; 3] {
+        self.change_under_shear(imprint, &Shear::default())
+    }
+
+    /// The same while the part also pulls sideways: stage `markers`, of sensors that have them and gels whose modulus
+    /// is known.
+    pub fn change_under_shear(&self, imprint: &Imprint, shear: &Shear) -> [Plane; 3] {
+        let mut change = self.unmarked_change(imprint);
+        if let (Some(markers), Some(elastic)) = (&self.sensor.markers, self.gel.elastic) {
+            let Sensor { grid, rest, .. } = self.sensor;
+            let gel =
+                MarkerGel::new(self.gel.thickness_m, elastic.young_modulus_pa, elastic.poisson_ratio, 0.0);
+            let moved = marker_displacements(&gel, &imprint.patch, shear, grid, &markers.rest_px);
+            draw_markers(markers, &moved, &without_markers(rest, grid, markers), &mut change);
+        }
+        change
+    }
+
+    /// The stages `deform` to `shadow`.
+    fn unmarked_change(&self, imprint: &Imprint) -> [Plane; 3] {
         let core_px = self.core_px(imprint) as f32;
         let core = |i: usize| imprint.depth_px.values[i] > core_px;
         if let Some(field) = &imprint.elastic {

@@ -8,6 +8,7 @@ pub use gel_shape::GelShape;
 
 use crate::colour::ColourModel;
 use crate::grid::Grid;
+use crate::markers::Markers;
 use crate::npz::NpzError;
 use crate::shadow::Shadow;
 use gripgen_twin::TactileImage;
@@ -25,6 +26,8 @@ pub struct Sensor {
     pub colour: ColourModel,
     /// The gel surface at rest.
     pub gel_shape: GelShape,
+    /// Dots on the gel, which the rest frame shows.
+    pub markers: Option<Markers>,
     /// The shadows beside a contact, where the sensor has any.
     pub shadow: Option<Box<Shadow>>,
     /// The deformation that the colours were calibrated with, where they were calibrated.

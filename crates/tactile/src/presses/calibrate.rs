@@ -294,6 +294,7 @@ impl Fit<'_> {
         // A 64th of a grey level is far below the noise, and packs well.
         rest.iter_mut().flatten().for_each(|v| *v = (*v * 64.0).round() / 64.0);
         let sensor = Sensor {
+            markers: None,
             shadow: None,
             grid: self.grid,
             noise_rgb: noise_rgb(&presses, &rest, &self.grid),

@@ -7,6 +7,7 @@ use crate::metrics::{MetricError, Score, score};
 use crate::render::Renderer;
 use crate::sensor::{GelShape, Pyramid, Sensor};
 use crate::simd::SimdLevel;
+use gripgen_twin::config::GelModel;
 use gripgen_twin::{ContactPatch, Gel, TactileImage};
 
 /// Sides of the crops around the contact, at the resolution of the calibration.
@@ -167,7 +168,7 @@ pub(crate) fn ball_imprint(circle: &Circle, ball_m: f64, grid: &Grid, shape: &Ge
     }
     let deepest = depth_px.values.iter().fold(0.0f32, |m, &d| m.max(d));
     let press_depth_m = if rest.is_some() { f64::from(deepest) * grid.metres_per_px } else { press_depth_m };
-    Imprint { depth_px, press_depth_m, patch: ContactPatch { cells: Vec::new() } }
+    Imprint { depth_px, press_depth_m, patch: ContactPatch { cells: Vec::new() }, elastic: None }
 }
 
 /// What the renderer needs of a gel: the deformation of the calibration, or that of Wucherer et al. 2023.
@@ -175,6 +176,8 @@ fn gel_of(sensor: &Sensor) -> Gel {
     let usual = || Pyramid { kernels_px: vec![71, 51, 21, 11, 5], restore_depth_fraction: 0.4 };
     let pyramid = sensor.pyramid.clone().unwrap_or_else(usual);
     Gel {
+        model: GelModel::Pyramid,
+        elastic: None,
         thickness_m: f64::INFINITY,
         width_m: sensor.grid.width_px as f64 * sensor.grid.metres_per_px,
         height_m: sensor.grid.height_px as f64 * sensor.grid.metres_per_px,

@@ -15,6 +15,7 @@
 //! | `gel_height_px` | (H, W), optional | a gel of any shape: height at rest, relative to its highest point |
 //! | `kernels_px`, `restore_depth_fraction` | (K,), scalar, optional | the deformation that the colours were calibrated with |
 //! | `shadow_values`, `shadow_heights_mm`, `shadow_step_mm` | (N, H, L, 3), (2,), scalar, optional | shadows: change of grey level by direction, height of the gel beside the contact (first, step) and distance; NaN after the end of a ray |
+//! | `marker_px`, `marker_radius_px`, `marker_darkness_rgb` | (N, 2), scalar, (3,), optional | dots on the gel: column and row at rest, radius, share of light that a dot takes |
 //! | `ball_mm` | scalar, optional | diameter of the ball of the calibration |
 
 use super::{GelShape, Pyramid, Sensor, SensorError};
@@ -22,6 +23,7 @@ use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
 use crate::colour::{ColourModel, Lambert, Regressor, TaximTable};
 use crate::deform::gaussian;
 use crate::grid::Grid;
+use crate::markers::Markers;
 use crate::npz::{Array, ElementType, Npz, NpzError, parse_npy, write_npz};
 use crate::shadow::{Shadow, ShadowKind, ShadowTable};
 use gripgen_twin::TactileImage;
@@ -107,6 +109,7 @@ impl Sensor {
             noise_rgb: [noise[0] as f32, noise[1] as f32, noise[2] as f32],
             colour,
             gel_shape,
+            markers: Markers::read(npz)?,
             shadow: None,
             pyramid,
             ball_m,
@@ -131,6 +134,7 @@ impl Sensor {
             noise_rgb: [0.0; 3],
             colour: ColourModel::Taxim(Box::new(table)),
             gel_shape: GelShape::Flat,
+            markers: None,
             shadow: None,
             pyramid: None,
             ball_m: None,
@@ -177,6 +181,7 @@ impl Sensor {
         if let Some(shadow) = self.shadow.as_ref().filter(|s| s.table().kind == ShadowKind::Darkening) {
             arrays.extend(shadow.table().arrays());
         }
+        arrays.extend(self.markers.iter().flat_map(Markers::arrays));
         if let Some(ball_m) = self.ball_m {
             arrays.push(("ball_mm", scalar(ball_m * 1e3), ElementType::F64));
         }

@@ -122,7 +122,7 @@ fn a_shadow_has_the_same_size_at_every_resolution() {
         let mut table = table(ShadowKind::Darkening, 0.125e-3);
         table.rays = vec![[0, 1, 2].map(|_| vec![-20.0; 12]); 63 * 2];
         let shadow_of = Shadow::new(table, metres_per_px, w, &dull());
-        let mut change = shade(&dull(), &scene.slope.0, &scene.slope.1, None);
+        let mut change = shade(&dull(), &scene.surface, &scene.slope.0, &scene.slope.1, None);
         shadow(&shadow_of, &dull(), &scene.relief(), &mut change, SimdLevel::best());
         let row = change[0].row(60 * scale);
         assert!(row[80 * scale].abs() < 1e-3, "no shadow in the middle of the contact: {}", row[80 * scale]);
@@ -205,7 +205,7 @@ fn a_table_from_presses_draws_the_shadows_it_was_made_from() {
             along_y: &along_y,
             core: &core,
         };
-        let mut change = shade(&dull(), &along_x, &along_y, None);
+        let mut change = shade(&dull(), &raised, &along_x, &along_y, None);
         shadow(&shadow_of, &dull(), &relief, &mut change, SimdLevel::best());
         for (channel, grey_levels) in colours.into_iter().enumerate().take(2) {
             let (mut error, mut truth, mut inside) = (0.0, 0.0, 0.0_f64);

@@ -30,7 +30,7 @@ fn dent() -> Plane {
 
 fn change(model: Regressor, surface: &Plane) -> [Plane; 3] {
     let (along_x, along_y) = gradient(surface);
-    shade(&ColourModel::Regressor(Box::new(model)), surface, &along_x, &along_y)
+    shade(&ColourModel::Regressor(Box::new(model)), surface, &along_x, &along_y, None)
 }
 
 /// Exponents of n_x and n_y of the terms, in order.

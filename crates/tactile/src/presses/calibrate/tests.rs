@@ -30,6 +30,8 @@ fn truth() -> Sensor {
         colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&lights))),
         gel_shape: GelShape::Flat,
         pyramid: Some(Pyramid { kernels_px: vec![13, 9, 5], restore_depth_fraction: 0.3 }),
+        markers: None,
+        shadow: None,
         ball_m: None,
     }
 }
