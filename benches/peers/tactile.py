@@ -65,15 +65,15 @@ def finish(rest, change, stream):
 def taxim_us():
     """The package's image at 320 x 240, without shadow; None if it is not installed."""
     try:
-        import jax
-        from taxim import CALIB_GELSIGHT, Taxim
+        from taxim import Taxim
+        sensor = Taxim(params={"sensor": {"w": 320, "h": 240, "pixmm": 0.059}}, backend="jax", device="cpu")
     except ImportError as error:
         print(f"taxim is left out: {error}\n")
         return None
-    sensor = Taxim(calib_folder=CALIB_GELSIGHT, params={"simulator": {"shape": (240, 320)}}, backend="jax")
     y, x = np.mgrid[:240, :320]
-    heights = np.sqrt(np.maximum(0, 1 - ((x - 160) ** 2 + (y - 120) ** 2) / 8e3)).astype(np.float32)
-    return best_us(lambda: jax.block_until_ready(sensor.render(heights, with_shadow=False, press_depth=1.0)), 20)
+    # A ball of 4 mm: distance from the gel in mm, growing away from it.
+    heights = (((x - 160) ** 2 + (y - 120) ** 2) * 0.059**2 / 8.0).astype(np.float32)
+    return best_us(lambda: sensor.render(heights, with_shadow=False, press_depth=1.0), 20)
 
 
 def main():

@@ -404,7 +404,7 @@ impl Edge {
     /// Where it crosses row `y`.
     #[inline(always)]
     pub(super) fn crossing(&self, y: f64) -> Option<f64> {
-        (y >= self.rows.0 && y <= self.rows.1).then(|| self.x_px + (y - self.y_px) * self.slope)
+        (y >= self.rows.0 && y <= self.rows.1).then_some(self.x_px + (y - self.y_px) * self.slope)
     }
 }
 
@@ -425,7 +425,7 @@ fn fill(map: &mut [f32], width: usize, t: [Corner; 3], rows: (usize, usize)) {
     let edges = [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])];
     let last_column = (width - 1) as f64;
     for row in rows.0..=rows.1 {
-        let y = row as i32 as f64;
+        let y = f64::from(row as i32);
         let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
         for edge in &edges {
             if let Some(x) = edge.crossing(y) {
