@@ -18,9 +18,20 @@ pub fn appearance(
     core: impl Fn(usize) -> bool,
     level: SimdLevel,
 ) -> [Plane; 3] {
-    let rest = sensor.gel_shape.rest_px(&sensor.grid).map(|gel| {
+    appearance_on(sensor, raised_px, sensor.gel_shape.rest_px(&sensor.grid).as_ref(), core, level)
+}
+
+/// [`appearance`] on a gel of another shape at rest than the sensor's, in pixels towards the part; `None` is flat.
+pub(crate) fn appearance_on(
+    sensor: &Sensor,
+    raised_px: &Plane,
+    rest_px: Option<&Plane>,
+    core: impl Fn(usize) -> bool,
+    level: SimdLevel,
+) -> [Plane; 3] {
+    let rest = rest_px.map(|gel| {
         // Towards the camera a gel that bulges towards the part is a hollow.
-        Plane { values: gel.values.iter().map(|h| -h).collect(), ..gel }
+        Plane { values: gel.values.iter().map(|h| -h).collect(), ..*gel }
     });
     let whole = rest.as_ref().map(|rest| {
         let values = raised_px.values.iter().zip(&rest.values).map(|(a, b)| a + b).collect();

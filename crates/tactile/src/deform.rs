@@ -36,6 +36,33 @@ pub fn deform(
     scratch.surface_plane()
 }
 
+/// [`deform`] with the weights of the kernels, of odd lengths, on a gel with any rest surface (towards the part).
+pub(crate) fn deform_with(
+    depth_px: &Plane,
+    core_px: f64,
+    kernels: &[Vec<f32>],
+    rest_px: Option<&Plane>,
+    level: SimdLevel,
+) -> Plane {
+    let last = gaussian(FINAL_KERNEL_PX);
+    let halves: Vec<Vec<f32>> = kernels.iter().chain([&last]).map(|k| k[k.len() / 2..].to_vec()).collect();
+    let rest = rest_px.map(|rest| BlurredRest::with_weights(rest, &halves, level));
+    let mut scratch = DeformScratch::default();
+    scratch.deform(depth_px, core_px, &halves, rest.as_ref(), level);
+    scratch.surface_plane()
+}
+
+/// A plane blurred along both axes with weights of odd length, borders mirrored.
+pub(crate) fn blurred(plane: &Plane, weights: &[f32], level: SimdLevel) -> Plane {
+    let half = &weights[weights.len() / 2..];
+    let whole = Area::whole(plane.width, plane.height);
+    let mut surface = Surface::default();
+    surface.start(plane, whole, half.len() - 1);
+    surface.blur(half, None, 0, level);
+    surface.upright(level);
+    surface.sheet.plane(whole)
+}
+
 /// The halves of all kernels, the last one included.
 pub(crate) fn weights(kernels_px: &[u32]) -> Vec<Vec<f32>> {
     kernels_px
@@ -57,8 +84,12 @@ pub struct BlurredRest {
 impl BlurredRest {
     /// From the surface at rest in pixels towards the part (as [`crate::GelShape::rest_px`] gives it).
     pub fn new(rest_px: &Plane, kernels_px: &[u32], level: SimdLevel) -> Self {
-        let weights = weights(kernels_px);
-        let half = largest_half(&weights);
+        Self::with_weights(rest_px, &weights(kernels_px), level)
+    }
+
+    /// The same for the halves of any kernels, the last one not restored.
+    fn with_weights(rest_px: &Plane, weights: &[Vec<f32>], level: SimdLevel) -> Self {
+        let half = largest_half(weights);
         let whole = Area::whole(rest_px.width, rest_px.height);
         // Heights in the image are towards the camera.
         let towards_camera = Plane { values: rest_px.values.iter().map(|&h| -h).collect(), ..*rest_px };

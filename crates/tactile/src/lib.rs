@@ -26,6 +26,7 @@ mod markers;
 pub mod metrics;
 mod noise;
 pub mod npz;
+mod optics;
 mod patch;
 pub mod presses;
 mod raster;
@@ -48,6 +49,7 @@ pub use markers::{
     MarkerGel, Markers, Shear, draw_markers, marker_displacements, print_markers, without_markers,
 };
 pub use noise::finish;
+pub use optics::seen_heights;
 pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;
 pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError, SensorFiles};

@@ -104,7 +104,7 @@ mod tests {
     use super::*;
     use crate::colour::{ColourModel, Lambert, Light, shade};
     use crate::sensor::{GelShape, Sensor};
-    use crate::{ClusteredMesh, Imprint, PressedGel, Renderer, SimdLevel, gradient, indent};
+    use crate::{BlurredRest, ClusteredMesh, Imprint, PressedGel, Renderer, SimdLevel, gradient, indent};
     use gripgen_twin::Gel;
     use gripgen_twin::frames::{pose, rotation_from_fixed_xyz};
     use gripgen_twin::parts::{InvoluteGear, SteppedShaft};
@@ -212,17 +212,45 @@ mod tests {
     #[test]
     fn surfaces_are_those_of_plain_sums() {
         for shape in [GelShape::Flat, GelShape::Dome { sag_m: 0.6e-3 }] {
-            let (sensor, gel) = (sensor(shape), gel());
+            let sensor = sensor(shape);
             let rest = sensor.gel_shape.rest_px(&GRID).unwrap_or(Plane::filled(104, 78, 0.0));
             let at_rest: Vec<f64> = rest.values.iter().map(|&r| -f64::from(r)).collect();
             for (name, imprint) in imprints(&sensor) {
                 let core_px = 0.4 * imprint.press_depth_m / GRID.metres_per_px;
                 let exact = deform(&imprint.depth_px, &at_rest, &KERNELS_PX, core_px);
                 for level in SimdLevel::available() {
-                    let ours = Renderer { sensor: &sensor, gel: &gel, level }.surface(&imprint);
+                    let blurred = BlurredRest::new(&rest, &KERNELS_PX, level);
+                    let ours =
+                        crate::deform(&imprint, &KERNELS_PX, 0.4, GRID.metres_per_px, Some(&blurred), level);
                     let worst = ours.values.iter().zip(&exact).map(|(&a, b)| (f64::from(a) - b).abs());
                     let worst = worst.fold(0.0, f64::max);
                     assert!(worst < 1e-4, "{name}, {level:?}: {worst} px");
+                }
+            }
+        }
+    }
+
+    /// With lights or a regression the displacement is blurred, whatever the gel's shape: far away nothing moves.
+    #[test]
+    fn a_dome_is_displaced_like_a_flat_gel() {
+        let (domed, flat, gel) = (sensor(GelShape::Dome { sag_m: 0.6e-3 }), sensor(GelShape::Flat), gel());
+        for (name, imprint) in imprints(&domed) {
+            let surface = |sensor| Renderer { sensor, gel: &gel, level: SimdLevel::best() }.surface(&imprint);
+            let moved = surface(&domed);
+            assert!(moved == surface(&flat), "{name}");
+            let change = Renderer { sensor: &domed, gel: &gel, level: SimdLevel::best() }.change(&imprint);
+            for (i, &raised) in moved.values.iter().enumerate() {
+                let (x, y) = (i % GRID.width_px, i / GRID.width_px);
+                let inner = (2..GRID.width_px - 2).contains(&x) && (2..GRID.height_px - 2).contains(&y);
+                let at_rest = |x: usize, y: usize| moved.at(x, y) == 0.0;
+                if inner
+                    && raised == 0.0
+                    && at_rest(x - 1, y)
+                    && at_rest(x + 1, y)
+                    && at_rest(x, y - 1)
+                    && at_rest(x, y + 1)
+                {
+                    assert!(change.iter().all(|plane| plane.values[i].abs() < 1e-4), "{name}, ({x}, {y})");
                 }
             }
         }

@@ -6,7 +6,7 @@ use crate::appearance::appearance;
 use crate::colour::ColourModel;
 use crate::elastic::{Base, ElasticGel, press_elastic};
 use crate::grid::Plane;
-use crate::indent::{Imprint, IndentError, Press, PressedGel};
+use crate::indent::{Imprint, IndentError, Press, PressedGel, indent};
 use crate::markers::{MarkerGel, Shear, draw_markers, marker_displacements, without_markers};
 use crate::noise::finish;
 use crate::raster::ClusteredMesh;
@@ -42,12 +42,12 @@ impl Renderer<'_> {
         force_n: f64,
     ) -> Result<Imprint, IndentError> {
         let grid = &self.sensor.grid;
-        if let Some(gel) = self.elastic_gel() {
-            let mut heights = mesh.raster(gel_from_mesh, grid, gel.thickness_m / grid.metres_per_px);
+        if self.elastic_gel().is_some() {
+            let mut heights = mesh.raster(gel_from_mesh, grid, self.gel.thickness_m / grid.metres_per_px);
             if let Some(rest) = self.sensor.gel_shape.rest_px(grid) {
                 heights.values.iter_mut().zip(&rest.values).for_each(|(h, r)| *h += r);
             }
-            return press_elastic(&heights, grid, &gel, force_n, self.level);
+            return self.press_heights(&heights, imprint_m3_per_n, force_n);
         }
         let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n };
         with_scratch(self, |scratch, prepared| {
@@ -56,6 +56,23 @@ impl Renderer<'_> {
             let rest = prepared.rest_px.as_ref();
             Press { grid, gel: &gel, force_n, rest, level: self.level }.sink(map, mesh)
         })
+    }
+
+    /// Presses a height map, in pixels above the gel at rest, into the gel.
+    pub(crate) fn press_heights(
+        &self,
+        heights: &Plane,
+        imprint_m3_per_n: f64,
+        force_n: f64,
+    ) -> Result<Imprint, IndentError> {
+        let grid = &self.sensor.grid;
+        match self.elastic_gel() {
+            Some(gel) => press_elastic(heights, grid, &gel, force_n, self.level),
+            None => {
+                let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n };
+                indent(heights, grid, &gel, force_n)
+            }
+        }
     }
 
     /// The gel surface around an imprint, in pixels towards the camera above its rest: stage `deform`. For an elastic
@@ -100,18 +117,23 @@ impl Renderer<'_> {
     /// is known.
     pub fn change_under_shear(&self, imprint: &Imprint, shear: &Shear) -> [Plane; 3] {
         let mut change = self.unmarked_change(imprint);
+        self.mark(imprint, shear, &mut change);
+        change
+    }
+
+    /// The stage `markers`.
+    pub(crate) fn mark(&self, imprint: &Imprint, shear: &Shear, change: &mut [Plane; 3]) {
         if let (Some(markers), Some(elastic)) = (&self.sensor.markers, self.gel.elastic) {
             let Sensor { grid, rest, .. } = self.sensor;
             let gel =
                 MarkerGel::new(self.gel.thickness_m, elastic.young_modulus_pa, elastic.poisson_ratio, 0.0);
             let moved = marker_displacements(&gel, &imprint.patch, shear, grid, &markers.rest_px);
-            draw_markers(markers, &moved, &without_markers(rest, grid, markers), &mut change);
+            draw_markers(markers, &moved, &without_markers(rest, grid, markers), change);
         }
-        change
     }
 
     /// The stages `deform` to `shadow`.
-    fn unmarked_change(&self, imprint: &Imprint) -> [Plane; 3] {
+    pub(crate) fn unmarked_change(&self, imprint: &Imprint) -> [Plane; 3] {
         let core_px = self.core_px(imprint) as f32;
         let core = |i: usize| imprint.depth_px.values[i] > core_px;
         if let Some(field) = &imprint.elastic {
@@ -148,9 +170,15 @@ impl Renderer<'_> {
         local && self.sensor.shadow.is_none()
     }
 
+    /// Whether the deformation blurs the gel as a whole, as Taxim does, which moves a gel that is not flat at rest even
+    /// far from the contact. With other colours it blurs the displacement alone: far from a contact nothing moves.
+    pub(crate) fn blurs_whole_gel(&self) -> bool {
+        matches!(self.sensor.colour, ColourModel::Taxim(_))
+    }
+
     /// Kernels and restored share of the deformation. A calibrated sensor says which; without its word those of the
     /// gel are used.
-    fn pyramid(&self) -> (&[u32], f64) {
+    pub(crate) fn pyramid(&self) -> (&[u32], f64) {
         match &self.sensor.pyramid {
             Some(pyramid) => (&pyramid.kernels_px, pyramid.restore_depth_fraction),
             None => (&self.gel.kernels_px, self.gel.restore_depth_fraction),
@@ -158,7 +186,7 @@ impl Renderer<'_> {
     }
 
     /// Depth from which on the gel follows the part.
-    fn core_px(&self, imprint: &Imprint) -> f64 {
+    pub(crate) fn core_px(&self, imprint: &Imprint) -> f64 {
         self.pyramid().1 * imprint.press_depth_m / self.sensor.grid.metres_per_px
     }
 

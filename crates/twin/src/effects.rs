@@ -10,22 +10,32 @@
 mod anisotropy;
 mod area_saturation;
 mod asymmetric_jaws;
+mod background_change;
+mod cad_mismatch;
+mod cast_shadow;
 mod chain;
 mod conditioning;
 mod contamination;
 mod controller_gain;
 mod deadband;
+mod defocus;
 mod dwell_ageing;
+mod exposure;
+mod gel_dome;
+mod gel_kernel;
 mod grip_force_loss;
 mod grip_relaxation;
 mod hooks;
 mod imprint_nonlinearity;
 mod jaw_tilt;
+mod light_drift;
 mod load_offset;
 mod load_power_law;
+mod misregistration;
 mod off_centre;
 mod rate_dependence;
 mod regime_transition;
+mod rest_offset;
 mod sensor_bias;
 mod sensor_creep;
 mod sensor_drift;
@@ -42,15 +52,16 @@ mod testing;
 mod tests;
 mod wear;
 
-pub use chain::{CommandChain, SensorChain, imprint_volume_m3, jaw_tilt_rad, normal_force_n};
+pub use chain::{CommandChain, SensorChain, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 pub use hooks::{
-    CommandHook, FrictionHook, GripPoint, ImprintHook, NormalForceHook, SensorHook, SensorMemory,
+    CommandHook, FrictionHook, GripPoint, ImprintHook, NormalForceHook, OpticsHook, SensorHook, SensorMemory,
     SensorPoint, TiltHook,
 };
 
+use crate::OpticsState;
 use std::fmt;
 
-/// The effects of this version: friction, gel and jaws, sensor and robot.
+/// The effects of this version: friction, gel and jaws, sensor and robot, optics.
 pub const LIBRARY: &[&EffectSpec] = &[
     &load_offset::SPEC,
     &load_power_law::SPEC,
@@ -80,6 +91,16 @@ pub const LIBRARY: &[&EffectSpec] = &[
     &sensor_creep::SPEC,
     &controller_gain::SPEC,
     &deadband::SPEC,
+    &light_drift::SPEC,
+    &background_change::SPEC,
+    &misregistration::SPEC,
+    &exposure::SPEC,
+    &defocus::SPEC,
+    &gel_kernel::SPEC,
+    &cad_mismatch::SPEC,
+    &rest_offset::SPEC,
+    &cast_shadow::SPEC,
+    &gel_dome::SPEC,
 ];
 
 /// A parameter of an effect.
@@ -126,6 +147,8 @@ pub struct EffectSpec {
     pub sensor: Option<SensorHook>,
     /// Acts on the command of the force loop.
     pub command: Option<CommandHook>,
+    /// Acts on the images of a jaw, and on nothing else.
+    pub optics: Option<OpticsHook>,
 }
 
 impl EffectSpec {
@@ -144,6 +167,7 @@ impl EffectSpec {
         tilt_rad: None,
         sensor: None,
         command: None,
+        optics: None,
     };
 
     /// Whether the effect is a friction law of the grip force, which can be taken per pressure cell.

@@ -25,10 +25,12 @@ pub(super) struct Prepared {
     grid: Grid,
     kernels_px: Vec<u32>,
     gel_shape: GelShape,
+    whole_gel: bool,
     /// Halves of the kernels.
     pub(super) weights: Vec<Vec<f32>>,
     /// The surface at rest; `None` if it is flat.
     pub(super) rest_px: Option<Plane>,
+    /// There where the blurs work on the whole gel.
     pub(super) blurred_rest: Option<BlurredRest>,
 }
 
@@ -40,8 +42,12 @@ impl Prepared {
             grid: sensor.grid,
             kernels_px: kernels_px.to_vec(),
             gel_shape: sensor.gel_shape.clone(),
+            whole_gel: renderer.blurs_whole_gel(),
             weights: weights(kernels_px),
-            blurred_rest: rest_px.as_ref().map(|rest| BlurredRest::new(rest, kernels_px, renderer.level)),
+            blurred_rest: rest_px
+                .as_ref()
+                .filter(|_| renderer.blurs_whole_gel())
+                .map(|rest| BlurredRest::new(rest, kernels_px, renderer.level)),
             rest_px,
         }
     }
@@ -49,6 +55,7 @@ impl Prepared {
     fn fits(&self, renderer: &Renderer<'_>) -> bool {
         self.grid == renderer.sensor.grid
             && self.kernels_px == renderer.pyramid().0
+            && self.whole_gel == renderer.blurs_whole_gel()
             && self.gel_shape == renderer.sensor.gel_shape
     }
 }

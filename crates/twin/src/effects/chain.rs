@@ -1,7 +1,7 @@
 //! The effects of a twin on one part, hook by hook, in the order of the twin.
 
 use super::{CommandHook, Effect, GripPoint, SensorHook, SensorMemory, SensorPoint};
-use crate::{Part, Twin};
+use crate::{OpticsState, Part, Twin};
 
 fn acting<'a>(twin: &'a Twin, part_name: &'a str) -> impl Iterator<Item = &'a Effect> {
     twin.effects.iter().filter(move |effect| effect.acts_on(part_name))
@@ -27,6 +27,17 @@ pub fn jaw_tilt_rad(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> f64 {
     acting(twin, part_name).fold(0.0, |tilt_rad, effect| {
         effect.spec.tilt_rad.map_or(tilt_rad, |hook| tilt_rad + hook(&effect.values, at))
     })
+}
+
+/// The optics of a jaw, neutral without effects.
+pub fn optics_state(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> OpticsState {
+    let mut state = OpticsState::default();
+    for effect in acting(twin, part_name) {
+        if let Some(hook) = effect.spec.optics {
+            hook(&effect.values, &mut state, at);
+        }
+    }
+    state
 }
 
 /// The wrist sensor as its effects change it, for one pull. The default reads the true force bit for bit.

@@ -1,6 +1,6 @@
 //! Where an effect acts, and what it may look at there.
 
-use crate::{Covariates, Jaw};
+use crate::{Covariates, Jaw, OpticsState};
 
 /// Smallest grip force a law is evaluated at, so that `1 / F` and `ln F` stay finite without contact.
 const SMALLEST_FORCE_N: f64 = 1e-6;
@@ -72,6 +72,9 @@ pub type SensorHook = fn(&[f64], f64, &mut SensorMemory, &SensorPoint) -> f64;
 /// Changes the command of the force loop: (parameters, desired force in N, measured force in N) -> force in N
 /// that the loop closes on.
 pub type CommandHook = fn(&[f64], f64, f64) -> f64;
+
+/// Changes the optics of a jaw: (parameters, optics so far, where). Pixels follow from them in `tactile`.
+pub type OpticsHook = fn(&[f64], &mut OpticsState, &GripPoint<'_>);
 
 /// The parameters of a spec by position.
 pub(super) fn values<const N: usize>(parameters: &[f64]) -> [f64; N] {

@@ -2,7 +2,10 @@
 
 use super::testing::{grip, twin};
 use super::*;
-use crate::{ContactPatch, Covariates, FrictionError, Jaw, PressureCell, Twin, cell_friction, grip_friction};
+use crate::{
+    ContactPatch, Covariates, FrictionError, Jaw, OpticsState, PressureCell, Twin, cell_friction,
+    grip_friction,
+};
 
 /// Circumstances from one end to the other.
 fn circumstances() -> Vec<Covariates> {
@@ -54,6 +57,17 @@ fn each_call(spec: &EffectSpec, parameters: &[f64], mut check: impl FnMut(&str, 
         if let Some(hook) = spec.tilt_rad {
             check("tilt_rad", 0.0, hook(parameters, at));
         }
+        if let Some(hook) = spec.optics {
+            // On top of nothing, and on top of another effect.
+            let other = OpticsState { light_gain: [0.9; 3], gamma: 1.2, scale: 0.97, ..Default::default() };
+            for before in [OpticsState::default(), other] {
+                let mut after = before;
+                hook(parameters, &mut after, at);
+                for (x, y) in numbers(&before).into_iter().zip(numbers(&after)) {
+                    check("optics", x, y);
+                }
+            }
+        }
     });
     for start_s in [0.0, 7200.0] {
         if let Some(hook) = spec.sensor {
@@ -69,6 +83,34 @@ fn each_call(spec: &EffectSpec, parameters: &[f64], mut check: impl FnMut(&str, 
             FORCES_N.iter().for_each(|&m| check("command", desired_n, hook(parameters, desired_n, m)));
         }
     }
+}
+
+/// Every number of the optics of a jaw.
+fn numbers(state: &OpticsState) -> Vec<f64> {
+    let OpticsState {
+        light_gain,
+        background,
+        exposure_gain,
+        gamma,
+        shift_m,
+        rotation_rad,
+        scale,
+        distortion_k1,
+        defocus_m,
+        kernel_scale,
+        part_offset_m,
+        edge_blunting_m,
+        rest_offset,
+        shadow_strength,
+        light_elevation_rad,
+        dome_sag_m,
+    } = *state;
+    let mut all = vec![exposure_gain, gamma, rotation_rad, scale, distortion_k1, defocus_m, kernel_scale];
+    all.extend([part_offset_m, edge_blunting_m, shadow_strength, light_elevation_rad, dome_sag_m]);
+    all.extend(
+        light_gain.into_iter().chain(shift_m).chain(rest_offset).chain(background.into_iter().flatten()),
+    );
+    all
 }
 
 fn neutral(spec: &EffectSpec) -> Vec<f64> {
@@ -93,7 +135,7 @@ fn ids_and_parameter_names_are_unique_and_neutral_values_lie_inside_the_bounds()
 }
 
 #[test]
-fn the_library_has_every_id_of_friction_gel_jaws_sensor_and_robot() {
+fn the_library_has_every_id_of_every_group() {
     let ids: Vec<&str> = LIBRARY.iter().map(|spec| spec.id).collect();
     assert_eq!(
         ids.join(" "),
@@ -101,13 +143,20 @@ fn the_library_has_every_id_of_friction_gel_jaws_sensor_and_robot() {
          contamination wear conditioning temperature grip_relaxation imprint_nonlinearity jaw_tilt off_centre \
          asymmetric_jaws grip_force_loss sensor_gain sensor_bias sensor_drift sensor_gain_drift \
          sensor_hysteresis sensor_quadratic sensor_saturation sensor_lowpass sensor_creep controller_gain \
-         deadband"
+         deadband light_drift background_change misregistration exposure defocus gel_kernel cad_mismatch \
+         rest_offset cast_shadow gel_dome"
     );
 }
 
-/// Every corner of the bounds of a spec's parameters.
+/// Every corner of the bounds of a spec's parameters; of one with many, those with one or all but one at the other end.
 fn corners(spec: &EffectSpec) -> impl Iterator<Item = Vec<f64>> {
-    (0..1_u32 << spec.parameters.len()).map(|corner| {
+    let n = spec.parameters.len();
+    let few: Vec<u32> = if n <= 6 {
+        (0..1 << n).collect()
+    } else {
+        (0..n).map(|i| 1 << i).flat_map(|one| [one, !one, 0, !0]).collect()
+    };
+    few.into_iter().map(|corner| {
         let end =
             |(i, p): (usize, &ParameterSpec)| if corner >> i & 1 == 0 { p.bounds.0 } else { p.bounds.1 };
         spec.parameters.iter().enumerate().map(end).collect()
@@ -115,7 +164,7 @@ fn corners(spec: &EffectSpec) -> impl Iterator<Item = Vec<f64>> {
 }
 
 /// At its neutral values an effect returns its input bit for bit. The first parameter is the size of the effect:
-/// where it is neutral, the others do not matter (`load_offset` has two sizes).
+/// where it is neutral, the others do not matter. Some have several sizes.
 #[test]
 fn neutral_parameters_change_nothing_bitwise() {
     for spec in LIBRARY {
@@ -124,7 +173,9 @@ fn neutral_parameters_change_nothing_bitwise() {
             parameters[0] = spec.parameters[0].neutral;
             parameters
         };
-        let any_scale = corners(spec).map(without_size).filter(|_| spec.id != "load_offset");
+        let sizes = ["load_offset", "light_drift", "background_change", "misregistration", "exposure"];
+        let one_size = !sizes.contains(&spec.id) && !["cad_mismatch", "rest_offset"].contains(&spec.id);
+        let any_scale = corners(spec).map(without_size).filter(|_| one_size);
         for parameters in any_scale.chain([neutral(spec)]) {
             each_call(spec, &parameters, |hook, before, after| {
                 calls += 1;
@@ -168,6 +219,8 @@ fn a_twin_of_neutral_effects_is_the_twin_without_effects() {
         equal(both(&|t| normal_force_n(t, "rod", at)));
         equal(both(&|t| imprint_volume_m3(t, "rod", part, at.grip_force_n)));
         equal(both(&|t| jaw_tilt_rad(t, "rod", at)));
+        assert_eq!(optics_state(&neutral_twin, "rod", at), OpticsState::default());
+        assert!(optics_state(&plain, "rod", at).is_neutral());
     });
     let mut chains = [SensorChain::new(&plain, "rod", 5.0), SensorChain::new(&neutral_twin, "rod", 5.0)];
     for direction in [1.0, -1.0] {
@@ -195,6 +248,43 @@ fn effects_act_in_the_order_of_the_twin_and_on_their_part() {
     let drift = "[[effects]]\nname = \"sensor_drift\"\nrate_n_per_h = 1.0\n";
     let mut later = SensorChain::new(&twin(drift).unwrap(), "rod", 1800.0);
     assert_eq!(later.read(10.0, 1800.0, 0.002), 11.0, "the clock is that of the campaign");
+}
+
+/// What an optics effect does to one part it does not do to another, and forces do not see it.
+#[test]
+fn optics_effects_act_on_their_part_and_on_no_force() {
+    let list: String = LIBRARY
+        .iter()
+        .filter(|spec| spec.optics.is_some())
+        .map(|spec| {
+            let largest = |p: &ParameterSpec| format!("{} = {:?}\n", p.name, 0.5 * (p.neutral + p.bounds.1));
+            let values: String = spec.parameters.iter().map(largest).collect();
+            format!("[[effects]]\nname = \"{}\"\npart = \"rod\"\n{values}", spec.id)
+        })
+        .collect();
+    let (plain, seen) = (twin("").unwrap(), twin(&list).unwrap());
+    assert_eq!(seen.effects.len(), 10);
+    each_grip(|at| {
+        assert!(
+            !optics_state(&seen, "rod", at).is_neutral() && optics_state(&seen, "plate", at).is_neutral()
+        );
+        let part = &plain.parts["rod"];
+        let all = |t: &Twin| {
+            let mu = grip_friction(t, "rod", part, at).unwrap().mu;
+            (
+                mu,
+                normal_force_n(t, "rod", at),
+                imprint_volume_m3(t, "rod", part, 40.0),
+                jaw_tilt_rad(t, "rod", at),
+            )
+        };
+        assert_eq!(all(&plain), all(&seen));
+    });
+    assert!(SensorChain::new(&seen, "rod", 5.0).is_identity());
+    for spec in LIBRARY.iter().filter(|spec| spec.optics.is_some()) {
+        let others = [spec.friction.is_some(), spec.normal_force.is_some(), spec.imprint_volume.is_some()];
+        assert!(!others.contains(&true) && spec.sensor.is_none() && spec.command.is_none(), "{}", spec.id);
+    }
 }
 
 /// A law of the load sees the normal force that is left, and its range is that of the commanded force.

@@ -6,7 +6,7 @@ use crate::colour::regressor::{
     AROUND_HEIGHTS, HEIGHT_INPUT, NEAR, Place, SURROUNDINGS, around_planes, between_cells, cell_px,
     limited_normal, near_terms,
 };
-use crate::deform::{BlurredRest, deform};
+use crate::deform::deform;
 use crate::gradient::gradient;
 use crate::grid::{Grid, Plane};
 use crate::sensor::{GelShape, Pyramid};
@@ -33,9 +33,8 @@ impl GelModel {
     pub(super) fn surface(&self, circle: &Circle, ball_m: f64, grid: &Grid) -> Plane {
         let imprint = ball_imprint(circle, ball_m, grid, &self.shape);
         let Pyramid { kernels_px, restore_depth_fraction } = &self.pyramid;
-        let level = SimdLevel::best();
-        let rest = self.shape.rest_px(grid).map(|rest| BlurredRest::new(&rest, kernels_px, level));
-        deform(&imprint, kernels_px, *restore_depth_fraction, grid.metres_per_px, rest.as_ref(), level)
+        let metres_per_px = grid.metres_per_px;
+        deform(&imprint, kernels_px, *restore_depth_fraction, metres_per_px, None, SimdLevel::best())
     }
 }
 

@@ -1,0 +1,143 @@
+//! The image as the optics effects of a twin change it.
+//!
+//! An [`OpticsState`] acts in this order, whatever the order of the effects: the shape of the gel at rest (here), the
+//! kernels of the gel (`kernels`), the shape of the part (`shape`), where the contact is seen (`warp`), shadow,
+//! focus and offset of what the contact changes (`shadow`, here), light and camera on the whole frame (`camera`). A
+//! stage in which nothing is changed is the plain one, bit for bit. Noise comes after all of it: it is the camera's.
+
+mod camera;
+#[cfg(test)]
+mod fit_tests;
+mod kernels;
+mod shadow;
+mod shape;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod warp;
+
+use crate::appearance::appearance_on;
+use crate::deform::{blurred, deform_with};
+use crate::grid::{Grid, Plane};
+use crate::indent::{Imprint, IndentError};
+use crate::markers::Shear;
+use crate::raster::ClusteredMesh;
+use crate::render::Renderer;
+use crate::sensor::GelShape;
+use gripgen_twin::OpticsState;
+use gripgen_twin::frames::Pose;
+
+/// The surface that is pressed into the gel, relative to the gel as it really is: `heights` of the part in pixels towards
+/// the gel on the sensor's grid, minus infinity where there is nothing.
+pub fn seen_heights(heights: Plane, grid: &Grid, optics: &OpticsState) -> Plane {
+    added(heights, dome(grid, optics).as_ref())
+}
+
+fn added(mut heights: Plane, rest: Option<&Plane>) -> Plane {
+    if let Some(rest) = rest {
+        heights.values.iter_mut().zip(&rest.values).for_each(|(height, rest)| *height += rest);
+    }
+    heights
+}
+
+/// What the effects add to the gel's shape at rest, in pixels towards the part.
+fn dome(grid: &Grid, optics: &OpticsState) -> Option<Plane> {
+    GelShape::Dome { sag_m: optics.dome_sag_m }.rest_px(grid)
+}
+
+impl Renderer<'_> {
+    /// [`Renderer::press`] on the gel as it really is. The image is made of it; forces are those of the plain press.
+    pub fn press_seen(
+        &self,
+        mesh: &ClusteredMesh,
+        gel_from_mesh: &Pose,
+        imprint_m3_per_n: f64,
+        force_n: f64,
+        optics: &OpticsState,
+    ) -> Result<Imprint, IndentError> {
+        if optics.dome_sag_m == 0.0 {
+            return self.press(mesh, gel_from_mesh, imprint_m3_per_n, force_n);
+        }
+        let grid = &self.sensor.grid;
+        let heights = mesh.raster(gel_from_mesh, grid, self.gel.thickness_m / grid.metres_per_px);
+        self.press_heights(&added(heights, self.rest_seen(optics).as_ref()), imprint_m3_per_n, force_n)
+    }
+
+    /// The gel's shape at rest with what the effects add to it, in pixels towards the part.
+    fn rest_seen(&self, optics: &OpticsState) -> Option<Plane> {
+        let grid = &self.sensor.grid;
+        match (self.sensor.gel_shape.rest_px(grid), dome(grid, optics)) {
+            (Some(rest), dome) => Some(added(rest, dome.as_ref())),
+            (None, dome) => dome,
+        }
+    }
+
+    /// What the camera sees, minus the rest frame of the sensor file, in grey levels of red, green and blue; for an
+    /// imprint of [`Renderer::press_seen`] or without contact. [`crate::finish`] makes an image of it.
+    pub fn change_seen(&self, imprint: Option<&Imprint>, optics: &OpticsState) -> [Plane; 3] {
+        let grid = &self.sensor.grid;
+        let mut change = match imprint {
+            Some(imprint) => self.contact_seen(imprint, optics),
+            None => [0, 1, 2].map(|_| Plane::filled(grid.width_px, grid.height_px, 0.0)),
+        };
+        if optics.changes_frame() {
+            camera::apply(optics, &self.sensor.rest, &mut change);
+        }
+        change
+    }
+
+    /// What the contact changes, as it reaches the camera.
+    fn contact_seen(&self, imprint: &Imprint, optics: &OpticsState) -> [Plane; 3] {
+        let grid = &self.sensor.grid;
+        let mut change = if !optics.changes_surface() && optics.shadow_strength == 0.0 {
+            self.unmarked_change(imprint)
+        } else {
+            let mut surface = self.surface_seen(imprint, optics);
+            if optics.part_offset_m != 0.0 || optics.edge_blunting_m != 0.0 {
+                surface = shape::part(surface, grid, optics, self.level);
+            }
+            let mut moved = None;
+            if optics.moves_contact() {
+                surface = warp::surface(&surface, grid, optics);
+                moved = Some(warp::surface(&imprint.depth_px, grid, optics));
+            }
+            let depth_px = moved.as_ref().unwrap_or(&imprint.depth_px);
+            let core_px = self.core_px(imprint) as f32;
+            let core = |i: usize| depth_px.values[i] > core_px;
+            let rest = self.rest_seen(optics);
+            let mut change = appearance_on(self.sensor, &surface, rest.as_ref(), core, self.level);
+            if optics.shadow_strength != 0.0 {
+                shadow::cast(self.sensor, optics, &surface, depth_px, &mut change);
+            }
+            change
+        };
+        if optics.defocus_m > 0.0 {
+            let weights = kernels::discrete_gaussian(optics.defocus_m / grid.metres_per_px);
+            for plane in &mut change {
+                *plane = blurred(plane, &weights, self.level);
+            }
+        }
+        self.mark(imprint, &Shear::default(), &mut change);
+        for (plane, offset) in change.iter_mut().zip(optics.rest_offset) {
+            if offset != 0.0 {
+                plane.values.iter_mut().for_each(|value| *value += offset as f32);
+            }
+        }
+        change
+    }
+
+    /// The gel surface around an imprint, with scaled kernels.
+    fn surface_seen(&self, imprint: &Imprint, optics: &OpticsState) -> Plane {
+        if imprint.elastic.is_some()
+            || (optics.kernel_scale == 1.0 && (optics.dome_sag_m == 0.0 || !self.blurs_whole_gel()))
+        {
+            return self.surface(imprint);
+        }
+        let (kernels_px, _) = self.pyramid();
+        let scaled: Vec<Vec<f32>> =
+            kernels_px.iter().map(|&k| kernels::scaled(k, optics.kernel_scale)).collect();
+        let rest = self.rest_seen(optics).filter(|_| self.blurs_whole_gel());
+        deform_with(&imprint.depth_px, self.core_px(imprint), &scaled, rest.as_ref(), self.level)
+    }
+}

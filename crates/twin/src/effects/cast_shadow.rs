@@ -1,0 +1,57 @@
+//! Shadows that the gel around a contact throws.
+
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+
+/// `cast_shadow`: a channel's light, which comes from the side towards which its colour model is brightest, does not
+/// reach the gel behind a contact. Outside the contact only: inside, the colours were measured with it. A negative
+/// strength takes away from shadows that the sensor file draws.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "cast_shadow",
+    about: "darkening behind a contact, away from each channel's light",
+    formula: "I_c' = I_c - strength I_c,rest s(max over d of (z(x + d l_c) - z(x)) / (d tan(elevation_deg)))",
+    source: "horizon mapping, Max 1988; lights of GelSight sensors stand low: shadows of -10 to -75 grey levels in Taxim",
+    parameters: &[
+        ParameterSpec {
+            name: "strength",
+            unit: "1",
+            neutral: 0.0,
+            bounds: (-0.5, 1.0),
+            about: "share of a channel's brightness that is missing in a full shadow",
+        },
+        ParameterSpec {
+            name: "elevation_deg",
+            unit: "deg",
+            neutral: 30.0,
+            bounds: (5.0, 60.0),
+            about: "height of the lights above the gel; lower ones throw longer shadows",
+        },
+    ],
+    covariates: &[],
+    optics: Some(optics),
+    ..EffectSpec::BARE
+};
+
+fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
+    let [strength, elevation_deg] = values(parameters);
+    if strength != 0.0 {
+        state.shadow_strength += strength;
+        state.light_elevation_rad = elevation_deg.to_radians();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
+
+    #[test]
+    fn without_strength_the_elevation_says_nothing() {
+        let (c, mut state) = (Covariates::default(), OpticsState::default());
+        optics(&[0.0, 10.0], &mut state, &grip(&c, 40.0));
+        assert_eq!(state, OpticsState::default());
+        optics(&[0.3, 10.0], &mut state, &grip(&c, 40.0));
+        assert_eq!((state.shadow_strength, state.light_elevation_rad), (0.3, 10f64.to_radians()));
+    }
+}

@@ -1,0 +1,45 @@
+//! A camera that is out of focus.
+
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+
+/// `defocus`: a Gaussian blur of what the contact changes in the image. The rest frame is smooth and was taken with the
+/// same lens: it stays as it is.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "defocus",
+    about: "blur of the contact in the image",
+    formula: "dI' = dI * N(0, sigma_mm)",
+    source: "Gaussian point spread function; sigma up to 3 px",
+    parameters: &[ParameterSpec {
+        name: "sigma_mm",
+        unit: "mm",
+        neutral: 0.0,
+        bounds: (0.0, 0.6),
+        about: "standard deviation of the point spread function, on the gel",
+    }],
+    covariates: &[],
+    optics: Some(optics),
+    ..EffectSpec::BARE
+};
+
+fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
+    let [sigma_mm] = values(parameters);
+    if sigma_mm != 0.0 {
+        state.defocus_m = libm::hypot(state.defocus_m, sigma_mm * 1e-3);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
+
+    #[test]
+    fn variances_of_two_blurs_add() {
+        let (c, mut state) = (Covariates::default(), OpticsState::default());
+        optics(&[0.3], &mut state, &grip(&c, 40.0));
+        optics(&[0.4], &mut state, &grip(&c, 40.0));
+        assert!((state.defocus_m - 5e-4).abs() < 1e-18);
+    }
+}

@@ -1,0 +1,61 @@
+//! A camera with another exposure or response.
+
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+
+/// `exposure`: gain and gamma of the camera, the same for all channels, with and without contact. Two of them one after
+/// the other are one.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "exposure",
+    about: "gain and gamma of the camera",
+    formula: "I' = 255 (gain I / 255)^gamma",
+    source: "power law of camera responses; gamma 0.8 to 1.2",
+    parameters: &[
+        ParameterSpec {
+            name: "gain",
+            unit: "1",
+            neutral: 1.0,
+            bounds: (0.3, 3.0),
+            about: "exposure over that of the sensor file",
+        },
+        ParameterSpec {
+            name: "gamma",
+            unit: "1",
+            neutral: 1.0,
+            bounds: (0.4, 2.5),
+            about: "exponent of the response",
+        },
+    ],
+    covariates: &[],
+    optics: Some(optics),
+    ..EffectSpec::BARE
+};
+
+fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
+    let [gain, gamma] = values(parameters);
+    // (g2 (g1 x)^a)^b = (g2^(1/a) g1 x)^(a b)
+    state.exposure_gain *= libm::pow(gain, 1.0 / state.gamma);
+    state.gamma *= gamma;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
+
+    #[test]
+    fn two_cameras_in_a_row_are_one() {
+        let c = Covariates::default();
+        let of = |list: &[[f64; 2]]| {
+            let mut state = OpticsState::default();
+            list.iter().for_each(|p| optics(p, &mut state, &grip(&c, 40.0)));
+            state
+        };
+        let seen = |s: &OpticsState, i: f64| 255.0 * (s.exposure_gain * i / 255.0).powf(s.gamma);
+        let (first, second, both) = (of(&[[0.9, 1.2]]), of(&[[1.3, 0.8]]), of(&[[0.9, 1.2], [1.3, 0.8]]));
+        for level in [3.0, 90.0, 200.0] {
+            assert!((seen(&both, level) - seen(&second, seen(&first, level))).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! A gel that is more or less domed than its sensor file says.
+
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+
+/// `gel_dome`: a paraboloid is added to the gel's shape at rest. The imprint has the same volume on another surface: a
+/// domed gel is touched nearer to its apex, in the middle of the image, and deeper there.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "gel_dome",
+    about: "sag of the gel at the corners of the image",
+    formula: "z_rest' = z_rest - sag_mm r^2 / r_corner^2, towards the part",
+    source: "GelSight gels are domed: 1.4 mm in Taxim's gel map (Si and Yuan 2022); paraboloid for the cap is ours",
+    parameters: &[ParameterSpec {
+        name: "sag_mm",
+        unit: "mm",
+        neutral: 0.0,
+        bounds: (-2.0, 3.0),
+        about: "how much deeper the corners lie below the apex",
+    }],
+    covariates: &[],
+    optics: Some(optics),
+    ..EffectSpec::BARE
+};
+
+fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
+    let [sag_mm] = values(parameters);
+    state.dome_sag_m += sag_mm * 1e-3;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
+
+    #[test]
+    fn sags_add() {
+        let (c, mut state) = (Covariates::default(), OpticsState::default());
+        optics(&[1.0], &mut state, &grip(&c, 40.0));
+        optics(&[-0.5], &mut state, &grip(&c, 40.0));
+        assert!((state.dome_sag_m - 0.5e-3).abs() < 1e-18 && state.changes_press());
+    }
+}

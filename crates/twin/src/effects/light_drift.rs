@@ -1,0 +1,48 @@
+//! Lights whose brightness drifts with the clock.
+
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+
+/// `light_drift`: every channel is multiplied, with and without contact, by a factor that starts at 1 and changes
+/// linearly with the clock of the campaign; never below 0.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "light_drift",
+    about: "brightness of each channel that changes with time",
+    formula: "I_c' = I_c (1 + c_per_h t), c = red, green, blue",
+    source: "temperature and ageing of LEDs, up to 5 % a channel",
+    parameters: &[rate("red_per_h", "red"), rate("green_per_h", "green"), rate("blue_per_h", "blue")],
+    covariates: &["time_s"],
+    optics: Some(optics),
+    ..EffectSpec::BARE
+};
+
+const fn rate(name: &'static str, about: &'static str) -> ParameterSpec {
+    ParameterSpec { name, unit: "1/h", neutral: 0.0, bounds: (-1.0, 1.0), about }
+}
+
+fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {
+    let rates: [f64; 3] = values(parameters);
+    for (gain, rate) in state.light_gain.iter_mut().zip(rates) {
+        *gain *= (1.0 + rate * (at.covariates.time_s / 3600.0)).max(0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
+
+    #[test]
+    fn each_channel_moves_by_its_rate_every_hour_from_the_first_image_on() {
+        let gain = |hours: f64| {
+            let c = Covariates { time_s: 3600.0 * hours, ..Default::default() };
+            let mut state = OpticsState::default();
+            optics(&[0.02, 0.0, -0.5], &mut state, &grip(&c, 40.0));
+            state.light_gain
+        };
+        assert_eq!(gain(0.0), [1.0; 3]);
+        assert_eq!(gain(1.0), [1.02, 1.0, 0.5]);
+        assert_eq!(gain(3.0), [1.06, 1.0, 0.0], "no light is less than none");
+    }
+}

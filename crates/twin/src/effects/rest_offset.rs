@@ -1,0 +1,44 @@
+//! A colour model that is not 0 at zero slope.
+
+use super::hooks::values;
+use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+
+/// `rest_offset`: one constant per channel, the value that the real sensor's colours have where the gel is flat but
+/// something touches it elsewhere. It is there in the whole frame of an image with contact, and not in the rest frame.
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    id: "rest_offset",
+    about: "constant added to images with contact",
+    formula: "I_c' = I_c + c with contact, c = red, green, blue",
+    source: "colour tables have -5 to 6 grey levels at zero slope where there should be none (Taxim, Si and Yuan 2022)",
+    parameters: &[level("red"), level("green"), level("blue")],
+    covariates: &[],
+    optics: Some(optics),
+    ..EffectSpec::BARE
+};
+
+const fn level(name: &'static str) -> ParameterSpec {
+    let about = "value of the channel at zero slope";
+    ParameterSpec { name, unit: "grey levels", neutral: 0.0, bounds: (-60.0, 60.0), about }
+}
+
+fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
+    let offsets: [f64; 3] = values(parameters);
+    for (sum, offset) in state.rest_offset.iter_mut().zip(offsets) {
+        *sum += offset;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Covariates;
+    use crate::effects::testing::grip;
+
+    #[test]
+    fn offsets_add_channel_by_channel() {
+        let (c, mut state) = (Covariates::default(), OpticsState::default());
+        optics(&[3.0, 0.0, -2.0], &mut state, &grip(&c, 40.0));
+        optics(&[1.0, 5.0, 0.0], &mut state, &grip(&c, 40.0));
+        assert_eq!(state.rest_offset, [4.0, 5.0, -2.0]);
+    }
+}
