@@ -203,7 +203,7 @@ pub fn press_only(
     mechanics: Mechanics,
 ) -> Result<Option<Press>, SampleError> {
     let options = SimulateOptions { mechanics, images: false, trace: false, level: SimdLevel::best() };
-    let Gripped { sensors, contact } = Gripped::new(twin, library, scenario, options)?;
+    let Gripped { sensors, contact, .. } = Gripped::new(twin, library, scenario, options)?;
     Ok(contact.map(|c| Press { imprint: c.imprint, sensors }))
 }
 

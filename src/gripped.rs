@@ -7,10 +7,10 @@ use crate::library::Library;
 use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip};
 use gripgen_tactile::{Imprint, Plane, Renderer, Sensor};
 use gripgen_twin::config::{ImageNoise, Mechanics};
-use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n};
+use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};
-use gripgen_twin::{Grasp, Jaw, Part, PerJaw, Scenario, TactileImage, Twin};
+use gripgen_twin::{Grasp, Jaw, OpticsState, Part, PerJaw, Scenario, TactileImage, Twin};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -22,6 +22,8 @@ pub(crate) struct Gripped {
     pub(crate) sensors: PerJaw<Arc<Sensor>>,
     /// `None` if the jaws miss the part.
     pub(crate) contact: Option<Contact>,
+    /// What differs from the sensor's rest frame in the images, if anything does and there are images.
+    change: Option<PerJaw<[Plane; 3]>>,
 }
 
 /// Jaws that hold a part.
@@ -30,8 +32,6 @@ pub(crate) struct Contact {
     pub(crate) imprint: PerJaw<Imprint>,
     /// Real normal force of each jaw.
     pub(crate) force_n: PerJaw<f64>,
-    /// What the imprint changes in the image, if there are images.
-    change: Option<PerJaw<[Plane; 3]>>,
 }
 
 impl Gripped {
@@ -59,18 +59,30 @@ impl Gripped {
             check_damping(twin, arm, pull_direction(scenario))?;
         }
         let arm = arm.as_deref().map_or(Arm::Carriage, Arm::Multibody);
-        let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, arm, &shape))?
-        else {
-            return Ok(Self { sensors, contact: None });
-        };
         let renderers = PerJaw::from_fn(|jaw| Renderer {
             sensor: &sensors[jaw],
             gel: &twin.gel[jaw],
             level: options.level,
         });
-        let imprint = press(twin, library, scenario, &force_n, &held.grasp, &renderers)?;
-        let change = options.images.then(|| imprint.map(|jaw, imprint| renderers[jaw].change(imprint)));
-        Ok(Self { sensors, contact: Some(Contact { held, imprint, force_n, change }) })
+        let optics =
+            PerJaw::from_fn(|jaw| optics_state(twin, &scenario.part, &grip_point(scenario, jaw, 0.0)));
+        let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, arm, &shape))?
+        else {
+            let differs = options.images && Jaw::BOTH.iter().any(|&jaw| optics[jaw].changes_frame());
+            let change = differs.then(|| renderers.map(|jaw, r| r.change_seen(None, &optics[jaw])));
+            return Ok(Self { sensors, contact: None, change });
+        };
+        let press = |optics| press(twin, library, scenario, &force_n, &held.grasp, &renderers, optics);
+        let imprint = press(None)?;
+        let mut change = None;
+        if options.images {
+            // Optics effects are seen and not felt: where they change the imprint, the image has its own.
+            let apart = Jaw::BOTH.iter().any(|&jaw| optics[jaw].changes_press());
+            let seen = apart.then(|| press(Some(&optics))).transpose()?;
+            let seen = seen.as_ref().unwrap_or(&imprint);
+            change = Some(renderers.map(|jaw, r| r.change_seen(Some(&seen[jaw]), &optics[jaw])));
+        }
+        Ok(Self { sensors, contact: Some(Contact { held, imprint, force_n }), change })
     }
 
     /// The images of one repetition.
@@ -84,7 +96,7 @@ impl Gripped {
                 ImageNoise::Off => None,
                 ImageNoise::Measured => Some(Stream::new(scenario.seed, scenario.index, purpose).bits()),
             };
-            let change = self.contact.as_ref().and_then(|c| c.change.as_ref()).map(|both| &both[jaw]);
+            let change = self.change.as_ref().map(|both| &both[jaw]);
             gripgen_tactile::finish(&self.sensors[jaw], change, key)
         })
     }
@@ -152,6 +164,7 @@ fn press(
     force_n: &PerJaw<f64>,
     grasp: &Grasp,
     renderers: &PerJaw<Renderer<'_>>,
+    optics: Option<&PerJaw<OpticsState>>,
 ) -> Result<PerJaw<Imprint>, SampleError> {
     let part = &twin.parts[&scenario.part];
     let mesh = library.clustered_mesh(part)?;
@@ -165,8 +178,11 @@ fn press(
         let volume_m3 = imprint_volume_m3(twin, &scenario.part, part, force_n[jaw]);
         let unchanged = volume_m3 == part.imprint_m3_per_n * force_n[jaw];
         let imprint_m3_per_n = if unchanged { part.imprint_m3_per_n } else { volume_m3 / force_n[jaw] };
-        renderers[jaw]
-            .press(&mesh, &gel_from_mesh, imprint_m3_per_n, force_n[jaw])
-            .map_err(|source| SampleError::Indent { jaw, source })
+        let renderer = &renderers[jaw];
+        match optics {
+            None => renderer.press(&mesh, &gel_from_mesh, imprint_m3_per_n, force_n[jaw]),
+            Some(o) => renderer.press_seen(&mesh, &gel_from_mesh, imprint_m3_per_n, force_n[jaw], &o[jaw]),
+        }
+        .map_err(|source| SampleError::Indent { jaw, source })
     })
 }

@@ -1,5 +1,6 @@
 //! Effects of the library, through the whole pipeline and in both mechanics.
 
+use crate::common::{content, jobs, run};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::effects::LIBRARY;
 use gripgen::twin::{Outcome, Pulled};
@@ -175,4 +176,80 @@ fn a_law_per_cell_sees_the_pressure() {
         let large = peak("per = \"cell\"\nreference_area_mm2 = 400.0", "");
         assert!(small > large * 1.3, "{small} N and {large} N");
     }
+}
+
+/// Optics effects with a size that shows, an hour and a hundred pulls into a campaign.
+const OPTICS: &[(&str, &str)] = &[
+    ("light_drift", "red_per_h = 0.05\nblue_per_h = -0.03"),
+    ("background_change", "red_u = 5.0\ngreen_vv = -4.0\nat_pull_index = 50"),
+    ("misregistration", "shift_x_mm = 0.5\nrotation_deg = 2.0"),
+    ("exposure", "gain = 0.9\ngamma = 1.1"),
+    ("defocus", "sigma_mm = 0.2"),
+    ("gel_kernel", "factor = 1.3"),
+    ("cad_mismatch", "offset_mm = 0.1\nblunting_mm = 0.2"),
+    ("rest_offset", "red = 3.0"),
+    ("cast_shadow", "strength = 0.4\nelevation_deg = 15.0"),
+    ("gel_dome", "sag_mm = 0.5"),
+];
+
+/// A part that is not gripped.
+const PLATE: &str = "mesh = \"asset:parts/long_shaft/part.stl\"\nmu = 0.2\nimprint_mm3_per_n = 1.5\n";
+
+/// The cameras see them, the jaws do not.
+#[test]
+fn optics_effects_change_images_and_no_label() {
+    let count = LIBRARY.iter().filter(|spec| spec.optics.is_some()).count();
+    assert_eq!(OPTICS.len(), count, "an effect without a case here");
+    let vary = format!("part = [\"gear\"]\n{ELSEWHERE}");
+    let of =
+        |effect: &str| pulled(&project(&format!("{effect}[parts.plate]\n{PLATE}"), "reduced", &vary, "png"));
+    let plain = of("");
+    for (name, values) in OPTICS {
+        let on = |part: &str| of(&format!("[[effects]]\nname = \"{name}\"\npart = \"{part}\"\n{values}\n"));
+        assert!(on("plate") == plain, "{name} on another part");
+        let mut seen = on("gear");
+        let images = std::mem::replace(&mut seen.images, plain.images.clone());
+        assert!(seen == plain, "{name} changes more than images");
+        let (before, after) = (plain.images.as_ref().unwrap(), images.as_ref().unwrap());
+        for (before, after) in [(&before.left, &after.left), (&before.right, &after.right)] {
+            let changed = before.rgb.iter().zip(&after.rgb).filter(|(a, b)| a.abs_diff(**b) > 2).count();
+            assert!(changed > 100, "{name}: {changed} values of the image");
+        }
+    }
+}
+
+/// Jaws that miss the part see light and camera change, and nothing of what a contact would.
+#[test]
+fn without_contact_only_light_and_camera_show() {
+    let vary = "grip_offset_mm = [60]\ntime_s = [3600]\npull_index = [100]\n";
+    let rest = |effect: &str| match generate(&project(effect, "reduced", vary, "png"), 0, SimdLevel::best())
+        .outcome
+    {
+        Outcome::NoContact { images: Some(images) } => images,
+        other => panic!("{other:?}"),
+    };
+    let plain = rest("");
+    for (name, values) in OPTICS {
+        let seen = rest(&format!("[[effects]]\nname = \"{name}\"\n{values}\n"));
+        let frame = ["light_drift", "background_change", "exposure"].contains(name);
+        assert_eq!(seen != plain, frame, "{name}");
+    }
+}
+
+/// A sweep with an optics effect has other images and the same labels; without its entry the old bytes come back.
+#[test]
+fn taking_an_optics_effect_out_restores_the_bytes_of_a_sweep() {
+    let shard_and_index = |effect: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        run(&project(effect, "reduced", "time_s = [3600]\n", "png"), folder.path(), jobs(1));
+        let mut files = content(folder.path());
+        ["shard-00000.mcap", "index.csv"].map(|name| files.remove(name).unwrap())
+    };
+    let [shard, index] = shard_and_index("");
+    for (name, values) in [OPTICS[0], OPTICS[9]] {
+        let entry = format!("[[effects]]\nname = \"{name}\"\n{values}\n");
+        let [other_shard, same_index] = shard_and_index(&entry);
+        assert!(other_shard != shard && same_index == index, "{name}: other images, the same labels");
+    }
+    assert!(shard_and_index("") == [shard, index], "the old bytes");
 }
