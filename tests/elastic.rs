@@ -153,7 +153,7 @@ fn the_elastic_gel_beside_the_pyramid_on_real_presses() {
             let imprint = press.pressed(model);
             let surface = match &imprint.elastic {
                 Some(field) => field.surface_px.clone(),
-                None => deform(&imprint, &[101, 51, 25, 11, 5], 0.4, GRID.metres_per_px, level),
+                None => deform(&imprint, &[101, 51, 25, 11, 5], 0.4, GRID.metres_per_px, None, level),
             };
             (imprint.press_depth_m * 1e3, surface)
         });
