@@ -12,6 +12,7 @@ pub use taxim::TaximTable;
 
 use crate::gradient::gradient;
 use crate::grid::Plane;
+use crate::simd::SimdLevel;
 
 /// How a sensor turns slope into colour.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +30,8 @@ pub enum ColourModel {
 /// `raised_px` is the height of the gel surface above its rest state, towards the camera, in pixels. `along_x`, `along_y`
 /// are the slopes of the whole surface, in pixels of height per pixel, `rest` those of the gel at rest, `None` for a flat
 /// gel. Taxim's table is a function of the whole slope alone, and its image differs from the rest frame everywhere. The
-/// other models are exactly 0 where the gel is at rest: lights draw the difference of the two slopes, the regression takes
-/// `raised_px` and its slopes, whatever the shape of the gel.
+/// other models are exactly 0 for a gel at rest: lights draw the difference of the two slopes, the regression takes
+/// `raised_px` and its slopes, whatever the shape of the gel; around a contact it changes pixels that are not displaced too.
 pub fn shade(
     model: &ColourModel,
     raised_px: &Plane,
@@ -54,10 +55,10 @@ pub fn shade(
         }
         ColourModel::Taxim(table) => table.shade(along_x, along_y, &mut change),
         ColourModel::Regressor(model) => match rest {
-            None => model.shade(raised_px, along_x, along_y, &mut change),
+            None => model.shade(raised_px, along_x, along_y, &mut change, SimdLevel::best()),
             Some(_) => {
                 let (along_x, along_y) = gradient(raised_px);
-                model.shade(raised_px, &along_x, &along_y, &mut change);
+                model.shade(raised_px, &along_x, &along_y, &mut change, SimdLevel::best());
             }
         },
     }

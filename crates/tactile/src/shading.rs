@@ -22,7 +22,13 @@ pub(crate) fn change(model: &ColourModel, sheet: &Sheet, area: Area, level: Simd
             let [along_x, along_y, _] = &mut change;
             level.run(SlopePlanes { slopes, along_x, along_y });
             let [along_x, along_y, _] = change;
-            shade(model, &sheet.plane(area), &along_x, &along_y, None)
+            let surface = sheet.plane(area);
+            if let ColourModel::Regressor(model) = model {
+                let mut change = [zeros(), zeros(), zeros()];
+                model.shade(&surface, &along_x, &along_y, &mut change, level);
+                return change;
+            }
+            shade(model, &surface, &along_x, &along_y, None)
         }
     }
 }

@@ -22,6 +22,7 @@ mod tests;
 pub(crate) use pyramid::{AROUND_HEIGHTS, SURROUNDINGS, cell_px};
 
 use crate::grid::{Grid, Plane};
+use crate::simd::{Kernel, Lanes, SimdLevel};
 use pyramid::{DERIVATIVES, Surroundings, double, surroundings};
 
 /// Highest degree of the normal alone.
@@ -72,13 +73,23 @@ impl Regressor {
             && limits().all(|&x| x >= 0.0)
     }
 
-    /// Writes the change that a surface (heights and slopes in pixels) makes.
-    pub(super) fn shade(&self, surface: &Plane, along_x: &Plane, along_y: &Plane, change: &mut [Plane; 3]) {
-        self.shade_around(surface, change);
-        self.shade_near(surface, along_x, along_y, change);
+    /// Writes the change that a surface (heights and slopes in pixels) makes, into planes of 0; the same bits on every unit.
+    pub(crate) fn shade(
+        &self,
+        surface: &Plane,
+        along_x: &Plane,
+        along_y: &Plane,
+        change: &mut [Plane; 3],
+        level: SimdLevel,
+    ) {
+        if surface.values.iter().all(|&z| z == 0.0) {
+            return;
+        }
+        level.run(Shade { model: self, surface, along_x, along_y, change });
     }
 
     /// The part of the surroundings, on cells, then bilinearly between their centres.
+    #[inline(always)]
     fn shade_around(&self, surface: &Plane, change: &mut [Plane; 3]) {
         let cell = cell_px(self.mm_per_px);
         let Surroundings { fine, coarse } = surroundings(surface, cell, self.mm_per_px);
@@ -87,12 +98,15 @@ impl Regressor {
             let on_coarse = self.combine(channel, &coarse, DERIVATIVES, 2 * cell, size);
             let mut on_fine = self.combine(channel, &fine, 0, cell, size);
             let doubled = double(&on_coarse, on_fine.width, on_fine.height);
-            on_fine.values.iter_mut().zip(&doubled.values).for_each(|(f, c)| *f += c);
+            for (fine, coarse) in on_fine.values.iter_mut().zip(&doubled.values) {
+                *fine += coarse;
+            }
             spread(&on_fine, cell, plane);
         }
     }
 
     /// The sum over features from `first` on, on their cells of `cell_px` pixels.
+    #[inline(always)]
     fn combine(
         &self,
         channel: usize,
@@ -114,8 +128,9 @@ impl Regressor {
                 // 1, u, v, u^2, u v, v^2 for this row as a polynomial in u.
                 let (c0, c1, c2) = (c[0] + v * (c[2] + v * c[5]), c[1] + v * c[4], c[3]);
                 let limit = self.around_limit[first + i];
-                for (x, &f) in feature.row(y).iter().enumerate() {
-                    row[x] += f.clamp(-limit, limit) * (c0 + u[x] * (c1 + u[x] * c2));
+                for ((sum, &f), &u) in row.iter_mut().zip(feature.row(y)).zip(&u) {
+                    let field = u.mul_add(u.mul_add(c2, c1), c0);
+                    *sum = f.max(-limit).min(limit).mul_add(field, *sum);
                 }
             }
         }
@@ -123,6 +138,7 @@ impl Regressor {
     }
 
     /// The part of displaced pixels.
+    #[inline(always)]
     fn shade_near(&self, surface: &Plane, along_x: &Plane, along_y: &Plane, change: &mut [Plane; 3]) {
         let (w, h) = (surface.width, surface.height);
         let place = Place::of((w, h));
@@ -144,13 +160,16 @@ impl Regressor {
                 for (channel, plane) in change.iter_mut().enumerate() {
                     let sum = combine_block(&terms, &fields[channel], u);
                     let out = &mut plane.values[y * w + start..][..n];
-                    out.iter_mut().zip(sum).for_each(|(o, s)| *o += s);
+                    for (o, s) in out.iter_mut().zip(sum) {
+                        *o += s;
+                    }
                 }
             }
         }
     }
 
     /// For one row the fields of each channel and term as polynomials of third degree in u, by powers.
+    #[inline(always)]
     fn row_fields(&self, v: f32) -> [[[f32; NEAR]; 4]; 3] {
         let mut fields = [[[0.0; NEAR]; 4]; 3];
         for (channel, powers) in fields.iter_mut().enumerate() {
@@ -167,38 +186,63 @@ impl Regressor {
     }
 
     /// The terms of a block of pixels: heights and both slopes in, one row a term out.
+    #[inline(always)]
     fn terms(&self, [height, gx, gy]: &[[f32; BLOCK]; 3]) -> [[f32; BLOCK]; NEAR] {
-        let mut terms = [[0.0; BLOCK]; NEAR];
         let scale = self.mm_per_px as f32;
+        let (mut nx, mut ny, mut h) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
         for x in 0..BLOCK {
-            let h = (height[x] * scale).min(self.height_limit_mm);
-            let [nx, ny] = limited_normal(gx[x], gy[x], self.slope_limit);
-            for (row, term) in terms.iter_mut().zip(near_terms(nx, ny, h)) {
-                row[x] = term;
-            }
+            [nx[x], ny[x]] = limited_normal(gx[x], gy[x], self.slope_limit);
+            h[x] = (height[x] * scale).min(self.height_limit_mm);
         }
-        terms
+        near_terms(&nx, &ny, &h)
     }
 }
 
-/// Horner's rule over the powers of u of sums over terms.
+/// [`Regressor::shade`] for one vector unit.
+struct Shade<'a> {
+    model: &'a Regressor,
+    surface: &'a Plane,
+    along_x: &'a Plane,
+    along_y: &'a Plane,
+    change: &'a mut [Plane; 3],
+}
+
+impl Kernel for Shade<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        self.model.shade_around(self.surface, self.change);
+        self.model.shade_near(self.surface, self.along_x, self.along_y, self.change);
+    }
+}
+
+/// Sums over terms for a block of pixels: the fields, cubic in u, are taken as straight lines through their value and
+/// slope in the middle of the block. A block is so short that this changes them by less than one part in a thousand.
+#[inline(always)]
 fn combine_block(terms: &[[f32; BLOCK]; NEAR], powers: &[[f32; NEAR]; 4], u: &[f32; BLOCK]) -> [f32; BLOCK] {
-    let mut sum = [0.0; BLOCK];
-    for power in powers.iter().rev() {
-        let mut of_power = [0.0; BLOCK];
-        for (term, c) in terms.iter().zip(power) {
-            for x in 0..BLOCK {
-                of_power[x] += c * term[x];
-            }
-        }
+    let middle = 0.5 * (u[BLOCK / 2 - 1] + u[BLOCK / 2]);
+    let (mut value, mut slope) = ([0.0; NEAR], [0.0; NEAR]);
+    for t in 0..NEAR {
+        let [p0, p1, p2, p3] = [powers[0][t], powers[1][t], powers[2][t], powers[3][t]];
+        value[t] = p0 + middle * (p1 + middle * (p2 + middle * p3));
+        slope[t] = p1 + middle * (2.0 * p2 + middle * (3.0 * p3));
+    }
+    let (mut values, mut slopes) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+    for (term, (value, slope)) in terms.iter().zip(value.iter().zip(&slope)) {
         for x in 0..BLOCK {
-            sum[x] = sum[x] * u[x] + of_power[x];
+            values[x] = term[x].mul_add(*value, values[x]);
+            slopes[x] = term[x].mul_add(*slope, slopes[x]);
         }
+    }
+    let mut sum = [0.0; BLOCK];
+    for x in 0..BLOCK {
+        sum[x] = (u[x] - middle).mul_add(slopes[x], values[x]);
     }
     sum
 }
 
 /// Components along x and y of the unit normal of a surface with these slopes, shortened to `limit`.
+#[inline(always)]
 pub(crate) fn limited_normal(gx: f32, gy: f32, limit: f32) -> [f32; 2] {
     let squared = gx * gx + gy * gy;
     let inverse = 1.0 / (1.0 + squared).sqrt();
@@ -208,29 +252,42 @@ pub(crate) fn limited_normal(gx: f32, gy: f32, limit: f32) -> [f32; 2] {
     [gx * scale, gy * scale]
 }
 
-/// The terms of a displaced pixel: `n_x^a n_y^b` by degree, then height times those of degrees 0 to 2.
-pub(crate) fn near_terms(nx: f32, ny: f32, height_mm: f32) -> [f32; NEAR] {
-    let mut terms = [0.0; NEAR];
-    let mut degree = [0.0f32; NORMAL_DEGREE + 1];
-    degree[0] = 1.0;
-    terms[NORMAL_TERMS] = height_mm;
+/// The terms of N displaced pixels: `n_x^a n_y^b` by degree, then height times those of degrees 0 to 2.
+#[inline(always)]
+pub(crate) fn near_terms<const N: usize>(
+    nx: &[f32; N],
+    ny: &[f32; N],
+    height_mm: &[f32; N],
+) -> [[f32; N]; NEAR] {
+    let mut terms = [[0.0; N]; NEAR];
+    terms[NORMAL_TERMS] = *height_mm;
+    let mut degree = [[1.0f32; N]; NORMAL_DEGREE + 1];
     let (mut at, mut at_height) = (0, NORMAL_TERMS + 1);
     for d in 1..=NORMAL_DEGREE {
         // nx^d, nx^(d-1) ny, ..., ny^d from the degree before.
-        degree[d] = degree[d - 1] * ny;
+        degree[d] = product(&degree[d - 1], ny);
         for monomial in &mut degree[..d] {
-            *monomial *= nx;
+            *monomial = product(monomial, nx);
         }
-        for &monomial in &degree[..=d] {
-            terms[at] = monomial;
+        for monomial in &degree[..=d] {
+            terms[at] = *monomial;
             at += 1;
             if d <= HEIGHT_DEGREE {
-                terms[at_height] = height_mm * monomial;
+                terms[at_height] = product(height_mm, monomial);
                 at_height += 1;
             }
         }
     }
     terms
+}
+
+#[inline(always)]
+fn product<const N: usize>(a: &[f32; N], b: &[f32; N]) -> [f32; N] {
+    let mut out = [0.0; N];
+    for x in 0..N {
+        out[x] = a[x] * b[x];
+    }
+    out
 }
 
 /// The features of the surroundings of a surface on its finest cells, one plane a feature.
@@ -249,6 +306,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
+    #[inline(always)]
     pub(crate) fn of((w, h): (usize, usize)) -> Self {
         Self { centre: ((w as f32 - 1.0) / 2.0, (h as f32 - 1.0) / 2.0), unit: 2.0 / w as f32 }
     }
@@ -257,20 +315,24 @@ impl Place {
         Self::of((grid.width_px, grid.height_px))
     }
 
+    #[inline(always)]
     pub(crate) fn u(self, x_px: f32) -> f32 {
         (x_px - self.centre.0) * self.unit
     }
 
+    #[inline(always)]
     pub(crate) fn v(self, y_px: f32) -> f32 {
         (y_px - self.centre.1) * self.unit
     }
 }
 
+#[inline(always)]
 fn cell_centre_px(index: usize, cell_px: usize) -> f32 {
     (index as f32 + 0.5) * cell_px as f32 - 0.5
 }
 
 /// The two cells beside a pixel and the weight of the second.
+#[inline(always)]
 pub(crate) fn between_cells(pixel: usize, cell_px: usize, cells: usize) -> (usize, usize, f32) {
     let at = ((pixel as f32 + 0.5) / cell_px as f32 - 0.5).clamp(0.0, (cells - 1) as f32);
     let first = (at as usize).min(cells - 1);
@@ -278,18 +340,24 @@ pub(crate) fn between_cells(pixel: usize, cell_px: usize, cells: usize) -> (usiz
 }
 
 /// Writes the values of cells into pixels, bilinearly between the centres.
+#[inline(always)]
 fn spread(cells: &Plane, cell_px: usize, out: &mut Plane) {
     let columns: Vec<_> = (0..out.width).map(|x| between_cells(x, cell_px, cells.width)).collect();
-    let mut row = vec![0.0f32; cells.width];
-    for y in 0..out.height {
-        let (above, below, weight) = between_cells(y, cell_px, cells.height);
-        let (above, below) = (cells.row(above), cells.row(below));
-        for x in 0..cells.width {
-            row[x] = above[x] + weight * (below[x] - above[x]);
-        }
-        let to = &mut out.values[y * out.width..(y + 1) * out.width];
+    // Each row of cells as wide as the image, once.
+    let mut wide = vec![0.0f32; cells.height * out.width];
+    for (row, to) in wide.chunks_exact_mut(out.width).enumerate() {
+        let row = cells.row(row);
         for (value, &(left, right, weight)) in to.iter_mut().zip(&columns) {
             *value = row[left] + weight * (row[right] - row[left]);
+        }
+    }
+    for y in 0..out.height {
+        let (above, below, weight) = between_cells(y, cell_px, cells.height);
+        let (above, below) =
+            (&wide[above * out.width..][..out.width], &wide[below * out.width..][..out.width]);
+        let to = &mut out.values[y * out.width..][..out.width];
+        for (value, (a, b)) in to.iter_mut().zip(above.iter().zip(below)) {
+            *value = a + weight * (b - a);
         }
     }
 }

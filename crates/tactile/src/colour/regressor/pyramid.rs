@@ -48,6 +48,7 @@ pub(super) struct Surroundings {
 }
 
 /// Features of `surface_px`, a height map in pixels.
+#[inline(always)]
 pub(super) fn surroundings(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -> Surroundings {
     let mut level = smooth(&smooth(&cells(surface_px, cell_px, mm_per_px)));
     let fine = derivatives(&level);
@@ -67,6 +68,7 @@ pub(super) fn surroundings(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -
 }
 
 /// Mean height of each cell in millimetres; cells at the right and lower border may hold fewer pixels.
+#[inline(always)]
 fn cells(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -> Plane {
     let (w, h) = (surface_px.width.div_ceil(cell_px), surface_px.height.div_ceil(cell_px));
     let mut out = Plane::filled(w, h, 0.0);
@@ -76,7 +78,9 @@ fn cells(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -> Plane {
         let count = rows.len();
         sums.fill(0.0);
         for y in rows {
-            sums.iter_mut().zip(surface_px.row(y)).for_each(|(s, z)| *s += z);
+            for (sum, z) in sums.iter_mut().zip(surface_px.row(y)) {
+                *sum += z;
+            }
         }
         for (cx, chunk) in sums.chunks(cell_px).enumerate() {
             let scale = mm_per_px as f32 / (count * chunk.len()) as f32;
@@ -87,6 +91,7 @@ fn cells(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -> Plane {
 }
 
 /// The binomial kernel along both axes, borders mirrored.
+#[inline(always)]
 fn smooth(plane: &Plane) -> Plane {
     let (w, h) = (plane.width, plane.height);
     let half = SMOOTH.len() / 2;
@@ -101,7 +106,9 @@ fn smooth(plane: &Plane) -> Plane {
         }
         let out = &mut across.values[y * w..(y + 1) * w];
         for (k, weight) in SMOOTH.iter().enumerate() {
-            out.iter_mut().zip(&padded[k..k + w]).for_each(|(o, p)| *o += weight * p);
+            for (o, p) in out.iter_mut().zip(&padded[k..k + w]) {
+                *o = weight.mul_add(*p, *o);
+            }
         }
     }
     let mut down = Plane::filled(w, h, 0.0);
@@ -109,13 +116,16 @@ fn smooth(plane: &Plane) -> Plane {
         let out = &mut down.values[y * w..(y + 1) * w];
         for (k, weight) in SMOOTH.iter().enumerate() {
             let source = mirrored(y as isize + k as isize - half as isize, h);
-            out.iter_mut().zip(across.row(source)).for_each(|(o, p)| *o += weight * p);
+            for (o, p) in out.iter_mut().zip(across.row(source)) {
+                *o = weight.mul_add(*p, *o);
+            }
         }
     }
     down
 }
 
 /// Means of two by two cells; an odd last column or row counts twice.
+#[inline(always)]
 fn halve(plane: &Plane) -> Plane {
     let (w, h) = (plane.width.div_ceil(2), plane.height.div_ceil(2));
     let mut out = Plane::filled(w, h, 0.0);
@@ -130,6 +140,7 @@ fn halve(plane: &Plane) -> Plane {
 }
 
 /// The inverse of [`halve`] for smooth planes: each cell is three quarters its parent and a quarter the next one.
+#[inline(always)]
 pub(super) fn double(plane: &Plane, width: usize, height: usize) -> Plane {
     let parents = |i: usize, n: usize| {
         let parent = i / 2;
@@ -153,6 +164,7 @@ pub(super) fn double(plane: &Plane, width: usize, height: usize) -> Plane {
 }
 
 /// The plane and its central differences up to third order, per cell.
+#[inline(always)]
 fn derivatives(z: &Plane) -> Vec<Plane> {
     let (zx, zy) = (along_x(z), along_y(z));
     let (zxx, zxy, zyy) = (along_x(&zx), along_y(&zx), along_y(&zy));
@@ -162,23 +174,29 @@ fn derivatives(z: &Plane) -> Vec<Plane> {
     all
 }
 
+#[inline(always)]
 fn along_x(z: &Plane) -> Plane {
     let mut out = Plane::filled(z.width, z.height, 0.0);
     for (from, to) in z.values.chunks_exact(z.width).zip(out.values.chunks_exact_mut(z.width)) {
-        for x in 1..z.width.saturating_sub(1) {
-            to[x] = 0.5 * (from[x + 1] - from[x - 1]);
+        if z.width > 2 {
+            let inner = to[1..z.width - 1].iter_mut().zip(from[2..].iter().zip(from));
+            for (to, (right, left)) in inner {
+                *to = 0.5 * (right - left);
+            }
         }
     }
     out
 }
 
+#[inline(always)]
 fn along_y(z: &Plane) -> Plane {
     let mut out = Plane::filled(z.width, z.height, 0.0);
     for y in 1..z.height.saturating_sub(1) {
         let (above, below) = (z.row(y - 1), z.row(y + 1));
         let to = &mut out.values[y * z.width..(y + 1) * z.width];
-        for x in 0..z.width {
-            to[x] = 0.5 * (below[x] - above[x]);
+        let inner = to.iter_mut().zip(below.iter().zip(above));
+        for (to, (below, above)) in inner {
+            *to = 0.5 * (below - above);
         }
     }
     out

@@ -67,7 +67,8 @@ impl Samples {
         for &pixel in &pixels {
             let (x, y) = (pixel % grid.width_px, pixel / grid.width_px);
             let [nx, ny] = limited_normal(along_x.values[pixel], along_y.values[pixel], 1.0);
-            inputs.extend(near_terms(nx, ny, surface.values[pixel] * mm_per_px as f32));
+            let height_mm = surface.values[pixel] * mm_per_px as f32;
+            inputs.extend(near_terms(&[nx], &[ny], &[height_mm]).map(|[term]| term));
             let columns = between_cells(x, cell, around[0].width);
             let rows = between_cells(y, cell, around[0].height);
             inputs.extend(around.iter().map(|plane| between(plane, columns, rows)));

@@ -165,3 +165,58 @@ fn sets_that_cannot_be_are_refused_with_both_numbers() {
         assert!(text.contains(wanted), "`{text}` lacks `{wanted}`");
     }
 }
+
+#[test]
+fn a_modelled_change_is_taken_off_the_rest_frame() {
+    let circle = Circle { x_px: 60.0, y_px: 50.0, radius_px: 11.0 };
+    let grey = |value: u8| TactileImage { width_px: 128, height_px: 96, rgb: vec![value; 3 * GRID.len()] };
+    let press = Press { name: "0".into(), image: grey(107), circle: Some(circle) };
+    let change = |_: usize| Some([0, 1, 2].map(|_| crate::Plane::filled(128, 96, 7.0)));
+    let rest = rest_frame(&[(&press, circle)], change, None, &GRID);
+    assert!(rest.iter().flatten().all(|v| (v - 100.0).abs() < 1e-4));
+    // Without a model the far pixels of one press outweigh the near ones of another.
+    let other = Press { name: "1".into(), image: grey(50), circle: None };
+    let far = Circle { x_px: 5.0, y_px: 5.0, radius_px: 11.0 };
+    let rest = rest_frame(&[(&press, circle), (&other, far)], |_| None, None, &GRID);
+    assert!((rest[0][50 * 128 + 60] - 50.0).abs() < 0.1);
+    assert!((rest[0][5 * 128 + 5] - 107.0).abs() < 0.1);
+}
+
+#[test]
+fn the_error_from_sums_is_the_error_over_pixels() {
+    let truth = truth();
+    let set = presses(&truth, 5);
+    let marked: Vec<Marked<'_>> = set.presses.iter().filter_map(|p| Some((p, p.circle?))).collect();
+    let candidate = Candidate::new(GelShape::Flat, &marked, 4e-3, &GRID);
+    let moments = candidate.coloured(&marked, &[0, 1, 2, 3, 4], &truth.rest);
+    let mut seen = Moments::zero();
+    moments[..4].iter().for_each(|m| seen.add(m));
+    let flat = Moments::of_inputs(&Samples::flat(1.0));
+    let solution = solve(&seen, &flat, &Smoothness::USUAL).unwrap();
+    let (near, around) = solution.near_and_around();
+    // The fifth press, feature by feature.
+    let samples = &candidate.samples[4];
+    let targets = samples.targets(marked[4].0, &truth.rest);
+    let near_inputs = near.len() / 30;
+    let (mut error, mut weights) = (0.0, 0.0);
+    for (p, target) in targets.iter().enumerate() {
+        let [u, v] = samples.places[p].map(f64::from);
+        let field = [1.0, u, v, u * u, u * v, v * v, u * u * u, u * u * v, u * v * v, v * v * v];
+        let inputs = &samples.inputs[p * samples::INPUTS..][..samples::INPUTS];
+        for (c, target) in target.iter().enumerate() {
+            let mut predicted = 0.0;
+            for (i, &input) in inputs.iter().enumerate() {
+                let coefficients = match i.checked_sub(near_inputs) {
+                    None => &near[(c * near_inputs + i) * 10..][..10],
+                    Some(f) => &around[(c * (inputs.len() - near_inputs) + f) * 6..][..6],
+                };
+                let value: f64 = coefficients.iter().zip(field).map(|(&k, m)| f64::from(k) * m).sum();
+                predicted += value * f64::from(input);
+            }
+            error += f64::from(samples.weights[p]) * (predicted - f64::from(*target)).powi(2);
+        }
+        weights += 3.0 * f64::from(samples.weights[p]);
+    }
+    let (exact, ours) = (error / weights, solution.error_on(&moments[4]));
+    assert!((ours - exact).abs() < 0.01 * exact, "{ours} against {exact}");
+}
