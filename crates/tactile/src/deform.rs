@@ -6,7 +6,7 @@ use crate::indent::Imprint;
 use crate::simd::SimdLevel;
 
 /// The last blur, which smooths the border of the contact too.
-const FINAL_KERNEL_PX: u32 = 5;
+pub(crate) const FINAL_KERNEL_PX: u32 = 5;
 
 /// Pixels beyond the deformed gel whose neighbours are not flat, and theirs: what the gradient looks at.
 const RIM_PX: usize = 2;

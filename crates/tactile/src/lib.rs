@@ -18,6 +18,7 @@ mod convolve;
 mod deform;
 mod elastic;
 mod fft;
+pub mod gpu;
 mod gradient;
 mod grid;
 mod indent;

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 const LEVELS: usize = 4096;
 
 /// Standard normal values, equally likely: the quantiles of the middle of each level, scaled to variance 1.
-fn levels() -> &'static [f32; LEVELS] {
+pub(crate) fn levels() -> &'static [f32; LEVELS] {
     static TABLE: OnceLock<[f32; LEVELS]> = OnceLock::new();
     TABLE.get_or_init(|| {
         let raw: Vec<f64> = (0..LEVELS).map(|i| normal_quantile((i as f64 + 0.5) / LEVELS as f64)).collect();

@@ -85,6 +85,22 @@ impl TaximTable {
         &self.offset
     }
 
+    /// Number of bins of slope, and of direction.
+    pub(crate) fn bins(&self) -> usize {
+        self.bins
+    }
+
+    /// Smallest slope of each bin, and cosine and sine of the lower border of each bin of direction.
+    pub(crate) fn borders(&self) -> (&[f32], Vec<[f64; 2]>) {
+        (self.steepness.first(), self.sectors.borders())
+    }
+
+    /// Coefficients of each bin for positions relative to [`MIDDLE_PX`]: terms `x^2, y^2, x y, x, y, 1`, each for red,
+    /// green, blue and nothing.
+    pub(crate) fn packed(&self) -> &[[[f32; 4]; 6]] {
+        &self.packed
+    }
+
     /// Bin of a slope: `floor(atan(|g|) / (pi/2 / (B-1)))`, `floor((atan2(gy, gx) + pi) / (2 pi / (B-1)))`, direction 0
     /// where it is flat, angles in single precision.
     #[inline]

@@ -57,6 +57,15 @@ impl Sectors {
         sectors
     }
 
+    /// Cosine and sine of the lower border of each sector.
+    pub(crate) fn borders(&self) -> Vec<[f64; 2]> {
+        if !self.borders.is_empty() {
+            return self.borders.clone();
+        }
+        let angle = |sector: usize| sector as f64 * self.step_rad - PI;
+        (0..self.count).map(|sector| [libm::cos(angle(sector)), libm::sin(angle(sector))]).collect()
+    }
+
     /// Direction of (x, y) by its definition.
     fn by_formula(&self, x: f32, y: f32) -> usize {
         let angle = libm::atan2(f64::from(y), f64::from(x)) as f32;
@@ -125,6 +134,11 @@ impl Steepness {
             .collect();
         first.push(f32::INFINITY);
         Self { first, guesses, base }
+    }
+
+    /// Smallest slope of each bin.
+    pub(crate) fn first(&self) -> &[f32] {
+        &self.first[..self.first.len() - 1]
     }
 
     /// The bin of a slope.

@@ -1,0 +1,133 @@
+// Stage indent: how deep the part sinks in. CPU twin: src/indent.rs.
+//
+// Newton's method on sum max(0, below + press) = wanted from the deep side, which converges monotonically and ends
+// when the set of touching pixels no longer changes. One workgroup an image; sums are taken in blocks of 16 values, so
+// that they lose no more than a few bits of 24.
+
+const THREADS = 256u;
+const BLOCK = 16u;
+// Newton ends after 2 to 8 steps (median 6); this only bounds what rounding could make of it.
+const MAX_STEPS = 24u;
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> presses: array<Press>;
+@group(0) @binding(2) var<storage, read> heights: array<u32>;
+@group(0) @binding(3) var<storage, read_write> outcomes: array<Outcome>;
+// The gel surface at rest towards the part, in pixels, at most 0.
+@group(0) @binding(5) var<storage, read> rest: array<f32>;
+//#PLANES
+
+var<workgroup> volumes: array<f32, THREADS>;
+var<workgroup> counts: array<u32, THREADS>;
+var<workgroup> highest: atomic<u32>;
+var<workgroup> newton: Newton;
+
+struct Newton {
+    press: f32,
+    touching: u32,
+    running: u32,
+    available: f32,
+}
+
+// Height above the gel at rest; only where there is a surface.
+fn above_gel(code: u32, pixel: u32) -> f32 {
+    return unordered(code) + rest[pixel];
+}
+
+// Volume and pixels in contact at a press, of all threads together, in place 0.
+fn measure(start: u32, pixels: u32, thread: u32, top: f32, press: f32) {
+    var volume = 0.0;
+    var count = 0u;
+    for (var block = thread * BLOCK; block < pixels; block += THREADS * BLOCK) {
+        var part = 0.0;
+        for (var i = block; i < min(block + BLOCK, pixels); i++) {
+            let code = heights[start + i];
+            let depth = (above_gel(code, i) - top) + press;
+            if code != 0u && depth > 0.0 {
+                part += depth;
+                count += 1u;
+            }
+        }
+        volume += part;
+    }
+    volumes[thread] = volume;
+    counts[thread] = count;
+    workgroupBarrier();
+    for (var half = THREADS / 2u; half > 0u; half /= 2u) {
+        if thread < half {
+            volumes[thread] += volumes[thread + half];
+            counts[thread] += counts[thread + half];
+        }
+        workgroupBarrier();
+    }
+}
+
+@compute @workgroup_size(THREADS)
+fn main(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let image = id.x;
+    let pixels = frame.width_px * frame.height_px;
+    let start = image * pixels;
+    let has_part = (presses[image].flags & HAS_PART) != 0u;
+    let wanted = presses[image].wanted_px3;
+    if thread == 0u {
+        atomicStore(&highest, 0u);
+    }
+    workgroupBarrier();
+    var mine = 0u;
+    for (var i = thread; i < pixels; i += THREADS) {
+        let code = heights[start + i];
+        if code != 0u {
+            mine = max(mine, ordered(above_gel(code, i)));
+        }
+    }
+    atomicMax(&highest, mine);
+    workgroupBarrier();
+    let code = atomicLoad(&highest);
+    let something = has_part && code != 0u;
+    let top = select(0.0, unordered(code), something);
+    if thread == 0u {
+        newton = Newton(frame.thickness_px, 0xffffffffu, select(0u, 1u, something), 0.0);
+    }
+    var step = 0u;
+    loop {
+        let now = workgroupUniformLoad(&newton);
+        if now.running == 0u || step == MAX_STEPS {
+            break;
+        }
+        measure(start, pixels, thread, top, now.press);
+        if thread == 0u {
+            if step == 0u {
+                newton.available = volumes[0];
+            }
+            if (step == 0u && volumes[0] < wanted) || counts[0] == now.touching || counts[0] == 0u {
+                newton.running = 0u;
+            } else {
+                newton.touching = counts[0];
+                newton.press = now.press - (volumes[0] - wanted) / f32(counts[0]);
+            }
+        }
+        step += 1u;
+    }
+    let found = workgroupUniformLoad(&newton);
+    let deeper = something && found.available < wanted;
+    let press = found.press;
+    let pressed = something && !deeper;
+    for (var i = thread; i < pixels; i += THREADS) {
+        let height = heights[start + i];
+        var depth = 0.0;
+        if pressed && height != 0u {
+            depth = max((above_gel(height, i) - top) + press, 0.0);
+        }
+        store_contact(i % frame.width_px, i / frame.width_px, image, depth);
+    }
+    if thread == 0u {
+        var status = 0u;
+        if has_part && !something {
+            status = 1u;
+        } else if deeper {
+            status = 2u;
+        }
+        let depth = select(0.0, press, pressed);
+        outcomes[image] = Outcome(status, depth, found.available, frame.restore_depth_fraction * depth);
+    }
+}

@@ -1,0 +1,25 @@
+// Stage noise: sensor noise, rounding to 8 bits and packing. CPU twin: src/noise.rs, with the same hash and table.
+
+fn scramble(word: u32) -> u32 {
+    var h = word;
+    h ^= h >> 16u;
+    h *= 0x85ebca6bu;
+    h ^= h >> 13u;
+    h *= 0xc2b2ae35u;
+    return h ^ (h >> 16u);
+}
+
+// The two words that an image's key becomes.
+fn key_words(low: u32, high: u32) -> vec2<u32> {
+    let first = scramble(low ^ scramble(high));
+    return vec2<u32>(first, scramble(high ^ scramble(low + first)));
+}
+
+// A standard normal number for value `index` of an image.
+fn standard_normal(words: vec2<u32>, index: u32) -> f32 {
+    return levels[scramble(scramble(index ^ words.x) + words.y) >> 20u];
+}
+
+fn rounded(value: f32) -> u32 {
+    return u32(floor(clamp(value, 0.0, 255.0) + 0.5));
+}

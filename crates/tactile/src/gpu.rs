@@ -1,0 +1,313 @@
+//! The pipeline on a graphics processor, through wgpu: batches of images from poses.
+//!
+//! Meshes, sensors and tables stay on the device; a batch uploads a pose, a force and a noise key for each image and
+//! brings back packed RGB. Every stage is one WGSL file in `shaders/`, with the name of its twin on the processor.
+//! Results are within a tolerance of those of [`crate::Renderer`], not equal to the bit: the surface within 1e-4 pixels,
+//! and at most 0.05 % of the image's values more than one grey level apart.
+
+mod batch;
+mod colour;
+mod device;
+mod layout;
+mod mesh;
+mod pipelines;
+mod readback;
+mod rest;
+mod source;
+#[cfg(test)]
+mod source_tests;
+#[cfg(test)]
+mod tests;
+
+pub use batch::{GpuMesh, GpuSensor};
+pub use device::{AdapterChoice, GpuAdapter};
+pub use source::Variant;
+
+use crate::grid::Plane;
+use crate::indent::IndentError;
+use crate::sensor::Sensor;
+use device::Device;
+use gripgen_twin::frames::Pose;
+use gripgen_twin::{Gel, TactileImage, TriMesh};
+use layout::{HAS_NOISE, HAS_PART, Outcome, Press};
+use pipelines::Pipelines;
+
+/// Values that a thread makes on a software adapter. 40 are a tenth faster and take three times as long to build.
+const SOFTWARE_RUN: u32 = 16;
+
+/// Why the graphics processor cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GpuError {
+    /// No adapter of the kind wanted.
+    #[error("{}; found {}", no_adapter(wanted), if found.is_empty() { "none".into() } else { found.join(", ") })]
+    NoAdapter {
+        /// What was wanted.
+        wanted: AdapterChoice,
+        /// What is there.
+        found: Vec<String>,
+    },
+    /// The device or its driver.
+    #[error("{adapter}: {problem}")]
+    Device {
+        /// Which.
+        adapter: String,
+        /// What it says.
+        problem: String,
+    },
+    /// Something that this backend cannot do.
+    #[error("the gpu backend cannot do {what}")]
+    Unsupported {
+        /// What.
+        what: &'static str,
+    },
+    /// Larger than the device allows.
+    #[error("one {what} takes {bytes} bytes, the device binds at most {allowed}")]
+    TooLarge {
+        /// What.
+        what: &'static str,
+        /// Its size.
+        bytes: u64,
+        /// The limit.
+        allowed: u64,
+    },
+    /// A blur kernel for which the memory of a workgroup is too small.
+    #[error("a blur kernel of {kernel_px} pixels does not fit the {workgroup_bytes} bytes of a workgroup")]
+    Kernel {
+        /// Width of the kernel.
+        kernel_px: u32,
+        /// Memory of a workgroup.
+        workgroup_bytes: u32,
+    },
+}
+
+fn no_adapter(wanted: &AdapterChoice) -> String {
+    match wanted {
+        AdapterChoice::Hardware => "no graphics processor with Vulkan, Metal or DX12".into(),
+        AdapterChoice::Named(name) => format!("no adapter is called `{name}`"),
+    }
+}
+
+impl GpuError {
+    /// What to do about it.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            GpuError::NoAdapter { wanted: AdapterChoice::Hardware, .. } => {
+                "use backend = \"cpu\"; a software adapter is taken when gpu_adapter names it"
+            }
+            _ => "use backend = \"cpu\"",
+        }
+    }
+}
+
+/// A part pressed into a gel.
+#[derive(Clone, Copy)]
+pub struct GpuPress<'a> {
+    /// The part.
+    pub mesh: &'a GpuMesh,
+    /// Where it is.
+    pub gel_from_mesh: Pose,
+    /// Imprint constant c of `V = c F`.
+    pub imprint_m3_per_n: f64,
+    /// Normal force.
+    pub force_n: f64,
+}
+
+/// One image to make.
+#[derive(Clone, Copy, Default)]
+pub struct GpuRequest<'a> {
+    /// The press; the gel at rest without one.
+    pub press: Option<GpuPress<'a>>,
+    /// Which noise; none without a key.
+    pub noise_key: Option<u64>,
+}
+
+/// One image as it comes back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GpuImage<'a> {
+    /// Red, green, blue of each pixel, row by row.
+    pub rgb: &'a [u8],
+    /// Largest depth of the contact; 0 without one.
+    pub press_depth_m: f64,
+}
+
+/// An open graphics processor.
+pub struct GpuRenderer {
+    device: Device,
+    pipelines: Pipelines,
+}
+
+impl GpuRenderer {
+    /// Opens an adapter.
+    pub fn new(choice: &AdapterChoice) -> Result<Self, GpuError> {
+        let device = Device::open(choice)?;
+        let software = device.adapter.software;
+        let variant = if software { Variant::Texture { run: SOFTWARE_RUN } } else { Variant::Tile };
+        Ok(Self { device, pipelines: Pipelines::new(variant) })
+    }
+
+    /// The same with the kernels of the other class of adapters, to compare them.
+    #[must_use]
+    pub fn with_variant(self, variant: Variant) -> Self {
+        Self { pipelines: Pipelines::new(variant), ..self }
+    }
+
+    /// Which adapter it is.
+    pub fn adapter(&self) -> &GpuAdapter {
+        &self.device.adapter
+    }
+
+    /// Puts a mesh on the device.
+    pub fn mesh(&self, mesh: &TriMesh) -> Result<GpuMesh, GpuError> {
+        GpuMesh::new(&self.device, mesh)
+    }
+
+    /// Puts a sensor with its gel on the device, with room for a batch.
+    pub fn sensor(&self, sensor: &Sensor, gel: &Gel) -> Result<GpuSensor, GpuError> {
+        GpuSensor::new(&self.device, &self.pipelines, sensor, gel)
+    }
+
+    /// Makes images, any number of them in any order of meshes, and hands them out with their place in `requests`.
+    /// Three batches are under way at a time.
+    pub fn render(
+        &self,
+        sensor: &mut GpuSensor,
+        requests: &[GpuRequest<'_>],
+        mut on_image: impl FnMut(usize, Result<GpuImage<'_>, IndentError>),
+    ) -> Result<(), GpuError> {
+        let order = by_mesh(requests);
+        let (pixel_bytes, image_bytes) = (3 * sensor.grid.len(), sensor.image_bytes);
+        let (grid, thickness_m) = (sensor.grid, sensor.thickness_m);
+        let mut deliver = |bytes: &[u8], (first, count): (usize, usize)| {
+            for (i, &place) in order[first..first + count].iter().enumerate() {
+                let at = count * image_bytes + i * size_of::<Outcome>();
+                let outcome = bytemuck::pod_read_unaligned(&bytes[at..at + size_of::<Outcome>()]);
+                let rgb = &bytes[i * image_bytes..][..pixel_bytes];
+                let press = requests[place].press.as_ref();
+                let result = judge(&outcome, press, &grid, thickness_m)
+                    .map(|press_depth_m| GpuImage { rgb, press_depth_m });
+                on_image(place, result);
+            }
+        };
+        let mut first = 0;
+        for batch in order.chunks(sensor.batch) {
+            if sensor.ring.is_full() {
+                sensor.ring.take(&self.device, &mut deliver)?;
+            }
+            let mut encoder = self.encode(sensor, requests, batch);
+            sensor.copy_out(&mut encoder, batch.len());
+            let submission = self.device.queue.submit([encoder.finish()]);
+            sensor.ring.put(submission, (first, batch.len()));
+            first += batch.len();
+        }
+        while sensor.ring.take(&self.device, &mut deliver)? {}
+        Ok(())
+    }
+
+    /// Makes images, in the order of `requests`.
+    pub fn images(
+        &self,
+        sensor: &mut GpuSensor,
+        requests: &[GpuRequest<'_>],
+    ) -> Result<Vec<Result<TactileImage, IndentError>>, GpuError> {
+        let (width_px, height_px) = (sensor.grid.width_px as u32, sensor.grid.height_px as u32);
+        let mut images: Vec<Option<Result<TactileImage, IndentError>>> = vec![None; requests.len()];
+        self.render(sensor, requests, |place, image| {
+            images[place] = Some(image.map(|i| TactileImage { width_px, height_px, rgb: i.rgb.to_vec() }));
+        })?;
+        Ok(images.into_iter().map(|i| i.expect("every request is answered")).collect())
+    }
+
+    /// Makes images and leaves them on the device, where the next batch replaces them: for measurements.
+    pub fn render_resident(
+        &self,
+        sensor: &mut GpuSensor,
+        requests: &[GpuRequest<'_>],
+    ) -> Result<(), GpuError> {
+        for batch in by_mesh(requests).chunks(sensor.batch) {
+            let encoder = self.encode(sensor, requests, batch);
+            self.device.queue.submit([encoder.finish()]);
+        }
+        self.device.wait(None)
+    }
+
+    /// The gel surfaces of up to one batch of requests, in pixels towards the camera: the result of stage `deform`.
+    pub fn surfaces(
+        &self,
+        sensor: &mut GpuSensor,
+        requests: &[GpuRequest<'_>],
+    ) -> Result<Vec<Plane>, GpuError> {
+        let mut surfaces: Vec<Option<Plane>> = vec![None; requests.len()];
+        for batch in by_mesh(requests).chunks(sensor.batch) {
+            let encoder = self.encode(sensor, requests, batch);
+            self.device.queue.submit([encoder.finish()]);
+            for (&place, plane) in batch.iter().zip(sensor.read_surfaces(&self.device, batch.len())?) {
+                surfaces[place] = Some(plane);
+            }
+        }
+        Ok(surfaces.into_iter().map(|s| s.expect("every request is answered")).collect())
+    }
+
+    fn encode(
+        &self,
+        sensor: &GpuSensor,
+        requests: &[GpuRequest<'_>],
+        batch: &[usize],
+    ) -> wgpu::CommandEncoder {
+        let presses: Vec<Press> = batch.iter().map(|&i| press_of(&requests[i], &sensor.grid)).collect();
+        let mut runs: Vec<(usize, usize, &GpuMesh)> = vec![];
+        for (i, &place) in batch.iter().enumerate() {
+            let Some(press) = &requests[place].press else { continue };
+            match runs.last_mut() {
+                Some((_, count, mesh)) if std::ptr::eq(*mesh, press.mesh) => *count += 1,
+                _ => runs.push((i, 1, press.mesh)),
+            }
+        }
+        sensor.encode(&self.device, &presses, &runs)
+    }
+}
+
+/// Places of the requests, those with the same mesh one after another.
+fn by_mesh(requests: &[GpuRequest<'_>]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..requests.len()).collect();
+    order.sort_by_key(|&i| requests[i].press.as_ref().map(|p| std::ptr::from_ref(p.mesh).addr()));
+    order
+}
+
+fn press_of(request: &GpuRequest<'_>, grid: &crate::Grid) -> Press {
+    let mut press: Press = bytemuck::Zeroable::zeroed();
+    if let Some(part) = &request.press {
+        part.mesh.steps.place(&part.gel_from_mesh, grid, &mut press);
+        let a = grid.metres_per_px;
+        press.wanted_px3 = (part.imprint_m3_per_n * part.force_n / (a * a * a)) as f32;
+        press.flags |= HAS_PART;
+    }
+    if let Some(key) = request.noise_key {
+        press.key = [key as u32, (key >> 32) as u32];
+        press.flags |= HAS_NOISE;
+    }
+    press
+}
+
+/// The press depth, or why there is none.
+fn judge(
+    outcome: &Outcome,
+    press: Option<&GpuPress<'_>>,
+    grid: &crate::Grid,
+    thickness_m: f64,
+) -> Result<f64, IndentError> {
+    let a = grid.metres_per_px;
+    match (outcome.status, press) {
+        (1, _) => Err(IndentError::NothingInFront {
+            width_mm: grid.width_px as f64 * a * 1e3,
+            height_mm: grid.height_px as f64 * a * 1e3,
+        }),
+        (2, Some(press)) => Err(IndentError::ThroughTheGel {
+            force_n: press.force_n,
+            wanted_mm3: press.imprint_m3_per_n * press.force_n * 1e9,
+            thickness_mm: thickness_m * 1e3,
+            available_mm3: f64::from(outcome.available_px3) * a * a * a * 1e9,
+        }),
+        _ => Ok(f64::from(outcome.press_px) * a),
+    }
+}

@@ -1,0 +1,387 @@
+//! One sensor on the device: what stays there, and the passes of a batch.
+
+use super::GpuError;
+use super::colour::Colours;
+use super::device::Device;
+use super::layout::{Cluster, Frame, Group, Outcome, Press};
+use super::mesh::{Clusters, Steps};
+use super::pipelines::{Pipelines, Stage};
+use super::readback::Ring;
+use super::rest::RestShape;
+use super::source::{Axis, Blur, Variant};
+use crate::grid::{Grid, Plane};
+use crate::noise::levels;
+use crate::sensor::Sensor;
+use gripgen_twin::{Gel, TriMesh};
+use wgpu::BufferUsages;
+
+/// Images of a batch. More planes than a processor's cache holds make a software adapter slower.
+const SOFTWARE_BATCH: u64 = 8;
+const HARDWARE_BATCH: u64 = 64;
+
+/// A mesh on the device.
+pub struct GpuMesh {
+    clusters: wgpu::Buffer,
+    vertices: wgpu::Buffer,
+    triangles: wgpu::Buffer,
+    count: u32,
+    pub(super) steps: Steps,
+}
+
+impl GpuMesh {
+    pub(super) fn new(device: &Device, mesh: &TriMesh) -> Result<Self, GpuError> {
+        let made = Clusters::new(mesh);
+        let bytes = (made.vertices.len() * 4).max(made.clusters.len() * size_of::<Cluster>()) as u64;
+        let limits = device.device.limits();
+        let allowed = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes > allowed {
+            return Err(GpuError::TooLarge { what: "mesh", bytes, allowed });
+        }
+        Ok(Self {
+            clusters: resident(device, "clusters", &made.clusters),
+            vertices: resident(device, "vertices", &made.vertices),
+            triangles: resident(device, "triangles", &made.triangles),
+            count: made.clusters.len() as u32,
+            steps: made.steps,
+        })
+    }
+}
+
+/// A plane for every image of a batch.
+enum Planes {
+    Texture(wgpu::Texture, wgpu::TextureView),
+    Buffer(wgpu::Buffer),
+}
+
+impl Planes {
+    fn binding(&self) -> wgpu::BindingResource<'_> {
+        match self {
+            Planes::Texture(_, view) => wgpu::BindingResource::TextureView(view),
+            Planes::Buffer(buffer) => buffer.as_entire_binding(),
+        }
+    }
+}
+
+/// A dispatch with what it is bound to. Its third dimension is the image.
+struct Pass {
+    stage: Stage,
+    bound: wgpu::BindGroup,
+    groups: [u32; 2],
+}
+
+/// A sensor with its gel on the device: rest frame, colours, blurs, and the planes of one batch.
+pub struct GpuSensor {
+    pub(super) grid: Grid,
+    pub(super) thickness_m: f64,
+    pub(super) batch: usize,
+    pub(super) image_bytes: usize,
+    pub(super) ring: Ring,
+    raster: [Stage; 2],
+    frame: wgpu::Buffer,
+    presses: wgpu::Buffer,
+    tops: wgpu::Buffer,
+    heights: wgpu::Buffer,
+    outcomes: wgpu::Buffer,
+    packed: wgpu::Buffer,
+    surface: Planes,
+    indent: Pass,
+    blurs: Vec<Pass>,
+    image: Pass,
+}
+
+impl GpuSensor {
+    /// Images that are computed at once.
+    pub fn batch(&self) -> usize {
+        self.batch
+    }
+
+    pub(super) fn new(
+        device: &Device,
+        pipelines: &Pipelines,
+        sensor: &Sensor,
+        gel: &Gel,
+    ) -> Result<Self, GpuError> {
+        let grid = sensor.grid;
+        let pixels = grid.len() as u64;
+        let image_words = pixels.div_ceil(4) * 3;
+        let limits = device.device.limits();
+        let allowed = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let most = if device.adapter.software { SOFTWARE_BATCH } else { HARDWARE_BATCH };
+        let batch = most.min(allowed / (4 * pixels)).min(u64::from(limits.max_texture_array_layers));
+        let image_groups = pixels.div_ceil(4).div_ceil(64);
+        if batch == 0 || image_groups > u64::from(limits.max_compute_workgroups_per_dimension) {
+            return Err(GpuError::TooLarge { what: "image", bytes: 4 * pixels, allowed });
+        }
+        let (kernels_px, restore_depth_fraction) = match &sensor.pyramid {
+            Some(pyramid) => (&pyramid.kernels_px, pyramid.restore_depth_fraction),
+            None => (&gel.kernels_px, gel.restore_depth_fraction),
+        };
+        let shape = RestShape::new(sensor.gel_shape.rest_px(&grid), &grid, kernels_px);
+        let colours = Colours::new(sensor, gel)?;
+        let frame = Frame {
+            width_px: grid.width_px as u32,
+            height_px: grid.height_px as u32,
+            image_words: image_words as u32,
+            bins: colours.bins,
+            thickness_px: (gel.thickness_m / grid.metres_per_px) as f32,
+            reach_px: (gel.thickness_m / grid.metres_per_px + shape.sag_px + 1.0) as f32,
+            restore_depth_fraction: restore_depth_fraction as f32,
+            noise_red: sensor.noise_rgb[0],
+            noise_green: sensor.noise_rgb[1],
+            noise_blue: sensor.noise_rgb[2],
+        };
+        let frame = with_content(device, "frame", bytemuck::bytes_of(&frame), BufferUsages::UNIFORM);
+        let gel_at_rest = resident(device, "gel at rest", &shape.rest_px);
+        let rest = resident(device, "rest frame", &colours.rest);
+        let colour = resident(device, "colours", &colours.coefficients);
+        let noise = resident(device, "noise", levels());
+        let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let buffer = |label, bytes: u64| empty(device, label, batch * bytes, storage);
+        let presses = buffer("presses", size_of::<Press>() as u64);
+        let tops = buffer("tops", 4);
+        let heights = buffer("heights", 4 * pixels);
+        let outcomes = buffer("outcomes", size_of::<Outcome>() as u64);
+        let packed = buffer("packed images", 4 * image_words);
+        let planes = || new_planes(device, pipelines.variant(), &grid, batch);
+        let (contact, half_way, surface) = (planes(), planes(), planes());
+
+        let indent = {
+            let stage = pipelines.indent(device)?;
+            let all = [&frame, &presses, &heights, &outcomes].map(wgpu::Buffer::as_entire_binding);
+            let all = all.into_iter().chain([contact.binding(), gel_at_rest.as_entire_binding()]);
+            let bound = bind(device, &stage, all);
+            Pass { stage, bound, groups: [1, 1] }
+        };
+        let mut blurs = Vec::new();
+        for (i, (kernel_px, restore)) in
+            kernels_px.iter().map(|&k| (k, true)).chain([(crate::deform::FINAL_KERNEL_PX, false)]).enumerate()
+        {
+            let from = if i == 0 { &contact } else { &surface };
+            let lift = shape.lift_px.get(i).map(|lift| resident(device, "lift", lift));
+            let ways = [(Axis::Y, from, &half_way, false), (Axis::X, &half_way, &surface, restore)];
+            for (axis, source, blurred, restore) in ways {
+                let lift = lift.as_ref().filter(|_| axis == Axis::X);
+                let stage =
+                    pipelines.blur(device, Blur { kernel_px, axis, restore, lifted: lift.is_some() })?;
+                let all = [frame.as_entire_binding(), outcomes.as_entire_binding()];
+                let all = all.into_iter().chain([source.binding(), blurred.binding()]);
+                let all = all.enumerate().map(|(i, r)| (i as u32, r));
+                let all: Vec<_> = all
+                    .chain(restore.then(|| (4, contact.binding())))
+                    .chain(lift.map(|lift| (5, lift.as_entire_binding())))
+                    .collect();
+                let bound = bind_at(device, &stage, all);
+                let (w, h) = (grid.width_px as u32, grid.height_px as u32);
+                let (along, across) = if axis == Axis::X { (w, h) } else { (h, w) };
+                let shape = stage.shape.expect("blurs have one");
+                let (along, across) = (along.div_ceil(shape.span), across.div_ceil(shape.lines));
+                let sideways = axis == Axis::Y && matches!(pipelines.variant(), Variant::Texture { .. });
+                let groups = if sideways { [across, along] } else { [along, across] };
+                blurs.push(Pass { stage, bound, groups });
+            }
+        }
+        let image = {
+            let domed = !shape.lift_px.is_empty();
+            let stage = pipelines.image(device, colours.shade, domed)?;
+            let all =
+                [&frame, &presses, &rest, &colour, &noise, &packed].map(wgpu::Buffer::as_entire_binding);
+            let all = all.into_iter().chain([surface.binding()]);
+            let all: Vec<_> = all.chain(domed.then(|| gel_at_rest.as_entire_binding())).collect();
+            let bound = bind(device, &stage, all);
+            Pass { stage, bound, groups: [image_groups as u32, 0] }
+        };
+        device.check()?;
+        Ok(Self {
+            grid,
+            thickness_m: gel.thickness_m,
+            batch: batch as usize,
+            image_bytes: 4 * image_words as usize,
+            ring: Ring::new(device, batch * (4 * image_words + size_of::<Outcome>() as u64)),
+            raster: [pipelines.raster_top(device)?, pipelines.raster_fill(device)?],
+            frame,
+            presses,
+            tops,
+            heights,
+            outcomes,
+            packed,
+            surface,
+            indent,
+            blurs,
+            image,
+        })
+    }
+
+    /// The commands of one batch. `runs` are runs of images that show the same mesh: first image, images, mesh.
+    pub(super) fn encode(
+        &self,
+        device: &Device,
+        presses: &[Press],
+        runs: &[(usize, usize, &GpuMesh)],
+    ) -> wgpu::CommandEncoder {
+        let images = presses.len() as u32;
+        device.queue.write_buffer(&self.presses, 0, bytemuck::cast_slice(presses));
+        let mut encoder = device.device.create_command_encoder(&Default::default());
+        encoder.clear_buffer(&self.tops, 0, Some(4 * u64::from(images)));
+        encoder.clear_buffer(&self.heights, 0, Some(4 * u64::from(images) * self.grid.len() as u64));
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            for &(first, count, mesh) in runs {
+                let group = Group { first_image: first as u32, clusters: mesh.count };
+                let group = with_content(device, "group", bytemuck::bytes_of(&group), BufferUsages::UNIFORM);
+                let groups = [mesh.count.div_ceil(64), mesh.count];
+                for (i, stage) in self.raster.iter().enumerate() {
+                    let all = [&self.frame, &group, &mesh.clusters, &mesh.vertices, &mesh.triangles];
+                    let all = all.into_iter().chain([&self.presses, &self.tops, &self.heights]);
+                    // The pass over tops has no use for triangles and heights.
+                    let used: Vec<_> = all
+                        .enumerate()
+                        .filter(|(binding, _)| i == 1 || ![4, 7].contains(binding))
+                        .map(|(binding, buffer)| (binding as u32, buffer.as_entire_binding()))
+                        .collect();
+                    pass.set_pipeline(&stage.pipeline);
+                    pass.set_bind_group(0, &bind_at(device, stage, used), &[]);
+                    pass.dispatch_workgroups(groups[i], count as u32, 1);
+                }
+            }
+            let mut run = |p: &Pass, groups: [u32; 3]| {
+                pass.set_pipeline(&p.stage.pipeline);
+                pass.set_bind_group(0, &p.bound, &[]);
+                pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
+            };
+            run(&self.indent, [images, 1, 1]);
+            for blur in &self.blurs {
+                run(blur, [blur.groups[0], blur.groups[1], images]);
+            }
+            run(&self.image, [self.image.groups[0], images, 1]);
+        }
+        encoder
+    }
+
+    /// Adds the copy of a batch's images, then outcomes, to the ring's buffer.
+    pub(super) fn copy_out(&self, encoder: &mut wgpu::CommandEncoder, images: usize) {
+        let bytes = (images * self.image_bytes) as u64;
+        let outcomes = (images * size_of::<Outcome>()) as u64;
+        encoder.copy_buffer_to_buffer(&self.packed, 0, self.ring.buffer(), 0, bytes);
+        encoder.copy_buffer_to_buffer(&self.outcomes, 0, self.ring.buffer(), bytes, outcomes);
+    }
+
+    /// The gel surfaces of the last batch.
+    pub(super) fn read_surfaces(&self, device: &Device, images: usize) -> Result<Vec<Plane>, GpuError> {
+        let (w, h) = (self.grid.width_px, self.grid.height_px);
+        let mut encoder = device.device.create_command_encoder(&Default::default());
+        // Rows of a texture are copied to multiples of 256 bytes.
+        let row_bytes = match self.surface {
+            Planes::Texture(..) => (4 * w).next_multiple_of(256),
+            Planes::Buffer(_) => 4 * w,
+        };
+        let bytes = (images * h * row_bytes) as u64;
+        let staging = empty(device, "surfaces", bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
+        match &self.surface {
+            Planes::Buffer(buffer) => encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, bytes),
+            Planes::Texture(texture, _) => encoder.copy_texture_to_buffer(
+                texture.as_image_copy(),
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &staging,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(row_bytes as u32),
+                        rows_per_image: Some(h as u32),
+                    },
+                },
+                wgpu::Extent3d { width: w as u32, height: h as u32, depth_or_array_layers: images as u32 },
+            ),
+        }
+        device.queue.submit([encoder.finish()]);
+        staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        device.wait(None)?;
+        let view = staging.get_mapped_range(..).map_err(|e| GpuError::Device {
+            adapter: device.adapter.to_string(),
+            problem: format!("reading back: {e}"),
+        })?;
+        let planes = view.chunks_exact(h * row_bytes).map(|image| Plane {
+            width: w,
+            height: h,
+            values: image
+                .chunks_exact(row_bytes)
+                .flat_map(|row| row[..4 * w].chunks_exact(4))
+                .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+                .collect(),
+        });
+        Ok(planes.collect())
+    }
+}
+
+fn new_planes(device: &Device, variant: Variant, grid: &Grid, batch: u64) -> Planes {
+    match variant {
+        Variant::Tile => Planes::Buffer(empty(
+            device,
+            "planes",
+            4 * batch * grid.len() as u64,
+            BufferUsages::STORAGE | BufferUsages::COPY_SRC,
+        )),
+        Variant::Texture { .. } => {
+            let texture = device.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("planes"),
+                size: wgpu::Extent3d {
+                    width: grid.width_px as u32,
+                    height: grid.height_px as u32,
+                    depth_or_array_layers: batch as u32,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::R32Float,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING
+                    | wgpu::TextureUsages::STORAGE_BINDING
+                    | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            });
+            let view = texture.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2Array),
+                ..Default::default()
+            });
+            Planes::Texture(texture, view)
+        }
+    }
+}
+
+fn bind<'a>(
+    device: &Device,
+    stage: &Stage,
+    resources: impl IntoIterator<Item = wgpu::BindingResource<'a>>,
+) -> wgpu::BindGroup {
+    bind_at(device, stage, resources.into_iter().enumerate().map(|(i, r)| (i as u32, r)))
+}
+
+fn bind_at<'a>(
+    device: &Device,
+    stage: &Stage,
+    resources: impl IntoIterator<Item = (u32, wgpu::BindingResource<'a>)>,
+) -> wgpu::BindGroup {
+    let entries: Vec<_> =
+        resources.into_iter().map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+    device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &stage.pipeline.get_bind_group_layout(0),
+        entries: &entries,
+    })
+}
+
+fn empty(device: &Device, label: &str, bytes: u64, usage: BufferUsages) -> wgpu::Buffer {
+    device.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: bytes,
+        usage,
+        mapped_at_creation: false,
+    })
+}
+
+fn with_content(device: &Device, label: &str, content: &[u8], usage: BufferUsages) -> wgpu::Buffer {
+    let buffer = empty(device, label, content.len() as u64, usage | BufferUsages::COPY_DST);
+    device.queue.write_buffer(&buffer, 0, content);
+    buffer
+}
+
+fn resident<T: bytemuck::NoUninit>(device: &Device, label: &str, content: &[T]) -> wgpu::Buffer {
+    with_content(device, label, bytemuck::cast_slice(content), BufferUsages::STORAGE)
+}

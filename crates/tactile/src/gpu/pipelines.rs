@@ -1,0 +1,97 @@
+//! Compute pipelines, built when they are first needed.
+
+use super::GpuError;
+use super::device::Device;
+use super::source::{self, Blur, BlurShape, Shade, Variant};
+use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
+
+/// A pipeline; its bind group layout follows from the source.
+#[derive(Debug, Clone)]
+pub(super) struct Stage {
+    pub(super) pipeline: wgpu::ComputePipeline,
+    /// How a blur shares the image.
+    pub(super) shape: Option<BlurShape>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Key {
+    RasterTop,
+    RasterFill,
+    Indent,
+    Blur(Blur),
+    Image(Shade, bool),
+}
+
+/// All pipelines of a renderer.
+pub(super) struct Pipelines {
+    variant: Variant,
+    built: Mutex<HashMap<Key, Stage>>,
+}
+
+impl Pipelines {
+    pub(super) fn new(variant: Variant) -> Self {
+        Self { variant, built: Mutex::default() }
+    }
+
+    pub(super) fn variant(&self) -> Variant {
+        self.variant
+    }
+
+    pub(super) fn raster_top(&self, device: &Device) -> Result<Stage, GpuError> {
+        self.get(device, Key::RasterTop, "top", || Ok((source::raster(), None)))
+    }
+
+    pub(super) fn raster_fill(&self, device: &Device) -> Result<Stage, GpuError> {
+        self.get(device, Key::RasterFill, "fill", || Ok((source::raster(), None)))
+    }
+
+    pub(super) fn indent(&self, device: &Device) -> Result<Stage, GpuError> {
+        self.get(device, Key::Indent, "main", || Ok((source::indent(self.variant), None)))
+    }
+
+    pub(super) fn image(&self, device: &Device, shade: Shade, domed: bool) -> Result<Stage, GpuError> {
+        let source = || Ok((source::image(self.variant, shade, domed), None));
+        self.get(device, Key::Image(shade, domed), "main", source)
+    }
+
+    pub(super) fn blur(&self, device: &Device, blur: Blur) -> Result<Stage, GpuError> {
+        self.get(device, Key::Blur(blur), "main", || {
+            let workgroup_bytes = device.device.limits().max_compute_workgroup_storage_size;
+            let (source, shape) = source::blur(self.variant, blur, workgroup_bytes)
+                .ok_or(GpuError::Kernel { kernel_px: blur.kernel_px, workgroup_bytes })?;
+            Ok((source, Some(shape)))
+        })
+    }
+
+    fn get(
+        &self,
+        device: &Device,
+        key: Key,
+        entry: &str,
+        source: impl FnOnce() -> Result<(String, Option<BlurShape>), GpuError>,
+    ) -> Result<Stage, GpuError> {
+        let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(stage) = built.get(&key) {
+            return Ok(stage.clone());
+        }
+        let label = format!("{key:?}");
+        let (source, shape) = source()?;
+        let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(&label),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        let pipeline = device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(&label),
+            layout: None,
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        device.check()?;
+        let stage = Stage { pipeline, shape };
+        built.insert(key, stage.clone());
+        Ok(stage)
+    }
+}

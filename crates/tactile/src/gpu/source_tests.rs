@@ -1,0 +1,82 @@
+//! Every WGSL source that can be generated, without an adapter. Whether it computes the right thing is for `tests.rs`.
+
+use super::source::{self, Axis, Blur, Shade, Variant};
+use wgpu::naga;
+
+const VARIANTS: [Variant; 3] = [Variant::Texture { run: 16 }, Variant::Texture { run: 40 }, Variant::Tile];
+
+/// The kernels of the shipped twins, Taxim's at 640 x 480, and the smallest and largest that a twin may name.
+const KERNELS_PX: [u32; 12] = [3, 5, 7, 11, 21, 31, 51, 71, 101, 151, 201, 255];
+
+fn validate(what: &str, source: &str) -> naga::Module {
+    let module = naga::front::wgsl::parse_str(source)
+        .unwrap_or_else(|e| panic!("{what}: {}", e.emit_to_string(source)));
+    let mut validator =
+        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+    if let Err(e) = validator.validate(&module) {
+        panic!("{what}: {}", e.emit_to_string(source));
+    }
+    module
+}
+
+/// Bytes of workgroup memory.
+fn workgroup_bytes(module: &naga::Module) -> u32 {
+    let mut layouter = naga::proc::Layouter::default();
+    layouter.update(module.to_ctx()).unwrap();
+    let shared = module.global_variables.iter().filter(|(_, v)| v.space == naga::AddressSpace::WorkGroup);
+    shared.map(|(_, v)| layouter[v.ty].size).sum()
+}
+
+fn no_markers(source: &str) {
+    assert!(!source.contains("/*") && !source.contains("//#"), "{source}");
+}
+
+#[test]
+fn every_stage_validates() {
+    let raster = validate("raster", &source::raster());
+    // The least that WebGPU allows.
+    assert!(workgroup_bytes(&raster) <= 16_384, "{} bytes", workgroup_bytes(&raster));
+    for variant in VARIANTS {
+        let indent = source::indent(variant);
+        no_markers(&indent);
+        assert!(workgroup_bytes(&validate("indent", &indent)) <= 16_384);
+        for (shade, domed) in
+            [(Shade::Lambert, false), (Shade::Lambert, true), (Shade::Taxim, false), (Shade::Taxim, true)]
+        {
+            let image = source::image(variant, shade, domed);
+            no_markers(&image);
+            validate("image", &image);
+        }
+    }
+}
+
+#[test]
+fn every_blur_validates_and_fits_the_workgroup_memory() {
+    for variant in VARIANTS {
+        for kernel_px in KERNELS_PX {
+            for axis in [Axis::X, Axis::Y] {
+                for (restore, lifted) in [(true, false), (false, false), (true, true), (false, true)] {
+                    for bytes in [16_384, 32_768, 49_152] {
+                        let blur = Blur { kernel_px, axis, restore, lifted };
+                        let what = format!("{variant:?} {blur:?} {bytes}");
+                        let (source, shape) =
+                            source::blur(variant, blur, bytes).unwrap_or_else(|| panic!("{what}: no tile"));
+                        no_markers(&source);
+                        let used = workgroup_bytes(&validate(&what, &source));
+                        assert!(used <= bytes, "{what}: {used} bytes");
+                        assert!(shape.span > 0 && shape.lines > 0);
+                        if matches!(variant, Variant::Texture { .. }) {
+                            break;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_tile_that_fits_nowhere_is_refused() {
+    let blur = Blur { kernel_px: 71, axis: Axis::X, restore: true, lifted: false };
+    assert_eq!(source::blur(Variant::Tile, blur, 1024), None);
+}

@@ -1,0 +1,303 @@
+//! The graphics processor against the processor, stage by stage and as a whole, in both variants of the kernels.
+//!
+//! Run on Mesa's lavapipe where there is no other adapter: it shows that results are right, not how fast they are.
+
+use super::*;
+use crate::colour::{ColourModel, Lambert, Light, TaximTable};
+use crate::npz::{Array, ElementType, Npz, write_npz};
+use crate::sensor::GelShape;
+use crate::{ClusteredMesh, Grid, Renderer, SimdLevel, finish};
+use gripgen_twin::frames::{pose, rotation_from_fixed_xyz};
+use gripgen_twin::parts::{BallBearing, InvoluteGear, SteppedShaft};
+use nalgebra::Vector3;
+
+/// Share of the values of an image that may be more than one grey level off.
+const OUTLIERS: f64 = 0.0005;
+/// Largest difference between two surfaces.
+const TOLERANCE_PX: f32 = 1e-4;
+
+fn renderer() -> GpuRenderer {
+    GpuRenderer::new(&AdapterChoice::Named("llvmpipe".into()))
+        .or_else(|_| GpuRenderer::new(&AdapterChoice::Hardware))
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn both_variants() -> [GpuRenderer; 2] {
+    [renderer().with_variant(Variant::Texture { run: 16 }), renderer().with_variant(Variant::Tile)]
+}
+
+/// A table whose colours change with slope and direction, as a calibrated one's do.
+fn taxim_table(width_px: usize, height_px: usize) -> TaximTable {
+    let bins = 125;
+    let channel = |phase: f64| {
+        let values = (0..bins * bins).flat_map(|k| {
+            let (i, j) = ((k / bins) as f64, (k % bins) as f64);
+            let value = 1.5 * i * (j * std::f64::consts::TAU / 124.0 + phase).cos();
+            [1e-6 * i, -2e-6 * i, 1e-6 * i, 1e-3 * i, -1e-3 * i, value + 100.0]
+        });
+        Array { shape: vec![bins, bins, 6], values: values.collect() }
+    };
+    let bytes = write_npz(&[
+        ("bins", Array { shape: vec![], values: vec![bins as f64] }, ElementType::F64),
+        ("grad_r", channel(0.0), ElementType::F64),
+        ("grad_g", channel(2.1), ElementType::F64),
+        ("grad_b", channel(4.2), ElementType::F64),
+    ])
+    .unwrap();
+    let rgb = (0..width_px * height_px).flat_map(|i| [(90 + i % 30) as u8, 110, 120]).collect();
+    let frame = TactileImage { width_px: width_px as u32, height_px: height_px as u32, rgb };
+    TaximTable::read(&mut Npz::open(&bytes).unwrap(), &frame).unwrap()
+}
+
+fn lights() -> ColourModel {
+    let light = |azimuth_deg: f64, colour| Light {
+        azimuth_rad: azimuth_deg.to_radians(),
+        elevation_rad: 0.6,
+        colour,
+        falloff: [0.3, 0.1],
+    };
+    ColourModel::Lambert(Box::new(Lambert::from_lights(&[
+        light(0.0, [150.0, 20.0, 10.0]),
+        light(120.0, [10.0, 160.0, 20.0]),
+        light(240.0, [20.0, 10.0, 155.0]),
+    ])))
+}
+
+fn sensor(width_px: usize, height_px: usize, colour: ColourModel) -> Sensor {
+    let rest = [90.0, 110.0, 120.0].map(|base| {
+        (0..width_px * height_px).map(|i| base + (i % width_px) as f32 * 0.05).collect::<Vec<f32>>()
+    });
+    Sensor {
+        grid: Grid { width_px, height_px, metres_per_px: 28e-3 / width_px as f64 },
+        rest,
+        noise_rgb: [1.5, 1.2, 1.8],
+        colour,
+        gel_shape: GelShape::Flat,
+        shadow: None,
+        markers: None,
+        pyramid: None,
+        ball_m: None,
+    }
+}
+
+pub(super) fn gel(kernels_px: &[u32]) -> Gel {
+    Gel {
+        thickness_m: 4e-3,
+        width_m: 28e-3,
+        height_m: 21e-3,
+        shear_stiffness_n_per_m: 1e4,
+        kernels_px: kernels_px.to_vec(),
+        restore_depth_fraction: 0.4,
+        model: gripgen_twin::config::GelModel::Pyramid,
+        elastic: None,
+    }
+}
+
+const PYRAMID: [u32; 5] = [71, 51, 21, 11, 5];
+
+/// The mesh turned and shifted, its highest point in the gel's surface.
+fn touching(mesh: &TriMesh, angles: [f64; 3], x_m: f64, y_m: f64) -> Pose {
+    let rotation = rotation_from_fixed_xyz(angles);
+    let nearest = mesh.vertices_m().iter().map(|v| (rotation * v).z).fold(f64::INFINITY, f64::min);
+    pose(&rotation, Vector3::new(x_m, y_m, -nearest))
+}
+
+/// A part in a pose with a force.
+struct Case {
+    mesh: usize,
+    at: Pose,
+    force_n: f64,
+}
+
+/// Parts with few large and many small triangles, upright and tilted, in the middle and over the window's edge.
+/// `turned_rad` turns them all about the gel's normal.
+fn cases(turned_rad: f64) -> (Vec<TriMesh>, Vec<Case>) {
+    let meshes = vec![
+        SteppedShaft { segments: 96, ..Default::default() }.mesh(),
+        InvoluteGear::default().mesh(),
+        BallBearing::default().mesh(),
+        SteppedShaft { segments: 1500, ..Default::default() }.mesh(),
+    ];
+    let mut cases = vec![];
+    for mesh in 0..meshes.len() {
+        for (angles, x_m, y_m, force_n) in [
+            ([0.0, 0.0, 0.0], 0.31e-3, -0.17e-3, 40.0),
+            ([1.57, 0.0, 0.4], 1.1e-3, 0.7e-3, 25.0),
+            ([0.02, 1.57, 1.0], -2e-3, 1e-3, 80.0),
+            ([0.7, 0.3, 2.0], 12e-3, -8e-3, 5.0),
+            ([1.5, 0.1, 0.0], -13.9e-3, 9e-3, 12.0),
+        ] {
+            let angles = [angles[0], angles[1], angles[2] + turned_rad];
+            cases.push(Case { mesh, at: touching(&meshes[mesh], angles, x_m, y_m), force_n });
+        }
+    }
+    (meshes, cases)
+}
+
+const IMPRINT_M3_PER_N: f64 = 1.0e-9;
+
+fn requests<'a>(cases: &[Case], meshes: &'a [GpuMesh], noise_key: Option<u64>) -> Vec<GpuRequest<'a>> {
+    let request = |case: &Case| GpuRequest {
+        press: Some(GpuPress {
+            mesh: &meshes[case.mesh],
+            gel_from_mesh: case.at,
+            imprint_m3_per_n: IMPRINT_M3_PER_N,
+            force_n: case.force_n,
+        }),
+        noise_key,
+    };
+    cases.iter().map(request).collect()
+}
+
+/// Renders all cases on both and compares surfaces and images.
+fn compare(gpu: &GpuRenderer, sensor: &Sensor, gel: &Gel, turned_rad: f64) {
+    let (meshes, cases) = cases(turned_rad);
+    let cpu = Renderer { sensor, gel, level: SimdLevel::best() };
+    let on_device: Vec<GpuMesh> = meshes.iter().map(|m| gpu.mesh(m).unwrap()).collect();
+    let meshes: Vec<ClusteredMesh> = meshes.iter().map(ClusteredMesh::new).collect();
+    let mut there = gpu.sensor(sensor, gel).unwrap();
+    let key = Some(0x1234_5678_9abc_def0);
+    let requests = requests(&cases, &on_device, key);
+    let surfaces = gpu.surfaces(&mut there, &requests).unwrap();
+    let images = gpu.images(&mut there, &requests).unwrap();
+    let (mut pressed, mut worst_px, mut worst_share) = (0, 0.0f32, 0.0f64);
+    for (i, case) in cases.iter().enumerate() {
+        let ours = cpu.press(&meshes[case.mesh], &case.at, IMPRINT_M3_PER_N, case.force_n);
+        let (imprint, image) = match (ours, &images[i]) {
+            (Ok(imprint), Ok(image)) => (imprint, image),
+            (Err(e), Err(there)) => {
+                assert_eq!(std::mem::discriminant(&e), std::mem::discriminant(there), "case {i}");
+                continue;
+            }
+            (ours, _) => panic!("case {i}: only one of them failed, cpu {:?}", ours.err()),
+        };
+        pressed += 1;
+        let surface = cpu.surface(&imprint);
+        let difference =
+            surface.values.iter().zip(&surfaces[i].values).fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
+        let image_of_cpu = cpu.image(Some(&imprint), key);
+        let off = image_of_cpu.rgb.iter().zip(&image.rgb).filter(|(a, b)| a.abs_diff(**b) > 1).count();
+        let share = off as f64 / image.rgb.len() as f64;
+        assert!(difference <= TOLERANCE_PX, "case {i}: surfaces differ by {difference} px");
+        assert!(share <= OUTLIERS, "case {i}: {:.4} % of the values differ by more than 1", 100.0 * share);
+        worst_px = worst_px.max(difference);
+        worst_share = worst_share.max(share);
+    }
+    assert!(pressed >= cases.len() * 3 / 4, "{pressed} of {} cases touch", cases.len());
+    println!(
+        "{}, {:?}: {pressed} presses, surfaces within {worst_px:.1e} px, at most {:.4} % of values more than 1 apart",
+        gpu.adapter(),
+        gpu.pipelines.variant(),
+        100.0 * worst_share
+    );
+}
+
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn images_agree_with_the_processor() {
+    for gpu in both_variants() {
+        compare(&gpu, &sensor(320, 240, lights()), &gel(&PYRAMID), 0.0);
+    }
+}
+
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn odd_sizes_and_other_pyramids_agree_with_the_processor() {
+    for gpu in both_variants() {
+        compare(&gpu, &sensor(131, 97, lights()), &gel(&[101, 31, 7, 3]), 0.0);
+    }
+}
+
+/// Turned by half a degree: the axes of the image are bounds of bins of direction, and there the last bit of a height
+/// decides on which side a slope lies (0.08 % of the values of the upright gear; its colours jump by 3 grey levels).
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn colours_of_a_taxim_table_agree_with_the_processor() {
+    for gpu in both_variants() {
+        let table = ColourModel::Taxim(Box::new(taxim_table(320, 240)));
+        compare(&gpu, &sensor(320, 240, table), &gel(&PYRAMID), 0.01);
+    }
+}
+
+/// Without contact the image is the rest frame, with the same noise to the bit.
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn a_gel_at_rest_gives_the_same_bytes() {
+    for gpu in both_variants() {
+        for colour in [lights(), ColourModel::Taxim(Box::new(taxim_table(67, 45)))] {
+            let sensor = sensor(67, 45, colour);
+            let mut there = gpu.sensor(&sensor, &gel(&[11, 5])).unwrap();
+            let keys = [None, Some(0), Some(7), Some(u64::MAX), Some(99 << 32 | 17)];
+            let requests = keys.map(|noise_key| GpuRequest { press: None, noise_key });
+            for (key, image) in keys.into_iter().zip(gpu.images(&mut there, &requests).unwrap()) {
+                assert!(image.unwrap() == finish(&sensor, None, key), "noise {key:?}");
+            }
+        }
+    }
+}
+
+/// More images than the ring holds, of meshes in any order, each in its place.
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn images_come_back_in_the_order_of_the_requests() {
+    let gpu = renderer();
+    let sensor = sensor(64, 48, lights());
+    let mut there = gpu.sensor(&sensor, &gel(&[11, 5])).unwrap();
+    let (meshes, cases) = cases(0.0);
+    let on_device: Vec<GpuMesh> = meshes.iter().map(|m| gpu.mesh(m).unwrap()).collect();
+    let single = requests(&cases, &on_device, None);
+    let alone: Vec<_> = single.iter().map(|r| gpu.images(&mut there, &[*r]).unwrap().remove(0)).collect();
+    let n = 5 * there.batch() + 3;
+    let place = |i: usize| (i * 7 + i / 5) % cases.len();
+    let many: Vec<_> = (0..n).map(|i| single[place(i)]).collect();
+    let together = gpu.images(&mut there, &many).unwrap();
+    for (i, image) in together.iter().enumerate() {
+        assert!(*image == alone[place(i)], "image {i}");
+    }
+}
+
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn presses_that_cannot_be_are_the_same_errors() {
+    let gpu = renderer();
+    let (sensor, gel) = (sensor(160, 120, lights()), gel(&[21, 5]));
+    let cpu = Renderer { sensor: &sensor, gel: &gel, level: SimdLevel::best() };
+    let mesh = SteppedShaft::default().mesh();
+    let there = gpu.mesh(&mesh).unwrap();
+    let mut on_device = gpu.sensor(&sensor, &gel).unwrap();
+    let middle = touching(&mesh, [0.0; 3], 0.0, 0.0);
+    let far = touching(&mesh, [0.0; 3], 0.5, 0.0);
+    for (at, force_n) in [(middle, 1e6), (far, 10.0)] {
+        let imprint_m3_per_n = 1e-9;
+        let press = GpuPress { mesh: &there, gel_from_mesh: at, imprint_m3_per_n, force_n };
+        let request = GpuRequest { press: Some(press), noise_key: None };
+        let theirs = gpu.images(&mut on_device, &[request]).unwrap().remove(0).unwrap_err();
+        let ours = cpu.press(&ClusteredMesh::new(&mesh), &at, imprint_m3_per_n, force_n).unwrap_err();
+        assert_eq!(theirs.to_string(), ours.to_string());
+    }
+}
+
+#[test]
+fn a_missing_adapter_is_one_clear_line() {
+    let Err(error) = GpuRenderer::new(&AdapterChoice::Named("no such adapter".into())) else {
+        panic!("there is none")
+    };
+    let text = error.to_string();
+    assert!(text.starts_with("no adapter is called `no such adapter`; found "), "{text}");
+    assert!(!text.contains('\n') && error.hint().contains("backend = \"cpu\""));
+}
+
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn domed_gels_agree_with_the_processor() {
+    for colour in [lights(), ColourModel::Taxim(Box::new(taxim_table(200, 150)))] {
+        let mut domed = sensor(200, 150, colour);
+        domed.gel_shape = GelShape::Dome { sag_m: 1e-3 };
+        for gpu in both_variants() {
+            compare(&gpu, &domed, &gel(&[51, 21, 11, 5]), 0.01);
+            let mut there = gpu.sensor(&domed, &gel(&[51, 21, 11, 5])).unwrap();
+            let image = gpu.images(&mut there, &[GpuRequest::default()]).unwrap().remove(0).unwrap();
+            assert!(image == finish(&domed, None, None), "at rest it shows its rest frame");
+        }
+    }
+}
