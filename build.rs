@@ -1,4 +1,5 @@
-//! Tells the tests whether the folder of shared measured data lies beside the checkout. The product never needs it.
+//! Tells the tests whether the folder of shared measured data lies beside the checkout, and whether `cargo xtask test`
+//! found a Vulkan driver. The product needs neither.
 
 use std::path::Path;
 
@@ -8,5 +9,10 @@ fn main() {
     if shared.is_dir() {
         println!("cargo::rustc-cfg=shared_data");
     }
+    println!("cargo::rustc-check-cfg=cfg(vulkan)");
+    if std::env::var_os("GRIPGEN_VULKAN").is_some() {
+        println!("cargo::rustc-cfg=vulkan");
+    }
+    println!("cargo::rerun-if-env-changed=GRIPGEN_VULKAN");
     println!("cargo::rerun-if-changed=build.rs");
 }

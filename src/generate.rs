@@ -1,12 +1,14 @@
 //! One sample: from a scenario to images, trace and label.
 
+use crate::gpu::Gpu;
 use crate::gripped::{Contact, Gripped, grip_point};
 use crate::hold::hold;
 use crate::library::{Library, LibraryError};
 use crate::project::Project;
 use gripgen_physics::{GripError, PullError, Signals, Until, pull_staircase, staircase_of};
+use gripgen_tactile::gpu::GpuError;
 use gripgen_tactile::{Imprint, IndentError, Sensor, SimdLevel};
-use gripgen_twin::config::{ConfigError, ImageStorage, Mechanics, TraceStorage};
+use gripgen_twin::config::{Backend, ConfigError, ImageStorage, Mechanics, TraceStorage};
 use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
@@ -58,6 +60,9 @@ pub enum SampleError {
         /// What is wrong.
         source: IndentError,
     },
+    /// The graphics processor.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
     /// The friction law.
     #[error(transparent)]
     Friction(#[from] FrictionError),
@@ -86,6 +91,8 @@ pub struct SimulateOptions {
     pub images: bool,
     /// Whether the trace is wanted; without it the pull ends as soon as its label is decided, which leaves the label.
     pub trace: bool,
+    /// Where images are made.
+    pub backend: Backend,
     /// The vector unit of the image pipeline; the result does not depend on it.
     pub level: SimdLevel,
 }
@@ -98,6 +105,7 @@ impl SimulateOptions {
             mechanics: sweep.mechanics,
             images: sweep.images != ImageStorage::None,
             trace: sweep.trace == TraceStorage::Full,
+            backend: sweep.backend,
             level,
         }
     }
@@ -135,17 +143,19 @@ fn try_generate(
         1 => Arc::new(grip()?),
         _ => project.grips.get((known.group, options), grip)?,
     };
-    pull(&twin, known, &gripped, options)
+    let gpu = if options.images { project.gpu()? } else { None };
+    pull(&twin, known, &gripped, options, gpu)
 }
 
-/// Simulates one scenario on a twin.
+/// Simulates one scenario on a twin. `gpu` makes the images where `options` say so.
 pub fn simulate(
     twin: &Twin,
     library: &Library,
     scenario: &Scenario,
     options: SimulateOptions,
+    gpu: Option<&Gpu>,
 ) -> Result<Outcome, SampleError> {
-    pull(twin, scenario, &Gripped::new(twin, library, scenario, options)?, options)
+    pull(twin, scenario, &Gripped::new(twin, library, scenario, options)?, options, gpu)
 }
 
 /// The second half of a sample: friction of this repetition, pull, label, image noise.
@@ -154,8 +164,9 @@ fn pull(
     scenario: &Scenario,
     gripped: &Gripped,
     options: SimulateOptions,
+    gpu: Option<&Gpu>,
 ) -> Result<Outcome, SampleError> {
-    let images = options.images.then(|| gripped.images(twin, scenario));
+    let images = if options.images { Some(gripped.images(twin, scenario, gpu)?) } else { None };
     let Some(Contact { held, imprint, force_n, .. }) = &gripped.contact else {
         return Ok(Outcome::NoContact { images });
     };
@@ -202,7 +213,13 @@ pub fn press_only(
     scenario: &Scenario,
     mechanics: Mechanics,
 ) -> Result<Option<Press>, SampleError> {
-    let options = SimulateOptions { mechanics, images: false, trace: false, level: SimdLevel::best() };
+    let options = SimulateOptions {
+        mechanics,
+        images: false,
+        trace: false,
+        backend: Backend::Cpu,
+        level: SimdLevel::best(),
+    };
     let Gripped { sensors, contact, .. } = Gripped::new(twin, library, scenario, options)?;
     Ok(contact.map(|c| Press { imprint: c.imprint, sensors }))
 }

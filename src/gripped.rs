@@ -3,10 +3,11 @@
 //! Repetitions of a configuration share it; scatter, noise and the pull itself are drawn anew for each.
 
 use crate::generate::{SampleError, SimulateOptions};
+use crate::gpu::{Gpu, ImageFault, ImageJob, PlacedPart};
 use crate::library::Library;
 use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip};
 use gripgen_tactile::{Imprint, Plane, Renderer, Sensor};
-use gripgen_twin::config::{ImageNoise, Mechanics};
+use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
 use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};
@@ -22,8 +23,16 @@ pub(crate) struct Gripped {
     pub(crate) sensors: PerJaw<Arc<Sensor>>,
     /// `None` if the jaws miss the part.
     pub(crate) contact: Option<Contact>,
-    /// What differs from the sensor's rest frame in the images, if anything does and there are images.
-    change: Option<PerJaw<[Plane; 3]>>,
+    /// What the images are made of, if anything differs from the rest frame and there are images.
+    look: Option<Look>,
+}
+
+/// What the cameras see without noise.
+enum Look {
+    /// The change of the image.
+    Change(PerJaw<[Plane; 3]>),
+    /// The parts in front of the gels: the graphics processor makes the image when its noise is known.
+    Parts(PerJaw<PlacedPart>),
 }
 
 /// Jaws that hold a part.
@@ -69,36 +78,79 @@ impl Gripped {
         let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, arm, &shape))?
         else {
             let differs = options.images && Jaw::BOTH.iter().any(|&jaw| optics[jaw].changes_frame());
-            let change = differs.then(|| renderers.map(|jaw, r| r.change_seen(None, &optics[jaw])));
-            return Ok(Self { sensors, contact: None, change });
+            let look =
+                differs.then(|| Look::Change(renderers.map(|jaw, r| r.change_seen(None, &optics[jaw]))));
+            return Ok(Self { sensors, contact: None, look });
         };
-        let press = |optics| press(twin, library, scenario, &force_n, &held.grasp, &renderers, optics);
+        let parts = placed_parts(twin, library, scenario, &force_n, &held.grasp)?;
+        let mesh = library.clustered_mesh(part)?;
+        let press = |optics: Option<&PerJaw<OpticsState>>| {
+            PerJaw::try_from_fn(|jaw| {
+                let PlacedPart { gel_from_mesh, imprint_m3_per_n, force_n, .. } = &parts[jaw];
+                let (renderer, c) = (&renderers[jaw], *imprint_m3_per_n);
+                let pressed = match optics {
+                    None => renderer.press(&mesh, gel_from_mesh, c, *force_n),
+                    Some(o) => renderer.press_seen(&mesh, gel_from_mesh, c, *force_n, &o[jaw]),
+                };
+                pressed.map_err(|source| SampleError::Indent { jaw, source })
+            })
+        };
         let imprint = press(None)?;
-        let mut change = None;
-        if options.images {
+        let look = if !options.images {
+            None
+        } else if options.backend == Backend::Gpu && Jaw::BOTH.iter().all(|&jaw| optics[jaw].is_neutral()) {
+            Some(Look::Parts(parts))
+        } else {
             // Optics effects are seen and not felt: where they change the imprint, the image has its own.
             let apart = Jaw::BOTH.iter().any(|&jaw| optics[jaw].changes_press());
             let seen = apart.then(|| press(Some(&optics))).transpose()?;
             let seen = seen.as_ref().unwrap_or(&imprint);
-            change = Some(renderers.map(|jaw, r| r.change_seen(Some(&seen[jaw]), &optics[jaw])));
-        }
-        Ok(Self { sensors, contact: Some(Contact { held, imprint, force_n }), change })
+            Some(Look::Change(renderers.map(|jaw, r| r.change_seen(Some(&seen[jaw]), &optics[jaw]))))
+        };
+        Ok(Self { sensors, contact: Some(Contact { held, imprint, force_n }), look })
     }
 
     /// The images of one repetition.
-    pub(crate) fn images(&self, twin: &Twin, scenario: &Scenario) -> PerJaw<TactileImage> {
-        PerJaw::from_fn(|jaw| {
+    pub(crate) fn images(
+        &self,
+        twin: &Twin,
+        scenario: &Scenario,
+        gpu: Option<&Gpu>,
+    ) -> Result<PerJaw<TactileImage>, SampleError> {
+        let key = |jaw: Jaw| {
             let purpose = match jaw {
                 Jaw::Left => Purpose::ImageNoiseLeft,
                 Jaw::Right => Purpose::ImageNoiseRight,
             };
-            let key = match twin.optics[jaw].image_noise {
+            match twin.optics[jaw].image_noise {
                 ImageNoise::Off => None,
                 ImageNoise::Measured => Some(Stream::new(scenario.seed, scenario.index, purpose).bits()),
+            }
+        };
+        let look = self.look.as_ref();
+        if let (Some(Look::Parts(parts)), Some(gpu)) = (look, gpu) {
+            let job = |jaw: Jaw| ImageJob {
+                sensor: self.sensors[jaw].clone(),
+                gel: twin.gel[jaw].clone(),
+                part: parts[jaw].clone(),
+                noise_key: key(jaw),
             };
-            let change = self.change.as_ref().map(|both| &both[jaw]);
-            gripgen_tactile::finish(&self.sensors[jaw], change, key)
-        })
+            let [left, right] = gpu.images(Jaw::BOTH.map(job));
+            let checked = |jaw, image: Result<TactileImage, ImageFault>| {
+                image.map_err(|fault| match fault {
+                    ImageFault::Device(e) => SampleError::Gpu(e),
+                    ImageFault::Indent(source) => SampleError::Indent { jaw, source },
+                })
+            };
+            return Ok(PerJaw { left: checked(Jaw::Left, left)?, right: checked(Jaw::Right, right)? });
+        }
+        Ok(PerJaw::from_fn(|jaw| {
+            let change = match look {
+                Some(Look::Change(both)) => Some(&both[jaw]),
+                _ => None,
+            };
+            gripgen_tactile::finish(&self.sensors[jaw], change, key(jaw))
+        }))
     }
 }
 
@@ -157,18 +209,17 @@ pub(crate) fn grip_point(scenario: &Scenario, jaw: Jaw, contact_area_m2: f64) ->
     }
 }
 
-fn press(
+/// The part in front of each gel, and how hard it is pressed.
+fn placed_parts(
     twin: &Twin,
     library: &Library,
     scenario: &Scenario,
     force_n: &PerJaw<f64>,
     grasp: &Grasp,
-    renderers: &PerJaw<Renderer<'_>>,
-    optics: Option<&PerJaw<OpticsState>>,
-) -> Result<PerJaw<Imprint>, SampleError> {
+) -> Result<PerJaw<PlacedPart>, SampleError> {
     let part = &twin.parts[&scenario.part];
-    let mesh = library.clustered_mesh(part)?;
-    PerJaw::try_from_fn(|jaw| {
+    let mesh = library.mesh(part)?;
+    Ok(PerJaw::from_fn(|jaw| {
         let mut gel_from_mesh = grasp.gel_from_part[jaw] * part.grips[scenario.grip_pose];
         let tilt_rad = jaw_tilt_rad(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
         if tilt_rad != 0.0 {
@@ -178,11 +229,6 @@ fn press(
         let volume_m3 = imprint_volume_m3(twin, &scenario.part, part, force_n[jaw]);
         let unchanged = volume_m3 == part.imprint_m3_per_n * force_n[jaw];
         let imprint_m3_per_n = if unchanged { part.imprint_m3_per_n } else { volume_m3 / force_n[jaw] };
-        let renderer = &renderers[jaw];
-        match optics {
-            None => renderer.press(&mesh, &gel_from_mesh, imprint_m3_per_n, force_n[jaw]),
-            Some(o) => renderer.press_seen(&mesh, &gel_from_mesh, imprint_m3_per_n, force_n[jaw], &o[jaw]),
-        }
-        .map_err(|source| SampleError::Indent { jaw, source })
-    })
+        PlacedPart { mesh: mesh.clone(), gel_from_mesh, imprint_m3_per_n, force_n: force_n[jaw] }
+    }))
 }

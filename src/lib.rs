@@ -41,8 +41,10 @@
 //! A sample depends on (version, resolved configuration, seed, index) and on nothing else.
 
 pub mod assets;
+mod bench;
 mod cache;
 mod generate;
+mod gpu;
 mod gripped;
 mod hold;
 mod init;
@@ -58,7 +60,9 @@ mod resolve;
 mod schema;
 mod sweep;
 
+pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use generate::{Press, SampleError, SimulateOptions, generate, press_only, simulate};
+pub use gpu::Gpu;
 pub use gripgen_physics as physics;
 pub use gripgen_record as record;
 pub use gripgen_tactile as tactile;

@@ -1,9 +1,9 @@
 //! What a sweep will be: size, time, and whether its first samples work.
 
 use crate::project::Project;
-use crate::sweep::{encode_options, guarded};
+use crate::sweep::{SweepError, encode_options, guarded};
+use gripgen_record::encode;
 use gripgen_record::proto::gripgen_v1::Status;
-use gripgen_record::{PictureError, encode};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::Outcome;
 use std::time::{Duration, Instant};
@@ -40,7 +40,8 @@ pub struct Probe {
 }
 
 /// Tries out a few samples spread over the sweep and extrapolates. Writes nothing.
-pub fn plan(project: &Project, simd: SimdLevel) -> Result<Plan, PictureError> {
+pub fn plan(project: &Project, simd: SimdLevel) -> Result<Plan, SweepError> {
+    project.prepare_gpu()?;
     let samples = project.sweep.samples;
     let probes = PROBES.min(samples);
     let (mut bytes, mut tried) = (0, Vec::new());

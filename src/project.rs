@@ -3,15 +3,18 @@
 use crate::assets;
 use crate::cache::Cache;
 use crate::generate::SimulateOptions;
+use crate::gpu::Gpu;
 use crate::gripped::{Gripped, check_damping};
 use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
 use crate::resolve::{Files, Named, Resolved, config_hash, resolve};
 use crate::sweep::VERSION;
 use gripgen_record::{RunFolder, sha256_hex};
-use gripgen_twin::config::{Backend, ConfigError, Document, SweepFile};
+use gripgen_tactile::gpu::GpuError;
+use gripgen_twin::config::{Backend, ConfigError, Document, ImageStorage, SweepFile};
 use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, RobotArm, Sweep, Twin, is_twin_key};
 use std::borrow::Cow;
+use std::sync::OnceLock;
 
 /// The twin whose sections stand in for what a twin leaves out, and the default of `--twin`.
 pub const BASELINE_TWIN: &str = "asset:configs/twin-baseline.toml";
@@ -33,6 +36,8 @@ pub struct Project {
     pub library: Library,
     /// Grips that repetitions share.
     pub(crate) grips: Cache<(u64, SimulateOptions), Gripped>,
+    /// The graphics processor of `backend = "gpu"`, opened when it is first needed.
+    gpu: OnceLock<Result<Gpu, GpuError>>,
     /// The configuration as it was resolved: sweep and twin with all defaults and overrides.
     pub config_toml: String,
     /// SHA-256 of everything a sample is a function of, beside gripgen's version.
@@ -96,7 +101,6 @@ impl Project {
             other => other,
         })?;
         let sweep = Sweep::new(&file, &twin_document).map_err(|e| document.located(e))?;
-        check_available(&sweep).map_err(|e| document.located(e))?;
         let locate = |path: &str| twin_location.beside(path);
         let Resolved { config_toml, files, named } = resolve(&sweep, &twin_document, &document, locate)?;
         let project = Self::from_resolved(location.run_name(), config_toml, files)?;
@@ -135,6 +139,28 @@ impl Project {
         Ok(project)
     }
 
+    /// The graphics processor that makes the images; `None` if the processor does.
+    pub fn gpu(&self) -> Result<Option<&Gpu>, GpuError> {
+        if self.sweep.backend == Backend::Cpu || self.sweep.images == ImageStorage::None {
+            return Ok(None);
+        }
+        let opened = self.gpu.get_or_init(|| Gpu::open(self.sweep.gpu_adapter.as_deref()));
+        opened.as_ref().map(Some).map_err(Clone::clone)
+    }
+
+    /// Opens the graphics processor, if images are made there, and puts both sensors on it: what cannot be done shows
+    /// before anything is written.
+    pub(crate) fn prepare_gpu(&self) -> Result<Option<&Gpu>, GpuError> {
+        let Some(gpu) = self.gpu()? else { return Ok(None) };
+        for jaw in Jaw::BOTH {
+            // A sensor that cannot be read fails its samples, with its own reason.
+            if let Ok(sensor) = self.library.sensor(&self.twin.optics[jaw]) {
+                gpu.prepare(&sensor, &self.twin.gel[jaw])?;
+            }
+        }
+        Ok(Some(gpu))
+    }
+
     /// The twin of sample `index`.
     pub fn twin_of(&self, index: u64) -> Result<Cow<'_, Twin>, ConfigError> {
         if !self.sweep.varies_twin() {
@@ -154,13 +180,13 @@ impl Project {
         let (document, twin_document) = (part("sweep")?, part("twin")?);
         let file: SweepFile = document.read()?;
         let sweep = Sweep::new(&file, &twin_document).map_err(|e| document.located(e))?;
-        check_available(&sweep)?;
         let twin = Twin::new(&twin_document.read_twin()?).map_err(|e| twin_document.located(e))?;
         let config_sha256 = config_hash(&config_toml, &files);
         let twin_table = twin_document.table().clone();
         let library = Library::new(files);
         let grips = Cache::new(GRIPS);
-        Ok(Self { name, sweep, twin, twin_table, library, grips, config_toml, config_sha256 })
+        let gpu = OnceLock::new();
+        Ok(Self { name, sweep, twin, twin_table, library, grips, gpu, config_toml, config_sha256 })
     }
 
     /// Builds the arm in every stance that its varied keys can draw, and checks the force loop against its mass.
@@ -231,14 +257,4 @@ impl Project {
             _ => Ok(()),
         }
     }
-}
-
-/// What the format allows and this version cannot do yet.
-fn check_available(sweep: &Sweep) -> Result<(), ConfigError> {
-    if sweep.backend == Backend::Gpu {
-        return Err(
-            ConfigError::new("backend", "`gpu` is not part of this version").hint("use backend = \"cpu\"")
-        );
-    }
-    Ok(())
 }

@@ -12,6 +12,7 @@ use gripgen_record::{
     FolderError, PictureError, RUN_SCHEMA, RunFolder, RunInfo, ShardError, Sidecar, extra_columns,
 };
 use gripgen_tactile::SimdLevel;
+use gripgen_tactile::gpu::{GpuAdapter, GpuError};
 use gripgen_twin::{Outcome, Sample};
 use pipeline::Run;
 pub(crate) use shards::encode_options;
@@ -68,6 +69,13 @@ pub enum SweepEvent {
         /// Samples of it that failed.
         failed: u64,
     },
+    /// The images are made by a graphics processor.
+    Gpu {
+        /// Which.
+        adapter: GpuAdapter,
+        /// The adapter that made what is there already, where it was another one.
+        another: Option<String>,
+    },
     /// Another process is writing the shards of this run that are left; said once, and again when their number
     /// changes.
     Waiting {
@@ -114,6 +122,9 @@ pub enum SweepError {
     /// An image.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// The graphics processor.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
     /// The slice does not exist.
     #[error("there is no slice {index} of {count}; slices are counted from 0 (or from 1) up to {count}")]
     Slice {
@@ -139,6 +150,7 @@ pub fn run_info(project: &Project) -> RunInfo {
         extra_columns: extra_columns(sweep.vary.iter().map(|v| v.key.as_str())),
         files_sha256: project.library.files_sha256(),
         config_toml: project.config_toml.clone(),
+        gpu_adapter: project.gpu().ok().flatten().map(|gpu| gpu.adapter().to_string()),
     }
 }
 
@@ -151,8 +163,14 @@ pub fn sweep(
     mut on_event: impl FnMut(SweepEvent),
 ) -> Result<SweepSummary, SweepError> {
     let shards = shards_of_slice(project.sweep.shards(), options.slice)?;
+    let gpu = project.prepare_gpu()?;
     let folder = RunFolder::create(out, run_info(project), &project.library.disk_files())
         .map_err(|e| explain_refusal(project, e))?;
+    if let Some(gpu) = gpu {
+        let (adapter, there) = (gpu.adapter().clone(), folder.info().gpu_adapter.clone());
+        let another = there.filter(|there| *there != adapter.to_string());
+        on_event(SweepEvent::Gpu { adapter, another });
+    }
     let mut summary = SweepSummary::default();
     let mut todo = VecDeque::new();
     let mut samples = 0;

@@ -12,6 +12,8 @@ mod determinism;
 mod effects;
 // The elastic gel, also beside the pyramid on real presses.
 mod elastic;
+// Images by a graphics processor are those of the processor, within the tolerance.
+mod gpu;
 // What the large set can teach.
 mod large;
 // Two mechanics, one result.

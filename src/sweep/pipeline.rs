@@ -5,9 +5,7 @@ use super::{
     SweepError, SweepEvent, SweepOptions, SweepSummary, count, encode_options, guarded, samples_of_shard,
 };
 use crate::project::Project;
-use gripgen_record::{
-    EncodedSample, FolderError, PartialShard, PictureError, RunFolder, ShardStart, Sidecar, encode,
-};
+use gripgen_record::{EncodedSample, FolderError, PartialShard, RunFolder, ShardStart, Sidecar, encode};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -41,7 +39,7 @@ struct Queue {
 }
 
 /// A finished sample and its place in the writer's order.
-type Done = (u64, u64, Result<EncodedSample, PictureError>);
+type Done = (u64, u64, Result<EncodedSample, SweepError>);
 
 impl Run<'_> {
     /// Makes `shards` and returns those that another process was writing.
@@ -122,9 +120,14 @@ impl Run<'_> {
         Some((queue.next_place - 1, index))
     }
 
-    fn make_sample(&self, index: u64) -> Result<EncodedSample, PictureError> {
+    fn make_sample(&self, index: u64) -> Result<EncodedSample, SweepError> {
         let options = encode_options(self.project, index);
-        encode(&guarded(self.project, index, self.options.simd), &options)
+        let sample = guarded(self.project, index, self.options.simd);
+        // A device that is lost is no fault of the sample: the run stops and can be continued.
+        if let Some(fault) = self.project.gpu()?.and_then(|gpu| gpu.fault()) {
+            return Err(fault.into());
+        }
+        Ok(encode(&sample, &options)?)
     }
 
     /// The writer: puts samples into shards in order.
@@ -143,7 +146,7 @@ impl Run<'_> {
         loop {
             while let Some((index, encoded)) = waiting.remove(&place) {
                 place += 1;
-                let encoded: Result<EncodedSample, PictureError> = encoded;
+                let encoded: Result<EncodedSample, SweepError> = encoded;
                 let shard = match open.take() {
                     Some(shard) => shard,
                     None => {

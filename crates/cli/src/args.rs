@@ -1,6 +1,7 @@
 //! What was typed.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use gripgen::twin::config::Backend;
 use std::path::PathBuf;
 
 /// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.
@@ -34,6 +35,8 @@ pub enum Command {
     Calibrate(CalibrateCommand),
     /// Say how far a sensor file is from measurements.
     Compare(CompareArgs),
+    /// Measure how many tactile images a second this machine makes.
+    Bench(BenchArgs),
     /// Print the JSON Schema of a configuration file.
     Schema(SchemaArgs),
     /// Print shell completions.
@@ -252,6 +255,41 @@ pub struct CompareArgs {
     pub talk: TalkArgs,
 }
 
+/// Where tactile images are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BackendKind {
+    /// The processor.
+    Cpu,
+    /// A graphics processor.
+    Gpu,
+}
+
+impl From<BackendKind> for Backend {
+    fn from(kind: BackendKind) -> Self {
+        match kind {
+            BackendKind::Cpu => Backend::Cpu,
+            BackendKind::Gpu => Backend::Gpu,
+        }
+    }
+}
+
+/// `gripgen bench`
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Where images are made.
+    #[arg(long, value_name = "cpu|gpu", default_value = "cpu")]
+    pub backend: BackendKind,
+    /// Part of the name of the graphics adapter; the first graphics processor where it is left out.
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+    /// Shortest time of each measurement.
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
+    pub seconds: f64,
+    /// JSON: the adapter and the rates.
+    #[command(flatten)]
+    pub json: JsonArgs,
+}
+
 /// Which configuration file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SchemaKind {
@@ -288,6 +326,13 @@ fn scale(text: &str) -> Result<f64, String> {
         Ok(mm) if mm.is_finite() && mm > 0.0 => Ok(mm),
         Ok(mm) => Err(format!("{mm} mm is no scale, it must be more than 0")),
         Err(_) => Err("a number of millimetres is needed, for example 25.4".into()),
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if (0.01..=3600.0).contains(&s) => Ok(s),
+        _ => Err("a number of seconds from 0.01 to 3600 is needed".into()),
     }
 }
 

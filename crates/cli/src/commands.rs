@@ -1,5 +1,6 @@
 //! One file a verb.
 
+pub mod bench;
 pub mod calibrate_presses;
 pub mod check;
 pub mod compare;

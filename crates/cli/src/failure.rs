@@ -3,7 +3,7 @@
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use gripgen::record::{ExportError, FolderError, ReadError};
 use gripgen::twin::config::{ConfigError, Place};
-use gripgen::{LoadError, SweepError};
+use gripgen::{BenchError, LoadError, SweepError};
 use std::fmt::Display;
 
 /// Exit codes.
@@ -120,6 +120,17 @@ impl From<SweepError> for Failure {
             SweepError::Folder(e) => e.into(),
             SweepError::AnotherConfig { .. } => another_run(&e),
             SweepError::Slice { .. } => Failure::usage(e),
+            SweepError::Gpu(e) => Failure::new(&e).hint(e.hint()),
+            other => Failure::new(other),
+        }
+    }
+}
+
+impl From<BenchError> for Failure {
+    fn from(e: BenchError) -> Self {
+        match e {
+            BenchError::Gpu(e) => Failure::new(&e).hint(e.hint()),
+            BenchError::Load(e) => e.into(),
             other => Failure::new(other),
         }
     }

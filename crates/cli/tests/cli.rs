@@ -458,3 +458,40 @@ fn a_reader_that_hangs_up_is_no_failure() {
     assert_code(&output, 0);
     assert!(output.stderr.is_empty(), "{}", text(&output.stderr));
 }
+
+/// Without the adapter that is named there is one line, a hint, and no output.
+#[test]
+fn a_missing_graphics_adapter_is_one_clear_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let missing = ["--set", "backend=gpu", "--set", "gpu_adapter=no such adapter"];
+    let sweep = run(&sweep_args(out.to_str().unwrap(), &missing));
+    let bench = run(&["bench", "--backend", "gpu", "--adapter", "no such adapter"]);
+    for output in [sweep, bench] {
+        assert_code(&output, 1);
+        let said = text(&output.stderr);
+        assert!(said.contains("no adapter is called `no such adapter`; found "), "{said}");
+        assert!(said.contains("hint: use backend = \"cpu\""), "{said}");
+        assert!(output.stdout.is_empty());
+    }
+    assert!(!out.exists());
+    assert_code(&run(&["bench", "--adapter", "llvmpipe"]), 2);
+}
+
+#[test]
+fn a_benchmark_says_what_it_measured() {
+    let output = run(&["bench", "--seconds", "0.05", "--json"]);
+    assert_code(&output, 0);
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(
+        (report["schema"].as_str(), report["backend"].as_str()),
+        (Some("gripgen.bench/1"), Some("cpu"))
+    );
+    assert!(report["adapter"].is_null() && report["triangles"].as_u64().unwrap() > 45_000);
+    let rate = &report["rates"][0];
+    let (images, seconds) = (rate["images"].as_f64().unwrap(), rate["seconds"].as_f64().unwrap());
+    assert!(
+        images >= 1.0
+            && (rate["images_per_s"].as_f64().unwrap() - images / seconds).abs() < 1e-6 * images / seconds
+    );
+}

@@ -35,6 +35,8 @@ pub struct Sweep {
     pub mechanics: Mechanics,
     /// Where images are computed.
     pub backend: Backend,
+    /// Part of the name of the graphics adapter; the first graphics processor where there is none.
+    pub gpu_adapter: Option<String>,
     /// How images are stored.
     pub images: ImageStorage,
     /// Whether traces are stored.
@@ -91,6 +93,7 @@ impl Sweep {
             seed: self.seed,
             mechanics: self.mechanics,
             backend: self.backend,
+            gpu_adapter: self.gpu_adapter.clone(),
             images: self.images,
             trace: self.trace,
             shard_samples: self.shard_samples,

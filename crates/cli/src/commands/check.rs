@@ -22,7 +22,7 @@ pub fn check(
 ) -> Result<u8, Failure> {
     let project = Project::load(&Location::parse(&config.config), &config.set)?;
     let mut sink = JsonSink::open(json)?;
-    let plan = plan(&project, SimdLevel::best()).map_err(Failure::new)?;
+    let plan = plan(&project, SimdLevel::best())?;
     let jobs = jobs.unwrap_or_else(cores).max(1);
     let failed: Vec<_> = plan.probes.iter().filter(|p| p.failure.is_some()).collect();
     if sink.wanted() {

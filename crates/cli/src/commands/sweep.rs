@@ -105,6 +105,16 @@ impl<'a> Watch<'a> {
                 self.bytes += bytes;
                 self.line(&json!({"event": "shard", "shard": shard, "bytes": bytes, "failed": failed}));
             }
+            SweepEvent::Gpu { adapter, another } => {
+                self.line(&json!({"event": "gpu", "adapter": adapter.to_string()}));
+                self.say(&format!("images by {adapter}"));
+                if let Some(another) = another {
+                    self.say(&format!(
+                        "warning: what is there was made by {another}; images are equal within the tolerance of the \
+                         gpu backend, not to the bit"
+                    ));
+                }
+            }
             SweepEvent::Waiting { shards } => {
                 self.line(&json!({"event": "waiting", "shards": shards}));
                 self.say(&format!("waiting for {shards} shards that another process is writing"));

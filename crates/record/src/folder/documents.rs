@@ -37,6 +37,9 @@ pub struct RunInfo {
     pub files_sha256: std::collections::BTreeMap<String, String>,
     /// The resolved configuration.
     pub config_toml: String,
+    /// The adapter that made the images, where it was not the processor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gpu_adapter: Option<String>,
 }
 
 /// The file beside a finished shard.

@@ -29,6 +29,10 @@ pub struct SweepFile {
     /// Where images are made.
     #[serde(default)]
     pub backend: Backend,
+    /// Part of the name of the graphics adapter for `backend = "gpu"`; where it is left out, the first graphics
+    /// processor. A software adapter (`llvmpipe`) is taken by name only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gpu_adapter: Option<String>,
     /// How images are stored.
     #[serde(default)]
     pub images: ImageStorage,
@@ -88,7 +92,7 @@ pub enum Backend {
     /// The processor; bitwise reproducible.
     #[default]
     Cpu,
-    /// A GPU through wgpu.
+    /// A graphics processor (Vulkan, Metal or DX12); equal to `cpu` within a tolerance.
     Gpu,
 }
 

@@ -2,7 +2,8 @@
 
 use super::{MAX_SAMPLES, Sweep, is_twin_key, put, read_twin};
 use crate::config::{
-    ConfigError, DesignFile, Document, PullFile, StepFile, SweepFile, in_range, read_vary, suggestion,
+    Backend, ConfigError, DesignFile, Document, PullFile, StepFile, SweepFile, in_range, read_vary,
+    suggestion,
 };
 use crate::draw::{Distribution, Drawn, VariedKey};
 use crate::scenario_keys::{self, KeyError, LISTED_KEYS, PULL_KEYS, SCENARIO_KEYS};
@@ -35,6 +36,10 @@ impl Sweep {
             check_sobol(samples.div_ceil(file.repetitions), vary.len())?;
         }
         check_direction(file.pull.direction, &checked_twin)?;
+        if file.gpu_adapter.is_some() && file.backend != Backend::Gpu {
+            let problem = "an adapter is named, but backend is \"cpu\"";
+            return Err(ConfigError::new("gpu_adapter", problem).hint("backend = \"gpu\" uses it"));
+        }
         let sweep = Self {
             twin: file.twin.clone(),
             samples,
@@ -43,6 +48,7 @@ impl Sweep {
             seed: file.seed,
             mechanics: file.mechanics,
             backend: file.backend,
+            gpu_adapter: file.gpu_adapter.clone(),
             images: file.images,
             trace: file.trace,
             shard_samples: file.shard_samples,
