@@ -9,10 +9,11 @@ use image::{ExtendedColorType, ImageEncoder};
 #[error("image: {0}")]
 pub struct PictureError(String);
 
-/// A PNG of an RGB image. Fast compression: slower settings gain nothing on noisy tactile images.
+/// A PNG of an RGB image. Fast compression and one filter for all rows: slower settings gain nothing on noisy tactile
+/// images, choosing a filter for each row costs a third more time for 4 % of the size.
 pub fn encode_png(image: &TactileImage) -> Result<Vec<u8>, PictureError> {
     let mut bytes = Vec::with_capacity(image.rgb.len() / 2);
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub)
         .write_image(&image.rgb, image.width_px, image.height_px, ExtendedColorType::Rgb8)
         .map_err(|e| PictureError(e.to_string()))?;
     Ok(bytes)
