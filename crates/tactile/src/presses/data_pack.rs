@@ -2,10 +2,10 @@
 //!
 //! | key | shape | what |
 //! |---|---|---|
-//! | `imgs` | (N, H, W, 3) u8 | the presses, blue first |
+//! | `imgs` | (N, H, W, 3), grey levels | the presses, blue first |
 //! | `touch_center` | (N, 2), optional | centre of each contact (x, y) in pixels |
 //! | `touch_radius` | (N,), optional | its radius in pixels |
-//! | `f0` | (H, W, 3) u8, optional | a frame without contact, blue first |
+//! | `f0` | (H, W, 3), grey levels, optional | a frame without contact, blue first |
 //!
 //! Centres and radii may be numbers of any type, NaN or a radius of 0 stand for "not known". `names` is not read:
 //! it is text or a pickle.
@@ -43,13 +43,15 @@ impl PressSet {
     /// Reads the bytes of a `dataPack.npz`. The file says neither what ball was used nor how large a pixel is.
     pub fn from_data_pack(bytes: &[u8], ball_m: f64, metres_per_px: f64) -> Result<Self, DataPackError> {
         let mut npz = Npz::open(bytes)?;
-        let (shape, mut images) = npz.bytes("imgs")?;
+        let (shape, mut images) = pixels(&mut npz, "imgs")?;
         let &[count, height, width, 3] = &shape[..] else {
             let problem = format!("its shape is {shape:?}, it must be (any, any, any, 3)");
             return Err(NpzError::Array { key: "imgs".into(), problem }.into());
         };
         let fits = |key: &'static str, found: &[usize], wanted: &[usize]| {
-            if found == wanted {
+            let [_, columns @ ..] = wanted else { return Ok(()) };
+            // A column of numbers is a list too.
+            if found == wanted || (columns.is_empty() && found == [wanted[0], 1]) {
                 return Ok(());
             }
             Err(DataPackError::Shape { key, found: found.to_vec(), images: vec![count, height, width, 3] })
@@ -65,7 +67,7 @@ impl PressSet {
         let centres = numbers("touch_center", &[count, 2])?;
         let radii = numbers("touch_radius", &[count])?;
         let rest = if npz.has("f0") {
-            let (found, mut values) = npz.bytes("f0")?;
+            let (found, mut values) = pixels(&mut npz, "f0")?;
             fits("f0", &found, &[height, width, 3])?;
             red_first(&mut values);
             Some(TactileImage { width_px: width as u32, height_px: height as u32, rgb: values })
@@ -91,6 +93,22 @@ fn circle(i: usize, centres: Option<&[f64]>, radii: Option<&[f64]>) -> Option<Ci
     let (x_px, y_px) = (centres[2 * i], centres[2 * i + 1]);
     let known = [x_px, y_px, radius_px].iter().all(|v| v.is_finite()) && radius_px > 0.0;
     known.then_some(Circle { x_px, y_px, radius_px })
+}
+
+/// Grey levels of an array: bytes as they stand, other numbers where they are whole and from 0 to 255.
+fn pixels(npz: &mut Npz<'_>, key: &str) -> Result<(Vec<usize>, Vec<u8>), NpzError> {
+    if let Ok(bytes) = npz.bytes(key) {
+        return Ok(bytes);
+    }
+    let array = npz.array(key)?;
+    let level = |&v: &f64| (v.fract() == 0.0 && (0.0..=255.0).contains(&v)).then_some(v as u8);
+    match array.values.iter().map(level).collect() {
+        Some(levels) => Ok((array.shape, levels)),
+        None => {
+            let problem = "it holds numbers that are no grey levels from 0 to 255".into();
+            Err(NpzError::Array { key: key.into(), problem })
+        }
+    }
 }
 
 fn red_first(bgr: &mut [u8]) {
@@ -143,8 +161,9 @@ mod tests {
         assert_eq!(error, "`touch_center` has shape [3, 2], `imgs` has [2, 4, 5, 3]");
         let grey = entry("imgs", &[2, 4, 5], |i| i as f64, ElementType::U8);
         assert!(read(&[grey]).unwrap_err().to_string().contains("(any, any, any, 3)"));
-        let wide = entry("imgs", &[2, 4, 5, 3], |i| i as f64, ElementType::F64);
-        assert!(read(&[wide]).unwrap_err().to_string().contains("`<f8`, they must be `|u1`"));
+        let wide = |scale: f64| entry("imgs", &[2, 4, 5, 3], move |i| scale * i as f64, ElementType::F64);
+        assert_eq!(read(&[wide(1.0)]), read(&[images()]), "whole grey levels may be numbers of any type");
+        assert!(read(&[wide(1.0 / 255.0)]).unwrap_err().to_string().contains("no grey levels from 0 to 255"));
         assert!(read(&[]).unwrap_err().to_string().contains("no array `imgs`"));
     }
 }
