@@ -251,7 +251,8 @@ impl Library {
     pub(crate) fn check_sensor(&self, optics: &Optics, gel: &Gel) -> Result<(), LibraryError> {
         let sensor = self.sensor(optics)?;
         let image_px = sensor.grid.width_px.min(sensor.grid.height_px);
-        match gel.kernels_px.iter().find(|&&k| k as usize / 2 >= image_px) {
+        let kernels_px = sensor.pyramid.as_ref().map_or(&gel.kernels_px, |pyramid| &pyramid.kernels_px);
+        match kernels_px.iter().find(|&&k| k as usize / 2 >= image_px) {
             None => Ok(()),
             Some(&kernel_px) => Err(LibraryError::Kernel { kernel_px, image_px }),
         }

@@ -1,14 +1,18 @@
 //! Press sets from disk: Taxim's `dataPack.npz`, or a folder with a table and images.
 
+use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
 use crate::project::{LoadError, load_twin_document};
-use gripgen_record::{PRESSES_FILE, PressFolder, PressFolderError, decode_picture, read_press_folder};
+use crate::resolve::Files;
+use gripgen_record::{PRESSES_FILE, PressFolder, PressFolderError, read_press_folder};
+use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::{
     Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, Press, PressSet,
 };
-use gripgen_tactile::{Sensor, SensorError};
-use gripgen_twin::Twin;
+use gripgen_twin::config::ImageNoise;
+use gripgen_twin::{Optics, Twin};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Taxim's file inside a folder.
 const DATA_PACK: &str = "dataPack.npz";
@@ -152,44 +156,39 @@ pub enum LoadSensorError {
     /// The twin that names it.
     #[error(transparent)]
     Twin(#[from] LoadError),
-    /// The sensor file.
-    #[error("{location}: {source}")]
-    Sensor {
-        /// The file.
-        location: Location,
-        /// What is wrong.
-        source: SensorError,
-    },
-    /// A background image.
-    #[error("{location}: {problem}")]
-    Picture {
-        /// The file.
-        location: Location,
-        /// What is wrong.
-        problem: String,
-    },
+    /// The sensor file, or one that belongs to it.
+    #[error(transparent)]
+    Sensor(#[from] LibraryError),
 }
 
 /// Reads a sensor file.
-pub fn load_sensor(location: &Location) -> Result<Sensor, LoadSensorError> {
-    Sensor::from_npz(&location.read()?, None, None)
-        .map_err(|source| LoadSensorError::Sensor { location: location.clone(), source })
+pub fn load_sensor(location: &Location) -> Result<Arc<Sensor>, LoadSensorError> {
+    let optics = Optics {
+        sensor: location.to_string(),
+        metres_per_px: None,
+        background: None,
+        gel_map: None,
+        shadow_table: None,
+        image_noise: ImageNoise::Off,
+    };
+    sensor_of(&optics, |_| location.clone())
 }
 
-/// The sensor of a twin's left jaw, with the twin's background and pixel size.
-pub fn load_twin_sensor(twin: &Location) -> Result<Sensor, LoadSensorError> {
+/// The sensor of a twin's left jaw, with what the twin puts beside it.
+pub fn load_twin_sensor(twin: &Location) -> Result<Arc<Sensor>, LoadSensorError> {
     let document = load_twin_document(twin, &[])?;
     let read = document.read_twin().map_err(LoadError::from)?;
     let optics = Twin::new(&read).map_err(|e| LoadError::from(document.located(e)))?.optics.left;
-    let location = twin.beside(&optics.sensor);
-    let background = match &optics.background {
-        None => None,
-        Some(path) => {
-            let location = twin.beside(path);
-            let picture = decode_picture(&location.read()?);
-            Some(picture.map_err(|e| LoadSensorError::Picture { location, problem: e.to_string() })?)
-        }
-    };
-    Sensor::from_npz(&location.read()?, optics.metres_per_px, background.as_ref())
-        .map_err(|source| LoadSensorError::Sensor { location, source })
+    sensor_of(&optics, |path| twin.beside(path))
+}
+
+fn sensor_of(optics: &Optics, locate: impl Fn(&str) -> Location) -> Result<Arc<Sensor>, LoadSensorError> {
+    let mut files = Files::new();
+    let beside = [&optics.background, &optics.gel_map, &optics.shadow_table].into_iter().flatten();
+    for path in std::iter::once(&optics.sensor).chain(beside) {
+        let location = locate(path);
+        let bytes = location.read()?.into_owned();
+        files.insert(path.clone(), (location, bytes));
+    }
+    Ok(Library::new(files).sensor(optics)?)
 }
