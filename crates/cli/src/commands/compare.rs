@@ -7,8 +7,8 @@ use gripgen::tactile::finish;
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{CompareError, PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
-    FoundCircles, LoadPressesError, Location, PressGeometry, PressReportText, find_missing_circles,
-    is_press_set, load_presses, load_sensor, load_twin_sensor, press_report,
+    FoundCircles, LoadPressesError, LoadSensorError, Location, PressGeometry, PressReportText,
+    find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor, press_report,
 };
 use serde_json::{Value, json};
 
@@ -28,8 +28,9 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
         Some(path) => load_sensor(&Location::parse(path)),
         None => load_twin_sensor(&Location::parse(&args.twin)),
     };
-    let sensor = sensor.map_err(|e| {
-        Failure::usage(e).hint("`gripgen calibrate presses` writes a sensor file for --sensor")
+    let sensor = sensor.map_err(|e| match e {
+        LoadSensorError::Twin(e) => Failure::from(e),
+        other => Failure::usage(other).hint("`gripgen calibrate presses` writes a sensor file for --sensor"),
     })?;
     let geometry = PressGeometry { ball_m: sensor.ball_m, metres_per_px: Some(sensor.grid.metres_per_px) };
     let mut set = load_presses(&args.measured, geometry).map_err(|e| match e {
