@@ -4,13 +4,14 @@ use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
 use crate::project::{LoadError, load_twin_document};
 use crate::resolve::Files;
-use gripgen_record::{PRESSES_FILE, PressFolder, PressFolderError, read_press_folder};
-use gripgen_tactile::Sensor;
+use gripgen_record::{PRESSES_FILE, PressFolder, PressFolderError, PressRecord, read_press_folder};
 use gripgen_tactile::presses::{
-    Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, Press, PressSet,
+    Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, Press, PressSet, find_circle,
+    reference_frame,
 };
+use gripgen_tactile::{Pyramid, Sensor};
 use gripgen_twin::config::ImageNoise;
-use gripgen_twin::{Optics, Twin};
+use gripgen_twin::{Optics, TactileImage, Twin};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -49,8 +50,32 @@ pub enum LoadPressesError {
     Geometry {
         /// The folder.
         path: PathBuf,
-        /// What is missing, with the flag.
+        /// What is missing.
         missing: &'static str,
+    },
+    /// Images of several sizes.
+    #[error("{}: `{name}` is {}x{} pixels, the first press {}x{}", .path.display(), .found.0, .found.1, .wanted.0, .wanted.1)]
+    Size {
+        /// The press set.
+        path: PathBuf,
+        /// The press, or the rest frame.
+        name: String,
+        /// Width and height of its image.
+        found: (u32, u32),
+        /// Width and height of the first.
+        wanted: (u32, u32),
+    },
+    /// A ball that sank in by more than its radius.
+    #[error("{}: `{name}` is {depth_mm} mm deep, the ball's radius is {radius_mm} mm", .path.display())]
+    Depth {
+        /// The table.
+        path: PathBuf,
+        /// The press.
+        name: String,
+        /// Its depth.
+        depth_mm: f64,
+        /// Radius of the ball.
+        radius_mm: f64,
     },
     /// A length that cannot be.
     #[error("{what} is {value_mm} mm, it must be from {least_mm} to {most_mm} mm")]
@@ -82,7 +107,9 @@ pub fn is_press_set(path: &Path) -> bool {
 /// Loads a press set. A `dataPack.npz` has Taxim's geometry (4.0 mm, 0.0295 mm per pixel) unless another one is given;
 /// for a folder both have to be.
 pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, LoadPressesError> {
-    let length = |what, value_m: Option<f64>, least_mm: f64, most_mm: f64| match value_m.map(|m| m * 1e3) {
+    let length = |what, value_m: Option<f64>, least_mm: f64, most_mm: f64| match value_m
+        .map(|m| (m * 1e9).round() * 1e-6)
+    {
         Some(value_mm) if !(least_mm..=most_mm).contains(&value_mm) => {
             Err(LoadPressesError::Length { what, value_mm, least_mm, most_mm })
         }
@@ -93,9 +120,9 @@ pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, Lo
     let pack = if path.is_dir() { path.join(DATA_PACK) } else { path.to_path_buf() };
     if path.join(PRESSES_FILE).is_file() {
         let missing = |missing| LoadPressesError::Geometry { path: path.into(), missing };
-        let ball_m = ball_m.ok_or_else(|| missing("how large the ball is (--ball-mm)"))?;
-        let metres_per_px = metres_per_px.ok_or_else(|| missing("how large a pixel is (--mm-per-px)"))?;
-        return Ok(from_folder(read_press_folder(path)?, ball_m, metres_per_px));
+        let ball_m = ball_m.ok_or_else(|| missing("how large the ball is"))?;
+        let metres_per_px = metres_per_px.ok_or_else(|| missing("how large a pixel is"))?;
+        return one_size(path, from_folder(path, read_press_folder(path)?, ball_m, metres_per_px)?);
     }
     if !pack.is_file() {
         return Err(LoadPressesError::Unknown { path: path.into() });
@@ -103,23 +130,78 @@ pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, Lo
     let bytes = Location::Disk(pack.clone()).read()?;
     let ball_m = ball_m.unwrap_or(DATA_PACK_BALL_M);
     let metres_per_px = metres_per_px.unwrap_or(DATA_PACK_METRES_PER_PX);
-    PressSet::from_data_pack(&bytes, ball_m, metres_per_px)
-        .map_err(|source| LoadPressesError::DataPack { path: pack, source })
+    let set = PressSet::from_data_pack(&bytes, ball_m, metres_per_px);
+    one_size(path, set.map_err(|source| LoadPressesError::DataPack { path: pack, source })?)
 }
 
-fn from_folder(folder: PressFolder, ball_m: f64, metres_per_px: f64) -> PressSet {
-    let press = |record: gripgen_record::PressRecord| {
-        let depth = |d| Circle::radius_px_at_depth(ball_m, d, metres_per_px);
-        let radius_px = record.radius_px.or(record.depth_m.map(depth));
-        let circle =
-            record.centre_px.zip(radius_px).map(|((x_px, y_px), radius_px)| Circle { x_px, y_px, radius_px });
-        Press { name: record.name, image: record.image, circle }
+/// All images have one size.
+fn one_size(path: &Path, set: PressSet) -> Result<PressSet, LoadPressesError> {
+    let size = |image: &TactileImage| (image.width_px, image.height_px);
+    let Some(wanted) = set.presses.first().map(|first| size(&first.image)) else { return Ok(set) };
+    let rest = set.rest.as_ref().map(|image| ("rest frame", image));
+    let other =
+        set.presses.iter().map(|p| (p.name.as_str(), &p.image)).chain(rest).find(|(_, i)| size(i) != wanted);
+    match other {
+        None => Ok(set),
+        Some((name, image)) => {
+            Err(LoadPressesError::Size { path: path.into(), name: name.into(), found: size(image), wanted })
+        }
+    }
+}
+
+fn from_folder(
+    path: &Path,
+    folder: PressFolder,
+    ball_m: f64,
+    metres_per_px: f64,
+) -> Result<PressSet, LoadPressesError> {
+    let radius_px = |record: &PressRecord| match record.depth_m {
+        Some(depth_m) if record.radius_px.is_none() && depth_m > ball_m / 2.0 => {
+            Err(LoadPressesError::Depth {
+                path: path.join(PRESSES_FILE),
+                name: record.name.clone(),
+                depth_mm: depth_m * 1e3,
+                radius_mm: ball_m * 0.5e3,
+            })
+        }
+        depth_m => Ok(record
+            .radius_px
+            .or(depth_m.map(|depth_m| Circle::radius_px_at_depth(ball_m, depth_m, metres_per_px)))),
     };
-    PressSet {
-        metres_per_px,
-        ball_m,
-        rest: folder.rest,
-        presses: folder.presses.into_iter().map(press).collect(),
+    let known = folder
+        .presses
+        .iter()
+        .map(|record| Ok((record.centre_px, radius_px(record)?)))
+        .collect::<Result<Vec<_>, LoadPressesError>>()?;
+    let presses = folder
+        .presses
+        .into_iter()
+        .zip(&known)
+        .map(|(record, &(centre, radius))| Press {
+            name: record.name,
+            image: record.image,
+            circle: centre.zip(radius).map(|((x_px, y_px), radius_px)| Circle { x_px, y_px, radius_px }),
+        })
+        .collect();
+    let mut set = PressSet { metres_per_px, ball_m, rest: folder.rest, presses };
+    complete(&mut set, &known);
+    Ok(set)
+}
+
+/// Where half of a mark is known, a depth say, the other half is looked for.
+fn complete(set: &mut PressSet, known: &[(Option<(f64, f64)>, Option<f64>)]) {
+    if known.iter().all(|(centre, radius)| centre.is_some() == radius.is_some()) {
+        return;
+    }
+    let Some(rest) = reference_frame(set) else { return };
+    let ball_radius_px = set.ball_m / 2.0 / set.metres_per_px;
+    for (press, &(centre, radius)) in set.presses.iter_mut().zip(known) {
+        let half = centre.is_some() != radius.is_some() && press.image.rgb.len() == 3 * rest[0].len();
+        let Some(found) = half.then(|| find_circle(&press.image, &rest, ball_radius_px)).flatten() else {
+            continue;
+        };
+        let (x_px, y_px) = centre.unwrap_or((found.x_px, found.y_px));
+        press.circle = Some(Circle { x_px, y_px, radius_px: radius.unwrap_or(found.radius_px) });
     }
 }
 
@@ -174,12 +256,16 @@ pub fn load_sensor(location: &Location) -> Result<Arc<Sensor>, LoadSensorError> 
     sensor_of(&optics, |_| location.clone())
 }
 
-/// The sensor of a twin's left jaw, with what the twin puts beside it.
+/// The sensor of a twin's left jaw, with what the twin puts beside it; the deformation is that of the twin's gel unless the
+/// sensor file has one.
 pub fn load_twin_sensor(twin: &Location) -> Result<Arc<Sensor>, LoadSensorError> {
     let document = load_twin_document(twin, &[])?;
     let read = document.read_twin().map_err(LoadError::from)?;
-    let optics = Twin::new(&read).map_err(|e| LoadError::from(document.located(e)))?.optics.left;
-    sensor_of(&optics, |path| twin.beside(path))
+    let Twin { optics, gel, .. } = Twin::new(&read).map_err(|e| LoadError::from(document.located(e)))?;
+    let sensor = sensor_of(&optics.left, |path| twin.beside(path))?;
+    let pyramid =
+        Pyramid { kernels_px: gel.left.kernels_px, restore_depth_fraction: gel.left.restore_depth_fraction };
+    Ok(Arc::new(Sensor { pyramid: sensor.pyramid.clone().or(Some(pyramid)), ..(*sensor).clone() }))
 }
 
 fn sensor_of(optics: &Optics, locate: impl Fn(&str) -> Location) -> Result<Arc<Sensor>, LoadSensorError> {

@@ -408,7 +408,11 @@ fn press_folder(count: usize) -> tempfile::TempDir {
         let name = format!("press-{i:02}.png");
         save(&name, &predict_press(&press, 5e-3, &sensor).unwrap());
         // Every fourth contact is left for the program to find.
-        let marks = if i % 4 == 1 { ",,".into() } else { format!("{x_px},{y_px},{}", circle.radius_px) };
+        let marks = match i % 4 {
+            1 => ",,".into(),
+            2 => format!(",,{}", circle.radius_px),
+            _ => format!("{x_px},{y_px},{}", circle.radius_px),
+        };
         table += &format!("{name},{marks}\n");
     }
     std::fs::write(folder.path().join("presses.csv"), table).unwrap();
@@ -438,8 +442,13 @@ fn a_sensor_is_calibrated_from_a_folder_of_presses_and_compared_with_it() {
     let json: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
     assert_eq!((&json["schema"], &json["presses"]["n"]), (&"gripgen.comparison/1".into(), &16.into()));
     let mse = json["presses"]["full"]["mse"].as_f64().unwrap();
-    assert!(mse < 2.0, "{mse}");
+    // The noise of rest.png is in it, and circles that were found.
+    assert!(mse < 3.0, "{mse}");
     assert_eq!(json["presses"]["each"].as_array().unwrap().len(), 16);
+    // A twin's sensor, with the deformation of its gel.
+    let twin = run(&["compare", path, "--json"]);
+    assert_code(&twin, 2);
+    assert!(text(&twin.stderr).contains("how large the ball is"), "{}", text(&twin.stderr));
     let wrong = run(&["compare", path, "--sensor", "asset:sensors/none.npz"]);
     assert_code(&wrong, 2);
     let nothing = run(&["compare", out.path().to_str().unwrap()]);

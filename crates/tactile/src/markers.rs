@@ -33,6 +33,9 @@ pub struct Shear {
     pub moment_n_m: f64,
 }
 
+/// Furthest that a marker may lie outside of the image.
+const FURTHEST_PX: f64 = 8192.0;
+
 impl Markers {
     /// `columns` x `rows` dots in the middle of the image.
     pub fn regular(
@@ -59,6 +62,13 @@ impl Markers {
         let centres = npz.array_of_shape("marker_px", &[None, Some(2)])?.values;
         if centres.iter().any(|v| !v.is_finite()) {
             return Err(SensorError::NotFinite { key: "marker_px" });
+        }
+        if let Some(&value) = centres.iter().find(|v| v.abs() > FURTHEST_PX) {
+            return Err(SensorError::Value {
+                key: "marker_px",
+                value,
+                range: "within 8192 pixels of the image",
+            });
         }
         let radius_px = npz.array_of_shape("marker_radius_px", &[])?.values[0];
         if !(0.5..=64.0).contains(&radius_px) {

@@ -185,6 +185,7 @@ pub(crate) fn parse_npy(bytes: &[u8]) -> Result<Array, String> {
         "i4" => |b| f64::from(i32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         "u8" => |b| u64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]) as f64,
         "i8" => |b| i64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]) as f64,
+        "f2" => |b| half(u16::from_le_bytes([b[0], b[1]])),
         "f4" => |b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         "f8" => |b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]),
         "O" => return Err("it holds Python objects (a pickle), which are never loaded".into()),
@@ -208,6 +209,18 @@ pub(crate) fn parse_npy(bytes: &[u8]) -> Result<Array, String> {
         values = c_order(&values, &shape);
     }
     Ok(Array { shape, values })
+}
+
+/// A number of 16 bits (IEEE 754 binary16).
+fn half(bits: u16) -> f64 {
+    let sign = if bits >> 15 == 0 { 1.0 } else { -1.0 };
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
+    sign * match exponent {
+        0 => libm::ldexp(fraction, -14),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        e => libm::ldexp(1.0 + fraction, e - 15),
+    }
 }
 
 /// Reorders values stored first axis fastest into last axis fastest.
@@ -292,6 +305,16 @@ fn npy_bytes(array: &Array, element: ElementType) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Values of numpy's float16.
+    #[test]
+    fn sixteen_bits_are_numpys() {
+        for (bits, value) in [(0x3c00, 1.0), (0xc000, -2.0), (0x3555, 0.333_251_953_125), (0x7bff, 65504.0)] {
+            assert_eq!(half(bits), value);
+        }
+        assert_eq!(half(0x0001), 5.960_464_477_539_063e-8);
+        assert!(half(0x7c00).is_infinite() && half(0x7e00).is_nan());
+    }
 
     #[test]
     fn what_is_written_is_read_back() {

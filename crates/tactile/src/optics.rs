@@ -59,9 +59,9 @@ impl Renderer<'_> {
         if optics.dome_sag_m == 0.0 {
             return self.press(mesh, gel_from_mesh, imprint_m3_per_n, force_n);
         }
-        let grid = &self.sensor.grid;
-        let heights = mesh.raster(gel_from_mesh, grid, self.gel.thickness_m / grid.metres_per_px);
-        self.press_heights(&added(heights, self.rest_seen(optics).as_ref()), imprint_m3_per_n, force_n)
+        let rest = self.rest_seen(optics);
+        let heights = mesh.raster(gel_from_mesh, &self.sensor.grid, self.reach_px(rest.as_ref()));
+        self.press_heights(&added(heights, rest.as_ref()), imprint_m3_per_n, force_n)
     }
 
     /// The gel's shape at rest with what the effects add to it, in pixels towards the part.

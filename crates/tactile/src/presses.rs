@@ -4,9 +4,10 @@ mod calibrate;
 mod circle;
 mod compare;
 mod data_pack;
+mod mark;
 
 pub use calibrate::{
-    CalibrateError, CalibrateOptions, Calibration, FEWEST_PRESSES, Smoothness, calibrate_presses,
+    CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, FEWEST_PRESSES, Smoothness, calibrate_presses,
 };
 pub use circle::{find_circle, reference_frame};
 pub use compare::{
@@ -16,6 +17,8 @@ pub use compare::{
 pub use data_pack::{DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError};
 
 use gripgen_twin::TactileImage;
+
+pub use mark::MarkError;
 
 /// Images of one sensor into which a ball was pressed, in the order in which they were taken.
 #[derive(Debug, Clone, PartialEq)]

@@ -43,8 +43,9 @@ impl Renderer<'_> {
     ) -> Result<Imprint, IndentError> {
         let grid = &self.sensor.grid;
         if self.elastic_gel().is_some() {
-            let mut heights = mesh.raster(gel_from_mesh, grid, self.gel.thickness_m / grid.metres_per_px);
-            if let Some(rest) = self.sensor.gel_shape.rest_px(grid) {
+            let rest = self.sensor.gel_shape.rest_px(grid);
+            let mut heights = mesh.raster(gel_from_mesh, grid, self.reach_px(rest.as_ref()));
+            if let Some(rest) = rest {
                 heights.values.iter_mut().zip(&rest.values).for_each(|(h, r)| *h += r);
             }
             return self.press_heights(&heights, imprint_m3_per_n, force_n);
@@ -147,6 +148,14 @@ impl Renderer<'_> {
             }
             appearance(self.sensor, &sheet.plane(area), core, self.level)
         })
+    }
+
+    /// How deep below the highest part of a surface another one may lie and still touch the gel: its thickness, and how
+    /// much the gel's own surface differs at rest.
+    pub(crate) fn reach_px(&self, rest_px: Option<&Plane>) -> f64 {
+        let lowest = rest_px.map_or(0.0, |rest| rest.values.iter().fold(0.0f32, |m, &h| m.min(h)));
+        let highest = rest_px.map_or(0.0, |rest| rest.values.iter().fold(0.0f32, |m, &h| m.max(h)));
+        self.gel.thickness_m / self.sensor.grid.metres_per_px + f64::from(highest - lowest)
     }
 
     /// The gel of a twin that says `elastic`.

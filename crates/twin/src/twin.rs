@@ -260,10 +260,16 @@ impl Twin {
                 .hint("leave the effect out, or set robot.twist = \"stiff\""));
         }
         if gel.iter().any(|(_, gel)| gel.model == GelModel::Elastic)
-            && let Some(i) = effects.iter().position(|e: &Effect| e.spec.id == "imprint_nonlinearity")
+            && let Some(i) = effects
+                .iter()
+                .position(|e: &Effect| ["imprint_nonlinearity", "gel_kernel"].contains(&e.spec.id))
         {
-            let problem =
-                "`imprint_nonlinearity` changes the imprint constant, which an elastic gel does not use";
+            let problem = match effects[i].spec.id {
+                "gel_kernel" => {
+                    "`gel_kernel` scales the blurs of the gel, which an elastic gel does not have"
+                }
+                _ => "`imprint_nonlinearity` changes the imprint constant, which an elastic gel does not use",
+            };
             return Err(ConfigError::new(format!("effects[{i}].name"), problem)
                 .hint("leave the effect out, or set gel.left.model = \"pyramid\""));
         }

@@ -1,62 +1,69 @@
 //! `gripgen calibrate presses`: a sensor file from presses of a ball.
 
-use crate::args::CalibratePressesArgs;
+use crate::args::{CalibratePressesArgs, TalkArgs};
 use crate::commands::compare::{comparison_json, say_circles, table};
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, write_file};
-use gripgen::tactile::presses::{CalibrateError, CalibrateOptions, Calibration, PressSet, calibrate_presses};
+use gripgen::tactile::presses::{
+    CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PressSet, calibrate_presses,
+};
 use gripgen::tactile::{GelShape, Sensor};
 use gripgen::{
     LoadPressesError, PressGeometry, PressReportText, find_missing_circles, load_presses, press_report,
 };
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
-    let folder = args.out.parent().filter(|folder| !folder.as_os_str().is_empty());
-    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        return Err(Failure::usage(format!(
-            "{}: there is no folder {}",
-            args.out.display(),
-            folder.display()
-        )));
+    let report = args.report.clone().unwrap_or_else(|| args.out.with_extension("html"));
+    if report == args.out {
+        let same = format!("{}: sensor file and report would be one file", report.display());
+        return Err(
+            Failure::usage(same).hint("end the sensor file in .npz, or name the report with --report")
+        );
     }
+    for path in [&args.out, &report] {
+        writable(path)?;
+    }
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let metres = |mm: Option<f64>| mm.map(|mm| mm * 1e-3);
     let geometry = PressGeometry { ball_m: metres(args.ball_mm), metres_per_px: metres(args.mm_per_px) };
     let mut set = load_presses(&args.presses, geometry).map_err(|e| match e {
         LoadPressesError::Geometry { .. } => {
-            Failure::usage(e).hint("measure the ball with calipers, and a pixel by a known length on the gel")
+            Failure::usage(e).hint(
+            "--ball-mm: measure the ball with calipers; --mm-per-px: measure a pixel by a known length on the gel",
+        )
         }
         other => Failure::usage(other),
     })?;
     say_circles(&find_missing_circles(&mut set), &args.talk);
     if !args.talk.quiet {
-        eprintln!("{} presses; fitting, and fitting again without each quarter of them", set.presses.len());
+        eprintln!("{} presses; fitting, and again without each fold of them", set.presses.len());
     }
     let options = CalibrateOptions::default();
-    let calibration = calibrate_presses(&set, &options).map_err(failure)?;
-    if !calibration.doubtful.is_empty() && !args.talk.quiet {
-        let names = calibration.doubtful.join(", ");
-        eprintln!("warning: no contact is visible where {names} are marked; scored, but not fitted to");
-    }
+    let calibration = calibrate_presses(&set, &options).map_err(|e| failure(&args.presses, &e))?;
+    warn(&calibration, set.presses.len(), &args.talk);
     let bytes = match calibration.sensor.to_npz() {
         Some(bytes) => bytes.map_err(Failure::new)?,
         None => return Err(Failure::new("the fitted colours have no place in a sensor file")),
     };
+    // What cannot be read again is no sensor file.
+    Sensor::from_npz(&bytes, None, None).map_err(|e| {
+        Failure::usage(format!("{}: the fitted sensor cannot be: {e}", args.presses.display()))
+            .hint("are these presses of one ball into one sensor, with the camera's settings fixed?")
+    })?;
     write_file(&args.out, &bytes)?;
-    let report = args.report.clone().unwrap_or_else(|| args.out.with_extension("html"));
-    let page =
-        press_report(&text(args, &set, &calibration, options.folds), &set, &calibration.held_out, |i| {
-            calibration.predicted.get(i).cloned()
-        });
+    let page = press_report(&text(args, &set, &calibration), &set, &calibration.held_out, |i| {
+        calibration.predicted.get(i).cloned()
+    });
     write_file(&report, page.as_bytes())?;
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.press_calibration/1",
             "sensor": args.out,
             "report": report,
-            "folds": options.folds,
+            "folds": calibration.folds,
             "fitted": fitted(&calibration.sensor),
             "doubtful": calibration.doubtful,
             "held_out": comparison_json(&calibration.held_out),
@@ -69,15 +76,60 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
     Ok(0)
 }
 
-fn failure(e: CalibrateError) -> Failure {
+/// What a user should know before trusting the fit.
+fn warn(calibration: &Calibration, presses: usize, talk: &TalkArgs) {
+    if talk.quiet {
+        return;
+    }
+    if !calibration.doubtful.is_empty() {
+        let names = calibration.doubtful.join(", ");
+        eprintln!("warning: no contact is visible where {names} are marked; scored, but not fitted to");
+    }
+    if calibration.distrusted > 0 {
+        let n = calibration.distrusted;
+        eprintln!(
+            "warning: {n} of {presses} marks show no contact; either they are wrong, or contacts are hardly visible on this sensor"
+        );
+    }
+    if presses < FEW_PRESSES {
+        eprintln!(
+            "warning: {presses} presses are few: elsewhere on the gel the error may be twice the one below"
+        );
+    }
+    if calibration.sensor.noise_rgb == [0.0; 3] {
+        eprintln!("warning: no pixel was far from the contacts, so the noise is not known and set to 0");
+    }
+}
+
+fn failure(presses: &Path, e: &CalibrateError) -> Failure {
+    let failure = Failure::usage(format!("{}: {e}", presses.display()));
     match e {
-        CalibrateError::Radius { .. } => {
-            Failure::usage(e).hint("is --ball-mm the diameter, and --mm-per-px that of these images?")
+        CalibrateError::Mark(MarkError::Radius { .. }) => {
+            failure.hint("is --ball-mm the diameter, and --mm-per-px that of these images?")
         }
+        CalibrateError::Mark(_) => failure
+            .hint("pixels count from 0 at the top left; leave the cells empty to have a contact looked for"),
         CalibrateError::TooFew { .. } => {
-            Failure::usage(e).hint("30 presses or more, spread over the whole gel, at two or three depths")
+            failure.hint("30 presses or more, spread over the whole gel, at two or three depths")
         }
-        other => Failure::usage(other),
+        CalibrateError::Nothing => {
+            failure.hint("are these images with contact, and is the rest frame one without?")
+        }
+        _ => failure,
+    }
+}
+
+/// Whether a file can be written there, before the work and not after.
+fn writable(path: &Path) -> Result<(), Failure> {
+    if path.is_dir() {
+        return Err(Failure::usage(format!("{}: this is a folder", path.display())).hint("name a file in it"));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder.filter(|folder| !folder.is_dir()) {
+        Some(folder) => {
+            Err(Failure::usage(format!("{}: there is no folder {}", path.display(), folder.display())))
+        }
+        None => Ok(()),
     }
 }
 
@@ -97,12 +149,7 @@ fn fitted(sensor: &Sensor) -> Value {
     })
 }
 
-fn text(
-    args: &CalibratePressesArgs,
-    set: &PressSet,
-    calibration: &Calibration,
-    folds: usize,
-) -> PressReportText {
+fn text(args: &CalibratePressesArgs, set: &PressSet, calibration: &Calibration) -> PressReportText {
     let sensor = &calibration.sensor;
     let gel = match sensor.gel_shape {
         GelShape::Dome { sag_m } => format!("dome, {:.2} mm lower at the corners", sag_m * 1e3),
@@ -116,8 +163,9 @@ fn text(
             set.presses.len()
         ),
         meaning: format!(
-            "Each press was predicted by a sensor fitted without it and without a {folds}th of the others: its \
-             frame at rest, its gel and its colours."
+            "Each press was predicted by a sensor fitted without it and the others of its fold ({} folds): its \
+             frame at rest, its gel and its colours.",
+            calibration.folds
         ),
         facts: vec![
             (

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::output::{JsonSink, print, write_file};
 use gripgen::tactile::finish;
 use gripgen::tactile::metrics::Score;
-use gripgen::tactile::presses::{CompareError, PressComparison, Scores, compare_presses, predict_press};
+use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
     FoundCircles, LoadPressesError, LoadSensorError, Location, PressGeometry, PressReportText,
     find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor, press_report,
@@ -38,16 +38,21 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
             .hint("a sensor file of `gripgen calibrate presses` holds both; name it with --sensor"),
         other => Failure::usage(other),
     })?;
+    if let Some(press) = set.presses.first() {
+        let (found, wanted) =
+            ((press.image.width_px, press.image.height_px), (sensor.grid.width_px, sensor.grid.height_px));
+        if (found.0 as usize, found.1 as usize) != wanted {
+            let sizes = format!("{}x{} pixels, the sensor has {}x{}", found.0, found.1, wanted.0, wanted.1);
+            return Err(Failure::usage(format!("{}: the images are {sizes}", args.measured.display()))
+                .hint("name the sensor file that belongs to these presses with --sensor"));
+        }
+    }
     if set.rest.is_none() {
         set.rest = Some(finish(&sensor, None, None));
     }
     say_circles(&find_missing_circles(&mut set), &args.talk);
-    let comparison = compare_presses(&set, &sensor).map_err(|e| match e {
-        CompareError::Size { .. } => {
-            Failure::usage(e).hint("name the sensor file that belongs to these presses with --sensor")
-        }
-        other => Failure::new(other),
-    })?;
+    let comparison = compare_presses(&set, &sensor)
+        .map_err(|e| Failure::usage(format!("{}: {e}", args.measured.display())))?;
     if let Some(path) = &args.report {
         let text = PressReportText {
             title: format!(

@@ -121,9 +121,11 @@ fn horizon(surface: &Plane, (x, y): (usize, usize), towards: [f32; 2], top: f32,
 pub(super) fn light_directions(sensor: &Sensor) -> [Option<[f32; 2]>; 3] {
     let (w, h) = (sensor.grid.width_px, sensor.grid.height_px);
     let flat = Plane::filled(w, h, 0.0);
+    // One height everywhere: a regression is asked only where the gel is displaced, and equal heights cancel.
+    let raised = Plane::filled(w, h, 1.0);
     let mean = |gx: f32, gy: f32| {
         let slope = |g: f32| if g == 0.0 { flat.clone() } else { Plane::filled(w, h, g) };
-        let change = shade(&sensor.colour, &slope(0.0), &slope(gx), &slope(gy), None);
+        let change = shade(&sensor.colour, &raised, &slope(gx), &slope(gy), None);
         change.map(|plane| plane.values.iter().map(|&v| f64::from(v)).sum::<f64>() / (w * h) as f64)
     };
     // A surface that falls towards a light faces it.
@@ -139,6 +141,26 @@ pub(super) fn light_directions(sensor: &Sensor) -> [Option<[f32; 2]>; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A regression is asked like lights are: red is bright on slopes that face right, green on those that face down.
+    #[test]
+    fn the_lights_of_a_regression_are_found() {
+        use crate::colour::regressor::{NEAR, NEAR_FIELD, SURROUNDINGS};
+        let mut near = vec![0.0; 3 * NEAR * NEAR_FIELD];
+        near[0] = 50.0;
+        near[(NEAR + 1) * NEAR_FIELD] = 30.0;
+        let colour = crate::colour::Regressor {
+            mm_per_px: 0.1,
+            near,
+            around: vec![0.0; 3 * SURROUNDINGS * 6],
+            slope_limit: 1.0,
+            height_limit_mm: 5.0,
+            around_limit: vec![1.0; SURROUNDINGS],
+        };
+        let mut sensor = super::super::testing::rig().sensor;
+        sensor.colour = crate::ColourModel::Regressor(Box::new(colour));
+        assert_eq!(light_directions(&sensor), [Some([1.0, 0.0]), Some([0.0, 1.0]), None]);
+    }
 
     /// A ridge of height h across the ray is seen under h / d, to within a step.
     #[test]

@@ -9,8 +9,9 @@ mod tests;
 
 pub use ridge::Smoothness;
 
-use super::circle::{is_doubtful, reference_frame};
+use super::circle::{Seen, look, reference_frame};
 use super::compare::{CompareError, PressComparison, PressScore, predict_ball, score_press};
+use super::mark::{self, MarkError};
 use super::{Circle, Press, PressSet};
 use crate::colour::regressor::AROUND_HEIGHTS;
 use crate::colour::{ColourModel, Regressor, shade};
@@ -27,14 +28,18 @@ use samples::{GelModel, Samples};
 /// Fewest presses that can be calibrated with: less do not cover the frame, and leave none to hold out.
 pub const FEWEST_PRESSES: usize = 4;
 
+/// With fewer presses the error is that of leaving out one at a time, and is not to be relied on.
+pub const FEW_PRESSES: usize = 12;
+
 /// Sizes of the blurs of the deformation, in millimetres.
 const KERNELS_MM: [f64; 3] = [2.1, 1.0, 0.5];
 
 /// Share of the press below which the gel follows the ball.
 const RESTORE_DEPTH_FRACTION: f64 = 0.4;
 
-/// Sags at the corners that are tried for a domed gel.
-const DOME_SAGS_M: [f64; 2] = [0.7e-3, 1.4e-3];
+/// Radii of curvature that are tried for a domed gel: that of Taxim's gel map (1.4 mm of sag on a half diagonal of 11.8 mm),
+/// and twice it.
+const DOME_RADII_M: [f64; 2] = [0.1, 0.05];
 
 /// A dome has to be better than a flat gel by this factor.
 const DOME_GAIN: f64 = 0.98;
@@ -51,15 +56,16 @@ const NO_LIMIT: f32 = 1e6;
 /// How to calibrate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrateOptions {
-    /// Folds of the cross-validation; press i is held out in fold `i % folds`. At least 2.
-    pub folds: usize,
+    /// Folds of the cross-validation; press i is held out in fold `i % folds`. At least 2. `None`: 4, and one for each
+    /// press where there are fewer than [`FEW_PRESSES`].
+    pub folds: Option<usize>,
     /// The gel at rest; `None`: flat or dome, by the error on held-out presses.
     pub gel_shape: Option<GelShape>,
 }
 
 impl Default for CalibrateOptions {
     fn default() -> Self {
-        Self { folds: 4, gel_shape: None }
+        Self { folds: None, gel_shape: None }
     }
 }
 
@@ -72,12 +78,16 @@ pub struct Calibration {
     pub held_out: PressComparison,
     /// The predictions that were scored.
     pub predicted: Vec<TactileImage>,
+    /// Folds of the cross-validation.
+    pub folds: usize,
     /// What the last fit, to all presses, chose.
     pub smoothness: Smoothness,
     /// Where each press was taken to touch: as marked, or as found where nobody marked it.
     pub circles: Vec<Circle>,
     /// Presses whose mark shows no contact although the image does: scored, but not fitted to.
     pub doubtful: Vec<String>,
+    /// Marks that show no contact where they are so many that the search is doubted instead: all were fitted to.
+    pub distrusted: usize,
 }
 
 /// Why presses cannot be calibrated with.
@@ -100,38 +110,17 @@ pub enum CalibrateError {
         /// Width and height of the first.
         wanted: (u32, u32),
     },
-    /// A contact whose centre lies beside the image.
-    #[error(
-        "press `{press}`: the centre ({x_px:.1}, {y_px:.1}) lies outside the {width_px}x{height_px} image"
-    )]
-    Outside {
-        /// The press.
-        press: String,
-        /// Centre, along the columns.
-        x_px: f64,
-        /// Centre, down the rows.
-        y_px: f64,
-        /// Width of the image.
-        width_px: u32,
-        /// Height of the image.
-        height_px: u32,
+    /// Images too small or too large.
+    #[error("{what} is {found} pixels, it must be from 16 to 4096")]
+    Pixels {
+        /// Which side.
+        what: &'static str,
+        /// Its length.
+        found: u32,
     },
-    /// A contact wider than the ball, or without width.
-    #[error("press `{press}`: the radius is {radius_mm:.3} mm, the ball's {ball_mm:.3} mm")]
-    Radius {
-        /// The press.
-        press: String,
-        /// Radius of the contact.
-        radius_mm: f64,
-        /// Radius of the ball.
-        ball_mm: f64,
-    },
-    /// Nobody marked the contact, and none is to be seen.
-    #[error("press `{press}` has no centre and radius, and no contact is to be seen in it")]
-    NoCircle {
-        /// The press.
-        press: String,
-    },
+    /// A mark that cannot be.
+    #[error(transparent)]
+    Mark(#[from] MarkError),
     /// A size that cannot be.
     #[error("{what} is {value_mm} mm, it must be {range}")]
     Value {
@@ -174,20 +163,23 @@ fn calibrate_marked(
     options: &CalibrateOptions,
     grid: Grid,
 ) -> Result<Calibration, CalibrateError> {
-    let marked = set.presses.iter().map(|p| marked(p, set, &grid)).collect::<Result<Vec<_>, _>>()?;
-    let trusted = trusted(set, &marked);
+    let marked = set
+        .presses
+        .iter()
+        .map(|p| Ok((p, mark::checked(p, set.ball_m, grid.metres_per_px)?)))
+        .collect::<Result<Vec<Marked<'_>>, MarkError>>()?;
+    let (trusted, distrusted) = trusted(set, &marked)?;
     let shapes = match &options.gel_shape {
         Some(shape) => vec![shape.clone()],
-        None => {
-            std::iter::once(GelShape::Flat).chain(DOME_SAGS_M.map(|sag_m| GelShape::Dome { sag_m })).collect()
-        }
+        None => std::iter::once(GelShape::Flat).chain(domes(&grid)).collect(),
     };
     let candidates: Vec<Candidate> =
         shapes.into_iter().map(|shape| Candidate::new(shape, &marked, set.ball_m, &grid)).collect();
-    let flat = Moments::of_inputs(&Samples::flat(FLAT_HEIGHT_MM));
+    let flat = Moments::of_inputs(&Samples::flat(FLAT_HEIGHT_MM, &grid));
     let fit = Fit { set, grid, marked: &marked, candidates: &candidates, flat };
 
-    let folds = options.folds.clamp(2, marked.len());
+    let usual = if marked.len() < FEW_PRESSES { marked.len() } else { 4 };
+    let folds = options.folds.unwrap_or(usual).clamp(2, marked.len());
     let mut predicted = vec![None; marked.len()];
     for fold in 0..folds {
         let (unseen, mut seen): (Vec<usize>, Vec<usize>) = (0..marked.len()).partition(|i| i % folds == fold);
@@ -208,20 +200,25 @@ fn calibrate_marked(
     let (sensor, smoothness) = fit.fit(&everything)?;
     let circles = marked.iter().map(|(_, circle)| *circle).collect();
     let doubtful = (0..marked.len()).filter(|&i| !trusted[i]).map(|i| marked[i].0.name.clone()).collect();
-    Ok(Calibration { sensor, held_out, predicted, smoothness, circles, doubtful })
+    Ok(Calibration { sensor, held_out, predicted, folds, smoothness, circles, doubtful, distrusted })
 }
 
 /// Which presses are marked where something is to be seen. Should that leave too few of them, it is the search that
-/// fails on this sensor, and all are trusted.
-fn trusted(set: &PressSet, marked: &[Marked<'_>]) -> Vec<bool> {
+/// fails on this sensor, and all are trusted; the number of marks that it doubts comes beside.
+fn trusted(set: &PressSet, marked: &[Marked<'_>]) -> Result<(Vec<bool>, usize), CalibrateError> {
     let ball_radius_px = set.ball_m / 2.0 / set.metres_per_px;
-    let Some(rest) = reference_frame(set) else { return vec![true; marked.len()] };
-    let trusted: Vec<bool> = marked
-        .iter()
-        .map(|(press, circle)| !is_doubtful(&press.image, &rest, circle, ball_radius_px))
-        .collect();
+    let Some(rest) = reference_frame(set) else { return Ok((vec![true; marked.len()], 0)) };
+    let seen: Vec<Seen> =
+        marked.iter().map(|(press, circle)| look(&press.image, &rest, circle, ball_radius_px)).collect();
+    if seen.iter().all(|s| *s == Seen::Nothing) {
+        return Err(CalibrateError::Nothing);
+    }
+    let trusted: Vec<bool> = seen.iter().map(|s| *s == Seen::Here).collect();
     let count = trusted.iter().filter(|&&t| t).count();
-    if count < FEWEST_PRESSES || 4 * count < 3 * marked.len() { vec![true; marked.len()] } else { trusted }
+    if count < FEWEST_PRESSES || 4 * count < 3 * marked.len() {
+        return Ok((vec![true; marked.len()], marked.len() - count));
+    }
+    Ok((trusted, 0))
 }
 
 /// One gel to try, with what the presses look like on it.
@@ -336,15 +333,14 @@ impl Fit<'_> {
         let solution = solve(&sums, &self.flat, smoothness).ok_or(CalibrateError::Nothing)?;
         let (near, around) = solution.near_and_around();
         let largest = seen.iter().map(|&i| &candidate.samples[i].largest);
-        let (mut slope_limit, mut height_limit_mm) = (0.0f32, 0.0f32);
+        let mut slope_limit = 0.0f32;
         let mut around_limit = vec![0.0f32; candidate.samples[seen[0]].largest.2.len()];
-        for (slope, height, features) in largest {
+        for (slope, _, features) in largest {
             slope_limit = slope_limit.max(*slope);
-            height_limit_mm = height_limit_mm.max(*height);
             around_limit.iter_mut().zip(features).for_each(|(l, f)| *l = l.max(AROUND_MARGIN * f));
         }
         // Heights alone may grow: over a wide flat contact they cancel, see `Samples::flat`.
-        height_limit_mm = NO_LIMIT;
+        let height_limit_mm = NO_LIMIT;
         AROUND_HEIGHTS.iter().for_each(|&level| around_limit[level] = NO_LIMIT);
         Ok(ColourModel::Regressor(Box::new(Regressor {
             mm_per_px: self.grid.metres_per_px * 1e3,
@@ -357,17 +353,23 @@ impl Fit<'_> {
     }
 }
 
+/// Domes to try on a window of this size.
+fn domes(grid: &Grid) -> [GelShape; 2] {
+    let (x, y) = grid.centre_m(grid.width_px - 1, grid.height_px - 1);
+    DOME_RADII_M.map(|radius_m| GelShape::Dome { sag_m: (x * x + y * y) / (2.0 * radius_m) })
+}
+
 /// The grid of a set whose numbers make sense.
 fn check(set: &PressSet) -> Result<Grid, CalibrateError> {
     if set.presses.len() < FEWEST_PRESSES {
         return Err(CalibrateError::TooFew { found: set.presses.len() });
     }
     let lengths =
-        [("the side of a pixel", set.metres_per_px, 1e-6..=1e-3), ("the ball", set.ball_m, 1e-4..=0.1)];
-    for ((what, value, range), text) in lengths.into_iter().zip(["from 0.001 to 1 mm", "from 0.1 to 100 mm"])
+        [("the side of a pixel", set.metres_per_px, 1e-7..=1e-3), ("the ball", set.ball_m, 1e-4..=0.1)];
+    for ((what, value, range), text) in lengths.into_iter().zip(["from 0.0001 to 1 mm", "from 0.1 to 100 mm"])
     {
         if !range.contains(&value) {
-            return Err(CalibrateError::Value { what, value_mm: value * 1e3, range: text });
+            return Err(CalibrateError::Value { what, value_mm: (value * 1e9).round() * 1e-6, range: text });
         }
     }
     let size = |image: &TactileImage| (image.width_px, image.height_px);
@@ -378,24 +380,10 @@ fn check(set: &PressSet) -> Result<Grid, CalibrateError> {
             return Err(CalibrateError::Size { press: name.into(), found: size(image), wanted });
         }
     }
+    for (what, n) in [("an image's width", wanted.0), ("an image's height", wanted.1)] {
+        if !(16..=4096).contains(&n) {
+            return Err(CalibrateError::Pixels { what, found: n });
+        }
+    }
     Ok(Grid { width_px: wanted.0 as usize, height_px: wanted.1 as usize, metres_per_px: set.metres_per_px })
-}
-
-/// A press with a circle that can be. One up to 5 % wider than the ball is taken for its equator: hand-drawn circles
-/// are that unsure.
-fn marked<'a>(press: &'a Press, set: &PressSet, grid: &Grid) -> Result<Marked<'a>, CalibrateError> {
-    let name = || press.name.clone();
-    let circle = press.circle.ok_or_else(|| CalibrateError::NoCircle { press: name() })?;
-    let (width_px, height_px) = (press.image.width_px, press.image.height_px);
-    let inside = |v: f64, n: u32| (-0.5..=f64::from(n) - 0.5).contains(&v);
-    if !inside(circle.x_px, width_px) || !inside(circle.y_px, height_px) {
-        let (x_px, y_px) = (circle.x_px, circle.y_px);
-        return Err(CalibrateError::Outside { press: name(), x_px, y_px, width_px, height_px });
-    }
-    let ball_px = set.ball_m / 2.0 / grid.metres_per_px;
-    if !(circle.radius_px > 0.0 && circle.radius_px <= 1.05 * ball_px) {
-        let radius_mm = circle.radius_px * grid.metres_per_px * 1e3;
-        return Err(CalibrateError::Radius { press: name(), radius_mm, ball_mm: set.ball_m / 2.0 * 1e3 });
-    }
-    Ok((press, Circle { radius_px: circle.radius_px.min(0.999 * ball_px), ..circle }))
 }

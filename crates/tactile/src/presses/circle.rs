@@ -29,18 +29,29 @@ pub fn find_circle(image: &TactileImage, rest: &[Vec<f32>; 3], ball_radius_px: f
     find_in(&smooth_change(image, rest, ball_radius_px), ball_radius_px)
 }
 
-/// Whether a marked circle holds less than [`DOUBTFUL`] of the contrast of the circle that is found.
-pub(super) fn is_doubtful(
-    image: &TactileImage,
-    rest: &[Vec<f32>; 3],
-    marked: &Circle,
-    ball_radius_px: f64,
-) -> bool {
+/// What is to be seen of a marked contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Seen {
+    /// A contact, about where it is marked.
+    Here,
+    /// A contact, but the mark holds less than [`DOUBTFUL`] of its contrast.
+    Elsewhere,
+    /// No contact at all.
+    Nothing,
+}
+
+/// Looks for the contact of an image and compares it with its mark.
+pub(super) fn look(image: &TactileImage, rest: &[Vec<f32>; 3], marked: &Circle, ball_radius_px: f64) -> Seen {
     let change = smooth_change(image, rest, ball_radius_px);
     let directions = directions();
-    find_in(&change, ball_radius_px).is_some_and(|found| {
-        contrast(&change, marked, &directions) < DOUBTFUL * contrast(&change, &found, &directions)
-    })
+    match find_in(&change, ball_radius_px) {
+        None => Seen::Nothing,
+        Some(found) => {
+            let here =
+                contrast(&change, marked, &directions) >= DOUBTFUL * contrast(&change, &found, &directions);
+            if here { Seen::Here } else { Seen::Elsewhere }
+        }
+    }
 }
 
 fn smooth_change(image: &TactileImage, rest: &[Vec<f32>; 3], ball_radius_px: f64) -> Plane {

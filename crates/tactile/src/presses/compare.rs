@@ -1,5 +1,6 @@
 //! A sensor file against presses: predicted and real image of each.
 
+use super::mark::{self, MarkError};
 use super::{Circle, Press, PressSet};
 use crate::grid::{Grid, Plane};
 use crate::indent::Imprint;
@@ -30,12 +31,9 @@ pub enum CompareError {
         /// Width and height of the sensor.
         wanted: (u32, u32),
     },
-    /// Nobody marked where the ball touches, and no contact is to be seen.
-    #[error("press `{press}` has no centre and radius, and no contact is to be seen in it")]
-    NoCircle {
-        /// The press.
-        press: String,
-    },
+    /// A mark that cannot be.
+    #[error(transparent)]
+    Mark(#[from] MarkError),
     /// The images are too small to compare.
     #[error(transparent)]
     Metric(#[from] MetricError),
@@ -116,7 +114,7 @@ pub fn predict_press(press: &Press, ball_m: f64, sensor: &Sensor) -> Result<Tact
     if found != wanted {
         return Err(CompareError::Size { press: press.name.clone(), found, wanted });
     }
-    let circle = press.circle.ok_or_else(|| CompareError::NoCircle { press: press.name.clone() })?;
+    let circle = mark::checked(press, ball_m, sensor.grid.metres_per_px)?;
     Ok(predict_ball(&circle, ball_m, sensor))
 }
 
@@ -206,7 +204,7 @@ pub fn score_press(press: &Press, predicted: &TactileImage) -> Result<Scores, Me
 pub fn crop(image: &TactileImage, centre: (f64, f64), side_px: u32) -> TactileImage {
     let range = |centre: f64, n: u32| {
         let side = side_px.min(n);
-        let first = (centre.round() as i64 - i64::from(side / 2)).clamp(0, i64::from(n - side)) as u32;
+        let first = (centre.round() - f64::from(side / 2)).clamp(0.0, f64::from(n - side)) as u32;
         (first, side)
     };
     let (x0, width_px) = range(centre.0, image.width_px);

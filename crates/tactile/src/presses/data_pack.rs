@@ -76,7 +76,7 @@ impl PressSet {
         };
         red_first(&mut images);
         let presses = images
-            .chunks_exact((3 * width * height).max(1))
+            .chunks_exact(width.saturating_mul(height).saturating_mul(3).max(1))
             .enumerate()
             .map(|(i, rgb)| Press {
                 name: i.to_string(),
@@ -95,17 +95,19 @@ fn circle(i: usize, centres: Option<&[f64]>, radii: Option<&[f64]>) -> Option<Ci
     known.then_some(Circle { x_px, y_px, radius_px })
 }
 
-/// Grey levels of an array: bytes as they stand, other numbers where they are whole and from 0 to 255.
+/// Grey levels of an array: bytes as they stand, other numbers where they are from 0 to 255.
 fn pixels(npz: &mut Npz<'_>, key: &str) -> Result<(Vec<usize>, Vec<u8>), NpzError> {
     if let Ok(bytes) = npz.bytes(key) {
         return Ok(bytes);
     }
     let array = npz.array(key)?;
-    let level = |&v: &f64| (v.fract() == 0.0 && (0.0..=255.0).contains(&v)).then_some(v as u8);
+    // An averaged frame is rounded; numbers from 0 to 1 are no grey levels.
+    let largest = array.values.iter().fold(0.0f64, |m, &v| m.max(v));
+    let level = |&v: &f64| (largest > 1.0 && (0.0..=255.0).contains(&v)).then(|| v.round() as u8);
     match array.values.iter().map(level).collect() {
         Some(levels) => Ok((array.shape, levels)),
         None => {
-            let problem = "it holds numbers that are no grey levels from 0 to 255".into();
+            let problem = format!("it holds numbers up to {largest}, they must be grey levels from 0 to 255");
             Err(NpzError::Array { key: key.into(), problem })
         }
     }
@@ -163,7 +165,9 @@ mod tests {
         assert!(read(&[grey]).unwrap_err().to_string().contains("(any, any, any, 3)"));
         let wide = |scale: f64| entry("imgs", &[2, 4, 5, 3], move |i| scale * i as f64, ElementType::F64);
         assert_eq!(read(&[wide(1.0)]), read(&[images()]), "whole grey levels may be numbers of any type");
-        assert!(read(&[wide(1.0 / 255.0)]).unwrap_err().to_string().contains("no grey levels from 0 to 255"));
+        assert!(
+            read(&[wide(1.0 / 119.0)]).unwrap_err().to_string().contains("must be grey levels from 0 to 255")
+        );
         assert!(read(&[]).unwrap_err().to_string().contains("no array `imgs`"));
     }
 }

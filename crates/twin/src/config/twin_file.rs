@@ -194,7 +194,8 @@ pub struct GelFile {
     pub height_mm: f64,
     /// Tangential force per shear displacement of the pad.
     pub shear_stiffness_n_per_mm: f64,
-    /// Sizes of the blurs in pixels of the sensor's image, in order; odd numbers.
+    /// Sizes of the blurs in pixels of the sensor's image, in order; odd numbers. A calibrated sensor file has its own
+    /// blurs and share below, which are used instead.
     pub kernels_px: Vec<u32>,
     /// The contact that blurs may not touch begins at this share of the press depth.
     pub restore_depth_fraction: f64,

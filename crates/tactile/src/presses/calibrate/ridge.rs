@@ -81,11 +81,13 @@ impl Solution {
         let gram = gram(sums, &self.features);
         let (energy, weight) = sums.energy_and_weight();
         let mut error = energy;
-        let product = &gram * &self.coefficients;
+        // Plain loops: a matrix product of the library sums in an order that depends on the processor.
         for c in 0..3 {
             for (i, &feature) in self.features.iter().enumerate() {
                 let w = self.coefficients[(i, c)];
-                error += w * (product[(i, c)] - 2.0 * sums.target(c, feature));
+                let product: f64 =
+                    (0..self.features.len()).map(|j| gram[(i, j)] * self.coefficients[(j, c)]).sum();
+                error += w * (product - 2.0 * sums.target(c, feature));
             }
         }
         error / (3.0 * weight)

@@ -88,7 +88,7 @@ impl Samples {
 
     /// A gel pressed flat as a whole, to `height_mm`: no slope anywhere, so its colour is taken to stay. Balls do not
     /// show this; without it the fit would make up what a wide flat part looks like.
-    pub(super) fn flat(height_mm: f32) -> Self {
+    pub(super) fn flat(height_mm: f32, grid: &Grid) -> Self {
         let mut input = [0.0; INPUTS];
         input[HEIGHT_INPUT] = height_mm;
         for level in AROUND_HEIGHTS {
@@ -96,6 +96,7 @@ impl Samples {
         }
         let places: Vec<[f32; 2]> = (0..FLAT_SIDE * FLAT_SIDE)
             .map(|i| [i % FLAT_SIDE, i / FLAT_SIDE].map(|k| 2.0 * (k as f32 + 0.5) / FLAT_SIDE as f32 - 1.0))
+            .map(|[u, v]| [u, v * (grid.height_px as f32 / grid.width_px as f32).max(1.0)])
             .collect();
         Self {
             pixels: (0..places.len()).collect(),

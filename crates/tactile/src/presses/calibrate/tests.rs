@@ -69,7 +69,7 @@ fn noisy(sensor: &Sensor, circle: &Circle, key: u64) -> TactileImage {
 fn a_sensor_is_found_again_from_its_presses() {
     let truth = truth();
     let set = presses(&truth, 16);
-    let found = calibrate_presses(&set, &CalibrateOptions { folds: 3, ..Default::default() }).unwrap();
+    let found = calibrate_presses(&set, &CalibrateOptions { folds: Some(3), ..Default::default() }).unwrap();
     // Two roundings beside the noise: no prediction can be better than this.
     let floor = f64::from(NOISE * NOISE) + 2.0 / 12.0;
     let mse = found.held_out.mean.full.mse;
@@ -97,7 +97,7 @@ fn a_sensor_is_found_again_from_its_presses() {
 #[test]
 fn the_same_presses_give_the_same_sensor() {
     let set = presses(&truth(), 6);
-    let options = CalibrateOptions { folds: 2, gel_shape: Some(GelShape::Flat) };
+    let options = CalibrateOptions { folds: Some(2), gel_shape: Some(GelShape::Flat) };
     assert_eq!(calibrate_presses(&set, &options).unwrap(), calibrate_presses(&set, &options).unwrap());
 }
 
@@ -130,7 +130,8 @@ fn a_press_marked_in_the_wrong_place_is_left_out() {
     let circle = set.presses[5].circle.as_mut().unwrap();
     (circle.x_px, circle.y_px) = (127.0 - circle.x_px, 95.0 - circle.y_px);
     let found =
-        calibrate_presses(&set, &CalibrateOptions { folds: 2, gel_shape: Some(GelShape::Flat) }).unwrap();
+        calibrate_presses(&set, &CalibrateOptions { folds: Some(2), gel_shape: Some(GelShape::Flat) })
+            .unwrap();
     assert_eq!(found.doubtful, ["5"]);
     let error = |i: usize| found.held_out.each[i].scores.full.mse;
     assert!(error(5) > 3.0 * error(4), "it is still scored, as marked: {} and {}", error(5), error(4));
@@ -150,10 +151,7 @@ fn sets_that_cannot_be_are_refused_with_both_numbers() {
     let small = TactileImage { width_px: 20, height_px: 10, rgb: vec![0; 600] };
     for (text, wanted) in [
         (error(&|s| s.presses.truncate(3)), "3 presses, a calibration needs at least 4"),
-        (
-            error(&|s| circle(s, 130.0, 9.0)),
-            "press `2`: the centre (130.0, 40.0) lies outside the 128x96 image",
-        ),
+        (error(&|s| circle(s, 130.0, 9.0)), "press `2`: the centre (130, 40) lies outside the 128x96 image"),
         (error(&|s| circle(s, f64::NAN, 9.0)), "outside the 128x96 image"),
         (error(&|s| circle(s, 60.0, 20.0)), "press `2`: the radius is 3.000 mm, the ball's 2.000 mm"),
         (error(&|s| circle(s, 60.0, 0.0)), "the radius is 0.000 mm"),
@@ -191,7 +189,7 @@ fn the_error_from_sums_is_the_error_over_pixels() {
     let moments = candidate.coloured(&marked, &[0, 1, 2, 3, 4], &truth.rest);
     let mut seen = Moments::zero();
     moments[..4].iter().for_each(|m| seen.add(m));
-    let flat = Moments::of_inputs(&Samples::flat(1.0));
+    let flat = Moments::of_inputs(&Samples::flat(1.0, &GRID));
     let solution = solve(&seen, &flat, &Smoothness::USUAL).unwrap();
     let (near, around) = solution.near_and_around();
     // The fifth press, feature by feature.
@@ -219,4 +217,22 @@ fn the_error_from_sums_is_the_error_over_pixels() {
     }
     let (exact, ours) = (error / weights, solution.error_on(&moments[4]));
     assert!((ours - exact).abs() < 0.01 * exact, "{ours} against {exact}");
+}
+
+#[test]
+fn images_without_any_contact_are_refused_and_marks_beside_it_are_counted() {
+    let sensor = truth();
+    let options = CalibrateOptions { folds: Some(2), gel_shape: Some(GelShape::Flat) };
+    let mut grey = presses(&sensor, 6);
+    grey.presses.iter_mut().for_each(|press| press.image.rgb.fill(90));
+    assert_eq!(calibrate_presses(&grey, &options), Err(CalibrateError::Nothing));
+    // Half of the marks on the other side of the image.
+    let mut mirrored = presses(&sensor, 12);
+    for press in mirrored.presses.iter_mut().step_by(2) {
+        let circle = press.circle.as_mut().unwrap();
+        circle.x_px = 127.0 - circle.x_px;
+        circle.y_px = 95.0 - circle.y_px;
+    }
+    let found = calibrate_presses(&mirrored, &options).unwrap();
+    assert!(found.doubtful.is_empty() && (4..=6).contains(&found.distrusted), "{}", found.distrusted);
 }
