@@ -4,8 +4,7 @@
 @group(0) @binding(1) var<storage, read> presses: array<Press>;
 // Rest frame: planes of red, green and blue, in grey levels; see shade_taxim.wgsl for what may follow.
 @group(0) @binding(2) var<storage, read> rest: array<f32>;
-// Coefficients of the colour model, see shade_*.wgsl.
-@group(0) @binding(3) var<storage, read> colour: array<f32>;
+// Binding 3 is `colour`, the coefficients of the colour model: see shade_*.wgsl.
 // Standard normal values, equally likely.
 @group(0) @binding(4) var<storage, read> levels: array<f32>;
 @group(0) @binding(5) var<storage, read_write> packed: array<u32>;
@@ -32,7 +31,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let y = pixel / frame.width_px;
             var change = vec3<f32>(0.0, 0.0, 0.0);
             if pressed {
-                change = shade(x, y, gradient(x, y, image));
+                change = shade(x, y, image, gradient(x, y, image));
             }
             for (var channel = 0u; channel < 3u; channel++) {
                 var value = rest[channel * pixels + pixel] + change[channel];

@@ -2,6 +2,8 @@
 //
 // `colour` holds the coefficients in the order channel, component of the normal, term.
 
+@group(0) @binding(3) var<storage, read> colour: array<f32>;
+
 fn field(first: u32, terms: array<f32, 6>) -> f32 {
     var value = 0.0;
     for (var i = 0u; i < 6u; i++) {
@@ -31,7 +33,7 @@ fn lit(x: u32, y: u32, slope: vec2<f32>) -> vec3<f32> {
 }
 
 // The same against the gel at rest.
-fn shade(x: u32, y: u32, slope: vec2<f32>) -> vec3<f32> {
+fn shade(x: u32, y: u32, image: u32, slope: vec2<f32>) -> vec3<f32> {
     let change = lit(x, y, slope);
     if DOMED {
         return change - lit(x, y, slope_at_rest(x, y));

@@ -5,6 +5,8 @@
 // atan: its precision on a GPU is 4096 units in the last place. `rest` holds, after the rest frame, the background that
 // Taxim draws on less that frame.
 
+@group(0) @binding(3) var<storage, read> colour: array<f32>;
+
 const CALIBRATION_WIDTH_PX = 640.0;
 const MIDDLE_PX = vec2<f32>(320.0, 240.0);
 
@@ -52,7 +54,7 @@ fn direction_bin(direction: vec2<f32>) -> u32 {
 }
 
 // Change of red, green and blue in grey levels.
-fn shade(x: u32, y: u32, slope: vec2<f32>) -> vec3<f32> {
+fn shade(x: u32, y: u32, image: u32, slope: vec2<f32>) -> vec3<f32> {
     let pixels = frame.width_px * frame.height_px;
     let steepness = length(slope);
     var direction = vec2<f32>(1.0, 0.0);

@@ -5,6 +5,7 @@
 //! Results are within a tolerance of those of [`crate::Renderer`], not equal to the bit: the surface within 1e-4 pixels,
 //! and at most 0.05 % of the image's values more than one grey level apart.
 
+mod around;
 mod batch;
 mod colour;
 mod device;

@@ -64,6 +64,28 @@ struct Group {
     clusters: u32,
 }
 
+// Colours by regression: limits, and where the planes of its surroundings lie. Levels are counted from the finest.
+struct Regression {
+    mm_per_px: f32,
+    // Largest sine of a slope, and height, that the calibration has seen.
+    slope_limit: f32,
+    height_limit_mm: f32,
+    // Pixels along the side of a cell of level 0.
+    cell_px: u32,
+    columns: vec4<u32>,
+    rows: vec4<u32>,
+    // First float of each level's planes: smoothed along both axes, along one; differences of levels 2 and 3, ten
+    // planes each; colours of levels 0 and 1, three planes each.
+    heights: vec4<u32>,
+    half_way: vec4<u32>,
+    differences: vec4<u32>,
+    colours: vec4<u32>,
+    // The same for the mean heights of the cells of level 0, and the floats of one image.
+    means: u32,
+    image_floats: u32,
+    unused: vec2<u32>,
+}
+
 const HAS_PART = 1u;
 const HAS_NOISE = 2u;
 

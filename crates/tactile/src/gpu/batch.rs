@@ -1,6 +1,7 @@
 //! One sensor on the device: what stays there, and the passes of a batch.
 
 use super::GpuError;
+use super::around::Around;
 use super::colour::Colours;
 use super::device::Device;
 use super::layout::{Cluster, Frame, Group, Outcome, Press};
@@ -11,7 +12,9 @@ use super::rest::RestShape;
 use super::source::{Axis, Blur, Variant};
 use crate::grid::{Grid, Plane};
 use crate::noise::levels;
+use crate::render::Renderer;
 use crate::sensor::Sensor;
+use crate::simd::SimdLevel;
 use gripgen_twin::{Gel, TriMesh};
 use wgpu::BufferUsages;
 
@@ -48,13 +51,13 @@ impl GpuMesh {
 }
 
 /// A plane for every image of a batch.
-enum Planes {
+pub(super) enum Planes {
     Texture(wgpu::Texture, wgpu::TextureView),
     Buffer(wgpu::Buffer),
 }
 
 impl Planes {
-    fn binding(&self) -> wgpu::BindingResource<'_> {
+    pub(super) fn binding(&self) -> wgpu::BindingResource<'_> {
         match self {
             Planes::Texture(_, view) => wgpu::BindingResource::TextureView(view),
             Planes::Buffer(buffer) => buffer.as_entire_binding(),
@@ -63,10 +66,10 @@ impl Planes {
 }
 
 /// A dispatch with what it is bound to. Its third dimension is the image.
-struct Pass {
-    stage: Stage,
-    bound: wgpu::BindGroup,
-    groups: [u32; 2],
+pub(super) struct Pass {
+    pub(super) stage: Stage,
+    pub(super) bound: wgpu::BindGroup,
+    pub(super) groups: [u32; 2],
 }
 
 /// A sensor with its gel on the device: rest frame, colours, blurs, and the planes of one batch.
@@ -85,7 +88,8 @@ pub struct GpuSensor {
     packed: wgpu::Buffer,
     surface: Planes,
     indent: Pass,
-    blurs: Vec<Pass>,
+    /// Between the stages `indent` and `gradient`: the blurs, and the surroundings of colours by regression.
+    between: Vec<Pass>,
     image: Pass,
 }
 
@@ -107,17 +111,17 @@ impl GpuSensor {
         let limits = device.device.limits();
         let allowed = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let most = if device.adapter.software { SOFTWARE_BATCH } else { HARDWARE_BATCH };
-        let batch = most.min(allowed / (4 * pixels)).min(u64::from(limits.max_texture_array_layers));
+        let colours = Colours::new(sensor, gel)?;
+        let floats = pixels.max(colours.regression.map_or(0, |r| u64::from(r.image_floats)));
+        let batch = most.min(allowed / (4 * floats)).min(u64::from(limits.max_texture_array_layers));
         let image_groups = pixels.div_ceil(4).div_ceil(64);
         if batch == 0 || image_groups > u64::from(limits.max_compute_workgroups_per_dimension) {
-            return Err(GpuError::TooLarge { what: "image", bytes: 4 * pixels, allowed });
+            return Err(GpuError::TooLarge { what: "image", bytes: 4 * floats, allowed });
         }
-        let (kernels_px, restore_depth_fraction) = match &sensor.pyramid {
-            Some(pyramid) => (&pyramid.kernels_px, pyramid.restore_depth_fraction),
-            None => (&gel.kernels_px, gel.restore_depth_fraction),
-        };
-        let shape = RestShape::new(sensor.gel_shape.rest_px(&grid), &grid, kernels_px);
-        let colours = Colours::new(sensor, gel)?;
+        let on_processor = Renderer { sensor, gel, level: SimdLevel::best() };
+        let (kernels_px, restore_depth_fraction) = on_processor.pyramid();
+        let rest_px = sensor.gel_shape.rest_px(&grid);
+        let shape = RestShape::new(rest_px, &grid, kernels_px, on_processor.blurs_whole_gel());
         let frame = Frame {
             width_px: grid.width_px as u32,
             height_px: grid.height_px as u32,
@@ -133,7 +137,8 @@ impl GpuSensor {
         let frame = with_content(device, "frame", bytemuck::bytes_of(&frame), BufferUsages::UNIFORM);
         let gel_at_rest = resident(device, "gel at rest", &shape.rest_px);
         let rest = resident(device, "rest frame", &colours.rest);
-        let colour = resident(device, "colours", &colours.coefficients);
+        let colour = bytemuck::cast_slice(&colours.coefficients);
+        let colour = with_content(device, "colours", colour, BufferUsages::STORAGE | BufferUsages::UNIFORM);
         let noise = resident(device, "noise", levels());
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let buffer = |label, bytes: u64| empty(device, label, batch * bytes, storage);
@@ -152,7 +157,7 @@ impl GpuSensor {
             let bound = bind(device, &stage, all);
             Pass { stage, bound, groups: [1, 1] }
         };
-        let mut blurs = Vec::new();
+        let mut between = Vec::new();
         for (i, (kernel_px, restore)) in
             kernels_px.iter().map(|&k| (k, true)).chain([(crate::deform::FINAL_KERNEL_PX, false)]).enumerate()
         {
@@ -177,19 +182,24 @@ impl GpuSensor {
                 let (along, across) = (along.div_ceil(shape.span), across.div_ceil(shape.lines));
                 let sideways = axis == Axis::Y && matches!(pipelines.variant(), Variant::Texture { .. });
                 let groups = if sideways { [across, along] } else { [along, across] };
-                blurs.push(Pass { stage, bound, groups });
+                between.push(Pass { stage, bound, groups });
             }
         }
+        let around = Around::new(device, pipelines, &colours, &frame, &surface, batch)?;
         let image = {
-            let domed = !shape.lift_px.is_empty();
+            // Colours by regression look at the displacement alone.
+            let domed = shape.domed && around.is_none();
             let stage = pipelines.image(device, colours.shade, domed)?;
             let all =
                 [&frame, &presses, &rest, &colour, &noise, &packed].map(wgpu::Buffer::as_entire_binding);
-            let all = all.into_iter().chain([surface.binding()]);
-            let all: Vec<_> = all.chain(domed.then(|| gel_at_rest.as_entire_binding())).collect();
-            let bound = bind(device, &stage, all);
+            let all = all.into_iter().chain([surface.binding()]).enumerate().map(|(i, r)| (i as u32, r));
+            let all = all.chain(domed.then(|| (7, gel_at_rest.as_entire_binding())));
+            let regression = around.iter().flat_map(|a| [(8, &a.regression), (9, &a.cells)]);
+            let all = all.chain(regression.map(|(i, buffer)| (i, buffer.as_entire_binding())));
+            let bound = bind_at(device, &stage, all);
             Pass { stage, bound, groups: [image_groups as u32, 0] }
         };
+        between.extend(around.map(|a| a.passes).unwrap_or_default());
         device.check()?;
         Ok(Self {
             grid,
@@ -206,7 +216,7 @@ impl GpuSensor {
             packed,
             surface,
             indent,
-            blurs,
+            between,
             image,
         })
     }
@@ -249,8 +259,8 @@ impl GpuSensor {
                 pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
             };
             run(&self.indent, [images, 1, 1]);
-            for blur in &self.blurs {
-                run(blur, [blur.groups[0], blur.groups[1], images]);
+            for pass in &self.between {
+                run(pass, [pass.groups[0], pass.groups[1], images]);
             }
             run(&self.image, [self.image.groups[0], images, 1]);
         }
@@ -353,7 +363,7 @@ fn bind<'a>(
     bind_at(device, stage, resources.into_iter().enumerate().map(|(i, r)| (i as u32, r)))
 }
 
-fn bind_at<'a>(
+pub(super) fn bind_at<'a>(
     device: &Device,
     stage: &Stage,
     resources: impl IntoIterator<Item = (u32, wgpu::BindingResource<'a>)>,
@@ -367,7 +377,7 @@ fn bind_at<'a>(
     })
 }
 
-fn empty(device: &Device, label: &str, bytes: u64, usage: BufferUsages) -> wgpu::Buffer {
+pub(super) fn empty(device: &Device, label: &str, bytes: u64, usage: BufferUsages) -> wgpu::Buffer {
     device.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size: bytes,
@@ -376,7 +386,12 @@ fn empty(device: &Device, label: &str, bytes: u64, usage: BufferUsages) -> wgpu:
     })
 }
 
-fn with_content(device: &Device, label: &str, content: &[u8], usage: BufferUsages) -> wgpu::Buffer {
+pub(super) fn with_content(
+    device: &Device,
+    label: &str,
+    content: &[u8],
+    usage: BufferUsages,
+) -> wgpu::Buffer {
     let buffer = empty(device, label, content.len() as u64, usage | BufferUsages::COPY_DST);
     device.queue.write_buffer(&buffer, 0, content);
     buffer

@@ -1,6 +1,8 @@
 //! Colour models as the stage `shade` wants them.
 
 use super::GpuError;
+use super::around::{around_coefficients, near_coefficients, regression};
+use super::layout::Regression;
 use super::source::Shade;
 use crate::colour::ColourModel;
 use crate::sensor::Sensor;
@@ -12,8 +14,11 @@ pub(super) struct Colours {
     pub(super) shade: Shade,
     /// Bins of a table; 0 with lights.
     pub(super) bins: u32,
-    /// In the order that `shade_lambert.wgsl` and `shade_taxim.wgsl` describe.
+    /// In the order that `shade_*.wgsl` describe.
     pub(super) coefficients: Vec<f32>,
+    /// Limits and planes of colours by regression, and the coefficients of the surroundings.
+    pub(super) regression: Option<Regression>,
+    pub(super) around: Vec<f32>,
     /// Rest frame, and what a table adds to it where the gel is pressed.
     pub(super) rest: Vec<f32>,
 }
@@ -29,11 +34,18 @@ impl Colours {
         if sensor.shadow.is_some() {
             return Err(GpuError::Unsupported { what: "shadows" });
         }
-        let mut rest = sensor.rest.concat();
-        match &sensor.colour {
+        let rest = sensor.rest.concat();
+        let plain = Self {
+            shade: Shade::Lambert,
+            bins: 0,
+            coefficients: vec![],
+            regression: None,
+            around: vec![],
+            rest,
+        };
+        Ok(match &sensor.colour {
             ColourModel::Lambert(lambert) => {
-                let coefficients = lambert.coefficients().iter().map(|&c| c as f32).collect();
-                Ok(Self { shade: Shade::Lambert, bins: 0, coefficients, rest })
+                Self { coefficients: lambert.coefficients().iter().map(|&c| c as f32).collect(), ..plain }
             }
             ColourModel::Taxim(table) => {
                 let (slopes, directions) = table.borders();
@@ -41,47 +53,39 @@ impl Colours {
                 coefficients.extend(directions.iter().flatten().map(|&x| x as f32));
                 let channels = |bin: &[[f32; 4]; 6]| [0, 1, 2].map(|c| bin.map(|term| term[c]));
                 coefficients.extend(table.packed().iter().flat_map(channels).flatten());
+                let mut rest = plain.rest.clone();
                 rest.extend(table.offset().iter().flatten());
-                Ok(Self { shade: Shade::Taxim, bins: table.bins() as u32, coefficients, rest })
+                Self { shade: Shade::Taxim, bins: table.bins() as u32, coefficients, rest, ..plain }
             }
-            // Its surroundings are a pyramid of their own, which has no WGSL twin yet.
-            ColourModel::Regressor(_) => Err(GpuError::Unsupported { what: "colours by regression" }),
-        }
+            ColourModel::Regressor(model) => Self {
+                shade: Shade::Regressor,
+                coefficients: near_coefficients(model),
+                regression: Some(regression(model, &sensor.grid)),
+                around: around_coefficients(model),
+                ..plain
+            },
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::colour::Regressor;
-    use crate::grid::Grid;
-    use crate::sensor::GelShape;
+    use crate::gpu::tests::{gel, lights, sensor};
+    use crate::markers::Markers;
 
     #[test]
     fn what_has_no_twin_is_refused() {
-        let regressor = Regressor {
-            mm_per_px: 0.1,
-            near: vec![],
-            around: vec![],
-            slope_limit: 1.0,
-            height_limit_mm: 1.0,
-            around_limit: vec![],
-        };
-        let sensor = Sensor {
-            grid: Grid { width_px: 16, height_px: 16, metres_per_px: 1e-4 },
-            rest: [0, 1, 2].map(|_| vec![0.0; 256]),
-            noise_rgb: [0.0; 3],
-            colour: ColourModel::Regressor(Box::new(regressor)),
-            gel_shape: GelShape::Flat,
-            shadow: None,
-            markers: None,
-            pyramid: None,
-            ball_m: None,
-        };
-        let mut gel = crate::gpu::tests::gel(&[5]);
-        let refused = |gel: &Gel| Colours::new(&sensor, gel).err().map(|e| e.to_string());
-        assert_eq!(refused(&gel).unwrap(), "the gpu backend cannot do colours by regression");
-        gel.model = GelModel::Elastic;
-        assert_eq!(refused(&gel).unwrap(), "the gpu backend cannot do an elastic gel");
+        let mut marked = sensor(16, 16, lights());
+        let plain = gel(&[5]);
+        let refused = |sensor: &Sensor, gel: &Gel| Colours::new(sensor, gel).err().map(|e| e.to_string());
+        assert_eq!(refused(&marked, &plain), None);
+        marked.markers = Some(Markers { rest_px: vec![[8.0, 8.0]], radius_px: 2.0, darkness_rgb: [0.5; 3] });
+        let elastic = Some(gripgen_twin::Elastic { young_modulus_pa: 2e5, poisson_ratio: 0.48 });
+        let moving = Gel { elastic, ..gel(&[5]) };
+        assert_eq!(refused(&marked, &plain), None, "markers of a gel of unknown modulus do not move");
+        assert_eq!(refused(&marked, &moving).unwrap(), "the gpu backend cannot do markers");
+        let solved = Gel { model: GelModel::Elastic, ..moving };
+        assert_eq!(refused(&marked, &solved).unwrap(), "the gpu backend cannot do an elastic gel");
     }
 }

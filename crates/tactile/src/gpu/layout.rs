@@ -68,6 +68,25 @@ pub(super) struct Group {
     pub(super) clusters: u32,
 }
 
+/// Colours by regression.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Regression {
+    pub(super) mm_per_px: f32,
+    pub(super) slope_limit: f32,
+    pub(super) height_limit_mm: f32,
+    pub(super) cell_px: u32,
+    pub(super) columns: [u32; 4],
+    pub(super) rows: [u32; 4],
+    pub(super) heights: [u32; 4],
+    pub(super) half_way: [u32; 4],
+    pub(super) differences: [u32; 4],
+    pub(super) colours: [u32; 4],
+    pub(super) means: u32,
+    pub(super) image_floats: u32,
+    pub(super) unused: [u32; 2],
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,5 +130,21 @@ mod tests {
         compare!(Outcome, status, press_px, available_px3, core_px);
         compare!(Cluster, first_vertex, vertices, first_triangle, triangles, centre, half);
         compare!(Group, first_image, clusters);
+        compare!(
+            Regression,
+            mm_per_px,
+            slope_limit,
+            height_limit_mm,
+            cell_px,
+            columns,
+            rows,
+            heights,
+            half_way,
+            differences,
+            colours,
+            means,
+            image_floats,
+            unused
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use super::GpuError;
 use super::device::Device;
-use super::source::{self, Blur, BlurShape, Shade, Variant};
+use super::source::{self, Blur, BlurShape, Shade, Step, Variant};
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -20,6 +20,7 @@ enum Key {
     RasterFill,
     Indent,
     Blur(Blur),
+    Around(Step),
     Image(Shade, bool),
 }
 
@@ -53,6 +54,12 @@ impl Pipelines {
     pub(super) fn image(&self, device: &Device, shade: Shade, domed: bool) -> Result<Stage, GpuError> {
         let source = || Ok((source::image(self.variant, shade, domed), None));
         self.get(device, Key::Image(shade, domed), "main", source)
+    }
+
+    /// A step of the surroundings of colours by regression.
+    pub(super) fn around(&self, device: &Device, step: Step) -> Result<Stage, GpuError> {
+        let source = || Ok((source::around(self.variant, step), None));
+        self.get(device, Key::Around(step), step.entry_point(), source)
     }
 
     pub(super) fn blur(&self, device: &Device, blur: Blur) -> Result<Stage, GpuError> {

@@ -11,19 +11,23 @@ pub(super) struct RestShape {
     pub(super) rest_px: Vec<f32>,
     /// Deepest of them below 0.
     pub(super) sag_px: f64,
-    /// After each blur what is added: `G_0 - G_i` to the core, after the last blur `G_n - G_0` to all. None if flat.
+    /// Whether it is not flat.
+    pub(super) domed: bool,
+    /// After each blur what is added: `G_0 - G_i` to the core, after the last blur `G_n - G_0` to all. None if it is
+    /// flat, or the blurs work on the displacement alone.
     pub(super) lift_px: Vec<Vec<f32>>,
 }
 
 impl RestShape {
-    pub(super) fn new(rest: Option<Plane>, grid: &Grid, kernels_px: &[u32]) -> Self {
+    /// `whole_gel`: whether the blurs work on the whole gel (`Renderer::blurs_whole_gel`).
+    pub(super) fn new(rest: Option<Plane>, grid: &Grid, kernels_px: &[u32], whole_gel: bool) -> Self {
         let Some(rest) = rest else {
-            return Self { rest_px: vec![0.0; grid.len()], sag_px: 0.0, lift_px: vec![] };
+            return Self { rest_px: vec![0.0; grid.len()], sag_px: 0.0, domed: false, lift_px: vec![] };
         };
         let first: Vec<f64> = rest.values.iter().map(|&h| -f64::from(h)).collect();
         let mut blurred = first.clone();
         let mut lift_px = vec![];
-        for &kernel_px in kernels_px.iter().chain([&FINAL_KERNEL_PX]) {
+        for &kernel_px in kernels_px.iter().chain([&FINAL_KERNEL_PX]).take_while(|_| whole_gel) {
             blurred = blur(&blurred, grid, &gaussian(kernel_px));
             lift_px.push(first.iter().zip(&blurred).map(|(g0, g)| (g0 - g) as f32).collect::<Vec<f32>>());
         }
@@ -31,7 +35,7 @@ impl RestShape {
             last.iter_mut().for_each(|l| *l = -*l);
         }
         let sag_px = first.iter().fold(0.0, |m: f64, &s| m.max(s));
-        Self { rest_px: rest.values, sag_px, lift_px }
+        Self { rest_px: rest.values, sag_px, domed: true, lift_px }
     }
 }
 

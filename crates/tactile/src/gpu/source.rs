@@ -6,6 +6,9 @@ use std::fmt::Write;
 /// Threads of a workgroup of the tiled blur.
 const TILE_THREADS: u32 = 256;
 
+/// Length of the kernel that smooths a level of the surroundings.
+const BINOMIAL_PX: usize = 17;
+
 /// How planes are stored and blurs are made. Weights are literals in both: reading them from a buffer costs more than
 /// the arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -31,6 +34,39 @@ pub(super) enum Axis {
 pub(super) enum Shade {
     Lambert,
     Taxim,
+    Regressor,
+}
+
+/// A step of the surroundings of colours by regression, with its level of the pyramid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Step {
+    Average,
+    Smooth(u32, Axis),
+    Differentiate(u32),
+    Coarse,
+    Fine,
+}
+
+impl Step {
+    /// The level on whose cells it works.
+    pub(super) fn level(self) -> u32 {
+        match self {
+            Step::Average | Step::Fine => 0,
+            Step::Coarse => 1,
+            Step::Smooth(level, _) | Step::Differentiate(level) => level,
+        }
+    }
+
+    pub(super) fn entry_point(self) -> &'static str {
+        match self {
+            Step::Average => "average",
+            Step::Smooth(_, Axis::X) => "smooth_across",
+            Step::Smooth(_, Axis::Y) => "smooth_down",
+            Step::Differentiate(_) => "differentiate",
+            Step::Coarse => "coarse",
+            Step::Fine => "fine",
+        }
+    }
 }
 
 /// How the threads of a blur share the image.
@@ -106,6 +142,12 @@ pub(super) fn image(variant: Variant, shade: Shade, domed: bool) -> String {
     let shade = match shade {
         Shade::Lambert => include_str!("../../shaders/shade_lambert.wgsl"),
         Shade::Taxim => include_str!("../../shaders/shade_taxim.wgsl"),
+        Shade::Regressor => {
+            concat!(
+                include_str!("../../shaders/shade_regressor.wgsl"),
+                include_str!("../../shaders/shared/field.wgsl")
+            )
+        }
     };
     [
         common(include_str!("../../shaders/image.wgsl"))
@@ -121,6 +163,47 @@ pub(super) fn image(variant: Variant, shade: Shade, domed: bool) -> String {
         include_str!("../../shaders/noise.wgsl"),
     ]
     .concat()
+}
+
+/// The surroundings of colours by regression; a step is one of its entry points.
+pub(super) fn around(variant: Variant, step: Step) -> String {
+    // The binomial kernel of length 9 twice.
+    let half = BINOMIAL_PX / 2;
+    let mut weights = vec![1.0 / 65536.0];
+    for k in 1..BINOMIAL_PX {
+        weights.push(weights[k - 1] * (BINOMIAL_PX - k) as f64 / k as f64);
+    }
+    let sum = |value: &str| {
+        weights.iter().enumerate().fold(String::new(), |mut text, (k, weight)| {
+            let at = value.replace('#', &format!("{}", k as i32 - half as i32));
+            let _ = writeln!(text, "    sum = fma({weight:e}f, {at}, sum);");
+            text
+        })
+    };
+    let across = sum("unsmoothed(mirrored(i32(at.x) + #, regression.columns[LEVEL]), at.y, id.z)");
+    let down = sum("half_way(at.x, mirrored(i32(at.y) + #, regression.rows[LEVEL]), id.z)");
+    let mut differences = String::new();
+    for name in ["zx", "zy", "zxx", "zxy", "zyy", "zxxx", "zxxy", "zxyy", "zyyy"] {
+        // x of zyy rather than y of zxy, as on the processor.
+        let (from, axis) = match name {
+            "zxyy" => ("zyy", "x"),
+            _ => name.split_at(name.len() - 1),
+        };
+        let (after, before) =
+            if axis == "x" { ("x + 1u, y", "x - 1u, y") } else { ("x, y + 1u", "x, y - 1u") };
+        let _ = writeln!(
+            differences,
+            "fn {name}(x: u32, y: u32, image: u32) -> f32 {{\n    if !inner_{axis}({axis}) {{ return 0.0; }}\n    \
+             return 0.5 * ({from}({after}, image) - {from}({before}, image));\n}}\n"
+        );
+    }
+    common(include_str!("../../shaders/regressor_pyramid.wgsl"))
+        .replace("/*LEVEL*/", &step.level().to_string())
+        .replace("/*ACROSS*/", &across)
+        .replace("/*DOWN*/", &down)
+        .replace("/*DIFFERENCES*/", &differences)
+        .replace("//#PLANES", &readable(variant, "surface", 4))
+        + include_str!("../../shaders/shared/field.wgsl")
 }
 
 /// Lanes and values a thread of the tiled blur, as large as the workgroup memory allows; `None` if none does.

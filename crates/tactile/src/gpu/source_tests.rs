@@ -1,6 +1,6 @@
 //! Every WGSL source that can be generated, without an adapter. Whether it computes the right thing is for `tests.rs`.
 
-use super::source::{self, Axis, Blur, Shade, Variant};
+use super::source::{self, Axis, Blur, Shade, Step, Variant};
 use wgpu::naga;
 
 const VARIANTS: [Variant; 3] = [Variant::Texture { run: 16 }, Variant::Texture { run: 40 }, Variant::Tile];
@@ -40,12 +40,25 @@ fn every_stage_validates() {
         let indent = source::indent(variant);
         no_markers(&indent);
         assert!(workgroup_bytes(&validate("indent", &indent)) <= 16_384);
-        for (shade, domed) in
-            [(Shade::Lambert, false), (Shade::Lambert, true), (Shade::Taxim, false), (Shade::Taxim, true)]
-        {
+        for (shade, domed) in [
+            (Shade::Lambert, false),
+            (Shade::Lambert, true),
+            (Shade::Taxim, false),
+            (Shade::Taxim, true),
+            (Shade::Regressor, false),
+        ] {
             let image = source::image(variant, shade, domed);
             no_markers(&image);
             validate("image", &image);
+        }
+        let smooth = (0..4).flat_map(|level| [Axis::X, Axis::Y].map(|axis| Step::Smooth(level, axis)));
+        let others =
+            [Step::Average, Step::Differentiate(2), Step::Differentiate(3), Step::Coarse, Step::Fine];
+        for step in smooth.chain(others) {
+            let source = source::around(variant, step);
+            no_markers(&source);
+            let module = validate("surroundings", &source);
+            assert!(module.entry_points.iter().any(|e| e.name == step.entry_point()));
         }
     }
 }

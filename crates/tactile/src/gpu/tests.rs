@@ -3,9 +3,10 @@
 //! Run on Mesa's lavapipe where there is no other adapter: it shows that results are right, not how fast they are.
 
 use super::*;
-use crate::colour::{ColourModel, Lambert, Light, TaximTable};
+use crate::colour::regressor::{AROUND_FIELD, AROUND_HEIGHTS, NEAR, NEAR_FIELD, SURROUNDINGS};
+use crate::colour::{ColourModel, Lambert, Light, Regressor, TaximTable};
 use crate::npz::{Array, ElementType, Npz, write_npz};
-use crate::sensor::GelShape;
+use crate::sensor::{GelShape, Pyramid};
 use crate::{ClusteredMesh, Grid, Renderer, SimdLevel, finish};
 use gripgen_twin::frames::{pose, rotation_from_fixed_xyz};
 use gripgen_twin::parts::{BallBearing, InvoluteGear, SteppedShaft};
@@ -49,7 +50,22 @@ fn taxim_table(width_px: usize, height_px: usize) -> TaximTable {
     TaximTable::read(&mut Npz::open(&bytes).unwrap(), &frame).unwrap()
 }
 
-fn lights() -> ColourModel {
+/// Regression with every coefficient in use, and limits that some presses reach.
+fn regression(width_px: usize) -> ColourModel {
+    let number = |i: usize| ((i * 7919 + 13) % 1009) as f32 / 504.5 - 1.0;
+    let mut around_limit = vec![0.3; SURROUNDINGS];
+    AROUND_HEIGHTS.iter().for_each(|&i| around_limit[i] = 0.6);
+    ColourModel::Regressor(Box::new(Regressor {
+        mm_per_px: 28.0 / width_px as f64,
+        near: (0..3 * NEAR * NEAR_FIELD).map(|i| 12.0 * number(i)).collect(),
+        around: (0..3 * SURROUNDINGS * AROUND_FIELD).map(|i| 10.0 * number(i + 77)).collect(),
+        slope_limit: 0.75,
+        height_limit_mm: 1.0,
+        around_limit,
+    }))
+}
+
+pub(super) fn lights() -> ColourModel {
     let light = |azimuth_deg: f64, colour| Light {
         azimuth_rad: azimuth_deg.to_radians(),
         elevation_rad: 0.6,
@@ -63,7 +79,7 @@ fn lights() -> ColourModel {
     ])))
 }
 
-fn sensor(width_px: usize, height_px: usize, colour: ColourModel) -> Sensor {
+pub(super) fn sensor(width_px: usize, height_px: usize, colour: ColourModel) -> Sensor {
     let rest = [90.0, 110.0, 120.0].map(|base| {
         (0..width_px * height_px).map(|i| base + (i % width_px) as f32 * 0.05).collect::<Vec<f32>>()
     });
@@ -219,12 +235,35 @@ fn colours_of_a_taxim_table_agree_with_the_processor() {
     }
 }
 
+/// Images of even and odd size, with cells of one pixel and of three, and levels smaller than the kernel that smooths
+/// them. Much smaller images differ by what the straight lines of the processor's blocks of 16 pixels leave out.
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn colours_by_regression_agree_with_the_processor() {
+    for gpu in both_variants() {
+        compare(&gpu, &sensor(320, 240, regression(320)), &gel(&PYRAMID), 0.0);
+        compare(&gpu, &sensor(131, 97, regression(131)), &gel(&[31, 21, 7, 3]), 0.0);
+        compare(&gpu, &sensor(80, 53, regression(80)), &gel(&[11, 5]), 0.0);
+    }
+}
+
+/// A calibrated sensor says which kernels its gel has.
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn the_deformation_of_the_calibration_is_used() {
+    let mut calibrated = sensor(160, 120, regression(160));
+    calibrated.pyramid = Some(Pyramid { kernels_px: vec![31, 15, 5], restore_depth_fraction: 0.25 });
+    for gpu in both_variants() {
+        compare(&gpu, &calibrated, &gel(&[71, 5]), 0.0);
+    }
+}
+
 /// Without contact the image is the rest frame, with the same noise to the bit.
 #[test]
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn a_gel_at_rest_gives_the_same_bytes() {
     for gpu in both_variants() {
-        for colour in [lights(), ColourModel::Taxim(Box::new(taxim_table(67, 45)))] {
+        for colour in [lights(), regression(67), ColourModel::Taxim(Box::new(taxim_table(67, 45)))] {
             let sensor = sensor(67, 45, colour);
             let mut there = gpu.sensor(&sensor, &gel(&[11, 5])).unwrap();
             let keys = [None, Some(0), Some(7), Some(u64::MAX), Some(99 << 32 | 17)];
@@ -290,7 +329,7 @@ fn a_missing_adapter_is_one_clear_line() {
 #[test]
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn domed_gels_agree_with_the_processor() {
-    for colour in [lights(), ColourModel::Taxim(Box::new(taxim_table(200, 150)))] {
+    for colour in [lights(), regression(200), ColourModel::Taxim(Box::new(taxim_table(200, 150)))] {
         let mut domed = sensor(200, 150, colour);
         domed.gel_shape = GelShape::Dome { sag_m: 1e-3 };
         for gpu in both_variants() {
