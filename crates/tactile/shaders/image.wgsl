@@ -31,7 +31,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let y = pixel / frame.width_px;
             var change = vec3<f32>(0.0, 0.0, 0.0);
             if pressed {
-                change = shade(x, y, image, gradient(x, y, image));
+                change = changed(x, y, image);
             }
             for (var channel = 0u; channel < 3u; channel++) {
                 var value = rest[channel * pixels + pixel] + change[channel];

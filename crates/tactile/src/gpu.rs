@@ -7,6 +7,7 @@
 
 mod around;
 mod batch;
+mod cast;
 mod colour;
 mod device;
 mod layout;

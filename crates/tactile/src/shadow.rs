@@ -5,10 +5,12 @@
 //! is a length on the gel here, so that a table serves any resolution; at Taxim's own it is the same pixels.
 
 mod blur;
+mod flat;
 mod presses;
 mod rays;
 mod table;
 
+pub(crate) use flat::FlatShadow;
 pub use presses::{BallPress, shadow_from_presses};
 pub use table::{ShadowKind, ShadowTable};
 

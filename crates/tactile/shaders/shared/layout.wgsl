@@ -86,6 +86,26 @@ struct Regression {
     unused: vec2<u32>,
 }
 
+// A shadow table.
+struct Shadows {
+    // Pixels around the core of a contact from which rays go out.
+    rim_px: u32,
+    // Rows and sectors of direction.
+    heights: u32,
+    directions: u32,
+    // Whether the outermost rows hold beyond their heights.
+    held: u32,
+    first_px: f32,
+    per_px: f32,
+}
+
+// One blur of shadows along one axis.
+struct ShadowBlur {
+    radius: i32,
+    edge_once: u32,
+    down: u32,
+}
+
 const HAS_PART = 1u;
 const HAS_NOISE = 2u;
 

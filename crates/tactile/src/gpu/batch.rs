@@ -2,6 +2,7 @@
 
 use super::GpuError;
 use super::around::Around;
+use super::cast::{Cast, Scene, ceiling};
 use super::colour::Colours;
 use super::device::Device;
 use super::layout::{Cluster, Frame, Group, Outcome, Press};
@@ -85,10 +86,12 @@ pub struct GpuSensor {
     tops: wgpu::Buffer,
     heights: wgpu::Buffer,
     outcomes: wgpu::Buffer,
+    /// What the rays of shadows leave; 0 at the start of a batch.
+    lowest: Option<wgpu::Buffer>,
     packed: wgpu::Buffer,
     surface: Planes,
     indent: Pass,
-    /// Between the stages `indent` and `gradient`: the blurs, and the surroundings of colours by regression.
+    /// Between the stages `indent` and `gradient`: the blurs, the surroundings of colours by regression, shadows.
     between: Vec<Pass>,
     image: Pass,
 }
@@ -112,7 +115,8 @@ impl GpuSensor {
         let allowed = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let most = if device.adapter.software { SOFTWARE_BATCH } else { HARDWARE_BATCH };
         let colours = Colours::new(sensor, gel)?;
-        let floats = pixels.max(colours.regression.map_or(0, |r| u64::from(r.image_floats)));
+        let planes = if colours.shadows.is_some() { 3 * pixels } else { pixels };
+        let floats = planes.max(colours.regression.map_or(0, |r| u64::from(r.image_floats)));
         let batch = most.min(allowed / (4 * floats)).min(u64::from(limits.max_texture_array_layers));
         let image_groups = pixels.div_ceil(4).div_ceil(64);
         if batch == 0 || image_groups > u64::from(limits.max_compute_workgroups_per_dimension) {
@@ -186,20 +190,42 @@ impl GpuSensor {
             }
         }
         let around = Around::new(device, pipelines, &colours, &frame, &surface, batch)?;
+        // What stage `shade` reads beside the surface.
+        let regression = around.iter().flat_map(|a| [(8, &a.regression), (9, &a.cells)]);
+        let shading = [(2, &rest), (3, &colour)].into_iter().chain(regression);
+        let shading: Vec<_> = shading.map(|(i, buffer)| (i, buffer.as_entire_binding())).collect();
+        let cast = match &colours.shadows {
+            None => None,
+            Some(flat) => {
+                let scene = Scene {
+                    grid: &grid,
+                    frame: &frame,
+                    outcomes: &outcomes,
+                    surface: &surface,
+                    contact: &contact,
+                    gel: shape.domed.then_some(&gel_at_rest),
+                    shade: colours.shade,
+                    shading: shading.clone(),
+                };
+                Some(Cast::new(device, pipelines, flat, scene, batch)?)
+            }
+        };
         let image = {
             // Colours by regression look at the displacement alone.
             let domed = shape.domed && around.is_none();
-            let stage = pipelines.image(device, colours.shade, domed)?;
-            let all =
-                [&frame, &presses, &rest, &colour, &noise, &packed].map(wgpu::Buffer::as_entire_binding);
-            let all = all.into_iter().chain([surface.binding()]).enumerate().map(|(i, r)| (i as u32, r));
-            let all = all.chain(domed.then(|| (7, gel_at_rest.as_entire_binding())));
-            let regression = around.iter().flat_map(|a| [(8, &a.regression), (9, &a.cells)]);
-            let all = all.chain(regression.map(|(i, buffer)| (i, buffer.as_entire_binding())));
+            let shadows = colours.shadows.as_ref().map(ceiling);
+            let stage = pipelines.image(device, colours.shade, domed, shadows)?;
+            let own = [(0, &frame), (1, &presses), (4, &noise), (5, &packed)];
+            let own = own.into_iter().chain(domed.then_some((7, &gel_at_rest)));
+            let own = own.chain(cast.as_ref().map(|c| (10, &c.dark)));
+            let own = own.map(|(i, buffer)| (i, buffer.as_entire_binding()));
+            let all = own.chain([(6, surface.binding())]).chain(shading);
             let bound = bind_at(device, &stage, all);
             Pass { stage, bound, groups: [image_groups as u32, 0] }
         };
         between.extend(around.map(|a| a.passes).unwrap_or_default());
+        let lowest = cast.as_ref().map(|c| c.lowest.clone());
+        between.extend(cast.map(|c| c.passes).unwrap_or_default());
         device.check()?;
         Ok(Self {
             grid,
@@ -213,6 +239,7 @@ impl GpuSensor {
             tops,
             heights,
             outcomes,
+            lowest,
             packed,
             surface,
             indent,
@@ -233,6 +260,9 @@ impl GpuSensor {
         let mut encoder = device.device.create_command_encoder(&Default::default());
         encoder.clear_buffer(&self.tops, 0, Some(4 * u64::from(images)));
         encoder.clear_buffer(&self.heights, 0, Some(4 * u64::from(images) * self.grid.len() as u64));
+        if let Some(lowest) = &self.lowest {
+            encoder.clear_buffer(lowest, 0, Some(12 * u64::from(images) * self.grid.len() as u64));
+        }
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             for &(first, count, mesh) in runs {
@@ -397,6 +427,6 @@ pub(super) fn with_content(
     buffer
 }
 
-fn resident<T: bytemuck::NoUninit>(device: &Device, label: &str, content: &[T]) -> wgpu::Buffer {
+pub(super) fn resident<T: bytemuck::NoUninit>(device: &Device, label: &str, content: &[T]) -> wgpu::Buffer {
     with_content(device, label, bytemuck::cast_slice(content), BufferUsages::STORAGE)
 }

@@ -6,6 +6,7 @@ use super::layout::Regression;
 use super::source::Shade;
 use crate::colour::ColourModel;
 use crate::sensor::Sensor;
+use crate::shadow::FlatShadow;
 use gripgen_twin::Gel;
 use gripgen_twin::config::GelModel;
 
@@ -19,7 +20,8 @@ pub(super) struct Colours {
     /// Limits and planes of colours by regression, and the coefficients of the surroundings.
     pub(super) regression: Option<Regression>,
     pub(super) around: Vec<f32>,
-    /// Rest frame, and what a table adds to it where the gel is pressed.
+    pub(super) shadows: Option<FlatShadow>,
+    /// Rest frame, what a table adds to it where the gel is pressed, and what takes its place under Taxim's shadows.
     pub(super) rest: Vec<f32>,
 }
 
@@ -31,9 +33,7 @@ impl Colours {
         if sensor.markers.is_some() && gel.elastic.is_some() {
             return Err(GpuError::Unsupported { what: "markers" });
         }
-        if sensor.shadow.is_some() {
-            return Err(GpuError::Unsupported { what: "shadows" });
-        }
+        let shadows = sensor.shadow.as_ref().map(|shadow| shadow.flat());
         let rest = sensor.rest.concat();
         let plain = Self {
             shade: Shade::Lambert,
@@ -41,9 +41,10 @@ impl Colours {
             coefficients: vec![],
             regression: None,
             around: vec![],
+            shadows: None,
             rest,
         };
-        Ok(match &sensor.colour {
+        let colours = match &sensor.colour {
             ColourModel::Lambert(lambert) => {
                 Self { coefficients: lambert.coefficients().iter().map(|&c| c as f32).collect(), ..plain }
             }
@@ -55,6 +56,7 @@ impl Colours {
                 coefficients.extend(table.packed().iter().flat_map(channels).flatten());
                 let mut rest = plain.rest.clone();
                 rest.extend(table.offset().iter().flatten());
+                rest.extend(shadows.iter().filter_map(|s| s.base.as_ref()).flatten().flatten());
                 Self { shade: Shade::Taxim, bins: table.bins() as u32, coefficients, rest, ..plain }
             }
             ColourModel::Regressor(model) => Self {
@@ -64,7 +66,8 @@ impl Colours {
                 around: around_coefficients(model),
                 ..plain
             },
-        })
+        };
+        Ok(Self { shadows, ..colours })
     }
 }
 

@@ -87,6 +87,27 @@ pub(super) struct Regression {
     pub(super) unused: [u32; 2],
 }
 
+/// A shadow table.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Shadows {
+    pub(super) rim_px: u32,
+    pub(super) heights: u32,
+    pub(super) directions: u32,
+    pub(super) held: u32,
+    pub(super) first_px: f32,
+    pub(super) per_px: f32,
+}
+
+/// One blur of shadows along one axis.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct ShadowBlur {
+    pub(super) radius: i32,
+    pub(super) edge_once: u32,
+    pub(super) down: u32,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,6 +151,8 @@ mod tests {
         compare!(Outcome, status, press_px, available_px3, core_px);
         compare!(Cluster, first_vertex, vertices, first_triangle, triangles, centre, half);
         compare!(Group, first_image, clusters);
+        compare!(Shadows, rim_px, heights, directions, held, first_px, per_px);
+        compare!(ShadowBlur, radius, edge_once, down);
         compare!(
             Regression,
             mm_per_px,

@@ -2,7 +2,7 @@
 
 use super::GpuError;
 use super::device::Device;
-use super::source::{self, Blur, BlurShape, Shade, Step, Variant};
+use super::source::{self, Blur, BlurShape, Ceiling, Shade, Step, Variant};
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -21,7 +21,10 @@ enum Key {
     Indent,
     Blur(Blur),
     Around(Step),
-    Image(Shade, bool),
+    Image(Shade, bool, Option<Ceiling>),
+    ShadowRays(bool),
+    ShadowMerge(Shade, bool, Ceiling),
+    ShadowBlur,
 }
 
 /// All pipelines of a renderer.
@@ -51,9 +54,35 @@ impl Pipelines {
         self.get(device, Key::Indent, "main", || Ok((source::indent(self.variant), None)))
     }
 
-    pub(super) fn image(&self, device: &Device, shade: Shade, domed: bool) -> Result<Stage, GpuError> {
-        let source = || Ok((source::image(self.variant, shade, domed), None));
-        self.get(device, Key::Image(shade, domed), "main", source)
+    pub(super) fn image(
+        &self,
+        device: &Device,
+        shade: Shade,
+        domed: bool,
+        shadows: Option<Ceiling>,
+    ) -> Result<Stage, GpuError> {
+        let source = || Ok((source::image(self.variant, shade, domed, shadows), None));
+        self.get(device, Key::Image(shade, domed, shadows), "main", source)
+    }
+
+    pub(super) fn shadow_rays(&self, device: &Device, domed: bool) -> Result<Stage, GpuError> {
+        let source = || Ok((source::shadow_rays(self.variant, domed), None));
+        self.get(device, Key::ShadowRays(domed), "main", source)
+    }
+
+    pub(super) fn shadow_merge(
+        &self,
+        device: &Device,
+        shade: Shade,
+        domed: bool,
+        kind: Ceiling,
+    ) -> Result<Stage, GpuError> {
+        let source = || Ok((source::shadow_merge(self.variant, shade, domed, kind), None));
+        self.get(device, Key::ShadowMerge(shade, domed, kind), "main", source)
+    }
+
+    pub(super) fn shadow_blur(&self, device: &Device) -> Result<Stage, GpuError> {
+        self.get(device, Key::ShadowBlur, "main", || Ok((source::shadow_blur(), None)))
     }
 
     /// A step of the surroundings of colours by regression.

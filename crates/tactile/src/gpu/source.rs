@@ -6,6 +6,8 @@ use std::fmt::Write;
 /// Threads of a workgroup of the tiled blur.
 const TILE_THREADS: u32 = 256;
 
+const GRADIENT: &str = include_str!("../../shaders/gradient.wgsl");
+
 /// Length of the kernel that smooths a level of the surroundings.
 const BINOMIAL_PX: usize = 17;
 
@@ -35,6 +37,17 @@ pub(super) enum Shade {
     Lambert,
     Taxim,
     Regressor,
+}
+
+/// What the values of a shadow table are to the image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Ceiling {
+    /// They are added.
+    Added,
+    /// They bound what any other colours than Taxim's change.
+    Relative,
+    /// They bound Taxim's image without its background.
+    Taxim,
 }
 
 /// A step of the surroundings of colours by regression, with its level of the pyramid.
@@ -137,32 +150,71 @@ pub(super) fn indent(variant: Variant) -> String {
     common(include_str!("../../shaders/indent.wgsl")).replace("//#PLANES", &writable(variant, "contact", 4))
 }
 
-/// Stages `gradient`, `shade` and `noise`.
-pub(super) fn image(variant: Variant, shade: Shade, domed: bool) -> String {
+/// The gel at rest: `whole_surface` and `slope_at_rest`.
+fn gel(domed: bool) -> &'static str {
+    match domed {
+        true => include_str!("../../shaders/shared/domed.wgsl"),
+        false => include_str!("../../shaders/shared/flat.wgsl"),
+    }
+}
+
+/// Stages `gradient` and `shade`.
+fn shading(shade: Shade, domed: bool) -> String {
     let shade = match shade {
         Shade::Lambert => include_str!("../../shaders/shade_lambert.wgsl"),
         Shade::Taxim => include_str!("../../shaders/shade_taxim.wgsl"),
-        Shade::Regressor => {
-            concat!(
-                include_str!("../../shaders/shade_regressor.wgsl"),
-                include_str!("../../shaders/shared/field.wgsl")
-            )
-        }
+        Shade::Regressor => concat!(
+            include_str!("../../shaders/shade_regressor.wgsl"),
+            include_str!("../../shaders/shared/field.wgsl")
+        ),
     };
-    [
-        common(include_str!("../../shaders/image.wgsl"))
-            .replace("//#PLANES", &readable(variant, "surface", 6))
-            .as_str(),
-        if domed {
-            include_str!("../../shaders/shared/domed.wgsl")
-        } else {
-            include_str!("../../shaders/shared/flat.wgsl")
-        },
-        include_str!("../../shaders/gradient.wgsl"),
-        shade,
-        include_str!("../../shaders/noise.wgsl"),
-    ]
-    .concat()
+    [gel(domed), GRADIENT, shade].concat()
+}
+
+/// Stages `gradient`, `shade` and `noise`, on top of `shadows`.
+pub(super) fn image(variant: Variant, shade: Shade, domed: bool, shadows: Option<Ceiling>) -> String {
+    let changed = match shadows {
+        None => include_str!("../../shaders/shared/unshadowed.wgsl").to_string(),
+        Some(kind) => include_str!("../../shaders/shared/shadowed.wgsl")
+            .replace("/*INSTEAD*/", if kind == Ceiling::Taxim { "true" } else { "false" }),
+    };
+    common(include_str!("../../shaders/image.wgsl")).replace("//#PLANES", &readable(variant, "surface", 6))
+        + &shading(shade, domed)
+        + &changed
+        + include_str!("../../shaders/noise.wgsl")
+}
+
+/// Stage `shadow`, the rays.
+pub(super) fn shadow_rays(variant: Variant, domed: bool) -> String {
+    let planes = readable(variant, "surface", 6) + &readable(variant, "contact", 8);
+    common(include_str!("../../shaders/shadow_rays.wgsl")).replace("//#PLANES", &planes)
+        + gel(domed)
+        + GRADIENT
+}
+
+/// Stage `shadow`, between rays and blurs.
+pub(super) fn shadow_merge(variant: Variant, shade: Shade, domed: bool, kind: Ceiling) -> String {
+    let (planes, unshadowed) = match kind {
+        Ceiling::Added => (
+            String::new(),
+            "fn unshadowed(x: u32, y: u32, image: u32) -> vec3<f32> {\n    return vec3<f32>();\n}\n".into(),
+        ),
+        Ceiling::Relative | Ceiling::Taxim => (
+            readable(variant, "surface", 6),
+            shading(shade, domed)
+                + "fn unshadowed(x: u32, y: u32, image: u32) -> vec3<f32> {\n    \
+                   return shade(x, y, image, gradient(x, y, image));\n}\n",
+        ),
+    };
+    common(include_str!("../../shaders/shadow_merge.wgsl"))
+        .replace("//#PLANES", &planes)
+        .replace("/*KIND*/", &(kind as u32).to_string())
+        + &unshadowed
+}
+
+/// Stage `shadow`, a blur.
+pub(super) fn shadow_blur() -> String {
+    common(include_str!("../../shaders/shadow_blur.wgsl"))
 }
 
 /// The surroundings of colours by regression; a step is one of its entry points.

@@ -1,6 +1,6 @@
 //! Every WGSL source that can be generated, without an adapter. Whether it computes the right thing is for `tests.rs`.
 
-use super::source::{self, Axis, Blur, Shade, Step, Variant};
+use super::source::{self, Axis, Blur, Ceiling, Shade, Step, Variant};
 use wgpu::naga;
 
 const VARIANTS: [Variant; 3] = [Variant::Texture { run: 16 }, Variant::Texture { run: 40 }, Variant::Tile];
@@ -36,6 +36,7 @@ fn every_stage_validates() {
     let raster = validate("raster", &source::raster());
     // The least that WebGPU allows.
     assert!(workgroup_bytes(&raster) <= 16_384, "{} bytes", workgroup_bytes(&raster));
+    validate("blur of shadows", &source::shadow_blur());
     for variant in VARIANTS {
         let indent = source::indent(variant);
         no_markers(&indent);
@@ -47,9 +48,20 @@ fn every_stage_validates() {
             (Shade::Taxim, true),
             (Shade::Regressor, false),
         ] {
-            let image = source::image(variant, shade, domed);
-            no_markers(&image);
-            validate("image", &image);
+            let kinds = [Ceiling::Added, Ceiling::Relative, Ceiling::Taxim];
+            for shadows in kinds.into_iter().map(Some).chain([None]) {
+                let image = source::image(variant, shade, domed, shadows);
+                no_markers(&image);
+                validate("image", &image);
+            }
+            for kind in kinds {
+                let merge = source::shadow_merge(variant, shade, domed, kind);
+                no_markers(&merge);
+                validate("merge", &merge);
+            }
+            let rays = source::shadow_rays(variant, domed);
+            no_markers(&rays);
+            assert!(workgroup_bytes(&validate("rays", &rays)) <= 16_384);
         }
         let smooth = (0..4).flat_map(|level| [Axis::X, Axis::Y].map(|axis| Step::Smooth(level, axis)));
         let others =

@@ -7,6 +7,7 @@ use crate::colour::regressor::{AROUND_FIELD, AROUND_HEIGHTS, NEAR, NEAR_FIELD, S
 use crate::colour::{ColourModel, Lambert, Light, Regressor, TaximTable};
 use crate::npz::{Array, ElementType, Npz, write_npz};
 use crate::sensor::{GelShape, Pyramid};
+use crate::shadow::{Shadow, ShadowKind, ShadowTable};
 use crate::{ClusteredMesh, Grid, Renderer, SimdLevel, finish};
 use gripgen_twin::frames::{pose, rotation_from_fixed_xyz};
 use gripgen_twin::parts::{BallBearing, InvoluteGear, SteppedShaft};
@@ -258,13 +259,65 @@ fn the_deformation_of_the_calibration_is_used() {
     }
 }
 
+/// Rays as long as a sensor's, longer in some directions, of some rows and of some channels. Some contacts lie below and
+/// above its rows.
+fn shadow_table(kind: ShadowKind) -> ShadowTable {
+    let heights = 4;
+    let ray = |i: usize, c: usize| -> Vec<f32> {
+        let steps = 8 + (i * 7 + c * 5) % 40;
+        (0..steps).map(|s| -40.0 * (1.0 - s as f32 / steps as f32) - ((i + c) % 5) as f32).collect()
+    };
+    ShadowTable {
+        kind,
+        directions_rad: (0..63).map(|n| f64::from(n) * 0.1).collect(),
+        first_height_m: 0.2e-3,
+        height_step_m: 0.1e-3,
+        heights,
+        step_m: 0.08e-3,
+        rays: (0..63 * heights).map(|i| [0, 1, 2].map(|c| ray(i, c))).collect(),
+    }
+}
+
+fn with_shadows(mut sensor: Sensor, kind: ShadowKind) -> Sensor {
+    let (grid, colour) = (&sensor.grid, &sensor.colour);
+    let shadow = Shadow::new(shadow_table(kind), grid.metres_per_px, grid.width_px, colour);
+    sensor.shadow = Some(Box::new(shadow));
+    sensor
+}
+
+/// Both kinds of table with every kind of colours, also on a gel that is not flat. Turned, since the sectors of direction
+/// have borders along the axes of the image too.
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+fn shadows_agree_with_the_processor() {
+    let taxim = || ColourModel::Taxim(Box::new(taxim_table(200, 150)));
+    let (flat, dome) = (GelShape::Flat, GelShape::Dome { sag_m: 1e-3 });
+    let (added, ceiling) = (ShadowKind::Darkening, ShadowKind::Ceiling);
+    for (kind, colour, gel_shape) in [
+        (added, lights(), &flat),
+        (added, regression(200), &dome),
+        (added, taxim(), &flat),
+        (ceiling, lights(), &dome),
+        (ceiling, regression(200), &dome),
+        (ceiling, taxim(), &flat),
+        (ceiling, taxim(), &dome),
+    ] {
+        let mut plain = sensor(200, 150, colour);
+        plain.gel_shape = gel_shape.clone();
+        let shadowed = with_shadows(plain, kind);
+        for gpu in both_variants() {
+            compare(&gpu, &shadowed, &gel(&[51, 21, 11, 5]), 0.01);
+        }
+    }
+}
+
 /// Without contact the image is the rest frame, with the same noise to the bit.
 #[test]
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn a_gel_at_rest_gives_the_same_bytes() {
     for gpu in both_variants() {
         for colour in [lights(), regression(67), ColourModel::Taxim(Box::new(taxim_table(67, 45)))] {
-            let sensor = sensor(67, 45, colour);
+            let sensor = with_shadows(sensor(67, 45, colour), ShadowKind::Ceiling);
             let mut there = gpu.sensor(&sensor, &gel(&[11, 5])).unwrap();
             let keys = [None, Some(0), Some(7), Some(u64::MAX), Some(99 << 32 | 17)];
             let requests = keys.map(|noise_key| GpuRequest { press: None, noise_key });
