@@ -3,9 +3,9 @@
 //! On Mesa's lavapipe, by name. Stages alone are compared in `crates/tactile/src/gpu/tests.rs`.
 
 use crate::common::{jobs, run, small_project};
-use gripgen::record::{RunFolder, ShardReader};
+use gripgen::record::{Record, RunFolder, ShardReader};
 use gripgen::tactile::gpu::GpuError;
-use gripgen::{SweepError, SweepEvent, sweep};
+use gripgen::{Location, Project, SweepError, SweepEvent, sweep};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -59,6 +59,36 @@ fn a_gpu_sweep_has_the_same_labels_and_images_within_the_tolerance() {
     let recorded = RunFolder::open(gpu.path()).unwrap().info().gpu_adapter.clone().unwrap();
     assert!(recorded.contains("llvmpipe") && recorded.contains("software"), "{recorded}");
     assert_eq!(RunFolder::open(cpu.path()).unwrap().info().gpu_adapter, None);
+}
+
+/// Optics effects are the processor's: what they change has the bytes of a sweep without a graphics processor. Samples
+/// of the same sweep that they leave alone are the device's.
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set: no Vulkan driver was found")]
+fn images_that_optics_effects_change_are_those_of_the_processor() {
+    let twin = "[parts.gear]\nmesh = \"asset:parts/gear/part.stl\"\nmu = 0.2\nimprint_mm3_per_n = 1.5\n\
+                [[parts.gear.grips]]\norientation_deg = [0.0, 0.0, 90.0]\n\
+                [[effects]]\nname = \"light_drift\"\nred_per_h = 0.2\nblue_per_h = -0.1\n";
+    let sweep = "twin = \"twin.toml\"\nsamples = 6\nimages = \"png\"\nmechanics = \"reduced\"\n\
+                 [vary]\ngrip_force_n = [30, 35, 40]\ntime_s = [0, 3600]\n";
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
+    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
+    let at = Location::Disk(folder.path().join("sweep.toml"));
+    let made = |sets: &[&str], out: &Path| {
+        let sets = sets.iter().filter_map(|s| s.split_once('=')).map(|(k, v)| (k.into(), v.into()));
+        run(&Project::load(&at, &sets.collect::<Vec<_>>()).unwrap(), out, jobs(2));
+        let reader = ShardReader::open(&RunFolder::open(out).unwrap().shard_path(0)).unwrap();
+        let records: Vec<_> = reader.indices().map(|i| reader.record(i).unwrap()).collect();
+        records
+    };
+    let (ours, theirs) = (made(&[], &folder.path().join("cpu")), made(&SOFTWARE, &folder.path().join("gpu")));
+    assert_eq!((ours.len(), theirs.len()), (6, 6));
+    let drifted = |r: &Record| r.sample.time_s > 0.0;
+    assert!((1..6).contains(&ours.iter().filter(|r| drifted(r)).count()));
+    for (a, b) in ours.iter().zip(&theirs).filter(|(a, _)| drifted(a)) {
+        assert!(a.images.is_some() && a.images == b.images);
+    }
 }
 
 /// A run that another adapter began is continued, with a word about it.
