@@ -3,17 +3,19 @@
 use gripgen_tactile::gpu::{
     AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRenderer, GpuRequest, GpuSensor,
 };
-use gripgen_tactile::{ClusteredMesh, IndentError, Renderer, Sensor, SimdLevel};
+use gripgen_tactile::{ClusteredMesh, ColourModel, IndentError, Renderer, Sensor, SensorError, SimdLevel};
 use gripgen_twin::config::Backend;
 use gripgen_twin::frames::{Pose, pose, rotation_from_fixed_xyz};
 use gripgen_twin::parts::SteppedShaft;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Gel, Jaw, TriMesh, Twin};
 use nalgebra::Vector3;
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::library::LibraryError;
-use crate::location::Location;
+use crate::location::{Location, ReadFileError};
 use crate::project::{LoadError, Project};
 
 /// Poses that are rendered in turn.
@@ -27,6 +29,8 @@ const SEGMENTS: usize = 1924;
 pub struct BenchOptions {
     /// Where images are made.
     pub backend: Backend,
+    /// The sensor file; the shipped sensor where there is none. One that names the deformation of its gel has its way.
+    pub sensor: Option<PathBuf>,
     /// Part of the name of the adapter; the first graphics processor where there is none.
     pub adapter: Option<String>,
     /// Shortest time of a measurement, in seconds.
@@ -46,6 +50,8 @@ pub struct BenchReport {
     pub batch: Option<usize>,
     /// Vector unit of the processor.
     pub level: SimdLevel,
+    /// Colours of the sensor: `lambert`, `taxim` or `regressor`.
+    pub colour: &'static str,
     /// Columns and rows of an image.
     pub size_px: (usize, usize),
     /// Triangles of the part.
@@ -87,14 +93,25 @@ pub enum BenchError {
     /// The shipped sensor.
     #[error(transparent)]
     Library(#[from] LibraryError),
+    /// The file of a sensor.
+    #[error(transparent)]
+    Read(#[from] ReadFileError),
+    /// What is in it.
+    #[error("{location}: {source}")]
+    Sensor {
+        /// The file.
+        location: Location,
+        /// What is wrong.
+        source: SensorError,
+    },
     /// A press of the measurement.
     #[error("a press of the measurement failed: {0}")]
     Press(#[from] IndentError),
 }
 
-/// A shaft of 50 000 triangles in many poses before the shipped sensor, pressed with 20 to 80 N.
+/// A shaft of 50 000 triangles in many poses before a sensor, pressed with 20 to 80 N.
 struct Work {
-    sensor: std::sync::Arc<Sensor>,
+    sensor: Arc<Sensor>,
     gel: Gel,
     imprint_m3_per_n: f64,
     mesh: TriMesh,
@@ -103,7 +120,7 @@ struct Work {
 }
 
 impl Work {
-    fn new() -> Result<Self, BenchError> {
+    fn new(sensor: Option<&PathBuf>) -> Result<Self, BenchError> {
         let project = Project::load(&Location::parse("asset:configs/quickstart.toml"), &[])?;
         let twin: &Twin = &project.twin;
         let mesh = SteppedShaft { segments: SEGMENTS, ..Default::default() }.mesh();
@@ -123,7 +140,14 @@ impl Work {
             })
             .collect();
         let imprint_m3_per_n = twin.parts.values().next().map_or(1e-9, |part| part.imprint_m3_per_n);
-        let sensor = project.library.sensor(&twin.optics[Jaw::Left])?;
+        let sensor = match sensor {
+            None => project.library.sensor(&twin.optics[Jaw::Left])?,
+            Some(path) => {
+                let location = Location::Disk(path.clone());
+                let sensor = Sensor::from_npz(&location.read()?, None, None);
+                Arc::new(sensor.map_err(|source| BenchError::Sensor { location, source })?)
+            }
+        };
         Ok(Self {
             sensor,
             gel: twin.gel[Jaw::Left].clone(),
@@ -145,13 +169,18 @@ pub fn bench(options: &BenchOptions) -> Result<BenchReport, BenchError> {
             Some(GpuRenderer::new(&options.adapter.as_ref().map_or(AdapterChoice::Hardware, named))?)
         }
     };
-    let work = Work::new()?;
+    let work = Work::new(options.sensor.as_ref())?;
     let least = Duration::from_secs_f64(options.seconds);
     let mut report = BenchReport {
         backend: options.backend,
         adapter: gpu.as_ref().map(|gpu| gpu.adapter().clone()),
         batch: None,
         level: SimdLevel::best(),
+        colour: match work.sensor.colour {
+            ColourModel::Lambert(_) => "lambert",
+            ColourModel::Taxim(_) => "taxim",
+            ColourModel::Regressor(_) => "regressor",
+        },
         size_px: (work.sensor.grid.width_px, work.sensor.grid.height_px),
         triangles: work.mesh.triangles().len(),
         rates: vec![],

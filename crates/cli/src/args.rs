@@ -282,6 +282,9 @@ pub struct BenchArgs {
     /// Part of the name of the graphics adapter; the first graphics processor where it is left out.
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
+    /// A sensor file, for example a calibrated one; the shipped sensor where it is left out.
+    #[arg(long, value_name = "FILE.npz")]
+    pub sensor: Option<PathBuf>,
     /// Shortest time of each measurement.
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub seconds: f64,

@@ -489,13 +489,15 @@ fn a_missing_graphics_adapter_is_one_clear_error() {
 
 #[test]
 fn a_benchmark_says_what_it_measured() {
-    let output = run(&["bench", "--seconds", "0.05", "--json"]);
+    let missing = run(&["bench", "--seconds", "0.05", "--sensor", "no-such-sensor.npz"]);
+    assert_code(&missing, 1);
+    assert!(text(&missing.stderr).contains("no-such-sensor.npz"), "{}", text(&missing.stderr));
+    let sensor = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/sensors/gelsight_r15/sensor.npz");
+    let output = run(&["bench", "--seconds", "0.05", "--sensor", sensor, "--json"]);
     assert_code(&output, 0);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(
-        (report["schema"].as_str(), report["backend"].as_str()),
-        (Some("gripgen.bench/1"), Some("cpu"))
-    );
+    let said = ["schema", "backend", "colour"].map(|key| report[key].as_str().unwrap());
+    assert_eq!(said, ["gripgen.bench/1", "cpu", "lambert"]);
     assert!(report["adapter"].is_null() && report["triangles"].as_u64().unwrap() > 45_000);
     let rate = &report["rates"][0];
     let (images, seconds) = (rate["images"].as_f64().unwrap(), rate["seconds"].as_f64().unwrap());

@@ -15,8 +15,13 @@ pub fn run(args: &BenchArgs) -> Result<u8, Failure> {
         return Err(Failure::usage("--adapter goes with --backend gpu"));
     }
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
-    let options =
-        BenchOptions { backend, adapter: args.adapter.clone(), seconds: args.seconds, threads: cores() };
+    let options = BenchOptions {
+        backend,
+        sensor: args.sensor.clone(),
+        adapter: args.adapter.clone(),
+        seconds: args.seconds,
+        threads: cores(),
+    };
     let report = bench(&options)?;
     if sink.wanted() {
         sink.document(&as_json(&report))?;
@@ -53,6 +58,7 @@ fn as_json(report: &BenchReport) -> Value {
         })),
         "batch": report.batch,
         "simd": format!("{:?}", report.level).to_lowercase(),
+        "colour": report.colour,
         "width_px": report.size_px.0,
         "height_px": report.size_px.1,
         "triangles": report.triangles,
@@ -67,8 +73,8 @@ fn in_words(report: &BenchReport) -> String {
     };
     let (width, height) = report.size_px;
     text += &format!(
-        "{width} x {height} pixels from a mesh of {} triangles, pose to image with noise\n",
-        report.triangles
+        "{width} x {height} pixels, colours {}, from a mesh of {} triangles, pose to image with noise\n",
+        report.colour, report.triangles
     );
     for rate in &report.rates {
         let what = match rate.what {
