@@ -5,7 +5,7 @@
 // Rest frame: planes of red, green and blue, in grey levels; see shade_taxim.wgsl for what may follow.
 @group(0) @binding(2) var<storage, read> rest: array<f32>;
 // Binding 3 is `colour`, the coefficients of the colour model: see shade_*.wgsl.
-// Standard normal values, equally likely.
+// Standard normal values by the sum of four random bytes.
 @group(0) @binding(4) var<storage, read> levels: array<f32>;
 @group(0) @binding(5) var<storage, read_write> packed: array<u32>;
 //#PLANES

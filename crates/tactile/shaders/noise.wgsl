@@ -1,4 +1,4 @@
-// Stage noise: sensor noise, rounding to 8 bits and packing. CPU twin: src/noise.rs, with the same hash and table.
+// Stage noise: sensor noise, rounding to 8 bits and packing. CPU twin: src/noise.rs, with the same hash and values.
 
 fn scramble(word: u32) -> u32 {
     var h = word;
@@ -17,7 +17,9 @@ fn key_words(low: u32, high: u32) -> vec2<u32> {
 
 // A standard normal number for value `index` of an image.
 fn standard_normal(words: vec2<u32>, index: u32) -> f32 {
-    return levels[scramble(scramble(index ^ words.x) + words.y) >> 20u];
+    let hash = scramble(scramble(index ^ words.x) + words.y);
+    let pairs = (hash & 0x00ff00ffu) + ((hash >> 8u) & 0x00ff00ffu);
+    return levels[(pairs & 0xffffu) + (pairs >> 16u)];
 }
 
 fn rounded(value: f32) -> u32 {
