@@ -7,6 +7,7 @@ mod taxim;
 pub(crate) use lambert::LambertRow;
 pub use lambert::{Lambert, Light};
 pub use regressor::Regressor;
+use regressor::{DrawScratch, Planes};
 pub(crate) use taxim::Sectors;
 pub use taxim::TaximTable;
 
@@ -54,13 +55,16 @@ pub fn shade(
             }
         }
         ColourModel::Taxim(table) => table.shade(along_x, along_y, &mut change),
-        ColourModel::Regressor(model) => match rest {
-            None => model.shade(raised_px, along_x, along_y, &mut change, SimdLevel::best()),
-            Some(_) => {
-                let (along_x, along_y) = gradient(raised_px);
-                model.shade(raised_px, &along_x, &along_y, &mut change, SimdLevel::best());
+        ColourModel::Regressor(model) => {
+            let (scratch, level) = (&mut DrawScratch::default(), SimdLevel::best());
+            match rest {
+                None => model.shade(&Planes::new(raised_px, along_x, along_y), &mut change, scratch, level),
+                Some(_) => {
+                    let (along_x, along_y) = gradient(raised_px);
+                    model.shade(&Planes::new(raised_px, &along_x, &along_y), &mut change, scratch, level);
+                }
             }
-        },
+        }
     }
     change
 }

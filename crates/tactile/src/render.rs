@@ -8,10 +8,10 @@ use crate::elastic::{Base, ElasticGel, press_elastic};
 use crate::grid::Plane;
 use crate::indent::{Imprint, IndentError, Press, PressedGel, indent};
 use crate::markers::{MarkerGel, Shear, draw_markers, marker_displacements, without_markers};
-use crate::noise::finish;
+use crate::noise::finish_on;
 use crate::raster::ClusteredMesh;
 use crate::sensor::Sensor;
-use crate::shading::change;
+use crate::shading::{LocalColours, change};
 use crate::simd::SimdLevel;
 use gripgen_twin::config::GelModel;
 use gripgen_twin::frames::Pose;
@@ -91,25 +91,20 @@ impl Renderer<'_> {
     /// The image of an imprint, or of the gel at rest: stages `deform` to `noise`. `noise_key` chooses the noise;
     /// without it there is none, and the gel at rest gives the rest frame of the sensor.
     pub fn image(&self, imprint: Option<&Imprint>, noise_key: Option<u64>) -> TactileImage {
-        let Some(imprint) = imprint else { return finish(self.sensor, None, noise_key) };
-        let lit = with_scratch(self, |scratch, prepared| match &self.sensor.colour {
-            ColourModel::Lambert(lambert)
-                if imprint.elastic.is_none()
-                    && self.sensor.markers.is_none()
-                    && self.only_where_raised(prepared) =>
-            {
-                self.deform(imprint, scratch, prepared);
-                let Scratch { deform, change, .. } = scratch;
-                let done = |change: &[Plane; 3]| finish(self.sensor, Some(change), noise_key);
-                Some(change.with(lambert, deform.surface(), self.level, done))
-            }
-            _ => None,
+        let Some(imprint) = imprint else { return finish_on(self.sensor, None, noise_key, self.level) };
+        let lit = with_scratch(self, |scratch, prepared| {
+            let local = imprint.elastic.is_none() && self.sensor.markers.is_none();
+            let colours = self.local_colours(prepared).filter(|_| local)?;
+            self.deform(imprint, scratch, prepared);
+            let Scratch { deform, change, .. } = scratch;
+            let done = |change: &[Plane; 3]| finish_on(self.sensor, Some(change), noise_key, self.level);
+            Some(change.with(colours, deform.surface(), self.level, done))
         });
-        lit.unwrap_or_else(|| finish(self.sensor, Some(&self.change(imprint)), noise_key))
+        lit.unwrap_or_else(|| finish_on(self.sensor, Some(&self.change(imprint)), noise_key, self.level))
     }
 
     /// What an imprint changes in the image, in grey levels of red, green and blue: stages `deform` to `shadow`. The
-    /// stage `noise`, [`finish`], makes an image of it.
+    /// stage `noise`, [`crate::finish`], makes an image of it.
     pub fn change(&self, imprint: &Imprint) -> [Plane; 3] {
         self.change_under_shear(imprint, &Shear::default())
     }
@@ -143,8 +138,8 @@ impl Renderer<'_> {
         with_scratch(self, |scratch, prepared| {
             self.deform(imprint, scratch, prepared);
             let (sheet, area) = scratch.deform.surface();
-            if self.only_where_raised(prepared) {
-                return change(&self.sensor.colour, sheet, area, self.level);
+            if let Some(colours) = self.local_colours(prepared) {
+                return change(colours, sheet, area, self.level);
             }
             appearance(self.sensor, &sheet.plane(area), core, self.level)
         })
@@ -169,14 +164,16 @@ impl Renderer<'_> {
         })
     }
 
-    /// Whether the image changes only where the gel is displaced, as a function of that displacement.
-    fn only_where_raised(&self, prepared: &Prepared) -> bool {
-        let local = match self.sensor.colour {
-            ColourModel::Lambert(_) => prepared.rest_px.is_none(),
-            ColourModel::Regressor(_) => true,
-            ColourModel::Taxim(_) => false,
-        };
-        local && self.sensor.shadow.is_none()
+    /// The colours where the image is a function of the displacement of the gel alone.
+    fn local_colours(&self, prepared: &Prepared) -> Option<LocalColours<'_>> {
+        match &self.sensor.colour {
+            _ if self.sensor.shadow.is_some() => None,
+            ColourModel::Lambert(lambert) if prepared.rest_px.is_none() => {
+                Some(LocalColours::Lambert(lambert))
+            }
+            ColourModel::Regressor(model) => Some(LocalColours::Regressor(model)),
+            ColourModel::Lambert(_) | ColourModel::Taxim(_) => None,
+        }
     }
 
     /// Whether the deformation blurs the gel as a whole, as Taxim does, which moves a gel that is not flat at rest even

@@ -1,49 +1,62 @@
 //! Stages `gradient` and `shade` in one walk over the part of the surface that is not flat.
 
-use crate::colour::{ColourModel, Lambert, LambertRow, shade};
+use crate::colour::regressor::{DrawScratch, Terrain};
+use crate::colour::{Lambert, LambertRow, Regressor};
 use crate::convolve::{Area, Sheet};
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
 use std::ops::Range;
 
 /// Colour change of a surface that is 0 beyond `area` and within its outermost two pixels, with the bits of
-/// [`crate::gradient`] and [`shade`].
-pub(crate) fn change(model: &ColourModel, sheet: &Sheet, area: Area, level: SimdLevel) -> [Plane; 3] {
-    let zeros = || Plane::filled(sheet.width, sheet.height, 0.0);
-    let mut change = [zeros(), zeros(), zeros()];
-    let Some(slopes) = Slopes::of(sheet, area) else { return change };
+/// [`crate::gradient`] and [`crate::shade`].
+pub(crate) fn change(model: LocalColours<'_>, sheet: &Sheet, area: Area, level: SimdLevel) -> [Plane; 3] {
+    let mut change = [0, 1, 2].map(|_| Plane::filled(sheet.width, sheet.height, 0.0));
+    if let Some(slopes) = Slopes::of(sheet, area) {
+        draw(model, slopes, &mut change, &mut DrawScratch::default(), level);
+    }
+    change
+}
+
+/// Draws into planes, which are 0 for lights.
+fn draw(
+    model: LocalColours<'_>,
+    slopes: Slopes<'_>,
+    change: &mut [Plane; 3],
+    scratch: &mut DrawScratch,
+    level: SimdLevel,
+) {
     match model {
-        ColourModel::Lambert(lambert) => {
-            lambert_change(lambert, slopes, &mut change, level);
-            change
+        LocalColours::Lambert(lambert) => {
+            let row = lambert.row(slopes.sheet.width, slopes.sheet.height);
+            level.run(ShadeRows { slopes, row, change });
         }
-        // Models that work on whole planes.
-        _ => {
-            let [along_x, along_y, _] = &mut change;
-            level.run(SlopePlanes { slopes, along_x, along_y });
-            let [along_x, along_y, _] = change;
-            let surface = sheet.plane(area);
-            if let ColourModel::Regressor(model) = model {
-                let mut change = [zeros(), zeros(), zeros()];
-                model.shade(&surface, &along_x, &along_y, &mut change, level);
-                return change;
-            }
-            shade(model, &surface, &along_x, &along_y, None)
-        }
+        LocalColours::Regressor(model) => model.shade(&slopes, change, scratch, level),
     }
 }
 
-/// Memory for the change of colour of one image; zeros between images.
+/// Models that draw the displacement of the gel alone.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum LocalColours<'a> {
+    /// Lights.
+    Lambert(&'a Lambert),
+    /// Regression.
+    Regressor(&'a Regressor),
+}
+
+/// Memory for the change of colour of one image.
 #[derive(Debug, Default)]
 pub(crate) struct ChangeScratch {
     planes: Option<[Plane; 3]>,
+    /// What may not be 0.
+    written: Area,
+    draw: DrawScratch,
 }
 
 impl ChangeScratch {
-    /// As [`change`] for lights, without new memory; `f` gets the planes.
+    /// As [`change`] without new memory; `f` gets the planes.
     pub(crate) fn with<T>(
         &mut self,
-        lambert: &Lambert,
+        model: LocalColours<'_>,
         (sheet, area): (&Sheet, Area),
         level: SimdLevel,
         f: impl FnOnce(&[Plane; 3]) -> T,
@@ -52,24 +65,26 @@ impl ChangeScratch {
         let size = |planes: &[Plane; 3]| (planes[0].width, planes[0].height);
         let planes = match self.planes.take().filter(|planes| size(planes) == (sheet.width, sheet.height)) {
             Some(planes) => self.planes.insert(planes),
-            None => self.planes.insert([zeros(), zeros(), zeros()]),
+            None => {
+                self.written = Area::EMPTY;
+                self.planes.insert([zeros(), zeros(), zeros()])
+            }
         };
-        if let Some(slopes) = Slopes::of(sheet, area) {
-            lambert_change(lambert, slopes, planes, level);
-        }
-        let result = f(planes);
-        for plane in planes {
-            for y in area.y.0..area.y.1 {
-                plane.values[y * sheet.width..][area.x.0..area.x.1].fill(0.0);
+        let slopes = Slopes::of(sheet, area);
+        let all = matches!(model, LocalColours::Regressor(_)) && slopes.is_some();
+        if !all {
+            for plane in planes.iter_mut() {
+                for y in self.written.y.0..self.written.y.1 {
+                    plane.values[y * sheet.width..][self.written.x.0..self.written.x.1].fill(0.0);
+                }
             }
         }
-        result
+        self.written = if all { Area::whole(sheet.width, sheet.height) } else { area };
+        if let Some(slopes) = slopes {
+            draw(model, slopes, planes, &mut self.draw, level);
+        }
+        f(planes)
     }
-}
-
-fn lambert_change(lambert: &Lambert, slopes: Slopes<'_>, change: &mut [Plane; 3], level: SimdLevel) {
-    let row = lambert.row(slopes.sheet.width, slopes.sheet.height);
-    level.run(ShadeRows { slopes, row, change });
 }
 
 /// Where slopes are needed.
@@ -117,6 +132,29 @@ impl<'a> Slopes<'a> {
     }
 }
 
+impl Terrain for Slopes<'_> {
+    #[inline(always)]
+    fn size(&self) -> (usize, usize) {
+        (self.sheet.width, self.sheet.height)
+    }
+    #[inline(always)]
+    fn rows(&self) -> Range<usize> {
+        self.rows.clone()
+    }
+    #[inline(always)]
+    fn columns(&self) -> Range<usize> {
+        self.columns.clone()
+    }
+    #[inline(always)]
+    fn heights(&self, y: usize) -> &[f32] {
+        self.sheet.row(y)
+    }
+    #[inline(always)]
+    fn slopes(&self, y: usize, along_x: &mut [f32], along_y: &mut [f32]) {
+        self.row(y, along_x, along_y);
+    }
+}
+
 /// Slopes and colours row by row.
 struct ShadeRows<'a> {
     slopes: Slopes<'a>,
@@ -134,25 +172,6 @@ impl Kernel for ShadeRows<'_> {
             self.slopes.row(y, &mut gx, &mut gy);
             let out = self.change.each_mut().map(|plane| &mut plane.values[y * w..(y + 1) * w]);
             self.row.shade(y, columns.clone(), &gx, &gy, out);
-        }
-    }
-}
-
-/// Slopes as planes.
-struct SlopePlanes<'a> {
-    slopes: Slopes<'a>,
-    along_x: &'a mut Plane,
-    along_y: &'a mut Plane,
-}
-
-impl Kernel for SlopePlanes<'_> {
-    type Output = ();
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) {
-        let w = self.slopes.sheet.width;
-        for y in self.slopes.rows.clone() {
-            let row = y * w..(y + 1) * w;
-            self.slopes.row(y, &mut self.along_x.values[row.clone()], &mut self.along_y.values[row]);
         }
     }
 }

@@ -5,6 +5,7 @@
 //! so that the levels see 0.5, 1, 2 and 4 mm around them. All values are linear in the height and exactly 0 where
 //! there is no contact anywhere.
 
+use super::Terrain;
 use crate::convolve::mirrored;
 use crate::grid::Plane;
 
@@ -47,10 +48,10 @@ pub(super) struct Surroundings {
     pub(super) coarse: Vec<Plane>,
 }
 
-/// Features of `surface_px`, a height map in pixels.
+/// Features of a surface, whose heights are in pixels.
 #[inline(always)]
-pub(super) fn surroundings(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -> Surroundings {
-    let mut level = smooth(&smooth(&cells(surface_px, cell_px, mm_per_px)));
+pub(super) fn surroundings(terrain: &impl Terrain, cell_px: usize, mm_per_px: f64) -> Surroundings {
+    let mut level = smooth(&smooth(&cells(terrain, cell_px, mm_per_px)));
     let fine = derivatives(&level);
     let mut coarse = Vec::new();
     let mut sizes: Vec<(usize, usize)> = Vec::new();
@@ -69,21 +70,28 @@ pub(super) fn surroundings(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -
 
 /// Mean height of each cell in millimetres; cells at the right and lower border may hold fewer pixels.
 #[inline(always)]
-fn cells(surface_px: &Plane, cell_px: usize, mm_per_px: f64) -> Plane {
-    let (w, h) = (surface_px.width.div_ceil(cell_px), surface_px.height.div_ceil(cell_px));
+fn cells(terrain: &impl Terrain, cell_px: usize, mm_per_px: f64) -> Plane {
+    let ((width_px, height_px), columns) = (terrain.size(), terrain.columns());
+    let (w, h) = (width_px.div_ceil(cell_px), height_px.div_ceil(cell_px));
     let mut out = Plane::filled(w, h, 0.0);
-    let mut sums = vec![0.0f32; surface_px.width];
-    for cy in 0..h {
-        let rows = cy * cell_px..((cy + 1) * cell_px).min(surface_px.height);
+    if terrain.rows().is_empty() || columns.is_empty() {
+        return out;
+    }
+    let mut sums = vec![0.0f32; width_px];
+    let first = columns.start / cell_px;
+    for cy in terrain.rows().start / cell_px..terrain.rows().end.div_ceil(cell_px) {
+        let rows = cy * cell_px..((cy + 1) * cell_px).min(height_px);
         let count = rows.len();
         sums.fill(0.0);
-        for y in rows {
-            for (sum, z) in sums.iter_mut().zip(surface_px.row(y)) {
+        for y in rows.start.max(terrain.rows().start)..rows.end.min(terrain.rows().end) {
+            let heights = &terrain.heights(y)[columns.clone()];
+            for (sum, z) in sums[columns.clone()].iter_mut().zip(heights) {
                 *sum += z;
             }
         }
-        for (cx, chunk) in sums.chunks(cell_px).enumerate() {
-            let scale = mm_per_px as f32 / (count * chunk.len()) as f32;
+        for (cx, chunk) in sums[..columns.end].chunks(cell_px).enumerate().skip(first) {
+            let pixels = cell_px.min(width_px - cx * cell_px);
+            let scale = mm_per_px as f32 / (count * pixels) as f32;
             out.values[cy * w + cx] = chunk.iter().sum::<f32>() * scale;
         }
     }
@@ -142,22 +150,28 @@ fn halve(plane: &Plane) -> Plane {
 /// The inverse of [`halve`] for smooth planes: each cell is three quarters its parent and a quarter the next one.
 #[inline(always)]
 pub(super) fn double(plane: &Plane, width: usize, height: usize) -> Plane {
-    let parents = |i: usize, n: usize| {
-        let parent = i / 2;
-        let other = if i.is_multiple_of(2) { parent.saturating_sub(1) } else { (parent + 1).min(n - 1) };
-        (parent, other)
-    };
+    let n = plane.width;
     let mut out = Plane::filled(width, height, 0.0);
-    let mut row = vec![0.0f32; plane.width];
-    for y in 0..height {
-        let (near, far) = parents(y, plane.height);
+    // A row of parents with the first and the last one twice.
+    let mut padded = vec![0.0f32; n + 2];
+    for (y, to) in out.values.chunks_exact_mut(width).enumerate() {
+        let near = y / 2;
+        let far = if y % 2 == 0 { near.saturating_sub(1) } else { (near + 1).min(plane.height - 1) };
         let (near, far) = (plane.row(near), plane.row(far));
-        for x in 0..plane.width {
-            row[x] = 0.75 * near[x] + 0.25 * far[x];
+        for (value, (near, far)) in padded[1..=n].iter_mut().zip(near.iter().zip(far)) {
+            *value = 0.75 * near + 0.25 * far;
         }
-        for x in 0..width {
-            let (a, b) = parents(x, plane.width);
-            out.values[y * width + x] = 0.75 * row[a] + 0.25 * row[b];
+        (padded[0], padded[n + 1]) = (padded[1], padded[n]);
+        let (pairs, last) = to.as_chunks_mut::<2>();
+        let (left, right) = (&padded[..pairs.len()], &padded[2..2 + pairs.len()]);
+        let parents = &padded[1..1 + pairs.len()];
+        for (pair, (parent, (left, right))) in
+            pairs.iter_mut().zip(parents.iter().zip(left.iter().zip(right)))
+        {
+            *pair = [0.75 * parent + 0.25 * left, 0.75 * parent + 0.25 * right];
+        }
+        if let [last] = last {
+            *last = 0.75 * padded[width / 2 + 1] + 0.25 * padded[width / 2];
         }
     }
     out
@@ -204,6 +218,7 @@ fn along_y(z: &Plane) -> Plane {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Planes;
     use super::*;
 
     #[test]
@@ -215,7 +230,7 @@ mod tests {
                 surface.values[y * 512 + x] = 1.0;
             }
         }
-        let found = surroundings(&surface, 8, 0.03);
+        let found = surroundings(&Planes::of_heights(&surface), 8, 0.03);
         let variance = |plane: &Plane| {
             let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
             for (i, &z) in plane.values.iter().enumerate() {
@@ -239,7 +254,7 @@ mod tests {
         for (i, z) in surface.values.iter_mut().enumerate() {
             *z = 0.1 * (i % 330) as f32 - 0.2 * (i / 330) as f32;
         }
-        let found = surroundings(&surface, 4, 0.06);
+        let found = surroundings(&Planes::of_heights(&surface), 4, 0.06);
         let middle = |plane: &Plane| plane.at(plane.width / 2, plane.height / 2);
         // Millimetres per cell: slope times the cell's side, doubled from level to level.
         let close = |value: f32, exact: f32| assert!((value - exact).abs() < 2e-3, "{value} {exact}");

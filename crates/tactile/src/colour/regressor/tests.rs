@@ -1,6 +1,7 @@
 use super::*;
 use crate::colour::{ColourModel, shade};
 use crate::gradient::gradient;
+use crate::simd::SimdLevel;
 
 /// Reproducible numbers between -1 and 1.
 fn number(i: usize) -> f32 {
@@ -151,7 +152,8 @@ fn vector_units_give_the_same_bits() {
     let (along_x, along_y) = gradient(&surface);
     let at = |level: SimdLevel| {
         let mut change = [0, 1, 2].map(|_| Plane::filled(83, 61, 0.0));
-        model(30.0, 30.0).shade(&surface, &along_x, &along_y, &mut change, level);
+        let planes = Planes::new(&surface, &along_x, &along_y);
+        model(30.0, 30.0).shade(&planes, &mut change, &mut DrawScratch::default(), level);
         change.map(|plane| plane.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>())
     };
     let portable = at(SimdLevel::Portable);
