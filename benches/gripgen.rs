@@ -123,7 +123,8 @@ fn tactile(c: &mut Criterion) {
     }
 }
 
-/// `tactile/ball/<what>/<vector unit>`: a bumpy ball of 50,000 triangles, from mesh to image.
+/// `tactile/ball/<what>/<vector unit>`: a bumpy ball of 50,000 triangles, from mesh to image; `image/<kind>` is the image of
+/// its imprint by the kinds of sensor in `scenes`.
 fn ball(c: &mut Criterion) {
     let mut group = c.benchmark_group("tactile/ball");
     group.sample_size(50).throughput(Throughput::Elements(1));
@@ -145,6 +146,12 @@ fn ball(c: &mut Criterion) {
         group.bench_function(BenchmarkId::new("press_and_image", &name), |b| {
             b.iter(|| black_box(renderer.image(Some(&press()), Some(7))));
         });
+        for (kind, sensor) in scenes::sensors(&sensor) {
+            let renderer = Renderer { sensor: &sensor, ..renderer };
+            group.bench_function(BenchmarkId::new(format!("image/{kind}"), &name), |b| {
+                b.iter(|| black_box(renderer.image(Some(&imprint), Some(7))));
+            });
+        }
     }
 }
 

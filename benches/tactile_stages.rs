@@ -53,6 +53,14 @@ fn main() {
         stage(name("image"), us(|| renderer.image(Some(&imprint), Some(7))));
         stage(name("press and image"), us(|| renderer.image(Some(&press(&renderer)), Some(7))));
     }
+    for (kind, sensor) in scenes::sensors(&sensor) {
+        for level in SimdLevel::available().into_iter().filter(|&l| l != SimdLevel::Portable) {
+            let renderer = Renderer { level, sensor: &sensor, ..best };
+            let name = |stage: &str| format!("{stage}, {kind}, {}", format!("{level:?}").to_lowercase());
+            stage(name("image"), us(|| renderer.image(Some(&imprint), Some(7))));
+            stage(name("press and image"), us(|| renderer.image(Some(&press(&renderer)), Some(7))));
+        }
+    }
     println!("{} triangles, {:.1} % of the image in contact", mesh.triangles().len(), 100.0 * contact);
     let Some(file) = file else { return };
     let json = serde_json::json!({

@@ -1,7 +1,11 @@
 //! A part for the tactile benchmarks.
 
-use gripgen::twin::TriMesh;
+use gripgen::tactile::presses::{
+    CalibrateOptions, Circle, Press, PressSet, calibrate_presses, predict_press,
+};
+use gripgen::tactile::{Markers, Sensor, Shadow, ShadowKind, ShadowTable, print_markers};
 use gripgen::twin::frames::{Pose, pose, rotation_from_fixed_xyz};
+use gripgen::twin::{TactileImage, TriMesh};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
 
@@ -39,3 +43,69 @@ pub fn gel_from_ball() -> Pose {
 pub const FORCE_N: f64 = 20.0;
 /// Imprint constant of a metal part.
 pub const IMPRINT_M3_PER_N: f64 = 1.5e-9;
+
+/// Kinds of sensor by name, with the frame, the pixels and the gel of a sensor with lights: `regressor`, calibrated with
+/// presses of a ball that the lights draw; `shadow`, with a table of shadows that fade over 3 mm; `markers`, with 14 x 11
+/// dots.
+pub fn sensors(lights: &Sensor) -> [(&'static str, Sensor); 3] {
+    let (grid, colour) = (lights.grid, &lights.colour);
+    let regressor = calibrate_presses(&presses(lights), &CalibrateOptions { folds: 2, ..Default::default() })
+        .expect("presses of a ball")
+        .sensor;
+    let rays = (0..DIRECTIONS * HEIGHTS).map(|i| {
+        let depth = 0.4 * (i % HEIGHTS + 1) as f32;
+        [0, 1, 2].map(|_| (0..80).map(|j| -depth * (1.0 - j as f32 / 80.0)).collect())
+    });
+    let table = ShadowTable {
+        kind: ShadowKind::Darkening,
+        directions_rad: (0..DIRECTIONS).map(|i| 2.0 * PI * i as f64 / DIRECTIONS as f64).collect(),
+        first_height_m: 0.0,
+        height_step_m: 0.02e-3,
+        heights: HEIGHTS,
+        step_m: 37e-6,
+        rays: rays.collect(),
+    };
+    let shadow = Shadow::new(table, grid.metres_per_px, grid.width_px, colour);
+    let markers = Markers::regular(&grid, 14, 11, 20.0, 3.0, [0.5; 3]);
+    let mut marked = lights.clone();
+    print_markers(&mut marked.rest, &grid, &markers);
+    [
+        ("regressor", Sensor { gel_shape: lights.gel_shape.clone(), ..regressor }),
+        ("shadow", Sensor { shadow: Some(Box::new(shadow)), ..lights.clone() }),
+        ("markers", Sensor { markers: Some(markers), ..marked }),
+    ]
+}
+
+/// Rays and rows of the table of shadows.
+const DIRECTIONS: usize = 63;
+const HEIGHTS: usize = 50;
+
+/// Eight presses of a ball of 4 mm all over the frame.
+fn presses(sensor: &Sensor) -> PressSet {
+    let grid = &sensor.grid;
+    let press = |i: usize| {
+        // A low-discrepancy sequence (Roberts 2018).
+        let at = |a: f64, n: usize| 40.0 + (n as f64 - 80.0) * ((i + 1) as f64 * a).fract();
+        let circle = Circle {
+            x_px: at(0.754_877_666, grid.width_px),
+            y_px: at(0.569_840_291, grid.height_px),
+            radius_px: (1.2e-3 + 0.1e-3 * (i % 4) as f64) / grid.metres_per_px,
+        };
+        let blank = TactileImage {
+            width_px: grid.width_px as u32,
+            height_px: grid.height_px as u32,
+            rgb: vec![0; 3 * grid.len()],
+        };
+        let mut press = Press { name: i.to_string(), image: blank, circle: Some(circle) };
+        press.image = predict_press(&press, BALL_M, sensor).expect("one size");
+        press
+    };
+    PressSet {
+        metres_per_px: grid.metres_per_px,
+        ball_m: BALL_M,
+        rest: None,
+        presses: (0..8).map(press).collect(),
+    }
+}
+
+const BALL_M: f64 = 4e-3;

@@ -16,12 +16,15 @@
 //! Every term is 0 for a gel at rest: no contact, no change.
 
 mod draw;
+mod near;
 mod pyramid;
+mod terrain;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use draw::{DrawScratch, Planes, Terrain};
+pub(crate) use draw::DrawScratch;
 pub(crate) use pyramid::{AROUND_HEIGHTS, SURROUNDINGS, cell_px};
+pub(crate) use terrain::{Planes, Terrain};
 
 use crate::grid::{Grid, Plane};
 use pyramid::{Surroundings, double, surroundings};

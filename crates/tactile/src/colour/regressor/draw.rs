@@ -1,79 +1,20 @@
 //! Drawing of the regression: the surroundings on cells, which are spread bilinearly over the pixels, then row by row
 //! the part of displaced pixels. Only fused multiply-adds and sums in a fixed order, so that all vector units agree.
 
+use super::near::Near;
 use super::pyramid::{DERIVATIVES, SURROUNDINGS, Surroundings, cell_px, double, surroundings};
-use super::{
-    AROUND_FIELD, NEAR, NEAR_FIELD, Place, Regressor, between_cells, cell_centre_px, limited_normal,
-    near_terms,
-};
+use super::terrain::Terrain;
+use super::{AROUND_FIELD, Place, Regressor, between_cells, cell_centre_px};
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
-use std::ops::Range;
 
 /// Pixels or cells that are computed together: the widest vector.
-const BLOCK: usize = 16;
+pub(super) const BLOCK: usize = 16;
 
 /// Pixels between two centres of cells that are written at once.
 const STRETCH: usize = 8;
 
-const CHANNELS: usize = 3;
-
-/// A surface by rows, in pixels, 0 outside of some rows and columns.
-pub(crate) trait Terrain {
-    /// Width and height.
-    fn size(&self) -> (usize, usize);
-    /// Rows with heights or slopes other than 0.
-    fn rows(&self) -> Range<usize>;
-    /// Columns with heights or slopes other than 0.
-    fn columns(&self) -> Range<usize>;
-    /// Heights of a row; other columns than those may hold anything.
-    fn heights(&self, y: usize) -> &[f32];
-    /// Writes the slopes of a row into those columns.
-    fn slopes(&self, y: usize, along_x: &mut [f32], along_y: &mut [f32]);
-}
-
-/// A surface as planes of heights and slopes.
-pub(crate) struct Planes<'a> {
-    heights: &'a Plane,
-    slopes: Option<[&'a Plane; 2]>,
-}
-
-impl<'a> Planes<'a> {
-    pub(crate) fn new(heights: &'a Plane, along_x: &'a Plane, along_y: &'a Plane) -> Self {
-        Self { heights, slopes: Some([along_x, along_y]) }
-    }
-
-    /// Without slopes.
-    pub(crate) fn of_heights(heights: &'a Plane) -> Self {
-        Self { heights, slopes: None }
-    }
-}
-
-impl Terrain for Planes<'_> {
-    #[inline(always)]
-    fn size(&self) -> (usize, usize) {
-        (self.heights.width, self.heights.height)
-    }
-    #[inline(always)]
-    fn rows(&self) -> Range<usize> {
-        0..self.heights.height
-    }
-    #[inline(always)]
-    fn columns(&self) -> Range<usize> {
-        0..self.heights.width
-    }
-    #[inline(always)]
-    fn heights(&self, y: usize) -> &[f32] {
-        self.heights.row(y)
-    }
-    #[inline(always)]
-    fn slopes(&self, y: usize, along_x: &mut [f32], along_y: &mut [f32]) {
-        if let Some([x, y_plane]) = self.slopes {
-            along_x[..x.width].copy_from_slice(x.row(y));
-            along_y[..x.width].copy_from_slice(y_plane.row(y));
-        }
-    }
-}
+pub(super) const CHANNELS: usize = 3;
 
 /// Memory to draw in, to be used again.
 #[derive(Debug, Default)]
@@ -162,7 +103,7 @@ fn around<L: Lanes>(
 
 /// Coefficients by monomial, then feature and channel, out of channel, feature, monomial.
 #[inline(always)]
-fn by_monomial<const FIELD: usize>(coefficients: &[f32], features: usize) -> Vec<f32> {
+pub(super) fn by_monomial<const FIELD: usize>(coefficients: &[f32], features: usize) -> Vec<f32> {
     let mut out = vec![0.0; coefficients.len()];
     for (i, of_feature) in coefficients.as_chunks::<FIELD>().0.iter().enumerate() {
         let to = CHANNELS * (i % features) + i / features;
@@ -171,6 +112,11 @@ fn by_monomial<const FIELD: usize>(coefficients: &[f32], features: usize) -> Vec
         }
     }
     out
+}
+
+#[inline(always)]
+pub(super) fn block_of(row: &[f32], start: usize) -> &[f32; BLOCK] {
+    row[start..].first_chunk().expect("rows are padded to whole blocks")
 }
 
 /// The surroundings on cells.
@@ -218,8 +164,8 @@ impl Cells<'_> {
                 let mut sums = [[0.0f32; BLOCK]; 3 * CHANNELS];
                 for (i, (feature, &limit)) in features.iter().zip(limits).enumerate() {
                     let mut f = [0.0f32; BLOCK];
-                    match feature.values.get(at..at + BLOCK) {
-                        Some(values) => f.copy_from_slice(values),
+                    match feature.values[at..].first_chunk() {
+                        Some(values) => f = *values,
                         None => f[..w * h - at].copy_from_slice(&feature.values[at..]),
                     }
                     for f in &mut f {
@@ -303,22 +249,20 @@ impl Spread {
     #[inline(always)]
     fn widen(&self, cells: &[f32], to: &mut [f32]) {
         let (weights, _) = self.weights.as_chunks::<STRETCH>();
-        let mut left = cells[0];
-        for (i, &right) in cells.iter().chain(cells.last()).enumerate() {
-            let difference = right - left;
-            // What goes beyond the next centre is written again.
-            for (j, weights) in weights.iter().enumerate() {
-                let Some(to) = to[i * self.cell + j * STRETCH..].first_chunk_mut::<STRETCH>() else {
-                    continue;
-                };
-                let mut values = [0.0; STRETCH];
-                for k in 0..STRETCH {
-                    values[k] = weights[k].mul_add(difference, left);
-                }
-                *to = values;
-            }
-            left = right;
+        match weights {
+            [weights] => self.widen_with(std::slice::from_ref(weights), cells, to),
+            _ => self.widen_with(weights, cells, to),
         }
+    }
+
+    #[inline(always)]
+    fn widen_with(&self, weights: &[[f32; STRETCH]], cells: &[f32], to: &mut [f32]) {
+        let (first, last) = (cells[0], cells[cells.len() - 1]);
+        stretch(weights, first, first, to);
+        for (i, (left, right)) in cells.iter().zip(&cells[1..]).enumerate() {
+            stretch(weights, *left, *right, &mut to[(i + 1) * self.cell..]);
+        }
+        stretch(weights, last, last, &mut to[cells.len() * self.cell..]);
     }
 
     /// A row of pixels.
@@ -335,157 +279,13 @@ impl Spread {
     }
 }
 
-/// The part of displaced pixels.
-struct Near<'a> {
-    model: &'a Regressor,
-    place: Place,
-    /// Coefficients by monomial, term and channel.
-    fields: Vec<f32>,
-    u: Vec<f32>,
-    /// Heights and slopes of a row, 0 beyond it.
-    rows: [Vec<f32>; 3],
-}
-
-impl<'a> Near<'a> {
-    #[inline(always)]
-    fn new(model: &'a Regressor, terrain: &impl Terrain) -> Self {
-        let (place, padded) = (Place::of(terrain.size()), terrain.size().0.next_multiple_of(BLOCK));
-        Self {
-            model,
-            place,
-            fields: by_monomial::<NEAR_FIELD>(&model.near, NEAR),
-            u: (0..padded).map(|x| place.u(x as f32)).collect(),
-            rows: [0, 1, 2].map(|_| vec![0.0; padded]),
-        }
-    }
-
-    /// Adds what the displaced pixels of row `y` change.
-    #[inline(always)]
-    fn row<L: Lanes>(&mut self, terrain: &impl Terrain, y: usize, out: &mut [&mut [f32]; CHANNELS]) {
-        let columns = terrain.columns();
-        let [heights, gx, gy] = &mut self.rows;
-        heights[columns.clone()].copy_from_slice(&terrain.heights(y)[columns.clone()]);
-        terrain.slopes(y, gx, gy);
-        let mut powers = [[0.0; CHANNELS * NEAR]; 4];
-        let mut ready = false;
-        for start in (columns.start / BLOCK * BLOCK..columns.end).step_by(BLOCK) {
-            let [heights, gx, gy] = &self.rows;
-            let block = [block_of(heights, start), block_of(gx, start), block_of(gy, start)];
-            if !moves(&block) {
-                continue;
-            }
-            if !ready {
-                powers = self.powers(y);
-                ready = true;
-            }
-            // SAFETY: the caller has the instructions of `L`.
-            let sums = unsafe { combine::<L>(&self.terms(&block), &powers, block_of(&self.u, start)) };
-            for (out, sum) in out.iter_mut().zip(&sums) {
-                let n = BLOCK.min(out.len() - start);
-                match out[start..start + n].as_chunks_mut::<BLOCK>() {
-                    ([out], _) => {
-                        for (out, sum) in out.iter_mut().zip(sum) {
-                            *out += sum;
-                        }
-                    }
-                    (_, out) => {
-                        for (out, sum) in out.iter_mut().zip(sum) {
-                            *out += sum;
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// For a row the fields of each term and channel as polynomials of third degree in u, by powers.
-    #[inline(always)]
-    fn powers(&self, y: usize) -> [[f32; CHANNELS * NEAR]; 4] {
-        let v = self.place.v(y as f32);
-        let mut powers = [[0.0; CHANNELS * NEAR]; 4];
-        let ([c0, c1, c2, c3, c4, c5, c6, c7, c8, c9], _) = self.fields.as_chunks::<{ CHANNELS * NEAR }>()
-        else {
-            return powers;
-        };
-        for i in 0..CHANNELS * NEAR {
-            powers[0][i] = v.mul_add(v.mul_add(v.mul_add(c9[i], c5[i]), c2[i]), c0[i]);
-            powers[1][i] = v.mul_add(v.mul_add(c8[i], c4[i]), c1[i]);
-            powers[2][i] = v.mul_add(c7[i], c3[i]);
-            powers[3][i] = c6[i];
-        }
-        powers
-    }
-
-    /// The terms of a block of pixels: heights and both slopes in, one row a term out.
-    #[inline(always)]
-    fn terms(&self, [height, gx, gy]: &[&[f32; BLOCK]; 3]) -> [[f32; BLOCK]; NEAR] {
-        let scale = self.model.mm_per_px as f32;
-        let (mut nx, mut ny, mut h) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-        for x in 0..BLOCK {
-            [nx[x], ny[x]] = limited_normal(gx[x], gy[x], self.model.slope_limit);
-            h[x] = (height[x] * scale).min(self.model.height_limit_mm);
-        }
-        near_terms(&nx, &ny, &h)
-    }
-}
-
+/// From one centre to the next; what goes beyond it is written again.
 #[inline(always)]
-fn block_of(row: &[f32], start: usize) -> &[f32; BLOCK] {
-    row[start..].first_chunk().expect("rows are padded to whole blocks")
-}
-
-/// Whether anything in a block is not 0.
-#[inline(always)]
-fn moves(block: &[&[f32; BLOCK]; 3]) -> bool {
-    let mut bits = [0u32; BLOCK];
-    for row in block {
-        for (bits, value) in bits.iter_mut().zip(*row) {
-            *bits |= value.to_bits() << 1;
+fn stretch(weights: &[[f32; STRETCH]], left: f32, right: f32, to: &mut [f32]) {
+    let difference = right - left;
+    for (weights, to) in weights.iter().zip(to.as_chunks_mut::<STRETCH>().0) {
+        for k in 0..STRETCH {
+            to[k] = weights[k].mul_add(difference, left);
         }
     }
-    bits.iter().fold(0, |all, b| all | b) != 0
-}
-
-/// Sums over terms for a block of pixels, by channel: the fields, cubic in u, are taken as straight lines through their
-/// value and slope in the middle of the block. A block is so short that this changes them by less than one part in a
-/// thousand.
-///
-/// # Safety
-/// The processor must have the instructions of `L`.
-#[inline(always)]
-unsafe fn combine<L: Lanes>(
-    terms: &[[f32; BLOCK]; NEAR],
-    powers: &[[f32; CHANNELS * NEAR]; 4],
-    u: &[f32; BLOCK],
-) -> [[f32; BLOCK]; CHANNELS] {
-    let middle = 0.5 * (u[BLOCK / 2 - 1] + u[BLOCK / 2]);
-    let (mut value, mut slope) = ([0.0; CHANNELS * NEAR], [0.0; CHANNELS * NEAR]);
-    for i in 0..CHANNELS * NEAR {
-        let (p0, p1, p2, p3) = (powers[0][i], powers[1][i], powers[2][i], powers[3][i]);
-        value[i] = middle.mul_add(middle.mul_add(middle.mul_add(p3, p2), p1), p0);
-        slope[i] = middle.mul_add(middle.mul_add(3.0 * p3, 2.0 * p2), p1);
-    }
-    let mut from_middle = *u;
-    for u in &mut from_middle {
-        *u -= middle;
-    }
-    let mut sums = [[0.0; BLOCK]; CHANNELS];
-    for half in (0..BLOCK).step_by(L::COUNT) {
-        // SAFETY: a block is whole vectors, forwarded otherwise.
-        unsafe {
-            let (mut values, mut slopes) = ([L::splat(0.0); CHANNELS], [L::splat(0.0); CHANNELS]);
-            for (t, term) in terms.iter().enumerate() {
-                let term = L::load(term.as_ptr().add(half));
-                for c in 0..CHANNELS {
-                    values[c] = L::fused(term, L::splat(value[CHANNELS * t + c]), values[c]);
-                    slopes[c] = L::fused(term, L::splat(slope[CHANNELS * t + c]), slopes[c]);
-                }
-            }
-            let from_middle = L::load(from_middle.as_ptr().add(half));
-            for c in 0..CHANNELS {
-                L::store(sums[c].as_mut_ptr().add(half), L::fused(from_middle, slopes[c], values[c]));
-            }
-        }
-    }
-    sums
 }

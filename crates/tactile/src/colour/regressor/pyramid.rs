@@ -21,6 +21,9 @@ pub(crate) const SURROUNDINGS: usize = LEVELS * DERIVATIVES;
 /// The features that are the height itself, one a level.
 pub(crate) const AROUND_HEIGHTS: [usize; LEVELS] = [0, DERIVATIVES, 2 * DERIVATIVES, 3 * DERIVATIVES];
 
+/// Cells that are computed together.
+const BLOCK: usize = 16;
+
 /// Side of a cell that is aimed at, in millimetres.
 const CELL_MM: f64 = 0.24;
 
@@ -101,35 +104,43 @@ fn cells(terrain: &impl Terrain, cell_px: usize, mm_per_px: f64) -> Plane {
 /// The binomial kernel along both axes, borders mirrored.
 #[inline(always)]
 fn smooth(plane: &Plane) -> Plane {
-    let (w, h) = (plane.width, plane.height);
-    let half = SMOOTH.len() / 2;
-    let mut across = Plane::filled(w, h, 0.0);
-    let mut padded = vec![0.0f32; w + 2 * half];
-    for y in 0..h {
-        let row = plane.row(y);
+    let (w, h, half) = (plane.width, plane.height, SMOOTH.len() / 2);
+    // Rows in whole blocks; between the axes with mirrored rows before the first and after the last.
+    let stride = w.next_multiple_of(BLOCK);
+    let mut across = vec![0.0f32; stride * (h + 2 * half)];
+    let mut padded = vec![0.0f32; stride + 2 * half];
+    for (y, to) in across.chunks_exact_mut(stride).enumerate() {
+        let row = plane.row(mirrored(y as isize - half as isize, h));
         padded[half..half + w].copy_from_slice(row);
         for i in 0..half {
             padded[half - 1 - i] = row[mirrored(-1 - i as isize, w)];
             padded[half + w + i] = row[mirrored((w + i) as isize, w)];
         }
-        let out = &mut across.values[y * w..(y + 1) * w];
-        for (k, weight) in SMOOTH.iter().enumerate() {
-            for (o, p) in out.iter_mut().zip(&padded[k..k + w]) {
-                *o = weight.mul_add(*p, *o);
-            }
-        }
+        weigh(&padded, 1, to);
     }
     let mut down = Plane::filled(w, h, 0.0);
-    for y in 0..h {
-        let out = &mut down.values[y * w..(y + 1) * w];
-        for (k, weight) in SMOOTH.iter().enumerate() {
-            let source = mirrored(y as isize + k as isize - half as isize, h);
-            for (o, p) in out.iter_mut().zip(across.row(source)) {
-                *o = weight.mul_add(*p, *o);
-            }
-        }
+    for (y, to) in down.values.chunks_exact_mut(w).enumerate() {
+        // The padding is not needed any more.
+        let row = &mut padded[..stride];
+        weigh(&across[y * stride..], stride, row);
+        to.copy_from_slice(&row[..w]);
     }
     down
+}
+
+/// Sums of values `step` apart, times the binomial kernel.
+#[inline(always)]
+fn weigh(from: &[f32], step: usize, to: &mut [f32]) {
+    for (i, to) in to.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {
+        let mut sum = [0.0f32; BLOCK];
+        for (k, weight) in SMOOTH.iter().enumerate() {
+            let Some(values) = from[i * BLOCK + k * step..].first_chunk::<BLOCK>() else { continue };
+            for j in 0..BLOCK {
+                sum[j] = weight.mul_add(values[j], sum[j]);
+            }
+        }
+        *to = sum;
+    }
 }
 
 /// Means of two by two cells; an odd last column or row counts twice.
