@@ -147,7 +147,8 @@ fn ball(c: &mut Criterion) {
             b.iter(|| black_box(renderer.image(Some(&press()), Some(7))));
         });
         for (kind, sensor) in scenes::sensors(&sensor) {
-            let renderer = Renderer { sensor: &sensor, ..renderer };
+            let gel = scenes::with_modulus(&project.twin.gel.left);
+            let renderer = Renderer { sensor: &sensor, gel: &gel, level };
             group.bench_function(BenchmarkId::new(format!("image/{kind}"), &name), |b| {
                 b.iter(|| black_box(renderer.image(Some(&imprint), Some(7))));
             });

@@ -53,9 +53,10 @@ fn main() {
         stage(name("image"), us(|| renderer.image(Some(&imprint), Some(7))));
         stage(name("press and image"), us(|| renderer.image(Some(&press(&renderer)), Some(7))));
     }
+    let known = scenes::with_modulus(gel);
     for (kind, sensor) in scenes::sensors(&sensor) {
         for level in SimdLevel::available().into_iter().filter(|&l| l != SimdLevel::Portable) {
-            let renderer = Renderer { level, sensor: &sensor, ..best };
+            let renderer = Renderer { level, sensor: &sensor, gel: &known };
             let name = |stage: &str| format!("{stage}, {kind}, {}", format!("{level:?}").to_lowercase());
             stage(name("image"), us(|| renderer.image(Some(&imprint), Some(7))));
             stage(name("press and image"), us(|| renderer.image(Some(&press(&renderer)), Some(7))));

@@ -5,7 +5,7 @@ use gripgen::tactile::presses::{
 };
 use gripgen::tactile::{Markers, Sensor, Shadow, ShadowKind, ShadowTable, print_markers};
 use gripgen::twin::frames::{Pose, pose, rotation_from_fixed_xyz};
-use gripgen::twin::{TactileImage, TriMesh};
+use gripgen::twin::{Elastic, Gel, TactileImage, TriMesh};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
 
@@ -74,6 +74,11 @@ pub fn sensors(lights: &Sensor) -> [(&'static str, Sensor); 3] {
         ("shadow", Sensor { shadow: Some(Box::new(shadow)), ..lights.clone() }),
         ("markers", Sensor { markers: Some(markers), ..marked }),
     ]
+}
+
+/// The gel with a known modulus, so that its markers move.
+pub fn with_modulus(gel: &Gel) -> Gel {
+    Gel { elastic: Some(Elastic { young_modulus_pa: 0.2e6, poisson_ratio: 0.48 }), ..gel.clone() }
 }
 
 /// Rays and rows of the table of shadows.

@@ -203,6 +203,30 @@ mod tests {
     }
 
     #[test]
+    fn vector_units_give_the_same_image() {
+        let grid = crate::grid::Grid { width_px: 53, height_px: 7, metres_per_px: 1e-4 };
+        let light = crate::colour::Lambert::from_lights(&[]);
+        let sensor = Sensor {
+            grid,
+            rest: [90.3, 120.5, 250.0].map(|level| vec![level; grid.len()]),
+            noise_rgb: [1.5, 0.0, 4.0],
+            colour: crate::colour::ColourModel::Lambert(Box::new(light)),
+            gel_shape: crate::sensor::GelShape::Flat,
+            markers: None,
+            shadow: None,
+            pyramid: None,
+            ball_m: None,
+        };
+        let change = [0, 1, 2].map(|c| Plane::filled(53, 7, 0.3 + c as f32));
+        for key in [None, Some(5)] {
+            let portable = finish_on(&sensor, Some(&change), key, SimdLevel::Portable);
+            for level in SimdLevel::available() {
+                assert_eq!(finish_on(&sensor, Some(&change), key, level), portable, "{level:?}");
+            }
+        }
+    }
+
+    #[test]
     fn rounding_is_to_the_nearest_level() {
         for (value, level) in [(-3.0, 0), (0.49, 0), (0.5, 1), (127.4, 127), (254.6, 255), (400.0, 255)] {
             assert_eq!(rounded(value), level);
