@@ -15,7 +15,7 @@ const SUM_DEVIATION: f32 = 147.800_54;
 /// Coefficients of x, x^3, x^5 and x^7 that make the scaled sum x of four bytes normal: least squares against the
 /// quantiles of the normal distribution, weighted by how likely each sum is, scaled to variance 1. Moments 4, 6 and 8
 /// are 2.9995, 14.97 and 103.9 instead of 3, 15 and 105; the largest value is 4.85.
-const TO_NORMAL: [f32; 4] = [0.958_845_2, 0.016_671_193, -0.002_032_010_7, 0.000_317_702_51];
+const TO_NORMAL: [f32; 4] = [0.958_845_2, 0.016_671_193, -0.002_032_010_7, 0.000_317_702_5];
 
 /// The value of a sum of four bytes.
 #[inline(always)]
