@@ -49,9 +49,10 @@ pub const IMPRINT_M3_PER_N: f64 = 1.5e-9;
 /// dots.
 pub fn sensors(lights: &Sensor) -> [(&'static str, Sensor); 3] {
     let (grid, colour) = (lights.grid, &lights.colour);
-    let regressor = calibrate_presses(&presses(lights), &CalibrateOptions { folds: 2, ..Default::default() })
-        .expect("presses of a ball")
-        .sensor;
+    let regressor =
+        calibrate_presses(&presses(lights), &CalibrateOptions { folds: Some(2), ..Default::default() })
+            .expect("presses of a ball")
+            .sensor;
     let rays = (0..DIRECTIONS * HEIGHTS).map(|i| {
         let depth = 0.4 * (i % HEIGHTS + 1) as f32;
         [0, 1, 2].map(|_| (0..80).map(|j| -depth * (1.0 - j as f32 / 80.0)).collect())

@@ -2,6 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
+// Calibrating a sensor and comparing with it.
+#[path = "cli/presses.rs"]
+mod presses;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -386,74 +390,6 @@ fn schema_and_completions_print() {
         assert_code(&output, 0);
         assert!(text(&output.stdout).contains("gripgen"));
     }
-}
-
-/// Presses of a ball as a folder of pictures, drawn with the shipped sensor.
-fn press_folder(count: usize) -> tempfile::TempDir {
-    use gripgen::tactile::presses::{Circle, Press, predict_press};
-    let folder = tempfile::tempdir().unwrap();
-    let bytes = gripgen::assets::get("sensors/gelsight_r15/sensor.npz").unwrap();
-    let sensor = gripgen::tactile::Sensor::from_npz(bytes, None, None).unwrap();
-    let rest = gripgen::tactile::finish(&sensor, None, Some(1));
-    let save = |name: &str, image: &gripgen::twin::TactileImage| {
-        std::fs::write(folder.path().join(name), gripgen::record::encode_png(image).unwrap()).unwrap();
-    };
-    save("rest.png", &rest);
-    let mut table = String::from("image,x_px,y_px,radius_px\n");
-    for i in 0..count {
-        let x_px = 40.0 + 240.0 * (i as f64 * 0.754_877_666).fract();
-        let y_px = 40.0 + 160.0 * (i as f64 * 0.569_840_291).fract();
-        let circle = Circle { x_px, y_px, radius_px: 20.0 + (i % 3) as f64 };
-        let press = Press { name: String::new(), image: rest.clone(), circle: Some(circle) };
-        let name = format!("press-{i:02}.png");
-        save(&name, &predict_press(&press, 5e-3, &sensor).unwrap());
-        // Every fourth contact is left for the program to find.
-        let marks = match i % 4 {
-            1 => ",,".into(),
-            2 => format!(",,{}", circle.radius_px),
-            _ => format!("{x_px},{y_px},{}", circle.radius_px),
-        };
-        table += &format!("{name},{marks}\n");
-    }
-    std::fs::write(folder.path().join("presses.csv"), table).unwrap();
-    folder
-}
-
-#[test]
-fn a_sensor_is_calibrated_from_a_folder_of_presses_and_compared_with_it() {
-    let presses = press_folder(16);
-    let path = presses.path().to_str().unwrap();
-    let out = tempfile::tempdir().unwrap();
-    let sensor = out.path().join("sensor.npz");
-    let flags = ["calibrate", "presses", path, "-o", sensor.to_str().unwrap(), "--json"];
-    let missing = run(&flags);
-    assert_code(&missing, 2);
-    assert!(text(&missing.stderr).contains("--ball-mm"), "{}", text(&missing.stderr));
-    let done = run(&[&flags[..], &["--ball-mm", "5", "--mm-per-px", "0.0877"]].concat());
-    assert_code(&done, 0);
-    assert!(text(&done.stderr).contains("4 presses, it was looked for"), "{}", text(&done.stderr));
-    let json: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-    assert_eq!(json["held_out"]["n"], 16);
-    assert_eq!(json["fitted"]["ball_mm"], 5.0);
-    assert!(std::fs::read_to_string(out.path().join("sensor.html")).unwrap().contains("press-07.png"));
-    // The file holds ball and pixel size, so comparing takes no flags.
-    let compared = run(&["compare", path, "--sensor", sensor.to_str().unwrap(), "--json"]);
-    assert_code(&compared, 0);
-    let json: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
-    assert_eq!((&json["schema"], &json["presses"]["n"]), (&"gripgen.comparison/1".into(), &16.into()));
-    let mse = json["presses"]["full"]["mse"].as_f64().unwrap();
-    // The noise of rest.png is in it, and circles that were found.
-    assert!(mse < 3.0, "{mse}");
-    assert_eq!(json["presses"]["each"].as_array().unwrap().len(), 16);
-    // A twin's sensor, with the deformation of its gel.
-    let twin = run(&["compare", path, "--json"]);
-    assert_code(&twin, 2);
-    assert!(text(&twin.stderr).contains("how large the ball is"), "{}", text(&twin.stderr));
-    let wrong = run(&["compare", path, "--sensor", "asset:sensors/none.npz"]);
-    assert_code(&wrong, 2);
-    let nothing = run(&["compare", out.path().to_str().unwrap()]);
-    assert_code(&nothing, 2);
-    assert!(text(&nothing.stderr).contains("presses.csv"));
 }
 
 /// `gripgen schema | head -1` is no failure.
