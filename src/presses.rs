@@ -172,7 +172,7 @@ fn from_folder(
         .presses
         .iter()
         .map(|record| Ok((record.centre_px, radius_px(record)?)))
-        .collect::<Result<Vec<_>, LoadPressesError>>()?;
+        .collect::<Result<Vec<Known>, LoadPressesError>>()?;
     let presses = folder
         .presses
         .into_iter()
@@ -188,8 +188,11 @@ fn from_folder(
     Ok(set)
 }
 
+/// Centre and radius in pixels, where somebody measured them.
+type Known = (Option<(f64, f64)>, Option<f64>);
+
 /// Where half of a mark is known, a depth say, the other half is looked for.
-fn complete(set: &mut PressSet, known: &[(Option<(f64, f64)>, Option<f64>)]) {
+fn complete(set: &mut PressSet, known: &[Known]) {
     if known.iter().all(|(centre, radius)| centre.is_some() == radius.is_some()) {
         return;
     }

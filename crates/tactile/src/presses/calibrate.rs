@@ -54,19 +54,13 @@ const AROUND_MARGIN: f32 = 1.1;
 const NO_LIMIT: f32 = 1e6;
 
 /// How to calibrate.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct CalibrateOptions {
     /// Folds of the cross-validation; press i is held out in fold `i % folds`. At least 2. `None`: 4, and one for each
     /// press where there are fewer than [`FEW_PRESSES`].
     pub folds: Option<usize>,
     /// The gel at rest; `None`: flat or dome, by the error on held-out presses.
     pub gel_shape: Option<GelShape>,
-}
-
-impl Default for CalibrateOptions {
-    fn default() -> Self {
-        Self { folds: None, gel_shape: None }
-    }
 }
 
 /// A calibrated sensor.
