@@ -10,8 +10,9 @@
 //! `T`: monomials of the normal (degrees 1 to 4) and of height times normal (degrees 0 to 2); `S`: the height around
 //! the pixel at four scales with its derivatives up to third order (see `pyramid`), which stands for cast shadows and
 //! for light that the dent throws onto its surroundings. u and v run over the image, -1 to 1 along its width, with
-//! total degrees of at most 3 and 2. Beyond what the presses showed, the normal, the height and each S are held at
-//! their largest values, so that other parts than a ball stay within the colours that the sensor has shown.
+//! total degrees of at most 3 and 2. Beyond what the presses showed, the normal and the derivatives in S are held at
+//! their largest values, so that other parts than a ball stay within the colours that the sensor has shown. Heights are
+//! not held: over a wide flat contact they cancel.
 //!
 //! Every term is 0 for a gel at rest: no contact, no change.
 
@@ -59,7 +60,7 @@ pub struct Regressor {
     pub(crate) around: Vec<f32>,
     /// Largest sine of the slope that was seen.
     pub(crate) slope_limit: f32,
-    /// Largest height that was seen, in millimetres.
+    /// Largest height that enters, in millimetres; a calibration sets no limit.
     pub(crate) height_limit_mm: f32,
     /// Largest magnitude of each feature of the surroundings that was seen.
     pub(crate) around_limit: Vec<f32>,
