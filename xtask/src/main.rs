@@ -66,6 +66,10 @@ fn test(all: bool) -> Result<(), String> {
         eprintln!("\nno Vulkan driver ({reason}): GPU tests will read ignored");
     } else {
         rust.env("GRIPGEN_VULKAN", "1");
+        // The driver complains about every device it opens without one.
+        if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+            rust.env("XDG_RUNTIME_DIR", std::env::temp_dir());
+        }
     }
     run("Rust tests", &mut rust)?;
     assets(true)?;
