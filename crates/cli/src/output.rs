@@ -93,6 +93,20 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     std::fs::rename(&partial, path).map_err(failed)
 }
 
+/// Whether a file can be written there, before the work and not after.
+pub fn writable(path: &Path) -> Result<(), Failure> {
+    if path.is_dir() {
+        return Err(Failure::usage(format!("{}: this is a folder", path.display())).hint("name a file in it"));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder.filter(|folder| !folder.is_dir()) {
+        Some(folder) => {
+            Err(Failure::usage(format!("{}: there is no folder {}", path.display(), folder.display())))
+        }
+        None => Ok(()),
+    }
+}
+
 /// A size for people.
 pub fn size(bytes: u64) -> String {
     let (mut x, mut unit) = (bytes as f64, "B");

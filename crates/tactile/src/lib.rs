@@ -50,7 +50,6 @@ pub use markers::{
     MarkerGel, Markers, Shear, draw_markers, marker_displacements, print_markers, without_markers,
 };
 pub use noise::finish;
-pub use optics::seen_heights;
 pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;
 pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError, SensorFiles};

@@ -28,12 +28,6 @@ use crate::sensor::GelShape;
 use gripgen_twin::OpticsState;
 use gripgen_twin::frames::Pose;
 
-/// The surface that is pressed into the gel, relative to the gel as it really is: `heights` of the part in pixels towards
-/// the gel on the sensor's grid, minus infinity where there is nothing.
-pub fn seen_heights(heights: Plane, grid: &Grid, optics: &OpticsState) -> Plane {
-    added(heights, dome(grid, optics).as_ref())
-}
-
 fn added(mut heights: Plane, rest: Option<&Plane>) -> Plane {
     if let Some(rest) = rest {
         heights.values.iter_mut().zip(&rest.values).for_each(|(height, rest)| *height += rest);

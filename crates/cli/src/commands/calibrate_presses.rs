@@ -3,7 +3,7 @@
 use crate::args::{CalibratePressesArgs, TalkArgs};
 use crate::commands::compare::{comparison_json, say_circles, table};
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, write_file};
+use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::tactile::presses::{
     CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PressSet, calibrate_presses,
 };
@@ -116,20 +116,6 @@ fn failure(presses: &Path, e: &CalibrateError) -> Failure {
             failure.hint("are these images with contact, and is the rest frame one without?")
         }
         _ => failure,
-    }
-}
-
-/// Whether a file can be written there, before the work and not after.
-fn writable(path: &Path) -> Result<(), Failure> {
-    if path.is_dir() {
-        return Err(Failure::usage(format!("{}: this is a folder", path.display())).hint("name a file in it"));
-    }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    match folder.filter(|folder| !folder.is_dir()) {
-        Some(folder) => {
-            Err(Failure::usage(format!("{}: there is no folder {}", path.display(), folder.display())))
-        }
-        None => Ok(()),
     }
 }
 

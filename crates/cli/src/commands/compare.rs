@@ -2,7 +2,7 @@
 
 use crate::args::{CompareArgs, TalkArgs};
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, write_file};
+use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::tactile::finish;
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
@@ -24,6 +24,10 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
         ))
         .hint("this version compares ball presses; pulls and force-sensor tables follow"));
     }
+    if let Some(report) = &args.report {
+        writable(report)?;
+    }
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let sensor = match &args.sensor {
         Some(path) => load_sensor(&Location::parse(path)),
         None => load_twin_sensor(&Location::parse(&args.twin)),
@@ -76,7 +80,6 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
         });
         write_file(path, page.as_bytes())?;
     }
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     if sink.wanted() {
         sink.document(&json!({"schema": "gripgen.comparison/1", "presses": comparison_json(&comparison)}))?;
     }

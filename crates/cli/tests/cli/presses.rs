@@ -69,3 +69,37 @@ fn a_sensor_is_calibrated_from_a_folder_of_presses_and_compared_with_it() {
     assert_code(&nothing, 2);
     assert!(text(&nothing.stderr).contains("presses.csv"));
 }
+
+#[test]
+fn presses_that_cannot_be_are_refused_before_the_fit() {
+    let presses = press_folder(5);
+    let path = presses.path().to_str().unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let at = |name: &str| out.path().join(name).to_str().unwrap().to_string();
+    let calibrate = |more: &[&str]| {
+        run(&[&["calibrate", "presses", path, "--ball-mm", "5", "--mm-per-px", "0.0877"], more].concat())
+    };
+    let table = presses.path().join("presses.csv");
+    let good = std::fs::read_to_string(&table).unwrap();
+    for (faulty, says) in [
+        ("image,x_px,y_px,depth_mm\npress-00.png,40,40,1200\n", "1200 mm deep, the ball's radius is 2.5 mm"),
+        ("image,x_px,y_px,radius_px\npress-00.png,40,40,90\n", "needs at least 4"),
+        (&good.replacen("\npress-00.png,40", "\npress-00.png,4000", 1), "outside the 320x240 image"),
+    ] {
+        std::fs::write(&table, faulty).unwrap();
+        let refused = calibrate(&["-o", &at("s.npz")]);
+        assert_code(&refused, 2);
+        assert!(text(&refused.stderr).contains(says), "{}", text(&refused.stderr));
+    }
+    std::fs::write(&table, good).unwrap();
+    for flags in [
+        vec!["-o".into(), at("none/s.npz")],
+        vec!["-o".into(), at("")],
+        vec!["-o".into(), at("s.html")],
+        vec!["-o".into(), at("s.npz"), "--report".into(), at("none/r.html")],
+        vec!["-o".into(), at("s.npz"), "--json".into(), at("none/j.json")],
+    ] {
+        assert_code(&calibrate(&flags.iter().map(String::as_str).collect::<Vec<_>>()), 2);
+    }
+    assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 0, "nothing was written");
+}

@@ -1,6 +1,6 @@
 //! What the tests of the optics share: a small sensor, things that are pressed into it, and the effects by name.
 
-use super::seen_heights;
+use super::{added, dome};
 use crate::colour::{ColourModel, Lambert, Light};
 use crate::grid::{Grid, Plane};
 use crate::indent::{Imprint, PressedGel, indent};
@@ -119,7 +119,7 @@ impl Rig {
         });
         let heights = Plane { width: GRID.width_px, height: GRID.height_px, values: values.collect() };
         let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n: IMPRINT_M3_PER_N };
-        Some(indent(&seen_heights(heights, &GRID, optics), &GRID, &gel, scene.force_n).unwrap())
+        Some(indent(&added(heights, dome(&GRID, optics).as_ref()), &GRID, &gel, scene.force_n).unwrap())
     }
 
     /// What the camera sees of a scene, minus the rest frame.

@@ -328,20 +328,19 @@ impl Fit<'_> {
         let (near, around) = solution.near_and_around();
         let largest = seen.iter().map(|&i| &candidate.samples[i].largest);
         let mut slope_limit = 0.0f32;
-        let mut around_limit = vec![0.0f32; candidate.samples[seen[0]].largest.2.len()];
-        for (slope, _, features) in largest {
+        let mut around_limit = vec![0.0f32; candidate.samples[seen[0]].largest.1.len()];
+        for (slope, features) in largest {
             slope_limit = slope_limit.max(*slope);
             around_limit.iter_mut().zip(features).for_each(|(l, f)| *l = l.max(AROUND_MARGIN * f));
         }
         // Heights alone may grow: over a wide flat contact they cancel, see `Samples::flat`.
-        let height_limit_mm = NO_LIMIT;
         AROUND_HEIGHTS.iter().for_each(|&level| around_limit[level] = NO_LIMIT);
         Ok(ColourModel::Regressor(Box::new(Regressor {
             mm_per_px: self.grid.metres_per_px * 1e3,
             near,
             around,
             slope_limit,
-            height_limit_mm,
+            height_limit_mm: NO_LIMIT,
             around_limit,
         })))
     }

@@ -168,7 +168,7 @@ mod tests {
             weights: (0..n).map(|i| 0.5 + number(i).abs()).collect(),
             inputs: (0..n * INPUTS).map(|i| number(3 * i + 1)).collect(),
             places: (0..n).map(|i| [number(i + 5), 0.7 * number(11 * i)]).collect(),
-            largest: (0.0, 0.0, vec![]),
+            largest: (0.0, vec![]),
         };
         let targets: Vec<[f32; 3]> = (0..n).map(|i| [number(i), number(2 * i), number(5 * i)]).collect();
         let mut moments = Moments::of_inputs(&samples);

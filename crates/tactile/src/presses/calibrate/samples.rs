@@ -48,8 +48,8 @@ pub(super) struct Samples {
     pub(super) inputs: Vec<f32>,
     /// Position of each pixel, as the regressor measures it.
     pub(super) places: Vec<[f32; 2]>,
-    /// Largest magnitudes in the whole image: sine of the slope, height in mm, each feature.
-    pub(super) largest: (f32, f32, Vec<f32>),
+    /// Largest magnitudes in the whole image: sine of the slope, each feature.
+    pub(super) largest: (f32, Vec<f32>),
 }
 
 impl Samples {
@@ -78,11 +78,7 @@ impl Samples {
             let [nx, ny] = limited_normal(gx, gy, 1.0);
             nx * nx + ny * ny
         });
-        let largest = (
-            slope.fold(0.0, f32::max).sqrt(),
-            magnitude(&surface) * mm_per_px as f32,
-            around.iter().map(magnitude).collect(),
-        );
+        let largest = (slope.fold(0.0, f32::max).sqrt(), around.iter().map(magnitude).collect());
         Self { pixels, weights, inputs, places, largest }
     }
 
@@ -103,7 +99,7 @@ impl Samples {
             weights: vec![1.0 / places.len() as f32; places.len()],
             inputs: places.iter().flat_map(|_| input).collect(),
             places,
-            largest: (0.0, 0.0, vec![0.0; SURROUNDINGS]),
+            largest: (0.0, vec![0.0; SURROUNDINGS]),
         }
     }
 
