@@ -56,13 +56,16 @@ mod plan;
 mod press_report;
 mod presses;
 mod project;
+mod report;
 mod resolve;
 mod schema;
 mod sweep;
+mod twin_edits;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use generate::{Press, SampleError, SimulateOptions, generate, press_only, simulate};
 pub use gpu::Gpu;
+pub use gripgen_identify as identify;
 pub use gripgen_physics as physics;
 pub use gripgen_record as record;
 pub use gripgen_tactile as tactile;
@@ -79,5 +82,7 @@ pub use presses::{
     load_presses, load_sensor, load_twin_sensor,
 };
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
+pub use report::{Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
 pub use schema::{sweep_schema, twin_schema};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, VERSION, run_info, sweep};
+pub use twin_edits::{EditedValue, TwinEdits};

@@ -1,0 +1,215 @@
+//! What a diagnosis says, as it stands in `diagnose --json` (DESIGN 5.4).
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Format string of the document.
+pub const DIAGNOSIS_SCHEMA: &str = "gripgen.diagnosis/1";
+
+/// What kind of measurement was diagnosed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// Pulls: labels and traces.
+    Pulls,
+    /// A table of a force sensor beside a reference.
+    Sensor,
+    /// Presses of a ball on a tactile sensor.
+    Presses,
+}
+
+/// The answer in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing beyond the baseline.
+    None,
+    /// One or more effects of the library act.
+    Effect,
+    /// There is structure that no effect of the library explains.
+    Unknown,
+    /// The data cannot answer; [`Diagnosis::notes`] says what is missing.
+    Insufficient,
+}
+
+/// What was looked at.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct DataSummary {
+    /// Pulls, of the pull channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pulls: Option<usize>,
+    /// Those with a trace.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traces: Option<usize>,
+    /// Rows, of the sensor channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rows: Option<usize>,
+    /// Presses, of the press channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub presses: Option<usize>,
+    /// Hash of the data.
+    pub sha256: String,
+    /// Names of observations that fit nothing and were given little weight: worst first.
+    pub outliers: Vec<String>,
+}
+
+/// A fitted parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterEstimate {
+    /// Value.
+    pub value: f64,
+    /// Lower end of the 90 % interval.
+    pub low90: f64,
+    /// Upper end of the 90 % interval.
+    pub high90: f64,
+    /// Unit, `1` for a plain number.
+    pub unit: String,
+}
+
+/// An effect that the data do not tell from the one named.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rival {
+    /// Its id.
+    pub name: String,
+    /// Its share of the evidence.
+    pub weight: f64,
+}
+
+/// The experiment that separates rivals.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SeparateBy {
+    /// For people.
+    pub text: String,
+    /// The campaign file, where one was written.
+    pub campaign: Option<String>,
+}
+
+/// An effect that acts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NamedEffect {
+    /// Its id.
+    pub name: String,
+    /// The only part it acts on, if it is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub part: Option<String>,
+    /// It and what is confused with it.
+    pub class: Vec<String>,
+    /// Its share of the evidence.
+    pub weight: f64,
+    /// Its parameters by name.
+    pub parameters: BTreeMap<String, ParameterEstimate>,
+    /// What it cannot be told apart from in these data.
+    pub indistinguishable_from: Vec<Rival>,
+    /// What would tell them apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub separate_by: Option<SeparateBy>,
+}
+
+/// A covariate on which the residual depends in a way that the library does not explain.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnknownCovariate {
+    /// Column; an interaction as `a*b`.
+    pub covariate: String,
+    /// Share of the variance of the residual that it explains.
+    pub strength: f64,
+    /// Of a permutation test by block.
+    pub p_value: f64,
+}
+
+/// The size at which an effect would have been seen in these data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Detectable {
+    /// Its parameter.
+    pub parameter: String,
+    /// That size.
+    pub value: f64,
+    /// With this probability.
+    pub power: f64,
+}
+
+/// An error on data that the fit has not seen.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct HeldOutError {
+    /// Root of the mean squared error, of forces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse_n: Option<f64>,
+    /// Mean squared error, of images in grey levels squared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mse: Option<f64>,
+    /// Lower end of its 90 % interval.
+    pub low90: f64,
+    /// Upper end of its 90 % interval.
+    pub high90: f64,
+    /// Mean of the absolute error as a share of the measured value, of forces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mape_pct: Option<f64>,
+}
+
+/// Before and after the effects were added.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct ErrorPair {
+    /// The baseline, refitted.
+    pub before: HeldOutError,
+    /// With the effects.
+    pub after: HeldOutError,
+}
+
+/// The error on other held-out sets.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct ErrorsBy {
+    /// One level of the main covariate held out at a time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub levels: Option<ErrorPair>,
+    /// One session held out at a time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sessions: Option<ErrorPair>,
+}
+
+/// The error on data that the fit has not seen, through the simulator.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ErrorReport {
+    /// What was held out: `repetitions` in the pull channel.
+    pub heldout: String,
+    /// Before.
+    pub before: HeldOutError,
+    /// After.
+    pub after: HeldOutError,
+    /// By other held-out sets.
+    pub by: ErrorsBy,
+}
+
+/// The answer.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// [`DIAGNOSIS_SCHEMA`].
+    pub schema: &'static str,
+    /// What was measured.
+    pub channel: Channel,
+    /// How much of it.
+    pub data: DataSummary,
+    /// Scatter of repetitions, of forces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor_n: Option<f64>,
+    /// Mean squared scatter that no model of this kind can predict, of images.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor_mse: Option<f64>,
+    /// The answer in a word.
+    pub verdict: Verdict,
+    /// Effects that act, by weight.
+    pub effects: Vec<NamedEffect>,
+    /// Covariates that matter in an unknown way, strongest first.
+    pub unknown: Vec<UnknownCovariate>,
+    /// Sizes at which effects that were not found would have been.
+    pub would_have_seen: BTreeMap<String, Detectable>,
+    /// Covariates that never varied.
+    pub not_excited: Vec<String>,
+    /// Covariates that nobody wrote down.
+    pub not_recorded: Vec<String>,
+    /// Fitted baseline values by key.
+    pub baseline: BTreeMap<String, ParameterEstimate>,
+    /// The error before and after, where it could be measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<ErrorReport>,
+    /// Remarks for people: what is missing, what was left out, what to beware of.
+    pub notes: Vec<String>,
+}

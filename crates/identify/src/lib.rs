@@ -1,0 +1,14 @@
+//! Calibration and diagnosis: numbers in, parameters and causes out.
+//!
+//! This crate does not know how predictions are made. It is given observations and a way to predict them from
+//! parameters, and returns fitted values with intervals, and a [`Diagnosis`]: what the model lacks, what cannot be told
+//! apart, and what to measure next. `docs/diagnosis.md` describes the method.
+
+mod diagnosis;
+mod least_squares;
+
+pub use diagnosis::{
+    Channel, DIAGNOSIS_SCHEMA, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy,
+    HeldOutError, NamedEffect, ParameterEstimate, Rival, SeparateBy, UnknownCovariate, Verdict,
+};
+pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
