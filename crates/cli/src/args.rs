@@ -1,7 +1,10 @@
 //! What was typed.
 
+mod identify;
+
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
+pub use identify::{CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, DiagnoseArgs, LawKind};
 use std::path::PathBuf;
 
 /// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.
@@ -33,8 +36,12 @@ pub enum Command {
     /// Fit a sensor file to measurements.
     #[command(subcommand)]
     Calibrate(CalibrateCommand),
-    /// Say how far a sensor file is from measurements.
+    /// Say how far a twin or a sensor file is from measurements.
     Compare(CompareArgs),
+    /// Find out where a twin is wrong, and why: pulls, force-sensor tables, presses.
+    Diagnose(DiagnoseArgs),
+    /// Plan the pulls of a campaign.
+    Campaign(CampaignArgs),
     /// Measure how many tactile images a second this machine makes.
     Bench(BenchArgs),
     /// Print the JSON Schema of a configuration file.
@@ -206,6 +213,10 @@ pub struct ExportArgs {
 pub enum CalibrateCommand {
     /// Fit colours, rest frame, noise and gel shape of a tactile sensor to presses of a ball.
     Presses(CalibratePressesArgs),
+    /// Fit friction, lag, stiffness and noise of a twin to measured pulls.
+    Pulls(CalibratePullsArgs),
+    /// Fit gain and offset of a force sensor to a table beside a reference.
+    Sensor(CalibrateSensorArgs),
 }
 
 /// `gripgen calibrate presses`

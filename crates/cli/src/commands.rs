@@ -2,9 +2,13 @@
 
 pub mod bench;
 pub mod calibrate_presses;
+pub mod calibrate_pulls;
+pub mod calibrate_sensor;
+pub mod campaign;
 pub mod check;
 pub mod compare;
 pub mod completions;
+pub mod diagnose;
 pub mod export;
 pub mod info;
 pub mod init;

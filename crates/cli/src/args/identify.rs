@@ -1,0 +1,122 @@
+//! What was typed for the verbs that close the loop.
+
+use super::{JsonArgs, TalkArgs, key_value};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// `gripgen calibrate pulls`
+#[derive(Debug, Args)]
+pub struct CalibratePullsArgs {
+    /// A folder with pulls.csv, or a run folder.
+    pub measured: PathBuf,
+    /// The twin to start from.
+    #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
+    pub twin: String,
+    /// Override a key of the twin; may be given many times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+    /// A friction law to fit to each part: `offset` is mu (a + b / F_G).
+    #[arg(long, value_name = "offset")]
+    pub law: Option<LawKind>,
+    /// Effects to fit beside the baseline, by name.
+    #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
+    pub fit: Vec<String>,
+    /// The twin to write.
+    #[arg(short, long, value_name = "FILE.toml")]
+    pub out: PathBuf,
+    /// JSON: what was fitted.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// Friction laws of `calibrate pulls`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LawKind {
+    /// mu (a + b / F_G), of Wucherer et al. 2023.
+    Offset,
+}
+
+/// `gripgen calibrate sensor`
+#[derive(Debug, Args)]
+pub struct CalibrateSensorArgs {
+    /// A folder with sensor.csv.
+    pub measured: PathBuf,
+    /// The twin to start from.
+    #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
+    pub twin: String,
+    /// The twin to write.
+    #[arg(short, long, value_name = "FILE.toml")]
+    pub out: Option<PathBuf>,
+    /// JSON: gain and offset of each session.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen diagnose`
+#[derive(Debug, Args)]
+pub struct DiagnoseArgs {
+    /// A folder with pulls.csv, sensor.csv or presses.csv, a run folder, or a dataPack.npz.
+    pub measured: PathBuf,
+    /// The twin to start from.
+    #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
+    pub twin: String,
+    /// Override a key of the twin; may be given many times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+    /// Of presses: a sensor file in place of the twin's.
+    #[arg(long, value_name = "FILE.npz")]
+    pub sensor: Option<String>,
+    /// The twin to write, with the effects that were found.
+    #[arg(short, long, value_name = "FILE.toml")]
+    pub out: Option<PathBuf>,
+    /// The report.
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
+    /// JSON: the diagnosis.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen campaign`
+#[derive(Debug, Args)]
+pub struct CampaignArgs {
+    /// A diagnosis (JSON) with effects that cannot be told apart: plan the pulls that separate them.
+    #[arg(long, value_name = "FILE.json", requires = "measured")]
+    pub separate: Option<PathBuf>,
+    /// The measurements of that diagnosis.
+    #[arg(long, value_name = "FOLDER")]
+    pub measured: Option<PathBuf>,
+    /// The twin.
+    #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
+    pub twin: String,
+    /// Parts to pull; all of the twin where this is left out.
+    #[arg(long, value_name = "PART,...", value_delimiter = ',')]
+    pub parts: Vec<String>,
+    /// Pulls to make.
+    #[arg(long, value_name = "N", default_value_t = 120)]
+    pub pulls: usize,
+    /// Sessions, with pauses between them.
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    pub sessions: usize,
+    /// Seed of the order.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// The campaign to write.
+    #[arg(short, long, value_name = "FILE.toml", default_value = "campaign.toml")]
+    pub out: PathBuf,
+    /// JSON: what was planned.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
