@@ -53,6 +53,7 @@ mod location;
 mod paper;
 mod picture;
 mod plan;
+mod predict;
 mod press_report;
 mod presses;
 mod project;
@@ -76,6 +77,7 @@ pub use location::{Location, ReadFileError};
 pub use paper::{PaperError, PaperReport, paper_report};
 pub use picture::{PictureSampleError, contact_sheet, sample_picture};
 pub use plan::{Plan, Probe, plan};
+pub use predict::PullPredictor;
 pub use press_report::{PressReportText, press_report};
 pub use presses::{
     FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_missing_circles, is_press_set,

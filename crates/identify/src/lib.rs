@@ -6,6 +6,7 @@
 
 mod diagnosis;
 mod least_squares;
+pub mod pulls;
 
 pub use diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy,

@@ -51,6 +51,22 @@ impl ForceLoop {
         while self.pending.front().is_some_and(|&(due, _)| due <= time_s + 1e-9) {
             self.effective_n = self.pending.pop_front().map_or(self.effective_n, |(_, force)| force);
         }
+        self.close(step_s, measured_n, contact_n)
+    }
+
+    /// The same for a command that has waited its dead time already.
+    pub(crate) fn advance_due(
+        &mut self,
+        step_s: f64,
+        desired_n: f64,
+        measured_n: f64,
+        contact_n: f64,
+    ) -> f64 {
+        self.effective_n = desired_n;
+        self.close(step_s, measured_n, contact_n)
+    }
+
+    fn close(&mut self, step_s: f64, measured_n: f64, contact_n: f64) -> f64 {
         let closed = match self.robot.feedback {
             Feedback::Measured => measured_n,
             Feedback::Independent => self.force_n,

@@ -1,6 +1,6 @@
 //! The effects of a twin on one part, hook by hook, in the order of the twin.
 
-use super::{CommandHook, Effect, GripPoint, SensorHook, SensorMemory, SensorPoint};
+use super::{CommandHook, Effect, EffectSpec, GripPoint, SensorHook, SensorMemory, SensorPoint};
 use crate::{OpticsState, Part, Twin};
 
 fn acting<'a>(twin: &'a Twin, part_name: &'a str) -> impl Iterator<Item = &'a Effect> {
@@ -63,6 +63,17 @@ impl SensorChain {
         Self { stages, clock_start_s, direction: 1.0 }
     }
 
+    /// The sensor effects among `effects` with their values, in their order.
+    pub fn of<'a>(
+        effects: impl Iterator<Item = (&'static EffectSpec, &'a [f64])>,
+        clock_start_s: f64,
+    ) -> Self {
+        let stages = effects
+            .filter_map(|(spec, values)| Some((spec.sensor?, values.to_vec(), SensorMemory::default())))
+            .collect();
+        Self { stages, clock_start_s, direction: 1.0 }
+    }
+
     /// For a pull of this sign along the sensor's axis. Forces stay magnitudes along the pull: against the axis
     /// (-1) a bias lowers the reading that it raises along the axis.
     #[must_use]
@@ -97,6 +108,11 @@ impl CommandChain {
     pub fn new(twin: &Twin, part_name: &str) -> Self {
         let stages = acting(twin, part_name).filter_map(|e| Some((e.spec.command?, e.values.clone())));
         Self { stages: stages.collect() }
+    }
+
+    /// The command effects among `effects` with their values, in their order.
+    pub fn of<'a>(effects: impl Iterator<Item = (&'static EffectSpec, &'a [f64])>) -> Self {
+        Self { stages: effects.filter_map(|(spec, values)| Some((spec.command?, values.to_vec()))).collect() }
     }
 
     /// What the force loop is told when it measures `measured_n`.

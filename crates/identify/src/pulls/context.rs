@@ -1,0 +1,345 @@
+//! A campaign with what its traces say, and the residuals of a model against both.
+
+use super::data::PullData;
+use super::fitting::huber;
+use super::model::{PredictPulls, PullModel};
+use super::observe::{LEVELS, TraceObservation, noise_n, observe};
+use crate::least_squares::{FitOptions, FreeParameter, fit};
+
+/// Scatter of friction from grip to grip with which residuals are weighed; their true scale is fitted.
+const SCATTER: f64 = 0.04;
+
+/// Force by which the response of an arm differs from that of a first-order loop, and its part that grows with force: what
+/// all traces of a campaign share says no more than this.
+const SHARED_N: (f64, f64) = (0.06, 0.012);
+
+/// The same from trace to trace.
+const OWN_N: (f64, f64) = (0.03, 0.005);
+
+/// Readings of a trace that are looked at before the slip.
+const READINGS: usize = 36;
+
+/// Levels of force that readings are averaged in.
+const EDGES_N: [f64; LEVELS] = [3.0, 6.0, 10.0, 16.0, 26.0, f64::INFINITY];
+
+/// What a trace says, ready to be compared.
+#[derive(Debug, Clone)]
+pub struct Observation {
+    /// Which pull.
+    pub row: usize,
+    /// Mean reading without load and the number of readings.
+    pub no_load_n: Option<(f64, usize)>,
+    /// Times while the jaws held.
+    pub times_s: Vec<f64>,
+    /// Readings at these times, means over a few neighbours.
+    pub readings_n: Vec<f64>,
+    /// Readings in each mean.
+    pub each: usize,
+    /// Level of force of each.
+    pub levels: Vec<usize>,
+    /// Reading at which the jaws slipped.
+    pub limit_n: Option<f64>,
+    /// Mean reading while the jaws slid and the number of readings.
+    pub slid_n: Option<(f64, usize)>,
+}
+
+/// A campaign, ready to be fitted.
+pub struct Context<'a> {
+    /// The pulls.
+    pub data: &'a PullData<'a>,
+    /// What predicts them.
+    pub predictor: &'a dyn PredictPulls,
+    /// What the traces say.
+    pub observations: Vec<Observation>,
+    /// Observation of each pull.
+    pub observed: Vec<Option<usize>>,
+    /// Ratio of sliding to slipping readings over all traces, and its standard error.
+    pub kinetic: Option<(f64, f64)>,
+    /// The baseline as the traces see it.
+    pub base: PullModel,
+    /// Lag and dead time of the twin that was given, for campaigns without traces.
+    pub given: (f64, f64, f64),
+    /// Half the sum of squares of the traces under the baseline.
+    pub baseline_trace_cost: f64,
+}
+
+impl<'a> Context<'a> {
+    /// Looks at the traces and fits what they say alone: noise, lag, dead time, stiffness, damping, kinetic ratio.
+    pub fn new(data: &'a PullData<'a>, predictor: &'a dyn PredictPulls, given: &PullModel) -> Self {
+        let mut base = given.clone();
+        base.effects.clear();
+        base.factor.clear();
+        base.scatter = SCATTER;
+        let pulls = &data.measured.pulls;
+        if let Some(noise) = noise_n(pulls) {
+            base.noise_n = noise.max(0.01);
+        }
+        let raw: Vec<TraceObservation> = pulls
+            .iter()
+            .enumerate()
+            .filter_map(|(i, p)| Some(observe(i, p.trace.as_ref()?, base.noise_n)))
+            .collect();
+        let mut context = Self {
+            data,
+            predictor,
+            observations: vec![],
+            observed: vec![None; data.len()],
+            kinetic: None,
+            given: (given.lag_s, given.dead_time_s, given.kinetic_ratio),
+            base,
+            baseline_trace_cost: 0.0,
+        };
+        context.look_at(&raw);
+        context
+    }
+
+    fn look_at(&mut self, raw: &[TraceObservation]) {
+        if raw.is_empty() {
+            return;
+        }
+        if let Some(stiffness) = stiffness(raw) {
+            self.base.stiffness_n_per_m = stiffness;
+        }
+        for _ in 0..2 {
+            self.fit_dynamics(raw);
+            if let Some(damping) = self.damping(raw) {
+                self.base.damping_n_s_per_m = damping;
+            }
+        }
+        for trace in raw {
+            let observation = self.observation(trace);
+            self.observed[trace.row] = Some(self.observations.len());
+            self.observations.push(observation);
+        }
+        let mut ratios: Vec<f64> = self
+            .observations
+            .iter()
+            .filter_map(|o| {
+                let bias = o.no_load_n.map_or(0.0, |b| b.0);
+                let (limit, slid) = (o.limit_n? - bias, o.slid_n?.0 - bias);
+                (limit > 8.0 * self.base.noise_n).then(|| slid / limit)
+            })
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        if ratios.len() >= 3 {
+            let n = ratios.len();
+            let median = ratios[n / 2];
+            let spread = 0.741 * (ratios[(3 * n) / 4] - ratios[n / 4]);
+            self.kinetic = Some((median, 1.2533 * spread / (n as f64).sqrt() + 0.003));
+            self.base.kinetic_ratio = median.clamp(0.3, 1.0);
+        }
+        let rows: Vec<usize> = (0..self.data.len()).collect();
+        self.baseline_trace_cost = huber(&self.trace_residuals(&self.base, &rows));
+    }
+
+    /// Lag and dead time from the readings while the jaws held.
+    fn fit_dynamics(&mut self, raw: &[TraceObservation]) {
+        let parameters = [("lag_s", self.base.lag_s, 1.0), ("dead_time_s", self.base.dead_time_s, 0.5)].map(
+            |(name, start, most)| FreeParameter {
+                name: name.into(),
+                start,
+                bounds: (0.0, most),
+                scale: 0.02,
+            },
+        );
+        let thinned: Vec<(usize, Vec<f64>, Vec<f64>)> = raw
+            .iter()
+            .map(|t| {
+                let step = t.held_s.len().div_ceil(READINGS).max(1);
+                let pick = |x: &[f64]| x.iter().copied().step_by(step).collect();
+                (t.row, pick(&t.held_s), pick(&t.held_n))
+            })
+            .collect();
+        let found = fit(&parameters, FitOptions { most_steps: 15, least_gain: 1e-4 }, |v| {
+            let mut model = self.base.clone();
+            (model.lag_s, model.dead_time_s) = (v[0], v[1]);
+            let mut r = Vec::new();
+            for (row, times, readings) in &thinned {
+                let predicted = self.predictor.trace(&model, *row, times);
+                r.extend(readings.iter().zip(&predicted.stuck_n).map(|(a, b)| {
+                    let x = (a - b) / (SHARED_N.0 + SHARED_N.1 * b.abs() + self.base.noise_n);
+                    // Readings of a sensor that is off by much do not pull the loop with them.
+                    x.signum() * (1.0 + x.abs()).sqrt().min(x.abs())
+                }));
+            }
+            r
+        });
+        if let Ok(found) = found {
+            (self.base.lag_s, self.base.dead_time_s) = (found.values[0], found.values[1]);
+        }
+    }
+
+    /// Force per speed of the sliding jaws: displacement after the slip against the force that nobody holds.
+    fn damping(&self, raw: &[TraceObservation]) -> Option<f64> {
+        let mut each = Vec::new();
+        for trace in raw.iter().filter(|t| t.slid_rows.len() >= 5) {
+            let times: Vec<f64> = trace.slid_rows.iter().map(|r| r.0).collect();
+            let applied = self.predictor.trace(&self.base, trace.row, &times).stuck_n;
+            let held = trace.slid_n?.0;
+            let mut impulse = 0.0;
+            for k in 1..times.len() {
+                impulse += (0.5 * (applied[k] + applied[k - 1]) - held).max(0.0) * (times[k] - times[k - 1]);
+            }
+            let travel = trace.slid_rows[times.len() - 1].2 - trace.slid_rows[0].2;
+            if travel > 5e-4 && impulse > 0.0 {
+                each.push(impulse / travel);
+            }
+        }
+        each.sort_by(f64::total_cmp);
+        (each.len() >= 3).then(|| each[each.len() / 2].clamp(10.0, 2e4))
+    }
+
+    fn observation(&self, trace: &TraceObservation) -> Observation {
+        let each = trace.held_s.len().div_ceil(READINGS).max(1);
+        let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+        let times_s: Vec<f64> = trace.held_s.chunks(each).map(mean).collect();
+        let readings_n: Vec<f64> = trace.held_n.chunks(each).map(mean).collect();
+        let stuck = self.predictor.trace(&self.base, trace.row, &times_s).stuck_n;
+        let levels =
+            stuck.iter().map(|f| EDGES_N.iter().position(|e| f <= e).unwrap_or(LEVELS - 1)).collect();
+        // The reading at the slip: what the last readings before it lie above the stuck tool, on top of that tool.
+        let limit_n = trace.slip_s.and_then(|slip_s| {
+            let n = trace.held_s.len();
+            let from = n.saturating_sub(16);
+            let last = &trace.held_s[from..n.saturating_sub(1)];
+            if last.len() < 3 {
+                return None;
+            }
+            let mut times = last.to_vec();
+            times.push(slip_s - 0.005);
+            let stuck = self.predictor.trace(&self.base, trace.row, &times).stuck_n;
+            let above: f64 = trace.held_n[from..n - 1].iter().zip(&stuck).map(|(r, s)| r - s).sum::<f64>()
+                / last.len() as f64;
+            Some(stuck[last.len()] + above)
+        });
+        Observation {
+            row: trace.row,
+            no_load_n: trace.no_load_n.filter(|(_, n)| *n >= 5),
+            times_s,
+            readings_n,
+            each,
+            levels,
+            limit_n,
+            slid_n: trace.slid_n,
+        }
+    }
+
+    /// Standard deviation of what is compared of each pull: its slip where there is a trace, its label otherwise.
+    pub(super) fn deviations(&self, model: &PullModel, rows: &[usize]) -> Vec<f64> {
+        let predicted = self.predictor.pulls(model, rows);
+        rows.iter()
+            .zip(&predicted)
+            .map(|(&i, p)| match self.limit_of(i) {
+                Some(_) => {
+                    let scatter = model.scatter * p.limit_n;
+                    (scatter * scatter + 0.1 * model.noise_n * model.noise_n + 0.03 * 0.03).sqrt()
+                }
+                None => (p.label_sd_n * p.label_sd_n + 0.03 * 0.03).sqrt(),
+            })
+            .collect()
+    }
+
+    fn limit_of(&self, row: usize) -> Option<f64> {
+        self.observations[self.observed[row]?].limit_n
+    }
+
+    /// What was measured less what is predicted, in standard deviations, of the pulls at `rows`.
+    pub(super) fn friction_residuals(&self, model: &PullModel, rows: &[usize], sd: &[f64]) -> Vec<f64> {
+        let predicted = self.predictor.pulls(model, rows);
+        rows.iter()
+            .zip(&predicted)
+            .zip(sd)
+            .map(|((&i, p), sd)| match self.limit_of(i) {
+                Some(limit_n) => (limit_n - p.limit_reading_n) / sd,
+                None => (self.data.label_n[i] - p.label_n) / sd,
+            })
+            .collect()
+    }
+
+    /// What the readings of the traces at `rows` differ from a model by, in standard deviations: their mean over all
+    /// traces by level of force, and each trace about that mean.
+    pub(super) fn trace_residuals(&self, model: &PullModel, rows: &[usize]) -> Vec<f64> {
+        let mut levels: Vec<Vec<(f64, f64, usize)>> = vec![vec![]; LEVELS];
+        let mut no_load = Vec::new();
+        let noise = model.noise_n;
+        for observation in rows.iter().filter_map(|&i| self.observed[i]).map(|o| &self.observations[o]) {
+            let predicted = self.predictor.trace(model, observation.row, &observation.times_s);
+            if let Some((mean, n)) = observation.no_load_n {
+                no_load.push((mean - predicted.no_load_n, n));
+            }
+            let mut sums = [(0.0, 0.0, 0_usize); LEVELS];
+            for (k, level) in observation.levels.iter().enumerate() {
+                sums[*level].0 += observation.readings_n[k] - predicted.stuck_n[k];
+                sums[*level].1 += observation.readings_n[k];
+                sums[*level].2 += 1;
+            }
+            for (level, (difference, force, n)) in levels.iter_mut().zip(sums) {
+                if n > 0 {
+                    level.push((difference / n as f64, force / n as f64, n * observation.each));
+                }
+            }
+        }
+        let mut r = Vec::new();
+        for level in levels.iter().filter(|l| !l.is_empty()) {
+            let count = level.len() as f64;
+            let mean = level.iter().map(|x| x.0).sum::<f64>() / count;
+            let force = level.iter().map(|x| x.1.abs()).sum::<f64>() / count;
+            let readings: usize = level.iter().map(|x| x.2).sum();
+            let shared = SHARED_N.0 + SHARED_N.1 * force;
+            r.push(mean / (shared * shared + noise * noise / readings as f64).sqrt());
+            for (difference, force, n) in level {
+                let own = OWN_N.0 + OWN_N.1 * force.abs();
+                r.push((difference - mean) / (own * own + noise * noise / *n as f64).sqrt());
+            }
+        }
+        if !no_load.is_empty() {
+            let mean = no_load.iter().map(|x| x.0).sum::<f64>() / no_load.len() as f64;
+            let readings: usize = no_load.iter().map(|x| x.1).sum();
+            r.push(mean / (0.02 * 0.02 + noise * noise / readings as f64).sqrt());
+            r.extend(
+                no_load.iter().map(|(x, n)| (x - mean) / (0.02 * 0.02 + noise * noise / *n as f64).sqrt()),
+            );
+        }
+        r
+    }
+
+    /// What is known beside the pulls, as residuals.
+    pub(super) fn priors(&self, model: &PullModel, signals: bool) -> Vec<f64> {
+        let mut r = Vec::new();
+        match self.kinetic {
+            Some((ratio, error)) => r.push((model.kinetic_ratio - ratio.min(1.0)) / error),
+            None => r.push((model.kinetic_ratio - self.given.2.min(0.95)) / 0.05),
+        }
+        if self.observations.is_empty() || signals {
+            let (wide_lag, wide_dead) = if self.observations.is_empty() { (0.04, 0.02) } else { (0.5, 0.5) };
+            let (lag, dead) = if self.observations.is_empty() {
+                (self.given.0, self.given.1)
+            } else {
+                (self.base.lag_s, self.base.dead_time_s)
+            };
+            r.push((model.lag_s - lag) / wide_lag);
+            r.push((model.dead_time_s - dead) / wide_dead);
+        }
+        r
+    }
+}
+
+/// Shear stiffness of both gels: median over the traces of reading over displacement.
+fn stiffness(raw: &[TraceObservation]) -> Option<f64> {
+    let mut each: Vec<f64> = raw
+        .iter()
+        .filter_map(|t| {
+            let n = t.held_n.len() as f64;
+            if n < 8.0 {
+                return None;
+            }
+            let (mf, mx) = (t.held_n.iter().sum::<f64>() / n, t.held_m.iter().sum::<f64>() / n);
+            let pairs = t.held_n.iter().zip(&t.held_m);
+            let (fx, ff) = pairs
+                .fold((0.0, 0.0), |(fx, ff), (f, x)| (fx + (f - mf) * (x - mx), ff + (f - mf) * (f - mf)));
+            (ff > 0.0 && fx > 0.0).then(|| ff / fx)
+        })
+        .collect();
+    each.sort_by(f64::total_cmp);
+    (each.len() >= 2).then(|| each[each.len() / 2].clamp(200.0, 2e6))
+}

@@ -1,0 +1,128 @@
+//! Unnamed dependences: a smooth curve in a column, steps between its words, the product of two columns.
+
+use super::data::{Column, PullData};
+
+/// A dependence of friction on a column that no effect explains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// The column, or `a*b`.
+    pub name: String,
+    /// One row of basis functions a pull; each has mean 0.
+    pub basis: Vec<Vec<f64>>,
+    /// Whether it adds a force to what the jaws hold; otherwise it multiplies it.
+    pub additive: bool,
+    /// Bound of a coefficient: share of the friction, or newtons.
+    pub most: f64,
+    /// Parameters that the data have to pay for.
+    pub cost: usize,
+}
+
+impl Curve {
+    /// Number of coefficients.
+    pub fn len(&self) -> usize {
+        self.basis.first().map_or(0, Vec::len)
+    }
+
+    /// Whether it has no coefficient.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Multiplies the factor of each pull.
+    pub fn apply(&self, coefficients: &[f64], limits_n: &[f64], factor: &mut [f64]) {
+        for (i, f) in factor.iter_mut().enumerate() {
+            let sum: f64 = self.basis[i].iter().zip(coefficients).map(|(b, c)| b * c).sum();
+            *f *= if self.additive {
+                (1.0 + sum / limits_n[i].max(0.1)).max(0.05)
+            } else {
+                libm::exp(sum.clamp(-3.0, 3.0))
+            };
+        }
+    }
+
+    /// The same curve as a force that is added.
+    pub fn added(&self) -> Self {
+        Self { additive: true, most: 15.0, ..self.clone() }
+    }
+}
+
+fn centred(mut basis: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let n = basis.len() as f64;
+    for k in 0..basis.first().map_or(0, Vec::len) {
+        let mean = basis.iter().map(|row| row[k]).sum::<f64>() / n;
+        basis.iter_mut().for_each(|row| row[k] -= mean);
+    }
+    basis
+}
+
+/// Piecewise linear between knots, as a line and hinges, in units of the column's range.
+fn hinges(x: &[f64], inner: usize) -> Vec<Vec<f64>> {
+    let mut sorted = x.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let (low, high) = (sorted[0], sorted[sorted.len() - 1]);
+    let range = (high - low).max(1e-300);
+    let mut distinct = sorted.clone();
+    distinct.dedup();
+    let inner = inner.min(distinct.len().saturating_sub(2));
+    let mut knots: Vec<f64> = (1..=inner).map(|k| distinct[k * (distinct.len() - 1) / (inner + 1)]).collect();
+    knots.dedup();
+    knots.retain(|k| *k > low && *k < high);
+    x.iter()
+        .map(|v| {
+            let mut row = vec![(v - low) / range];
+            row.extend(knots.iter().map(|k| ((v - k) / range).max(0.0)));
+            row
+        })
+        .collect()
+}
+
+/// The curves in a column: of few knots, and for a clock also of many.
+pub fn curves_in(name: &str, column: &Column) -> Vec<Curve> {
+    let curve = |basis: Vec<Vec<f64>>, cost: usize| Curve {
+        name: name.into(),
+        basis: centred(basis),
+        additive: false,
+        most: 3.0,
+        cost,
+    };
+    match column {
+        Column::Word(at, names) => {
+            let n = names.len() - 1;
+            let row = |w: &usize| (0..n).map(|k| f64::from(u8::from(*w == k + 1))).collect();
+            vec![curve(at.iter().map(row).collect(), n)]
+        }
+        Column::Number(x) => {
+            let distinct = column.distinct();
+            let mut all = vec![curve(hinges(x, 0), 1)];
+            if distinct > 2 {
+                all.push(curve(hinges(x, 2.min(distinct - 2)), 1 + 2.min(distinct - 2)));
+            }
+            if distinct > 12 {
+                all.push(curve(hinges(x, 8), 9));
+            }
+            if distinct > 40 && x.len() > 60 {
+                all.push(curve(hinges(x, 16), 17));
+            }
+            all
+        }
+    }
+}
+
+/// The product of two columns of numbers, each about its mean. One more parameter is paid for the choice of the pair.
+pub fn product(data: &PullData<'_>, a: &str, b: &str) -> Option<Curve> {
+    let standard = |name: &str| {
+        let x = data.numbers(name)?;
+        let n = x.len() as f64;
+        let mean = x.iter().sum::<f64>() / n;
+        let sd = (x.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n).sqrt();
+        (sd > 0.0).then(|| x.iter().map(|v| (v - mean) / sd).collect::<Vec<_>>())
+    };
+    let (x, y) = (standard(a)?, standard(b)?);
+    Some(Curve {
+        name: format!("{a}*{b}"),
+        basis: centred(x.iter().zip(&y).map(|(x, y)| vec![x * y]).collect()),
+        additive: false,
+        most: 2.0,
+        cost: 2,
+    })
+}

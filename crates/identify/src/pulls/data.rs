@@ -1,0 +1,158 @@
+//! A campaign as numbers.
+
+use gripgen_twin::{ExtraValues, MeasuredPulls};
+use std::collections::BTreeMap;
+
+/// A column of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Column {
+    /// Numbers, all finite.
+    Number(Vec<f64>),
+    /// Words, as positions in a sorted list of them.
+    Word(Vec<usize>, Vec<String>),
+}
+
+impl Column {
+    /// Number of different values.
+    pub fn distinct(&self) -> usize {
+        match self {
+            Column::Word(_, words) => words.len(),
+            Column::Number(x) => {
+                let mut bits: Vec<u64> = x.iter().map(|x| (x + 0.0).to_bits()).collect();
+                bits.sort_unstable();
+                bits.dedup();
+                bits.len()
+            }
+        }
+    }
+}
+
+/// What is asked about a campaign beside its pulls.
+#[derive(Debug, Clone)]
+pub struct PullData<'a> {
+    /// The pulls.
+    pub measured: &'a MeasuredPulls,
+    /// Names of the parts; positions elsewhere mean these.
+    pub parts: Vec<String>,
+    /// Part of each pull.
+    pub part_of: Vec<usize>,
+    /// Labels.
+    pub label_n: Vec<f64>,
+    /// Columns that were written down, by name, in a fixed order.
+    pub columns: BTreeMap<String, Column>,
+    /// Session of each pull, as a position.
+    pub session_of: Vec<usize>,
+    /// Pulls of one configuration share a number.
+    pub group_of: Vec<usize>,
+}
+
+fn words(values: impl Iterator<Item = String>) -> Column {
+    let values: Vec<String> = values.collect();
+    let mut names = values.clone();
+    names.sort();
+    names.dedup();
+    let at = values.iter().map(|v| names.partition_point(|n| n < v)).collect();
+    Column::Word(at, names)
+}
+
+/// Numbers of consecutive runs of equal keys, in the order of their first pulls.
+fn numbered<K: Ord + Clone>(keys: impl Iterator<Item = K>) -> Vec<usize> {
+    let mut known = BTreeMap::new();
+    keys.map(|k| {
+        let next = known.len();
+        *known.entry(k).or_insert(next)
+    })
+    .collect()
+}
+
+impl<'a> PullData<'a> {
+    /// Looks at a campaign.
+    pub fn new(measured: &'a MeasuredPulls) -> Self {
+        let pulls = &measured.pulls;
+        let number = |f: &dyn Fn(usize) -> f64| Column::Number((0..pulls.len()).map(f).collect());
+        let mut columns = BTreeMap::new();
+        for name in &measured.recorded {
+            let column = match name.as_str() {
+                "part" => words(pulls.iter().map(|p| p.part.clone())),
+                "gel_id" => words(pulls.iter().map(|p| p.covariates.gel_id.clone())),
+                "session" => words(pulls.iter().map(|p| p.covariates.session.clone())),
+                "grip_force_n" => number(&|i| pulls[i].grip_force_n),
+                "force_increment_n" => number(&|i| pulls[i].increment_n),
+                "step_time_s" => number(&|i| pulls[i].step_s),
+                "dwell_s" => number(&|i| pulls[i].covariates.dwell_s),
+                "pull_index" => number(&|i| pulls[i].covariates.pull_index as f64),
+                "time_s" => number(&|i| pulls[i].covariates.time_s),
+                "temperature_c" => number(&|i| pulls[i].covariates.temperature_c),
+                "grip_offset_mm" => number(&|i| pulls[i].covariates.grip_offset_m * 1e3),
+                "grip_angle_deg" => number(&|i| pulls[i].covariates.grip_angle_rad.to_degrees()),
+                "pull_direction" => number(&|i| pulls[i].covariates.pull_direction),
+                _ => continue,
+            };
+            columns.insert(name.clone(), column);
+        }
+        for extra in &measured.extra {
+            let column = match &extra.values {
+                ExtraValues::Text(values) => words(values.iter().cloned()),
+                ExtraValues::Number(values) => {
+                    // Gaps get the median, which says nothing.
+                    let mut known: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+                    known.sort_by(f64::total_cmp);
+                    let median = known.get(known.len() / 2).copied().unwrap_or(0.0);
+                    Column::Number(values.iter().map(|x| if x.is_finite() { *x } else { median }).collect())
+                }
+            };
+            columns.insert(extra.name.clone(), column);
+        }
+        let parts = match words(pulls.iter().map(|p| p.part.clone())) {
+            Column::Word(_, names) => names,
+            Column::Number(_) => vec![],
+        };
+        let part_of = pulls.iter().map(|p| parts.partition_point(|n| *n < p.part)).collect();
+        let session_of = numbered(pulls.iter().map(|p| p.covariates.session.clone()));
+        let group_of = numbered(pulls.iter().map(|p| {
+            let c = &p.covariates;
+            let numbers = [
+                p.grip_force_n,
+                p.increment_n,
+                p.step_s,
+                c.dwell_s,
+                c.grip_offset_m,
+                c.grip_angle_rad,
+                c.pull_direction,
+            ];
+            (p.part.clone(), numbers.map(f64::to_bits))
+        }));
+        Self {
+            measured,
+            parts,
+            part_of,
+            label_n: pulls.iter().map(|p| p.max_pull_force_n).collect(),
+            columns,
+            session_of,
+            group_of,
+        }
+    }
+
+    /// Number of pulls.
+    pub fn len(&self) -> usize {
+        self.label_n.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.label_n.is_empty()
+    }
+
+    /// Whether a column was written down and varies.
+    pub fn varies(&self, name: &str) -> bool {
+        self.columns.get(name).is_some_and(|c| c.distinct() > 1)
+    }
+
+    /// Numbers of a column, words as their positions.
+    pub fn numbers(&self, name: &str) -> Option<Vec<f64>> {
+        Some(match self.columns.get(name)? {
+            Column::Number(x) => x.clone(),
+            Column::Word(at, _) => at.iter().map(|&i| i as f64).collect(),
+        })
+    }
+}

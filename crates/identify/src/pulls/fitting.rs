@@ -1,0 +1,233 @@
+//! Fitting a model to a campaign: friction from labels and slips, readings from traces, all parameters together.
+
+use super::candidates::Candidate;
+use super::context::Context;
+use super::curves::Curve;
+use super::likelihood::{Likelihood, likelihood, scale, weight_of};
+use super::model::PullModel;
+use crate::least_squares::{FitOptions, FreeParameter, fit};
+use nalgebra::DMatrix;
+
+/// Rounds of weights.
+const ROUNDS: usize = 3;
+
+/// What is fitted: effects of the library, each from a start, and unnamed curves.
+#[derive(Debug, Clone, Default)]
+pub struct Terms {
+    /// Effects with the values that their fits start from.
+    pub effects: Vec<(Candidate, Vec<f64>)>,
+    /// Unnamed dependences with their coefficients.
+    pub curves: Vec<(Curve, Vec<f64>)>,
+}
+
+impl Terms {
+    /// Whether readings or commands are changed.
+    pub fn act_on_signals(&self) -> bool {
+        self.effects.iter().any(|(c, _)| c.acts_on_signals())
+    }
+
+    /// Parameters that the data have to pay for.
+    pub fn cost(&self) -> usize {
+        self.effects.iter().map(|(c, _)| c.cost()).sum::<usize>()
+            + self.curves.iter().map(|(c, _)| c.cost).sum::<usize>()
+    }
+}
+
+/// A fitted model.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// The terms with their fitted values.
+    pub terms: Terms,
+    /// The model.
+    pub model: PullModel,
+    /// Names of the fitted parameters.
+    pub names: Vec<String>,
+    /// Their values.
+    pub values: Vec<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Of the pulls, in units of their predicted standard deviations.
+    pub residuals: Vec<f64>,
+    /// How likely they are.
+    pub likelihood: Likelihood,
+    /// Half the sum of squares that the traces add.
+    pub trace_cost: f64,
+}
+
+impl Fitted {
+    /// Logarithm of the likelihood of everything, less half the logarithm of the number of pulls for each parameter that
+    /// the baseline lacks (Schwarz 1978).
+    pub fn score(&self, pulls: usize) -> f64 {
+        self.likelihood.log
+            - self.trace_cost
+            - 0.5 * self.terms.cost() as f64 * libm::log(pulls.max(2) as f64)
+    }
+}
+
+/// Which parameters a fit has, in order.
+struct Layout {
+    parts: usize,
+    dynamics: bool,
+    parameters: Vec<FreeParameter>,
+}
+
+impl Context<'_> {
+    fn layout(&self, start: &PullModel, terms: &Terms) -> Layout {
+        let mut parameters = Vec::new();
+        for (name, mu) in self.data.parts.iter().zip(&start.mu) {
+            parameters.push(FreeParameter {
+                name: format!("parts.{name}.mu"),
+                start: *mu,
+                bounds: (1e-3, 3.0),
+                scale: 0.1 * mu.max(0.02),
+            });
+        }
+        parameters.push(FreeParameter {
+            name: "kinetic_ratio".into(),
+            start: start.kinetic_ratio,
+            bounds: (0.3, 1.0),
+            scale: 0.05,
+        });
+        let dynamics = terms.act_on_signals() || self.observations.is_empty();
+        if dynamics {
+            for (name, value, most) in
+                [("robot.lag_s", start.lag_s, 1.0), ("robot.dead_time_s", start.dead_time_s, 0.5)]
+            {
+                parameters.push(FreeParameter {
+                    name: name.into(),
+                    start: value,
+                    bounds: (0.0, most),
+                    scale: 0.02,
+                });
+            }
+        }
+        for (candidate, from) in &terms.effects {
+            parameters.extend(candidate.parameters(from));
+        }
+        for (curve, from) in &terms.curves {
+            for (k, start) in from.iter().enumerate() {
+                parameters.push(FreeParameter {
+                    name: format!("curve.{}.{k}", curve.name),
+                    start: *start,
+                    bounds: (-curve.most, curve.most),
+                    scale: 0.1 * curve.most.min(1.0),
+                });
+            }
+        }
+        Layout { parts: self.data.parts.len(), dynamics, parameters }
+    }
+
+    fn model_at(&self, start: &PullModel, terms: &Terms, layout: &Layout, values: &[f64]) -> PullModel {
+        let mut model = start.clone();
+        model.mu.copy_from_slice(&values[..layout.parts]);
+        let mut at = layout.parts;
+        model.kinetic_ratio = values[at];
+        at += 1;
+        if layout.dynamics {
+            (model.lag_s, model.dead_time_s) = (values[at], values[at + 1]);
+            at += 2;
+        }
+        model.effects.clear();
+        for (candidate, from) in &terms.effects {
+            let mut own = from.clone();
+            for &(i, _) in &candidate.free {
+                own[i] = values[at];
+                at += 1;
+            }
+            model.effects.push(candidate.with(&own));
+        }
+        model.factor.clear();
+        if !terms.curves.is_empty() {
+            let mut factor = vec![1.0; self.data.len()];
+            let limits = if terms.curves.iter().any(|(c, _)| c.additive) {
+                self.predictor.limits_n(&model)
+            } else {
+                vec![]
+            };
+            for (curve, from) in &terms.curves {
+                curve.apply(&values[at..at + from.len()], &limits, &mut factor);
+                at += from.len();
+            }
+            model.factor = factor;
+        }
+        model
+    }
+
+    /// Fits `terms` and the baseline to the pulls of `rows`, from `start`. `None` if the start cannot be predicted.
+    pub fn fit(&self, start: &PullModel, terms: &Terms, rows: &[usize]) -> Option<Fitted> {
+        let layout = self.layout(start, terms);
+        let mut parameters = layout.parameters.clone();
+        let signals = terms.act_on_signals();
+        let mut outcome = None;
+        for round in 0..ROUNDS {
+            let values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
+            let model = self.model_at(start, terms, &layout, &values);
+            let sd = self.deviations(&model, rows);
+            let friction = self.friction_residuals(&model, rows, &sd);
+            let traces = if signals { self.trace_residuals(&model, rows) } else { vec![] };
+            let s = scale(&friction).max(0.2);
+            // The first round does not know yet which pulls are bad.
+            let weights: Vec<f64> = friction
+                .iter()
+                .map(|r| if round == 0 { 1.0 } else { weight_of((r / s).powi(2)).sqrt() })
+                .collect();
+            let trace_weights: Vec<f64> = traces.iter().map(|r| (2.5 / r.abs().max(2.5)).sqrt()).collect();
+            let options = FitOptions { most_steps: if round == 0 { 12 } else { 8 }, least_gain: 1e-4 };
+            let found = fit(&parameters, options, |values| {
+                let model = self.model_at(start, terms, &layout, values);
+                let mut r = self.friction_residuals(&model, rows, &sd);
+                r.iter_mut().zip(&weights).for_each(|(r, w)| *r *= w / s);
+                if signals {
+                    let mut t = self.trace_residuals(&model, rows);
+                    t.iter_mut().zip(&trace_weights).for_each(|(r, w)| *r *= w);
+                    r.extend(t);
+                }
+                r.extend(self.priors(&model, signals));
+                r
+            })
+            .ok()?;
+            for (p, v) in parameters.iter_mut().zip(&found.values) {
+                p.start = *v;
+            }
+            outcome = Some(found);
+        }
+        let found = outcome?;
+        let model = self.model_at(start, terms, &layout, &found.values);
+        let sd = self.deviations(&model, rows);
+        let residuals = self.friction_residuals(&model, rows, &sd);
+        let log_sd: Vec<f64> = sd.iter().map(|s| libm::log(*s)).collect();
+        let sessions: Vec<usize> = rows.iter().map(|&i| self.data.session_of[i]).collect();
+        let judged = likelihood(&residuals, &log_sd, &sessions);
+        let traces = if signals { self.trace_residuals(&model, rows) } else { vec![] };
+        let own = huber(&traces) + 0.5 * self.priors(&model, signals).iter().map(|r| r * r).sum::<f64>();
+        let trace_cost = if signals { own } else { own + self.baseline_trace_cost };
+        let mut fitted_terms = terms.clone();
+        for ((_, values), effect) in fitted_terms.effects.iter_mut().zip(&model.effects) {
+            values.clone_from(&effect.values);
+        }
+        let mut at = found.values.len() - terms.curves.iter().map(|(_, v)| v.len()).sum::<usize>();
+        for (_, values) in &mut fitted_terms.curves {
+            let n = values.len();
+            values.copy_from_slice(&found.values[at..at + n]);
+            at += n;
+        }
+        // Neighbours that remember each other say less than their number.
+        let stretch = (1.0 + judged.memory) / (1.0 - judged.memory);
+        Some(Fitted {
+            terms: fitted_terms,
+            model,
+            names: parameters.iter().map(|p| p.name.clone()).collect(),
+            values: found.values,
+            covariance: found.covariance * stretch,
+            residuals,
+            likelihood: judged,
+            trace_cost,
+        })
+    }
+}
+
+/// Half of Huber's cost.
+pub fn huber(residuals: &[f64]) -> f64 {
+    const K: f64 = 2.5;
+    residuals.iter().map(|r| if r.abs() <= K { 0.5 * r * r } else { K * (r.abs() - 0.5 * K) }).sum()
+}

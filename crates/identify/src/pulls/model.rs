@@ -1,0 +1,92 @@
+//! What predicts pulls, and what it predicts them from.
+
+use gripgen_twin::effects::EffectSpec;
+
+/// An effect of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelEffect {
+    /// Which.
+    pub spec: &'static EffectSpec,
+    /// Values in the order of the spec.
+    pub values: Vec<f64>,
+    /// The only part it acts on, by position, or all.
+    pub part: Option<usize>,
+    /// Grip forces at whose ends the law is held, if it is.
+    pub held_grip_force_n: Option<(f64, f64)>,
+}
+
+impl ModelEffect {
+    /// An effect on all parts.
+    pub fn new(spec: &'static EffectSpec, values: Vec<f64>) -> Self {
+        Self { spec, values, part: None, held_grip_force_n: None }
+    }
+
+    /// Whether it changes readings or commands, and not only what the jaws hold.
+    pub fn acts_on_signals(&self) -> bool {
+        self.spec.sensor.is_some() || self.spec.command.is_some()
+    }
+}
+
+/// A twin, reduced to what pulls depend on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PullModel {
+    /// Friction coefficient of each part.
+    pub mu: Vec<f64>,
+    /// Kinetic over static friction.
+    pub kinetic_ratio: f64,
+    /// Time constant of the force loop.
+    pub lag_s: f64,
+    /// Dead time of the force loop.
+    pub dead_time_s: f64,
+    /// Shear stiffness of both gels together.
+    pub stiffness_n_per_m: f64,
+    /// Force per speed that the force loop yields to.
+    pub damping_n_s_per_m: f64,
+    /// Noise of one reading.
+    pub noise_n: f64,
+    /// Relative scatter of friction from grip to grip.
+    pub scatter: f64,
+    /// The effects, in order.
+    pub effects: Vec<ModelEffect>,
+    /// Factor on the friction of each pull, 1 where this is empty.
+    pub factor: Vec<f64>,
+}
+
+/// What a model predicts of a pull.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PullPrediction {
+    /// What the jaws hold, without scatter.
+    pub limit_n: f64,
+    /// The reading of that force, when it is reached.
+    pub limit_reading_n: f64,
+    /// Expected label over scatter and noise.
+    pub label_n: f64,
+    /// Its standard deviation over scatter and noise.
+    pub label_sd_n: f64,
+}
+
+/// What a model predicts of the readings of a pull.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TracePrediction {
+    /// Reading without load, before the pull.
+    pub no_load_n: f64,
+    /// Readings of a tool that holds, at each time asked for.
+    pub stuck_n: Vec<f64>,
+}
+
+/// Predicts the pulls of a campaign. Implemented where mechanics are known.
+pub trait PredictPulls: Sync {
+    /// Predictions of the pulls at `rows`.
+    fn pulls(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction>;
+
+    /// Limits alone, of all pulls: friction and normal force, no sensor.
+    fn limits_n(&self, model: &PullModel) -> Vec<f64>;
+
+    /// Readings of pull `row` at `times_s` if it never slipped.
+    fn trace(&self, model: &PullModel, row: usize, times_s: &[f64]) -> TracePrediction;
+
+    /// Calls `task` for 0..n, in parallel where that is possible. Each call stands for itself.
+    fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync)) {
+        (0..n).for_each(task);
+    }
+}

@@ -1,0 +1,126 @@
+//! What a trace says, in a few numbers: the no-load reading, the readings while the jaws held, the reading at which they
+//! slipped, the reading while they slid.
+
+use gripgen_twin::{MeasuredPull, PullTrace};
+
+/// Levels of force at which the readings before a slip are averaged.
+pub const LEVELS: usize = 6;
+
+/// Displacement beyond that of the sheared gels at which the jaws have slipped.
+const SLID_M: f64 = 0.12e-3;
+
+/// Time at the start of a pull that is left out: the response of an arm is of higher order than its model.
+const START_S: f64 = 0.25;
+
+/// The numbers of one trace.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TraceObservation {
+    /// Which pull.
+    pub row: usize,
+    /// Mean reading without load, and how many readings.
+    pub no_load_n: Option<(f64, usize)>,
+    /// Times of readings while the jaws held.
+    pub held_s: Vec<f64>,
+    /// These readings.
+    pub held_n: Vec<f64>,
+    /// Displacements at these readings.
+    pub held_m: Vec<f64>,
+    /// Time of the first row after the slip, if there is one.
+    pub slip_s: Option<f64>,
+    /// Mean reading while the jaws slid, and how many readings.
+    pub slid_n: Option<(f64, usize)>,
+    /// Time, reading and displacement while the jaws slid.
+    pub slid_rows: Vec<(f64, f64, f64)>,
+}
+
+/// Standard deviation of the no-load readings of all traces, about the mean of each.
+pub fn noise_n(pulls: &[MeasuredPull]) -> Option<f64> {
+    let (mut square, mut count) = (0.0, 0_usize);
+    for trace in pulls.iter().filter_map(|p| p.trace.as_ref()) {
+        let x: Vec<f64> = trace.rows().filter(|r| r.time_s < 0.0).map(|r| r.measured_force_n).collect();
+        if x.len() < 5 {
+            continue;
+        }
+        let mean = x.iter().sum::<f64>() / x.len() as f64;
+        square += x.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>();
+        count += x.len() - 1;
+    }
+    (count >= 20).then(|| (square / count as f64).sqrt())
+}
+
+/// Reads a trace. `noise_n` is the noise of a reading.
+pub fn observe(row: usize, trace: &PullTrace, noise_n: f64) -> TraceObservation {
+    let no_load: Vec<f64> = trace.rows().filter(|r| r.time_s < 0.0).map(|r| r.measured_force_n).collect();
+    let pulled: Vec<_> = trace.rows().filter(|r| r.time_s >= 0.0).collect();
+    let slip =
+        slip_row(&pulled.iter().map(|r| (r.measured_force_n, r.displacement_m)).collect::<Vec<_>>(), noise_n);
+    let held = slip.unwrap_or(pulled.len());
+    let mut observation = TraceObservation {
+        row,
+        no_load_n: mean(&no_load),
+        held_s: vec![],
+        held_n: vec![],
+        held_m: vec![],
+        slip_s: slip.map(|i| pulled[i].time_s),
+        slid_n: None,
+        slid_rows: vec![],
+    };
+    for r in pulled[..held].iter().filter(|r| r.time_s >= START_S) {
+        observation.held_s.push(r.time_s);
+        observation.held_n.push(r.measured_force_n);
+        observation.held_m.push(r.displacement_m);
+    }
+    if let Some(slip) = slip {
+        let slid: Vec<f64> = pulled[slip..].iter().skip(1).map(|r| r.measured_force_n).collect();
+        observation.slid_n = mean(&slid).filter(|(_, n)| *n >= 3);
+        observation.slid_rows =
+            pulled[slip..].iter().map(|r| (r.time_s, r.measured_force_n, r.displacement_m)).collect();
+    }
+    observation
+}
+
+fn mean(x: &[f64]) -> Option<(f64, usize)> {
+    (!x.is_empty()).then(|| (x.iter().sum::<f64>() / x.len() as f64, x.len()))
+}
+
+/// The first row after the slip of (reading, displacement) rows: from there on the displacement is beyond that of the
+/// sheared gels for good.
+fn slip_row(rows: &[(f64, f64)], noise_n: f64) -> Option<usize> {
+    let n = rows.len();
+    if n < 8 {
+        return None;
+    }
+    // Compliance of the gels from the first part of the pull, by least squares through the first rows that carry load.
+    let most = rows.iter().map(|r| r.0).fold(0.0, f64::max);
+    let (mut fx, mut ff) = (0.0, 0.0);
+    let mut x0 = 0.0;
+    for (i, (force, x)) in rows.iter().enumerate() {
+        if i == 0 {
+            x0 = *x;
+        }
+        if *force > 0.85 * most {
+            break;
+        }
+        if *force > 2.0 * noise_n {
+            fx += force * (x - x0);
+            ff += force * force;
+        }
+    }
+    let compliance = if ff > 0.0 { (fx / ff).max(0.0) } else { 0.0 };
+    let beyond = |i: usize| rows[i].1 - x0 - compliance * rows[i].0;
+    // Noise of the displacement as the rows show it.
+    let steps: Vec<f64> = rows.windows(2).map(|w| (w[1].1 - w[0].1).abs()).collect();
+    let mut sorted = steps;
+    sorted.sort_by(f64::total_cmp);
+    let jitter = sorted[sorted.len() / 2] * 3.0;
+    let threshold = SLID_M.max(jitter);
+    if beyond(n - 1) <= threshold {
+        return None;
+    }
+    let mut first = n - 1;
+    while first > 0 && beyond(first - 1) > threshold {
+        first -= 1;
+    }
+    // The rows just before the threshold belong to the slide already.
+    Some(first.saturating_sub(1).max(1))
+}

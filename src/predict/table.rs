@@ -1,0 +1,136 @@
+//! Labels as a function of what the jaws hold, over scatter and noise.
+
+use gripgen_identify::pulls::model::PullPrediction;
+use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
+use gripgen_twin::Staircase;
+use gripgen_twin::effects::{CommandChain, SensorChain};
+
+/// Distance of two forces in a table.
+const STEP_N: f64 = 0.125;
+
+/// Nodes and weights of the Gauss-Hermite rule of 9 points for a standard normal variable (Abramowitz and Stegun 1964,
+/// table 25.10, scaled).
+const NODES: [(f64, f64); 9] = [
+    (-4.512_745_863_399_783, 2.234_584_400_774_66e-5),
+    (-3.205_429_002_856_47, 2.789_141_321_231_77e-3),
+    (-2.076_847_978_677_83, 4.991_640_676_521_79e-2),
+    (-1.023_255_663_789_13, 2.440_975_028_949_39e-1),
+    (0.0, 4.063_492_063_492_06e-1),
+    (1.023_255_663_789_13, 2.440_975_028_949_39e-1),
+    (2.076_847_978_677_83, 4.991_640_676_521_79e-2),
+    (3.205_429_002_856_47, 2.789_141_321_231_77e-3),
+    (4.512_745_863_399_783, 2.234_584_400_774_66e-5),
+];
+
+/// A pull whose jaws hold a force that scatters.
+pub(super) struct Scattered<'a> {
+    pub rig: QuasiStatic,
+    pub stuck: &'a StuckPull,
+    pub staircase: &'a Staircase,
+    pub kinetic_ratio: f64,
+    pub scatter: f64,
+    pub noise_n: f64,
+    pub tolerance_n: f64,
+    pub sensor: SensorChain,
+    pub command: CommandChain,
+}
+
+impl Scattered<'_> {
+    /// Mean and mean square of the label of jaws that hold exactly `limit_n`.
+    fn label(&self, limit_n: f64, slip: &mut SlipPull) -> (f64, f64) {
+        let decided_n = self.tolerance_n + 7.0 * self.noise_n;
+        self.rig.slip(
+            self.stuck,
+            self.staircase,
+            limit_n,
+            self.kinetic_ratio,
+            decided_n,
+            &self.sensor,
+            &self.command,
+            slip,
+        );
+        match slip.label(self.stuck, self.tolerance_n, self.noise_n) {
+            Some((mean, var)) => (mean, mean * mean + var),
+            // A reading that was never near the command: the rule would fail, the reading at the slip stands in.
+            None => {
+                let reading = self.reading(limit_n);
+                (reading, reading * reading)
+            }
+        }
+    }
+
+    /// The reading when the contact force reaches `limit_n`.
+    fn reading(&self, limit_n: f64) -> f64 {
+        let contact = &self.stuck.contact_n;
+        let after = contact.partition_point(|&f| f < limit_n).clamp(1, contact.len() - 1);
+        let (low, high) = (contact[after - 1], contact[after]);
+        let w = if high > low { ((limit_n - low) / (high - low)).clamp(0.0, 1.0) } else { 1.0 };
+        self.stuck.reading_n[after - 1] * (1.0 - w) + self.stuck.reading_n[after] * w
+    }
+
+    /// The prediction for jaws that hold `limit_n` on average.
+    pub fn predict(&self, limit_n: f64) -> PullPrediction {
+        let mut slip = SlipPull::default();
+        let moments = NODES[1..8].iter().map(|&(z, w)| {
+            let (mean, square) = self.label((limit_n * (1.0 + self.scatter * z)).max(0.0), &mut slip);
+            (w, mean, square)
+        });
+        let (w, mean, square) = moments
+            .fold((0.0, 0.0, 0.0), |(a, b, c), (w, mean, square)| (a + w, b + w * mean, c + w * square));
+        finished(limit_n, self.reading(limit_n), mean / w, square / w)
+    }
+}
+
+fn finished(limit_n: f64, limit_reading_n: f64, mean_n: f64, square: f64) -> PullPrediction {
+    let label_sd_n = (square - mean_n * mean_n).max(0.0).sqrt();
+    PullPrediction { limit_n, limit_reading_n, label_n: mean_n, label_sd_n }
+}
+
+/// Predictions for evenly spaced forces.
+pub(super) struct LabelTable {
+    rows: Vec<PullPrediction>,
+}
+
+impl LabelTable {
+    pub fn new(pull: &Scattered<'_>, most_n: f64) -> Self {
+        // Beyond by what scatter adds.
+        let reach = most_n * (1.0 + 3.3 * pull.scatter);
+        let count = (reach / STEP_N).ceil() as usize + 2;
+        let mut slip = SlipPull::default();
+        let exact: Vec<(f64, f64)> = (0..count).map(|i| pull.label(i as f64 * STEP_N, &mut slip)).collect();
+        let between = |limit_n: f64| {
+            let x = (limit_n / STEP_N).clamp(0.0, (count - 2) as f64);
+            let (i, w) = (x as usize, x.fract());
+            (exact[i].0 * (1.0 - w) + exact[i + 1].0 * w, exact[i].1 * (1.0 - w) + exact[i + 1].1 * w)
+        };
+        let wanted = (most_n / STEP_N).ceil() as usize + 2;
+        let rows = (0..wanted)
+            .map(|i| {
+                let limit_n = i as f64 * STEP_N;
+                let (mean, square) = NODES.iter().fold((0.0, 0.0), |(m, s), &(z, w)| {
+                    let (mean, square) = between((limit_n * (1.0 + pull.scatter * z)).max(0.0));
+                    (m + w * mean, s + w * square)
+                });
+                finished(limit_n, pull.reading(limit_n), mean, square)
+            })
+            .collect();
+        Self { rows }
+    }
+
+    /// The prediction for jaws that hold `limit_n`.
+    pub fn at(&self, limit_n: f64) -> PullPrediction {
+        let last = self.rows.len() - 1;
+        let x = (limit_n / STEP_N).clamp(0.0, last as f64 - 1e-9);
+        let (i, w) = (x as usize, x.fract());
+        let (a, b) = (&self.rows[i], &self.rows[i + 1]);
+        let mix = |a: f64, b: f64| a * (1.0 - w) + b * w;
+        // Beyond the table everything grows with the force.
+        let beyond = (limit_n / (last as f64 * STEP_N)).max(1.0);
+        PullPrediction {
+            limit_n,
+            limit_reading_n: beyond * mix(a.limit_reading_n, b.limit_reading_n),
+            label_n: beyond * mix(a.label_n, b.label_n),
+            label_sd_n: mix(a.label_sd_n, b.label_sd_n),
+        }
+    }
+}
