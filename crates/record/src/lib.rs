@@ -6,6 +6,7 @@
 //!
 //! This crate does not know how samples are made. Reading holds one sample in memory, writing one as well.
 
+mod campaign;
 mod encode;
 mod export;
 mod folder;
@@ -13,10 +14,12 @@ mod index;
 mod picture;
 mod presses;
 pub mod proto;
+mod pulls;
 mod reader;
 mod shard;
 mod verify;
 
+pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader};
 pub use encode::{EncodeOptions, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
 pub use folder::{
@@ -26,6 +29,7 @@ pub use folder::{
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
 pub use picture::{PictureError, decode as decode_picture, encode_png};
 pub use presses::{PRESSES_FILE, PressFolder, PressFolderError, PressRecord, read_press_folder};
+pub use pulls::{PULLS_FILE, PullFolderError, TRACES_FOLDER, read_pull_folder};
 pub use reader::{ReadError, Record, ShardReader};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, ShardError, ShardInfo, ShardWriter};
 pub use verify::{Verification, verify};

@@ -1,0 +1,127 @@
+use super::*;
+use gripgen_twin::config::Feedback;
+
+fn folder(table: &str, files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join(TRACES_FOLDER)).unwrap();
+    std::fs::write(folder.path().join(PULLS_FILE), table).unwrap();
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+const TRACE: &str = "displacement_mm,time_s,measured_force_n,desired_force_n\n0,-0.01,0.1,0\n2,0.01,0.9,1\n";
+
+#[test]
+fn columns_stand_in_any_order_and_the_rest_are_covariates_of_unknown_meaning() {
+    let table = "\u{feff}max_pull_force_n, part ,pull_id,humidity_pct,operator,grip_force_n,grip_angle_deg,\
+                 dwell_s,session,pull_direction,temperature_c,,blank\n\
+                 11.5, gear ,a,40,ann,60,90,,2,-1,,7,\n\
+                 3, shaft,b,,bo,10,0,20,,1,,8,\n";
+    let campaign =
+        "force_convention = \"total\"\nlabel_tolerance_n = 2\nfeedback = \"measured\"\noperator = \"x\"\n";
+    let folder = folder(table, &[("campaign.toml", campaign), ("traces/b.csv", TRACE)]);
+    let read = read_pull_folder(folder.path()).unwrap();
+    let [a, b] = &read.pulls[..] else { panic!("two pulls") };
+    assert_eq!((a.id.as_str(), a.part.as_str(), a.max_pull_force_n), ("a", "gear", 11.5));
+    assert_eq!((a.grip_force_n, b.grip_force_n), (30.0, 5.0), "the campaign says that forces are sums");
+    assert_eq!((a.covariates.dwell_s, b.covariates.dwell_s), (1.0, 20.0), "an empty cell is the default");
+    assert_eq!((a.covariates.session.as_str(), b.covariates.session.as_str()), ("2", "1"));
+    assert_eq!((a.covariates.pull_direction, a.increment_n, a.step_s), (-1.0, 1.0, 0.104));
+    assert!((a.covariates.grip_angle_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    let recorded = ["part", "grip_force_n", "grip_angle_deg", "dwell_s", "session", "pull_direction"];
+    assert_eq!(read.recorded, recorded, "a column without a value was not recorded");
+    let [humidity, operator] = &read.extra[..] else { panic!("{:?}", read.extra) };
+    let ExtraValues::Number(humidity) = &humidity.values else { panic!("numbers") };
+    assert_eq!(humidity[0], 40.0);
+    assert!(humidity[1].is_nan());
+    assert_eq!(operator.values, ExtraValues::Text(vec!["ann".into(), "bo".into()]));
+    assert_eq!((read.label_tolerance_n, read.stop_m, read.feedback), (2.0, 5e-3, Some(Feedback::Measured)));
+    assert!(a.trace.is_none());
+    let trace = b.trace.as_ref().unwrap();
+    assert_eq!((trace.time_s[0], trace.displacement_m[1], trace.desired_force_n[1]), (-0.01, 2e-3, 1.0));
+}
+
+#[test]
+fn faults_name_file_line_column_and_value() {
+    let cell = |part: &str, force: &str, label: &str| {
+        format!("pull_id,part,grip_force_n,max_pull_force_n\na,g,1,1\nb,{part},{force},{label}\n")
+    };
+    for (table, part) in [
+        ("pull_id,part,grip_force_n\n", "no column `max_pull_force_n`; found: pull_id, part, grip_force_n"),
+        ("pull_id,part,grip_force_n,max_pull_force_n\n", "holds no rows"),
+        (&cell("g", "5", "nan"), "line 3, `max_pull_force_n` is `nan`, it must be a number of at least 0"),
+        (&cell("g", "5", "-2"), "`max_pull_force_n` is `-2`"),
+        (&cell("g", "5", "inf"), "`max_pull_force_n` is `inf`"),
+        (&cell("g", "5", ""), "`max_pull_force_n` is ``"),
+        (&cell("g", "0", "1"), "line 3, `grip_force_n` is `0`, it must be a number above 0"),
+        (&cell("g", "-7", "1"), "`grip_force_n` is `-7`"),
+        (&cell("g", "five", "1"), "`grip_force_n` is `five`"),
+        (&cell("", "5", "1"), "`part` is ``, it must be a name"),
+        (
+            "pull_id,part,grip_force_n,max_pull_force_n\n../x,g,1,1\n",
+            "`pull_id` is `../x`, it must be a name without",
+        ),
+        (
+            "pull_id,part,grip_force_n,max_pull_force_n\na,g,1,1\nb,g,1,1\na,g,2,2\n",
+            "lines 2 and 4 are both pull `a`",
+        ),
+        ("pull_id,part,grip_force_n,max_pull_force_n\na,g,1\n", "line: 2"),
+        ("pull_id,part,part,grip_force_n,max_pull_force_n\na,g,g,1,1\n", "two columns `part`"),
+        ("pull_id,part,grip_force_n,max_pull_force_n,pull_direction\na,g,1,1,0\n", "1 (up) or -1 (down)"),
+        ("pull_id,part,grip_force_n,max_pull_force_n,pull_index\na,g,1,1,1.5\n", "`pull_index` is `1.5`"),
+        (
+            "pull_id,part,grip_force_n,max_pull_force_n,temperature_c\na,g,1,1,NaN\n",
+            "`temperature_c` is `NaN`",
+        ),
+        ("", "no column `pull_id`"),
+    ] {
+        let folder = folder(table, &[]);
+        let error = read_pull_folder(folder.path()).unwrap_err().to_string();
+        assert!(error.contains(part) && error.contains("pulls.csv"), "{table:?}: {error}");
+    }
+}
+
+#[test]
+fn faults_of_the_other_files_are_theirs() {
+    let table = "pull_id,part,grip_force_n,max_pull_force_n\na,g,1,1\n";
+    for (file, text, part) in [
+        (
+            "campaign.toml",
+            "label_tolerance_n = -1\n",
+            "`label_tolerance_n` is -1, it must be a number above 0",
+        ),
+        ("campaign.toml", "\nforce_convention = \"sum\"\n", "campaign.toml:2: unknown variant `sum`"),
+        ("campaign.toml", "stop_mm = ", "campaign.toml"),
+        ("traces/a.csv", "time_s,desired_force_n,measured_force_n\n", "no column `displacement_mm`"),
+        (
+            "traces/a.csv",
+            &TRACE.replace("0.9", "x"),
+            "line 3, `measured_force_n` is `x`, it must be a number",
+        ),
+        (
+            "traces/a.csv",
+            &TRACE.replace("2,0.01", "2,-0.01"),
+            "line 3, `time_s` is `-0.01`, it must be later",
+        ),
+        ("traces/a.csv", &TRACE[..56], "a.csv: the table holds no rows"),
+    ] {
+        let error = read_pull_folder(folder(table, &[(file, text)]).path()).unwrap_err().to_string();
+        assert!(error.contains(part), "{text:?}: {error}");
+    }
+    let error = read_pull_folder(&tempfile::tempdir().unwrap().path().join("none")).unwrap_err().to_string();
+    assert!(error.contains("pulls.csv"), "{error}");
+}
+
+#[test]
+fn the_hash_covers_every_file_that_was_read() {
+    let table = "pull_id,part,grip_force_n,max_pull_force_n\na,g,1,1\n";
+    let hash = |files: &[(&str, &str)]| read_pull_folder(folder(table, files).path()).unwrap().sha256;
+    let plain = hash(&[]);
+    assert_eq!(plain.len(), 64);
+    assert_eq!(plain, hash(&[("notes.txt", "x")]), "what is not read does not count");
+    let traced = hash(&[("traces/a.csv", TRACE)]);
+    let campaign = hash(&[("campaign.toml", "stop_mm = 4\n")]);
+    assert!(plain != traced && plain != campaign && traced != campaign);
+}
