@@ -5,11 +5,15 @@
 //! apart, and what to measure next. `docs/diagnosis.md` describes the method.
 
 mod diagnosis;
+mod draws;
 mod least_squares;
+mod permutation;
 pub mod pulls;
 
 pub use diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy,
     HeldOutError, NamedEffect, ParameterEstimate, Rival, SeparateBy, UnknownCovariate, Verdict,
 };
+pub use draws::Draws;
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
+pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
