@@ -19,6 +19,12 @@ const MOST_TIME_S: f64 = 120.0;
 /// Tables kept: those of a model and of its neighbours for a derivative.
 const TABLES: usize = 96;
 
+/// Distance of the kinetic ratios for which there are tables; those between are interpolated.
+const RATIO_STEP: f64 = 0.025;
+
+/// Tables of two kinetic ratios and the weight of the second.
+type Tables = (Arc<LabelTable>, Arc<LabelTable>, f64);
+
 /// Ids of sensor effects that depend on the campaign's clock.
 const CLOCKS: [&str; 2] = ["sensor_drift", "sensor_gain_drift"];
 
@@ -166,13 +172,23 @@ impl<'a> PullPredictor<'a> {
         }
     }
 
-    fn table(&self, model: &PullModel, row: usize) -> Option<Arc<LabelTable>> {
-        let key = self.key(model, row, &[model.kinetic_ratio, model.scatter, model.noise_n])?;
-        let made = self.tables.get(key, || {
-            let stuck = self.stuck(model, row);
-            Ok::<_, Infallible>(LabelTable::new(&self.scattered(model, row, &stuck), self.most_n))
-        });
-        Some(made.unwrap_or_else(|never| match never {}))
+    /// The tables of two kinetic ratios around the model's, and the weight of the second.
+    fn table(&self, model: &PullModel, row: usize) -> Option<Tables> {
+        let steps = (model.kinetic_ratio / RATIO_STEP).min(1.0 / RATIO_STEP);
+        let at = |ratio: f64| {
+            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n])?;
+            let made = self.tables.get(key, || {
+                let (stuck, model) =
+                    (self.stuck(model, row), PullModel { kinetic_ratio: ratio, ..model.clone() });
+                Ok::<_, Infallible>(LabelTable::new(&self.scattered(&model, row, &stuck), self.most_n))
+            });
+            Some(made.unwrap_or_else(|never| match never {}))
+        };
+        let low = steps.floor();
+        let weight = steps - low;
+        let first = at(low * RATIO_STEP)?;
+        let second = if weight > 0.0 { at((low + 1.0) * RATIO_STEP)? } else { first.clone() };
+        Some((first, second, weight))
     }
 
     /// What the jaws of pull `row` hold, without scatter.
@@ -209,7 +225,7 @@ impl<'a> PullPredictor<'a> {
 
 impl PredictPulls for PullPredictor<'_> {
     fn pulls(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
-        let mut known: Vec<Option<Arc<LabelTable>>> = vec![None; 2 * self.profiles.len()];
+        let mut known: Vec<Option<Tables>> = vec![None; 2 * self.profiles.len()];
         rows.iter()
             .map(|&row| {
                 let limit_n = self.limit_n(model, row);
@@ -219,12 +235,26 @@ impl PredictPulls for PullPredictor<'_> {
                     known[slot] = self.table(model, row);
                 }
                 match &known[slot] {
-                    Some(table) => table.at(limit_n),
+                    Some((first, second, weight)) => first.at(limit_n).mixed(&second.at(limit_n), *weight),
                     None => {
                         let stuck = self.stuck(model, row);
                         self.scattered(model, row, &stuck).predict(limit_n)
                     }
                 }
+            })
+            .collect()
+    }
+
+    fn slips(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
+        let changed = model.effects.iter().any(gripgen_identify::pulls::model::ModelEffect::acts_on_signals);
+        rows.iter()
+            .map(|&row| {
+                let limit_n = self.limit_n(model, row);
+                let limit_reading_n = match changed {
+                    true => table::reading_n(&self.stuck(model, row), limit_n),
+                    false => limit_n,
+                };
+                PullPrediction { limit_n, limit_reading_n, ..PullPrediction::default() }
             })
             .collect()
     }

@@ -53,19 +53,10 @@ impl Scattered<'_> {
             Some((mean, var)) => (mean, mean * mean + var),
             // A reading that was never near the command: the rule would fail, the reading at the slip stands in.
             None => {
-                let reading = self.reading(limit_n);
+                let reading = reading_n(self.stuck, limit_n);
                 (reading, reading * reading)
             }
         }
-    }
-
-    /// The reading when the contact force reaches `limit_n`.
-    fn reading(&self, limit_n: f64) -> f64 {
-        let contact = &self.stuck.contact_n;
-        let after = contact.partition_point(|&f| f < limit_n).clamp(1, contact.len() - 1);
-        let (low, high) = (contact[after - 1], contact[after]);
-        let w = if high > low { ((limit_n - low) / (high - low)).clamp(0.0, 1.0) } else { 1.0 };
-        self.stuck.reading_n[after - 1] * (1.0 - w) + self.stuck.reading_n[after] * w
     }
 
     /// The prediction for jaws that hold `limit_n` on average.
@@ -77,8 +68,17 @@ impl Scattered<'_> {
         });
         let (w, mean, square) = moments
             .fold((0.0, 0.0, 0.0), |(a, b, c), (w, mean, square)| (a + w, b + w * mean, c + w * square));
-        finished(limit_n, self.reading(limit_n), mean / w, square / w)
+        finished(limit_n, reading_n(self.stuck, limit_n), mean / w, square / w)
     }
+}
+
+/// The reading when the contact force of a tool that holds reaches `limit_n`.
+pub(super) fn reading_n(stuck: &StuckPull, limit_n: f64) -> f64 {
+    let contact = &stuck.contact_n;
+    let after = contact.partition_point(|&f| f < limit_n).clamp(1, contact.len() - 1);
+    let (low, high) = (contact[after - 1], contact[after]);
+    let w = if high > low { ((limit_n - low) / (high - low)).clamp(0.0, 1.0) } else { 1.0 };
+    stuck.reading_n[after - 1] * (1.0 - w) + stuck.reading_n[after] * w
 }
 
 fn finished(limit_n: f64, limit_reading_n: f64, mean_n: f64, square: f64) -> PullPrediction {
@@ -111,7 +111,7 @@ impl LabelTable {
                     let (mean, square) = between((limit_n * (1.0 + pull.scatter * z)).max(0.0));
                     (m + w * mean, s + w * square)
                 });
-                finished(limit_n, pull.reading(limit_n), mean, square)
+                finished(limit_n, reading_n(pull.stuck, limit_n), mean, square)
             })
             .collect();
         Self { rows }

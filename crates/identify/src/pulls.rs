@@ -1,10 +1,14 @@
 //! Pulls: calibration of the baseline and diagnosis.
 
+pub mod answer;
 pub mod candidates;
 pub mod context;
 pub mod curves;
 pub mod data;
 pub mod fitting;
+pub mod heldout;
 pub mod likelihood;
 pub mod model;
 pub mod observe;
+pub mod power;
+pub mod search;

@@ -2,7 +2,7 @@
 
 use super::data::PullData;
 use super::fitting::huber;
-use super::model::{PredictPulls, PullModel};
+use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, noise_n, observe};
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 
@@ -59,6 +59,8 @@ pub struct Context<'a> {
     pub base: PullModel,
     /// Lag and dead time of the twin that was given, for campaigns without traces.
     pub given: (f64, f64, f64),
+    /// Whether lag and dead time are fitted with friction alone, which is slow.
+    pub free_lag: bool,
     /// Half the sum of squares of the traces under the baseline.
     pub baseline_trace_cost: f64,
 }
@@ -87,6 +89,7 @@ impl<'a> Context<'a> {
             kinetic: None,
             given: (given.lag_s, given.dead_time_s, given.kinetic_ratio),
             base,
+            free_lag: false,
             baseline_trace_cost: 0.0,
         };
         context.look_at(&raw);
@@ -224,19 +227,26 @@ impl<'a> Context<'a> {
         }
     }
 
+    /// Predictions of the pulls at `rows`; those with a slip in their trace have no label.
+    fn predicted(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
+        let seen: Vec<usize> = rows.iter().copied().filter(|&i| self.limit_of(i).is_some()).collect();
+        let unseen: Vec<usize> = rows.iter().copied().filter(|&i| self.limit_of(i).is_none()).collect();
+        let mut slips = self.predictor.slips(model, &seen).into_iter();
+        let mut labels = self.predictor.pulls(model, &unseen).into_iter();
+        let next = |&i: &usize| if self.limit_of(i).is_some() { slips.next() } else { labels.next() };
+        rows.iter().map(next).map(Option::unwrap_or_default).collect()
+    }
+
     /// Standard deviation of what is compared of each pull: its slip where there is a trace, its label otherwise.
     pub(super) fn deviations(&self, model: &PullModel, rows: &[usize]) -> Vec<f64> {
-        let predicted = self.predictor.pulls(model, rows);
-        rows.iter()
-            .zip(&predicted)
-            .map(|(&i, p)| match self.limit_of(i) {
-                Some(_) => {
-                    let scatter = model.scatter * p.limit_n;
-                    (scatter * scatter + 0.1 * model.noise_n * model.noise_n + 0.03 * 0.03).sqrt()
-                }
-                None => (p.label_sd_n * p.label_sd_n + 0.03 * 0.03).sqrt(),
-            })
-            .collect()
+        let each = |(&i, p): (&usize, &PullPrediction)| match self.limit_of(i) {
+            Some(_) => {
+                let scatter = model.scatter * p.limit_n;
+                (scatter * scatter + 0.1 * model.noise_n * model.noise_n + 0.03 * 0.03).sqrt()
+            }
+            None => (p.label_sd_n * p.label_sd_n + 0.03 * 0.03).sqrt(),
+        };
+        rows.iter().zip(&self.predicted(model, rows)).map(each).collect()
     }
 
     fn limit_of(&self, row: usize) -> Option<f64> {
@@ -245,15 +255,11 @@ impl<'a> Context<'a> {
 
     /// What was measured less what is predicted, in standard deviations, of the pulls at `rows`.
     pub(super) fn friction_residuals(&self, model: &PullModel, rows: &[usize], sd: &[f64]) -> Vec<f64> {
-        let predicted = self.predictor.pulls(model, rows);
-        rows.iter()
-            .zip(&predicted)
-            .zip(sd)
-            .map(|((&i, p), sd)| match self.limit_of(i) {
-                Some(limit_n) => (limit_n - p.limit_reading_n) / sd,
-                None => (self.data.label_n[i] - p.label_n) / sd,
-            })
-            .collect()
+        let each = |((&i, p), sd): ((&usize, &PullPrediction), &f64)| match self.limit_of(i) {
+            Some(limit_n) => (limit_n - p.limit_reading_n) / sd,
+            None => (self.data.label_n[i] - p.label_n) / sd,
+        };
+        rows.iter().zip(&self.predicted(model, rows)).zip(sd).map(each).collect()
     }
 
     /// What the readings of the traces at `rows` differ from a model by, in standard deviations: their mean over all
@@ -310,7 +316,7 @@ impl<'a> Context<'a> {
             Some((ratio, error)) => r.push((model.kinetic_ratio - ratio.min(1.0)) / error),
             None => r.push((model.kinetic_ratio - self.given.2.min(0.95)) / 0.05),
         }
-        if self.observations.is_empty() || signals {
+        if self.free_lag || signals {
             let (wide_lag, wide_dead) = if self.observations.is_empty() { (0.04, 0.02) } else { (0.5, 0.5) };
             let (lag, dead) = if self.observations.is_empty() {
                 (self.given.0, self.given.1)

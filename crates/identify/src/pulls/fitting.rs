@@ -88,7 +88,7 @@ impl Context<'_> {
             bounds: (0.3, 1.0),
             scale: 0.05,
         });
-        let dynamics = terms.act_on_signals() || self.observations.is_empty();
+        let dynamics = terms.act_on_signals() || self.free_lag;
         if dynamics {
             for (name, value, most) in
                 [("robot.lag_s", start.lag_s, 1.0), ("robot.dead_time_s", start.dead_time_s, 0.5)]

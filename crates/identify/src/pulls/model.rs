@@ -65,6 +65,20 @@ pub struct PullPrediction {
     pub label_sd_n: f64,
 }
 
+impl PullPrediction {
+    /// The prediction between two, `weight` of the way to `other`.
+    #[must_use]
+    pub fn mixed(&self, other: &Self, weight: f64) -> Self {
+        let mix = |a: f64, b: f64| a * (1.0 - weight) + b * weight;
+        Self {
+            limit_n: mix(self.limit_n, other.limit_n),
+            limit_reading_n: mix(self.limit_reading_n, other.limit_reading_n),
+            label_n: mix(self.label_n, other.label_n),
+            label_sd_n: mix(self.label_sd_n, other.label_sd_n),
+        }
+    }
+}
+
 /// What a model predicts of the readings of a pull.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TracePrediction {
@@ -78,6 +92,9 @@ pub struct TracePrediction {
 pub trait PredictPulls: Sync {
     /// Predictions of the pulls at `rows`.
     fn pulls(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction>;
+
+    /// What the jaws hold and the reading of it, of the pulls at `rows`; labels may be left at 0.
+    fn slips(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction>;
 
     /// Limits alone, of all pulls: friction and normal force, no sensor.
     fn limits_n(&self, model: &PullModel) -> Vec<f64>;

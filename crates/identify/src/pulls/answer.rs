@@ -1,0 +1,427 @@
+//! From a campaign to an answer.
+
+use super::candidates::{Candidate, candidates};
+use super::context::Context;
+use super::data::{Column, PullData};
+use super::fitting::{Fitted, Terms};
+use super::heldout::{by_value, errors, folds, noise_floor_n, predicted, scatter};
+use super::model::{PredictPulls, PullModel};
+use super::power::detectable;
+use super::search::{Accepted, Rival as Competing, Search, TIED_WITHIN};
+use crate::diagnosis::{
+    Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate,
+    Rival, SeparateBy, UnknownCovariate, Verdict,
+};
+use crate::permutation::{Covariate, dependence, interaction};
+use gripgen_twin::{KNOWN_COLUMNS, MeasuredPulls};
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+/// Fewest pulls that are diagnosed.
+const FEWEST: usize = 8;
+
+/// Standard deviations beyond which a pull is named as an outlier.
+const OUTLIER: f64 = 4.5;
+
+/// Half width of a 90 % interval of a normal variable.
+const HALF90: f64 = 1.645;
+
+/// Odds are taken to this power, because no model here is exactly right.
+const TEMPER: f64 = 0.6;
+
+/// An answer, with what a report and a twin need beside it.
+#[derive(Debug, Clone)]
+pub struct PullAnswer {
+    /// The answer.
+    pub diagnosis: Diagnosis,
+    /// What was fitted; not there if the data are insufficient.
+    pub fits: Option<PullFits>,
+}
+
+/// The fits behind an answer.
+#[derive(Debug, Clone)]
+pub struct PullFits {
+    /// Plain baseline.
+    pub before: Fitted,
+    /// With what was accepted.
+    pub after: Fitted,
+    /// What was accepted and what competed.
+    pub accepted: Accepted,
+    /// The effects that competed.
+    pub candidates: Vec<Candidate>,
+    /// Names of the curves that competed.
+    pub curve_names: Vec<String>,
+    /// Labels predicted for held-out repetitions, before and after.
+    pub heldout_label_n: [Vec<f64>; 2],
+    /// Labels predicted by the fits to all pulls, before and after.
+    pub label_n: [Vec<f64>; 2],
+}
+
+/// What may be asked of a diagnosis.
+#[derive(Default)]
+pub struct PullOptions<'a> {
+    /// Effects that must not compete.
+    pub without: &'a [&'a str],
+}
+
+/// Diagnoses a campaign from a baseline. `progress` is told the share that is done.
+pub fn diagnose_pulls(
+    measured: &MeasuredPulls,
+    predictor: &dyn PredictPulls,
+    given: &PullModel,
+    options: &PullOptions<'_>,
+    progress: &(dyn Fn(f64) + Sync),
+) -> PullAnswer {
+    let data = PullData::new(measured);
+    let mut diagnosis = blank(&data);
+    if let Some(missing) = insufficient(&data) {
+        diagnosis.notes.push(missing);
+        return PullAnswer { diagnosis, fits: None };
+    }
+    let mut context = Context::new(&data, predictor, given);
+    let rows: Vec<usize> = (0..data.len()).collect();
+    if context.observations.is_empty() {
+        // Without traces the labels are all that knows of the force loop.
+        context.free_lag = true;
+        if let Some(found) = context.fit(&context.base, &Terms::default(), &rows) {
+            context.base = found.model;
+        }
+        context.free_lag = false;
+    }
+    let most_n = data.label_n.iter().copied().fold(0.0, f64::max);
+    let search = Search::new(&context, candidates(&data, most_n, options.without));
+    if search.candidates.is_empty() && search.curves.is_empty() {
+        diagnosis
+            .notes
+            .push("nothing was varied: there is no covariate that the force could depend on".into());
+        return PullAnswer { diagnosis, fits: None };
+    }
+    let Some((before, accepted)) = search.run(&|share| progress(0.8 * share)) else {
+        diagnosis
+            .notes
+            .push("the labels cannot be predicted at all: is the unit of the forces newton?".into());
+        return PullAnswer { diagnosis, fits: None };
+    };
+    let after = accepted.fitted.clone();
+    diagnosis.effects = named(&search, &before, &accepted, &data);
+    diagnosis.unknown = unknown(&search, &before, &accepted, &data);
+    diagnosis.verdict = match (diagnosis.effects.is_empty(), diagnosis.unknown.is_empty()) {
+        (false, _) => Verdict::Effect,
+        (true, false) => Verdict::Unknown,
+        (true, true) => Verdict::None,
+    };
+    diagnosis.baseline = baseline(&after, &context);
+    diagnosis.data.outliers = outliers(&after, measured);
+    let repetitions = folds(data.len());
+    let heldout = [predicted(&context, &before, &repetitions), predicted(&context, &after, &repetitions)];
+    progress(0.9);
+    let labels = [&before, &after].map(|fitted| {
+        let mut model = fitted.model.clone();
+        model.scatter = scatter(&model, fitted.likelihood.scale);
+        predictor.pulls(&model, &rows).iter().map(|p| p.label_n).collect::<Vec<f64>>()
+    });
+    let own: Vec<f64> = data.label_n.iter().zip(&labels[1]).map(|(m, p)| m - p).collect();
+    diagnosis.noise_floor_n = Some(noise_floor_n(&own, &data.group_of, after.names.len()));
+    diagnosis.error = errors(&data.label_n, &heldout[0], &heldout[1], &data.group_of).map(|pair| {
+        let by = |sets: Vec<Vec<usize>>| {
+            if sets.len() < 3 || sets.len() > 20 {
+                return None;
+            }
+            let [b, a] = [&before, &after].map(|f| predicted(&context, f, &sets));
+            errors(&data.label_n, &b, &a, &data.group_of)
+        };
+        let force: Vec<u64> = measured.pulls.iter().map(|p| p.grip_force_n.to_bits()).collect();
+        let session: Vec<u64> = data.session_of.iter().map(|&s| s as u64).collect();
+        ErrorReport {
+            heldout: "repetitions".into(),
+            before: pair.before,
+            after: pair.after,
+            by: ErrorsBy { levels: by(by_value(&force)), sessions: by(by_value(&session)) },
+        }
+    });
+    progress(0.96);
+    diagnosis.would_have_seen = would_have_seen(&context, &after, &search.candidates);
+    progress(1.0);
+    let fits = PullFits {
+        before,
+        after,
+        candidates: search.candidates.clone(),
+        curve_names: search.curves.iter().map(|c| c.name.clone()).collect(),
+        accepted,
+        heldout_label_n: heldout,
+        label_n: labels,
+    };
+    PullAnswer { diagnosis, fits: Some(fits) }
+}
+
+fn blank(data: &PullData<'_>) -> Diagnosis {
+    let known: Vec<&str> =
+        KNOWN_COLUMNS.iter().copied().filter(|c| !["part", "gel_id", "session"].contains(c)).collect();
+    Diagnosis {
+        schema: DIAGNOSIS_SCHEMA,
+        channel: Channel::Pulls,
+        data: DataSummary {
+            pulls: Some(data.len()),
+            traces: Some(data.measured.pulls.iter().filter(|p| p.trace.is_some()).count()),
+            sha256: data.measured.sha256.clone(),
+            ..DataSummary::default()
+        },
+        noise_floor_n: None,
+        noise_floor_mse: None,
+        verdict: Verdict::Insufficient,
+        effects: vec![],
+        unknown: vec![],
+        would_have_seen: BTreeMap::new(),
+        not_excited: known
+            .iter()
+            .filter(|c| data.columns.contains_key(**c) && !data.varies(c))
+            .map(|c| (*c).into())
+            .collect(),
+        not_recorded: known.iter().filter(|c| !data.columns.contains_key(**c)).map(|c| (*c).into()).collect(),
+        baseline: BTreeMap::new(),
+        error: None,
+        notes: vec![],
+    }
+}
+
+/// What the data lack, if they cannot be diagnosed at all.
+fn insufficient(data: &PullData<'_>) -> Option<String> {
+    let n = data.len();
+    if n < FEWEST {
+        return Some(format!("{n} pulls are too few, a diagnosis needs {FEWEST} at least"));
+    }
+    if data.label_n.iter().all(|x| *x == data.label_n[0]) {
+        return Some(format!("all {n} labels are {} N", data.label_n[0]));
+    }
+    if data.parts.len() * 3 > n {
+        return Some(format!("{n} pulls of {} parts are too few", data.parts.len()));
+    }
+    let mut ratios: Vec<f64> =
+        data.measured.pulls.iter().map(|p| p.max_pull_force_n / (2.0 * p.grip_force_n)).collect();
+    ratios.sort_by(f64::total_cmp);
+    let ratio = ratios[n / 2];
+    if !(0.004..=4.0).contains(&ratio) {
+        return Some(format!(
+            "the labels are {ratio:.3e} times twice the grip force, which no gel does (0.004 to 4): are all forces in newtons, per jaw?"
+        ));
+    }
+    None
+}
+
+/// The accepted effects with their rivals.
+fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted, data: &PullData<'_>) -> Vec<NamedEffect> {
+    let n = data.len();
+    let mut effects: Vec<NamedEffect> = accepted
+        .effects
+        .iter()
+        .map(|(i, tied)| {
+            let candidate = &search.candidates[*i];
+            let odds: Vec<f64> = tied.iter().map(|(_, less)| libm::exp(TEMPER * less)).collect();
+            let total = 1.0 + odds.iter().sum::<f64>();
+            // What is left for "none" and for everything else.
+            let alone = accepted.entries.iter().find(|e| matches!(e.rival, Competing::Effect(k) if k == *i));
+            let rest = alone.map_or(0.05, |e| libm::exp(-TEMPER * e.gain.max(0.0)).min(0.5)).max(0.02);
+            let share = (1.0 - rest) / total;
+            let rivals: Vec<Rival> = tied
+                .iter()
+                .zip(&odds)
+                .map(|((k, _), odds)| Rival {
+                    name: search.candidates[*k].spec.id.into(),
+                    weight: share * odds,
+                })
+                .collect();
+            let mut class: Vec<String> = vec![candidate.spec.id.into()];
+            class.extend(tied.iter().map(|(k, _)| search.candidates[*k].spec.id.to_string()));
+            class.extend(
+                alike(search, before, accepted, *i, n)
+                    .into_iter()
+                    .filter(|c| !class.contains(c))
+                    .collect::<Vec<_>>(),
+            );
+            let names: Vec<&str> = tied.iter().map(|(k, _)| search.candidates[*k].spec.id).collect();
+            NamedEffect {
+                name: candidate.spec.id.into(),
+                part: None,
+                class,
+                weight: share,
+                parameters: parameters(&accepted.fitted, candidate),
+                indistinguishable_from: rivals,
+                separate_by: (!names.is_empty())
+                    .then(|| SeparateBy { text: separation(candidate.spec.id, &names), campaign: None }),
+            }
+        })
+        .collect();
+    effects.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    effects
+}
+
+/// Effects that explain nearly as much as effect `i` does alone: its class in this campaign.
+fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize, n: usize) -> Vec<String> {
+    let gained = |f: &Fitted| (f.likelihood.log - f.trace_cost) - (before.likelihood.log - before.trace_cost);
+    let own = accepted.entries.iter().find(|e| matches!(e.rival, Competing::Effect(k) if k == i));
+    let Some(own) = own.map(|e| gained(&e.fitted)) else { return vec![] };
+    let wide = (0.1 * own).min(3.0 * TIED_WITHIN).max(TIED_WITHIN) + 0.0 * n as f64;
+    let near = |e: &super::search::Entry| match e.rival {
+        Competing::Effect(k) if k != i && gained(&e.fitted) > own - wide => {
+            Some(search.candidates[k].spec.id.to_string())
+        }
+        _ => None,
+    };
+    accepted.entries.iter().filter_map(near).collect()
+}
+
+fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<String, ParameterEstimate> {
+    let Some(effect) = fitted.model.effects.iter().find(|e| e.spec == candidate.spec) else {
+        return BTreeMap::new();
+    };
+    let spec = candidate.spec;
+    let each = |(k, p): (usize, &gripgen_twin::effects::ParameterSpec)| {
+        let value = effect.values[k];
+        let name = format!("{}.{}", spec.id, p.name);
+        let half = fitted
+            .names
+            .iter()
+            .position(|n| *n == name)
+            .map_or(0.0, |at| HALF90 * fitted.covariance[(at, at)].max(0.0).sqrt());
+        let estimate = ParameterEstimate {
+            value,
+            low90: (value - half).max(p.bounds.0.min(value)),
+            high90: (value + half).min(p.bounds.1.max(value)),
+            unit: p.unit.into(),
+        };
+        (p.name.to_string(), estimate)
+    };
+    spec.parameters.iter().enumerate().map(each).collect()
+}
+
+/// The covariates of accepted curves.
+fn unknown(
+    search: &Search<'_>,
+    before: &Fitted,
+    accepted: &Accepted,
+    data: &PullData<'_>,
+) -> Vec<UnknownCovariate> {
+    let column = |name: &str| match data.columns.get(name) {
+        Some(Column::Number(x)) => Covariate::Number(x.clone()),
+        Some(Column::Word(at, _)) => Covariate::Word(at.iter().map(|&w| w as u32).collect()),
+        None => Covariate::Number(vec![0.0; data.len()]),
+    };
+    // Residuals of everything but the curves.
+    let residuals = if accepted.effects.is_empty() {
+        before.residuals.clone()
+    } else {
+        let mut terms = accepted.fitted.terms.clone();
+        terms.curves.clear();
+        match search.context.fit(&accepted.fitted.model, &terms, &search.rows) {
+            Some(f) => f.residuals,
+            None => before.residuals.clone(),
+        }
+    };
+    // Neighbours that remember each other move together.
+    let length = if accepted.fitted.likelihood.memory > 0.25 { 5 } else { 1 };
+    let blocks: Vec<usize> = (0..data.len()).map(|i| i / length).collect();
+    let mut found: Vec<UnknownCovariate> = accepted
+        .curves
+        .iter()
+        .map(|&i| {
+            let name = search.curves[i].name.clone();
+            let tested = match name.split_once('*') {
+                Some((a, b)) => interaction(&residuals, &[], (&column(a), &column(b)), &blocks, 999, 1),
+                None => dependence(&residuals, &[], &column(&name), &blocks, 999, 1),
+            };
+            UnknownCovariate { covariate: name, strength: tested.strength, p_value: tested.p_value }
+        })
+        .collect();
+    found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
+    found
+}
+
+fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
+    let mut values = BTreeMap::new();
+    let unit = |name: &str| if name.ends_with("_s") { "s" } else { "1" }.to_string();
+    for (k, name) in fitted.names.iter().enumerate() {
+        if !(name.starts_with("parts.") || name.starts_with("robot.") || name == "kinetic_ratio") {
+            continue;
+        }
+        let (value, half) = (fitted.values[k], HALF90 * fitted.covariance[(k, k)].max(0.0).sqrt());
+        let estimate =
+            ParameterEstimate { value, low90: value - half, high90: value + half, unit: unit(name) };
+        values.insert(name.clone(), estimate);
+    }
+    let m = &fitted.model;
+    let plain =
+        |value: f64, unit: &str| ParameterEstimate { value, low90: value, high90: value, unit: unit.into() };
+    values.entry("robot.lag_s".into()).or_insert_with(|| plain(m.lag_s, "s"));
+    values.entry("robot.dead_time_s".into()).or_insert_with(|| plain(m.dead_time_s, "s"));
+    values.insert("scatter".into(), plain(scatter(m, fitted.likelihood.scale), "1"));
+    if !context.observations.is_empty() {
+        values.insert("wrist.noise_n".into(), plain(m.noise_n, "N"));
+        let each = m.stiffness_n_per_m * 0.5e-3;
+        values.insert("gel.left.shear_stiffness_n_per_mm".into(), plain(each, "N/mm"));
+        values.insert("robot.damping_n_s_per_m".into(), plain(m.damping_n_s_per_m, "N s/m"));
+    }
+    values
+}
+
+fn outliers(fitted: &Fitted, measured: &MeasuredPulls) -> Vec<String> {
+    let s = fitted.likelihood.scale;
+    let mut far: Vec<(f64, &str)> = fitted
+        .residuals
+        .iter()
+        .zip(&measured.pulls)
+        .map(|(r, p)| (r.abs() / s, p.id.as_str()))
+        .filter(|(r, _)| *r > OUTLIER)
+        .collect();
+    far.sort_by(|a, b| b.0.total_cmp(&a.0));
+    far.into_iter().map(|(_, id)| id.to_string()).collect()
+}
+
+fn would_have_seen(
+    context: &Context<'_>,
+    after: &Fitted,
+    all: &[Candidate],
+) -> BTreeMap<String, crate::diagnosis::Detectable> {
+    let others: Vec<&Candidate> =
+        all.iter().filter(|c| !after.model.effects.iter().any(|e| e.spec == c.spec)).collect();
+    let found = Mutex::new(BTreeMap::new());
+    context.predictor.for_each(others.len(), &|i| {
+        if let (Some(seen), Ok(mut found)) = (detectable(context, after, others[i]), found.lock()) {
+            found.insert(others[i].spec.id.to_string(), seen);
+        }
+    });
+    found.into_inner().unwrap_or_default()
+}
+
+/// What tells effects apart, for people.
+fn separation(name: &str, rivals: &[&str]) -> String {
+    let any = |ids: &[&str]| ids.iter().any(|id| *id == name || rivals.contains(id));
+    let mut steps: Vec<&str> = Vec::new();
+    if any(&["sensor_bias", "sensor_drift"]) {
+        steps.push("record half a second without load before every pull");
+        steps.push("pull the same grip down as well as up");
+    }
+    if any(&["grip_force_loss", "load_offset"]) {
+        steps.push(
+            "measure the grip force with a load cell at 5, 20 and 80 N, and pull with the jaws just touching",
+        );
+    }
+    if any(&["rate_dependence", "load_power_law", "sensor_lowpass"]) {
+        steps.push("pull two grip forces with steps a fifth and five times as fast");
+    }
+    if any(&["regime_transition", "area_saturation", "load_power_law"]) {
+        steps.push("add grip forces below 20 N and above 60 N");
+    }
+    if any(&["sensor_gain", "controller_gain", "sensor_quadratic", "sensor_saturation", "jaw_tilt"]) {
+        steps.push("hang two known masses on the gripper");
+    }
+    if any(&["wear", "sensor_gain_drift", "temperature", "conditioning", "contamination", "sensor_drift"]) {
+        steps.push("pause 30 min without pulls, then repeat the first grip 5 times");
+    }
+    if any(&["dwell_ageing", "grip_relaxation"]) {
+        steps.push("dwell 1, 10 and 100 s, once holding the force and once the width");
+    }
+    if steps.is_empty() {
+        steps.push("repeat the campaign with every covariate varied in random order");
+    }
+    steps.join("; ")
+}

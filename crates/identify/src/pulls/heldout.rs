@@ -1,0 +1,168 @@
+//! The error on pulls that a fit has not seen.
+
+use super::context::Context;
+use super::fitting::{Fitted, Terms};
+use super::model::PullModel;
+use crate::diagnosis::{ErrorPair, HeldOutError};
+use crate::draws::Draws;
+use std::sync::Mutex;
+
+/// Folds of repetitions.
+const FOLDS: usize = 5;
+
+/// Resamples of an interval.
+const RESAMPLES: usize = 400;
+
+/// Sets of pulls that are held out one after the other.
+pub fn folds(n: usize) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..n).collect();
+    let mut draws = Draws::new(5, 1);
+    for i in (1..n).rev() {
+        order.swap(i, draws.below(i + 1));
+    }
+    let count = FOLDS.min(n);
+    (0..count).map(|k| order.iter().copied().skip(k).step_by(count).collect()).collect()
+}
+
+/// One set for each value.
+pub fn by_value(of: &[u64]) -> Vec<Vec<usize>> {
+    let mut values = of.to_vec();
+    values.sort_unstable();
+    values.dedup();
+    values.iter().map(|v| (0..of.len()).filter(|&i| of[i] == *v).collect()).collect()
+}
+
+/// Labels predicted for pulls by a fit that has not seen them. NaN where no fit was possible.
+pub fn predicted(context: &Context<'_>, fitted: &Fitted, held_out: &[Vec<usize>]) -> Vec<f64> {
+    let n = context.data.len();
+    let result = Mutex::new(vec![f64::NAN; n]);
+    let terms: &Terms = &fitted.terms;
+    context.predictor.for_each(held_out.len(), &|k| {
+        let out = &held_out[k];
+        let rows: Vec<usize> = (0..n).filter(|i| !out.contains(i)).collect();
+        let Some(found) = context.fit(&fitted.model, terms, &rows) else { return };
+        let mut model = found.model;
+        model.scatter = scatter(&model, found.likelihood.scale);
+        let labels = context.predictor.pulls(&model, out);
+        if let Ok(mut result) = result.lock() {
+            for (&i, p) in out.iter().zip(&labels) {
+                result[i] = p.label_n;
+            }
+        }
+    });
+    result.into_inner().unwrap_or_default()
+}
+
+/// The scatter of friction that residuals of this scale show.
+pub fn scatter(model: &PullModel, scale: f64) -> f64 {
+    (model.scatter * scale).clamp(0.001, 0.3)
+}
+
+/// Errors of two predictions, with intervals that hold for both alike: pulls are drawn anew, whole configurations of
+/// `groups` at a time.
+pub fn errors(label_n: &[f64], before: &[f64], after: &[f64], groups: &[usize]) -> Option<ErrorPair> {
+    let known: Vec<usize> =
+        (0..label_n.len()).filter(|&i| before[i].is_finite() && after[i].is_finite()).collect();
+    if known.len() < 3 {
+        return None;
+    }
+    let count = groups.iter().max().map_or(0, |g| g + 1);
+    let mut members = vec![vec![]; count];
+    for &i in &known {
+        members[groups[i]].push(i);
+    }
+    members.retain(|m| !m.is_empty());
+    // Few configurations are no population; then pulls are drawn.
+    if members.len() < 15 {
+        members = known.iter().map(|&i| vec![i]).collect();
+    }
+    let error = |predicted: &[f64]| {
+        let square = |i: usize| (predicted[i] - label_n[i]) * (predicted[i] - label_n[i]);
+        let rmse = |square: f64, n: usize| (square / n.max(1) as f64).sqrt();
+        let all: f64 = known.iter().map(|&i| square(i)).sum();
+        let relative: f64 =
+            known.iter().map(|&i| (predicted[i] - label_n[i]).abs() / label_n[i].abs().max(0.1)).sum();
+        let mut draws = Draws::new(11, 2);
+        let mut found: Vec<f64> = (0..RESAMPLES)
+            .map(|_| {
+                let (mut sum, mut n) = (0.0, 0);
+                for _ in 0..members.len() {
+                    let group = &members[draws.below(members.len())];
+                    sum += group.iter().map(|&i| square(i)).sum::<f64>();
+                    n += group.len();
+                }
+                rmse(sum, n)
+            })
+            .collect();
+        found.sort_by(f64::total_cmp);
+        HeldOutError {
+            rmse_n: Some(rmse(all, known.len())),
+            mse: None,
+            low90: found[RESAMPLES / 20],
+            high90: found[RESAMPLES - 1 - RESAMPLES / 20],
+            mape_pct: Some(100.0 * relative / known.len() as f64),
+        }
+    };
+    Some(ErrorPair { before: error(before), after: error(after) })
+}
+
+/// Scatter of repetitions about the mean of their configuration, after what a model predicts of their differences is
+/// taken out: pooled standard deviation. Without repetitions the errors themselves, with the fitted parameters counted.
+pub fn noise_floor_n(errors: &[f64], groups: &[usize], parameters: usize) -> f64 {
+    let count = groups.iter().max().map_or(0, |g| g + 1);
+    let mut sums = vec![(0.0, 0.0, 0_usize); count];
+    for (e, g) in errors.iter().zip(groups) {
+        sums[*g].0 += e;
+        sums[*g].1 += e * e;
+        sums[*g].2 += 1;
+    }
+    let (mut square, mut free) = (0.0, 0_usize);
+    for (sum, squares, n) in sums.into_iter().filter(|s| s.2 > 1) {
+        square += squares - sum * sum / n as f64;
+        free += n - 1;
+    }
+    if free >= 10 {
+        return (square / free as f64).max(0.0).sqrt();
+    }
+    let n = errors.len();
+    (errors.iter().map(|e| e * e).sum::<f64>() / n.saturating_sub(parameters).max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pull_is_held_out_once() {
+        let mut all: Vec<usize> = folds(23).concat();
+        all.sort_unstable();
+        assert_eq!(all, (0..23).collect::<Vec<_>>());
+        assert_eq!(by_value(&[3, 1, 3]), vec![vec![1], vec![0, 2]]);
+    }
+
+    /// The interval of the root mean square of normal errors: +-1.645 sigma / sqrt(2 n).
+    #[test]
+    fn intervals_are_those_of_normal_errors() {
+        let mut draws = Draws::new(3, 0);
+        let n = 400;
+        let truth = vec![10.0; n];
+        let off: Vec<f64> = (0..n).map(|_| 10.0 + 0.5 * draws.normal()).collect();
+        let groups: Vec<usize> = (0..n).collect();
+        let pair = errors(&truth, &off, &off, &groups).unwrap();
+        let half = 0.5 * (pair.after.high90 - pair.after.low90);
+        let exact = 1.645 * 0.5 / (2.0 * n as f64).sqrt();
+        assert!((half / exact - 1.0).abs() < 0.15, "{half} {exact}");
+    }
+
+    #[test]
+    fn the_floor_is_the_scatter_within_configurations() {
+        let errors = [1.0, 3.0, 10.0, 12.0, -5.0, -3.0];
+        let groups = [0, 0, 1, 1, 2, 2];
+        // Three free differences are too few: the errors themselves.
+        assert!((noise_floor_n(&errors, &groups, 0) - (288.0_f64 / 6.0).sqrt()).abs() < 1e-9);
+        let errors: Vec<f64> =
+            (0..40).map(|i| f64::from(i / 2) + if i % 2 == 0 { 0.5 } else { -0.5 }).collect();
+        let groups: Vec<usize> = (0..40).map(|i| i / 2).collect();
+        assert!((noise_floor_n(&errors, &groups, 0) - 0.5_f64.sqrt()).abs() < 1e-9);
+    }
+}

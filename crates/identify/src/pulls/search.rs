@@ -1,0 +1,290 @@
+//! The competition: every effect and every unnamed curve is fitted beside all baseline parameters, and has to earn its
+//! place.
+
+use super::candidates::Candidate;
+use super::context::Context;
+use super::curves::{Curve, curves_in, product};
+use super::fitting::{Fitted, Terms};
+use super::model::PullModel;
+use std::sync::Mutex;
+
+/// Score that a named effect has to gain: with some twenty rivals, about one campaign in fifty without an effect reaches
+/// it by chance (measured by `cargo xtask blind`).
+pub const NAMED_GAIN: f64 = 3.0;
+
+/// Score that a second effect has to gain.
+pub const SECOND_GAIN: f64 = 4.0;
+
+/// Score that an unnamed curve has to gain.
+pub const CURVE_GAIN: f64 = 4.5;
+
+/// Rivals within this score of the best are not told apart: odds of about 20 to 1.
+pub const TIED_WITHIN: f64 = 3.0;
+
+/// Share of what the best curve in its own covariate explains that a named effect has to explain.
+const EXPLAINED: f64 = 0.75;
+
+/// Something that may be added to a model.
+#[derive(Debug, Clone)]
+pub enum Rival {
+    /// An effect of the library, by position.
+    Effect(usize),
+    /// An unnamed curve, by position.
+    Curve(usize),
+}
+
+/// A rival with its fit.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    /// What was added.
+    pub rival: Rival,
+    /// The model with it.
+    pub fitted: Fitted,
+    /// Its score less that of the model without it.
+    pub gain: f64,
+}
+
+/// What was accepted: a model, and for each of its effects what else could stand in its place.
+#[derive(Debug, Clone)]
+pub struct Accepted {
+    /// The model.
+    pub fitted: Fitted,
+    /// Effects by position, each with its rivals (position, score less the best).
+    pub effects: Vec<(usize, Vec<(usize, f64)>)>,
+    /// Unnamed curves by position.
+    pub curves: Vec<usize>,
+    /// Everything that competed for the first place, best first.
+    pub entries: Vec<Entry>,
+}
+
+/// A competition on a campaign.
+pub struct Search<'a> {
+    /// The campaign.
+    pub context: &'a Context<'a>,
+    /// The effects that compete.
+    pub candidates: Vec<Candidate>,
+    /// The curves that compete.
+    pub curves: Vec<Curve>,
+    /// The pulls that are fitted.
+    pub rows: Vec<usize>,
+}
+
+impl<'a> Search<'a> {
+    /// With the curves of all columns that vary, and of the products of pairs of them.
+    pub fn new(context: &'a Context<'a>, candidates: Vec<Candidate>) -> Self {
+        let data = context.data;
+        let n = data.len();
+        let mut curves = Vec::new();
+        let mut numbers = Vec::new();
+        for (name, column) in &data.columns {
+            let distinct = column.distinct();
+            let words = matches!(column, super::data::Column::Word(..));
+            if name == "part" || distinct < 2 || (words && distinct * 4 > n) {
+                continue;
+            }
+            for curve in curves_in(name, column) {
+                if curve.cost * 5 > n {
+                    continue;
+                }
+                if curve.cost <= 3 {
+                    curves.push(curve.added());
+                }
+                curves.push(curve);
+            }
+            if !words {
+                numbers.push(name.as_str());
+            }
+        }
+        for (i, a) in numbers.iter().enumerate() {
+            for b in &numbers[i + 1..] {
+                curves.extend(product(data, a, b).filter(|_| n >= 40));
+            }
+        }
+        Self { context, candidates, curves, rows: (0..n).collect() }
+    }
+
+    fn score(&self, fitted: &Fitted) -> f64 {
+        fitted.score(self.rows.len())
+    }
+
+    /// `terms` with one rival more, from all its starts; the best fit.
+    fn with(&self, start: &PullModel, terms: &Terms, rival: &Rival) -> Option<Fitted> {
+        let mut best: Option<Fitted> = None;
+        let keep = |fitted: Option<Fitted>, best: &mut Option<Fitted>| {
+            if let Some(f) = fitted
+                && best.as_ref().is_none_or(|b| self.score(&f) > self.score(b))
+            {
+                *best = Some(f);
+            }
+        };
+        match rival {
+            Rival::Curve(i) => {
+                let curve = &self.curves[*i];
+                let mut terms = terms.clone();
+                terms.curves.push((curve.clone(), vec![0.0; curve.len()]));
+                keep(self.context.fit(start, &terms, &self.rows), &mut best);
+            }
+            Rival::Effect(i) => {
+                let candidate = &self.candidates[*i];
+                for from in &candidate.starts {
+                    let mut terms = terms.clone();
+                    terms.effects.push((candidate.clone(), from.clone()));
+                    keep(self.context.fit(start, &terms, &self.rows), &mut best);
+                }
+            }
+        }
+        best
+    }
+
+    /// Fits `terms` with each rival added, best first. `done` is called after each.
+    fn compete(
+        &self,
+        before: &Fitted,
+        terms: &Terms,
+        rivals: &[Rival],
+        done: &(dyn Fn() + Sync),
+    ) -> Vec<Entry> {
+        let results: Vec<Mutex<Option<Fitted>>> = rivals.iter().map(|_| Mutex::new(None)).collect();
+        self.context.predictor.for_each(rivals.len(), &|i| {
+            let fitted = self.with(&before.model, terms, &rivals[i]);
+            if let Ok(mut slot) = results[i].lock() {
+                *slot = fitted;
+            }
+            done();
+        });
+        let old = self.score(before);
+        let mut entries: Vec<Entry> = rivals
+            .iter()
+            .zip(results)
+            .filter_map(|(rival, slot)| {
+                let fitted = slot.into_inner().ok().flatten()?;
+                let gain = self.score(&fitted) - old;
+                Some(Entry { rival: rival.clone(), fitted, gain })
+            })
+            .collect();
+        entries.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        entries
+    }
+
+    fn all(&self, without: &[usize]) -> Vec<Rival> {
+        // The slow ones first, so that threads end together.
+        let mut effects: Vec<usize> = (0..self.candidates.len()).filter(|i| !without.contains(i)).collect();
+        effects.sort_by_key(|&i| !self.candidates[i].acts_on_signals());
+        effects.into_iter().map(Rival::Effect).chain((0..self.curves.len()).map(Rival::Curve)).collect()
+    }
+
+    /// Runs the competition. `progress` is told the share that is done.
+    pub fn run(&self, progress: &(dyn Fn(f64) + Sync)) -> Option<(Fitted, Accepted)> {
+        let none = Terms::default();
+        let baseline = self.context.fit(&self.context.base, &none, &self.rows)?;
+        let rivals = self.all(&[]);
+        let count = Mutex::new(0.0);
+        let total = 2.2 * rivals.len() as f64;
+        let tick = || {
+            if let Ok(mut count) = count.lock() {
+                *count += 1.0;
+                progress((*count / total).min(1.0));
+            }
+        };
+        let first = self.compete(&baseline, &none, &rivals, &tick);
+        let mut accepted =
+            Accepted { fitted: baseline.clone(), effects: vec![], curves: vec![], entries: first.clone() };
+        let Some(winner) = self.winner(&baseline, &first, NAMED_GAIN, CURVE_GAIN) else {
+            return Some((baseline, accepted));
+        };
+        self.accept(&mut accepted, &winner, &first);
+        for _ in 0..2 {
+            let without: Vec<usize> = accepted.effects.iter().map(|(i, _)| *i).collect();
+            let terms = accepted.fitted.terms.clone();
+            let entries = self.compete(&accepted.fitted, &terms, &self.all(&without), &tick);
+            let Some(winner) = self.winner(&accepted.fitted, &entries, SECOND_GAIN, CURVE_GAIN + 1.0) else {
+                break;
+            };
+            // One unnamed curve at most, and two effects.
+            let full = match winner.rival {
+                Rival::Curve(_) => !accepted.curves.is_empty(),
+                Rival::Effect(_) => accepted.effects.len() >= 2,
+            };
+            if full {
+                break;
+            }
+            self.accept(&mut accepted, &winner, &entries);
+            self.exchange(&mut accepted, &tick);
+        }
+        progress(1.0);
+        Some((baseline, accepted))
+    }
+
+    /// The entry that is accepted, if one is.
+    fn winner(&self, before: &Fitted, entries: &[Entry], named_gain: f64, curve_gain: f64) -> Option<Entry> {
+        let named = entries.iter().find(|e| matches!(e.rival, Rival::Effect(_)) && e.gain >= named_gain);
+        let curve = entries.iter().find(|e| matches!(e.rival, Rival::Curve(_)) && e.gain >= curve_gain);
+        match (named, curve) {
+            (Some(named), None) => Some(named.clone()),
+            (None, Some(curve)) => Some(curve.clone()),
+            (None, None) => None,
+            (Some(named), Some(curve)) => {
+                let gained = |e: &Entry| {
+                    (e.fitted.likelihood.log - e.fitted.trace_cost)
+                        - (before.likelihood.log - before.trace_cost)
+                };
+                let enough = gained(named) >= EXPLAINED * gained(curve) || named.gain >= curve.gain - 1.0;
+                Some(if enough { named.clone() } else { curve.clone() })
+            }
+        }
+    }
+
+    fn accept(&self, accepted: &mut Accepted, winner: &Entry, entries: &[Entry]) {
+        accepted.fitted = winner.fitted.clone();
+        match winner.rival {
+            Rival::Curve(i) => accepted.curves.push(i),
+            Rival::Effect(i) => accepted.effects.push((i, tied(i, winner.gain, entries))),
+        }
+    }
+
+    /// With a second term in the model, the first may have stood for both: every effect is tried in the place of each.
+    fn exchange(&self, accepted: &mut Accepted, tick: &(dyn Fn() + Sync)) {
+        let count = accepted.effects.len();
+        if count + accepted.curves.len() < 2 {
+            return;
+        }
+        // What is fitted anew goes to the end, so that the first place is always the next.
+        for _ in 0..count {
+            let others: Vec<usize> = accepted.effects[1..].iter().map(|(i, _)| *i).collect();
+            let mut terms = accepted.fitted.terms.clone();
+            terms.effects.remove(0);
+            let mut start = accepted.fitted.clone();
+            start.model.effects.remove(0);
+            let rivals: Vec<Rival> =
+                (0..self.candidates.len()).filter(|i| !others.contains(i)).map(Rival::Effect).collect();
+            let entries = self.compete(&start, &terms, &rivals, tick);
+            let old = accepted.effects[0].0;
+            let gain_of = |i: usize| {
+                entries
+                    .iter()
+                    .find(|e| matches!(e.rival, Rival::Effect(k) if k == i))
+                    .map_or(f64::NEG_INFINITY, |e| e.gain)
+            };
+            let Some(Rival::Effect(best)) = entries.first().map(|e| e.rival.clone()) else { return };
+            let chosen = if gain_of(best) > gain_of(old) + 0.5 { best } else { old };
+            let Some(entry) = entries.iter().find(|e| matches!(e.rival, Rival::Effect(k) if k == chosen))
+            else {
+                return;
+            };
+            accepted.fitted = entry.fitted.clone();
+            accepted.effects.remove(0);
+            accepted.effects.push((chosen, tied(chosen, entry.gain, &entries)));
+        }
+    }
+}
+
+/// Rivals of effect `i` that the data do not tell from it, with their scores less its own.
+fn tied(i: usize, gain: f64, entries: &[Entry]) -> Vec<(usize, f64)> {
+    entries
+        .iter()
+        .filter_map(|e| match e.rival {
+            Rival::Effect(k) if k != i && e.gain > gain - TIED_WITHIN => Some((k, e.gain - gain)),
+            _ => None,
+        })
+        .collect()
+}
