@@ -16,6 +16,8 @@ mod elastic;
 mod gpu;
 // What the large set can teach.
 mod large;
+// Measured pulls from every place they may be in.
+mod measured;
 // Two mechanics, one result.
 mod mechanics;
 // Numbers that Wucherer et al. 2023 print.

@@ -192,6 +192,23 @@ impl ShardReader {
         Ok(Record { sample, images, trace })
     }
 
+    /// The `/sample` message of a sample and its force over time, where it is stored, without its images.
+    pub fn pull(&self, index: u64) -> Result<(Sample, Option<gripgen_twin::PullTrace>), ReadError> {
+        let (mut sample, mut trace) = (None, None);
+        self.each_message(index, |topic, data| {
+            match topic {
+                "/sample" => sample = Some(Sample::decode(data).map_err(|e| e.to_string())?),
+                "/pull/trace" => {
+                    trace = Some(trace_of(&PullTrace::decode(data).map_err(|e| e.to_string())?)?);
+                }
+                _ => {}
+            }
+            Ok(())
+        })?;
+        let sample = sample.ok_or_else(|| self.damaged(index, "/sample", "it is missing"))?;
+        Ok((sample, trace))
+    }
+
     /// The messages of a sample, as they are stored.
     pub(crate) fn raw(&self, index: u64) -> Result<RawRecord, ReadError> {
         let (mut sample, mut left, mut right, mut trace) = (None, None, None, None);
