@@ -43,6 +43,7 @@
 pub mod assets;
 mod bench;
 mod cache;
+mod diagnose;
 mod generate;
 mod gpu;
 mod gripped;
@@ -65,6 +66,7 @@ mod sweep;
 mod twin_edits;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
+pub use diagnose::{PullDiagnoseOptions, diagnose_pull_table, given_model};
 pub use generate::{Press, SampleError, SimulateOptions, generate, press_only, simulate};
 pub use gpu::Gpu;
 pub use gripgen_identify as identify;
@@ -86,7 +88,9 @@ pub use presses::{
     load_presses, load_sensor, load_twin_sensor,
 };
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
-pub use report::{Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
+pub use report::{
+    Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
+};
 pub use schema::{sweep_schema, twin_schema};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, VERSION, run_info, sweep};
-pub use twin_edits::{EditedValue, TwinEdits};
+pub use twin_edits::{EditedValue, TwinEdits, write_twin};

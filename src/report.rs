@@ -109,3 +109,8 @@ pub struct Diagnosed {
     /// What the report shows.
     pub report: ReportData,
 }
+
+/// The page.
+pub fn diagnosis_page(_diagnosed: &Diagnosed) -> String {
+    String::new()
+}

@@ -21,3 +21,13 @@ pub struct TwinEdits {
     /// The effects of the new twin, all of them; `None` leaves those of the old one.
     pub effects: Option<Vec<EffectFile>>,
 }
+
+/// Writes a twin.
+pub fn write_twin(
+    _base: &crate::Location,
+    _sets: &[(String, String)],
+    _edits: &TwinEdits,
+    _out: &std::path::Path,
+) -> Result<(), String> {
+    Err("not built yet".into())
+}

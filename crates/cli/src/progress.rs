@@ -4,6 +4,7 @@ use crate::args::TalkArgs;
 use crate::output::duration;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Time between two lines where there is no terminal.
@@ -66,5 +67,50 @@ impl Progress {
             bar.finish_and_clear();
         }
         self.start.elapsed()
+    }
+}
+
+/// Progress of work whose amount is known as a share only. May be told from many threads.
+pub struct Share {
+    what: &'static str,
+    silent: bool,
+    start: Instant,
+    state: Mutex<(f64, Instant)>,
+    bar: Option<ProgressBar>,
+}
+
+impl Share {
+    /// Starts at nothing.
+    pub fn start(what: &'static str, talk: &TalkArgs) -> Self {
+        let bar = (std::io::stderr().is_terminal() && !talk.quiet).then(|| {
+            let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr_with_hz(10));
+            let style = ProgressStyle::with_template("{bar:32} {percent} % {prefix}  {eta} left");
+            bar.set_style(style.expect("the template is a constant"));
+            bar.set_prefix(what);
+            bar
+        });
+        let now = Instant::now();
+        Self { what, silent: talk.quiet, start: now, state: Mutex::new((0.0, now)), bar }
+    }
+
+    /// This share is done. Progress never goes back.
+    pub fn at(&self, share: f64) {
+        let Ok(mut state) = self.state.lock() else { return };
+        state.0 = state.0.max(share.clamp(0.0, 1.0));
+        if let Some(bar) = &self.bar {
+            bar.set_position((state.0 * 1000.0) as u64);
+        } else if !self.silent && state.1.elapsed() >= LINE_EVERY {
+            state.1 = Instant::now();
+            let elapsed = self.start.elapsed().as_secs_f64();
+            let left = duration(elapsed * (1.0 / state.0.max(1e-3) - 1.0));
+            eprintln!("{}: {:.0} %, {left} left", self.what, 100.0 * state.0);
+        }
+    }
+
+    /// The work is done.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
     }
 }

@@ -1,19 +1,72 @@
 //! `gripgen diagnose`: where a twin is wrong, and why.
 
+mod output;
+
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
-use gripgen::is_press_set;
+use crate::output::writable;
+use crate::progress::Share;
+use gripgen::twin::Twin;
+use gripgen::{
+    Diagnosed, Location, PullDiagnoseOptions, diagnose_pull_table, is_press_set, load_pulls,
+    load_twin_document,
+};
+use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
     if !args.measured.exists() {
         return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
     }
-    if is_press_set(&args.measured) {
+    for path in [args.out.as_deref(), args.report.as_deref()].into_iter().flatten() {
+        writable(path)?;
+    }
+    if args.out.is_some() || args.json.json.is_some() || args.report.is_some() {
+        // Nothing is asked that would be lost.
+    }
+    let diagnosed = if is_press_set(&args.measured) {
         return Err(Failure::usage("presses: not built yet"));
-    }
-    if args.measured.join("sensor.csv").is_file() {
+    } else if args.measured.join("sensor.csv").is_file() {
         return Err(Failure::usage("force-sensor tables: not built yet"));
+    } else {
+        pulls(args)?
+    };
+    output::write(args, diagnosed)
+}
+
+/// The twin that a verb starts from.
+pub fn load_twin(path: &str, sets: &[(String, String)]) -> Result<Twin, Failure> {
+    let document = load_twin_document(&Location::parse(path), sets)?;
+    let file = document.read_twin().map_err(|e| Failure::from(document.located(e)))?;
+    Twin::new(&file).map_err(|e| Failure::from(document.located(e)))
+}
+
+/// Worker threads.
+pub fn jobs() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// What cannot be read as pulls.
+pub fn no_pulls(path: &Path, e: impl std::fmt::Display) -> Failure {
+    let known = path.join("pulls.csv").is_file() || path.join("run.json").is_file();
+    let failure = Failure::usage(e);
+    if known {
+        return failure;
     }
-    Err(Failure::usage("pulls: not built yet"))
+    failure.hint("measurements are a folder with pulls.csv, sensor.csv or presses.csv, a run folder, or a dataPack.npz")
+}
+
+fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
+    let loaded = load_pulls(&args.measured).map_err(|e| no_pulls(&args.measured, e))?;
+    let twin = load_twin(&args.twin, &args.set)?;
+    let options = PullDiagnoseOptions { jobs: jobs(), without: &[] };
+    let share = Share::start("diagnosing", &args.talk);
+    let diagnosed = diagnose_pull_table(&loaded.pulls, &twin, &options, &|x| share.at(x));
+    share.finish();
+    let mut diagnosed = diagnosed.map_err(|e| {
+        Failure::usage(e)
+            .hint("name a twin that has this part with --twin, or the column `part` as the twin does")
+    })?;
+    diagnosed.diagnosis.notes.extend(loaded.notes);
+    Ok(diagnosed)
 }

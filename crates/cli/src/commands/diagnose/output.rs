@@ -1,0 +1,96 @@
+//! What a diagnosis writes and says.
+
+use crate::args::DiagnoseArgs;
+use crate::failure::Failure;
+use crate::output::{JsonSink, print, write_file};
+use gripgen::identify::{Diagnosis, HeldOutError, Verdict};
+use gripgen::{Diagnosed, Location, diagnosis_page, write_twin};
+use std::fmt::Write;
+
+/// Twin, report, JSON, and a summary for people.
+pub fn write(args: &DiagnoseArgs, mut diagnosed: Diagnosed) -> Result<u8, Failure> {
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    if let Some(out) = &args.out {
+        write_twin(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out).map_err(Failure::new)?;
+    }
+    if diagnosed.report.title.is_empty() {
+        diagnosed.report.title = args.measured.display().to_string();
+    }
+    if let Some(report) = &args.report {
+        write_file(report, diagnosis_page(&diagnosed).as_bytes())?;
+    }
+    if sink.wanted() {
+        let value = serde_json::to_value(&diagnosed.diagnosis).map_err(Failure::new)?;
+        sink.document(&value)?;
+    }
+    if !sink.on_stdout() {
+        print(&summary(&diagnosed.diagnosis))?;
+    }
+    if !args.talk.quiet {
+        for (path, what) in [(&args.out, "the twin"), (&args.report, "the report")] {
+            if let Some(path) = path {
+                eprintln!("{what}: {}", path.display());
+            }
+        }
+    }
+    Ok(0)
+}
+
+/// A few lines for people.
+fn summary(diagnosis: &Diagnosis) -> String {
+    let mut text = String::new();
+    let word = match diagnosis.verdict {
+        Verdict::None => "nothing beyond the baseline was found",
+        Verdict::Effect => "the twin lacks an effect",
+        Verdict::Unknown => "there is structure that no effect of the library explains",
+        Verdict::Insufficient => "the data cannot answer",
+    };
+    let _ = writeln!(text, "verdict: {word}");
+    for effect in &diagnosis.effects {
+        let _ = writeln!(text, "  {} (weight {:.2})", effect.name, effect.weight);
+        for (name, p) in &effect.parameters {
+            let unit = if p.unit == "1" { "" } else { &p.unit };
+            let _ = writeln!(text, "    {name} = {:.4} {unit} ({:.4} to {:.4})", p.value, p.low90, p.high90);
+        }
+        for rival in &effect.indistinguishable_from {
+            let _ = writeln!(text, "    not told apart from {} (weight {:.2})", rival.name, rival.weight);
+        }
+        if let Some(separate) = &effect.separate_by {
+            let _ = writeln!(text, "    to tell them apart: {}", separate.text);
+        }
+    }
+    for unknown in &diagnosis.unknown {
+        let _ = writeln!(
+            text,
+            "  depends on {} in an unknown way (explains {:.0} % of the residual, p {:.3})",
+            unknown.covariate,
+            100.0 * unknown.strength,
+            unknown.p_value
+        );
+    }
+    if let Some(error) = &diagnosis.error {
+        let _ = writeln!(
+            text,
+            "error on held-out {}: {} before, {} after{}",
+            error.heldout,
+            one(&error.before),
+            one(&error.after),
+            diagnosis.noise_floor_n.map_or(String::new(), |f| format!(", floor {f:.3} N"))
+        );
+    }
+    if !diagnosis.data.outliers.is_empty() {
+        let _ = writeln!(text, "outliers: {}", diagnosis.data.outliers.join(", "));
+    }
+    for note in &diagnosis.notes {
+        let _ = writeln!(text, "note: {note}");
+    }
+    text
+}
+
+fn one(error: &HeldOutError) -> String {
+    match (error.rmse_n, error.mse) {
+        (Some(rmse), _) => format!("{rmse:.3} N ({:.3} to {:.3})", error.low90, error.high90),
+        (None, Some(mse)) => format!("{mse:.2} grey levels^2 ({:.2} to {:.2})", error.low90, error.high90),
+        (None, None) => "not measured".into(),
+    }
+}

@@ -1,0 +1,5 @@
+//! Diagnoses: measurements and a twin in, an answer and a better twin out. One file a channel.
+
+mod pulls;
+
+pub use pulls::{PullDiagnoseOptions, diagnose_pull_table, given_model};

@@ -1,0 +1,140 @@
+//! Diagnosis of pulls through the reduced mechanics.
+
+use crate::predict::PullPredictor;
+use crate::report::{Diagnosed, ReportData};
+use crate::twin_edits::{EditedValue, TwinEdits};
+use gripgen_identify::Diagnosis;
+use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
+use gripgen_identify::pulls::model::PullModel;
+use gripgen_twin::config::{CalibrationFile, EffectFile};
+use gripgen_twin::effects::OutsideFit;
+use gripgen_twin::{MeasuredPulls, Twin};
+use std::collections::BTreeMap;
+
+/// How a diagnosis of pulls is made.
+pub struct PullDiagnoseOptions<'a> {
+    /// Worker threads.
+    pub jobs: usize,
+    /// Effects that must not compete.
+    pub without: &'a [&'a str],
+}
+
+/// A part was measured that the twin does not have.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("the measurements have a part `{part}`, the twin has {known}")]
+pub struct UnknownPartError {
+    /// The part.
+    pub part: String,
+    /// Parts of the twin.
+    pub known: String,
+}
+
+/// What a twin says of pulls, without its effects: where fits start.
+pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPartError> {
+    let known = || twin.parts.keys().cloned().collect::<Vec<_>>().join(", ");
+    let found = parts.iter().map(|name| {
+        twin.parts.get(name).ok_or_else(|| UnknownPartError { part: name.clone(), known: known() })
+    });
+    let found = found.collect::<Result<Vec<_>, _>>()?;
+    let mean = |f: &dyn Fn(&gripgen_twin::Part) -> f64| {
+        found.iter().map(|p| f(p)).sum::<f64>() / found.len().max(1) as f64
+    };
+    Ok(PullModel {
+        mu: found.iter().map(|p| p.mu).collect(),
+        kinetic_ratio: mean(&|p| p.kinetic_ratio),
+        lag_s: twin.robot.lag_s,
+        dead_time_s: twin.robot.dead_time_s,
+        stiffness_n_per_m: twin.gel.left.shear_stiffness_n_per_m + twin.gel.right.shear_stiffness_n_per_m,
+        damping_n_s_per_m: twin.robot.damping_n_s_per_m,
+        noise_n: twin.wrist.noise_n,
+        scatter: mean(&|p| p.scatter),
+        effects: vec![],
+        factor: vec![],
+    })
+}
+
+/// Diagnoses a campaign of pulls. `progress` is told the share that is done.
+pub fn diagnose_pull_table(
+    measured: &MeasuredPulls,
+    twin: &Twin,
+    options: &PullDiagnoseOptions<'_>,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Diagnosed, UnknownPartError> {
+    let predictor = PullPredictor::new(measured, twin, options.jobs);
+    let given = given_model(twin, predictor.part_names())?;
+    let asked = PullOptions { without: options.without };
+    let answer = diagnose_pulls(measured, &predictor, &given, &asked, progress);
+    let edits =
+        answer.fits.as_ref().map(|f| edits(f, &answer.diagnosis, measured, &predictor)).unwrap_or_default();
+    Ok(Diagnosed { diagnosis: answer.diagnosis, edits, report: ReportData::default() })
+}
+
+/// The twin that the answer describes.
+fn edits(
+    fits: &PullFits,
+    diagnosis: &Diagnosis,
+    measured: &MeasuredPulls,
+    predictor: &PullPredictor<'_>,
+) -> TwinEdits {
+    let model = &fits.after.model;
+    let evidence = format!("gripgen diagnose of {} pulls", measured.pulls.len());
+    let calibration = |low90: f64, high90: f64| CalibrationFile {
+        low90,
+        high90,
+        evidence: Some(evidence.clone()),
+        data_sha256: Some(measured.sha256.clone()),
+    };
+    let mut values = Vec::new();
+    let mut set = |key: String, value: f64, known: Option<(f64, f64)>| {
+        values.push(EditedValue { key, value, calibration: known.map(|(low, high)| calibration(low, high)) });
+    };
+    let interval = |name: &str| diagnosis.baseline.get(name).map(|e| (e.low90, e.high90));
+    let scatter = diagnosis.baseline.get("scatter").map_or(model.scatter, |e| e.value);
+    for (name, mu) in predictor.part_names().iter().zip(&model.mu) {
+        set(format!("parts.{name}.mu"), *mu, interval(&format!("parts.{name}.mu")));
+        set(format!("parts.{name}.kinetic_ratio"), model.kinetic_ratio, interval("kinetic_ratio"));
+        set(format!("parts.{name}.scatter"), scatter, None);
+    }
+    set("robot.lag_s".into(), model.lag_s, interval("robot.lag_s"));
+    set("robot.dead_time_s".into(), model.dead_time_s, interval("robot.dead_time_s"));
+    if diagnosis.baseline.contains_key("robot.damping_n_s_per_m") {
+        set("robot.damping_n_s_per_m".into(), model.damping_n_s_per_m, None);
+        let fast_mm_s = (40.0 / model.damping_n_s_per_m * 1e3).clamp(20.0, 1500.0);
+        set("robot.speed_limit_mm_s".into(), fast_mm_s, None);
+        set("wrist.noise_n".into(), model.noise_n, None);
+        for jaw in ["left", "right"] {
+            set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), model.stiffness_n_per_m * 0.5e-3, None);
+        }
+    }
+    let forces = measured.pulls.iter().map(|p| p.grip_force_n);
+    let range = forces.fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
+    let effects = model.effects.iter().map(|effect| {
+        let named = diagnosis.effects.iter().find(|e| e.name == effect.spec.id);
+        let known = |name: &str| named.and_then(|n| n.parameters.get(name));
+        EffectFile {
+            name: effect.spec.id.into(),
+            part: None,
+            fitted_grip_force_n: Some([range.0, range.1]),
+            outside_fit: OutsideFit::Extrapolate,
+            per: gripgen_twin::effects::Per::Jaw,
+            reference_area_mm2: None,
+            source: Some(evidence.clone()),
+            calibration: effect
+                .spec
+                .parameters
+                .iter()
+                .filter_map(|p| {
+                    Some((p.name.to_string(), calibration(known(p.name)?.low90, known(p.name)?.high90)))
+                })
+                .collect::<BTreeMap<_, _>>(),
+            parameters: effect
+                .spec
+                .parameters
+                .iter()
+                .zip(&effect.values)
+                .map(|(p, v)| (p.name.to_string(), toml::Value::Float(*v)))
+                .collect(),
+        }
+    });
+    TwinEdits { values, effects: Some(effects.collect()) }
+}
