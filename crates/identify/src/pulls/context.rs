@@ -131,7 +131,22 @@ impl<'a> Context<'a> {
             self.kinetic = Some((median, 1.2533 * spread / (n as f64).sqrt() + 0.003));
             self.base.kinetic_ratio = median.clamp(0.3, 1.0);
         }
+        // Lag and dead time once more, now against what effects on the readings will be judged by.
         let rows: Vec<usize> = (0..self.data.len()).collect();
+        let parameters = dynamics(&self.base);
+        let found = fit(&parameters, FitOptions { most_steps: 15, least_gain: 1e-5 }, |v| {
+            let mut model = self.base.clone();
+            (model.lag_s, model.dead_time_s) = (v[0], v[1]);
+            let mut r = self.trace_residuals(&model, &rows);
+            // Huber's cost as a sum of squares.
+            r.iter_mut()
+                .filter(|x| x.abs() > 2.5)
+                .for_each(|x| *x = x.signum() * (5.0 * x.abs() - 6.25).sqrt());
+            r
+        });
+        if let Ok(found) = found {
+            (self.base.lag_s, self.base.dead_time_s) = (found.values[0], found.values[1]);
+        }
         self.baseline_trace_cost = huber(&self.trace_residuals(&self.base, &rows));
     }
 
@@ -328,6 +343,13 @@ impl<'a> Context<'a> {
         }
         r
     }
+}
+
+/// Lag and dead time, free.
+fn dynamics(base: &PullModel) -> [FreeParameter; 2] {
+    [("lag_s", base.lag_s, 1.0), ("dead_time_s", base.dead_time_s, 0.5)].map(|(name, start, most)| {
+        FreeParameter { name: name.into(), start, bounds: (0.0, most), scale: 0.02 }
+    })
 }
 
 /// Shear stiffness of both gels: median over the traces of reading over displacement.

@@ -24,6 +24,13 @@ pub const TIED_WITHIN: f64 = 3.0;
 /// Share of what the best curve in its own covariate explains that a named effect has to explain.
 const EXPLAINED: f64 = 0.75;
 
+/// Share of the variance that an effect leaves which a curve in its own covariate may explain: formulas differ a little
+/// from what nature does. More than that, and the effect is not what acts.
+const MISFIT: f64 = 0.3;
+
+/// Correlation of ranks from which on two columns are the same clock.
+const SAME_CLOCK: f64 = 0.9;
+
 /// Something that may be added to a model.
 #[derive(Debug, Clone)]
 pub enum Rival {
@@ -189,14 +196,24 @@ impl<'a> Search<'a> {
         let first = self.compete(&baseline, &none, &rivals, &tick);
         let mut accepted =
             Accepted { fitted: baseline.clone(), effects: vec![], curves: vec![], entries: first.clone() };
-        let Some(winner) = self.winner(&baseline, &first, NAMED_GAIN, CURVE_GAIN) else {
+        let Some(mut winner) = self.winner(&baseline, &first, NAMED_GAIN, CURVE_GAIN) else {
             return Some((baseline, accepted));
         };
+        if let Rival::Effect(i) = winner.rival
+            && let Some(curve) = self.misfit(&baseline, &winner, i, &tick)
+        {
+            winner = curve;
+        }
         self.accept(&mut accepted, &winner, &first);
         for _ in 0..2 {
             let without: Vec<usize> = accepted.effects.iter().map(|(i, _)| *i).collect();
             let terms = accepted.fitted.terms.clone();
-            let entries = self.compete(&accepted.fitted, &terms, &self.all(&without), &tick);
+            let mut rivals = self.all(&without);
+            rivals.retain(|r| match r {
+                Rival::Effect(_) => true,
+                Rival::Curve(k) => !without.iter().any(|&i| self.shares_covariate(i, *k)),
+            });
+            let entries = self.compete(&accepted.fitted, &terms, &rivals, &tick);
             let Some(winner) = self.winner(&accepted.fitted, &entries, SECOND_GAIN, CURVE_GAIN + 1.0) else {
                 break;
             };
@@ -213,6 +230,42 @@ impl<'a> Search<'a> {
         }
         progress(1.0);
         Some((baseline, accepted))
+    }
+
+    /// Whether curve `k` is in a covariate of effect `i`, or in one that runs with it.
+    fn shares_covariate(&self, i: usize, k: usize) -> bool {
+        let name = self.curves[k].name.as_str();
+        let own = self.candidates[i].spec.covariates;
+        let readings = own.is_empty() && self.candidates[i].acts_on_signals();
+        if own.contains(&name) || (readings && name == "grip_force_n") {
+            return true;
+        }
+        let rate = ["force_increment_n", "step_time_s"];
+        if rate.contains(&name) && own.iter().any(|c| rate.contains(c)) {
+            return true;
+        }
+        own.iter().any(|c| ["pull_index", "time_s"].contains(c) && self.same_clock(c, name))
+    }
+
+    fn same_clock(&self, a: &str, b: &str) -> bool {
+        let data = self.context.data;
+        let (Some(x), Some(y)) = (data.numbers(a), data.numbers(b)) else { return false };
+        b == "session" || rank_correlation(&x, &y).abs() > SAME_CLOCK
+    }
+
+    /// The best curve in the covariates of an accepted effect, if it explains so much beside it that the effect is not what
+    /// acts: the effect goes, the curve stays.
+    fn misfit(&self, before: &Fitted, winner: &Entry, i: usize, tick: &(dyn Fn() + Sync)) -> Option<Entry> {
+        let own: Vec<Rival> =
+            (0..self.curves.len()).filter(|&k| self.shares_covariate(i, k)).map(Rival::Curve).collect();
+        let beside = self.compete(&winner.fitted, &winner.fitted.terms, &own, tick);
+        let best = beside.first().filter(|e| e.gain >= CURVE_GAIN)?;
+        let left = best.fitted.likelihood.scale / winner.fitted.likelihood.scale;
+        if 1.0 - left * left <= MISFIT {
+            return None;
+        }
+        let alone = self.compete(before, &before.terms, &own, tick);
+        alone.into_iter().next().filter(|e| e.gain > winner.gain)
     }
 
     /// The entry that is accepted, if one is.
@@ -276,6 +329,21 @@ impl<'a> Search<'a> {
             accepted.effects.push((chosen, tied(chosen, entry.gain, &entries)));
         }
     }
+}
+
+/// Spearman's correlation.
+fn rank_correlation(x: &[f64], y: &[f64]) -> f64 {
+    let ranks = |v: &[f64]| {
+        let mut order: Vec<usize> = (0..v.len()).collect();
+        order.sort_by(|&a, &b| v[a].total_cmp(&v[b]));
+        let mut rank = vec![0.0; v.len()];
+        order.iter().enumerate().for_each(|(r, &i)| rank[i] = r as f64);
+        rank
+    };
+    let (a, b) = (ranks(x), ranks(y));
+    let mean = (x.len() as f64 - 1.0) / 2.0;
+    let sum = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| (p - mean) * (q - mean)).sum::<f64>();
+    sum(&a, &b) / (sum(&a, &a) * sum(&b, &b)).sqrt().max(1e-300)
 }
 
 /// Rivals of effect `i` that the data do not tell from it, with their scores less its own.
