@@ -1,0 +1,1 @@
+"""A blind benchmark of `gripgen diagnose`: own physics, own formulas, sealed truth."""

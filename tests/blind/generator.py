@@ -1,0 +1,109 @@
+"""One case in, one campaign folder, its unseen pulls and its sealed truth out."""
+
+from pathlib import Path
+
+import numpy as np
+
+from . import campaigns, cases, effects, folders, ledger, physics, unknowns
+
+UNSEEN = 120
+REPLICAS = 5
+
+
+def build(case, seed, name, open_folder, sealed_folder):
+    """Writes `open_folder/name` and `sealed_folder/name`; returns the truth's hash."""
+    rng = np.random.default_rng(seed)
+    world = physics.draw_world(rng)
+    design = ledger.draw_design(rng, **case["design"])
+    led = ledger.draw_ledger(design, rng)
+    mu = campaigns.friction_of_parts(design, rng)
+    plain = campaigns.expected(world, mu, led, [], np.ones((1, len(led["part"]))), rng, draws=1)
+    design["largest_n"] = float(np.max(plain))
+    acting, sizes = _acting(case, world, mu, led, design, rng)
+
+    n = len(led["pull_index"])
+    factor = campaigns.scatter_factors(world, n, rng, case["kind"])
+    bad = np.zeros(n, bool)
+    if case["kind"] == "outliers":
+        bad = rng.random(n) < 0.04
+        factor = np.where(bad, factor * rng.uniform(0.45, 0.75, n), factor)
+    out = campaigns.run(world, mu, led, acting, factor)
+    label, noisy = campaigns.labels(world, out, rng)
+    seen = folders.measured_ledger(led, rng)
+    place = Path(open_folder) / name
+    folders.write_campaign(place, seen, label, design["distractors"])
+    which = {"fourth": range(0, n, 4), "all": range(n), "none": []}[design["traces"]]
+    if len(which):
+        folders.write_traces(place, which, out, noisy, world, rng)
+
+    hidden = Path(sealed_folder) / name
+    floor = _unseen(world, mu, design, acting, case, rng, hidden / "unseen")
+    truth = {
+        "group": case["group"], "kind": case["kind"], "seed": seed,
+        "acts": sizes, "tied": case.get("tied", []), "outliers": [f"p{i:04d}" for i in np.flatnonzero(bad)],
+        "floor_rmse_n": floor, "pulls": n, "design": {k: v for k, v in design.items()},
+        "world": {
+            "lag_s": world.lag_s, "dead_s": float(world.dead_s), "kinetic_ratio": world.kinetic_ratio,
+            "stiffness_n_per_mm": world.stiffness_n_per_mm, "noise_n": float(world.noise_n),
+            "scatter": world.scatter, "mu": {k: float(v) for k, v in mu.items()},
+        },
+    }
+    return folders.write_truth(hidden / "truth.json", _plain(truth))
+
+
+def _acting(case, world, mu, led, design, rng):
+    """Draws constants and sizes: the asked multiple of the detectable size, within bounds."""
+    acting, told = [], []
+    for name, multiple in case["acts"]:
+        known = name in effects.LIBRARY
+        constant = (effects if known else unknowns).constants(name, rng, design)
+        sign = cases.size_sign(name, rng)
+        unit, low, high = campaigns.detectable_size(world, mu, led, name, constant, rng, acting, sign)
+        size = float(np.clip(multiple * unit, low, high))
+        acting.append(campaigns.Acting(name, sign * size, constant))
+        told.append({
+            "name": name, "library": known, "size": sign * size, "constants": constant,
+            "detectable": unit, "multiple": size / unit, "asked": multiple,
+            "class": cases.class_of(name) if known else [],
+            "always_tied": cases.ALWAYS_TIED.get(name, []),
+            "accepted": [] if known else unknowns.UNKNOWN[name][3],
+        })
+    return acting, told
+
+
+def _unseen(world, mu, design, acting, case, rng, place):
+    """The same campaign made again; returns the error of an oracle that knows the truth.
+
+    Every pull is drawn `REPLICAS` times with the same covariates. The first draw is
+    written; the mean of the others is the oracle's prediction.
+    """
+    tables = []
+    while sum(len(t["pull_index"]) for t in tables) < UNSEEN:
+        again = dict(design)
+        fresh = ledger.draw_ledger(again, rng)
+        tables.append(fresh)
+    table = {k: np.concatenate([t[k] for t in tables]) for k in tables[0]}
+    total = len(table["pull_index"])
+    keep = np.sort(rng.permutation(total)[:UNSEEN])
+    table = {k: v[keep] for k, v in table.items()}
+    draws = []
+    for _ in range(REPLICAS):
+        factor = campaigns.scatter_factors(world, UNSEEN, rng)
+        draws.append(campaigns.labels(world, campaigns.run(world, mu, table, acting, factor), rng)[0])
+    oracle = np.mean(draws[1:], axis=0)
+    folders.write_campaign(place, folders.measured_ledger(table, rng), draws[0], design["distractors"], prefix="u")
+    others = REPLICAS - 1
+    return float(np.sqrt(np.mean((draws[0] - oracle) ** 2) * others / (others + 1)))
+
+
+def _plain(value):
+    """Numpy scalars out of nested plain data."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return value.item()
+    return value
