@@ -232,7 +232,9 @@ def gp(folder, unseen, work):
 TOOLS = {"offset": offset, "bic": bic, "stlsq": stlsq, "gp": gp}
 
 
-def _timed(tool):
+def timed(tool):
+    """The same tool with the seconds it took."""
+
     def run(*arguments):
         started = time.monotonic()
         answer = tool(*arguments)
@@ -254,7 +256,7 @@ def main(arguments=None):
     if args.ours:
         columns["gripgen"] = json.loads(Path(args.ours).read_text(encoding="utf-8"))["summary"]
     for name in args.tools.split(","):
-        records, _ = scorer.score(args.folder.rstrip("/"), "unused", _timed(TOOLS[name]), jobs=2)
+        records, _ = scorer.score(args.folder.rstrip("/"), "unused", timed(TOOLS[name]), jobs=2)
         columns[name] = judge.summary(list(records.values()))
     text = scorer.table(columns)
     print(text)
