@@ -97,6 +97,9 @@ pub fn curves_in(name: &str, column: &Column) -> Vec<Curve> {
             if distinct > 2 {
                 all.push(curve(hinges(x, 2.min(distinct - 2)), 1 + 2.min(distinct - 2)));
             }
+            if (5..=9).contains(&distinct) {
+                all.push(curve(hinges(x, distinct - 2), distinct - 1));
+            }
             if distinct > 12 {
                 all.push(curve(hinges(x, 8), 9));
             }

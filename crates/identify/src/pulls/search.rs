@@ -210,7 +210,7 @@ impl<'a> Search<'a> {
             let terms = accepted.fitted.terms.clone();
             let mut rivals = self.all(&without);
             rivals.retain(|r| match r {
-                Rival::Effect(_) => true,
+                Rival::Effect(i) => !accepted.curves.iter().any(|&k| self.shares_covariate(*i, k)),
                 Rival::Curve(k) => !without.iter().any(|&i| self.shares_covariate(i, *k)),
             });
             let entries = self.compete(&accepted.fitted, &terms, &rivals, &tick);
