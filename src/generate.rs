@@ -13,7 +13,7 @@ use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
     FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample,
-    Scenario, Twin, cell_friction, slip_label,
+    Scenario, Twin, cell_friction, slip_label, table_factor, table_offset_n,
 };
 use std::sync::Arc;
 
@@ -176,7 +176,7 @@ fn pull(
         let at = grip_point(scenario, jaw, patches[jaw].area_m2());
         cell_friction(twin, &scenario.part, part, &at, patches[jaw])
     })?;
-    let scatter = scatter(part, scenario);
+    let scatter = scatter(part, scenario) * table_factor(twin, scenario);
     let cell_mu = laws.map(|_, (cells, _)| cells.iter().map(|mu| mu * scatter).collect());
     let law = laws.map(|_, (_, law)| *law);
     let friction = hold(twin, scenario, &patches, &cell_mu, law.left.kinetic_ratio);
@@ -184,7 +184,8 @@ fn pull(
     let signals = Signals {
         noise: stream(Purpose::ForceNoise),
         sensor: SensorChain::new(twin, &scenario.part, scenario.covariates.time_s)
-            .along(scenario.covariates.pull_direction),
+            .along(scenario.covariates.pull_direction)
+            .plus(table_offset_n(twin, scenario)),
         command: CommandChain::new(twin, &scenario.part),
     };
     let mut session = (**held).clone().pull(&friction, signals);

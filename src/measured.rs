@@ -146,6 +146,7 @@ fn measured(sample: Sample, trace: Option<PullTrace>) -> Option<MeasuredPull> {
             grip_offset_m: sample.grip_offset_mm * 1e-3,
             grip_angle_rad: sample.grip_angle_deg.to_radians(),
             pull_direction: f64::from(sample.pull_direction),
+            ..Covariates::default()
         },
         part: sample.part,
         trace,

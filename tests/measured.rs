@@ -1,6 +1,6 @@
 //! Measured pulls from every place they may be in.
 
-use crate::common::{jobs, project, run, small_project};
+use crate::common::{jobs, run, small_project};
 use gripgen::load_pulls;
 use gripgen::record::ShardReader;
 use gripgen::twin::config::Feedback;
@@ -11,13 +11,13 @@ fn a_run_folder_is_a_campaign() {
         "vary.grip_force_n=[10, 20, 30]",
         "images=none",
         "vary.session=[\"a\", \"b\"]",
-        "twin=asset:configs/twin.toml",
         "vary.parts.gear.mu=[0.1, 0.2]",
     ]);
     let folder = tempfile::tempdir().unwrap();
-    run(&project, folder.path(), jobs(2));
+    let summary = run(&project, folder.path(), jobs(2));
     let loaded = load_pulls(folder.path()).unwrap();
-    let failed = 12 - loaded.pulls.pulls.len();
+    let failed = summary.failed;
+    assert_eq!(loaded.pulls.pulls.len() as u64, summary.samples - failed);
     assert!(failed > 0, "10 N lie outside the fit of every part");
     assert_eq!(loaded.notes, [format!("{failed} pulls were left out: they failed")]);
     assert!(loaded.pulls.extra.is_empty(), "an experiment does not know the drawn coefficient");
@@ -35,14 +35,11 @@ fn a_run_folder_is_a_campaign() {
 
 #[test]
 fn a_run_without_a_slip_says_why() {
-    let project = project(
-        "asset:configs/quickstart.toml",
-        &["vary.grip_force_n=[10]", "images=none", "samples=3", "twin=asset:configs/twin.toml"],
-    );
+    let project = small_project(&["vary.grip_force_n=[10]", "images=none"]);
     let folder = tempfile::tempdir().unwrap();
     run(&project, folder.path(), jobs(1));
     let error = load_pulls(folder.path()).unwrap_err().to_string();
-    assert!(error.contains("no pull of this run can be used: 3 pulls were left out: they failed"), "{error}");
+    assert!(error.contains("no pull of this run can be used: 4 pulls were left out: they failed"), "{error}");
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod trace;
 use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, parse_header};
 use cells::{Cells, Column};
 use gripgen_twin::config::PullFile;
+use gripgen_twin::draw::Drawn;
 use gripgen_twin::{Covariates, ExtraColumn, ExtraValues, MeasuredPull, MeasuredPulls};
 use sha2::{Digest, Sha256};
 use std::collections::{HashMap, HashSet};
@@ -189,7 +190,18 @@ fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<Meas
         return Err(PullFolderError::Empty { path: path.into() });
     }
     let recorded = columns.iter().filter_map(Column::recorded).collect();
-    let extra = columns.into_iter().filter_map(extra_column).collect();
+    let extra: Vec<ExtraColumn> = columns.into_iter().filter_map(extra_column).collect();
+    for column in &extra {
+        for (i, pull) in pulls.iter_mut().enumerate() {
+            let value = match &column.values {
+                ExtraValues::Number(x) if x[i].is_nan() => continue,
+                ExtraValues::Number(x) => Drawn::Number(x[i]),
+                ExtraValues::Text(words) if words[i].is_empty() => continue,
+                ExtraValues::Text(words) => Drawn::Text(words[i].clone()),
+            };
+            pull.covariates.extra.insert(column.name.clone(), value);
+        }
+    }
     Ok(MeasuredPulls {
         pulls,
         recorded,

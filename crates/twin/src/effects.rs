@@ -47,7 +47,7 @@ mod sensor_quadratic;
 mod sensor_saturation;
 mod temperature;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 mod wear;

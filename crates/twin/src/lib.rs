@@ -29,6 +29,7 @@ mod scenario;
 mod scenario_keys;
 pub mod sobol;
 mod sweep;
+mod table;
 mod trace;
 mod twin;
 
@@ -46,6 +47,7 @@ pub use sample::{ImprintSummary, Outcome, Pulled, Sample};
 pub use scenario::{Covariates, PullSettings, Scenario};
 pub use scenario_keys::{PULL_KEYS, SCENARIO_KEYS};
 pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep, is_twin_key};
+pub use table::{TABLE_EFFECT, Table, TableAxis, TableTarget, covariate, table_factor, table_offset_n};
 pub use trace::{PullTrace, TraceRow};
 pub use twin::{
     DEFAULTED_SECTIONS, Elastic, Gel, Gripper, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist,

@@ -24,6 +24,8 @@ pub struct Covariates {
     pub grip_angle_rad: f64,
     /// +1 along the pull direction of the sweep, -1 against it.
     pub pull_direction: f64,
+    /// Columns of unknown meaning that a table of the twin may depend on.
+    pub extra: BTreeMap<String, Drawn>,
 }
 
 impl Default for Covariates {
@@ -38,6 +40,7 @@ impl Default for Covariates {
             grip_offset_m: 0.0,
             grip_angle_rad: 0.0,
             pull_direction: 1.0,
+            extra: BTreeMap::new(),
         }
     }
 }

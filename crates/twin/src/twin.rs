@@ -7,6 +7,7 @@ use crate::config::{
 };
 use crate::effects::Effect;
 use crate::frames::{Pose, pose};
+use crate::table::{TABLE_EFFECT, Table, check_table};
 use crate::{Jaw, PerJaw};
 pub(crate) use check::unknown_part_hint;
 use check::{check_arm, check_effect, check_gel, check_part};
@@ -38,6 +39,8 @@ pub struct Twin {
     pub parts: BTreeMap<String, Part>,
     /// The effects, in the order in which they act.
     pub effects: Vec<Effect>,
+    /// Dependences without a name, which act after the effects.
+    pub tables: Vec<Table>,
 }
 
 /// An arm with six joints, and how it stands when it grips.
@@ -250,21 +253,26 @@ impl Twin {
             .iter()
             .map(|(name, part)| Ok((name.clone(), check_part(part, &format!("parts.{name}"))?)))
             .collect::<Result<_, ConfigError>>()?;
-        let effects =
-            (0..file.effects.len()).map(|i| check_effect(file, i)).collect::<Result<Vec<Effect>, _>>()?;
+        let (mut effects, mut tables) = (Vec::new(), Vec::new());
+        for (i, effect) in file.effects.iter().enumerate() {
+            if effect.name == TABLE_EFFECT {
+                tables.push(check_table(file, i)?);
+            } else {
+                effects.push(check_effect(file, i)?);
+            }
+        }
+        let named = |ids: &[&str]| file.effects.iter().position(|e| ids.contains(&e.name.as_str()));
         if robot.twist == Twist::Free
-            && let Some(i) = effects.iter().position(|e: &Effect| e.spec.id == "off_centre")
+            && let Some(i) = named(&["off_centre"])
         {
             let problem = "`off_centre` and robot.twist = \"free\" are the same loss, counted twice";
             return Err(ConfigError::new(format!("effects[{i}].name"), problem)
                 .hint("leave the effect out, or set robot.twist = \"stiff\""));
         }
         if gel.iter().any(|(_, gel)| gel.model == GelModel::Elastic)
-            && let Some(i) = effects
-                .iter()
-                .position(|e: &Effect| ["imprint_nonlinearity", "gel_kernel"].contains(&e.spec.id))
+            && let Some(i) = named(&["imprint_nonlinearity", "gel_kernel"])
         {
-            let problem = match effects[i].spec.id {
+            let problem = match file.effects[i].name.as_str() {
                 "gel_kernel" => {
                     "`gel_kernel` scales the blurs of the gel, which an elastic gel does not have"
                 }
@@ -273,7 +281,7 @@ impl Twin {
             return Err(ConfigError::new(format!("effects[{i}].name"), problem)
                 .hint("leave the effect out, or set gel.left.model = \"pyramid\""));
         }
-        Ok(Twin { robot, arm, gripper, wrist, gel, optics, parts, effects })
+        Ok(Twin { robot, arm, gripper, wrist, gel, optics, parts, effects, tables })
     }
 
     /// Grip force per jaw of a force that follows this twin's convention.

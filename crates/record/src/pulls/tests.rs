@@ -36,6 +36,9 @@ fn columns_stand_in_any_order_and_the_rest_are_covariates_of_unknown_meaning() {
     let ExtraValues::Number(humidity) = &humidity.values else { panic!("numbers") };
     assert_eq!(humidity[0], 40.0);
     assert!(humidity[1].is_nan());
+    assert_eq!(a.covariates.extra["humidity_pct"], Drawn::Number(40.0));
+    assert!(!b.covariates.extra.contains_key("humidity_pct"), "nobody wrote it down");
+    assert_eq!(b.covariates.extra["operator"], Drawn::Text("bo".into()));
     assert_eq!(operator.values, ExtraValues::Text(vec!["ann".into(), "bo".into()]));
     assert_eq!((read.label_tolerance_n, read.stop_m, read.feedback), (2.0, 5e-3, Some(Feedback::Measured)));
     assert!(a.trace.is_none());

@@ -327,8 +327,20 @@ pub struct EffectFile {
     pub calibration: BTreeMap<String, CalibrationFile>,
     /// The parameters of the effect, by name.
     #[serde(flatten)]
-    #[schemars(with = "BTreeMap<String, f64>")]
+    #[schemars(with = "BTreeMap<String, ParameterValue>")]
     pub parameters: BTreeMap<String, toml::Value>,
+}
+
+/// What a key of an effect may hold: a number, or a list, a word or a flag of a table.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "only its schema is used")]
+enum ParameterValue {
+    Number(f64),
+    Numbers(Vec<f64>),
+    Words(Vec<String>),
+    Word(String),
+    Flag(bool),
 }
 
 /// How well a value of the same section is known: `calibration.KEY`.

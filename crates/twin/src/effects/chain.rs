@@ -46,11 +46,12 @@ pub struct SensorChain {
     stages: Vec<(SensorHook, Vec<f64>, SensorMemory)>,
     clock_start_s: f64,
     direction: f64,
+    offset_n: f64,
 }
 
 impl Default for SensorChain {
     fn default() -> Self {
-        Self { stages: Vec::new(), clock_start_s: 0.0, direction: 1.0 }
+        Self { stages: Vec::new(), clock_start_s: 0.0, direction: 1.0, offset_n: 0.0 }
     }
 }
 
@@ -60,7 +61,7 @@ impl SensorChain {
         let stages = acting(twin, part_name)
             .filter_map(|e| Some((e.spec.sensor?, e.values.clone(), SensorMemory::default())))
             .collect();
-        Self { stages, clock_start_s, direction: 1.0 }
+        Self { stages, clock_start_s, direction: 1.0, offset_n: 0.0 }
     }
 
     /// The sensor effects among `effects` with their values, in their order.
@@ -71,7 +72,7 @@ impl SensorChain {
         let stages = effects
             .filter_map(|(spec, values)| Some((spec.sensor?, values.to_vec(), SensorMemory::default())))
             .collect();
-        Self { stages, clock_start_s, direction: 1.0 }
+        Self { stages, clock_start_s, direction: 1.0, offset_n: 0.0 }
     }
 
     /// For a pull of this sign along the sensor's axis. Forces stay magnitudes along the pull: against the axis
@@ -82,9 +83,16 @@ impl SensorChain {
         self
     }
 
+    /// With so much added to every reading, whatever its direction; what a table of the twin says.
+    #[must_use]
+    pub fn plus(mut self, offset_n: f64) -> Self {
+        self.offset_n = offset_n;
+        self
+    }
+
     /// Whether it reads the true force as it is.
     pub fn is_identity(&self) -> bool {
-        self.stages.is_empty()
+        self.stages.is_empty() && self.offset_n == 0.0
     }
 
     /// The reading of a true force at `time_s` since the start of the pull, `step_s` after the one before.
@@ -93,7 +101,9 @@ impl SensorChain {
         let read = self.stages.iter_mut().fold(self.direction * true_n, |force_n, (hook, values, memory)| {
             hook(values, force_n, memory, &at)
         });
-        self.direction * read
+        let read = self.direction * read;
+        // Adding 0 would turn -0 into 0.
+        if self.offset_n == 0.0 { read } else { read + self.offset_n }
     }
 }
 

@@ -1,0 +1,348 @@
+//! Tables: a dependence that was measured and has no name.
+//!
+//! A diagnosis that finds structure in the data which no effect of the library explains adds it to the twin as a table
+//! over one covariate. It repeats what was seen and says nothing about why: it is marked `physical = false`, and outside
+//! its range it is held.
+
+use crate::config::{ConfigError, EffectFile, TwinFile, in_range, suggestion};
+use crate::draw::Drawn;
+use crate::effects::{OutsideFit, Per};
+use crate::{Covariates, KNOWN_COLUMNS, Scenario, Twin};
+
+/// The `name` of a table among the effects of a twin file. It is not in the library.
+pub const TABLE_EFFECT: &str = "table";
+
+/// Columns of a pull table that hold words.
+const WORD_COLUMNS: [&str; 3] = ["part", "gel_id", "session"];
+
+/// Where a table has its values.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TableAxis {
+    /// At numbers that increase; in between it is linear, outside it is held.
+    Numbers(Vec<f64>),
+    /// At words; at others it does nothing.
+    Words(Vec<String>),
+}
+
+/// What a table changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableTarget {
+    /// It multiplies the friction of both jaws.
+    Factor,
+    /// It is added to the readings of the wrist sensor, in newtons.
+    Offset,
+}
+
+/// A table over one covariate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// A column of a pull table, in its units, or one of unknown meaning.
+    pub covariate: String,
+    /// The only part it acts on, or all of them.
+    pub part: Option<String>,
+    /// Where its values are.
+    pub axis: TableAxis,
+    /// One value for each place of the axis.
+    pub values: Vec<f64>,
+    /// What it changes.
+    pub target: TableTarget,
+}
+
+impl Table {
+    /// The value where the covariate is `at`; `None` where the table says nothing.
+    pub fn value(&self, at: &Drawn) -> Option<f64> {
+        match (&self.axis, at) {
+            (TableAxis::Words(words), at) => {
+                let at = at.to_string();
+                words.iter().position(|w| *w == at).map(|i| self.values[i])
+            }
+            (TableAxis::Numbers(x), Drawn::Number(at)) => Some(interpolate(x, &self.values, *at)),
+            (TableAxis::Numbers(_), Drawn::Text(_)) => None,
+        }
+    }
+
+    fn of(&self, scenario: &Scenario) -> Option<f64> {
+        if self.part.as_ref().is_some_and(|part| *part != scenario.part) {
+            return None;
+        }
+        let (pull, c) = (&scenario.pull, &scenario.covariates);
+        let forces = [scenario.grip_force_n, pull.increment_n, pull.step_s];
+        self.value(&covariate(&self.covariate, &scenario.part, forces, c)?)
+    }
+}
+
+/// Linear between the points, held outside.
+fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
+    let after = x.partition_point(|&x| x <= at);
+    if after == 0 {
+        return y[0];
+    }
+    if after == x.len() {
+        return y[after - 1];
+    }
+    let share = (at - x[after - 1]) / (x[after] - x[after - 1]);
+    y[after - 1] + share * (y[after] - y[after - 1])
+}
+
+/// A covariate of a pull by the name of its column, in the unit of that column; `None` if nobody wrote it down.
+///
+/// `forces` are grip force per jaw, height of a step and length of a step.
+pub fn covariate(name: &str, part: &str, forces: [f64; 3], c: &Covariates) -> Option<Drawn> {
+    let [grip_force_n, increment_n, step_s] = forces;
+    let text = |text: &str| Some(Drawn::Text(text.into()));
+    let number = |x| Some(Drawn::Number(x));
+    match name {
+        "part" => text(part),
+        "gel_id" => text(&c.gel_id),
+        "session" => text(&c.session),
+        "grip_force_n" => number(grip_force_n),
+        "force_increment_n" => number(increment_n),
+        "step_time_s" => number(step_s),
+        "dwell_s" => number(c.dwell_s),
+        "pull_index" => number(c.pull_index as f64),
+        "time_s" => number(c.time_s),
+        "temperature_c" => number(c.temperature_c),
+        "grip_offset_mm" => number(c.grip_offset_m * 1e3),
+        "grip_angle_deg" => number(c.grip_angle_rad.to_degrees()),
+        "pull_direction" => number(c.pull_direction),
+        other => c.extra.get(other).cloned(),
+    }
+}
+
+/// By what the tables of a twin multiply the friction of a pull; 1 without any.
+pub fn table_factor(twin: &Twin, scenario: &Scenario) -> f64 {
+    let factors = twin.tables.iter().filter(|t| t.target == TableTarget::Factor);
+    factors.filter_map(|t| t.of(scenario)).product()
+}
+
+/// What the tables of a twin add to the readings of the wrist sensor, in newtons; 0 without any.
+pub fn table_offset_n(twin: &Twin, scenario: &Scenario) -> f64 {
+    let offsets = twin.tables.iter().filter(|t| t.target == TableTarget::Offset);
+    offsets.filter_map(|t| t.of(scenario)).fold(0.0, |sum, x| sum + x)
+}
+
+const KEYS: [&str; 6] = ["covariate", "x", "words", "factor", "offset_n", "physical"];
+
+/// Checks a table of a twin file. Errors name the key.
+pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, ConfigError> {
+    let effect = &file.effects[index];
+    let key = |name: &str| format!("effects[{index}].{name}");
+    refuse_foreign(effect, &key)?;
+    if let Some(part) = effect.part.as_ref().filter(|part| !file.parts.contains_key(*part)) {
+        let error = ConfigError::new(key("part"), format!("the twin has no part `{part}`"));
+        return Err(crate::twin::unknown_part_hint(error, part, file.parts.keys()));
+    }
+    let get = |name: &str| effect.parameters.get(name);
+    if get("physical") != Some(&toml::Value::Boolean(false)) {
+        return Err(ConfigError::new(key("physical"), "a table explains nothing, it must say so")
+            .hint("add physical = false"));
+    }
+    let covariate = match get("covariate") {
+        Some(toml::Value::String(name)) if !name.is_empty() => name.clone(),
+        _ => {
+            return Err(ConfigError::new(key("covariate"), "the name of a column of a pull table is needed"));
+        }
+    };
+    let known = KNOWN_COLUMNS.contains(&covariate.as_str());
+    let axis = match (get("x"), get("words")) {
+        (Some(_), None) if WORD_COLUMNS.contains(&covariate.as_str()) => {
+            let problem = format!("`{covariate}` holds words, not numbers");
+            return Err(ConfigError::new(key("x"), problem).hint("give its values in words = [...]"));
+        }
+        (None, Some(_)) if known && !WORD_COLUMNS.contains(&covariate.as_str()) => {
+            let problem = format!("`{covariate}` holds numbers, not words");
+            return Err(ConfigError::new(key("words"), problem).hint("give its values in x = [...]"));
+        }
+        (Some(x), None) => TableAxis::Numbers(increasing(numbers(x, &key("x"))?, &key("x"))?),
+        (None, Some(words)) => TableAxis::Words(distinct(words, &key("words"))?),
+        _ => return Err(ConfigError::new(key("x"), "a table has either `x` or `words`")),
+    };
+    let (values, target, name) = match (get("factor"), get("offset_n")) {
+        (Some(v), None) => (numbers(v, &key("factor"))?, TableTarget::Factor, "factor"),
+        (None, Some(v)) => (numbers(v, &key("offset_n"))?, TableTarget::Offset, "offset_n"),
+        _ => return Err(ConfigError::new(key("factor"), "a table has either `factor` or `offset_n`")),
+    };
+    let places = match &axis {
+        TableAxis::Numbers(x) => x.len(),
+        TableAxis::Words(words) => words.len(),
+    };
+    if values.len() != places {
+        let problem = format!("{} values for {places} places of `{covariate}`", values.len());
+        return Err(ConfigError::new(key(name), problem));
+    }
+    for (i, &value) in values.iter().enumerate() {
+        let at = key(&format!("{name}[{i}]"));
+        match target {
+            TableTarget::Factor => in_range(&at, value, 1e-3..=1e3, "1")?,
+            TableTarget::Offset => in_range(&at, value, -1e3..=1e3, "N")?,
+        };
+    }
+    Ok(Table { covariate, part: effect.part.clone(), axis, values, target })
+}
+
+/// Keys that a table does not have.
+fn refuse_foreign(effect: &EffectFile, key: &dyn Fn(&str) -> String) -> Result<(), ConfigError> {
+    if let Some(name) = effect.parameters.keys().find(|name| !KEYS.contains(&name.as_str())) {
+        let error = ConfigError::new(key(name), format!("a table has no key `{name}`"));
+        return Err(match suggestion(name, KEYS) {
+            Some(close) => error.hint(format!("did you mean `{close}`?")),
+            None => error.hint(format!("its keys: {}", KEYS.join(", "))),
+        });
+    }
+    let foreign = [
+        ("fitted_grip_force_n", effect.fitted_grip_force_n.is_some()),
+        ("outside_fit", effect.outside_fit != OutsideFit::default()),
+        ("per", effect.per != Per::default()),
+        ("reference_area_mm2", effect.reference_area_mm2.is_some()),
+    ];
+    match foreign.iter().find(|(_, there)| *there) {
+        Some((name, _)) => {
+            Err(ConfigError::new(key(name), "a table is held outside its range and acts on the whole grip")
+                .hint(format!("leave {name} out")))
+        }
+        None => Ok(()),
+    }
+}
+
+fn list<'a>(value: &'a toml::Value, key: &str) -> Result<&'a [toml::Value], ConfigError> {
+    match value.as_array() {
+        Some(list) if !list.is_empty() => Ok(list),
+        _ => Err(ConfigError::new(key, "a list with at least one value is needed")),
+    }
+}
+
+fn numbers(value: &toml::Value, key: &str) -> Result<Vec<f64>, ConfigError> {
+    let number = |(i, value): (usize, &toml::Value)| match value {
+        toml::Value::Float(x) if x.is_finite() => Ok(*x),
+        toml::Value::Integer(i) => Ok(*i as f64),
+        other => Err(ConfigError::new(format!("{key}[{i}]"), format!("a number is needed, found {other}"))),
+    };
+    list(value, key)?.iter().enumerate().map(number).collect()
+}
+
+fn increasing(x: Vec<f64>, key: &str) -> Result<Vec<f64>, ConfigError> {
+    match x.windows(2).position(|pair| pair[0] >= pair[1]) {
+        None => Ok(x),
+        Some(i) => {
+            let problem = format!("{} after {}, the numbers must increase", x[i + 1], x[i]);
+            Err(ConfigError::new(format!("{key}[{}]", i + 1), problem))
+        }
+    }
+}
+
+fn distinct(value: &toml::Value, key: &str) -> Result<Vec<String>, ConfigError> {
+    let mut words: Vec<String> = Vec::new();
+    for (i, value) in list(value, key)?.iter().enumerate() {
+        match value.as_str() {
+            Some(word) if !words.iter().any(|w| w == word) => words.push(word.into()),
+            Some(word) => {
+                return Err(ConfigError::new(format!("{key}[{i}]"), format!("`{word}` stands twice")));
+            }
+            None => {
+                return Err(ConfigError::new(
+                    format!("{key}[{i}]"),
+                    format!("a word is needed, found {value}"),
+                ));
+            }
+        }
+    }
+    Ok(words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::testing::twin;
+    use crate::{PullSettings, TWIN_SCHEMA};
+
+    fn scenario(part: &str, extra: &[(&str, Drawn)]) -> Scenario {
+        let pull = PullSettings {
+            increment_n: 0.5,
+            step_s: 0.1,
+            step_jitter: 0.0,
+            stop_m: 5e-3,
+            direction: [0.0, 0.0, 1.0],
+            max_force_n: None,
+            max_time_s: 60.0,
+            label_tolerance_n: 3.0,
+        };
+        let extra = extra.iter().map(|(k, v)| (k.to_string(), v.clone())).collect();
+        Scenario {
+            seed: 1,
+            index: 0,
+            group: 0,
+            repetition: 0,
+            part: part.into(),
+            grip_pose: 0,
+            grip_force_n: 40.0,
+            covariates: Covariates { session: "2".into(), grip_offset_m: 3e-3, extra, ..Default::default() },
+            pull,
+            drawn: Default::default(),
+        }
+    }
+
+    const HUMIDITY: &str = "[[effects]]\nname = \"table\"\ncovariate = \"humidity_pct\"\nx = [30, 40.0, 60]\n\
+                            factor = [1.0, 1.2, 0.8]\nphysical = false\n";
+
+    #[test]
+    fn a_table_is_linear_between_its_points_and_held_outside() {
+        let twin = twin(HUMIDITY).unwrap();
+        assert!(twin.effects.is_empty() && twin.tables.len() == 1);
+        let at = |x: f64| table_factor(&twin, &scenario("rod", &[("humidity_pct", Drawn::Number(x))]));
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        close(at(30.0), 1.0);
+        close(at(35.0), 1.1);
+        close(at(40.0), 1.2);
+        close(at(50.0), 1.0);
+        close(at(-5.0), 1.0);
+        close(at(90.0), 0.8);
+        close(table_factor(&twin, &scenario("rod", &[])), 1.0);
+        close(table_factor(&twin, &scenario("rod", &[("humidity_pct", Drawn::Text("wet".into()))])), 1.0);
+    }
+
+    #[test]
+    fn tables_know_the_columns_of_a_pull_and_their_part() {
+        let table = |covariate: &str, axis: &str, more: &str| {
+            let text = format!(
+                "[[effects]]\nname = \"table\"\ncovariate = \"{covariate}\"\n{axis}\n{more}\nphysical = false\n"
+            );
+            twin(&text).unwrap()
+        };
+        let rod = scenario("rod", &[]);
+        let factor = |covariate, axis| table_factor(&table(covariate, axis, "factor = [0.5, 1.5]"), &rod);
+        assert_eq!(factor("session", "words = [\"1\", \"2\"]"), 1.5);
+        assert_eq!(factor("session", "words = [\"1\", \"3\"]"), 1.0, "another word");
+        assert_eq!(factor("force_increment_n", "x = [0.5, 1]"), 0.5);
+        assert_eq!(factor("step_time_s", "x = [0.05, 0.1]"), 1.5);
+        assert_eq!(factor("grip_force_n", "x = [20, 60]"), 1.0);
+        assert!((factor("grip_offset_mm", "x = [0, 6]") - 1.0).abs() < 1e-12);
+        let offset = table("part", "words = [\"rod\", \"plate\"]", "offset_n = [0.7, -0.2]");
+        assert_eq!((table_factor(&offset, &rod), table_offset_n(&offset, &rod)), (1.0, 0.7));
+        let own = table("dwell_s", "x = [1]", "factor = [2.0]\npart = \"plate\"");
+        assert_eq!((table_factor(&own, &rod), table_factor(&own, &scenario("plate", &[]))), (1.0, 2.0));
+    }
+
+    #[test]
+    fn faults_name_the_key() {
+        for (from, to, key, part) in [
+            ("physical = false", "physical = true", "effects[0].physical", "must say so"),
+            ("physical = false", "", "effects[0].physical", "must say so"),
+            ("40.0, 60", "60, 40.0", "effects[0].x[2]", "40 after 60"),
+            ("[30, 40.0, 60]", "[]", "effects[0].x", "at least one"),
+            ("[30, 40.0, 60]", "[30, \"a\", 60]", "effects[0].x[1]", "a number is needed"),
+            ("1.2, 0.8", "1.2", "effects[0].factor", "2 values for 3 places of `humidity_pct`"),
+            ("1.2, 0.8", "-1.2, 0.8", "effects[0].factor[1]", "out of range"),
+            ("factor =", "facter =", "effects[0].facter", "no key `facter`"),
+            ("x =", "words =", "effects[0].words[0]", "a word is needed"),
+            ("humidity_pct", "session", "effects[0].x", "holds words"),
+            ("covariate = \"humidity_pct\"", "", "effects[0].covariate", "name of a column"),
+            ("physical", "per = \"cell\"\nphysical", "effects[0].per", "held outside"),
+            ("physical", "part = \"rods\"\nphysical", "effects[0].part", "no part `rods`"),
+        ] {
+            assert!(HUMIDITY.contains(from), "{from}");
+            let error = twin(&HUMIDITY.replacen(from, to, 1)).unwrap_err();
+            assert!(error.key == key && error.problem.contains(part), "{to}: {error}");
+        }
+        assert!(twin(&format!("schema = \"{TWIN_SCHEMA}\"\n{HUMIDITY}")).is_ok());
+    }
+}
