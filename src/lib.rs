@@ -93,4 +93,4 @@ pub use report::{
 };
 pub use schema::{sweep_schema, twin_schema};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, VERSION, run_info, sweep};
-pub use twin_edits::{EditedValue, TwinEdits, write_twin};
+pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, write_twin};

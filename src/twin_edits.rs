@@ -1,6 +1,11 @@
-//! What a calibration or a diagnosis changes in a twin, and writing the twin that comes out.
+//! A twin that was changed by a calibration or a diagnosis: what changes, and the new file.
 
-use gripgen_twin::config::{CalibrationFile, EffectFile};
+use crate::location::Location;
+use crate::project::{LoadError, load_twin_document};
+use crate::sweep::VERSION;
+use gripgen_twin::config::{CalibrationFile, ConfigError, EffectFile, TwinFile};
+use gripgen_twin::{TWIN_SCHEMA, Twin};
+use std::path::{Component, Path, PathBuf};
 
 /// A value of a twin that was fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,12 +27,124 @@ pub struct TwinEdits {
     pub effects: Option<Vec<EffectFile>>,
 }
 
-/// Writes a twin.
+/// Why a changed twin could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteTwinError {
+    /// The old twin, or an override of it.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The new values do not make a twin.
+    #[error("the new twin: {0}")]
+    Edit(ConfigError),
+    /// The file cannot be written.
+    #[error("{}: {problem}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        problem: String,
+    },
+}
+
+/// The twin at `base` with overrides and edits applied, its paths as they stand there.
+pub fn edited_twin(
+    base: &Location,
+    sets: &[(String, String)],
+    edits: &TwinEdits,
+) -> Result<TwinFile, WriteTwinError> {
+    let mut document = load_twin_document(base, sets)?;
+    let edit = |e: ConfigError| WriteTwinError::Edit(e);
+    if let Some(effects) = &edits.effects {
+        document.assign("effects", to_value(effects)?).map_err(edit)?;
+    }
+    for edited in &edits.values {
+        let place = document.assign(&edited.key, toml::Value::Float(edited.value)).map_err(edit)?;
+        if let (Some(calibration), Some((section, leaf))) = (&edited.calibration, place.rsplit_once('.')) {
+            let key = format!("{section}.calibration.{leaf}");
+            document.assign(&key, to_value(calibration)?).map_err(edit)?;
+        }
+    }
+    let mut file = document.read_twin().map_err(edit)?;
+    file.schema = Some(TWIN_SCHEMA.into());
+    Twin::new(&file).map_err(edit)?;
+    Ok(file)
+}
+
+/// Writes the twin at `base` with overrides and edits applied into `out`, with every key spelt out.
+///
+/// The paths in it are written anew so that they name the same files from where `out` lies; those inside gripgen and
+/// absolute ones stay. Comments of the old file are not kept.
 pub fn write_twin(
-    _base: &crate::Location,
-    _sets: &[(String, String)],
-    _edits: &TwinEdits,
-    _out: &std::path::Path,
-) -> Result<(), String> {
-    Err("not built yet".into())
+    base: &Location,
+    sets: &[(String, String)],
+    edits: &TwinEdits,
+    out: &Path,
+) -> Result<(), WriteTwinError> {
+    let mut file = edited_twin(base, sets, edits)?;
+    let io = |problem: String| WriteTwinError::Io { path: out.into(), problem };
+    let folder = match out.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let folder = folder.canonicalize().map_err(|e| io(e.to_string()))?;
+    for path in paths_of(&mut file) {
+        *path = path_from(&folder, &base.beside(path));
+    }
+    let body = toml::to_string_pretty(&file).map_err(|e| io(e.to_string()))?;
+    std::fs::write(out, header(base, sets, edits) + &body).map_err(|e| io(e.to_string()))
+}
+
+fn header(base: &Location, sets: &[(String, String)], edits: &TwinEdits) -> String {
+    let effects = match &edits.effects {
+        Some(effects) => format!("{} effects found", effects.len()),
+        None => "its own effects".into(),
+    };
+    let overrides = if sets.is_empty() { String::new() } else { format!(", {} overridden", sets.len()) };
+    // A file name may hold a line break.
+    let base = base.to_string().replace(char::is_control, " ");
+    format!(
+        "# Made by gripgen {VERSION} from {base}: {} values fitted{overrides}, {effects}.\n\
+         # A value that was fitted has its 90 % interval and its evidence under `calibration`.\n\
+         # Taking an entry of [[effects]] out restores the twin without it.\n\n",
+        edits.values.len()
+    )
+}
+
+fn to_value<T: serde::Serialize>(value: &T) -> Result<toml::Value, WriteTwinError> {
+    toml::Value::try_from(value).map_err(|e| WriteTwinError::Edit(ConfigError::new("", e.to_string())))
+}
+
+/// The paths of files in a twin.
+fn paths_of(file: &mut TwinFile) -> Vec<&mut String> {
+    let mut paths: Vec<&mut String> = file.parts.values_mut().map(|part| &mut part.mesh).collect();
+    paths.extend(file.robot.arm.as_mut().map(|arm| &mut arm.urdf));
+    for optics in [Some(&mut file.optics.left), file.optics.right.as_mut()].into_iter().flatten() {
+        paths.push(&mut optics.sensor);
+        let beside = [&mut optics.background, &mut optics.gel_map, &mut optics.shadow_table];
+        paths.extend(beside.into_iter().filter_map(Option::as_mut));
+    }
+    paths
+}
+
+/// How a file is called in a configuration that lies in `folder` (canonical): relative to it where there is a way.
+fn path_from(folder: &Path, file: &Location) -> String {
+    let Location::Disk(path) = file else { return file.to_string() };
+    if path.is_absolute() {
+        return path.display().to_string();
+    }
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+    // The folder of the file as it really lies, so that `..` does what it seems to do; its own name is kept.
+    let real = match (absolute.parent().map(Path::canonicalize), absolute.file_name()) {
+        (Some(Ok(parent)), Some(name)) => parent.join(name),
+        _ => absolute,
+    };
+    let same = folder.components().zip(real.components()).take_while(|(a, b)| a == b).count();
+    if same == 0 {
+        return real.display().to_string();
+    }
+    let up = folder.components().skip(same).map(|_| Component::ParentDir);
+    let relative: PathBuf = up.chain(real.components().skip(same)).collect();
+    // Written with slashes everywhere, which every system reads.
+    relative.iter().map(|part| part.to_string_lossy()).collect::<Vec<_>>().join("/")
 }

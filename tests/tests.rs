@@ -40,3 +40,5 @@ mod taxim_heights;
 mod taxim_stages;
 // The repository itself.
 mod tidy;
+// Twins that were changed.
+mod twin_edits;
