@@ -3,7 +3,7 @@
 mod table;
 
 use crate::cache::Cache;
-use gripgen_identify::pulls::model::{PredictPulls, PullModel, PullPrediction, TracePrediction};
+use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
 use gripgen_physics::{QuasiStatic, StuckPull};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::effects::{CommandChain, GripPoint, SensorChain};
@@ -44,6 +44,10 @@ pub struct PullPredictor<'a> {
     jobs: usize,
     stuck: Cache<Key, StuckPull>,
     tables: Cache<Key, LabelTable>,
+}
+
+fn acts_on_signals(model: &PullModel) -> bool {
+    model.effects.iter().any(ModelEffect::acts_on_signals)
 }
 
 /// What a stuck pull or a table depends on: profile, direction, and the bits of the parameters.
@@ -151,9 +155,10 @@ impl<'a> PullPredictor<'a> {
             let staircase = &self.staircases[self.profile_of[row]];
             Ok::<_, Infallible>(self.rig(model).stuck(staircase, &sensor, &command, self.most_n))
         };
+        // What a fit tries of an effect on signals comes once and would push everything else out.
         let made = match self.key(model, row, &[]) {
-            Some(key) => self.stuck.get(key, make),
-            None => make().map(Arc::new),
+            Some(key) if !acts_on_signals(model) => self.stuck.get(key, make),
+            _ => make().map(Arc::new),
         };
         made.unwrap_or_else(|never| match never {})
     }
@@ -173,22 +178,82 @@ impl<'a> PullPredictor<'a> {
     }
 
     /// The tables of two kinetic ratios around the model's, and the weight of the second.
-    fn table(&self, model: &PullModel, row: usize) -> Option<Tables> {
+    fn table(&self, model: &PullModel, row: usize) -> Tables {
+        let never = |made: Result<Arc<LabelTable>, Infallible>| made.unwrap_or_else(|never| match never {});
+        let build = |model: &PullModel| {
+            let stuck = self.stuck(model, row);
+            Ok::<_, Infallible>(LabelTable::new(&self.scattered(model, row, &stuck), self.most_n))
+        };
+        if acts_on_signals(model) {
+            let table = never(build(model).map(Arc::new));
+            return (table.clone(), table, 0.0);
+        }
         let steps = (model.kinetic_ratio / RATIO_STEP).min(1.0 / RATIO_STEP);
         let at = |ratio: f64| {
-            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n])?;
-            let made = self.tables.get(key, || {
-                let (stuck, model) =
-                    (self.stuck(model, row), PullModel { kinetic_ratio: ratio, ..model.clone() });
-                Ok::<_, Infallible>(LabelTable::new(&self.scattered(&model, row, &stuck), self.most_n))
-            });
-            Some(made.unwrap_or_else(|never| match never {}))
+            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n]).unwrap_or_default();
+            let model = PullModel { kinetic_ratio: ratio, ..model.clone() };
+            never(self.tables.get(key, || build(&model)))
         };
         let low = steps.floor();
         let weight = steps - low;
-        let first = at(low * RATIO_STEP)?;
-        let second = if weight > 0.0 { at((low + 1.0) * RATIO_STEP)? } else { first.clone() };
-        Some((first, second, weight))
+        let first = at(low * RATIO_STEP);
+        let second = if weight > 0.0 { at((low + 1.0) * RATIO_STEP) } else { first.clone() };
+        (first, second, weight)
+    }
+
+    /// Pulls of one profile and direction share a place.
+    fn slot(&self, row: usize) -> usize {
+        2 * self.profile_of[row] + usize::from(self.measured.pulls[row].covariates.pull_direction < 0.0)
+    }
+
+    /// Whether pulls of one profile and direction have the same signals.
+    fn shares_signals(&self, model: &PullModel) -> bool {
+        !model
+            .effects
+            .iter()
+            .any(|e| CLOCKS.contains(&e.spec.id) || (e.acts_on_signals() && e.part.is_some()))
+    }
+
+    /// Labels with signals that depend on the clock: tables at the first, the middle and the last pull of each profile
+    /// and direction, and a parabola in time between them. Signals of one part are taken pull by pull.
+    fn pulls_by_clock(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
+        let time = |row: usize| self.measured.pulls[row].covariates.time_s;
+        let alone = |row: usize| {
+            let stuck = self.stuck(model, row);
+            self.scattered(model, row, &stuck).predict(self.limit_n(model, row))
+        };
+        let of_part = model.effects.iter().any(|e| e.acts_on_signals() && e.part.is_some());
+        let mut places: Vec<Vec<usize>> = vec![vec![]; 2 * self.profiles.len()];
+        for (k, &row) in rows.iter().enumerate() {
+            places[self.slot(row)].push(k);
+        }
+        let mut found = vec![PullPrediction::default(); rows.len()];
+        for place in places.iter_mut().filter(|p| !p.is_empty()) {
+            place.sort_by(|&a, &b| time(rows[a]).total_cmp(&time(rows[b])));
+            let nodes = [place[0], place[place.len() / 2], place[place.len() - 1]].map(|k| rows[k]);
+            let t = nodes.map(time);
+            if of_part || place.len() < 12 || t[0] >= t[1] || t[1] >= t[2] {
+                place.iter().for_each(|&k| found[k] = alone(rows[k]));
+                continue;
+            }
+            let tables = nodes.map(|row| self.table(model, row).0);
+            for &k in place.iter() {
+                let (at, limit_n) = (time(rows[k]), self.limit_n(model, rows[k]));
+                let p = [0, 1, 2].map(|i| tables[i].at(limit_n));
+                let weight = |i: usize, j: usize, k: usize| {
+                    (at - t[j]) * (at - t[k]) / ((t[i] - t[j]) * (t[i] - t[k]))
+                };
+                let w = [weight(0, 1, 2), weight(1, 0, 2), weight(2, 0, 1)];
+                let sum = |f: &dyn Fn(&PullPrediction) -> f64| (0..3).map(|i| w[i] * f(&p[i])).sum::<f64>();
+                found[k] = PullPrediction {
+                    limit_n,
+                    limit_reading_n: sum(&|p| p.limit_reading_n),
+                    label_n: sum(&|p| p.label_n),
+                    label_sd_n: sum(&|p| p.label_sd_n).max(0.5 * p[1].label_sd_n),
+                };
+            }
+        }
+        found
     }
 
     /// What the jaws of pull `row` hold, without scatter.
@@ -225,34 +290,38 @@ impl<'a> PullPredictor<'a> {
 
 impl PredictPulls for PullPredictor<'_> {
     fn pulls(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
+        let clock = model
+            .effects
+            .iter()
+            .any(|e| CLOCKS.contains(&e.spec.id) || (e.acts_on_signals() && e.part.is_some()));
+        if clock {
+            return self.pulls_by_clock(model, rows);
+        }
         let mut known: Vec<Option<Tables>> = vec![None; 2 * self.profiles.len()];
         rows.iter()
             .map(|&row| {
+                let slot = self.slot(row);
+                let (first, second, weight) = known[slot].get_or_insert_with(|| self.table(model, row));
                 let limit_n = self.limit_n(model, row);
-                let against = self.measured.pulls[row].covariates.pull_direction < 0.0;
-                let slot = 2 * self.profile_of[row] + usize::from(against);
-                if known[slot].is_none() {
-                    known[slot] = self.table(model, row);
-                }
-                match &known[slot] {
-                    Some((first, second, weight)) => first.at(limit_n).mixed(&second.at(limit_n), *weight),
-                    None => {
-                        let stuck = self.stuck(model, row);
-                        self.scattered(model, row, &stuck).predict(limit_n)
-                    }
-                }
+                first.at(limit_n).mixed(&second.at(limit_n), *weight)
             })
             .collect()
     }
 
     fn slips(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
-        let changed = model.effects.iter().any(gripgen_identify::pulls::model::ModelEffect::acts_on_signals);
+        let changed = acts_on_signals(model);
+        let shared = self.shares_signals(model);
+        let mut known: Vec<Option<Arc<StuckPull>>> = vec![None; 2 * self.profiles.len()];
         rows.iter()
             .map(|&row| {
                 let limit_n = self.limit_n(model, row);
-                let limit_reading_n = match changed {
-                    true => table::reading_n(&self.stuck(model, row), limit_n),
-                    false => limit_n,
+                let limit_reading_n = match (changed, shared) {
+                    (false, _) => limit_n,
+                    (true, true) => {
+                        let stuck = known[self.slot(row)].get_or_insert_with(|| self.stuck(model, row));
+                        table::reading_n(stuck, limit_n)
+                    }
+                    (true, false) => table::reading_n(&self.stuck(model, row), limit_n),
                 };
                 PullPrediction { limit_n, limit_reading_n, ..PullPrediction::default() }
             })

@@ -5,8 +5,8 @@ use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
 use gripgen_twin::Staircase;
 use gripgen_twin::effects::{CommandChain, SensorChain};
 
-/// Distance of two forces in a table.
-const STEP_N: f64 = 0.125;
+/// Distance of two small forces in a table.
+const STEP_N: f64 = 0.2;
 
 /// Nodes and weights of the Gauss-Hermite rule of 9 points for a standard normal variable (Abramowitz and Stegun 1964,
 /// table 25.10, scaled).
@@ -86,27 +86,40 @@ fn finished(limit_n: f64, limit_reading_n: f64, mean_n: f64, square: f64) -> Pul
     PullPrediction { limit_n, limit_reading_n, label_n: mean_n, label_sd_n }
 }
 
-/// Predictions for evenly spaced forces.
+/// Predictions for forces whose distances grow with them.
 pub(super) struct LabelTable {
     rows: Vec<PullPrediction>,
+}
+
+/// Force beyond which distances grow.
+const EVEN_N: f64 = 8.0;
+
+/// Place of a force in a table: evenly spaced at first, then by equal ratios.
+fn place(limit_n: f64) -> f64 {
+    if limit_n <= EVEN_N { limit_n / STEP_N } else { EVEN_N / STEP_N * (1.0 + libm::log(limit_n / EVEN_N)) }
+}
+
+/// The force at a place.
+fn force_n(place: f64) -> f64 {
+    let even = EVEN_N / STEP_N;
+    if place <= even { place * STEP_N } else { EVEN_N * libm::exp(place / even - 1.0) }
 }
 
 impl LabelTable {
     pub fn new(pull: &Scattered<'_>, most_n: f64) -> Self {
         // Beyond by what scatter adds.
-        let reach = most_n * (1.0 + 3.3 * pull.scatter);
-        let count = (reach / STEP_N).ceil() as usize + 2;
+        let count = place(most_n * (1.0 + 3.3 * pull.scatter)).ceil() as usize + 2;
         let mut slip = SlipPull::default();
-        let exact: Vec<(f64, f64)> = (0..count).map(|i| pull.label(i as f64 * STEP_N, &mut slip)).collect();
+        let exact: Vec<(f64, f64)> = (0..count).map(|i| pull.label(force_n(i as f64), &mut slip)).collect();
         let between = |limit_n: f64| {
-            let x = (limit_n / STEP_N).clamp(0.0, (count - 2) as f64);
+            let x = place(limit_n).clamp(0.0, (count - 2) as f64);
             let (i, w) = (x as usize, x.fract());
             (exact[i].0 * (1.0 - w) + exact[i + 1].0 * w, exact[i].1 * (1.0 - w) + exact[i + 1].1 * w)
         };
-        let wanted = (most_n / STEP_N).ceil() as usize + 2;
+        let wanted = place(most_n).ceil() as usize + 2;
         let rows = (0..wanted)
             .map(|i| {
-                let limit_n = i as f64 * STEP_N;
+                let limit_n = force_n(i as f64);
                 let (mean, square) = NODES.iter().fold((0.0, 0.0), |(m, s), &(z, w)| {
                     let (mean, square) = between((limit_n * (1.0 + pull.scatter * z)).max(0.0));
                     (m + w * mean, s + w * square)
@@ -120,12 +133,12 @@ impl LabelTable {
     /// The prediction for jaws that hold `limit_n`.
     pub fn at(&self, limit_n: f64) -> PullPrediction {
         let last = self.rows.len() - 1;
-        let x = (limit_n / STEP_N).clamp(0.0, last as f64 - 1e-9);
+        let x = place(limit_n).clamp(0.0, last as f64 - 1e-9);
         let (i, w) = (x as usize, x.fract());
         let (a, b) = (&self.rows[i], &self.rows[i + 1]);
         let mix = |a: f64, b: f64| a * (1.0 - w) + b * w;
         // Beyond the table everything grows with the force.
-        let beyond = (limit_n / (last as f64 * STEP_N)).max(1.0);
+        let beyond = (limit_n / force_n(last as f64)).max(1.0);
         PullPrediction {
             limit_n,
             limit_reading_n: beyond * mix(a.limit_reading_n, b.limit_reading_n),

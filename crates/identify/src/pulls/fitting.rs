@@ -159,7 +159,7 @@ impl Context<'_> {
         let mut parameters = layout.parameters.clone();
         let signals = terms.act_on_signals();
         let mut outcome = None;
-        for round in 0..ROUNDS {
+        for round in 0..if signals { ROUNDS - 1 } else { ROUNDS } {
             let values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
             let model = self.model_at(start, terms, &layout, &values);
             let sd = self.deviations(&model, rows);
@@ -172,7 +172,12 @@ impl Context<'_> {
                 .map(|r| if round == 0 { 1.0 } else { weight_of((r / s).powi(2)).sqrt() })
                 .collect();
             let trace_weights: Vec<f64> = traces.iter().map(|r| (2.5 / r.abs().max(2.5)).sqrt()).collect();
-            let options = FitOptions { most_steps: if round == 0 { 12 } else { 8 }, least_gain: 1e-4 };
+            let options = match (signals, round) {
+                (false, 0) => FitOptions { most_steps: 12, least_gain: 1e-4 },
+                (false, _) => FitOptions { most_steps: 8, least_gain: 1e-4 },
+                (true, 0) => FitOptions { most_steps: 8, least_gain: 1e-3 },
+                (true, _) => FitOptions { most_steps: 3, least_gain: 1e-3 },
+            };
             let found = fit(&parameters, options, |values| {
                 let model = self.model_at(start, terms, &layout, values);
                 let mut r = self.friction_residuals(&model, rows, &sd);

@@ -28,6 +28,9 @@ const EXPLAINED: f64 = 0.75;
 /// from what nature does. More than that, and the effect is not what acts.
 const MISFIT: f64 = 0.3;
 
+/// Gain of log-likelihood that the slope at nothing has to promise for an effect on signals to be fitted.
+const LEAST_PROMISE: f64 = 1.5;
+
 /// Correlation of ranks from which on two columns are the same clock.
 const SAME_CLOCK: f64 = 0.9;
 
@@ -134,6 +137,10 @@ impl<'a> Search<'a> {
             Rival::Effect(i) => {
                 let candidate = &self.candidates[*i];
                 for from in &candidate.starts {
+                    // Fits of effects on signals are slow: those that promise nothing are left out.
+                    if self.context.promise(start, candidate, from, &self.rows) < LEAST_PROMISE {
+                        continue;
+                    }
                     let mut terms = terms.clone();
                     terms.effects.push((candidate.clone(), from.clone()));
                     keep(self.context.fit(start, &terms, &self.rows), &mut best);
