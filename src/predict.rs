@@ -1,5 +1,6 @@
 //! Predictions of measured pulls by the reduced mechanics without inertia: expected values over scatter and noise.
 
+mod signals;
 mod table;
 
 use crate::cache::Cache;
@@ -8,6 +9,7 @@ use gripgen_physics::{QuasiStatic, StuckPull};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::effects::{CommandChain, GripPoint, SensorChain};
 use gripgen_twin::{Jaw, MeasuredPulls, Robot, Staircase, Twin};
+use signals::Signals;
 use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -201,6 +203,10 @@ impl<'a> PullPredictor<'a> {
         (first, second, weight)
     }
 
+    fn slots(&self) -> usize {
+        2 * self.profiles.len()
+    }
+
     /// Pulls of one profile and direction share a place.
     fn slot(&self, row: usize) -> usize {
         2 * self.profile_of[row] + usize::from(self.measured.pulls[row].covariates.pull_direction < 0.0)
@@ -223,7 +229,7 @@ impl<'a> PullPredictor<'a> {
             self.scattered(model, row, &stuck).predict(self.limit_n(model, row))
         };
         let of_part = model.effects.iter().any(|e| e.acts_on_signals() && e.part.is_some());
-        let mut places: Vec<Vec<usize>> = vec![vec![]; 2 * self.profiles.len()];
+        let mut places: Vec<Vec<usize>> = vec![vec![]; self.slots()];
         for (k, &row) in rows.iter().enumerate() {
             places[self.slot(row)].push(k);
         }
@@ -297,7 +303,7 @@ impl PredictPulls for PullPredictor<'_> {
         if clock {
             return self.pulls_by_clock(model, rows);
         }
-        let mut known: Vec<Option<Tables>> = vec![None; 2 * self.profiles.len()];
+        let mut known: Vec<Option<Tables>> = vec![None; self.slots()];
         rows.iter()
             .map(|&row| {
                 let slot = self.slot(row);
@@ -309,21 +315,15 @@ impl PredictPulls for PullPredictor<'_> {
     }
 
     fn slips(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
-        let changed = acts_on_signals(model);
-        let shared = self.shares_signals(model);
-        let mut known: Vec<Option<Arc<StuckPull>>> = vec![None; 2 * self.profiles.len()];
+        let mut signals = Signals::new(self, model);
         rows.iter()
             .map(|&row| {
                 let limit_n = self.limit_n(model, row);
-                let limit_reading_n = match (changed, shared) {
-                    (false, _) => limit_n,
-                    (true, true) => {
-                        let stuck = known[self.slot(row)].get_or_insert_with(|| self.stuck(model, row));
-                        table::reading_n(stuck, limit_n)
-                    }
-                    (true, false) => table::reading_n(&self.stuck(model, row), limit_n),
-                };
-                PullPrediction { limit_n, limit_reading_n, ..PullPrediction::default() }
+                PullPrediction {
+                    limit_n,
+                    limit_reading_n: signals.limit_reading_n(row, limit_n),
+                    ..PullPrediction::default()
+                }
             })
             .collect()
     }
@@ -332,18 +332,15 @@ impl PredictPulls for PullPredictor<'_> {
         (0..self.measured.pulls.len()).map(|row| self.limit_n(model, row)).collect()
     }
 
-    fn trace(&self, model: &PullModel, row: usize, times_s: &[f64]) -> TracePrediction {
-        let stuck = self.stuck(model, row);
-        let last = stuck.reading_n.len() - 1;
-        let stuck_n = times_s
+    fn traces(&self, model: &PullModel, asked: &[(usize, &[f64])]) -> Vec<TracePrediction> {
+        let mut signals = Signals::new(self, model);
+        asked
             .iter()
-            .map(|t| {
-                let x = (t * self.rate_hz).clamp(0.0, last as f64);
-                let (i, w) = (x as usize, x.fract());
-                stuck.reading_n[i] * (1.0 - w) + stuck.reading_n[(i + 1).min(last)] * w
+            .map(|(row, times_s)| TracePrediction {
+                no_load_n: self.sensor(model, *row).read(0.0, -0.25, 0.0),
+                stuck_n: signals.stuck_n(*row, times_s),
             })
-            .collect();
-        TracePrediction { no_load_n: self.sensor(model, row).read(0.0, -0.25, 0.0), stuck_n }
+            .collect()
     }
 
     fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync)) {

@@ -172,8 +172,9 @@ impl<'a> Context<'a> {
             let mut model = self.base.clone();
             (model.lag_s, model.dead_time_s) = (v[0], v[1]);
             let mut r = Vec::new();
-            for (row, times, readings) in &thinned {
-                let predicted = self.predictor.trace(&model, *row, times);
+            let asked: Vec<(usize, &[f64])> =
+                thinned.iter().map(|(row, times, _)| (*row, times.as_slice())).collect();
+            for ((_, _, readings), predicted) in thinned.iter().zip(self.predictor.traces(&model, &asked)) {
                 r.extend(readings.iter().zip(&predicted.stuck_n).map(|(a, b)| {
                     let x = (a - b) / (SHARED_N.0 + SHARED_N.1 * b.abs() + self.base.noise_n);
                     // Readings of a sensor that is off by much do not pull the loop with them.
@@ -283,8 +284,10 @@ impl<'a> Context<'a> {
         let mut levels: Vec<Vec<(f64, f64, usize)>> = vec![vec![]; LEVELS];
         let mut no_load = Vec::new();
         let noise = model.noise_n;
-        for observation in rows.iter().filter_map(|&i| self.observed[i]).map(|o| &self.observations[o]) {
-            let predicted = self.predictor.trace(model, observation.row, &observation.times_s);
+        let seen: Vec<&Observation> =
+            rows.iter().filter_map(|&i| self.observed[i]).map(|o| &self.observations[o]).collect();
+        let asked: Vec<(usize, &[f64])> = seen.iter().map(|o| (o.row, o.times_s.as_slice())).collect();
+        for (observation, predicted) in seen.iter().zip(self.predictor.traces(model, &asked)) {
             if let Some((mean, n)) = observation.no_load_n {
                 no_load.push((mean - predicted.no_load_n, n));
             }

@@ -99,8 +99,13 @@ pub trait PredictPulls: Sync {
     /// Limits alone, of all pulls: friction and normal force, no sensor.
     fn limits_n(&self, model: &PullModel) -> Vec<f64>;
 
-    /// Readings of pull `row` at `times_s` if it never slipped.
-    fn trace(&self, model: &PullModel, row: usize, times_s: &[f64]) -> TracePrediction;
+    /// Readings of pulls if they never slipped: for each a row and times.
+    fn traces(&self, model: &PullModel, asked: &[(usize, &[f64])]) -> Vec<TracePrediction>;
+
+    /// Readings of one pull.
+    fn trace(&self, model: &PullModel, row: usize, times_s: &[f64]) -> TracePrediction {
+        self.traces(model, &[(row, times_s)]).pop().unwrap_or_default()
+    }
 
     /// Calls `task` for 0..n, in parallel where that is possible. Each call stands for itself.
     fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync)) {
