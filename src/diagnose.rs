@@ -2,4 +2,4 @@
 
 mod pulls;
 
-pub use pulls::{PullDiagnoseOptions, diagnose_pull_table, given_model};
+pub use pulls::{PullDiagnoseOptions, UnknownPartError, diagnose_pull_table, given_model};

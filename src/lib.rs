@@ -43,6 +43,7 @@
 pub mod assets;
 mod bench;
 mod cache;
+mod compare;
 mod diagnose;
 mod generate;
 mod gpu;
@@ -66,6 +67,7 @@ mod sweep;
 mod twin_edits;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
+pub use compare::{LabelErrors, PullComparison, compare_pulls};
 pub use diagnose::{PullDiagnoseOptions, diagnose_pull_table, given_model};
 pub use generate::{Press, SampleError, SimulateOptions, generate, press_only, simulate};
 pub use gpu::Gpu;

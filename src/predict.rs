@@ -5,7 +5,7 @@ mod table;
 
 use crate::cache::Cache;
 use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
-use gripgen_physics::{QuasiStatic, StuckPull};
+use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::effects::{CommandChain, GripPoint, SensorChain};
 use gripgen_twin::{Jaw, MeasuredPulls, Robot, Staircase, Twin};
@@ -100,6 +100,31 @@ impl<'a> PullPredictor<'a> {
     /// Names of the parts in the order of a model's coefficients.
     pub fn part_names(&self) -> &[String] {
         &self.part_names
+    }
+
+    /// Readings of pull `row` at `times_s` without scatter and noise, as far as the pull lasts.
+    pub fn expected_trace_n(&self, model: &PullModel, row: usize, times_s: &[f64]) -> Vec<f64> {
+        let stuck = self.stuck(model, row);
+        let (sensor, command) = (self.sensor(model, row), self.command(model, row));
+        let mut slip = SlipPull::default();
+        let staircase = &self.staircases[self.profile_of[row]];
+        let rig = self.rig(model);
+        let limit_n = self.limit_n(model, row);
+        rig.slip(
+            &stuck,
+            staircase,
+            limit_n,
+            model.kinetic_ratio,
+            f64::INFINITY,
+            &sensor,
+            &command,
+            &mut slip,
+        );
+        let at = |tick: usize| match tick.checked_sub(slip.slip_tick) {
+            None => stuck.reading_n.get(tick).copied(),
+            Some(after) => slip.reading_n.get(after).copied(),
+        };
+        times_s.iter().map_while(|t| at((t * self.rate_hz).round().max(0.0) as usize)).collect()
     }
 
     /// What the force loop closes on.

@@ -5,10 +5,12 @@ use crate::report::{Diagnosed, ReportData};
 use crate::twin_edits::{EditedValue, TwinEdits};
 use gripgen_identify::Diagnosis;
 use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
+use gripgen_identify::pulls::curves::Curve;
+use gripgen_identify::pulls::data::{Column, PullData};
 use gripgen_identify::pulls::model::PullModel;
 use gripgen_twin::config::{CalibrationFile, EffectFile};
 use gripgen_twin::effects::OutsideFit;
-use gripgen_twin::{MeasuredPulls, Twin};
+use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Twin};
 use std::collections::BTreeMap;
 
 /// How a diagnosis of pulls is made.
@@ -136,5 +138,70 @@ fn edits(
                 .collect(),
         }
     });
-    TwinEdits { values, effects: Some(effects.collect()) }
+    let mut effects: Vec<EffectFile> = effects.collect();
+    effects.extend(
+        fits.after
+            .terms
+            .curves
+            .iter()
+            .filter_map(|(curve, values)| table(curve, values, measured, &evidence)),
+    );
+    TwinEdits { values, effects: Some(effects) }
+}
+
+/// A curve without a name as a table of the twin, marked as not physical. The product of two columns has none.
+fn table(
+    curve: &Curve,
+    coefficients: &[f64],
+    measured: &MeasuredPulls,
+    evidence: &str,
+) -> Option<EffectFile> {
+    let data = PullData::new(measured);
+    let column = data.columns.get(&curve.name)?;
+    let sum = |i: usize| curve.basis[i].iter().zip(coefficients).map(|(b, c)| b * c).sum::<f64>();
+    let value = |i: usize| if curve.additive { sum(i) } else { sum(i).clamp(-3.0, 3.0).exp() };
+    let mut parameters = BTreeMap::from([
+        ("covariate".to_string(), toml::Value::String(curve.name.clone())),
+        ("physical".to_string(), toml::Value::Boolean(false)),
+    ]);
+    let numbers = |x: Vec<f64>| toml::Value::Array(x.into_iter().map(toml::Value::Float).collect());
+    let target = if curve.additive { "offset_n" } else { "factor" };
+    match column {
+        Column::Word(at, words) => {
+            let own = |w: usize| at.iter().position(|&k| k == w).map(value);
+            let values: Option<Vec<f64>> = (0..words.len()).map(own).collect();
+            parameters.insert(
+                "words".into(),
+                toml::Value::Array(words.iter().cloned().map(toml::Value::String).collect()),
+            );
+            parameters.insert(target.into(), numbers(values?));
+        }
+        Column::Number(x) => {
+            let mut points: Vec<(f64, f64)> = x.iter().enumerate().map(|(i, x)| (*x, value(i))).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            points.dedup_by(|a, b| a.0 == b.0);
+            // Piecewise linear: some sixty points hold all that it is.
+            let step = points.len().div_ceil(60).max(1);
+            let last = points.len() - 1;
+            let kept: Vec<(f64, f64)> = points
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| i % step == 0 || *i == last)
+                .map(|(_, p)| *p)
+                .collect();
+            parameters.insert("x".into(), numbers(kept.iter().map(|p| p.0).collect()));
+            parameters.insert(target.into(), numbers(kept.iter().map(|p| p.1).collect()));
+        }
+    }
+    Some(EffectFile {
+        name: TABLE_EFFECT.into(),
+        part: None,
+        fitted_grip_force_n: None,
+        outside_fit: OutsideFit::Extrapolate,
+        per: gripgen_twin::effects::Per::Jaw,
+        reference_area_mm2: None,
+        source: Some(evidence.into()),
+        calibration: BTreeMap::new(),
+        parameters,
+    })
 }

@@ -1,5 +1,6 @@
 //! `gripgen compare`: how far a twin or a sensor file is from measurements.
 
+use super::diagnose::{jobs, load_twin, no_pulls};
 use crate::args::{CompareArgs, TalkArgs};
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, writable, write_file};
@@ -7,8 +8,9 @@ use gripgen::tactile::finish;
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
-    FoundCircles, LoadPressesError, LoadSensorError, Location, PressGeometry, PressReportText,
-    find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor, press_report,
+    FoundCircles, LabelErrors, LoadPressesError, LoadSensorError, Location, PressGeometry, PressReportText,
+    compare_pulls, find_missing_circles, is_press_set, load_presses, load_pulls, load_sensor,
+    load_twin_sensor, press_report,
 };
 use serde_json::{Value, json};
 
@@ -18,11 +20,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
         return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
     }
     if !is_press_set(&args.measured) {
-        return Err(Failure::usage(format!(
-            "{}: neither a `dataPack.npz` nor a folder with `presses.csv`",
-            args.measured.display()
-        ))
-        .hint("this version compares ball presses; pulls and force-sensor tables follow"));
+        return pulls(args);
     }
     if let Some(report) = &args.report {
         writable(report)?;
@@ -100,6 +98,51 @@ pub fn say_circles(circles: &FoundCircles, talk: &TalkArgs) {
     if !circles.without_contact.is_empty() {
         eprintln!("warning: no contact is visible in {}; left out", circles.without_contact.join(", "));
     }
+}
+
+/// A twin against measured pulls.
+fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
+    let loaded = load_pulls(&args.measured).map_err(|e| no_pulls(&args.measured, e))?;
+    let twin = load_twin(&args.twin, &[])?;
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let found = compare_pulls(&loaded.pulls, &twin, jobs())
+        .map_err(|e| Failure::usage(e).hint("name a twin that has this part with --twin"))?;
+    let errors =
+        |e: &LabelErrors| json!({"n": e.n, "rmse_n": e.rmse_n, "mape_pct": e.mape_pct, "bias_n": e.bias_n});
+    if sink.wanted() {
+        let mut pulls = errors(&found.pulls);
+        pulls["by_part"] = found
+            .by_part
+            .iter()
+            .map(|(name, e)| (name.clone(), errors(e)))
+            .collect::<serde_json::Map<_, _>>()
+            .into();
+        pulls["n_outside_fit"] = json!(found.outside_fit);
+        let traces = json!({"n": found.traces.0, "rmse_n": found.traces.1});
+        sink.document(&json!({"schema": "gripgen.comparison/1", "pulls": pulls, "traces": traces}))?;
+    }
+    if !sink.on_stdout() {
+        let mut text =
+            format!("{:<16} {:>6} {:>9} {:>7} {:>8}\n", "part", "pulls", "RMSE N", "MAPE %", "bias N");
+        for (name, e) in found.by_part.iter().map(|(n, e)| (n.as_str(), e)).chain([("all", &found.pulls)]) {
+            text +=
+                &format!("{name:<16} {:>6} {:>9.3} {:>7.2} {:>8.3}\n", e.n, e.rmse_n, e.mape_pct, e.bias_n);
+        }
+        if found.traces.0 > 0 {
+            text += &format!("{} traces: {:.3} N between their readings\n", found.traces.0, found.traces.1);
+        }
+        print(&text)?;
+    }
+    if !args.talk.quiet {
+        loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        if found.outside_fit > 0 {
+            eprintln!(
+                "note: {} pulls lie outside the grip forces on which an effect was fitted",
+                found.outside_fit
+            );
+        }
+    }
+    Ok(0)
 }
 
 /// The scores of presses as they stand in `--json`.
