@@ -23,6 +23,7 @@ static FILES: &[(&str, &[u8])] = embedded![
     "parts/long_shaft/part.stl",
     "parts/roller_bearing/part.stl",
     "sensors/gelsight_r15/sensor.npz",
+    "templates/diagnosis.html",
     "templates/part-sweep.toml",
     "templates/part-twin.toml",
     "templates/presses.html",

@@ -1,5 +1,14 @@
 //! The report of a diagnosis: one HTML page with its plots inside.
 
+mod axis;
+mod bars;
+mod page;
+mod plot;
+#[cfg(test)]
+mod tests;
+
+pub use page::diagnosis_page;
+
 use gripgen_identify::Diagnosis;
 
 /// How the points of a series are drawn.
@@ -108,9 +117,4 @@ pub struct Diagnosed {
     pub edits: crate::TwinEdits,
     /// What the report shows.
     pub report: ReportData,
-}
-
-/// The page.
-pub fn diagnosis_page(_diagnosed: &Diagnosed) -> String {
-    String::new()
 }
