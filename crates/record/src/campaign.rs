@@ -1,6 +1,7 @@
 //! `campaign.toml`: how a campaign of pulls was made, or is to be made.
 
 use gripgen_twin::config::{Feedback, ForceConvention};
+use gripgen_twin::{Campaign, PlannedPull, PullKind};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -90,4 +91,173 @@ fn check_header(path: &Path, header: &CampaignHeader) -> Result<(), CampaignFile
         }
     }
     Ok(())
+}
+
+/// A campaign file with its pulls.
+#[derive(Deserialize)]
+struct CampaignFile {
+    #[serde(flatten)]
+    header: CampaignHeader,
+    #[serde(default)]
+    pulls: Vec<PlannedPull>,
+}
+
+/// Reads a campaign with its list of pulls, grip forces per jaw. Unknown keys of the file are left alone, those of a pull
+/// are errors: a misspelt dwell would be made as if it were not there.
+pub fn read_campaign(path: &Path) -> Result<Campaign, CampaignFileError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| CampaignFileError::Io { path: path.into(), problem: e.to_string() })?;
+    let CampaignFile { header, mut pulls } = parse(path, &text)?;
+    check_header(path, &header)?;
+    if pulls.is_empty() {
+        let problem = "it has no `pulls`, there is nothing to do".to_string();
+        return Err(CampaignFileError::Format { path: path.into(), line: None, problem });
+    }
+    for (i, pull) in pulls.iter_mut().enumerate() {
+        check_pull(pull).map_err(|problem| {
+            let problem = format!("pulls[{i}]: {problem}");
+            CampaignFileError::Format { path: path.into(), line: None, problem }
+        })?;
+        pull.grip_force_n = header.per_jaw_n(pull.grip_force_n);
+    }
+    let CampaignHeader { label_tolerance_n, stop_mm, feedback, .. } = header;
+    Ok(Campaign { label_tolerance_n, stop_m: stop_mm * 1e-3, feedback, pulls })
+}
+
+fn check_pull(pull: &PlannedPull) -> Result<(), String> {
+    let loaded = pull.kind == PullKind::Pull;
+    if loaded && pull.part.is_empty() {
+        return Err("a pull needs a `part`".into());
+    }
+    let above_zero = [
+        ("grip_force_n", pull.grip_force_n, loaded),
+        ("force_increment_n", pull.force_increment_n, loaded),
+        ("step_time_s", pull.step_time_s, loaded),
+        ("dwell_s", pull.dwell_s, !loaded),
+    ];
+    for (key, value, strict) in above_zero {
+        if !value.is_finite() || value < 0.0 || (strict && value == 0.0) {
+            let wanted = if strict { "above 0" } else { "of at least 0" };
+            return Err(format!("`{key}` is {value}, it must be a number {wanted}"));
+        }
+    }
+    if !(pull.pause_s.is_finite() && pull.pause_s >= 0.0) {
+        return Err(format!("`pause_s` is {}, it must be a number of at least 0", pull.pause_s));
+    }
+    if pull.pull_direction.abs() != 1.0 {
+        return Err(format!("`pull_direction` is {}, it must be 1 (up) or -1 (down)", pull.pull_direction));
+    }
+    for (key, value) in [("grip_offset_mm", pull.grip_offset_mm), ("grip_angle_deg", pull.grip_angle_deg)] {
+        if !value.is_finite() {
+            return Err(format!("`{key}` is {value}, it must be a number"));
+        }
+    }
+    Ok(())
+}
+
+/// The text of a campaign file, a line a pull; `about` becomes its comment. [`read_campaign`] reads it back.
+pub fn campaign_toml(campaign: &Campaign, about: &str) -> String {
+    let mut text = String::new();
+    for line in about.lines() {
+        text += format!("# {line}").trim_end();
+        text.push('\n');
+    }
+    text += &header_toml(campaign.label_tolerance_n, campaign.stop_m, campaign.feedback);
+    text += "pulls = [\n";
+    let number = |x: f64| toml::Value::Float(x).to_string();
+    let word = |x: &str| toml::Value::String(x.into()).to_string();
+    for pull in &campaign.pulls {
+        let entry = match pull.kind {
+            PullKind::NoLoad => format!("kind = \"no_load\", dwell_s = {}", number(pull.dwell_s)),
+            PullKind::Pull => format!(
+                "kind = \"pull\", part = {}, grip_force_n = {}, force_increment_n = {}, step_time_s = {}, dwell_s = {}, \
+                 pull_direction = {}, grip_offset_mm = {}, grip_angle_deg = {}",
+                word(&pull.part),
+                number(pull.grip_force_n),
+                number(pull.force_increment_n),
+                number(pull.step_time_s),
+                number(pull.dwell_s),
+                number(pull.pull_direction),
+                number(pull.grip_offset_mm),
+                number(pull.grip_angle_deg),
+            ),
+        };
+        let (pause, session, gel) = (number(pull.pause_s), word(&pull.session), word(&pull.gel_id));
+        text += &format!("  {{ {entry}, pause_s = {pause}, session = {session}, gel_id = {gel} }},\n");
+    }
+    text + "]\n"
+}
+
+/// The keys that hold for all pulls.
+pub(crate) fn header_toml(label_tolerance_n: f64, stop_m: f64, feedback: Option<Feedback>) -> String {
+    // Without the last bits that the way to metres and back costs.
+    let stop_mm = (stop_m * 1e12).round() / 1e9;
+    let header =
+        CampaignHeader { force_convention: ForceConvention::PerJaw, label_tolerance_n, stop_mm, feedback };
+    toml::to_string(&header).unwrap_or_else(|e| unreachable!("four plain keys are always TOML: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Campaign, CampaignFileError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(CAMPAIGN_FILE);
+        std::fs::write(&path, text).unwrap();
+        read_campaign(&path)
+    }
+
+    #[test]
+    fn a_campaign_that_was_written_is_read_back() {
+        let pull = PlannedPull { part: "gear \"a\"".into(), grip_force_n: 0.1 + 0.2, ..Default::default() };
+        let second =
+            PlannedPull { pull_direction: -1.0, pause_s: 1500.0, session: "2".into(), ..pull.clone() };
+        let none = PlannedPull { kind: PullKind::NoLoad, dwell_s: 5.0, ..Default::default() };
+        let campaign = Campaign {
+            label_tolerance_n: 2.5,
+            stop_m: 4e-3,
+            feedback: Some(Feedback::Independent),
+            pulls: vec![none, pull, second],
+        };
+        let text = campaign_toml(&campaign, "two pulls\n[not a section]");
+        assert!(
+            text.starts_with("# two pulls\n# [not a section]\nforce_convention = \"per_jaw\"\n"),
+            "{text}"
+        );
+        assert_eq!(read(&text).unwrap(), campaign);
+        let header = parse_header(Path::new("c"), &text).unwrap();
+        assert_eq!((header.stop_mm, header.label_tolerance_n), (4.0, 2.5), "a data folder takes the header");
+    }
+
+    #[test]
+    fn plain_tables_and_total_forces_are_read_too() {
+        let text =
+            "force_convention = \"total\"\nrobot = \"r\"\n[[pulls]]\npart = \"gear\"\ngrip_force_n = 40\n";
+        let campaign = read(text).unwrap();
+        assert_eq!(
+            campaign.pulls,
+            [PlannedPull { part: "gear".into(), grip_force_n: 20.0, ..Default::default() }]
+        );
+        // (25 s + 1 s + 11 steps of 0.104 s): 2 x 0.2 x 20 N and 3 N in steps of 1 N.
+        assert!((campaign.estimated_minutes() * 60.0 - 27.144).abs() < 1e-9);
+    }
+
+    #[test]
+    fn faults_name_the_pull_and_the_key() {
+        let pull = "[[pulls]]\npart = \"gear\"\ngrip_force_n = 40\n";
+        for (text, part) in [
+            (String::new(), "no `pulls`"),
+            (format!("{pull}dwel_s = 3\n"), "unknown field `dwel_s`"),
+            (format!("{pull}{}", pull.replace("40", "-4")), "pulls[1]: `grip_force_n` is -4"),
+            (pull.replace("part = \"gear\"", ""), "pulls[0]: a pull needs a `part`"),
+            (format!("{pull}pull_direction = 0\n"), "1 (up) or -1 (down)"),
+            (format!("{pull}step_time_s = nan\n"), "`step_time_s` is NaN"),
+            (format!("{pull}pause_s = -1\n"), "`pause_s` is -1"),
+            (format!("stop_mm = 0\n{pull}"), "`stop_mm` is 0"),
+        ] {
+            let error = read(&text).unwrap_err().to_string();
+            assert!(error.contains(part) && error.contains("campaign.toml"), "{text}: {error}");
+        }
+    }
 }

@@ -19,7 +19,7 @@ mod reader;
 mod shard;
 mod verify;
 
-pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader};
+pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
 pub use encode::{EncodeOptions, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
 pub use folder::{
@@ -29,7 +29,7 @@ pub use folder::{
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
 pub use picture::{PictureError, decode as decode_picture, encode_png};
 pub use presses::{PRESSES_FILE, PressFolder, PressFolderError, PressRecord, read_press_folder};
-pub use pulls::{PULLS_FILE, PullFolderError, TRACES_FOLDER, read_pull_folder};
+pub use pulls::{PULLS_FILE, PullFolderError, TRACES_FOLDER, read_pull_folder, write_pull_folder};
 pub use reader::{ReadError, Record, ShardReader};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, ShardError, ShardInfo, ShardWriter};
 pub use verify::{Verification, verify};

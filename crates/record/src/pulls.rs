@@ -4,6 +4,9 @@ mod cells;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod write;
+
+pub use write::write_pull_folder;
 
 use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, parse_header};
 use cells::{Cells, Column};

@@ -128,3 +128,26 @@ fn the_hash_covers_every_file_that_was_read() {
     let campaign = hash(&[("campaign.toml", "stop_mm = 4\n")]);
     assert!(plain != traced && plain != campaign && traced != campaign);
 }
+
+#[test]
+fn what_is_written_is_read_back() {
+    let table = "pull_id,part,grip_force_n,max_pull_force_n,grip_angle_deg,grip_offset_mm,humidity_pct,operator,session\n\
+                 a,gear,30,11.5,30,0.3,40,\"a, b\",1\nb,gear,0.1,3,-7.7,-2,,c,2\n";
+    let first = folder(table, &[("traces/b.csv", TRACE), ("campaign.toml", "feedback = \"measured\"\n")]);
+    let mut read = read_pull_folder(first.path()).unwrap();
+    let second = tempfile::tempdir().unwrap();
+    let out = second.path().join("new/folder");
+    write_pull_folder(&out, &read).unwrap();
+    let mut again = read_pull_folder(&out).unwrap();
+    let text = std::fs::read_to_string(out.join(PULLS_FILE)).unwrap();
+    assert!(text.contains("30,") && !text.contains("29.99"), "{text}");
+    assert!(!text.contains("dwell_s"), "what nobody wrote down stays out");
+    read.sha256.clear();
+    again.sha256.clear();
+    read.recorded.sort();
+    again.recorded.sort();
+    // An empty cell is no number, which is not equal to itself.
+    assert_eq!(format!("{read:?}"), format!("{again:?}"));
+    let error = write_pull_folder(&out, &read).unwrap_err().to_string();
+    assert!(error.contains("pulls.csv"), "a table that is there is left alone: {error}");
+}
