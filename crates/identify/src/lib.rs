@@ -4,12 +4,15 @@
 //! parameters, and returns fitted values with intervals, and a [`Diagnosis`]: what the model lacks, what cannot be told
 //! apart, and what to measure next. `docs/diagnosis.md` describes the method.
 
+mod campaign;
 mod diagnosis;
 mod draws;
 mod least_squares;
 mod permutation;
 pub mod pulls;
+mod separate;
 
+pub use campaign::{CampaignError, CampaignOptions, plan_campaign};
 pub use diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy,
     HeldOutError, NamedEffect, ParameterEstimate, Rival, SeparateBy, UnknownCovariate, Verdict,
@@ -17,3 +20,4 @@ pub use diagnosis::{
 pub use draws::Draws;
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
+pub use separate::{CandidatePull, Rival as SeparableRival, SeparateError, SeparatingPlan, plan_separating};
