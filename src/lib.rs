@@ -43,6 +43,7 @@
 pub mod assets;
 mod bench;
 mod cache;
+mod campaign;
 mod compare;
 mod diagnose;
 mod generate;
@@ -67,6 +68,7 @@ mod sweep;
 mod twin_edits;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
+pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use compare::{LabelErrors, PullComparison, compare_pulls};
 pub use diagnose::{PullDiagnoseOptions, diagnose_pull_table, given_model};
 pub use generate::{Press, SampleError, SimulateOptions, generate, press_only, simulate};

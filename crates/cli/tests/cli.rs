@@ -2,6 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
+// Planning a campaign, and making it on a twin.
+#[path = "cli/campaign.rs"]
+mod campaign;
 // Calibrating a sensor and comparing with it.
 #[path = "cli/presses.rs"]
 mod presses;

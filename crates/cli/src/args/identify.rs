@@ -107,6 +107,27 @@ pub struct CampaignArgs {
     /// Sessions, with pauses between them.
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub sessions: usize,
+    /// Grip angles to use.
+    #[arg(
+        long,
+        value_name = "DEG,...",
+        value_delimiter = ',',
+        default_value = "0",
+        allow_negative_numbers = true
+    )]
+    pub angles_deg: Vec<f64>,
+    /// Grip offsets to use.
+    #[arg(
+        long,
+        value_name = "MM,...",
+        value_delimiter = ',',
+        default_value = "0",
+        allow_negative_numbers = true
+    )]
+    pub offsets_mm: Vec<f64>,
+    /// Also make the campaign on the twin, into this folder of measurements.
+    #[arg(long, value_name = "FOLDER")]
+    pub simulate: Option<PathBuf>,
     /// Seed of the order.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

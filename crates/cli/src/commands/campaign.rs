@@ -2,9 +2,101 @@
 
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
+use crate::output::{JsonSink, print, program, writable, write_file};
+use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
+use gripgen::record::{campaign_toml, write_pull_folder};
+use gripgen::twin::{Campaign, PullKind, Twin};
+use gripgen::{Location, load_twin_document, simulate_campaign};
+use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
-    let _ = args;
-    Err(Failure::usage("not built yet"))
+    if args.separate.is_some() {
+        return Err(Failure::usage("--separate: this version plans the separating pulls in `diagnose`")
+            .hint("`gripgen diagnose MEASURED -o diagnosed.toml` writes them beside the new twin"));
+    }
+    writable(&args.out)?;
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let at = Location::parse(&args.twin);
+    let document = load_twin_document(&at, &[])?;
+    let twin = document
+        .read_twin()
+        .and_then(|file| Twin::new(&file))
+        .map_err(|e| Failure::from(document.located(e)))?;
+    let campaign = plan_campaign(&options(args, &twin)?).map_err(|e| match e {
+        CampaignError::TooFew { .. } => {
+            Failure::usage(e).hint("raise --pulls, or name fewer parts with --parts")
+        }
+        CampaignError::Sessions { .. } => Failure::usage(e).hint("change --sessions"),
+        other => Failure::usage(other),
+    })?;
+    let minutes = campaign.estimated_minutes();
+    let hours =
+        format!("{} pulls, about {} h {:02} min", count(&campaign), minutes as u64 / 60, minutes as u64 % 60);
+    let about = format!(
+        "{hours} of the robot's time, pauses included.\n\
+         Made by `gripgen campaign`, seed {}: settings in random order, each twice; one reference grip throughout.\n\
+         Keys are described in docs/format.md. Run it with `gripgen rig pull`.",
+        args.seed
+    );
+    write_file(&args.out, campaign_toml(&campaign, &about).as_bytes())?;
+    let simulated = match &args.simulate {
+        Some(folder) => {
+            let made = simulate_campaign(&at, &[], &campaign, args.seed).map_err(Failure::usage)?;
+            write_pull_folder(folder, &made.pulls).map_err(|e| {
+                Failure::new(e).hint("a folder that holds measurements is left alone; name a new one")
+            })?;
+            if !args.talk.quiet {
+                made.notes.iter().for_each(|note| eprintln!("{note}"));
+            }
+            Some(folder)
+        }
+        None => None,
+    };
+    if sink.wanted() {
+        sink.document(&json!({
+            "schema": "gripgen.campaign/1",
+            "campaign": args.out,
+            "pulls": count(&campaign),
+            "no_load": campaign.pulls.len() - count(&campaign),
+            "minutes": (minutes * 10.0).round() / 10.0,
+            "simulated": simulated,
+        }))?;
+    }
+    if !sink.on_stdout() && !args.talk.quiet {
+        print(&format!("{hours}\n{}\n", args.out.display()))?;
+        if let Some(folder) = simulated {
+            print(&format!("{}\n", folder.display()))?;
+            eprintln!("next: {} diagnose {}", program(), folder.display());
+        }
+    }
+    Ok(0)
+}
+
+fn options(args: &CampaignArgs, twin: &Twin) -> Result<CampaignOptions, Failure> {
+    let known: Vec<String> = twin.parts.keys().cloned().collect();
+    if let Some(part) = args.parts.iter().find(|part| !twin.parts.contains_key(*part)) {
+        return Err(Failure::usage(format!("--parts: {} has no part `{part}`", args.twin))
+            .hint(format!("its parts: {}", known.join(", "))));
+    }
+    let mut parts: Vec<String> = Vec::new();
+    for part in if args.parts.is_empty() { &known } else { &args.parts } {
+        if !parts.contains(part) {
+            parts.push(part.clone());
+        }
+    }
+    Ok(CampaignOptions {
+        parts,
+        pulls: args.pulls,
+        sessions: args.sessions,
+        seed: args.seed,
+        max_force_n: twin.gripper.max_force_n,
+        angles_deg: args.angles_deg.clone(),
+        offsets_mm: args.offsets_mm.clone(),
+        ..CampaignOptions::default()
+    })
+}
+
+fn count(campaign: &Campaign) -> usize {
+    campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).count()
 }

@@ -1,0 +1,102 @@
+//! Campaigns: planned, made on a twin, written, and read as measurements.
+
+use gripgen::identify::{CampaignOptions, plan_campaign};
+use gripgen::record::{CAMPAIGN_FILE, campaign_toml, read_campaign, write_pull_folder};
+use gripgen::twin::config::Feedback;
+use gripgen::twin::{Campaign, PlannedPull};
+use gripgen::{Location, load_pulls, simulate_campaign};
+
+fn baseline() -> Location {
+    Location::parse("asset:configs/twin-baseline.toml")
+}
+
+fn sets(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
+    pairs.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect()
+}
+
+/// Without noise and scatter the measurements are those of Coulomb's law.
+#[test]
+fn a_planned_campaign_is_made_on_the_twin() {
+    let options =
+        CampaignOptions { parts: vec!["gear".into(), "long_shaft".into()], pulls: 40, ..Default::default() };
+    let plan = plan_campaign(&options).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join(CAMPAIGN_FILE);
+    std::fs::write(&file, campaign_toml(&plan, "a test")).unwrap();
+    let campaign = read_campaign(&file).unwrap();
+    assert_eq!(campaign, plan);
+    let quiet = sets(&[
+        ("wrist.noise_n", "0"),
+        ("parts.gear.scatter", "0"),
+        ("parts.long_shaft.scatter", "0"),
+        ("parts.gear.mu", "0.2"),
+        ("parts.long_shaft.mu", "0.2"),
+        ("robot.lag_s", "0.0"),
+        ("robot.dead_time_s", "0.0"),
+    ]);
+    let made = simulate_campaign(&baseline(), &quiet, &campaign, 5).unwrap();
+    assert!(made.notes.is_empty(), "{:?}", made.notes);
+    assert_eq!(made.pulls.pulls.len(), 40);
+    for pull in &made.pulls.pulls {
+        let limit = 2.0 * 0.2 * pull.grip_force_n;
+        assert!((pull.max_pull_force_n / limit - 1.0).abs() < 0.02, "{limit}: {}", pull.max_pull_force_n);
+        let trace = pull.trace.as_ref().unwrap();
+        assert!((trace.time_s[0] + 0.5).abs() < 1e-9 && trace.measured_force_n[0] == 0.0);
+        assert!((trace.time_s[1] - trace.time_s[0] - 0.01).abs() < 1e-9);
+        assert_eq!(trace.time_s.iter().filter(|t| **t < 0.0).count(), 50);
+    }
+    let clock: Vec<f64> = made.pulls.pulls.iter().map(|p| p.covariates.time_s).collect();
+    assert!(clock.windows(2).all(|t| t[1] > t[0] + 20.0), "{clock:?}");
+    assert_eq!(clock.windows(2).filter(|t| t[1] - t[0] > 1500.0).count(), 2, "two pauses");
+
+    let out = folder.path().join("measured");
+    write_pull_folder(&out, &made.pulls).unwrap();
+    let read = load_pulls(&out).unwrap().pulls;
+    assert_eq!(read.pulls.len(), made.pulls.pulls.len());
+    for (mut read, mut made) in read.pulls.into_iter().zip(made.pulls.pulls) {
+        let (a, b) = (read.trace.take().unwrap(), made.trace.take().unwrap());
+        assert!(read == made, "{read:?}");
+        assert!(a.time_s == b.time_s && a.measured_force_n == b.measured_force_n, "{}", made.id);
+        // Millimetres and back cost the last bit.
+        assert!(a.displacement_m.iter().zip(&b.displacement_m).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+    assert_eq!(read.recorded.len(), 13);
+}
+
+#[test]
+fn a_simulated_campaign_depends_on_its_seed_and_has_its_effects() {
+    let pull = |grip_force_n| PlannedPull { part: "gear".into(), grip_force_n, ..Default::default() };
+    let campaign = Campaign {
+        label_tolerance_n: 3.0,
+        stop_m: 5e-3,
+        feedback: Some(Feedback::Independent),
+        pulls: (0..6).map(|i| pull(20.0 + 5.0 * f64::from(i))).collect(),
+    };
+    let made = |pairs: &[(&str, &str)], seed| {
+        simulate_campaign(&baseline(), &sets(pairs), &campaign, seed).unwrap().pulls
+    };
+    let plain = made(&[], 1);
+    assert!(plain == made(&[], 1));
+    assert!(plain.pulls != made(&[], 2).pulls);
+    assert_eq!(plain.feedback, Some(Feedback::Independent));
+    let biased = made(&[("effects", "[{ name = \"sensor_bias\", bias_n = 1.5 }]")], 1);
+    let unloaded = |m: &gripgen::twin::MeasuredPulls| {
+        let trace = m.pulls[0].trace.as_ref().unwrap();
+        trace.measured_force_n[..50].iter().sum::<f64>() / 50.0
+    };
+    assert!((unloaded(&biased) - unloaded(&plain) - 1.5).abs() < 1e-3, "the same noise, and the bias");
+}
+
+#[test]
+fn what_the_twin_does_not_have_is_refused() {
+    let pull = PlannedPull { part: "gaer".into(), grip_force_n: 20.0, ..Default::default() };
+    let mut campaign = Campaign { label_tolerance_n: 3.0, stop_m: 5e-3, feedback: None, pulls: vec![pull] };
+    let error = simulate_campaign(&baseline(), &[], &campaign, 1).unwrap_err().to_string();
+    assert!(
+        error.contains("pulls[0]: the twin has no part `gaer`; its parts: ball_bearing, gear"),
+        "{error}"
+    );
+    campaign.pulls[0] = PlannedPull { part: "gear".into(), grip_force_n: 300.0, ..Default::default() };
+    let error = simulate_campaign(&baseline(), &[], &campaign, 1).unwrap_err().to_string();
+    assert!(error.contains("300 N per jaw, the gripper has at most 80 N"), "{error}");
+}
