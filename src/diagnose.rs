@@ -1,5 +1,6 @@
 //! Diagnoses: measurements and a twin in, an answer and a better twin out. One file a channel.
 
+mod pull_report;
 mod pulls;
 
 pub use pulls::{PullDiagnoseOptions, UnknownPartError, diagnose_pull_table, given_model};

@@ -4,6 +4,7 @@ mod axis;
 mod bars;
 mod page;
 mod plot;
+mod sentence;
 #[cfg(test)]
 mod tests;
 

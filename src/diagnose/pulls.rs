@@ -1,7 +1,8 @@
 //! Diagnosis of pulls through the reduced mechanics.
 
+use super::pull_report::pull_report;
 use crate::predict::PullPredictor;
-use crate::report::{Diagnosed, ReportData};
+use crate::report::Diagnosed;
 use crate::twin_edits::{EditedValue, TwinEdits};
 use gripgen_identify::Diagnosis;
 use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
@@ -68,7 +69,8 @@ pub fn diagnose_pull_table(
     let answer = diagnose_pulls(measured, &predictor, &given, &asked, progress);
     let edits =
         answer.fits.as_ref().map(|f| edits(f, &answer.diagnosis, measured, &predictor)).unwrap_or_default();
-    Ok(Diagnosed { diagnosis: answer.diagnosis, edits, report: ReportData::default() })
+    let report = pull_report(measured, &predictor, &answer);
+    Ok(Diagnosed { diagnosis: answer.diagnosis, edits, report })
 }
 
 /// The twin that the answer describes.

@@ -2,6 +2,7 @@
 
 use super::bars::{self, Bar, number};
 use super::plot::{self, COLOURS, shorten};
+use super::sentence::{error_unit, sentence};
 use super::{Diagnosed, Plot, PlotGroup};
 use crate::assets;
 use gripgen_identify::{
@@ -29,12 +30,14 @@ const SENTENCE: usize = 600;
 pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
     let (d, report) = (&diagnosed.diagnosis, &diagnosed.report);
     let floor = d.noise_floor_n.or(d.noise_floor_mse);
+    let unit = if report.error_unit.is_empty() { error_unit(d.channel) } else { &report.error_unit };
+    let said = if report.sentence.is_empty() { sentence(d) } else { report.sentence.clone() };
     let page = json!({
         "title": clean(&report.title, NAME),
-        "sentence": clean(&report.sentence, SENTENCE),
+        "sentence": clean(&said, SENTENCE),
         "verdict": verdict(d.verdict),
-        "facts": facts(d, floor, &report.error_unit),
-        "bars": error_bars(d).map(|b| bars::draw(&b, floor, &report.error_unit)),
+        "facts": facts(d, floor, unit),
+        "bars": error_bars(d).map(|b| bars::draw(&b, floor, unit)),
         "percent": percent(d),
         "effects": d.effects.iter().take(ROWS).map(effect).collect::<Vec<_>>(),
         "unknown": d.unknown.iter().take(ROWS).map(|u| json!({
@@ -46,7 +49,10 @@ pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
             "heldout": number(e.heldout_error), "values": clean(&e.values, 2 * NAME), "fate": clean(&e.fate, 2 * NAME),
             "named": e.fate.starts_with("named"),
         })).collect::<Vec<_>>(),
-        "unit": clean(&report.error_unit, NAME),
+        // Columns that a channel does not fill are left out.
+        "evidence_error": report.evidence.iter().any(|e| e.heldout_error.is_finite()),
+        "evidence_spread": report.evidence.iter().any(|e| e.standard_error.is_finite()),
+        "unit": clean(unit, NAME),
         "seen": d.would_have_seen.iter().take(ROWS).map(|(name, s)| json!({
             "name": clean(name, NAME), "parameter": clean(&s.parameter, NAME), "value": number(s.value),
             "power": number(100.0 * s.power),

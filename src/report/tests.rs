@@ -321,3 +321,63 @@ fn odd_numbers_and_empty_reports_make_a_page() {
     let (_, text) = parse(&diagnosis_page(&empty));
     assert!(text.contains("the data cannot answer"));
 }
+
+#[test]
+fn the_verdict_is_one_sentence_of_the_answer_itself() {
+    let said = |change: &dyn Fn(&mut Diagnosis)| {
+        let mut d = diagnosed(0);
+        d.report = ReportData::default();
+        change(&mut d.diagnosis);
+        let (_, text) = parse(&diagnosis_page(&d));
+        text
+    };
+    let end = "takes the held-out error from 1.90 N to 0.330 N (noise floor 0.310 N).";
+    for (change, sentence) in [
+        (
+            (&|d: &mut Diagnosis| d.unknown.clear()) as &dyn Fn(&mut Diagnosis),
+            format!(
+                "The twin lacks wear (which these data do not tell from sensor_gain_drift); adding it {end}"
+            ),
+        ),
+        (
+            &|d: &mut Diagnosis| {
+                d.effects[0].indistinguishable_from.clear();
+                let second = NamedEffect {
+                    name: "jaw_tilt".into(),
+                    part: Some("gear".into()),
+                    ..d.effects[0].clone()
+                };
+                d.effects.push(second);
+            },
+            format!(
+                "The twin lacks 2 effects: wear and jaw_tilt on gear, and something unknown that goes with humidity_pct; \
+                 adding them {end}"
+            ),
+        ),
+        (
+            &|d: &mut Diagnosis| d.verdict = Verdict::Unknown,
+            format!(
+                "The residual depends on humidity_pct in a way that no known effect explains; a table over it {end}"
+            ),
+        ),
+        (
+            &|d: &mut Diagnosis| d.verdict = Verdict::None,
+            "Nothing beyond the baseline was found: the held-out error is 0.330 N (noise floor 0.310 N)."
+                .into(),
+        ),
+        (
+            &|d: &mut Diagnosis| {
+                d.verdict = Verdict::Insufficient;
+                d.notes = vec!["4 pulls, 8 are needed".into()];
+            },
+            "The data cannot answer: 4 pulls, 8 are needed.".into(),
+        ),
+    ] {
+        let text = said(change);
+        assert!(
+            text.contains(&sentence),
+            "`{sentence}` is not in {}",
+            &text[text.find("}").unwrap_or(0)..].trim()
+        );
+    }
+}
