@@ -118,7 +118,7 @@ fn edits(
         EffectFile {
             name: effect.spec.id.into(),
             part: None,
-            fitted_grip_force_n: Some([range.0, range.1]),
+            fitted_grip_force_n: effect.spec.friction.map(|_| [range.0, range.1]),
             outside_fit: OutsideFit::Extrapolate,
             per: gripgen_twin::effects::Per::Jaw,
             reference_area_mm2: None,
