@@ -10,6 +10,7 @@ use gripgen_twin::config::Feedback;
 use gripgen_twin::effects::{CommandChain, GripPoint, SensorChain};
 use gripgen_twin::{Jaw, MeasuredPulls, Robot, Staircase, Twin};
 use signals::Signals;
+use std::cell::RefCell;
 use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -44,8 +45,42 @@ pub struct PullPredictor<'a> {
     /// Force up to which pulls are looked at.
     most_n: f64,
     jobs: usize,
-    stuck: Cache<Key, StuckPull>,
+    stuck: Cache<Key, Kept>,
     tables: Cache<Key, LabelTable>,
+}
+
+thread_local! {
+    static SPARE: RefCell<Vec<StuckPull>> = const { RefCell::new(Vec::new()) };
+}
+
+/// A pull whose memory is used again: fits make thousands a second, and the system would clear every page of each.
+struct Kept(StuckPull);
+
+impl Kept {
+    fn spare() -> Self {
+        Self(SPARE.with_borrow_mut(Vec::pop).unwrap_or_default())
+    }
+}
+
+impl Drop for Kept {
+    fn drop(&mut self) {
+        let pull = std::mem::take(&mut self.0);
+        // Threads that end have nowhere to keep it.
+        let _ = SPARE.try_with(|spare| {
+            let mut spare = spare.borrow_mut();
+            if spare.len() < 64 {
+                spare.push(pull);
+            }
+        });
+    }
+}
+
+impl std::ops::Deref for Kept {
+    type Target = StuckPull;
+
+    fn deref(&self) -> &StuckPull {
+        &self.0
+    }
 }
 
 fn acts_on_signals(model: &PullModel) -> bool {
@@ -176,11 +211,13 @@ impl<'a> PullPredictor<'a> {
         Some((self.profile_of[row], against, bits))
     }
 
-    fn stuck(&self, model: &PullModel, row: usize) -> Arc<StuckPull> {
+    fn stuck(&self, model: &PullModel, row: usize) -> Arc<Kept> {
         let make = || {
             let (sensor, command) = (self.sensor(model, row), self.command(model, row));
             let staircase = &self.staircases[self.profile_of[row]];
-            Ok::<_, Infallible>(self.rig(model).stuck(staircase, &sensor, &command, self.most_n))
+            let mut kept = Kept::spare();
+            self.rig(model).stuck(staircase, &sensor, &command, self.most_n, &mut kept.0);
+            Ok::<_, Infallible>(kept)
         };
         // What a fit tries of an effect on signals comes once and would push everything else out.
         let made = match self.key(model, row, &[]) {

@@ -1,8 +1,7 @@
 //! Readings of tools that hold, shared by the pulls that have the same.
 
-use super::{PullPredictor, acts_on_signals, table};
+use super::{Kept, PullPredictor, acts_on_signals, table};
 use gripgen_identify::pulls::model::PullModel;
-use gripgen_physics::StuckPull;
 use gripgen_twin::config::Feedback;
 use std::sync::Arc;
 
@@ -18,7 +17,7 @@ pub(super) struct Signals<'a> {
     /// Whether a reading is a function of the force at that time alone, and the force does not depend on readings.
     pointwise: bool,
     shared: bool,
-    known: Vec<Option<Arc<StuckPull>>>,
+    known: Vec<Option<Arc<Kept>>>,
 }
 
 impl<'a> Signals<'a> {
@@ -37,7 +36,7 @@ impl<'a> Signals<'a> {
         }
     }
 
-    fn stuck(&mut self, row: usize) -> Arc<StuckPull> {
+    fn stuck(&mut self, row: usize) -> Arc<Kept> {
         let (predictor, model) = (self.predictor, if self.pointwise { &self.plain } else { self.model });
         if !(self.pointwise || self.shared) {
             return predictor.stuck(model, row);

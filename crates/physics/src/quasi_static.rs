@@ -67,18 +67,19 @@ impl QuasiStatic {
         (self.max_time_s * self.rate_hz) as usize
     }
 
-    /// The pull of a tool that holds, until its contact force exceeds `force_n`.
+    /// The pull of a tool that holds, until its contact force exceeds `force_n`, into `pull`.
     pub fn stuck(
         &self,
         staircase: &Staircase,
         sensor: &SensorChain,
         command: &CommandChain,
         force_n: f64,
-    ) -> StuckPull {
+        pull: &mut StuckPull,
+    ) {
         let step_s = 1.0 / self.rate_hz;
         let (mut sensor, mut control) = (sensor.clone(), ForceLoop::new(self.robot));
         let share = 1.0 / (1.0 + step_s * self.stiffness_n_per_m / self.robot.damping_n_s_per_m);
-        let mut pull = StuckPull::default();
+        pull.clear();
         let (mut contact_n, mut applied_n, mut largest_n) = (0.0_f64, 0.0, 0.0_f64);
         for tick in 0..=self.ticks() {
             let time_s = tick as f64 / self.rate_hz;
@@ -101,7 +102,6 @@ impl QuasiStatic {
             // k x, implicit in x.
             contact_n = applied_n + (contact_n - applied_n) * share;
         }
-        pull
     }
 
     /// What follows when the jaws hold `limit_n` only. Ends at the displacement stop, or when the command is more than
@@ -156,6 +156,15 @@ impl QuasiStatic {
             let applied_n = control.advance_due(step_s, commanded_n, reading_n, kinetic_n);
             pull.displacement_m += ((applied_n - kinetic_n) / self.robot.damping_n_s_per_m).max(0.0) * step_s;
         }
+    }
+}
+
+impl StuckPull {
+    /// Forgets everything and keeps its memory.
+    fn clear(&mut self) {
+        let Self { desired_n, reading_n, contact_n, largest_n, applied_n, sensors } = self;
+        [desired_n, reading_n, contact_n, largest_n, applied_n].into_iter().for_each(Vec::clear);
+        sensors.clear();
     }
 }
 
