@@ -178,6 +178,7 @@ impl<'a> PullPredictor<'a> {
             robot,
             stiffness_n_per_m: model.stiffness_n_per_m,
             rate_hz: self.rate_hz,
+            fall_s: model.fall_s,
             stop_m: self.measured.stop_m,
             max_time_s: MOST_TIME_S,
         }
@@ -196,7 +197,8 @@ impl<'a> PullPredictor<'a> {
 
     /// What signals of pull `row` depend on, if other pulls share it.
     fn key(&self, model: &PullModel, row: usize, more: &[f64]) -> Option<Key> {
-        let rig = [model.lag_s, model.dead_time_s, model.stiffness_n_per_m, model.damping_n_s_per_m];
+        let rig =
+            [model.lag_s, model.dead_time_s, model.stiffness_n_per_m, model.damping_n_s_per_m, model.fall_s];
         let mut bits: Vec<u64> = rig.iter().chain(more).map(|x| x.to_bits()).collect();
         let mut signed = false;
         for effect in model.effects.iter().filter(|e| e.acts_on_signals()) {

@@ -49,6 +49,8 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
         dead_time_s: twin.robot.dead_time_s,
         stiffness_n_per_m: twin.gel.left.shear_stiffness_n_per_m + twin.gel.right.shear_stiffness_n_per_m,
         damping_n_s_per_m: twin.robot.damping_n_s_per_m,
+        fall_s: 0.0,
+        misread_n: 0.0,
         noise_n: twin.wrist.noise_n,
         scatter: mean(&|p| p.scatter),
         effects: vec![],

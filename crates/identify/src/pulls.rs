@@ -1,6 +1,7 @@
 //! Pulls: calibration of the baseline and diagnosis.
 
 pub mod answer;
+pub mod calibrate;
 pub mod candidates;
 pub mod context;
 pub mod curves;

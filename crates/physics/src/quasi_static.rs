@@ -23,6 +23,8 @@ pub struct QuasiStatic {
     pub stiffness_n_per_m: f64,
     /// Readings per second.
     pub rate_hz: f64,
+    /// Time constant with which the force falls to its kinetic value after a slip; 0 in the reduced mechanics.
+    pub fall_s: f64,
     /// Displacement at which a pull ends.
     pub stop_m: f64,
     /// Longest time of a pull.
@@ -141,9 +143,13 @@ impl QuasiStatic {
         let mut control = ForceLoop::new(self.robot);
         control.take_over(stuck.applied_n[held]);
         let dead_ticks = (self.robot.dead_time_s * self.rate_hz - 1e-9).ceil().max(0.0);
+        let kept = if self.fall_s > 0.0 { libm::exp(-step_s / self.fall_s) } else { 0.0 };
+        let mut above_n = (limit_n - kinetic_n) * kept;
         for tick in held..=self.ticks() {
             let time_s = tick as f64 / self.rate_hz;
-            let reading_n = sensor.read(kinetic_n, time_s, step_s);
+            let contact_n = kinetic_n + above_n;
+            above_n *= kept;
+            let reading_n = sensor.read(contact_n, time_s, step_s);
             let desired_n = staircase.desired_n(time_s);
             pull.desired_n.push(desired_n);
             pull.reading_n.push(reading_n);
@@ -153,8 +159,8 @@ impl QuasiStatic {
             // Commands under way at the slip go on arriving: the loop is given the one that is due.
             let due_n = staircase.desired_n((time_s - dead_ticks * step_s).max(0.0));
             let commanded_n = command.apply(due_n, reading_n);
-            let applied_n = control.advance_due(step_s, commanded_n, reading_n, kinetic_n);
-            pull.displacement_m += ((applied_n - kinetic_n) / self.robot.damping_n_s_per_m).max(0.0) * step_s;
+            let applied_n = control.advance_due(step_s, commanded_n, reading_n, contact_n);
+            pull.displacement_m += ((applied_n - contact_n) / self.robot.damping_n_s_per_m).max(0.0) * step_s;
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, candidates};
 use super::context::Context;
 use super::data::{Column, PullData};
-use super::fitting::{Fitted, Terms};
+use super::fitting::Fitted;
 use super::heldout::{by_value, errors, folds, noise_floor_n, predicted, scatter};
 use super::model::{PredictPulls, PullModel};
 use super::power::detectable;
@@ -25,6 +25,10 @@ const OUTLIER: f64 = 4.5;
 
 /// Half width of a 90 % interval of a normal variable.
 const HALF90: f64 = 1.645;
+
+/// Part of the squared error by which labels that no fit has seen may be predicted worse, by chance, with an effect that
+/// shows in the traces only.
+const WORSE: f64 = 1.03;
 
 /// Odds are taken to this power, because no model here is exactly right.
 const TEMPER: f64 = 0.6;
@@ -80,14 +84,7 @@ pub fn diagnose_pulls(
     }
     let mut context = Context::new(&data, predictor, given);
     let rows: Vec<usize> = (0..data.len()).collect();
-    if context.observations.is_empty() {
-        // Without traces the labels are all that knows of the force loop.
-        context.free_lag = true;
-        if let Some(found) = context.fit(&context.base, &Terms::default(), &rows) {
-            context.base = found.model;
-        }
-        context.free_lag = false;
-    }
+    context.learn_lag(&rows);
     let most_n = data.label_n.iter().copied().fold(0.0, f64::max);
     let search = Search::new(&context, candidates(&data, most_n, options.without));
     if search.candidates.is_empty() && search.curves.is_empty() {
@@ -102,6 +99,9 @@ pub fn diagnose_pulls(
             .push("the labels cannot be predicted at all: is the unit of the forces newton?".into());
         return PullAnswer { diagnosis, fits: None };
     };
+    let repetitions = folds(data.len());
+    let heldout_before = predicted(&context, &before, &repetitions);
+    let (accepted, heldout_after) = confirmed(&search, &before, accepted, &heldout_before, &repetitions);
     let after = accepted.fitted.clone();
     diagnosis.effects = named(&search, &before, &accepted, &data);
     diagnosis.unknown = unknown(&search, &before, &accepted, &data);
@@ -112,8 +112,7 @@ pub fn diagnose_pulls(
     };
     diagnosis.baseline = baseline(&after, &context);
     diagnosis.data.outliers = outliers(&after, measured);
-    let repetitions = folds(data.len());
-    let heldout = [predicted(&context, &before, &repetitions), predicted(&context, &after, &repetitions)];
+    let heldout = [heldout_before, heldout_after];
     progress(0.9);
     let labels = [&before, &after].map(|fitted| {
         let mut model = fitted.model.clone();
@@ -154,6 +153,42 @@ pub fn diagnose_pulls(
     PullAnswer { diagnosis, fits: Some(fits) }
 }
 
+/// What was accepted, as far as it does not predict labels worse that no fit has seen: the last term goes first.
+fn confirmed(
+    search: &Search<'_>,
+    before: &Fitted,
+    mut accepted: Accepted,
+    heldout_before: &[f64],
+    repetitions: &[Vec<usize>],
+) -> (Accepted, Vec<f64>) {
+    let data = search.context.data;
+    let squares = |predicted: &[f64]| -> f64 {
+        data.label_n
+            .iter()
+            .zip(predicted)
+            .filter(|(_, p)| p.is_finite())
+            .map(|(l, p)| (l - p) * (l - p))
+            .sum()
+    };
+    loop {
+        let after = predicted(search.context, &accepted.fitted, repetitions);
+        let terms = accepted.effects.len() + accepted.curves.len();
+        if terms == 0 || squares(&after) <= WORSE * squares(heldout_before) {
+            return (accepted, after);
+        }
+        let mut fewer = accepted.fitted.terms.clone();
+        if accepted.effects.len() > 1 || accepted.curves.is_empty() {
+            accepted.effects.pop();
+            fewer.effects.pop();
+        } else {
+            accepted.curves.pop();
+            fewer.curves.pop();
+        }
+        let refitted = search.context.fit(&before.model, &fewer, &search.rows);
+        accepted.fitted = refitted.unwrap_or_else(|| before.clone());
+    }
+}
+
 fn blank(data: &PullData<'_>) -> Diagnosis {
     let known: Vec<&str> =
         KNOWN_COLUMNS.iter().copied().filter(|c| !["part", "gel_id", "session"].contains(c)).collect();
@@ -185,7 +220,7 @@ fn blank(data: &PullData<'_>) -> Diagnosis {
 }
 
 /// What the data lack, if they cannot be diagnosed at all.
-fn insufficient(data: &PullData<'_>) -> Option<String> {
+pub(super) fn insufficient(data: &PullData<'_>) -> Option<String> {
     let n = data.len();
     if n < FEWEST {
         return Some(format!("{n} pulls are too few, a diagnosis needs {FEWEST} at least"));
@@ -270,14 +305,14 @@ fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize, n:
     accepted.entries.iter().filter_map(near).collect()
 }
 
-fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<String, ParameterEstimate> {
+pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<String, ParameterEstimate> {
     let Some(effect) = fitted.model.effects.iter().find(|e| e.spec == candidate.spec) else {
         return BTreeMap::new();
     };
     let spec = candidate.spec;
     let each = |(k, p): (usize, &gripgen_twin::effects::ParameterSpec)| {
         let value = effect.values[k];
-        let name = format!("{}.{}", spec.id, p.name);
+        let name = candidate.name_of(p.name);
         let half = fitted
             .names
             .iter()
@@ -336,7 +371,7 @@ fn unknown(
     found
 }
 
-fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
+pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
     let mut values = BTreeMap::new();
     let unit = |name: &str| if name.ends_with("_s") { "s" } else { "1" }.to_string();
     for (k, name) in fitted.names.iter().enumerate() {

@@ -14,6 +14,8 @@ pub struct Candidate {
     pub starts: Vec<Vec<f64>>,
     /// Which parameters are fitted, with their scales.
     pub free: Vec<(usize, f64)>,
+    /// The only part it acts on, by position and name, or all.
+    pub part: Option<(usize, String)>,
     /// Parameters that are tried at the starts only, like the pull at which something happened.
     pub searched: usize,
 }
@@ -21,7 +23,7 @@ pub struct Candidate {
 impl Candidate {
     /// The effect with some values.
     pub fn with(&self, values: &[f64]) -> ModelEffect {
-        ModelEffect::new(self.spec, values.to_vec())
+        ModelEffect { part: self.part.as_ref().map(|p| p.0), ..ModelEffect::new(self.spec, values.to_vec()) }
     }
 
     /// Its free parameters from a start.
@@ -30,14 +32,17 @@ impl Candidate {
             .iter()
             .map(|&(i, scale)| {
                 let p = &self.spec.parameters[i];
-                FreeParameter {
-                    name: format!("{}.{}", self.spec.id, p.name),
-                    start: start[i],
-                    bounds: p.bounds,
-                    scale,
-                }
+                FreeParameter { name: self.name_of(p.name), start: start[i], bounds: p.bounds, scale }
             })
             .collect()
+    }
+
+    /// Name of a parameter in a fit.
+    pub fn name_of(&self, parameter: &str) -> String {
+        match &self.part {
+            Some((_, part)) => format!("{}@{part}.{parameter}", self.spec.id),
+            None => format!("{}.{parameter}", self.spec.id),
+        }
     }
 
     /// Parameters that the data have to pay for.
@@ -73,7 +78,7 @@ pub fn candidates(data: &PullData<'_>, most_reading_n: f64, without: &[&str]) ->
         .collect()
 }
 
-fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: f64) -> Option<Candidate> {
+pub(super) fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: f64) -> Option<Candidate> {
     let varies = |name: &str| data.varies(name);
     let rate = varies("force_increment_n") || varies("step_time_s");
     // A clock and a count of pulls always run.
@@ -84,7 +89,7 @@ fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: f64) -> Opt
             .iter()
             .filter_map(|(name, scale)| Some((spec.parameters.iter().position(|p| p.name == *name)?, *scale)))
             .collect();
-        Some(Candidate { spec, starts, free, searched })
+        Some(Candidate { spec, starts, free, part: None, searched })
     };
     let over = |name: &str, at: &[f64], other: (&str, f64), free: &[(&str, f64)], searched: usize| {
         let starts = at.iter().map(|x| values(spec, &[(name, *x), other])).collect();
@@ -92,7 +97,7 @@ fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: f64) -> Opt
             .iter()
             .filter_map(|(name, scale)| Some((spec.parameters.iter().position(|p| p.name == *name)?, *scale)))
             .collect();
-        Some(Candidate { spec, starts, free, searched })
+        Some(Candidate { spec, starts, free, part: None, searched })
     };
     let force = varies("grip_force_n");
     match spec.id {
@@ -108,7 +113,13 @@ fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: f64) -> Opt
                     starts.push(values(spec, &[("f_c_n", f_c), ("step", step), ("width_n", 2.0)]));
                 }
             }
-            Some(Candidate { spec, starts, free: vec![(0, 0.1), (1, 3.0), (2, 1.0)], searched: 0 })
+            Some(Candidate {
+                spec,
+                starts,
+                free: vec![(0, 0.1), (1, 3.0), (2, 1.0)],
+                part: None,
+                searched: 0,
+            })
         }
         "rate_dependence" if rate => plain(&[&[("k", 0.0)]], &[("k", 0.02)], 0),
         "dwell_ageing" if varies("dwell_s") => plain(&[&[("beta", 0.01)]], &[("beta", 0.01)], 0),

@@ -1,7 +1,7 @@
 //! A campaign with what its traces say, and the residuals of a model against both.
 
 use super::data::PullData;
-use super::fitting::huber;
+use super::fitting::{Terms, huber};
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, noise_n, observe};
 use crate::least_squares::{FitOptions, FreeParameter, fit};
@@ -15,6 +15,10 @@ const SHARED_N: (f64, f64) = (0.06, 0.012);
 
 /// The same from trace to trace.
 const OWN_N: (f64, f64) = (0.03, 0.005);
+
+/// Force by which slips and labels of a rig differ from those of a pull without inertia: an offset as small as this says
+/// nothing about friction.
+const MISREAD_N: f64 = 0.05;
 
 /// Readings of a trace that are looked at before the slip.
 const READINGS: usize = 36;
@@ -96,6 +100,18 @@ impl<'a> Context<'a> {
         context
     }
 
+    /// Without traces the labels are all that knows of the force loop: lag and dead time from them, once.
+    pub(super) fn learn_lag(&mut self, rows: &[usize]) {
+        if !self.observations.is_empty() {
+            return;
+        }
+        self.free_lag = true;
+        if let Some(found) = self.fit(&self.base, &Terms::default(), rows) {
+            self.base = found.model;
+        }
+        self.free_lag = false;
+    }
+
     fn look_at(&mut self, raw: &[TraceObservation]) {
         if raw.is_empty() {
             return;
@@ -105,6 +121,9 @@ impl<'a> Context<'a> {
         }
         for _ in 0..2 {
             self.fit_dynamics(raw);
+            if let Some(fall_s) = fall_s(raw) {
+                self.base.fall_s = fall_s;
+            }
             if let Some(damping) = self.damping(raw) {
                 self.base.damping_n_s_per_m = damping;
             }
@@ -219,7 +238,7 @@ impl<'a> Context<'a> {
         // The reading at the slip: what the last readings before it lie above the stuck tool, on top of that tool.
         let limit_n = trace.slip_s.and_then(|slip_s| {
             let n = trace.held_s.len();
-            let from = n.saturating_sub(16);
+            let from = n.saturating_sub(6);
             let last = &trace.held_s[from..n.saturating_sub(1)];
             if last.len() < 3 {
                 return None;
@@ -258,7 +277,7 @@ impl<'a> Context<'a> {
         let each = |(&i, p): (&usize, &PullPrediction)| match self.limit_of(i) {
             Some(_) => {
                 let scatter = model.scatter * p.limit_n;
-                (scatter * scatter + 0.1 * model.noise_n * model.noise_n + 0.03 * 0.03).sqrt()
+                (scatter * scatter + 0.2 * model.noise_n * model.noise_n + 0.03 * 0.03).sqrt()
             }
             None => (p.label_sd_n * p.label_sd_n + 0.03 * 0.03).sqrt(),
         };
@@ -272,8 +291,8 @@ impl<'a> Context<'a> {
     /// What was measured less what is predicted, in standard deviations, of the pulls at `rows`.
     pub(super) fn friction_residuals(&self, model: &PullModel, rows: &[usize], sd: &[f64]) -> Vec<f64> {
         let each = |((&i, p), sd): ((&usize, &PullPrediction), &f64)| match self.limit_of(i) {
-            Some(limit_n) => (limit_n - p.limit_reading_n) / sd,
-            None => (self.data.label_n[i] - p.label_n) / sd,
+            Some(limit_n) => (limit_n - p.limit_reading_n - model.misread_n) / sd,
+            None => (self.data.label_n[i] - p.label_n - model.misread_n) / sd,
         };
         rows.iter().zip(&self.predicted(model, rows)).zip(sd).map(each).collect()
     }
@@ -329,7 +348,7 @@ impl<'a> Context<'a> {
 
     /// What is known beside the pulls, as residuals.
     pub(super) fn priors(&self, model: &PullModel, signals: bool) -> Vec<f64> {
-        let mut r = Vec::new();
+        let mut r = vec![model.misread_n / MISREAD_N];
         match self.kinetic {
             Some((ratio, error)) => r.push((model.kinetic_ratio - ratio.min(1.0)) / error),
             None => r.push((model.kinetic_ratio - self.given.2.min(0.95)) / 0.05),
@@ -353,6 +372,33 @@ fn dynamics(base: &PullModel) -> [FreeParameter; 2] {
     [("lag_s", base.lag_s, 1.0), ("dead_time_s", base.dead_time_s, 0.5)].map(|(name, start, most)| {
         FreeParameter { name: name.into(), start, bounds: (0.0, most), scale: 0.02 }
     })
+}
+
+/// Time constant of the fall after a slip: the area above the kinetic force, over the drop, of all traces that drop by much.
+fn fall_s(raw: &[TraceObservation]) -> Option<f64> {
+    let mut each: Vec<f64> = raw
+        .iter()
+        .filter_map(|t| {
+            let n = t.held_n.len();
+            if n < 8 || t.slid_rows.len() < 8 {
+                return None;
+            }
+            // The kinetic force is that of the second half of the slide; the limit that of the last readings before.
+            let half = &t.slid_rows[t.slid_rows.len() / 2..];
+            let kinetic = half.iter().map(|r| r.1).sum::<f64>() / half.len() as f64;
+            let limit = t.held_n[n - 4..].iter().sum::<f64>() / 4.0;
+            let step_s = t.slid_rows[1].0 - t.slid_rows[0].0;
+            // From two rows before the slide was seen: it has begun by then.
+            let first = t.held_n[n - 2..].iter().copied();
+            let rows = first.chain(t.slid_rows[..t.slid_rows.len() / 2].iter().map(|r| r.1));
+            let area: f64 = rows.map(|f| (f - kinetic) * step_s).sum();
+            let drop = limit - kinetic;
+            // What is left of the rows before the slip.
+            (drop > 0.6).then(|| area / drop - 2.0 * step_s)
+        })
+        .collect();
+    each.sort_by(f64::total_cmp);
+    (each.len() >= 4).then(|| each[each.len() / 2].clamp(0.0, 0.1))
 }
 
 /// Shear stiffness of both gels: median over the traces of reading over displacement.

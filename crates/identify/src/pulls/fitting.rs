@@ -88,6 +88,12 @@ impl Context<'_> {
             bounds: (0.3, 1.0),
             scale: 0.05,
         });
+        parameters.push(FreeParameter {
+            name: "misread_n".into(),
+            start: start.misread_n,
+            bounds: (-0.5, 0.5),
+            scale: 0.05,
+        });
         let dynamics = terms.act_on_signals() || self.free_lag;
         if dynamics {
             for (name, value, most) in
@@ -121,8 +127,8 @@ impl Context<'_> {
         let mut model = start.clone();
         model.mu.copy_from_slice(&values[..layout.parts]);
         let mut at = layout.parts;
-        model.kinetic_ratio = values[at];
-        at += 1;
+        (model.kinetic_ratio, model.misread_n) = (values[at], values[at + 1]);
+        at += 2;
         if layout.dynamics {
             (model.lag_s, model.dead_time_s) = (values[at], values[at + 1]);
             at += 2;

@@ -46,7 +46,7 @@ pub fn predicted(context: &Context<'_>, fitted: &Fitted, held_out: &[Vec<usize>]
         let labels = context.predictor.pulls(&model, out);
         if let Ok(mut result) = result.lock() {
             for (&i, p) in out.iter().zip(&labels) {
-                result[i] = p.label_n;
+                result[i] = p.label_n + model.misread_n;
             }
         }
     });

@@ -42,6 +42,10 @@ pub struct PullModel {
     pub stiffness_n_per_m: f64,
     /// Force per speed that the force loop yields to.
     pub damping_n_s_per_m: f64,
+    /// Time constant with which the force falls after a slip: as the traces show it.
+    pub fall_s: f64,
+    /// What labels and slips are read too high by; known to be small.
+    pub misread_n: f64,
     /// Noise of one reading.
     pub noise_n: f64,
     /// Relative scatter of friction from grip to grip.

@@ -1,0 +1,198 @@
+//! Calibration of the baseline, with the effects that were asked for and no search.
+
+use super::answer::{baseline, insufficient, parameters};
+use super::candidates::{Candidate, candidate};
+use super::context::Context;
+use super::data::PullData;
+use super::fitting::{Fitted, Terms};
+use super::heldout::{errors, folds, predicted};
+use super::model::{PredictPulls, PullModel};
+use crate::diagnosis::{HeldOutError, ParameterEstimate};
+use gripgen_twin::MeasuredPulls;
+use gripgen_twin::effects::find;
+use std::collections::BTreeMap;
+
+/// What a calibration fits beside the baseline.
+#[derive(Debug, Clone, Default)]
+pub struct CalibrateRequest {
+    /// The law mu (a + b / F_G) of Wucherer et al. 2023 for each part; mu stays that of the twin.
+    pub offset_law: bool,
+    /// Effects of the library, by id.
+    pub effects: Vec<String>,
+}
+
+/// The offset law of a part: its coefficient is mu (a + b / F_G) with the mu of the twin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OffsetLaw {
+    /// The part.
+    pub part: String,
+    /// Coefficient a, 1.
+    pub a: ParameterEstimate,
+    /// Coefficient b.
+    pub b_n: ParameterEstimate,
+    /// Covariance of (a, b): variance of a, covariance in N, variance of b in N^2.
+    pub covariance: [f64; 3],
+    /// Largest relative standard deviation of the coefficient over the grip forces of the fit.
+    pub largest_relative_sigma: f64,
+    /// The same, of a fit to the least, the middle and the largest grip force alone.
+    pub of_three_levels: Option<f64>,
+}
+
+/// A calibrated baseline.
+#[derive(Debug, Clone)]
+pub struct PullCalibration {
+    /// The fit.
+    pub fitted: Fitted,
+    /// Baseline values by key.
+    pub baseline: BTreeMap<String, ParameterEstimate>,
+    /// Effects by id, with their parameters.
+    pub effects: Vec<(String, BTreeMap<String, ParameterEstimate>)>,
+    /// The law of each part.
+    pub laws: Vec<OffsetLaw>,
+    /// Error on held-out repetitions.
+    pub error: Option<HeldOutError>,
+    /// Grip forces of the pulls.
+    pub grip_force_n: (f64, f64),
+}
+
+/// Why there is no calibration.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    /// The data do not suffice.
+    #[error("{0}")]
+    Insufficient(String),
+    /// No such effect.
+    #[error("there is no effect `{0}`")]
+    UnknownEffect(String),
+    /// An effect that these pulls cannot show.
+    #[error("these pulls cannot show `{effect}`: it acts on nothing that was varied (it needs {needs})")]
+    NotExcited {
+        /// The effect.
+        effect: String,
+        /// The columns it needs.
+        needs: String,
+    },
+    /// The labels cannot be predicted.
+    #[error("the labels cannot be predicted at all: is the unit of the forces newton?")]
+    NoFit,
+}
+
+/// Fits the baseline of a campaign and what is asked for.
+pub fn calibrate_pulls(
+    measured: &MeasuredPulls,
+    predictor: &dyn PredictPulls,
+    given: &PullModel,
+    request: &CalibrateRequest,
+) -> Result<PullCalibration, CalibrateError> {
+    let data = PullData::new(measured);
+    if let Some(missing) = insufficient(&data) {
+        return Err(CalibrateError::Insufficient(missing));
+    }
+    let most_n = data.label_n.iter().copied().fold(0.0, f64::max);
+    let mut terms = Terms::default();
+    let asked = |id: &str| -> Result<Candidate, CalibrateError> {
+        let spec = find(id).ok_or_else(|| CalibrateError::UnknownEffect(id.into()))?;
+        let needs = || {
+            if spec.covariates.is_empty() {
+                "no column, but pulls".into()
+            } else {
+                spec.covariates.join(", ")
+            }
+        };
+        candidate(spec, &data, most_n)
+            .ok_or_else(|| CalibrateError::NotExcited { effect: id.into(), needs: needs() })
+    };
+    if request.offset_law {
+        let law = asked("load_offset")?;
+        for part in 0..data.parts.len() {
+            let own = Candidate { part: Some((part, data.parts[part].clone())), ..law.clone() };
+            let start = own.starts[0].clone();
+            terms.effects.push((own, start));
+        }
+    }
+    for id in &request.effects {
+        let candidate = asked(id)?;
+        let start = candidate.starts[candidate.starts.len() / 2].clone();
+        terms.effects.push((candidate, start));
+    }
+    let mut context = Context::new(&data, predictor, given);
+    let rows: Vec<usize> = (0..data.len()).collect();
+    context.learn_lag(&rows);
+    let fitted = context.fit(&context.base, &terms, &rows).ok_or(CalibrateError::NoFit)?;
+    let held = predicted(&context, &fitted, &folds(data.len()));
+    let forces = || measured.pulls.iter().map(|p| p.grip_force_n);
+    let range = forces().fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
+    let laws = if request.offset_law { laws(&context, &fitted, &terms, given, range) } else { vec![] };
+    let effects = terms
+        .effects
+        .iter()
+        .filter(|(c, _)| c.part.is_none())
+        .map(|(c, _)| (c.spec.id.to_string(), parameters(&fitted, c)))
+        .collect();
+    Ok(PullCalibration {
+        baseline: baseline(&fitted, &context),
+        effects,
+        laws,
+        error: errors(&data.label_n, &held, &held, &data.group_of).map(|pair| pair.after),
+        grip_force_n: range,
+        fitted,
+    })
+}
+
+/// From (mu', b') of a fit with the coefficient mu' (1 + b' / F) to (a, b) of mu (a + b / F).
+fn laws(
+    context: &Context<'_>,
+    fitted: &Fitted,
+    terms: &Terms,
+    given: &PullModel,
+    range: (f64, f64),
+) -> Vec<OffsetLaw> {
+    let mut levels: Vec<f64> = context.data.measured.pulls.iter().map(|p| p.grip_force_n).collect();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    let three = [levels[0], levels[levels.len() / 2], levels[levels.len() - 1]];
+    let rows: Vec<usize> = (0..context.data.len())
+        .filter(|&i| three.contains(&context.data.measured.pulls[i].grip_force_n))
+        .collect();
+    let few = if levels.len() > 3 { context.fit(&fitted.model, terms, &rows) } else { None };
+    let of = |fitted: &Fitted, part: usize| {
+        let name = &context.data.parts[part];
+        let at = |wanted: &str| fitted.names.iter().position(|n| n == wanted);
+        let (m, b) = (at(&format!("parts.{name}.mu"))?, at(&format!("load_offset@{name}.b_n"))?);
+        let (mu, b_n) = (fitted.values[m], fitted.values[b]);
+        let mu_given = given.mu[part];
+        // a = mu' / mu, b = mu' b' / mu.
+        let (a, law_b) = (mu / mu_given, mu * b_n / mu_given);
+        let c = |i, j| fitted.covariance[(i, j)];
+        let square = mu_given * mu_given;
+        let aa = c(m, m) / square;
+        let ab = (b_n * c(m, m) + mu * c(m, b)) / square;
+        let bb = (b_n * b_n * c(m, m) + 2.0 * b_n * mu * c(m, b) + mu * mu * c(b, b)) / square;
+        Some((a, law_b, [aa, ab, bb]))
+    };
+    let largest = |(a, b, [aa, ab, bb]): (f64, f64, [f64; 3])| {
+        (0..=40)
+            .map(|k| range.0 + (range.1 - range.0) * f64::from(k) / 40.0)
+            .map(|f| (aa + 2.0 * ab / f + bb / (f * f)).max(0.0).sqrt() / (a + b / f).abs().max(1e-9))
+            .fold(0.0, f64::max)
+    };
+    (0..context.data.parts.len())
+        .filter_map(|part| {
+            let law = of(fitted, part)?;
+            let (a, b, covariance) = law;
+            let estimate = |value: f64, variance: f64, unit: &str| {
+                let half = 1.645 * variance.max(0.0).sqrt();
+                ParameterEstimate { value, low90: value - half, high90: value + half, unit: unit.into() }
+            };
+            Some(OffsetLaw {
+                part: context.data.parts[part].clone(),
+                a: estimate(a, covariance[0], "1"),
+                b_n: estimate(b, covariance[2], "N"),
+                covariance,
+                largest_relative_sigma: largest(law),
+                of_three_levels: few.as_ref().and_then(|few| of(few, part)).map(largest),
+            })
+        })
+        .collect()
+}
