@@ -3,4 +3,5 @@
 mod pull_report;
 mod pulls;
 
+pub(crate) use pulls::pull_values;
 pub use pulls::{PullDiagnoseOptions, UnknownPartError, diagnose_pull_table, given_model};

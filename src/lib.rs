@@ -43,6 +43,7 @@
 pub mod assets;
 mod bench;
 mod cache;
+mod calibrate;
 mod campaign;
 mod compare;
 mod diagnose;
@@ -68,6 +69,7 @@ mod sweep;
 mod twin_edits;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
+pub use calibrate::{CalibratePullsError, calibrate_twin};
 pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use compare::{LabelErrors, PullComparison, compare_pulls};
 pub use diagnose::{PullDiagnoseOptions, diagnose_pull_table, given_model};

@@ -4,11 +4,12 @@ use super::pull_report::pull_report;
 use crate::predict::PullPredictor;
 use crate::report::Diagnosed;
 use crate::twin_edits::{EditedValue, TwinEdits};
-use gripgen_identify::Diagnosis;
 use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
 use gripgen_identify::pulls::curves::Curve;
 use gripgen_identify::pulls::data::{Column, PullData};
+use gripgen_identify::pulls::fitting::Fitted;
 use gripgen_identify::pulls::model::PullModel;
+use gripgen_identify::{Diagnosis, ParameterEstimate};
 use gripgen_twin::config::{CalibrationFile, EffectFile};
 use gripgen_twin::effects::OutsideFit;
 use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Twin};
@@ -75,6 +76,39 @@ pub fn diagnose_pull_table(
     Ok(Diagnosed { diagnosis: answer.diagnosis, edits, report })
 }
 
+/// Fitted baseline values as they stand in a twin.
+pub(crate) fn pull_values(
+    fitted: &Fitted,
+    baseline: &BTreeMap<String, ParameterEstimate>,
+    parts: &[String],
+    calibration: &dyn Fn(f64, f64) -> CalibrationFile,
+) -> Vec<EditedValue> {
+    let model = &fitted.model;
+    let mut values = Vec::new();
+    let mut set = |key: String, value: f64, known: Option<(f64, f64)>| {
+        values.push(EditedValue { key, value, calibration: known.map(|(low, high)| calibration(low, high)) });
+    };
+    let interval = |name: &str| baseline.get(name).map(|e| (e.low90, e.high90));
+    let scatter = baseline.get("scatter").map_or(model.scatter, |e| e.value);
+    for (name, mu) in parts.iter().zip(&model.mu) {
+        set(format!("parts.{name}.mu"), *mu, interval(&format!("parts.{name}.mu")));
+        set(format!("parts.{name}.kinetic_ratio"), model.kinetic_ratio, interval("kinetic_ratio"));
+        set(format!("parts.{name}.scatter"), scatter, None);
+    }
+    set("robot.lag_s".into(), model.lag_s, interval("robot.lag_s"));
+    set("robot.dead_time_s".into(), model.dead_time_s, interval("robot.dead_time_s"));
+    if baseline.contains_key("robot.damping_n_s_per_m") {
+        set("robot.damping_n_s_per_m".into(), model.damping_n_s_per_m, None);
+        let fast_mm_s = (40.0 / model.damping_n_s_per_m * 1e3).clamp(20.0, 1500.0);
+        set("robot.speed_limit_mm_s".into(), fast_mm_s, None);
+        set("wrist.noise_n".into(), model.noise_n, None);
+        for jaw in ["left", "right"] {
+            set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), model.stiffness_n_per_m * 0.5e-3, None);
+        }
+    }
+    values
+}
+
 /// The twin that the answer describes.
 fn edits(
     fits: &PullFits,
@@ -90,28 +124,7 @@ fn edits(
         evidence: Some(evidence.clone()),
         data_sha256: Some(measured.sha256.clone()),
     };
-    let mut values = Vec::new();
-    let mut set = |key: String, value: f64, known: Option<(f64, f64)>| {
-        values.push(EditedValue { key, value, calibration: known.map(|(low, high)| calibration(low, high)) });
-    };
-    let interval = |name: &str| diagnosis.baseline.get(name).map(|e| (e.low90, e.high90));
-    let scatter = diagnosis.baseline.get("scatter").map_or(model.scatter, |e| e.value);
-    for (name, mu) in predictor.part_names().iter().zip(&model.mu) {
-        set(format!("parts.{name}.mu"), *mu, interval(&format!("parts.{name}.mu")));
-        set(format!("parts.{name}.kinetic_ratio"), model.kinetic_ratio, interval("kinetic_ratio"));
-        set(format!("parts.{name}.scatter"), scatter, None);
-    }
-    set("robot.lag_s".into(), model.lag_s, interval("robot.lag_s"));
-    set("robot.dead_time_s".into(), model.dead_time_s, interval("robot.dead_time_s"));
-    if diagnosis.baseline.contains_key("robot.damping_n_s_per_m") {
-        set("robot.damping_n_s_per_m".into(), model.damping_n_s_per_m, None);
-        let fast_mm_s = (40.0 / model.damping_n_s_per_m * 1e3).clamp(20.0, 1500.0);
-        set("robot.speed_limit_mm_s".into(), fast_mm_s, None);
-        set("wrist.noise_n".into(), model.noise_n, None);
-        for jaw in ["left", "right"] {
-            set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), model.stiffness_n_per_m * 0.5e-3, None);
-        }
-    }
+    let values = pull_values(&fits.after, &diagnosis.baseline, predictor.part_names(), &calibration);
     let forces = measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces.fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
     let effects = model.effects.iter().map(|effect| {

@@ -1,10 +1,122 @@
 //! `gripgen calibrate pulls`: fit a twin to measured pulls.
 
+use super::diagnose::{jobs, load_twin, no_pulls};
 use crate::args::CalibratePullsArgs;
 use crate::failure::Failure;
+use crate::output::{JsonSink, print, writable};
+use gripgen::identify::ParameterEstimate;
+use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
+use gripgen::{CalibratePullsError, Location, calibrate_twin, load_pulls, write_twin};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
 
 /// Runs the verb.
 pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
-    let _ = args;
-    Err(Failure::usage("not built yet"))
+    writable(&args.out)?;
+    let loaded = load_pulls(&args.measured).map_err(|e| no_pulls(&args.measured, e))?;
+    let twin = load_twin(&args.twin, &args.set)?;
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let request = CalibrateRequest { offset_law: args.law.is_some(), effects: args.fit.clone() };
+    let (found, edits) = calibrate_twin(&loaded.pulls, &twin, &request, jobs()).map_err(|e| {
+        let hint = match &e {
+            CalibratePullsError::Part(_) => "name a twin that has this part with --twin",
+            CalibratePullsError::Fit(CalibrateError::UnknownEffect(_)) => "docs/model.md lists the effects",
+            CalibratePullsError::Fit(CalibrateError::NotExcited { .. }) => {
+                "`gripgen campaign` plans pulls that vary everything"
+            }
+            _ => "`gripgen campaign` plans pulls that can be calibrated",
+        };
+        Failure::usage(e).hint(hint)
+    })?;
+    write_twin(&Location::parse(&args.twin), &args.set, &edits, &args.out).map_err(Failure::new)?;
+    if sink.wanted() {
+        sink.document(&json_of(&found, loaded.pulls.pulls.len(), &loaded.pulls.sha256))?;
+    }
+    if !sink.on_stdout() {
+        print(&summary(&found))?;
+    }
+    if !args.talk.quiet {
+        loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        eprintln!("the twin: {}", args.out.display());
+    }
+    Ok(0)
+}
+
+fn estimate(p: &ParameterEstimate) -> Value {
+    json!({"value": p.value, "low90": p.low90, "high90": p.high90, "unit": p.unit})
+}
+
+fn json_of(found: &PullCalibration, pulls: usize, sha256: &str) -> Value {
+    let named = |values: &std::collections::BTreeMap<String, ParameterEstimate>| {
+        values.iter().map(|(name, p)| (name.clone(), estimate(p))).collect::<Map<_, _>>()
+    };
+    let laws: Vec<Value> = found
+        .laws
+        .iter()
+        .map(|law| {
+            json!({
+                "part": law.part,
+                "a": estimate(&law.a),
+                "b_n": estimate(&law.b_n),
+                "covariance": {"a_a": law.covariance[0], "a_b_n": law.covariance[1], "b_n_b_n": law.covariance[2]},
+                "largest_relative_sigma": law.largest_relative_sigma,
+                "largest_relative_sigma_of_three_levels": law.of_three_levels,
+            })
+        })
+        .collect();
+    let effects: Vec<Value> =
+        found.effects.iter().map(|(name, p)| json!({"name": name, "parameters": named(p)})).collect();
+    json!({
+        "schema": "gripgen.calibration/1",
+        "channel": "pulls",
+        "data": {"pulls": pulls, "sha256": sha256},
+        "fitted_grip_force_n": [found.grip_force_n.0, found.grip_force_n.1],
+        "baseline": named(&found.baseline),
+        "laws": laws,
+        "effects": effects,
+        "error": found.error.map(|e| json!({
+            "heldout": "repetitions", "rmse_n": e.rmse_n, "low90": e.low90, "high90": e.high90, "mape_pct": e.mape_pct
+        })),
+    })
+}
+
+fn summary(found: &PullCalibration) -> String {
+    let mut text = String::new();
+    let line = |text: &mut String, name: &str, p: &ParameterEstimate| {
+        let unit = if p.unit == "1" { "" } else { p.unit.as_str() };
+        let _ = if p.low90 < p.high90 {
+            writeln!(text, "{name:<36} {:>10.4} {unit:<7} ({:.4} to {:.4})", p.value, p.low90, p.high90)
+        } else {
+            writeln!(text, "{name:<36} {:>10.4} {unit}", p.value)
+        };
+    };
+    for (name, p) in &found.baseline {
+        line(&mut text, name, p);
+    }
+    for law in &found.laws {
+        line(&mut text, &format!("load_offset of {}: a", law.part), &law.a);
+        line(&mut text, &format!("load_offset of {}: b_n", law.part), &law.b_n);
+        let few = law
+            .of_three_levels
+            .map_or(String::new(), |s| format!(", {:.1} % from three forces alone", 100.0 * s));
+        let _ = writeln!(
+            text,
+            "  its coefficient is known to {:.1} % (standard deviation, worst){few}",
+            100.0 * law.largest_relative_sigma
+        );
+    }
+    for (name, parameters) in &found.effects {
+        for (parameter, p) in parameters {
+            line(&mut text, &format!("{name}.{parameter}"), p);
+        }
+    }
+    if let Some(error) = &found.error {
+        let rmse = error.rmse_n.unwrap_or_default();
+        let _ = writeln!(
+            text,
+            "error on held-out repetitions: {rmse:.3} N ({:.3} to {:.3})",
+            error.low90, error.high90
+        );
+    }
+    text
 }
