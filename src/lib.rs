@@ -59,6 +59,7 @@ mod paper;
 mod picture;
 mod plan;
 mod predict;
+mod press_columns;
 mod press_report;
 mod presses;
 mod project;
@@ -72,7 +73,10 @@ pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use calibrate::{CalibratePullsError, calibrate_twin};
 pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use compare::{LabelErrors, PullComparison, compare_pulls};
-pub use diagnose::{PullDiagnoseOptions, diagnose_pull_table, given_model};
+pub use diagnose::{
+    PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions, diagnose_presses,
+    diagnose_pull_table, given_model, is_optics_effect,
+};
 pub use generate::{Press, SampleError, SimulateOptions, generate, press_only, simulate};
 pub use gpu::Gpu;
 pub use gripgen_identify as identify;
@@ -88,6 +92,7 @@ pub use paper::{PaperError, PaperReport, paper_report};
 pub use picture::{PictureSampleError, contact_sheet, sample_picture};
 pub use plan::{Plan, Probe, plan};
 pub use predict::PullPredictor;
+pub use press_columns::{PressColumns, load_press_columns, presses_sha256};
 pub use press_report::{PressReportText, press_report};
 pub use presses::{
     FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_missing_circles, is_press_set,

@@ -7,6 +7,7 @@
 mod campaign;
 mod diagnosis;
 mod draws;
+mod grouped;
 mod least_squares;
 mod permutation;
 pub mod pulls;
@@ -18,6 +19,10 @@ pub use diagnosis::{
     HeldOutError, NamedEffect, ParameterEstimate, Rival, SeparateBy, UnknownCovariate, Verdict,
 };
 pub use draws::Draws;
+pub use grouped::{
+    GroupMoments, GroupedFit, GroupedModel, fit_grouped, fold_steps, grouped_intervals, grouped_step,
+    held_out_costs, t_quantile_95,
+};
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
 pub use separate::{CandidatePull, Rival as SeparableRival, SeparateError, SeparatingPlan, plan_separating};

@@ -28,7 +28,10 @@ pub use folder::{
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
 pub use picture::{PictureError, decode as decode_picture, encode_png};
-pub use presses::{PRESSES_FILE, PressFolder, PressFolderError, PressRecord, read_press_folder};
+pub use presses::{
+    PRESSES_FILE, PressColumnTable, PressFolder, PressFolderError, PressRecord, read_press_columns,
+    read_press_folder,
+};
 pub use pulls::{PULLS_FILE, PullFolderError, TRACES_FOLDER, read_pull_folder, write_pull_folder};
 pub use reader::{ReadError, Record, ShardReader};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, ShardError, ShardInfo, ShardWriter};

@@ -120,6 +120,34 @@ pub fn read_press_folder(folder: &Path) -> Result<PressFolder, PressFolderError>
     Ok(PressFolder { rest: rest.map(|p| picture(&p)).transpose()?, presses })
 }
 
+/// All columns of a press table as they stand.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PressColumnTable {
+    /// The image of each row.
+    pub names: Vec<String>,
+    /// Name and cells of each column.
+    pub columns: Vec<(String, Vec<String>)>,
+}
+
+/// Reads the columns of a press table, and no image.
+pub fn read_press_columns(folder: &Path) -> Result<PressColumnTable, PressFolderError> {
+    let path = folder.join(PRESSES_FILE);
+    let table = |e: csv::Error| PressFolderError::Table { path: path.clone(), problem: e.to_string() };
+    let bytes = read(&path)?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&bytes[..]);
+    let header = reader.headers().map_err(table)?.clone();
+    let mut columns: Vec<(String, Vec<String>)> =
+        header.iter().map(|h| (h.trim_start_matches('\u{feff}').to_string(), Vec::new())).collect();
+    for row in reader.records() {
+        let row = row.map_err(table)?;
+        for ((_, cells), cell) in columns.iter_mut().zip(row.iter()) {
+            cells.push(cell.to_string());
+        }
+    }
+    let names = columns.iter().find(|(name, _)| name == "image").map(|(_, cells)| cells.clone());
+    Ok(PressColumnTable { names: names.unwrap_or_default(), columns })
+}
+
 /// A number of a cell, none where it is empty; otherwise what it must be.
 fn number(cell: &str, column: &str) -> Result<Option<f64>, &'static str> {
     if cell.is_empty() {
@@ -166,6 +194,15 @@ mod tests {
         let first = &read.presses[0];
         assert_eq!((first.centre_px, first.radius_px, first.depth_m), (Some((9.5, 8.0)), None, Some(0.7e-3)));
         assert_eq!((read.presses[1].centre_px, read.presses[1].radius_px), (None, Some(3.0)));
+    }
+
+    #[test]
+    fn columns_are_read_as_they_stand() {
+        let folder = folder("image, lamp, time_s\na.png, on, 3.5\na.png,off,\n");
+        let read = read_press_columns(folder.path()).unwrap();
+        assert_eq!(read.names, ["a.png", "a.png"]);
+        assert_eq!(read.columns[1], ("lamp".to_string(), vec!["on".to_string(), "off".to_string()]));
+        assert_eq!(read.columns[2].1, ["3.5", ""]);
     }
 
     #[test]

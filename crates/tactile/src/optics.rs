@@ -17,6 +17,8 @@ mod testing;
 mod tests;
 mod warp;
 
+pub(crate) use camera::level_at;
+
 use crate::appearance::appearance_on;
 use crate::deform::{blurred, deform_with};
 use crate::grid::{Grid, Plane};

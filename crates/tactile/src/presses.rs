@@ -5,6 +5,7 @@ mod circle;
 mod compare;
 mod data_pack;
 mod mark;
+mod seen;
 
 pub use calibrate::{
     CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, FEWEST_PRESSES, Smoothness, calibrate_presses,
@@ -19,6 +20,7 @@ pub use data_pack::{DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError};
 use gripgen_twin::TactileImage;
 
 pub use mark::MarkError;
+pub use seen::{PressScene, PressView, ZONES, Zone, frame_mse, surface_part};
 
 /// Images of one sensor into which a ball was pressed, in the order in which they were taken.
 #[derive(Debug, Clone, PartialEq)]

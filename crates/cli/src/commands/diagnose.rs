@@ -1,6 +1,7 @@
 //! `gripgen diagnose`: where a twin is wrong, and why.
 
 mod output;
+mod presses;
 
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
@@ -21,11 +22,8 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
     for path in [args.out.as_deref(), args.report.as_deref()].into_iter().flatten() {
         writable(path)?;
     }
-    if args.out.is_some() || args.json.json.is_some() || args.report.is_some() {
-        // Nothing is asked that would be lost.
-    }
     let diagnosed = if is_press_set(&args.measured) {
-        return Err(Failure::usage("presses: not built yet"));
+        presses::presses(args)?
     } else if args.measured.join("sensor.csv").is_file() {
         return Err(Failure::usage("force-sensor tables: not built yet"));
     } else {

@@ -80,6 +80,12 @@ impl TaximTable {
         &self.background
     }
 
+    /// The table with other planes: `of` makes each from the one that it replaces.
+    pub(crate) fn with_planes(&self, of: impl Fn(&[f32]) -> Vec<f32>) -> Self {
+        let planes = |old: &[Vec<f32>; 3]| [0, 1, 2].map(|c| of(&old[c]));
+        Self { background: planes(&self.background), offset: planes(&self.offset), ..self.clone() }
+    }
+
     /// [`TaximTable::background`] minus the frame at rest.
     pub(crate) fn offset(&self) -> &[Vec<f32>; 3] {
         &self.offset

@@ -1,6 +1,6 @@
 //! Light and camera on the whole frame, with and without contact.
 
-use crate::grid::Plane;
+use crate::grid::{Grid, Plane};
 use gripgen_twin::{BACKGROUND_TERMS, OpticsState};
 
 /// Turns a change against the rest frame into the change that the camera shows, in grey levels:
@@ -33,6 +33,23 @@ pub(super) fn apply(optics: &OpticsState, rest: &[Vec<f32>; 3], change: &mut [Pl
             }
         }
     }
+}
+
+/// [`apply`] at one pixel: what becomes of a level of the rest frame with its change.
+pub(crate) fn level_at(optics: &OpticsState, grid: &Grid, pixel: usize, channel: usize, level: f32) -> f32 {
+    let (w, h) = (grid.width_px, grid.height_px);
+    let mut seen = level * optics.light_gain[channel] as f32;
+    let pattern = &optics.background[channel];
+    if pattern.iter().any(|c| *c != 0.0) {
+        let [c0, c1, c2] = row_polynomial(pattern, w, h, pixel / w).map(|c| c as f32);
+        let u = normalised(pixel % w, w) as f32;
+        seen += c0 + u * (c1 + u * c2);
+    }
+    if optics.exposure_gain != 1.0 || optics.gamma != 1.0 {
+        let light = (optics.exposure_gain * f64::from(seen) / 255.0).max(0.0);
+        seen = (255.0 * libm::pow(light, optics.gamma)) as f32;
+    }
+    seen
 }
 
 /// The curve `255 (exposure max(0, I) / 255)^gamma` of a camera, tabulated from `FIRST_LEVEL` to twice full scale and
@@ -127,6 +144,24 @@ mod tests {
                 let exact = 255.0 * (exposure_gain * level.max(0.0) / 255.0).powf(gamma);
                 let found = f64::from(response.of(level as f32));
                 assert!((found - exact).abs() < 1e-3 + 1e-6 * exact, "{gamma}, {level}: {found} and {exact}");
+            }
+        }
+    }
+
+    /// One pixel at a time is the frame, to within the table of the response.
+    #[test]
+    fn single_pixels_are_those_of_the_frame() {
+        let mut optics =
+            OpticsState { light_gain: [0.9, 1.0, 1.1], exposure_gain: 1.2, gamma: 0.8, ..Default::default() };
+        optics.background = [[3.0, -2.0, 4.0, 1.0, 5.0]; 3];
+        let grid = Grid { width_px: 24, height_px: 17, metres_per_px: 1e-4 };
+        let rest = [0, 1, 2].map(|c| (0..grid.len()).map(|i| (20 * c + i % 60) as f32).collect::<Vec<f32>>());
+        let mut change = [0, 1, 2].map(|_| Plane::filled(24, 17, 7.0));
+        apply(&optics, &rest, &mut change);
+        for c in 0..3 {
+            for i in 0..grid.len() {
+                let one = level_at(&optics, &grid, i, c, rest[c][i] + 7.0);
+                assert!((one - rest[c][i] - change[c].values[i]).abs() < 2e-3);
             }
         }
     }

@@ -170,7 +170,7 @@ pub(crate) fn ball_imprint(circle: &Circle, ball_m: f64, grid: &Grid, shape: &Ge
 }
 
 /// What the renderer needs of a gel: the deformation of the calibration, or that of Wucherer et al. 2023.
-fn gel_of(sensor: &Sensor) -> Gel {
+pub(super) fn gel_of(sensor: &Sensor) -> Gel {
     let usual = || Pyramid { kernels_px: vec![71, 51, 21, 11, 5], restore_depth_fraction: 0.4 };
     let pyramid = sensor.pyramid.clone().unwrap_or_else(usual);
     Gel {

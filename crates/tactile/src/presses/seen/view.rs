@@ -1,0 +1,203 @@
+//! Chosen pixels of one press: what was measured there, and what is seen under any optics.
+
+use super::PressScene;
+use super::reduce::means;
+use crate::optics::level_at;
+use crate::presses::Circle;
+use gripgen_twin::{OpticsState, TactileImage};
+
+/// Where a pixel lies beside the contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Zone {
+    /// Inside the rim of the contact.
+    Contact,
+    /// Up to 0.4 radii outside.
+    Rim,
+    /// From there to 2.2 radii outside: where shadows fall.
+    Shadow,
+    /// Further away.
+    Far,
+}
+
+/// All zones, from the contact outwards.
+pub const ZONES: [Zone; 4] = [Zone::Contact, Zone::Rim, Zone::Shadow, Zone::Far];
+
+impl Zone {
+    /// Name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Zone::Contact => "contact",
+            Zone::Rim => "rim",
+            Zone::Shadow => "shadow zone",
+            Zone::Far => "far field",
+        }
+    }
+
+    fn at(radii_from_rim: f64) -> Zone {
+        match radii_from_rim {
+            d if d < 0.0 => Zone::Contact,
+            d if d < 0.4 => Zone::Rim,
+            d if d < 2.2 => Zone::Shadow,
+            _ => Zone::Far,
+        }
+    }
+}
+
+/// Pixels of a zone that are looked at in a press.
+const PIXELS_A_ZONE: usize = 600;
+
+/// Chosen pixels of one press, or of a frame without contact.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressView {
+    circle: Option<Circle>,
+    pixels: Vec<usize>,
+    zones: Vec<Zone>,
+    measured: Vec<[f32; 3]>,
+    rest: Vec<[f32; 3]>,
+    /// What the full resolution shows beyond that of the scene, without effects.
+    finer: Vec<[f32; 3]>,
+}
+
+impl PressView {
+    /// Draws pixels of press number `index`, the same ones each time. `full` is the scene at the resolution of the
+    /// image.
+    pub fn draw(
+        index: usize,
+        image: &TactileImage,
+        circle: Option<Circle>,
+        full: &PressScene,
+        scene: &PressScene,
+    ) -> Self {
+        let grid = &scene.sensor.grid;
+        let (w, h, f) = (grid.width_px, grid.height_px, scene.factor);
+        let here = circle.map(|c| scene.circle_here(&c));
+        let mut by_zone = [const { Vec::new() }; ZONES.len()];
+        for pixel in 0..grid.len() {
+            let zone = here.map_or(Zone::Far, |c| {
+                let (x, y) = ((pixel % w) as f64 - c.x_px, (pixel / w) as f64 - c.y_px);
+                Zone::at((libm::hypot(x, y) - c.radius_px) / c.radius_px.max(1.0))
+            });
+            by_zone[zone as usize].push(pixel);
+        }
+        let mut state = (index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(11);
+        let (mut pixels, mut zones) = (Vec::new(), Vec::new());
+        for (zone, mut list) in ZONES.into_iter().zip(by_zone) {
+            let n = PIXELS_A_ZONE.min(list.len());
+            for i in 0..n {
+                let j = i + (random(&mut state) % (list.len() - i) as u64) as usize;
+                list.swap(i, j);
+            }
+            list.truncate(n);
+            list.sort_unstable();
+            zones.extend(std::iter::repeat_n(zone, list.len()));
+            pixels.extend(list);
+        }
+        let (full_w, full_h) = (image.width_px as usize, image.height_px as usize);
+        let planes = [0, 1, 2].map(|c| {
+            let plane: Vec<f32> = image.rgb.iter().skip(c).step_by(3).map(|&v| f32::from(v)).collect();
+            means(&plane, full_w, full_h, f)
+        });
+        let plain = OpticsState::default();
+        let finer = match circle {
+            Some(_) if f > 1 => {
+                let (fine, coarse) =
+                    (full.change_seen(circle.as_ref(), &plain), scene.change_seen(circle.as_ref(), &plain));
+                let fine = [0, 1, 2].map(|c| means(&fine[c].values, full_w, full_h, f));
+                pixels.iter().map(|&p| [0, 1, 2].map(|c| fine[c][p] - coarse[c].values[p])).collect()
+            }
+            _ => vec![[0.0; 3]; pixels.len()],
+        };
+        debug_assert_eq!(planes[0].len(), w * h);
+        Self {
+            circle,
+            measured: pixels.iter().map(|&p| [0, 1, 2].map(|c| planes[c][p])).collect(),
+            rest: pixels.iter().map(|&p| [0, 1, 2].map(|c| scene.sensor.rest[c][p])).collect(),
+            finer,
+            pixels,
+            zones,
+        }
+    }
+
+    /// The zone of each pixel.
+    pub fn zones(&self) -> &[Zone] {
+        &self.zones
+    }
+
+    /// Position of each pixel in the frame, from -1 to 1 along rows and columns.
+    pub fn places(&self, scene: &PressScene) -> Vec<[f64; 2]> {
+        let grid = &scene.sensor.grid;
+        let at = |i: usize, n: usize| (2 * i + 1) as f64 / n as f64 - 1.0;
+        self.pixels
+            .iter()
+            .map(|&p| [at(p % grid.width_px, grid.width_px), at(p / grid.width_px, grid.height_px)])
+            .collect()
+    }
+
+    /// What was measured at each pixel: red, green, blue.
+    pub fn measured(&self) -> &[[f32; 3]] {
+        &self.measured
+    }
+
+    /// What the contact changes at each pixel under the part of `optics` that needs a picture of its own
+    /// ([`surface_part`]); for [`PressView::levels`]. `circle` takes the place of the marked one.
+    pub fn contact(
+        &self,
+        scene: &PressScene,
+        optics: &OpticsState,
+        circle: Option<&Circle>,
+    ) -> Vec<[f32; 3]> {
+        if self.circle.is_none() {
+            return vec![[0.0; 3]; self.pixels.len()];
+        }
+        let change = scene.change_seen(circle.or(self.circle.as_ref()), &surface_part(optics));
+        let at = |(&p, finer): (&usize, &[f32; 3])| [0, 1, 2].map(|c| change[c].values[p] + finer[c]);
+        self.pixels.iter().zip(&self.finer).map(at).collect()
+    }
+
+    /// The circle of the press.
+    pub fn circle(&self) -> Option<&Circle> {
+        self.circle.as_ref()
+    }
+
+    /// Grey levels that the camera shows at each pixel, within 0 to 255.
+    pub fn levels(&self, scene: &PressScene, contact: &[[f32; 3]], optics: &OpticsState) -> Vec<[f32; 3]> {
+        let grid = &scene.sensor.grid;
+        let offset = match self.circle {
+            Some(_) => optics.rest_offset.map(|o| o as f32),
+            None => [0.0; 3],
+        };
+        let frame = optics.changes_frame();
+        let mut levels = Vec::with_capacity(self.pixels.len());
+        for ((&pixel, rest), contact) in self.pixels.iter().zip(&self.rest).zip(contact) {
+            levels.push([0, 1, 2].map(|c| {
+                let level = rest[c] + contact[c] + offset[c];
+                let seen = if frame { level_at(optics, grid, pixel, c, level) } else { level };
+                seen.clamp(0.0, 255.0)
+            }));
+        }
+        levels
+    }
+}
+
+/// The part of an optics that changes the picture of a contact in a way that has to be drawn; the rest is a function of
+/// each pixel.
+pub fn surface_part(optics: &OpticsState) -> OpticsState {
+    let neutral = OpticsState::default();
+    OpticsState {
+        light_gain: neutral.light_gain,
+        background: neutral.background,
+        exposure_gain: neutral.exposure_gain,
+        gamma: neutral.gamma,
+        rest_offset: neutral.rest_offset,
+        ..*optics
+    }
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014).
+fn random(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}

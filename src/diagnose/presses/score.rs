@@ -1,0 +1,189 @@
+//! Candidates fitted and scored on presses that their fit has not seen.
+
+use super::candidates::{STEP_PARAMETER, is_drawn};
+use super::work::{Acting, NamedModel, Work};
+use gripgen_identify::{
+    FreeParameter, GroupMoments, GroupedFit, fit_grouped, fold_steps, grouped_step, held_out_costs,
+};
+use gripgen_twin::effects::EffectSpec;
+
+/// Steps of a fit at most.
+const MOST_STEPS: usize = 4;
+
+/// Presses before and after a change of background at least.
+const FEWEST_ON_A_SIDE: usize = 2;
+
+/// Presses, how much each counts, and which are held out together.
+#[derive(Debug, Clone)]
+pub(super) struct Design {
+    pub(super) weights: Vec<f64>,
+    /// Drawn.
+    pub(super) folds: Vec<usize>,
+    /// Neighbours in order.
+    pub(super) blocks: Vec<usize>,
+}
+
+impl Design {
+    pub(super) fn new(n: usize) -> Self {
+        let k = if n < 12 { n } else { 6 };
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by_key(|&i| hash(i as u64));
+        let mut folds = vec![0; n];
+        order.iter().enumerate().for_each(|(place, &i)| folds[i] = place % k.max(1));
+        let blocks = (0..n).map(|i| i * k.min(6) / n.max(1)).collect();
+        Self { weights: vec![1.0; n], folds, blocks }
+    }
+
+    /// Weights that keep single presses from deciding.
+    pub(super) fn reweigh(&mut self, costs: &[f64]) {
+        let mut sorted = costs.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let median = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(1e-12);
+        self.weights = costs.iter().map(|c| (6.0 * median / c.max(1e-12)).min(1.0)).collect();
+    }
+
+    /// Weighted mean over the presses and its standard error.
+    pub(super) fn mean(&self, values: &[f64]) -> (f64, f64) {
+        let sum: f64 = self.weights.iter().sum();
+        let mean = values.iter().zip(&self.weights).map(|(v, w)| v * w).sum::<f64>() / sum;
+        let squares: f64 = values.iter().zip(&self.weights).map(|(v, w)| (w * (v - mean)).powi(2)).sum();
+        let n = values.len() as f64;
+        (mean, (squares * n / (n - 1.0).max(1.0)).sqrt() / sum)
+    }
+}
+
+pub(super) fn hash(i: u64) -> u64 {
+    let mut z = i.wrapping_add(7).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// A set of effects, fitted and scored.
+#[derive(Debug, Clone)]
+pub(super) struct Scored {
+    pub(super) acting: Vec<Acting>,
+    pub(super) free: Vec<(usize, usize)>,
+    pub(super) parameters: Vec<FreeParameter>,
+    pub(super) fit: GroupedFit,
+    /// Cost of each press under a fit without its fold.
+    pub(super) held_out: Vec<f64>,
+}
+
+impl Scored {
+    /// The effects as the fit without each fold has them.
+    pub(super) fn by_fold(&self, weights: &[f64], folds: &[usize]) -> Vec<Vec<Acting>> {
+        fold_steps(&self.parameters, &self.fit, weights, folds)
+            .iter()
+            .map(|step| {
+                let mut acting = self.acting.clone();
+                for (k, &(e, j)) in self.free.iter().enumerate() {
+                    acting[e].values[j] = self.fit.values[k] + step[k];
+                }
+                acting
+            })
+            .collect()
+    }
+}
+
+/// Fits and scores a set of effects together.
+pub(super) fn scored(work: &Work, design: &Design, acting: Vec<Acting>) -> Scored {
+    if acting.is_empty() {
+        let costs = NamedModel::new(work, acting).moments_alone();
+        let moments = costs.iter().map(|&cost| GroupMoments { cost, ..GroupMoments::zero(0) }).collect();
+        let fit = GroupedFit { values: Vec::new(), moments };
+        return Scored { acting: Vec::new(), free: Vec::new(), parameters: Vec::new(), fit, held_out: costs };
+    }
+    let model = NamedModel::new(work, acting);
+    let fit = fit_grouped(&model.parameters, MOST_STEPS, &design.weights, &model);
+    let held_out = held_out_costs(&model.parameters, &fit, &design.weights, &design.folds);
+    Scored { acting: model.at(&fit.values), free: model.free, parameters: model.parameters, fit, held_out }
+}
+
+/// A candidate that cannot lower the cost by `least`, as its first step shows; drawing pictures for a fit would be
+/// in vain.
+fn faint(work: &Work, design: &Design, acting: &[Acting], least: f64) -> Option<Scored> {
+    let model = NamedModel::new(work, acting.to_vec());
+    let values: Vec<f64> = model.parameters.iter().map(|p| p.start).collect();
+    let fit = GroupedFit { moments: gripgen_identify::GroupedModel::moments(&model, &values), values };
+    let step = grouped_step(&model.parameters, &fit.values, &fit.moments, &design.weights);
+    let reached: Vec<f64> = fit.moments.iter().map(|m| m.cost_after(&step)).collect();
+    let without = scored(work, design, acting[..acting.len() - 1].to_vec());
+    if design.mean(&differences(&without.held_out, &reached)).0 > least {
+        return None;
+    }
+    let held_out = held_out_costs(&model.parameters, &fit, &design.weights, &design.folds);
+    let values: Vec<f64> = fit.values.iter().zip(step.iter()).map(|(v, s)| v + s).collect();
+    Some(Scored { acting: model.at(&values), free: model.free, parameters: model.parameters, fit, held_out })
+}
+
+/// Differences press by press.
+pub(super) fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// The effects of `model` with one more; `least`: a gain that would count. A change of background is tried from every press on.
+pub(super) fn with(
+    work: &Work,
+    design: &Design,
+    model: &[Acting],
+    spec: &'static EffectSpec,
+    least: f64,
+) -> Scored {
+    let mut acting = model.to_vec();
+    acting.push(Acting::start(spec, &work.scene));
+    let Some(at) = spec.parameters.iter().position(|p| p.name == STEP_PARAMETER) else {
+        if is_drawn(spec)
+            && let Some(faint) = faint(work, design, &acting, least)
+        {
+            return faint;
+        }
+        return scored(work, design, acting);
+    };
+    let place = step_place(work, design, &acting, at);
+    if let Some(last) = acting.last_mut() {
+        last.values[at] = place;
+    }
+    scored(work, design, acting)
+}
+
+/// The pull index from which on the last effect of a model explains most, held out.
+fn step_place(work: &Work, design: &Design, acting: &[Acting], at: usize) -> f64 {
+    let model = NamedModel::new(work, acting.to_vec());
+    let values: Vec<f64> = model.parameters.iter().map(|p| p.start).collect();
+    let moments = gripgen_identify::GroupedModel::moments(&model, &values);
+    let own: Vec<bool> = model.free.iter().map(|&(e, _)| e + 1 == acting.len()).collect();
+    let n = moments.len();
+    let index = |i: usize| work.circumstances[i].pull_index as f64;
+    let neutral = acting.last().map_or(0.0, |a| a.spec.parameters[at].neutral);
+    let places =
+        std::iter::once(0).chain(FEWEST_ON_A_SIDE..(n + 1).saturating_sub(FEWEST_ON_A_SIDE)).map(|first| {
+            let masked: Vec<GroupMoments> = moments
+                .iter()
+                .enumerate()
+                .map(|(i, m)| if i < first { without(m, &own) } else { m.clone() })
+                .collect();
+            let fit = GroupedFit { values: values.clone(), moments: masked };
+            let costs = held_out_costs(&model.parameters, &fit, &design.weights, &design.folds);
+            (first, design.mean(&costs).0)
+        });
+    let best = places.min_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or(neutral, |(first, _)| if first == 0 { neutral } else { index(first) })
+}
+
+/// Moments of a press on which some parameters do not act.
+pub(super) fn without(moments: &GroupMoments, own: &[bool]) -> GroupMoments {
+    let mut masked = moments.clone();
+    for (k, _) in own.iter().enumerate().filter(|(_, own)| **own) {
+        masked.gradient[k] = 0.0;
+        masked.normal.row_mut(k).fill(0.0);
+        masked.normal.column_mut(k).fill(0.0);
+    }
+    masked
+}
+
+impl NamedModel<'_> {
+    fn moments_alone(&self) -> Vec<f64> {
+        gripgen_identify::GroupedModel::costs(self, &[])
+    }
+}

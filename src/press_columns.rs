@@ -1,0 +1,82 @@
+//! The columns of a press table that say in which circumstances each press was made.
+
+use crate::diagnose::{PressCovariate, PressValues};
+use gripgen_record::{PRESSES_FILE, PressFolderError, read_press_columns, sha256_hex};
+use gripgen_tactile::presses::PressSet;
+use std::path::Path;
+
+/// Columns that are marks of the contact, not circumstances.
+const MARKS: [&str; 6] = ["image", "x_px", "y_px", "radius_px", "depth_mm", "pull_index"];
+
+/// What a table says beside images and marks.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PressColumns {
+    /// Name of the image of each row.
+    pub names: Vec<String>,
+    /// Seconds since the first press.
+    pub time_s: Option<Vec<f64>>,
+    /// All other columns.
+    pub covariates: Vec<PressCovariate>,
+}
+
+impl PressColumns {
+    /// Takes the rows of some images out.
+    pub fn leave_out(&mut self, names: &[String]) {
+        let keep: Vec<bool> = self.names.iter().map(|n| !names.contains(n)).collect();
+        retain(&mut self.names, &keep);
+        if let Some(times) = &mut self.time_s {
+            retain(times, &keep);
+        }
+        for covariate in &mut self.covariates {
+            match &mut covariate.values {
+                PressValues::Numbers(values) => retain(values, &keep),
+                PressValues::Words(words) => retain(words, &keep),
+            }
+        }
+    }
+}
+
+fn retain<T>(list: &mut Vec<T>, keep: &[bool]) {
+    let mut at = 0;
+    list.retain(|_| {
+        at += 1;
+        keep.get(at - 1).copied().unwrap_or(true)
+    });
+}
+
+/// Reads them from the table of a folder; a `dataPack.npz` has none. Numbers that are missing in some rows are words.
+pub fn load_press_columns(path: &Path) -> Result<PressColumns, PressFolderError> {
+    if !path.join(PRESSES_FILE).is_file() {
+        return Ok(PressColumns::default());
+    }
+    let table = read_press_columns(path)?;
+    let mut columns = PressColumns { names: table.names, ..Default::default() };
+    for (name, cells) in table.columns {
+        let numbers: Option<Vec<f64>> =
+            cells.iter().map(|c| c.parse::<f64>().ok().filter(|x| x.is_finite())).collect();
+        if MARKS.contains(&name.as_str()) {
+            continue;
+        }
+        match numbers {
+            Some(times) if name == "time_s" => {
+                let first = times.iter().fold(f64::INFINITY, |m, t| m.min(*t));
+                columns.time_s = Some(times.iter().map(|t| t - first).collect());
+            }
+            Some(numbers) => {
+                columns.covariates.push(PressCovariate { name, values: PressValues::Numbers(numbers) });
+            }
+            None => columns.covariates.push(PressCovariate { name, values: PressValues::Words(cells) }),
+        }
+    }
+    Ok(columns)
+}
+
+/// Hash of the images and marks of a set.
+pub fn presses_sha256(set: &PressSet) -> String {
+    let mut text = String::new();
+    for press in &set.presses {
+        let mark = press.circle.map_or(String::new(), |c| format!("{} {} {}", c.x_px, c.y_px, c.radius_px));
+        text += &format!("{} {} {mark}\n", press.name, sha256_hex(&press.image.rgb));
+    }
+    sha256_hex(text.as_bytes())
+}
