@@ -10,6 +10,8 @@ mod common;
 mod config;
 // The same bytes for any number of threads, slices, vector units, and after an interruption.
 mod determinism;
+// Lost grips of a real robot, by rows and by events.
+mod event_log;
 // Effects of the library, through the whole pipeline.
 mod effects;
 // The elastic gel, also beside the pyramid on real presses.

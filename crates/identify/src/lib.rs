@@ -11,6 +11,7 @@ mod grouped;
 mod least_squares;
 mod permutation;
 pub mod pulls;
+mod sensor;
 mod separate;
 
 pub use campaign::{CampaignError, CampaignOptions, plan_campaign};
@@ -25,4 +26,8 @@ pub use grouped::{
 };
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
+pub use sensor::{
+    SensorBlock, SensorCalibration, SensorComparison, SensorData, SensorDiagnosis, SensorEvidence,
+    SensorOptions, SensorRow, SessionCalibration, calibrate_sensor, compare_sensor, diagnose_sensor,
+};
 pub use separate::{CandidatePull, Rival as SeparableRival, SeparateError, SeparatingPlan, plan_separating};

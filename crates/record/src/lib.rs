@@ -16,6 +16,7 @@ mod presses;
 pub mod proto;
 mod pulls;
 mod reader;
+mod sensor_table;
 mod shard;
 mod verify;
 
@@ -34,5 +35,6 @@ pub use presses::{
 };
 pub use pulls::{PULLS_FILE, PullFolderError, TRACES_FOLDER, read_pull_folder, write_pull_folder};
 pub use reader::{ReadError, Record, ShardReader};
+pub use sensor_table::{ExtraValues, SENSOR_FILE, SensorTable, SensorTableError, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, ShardError, ShardInfo, ShardWriter};
 pub use verify::{Verification, verify};

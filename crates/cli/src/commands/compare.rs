@@ -2,6 +2,7 @@
 
 use super::diagnose::{jobs, load_twin, no_pulls};
 use crate::args::{CompareArgs, TalkArgs};
+use crate::commands::compare_sensor;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::tactile::finish;
@@ -9,8 +10,8 @@ use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
     FoundCircles, LabelErrors, LoadPressesError, LoadSensorError, Location, PressGeometry, PressReportText,
-    compare_pulls, find_missing_circles, is_press_set, load_presses, load_pulls, load_sensor,
-    load_twin_sensor, press_report,
+    compare_pulls, find_missing_circles, is_press_set, is_sensor_table, load_presses, load_pulls,
+    load_sensor, load_twin_sensor, press_report,
 };
 use serde_json::{Value, json};
 
@@ -18,6 +19,9 @@ use serde_json::{Value, json};
 pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
     if !args.measured.exists() {
         return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
+    }
+    if is_sensor_table(&args.measured) {
+        return compare_sensor::run(args);
     }
     if !is_press_set(&args.measured) {
         return pulls(args);

@@ -9,8 +9,8 @@ use crate::output::writable;
 use crate::progress::Share;
 use gripgen::twin::Twin;
 use gripgen::{
-    Diagnosed, Location, PullDiagnoseOptions, diagnose_pull_table, is_press_set, load_pulls,
-    load_twin_document,
+    Diagnosed, Location, PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_press_set,
+    is_sensor_table, load_pulls, load_sensor_table, load_twin_document,
 };
 use std::path::Path;
 
@@ -24,8 +24,8 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
     }
     let diagnosed = if is_press_set(&args.measured) {
         presses::presses(args)?
-    } else if args.measured.join("sensor.csv").is_file() {
-        return Err(Failure::usage("force-sensor tables: not built yet"));
+    } else if is_sensor_table(&args.measured) {
+        sensor(args)?
     } else {
         pulls(args)?
     };
@@ -52,6 +52,11 @@ pub fn no_pulls(path: &Path, e: impl std::fmt::Display) -> Failure {
         return failure;
     }
     failure.hint("measurements are a folder with pulls.csv, sensor.csv or presses.csv, a run folder, or a dataPack.npz")
+}
+
+fn sensor(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
+    let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
+    Ok(diagnose_sensor_table(&table))
 }
 
 fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {

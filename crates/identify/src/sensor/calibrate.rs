@@ -1,0 +1,94 @@
+//! Gain and offset of a force sensor.
+
+use super::candidates::chain;
+use super::moments::{Model, Moments};
+use super::noise::{Noise, Whitener, fit_noise};
+use super::prepare::{Prepared, prepare};
+use super::refine::joint_fit;
+use super::{SensorData, SensorOptions};
+use crate::diagnosis::ParameterEstimate;
+
+/// Gain and offset of one session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionCalibration {
+    /// Its name.
+    pub name: String,
+    /// Rows that were used.
+    pub rows: usize,
+    /// Measured over reference.
+    pub gain: ParameterEstimate,
+    /// Reading without load, in the unit of the measured column.
+    pub offset: ParameterEstimate,
+    /// Root of the mean squared residual, in the unit of the measured column.
+    pub rmse_n: f64,
+    /// Correlation of the residual from one row to the next.
+    pub lag_one: f64,
+}
+
+/// Gain and offset of every session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorCalibration {
+    /// In the order of the table.
+    pub sessions: Vec<SessionCalibration>,
+    /// Reference forces of the table: smallest and largest.
+    pub reference_range_n: (f64, f64),
+    /// Remarks for people.
+    pub notes: Vec<String>,
+}
+
+/// Fits gain and offset of every session by least squares. The 90 % intervals hold for residuals as correlated as the
+/// measured ones: white noise beside a first-order autoregression, simulated. The error says what is missing.
+pub fn calibrate_sensor(data: &SensorData) -> Result<SensorCalibration, String> {
+    let prepared = prepare(data, SensorOptions::default().most_rows)?;
+    let noise = baseline_noise(&prepared);
+    let fit = joint_fit(&prepared, &[], noise, true);
+    let estimates: Vec<SessionCalibration> = fit
+        .sessions
+        .iter()
+        .zip(&prepared.names)
+        .enumerate()
+        .map(|(s, (&([offset, gain], [offset90, gain90]), name))| {
+            let left: Vec<f64> = (0..prepared.session.len())
+                .filter(|&i| prepared.session[i] == s)
+                .map(|i| prepared.measured[i] - offset - gain * prepared.reference_n[i])
+                .collect();
+            let power: f64 = left.iter().map(|r| r * r).sum();
+            let next: f64 = left.windows(2).map(|w| w[0] * w[1]).sum();
+            SessionCalibration {
+                name: name.clone(),
+                rows: left.len(),
+                gain: estimate(gain, gain90, "1"),
+                offset: estimate(offset, offset90, "N"),
+                rmse_n: libm::sqrt(power / left.len() as f64),
+                lag_one: if power > 0.0 { next / power } else { 0.0 },
+            }
+        })
+        .collect();
+    let reference_range_n = super::prepare::range(prepared.reference_n.iter().copied());
+    Ok(SensorCalibration { sessions: estimates, reference_range_n, notes: prepared.notes })
+}
+
+/// Value and half length of its interval.
+pub(crate) fn estimate(value: f64, half90: f64, unit: &str) -> ParameterEstimate {
+    ParameterEstimate { value, low90: value - half90, high90: value + half90, unit: unit.into() }
+}
+
+/// The noise beside gain and offset.
+fn baseline_noise(prepared: &Prepared) -> Noise {
+    let columns = [
+        vec![1.0; prepared.groups.len()],
+        prepared.grouped(&chain(prepared, &[])),
+        prepared.grouped(&prepared.measured),
+    ];
+    let n = prepared.groups.len() as f64;
+    fit_noise(|noise| {
+        let whitener = Whitener::new(noise, &prepared.group_steps);
+        let mut weighed = columns.to_vec();
+        for column in &mut weighed {
+            whitener.apply(column);
+        }
+        let left = Moments::new(&prepared.units, &weighed).solve(&Model::baseline(), |_| true).left;
+        0.5 * (n * libm::log((left / n).max(f64::MIN_POSITIVE)) + whitener.log_determinant)
+    })
+    .0
+}

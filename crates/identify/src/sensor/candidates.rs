@@ -1,0 +1,292 @@
+//! What may be missing: effects of the library on a grid of their inner parameter, and curves without a name.
+
+use super::prepare::{Prepared, range};
+use super::{SensorData, moments::Model};
+use crate::permutation::Covariate;
+use gripgen_twin::effects::{EffectSpec, SensorMemory, SensorPoint, find};
+
+/// Effects that compete. Gain and bias are the baseline.
+pub(crate) const EFFECTS: [&str; 7] = [
+    "sensor_drift",
+    "sensor_gain_drift",
+    "sensor_quadratic",
+    "sensor_saturation",
+    "sensor_lowpass",
+    "sensor_creep",
+    "sensor_hysteresis",
+];
+
+/// Name of the derivative of the reference in an answer.
+pub(crate) const FORCE_RATE: &str = "force_rate_n_per_s";
+
+/// How a candidate enters the model at one point of its grid.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Change {
+    /// Columns with a coefficient each; the value of the first lies within the bounds.
+    Add(Vec<usize>, (f64, f64)),
+    /// A column that is added to the force.
+    Force(usize),
+}
+
+impl Change {
+    pub fn on(&self, model: &Model) -> Model {
+        match self {
+            Change::Add(columns, _) => model.with(columns),
+            Change::Force(column) => model.changed(*column),
+        }
+    }
+
+    /// Columns with a coefficient.
+    pub fn size(&self) -> usize {
+        match self {
+            Change::Add(columns, _) => columns.len(),
+            Change::Force(_) => 0,
+        }
+    }
+}
+
+/// What a candidate is.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Kind {
+    /// Of the library.
+    Effect(&'static EffectSpec),
+    /// A curve in this covariate.
+    Curve(String),
+}
+
+/// One that may be missing.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Candidate {
+    pub kind: Kind,
+    /// Points of the grid: inner parameter (by position) with its value, and the change.
+    pub points: Vec<(Option<(usize, f64)>, Change)>,
+}
+
+impl Candidate {
+    /// Id or covariate.
+    pub fn name(&self) -> &str {
+        match &self.kind {
+            Kind::Effect(spec) => spec.id,
+            Kind::Curve(covariate) => covariate,
+        }
+    }
+
+    pub fn is_effect(&self) -> bool {
+        matches!(self.kind, Kind::Effect(_))
+    }
+}
+
+/// Reading of a chain of effects on the reference forces, each session from the start.
+pub(crate) fn chain(prepared: &Prepared, effects: &[(&EffectSpec, &[f64])]) -> Vec<f64> {
+    let mut memories = vec![SensorMemory::default(); effects.len()];
+    (0..prepared.reference_n.len())
+        .map(|i| {
+            if i > 0 && prepared.session[i] != prepared.session[i - 1] {
+                memories.fill(SensorMemory::default());
+            }
+            let at = SensorPoint { clock_s: prepared.clock_s[i], step_s: prepared.step_s[i] };
+            effects.iter().zip(&mut memories).fold(
+                prepared.reference_n[i],
+                |force, ((spec, values), memory)| {
+                    spec.sensor.map_or(force, |hook| hook(values, force, memory, &at))
+                },
+            )
+        })
+        .collect()
+}
+
+/// Position of the parameter that sets the size of an effect; the others give its shape.
+pub(crate) fn size_parameter(spec: &EffectSpec) -> usize {
+    // The library lists the size first; an effect with one parameter has nothing else.
+    debug_assert!(!spec.parameters.is_empty());
+    0
+}
+
+/// Bounds of a parameter in this table. Those of the library are for campaigns of hours; in a table of seconds a change
+/// by the whole range is no more than that, whatever it would be in an hour.
+pub(crate) fn bounds(spec: &EffectSpec, parameter: usize, prepared: &Prepared) -> (f64, f64) {
+    let (low, high) = spec.parameters[parameter].bounds;
+    let hours = prepared.whole_s() / 3600.0;
+    let (bottom, top) = range(prepared.reference_n.iter().copied());
+    let most = top.abs().max(bottom.abs());
+    let wide = match (spec.id, spec.parameters[parameter].name) {
+        ("sensor_drift", _) => (top - bottom) / hours,
+        ("sensor_gain_drift", _) => 0.9 / hours,
+        ("sensor_quadratic", _) => 0.9 / most,
+        ("sensor_saturation", _) => return (low.min(0.2 * most), most),
+        _ => return (low, high),
+    };
+    (low.min(-wide), high.max(wide))
+}
+
+/// Values of the inner parameter of an effect that are tried.
+fn grid(spec: &EffectSpec, prepared: &Prepared) -> Option<(usize, Vec<f64>)> {
+    let (bottom, top) = range(prepared.reference_n.iter().copied());
+    let most = top.abs().max(bottom.abs());
+    let mut steps = prepared.step_s.clone();
+    steps.sort_by(f64::total_cmp);
+    let step_s = steps[steps.len() / 2];
+    let between = |low: f64, high: f64, count: usize| -> Vec<f64> {
+        let ratio = libm::log(high / low) / (count - 1) as f64;
+        (0..count).map(|k| low * libm::exp(ratio * k as f64)).collect()
+    };
+    match spec.id {
+        "sensor_saturation" => {
+            Some((0, (0..24).map(|k| most * (0.4 + 0.599 * f64::from(k) / 23.0)).collect()))
+        }
+        "sensor_lowpass" => {
+            let low = (0.3 * step_s).min(0.5);
+            Some((0, between(low, (0.1 * prepared.longest_s()).clamp(2.0 * low, 2.0), 14)))
+        }
+        "sensor_creep" => {
+            let low = (1.5 * step_s).max(0.1);
+            Some((1, between(low, prepared.longest_s().clamp(4.0 * low, 3600.0), 14)))
+        }
+        "sensor_hysteresis" => {
+            let low = (0.01 * (top - bottom)).max(0.1);
+            Some((1, between(low, (top - bottom).clamp(2.0 * low, 100.0), 8)))
+        }
+        _ => None,
+    }
+}
+
+/// Candidates and their columns; columns 0 (constant) and 1 (reference) come first, the measured force is not among
+/// them. `gains` are those of the sessions: columns of effects are in the units of the measured force.
+pub(crate) fn candidates(
+    data: &SensorData,
+    prepared: &Prepared,
+    gains: &[f64],
+) -> (Vec<Candidate>, Vec<Vec<f64>>) {
+    let sessions = prepared.group_session();
+    let scaled = |full: &[f64]| -> Vec<f64> {
+        prepared.grouped(full).iter().zip(&sessions).map(|(v, &s)| v * gains[s]).collect()
+    };
+    let reference = prepared.grouped(&prepared.reference_n);
+    let mut columns = vec![vec![1.0; reference.len()], reference];
+    let mut all = Vec::new();
+    for spec in EFFECTS.into_iter().filter_map(find) {
+        let neutral: Vec<f64> = spec.parameters.iter().map(|p| p.neutral).collect();
+        let inner = grid(spec, prepared);
+        let places: Vec<Option<(usize, f64)>> = match &inner {
+            Some((parameter, values)) => values.iter().map(|&v| Some((*parameter, v))).collect(),
+            None => vec![None],
+        };
+        let size = size_parameter(spec);
+        let points = places
+            .into_iter()
+            .map(|place| {
+                let mut values = neutral.clone();
+                if let Some((parameter, value)) = place {
+                    values[parameter] = value;
+                }
+                let only_inner = place.is_some_and(|(parameter, _)| parameter == size);
+                if !only_inner {
+                    values[size] = 1.0;
+                }
+                let changed = chain(prepared, &[(spec, &values)]);
+                let difference: Vec<f64> =
+                    changed.iter().zip(&prepared.reference_n).map(|(a, b)| a - b).collect();
+                columns.push(if only_inner { prepared.grouped(&difference) } else { scaled(&difference) });
+                let column = columns.len() - 1;
+                let change = if only_inner {
+                    Change::Force(column)
+                } else {
+                    Change::Add(vec![column], bounds(spec, size, prepared))
+                };
+                (place, change)
+            })
+            .collect();
+        all.push(Candidate { kind: Kind::Effect(spec), points });
+    }
+    let mut curve = |name: &str, full: Vec<Vec<f64>>| {
+        let from = columns.len();
+        columns.extend(full.iter().map(|c| prepared.grouped(c)));
+        let change = Change::Add((from..columns.len()).collect(), (f64::NEG_INFINITY, f64::INFINITY));
+        (Kind::Curve(name.to_string()), change)
+    };
+    let mut add = |(kind, change): (Kind, Change)| match all.iter_mut().find(|c| c.kind == kind) {
+        Some(known) => known.points.push((None, change)),
+        None => all.push(Candidate { kind, points: vec![(None, change)] }),
+    };
+    let x = &prepared.reference_n;
+    let times = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        columns.iter().map(|c| c.iter().zip(x).map(|(a, b)| a * b).collect()).collect()
+    };
+    let clock = hats(&prepared.clock_s, 5);
+    add(curve("time_s", clock.clone()));
+    add(curve("time_s", times(&clock)));
+    add(curve("reference_force_n", hats(x, 3)));
+    add(curve(FORCE_RATE, hats(&force_rate(prepared), 3)));
+    for (name, covariate) in &data.extra {
+        if let Some(shapes) = shapes(covariate, prepared) {
+            add(curve(name, shapes.clone()));
+            add(curve(name, times(&shapes)));
+        }
+    }
+    (all, columns)
+}
+
+/// Change of the reference in a second, over two steps.
+pub(crate) fn force_rate(prepared: &Prepared) -> Vec<f64> {
+    let n = prepared.reference_n.len();
+    let same = |a: usize, b: usize| prepared.session[a] == prepared.session[b];
+    (0..n)
+        .map(|i| {
+            let from = if i > 0 && same(i - 1, i) { i - 1 } else { i };
+            let to = if i + 1 < n && same(i, i + 1) { i + 1 } else { i };
+            let time = prepared.clock_s[to] - prepared.clock_s[from];
+            if time > 0.0 { (prepared.reference_n[to] - prepared.reference_n[from]) / time } else { 0.0 }
+        })
+        .collect()
+}
+
+/// A straight line and a piecewise linear curve with inner knots at quantiles.
+fn hats(values: &[f64], knots: usize) -> Vec<Vec<f64>> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let (low, high) = (sorted[0], sorted[sorted.len() - 1]);
+    let scale = if high > low { 1.0 / (high - low) } else { 0.0 };
+    let unit = |v: f64| (v - low) * scale;
+    let mut columns: Vec<Vec<f64>> = vec![values.iter().map(|&v| unit(v)).collect()];
+    for k in 1..=knots {
+        let knot = unit(sorted[k * (sorted.len() - 1) / (knots + 1)]);
+        if knot > 0.02 && knot < 0.98 {
+            columns.push(values.iter().map(|&v| (unit(v) - knot).max(0.0)).collect());
+        }
+    }
+    columns
+}
+
+/// Columns of a covariate, if it varies; a missing value counts as the mean.
+fn shapes(covariate: &Covariate, prepared: &Prepared) -> Option<Vec<Vec<f64>>> {
+    if !covariate.varies() {
+        return None;
+    }
+    let known: Vec<bool> = prepared.row.iter().map(|&i| covariate.is_known(i)).collect();
+    let count = known.iter().filter(|k| **k).count();
+    if count < 12 {
+        return None;
+    }
+    match covariate {
+        Covariate::Number(values) => {
+            let at = |i: usize| values[prepared.row[i]];
+            let mean = (0..known.len()).filter(|&i| known[i]).map(at).sum::<f64>() / count as f64;
+            let filled: Vec<f64> = (0..known.len()).map(|i| if known[i] { at(i) } else { mean }).collect();
+            let (low, high) = range(filled.iter().copied());
+            (high > low).then(|| hats(&filled, 3))
+        }
+        Covariate::Word(values) => {
+            let mut words: Vec<u32> =
+                (0..known.len()).filter(|&i| known[i]).map(|i| values[prepared.row[i]]).collect();
+            words.sort_unstable();
+            words.dedup();
+            if words.len() < 2 || words.len() > 12 {
+                return None;
+            }
+            let column = |word: &u32| -> Vec<f64> {
+                prepared.row.iter().map(|&i| f64::from(u8::from(values[i] == *word))).collect()
+            };
+            Some(words.iter().skip(1).map(column).collect())
+        }
+    }
+}
