@@ -10,6 +10,8 @@ mod common;
 mod config;
 // The same bytes for any number of threads, slices, vector units, and after an interruption.
 mod determinism;
+// Diagnoses of pulls.
+mod diagnose;
 // Lost grips of a real robot, by rows and by events.
 mod event_log;
 // Effects of the library, through the whole pipeline.

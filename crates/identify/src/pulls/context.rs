@@ -121,7 +121,7 @@ impl<'a> Context<'a> {
         }
         for _ in 0..2 {
             self.fit_dynamics(raw);
-            if let Some(fall_s) = fall_s(raw) {
+            if let Some(fall_s) = fall_s(raw, self.base.noise_n) {
                 self.base.fall_s = fall_s;
             }
             if let Some(damping) = self.damping(raw) {
@@ -375,7 +375,7 @@ fn dynamics(base: &PullModel) -> [FreeParameter; 2] {
 }
 
 /// Time constant of the fall after a slip: the area above the kinetic force, over the drop, of all traces that drop by much.
-fn fall_s(raw: &[TraceObservation]) -> Option<f64> {
+fn fall_s(raw: &[TraceObservation], noise_n: f64) -> Option<f64> {
     let mut each: Vec<f64> = raw
         .iter()
         .filter_map(|t| {
@@ -388,13 +388,14 @@ fn fall_s(raw: &[TraceObservation]) -> Option<f64> {
             let kinetic = half.iter().map(|r| r.1).sum::<f64>() / half.len() as f64;
             let limit = t.held_n[n - 4..].iter().sum::<f64>() / 4.0;
             let step_s = t.slid_rows[1].0 - t.slid_rows[0].0;
-            // From two rows before the slide was seen: it has begun by then.
-            let first = t.held_n[n - 2..].iter().copied();
-            let rows = first.chain(t.slid_rows[..t.slid_rows.len() / 2].iter().map(|r| r.1));
-            let area: f64 = rows.map(|f| (f - kinetic) * step_s).sum();
             let drop = limit - kinetic;
-            // What is left of the rows before the slip.
-            (drop > 0.6).then(|| area / drop - 2.0 * step_s)
+            // From the last reading near the limit on: nothing, on average, of a force that falls at once.
+            let first = t.held_n[n - 4..].iter().copied();
+            let share: Vec<f64> =
+                first.chain(t.slid_rows.iter().map(|r| r.1)).map(|f| (f - kinetic) / drop).collect();
+            let near = share.iter().rposition(|u| *u > 0.75)?;
+            let area: f64 = share[near + 1..].iter().take(8).sum::<f64>() * step_s;
+            (drop > 0.6 && drop > 6.0 * noise_n).then_some(area)
         })
         .collect();
     each.sort_by(f64::total_cmp);
