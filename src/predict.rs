@@ -407,6 +407,10 @@ impl PredictPulls for PullPredictor<'_> {
             .collect()
     }
 
+    fn winds_up(&self) -> bool {
+        self.robot.feedback == Feedback::Measured
+    }
+
     fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync)) {
         let next = AtomicUsize::new(0);
         std::thread::scope(|scope| {

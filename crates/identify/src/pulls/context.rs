@@ -124,7 +124,9 @@ impl<'a> Context<'a> {
             if let Some(fall_s) = fall_s(raw, self.base.noise_n) {
                 self.base.fall_s = fall_s;
             }
-            if let Some(damping) = self.damping(raw) {
+            if !self.predictor.winds_up()
+                && let Some(damping) = self.damping(raw)
+            {
                 self.base.damping_n_s_per_m = damping;
             }
         }

@@ -111,6 +111,12 @@ pub trait PredictPulls: Sync {
         self.traces(model, &[(row, times_s)]).pop().unwrap_or_default()
     }
 
+    /// Whether the force loop closes on its sensor: it then winds up while the jaws slide, and how fast they do says nothing
+    /// about its damping.
+    fn winds_up(&self) -> bool {
+        false
+    }
+
     /// Calls `task` for 0..n, in parallel where that is possible. Each call stands for itself.
     fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync)) {
         (0..n).for_each(task);

@@ -6,8 +6,8 @@ use gripgen_twin::{MeasuredPull, PullTrace};
 /// Levels of force at which the readings before a slip are averaged.
 pub const LEVELS: usize = 6;
 
-/// Displacement beyond that of the sheared gels at which the jaws have slipped.
-const SLID_M: f64 = 0.12e-3;
+/// Displacement beyond that of the sheared gels at which the jaws have slipped, if noise allows to see it.
+const SLID_M: f64 = 0.03e-3;
 
 /// Time at the start of a pull that is left out: the response of an arm is of higher order than its model.
 const START_S: f64 = 0.25;
@@ -108,12 +108,11 @@ fn slip_row(rows: &[(f64, f64)], noise_n: f64) -> Option<usize> {
     }
     let compliance = if ff > 0.0 { (fx / ff).max(0.0) } else { 0.0 };
     let beyond = |i: usize| rows[i].1 - x0 - compliance * rows[i].0;
-    // Noise of the displacement as the rows show it.
-    let steps: Vec<f64> = rows.windows(2).map(|w| (w[1].1 - w[0].1).abs()).collect();
-    let mut sorted = steps;
-    sorted.sort_by(f64::total_cmp);
-    let jitter = sorted[sorted.len() / 2] * 3.0;
-    let threshold = SLID_M.max(jitter);
+    // Noise of the displacement from its second differences, which a steady motion does not have.
+    let mut bends: Vec<f64> =
+        rows[..n / 2 + 2].windows(3).map(|w| (w[2].1 - 2.0 * w[1].1 + w[0].1).abs()).collect();
+    bends.sort_by(f64::total_cmp);
+    let threshold = SLID_M.max(5.0 * 0.605 * bends[bends.len() / 2]);
     if beyond(n - 1) <= threshold {
         return None;
     }
