@@ -241,12 +241,19 @@ fn evidence(fits: &PullFits, answer: &PullAnswer) -> Vec<EvidenceRow> {
         free.map(|(p, v)| format!("{} {v:.4}", p.name)).collect::<Vec<_>>().join(", ")
     };
     let d = &answer.diagnosis;
+    // A curve in a covariate of a named effect says the same with more parameters.
+    let own = |name: &str| {
+        let column = name.strip_prefix("curve in ");
+        let specs = d.effects.iter().filter_map(|e| find(&e.name));
+        column.is_some_and(|c| specs.into_iter().any(|spec| spec.covariates.contains(&c)))
+    };
     let fate = |name: &str| {
         let tied = d.effects.iter().find(|e| e.indistinguishable_from.iter().any(|r| r.name == name));
         let unknown = d.unknown.iter().any(|u| name.strip_prefix("curve in ") == Some(u.covariate.as_str()));
         match tied {
             _ if d.effects.iter().any(|e| e.name == name) || unknown => "named".to_string(),
             Some(effect) => format!("not told apart from {}", effect.name),
+            None if own(name) => "the same covariate without a name".into(),
             None => "worse".into(),
         }
     };
@@ -258,7 +265,14 @@ fn evidence(fits: &PullFits, answer: &PullAnswer) -> Vec<EvidenceRow> {
         values: values(entry),
         fate: fate(&name(entry)),
     };
-    fits.accepted.entries.iter().take(CANDIDATES).map(row).collect()
+    // Best first, so of several curves in one column the best stays.
+    let mut rows: Vec<EvidenceRow> = Vec::new();
+    for entry in fits.accepted.entries.iter().map(row) {
+        if rows.len() < CANDIDATES && !rows.iter().any(|r| r.name == entry.name) {
+            rows.push(entry);
+        }
+    }
+    rows
 }
 
 fn worst(measured: &MeasuredPulls, fits: &PullFits) -> Vec<WorstRow> {
