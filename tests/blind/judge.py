@@ -6,7 +6,17 @@ import numpy as np
 
 # Parameters of an answer that mean the same as the truth's size: name of the effect, then
 # which parameter names count and how the size is expressed.
-COMPARABLE = {}
+COMPARABLE = {
+    "grip_force_loss": (["loss_n"], lambda act: act["size"]),
+    "jaw_tilt": (["tilt_deg"], lambda act: act["size"]),
+    "sensor_bias": (["bias_n"], lambda act: act["size"]),
+    "sensor_gain": (["gain"], lambda act: 1 + act["size"]),
+    "controller_gain": (["gain"], lambda act: 1 + act["size"]),
+    "contamination": (["drop"], lambda act: act["size"]),
+    "temperature": (["k_per_k"], lambda act: act["size"]),
+    "deadband": (["width_n", "deadband_n", "band_n"], lambda act: act["size"]),
+    "sensor_lowpass": (["tau_s"], lambda act: act["size"]),
+}
 SETTLED = 1.9  # multiples of the detectable size from which naming is asked for
 
 

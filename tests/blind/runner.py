@@ -58,8 +58,11 @@ def read_answer(report):
     return answer
 
 
-def diagnose(campaign, unseen, work, limit_s=240, before=True):
-    """diagnose, then compare on the unseen pulls; `GRIPGEN_BIN` names the binary."""
+def diagnose(campaign, unseen, work, limit_s=240, before=True, errors=True):
+    """diagnose, then compare on the unseen pulls; `GRIPGEN_BIN` names the binary.
+
+    Without `errors` only what was named is looked at, no twin is written.
+    """
     binary = os.environ.get("GRIPGEN_BIN", "gripgen")
     work = Path(work)
     work.mkdir(parents=True, exist_ok=True)
@@ -67,7 +70,8 @@ def diagnose(campaign, unseen, work, limit_s=240, before=True):
     for old in (report, twin):
         old.unlink(missing_ok=True)
     answer = Answer()
-    _, why, spent = _call([binary, "diagnose", str(campaign), "--json", str(report), "-o", str(twin)], limit_s)
+    command = [binary, "diagnose", str(campaign), "--json", str(report)] + (["-o", str(twin)] if errors else [])
+    _, why, spent = _call(command, limit_s)
     if why:
         answer.reason, answer.seconds = why, spent
         return answer
@@ -76,6 +80,8 @@ def diagnose(campaign, unseen, work, limit_s=240, before=True):
     except (OSError, ValueError, KeyError, TypeError) as error:
         return Answer(reason=f"unreadable report: {error!r}", seconds=spent)
     answer.seconds = spent
+    if not errors:
+        return answer
     answer.rmse_after_n, answer.reason = _compare(binary, unseen, twin, limit_s)
     if before:
         fitted = work / "fitted.toml"

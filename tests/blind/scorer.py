@@ -94,13 +94,14 @@ def main(arguments=None):
     parser.add_argument("--limit-s", type=float, default=240)
     parser.add_argument("--only", default="", help="comma list of campaign names")
     parser.add_argument("--no-before", action="store_true")
+    parser.add_argument("--names-only", action="store_true", help="no errors on unseen pulls")
     parser.add_argument("--work", default=None, help="where reports and twins go")
     args = parser.parse_args(arguments)
     work = args.work or args.folder.rstrip("/") + "-work"
     only = [n for n in args.only.split(",") if n]
 
     def tool(campaign, unseen, place):
-        return runner.diagnose(campaign, unseen, place, args.limit_s, not args.no_before)
+        return runner.diagnose(campaign, unseen, place, args.limit_s, not args.no_before, not args.names_only)
 
     records, seal = score(args.folder.rstrip("/"), work, tool, args.jobs, only)
     result = judge.summary(list(records.values()))
