@@ -32,7 +32,7 @@ def build(case, seed, name, open_folder, sealed_folder):
     seen = folders.measured_ledger(led, rng)
     place = Path(open_folder) / name
     folders.write_campaign(place, seen, label, design["distractors"])
-    which = {"fourth": range(0, n, 4), "all": range(n), "none": []}[design["traces"]]
+    which = {"fourth": range(0, n, 4), "all": range(n), "few": range(0, n, 8), "none": []}[design["traces"]]
     if len(which):
         folders.write_traces(place, which, out, noisy, world, rng)
 

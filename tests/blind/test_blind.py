@@ -214,16 +214,20 @@ def test_scorer_reads_campaign_and_seal(tmp_path, monkeypatch):
 
 # --- the binary -----------------------------------------------------------------------
 
+def small(group, kind, acts, **design):
+    """A campaign of one part and few traces, so that a debug build is soon done."""
+    return {"group": group, "kind": kind, "acts": acts, "design": dict({"parts": 1, "increments": [1.0], "traces": "few"}, **design)}
+
+
 SMALL = [
-    {"group": "A", "kind": "plain", "acts": [], "design": {"count": 60, "parts": 1}},
-    {"group": "A", "kind": "outliers", "acts": [], "design": {"count": 80, "parts": 1}},
-    {"group": "B", "kind": "one", "acts": [("dwell_ageing", 4)], "design": dict(cases.EXCITES["dwell_ageing"], count=60)},
-    {"group": "B", "kind": "one", "acts": [("sensor_bias", 4)], "design": dict(cases.EXCITES["sensor_bias"], count=60)},
-    {"group": "B", "kind": "one", "acts": [("anisotropy", 4)], "design": dict(cases.EXCITES["anisotropy"], count=70)},
-    {"group": "B", "kind": "one", "acts": [("jaw_tilt", 4)], "design": dict(cases.EXCITES["jaw_tilt"], count=60)},
-    {"group": "D", "kind": "operator", "acts": [("operator", 4)], "design": {"count": 80, "distractors": ["operator"]}},
-    {"group": "E", "kind": "few", "acts": [("load_offset", 2)], "design": {
-        "count": 9, "forces": [5.0, 20.0, 80.0], "parts": 1, "traces": "all"}},
+    small("A", "plain", [], count=40),
+    small("A", "outliers", [], count=50),
+    small("B", "one", [("dwell_ageing", 4)], count=40, dwells=[0.5, 3.0, 20.0, 90.0], forces="few"),
+    small("B", "one", [("sensor_bias", 4)], count=40, directions=[1, -1]),
+    small("B", "one", [("anisotropy", 4)], count=42, angles=[0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0], forces="few"),
+    small("B", "one", [("jaw_tilt", 4)], count=40, directions=[1, -1]),
+    small("D", "operator", [("operator", 4)], count=50, distractors=["operator"]),
+    small("E", "few", [("load_offset", 2)], count=9, forces=[5.0, 20.0, 80.0]),
 ]
 
 
@@ -233,7 +237,7 @@ def test_small_set_through_the_binary(tmp_path):
     out, sealed = tmp_path / "set", tmp_path / "set-sealed"
     lines = [f"{generator.build(c, 100 + i, f'c{i:03d}', out, sealed)}  c{i:03d}\n" for i, c in enumerate(SMALL)]
     (sealed / "SHA256").write_text("".join(lines))
-    records, _ = scorer.score(out, tmp_path / "work", lambda *a: runner.diagnose(*a, limit_s=100, before=False), jobs=2)
+    records, _ = scorer.score(out, tmp_path / "work", lambda *a: runner.diagnose(*a, limit_s=240, before=False), jobs=2)
     shown = scorer.details(records)
     rows = list(records.values())
     assert not any(r["failed"] for r in rows), shown
