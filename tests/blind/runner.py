@@ -99,3 +99,17 @@ def _compare(binary, unseen, twin, limit_s):
         return float(json.loads(text)["pulls"]["rmse_n"]), ""
     except (ValueError, KeyError, TypeError) as error:
         return None, f"compare: {error!r}"
+
+
+def collect(unseen, place, limit_s=120):
+    """Scores a report and a twin that a run has left in `place`; only compare is run."""
+    place = Path(place)
+    try:
+        answer = read_answer(json.loads((place / "report.json").read_text(encoding="utf-8")))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        return Answer(reason=f"unreadable report: {error!r}")
+    twin = next((place / n for n in ("diagnosed.toml", "twin.toml") if (place / n).is_file()), None)
+    if twin is not None:
+        binary = os.environ.get("GRIPGEN_BIN", "gripgen")
+        answer.rmse_after_n, answer.reason = _compare(binary, unseen, twin, limit_s)
+    return answer

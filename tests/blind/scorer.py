@@ -94,6 +94,7 @@ def main(arguments=None):
     parser.add_argument("--limit-s", type=float, default=240)
     parser.add_argument("--only", default="", help="comma list of campaign names")
     parser.add_argument("--no-before", action="store_true")
+    parser.add_argument("--reports", action="store_true", help="score what an earlier run left in --work")
     parser.add_argument("--names-only", action="store_true", help="no errors on unseen pulls")
     parser.add_argument("--work", default=None, help="where reports and twins go")
     args = parser.parse_args(arguments)
@@ -101,6 +102,8 @@ def main(arguments=None):
     only = [n for n in args.only.split(",") if n]
 
     def tool(campaign, unseen, place):
+        if args.reports:
+            return runner.collect(unseen, place, args.limit_s)
         return runner.diagnose(campaign, unseen, place, args.limit_s, not args.no_before, not args.names_only)
 
     records, seal = score(args.folder.rstrip("/"), work, tool, args.jobs, only)
