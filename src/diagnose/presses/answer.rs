@@ -113,6 +113,16 @@ impl Answer<'_> {
         if self.input.set.rest.is_none() {
             diagnosis.not_recorded.push("rest.png".into());
         }
+        if let (Some(before), Some(after)) =
+            (rest_difference(self, &[]), rest_difference(self, &self.found.model.acting))
+        {
+            let levels = |d: [f64; 3]| d.map(|v| format!("{v:.1}")).join(", ");
+            diagnosis.notes.push(format!(
+                "the frame without contact of the set differs from the sensor file's by {} grey levels (red, green, blue) on average, under the effects that were found by {}",
+                levels(before),
+                levels(after)
+            ));
+        }
         diagnosis.data.outliers = self.outliers();
         let pair = |after: &[f64]| ErrorPair { before: interval(&errors.before), after: interval(after) };
         let drawn = pair(&errors.after);
@@ -330,11 +340,11 @@ impl FrameErrors {
     }
 }
 
-/// The rest frame under the effects against the one of the set: mean difference of each channel.
-#[allow(dead_code)]
-pub(super) fn rest_difference(answer: &Answer<'_>) -> Option<[f64; 3]> {
+/// The frame without contact of the set against that of the sensor file under some effects at the start: mean
+/// difference of each channel.
+fn rest_difference(answer: &Answer<'_>, acting: &[Acting]) -> Option<[f64; 3]> {
     let rest = answer.input.set.rest.as_ref()?;
-    let optics = optics_at(&Default::default(), &answer.found.model.acting);
+    let optics = optics_at(&Default::default(), acting);
     let change = answer.work.full.change_seen(None, &optics);
     let n = change[0].values.len() as f64;
     Some([0, 1, 2].map(|c| {

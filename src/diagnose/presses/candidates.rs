@@ -38,7 +38,7 @@ pub(super) fn free_parameter(spec: &EffectSpec, j: usize, scene: &PressScene) ->
         ("gel_kernel", _) => (1.0, 0.1),
         ("cad_mismatch", "offset_mm") => (0.0, px_mm),
         ("cad_mismatch", _) => (2.0 * px_mm, px_mm),
-        ("cast_shadow", "strength") => (0.1, 0.1),
+        ("cast_shadow", "strength") => (0.03, 0.05),
         ("cast_shadow", _) => (20.0, 5.0),
         ("gel_dome", _) => (0.0, 0.3),
         _ => (p.neutral, 0.1 * (p.bounds.1 - p.bounds.0)),

@@ -1,7 +1,7 @@
 //! Candidates fitted and scored on presses that their fit has not seen.
 
 use super::candidates::{STEP_PARAMETER, is_drawn};
-use super::work::{Acting, NamedModel, Work};
+use super::work::{Acting, Head, NamedModel, Work};
 use gripgen_identify::{
     FreeParameter, GroupMoments, GroupedFit, fit_grouped, fold_steps, grouped_step, held_out_costs,
 };
@@ -100,59 +100,71 @@ pub(super) fn scored(work: &Work, design: &Design, acting: Vec<Acting>) -> Score
     Scored { acting: model.at(&fit.values), free: model.free, parameters: model.parameters, fit, held_out }
 }
 
-/// A candidate that cannot lower the cost by `least`, as its first step shows; drawing pictures for a fit would be
-/// in vain.
-fn faint(work: &Work, design: &Design, acting: &[Acting], least: f64) -> Option<Scored> {
-    let model = NamedModel::new(work, acting.to_vec());
-    let values: Vec<f64> = model.parameters.iter().map(|p| p.start).collect();
-    let fit = GroupedFit { moments: gripgen_identify::GroupedModel::moments(&model, &values), values };
-    let step = grouped_step(&model.parameters, &fit.values, &fit.moments, &design.weights);
-    let reached: Vec<f64> = fit.moments.iter().map(|m| m.cost_after(&step)).collect();
-    let without = scored(work, design, acting[..acting.len() - 1].to_vec());
-    if design.mean(&differences(&without.held_out, &reached)).0 > least {
-        return None;
-    }
-    let held_out = held_out_costs(&model.parameters, &fit, &design.weights, &design.folds);
-    let values: Vec<f64> = fit.values.iter().zip(step.iter()).map(|(v, s)| v + s).collect();
-    Some(Scored { acting: model.at(&values), free: model.free, parameters: model.parameters, fit, held_out })
-}
-
 /// Differences press by press.
 pub(super) fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// The effects of `model` with one more; `least`: a gain that would count. A change of background is tried from every press on.
+/// What a candidate is added to: accepted effects with what their parameters do.
+pub(super) struct Base<'a> {
+    pub(super) acting: &'a [Acting],
+    pub(super) held_out: &'a [f64],
+    pub(super) head: Head,
+}
+
+impl<'a> Base<'a> {
+    pub(super) fn new(work: &Work, scored: &'a Scored) -> Self {
+        let head = Head::new(work, &scored.acting);
+        Self { acting: &scored.acting, held_out: &scored.held_out, head }
+    }
+}
+
+/// The accepted effects with one more, which alone is fitted; the others follow to first order. `least`: a gain that
+/// would count; a candidate whose first step does not show it is not drawn for a fit. A change of background is tried
+/// from every press on.
 pub(super) fn with(
     work: &Work,
     design: &Design,
-    model: &[Acting],
+    base: &Base<'_>,
     spec: &'static EffectSpec,
     least: f64,
 ) -> Scored {
-    let mut acting = model.to_vec();
+    let mut acting = base.acting.to_vec();
     acting.push(Acting::start(spec, &work.scene));
-    let Some(at) = spec.parameters.iter().position(|p| p.name == STEP_PARAMETER) else {
-        if is_drawn(spec)
-            && let Some(faint) = faint(work, design, &acting, least)
-        {
-            return faint;
+    if let Some(at) = spec.parameters.iter().position(|p| p.name == STEP_PARAMETER) {
+        let place = step_place(work, design, &acting, at);
+        if let Some(last) = acting.last_mut() {
+            last.values[at] = place;
         }
-        return scored(work, design, acting);
-    };
-    let place = step_place(work, design, &acting, at);
-    if let Some(last) = acting.last_mut() {
-        last.values[at] = place;
     }
-    scored(work, design, acting)
+    let model = NamedModel::last(work, acting);
+    let (free, parameters) = model.behind(&base.head);
+    let whole = |tail: &[f64]| -> GroupedFit {
+        let values = base.head.values().chain(tail.iter().copied()).collect();
+        GroupedFit { values, moments: model.moments_behind(&base.head, tail) }
+    };
+    let start: Vec<f64> = model.parameters.iter().map(|p| p.start).collect();
+    let mut fit = whole(&start);
+    let step = grouped_step(&parameters, &fit.values, &fit.moments, &design.weights);
+    let reached: Vec<f64> = fit.moments.iter().map(|m| m.cost_after(&step)).collect();
+    let promise = design.mean(&differences(base.held_out, &reached)).0;
+    let known = base.head.values().count();
+    let mut values: Vec<f64> = (known..fit.values.len()).map(|k| fit.values[k] + step[k]).collect();
+    if !is_drawn(spec) || promise > least {
+        let found = fit_grouped(&model.parameters, MOST_STEPS, &design.weights, &model);
+        fit = whole(&found.values);
+        values = found.values;
+    }
+    let held_out = held_out_costs(&parameters, &fit, &design.weights, &design.folds);
+    Scored { acting: model.at(&values), free, parameters, fit, held_out }
 }
 
 /// The pull index from which on the last effect of a model explains most, held out.
 fn step_place(work: &Work, design: &Design, acting: &[Acting], at: usize) -> f64 {
-    let model = NamedModel::new(work, acting.to_vec());
+    let model = NamedModel::last(work, acting.to_vec());
     let values: Vec<f64> = model.parameters.iter().map(|p| p.start).collect();
     let moments = gripgen_identify::GroupedModel::moments(&model, &values);
-    let own: Vec<bool> = model.free.iter().map(|&(e, _)| e + 1 == acting.len()).collect();
+    let own = vec![true; model.free.len()];
     let n = moments.len();
     let index = |i: usize| work.circumstances[i].pull_index as f64;
     let neutral = acting.last().map_or(0.0, |a| a.spec.parameters[at].neutral);

@@ -1,7 +1,7 @@
 //! Which effects act: added one after another, exchanged, dropped, and compared with what has no name.
 
 use super::candidates::optics_effects;
-use super::score::{Design, Scored, differences, scored, with};
+use super::score::{Base, Design, Scored, differences, scored, with};
 use super::unnamed::{Fields, PressCovariate, Unnamed};
 use super::work::Work;
 use gripgen_twin::effects::EffectSpec;
@@ -12,6 +12,10 @@ pub(super) const MATERIAL: f64 = 0.02;
 
 /// Gains are this many standard errors above 0 at least.
 pub(super) const SURE: f64 = 3.0;
+
+/// The same for effects after the first: where one was found, its formula is not quite that of nature either, and what
+/// it leaves looks like others.
+const MATERIAL_FURTHER: f64 = 0.05;
 
 /// The same for what has no name: a smooth curve fits into more of a sensor file's own misfit.
 const MATERIAL_UNNAMED: f64 = 0.12;
@@ -90,11 +94,13 @@ pub(super) fn search(
         let mut best: Option<(f64, Scored)> = None;
         let left: Vec<_> =
             candidates.iter().filter(|s| model.acting.iter().all(|a| a.spec != **s)).copied().collect();
+        let ground = Base::new(work, &model);
         for (k, spec) in left.iter().enumerate() {
             let share = (round as f64 + k as f64 / left.len() as f64) / (MOST_EFFECTS + 1) as f64;
             progress(share, spec.id);
-            let least = (MATERIAL * base).max(FURTHER * explained);
-            let tried = with(work, &design, &model.acting, spec, 0.5 * least);
+            let material = if model.acting.is_empty() { MATERIAL } else { MATERIAL_FURTHER };
+            let least = (material * base).max(FURTHER * explained);
+            let tried = with(work, &design, &ground, spec, 0.5 * least);
             let (gain, standard_error) = design.mean(&differences(&model.held_out, &tried.held_out));
             trials.push(Trial {
                 round,
@@ -109,7 +115,7 @@ pub(super) fn search(
             }
         }
         match best {
-            Some((_, tried)) if round < MOST_EFFECTS => model = tried,
+            Some((_, tried)) if round < MOST_EFFECTS => model = scored(work, &design, tried.acting),
             _ => break,
         }
         model = dropped(work, &design, model, MATERIAL * base / 2.0);
@@ -152,13 +158,14 @@ fn finish(
         let spec = model.acting[e].spec;
         let mut rest = model.acting.clone();
         rest.remove(e);
-        let without = scored(work, &design, rest.clone());
+        let without = scored(work, &design, rest);
+        let ground = Base::new(work, &without);
         let gain = design.mean(&differences(&without.held_out, &model.held_out)).0;
         let mut tied = Vec::new();
         let mut better: Option<(f64, Scored)> = None;
         for other in candidates.iter().filter(|s| model.acting.iter().all(|a| a.spec != **s)) {
             progress(0.9, other.id);
-            let tried = with(work, &design, &rest, other, 0.7 * gain);
+            let tried = with(work, &design, &ground, other, 0.7 * gain);
             let (loss, standard_error) = design.mean(&differences(&tried.held_out, &model.held_out));
             if loss < 0.0 && better.as_ref().is_none_or(|(l, _)| loss < *l) {
                 better = Some((loss, tried));
@@ -170,7 +177,7 @@ fn finish(
         match better {
             Some((loss, tried)) if exchanges < 3 && loss < -0.01 * gain => {
                 debug_assert!(tried.acting.last().is_some_and(|a| a.spec != spec));
-                model = tried;
+                model = scored(work, &design, tried.acting);
                 exchanges += 1;
                 (rivals, gains, e) = (Vec::new(), Vec::new(), 0);
             }

@@ -241,22 +241,75 @@ impl<'a> NamedModel<'a> {
     }
 }
 
+/// Derivatives by the parameters of effects that were accepted, where their fit ended: drawn once, used beside every
+/// further candidate.
+pub(super) struct Head {
+    free: Vec<(usize, usize)>,
+    parameters: Vec<FreeParameter>,
+    /// By press and parameter.
+    slopes: Vec<Vec<Vec<[f32; 3]>>>,
+}
+
+impl Head {
+    pub(super) fn new(work: &Work, acting: &[Acting]) -> Self {
+        let model = NamedModel::new(work, acting.to_vec());
+        let values: Vec<f64> = model.parameters.iter().map(|p| p.start).collect();
+        let slopes = for_each(work.views.len(), |i| model.derivatives(i, &values).1);
+        Self { free: model.free, parameters: model.parameters, slopes }
+    }
+
+    /// Where the parameters are.
+    pub(super) fn values(&self) -> impl Iterator<Item = f64> {
+        self.parameters.iter().map(|p| p.start)
+    }
+}
+
+impl<'a> NamedModel<'a> {
+    /// The last effect of a list alone, those before it where they are.
+    pub(super) fn last(work: &'a Work, acting: Vec<Acting>) -> Self {
+        let all = Self::new(work, acting);
+        let own = |e: usize| e + 1 == all.acting.len();
+        let both = all.free.iter().zip(&all.parameters).filter(|((e, _), _)| own(*e));
+        let (free, parameters) = both.map(|(f, p)| (*f, p.clone())).unzip();
+        Self { work, acting: all.acting, free, parameters }
+    }
+
+    /// This model's parameters behind those of a head.
+    pub(super) fn behind(&self, head: &Head) -> (Vec<(usize, usize)>, Vec<FreeParameter>) {
+        let free = head.free.iter().chain(&self.free).copied().collect();
+        let parameters = head.parameters.iter().chain(&self.parameters).cloned().collect();
+        (free, parameters)
+    }
+
+    /// Moments of a head's parameters and this model's.
+    pub(super) fn moments_behind(&self, head: &Head, values: &[f64]) -> Vec<GroupMoments> {
+        for_each(self.work.views.len(), |i| {
+            let (base, own) = self.derivatives(i, values);
+            let slopes: Vec<&Vec<[f32; 3]>> = head.slopes[i].iter().chain(&own).collect();
+            moments_of(self.work, i, &base, &slopes)
+        })
+    }
+}
+
+fn moments_of(work: &Work, press: usize, base: &[[f32; 3]], slopes: &[&Vec<[f32; 3]>]) -> GroupMoments {
+    let weights = work.pixel_weights(press);
+    let mut moments = GroupMoments::zero(slopes.len());
+    let mut row = vec![0.0; slopes.len()];
+    for (k, measured) in work.views[press].measured().iter().enumerate() {
+        for c in 0..3 {
+            row.iter_mut().zip(slopes).for_each(|(r, s)| *r = f64::from(s[k][c]));
+            moments.add(f64::from(base[k][c] - measured[c]), &row, weights[k]);
+        }
+    }
+    moments.finish();
+    moments
+}
+
 impl GroupedModel for NamedModel<'_> {
     fn moments(&self, values: &[f64]) -> Vec<GroupMoments> {
-        let n = self.parameters.len();
         for_each(self.work.views.len(), |i| {
             let (base, slopes) = self.derivatives(i, values);
-            let weights = self.work.pixel_weights(i);
-            let mut moments = GroupMoments::zero(n);
-            let mut row = vec![0.0; n];
-            for (k, measured) in self.work.views[i].measured().iter().enumerate() {
-                for c in 0..3 {
-                    row.iter_mut().zip(&slopes).for_each(|(r, s)| *r = f64::from(s[k][c]));
-                    moments.add(f64::from(base[k][c] - measured[c]), &row, weights[k]);
-                }
-            }
-            moments.finish();
-            moments
+            moments_of(self.work, i, &base, &slopes.iter().collect::<Vec<_>>())
         })
     }
 
