@@ -28,6 +28,8 @@ mod measured;
 mod mechanics;
 // Numbers that Wucherer et al. 2023 print.
 mod paper;
+// Presses whose optics were changed, diagnosed.
+mod press_diagnosis;
 // Presses of a ball into a real sensor.
 mod presses;
 // Labels against closed forms, through the whole pipeline.

@@ -1,0 +1,131 @@
+//! Presses whose optics were changed by formulas of the test, diagnosed.
+
+use crate::common::root;
+use gripgen::identify::{Diagnosis, Verdict};
+use gripgen::tactile::presses::{Circle, Press, PressScene, PressSet};
+use gripgen::tactile::{Sensor, finish};
+use gripgen::twin::{OpticsState, TactileImage};
+use gripgen::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses};
+
+const PRESSES: usize = 12;
+const BALL_M: f64 = 6e-3;
+
+fn sensor() -> Sensor {
+    let bytes = std::fs::read(root().join("assets/sensors/gelsight_r15/sensor.npz")).unwrap();
+    Sensor::from_npz(&bytes, None, None).unwrap()
+}
+
+/// Presses of the shipped sensor with its noise; `change`: share of the way through, row-major (u, v), grey levels.
+fn presses(sensor: &Sensor, change: impl Fn(f64, [f64; 2], [f64; 3]) -> [f64; 3]) -> PressSet {
+    let scene = PressScene::new(sensor, BALL_M);
+    let (w, h) = (sensor.grid.width_px, sensor.grid.height_px);
+    let press = |i: usize| {
+        let place = |k: usize| ((i * k * 37 + 11 * k) % 100) as f64 / 100.0;
+        let circle = Circle {
+            x_px: w as f64 * (0.25 + 0.5 * place(3)),
+            y_px: h as f64 * (0.25 + 0.5 * place(5)),
+            radius_px: 18.0 + 8.0 * place(7),
+        };
+        let seen = scene.change_seen(Some(&circle), &OpticsState::default());
+        let image = finish(sensor, Some(&seen), Some(i as u64 + 1));
+        let rgb = image.rgb.chunks_exact(3).enumerate().flat_map(|(p, rgb)| {
+            let at = |k: usize, n: usize| 2.0 * k as f64 / n as f64 - 1.0;
+            let place = [at(p % w, w), at(p / w, h)];
+            change(i as f64 / PRESSES as f64, place, [rgb[0], rgb[1], rgb[2]].map(f64::from))
+                .map(|v| v.round().clamp(0.0, 255.0) as u8)
+        });
+        let image = TactileImage { rgb: rgb.collect(), ..image };
+        Press { name: format!("press-{i:02}"), image, circle: Some(circle) }
+    };
+    PressSet {
+        metres_per_px: sensor.grid.metres_per_px,
+        ball_m: BALL_M,
+        rest: Some(finish(sensor, None, None)),
+        presses: (0..PRESSES).map(press).collect(),
+    }
+}
+
+fn diagnosis(set: &PressSet, sensor: &Sensor, covariates: Vec<PressCovariate>) -> Diagnosis {
+    let input = PressDiagnosisInput {
+        set,
+        sensor,
+        time_s: None,
+        covariates,
+        marked: true,
+        sha256: "0".into(),
+        kept_effects: Vec::new(),
+    };
+    diagnose_presses(&input, &mut |_, _| {}).diagnosis
+}
+
+fn names(d: &Diagnosis) -> Vec<&str> {
+    d.effects.iter().map(|e| e.name.as_str()).collect()
+}
+
+fn mse(d: &Diagnosis) -> (f64, f64) {
+    let error = d.error.as_ref().unwrap();
+    (error.before.mse.unwrap(), error.after.mse.unwrap())
+}
+
+/// Nothing is found where there is nothing, and the error is that of the noise.
+#[test]
+fn presses_as_the_sensor_file_has_them_lack_nothing() {
+    let sensor = sensor();
+    let d = diagnosis(&presses(&sensor, |_, _, p| p), &sensor, Vec::new());
+    assert_eq!((d.verdict, names(&d), d.unknown.len()), (Verdict::None, vec![], 0), "{d:?}");
+    let floor = d.noise_floor_mse.unwrap();
+    assert!((mse(&d).0 / floor - 1.0).abs() < 0.15, "{} and {floor}", mse(&d).0);
+}
+
+/// Light that settles as a stretched exponential of the order is a drift, and its error goes down to nearly the noise.
+#[test]
+fn light_that_settles_is_a_drift() {
+    let sensor = sensor();
+    let set = presses(&sensor, |share, _, p| {
+        let settled = 1.0 - (-(share / 0.8_f64).powf(1.1)).exp();
+        [p[0] * (1.0 - 0.08 * settled), p[1] * (1.0 - 0.05 * settled), p[2] * (1.0 - 0.10 * settled)]
+    });
+    let d = diagnosis(&set, &sensor, Vec::new());
+    assert_eq!((d.verdict, names(&d)), (Verdict::Effect, vec!["light_drift"]), "{d:?}");
+    assert!(d.effects[0].parameters["blue_per_h"].high90 < 0.0);
+    assert!(mse(&d).1 < 0.25 * mse(&d).0, "{:?}", mse(&d));
+}
+
+/// A constant that is added to images with contact, through whole levels.
+#[test]
+fn a_constant_is_an_offset_with_its_value() {
+    let sensor = sensor();
+    let set = presses(&sensor, |_, _, [r, g, b]| [r + 4.0, g - 3.0, b + 2.0]);
+    let d = diagnosis(&set, &sensor, Vec::new());
+    assert_eq!(names(&d), ["rest_offset"], "{d:?}");
+    for (name, value) in [("red", 4.0), ("green", -3.0), ("blue", 2.0)] {
+        let p = &d.effects[0].parameters[name];
+        assert!((p.value - value).abs() < 0.1, "{name}: {}", p.value);
+    }
+}
+
+/// What follows a column of the table and no effect of the library is unknown, by the column's name.
+#[test]
+fn light_that_follows_a_lamp_is_unknown_by_the_name_of_its_column() {
+    let sensor = sensor();
+    let volts: Vec<f64> = (0..PRESSES).map(|i| ((i * 5 + 2) % 12) as f64 / 11.0).collect();
+    let by_press = volts.clone();
+    let set = presses(&sensor, move |share, _, p| {
+        let v = by_press[(share * PRESSES as f64).round() as usize];
+        p.map(|x| x * (1.0 + 0.06 * (2.0 * v - 1.0)))
+    });
+    let column = PressCovariate { name: "lamp_v".into(), values: PressValues::Numbers(volts) };
+    let d = diagnosis(&set, &sensor, vec![column]);
+    assert_eq!((d.verdict, d.unknown[0].covariate.as_str()), (Verdict::Unknown, "lamp_v"), "{d:?}");
+}
+
+/// Too few presses are said to be too few.
+#[test]
+fn three_presses_are_too_few() {
+    let sensor = sensor();
+    let mut set = presses(&sensor, |_, _, p| p);
+    set.presses.truncate(3);
+    let d = diagnosis(&set, &sensor, Vec::new());
+    assert_eq!(d.verdict, Verdict::Insufficient);
+    assert!(d.notes[0].contains("3 presses with a visible contact, 4 are needed"), "{:?}", d.notes);
+}
