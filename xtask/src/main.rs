@@ -1,6 +1,7 @@
 //! Tasks of gripgen's developers. No dependencies, so that it is built in a second.
 //!
 //! `cargo xtask test` sets up what the tests need and runs all of them; `cargo xtask test --all` adds the slow ones;
+//! `cargo xtask blind` runs the whole blind benchmark of the diagnosis (hours) and writes docs/loop/blind.md;
 //! `cargo xtask assets [--check]` makes the shipped meshes and the shipped sensor from the numbers beside them.
 
 mod python;
@@ -21,9 +22,10 @@ fn main() -> ExitCode {
     let result = match words[..] {
         ["test"] => test(false),
         ["test", "--all"] => test(true),
+        ["blind"] => blind(),
         ["assets"] => assets(false),
         ["assets", "--check"] => assets(true),
-        _ => Err("usage: cargo xtask test [--all] | assets [--check]".into()),
+        _ => Err("usage: cargo xtask test [--all] | blind | assets [--check]".into()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -80,6 +82,16 @@ fn test(all: bool) -> Result<(), String> {
     run("Python checks", &mut checks)?;
     eprintln!("\nall tests passed in {:.0} s", start.elapsed().as_secs_f64());
     Ok(())
+}
+
+fn blind() -> Result<(), String> {
+    let python = python::set_up(&root())?;
+    run("release build", &mut cargo(&["build", "--release", "--quiet"]))?;
+    let mut all = Command::new(&python);
+    all.args(["-m", "tests.blind.all", "--out"]).arg(python::target(&root()).join("blind"));
+    all.args(["--doc", "docs/loop/blind.md"]);
+    all.env("GRIPGEN_BIN", python::target(&root()).join("release/gripgen"));
+    run("blind benchmark", &mut all)
 }
 
 fn assets(check: bool) -> Result<(), String> {

@@ -65,7 +65,7 @@ fn make_venv(python: &str, venv: &Path) -> bool {
 /// The command that runs the Python checks against the binary that the Rust tests have built.
 pub fn pytest(python: &Path, root: &Path) -> Command {
     let mut command = Command::new(python);
-    command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/python"]);
+    command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/python", "tests/blind"]);
     command.env("GRIPGEN_BIN", target(root).join("debug/gripgen")).env("PYTHONDONTWRITEBYTECODE", "1");
     command
 }

@@ -4,7 +4,7 @@ mod identify;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
-pub use identify::{CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, DiagnoseArgs, LawKind};
+pub use identify::{CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, DiagnoseArgs};
 use std::path::PathBuf;
 
 /// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.

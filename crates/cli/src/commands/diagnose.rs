@@ -5,7 +5,7 @@ mod presses;
 
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
-use crate::output::writable;
+use crate::output::{JsonSink, writable};
 use crate::progress::Share;
 use gripgen::twin::Twin;
 use gripgen::{
@@ -22,6 +22,8 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
     for path in [args.out.as_deref(), args.report.as_deref()].into_iter().flatten() {
         writable(path)?;
     }
+    // Opened before the work, so that a path that cannot be written costs nothing.
+    let sink = JsonSink::open(args.json.json.as_deref())?;
     let diagnosed = if is_press_set(&args.measured) {
         presses::presses(args)?
     } else if is_sensor_table(&args.measured) {
@@ -29,7 +31,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
     } else {
         pulls(args)?
     };
-    output::write(args, diagnosed)
+    output::write(args, sink, diagnosed)
 }
 
 /// The twin that a verb starts from.

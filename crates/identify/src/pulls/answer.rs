@@ -103,7 +103,7 @@ pub fn diagnose_pulls(
     let heldout_before = predicted(&context, &before, &repetitions);
     let (accepted, heldout_after) = confirmed(&search, &before, accepted, &heldout_before, &repetitions);
     let after = accepted.fitted.clone();
-    diagnosis.effects = named(&search, &before, &accepted, &data);
+    diagnosis.effects = named(&search, &before, &accepted);
     diagnosis.unknown = unknown(&search, &before, &accepted, &data);
     diagnosis.verdict = match (diagnosis.effects.is_empty(), diagnosis.unknown.is_empty()) {
         (false, _) => Verdict::Effect,
@@ -244,8 +244,7 @@ pub(super) fn insufficient(data: &PullData<'_>) -> Option<String> {
 }
 
 /// The accepted effects with their rivals.
-fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted, data: &PullData<'_>) -> Vec<NamedEffect> {
-    let n = data.len();
+fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted) -> Vec<NamedEffect> {
     let mut effects: Vec<NamedEffect> = accepted
         .effects
         .iter()
@@ -268,7 +267,7 @@ fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted, data: &PullD
             let mut class: Vec<String> = vec![candidate.spec.id.into()];
             class.extend(tied.iter().map(|(k, _)| search.candidates[*k].spec.id.to_string()));
             class.extend(
-                alike(search, before, accepted, *i, n)
+                alike(search, before, accepted, *i)
                     .into_iter()
                     .filter(|c| !class.contains(c))
                     .collect::<Vec<_>>(),
@@ -291,11 +290,11 @@ fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted, data: &PullD
 }
 
 /// Effects that explain nearly as much as effect `i` does alone: its class in this campaign.
-fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize, n: usize) -> Vec<String> {
+fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize) -> Vec<String> {
     let gained = |f: &Fitted| (f.likelihood.log - f.trace_cost) - (before.likelihood.log - before.trace_cost);
     let own = accepted.entries.iter().find(|e| matches!(e.rival, Competing::Effect(k) if k == i));
     let Some(own) = own.map(|e| gained(&e.fitted)) else { return vec![] };
-    let wide = (0.1 * own).min(3.0 * TIED_WITHIN).max(TIED_WITHIN) + 0.0 * n as f64;
+    let wide = (0.1 * own).clamp(TIED_WITHIN, 3.0 * TIED_WITHIN);
     let near = |e: &super::search::Entry| match e.rival {
         Competing::Effect(k) if k != i && gained(&e.fitted) > own - wide => {
             Some(search.candidates[k].spec.id.to_string())

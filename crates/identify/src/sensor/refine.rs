@@ -98,7 +98,7 @@ pub(crate) fn joint_fit(
     let spread = Spread { jacobian: &jacobian, inverse: &inverse, one: &one, force: &f, sessions: &sessions };
     let (theta_sd, base_sd) = if equal_weights {
         // Size of the slow part of the noise.
-        let mut left = residual.clone();
+        let mut left = residual;
         whitener.apply(&mut left);
         let slow = libm::sqrt(left.iter().map(|r| r * r).sum::<f64>() / (n - used).max(1.0));
         spread.simulated(noise, slow, &prepared.group_steps, &follow)

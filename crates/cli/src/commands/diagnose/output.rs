@@ -8,11 +8,7 @@ use gripgen::{Diagnosed, Location, diagnosis_page, write_twin};
 use std::fmt::Write;
 
 /// Twin, report, JSON, and a summary for people.
-pub fn write(args: &DiagnoseArgs, mut diagnosed: Diagnosed) -> Result<u8, Failure> {
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
-    if let Some(out) = &args.out {
-        write_twin(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out).map_err(Failure::new)?;
-    }
+pub fn write(args: &DiagnoseArgs, mut sink: JsonSink, mut diagnosed: Diagnosed) -> Result<u8, Failure> {
     if diagnosed.report.title.is_empty() {
         diagnosed.report.title = args.measured.display().to_string();
     }
@@ -22,6 +18,9 @@ pub fn write(args: &DiagnoseArgs, mut diagnosed: Diagnosed) -> Result<u8, Failur
     if sink.wanted() {
         let value = serde_json::to_value(&diagnosed.diagnosis).map_err(Failure::new)?;
         sink.document(&value)?;
+    }
+    if let Some(out) = &args.out {
+        write_twin(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out).map_err(Failure::new)?;
     }
     if !sink.on_stdout() {
         print(&summary(&diagnosed.diagnosis))?;
