@@ -115,7 +115,7 @@ fn an_effect_of_the_simulator_is_found_and_put_into_the_twin() {
     let with = Twin::new(&file).unwrap();
     let after = compare_pulls(&measured, &with, 2).unwrap().pulls.rmse_n;
     assert!(after < 1.25 * error.after.rmse_n.unwrap(), "{after} N by compare, {error:?}");
-    let mut plain = file.clone();
+    let mut plain = file;
     plain.effects.clear();
     assert_eq!(Twin::new(&plain).unwrap().effects.len(), 0);
     assert!(compare_pulls(&measured, &Twin::new(&plain).unwrap(), 2).unwrap().pulls.rmse_n > after);

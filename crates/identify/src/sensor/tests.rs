@@ -170,7 +170,7 @@ fn a_column_of_unknown_meaning_is_named() {
 fn values_do_not_depend_on_the_unit_of_the_reading() {
     let made = make(&case(Effect::Drift, 4.0, NoiseKind::White, 3));
     let d = answer(&made).diagnosis;
-    let mut scaled = made.data.clone();
+    let mut scaled = made.data;
     scaled.measured_force_n.iter_mut().for_each(|v| *v *= -0.03);
     let other =
         diagnose_sensor(&scaled, &SensorOptions { simulations: 100, ..SensorOptions::default() }).diagnosis;

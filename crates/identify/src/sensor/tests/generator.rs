@@ -166,8 +166,10 @@ pub(super) fn make(case: &Case) -> Made {
         let x = forces(n, step_s, &mut draws);
         let clock: Vec<f64> = (0..n).map(|i| start + i as f64 * step_s).collect();
         let (phase, period) = (6.0 * draws.uniform(), n as f64 * step_s / (1.5 + 2.0 * draws.uniform()));
-        let warm: Vec<f64> =
-            clock.iter().map(|t| 22.0 + 2.0 * libm::sin(6.28 * t / period + phase)).collect();
+        let warm: Vec<f64> = clock
+            .iter()
+            .map(|t| 22.0 + 2.0 * libm::sin(std::f64::consts::TAU * t / period + phase))
+            .collect();
         let gain = (0.9 + 0.2 * draws.uniform()) * if case.seed % 4 == 3 { -0.03 } else { 1.0 };
         let offset = gain * 2.0 * draws.normal();
         let mut sum = vec![0.0; n];
