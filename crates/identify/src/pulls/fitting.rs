@@ -96,14 +96,14 @@ impl Context<'_> {
         });
         let dynamics = terms.act_on_signals() || self.free_lag;
         if dynamics {
-            for (name, value, most) in
-                [("robot.lag_s", start.lag_s, 1.0), ("robot.dead_time_s", start.dead_time_s, 0.5)]
+            for (name, value, most, scale) in
+                [("robot.lag_s", start.lag_s, 1.0, 0.02), ("robot.dead_time_s", start.dead_time_s, 0.5, 0.4)]
             {
                 parameters.push(FreeParameter {
                     name: name.into(),
                     start: value,
                     bounds: (0.0, most),
-                    scale: 0.02,
+                    scale,
                 });
             }
         }

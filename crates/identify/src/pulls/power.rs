@@ -111,7 +111,7 @@ impl Context<'_> {
         let mut columns: Vec<DVector<f64>> =
             (0..model.mu.len()).map(|k| slope(&|m| m.mu[k] *= 1.01, 0.01 * model.mu[k])).collect();
         columns.push(slope(&|m| m.lag_s += 2e-3, 2e-3));
-        columns.push(slope(&|m| m.dead_time_s += 2e-3, 2e-3));
+        columns.push(slope(&|m| m.dead_time_s += 4e-3, 4e-3));
         columns.push(slope(&|m| m.kinetic_ratio -= 0.01, -0.01));
         let basis = DMatrix::from_columns(&columns);
         let svd = basis.clone().svd(true, true);

@@ -13,7 +13,7 @@ use std::sync::Mutex;
 pub const NAMED_GAIN: f64 = 3.0;
 
 /// Score that a second effect has to gain.
-pub const SECOND_GAIN: f64 = 4.0;
+pub const SECOND_GAIN: f64 = 6.0;
 
 /// Score that an unnamed curve has to gain.
 pub const CURVE_GAIN: f64 = 4.5;
