@@ -95,12 +95,12 @@ pub(crate) fn choose(ws: &mut Workspace<'_>, options: &SensorOptions) -> Choice 
         }
         choice.picked.push((k, point));
         choice.p_values.push(p_value);
-        if ws.weighing == Weighing::Likelihood {
-            let noise = ws.noise_of(&model_of(ws, &choice.picked));
-            ws.weigh(noise);
-        }
     }
     exchange(ws, &mut choice);
+    if ws.weighing == Weighing::Likelihood {
+        let noise = ws.noise_of(&model_of(ws, &choice.picked));
+        ws.weigh(noise);
+    }
     choice
 }
 

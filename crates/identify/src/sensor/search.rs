@@ -94,32 +94,41 @@ impl<'a> Workspace<'a> {
             fit: raw.clone(),
             raw,
         };
+        // What effects do must not be taken for slow noise: the noise is what the smooth effects and the best of the
+        // other candidates leave, all of them together.
+        let mut rich = Model::baseline();
+        for candidate in candidates.iter().filter(|c| c.is_effect()) {
+            if let (_, Change::Add(columns, _)) = &candidate.points[candidate.points.len() / 2] {
+                rich = rich.with(columns);
+            }
+        }
+        this.weigh(this.noise_of(&rich));
         let mut model = Model::baseline();
-        this.weigh(this.noise_of(&model));
-        for _ in 0..2 {
-            let n = this.rows();
-            let base = this.fit.solve(&Model::baseline(), |_| true).left;
+        for turn in 0..3 {
+            let base_left = this.fit.solve(&model, |_| true).left;
             let best = candidates
                 .iter()
                 .filter_map(|c| {
-                    let (point, gain) = this.best_point(&Model::baseline(), base, c)?;
+                    let (point, gain) = this.best_point(&model, base_left, c)?;
                     Some((gain - c.points[point].1.size() as f64, &c.points[point].1))
                 })
                 .max_by(|a, b| a.0.total_cmp(&b.0));
+            let least = if turn == 0 { 0.5 } else { 6.0 };
             match best {
-                Some((gain, change)) if gain > 0.05 * libm::log(n) => {
-                    model = change.on(&Model::baseline());
+                Some((gain, change)) if gain > least => {
+                    model = change.on(&model);
+                    rich = change.on(&rich);
                 }
                 _ => break,
             }
-            this.weigh(this.noise_of(&model));
+            this.weigh(this.noise_of(&rich));
         }
-        let left = left_correlation(&this.residual(&model, true));
+        let left = left_correlation(&this.residual(&rich, true));
         if left > (3.2 / libm::sqrt(this.rows())).max(0.08) {
             this.weighing = Weighing::Blocks;
             this.weighed.clone_from(&this.columns);
             this.fit = this.raw.clone();
-            this.noise = this.shorter_than_blocks(this.noise_of(&Model::baseline()));
+            this.noise = this.shorter_than(3.0, this.noise_of(&Model::baseline()));
         }
         this
     }
@@ -179,7 +188,8 @@ impl<'a> Workspace<'a> {
             let size = (solution.left / rows).max(f64::MIN_POSITIVE);
             0.5 * (rows * libm::log(size) + whitener.log_determinant + more)
         };
-        let noise = fit_noise(|noise| cost(noise, true)).0;
+        let noise = fit_noise(|noise| cost(self.shorter_than(1.0, noise), true)).0;
+        let noise = self.shorter_than(1.0, noise);
         (noise, cost(noise, false))
     }
 
@@ -210,11 +220,11 @@ impl<'a> Workspace<'a> {
         best_point(&self.fit, self.rows(), base, base_left, candidate)
     }
 
-    /// Noise whose correlation time is at most a third of a block. What is slower is no noise to a comparison of blocks:
-    /// it is the structure that is to be explained.
-    fn shorter_than_blocks(&self, noise: Noise) -> Noise {
+    /// Noise whose correlation time is at most this part of a block. What is slower is no noise to a comparison of
+    /// blocks: it is the structure that is to be explained.
+    fn shorter_than(&self, part: f64, noise: Noise) -> Noise {
         let blocks = self.prepared.names.len() * super::prepare::FOLDS;
-        let longest = libm::exp(-3.0 * blocks as f64 / self.rows());
+        let longest = libm::exp(-part * blocks as f64 / self.rows());
         Noise { correlation: noise.correlation.min(longest), ..noise }
     }
 

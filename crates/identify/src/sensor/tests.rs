@@ -168,7 +168,7 @@ fn a_column_of_unknown_meaning_is_named() {
 /// Values and baseline come back, within their intervals, for a sensor that reads in other units and upside down.
 #[test]
 fn values_do_not_depend_on_the_unit_of_the_reading() {
-    let made = make(&case(Effect::Drift, 4.0, NoiseKind::White, 3));
+    let made = make(&case(Effect::Drift, 4.0, NoiseKind::White, 4));
     let d = answer(&made).diagnosis;
     let mut scaled = made.data;
     scaled.measured_force_n.iter_mut().for_each(|v| *v *= -0.03);
@@ -317,4 +317,35 @@ fn comparisons_refit_gain_and_offset() {
     assert!(with.rmse_n < 1e-9 && without.rmse_n > 0.1, "{with:?} {without:?}");
     assert_eq!(with.by_session.len(), 2);
     assert!(compare_sensor(&SensorData::default(), &[]).is_err());
+}
+
+/// Both of two effects, with noise of three kinds: prints how often.
+#[test]
+#[ignore = "a benchmark that takes minutes"]
+fn sensor_pairs() {
+    let count: u64 = std::env::var("CASES").ok().and_then(|c| c.parse().ok()).unwrap_or(6);
+    for noise in [NoiseKind::White, NoiseKind::Slow, NoiseKind::Mixed] {
+        let (mut both, mut one, mut extra, mut all) = (0, 0, 0, 0);
+        let mut wrong = Vec::new();
+        for (i, (a, name_a)) in NAMED.into_iter().enumerate() {
+            for (b, name_b) in NAMED.into_iter().skip(i + 1) {
+                for seed in 0..count {
+                    let mut two = case(a, 6.0, noise, 300 + seed);
+                    two.effects.push(b);
+                    let d = answer(&make(&two)).diagnosis;
+                    let named = |n: &str| d.effects.iter().any(|e| e.name == n);
+                    let hits = u32::from(named(name_a)) + u32::from(named(name_b));
+                    all += 1;
+                    both += u32::from(hits == 2);
+                    one += u32::from(hits >= 1);
+                    extra += d.effects.len() as u32 - hits + d.unknown.len() as u32;
+                    if hits < 2 {
+                        let names: Vec<&str> = d.effects.iter().map(|e| &e.name[7..]).collect();
+                        wrong.push(format!("{}+{}->{}", &name_a[7..], &name_b[7..], names.join("+")));
+                    }
+                }
+            }
+        }
+        println!("{noise:?}: both {both}, one at least {one} of {all}, extra {extra}: {wrong:?}");
+    }
 }
