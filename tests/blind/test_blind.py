@@ -221,28 +221,35 @@ def small(group, kind, acts, **design):
 
 SMALL = [
     small("A", "plain", [], count=40),
-    small("A", "outliers", [], count=50),
     small("B", "one", [("dwell_ageing", 4)], count=40, dwells=[0.5, 3.0, 20.0, 90.0], forces="few"),
+    small("D", "operator", [("operator", 4)], count=50, distractors=["operator"]),
+    small("E", "few", [("load_offset", 2)], count=9, forces=[5.0, 20.0, 80.0]),
+]
+MORE = [
+    small("A", "outliers", [], count=50),
     small("B", "one", [("sensor_bias", 4)], count=40, directions=[1, -1]),
     small("B", "one", [("anisotropy", 4)], count=42, angles=[0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0], forces="few"),
     small("B", "one", [("jaw_tilt", 4)], count=40, directions=[1, -1]),
-    small("D", "operator", [("operator", 4)], count=50, distractors=["operator"]),
-    small("E", "few", [("load_offset", 2)], count=9, forces=[5.0, 20.0, 80.0]),
 ]
 
 
 @pytest.mark.skipif("GRIPGEN_BIN" not in os.environ, reason="no binary named")
 def test_small_set_through_the_binary(tmp_path):
-    """Generous on purpose: eight campaigns cannot measure a rate, only see it collapse."""
+    """Generous on purpose: so few campaigns cannot measure a rate, only see it collapse.
+
+    Four by default, for a debug build; GRIPGEN_BLIND_MORE=1 adds four.
+    """
     out, sealed = tmp_path / "set", tmp_path / "set-sealed"
-    lines = [f"{generator.build(c, 100 + i, f'c{i:03d}', out, sealed)}  c{i:03d}\n" for i, c in enumerate(SMALL)]
+    wanted = SMALL + (MORE if os.environ.get("GRIPGEN_BLIND_MORE") else [])
+    lines = [f"{generator.build(c, 100 + i, f'c{i:03d}', out, sealed)}  c{i:03d}\n" for i, c in enumerate(wanted)]
     (sealed / "SHA256").write_text("".join(lines))
     records, _ = scorer.score(out, tmp_path / "work", lambda *a: runner.diagnose(*a, limit_s=240, before=False), jobs=2)
     shown = scorer.details(records)
     rows = list(records.values())
     assert not any(r["failed"] for r in rows), shown
     assert sum(r["null"] for r in rows if "null" in r) >= 1, shown
-    assert sum(r["top1_class"] for r in rows if "top1_class" in r) >= 3, shown
+    named = [r["top1_class"] for r in rows if "top1_class" in r]
+    assert sum(named) >= 0.7 * len(named), shown
     assert all(r["unknown_listed"] for r in rows if r["group"] == "D"), shown
     ratios = [r["ratio"] for r in rows if r["group"] in "ABCD"]
     assert np.median(ratios) <= 1.3, shown
