@@ -11,7 +11,7 @@ const SCATTER: f64 = 0.04;
 
 /// Force by which the response of an arm differs from that of a first-order loop, and its part that grows with force: what
 /// all traces of a campaign share says no more than this.
-const SHARED_N: (f64, f64) = (0.06, 0.012);
+const SHARED_N: (f64, f64) = (0.06, 0.02);
 
 /// The same from trace to trace.
 const OWN_N: (f64, f64) = (0.03, 0.005);
@@ -19,6 +19,10 @@ const OWN_N: (f64, f64) = (0.03, 0.005);
 /// Force by which slips and labels of a rig differ from those of a pull without inertia: an offset as small as this says
 /// nothing about friction.
 const MISREAD_N: f64 = 0.05;
+
+/// By how much more both differ where the loop closes on its sensor: it then answers with the arm's inertia, which the fast
+/// prediction lacks.
+const CLOSED_LOOP: f64 = 5.0;
 
 /// Readings of a trace that are looked at before the slip.
 const READINGS: usize = 36;
@@ -154,20 +158,27 @@ impl<'a> Context<'a> {
         }
         // Lag and dead time once more, now against what effects on the readings will be judged by.
         let rows: Vec<usize> = (0..self.data.len()).collect();
-        let parameters = dynamics(&self.base);
-        let found = fit(&parameters, FitOptions { most_steps: 15, least_gain: 1e-5 }, |v| {
-            let mut model = self.base.clone();
-            (model.lag_s, model.dead_time_s) = (v[0], v[1]);
-            let mut r = self.trace_residuals(&model, &rows);
-            // Huber's cost as a sum of squares.
-            r.iter_mut()
-                .filter(|x| x.abs() > 2.5)
-                .for_each(|x| *x = x.signum() * (5.0 * x.abs() - 6.25).sqrt());
-            r
-        });
-        if let Ok(found) = found {
-            (self.base.lag_s, self.base.dead_time_s) = (found.values[0], found.values[1]);
+        let mut best = (f64::INFINITY, self.base.lag_s, self.base.dead_time_s);
+        for step in 0..16 {
+            // Every dead time has its lag; the best of both is where effects start from.
+            let dead_time_s = 0.004 * f64::from(step);
+            let lag = [dynamics(&self.base)[0].clone()];
+            let found = fit(&lag, FitOptions { most_steps: 10, least_gain: 1e-5 }, |v| {
+                let model = PullModel { lag_s: v[0], dead_time_s, ..self.base.clone() };
+                let mut r = self.trace_residuals(&model, &rows);
+                // Huber's cost as a sum of squares.
+                r.iter_mut()
+                    .filter(|x| x.abs() > 2.5)
+                    .for_each(|x| *x = x.signum() * (5.0 * x.abs() - 6.25).sqrt());
+                r
+            });
+            if let Ok(found) = found
+                && found.cost < best.0
+            {
+                best = (found.cost, found.values[0], dead_time_s);
+            }
         }
+        (self.base.lag_s, self.base.dead_time_s) = (best.1, best.2);
         self.baseline_trace_cost = huber(&self.trace_residuals(&self.base, &rows));
     }
 
@@ -324,16 +335,17 @@ impl<'a> Context<'a> {
                 }
             }
         }
+        let wide = if self.predictor.winds_up() { CLOSED_LOOP } else { 1.0 };
         let mut r = Vec::new();
         for level in levels.iter().filter(|l| !l.is_empty()) {
             let count = level.len() as f64;
             let mean = level.iter().map(|x| x.0).sum::<f64>() / count;
             let force = level.iter().map(|x| x.1.abs()).sum::<f64>() / count;
             let readings: usize = level.iter().map(|x| x.2).sum();
-            let shared = SHARED_N.0 + SHARED_N.1 * force;
+            let shared = wide * (SHARED_N.0 + SHARED_N.1 * force);
             r.push(mean / (shared * shared + noise * noise / readings as f64).sqrt());
             for (difference, force, n) in level {
-                let own = OWN_N.0 + OWN_N.1 * force.abs();
+                let own = wide * (OWN_N.0 + OWN_N.1 * force.abs());
                 r.push((difference - mean) / (own * own + noise * noise / *n as f64).sqrt());
             }
         }
