@@ -9,6 +9,9 @@ pub const LEVELS: usize = 6;
 /// Displacement beyond that of the sheared gels at which the jaws have slipped, if noise allows to see it.
 const SLID_M: f64 = 0.03e-3;
 
+/// Share by which the displacement grows beyond that of the sheared gels while the rim of the contact slips.
+const SOFTER: f64 = 0.12;
+
 /// Time at the start of a pull that is left out: the response of an arm is of higher order than its model.
 const START_S: f64 = 0.25;
 
@@ -113,11 +116,13 @@ fn slip_row(rows: &[(f64, f64)], noise_n: f64) -> Option<usize> {
         rows[..n / 2 + 2].windows(3).map(|w| (w[2].1 - 2.0 * w[1].1 + w[0].1).abs()).collect();
     bends.sort_by(f64::total_cmp);
     let threshold = SLID_M.max(5.0 * 0.605 * bends[bends.len() / 2]);
-    if beyond(n - 1) <= threshold {
+    // Slip that begins at the rim softens the gels before the jaws let go.
+    let slid = |i: usize| beyond(i) > threshold.max(SOFTER * compliance * rows[i].0);
+    if !slid(n - 1) {
         return None;
     }
     let mut first = n - 1;
-    while first > 0 && beyond(first - 1) > threshold {
+    while first > 0 && slid(first - 1) {
         first -= 1;
     }
     // The rows just before the threshold belong to the slide already.
