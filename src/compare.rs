@@ -50,7 +50,7 @@ impl LabelErrors {
 }
 
 /// A twin as it predicts pulls of these parts, with its effects.
-pub(crate) fn model_of(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPartError> {
+fn model_of(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPartError> {
     let mut model = given_model(twin, parts)?;
     for effect in &twin.effects {
         let part = effect.part.as_ref().map(|name| parts.iter().position(|p| p == name));

@@ -6,6 +6,8 @@
 #[path = "cli/campaign.rs"]
 mod campaign;
 // Calibrating a sensor and comparing with it.
+#[path = "cli/measured.rs"]
+mod measured;
 #[path = "cli/presses.rs"]
 mod presses;
 

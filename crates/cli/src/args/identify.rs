@@ -89,12 +89,6 @@ pub struct DiagnoseArgs {
 /// `gripgen campaign`
 #[derive(Debug, Args)]
 pub struct CampaignArgs {
-    /// A diagnosis (JSON) with effects that cannot be told apart: plan the pulls that separate them.
-    #[arg(long, value_name = "FILE.json", requires = "measured")]
-    pub separate: Option<PathBuf>,
-    /// The measurements of that diagnosis.
-    #[arg(long, value_name = "FOLDER")]
-    pub measured: Option<PathBuf>,
     /// The twin.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,

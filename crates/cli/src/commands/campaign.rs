@@ -1,28 +1,21 @@
 //! `gripgen campaign`: plan a campaign.
 
+use super::diagnose::load_twin;
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, program, writable, write_file};
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};
 use gripgen::twin::{Campaign, PullKind, Twin};
-use gripgen::{Location, load_twin_document, simulate_campaign};
+use gripgen::{Location, simulate_campaign};
 use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
-    if args.separate.is_some() {
-        return Err(Failure::usage("--separate: this version plans the separating pulls in `diagnose`")
-            .hint("`gripgen diagnose MEASURED -o diagnosed.toml` writes them beside the new twin"));
-    }
     writable(&args.out)?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let at = Location::parse(&args.twin);
-    let document = load_twin_document(&at, &[])?;
-    let twin = document
-        .read_twin()
-        .and_then(|file| Twin::new(&file))
-        .map_err(|e| Failure::from(document.located(e)))?;
+    let twin = load_twin(&args.twin, &[])?;
     let campaign = plan_campaign(&options(args, &twin)?).map_err(|e| match e {
         CampaignError::TooFew { .. } => {
             Failure::usage(e).hint("raise --pulls, or name fewer parts with --parts")

@@ -1,0 +1,67 @@
+//! `gripgen calibrate pulls`, `compare` and `diagnose` of measured pulls: one way through, and input that cannot be used.
+
+use super::{assert_code, run, text};
+
+/// Pulls of a shaft with a coefficient of 0.2, 12 of them at three forces.
+fn pulls(rows: usize) -> String {
+    let mut table = String::from("pull_id,part,grip_force_n,max_pull_force_n\n");
+    for i in 0..rows {
+        let force_n = [20.0, 40.0, 60.0][i % 3];
+        let label_n = 0.4 * force_n * (1.0 + 0.01 * (i as f64 - 5.5));
+        table += &format!("p{i},long_shaft,{force_n},{label_n:.3}\n");
+    }
+    table
+}
+
+fn folder(table: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("pulls.csv"), table).unwrap();
+    folder
+}
+
+#[test]
+fn a_fitted_twin_predicts_the_pulls_it_was_fitted_to() {
+    let folder = folder(&pulls(12));
+    let (at, twin) = (folder.path().to_str().unwrap(), folder.path().join("fitted.toml"));
+    let twin = twin.to_str().unwrap();
+    let fitted = run(&["calibrate", "pulls", at, "-o", twin, "--json"]);
+    assert_code(&fitted, 0);
+    let json: serde_json::Value = serde_json::from_slice(&fitted.stdout).unwrap();
+    // Labels alone do not tell a small fall after the slip from a small coefficient: the product is what they show.
+    let value = |key: &str| json["baseline"][key]["value"].as_f64().unwrap();
+    let kinetic = value("parts.long_shaft.mu") * value("kinetic_ratio");
+    assert!((kinetic / 0.2 - 1.0).abs() < 0.05, "{kinetic}");
+    let error = |twin: &str| {
+        let compared = run(&["compare", at, "--twin", twin, "--json"]);
+        assert_code(&compared, 0);
+        let json: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
+        assert_eq!(json["pulls"]["n"], 12);
+        json["pulls"]["rmse_n"].as_f64().unwrap()
+    };
+    assert!(error(twin) < 0.5 * error("asset:configs/twin-baseline.toml"));
+    let unknown = run(&["calibrate", "pulls", at, "-o", twin, "--fit", "dwell_ageing"]);
+    assert_code(&unknown, 2);
+    assert!(text(&unknown.stderr).contains("it needs dwell_s"), "{}", text(&unknown.stderr));
+}
+
+#[test]
+fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
+    let one = folder(&pulls(1));
+    let out = one.path().join("out.toml");
+    let found = run(&["diagnose", one.path().to_str().unwrap(), "--json", "-o", out.to_str().unwrap()]);
+    assert_code(&found, 0);
+    let json: serde_json::Value = serde_json::from_slice(&found.stdout).unwrap();
+    assert_eq!((&json["schema"], &json["verdict"]), (&"gripgen.diagnosis/1".into(), &"insufficient".into()));
+    assert!(json["notes"][0].as_str().unwrap().contains("too few") && out.is_file());
+    for (table, says) in [
+        (pulls(12).replace("max_pull_force_n", "force"), "max_pull_force_n"),
+        (pulls(12).replace("p3,", "p2,"), "p2"),
+        (pulls(12).replace(",8.", ",nan8."), "line"),
+        (pulls(12).replace("long_shaft", "anvil"), "anvil"),
+    ] {
+        let folder = folder(&table);
+        let refused = run(&["diagnose", folder.path().to_str().unwrap()]);
+        assert_code(&refused, 2);
+        assert!(text(&refused.stderr).contains(says), "{says}: {}", text(&refused.stderr));
+    }
+}
