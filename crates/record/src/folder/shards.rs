@@ -78,12 +78,34 @@ impl RunFolder {
             if !is_at(&file, &path).map_err(&at)? {
                 continue;
             }
+            // Its writer keeps the lock over the rename until the sidecar is out: a shard that is there without one
+            // is either just being published, or was left by a process that died in between.
+            let publishing = self.is_being_published(shard)?;
             if let Some(sidecar) = self.finished(shard)? {
                 std::fs::remove_file(&path).map_err(&at)?;
                 return Ok(ShardStart::Done(sidecar));
             }
+            if publishing {
+                std::fs::remove_file(&path).map_err(&at)?;
+                return Ok(ShardStart::Busy);
+            }
             file.set_len(0).map_err(&at)?;
             return Ok(ShardStart::Begun(PartialShard { file, path }));
+        }
+    }
+
+    /// Whether a process holds the lock of a shard that has its final name already.
+    fn is_being_published(&self, shard: u64) -> Result<bool, FolderError> {
+        let path = self.shard_path(shard);
+        let file = match File::open(&path) {
+            Ok(file) => file,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
+            Err(e) => return Err(io_at(&path)(e)),
+        };
+        match file.try_lock_shared() {
+            Ok(()) => Ok(false),
+            Err(TryLockError::WouldBlock) => Ok(true),
+            Err(TryLockError::Error(e)) => Err(io_at(&path)(e)),
         }
     }
 
@@ -135,4 +157,53 @@ fn is_at(file: &File, path: &Path) -> std::io::Result<bool> {
 #[cfg(not(unix))]
 fn is_at(_file: &File, path: &Path) -> std::io::Result<bool> {
     path.try_exists()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{RUN_SCHEMA, RunInfo};
+    use super::*;
+
+    fn folder(path: &Path) -> RunFolder {
+        let info = RunInfo {
+            schema: RUN_SCHEMA.into(),
+            gripgen_version: "0".into(),
+            name: "run".into(),
+            source: "sim".into(),
+            config_sha256: "0".repeat(64),
+            samples: 1,
+            shard_samples: 1,
+            shards: 1,
+            extra_columns: Vec::new(),
+            files_sha256: std::collections::BTreeMap::new(),
+            config_toml: String::new(),
+            gpu_adapter: None,
+        };
+        RunFolder::create(path, info, &[]).unwrap()
+    }
+
+    fn begun(folder: &RunFolder) -> PartialShard {
+        match folder.start_shard(0).unwrap() {
+            ShardStart::Begun(partial) => partial,
+            ShardStart::Busy => panic!("busy"),
+            ShardStart::Done(_) => panic!("done"),
+        }
+    }
+
+    /// Between the rename and the sidecar the shard has no partial name and is not done: it is still its writer's.
+    #[test]
+    fn a_shard_being_published_is_busy() {
+        let temporary = tempfile::tempdir().unwrap();
+        let folder = folder(temporary.path());
+        let partial = begun(&folder);
+        assert!(matches!(folder.start_shard(0).unwrap(), ShardStart::Busy), "being written");
+        std::fs::rename(&partial.path, folder.shard_path(0)).unwrap();
+        assert!(matches!(folder.start_shard(0).unwrap(), ShardStart::Busy), "being published");
+        assert!(!partial.path.exists(), "nothing is left of the attempt");
+        drop(partial);
+        // Its writer died there: the next one makes it again.
+        let partial = begun(&folder);
+        folder.finish_shard(0, 0, partial, 0, Vec::new()).unwrap();
+        assert!(matches!(folder.start_shard(0).unwrap(), ShardStart::Done(_)), "done");
+    }
 }
