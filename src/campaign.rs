@@ -7,11 +7,12 @@ use crate::project::{LoadError, Project, load_twin_document};
 use gripgen_record::sha256_hex;
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, ConfigError, Mechanics};
+use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::SensorChain;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    Campaign, Covariates, KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, Outcome, PlannedPull, PullKind,
-    PullTrace, Scenario, TraceRow, Twin, table_offset_n,
+    Campaign, Covariates, KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, Outcome, PULLS_SINCE_REST, PlannedPull,
+    PullKind, PullTrace, RestCount, Scenario, TraceRow, Twin, table_offset_n,
 };
 
 /// Time between readings of a stored trace; the label is taken at the full rate.
@@ -66,10 +67,13 @@ pub fn simulate_campaign(
     let (mut pulls, mut clock_s, mut left_out) = (Vec::new(), 0.0, 0);
     let made = campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).count();
     let mut index = 0;
+    let mut rests = RestCount::default();
     for planned in &campaign.pulls {
         clock_s += planned.pause_s;
         if planned.kind == PullKind::Pull {
-            let scenario = scenario(&project, campaign, planned, seed, index, clock_s);
+            let mut scenario = scenario(&project, campaign, planned, seed, index, clock_s);
+            let since = rests.since(&scenario.covariates);
+            scenario.covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since as f64));
             match pull(&project, &scenario, index) {
                 Some(pull) => pulls.push(pull),
                 None => left_out += 1,

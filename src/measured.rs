@@ -116,7 +116,7 @@ fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
     let Some((label_tolerance_n, stop_mm)) = rule else {
         return Err(LoadPullsError::Nothing { path: path.into(), notes: notes.join("; ") });
     };
-    let pulls = MeasuredPulls {
+    let mut pulls = MeasuredPulls {
         pulls,
         recorded: KNOWN_COLUMNS.iter().map(ToString::to_string).collect(),
         extra: Vec::new(),
@@ -125,6 +125,10 @@ fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
         feedback: feedback_of(&folder.info().config_toml),
         sha256: sha256_hex(hashes.as_bytes()),
     };
+    // The samples of a sweep have no order in which they were made.
+    if folder.info().source == "rig" {
+        pulls.count_rests();
+    }
     Ok(LoadedPulls { pulls, notes })
 }
 

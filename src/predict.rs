@@ -22,6 +22,11 @@ const MOST_TIME_S: f64 = 120.0;
 /// Tables kept: those of a model and of its neighbours for a derivative.
 const TABLES: usize = 96;
 
+/// Pulls and tables kept of models whose effects act on signals: a derivative by a friction parameter asks for those of
+/// the model itself again.
+const SIGNAL_PULLS: usize = 64;
+const SIGNAL_TABLES: usize = 192;
+
 /// Distance of the kinetic ratios for which there are tables; those between are interpolated.
 const RATIO_STEP: f64 = 0.025;
 
@@ -47,6 +52,8 @@ pub struct PullPredictor<'a> {
     jobs: usize,
     stuck: Cache<Key, Kept>,
     tables: Cache<Key, LabelTable>,
+    signal_stuck: Cache<Key, Kept>,
+    signal_tables: Cache<Key, LabelTable>,
 }
 
 thread_local! {
@@ -129,6 +136,8 @@ impl<'a> PullPredictor<'a> {
             jobs: jobs.max(1),
             stuck: Cache::new(TABLES),
             tables: Cache::new(TABLES),
+            signal_stuck: Cache::new(SIGNAL_PULLS),
+            signal_tables: Cache::new(SIGNAL_TABLES),
         }
     }
 
@@ -195,22 +204,25 @@ impl<'a> PullPredictor<'a> {
         CommandChain::of(own.map(|e| (e.spec, e.values.as_slice())))
     }
 
-    /// What signals of pull `row` depend on, if other pulls share it.
-    fn key(&self, model: &PullModel, row: usize, more: &[f64]) -> Option<Key> {
+    /// What signals of pull `row` depend on.
+    fn key(&self, model: &PullModel, row: usize, more: &[f64]) -> Key {
         let rig =
             [model.lag_s, model.dead_time_s, model.stiffness_n_per_m, model.damping_n_s_per_m, model.fall_s];
         let mut bits: Vec<u64> = rig.iter().chain(more).map(|x| x.to_bits()).collect();
         let mut signed = false;
         for effect in model.effects.iter().filter(|e| e.acts_on_signals()) {
-            if CLOCKS.contains(&effect.spec.id) || effect.part.is_some() {
-                return None;
+            if CLOCKS.contains(&effect.spec.id) {
+                bits.push(self.measured.pulls[row].covariates.time_s.to_bits());
+            }
+            if let Some(part) = effect.part {
+                bits.push(u64::from(part == self.part_of[row]));
             }
             signed = true;
             bits.push(effect.spec.id.as_ptr() as u64);
             bits.extend(effect.values.iter().map(|x| x.to_bits()));
         }
         let against = signed && self.measured.pulls[row].covariates.pull_direction < 0.0;
-        Some((self.profile_of[row], against, bits))
+        (self.profile_of[row], against, bits)
     }
 
     fn stuck(&self, model: &PullModel, row: usize) -> Arc<Kept> {
@@ -221,12 +233,9 @@ impl<'a> PullPredictor<'a> {
             self.rig(model).stuck(staircase, &sensor, &command, self.most_n, &mut kept.0);
             Ok::<_, Infallible>(kept)
         };
-        // What a fit tries of an effect on signals comes once and would push everything else out.
-        let made = match self.key(model, row, &[]) {
-            Some(key) if !acts_on_signals(model) => self.stuck.get(key, make),
-            _ => make().map(Arc::new),
-        };
-        made.unwrap_or_else(|never| match never {})
+        // What a fit tries of an effect on signals would push everything else out: it has a place of its own.
+        let cache = if acts_on_signals(model) { &self.signal_stuck } else { &self.stuck };
+        cache.get(self.key(model, row, &[]), make).unwrap_or_else(|never| match never {})
     }
 
     fn scattered<'s>(&'s self, model: &'s PullModel, row: usize, stuck: &'s StuckPull) -> Scattered<'s> {
@@ -251,12 +260,13 @@ impl<'a> PullPredictor<'a> {
             Ok::<_, Infallible>(LabelTable::new(&self.scattered(model, row, &stuck), self.most_n))
         };
         if acts_on_signals(model) {
-            let table = never(build(model).map(Arc::new));
+            let own = [model.kinetic_ratio, model.scatter, model.noise_n];
+            let table = never(self.signal_tables.get(self.key(model, row, &own), || build(model)));
             return (table.clone(), table, 0.0);
         }
         let steps = (model.kinetic_ratio / RATIO_STEP).min(1.0 / RATIO_STEP);
         let at = |ratio: f64| {
-            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n]).unwrap_or_default();
+            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n]);
             let model = PullModel { kinetic_ratio: ratio, ..model.clone() };
             never(self.tables.get(key, || build(&model)))
         };

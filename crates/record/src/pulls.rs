@@ -205,7 +205,7 @@ fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<Meas
             pull.covariates.extra.insert(column.name.clone(), value);
         }
     }
-    Ok(MeasuredPulls {
+    let mut measured = MeasuredPulls {
         pulls,
         recorded,
         extra,
@@ -213,7 +213,9 @@ fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<Meas
         stop_m: header.stop_mm * 1e-3,
         feedback: header.feedback,
         sha256: String::new(),
-    })
+    };
+    measured.count_rests();
+    Ok(measured)
 }
 
 /// A column of unknown meaning that holds something.

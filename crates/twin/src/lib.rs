@@ -40,7 +40,9 @@ pub use grasp::Grasp;
 pub use image::TactileImage;
 pub use jaw::{Jaw, PerJaw};
 pub use label::{LabelError, PullEnd, SlipLabel, slip_label};
-pub use measured::{ExtraColumn, ExtraValues, KNOWN_COLUMNS, MeasuredPull, MeasuredPulls};
+pub use measured::{
+    ExtraColumn, ExtraValues, KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, RestCount,
+};
 pub use mesh::{EXTENT_RANGE_M, MAX_TRIANGLES, MeshError, TriMesh, write_binary_stl};
 pub use optics::{BACKGROUND_TERMS, OpticsState};
 pub use patch::{ContactPatch, PressureCell};

@@ -1,6 +1,7 @@
 //! Pulls that were measured, or simulated and taken as if they were.
 
 use crate::config::Feedback;
+use crate::draw::Drawn;
 use crate::{Covariates, PullTrace};
 
 /// The columns of a pull table whose meaning is known, without `pull_id` and the label.
@@ -19,6 +20,12 @@ pub const KNOWN_COLUMNS: &[&str] = &[
     "grip_angle_deg",
     "pull_direction",
 ];
+
+/// The covariate [`MeasuredPulls::count_rests`] adds.
+pub const PULLS_SINCE_REST: &str = "pulls_since_rest";
+
+/// A pause as long as this is a rest: polymers forget most of their first cycles in a quarter of an hour.
+const REST_S: f64 = 900.0;
 
 /// One measured pull.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,4 +83,104 @@ pub struct MeasuredPulls {
     pub feedback: Option<Feedback>,
     /// SHA-256 of the files it was read from.
     pub sha256: String,
+}
+
+/// Counts pulls from the last rest: where the session or the gel changes, or the clock stands still for a quarter of an
+/// hour.
+#[derive(Debug, Clone, Default)]
+pub struct RestCount {
+    /// Rests so far.
+    rests: usize,
+    /// The pull before, and the index of the first pull after the last rest.
+    last: Option<(Covariates, u64)>,
+}
+
+impl RestCount {
+    /// Pulls since the last rest, of the next pull.
+    pub fn since(&mut self, next: &Covariates) -> u64 {
+        let first = match &self.last {
+            None => next.pull_index,
+            Some((last, first)) => {
+                let rested = last.session != next.session
+                    || last.gel_id != next.gel_id
+                    || next.time_s - next.dwell_s - last.time_s > REST_S;
+                self.rests += usize::from(rested);
+                if rested { next.pull_index } else { *first }
+            }
+        };
+        self.last = Some((next.clone(), first));
+        next.pull_index.saturating_sub(first)
+    }
+}
+
+impl MeasuredPulls {
+    /// Gives every pull the covariate [`PULLS_SINCE_REST`], unless it was written down. Without rests nothing is
+    /// added.
+    pub fn count_rests(&mut self) {
+        let known = |name: &str| self.recorded.iter().any(|c| c == name);
+        if self.extra.iter().any(|c| c.name == PULLS_SINCE_REST) || !(known("session") || known("time_s")) {
+            return;
+        }
+        let indexed = known("pull_index");
+        let mut count = RestCount::default();
+        let since: Vec<u64> = self
+            .pulls
+            .iter()
+            .enumerate()
+            .map(|(i, pull)| {
+                let index = if indexed { pull.covariates.pull_index } else { i as u64 };
+                count.since(&Covariates { pull_index: index, ..pull.covariates.clone() })
+            })
+            .collect();
+        if count.rests > 0 {
+            for (pull, since) in self.pulls.iter_mut().zip(since) {
+                pull.covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since as f64));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pulls_are_counted_from_the_last_rest() {
+        let pull = |i: u64, session: &str, time_s: f64| MeasuredPull {
+            id: i.to_string(),
+            part: "p".into(),
+            grip_force_n: 10.0,
+            increment_n: 1.0,
+            step_s: 0.1,
+            covariates: Covariates { pull_index: i, session: session.into(), time_s, ..Default::default() },
+            max_pull_force_n: 3.0,
+            trace: None,
+        };
+        let mut measured = MeasuredPulls {
+            pulls: vec![
+                pull(4, "1", 0.0),
+                pull(5, "1", 60.0),
+                pull(8, "1", 120.0),
+                pull(9, "1", 1200.0),
+                pull(10, "2", 1260.0),
+                pull(11, "2", 1320.0),
+            ],
+            recorded: vec!["session".into(), "pull_index".into(), "time_s".into()],
+            extra: vec![],
+            label_tolerance_n: 3.0,
+            stop_m: 5e-3,
+            feedback: None,
+            sha256: String::new(),
+        };
+        let since = |m: &MeasuredPulls| -> Vec<Option<Drawn>> {
+            m.pulls.iter().map(|p| p.covariates.extra.get(PULLS_SINCE_REST).cloned()).collect()
+        };
+        measured.count_rests();
+        let wanted = [0.0, 1.0, 4.0, 0.0, 0.0, 1.0].map(|x| Some(Drawn::Number(x)));
+        assert_eq!(since(&measured), wanted);
+        measured.pulls.truncate(3);
+        measured.pulls.iter_mut().for_each(|p| p.covariates.extra.clear());
+        measured.count_rests();
+        assert_eq!(since(&measured), [None, None, None], "no rest, nothing to count from");
+    }
 }

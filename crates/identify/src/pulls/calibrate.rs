@@ -134,7 +134,7 @@ pub fn calibrate_pulls(
         baseline: baseline(&fitted, &context),
         effects,
         laws,
-        error: errors(&data.label_n, &held, &held, &data.group_of).map(|pair| pair.after),
+        error: errors(&data.label_n, &held, &held, &data.group_of, &rows).map(|pair| pair.after),
         grip_force_n: range,
         fitted,
     })

@@ -3,6 +3,7 @@
 use super::data::{Column, PullData};
 use super::model::ModelEffect;
 use crate::least_squares::FreeParameter;
+use gripgen_twin::PULLS_SINCE_REST;
 use gripgen_twin::effects::{EffectSpec, LIBRARY};
 
 /// An effect that competes.
@@ -32,7 +33,12 @@ impl Candidate {
             .iter()
             .map(|&(i, scale)| {
                 let p = &self.spec.parameters[i];
-                FreeParameter { name: self.name_of(p.name), start: start[i], bounds: p.bounds, scale }
+                let mut bounds = p.bounds;
+                // A gel that settles once to less friction is worn, which is another effect.
+                if (self.spec.id, p.name) == ("conditioning", "depth") && start[2] == 0.0 {
+                    bounds.0 = 0.0;
+                }
+                FreeParameter { name: self.name_of(p.name), start: start[i], bounds, scale }
             })
             .collect()
     }
@@ -142,7 +148,18 @@ pub(super) fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: 
             0,
         ),
         "conditioning" if varies("pull_index") => {
-            over("n0", &[2.0, 6.0, 20.0], ("depth", 0.1), &[("depth", 0.05), ("n0", 2.0)], 0)
+            let rested =
+                data.measured.pulls.iter().any(|p| p.covariates.extra.contains_key(PULLS_SINCE_REST));
+            let mut starts = Vec::new();
+            for n0 in [2.0, 6.0, 20.0] {
+                starts.push(values(spec, &[("n0", n0), ("depth", 0.1)]));
+                if rested {
+                    starts.push(values(spec, &[("n0", n0), ("depth", 0.1), ("rests", 1.0)]));
+                    starts.push(values(spec, &[("n0", n0), ("depth", -0.1), ("rests", 1.0)]));
+                }
+            }
+            let free = vec![(0, 0.05), (1, 2.0)];
+            Some(Candidate { spec, starts, free, part: None, searched: usize::from(rested) })
         }
         "temperature" if varies("temperature_c") => plain(&[&[("k_per_k", 0.0)]], &[("k_per_k", 0.005)], 0),
         "grip_relaxation" if varies("dwell_s") => {

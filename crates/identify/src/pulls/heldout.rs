@@ -58,11 +58,20 @@ pub fn scatter(model: &PullModel, scale: f64) -> f64 {
     (model.scatter * scale).clamp(0.001, 0.3)
 }
 
-/// Errors of two predictions, with intervals that hold for both alike: pulls are drawn anew, whole configurations of
-/// `groups` at a time.
-pub fn errors(label_n: &[f64], before: &[f64], after: &[f64], groups: &[usize]) -> Option<ErrorPair> {
+/// Errors of two predictions at the pulls of `rows`, with intervals that hold for both alike: pulls are drawn anew, whole
+/// configurations of `groups` at a time.
+///
+/// The interval is that of the error on as many new pulls: these scatter as much as the ones at hand, so its ends are
+/// sqrt(2) further away, in the logarithm, than those of the bootstrap (Efron and Tibshirani 1993, chapter 13).
+pub fn errors(
+    label_n: &[f64],
+    before: &[f64],
+    after: &[f64],
+    groups: &[usize],
+    rows: &[usize],
+) -> Option<ErrorPair> {
     let known: Vec<usize> =
-        (0..label_n.len()).filter(|&i| before[i].is_finite() && after[i].is_finite()).collect();
+        rows.iter().copied().filter(|&i| before[i].is_finite() && after[i].is_finite()).collect();
     if known.len() < 3 {
         return None;
     }
@@ -95,11 +104,19 @@ pub fn errors(label_n: &[f64], before: &[f64], after: &[f64], groups: &[usize]) 
             })
             .collect();
         found.sort_by(f64::total_cmp);
+        let own = rmse(all, known.len());
+        let new = |end: f64| {
+            if own > 0.0 && end > 0.0 {
+                own * libm::exp(std::f64::consts::SQRT_2 * libm::log(end / own))
+            } else {
+                end
+            }
+        };
         HeldOutError {
-            rmse_n: Some(rmse(all, known.len())),
+            rmse_n: Some(own),
             mse: None,
-            low90: found[RESAMPLES / 20],
-            high90: found[RESAMPLES - 1 - RESAMPLES / 20],
+            low90: new(found[RESAMPLES / 20]),
+            high90: new(found[RESAMPLES - 1 - RESAMPLES / 20]),
             mape_pct: Some(100.0 * relative / known.len() as f64),
         }
     };
@@ -140,7 +157,7 @@ mod tests {
         assert_eq!(by_value(&[3, 1, 3]), vec![vec![1], vec![0, 2]]);
     }
 
-    /// The interval of the root mean square of normal errors: +-1.645 sigma / sqrt(2 n).
+    /// The interval of the root mean square of as many new normal errors: +-1.645 sigma / sqrt(n).
     #[test]
     fn intervals_are_those_of_normal_errors() {
         let mut draws = Draws::new(3, 0);
@@ -148,9 +165,9 @@ mod tests {
         let truth = vec![10.0; n];
         let off: Vec<f64> = (0..n).map(|_| 10.0 + 0.5 * draws.normal()).collect();
         let groups: Vec<usize> = (0..n).collect();
-        let pair = errors(&truth, &off, &off, &groups).unwrap();
+        let pair = errors(&truth, &off, &off, &groups, &groups).unwrap();
         let half = 0.5 * (pair.after.high90 - pair.after.low90);
-        let exact = 1.645 * 0.5 / (2.0 * n as f64).sqrt();
+        let exact = 1.645 * 0.5 / (n as f64).sqrt();
         assert!((half / exact - 1.0).abs() < 0.15, "{half} {exact}");
     }
 

@@ -2,10 +2,11 @@
 
 use super::candidates::Candidate;
 use super::context::Context;
-use super::fitting::Fitted;
+use super::curves::Curve;
+use super::fitting::{Fitted, Terms};
 use super::model::PullModel;
 use crate::diagnosis::Detectable;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Dyn, SVD};
 
 /// Standard errors that an effect has to be away from nothing to be seen with a probability of 0.8 at a level of 1 %.
 const SEEN: f64 = 3.42;
@@ -70,57 +71,135 @@ pub fn detectable(context: &Context<'_>, fitted: &Fitted, candidate: &Candidate)
     })
 }
 
-impl Context<'_> {
-    /// What an effect on signals promises to gain in log-likelihood beside `model`, from its slope at nothing (a score
-    /// test, Rao 1948). Effects on friction, and effects without a slope there, promise everything.
-    pub(super) fn promise(
-        &self,
-        model: &PullModel,
-        candidate: &Candidate,
-        from: &[f64],
-        rows: &[usize],
-    ) -> f64 {
+/// What a term promises to gain in log-likelihood beside a model, from its slope at nothing (a score test, Rao 1948).
+pub(super) struct ScoreTest<'a> {
+    context: &'a Context<'a>,
+    model: &'a PullModel,
+    rows: &'a [usize],
+    sd: Vec<f64>,
+    /// Scale of the residuals of pulls.
+    scale: f64,
+    /// Residuals, and what of them no parameter of the model explains.
+    residuals: DVector<f64>,
+    left: DVector<f64>,
+    /// Derivatives by the parameters of the model.
+    basis: DMatrix<f64>,
+    svd: SVD<f64, Dyn, Dyn>,
+    signals: bool,
+}
+
+impl<'a> ScoreTest<'a> {
+    /// Beside `model`, whose effects are those of `terms`. `signals` tells whether what traces say is looked at.
+    pub fn new(
+        context: &'a Context<'a>,
+        model: &'a PullModel,
+        terms: &Terms,
+        rows: &'a [usize],
+        signals: bool,
+    ) -> Self {
+        let sd = context.deviations(model, rows);
+        let mut test = Self {
+            context,
+            model,
+            rows,
+            sd,
+            scale: 1.0,
+            residuals: DVector::zeros(0),
+            left: DVector::zeros(0),
+            basis: DMatrix::zeros(0, 0),
+            svd: DMatrix::zeros(1, 1).svd(true, true),
+            signals,
+        };
+        test.residuals = test.residuals_of(model);
+        test.scale = super::likelihood::scale(&test.residuals.as_slice()[..rows.len()]).max(0.1);
+        let mut columns: Vec<DVector<f64>> =
+            (0..model.mu.len()).map(|k| test.slope(&|m| m.mu[k] *= 1.01, 0.01 * model.mu[k])).collect();
+        columns.push(test.slope(&|m| m.kinetic_ratio -= 0.01, -0.01));
+        if signals {
+            columns.push(test.slope(&|m| m.lag_s += 2e-3, 2e-3));
+            columns.push(test.slope(&|m| m.dead_time_s += 4e-3, 4e-3));
+        }
+        for (e, (candidate, _)) in terms.effects.iter().enumerate() {
+            for &(i, scale) in &candidate.free {
+                let bounds = candidate.spec.parameters[i].bounds;
+                let step = if model.effects[e].values[i] + 0.1 * scale <= bounds.1 { 0.1 } else { -0.1 };
+                columns.push(test.slope(&|m| m.effects[e].values[i] += step * scale, step * scale));
+            }
+        }
+        test.basis = DMatrix::from_columns(&columns);
+        test.svd = test.basis.clone().svd(true, true);
+        // Far residuals count as in the fit.
+        let clipped = test.own(test.residuals.clone()).map(|x| x.clamp(-3.0, 3.0));
+        test.left = test.free(&clipped);
+        test
+    }
+
+    fn residuals_of(&self, model: &PullModel) -> DVector<f64> {
+        let mut r = self.context.friction_residuals(model, self.rows, &self.sd);
+        if self.signals {
+            r.extend(self.context.trace_residuals(model, self.rows));
+        }
+        DVector::from_vec(r)
+    }
+
+    /// Residuals of pulls in units of their scale.
+    fn own(&self, v: DVector<f64>) -> DVector<f64> {
+        let n = self.rows.len();
+        DVector::from_iterator(
+            v.len(),
+            v.iter().enumerate().map(|(i, x)| if i < n { x / self.scale } else { *x }),
+        )
+    }
+
+    fn slope(&self, change: &dyn Fn(&mut PullModel), step: f64) -> DVector<f64> {
+        let mut moved = self.model.clone();
+        change(&mut moved);
+        self.own((self.residuals_of(&moved) - &self.residuals) / step)
+    }
+
+    fn free(&self, v: &DVector<f64>) -> DVector<f64> {
+        self.svd.solve(v, 1e-9).map(|c| v - &self.basis * c).unwrap_or_else(|_| v.clone())
+    }
+
+    /// What an effect promises from a start.
+    pub fn effect(&self, candidate: &Candidate, from: &[f64]) -> f64 {
         let Some(&(size, scale)) = candidate.free.first() else { return f64::INFINITY };
-        let p = &candidate.spec.parameters[size];
-        if !candidate.acts_on_signals() || ["sensor_saturation", "deadband"].contains(&candidate.spec.id) {
+        // These have no slope at nothing.
+        if ["sensor_saturation", "deadband"].contains(&candidate.spec.id) {
             return f64::INFINITY;
         }
-        let sd = self.deviations(model, rows);
-        let residuals = |model: &PullModel| {
-            let mut r = self.friction_residuals(model, rows, &sd);
-            r.extend(self.trace_residuals(model, rows));
-            DVector::from_vec(r)
-        };
-        let r = residuals(model);
-        let s = super::likelihood::scale(&r.as_slice()[..rows.len()]).max(0.1);
-        let own = |v: DVector<f64>| {
-            DVector::from_iterator(
-                v.len(),
-                v.iter().enumerate().map(|(i, x)| if i < rows.len() { x / s } else { *x }),
-            )
-        };
-        let slope = |change: &dyn Fn(&mut PullModel), step: f64| {
-            let mut moved = model.clone();
-            change(&mut moved);
-            own((residuals(&moved) - &r) / step)
-        };
+        let p = &candidate.spec.parameters[size];
         let mut values = from.to_vec();
         let step = if p.neutral + 0.3 * scale <= p.bounds.1 { 0.3 * scale } else { -0.3 * scale };
         values[size] = p.neutral + step;
-        let raw = slope(&|m| m.effects.push(candidate.with(&values)), step);
-        let mut columns: Vec<DVector<f64>> =
-            (0..model.mu.len()).map(|k| slope(&|m| m.mu[k] *= 1.01, 0.01 * model.mu[k])).collect();
-        columns.push(slope(&|m| m.lag_s += 2e-3, 2e-3));
-        columns.push(slope(&|m| m.dead_time_s += 4e-3, 4e-3));
-        columns.push(slope(&|m| m.kinetic_ratio -= 0.01, -0.01));
-        let basis = DMatrix::from_columns(&columns);
-        let svd = basis.clone().svd(true, true);
-        // Far residuals count as in the fit.
-        let r = own(r).map(|x| x.clamp(-3.0, 3.0));
-        let free =
-            |v: &DVector<f64>| svd.solve(v, 1e-9).map(|c| v - &basis * c).unwrap_or_else(|_| v.clone());
-        let (raw, r) = (free(&raw), free(&r));
+        let raw = self.free(&self.slope(&|m| m.effects.push(candidate.with(&values)), step));
         let length = raw.norm_squared();
-        if length < 1e-12 { 0.0 } else { 0.5 * raw.dot(&r).powi(2) / length }
+        if length < 1e-12 { 0.0 } else { 0.5 * raw.dot(&self.left).powi(2) / length }
+    }
+
+    /// What an unnamed curve promises.
+    pub fn curve(&self, curve: &Curve) -> f64 {
+        let n = self.context.data.len();
+        let limits = if curve.additive { self.context.predictor.limits_n(self.model) } else { vec![] };
+        let step = 0.02;
+        let columns: Vec<DVector<f64>> = (0..curve.len())
+            .map(|k| {
+                let mut coefficients = vec![0.0; curve.len()];
+                coefficients[k] = step;
+                let moved = |m: &mut PullModel| {
+                    if m.factor.is_empty() {
+                        m.factor = vec![1.0; n];
+                    }
+                    curve.apply(&coefficients, &limits, &mut m.factor);
+                };
+                self.free(&self.slope(&moved, step))
+            })
+            .collect();
+        if columns.is_empty() {
+            return 0.0;
+        }
+        let columns = DMatrix::from_columns(&columns);
+        let explained = columns.clone().svd(true, true).solve(&self.left, 1e-9).map(|c| &columns * c);
+        explained.map_or(f64::INFINITY, |e| 0.5 * self.left.dot(&e))
     }
 }

@@ -6,6 +6,7 @@ use super::context::Context;
 use super::curves::{Curve, curves_in, product};
 use super::fitting::{Fitted, Terms};
 use super::model::PullModel;
+use super::power::ScoreTest;
 use std::sync::Mutex;
 
 /// Score that a named effect has to gain: odds of 20 to 1, beyond what its parameters cost. Set on the development split of
@@ -28,8 +29,10 @@ const EXPLAINED: f64 = 0.75;
 /// from what nature does. More than that, and the effect is not what acts.
 const MISFIT: f64 = 0.3;
 
-/// Gain of log-likelihood that the slope at nothing has to promise for an effect on signals to be fitted.
+/// Gain of log-likelihood that the slope at nothing has to promise for an effect on signals to be fitted, and for anything
+/// beside such an effect: these fits are slow.
 const LEAST_PROMISE: f64 = 1.5;
+const LEAST_PROMISE_BESIDE: f64 = 2.5;
 
 /// Correlation of ranks from which on two columns are the same clock.
 const SAME_CLOCK: f64 = 0.9;
@@ -117,8 +120,9 @@ impl<'a> Search<'a> {
         fitted.score(self.rows.len())
     }
 
-    /// `terms` with one rival more, from all its starts; the best fit.
-    fn with(&self, start: &PullModel, terms: &Terms, rival: &Rival) -> Option<Fitted> {
+    /// `terms` with one rival more, from all its starts; the best fit. `test` is a score test beside them.
+    fn with(&self, start: &PullModel, terms: &Terms, rival: &Rival, test: &ScoreTest<'_>) -> Option<Fitted> {
+        let slow = terms.act_on_signals();
         let mut best: Option<Fitted> = None;
         let keep = |fitted: Option<Fitted>, best: &mut Option<Fitted>| {
             if let Some(f) = fitted
@@ -130,15 +134,22 @@ impl<'a> Search<'a> {
         match rival {
             Rival::Curve(i) => {
                 let curve = &self.curves[*i];
+                if slow && test.curve(curve) < LEAST_PROMISE_BESIDE {
+                    return None;
+                }
                 let mut terms = terms.clone();
                 terms.curves.push((curve.clone(), vec![0.0; curve.len()]));
                 keep(self.context.fit(start, &terms, &self.rows), &mut best);
             }
             Rival::Effect(i) => {
                 let candidate = &self.candidates[*i];
+                let least = match (slow, candidate.acts_on_signals()) {
+                    (true, _) => LEAST_PROMISE_BESIDE,
+                    (false, true) => LEAST_PROMISE,
+                    (false, false) => 0.0,
+                };
                 for from in &candidate.starts {
-                    // Fits of effects on signals are slow: those that promise nothing are left out.
-                    if self.context.promise(start, candidate, from, &self.rows) < LEAST_PROMISE {
+                    if least > 0.0 && test.effect(candidate, from) < least {
                         continue;
                     }
                     let mut terms = terms.clone();
@@ -159,8 +170,9 @@ impl<'a> Search<'a> {
         done: &(dyn Fn() + Sync),
     ) -> Vec<Entry> {
         let results: Vec<Mutex<Option<Fitted>>> = rivals.iter().map(|_| Mutex::new(None)).collect();
+        let test = ScoreTest::new(self.context, &before.model, terms, &self.rows, true);
         self.context.predictor.for_each(rivals.len(), &|i| {
-            let fitted = self.with(&before.model, terms, &rivals[i]);
+            let fitted = self.with(&before.model, terms, &rivals[i], &test);
             if let Ok(mut slot) = results[i].lock() {
                 *slot = fitted;
             }

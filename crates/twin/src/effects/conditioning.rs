@@ -2,20 +2,23 @@
 
 use super::hooks::values;
 use super::{EffectSpec, GripPoint, ParameterSpec};
+use crate::PULLS_SINCE_REST;
+use crate::draw::Drawn;
 
-/// `conditioning`: silicone softens in its first cycles (Mullins effect), so that the contact grows and friction
-/// rises to its settled value. It rises only: a fall with the same shape would be `wear` under another name.
+/// `conditioning`: silicone softens in its first cycles (Mullins effect), so that the contact changes and friction
+/// moves to its settled value. What rest undoes comes back after every rest; what it does not happens once in the life of a
+/// gel, where only a rise is told from `wear`.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "conditioning",
-    about: "friction coefficient that is low in the first pulls of a gel",
-    formula: "mu' = mu (1 - depth exp(-pull_index / n0))",
+    about: "friction coefficient that settles in the first pulls of a gel, or after a rest",
+    formula: "mu' = mu (1 - depth exp(-n / n0)), n = (1 - rests) pull_index + rests pulls_since_rest",
     source: "Mullins softening, 5 to 30 % in the first cycle, over in 3 to 10",
     parameters: &[
         ParameterSpec {
             name: "depth",
             unit: "1",
             neutral: 0.0,
-            bounds: (0.0, 0.6),
+            bounds: (-0.6, 0.6),
             about: "share of the settled coefficient that the first pull lacks",
         },
         ParameterSpec {
@@ -25,6 +28,13 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
             bounds: (0.5, 100.0),
             about: "pulls after which 63 % of that are there",
         },
+        ParameterSpec {
+            name: "rests",
+            unit: "1",
+            neutral: 0.0,
+            bounds: (0.0, 1.0),
+            about: "1 where every rest starts it anew, 0 where it happens once in the life of a gel",
+        },
     ],
     covariates: &["pull_index"],
     friction: Some(friction),
@@ -32,8 +42,14 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
 };
 
 fn friction(parameters: &[f64], mu: f64, at: &GripPoint<'_>) -> f64 {
-    let [depth, n0] = values(parameters);
-    mu * (1.0 - depth * libm::exp(-(at.covariates.pull_index as f64) / n0))
+    let [depth, n0, rests] = values(parameters);
+    let index = at.covariates.pull_index as f64;
+    let since = match at.covariates.extra.get(PULLS_SINCE_REST) {
+        Some(Drawn::Number(n)) if rests > 0.0 => *n,
+        _ => index,
+    };
+    let n = (1.0 - rests) * index + rests * since;
+    mu * (1.0 - depth * libm::exp(-n / n0))
 }
 
 #[cfg(test)]
@@ -46,12 +62,22 @@ mod tests {
     fn the_first_pull_lacks_depth_and_each_pull_the_same_share_of_what_is_left() {
         let lacks = |pull_index| {
             let c = Covariates { pull_index, ..Default::default() };
-            1.0 - friction(&[0.2, 4.0], 0.3, &grip(&c, 40.0)) / 0.3
+            1.0 - friction(&[0.2, 4.0, 0.0], 0.3, &grip(&c, 40.0)) / 0.3
         };
         assert!((lacks(0) - 0.2).abs() < 1e-12);
         assert!((lacks(4) - 0.2 * 0.367_879_441_17).abs() < 1e-12);
         for n in 0..10 {
             assert!((lacks(n + 1) / lacks(n) - 0.778_800_783_07).abs() < 1e-9, "exp(-1/4)");
         }
+    }
+    /// With rests, the count starts anew after each; where nobody counted, the pulls of the gel stand in.
+    #[test]
+    fn a_rest_starts_it_anew() {
+        let mut c = Covariates { pull_index: 40, ..Default::default() };
+        let lacks = |c: &Covariates, rests| 1.0 - friction(&[0.2, 4.0, rests], 0.3, &grip(c, 40.0)) / 0.3;
+        assert_eq!(lacks(&c, 1.0), lacks(&c, 0.0));
+        c.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(0.0));
+        assert!((lacks(&c, 1.0) - 0.2).abs() < 1e-12);
+        assert!(lacks(&c, 0.0) < 1e-4);
     }
 }
