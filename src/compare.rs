@@ -4,7 +4,7 @@ use crate::diagnose::{UnknownPartError, given_model};
 use crate::predict::PullPredictor;
 use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel};
 use gripgen_twin::effects::OutsideFit;
-use gripgen_twin::{MeasuredPulls, Table, TableTarget, Twin, covariate};
+use gripgen_twin::{MeasuredPulls, Table, TableTarget, Twin};
 use std::collections::BTreeMap;
 
 /// Errors of predicted labels.
@@ -76,9 +76,8 @@ fn apply_tables(model: &mut PullModel, twin: &Twin, measured: &MeasuredPulls, pr
         return;
     }
     let value = |p: &gripgen_twin::MeasuredPull, target: TableTarget, t: &Table| {
-        let acts = t.target == target && t.part.as_ref().is_none_or(|part| *part == p.part);
-        let at = covariate(&t.covariate, &p.part, [p.grip_force_n, p.increment_n, p.step_s], &p.covariates);
-        at.filter(|_| acts).and_then(|at| t.value(&at))
+        let forces = [p.grip_force_n, p.increment_n, p.step_s];
+        (t.target == target).then(|| t.at(&p.part, forces, &p.covariates)).flatten()
     };
     let limits_n = predictor.limits_n(model);
     let factor = |(p, limit_n): (&gripgen_twin::MeasuredPull, &f64)| {

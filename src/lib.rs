@@ -74,7 +74,7 @@ pub use calibrate::{CalibratePullsError, calibrate_twin};
 pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use compare::{LabelErrors, PullComparison, compare_pulls};
 pub use diagnose::{
-    PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions, calibrate_sensor_table,
+    NextPulls, PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions, calibrate_sensor_table,
     compare_sensor_table, diagnose_presses, diagnose_pull_table, diagnose_sensor_table, given_model,
     is_optics_effect, is_sensor_table, load_sensor_table, sensor_calibration_edits,
 };

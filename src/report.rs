@@ -118,4 +118,6 @@ pub struct Diagnosed {
     pub edits: crate::TwinEdits,
     /// What the report shows.
     pub report: ReportData,
+    /// The pulls that would tell apart what these could not.
+    pub next: Option<crate::NextPulls>,
 }

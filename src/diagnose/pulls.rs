@@ -1,5 +1,6 @@
 //! Diagnosis of pulls through the reduced mechanics.
 
+use super::next::next_pulls;
 use super::pull_report::pull_report;
 use crate::predict::PullPredictor;
 use crate::report::Diagnosed;
@@ -73,7 +74,17 @@ pub fn diagnose_pull_table(
     let edits =
         answer.fits.as_ref().map(|f| edits(f, &answer.diagnosis, measured, &predictor)).unwrap_or_default();
     let report = pull_report(measured, &predictor, &answer);
-    Ok(Diagnosed { diagnosis: answer.diagnosis, edits, report })
+    let next = match &answer.fits {
+        Some(fits) => next_pulls(fits, measured, twin, options.jobs),
+        None => None,
+    };
+    let mut diagnosis = answer.diagnosis;
+    if let Some(next) = &next {
+        for separate in diagnosis.effects.iter_mut().filter_map(|e| e.separate_by.as_mut()) {
+            separate.text = format!("{}; or {}", separate.text, next.text());
+        }
+    }
+    Ok(Diagnosed { diagnosis, edits, report, next })
 }
 
 /// Fitted baseline values as they stand in a twin.
@@ -166,7 +177,10 @@ fn edits(
     TwinEdits { values, effects: Some(effects) }
 }
 
-/// A curve without a name as a table of the twin, marked as not physical. The product of two columns has none.
+/// Points of a table over a product of columns.
+const PRODUCT_POINTS: usize = 25;
+
+/// A curve without a name as a table of the twin, marked as not physical.
 fn table(
     curve: &Curve,
     coefficients: &[f64],
@@ -174,6 +188,20 @@ fn table(
     evidence: &str,
 ) -> Option<EffectFile> {
     let data = PullData::new(measured);
+    let entry = |parameters| EffectFile {
+        name: TABLE_EFFECT.into(),
+        part: None,
+        fitted_grip_force_n: None,
+        outside_fit: OutsideFit::Extrapolate,
+        per: gripgen_twin::effects::Per::Jaw,
+        reference_area_mm2: None,
+        source: Some(evidence.into()),
+        calibration: BTreeMap::new(),
+        parameters,
+    };
+    if let Some((a, b)) = curve.name.split_once('*') {
+        return Some(entry(product_table(&data, curve, coefficients, a, b)?));
+    }
     let column = data.columns.get(&curve.name)?;
     let sum = |i: usize| curve.basis[i].iter().zip(coefficients).map(|(b, c)| b * c).sum::<f64>();
     let value = |i: usize| if curve.additive { sum(i) } else { sum(i).clamp(-3.0, 3.0).exp() };
@@ -210,15 +238,42 @@ fn table(
             parameters.insert(target.into(), numbers(kept.iter().map(|p| p.1).collect()));
         }
     }
-    Some(EffectFile {
-        name: TABLE_EFFECT.into(),
-        part: None,
-        fitted_grip_force_n: None,
-        outside_fit: OutsideFit::Extrapolate,
-        per: gripgen_twin::effects::Per::Jaw,
-        reference_area_mm2: None,
-        source: Some(evidence.into()),
-        calibration: BTreeMap::new(),
-        parameters,
-    })
+    Some(entry(parameters))
+}
+
+/// What is taken off two columns, and the factor over their product.
+fn product_table(
+    data: &PullData<'_>,
+    curve: &Curve,
+    coefficients: &[f64],
+    a: &str,
+    b: &str,
+) -> Option<BTreeMap<String, toml::Value>> {
+    let (x, y) = (data.numbers(a)?, data.numbers(b)?);
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let centre = [mean(&x), mean(&y)];
+    let products: Vec<f64> = x.iter().zip(&y).map(|(x, y)| (x - centre[0]) * (y - centre[1])).collect();
+    // The basis is a straight line in the product: two pulls that differ give it.
+    let of = |best: fn(f64, f64) -> bool| {
+        (0..products.len()).reduce(|i, j| if best(products[j], products[i]) { j } else { i })
+    };
+    let (low, high) = (of(|a, b| a < b)?, of(|a, b| a > b)?);
+    let width = products[high] - products[low];
+    if width <= 0.0 {
+        return None;
+    }
+    let slope = (curve.basis[high][0] - curve.basis[low][0]) / width;
+    let at = |k: usize| products[low] + width * k as f64 / (PRODUCT_POINTS - 1) as f64;
+    let factor = |z: f64| {
+        let basis = curve.basis[low][0] + slope * (z - products[low]);
+        libm::exp((coefficients[0] * basis).clamp(-3.0, 3.0))
+    };
+    let numbers = |x: Vec<f64>| toml::Value::Array(x.into_iter().map(toml::Value::Float).collect());
+    Some(BTreeMap::from([
+        ("covariate".to_string(), toml::Value::String(curve.name.clone())),
+        ("centre".to_string(), numbers(centre.to_vec())),
+        ("x".to_string(), numbers((0..PRODUCT_POINTS).map(at).collect())),
+        ("factor".to_string(), numbers((0..PRODUCT_POINTS).map(|k| factor(at(k))).collect())),
+        ("physical".to_string(), toml::Value::Boolean(false)),
+    ]))
 }

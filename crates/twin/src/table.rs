@@ -36,8 +36,10 @@ pub enum TableTarget {
 /// A table over one covariate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// A column of a pull table, in its units, or one of unknown meaning.
+    /// A column of a pull table, in its units, or one of unknown meaning; the product of two as `a*b`.
     pub covariate: String,
+    /// What is taken off both factors of a product.
+    pub centre: Option<[f64; 2]>,
     /// The only part it acts on, or all of them.
     pub part: Option<String>,
     /// Where its values are.
@@ -62,12 +64,25 @@ impl Table {
     }
 
     fn of(&self, scenario: &Scenario) -> Option<f64> {
-        if self.part.as_ref().is_some_and(|part| *part != scenario.part) {
+        let pull = &scenario.pull;
+        let forces = [scenario.grip_force_n, pull.increment_n, pull.step_s];
+        self.at(&scenario.part, forces, &scenario.covariates)
+    }
+
+    /// The value at a pull; `None` where the table says nothing. `forces` are those of [`covariate`].
+    pub fn at(&self, part: &str, forces: [f64; 3], c: &Covariates) -> Option<f64> {
+        if self.part.as_ref().is_some_and(|own| own != part) {
             return None;
         }
-        let (pull, c) = (&scenario.pull, &scenario.covariates);
-        let forces = [scenario.grip_force_n, pull.increment_n, pull.step_s];
-        self.value(&covariate(&self.covariate, &scenario.part, forces, c)?)
+        let column = |name: &str| covariate(name, part, forces, c);
+        let at = match (self.centre, self.covariate.split_once('*')) {
+            (Some([a, b]), Some((first, second))) => match (column(first)?, column(second)?) {
+                (Drawn::Number(x), Drawn::Number(y)) => Drawn::Number((x - a) * (y - b)),
+                _ => return None,
+            },
+            _ => column(&self.covariate)?,
+        };
+        self.value(&at)
     }
 }
 
@@ -121,7 +136,7 @@ pub fn table_offset_n(twin: &Twin, scenario: &Scenario) -> f64 {
     offsets.filter_map(|t| t.of(scenario)).fold(0.0, |sum, x| sum + x)
 }
 
-const KEYS: [&str; 6] = ["covariate", "x", "words", "factor", "offset_n", "physical"];
+const KEYS: [&str; 7] = ["covariate", "centre", "x", "words", "factor", "offset_n", "physical"];
 
 /// Checks a table of a twin file. Errors name the key.
 pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, ConfigError> {
@@ -143,13 +158,14 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
             return Err(ConfigError::new(key("covariate"), "the name of a column of a pull table is needed"));
         }
     };
+    let centre = centre(&covariate, get("centre"), &key)?;
     let known = KNOWN_COLUMNS.contains(&covariate.as_str());
     let axis = match (get("x"), get("words")) {
         (Some(_), None) if WORD_COLUMNS.contains(&covariate.as_str()) => {
             let problem = format!("`{covariate}` holds words, not numbers");
             return Err(ConfigError::new(key("x"), problem).hint("give its values in words = [...]"));
         }
-        (None, Some(_)) if known && !WORD_COLUMNS.contains(&covariate.as_str()) => {
+        (None, Some(_)) if (known || centre.is_some()) && !WORD_COLUMNS.contains(&covariate.as_str()) => {
             let problem = format!("`{covariate}` holds numbers, not words");
             return Err(ConfigError::new(key("words"), problem).hint("give its values in x = [...]"));
         }
@@ -177,7 +193,37 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
             TableTarget::Offset => in_range(&at, value, -1e3..=1e3, "N")?,
         };
     }
-    Ok(Table { covariate, part: effect.part.clone(), axis, values, target })
+    Ok(Table { covariate, centre, part: effect.part.clone(), axis, values, target })
+}
+
+/// What is taken off the factors of a product; a single column has none.
+fn centre(
+    covariate: &str,
+    value: Option<&toml::Value>,
+    key: &dyn Fn(&str) -> String,
+) -> Result<Option<[f64; 2]>, ConfigError> {
+    match (covariate.split_once('*'), value) {
+        (None, None) => Ok(None),
+        (None, Some(_)) => {
+            let problem = format!("`{covariate}` is one column, only a product has a centre");
+            Err(ConfigError::new(key("centre"), problem).hint("leave centre out"))
+        }
+        (Some((a, b)), value) => {
+            if let Some(word) = [a, b].into_iter().find(|name| WORD_COLUMNS.contains(name) || name.is_empty())
+            {
+                let problem = format!("`{word}` holds no numbers, it has no product");
+                return Err(ConfigError::new(key("covariate"), problem));
+            }
+            let found = value.map_or(Ok(vec![]), |v| numbers(v, &key("centre")))?;
+            let count = found.len();
+            let pair = <[f64; 2]>::try_from(found).map_err(|_| {
+                let problem = format!("a product needs what is taken off its 2 factors, {count} are given");
+                ConfigError::new(key("centre"), problem)
+                    .hint("centre = [mean of the first, mean of the second]")
+            })?;
+            Ok(Some(pair))
+        }
+    }
 }
 
 /// Keys that a table does not have.
@@ -320,6 +366,33 @@ mod tests {
         assert_eq!((table_factor(&offset, &rod), table_offset_n(&offset, &rod)), (1.0, 0.7));
         let own = table("dwell_s", "x = [1]", "factor = [2.0]\npart = \"plate\"");
         assert_eq!((table_factor(&own, &rod), table_factor(&own, &scenario("plate", &[]))), (1.0, 2.0));
+    }
+
+    /// A product is that of both columns about their centres.
+    #[test]
+    fn a_table_may_stand_over_the_product_of_two_columns() {
+        let text = "[[effects]]\nname = \"table\"\ncovariate = \"grip_force_n*humidity_pct\"\ncentre = [30, 50]\n\
+                    x = [-100, 100]\nfactor = [0.9, 1.1]\nphysical = false\n";
+        let twin_of = |text: &str| twin(text);
+        let made = twin_of(text).unwrap();
+        let at = |x: f64| table_factor(&made, &scenario("rod", &[("humidity_pct", Drawn::Number(x))]));
+        // The grip is 40 N: (40 - 30) (55 - 50) = 50.
+        assert!(
+            (at(55.0) - 1.05).abs() < 1e-12 && (at(45.0) - 0.95).abs() < 1e-12,
+            "{} {}",
+            at(55.0),
+            at(45.0)
+        );
+        assert_eq!(table_factor(&made, &scenario("rod", &[])), 1.0, "nobody wrote it down");
+        for (from, to, key) in [
+            ("centre = [30, 50]\n", "", "effects[0].centre"),
+            ("[30, 50]", "[30]", "effects[0].centre"),
+            ("*humidity_pct", "*part", "effects[0].covariate"),
+            ("*humidity_pct", "", "effects[0].centre"),
+        ] {
+            let error = twin_of(&text.replacen(from, to, 1)).unwrap_err();
+            assert_eq!(error.key, key, "{error}");
+        }
     }
 
     #[test]

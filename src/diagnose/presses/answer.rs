@@ -43,7 +43,7 @@ pub(super) fn insufficient(input: &PressDiagnosisInput<'_>, missing: &str) -> Di
     diagnosis.verdict = Verdict::Insufficient;
     diagnosis.notes.push(format!("too little to go by: {missing}"));
     let report = page::report(&diagnosis, None, &[]);
-    Diagnosed { diagnosis, edits: TwinEdits::default(), report }
+    Diagnosed { diagnosis, edits: TwinEdits::default(), report, next: None }
 }
 
 fn bare(input: &PressDiagnosisInput<'_>) -> Diagnosis {
@@ -134,7 +134,7 @@ impl Answer<'_> {
         });
         diagnosis.notes.push("`by.sessions` holds out blocks of presses that follow one another".into());
         let report = page::report(&diagnosis, Some(self), &errors.both());
-        Diagnosed { edits: self.edits(&diagnosis), diagnosis, report }
+        Diagnosed { edits: self.edits(&diagnosis), diagnosis, report, next: None }
     }
 
     fn effects(&self) -> Vec<NamedEffect> {

@@ -119,6 +119,14 @@ pub struct CampaignArgs {
         allow_negative_numbers = true
     )]
     pub offsets_mm: Vec<f64>,
+    /// Instead of a first campaign: the pulls that best tell apart, per minute, what a diagnosis of these measurements
+    /// leaves tied.
+    #[arg(
+        long,
+        value_name = "MEASURED",
+        conflicts_with_all = ["parts", "pulls", "sessions", "angles_deg", "offsets_mm"]
+    )]
+    pub separate: Option<PathBuf>,
     /// Also make the campaign on the twin, into this folder of measurements.
     #[arg(long, value_name = "FOLDER")]
     pub simulate: Option<PathBuf>,

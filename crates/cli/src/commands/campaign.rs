@@ -1,14 +1,16 @@
 //! `gripgen campaign`: plan a campaign.
 
-use super::diagnose::load_twin;
+use super::diagnose::output::next_toml;
+use super::diagnose::{diagnose_folder, load_twin};
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, program, writable, write_file};
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};
 use gripgen::twin::{Campaign, PullKind, Twin};
-use gripgen::{Location, simulate_campaign};
+use gripgen::{Location, NextPulls, simulate_campaign};
 use serde_json::json;
+use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
@@ -16,13 +18,14 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let at = Location::parse(&args.twin);
     let twin = load_twin(&args.twin, &[])?;
-    let campaign = plan_campaign(&options(args, &twin)?).map_err(|e| match e {
-        CampaignError::TooFew { .. } => {
-            Failure::usage(e).hint("raise --pulls, or name fewer parts with --parts")
+    let (campaign, separating) = match &args.separate {
+        Some(measured) => {
+            let next = separating(args, measured, &twin)?;
+            let text = next_toml(&next, measured);
+            (next.campaign, Some(text))
         }
-        CampaignError::Sessions { .. } => Failure::usage(e).hint("change --sessions"),
-        other => Failure::usage(other),
-    })?;
+        None => (first(args, &twin)?, None),
+    };
     let minutes = campaign.estimated_minutes();
     let hours =
         format!("{} pulls, about {} h {:02} min", count(&campaign), minutes as u64 / 60, minutes as u64 % 60);
@@ -32,7 +35,8 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
          Keys are described in docs/format.md. Run it with `gripgen rig pull`.",
         args.seed
     );
-    write_file(&args.out, campaign_toml(&campaign, &about).as_bytes())?;
+    let text = separating.unwrap_or_else(|| campaign_toml(&campaign, &about));
+    write_file(&args.out, text.as_bytes())?;
     let simulated = match &args.simulate {
         Some(folder) => {
             let made = simulate_campaign(&at, &[], &campaign, args.seed).map_err(Failure::usage)?;
@@ -64,6 +68,28 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         }
     }
     Ok(0)
+}
+
+/// A first campaign.
+fn first(args: &CampaignArgs, twin: &Twin) -> Result<Campaign, Failure> {
+    plan_campaign(&options(args, twin)?).map_err(|e| match e {
+        CampaignError::TooFew { .. } => {
+            Failure::usage(e).hint("raise --pulls, or name fewer parts with --parts")
+        }
+        CampaignError::Sessions { .. } => Failure::usage(e).hint("change --sessions"),
+        other => Failure::usage(other),
+    })
+}
+
+/// The pulls that separate what a diagnosis of `measured` leaves tied.
+fn separating(args: &CampaignArgs, measured: &Path, twin: &Twin) -> Result<NextPulls, Failure> {
+    let diagnosed = diagnose_folder(measured, twin, &args.talk)?;
+    diagnosed.next.ok_or_else(|| {
+        let found =
+            format!("--separate: {} leaves nothing tied that pulls could separate", measured.display());
+        Failure::usage(found)
+            .hint("`gripgen diagnose` says what was found; without --separate a first campaign is planned")
+    })
 }
 
 fn options(args: &CampaignArgs, twin: &Twin) -> Result<CampaignOptions, Failure> {

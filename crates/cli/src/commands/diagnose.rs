@@ -1,9 +1,9 @@
 //! `gripgen diagnose`: where a twin is wrong, and why.
 
-mod output;
+pub mod output;
 mod presses;
 
-use crate::args::DiagnoseArgs;
+use crate::args::{DiagnoseArgs, TalkArgs};
 use crate::failure::Failure;
 use crate::output::{JsonSink, writable};
 use crate::progress::Share;
@@ -62,11 +62,16 @@ fn sensor(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
 }
 
 fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
-    let loaded = load_pulls(&args.measured).map_err(|e| no_pulls(&args.measured, e))?;
     let twin = load_twin(&args.twin, &args.set)?;
+    diagnose_folder(&args.measured, &twin, &args.talk)
+}
+
+/// Diagnoses the pulls of a folder, with progress.
+pub fn diagnose_folder(measured: &Path, twin: &Twin, talk: &TalkArgs) -> Result<Diagnosed, Failure> {
+    let loaded = load_pulls(measured).map_err(|e| no_pulls(measured, e))?;
     let options = PullDiagnoseOptions { jobs: jobs(), without: &[] };
-    let share = Share::start("diagnosing", &args.talk);
-    let diagnosed = diagnose_pull_table(&loaded.pulls, &twin, &options, &|x| share.at(x));
+    let share = Share::start("diagnosing", talk);
+    let diagnosed = diagnose_pull_table(&loaded.pulls, twin, &options, &|x| share.at(x));
     share.finish();
     let mut diagnosed = diagnosed.map_err(|e| {
         Failure::usage(e)

@@ -262,7 +262,7 @@ fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted) -> Vec<Named
         .iter()
         .map(|(i, tied)| {
             let candidate = &search.candidates[*i];
-            let odds: Vec<f64> = tied.iter().map(|(_, less)| libm::exp(TEMPER * less)).collect();
+            let odds: Vec<f64> = tied.iter().map(|t| libm::exp(TEMPER * t.less)).collect();
             let total = 1.0 + odds.iter().sum::<f64>();
             // What is left for "none" and for everything else.
             let alone = accepted.entries.iter().find(|e| matches!(e.rival, Competing::Effect(k) if k == *i));
@@ -271,20 +271,20 @@ fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted) -> Vec<Named
             let rivals: Vec<Rival> = tied
                 .iter()
                 .zip(&odds)
-                .map(|((k, _), odds)| Rival {
-                    name: search.candidates[*k].spec.id.into(),
+                .map(|(t, odds)| Rival {
+                    name: search.candidates[t.effect].spec.id.into(),
                     weight: share * odds,
                 })
                 .collect();
             let mut class: Vec<String> = vec![candidate.spec.id.into()];
-            class.extend(tied.iter().map(|(k, _)| search.candidates[*k].spec.id.to_string()));
+            class.extend(tied.iter().map(|t| search.candidates[t.effect].spec.id.to_string()));
             class.extend(
                 alike(search, before, accepted, *i)
                     .into_iter()
                     .filter(|c| !class.contains(c))
                     .collect::<Vec<_>>(),
             );
-            let names: Vec<&str> = tied.iter().map(|(k, _)| search.candidates[*k].spec.id).collect();
+            let names: Vec<&str> = tied.iter().map(|t| search.candidates[t.effect].spec.id).collect();
             NamedEffect {
                 name: candidate.spec.id.into(),
                 part: None,

@@ -64,6 +64,30 @@ impl Fitted {
     }
 }
 
+impl Fitted {
+    /// The model with other values of the fitted parameters, for pulls that need not be those of the fit: without the
+    /// factors of unnamed curves.
+    pub fn with_values(&self, values: &[f64]) -> PullModel {
+        let mut model = self.model.clone();
+        model.factor.clear();
+        let parts = model.mu.len();
+        model.mu.copy_from_slice(&values[..parts]);
+        (model.kinetic_ratio, model.misread_n) = (values[parts], values[parts + 1]);
+        let mut at = parts + 2;
+        if self.names.get(at).is_some_and(|name| name == "robot.lag_s") {
+            (model.lag_s, model.dead_time_s) = (values[at].max(0.0), values[at + 1].max(0.0));
+            at += 2;
+        }
+        for ((candidate, _), effect) in self.terms.effects.iter().zip(&mut model.effects) {
+            for &(i, _) in &candidate.free {
+                effect.values[i] = values[at];
+                at += 1;
+            }
+        }
+        model
+    }
+}
+
 /// Which parameters a fit has, in order.
 struct Layout {
     parts: usize,

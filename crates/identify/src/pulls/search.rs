@@ -57,13 +57,24 @@ pub struct Entry {
     pub gain: f64,
 }
 
+/// An effect that the data do not tell from an accepted one.
+#[derive(Debug, Clone)]
+pub struct Tied {
+    /// Which, by position.
+    pub effect: usize,
+    /// Its score less that of the accepted one.
+    pub less: f64,
+    /// The model with it in place of the accepted one.
+    pub fitted: Fitted,
+}
+
 /// What was accepted: a model, and for each of its effects what else could stand in its place.
 #[derive(Debug, Clone)]
 pub struct Accepted {
     /// The model.
     pub fitted: Fitted,
-    /// Effects by position, each with its rivals (position, score less the best).
-    pub effects: Vec<(usize, Vec<(usize, f64)>)>,
+    /// Effects by position, each with what is tied with it.
+    pub effects: Vec<(usize, Vec<Tied>)>,
     /// Unnamed curves by position.
     pub curves: Vec<usize>,
     /// Everything that competed for the first place, best first.
@@ -365,12 +376,14 @@ fn rank_correlation(x: &[f64], y: &[f64]) -> f64 {
     sum(&a, &b) / (sum(&a, &a) * sum(&b, &b)).sqrt().max(1e-300)
 }
 
-/// Rivals of effect `i` that the data do not tell from it, with their scores less its own.
-fn tied(i: usize, gain: f64, entries: &[Entry]) -> Vec<(usize, f64)> {
+/// Rivals of effect `i` that the data do not tell from it.
+fn tied(i: usize, gain: f64, entries: &[Entry]) -> Vec<Tied> {
     entries
         .iter()
         .filter_map(|e| match e.rival {
-            Rival::Effect(k) if k != i && e.gain > gain - TIED_WITHIN => Some((k, e.gain - gain)),
+            Rival::Effect(k) if k != i && e.gain > gain - TIED_WITHIN => {
+                Some(Tied { effect: k, less: e.gain - gain, fitted: e.fitted.clone() })
+            }
             _ => None,
         })
         .collect()

@@ -4,14 +4,17 @@ use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, write_file};
 use gripgen::identify::{Diagnosis, HeldOutError, Verdict};
-use gripgen::{Diagnosed, Location, diagnosis_page, write_twin};
+use gripgen::record::campaign_toml;
+use gripgen::{Diagnosed, Location, NextPulls, diagnosis_page, write_twin};
 use std::fmt::Write;
+use std::path::{Path, PathBuf};
 
 /// Twin, report, JSON, and a summary for people.
 pub fn write(args: &DiagnoseArgs, mut sink: JsonSink, mut diagnosed: Diagnosed) -> Result<u8, Failure> {
     if diagnosed.report.title.is_empty() {
         diagnosed.report.title = args.measured.display().to_string();
     }
+    let next = write_next(args, &mut diagnosed)?;
     if let Some(report) = &args.report {
         write_file(report, diagnosis_page(&diagnosed).as_bytes())?;
     }
@@ -26,13 +29,54 @@ pub fn write(args: &DiagnoseArgs, mut sink: JsonSink, mut diagnosed: Diagnosed) 
         print(&summary(&diagnosed.diagnosis))?;
     }
     if !args.talk.quiet {
-        for (path, what) in [(&args.out, "the twin"), (&args.report, "the report")] {
+        for (path, what) in [(&args.out, "the twin"), (&args.report, "the report"), (&next, "the next pulls")]
+        {
             if let Some(path) = path {
                 eprintln!("{what}: {}", path.display());
             }
         }
     }
     Ok(0)
+}
+
+/// First words of the comment of a campaign that a diagnosis planned.
+const PLANNED_BY: &str = "Planned by `gripgen diagnose`";
+
+/// The campaign that separates what is tied, beside the twin, the JSON or the report. Nobody's own file is written over.
+fn write_next(args: &DiagnoseArgs, diagnosed: &mut Diagnosed) -> Result<Option<PathBuf>, Failure> {
+    let beside = [
+        args.out.as_deref(),
+        args.json.json.as_deref().filter(|p| *p != "-").map(Path::new),
+        args.report.as_deref(),
+    ];
+    let (Some(next), Some(beside)) = (&diagnosed.next, beside.into_iter().flatten().next()) else {
+        return Ok(None);
+    };
+    let path = beside.with_file_name("next.toml");
+    let own = std::fs::read_to_string(&path).map_or(true, |text| text.contains(PLANNED_BY));
+    if !own {
+        let note = format!(
+            "{} is not of a diagnosis and was left alone: the next pulls were not written",
+            path.display()
+        );
+        diagnosed.diagnosis.notes.push(note);
+        return Ok(None);
+    }
+    write_file(&path, next_toml(next, &args.measured).as_bytes())?;
+    for separate in diagnosed.diagnosis.effects.iter_mut().filter_map(|e| e.separate_by.as_mut()) {
+        separate.campaign = Some(path.display().to_string());
+    }
+    Ok(Some(path))
+}
+
+/// The text of the next pulls.
+pub fn next_toml(next: &NextPulls, measured: &Path) -> String {
+    let about = format!(
+        "{PLANNED_BY} of {}.\n{}.\nKeys are described in docs/format.md. Run it with `gripgen rig pull`.",
+        measured.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+        next.text(),
+    );
+    campaign_toml(&next.campaign, &about)
 }
 
 /// A few lines for people.
