@@ -230,13 +230,17 @@ fn curves(measured: &MeasuredPulls, predictor: &PullPredictor<'_>, fits: &PullFi
 fn evidence(fits: &PullFits, answer: &PullAnswer) -> Vec<EvidenceRow> {
     let name = |entry: &Entry| match entry.rival {
         Rival::Effect(i) => fits.candidates.get(i).map_or("?", |c| c.spec.id).to_string(),
+        Rival::ByPart(i) => {
+            format!("{}, by part", fits.candidates.get(i).map_or("?", |c| c.spec.id))
+        }
         Rival::Curve(i) => format!("curve in {}", fits.curve_names.get(i).map_or("?", String::as_str)),
     };
     let values = |entry: &Entry| {
-        let Rival::Effect(i) = entry.rival else { return String::new() };
-        let Some(candidate) = fits.candidates.get(i) else { return String::new() };
-        let own = entry.fitted.model.effects.iter().find(|e| e.spec == candidate.spec);
-        let pairs = own.map(|e| e.spec.parameters.iter().zip(&e.values)).into_iter().flatten();
+        let Some(candidate) = entry.rival.effect().and_then(|i| fits.candidates.get(i)) else {
+            return String::new();
+        };
+        let own = entry.fitted.model.effects.iter().filter(|e| e.spec == candidate.spec);
+        let pairs = own.flat_map(|e| e.spec.parameters.iter().zip(&e.values));
         let free = pairs.filter(|(p, _)| !candidate.spec.references.contains(&p.name));
         free.map(|(p, v)| format!("{} {v:.4}", p.name)).collect::<Vec<_>>().join(", ")
     };
@@ -247,28 +251,35 @@ fn evidence(fits: &PullFits, answer: &PullAnswer) -> Vec<EvidenceRow> {
         let specs = d.effects.iter().filter_map(|e| find(&e.name));
         column.is_some_and(|c| specs.into_iter().any(|spec| spec.covariates.contains(&c)))
     };
+    let plain = |name: &str| name.strip_suffix(", by part").unwrap_or(name).to_string();
     let fate = |name: &str| {
-        let tied = d.effects.iter().find(|e| e.indistinguishable_from.iter().any(|r| r.name == name));
+        let tied = d.effects.iter().find(|e| e.indistinguishable_from.iter().any(|r| r.name == plain(name)));
         let unknown = d.unknown.iter().any(|u| name.strip_prefix("curve in ") == Some(u.covariate.as_str()));
         match tied {
-            _ if d.effects.iter().any(|e| e.name == name) || unknown => "named".to_string(),
+            _ if d.effects.iter().any(|e| e.name == plain(name)) || unknown => "named".to_string(),
             Some(effect) => format!("not told apart from {}", effect.name),
             None if own(name) => "the same covariate without a name".into(),
             None => "worse".into(),
         }
     };
-    let row = |entry: &Entry| EvidenceRow {
-        name: name(entry),
-        heldout_gain: entry.gain,
-        standard_error: f64::NAN,
-        heldout_error: f64::NAN,
-        values: values(entry),
-        fate: fate(&name(entry)),
+    let row = |(k, entry): (usize, &Entry)| {
+        let score = fits.scores.get(k).copied().flatten();
+        EvidenceRow {
+            name: name(entry),
+            heldout_gain: score.map_or(f64::NAN, |s| s.gain),
+            standard_error: score.map_or(f64::NAN, |s| s.standard_error),
+            heldout_error: score.map_or(f64::NAN, |s| s.rmse_n),
+            values: values(entry),
+            fate: fate(&name(entry)),
+        }
     };
     // Best first, so of several curves in one column the best stays.
     let mut rows: Vec<EvidenceRow> = Vec::new();
-    for entry in fits.accepted.entries.iter().map(row) {
-        if rows.len() < CANDIDATES && !rows.iter().any(|r| r.name == entry.name) {
+    for entry in fits.accepted.entries.iter().enumerate().map(row) {
+        if rows.len() < CANDIDATES
+            && entry.heldout_gain.is_finite()
+            && !rows.iter().any(|r| r.name == entry.name)
+        {
             rows.push(entry);
         }
     }

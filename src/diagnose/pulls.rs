@@ -139,11 +139,12 @@ fn edits(
     let forces = measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces.fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
     let effects = model.effects.iter().map(|effect| {
-        let named = diagnosis.effects.iter().find(|e| e.name == effect.spec.id);
+        let part = effect.part.map(|p| predictor.part_names()[p].clone());
+        let named = diagnosis.effects.iter().find(|e| e.name == effect.spec.id && e.part == part);
         let known = |name: &str| named.and_then(|n| n.parameters.get(name));
         EffectFile {
             name: effect.spec.id.into(),
-            part: None,
+            part,
             fitted_grip_force_n: effect.spec.friction.map(|_| [range.0, range.1]),
             outside_fit: OutsideFit::Extrapolate,
             per: gripgen_twin::effects::Per::Jaw,

@@ -72,6 +72,9 @@ pub struct DiagnoseArgs {
     /// Of presses: a sensor file in place of the twin's.
     #[arg(long, value_name = "FILE.npz")]
     pub sensor: Option<String>,
+    /// Of pulls: effects that must not be named, because something else is known to rule them out.
+    #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
+    pub without: Vec<String>,
     /// The twin to write, with the effects that were found.
     #[arg(short, long, value_name = "FILE.toml")]
     pub out: Option<PathBuf>,

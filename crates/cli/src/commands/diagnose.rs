@@ -8,6 +8,7 @@ use crate::failure::Failure;
 use crate::output::{JsonSink, writable};
 use crate::progress::Share;
 use gripgen::twin::Twin;
+use gripgen::twin::effects::LIBRARY;
 use gripgen::{
     Diagnosed, Location, PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_press_set,
     is_sensor_table, load_pulls, load_sensor_table, load_twin_document,
@@ -63,13 +64,25 @@ fn sensor(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
 
 fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
     let twin = load_twin(&args.twin, &args.set)?;
-    diagnose_folder(&args.measured, &twin, &args.talk)
+    let known = |id: &String| LIBRARY.iter().any(|spec| spec.id == id);
+    if let Some(id) = args.without.iter().find(|id| !known(id)) {
+        let ids: Vec<&str> = LIBRARY.iter().map(|spec| spec.id).collect();
+        return Err(Failure::usage(format!("--without: there is no effect `{id}`"))
+            .hint(format!("the effects: {}", ids.join(", "))));
+    }
+    let without: Vec<&str> = args.without.iter().map(String::as_str).collect();
+    diagnose_folder(&args.measured, &twin, &without, &args.talk)
 }
 
 /// Diagnoses the pulls of a folder, with progress.
-pub fn diagnose_folder(measured: &Path, twin: &Twin, talk: &TalkArgs) -> Result<Diagnosed, Failure> {
+pub fn diagnose_folder(
+    measured: &Path,
+    twin: &Twin,
+    without: &[&str],
+    talk: &TalkArgs,
+) -> Result<Diagnosed, Failure> {
     let loaded = load_pulls(measured).map_err(|e| no_pulls(measured, e))?;
-    let options = PullDiagnoseOptions { jobs: jobs(), without: &[] };
+    let options = PullDiagnoseOptions { jobs: jobs(), without };
     let share = Share::start("diagnosing", talk);
     let diagnosed = diagnose_pull_table(&loaded.pulls, twin, &options, &|x| share.at(x));
     share.finish();

@@ -4,10 +4,12 @@ use super::candidates::{Candidate, candidates};
 use super::context::Context;
 use super::data::{Column, PullData};
 use super::fitting::Fitted;
-use super::heldout::{by_value, errors, folds, noise_floor_n, predicted, scatter};
+use super::heldout::{
+    HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
+};
 use super::model::{PredictPulls, PullModel};
 use super::power::detectable;
-use super::search::{Accepted, Rival as Competing, Search, TIED_WITHIN};
+use super::search::{Accepted, Search, TIED_WITHIN};
 use crate::diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate,
     Rival, SeparateBy, UnknownCovariate, Verdict,
@@ -26,6 +28,9 @@ const OUTLIER: f64 = 4.5;
 /// Half width of a 90 % interval of a normal variable, and by how much more the formulas here differ from what acts: set on
 /// the development split of the blind benchmark.
 const HALF90: f64 = 1.645 * 1.2;
+
+/// Rivals of the first place that are scored on held-out repetitions.
+const SCORED: usize = 8;
 
 /// Part of the squared error by which labels that no fit has seen may be predicted worse, by chance, with an effect that
 /// shows in the traces only.
@@ -56,6 +61,8 @@ pub struct PullFits {
     pub candidates: Vec<Candidate>,
     /// Names of the curves that competed.
     pub curve_names: Vec<String>,
+    /// How the first of the entries predict held-out repetitions, in their order.
+    pub scores: Vec<Option<HeldOutScore>>,
     /// Labels predicted for held-out repetitions, before and after.
     pub heldout_label_n: [Vec<f64>; 2],
     /// Labels predicted by the fits to all pulls, before and after.
@@ -150,6 +157,12 @@ pub fn diagnose_pulls(
             by: ErrorsBy { levels: by(by_value(&force)), sessions: by(by_value(&session)) },
         }
     });
+    progress(0.92);
+    let scores = accepted.entries.iter().take(SCORED).map(|entry| {
+        let held = predicted(&context, &entry.fitted, &repetitions);
+        held_out_score(&data.label_n, &heldout[0], &held, &counted)
+    });
+    let scores = scores.collect();
     progress(0.96);
     diagnosis.would_have_seen = would_have_seen(&context, &after, &search.candidates);
     progress(1.0);
@@ -159,6 +172,7 @@ pub fn diagnose_pulls(
         candidates: search.candidates.clone(),
         curve_names: search.curves.iter().map(|c| c.name.clone()).collect(),
         accepted,
+        scores,
         heldout_label_n: heldout,
         label_n: labels,
     };
@@ -190,8 +204,9 @@ fn confirmed(
         }
         let mut fewer = accepted.fitted.terms.clone();
         if accepted.effects.len() > 1 || accepted.curves.is_empty() {
-            accepted.effects.pop();
-            fewer.effects.pop();
+            if let Some((last, _)) = accepted.effects.pop() {
+                fewer.effects.retain(|(c, _)| c.spec != search.candidates[last].spec);
+            }
         } else {
             accepted.curves.pop();
             fewer.curves.pop();
@@ -260,12 +275,12 @@ fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted) -> Vec<Named
     let mut effects: Vec<NamedEffect> = accepted
         .effects
         .iter()
-        .map(|(i, tied)| {
+        .flat_map(|(i, tied)| {
             let candidate = &search.candidates[*i];
             let odds: Vec<f64> = tied.iter().map(|t| libm::exp(TEMPER * t.less)).collect();
             let total = 1.0 + odds.iter().sum::<f64>();
             // What is left for "none" and for everything else.
-            let alone = accepted.entries.iter().find(|e| matches!(e.rival, Competing::Effect(k) if k == *i));
+            let alone = accepted.entries.iter().find(|e| e.rival.effect() == Some(*i));
             let rest = alone.map_or(0.05, |e| libm::exp(-TEMPER * e.gain.max(0.0)).min(0.5)).max(0.02);
             let share = (1.0 - rest) / total;
             let rivals: Vec<Rival> = tied
@@ -285,16 +300,30 @@ fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted) -> Vec<Named
                     .collect::<Vec<_>>(),
             );
             let names: Vec<&str> = tied.iter().map(|t| search.candidates[t.effect].spec.id).collect();
-            NamedEffect {
+            let named = NamedEffect {
                 name: candidate.spec.id.into(),
                 part: None,
                 class,
                 weight: share,
-                parameters: parameters(&accepted.fitted, candidate),
+                parameters: BTreeMap::new(),
                 indistinguishable_from: rivals,
                 separate_by: (!names.is_empty())
                     .then(|| SeparateBy { text: separation(candidate.spec.id, &names), campaign: None }),
-            }
+            };
+            // One entry, or one for each part that shows it.
+            let own =
+                accepted.fitted.terms.effects.iter().map(|(c, _)| c).filter(|c| c.spec == candidate.spec);
+            let each = own.filter_map(|c| {
+                let parameters = parameters(&accepted.fitted, c);
+                let size = &c.spec.parameters[c.size()];
+                let seen = c.part.is_none()
+                    || parameters
+                        .get(size.name)
+                        .is_some_and(|p| p.low90 > size.neutral || p.high90 < size.neutral);
+                let part = c.part.as_ref().map(|(_, name)| name.clone());
+                seen.then(|| NamedEffect { part, parameters, ..named.clone() })
+            });
+            each.collect::<Vec<_>>()
         })
         .collect();
     effects.sort_by(|a, b| b.weight.total_cmp(&a.weight));
@@ -304,20 +333,23 @@ fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted) -> Vec<Named
 /// Effects that explain nearly as much as effect `i` does alone: its class in this campaign.
 fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize) -> Vec<String> {
     let gained = |f: &Fitted| (f.likelihood.log - f.trace_cost) - (before.likelihood.log - before.trace_cost);
-    let own = accepted.entries.iter().find(|e| matches!(e.rival, Competing::Effect(k) if k == i));
+    let own = accepted.entries.iter().find(|e| e.rival.effect() == Some(i));
     let Some(own) = own.map(|e| gained(&e.fitted)) else { return vec![] };
     let wide = (0.1 * own).clamp(TIED_WITHIN, 3.0 * TIED_WITHIN);
-    let near = |e: &super::search::Entry| match e.rival {
-        Competing::Effect(k) if k != i && gained(&e.fitted) > own - wide => {
-            Some(search.candidates[k].spec.id.to_string())
-        }
+    let near = |e: &super::search::Entry| match e.rival.effect() {
+        Some(k) if k != i && gained(&e.fitted) > own - wide => Some(search.candidates[k].spec.id.to_string()),
         _ => None,
     };
-    accepted.entries.iter().filter_map(near).collect()
+    let mut found: Vec<String> = accepted.entries.iter().filter_map(near).collect();
+    found.sort();
+    found.dedup();
+    found
 }
 
 pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<String, ParameterEstimate> {
-    let Some(effect) = fitted.model.effects.iter().find(|e| e.spec == candidate.spec) else {
+    let part = candidate.part.as_ref().map(|p| p.0);
+    let own = |e: &&super::model::ModelEffect| e.spec == candidate.spec && e.part == part;
+    let Some(effect) = fitted.model.effects.iter().find(own) else {
         return BTreeMap::new();
     };
     let spec = candidate.spec;

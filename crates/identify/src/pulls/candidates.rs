@@ -27,6 +27,12 @@ impl Candidate {
         ModelEffect { part: self.part.as_ref().map(|p| p.0), ..ModelEffect::new(self.spec, values.to_vec()) }
     }
 
+    /// The same effect once for each part.
+    pub fn by_part(&self, parts: &[String]) -> Vec<Self> {
+        let own = |(k, name): (usize, &String)| Self { part: Some((k, name.clone())), ..self.clone() };
+        parts.iter().enumerate().map(own).collect()
+    }
+
     /// Its free parameters from a start.
     pub fn parameters(&self, start: &[f64]) -> Vec<FreeParameter> {
         self.free

@@ -53,6 +53,41 @@ pub fn predicted(context: &Context<'_>, fitted: &Fitted, held_out: &[Vec<usize>]
     result.into_inner().unwrap_or_default()
 }
 
+/// How a rival predicts pulls that no fit has seen, against the model without it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldOutScore {
+    /// Gain in log-likelihood: half the difference of the squared errors over the variance that is left.
+    pub gain: f64,
+    /// Standard error of the gain, pulls taken as independent.
+    pub standard_error: f64,
+    /// Root mean square of its errors.
+    pub rmse_n: f64,
+}
+
+/// Scores predictions at the pulls of `rows` against those without the rival.
+pub fn held_out_score(
+    label_n: &[f64],
+    without: &[f64],
+    with: &[f64],
+    rows: &[usize],
+) -> Option<HeldOutScore> {
+    let known: Vec<(f64, f64)> = rows
+        .iter()
+        .map(|&i| (without[i] - label_n[i], with[i] - label_n[i]))
+        .filter(|(a, b)| a.is_finite() && b.is_finite())
+        .collect();
+    let n = known.len() as f64;
+    let square = known.iter().map(|(_, b)| b * b).sum::<f64>() / n;
+    if known.len() < 3 || square <= 0.0 {
+        return None;
+    }
+    let each: Vec<f64> = known.iter().map(|(a, b)| 0.5 * (a * a - b * b) / square).collect();
+    let gain = each.iter().sum::<f64>();
+    let mean = gain / n;
+    let variance = each.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0);
+    Some(HeldOutScore { gain, standard_error: (n * variance).sqrt(), rmse_n: square.sqrt() })
+}
+
 /// The scatter of friction that residuals of this scale show.
 pub fn scatter(model: &PullModel, scale: f64) -> f64 {
     (model.scatter * scale).clamp(0.001, 0.3)
@@ -169,6 +204,15 @@ mod tests {
         let half = 0.5 * (pair.after.high90 - pair.after.low90);
         let exact = 1.645 * 0.5 / (n as f64).sqrt();
         assert!((half / exact - 1.0).abs() < 0.15, "{half} {exact}");
+    }
+
+    /// Errors of 2 N that become 1 N gain 1.5 each, all alike.
+    #[test]
+    fn gains_are_those_of_the_squares() {
+        let label = [10.0; 8];
+        let found = held_out_score(&label, &[12.0; 8], &[9.0; 8], &[0, 1, 2, 3]).unwrap();
+        assert_eq!(found, HeldOutScore { gain: 6.0, standard_error: 0.0, rmse_n: 1.0 });
+        assert_eq!(held_out_score(&label, &[12.0; 8], &[f64::NAN; 8], &[0, 1, 2, 3]), None);
     }
 
     #[test]

@@ -34,6 +34,21 @@ const MISFIT: f64 = 0.3;
 const LEAST_PROMISE: f64 = 1.5;
 const LEAST_PROMISE_BESIDE: f64 = 2.5;
 
+/// Effects of the surface, which parts may have each in their own way; those of gel, gripper, sensor and robot are common.
+const PER_PART: [&str; 7] = [
+    "load_offset",
+    "load_power_law",
+    "area_saturation",
+    "rate_dependence",
+    "dwell_ageing",
+    "anisotropy",
+    "temperature",
+];
+
+/// Parts at most, and pulls of each at least, of an effect that differs by part.
+const MOST_PARTS: usize = 6;
+const FEWEST_OF_PART: usize = 10;
+
 /// Correlation of ranks from which on two columns are the same clock.
 const SAME_CLOCK: f64 = 0.9;
 
@@ -42,6 +57,8 @@ const SAME_CLOCK: f64 = 0.9;
 pub enum Rival {
     /// An effect of the library, by position.
     Effect(usize),
+    /// The same with parameters of its own for each part.
+    ByPart(usize),
     /// An unnamed curve, by position.
     Curve(usize),
 }
@@ -55,6 +72,16 @@ pub struct Entry {
     pub fitted: Fitted,
     /// Its score less that of the model without it.
     pub gain: f64,
+}
+
+impl Rival {
+    /// Position of the effect, if it is one.
+    pub fn effect(&self) -> Option<usize> {
+        match self {
+            Rival::Effect(i) | Rival::ByPart(i) => Some(*i),
+            Rival::Curve(_) => None,
+        }
+    }
 }
 
 /// An effect that the data do not tell from an accepted one.
@@ -73,7 +100,8 @@ pub struct Tied {
 pub struct Accepted {
     /// The model.
     pub fitted: Fitted,
-    /// Effects by position, each with what is tied with it.
+    /// Effects by position, in the order in which their terms stand, each with what is tied with it. One that differs by
+    /// part has a term for every part.
     pub effects: Vec<(usize, Vec<Tied>)>,
     /// Unnamed curves by position.
     pub curves: Vec<usize>,
@@ -152,6 +180,14 @@ impl<'a> Search<'a> {
                 terms.curves.push((curve.clone(), vec![0.0; curve.len()]));
                 keep(self.context.fit(start, &terms, &self.rows), &mut best);
             }
+            Rival::ByPart(i) => {
+                let candidates = self.candidates[*i].by_part(&self.context.data.parts);
+                for from in &self.candidates[*i].starts {
+                    let mut terms = terms.clone();
+                    terms.effects.extend(candidates.iter().map(|c| (c.clone(), from.clone())));
+                    keep(self.context.fit(start, &terms, &self.rows), &mut best);
+                }
+            }
             Rival::Effect(i) => {
                 let candidate = &self.candidates[*i];
                 let least = match (slow, candidate.acts_on_signals()) {
@@ -207,7 +243,28 @@ impl<'a> Search<'a> {
         // The slow ones first, so that threads end together.
         let mut effects: Vec<usize> = (0..self.candidates.len()).filter(|i| !without.contains(i)).collect();
         effects.sort_by_key(|&i| !self.candidates[i].acts_on_signals());
-        effects.into_iter().map(Rival::Effect).chain((0..self.curves.len()).map(Rival::Curve)).collect()
+        let differing: Vec<usize> = effects.iter().copied().filter(|&i| self.may_differ(i)).collect();
+        effects
+            .into_iter()
+            .map(Rival::Effect)
+            .chain(differing.into_iter().map(Rival::ByPart))
+            .chain((0..self.curves.len()).map(Rival::Curve))
+            .collect()
+    }
+
+    /// Whether effect `i` may have other parameters for each part, and every part has pulls enough to show them.
+    fn may_differ(&self, i: usize) -> bool {
+        let data = self.context.data;
+        let parts = data.parts.len();
+        let fewest = (0..parts).map(|p| data.part_of.iter().filter(|&&q| q == p).count()).min();
+        (2..=MOST_PARTS).contains(&parts)
+            && fewest >= Some(FEWEST_OF_PART)
+            && PER_PART.contains(&self.candidates[i].spec.id)
+    }
+
+    /// Terms of accepted effect `place`, which start at the first.
+    fn terms_of(&self, fitted: &Fitted, i: usize) -> usize {
+        fitted.terms.effects.iter().filter(|(c, _)| c.spec == self.candidates[i].spec).count()
     }
 
     /// Runs the competition. `progress` is told the share that is done.
@@ -229,7 +286,7 @@ impl<'a> Search<'a> {
         let Some(mut winner) = self.winner(&baseline, &first, NAMED_GAIN, CURVE_GAIN) else {
             return Some((baseline, accepted));
         };
-        if let Rival::Effect(i) = winner.rival
+        if let Some(i) = winner.rival.effect()
             && let Some(curve) = self.misfit(&baseline, &winner, i, &tick)
         {
             winner = curve;
@@ -240,7 +297,9 @@ impl<'a> Search<'a> {
             let terms = accepted.fitted.terms.clone();
             let mut rivals = self.all(&without);
             rivals.retain(|r| match r {
-                Rival::Effect(i) => !accepted.curves.iter().any(|&k| self.shares_covariate(*i, k)),
+                Rival::Effect(i) | Rival::ByPart(i) => {
+                    !accepted.curves.iter().any(|&k| self.shares_covariate(*i, k))
+                }
                 Rival::Curve(k) => !without.iter().any(|&i| self.shares_covariate(i, *k)),
             });
             let entries = self.compete(&accepted.fitted, &terms, &rivals, &tick);
@@ -250,7 +309,7 @@ impl<'a> Search<'a> {
             // One unnamed curve at most, and two effects.
             let full = match winner.rival {
                 Rival::Curve(_) => !accepted.curves.is_empty(),
-                Rival::Effect(_) => accepted.effects.len() >= 2,
+                Rival::Effect(_) | Rival::ByPart(_) => accepted.effects.len() >= 2,
             };
             if full {
                 break;
@@ -300,7 +359,7 @@ impl<'a> Search<'a> {
 
     /// The entry that is accepted, if one is.
     fn winner(&self, before: &Fitted, entries: &[Entry], named_gain: f64, curve_gain: f64) -> Option<Entry> {
-        let named = entries.iter().find(|e| matches!(e.rival, Rival::Effect(_)) && e.gain >= named_gain);
+        let named = entries.iter().find(|e| e.rival.effect().is_some() && e.gain >= named_gain);
         let curve = entries.iter().find(|e| matches!(e.rival, Rival::Curve(_)) && e.gain >= curve_gain);
         match (named, curve) {
             (Some(named), None) => Some(named.clone()),
@@ -321,7 +380,9 @@ impl<'a> Search<'a> {
         accepted.fitted = winner.fitted.clone();
         match winner.rival {
             Rival::Curve(i) => accepted.curves.push(i),
-            Rival::Effect(i) => accepted.effects.push((i, tied(i, winner.gain, entries))),
+            Rival::Effect(i) | Rival::ByPart(i) => {
+                accepted.effects.push((i, tied(i, winner.gain, entries)));
+            }
         }
     }
 
@@ -334,29 +395,25 @@ impl<'a> Search<'a> {
         // What is fitted anew goes to the end, so that the first place is always the next.
         for _ in 0..count {
             let others: Vec<usize> = accepted.effects[1..].iter().map(|(i, _)| *i).collect();
-            let mut terms = accepted.fitted.terms.clone();
-            terms.effects.remove(0);
-            let mut start = accepted.fitted.clone();
-            start.model.effects.remove(0);
-            let rivals: Vec<Rival> =
-                (0..self.candidates.len()).filter(|i| !others.contains(i)).map(Rival::Effect).collect();
-            let entries = self.compete(&start, &terms, &rivals, tick);
             let old = accepted.effects[0].0;
-            let gain_of = |i: usize| {
-                entries
-                    .iter()
-                    .find(|e| matches!(e.rival, Rival::Effect(k) if k == i))
-                    .map_or(f64::NEG_INFINITY, |e| e.gain)
+            let width = self.terms_of(&accepted.fitted, old);
+            let mut terms = accepted.fitted.terms.clone();
+            terms.effects.drain(..width);
+            let mut start = accepted.fitted.clone();
+            start.model.effects.drain(..width);
+            let mut rivals = self.all(&others);
+            rivals.retain(|r| r.effect().is_some());
+            let entries = self.compete(&start, &terms, &rivals, tick);
+            let Some(best) = entries.first() else { return };
+            let same = |e: &&Entry| e.rival.effect() == Some(old);
+            let chosen = match entries.iter().find(same) {
+                Some(own) if own.gain + 0.5 >= best.gain => own,
+                _ => best,
             };
-            let Some(Rival::Effect(best)) = entries.first().map(|e| e.rival.clone()) else { return };
-            let chosen = if gain_of(best) > gain_of(old) + 0.5 { best } else { old };
-            let Some(entry) = entries.iter().find(|e| matches!(e.rival, Rival::Effect(k) if k == chosen))
-            else {
-                return;
-            };
-            accepted.fitted = entry.fitted.clone();
+            let Some(i) = chosen.rival.effect() else { return };
+            accepted.fitted = chosen.fitted.clone();
             accepted.effects.remove(0);
-            accepted.effects.push((chosen, tied(chosen, entry.gain, &entries)));
+            accepted.effects.push((i, tied(i, chosen.gain, &entries)));
         }
     }
 }
@@ -378,13 +435,15 @@ fn rank_correlation(x: &[f64], y: &[f64]) -> f64 {
 
 /// Rivals of effect `i` that the data do not tell from it.
 fn tied(i: usize, gain: f64, entries: &[Entry]) -> Vec<Tied> {
-    entries
-        .iter()
-        .filter_map(|e| match e.rival {
-            Rival::Effect(k) if k != i && e.gain > gain - TIED_WITHIN => {
-                Some(Tied { effect: k, less: e.gain - gain, fitted: e.fitted.clone() })
+    let mut found: Vec<Tied> = Vec::new();
+    for e in entries.iter().filter(|e| e.gain > gain - TIED_WITHIN) {
+        // The better one of a common effect and one that differs by part comes first.
+        match e.rival.effect() {
+            Some(k) if k != i && found.iter().all(|t| t.effect != k) => {
+                found.push(Tied { effect: k, less: e.gain - gain, fitted: e.fitted.clone() });
             }
-            _ => None,
-        })
-        .collect()
+            _ => {}
+        }
+    }
+    found
 }
