@@ -226,8 +226,8 @@ fn table(
             let mut points: Vec<(f64, f64)> = x.iter().enumerate().map(|(i, x)| (*x, value(i))).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             points.dedup_by(|a, b| a.0 == b.0);
-            // Piecewise linear: some sixty points hold all that it is.
-            let step = points.len().div_ceil(60).max(1);
+            // Piecewise linear, or a wave of up to one cycle in four pulls.
+            let step = points.len().div_ceil(400).max(1);
             let last = points.len() - 1;
             let kept: Vec<(f64, f64)> = points
                 .iter()

@@ -7,7 +7,7 @@ use super::fitting::Fitted;
 use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
 };
-use super::model::{PredictPulls, PullModel};
+use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::power::detectable;
 use super::search::{Accepted, Search, TIED_WITHIN};
 use crate::diagnosis::{
@@ -35,6 +35,9 @@ const SCORED: usize = 8;
 /// Part of the squared error by which labels that no fit has seen may be predicted worse, by chance, with an effect that
 /// shows in the traces only.
 const WORSE: f64 = 1.03;
+
+/// Standard deviations beyond which the error of a held-out pull counts no more.
+const BAD: f64 = 5.0;
 
 /// Odds are taken to this power, because no model here is exactly right.
 const TEMPER: f64 = 0.6;
@@ -158,9 +161,10 @@ pub fn diagnose_pulls(
         }
     });
     progress(0.92);
+    let sd_n = label_sd_n(&before, &predictor.pulls(&before.model, &rows));
     let scores = accepted.entries.iter().take(SCORED).map(|entry| {
         let held = predicted(&context, &entry.fitted, &repetitions);
-        held_out_score(&data.label_n, &heldout[0], &held, &counted)
+        held_out_score(&data.label_n, &sd_n, &heldout[0], &held, &counted)
     });
     let scores = scores.collect();
     progress(0.96);
@@ -179,6 +183,12 @@ pub fn diagnose_pulls(
     PullAnswer { diagnosis, fits: Some(fits) }
 }
 
+/// Standard deviations of labels, as a fit sees them.
+fn label_sd_n(fitted: &Fitted, predicted: &[PullPrediction]) -> Vec<f64> {
+    let scale = fitted.likelihood.scale.max(0.1);
+    predicted.iter().map(|p| (scale * scale * p.label_sd_n * p.label_sd_n + 0.03 * 0.03).sqrt()).collect()
+}
+
 /// What was accepted, as far as it does not predict labels worse that no fit has seen: the last term goes first.
 fn confirmed(
     search: &Search<'_>,
@@ -188,13 +198,11 @@ fn confirmed(
     repetitions: &[Vec<usize>],
 ) -> (Accepted, Vec<f64>) {
     let data = search.context.data;
+    let sd_n = label_sd_n(before, &search.context.predictor.pulls(&before.model, &search.rows));
+    // A few bad pulls decide nothing.
     let squares = |predicted: &[f64]| -> f64 {
-        data.label_n
-            .iter()
-            .zip(predicted)
-            .filter(|(_, p)| p.is_finite())
-            .map(|(l, p)| (l - p) * (l - p))
-            .sum()
+        let each = data.label_n.iter().zip(predicted).zip(&sd_n).filter(|((_, p), _)| p.is_finite());
+        each.map(|((l, p), sd)| ((l - p) / sd).powi(2).min(BAD * BAD)).sum()
     };
     loop {
         let after = predicted(search.context, &accepted.fitted, repetitions);

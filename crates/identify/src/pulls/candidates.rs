@@ -41,8 +41,11 @@ impl Candidate {
                 let p = &self.spec.parameters[i];
                 let mut bounds = p.bounds;
                 // A gel that settles once to less friction is worn, which is another effect.
-                if (self.spec.id, p.name) == ("conditioning", "depth") && start[2] == 0.0 {
-                    bounds.0 = 0.0;
+                match (self.spec.id, p.name) {
+                    ("conditioning", "depth") if start[2] == 0.0 => bounds.0 = 0.0,
+                    // A wider one is no transition but a saturation or a power law.
+                    ("regime_transition", "width_n") => bounds.1 = 6.0,
+                    _ => {}
                 }
                 FreeParameter { name: self.name_of(p.name), start: start[i], bounds, scale }
             })
@@ -116,7 +119,7 @@ pub(super) fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: 
         "load_offset" if force => plain(&[&[("b_n", 0.0)]], &[("b_n", 1.0)], 0),
         "load_power_law" if force => plain(&[&[("n", 0.0)]], &[("n", 0.05)], 0),
         "area_saturation" if force => {
-            plain(&[&[("saturation_per_n", 0.002)]], &[("saturation_per_n", 0.002)], 0)
+            over("sharpness", &[1.0, 2.5], ("saturation_per_n", 0.004), &[("saturation_per_n", 0.002)], 0)
         }
         "regime_transition" if force => {
             let mut starts = Vec::new();
@@ -194,7 +197,8 @@ pub(super) fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: 
             0,
         ),
         "sensor_quadratic" if force => {
-            plain(&[&[("quadratic_per_n", 0.0)]], &[("quadratic_per_n", 0.001)], 0)
+            let odd: &[f64] = if varies("pull_direction") { &[0.0, 1.0] } else { &[0.0] };
+            over("odd", odd, ("quadratic_per_n", 0.0), &[("quadratic_per_n", 0.001)], 0)
         }
         "sensor_saturation" => over(
             "limit_n",

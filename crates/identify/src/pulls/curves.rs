@@ -111,6 +111,34 @@ pub fn curves_in(name: &str, column: &Column) -> Vec<Curve> {
     }
 }
 
+/// The sine over `x` that explains most of `residuals`, by least squares at many frequencies (Lomb 1976): at least one and
+/// a half cycles, at most one in four pulls. The choice of the frequency is paid for like two parameters.
+pub fn periodic(name: &str, x: &[f64], residuals: &[f64]) -> Option<Curve> {
+    let n = x.len();
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    if n < 40 || low >= high {
+        return None;
+    }
+    let mean = residuals.iter().sum::<f64>() / n as f64;
+    let basis = |cycles: f64| -> Vec<Vec<f64>> {
+        let angle = |v: &f64| std::f64::consts::TAU * cycles * (v - low) / (high - low);
+        centred(x.iter().map(|v| vec![libm::sin(angle(v)), libm::cos(angle(v))]).collect())
+    };
+    let explained = |cycles: f64| {
+        let b = basis(cycles);
+        let sum = |f: &dyn Fn(usize) -> f64| (0..n).map(f).sum::<f64>();
+        let (ss, cc, sc) =
+            (sum(&|i| b[i][0] * b[i][0]), sum(&|i| b[i][1] * b[i][1]), sum(&|i| b[i][0] * b[i][1]));
+        let (rs, rc) = (sum(&|i| b[i][0] * (residuals[i] - mean)), sum(&|i| b[i][1] * (residuals[i] - mean)));
+        let det = ss * cc - sc * sc;
+        if det > 1e-6 * ss * cc { (rs * rs * cc - 2.0 * rs * rc * sc + rc * rc * ss) / det } else { 0.0 }
+    };
+    // Four frequencies for each that the length of the campaign tells apart.
+    let tried = (6..=n).map(|k| 0.25 * k as f64);
+    let best = tried.map(|c| (c, explained(c))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(Curve { name: name.into(), basis: basis(best.0), additive: false, most: 3.0, cost: 4 })
+}
+
 /// The product of two columns of numbers, each about its mean. One more parameter is paid for the choice of the pair.
 pub fn product(data: &PullData<'_>, a: &str, b: &str) -> Option<Curve> {
     let standard = |name: &str| {
@@ -128,4 +156,32 @@ pub fn product(data: &PullData<'_>, a: &str, b: &str) -> Option<Curve> {
         most: 2.0,
         cost: 2,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wave of 7.3 cycles, sampled unevenly, is found with its frequency and explains nearly everything.
+    #[test]
+    fn a_wave_is_found_with_its_frequency() {
+        let x: Vec<f64> = (0..90).map(|i| f64::from(i) + 0.4 * f64::from(i % 7)).collect();
+        let range = x[89] - x[0];
+        let of = |v: f64| 0.3 * (std::f64::consts::TAU * 7.3 * (v - x[0]) / range + 0.9).sin();
+        let residuals: Vec<f64> = x.iter().map(|v| of(*v)).collect();
+        let curve = periodic("time_s", &x, &residuals).unwrap();
+        // Amplitude and phase by least squares.
+        let dot = |a: usize, b: usize| curve.basis.iter().map(|r| r[a] * r[b]).sum::<f64>();
+        let right = |a: usize| curve.basis.iter().zip(&residuals).map(|(row, r)| row[a] * r).sum::<f64>();
+        let det = dot(0, 0) * dot(1, 1) - dot(0, 1) * dot(0, 1);
+        let c = [
+            (right(0) * dot(1, 1) - right(1) * dot(0, 1)) / det,
+            (right(1) * dot(0, 0) - right(0) * dot(0, 1)) / det,
+        ];
+        let left: f64 =
+            curve.basis.iter().zip(&residuals).map(|(b, r)| (r - b[0] * c[0] - b[1] * c[1]).powi(2)).sum();
+        let all: f64 = residuals.iter().map(|r| r * r).sum();
+        assert!(left < 0.05 * all, "{left} of {all}");
+        assert!(periodic("time_s", &x[..30], &residuals[..30]).is_none());
+    }
 }

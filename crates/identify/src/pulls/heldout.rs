@@ -64,28 +64,35 @@ pub struct HeldOutScore {
     pub rmse_n: f64,
 }
 
-/// Scores predictions at the pulls of `rows` against those without the rival.
+/// Scores predictions at the pulls of `rows` against those without the rival. `sd_n` are the standard deviations of the
+/// labels: a weak grip that is predicted well says as much as a strong one.
 pub fn held_out_score(
     label_n: &[f64],
+    sd_n: &[f64],
     without: &[f64],
     with: &[f64],
     rows: &[usize],
 ) -> Option<HeldOutScore> {
-    let known: Vec<(f64, f64)> = rows
-        .iter()
-        .map(|&i| (without[i] - label_n[i], with[i] - label_n[i]))
-        .filter(|(a, b)| a.is_finite() && b.is_finite())
-        .collect();
+    let known: Vec<usize> =
+        rows.iter().copied().filter(|&i| without[i].is_finite() && with[i].is_finite()).collect();
     let n = known.len() as f64;
-    let square = known.iter().map(|(_, b)| b * b).sum::<f64>() / n;
-    if known.len() < 3 || square <= 0.0 {
+    let mean = |of: &dyn Fn(usize) -> f64| known.iter().map(|&i| of(i)).sum::<f64>() / n;
+    let error = |predicted: &[f64], i: usize| predicted[i] - label_n[i];
+    let relative = mean(&|i| (error(with, i) / sd_n[i]).powi(2));
+    if known.len() < 3 || relative <= 0.0 {
         return None;
     }
-    let each: Vec<f64> = known.iter().map(|(a, b)| 0.5 * (a * a - b * b) / square).collect();
-    let gain = each.iter().sum::<f64>();
-    let mean = gain / n;
-    let variance = each.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0);
-    Some(HeldOutScore { gain, standard_error: (n * variance).sqrt(), rmse_n: square.sqrt() })
+    let each = |i: usize| {
+        let (a, b) = (error(without, i) / sd_n[i], error(with, i) / sd_n[i]);
+        0.5 * (a * a - b * b) / relative
+    };
+    let gain = mean(&each);
+    let variance = mean(&|i| (each(i) - gain).powi(2)) * n / (n - 1.0);
+    Some(HeldOutScore {
+        gain: n * gain,
+        standard_error: (n * variance).sqrt(),
+        rmse_n: mean(&|i| error(with, i).powi(2)).sqrt(),
+    })
 }
 
 /// The scatter of friction that residuals of this scale show.
@@ -210,9 +217,9 @@ mod tests {
     #[test]
     fn gains_are_those_of_the_squares() {
         let label = [10.0; 8];
-        let found = held_out_score(&label, &[12.0; 8], &[9.0; 8], &[0, 1, 2, 3]).unwrap();
+        let found = held_out_score(&label, &[0.5; 8], &[12.0; 8], &[9.0; 8], &[0, 1, 2, 3]).unwrap();
         assert_eq!(found, HeldOutScore { gain: 6.0, standard_error: 0.0, rmse_n: 1.0 });
-        assert_eq!(held_out_score(&label, &[12.0; 8], &[f64::NAN; 8], &[0, 1, 2, 3]), None);
+        assert_eq!(held_out_score(&label, &[0.5; 8], &[12.0; 8], &[f64::NAN; 8], &[0, 1, 2, 3]), None);
     }
 
     #[test]

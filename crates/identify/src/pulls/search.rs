@@ -3,7 +3,7 @@
 
 use super::candidates::Candidate;
 use super::context::Context;
-use super::curves::{Curve, curves_in, product};
+use super::curves::{Curve, curves_in, periodic, product};
 use super::fitting::{Fitted, Terms};
 use super::model::PullModel;
 use super::power::ScoreTest;
@@ -48,6 +48,9 @@ const PER_PART: [&str; 7] = [
 /// Parts at most, and pulls of each at least, of an effect that differs by part.
 const MOST_PARTS: usize = 6;
 const FEWEST_OF_PART: usize = 10;
+
+/// Score by which a curve in a clock has to be better than steps from session to session.
+const RATHER_SESSION: f64 = 4.0;
 
 /// Correlation of ranks from which on two columns are the same clock.
 const SAME_CLOCK: f64 = 0.9;
@@ -147,6 +150,7 @@ impl<'a> Search<'a> {
                 numbers.push(name.as_str());
             }
         }
+        curves.extend(wave(context, &["time_s", "pull_index"]));
         for (i, a) in numbers.iter().enumerate() {
             for b in &numbers[i + 1..] {
                 curves.extend(product(data, a, b).filter(|_| n >= 40));
@@ -298,7 +302,10 @@ impl<'a> Search<'a> {
             let mut rivals = self.all(&without);
             rivals.retain(|r| match r {
                 Rival::Effect(i) | Rival::ByPart(i) => {
-                    !accepted.curves.iter().any(|&k| self.shares_covariate(*i, k))
+                    // A drift that is not straight looks like a straight one from another start.
+                    let of_drift = self.candidates[*i].spec.id == "sensor_bias"
+                        && without.iter().any(|&k| self.candidates[k].spec.id == "sensor_drift");
+                    !of_drift && !accepted.curves.iter().any(|&k| self.shares_covariate(*i, k))
                 }
                 Rival::Curve(k) => !without.iter().any(|&i| self.shares_covariate(i, *k)),
             });
@@ -316,6 +323,7 @@ impl<'a> Search<'a> {
             }
             self.accept(&mut accepted, &winner, &entries);
             self.exchange(&mut accepted, &tick);
+            self.prune(&mut accepted);
         }
         progress(1.0);
         Some((baseline, accepted))
@@ -357,13 +365,50 @@ impl<'a> Search<'a> {
         alone.into_iter().next().filter(|e| e.gain > winner.gain)
     }
 
+    /// Sessions themselves rather than a clock that runs along with them.
+    fn rather_session(&self, best: &Entry, entries: &[Entry]) -> Entry {
+        let name = |e: &Entry| match e.rival {
+            Rival::Curve(k) => self.curves[k].name.as_str(),
+            _ => "",
+        };
+        let clock = name(best).split('*').all(|c| ["time_s", "pull_index"].contains(&c));
+        let session = entries.iter().find(|e| name(e) == "session");
+        session.filter(|s| clock && s.gain > best.gain - RATHER_SESSION).unwrap_or(best).clone()
+    }
+
+    /// Whether an effect on signals is larger than what a first-order loop gets wrong of an arm: less than 2 % of the
+    /// readings, or of a few hundredths of a newton or a second, is no effect, however often it was measured.
+    fn visible(&self, entry: &Entry) -> bool {
+        let Rival::Effect(i) = entry.rival else { return true };
+        let spec = self.candidates[i].spec;
+        let Some(effect) = entry.fitted.model.effects.iter().find(|e| e.spec == spec) else { return true };
+        let size = (effect.values[self.candidates[i].size()]
+            - spec.parameters[self.candidates[i].size()].neutral)
+            .abs();
+        let pulls = &self.context.data.measured.pulls;
+        let last_s = pulls.iter().map(|p| p.covariates.time_s).fold(0.0, f64::max);
+        let first_s = pulls.iter().map(|p| p.covariates.time_s).fold(last_s, f64::min);
+        let hours = (last_s - first_s) / 3600.0;
+        let most_n = self.context.data.label_n.iter().copied().fold(0.0, f64::max);
+        match spec.id {
+            "sensor_gain" | "controller_gain" | "sensor_creep" => size >= 0.02,
+            "sensor_gain_drift" => size * hours >= 0.02,
+            "sensor_quadratic" => size * most_n >= 0.02,
+            "sensor_bias" | "sensor_hysteresis" => size >= 0.05,
+            "sensor_drift" => size * hours >= 0.05,
+            "sensor_lowpass" => size >= 0.02,
+            _ => true,
+        }
+    }
+
     /// The entry that is accepted, if one is.
     fn winner(&self, before: &Fitted, entries: &[Entry], named_gain: f64, curve_gain: f64) -> Option<Entry> {
-        let named = entries.iter().find(|e| e.rival.effect().is_some() && e.gain >= named_gain);
+        let named =
+            entries.iter().find(|e| e.rival.effect().is_some() && e.gain >= named_gain && self.visible(e));
         let curve = entries.iter().find(|e| matches!(e.rival, Rival::Curve(_)) && e.gain >= curve_gain);
         match (named, curve) {
             (Some(named), None) => Some(named.clone()),
-            (None, Some(curve)) => Some(curve.clone()),
+            (None, Some(curve)) => Some(self.rather_session(curve, entries)),
             (None, None) => None,
             (Some(named), Some(curve)) => {
                 let gained = |e: &Entry| {
@@ -371,7 +416,26 @@ impl<'a> Search<'a> {
                         - (before.likelihood.log - before.trace_cost)
                 };
                 let enough = gained(named) >= EXPLAINED * gained(curve) || named.gain >= curve.gain - 1.0;
-                Some(if enough { named.clone() } else { curve.clone() })
+                Some(if enough { named.clone() } else { self.rather_session(curve, entries) })
+            }
+        }
+    }
+
+    /// Takes out effects that later terms have made superfluous.
+    fn prune(&self, accepted: &mut Accepted) {
+        if accepted.effects.len() + accepted.curves.len() < 2 {
+            return;
+        }
+        for place in (0..accepted.effects.len()).rev() {
+            let spec = self.candidates[accepted.effects[place].0].spec;
+            let mut terms = accepted.fitted.terms.clone();
+            terms.effects.retain(|(c, _)| c.spec != spec);
+            let mut start = accepted.fitted.model.clone();
+            start.effects.retain(|e| e.spec != spec);
+            let Some(fewer) = self.context.fit(&start, &terms, &self.rows) else { continue };
+            if self.score(&accepted.fitted) - self.score(&fewer) < NAMED_GAIN {
+                accepted.effects.remove(place);
+                accepted.fitted = fewer;
             }
         }
     }
@@ -416,6 +480,18 @@ impl<'a> Search<'a> {
             accepted.effects.push((i, tied(i, chosen.gain, &entries)));
         }
     }
+}
+
+/// The sine in the first clock that was written down that fits the residuals of the baseline best.
+fn wave(context: &Context<'_>, clocks: &[&str]) -> Option<Curve> {
+    let data = context.data;
+    let name = *clocks.iter().find(|name| data.columns.contains_key(**name))?;
+    let at = data.numbers(name)?;
+    let rows: Vec<usize> = (0..data.len()).collect();
+    let baseline = context.fit(&context.base, &Terms::default(), &rows)?;
+    let most = 3.0 * baseline.likelihood.scale;
+    let residuals: Vec<f64> = baseline.residuals.iter().map(|r| r.clamp(-most, most)).collect();
+    periodic(name, &at, &residuals)
 }
 
 /// Spearman's correlation.

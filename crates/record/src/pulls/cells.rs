@@ -92,7 +92,8 @@ fn setter(name: &str) -> Option<Setter> {
         "gel_id" => |cell, pull| text(cell, &mut pull.covariates.gel_id),
         "session" => |cell, pull| text(cell, &mut pull.covariates.session),
         "grip_force_n" => |cell, pull| above_zero(cell, &mut pull.grip_force_n),
-        "max_pull_force_n" => |cell, pull| not_negative(cell, &mut pull.max_pull_force_n),
+        // A sensor that is off may read less than nothing.
+        "max_pull_force_n" => |cell, pull| number(cell, &mut pull.max_pull_force_n),
         "force_increment_n" => |cell, pull| above_zero(cell, &mut pull.increment_n),
         "step_time_s" => |cell, pull| above_zero(cell, &mut pull.step_s),
         "dwell_s" => |cell, pull| not_negative(cell, &mut pull.covariates.dwell_s),

@@ -3,26 +3,37 @@
 use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{EffectSpec, ParameterSpec};
 
-/// `sensor_quadratic`: the second term of the sensor's curve.
+/// `sensor_quadratic`: the second term of the sensor's curve. A load cell bends the same way whatever the sign of the
+/// force (an even term); one that is made of two springs may bend alike in both directions (an odd one). Only pulls in both
+/// directions tell.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_quadratic",
     about: "measured force with a quadratic term",
-    formula: "F_m = F + quadratic_per_n F^2",
+    formula: "F_m = F + quadratic_per_n F^2, with F |F| for F^2 where odd = 1",
     source: "non-linearity of load cells, 0.5 to 3 % of the range",
-    parameters: &[ParameterSpec {
-        name: "quadratic_per_n",
-        unit: "1/N",
-        neutral: 0.0,
-        bounds: (-0.01, 0.01),
-        about: "relative change of the gain for a newton",
-    }],
+    parameters: &[
+        ParameterSpec {
+            name: "quadratic_per_n",
+            unit: "1/N",
+            neutral: 0.0,
+            bounds: (-0.01, 0.01),
+            about: "relative change of the gain for a newton",
+        },
+        ParameterSpec {
+            name: "odd",
+            unit: "1",
+            neutral: 0.0,
+            bounds: (0.0, 1.0),
+            about: "1 where the line bends alike in both directions, 0 where it bends one way",
+        },
+    ],
     sensor: Some(sensor),
     ..EffectSpec::BARE
 };
 
 fn sensor(parameters: &[f64], true_n: f64, _: &mut SensorMemory, _: &SensorPoint) -> f64 {
-    let [quadratic_per_n] = values(parameters);
-    true_n * (1.0 + quadratic_per_n * true_n)
+    let [quadratic_per_n, odd] = values(parameters);
+    true_n * (1.0 + quadratic_per_n * ((1.0 - odd) * true_n + odd * true_n.abs()))
 }
 
 #[cfg(test)]
@@ -33,11 +44,18 @@ mod tests {
     #[test]
     fn the_second_difference_is_constant_and_small_loads_read_right() {
         let forces: Vec<f64> = (0..9).map(|i| f64::from(i) * 5.0).collect();
-        let read = readings(sensor, &[0.001], &forces, 0.002);
+        let read = readings(sensor, &[0.001, 0.0], &forces, 0.002);
         assert!((read[8] - 41.6).abs() < 1e-12, "40 + 0.001 x 1600");
         for three in read.windows(3) {
             // 2 q (5 N)^2
             assert!((three[2] - 2.0 * three[1] + three[0] - 0.05).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn an_odd_line_is_the_same_in_both_directions() {
+        let read = |odd| readings(sensor, &[0.001, odd], &[-40.0, 40.0], 0.002);
+        assert_eq!(read(0.0), [-38.4, 41.6]);
+        assert_eq!(read(1.0), [-41.6, 41.6]);
     }
 }
