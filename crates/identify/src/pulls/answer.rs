@@ -8,7 +8,7 @@ use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
 };
 use super::model::{PredictPulls, PullModel, PullPrediction};
-use super::power::detectable;
+use super::power::ScoreTest;
 use super::search::{Accepted, Search, TIED_WITHIN};
 use crate::diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate,
@@ -111,7 +111,7 @@ pub fn diagnose_pulls(
         return PullAnswer { diagnosis, fits: None };
     };
     let repetitions = folds(data.len());
-    let heldout_before = predicted(&context, &before, &repetitions);
+    let heldout_before = predicted(&context, &before, &repetitions, false);
     let (accepted, heldout_after) = confirmed(&search, &before, accepted, &heldout_before, &repetitions);
     let after = accepted.fitted.clone();
     diagnosis.effects = named(&search, &before, &accepted);
@@ -148,7 +148,7 @@ pub fn diagnose_pulls(
             if sets.len() < 3 || sets.len() > 20 {
                 return None;
             }
-            let [b, a] = [&before, &after].map(|f| predicted(&context, f, &sets));
+            let [b, a] = [&before, &after].map(|f| predicted(&context, f, &sets, true));
             errors(&data.label_n, &b, &a, &data.group_of, &counted)
         };
         let force: Vec<u64> = measured.pulls.iter().map(|p| p.grip_force_n.to_bits()).collect();
@@ -163,7 +163,7 @@ pub fn diagnose_pulls(
     progress(0.92);
     let sd_n = label_sd_n(&before, &predictor.pulls(&before.model, &rows));
     let scores = accepted.entries.iter().take(SCORED).map(|entry| {
-        let held = predicted(&context, &entry.fitted, &repetitions);
+        let held = predicted(&context, &entry.fitted, &repetitions, true);
         held_out_score(&data.label_n, &sd_n, &heldout[0], &held, &counted)
     });
     let scores = scores.collect();
@@ -205,7 +205,7 @@ fn confirmed(
         each.map(|((l, p), sd)| ((l - p) / sd).powi(2).min(BAD * BAD)).sum()
     };
     loop {
-        let after = predicted(search.context, &accepted.fitted, repetitions);
+        let after = predicted(search.context, &accepted.fitted, repetitions, false);
         let terms = accepted.effects.len() + accepted.curves.len();
         if terms == 0 || squares(&after) <= WORSE * squares(heldout_before) {
             return (accepted, after);
@@ -471,8 +471,11 @@ fn would_have_seen(
     let others: Vec<&Candidate> =
         all.iter().filter(|c| !after.model.effects.iter().any(|e| e.spec == c.spec)).collect();
     let found = Mutex::new(BTreeMap::new());
+    let rows: Vec<usize> = (0..context.data.len()).collect();
+    let traces = !context.observations.is_empty();
+    let test = ScoreTest::new(context, &after.model, &after.terms, &rows, traces);
     context.predictor.for_each(others.len(), &|i| {
-        if let (Some(seen), Ok(mut found)) = (detectable(context, after, others[i]), found.lock()) {
+        if let (Some(seen), Ok(mut found)) = (test.detectable(others[i]), found.lock()) {
             found.insert(others[i].spec.id.to_string(), seen);
         }
     });

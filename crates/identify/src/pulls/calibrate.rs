@@ -120,7 +120,7 @@ pub fn calibrate_pulls(
     let rows: Vec<usize> = (0..data.len()).collect();
     context.learn_lag(&rows);
     let fitted = context.fit(&context.base, &terms, &rows).ok_or(CalibrateError::NoFit)?;
-    let held = predicted(&context, &fitted, &folds(data.len()));
+    let held = predicted(&context, &fitted, &folds(data.len()), false);
     let forces = || measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces().fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
     let laws = if request.offset_law { laws(&context, &fitted, &terms, given, range) } else { vec![] };

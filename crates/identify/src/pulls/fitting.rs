@@ -18,12 +18,19 @@ pub struct Terms {
     pub effects: Vec<(Candidate, Vec<f64>)>,
     /// Unnamed dependences with their coefficients.
     pub curves: Vec<(Curve, Vec<f64>)>,
+    /// Whether lag, dead time, kinetic ratio and what acts on signals stay as they are given, which makes fits of friction
+    /// beside them fast.
+    pub hold_signals: bool,
 }
 
 impl Terms {
     /// Whether readings or commands are changed.
     pub fn act_on_signals(&self) -> bool {
         self.effects.iter().any(|(c, _)| c.acts_on_signals())
+    }
+
+    fn holds(&self, candidate: &Candidate) -> bool {
+        self.hold_signals && candidate.acts_on_signals()
     }
 
     /// Parameters that the data have to pay for.
@@ -73,12 +80,16 @@ impl Fitted {
         let parts = model.mu.len();
         model.mu.copy_from_slice(&values[..parts]);
         (model.kinetic_ratio, model.misread_n) = (values[parts], values[parts + 1]);
+        let held = self.terms.hold_signals;
         let mut at = parts + 2;
         if self.names.get(at).is_some_and(|name| name == "robot.lag_s") {
             (model.lag_s, model.dead_time_s) = (values[at].max(0.0), values[at + 1].max(0.0));
             at += 2;
         }
         for ((candidate, _), effect) in self.terms.effects.iter().zip(&mut model.effects) {
+            if held && candidate.acts_on_signals() {
+                continue;
+            }
             for &(i, _) in &candidate.free {
                 effect.values[i] = values[at];
                 at += 1;
@@ -106,10 +117,11 @@ impl Context<'_> {
                 scale: 0.1 * mu.max(0.02),
             });
         }
+        let ratio = start.kinetic_ratio;
         parameters.push(FreeParameter {
             name: "kinetic_ratio".into(),
-            start: start.kinetic_ratio,
-            bounds: (0.3, 1.0),
+            start: ratio,
+            bounds: if terms.hold_signals { (ratio, ratio) } else { (0.3, 1.0) },
             scale: 0.05,
         });
         parameters.push(FreeParameter {
@@ -118,7 +130,7 @@ impl Context<'_> {
             bounds: (-0.5, 0.5),
             scale: 0.05,
         });
-        let dynamics = terms.act_on_signals() || self.free_lag;
+        let dynamics = (terms.act_on_signals() || self.free_lag) && !terms.hold_signals;
         if dynamics {
             for (name, value, most, scale) in
                 [("robot.lag_s", start.lag_s, 1.0, 0.02), ("robot.dead_time_s", start.dead_time_s, 0.5, 0.4)]
@@ -131,7 +143,7 @@ impl Context<'_> {
                 });
             }
         }
-        for (candidate, from) in &terms.effects {
+        for (candidate, from) in terms.effects.iter().filter(|(c, _)| !terms.holds(c)) {
             parameters.extend(candidate.parameters(from));
         }
         for (curve, from) in &terms.curves {
@@ -160,7 +172,8 @@ impl Context<'_> {
         model.effects.clear();
         for (candidate, from) in &terms.effects {
             let mut own = from.clone();
-            for &(i, _) in &candidate.free {
+            let free: &[(usize, f64)] = if terms.holds(candidate) { &[] } else { &candidate.free };
+            for &(i, _) in free {
                 own[i] = values[at];
                 at += 1;
             }
@@ -187,7 +200,9 @@ impl Context<'_> {
     pub fn fit(&self, start: &PullModel, terms: &Terms, rows: &[usize]) -> Option<Fitted> {
         let layout = self.layout(start, terms);
         let mut parameters = layout.parameters.clone();
-        let signals = terms.act_on_signals();
+        let acts = terms.act_on_signals();
+        // What is held predicts the same readings whatever friction does.
+        let signals = acts && !terms.hold_signals;
         let mut outcome = None;
         for round in 0..if signals { ROUNDS - 1 } else { ROUNDS } {
             let values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
@@ -233,9 +248,9 @@ impl Context<'_> {
         let log_sd: Vec<f64> = sd.iter().map(|s| libm::log(*s)).collect();
         let sessions: Vec<usize> = rows.iter().map(|&i| self.data.session_of[i]).collect();
         let judged = likelihood(&residuals, &log_sd, &sessions);
-        let traces = if signals { self.trace_residuals(&model, rows) } else { vec![] };
-        let own = huber(&traces) + 0.5 * self.priors(&model, signals).iter().map(|r| r * r).sum::<f64>();
-        let trace_cost = if signals { own } else { own + self.baseline_trace_cost };
+        let traces = if acts { self.trace_residuals(&model, rows) } else { vec![] };
+        let own = huber(&traces) + 0.5 * self.priors(&model, acts).iter().map(|r| r * r).sum::<f64>();
+        let trace_cost = if acts { own } else { own + self.baseline_trace_cost };
         let mut fitted_terms = terms.clone();
         for ((_, values), effect) in fitted_terms.effects.iter_mut().zip(&model.effects) {
             values.clone_from(&effect.values);

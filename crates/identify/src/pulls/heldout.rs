@@ -32,11 +32,17 @@ pub fn by_value(of: &[u64]) -> Vec<Vec<usize>> {
     values.iter().map(|v| (0..of.len()).filter(|&i| of[i] == *v).collect()).collect()
 }
 
-/// Labels predicted for pulls by a fit that has not seen them. NaN where no fit was possible.
-pub fn predicted(context: &Context<'_>, fitted: &Fitted, held_out: &[Vec<usize>]) -> Vec<f64> {
+/// Labels predicted for pulls by a fit that has not seen them. NaN where no fit was possible. With `hold_signals` what acts on
+/// signals, which traces show rather than labels, stays as all pulls gave it.
+pub fn predicted(
+    context: &Context<'_>,
+    fitted: &Fitted,
+    held_out: &[Vec<usize>],
+    hold_signals: bool,
+) -> Vec<f64> {
     let n = context.data.len();
     let result = Mutex::new(vec![f64::NAN; n]);
-    let terms: &Terms = &fitted.terms;
+    let terms = &Terms { hold_signals, ..fitted.terms.clone() };
     context.predictor.for_each(held_out.len(), &|k| {
         let out = &held_out[k];
         let rows: Vec<usize> = (0..n).filter(|i| !out.contains(i)).collect();

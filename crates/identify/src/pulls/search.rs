@@ -22,6 +22,10 @@ pub const CURVE_GAIN: f64 = 4.5;
 /// Rivals within this score of the best are not told apart: odds of about 20 to 1.
 pub const TIED_WITHIN: f64 = 3.0;
 
+/// Entries within this score of the best, and how many at most, are fitted again with everything free.
+const REFIT_WITHIN: f64 = 6.0;
+const MOST_REFITS: usize = 6;
+
 /// Share of what the best curve in its own covariate explains that a named effect has to explain.
 const EXPLAINED: f64 = 0.75;
 
@@ -181,6 +185,7 @@ impl<'a> Search<'a> {
                     return None;
                 }
                 let mut terms = terms.clone();
+                terms.hold_signals = slow;
                 terms.curves.push((curve.clone(), vec![0.0; curve.len()]));
                 keep(self.context.fit(start, &terms, &self.rows), &mut best);
             }
@@ -188,6 +193,7 @@ impl<'a> Search<'a> {
                 let candidates = self.candidates[*i].by_part(&self.context.data.parts);
                 for from in &self.candidates[*i].starts {
                     let mut terms = terms.clone();
+                    terms.hold_signals = slow;
                     terms.effects.extend(candidates.iter().map(|c| (c.clone(), from.clone())));
                     keep(self.context.fit(start, &terms, &self.rows), &mut best);
                 }
@@ -204,6 +210,7 @@ impl<'a> Search<'a> {
                         continue;
                     }
                     let mut terms = terms.clone();
+                    terms.hold_signals = slow && !candidate.acts_on_signals();
                     terms.effects.push((candidate.clone(), from.clone()));
                     keep(self.context.fit(start, &terms, &self.rows), &mut best);
                 }
@@ -240,7 +247,31 @@ impl<'a> Search<'a> {
             })
             .collect();
         entries.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        self.refit(&mut entries, old);
         entries
+    }
+
+    /// Fits the best entries again with everything free, where signals were held.
+    fn refit(&self, entries: &mut [Entry], old: f64) {
+        let Some(best) = entries.first().map(|e| e.gain) else { return };
+        let held = |e: &Entry| e.fitted.terms.hold_signals && e.gain > best - REFIT_WITHIN && e.gain > 0.0;
+        let chosen: Vec<usize> =
+            (0..entries.len()).filter(|&k| held(&entries[k])).take(MOST_REFITS).collect();
+        let results: Vec<Mutex<Option<Fitted>>> = chosen.iter().map(|_| Mutex::new(None)).collect();
+        self.context.predictor.for_each(chosen.len(), &|i| {
+            let entry = &entries[chosen[i]];
+            let terms = Terms { hold_signals: false, ..entry.fitted.terms.clone() };
+            if let Ok(mut slot) = results[i].lock() {
+                *slot = self.context.fit(&entry.fitted.model, &terms, &self.rows);
+            }
+        });
+        for (&k, slot) in chosen.iter().zip(results) {
+            if let Some(fitted) = slot.into_inner().ok().flatten() {
+                let gain = self.score(&fitted) - old;
+                entries[k] = Entry { rival: entries[k].rival.clone(), fitted, gain };
+            }
+        }
+        entries.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     }
 
     fn all(&self, without: &[usize]) -> Vec<Rival> {
@@ -300,15 +331,7 @@ impl<'a> Search<'a> {
             let without: Vec<usize> = accepted.effects.iter().map(|(i, _)| *i).collect();
             let terms = accepted.fitted.terms.clone();
             let mut rivals = self.all(&without);
-            rivals.retain(|r| match r {
-                Rival::Effect(i) | Rival::ByPart(i) => {
-                    // A drift that is not straight looks like a straight one from another start.
-                    let of_drift = self.candidates[*i].spec.id == "sensor_bias"
-                        && without.iter().any(|&k| self.candidates[k].spec.id == "sensor_drift");
-                    !of_drift && !accepted.curves.iter().any(|&k| self.shares_covariate(*i, k))
-                }
-                Rival::Curve(k) => !without.iter().any(|&i| self.shares_covariate(i, *k)),
-            });
+            rivals.retain(|r| self.stands_beside(r, &without, &accepted.curves));
             let entries = self.compete(&accepted.fitted, &terms, &rivals, &tick);
             let Some(winner) = self.winner(&accepted.fitted, &entries, SECOND_GAIN, CURVE_GAIN + 1.0) else {
                 break;
@@ -327,6 +350,19 @@ impl<'a> Search<'a> {
         }
         progress(1.0);
         Some((baseline, accepted))
+    }
+
+    /// Whether a rival says something else than the effects and curves that are there already.
+    fn stands_beside(&self, rival: &Rival, effects: &[usize], curves: &[usize]) -> bool {
+        match rival {
+            Rival::Effect(i) | Rival::ByPart(i) => {
+                // A drift that is not straight looks like a straight one from another start.
+                let of_drift = self.candidates[*i].spec.id == "sensor_bias"
+                    && effects.iter().any(|&k| self.candidates[k].spec.id == "sensor_drift");
+                !of_drift && !curves.iter().any(|&k| self.shares_covariate(*i, k))
+            }
+            Rival::Curve(k) => !effects.iter().any(|&i| self.shares_covariate(i, *k)),
+        }
     }
 
     /// Whether curve `k` is in a covariate of effect `i`, or in one that runs with it.
@@ -466,7 +502,10 @@ impl<'a> Search<'a> {
             let mut start = accepted.fitted.clone();
             start.model.effects.drain(..width);
             let mut rivals = self.all(&others);
-            rivals.retain(|r| r.effect().is_some());
+            rivals.retain(|r| {
+                let own = r.effect() == Some(old);
+                r.effect().is_some() && (own || self.stands_beside(r, &others, &accepted.curves))
+            });
             let entries = self.compete(&start, &terms, &rivals, tick);
             let Some(best) = entries.first() else { return };
             let same = |e: &&Entry| e.rival.effect() == Some(old);
