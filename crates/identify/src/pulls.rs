@@ -12,4 +12,5 @@ pub mod likelihood;
 pub mod model;
 pub mod observe;
 pub mod power;
+mod screen;
 pub mod search;

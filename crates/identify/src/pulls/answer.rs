@@ -2,19 +2,19 @@
 
 use super::candidates::{Candidate, candidates};
 use super::context::Context;
-use super::data::{Column, PullData};
+use super::data::PullData;
 use super::fitting::Fitted;
 use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
 };
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::power::ScoreTest;
+use super::screen::test;
 use super::search::{Accepted, Search, TIED_WITHIN};
 use crate::diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate,
     Rival, SeparateBy, UnknownCovariate, Verdict,
 };
-use crate::permutation::{Covariate, dependence, interaction};
 use gripgen_twin::{KNOWN_COLUMNS, MeasuredPulls};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -38,6 +38,9 @@ const WORSE: f64 = 1.03;
 
 /// Standard deviations beyond which the error of a held-out pull counts no more.
 const BAD: f64 = 5.0;
+
+/// Least standard deviation of a parameter, as a share of its distance from nothing: formulas are not that good.
+const LEAST_SD: f64 = 0.02;
 
 /// Odds are taken to this power, because no model here is exactly right.
 const TEMPER: f64 = 0.6;
@@ -364,11 +367,10 @@ pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<Str
     let each = |(k, p): (usize, &gripgen_twin::effects::ParameterSpec)| {
         let value = effect.values[k];
         let name = candidate.name_of(p.name);
-        let half = fitted
-            .names
-            .iter()
-            .position(|n| *n == name)
-            .map_or(0.0, |at| HALF90 * fitted.covariance[(at, at)].max(0.0).sqrt());
+        let half = fitted.names.iter().position(|n| *n == name).map_or(0.0, |at| {
+            let sd = fitted.covariance[(at, at)].max(0.0).sqrt();
+            HALF90 * sd.max(LEAST_SD * (value - p.neutral).abs())
+        });
         let estimate = ParameterEstimate {
             value,
             low90: (value - half).max(p.bounds.0.min(value)),
@@ -387,11 +389,6 @@ fn unknown(
     accepted: &Accepted,
     data: &PullData<'_>,
 ) -> Vec<UnknownCovariate> {
-    let column = |name: &str| match data.columns.get(name) {
-        Some(Column::Number(x)) => Covariate::Number(x.clone()),
-        Some(Column::Word(at, _)) => Covariate::Word(at.iter().map(|&w| w as u32).collect()),
-        None => Covariate::Number(vec![0.0; data.len()]),
-    };
     // Residuals of everything but the curves.
     let residuals = if accepted.effects.is_empty() {
         before.residuals.clone()
@@ -403,21 +400,12 @@ fn unknown(
             None => before.residuals.clone(),
         }
     };
-    // Neighbours that remember each other move together.
-    let length = if accepted.fitted.likelihood.memory > 0.25 { 5 } else { 1 };
-    let blocks: Vec<usize> = (0..data.len()).map(|i| i / length).collect();
-    let mut found: Vec<UnknownCovariate> = accepted
-        .curves
-        .iter()
-        .map(|&i| {
-            let name = search.curves[i].name.clone();
-            let tested = match name.split_once('*') {
-                Some((a, b)) => interaction(&residuals, &[], (&column(a), &column(b)), &blocks, 999, 1),
-                None => dependence(&residuals, &[], &column(&name), &blocks, 999, 1),
-            };
-            UnknownCovariate { covariate: name, strength: tested.strength, p_value: tested.p_value }
-        })
-        .collect();
+    let each = accepted.curves.iter().map(|&i| {
+        let curve = &search.curves[i];
+        let tested = test(data, &accepted.fitted, &residuals, curve);
+        UnknownCovariate { covariate: curve.name.clone(), strength: tested.strength, p_value: tested.p_value }
+    });
+    let mut found: Vec<UnknownCovariate> = each.collect();
     found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     found
 }

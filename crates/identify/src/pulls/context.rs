@@ -2,6 +2,7 @@
 
 use super::data::PullData;
 use super::fitting::{Terms, huber};
+use super::likelihood::scale;
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, noise_n, observe};
 use crate::least_squares::{FitOptions, FreeParameter, fit};
@@ -49,6 +50,49 @@ pub struct Observation {
     pub limit_n: Option<f64>,
     /// Mean reading while the jaws slid and the number of readings.
     pub slid_n: Option<(f64, usize)>,
+}
+
+/// What the readings of traces differ from a model by, in the deviations that arms and sensors are known to have.
+pub(super) struct TraceResiduals {
+    /// Of all traces together, by level of force, and of the readings without a load.
+    shared: Vec<f64>,
+    /// Of each trace about that, by level of force.
+    own: Vec<f64>,
+    traces: usize,
+}
+
+impl TraceResiduals {
+    /// By how much further traces lie from each other than is known of arms and sensors: what is not in the model, like the
+    /// drag of a cable, moves a whole trace, so its levels say no more than one of them.
+    pub fn widening(&self) -> f64 {
+        if self.own.is_empty() {
+            return 1.0;
+        }
+        let s = scale(&self.own).max(1.0);
+        s * self.correlated(s)
+    }
+
+    /// Root of the number of levels that say the same.
+    fn correlated(&self, s: f64) -> f64 {
+        let levels = self.own.len() as f64 / self.traces.max(1) as f64;
+        (1.0 + (levels - 1.0).max(0.0) * (1.0 - 1.0 / (s * s))).sqrt()
+    }
+
+    /// As one list, with those between traces divided by `widening`.
+    pub fn widened(mut self, widening: f64) -> Vec<f64> {
+        self.shared.extend(self.own.iter().map(|r| r / widening));
+        self.shared
+    }
+
+    /// Minus the logarithm of their likelihood, with the most likely scale between traces, of at least 1.
+    pub fn cost(&self) -> f64 {
+        let widening = self.widening();
+        let s = if self.own.is_empty() { 1.0 } else { scale(&self.own).max(1.0) };
+        let correlated = self.correlated(s);
+        let own: Vec<f64> = self.own.iter().map(|r| r / widening).collect();
+        let apart = self.own.len() as f64 / (correlated * correlated);
+        huber(&self.shared) + huber(&own) + apart * libm::log(s)
+    }
 }
 
 /// A campaign, ready to be fitted.
@@ -165,7 +209,7 @@ impl<'a> Context<'a> {
             let lag = [dynamics(&self.base)[0].clone()];
             let found = fit(&lag, FitOptions { most_steps: 10, least_gain: 1e-5 }, |v| {
                 let model = PullModel { lag_s: v[0], dead_time_s, ..self.base.clone() };
-                let mut r = self.trace_residuals(&model, &rows);
+                let mut r = self.trace_residuals(&model, &rows).widened(1.0);
                 // Huber's cost as a sum of squares.
                 r.iter_mut()
                     .filter(|x| x.abs() > 2.5)
@@ -179,7 +223,7 @@ impl<'a> Context<'a> {
             }
         }
         (self.base.lag_s, self.base.dead_time_s) = (best.1, best.2);
-        self.baseline_trace_cost = huber(&self.trace_residuals(&self.base, &rows));
+        self.baseline_trace_cost = self.trace_residuals(&self.base, &rows).cost();
     }
 
     /// Lag and dead time from the readings while the jaws held.
@@ -312,7 +356,7 @@ impl<'a> Context<'a> {
 
     /// What the readings of the traces at `rows` differ from a model by, in standard deviations: their mean over all
     /// traces by level of force, and each trace about that mean.
-    pub(super) fn trace_residuals(&self, model: &PullModel, rows: &[usize]) -> Vec<f64> {
+    pub(super) fn trace_residuals(&self, model: &PullModel, rows: &[usize]) -> TraceResiduals {
         let mut levels: Vec<Vec<(f64, f64, usize)>> = vec![vec![]; LEVELS];
         let mut no_load = Vec::new();
         let noise = model.noise_n;
@@ -336,24 +380,24 @@ impl<'a> Context<'a> {
             }
         }
         let wide = if self.predictor.winds_up() { CLOSED_LOOP } else { 1.0 };
-        let mut r = Vec::new();
+        let mut r = TraceResiduals { shared: vec![], own: vec![], traces: seen.len() };
         for level in levels.iter().filter(|l| !l.is_empty()) {
             let count = level.len() as f64;
             let mean = level.iter().map(|x| x.0).sum::<f64>() / count;
             let force = level.iter().map(|x| x.1.abs()).sum::<f64>() / count;
             let readings: usize = level.iter().map(|x| x.2).sum();
             let shared = wide * (SHARED_N.0 + SHARED_N.1 * force);
-            r.push(mean / (shared * shared + noise * noise / readings as f64).sqrt());
+            r.shared.push(mean / (shared * shared + noise * noise / readings as f64).sqrt());
             for (difference, force, n) in level {
                 let own = wide * (OWN_N.0 + OWN_N.1 * force.abs());
-                r.push((difference - mean) / (own * own + noise * noise / *n as f64).sqrt());
+                r.own.push((difference - mean) / (own * own + noise * noise / *n as f64).sqrt());
             }
         }
         if !no_load.is_empty() {
             let mean = no_load.iter().map(|x| x.0).sum::<f64>() / no_load.len() as f64;
             let readings: usize = no_load.iter().map(|x| x.1).sum();
-            r.push(mean / (0.02 * 0.02 + noise * noise / readings as f64).sqrt());
-            r.extend(
+            r.shared.push(mean / (0.02 * 0.02 + noise * noise / readings as f64).sqrt());
+            r.shared.extend(
                 no_load.iter().map(|(x, n)| (x - mean) / (0.02 * 0.02 + noise * noise / *n as f64).sqrt()),
             );
         }

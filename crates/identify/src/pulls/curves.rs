@@ -15,6 +15,8 @@ pub struct Curve {
     pub most: f64,
     /// Parameters that the data have to pay for.
     pub cost: usize,
+    /// Whether it is a sine of one frequency.
+    pub wave: bool,
 }
 
 impl Curve {
@@ -84,6 +86,7 @@ pub fn curves_in(name: &str, column: &Column) -> Vec<Curve> {
         additive: false,
         most: 3.0,
         cost,
+        wave: false,
     };
     match column {
         Column::Word(at, names) => {
@@ -111,32 +114,59 @@ pub fn curves_in(name: &str, column: &Column) -> Vec<Curve> {
     }
 }
 
-/// The sine over `x` that explains most of `residuals`, by least squares at many frequencies (Lomb 1976): at least one and
-/// a half cycles, at most one in four pulls. The choice of the frequency is paid for like two parameters.
-pub fn periodic(name: &str, x: &[f64], residuals: &[f64]) -> Option<Curve> {
-    let n = x.len();
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    if n < 40 || low >= high {
-        return None;
+/// Sines of many frequencies over a clock (Lomb 1976): at least one and a half cycles, at most one in four pulls.
+pub struct Waves {
+    /// For each frequency an orthonormal pair, one number a pull.
+    pairs: Vec<[Vec<f64>; 2]>,
+}
+
+impl Waves {
+    /// Over a clock; `None` for few pulls.
+    pub fn new(x: &[f64]) -> Option<Self> {
+        let n = x.len();
+        let (low, high) =
+            x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        if n < 40 || low >= high {
+            return None;
+        }
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let unit = |mut v: Vec<f64>| {
+            let mean = v.iter().sum::<f64>() / n as f64;
+            v.iter_mut().for_each(|a| *a -= mean);
+            let length = dot(&v, &v).sqrt().max(1e-9);
+            v.iter_mut().for_each(|a| *a /= length);
+            v
+        };
+        // Four frequencies for each that the length of the campaign tells apart, up to a slow clock of 250 cycles.
+        let pairs = (6..=n.min(1000))
+            .map(|k| {
+                let angle = |v: &f64| std::f64::consts::TAU * 0.25 * k as f64 * (v - low) / (high - low);
+                let sine = unit(x.iter().map(|v| libm::sin(angle(v))).collect());
+                let cosine = unit(x.iter().map(|v| libm::cos(angle(v))).collect());
+                let along = dot(&sine, &cosine);
+                let rest = unit(cosine.iter().zip(&sine).map(|(c, s)| c - along * s).collect());
+                [sine, rest]
+            })
+            .collect();
+        Some(Self { pairs })
     }
-    let mean = residuals.iter().sum::<f64>() / n as f64;
-    let basis = |cycles: f64| -> Vec<Vec<f64>> {
-        let angle = |v: &f64| std::f64::consts::TAU * cycles * (v - low) / (high - low);
-        centred(x.iter().map(|v| vec![libm::sin(angle(v)), libm::cos(angle(v))]).collect())
-    };
-    let explained = |cycles: f64| {
-        let b = basis(cycles);
-        let sum = |f: &dyn Fn(usize) -> f64| (0..n).map(f).sum::<f64>();
-        let (ss, cc, sc) =
-            (sum(&|i| b[i][0] * b[i][0]), sum(&|i| b[i][1] * b[i][1]), sum(&|i| b[i][0] * b[i][1]));
-        let (rs, rc) = (sum(&|i| b[i][0] * (residuals[i] - mean)), sum(&|i| b[i][1] * (residuals[i] - mean)));
-        let det = ss * cc - sc * sc;
-        if det > 1e-6 * ss * cc { (rs * rs * cc - 2.0 * rs * rc * sc + rc * rc * ss) / det } else { 0.0 }
-    };
-    // Four frequencies for each that the length of the campaign tells apart.
-    let tried = (6..=n).map(|k| 0.25 * k as f64);
-    let best = tried.map(|c| (c, explained(c))).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some(Curve { name: name.into(), basis: basis(best.0), additive: false, most: 3.0, cost: 4 })
+
+    /// The best frequency by position, and the sum of squares that it explains.
+    pub fn best(&self, residuals: &[f64]) -> (usize, f64) {
+        let dot = |a: &[f64]| a.iter().zip(residuals).map(|(a, r)| a * r).sum::<f64>();
+        let each = self.pairs.iter().map(|[a, b]| dot(a).powi(2) + dot(b).powi(2)).enumerate();
+        each.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
+    }
+}
+
+/// The sine over `x` that explains most of `residuals`. The choice of the frequency is paid for like two parameters.
+pub fn periodic(name: &str, x: &[f64], residuals: &[f64]) -> Option<Curve> {
+    let waves = Waves::new(x)?;
+    let [a, b] = &waves.pairs[waves.best(residuals).0];
+    // Root mean squares of 1, like other curves.
+    let scale = (x.len() as f64).sqrt();
+    let basis = a.iter().zip(b).map(|(a, b)| vec![scale * a, scale * b]).collect();
+    Some(Curve { name: name.into(), basis, additive: false, most: 1.0, cost: 4, wave: true })
 }
 
 /// The product of two columns of numbers, each about its mean. One more parameter is paid for the choice of the pair.
@@ -155,6 +185,7 @@ pub fn product(data: &PullData<'_>, a: &str, b: &str) -> Option<Curve> {
         additive: false,
         most: 2.0,
         cost: 2,
+        wave: false,
     })
 }
 

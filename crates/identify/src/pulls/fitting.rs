@@ -198,18 +198,39 @@ impl Context<'_> {
 
     /// Fits `terms` and the baseline to the pulls of `rows`, from `start`. `None` if the start cannot be predicted.
     pub fn fit(&self, start: &PullModel, terms: &Terms, rows: &[usize]) -> Option<Fitted> {
+        self.fit_in(0..ROUNDS, start, terms, rows)
+    }
+
+    /// The same from a start that is nearly right: one round, and bad pulls are known.
+    pub fn fit_again(&self, start: &PullModel, terms: &Terms, rows: &[usize]) -> Option<Fitted> {
+        self.fit_in(ROUNDS - 1..ROUNDS, start, terms, rows)
+    }
+
+    fn fit_in(
+        &self,
+        rounds: std::ops::Range<usize>,
+        start: &PullModel,
+        terms: &Terms,
+        rows: &[usize],
+    ) -> Option<Fitted> {
         let layout = self.layout(start, terms);
         let mut parameters = layout.parameters.clone();
         let acts = terms.act_on_signals();
         // What is held predicts the same readings whatever friction does.
         let signals = acts && !terms.hold_signals;
         let mut outcome = None;
-        for round in 0..if signals { ROUNDS - 1 } else { ROUNDS } {
+        for round in rounds {
             let values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
             let model = self.model_at(start, terms, &layout, &values);
             let sd = self.deviations(&model, rows);
             let friction = self.friction_residuals(&model, rows, &sd);
-            let traces = if signals { self.trace_residuals(&model, rows) } else { vec![] };
+            let (traces, widening) = if signals {
+                let traces = self.trace_residuals(&model, rows);
+                let widening = traces.widening();
+                (traces.widened(widening), widening)
+            } else {
+                (vec![], 1.0)
+            };
             let s = scale(&friction).max(0.2);
             // The first round does not know yet which pulls are bad.
             let weights: Vec<f64> = friction
@@ -228,7 +249,7 @@ impl Context<'_> {
                 let mut r = self.friction_residuals(&model, rows, &sd);
                 r.iter_mut().zip(&weights).for_each(|(r, w)| *r *= w / s);
                 if signals {
-                    let mut t = self.trace_residuals(&model, rows);
+                    let mut t = self.trace_residuals(&model, rows).widened(widening);
                     t.iter_mut().zip(&trace_weights).for_each(|(r, w)| *r *= w);
                     r.extend(t);
                 }
@@ -248,8 +269,8 @@ impl Context<'_> {
         let log_sd: Vec<f64> = sd.iter().map(|s| libm::log(*s)).collect();
         let sessions: Vec<usize> = rows.iter().map(|&i| self.data.session_of[i]).collect();
         let judged = likelihood(&residuals, &log_sd, &sessions);
-        let traces = if acts { self.trace_residuals(&model, rows) } else { vec![] };
-        let own = huber(&traces) + 0.5 * self.priors(&model, acts).iter().map(|r| r * r).sum::<f64>();
+        let traces = if acts { self.trace_residuals(&model, rows).cost() } else { 0.0 };
+        let own = traces + 0.5 * self.priors(&model, acts).iter().map(|r| r * r).sum::<f64>();
         let trace_cost = if acts { own } else { own + self.baseline_trace_cost };
         let mut fitted_terms = terms.clone();
         for ((_, values), effect) in fitted_terms.effects.iter_mut().zip(&model.effects) {

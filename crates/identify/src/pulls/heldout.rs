@@ -46,7 +46,7 @@ pub fn predicted(
     context.predictor.for_each(held_out.len(), &|k| {
         let out = &held_out[k];
         let rows: Vec<usize> = (0..n).filter(|i| !out.contains(i)).collect();
-        let Some(found) = context.fit(&fitted.model, terms, &rows) else { return };
+        let Some(found) = context.fit_again(&fitted.model, terms, &rows) else { return };
         let mut model = found.model;
         model.scatter = scatter(&model, found.likelihood.scale);
         let labels = context.predictor.pulls(&model, out);

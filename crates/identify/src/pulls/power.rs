@@ -26,6 +26,7 @@ pub(super) struct ScoreTest<'a> {
     basis: DMatrix<f64>,
     svd: SVD<f64, Dyn, Dyn>,
     signals: bool,
+    widening: f64,
 }
 
 impl<'a> ScoreTest<'a> {
@@ -49,6 +50,7 @@ impl<'a> ScoreTest<'a> {
             basis: DMatrix::zeros(0, 0),
             svd: DMatrix::zeros(1, 1).svd(true, true),
             signals,
+            widening: if signals { context.trace_residuals(model, rows).widening() } else { 1.0 },
         };
         test.residuals = test.residuals_of(model);
         test.scale = super::likelihood::scale(&test.residuals.as_slice()[..rows.len()]).max(0.1);
@@ -77,7 +79,7 @@ impl<'a> ScoreTest<'a> {
     fn residuals_of(&self, model: &PullModel) -> DVector<f64> {
         let mut r = self.context.friction_residuals(model, self.rows, &self.sd);
         if self.signals {
-            r.extend(self.context.trace_residuals(model, self.rows));
+            r.extend(self.context.trace_residuals(model, self.rows).widened(self.widening));
         }
         DVector::from_vec(r)
     }

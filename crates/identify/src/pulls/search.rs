@@ -7,6 +7,7 @@ use super::curves::{Curve, curves_in, periodic, product};
 use super::fitting::{Fitted, Terms};
 use super::model::PullModel;
 use super::power::ScoreTest;
+use super::screen::test;
 use std::sync::Mutex;
 
 /// Score that a named effect has to gain: odds of 20 to 1, beyond what its parameters cost. Set on the development split of
@@ -37,6 +38,9 @@ const MISFIT: f64 = 0.3;
 /// beside such an effect: these fits are slow.
 const LEAST_PROMISE: f64 = 1.5;
 const LEAST_PROMISE_BESIDE: f64 = 2.5;
+
+/// Level of the permutation test that a curve has to pass beside its score.
+const LEVEL: f64 = 0.02;
 
 /// Effects of the surface, which parts may have each in their own way; those of gel, gripper, sensor and robot are common.
 const PER_PART: [&str; 7] = [
@@ -441,7 +445,13 @@ impl<'a> Search<'a> {
     fn winner(&self, before: &Fitted, entries: &[Entry], named_gain: f64, curve_gain: f64) -> Option<Entry> {
         let named =
             entries.iter().find(|e| e.rival.effect().is_some() && e.gain >= named_gain && self.visible(e));
-        let curve = entries.iter().find(|e| matches!(e.rival, Rival::Curve(_)) && e.gain >= curve_gain);
+        let curve = entries.iter().filter(|e| e.gain >= curve_gain).find(|e| match e.rival {
+            Rival::Curve(k) => {
+                let found = test(self.context.data, before, &before.residuals, &self.curves[k]);
+                found.p_value <= LEVEL
+            }
+            _ => false,
+        });
         match (named, curve) {
             (Some(named), None) => Some(named.clone()),
             (None, Some(curve)) => Some(self.rather_session(curve, entries)),
@@ -457,6 +467,15 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// A fit with everything free.
+    fn freed(&self, fitted: &Fitted) -> Fitted {
+        if !fitted.terms.hold_signals {
+            return fitted.clone();
+        }
+        let terms = Terms { hold_signals: false, ..fitted.terms.clone() };
+        self.context.fit(&fitted.model, &terms, &self.rows).unwrap_or_else(|| fitted.clone())
+    }
+
     /// Takes out effects that later terms have made superfluous.
     fn prune(&self, accepted: &mut Accepted) {
         if accepted.effects.len() + accepted.curves.len() < 2 {
@@ -464,7 +483,7 @@ impl<'a> Search<'a> {
         }
         for place in (0..accepted.effects.len()).rev() {
             let spec = self.candidates[accepted.effects[place].0].spec;
-            let mut terms = accepted.fitted.terms.clone();
+            let mut terms = Terms { hold_signals: false, ..accepted.fitted.terms.clone() };
             terms.effects.retain(|(c, _)| c.spec != spec);
             let mut start = accepted.fitted.model.clone();
             start.effects.retain(|e| e.spec != spec);
@@ -477,7 +496,7 @@ impl<'a> Search<'a> {
     }
 
     fn accept(&self, accepted: &mut Accepted, winner: &Entry, entries: &[Entry]) {
-        accepted.fitted = winner.fitted.clone();
+        accepted.fitted = self.freed(&winner.fitted);
         match winner.rival {
             Rival::Curve(i) => accepted.curves.push(i),
             Rival::Effect(i) | Rival::ByPart(i) => {
@@ -514,7 +533,7 @@ impl<'a> Search<'a> {
                 _ => best,
             };
             let Some(i) = chosen.rival.effect() else { return };
-            accepted.fitted = chosen.fitted.clone();
+            accepted.fitted = self.freed(&chosen.fitted);
             accepted.effects.remove(0);
             accepted.effects.push((i, tied(i, chosen.gain, &entries)));
         }
