@@ -211,6 +211,25 @@ fn comes_back(measured: &MeasuredPulls, id: &str, columns: &[&str]) {
     );
 }
 
+/// The laws of Wucherer et al. 2023 in the shipped twin have another offset for each part, and not all the same sign: they come
+/// back with the part's own b / a.
+#[test]
+fn laws_that_differ_by_part_come_back_with_theirs() {
+    let location = Location::parse("asset:configs/twin.toml");
+    let parts: Vec<String> = ["ball_bearing", "roller_bearing"].map(String::from).to_vec();
+    let options = CampaignOptions { parts, pulls: 120, ..Default::default() };
+    let measured = simulate_campaign(&location, &[], &plan_campaign(&options).unwrap(), 3).unwrap().pulls;
+    let found = diagnose(&measured, &[]);
+    for (part, b_over_a_n) in [("ball_bearing", -4.34 / 1.20), ("roller_bearing", 10.15 / 1.10)] {
+        let entries = &found.diagnosis.effects;
+        let own = entries.iter().find(|e| e.name == "load_offset" && e.part.as_deref() == Some(part));
+        let b_n = own.unwrap_or_else(|| panic!("{part}: {entries:?}")).parameters["b_n"].value;
+        assert!((b_n - b_over_a_n).abs() < 1.5, "{part}: {b_n} N, the law has {b_over_a_n} N");
+    }
+    let twin = Twin::new(&edited_twin(&baseline(), &[], &found.edits).unwrap()).unwrap();
+    assert_eq!(twin.effects.iter().filter(|e| e.part.is_some()).count(), 2, "{:?}", twin.effects);
+}
+
 /// What is tied is told apart by the pulls that are planned for it: a bias of the sensor, pulled upwards only without
 /// traces, looks like an offset of the friction until the planned pulls are made on the same rig.
 #[test]

@@ -150,6 +150,7 @@ fn diagnosed(n: usize) -> Diagnosed {
     ];
     let evidence = ["wear", "sensor_gain_drift", "none", "curve in humidity_pct"].iter().enumerate();
     Diagnosed {
+        next: None,
         diagnosis: diagnosis(),
         edits: TwinEdits::default(),
         report: ReportData {

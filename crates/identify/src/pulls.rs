@@ -3,6 +3,8 @@
 pub mod answer;
 pub mod calibrate;
 pub mod candidates;
+mod choose;
+mod compete;
 pub mod context;
 pub mod curves;
 pub mod data;
@@ -14,3 +16,5 @@ pub mod observe;
 pub mod power;
 mod screen;
 pub mod search;
+mod trace_residuals;
+mod words;

@@ -45,6 +45,8 @@ impl Candidate {
                     ("conditioning", "depth") if start[2] == 0.0 => bounds.0 = 0.0,
                     // A wider one is no transition but a saturation or a power law.
                     ("regime_transition", "width_n") => bounds.1 = 6.0,
+                    // What comes late is a part of the response; one that goes back is a lag of another kind.
+                    ("sensor_creep", "fraction") => bounds.0 = 0.0,
                     _ => {}
                 }
                 FreeParameter { name: self.name_of(p.name), start: start[i], bounds, scale }
@@ -119,7 +121,7 @@ pub(super) fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: 
         "load_offset" if force => plain(&[&[("b_n", 0.0)]], &[("b_n", 1.0)], 0),
         "load_power_law" if force => plain(&[&[("n", 0.0)]], &[("n", 0.05)], 0),
         "area_saturation" if force => {
-            over("sharpness", &[1.0, 2.5], ("saturation_per_n", 0.004), &[("saturation_per_n", 0.002)], 0)
+            over("sharpness", &[1.0, 2.5], ("saturation_per_n", 0.004), &[("saturation_per_n", 0.002)], 1)
         }
         "regime_transition" if force => {
             let mut starts = Vec::new();

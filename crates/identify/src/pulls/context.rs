@@ -1,10 +1,10 @@
 //! A campaign with what its traces say, and the residuals of a model against both.
 
 use super::data::PullData;
-use super::fitting::{Terms, huber};
-use super::likelihood::scale;
+use super::fitting::Terms;
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, noise_n, observe};
+use super::trace_residuals::TraceResiduals;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 
 /// Scatter of friction from grip to grip with which residuals are weighed; their true scale is fitted.
@@ -50,49 +50,6 @@ pub struct Observation {
     pub limit_n: Option<f64>,
     /// Mean reading while the jaws slid and the number of readings.
     pub slid_n: Option<(f64, usize)>,
-}
-
-/// What the readings of traces differ from a model by, in the deviations that arms and sensors are known to have.
-pub(super) struct TraceResiduals {
-    /// Of all traces together, by level of force, and of the readings without a load.
-    shared: Vec<f64>,
-    /// Of each trace about that, by level of force.
-    own: Vec<f64>,
-    traces: usize,
-}
-
-impl TraceResiduals {
-    /// By how much further traces lie from each other than is known of arms and sensors: what is not in the model, like the
-    /// drag of a cable, moves a whole trace, so its levels say no more than one of them.
-    pub fn widening(&self) -> f64 {
-        if self.own.is_empty() {
-            return 1.0;
-        }
-        let s = scale(&self.own).max(1.0);
-        s * self.correlated(s)
-    }
-
-    /// Root of the number of levels that say the same.
-    fn correlated(&self, s: f64) -> f64 {
-        let levels = self.own.len() as f64 / self.traces.max(1) as f64;
-        (1.0 + (levels - 1.0).max(0.0) * (1.0 - 1.0 / (s * s))).sqrt()
-    }
-
-    /// As one list, with those between traces divided by `widening`.
-    pub fn widened(mut self, widening: f64) -> Vec<f64> {
-        self.shared.extend(self.own.iter().map(|r| r / widening));
-        self.shared
-    }
-
-    /// Minus the logarithm of their likelihood, with the most likely scale between traces, of at least 1.
-    pub fn cost(&self) -> f64 {
-        let widening = self.widening();
-        let s = if self.own.is_empty() { 1.0 } else { scale(&self.own).max(1.0) };
-        let correlated = self.correlated(s);
-        let own: Vec<f64> = self.own.iter().map(|r| r / widening).collect();
-        let apart = self.own.len() as f64 / (correlated * correlated);
-        huber(&self.shared) + huber(&own) + apart * libm::log(s)
-    }
 }
 
 /// A campaign, ready to be fitted.

@@ -71,7 +71,7 @@ impl<'a> ScoreTest<'a> {
         test.basis = DMatrix::from_columns(&columns);
         test.svd = test.basis.clone().svd(true, true);
         // Far residuals count as in the fit.
-        let clipped = test.own(test.residuals.clone()).map(|x| x.clamp(-3.0, 3.0));
+        let clipped = test.own(&test.residuals).map(|x| x.clamp(-3.0, 3.0));
         test.left = test.free(&clipped);
         test
     }
@@ -85,7 +85,7 @@ impl<'a> ScoreTest<'a> {
     }
 
     /// Residuals of pulls in units of their scale.
-    fn own(&self, v: DVector<f64>) -> DVector<f64> {
+    fn own(&self, v: &DVector<f64>) -> DVector<f64> {
         let n = self.rows.len();
         DVector::from_iterator(
             v.len(),
@@ -96,7 +96,7 @@ impl<'a> ScoreTest<'a> {
     fn slope(&self, change: &dyn Fn(&mut PullModel), step: f64) -> DVector<f64> {
         let mut moved = self.model.clone();
         change(&mut moved);
-        self.own((self.residuals_of(&moved) - &self.residuals) / step)
+        self.own(&((self.residuals_of(&moved) - &self.residuals) / step))
     }
 
     fn free(&self, v: &DVector<f64>) -> DVector<f64> {

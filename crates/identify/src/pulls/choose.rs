@@ -1,0 +1,161 @@
+//! Which of the rivals is accepted.
+
+use super::fitting::Fitted;
+use super::screen::test;
+use super::search::{CURVE_GAIN, Entry, Rival, Search};
+
+/// Share of what the best curve in its own covariate explains that a named effect has to explain.
+const EXPLAINED: f64 = 0.75;
+
+/// Share of the variance that an effect leaves which a curve in its own covariate may explain: formulas differ a little
+/// from what nature does. More than that, and the effect is not what acts.
+const MISFIT: f64 = 0.3;
+
+/// Score by which a curve in a clock has to be better than steps from session to session.
+const RATHER_SESSION: f64 = 4.0;
+
+/// Correlation of ranks from which on two columns are the same clock.
+const SAME_CLOCK: f64 = 0.9;
+
+/// Level of the permutation test that a curve has to pass beside its score.
+const LEVEL: f64 = 0.02;
+
+impl Search<'_> {
+    /// Whether a rival says something else than the effects and curves that are there already.
+    pub(super) fn stands_beside(&self, rival: &Rival, effects: &[usize], curves: &[usize]) -> bool {
+        match rival {
+            Rival::Effect(i) | Rival::ByPart(i) => {
+                // A drift that is not straight looks like a straight one from another start.
+                let of_drift = self.candidates[*i].spec.id == "sensor_bias"
+                    && effects.iter().any(|&k| self.candidates[k].spec.id == "sensor_drift");
+                !of_drift && !curves.iter().any(|&k| self.shares_covariate(*i, k))
+            }
+            Rival::Curve(k) => !effects.iter().any(|&i| self.shares_covariate(i, *k)),
+        }
+    }
+
+    /// Whether curve `k` is in a covariate of effect `i`, or in one that runs with it.
+    pub(super) fn shares_covariate(&self, i: usize, k: usize) -> bool {
+        let name = self.curves[k].name.as_str();
+        let own = self.candidates[i].spec.covariates;
+        let readings = own.is_empty() && self.candidates[i].acts_on_signals();
+        if own.contains(&name) || (readings && name == "grip_force_n") {
+            return true;
+        }
+        let rate = ["force_increment_n", "step_time_s"];
+        if rate.contains(&name) && own.iter().any(|c| rate.contains(c)) {
+            return true;
+        }
+        own.iter().any(|c| ["pull_index", "time_s"].contains(c) && self.same_clock(c, name))
+    }
+
+    pub(super) fn same_clock(&self, a: &str, b: &str) -> bool {
+        let data = self.context.data;
+        let (Some(x), Some(y)) = (data.numbers(a), data.numbers(b)) else { return false };
+        b == "session" || rank_correlation(&x, &y).abs() > SAME_CLOCK
+    }
+
+    /// The best curve in the covariates of an accepted effect, if it explains so much beside it that the effect is not what
+    /// acts: the effect goes, the curve stays.
+    pub(super) fn misfit(
+        &self,
+        before: &Fitted,
+        winner: &Entry,
+        i: usize,
+        tick: &(dyn Fn() + Sync),
+    ) -> Option<Entry> {
+        let own: Vec<Rival> =
+            (0..self.curves.len()).filter(|&k| self.shares_covariate(i, k)).map(Rival::Curve).collect();
+        let beside = self.compete(&winner.fitted, &winner.fitted.terms, &own, tick);
+        let best = beside.first().filter(|e| e.gain >= CURVE_GAIN)?;
+        let left = best.fitted.likelihood.scale / winner.fitted.likelihood.scale;
+        if 1.0 - left * left <= MISFIT {
+            return None;
+        }
+        let alone = self.compete(before, &before.terms, &own, tick);
+        alone.into_iter().next().filter(|e| e.gain > winner.gain)
+    }
+
+    /// Sessions themselves rather than a clock that runs along with them.
+    pub(super) fn rather_session(&self, best: &Entry, entries: &[Entry]) -> Entry {
+        let name = |e: &Entry| match e.rival {
+            Rival::Curve(k) => self.curves[k].name.as_str(),
+            _ => "",
+        };
+        let clock = name(best).split('*').all(|c| ["time_s", "pull_index"].contains(&c));
+        let session = entries.iter().find(|e| name(e) == "session");
+        session.filter(|s| clock && s.gain > best.gain - RATHER_SESSION).unwrap_or(best).clone()
+    }
+
+    /// Whether an effect on signals is larger than what a first-order loop gets wrong of an arm: less than 2 % of the
+    /// readings, or of a few hundredths of a newton or a second, is no effect, however often it was measured.
+    pub(super) fn visible(&self, entry: &Entry) -> bool {
+        let Rival::Effect(i) = entry.rival else { return true };
+        let spec = self.candidates[i].spec;
+        let Some(effect) = entry.fitted.model.effects.iter().find(|e| e.spec == spec) else { return true };
+        let size = (effect.values[self.candidates[i].size()]
+            - spec.parameters[self.candidates[i].size()].neutral)
+            .abs();
+        let pulls = &self.context.data.measured.pulls;
+        let last_s = pulls.iter().map(|p| p.covariates.time_s).fold(0.0, f64::max);
+        let first_s = pulls.iter().map(|p| p.covariates.time_s).fold(last_s, f64::min);
+        let hours = (last_s - first_s) / 3600.0;
+        let most_n = self.context.data.label_n.iter().copied().fold(0.0, f64::max);
+        match spec.id {
+            "sensor_gain" | "controller_gain" | "sensor_creep" => size >= 0.02,
+            "sensor_gain_drift" => size * hours >= 0.02,
+            "sensor_quadratic" => size * most_n >= 0.02,
+            "sensor_bias" | "sensor_hysteresis" => size >= 0.05,
+            "sensor_drift" => size * hours >= 0.05,
+            "sensor_lowpass" => size >= 0.02,
+            _ => true,
+        }
+    }
+
+    /// The entry that is accepted, if one is.
+    pub(super) fn winner(
+        &self,
+        before: &Fitted,
+        entries: &[Entry],
+        named_gain: f64,
+        curve_gain: f64,
+    ) -> Option<Entry> {
+        let named =
+            entries.iter().find(|e| e.rival.effect().is_some() && e.gain >= named_gain && self.visible(e));
+        let curve = entries.iter().filter(|e| e.gain >= curve_gain).find(|e| match e.rival {
+            Rival::Curve(k) => {
+                let found = test(self.context.data, before, &before.residuals, &self.curves[k]);
+                found.p_value <= LEVEL
+            }
+            _ => false,
+        });
+        match (named, curve) {
+            (Some(named), None) => Some(named.clone()),
+            (None, Some(curve)) => Some(self.rather_session(curve, entries)),
+            (None, None) => None,
+            (Some(named), Some(curve)) => {
+                let gained = |e: &Entry| {
+                    (e.fitted.likelihood.log - e.fitted.trace_cost)
+                        - (before.likelihood.log - before.trace_cost)
+                };
+                let enough = gained(named) >= EXPLAINED * gained(curve) || named.gain >= curve.gain - 1.0;
+                Some(if enough { named.clone() } else { self.rather_session(curve, entries) })
+            }
+        }
+    }
+}
+
+/// Spearman's correlation.
+fn rank_correlation(x: &[f64], y: &[f64]) -> f64 {
+    let ranks = |v: &[f64]| {
+        let mut order: Vec<usize> = (0..v.len()).collect();
+        order.sort_by(|&a, &b| v[a].total_cmp(&v[b]));
+        let mut rank = vec![0.0; v.len()];
+        order.iter().enumerate().for_each(|(r, &i)| rank[i] = r as f64);
+        rank
+    };
+    let (a, b) = (ranks(x), ranks(y));
+    let mean = (x.len() as f64 - 1.0) / 2.0;
+    let sum = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| (p - mean) * (q - mean)).sum::<f64>();
+    sum(&a, &b) / (sum(&a, &a) * sum(&b, &b)).sqrt().max(1e-300)
+}

@@ -1,0 +1,185 @@
+//! Fits of all rivals beside a model.
+
+use super::fitting::{Fitted, Terms};
+use super::model::PullModel;
+use super::power::ScoreTest;
+use super::search::{Entry, Rival, Search};
+use std::sync::Mutex;
+
+/// Gain of log-likelihood that the slope at nothing has to promise for an effect on signals to be fitted, and for anything
+/// beside such an effect: these fits are slow.
+const LEAST_PROMISE: f64 = 1.5;
+
+const LEAST_PROMISE_BESIDE: f64 = 2.5;
+
+/// Entries within this score of the best, and how many at most, are fitted again with everything free.
+const REFIT_WITHIN: f64 = 6.0;
+
+const MOST_REFITS: usize = 6;
+
+/// Effects of the surface, which parts may have each in their own way; those of gel, gripper, sensor and robot are common.
+const PER_PART: [&str; 7] = [
+    "load_offset",
+    "load_power_law",
+    "area_saturation",
+    "rate_dependence",
+    "dwell_ageing",
+    "anisotropy",
+    "temperature",
+];
+
+/// Parts at most, and pulls of each at least, of an effect that differs by part.
+const MOST_PARTS: usize = 6;
+
+const FEWEST_OF_PART: usize = 10;
+
+impl Search<'_> {
+    pub(super) fn score(&self, fitted: &Fitted) -> f64 {
+        fitted.score(self.rows.len())
+    }
+
+    /// `terms` with one rival more, from all its starts; the best fit. `test` is a score test beside them.
+    pub(super) fn with(
+        &self,
+        start: &PullModel,
+        terms: &Terms,
+        rival: &Rival,
+        test: &ScoreTest<'_>,
+    ) -> Option<Fitted> {
+        let slow = terms.act_on_signals();
+        let mut best: Option<Fitted> = None;
+        let keep = |fitted: Option<Fitted>, best: &mut Option<Fitted>| {
+            if let Some(f) = fitted
+                && best.as_ref().is_none_or(|b| self.score(&f) > self.score(b))
+            {
+                *best = Some(f);
+            }
+        };
+        match rival {
+            Rival::Curve(i) => {
+                let curve = &self.curves[*i];
+                if slow && test.curve(curve) < LEAST_PROMISE_BESIDE {
+                    return None;
+                }
+                let mut terms = terms.clone();
+                terms.hold_signals = slow;
+                terms.curves.push((curve.clone(), vec![0.0; curve.len()]));
+                keep(self.context.fit(start, &terms, &self.rows), &mut best);
+            }
+            Rival::ByPart(i) => {
+                let candidates = self.candidates[*i].by_part(&self.context.data.parts);
+                for from in &self.candidates[*i].starts {
+                    let mut terms = terms.clone();
+                    terms.hold_signals = slow;
+                    terms.effects.extend(candidates.iter().map(|c| (c.clone(), from.clone())));
+                    keep(self.context.fit(start, &terms, &self.rows), &mut best);
+                }
+            }
+            Rival::Effect(i) => {
+                let candidate = &self.candidates[*i];
+                let least = match (slow, candidate.acts_on_signals()) {
+                    (true, _) => LEAST_PROMISE_BESIDE,
+                    (false, true) => LEAST_PROMISE,
+                    (false, false) => 0.0,
+                };
+                for from in &candidate.starts {
+                    if least > 0.0 && test.effect(candidate, from) < least {
+                        continue;
+                    }
+                    let mut terms = terms.clone();
+                    terms.hold_signals = slow && !candidate.acts_on_signals();
+                    terms.effects.push((candidate.clone(), from.clone()));
+                    keep(self.context.fit(start, &terms, &self.rows), &mut best);
+                }
+            }
+        }
+        best
+    }
+
+    /// Fits `terms` with each rival added, best first. `done` is called after each.
+    pub(super) fn compete(
+        &self,
+        before: &Fitted,
+        terms: &Terms,
+        rivals: &[Rival],
+        done: &(dyn Fn() + Sync),
+    ) -> Vec<Entry> {
+        let results: Vec<Mutex<Option<Fitted>>> = rivals.iter().map(|_| Mutex::new(None)).collect();
+        let test = ScoreTest::new(self.context, &before.model, terms, &self.rows, true);
+        self.context.predictor.for_each(rivals.len(), &|i| {
+            let fitted = self.with(&before.model, terms, &rivals[i], &test);
+            if let Ok(mut slot) = results[i].lock() {
+                *slot = fitted;
+            }
+            done();
+        });
+        let old = self.score(before);
+        let mut entries: Vec<Entry> = rivals
+            .iter()
+            .zip(results)
+            .filter_map(|(rival, slot)| {
+                let fitted = slot.into_inner().ok().flatten()?;
+                let gain = self.score(&fitted) - old;
+                Some(Entry { rival: rival.clone(), fitted, gain })
+            })
+            .collect();
+        entries.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        self.refit(&mut entries, old);
+        entries
+    }
+
+    /// Fits the best entries again with everything free, where signals were held.
+    pub(super) fn refit(&self, entries: &mut [Entry], old: f64) {
+        let Some(best) = entries.first().map(|e| e.gain) else { return };
+        let held = |e: &Entry| e.fitted.terms.hold_signals && e.gain > best - REFIT_WITHIN && e.gain > 0.0;
+        let chosen: Vec<usize> =
+            (0..entries.len()).filter(|&k| held(&entries[k])).take(MOST_REFITS).collect();
+        let results: Vec<Mutex<Option<Fitted>>> = chosen.iter().map(|_| Mutex::new(None)).collect();
+        self.context.predictor.for_each(chosen.len(), &|i| {
+            let entry = &entries[chosen[i]];
+            let terms = Terms { hold_signals: false, ..entry.fitted.terms.clone() };
+            if let Ok(mut slot) = results[i].lock() {
+                *slot = self.context.fit(&entry.fitted.model, &terms, &self.rows);
+            }
+        });
+        for (&k, slot) in chosen.iter().zip(results) {
+            if let Some(fitted) = slot.into_inner().ok().flatten() {
+                let gain = self.score(&fitted) - old;
+                entries[k] = Entry { rival: entries[k].rival.clone(), fitted, gain };
+            }
+        }
+        entries.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    }
+
+    pub(super) fn all(&self, without: &[usize]) -> Vec<Rival> {
+        // The slow ones first, so that threads end together.
+        let mut effects: Vec<usize> = (0..self.candidates.len()).filter(|i| !without.contains(i)).collect();
+        effects.sort_by_key(|&i| !self.candidates[i].acts_on_signals());
+        let differing: Vec<usize> = effects.iter().copied().filter(|&i| self.may_differ(i)).collect();
+        effects
+            .into_iter()
+            .map(Rival::Effect)
+            .chain(differing.into_iter().map(Rival::ByPart))
+            .chain((0..self.curves.len()).map(Rival::Curve))
+            .collect()
+    }
+
+    /// Whether effect `i` may have other parameters for each part, and every part has pulls enough to show them.
+    pub(super) fn may_differ(&self, i: usize) -> bool {
+        let data = self.context.data;
+        let parts = data.parts.len();
+        let fewest = (0..parts).map(|p| data.part_of.iter().filter(|&&q| q == p).count()).min();
+        (2..=MOST_PARTS).contains(&parts)
+            && fewest >= Some(FEWEST_OF_PART)
+            && PER_PART.contains(&self.candidates[i].spec.id)
+    }
+
+    /// A fit with everything free.
+    pub(super) fn freed(&self, fitted: &Fitted) -> Fitted {
+        if !fitted.terms.hold_signals {
+            return fitted.clone();
+        }
+        let terms = Terms { hold_signals: false, ..fitted.terms.clone() };
+        self.context.fit(&fitted.model, &terms, &self.rows).unwrap_or_else(|| fitted.clone())
+    }
+}

@@ -1,0 +1,81 @@
+//! How far readings of traces lie from a model, and what that says.
+
+use super::fitting::huber;
+use super::likelihood::scale;
+
+/// What the readings of traces differ from a model by, in the deviations that arms and sensors are known to have.
+pub(super) struct TraceResiduals {
+    /// Of all traces together, by level of force, and of the readings without a load.
+    pub shared: Vec<f64>,
+    /// Of each trace about that, by level of force.
+    pub own: Vec<f64>,
+    /// How many traces.
+    pub traces: usize,
+}
+
+impl TraceResiduals {
+    /// By how much further traces lie from each other than is known of arms and sensors: what is not in the model, like the
+    /// drag of a cable, moves a whole trace, so its levels say no more than one of them.
+    pub fn widening(&self) -> f64 {
+        if self.own.is_empty() {
+            return 1.0;
+        }
+        let s = scale(&self.own).max(1.0);
+        s * self.correlated(s)
+    }
+
+    /// Root of the number of levels that say the same.
+    fn correlated(&self, s: f64) -> f64 {
+        let levels = self.own.len() as f64 / self.traces.max(1) as f64;
+        (1.0 + (levels - 1.0).max(0.0) * (1.0 - 1.0 / (s * s))).sqrt()
+    }
+
+    /// As one list, with those between traces divided by `widening`.
+    pub fn widened(mut self, widening: f64) -> Vec<f64> {
+        self.shared.extend(self.own.iter().map(|r| r / widening));
+        self.shared
+    }
+
+    /// Minus the logarithm of their likelihood, with the most likely scale between traces, of at least 1.
+    pub fn cost(&self) -> f64 {
+        let widening = self.widening();
+        let s = if self.own.is_empty() { 1.0 } else { scale(&self.own).max(1.0) };
+        let correlated = self.correlated(s);
+        let own: Vec<f64> = self.own.iter().map(|r| r / widening).collect();
+        let apart = self.own.len() as f64 / (correlated * correlated);
+        huber(&self.shared) + huber(&own) + apart * libm::log(s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(own: Vec<f64>) -> TraceResiduals {
+        TraceResiduals { shared: vec![0.5], own, traces: 20 }
+    }
+
+    /// Deviations as expected count one by one.
+    #[test]
+    fn traces_that_agree_count_fully() {
+        let r = of((0..80).map(|i| if i % 2 == 0 { 0.4 } else { -0.4 }).collect());
+        assert_eq!(r.widening(), 1.0);
+        let plain = 0.5 * 0.25 + 80.0 * 0.5 * 0.16;
+        assert!((r.cost() - plain).abs() < 1e-9, "{} {plain}", r.cost());
+        assert_eq!(r.widened(1.0).len(), 81);
+    }
+
+    /// Twenty traces that are each shifted by ten deviations, at four levels: twenty numbers with a scale of ten.
+    #[test]
+    fn traces_that_are_shifted_count_once() {
+        let shift = |i: usize| if (i / 4).is_multiple_of(2) { 10.0 } else { -10.0 };
+        let r = of((0..80).map(shift).collect());
+        let widening = r.widening();
+        // Four levels count as one, nearly.
+        assert!((widening / 2.0 - 10.0).abs() < 1.5, "{widening}");
+        let twice = of((0..80).map(|i| 2.0 * shift(i)).collect());
+        // Scale alone: 20 traces, each a factor of two.
+        let gained = twice.cost() - r.cost();
+        assert!((gained - 20.0 * 2.0_f64.ln()).abs() < 1.0, "{gained}");
+    }
+}
