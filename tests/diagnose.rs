@@ -181,13 +181,10 @@ fn an_effect_that_the_library_lacks_comes_back_as_its_covariate() {
             offsets_mm: vec![0.0, 2.0, 4.0],
             ..Default::default()
         };
-        let mut measured = simulated_at(&effect, 120, &[], places);
-        // Labels alone: traces would tell the rate by other means.
-        measured.pulls.iter_mut().for_each(|p| p.trace = None);
-        comes_back(&measured, id, columns);
+        comes_back(&simulated_at(&effect, 90, &[], places), id, columns);
     }
     // The planner does not heat: a temperature is made up, and labels fall by 2 % a kelvin.
-    let mut measured = simulated("", 120, &[]);
+    let mut measured = simulated("", 90, &[]);
     for (i, pull) in measured.pulls.iter_mut().enumerate() {
         let degrees = 23.0 + 4.0 * (i as f64 * 0.7).sin();
         pull.covariates.temperature_c = degrees;

@@ -16,8 +16,8 @@ from . import baselines, generate, judge, runner, scorer
 PAGE = """# Blind benchmark
 
 {cases} campaigns made by the separate generator in [tests/blind](../../tests/blind/README.md), which shares no code and no
-formula with gripgen. {dev} of them (the development split) were used while the method was made; the {sealed} sealed ones only
-for this table. sha256 over the sealed truths: `{seal}`.
+formula with gripgen. {dev} of them (the development split) and 180 more drawn alike (`--split dev --cases 180`) were used while the
+method was made; the {sealed} sealed ones only for this table. sha256 over the sealed truths: `{seal}`.
 
 Rates carry their exact 95 % interval. All errors are on 120 pulls a campaign that no tool has seen; the floor is the error
 of an oracle that knows all but scatter and noise. Re-run: `{command}`.

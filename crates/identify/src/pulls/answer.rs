@@ -347,6 +347,11 @@ fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize) ->
     let gained = |f: &Fitted| (f.likelihood.log - f.trace_cost) - (before.likelihood.log - before.trace_cost);
     let own = accepted.entries.iter().find(|e| e.rival.effect() == Some(i));
     let Some(own) = own.map(|e| gained(&e.fitted)) else { return vec![] };
+    // What was found beside another effect was not seen alone: these entries say nothing of it.
+    let best = accepted.entries.iter().filter(|e| e.rival.effect().is_some()).map(|e| gained(&e.fitted));
+    if own < best.fold(f64::NEG_INFINITY, f64::max) - 3.0 * TIED_WITHIN {
+        return vec![];
+    }
     let wide = (0.1 * own).clamp(TIED_WITHIN, 3.0 * TIED_WITHIN);
     let near = |e: &super::search::Entry| match e.rival.effect() {
         Some(k) if k != i && gained(&e.fitted) > own - wide => Some(search.candidates[k].spec.id.to_string()),
