@@ -151,6 +151,9 @@ fn the_example_is_diagnosed_and_an_effect_that_is_taken_away_becomes_unknown() {
     let measured = load_pulls(&root().join("assets/campaigns/example")).unwrap().pulls;
     let found = diagnose(&measured, &[]);
     assert_eq!(names(&found.diagnosis), ["dwell_ageing"], "{:?}", found.diagnosis.unknown);
+    // Found again in nearly all simulated campaigns, so its weight stays.
+    assert!(found.diagnosis.effects[0].weight > 0.9, "{:?}", found.diagnosis.effects);
+    assert!(found.diagnosis.notes.iter().any(|n| n.contains("simulated campaigns")));
     let error = found.diagnosis.error.as_ref().unwrap();
     assert!(error.after.rmse_n.unwrap() < 0.8 * error.before.rmse_n.unwrap(), "{error:?}");
     let without = diagnose(&measured, &["dwell_ageing"]);

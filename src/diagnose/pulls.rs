@@ -60,13 +60,28 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
     })
 }
 
-/// Diagnoses a campaign of pulls. `progress` is told the share that is done.
+/// Pulls that are looked at most: what so many do not show is too small to matter, and a fit takes as long as it has pulls.
+const MOST_PULLS: usize = 2000;
+
+/// Diagnoses a campaign of pulls. `progress` is told the share that is done. Of a very long campaign every so many pulls are
+/// looked at, and a note says so.
 pub fn diagnose_pull_table(
     measured: &MeasuredPulls,
     twin: &Twin,
     options: &PullDiagnoseOptions<'_>,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Diagnosed, UnknownPartError> {
+    let step = measured.pulls.len().div_ceil(MOST_PULLS);
+    if step > 1 {
+        let mut found = diagnose_pull_table(&measured.every(step), twin, options, progress)?;
+        let note = format!(
+            "one of every {step} of {} pulls was looked at, {} of them",
+            measured.pulls.len(),
+            measured.pulls.len().div_ceil(step)
+        );
+        found.diagnosis.notes.insert(0, note);
+        return Ok(found);
+    }
     let predictor = PullPredictor::new(measured, twin, options.jobs);
     let given = given_model(twin, predictor.part_names())?;
     let asked = PullOptions { without: options.without };

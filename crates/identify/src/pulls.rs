@@ -16,5 +16,6 @@ pub mod observe;
 pub mod power;
 mod screen;
 pub mod search;
+mod simulate;
 mod trace_residuals;
 mod words;

@@ -114,6 +114,26 @@ impl RestCount {
 }
 
 impl MeasuredPulls {
+    /// Every so many pulls, in order, with their columns.
+    #[must_use]
+    pub fn every(&self, step: usize) -> Self {
+        let step = step.max(1);
+        let extra = self.extra.iter().map(|column| ExtraColumn {
+            name: column.name.clone(),
+            values: match &column.values {
+                ExtraValues::Number(x) => ExtraValues::Number(x.iter().copied().step_by(step).collect()),
+                ExtraValues::Text(words) => ExtraValues::Text(words.iter().step_by(step).cloned().collect()),
+            },
+        });
+        Self {
+            pulls: self.pulls.iter().step_by(step).cloned().collect(),
+            recorded: self.recorded.clone(),
+            extra: extra.collect(),
+            sha256: self.sha256.clone(),
+            ..*self
+        }
+    }
+
     /// Gives every pull the covariate [`PULLS_SINCE_REST`], unless it was written down. Without rests nothing is
     /// added.
     pub fn count_rests(&mut self) {
@@ -178,6 +198,9 @@ mod tests {
         measured.count_rests();
         let wanted = [0.0, 1.0, 4.0, 0.0, 0.0, 1.0].map(|x| Some(Drawn::Number(x)));
         assert_eq!(since(&measured), wanted);
+        let half = measured.every(2);
+        assert_eq!(half.pulls.iter().map(|p| p.id.as_str()).collect::<Vec<_>>(), ["4", "8", "10"]);
+        assert_eq!(since(&half), [wanted[0].clone(), wanted[2].clone(), wanted[4].clone()]);
         measured.pulls.truncate(3);
         measured.pulls.iter_mut().for_each(|p| p.covariates.extra.clear());
         measured.count_rests();

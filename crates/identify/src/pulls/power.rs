@@ -18,7 +18,7 @@ pub(super) struct ScoreTest<'a> {
     rows: &'a [usize],
     sd: Vec<f64>,
     /// Scale of the residuals of pulls.
-    scale: f64,
+    pub scale: f64,
     /// Residuals, and what of them no parameter of the model explains.
     residuals: DVector<f64>,
     left: DVector<f64>,
@@ -76,7 +76,8 @@ impl<'a> ScoreTest<'a> {
         test
     }
 
-    fn residuals_of(&self, model: &PullModel) -> DVector<f64> {
+    /// Residuals of another model, in the deviations of this one.
+    pub fn residuals_of(&self, model: &PullModel) -> DVector<f64> {
         let mut r = self.context.friction_residuals(model, self.rows, &self.sd);
         if self.signals {
             r.extend(self.context.trace_residuals(model, self.rows).widened(self.widening));
@@ -85,7 +86,7 @@ impl<'a> ScoreTest<'a> {
     }
 
     /// Residuals of pulls in units of their scale.
-    fn own(&self, v: &DVector<f64>) -> DVector<f64> {
+    pub fn own(&self, v: &DVector<f64>) -> DVector<f64> {
         let n = self.rows.len();
         DVector::from_iterator(
             v.len(),
@@ -99,32 +100,49 @@ impl<'a> ScoreTest<'a> {
         self.own(&((self.residuals_of(&moved) - &self.residuals) / step))
     }
 
-    fn free(&self, v: &DVector<f64>) -> DVector<f64> {
+    /// What no parameter of the model explains.
+    pub fn free(&self, v: &DVector<f64>) -> DVector<f64> {
         self.svd.solve(v, 1e-9).map(|c| v - &self.basis * c).unwrap_or_else(|_| v.clone())
     }
 
     /// What an effect promises from a start.
     pub fn effect(&self, candidate: &Candidate, from: &[f64]) -> f64 {
-        let Some(&(size, scale)) = candidate.free.first() else { return f64::INFINITY };
         // These have no slope at nothing.
-        if ["sensor_saturation", "deadband"].contains(&candidate.spec.id) {
+        if candidate.free.is_empty() || ["sensor_saturation", "deadband"].contains(&candidate.spec.id) {
             return f64::INFINITY;
         }
-        let p = &candidate.spec.parameters[size];
-        let mut values = from.to_vec();
-        let step = if p.neutral + 0.3 * scale <= p.bounds.1 { 0.3 * scale } else { -0.3 * scale };
-        values[size] = p.neutral + step;
-        let raw = self.free(&self.slope(&|m| m.effects.push(candidate.with(&values)), step));
+        let raw = self.direction(candidate, from);
         let length = raw.norm_squared();
         if length < 1e-12 { 0.0 } else { 0.5 * raw.dot(&self.left).powi(2) / length }
     }
 
+    /// How an effect from a start moves the residuals for its size, as far as no parameter of the model does.
+    pub fn direction(&self, candidate: &Candidate, from: &[f64]) -> DVector<f64> {
+        let Some(&(size, scale)) = candidate.free.first() else { return DVector::zeros(self.left.len()) };
+        let p = &candidate.spec.parameters[size];
+        let mut values = from.to_vec();
+        let step = if p.neutral + 0.3 * scale <= p.bounds.1 { 0.3 * scale } else { -0.3 * scale };
+        values[size] = p.neutral + step;
+        self.free(&self.slope(&|m| m.effects.push(candidate.with(&values)), step))
+    }
+
     /// What an unnamed curve promises.
     pub fn curve(&self, curve: &Curve) -> f64 {
+        let columns = self.directions_of(curve);
+        if columns.is_empty() {
+            return 0.0;
+        }
+        let columns = DMatrix::from_columns(&columns);
+        let explained = columns.clone().svd(true, true).solve(&self.left, 1e-9).map(|c| &columns * c);
+        explained.map_or(f64::INFINITY, |e| 0.5 * self.left.dot(&e))
+    }
+
+    /// How the coefficients of a curve move the residuals, as far as no parameter of the model does.
+    pub fn directions_of(&self, curve: &Curve) -> Vec<DVector<f64>> {
         let n = self.context.data.len();
         let limits = if curve.additive { self.context.predictor.limits_n(self.model) } else { vec![] };
         let step = 0.02;
-        let columns: Vec<DVector<f64>> = (0..curve.len())
+        (0..curve.len())
             .map(|k| {
                 let mut coefficients = vec![0.0; curve.len()];
                 coefficients[k] = step;
@@ -136,13 +154,7 @@ impl<'a> ScoreTest<'a> {
                 };
                 self.free(&self.slope(&moved, step))
             })
-            .collect();
-        if columns.is_empty() {
-            return 0.0;
-        }
-        let columns = DMatrix::from_columns(&columns);
-        let explained = columns.clone().svd(true, true).solve(&self.left, 1e-9).map(|c| &columns * c);
-        explained.map_or(f64::INFINITY, |e| 0.5 * self.left.dot(&e))
+            .collect()
     }
 
     /// The detectable size of an effect beside the model; `None` where the campaign cannot show it at any physical size.
