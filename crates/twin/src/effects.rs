@@ -131,7 +131,7 @@ pub struct EffectSpec {
     pub source: &'static str,
     /// Its parameters, in twin-file units.
     pub parameters: &'static [ParameterSpec],
-    /// Names of those parameters that are references, not fitted.
+    /// Names of those parameters that are references, or choose between forms of the law: not fitted.
     pub references: &'static [&'static str],
     /// Columns of a pull table that it needs.
     pub covariates: &'static [&'static str],

@@ -219,6 +219,9 @@ fn two_effects_are_both_named() {
     let mut names: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
     names.sort_unstable();
     assert_eq!(names, ["sensor_drift", "sensor_quadratic"]);
+    // Which way a line bends below zero is not asked of forces above it.
+    let odd = d.effects.iter().find_map(|e| e.parameters.get("odd"));
+    assert!(odd.is_some_and(|p| (p.value, p.low90, p.high90) == (0.0, 0.0, 0.0)), "{odd:?}");
 }
 
 /// Every fault is an answer, never a panic and never a name.
@@ -312,7 +315,7 @@ fn comparisons_refit_gain_and_offset() {
         sessions: vec!["a".into(), "b".into()],
         extra: vec![],
     };
-    let with = compare_sensor(&data, &[(spec, &[0.004])]).unwrap();
+    let with = compare_sensor(&data, &[(spec, &[0.004, 0.0])]).unwrap();
     let without = compare_sensor(&data, &[]).unwrap();
     assert!(with.rmse_n < 1e-9 && without.rmse_n > 0.1, "{with:?} {without:?}");
     assert_eq!(with.by_session.len(), 2);

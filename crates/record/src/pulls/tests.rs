@@ -54,8 +54,7 @@ fn faults_name_file_line_column_and_value() {
     for (table, part) in [
         ("pull_id,part,grip_force_n\n", "no column `max_pull_force_n`; found: pull_id, part, grip_force_n"),
         ("pull_id,part,grip_force_n,max_pull_force_n\n", "holds no rows"),
-        (&cell("g", "5", "nan"), "line 3, `max_pull_force_n` is `nan`, it must be a number of at least 0"),
-        (&cell("g", "5", "-2"), "`max_pull_force_n` is `-2`"),
+        (&cell("g", "5", "nan"), "line 3, `max_pull_force_n` is `nan`, it must be a number"),
         (&cell("g", "5", "inf"), "`max_pull_force_n` is `inf`"),
         (&cell("g", "5", ""), "`max_pull_force_n` is ``"),
         (&cell("g", "0", "1"), "line 3, `grip_force_n` is `0`, it must be a number above 0"),

@@ -5,7 +5,7 @@ use super::{EffectSpec, GripPoint, ParameterSpec};
 
 /// `area_saturation`: once the pad is in full contact, more load brings no more area. The parameter is the
 /// inverse of the saturation force `F_s`, so that 0 means none; the friction force tends to `mu F_s`. How suddenly it
-/// levels off is not known: a sharpness of 1 is the rational law, 2.5 lies within 1 % of a hyperbolic tangent.
+/// levels off is not known: a sharpness of 1 is the rational law, 2.5 lies within 3 % of a hyperbolic tangent.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "area_saturation",
     about: "friction force that levels off at high grip force",
@@ -28,6 +28,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         },
     ],
     covariates: &["grip_force_n"],
+    references: &["sharpness"],
     friction: Some(friction),
     ..EffectSpec::BARE
 };
@@ -55,7 +56,7 @@ mod tests {
         assert!((1e6 * mu(1e6) - 40.0).abs() < 0.01, "mu F_s = 40 N");
     }
 
-    /// F tanh(F_s / F) is the other common law: within 1 % of a sharpness of 2.5, which also tends to mu F_s.
+    /// F tanh(F_s / F) is the other common law: within 3 % of a sharpness of 2.5, which also tends to mu F_s.
     #[test]
     fn a_sharper_law_is_nearly_a_hyperbolic_tangent() {
         let c = Covariates::default();
@@ -63,7 +64,7 @@ mod tests {
             let share: f64 = 0.02 * force_n;
             let tanh = 0.4 * share.tanh() / share;
             let own = friction(&[0.02, 2.5], 0.4, &grip(&c, force_n));
-            assert!((own / tanh - 1.0).abs() < 0.02, "{force_n} N: {own} {tanh}");
+            assert!((own / tanh - 1.0).abs() < 0.03, "{force_n} N: {own} {tanh}");
         }
         assert_eq!(friction(&[0.0, 2.5], 0.4, &grip(&c, 40.0)), 0.4);
     }

@@ -37,6 +37,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         },
     ],
     covariates: &["pull_index"],
+    references: &["rests"],
     friction: Some(friction),
     ..EffectSpec::BARE
 };

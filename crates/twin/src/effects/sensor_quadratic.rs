@@ -9,7 +9,7 @@ use super::{EffectSpec, ParameterSpec};
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_quadratic",
     about: "measured force with a quadratic term",
-    formula: "F_m = F + quadratic_per_n F^2, with F |F| for F^2 where odd = 1",
+    formula: "F_m = F + quadratic_per_n F^2, with F abs(F) for F^2 where odd = 1",
     source: "non-linearity of load cells, 0.5 to 3 % of the range",
     parameters: &[
         ParameterSpec {
@@ -27,6 +27,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
             about: "1 where the line bends alike in both directions, 0 where it bends one way",
         },
     ],
+    references: &["odd"],
     sensor: Some(sensor),
     ..EffectSpec::BARE
 };
