@@ -5,7 +5,7 @@ use gripgen_identify::pulls::answer::PullFits;
 use gripgen_identify::pulls::fitting::Fitted;
 use gripgen_identify::pulls::heldout::scatter;
 use gripgen_identify::pulls::model::{PredictPulls, PullModel};
-use gripgen_identify::{CandidatePull, SeparableRival, plan_separating};
+use gripgen_identify::{CandidatePull, DWELLS_S, FORCES_N, NO_LOAD_S, SeparableRival, plan_separating};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::{Campaign, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, PlannedPull, PullKind, Twin};
 use nalgebra::{DMatrix, DVector};
@@ -28,13 +28,8 @@ const REST_S: f64 = 1800.0;
 /// Pulls that share the rest, for its cost.
 const SHARE_REST: f64 = 8.0;
 
-/// How long the sensor is read without a load before and after each half.
-const NO_LOAD_S: f64 = 5.0;
-
-const FORCES_N: [f64; 8] = [5.0, 8.0, 12.0, 20.0, 30.0, 45.0, 60.0, 80.0];
 /// Height and length of a step: a fifth of the usual rate, the usual one, five times as fast.
 const STEPS: [(f64, f64); 3] = [(0.5, 0.26), (1.0, 0.104), (2.0, 0.0416)];
-const DWELLS_S: [f64; 3] = [1.0, 10.0, 60.0];
 
 /// Noise variances below which pulls do not tell two models apart: one is taken for the other in 30 % of cases.
 const HOPELESS: f64 = 1.0;
@@ -51,6 +46,11 @@ pub struct NextPulls {
 }
 
 impl NextPulls {
+    /// Whether these pulls tell effect `id` from something.
+    pub fn separates(&self, id: &str) -> bool {
+        self.apart.iter().any(|(accepted, ..)| accepted == id)
+    }
+
     /// A sentence or two.
     pub fn text(&self) -> String {
         let pulls = self.campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).count();

@@ -95,7 +95,8 @@ pub fn diagnose_pull_table(
     };
     let mut diagnosis = answer.diagnosis;
     if let Some(next) = &next {
-        for separate in diagnosis.effects.iter_mut().filter_map(|e| e.separate_by.as_mut()) {
+        let own = diagnosis.effects.iter_mut().filter(|e| next.separates(&e.name));
+        for separate in own.filter_map(|e| e.separate_by.as_mut()) {
             separate.text = format!("{}; or {}", separate.text, next.text());
         }
     }

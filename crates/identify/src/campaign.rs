@@ -88,15 +88,16 @@ pub enum CampaignError {
 }
 
 /// Grip forces of a gripper that reaches 80 N; three lie below 20 N, where offsets show.
-const FORCES_N: [f64; 8] = [5.0, 8.0, 12.0, 20.0, 30.0, 45.0, 60.0, 80.0];
+pub const FORCES_N: [f64; 8] = [5.0, 8.0, 12.0, 20.0, 30.0, 45.0, 60.0, 80.0];
 const INCREMENTS_N: [f64; 3] = [0.5, 1.0, 2.0];
 const STEPS_S: [f64; 3] = [0.052, 0.104, 0.208];
-const DWELLS_S: [f64; 3] = [1.0, 10.0, 60.0];
+/// Dwells that are used: ageing and relaxation go with their logarithm.
+pub const DWELLS_S: [f64; 3] = [1.0, 10.0, 60.0];
 const DIRECTIONS: [f64; 2] = [1.0, -1.0];
 /// Pause before a session: temperature, gel and sensor come to rest.
 const PAUSE_S: f64 = 1500.0;
 /// How long the sensor is read without a load.
-const NO_LOAD_S: f64 = 5.0;
+pub const NO_LOAD_S: f64 = 5.0;
 /// Assignments of the factors that are tried; the least correlated one is kept.
 const TRIES: u64 = 60;
 

@@ -14,7 +14,7 @@ pub mod pulls;
 mod sensor;
 mod separate;
 
-pub use campaign::{CampaignError, CampaignOptions, plan_campaign};
+pub use campaign::{CampaignError, CampaignOptions, DWELLS_S, FORCES_N, NO_LOAD_S, plan_campaign};
 pub use diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy,
     HeldOutError, NamedEffect, ParameterEstimate, Rival, SeparateBy, UnknownCovariate, Verdict,

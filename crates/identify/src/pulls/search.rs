@@ -124,7 +124,7 @@ impl<'a> Search<'a> {
         Self { context, candidates, curves, rows: (0..n).collect() }
     }
 
-    /// Terms of accepted effect `place`, which start at the first.
+    /// How many terms of a fit are those of effect `i`: one, or one for each part.
     fn terms_of(&self, fitted: &Fitted, i: usize) -> usize {
         fitted.terms.effects.iter().filter(|(c, _)| c.spec == self.candidates[i].spec).count()
     }

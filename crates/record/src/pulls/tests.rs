@@ -85,6 +85,13 @@ fn faults_name_file_line_column_and_value() {
     }
 }
 
+/// A sensor that is off reads less than nothing of a grip that hardly holds.
+#[test]
+fn a_label_below_zero_is_read() {
+    let folder = folder("pull_id,part,grip_force_n,max_pull_force_n\na,g,5,-0.286\n", &[]);
+    assert_eq!(read_pull_folder(folder.path()).unwrap().pulls[0].max_pull_force_n, -0.286);
+}
+
 #[test]
 fn faults_of_the_other_files_are_theirs() {
     let table = "pull_id,part,grip_force_n,max_pull_force_n\na,g,1,1\n";

@@ -63,7 +63,8 @@ fn write_next(args: &DiagnoseArgs, diagnosed: &mut Diagnosed) -> Result<Option<P
         return Ok(None);
     }
     write_file(&path, next_toml(next, &args.measured).as_bytes())?;
-    for separate in diagnosed.diagnosis.effects.iter_mut().filter_map(|e| e.separate_by.as_mut()) {
+    let own = diagnosed.diagnosis.effects.iter_mut().filter(|e| next.separates(&e.name));
+    for separate in own.filter_map(|e| e.separate_by.as_mut()) {
         separate.campaign = Some(path.display().to_string());
     }
     Ok(Some(path))
