@@ -6,7 +6,7 @@ use crate::measured::LoadedPulls;
 use crate::project::{LoadError, Project, load_twin_document};
 use gripgen_record::sha256_hex;
 use gripgen_tactile::SimdLevel;
-use gripgen_twin::config::{Backend, ConfigError, Mechanics};
+use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::SensorChain;
 use gripgen_twin::random::{Purpose, Stream};
@@ -123,27 +123,7 @@ fn load(
             parts.push(&pull.part);
         }
     }
-    let word = |text: &str| toml::Value::String(text.into()).to_string();
-    let at = match twin {
-        Location::Asset(_) => twin.to_string(),
-        Location::Disk(path) => {
-            let path = std::path::absolute(path).map_err(|e| ConfigError::new("twin", e.to_string()));
-            path.map_err(LoadError::Config)?.display().to_string()
-        }
-    };
-    let vary = format!(
-        "{{ part = [{}], grip_force_n = [1.0] }}",
-        parts.iter().map(|p| word(p)).collect::<Vec<_>>().join(", ")
-    );
-    let own = [
-        ("twin", word(&at)),
-        ("vary", vary),
-        ("images", "\"none\"".into()),
-        ("mechanics", "\"reduced\"".into()),
-    ];
-    let mut all: Vec<(String, String)> = own.map(|(key, value)| (key.to_string(), value)).into();
-    all.extend(sets.iter().cloned());
-    Ok(Project::load(&Location::parse("asset:configs/quickstart.toml"), &all)?)
+    Ok(Project::of_twin(twin, &parts, false, sets)?)
 }
 
 fn scenario(

@@ -210,7 +210,7 @@ pub(crate) fn grip_point(scenario: &Scenario, jaw: Jaw, contact_area_m2: f64) ->
 }
 
 /// The part in front of each gel, and how hard it is pressed.
-fn placed_parts(
+pub(crate) fn placed_parts(
     twin: &Twin,
     library: &Library,
     scenario: &Scenario,

@@ -51,6 +51,7 @@ mod generate;
 mod gpu;
 mod gripped;
 mod hold;
+mod imprint;
 mod init;
 mod library;
 mod location;
@@ -68,6 +69,7 @@ mod resolve;
 mod schema;
 mod sweep;
 mod twin_edits;
+mod twin_project;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use calibrate::{CalibratePullsError, calibrate_twin};
@@ -85,6 +87,9 @@ pub use gripgen_physics as physics;
 pub use gripgen_record as record;
 pub use gripgen_tactile as tactile;
 pub use gripgen_twin as twin;
+pub use imprint::{
+    CalibrateImprintsError, ImprintCalibration, ImprintCalibrations, ImprintImagesError, calibrate_imprints,
+};
 pub use init::{InitError, PartStarter, Proposal, StarterFile, part_starter, starter};
 pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError};

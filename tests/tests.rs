@@ -20,6 +20,7 @@ mod effects;
 mod elastic;
 // Images by a graphics processor are those of the processor, within the tolerance.
 mod gpu;
+mod imprint;
 // What the large set can teach.
 mod large;
 // Measured pulls from every place they may be in.

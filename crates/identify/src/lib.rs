@@ -8,6 +8,7 @@ mod campaign;
 mod diagnosis;
 mod draws;
 mod grouped;
+mod imprint;
 mod least_squares;
 mod permutation;
 pub mod pulls;
@@ -24,6 +25,7 @@ pub use grouped::{
     GroupMoments, GroupedFit, GroupedModel, fit_grouped, fold_steps, grouped_intervals, grouped_step,
     held_out_costs, t_quantile_95,
 };
+pub use imprint::{FittedPress, ImprintEstimate, imprint_constant};
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
 pub use sensor::{

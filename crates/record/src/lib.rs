@@ -33,7 +33,10 @@ pub use presses::{
     PRESSES_FILE, PressColumnTable, PressFolder, PressFolderError, PressRecord, read_press_columns,
     read_press_folder,
 };
-pub use pulls::{PULLS_FILE, PullFolderError, TRACES_FOLDER, read_pull_folder, write_pull_folder};
+pub use pulls::{
+    PULLS_FILE, PullFolderError, PullImages, PullImagesError, TRACES_FOLDER, pulls_with_images,
+    read_pull_folder, read_pull_images, write_pull_folder,
+};
 pub use reader::{ReadError, Record, ShardReader};
 pub use sensor_table::{ExtraValues, SENSOR_FILE, SensorTable, SensorTableError, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, ShardError, ShardInfo, ShardWriter};

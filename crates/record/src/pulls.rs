@@ -1,11 +1,13 @@
 //! A folder of measured pulls: `pulls.csv`, and where they are there `campaign.toml` and `traces/<pull_id>.csv`.
 
 mod cells;
+mod images;
 #[cfg(test)]
 mod tests;
 mod trace;
 mod write;
 
+pub use images::{PullImages, PullImagesError, pulls_with_images, read_pull_images};
 pub use write::write_pull_folder;
 
 use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, parse_header};

@@ -137,6 +137,11 @@ impl ShardReader {
         &self.metadata
     }
 
+    /// Whether its samples have images.
+    pub fn has_images(&self) -> bool {
+        self.summary.channels.values().any(|c| c.topic.starts_with("/tactile/"))
+    }
+
     /// Global indices of its samples.
     pub fn indices(&self) -> std::ops::Range<u64> {
         self.first_sample..self.first_sample + self.samples

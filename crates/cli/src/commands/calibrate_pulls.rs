@@ -6,7 +6,10 @@ use crate::failure::Failure;
 use crate::output::{JsonSink, print, writable};
 use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
-use gripgen::{CalibratePullsError, Location, calibrate_twin, load_pulls, write_twin};
+use gripgen::{
+    CalibratePullsError, ImprintCalibrations, Location, calibrate_imprints, calibrate_twin, load_pulls,
+    write_twin,
+};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -17,7 +20,7 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     let twin = load_twin(&args.twin, &args.set)?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let request = CalibrateRequest { offset_law: args.law.is_some(), effects: args.fit.clone() };
-    let (found, edits) = calibrate_twin(&loaded.pulls, &twin, &request, jobs()).map_err(|e| {
+    let (found, mut edits) = calibrate_twin(&loaded.pulls, &twin, &request, jobs()).map_err(|e| {
         let hint = match &e {
             CalibratePullsError::Part(_) => "name a twin that has this part with --twin",
             CalibratePullsError::Fit(CalibrateError::UnknownEffect(_)) => "docs/model.md lists the effects",
@@ -28,15 +31,20 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
         };
         Failure::usage(e).hint(hint)
     })?;
-    write_twin(&Location::parse(&args.twin), &args.set, &edits, &args.out).map_err(Failure::new)?;
+    let twin_at = Location::parse(&args.twin);
+    let imprints = calibrate_imprints(&args.measured, &loaded.pulls, &twin_at, &args.set).map_err(|e| {
+        Failure::usage(e).hint("images/<pull_id>_left.png and _right.png have the size of the twin's sensor")
+    })?;
+    edits.values.extend(imprints.values(&loaded.pulls));
+    write_twin(&twin_at, &args.set, &edits, &args.out).map_err(Failure::new)?;
     if sink.wanted() {
-        sink.document(&json_of(&found, loaded.pulls.pulls.len(), &loaded.pulls.sha256))?;
+        sink.document(&json_of(&found, &imprints, loaded.pulls.pulls.len(), &loaded.pulls.sha256))?;
     }
     if !sink.on_stdout() {
-        print(&summary(&found))?;
+        print(&summary(&found, &imprints))?;
     }
     if !args.talk.quiet {
-        loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        loaded.notes.iter().chain(&imprints.notes).for_each(|note| eprintln!("note: {note}"));
         eprintln!("the twin: {}", args.out.display());
     }
     Ok(0)
@@ -46,7 +54,7 @@ fn estimate(p: &ParameterEstimate) -> Value {
     json!({"value": p.value, "low90": p.low90, "high90": p.high90, "unit": p.unit})
 }
 
-fn json_of(found: &PullCalibration, pulls: usize, sha256: &str) -> Value {
+fn json_of(found: &PullCalibration, imprints: &ImprintCalibrations, pulls: usize, sha256: &str) -> Value {
     let named = |values: &std::collections::BTreeMap<String, ParameterEstimate>| {
         values.iter().map(|(name, p)| (name.clone(), estimate(p))).collect::<Map<_, _>>()
     };
@@ -74,13 +82,19 @@ fn json_of(found: &PullCalibration, pulls: usize, sha256: &str) -> Value {
         "baseline": named(&found.baseline),
         "laws": laws,
         "effects": effects,
+        "imprints": imprints.parts.iter().map(|i| (i.part.clone(), json!({
+            "imprint_mm3_per_n": estimate(&i.estimate.imprint_mm3_per_n),
+            "exponent": i.estimate.exponent.as_ref().map(estimate),
+            "pulls": i.pulls,
+            "explained": i.explained,
+        }))).collect::<Map<_, _>>(),
         "error": found.error.map(|e| json!({
             "heldout": "repetitions", "rmse_n": e.rmse_n, "low90": e.low90, "high90": e.high90, "mape_pct": e.mape_pct
         })),
     })
 }
 
-fn summary(found: &PullCalibration) -> String {
+fn summary(found: &PullCalibration, imprints: &ImprintCalibrations) -> String {
     let mut text = String::new();
     let line = |text: &mut String, name: &str, p: &ParameterEstimate| {
         let unit = if p.unit == "1" { "" } else { p.unit.as_str() };
@@ -92,6 +106,20 @@ fn summary(found: &PullCalibration) -> String {
     };
     for (name, p) in &found.baseline {
         line(&mut text, name, p);
+    }
+    for found in &imprints.parts {
+        let (name, c) =
+            (format!("parts.{}.imprint_mm3_per_n", found.part), &found.estimate.imprint_mm3_per_n);
+        line(&mut text, &name, c);
+        let share = 100.0 * found.explained;
+        let _ = writeln!(
+            text,
+            "  it explains {share:.0} % of what changes in the images of {} pulls",
+            found.pulls
+        );
+        if let Some(p) = found.estimate.exponent.as_ref().filter(|p| p.low90 > 1.0 || p.high90 < 1.0) {
+            line(&mut text, "  imprints grow as F^p (imprint_nonlinearity) with p", p);
+        }
     }
     for law in &found.laws {
         line(&mut text, &format!("load_offset of {}: a", law.part), &law.a);
