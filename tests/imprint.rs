@@ -11,6 +11,7 @@ fn sweep(out: &Path, sets: &[&str]) {
     let own = [
         "design=\"random\"",
         "samples=16",
+        "shard_samples=64",
         "images=\"png\"",
         "mechanics=\"reduced\"",
         "vary.part=[\"gear\", \"long_shaft\"]",
