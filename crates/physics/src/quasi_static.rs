@@ -82,6 +82,7 @@ impl QuasiStatic {
         let (mut sensor, mut control) = (sensor.clone(), ForceLoop::new(self.robot));
         let share = 1.0 / (1.0 + step_s * self.stiffness_n_per_m / self.robot.damping_n_s_per_m);
         pull.clear();
+        let mut stairs = staircase.from(0.0);
         let (mut contact_n, mut applied_n, mut largest_n) = (0.0_f64, 0.0, 0.0_f64);
         for tick in 0..=self.ticks() {
             let time_s = tick as f64 / self.rate_hz;
@@ -89,7 +90,7 @@ impl QuasiStatic {
                 pull.sensors.push(sensor.clone());
             }
             let reading_n = sensor.read(contact_n, time_s, if tick == 0 { 0.0 } else { step_s });
-            let desired_n = staircase.desired_n(time_s);
+            let desired_n = stairs.desired_n(time_s);
             largest_n = largest_n.max(contact_n);
             pull.desired_n.push(desired_n);
             pull.reading_n.push(reading_n);
@@ -145,19 +146,22 @@ impl QuasiStatic {
         let dead_ticks = (self.robot.dead_time_s * self.rate_hz - 1e-9).ceil().max(0.0);
         let kept = if self.fall_s > 0.0 { libm::exp(-step_s / self.fall_s) } else { 0.0 };
         let mut above_n = (limit_n - kinetic_n) * kept;
+        let held_s = held as f64 / self.rate_hz;
+        let (mut stairs, mut due) =
+            (staircase.from(held_s), staircase.from((held_s - dead_ticks * step_s).max(0.0)));
         for tick in held..=self.ticks() {
             let time_s = tick as f64 / self.rate_hz;
             let contact_n = kinetic_n + above_n;
             above_n *= kept;
             let reading_n = sensor.read(contact_n, time_s, step_s);
-            let desired_n = staircase.desired_n(time_s);
+            let desired_n = stairs.desired_n(time_s);
             pull.desired_n.push(desired_n);
             pull.reading_n.push(reading_n);
             if pull.displacement_m > self.stop_m || desired_n - reading_n > decided_n {
                 break;
             }
             // Commands under way at the slip go on arriving: the loop is given the one that is due.
-            let due_n = staircase.desired_n((time_s - dead_ticks * step_s).max(0.0));
+            let due_n = due.desired_n((time_s - dead_ticks * step_s).max(0.0));
             let commanded_n = command.apply(due_n, reading_n);
             let applied_n = control.advance_due(step_s, commanded_n, reading_n, contact_n);
             pull.displacement_m += ((applied_n - contact_n) / self.robot.damping_n_s_per_m).max(0.0) * step_s;

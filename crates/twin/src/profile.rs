@@ -40,6 +40,32 @@ impl Staircase {
         let begun = self.starts_s.partition_point(|&start| start <= time_s + 1e-9);
         begun as f64 * self.increment_n
     }
+
+    /// For commands at times that never fall, the first of them at `time_s`.
+    pub fn from(&self, time_s: f64) -> StaircaseCursor<'_> {
+        StaircaseCursor {
+            staircase: self,
+            begun: self.starts_s.partition_point(|&start| start <= time_s + 1e-9),
+        }
+    }
+}
+
+/// A staircase that is walked up: the same forces as [`Staircase::desired_n`] without a search.
+#[derive(Debug, Clone)]
+pub struct StaircaseCursor<'a> {
+    staircase: &'a Staircase,
+    begun: usize,
+}
+
+impl StaircaseCursor<'_> {
+    /// The commanded force at `time_s`, which is not before the time asked for last.
+    pub fn desired_n(&mut self, time_s: f64) -> f64 {
+        let starts_s = &self.staircase.starts_s;
+        while self.begun < starts_s.len() && starts_s[self.begun] <= time_s + 1e-9 {
+            self.begun += 1;
+        }
+        self.begun as f64 * self.staircase.increment_n
+    }
 }
 
 #[cfg(test)]
@@ -63,5 +89,12 @@ mod tests {
         assert_eq!(s.desired_n(0.41), 6.0);
         let forces: Vec<f64> = (0..100).map(|i| s.desired_n(f64::from(i) * 0.01)).collect();
         assert!(forces.windows(2).all(|w| w[0] <= w[1]));
+        for first in [-20, 0, 37, 250] {
+            let mut cursor = s.from(f64::from(first) * 0.01);
+            for i in first..300 {
+                let time_s = f64::from(i) * 0.01;
+                assert_eq!(cursor.desired_n(time_s), s.desired_n(time_s), "{time_s} s");
+            }
+        }
     }
 }
