@@ -24,7 +24,7 @@ const TABLES: usize = 96;
 
 /// Pulls and tables kept of models whose effects act on signals: a derivative by a friction parameter asks for those of
 /// the model itself again.
-const SIGNAL_PULLS: usize = 64;
+const SIGNAL_PULLS: usize = 320;
 const SIGNAL_TABLES: usize = 192;
 
 /// Distance of the kinetic ratios for which there are tables; those between are interpolated.
