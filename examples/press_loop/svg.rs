@@ -57,9 +57,9 @@ pub fn plot(plot: &Plot) -> String {
                 py(p.1)
             );
         }
-        let at = w - 70.0;
-        let _ =
-            write!(svg, "<text x=\"{at}\" y=\"{}\" fill=\"{colour}\">{}</text>", 40 + 14 * k, series.name);
+        // Above the frame, where no dot can be.
+        let at = w - 100.0 + 50.0 * k as f64;
+        let _ = write!(svg, "<text x=\"{at}\" y=\"15\" fill=\"{colour}\">{}</text>", series.name);
     }
     svg + "</svg>\n"
 }
