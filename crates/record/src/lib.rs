@@ -7,6 +7,7 @@
 //! This crate does not know how samples are made. Reading holds one sample in memory, writing one as well.
 
 mod campaign;
+mod dataset;
 mod encode;
 mod export;
 mod folder;
@@ -21,6 +22,7 @@ mod shard;
 mod verify;
 
 pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
+pub use dataset::{Column, Dataset, DatasetError, Table};
 pub use encode::{EncodeOptions, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
 pub use folder::{

@@ -25,6 +25,32 @@ pub fn decode(bytes: &[u8]) -> Result<TactileImage, PictureError> {
     Ok(TactileImage { width_px: decoded.width(), height_px: decoded.height(), rgb: decoded.into_raw() })
 }
 
+/// Decodes an RGB PNG of a known size into `out` without a copy; the inner error is the size of another one.
+///
+/// Checksums of the PNG are not looked at: chunks of a shard have their own.
+pub(crate) fn decode_png_into(
+    bytes: &[u8],
+    wanted: (u32, u32),
+    out: &mut [u8],
+) -> Result<Result<(), (u32, u32)>, PictureError> {
+    let mut options = png::DecodeOptions::default();
+    options.set_ignore_checksums(true);
+    let decoder = png::Decoder::new_with_options(std::io::Cursor::new(bytes), options);
+    let mut reader = decoder.read_info().map_err(|e| PictureError(e.to_string()))?;
+    let info = reader.info();
+    if (info.width, info.height) != wanted {
+        return Ok(Err((info.width, info.height)));
+    }
+    if info.color_type != png::ColorType::Rgb || info.bit_depth != png::BitDepth::Eight {
+        // Somebody else's images: grey, with transparency, of 16 bits.
+        let image = decode(bytes)?;
+        out.copy_from_slice(&image.rgb);
+        return Ok(Ok(()));
+    }
+    reader.next_frame(out).map_err(|e| PictureError(e.to_string()))?;
+    Ok(Ok(()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -35,5 +61,11 @@ mod tests {
         let image = TactileImage { width_px: 17, height_px: 9, rgb };
         assert_eq!(decode(&encode_png(&image).unwrap()).unwrap(), image);
         assert!(decode(b"no image").is_err());
+        let mut out = vec![0; image.rgb.len()];
+        let png = encode_png(&image).unwrap();
+        assert_eq!(decode_png_into(&png, (17, 9), &mut out), Ok(Ok(())));
+        assert_eq!(out, image.rgb);
+        assert_eq!(decode_png_into(&png, (9, 17), &mut out), Ok(Err((17, 9))));
+        assert!(decode_png_into(&png[..png.len() / 2], (17, 9), &mut out).is_err());
     }
 }

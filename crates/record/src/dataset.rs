@@ -1,0 +1,351 @@
+//! A run or a folder of measured pulls as rows with random access: what training code reads.
+//!
+//! A row is one sample, counted from 0 in the order of the index; rows of shards that are not done are left out. Any
+//! row can be read at any time from any thread. Memory does not grow with what was read: the shards used last stay open.
+
+mod columns;
+#[cfg(test)]
+mod tests;
+
+pub use columns::{Column, Table};
+
+use crate::folder::{FolderError, RunFolder};
+use crate::picture::decode_png_into;
+use crate::pulls::{PullFolderError, PullImagesError, pulls_with_images, read_pull_folder, read_pull_images};
+use crate::reader::{ReadError, Record, ShardReader};
+use gripgen_twin::{Jaw, MeasuredPulls, PullTrace};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Shards that stay open.
+const OPEN_SHARDS: usize = 64;
+
+/// Rows of simulated or measured pulls.
+pub struct Dataset {
+    path: PathBuf,
+    table: Table,
+    source: Source,
+    image_size_px: Option<(u32, u32)>,
+}
+
+enum Source {
+    Run {
+        folder: Box<RunFolder>,
+        /// Global index of the first sample and first row of each finished shard, by row.
+        shards: Vec<FinishedShard>,
+        open: Mutex<Vec<(u64, Arc<ShardReader>)>>,
+    },
+    Pulls {
+        measured: Box<MeasuredPulls>,
+        with_images: BTreeSet<String>,
+    },
+}
+
+#[derive(Clone, Copy)]
+struct FinishedShard {
+    shard: u64,
+    first_row: usize,
+    first_sample: u64,
+}
+
+/// Why a dataset, or a row of it, could not be read. Every message names the file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DatasetError {
+    /// Neither a run nor measured pulls.
+    #[error("{}: neither a run folder (run.json) nor a folder of measured pulls (pulls.csv)", .path.display())]
+    Unknown {
+        /// The path.
+        path: PathBuf,
+    },
+    /// Nothing is finished.
+    #[error("{}: no shard of this run is done", .path.display())]
+    Empty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The run folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A shard.
+    #[error(transparent)]
+    Shard(#[from] ReadError),
+    /// A shard that another run, or another version, made.
+    #[error("{}: `{what}` is {found}, the run.json beside it says {wanted}", .path.display())]
+    Mixed {
+        /// The shard.
+        path: PathBuf,
+        /// What differs.
+        what: &'static str,
+        /// Value in the shard.
+        found: String,
+        /// Value of the run.
+        wanted: String,
+    },
+    /// Measured pulls.
+    #[error(transparent)]
+    Pulls(#[from] PullFolderError),
+    /// Their images.
+    #[error(transparent)]
+    Images(#[from] PullImagesError),
+    /// There is no such row.
+    #[error("{}: there is no row {row}, it has {rows}", .path.display())]
+    NoRow {
+        /// The dataset.
+        path: PathBuf,
+        /// Row asked for.
+        row: usize,
+        /// Rows there are.
+        rows: usize,
+    },
+    /// A row without what was asked for.
+    #[error("{}: row {row} has no {what}", .path.display())]
+    Missing {
+        /// The dataset.
+        path: PathBuf,
+        /// The row.
+        row: usize,
+        /// What it lacks.
+        what: &'static str,
+    },
+    /// Images of another size than the first.
+    #[error("{}: an image of row {row} is {}x{} pixels, the first one {}x{}", .path.display(), .found.0, .found.1, .wanted.0, .wanted.1)]
+    Size {
+        /// The dataset.
+        path: PathBuf,
+        /// The row.
+        row: usize,
+        /// Width and height found.
+        found: (u32, u32),
+        /// Those of the first image.
+        wanted: (u32, u32),
+    },
+}
+
+impl Dataset {
+    /// Opens a run folder or a folder with `pulls.csv`. Reads its index, no shard.
+    pub fn open(path: &Path) -> Result<Self, DatasetError> {
+        if path.join("run.json").is_file() {
+            return Self::open_run(path);
+        }
+        if path.join(crate::PULLS_FILE).is_file() {
+            return Self::open_pulls(path);
+        }
+        Err(DatasetError::Unknown { path: path.into() })
+    }
+
+    fn open_run(path: &Path) -> Result<Self, DatasetError> {
+        let folder = RunFolder::open(path)?;
+        let mut table = Table::of_index(&folder.info().extra_columns);
+        let mut shards = Vec::new();
+        for shard in 0..folder.info().shards {
+            let Some(sidecar) = folder.finished(shard)? else { continue };
+            let (found, wanted) = (&sidecar.gripgen_version, &folder.info().gripgen_version);
+            if found != wanted {
+                let (path, what) = (folder.sidecar_path(shard), "gripgen_version");
+                return Err(DatasetError::Mixed { path, what, found: found.clone(), wanted: wanted.clone() });
+            }
+            shards.push(FinishedShard { shard, first_row: table.rows(), first_sample: sidecar.first_sample });
+            sidecar.rows.iter().for_each(|row| table.push(row));
+        }
+        if table.rows() == 0 {
+            return Err(DatasetError::Empty { path: path.into() });
+        }
+        let source = Source::Run { folder: Box::new(folder), shards, open: Mutex::default() };
+        let table = table.finished();
+        let mut found = Self { path: path.into(), table, source, image_size_px: None };
+        found.image_size_px = found.first_image_size()?;
+        Ok(found)
+    }
+
+    fn open_pulls(path: &Path) -> Result<Self, DatasetError> {
+        let measured = read_pull_folder(path)?;
+        let with_images = pulls_with_images(path)?;
+        let first = measured.pulls.iter().find(|p| with_images.contains(&p.id));
+        let image_size_px = match first {
+            Some(pull) => {
+                let image = read_pull_images(path, &pull.id)?.grip.left;
+                Some((image.width_px, image.height_px))
+            }
+            None => None,
+        };
+        let table = Table::of_pulls(&measured);
+        let source = Source::Pulls { measured: Box::new(measured), with_images };
+        Ok(Self { path: path.into(), table, source, image_size_px })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The run folder, where it is one.
+    pub fn run(&self) -> Option<&RunFolder> {
+        match &self.source {
+            Source::Run { folder, .. } => Some(folder),
+            Source::Pulls { .. } => None,
+        }
+    }
+
+    /// One row a sample: what was varied, the label, how it ended. Of measured pulls the columns of their table.
+    pub fn table(&self) -> &Table {
+        &self.table
+    }
+
+    /// Width and height of all images; `None` if there are none.
+    pub fn image_size_px(&self) -> Option<(u32, u32)> {
+        self.image_size_px
+    }
+
+    /// Global index of the sample in a row of a run.
+    pub fn sample_index(&self, row: usize) -> Result<u64, DatasetError> {
+        self.check_row(row)?;
+        match &self.source {
+            Source::Run { shards, .. } => {
+                let at = shards[shards.partition_point(|s| s.first_row <= row) - 1];
+                Ok(at.first_sample + (row - at.first_row) as u64)
+            }
+            Source::Pulls { .. } => Ok(row as u64),
+        }
+    }
+
+    /// Both images of a row into `out`: `[2, height, width, 3]` bytes, left jaw first.
+    pub fn images_into(&self, row: usize, out: &mut [u8]) -> Result<(), DatasetError> {
+        self.check_row(row)?;
+        let missing = || DatasetError::Missing { path: self.path.clone(), row, what: "images" };
+        let wanted = self.image_size_px.ok_or_else(missing)?;
+        let size = |found| DatasetError::Size { path: self.path.clone(), row, found, wanted };
+        let (left, right) = out.split_at_mut(out.len() / 2);
+        match &self.source {
+            Source::Run { .. } => {
+                let (reader, index) = self.shard_of(row)?;
+                let raw = reader.raw(index)?;
+                let both = raw.images.as_ref().ok_or_else(missing)?;
+                for (jaw, out) in [(Jaw::Left, left), (Jaw::Right, right)] {
+                    reader.image_into(index, jaw, &both[jaw], raw.raw_images, wanted, out)?.map_err(size)?;
+                }
+            }
+            Source::Pulls { measured, with_images } => {
+                let id = &measured.pulls[row].id;
+                if !with_images.contains(id) {
+                    return Err(missing());
+                }
+                let images = read_pull_images(&self.path, id)?.grip;
+                for (image, out) in [(images.left, left), (images.right, right)] {
+                    if (image.width_px, image.height_px) != wanted {
+                        return Err(size((image.width_px, image.height_px)));
+                    }
+                    out.copy_from_slice(&image.rgb);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The force over time of a row, where it is stored.
+    pub fn trace(&self, row: usize) -> Result<Option<PullTrace>, DatasetError> {
+        self.check_row(row)?;
+        match &self.source {
+            Source::Run { .. } => {
+                let (reader, index) = self.shard_of(row)?;
+                Ok(reader.pull(index)?.1)
+            }
+            Source::Pulls { measured, .. } => Ok(measured.pulls[row].trace.clone()),
+        }
+    }
+
+    /// Everything of a row of a run; `None` for measured pulls from a table.
+    pub fn record(&self, row: usize) -> Result<Option<Record>, DatasetError> {
+        self.check_row(row)?;
+        match &self.source {
+            Source::Run { .. } => {
+                let (reader, index) = self.shard_of(row)?;
+                Ok(Some(reader.record(index)?))
+            }
+            Source::Pulls { .. } => Ok(None),
+        }
+    }
+
+    fn check_row(&self, row: usize) -> Result<(), DatasetError> {
+        let rows = self.table.rows();
+        if row < rows { Ok(()) } else { Err(DatasetError::NoRow { path: self.path.clone(), row, rows }) }
+    }
+
+    /// The shard of a row and the global index of its sample.
+    fn shard_of(&self, row: usize) -> Result<(Arc<ShardReader>, u64), DatasetError> {
+        let Source::Run { folder, shards, open } = &self.source else {
+            return Err(DatasetError::Unknown { path: self.path.clone() });
+        };
+        let at = shards[shards.partition_point(|s| s.first_row <= row) - 1];
+        let index = at.first_sample + (row - at.first_row) as u64;
+        let lock = || open.lock().unwrap_or_else(PoisonError::into_inner);
+        {
+            let mut open = lock();
+            if let Some(i) = open.iter().position(|(shard, _)| *shard == at.shard) {
+                let entry = open.remove(i);
+                let reader = entry.1.clone();
+                open.push(entry);
+                return Ok((reader, index));
+            }
+        }
+        let path = folder.shard_path(at.shard);
+        let reader = Arc::new(ShardReader::open(&path)?);
+        let found = reader.metadata().get("config_sha256").cloned().unwrap_or_default();
+        let wanted = &folder.info().config_sha256;
+        if found != *wanted {
+            return Err(DatasetError::Mixed { path, what: "config_sha256", found, wanted: wanted.clone() });
+        }
+        let mut open = lock();
+        if open.len() >= OPEN_SHARDS {
+            open.remove(0);
+        }
+        open.push((at.shard, reader.clone()));
+        Ok((reader, index))
+    }
+
+    /// Size of the first image of a run; a sample that failed has none.
+    fn first_image_size(&self) -> Result<Option<(u32, u32)>, DatasetError> {
+        let (reader, _) = self.shard_of(0)?;
+        if !reader.has_images() {
+            return Ok(None);
+        }
+        for row in 0..self.table.rows() {
+            let (reader, index) = self.shard_of(row)?;
+            if let Some(images) = reader.record(index)?.images {
+                return Ok(Some((images.left.width_px, images.left.height_px)));
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl ShardReader {
+    /// One image of a sample into `out`; the inner error is the size of an image that is not of the wanted one.
+    fn image_into(
+        &self,
+        index: u64,
+        jaw: Jaw,
+        message: &[u8],
+        raw: bool,
+        wanted: (u32, u32),
+        out: &mut [u8],
+    ) -> Result<Result<(), (u32, u32)>, ReadError> {
+        use crate::proto::foxglove::{CompressedImage, RawImage};
+        use prost::Message;
+        let damaged = |problem: String| self.damaged(index, &format!("/tactile/{jaw}"), &problem);
+        if raw {
+            let image = RawImage::decode(message).map_err(|e| damaged(e.to_string()))?;
+            if (image.width, image.height) != wanted {
+                return Ok(Err((image.width, image.height)));
+            }
+            if image.data.len() != out.len() {
+                return Err(damaged(format!("{} bytes, expected {}", image.data.len(), out.len())));
+            }
+            out.copy_from_slice(&image.data);
+            return Ok(Ok(()));
+        }
+        let image = CompressedImage::decode(message).map_err(|e| damaged(e.to_string()))?;
+        decode_png_into(&image.data, wanted, out).map_err(|e| damaged(e.to_string()))
+    }
+}
