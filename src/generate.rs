@@ -5,7 +5,7 @@ use crate::gripped::{Contact, Gripped, grip_point};
 use crate::hold::hold;
 use crate::library::{Library, LibraryError};
 use crate::project::Project;
-use gripgen_physics::{GripError, PullError, Signals, Until, pull_staircase, staircase_of};
+use gripgen_physics::{GripError, PullError, PullSession, Signals, Until, pull_staircase, staircase_of};
 use gripgen_tactile::gpu::GpuError;
 use gripgen_tactile::{Imprint, IndentError, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ConfigError, ImageStorage, Mechanics, TraceStorage};
@@ -13,7 +13,7 @@ use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
     FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample,
-    Scenario, Twin, cell_friction, slip_label, table_factor, table_offset_n,
+    Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
 };
 use std::sync::Arc;
 
@@ -158,18 +158,37 @@ pub fn simulate(
     pull(twin, scenario, &Gripped::new(twin, library, scenario, options)?, options, gpu)
 }
 
-/// The second half of a sample: friction of this repetition, pull, label, image noise.
-fn pull(
+/// A grip that is ready to pull.
+pub struct StartedPull {
+    /// What the cameras see, where images are wanted.
+    pub images: Option<PerJaw<TactileImage>>,
+    /// The pull; `None` if the jaws miss the part.
+    pub session: Option<PullSession>,
+}
+
+/// Grips for a scenario and stops before the pull, which the caller commands step by step.
+pub fn start_pull(
+    twin: &Twin,
+    library: &Library,
+    scenario: &Scenario,
+    options: SimulateOptions,
+) -> Result<StartedPull, SampleError> {
+    let gripped = Gripped::new(twin, library, scenario, options)?;
+    let images = if options.images { Some(gripped.images(twin, scenario, None)?) } else { None };
+    let session = match &gripped.contact {
+        Some(contact) => Some(pull_session(twin, scenario, contact)?.0),
+        None => None,
+    };
+    Ok(StartedPull { images, session })
+}
+
+/// The session of this repetition, the friction laws of both jaws, and the factor of its scatter.
+fn pull_session(
     twin: &Twin,
     scenario: &Scenario,
-    gripped: &Gripped,
-    options: SimulateOptions,
-    gpu: Option<&Gpu>,
-) -> Result<Outcome, SampleError> {
-    let images = if options.images { Some(gripped.images(twin, scenario, gpu)?) } else { None };
-    let Some(Contact { held, imprint, force_n, .. }) = &gripped.contact else {
-        return Ok(Outcome::NoContact { images });
-    };
+    contact: &Contact,
+) -> Result<(PullSession, PerJaw<GripFriction>, f64), SampleError> {
+    let Contact { held, imprint, .. } = contact;
     let part = &twin.parts[&scenario.part];
     let patches = PerJaw::from_fn(|jaw| &imprint[jaw].patch);
     let laws = PerJaw::try_from_fn(|jaw| {
@@ -180,19 +199,35 @@ fn pull(
     let cell_mu = laws.map(|_, (cells, _)| cells.iter().map(|mu| mu * scatter).collect());
     let law = laws.map(|_, (_, law)| *law);
     let friction = hold(twin, scenario, &patches, &cell_mu, law.left.kinetic_ratio);
-    let stream = |purpose| Stream::new(scenario.seed, scenario.index, purpose);
     let signals = Signals {
-        noise: stream(Purpose::ForceNoise),
+        noise: Stream::new(scenario.seed, scenario.index, Purpose::ForceNoise),
         sensor: SensorChain::new(twin, &scenario.part, scenario.covariates.time_s)
             .along(scenario.covariates.pull_direction)
             .plus(table_offset_n(twin, scenario)),
         command: CommandChain::new(twin, &scenario.part),
     };
-    let mut session = (**held).clone().pull(&friction, signals);
-    let staircase = staircase_of(&scenario.pull, &mut stream(Purpose::StepJitter));
+    Ok(((**held).clone().pull(&friction, signals), law, scatter))
+}
+
+/// The second half of a sample: friction of this repetition, pull, label, image noise.
+fn pull(
+    twin: &Twin,
+    scenario: &Scenario,
+    gripped: &Gripped,
+    options: SimulateOptions,
+    gpu: Option<&Gpu>,
+) -> Result<Outcome, SampleError> {
+    let images = if options.images { Some(gripped.images(twin, scenario, gpu)?) } else { None };
+    let Some(contact) = &gripped.contact else {
+        return Ok(Outcome::NoContact { images });
+    };
+    let (mut session, law, scatter) = pull_session(twin, scenario, contact)?;
+    let mut jitter = Stream::new(scenario.seed, scenario.index, Purpose::StepJitter);
+    let staircase = staircase_of(&scenario.pull, &mut jitter);
     let until = if options.trace { Until::Stopped } else { Until::Decided };
     let result = pull_staircase(&mut session, &staircase, &scenario.pull, until)?;
     let label = slip_label(&result.trace, scenario.pull.label_tolerance_n, result.slid)?;
+    let Contact { held, imprint, force_n } = contact;
     let summary =
         imprint.map(|_, i| ImprintSummary { press_depth_m: i.press_depth_m, patch: i.patch.clone() });
     Ok(Outcome::Pulled(Box::new(Pulled {

@@ -67,6 +67,7 @@ mod project;
 mod report;
 mod resolve;
 mod schema;
+mod simulator;
 mod sweep;
 mod twin_edits;
 mod twin_project;
@@ -80,7 +81,9 @@ pub use diagnose::{
     compare_sensor_table, diagnose_presses, diagnose_pull_table, diagnose_sensor_table, given_model,
     is_optics_effect, is_sensor_table, load_sensor_table, sensor_calibration_edits,
 };
-pub use generate::{Press, SampleError, SimulateOptions, generate, press_only, simulate};
+pub use generate::{
+    Press, SampleError, SimulateOptions, StartedPull, generate, press_only, simulate, start_pull,
+};
 pub use gpu::Gpu;
 pub use gripgen_identify as identify;
 pub use gripgen_physics as physics;
@@ -109,5 +112,6 @@ pub use report::{
     Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
 };
 pub use schema::{sweep_schema, twin_schema};
-pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, VERSION, run_info, sweep};
+pub use simulator::{Draw, Simulator};
+pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, VERSION, prepare_run, run_info, sweep};
 pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, write_twin};

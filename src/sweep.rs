@@ -154,6 +154,13 @@ pub fn run_info(project: &Project) -> RunInfo {
     }
 }
 
+/// Makes the folder of a run, or opens it: `run.json` and the files that it depends on, no sample yet. Refuses a folder that
+/// holds another run.
+pub fn prepare_run(project: &Project, out: &Path) -> Result<RunFolder, SweepError> {
+    RunFolder::create(out, run_info(project), &project.library.disk_files())
+        .map_err(|e| explain_refusal(project, e))
+}
+
 /// Runs a sweep into `out`, or what is missing of it. `stop` ends it after the shards under way.
 pub fn sweep(
     project: &Project,
@@ -164,8 +171,7 @@ pub fn sweep(
 ) -> Result<SweepSummary, SweepError> {
     let shards = shards_of_slice(project.sweep.shards(), options.slice)?;
     let gpu = project.prepare_gpu()?;
-    let folder = RunFolder::create(out, run_info(project), &project.library.disk_files())
-        .map_err(|e| explain_refusal(project, e))?;
+    let folder = prepare_run(project, out)?;
     if let Some(gpu) = gpu {
         let (adapter, there) = (gpu.adapter().clone(), folder.info().gpu_adapter.clone());
         let another = there.filter(|there| *there != adapter.to_string());

@@ -54,6 +54,19 @@ impl Failure {
         self.exit_code
     }
 
+    /// What is wrong, and where, without colours.
+    pub fn message(&self) -> String {
+        match &self.place {
+            Some(_) => Renderer::plain().render(&[self.group()]).to_string(),
+            None => self.message.clone(),
+        }
+    }
+
+    /// What to do about it.
+    pub fn what_to_do(&self) -> Option<&str> {
+        self.hint.as_deref()
+    }
+
     /// Prints it to standard error.
     pub fn print(&self) {
         anstream::eprintln!("{}", self.rendered());
@@ -63,15 +76,18 @@ impl Failure {
     }
 
     fn rendered(&self) -> String {
+        Renderer::styled().render(&[self.group()])
+    }
+
+    fn group(&self) -> Group<'_> {
         let title = Level::ERROR.primary_title(&self.message);
-        let group = match &self.place {
+        match &self.place {
             Some(Place { file, text, span: Some(span) }) => {
                 let at = AnnotationKind::Primary.span(span.clone());
                 title.element(Snippet::source(&**text).path(file.as_str()).annotation(at))
             }
             _ => Group::with_title(title),
-        };
-        Renderer::styled().render(&[group])
+        }
     }
 }
 

@@ -14,19 +14,36 @@ use args::{CalibrateCommand, Cli, Command};
 use clap::Parser;
 use std::ffi::OsString;
 
+pub use failure::Failure;
+
 /// Runs gripgen with the arguments of a process (the first is its name) and returns its exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let arguments: Vec<OsString> = arguments.into_iter().collect();
-    output::remember_program(arguments.first());
-    let cli = match Cli::try_parse_from(arguments) {
-        Ok(cli) => cli,
+    match parsed(arguments) {
+        Ok(cli) => execute(&cli).unwrap_or_else(|failure| {
+            failure.print();
+            failure.exit_code()
+        }),
         Err(e) => {
             // Clap prints help and versions to standard output, everything else to standard error.
             let _ = e.print();
-            return if e.use_stderr() { 2 } else { 0 };
+            if e.use_stderr() { 2 } else { 0 }
         }
-    };
-    let result = match &cli.command {
+    }
+}
+
+/// The same for a caller that shows errors itself. `Ok` is the exit code of work that was done.
+pub fn try_run(arguments: impl IntoIterator<Item = OsString>) -> Result<u8, Failure> {
+    execute(&parsed(arguments).map_err(|e| Failure::usage(e.to_string().trim_end()))?)
+}
+
+fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    output::remember_program(arguments.first());
+    Cli::try_parse_from(arguments)
+}
+
+fn execute(cli: &Cli) -> Result<u8, Failure> {
+    match &cli.command {
         Command::Init(args) => commands::init::run(args),
         Command::Check(args) => commands::check::run(args),
         Command::Sweep(args) => commands::sweep::run(args),
@@ -43,9 +60,5 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Bench(args) => commands::bench::run(args),
         Command::Schema(args) => commands::schema::run(args),
         Command::Completions(args) => commands::completions::run(args),
-    };
-    result.unwrap_or_else(|failure| {
-        failure.print();
-        failure.exit_code()
-    })
+    }
 }

@@ -50,11 +50,14 @@ impl From<ConfigError> for KeyError {
 }
 
 impl KeyError {
-    /// For keys that were checked to exist.
-    pub(crate) fn into_config_error(self) -> ConfigError {
+    /// What is wrong with the value of `key`.
+    pub(crate) fn into_config_error(self, key: &str) -> ConfigError {
         match self {
             KeyError::Bad(e) => e,
-            KeyError::Unknown => ConfigError::new("", "a key that does not exist was drawn"),
+            KeyError::Unknown => {
+                let known = SCENARIO_KEYS.iter().chain(PULL_KEYS).copied().collect::<Vec<_>>().join(", ");
+                ConfigError::new(key, "there is no such key").hint(format!("keys of a pull: {known}"))
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::config::{
     check_part, get, read_twin_table,
 };
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
-use crate::scenario_keys::{self, KeyError};
+use crate::scenario_keys;
 use crate::{Covariates, PullSettings, Scenario, Twin, sobol};
 use std::collections::BTreeMap;
 
@@ -131,7 +131,16 @@ impl Sweep {
     /// The scenario of sample `index`, with forces per jaw by the convention of `twin`, and whether it can be
     /// simulated. A scenario that cannot still holds what was drawn, for the record.
     pub fn scenario(&self, index: u64, twin: &Twin) -> (Scenario, Result<(), ConfigError>) {
-        let drawn = self.drawn(index);
+        self.scenario_of(self.drawn(index), index, twin)
+    }
+
+    /// The same with `drawn` values instead of those of the sweep.
+    pub fn scenario_of(
+        &self,
+        drawn: BTreeMap<String, Drawn>,
+        index: u64,
+        twin: &Twin,
+    ) -> (Scenario, Result<(), ConfigError>) {
         let mut pull = self.pull.clone();
         let mut scenario = self.blank();
         scenario.index = index;
@@ -143,7 +152,7 @@ impl Sweep {
                 None if is_twin_key(key) => Ok(()),
                 None => scenario_keys::set(&mut scenario, key, value),
             };
-            problem = problem.and(put.map_err(KeyError::into_config_error));
+            problem = problem.and(put.map_err(|e| e.into_config_error(key)));
         }
         match check::pull_settings(&pull) {
             Ok(settings) => scenario.pull = settings,
@@ -171,6 +180,18 @@ impl Sweep {
         let mut table = base.clone();
         put(&mut table, key, value)?;
         read_twin(&table)
+    }
+
+    /// The twin of `base` with values put in; `None` if there are none.
+    pub fn twin_with_all<'a>(
+        base: &toml::Table,
+        values: impl IntoIterator<Item = (&'a String, &'a Drawn)>,
+    ) -> Result<Option<Twin>, ConfigError> {
+        let mut table = None;
+        for (key, value) in values {
+            put(table.get_or_insert_with(|| base.clone()), key, value)?;
+        }
+        table.map(|table| read_twin(&table)).transpose()
     }
 
     /// A scenario in which nothing is drawn yet.

@@ -108,7 +108,7 @@ impl Sweep {
                 let mut scenario = self.blank();
                 let put = scenario_keys::set(&mut scenario, "part", part)
                     .and_then(|()| scenario_keys::set(&mut scenario, "grip_pose", pose));
-                put.map_err(KeyError::into_config_error)
+                put.map_err(|e| e.into_config_error("grip_pose"))
                     .and_then(|()| scenario_keys::check_against_twin(&scenario, twin))
                     .map_err(|e| ConfigError { key: format!("vary.grip_pose[{i}]"), ..e })?;
             }

@@ -1,0 +1,57 @@
+"""gripgen: a digital twin of grip, pull and slip with tactile images.
+
+    import gripgen as gg
+
+    gg.sweep("sweep.toml", "runs/first")             # the bytes of `gripgen sweep`
+    ds = gg.load("runs/first")                       # random access; simulated and measured runs alike
+    images, labels = ds.batch([3, 1, 9])             # uint8[3, 2, 240, 320, 3], float32[3]
+    pull = gg.Sim().pull(part="gear", grip_force_n=40.0, seed=1)
+
+Units stand in the names: `_n` newton, `_mm` millimetre, `_s` second, `_deg` degree. Grip forces are those of one jaw.
+"""
+
+from importlib.util import find_spec as _find_spec
+
+from ._core import ConfigError, DataError, GripgenError, __version__
+from .dataset import Batch, Dataset, Sample, load
+from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, diagnose
+from .policies import Staircase
+from .simulation import Pull, Sim
+from .sweeps import SweepSummary, sweep
+
+__all__ = [
+    "Batch",
+    "Calibration",
+    "Comparison",
+    "ConfigError",
+    "DataError",
+    "Dataset",
+    "Diagnosis",
+    "GripgenError",
+    "Pull",
+    "Sample",
+    "Sim",
+    "Staircase",
+    "SweepSummary",
+    "__version__",
+    "calibrate",
+    "compare",
+    "diagnose",
+    "load",
+    "sweep",
+]
+
+
+def __getattr__(name: str) -> object:
+    # `gg.ray` and `gg.torch` need packages that not everybody has: they are imported when they are asked for.
+    if name in ("ray", "torch"):
+        from importlib import import_module
+
+        return import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+if _find_spec("gymnasium") is not None:
+    from .envs import register as _register
+
+    _register()

@@ -1,0 +1,297 @@
+"""Datasets: runs and measured pulls as rows with random access."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from . import _core, remote
+
+if TYPE_CHECKING:
+    import pandas
+    import pyarrow
+    from numpy.typing import ArrayLike, NDArray
+
+#: Statuses whose label is exact.
+LABELLED = ("slipped", "no_contact")
+
+
+class Sample(NamedTuple):
+    """One row: both images, the label, and what is known of the pull."""
+
+    #: uint8[2, H, W, 3], left jaw first; None where the dataset has no images.
+    images: NDArray[np.uint8] | None
+    #: The pull force at slip, N.
+    max_pull_force_n: float
+    #: The row of the table.
+    values: dict[str, Any]
+
+
+class Batch(NamedTuple):
+    """Several rows with more than images and labels; what was not asked for is None."""
+
+    #: uint8[B, 2, H, W, 3].
+    images: NDArray[np.uint8] | None
+    #: float32[B], N.
+    max_pull_force_n: NDArray[np.float32]
+    #: float32[B, T, 4]: time_s, desired_force_n, measured_force_n, displacement_mm; NaN beyond the end of a pull.
+    traces: NDArray[np.float32] | None = None
+    #: int64[B], rows of each trace; 0 where none is stored.
+    trace_rows: NDArray[np.int64] | None = None
+    #: float32[B, 2, H, W], mm that the part is pressed into the gel.
+    heights_mm: NDArray[np.float32] | None = None
+    #: float32[B, 2, 64, 4]: x_mm, y_mm, area_mm2 and force_n of the cells of each jaw's contact.
+    forces: NDArray[np.float32] | None = None
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    status: Sequence[str] = LABELLED,
+    cache_dir: str | os.PathLike[str] | None = None,
+) -> Dataset:
+    """Open a run folder or a folder with `pulls.csv`; an fsspec URL (`s3://...`) is copied into `cache_dir` first.
+
+    Rows are kept whose status is in `status`. A censored pull ended before the jaws slipped: its label is a lower
+    bound, so it is left out unless asked for; a failed sample has neither label nor images.
+
+    Raises DataError, naming the file, for what is no such folder or is damaged.
+    """
+    text = os.fspath(path)
+    if remote.is_url(text):
+        text = remote.fetch(text, cache_dir)
+    return Dataset(text, status=tuple(status))
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset(Sequence[Sample]):
+    """Rows of a run, in the order of its index. Made by `load`.
+
+    `ds[i]` is one row, `ds.batch(rows)` several in one call without the interpreter's lock, `ds.table()` everything
+    but images and traces. It is a map-style dataset for torch (`__getitems__` fetches a batch at once), can be
+    pickled, and works under fork and spawn: a copy opens the files anew when it first reads.
+    """
+
+    path: str
+    status: tuple[str, ...] = LABELLED
+    #: Rows of the run that belong to this dataset.
+    rows: NDArray[np.int64] | None = None
+
+    def __post_init__(self) -> None:
+        if self.rows is None:
+            found = np.asarray(self._columns()["status"])
+            rows = np.flatnonzero(np.isin(found, self.status))
+        else:
+            rows = np.array(self.rows, dtype=np.int64)
+        rows.flags.writeable = False
+        object.__setattr__(self, "rows", rows)
+
+    # What is open belongs to the process that opened it.
+    def __getstate__(self) -> dict[str, Any]:
+        return {"path": self.path, "status": self.status, "rows": self.rows}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, value)
+
+    def _open(self) -> _core.Dataset:
+        return _opened(self.path)
+
+    def _columns(self) -> dict[str, Any]:
+        found = self.__dict__.get("_columns_read")
+        if found is None:
+            found = self._open().columns()
+            object.__setattr__(self, "_columns_read", found)
+        return found
+
+    def __repr__(self) -> str:
+        size = self.image_size_px
+        images = f"images 2 x {size[0]} x {size[1]}" if size else "no images"
+        return f"gripgen.Dataset({self.path!r}, {len(self)} pulls, {images})"
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def image_size_px(self) -> tuple[int, int] | None:
+        """Width and height of the images; None if there are none."""
+        return self._open().image_size_px
+
+    @property
+    def info(self) -> dict[str, str]:
+        """What the run says of itself: name, source, gripgen_version, config_sha256, config_toml."""
+        return self._open().info
+
+    @property
+    def labels(self) -> NDArray[np.float32]:
+        """float32[len]: the pull force at slip of every row, N."""
+        return self.column("max_pull_force_n").astype(np.float32)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """A column of the table as an array of float64 or str."""
+        columns = self._columns()
+        if name not in columns:
+            raise _core.DataError(f"{self.path}: there is no column {name!r}; there are {', '.join(columns)}")
+        return np.asarray(columns[name])[self.rows]
+
+    def table(self, *, to: str = "pandas") -> pandas.DataFrame | pyarrow.Table:
+        """All columns without images and traces, as a pandas DataFrame or (`to="arrow"`) a pyarrow Table."""
+        columns = {name: self.column(name) for name in self._columns()}
+        if to == "pandas":
+            import pandas
+
+            return pandas.DataFrame(columns)
+        if to == "arrow":
+            import pyarrow
+
+            return pyarrow.table({name: pyarrow.array(values.tolist()) for name, values in columns.items()})
+        raise _core.ConfigError(f"to = {to!r} is neither 'pandas' nor 'arrow'")
+
+    def _rows_of(self, ids: ArrayLike) -> list[int]:
+        ids = np.asarray(ids, dtype=np.int64).reshape(-1)
+        n = len(self)
+        outside = ids[(ids < -n) | (ids >= n)]
+        if outside.size:
+            raise IndexError(f"there is no row {outside[0]}, the dataset has {n}")
+        return self.rows[ids].tolist()
+
+    def __getitem__(self, i: int | slice) -> Sample | Dataset:
+        if isinstance(i, slice):
+            return self.subset(range(*i.indices(len(self))))
+        return self.__getitems__([i])[0]
+
+    def __getitems__(self, ids: Sequence[int]) -> list[Sample]:
+        """Several rows at once; torch's loaders call it with the ids of a batch."""
+        rows = self._rows_of(ids)
+        images = self._open().images(rows) if self.image_size_px else [None] * len(rows)
+        columns = self._columns()
+        found = []
+        for row, both in zip(rows, images):
+            values = {name: column[row] for name, column in columns.items()}
+            found.append(Sample(both, float(values["max_pull_force_n"]), values))
+        return found
+
+    def __iter__(self) -> Iterator[Sample]:
+        for first in range(0, len(self), 32):
+            yield from self.__getitems__(range(first, min(first + 32, len(self))))
+
+    def batch(
+        self,
+        ids: ArrayLike,
+        *,
+        images: bool = True,
+        traces: bool = False,
+        heights: bool = False,
+        forces: bool = False,
+        threads: int = 1,
+    ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32]] | Batch:
+        """Rows as arrays: `images, labels = ds.batch(ids)`, uint8[B, 2, H, W, 3] and float32[B].
+
+        With `traces`, `heights` or `forces` a `Batch` with those. Heights are simulated again from the run's own
+        configuration and cost milliseconds each. `threads` share decoding and simulation.
+        """
+        rows = self._rows_of(ids)
+        opened = self._open()
+        labels = np.asarray(self._columns()["max_pull_force_n"])[rows].astype(np.float32)
+        pixels = opened.images(rows, threads) if images else None
+        if not (traces or heights or forces):
+            return pixels, labels
+        lines, lengths = opened.traces(rows) if traces else (None, None)
+        return Batch(
+            images=pixels,
+            max_pull_force_n=labels,
+            traces=lines,
+            trace_rows=lengths,
+            heights_mm=opened.heights(rows, threads) if heights else None,
+            forces=opened.forces(rows) if forces else None,
+        )
+
+    def subset(self, ids: ArrayLike) -> Dataset:
+        """The rows with these numbers, in this order."""
+        return Dataset(self.path, self.status, np.asarray(self._rows_of(ids), dtype=np.int64))
+
+    def where(self, keep: ArrayLike) -> Dataset:
+        """The rows for which `keep` (bool[len]) is true."""
+        return Dataset(self.path, self.status, self.rows[np.asarray(keep, dtype=bool)])
+
+    def split(
+        self, *, by: str | Sequence[str] = "group", test: float = 0.2, seed: int = 0
+    ) -> tuple[Dataset, Dataset]:
+        """Split into train and test so that rows with equal values of `by` stay together.
+
+        The default keeps the repetitions of a configuration together, which would leak from train to test otherwise;
+        `by="part"` holds out whole parts, `by=("part", "grip_pose")` whole grips. `test` is the share of groups, at
+        least one.
+        """
+        names = [by] if isinstance(by, str) else list(by)
+        if by == "group" and "group" not in self._columns():
+            # Measured pulls: what was set is the configuration.
+            known = ["part", "grip_force_n", "grip_offset_mm", "grip_angle_deg", "force_increment_n", "step_time_s"]
+            names = [name for name in known if name in self._columns()]
+        keys = list(zip(*(self.column(name).tolist() for name in names)))
+        groups = sorted(set(keys), key=repr)
+        if len(groups) < 2:
+            raise _core.DataError(f"{self.path}: all {len(self)} pulls have the same {', '.join(names)}")
+        order = np.random.default_rng(seed).permutation(len(groups))
+        count = min(max(1, round(test * len(groups))), len(groups) - 1)
+        held_out = {groups[i] for i in order[:count]}
+        is_test = np.array([key in held_out for key in keys])
+        return self.where(~is_test), self.where(is_test)
+
+    def iterate(
+        self,
+        *,
+        batch_size: int = 32,
+        shuffle: bool = True,
+        seed: int = 0,
+        epoch: int = 0,
+        rank: int = 0,
+        world_size: int = 1,
+        drop_last: bool = False,
+        threads: int = 1,
+    ) -> Iterator[tuple[NDArray[np.uint8] | None, NDArray[np.float32]]]:
+        """Batches of this rank in a seeded order, a new one every epoch; every row is seen by one rank."""
+        order = np.arange(len(self))
+        if shuffle:
+            order = np.random.default_rng((seed, epoch)).permutation(order)
+        order = order[rank::world_size]
+        for first in range(0, len(order), batch_size):
+            ids = order[first : first + batch_size]
+            if drop_last and len(ids) < batch_size:
+                return
+            images, labels = self.batch(ids, images=self.image_size_px is not None, threads=threads)
+            yield images, labels
+
+
+# Opened files by path; a child process after a fork opens its own.
+_lock = threading.Lock()
+_open_files: dict[str, _core.Dataset] = {}
+_open_in = os.getpid()
+
+
+def _opened(path: str) -> _core.Dataset:
+    global _open_in
+    if _open_in != os.getpid():
+        _forget()
+    with _lock:
+        found = _open_files.get(path)
+        if found is None:
+            found = _core.Dataset(path)
+            if len(_open_files) >= 16:
+                _open_files.pop(next(iter(_open_files)))
+            _open_files[path] = found
+        return found
+
+
+def _forget() -> None:
+    global _lock, _open_files, _open_in
+    _lock, _open_files, _open_in = threading.Lock(), {}, os.getpid()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget)

@@ -1,0 +1,44 @@
+//! The Python module `gripgen._core`: numpy arrays in and out, everything else in the crates below.
+//!
+//! Work is done without the interpreter's lock. Arrays are handed over, not copied. The Python half of the package,
+//! with its stubs (`_core.pyi`), is in `crates/py/python/gripgen`.
+
+mod dataset;
+mod error;
+mod pulls;
+mod simulator;
+mod sweep;
+mod values;
+
+use gripgen::VERSION;
+use pyo3::prelude::*;
+use std::ffi::OsString;
+
+/// Run the command line with these arguments (without the program's name) and return its exit code.
+#[pyfunction]
+fn run_cli(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    let all = std::iter::once(OsString::from("gripgen")).chain(arguments);
+    py.detach(|| gripgen_cli::run(all))
+}
+
+/// The same for a caller that wants exceptions instead of messages on standard error.
+#[pyfunction]
+fn run_verb(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
+    let all = std::iter::once(OsString::from("gripgen")).chain(arguments);
+    py.detach(|| gripgen_cli::try_run(all)).map_err(|e| error::failure(py, &e))
+}
+
+#[pymodule(gil_used = false)]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", VERSION)?;
+    module.add("GripgenError", module.py().get_type::<error::GripgenError>())?;
+    module.add("ConfigError", module.py().get_type::<error::ConfigError>())?;
+    module.add("DataError", module.py().get_type::<error::DataError>())?;
+    module.add_class::<dataset::Dataset>()?;
+    module.add_class::<simulator::Simulator>()?;
+    module.add_class::<pulls::Pulls>()?;
+    module.add_function(wrap_pyfunction!(run_cli, module)?)?;
+    module.add_function(wrap_pyfunction!(run_verb, module)?)?;
+    module.add_function(wrap_pyfunction!(sweep::sweep, module)?)?;
+    module.add_function(wrap_pyfunction!(sweep::prepare_run, module)?)
+}
