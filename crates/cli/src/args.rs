@@ -192,13 +192,22 @@ pub struct ShowArgs {
 /// `gripgen export`
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// A run folder.
+    /// A run folder; for Parquet also a folder of measured pulls.
     pub run: PathBuf,
-    /// The sample.
-    #[arg(long, value_name = "K")]
-    pub sample: u64,
+    /// One sample as an MCAP file with every reading.
+    #[arg(long, value_name = "K", required_unless_present = "to")]
+    pub sample: Option<u64>,
+    /// All samples in another format: table, images as PNG, traces.
+    #[arg(long, value_enum, value_name = "FORMAT", conflicts_with = "sample")]
+    pub to: Option<ExportFormat>,
+    /// Without images.
+    #[arg(long, requires = "to")]
+    pub no_images: bool,
+    /// Without traces.
+    #[arg(long, requires = "to")]
+    pub no_traces: bool,
     /// The file to write.
-    #[arg(short, long, value_name = "FILE.mcap")]
+    #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
     /// JSON: the file's path and size.
     #[command(flatten)]
@@ -206,6 +215,13 @@ pub struct ExportArgs {
     /// How much is said.
     #[command(flatten)]
     pub talk: TalkArgs,
+}
+
+/// Formats of `gripgen export --to`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportFormat {
+    /// One Apache Parquet file.
+    Parquet,
 }
 
 /// `gripgen calibrate`

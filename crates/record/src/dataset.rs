@@ -10,10 +10,10 @@ mod tests;
 pub use columns::{Column, Table};
 
 use crate::folder::{FolderError, RunFolder};
-use crate::picture::decode_png_into;
+use crate::picture::{decode_png_into, encode_png};
 use crate::pulls::{PullFolderError, PullImagesError, pulls_with_images, read_pull_folder, read_pull_images};
 use crate::reader::{ReadError, Record, ShardReader};
-use gripgen_twin::{Jaw, MeasuredPulls, PullTrace};
+use gripgen_twin::{Jaw, MeasuredPulls, PullTrace, TactileImage};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -243,6 +243,36 @@ impl Dataset {
         Ok(())
     }
 
+    /// Both images of a row as PNG, left jaw first; `None` where it has none.
+    pub fn images_png(&self, row: usize) -> Result<Option<[Vec<u8>; 2]>, DatasetError> {
+        self.check_row(row)?;
+        let coded = |image: &TactileImage| {
+            let problem = |e: crate::PictureError| PullImagesError {
+                path: self.path.clone(),
+                problem: format!("row {row}: {e}"),
+            };
+            encode_png(image).map_err(|e| DatasetError::Images(problem(e)))
+        };
+        match &self.source {
+            Source::Run { .. } => {
+                let (reader, index) = self.shard_of(row)?;
+                if reader.has_raw_images() {
+                    let images = reader.record(index)?.images;
+                    return images.map(|i| Ok([coded(&i.left)?, coded(&i.right)?])).transpose();
+                }
+                Ok(reader.images_png(index)?)
+            }
+            Source::Pulls { measured, with_images } => {
+                let id = &measured.pulls[row].id;
+                if !with_images.contains(id) {
+                    return Ok(None);
+                }
+                let images = read_pull_images(&self.path, id)?.grip;
+                Ok(Some([coded(&images.left)?, coded(&images.right)?]))
+            }
+        }
+    }
+
     /// The force over time of a row, where it is stored.
     pub fn trace(&self, row: usize) -> Result<Option<PullTrace>, DatasetError> {
         self.check_row(row)?;
@@ -321,6 +351,20 @@ impl Dataset {
 }
 
 impl ShardReader {
+    /// Both images of a sample as they are stored.
+    fn images_png(&self, index: u64) -> Result<Option<[Vec<u8>; 2]>, ReadError> {
+        use crate::proto::foxglove::CompressedImage;
+        use prost::Message;
+        let Some(both) = self.raw(index)?.images else { return Ok(None) };
+        let png = |jaw: Jaw| {
+            let image = CompressedImage::decode(&both[jaw][..]);
+            image
+                .map(|image| image.data.to_vec())
+                .map_err(|e| self.damaged(index, &format!("/tactile/{jaw}"), &e.to_string()))
+        };
+        Ok(Some([png(Jaw::Left)?, png(Jaw::Right)?]))
+    }
+
     /// One image of a sample into `out`; the inner error is the size of an image that is not of the wanted one.
     fn image_into(
         &self,

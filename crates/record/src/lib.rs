@@ -12,6 +12,7 @@ mod encode;
 mod export;
 mod folder;
 mod index;
+mod parquet;
 mod picture;
 mod presses;
 pub mod proto;
@@ -30,6 +31,7 @@ pub use folder::{
     sha256_hex,
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
+pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};
 pub use picture::{PictureError, decode as decode_picture, encode_png};
 pub use presses::{
     PRESSES_FILE, PressColumnTable, PressFolder, PressFolderError, PressRecord, read_press_columns,

@@ -142,6 +142,11 @@ impl ShardReader {
         self.summary.channels.values().any(|c| c.topic.starts_with("/tactile/"))
     }
 
+    /// Whether these are stored without PNG.
+    pub(crate) fn has_raw_images(&self) -> bool {
+        self.summary.schemas.values().any(|s| s.name == "foxglove.RawImage")
+    }
+
     /// Global indices of its samples.
     pub fn indices(&self) -> std::ops::Range<u64> {
         self.first_sample..self.first_sample + self.samples
@@ -236,7 +241,7 @@ impl ShardReader {
                 return Err(self.damaged(index, &format!("/tactile/{missing}"), "it is missing"));
             }
         };
-        let raw_images = self.summary.schemas.values().any(|s| s.name == "foxglove.RawImage");
+        let raw_images = self.has_raw_images();
         Ok(RawRecord { sample, images, raw_images, trace })
     }
 

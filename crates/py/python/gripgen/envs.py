@@ -20,6 +20,9 @@ Vary = Mapping[str, float | str | Sequence[Any]]
 #: Time between two commands: the mean step of Wucherer et al. 2023.
 STEP_S = 0.104
 
+#: No pull of this rig goes further: N, mm, s.
+_FORCE_BOUNDS = np.array([4000.0, 1000.0, 4000.0], dtype=np.float32)
+
 
 def register() -> None:
     """Make `gym.make("gripgen/Pull-v0")` known; `import gripgen` does it."""
@@ -56,7 +59,7 @@ class _Task:
         parts = self.sim.parts if part is None else [part] if isinstance(part, str) else list(part)
         self.vary: dict[str, Any] = {"part": parts, "grip_force_n": (20.0, 80.0)} | dict(vary or {})
         spaces: dict[str, gym.Space[Any]] = {
-            "force": gym.spaces.Box(-np.inf, np.inf, (3,), np.float32),
+            "force": gym.spaces.Box(-_FORCE_BOUNDS, _FORCE_BOUNDS, dtype=np.float32),
         }
         if images:
             width, height = self.sim._core.image_size_px
@@ -120,7 +123,7 @@ class PullEnv(gym.Env[dict[str, np.ndarray], np.ndarray]):
     def _observation(self, force: tuple[float, float, float]) -> dict[str, np.ndarray]:
         observation = {"force": np.array(force, dtype=np.float32)}
         if self._tactile is not None:
-            observation["tactile"] = self._tactile
+            observation["tactile"] = self._tactile.copy()
         return observation
 
     def reset(
