@@ -58,7 +58,7 @@ fn cargo(arguments: &[&str]) -> Command {
 fn test(all: bool) -> Result<(), String> {
     let start = Instant::now();
     let vulkan = vulkan::set_up();
-    let python = python::set_up(&root())?;
+    let python = python::set_up(&root(), all)?;
     run("format", &mut cargo(&["fmt", "--all", "--check"]))?;
     let clippy = ["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"];
     run("clippy", &mut cargo(&clippy))?;
@@ -75,6 +75,7 @@ fn test(all: bool) -> Result<(), String> {
     }
     run("Rust tests", &mut rust)?;
     assets(true)?;
+    python::stage_package(&root())?;
     let mut checks = python::pytest(&python, &root());
     if all {
         checks.env("GRIPGEN_SLOW_TESTS", "1");
@@ -85,7 +86,7 @@ fn test(all: bool) -> Result<(), String> {
 }
 
 fn blind() -> Result<(), String> {
-    let python = python::set_up(&root())?;
+    let python = python::set_up(&root(), false)?;
     run("release build", &mut cargo(&["build", "--release", "--quiet"]))?;
     let mut all = Command::new(&python);
     all.args(["-m", "tests.blind.all", "--out"]).arg(python::target(&root()).join("blind"));
@@ -96,7 +97,8 @@ fn blind() -> Result<(), String> {
 
 fn assets(check: bool) -> Result<(), String> {
     // The same selection as in `cargo test --workspace`, so that nothing is built twice.
-    run("build of the asset maker", &mut cargo(&["build", "--quiet", "--workspace", "--examples"]))?;
+    let selection = ["build", "--quiet", "--workspace", "--lib", "--bins", "--examples"];
+    run("build of the asset maker and the Python module", &mut cargo(&selection))?;
     let mut maker = Command::new(python::target(&root()).join("debug/examples/make_assets"));
     run("assets", maker.args(check.then_some("--check")))
 }

@@ -4,17 +4,27 @@ use crate::{apt_install, can_install};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Makes `target/venv` with the packages of `tests/python/requirements.txt`; returns its Python.
-pub fn set_up(root: &Path) -> Result<PathBuf, String> {
+/// What is installed.
+const STAMP: &str = "gripgen-requirements.txt";
+
+/// Makes `target/venv` with the packages of `tests/python/requirements.txt`, and with those of `requirements-all.txt` if
+/// `all`; returns its Python.
+pub fn set_up(root: &Path, all: bool) -> Result<PathBuf, String> {
     let venv = target(root).join("venv");
     let python = venv.join("bin/python");
-    let requirements = root.join("tests/python/requirements.txt");
-    let wanted =
-        std::fs::read_to_string(&requirements).map_err(|e| format!("{}: {e}", requirements.display()))?;
-    let stamp = venv.join("gripgen-requirements.txt");
-    if python.exists() && std::fs::read_to_string(&stamp).is_ok_and(|have| have == wanted) {
+    let read = |name: &str| {
+        let path = root.join("tests/python").join(name);
+        std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))
+    };
+    let few = read("requirements.txt")?;
+    let many = format!("{few}{}", read("requirements-all.txt")?);
+    let have = std::fs::read_to_string(venv.join(STAMP)).unwrap_or_default();
+    // What has more than is wanted will do.
+    if python.exists() && (have == many || (have == few && !all)) {
         return Ok(python);
     }
+    let wanted = if all { many } else { few };
+    let stamp = venv.join(STAMP);
     eprintln!("making a Python environment in {}", venv.display());
     let system = system_python()?;
     if !make_venv(&system, &venv) {
@@ -29,10 +39,14 @@ pub fn set_up(root: &Path) -> Result<PathBuf, String> {
         }
     }
     let mut pip = Command::new(&python);
-    pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"]).arg(&requirements);
+    pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+    pip.args(["-r", "tests/python/requirements.txt"]).current_dir(root);
+    if all {
+        pip.args(["-r", "tests/python/requirements-all.txt"]);
+    }
     let status = pip.status().map_err(|e| format!("pip: {e}"))?;
     if !status.success() {
-        return Err(format!("pip install -r tests/python/requirements.txt: {status}"));
+        return Err(format!("pip install of the packages in tests/python/requirements*.txt: {status}"));
     }
     std::fs::write(&stamp, wanted).map_err(|e| format!("{}: {e}", stamp.display()))?;
     Ok(python)
@@ -62,10 +76,46 @@ fn make_venv(python: &str, venv: &Path) -> bool {
     command.status().is_ok_and(|s| s.success())
 }
 
+/// Puts the Python package together in `target/python` from its sources and the module that cargo has built.
+pub fn stage_package(root: &Path) -> Result<PathBuf, String> {
+    let stage = target(root).join("python");
+    let package = stage.join("gripgen");
+    let at = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
+    std::fs::create_dir_all(&package).map_err(|e| at(&package, e))?;
+    for entry in std::fs::read_dir(&package).map_err(|e| at(&package, e))?.flatten() {
+        // Files that are gone from the sources; what Python compiled goes with the folder of its own.
+        if entry.path().is_file() {
+            std::fs::remove_file(entry.path()).map_err(|e| at(&entry.path(), e))?;
+        }
+    }
+    let sources = root.join("crates/py/python/gripgen");
+    for entry in std::fs::read_dir(&sources).map_err(|e| at(&sources, e))?.flatten() {
+        if entry.path().is_file() {
+            std::fs::copy(entry.path(), package.join(entry.file_name())).map_err(|e| at(&entry.path(), e))?;
+        }
+    }
+    let names =
+        ["lib_core.so", "lib_core.dylib", "_core.dll"].map(|name| target(root).join("debug").join(name));
+    let built = names.iter().find(|path| path.exists()).ok_or("cargo has not built the Python module")?;
+    let name = if cfg!(windows) { "_core.pyd" } else { "_core.abi3.so" };
+    std::fs::copy(built, package.join(name)).map_err(|e| at(built, e))?;
+    Ok(stage)
+}
+
 /// The command that runs the Python checks against the binary that the Rust tests have built.
 pub fn pytest(python: &Path, root: &Path) -> Command {
     let mut command = Command::new(python);
-    command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/python", "tests/blind"]);
+    command.args([
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "tests/python",
+        "tests/gripgen_py",
+        "tests/blind",
+    ]);
+    command.env("PYTHONPATH", target(root).join("python"));
     command.env("GRIPGEN_BIN", target(root).join("debug/gripgen")).env("PYTHONDONTWRITEBYTECODE", "1");
     command
 }

@@ -31,9 +31,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// The same for a caller that shows errors itself. `Ok` is the exit code of work that was done.
+/// The same for a caller that shows errors itself and wants nothing on standard output. `Ok` is the exit code of work that
+/// was done.
 pub fn try_run(arguments: impl IntoIterator<Item = OsString>) -> Result<u8, Failure> {
-    execute(&parsed(arguments).map_err(|e| Failure::usage(e.to_string().trim_end()))?)
+    let cli = parsed(arguments).map_err(|e| Failure::usage(e.to_string().trim_end()))?;
+    output::silently(|| execute(&cli))
 }
 
 fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {

@@ -2,6 +2,7 @@
 
 use crate::failure::Failure;
 use serde_json::Value;
+use std::cell::Cell;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -75,8 +76,23 @@ pub fn program() -> &'static str {
     PROGRAM.get().map_or("gripgen", String::as_str)
 }
 
+thread_local! {
+    static SILENT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Does `work` without a word on standard output: its caller is a program that asked for files.
+pub fn silently<T>(work: impl FnOnce() -> T) -> T {
+    let before = SILENT.replace(true);
+    let done = work();
+    SILENT.set(before);
+    done
+}
+
 /// Writes to standard output. A reader that hung up (`| head`) is no failure.
 pub fn print(text: &str) -> Result<(), Failure> {
+    if SILENT.get() {
+        return Ok(());
+    }
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),

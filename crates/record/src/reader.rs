@@ -5,17 +5,21 @@ use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::shard::{LAYOUT_VERSION, METADATA_NAME};
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
+use mcap::records::{AttachmentIndex, ChunkIndex, MetadataIndex};
+use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use mcap::{McapError, Summary};
-use memmap2::Mmap;
 use prost::Message;
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
-/// A shard opened for reading. The file is mapped into memory; a sample is decoded when it is asked for.
+/// A shard opened for reading. Its summary is in memory; a sample is read when it is asked for. Nothing is mapped: a file
+/// that is cut off while it is open is an error and not the end of the process.
 pub struct ShardReader {
     path: PathBuf,
-    map: Mmap,
+    file: File,
+    bytes: u64,
     summary: Summary,
     metadata: BTreeMap<String, String>,
     slot_ns: u64,
@@ -101,17 +105,25 @@ impl ShardReader {
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let at = |source| ReadError::Open { path: path.into(), source };
         let file = File::open(path).map_err(at)?;
-        // SAFETY: shards are written once and renamed into place; nothing changes them while they are read.
-        let map = unsafe { Mmap::map(&file) }.map_err(at)?;
+        let bytes = file.metadata().map_err(at)?.len();
         let bad = |source| ReadError::Mcap { path: path.into(), source };
         let foreign = |problem: String| ReadError::Foreign { path: path.into(), problem };
-        let summary = Summary::read(&map).map_err(bad)?.ok_or_else(|| foreign("it has no summary".into()))?;
+        let magic = mcap::MAGIC.len() as u64;
+        for start in [0, bytes.saturating_sub(magic)] {
+            if piece(&file, bytes, start, magic).map_err(bad)? != mcap::MAGIC {
+                return Err(bad(McapError::BadMagic));
+            }
+        }
+        let summary =
+            read_summary(&file, bytes).map_err(bad)?.ok_or_else(|| foreign("it has no summary".into()))?;
         let index = summary
             .metadata_indexes
             .iter()
             .find(|m| m.name == METADATA_NAME)
             .ok_or_else(|| foreign(format!("it has no metadata record `{METADATA_NAME}`")))?;
-        let metadata = mcap::read::metadata(&map, index).map_err(bad)?.metadata;
+        let record = piece(&file, bytes, index.offset, index.length).map_err(bad)?;
+        let at_start = MetadataIndex { offset: 0, ..index.clone() };
+        let metadata = mcap::read::metadata(&record, &at_start).map_err(bad)?.metadata;
         let number = |key: &str| {
             metadata
                 .get(key)
@@ -129,7 +141,7 @@ impl ShardReader {
         if slot_ns == 0 {
             return Err(foreign("its time slots are 0 ns long".into()));
         }
-        Ok(Self { path: path.into(), map, summary, slot_ns, samples, first_sample, metadata })
+        Ok(Self { path: path.into(), file, bytes, summary, slot_ns, samples, first_sample, metadata })
     }
 
     /// What the shard says about itself.
@@ -161,8 +173,10 @@ impl ShardReader {
             .iter()
             .find(|a| a.name == "config.toml")
             .ok_or_else(|| foreign("it has no attachment `config.toml`"))?;
-        let attachment = mcap::read::attachment(&self.map, index)
-            .map_err(|source| ReadError::Mcap { path: self.path.clone(), source })?;
+        let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
+        let record = piece(&self.file, self.bytes, index.offset, index.length).map_err(bad)?;
+        let at_start = AttachmentIndex { offset: 0, ..index.clone() };
+        let attachment = mcap::read::attachment(&record, &at_start).map_err(bad)?;
         String::from_utf8(attachment.data.into_owned()).map_err(|_| foreign("its configuration is not text"))
     }
 
@@ -261,13 +275,12 @@ impl ShardReader {
         let mut at = chunks.partition_point(|c| c.message_start_time < start);
         while let Some(chunk) = chunks.get(at).filter(|c| c.message_start_time < start + self.slot_ns) {
             if chunk.message_end_time == start {
-                let messages = self
-                    .summary
-                    .stream_chunk(&self.map, chunk)
-                    .map_err(|source| ReadError::Mcap { path: self.path.clone(), source })?;
-                for message in messages {
-                    let message =
-                        message.map_err(|source| ReadError::Mcap { path: self.path.clone(), source })?;
+                let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
+                let record = piece(&self.file, self.bytes, chunk.chunk_start_offset, chunk.chunk_length)
+                    .map_err(bad)?;
+                let at_start = ChunkIndex { chunk_start_offset: 0, ..chunk.clone() };
+                for message in self.summary.stream_chunk(&record, &at_start).map_err(bad)? {
+                    let message = message.map_err(bad)?;
                     visit(&message.channel.topic, &message.data)
                         .map_err(|problem| self.damaged(index, &message.channel.topic, &problem))?;
                 }
@@ -281,6 +294,54 @@ impl ShardReader {
     pub(crate) fn damaged(&self, sample: u64, topic: &str, problem: &str) -> ReadError {
         ReadError::Message { path: self.path.clone(), sample, topic: topic.into(), problem: problem.into() }
     }
+}
+
+/// Smallest record: its kind and its length.
+const LEAST_RECORD: u64 = 8;
+
+/// Some bytes of a file that is `bytes` long.
+fn piece(file: &File, bytes: u64, start: u64, length: u64) -> Result<Vec<u8>, McapError> {
+    let fits = start.checked_add(length).is_some_and(|end| end <= bytes) && length >= LEAST_RECORD;
+    if !fits {
+        return Err(McapError::BadIndex);
+    }
+    let mut found = vec![0; length as usize];
+    read_exact_at(file, &mut found, start)?;
+    Ok(found)
+}
+
+#[cfg(unix)]
+fn read_exact_at(file: &File, out: &mut [u8], start: u64) -> std::io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, out, start)
+}
+
+#[cfg(windows)]
+fn read_exact_at(file: &File, mut out: &mut [u8], mut start: u64) -> std::io::Result<()> {
+    while !out.is_empty() {
+        let n = std::os::windows::fs::FileExt::seek_read(file, out, start)?;
+        if n == 0 {
+            return Err(std::io::ErrorKind::UnexpectedEof.into());
+        }
+        (out, start) = (&mut out[n..], start + n as u64);
+    }
+    Ok(())
+}
+
+fn read_summary(file: &File, bytes: u64) -> Result<Option<Summary>, McapError> {
+    let options =
+        SummaryReaderOptions::default().with_file_size(bytes).with_record_length_limit(bytes as usize);
+    let mut reader = SummaryReader::new_with_options(options);
+    let mut file = file;
+    while let Some(event) = reader.next_event() {
+        match event? {
+            SummaryReadEvent::ReadRequest(n) => {
+                let read = file.read(reader.insert(n))?;
+                reader.notify_read(read);
+            }
+            SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to)?),
+        }
+    }
+    Ok(reader.finish())
 }
 
 fn raw_image(data: &[u8]) -> Result<TactileImage, String> {

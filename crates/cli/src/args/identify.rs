@@ -95,6 +95,9 @@ pub struct CampaignArgs {
     /// The twin.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,
+    /// Override a key of the twin; may be given many times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
     /// Parts to pull; all of the twin where this is left out.
     #[arg(long, value_name = "PART,...", value_delimiter = ',')]
     pub parts: Vec<String>,

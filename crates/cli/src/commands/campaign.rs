@@ -17,7 +17,7 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     writable(&args.out)?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let at = Location::parse(&args.twin);
-    let twin = load_twin(&args.twin, &[])?;
+    let twin = load_twin(&args.twin, &args.set)?;
     let (campaign, separating) = match &args.separate {
         Some(measured) => {
             let next = separating(args, measured, &twin)?;
@@ -39,7 +39,7 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     write_file(&args.out, text.as_bytes())?;
     let simulated = match &args.simulate {
         Some(folder) => {
-            let made = simulate_campaign(&at, &[], &campaign, args.seed).map_err(Failure::usage)?;
+            let made = simulate_campaign(&at, &args.set, &campaign, args.seed).map_err(Failure::usage)?;
             write_pull_folder(folder, &made.pulls).map_err(|e| {
                 Failure::new(e).hint("a folder that holds measurements is left alone; name a new one")
             })?;

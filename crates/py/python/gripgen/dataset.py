@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -65,7 +65,7 @@ def load(
     text = os.fspath(path)
     if remote.is_url(text):
         text = remote.fetch(text, cache_dir)
-    return Dataset(text, status=tuple(status))
+    return Dataset(text, status=tuple(status), _opened=(os.getpid(), _core.Dataset(text)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +81,14 @@ class Dataset(Sequence[Sample]):
     status: tuple[str, ...] = LABELLED
     #: Rows of the run that belong to this dataset.
     rows: NDArray[np.int64] | None = None
+    # The open files, and the process that opened them.
+    _opened: tuple[int, _core.Dataset] | None = field(default=None, repr=False)
+    # Rows of the run when it was loaded.
+    _total: int = 0
 
     def __post_init__(self) -> None:
+        if not self._total:
+            object.__setattr__(self, "_total", len(self._open()))
         if self.rows is None:
             found = np.asarray(self._columns()["status"])
             rows = np.flatnonzero(np.isin(found, self.status))
@@ -91,16 +97,25 @@ class Dataset(Sequence[Sample]):
         rows.flags.writeable = False
         object.__setattr__(self, "rows", rows)
 
-    # What is open belongs to the process that opened it.
     def __getstate__(self) -> dict[str, Any]:
-        return {"path": self.path, "status": self.status, "rows": self.rows}
+        return {"path": self.path, "status": self.status, "rows": self.rows, "_opened": None, "_total": self._total}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         for name, value in state.items():
             object.__setattr__(self, name, value)
 
     def _open(self) -> _core.Dataset:
-        return _opened(self.path)
+        # What is open belongs to the process that opened it: a child opens the files anew.
+        if self._opened is not None and self._opened[0] == os.getpid():
+            return self._opened[1]
+        found = _opened_here(self.path)
+        if self._total and len(found) != self._total:
+            raise _core.DataError(
+                f"{self.path}: it has {len(found)} rows now and had {self._total} when it was loaded\n"
+                "hint: load it again"
+            )
+        object.__setattr__(self, "_opened", (os.getpid(), found))
+        return found
 
     def _columns(self) -> dict[str, Any]:
         found = self.__dict__.get("_columns_read")
@@ -213,11 +228,14 @@ class Dataset(Sequence[Sample]):
 
     def subset(self, ids: ArrayLike) -> Dataset:
         """The rows with these numbers, in this order."""
-        return Dataset(self.path, self.status, np.asarray(self._rows_of(ids), dtype=np.int64))
+        return self._with(np.asarray(self._rows_of(ids), dtype=np.int64))
 
     def where(self, keep: ArrayLike) -> Dataset:
         """The rows for which `keep` (bool[len]) is true."""
-        return Dataset(self.path, self.status, self.rows[np.asarray(keep, dtype=bool)])
+        return self._with(self.rows[np.asarray(keep, dtype=bool)])
+
+    def _with(self, rows: NDArray[np.int64]) -> Dataset:
+        return Dataset(self.path, self.status, rows, (os.getpid(), self._open()), self._total)
 
     def split(
         self, *, by: str | Sequence[str] = "group", test: float = 0.2, seed: int = 0
@@ -268,29 +286,26 @@ class Dataset(Sequence[Sample]):
             yield images, labels
 
 
-# Opened files by path; a child process after a fork opens its own.
+# What this process opened for datasets that came from another one: workers have many copies of one.
 _lock = threading.Lock()
 _open_files: dict[str, _core.Dataset] = {}
-_open_in = os.getpid()
+_MOST_OPEN = 16
 
 
-def _opened(path: str) -> _core.Dataset:
-    global _open_in
-    if _open_in != os.getpid():
-        _forget()
+def _opened_here(path: str) -> _core.Dataset:
     with _lock:
         found = _open_files.get(path)
         if found is None:
             found = _core.Dataset(path)
-            if len(_open_files) >= 16:
+            if len(_open_files) >= _MOST_OPEN:
                 _open_files.pop(next(iter(_open_files)))
             _open_files[path] = found
         return found
 
 
 def _forget() -> None:
-    global _lock, _open_files, _open_in
-    _lock, _open_files, _open_in = threading.Lock(), {}, os.getpid()
+    global _lock, _open_files
+    _lock, _open_files = threading.Lock(), {}
 
 
 if hasattr(os, "register_at_fork"):

@@ -1,0 +1,110 @@
+"""The Rust half of gripgen. Use it through the package: names here may change."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "ConfigError",
+    "DataError",
+    "Dataset",
+    "GripgenError",
+    "Pulls",
+    "Simulator",
+    "__version__",
+    "prepare_run",
+    "run_cli",
+    "run_verb",
+    "sweep",
+]
+
+__version__: str
+
+class GripgenError(Exception):
+    """What gripgen could not do; `hint` says what to do about it."""
+
+class ConfigError(GripgenError):
+    """A configuration, a key or an argument that cannot be."""
+
+class DataError(GripgenError):
+    """Data that cannot be read; the message names the file."""
+
+@final
+class Dataset:
+    """Rows of simulated or measured pulls, opened for reading. Threads may share it."""
+
+    def __new__(cls, path: str | os.PathLike[str]) -> Dataset: ...
+    def __len__(self) -> int: ...
+    @property
+    def path(self) -> Any: ...
+    @property
+    def image_size_px(self) -> tuple[int, int] | None: ...
+    @property
+    def info(self) -> dict[str, str]: ...
+    def columns(self) -> dict[str, NDArray[np.float64] | list[str]]: ...
+    def images(self, rows: Sequence[int], threads: int = 1) -> NDArray[np.uint8]: ...
+    def traces(self, rows: Sequence[int]) -> tuple[NDArray[np.float32], NDArray[np.int64]]: ...
+    def forces(self, rows: Sequence[int]) -> NDArray[np.float32]: ...
+    def heights(self, rows: Sequence[int], threads: int = 1) -> NDArray[np.float32]: ...
+
+@final
+class Simulator:
+    """A twin with its files, ready to pull. Threads may share it."""
+
+    def __new__(
+        cls,
+        twin: str,
+        overrides: Mapping[str, Any] | None = None,
+        mechanics: str = "reduced",
+        images: bool = True,
+    ) -> Simulator: ...
+    @property
+    def parts(self) -> list[str]: ...
+    @property
+    def max_grip_force_n(self) -> float: ...
+    @property
+    def image_size_px(self) -> tuple[int, int]: ...
+    def pulls(
+        self,
+        asked: Sequence[Mapping[str, float | str]],
+        seed: int = 0,
+        first_index: int = 0,
+        images: bool = True,
+        trace: bool = True,
+        threads: int = 1,
+    ) -> list[dict[str, Any]]: ...
+
+@final
+class Pulls:
+    """Pulls under way, each in a place of its own."""
+
+    def __new__(cls, simulator: Simulator, places: int) -> Pulls: ...
+    def start(
+        self, place: int, values: Mapping[str, float | str], seed: int, index: int, images: bool = True
+    ) -> NDArray[np.uint8] | None: ...
+    def step(
+        self,
+        commands: NDArray[np.float64],
+        duration_s: float,
+        speeds: bool = False,
+        threads: int = 1,
+        waits: NDArray[np.bool_] | None = None,
+    ) -> NDArray[np.float64]: ...
+    def result(self, place: int) -> dict[str, Any]: ...
+
+def run_cli(arguments: Sequence[str]) -> int: ...
+def run_verb(arguments: Sequence[str]) -> int: ...
+def sweep(
+    config: str | None,
+    out: str | os.PathLike[str],
+    overrides: Mapping[str, Any] | None = None,
+    jobs: int = 1,
+    slice: tuple[int, int] | None = None,
+    on_progress: Callable[[int, int], object] | None = None,
+) -> dict[str, Any]: ...
+def prepare_run(
+    config: str, out: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None
+) -> tuple[int, int, list[int]]: ...
