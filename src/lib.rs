@@ -98,7 +98,7 @@ pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError};
 pub use measured::{LoadPullsError, LoadedPulls, load_pulls};
 pub use paper::{PaperError, PaperReport, paper_report};
-pub use picture::{PictureSampleError, contact_sheet, sample_picture};
+pub use picture::{PictureSampleError, contact_sheet, contact_sheet_samples, sample_picture};
 pub use plan::{Plan, Probe, plan};
 pub use predict::PullPredictor;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};

@@ -34,7 +34,7 @@ pub enum SheetError {
 
 /// A PNG of a few samples, spread over parts and labels.
 pub fn contact_sheet(folder: &RunFolder) -> Result<Vec<u8>, SheetError> {
-    let chosen = choose(folder)?;
+    let chosen = contact_sheet_samples(folder)?;
     let rows = chosen.len().div_ceil(COLUMNS).max(1) as u32;
     let width = COLUMNS as u32 * (TILE_WIDTH + GAP) + GAP;
     let height = HEADER + rows * (TILE_HEIGHT + GAP) + GAP;
@@ -54,8 +54,8 @@ pub fn contact_sheet(folder: &RunFolder) -> Result<Vec<u8>, SheetError> {
     Ok(canvas.into_png())
 }
 
-/// Samples to show: parts in turn, and of each part labels from small to large.
-fn choose(folder: &RunFolder) -> Result<Vec<u64>, FolderError> {
+/// Samples that [`contact_sheet`] shows: parts in turn, and of each part labels from small to large.
+pub fn contact_sheet_samples(folder: &RunFolder) -> Result<Vec<u64>, FolderError> {
     let at = |name: &str| INDEX_COLUMNS.iter().position(|c| *c == name).unwrap_or(0);
     let (part, label) = (at("part"), at("max_pull_force_n"));
     let mut by_part: BTreeMap<String, Vec<(f64, u64)>> = BTreeMap::new();

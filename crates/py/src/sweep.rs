@@ -1,9 +1,11 @@
 //! Sweeps from Python: the same bytes as the command line.
 
 use crate::{error, values};
-use gripgen::record::RunFolder;
+use gripgen::record::{FolderError, RunFolder};
 use gripgen::tactile::SimdLevel;
-use gripgen::{Location, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet};
+use gripgen::{
+    Location, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet, contact_sheet_samples,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
@@ -85,6 +87,22 @@ pub fn prepare_run(
         }
     }
     Ok((folder.info().samples, folder.info().shards, done))
+}
+
+/// Shards whose samples the overview of a run shows; of the others the sidecar and the size of the file are enough to finish
+/// the run.
+#[pyfunction]
+pub fn contact_sheet_shards(py: Python<'_>, out: PathBuf) -> PyResult<Vec<u64>> {
+    let found = py.detach(|| {
+        let folder = RunFolder::open(&out)?;
+        let samples = contact_sheet_samples(&folder)?;
+        Ok((samples, folder.info().shard_samples))
+    });
+    let (samples, shard_samples) = found.map_err(|e: FolderError| error::sweep(py, e.into()))?;
+    let mut shards: Vec<u64> = samples.into_iter().map(|index| index / shard_samples).collect();
+    shards.sort_unstable();
+    shards.dedup();
+    Ok(shards)
 }
 
 fn load(py: Python<'_>, config: Option<&str>, out: &Path, sets: &[(String, String)]) -> PyResult<Project> {

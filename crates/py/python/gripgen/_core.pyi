@@ -15,6 +15,7 @@ __all__ = [
     "Pulls",
     "Simulator",
     "__version__",
+    "contact_sheet_shards",
     "prepare_run",
     "run_cli",
     "run_verb",
@@ -108,3 +109,4 @@ def sweep(
 def prepare_run(
     config: str, out: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None
 ) -> tuple[int, int, list[int]]: ...
+def contact_sheet_shards(out: str | os.PathLike[str]) -> list[int]: ...

@@ -7,6 +7,7 @@ same call again makes what is missing.
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import tempfile
@@ -35,9 +36,10 @@ class _Store:
     def names(self) -> set[str]:
         """Files of the run, with those of its inputs as `inputs/NAME`."""
         found: set[str] = set()
+        self.files.invalidate_cache()
         for folder in ("", "inputs/"):
             try:
-                entries = self.files.ls(f"{self.root}/{folder}".rstrip("/"), detail=False, refresh=True)
+                entries = self.files.ls(f"{self.root}/{folder}".rstrip("/"), detail=False)
             except FileNotFoundError:
                 continue
             found |= {folder + entry.rstrip("/").rsplit("/", 1)[-1] for entry in entries}
@@ -109,8 +111,6 @@ def sweep(
 
 def _broken(store: _Store, done: set[int], local: Path) -> set[int]:
     """Shards whose file has not the size that its sidecar says, or whose sidecar is damaged."""
-    import json
-
     broken = set()
     for shard in done:
         try:
@@ -154,14 +154,19 @@ def _make_missing(
 
 def _finish(store: _Store, local: Path, shards: int, samples: int, out: str) -> SweepSummary:
     """Index and overview, by the same code as on one machine."""
+    store.files.invalidate_cache()
     if store.is_local:
         found = _core.sweep(None, store.root, None, 1, None, None)
         return SweepSummary(out=out, **found)
-    # The index needs sidecars and the sizes of the shards, the overview the first shards: the rest need not be fetched.
+    # The index is made of sidecars, the overview of a few samples: empty files of the right size stand for the other shards.
     for shard in range(shards):
-        for suffix in ("json", "mcap"):
-            name = f"shard-{shard:05}.{suffix}"
-            publish(local / name, store.read(name))
+        sidecar = store.read(f"shard-{shard:05}.json")
+        publish(local / f"shard-{shard:05}.json", sidecar)
+        with open(local / f"shard-{shard:05}.mcap", "wb") as file:
+            file.truncate(json.loads(sidecar)["bytes"])
+    for shard in _core.contact_sheet_shards(str(local)):
+        name = f"shard-{shard:05}.mcap"
+        publish(local / name, store.read(name))
     found = _core.sweep(None, str(local), None, 1, None, None)
     for name in ("index.csv", "contact-sheet.png"):
         store.write(name, (local / name).read_bytes())
