@@ -51,7 +51,7 @@ def stock_reader(run: Path, shard_samples: int):
             shard, k = divmod(int(index), shard_samples)
             start = k * slots[shard]
             topics = ["/sample", "/tactile/left", "/tactile/right"]
-            window = {"start_time": start, "end_time": start + 1}
+            window = {"starting_at": start, "ending_before": start + 1}
             for _, channel, _, message in readers[shard].iter_decoded_messages(topics=topics, **window):
                 if channel.topic == "/sample":
                     labels[i] = message.max_pull_force_n

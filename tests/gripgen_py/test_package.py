@@ -51,6 +51,8 @@ def desk(tmp_path, monkeypatch):
     """A folder like a checkout with what the documentation takes for given: measured pulls, a part."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
+    # A cluster of its own, whatever else runs on this machine.
+    monkeypatch.setenv("RAY_ADDRESS", "local")
     for name in ("assets", "tests", "examples"):
         (tmp_path / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "assets/campaigns/example", tmp_path / "measured")
@@ -78,6 +80,9 @@ def test_python_snippets_run_in_their_order(page, desk):
             continue
         exec(compile(code, page, "exec"), names)
         ran += 1
+    if "ray" in sys.modules:
+        # The cluster that a snippet started.
+        sys.modules["ray"].shutdown()
     assert ran or page in ("docs/training.md", "docs/scale.md")
 
 
