@@ -57,7 +57,7 @@ impl Failure {
     /// What is wrong, and where, without colours.
     pub fn message(&self) -> String {
         match &self.place {
-            Some(_) => Renderer::plain().render(&[self.group()]).to_string(),
+            Some(_) => Renderer::plain().render(&[self.group()]),
             None => self.message.clone(),
         }
     }

@@ -3,6 +3,8 @@
 //! Work is done without the interpreter's lock. Arrays are handed over, not copied. The Python half of the package,
 //! with its stubs (`_core.pyi`), is in `crates/py/python/gripgen`.
 
+#![expect(clippy::needless_pass_by_value, reason = "arguments of functions for Python are owned")]
+
 mod dataset;
 mod error;
 mod pulls;

@@ -73,7 +73,6 @@ impl Pulls {
     /// (displacement stop, or no contact), whether its time is up. A place whose pull is over stands still, and so do those
     /// that `waits` (bool[N]) is true of.
     #[pyo3(signature = (commands, duration_s, speeds = false, threads = 1, waits = None))]
-    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -130,6 +129,9 @@ impl Pulls {
     }
 }
 
+/// Places, their commands, and where what they return goes.
+type Piece<'a> = (&'a mut [Option<Place>], (&'a [f64], &'a mut [f64]));
+
 fn step_all(
     places: &mut [Option<Place>],
     commands: &[f64],
@@ -139,7 +141,7 @@ fn step_all(
 ) -> Result<Vec<f64>, SampleError> {
     let mut values = vec![0.0; places.len() * COLUMNS];
     let each = places.len().div_ceil(threads.clamp(1, places.len().max(1))).max(1);
-    let piece = |(places, (commands, out)): (&mut [Option<Place>], (&[f64], &mut [f64]))| {
+    let piece = |(places, (commands, out)): Piece<'_>| {
         let all = places.iter_mut().zip(commands).zip(out.chunks_mut(COLUMNS));
         for ((place, &command), out) in all {
             if let Some(place) = place.as_mut().filter(|_| !command.is_nan()) {
