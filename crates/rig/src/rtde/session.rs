@@ -1,0 +1,392 @@
+//! The session of a client, without a socket: bytes in, events and bytes out.
+//!
+//! ```text
+//! protocol 2? --refused--> protocol 1? --> controller's version --> outputs --> inputs, one by one --> start --> data
+//! ```
+//!
+//! A text message may come at any moment, also between a request and its answer; a data frame may still come after a
+//! pause was asked for.
+
+use super::frame::{Frame, FrameError, FrameTooLongError, Framer, Kind, encode_frame};
+use super::recipe::{Recipe, RecipeError};
+use super::value::{Value, ValueError};
+
+/// Longest list of names that a controller takes.
+const MOST_NAMES: usize = 2048;
+
+/// What a client wants.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionPlan {
+    /// Fields that the controller sends; at least one.
+    pub outputs: Vec<String>,
+    /// How often it sends them. Protocol 1 sends at its own rate.
+    pub frequency_hz: f64,
+    /// Fields that the client writes, one list for each input recipe.
+    pub inputs: Vec<Vec<String>>,
+}
+
+/// What the session learns.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Event {
+    /// Both sides speak this protocol.
+    Protocol(u16),
+    /// Version of the controller: major, minor, bugfix, build.
+    ControllerVersion([u32; 4]),
+    /// All recipes are set up and the controller sends.
+    Started,
+    /// The controller stopped sending.
+    Paused,
+    /// Values of the output recipe, in its order.
+    Data(Vec<Value>),
+    /// A message for people; level 0 is an exception, 1 an error, 2 a warning, 3 information.
+    Text {
+        /// What it says.
+        text: String,
+        /// Who says it; empty in protocol 1.
+        source: String,
+        /// How grave it is.
+        level: u8,
+    },
+}
+
+/// Why a session ended. Nothing more may be read; a new connection begins a new session, with all recipes.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// The stream.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// A request that does not fit into a frame.
+    #[error(transparent)]
+    TooLong(#[from] FrameTooLongError),
+    /// A recipe.
+    #[error(transparent)]
+    Recipe(#[from] RecipeError),
+    /// A plan without outputs: a controller starts with at least one.
+    #[error("no outputs are asked for: a controller starts with at least one")]
+    NoOutputs,
+    /// Names longer than a controller takes.
+    #[error("the names of a recipe are {bytes} bytes long, a controller takes at most {MOST_NAMES}")]
+    Names {
+        /// Their length.
+        bytes: usize,
+    },
+    /// Neither protocol 2 nor 1.
+    #[error("the controller speaks neither protocol 2 nor 1")]
+    Protocol,
+    /// The controller refuses to start.
+    #[error("the controller refuses to start sending")]
+    Refused,
+    /// An answer of another length than its kind has.
+    #[error("an answer of kind {kind:?} is {found} bytes long, {wanted} were expected")]
+    Answer {
+        /// Its kind.
+        kind: Kind,
+        /// Its length.
+        found: usize,
+        /// What it should be.
+        wanted: usize,
+    },
+    /// An answer to something that was not asked.
+    #[error("an answer of kind {found:?} came while {wanted:?} was awaited")]
+    Unexpected {
+        /// What came.
+        found: Kind,
+        /// What should have.
+        wanted: Kind,
+    },
+    /// A data frame that does not fit its recipe.
+    #[error("a data frame of {found} bytes does not fit the output recipe of {wanted}")]
+    Data {
+        /// Its length.
+        found: usize,
+        /// Length by the recipe, its number included.
+        wanted: usize,
+    },
+    /// The controller's clock went backwards: it has restarted.
+    #[error("the controller's clock went from {before_s} s back to {now_s} s: it has restarted")]
+    Restarted {
+        /// Time of the data frame before.
+        before_s: f64,
+        /// Time of this one.
+        now_s: f64,
+    },
+}
+
+/// Why inputs cannot be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteInputError {
+    /// The session has not started, or was paused.
+    #[error("inputs are written after the start of the session")]
+    NotStarted,
+    /// There is no such recipe.
+    #[error("there is no input recipe {recipe}, the session has {recipes}")]
+    NoRecipe {
+        /// Which was asked for, counted from 0.
+        recipe: usize,
+        /// How many there are.
+        recipes: usize,
+    },
+    /// Another number of values.
+    #[error("{found} values for an input recipe of {wanted}")]
+    Count {
+        /// Values given.
+        found: usize,
+        /// Fields of the recipe.
+        wanted: usize,
+    },
+    /// A value of another type.
+    #[error(transparent)]
+    Value(#[from] ValueError),
+}
+
+/// Where the session is: which answer it waits for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Version(u16),
+    Controller,
+    Outputs,
+    Inputs(usize),
+    Start,
+    Running,
+    Pause,
+    Paused,
+}
+
+/// A session under way.
+#[derive(Debug, Clone)]
+pub struct Link {
+    plan: SessionPlan,
+    state: State,
+    protocol: u16,
+    framer: Framer,
+    outgoing: Vec<u8>,
+    output: Option<Recipe>,
+    inputs: Vec<Recipe>,
+    last_s: f64,
+}
+
+impl Link {
+    /// Begins a session: its first bytes are in [`take_outgoing`](Self::take_outgoing).
+    pub fn new(plan: SessionPlan) -> Result<Self, SessionError> {
+        if plan.outputs.is_empty() {
+            return Err(SessionError::NoOutputs);
+        }
+        for names in plan.inputs.iter().chain([&plan.outputs]) {
+            let bytes = names.join(",").len();
+            if bytes > MOST_NAMES {
+                return Err(SessionError::Names { bytes });
+            }
+        }
+        let mut link = Self {
+            plan,
+            state: State::Version(2),
+            protocol: 2,
+            framer: Framer::default(),
+            outgoing: Vec::new(),
+            output: None,
+            inputs: Vec::new(),
+            last_s: f64::NEG_INFINITY,
+        };
+        link.ask(Kind::ProtocolVersion, &2_u16.to_be_bytes())?;
+        Ok(link)
+    }
+
+    /// Bytes to send; nothing the second time.
+    pub fn take_outgoing(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.outgoing)
+    }
+
+    /// The recipe of [`Event::Data`], once the controller has accepted it.
+    pub fn output(&self) -> Option<&Recipe> {
+        self.output.as_ref()
+    }
+
+    /// Whether the controller sends.
+    pub fn is_running(&self) -> bool {
+        self.state == State::Running
+    }
+
+    /// Takes in what came from the wire and says what it means. After an error the session is over.
+    pub fn receive(&mut self, bytes: &[u8]) -> Result<Vec<Event>, SessionError> {
+        self.framer.push(bytes);
+        let mut events = Vec::new();
+        while let Some(frame) = self.framer.next_frame()? {
+            self.take(&frame, &mut events)?;
+        }
+        Ok(events)
+    }
+
+    /// Writes the values of input recipe `recipe`, counted from 0 in the order of the plan.
+    pub fn write_input(&mut self, recipe: usize, values: &[Value]) -> Result<(), WriteInputError> {
+        if self.state != State::Running {
+            return Err(WriteInputError::NotStarted);
+        }
+        let recipes = self.inputs.len();
+        let found = self.inputs.get(recipe).ok_or(WriteInputError::NoRecipe { recipe, recipes })?;
+        if values.len() != found.fields.len() {
+            return Err(WriteInputError::Count { found: values.len(), wanted: found.fields.len() });
+        }
+        let payload = found.write(values)?;
+        let frame = encode_frame(Kind::Data, &payload).expect("names of 2048 bytes are 1024 fields at most");
+        self.outgoing.extend(frame);
+        Ok(())
+    }
+
+    /// Asks the controller to stop sending.
+    pub fn pause(&mut self) -> Result<(), SessionError> {
+        if self.state == State::Running {
+            self.state = State::Pause;
+            self.ask(Kind::Pause, &[])?;
+        }
+        Ok(())
+    }
+
+    fn ask(&mut self, kind: Kind, payload: &[u8]) -> Result<(), SessionError> {
+        let frame = encode_frame(kind, payload)?;
+        self.outgoing.extend(frame);
+        Ok(())
+    }
+
+    /// The kind of answer that is awaited.
+    fn awaited(&self) -> Kind {
+        match self.state {
+            State::Version(_) => Kind::ProtocolVersion,
+            State::Controller => Kind::ControllerVersion,
+            State::Outputs => Kind::SetUpOutputs,
+            State::Inputs(_) => Kind::SetUpInputs,
+            State::Start => Kind::Start,
+            State::Pause => Kind::Pause,
+            State::Running | State::Paused => Kind::Data,
+        }
+    }
+
+    fn take(&mut self, frame: &Frame, events: &mut Vec<Event>) -> Result<(), SessionError> {
+        let payload = &frame.payload[..];
+        match frame.kind {
+            Kind::Text => {
+                events.push(self.text(payload));
+                return Ok(());
+            }
+            Kind::Data => return self.data(payload, events),
+            kind if kind != self.awaited() => {
+                return Err(SessionError::Unexpected { found: kind, wanted: self.awaited() });
+            }
+            _ => {}
+        }
+        match self.state {
+            State::Version(version) => {
+                if accepted(frame)? {
+                    self.protocol = version;
+                    events.push(Event::Protocol(version));
+                    self.state = State::Controller;
+                    self.ask(Kind::ControllerVersion, &[])
+                } else if version == 2 {
+                    self.state = State::Version(1);
+                    self.ask(Kind::ProtocolVersion, &1_u16.to_be_bytes())
+                } else {
+                    Err(SessionError::Protocol)
+                }
+            }
+            State::Controller => {
+                let number =
+                    |i: usize| payload.get(4 * i..4 * i + 4)?.try_into().ok().map(u32::from_be_bytes);
+                let numbers = [number(0), number(1), number(2), number(3)];
+                let ([Some(major), Some(minor), Some(bugfix), Some(build)], 16) = (numbers, payload.len())
+                else {
+                    return Err(SessionError::Answer { kind: frame.kind, found: payload.len(), wanted: 16 });
+                };
+                events.push(Event::ControllerVersion([major, minor, bugfix, build]));
+                self.state = State::Outputs;
+                let mut asked = match self.protocol {
+                    1 => vec![],
+                    _ => self.plan.frequency_hz.to_be_bytes().to_vec(),
+                };
+                asked.extend(self.plan.outputs.join(",").bytes());
+                self.ask(Kind::SetUpOutputs, &asked)
+            }
+            State::Outputs => {
+                self.output = Some(Recipe::from_answer(&self.plan.outputs, payload, self.protocol > 1)?);
+                self.next_input(0)
+            }
+            State::Inputs(k) => {
+                self.inputs.push(Recipe::from_answer(&self.plan.inputs[k], payload, true)?);
+                self.next_input(k + 1)
+            }
+            State::Start => {
+                if !accepted(frame)? {
+                    return Err(SessionError::Refused);
+                }
+                self.state = State::Running;
+                events.push(Event::Started);
+                Ok(())
+            }
+            State::Pause => {
+                // A refusal leaves it sending.
+                let paused = accepted(frame)?;
+                self.state = if paused { State::Paused } else { State::Running };
+                events.extend(paused.then_some(Event::Paused));
+                Ok(())
+            }
+            State::Running | State::Paused => Ok(()),
+        }
+    }
+
+    fn next_input(&mut self, k: usize) -> Result<(), SessionError> {
+        if let Some(names) = self.plan.inputs.get(k) {
+            self.state = State::Inputs(k);
+            let asked = names.join(",").into_bytes();
+            return self.ask(Kind::SetUpInputs, &asked);
+        }
+        self.state = State::Start;
+        self.ask(Kind::Start, &[])
+    }
+
+    fn data(&mut self, payload: &[u8], events: &mut Vec<Event>) -> Result<(), SessionError> {
+        // The first data frames may overtake the answer to the start.
+        let Some(recipe) = &self.output else {
+            return Err(SessionError::Unexpected { found: Kind::Data, wanted: self.awaited() });
+        };
+        let Some(values) = recipe.read(payload) else {
+            let wanted = recipe.size() + usize::from(recipe.id.is_some());
+            return Err(SessionError::Data { found: payload.len(), wanted });
+        };
+        let time_s = recipe.place("timestamp").and_then(|place| values.get(place));
+        if let Some(&Value::Double(now_s)) = time_s {
+            if now_s < self.last_s {
+                return Err(SessionError::Restarted { before_s: self.last_s, now_s });
+            }
+            self.last_s = now_s;
+        }
+        events.push(Event::Data(values));
+        Ok(())
+    }
+
+    /// A message for people. What cannot be read is shown as it is: no message ends a session.
+    fn text(&self, payload: &[u8]) -> Event {
+        let words = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        let v2 = || {
+            let (&length, rest) = payload.split_first()?;
+            let (text, rest) = rest.split_at_checked(usize::from(length))?;
+            let (&length, rest) = rest.split_first()?;
+            let (source, rest) = rest.split_at_checked(usize::from(length))?;
+            Some(Event::Text { text: words(text), source: words(source), level: *rest.first()? })
+        };
+        let v1 = || {
+            let (&level, text) = payload.split_first()?;
+            Some(Event::Text { text: words(text), source: String::new(), level })
+        };
+        let read = if self.protocol == 1 { v1() } else { v2() };
+        read.unwrap_or_else(|| Event::Text { text: words(payload), source: String::new(), level: 3 })
+    }
+}
+
+/// Answers of one byte.
+fn accepted(frame: &Frame) -> Result<bool, SessionError> {
+    match frame.payload[..] {
+        [flag] => Ok(flag != 0),
+        _ => Err(SessionError::Answer { kind: frame.kind, found: frame.payload.len(), wanted: 1 }),
+    }
+}
