@@ -40,6 +40,13 @@ def test_a_sweep_goes_on_where_it_stopped(run, tmp_path):
     assert "another folder" in e.value.hint and content(out) == content(run)
 
 
+def test_a_run_is_called_like_its_configuration(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    summary = gg.sweep(CONFIG, set=SMALL)
+    assert summary.out == os.path.join("runs", "quickstart")
+    assert content(tmp_path / summary.out) == content(run)
+
+
 def test_a_pull_is_a_function_of_its_arguments():
     sim = gg.Sim(set={"parts.gear.scatter": 0.0, "wrist.noise_n": 0.0})
     pull = sim.pull(part="gear", grip_force_n=40.0, mu=0.2, seed=3)

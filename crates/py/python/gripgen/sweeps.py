@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from . import _core
@@ -33,14 +34,15 @@ class SweepSummary:
 
 def sweep(
     config: str | os.PathLike[str],
-    out: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
     *,
     jobs: int | None = None,
     slice: tuple[int, int] | None = None,
     set: Mapping[str, Any] | None = None,
     progress: bool | Callable[[int, int], None] | None = None,
 ) -> SweepSummary:
-    """Run a sweep into the folder `out`, or what is missing of it: the same bytes as `gripgen sweep`.
+    """Run a sweep into the folder `out` (`runs/NAME` of NAME.toml if None), or what is missing of it: the same bytes
+    as `gripgen sweep`.
 
     `jobs` threads (all cores if None), `slice=(i, n)` for piece i of n, `set` overrides any key. `progress` is called
     with samples done and samples in all; True prints them, None prints on a terminal only. Ctrl-C finishes the
@@ -55,6 +57,7 @@ def sweep(
     else:
         tell = progress
     jobs = os.cpu_count() or 1 if jobs is None else jobs
+    out = Path("runs") / Path(config).stem if out is None else out
     found = _core.sweep(os.fspath(config), os.fspath(out), dict(set or {}), jobs, slice, tell)
     return SweepSummary(out=os.fspath(out), **found)
 
