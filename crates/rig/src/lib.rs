@@ -2,8 +2,9 @@
 //!
 //! Sessions are without sockets: bytes in, events and bytes out, so that every moment of a connection can be tested. What is here
 //! so far are the clients of RTDE (the robot's data exchange), of GCL (the gripper's text interface) and of the cameras'
-//! streams, and RTDE's socket; the experiment itself follows.
+//! streams, RTDE's socket, and the pull as a program for the robot; the experiment itself follows.
 
 pub mod camera;
 pub mod gcl;
+pub mod pull_program;
 pub mod rtde;
