@@ -104,3 +104,30 @@ def test_a_speed_command_moves_the_arm():
     assert observation["force"][1] == pytest.approx(2.08, rel=0.1)
     with pytest.raises(gg.ConfigError, match="neither"):
         gym.make("gripgen/Pull-v0", command="torque")
+
+
+def test_threads_may_share_pulls():
+    """Two threads that step and look at the same pulls wait for each other, and not for ever."""
+    import threading
+
+    from gripgen import _core
+
+    pulls = _core.Pulls(gg.Sim(images=False)._core, 2)
+    for place in range(2):
+        pulls.start(place, {"part": "gear", "grip_force_n": 60.0}, 1, place, False)
+    done = []
+
+    def work():
+        for force_n in range(200):
+            pulls.step(np.full(2, force_n * 0.01), 0.02, False, 2)
+            pulls.result(0)
+        done.append(True)
+
+    threads = [threading.Thread(target=work, daemon=True) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert len(done) == 3
+    with pytest.raises(gg.ConfigError, match="3 commands for 2 pulls"):
+        pulls.step(np.zeros(3), 0.1)

@@ -7,6 +7,7 @@ use gripgen::twin::{PullTrace, TraceRow, slip_label};
 use gripgen::{Draw, SampleError, Simulator as Twin};
 use numpy::{PyArray, PyArray2, PyArray4, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -52,7 +53,7 @@ impl Pulls {
         let asked = values::drawn(py, values)?;
         let started = py.detach(|| self.twin.start(&asked, Draw { seed, index }, images));
         let (scenario, started) = started.map_err(|e| error::sample(py, e))?;
-        let mut places = self.lock();
+        let mut places = self.lock_attached(py);
         let count = places.len();
         let Some(slot) = places.get_mut(place) else {
             return Err(error::argument(py, &format!("there is no place {place}, there are {count}"), None));
@@ -91,41 +92,54 @@ impl Pulls {
                 .filter(|(_, wait)| **wait)
                 .for_each(|(c, _)| *c = f64::NAN);
         }
-        let mut places = self.lock();
-        if commands.len() != places.len() {
-            let what = format!("{} commands for {} pulls", commands.len(), places.len());
-            return Err(error::argument(py, &what, None));
-        }
-        let n = places.len();
-        let places = &mut places[..];
-        let stepped = py.detach(|| step_all(places, &commands, duration_s, speeds, threads));
-        let values = stepped.map_err(|e| error::sample(py, e))?;
+        // The lock is taken and given back without the interpreter's: nobody who waits for one holds the other.
+        let stepped = py.detach(|| {
+            let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
+            if commands.len() != places.len() {
+                return Err(Err(places.len()));
+            }
+            step_all(&mut places[..], &commands, duration_s, speeds, threads).map_err(Ok)
+        });
+        let n = commands.len();
+        let values = stepped.map_err(|e| match e {
+            Ok(e) => error::sample(py, e),
+            Err(places) => error::argument(py, &format!("{n} commands for {places} pulls"), None),
+        })?;
         PyArray::from_vec(py, values).reshape([n, COLUMNS])
     }
 
     /// The pull in a place so far: its trace, and the label by the label rule where the commands were forces.
     fn result<'py>(&self, py: Python<'py>, place: usize) -> PyResult<Bound<'py, PyDict>> {
-        let places = self.lock();
-        let found = PyDict::new(py);
-        let Some(Some(place)) = places.get(place) else { return Ok(found) };
-        trace_into(&found, &place.trace)?;
-        let Some(session) = &place.session else {
-            found.set_item("status", "no_contact")?;
-            found.set_item("max_pull_force_n", 0.0)?;
-            return Ok(found);
+        let taken = {
+            let places = self.lock_attached(py);
+            let of = |place: &Place| {
+                let largest = place.trace.measured_force_n.iter().copied().fold(0.0, f64::max);
+                let slid = place.session.as_ref().map(PullSession::has_slid);
+                let label = slid.filter(|_| place.forces_only).and_then(|slid| {
+                    slip_label(&place.trace, place.tolerance_n, slid).ok().map(|l| l.max_pull_force_n)
+                });
+                (place.trace.clone(), slid, label.unwrap_or(largest))
+            };
+            places.get(place).and_then(Option::as_ref).map(of)
         };
-        let slid = session.has_slid();
-        found.set_item("status", if slid { "slipped" } else { "censored" })?;
-        let largest = place.trace.measured_force_n.iter().copied().fold(0.0, f64::max);
-        let label = slip_label(&place.trace, place.tolerance_n, slid).ok().filter(|_| place.forces_only);
-        found.set_item("max_pull_force_n", label.map_or(largest, |l| l.max_pull_force_n))?;
+        let found = PyDict::new(py);
+        let Some((trace, slid, max_pull_force_n)) = taken else { return Ok(found) };
+        trace_into(&found, &trace)?;
+        let status = match slid {
+            None => "no_contact",
+            Some(true) => "slipped",
+            Some(false) => "censored",
+        };
+        found.set_item("status", status)?;
+        found.set_item("max_pull_force_n", if slid.is_none() { 0.0 } else { max_pull_force_n })?;
         Ok(found)
     }
 }
 
 impl Pulls {
-    fn lock(&self) -> MutexGuard<'_, Vec<Option<Place>>> {
-        self.places.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The lock, waited for without the interpreter's.
+    fn lock_attached<'a>(&'a self, py: Python<'a>) -> MutexGuard<'a, Vec<Option<Place>>> {
+        self.places.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 }
 
