@@ -57,6 +57,7 @@ mod library;
 mod location;
 mod measured;
 mod paper;
+mod parallel;
 mod picture;
 mod plan;
 mod predict;
@@ -98,7 +99,11 @@ pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError};
 pub use measured::{LoadPullsError, LoadedPulls, load_pulls};
 pub use paper::{PaperError, PaperReport, paper_report};
-pub use picture::{PictureSampleError, contact_sheet, contact_sheet_samples, sample_picture};
+pub use parallel::in_parallel;
+pub use picture::{
+    CONTACT_SHEET, PictureSampleError, contact_sheet, contact_sheet_samples, publish_contact_sheet,
+    sample_picture,
+};
 pub use plan::{Plan, Probe, plan};
 pub use predict::PullPredictor;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};

@@ -12,4 +12,4 @@ pub(crate) use canvas::{Anchor, Canvas, Rgb, TextStyle};
 pub(crate) use paper::paper_picture;
 pub use sample::{PictureSampleError, sample_picture};
 pub(crate) use scene::{Scene, SceneMesh, View};
-pub use sheet::{contact_sheet, contact_sheet_samples};
+pub use sheet::{CONTACT_SHEET, contact_sheet, contact_sheet_samples, publish_contact_sheet};

@@ -4,6 +4,7 @@ mod signals;
 mod table;
 
 use crate::cache::Cache;
+use crate::parallel::in_parallel;
 use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
 use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
 use gripgen_twin::config::Feedback;
@@ -13,7 +14,6 @@ use signals::Signals;
 use std::cell::RefCell;
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use table::{LabelTable, Scattered};
 
 /// Longest pull that is looked at.
@@ -422,19 +422,6 @@ impl PredictPulls for PullPredictor<'_> {
     }
 
     fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync)) {
-        let next = AtomicUsize::new(0);
-        std::thread::scope(|scope| {
-            for _ in 0..self.jobs.min(n) {
-                scope.spawn(|| {
-                    loop {
-                        let i = next.fetch_add(1, Ordering::Relaxed);
-                        if i >= n {
-                            break;
-                        }
-                        task(i);
-                    }
-                });
-            }
-        });
+        in_parallel(n, self.jobs, task);
     }
 }

@@ -1,7 +1,7 @@
 //! Imprint constants from tactile images: those that the images were made with come back.
 
 use crate::common::{jobs, run, small_project};
-use gripgen::record::{RunFolder, ShardReader, encode_png, write_pull_folder};
+use gripgen::record::{Dataset, RunFolder, ShardReader, encode_png, write_pull_folder};
 use gripgen::twin::TactileImage;
 use gripgen::{ImprintCalibrations, Location, calibrate_imprints, load_pulls};
 use std::path::Path;
@@ -86,4 +86,21 @@ fn images_of_another_part_or_size_are_not_believed() {
     }
     let e = calibrate_imprints(folder.path(), &measured, &twin, &[]).unwrap_err().to_string();
     assert!(e.contains("4x3") && e.contains("320x240"), "{e}");
+}
+
+/// 12 samples in shards of 5, the middle one not done: rows close up, samples keep their indices.
+#[test]
+fn samples_are_found_where_a_shard_is_missing() {
+    let out = tempfile::tempdir().unwrap();
+    run(&small_project(&["images=\"none\"", "mechanics=\"reduced\""]), out.path(), jobs(2));
+    std::fs::remove_file(RunFolder::open(out.path()).unwrap().sidecar_path(1)).unwrap();
+    let rows = Dataset::open(out.path()).unwrap();
+    assert_eq!(rows.table().rows(), 7);
+    for (sample, row) in
+        [(0, Some(0)), (4, Some(4)), (5, None), (9, None), (10, Some(5)), (11, Some(6)), (12, None)]
+    {
+        assert_eq!(rows.row_of(&sample.to_string()), row, "sample {sample}");
+        assert!(row.is_none_or(|row| rows.sample_index(row).unwrap() == sample));
+    }
+    assert_eq!(rows.row_of("p0001"), None);
 }

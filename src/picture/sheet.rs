@@ -32,6 +32,14 @@ pub enum SheetError {
     Read(#[from] ReadError),
 }
 
+/// Name of the overview in a run folder.
+pub const CONTACT_SHEET: &str = "contact-sheet.png";
+
+/// Draws the overview of a run into its folder.
+pub fn publish_contact_sheet(folder: &RunFolder) -> Result<(), SheetError> {
+    Ok(folder.publish(CONTACT_SHEET, &contact_sheet(folder)?)?)
+}
+
 /// A PNG of a few samples, spread over parts and labels.
 pub fn contact_sheet(folder: &RunFolder) -> Result<Vec<u8>, SheetError> {
     let chosen = contact_sheet_samples(folder)?;

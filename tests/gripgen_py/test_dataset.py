@@ -189,7 +189,7 @@ def test_measured_pulls_are_loaded_by_the_same_call(run, tmp_path):
 
 
 def test_failed_samples_are_left_out_unless_asked_for(tmp_path):
-    # 400 N press the part through the gel.
+    # An imprint of 9 mm^3/N at 80 N goes through the gel.
     keys = {"mechanics": "reduced", "vary.grip_force_n": [20, 80], "vary.part": ["gear"], "images": "none",
             "vary.grip_pose": [0], "vary.grip_angle_deg": [0], "parts.gear.imprint_mm3_per_n": 9.0}
     summary = gg.sweep("asset:configs/quickstart.toml", tmp_path / "run", set=keys)

@@ -99,7 +99,6 @@ def test_shell_commands_run_in_their_order(desk):
             plain = command.removeprefix("target/release/")
             if any(plain.startswith(start) for start in NOT_RUN):
                 continue
-            # A first sweep of a newcomer is 10 000 samples; a handful shows that it runs.
             done = subprocess.run(
                 command, shell=True, capture_output=True, text=True, check=False, env=os.environ | {"PATH": path}
             )

@@ -4,12 +4,11 @@ use crate::error;
 use gripgen::record::proto::gripgen_v1::JawContact;
 use gripgen::record::{Column, Dataset as Rows, DatasetError};
 use gripgen::twin::{ContactPatch, Jaw};
-use gripgen::{Project, press_only};
+use gripgen::{Project, in_parallel, press_only};
 use numpy::{IntoPyArray, PyArray, PyArray1, PyArray3, PyArray4, PyArray5, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Rows of simulated or measured pulls, opened for reading. Threads may share it.
@@ -29,12 +28,6 @@ impl Dataset {
 
     fn __len__(&self) -> usize {
         self.rows.table().rows()
-    }
-
-    /// Where it is.
-    #[getter]
-    fn path(&self) -> PathBuf {
-        self.rows.path().to_path_buf()
     }
 
     /// Width and height of the images; None if there are none.
@@ -207,27 +200,7 @@ fn fill<T: Send>(
     threads: usize,
     of: impl Fn(usize, &mut [T]) -> Result<(), DatasetError> + Sync,
 ) -> Result<(), DatasetError> {
-    let threads = threads.clamp(1, rows.len().max(1));
-    if threads == 1 {
-        return rows.iter().zip(values.chunks_mut(each)).try_for_each(|(&row, out)| of(row, out));
-    }
     let pieces: Vec<Mutex<&mut [T]>> = values.chunks_mut(each).map(Mutex::new).collect();
-    let next = AtomicUsize::new(0);
-    let errors = Mutex::new(Vec::new());
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some(i) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|&i| i < rows.len()) {
-                    let mut out = pieces[i].lock().unwrap_or_else(PoisonError::into_inner);
-                    if let Err(e) = of(rows[i], &mut out) {
-                        errors.lock().unwrap_or_else(PoisonError::into_inner).push((i, e));
-                        return;
-                    }
-                }
-            });
-        }
-    });
-    let mut errors = errors.into_inner().unwrap_or_else(PoisonError::into_inner);
-    errors.sort_by_key(|(i, _)| *i);
-    errors.into_iter().next().map_or(Ok(()), |(_, e)| Err(e))
+    let one = |i: usize| of(rows[i], &mut pieces[i].lock().unwrap_or_else(PoisonError::into_inner));
+    in_parallel(rows.len(), threads, one).into_iter().collect()
 }

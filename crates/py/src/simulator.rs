@@ -6,13 +6,12 @@ use gripgen::record::status_name;
 use gripgen::twin::config::Mechanics;
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::{Outcome, PerJaw, PullTrace, Sample, TactileImage};
-use gripgen::{Draw, Location, Simulator as Twin};
+use gripgen::{Draw, Location, Simulator as Twin, in_parallel};
 use numpy::{PyArray, PyArray1, PyArray4, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// A twin with its files, ready to pull. Threads may share it.
 #[pyclass(frozen, module = "gripgen._core")]
@@ -54,12 +53,6 @@ impl Simulator {
         self.twin.twin().parts.keys().cloned().collect()
     }
 
-    /// Largest grip force of one jaw, N.
-    #[getter]
-    fn max_grip_force_n(&self) -> f64 {
-        self.twin.twin().gripper.max_force_n
-    }
-
     /// Width and height of the images.
     #[getter]
     fn image_size_px(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
@@ -88,45 +81,14 @@ impl Simulator {
             .enumerate()
             .map(|(i, v)| Ok((values::drawn(py, v)?, Draw { seed, index: first_index + i as u64 })))
             .collect::<PyResult<_>>()?;
-        let made = py.detach(|| self.simulate(&all, images, trace, threads));
+        let one = |i: usize| self.twin.pull(&all[i].0, all[i].1, images, trace);
+        let made = py.detach(|| in_parallel(all.len(), threads, one));
         made.into_iter()
             .map(|made| match made {
                 Ok(sample) => dict_of(py, sample, trace),
                 Err(e) => Err(error::config(py, e)),
             })
             .collect()
-    }
-}
-
-impl Simulator {
-    fn simulate(
-        &self,
-        all: &[Asked],
-        images: bool,
-        trace: bool,
-        threads: usize,
-    ) -> Vec<Result<Sample, gripgen::twin::config::ConfigError>> {
-        let one = |(values, draw): &Asked| self.twin.pull(values, *draw, images, trace);
-        let threads = threads.clamp(1, all.len().max(1));
-        if threads == 1 {
-            return all.iter().map(one).collect();
-        }
-        let next = AtomicUsize::new(0);
-        let done = Mutex::new(Vec::with_capacity(all.len()));
-        std::thread::scope(|scope| {
-            for _ in 0..threads {
-                scope.spawn(|| {
-                    while let Some(i) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|&i| i < all.len())
-                    {
-                        let made = one(&all[i]);
-                        done.lock().unwrap_or_else(PoisonError::into_inner).push((i, made));
-                    }
-                });
-            }
-        });
-        let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-        done.sort_by_key(|(i, _)| *i);
-        done.into_iter().map(|(_, made)| made).collect()
     }
 }
 

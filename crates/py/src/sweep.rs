@@ -4,7 +4,8 @@ use crate::{error, values};
 use gripgen::record::{FolderError, RunFolder};
 use gripgen::tactile::SimdLevel;
 use gripgen::{
-    Location, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet, contact_sheet_samples,
+    CONTACT_SHEET, Location, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet_samples,
+    publish_contact_sheet,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -14,8 +15,6 @@ use std::time::{Duration, Instant};
 
 /// Time between two looks at the interpreter: signals, and the caller's progress.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(100);
-
-const CONTACT_SHEET: &str = "contact-sheet.png";
 
 /// Makes a run, or what is missing of it. Without `config` the run is the one that `out` already is (see prepare_run).
 /// `on_progress(done, samples)` is called about ten times a second. Returns counts and whether the run is complete.
@@ -68,7 +67,7 @@ pub fn sweep<'py>(
     dict_of(py, &summary)
 }
 
-/// Makes the folder of a run, without samples. Returns the number of samples and of shards, and the shards that are done.
+/// Makes the folder of a run, without samples. Returns the number of samples and of shards.
 #[pyfunction]
 #[pyo3(signature = (config, out, overrides = None))]
 pub fn prepare_run(
@@ -76,17 +75,11 @@ pub fn prepare_run(
     config: &str,
     out: PathBuf,
     overrides: Option<&Bound<'_, PyDict>>,
-) -> PyResult<(u64, u64, Vec<u64>)> {
+) -> PyResult<(u64, u64)> {
     let sets = values::overrides(overrides)?;
     let project = load(py, Some(config), &out, &sets)?;
     let folder = py.detach(|| gripgen::prepare_run(&project, &out)).map_err(|e| error::sweep(py, e))?;
-    let mut done = Vec::new();
-    for shard in 0..folder.info().shards {
-        if folder.finished(shard).map_err(|e| error::sweep(py, e.into()))?.is_some() {
-            done.push(shard);
-        }
-    }
-    Ok((folder.info().samples, folder.info().shards, done))
+    Ok((folder.info().samples, folder.info().shards))
 }
 
 /// Shards whose samples the overview of a run shows; of the others the sidecar and the size of the file are enough to finish
@@ -121,8 +114,7 @@ fn draw_contact_sheet(out: &Path) -> Result<(), String> {
         return Ok(());
     }
     let folder = RunFolder::open(out).map_err(|e| e.to_string())?;
-    let sheet = contact_sheet(&folder).map_err(|e| e.to_string())?;
-    folder.publish(CONTACT_SHEET, &sheet).map_err(|e| e.to_string())
+    publish_contact_sheet(&folder).map_err(|e| e.to_string())
 }
 
 fn dict_of<'py>(py: Python<'py>, summary: &SweepSummary) -> PyResult<Bound<'py, PyDict>> {

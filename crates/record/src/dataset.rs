@@ -210,6 +210,20 @@ impl Dataset {
         }
     }
 
+    /// The row of the sample with this global index, or of the pull with this id.
+    pub fn row_of(&self, id: &str) -> Option<usize> {
+        match &self.source {
+            Source::Run { shards, .. } => {
+                let index: u64 = id.parse().ok()?;
+                let place = shards.partition_point(|s| s.first_sample <= index).checked_sub(1)?;
+                let row = shards[place].first_row + (index - shards[place].first_sample) as usize;
+                let end = shards.get(place + 1).map_or(self.table.rows(), |next| next.first_row);
+                (row < end).then_some(row)
+            }
+            Source::Pulls { measured, .. } => measured.pulls.iter().position(|p| p.id == id),
+        }
+    }
+
     /// Both images of a row into `out`: `[2, height, width, 3]` bytes, left jaw first.
     pub fn images_into(&self, row: usize, out: &mut [u8]) -> Result<(), DatasetError> {
         self.check_row(row)?;

@@ -1,12 +1,12 @@
 //! Presses, and what any set of effects makes of them, at the pixels that are looked at.
 
 use super::candidates::{fitted, free_parameter};
+use crate::parallel::in_parallel;
 use gripgen_identify::{FreeParameter, GroupMoments, GroupedModel};
 use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::{Circle, PressScene, PressSet, PressView, ZONES, surface_part};
 use gripgen_twin::effects::{EffectSpec, GripPoint};
 use gripgen_twin::{Covariates, Jaw, OpticsState};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// What a contact changes at the pixels of a view.
@@ -143,33 +143,9 @@ impl Work {
     }
 }
 
-/// `of` for 0 to `n - 1`, on all cores; the result does not depend on how many there are.
+/// `of` for 0 to `n - 1`, on all cores.
 pub(super) fn for_each<T: Send>(n: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(n.max(1));
-    let next = AtomicUsize::new(0);
-    let run = || {
-        let mut done = Vec::new();
-        loop {
-            let i = next.fetch_add(1, Ordering::Relaxed);
-            if i >= n {
-                return done;
-            }
-            done.push((i, of(i)));
-        }
-    };
-    let mut all: Vec<(usize, T)> = std::thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(run)).collect();
-        let mut all = run();
-        for other in others {
-            match other.join() {
-                Ok(done) => all.extend(done),
-                Err(panic) => std::panic::resume_unwind(panic),
-            }
-        }
-        all
-    });
-    all.sort_by_key(|(i, _)| *i);
-    all.into_iter().map(|(_, value)| value).collect()
+    in_parallel(n, std::thread::available_parallelism().map_or(1, usize::from), of)
 }
 
 /// What the effects of a model make of the optics in some circumstances.

@@ -2,10 +2,9 @@
 
 use crate::args::ShowArgs;
 use crate::commands::open_run;
-use crate::commands::sweep::CONTACT_SHEET;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, write_file};
-use gripgen::{contact_sheet, sample_picture};
+use gripgen::{CONTACT_SHEET, contact_sheet, sample_picture};
 use serde_json::json;
 
 /// Runs the verb.

@@ -8,15 +8,14 @@ use crate::output::{JsonSink, duration, print, program, size};
 use crate::progress::Progress;
 use gripgen::record::{RunFolder, status_name};
 use gripgen::tactile::SimdLevel;
-use gripgen::{Location, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet, sweep};
+use gripgen::{
+    CONTACT_SHEET, Location, Project, SweepEvent, SweepOptions, SweepSummary, publish_contact_sheet, sweep,
+};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Failures that are printed one by one; the rest are in the index.
 const FAILURES_SHOWN: u64 = 10;
-
-/// Name of the overview picture in a run folder.
-pub const CONTACT_SHEET: &str = "contact-sheet.png";
 
 /// Runs the verb.
 pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
@@ -136,8 +135,7 @@ impl<'a> Watch<'a> {
         let took = self.progress.take().map_or(0.0, |p| p.finish().as_secs_f64());
         let sheet = out.join(CONTACT_SHEET);
         if summary.complete && (self.made > 0 || !sheet.exists()) {
-            let folder = RunFolder::open(out)?;
-            folder.publish(CONTACT_SHEET, &contact_sheet(&folder).map_err(Failure::new)?)?;
+            publish_contact_sheet(&RunFolder::open(out)?).map_err(Failure::new)?;
         }
         self.line(&json!({
             "event": "done", "out": out, "samples": summary.samples, "failed": summary.failed,

@@ -11,7 +11,7 @@ use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::power::ScoreTest;
 use super::screen::test;
 use super::search::{Accepted, Search, TIED_WITHIN};
-use super::simulate::{Trusted, trusted};
+use super::simulate::{recalibrate, trusted};
 use super::words::separation;
 use crate::diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate,
@@ -187,24 +187,6 @@ pub fn diagnose_pulls(
         label_n: labels,
     };
     PullAnswer { diagnosis, fits: Some(fits) }
-}
-
-/// Puts what simulated campaigns say into an answer: weights are multiplied by the share of them in which the effect, or what is
-/// tied with it, is found again.
-fn recalibrate(diagnosis: &mut Diagnosis, trusted: &[Trusted]) {
-    for t in trusted {
-        let entries = diagnosis.effects.iter_mut().filter(|e| e.name == t.effect);
-        entries.for_each(|e| {
-            e.weight *= t.recovered.max(0.02);
-            e.indistinguishable_from.iter_mut().for_each(|r| r.weight *= t.recovered.max(0.02));
-        });
-        diagnosis.notes.push(format!(
-            "of simulated campaigns with these pulls and this {}, {:.0} % name it, or what is tied with it, first; of those without it, {:.0} % name something",
-            t.effect,
-            100.0 * t.recovered,
-            100.0 * t.false_alarms
-        ));
-    }
 }
 
 /// Standard deviations of labels, as a fit sees them.

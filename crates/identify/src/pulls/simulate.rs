@@ -6,6 +6,7 @@
 
 use super::power::ScoreTest;
 use super::search::{Accepted, CURVE_GAIN, NAMED_GAIN, Rival, Search, Tied};
+use crate::diagnosis::Diagnosis;
 use crate::draws::Draws;
 use nalgebra::DVector;
 
@@ -39,6 +40,24 @@ pub fn trusted(search: &Search<'_>, accepted: &Accepted) -> Vec<Trusted> {
         of_effect(search, accepted, *i, &set)
     };
     acting.map(of).collect()
+}
+
+/// Puts what simulated campaigns say into an answer: weights are multiplied by the share of them in which the effect, or what is
+/// tied with it, is found again.
+pub fn recalibrate(diagnosis: &mut Diagnosis, trusted: &[Trusted]) {
+    for t in trusted {
+        let entries = diagnosis.effects.iter_mut().filter(|e| e.name == t.effect);
+        entries.for_each(|e| {
+            e.weight *= t.recovered.max(0.02);
+            e.indistinguishable_from.iter_mut().for_each(|r| r.weight *= t.recovered.max(0.02));
+        });
+        diagnosis.notes.push(format!(
+            "of simulated campaigns with these pulls and this {}, {:.0} % name it, or what is tied with it, first; of those without it, {:.0} % name something",
+            t.effect,
+            100.0 * t.recovered,
+            100.0 * t.false_alarms
+        ));
+    }
 }
 
 /// Of one effect; `set` is it and what is tied with it.

@@ -97,7 +97,7 @@ def sweep(
             publish(local / "run.json", store.read("run.json"))
         elif foreign := [n for n in there if not n.endswith(".partial") and not n.startswith("inputs")]:
             raise _core.GripgenError(f"{out} is not empty and holds no run (no run.json, but {foreign[0]})")
-        samples, shards, _ = _core.prepare_run(os.fspath(config), str(local), dict(set or {}))
+        samples, shards = _core.prepare_run(os.fspath(config), str(local), dict(set or {}))
         run = {str(p.relative_to(local)): p.read_bytes() for p in local.rglob("*") if p.is_file()}
         # run.json last: a folder that has it has its inputs.
         for name in sorted(run, key=lambda n: n == "run.json"):
