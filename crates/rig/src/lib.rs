@@ -5,6 +5,11 @@
 //! streams, RTDE's socket, and the pull as a program for the robot; the experiment itself follows.
 
 pub mod camera;
+pub mod dashboard;
 pub mod gcl;
-pub mod pull_program;
+pub mod primary;
+pub mod program;
+pub mod robot_state;
 pub mod rtde;
+pub mod stamped;
+pub mod virtual_rig;

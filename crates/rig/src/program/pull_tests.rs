@@ -26,7 +26,7 @@ fn blocks_close_where_they_open() {
         }
     }
     assert!(open.is_empty());
-    assert!(text.ends_with("end\ngripgen_pull()\n"), "nothing after the call");
+    assert!(text.ends_with("\nend\n"), "nothing after the function");
 }
 
 #[test]
@@ -58,7 +58,7 @@ fn the_watchdog_is_set_after_the_first_heartbeat_and_before_anything_moves() {
         "rtde_set_watchdog(\"input_int_register_24\", 10.0, \"stop\")",
         "zero_ftsensor()",
         "write_output_integer_register(24, 2)",
-        "read_input_integer_register(25) != 1",
+        "read_input_integer_register(25) != run_id",
         "start = get_actual_tcp_pose()",
         "force_mode(frame",
     ];
@@ -73,13 +73,15 @@ fn the_numbers_of_the_pull_stand_in_the_program() {
         (p.max_force_n, p.abort_force_n, p.speed_mm_s, p.direction) = (30.0, 35.0, 10.0, -1.0);
     });
     for wanted in [
-        "desired = step * 0.500000",
-        "floor(time / 0.200000) + 1",
-        "desired > 30.000000",
-        "norm(wrench[2]) > 35.000000",
-        "norm(moved) > 0.003000",
-        "[0, 0, -1 * desired, 0, 0, 0], 2, [0.005000, 0.005000, 0.010000, 0.03, 0.03, 0.03]",
-        "read_input_integer_register(25) != 7",
+        "  run_id = 7\n",
+        "  increment_n = 0.500000\n",
+        "  step_s = 0.200000\n",
+        "  max_force_n = 30.000000\n",
+        "  abort_force_n = 35.000000\n",
+        "  stop_mm = 3.000000\n",
+        "  direction = -1.000000\n",
+        "[0, 0, direction * desired, 0, 0, 0], 2, [aside_m, aside_m, speed_mm_s / 1000, 0.03, 0.03, 0.03])",
+        "read_input_integer_register(25) != run_id",
     ] {
         assert!(text.contains(wanted), "{wanted}\n{text}");
     }
@@ -89,6 +91,24 @@ fn the_numbers_of_the_pull_stand_in_the_program() {
     {
         assert!((24..48).contains(&digits.parse::<u8>().unwrap()), "{digits}");
     }
+}
+
+#[test]
+fn a_program_is_read_back_and_nothing_else_is_taken_for_one() {
+    let program = PullProgram { run: 12, increment_n: 0.7, direction: -1.0, ..PullProgram::default() };
+    let text = program.script().unwrap();
+    assert_eq!(PullProgram::from_script(&text), Some(program));
+    for (good, bad) in [
+        ("stopl(2.0)", "stopl(0.1)"),
+        ("increment_n = 0.7", "increment_n = 7.0"),
+        ("  run_id = 12", "  run_id = 0"),
+        ("  end\nend\n", "  end\nend\nmovel(p[0,0,0,0,0,0])\n"),
+    ] {
+        let other = text.replacen(good, bad, 1);
+        assert_ne!(other, text);
+        assert_eq!(PullProgram::from_script(&other), None, "{bad}");
+    }
+    assert_eq!(PullProgram::from_script(""), None);
 }
 
 #[test]
@@ -105,4 +125,28 @@ fn nothing_beyond_the_limits_becomes_a_program() {
     assert!(refused(|p| p.step_s = f64::NAN).contains("NaN"));
     assert!(refused(|p| p.centre_of_gravity_mm = [0.0, f64::NAN, 0.0]).contains("centre of gravity is NaN"));
     assert!(refused(|p| p.run = 0).contains("the run is 0"));
+}
+
+/// Words that URScript has itself cannot be names.
+#[test]
+fn no_name_is_a_word_of_the_language() {
+    const WORDS: [&str; 12] =
+        ["run", "force", "time", "thread", "kill", "sync", "global", "local", "def", "sec", "join", "pause"];
+    let motion = MotionProgram {
+        run: 1,
+        target: TcpPose { position_m: [0.3, 0.0, 0.2], rotation_rad: [0.0; 3] },
+        speed_mm_s: 50.0,
+        abort_force_n: 20.0,
+        max_time_s: 10.0,
+        payload_kg: 1.0,
+        centre_of_gravity_mm: [0.0; 3],
+        tool_mm: [0.0; 3],
+    };
+    for text in [script(|_| ()), motion.script().unwrap()] {
+        for line in text.lines() {
+            if let Some((name, _)) = line.trim().trim_start_matches("global ").split_once(" = ") {
+                assert!(!WORDS.contains(&name), "{line}");
+            }
+        }
+    }
 }

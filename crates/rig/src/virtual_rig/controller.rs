@@ -1,0 +1,295 @@
+//! The virtual robot's controller: power, safety, programs, watchdog, one control step after the other.
+
+use super::arm::{Arm, ArmError, STEP_S};
+use super::plant::Plant;
+use super::robot::{Registers, Robot, RuntimeState};
+use super::rtde_control::RtdeControl;
+use super::running::{Kind, Progress, Running};
+use crate::program::{HEARTBEAT_LEAST_HZ, MotionProgram, PullProgram, TcpPose, registers};
+use crate::robot_state::{RobotMode, SafetyStatus};
+use crate::rtde::Value;
+use std::sync::Arc;
+
+/// Time on the controller's clock when the rig starts: clients do not trust a controller in its first seconds.
+const BOOTED_S: f64 = 60.0;
+/// How long a protective stop stays before it can be unlocked.
+const UNLOCK_AFTER_S: f64 = 5.0;
+
+/// What the controller tells everybody.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Announcement {
+    /// A program runs.
+    Started {
+        /// Its name.
+        title: String,
+    },
+    /// It does not run any more.
+    Stopped {
+        /// Its name.
+        title: String,
+        /// Why, if not by itself.
+        why: String,
+    },
+    /// A program that this controller cannot run.
+    CannotRun {
+        /// What is wrong.
+        problem: String,
+    },
+    /// The safety system changed.
+    Safety(SafetyStatus),
+}
+
+enum Program {
+    Own(Running),
+    RtdeControl(RtdeControl),
+}
+
+impl Program {
+    fn title(&self) -> &'static str {
+        match self {
+            Program::Own(running) => running.title(),
+            Program::RtdeControl(_) => "rtde_control",
+        }
+    }
+}
+
+struct Watchdog {
+    register: usize,
+    period_s: f64,
+}
+
+/// The controller.
+pub struct Controller {
+    robot: Robot,
+    arm: Arm,
+    program: Option<Program>,
+    watchdog: Option<Watchdog>,
+    /// When each integer register was last written.
+    written_s: [f64; 48],
+    clock_rate: f64,
+    stopped_s: f64,
+    announcements: Vec<Announcement>,
+}
+
+impl Controller {
+    /// A controller that is powered on with its brakes released. `clock_rate` is how many times faster than real time it runs.
+    pub fn new(plant: Arc<dyn Plant>, tcp: TcpPose, clock_rate: f64) -> Self {
+        let robot = Robot {
+            timestamp_s: BOOTED_S,
+            mode: RobotMode::Running,
+            safety: SafetyStatus::Normal,
+            runtime: RuntimeState::Stopped,
+            tcp,
+            velocity_m_s: [0.0; 3],
+            wrench: [0.0; 6],
+            raw_wrench: [0.0; 6],
+            payload_kg: 0.0,
+            centre_of_gravity_m: [0.0; 3],
+            inputs: Registers::default(),
+            outputs: Registers::default(),
+        };
+        Self {
+            robot,
+            arm: Arm::new(plant, tcp),
+            program: None,
+            watchdog: None,
+            written_s: [BOOTED_S; 48],
+            clock_rate,
+            stopped_s: f64::NEG_INFINITY,
+            announcements: Vec::new(),
+        }
+    }
+
+    /// The robot as it is now.
+    pub fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// The arm.
+    pub fn arm(&self) -> &Arm {
+        &self.arm
+    }
+
+    /// The arm, to close and open its jaws and hang masses on it.
+    pub fn arm_mut(&mut self) -> &mut Arm {
+        &mut self.arm
+    }
+
+    /// What was announced since the last call.
+    pub fn take_announcements(&mut self) -> Vec<Announcement> {
+        std::mem::take(&mut self.announcements)
+    }
+
+    /// Name of the program that runs or is paused.
+    pub fn program_title(&self) -> Option<&'static str> {
+        self.program.as_ref().map(Program::title)
+    }
+
+    /// Somebody else has something to tell.
+    pub fn announce_problem(&mut self, problem: &str) {
+        self.announcements.push(Announcement::CannotRun { problem: problem.into() });
+    }
+
+    /// A client wrote an input.
+    pub fn write_input(&mut self, name: &str, value: Value) {
+        self.robot.write_input(name, value);
+        let register =
+            name.strip_prefix("input_int_register_").and_then(|digits| digits.parse::<usize>().ok());
+        if let Some(at) = register.and_then(|i| self.written_s.get_mut(i)) {
+            *at = self.robot.timestamp_s;
+        }
+    }
+
+    /// A client sent a program. It replaces the one that runs.
+    pub fn run_script(&mut self, text: &str) {
+        let program = PullProgram::from_script(text)
+            .map(Kind::Pull)
+            .or_else(|| MotionProgram::from_script(text).map(Kind::Motion))
+            .map(|kind| Program::Own(Running::new(kind, self.clock_rate)))
+            .or_else(|| RtdeControl::from_script(text).map(Program::RtdeControl));
+        let Some(program) = program else {
+            // A stop in one line is understood, as every client's last resort.
+            if matches!(text.trim(), "stopl(2.0)" | "halt" | "stopj(2.0)") {
+                return self.stop_program("a script said stop");
+            }
+            let first = text.lines().next().unwrap_or_default();
+            let problem = format!("this rig runs the programs of gripgen and of ur_rtde, not `{first}`");
+            return self.announcements.push(Announcement::CannotRun { problem });
+        };
+        self.stop_program("another program replaces it");
+        if self.robot.mode != RobotMode::Running || self.robot.safety != SafetyStatus::Normal {
+            let (mode, safety) = (self.robot.mode.name(), self.robot.safety.name());
+            let problem = format!("the robot is {mode} and {safety}: no program can run");
+            return self.announcements.push(Announcement::CannotRun { problem });
+        }
+        self.announcements.push(Announcement::Started { title: program.title().into() });
+        self.program = Some(program);
+        self.robot.runtime = RuntimeState::Playing;
+    }
+
+    /// Ends the program and brakes.
+    pub fn stop_program(&mut self, why: &str) {
+        if let Some(program) = self.program.take() {
+            let (title, why) = (program.title().into(), why.into());
+            self.announcements.push(Announcement::Stopped { title, why });
+        }
+        self.watchdog = None;
+        self.robot.runtime = RuntimeState::Stopped;
+        self.arm.stop();
+    }
+
+    /// The emergency stop: no power.
+    pub fn emergency_stop(&mut self) {
+        self.stop_program("emergency stop");
+        self.robot.mode = RobotMode::PowerOff;
+        self.set_safety(SafetyStatus::RobotEmergencyStop);
+    }
+
+    /// The controller stops by itself; the program waits.
+    pub fn protective_stop(&mut self) {
+        self.arm.stop();
+        self.watchdog = None;
+        if self.program.is_some() {
+            self.robot.runtime = RuntimeState::Paused;
+        }
+        self.stopped_s = self.robot.timestamp_s;
+        self.set_safety(SafetyStatus::ProtectiveStop);
+    }
+
+    /// Leaves a protective stop, or says why not yet. The program stays where it is.
+    pub fn unlock(&mut self) -> Result<(), String> {
+        let passed_s = self.robot.timestamp_s - self.stopped_s;
+        if self.robot.safety != SafetyStatus::ProtectiveStop {
+            return Ok(());
+        }
+        if passed_s < UNLOCK_AFTER_S {
+            return Err(format!("{passed_s:.1} s have passed since the stop, {UNLOCK_AFTER_S} s are needed"));
+        }
+        self.set_safety(SafetyStatus::Normal);
+        Ok(())
+    }
+
+    /// The emergency stop is released and the safety system starts anew.
+    pub fn restart_safety(&mut self) {
+        self.set_safety(SafetyStatus::Normal);
+    }
+
+    /// Power and brakes.
+    pub fn set_mode(&mut self, mode: RobotMode) {
+        if mode != RobotMode::Running {
+            self.stop_program("the arm loses its power or its brakes are on");
+        }
+        self.robot.mode = mode;
+    }
+
+    /// The program waits, the arm brakes.
+    pub fn pause(&mut self) {
+        if self.program.is_some() {
+            self.arm.stop();
+            self.robot.runtime = RuntimeState::Paused;
+        }
+    }
+
+    /// A paused program goes on.
+    pub fn play(&mut self) {
+        if self.program.is_some() && self.robot.safety == SafetyStatus::Normal {
+            self.robot.runtime = RuntimeState::Playing;
+        }
+    }
+
+    fn set_safety(&mut self, safety: SafetyStatus) {
+        self.robot.safety = safety;
+        self.announcements.push(Announcement::Safety(safety));
+    }
+
+    /// First half of a control step: the program reads the sensors and writes its registers. What clients get is the robot
+    /// after it.
+    pub fn begin_step(&mut self) {
+        if self.robot.runtime != RuntimeState::Playing {
+            return;
+        }
+        if let Some(dog) = &self.watchdog {
+            let silent_s = self.robot.timestamp_s - self.written_s[dog.register];
+            if silent_s > dog.period_s {
+                return self.stop_program("the host does not write its heartbeat any more");
+            }
+        }
+        let (robot, arm) = (&mut self.robot, &mut self.arm);
+        let (progress, register, rate_hz) = match &mut self.program {
+            Some(Program::Own(running)) => {
+                (running.step(robot, arm), usize::from(registers::HEARTBEAT), HEARTBEAT_LEAST_HZ)
+            }
+            Some(Program::RtdeControl(control)) => {
+                let progress = control.step(robot, arm);
+                (progress, control.command_register(), control.watchdog_hz(robot))
+            }
+            None => return,
+        };
+        match progress {
+            Progress::Running => {}
+            Progress::SetWatchdog => {
+                // It watches the host, whose time is not that of a faster clock.
+                self.watchdog = Some(Watchdog { register, period_s: self.clock_rate / rate_hz });
+            }
+            Progress::Ended => self.stop_program(""),
+        }
+    }
+
+    /// Second half: time and physics go on.
+    pub fn end_step(&mut self) {
+        self.robot.timestamp_s += STEP_S;
+        match self.arm.advance(self.robot.timestamp_s) {
+            Ok(()) => {}
+            Err(ArmError::Collision { .. }) => self.protective_stop(),
+            Err(e @ ArmError::Plant(_)) => {
+                self.announcements.push(Announcement::CannotRun { problem: e.to_string() });
+                self.stop_program("the plant cannot go on");
+            }
+        }
+        self.robot.tcp = self.arm.tcp();
+        self.robot.velocity_m_s = self.arm.velocity_m_s();
+        let (force_n, raw_n) = self.arm.force_z_n();
+        (self.robot.wrench[2], self.robot.raw_wrench[2]) = (force_n, raw_n);
+    }
+}

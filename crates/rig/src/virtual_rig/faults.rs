@@ -1,0 +1,134 @@
+//! What can go wrong, on demand: on the wire, with the robot, with the part.
+
+use gripgen_twin::Jaw;
+
+/// A device of the rig, by its connections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Device {
+    /// RTDE.
+    Rtde,
+    /// The dashboard.
+    Dashboard,
+    /// Primary, secondary and real-time port.
+    Script,
+    /// The gripper.
+    Gripper,
+    /// The camera behind the left gel.
+    CameraLeft,
+    /// The camera behind the right gel.
+    CameraRight,
+}
+
+impl Device {
+    /// All of them, with their words.
+    pub const ALL: [(Device, &'static str); 6] = [
+        (Device::Rtde, "rtde"),
+        (Device::Dashboard, "dashboard"),
+        (Device::Script, "script"),
+        (Device::Gripper, "gripper"),
+        (Device::CameraLeft, "camera-left"),
+        (Device::CameraRight, "camera-right"),
+    ];
+
+    /// Its word.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(device, _)| *device == self).map_or("", |(_, name)| *name)
+    }
+}
+
+/// A fault.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Fault {
+    /// Its connections are closed.
+    Drop(Device),
+    /// For so long it sends nothing; then everything.
+    Delay(Device, f64),
+    /// Half of what it sends next goes out, then its connections are closed.
+    Truncate(Device),
+    /// What it sends next has damaged bytes.
+    Garble(Device),
+    /// Its connections are closed and new ones are refused, until `accept`.
+    Refuse(Device),
+    /// It takes connections again.
+    Accept(Device),
+    /// The red button.
+    EmergencyStop,
+    /// The red button is released, the safety system restarted.
+    ReleaseEmergencyStop,
+    /// The controller stops by itself.
+    ProtectiveStop,
+    /// A camera sends the same frame with the same stamp for ever.
+    Freeze(Jaw),
+    /// It sees again.
+    Thaw(Jaw),
+    /// The part slips out of the jaws.
+    PartLost,
+    /// A mass hangs on the tool, in kg; 0 takes it off.
+    Hang(f64),
+}
+
+/// Words that are no fault.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{line}` is none of: drop|truncate|garble|refuse|accept DEVICE, delay DEVICE S, estop, release-estop, protective-stop, \
+     freeze|thaw left|right, part-lost, hang KG; devices: rtde, dashboard, script, gripper, camera-left, camera-right"
+)]
+pub struct FaultError {
+    /// The words.
+    pub line: String,
+}
+
+impl std::str::FromStr for Fault {
+    type Err = FaultError;
+
+    fn from_str(line: &str) -> Result<Self, FaultError> {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let device = |word: &str| Device::ALL.iter().find(|(_, name)| *name == word).map(|(d, _)| *d);
+        let jaw = |word: &str| match word {
+            "left" => Some(Jaw::Left),
+            "right" => Some(Jaw::Right),
+            _ => None,
+        };
+        let number = |word: &str, most: f64| word.parse().ok().filter(|x: &f64| (0.0..=most).contains(x));
+        let fault = match words[..] {
+            ["drop", d] => device(d).map(Fault::Drop),
+            ["truncate", d] => device(d).map(Fault::Truncate),
+            ["garble", d] => device(d).map(Fault::Garble),
+            ["refuse", d] => device(d).map(Fault::Refuse),
+            ["accept", d] => device(d).map(Fault::Accept),
+            ["delay", d, s] => device(d).zip(number(s, 3600.0)).map(|(d, s)| Fault::Delay(d, s)),
+            ["estop"] => Some(Fault::EmergencyStop),
+            ["release-estop"] => Some(Fault::ReleaseEmergencyStop),
+            ["protective-stop"] => Some(Fault::ProtectiveStop),
+            ["freeze", j] => jaw(j).map(Fault::Freeze),
+            ["thaw", j] => jaw(j).map(Fault::Thaw),
+            ["part-lost"] => Some(Fault::PartLost),
+            ["hang", kg] => number(kg, 5.0).map(Fault::Hang),
+            _ => None,
+        };
+        fault.ok_or_else(|| FaultError { line: line.trim().chars().take(80).collect() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_are_read_from_words() {
+        for (line, fault) in [
+            ("drop rtde", Fault::Drop(Device::Rtde)),
+            (" delay  gripper 0.5 ", Fault::Delay(Device::Gripper, 0.5)),
+            ("truncate camera-left", Fault::Truncate(Device::CameraLeft)),
+            ("freeze right", Fault::Freeze(Jaw::Right)),
+            ("estop", Fault::EmergencyStop),
+            ("hang 1.0", Fault::Hang(1.0)),
+        ] {
+            assert_eq!(line.parse(), Ok(fault));
+        }
+        for bad in ["", "drop", "drop nothing", "delay rtde", "delay rtde -1", "hang nan", "estop now"] {
+            assert!(bad.parse::<Fault>().is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! The ports, one kind a function.
+
+pub(super) mod socket;
