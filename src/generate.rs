@@ -183,7 +183,7 @@ pub fn start_pull(
 }
 
 /// The session of this repetition, the friction laws of both jaws, and the factor of its scatter.
-fn pull_session(
+pub(crate) fn pull_session(
     twin: &Twin,
     scenario: &Scenario,
     contact: &Contact,

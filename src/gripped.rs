@@ -77,10 +77,7 @@ impl Gripped {
             PerJaw::from_fn(|jaw| optics_state(twin, &scenario.part, &grip_point(scenario, jaw, 0.0)));
         let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, arm, &shape))?
         else {
-            let differs = options.images && Jaw::BOTH.iter().any(|&jaw| optics[jaw].changes_frame());
-            let look =
-                differs.then(|| Look::Change(renderers.map(|jaw, r| r.change_seen(None, &optics[jaw]))));
-            return Ok(Self { sensors, contact: None, look });
+            return Self::at_rest(twin, library, scenario, options);
         };
         let parts = placed_parts(twin, library, scenario, &force_n, &held.grasp)?;
         let mesh = library.clustered_mesh(part)?;
@@ -108,6 +105,26 @@ impl Gripped {
             Some(Look::Change(renderers.map(|jaw, r| r.change_seen(Some(&seen[jaw]), &optics[jaw]))))
         };
         Ok(Self { sensors, contact: Some(Contact { held, imprint, force_n }), look })
+    }
+
+    /// Open jaws, or jaws that miss the part.
+    pub(crate) fn at_rest(
+        twin: &Twin,
+        library: &Library,
+        scenario: &Scenario,
+        options: SimulateOptions,
+    ) -> Result<Self, SampleError> {
+        let sensors = PerJaw::try_from_fn(|jaw| library.sensor(&twin.optics[jaw]))?;
+        let optics =
+            PerJaw::from_fn(|jaw| optics_state(twin, &scenario.part, &grip_point(scenario, jaw, 0.0)));
+        let differs = options.images && Jaw::BOTH.iter().any(|&jaw| optics[jaw].changes_frame());
+        let look = differs.then(|| {
+            Look::Change(PerJaw::from_fn(|jaw| {
+                let renderer = Renderer { sensor: &sensors[jaw], gel: &twin.gel[jaw], level: options.level };
+                renderer.change_seen(None, &optics[jaw])
+            }))
+        });
+        Ok(Self { sensors, contact: None, look })
     }
 
     /// The images of one repetition.

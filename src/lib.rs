@@ -60,6 +60,7 @@ mod paper;
 mod parallel;
 mod picture;
 mod plan;
+mod plant;
 mod predict;
 mod press_columns;
 mod press_report;
@@ -105,6 +106,7 @@ pub use picture::{
     sample_picture,
 };
 pub use plan::{Plan, Probe, plan};
+pub use plant::{Fixture, PlantGrip, PlantPull, PlantReading, TwinPlant, tool_at};
 pub use predict::PullPredictor;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};
 pub use press_report::{PressReportText, press_report};

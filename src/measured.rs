@@ -2,11 +2,16 @@
 
 use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_record::{
-    FolderError, PullFolderError, ReadError, RunFolder, ShardReader, read_pull_folder, sha256_hex,
+    FolderError, PullFolderError, RIG_SOURCE, ReadError, RigCampaign, RunFolder, ShardReader,
+    read_pull_folder, rig_campaign, sha256_hex,
 };
 use gripgen_twin::config::Feedback;
-use gripgen_twin::{Covariates, KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, PullTrace};
+use gripgen_twin::draw::Drawn;
+use gripgen_twin::{
+    Covariates, ExtraColumn, ExtraValues, KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, PullTrace,
+};
 use serde::Deserialize;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Measured pulls, and remarks for people: what was left out.
@@ -45,7 +50,8 @@ pub enum LoadPullsError {
 ///
 /// Of a run folder, pulls without a slip (failed, without contact, censored) are left out and counted in the notes, and so
 /// are those whose label rule is not that of the first. Its covariates are those stored with each sample; what a sweep
-/// drew beside them (`parts.gear.mu`) is not known to an experiment and stays out.
+/// drew beside them (`parts.gear.mu`) is not known to an experiment and stays out, what a rig measured beside them is a
+/// covariate of unknown meaning.
 pub fn load_pulls(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
     if path.join("run.json").is_file() {
         return load_run(path);
@@ -56,6 +62,7 @@ pub fn load_pulls(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
 /// Pulls of a run that are left out, by reason.
 #[derive(Default)]
 struct LeftOut {
+    rig: bool,
     failed: usize,
     no_contact: usize,
     censored: usize,
@@ -76,8 +83,10 @@ impl LeftOut {
             .filter(|(n, _)| *n > 0)
             .map(|(n, what)| format!("{n} pulls were left out: they {what}"))
             .collect();
-        if self.unfinished_shards > 0 {
-            notes.push(format!("{} shards are not finished and were left out", self.unfinished_shards));
+        match self.unfinished_shards {
+            0 => {}
+            n if self.rig => notes.push(format!("{n} pulls of the campaign are not made yet")),
+            n => notes.push(format!("{n} shards are not finished and were left out")),
         }
         notes
     }
@@ -85,7 +94,9 @@ impl LeftOut {
 
 fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
     let folder = RunFolder::open(path)?;
-    let (mut pulls, mut left_out, mut hashes) = (Vec::new(), LeftOut::default(), String::new());
+    let rig = (folder.info().source == RIG_SOURCE).then(|| rig_campaign(&folder)).transpose()?;
+    let mut left_out = LeftOut { rig: rig.is_some(), ..LeftOut::default() };
+    let (mut pulls, mut hashes) = (Vec::new(), String::new());
     let mut rule: Option<(f64, f64)> = None;
     for shard in 0..folder.info().shards {
         let Some(sidecar) = folder.finished(shard)? else {
@@ -100,7 +111,8 @@ fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
                 Status::Slipped => {
                     let mine = (sample.label_tolerance_n, sample.stop_mm);
                     if *rule.get_or_insert(mine) == mine {
-                        pulls.extend(measured(sample, trace));
+                        let beside = if rig.is_some() { measured_beside(&sample) } else { BTreeMap::new() };
+                        pulls.extend(measured(sample, trace, beside));
                         continue;
                     }
                     &mut left_out.other_rule
@@ -125,15 +137,62 @@ fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
         feedback: feedback_of(&folder.info().config_toml),
         sha256: sha256_hex(hashes.as_bytes()),
     };
-    // The samples of a sweep have no order in which they were made.
-    if folder.info().source == "rig" {
-        pulls.count_rests();
+    if let Some(campaign) = rig {
+        as_made(&mut pulls, campaign);
     }
     Ok(LoadedPulls { pulls, notes })
 }
 
+/// What is known of pulls that a rig made, and samples of a sweep have not: the order in which they were made, rests
+/// between them, what was written down.
+fn as_made(pulls: &mut MeasuredPulls, campaign: RigCampaign) {
+    pulls.feedback = campaign.feedback;
+    if let Some(recorded) = campaign.recorded {
+        let always = ["part", "grip_force_n"];
+        pulls.recorded.retain(|c| always.contains(&c.as_str()) || recorded.contains(c));
+    }
+    if pulls.recorded.iter().any(|c| c == "time_s") {
+        // A pull that failed at first was made again after the others.
+        pulls.pulls.sort_by(|a, b| a.covariates.time_s.total_cmp(&b.covariates.time_s));
+    }
+    let names: BTreeSet<String> =
+        pulls.pulls.iter().flat_map(|p| p.covariates.extra.keys().cloned()).collect();
+    pulls.extra = names.into_iter().map(|name| extra_column(name, &pulls.pulls)).collect();
+    pulls.count_rests();
+}
+
+/// A column of unknown meaning: numbers if every value is one.
+fn extra_column(name: String, pulls: &[MeasuredPull]) -> ExtraColumn {
+    let values = || pulls.iter().map(|p| p.covariates.extra.get(&name));
+    let values = match values().any(|v| matches!(v, Some(Drawn::Text(_)))) {
+        true => ExtraValues::Text(values().map(|v| v.map_or(String::new(), Drawn::to_string)).collect()),
+        false => ExtraValues::Number(
+            values()
+                .map(|v| match v {
+                    Some(Drawn::Number(x)) => *x,
+                    _ => f64::NAN,
+                })
+                .collect(),
+        ),
+    };
+    ExtraColumn { name, values }
+}
+
+/// What was measured of a pull beside the known covariates.
+fn measured_beside(sample: &Sample) -> BTreeMap<String, Drawn> {
+    let numbers = sample.drawn_number.iter().filter(|(_, x)| x.is_finite());
+    let numbers = numbers.map(|(name, x)| (name.clone(), Drawn::Number(*x)));
+    let words = sample.drawn_text.iter().filter(|(_, word)| !word.is_empty());
+    let words = words.map(|(name, word)| (name.clone(), Drawn::Text(word.clone())));
+    numbers.chain(words).filter(|(name, _)| !KNOWN_COLUMNS.contains(&name.as_str())).collect()
+}
+
 /// A pull that slipped; `None` if it has no label after all.
-fn measured(sample: Sample, trace: Option<PullTrace>) -> Option<MeasuredPull> {
+fn measured(
+    sample: Sample,
+    trace: Option<PullTrace>,
+    extra: BTreeMap<String, Drawn>,
+) -> Option<MeasuredPull> {
     Some(MeasuredPull {
         id: sample.index.to_string(),
         max_pull_force_n: sample.max_pull_force_n?,
@@ -150,14 +209,14 @@ fn measured(sample: Sample, trace: Option<PullTrace>) -> Option<MeasuredPull> {
             grip_offset_m: sample.grip_offset_mm * 1e-3,
             grip_angle_rad: sample.grip_angle_deg.to_radians(),
             pull_direction: f64::from(sample.pull_direction),
-            ..Covariates::default()
+            extra,
         },
         part: sample.part,
         trace,
     })
 }
 
-/// What the force loop of a run closed on, where its configuration says so.
+/// What the force loop of a sweep closed on, where its configuration says so.
 fn feedback_of(config_toml: &str) -> Option<Feedback> {
     let config: toml::Table = config_toml.parse().ok()?;
     let feedback = config.get("twin")?.get("robot")?.get("feedback")?;

@@ -4,6 +4,7 @@ mod canvas;
 mod colours;
 mod paper;
 mod plot;
+mod rig;
 mod sample;
 mod scene;
 mod sheet;

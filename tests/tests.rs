@@ -39,6 +39,8 @@ mod pull;
 mod roundtrip;
 // The wrist sensor against logs of a real arm.
 mod real_force;
+// Runs of a rig, read by everything that reads sweeps.
+mod rig_run;
 // Shadows learnt from real presses.
 mod shadows;
 // Files of Taxim.

@@ -55,10 +55,13 @@ impl ImageSource {
                 Ok(Seen { grip: images.grip, rest: images.rest, grip_pose: None })
             }
             Self::Run(samples) => {
-                let record = samples.record(samples.row_of(id).ok_or_else(none)?)?.ok_or_else(none)?;
+                let row = samples.row_of(id).ok_or_else(none)?;
+                let record = samples.record(row)?.ok_or_else(none)?;
                 let grip = record.images.ok_or_else(none)?;
-                let grip_pose = Some(record.sample.grip_pose as usize);
-                Ok(Seen { grip, rest: PerJaw { left: None, right: None }, grip_pose })
+                let (left, right) = samples.rest(row)?.map(|rest| (rest.left, rest.right)).unzip();
+                // Which of the twin's grips a rig made is not known to it.
+                let grip_pose = (!samples.has_rest()).then_some(record.sample.grip_pose as usize);
+                Ok(Seen { grip, rest: PerJaw { left, right }, grip_pose })
             }
         }
     }

@@ -3,19 +3,20 @@
 use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
 use super::colours::{COMMAND, DISPLACEMENT, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK, scale};
 use super::plot::{Area, Curve, pull_curve};
+use super::rig::rig_picture;
 use super::sheet::{details, heading};
 use crate::generate::{Press, press_only};
 use crate::project::Project;
 use gripgen_record::proto::gripgen_v1::{JawContact, Sample};
-use gripgen_record::{FolderError, ReadError, Record, RunFolder, ShardReader};
+use gripgen_record::{FolderError, RIG_SOURCE, ReadError, Record, RunFolder, ShardReader};
 use gripgen_tactile::Plane;
 use gripgen_twin::{Jaw, TactileImage};
 
-const MARGIN: u32 = 16;
-const IMAGE: (u32, u32) = (400, 300);
-const HEADER: u32 = 64;
-const CAPTION: u32 = 24;
-const CURVE_HEIGHT: u32 = 380;
+pub(super) const MARGIN: u32 = 16;
+pub(super) const IMAGE: (u32, u32) = (400, 300);
+pub(super) const HEADER: u32 = 64;
+pub(super) const CAPTION: u32 = 24;
+pub(super) const CURVE_HEIGHT: u32 = 380;
 
 /// Why a sample could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -38,13 +39,18 @@ pub enum PictureSampleError {
 }
 
 /// A PNG of one sample of a run. Height and pressure maps are made again from the run's configuration; where that is
-/// not possible (a measured run) the stored pressure cells are drawn instead.
+/// not possible the stored pressure cells are drawn instead. Of a measured pull the images before and in the grip and their
+/// difference are drawn.
 pub fn sample_picture(folder: &RunFolder, index: u64) -> Result<Vec<u8>, PictureSampleError> {
     let shard = index / folder.info().shard_samples;
     if folder.finished(shard)?.is_none() {
         return Err(PictureSampleError::NotDone { index, shard });
     }
-    let record = ShardReader::open(&folder.shard_path(shard))?.record(index)?;
+    let reader = ShardReader::open(&folder.shard_path(shard))?;
+    let record = reader.record(index)?;
+    if folder.info().source == RIG_SOURCE {
+        return Ok(rig_picture(&record, reader.rest(index)?.as_ref()));
+    }
     let press = press_again(folder, index);
     let columns = 4;
     let width = columns * (IMAGE.0 + MARGIN) + MARGIN;
@@ -71,7 +77,7 @@ fn press_again(folder: &RunFolder, index: u64) -> Option<Press> {
     press_only(&twin, &project.library, &scenario, project.sweep.mechanics).ok()?
 }
 
-fn second_line(s: &Sample) -> String {
+pub(super) fn second_line(s: &Sample) -> String {
     let mut text = details(s);
     if let Some(mu) = s.mu {
         text += &format!(", mu {mu:.4}");
@@ -122,17 +128,17 @@ fn draw_jaw(canvas: &mut Canvas, at: (u32, u32), jaw: Jaw, record: &Record, pres
     }
 }
 
-fn frame(canvas: &mut Canvas, x: u32, y: u32) {
+pub(super) fn frame(canvas: &mut Canvas, x: u32, y: u32) {
     canvas.rect(f64::from(x), f64::from(y), f64::from(IMAGE.0), f64::from(IMAGE.1), PANEL);
 }
 
-fn pixel(image: &TactileImage, u: u32, v: u32) -> Rgb {
+pub(super) fn pixel(image: &TactileImage, u: u32, v: u32) -> Rgb {
     let [r, g, b] = image.pixel(u, v);
     Rgb(r, g, b)
 }
 
 /// Draws an image into the frame, as large as it fits, centred.
-fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour: impl Fn(u32, u32) -> Rgb) {
+pub(super) fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour: impl Fn(u32, u32) -> Rgb) {
     let (zoom, left, top) = placement(size);
     let (width, height) = ((f64::from(size.0) * zoom) as u32, (f64::from(size.1) * zoom) as u32);
     for row in 0..height {
@@ -187,7 +193,7 @@ fn draw_cells_alone(canvas: &mut Canvas, x: u32, y: u32, contact: &JawContact) {
     }
 }
 
-fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Record) {
+pub(super) fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Record) {
     let mut x = f64::from(MARGIN);
     for (text, ink) in [
         ("force / N:", INK),

@@ -1,10 +1,12 @@
 //! What was typed.
 
 mod identify;
+mod rig;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
 pub use identify::{CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, DiagnoseArgs};
+pub use rig::{RigCommand, RigServeArgs};
 use std::path::PathBuf;
 
 /// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.
@@ -42,6 +44,9 @@ pub enum Command {
     Diagnose(DiagnoseArgs),
     /// Plan the pulls of a campaign.
     Campaign(CampaignArgs),
+    /// The experiment on a robot, and a virtual one that speaks the same protocols.
+    #[command(subcommand)]
+    Rig(RigCommand),
     /// Measure how many tactile images a second this machine makes.
     Bench(BenchArgs),
     /// Print the JSON Schema of a configuration file.

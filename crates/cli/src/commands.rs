@@ -13,16 +13,22 @@ pub mod diagnose;
 pub mod export;
 pub mod info;
 pub mod init;
+pub mod rig;
 pub mod schema;
 pub mod show;
 pub mod sweep;
 pub mod verify;
 
 use crate::failure::Failure;
-use gripgen::record::RunFolder;
+use gripgen::record::{RIG_SOURCE, RunFolder};
 use std::path::Path;
 
 /// Opens a run folder for reading.
 fn open_run(path: &Path) -> Result<RunFolder, Failure> {
     RunFolder::open(path).map_err(Failure::from)
+}
+
+/// What makes the shards of a run.
+fn maker(folder: &RunFolder) -> &'static str {
+    if folder.info().source == RIG_SOURCE { "campaign" } else { "sweep" }
 }

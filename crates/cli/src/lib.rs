@@ -10,7 +10,7 @@ mod interrupt;
 mod output;
 mod progress;
 
-use args::{CalibrateCommand, Cli, Command};
+use args::{CalibrateCommand, Cli, Command, RigCommand};
 use clap::Parser;
 use std::ffi::OsString;
 
@@ -56,6 +56,7 @@ fn execute(cli: &Cli) -> Result<u8, Failure> {
         Command::Calibrate(CalibrateCommand::Presses(args)) => commands::calibrate_presses::run(args),
         Command::Calibrate(CalibrateCommand::Pulls(args)) => commands::calibrate_pulls::run(args),
         Command::Calibrate(CalibrateCommand::Sensor(args)) => commands::calibrate_sensor::run(args),
+        Command::Rig(RigCommand::Serve(args)) => commands::rig::serve::run(args),
         Command::Compare(args) => commands::compare::run(args),
         Command::Diagnose(args) => commands::diagnose::run(args),
         Command::Campaign(args) => commands::campaign::run(args),

@@ -10,6 +10,9 @@ mod campaign;
 mod measured;
 #[path = "cli/presses.rs"]
 mod presses;
+// Runs of a rig.
+#[path = "cli/rig_run.rs"]
+mod rig_run;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! `_core.Dataset`: rows of a run or of measured pulls.
 
 use crate::error;
-use gripgen::record::proto::gripgen_v1::JawContact;
+use gripgen::record::proto::gripgen_v1::{JawContact, Status};
 use gripgen::record::{Column, Dataset as Rows, DatasetError};
 use gripgen::twin::{ContactPatch, Jaw};
 use gripgen::{Project, in_parallel, press_only};
@@ -113,9 +113,14 @@ impl Dataset {
         let filled = py.detach(|| {
             for (&row, out) in rows.iter().zip(values.chunks_mut(2 * CELLS * 4)) {
                 let missing =
-                    DatasetError::Missing { path: self.rows.path().into(), row, what: "contact forces" };
-                let record = self.rows.record(row)?.ok_or(missing)?;
-                let jaws = [record.sample.left, record.sample.right];
+                    || DatasetError::Missing { path: self.rows.path().into(), row, what: "contact forces" };
+                let sample = self.rows.record(row)?.ok_or_else(missing)?.sample;
+                // A rig does not know them; zeros would say that nothing was touched.
+                let touched = matches!(sample.status(), Status::Slipped | Status::Censored);
+                if touched && sample.left.is_none() && sample.right.is_none() {
+                    return Err(missing());
+                }
+                let jaws = [sample.left, sample.right];
                 for (jaw, out) in jaws.iter().zip(out.chunks_mut(CELLS * 4)) {
                     jaw.iter().for_each(|jaw| cells_into(jaw, out));
                 }

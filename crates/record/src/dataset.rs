@@ -13,7 +13,8 @@ use crate::folder::{FolderError, RunFolder};
 use crate::picture::{decode_png_into, encode_png};
 use crate::pulls::{PullFolderError, PullImagesError, pulls_with_images, read_pull_folder, read_pull_images};
 use crate::reader::{ReadError, Record, ShardReader};
-use gripgen_twin::{Jaw, MeasuredPulls, PullTrace, TactileImage};
+use crate::rig_run::RIG_SOURCE;
+use gripgen_twin::{Jaw, MeasuredPulls, PerJaw, PullTrace, TactileImage};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -287,6 +288,32 @@ impl Dataset {
         }
     }
 
+    /// Whether its rows may have images without contact that [`Dataset::rest_png`] knows: those of a rig.
+    pub fn has_rest(&self) -> bool {
+        self.run().is_some_and(|run| run.info().source == RIG_SOURCE)
+    }
+
+    /// Both images of a row of a rig's run before the grip, where there are any.
+    pub fn rest(&self, row: usize) -> Result<Option<PerJaw<TactileImage>>, DatasetError> {
+        self.check_row(row)?;
+        if !self.has_rest() {
+            return Ok(None);
+        }
+        let (reader, index) = self.shard_of(row)?;
+        Ok(reader.rest(index)?)
+    }
+
+    /// The same as PNG, left jaw first.
+    pub fn rest_png(&self, row: usize) -> Result<Option<[Vec<u8>; 2]>, DatasetError> {
+        self.check_row(row)?;
+        if !self.has_rest() {
+            return Ok(None);
+        }
+        let (reader, index) = self.shard_of(row)?;
+        let both = reader.raw_rest(index)?;
+        Ok(both.map(|both| reader.png_of(index, "_rest", &both)).transpose()?)
+    }
+
     /// The force over time of a row, where it is stored.
     pub fn trace(&self, row: usize) -> Result<Option<PullTrace>, DatasetError> {
         self.check_row(row)?;
@@ -367,16 +394,21 @@ impl Dataset {
 impl ShardReader {
     /// Both images of a sample as they are stored.
     fn images_png(&self, index: u64) -> Result<Option<[Vec<u8>; 2]>, ReadError> {
+        let both = self.raw(index)?.images;
+        both.map(|both| self.png_of(index, "", &both)).transpose()
+    }
+
+    /// The PNGs in two messages; `kind` is the end of their topics.
+    fn png_of(&self, index: u64, kind: &str, both: &PerJaw<Vec<u8>>) -> Result<[Vec<u8>; 2], ReadError> {
         use crate::proto::foxglove::CompressedImage;
         use prost::Message;
-        let Some(both) = self.raw(index)?.images else { return Ok(None) };
         let png = |jaw: Jaw| {
             let image = CompressedImage::decode(&both[jaw][..]);
             image
                 .map(|image| image.data.to_vec())
-                .map_err(|e| self.damaged(index, &format!("/tactile/{jaw}"), &e.to_string()))
+                .map_err(|e| self.damaged(index, &format!("/tactile/{jaw}{kind}"), &e.to_string()))
         };
-        Ok(Some([png(Jaw::Left)?, png(Jaw::Right)?]))
+        Ok([png(Jaw::Left)?, png(Jaw::Right)?])
     }
 
     /// One image of a sample into `out`; the inner error is the size of an image that is not of the wanted one.

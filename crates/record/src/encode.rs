@@ -7,7 +7,9 @@ use crate::proto::gripgen_v1 as proto;
 use gripgen_twin::config::{ImageStorage, TraceStorage};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::frames::Pose;
-use gripgen_twin::{ImprintSummary, Jaw, Outcome, PerJaw, PullTrace, Sample, Scenario, TactileImage};
+use gripgen_twin::{
+    ImprintSummary, Jaw, Outcome, PerJaw, PullTrace, Sample, Scenario, SlipLabel, TactileImage,
+};
 use prost::Message;
 use prost_types::Timestamp;
 
@@ -53,10 +55,23 @@ pub struct EncodedSample {
     pub trace: Option<Vec<u8>>,
     /// `/pull/state`
     pub states: Vec<Timed>,
+    /// What only runs of a rig have.
+    pub rig: Option<EncodedRig>,
     /// Its row of the index.
     pub row: Vec<String>,
     /// How it ended.
     pub status: proto::Status,
+}
+
+/// The messages of a measured pull beside those of any sample.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EncodedRig {
+    /// `/tactile/left_rest`, `/tactile/right_rest`
+    pub rest: Option<PerJaw<Vec<u8>>>,
+    /// `/rig/log`, one a stream
+    pub streams: Vec<Vec<u8>>,
+    /// `/rig/events`, one an event
+    pub events: Vec<Vec<u8>>,
 }
 
 /// Encodes a sample. Pure: the same sample gives the same bytes.
@@ -85,6 +100,7 @@ pub fn encode(sample: &Sample, options: &EncodeOptions) -> Result<EncodedSample,
         images,
         trace: trace.map(|t| trace_message(t, timestamp).encode_to_vec()),
         states: trace.map(|t| state_messages(t, start_ns, options.view_rate_hz)).unwrap_or_default(),
+        rig: None,
         row,
         status,
     })
@@ -100,9 +116,9 @@ fn as_written(x: f64) -> f64 {
     (x * 1e9).round() / 1e9
 }
 
-fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sample {
-    let Scenario { covariates: c, pull, .. } = &sample.scenario;
-    let s = &sample.scenario;
+/// What was asked; how it ended is left out.
+pub(crate) fn scenario_message(s: &Scenario, timestamp: Option<Timestamp>) -> proto::Sample {
+    let Scenario { covariates: c, pull, .. } = s;
     let mut message = proto::Sample {
         timestamp,
         index: s.index,
@@ -133,13 +149,14 @@ fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sampl
             Drawn::Text(text) => drop(message.drawn_text.insert(key.clone(), text.clone())),
         }
     }
+    message
+}
+
+fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sample {
+    let mut message = scenario_message(&sample.scenario, timestamp);
     match &sample.outcome {
         Outcome::Pulled(p) => {
-            let censored = p.label.censored;
-            message.set_status(if censored { proto::Status::Censored } else { proto::Status::Slipped });
-            message.max_pull_force_n = Some(p.label.max_pull_force_n);
-            message.slip_time_s = Some(p.label.slip_time_s);
-            message.censored = censored;
+            set_label(&mut message, &p.label);
             message.mu = Some(p.mu);
             message.outside_fit = p.outside_fit;
             message.lag_exceeds_tolerance = p.lag_exceeds_tolerance;
@@ -159,6 +176,14 @@ fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sampl
         }
     }
     message
+}
+
+/// The label of a pull, and the status that goes with it.
+pub(crate) fn set_label(message: &mut proto::Sample, label: &SlipLabel) {
+    message.set_status(if label.censored { proto::Status::Censored } else { proto::Status::Slipped });
+    message.max_pull_force_n = Some(label.max_pull_force_n);
+    message.slip_time_s = Some(label.slip_time_s);
+    message.censored = label.censored;
 }
 
 fn contact_message(normal_force_n: f64, pose: &Pose, imprint: &ImprintSummary) -> proto::JawContact {
@@ -181,7 +206,7 @@ fn contact_message(normal_force_n: f64, pose: &Pose, imprint: &ImprintSummary) -
     }
 }
 
-fn image_message(
+pub(crate) fn image_message(
     image: &TactileImage,
     jaw: Jaw,
     storage: ImageStorage,
@@ -204,7 +229,7 @@ fn image_message(
     })
 }
 
-fn trace_message(trace: &PullTrace, timestamp: Option<Timestamp>) -> proto::PullTrace {
+pub(crate) fn trace_message(trace: &PullTrace, timestamp: Option<Timestamp>) -> proto::PullTrace {
     let single = |values: &[f64], scale: f64| values.iter().map(|x| (x * scale) as f32).collect();
     let rate_hz = uniform_rate_hz(&trace.time_s);
     proto::PullTrace {

@@ -68,6 +68,8 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
         images,
         trace,
         states,
+        // A pull of a rig has a file of its own already, which starts at time 0.
+        rig: reader.raw_rig(index)?,
         row: vec![],
     };
     let mut writer = ShardWriter::new(Cursor::new(Vec::new()), &info(reader, index)?, storage)?;

@@ -18,13 +18,15 @@ mod presses;
 pub mod proto;
 mod pulls;
 mod reader;
+mod rig_log;
+mod rig_run;
 mod sensor_table;
 mod shard;
 mod verify;
 
 pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
 pub use dataset::{Column, Dataset, DatasetError, Table};
-pub use encode::{EncodeOptions, EncodedSample, Timed, VIEW_RATE_HZ, encode};
+pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
 pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
@@ -42,6 +44,11 @@ pub use pulls::{
     read_pull_folder, read_pull_images, write_pull_folder,
 };
 pub use reader::{ReadError, Record, ShardReader};
+pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};
+pub use rig_run::{
+    RIG_SOURCE, RigCampaign, RigPull, RigPullError, RigResult, RigRunError, RigRunInfo, create_rig_run,
+    discard_failed, failed_pulls, missing_pulls, rig_campaign, write_rig_pull,
+};
 pub use sensor_table::{ExtraValues, SENSOR_FILE, SensorTable, SensorTableError, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, ShardError, ShardInfo, ShardWriter};
 pub use verify::{Verification, verify};

@@ -1,6 +1,7 @@
 //! A dataset as one Parquet file: for tools that read tables with images in them.
 //!
-//! Columns are those of the table, then `left_png` and `right_png` (the images as PNG bytes), then `trace_time_s`,
+//! Columns are those of the table, then `left_png` and `right_png` (the images as PNG bytes; of a rig also `left_rest_png`
+//! and `right_rest_png`, those without contact), then `trace_time_s`,
 //! `trace_desired_force_n`, `trace_measured_force_n` and `trace_displacement_mm` (lists of float). What is not there is
 //! null. Nothing in the file depends on time, host or path.
 
@@ -67,6 +68,13 @@ pub fn export_parquet<W: Write + Send>(
                 write_bytes(&mut out, images.iter().map(|both| both.as_ref().map(|b| b[jaw].clone())))?;
             }
         }
+        if options.images && dataset.has_rest() {
+            let rest: Vec<_> =
+                group.iter().map(|&row| dataset.rest_png(row)).collect::<Result<_, DatasetError>>()?;
+            for jaw in 0..2 {
+                write_bytes(&mut out, rest.iter().map(|both| both.as_ref().map(|b| b[jaw].clone())))?;
+            }
+        }
         if options.traces {
             let traces: Vec<_> =
                 group.iter().map(|&row| dataset.trace(row)).collect::<Result<_, DatasetError>>()?;
@@ -101,7 +109,8 @@ fn schema(dataset: &Dataset, options: ParquetOptions) -> Result<TypePtr, Parquet
         });
     }
     if options.images {
-        for name in ["left_png", "right_png"] {
+        let rest = ["left_rest_png", "right_rest_png"].into_iter().filter(|_| dataset.has_rest());
+        for name in ["left_png", "right_png"].into_iter().chain(rest) {
             fields.push(leaf(name, Physical::BYTE_ARRAY, None, Repetition::OPTIONAL)?);
         }
     }

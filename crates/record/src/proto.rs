@@ -17,6 +17,8 @@ pub mod foxglove {
 
 /// `FileDescriptorSet` of `gripgen/v1/pull.proto` and what it imports.
 pub const PULL_DESCRIPTOR: &[u8] = include_bytes!("proto/gripgen.v1.pull.bin");
+/// `FileDescriptorSet` of `gripgen/v1/rig.proto` and what it imports.
+pub const RIG_DESCRIPTOR: &[u8] = include_bytes!("proto/gripgen.v1.rig.bin");
 /// `FileDescriptorSet` of `foxglove/CompressedImage.proto` and what it imports.
 pub const COMPRESSED_IMAGE_DESCRIPTOR: &[u8] = include_bytes!("proto/foxglove.CompressedImage.bin");
 /// `FileDescriptorSet` of `foxglove/RawImage.proto` and what it imports.
@@ -42,10 +44,14 @@ mod tests {
     #[test]
     fn generated_code_and_descriptors_are_fresh() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("proto");
-        let files = ["gripgen/v1/pull.proto", "foxglove/CompressedImage.proto", "foxglove/RawImage.proto"];
-        for (file, name) in
-            files.iter().zip(["gripgen.v1.pull", "foxglove.CompressedImage", "foxglove.RawImage"])
-        {
+        let files = [
+            "gripgen/v1/pull.proto",
+            "gripgen/v1/rig.proto",
+            "foxglove/CompressedImage.proto",
+            "foxglove/RawImage.proto",
+        ];
+        let names = ["gripgen.v1.pull", "gripgen.v1.rig", "foxglove.CompressedImage", "foxglove.RawImage"];
+        for (file, name) in files.iter().zip(names) {
             let mut set = protox::compile([root.join(file)], [&root]).unwrap();
             for descriptor in &mut set.file {
                 // Comments do not belong into every data file.

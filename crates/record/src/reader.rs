@@ -1,8 +1,11 @@
 //! Reading a shard: any sample, in any order, one at a time.
 
+mod rig;
+
 use crate::picture::{PictureError, decode};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
+use crate::rig_run::RIG_SOURCE;
 use crate::shard::{LAYOUT_VERSION, METADATA_NAME};
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use mcap::records::{AttachmentIndex, ChunkIndex, MetadataIndex};
@@ -149,6 +152,11 @@ impl ShardReader {
         &self.metadata
     }
 
+    /// Whether a rig made it.
+    pub(crate) fn is_rig(&self) -> bool {
+        self.metadata.get("source").is_some_and(|source| source == RIG_SOURCE)
+    }
+
     /// Whether its samples have images.
     pub fn has_images(&self) -> bool {
         self.summary.channels.values().any(|c| c.topic.starts_with("/tactile/"))
@@ -263,32 +271,62 @@ impl ShardReader {
     fn each_message(
         &self,
         index: u64,
+        visit: impl FnMut(&str, &[u8]) -> Result<(), String>,
+    ) -> Result<(), ReadError> {
+        // The core chunk of a slot comes first in it.
+        match self.chunks_of(index)?.next() {
+            Some(chunk) => self.each_message_in(chunk, index, visit),
+            None => Err(self.damaged(index, "/sample", "its chunk is missing")),
+        }
+    }
+
+    /// The same for every message of these topics, in whichever chunks they are.
+    fn each_message_of(
+        &self,
+        index: u64,
+        topics: &[&str],
         mut visit: impl FnMut(&str, &[u8]) -> Result<(), String>,
     ) -> Result<(), ReadError> {
+        let channels = &self.summary.channels;
+        let wanted = |id: &u16| channels.get(id).is_some_and(|c| topics.contains(&c.topic.as_str()));
+        for chunk in self.chunks_of(index)?.filter(|c| c.message_index_offsets.keys().any(wanted)) {
+            self.each_message_in(chunk, index, |topic, data| {
+                if topics.contains(&topic) { visit(topic, data) } else { Ok(()) }
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Chunks of a sample whose messages are all from the start of its slot.
+    fn chunks_of(&self, index: u64) -> Result<impl Iterator<Item = &ChunkIndex>, ReadError> {
         if !self.indices().contains(&index) {
             let (first, end) = (self.first_sample, self.first_sample + self.samples);
             return Err(ReadError::NoSample { path: self.path.clone(), sample: index, first, end });
         }
         let start = (index - self.first_sample) * self.slot_ns;
-        // Chunks are written in the order of their samples; the core chunk of a slot comes first in it.
+        // Chunks are written in the order of their samples.
         let chunks = &self.summary.chunk_indexes;
-        let mut at = chunks.partition_point(|c| c.message_start_time < start);
-        while let Some(chunk) = chunks.get(at).filter(|c| c.message_start_time < start + self.slot_ns) {
-            if chunk.message_end_time == start {
-                let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
-                let record = piece(&self.file, self.bytes, chunk.chunk_start_offset, chunk.chunk_length)
-                    .map_err(bad)?;
-                let at_start = ChunkIndex { chunk_start_offset: 0, ..chunk.clone() };
-                for message in self.summary.stream_chunk(&record, &at_start).map_err(bad)? {
-                    let message = message.map_err(bad)?;
-                    visit(&message.channel.topic, &message.data)
-                        .map_err(|problem| self.damaged(index, &message.channel.topic, &problem))?;
-                }
-                return Ok(());
-            }
-            at += 1;
+        let first = chunks.partition_point(|c| c.message_start_time < start);
+        let slot = chunks[first..].iter().take_while(move |c| c.message_start_time < start + self.slot_ns);
+        Ok(slot.filter(move |c| c.message_end_time == start))
+    }
+
+    fn each_message_in(
+        &self,
+        chunk: &ChunkIndex,
+        index: u64,
+        mut visit: impl FnMut(&str, &[u8]) -> Result<(), String>,
+    ) -> Result<(), ReadError> {
+        let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
+        let record =
+            piece(&self.file, self.bytes, chunk.chunk_start_offset, chunk.chunk_length).map_err(bad)?;
+        let at_start = ChunkIndex { chunk_start_offset: 0, ..chunk.clone() };
+        for message in self.summary.stream_chunk(&record, &at_start).map_err(bad)? {
+            let message = message.map_err(bad)?;
+            visit(&message.channel.topic, &message.data)
+                .map_err(|problem| self.damaged(index, &message.channel.topic, &problem))?;
         }
-        Err(self.damaged(index, "/sample", "its chunk is missing"))
+        Ok(())
     }
 
     pub(crate) fn damaged(&self, sample: u64, topic: &str, problem: &str) -> ReadError {

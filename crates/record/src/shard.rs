@@ -1,7 +1,8 @@
 //! Writing a shard: one MCAP file with a number of samples.
 
 use crate::encode::EncodedSample;
-use crate::proto::{COMPRESSED_IMAGE_DESCRIPTOR, PULL_DESCRIPTOR, RAW_IMAGE_DESCRIPTOR};
+use crate::proto::{COMPRESSED_IMAGE_DESCRIPTOR, PULL_DESCRIPTOR, RAW_IMAGE_DESCRIPTOR, RIG_DESCRIPTOR};
+use crate::rig_run::RIG_SOURCE;
 use gripgen_twin::PerJaw;
 use gripgen_twin::config::ImageStorage;
 use mcap::records::{MessageHeader, Metadata};
@@ -71,6 +72,14 @@ struct Channels {
     images: Option<PerJaw<u16>>,
     trace: u16,
     state: u16,
+    rig: Option<RigChannels>,
+}
+
+/// Channels that only a shard of a rig has.
+struct RigChannels {
+    rest: PerJaw<u16>,
+    log: u16,
+    events: u16,
 }
 
 /// Why a shard could not be written.
@@ -129,11 +138,31 @@ impl<W: Write + Seek> ShardWriter<W> {
         };
         let trace = channel("gripgen.v1.PullTrace", PULL_DESCRIPTOR, "/pull/trace")?;
         let state = channel("gripgen.v1.PullState", PULL_DESCRIPTOR, "/pull/state")?;
-        let channels = Channels { sample, images, trace, state };
+        let rig = match info.source == RIG_SOURCE {
+            false => None,
+            true => Some(RigChannels {
+                rest: PerJaw {
+                    left: channel(
+                        "foxglove.CompressedImage",
+                        COMPRESSED_IMAGE_DESCRIPTOR,
+                        "/tactile/left_rest",
+                    )?,
+                    right: channel(
+                        "foxglove.CompressedImage",
+                        COMPRESSED_IMAGE_DESCRIPTOR,
+                        "/tactile/right_rest",
+                    )?,
+                },
+                log: channel("gripgen.v1.RigStream", RIG_DESCRIPTOR, "/rig/log")?,
+                events: channel("gripgen.v1.RigEvent", RIG_DESCRIPTOR, "/rig/events")?,
+            }),
+        };
+        let channels = Channels { sample, images, trace, state, rig };
         Ok(Self { writer, channels, written: 0, expected: info.samples })
     }
 
-    /// Appends a sample: one chunk with what training reads, one with what viewers draw.
+    /// Appends a sample: one chunk with what training reads, one with what viewers draw; of a rig one with the images
+    /// without contact and one with the log between them.
     pub fn push(&mut self, sample: &EncodedSample) -> Result<(), ShardError> {
         let sequence = self.written as u32;
         let mut write = |channel_id, time_ns, data: &[u8]| {
@@ -150,6 +179,7 @@ impl<W: Write + Seek> ShardWriter<W> {
             write(self.channels.trace, sample.start_ns, trace)?;
         }
         self.writer.flush()?;
+        self.push_rig(sample, sequence)?;
         if !sample.states.is_empty() {
             for state in &sample.states {
                 let (channel_id, time_ns) = (self.channels.state, state.time_ns);
@@ -159,6 +189,32 @@ impl<W: Write + Seek> ShardWriter<W> {
             self.writer.flush()?;
         }
         self.written += 1;
+        Ok(())
+    }
+
+    /// What only a rig has, in chunks of its own.
+    fn push_rig(&mut self, sample: &EncodedSample, sequence: u32) -> Result<(), ShardError> {
+        let (Some(channels), Some(rig)) = (&self.channels.rig, &sample.rig) else { return Ok(()) };
+        let time_ns = sample.start_ns;
+        let write = |writer: &mut Writer<W>, channel_id, data: &[u8]| {
+            let header = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
+            writer.write_to_known_channel(&header, data)
+        };
+        if let Some(rest) = &rig.rest {
+            for (jaw, &channel) in channels.rest.iter() {
+                write(&mut self.writer, channel, &rest[jaw])?;
+            }
+            self.writer.flush()?;
+        }
+        for stream in &rig.streams {
+            write(&mut self.writer, channels.log, stream)?;
+        }
+        for event in &rig.events {
+            write(&mut self.writer, channels.events, event)?;
+        }
+        if !(rig.streams.is_empty() && rig.events.is_empty()) {
+            self.writer.flush()?;
+        }
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 use crate::folder::{FolderError, RunFolder, hash_file};
 use crate::index::{csv_lines, index_header, index_row};
 use crate::reader::ShardReader;
+use crate::rig_run::RIG_SOURCE;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -72,7 +73,8 @@ fn misfit(folder: &RunFolder, shard: u64) -> String {
         (false, _) => return format!("{}: the shard it describes is missing", sidecar.display()),
         (true, true) => "its sidecar does not fit it",
     };
-    format!("{}: {problem}; running the sweep again makes it anew", file.display())
+    let what = if folder.info().source == RIG_SOURCE { "campaign" } else { "sweep" };
+    format!("{}: {problem}; running the {what} again makes it anew", file.display())
 }
 
 fn check_shard(file: &Path, folder: &RunFolder, rows: &[Vec<String>]) -> Result<u64, String> {
@@ -88,6 +90,9 @@ fn check_shard(file: &Path, folder: &RunFolder, rows: &[Vec<String>]) -> Result<
     }
     for (index, row) in indices.zip(rows) {
         let record = reader.record(index).map_err(|e| e.to_string())?;
+        if reader.is_rig() {
+            reader.rest(index).and_then(|_| reader.rig_log(index)).map_err(|e| e.to_string())?;
+        }
         let found = index_row(&record.sample, &folder.info().extra_columns);
         // Columns 1 and 2 (shard, in_shard) are filled in by the writer.
         if let Some(i) = (0..found.len()).find(|&i| !(1..=2).contains(&i) && found[i] != row[i]) {

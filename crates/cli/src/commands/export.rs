@@ -1,7 +1,7 @@
 //! `gripgen export`: a sample as a file of its own, or all of them as a table.
 
 use crate::args::{ExportArgs, ExportFormat};
-use crate::commands::open_run;
+use crate::commands::{maker, open_run};
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, write_file};
 use crate::progress::Progress;
@@ -70,7 +70,7 @@ fn one(args: &ExportArgs, sample: u64) -> Result<u8, Failure> {
     let shard = sample / info.shard_samples;
     if folder.finished(shard)?.is_none() {
         return Err(Failure::new(format!("sample {} belongs to shard {shard}, which is not done", sample))
-            .hint("run the sweep again to finish it"));
+            .hint(format!("run the {} again to finish it", maker(&folder))));
     }
     let bytes = export_sample(&ShardReader::open(&folder.shard_path(shard))?, sample)?;
     write_file(&args.out, &bytes)?;

@@ -4,7 +4,7 @@ use crate::args::InfoArgs;
 use crate::commands::open_run;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, size};
-use gripgen::record::INDEX_COLUMNS;
+use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -42,17 +42,19 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     let (status, part, label) = (at("status"), at("part"), at("max_pull_force_n"));
     let mut statuses: BTreeMap<String, u64> = BTreeMap::new();
     let mut parts: BTreeMap<String, PartSummary> = BTreeMap::new();
-    let (mut done, mut shards, mut bytes) = (0, 0, 0);
+    let (mut done, mut failed, mut shards, mut bytes) = (0, 0, 0, 0);
     for shard in 0..info.shards {
         let Some(sidecar) = folder.finished(shard)? else { continue };
         shards += 1;
         done += sidecar.samples;
+        failed += sidecar.failed;
         bytes += sidecar.bytes;
         for row in &sidecar.rows {
             *statuses.entry(row[status].clone()).or_default() += 1;
             parts.entry(row[part].clone()).or_default().add(row[label].parse().ok());
         }
     }
+    let missing = info.samples.saturating_sub(done);
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     if sink.wanted() {
         let by_part: BTreeMap<_, _> = parts
@@ -68,7 +70,8 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
         sink.document(&json!({
             "schema": "gripgen.info/1", "name": info.name, "source": info.source,
             "gripgen_version": info.gripgen_version, "config_sha256": info.config_sha256,
-            "samples": info.samples, "done": done, "shards": info.shards, "shards_done": shards, "bytes": bytes,
+            "samples": info.samples, "done": done, "missing": missing, "failed": failed,
+            "shards": info.shards, "shards_done": shards, "bytes": bytes,
             "status": statuses, "parts": by_part,
         }))?;
         if sink.on_stdout() {
@@ -80,8 +83,15 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     }
     let mut text = format!("{} ({}), made by gripgen {}\n", info.name, info.source, info.gripgen_version);
     text += &format!("configuration {}\n", &info.config_sha256[..16.min(info.config_sha256.len())]);
-    text +=
-        &format!("{done} of {} samples, {shards} of {} shards, {}\n", info.samples, info.shards, size(bytes));
+    text += &match info.source == RIG_SOURCE {
+        true => {
+            format!("{done} of {} pulls, {missing} missing, {failed} failed, {}\n", info.samples, size(bytes))
+        }
+        false => {
+            let bytes = size(bytes);
+            format!("{done} of {} samples, {shards} of {} shards, {bytes}\n", info.samples, info.shards)
+        }
+    };
     let counts: Vec<String> = statuses.iter().map(|(name, n)| format!("{n} {name}")).collect();
     text += &format!("{}\n\n", counts.join(", "));
     text += &format!("{:<20} {:>8} {:>24}\n", "part", "samples", "max_pull_force_n");

@@ -1,7 +1,7 @@
 //! `gripgen verify`: is the folder what it says it is?
 
 use crate::args::VerifyArgs;
-use crate::commands::open_run;
+use crate::commands::{maker, open_run};
 use crate::failure::{Failure, code};
 use crate::output::{JsonSink, print};
 use crate::progress::Progress;
@@ -11,8 +11,8 @@ use serde_json::json;
 /// Runs the verb.
 pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
-    let shards = open_run(&args.run)?.info().shards;
-    let mut progress = Progress::start("shards", 0, shards, &args.talk);
+    let folder = open_run(&args.run)?;
+    let mut progress = Progress::start("shards", 0, folder.info().shards, &args.talk);
     let result = verify(&args.run, |_| progress.step())?;
     progress.finish();
     let complete = result.missing_shards == 0;
@@ -37,8 +37,9 @@ pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
     }
     if !good {
         eprintln!(
-            "\nhint: sweeping again makes anew what has no fitting sidecar; where the content differs, delete the \
-             sidecar (shard-NNNNN.json) first"
+            "\nhint: running the {} again makes anew what has no fitting sidecar; where the content differs, \
+             delete the sidecar (shard-NNNNN.json) first",
+            maker(&folder)
         );
     }
     Ok(if good { 0 } else { code::MISMATCH })

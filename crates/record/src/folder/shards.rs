@@ -30,6 +30,11 @@ impl PartialShard {
         self.file.try_clone().map_err(io_at(&self.path))
     }
 
+    /// Removes the file; nothing was written into it.
+    pub(crate) fn give_up(self) -> Result<(), FolderError> {
+        std::fs::remove_file(&self.path).map_err(io_at(&self.path))
+    }
+
     /// An error about this file.
     pub fn error(&self, source: std::io::Error) -> FolderError {
         FolderError::Io { path: self.path.clone(), source }

@@ -190,3 +190,42 @@ impl Status {
         }
     }
 }
+/// A column of a stream: a value for each of its rows, NaN where the device gave none.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct RigColumn {
+    #[prost(string, tag = "1")]
+    pub name: ::prost::alloc::string::String,
+    #[prost(double, repeated, tag = "2")]
+    pub value: ::prost::alloc::vec::Vec<f64>,
+}
+/// What one source sent during a pull, as packed columns of equal length.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct RigStream {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    /// The source: "robot", "gripper", "camera_left".
+    #[prost(string, tag = "2")]
+    pub name: ::prost::alloc::string::String,
+    /// When each row was received, seconds.
+    #[prost(double, repeated, tag = "3")]
+    pub host_time_s: ::prost::alloc::vec::Vec<f64>,
+    /// When each row was taken by the clock of the device, seconds; empty if it has no clock.
+    #[prost(double, repeated, tag = "4")]
+    pub device_time_s: ::prost::alloc::vec::Vec<f64>,
+    #[prost(message, repeated, tag = "5")]
+    pub columns: ::prost::alloc::vec::Vec<RigColumn>,
+}
+/// Something that happened once: a command, a change of state, a message of a device.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct RigEvent {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    #[prost(double, tag = "2")]
+    pub host_time_s: f64,
+    #[prost(double, optional, tag = "3")]
+    pub device_time_s: ::core::option::Option<f64>,
+    #[prost(string, tag = "4")]
+    pub source: ::prost::alloc::string::String,
+    #[prost(string, tag = "5")]
+    pub text: ::prost::alloc::string::String,
+}

@@ -1,0 +1,4 @@
+//! `gripgen rig`: one file a verb.
+
+pub mod plant;
+pub mod serve;

@@ -1,0 +1,248 @@
+//! A run of a rig: a campaign of measured pulls as a run folder, one shard a pull.
+//!
+//! A pull is done when its shard has a sidecar, as the shards of a sweep are. A campaign that was interrupted goes on with
+//! [`missing_pulls`]; pulls that failed can be made again after [`discard_failed`].
+
+mod pull;
+#[cfg(test)]
+mod tests;
+
+pub use pull::{RigPull, RigPullError, RigResult};
+
+use crate::folder::{FolderError, RUN_SCHEMA, RunFolder, RunInfo, ShardStart, Sidecar, sha256_hex};
+use crate::index::extra_columns;
+use crate::proto::gripgen_v1::Status;
+use crate::shard::{ShardError, ShardInfo, ShardWriter};
+use gripgen_twin::config::{Feedback, ImageStorage};
+use serde::Deserialize;
+use std::io::{BufWriter, ErrorKind};
+use std::path::Path;
+
+/// What the `source` of a run and of a shard is where a rig made it.
+pub const RIG_SOURCE: &str = "rig";
+
+/// What a run of a rig is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RigRunInfo {
+    /// Name of the run; no data depends on it.
+    pub name: String,
+    /// Version of gripgen.
+    pub gripgen_version: String,
+    /// Sections `[rig]` (addresses, limits, taught poses) and `[campaign]` (what holds for all pulls, and the pulls).
+    pub config_toml: String,
+    /// Pulls of the campaign.
+    pub pulls: u64,
+}
+
+/// What the section `[campaign]` says of all measured pulls; other keys of it are left alone.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Deserialize)]
+#[serde(default)]
+pub struct RigCampaign {
+    /// What the force loop closed on, where it is known.
+    pub feedback: Option<Feedback>,
+    /// Columns that vary or were really measured; all of them where the key is missing. Names that are no fixed column of
+    /// the index get a column of their own there.
+    pub recorded: Option<Vec<String>>,
+}
+
+/// Why a measured pull could not be stored, or taken away.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RigRunError {
+    /// The folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The shard.
+    #[error(transparent)]
+    Shard(#[from] ShardError),
+    /// What was measured.
+    #[error("pull {pull}: {source}")]
+    Pull {
+        /// Its place in the campaign.
+        pull: u64,
+        /// What is wrong with it.
+        source: RigPullError,
+    },
+    /// The run of something else.
+    #[error("{}: its source is `{found}`, pulls of a rig go into runs of a `{RIG_SOURCE}`", .path.display())]
+    NoRig {
+        /// The folder.
+        path: std::path::PathBuf,
+        /// Its source.
+        found: String,
+    },
+    /// The campaign has no such pull.
+    #[error("there is no pull {pull}, the campaign has {pulls} (counted from 0)")]
+    NoPull {
+        /// The pull.
+        pull: u64,
+        /// Pulls there are.
+        pulls: u64,
+    },
+    /// It is done: what was measured is not replaced.
+    #[error("pull {pull} is done: {}", .shard.display())]
+    Done {
+        /// The pull.
+        pull: u64,
+        /// Its shard.
+        shard: std::path::PathBuf,
+    },
+    /// Another process writes it at this moment.
+    #[error("pull {pull} is being written by another process")]
+    Busy {
+        /// The pull.
+        pull: u64,
+    },
+    /// A pull with a label is not thrown away.
+    #[error("pull {pull} did not fail, it stays: {}", .shard.display())]
+    Labelled {
+        /// The pull.
+        pull: u64,
+        /// Its shard.
+        shard: std::path::PathBuf,
+    },
+}
+
+/// Opens the folder of a rig's run, or makes it. The run of another campaign, rig or version is refused.
+pub fn create_rig_run(path: &Path, info: &RigRunInfo) -> Result<RunFolder, FolderError> {
+    let campaign = campaign_of(path, &info.config_toml)?;
+    let recorded = campaign.recorded.unwrap_or_default();
+    let run = RunInfo {
+        schema: RUN_SCHEMA.into(),
+        gripgen_version: info.gripgen_version.clone(),
+        name: info.name.clone(),
+        source: RIG_SOURCE.into(),
+        config_sha256: sha256_hex(info.config_toml.as_bytes()),
+        samples: info.pulls,
+        shard_samples: 1,
+        shards: info.pulls,
+        extra_columns: extra_columns(recorded.iter().map(String::as_str)),
+        files_sha256: std::collections::BTreeMap::new(),
+        config_toml: info.config_toml.clone(),
+        gpu_adapter: None,
+    };
+    let folder = RunFolder::create(path, run, &[])?;
+    let found = folder.info().samples;
+    if found != info.pulls {
+        let (found, wanted) = (found.to_string(), info.pulls.to_string());
+        return Err(FolderError::AnotherRun { path: path.into(), what: "number of pulls", found, wanted });
+    }
+    Ok(folder)
+}
+
+/// What holds for all pulls of a rig's run.
+pub fn rig_campaign(folder: &RunFolder) -> Result<RigCampaign, FolderError> {
+    campaign_of(folder.path(), &folder.info().config_toml)
+}
+
+fn campaign_of(path: &Path, config_toml: &str) -> Result<RigCampaign, FolderError> {
+    #[derive(Deserialize)]
+    struct Config {
+        #[serde(default)]
+        campaign: RigCampaign,
+    }
+    let config: Result<Config, _> = toml::from_str(config_toml);
+    config.map(|c| c.campaign).map_err(|e| {
+        let problem = format!("the configuration of the run: {}", e.to_string().trim_end());
+        FolderError::Invalid { path: path.join("run.json"), problem }
+    })
+}
+
+/// Stores a measured pull as its shard: written aside, renamed, the sidecar last. One that is done is not replaced.
+pub fn write_rig_pull(folder: &RunFolder, pull: &RigPull) -> Result<Sidecar, RigRunError> {
+    let index = pull.scenario.index;
+    check_place(folder, index)?;
+    let encoded = pull
+        .encode(&folder.info().extra_columns)
+        .map_err(|source| RigRunError::Pull { pull: index, source })?;
+    let partial = match folder.start_shard(index)? {
+        ShardStart::Begun(partial) => partial,
+        ShardStart::Busy => return Err(RigRunError::Busy { pull: index }),
+        ShardStart::Done(_) => {
+            return Err(RigRunError::Done { pull: index, shard: folder.shard_path(index) });
+        }
+    };
+    let file = BufWriter::new(partial.duplicate()?);
+    let mut writer = ShardWriter::new(file, &shard_info(folder, pull), ImageStorage::Png)?;
+    writer.push(&encoded)?;
+    writer.finish()?.into_inner().map_err(|e| partial.error(e.into_error()))?;
+    let mut row = encoded.row;
+    (row[1], row[2]) = (index.to_string(), "0".into());
+    let failed = u64::from(encoded.status == Status::Failed);
+    Ok(folder.finish_shard(index, index, partial, failed, vec![row])?)
+}
+
+fn shard_info(folder: &RunFolder, pull: &RigPull) -> ShardInfo {
+    let run = folder.info();
+    ShardInfo {
+        gripgen_version: run.gripgen_version.clone(),
+        config_sha256: run.config_sha256.clone(),
+        source: run.source.clone(),
+        shard: pull.scenario.index,
+        shards: run.shards,
+        first_sample: pull.scenario.index,
+        samples: 1,
+        slot_ns: pull.slot_ns(),
+        config_toml: run.config_toml.clone(),
+    }
+}
+
+fn check_place(folder: &RunFolder, pull: u64) -> Result<(), RigRunError> {
+    let run = folder.info();
+    if run.source != RIG_SOURCE {
+        return Err(RigRunError::NoRig { path: folder.path().into(), found: run.source.clone() });
+    }
+    if pull >= run.samples {
+        return Err(RigRunError::NoPull { pull, pulls: run.samples });
+    }
+    Ok(())
+}
+
+/// Pulls of a rig's run that are still to be made, in order.
+pub fn missing_pulls(folder: &RunFolder) -> Result<Vec<u64>, FolderError> {
+    pulls_where(folder, |sidecar| sidecar.is_none())
+}
+
+/// Pulls of a rig's run that were tried and failed, in order.
+pub fn failed_pulls(folder: &RunFolder) -> Result<Vec<u64>, FolderError> {
+    pulls_where(folder, |sidecar| sidecar.is_some_and(|s| s.failed > 0))
+}
+
+fn pulls_where(folder: &RunFolder, is: impl Fn(Option<&Sidecar>) -> bool) -> Result<Vec<u64>, FolderError> {
+    let mut found = Vec::new();
+    for shard in 0..folder.info().shards {
+        if is(folder.finished(shard)?.as_ref()) {
+            found.push(shard);
+        }
+    }
+    Ok(found)
+}
+
+/// Takes a failed pull away, so that it can be made again; returns whether there was one. One with a label stays, which is
+/// an error. The index goes with it: it is written again when all pulls are done.
+pub fn discard_failed(folder: &RunFolder, pull: u64) -> Result<bool, RigRunError> {
+    check_place(folder, pull)?;
+    match folder.finished(pull)? {
+        None => return Ok(false),
+        Some(sidecar) if sidecar.failed == 0 => {
+            return Err(RigRunError::Labelled { pull, shard: folder.shard_path(pull) });
+        }
+        Some(_) => {}
+    }
+    // A process that dies between two of these leaves a shard without a sidecar: a pull that was not made.
+    remove(&folder.path().join("index.csv"))?;
+    remove(&folder.sidecar_path(pull))?;
+    // Whoever is making it again by now replaces the shard.
+    if let ShardStart::Begun(partial) = folder.start_shard(pull)? {
+        remove(&folder.shard_path(pull))?;
+        partial.give_up()?;
+    }
+    Ok(true)
+}
+
+fn remove(path: &Path) -> Result<(), FolderError> {
+    match std::fs::remove_file(path) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(FolderError::Io { path: path.into(), source: e }),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,190 @@
+//! A measured pull, and the messages that it is stored as.
+
+use crate::encode::{
+    EncodedRig, EncodedSample, VIEW_RATE_HZ, image_message, scenario_message, set_label, state_messages,
+    timestamp, trace_message,
+};
+use crate::index::index_row;
+use crate::picture::PictureError;
+use crate::proto::gripgen_v1::{PullTrace as PullTraceMessage, Status};
+use crate::rig_log::{RigLog, RigLogError};
+use gripgen_twin::config::ImageStorage;
+use gripgen_twin::{Jaw, PerJaw, PullTrace, Scenario, SlipLabel, TactileImage};
+use prost::Message;
+
+/// How a measured pull ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RigResult {
+    /// The jaws slid: the label is exact.
+    Slipped {
+        /// The label; it is not censored.
+        label: SlipLabel,
+    },
+    /// The pull ended before they slid: the label is a lower bound.
+    Censored {
+        /// The label.
+        label: SlipLabel,
+    },
+    /// The jaws closed without touching the part: the label is 0.
+    NoContact,
+    /// Something went wrong; there is no label.
+    Failed {
+        /// Why, with the numbers.
+        reason: String,
+    },
+}
+
+/// One measured pull, or one that failed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigPull {
+    /// What was asked: `index` is the place in the campaign, `seed` is 0. `drawn` holds what was measured beside the
+    /// known covariates.
+    pub scenario: Scenario,
+    /// How it ended.
+    pub result: RigResult,
+    /// Images while the part was gripped, before the pull.
+    pub images: Option<PerJaw<TactileImage>>,
+    /// Images before the grip, the jaws open.
+    pub rest: Option<PerJaw<TactileImage>>,
+    /// The force over time; rows before time 0 are the reading without a load and the preload.
+    pub trace: Option<PullTrace>,
+    /// Everything that was received.
+    pub log: RigLog,
+}
+
+/// A pull that cannot be stored as it is.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RigPullError {
+    /// A label that is no number.
+    #[error("its label is {max_pull_force_n} N at {slip_time_s} s, both must be numbers")]
+    Label {
+        /// The force.
+        max_pull_force_n: f64,
+        /// The time.
+        slip_time_s: f64,
+    },
+    /// Columns of a trace that do not fit together.
+    #[error("its trace has columns of {rows:?} rows (time, desired force, measured force, displacement)")]
+    TraceRows {
+        /// Rows of each column.
+        rows: [usize; 4],
+    },
+    /// Times of a trace that do not rise.
+    #[error("row {row} of its trace is at {time_s} s, the row before at {before_s} s")]
+    TraceTime {
+        /// The row, counted from 0.
+        row: usize,
+        /// Its time.
+        time_s: f64,
+        /// The time of the row before; minus infinity for the first.
+        before_s: f64,
+    },
+    /// An image whose bytes are not those of its size.
+    #[error("the image {what} of the {jaw} jaw is {width_px}x{height_px} pixels and has {bytes} bytes")]
+    Image {
+        /// `while gripped` or `at rest`.
+        what: &'static str,
+        /// The jaw.
+        jaw: Jaw,
+        /// Columns.
+        width_px: u32,
+        /// Rows.
+        height_px: u32,
+        /// Its bytes; three a pixel are needed.
+        bytes: usize,
+    },
+    /// The image cannot be coded.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// The log.
+    #[error(transparent)]
+    Log(#[from] RigLogError),
+}
+
+impl RigPull {
+    /// The messages of its shard.
+    pub(super) fn encode(&self, extra_columns: &[String]) -> Result<EncodedSample, RigPullError> {
+        self.check()?;
+        let start = Some(timestamp(0));
+        let mut message = scenario_message(&self.scenario, start);
+        match &self.result {
+            RigResult::Slipped { label } => set_label(&mut message, &SlipLabel { censored: false, ..*label }),
+            RigResult::Censored { label } => set_label(&mut message, &SlipLabel { censored: true, ..*label }),
+            RigResult::NoContact => {
+                message.set_status(Status::NoContact);
+                message.max_pull_force_n = Some(0.0);
+            }
+            RigResult::Failed { reason } => {
+                message.set_status(Status::Failed);
+                message.failure.clone_from(reason);
+            }
+        }
+        let coded = |both: &Option<PerJaw<TactileImage>>| {
+            let png = |both: &PerJaw<TactileImage>| {
+                PerJaw::try_from_fn(|jaw| image_message(&both[jaw], jaw, ImageStorage::Png, start))
+            };
+            both.as_ref().map(png).transpose()
+        };
+        let trace = self.trace.as_ref();
+        let (streams, events) = self.log.encode(start);
+        Ok(EncodedSample {
+            start_ns: 0,
+            sample: message.encode_to_vec(),
+            images: coded(&self.images)?,
+            // The times are measurements too: none of them is rounded to a rate.
+            trace: trace.map(|t| {
+                let columns = trace_message(t, start);
+                PullTraceMessage { rate_hz: 0.0, time_s: t.time_s.clone(), ..columns }.encode_to_vec()
+            }),
+            states: trace.map(|t| state_messages(t, 0, Some(VIEW_RATE_HZ))).unwrap_or_default(),
+            rig: Some(EncodedRig { rest: coded(&self.rest)?, streams, events }),
+            row: index_row(&message, extra_columns),
+            status: message.status(),
+        })
+    }
+
+    /// Longer than the pull, in whole seconds.
+    pub(super) fn slot_ns(&self) -> u64 {
+        let ends = self.trace.as_ref().and_then(|t| t.time_s.first().zip(t.time_s.last()));
+        let length_s = ends.map_or(0.0, |(first, last)| last - first.min(0.0));
+        (length_s.max(0.0).ceil() as u64 + 1).saturating_mul(1_000_000_000)
+    }
+
+    fn check(&self) -> Result<(), RigPullError> {
+        if let RigResult::Slipped { label } | RigResult::Censored { label } = &self.result {
+            let SlipLabel { max_pull_force_n, slip_time_s, .. } = *label;
+            if !(max_pull_force_n.is_finite() && slip_time_s.is_finite()) {
+                return Err(RigPullError::Label { max_pull_force_n, slip_time_s });
+            }
+        }
+        for (what, images) in [("while gripped", &self.images), ("at rest", &self.rest)] {
+            for (jaw, image) in images.iter().flat_map(PerJaw::iter) {
+                let TactileImage { width_px, height_px, ref rgb } = *image;
+                let wanted = u64::from(width_px) * u64::from(height_px) * 3;
+                if rgb.len() as u64 != wanted {
+                    let bytes = rgb.len();
+                    return Err(RigPullError::Image { what, jaw, width_px, height_px, bytes });
+                }
+            }
+        }
+        self.trace.as_ref().map_or(Ok(()), check_trace)?;
+        Ok(self.log.check()?)
+    }
+}
+
+fn check_trace(t: &PullTrace) -> Result<(), RigPullError> {
+    let columns = [&t.time_s, &t.desired_force_n, &t.measured_force_n, &t.displacement_m];
+    let rows = columns.map(Vec::len);
+    if rows.iter().any(|&n| n != rows[0]) {
+        return Err(RigPullError::TraceRows { rows });
+    }
+    let mut before_s = f64::NEG_INFINITY;
+    for (row, &time_s) in t.time_s.iter().enumerate() {
+        if !(time_s.is_finite() && time_s > before_s) {
+            return Err(RigPullError::TraceTime { row, time_s, before_s });
+        }
+        before_s = time_s;
+    }
+    Ok(())
+}

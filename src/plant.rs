@@ -1,0 +1,315 @@
+//! The twin as what a virtual rig moves: grips where the tool is, pulls that somebody else commands.
+
+use crate::generate::{SampleError, SimulateOptions, pull_session};
+use crate::gripped::Gripped;
+use crate::location::Location;
+use crate::project::{LoadError, Project, load_twin_document};
+use gripgen_physics::{Command, PullSession};
+use gripgen_tactile::SimdLevel;
+use gripgen_twin::config::{Backend, Mechanics};
+use gripgen_twin::draw::Drawn;
+use gripgen_twin::effects::SensorChain;
+use gripgen_twin::frames::{Pose, rotation_about_axis};
+use gripgen_twin::random::{Purpose, Stream};
+use gripgen_twin::{
+    Covariates, PULLS_SINCE_REST, PerJaw, RestCount, Scenario, TactileImage, Twin, table_offset_n,
+};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Height of the grip centres above the robot's base, and how far the first is in front of it.
+const FIXTURE_Z_M: f64 = 0.25;
+const FIXTURE_X_M: f64 = 0.45;
+/// Distance between fixtures.
+const FIXTURE_STEP_M: f64 = 0.12;
+/// A tool that is further from a fixture than this has nothing between its jaws.
+const REACH_M: f64 = 0.05;
+/// Across the part, and along the pull, the jaws miss it sooner.
+const BESIDE_M: f64 = 0.02;
+
+/// Where a part is mounted: the pose of the tool that grips it in its middle at a grip angle of 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fixture {
+    /// Name of the part.
+    pub part: String,
+    /// The tool in the robot's base: x along the part's long axis, y along the jaws' axis, z down.
+    pub base_from_tool: Pose,
+}
+
+/// A twin with its parts mounted in fixtures, and a clock that its pulls are counted by.
+pub struct TwinPlant {
+    project: Arc<Project>,
+    fixtures: Vec<Fixture>,
+    seed: u64,
+    counted: Arc<Mutex<Counted>>,
+}
+
+#[derive(Default)]
+struct Counted {
+    pulls: u64,
+    rests: RestCount,
+}
+
+impl TwinPlant {
+    /// Loads a twin with its files and mounts its parts side by side along the base's y axis, in the order of their names.
+    pub fn open(twin: &Location, sets: &[(String, String)], seed: u64) -> Result<Self, LoadError> {
+        let document = load_twin_document(twin, sets)?;
+        let checked = document.read_twin().and_then(|file| Twin::new(&file));
+        let checked = checked.map_err(|e| LoadError::from(document.located(e)))?;
+        let parts: Vec<&str> = checked.parts.keys().map(String::as_str).collect();
+        let project = Arc::new(Project::of_twin(twin, &parts, true, sets)?);
+        let first_y_m = -0.5 * FIXTURE_STEP_M * (parts.len().max(1) - 1) as f64;
+        let fixtures = parts.iter().enumerate().map(|(i, part)| {
+            let position_m = Vector3::new(FIXTURE_X_M, first_y_m + i as f64 * FIXTURE_STEP_M, FIXTURE_Z_M);
+            let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+            Fixture {
+                part: (*part).into(),
+                base_from_tool: Pose::from_parts(Translation3::from(position_m), down),
+            }
+        });
+        Ok(Self { fixtures: fixtures.collect(), project, seed, counted: Arc::default() })
+    }
+
+    /// Where the parts are.
+    pub fn fixtures(&self) -> &[Fixture] {
+        &self.fixtures
+    }
+
+    /// The twin.
+    pub fn twin(&self) -> &Twin {
+        &self.project.twin
+    }
+
+    /// What the cameras see with the jaws open; nothing where a sensor file cannot be read.
+    pub fn rest_images(&self, time_s: f64) -> Result<PerJaw<TactileImage>, SampleError> {
+        let mut scenario = self.scenario_of_part(&self.fixtures[0].part);
+        scenario.covariates.time_s = time_s;
+        let Project { twin, library, .. } = &*self.project;
+        Gripped::at_rest(twin, library, &scenario, options(true))?.images(twin, &scenario, None)
+    }
+
+    /// What the wrist sensor says along +z without a load.
+    pub fn offset_n(&self, time_s: f64) -> f64 {
+        let mut scenario = self.scenario_of_part(&self.fixtures[0].part);
+        scenario.covariates.time_s = time_s;
+        let twin = &self.project.twin;
+        let chain = SensorChain::new(twin, &scenario.part, time_s);
+        chain.along(1.0).plus(table_offset_n(twin, &scenario)).read(0.0, 0.0, 0.0)
+    }
+
+    /// Noise of its reading number `tick` without a load.
+    pub fn noise_n(&self, tick: u64) -> f64 {
+        // Lanes 0 and 1 are those of pulls and of their no-load readings.
+        let mut noise = Stream::with_lane(self.seed, tick, Purpose::ForceNoise, 2);
+        self.project.twin.wrist.noise_n * noise.normal()
+    }
+
+    /// The jaws close where the tool is. `None` if nothing is there.
+    pub fn grip(
+        &self,
+        base_from_tool: &Pose,
+        force_per_jaw_n: f64,
+        time_s: f64,
+    ) -> Result<Option<PlantGrip>, SampleError> {
+        let Some((part, offset_m, angle_rad)) = self.part_at(base_from_tool) else { return Ok(None) };
+        let mut scenario = self.scenario_of_part(part);
+        scenario.grip_force_n = force_per_jaw_n;
+        {
+            let counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
+            (scenario.index, scenario.group) = (counted.pulls, counted.pulls);
+        }
+        scenario.covariates = Covariates {
+            pull_index: scenario.index,
+            time_s,
+            grip_offset_m: offset_m,
+            grip_angle_rad: angle_rad,
+            ..Covariates::default()
+        };
+        let Project { twin, library, .. } = &*self.project;
+        let gripped = Gripped::new(twin, library, &scenario, options(true))?;
+        let images = gripped.images(twin, &scenario, None)?;
+        let Some(contact) = &gripped.contact else { return Ok(None) };
+        let gel_from_part = &contact.held.grasp.gel_from_part;
+        let width_m = gel_from_part.left.translation.z + gel_from_part.right.translation.z;
+        let (project, counted) = (self.project.clone(), self.counted.clone());
+        Ok(Some(PlantGrip { project, counted, scenario, images, width_m, session: None }))
+    }
+
+    /// The part between the jaws of a tool, the lever along its long axis, and the angle about the jaws' axis.
+    fn part_at(&self, base_from_tool: &Pose) -> Option<(&str, f64, f64)> {
+        let relative = |fixture: &Fixture| fixture.base_from_tool.inv_mul(base_from_tool);
+        let distance_m = |fixture: &Fixture| relative(fixture).translation.vector.norm();
+        let nearest = self.fixtures.iter().min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)))?;
+        let pose = relative(nearest);
+        let [x_m, y_m, z_m] = pose.translation.vector.into();
+        if x_m.abs() > REACH_M || y_m.abs() > BESIDE_M || z_m.abs() > BESIDE_M {
+            return None;
+        }
+        let turned = pose.rotation * Vector3::x();
+        Some((&nearest.part, x_m, libm::atan2(-turned.z, turned.x)))
+    }
+
+    fn scenario_of_part(&self, part: &str) -> Scenario {
+        let mut scenario = self.project.sweep.scenario(0, &self.project.twin).0;
+        (scenario.seed, scenario.index, scenario.group, scenario.repetition) = (self.seed, 0, 0, 0);
+        scenario.part = part.into();
+        scenario.grip_pose = 0;
+        scenario.drawn.clear();
+        scenario.covariates = Covariates::default();
+        scenario.pull.step_jitter = 0.0;
+        scenario
+    }
+}
+
+/// Pose of a tool at a lever along the part's long axis and an angle about the jaws' axis, from that in the middle at 0.
+pub fn tool_at(base_from_middle: &Pose, offset_m: f64, angle_rad: f64) -> Pose {
+    let turn = UnitQuaternion::from_rotation_matrix(&rotation_about_axis(1, angle_rad));
+    base_from_middle * Pose::from_parts(Translation3::new(offset_m, 0.0, 0.0), turn)
+}
+
+/// What a pull is, beside its grip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlantPull {
+    /// +1 up, -1 down.
+    pub direction: f64,
+    /// Height of a step.
+    pub increment_n: f64,
+    /// Length of a step.
+    pub step_s: f64,
+    /// Time since the jaws closed.
+    pub dwell_s: f64,
+    /// Clock of the rig.
+    pub time_s: f64,
+}
+
+/// A reading of a pull: force along the pull as the wrist sensor says it, displacement and speed of the tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlantReading {
+    /// Force.
+    pub measured_n: f64,
+    /// Displacement.
+    pub displacement_m: f64,
+    /// Speed.
+    pub speed_m_s: f64,
+}
+
+/// Jaws closed on a part.
+pub struct PlantGrip {
+    project: Arc<Project>,
+    counted: Arc<Mutex<Counted>>,
+    scenario: Scenario,
+    images: PerJaw<TactileImage>,
+    width_m: f64,
+    session: Option<PullSession>,
+}
+
+impl PlantGrip {
+    /// What the cameras see.
+    pub fn images(&self) -> &PerJaw<TactileImage> {
+        &self.images
+    }
+
+    /// Opening of the jaws.
+    pub fn width_m(&self) -> f64 {
+        self.width_m
+    }
+
+    /// The pull begins: friction is that of this dwell, this loading rate, and as many pulls as there were.
+    pub fn begin_pull(&mut self, pull: &PlantPull) -> Result<PlantReading, SampleError> {
+        let s = &mut self.scenario;
+        (s.covariates.dwell_s, s.covariates.time_s) = (pull.dwell_s, pull.time_s);
+        s.covariates.pull_direction = pull.direction;
+        (s.pull.increment_n, s.pull.step_s) = (pull.increment_n, pull.step_s);
+        {
+            let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
+            s.covariates.pull_index = counted.pulls;
+            counted.pulls += 1;
+            let since = counted.rests.since(&s.covariates);
+            s.covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since as f64));
+        }
+        let Project { twin, library, .. } = &*self.project;
+        let gripped = Gripped::new(twin, library, &self.scenario, options(false))?;
+        if let Some(contact) = &gripped.contact {
+            self.session = Some(pull_session(twin, &self.scenario, contact)?.0);
+        }
+        Ok(self.reading())
+    }
+
+    /// The arm pulls with this force along the pull.
+    pub fn pull(&mut self, force_n: f64, step_s: f64) -> Result<PlantReading, SampleError> {
+        if let Some(session) = &mut self.session {
+            session.step(Command::ForceN(force_n), step_s)?;
+        }
+        Ok(self.reading())
+    }
+
+    fn reading(&self) -> PlantReading {
+        let state = self.session.as_ref().map(PullSession::state);
+        PlantReading {
+            measured_n: state.map_or(0.0, |s| s.measured_force_n),
+            displacement_m: state.map_or(0.0, |s| s.displacement_m),
+            speed_m_s: state.map_or(0.0, |s| s.speed_m_per_s),
+        }
+    }
+}
+
+fn options(images: bool) -> SimulateOptions {
+    SimulateOptions {
+        mechanics: Mechanics::Reduced,
+        images,
+        trace: true,
+        backend: Backend::Cpu,
+        level: SimdLevel::best(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plant() -> TwinPlant {
+        TwinPlant::open(&Location::parse("asset:configs/twin-baseline.toml"), &[], 3).unwrap()
+    }
+
+    #[test]
+    fn the_tool_says_which_part_is_gripped_and_where() {
+        let plant = plant();
+        let fixture = &plant.fixtures()[1];
+        for (offset_m, angle_deg) in [(0.0, 0.0), (2e-3, 30.0), (-1.5e-3, 90.0), (0.0, -45.0)] {
+            let tool = tool_at(&fixture.base_from_tool, offset_m, f64::to_radians(angle_deg));
+            let (part, x_m, rad) = plant.part_at(&tool).unwrap();
+            assert_eq!(part, fixture.part);
+            assert!((x_m - offset_m).abs() < 1e-12 && (rad.to_degrees() - angle_deg).abs() < 1e-9);
+        }
+        let mut away = fixture.base_from_tool;
+        away.translation.z += 0.1;
+        assert!(plant.grip(&away, 20.0, 0.0).unwrap().is_none());
+    }
+
+    /// The same pull as that of a sweep: what the rig reads is what the staircase reads.
+    #[test]
+    fn a_pull_on_the_plant_is_a_pull_of_the_twin() {
+        let plant = plant();
+        let fixture = plant.fixtures().iter().find(|f| f.part == "long_shaft").unwrap();
+        let mut grip = plant.grip(&fixture.base_from_tool, 40.0, 5.0).unwrap().unwrap();
+        let width_mm = 1e3 * grip.width_m();
+        assert!(width_mm > 1.0 && width_mm < 60.0, "{width_mm}");
+        let pull = PlantPull { direction: 1.0, increment_n: 1.0, step_s: 0.104, dwell_s: 1.0, time_s: 7.0 };
+        let mut reading = grip.begin_pull(&pull).unwrap();
+        let (mut tick, mut largest_n) = (0, 0.0_f64);
+        while reading.displacement_m < 5e-3 && tick < 20_000 {
+            let desired_n = ((f64::from(tick) * 0.002 + 1e-9) / 0.104).floor() + 1.0;
+            reading = grip.pull(desired_n, 0.002).unwrap();
+            largest_n = largest_n.max(reading.measured_n);
+            tick += 1;
+        }
+        let scenario = grip.scenario.clone();
+        let twin = plant.twin();
+        let outcome =
+            crate::generate::simulate(twin, &plant.project.library, &scenario, options(false), None);
+        let gripgen_twin::Outcome::Pulled(pulled) = outcome.unwrap() else { panic!("it slips") };
+        let peak = pulled.trace.measured_force_n.iter().copied().fold(0.0, f64::max);
+        assert_eq!(largest_n, peak);
+        assert!((tick as f64 * 0.002 - pulled.trace.time_s.last().unwrap()).abs() < 0.005);
+    }
+}
