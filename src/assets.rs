@@ -14,6 +14,7 @@ static FILES: &[(&str, &[u8])] = embedded![
     "configs/paper.toml",
     "configs/quickstart.toml",
     "configs/large.toml",
+    "configs/rig.toml",
     "configs/twin-large.toml",
     "configs/twin-baseline.toml",
     "configs/twin.toml",

@@ -68,6 +68,7 @@ mod presses;
 mod project;
 mod report;
 mod resolve;
+mod rig_run;
 mod schema;
 mod simulator;
 mod sweep;
@@ -106,7 +107,7 @@ pub use picture::{
     sample_picture,
 };
 pub use plan::{Plan, Probe, plan};
-pub use plant::{Fixture, PlantGrip, PlantPull, PlantReading, TwinPlant, tool_at};
+pub use plant::{Fixture, PlantGrip, PlantPull, PlantReading, TwinPlant};
 pub use predict::PullPredictor;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};
 pub use press_report::{PressReportText, press_report};
@@ -118,6 +119,7 @@ pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
 pub use report::{
     Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
 };
+pub use rig_run::{plain_campaign, rig_run_toml};
 pub use schema::{sweep_schema, twin_schema};
 pub use simulator::{Draw, Simulator};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, VERSION, prepare_run, run_info, sweep};

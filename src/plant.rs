@@ -9,7 +9,7 @@ use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::SensorChain;
-use gripgen_twin::frames::{Pose, rotation_about_axis};
+use gripgen_twin::frames::Pose;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
     Covariates, PULLS_SINCE_REST, PerJaw, RestCount, Scenario, TactileImage, Twin, table_offset_n,
@@ -161,12 +161,6 @@ impl TwinPlant {
     }
 }
 
-/// Pose of a tool at a lever along the part's long axis and an angle about the jaws' axis, from that in the middle at 0.
-pub fn tool_at(base_from_middle: &Pose, offset_m: f64, angle_rad: f64) -> Pose {
-    let turn = UnitQuaternion::from_rotation_matrix(&rotation_about_axis(1, angle_rad));
-    base_from_middle * Pose::from_parts(Translation3::new(offset_m, 0.0, 0.0), turn)
-}
-
 /// What a pull is, beside its grip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlantPull {
@@ -266,6 +260,7 @@ fn options(images: bool) -> SimulateOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gripgen_twin::frames::tool_at;
 
     fn plant() -> TwinPlant {
         TwinPlant::open(&Location::parse("asset:configs/twin-baseline.toml"), &[], 3).unwrap()

@@ -6,7 +6,7 @@ mod rig;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
 pub use identify::{CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, DiagnoseArgs};
-pub use rig::{RigCommand, RigServeArgs};
+pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigServeArgs, RigTeachArgs};
 use std::path::PathBuf;
 
 /// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.

@@ -42,6 +42,13 @@ impl Failure {
         Self { exit_code: code::USAGE, ..Self::new(message) }
     }
 
+    /// The same with another exit code.
+    #[must_use]
+    pub fn with_code(mut self, exit_code: u8) -> Self {
+        self.exit_code = exit_code;
+        self
+    }
+
     /// Adds what to do about it.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {

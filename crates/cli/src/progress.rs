@@ -53,6 +53,13 @@ impl Progress {
         }
     }
 
+    /// Words behind the bar; nothing without one.
+    pub fn message(&self, text: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(text.to_string());
+        }
+    }
+
     /// A line that does not disturb the bar.
     pub fn say(&self, text: &str) {
         match &self.bar {
@@ -62,7 +69,7 @@ impl Progress {
     }
 
     /// Ends the display; returns the time it took.
-    pub fn finish(self) -> Duration {
+    pub fn finish(&self) -> Duration {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }

@@ -1,11 +1,12 @@
 //! The real experiment: the protocols of robot, gripper and cameras.
 //!
-//! Sessions are without sockets: bytes in, events and bytes out, so that every moment of a connection can be tested. What is here
-//! so far are the clients of RTDE (the robot's data exchange), of GCL (the gripper's text interface) and of the cameras'
-//! streams, RTDE's socket, and the pull as a program for the robot; the experiment itself follows.
+//! Sessions are without sockets: bytes in, events and bytes out, so that every moment of a connection can be tested. Clients
+//! on sockets have a reader thread each. [`experiment`] is the pull itself, [`program`] what the robot runs of it,
+//! [`virtual_rig`] the devices' side of the same protocols for a machine without any.
 
 pub mod camera;
 pub mod dashboard;
+pub mod experiment;
 pub mod gcl;
 pub mod primary;
 pub mod program;

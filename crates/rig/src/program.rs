@@ -51,13 +51,15 @@ pub enum Phase {
     Stopped = 4,
     /// It moves to another pose.
     Moving = 5,
+    /// The pull or the motion is over and the tool comes to rest.
+    Braking = 6,
 }
 
 impl Phase {
     /// The phase with this number.
     pub fn from_number(number: i32) -> Option<Self> {
-        use Phase::{Moving, Pulling, Started, Stopped, Zeroed};
-        [Started, Zeroed, Pulling, Stopped, Moving].into_iter().find(|phase| *phase as i32 == number)
+        use Phase::{Braking, Moving, Pulling, Started, Stopped, Zeroed};
+        [Started, Zeroed, Pulling, Stopped, Moving, Braking].into_iter().find(|phase| *phase as i32 == number)
     }
 }
 

@@ -17,5 +17,5 @@ mod value;
 pub use frame::{Frame, FrameError, FrameTooLongError, Framer, Kind, encode_frame};
 pub use recipe::{Recipe, RecipeError};
 pub use session::{Event, Link, SessionError, SessionPlan, WriteInputError};
-pub use socket::{LinkError, RtdeClient, WriteError};
+pub use socket::{LinkError, RtdeClient, RtdeWriter, WriteError};
 pub use value::{FieldType, Value, ValueError};

@@ -47,6 +47,12 @@ pub fn pose(rotation: &Rotation3<f64>, position_m: Vector3<f64>) -> Pose {
     Pose::from_parts(Translation3::from(position_m), quaternion_from_rotation(rotation))
 }
 
+/// `base_from_tool` of a grip at a lever along the part's long axis and an angle about the jaws' axis, from that in its middle
+/// at an angle of 0. The tool's x axis lies along the part, its y axis along the jaws.
+pub fn tool_at(base_from_middle: &Pose, offset_m: f64, angle_rad: f64) -> Pose {
+    base_from_middle * pose(&rotation_about_axis(1, angle_rad), Vector3::new(offset_m, 0.0, 0.0))
+}
+
 /// The unit quaternion of a rotation, by the largest-component method (Shepperd 1978), square roots only.
 fn quaternion_from_rotation(rotation: &Rotation3<f64>) -> UnitQuaternion<f64> {
     let m = rotation.matrix();

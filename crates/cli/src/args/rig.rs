@@ -2,12 +2,112 @@
 
 use super::{JsonArgs, TalkArgs, key_value};
 use clap::{Args, Subcommand};
+use std::path::PathBuf;
 
 /// `gripgen rig`
 #[derive(Debug, Subcommand)]
 pub enum RigCommand {
+    /// Say whether every device of a rig answers; nothing moves.
+    Check(RigCheckArgs),
+    /// Store where the tool is as the pose of a part.
+    Teach(RigTeachArgs),
+    /// Make pulls on a rig and record them. Running it again makes what is missing.
+    Pull(RigPullArgs),
     /// Serve a virtual rig on this machine: RTDE, dashboard, script ports, gripper and cameras, moved by a twin.
     Serve(RigServeArgs),
+}
+
+/// `gripgen rig check`
+#[derive(Debug, Args)]
+pub struct RigCheckArgs {
+    /// The rig.
+    #[arg(value_name = "RIG.toml", default_value = "asset:configs/rig.toml")]
+    pub rig: String,
+    /// Override a key of the rig's file; may be given many times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+    /// Find sign and gain of the force sensor with a known mass, which is to be hung on the tool when it says so.
+    #[arg(long, value_name = "KG", value_parser = mass)]
+    pub mass_kg: Option<f64>,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen rig teach`
+#[derive(Debug, Args)]
+pub struct RigTeachArgs {
+    /// Name of the part, as in campaigns and twins.
+    pub name: String,
+    /// The rig's file, which the pose is written into.
+    #[arg(long, value_name = "RIG.toml", default_value = "rig.toml")]
+    pub rig: PathBuf,
+    /// Override a key of the rig's file; may be given many times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+    /// JSON: the pose.
+    #[command(flatten)]
+    pub json: JsonArgs,
+}
+
+/// `gripgen rig pull`
+#[derive(Debug, Args)]
+pub struct RigPullArgs {
+    /// The rig.
+    #[arg(value_name = "RIG.toml", default_value = "asset:configs/rig.toml")]
+    pub rig: String,
+    /// Override a key of the rig's file; may be given many times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+    /// The pulls to make, as `gripgen campaign` plans them. Without it they are those of the flags below.
+    #[arg(long, value_name = "CAMPAIGN.toml")]
+    pub campaign: Option<PathBuf>,
+    /// Parts to pull; all that are taught where it is left out.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', conflicts_with = "campaign")]
+    pub parts: Vec<String>,
+    /// Grip forces, of one jaw.
+    #[arg(long, value_name = "N,...", value_delimiter = ',', default_values_t = [20.0], conflicts_with = "campaign")]
+    pub grip_force_n: Vec<f64>,
+    /// How often each is pulled.
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "campaign")]
+    pub repetitions: usize,
+    /// Seed of the order.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Run folder; runs/<name of the campaign> where it is left out.
+    #[arg(short, long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Only check everything against the limits; nothing is sent.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Print the robot's program of the first pull; nothing is sent.
+    #[arg(long)]
+    pub print_program: bool,
+    /// Somebody stands beside the robot: power on, brakes off.
+    #[arg(long)]
+    pub power_on: bool,
+    /// Somebody has looked at the robot: leave a protective stop.
+    #[arg(long)]
+    pub unlock: bool,
+    /// How often a fault after which the robot stands still may be answered by a new connection, between two pulls.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub reconnect: u32,
+    /// JSON: one event a line.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+fn mass(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(kg) if (0.2..=4.0).contains(&kg) => Ok(kg),
+        _ => Err("a number of kilograms from 0.2 to 4 is needed, for example 1.0".into()),
+    }
 }
 
 /// `gripgen rig serve`

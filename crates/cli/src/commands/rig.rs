@@ -1,4 +1,11 @@
 //! `gripgen rig`: one file a verb.
 
-pub mod plant;
+pub mod check;
+mod live;
+mod load;
+mod plant;
+pub mod pull;
+mod record;
 pub mod serve;
+mod standing;
+pub mod teach;

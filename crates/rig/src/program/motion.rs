@@ -173,11 +173,13 @@ fn body() -> String {
       ticks = ticks + 1
       sync()
     end
+    write_output_integer_register({PHASE}, {braking})
     kill handle
     stopl({stop:.1})
   end
 ",
         moving = Phase::Moving as i32,
+        braking = Phase::Braking as i32,
         force = StopReason::Force as i32,
         host = StopReason::Host as i32,
         time = StopReason::Time as i32,

@@ -223,6 +223,7 @@ fn body() -> String {
       ticks = ticks + 1
       sync()
     end
+    write_output_integer_register({PHASE}, {braking})
     end_force_mode()
     stopl({stop:.1})
   end
@@ -233,6 +234,7 @@ fn body() -> String {
         preload = super::PRELOAD_S,
         settle = super::SETTLE_S,
         pulling = Phase::Pulling as i32,
+        braking = Phase::Braking as i32,
         largest = StopReason::LargestCommand as i32,
         stop = super::STOP_DECELERATION_M_S2,
     )

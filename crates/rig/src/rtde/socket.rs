@@ -3,10 +3,11 @@
 use super::session::{Event, Link, SessionError, SessionPlan, WriteInputError};
 use super::value::Value;
 use super::{Recipe, RecipeError};
+use crate::stamped::{Stamped, lock};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -61,7 +62,7 @@ pub struct RtdeClient {
     stream: TcpStream,
     address: SocketAddr,
     recipe: Recipe,
-    events: Receiver<Event>,
+    events: Receiver<Stamped<Event>>,
     reader: Option<JoinHandle<()>>,
 }
 
@@ -70,10 +71,6 @@ struct Shared {
     newest: Mutex<Option<Vec<Value>>>,
     ended: Mutex<Option<LinkError>>,
     wanted: Mutex<bool>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl RtdeClient {
@@ -120,7 +117,7 @@ impl RtdeClient {
             };
             for event in link.receive(&buffer[..n]).map_err(session)? {
                 keep_newest(&event, &mut newest);
-                let _ = tell.send(event);
+                let _ = tell.send(Stamped { at: Instant::now(), event });
             }
         }
         let recipe = link.output().cloned().expect("a session that runs has its outputs");
@@ -142,7 +139,7 @@ impl RtdeClient {
     }
 
     /// What happened, in its order; the end of the channel is the end of the connection.
-    pub fn events(&self) -> &Receiver<Event> {
+    pub fn events(&self) -> &Receiver<Stamped<Event>> {
         &self.events
     }
 
@@ -157,14 +154,45 @@ impl RtdeClient {
     }
 
     /// Writes the values of an input recipe at once.
-    pub fn write_input(&mut self, recipe: usize, values: &[Value]) -> Result<(), WriteError> {
-        let mut link = lock(&self.shared.link);
-        link.write_input(recipe, values)?;
-        let outgoing = link.take_outgoing();
-        let address = self.address;
-        self.stream.write_all(&outgoing).map_err(|source| LinkError::Io { address, source })?;
-        Ok(())
+    pub fn write_input(&self, recipe: usize, values: &[Value]) -> Result<(), WriteError> {
+        write_input(&self.shared, &self.stream, self.address, recipe, values)
     }
+
+    /// A second hand that writes inputs: for a heartbeat, in a thread of its own.
+    pub fn writer(&self) -> Result<RtdeWriter, LinkError> {
+        let address = self.address;
+        let stream = self.stream.try_clone().map_err(|source| LinkError::Io { address, source })?;
+        Ok(RtdeWriter { shared: self.shared.clone(), stream, address })
+    }
+}
+
+/// Writes inputs of a client's connection. It does not keep the connection open.
+pub struct RtdeWriter {
+    shared: Arc<Shared>,
+    stream: TcpStream,
+    address: SocketAddr,
+}
+
+impl RtdeWriter {
+    /// Writes the values of an input recipe at once.
+    pub fn write_input(&self, recipe: usize, values: &[Value]) -> Result<(), WriteError> {
+        write_input(&self.shared, &self.stream, self.address, recipe, values)
+    }
+}
+
+fn write_input(
+    shared: &Shared,
+    mut stream: &TcpStream,
+    address: SocketAddr,
+    recipe: usize,
+    values: &[Value],
+) -> Result<(), WriteError> {
+    // The lock is kept over the write: two hands never mix their frames.
+    let mut link = lock(&shared.link);
+    link.write_input(recipe, values)?;
+    let outgoing = link.take_outgoing();
+    stream.write_all(&outgoing).map_err(|source| LinkError::Io { address, source })?;
+    Ok(())
 }
 
 /// Why inputs were not written.
@@ -201,7 +229,7 @@ fn keep_newest(event: &Event, newest: &mut Option<Vec<Value>>) {
 }
 
 /// The reader's loop, until the connection ends or nobody wants it any more.
-fn read_on(shared: &Shared, mut stream: TcpStream, address: SocketAddr, tell: &Sender<Event>) {
+fn read_on(shared: &Shared, mut stream: TcpStream, address: SocketAddr, tell: &Sender<Stamped<Event>>) {
     let mut buffer = [0; 65_536];
     let mut heard = Instant::now();
     let end = loop {
@@ -220,7 +248,7 @@ fn read_on(shared: &Shared, mut stream: TcpStream, address: SocketAddr, tell: &S
                 for event in events {
                     keep_newest(&event, &mut lock(&shared.newest));
                     // Nobody reads the log: the newest values are still there.
-                    let _ = tell.send(event);
+                    let _ = tell.send(Stamped { at: heard, event });
                 }
             }
             Err(e) if would_block(&e) => {

@@ -78,7 +78,7 @@ fn every_packet_arrives_in_order_and_the_end_is_known() {
     assert_eq!(client.recipe().place("actual_TCP_force"), Some(1));
     let mut tick = 0;
     for event in client.events() {
-        if let Event::Data(values) = event {
+        if let Event::Data(values) = event.event {
             assert_eq!(values[0], Value::Double(40.0 + f64::from(tick) * 0.002));
             tick += 1;
         }
@@ -96,7 +96,7 @@ fn inputs_reach_the_controller_while_it_sends() {
         stream.write_all(&data(0)).unwrap();
         let _ = tell.send(next(&mut stream));
     });
-    let mut client = RtdeClient::connect(address, &plan(), TIMEOUT).unwrap();
+    let client = RtdeClient::connect(address, &plan(), TIMEOUT).unwrap();
     client.write_input(0, &[Value::Double(12.5)]).unwrap();
     let (kind, payload) = heard.recv_timeout(TIMEOUT).unwrap().unwrap();
     assert_eq!((kind, payload), (b'U', [&[7][..], &12.5_f64.to_be_bytes()].concat()));

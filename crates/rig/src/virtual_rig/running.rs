@@ -131,6 +131,7 @@ impl Running {
             }
             Stage::Moving { ticks } => self.move_on(robot, arm, ticks, go),
             Stage::Stopping(reason) => {
+                say(robot, Phase::Braking);
                 arm.stop();
                 if arm.speed_m_s() > 0.0 {
                     Stage::Stopping(reason)
@@ -238,9 +239,8 @@ impl Running {
 
     fn move_on(&self, robot: &Robot, arm: &mut Arm, ticks: u64, go: i32) -> Stage {
         let Kind::Motion(m) = self.kind else { return Stage::Stopping(StopReason::Host) };
-        if ticks == 0 {
-            arm.set_drive(Drive::Line { target: m.target, speed_m_s: m.speed_mm_s * 1e-3 });
-        }
+        // In every step: a program that was paused goes on where it is.
+        arm.set_drive(Drive::Line { target: m.target, speed_m_s: m.speed_mm_s * 1e-3 });
         let force = robot.wrench[..3].iter().map(|f| f * f).sum::<f64>().sqrt();
         let exits = [
             (force > m.abort_force_n, StopReason::Force),

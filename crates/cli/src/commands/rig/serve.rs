@@ -50,7 +50,7 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     if !args.talk.quiet {
         eprintln!("Ctrl-C ends the virtual rig");
     }
-    let stop = stop_flag();
+    let stop = stop_flag("ending the virtual rig");
     let (tell, told) = channel();
     if args.faults {
         std::thread::spawn(move || {

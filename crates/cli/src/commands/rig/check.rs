@@ -1,0 +1,65 @@
+//! `gripgen rig check`: does every device answer.
+
+use super::load::load_rig;
+use crate::args::RigCheckArgs;
+use crate::failure::{Failure, code};
+use crate::output::{JsonSink, print, size};
+use gripgen_rig::experiment::check::{CheckLine, check, check_force};
+use serde_json::{Value, json};
+
+/// Free space that a day of pulls needs.
+const LEAST_FREE: u64 = 2_000_000_000;
+
+/// Runs the verb.
+pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
+    let config = load_rig(&args.rig, &args.set)?;
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let (on_stdout, mut lines) = (sink.on_stdout(), Vec::new());
+    let mut failed = Ok(());
+    let mut tell = |line: CheckLine| {
+        let mark = if line.ok { "ok  " } else { "BAD " };
+        if !on_stdout && failed.is_ok() {
+            failed = print(&format!("{mark} {:<18} {}\n", line.what, line.found));
+        }
+        lines.push(line);
+    };
+    check(&config, &mut tell);
+    tell(free_space());
+    failed?;
+    let mut force = Value::Null;
+    if let Some(mass_kg) = args.mass_kg {
+        let hang = || eprintln!("hang {mass_kg} kg on the tool now, and let it come to rest");
+        let found = check_force(&config, mass_kg, hang).map_err(Failure::new)?;
+        force = json!({"change_n": found.change_n, "weight_n": found.weight_n, "force_sign": found.sign, "force_gain": found.gain});
+        if !on_stdout {
+            let words = format!(
+                "the reading changed by {:.2} N for {:.2} N: force_sign = {:.1}, force_gain = {:.3}",
+                found.change_n, found.weight_n, found.sign, found.gain
+            );
+            let same =
+                found.sign == config.robot.force_sign && (found.gain - config.robot.force_gain).abs() < 0.05;
+            let verdict = if same { "as in the rig's file" } else { "set them in the rig's file" };
+            print(&format!(
+                "{}  {:<18} {words}; {verdict}\n",
+                if same { "ok " } else { "BAD" },
+                "force sign"
+            ))?;
+        }
+    }
+    let ok = lines.iter().all(|line| line.ok);
+    let entries: Vec<Value> =
+        lines.iter().map(|l| json!({"what": l.what, "ok": l.ok, "found": l.found})).collect();
+    sink.document(&json!({"schema": "gripgen.rigcheck/1", "ok": ok, "checks": entries, "force": force}))?;
+    if !ok && !args.talk.quiet && !on_stdout {
+        eprintln!("an experiment needs all of them; nothing was moved");
+    }
+    Ok(if ok { 0 } else { code::FAILED })
+}
+
+fn free_space() -> CheckLine {
+    let (ok, found) = match fs4::available_space(".") {
+        Ok(bytes) => (bytes >= LEAST_FREE, format!("{} free here", size(bytes))),
+        Err(e) => (false, e.to_string()),
+    };
+    CheckLine { what: "disk", ok, found }
+}

@@ -1,0 +1,249 @@
+//! `gripgen rig pull`: the experiment, recorded.
+
+use super::live::Live;
+use super::load::load_rig;
+use super::record::{Standing, rig_pull};
+use super::standing::CampaignClock;
+use crate::args::RigPullArgs;
+use crate::failure::{Failure, code};
+use crate::interrupt::stop_flag;
+use crate::output::{JsonSink, print, program};
+use gripgen::record::{
+    RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls, read_campaign,
+    write_rig_pull,
+};
+use gripgen::twin::{Campaign, PlannedPull, PullKind};
+use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_toml};
+use gripgen_rig::experiment::plan::pull_program;
+use gripgen_rig::experiment::prepare::Permit;
+use gripgen_rig::experiment::pull::MeasuredPull;
+use gripgen_rig::experiment::{Devices, Experiment, PullOutcome, RigConfig, check_campaign};
+use serde_json::json;
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Pulls in a row without a label after which somebody has to look.
+const MOST_FAILED_IN_A_ROW: usize = 3;
+
+/// Runs the verb.
+pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
+    let config = load_rig(&args.rig, &args.set)?;
+    let campaign = planned(args, &config)?;
+    check_campaign(&config, &campaign).map_err(|e| {
+        Failure::usage(e).hint("nothing was sent and nothing moved; the limits stand in the rig's file and in the device's data sheet")
+    })?;
+    let pulls: Vec<&PlannedPull> = campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).collect();
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    if args.print_program {
+        let Some(first) = pulls.first() else { return Ok(0) };
+        let script = pull_program(&config, &campaign, first, 1).script().map_err(Failure::usage)?;
+        return print(&script).map(|()| 0);
+    }
+    let minutes = campaign.estimated_minutes();
+    let words =
+        format!("{} pulls, about {} h {:02} min", pulls.len(), minutes as u64 / 60, minutes as u64 % 60);
+    if args.dry_run {
+        sink.line(&json!({"event": "checked", "pulls": pulls.len(), "minutes": minutes}))?;
+        if !sink.on_stdout() {
+            print(&format!("{words}; everything is inside the limits, nothing was sent\n"))?;
+        }
+        return Ok(0);
+    }
+    let folder = open_folder(args, &config, &campaign, pulls.len() as u64)?;
+    let todo = todo(&folder)?;
+    let live = RefCell::new(Live::new(pulls.len() as u64, todo.len() as u64, &args.talk, sink));
+    if todo.is_empty() {
+        return finish(&folder, &live.borrow(), 0);
+    }
+    live.borrow().say(&format!("{words}; {} to make, into {}", todo.len(), folder.path().display()));
+    let stop = stop_flag("stopping the robot safely");
+    let job = Job { args, config: &config, campaign: &campaign, folder: &folder, live: &live, stop };
+    let failed = job.make(&todo)?;
+    finish(&folder, &live.borrow(), failed)
+}
+
+/// The campaign of a file, or that of the flags.
+fn planned(args: &RigPullArgs, config: &RigConfig) -> Result<Campaign, Failure> {
+    if let Some(path) = &args.campaign {
+        return read_campaign(path).map_err(Failure::usage);
+    }
+    let known: Vec<String> = config.poses.keys().cloned().collect();
+    let parts = if args.parts.is_empty() { &known } else { &args.parts };
+    if parts.is_empty() {
+        return Err(Failure::usage(format!("{}: no pose is taught", args.rig))
+            .hint("move the tool to a part by hand, then `gripgen rig teach NAME`"));
+    }
+    Ok(plain_campaign(parts, &args.grip_force_n, args.repetitions, args.seed))
+}
+
+fn open_folder(
+    args: &RigPullArgs,
+    config: &RigConfig,
+    campaign: &Campaign,
+    pulls: u64,
+) -> Result<RunFolder, Failure> {
+    let name = match &args.campaign {
+        Some(path) => path.file_stem().map_or("rig".into(), |stem| stem.to_string_lossy().into_owned()),
+        None => "rig".into(),
+    };
+    let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&name));
+    let config_toml = rig_run_toml(config, campaign).map_err(Failure::new)?;
+    let info = RigRunInfo { name, gripgen_version: VERSION.into(), config_toml, pulls };
+    Ok(create_rig_run(&out, &info)?)
+}
+
+/// Pulls that are missing or failed.
+fn todo(folder: &RunFolder) -> Result<BTreeSet<u64>, Failure> {
+    let mut todo: BTreeSet<u64> = missing_pulls(folder)?.into_iter().collect();
+    todo.extend(failed_pulls(folder)?);
+    Ok(todo)
+}
+
+fn finish(folder: &RunFolder, live: &Live, failed: usize) -> Result<u8, Failure> {
+    let complete = folder.write_index()?;
+    if complete {
+        publish_contact_sheet(folder).map_err(Failure::new)?;
+    }
+    live.done(folder.path(), failed, complete)?;
+    Ok(if failed > 0 { code::SAMPLES_FAILED } else { 0 })
+}
+
+/// What is to be made, and where it goes.
+struct Job<'a> {
+    args: &'a RigPullArgs,
+    config: &'a RigConfig,
+    campaign: &'a Campaign,
+    folder: &'a RunFolder,
+    live: &'a RefCell<Live>,
+    stop: &'a AtomicBool,
+}
+
+/// How a row of pulls ended.
+enum End {
+    /// All were tried; so many have no label.
+    Done(usize),
+    /// A safe stop; the robot said that it stands.
+    Stopped { reason: String, still: bool },
+}
+
+impl Job<'_> {
+    /// Makes what is left, connecting anew between pulls as often as somebody allowed it.
+    fn make(&self, todo: &BTreeSet<u64>) -> Result<usize, Failure> {
+        let mut left = todo.clone();
+        let mut reconnects = self.args.reconnect;
+        let mut clock = CampaignClock::of(self.folder)?;
+        loop {
+            let (reason, still) = match self.connected(&mut left, &mut clock)? {
+                End::Done(failed) => return Ok(failed),
+                End::Stopped { reason, still } => (reason, still),
+            };
+            let interrupted = self.stop.load(Ordering::SeqCst);
+            if interrupted || !still || reconnects == 0 {
+                let again =
+                    format!("look at the rig; `{} rig pull` with the same arguments goes on", program());
+                let rest = if still {
+                    "the robot stands still"
+                } else {
+                    "NOBODY KNOWS WHETHER THE ROBOT STANDS STILL"
+                };
+                let failure =
+                    Failure::new(format!("{reason}; {rest}, the gripper keeps what it holds")).hint(again);
+                return Err(if interrupted { failure.with_code(code::INTERRUPTED) } else { failure });
+            }
+            reconnects -= 1;
+            self.live.borrow().say(&format!("{reason}; the robot stands still, connecting again"));
+        }
+    }
+
+    /// One connection: pulls until all are made, or one is stopped.
+    fn connected(&self, left: &mut BTreeSet<u64>, clock: &mut CampaignClock) -> Result<End, Failure> {
+        let mut devices = Devices::connect(self.config).map_err(|e| {
+            Failure::new(e).hint("`gripgen rig check` says which devices answer; a virtual rig is started by `gripgen rig serve`")
+        })?;
+        let permit = Permit { power_on: self.args.power_on, unlock: self.args.unlock };
+        devices.prepare(permit).map_err(Failure::new)?;
+        let mut emit = |event| self.live.borrow_mut().event(&event);
+        let mut experiment = Experiment::new(self.config, devices, self.stop, &mut emit);
+        if let Err(fault) = experiment.begin() {
+            let stopped = experiment.safe_stop(&fault);
+            return Ok(End::Stopped { reason: stopped.reason, still: stopped.still });
+        }
+        let (mut index, mut in_a_row) = (0, 0);
+        let mut waiting: Vec<&PlannedPull> = Vec::new();
+        for entry in &self.campaign.pulls {
+            if entry.kind != PullKind::Pull {
+                waiting.push(entry);
+                continue;
+            }
+            let place = index;
+            index += 1;
+            if !left.contains(&place) {
+                waiting.clear();
+                continue;
+            }
+            waiting.push(entry);
+            let made = self.one(&mut experiment, &waiting, place, clock);
+            waiting.clear();
+            let pull = made?;
+            if let Some(stopped) = &pull.stopped {
+                return Ok(End::Stopped { reason: stopped.reason.clone(), still: stopped.still });
+            }
+            match pull.outcome {
+                PullOutcome::Failed { reason } if in_a_row + 1 >= MOST_FAILED_IN_A_ROW => {
+                    experiment.close();
+                    let words = format!(
+                        "{MOST_FAILED_IN_A_ROW} pulls in a row have no label, the last one: {reason}"
+                    );
+                    return Err(Failure::new(words).hint("look at the rig; the same command goes on"));
+                }
+                PullOutcome::Failed { .. } => in_a_row += 1,
+                _ => {
+                    in_a_row = 0;
+                    left.remove(&place);
+                }
+            }
+        }
+        experiment.close();
+        Ok(End::Done(left.len()))
+    }
+
+    /// What comes before a pull, the pull, and its record.
+    fn one(
+        &self,
+        experiment: &mut Experiment<'_>,
+        waiting: &[&PlannedPull],
+        place: u64,
+        clock: &mut CampaignClock,
+    ) -> Result<Recorded, Failure> {
+        let planned = waiting.last().copied().cloned().unwrap_or_default();
+        self.live.borrow_mut().begin(place, &planned);
+        let before = waiting.iter().try_for_each(|entry| {
+            experiment.pause(entry.pause_s)?;
+            if entry.kind == PullKind::NoLoad { experiment.read_no_load(entry.dwell_s) } else { Ok(()) }
+        });
+        let measured = match before {
+            Ok(()) => experiment.pull(self.campaign, &planned),
+            Err(fault) => experiment.give_up(&planned, &fault),
+        };
+        let recorded = Recorded { outcome: measured.outcome.clone(), stopped: measured.stopped.clone() };
+        let standing = clock.standing(place, &measured);
+        self.live.borrow_mut().pulled(&standing, &measured)?;
+        self.record(standing, measured)?;
+        Ok(recorded)
+    }
+
+    fn record(&self, standing: Standing, measured: MeasuredPull) -> Result<(), Failure> {
+        discard_failed(self.folder, standing.index).map_err(Failure::new)?;
+        let pull = rig_pull(self.config, self.campaign, standing, measured);
+        write_rig_pull(self.folder, &pull).map_err(Failure::new)?;
+        Ok(())
+    }
+}
+
+/// What the loop needs of a pull that is written.
+struct Recorded {
+    outcome: PullOutcome,
+    stopped: Option<gripgen_rig::experiment::Stopped>,
+}

@@ -1,0 +1,158 @@
+//! From what the rig measured to what the recorder stores.
+
+use gripgen::record::{RigLog, RigLogEvent, RigPull, RigResult, RigStream};
+use gripgen::twin::{Campaign, Covariates, Jaw, PlannedPull, PullSettings, Scenario};
+use gripgen_rig::experiment::pull::{FrameStamp, MeasuredPull};
+use gripgen_rig::experiment::{PullOutcome, RigConfig, RobotRow};
+use std::collections::BTreeMap;
+
+/// Where a pull stands in its campaign.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Its place among the pulls.
+    pub index: u64,
+    /// Pulls that were made before it.
+    pub made: u64,
+    /// Time since the campaign began.
+    pub time_s: f64,
+}
+
+/// A measured pull as it is stored.
+pub fn rig_pull(config: &RigConfig, campaign: &Campaign, standing: Standing, m: MeasuredPull) -> RigPull {
+    let result = match &m.outcome {
+        PullOutcome::Labelled(label) if label.censored => RigResult::Censored { label: *label },
+        PullOutcome::Labelled(label) => RigResult::Slipped { label: *label },
+        PullOutcome::NoContact => RigResult::NoContact,
+        PullOutcome::Failed { reason } => RigResult::Failed { reason: reason.clone() },
+    };
+    let scenario = scenario(config, campaign, standing, &m.planned, m.dwell_s);
+    let mut streams = vec![robot(&m.rows, &m.rows_unix_s)];
+    streams.extend(Jaw::BOTH.map(|jaw| camera(jaw, &m)).into_iter().flatten());
+    let mut events: Vec<RigLogEvent> = Vec::with_capacity(m.log.len() + 2);
+    let event = |host_time_s, device_time_s, source: &str, text: String| RigLogEvent {
+        host_time_s,
+        device_time_s,
+        source: source.into(),
+        text,
+    };
+    events.extend(m.log.iter().map(|(at, line)| event(*at, None, line.source, line.text.clone())));
+    let start = format!("time_s {:.6}, preload {:.3} N", standing.time_s, m.preload_n);
+    events.push(event(m.unix_s, Some(m.robot_time_s), START, start));
+    if let Some(stopped) = &m.stopped {
+        let still = if stopped.still {
+            "the robot stood still"
+        } else {
+            "nobody knows whether the robot stood still"
+        };
+        let text = format!("{}; {still}; {}", stopped.reason, stopped.steps.join("; "));
+        events.push(event(m.unix_s, None, "safe stop", text));
+    }
+    events.sort_by(|a, b| a.host_time_s.total_cmp(&b.host_time_s));
+    RigPull {
+        scenario,
+        result,
+        images: m.images,
+        rest: m.rest,
+        trace: m.trace.filter(|trace| trace.len() > 1),
+        log: RigLog { streams, events },
+    }
+}
+
+/// Source of the event that ties the clocks of a pull together.
+pub const START: &str = "start of the pull";
+
+fn scenario(
+    config: &RigConfig,
+    campaign: &Campaign,
+    standing: Standing,
+    planned: &PlannedPull,
+    dwell_s: f64,
+) -> Scenario {
+    let thousandth = |x: f64| (x * 1e3).round() * 1e-3;
+    Scenario {
+        seed: 0,
+        index: standing.index,
+        group: standing.index,
+        repetition: 0,
+        part: planned.part.clone(),
+        grip_pose: 0,
+        grip_force_n: planned.grip_force_n,
+        covariates: Covariates {
+            gel_id: planned.gel_id.clone(),
+            session: planned.session.clone(),
+            pull_index: standing.made,
+            time_s: thousandth(standing.time_s),
+            dwell_s: thousandth(dwell_s),
+            grip_offset_m: planned.grip_offset_mm * 1e-3,
+            grip_angle_rad: planned.grip_angle_deg.to_radians(),
+            pull_direction: planned.pull_direction,
+            ..Covariates::default()
+        },
+        pull: PullSettings {
+            increment_n: planned.force_increment_n,
+            step_s: planned.step_time_s,
+            step_jitter: 0.0,
+            stop_m: campaign.stop_m,
+            direction: [0.0, 0.0, 1.0],
+            max_force_n: Some(config.limits.pull_force_n),
+            max_time_s: config.limits.pull_time_s,
+            label_tolerance_n: campaign.label_tolerance_n,
+        },
+        drawn: BTreeMap::new(),
+    }
+}
+
+fn robot(rows: &[RobotRow], unix_s: &[f64]) -> RigStream {
+    let column = |of: &dyn Fn(&RobotRow) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
+    let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
+    for (i, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        columns.push((format!("tcp_{axis}_mm"), column(&|r| 1e3 * r.tcp.position_m[i])));
+        columns.push((format!("tcp_r{axis}_rad"), column(&|r| r.tcp.rotation_rad[i])));
+        columns.push((format!("speed_{axis}_m_s"), column(&|r| r.speed[i])));
+        columns.push((format!("force_{axis}_n"), column(&|r| r.force[i])));
+        columns.push((format!("torque_{axis}_nm"), column(&|r| r.force[3 + i])));
+        columns.push((format!("raw_force_{axis}_n"), column(&|r| r.raw_force[i])));
+    }
+    type Of = fn(&RobotRow) -> f64;
+    let single: [(&str, Of); 12] = [
+        ("robot_mode", |r| f64::from(r.mode)),
+        ("safety_mode", |r| f64::from(r.safety)),
+        ("safety_status_bits", |r| f64::from(r.safety_bits)),
+        ("runtime_state", |r| f64::from(r.runtime)),
+        ("speed_scaling", |r| r.speed_scaling),
+        ("phase", |r| f64::from(r.phase)),
+        ("step", |r| f64::from(r.step)),
+        ("run", |r| f64::from(r.run)),
+        ("stop_reason", |r| f64::from(r.reason)),
+        ("desired_force_n", |r| r.desired_n),
+        ("displacement_mm", |r| 1e3 * r.displacement_m),
+        ("lateral_mm", |r| 1e3 * r.lateral_m),
+    ];
+    columns.extend(single.into_iter().map(|(name, of)| (name.to_string(), column(&of))));
+    RigStream {
+        name: "robot".into(),
+        host_time_s: unix_s.to_vec(),
+        device_time_s: rows.iter().map(|r| r.timestamp_s).collect(),
+        columns,
+    }
+}
+
+/// Stamps of the frames that were taken; nothing where there are none.
+fn camera(jaw: Jaw, m: &MeasuredPull) -> Option<RigStream> {
+    let frames: Vec<&FrameStamp> = m.frames.iter().filter(|frame| frame.jaw == jaw).collect();
+    // Host stamps lie on the robot's: both are this machine's clock.
+    let origin = m.rows.first().zip(m.rows_unix_s.first());
+    let (row, unix_s) = origin?;
+    let host_time_s = frames.iter().map(|frame| match frame.at.checked_duration_since(row.at) {
+        Some(after) => unix_s + after.as_secs_f64(),
+        None => unix_s - row.at.duration_since(frame.at).as_secs_f64(),
+    });
+    let device: Option<Vec<f64>> = frames.iter().map(|frame| frame.device_time_s).collect();
+    let is_grip = frames.iter().map(|frame| f64::from(u8::from(frame.what == "grip"))).collect();
+    (!frames.is_empty()).then(|| RigStream {
+        name: format!("camera_{jaw}"),
+        host_time_s: host_time_s.collect(),
+        device_time_s: device.unwrap_or_default(),
+        columns: vec![("is_grip".into(), is_grip)],
+    })
+}

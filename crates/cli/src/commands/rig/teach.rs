@@ -1,0 +1,76 @@
+//! `gripgen rig teach`: the pose of the tool becomes that of a part.
+
+use super::load::load_rig;
+use crate::args::RigTeachArgs;
+use crate::failure::Failure;
+use crate::output::{JsonSink, print, write_file};
+use gripgen::twin::config::Document;
+use gripgen_rig::experiment::RigConfig;
+use gripgen_rig::experiment::check::read_pose;
+use gripgen_rig::experiment::plan::outside_workspace;
+use serde_json::json;
+use toml_edit::{Array, DocumentMut, Item, Table, value};
+
+/// Runs the verb.
+pub fn run(args: &RigTeachArgs) -> Result<u8, Failure> {
+    let path = args.rig.display().to_string();
+    let config = load_rig(&path, &args.set)?;
+    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let pose = read_pose(&config)
+        .map_err(|e| Failure::new(e).hint("`gripgen rig check` says which devices answer"))?;
+    if let Some((axis, value_mm, low_mm, high_mm)) = outside_workspace(&config, &pose) {
+        return Err(Failure::new(format!(
+            "the tool is at {axis} = {value_mm:.1} mm, the workspace goes from {low_mm} to {high_mm} mm"
+        ))
+        .hint("a pose outside the workspace is never gone to: widen [limits], or move the part"));
+    }
+    let text = std::fs::read_to_string(&args.rig).map_err(|e| Failure::usage(format!("{path}: {e}")))?;
+    let mut document: DocumentMut = text.parse().map_err(|e| Failure::usage(format!("{path}: {e}")))?;
+    let replaced = taught(&mut document, &args.name, pose.numbers());
+    let text = document.to_string();
+    // What was written is read once more before it replaces the file.
+    RigConfig::read(&Document::parse(&path, &text)?)?;
+    write_file(&args.rig, text.as_bytes())?;
+    let [x, y, z] = pose.position_m.map(|m| 1e3 * m);
+    if sink.wanted() {
+        sink.document(&json!({"name": args.name, "base_from_tool": pose.numbers(), "replaced": replaced}))?;
+    }
+    if !sink.on_stdout() {
+        let done = if replaced { "taught again" } else { "taught" };
+        print(&format!("{}: {done} at {x:.1}, {y:.1}, {z:.1} mm\n", args.name))?;
+    }
+    Ok(0)
+}
+
+/// Puts a pose in; comments and everything else stay. Returns whether there was one.
+fn taught(document: &mut DocumentMut, name: &str, numbers: [f64; 6]) -> bool {
+    let poses = document.entry("poses").or_insert_with(|| {
+        let mut table = Table::new();
+        table.set_implicit(true);
+        Item::Table(table)
+    });
+    let Some(poses) = poses.as_table_like_mut() else { return false };
+    let replaced = poses.contains_key(name);
+    let pose = poses.entry(name).or_insert_with(|| Item::Table(Table::new()));
+    if let Some(pose) = pose.as_table_like_mut() {
+        pose.insert("base_from_tool", value(numbers.iter().copied().collect::<Array>()));
+    }
+    replaced
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_is_added_or_replaced_and_the_rest_stays() {
+        let text = "# mine\n[robot]\naddress = \"a\" # there\n\n[poses.gear]\nbase_from_tool = [0, 0, 0, 0, 0, 0] # old\n";
+        let mut document: DocumentMut = text.parse().unwrap();
+        assert!(taught(&mut document, "gear", [0.1, 0.2, 0.3, 0.0, 1.5, 0.0]));
+        assert!(!taught(&mut document, "nut", [0.4, 0.0, 0.3, 0.0, 0.0, 0.0]));
+        let text = document.to_string();
+        assert!(text.starts_with("# mine\n[robot]\naddress = \"a\" # there\n"), "{text}");
+        assert!(text.contains("[poses.gear]\nbase_from_tool = [0.1, 0.2, 0.3, 0.0, 1.5, 0.0]"), "{text}");
+        assert!(text.contains("[poses.nut]\nbase_from_tool = [0.4"), "{text}");
+    }
+}

@@ -1,0 +1,33 @@
+//! The experiment: go to a part, zero, grip, look, pull until the jaws slip, let go, come back.
+//!
+//! ```text
+//! rig.toml, campaign --check--> plan --connect--> rest images, program, zero --grip--> images --go--> staircase on the robot
+//!                                                                                                   |
+//!      MeasuredPull <-- release, retract <-- reason, still? <-------------- slip, limit, or safe stop
+//! ```
+//!
+//! Safety comes first. Every number is checked before anything moves; the robot's program has the same limits again and is
+//! watched by a heartbeat that only an experiment which is alive keeps up; and whatever goes wrong ends in [`stop`], the one
+//! way to stop.
+
+pub mod check;
+mod clock;
+pub mod config;
+pub mod devices;
+pub mod fault;
+mod images;
+pub mod plan;
+pub mod prepare;
+pub mod pull;
+mod robot;
+mod run;
+pub mod stop;
+
+pub use config::RigConfig;
+pub use devices::Devices;
+pub use fault::Fault;
+pub use plan::{PlanError, check_campaign};
+pub use pull::{MeasuredPull, PullOutcome};
+pub use robot::RobotRow;
+pub use run::{Experiment, RigEvent};
+pub use stop::Stopped;

@@ -1,0 +1,140 @@
+//! All devices of a rig, connected.
+
+use super::config::RigConfig;
+use super::fault::Fault;
+use super::robot::{Heart, session_plan, unfit};
+use crate::camera::{CameraClient, CameraLinkError};
+use crate::dashboard::{DashboardClient, DashboardLinkError};
+use crate::gcl::{GclClient, GclLinkError};
+use crate::primary::{PrimaryClient, PrimaryLinkError};
+use crate::rtde::{LinkError, RtdeClient, SessionPlan};
+use gripgen_twin::PerJaw;
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::time::Duration;
+
+/// How long a device may take to answer at first.
+const TIMEOUT: Duration = Duration::from_secs(3);
+
+/// Why a rig is not there.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConnectError {
+    /// A name that nobody knows.
+    #[error("{what}: `{host}` is not found: {problem}")]
+    Name {
+        /// Which device.
+        what: &'static str,
+        /// Its name.
+        host: String,
+        /// What the system says.
+        problem: String,
+    },
+    /// The robot's data.
+    #[error("RTDE: {0}")]
+    Rtde(#[from] LinkError),
+    /// Its data are of other types than those of the guide.
+    #[error("RTDE: {0}")]
+    Types(String),
+    /// Its inputs.
+    #[error("RTDE: {0}")]
+    Heart(Box<Fault>),
+    /// Its dashboard.
+    #[error("dashboard: {0}")]
+    Dashboard(#[from] DashboardLinkError),
+    /// Its primary interface.
+    #[error("primary interface: {0}")]
+    Primary(#[from] PrimaryLinkError),
+    /// The gripper.
+    #[error("gripper: {0}")]
+    Gripper(#[from] GclLinkError),
+    /// A camera.
+    #[error("camera: {0}")]
+    Camera(#[from] CameraLinkError),
+}
+
+/// The devices of a rig. Dropping them ends the heartbeat, and with it whatever the robot does.
+pub struct Devices {
+    pub(super) heart: Heart,
+    pub(super) robot: RtdeClient,
+    pub(super) dashboard: DashboardClient,
+    pub(super) primary: PrimaryClient,
+    /// `None` once it was said goodbye.
+    pub(super) gripper: Option<GclClient>,
+    pub(super) cameras: PerJaw<CameraClient>,
+}
+
+/// Where a device is.
+fn resolve(what: &'static str, host: &str, port: u16) -> Result<SocketAddr, ConnectError> {
+    let name = |problem: String| ConnectError::Name { what, host: host.into(), problem };
+    let found = (host, port).to_socket_addrs().map_err(|e| name(e.to_string()))?;
+    // Controllers and grippers speak IPv4.
+    let mut all: Vec<SocketAddr> = found.collect();
+    all.sort_by_key(SocketAddr::is_ipv6);
+    all.first().copied().ok_or_else(|| name("no address".into()))
+}
+
+/// Connects a camera.
+pub(super) fn connect_camera(config: &RigConfig, left: bool) -> Result<CameraClient, ConnectError> {
+    let camera = if left { &config.cameras.left } else { &config.cameras.right };
+    let at = resolve("camera", &camera.address, camera.port)?;
+    Ok(CameraClient::connect(at, &camera.address, TIMEOUT)?)
+}
+
+/// Connects the gripper.
+pub(super) fn connect_gripper(config: &RigConfig) -> Result<GclClient, ConnectError> {
+    let at = resolve("gripper", &config.gripper.address, config.gripper.port)?;
+    Ok(GclClient::connect(at, config.gripper_limits(), TIMEOUT)?)
+}
+
+/// Connects the dashboard.
+pub(super) fn connect_dashboard(config: &RigConfig) -> Result<DashboardClient, ConnectError> {
+    let at = resolve("dashboard", &config.robot.address, config.robot.dashboard_port)?;
+    Ok(DashboardClient::connect(at, TIMEOUT)?)
+}
+
+/// Connects RTDE.
+pub(super) fn connect_robot(config: &RigConfig) -> Result<RtdeClient, ConnectError> {
+    let at = resolve("RTDE", &config.robot.address, config.robot.rtde_port)?;
+    let robot = RtdeClient::connect(at, &session_plan(), TIMEOUT)?;
+    match unfit(robot.recipe()) {
+        Some(types) => Err(ConnectError::Types(types)),
+        None => Ok(robot),
+    }
+}
+
+/// Connects RTDE to listen: no input is asked for, nothing can be written.
+pub(super) fn connect_listener(config: &RigConfig, timeout: Duration) -> Result<RtdeClient, ConnectError> {
+    let at = resolve("RTDE", &config.robot.address, config.robot.rtde_port)?;
+    let plan = SessionPlan { inputs: vec![], ..session_plan() };
+    Ok(RtdeClient::connect(at, &plan, timeout)?)
+}
+
+/// Connects the primary interface.
+pub(super) fn connect_primary(config: &RigConfig) -> Result<PrimaryClient, ConnectError> {
+    let at = resolve("primary interface", &config.robot.address, config.robot.primary_port)?;
+    Ok(PrimaryClient::connect(at, TIMEOUT)?)
+}
+
+impl Devices {
+    /// Connects everything. Nothing moves.
+    pub fn connect(config: &RigConfig) -> Result<Self, ConnectError> {
+        let robot = connect_robot(config)?;
+        let heart = Heart::start(&robot).map_err(|e| ConnectError::Heart(Box::new(e)))?;
+        Ok(Self {
+            heart,
+            robot,
+            dashboard: connect_dashboard(config)?,
+            primary: connect_primary(config)?,
+            gripper: Some(connect_gripper(config)?),
+            cameras: PerJaw { left: connect_camera(config, true)?, right: connect_camera(config, false)? },
+        })
+    }
+
+    /// Says goodbye to the gripper, which takes a cut connection for an emergency, and lets the rest go.
+    pub fn close(mut self) {
+        if let Some(gripper) = self.gripper.take() {
+            // A gripper that does not answer any more is left as it is.
+            let _ = gripper.close();
+        }
+    }
+}

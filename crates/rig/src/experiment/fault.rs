@@ -1,0 +1,172 @@
+//! What ends a pull before its end.
+
+use crate::camera::{CameraWaitError, DecodeFrameError, ViewError};
+use crate::dashboard::DashboardError;
+use crate::gcl::{GclLinkError, GclSendError};
+use crate::primary::ScriptError;
+use crate::program::{ProgramLimitError, StopReason};
+use crate::robot_state::{RobotMode, SafetyStatus};
+use crate::rtde::{LinkError, WriteError};
+use gripgen_twin::Jaw;
+
+/// Why an experiment was stopped.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// Somebody pressed Ctrl-C.
+    #[error("interrupted")]
+    Interrupted,
+    /// The safety system.
+    #[error("the robot is in {}", .status.name())]
+    Safety {
+        /// What it says.
+        status: SafetyStatus,
+    },
+    /// Power or brakes.
+    #[error("the robot is {}, it must be RUNNING", .mode.name())]
+    Mode {
+        /// What it is.
+        mode: RobotMode,
+    },
+    /// A number of the robot that is not known.
+    #[error("the robot says {what} {number}, which nobody knows")]
+    Unknown {
+        /// Which.
+        what: &'static str,
+        /// Its value.
+        number: i32,
+    },
+    /// The speed slider.
+    #[error("the robot runs at {percent:.0} % of its speed, a pull needs 100 %")]
+    Speed {
+        /// What the slider says.
+        percent: f64,
+    },
+    /// The robot's connection ended.
+    #[error("the robot: {0}")]
+    Robot(#[from] LinkError),
+    /// It cannot be written to.
+    #[error("the robot: {0}")]
+    Write(#[from] WriteError),
+    /// It says nothing.
+    #[error("the robot said nothing for {silent_s:.3} s, {limit_s:.3} s are allowed")]
+    Silent {
+        /// For how long.
+        silent_s: f64,
+        /// The longest that is allowed.
+        limit_s: f64,
+    },
+    /// Data of it are missing.
+    #[error("{gap_s:.3} s are missing between two readings of the robot, {limit_s:.3} s are allowed")]
+    Gap {
+        /// How much.
+        gap_s: f64,
+        /// The most that is allowed.
+        limit_s: f64,
+    },
+    /// A program that could not be sent.
+    #[error("the program: {0}")]
+    Script(#[from] ScriptError),
+    /// A program with a number that no program may have.
+    #[error("the program: {0}")]
+    Program(#[from] ProgramLimitError),
+    /// The program ended, or is paused, where it should run.
+    #[error("the robot's program ended in {what}{}", .said.as_ref().map(|s| format!(": {s}")).unwrap_or_default())]
+    Ended {
+        /// What it was doing.
+        what: &'static str,
+        /// What the controller says to it.
+        said: Option<String>,
+    },
+    /// It broke itself off.
+    #[error("{what} was broken off: {}", .reason.meaning())]
+    BrokenOff {
+        /// What it was doing.
+        what: &'static str,
+        /// Its reason.
+        reason: StopReason,
+    },
+    /// Something took too long.
+    #[error("{what} took {waited_s:.1} s, {limit_s:.1} s are allowed")]
+    Late {
+        /// What.
+        what: &'static str,
+        /// For how long.
+        waited_s: f64,
+        /// The longest that is allowed.
+        limit_s: f64,
+    },
+    /// The gripper's connection.
+    #[error("the gripper: {0}")]
+    Gripper(#[from] GclLinkError),
+    /// It was not sent a command.
+    #[error("the gripper: {0}")]
+    GripperSend(#[from] GclSendError),
+    /// It refuses, or fails.
+    #[error("the gripper answers `{line}`: {meaning}")]
+    GripperFailed {
+        /// Its line.
+        line: String,
+        /// What its status means.
+        meaning: &'static str,
+    },
+    /// It does not hold the part any more.
+    #[error("the gripper is in state {state} ({}) where it should hold the part", grip_state_name(*.state))]
+    NotHolding {
+        /// Its state.
+        state: f64,
+    },
+    /// A camera.
+    #[error("the {jaw} camera: {source}")]
+    Camera {
+        /// Which.
+        jaw: Jaw,
+        /// What is wrong.
+        source: CameraWaitError,
+    },
+    /// A camera that shows the past.
+    #[error("the {jaw} camera is frozen: its frame of {time_s:.3} s by its own clock came again")]
+    Frozen {
+        /// Which.
+        jaw: Jaw,
+        /// The stamp.
+        time_s: f64,
+    },
+    /// A frame that is none.
+    #[error("the {jaw} camera: {source}")]
+    Frame {
+        /// Which.
+        jaw: Jaw,
+        /// What is wrong.
+        source: DecodeFrameError,
+    },
+    /// A frame that does not fit its view.
+    #[error("the {jaw} camera: {source}")]
+    View {
+        /// Which.
+        jaw: Jaw,
+        /// What is wrong.
+        source: ViewError,
+    },
+    /// The dashboard.
+    #[error("the dashboard: {0}")]
+    Dashboard(#[from] DashboardError),
+    /// A pose outside the box.
+    #[error(
+        "the tool would go to {axis} = {value_mm:.1} mm, the workspace goes from {low_mm} to {high_mm} mm"
+    )]
+    Workspace {
+        /// x, y or z.
+        axis: char,
+        /// Where it would be.
+        value_mm: f64,
+        /// Where the box begins.
+        low_mm: f64,
+        /// Where it ends.
+        high_mm: f64,
+    },
+}
+
+fn grip_state_name(state: f64) -> String {
+    crate::gcl::GripState::from_number(state).map_or("unknown".into(), |s| format!("{s:?}"))
+}

@@ -1,0 +1,134 @@
+//! Before anything moves: is the robot allowed to, and does somebody stand beside it who said so.
+
+use super::devices::Devices;
+use crate::dashboard::{DashboardCommand, DashboardError, DashboardReply};
+use crate::robot_state::{RobotMode, SafetyStatus};
+use std::time::{Duration, Instant};
+
+/// How long the dashboard may take.
+const REPLY: Duration = Duration::from_secs(2);
+/// How long power and brakes may take.
+const POWER: Duration = Duration::from_secs(60);
+/// Time between two questions.
+const ASK: Duration = Duration::from_millis(200);
+
+/// What a person who stands beside the robot has allowed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Permit {
+    /// Power on and brakes off.
+    pub power_on: bool,
+    /// Leave a protective stop.
+    pub unlock: bool,
+}
+
+/// Why the robot is not ready.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PrepareError {
+    /// The dashboard.
+    #[error("the dashboard: {0}")]
+    Dashboard(#[from] DashboardError),
+    /// An answer to something else.
+    #[error("the dashboard answers {found:?} to {asked}")]
+    Answer {
+        /// What was asked.
+        asked: &'static str,
+        /// What came.
+        found: DashboardReply,
+    },
+    /// Commands from outside are not taken.
+    #[error("the robot is in local control: switch the teach pendant to remote control")]
+    Local,
+    /// Nobody allowed to leave a protective stop.
+    #[error("the robot is in a protective stop: look at it, then allow --unlock")]
+    Protective,
+    /// Another state of the safety system.
+    #[error("the safety system says {}: this is left to a person at the robot", .status.name())]
+    Safety {
+        /// What it says.
+        status: SafetyStatus,
+    },
+    /// Nobody allowed power.
+    #[error("the robot is {}: look at it, then allow --power-on", .mode.name())]
+    Power {
+        /// What it is.
+        mode: RobotMode,
+    },
+    /// It does not get ready.
+    #[error("the robot is still {} after {waited_s:.0} s", .mode.name())]
+    Slow {
+        /// What it is.
+        mode: RobotMode,
+        /// For how long it was waited.
+        waited_s: f64,
+    },
+}
+
+impl Devices {
+    /// Makes the robot ready, as far as somebody allowed it.
+    pub fn prepare(&mut self, permit: Permit) -> Result<(), PrepareError> {
+        match self.ask(DashboardCommand::IsInRemoteControl)? {
+            DashboardReply::RemoteControl(false) => return Err(PrepareError::Local),
+            DashboardReply::RemoteControl(true) => {}
+            found => return Err(PrepareError::Answer { asked: "is in remote control", found }),
+        }
+        match self.safety()? {
+            SafetyStatus::Normal | SafetyStatus::Reduced => {}
+            SafetyStatus::ProtectiveStop if permit.unlock => {
+                // A program that waits since the stop must not go on.
+                self.ask(DashboardCommand::Stop)?;
+                self.ask(DashboardCommand::CloseSafetyPopup)?;
+                self.ask(DashboardCommand::UnlockProtectiveStop)?;
+                let status = self.safety()?;
+                if status != SafetyStatus::Normal {
+                    return Err(PrepareError::Safety { status });
+                }
+            }
+            SafetyStatus::ProtectiveStop => return Err(PrepareError::Protective),
+            status => return Err(PrepareError::Safety { status }),
+        }
+        let mode = self.mode()?;
+        if mode == RobotMode::Running {
+            return Ok(());
+        }
+        if !permit.power_on {
+            return Err(PrepareError::Power { mode });
+        }
+        self.ask(DashboardCommand::PowerOn)?;
+        self.until(|mode| matches!(mode, RobotMode::Idle | RobotMode::Running))?;
+        self.ask(DashboardCommand::BrakeRelease)?;
+        self.until(|mode| mode == RobotMode::Running)
+    }
+
+    fn ask(&mut self, command: DashboardCommand) -> Result<DashboardReply, PrepareError> {
+        Ok(self.dashboard.command(command, REPLY)?)
+    }
+
+    fn safety(&mut self) -> Result<SafetyStatus, PrepareError> {
+        match self.ask(DashboardCommand::SafetyStatus)? {
+            DashboardReply::SafetyStatus(status) => Ok(status),
+            found => Err(PrepareError::Answer { asked: "safetystatus", found }),
+        }
+    }
+
+    fn mode(&mut self) -> Result<RobotMode, PrepareError> {
+        match self.ask(DashboardCommand::RobotMode)? {
+            DashboardReply::RobotMode(mode) => Ok(mode),
+            found => Err(PrepareError::Answer { asked: "robotmode", found }),
+        }
+    }
+
+    fn until(&mut self, is: impl Fn(RobotMode) -> bool) -> Result<(), PrepareError> {
+        let began = Instant::now();
+        loop {
+            let mode = self.mode()?;
+            if is(mode) {
+                return Ok(());
+            }
+            if began.elapsed() > POWER {
+                return Err(PrepareError::Slow { mode, waited_s: began.elapsed().as_secs_f64() });
+            }
+            std::thread::sleep(ASK);
+        }
+    }
+}

@@ -1,0 +1,369 @@
+//! One pull, from the way to the part to the way back.
+
+use super::fault::Fault;
+pub use super::images::FrameStamp;
+use super::plan::{GripPoses, grip_command, grip_poses, pull_program};
+use super::robot::RobotRow;
+pub use super::run::LogLine;
+use super::run::{Experiment, RigEvent};
+use super::stop::Stopped;
+use crate::gcl::{GclCommand, GripState, Query};
+use crate::program::{PRELOAD_S, Phase, SETTLE_S, StopReason};
+use gripgen_twin::{Campaign, PerJaw, PlannedPull, PullTrace, SlipLabel, TactileImage, TraceRow, slip_label};
+use std::time::{Duration, Instant};
+
+/// How long the sensor is read without a load before the grip, by the robot's clock.
+const NO_LOAD_S: f64 = 0.5;
+/// Slack of this machine on what the robot times.
+const SLACK: Duration = Duration::from_secs(5);
+/// Height from which the way back is fast.
+const CLEAR_M: f64 = 0.02;
+
+/// What came of a pull.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PullOutcome {
+    /// The jaws slipped, or the pull ended before they did (`censored`).
+    Labelled(SlipLabel),
+    /// There was nothing between the jaws.
+    NoContact,
+    /// It has no label.
+    Failed {
+        /// Why.
+        reason: String,
+    },
+}
+
+/// A pull with all that came during it.
+#[derive(Debug, Clone)]
+pub struct MeasuredPull {
+    /// What was asked.
+    pub planned: PlannedPull,
+    /// What came of it.
+    pub outcome: PullOutcome,
+    /// How everything was stopped, where something went wrong.
+    pub stopped: Option<Stopped>,
+    /// The force over time; rows before 0 are those without a load.
+    pub trace: Option<PullTrace>,
+    /// Grip images.
+    pub images: Option<PerJaw<TactileImage>>,
+    /// Images with open jaws.
+    pub rest: Option<PerJaw<TactileImage>>,
+    /// When the images came.
+    pub frames: Vec<FrameStamp>,
+    /// Time from closing the jaws to the start of the pull, by the robot's clock.
+    pub dwell_s: f64,
+    /// The controller's clock at the start of the pull; that of the last reading where there was none.
+    pub robot_time_s: f64,
+    /// The same moment, in seconds since 1970 by this machine's clock.
+    pub unix_s: f64,
+    /// Force along the pull before it, N.
+    pub preload_n: f64,
+    /// Everything that the robot said.
+    pub rows: Vec<RobotRow>,
+    /// Seconds since 1970 of each row's arrival.
+    pub rows_unix_s: Vec<f64>,
+    /// Words of all devices, with seconds since 1970.
+    pub log: Vec<(f64, LogLine)>,
+}
+
+/// What is known of a pull under way.
+#[derive(Default)]
+struct Parts {
+    rest: Option<PerJaw<TactileImage>>,
+    images: Option<PerJaw<TactileImage>>,
+    frames: Vec<FrameStamp>,
+    /// Robot's clock: from and to when nothing loaded the sensor.
+    no_load_s: Option<(f64, f64)>,
+    held_s: Option<f64>,
+    run: Option<i32>,
+    preload_n: f64,
+    outcome: Option<PullOutcome>,
+}
+
+impl Experiment<'_> {
+    /// Makes a pull. Whatever goes wrong ends in a safe stop; then no further pull may follow on this experiment.
+    pub fn pull(&mut self, campaign: &Campaign, planned: &PlannedPull) -> MeasuredPull {
+        self.rows.clear();
+        self.log.clear();
+        let mut parts = Parts::default();
+        let made = self.make(campaign, planned, &mut parts);
+        let stopped = made.as_ref().err().map(|fault| self.safe_stop(fault));
+        self.measured(planned, parts, stopped)
+    }
+
+    /// A pull that cannot be made because of what came before it: everything is stopped.
+    pub fn give_up(&mut self, planned: &PlannedPull, fault: &Fault) -> MeasuredPull {
+        let stopped = self.safe_stop(fault);
+        self.measured(planned, Parts::default(), Some(stopped))
+    }
+
+    /// The robot answers and may move, and the jaws are open.
+    pub fn begin(&mut self) -> Result<(), Fault> {
+        self.reading()?;
+        self.look()?;
+        self.clear()
+    }
+
+    /// Reads the sensor without a load for so long; nothing moves.
+    pub fn read_no_load(&mut self, seconds: f64) -> Result<(), Fault> {
+        self.tell(RigEvent::Step("reading the sensor without a load"));
+        let until_s = self.robot_time_s()? + seconds;
+        self.wait_until("the reading without a load", until_s)
+    }
+
+    /// Waits by the robot's clock.
+    pub fn pause(&mut self, seconds: f64) -> Result<(), Fault> {
+        if seconds > 0.0 {
+            self.tell(RigEvent::Step("pause"));
+            let until_s = self.robot_time_s()? + seconds;
+            self.wait_until("the pause", until_s)?;
+        }
+        Ok(())
+    }
+
+    /// Opens jaws that an experiment before this one left closed, and goes up. Only a robot that stands is asked.
+    fn clear(&mut self) -> Result<(), Fault> {
+        let state = self.ask_gripper(Query::GripState)?;
+        let holds = [GripState::Holding, GripState::PartLost, GripState::NoPart];
+        if !holds.into_iter().any(|held| GripState::from_number(state) == Some(held)) {
+            return Ok(());
+        }
+        self.tell(RigEvent::Step("opening jaws that were left closed"));
+        self.release()?;
+        let here = self.reading()?.tcp;
+        let highest_m = 1e-3 * self.config.limits.workspace_high_mm[2];
+        let up_m = (1e-3 * self.config.motion.approach_mm).min(highest_m - here.position_m[2]);
+        if up_m > 0.0 {
+            self.move_to("the way up", here.raised(up_m), self.config.motion.approach_speed_mm_s)?;
+        }
+        Ok(())
+    }
+
+    fn make(&mut self, campaign: &Campaign, planned: &PlannedPull, parts: &mut Parts) -> Result<(), Fault> {
+        let Some(poses) = grip_poses(self.config, planned) else {
+            let reason = format!("nobody taught where `{}` is", planned.part);
+            parts.outcome = Some(PullOutcome::Failed { reason });
+            return Ok(());
+        };
+        self.approach(&poses)?;
+        self.tell(RigEvent::Step("rest images"));
+        let rest = self.look_at_gels("rest", &[])?;
+        parts.rest = Some(rest.images);
+        parts.frames.extend(rest.stamps);
+        self.move_to("the way down", poses.grip, self.config.motion.approach_speed_mm_s)?;
+        let run = self.next_run();
+        let program = pull_program(self.config, campaign, planned, run);
+        let script = program.script()?;
+        self.devices.heart.set_go(0);
+        self.tell(RigEvent::Step("zeroing the force sensor"));
+        self.start_program("the pull", run, &script)?;
+        self.wait("zeroing", SLACK, |x| {
+            Ok(x.newest().is_some_and(|r| r.phase_of(run) == Some(Phase::Zeroed)))
+        })?;
+        let from_s = self.robot_time_s()?;
+        self.wait_until("the reading without a load", from_s + NO_LOAD_S)?;
+        parts.no_load_s = Some((from_s, self.robot_time_s()?));
+        self.tell(RigEvent::Step("gripping"));
+        let command = grip_command(planned.grip_force_n);
+        self.gripper(&command)?;
+        parts.held_s = Some(self.robot_time_s()?);
+        let state = self.ask_gripper(Query::GripState)?;
+        let width_mm = self.ask_gripper(Query::Position)?;
+        // Without a width to look for, the gripper says that it holds whatever it closed on.
+        match GripState::from_number(state) {
+            Some(GripState::Holding) if width_mm >= self.config.gripper.empty_below_mm => {}
+            Some(GripState::Holding | GripState::NoPart) => {
+                parts.outcome = Some(PullOutcome::NoContact);
+                return self.leave(run, &poses);
+            }
+            _ => return Err(Fault::NotHolding { state }),
+        }
+        // The device clamps a force beyond its own settings without a word: what it reports goes into the record.
+        self.ask_gripper(Query::Force)?;
+        let held_s = parts.held_s.unwrap_or_default();
+        self.wait_until("settling", held_s + self.config.images.settle_s)?;
+        self.tell(RigEvent::Step("grip images"));
+        let grip = self.look_at_gels("grip", &parts.frames)?;
+        parts.images = Some(grip.images);
+        parts.frames.extend(grip.stamps);
+        // The program needs its own time between the go and the first step.
+        self.wait_until("the dwell", held_s + planned.dwell_s - PRELOAD_S - SETTLE_S)?;
+        parts.run = Some(run);
+        let reason = self.staircase(run, planned, program.max_time_s)?;
+        parts.preload_n =
+            self.signed(planned, self.newest().map_or(0.0, |row| row.preload_n * planned.pull_direction));
+        let state = self.ask_gripper(Query::GripState)?;
+        if GripState::from_number(state) != Some(GripState::Holding) {
+            return Err(Fault::NotHolding { state });
+        }
+        self.check_gaps(run)?;
+        parts.outcome = self.label(campaign, planned, parts, reason);
+        self.retract(&poses)
+    }
+
+    /// Up to a safe height, over the part, ready to go down.
+    fn approach(&mut self, poses: &GripPoses) -> Result<(), Fault> {
+        let (motion, here) = (&self.config.motion, self.reading()?.tcp);
+        let (speed, height_m) = (motion.speed_mm_s, here.position_m[2].max(poses.approach.position_m[2]));
+        let mut up = here;
+        up.position_m[2] = height_m;
+        let mut over = poses.approach;
+        over.position_m[2] = height_m;
+        self.move_to("the way up", up, speed)?;
+        self.move_to("the way over the part", over, speed)?;
+        self.move_to("the way to the part", poses.approach, speed)
+    }
+
+    /// Says go and watches until the program has stopped.
+    fn staircase(&mut self, run: i32, planned: &PlannedPull, most_s: f64) -> Result<StopReason, Fault> {
+        self.tell(RigEvent::Step("pulling"));
+        self.devices.heart.set_go(run);
+        let is_pulling = |x: &mut Self| {
+            let phase = x.newest().and_then(|row| row.phase_of(run));
+            Ok(matches!(phase, Some(Phase::Pulling | Phase::Braking | Phase::Stopped)))
+        };
+        self.wait("the start of the pull", SLACK, is_pulling)?;
+        let began = Instant::now();
+        let limit = Duration::from_secs_f64(most_s) + SLACK;
+        let (mut shown, mut start_s) = (0, None);
+        self.wait("the pull", limit, |x| {
+            for i in shown..x.rows.len() {
+                let row = x.rows[i];
+                if row.phase_of(run) == Some(Phase::Pulling) {
+                    let from_s = *start_s.get_or_insert(row.timestamp_s);
+                    let measured_n = x.signed(planned, row.force[2]);
+                    x.tell(RigEvent::Reading {
+                        time_s: row.timestamp_s - from_s,
+                        desired_n: row.desired_n,
+                        measured_n,
+                        displacement_mm: 1e3 * row.displacement_m,
+                    });
+                }
+            }
+            shown = x.rows.len();
+            Ok(x.newest().is_some_and(|r| r.phase_of(run) == Some(Phase::Stopped)))
+        })?;
+        self.end_of_program("the pull", run, limit.saturating_sub(began.elapsed()) + SLACK)
+    }
+
+    /// The force along the pull that a reading along z means.
+    fn signed(&self, planned: &PlannedPull, force_z: f64) -> f64 {
+        self.config.robot.force_sign * self.config.robot.force_gain * planned.pull_direction * force_z
+    }
+
+    /// A pull with missing readings is none.
+    fn check_gaps(&self, run: i32) -> Result<(), Fault> {
+        let pulling: Vec<&RobotRow> =
+            self.rows.iter().filter(|r| r.phase_of(run) == Some(Phase::Pulling)).collect();
+        let limit_s = self.config.limits.robot_gap_s;
+        for pair in pulling.windows(2) {
+            let gap_s = pair[1].timestamp_s - pair[0].timestamp_s;
+            if gap_s > limit_s {
+                return Err(Fault::Gap { gap_s, limit_s });
+            }
+        }
+        Ok(())
+    }
+
+    /// The label of a pull that ended by itself.
+    fn label(
+        &self,
+        campaign: &Campaign,
+        planned: &PlannedPull,
+        parts: &Parts,
+        reason: StopReason,
+    ) -> Option<PullOutcome> {
+        let slid = reason == StopReason::Displacement;
+        if !slid && !matches!(reason, StopReason::LargestCommand | StopReason::Time) {
+            let reason = format!("the pull was broken off: {}", reason.meaning());
+            return Some(PullOutcome::Failed { reason });
+        }
+        let trace = self.trace(planned, parts)?;
+        let pulled: PullTrace = trace.rows().filter(|row| row.time_s >= 0.0).collect();
+        Some(
+            match slip_label(&pulled.until_displacement(campaign.stop_m), campaign.label_tolerance_n, slid) {
+                Ok(label) => PullOutcome::Labelled(label),
+                Err(e) => PullOutcome::Failed { reason: e.to_string() },
+            },
+        )
+    }
+
+    /// The force over time: readings without a load before 0, then the staircase.
+    fn trace(&self, planned: &PlannedPull, parts: &Parts) -> Option<PullTrace> {
+        let run = parts.run?;
+        let first = self.rows.iter().find(|r| r.phase_of(run) == Some(Phase::Pulling))?;
+        let (start_s, unloaded) = (first.timestamp_s, parts.no_load_s.unwrap_or((0.0, 0.0)));
+        let rows = self.rows.iter().filter_map(|row| {
+            let pulling = row.phase_of(run) == Some(Phase::Pulling);
+            let without = row.timestamp_s >= unloaded.0 && row.timestamp_s < unloaded.1;
+            (pulling || without).then(|| TraceRow {
+                time_s: ((row.timestamp_s - start_s) * 1e6).round() * 1e-6,
+                desired_force_n: if pulling { row.desired_n } else { 0.0 },
+                measured_force_n: self.signed(planned, row.force[2]),
+                displacement_m: if pulling { row.displacement_m } else { 0.0 },
+            })
+        });
+        Some(rows.collect())
+    }
+
+    /// Lets a program go that was not needed, and the way back.
+    fn leave(&mut self, run: i32, poses: &GripPoses) -> Result<(), Fault> {
+        self.devices.heart.set_go(crate::program::registers::STOP);
+        self.end_of_program("the pull", run, SLACK)?;
+        self.retract(poses)
+    }
+
+    fn release(&mut self) -> Result<(), Fault> {
+        self.gripper(&GclCommand::Release { pull_back_mm: self.config.gripper.open_mm })?;
+        Ok(())
+    }
+
+    fn retract(&mut self, poses: &GripPoses) -> Result<(), Fault> {
+        self.tell(RigEvent::Step("releasing"));
+        self.release()?;
+        let here = self.reading()?.tcp;
+        self.move_to("the way up", here.raised(CLEAR_M), self.config.motion.approach_speed_mm_s)?;
+        self.move_to("the way back", poses.approach, self.config.motion.speed_mm_s)
+    }
+
+    fn measured(&mut self, planned: &PlannedPull, parts: Parts, stopped: Option<Stopped>) -> MeasuredPull {
+        let trace = self.trace(planned, &parts);
+        let start = parts
+            .run
+            .and_then(|run| self.rows.iter().find(|row| row.phase_of(run) == Some(Phase::Pulling)).copied());
+        let anchor = start.or(self.rows.last().copied());
+        let robot_time_s = anchor.map_or(0.0, |row| row.timestamp_s);
+        let unix_s = self.clock.unix_s(anchor.map_or_else(Instant::now, |row| row.at));
+        let outcome = match (&stopped, parts.outcome) {
+            (Some(stopped), _) => PullOutcome::Failed { reason: stopped.reason.clone() },
+            (None, Some(outcome)) => outcome,
+            (None, None) => PullOutcome::Failed { reason: "the robot said nothing during the pull".into() },
+        };
+        if let Some(gripper) = &self.devices.gripper {
+            let lines = gripper.take_log();
+            self.log.extend(lines.into_iter().map(|line| {
+                let text = format!("{} {}", if line.sent { ">" } else { "<" }, line.line);
+                LogLine { at: line.at, source: "gripper", text }
+            }));
+        }
+        let mut log = std::mem::take(&mut self.log);
+        log.sort_by_key(|line| line.at);
+        let rows = std::mem::take(&mut self.rows);
+        MeasuredPull {
+            planned: planned.clone(),
+            outcome,
+            stopped,
+            trace,
+            images: parts.images,
+            rest: parts.rest,
+            frames: parts.frames,
+            dwell_s: parts.held_s.zip(start).map_or(0.0, |(held_s, row)| row.timestamp_s - held_s),
+            robot_time_s,
+            unix_s,
+            preload_n: parts.preload_n,
+            rows_unix_s: rows.iter().map(|row| self.clock.unix_s(row.at)).collect(),
+            rows,
+            log: log.into_iter().map(|line| (self.clock.unix_s(line.at), line)).collect(),
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! The robot's readings, and the heartbeat that keeps its program alive.
+
+use super::fault::Fault;
+use crate::program::{Phase, TcpPose, registers};
+use crate::robot_state::{RobotMode, SafetyStatus};
+use crate::rtde::{Recipe, RtdeClient, SessionPlan, Value};
+use crate::stamped::lock;
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Rate that readings are asked for.
+const RATE_HZ: f64 = 500.0;
+/// Time between two beats: the program wants ten a second at least.
+const BEAT: Duration = Duration::from_millis(10);
+/// An experiment that has not looked at its robot for so long is taken for dead.
+const ALIVE: Duration = Duration::from_millis(500);
+
+/// A reading of the robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobotRow {
+    /// When it arrived.
+    pub at: Instant,
+    /// The controller's clock.
+    pub timestamp_s: f64,
+    /// Where the tool is.
+    pub tcp: TcpPose,
+    /// How fast it moves: m/s and rad/s.
+    pub speed: [f64; 6],
+    /// Force and torque at the tool as the robot says them, zeroed: N and Nm.
+    pub force: [f64; 6],
+    /// The same before zeroing.
+    pub raw_force: [f64; 6],
+    /// Power and brakes, as a number.
+    pub mode: i32,
+    /// Safety, as a number.
+    pub safety: i32,
+    /// Its bits.
+    pub safety_bits: u32,
+    /// The program: 2 while it runs.
+    pub runtime: u32,
+    /// Speed slider, 1 for 100 %.
+    pub speed_scaling: f64,
+    /// What the program says it does, as a number.
+    pub phase: i32,
+    /// Which step of the staircase.
+    pub step: i32,
+    /// Which run.
+    pub run: i32,
+    /// Why it stopped.
+    pub reason: i32,
+    /// The commanded force, N.
+    pub desired_n: f64,
+    /// Displacement along the pull.
+    pub displacement_m: f64,
+    /// Displacement aside.
+    pub lateral_m: f64,
+    /// Force along the pull before it, N, as the robot says it.
+    pub preload_n: f64,
+}
+
+const OUTPUTS: [&str; 18] = [
+    "timestamp",
+    "actual_TCP_pose",
+    "actual_TCP_speed",
+    "actual_TCP_force",
+    "ft_raw_wrench",
+    "robot_mode",
+    "safety_mode",
+    "safety_status_bits",
+    "runtime_state",
+    "speed_scaling",
+    "output_int_register_24",
+    "output_int_register_25",
+    "output_int_register_26",
+    "output_int_register_27",
+    "output_double_register_24",
+    "output_double_register_25",
+    "output_double_register_26",
+    "output_double_register_27",
+];
+
+/// What is asked of RTDE.
+pub(super) fn session_plan() -> SessionPlan {
+    let input = |register: u8| format!("input_int_register_{register}");
+    SessionPlan {
+        outputs: OUTPUTS.map(String::from).to_vec(),
+        frequency_hz: RATE_HZ,
+        inputs: vec![vec![input(registers::HEARTBEAT), input(registers::GO)]],
+    }
+}
+
+impl RobotRow {
+    /// Reads a data frame of [`session_plan`]; `None` if its types are others.
+    pub(super) fn from_values(at: Instant, values: &[Value]) -> Option<Self> {
+        let double = |i: usize| if let Some(Value::Double(x)) = values.get(i) { Some(*x) } else { None };
+        let vector = |i: usize| if let Some(Value::Vector6d(v)) = values.get(i) { Some(*v) } else { None };
+        let int = |i: usize| if let Some(Value::Int32(x)) = values.get(i) { Some(*x) } else { None };
+        let bits = |i: usize| if let Some(Value::Uint32(x)) = values.get(i) { Some(*x) } else { None };
+        Some(Self {
+            at,
+            timestamp_s: double(0)?,
+            tcp: TcpPose::from_numbers(vector(1)?),
+            speed: vector(2)?,
+            force: vector(3)?,
+            raw_force: vector(4)?,
+            mode: int(5)?,
+            safety: int(6)?,
+            safety_bits: bits(7)?,
+            runtime: bits(8)?,
+            speed_scaling: double(9)?,
+            phase: int(10)?,
+            step: int(11)?,
+            run: int(12)?,
+            reason: int(13)?,
+            desired_n: double(14)?,
+            displacement_m: double(15)?,
+            lateral_m: double(16)?,
+            preload_n: double(17)?,
+        })
+    }
+
+    /// Whether a program runs.
+    pub fn program_runs(&self) -> bool {
+        self.runtime == 2
+    }
+
+    /// What the program of run `run` says it does.
+    pub fn phase_of(&self, run: i32) -> Option<Phase> {
+        if self.run == run { Phase::from_number(self.phase) } else { None }
+    }
+
+    /// Speed of the tool.
+    pub fn speed_m_s(&self) -> f64 {
+        self.speed[..3].iter().map(|v| v * v).sum::<f64>().sqrt()
+    }
+
+    /// Whether the robot may move.
+    pub(super) fn check(&self) -> Result<(), Fault> {
+        let status = SafetyStatus::from_number(self.safety)
+            .ok_or(Fault::Unknown { what: "safety_mode", number: self.safety })?;
+        if !status.allows_motion() {
+            return Err(Fault::Safety { status });
+        }
+        let mode = RobotMode::from_number(self.mode)
+            .ok_or(Fault::Unknown { what: "robot_mode", number: self.mode })?;
+        if mode != RobotMode::Running {
+            return Err(Fault::Mode { mode });
+        }
+        if (self.speed_scaling - 1.0).abs() > 0.01 {
+            return Err(Fault::Speed { percent: 100.0 * self.speed_scaling });
+        }
+        Ok(())
+    }
+}
+
+/// Which types the controller answered with, where they are not those that are read here.
+pub(super) fn unfit(recipe: &Recipe) -> Option<String> {
+    use crate::rtde::FieldType::{Double, Int32, Uint32, Vector6d};
+    let wanted = [
+        Double, Vector6d, Vector6d, Vector6d, Vector6d, Int32, Int32, Uint32, Uint32, Double, Int32, Int32,
+        Int32, Int32, Double, Double, Double, Double,
+    ];
+    let pairs = recipe.fields.iter().zip(wanted);
+    let wrong = pairs.filter(|((_, found), wanted)| found != wanted);
+    wrong.map(|((name, found), wanted)| format!("{name} is {found:?} instead of {wanted:?}")).next()
+}
+
+/// The hand that beats, in a thread of its own, as long as the experiment is alive.
+pub(super) struct Heart {
+    hand: Arc<Hand>,
+    thread: Option<JoinHandle<()>>,
+}
+
+struct Hand {
+    go: AtomicI32,
+    alive: Mutex<Instant>,
+    wanted: AtomicBool,
+}
+
+impl Heart {
+    /// Begins to beat.
+    pub(super) fn start(client: &RtdeClient) -> Result<Self, Fault> {
+        let writer = client.writer()?;
+        let hand = Arc::new(Hand {
+            go: AtomicI32::new(0),
+            alive: Mutex::new(Instant::now()),
+            wanted: AtomicBool::new(true),
+        });
+        let own = hand.clone();
+        let thread = std::thread::spawn(move || {
+            let mut beat = 0_i32;
+            while own.wanted.load(Ordering::SeqCst) {
+                if lock(&own.alive).elapsed() < ALIVE {
+                    beat = beat.wrapping_add(1);
+                    let go = own.go.load(Ordering::SeqCst);
+                    if writer.write_input(0, &[Value::Int32(beat), Value::Int32(go)]).is_err() {
+                        return;
+                    }
+                }
+                std::thread::sleep(BEAT);
+            }
+        });
+        Ok(Self { hand, thread: Some(thread) })
+    }
+
+    /// The experiment is alive.
+    pub(super) fn alive(&self) {
+        *lock(&self.hand.alive) = Instant::now();
+    }
+
+    /// What the program is told from the next beat on.
+    pub(super) fn set_go(&self, go: i32) {
+        self.hand.go.store(go, Ordering::SeqCst);
+    }
+
+    /// No beat after this: the controller stops the program by itself.
+    pub(super) fn stop(&mut self) {
+        self.hand.wanted.store(false, Ordering::SeqCst);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Heart {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}

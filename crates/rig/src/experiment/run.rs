@@ -1,0 +1,391 @@
+//! An experiment under way: everything that comes is kept, everything that is wrong ends the waiting.
+
+use super::clock::HostClock;
+use super::config::RigConfig;
+use super::devices::Devices;
+use super::fault::Fault;
+use super::plan::{motion_program, outside_workspace};
+use super::robot::RobotRow;
+use crate::gcl::{GclCommand, GclEvent, status_meaning};
+use crate::primary::{PrimaryEvent, RobotMessage};
+use crate::program::{Phase, StopReason, TcpPose};
+use crate::rtde::Event;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::{Duration, Instant};
+
+/// How long one look at the devices waits for news.
+const LOOK: Duration = Duration::from_millis(5);
+/// How long a program may take to begin, or to end when its work is done.
+const PROGRAM: Duration = Duration::from_secs(5);
+/// How long a motion of the gripper may take.
+const GRIPPER: Duration = Duration::from_secs(30);
+/// Slack on the times that the robot itself keeps.
+const SLACK: Duration = Duration::from_secs(3);
+/// A tool that is closer to a pose than this is there.
+const THERE_M: f64 = 1e-4;
+
+/// What happens, for somebody who looks on.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum RigEvent {
+    /// What is done now.
+    Step(&'static str),
+    /// A reading during the pull.
+    Reading {
+        /// Time since the pull began.
+        time_s: f64,
+        /// Commanded force.
+        desired_n: f64,
+        /// Measured force along the pull.
+        measured_n: f64,
+        /// Displacement.
+        displacement_mm: f64,
+    },
+    /// Words of a device.
+    Said {
+        /// Which.
+        source: &'static str,
+        /// What.
+        text: String,
+    },
+}
+
+/// Words that came, or were sent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogLine {
+    /// When.
+    pub at: Instant,
+    /// Who.
+    pub source: &'static str,
+    /// What.
+    pub text: String,
+}
+
+/// An experiment: the devices, and what came from them since the last pull began.
+pub struct Experiment<'a> {
+    pub(super) config: &'a RigConfig,
+    pub(super) devices: Devices,
+    pub(super) clock: HostClock,
+    pub(super) rows: Vec<RobotRow>,
+    pub(super) log: Vec<LogLine>,
+    /// What the gripper said and nobody has looked at.
+    pub(super) gripper_events: Vec<GclEvent>,
+    stop: &'a AtomicBool,
+    emit: &'a mut dyn FnMut(RigEvent),
+    newest: Option<RobotRow>,
+    heard: Instant,
+    run: i32,
+    /// What must go on while it is waited: a program of this number.
+    watched: Option<(i32, &'static str)>,
+    pub(super) last_said: Option<String>,
+}
+
+impl<'a> Experiment<'a> {
+    /// Begins with devices that are connected. `stop` is Ctrl-C.
+    pub fn new(
+        config: &'a RigConfig,
+        devices: Devices,
+        stop: &'a AtomicBool,
+        emit: &'a mut dyn FnMut(RigEvent),
+    ) -> Self {
+        // Numbers of runs differ between experiments: an old program's registers are not taken for the new one's.
+        let clock = HostClock::start();
+        let run = (clock.unix_s(Instant::now()) as i64 % 1_000_000) as i32 * 1000;
+        Self {
+            config,
+            devices,
+            clock,
+            rows: Vec::new(),
+            log: Vec::new(),
+            gripper_events: Vec::new(),
+            stop,
+            emit,
+            newest: None,
+            heard: Instant::now(),
+            run: run.max(1),
+            watched: None,
+            last_said: None,
+        }
+    }
+
+    /// Says goodbye.
+    pub fn close(self) {
+        self.devices.close();
+    }
+
+    pub(super) fn tell(&mut self, event: RigEvent) {
+        (self.emit)(event);
+    }
+
+    pub(super) fn next_run(&mut self) -> i32 {
+        self.run = if self.run >= 1_000_000_000 { 1 } else { self.run + 1 };
+        self.run
+    }
+
+    /// What the robot last said.
+    pub fn newest(&self) -> Option<&RobotRow> {
+        self.newest.as_ref()
+    }
+
+    pub(super) fn note(&mut self, source: &'static str, text: String) {
+        self.log.push(LogLine { at: Instant::now(), source, text });
+    }
+
+    /// Takes in what came, for at most one look. Gives how many readings there were.
+    pub(super) fn look(&mut self) -> Result<usize, Fault> {
+        self.devices.heart.alive();
+        if self.stop.load(Ordering::SeqCst) {
+            return Err(Fault::Interrupted);
+        }
+        let rows = self.take_robot(LOOK)?;
+        self.take_others()?;
+        if let Some(row) = &self.newest {
+            row.check()?;
+        }
+        let (silent_s, limit_s) = (self.heard.elapsed().as_secs_f64(), self.config.limits.robot_silence_s);
+        if silent_s > limit_s {
+            return Err(Fault::Silent { silent_s, limit_s });
+        }
+        self.check_program()?;
+        Ok(rows)
+    }
+
+    /// Takes in what the robot said.
+    pub(super) fn take_robot(&mut self, wait: Duration) -> Result<usize, Fault> {
+        let mut rows = 0;
+        let mut wait = wait;
+        loop {
+            let event = match self.devices.robot.events().recv_timeout(wait) {
+                Ok(event) => event,
+                Err(RecvTimeoutError::Timeout) => return Ok(rows),
+                Err(RecvTimeoutError::Disconnected) => {
+                    let silent_s = self.heard.elapsed().as_secs_f64();
+                    let silent = Fault::Silent { silent_s, limit_s: self.config.limits.robot_silence_s };
+                    return Err(self.devices.robot.ended().map_or(silent, Fault::Robot));
+                }
+            };
+            wait = Duration::ZERO;
+            match event.event {
+                Event::Data(values) => {
+                    // The types were looked at when the connection was made.
+                    if let Some(row) = RobotRow::from_values(event.at, &values) {
+                        self.heard = event.at.max(self.heard);
+                        self.newest = Some(row);
+                        self.rows.push(row);
+                        rows += 1;
+                    }
+                }
+                Event::Text { text, source, level } => {
+                    let text = format!("{source}: {text} (level {level})");
+                    self.log.push(LogLine { at: event.at, source: "robot", text: text.clone() });
+                    self.tell(RigEvent::Said { source: "robot", text });
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Takes in what the controller announces and what the gripper says.
+    fn take_others(&mut self) -> Result<(), Fault> {
+        while let Ok(event) = self.devices.primary.events().try_recv() {
+            let PrimaryEvent::Message { message, .. } = &event.event else { continue };
+            let said = match message {
+                RobotMessage::ErrorCode(e) => Some(format!("C{}A{} {}", e.code, e.argument, e.text)),
+                RobotMessage::RuntimeException(e) => {
+                    Some(format!("line {}, column {}: {}", e.line, e.column, e.text))
+                }
+                RobotMessage::Key(key) => Some(format!("{} {}", key.title, key.text)),
+                _ => None,
+            };
+            if let Some(text) = said {
+                self.log.push(LogLine { at: event.at, source: "controller", text: text.clone() });
+                self.last_said = Some(text);
+            }
+        }
+        if let Some(gripper) = &self.devices.gripper {
+            while let Ok(event) = gripper.events().try_recv() {
+                self.gripper_events.push(event.event);
+            }
+            if let Some(end) = gripper.ended() {
+                return Err(end.into());
+            }
+        }
+        Ok(())
+    }
+
+    /// A program that is waited for must run until it has said why it stopped.
+    fn check_program(&mut self) -> Result<(), Fault> {
+        let Some((run, what)) = self.watched else { return Ok(()) };
+        let Some(row) = &self.newest else { return Ok(()) };
+        let began = row.run == run;
+        if began && !row.program_runs() && row.phase_of(run) != Some(Phase::Stopped) {
+            self.watched = None;
+            return Err(Fault::Ended { what, said: self.last_said.take() });
+        }
+        Ok(())
+    }
+
+    /// Waits until something is so.
+    pub(super) fn wait(
+        &mut self,
+        what: &'static str,
+        limit: Duration,
+        mut is: impl FnMut(&mut Self) -> Result<bool, Fault>,
+    ) -> Result<(), Fault> {
+        let began = Instant::now();
+        loop {
+            self.look()?;
+            if is(self)? {
+                return Ok(());
+            }
+            if began.elapsed() > limit {
+                let (waited_s, limit_s) = (began.elapsed().as_secs_f64(), limit.as_secs_f64());
+                return Err(Fault::Late { what, waited_s, limit_s });
+            }
+        }
+    }
+
+    /// The robot's clock now.
+    pub(super) fn robot_time_s(&mut self) -> Result<f64, Fault> {
+        self.reading().map(|row| row.timestamp_s)
+    }
+
+    /// The newest reading; waits for the first.
+    pub(super) fn reading(&mut self) -> Result<RobotRow, Fault> {
+        if self.newest.is_none() {
+            self.wait("the first reading of the robot", PROGRAM, |x| Ok(x.newest.is_some()))?;
+        }
+        self.newest.ok_or(Fault::Late { what: "the first reading of the robot", waited_s: 0.0, limit_s: 0.0 })
+    }
+
+    /// Waits until the robot's clock says so.
+    pub(super) fn wait_until(&mut self, what: &'static str, time_s: f64) -> Result<(), Fault> {
+        let left_s = (time_s - self.robot_time_s()?).max(0.0);
+        self.wait(what, Duration::from_secs_f64(left_s) + SLACK, |x| {
+            Ok(x.newest.is_some_and(|row| row.timestamp_s >= time_s))
+        })
+    }
+
+    /// Starts a program and waits until it has begun.
+    pub(super) fn start_program(&mut self, what: &'static str, run: i32, script: &str) -> Result<(), Fault> {
+        self.last_said = None;
+        self.note("program", format!("{what}, run {run}"));
+        self.devices.primary.send_script(script)?;
+        let began = |x: &mut Self| {
+            // A program that cannot be run is announced, and begins nothing.
+            if let Some(said) = x.last_said.take_if(|said| said.starts_with('C') || said.starts_with("line"))
+            {
+                return Err(Fault::Ended { what, said: Some(said) });
+            }
+            Ok(x.newest.is_some_and(|row| row.run == run && row.phase_of(run).is_some()))
+        };
+        self.wait("the start of a program", PROGRAM, began)?;
+        self.watched = Some((run, what));
+        Ok(())
+    }
+
+    /// Waits for the end of a program and gives its reason.
+    pub(super) fn end_of_program(
+        &mut self,
+        what: &'static str,
+        run: i32,
+        limit: Duration,
+    ) -> Result<StopReason, Fault> {
+        self.wait(what, limit, |x| Ok(x.newest.is_some_and(|r| r.phase_of(run) == Some(Phase::Stopped))))?;
+        self.watched = None;
+        let number = self.newest.map_or(0, |row| row.reason);
+        let reason =
+            StopReason::from_number(number).ok_or(Fault::Unknown { what: "a stop reason", number })?;
+        // The program waits until its go is taken back.
+        self.devices.heart.set_go(0);
+        self.wait("the end of a program", PROGRAM, |x| Ok(x.newest.is_some_and(|r| !r.program_runs())))?;
+        Ok(reason)
+    }
+
+    /// Moves the tool in a straight line.
+    pub(super) fn move_to(
+        &mut self,
+        what: &'static str,
+        target: TcpPose,
+        speed_mm_s: f64,
+    ) -> Result<(), Fault> {
+        if let Some((axis, value_mm, low_mm, high_mm)) = outside_workspace(self.config, &target) {
+            return Err(Fault::Workspace { axis, value_mm, low_mm, high_mm });
+        }
+        let here = self.reading()?.tcp;
+        let way_m = here.distance_m(&target);
+        let turned =
+            (0..3).map(|i| (here.rotation_rad[i] - target.rotation_rad[i]).abs()).fold(0.0, f64::max);
+        if way_m < THERE_M && turned < 1e-4 {
+            return Ok(());
+        }
+        self.tell(RigEvent::Step(what));
+        let run = self.next_run();
+        let program = motion_program(self.config, target, speed_mm_s, way_m.max(0.05), run);
+        let script = program.script()?;
+        self.devices.heart.set_go(run);
+        self.start_program(what, run, &script)?;
+        let limit = Duration::from_secs_f64(program.max_time_s) + PROGRAM;
+        match self.end_of_program(what, run, limit)? {
+            StopReason::Arrived => Ok(()),
+            reason => Err(Fault::BrokenOff { what, reason }),
+        }
+    }
+
+    /// Sends a command to the gripper.
+    pub(super) fn tell_gripper(&mut self, command: &GclCommand) -> Result<(), Fault> {
+        self.gripper_events.clear();
+        match &self.devices.gripper {
+            Some(gripper) => Ok(gripper.send(command)?),
+            None => Ok(()),
+        }
+    }
+
+    /// Lets the gripper do something and waits for its end. `Ok(false)`: it found nothing.
+    pub(super) fn gripper(&mut self, command: &GclCommand) -> Result<bool, Fault> {
+        let name = command.name();
+        self.tell_gripper(command)?;
+        let mut found = true;
+        self.wait("the gripper", GRIPPER, |x| {
+            for event in std::mem::take(&mut x.gripper_events) {
+                match event {
+                    GclEvent::Finished(done) if done == name && command.moves() => return Ok(true),
+                    GclEvent::Acknowledged(done) if done == name && !command.moves() => return Ok(true),
+                    // 18: no part at the width.
+                    GclEvent::Failed { status: Some(18), .. } => {
+                        found = false;
+                        return Ok(true);
+                    }
+                    GclEvent::Failed { status, line, .. } => {
+                        let meaning = status.map_or("no status", status_meaning);
+                        return Err(Fault::GripperFailed { line, meaning });
+                    }
+                    _ => {}
+                }
+            }
+            Ok(false)
+        })?;
+        Ok(found)
+    }
+
+    /// Asks the gripper for a value.
+    pub(super) fn ask_gripper(&mut self, query: crate::gcl::Query) -> Result<f64, Fault> {
+        self.tell_gripper(&GclCommand::Ask(query))?;
+        let mut value = None;
+        self.wait("an answer of the gripper", SLACK, |x| {
+            for event in std::mem::take(&mut x.gripper_events) {
+                match event {
+                    GclEvent::Value { name, number } if name == query.name() => value = Some(number),
+                    GclEvent::Failed { status, line, .. } => {
+                        let meaning = status.map_or("no status", status_meaning);
+                        return Err(Fault::GripperFailed { line, meaning });
+                    }
+                    _ => {}
+                }
+            }
+            Ok(value.is_some())
+        })?;
+        Ok(value.unwrap_or(f64::NAN))
+    }
+}

@@ -1,0 +1,101 @@
+//! The one way to stop.
+//!
+//! First the robot, then proof that it stands, and the gripper keeps what it holds: a part that falls is worse than one that
+//! is held. Nothing here waits longer than [`LONGEST`].
+
+use super::config::RigConfig;
+use super::devices::connect_listener;
+use super::fault::Fault;
+use super::robot::RobotRow;
+use super::run::Experiment;
+use crate::dashboard::DashboardCommand;
+use crate::program::registers;
+use crate::rtde::Event;
+use std::time::{Duration, Instant};
+
+/// Longest time of a stop, all of its parts together.
+pub const LONGEST: Duration = Duration::from_secs(4);
+/// How long the dashboard may take.
+const DASHBOARD: Duration = Duration::from_millis(1000);
+/// A tool that is slower than this stands.
+const STILL_M_S: f64 = 1e-3;
+/// For how long, by the robot's clock.
+const STILL_FOR_S: f64 = 0.2;
+
+/// How a stop went.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Stopped {
+    /// Why.
+    pub reason: String,
+    /// Whether the robot said itself that it stands still.
+    pub still: bool,
+    /// What was done, for the record.
+    pub steps: Vec<String>,
+}
+
+impl Experiment<'_> {
+    /// Stops everything because of a fault.
+    pub fn safe_stop(&mut self, fault: &Fault) -> Stopped {
+        let began = Instant::now();
+        let mut steps = Vec::new();
+        // Both ways at once: the program is told, and its watchdog hears nothing any more.
+        self.devices.heart.set_go(registers::STOP);
+        self.devices.heart.alive();
+        std::thread::sleep(Duration::from_millis(25));
+        self.devices.heart.stop();
+        steps.push("the program was told to stop, the heartbeat ended".to_string());
+        match self.devices.dashboard.command(DashboardCommand::Stop, DASHBOARD) {
+            Ok(_) => steps.push("the dashboard stopped the program".into()),
+            Err(e) => steps.push(format!("the dashboard could not be told: {e}")),
+        }
+        let still = self.wait_for_rest(began);
+        steps.push(
+            if still { "the robot stands still" } else { "nobody knows whether the robot stands still" }
+                .into(),
+        );
+        steps.push("the gripper keeps what it holds".into());
+        let reason = fault.to_string();
+        self.note("stop", format!("{reason}; {}", steps.join("; ")));
+        Stopped { reason, still, steps }
+    }
+
+    /// Whether the robot says that it stands, within the time that a stop has.
+    fn wait_for_rest(&mut self, began: Instant) -> bool {
+        let mut since_s: Option<f64> = None;
+        while began.elapsed() < LONGEST {
+            // What the robot says counts, however bad it is. A link that is gone is made anew, to listen only.
+            if self.take_robot(Duration::from_millis(20)).is_err() {
+                let left = LONGEST.saturating_sub(began.elapsed());
+                return listen_for_rest(self.config, left);
+            }
+            let Some(row) = self.newest() else { continue };
+            if row.at < began {
+                continue;
+            }
+            if row.speed_m_s() > STILL_M_S {
+                since_s = None;
+            } else if row.timestamp_s - *since_s.get_or_insert(row.timestamp_s) >= STILL_FOR_S {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Whether the robot says on a new connection that it stands. Nothing is written there.
+fn listen_for_rest(config: &RigConfig, limit: Duration) -> bool {
+    let began = Instant::now();
+    let Ok(robot) = connect_listener(config, limit) else { return false };
+    let mut since_s: Option<f64> = None;
+    while let Some(left) = limit.checked_sub(began.elapsed()) {
+        let Ok(event) = robot.events().recv_timeout(left) else { return false };
+        let Event::Data(values) = event.event else { continue };
+        let Some(row) = RobotRow::from_values(event.at, &values) else { return false };
+        if row.speed_m_s() > STILL_M_S {
+            since_s = None;
+        } else if row.timestamp_s - *since_s.get_or_insert(row.timestamp_s) >= STILL_FOR_S {
+            return true;
+        }
+    }
+    false
+}
