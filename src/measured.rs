@@ -36,6 +36,23 @@ pub enum LoadPullsError {
     /// A shard of it.
     #[error(transparent)]
     Shard(#[from] ReadError),
+    /// Folders whose labels mean different things.
+    #[error(
+        "{}: its labels are taken with {other_n} N and {:.1} mm, those of the first folder with {tolerance_n} N and {:.1} mm",
+        .path.display(), 1e3 * .other_m, 1e3 * .stop_m
+    )]
+    Rule {
+        /// The folder.
+        path: PathBuf,
+        /// Tolerance of the first folder.
+        tolerance_n: f64,
+        /// Tolerance of this one.
+        other_n: f64,
+        /// Displacement stop of the first folder.
+        stop_m: f64,
+        /// Displacement stop of this one.
+        other_m: f64,
+    },
     /// Every pull of a run folder was left out.
     #[error("{}: no pull of this run can be used: {notes}", .path.display())]
     Nothing {
@@ -57,6 +74,56 @@ pub fn load_pulls(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
         return load_run(path);
     }
     Ok(LoadedPulls { pulls: read_pull_folder(path)?, notes: Vec::new() })
+}
+
+/// Loads several folders as one campaign, in their order: what was measured later on the same rig. Pulls whose ids are taken get the
+/// name of their folder before them; what only some of the folders recorded counts as not recorded.
+pub fn load_pulls_of(folders: &[&Path]) -> Result<LoadedPulls, LoadPullsError> {
+    let Some((first, rest)) = folders.split_first() else {
+        return Err(LoadPullsError::Nothing { path: PathBuf::new(), notes: "no folder was named".into() });
+    };
+    let mut all = load_pulls(first)?;
+    for path in rest {
+        join(path, &mut all, load_pulls(path)?)?;
+    }
+    if folders.len() > 1 {
+        all.pulls.count_rests();
+    }
+    Ok(all)
+}
+
+/// Puts further pulls behind those that are there.
+fn join(path: &Path, all: &mut LoadedPulls, next: LoadedPulls) -> Result<(), LoadPullsError> {
+    let (mine, mut theirs) = (&mut all.pulls, next.pulls);
+    let rules = [(mine.label_tolerance_n, mine.stop_m), (theirs.label_tolerance_n, theirs.stop_m)];
+    if rules[0] != rules[1] {
+        let [(tolerance_n, stop_m), (other_n, other_m)] = rules;
+        return Err(LoadPullsError::Rule { path: path.into(), tolerance_n, other_n, stop_m, other_m });
+    }
+    let ids: BTreeSet<String> = mine.pulls.iter().map(|p| p.id.clone()).collect();
+    let folder = path.file_name().map_or_else(|| "next".into(), |name| name.to_string_lossy().into_owned());
+    for pull in theirs.pulls.iter_mut().filter(|pull| ids.contains(&pull.id)) {
+        pull.id = format!("{folder}-{}", pull.id);
+    }
+    mine.recorded.retain(|name| theirs.recorded.contains(name));
+    mine.extra.retain(|column| theirs.extra.iter().any(|c| same_kind(column, c)));
+    for column in &mut mine.extra {
+        let more = theirs.extra.iter().find(|c| c.name == column.name).map(|c| &c.values);
+        match (&mut column.values, more) {
+            (ExtraValues::Number(x), Some(ExtraValues::Number(more))) => x.extend(more),
+            (ExtraValues::Text(words), Some(ExtraValues::Text(more))) => words.extend(more.iter().cloned()),
+            _ => {}
+        }
+    }
+    mine.feedback = mine.feedback.filter(|f| theirs.feedback.is_none_or(|other| *f == other));
+    mine.sha256 = sha256_hex(format!("{}{}", mine.sha256, theirs.sha256).as_bytes());
+    mine.pulls.append(&mut theirs.pulls);
+    all.notes.extend(next.notes);
+    Ok(())
+}
+
+fn same_kind(a: &ExtraColumn, b: &ExtraColumn) -> bool {
+    a.name == b.name && std::mem::discriminant(&a.values) == std::mem::discriminant(&b.values)
 }
 
 /// Pulls of a run that are left out, by reason.
@@ -112,7 +179,7 @@ fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
                     let mine = (sample.label_tolerance_n, sample.stop_mm);
                     if *rule.get_or_insert(mine) == mine {
                         let beside = if rig.is_some() { measured_beside(&sample) } else { BTreeMap::new() };
-                        pulls.extend(measured(sample, trace, beside));
+                        pulls.extend(measured(sample, trace.as_ref(), beside));
                         continue;
                     }
                     &mut left_out.other_rule
@@ -187,10 +254,26 @@ fn measured_beside(sample: &Sample) -> BTreeMap<String, Drawn> {
     numbers.chain(words).filter(|(name, _)| !KNOWN_COLUMNS.contains(&name.as_str())).collect()
 }
 
+/// Time between the readings of a trace that are used. The force loop feeds noise back with its lag, so readings that are
+/// closer say the same again; taken as new ones they make a diagnosis too sure of itself.
+const READING_STEP_S: f64 = 0.01;
+
+/// Every so many rows of a trace, its first row of the pull among them.
+fn thinned(trace: &PullTrace) -> PullTrace {
+    let begun = trace.time_s.partition_point(|&t| t < 0.0);
+    let pulled = trace.time_s.get(begun..).unwrap_or_default();
+    let step_s = match pulled {
+        [first, .., last] => (last - first) / (pulled.len() - 1) as f64,
+        _ => return trace.clone(),
+    };
+    let every = (READING_STEP_S / step_s).round().max(1.0) as usize;
+    trace.rows().enumerate().filter(|(i, _)| i % every == begun % every).map(|(_, row)| row).collect()
+}
+
 /// A pull that slipped; `None` if it has no label after all.
 fn measured(
     sample: Sample,
-    trace: Option<PullTrace>,
+    trace: Option<&PullTrace>,
     extra: BTreeMap<String, Drawn>,
 ) -> Option<MeasuredPull> {
     Some(MeasuredPull {
@@ -212,7 +295,7 @@ fn measured(
             extra,
         },
         part: sample.part,
-        trace,
+        trace: trace.map(thinned),
     })
 }
 
@@ -221,4 +304,32 @@ fn feedback_of(config_toml: &str) -> Option<Feedback> {
     let config: toml::Table = config_toml.parse().ok()?;
     let feedback = config.get("twin")?.get("robot")?.get("feedback")?;
     Feedback::deserialize(feedback.clone()).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gripgen_twin::TraceRow;
+
+    #[test]
+    fn traces_keep_a_reading_every_ten_milliseconds_and_the_first_of_the_pull() {
+        let at = |time_s: f64| TraceRow {
+            time_s,
+            desired_force_n: 1.0,
+            measured_force_n: time_s,
+            displacement_m: 0.0,
+        };
+        // 500 a second, some before the pull, with a gap.
+        let before = (0..21).map(|i| at(-3.0 + 0.002 * f64::from(i)));
+        let trace: PullTrace = before.chain((0..501).map(|i| at(0.002 * f64::from(i)))).collect();
+        let thin = thinned(&trace);
+        let pulled: Vec<f64> = thin.time_s.iter().copied().filter(|t| *t >= 0.0).collect();
+        assert_eq!(pulled.len(), 101);
+        assert_eq!(pulled[0], 0.0);
+        assert!(pulled.windows(2).all(|w| (w[1] - w[0] - 0.01).abs() < 1e-12));
+        assert_eq!(thin.len() - pulled.len(), 4, "four or five of 21 before the pull");
+        // What is as slow already stays as it is.
+        assert_eq!(thinned(&thin), thin);
+        assert_eq!(thinned(&PullTrace::default()), PullTrace::default());
+    }
 }

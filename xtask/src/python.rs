@@ -113,6 +113,7 @@ pub fn pytest(python: &Path, root: &Path) -> Command {
         "no:cacheprovider",
         "tests/python",
         "tests/gripgen_py",
+        "tests/rig_py",
         "tests/blind",
     ]);
     command.env("PYTHONPATH", target(root).join("python"));

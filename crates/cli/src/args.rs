@@ -270,6 +270,9 @@ pub struct CalibratePressesArgs {
 pub struct CompareArgs {
     /// Ball presses: Taxim's dataPack.npz, or a folder with presses.csv and images.
     pub measured: PathBuf,
+    /// Of pulls: a folder that was measured later on the same rig; may be given many times.
+    #[arg(long, value_name = "FOLDER")]
+    pub also: Vec<PathBuf>,
     /// A sensor file.
     #[arg(long, value_name = "FILE.npz")]
     pub sensor: Option<String>,

@@ -27,6 +27,8 @@ pub use pull::PullProgram;
 pub const HEARTBEAT_LEAST_HZ: f64 = 10.0;
 /// How long a program waits for the first heartbeat.
 pub const HEARTBEAT_WAIT_S: f64 = 10.0;
+/// How long a motion waits for its go.
+pub const GO_WAIT_S: f64 = 2.0;
 /// How long the sensor rests before it is zeroed.
 pub const ZERO_REST_S: f64 = 0.5;
 /// How long the preload is averaged.

@@ -11,6 +11,8 @@
 
 pub mod arm;
 pub mod controller;
+#[cfg(test)]
+mod controller_tests;
 pub mod dashboard;
 #[cfg(test)]
 mod dashboard_tests;
@@ -26,6 +28,10 @@ pub mod plant;
 pub mod robot;
 pub mod rtde;
 mod rtde_control;
+#[cfg(test)]
+mod rtde_control_tests;
+#[cfg(test)]
+mod rtde_tests;
 mod running;
 pub mod script;
 pub mod server;

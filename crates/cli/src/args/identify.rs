@@ -9,6 +9,9 @@ use std::path::PathBuf;
 pub struct CalibratePullsArgs {
     /// A folder with pulls.csv, or a run folder.
     pub measured: PathBuf,
+    /// Of pulls: a folder that was measured later on the same rig; may be given many times.
+    #[arg(long, value_name = "FOLDER")]
+    pub also: Vec<PathBuf>,
     /// The twin to start from.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,
@@ -63,6 +66,9 @@ pub struct CalibrateSensorArgs {
 pub struct DiagnoseArgs {
     /// A folder with pulls.csv, sensor.csv or presses.csv, a run folder, or a dataPack.npz.
     pub measured: PathBuf,
+    /// Of pulls: a folder that was measured later on the same rig; may be given many times.
+    #[arg(long, value_name = "FOLDER")]
+    pub also: Vec<PathBuf>,
     /// The twin to start from.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,

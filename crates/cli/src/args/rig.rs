@@ -77,6 +77,9 @@ pub struct RigPullArgs {
     /// Seed of the order.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    /// A run on the same rig and gels before this one: its pulls and its clock are counted on.
+    #[arg(long, value_name = "FOLDER")]
+    pub after: Option<PathBuf>,
     /// Run folder; runs/<name of the campaign> where it is left out.
     #[arg(short, long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
@@ -155,7 +158,6 @@ pub struct RigServeArgs {
     /// Port of the camera behind the right gel; 38081.
     #[arg(long, value_name = "PORT")]
     pub camera_right_port: Option<u16>,
-    #[arg(long, value_name = "FILE.toml")]
     /// Read faults from standard input, one a line, and let them happen: `drop rtde`, `delay gripper 0.5`, `estop`, `freeze left`.
     #[arg(long)]
     pub faults: bool,

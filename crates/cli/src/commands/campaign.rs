@@ -1,7 +1,7 @@
 //! `gripgen campaign`: plan a campaign.
 
 use super::diagnose::output::next_toml;
-use super::diagnose::{diagnose_folder, load_twin};
+use super::diagnose::{diagnose_folders, load_twin};
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, program, writable, write_file};
@@ -83,7 +83,7 @@ fn first(args: &CampaignArgs, twin: &Twin) -> Result<Campaign, Failure> {
 
 /// The pulls that separate what a diagnosis of `measured` leaves tied.
 fn separating(args: &CampaignArgs, measured: &Path, twin: &Twin) -> Result<NextPulls, Failure> {
-    let diagnosed = diagnose_folder(measured, twin, &[], &args.talk)?;
+    let diagnosed = diagnose_folders(&[measured], twin, &[], &args.talk)?;
     diagnosed.next.ok_or_else(|| {
         let found =
             format!("--separate: {} leaves nothing tied that pulls could separate", measured.display());

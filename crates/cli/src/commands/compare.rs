@@ -1,6 +1,6 @@
 //! `gripgen compare`: how far a twin or a sensor file is from measurements.
 
-use super::diagnose::{jobs, load_twin, no_pulls};
+use super::diagnose::{folders, jobs, load_twin, no_pulls};
 use crate::args::{CompareArgs, TalkArgs};
 use crate::commands::compare_sensor;
 use crate::failure::Failure;
@@ -10,7 +10,7 @@ use gripgen::tactile::presses::{PressComparison, PressSet, Scores, compare_press
 use gripgen::tactile::{Sensor, finish};
 use gripgen::{
     FoundCircles, LabelErrors, LoadPressesError, LoadSensorError, Location, PressGeometry, PressReportText,
-    compare_pulls, find_missing_circles, is_press_set, is_sensor_table, load_presses, load_pulls,
+    compare_pulls, find_missing_circles, is_press_set, is_sensor_table, load_presses, load_pulls_of,
     load_sensor, load_twin_sensor, press_report,
 };
 use serde_json::{Value, json};
@@ -118,7 +118,8 @@ pub fn load_sensor_and_presses(
 
 /// A twin against measured pulls.
 fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
-    let loaded = load_pulls(&args.measured).map_err(|e| no_pulls(&args.measured, e))?;
+    let measured = folders(&args.measured, &args.also);
+    let loaded = load_pulls_of(&measured).map_err(|e| no_pulls(&measured, e))?;
     let twin = load_twin(&args.twin, &[])?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let found = compare_pulls(&loaded.pulls, &twin, jobs())

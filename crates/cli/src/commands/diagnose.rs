@@ -11,9 +11,9 @@ use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
 use gripgen::{
     Diagnosed, Location, PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_press_set,
-    is_sensor_table, load_pulls, load_sensor_table, load_twin_document,
+    is_sensor_table, load_pulls_of, load_sensor_table, load_twin_document,
 };
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Runs the verb.
 pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
@@ -48,8 +48,8 @@ pub fn jobs() -> usize {
 }
 
 /// What cannot be read as pulls.
-pub fn no_pulls(path: &Path, e: impl std::fmt::Display) -> Failure {
-    let known = path.join("pulls.csv").is_file() || path.join("run.json").is_file();
+pub fn no_pulls(paths: &[&Path], e: impl std::fmt::Display) -> Failure {
+    let known = paths.iter().all(|path| path.join("pulls.csv").is_file() || path.join("run.json").is_file());
     let failure = Failure::usage(e);
     if known {
         return failure;
@@ -71,17 +71,22 @@ fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
             .hint(format!("the effects: {}", ids.join(", "))));
     }
     let without: Vec<&str> = args.without.iter().map(String::as_str).collect();
-    diagnose_folder(&args.measured, &twin, &without, &args.talk)
+    diagnose_folders(&folders(&args.measured, &args.also), &twin, &without, &args.talk)
 }
 
-/// Diagnoses the pulls of a folder, with progress.
-pub fn diagnose_folder(
-    measured: &Path,
+/// Folders that are read as one campaign.
+pub fn folders<'a>(measured: &'a Path, also: &'a [PathBuf]) -> Vec<&'a Path> {
+    std::iter::once(measured).chain(also.iter().map(PathBuf::as_path)).collect()
+}
+
+/// Diagnoses the pulls of folders, with progress.
+pub fn diagnose_folders(
+    measured: &[&Path],
     twin: &Twin,
     without: &[&str],
     talk: &TalkArgs,
 ) -> Result<Diagnosed, Failure> {
-    let loaded = load_pulls(measured).map_err(|e| no_pulls(measured, e))?;
+    let loaded = load_pulls_of(measured).map_err(|e| no_pulls(measured, e))?;
     let options = PullDiagnoseOptions { jobs: jobs(), without };
     let share = Share::start("diagnosing", talk);
     let diagnosed = diagnose_pull_table(&loaded.pulls, twin, &options, &|x| share.at(x));

@@ -27,9 +27,8 @@ pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
     let jobs = args.jobs.unwrap_or_else(check::cores).max(1);
     let options = SweepOptions { jobs, slice: args.slice, simd: simd_level(args)? };
     let mut watch = Watch::new(args, &project)?;
-    let result = sweep(&project, &out, options, stop_flag("finishing the shards under way"), |event| {
-        watch.on_event(&event)
-    });
+    let stop = stop_flag("finishing the shards under way");
+    let result = sweep(&project, &out, options, stop, |event| watch.on_event(&event));
     let summary = result?;
     watch.finish(&out, &summary)?;
     if summary.interrupted {

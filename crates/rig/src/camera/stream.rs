@@ -4,6 +4,8 @@
 pub const MOST_FRAME: usize = 4 << 20;
 /// Longest headers.
 const MOST_HEADERS: usize = 8 << 10;
+/// What may come without their end: its last byte may still be on the way.
+const MOST_WITHOUT_END: usize = MOST_HEADERS + b"\r\n\r\n".len() - 1;
 
 /// The request for a stream of the camera at `host`.
 pub fn stream_request(host: &str) -> Vec<u8> {
@@ -95,8 +97,15 @@ impl CameraStream {
             [&b"\r\n\r\n"[..], b"\n\n"].map(|end| find(&self.bytes, end).map(|at| (at, at + end.len())));
         let Some((end, after)) = ends.into_iter().flatten().min() else {
             let bytes = self.bytes.len();
-            return if bytes > MOST_HEADERS { Err(CameraStreamError::Headers { bytes }) } else { Ok(None) };
+            return if bytes > MOST_WITHOUT_END {
+                Err(CameraStreamError::Headers { bytes })
+            } else {
+                Ok(None)
+            };
         };
+        if end > MOST_HEADERS {
+            return Err(CameraStreamError::Headers { bytes: end });
+        }
         let text = String::from_utf8_lossy(&self.bytes[..end]).into_owned();
         self.bytes.drain(..after);
         Ok(Some(text.lines().map(|line| line.trim().to_string()).collect()))
@@ -114,7 +123,11 @@ impl CameraStream {
         let after = &self.bytes[at + boundary.len()..];
         if find(after, b"\r\n\r\n").or_else(|| find(after, b"\n\n")).is_none() {
             let bytes = after.len();
-            return if bytes > MOST_HEADERS { Err(CameraStreamError::Headers { bytes }) } else { Ok(false) };
+            return if bytes > MOST_WITHOUT_END {
+                Err(CameraStreamError::Headers { bytes })
+            } else {
+                Ok(false)
+            };
         }
         self.bytes.drain(..at + boundary.len());
         Ok(true)

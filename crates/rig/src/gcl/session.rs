@@ -133,6 +133,9 @@ impl GclLink {
         let mut events = Vec::new();
         let mut start = 0;
         while let Some(end) = self.incoming[start..].iter().position(|&b| b == b'\n') {
+            if end > MOST_LINE {
+                return Err(GclSessionError);
+            }
             let line = String::from_utf8_lossy(&self.incoming[start..start + end]).trim().to_string();
             start += end + 1;
             if !line.is_empty() {

@@ -142,9 +142,10 @@ impl MotionProgram {
     }
 }
 
-/// What follows the head. The motion is a thread of its own, so that the main one can watch and stop it.
+/// What follows the head. The go may come a beat after the first: the host writes both, but from two hands. The motion is a thread of
+/// its own, so that the main one can watch and stop it.
 fn body() -> String {
-    use registers::{GO, PHASE};
+    use registers::{GO, PHASE, STOP};
     format!(
         "  set_payload(payload_kg, [centre_x_mm / 1000, centre_y_mm / 1000, centre_z_mm / 1000])
   set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000, 0, 0, 0])
@@ -154,6 +155,14 @@ fn body() -> String {
   thread motion():
     movel(gripgen_target, a=0.5, v=gripgen_speed)
     gripgen_arrived = True
+  end
+  waited = 0.0
+  while read_input_integer_register({GO}) != run_id and reason == 0:
+    sync()
+    waited = waited + get_steptime()
+    if waited > {wait:.1} or read_input_integer_register({GO}) == {STOP}:
+      reason = {host}
+    end
   end
   if reason == 0:
     write_output_integer_register({PHASE}, {moving})
@@ -178,6 +187,7 @@ fn body() -> String {
     stopl({stop:.1})
   end
 ",
+        wait = super::GO_WAIT_S,
         moving = Phase::Moving as i32,
         braking = Phase::Braking as i32,
         force = StopReason::Force as i32,

@@ -3,7 +3,7 @@ use super::*;
 fn motion() -> MotionProgram {
     MotionProgram {
         run: 4,
-        target: TcpPose { position_m: [0.3, -0.2, 0.25], rotation_rad: [0.0, 3.141_593, 0.0] },
+        target: TcpPose { position_m: [0.3, -0.2, 0.25], rotation_rad: [0.0, 1.25, 0.0] },
         speed_mm_s: 100.0,
         abort_force_n: 20.0,
         max_time_s: 20.0,

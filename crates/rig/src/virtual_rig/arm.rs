@@ -109,9 +109,18 @@ impl Arm {
         self.velocity_m_s.iter().map(|v| v * v).sum::<f64>().sqrt()
     }
 
-    /// What moves it.
+    /// What moves it. A drive with a number that is none is a stop.
     pub fn set_drive(&mut self, drive: Drive) {
-        self.drive = drive;
+        let finite = match drive {
+            Drive::Hold | Drive::Stop => true,
+            Drive::Force { force_n, speed_limit_m_s, .. } => {
+                force_n.is_finite() && speed_limit_m_s.is_finite()
+            }
+            Drive::Line { target, speed_m_s } => {
+                speed_m_s.is_finite() && target.numbers().iter().all(|x| x.is_finite())
+            }
+        };
+        self.drive = if finite { drive } else { Drive::Stop };
     }
 
     /// Brakes, if it moves.

@@ -186,10 +186,9 @@ impl Controller {
         self.set_safety(SafetyStatus::RobotEmergencyStop);
     }
 
-    /// The controller stops by itself; the program waits.
+    /// The controller stops by itself; the program waits, and its watchdog with it.
     pub fn protective_stop(&mut self) {
         self.arm.stop();
-        self.watchdog = None;
         if self.program.is_some() {
             self.robot.runtime = RuntimeState::Paused;
         }

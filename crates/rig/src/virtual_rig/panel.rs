@@ -79,13 +79,11 @@ impl DashboardRobot for Panel<'_> {
     }
 
     fn play(&mut self) -> Result<(), String> {
-        match self.0.program_title() {
-            Some(_) => {
-                self.0.play();
-                Ok(())
-            }
-            None => Err("Failed to execute: play".into()),
+        if self.0.program_title().is_none() || self.safety_status() != SafetyStatus::Normal {
+            return Err("Failed to execute: play".into());
         }
+        self.0.play();
+        Ok(())
     }
 
     fn stop_program(&mut self) -> Result<(), String> {

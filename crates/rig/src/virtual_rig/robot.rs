@@ -132,7 +132,12 @@ impl Robot {
             "payload" => Double(self.payload_kg),
             "payload_cog" => Vector3d(self.centre_of_gravity_m),
             "payload_inertia" => zero,
-            _ => return register(&self.outputs, name.strip_prefix("output_")?),
+            // A controller lets clients read what others wrote, too.
+            _ => {
+                let written = name.strip_prefix("input_").and_then(|name| register(&self.inputs, name));
+                let answered = || register(&self.outputs, name.strip_prefix("output_")?);
+                return written.or_else(answered).or_else(|| idle_output(name));
+            }
         })
     }
 
@@ -152,6 +157,36 @@ impl Robot {
             _ => {}
         }
     }
+}
+
+/// Fields of parts that this robot has and nothing here uses. UR's client library asks for them all in one recipe, and one
+/// that is missing spoils it.
+fn idle_output(name: &str) -> Option<Value> {
+    Some(match name {
+        "tcp_offset" => Value::Vector6d([0.0; 6]),
+        "elbow_position" | "elbow_velocity" => Value::Vector3d([0.0; 3]),
+        "io_current"
+        | "target_execution_time"
+        | "tool_analog_input0"
+        | "tool_analog_input1"
+        | "tool_output_current"
+        | "euromap67_24V_voltage"
+        | "euromap67_24V_current" => Value::Double(0.0),
+        "tool_temperature" => Value::Double(JOINT_TEMPERATURE_C),
+        // 253: running.
+        "tool_mode" => Value::Uint32(253),
+        "analog_io_types"
+        | "tool_analog_input_types"
+        | "script_control_line"
+        | "euromap67_input_bits"
+        | "euromap67_output_bits" => Value::Uint32(0),
+        "actual_configurable_digital_input_bits" | "actual_configurable_digital_output_bits" => {
+            Value::Uint64(0)
+        }
+        "tool_output_voltage" => Value::Int32(0),
+        "tool_output_mode" | "tool_digital_output0_mode" | "tool_digital_output1_mode" => Value::Uint8(0),
+        _ => return None,
+    })
 }
 
 /// Type of an input field; `None` if there is no such field.
@@ -210,4 +245,62 @@ fn register(registers: &Registers, name: &str) -> Option<Value> {
         Place::Bit(i) => Value::Bool(registers.bits >> i & 1 == 1),
         Place::Word(shift) => Value::Uint32((registers.bits >> shift) as u32),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::program::TcpPose;
+
+    /// UR's client library lists the input registers among the outputs of a controller.
+    #[test]
+    fn what_was_written_can_be_read() {
+        let tcp = TcpPose { position_m: [0.0; 3], rotation_rad: [0.0; 3] };
+        let mut robot = Robot {
+            timestamp_s: 0.0,
+            mode: RobotMode::Running,
+            safety: SafetyStatus::Normal,
+            runtime: RuntimeState::Stopped,
+            tcp,
+            velocity_m_s: [0.0; 3],
+            wrench: [0.0; 6],
+            raw_wrench: [0.0; 6],
+            payload_kg: 0.0,
+            centre_of_gravity_m: [0.0; 3],
+            inputs: Registers::default(),
+            outputs: Registers::default(),
+        };
+        for (name, value) in [
+            ("input_int_register_24", Value::Int32(-7)),
+            ("input_double_register_47", Value::Double(2.5)),
+            ("input_bit_register_64", Value::Bool(true)),
+            ("input_bit_registers32_to_63", Value::Uint32(0x8000_0001)),
+        ] {
+            assert_eq!(input_type(name), Some(value.field_type()));
+            robot.write_input(name, value);
+            assert_eq!(robot.output(name), Some(value));
+            let answers = name.replace("input", "output");
+            assert_ne!(robot.output(&answers), robot.output(name), "a register of its own");
+        }
+        for unknown in ["input_int_register_48", "input_", "int_register_0", "input_bit_register_63"] {
+            assert_eq!(robot.output(unknown), None, "{unknown}");
+        }
+    }
+
+    /// Types as in the table of UR's client library.
+    #[test]
+    fn parts_that_nothing_here_uses_are_there_with_their_types() {
+        for (name, kind) in [
+            ("tcp_offset", FieldType::Vector6d),
+            ("elbow_position", FieldType::Vector3d),
+            ("tool_mode", FieldType::Uint32),
+            ("tool_output_voltage", FieldType::Int32),
+            ("tool_output_mode", FieldType::Uint8),
+            ("tool_temperature", FieldType::Double),
+            ("analog_io_types", FieldType::Uint32),
+            ("actual_configurable_digital_input_bits", FieldType::Uint64),
+        ] {
+            assert_eq!(idle_output(name).map(|value| value.field_type()), Some(kind), "{name}");
+        }
+    }
 }

@@ -176,7 +176,8 @@ impl RtdeServer {
         let known = !types.contains(&"NOT_FOUND") && !names.is_empty();
         let mut answer = if self.protocol > 1 { vec![u8::from(known)] } else { vec![] };
         answer.extend(types.join(",").bytes());
-        self.every = (FULL_RATE_HZ / rate_hz.clamp(1.0, FULL_RATE_HZ)).round() as u64;
+        // A rate that is no number is the full one.
+        self.every = (FULL_RATE_HZ / rate_hz.clamp(1.0, FULL_RATE_HZ)).round().max(1.0) as u64;
         self.outputs = if known { names } else { vec![] };
         self.started &= known;
         Some(answer)

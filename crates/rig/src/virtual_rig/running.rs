@@ -4,8 +4,8 @@ use super::arm::{Arm, Drive, STEP_S};
 use super::plant::PullRequest;
 use super::robot::Robot;
 use crate::program::{
-    ACKNOWLEDGE_S, HEARTBEAT_WAIT_S, MotionProgram, PRELOAD_S, Phase, PullProgram, SETTLE_S, StopReason,
-    TcpPose, ZERO_REST_S, registers,
+    ACKNOWLEDGE_S, GO_WAIT_S, HEARTBEAT_WAIT_S, MotionProgram, PRELOAD_S, Phase, PullProgram, SETTLE_S,
+    StopReason, TcpPose, ZERO_REST_S, registers,
 };
 
 /// What a program asks of the controller beside moving the arm.
@@ -111,7 +111,7 @@ impl Running {
                 say(robot, Phase::Zeroed);
                 Stage::WaitGo { waited_s: 0.0 }
             }
-            Stage::WaitGo { waited_s } => self.wait_go(go, waited_s),
+            Stage::WaitGo { waited_s } => self.wait_go(robot, go, waited_s),
             Stage::Preload { sum, ticks } if f64::from(ticks) * STEP_S < PRELOAD_S => {
                 Stage::Preload { sum: sum + robot.wrench[2], ticks: ticks + 1 }
             }
@@ -159,18 +159,22 @@ impl Running {
         (robot.payload_kg, robot.centre_of_gravity_m) = (payload_kg, centre_mm.map(|mm| mm * 1e-3));
         match self.kind {
             Kind::Pull(_) => Stage::ZeroRest { left_s: ZERO_REST_S },
-            Kind::Motion(_) => {
-                say(robot, Phase::Moving);
-                Stage::Moving { ticks: 0 }
-            }
+            Kind::Motion(_) => Stage::WaitGo { waited_s: 0.0 },
         }
     }
 
-    fn wait_go(&self, go: i32, waited_s: f64) -> Stage {
-        let Kind::Pull(pull) = self.kind else { return Stage::Stopping(StopReason::Host) };
-        if go == pull.run {
-            Stage::Preload { sum: 0.0, ticks: 0 }
-        } else if go == registers::STOP || waited_s > pull.wait_s * self.clock_rate {
+    fn wait_go(&self, robot: &mut Robot, go: i32, waited_s: f64) -> Stage {
+        let wait_s = match self.kind {
+            Kind::Pull(pull) => pull.wait_s,
+            Kind::Motion(_) => GO_WAIT_S,
+        };
+        if go == self.run() {
+            if let Kind::Pull(_) = self.kind {
+                return Stage::Preload { sum: 0.0, ticks: 0 };
+            }
+            say(robot, Phase::Moving);
+            Stage::Moving { ticks: 0 }
+        } else if go == registers::STOP || waited_s > wait_s * self.clock_rate {
             Stage::Stopping(StopReason::Host)
         } else {
             Stage::WaitGo { waited_s: waited_s + STEP_S }

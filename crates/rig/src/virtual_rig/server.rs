@@ -2,6 +2,8 @@
 
 mod ports;
 mod socket;
+#[cfg(test)]
+mod tests;
 
 pub use socket::{RigStatus, ServeError, ServeOptions, ServedRig};
 

@@ -134,6 +134,9 @@ impl Job<'_> {
         let mut left = todo.clone();
         let mut reconnects = self.args.reconnect;
         let mut clock = CampaignClock::of(self.folder)?;
+        if let (true, Some(before)) = (clock.is_new(), &self.args.after) {
+            clock = CampaignClock::of(&RunFolder::open(before)?)?;
+        }
         loop {
             let (reason, still) = match self.connected(&mut left, &mut clock)? {
                 End::Done(failed) => return Ok(failed),

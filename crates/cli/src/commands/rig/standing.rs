@@ -34,6 +34,11 @@ impl CampaignClock {
         Ok(clock)
     }
 
+    /// Whether nothing was measured yet.
+    pub fn is_new(&self) -> bool {
+        self.last.is_none()
+    }
+
     /// Where this pull stands.
     pub fn standing(&mut self, index: u64, measured: &MeasuredPull) -> Standing {
         let (robot_s, unix_s) = (measured.robot_time_s, measured.unix_s);

@@ -35,7 +35,9 @@ impl DeviceFaults {
     }
 
     pub(crate) fn delay(&self, seconds: f64) {
-        lock(&self.state).silent_until = Some(Instant::now() + Duration::from_secs_f64(seconds));
+        // What is no time is none.
+        let wait = Duration::try_from_secs_f64(seconds).unwrap_or_default();
+        lock(&self.state).silent_until = Instant::now().checked_add(wait);
     }
 
     pub(crate) fn truncate(&self) {
@@ -60,11 +62,20 @@ impl DeviceFaults {
         lock(&self.state).generation
     }
 
+    /// How long nothing is sent from now on.
+    fn silence(&self) -> Option<Duration> {
+        let until = lock(&self.state).silent_until?;
+        until.checked_duration_since(Instant::now()).filter(|wait| !wait.is_zero())
+    }
+
     /// What becomes of bytes that leave: `None` closes the connection after them.
-    fn spoil(&self, bytes: &mut Vec<u8>) -> Option<()> {
-        let until = lock(&self.state).silent_until;
-        if let Some(wait) = until.and_then(|until| until.checked_duration_since(Instant::now())) {
-            std::thread::sleep(wait);
+    fn spoil(&self, bytes: &mut Vec<u8>, stop: &AtomicBool) -> Option<()> {
+        while let Some(wait) = self.silence() {
+            // A rig that is not wanted any more does not wait for an hour of silence.
+            if stop.load(Ordering::SeqCst) {
+                return None;
+            }
+            std::thread::sleep(wait.min(LOOK));
         }
         let mut state = lock(&self.state);
         if std::mem::take(&mut state.garble) {
@@ -140,10 +151,15 @@ impl Outbox {
 }
 
 /// Empties an outbox into a connection, in a thread of its own.
-pub(crate) fn spawn_writer(mut stream: TcpStream, outbox: Arc<Outbox>, faults: Arc<DeviceFaults>) {
+pub(crate) fn spawn_writer(
+    mut stream: TcpStream,
+    outbox: Arc<Outbox>,
+    faults: Arc<DeviceFaults>,
+    stop: Arc<AtomicBool>,
+) {
     std::thread::spawn(move || {
         while let Some(mut piece) = outbox.next() {
-            let last = faults.spoil(&mut piece).is_none();
+            let last = faults.spoil(&mut piece, &stop).is_none();
             if stream.write_all(&piece).is_err() || last {
                 break;
             }
@@ -180,8 +196,9 @@ pub(crate) fn read_on(
             Err(_) => break,
         }
     }
-    // What an orderly end still has to say goes out first; a fault, or a client that does not read, gets nothing more.
-    let cut = faults.generation() != generation || outbox.overflows();
+    // What an orderly end still has to say goes out first; a fault, or a client that does not read, gets nothing more. A rig that
+    // is not wanted any more waits for nobody to read.
+    let cut = faults.generation() != generation || outbox.overflows() || stop.load(Ordering::SeqCst);
     outbox.close();
     if cut {
         let _ = stream.shutdown(Shutdown::Both);

@@ -177,7 +177,8 @@ impl Shared {
     /// A queue for a connection, and the thread that empties it.
     fn outbox(&self, stream: &TcpStream, device: Device) -> Option<Arc<Outbox>> {
         let outbox = Arc::new(Outbox::default());
-        spawn_writer(stream.try_clone().ok()?, outbox.clone(), self.faults(device).clone());
+        let (faults, stop) = (self.faults(device).clone(), self.stop.clone());
+        spawn_writer(stream.try_clone().ok()?, outbox.clone(), faults, stop);
         Some(outbox)
     }
 
@@ -247,12 +248,8 @@ impl Shared {
     /// The gripper has one connection; a second one is closed.
     fn serve_gripper(&self, stream: TcpStream) {
         let Some(outbox) = self.outbox(&stream, Device::Gripper) else { return };
-        {
-            let mut place = lock(&self.gripper);
-            if place.as_ref().is_some_and(|other| !other.is_closed()) {
-                return outbox.close();
-            }
-            *place = Some(outbox.clone());
+        if !self.take_gripper(&outbox) {
+            return outbox.close();
         }
         lock(&self.world).gripper.connected();
         let mut lines = Lines::default();
@@ -267,7 +264,26 @@ impl Shared {
             })
         });
         lock(&self.world).gripper.disconnected();
-        outbox.close();
+        *lock(&self.gripper) = None;
+    }
+
+    /// Takes the gripper for a connection, if nobody has it. Whoever had it and is gone still tells it so: that would end the
+    /// session of the next one.
+    fn take_gripper(&self, outbox: &Arc<Outbox>) -> bool {
+        loop {
+            let mut place = lock(&self.gripper);
+            match &*place {
+                None => {
+                    *place = Some(outbox.clone());
+                    return true;
+                }
+                Some(other) if !other.is_closed() => return false,
+                Some(_) => {
+                    drop(place);
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+            }
+        }
     }
 
     fn serve_camera(&self, jaw: Jaw, stream: TcpStream) {
