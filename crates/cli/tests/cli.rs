@@ -10,6 +10,9 @@ mod campaign;
 mod measured;
 #[path = "cli/presses.rs"]
 mod presses;
+// The loop over the wire.
+#[path = "cli/rig_loop.rs"]
+mod rig_loop;
 // Runs of a rig.
 #[path = "cli/rig_run.rs"]
 mod rig_run;

@@ -158,6 +158,9 @@ pub struct RigServeArgs {
     /// Port of the camera behind the right gel; 38081.
     #[arg(long, value_name = "PORT")]
     pub camera_right_port: Option<u16>,
+    /// Write a rig.toml for this rig: its ports, and the fixtures of its parts as taught poses.
+    #[arg(long, value_name = "RIG.toml")]
+    pub write_rig: Option<PathBuf>,
     /// Read faults from standard input, one a line, and let them happen: `drop rtde`, `delay gripper 0.5`, `estop`, `freeze left`.
     #[arg(long)]
     pub faults: bool,

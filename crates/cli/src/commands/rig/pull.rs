@@ -51,6 +51,9 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
         }
         return Ok(0);
     }
+    // Before a folder is made.
+    let before = args.after.as_deref().map(RunFolder::open).transpose()?;
+    let before = before.as_ref().map(CampaignClock::of).transpose()?.unwrap_or_default();
     let folder = open_folder(args, &config, &campaign, pulls.len() as u64)?;
     let todo = todo(&folder)?;
     let live = RefCell::new(Live::new(pulls.len() as u64, todo.len() as u64, &args.talk, sink));
@@ -59,7 +62,7 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
     }
     live.borrow().say(&format!("{words}; {} to make, into {}", todo.len(), folder.path().display()));
     let stop = stop_flag("stopping the robot safely");
-    let job = Job { args, config: &config, campaign: &campaign, folder: &folder, live: &live, stop };
+    let job = Job { args, config: &config, campaign: &campaign, folder: &folder, before, live: &live, stop };
     let failed = job.make(&todo)?;
     finish(&folder, &live.borrow(), failed)
 }
@@ -116,6 +119,7 @@ struct Job<'a> {
     config: &'a RigConfig,
     campaign: &'a Campaign,
     folder: &'a RunFolder,
+    before: CampaignClock,
     live: &'a RefCell<Live>,
     stop: &'a AtomicBool,
 }
@@ -134,8 +138,8 @@ impl Job<'_> {
         let mut left = todo.clone();
         let mut reconnects = self.args.reconnect;
         let mut clock = CampaignClock::of(self.folder)?;
-        if let (true, Some(before)) = (clock.is_new(), &self.args.after) {
-            clock = CampaignClock::of(&RunFolder::open(before)?)?;
+        if clock.is_new() {
+            clock = self.before;
         }
         loop {
             let (reason, still) = match self.connected(&mut left, &mut clock)? {

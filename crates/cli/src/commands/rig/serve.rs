@@ -1,10 +1,12 @@
 //! `gripgen rig serve`: a virtual rig.
 
+use super::load::SHIPPED_RIG;
 use super::plant::Moved;
+use super::teach::taught;
 use crate::args::RigServeArgs;
 use crate::failure::Failure;
 use crate::interrupt::stop_flag;
-use crate::output::{JsonSink, print};
+use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::{Location, TwinPlant};
 use gripgen_rig::camera::CameraView;
 use gripgen_rig::program::TcpPose;
@@ -12,10 +14,12 @@ use gripgen_rig::virtual_rig::faults::Fault;
 use gripgen_rig::virtual_rig::server::{RigAddresses, ServeError, ServeOptions, ServedRig};
 use serde_json::json;
 use std::io::BufRead;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
+use toml_edit::{DocumentMut, value};
 
 /// How far above its fixture the tool begins.
 const ABOVE_M: f64 = 0.1;
@@ -27,6 +31,14 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let plant = TwinPlant::open(&Location::parse(&args.twin), &args.set, args.seed)?;
     let tcp = begin_at(args, &plant)?;
+    let fixtures: Vec<(String, TcpPose)> = plant
+        .fixtures()
+        .iter()
+        .map(|f| (f.part.clone(), TcpPose::from_base_from_tool(&f.base_from_tool)))
+        .collect();
+    if let Some(path) = &args.write_rig {
+        writable(path)?;
+    }
     let plant = Moved::new(plant).map_err(Failure::new)?;
     let options = ServeOptions {
         addresses: addresses(args),
@@ -37,9 +49,12 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     };
     let rig = ServedRig::start(Arc::new(plant), &options).map_err(|e| refused(&e))?;
     let addresses = rig.addresses();
+    // Before the line that says ready: who waits for that line finds the file.
+    if let Some(path) = &args.write_rig {
+        write_file(path, rig_toml(&addresses, &fixtures)?.as_bytes())?;
+    }
     if sink.wanted() {
-        let of =
-            |(what, address): (&str, std::net::SocketAddr)| (what.to_string(), json!(address.to_string()));
+        let of = |(what, address): (&str, SocketAddr)| (what.to_string(), json!(address.to_string()));
         let ports: serde_json::Map<String, serde_json::Value> = addresses.all().into_iter().map(of).collect();
         sink.line(&json!({"event": "ready", "speed": args.speed, "addresses": ports}))?;
     }
@@ -77,6 +92,24 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
         }
     }
     Ok(0)
+}
+
+/// The shipped rig.toml with these ports and poses.
+fn rig_toml(addresses: &RigAddresses, fixtures: &[(String, TcpPose)]) -> Result<String, Failure> {
+    let text = Location::parse(SHIPPED_RIG).read_text().map_err(Failure::new)?;
+    let mut document: DocumentMut = text.parse().map_err(Failure::new)?;
+    let port = |at: SocketAddr| value(i64::from(at.port()));
+    document["robot"]["rtde_port"] = port(addresses.rtde);
+    document["robot"]["dashboard_port"] = port(addresses.dashboard);
+    document["robot"]["primary_port"] = port(addresses.primary);
+    document["gripper"]["port"] = port(addresses.gripper);
+    document["cameras"]["left"]["port"] = port(addresses.camera_left);
+    document["cameras"]["right"]["port"] = port(addresses.camera_right);
+    document.remove("poses");
+    for (part, pose) in fixtures {
+        taught(&mut document, part, pose.numbers());
+    }
+    Ok(document.to_string())
 }
 
 fn begin_at(args: &RigServeArgs, plant: &TwinPlant) -> Result<TcpPose, Failure> {

@@ -43,7 +43,7 @@ pub fn run(args: &RigTeachArgs) -> Result<u8, Failure> {
 }
 
 /// Puts a pose in; comments and everything else stay. Returns whether there was one.
-fn taught(document: &mut DocumentMut, name: &str, numbers: [f64; 6]) -> bool {
+pub fn taught(document: &mut DocumentMut, name: &str, numbers: [f64; 6]) -> bool {
     let poses = document.entry("poses").or_insert_with(|| {
         let mut table = Table::new();
         table.set_implicit(true);
