@@ -191,7 +191,7 @@ fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
             *counter += 1;
         }
     }
-    let notes = left_out.notes();
+    let mut notes = left_out.notes();
     let Some((label_tolerance_n, stop_mm)) = rule else {
         return Err(LoadPullsError::Nothing { path: path.into(), notes: notes.join("; ") });
     };
@@ -207,6 +207,7 @@ fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
     if let Some(campaign) = rig {
         as_made(&mut pulls, campaign);
     }
+    fewer_traces(&mut pulls.pulls, &mut notes);
     Ok(LoadedPulls { pulls, notes })
 }
 
@@ -252,6 +253,28 @@ fn measured_beside(sample: &Sample) -> BTreeMap<String, Drawn> {
     let words = sample.drawn_text.iter().filter(|(_, word)| !word.is_empty());
     let words = words.map(|(name, word)| (name.clone(), Drawn::Text(word.clone())));
     numbers.chain(words).filter(|(name, _)| !KNOWN_COLUMNS.contains(&name.as_str())).collect()
+}
+
+/// Traces that are always used, and the share of them beyond that. The model of arm and loop is good to about a hundredth: with
+/// the traces of all pulls a diagnosis is sure of what the model does not have, and calls it an effect.
+const FEW_TRACES: usize = 24;
+const SHARE_OF_TRACES: usize = 4;
+
+/// Takes away all traces but so many, evenly spread, and says so.
+fn fewer_traces(pulls: &mut [MeasuredPull], notes: &mut Vec<String>) {
+    let traced = pulls.iter().filter(|p| p.trace.is_some()).count();
+    let kept = FEW_TRACES.max(pulls.len() / SHARE_OF_TRACES);
+    if traced <= kept {
+        return;
+    }
+    let with_trace = pulls.iter_mut().filter(|p| p.trace.is_some());
+    for (i, pull) in with_trace.enumerate() {
+        // The first of each stretch of `traced / kept`.
+        if i * kept % traced >= kept {
+            pull.trace = None;
+        }
+    }
+    notes.push(format!("traces of {kept} of {traced} pulls are used: more of them would say more of the arm than its model knows"));
 }
 
 /// Time between the readings of a trace that are used. The force loop feeds noise back with its lag, so readings that are
@@ -310,6 +333,28 @@ fn feedback_of(config_toml: &str) -> Option<Feedback> {
 mod tests {
     use super::*;
     use gripgen_twin::TraceRow;
+
+    #[test]
+    fn of_many_traces_some_are_used_and_all_of_a_few() {
+        let pull = |i: usize| MeasuredPull {
+            id: i.to_string(),
+            part: "p".into(),
+            grip_force_n: 10.0,
+            increment_n: 1.0,
+            step_s: 0.1,
+            covariates: Covariates::default(),
+            max_pull_force_n: 3.0,
+            trace: Some(PullTrace::default()),
+        };
+        for (n, kept) in [(5, 5), (24, 24), (25, 24), (60, 24), (120, 30), (1000, 250)] {
+            let (mut pulls, mut notes): (Vec<_>, Vec<_>) = ((0..n).map(pull).collect(), vec![]);
+            fewer_traces(&mut pulls, &mut notes);
+            assert_eq!(pulls.iter().filter(|p| p.trace.is_some()).count(), kept, "of {n}");
+            assert_eq!(notes.len(), usize::from(kept < n));
+            let last = pulls.iter().rposition(|p| p.trace.is_some()).unwrap();
+            assert!(last + 5 >= n - 1, "evenly spread: the last of {n} is {last}");
+        }
+    }
 
     #[test]
     fn traces_keep_a_reading_every_ten_milliseconds_and_the_first_of_the_pull() {

@@ -10,12 +10,19 @@ mod campaign;
 mod measured;
 #[path = "cli/presses.rs"]
 mod presses;
+// Faults in the middle of a campaign of a rig.
+#[path = "cli/rig_faults.rs"]
+mod rig_faults;
 // The loop over the wire.
 #[path = "cli/rig_loop.rs"]
 mod rig_loop;
 // Runs of a rig.
 #[path = "cli/rig_run.rs"]
 mod rig_run;
+#[path = "cli/rig_served.rs"]
+mod rig_served;
+#[path = "cli/rig_verbs.rs"]
+mod rig_verbs;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

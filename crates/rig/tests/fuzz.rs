@@ -168,6 +168,7 @@ fn rtde_link() {
         outputs: vec!["timestamp".into(), "actual_q".into()],
         frequency_hz: 500.0,
         inputs: vec![vec!["input_int_register_24".into()]],
+        lenient: false,
     };
     fuzz("rtde_link", 1, vec![], |pieces| {
         let mut link = Link::new(plan.clone()).unwrap();
@@ -309,7 +310,7 @@ fn program() {
     let pull = PullProgram::default().script().unwrap();
     let motion = MotionProgram {
         run: 4,
-        target: TcpPose { position_m: [0.3, -0.2, 0.25], rotation_rad: [0.0, 3.141_593, 0.0] },
+        target: TcpPose { position_m: [0.3, -0.2, 0.25], rotation_rad: [0.0, 3.125, 0.0] },
         speed_mm_s: 100.0,
         abort_force_n: 20.0,
         max_time_s: 20.0,

@@ -75,6 +75,9 @@ pub struct DiagnoseArgs {
     /// Override a key of the twin; may be given many times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
+    /// Plan only what this rig's gripper can do (the rig.toml of `gripgen rig pull`).
+    #[arg(long, value_name = "RIG.toml")]
+    pub rig: Option<String>,
     /// Of presses: a sensor file in place of the twin's.
     #[arg(long, value_name = "FILE.npz")]
     pub sensor: Option<String>,
@@ -104,6 +107,9 @@ pub struct CampaignArgs {
     /// Override a key of the twin; may be given many times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
+    /// Plan only what this rig's gripper can do (the rig.toml of `gripgen rig pull`).
+    #[arg(long, value_name = "RIG.toml")]
+    pub rig: Option<String>,
     /// Parts to pull; all of the twin where this is left out.
     #[arg(long, value_name = "PART,...", value_delimiter = ',')]
     pub parts: Vec<String>,

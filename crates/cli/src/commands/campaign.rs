@@ -1,7 +1,7 @@
 //! `gripgen campaign`: plan a campaign.
 
 use super::diagnose::output::next_toml;
-use super::diagnose::{diagnose_folders, load_twin};
+use super::diagnose::{diagnose_folders, load_twin, within_rig};
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, program, writable, write_file};
@@ -17,7 +17,7 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     writable(&args.out)?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let at = Location::parse(&args.twin);
-    let twin = load_twin(&args.twin, &args.set)?;
+    let twin = within_rig(load_twin(&args.twin, &args.set)?, args.rig.as_deref())?;
     let (campaign, separating) = match &args.separate {
         Some(measured) => {
             let next = separating(args, measured, &twin)?;

@@ -3,6 +3,7 @@
 pub mod output;
 mod presses;
 
+use super::rig::load_rig;
 use crate::args::{DiagnoseArgs, TalkArgs};
 use crate::failure::Failure;
 use crate::output::{JsonSink, writable};
@@ -42,6 +43,15 @@ pub fn load_twin(path: &str, sets: &[(String, String)]) -> Result<Twin, Failure>
     Twin::new(&file).map_err(|e| Failure::from(document.located(e)))
 }
 
+/// The twin with no more grip force than the gripper of a rig has.
+pub fn within_rig(mut twin: Twin, rig: Option<&str>) -> Result<Twin, Failure> {
+    if let Some(rig) = rig {
+        let [_, most_n] = load_rig(rig, &[])?.gripper.force_per_jaw_n;
+        twin.gripper.max_force_n = twin.gripper.max_force_n.min(most_n);
+    }
+    Ok(twin)
+}
+
 /// Worker threads.
 pub fn jobs() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
@@ -63,7 +73,7 @@ fn sensor(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
 }
 
 fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
-    let twin = load_twin(&args.twin, &args.set)?;
+    let twin = within_rig(load_twin(&args.twin, &args.set)?, args.rig.as_deref())?;
     let known = |id: &String| LIBRARY.iter().any(|spec| spec.id == id);
     if let Some(id) = args.without.iter().find(|id| !known(id)) {
         let ids: Vec<&str> = LIBRARY.iter().map(|spec| spec.id).collect();

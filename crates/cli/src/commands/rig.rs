@@ -9,3 +9,5 @@ mod record;
 pub mod serve;
 mod standing;
 pub mod teach;
+
+pub use load::load_rig;

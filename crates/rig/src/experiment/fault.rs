@@ -3,7 +3,7 @@
 use crate::camera::{CameraWaitError, DecodeFrameError, ViewError};
 use crate::dashboard::DashboardError;
 use crate::gcl::{GclLinkError, GclSendError};
-use crate::primary::ScriptError;
+use crate::primary::{PrimaryLinkError, ScriptError};
 use crate::program::{ProgramLimitError, StopReason};
 use crate::robot_state::{RobotMode, SafetyStatus};
 use crate::rtde::{LinkError, WriteError};
@@ -64,9 +64,33 @@ pub enum Fault {
         /// The most that is allowed.
         limit_s: f64,
     },
+    /// The primary interface, without which no program can be sent.
+    #[error("the primary interface: {0}")]
+    Primary(#[from] PrimaryLinkError),
+    /// A force that neither the command nor a slip explains.
+    #[error(
+        "something else moved the tool: {measured_n:.1} N were measured at a command of {desired_n:.1} N, {low_n:.1} to {high_n:.1} N \
+         can come of it"
+    )]
+    Disturbed {
+        /// What was measured along the pull.
+        measured_n: f64,
+        /// What was commanded.
+        desired_n: f64,
+        /// Least that is believed.
+        low_n: f64,
+        /// Most that is believed.
+        high_n: f64,
+    },
     /// A program that could not be sent.
-    #[error("the program: {0}")]
+    #[error("the primary interface: {0}")]
     Script(#[from] ScriptError),
+    /// A program of somebody else runs.
+    #[error("the robot runs a program that nobody here has sent; {waited_s:.1} s were waited for its end")]
+    Busy {
+        /// For how long it was waited.
+        waited_s: f64,
+    },
     /// A program with a number that no program may have.
     #[error("the program: {0}")]
     Program(#[from] ProgramLimitError),
@@ -110,6 +134,14 @@ pub enum Fault {
         /// What its status means.
         meaning: &'static str,
     },
+    /// It moves no more, and did not say that it has finished.
+    #[error("the gripper is in state {state} ({}), and never said that {command} is done", grip_state_name(*.state))]
+    Unfinished {
+        /// What was asked.
+        command: &'static str,
+        /// Its state.
+        state: f64,
+    },
     /// It does not hold the part any more.
     #[error("the gripper is in state {state} ({}) where it should hold the part", grip_state_name(*.state))]
     NotHolding {
@@ -131,6 +163,16 @@ pub enum Fault {
         jaw: Jaw,
         /// The stamp.
         time_s: f64,
+    },
+    /// A camera whose frames come late: they show what was before.
+    #[error(
+        "the {jaw} camera shows the past: what comes now was taken {late_s:.3} s before it was asked for"
+    )]
+    Past {
+        /// Which.
+        jaw: Jaw,
+        /// How long before.
+        late_s: f64,
     },
     /// A frame that is none.
     #[error("the {jaw} camera: {source}")]

@@ -19,6 +19,8 @@ pub struct FrameStamp {
     pub at: Instant,
     /// The camera's clock, where it has one.
     pub device_time_s: Option<f64>,
+    /// The robot's clock when it came.
+    pub robot_time_s: f64,
 }
 
 /// Images with their stamps.
@@ -28,12 +30,11 @@ pub(super) struct Seen {
 }
 
 impl Experiment<'_> {
-    /// The first frame of each camera that comes after this moment. A frame with the stamp of one before it is the past:
-    /// the camera is frozen.
+    /// The first frame of each camera that was taken after this moment, as far as the frames before it say when that was.
     pub(super) fn look_at_gels(&mut self, what: &'static str, before: &[FrameStamp]) -> Result<Seen, Fault> {
-        let asked = Instant::now();
-        let left = self.frame_after(Jaw::Left, asked)?;
-        let right = self.frame_after(Jaw::Right, asked)?;
+        let asked = Asked { at: Instant::now(), robot_time_s: self.robot_time_s()? };
+        let left = self.frame_after(Jaw::Left, &asked, before)?;
+        let right = self.frame_after(Jaw::Right, &asked, before)?;
         let views = self.config.views();
         let image = |jaw: Jaw, frame: &Stamped<Arc<CameraFrame>>| {
             let frame = decode_jpeg(&frame.event.jpeg, &SHIPPED_FRAME_LIMITS)
@@ -46,36 +47,76 @@ impl Experiment<'_> {
             what,
             at: frame.at,
             device_time_s: frame.event.device_time_s,
+            robot_time_s: self.robot_time_at(frame.at),
         };
         let stamps = vec![stamp(Jaw::Left, &left), stamp(Jaw::Right, &right)];
-        for new in &stamps {
-            let same = |old: &&FrameStamp| old.jaw == new.jaw && old.device_time_s == new.device_time_s;
-            if let Some(time_s) = before.iter().find(same).and_then(|old| old.device_time_s) {
-                return Err(Fault::Frozen { jaw: new.jaw, time_s });
-            }
-        }
         Ok(Seen { images, stamps })
     }
 
-    fn frame_after(&mut self, jaw: Jaw, asked: Instant) -> Result<Stamped<Arc<CameraFrame>>, Fault> {
+    fn frame_after(
+        &mut self,
+        jaw: Jaw,
+        asked: &Asked,
+        before: &[FrameStamp],
+    ) -> Result<Stamped<Arc<CameraFrame>>, Fault> {
         let limit = Duration::from_secs_f64(self.config.images.frame_s);
+        let old = before.iter().rfind(|old| old.jaw == jaw);
+        // What came, but was taken before: a frame that waited on its way, or one of a camera that stands still.
+        let mut first_late: Option<f64> = None;
         loop {
             self.look()?;
             let camera = &self.devices.cameras[jaw];
-            if let Some(frame) = camera.newest().filter(|frame| frame.at > asked) {
-                return Ok(frame);
+            let newest = camera.newest();
+            let late = newest
+                .as_ref()
+                .and_then(|frame| Some((asked.late_s(frame, old)?, frame.event.device_time_s?)));
+            if let Some(frame) = newest.as_ref().filter(|frame| frame.at > asked.at) {
+                match late {
+                    Some((_, time_s)) => _ = first_late.get_or_insert(time_s),
+                    None => return Ok(frame.clone()),
+                }
             }
             let wait = |source| Fault::Camera { jaw, source };
             if let Some(end) = camera.ended() {
                 return Err(wait(CameraWaitError::Link(end)));
             }
-            if asked.elapsed() > limit {
+            let waited = asked.at.elapsed();
+            if waited > limit {
                 let limit_s = limit.as_secs_f64();
-                return Err(wait(match camera.newest() {
-                    Some(old) => CameraWaitError::Old { age_s: old.at.elapsed().as_secs_f64(), limit_s },
-                    None => CameraWaitError::None { connected_s: asked.elapsed().as_secs_f64(), limit_s },
-                }));
+                return Err(match (newest, first_late, late) {
+                    (_, Some(first_s), Some((_, time_s))) if first_s == time_s => {
+                        Fault::Frozen { jaw, time_s }
+                    }
+                    (_, Some(_), Some((late_s, _))) => Fault::Past { jaw, late_s },
+                    (Some(old), ..) => {
+                        wait(CameraWaitError::Old { age_s: old.at.elapsed().as_secs_f64(), limit_s })
+                    }
+                    (None, ..) => wait(CameraWaitError::None { connected_s: waited.as_secs_f64(), limit_s }),
+                });
             }
         }
+    }
+
+    /// The robot's clock at a moment of this machine's, to within a reading.
+    fn robot_time_at(&self, at: Instant) -> f64 {
+        let row = self.rows.iter().rfind(|row| row.at <= at).or(self.rows.first());
+        row.map_or(0.0, |row| row.timestamp_s)
+    }
+}
+
+/// When a frame was asked for.
+struct Asked {
+    at: Instant,
+    robot_time_s: f64,
+}
+
+impl Asked {
+    /// How long before that a frame was taken, going by a frame before it; `None` if it was taken after it, or nobody knows. The
+    /// camera's clock and the robot's go equally fast, however far apart they are.
+    fn late_s(&self, frame: &Stamped<Arc<CameraFrame>>, old: Option<&FrameStamp>) -> Option<f64> {
+        let old = old?;
+        let passed_s = frame.event.device_time_s? - old.device_time_s?;
+        let late_s = self.robot_time_s - (old.robot_time_s + passed_s);
+        (late_s > 0.0).then_some(late_s)
     }
 }

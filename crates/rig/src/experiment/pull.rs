@@ -5,7 +5,7 @@ pub use super::images::FrameStamp;
 use super::plan::{GripPoses, grip_command, grip_poses, pull_program};
 use super::robot::RobotRow;
 pub use super::run::LogLine;
-use super::run::{Experiment, RigEvent};
+use super::run::{Experiment, PROGRAM, RigEvent};
 use super::stop::Stopped;
 use crate::gcl::{GclCommand, GripState, Query};
 use crate::program::{PRELOAD_S, Phase, SETTLE_S, StopReason};
@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 /// How long the sensor is read without a load before the grip, by the robot's clock.
 const NO_LOAD_S: f64 = 0.5;
 /// Slack of this machine on what the robot times.
-const SLACK: Duration = Duration::from_secs(5);
+const SLACK: Duration = Duration::from_secs(3);
 /// Height from which the way back is fast.
 const CLEAR_M: f64 = 0.02;
 
@@ -97,10 +97,19 @@ impl Experiment<'_> {
         self.measured(planned, Parts::default(), Some(stopped))
     }
 
-    /// The robot answers and may move, and the jaws are open.
+    /// The robot answers, may move, and runs nobody's program; the gripper takes commands, and the jaws are open.
     pub fn begin(&mut self) -> Result<(), Fault> {
-        self.reading()?;
-        self.look()?;
+        self.ready()?;
+        let began = Instant::now();
+        let idle = self.wait("the end of a program", PROGRAM, |x| {
+            Ok(x.newest().is_some_and(|row| row.at >= began && !row.program_runs()))
+        });
+        idle.map_err(|fault| match fault {
+            Fault::Late { waited_s, .. } => Fault::Busy { waited_s },
+            other => other,
+        })?;
+        // A connection that was cut, whoever had it, is an emergency to a gripper; it keeps what it holds.
+        self.gripper(&GclCommand::AcknowledgeFastStop)?;
         self.clear()
     }
 
@@ -116,12 +125,16 @@ impl Experiment<'_> {
         if seconds > 0.0 {
             self.tell(RigEvent::Step("pause"));
             let until_s = self.robot_time_s()? + seconds;
-            self.wait_until("the pause", until_s)?;
+            self.wait("the pause", Duration::from_secs_f64(seconds) + SLACK, |x| {
+                // Half an hour of readings that nobody records would fill the memory.
+                x.rows.clear();
+                Ok(x.newest().is_some_and(|row| row.timestamp_s >= until_s))
+            })?;
         }
         Ok(())
     }
 
-    /// Opens jaws that an experiment before this one left closed, and goes up. Only a robot that stands is asked.
+    /// Opens jaws that an experiment before this one left closed, and goes up.
     fn clear(&mut self) -> Result<(), Fault> {
         let state = self.ask_gripper(Query::GripState)?;
         let holds = [GripState::Holding, GripState::PartLost, GripState::NoPart];
@@ -197,6 +210,7 @@ impl Experiment<'_> {
             return Err(Fault::NotHolding { state });
         }
         self.check_gaps(run)?;
+        self.check_force(campaign, planned, run, parts.preload_n)?;
         parts.outcome = self.label(campaign, planned, parts, reason);
         self.retract(&poses)
     }
@@ -253,13 +267,34 @@ impl Experiment<'_> {
 
     /// A pull with missing readings is none.
     fn check_gaps(&self, run: i32) -> Result<(), Fault> {
-        let pulling: Vec<&RobotRow> =
-            self.rows.iter().filter(|r| r.phase_of(run) == Some(Phase::Pulling)).collect();
         let limit_s = self.config.limits.robot_gap_s;
-        for pair in pulling.windows(2) {
+        // The readings before the first and after the last one count: there its beginning or its end would be missing.
+        for pair in self.rows.windows(2) {
+            let pulls = pair.iter().any(|row| row.phase_of(run) == Some(Phase::Pulling));
             let gap_s = pair[1].timestamp_s - pair[0].timestamp_s;
-            if gap_s > limit_s {
+            if pulls && gap_s > limit_s {
                 return Err(Fault::Gap { gap_s, limit_s });
+            }
+        }
+        Ok(())
+    }
+
+    /// A pull in which a hand, a cable or a collision took part is none. Only what is far from any slip, and from any sensor
+    /// that reads up to twice too much, is told from it.
+    fn check_force(
+        &self,
+        campaign: &Campaign,
+        planned: &PlannedPull,
+        run: i32,
+        preload_n: f64,
+    ) -> Result<(), Fault> {
+        let slack_n = 2.0 * campaign.label_tolerance_n;
+        let low_n = preload_n.min(0.0) - slack_n;
+        for row in self.rows.iter().filter(|row| row.phase_of(run) == Some(Phase::Pulling)) {
+            let (measured_n, desired_n) = (self.signed(planned, row.force[2]), row.desired_n);
+            let high_n = 2.0 * desired_n + preload_n.max(0.0) + slack_n;
+            if !(low_n..=high_n).contains(&measured_n) {
+                return Err(Fault::Disturbed { measured_n, desired_n, low_n, high_n });
             }
         }
         Ok(())
@@ -311,11 +346,6 @@ impl Experiment<'_> {
         self.devices.heart.set_go(crate::program::registers::STOP);
         self.end_of_program("the pull", run, SLACK)?;
         self.retract(poses)
-    }
-
-    fn release(&mut self) -> Result<(), Fault> {
-        self.gripper(&GclCommand::Release { pull_back_mm: self.config.gripper.open_mm })?;
-        Ok(())
     }
 
     fn retract(&mut self, poses: &GripPoses) -> Result<(), Fault> {

@@ -88,6 +88,7 @@ pub(super) fn session_plan() -> SessionPlan {
         outputs: OUTPUTS.map(String::from).to_vec(),
         frequency_hz: RATE_HZ,
         inputs: vec![vec![input(registers::HEARTBEAT), input(registers::GO)]],
+        lenient: false,
     }
 }
 

@@ -6,7 +6,7 @@ use super::devices::Devices;
 use super::fault::Fault;
 use super::plan::{motion_program, outside_workspace};
 use super::robot::RobotRow;
-use crate::gcl::{GclCommand, GclEvent, status_meaning};
+use crate::gcl::GclEvent;
 use crate::primary::{PrimaryEvent, RobotMessage};
 use crate::program::{Phase, StopReason, TcpPose};
 use crate::rtde::Event;
@@ -17,11 +17,11 @@ use std::time::{Duration, Instant};
 /// How long one look at the devices waits for news.
 const LOOK: Duration = Duration::from_millis(5);
 /// How long a program may take to begin, or to end when its work is done.
-const PROGRAM: Duration = Duration::from_secs(5);
-/// How long a motion of the gripper may take.
-const GRIPPER: Duration = Duration::from_secs(30);
-/// Slack on the times that the robot itself keeps.
-const SLACK: Duration = Duration::from_secs(3);
+pub(super) const PROGRAM: Duration = Duration::from_secs(3);
+/// Slack on the times that the devices themselves keep.
+pub(super) const SLACK: Duration = Duration::from_secs(3);
+/// Largest number of a run.
+const MOST_RUN: i32 = 1_000_000_000;
 /// A tool that is closer to a pose than this is there.
 const THERE_M: f64 = 1e-4;
 
@@ -89,9 +89,10 @@ impl<'a> Experiment<'a> {
         stop: &'a AtomicBool,
         emit: &'a mut dyn FnMut(RigEvent),
     ) -> Self {
-        // Numbers of runs differ between experiments: an old program's registers are not taken for the new one's.
+        // Numbers of runs differ between experiments: an old program's registers are not taken for the new one's. No run is as
+        // short as a millisecond, so they count up more slowly than the clock that they begin at.
         let clock = HostClock::start();
-        let run = (clock.unix_s(Instant::now()) as i64 % 1_000_000) as i32 * 1000;
+        let run = ((clock.unix_s(Instant::now()) * 1e3) as i64 % i64::from(MOST_RUN)) as i32;
         Self {
             config,
             devices,
@@ -103,7 +104,7 @@ impl<'a> Experiment<'a> {
             emit,
             newest: None,
             heard: Instant::now(),
-            run: run.max(1),
+            run,
             watched: None,
             last_said: None,
         }
@@ -119,7 +120,7 @@ impl<'a> Experiment<'a> {
     }
 
     pub(super) fn next_run(&mut self) -> i32 {
-        self.run = if self.run >= 1_000_000_000 { 1 } else { self.run + 1 };
+        self.run = if self.run >= MOST_RUN { 1 } else { self.run + 1 };
         self.run
     }
 
@@ -149,6 +150,20 @@ impl<'a> Experiment<'a> {
         }
         self.check_program()?;
         Ok(rows)
+    }
+
+    /// The first reading that allows to move. What the dashboard has just switched on is a moment late in the readings.
+    pub(super) fn ready(&mut self) -> Result<(), Fault> {
+        let began = Instant::now();
+        while began.elapsed() < PROGRAM {
+            self.devices.heart.alive();
+            self.take_robot(LOOK)?;
+            let interrupted = self.stop.load(Ordering::SeqCst);
+            if interrupted || self.newest.is_some_and(|row| row.at >= began && row.check().is_ok()) {
+                break;
+            }
+        }
+        self.look().map(|_| ())
     }
 
     /// Takes in what the robot said.
@@ -203,6 +218,10 @@ impl<'a> Experiment<'a> {
                 self.last_said = Some(text);
             }
         }
+        // What the controller announces can be missed; a program that cannot be sent can not.
+        if let Some(end) = self.devices.primary.ended() {
+            return Err(end.into());
+        }
         if let Some(gripper) = &self.devices.gripper {
             while let Ok(event) = gripper.events().try_recv() {
                 self.gripper_events.push(event.event);
@@ -218,8 +237,8 @@ impl<'a> Experiment<'a> {
     fn check_program(&mut self) -> Result<(), Fault> {
         let Some((run, what)) = self.watched else { return Ok(()) };
         let Some(row) = &self.newest else { return Ok(()) };
-        let began = row.run == run;
-        if began && !row.program_runs() && row.phase_of(run) != Some(Phase::Stopped) {
+        // It has begun: another number is that of another program in its place.
+        if row.phase_of(run) != Some(Phase::Stopped) && (row.run != run || !row.program_runs()) {
             self.watched = None;
             return Err(Fault::Ended { what, said: self.last_said.take() });
         }
@@ -331,61 +350,5 @@ impl<'a> Experiment<'a> {
             StopReason::Arrived => Ok(()),
             reason => Err(Fault::BrokenOff { what, reason }),
         }
-    }
-
-    /// Sends a command to the gripper.
-    pub(super) fn tell_gripper(&mut self, command: &GclCommand) -> Result<(), Fault> {
-        self.gripper_events.clear();
-        match &self.devices.gripper {
-            Some(gripper) => Ok(gripper.send(command)?),
-            None => Ok(()),
-        }
-    }
-
-    /// Lets the gripper do something and waits for its end. `Ok(false)`: it found nothing.
-    pub(super) fn gripper(&mut self, command: &GclCommand) -> Result<bool, Fault> {
-        let name = command.name();
-        self.tell_gripper(command)?;
-        let mut found = true;
-        self.wait("the gripper", GRIPPER, |x| {
-            for event in std::mem::take(&mut x.gripper_events) {
-                match event {
-                    GclEvent::Finished(done) if done == name && command.moves() => return Ok(true),
-                    GclEvent::Acknowledged(done) if done == name && !command.moves() => return Ok(true),
-                    // 18: no part at the width.
-                    GclEvent::Failed { status: Some(18), .. } => {
-                        found = false;
-                        return Ok(true);
-                    }
-                    GclEvent::Failed { status, line, .. } => {
-                        let meaning = status.map_or("no status", status_meaning);
-                        return Err(Fault::GripperFailed { line, meaning });
-                    }
-                    _ => {}
-                }
-            }
-            Ok(false)
-        })?;
-        Ok(found)
-    }
-
-    /// Asks the gripper for a value.
-    pub(super) fn ask_gripper(&mut self, query: crate::gcl::Query) -> Result<f64, Fault> {
-        self.tell_gripper(&GclCommand::Ask(query))?;
-        let mut value = None;
-        self.wait("an answer of the gripper", SLACK, |x| {
-            for event in std::mem::take(&mut x.gripper_events) {
-                match event {
-                    GclEvent::Value { name, number } if name == query.name() => value = Some(number),
-                    GclEvent::Failed { status, line, .. } => {
-                        let meaning = status.map_or("no status", status_meaning);
-                        return Err(Fault::GripperFailed { line, meaning });
-                    }
-                    _ => {}
-                }
-            }
-            Ok(value.is_some())
-        })?;
-        Ok(value.unwrap_or(f64::NAN))
     }
 }

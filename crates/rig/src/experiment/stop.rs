@@ -6,6 +6,7 @@
 use super::config::RigConfig;
 use super::devices::connect_listener;
 use super::fault::Fault;
+use super::rest::Rest;
 use super::robot::RobotRow;
 use super::run::Experiment;
 use crate::dashboard::DashboardCommand;
@@ -14,13 +15,11 @@ use crate::rtde::Event;
 use std::time::{Duration, Instant};
 
 /// Longest time of a stop, all of its parts together.
-pub const LONGEST: Duration = Duration::from_secs(4);
+pub const LONGEST: Duration = Duration::from_secs(3);
+/// Time between two attempts to reach a robot that refuses.
+const AGAIN: Duration = Duration::from_millis(100);
 /// How long the dashboard may take.
 const DASHBOARD: Duration = Duration::from_millis(1000);
-/// A tool that is slower than this stands.
-const STILL_M_S: f64 = 1e-3;
-/// For how long, by the robot's clock.
-const STILL_FOR_S: f64 = 0.2;
 
 /// How a stop went.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,20 +60,18 @@ impl Experiment<'_> {
 
     /// Whether the robot says that it stands, within the time that a stop has.
     fn wait_for_rest(&mut self, began: Instant) -> bool {
-        let mut since_s: Option<f64> = None;
+        let (mut rest, mut seen) = (Rest::default(), self.rows.len());
         while began.elapsed() < LONGEST {
             // What the robot says counts, however bad it is. A link that is gone is made anew, to listen only.
             if self.take_robot(Duration::from_millis(20)).is_err() {
-                let left = LONGEST.saturating_sub(began.elapsed());
-                return listen_for_rest(self.config, left);
+                return listen_for_rest(self.config, began);
             }
-            let Some(row) = self.newest() else { continue };
-            if row.at < began {
-                continue;
+            let mut stands = false;
+            for row in self.rows.iter().skip(seen).filter(|row| row.at >= began) {
+                stands = rest.take(row);
             }
-            if row.speed_m_s() > STILL_M_S {
-                since_s = None;
-            } else if row.timestamp_s - *since_s.get_or_insert(row.timestamp_s) >= STILL_FOR_S {
+            seen = self.rows.len();
+            if stands {
                 return true;
             }
         }
@@ -82,19 +79,22 @@ impl Experiment<'_> {
     }
 }
 
-/// Whether the robot says on a new connection that it stands. Nothing is written there.
-fn listen_for_rest(config: &RigConfig, limit: Duration) -> bool {
-    let began = Instant::now();
-    let Ok(robot) = connect_listener(config, limit) else { return false };
-    let mut since_s: Option<f64> = None;
-    while let Some(left) = limit.checked_sub(began.elapsed()) {
-        let Ok(event) = robot.events().recv_timeout(left) else { return false };
-        let Event::Data(values) = event.event else { continue };
-        let Some(row) = RobotRow::from_values(event.at, &values) else { return false };
-        if row.speed_m_s() > STILL_M_S {
-            since_s = None;
-        } else if row.timestamp_s - *since_s.get_or_insert(row.timestamp_s) >= STILL_FOR_S {
-            return true;
+/// Whether the robot says on a new connection that it stands, within the time that the stop which began then has. Nothing is
+/// written there.
+fn listen_for_rest(config: &RigConfig, began: Instant) -> bool {
+    while let Some(left) = LONGEST.checked_sub(began.elapsed()) {
+        let Ok(robot) = connect_listener(config, left) else {
+            std::thread::sleep(AGAIN.min(left));
+            continue;
+        };
+        let mut rest = Rest::default();
+        while let Some(left) = LONGEST.checked_sub(began.elapsed()) {
+            let Ok(event) = robot.events().recv_timeout(left) else { break };
+            let Event::Data(values) = event.event else { continue };
+            let Some(row) = RobotRow::from_values(event.at, &values) else { return false };
+            if rest.take(&row) {
+                return true;
+            }
         }
     }
     false

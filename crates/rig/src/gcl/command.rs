@@ -66,6 +66,11 @@ impl GripState {
         ];
         (0..all.len()).find(|&i| i as f64 == number).map(|i| all[i])
     }
+
+    /// Whether the jaws move.
+    pub fn moves(self) -> bool {
+        matches!(self, GripState::Gripping | GripState::Releasing | GripState::Positioning)
+    }
 }
 
 /// A command.

@@ -2,6 +2,9 @@
 
 use super::value::{FieldType, Value, ValueError};
 
+/// The type of a field by its name, for those that are known.
+pub(super) type KnownTypes = fn(&str) -> Option<FieldType>;
+
 /// Fields of a data frame that the controller has accepted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Recipe {
@@ -52,8 +55,14 @@ pub enum RecipeError {
 }
 
 impl Recipe {
-    /// Reads the controller's answer to `names`.
-    pub(super) fn from_answer(names: &[String], answer: &[u8], with_id: bool) -> Result<Self, RecipeError> {
+    /// Reads the controller's answer to `names`. With a table of `known` fields, an answer that repeats the names has the
+    /// table's types.
+    pub(super) fn from_answer(
+        names: &[String],
+        answer: &[u8],
+        with_id: bool,
+        known: Option<KnownTypes>,
+    ) -> Result<Self, RecipeError> {
         let unreadable = || RecipeError::Answer { bytes: answer.len() };
         let (id, types) = match answer {
             types if !with_id => (None, types),
@@ -75,8 +84,9 @@ impl Recipe {
         if !taken.is_empty() {
             return Err(RecipeError::InUse { names: taken });
         }
+        let table = known.filter(|_| names.iter().zip(&types).all(|(name, found)| name == found));
         let fields = names.iter().zip(&types).map(|(name, found)| {
-            let kind = FieldType::from_name(found);
+            let kind = table.map_or_else(|| FieldType::from_name(found), |type_of| type_of(name));
             let unknown = || RecipeError::Type { name: name.clone(), found: found.to_string() };
             Ok((name.clone(), kind.ok_or_else(unknown)?))
         });
@@ -95,11 +105,15 @@ impl Recipe {
 
     /// Reads the values of a data frame; `None` if it has another number or length.
     pub(super) fn read(&self, payload: &[u8]) -> Option<Vec<Value>> {
-        let mut rest = match (self.id, payload) {
-            (None, rest) => rest,
-            (Some(id), [found, rest @ ..]) if *found == id => rest,
-            _ => return None,
-        };
+        match (self.id, payload) {
+            (None, values) => self.read_values(values),
+            (Some(id), [found, values @ ..]) if *found == id => self.read_values(values),
+            _ => None,
+        }
+    }
+
+    /// Reads the values of a data frame behind its number; `None` if it has another length.
+    pub(super) fn read_values(&self, mut rest: &[u8]) -> Option<Vec<Value>> {
         if rest.len() != self.size() {
             return None;
         }

@@ -12,6 +12,7 @@ fn plan() -> SessionPlan {
         outputs: vec!["timestamp".into(), "actual_TCP_force".into()],
         frequency_hz: 500.0,
         inputs: vec![vec!["input_double_register_24".into()]],
+        lenient: false,
     }
 }
 

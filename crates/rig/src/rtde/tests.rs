@@ -14,6 +14,7 @@ fn plan(outputs: &str, inputs: &[&str]) -> SessionPlan {
         outputs: names(outputs),
         frequency_hz: 500.0,
         inputs: inputs.iter().map(|i| names(i)).collect(),
+        lenient: false,
     }
 }
 
@@ -63,7 +64,7 @@ fn a_session_sends_the_published_bytes() {
 
 #[test]
 fn the_published_data_frames_have_the_published_values() {
-    let recipe = Recipe::from_answer(&names("a,b"), b"\x01DOUBLE,DOUBLE", true).unwrap();
+    let recipe = Recipe::from_answer(&names("a,b"), b"\x01DOUBLE,DOUBLE", true, None).unwrap();
     let data = bytes("0014550140d0070d2f1a9fbe3ff0000000000000");
     let values = recipe.read(&data[3..]).unwrap();
     let [Value::Double(a), Value::Double(b)] = values[..] else { panic!("{values:?}") };
@@ -94,7 +95,7 @@ fn every_type_comes_back_as_it_was_sent() {
     ];
     let types: Vec<&str> = values.iter().map(|v| v.field_type().name()).collect();
     let answer = [&[9][..], types.join(",").as_bytes()].concat();
-    let recipe = Recipe::from_answer(&vec!["x".to_string(); 10], &answer, true).unwrap();
+    let recipe = Recipe::from_answer(&vec!["x".to_string(); 10], &answer, true, None).unwrap();
     let payload = recipe.write(&values).unwrap();
     assert_eq!(payload.len(), 1 + recipe.size());
     assert_eq!(recipe.read(&payload).unwrap(), values);
@@ -151,7 +152,8 @@ fn an_old_controller_is_spoken_to_in_protocol_1() {
 
 #[test]
 fn what_a_controller_refuses_is_named() {
-    let refused = |answer: &[u8]| Recipe::from_answer(&names("a,b"), answer, true).unwrap_err().to_string();
+    let refused =
+        |answer: &[u8]| Recipe::from_answer(&names("a,b"), answer, true, None).unwrap_err().to_string();
     assert_eq!(refused(b"\0NOT_FOUND,VECTOR6D"), "the controller does not know a");
     assert_eq!(refused(b"\0IN_USE,IN_USE"), "another client, or a fieldbus, has a, b");
     assert_eq!(refused(b"\x01DOUBLE"), "the controller answers with 1 types to 2 names");

@@ -123,6 +123,11 @@ impl Arm {
         self.drive = if finite { drive } else { Drive::Stop };
     }
 
+    /// Whether it is in force mode.
+    pub fn applies_force(&self) -> bool {
+        matches!(self.drive, Drive::Force { .. })
+    }
+
     /// Brakes, if it moves.
     pub fn stop(&mut self) {
         self.drive = Drive::Stop;
@@ -170,10 +175,11 @@ impl Arm {
 
     /// The sensor without noise, not zeroed: load on the tool along z.
     fn load_n(&self, time_s: f64) -> f64 {
-        match &self.pulling {
+        let without_mass_n = match &self.pulling {
             Some(p) => -p.direction * p.reading.measured_n,
-            None => -self.plant.offset_n(time_s) - self.hung_mass_kg * GRAVITY_M_S2,
-        }
+            None => -self.plant.offset_n(time_s),
+        };
+        without_mass_n - self.hung_mass_kg * GRAVITY_M_S2
     }
 
     /// One control step of physics.

@@ -14,7 +14,7 @@ use plant::Spring;
 use std::sync::Arc;
 
 #[path = "../../tests/common/plant.rs"]
-mod plant;
+pub(super) mod plant;
 
 mod pulls;
 

@@ -1,8 +1,7 @@
 //! RTDE as a controller speaks it, without a socket: bytes in, bytes out, data frames when they are due.
 
 use super::controller::Controller;
-use super::robot::input_type;
-use crate::rtde::{FieldType, Frame, FrameError, Framer, Kind, Value, encode_frame};
+use crate::rtde::{FieldType, Frame, FrameError, Framer, Kind, Value, encode_frame, input_type, output_type};
 use std::collections::BTreeMap;
 
 /// Version of the controller that the virtual rig says it is: major, minor, bugfix, build.
@@ -141,7 +140,7 @@ impl RtdeServer {
             Kind::ControllerVersion => {
                 Some(CONTROLLER_VERSION.iter().flat_map(|n| n.to_be_bytes()).collect())
             }
-            Kind::SetUpOutputs => Some(self.set_up_outputs(payload, controller).ok_or_else(wrong)?),
+            Kind::SetUpOutputs => Some(self.set_up_outputs(payload).ok_or_else(wrong)?),
             Kind::SetUpInputs => Some(self.set_up_inputs(payload, owners).ok_or_else(wrong)?),
             Kind::Start => {
                 self.started = !self.outputs.is_empty();
@@ -160,7 +159,7 @@ impl RtdeServer {
         })
     }
 
-    fn set_up_outputs(&mut self, payload: &[u8], controller: &Controller) -> Option<Vec<u8>> {
+    fn set_up_outputs(&mut self, payload: &[u8]) -> Option<Vec<u8>> {
         let (rate_hz, names) = match self.protocol {
             1 => (FULL_RATE_HZ, payload),
             _ => {
@@ -169,10 +168,8 @@ impl RtdeServer {
             }
         };
         let names = names_of(names)?;
-        let types: Vec<&str> = names
-            .iter()
-            .map(|name| controller.robot().output(name).map_or("NOT_FOUND", |v| v.field_type().name()))
-            .collect();
+        let types: Vec<&str> =
+            names.iter().map(|name| output_type(name).map_or("NOT_FOUND", FieldType::name)).collect();
         let known = !types.contains(&"NOT_FOUND") && !names.is_empty();
         let mut answer = if self.protocol > 1 { vec![u8::from(known)] } else { vec![] };
         answer.extend(types.join(",").bytes());

@@ -1,15 +1,11 @@
 //! What clients do to a controller: published byte sequences, the checklist of four public clients, and the crate's own client.
 
 use super::controller::Controller;
-use super::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
+use super::controller_tests::plant::Spring;
 use super::rtde::{InputOwners, RtdeServer};
 use crate::program::TcpPose;
 use crate::rtde::{Event, Kind, Link, SessionError, SessionPlan, Value, encode_frame};
-use gripgen_twin::{PerJaw, TactileImage};
 use std::sync::Arc;
-
-#[path = "../../tests/common/plant.rs"]
-mod plant;
 
 const TWO: &[u8] = &[0, 5, b'V', 0, 2];
 
@@ -22,7 +18,7 @@ struct Served {
 
 fn served() -> Served {
     let tcp = TcpPose { position_m: [0.3, 0.0, 0.2], rotation_rad: [0.0; 3] };
-    let controller = Controller::new(Arc::new(plant::Spring::default()), tcp, 1.0);
+    let controller = Controller::new(Arc::new(Spring::default()), tcp, 1.0);
     Served { controller, owners: InputOwners::default(), server: RtdeServer::new(1) }
 }
 
@@ -216,6 +212,7 @@ fn the_client_of_this_crate_has_whole_sessions() {
         outputs: ["timestamp", "actual_TCP_pose", "input_int_register_24"].map(String::from).to_vec(),
         frequency_hz: 250.0,
         inputs: vec![vec!["input_int_register_24".into()], vec!["input_double_register_24".into()]],
+        lenient: false,
     };
     let (mut s, mut link) = (served(), Link::new(plan.clone()).unwrap());
     let mut values = Vec::new();

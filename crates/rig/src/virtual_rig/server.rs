@@ -1,4 +1,8 @@
 //! The virtual rig on loopback: its ports, its clock.
+//!
+//! The primary and the secondary port take programs and send messages, and the robot's mode ten times a second of the
+//! controller's clock. Of the other states that a controller sends there they have none. The real-time port takes programs and
+//! sends nothing: its state packets are out of date beside RTDE, and no client of this rig reads them.
 
 mod ports;
 mod socket;
@@ -8,11 +12,13 @@ mod tests;
 pub use socket::{RigStatus, ServeError, ServeOptions, ServedRig};
 
 use crate::primary::{
-    ErrorCodeMessage, KeyMessage, MessageHeader, PROGRAM_STARTED, PROGRAM_STOPPED, SafetyModeMessage,
-    VersionMessage, encode_error_code_message, encode_key_message, encode_safety_mode_message,
-    encode_version_message,
+    ErrorCodeMessage, KeyMessage, MessageHeader, PROGRAM_STARTED, PROGRAM_STOPPED, RobotModeData,
+    SafetyModeMessage, VersionMessage, encode_error_code_message, encode_key_message, encode_robot_mode_data,
+    encode_safety_mode_message, encode_version_message,
 };
-use crate::virtual_rig::controller::Announcement;
+use crate::robot_state::SafetyStatus;
+use crate::virtual_rig::controller::{Announcement, Controller};
+use crate::virtual_rig::robot::RuntimeState;
 use crate::virtual_rig::rtde::CONTROLLER_VERSION;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
@@ -27,7 +33,7 @@ pub struct RigAddresses {
     pub primary: SocketAddr,
     /// The secondary interface.
     pub secondary: SocketAddr,
-    /// The real-time interface: it takes programs.
+    /// The real-time interface: it takes programs and sends nothing.
     pub real_time: SocketAddr,
     /// The gripper.
     pub gripper: SocketAddr,
@@ -104,9 +110,37 @@ fn version_message() -> Vec<u8> {
     encode_version_message(MessageHeader { device_ticks: u64::MAX, source: -2 }, &version)
 }
 
+/// The controller's clock, as the primary interface has it here.
+fn device_ticks(time_s: f64) -> u64 {
+    (time_s * 1e6) as u64
+}
+
+/// The robot's mode as a packet of the primary interface.
+fn robot_mode_packet(controller: &Controller) -> Vec<u8> {
+    use SafetyStatus::{ProtectiveStop, RobotEmergencyStop, SystemEmergencyStop};
+    let robot = controller.robot();
+    encode_robot_mode_data(&RobotModeData {
+        device_ticks: device_ticks(robot.timestamp_s),
+        // The controller believes that its arm is real, as on a rig.
+        real_robot_connected: true,
+        real_robot_enabled: true,
+        power_on: robot.status_bits() & 1 == 1,
+        emergency_stopped: matches!(robot.safety, RobotEmergencyStop | SystemEmergencyStop),
+        protective_stopped: robot.safety == ProtectiveStop,
+        program_running: robot.runtime == RuntimeState::Playing,
+        program_paused: robot.runtime == RuntimeState::Paused,
+        mode_number: robot.mode.number() as i8,
+        // 2 is force, 0 position.
+        control_mode: if controller.arm().applies_force() { 2 } else { 0 },
+        target_speed_fraction: 1.0,
+        speed_scaling: 1.0,
+        target_speed_fraction_limit: 1.0,
+    })
+}
+
 /// An announcement as a message of the primary interface.
 fn announcement_message(announcement: &Announcement, time_s: f64) -> Vec<u8> {
-    let header = MessageHeader { device_ticks: (time_s * 1e6) as u64, source: -2 };
+    let header = MessageHeader { device_ticks: device_ticks(time_s), source: -2 };
     let key = |title: &str, text: &str| {
         let key = KeyMessage { code: 0, argument: 0, title: title.into(), text: text.into() };
         encode_key_message(header, &key)

@@ -20,6 +20,9 @@ const GROWS: usize = 3;
 /// What a parser does with a piece; no more is read after `false`.
 type Take = Box<dyn FnMut(&[u8]) -> bool>;
 
+/// What it is, who hears it, how it begins and goes on, and the most bytes that may be held for it.
+type Stream<'a> = (&'a str, Take, &'a [u8], &'a [u8], usize);
+
 /// Feeds `first`, then `again` for ever; the most that was held. What may become large is fed in larger pieces.
 fn feed(mut take: Take, first: &[u8], again: &[u8], allowed: usize) -> usize {
     let size = if allowed > 2 << 20 { LARGE_PIECE } else { PIECE };
@@ -37,7 +40,12 @@ fn feed(mut take: Take, first: &[u8], again: &[u8], allowed: usize) -> usize {
 }
 
 fn link() -> Take {
-    let plan = SessionPlan { outputs: vec!["timestamp".into()], frequency_hz: 500.0, inputs: vec![] };
+    let plan = SessionPlan {
+        outputs: vec!["timestamp".into()],
+        frequency_hz: 500.0,
+        inputs: vec![],
+        lenient: false,
+    };
     let mut link = Link::new(plan).unwrap();
     Box::new(move |bytes| link.receive(bytes).is_ok())
 }
@@ -106,7 +114,7 @@ fn nothing_grows_with_a_stream_without_end() {
     // What a piece becomes is there beside what is kept: events and answers of 1 KiB.
     let given = 160 * PIECE;
     let (frame, headers) = (GROWS * (65_536 + 65_536 + PIECE), GROWS * (8 * 1024 + PIECE));
-    let streams: [(&str, Take, &[u8], &[u8], usize); 16] = [
+    let streams: [Stream; 16] = [
         ("texts to the client of RTDE", link(), &[], &short_text, frame + given),
         ("long texts", link(), &[], &long_text, frame + given + 4 * 65_536),
         ("texts to the server of RTDE", server(), &[], &short_text, frame + given),

@@ -92,7 +92,7 @@ fn change(random: &mut Random, corpus: &[Vec<u8>], bytes: &mut Vec<u8>) {
     match random.below(10) {
         0 | 1 if !bytes.is_empty() => bytes[at] ^= 1 << random.below(8),
         2 if !bytes.is_empty() => {
-            bytes[at] = *random.pick(&[0, 1, 2, 3, 9, 10, 13, 32, 0x7f, 0x80, 0xfe, 0xff])
+            bytes[at] = *random.pick(&[0, 1, 2, 3, 9, 10, 13, 32, 0x7f, 0x80, 0xfe, 0xff]);
         }
         // Where a length may stand: two or four bytes, near a right one or far from it.
         3 => {

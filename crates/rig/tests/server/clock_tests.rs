@@ -26,8 +26,8 @@ const NAMES: [&str; 13] = [
 
 fn client(address: SocketAddr) -> RtdeClient {
     let outputs = NAMES.map(String::from).to_vec();
-    RtdeClient::connect(address, &SessionPlan { outputs, frequency_hz: 500.0, inputs: vec![] }, TIMEOUT)
-        .unwrap()
+    let plan = SessionPlan { outputs, frequency_hz: 500.0, inputs: vec![], lenient: false };
+    RtdeClient::connect(address, &plan, TIMEOUT).unwrap()
 }
 
 /// Counts data frames, each a control step after the one before.

@@ -3,7 +3,8 @@
 use super::{TIMEOUT, serve};
 use gripgen_rig::camera::{CameraClient, SHIPPED_FRAME_LIMITS, decode_jpeg};
 use gripgen_rig::gcl::{GclClient, GclCommand, GripState, Query, SHIPPED_LIMITS};
-use gripgen_rig::primary::{PrimaryEvent, PrimaryStream, RobotMessage};
+use gripgen_rig::primary::{PrimaryClient, PrimaryEvent, PrimaryStream, RobotMessage};
+use gripgen_rig::robot_state::RobotMode;
 use gripgen_rig::virtual_rig::faults::Fault;
 use gripgen_rig::virtual_rig::server::ServedRig;
 use gripgen_twin::Jaw;
@@ -139,5 +140,38 @@ fn every_script_port_takes_programs_and_the_primary_one_tells() {
         TcpStream::connect(port).unwrap().write_all(script.as_bytes()).unwrap();
         let RobotMessage::ErrorCode(error) = next() else { panic!("{name}") };
         assert!(error.text.contains(&format!("def {name}():")), "{}", error.text);
+    }
+}
+
+#[test]
+fn the_mode_of_the_robot_comes_ten_times_a_second() {
+    let rig = serve(1.0);
+    let at = rig.addresses();
+    let connect = |address| PrimaryClient::connect(address, TIMEOUT).unwrap();
+    let clients = [connect(at.primary), connect(at.secondary)];
+    let newest = |client: &PrimaryClient| client.newest_mode().map(|mode| mode.event);
+    wait_for("the first mode", || clients.iter().all(|client| newest(client).is_some()));
+    for client in &clients {
+        let mode = newest(client).unwrap();
+        assert_eq!(mode.mode(), Some(RobotMode::Running));
+        assert!(mode.power_on && !mode.emergency_stopped && !mode.program_running, "{mode:?}");
+        // Packets are a tenth of a second of the controller's clock apart.
+        let before = mode.device_ticks;
+        wait_for("the next mode", || newest(client).unwrap().device_ticks > before);
+        let next = newest(client).unwrap().device_ticks - before;
+        assert!((next + 5) % 100_000 < 10, "{next} us");
+    }
+    let real_time = TcpStream::connect(at.real_time).unwrap();
+    real_time.set_read_timeout(Some(Duration::from_millis(300))).unwrap();
+    assert!((&real_time).read(&mut [0; 16]).is_err(), "the real-time port is silent");
+
+    rig.inject(Fault::EmergencyStop);
+    for client in &clients {
+        wait_for("the stop", || newest(client).unwrap().emergency_stopped);
+        let mode = newest(client).unwrap();
+        assert!(mode.mode() == Some(RobotMode::PowerOff) && !mode.power_on, "{mode:?}");
+        // The mode is an event where it changes, beside the version and the safety message.
+        let modes = client.events().try_iter().filter(|e| matches!(e.event, PrimaryEvent::RobotMode(_)));
+        assert_eq!((modes.count(), client.skipped(), client.events_lost()), (2, 0, 0));
     }
 }

@@ -26,27 +26,27 @@ pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
     check(&config, &mut tell);
     tell(free_space());
     failed?;
-    let mut force = Value::Null;
+    let (mut force, mut force_ok) = (Value::Null, true);
     if let Some(mass_kg) = args.mass_kg {
         let hang = || eprintln!("hang {mass_kg} kg on the tool now, and let it come to rest");
         let found = check_force(&config, mass_kg, hang).map_err(Failure::new)?;
+        force_ok =
+            found.sign == config.robot.force_sign && (found.gain - config.robot.force_gain).abs() < 0.05;
         force = json!({"change_n": found.change_n, "weight_n": found.weight_n, "force_sign": found.sign, "force_gain": found.gain});
         if !on_stdout {
             let words = format!(
                 "the reading changed by {:.2} N for {:.2} N: force_sign = {:.1}, force_gain = {:.3}",
                 found.change_n, found.weight_n, found.sign, found.gain
             );
-            let same =
-                found.sign == config.robot.force_sign && (found.gain - config.robot.force_gain).abs() < 0.05;
-            let verdict = if same { "as in the rig's file" } else { "set them in the rig's file" };
+            let verdict = if force_ok { "as in the rig's file" } else { "set them in the rig's file" };
             print(&format!(
                 "{}  {:<18} {words}; {verdict}\n",
-                if same { "ok " } else { "BAD" },
+                if force_ok { "ok " } else { "BAD" },
                 "force sign"
             ))?;
         }
     }
-    let ok = lines.iter().all(|line| line.ok);
+    let ok = force_ok && lines.iter().all(|line| line.ok);
     let entries: Vec<Value> =
         lines.iter().map(|l| json!({"what": l.what, "ok": l.ok, "found": l.found})).collect();
     sink.document(&json!({"schema": "gripgen.rigcheck/1", "ok": ok, "checks": entries, "force": force}))?;

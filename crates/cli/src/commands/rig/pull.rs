@@ -236,8 +236,10 @@ impl Job<'_> {
         };
         let recorded = Recorded { outcome: measured.outcome.clone(), stopped: measured.stopped.clone() };
         let standing = clock.standing(place, &measured);
-        self.live.borrow_mut().pulled(&standing, &measured)?;
+        // A pull is recorded, whether or not somebody still listens.
+        let told = self.live.borrow_mut().pulled(&standing, &measured);
         self.record(standing, measured)?;
+        told?;
         Ok(recorded)
     }
 

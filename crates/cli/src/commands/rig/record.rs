@@ -1,7 +1,7 @@
 //! From what the rig measured to what the recorder stores.
 
 use gripgen::record::{RigLog, RigLogEvent, RigPull, RigResult, RigStream};
-use gripgen::twin::{Campaign, Covariates, Jaw, PlannedPull, PullSettings, Scenario};
+use gripgen::twin::{Campaign, Covariates, Jaw, PlannedPull, PullKind, PullSettings, Scenario};
 use gripgen_rig::experiment::pull::{FrameStamp, MeasuredPull};
 use gripgen_rig::experiment::{PullOutcome, RigConfig, RobotRow};
 use std::collections::BTreeMap;
@@ -68,12 +68,13 @@ fn scenario(
     planned: &PlannedPull,
     dwell_s: f64,
 ) -> Scenario {
+    let (group, repetition) = group_of(campaign, standing.index as usize);
     let thousandth = |x: f64| (x * 1e3).round() * 1e-3;
     Scenario {
         seed: 0,
         index: standing.index,
-        group: standing.index,
-        repetition: 0,
+        group,
+        repetition,
         part: planned.part.clone(),
         grip_pose: 0,
         grip_force_n: planned.grip_force_n,
@@ -100,6 +101,24 @@ fn scenario(
         },
         drawn: BTreeMap::new(),
     }
+}
+
+/// The first pull of the campaign with the same settings, and how many of them come before this one: repetitions stay together
+/// when data are split by group.
+fn group_of(campaign: &Campaign, index: usize) -> (u64, u64) {
+    let pulls: Vec<&PlannedPull> = campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).collect();
+    let Some(mine) = pulls.get(index) else { return (index as u64, 0) };
+    let same = |p: &PlannedPull| {
+        let alike = PlannedPull {
+            pause_s: mine.pause_s,
+            session: mine.session.clone(),
+            gel_id: mine.gel_id.clone(),
+            ..p.clone()
+        };
+        alike == **mine
+    };
+    let first = pulls.iter().position(|p| same(p)).unwrap_or(index);
+    (first as u64, pulls[..index].iter().filter(|p| same(p)).count() as u64)
 }
 
 fn robot(rows: &[RobotRow], unix_s: &[f64]) -> RigStream {
@@ -155,4 +174,24 @@ fn camera(jaw: Jaw, m: &MeasuredPull) -> Option<RigStream> {
         device_time_s: device.unwrap_or_default(),
         columns: vec![("is_grip".into(), is_grip)],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn repetitions_are_one_group() {
+        let pull = |part: &str, session: &str| PlannedPull {
+            part: part.into(),
+            grip_force_n: 20.0,
+            session: session.into(),
+            ..PlannedPull::default()
+        };
+        let pause = PlannedPull { kind: PullKind::NoLoad, ..PlannedPull::default() };
+        let pulls = vec![pause, pull("a", "1"), pull("b", "1"), pull("a", "2"), pull("a", "2")];
+        let campaign = Campaign { label_tolerance_n: 3.0, stop_m: 5e-3, feedback: None, pulls };
+        let groups: Vec<(u64, u64)> = (0..4).map(|i| group_of(&campaign, i)).collect();
+        assert_eq!(groups, [(0, 0), (1, 0), (0, 1), (0, 2)]);
+    }
 }

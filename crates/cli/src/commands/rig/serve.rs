@@ -47,6 +47,7 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
         // The R1.5 sends portrait frames.
         view: CameraView { rotate_deg: 90, mirror: false, crop_px: None, size_px: [320, 240] },
     };
+    let stop = stop_flag("ending the virtual rig");
     let rig = ServedRig::start(Arc::new(plant), &options).map_err(|e| refused(&e))?;
     let addresses = rig.addresses();
     // Before the line that says ready: who waits for that line finds the file.
@@ -65,7 +66,6 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     if !args.talk.quiet {
         eprintln!("Ctrl-C ends the virtual rig");
     }
-    let stop = stop_flag("ending the virtual rig");
     let (tell, told) = channel();
     if args.faults {
         std::thread::spawn(move || {

@@ -1,7 +1,7 @@
 //! Starting, the clock, and what stops it.
 
 use super::ports::socket::Shared;
-use super::{RigAddresses, announcement_message};
+use super::{RigAddresses, announcement_message, robot_mode_packet};
 use crate::camera::CameraView;
 use crate::gcl::GripState;
 use crate::program::TcpPose;
@@ -22,6 +22,8 @@ use std::time::{Duration, Instant};
 const NAP: Duration = Duration::from_millis(1);
 /// A clock that is further behind than this, in real time, gives up what it lost: the rig then runs slower than asked.
 const MOST_BEHIND_S: f64 = 0.25;
+/// Control steps between two packets with the robot's mode: ten a second.
+const STEPS_A_MODE: u64 = 50;
 /// Control steps without a look at the clients.
 const STEPS_AT_ONCE: u64 = 64;
 
@@ -202,6 +204,9 @@ fn run_clock(shared: &Shared, ask: &Sender<GripRequest>) {
             let time_s = world.controller.robot().timestamp_s;
             for announcement in told.robot {
                 shared.announce(&announcement_message(&announcement, time_s));
+            }
+            if world.step_number().is_multiple_of(STEPS_A_MODE) {
+                shared.announce(&robot_mode_packet(&world.controller));
             }
         }
         let request = world.take_grip_request();

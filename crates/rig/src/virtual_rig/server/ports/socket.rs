@@ -221,7 +221,7 @@ impl Shared {
         });
     }
 
-    /// Primary and secondary interface: who the controller is, what it announces; and they take programs.
+    /// Primary and secondary interface: who the controller is, what it announces, its robot's mode; and they take programs.
     fn serve_messages(&self, stream: TcpStream) {
         let Some(outbox) = self.outbox(&stream, Device::Script) else { return };
         outbox.push(version_message());
@@ -229,6 +229,7 @@ impl Shared {
         self.take_programs(stream, &outbox);
     }
 
+    /// Real-time interface: it takes programs and sends nothing.
     fn serve_script(&self, stream: TcpStream) {
         let Some(outbox) = self.outbox(&stream, Device::Script) else { return };
         self.take_programs(stream, &outbox);

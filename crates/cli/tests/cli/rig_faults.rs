@@ -1,0 +1,140 @@
+//! `gripgen rig pull` when something goes wrong in the middle: what it says, what it leaves, and that it goes on.
+
+use super::rig_served::Served;
+use super::{assert_code, run, text};
+use gripgen::record::{RunFolder, ShardReader, status_name};
+use std::path::Path;
+use std::time::Duration;
+
+/// No fault holds the robot's client up for longer.
+const LONGEST: Duration = Duration::from_secs(5);
+const SPEED: [&str; 2] = ["--speed", "20"];
+
+/// Status and failure of each pull of a folder; `None` where there is none.
+fn pulls(out: &Path) -> Vec<Option<(String, String)>> {
+    let folder = RunFolder::open(out).unwrap();
+    let pull = |index: u64| {
+        // A shard without its sidecar is half written: it is taken for none.
+        let done = folder.sidecar_path(index).exists();
+        done.then(|| {
+            let (sample, _) = ShardReader::open(&folder.shard_path(index)).unwrap().pull(index).unwrap();
+            (status_name(sample.status()).to_string(), sample.failure)
+        })
+    };
+    (0..folder.info().shards).map(pull).collect()
+}
+
+fn statuses(out: &Path) -> Vec<String> {
+    pulls(out).into_iter().map(|pull| pull.map_or("missing".into(), |(status, _)| status)).collect()
+}
+
+/// Counts of `gripgen info`: done, missing, failed. And `verify` finds nothing wrong.
+#[track_caller]
+fn assert_counts(out: &Path, counts: [u64; 3]) {
+    let info = run(&["info", out.to_str().unwrap(), "--json"]);
+    assert_code(&info, 0);
+    let json: serde_json::Value = serde_json::from_slice(&info.stdout).unwrap();
+    assert_eq!(["done", "missing", "failed"].map(|key| json[key].as_u64().unwrap()), counts, "{json}");
+    assert_code(&run(&["verify", out.to_str().unwrap()]), 0);
+}
+
+#[test]
+fn an_emergency_stop_fails_one_pull_and_the_same_command_finishes_the_campaign() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("lab");
+    let mut rig = Served::start(&SPEED);
+    let mut pulling = rig.pull(&out, 3, &[]);
+    pulling.until(&["2/3", ": pulling"]);
+    rig.inject("estop");
+    assert!(pulling.ends_with(1) < LONGEST);
+    let said = &pulling.said;
+    assert!(
+        said.contains("ROBOT_EMERGENCY_STOP; the robot stands still, the gripper keeps what it holds"),
+        "{said}"
+    );
+    assert_eq!(statuses(&out), ["slipped", "failed", "missing"], "{said}");
+    let failure = pulls(&out).remove(1).unwrap().1;
+    assert_eq!(failure, "the robot is in ROBOT_EMERGENCY_STOP");
+    assert_counts(&out, [2, 1, 1]);
+
+    // The button is still pressed; then it is released, and nobody has allowed power.
+    let mut refused = rig.pull(&out, 3, &["--power-on"]);
+    refused.ends_with(1);
+    assert!(refused.said.contains("ROBOT_EMERGENCY_STOP: this is left to a person"), "{}", refused.said);
+    rig.inject("release-estop");
+    while !rig.found("robot").starts_with("POWER_OFF, NORMAL") {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let mut refused = rig.pull(&out, 3, &[]);
+    refused.ends_with(1);
+    assert!(refused.said.contains("allow --power-on"), "{}", refused.said);
+    assert_eq!(statuses(&out), ["slipped", "failed", "missing"]);
+
+    rig.pull(&out, 3, &["--power-on"]).ends_with(0);
+    assert_eq!(statuses(&out), ["slipped"; 3]);
+    assert_counts(&out, [3, 0, 0]);
+}
+
+#[test]
+fn a_protective_stop_is_left_only_when_somebody_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("lab");
+    let mut rig = Served::start(&SPEED);
+    let mut pulling = rig.pull(&out, 1, &[]);
+    pulling.until(&["1/1", ": the way down"]);
+    rig.inject("protective-stop");
+    assert!(pulling.ends_with(1) < LONGEST);
+    assert!(pulling.said.contains("PROTECTIVE_STOP; the robot stands still"), "{}", pulling.said);
+    let place = rig.place();
+    let mut refused = rig.pull(&out, 1, &["--power-on"]);
+    refused.ends_with(1);
+    assert!(refused.said.contains("allow --unlock"), "{}", refused.said);
+    assert!(rig.found("robot").contains("PROTECTIVE_STOP") && rig.place() == place, "nothing moved");
+    // A robot is locked for five seconds, by its own clock.
+    std::thread::sleep(Duration::from_millis(300));
+    rig.pull(&out, 1, &["--unlock"]).ends_with(0);
+    assert_eq!(statuses(&out), ["slipped"]);
+}
+
+#[test]
+fn ctrl_c_stops_the_robot_and_the_same_command_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("lab");
+    let rig = Served::start(&SPEED);
+    let mut pulling = rig.pull(&out, 2, &[]);
+    pulling.until(&["2/2", ": pulling"]);
+    pulling.interrupt();
+    assert!(pulling.ends_with(130) < LONGEST);
+    assert!(pulling.said.contains("interrupted; the robot stands still"), "{}", pulling.said);
+    assert!(rig.found("robot").ends_with("program stopped"));
+    assert_eq!(statuses(&out), ["slipped", "failed"]);
+    rig.pull(&out, 2, &[]).ends_with(0);
+    assert_eq!(statuses(&out), ["slipped"; 2]);
+}
+
+/// SIGKILL: nobody says stop, nobody says goodbye.
+#[test]
+fn a_host_that_dies_stops_the_robot_and_leaves_no_half_pull() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("lab");
+    let rig = Served::start(&SPEED);
+    for moment in [": pulling", ": gripping", ": the way down"] {
+        let mut pulling = rig.pull(&out, 2, &[]);
+        pulling.until(&["2/2", moment]);
+        pulling.process.kill().unwrap();
+        pulling.end();
+        // Three times as long as the watchdog needs.
+        std::thread::sleep(Duration::from_millis(300));
+        let place = rig.place();
+        if moment == ": pulling" {
+            assert!(rig.found("robot").ends_with("program stopped"));
+        }
+        assert_eq!(rig.place(), place, "{moment}: it stands");
+        assert_eq!(statuses(&out), ["slipped", "missing"], "{moment}");
+        assert_counts(&out, [1, 1, 0]);
+    }
+    rig.pull(&out, 2, &[]).ends_with(0);
+    assert_eq!(statuses(&out), ["slipped"; 2]);
+    let table = run(&["info", out.to_str().unwrap()]);
+    assert!(text(&table.stdout).contains("2 of 2 pulls"), "{}", text(&table.stdout));
+}
