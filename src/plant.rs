@@ -305,6 +305,6 @@ mod tests {
         let gripgen_twin::Outcome::Pulled(pulled) = outcome.unwrap() else { panic!("it slips") };
         let peak = pulled.trace.measured_force_n.iter().copied().fold(0.0, f64::max);
         assert_eq!(largest_n, peak);
-        assert!((tick as f64 * 0.002 - pulled.trace.time_s.last().unwrap()).abs() < 0.005);
+        assert!((f64::from(tick) * 0.002 - pulled.trace.time_s.last().unwrap()).abs() < 0.005);
     }
 }

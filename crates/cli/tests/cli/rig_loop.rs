@@ -96,7 +96,7 @@ fn an_undeclared_effect_of_a_rig_is_found_over_the_wire_and_the_next_campaign_te
     let rig = Served::start(folder.path());
 
     rig.pull(&at("first"), &["--grip-force-n", "20,30,40", "--repetitions", "5"]);
-    let limit = ["--set", "gripper.max_force_n=40"];
+    let limit = ["--rig", rig.rig.to_str().unwrap()];
     let output = gripgen()
         .args(["diagnose", &path("first"), "-o", &path("found.toml"), "--json", &path("first.json"), "-q"])
         .args(limit)

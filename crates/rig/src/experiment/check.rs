@@ -1,14 +1,16 @@
 //! Does every device answer, and how fast. Nothing moves.
 
 use super::config::RigConfig;
-use super::devices::{connect_camera, connect_dashboard, connect_gripper, connect_listener, connect_primary};
+use super::devices::{
+    connect_camera, connect_dashboard, connect_for, connect_gripper, connect_listener, connect_primary,
+};
 use super::robot::RobotRow;
 use crate::camera::{SHIPPED_FRAME_LIMITS, decode_jpeg};
 use crate::dashboard::{DashboardCommand, DashboardReply};
 use crate::gcl::{GclCommand, GripState, Query};
 use crate::primary::{PrimaryEvent, RobotMessage};
 use crate::robot_state::{RobotMode, SafetyStatus};
-use crate::rtde::{Event, RtdeClient};
+use crate::rtde::{Event, RtdeClient, Value};
 use std::time::{Duration, Instant};
 
 /// How long a device may take.
@@ -103,8 +105,43 @@ fn robot_data(config: &RigConfig) -> Vec<CheckLine> {
         line::<String>("RTDE", Ok((gap_s <= config.limits.robot_gap_s, words))),
         line::<String>("robot", Ok((ready && last.speed_scaling > 0.99, state))),
         line::<String>("tool", Ok((true, format!("at {x:.1}, {y:.1}, {z:.1} mm")))),
+        line("tool offset", tool_offset(config)),
         line::<String>("force", Ok((fx.hypot(fy).hypot(fz) < 20.0, force))),
     ]
+}
+
+/// Grip centre at the flange that the robot counts with, beside that of the rig's file.
+fn tool_offset(config: &RigConfig) -> Result<(bool, String), ReadPoseError> {
+    let found_mm = read_tool_mm(config)?;
+    let words = |mm: [f64; 3]| format!("{:.1}, {:.1}, {:.1} mm", mm[0], mm[1], mm[2]);
+    let (found, wanted) = (words(found_mm), words(config.robot.tool_mm));
+    if same_tool(found_mm, config) {
+        return Ok((true, format!("{found} at the flange, as in the rig's file")));
+    }
+    Ok((
+        false,
+        format!(
+            "{found} at the flange, {wanted} in the rig's file: taught poses would be off by the difference"
+        ),
+    ))
+}
+
+fn same_tool(found_mm: [f64; 3], config: &RigConfig) -> bool {
+    (0..3).all(|i| (found_mm[i] - config.robot.tool_mm[i]).abs() < SAME_TOOL_MM)
+}
+
+fn read_tool_mm(config: &RigConfig) -> Result<[f64; 3], ReadPoseError> {
+    let robot = connect_for(config, &["timestamp", "tcp_offset"], REPLY)?;
+    let began = Instant::now();
+    while let Some(left) = REPLY.checked_sub(began.elapsed()) {
+        let Ok(event) = robot.events().recv_timeout(left) else { break };
+        if let Event::Data(values) = event.event
+            && let Some(Value::Vector6d([x, y, z, ..])) = values.get(1)
+        {
+            return Ok([x, y, z].map(|m| 1e3 * m));
+        }
+    }
+    Err(ReadPoseError::Silent)
 }
 
 /// Largest gap in the robot's clock, and how late 99 % of the readings are at most, beside the earliest, when a constant
@@ -284,6 +321,8 @@ pub fn check_force(
     }
 }
 
+/// Grip centres that are closer than this are the same.
+const SAME_TOOL_MM: f64 = 0.5;
 /// A tool that is slower than this stands.
 const STILL_M_S: f64 = 1e-3;
 
@@ -297,6 +336,17 @@ pub enum ReadPoseError {
     /// No reading.
     #[error("the robot is connected, but no reading came within {:.0} s", REPLY.as_secs_f64())]
     Silent,
+    /// Its grip centre is another one.
+    #[error(
+        "the robot counts with a grip centre {found_mm:?} mm from its flange, the rig's file says {wanted_mm:?} mm: the pose would be off by \
+         the difference"
+    )]
+    Tool {
+        /// What the robot has.
+        found_mm: [f64; 3],
+        /// What the rig's file has.
+        wanted_mm: [f64; 3],
+    },
     /// It moves.
     #[error("the tool moves with {speed_mm_s:.1} mm/s, it must stand (below {most_mm_s} mm/s)")]
     Moving {
@@ -309,6 +359,10 @@ pub enum ReadPoseError {
 
 /// Where the tool stands: what is taught.
 pub fn read_pose(config: &RigConfig) -> Result<crate::program::TcpPose, ReadPoseError> {
+    let found_mm = read_tool_mm(config)?;
+    if !same_tool(found_mm, config) {
+        return Err(ReadPoseError::Tool { found_mm, wanted_mm: config.robot.tool_mm });
+    }
     let robot = connect_listener(config, REPLY)?;
     let (rows, _) = readings(&robot, AVERAGED, REPLY);
     let Some(last) = rows.last() else { return Err(ReadPoseError::Silent) };

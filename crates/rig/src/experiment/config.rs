@@ -73,6 +73,9 @@ pub struct GripperSection {
     /// How far the jaws open after a pull.
     #[serde(default = "open_mm")]
     pub open_mm: f64,
+    /// Width that the jaws are opened to before the first pull; wider than the widest part.
+    #[serde(default = "start_mm")]
+    pub start_mm: f64,
     /// Jaws that are closer than this have closed on each other.
     #[serde(default = "one")]
     pub empty_below_mm: f64,
@@ -232,6 +235,9 @@ fn one() -> f64 {
 fn open_mm() -> f64 {
     10.0
 }
+fn start_mm() -> f64 {
+    100.0
+}
 fn force_range() -> [f64; 2] {
     let (least, most) = crate::gcl::SHIPPED_LIMITS.force_sum_n;
     [0.5 * least, 0.5 * most]
@@ -257,6 +263,7 @@ impl RigConfig {
             ("robot.payload_kg", self.robot.payload_kg, 0.0, 5.0, "kg"),
             ("robot.force_gain", self.robot.force_gain, 0.1, 10.0, ""),
             ("gripper.open_mm", self.gripper.open_mm, 1.0, 100.0, "mm"),
+            ("gripper.start_mm", self.gripper.start_mm, 1.0, 110.0, "mm"),
             ("gripper.empty_below_mm", self.gripper.empty_below_mm, 0.0, 50.0, "mm"),
             ("gripper.force_per_jaw_n[0]", self.gripper.force_per_jaw_n[0], 0.5, 40.0, "N"),
             ("gripper.force_per_jaw_n[1]", self.gripper.force_per_jaw_n[1], 0.5, 40.0, "N"),

@@ -109,6 +109,18 @@ pub(super) fn connect_listener(config: &RigConfig, timeout: Duration) -> Result<
     Ok(RtdeClient::connect(at, &plan, timeout)?)
 }
 
+/// Connects RTDE to listen to these fields.
+pub(super) fn connect_for(
+    config: &RigConfig,
+    fields: &[&str],
+    timeout: Duration,
+) -> Result<RtdeClient, ConnectError> {
+    let at = resolve("RTDE", &config.robot.address, config.robot.rtde_port)?;
+    let outputs = fields.iter().map(ToString::to_string).collect();
+    let plan = SessionPlan { outputs, inputs: vec![], ..session_plan() };
+    Ok(RtdeClient::connect(at, &plan, timeout)?)
+}
+
 /// Connects the primary interface.
 pub(super) fn connect_primary(config: &RigConfig) -> Result<PrimaryClient, ConnectError> {
     let at = resolve("primary interface", &config.robot.address, config.robot.primary_port)?;

@@ -19,6 +19,10 @@ const SLACK: Duration = Duration::from_secs(3);
 /// Height from which the way back is fast.
 const CLEAR_M: f64 = 0.02;
 
+/// Of readings that no label depends on, one in so many is recorded, and all from so long before the pull.
+const ONE_IN: usize = 10;
+const BEFORE_S: f64 = 0.5;
+
 /// What came of a pull.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PullOutcome {
@@ -83,8 +87,6 @@ struct Parts {
 impl Experiment<'_> {
     /// Makes a pull. Whatever goes wrong ends in a safe stop; then no further pull may follow on this experiment.
     pub fn pull(&mut self, campaign: &Campaign, planned: &PlannedPull) -> MeasuredPull {
-        self.rows.clear();
-        self.log.clear();
         let mut parts = Parts::default();
         let made = self.make(campaign, planned, &mut parts);
         let stopped = made.as_ref().err().map(|fault| self.safe_stop(fault));
@@ -110,7 +112,14 @@ impl Experiment<'_> {
         })?;
         // A connection that was cut, whoever had it, is an emergency to a gripper; it keeps what it holds.
         self.gripper(&GclCommand::AcknowledgeFastStop)?;
-        self.clear()
+        self.clear()?;
+        // A release opens by so much: how wide the jaws are is decided here.
+        let width_mm = self.config.gripper.start_mm;
+        if self.ask_gripper(Query::Position)? < width_mm - 1.0 {
+            self.tell(RigEvent::Step("opening the jaws"));
+            self.gripper(&GclCommand::Move { width_mm })?;
+        }
+        Ok(())
     }
 
     /// Reads the sensor without a load for so long; nothing moves.
@@ -378,7 +387,7 @@ impl Experiment<'_> {
         }
         let mut log = std::mem::take(&mut self.log);
         log.sort_by_key(|line| line.at);
-        let rows = std::mem::take(&mut self.rows);
+        let rows = thinned(std::mem::take(&mut self.rows), parts.run, parts.no_load_s);
         MeasuredPull {
             planned: planned.clone(),
             outcome,
@@ -396,4 +405,22 @@ impl Experiment<'_> {
             log: log.into_iter().map(|line| (self.clock.unix_s(line.at), line)).collect(),
         }
     }
+}
+
+/// Readings that are recorded: all of the pull, of the moment before it and of the sensor without a load; of the way there and back,
+/// and of the dwell, one in so many.
+fn thinned(rows: Vec<RobotRow>, run: Option<i32>, no_load_s: Option<(f64, f64)>) -> Vec<RobotRow> {
+    let begins_s = rows.iter().find(|row| run.is_some_and(|run| row.phase_of(run) == Some(Phase::Pulling)));
+    let begins_s = begins_s.map_or(f64::INFINITY, |row| row.timestamp_s);
+    let matters = |row: &RobotRow| {
+        let phase = run.and_then(|run| row.phase_of(run));
+        let before = row.timestamp_s > begins_s - BEFORE_S && row.timestamp_s < begins_s;
+        let without = no_load_s.is_some_and(|(from, to)| row.timestamp_s >= from && row.timestamp_s < to);
+        before || without || matches!(phase, Some(Phase::Pulling | Phase::Braking))
+    };
+    rows.into_iter()
+        .enumerate()
+        .filter(|(i, row)| i % ONE_IN == 0 || matters(row))
+        .map(|(_, row)| row)
+        .collect()
 }

@@ -87,6 +87,11 @@ pub enum GclCommand {
         /// Speed of the jaws, mm/s; only with a width.
         speed_mm_s: Option<f64>,
     },
+    /// Open to a width. Not for gripping.
+    Move {
+        /// The width, mm.
+        width_mm: f64,
+    },
     /// Let go, and open by so much.
     Release {
         /// How far the jaws open, mm.
@@ -169,6 +174,7 @@ impl GclCommand {
     pub fn name(&self) -> &'static str {
         match self {
             GclCommand::Home => "HOME",
+            GclCommand::Move { .. } => "MOVE",
             GclCommand::Grip { .. } => "GRIP",
             GclCommand::Release { .. } => "RELEASE",
             GclCommand::AcknowledgeFastStop => "FSACK",
@@ -182,7 +188,10 @@ impl GclCommand {
 
     /// Whether the jaws move, which only one command at a time may do.
     pub fn moves(&self) -> bool {
-        matches!(self, GclCommand::Home | GclCommand::Grip { .. } | GclCommand::Release { .. })
+        matches!(
+            self,
+            GclCommand::Home | GclCommand::Move { .. } | GclCommand::Grip { .. } | GclCommand::Release { .. }
+        )
     }
 
     /// The line on the wire. Numbers beyond `limits`, and those that are none, are refused.
@@ -197,6 +206,7 @@ impl GclCommand {
             GclCommand::Ask(query) => write!(line, "{}?", query.name()),
             GclCommand::Verbose(on) => write!(line, "VERBOSE={}", u8::from(on)),
             GclCommand::PartWidthTolerance { tolerance_mm } => write!(line, "PWT={}", width(tolerance_mm)?),
+            GclCommand::Move { width_mm } => write!(line, "MOVE({})", width(width_mm)?),
             GclCommand::Release { pull_back_mm } => write!(line, "RELEASE({})", width(pull_back_mm)?),
             GclCommand::Grip { force_per_jaw_n, part_width_mm, speed_mm_s } => {
                 let sum_n = JAWS * force_per_jaw_n;

@@ -21,6 +21,7 @@ fn commands_are_the_lines_of_the_manual() {
     assert_eq!(line(whole), "GRIP(25, 20, 50)\n");
     assert_eq!(line(GclCommand::Release { pull_back_mm: 5.0 }), "RELEASE(5)\n");
     assert_eq!(line(GclCommand::Home), "HOME()\n");
+    assert_eq!(line(GclCommand::Move { width_mm: 100.0 }), "MOVE(100)\n");
     assert_eq!(line(GclCommand::AcknowledgeFastStop), "FSACK()\n");
     assert_eq!(line(GclCommand::Ask(Query::GripState)), "GRIPSTATE?\n");
     assert_eq!(line(GclCommand::Verbose(true)), "VERBOSE=1\n");

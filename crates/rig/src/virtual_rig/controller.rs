@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 /// Time on the controller's clock when the rig starts: clients do not trust a controller in its first seconds.
 const BOOTED_S: f64 = 60.0;
+/// Grip centre at the flange that the teach pendant was told, as in the shipped rig.toml.
+const TOOL_M: [f64; 3] = [0.0, 0.0, 0.2];
 /// How long a protective stop stays before it can be unlocked.
 const UNLOCK_AFTER_S: f64 = 5.0;
 
@@ -86,6 +88,7 @@ impl Controller {
             raw_wrench: [0.0; 6],
             payload_kg: 0.0,
             centre_of_gravity_m: [0.0; 3],
+            tool_m: TOOL_M,
             inputs: Registers::default(),
             outputs: Registers::default(),
         };

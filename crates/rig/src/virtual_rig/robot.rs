@@ -70,6 +70,8 @@ pub struct Robot {
     pub payload_kg: f64,
     /// Its centre of gravity at the flange, in m.
     pub centre_of_gravity_m: [f64; 3],
+    /// Grip centre at the flange that the controller counts with, in m.
+    pub tool_m: [f64; 3],
     /// What clients wrote.
     pub inputs: Registers,
     /// What programs wrote.
@@ -123,6 +125,7 @@ impl Robot {
             "joint_mode" => kind.value(&[PART_RUNNING; 6]),
             "tool_mode" => kind.value(&[PART_RUNNING]),
             "actual_TCP_pose" | "target_TCP_pose" => kind.value(&self.tcp.numbers()),
+            "tcp_offset" => kind.value(&self.tool_m),
             "actual_TCP_speed" | "target_TCP_speed" => kind.value(&[vx, vy, vz]),
             "actual_TCP_force" => kind.value(&self.wrench),
             "ft_raw_wrench" => kind.value(&self.raw_wrench),
@@ -179,6 +182,7 @@ mod tests {
             raw_wrench: [0.0; 6],
             payload_kg: 0.0,
             centre_of_gravity_m: [0.0, 0.0, 0.04],
+            tool_m: [0.0; 3],
             inputs: Registers::default(),
             outputs: Registers::default(),
         };

@@ -152,10 +152,11 @@ impl Running {
     }
 
     fn after_heartbeat(&self, robot: &mut Robot) -> Stage {
-        let (payload_kg, centre_mm) = match self.kind {
-            Kind::Pull(p) => (p.payload_kg, p.centre_of_gravity_mm),
-            Kind::Motion(m) => (m.payload_kg, m.centre_of_gravity_mm),
+        let (payload_kg, centre_mm, tool_mm) = match self.kind {
+            Kind::Pull(p) => (p.payload_kg, p.centre_of_gravity_mm, p.tool_mm),
+            Kind::Motion(m) => (m.payload_kg, m.centre_of_gravity_mm, m.tool_mm),
         };
+        robot.tool_m = tool_mm.map(|mm| mm * 1e-3);
         (robot.payload_kg, robot.centre_of_gravity_m) = (payload_kg, centre_mm.map(|mm| mm * 1e-3));
         match self.kind {
             Kind::Pull(_) => Stage::ZeroRest { left_s: ZERO_REST_S },
