@@ -131,6 +131,8 @@ pub struct LimitsSection {
     pub abort_force_n: f64,
     /// Measured torque at which it is broken off.
     pub abort_torque_nm: f64,
+    /// Largest force along the pull before its first step.
+    pub preload_n: f64,
     /// Measured force at which a motion is broken off.
     pub motion_force_n: f64,
     /// Largest speed along the pull.
@@ -189,6 +191,7 @@ impl Default for LimitsSection {
             pull_force_n: pull.max_force_n,
             abort_force_n: pull.abort_force_n,
             abort_torque_nm: pull.abort_torque_nm,
+            preload_n: 10.0,
             motion_force_n: 20.0,
             pull_speed_mm_s: pull.speed_mm_s,
             lateral_mm: pull.lateral_mm,
@@ -270,6 +273,7 @@ impl RigConfig {
             ("limits.pull_force_n", limits.pull_force_n, 1.0, 45.0, "N"),
             ("limits.abort_force_n", limits.abort_force_n, limits.pull_force_n, 50.0, "N"),
             ("limits.abort_torque_nm", limits.abort_torque_nm, 0.5, 10.0, "Nm"),
+            ("limits.preload_n", limits.preload_n, 0.5, 50.0, "N"),
             ("limits.motion_force_n", limits.motion_force_n, 1.0, 50.0, "N"),
             ("limits.pull_speed_mm_s", limits.pull_speed_mm_s, 1.0, 50.0, "mm/s"),
             ("limits.lateral_mm", limits.lateral_mm, 0.5, 10.0, "mm"),

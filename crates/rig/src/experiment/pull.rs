@@ -212,8 +212,7 @@ impl Experiment<'_> {
         self.wait_until("the dwell", held_s + planned.dwell_s - PRELOAD_S - SETTLE_S)?;
         parts.run = Some(run);
         let reason = self.staircase(run, planned, program.max_time_s)?;
-        parts.preload_n =
-            self.signed(planned, self.newest().map_or(0.0, |row| row.preload_n * planned.pull_direction));
+        parts.preload_n = self.preload_n(planned);
         let state = self.ask_gripper(Query::GripState)?;
         if GripState::from_number(state) != Some(GripState::Holding) {
             return Err(Fault::NotHolding { state });
@@ -246,6 +245,11 @@ impl Experiment<'_> {
             Ok(matches!(phase, Some(Phase::Pulling | Phase::Braking | Phase::Stopped)))
         };
         self.wait("the start of the pull", SLACK, is_pulling)?;
+        let preload_n = self.preload_n(planned);
+        let most_n = self.config.limits.preload_n;
+        if preload_n.abs() > most_n {
+            return Err(Fault::Preload { preload_n, most_n });
+        }
         let began = Instant::now();
         let limit = Duration::from_secs_f64(most_s) + SLACK;
         let (mut shown, mut start_s) = (0, None);
@@ -267,6 +271,11 @@ impl Experiment<'_> {
             Ok(x.newest().is_some_and(|r| r.phase_of(run) == Some(Phase::Stopped)))
         })?;
         self.end_of_program("the pull", run, limit.saturating_sub(began.elapsed()) + SLACK)
+    }
+
+    /// What the program measured before the first step, along the pull.
+    fn preload_n(&self, planned: &PlannedPull) -> f64 {
+        self.signed(planned, self.newest().map_or(0.0, |row| row.preload_n * planned.pull_direction))
     }
 
     /// The force along the pull that a reading along z means.

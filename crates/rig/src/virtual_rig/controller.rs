@@ -167,6 +167,8 @@ impl Controller {
             return self.announcements.push(Announcement::CannotRun { problem });
         }
         self.announcements.push(Announcement::Started { title: program.title().into() });
+        // A controller zeroes its sensor at the start of every program.
+        self.arm.zero(self.robot.timestamp_s);
         self.program = Some(program);
         self.robot.runtime = RuntimeState::Playing;
     }

@@ -163,7 +163,7 @@ fn causes(kind: Kind) -> &'static [&'static str] {
         Kind::Rig(Fault::ProtectiveStop) => &["PROTECTIVE_STOP"],
         Kind::Rig(Fault::PartLost) => &["the gripper is in state 3", "no part at this width"],
         Kind::Rig(Fault::Hang(_)) | Kind::Touch => {
-            &["more force than is allowed", "something else", "tolerance"]
+            &["more force than is allowed", "something else", "preload", "tolerance"]
         }
         Kind::Interrupt => &["interrupted"],
         Kind::Stuck => &["program ended"],

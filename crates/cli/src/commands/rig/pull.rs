@@ -17,7 +17,7 @@ use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_toml};
 use gripgen_rig::experiment::plan::pull_program;
 use gripgen_rig::experiment::prepare::Permit;
 use gripgen_rig::experiment::pull::MeasuredPull;
-use gripgen_rig::experiment::{Devices, Experiment, PullOutcome, RigConfig, check_campaign};
+use gripgen_rig::experiment::{Devices, Experiment, Fault, PullOutcome, RigConfig, check_campaign};
 use serde_json::json;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -174,6 +174,11 @@ impl Job<'_> {
         let mut emit = |event| self.live.borrow_mut().event(&event);
         let mut experiment = Experiment::new(self.config, devices, self.stop, &mut emit);
         if let Err(fault) = experiment.begin() {
+            if let Fault::Busy { .. } = fault {
+                // It is not ours to stop.
+                return Err(Failure::new(fault)
+                    .hint("wait for its end, or stop it on the teach pendant; nothing was moved"));
+            }
             let stopped = experiment.safe_stop(&fault);
             return Ok(End::Stopped { reason: stopped.reason, still: stopped.still });
         }
