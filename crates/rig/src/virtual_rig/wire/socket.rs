@@ -118,6 +118,16 @@ impl Outbox {
         self.ready.notify_one();
     }
 
+    /// Adds the last piece: whoever gets it finds the queue closed.
+    pub(crate) fn push_last(&self, piece: Vec<u8>) {
+        let mut queue = lock(&self.queue);
+        queue.bytes += piece.len();
+        queue.pieces.push_back(piece);
+        queue.closed = true;
+        drop(queue);
+        self.ready.notify_one();
+    }
+
     /// Sends what waits and closes the connection.
     pub(crate) fn close(&self) {
         lock(&self.queue).closed = true;

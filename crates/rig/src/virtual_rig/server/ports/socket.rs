@@ -258,10 +258,15 @@ impl Shared {
             lines.each(bytes, |line| {
                 let mut world = lock(&self.world);
                 let now_s = world.time_s();
-                for reply in world.gripper.line(now_s, line) {
-                    outbox.push((reply + "\n").into_bytes());
+                let replies = world.gripper.line(now_s, line);
+                let goodbye = world.gripper.said_goodbye();
+                // Who reads the answer to a goodbye finds the connection closing: the next client is not turned away.
+                let piece = |reply: String| (reply + "\n").into_bytes();
+                let last = if goodbye { replies.len().saturating_sub(1) } else { usize::MAX };
+                for (i, reply) in replies.into_iter().enumerate() {
+                    if i == last { outbox.push_last(piece(reply)) } else { outbox.push(piece(reply)) }
                 }
-                !world.gripper.said_goodbye()
+                !goodbye
             })
         });
         lock(&self.world).gripper.disconnected();
