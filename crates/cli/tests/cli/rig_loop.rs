@@ -11,7 +11,7 @@ use std::process::{Child, Stdio};
 const SPEED: &str = "50";
 
 /// What the rig has and nobody declares: an offset in its friction law.
-const HIDDEN: &str = "effects=[{name=\"load_offset\", a=1.15, b_n=-2.5, fitted_grip_force_n=[2, 80], outside_fit=\"extrapolate\"}]";
+const HIDDEN: &str = "effects=[{name=\"load_offset\", a=1.2, b_n=-4.0, fitted_grip_force_n=[2, 80], outside_fit=\"extrapolate\"}]";
 
 /// A virtual rig that is served, and the file that finds it.
 struct Served {
