@@ -34,7 +34,7 @@ impl Served {
     fn pull(&self, out: &Path, more: &[&str]) {
         // A machine that builds something else at the same time is slow, not broken.
         let patient =
-            ["--set", "limits.robot_silence_s=1.0", "--set", "images.frame_s=5.0", "--reconnect", "3"];
+            ["--set", "limits.robot_silence_s=1.0", "--set", "images.frame_s=5.0", "--reconnect", "20"];
         let mut arguments =
             vec!["rig", "pull", self.rig.to_str().unwrap(), "-q", "-o", out.to_str().unwrap()];
         arguments.extend(patient);
@@ -72,6 +72,7 @@ fn pulls_needed(first: &Path, second: &Path) -> Option<usize> {
     let before = load_pulls_of(&[first]).unwrap().pulls.pulls.len();
     let mut needed = None;
     for more in [32, 16, 8, 4] {
+        let more = more.min(all.pulls.len() - before);
         all.pulls.truncate(before + more);
         let options = PullDiagnoseOptions { jobs: 2, without: &[] };
         let diagnosis = diagnose_pull_table(&all, &twin, &options, &|_| ()).unwrap().diagnosis;
