@@ -9,7 +9,7 @@
 use gripgen::identify::{CampaignOptions, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
 use gripgen::{
-    Location, PullDiagnoseOptions, compare_pulls, diagnose_pull_table, load_twin_document, simulate_campaign,
+    Library, Location, PullDiagnoseOptions, compare_pulls, diagnose_pull_table, load_twin_document, simulate_campaign,
 };
 use std::time::Instant;
 
@@ -34,13 +34,14 @@ fn main() {
     }
     let base = Location::parse("asset:configs/twin-baseline.toml");
     let twin = Twin::new(&load_twin_document(&base, &[]).unwrap().read_twin().unwrap()).unwrap();
+    let library = Library::of_twin(&twin, &base).unwrap();
     let jobs = std::thread::available_parallelism().map_or(1, usize::from);
     println!("{PULLS} pulls, {} traces, {jobs} threads", PULLS.div_ceil(TRACE_EVERY));
     println!("{:20} {:>10} {:>14}  found", "campaign", "seconds", "comparisons");
     for (name, effects) in CASES {
         let measured = campaign(effects);
         let started = Instant::now();
-        compare_pulls(&measured, &twin, jobs).unwrap();
+        compare_pulls(&measured, &twin, &library, jobs).unwrap();
         let once_s = started.elapsed().as_secs_f64();
         let started = Instant::now();
         let options = PullDiagnoseOptions { jobs, without: &[] };

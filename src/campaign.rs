@@ -178,6 +178,7 @@ fn pull(project: &Project, scenario: &Scenario, index: u64) -> Option<MeasuredPu
     Some(MeasuredPull {
         id: format!("p{index:04}"),
         part: scenario.part.clone(),
+        grip_pose: scenario.grip_pose,
         grip_force_n: scenario.grip_force_n,
         increment_n: scenario.pull.increment_n,
         step_s: scenario.pull.step_s,

@@ -8,7 +8,7 @@ mod sensor;
 
 pub use next::NextPulls;
 pub use presses::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses, is_optics_effect};
-pub(crate) use pulls::pull_values;
+pub(crate) use pulls::{check_parts, pull_values};
 pub use pulls::{PullDiagnoseOptions, UnknownPartError, diagnose_pull_table, given_model};
 pub use sensor::{
     calibrate_sensor_table, compare_sensor_table, diagnose_sensor_table, is_sensor_table, load_sensor_table,

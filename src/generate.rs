@@ -5,14 +5,16 @@ use crate::gripped::{Contact, Gripped, grip_point};
 use crate::hold::hold;
 use crate::library::{Library, LibraryError};
 use crate::project::Project;
-use gripgen_physics::{GripError, PullError, PullSession, Signals, Until, pull_staircase, staircase_of};
+use gripgen_physics::{
+    GripError, JawFriction, PullError, PullSession, Signals, Until, pull_staircase, staircase_of,
+};
 use gripgen_tactile::gpu::GpuError;
 use gripgen_tactile::{Imprint, IndentError, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ConfigError, ImageStorage, Mechanics, TraceStorage};
 use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample,
+    ContactPatch, FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample,
     Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
 };
 use std::sync::Arc;
@@ -49,6 +51,9 @@ pub enum SampleError {
         /// The commanded force.
         commanded_n: f64,
     },
+    /// Jaws that miss the part in its middle, where it was measured to be held.
+    #[error("the jaws miss the part")]
+    Missed,
     /// The grip.
     #[error(transparent)]
     Grip(#[from] GripError),
@@ -189,24 +194,56 @@ pub(crate) fn pull_session(
     contact: &Contact,
 ) -> Result<(PullSession, PerJaw<GripFriction>, f64), SampleError> {
     let Contact { held, imprint, .. } = contact;
-    let part = &twin.parts[&scenario.part];
     let patches = PerJaw::from_fn(|jaw| &imprint[jaw].patch);
-    let laws = PerJaw::try_from_fn(|jaw| {
-        let at = grip_point(scenario, jaw, patches[jaw].area_m2());
-        cell_friction(twin, &scenario.part, part, &at, patches[jaw])
-    })?;
-    let scatter = scatter(part, scenario) * table_factor(twin, scenario);
-    let cell_mu = laws.map(|_, (cells, _)| cells.iter().map(|mu| mu * scatter).collect());
-    let law = laws.map(|_, (_, law)| *law);
-    let friction = hold(twin, scenario, &patches, &cell_mu, law.left.kinetic_ratio);
+    let law = PatchFriction::new(twin, scenario, &patches)?;
+    let scatter = scatter(&twin.parts[&scenario.part], scenario) * table_factor(twin, scenario);
+    let friction = law.held(twin, scenario, &patches, scatter);
     let signals = Signals {
         noise: Stream::new(scenario.seed, scenario.index, Purpose::ForceNoise),
-        sensor: SensorChain::new(twin, &scenario.part, scenario.covariates.time_s)
-            .along(scenario.covariates.pull_direction)
-            .plus(table_offset_n(twin, scenario)),
+        sensor: sensor_chain(twin, scenario),
         command: CommandChain::new(twin, &scenario.part),
     };
-    Ok(((**held).clone().pull(&friction, signals), law, scatter))
+    Ok(((**held).clone().pull(&friction, signals), law.law, scatter))
+}
+
+/// The wrist sensor of a pull, with what tables of the twin add to its readings.
+pub(crate) fn sensor_chain(twin: &Twin, scenario: &Scenario) -> SensorChain {
+    SensorChain::new(twin, &scenario.part, scenario.covariates.time_s)
+        .along(scenario.covariates.pull_direction)
+        .plus(table_offset_n(twin, scenario))
+}
+
+/// The friction laws of a twin on the patches of a grip.
+pub(crate) struct PatchFriction {
+    cell_mu: PerJaw<Vec<f64>>,
+    law: PerJaw<GripFriction>,
+}
+
+impl PatchFriction {
+    pub(crate) fn new(
+        twin: &Twin,
+        scenario: &Scenario,
+        patches: &PerJaw<&ContactPatch>,
+    ) -> Result<Self, FrictionError> {
+        let part = &twin.parts[&scenario.part];
+        let laws = PerJaw::try_from_fn(|jaw| {
+            let at = grip_point(scenario, jaw, patches[jaw].area_m2());
+            cell_friction(twin, &scenario.part, part, &at, patches[jaw])
+        })?;
+        Ok(Self { law: laws.map(|_, (_, law)| *law), cell_mu: laws.map(|_, (cells, _)| cells.clone()) })
+    }
+
+    /// What the jaws hold when every coefficient is multiplied by `factor`.
+    pub(crate) fn held(
+        &self,
+        twin: &Twin,
+        scenario: &Scenario,
+        patches: &PerJaw<&ContactPatch>,
+        factor: f64,
+    ) -> PerJaw<JawFriction> {
+        let mu = self.cell_mu.map(|_, cells| cells.iter().map(|mu| mu * factor).collect());
+        hold(twin, scenario, patches, &mu, self.law.left.kinetic_ratio)
+    }
 }
 
 /// The second half of a sample: friction of this repetition, pull, label, image noise.

@@ -6,7 +6,7 @@ use crate::generate::{SampleError, SimulateOptions};
 use crate::gpu::{Gpu, ImageFault, ImageJob, PlacedPart};
 use crate::library::Library;
 use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip};
-use gripgen_tactile::{Imprint, Plane, Renderer, Sensor};
+use gripgen_tactile::{ClusteredMesh, Imprint, Plane, Renderer, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
 use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 use gripgen_twin::frames::{pose, rotation_about_axis};
@@ -51,58 +51,26 @@ impl Gripped {
         scenario: &Scenario,
         options: SimulateOptions,
     ) -> Result<Self, SampleError> {
-        let part = &twin.parts[&scenario.part];
         let sensors = PerJaw::try_from_fn(|jaw| library.sensor(&twin.optics[jaw]))?;
-        let force_n = PerJaw::try_from_fn(|jaw| {
-            let force_n = normal_force_n(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
-            let commanded_n = scenario.grip_force_n;
-            if force_n < LEAST_FORCE_N {
-                Err(SampleError::NoForce { jaw, force_n, commanded_n })
-            } else {
-                Ok(force_n)
-            }
-        })?;
-        let shape = library.shape(part, scenario.grip_pose)?;
-        let arm = twin.arm.as_ref().map(|arm| library.arm(arm)).transpose()?;
-        if let Some(arm) = arm.as_deref() {
-            check_damping(twin, arm, pull_direction(scenario))?;
-        }
-        let arm = arm.as_deref().map_or(Arm::Carriage, Arm::Multibody);
-        let renderers = PerJaw::from_fn(|jaw| Renderer {
-            sensor: &sensors[jaw],
-            gel: &twin.gel[jaw],
-            level: options.level,
-        });
         let optics =
             PerJaw::from_fn(|jaw| optics_state(twin, &scenario.part, &grip_point(scenario, jaw, 0.0)));
-        let Grip::Held(held) = grip(&grip_setup(twin, scenario, force_n, options.mechanics, arm, &shape))?
-        else {
+        let force_n = jaw_forces_n(twin, scenario)?;
+        let Some(held) = held(twin, library, scenario, force_n, options.mechanics)? else {
             return Self::at_rest(twin, library, scenario, options);
         };
-        let parts = placed_parts(twin, library, scenario, &force_n, &held.grasp)?;
-        let mesh = library.clustered_mesh(part)?;
-        let press = |optics: Option<&PerJaw<OpticsState>>| {
-            PerJaw::try_from_fn(|jaw| {
-                let PlacedPart { gel_from_mesh, imprint_m3_per_n, force_n, .. } = &parts[jaw];
-                let (renderer, c) = (&renderers[jaw], *imprint_m3_per_n);
-                let pressed = match optics {
-                    None => renderer.press(&mesh, gel_from_mesh, c, *force_n),
-                    Some(o) => renderer.press_seen(&mesh, gel_from_mesh, c, *force_n, &o[jaw]),
-                };
-                pressed.map_err(|source| SampleError::Indent { jaw, source })
-            })
-        };
-        let imprint = press(None)?;
+        let press = Press::new(twin, library, scenario, &force_n, &held.grasp, options.level)?;
+        let imprint = press.imprints(None)?;
         let look = if !options.images {
             None
         } else if options.backend == Backend::Gpu && Jaw::BOTH.iter().all(|&jaw| optics[jaw].is_neutral()) {
-            Some(Look::Parts(parts))
+            Some(Look::Parts(press.parts))
         } else {
             // Optics effects are seen and not felt: where they change the imprint, the image has its own.
             let apart = Jaw::BOTH.iter().any(|&jaw| optics[jaw].changes_press());
-            let seen = apart.then(|| press(Some(&optics))).transpose()?;
+            let seen = apart.then(|| press.imprints(Some(&optics))).transpose()?;
             let seen = seen.as_ref().unwrap_or(&imprint);
-            Some(Look::Change(renderers.map(|jaw, r| r.change_seen(Some(&seen[jaw]), &optics[jaw]))))
+            let change = |jaw: Jaw| press.renderer(jaw).change_seen(Some(&seen[jaw]), &optics[jaw]);
+            Some(Look::Change(PerJaw::from_fn(change)))
         };
         Ok(Self { sensors, contact: Some(Contact { held, imprint, force_n }), look })
     }
@@ -168,6 +136,87 @@ impl Gripped {
             };
             gripgen_tactile::finish(&self.sensors[jaw], change, key(jaw))
         }))
+    }
+}
+
+/// Real normal force of each jaw. An error if an effect leaves a jaw none.
+pub(crate) fn jaw_forces_n(twin: &Twin, scenario: &Scenario) -> Result<PerJaw<f64>, SampleError> {
+    PerJaw::try_from_fn(|jaw| {
+        let force_n = normal_force_n(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
+        let commanded_n = scenario.grip_force_n;
+        if force_n < LEAST_FORCE_N {
+            Err(SampleError::NoForce { jaw, force_n, commanded_n })
+        } else {
+            Ok(force_n)
+        }
+    })
+}
+
+/// The part between closed jaws; `None` if they miss it.
+pub(crate) fn held(
+    twin: &Twin,
+    library: &Library,
+    scenario: &Scenario,
+    force_n: PerJaw<f64>,
+    mechanics: Mechanics,
+) -> Result<Option<Box<Held>>, SampleError> {
+    let shape = library.shape(&twin.parts[&scenario.part], scenario.grip_pose)?;
+    let arm = twin.arm.as_ref().map(|arm| library.arm(arm)).transpose()?;
+    if let Some(arm) = arm.as_deref() {
+        check_damping(twin, arm, pull_direction(scenario))?;
+    }
+    let arm = arm.as_deref().map_or(Arm::Carriage, Arm::Multibody);
+    match grip(&grip_setup(twin, scenario, force_n, mechanics, arm, &shape))? {
+        Grip::Held(held) => Ok(Some(held)),
+        Grip::NoContact => Ok(None),
+    }
+}
+
+/// A part in front of both gels, ready to be pressed in.
+pub(crate) struct Press<'a> {
+    twin: &'a Twin,
+    sensors: PerJaw<Arc<Sensor>>,
+    parts: PerJaw<PlacedPart>,
+    mesh: Arc<ClusteredMesh>,
+    level: SimdLevel,
+}
+
+impl<'a> Press<'a> {
+    pub(crate) fn new(
+        twin: &'a Twin,
+        library: &Library,
+        scenario: &Scenario,
+        force_n: &PerJaw<f64>,
+        grasp: &Grasp,
+        level: SimdLevel,
+    ) -> Result<Self, SampleError> {
+        Ok(Self {
+            twin,
+            sensors: PerJaw::try_from_fn(|jaw| library.sensor(&twin.optics[jaw]))?,
+            parts: placed_parts(twin, library, scenario, force_n, grasp)?,
+            mesh: library.clustered_mesh(&twin.parts[&scenario.part])?,
+            level,
+        })
+    }
+
+    fn renderer(&self, jaw: Jaw) -> Renderer<'_> {
+        Renderer { sensor: &self.sensors[jaw], gel: &self.twin.gel[jaw], level: self.level }
+    }
+
+    /// What the jaws feel, or with `optics` what their cameras see.
+    pub(crate) fn imprints(
+        &self,
+        optics: Option<&PerJaw<OpticsState>>,
+    ) -> Result<PerJaw<Imprint>, SampleError> {
+        PerJaw::try_from_fn(|jaw| {
+            let PlacedPart { gel_from_mesh, imprint_m3_per_n, force_n, .. } = &self.parts[jaw];
+            let (renderer, c) = (self.renderer(jaw), *imprint_m3_per_n);
+            let pressed = match optics {
+                None => renderer.press(&self.mesh, gel_from_mesh, c, *force_n),
+                Some(o) => renderer.press_seen(&self.mesh, gel_from_mesh, c, *force_n, &o[jaw]),
+            };
+            pressed.map_err(|source| SampleError::Indent { jaw, source })
+        })
     }
 }
 

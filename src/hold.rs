@@ -22,7 +22,8 @@ pub(crate) fn hold(
     let mut friction = patches.map(|jaw, patch| {
         let cells = patch.cells.iter().zip(&mu[jaw]);
         let cells = cells.map(|(c, mu)| FrictionCell { limit_n: mu * c.force_n, area_m2: c.area_m2 });
-        JawFriction { cells: cells.collect(), kinetic_ratio }
+        let kinetic_fall_s = twin.parts[&scenario.part].kinetic_fall_s;
+        JawFriction { cells: cells.collect(), kinetic_ratio, kinetic_fall_s }
     });
     if twin.robot.twist == Twist::Free {
         let share = free_share(scenario, patches, &friction);

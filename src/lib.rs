@@ -47,6 +47,7 @@ mod calibrate;
 mod campaign;
 mod compare;
 mod diagnose;
+mod expect;
 mod generate;
 mod gpu;
 mod gripped;

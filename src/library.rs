@@ -1,12 +1,12 @@
 //! Meshes, contact shapes and sensors: read once, shared by the samples that need them.
 
 use crate::cache::Cache;
-use crate::location::Location;
+use crate::location::{Location, ReadFileError};
 use crate::resolve::Files;
 use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, UrdfError};
 use gripgen_record::{decode_picture, sha256_hex};
 use gripgen_tactile::{ClusteredMesh, Sensor, SensorError, SensorFiles};
-use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh};
+use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh, Twin};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -125,6 +125,24 @@ impl LibraryError {
 }
 
 impl Library {
+    /// The files that the grips of a twin need: meshes, robot and sensors. `beside` is where the twin lies.
+    pub fn of_twin(twin: &Twin, beside: &Location) -> Result<Self, ReadFileError> {
+        let meshes = twin.parts.values().map(|part| &part.mesh);
+        let sensors = twin.optics.iter().flat_map(|(_, o)| {
+            [Some(&o.sensor), o.background.as_ref(), o.gel_map.as_ref(), o.shadow_table.as_ref()]
+        });
+        let arm = twin.arm.iter().map(|arm| &arm.urdf);
+        let mut files = Files::new();
+        for path in meshes.chain(sensors.flatten()).chain(arm) {
+            if !files.contains_key(path) {
+                let at = beside.beside(path);
+                let bytes = at.read()?.into_owned();
+                files.insert(path.clone(), (at, bytes));
+            }
+        }
+        Ok(Self::new(files))
+    }
+
     pub(crate) fn new(files: Files) -> Self {
         Self {
             files,

@@ -302,6 +302,7 @@ fn measured(
     Some(MeasuredPull {
         id: sample.index.to_string(),
         max_pull_force_n: sample.max_pull_force_n?,
+        grip_pose: sample.grip_pose as usize,
         grip_force_n: sample.grip_force_n,
         increment_n: sample.force_increment_n,
         step_s: sample.step_time_s,
@@ -339,6 +340,7 @@ mod tests {
         let pull = |i: usize| MeasuredPull {
             id: i.to_string(),
             part: "p".into(),
+            grip_pose: 0,
             grip_force_n: 10.0,
             increment_n: 1.0,
             step_s: 0.1,

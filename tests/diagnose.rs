@@ -7,7 +7,7 @@ use gripgen::physics::label_moments;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{MeasuredPulls, PullTrace, TraceRow, Twin, slip_label};
 use gripgen::{
-    Diagnosed, Location, PullDiagnoseOptions, calibrate_twin, compare_pulls, diagnose_pull_table,
+    Diagnosed, Library, Location, PullDiagnoseOptions, calibrate_twin, compare_pulls, diagnose_pull_table,
     edited_twin, load_pulls, load_twin_document, simulate_campaign,
 };
 
@@ -17,6 +17,11 @@ fn baseline() -> Location {
 
 fn twin_at(location: &Location) -> Twin {
     Twin::new(&load_twin_document(location, &[]).unwrap().read_twin().unwrap()).unwrap()
+}
+
+/// The files of a twin that names embedded ones only.
+fn library(twin: &Twin) -> Library {
+    Library::of_twin(twin, &baseline()).unwrap()
 }
 
 fn diagnose(measured: &MeasuredPulls, without: &[&str]) -> Diagnosed {
@@ -100,7 +105,7 @@ fn a_pull_without_inertia_is_the_reduced_one() {
         let measured = simulated("", 40, &sets);
         let sets: Vec<(String, String)> = sets.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
         let twin = Twin::new(&load_twin_document(&baseline(), &sets).unwrap().read_twin().unwrap()).unwrap();
-        let found = compare_pulls(&measured, &twin, 2).unwrap();
+        let found = compare_pulls(&measured, &twin, &library(&twin), 2).unwrap();
         println!("kinetic ratio {ratio}: {:.3} N, {:.2} %", found.pulls.rmse_n, found.pulls.mape_pct);
         assert!(found.pulls.mape_pct < 2.0, "kinetic ratio {ratio}: {found:?}");
     }
@@ -128,12 +133,13 @@ fn an_effect_of_the_simulator_is_found_and_put_into_the_twin() {
     );
     let file = edited_twin(&baseline(), &[], &found.edits).unwrap();
     let with = Twin::new(&file).unwrap();
-    let after = compare_pulls(&measured, &with, 2).unwrap().pulls.rmse_n;
+    let after = compare_pulls(&measured, &with, &library(&with), 2).unwrap().pulls.rmse_n;
     assert!(after < 1.25 * error.after.rmse_n.unwrap(), "{after} N by compare, {error:?}");
     let mut plain = file;
     plain.effects.clear();
-    assert_eq!(Twin::new(&plain).unwrap().effects.len(), 0);
-    assert!(compare_pulls(&measured, &Twin::new(&plain).unwrap(), 2).unwrap().pulls.rmse_n > after);
+    let plain = Twin::new(&plain).unwrap();
+    assert_eq!(plain.effects.len(), 0);
+    assert!(compare_pulls(&measured, &plain, &library(&plain), 2).unwrap().pulls.rmse_n > after);
 }
 
 #[test]

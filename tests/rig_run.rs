@@ -274,7 +274,7 @@ fn check(path: &Path, folder: &RunFolder, pulls: &[RigPull], made: usize) {
 
     let measured = load_pulls(path).unwrap().pulls;
     let twin = Simulator::open(&baseline(), &[], Mechanics::Reduced, false).unwrap();
-    let compared = compare_pulls(&measured, twin.twin(), 2).unwrap();
+    let compared = compare_pulls(&measured, twin.twin(), &twin.project().library, 2).unwrap();
     assert_eq!((compared.pulls.n, measured.pulls.len()), (made - 1, made - 1));
     let options = PullDiagnoseOptions { jobs: 2, without: &[] };
     let found = diagnose_pull_table(&measured, twin.twin(), &options, &|_| {}).unwrap();

@@ -35,6 +35,8 @@ mod press_diagnosis;
 mod presses;
 // Labels against closed forms, through the whole pipeline.
 mod pull;
+// What a twin simulates is what it predicts.
+mod one_physics;
 // What is written is what was simulated.
 mod roundtrip;
 // The wrist sensor against logs of a real arm.

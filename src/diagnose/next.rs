@@ -252,6 +252,7 @@ fn as_measured(campaign: &MeasuredPulls, planned: &[PlannedPull], after_rest: &[
         MeasuredPull {
             id: format!("next{i:05}"),
             part: p.part.clone(),
+            grip_pose: 0,
             grip_force_n: p.grip_force_n,
             increment_n: p.force_increment_n,
             step_s: p.step_time_s,

@@ -34,13 +34,19 @@ pub struct UnknownPartError {
     pub known: String,
 }
 
+fn known_part<'a>(twin: &'a Twin, name: &str) -> Result<&'a gripgen_twin::Part, UnknownPartError> {
+    let known = || twin.parts.keys().cloned().collect::<Vec<_>>().join(", ");
+    twin.parts.get(name).ok_or_else(|| UnknownPartError { part: name.into(), known: known() })
+}
+
+/// Whether the twin has every part that was measured.
+pub(crate) fn check_parts(measured: &MeasuredPulls, twin: &Twin) -> Result<(), UnknownPartError> {
+    measured.pulls.iter().try_for_each(|pull| known_part(twin, &pull.part).map(drop))
+}
+
 /// What a twin says of pulls, without its effects: where fits start.
 pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPartError> {
-    let known = || twin.parts.keys().cloned().collect::<Vec<_>>().join(", ");
-    let found = parts.iter().map(|name| {
-        twin.parts.get(name).ok_or_else(|| UnknownPartError { part: name.clone(), known: known() })
-    });
-    let found = found.collect::<Result<Vec<_>, _>>()?;
+    let found = parts.iter().map(|name| known_part(twin, name)).collect::<Result<Vec<_>, _>>()?;
     let mean = |f: &dyn Fn(&gripgen_twin::Part) -> f64| {
         found.iter().map(|p| f(p)).sum::<f64>() / found.len().max(1) as f64
     };

@@ -45,12 +45,14 @@ pub(crate) struct RapierPull {
     pad_friction: PerJaw<f64>,
     /// What both jaws hold together before they slip.
     limit_n: f64,
-    kinetic_ratio: PerJaw<f64>,
+    friction: PerJaw<JawFriction>,
     start: rapier::Vector,
     momentum_n_s: f64,
     contact_force_n: f64,
     refresh_contacts: bool,
     sliding: bool,
+    /// Time since the jaws began to slide.
+    slid_s: f64,
 }
 
 impl RapierPull {
@@ -68,10 +70,11 @@ impl RapierPull {
             shear_stiffness_n_per_m: start.shear_stiffness_n_per_m,
             pad_friction: friction.map(|jaw, f| f.limit_n() / start.normal_force_n[jaw]),
             limit_n: friction.left.limit_n() + friction.right.limit_n(),
-            kinetic_ratio: friction.map(|_, f| f.kinetic_ratio),
+            friction: friction.map(|_, f| JawFriction { cells: vec![], ..*f }),
             contact_force_n: 0.0,
             refresh_contacts: false,
             sliding: false,
+            slid_s: 0.0,
         };
         pull.write_friction();
         pull
@@ -114,11 +117,12 @@ impl RapierPull {
         } else {
             speed_m_per_s.abs() > SLIDING_M_PER_S && contact_force_n.abs() >= AT_LIMIT * self.limit_n
         };
-        if sliding != self.sliding {
-            self.sliding = sliding;
-            if self.kinetic_ratio.iter().any(|(_, &ratio)| ratio != 1.0) {
-                self.write_friction();
-            }
+        let changed = sliding != self.sliding;
+        self.sliding = sliding;
+        self.slid_s = if sliding { self.slid_s + step_s } else { 0.0 };
+        let falls = self.friction.iter().any(|(_, f)| f.kinetic_fall_s > 0.0);
+        if (changed || (sliding && falls)) && self.friction.iter().any(|(_, f)| f.kinetic_ratio != 1.0) {
+            self.write_friction();
         }
         let displacement_m = self.position_m() + contact_force_n / self.shear_stiffness_n_per_m;
         Ok(Motion { contact_force_n, displacement_m, speed_m_per_s, sliding })
@@ -133,7 +137,7 @@ impl RapierPull {
     /// Hands the jaws' friction to the engine. It acts from the next step on, which rebuilds all contacts.
     fn write_friction(&mut self) {
         for (jaw, &pad) in self.rig.pads.iter() {
-            let ratio = if self.sliding { self.kinetic_ratio[jaw] } else { 1.0 };
+            let ratio = if self.sliding { self.friction[jaw].sliding_share(self.slid_s) } else { 1.0 };
             self.world.colliders[pad].set_friction(self.pad_friction[jaw] * ratio);
         }
         self.refresh_contacts = true;

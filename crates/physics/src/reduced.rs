@@ -41,8 +41,9 @@ pub(crate) struct ReducedPull {
     bristles: Bristles,
     /// Where the cells of the left jaw end and those of the right one begin.
     boundary: usize,
-    kinetic_ratio: PerJaw<f64>,
-    sliding: bool,
+    friction: PerJaw<JawFriction>,
+    /// Time since the jaws began to slide; `None` while they hold.
+    slid_s: Option<f64>,
 }
 
 /// The bristles of both jaws, one column each.
@@ -87,8 +88,8 @@ impl ReducedPull {
             static_limit_n: bristles.limit_n.clone(),
             bristles,
             boundary,
-            kinetic_ratio: friction.map(|_, f| f.kinetic_ratio),
-            sliding: false,
+            friction: friction.map(|_, f| JawFriction { cells: vec![], ..*f }),
+            slid_s: None,
         }
     }
 
@@ -132,8 +133,9 @@ impl ReducedPull {
         }
         // The jaws slide when no bristle holds any more, and stick again when one does.
         let sliding = slope == 0.0 && speed != 0.0;
-        if sliding != self.sliding {
-            self.sliding = sliding;
+        let falls = self.friction.iter().any(|(_, f)| f.kinetic_fall_s > 0.0);
+        if sliding != self.slid_s.is_some() || (sliding && falls) {
+            self.slid_s = sliding.then(|| self.slid_s.unwrap_or(0.0) + step_s);
             self.set_limits();
         }
         Ok(Motion { contact_force_n: force, displacement_m: self.position_m, speed_m_per_s: speed, sliding })
@@ -141,13 +143,13 @@ impl ReducedPull {
 
     /// Static limits, or kinetic ones while the jaws slide.
     fn set_limits(&mut self) {
-        if self.kinetic_ratio.iter().all(|(_, &ratio)| ratio == 1.0) {
+        if self.friction.iter().all(|(_, f)| f.kinetic_ratio == 1.0) {
             return;
         }
+        let share = self.friction.map(|_, f| self.slid_s.map_or(1.0, |s| f.sliding_share(s)));
         let limits = self.bristles.limit_n.iter_mut().zip(&self.static_limit_n).enumerate();
         for (i, (limit, &held)) in limits {
-            let ratio = if i < self.boundary { self.kinetic_ratio.left } else { self.kinetic_ratio.right };
-            *limit = if self.sliding { held * ratio } else { held };
+            *limit = held * if i < self.boundary { share.left } else { share.right };
         }
         self.bristles.measure();
     }

@@ -38,12 +38,23 @@ pub struct JawFriction {
     pub cells: Vec<FrictionCell>,
     /// Kinetic over static friction.
     pub kinetic_ratio: f64,
+    /// Time constant with which friction falls to that once the jaws slide; 0: at once.
+    pub kinetic_fall_s: f64,
 }
 
 impl JawFriction {
     /// A jaw that slips as a whole.
     pub fn uniform(limit_n: f64, kinetic_ratio: f64) -> Self {
-        Self { cells: vec![FrictionCell { limit_n, area_m2: 1.0 }], kinetic_ratio }
+        Self { cells: vec![FrictionCell { limit_n, area_m2: 1.0 }], kinetic_ratio, kinetic_fall_s: 0.0 }
+    }
+
+    /// Share of its limit that a jaw keeps once it has slid for `slid_s`: `r + (1 - r) exp(-t / tau)` with the kinetic
+    /// ratio r and the time constant tau.
+    pub(crate) fn sliding_share(&self, slid_s: f64) -> f64 {
+        if self.kinetic_fall_s == 0.0 {
+            return self.kinetic_ratio;
+        }
+        self.kinetic_ratio + (1.0 - self.kinetic_ratio) * libm::exp(-slid_s / self.kinetic_fall_s)
     }
 
     /// Largest tangential force before the jaw slips: the sum over its cells.

@@ -169,6 +169,7 @@ fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<Meas
         let mut pull = MeasuredPull {
             id: String::new(),
             part: String::new(),
+            grip_pose: 0,
             grip_force_n: 0.0,
             increment_n: plain.increment_n,
             step_s: cells::DEFAULT_STEP_S,

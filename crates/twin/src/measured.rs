@@ -34,6 +34,8 @@ pub struct MeasuredPull {
     pub id: String,
     /// Name of the part.
     pub part: String,
+    /// Which of the part's grips in the twin; 0 where nobody wrote it down.
+    pub grip_pose: usize,
     /// Grip force, per jaw.
     pub grip_force_n: f64,
     /// Height of a step of the staircase.
@@ -169,6 +171,7 @@ mod tests {
         let pull = |i: u64, session: &str, time_s: f64| MeasuredPull {
             id: i.to_string(),
             part: "p".into(),
+            grip_pose: 0,
             grip_force_n: 10.0,
             increment_n: 1.0,
             step_s: 0.1,

@@ -35,6 +35,19 @@ impl ContactPatch {
     /// Most cells of a patch.
     pub const MAX_CELLS: usize = 64;
 
+    /// A contact of which only force and area are known: 8 x 8 cells of one pressure on a square.
+    pub fn uniform(force_n: f64, area_m2: f64) -> Self {
+        let side_m = area_m2.max(0.0).sqrt();
+        let at = |k: usize| ((k as f64 + 0.5) / 8.0 - 0.5) * side_m;
+        let cell = |i: usize| PressureCell {
+            x_m: at(i % 8),
+            y_m: at(i / 8),
+            area_m2: area_m2 / 64.0,
+            force_n: force_n / 64.0,
+        };
+        Self { cells: (0..64).map(cell).collect() }
+    }
+
     /// Normal force of the jaw.
     pub fn normal_force_n(&self) -> f64 {
         self.cells.iter().map(|c| c.force_n).sum()

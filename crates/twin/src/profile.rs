@@ -1,5 +1,7 @@
 //! The commanded pull: a force staircase.
 
+use crate::PullTrace;
+
 /// A staircase `F_des(t) = i dF` with steps that need not be equally long.
 ///
 /// Step `i` (counted from 1) begins at the end of step `i - 1`; step 1 begins at time 0 and already commands
@@ -27,6 +29,46 @@ impl Staircase {
             end += step_s();
         }
         Self { increment_n, starts_s }
+    }
+
+    /// The staircase that a trace carries: a step begins where its command does, within the time between two rows. `None` if
+    /// the steps are those of `step_s` as far as the rows can tell, or if the commands are no staircase of `increment_n`.
+    /// After the last row the steps go on with `step_s` until `duration_s`.
+    pub fn of_trace(trace: &PullTrace, increment_n: f64, step_s: f64, duration_s: f64) -> Option<Self> {
+        let rows: Vec<_> = trace.rows().filter(|row| row.time_s >= 0.0).collect();
+        let first = rows.first()?;
+        if (first.desired_force_n - increment_n).abs() > 0.01 * increment_n {
+            return None;
+        }
+        let (mut starts_s, mut nominal) = (vec![0.0], true);
+        for pair in rows.windows(2) {
+            let begun = (pair[1].desired_force_n / increment_n).round();
+            if (begun * increment_n - pair[1].desired_force_n).abs() > 0.01 * increment_n {
+                return None;
+            }
+            let new = begun - starts_s.len() as f64;
+            if new < 0.0 || new > 1e4 {
+                return None;
+            }
+            for k in 0..new as usize {
+                let (low, high) = (pair[0].time_s, pair[1].time_s);
+                let plain = starts_s.len() as f64 * step_s;
+                nominal &= plain > low - 1e-6 && plain < high + 1e-6;
+                // The length of a step where the rows allow it, else evenly between them.
+                let after = starts_s[starts_s.len() - 1] + step_s;
+                let evenly = low + (high - low) * (k as f64 + 1.0) / new;
+                starts_s.push(if after > low && after <= high + 1e-9 { after } else { evenly });
+            }
+        }
+        if nominal {
+            return None;
+        }
+        let mut next = starts_s[starts_s.len() - 1] + step_s;
+        while next < duration_s {
+            starts_s.push(next);
+            next += step_s;
+        }
+        Some(Self { increment_n, starts_s })
     }
 
     /// Height of one step.

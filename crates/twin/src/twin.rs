@@ -168,6 +168,8 @@ pub struct Part {
     pub mu: f64,
     /// Kinetic over static friction.
     pub kinetic_ratio: f64,
+    /// Time constant with which friction falls to its kinetic value once the jaws slide; 0: at once.
+    pub kinetic_fall_s: f64,
     /// Relative scatter of the coefficient from grip to grip.
     pub scatter: f64,
     /// Imprint constant c of V = c F.

@@ -1,6 +1,6 @@
 //! `gripgen compare`: how far a twin or a sensor file is from measurements.
 
-use super::diagnose::{folders, jobs, load_twin, no_pulls};
+use super::diagnose::{folders, jobs, load_library, load_twin, no_pulls};
 use crate::args::{CompareArgs, TalkArgs};
 use crate::commands::compare_sensor;
 use crate::failure::Failure;
@@ -122,7 +122,8 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
     let loaded = load_pulls_of(&measured).map_err(|e| no_pulls(&measured, e))?;
     let twin = load_twin(&args.twin, &[])?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
-    let found = compare_pulls(&loaded.pulls, &twin, jobs())
+    let library = load_library(&twin, &args.twin)?;
+    let found = compare_pulls(&loaded.pulls, &twin, &library, jobs())
         .map_err(|e| Failure::usage(e).hint("name a twin that has this part with --twin"))?;
     let errors =
         |e: &LabelErrors| json!({"n": e.n, "rmse_n": e.rmse_n, "mape_pct": e.mape_pct, "bias_n": e.bias_n});

@@ -11,7 +11,7 @@ use crate::progress::Share;
 use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
 use gripgen::{
-    Diagnosed, Location, PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_press_set,
+    Diagnosed, Library, Location, PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_press_set,
     is_sensor_table, load_pulls_of, load_sensor_table, load_twin_document,
 };
 use std::path::{Path, PathBuf};
@@ -41,6 +41,12 @@ pub fn load_twin(path: &str, sets: &[(String, String)]) -> Result<Twin, Failure>
     let document = load_twin_document(&Location::parse(path), sets)?;
     let file = document.read_twin().map_err(|e| Failure::from(document.located(e)))?;
     Twin::new(&file).map_err(|e| Failure::from(document.located(e)))
+}
+
+/// The files that the grips of a twin need. `path` is the twin's own.
+pub fn load_library(twin: &Twin, path: &str) -> Result<Library, Failure> {
+    let unread = |e| Failure::usage(e).hint("paths in a twin are relative to its file");
+    Library::of_twin(twin, &Location::parse(path)).map_err(unread)
 }
 
 /// The twin with no more grip force than the gripper of a rig has.

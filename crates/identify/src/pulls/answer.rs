@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, candidates};
 use super::context::Context;
 use super::data::PullData;
-use super::fitting::Fitted;
+use super::fitting::{Fitted, Terms};
 use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
 };
@@ -101,6 +101,9 @@ pub fn diagnose_pulls(
     let mut context = Context::new(&data, predictor, given);
     let rows: Vec<usize> = (0..data.len()).collect();
     context.learn_lag(&rows);
+    if let Some(plain) = context.fit(&context.base, &Terms::default(), &rows) {
+        context.correct_at(&plain.model);
+    }
     let most_n = data.label_n.iter().copied().fold(0.0, f64::max);
     let search = Search::new(&context, candidates(&data, most_n, options.without));
     if search.candidates.is_empty() && search.curves.is_empty() {
@@ -116,9 +119,14 @@ pub fn diagnose_pulls(
         return PullAnswer { diagnosis, fits: None };
     };
     let repetitions = folds(data.len());
-    let heldout_before = predicted(&context, &before, &repetitions, false);
-    let (accepted, heldout_after) = confirmed(&search, &before, accepted, &heldout_before, &repetitions);
-    let after = accepted.fitted.clone();
+    let fast_before = predicted(&context, &before, &repetitions, false);
+    let mut accepted = confirmed(&search, &before, accepted, &fast_before, &repetitions);
+    // What is stated from here on is what a twin of these models says.
+    let (before_context, stated_before) = context.stated(&before);
+    let (after_context, after) = context.stated(&accepted.fitted);
+    accepted.fitted = after.clone();
+    let heldout_before = predicted(&before_context, &stated_before, &repetitions, false);
+    let heldout_after = predicted(&after_context, &after, &repetitions, false);
     diagnosis.effects = named(&search, &before, &accepted);
     diagnosis.unknown = unknown(&search, &before, &accepted, &data);
     diagnosis.verdict = match (diagnosis.effects.is_empty(), diagnosis.unknown.is_empty()) {
@@ -140,10 +148,10 @@ pub fn diagnose_pulls(
     }
     let heldout = [heldout_before, heldout_after];
     progress(0.9);
-    let labels = [&before, &after].map(|fitted| {
+    let labels = [&stated_before, &after].map(|fitted| {
         let mut model = fitted.model.clone();
         model.scatter = scatter(&model, fitted.likelihood.scale);
-        predictor.pulls(&model, &rows).iter().map(|p| p.label_n).collect::<Vec<f64>>()
+        predictor.labels_n(&model, &rows)
     });
     let own: Vec<f64> = counted.iter().map(|&i| data.label_n[i] - labels[1][i]).collect();
     let groups: Vec<usize> = counted.iter().map(|&i| data.group_of[i]).collect();
@@ -153,7 +161,8 @@ pub fn diagnose_pulls(
             if sets.len() < 3 || sets.len() > 20 {
                 return None;
             }
-            let [b, a] = [&before, &after].map(|f| predicted(&context, f, &sets, true));
+            let b = predicted(&before_context, &stated_before, &sets, true);
+            let a = predicted(&after_context, &after, &sets, true);
             errors(&data.label_n, &b, &a, &data.group_of, &counted)
         };
         let force: Vec<u64> = measured.pulls.iter().map(|p| p.grip_force_n.to_bits()).collect();
@@ -170,14 +179,14 @@ pub fn diagnose_pulls(
     let sd_n = label_sd_n(&before, &predictor.pulls(&before.model, &rows));
     let scores = accepted.entries.iter().take(SCORED).map(|entry| {
         let held = predicted(&context, &entry.fitted, &repetitions, true);
-        held_out_score(&data.label_n, &sd_n, &heldout[0], &held, &counted)
+        held_out_score(&data.label_n, &sd_n, &fast_before, &held, &counted)
     });
     let scores = scores.collect();
     progress(0.96);
     diagnosis.would_have_seen = would_have_seen(&context, &after, &search.candidates);
     progress(1.0);
     let fits = PullFits {
-        before,
+        before: stated_before,
         after,
         candidates: search.candidates.clone(),
         curve_names: search.curves.iter().map(|c| c.name.clone()).collect(),
@@ -202,7 +211,7 @@ fn confirmed(
     mut accepted: Accepted,
     heldout_before: &[f64],
     repetitions: &[Vec<usize>],
-) -> (Accepted, Vec<f64>) {
+) -> Accepted {
     let data = search.context.data;
     let sd_n = label_sd_n(before, &search.context.predictor.pulls(&before.model, &search.rows));
     // A few bad pulls decide nothing.
@@ -214,7 +223,7 @@ fn confirmed(
         let after = predicted(search.context, &accepted.fitted, repetitions, false);
         let terms = accepted.effects.len() + accepted.curves.len();
         if terms == 0 || squares(&after) <= WORSE * squares(heldout_before) {
-            return (accepted, after);
+            return accepted;
         }
         let mut fewer = accepted.fitted.terms.clone();
         if accepted.effects.len() > 1 || accepted.curves.is_empty() {

@@ -119,7 +119,8 @@ pub fn calibrate_pulls(
     let mut context = Context::new(&data, predictor, given);
     let rows: Vec<usize> = (0..data.len()).collect();
     context.learn_lag(&rows);
-    let fitted = context.fit(&context.base, &terms, &rows).ok_or(CalibrateError::NoFit)?;
+    let found = context.fit(&context.base, &terms, &rows).ok_or(CalibrateError::NoFit)?;
+    let (context, fitted) = context.stated(&found);
     let held = predicted(&context, &fitted, &folds(data.len()), false);
     let forces = || measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces().fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));

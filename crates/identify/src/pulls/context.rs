@@ -1,7 +1,7 @@
 //! A campaign with what its traces say, and the residuals of a model against both.
 
 use super::data::PullData;
-use super::fitting::Terms;
+use super::fitting::{Fitted, Terms};
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, noise_n, observe};
 use super::trace_residuals::TraceResiduals;
@@ -53,6 +53,7 @@ pub struct Observation {
 }
 
 /// A campaign, ready to be fitted.
+#[derive(Clone)]
 pub struct Context<'a> {
     /// The pulls.
     pub data: &'a PullData<'a>,
@@ -72,6 +73,8 @@ pub struct Context<'a> {
     pub free_lag: bool,
     /// Half the sum of squares of the traces under the baseline.
     pub baseline_trace_cost: f64,
+    /// What the labels of the simulator lie above those of the fast prediction, near the model that is fitted.
+    pub above_fast_n: Vec<f64>,
 }
 
 impl<'a> Context<'a> {
@@ -100,6 +103,7 @@ impl<'a> Context<'a> {
             base,
             free_lag: false,
             baseline_trace_cost: 0.0,
+            above_fast_n: vec![0.0; data.len()],
         };
         context.look_at(&raw);
         context
@@ -115,6 +119,34 @@ impl<'a> Context<'a> {
             self.base = found.model;
         }
         self.free_lag = false;
+    }
+
+    /// Learns what the labels of the simulator lie above those of the fast prediction at a model. Fits near it then are fits
+    /// through the simulator.
+    pub fn correct_at(&mut self, model: &PullModel) {
+        let rows: Vec<usize> = (0..self.data.len()).filter(|&i| self.limit_of(i).is_none()).collect();
+        let exact = self.predictor.labels_n(model, &rows);
+        let fast = self.predictor.pulls(model, &rows);
+        for ((&row, exact_n), fast) in rows.iter().zip(exact).zip(fast) {
+            self.above_fast_n[row] = exact_n - fast.label_n;
+        }
+    }
+
+    /// The fit as it is written into a twin: at labels of the simulator, and without a nuisance that no twin has.
+    pub fn stated(&self, fitted: &Fitted) -> (Self, Fitted) {
+        let mut context = self.clone();
+        let rows: Vec<usize> = (0..self.data.len()).collect();
+        let mut fitted = fitted.clone();
+        fitted.terms.stated = true;
+        for _ in 0..2 {
+            fitted.model.misread_n = 0.0;
+            context.correct_at(&fitted.model);
+            match context.fit_again(&fitted.model, &fitted.terms, &rows) {
+                Some(found) => fitted = found,
+                None => break,
+            }
+        }
+        (context, fitted)
     }
 
     fn look_at(&mut self, raw: &[TraceObservation]) {
@@ -306,7 +338,10 @@ impl<'a> Context<'a> {
     pub(super) fn friction_residuals(&self, model: &PullModel, rows: &[usize], sd: &[f64]) -> Vec<f64> {
         let each = |((&i, p), sd): ((&usize, &PullPrediction), &f64)| match self.limit_of(i) {
             Some(limit_n) => (limit_n - p.limit_reading_n - model.misread_n) / sd,
-            None => (self.data.label_n[i] - p.label_n - model.misread_n) / sd,
+            None => {
+                let predicted_n = p.label_n + self.above_fast_n[i] + model.misread_n;
+                (self.data.label_n[i] - predicted_n) / sd
+            }
         };
         rows.iter().zip(&self.predicted(model, rows)).zip(sd).map(each).collect()
     }

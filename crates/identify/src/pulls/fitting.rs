@@ -21,6 +21,8 @@ pub struct Terms {
     /// Whether lag, dead time, kinetic ratio and what acts on signals stay as they are given, which makes fits of friction
     /// beside them fast.
     pub hold_signals: bool,
+    /// Whether the model is one that a twin can hold: without the nuisance of labels that are read too high.
+    pub stated: bool,
 }
 
 impl Terms {
@@ -126,8 +128,8 @@ impl Context<'_> {
         });
         parameters.push(FreeParameter {
             name: "misread_n".into(),
-            start: start.misread_n,
-            bounds: (-0.5, 0.5),
+            start: if terms.stated { 0.0 } else { start.misread_n },
+            bounds: if terms.stated { (0.0, 0.0) } else { (-0.5, 0.5) },
             scale: 0.05,
         });
         let dynamics = (terms.act_on_signals() || self.free_lag) && !terms.hold_signals;

@@ -16,6 +16,7 @@ fn session_with_cells(bench: &Bench, mu: f64, cells: usize, kinetic_ratio: f64) 
             .map(|i| FrictionCell { limit_n: mu * bench.grip_force_n * weight(i) / sum, area_m2: 1e-6 })
             .collect(),
         kinetic_ratio,
+        kinetic_fall_s: 0.0,
     };
     let noise = Stream::new(1, 2, Purpose::ForceNoise);
     bench.held().pull(&PerJaw { left: friction.clone(), right: friction }, noise)

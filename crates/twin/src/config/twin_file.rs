@@ -261,6 +261,9 @@ pub struct PartFile {
     /// Kinetic over static friction; 1 = no loss when sliding.
     #[serde(default = "one")]
     pub kinetic_ratio: f64,
+    /// Time constant with which friction falls from its static to its kinetic value once the jaws slide; 0: at once.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub kinetic_fall_s: f64,
     /// Relative standard deviation of the friction coefficient from grip to grip.
     #[serde(default)]
     pub scatter: f64,
@@ -276,6 +279,10 @@ pub struct PartFile {
 
 fn one() -> f64 {
     1.0
+}
+
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 fn plain_grip() -> Vec<GripFile> {

@@ -95,6 +95,7 @@ pub(super) fn check_part(part: &PartFile, key: &str) -> Result<Part, ConfigError
         grips,
         mu: in_range(&at("mu"), part.mu, 0.0..=5.0, "1")?,
         kinetic_ratio: in_range(&at("kinetic_ratio"), part.kinetic_ratio, 0.05..=1.0, "1")?,
+        kinetic_fall_s: in_range(&at("kinetic_fall_s"), part.kinetic_fall_s, 0.0..=1.0, "s")?,
         scatter: in_range(&at("scatter"), part.scatter, 0.0..=0.5, "1")?,
         imprint_m3_per_n: in_range(&at("imprint_mm3_per_n"), part.imprint_mm3_per_n, 1e-3..=1e3, "mm3/N")?
             * 1e-9,

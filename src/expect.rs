@@ -1,0 +1,304 @@
+//! What a twin is expected to measure: the simulator itself, without noise, over the scatter of friction.
+//!
+//! A measured pull is put into a scenario and goes through the functions that make a sample: real normal force, imprint,
+//! friction law on each cell, limit surface, reduced mechanics, force loop, wrist sensor. What a sample draws is averaged:
+//! the scatter of friction by quadrature, the noise of the readings by [`label_moments`].
+
+use crate::cache::Cache;
+use crate::generate::{PatchFriction, SampleError, sensor_chain};
+use crate::gripped::{Press, grip_point, held, jaw_forces_n};
+use crate::library::Library;
+use gripgen_physics::{
+    Command, Held, JawFriction, PullSession, Signals, label_moments,
+};
+use gripgen_tactile::SimdLevel;
+use gripgen_twin::config::Mechanics;
+use gripgen_twin::effects::{CommandChain, OutsideFit, imprint_volume_m3, jaw_tilt_rad};
+use gripgen_twin::random::{Purpose, Stream, normal_quantile};
+use gripgen_twin::{
+    ContactPatch, Jaw, MeasuredPulls, PerJaw, PullSettings, Scenario, Staircase, Twin, table_factor,
+};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Longest pull that is looked at.
+const MAX_TIME_S: f64 = 120.0;
+
+/// Patches kept: those of a campaign, for the forces of a few models.
+const PATCHES: usize = 4096;
+
+/// Nodes and weights of the Gauss-Hermite rule of 9 points for a standard normal variable (Abramowitz and Stegun 1964,
+/// table 25.10, scaled). Enough where the label is a smooth function of what the jaws hold.
+const SMOOTH_NODES: [(f64, f64); 9] = [
+    (-4.512_745_863_399_783, 2.234_584_400_774_66e-5),
+    (-3.205_429_002_856_47, 2.789_141_321_231_77e-3),
+    (-2.076_847_978_677_83, 4.991_640_676_521_79e-2),
+    (-1.023_255_663_789_13, 2.440_975_028_949_39e-1),
+    (0.0, 4.063_492_063_492_06e-1),
+    (1.023_255_663_789_13, 2.440_975_028_949_39e-1),
+    (2.076_847_978_677_83, 4.991_640_676_521_79e-2),
+    (3.205_429_002_856_47, 2.789_141_321_231_77e-3),
+    (4.512_745_863_399_783, 2.234_584_400_774_66e-5),
+];
+
+/// Nodes where it is not: a force that falls after the slip makes the label jump from step to step of the staircase.
+const STRATA: usize = 40;
+
+/// Standard deviations of noise within which a reading counts as possible.
+const WIDE: f64 = 7.0;
+
+/// What is expected of one pull.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Expected {
+    /// What the jaws hold, without scatter.
+    pub limit_n: f64,
+    /// Mean of the label over scatter and noise.
+    pub label_n: f64,
+    /// Its standard deviation.
+    pub label_sd_n: f64,
+}
+
+/// A twin whose pulls are predicted: without noise, and with laws that never refuse.
+#[derive(Debug, Clone)]
+pub(crate) struct QuietTwin {
+    twin: Twin,
+    noise_n: f64,
+}
+
+impl QuietTwin {
+    pub(crate) fn new(twin: &Twin) -> Self {
+        let mut twin = twin.clone();
+        let noise_n = std::mem::take(&mut twin.wrist.noise_n);
+        for effect in &mut twin.effects {
+            // A measured pull is always predicted; how many lie outside is counted elsewhere.
+            if effect.outside_fit == OutsideFit::Error {
+                effect.outside_fit = OutsideFit::Extrapolate;
+            }
+        }
+        Self { twin, noise_n }
+    }
+}
+
+/// What a patch depends on beside the gels: part, grip, place, and what each jaw does.
+type PatchKey = (String, usize, [u64; 9]);
+
+/// The pulls of a campaign, ready to be made on twins.
+pub(crate) struct Expectations<'a> {
+    measured: &'a MeasuredPulls,
+    library: &'a Library,
+    staircases: Vec<Arc<Staircase>>,
+    patches: Cache<PatchKey, PerJaw<ContactPatch>>,
+}
+
+/// The pull of one row on one twin, without its friction.
+struct Prepared {
+    scenario: Scenario,
+    held: Box<Held>,
+    patches: Arc<PerJaw<ContactPatch>>,
+    law: PatchFriction,
+}
+
+/// Readings of a pull: commands, readings and forces on the contact at the sensor's rate.
+#[derive(Default)]
+pub(crate) struct Readings {
+    pub desired_n: Vec<f64>,
+    pub measured_n: Vec<f64>,
+    /// First tick at which the jaws slide along the pull.
+    pub slip_tick: Option<usize>,
+}
+
+impl<'a> Expectations<'a> {
+    pub(crate) fn new(measured: &'a MeasuredPulls, library: &'a Library) -> Self {
+        let mut known: BTreeMap<[u64; 2], Arc<Staircase>> = BTreeMap::new();
+        let staircases = measured.pulls.iter().map(|p| {
+            let plain = known
+                .entry([p.increment_n.to_bits(), p.step_s.to_bits()])
+                .or_insert_with(|| Arc::new(Staircase::constant(p.increment_n, p.step_s, MAX_TIME_S)));
+            let own = p.trace.as_ref().and_then(|t| Staircase::of_trace(t, p.increment_n, p.step_s, MAX_TIME_S));
+            own.map_or_else(|| plain.clone(), Arc::new)
+        });
+        Self { measured, library, staircases: staircases.collect(), patches: Cache::new(PATCHES) }
+    }
+
+    /// What is expected of the pull at `row` on a twin, its friction multiplied by `factor`.
+    pub(crate) fn expected(&self, quiet: &QuietTwin, row: usize, factor: f64) -> Expected {
+        let Ok(prepared) = self.prepared(quiet, row) else { return Expected::default() };
+        let factor = factor * table_factor(&quiet.twin, &prepared.scenario);
+        let part = &quiet.twin.parts[&prepared.scenario.part];
+        let (mut sums, mut limit_n) = ((0.0, 0.0, 0.0), 0.0);
+        let decided_n = self.measured.label_tolerance_n + WIDE * quiet.noise_n;
+        for (weight, z) in nodes(part.scatter, part.kinetic_ratio) {
+            let friction = prepared.friction(&quiet.twin, (factor * (1.0 + part.scatter * z)).max(0.0));
+            if z == 0.0 {
+                limit_n = friction.left.limit_n() + friction.right.limit_n();
+            }
+            let Ok(readings) = self.pull(quiet, row, &prepared, &friction, decided_n) else { continue };
+            let both = readings.desired_n.iter().zip(&readings.measured_n);
+            let (mean, variance) =
+                label_moments(both, self.measured.label_tolerance_n, quiet.noise_n).unwrap_or_else(|| {
+                    // A reading that was never near the command: the reading at the slip stands in.
+                    let at = readings.slip_tick.unwrap_or(readings.measured_n.len()).saturating_sub(1);
+                    (readings.measured_n.get(at).copied().unwrap_or(0.0), 0.0)
+                });
+            sums = (sums.0 + weight, sums.1 + weight * mean, sums.2 + weight * (mean * mean + variance));
+        }
+        let (weight, mean, square) = sums;
+        if weight == 0.0 {
+            return Expected { limit_n, ..Expected::default() };
+        }
+        let label_n = mean / weight;
+        if limit_n == 0.0 {
+            let friction = prepared.friction(&quiet.twin, factor);
+            limit_n = friction.left.limit_n() + friction.right.limit_n();
+        }
+        Expected { limit_n, label_n, label_sd_n: (square / weight - label_n * label_n).max(0.0).sqrt() }
+    }
+
+    /// Readings of the pull at `row` without scatter and noise, to its end.
+    pub(crate) fn readings(&self, quiet: &QuietTwin, row: usize) -> Readings {
+        let Ok(prepared) = self.prepared(quiet, row) else { return Readings::default() };
+        let factor = table_factor(&quiet.twin, &prepared.scenario);
+        let friction = prepared.friction(&quiet.twin, factor);
+        self.pull(quiet, row, &prepared, &friction, f64::INFINITY).unwrap_or_default()
+    }
+
+    /// What the jaws of the pull at `row` hold, without scatter.
+    pub(crate) fn limit_n(&self, quiet: &QuietTwin, row: usize) -> f64 {
+        let Ok(prepared) = self.prepared(quiet, row) else { return 0.0 };
+        let friction = prepared.friction(&quiet.twin, table_factor(&quiet.twin, &prepared.scenario));
+        friction.left.limit_n() + friction.right.limit_n()
+    }
+
+    fn scenario(&self, row: usize) -> Scenario {
+        let pull = &self.measured.pulls[row];
+        Scenario {
+            seed: 0,
+            index: 0,
+            group: 0,
+            repetition: 0,
+            part: pull.part.clone(),
+            grip_pose: pull.grip_pose,
+            grip_force_n: pull.grip_force_n,
+            covariates: pull.covariates.clone(),
+            pull: PullSettings {
+                increment_n: pull.increment_n,
+                step_s: pull.step_s,
+                step_jitter: 0.0,
+                stop_m: self.measured.stop_m,
+                direction: [0.0, 0.0, 1.0],
+                max_force_n: None,
+                max_time_s: MAX_TIME_S,
+                label_tolerance_n: self.measured.label_tolerance_n,
+            },
+            drawn: BTreeMap::new(),
+        }
+    }
+
+    fn prepared(&self, quiet: &QuietTwin, row: usize) -> Result<Prepared, SampleError> {
+        let twin = &quiet.twin;
+        let mut scenario = self.scenario(row);
+        let part = &twin.parts[&scenario.part];
+        scenario.grip_pose = scenario.grip_pose.min(part.grips.len() - 1);
+        let force_n = jaw_forces_n(twin, &scenario)?;
+        let grip = |scenario: &Scenario| held(twin, self.library, scenario, force_n, Mechanics::Reduced);
+        let mut pressed = scenario.clone();
+        let mut found = grip(&pressed)?;
+        if found.is_none() {
+            // What was measured had contact: jaws that miss the part in the model hold it as in its middle.
+            (pressed.covariates.grip_offset_m, pressed.covariates.grip_angle_rad) = (0.0, 0.0);
+            found = grip(&pressed)?;
+        }
+        let held = found.ok_or(SampleError::Missed)?;
+        let patches = self.patches.get(patch_key(twin, &pressed, &force_n), || {
+            let press = Press::new(twin, self.library, &pressed, &force_n, &held.grasp, SimdLevel::best())?;
+            let whole = |jaw: Jaw| ContactPatch::uniform(force_n[jaw], WHOLE_AREA_M2);
+            // Deeper than the gel: the shape of the contact is not known, its force is.
+            Ok::<_, SampleError>(match press.imprints(None) {
+                Ok(imprints) => imprints.map(|_, i| i.patch.clone()),
+                Err(_) => PerJaw::from_fn(whole),
+            })
+        })?;
+        let law = PatchFriction::new(twin, &scenario, &PerJaw::from_fn(|jaw| &patches[jaw]))?;
+        Ok(Prepared { scenario, held, patches, law })
+    }
+
+    fn pull(
+        &self,
+        quiet: &QuietTwin,
+        row: usize,
+        prepared: &Prepared,
+        friction: &PerJaw<JawFriction>,
+        decided_n: f64,
+    ) -> Result<Readings, SampleError> {
+        let (twin, scenario) = (&quiet.twin, &prepared.scenario);
+        let signals = Signals {
+            noise: Stream::new(0, 0, Purpose::ForceNoise),
+            sensor: sensor_chain(twin, scenario),
+            command: CommandChain::new(twin, &scenario.part),
+        };
+        // A sensor that remembers goes on rising after the slip; one that does not reads what the jaws hold at most.
+        let decides = signals.sensor.is_identity();
+        let mut session: PullSession = (*prepared.held).clone().pull(friction, signals);
+        let rate_hz = session.rate_hz();
+        let mut stairs = self.staircases[row].from(0.0);
+        let mut readings = Readings::default();
+        for tick in 0..=(MAX_TIME_S * rate_hz) as usize {
+            let state = session.state();
+            let desired_n = stairs.desired_n(tick as f64 / rate_hz);
+            readings.desired_n.push(desired_n);
+            readings.measured_n.push(state.measured_force_n);
+            let slips = state.sliding && state.speed_m_per_s > 0.0;
+            if slips && readings.slip_tick.is_none() {
+                readings.slip_tick = Some(tick);
+            }
+            // The command only rises: a reading this far below it stays there.
+            if state.displacement_m > self.measured.stop_m
+                || (decides && slips && desired_n - state.measured_force_n > decided_n)
+            {
+                break;
+            }
+            session.step(Command::ForceN(desired_n), 1.0 / rate_hz)?;
+        }
+        Ok(readings)
+    }
+}
+
+/// Area of a contact of unknown shape: a tenth of a pad.
+const WHOLE_AREA_M2: f64 = 6e-5;
+
+impl Prepared {
+    fn friction(&self, twin: &Twin, factor: f64) -> PerJaw<JawFriction> {
+        let patches = PerJaw::from_fn(|jaw| &self.patches[jaw]);
+        self.law.held(twin, &self.scenario, &patches, factor)
+    }
+}
+
+/// Weights and standard normal nodes over which friction scatters.
+fn nodes(scatter: f64, kinetic_ratio: f64) -> Vec<(f64, f64)> {
+    if scatter == 0.0 {
+        return vec![(1.0, 0.0)];
+    }
+    if kinetic_ratio == 1.0 {
+        return SMOOTH_NODES[1..8].iter().map(|&(z, w)| (w, z)).collect();
+    }
+    (0..STRATA).map(|i| (1.0, normal_quantile((i as f64 + 0.5) / STRATA as f64))).collect()
+}
+
+fn patch_key(twin: &Twin, scenario: &Scenario, force_n: &PerJaw<f64>) -> PatchKey {
+    let c = &scenario.covariates;
+    let part = &twin.parts[&scenario.part];
+    let tilt = |jaw: Jaw| jaw_tilt_rad(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
+    let volume = |jaw: Jaw| imprint_volume_m3(twin, &scenario.part, part, force_n[jaw]);
+    let numbers = [
+        c.grip_offset_m,
+        c.grip_angle_rad,
+        force_n.left,
+        force_n.right,
+        tilt(Jaw::Left),
+        tilt(Jaw::Right),
+        volume(Jaw::Left),
+        volume(Jaw::Right),
+        c.pull_direction,
+    ];
+    (scenario.part.clone(), scenario.grip_pose, numbers.map(f64::to_bits))
+}

@@ -1,0 +1,219 @@
+//! What a twin simulates is what it predicts: labels of campaigns made on a twin against the labels expected of it.
+
+use gripgen::twin::config::ConfigError;
+use gripgen::twin::effects::{EffectSpec, LIBRARY};
+use gripgen::twin::{Campaign, PlannedPull, Twin};
+use gripgen::{Library, Location, compare_pulls, load_twin_document, simulate_campaign};
+
+/// A twin by what is added to the shipped baseline.
+struct Case {
+    name: String,
+    sets: Vec<(String, String)>,
+    effects: String,
+}
+
+fn set(key: &str, value: &str) -> (String, String) {
+    (key.into(), value.into())
+}
+
+/// Neither noise nor scatter, on the two parts that are pulled.
+fn quiet() -> Vec<(String, String)> {
+    let parts = ["long_shaft", "gear"];
+    let scatter = parts.iter().map(|p| set(&format!("parts.{p}.scatter"), "0"));
+    scatter.chain([set("wrist.noise_n", "0")]).collect()
+}
+
+/// Pulls over what a campaign varies.
+fn campaign(pulls: usize) -> Campaign {
+    let of = |i: usize| PlannedPull {
+        part: ["long_shaft", "gear"][i % 2].into(),
+        grip_force_n: [21.0, 33.0, 47.0, 62.0, 78.0][i % 5] - 0.37 * (i % 7) as f64,
+        grip_offset_mm: [0.0, 2.0, -4.0][i % 3],
+        grip_angle_deg: [0.0, 30.0, 90.0][i / 3 % 3],
+        pull_direction: if i % 4 == 3 { -1.0 } else { 1.0 },
+        dwell_s: [1.0, 10.0, 60.0][i / 2 % 3],
+        force_increment_n: [1.0, 0.5][i / 4 % 2],
+        step_time_s: [0.104, 0.05][i / 8 % 2],
+        ..PlannedPull::default()
+    };
+    Campaign { label_tolerance_n: 3.0, stop_m: 5e-3, feedback: None, pulls: (0..pulls).map(of).collect() }
+}
+
+/// Mean absolute difference between label and expected label, as a share of the mean label; `None` where the twin refuses.
+fn difference(case: &Case, pulls: usize) -> Result<f64, ConfigError> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("twin.toml");
+    let base = include_str!("../assets/configs/twin-baseline.toml");
+    std::fs::write(&file, format!("{base}\n{}", case.effects)).unwrap();
+    let at = Location::Disk(file);
+    let sets = [quiet(), case.sets.clone()].concat();
+    let twin = Twin::new(&load_twin_document(&at, &sets).unwrap().read_twin()?)?;
+    let mut measured = simulate_campaign(&at, &sets, &campaign(pulls), 3).unwrap().pulls;
+    measured.pulls.iter_mut().for_each(|p| p.trace = None);
+    let library = Library::of_twin(&twin, &at).unwrap();
+    let found = compare_pulls(&measured, &twin, &library, 2).unwrap();
+    let both = measured.pulls.iter().zip(&found.label_n);
+    let (off, sum) = both.fold((0.0, 0.0), |(off, sum), (p, l)| {
+        (off + (l - p.max_pull_force_n).abs(), sum + p.max_pull_force_n)
+    });
+    assert!(measured.pulls.len() > pulls / 2, "{}: {} pulls", case.name, measured.pulls.len());
+    Ok(off / sum)
+}
+
+/// Values of an effect at a share of the way to a bound of parameter `size`; the others act where they have to.
+fn strength(spec: &EffectSpec, size: usize, share: f64) -> Vec<f64> {
+    let towards = |i: usize, share: f64| {
+        let p = &spec.parameters[i];
+        let (low, high) = p.bounds;
+        // Over decades.
+        if low > 0.0 && high / low > 1e3 {
+            return low * (high / low).powf(if p.neutral == high { 0.2 + 0.1 * share } else { 0.6 * share });
+        }
+        if share >= 0.0 { p.neutral + share * (high - p.neutral) } else { p.neutral + share * (p.neutral - low) }
+    };
+    (0..spec.parameters.len())
+        .map(|i| match i {
+            i if i == size => towards(i, share),
+            0 => towards(0, 0.15),
+            i => spec.parameters[i].neutral,
+        })
+        .collect()
+}
+
+fn entry(spec: &EffectSpec, values: &[f64], more: &str) -> String {
+    let parameters = spec.parameters.iter().zip(values).map(|(p, v)| format!("{} = {v:?}\n", p.name));
+    format!("[[effects]]\nname = \"{}\"\n{}{more}\n", spec.id, parameters.collect::<String>())
+}
+
+/// Twins with each effect of the library on pulls, at several strengths, with the options that it allows.
+fn effects() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for spec in LIBRARY.iter().filter(|s| s.optics.is_none()) {
+        for size in 0..spec.parameters.len() {
+            if spec.references.contains(&spec.parameters[size].name) {
+                continue;
+            }
+            for share in [-0.3, 0.1, 0.35] {
+                let values = strength(spec, size, share);
+                let name = format!("{} {values:?}", spec.id);
+                cases.push(Case { name: name.clone(), sets: vec![], effects: entry(spec, &values, "") });
+                if spec.friction.is_some() && share > 0.2 {
+                    for kinetic in ["0.8", "0.93"] {
+                        let sets = vec![
+                            set("parts.long_shaft.kinetic_ratio", kinetic),
+                            set("parts.gear.kinetic_ratio", kinetic),
+                        ];
+                        let name = format!("{name} kinetic {kinetic}");
+                        cases.push(Case { name, sets, effects: entry(spec, &values, "") });
+                    }
+                }
+                if spec.is_load_law() {
+                    let own = [
+                        "per = \"cell\"\nreference_area_mm2 = 80.0",
+                        "fitted_grip_force_n = [30.0, 60.0]\noutside_fit = \"hold\"",
+                        "fitted_grip_force_n = [30.0, 60.0]\noutside_fit = \"extrapolate\"",
+                    ];
+                    for more in own {
+                        let loss = "[[effects]]\nname = \"grip_force_loss\"\nloss_n = 3.0\n";
+                        let effects = format!("{loss}{}", entry(spec, &values, more));
+                        cases.push(Case { name: format!("{name} {more}"), sets: vec![], effects });
+                    }
+                }
+            }
+        }
+    }
+    cases
+}
+
+/// Twins whose rig differs from the shipped one.
+fn rigs() -> Vec<Case> {
+    let kinetic = |ratio: &str| {
+        vec![set("parts.long_shaft.kinetic_ratio", ratio), set("parts.gear.kinetic_ratio", ratio)]
+    };
+    let mut cases = vec![("kinetic 0.8", kinetic("0.8")), ("kinetic 0.93", kinetic("0.93"))];
+    for lag in ["0.005", "0.2"] {
+        for ratio in ["1.0", "0.8"] {
+            cases.push(("lag", [kinetic(ratio), vec![set("robot.lag_s", lag)]].concat()));
+        }
+    }
+    let own = |key: &str, value: &str| [kinetic("0.85"), vec![set(key, value)]].concat();
+    cases.extend([
+        ("dead time", own("robot.dead_time_s", "0.03")),
+        ("independent", own("robot.feedback", "\"independent\"")),
+        ("damping", own("robot.damping_n_s_per_m", "800")),
+        ("fast", own("robot.speed_limit_mm_s", "100")),
+        ("soft gels", own("gel.left.shear_stiffness_n_per_mm", "4")),
+        ("carriage", own("robot.model", "\"carriage\"")),
+        ("rate", own("wrist.rate_hz", "1000")),
+        ("free twist", own("robot.twist", "\"free\"")),
+    ]);
+    let named = |(name, sets): (&str, Vec<(String, String)>)| {
+        let name = format!("{name} {}", sets.iter().map(|(k, v)| format!("{k}={v} ")).collect::<String>());
+        Case { name, sets, effects: String::new() }
+    };
+    cases.into_iter().map(named).collect()
+}
+
+fn worst(cases: &[Case], pulls: usize, most: f64) {
+    let mut off: Vec<(f64, &str)> = cases
+        .iter()
+        .filter_map(|case| Some((difference(case, pulls).ok()?, case.name.as_str())))
+        .collect();
+    off.sort_by(|a, b| b.0.total_cmp(&a.0));
+    println!("{} of {} twins can be read", off.len(), cases.len());
+    off.iter().take(40).for_each(|(off, name)| println!("{:8.3} %  {}", 100.0 * off, name.replace('\n', " ")));
+    assert!(off.len() * 20 > cases.len() * 19 && off[0].0 < most, "{:?}", off[0]);
+}
+
+/// Scatter and noise: the expected label against the mean of many simulated ones, within the largest of 0.5 %, 0.02 N and three
+/// standard errors.
+#[test]
+fn the_expected_label_is_the_mean_of_many_noisy_pulls() {
+    const PULLS: usize = 300;
+    let kinetic = |ratio: &str| set("parts.long_shaft.kinetic_ratio", ratio);
+    let cases: [(&str, Vec<(String, String)>, &str); 8] = [
+        ("plain", vec![], ""),
+        ("kinetic", vec![kinetic("0.8")], ""),
+        ("kinetic, no scatter", vec![kinetic("0.85"), set("parts.long_shaft.scatter", "0")], ""),
+        ("noisy", vec![kinetic("0.9"), set("wrist.noise_n", "0.6")], ""),
+        ("noisy, fast loop", vec![kinetic("0.9"), set("wrist.noise_n", "0.6"), set("robot.lag_s", "0.01")], ""),
+        ("slow loop", vec![kinetic("0.9"), set("robot.lag_s", "0.2")], ""),
+        ("wide", vec![kinetic("0.85"), set("parts.long_shaft.scatter", "0.1")], ""),
+        ("saturation", vec![kinetic("0.9")], "[[effects]]\nname = \"sensor_saturation\"\nlimit_n = 11.0\n"),
+    ];
+    for (name, sets, effects) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("twin.toml");
+        let base = include_str!("../assets/configs/twin-baseline.toml");
+        std::fs::write(&file, format!("{base}\n{effects}")).unwrap();
+        let at = Location::Disk(file);
+        let twin = Twin::new(&load_twin_document(&at, &sets).unwrap().read_twin().unwrap()).unwrap();
+        let library = Library::of_twin(&twin, &at).unwrap();
+        for grip_force_n in [22.0, 41.3] {
+            let pull = PlannedPull { part: "long_shaft".into(), grip_force_n, ..PlannedPull::default() };
+            let pulls = vec![pull; PULLS];
+            let campaign = Campaign { label_tolerance_n: 3.0, stop_m: 5e-3, feedback: None, pulls };
+            let mut measured = simulate_campaign(&at, &sets, &campaign, 11).unwrap().pulls;
+            measured.pulls.iter_mut().for_each(|p| p.trace = None);
+            let labels: Vec<f64> = measured.pulls.iter().map(|p| p.max_pull_force_n).collect();
+            let n = labels.len() as f64;
+            let mean = labels.iter().sum::<f64>() / n;
+            let sd = (labels.iter().map(|l| (l - mean) * (l - mean)).sum::<f64>() / n).sqrt();
+            measured.pulls.truncate(1);
+            let expected = compare_pulls(&measured, &twin, &library, 1).unwrap().label_n[0];
+            let most = (5e-3 * mean).max(0.02).max(3.0 * sd / n.sqrt());
+            println!("{name}, {grip_force_n} N: {mean:.3} +- {:.3} N, expected {expected:.3}", sd / n.sqrt());
+            assert!((expected - mean).abs() < most, "{name}, {grip_force_n} N: {mean} N, expected {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_twin_predicts_what_it_simulates_with_every_effect() {
+    worst(&effects(), 24, 0.005);
+}
+
+#[test]
+fn a_twin_predicts_what_it_simulates_on_every_rig() {
+    worst(&rigs(), 24, 0.005);
+}
