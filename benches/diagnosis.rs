@@ -9,7 +9,8 @@
 use gripgen::identify::{CampaignOptions, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
 use gripgen::{
-    Library, Location, PullDiagnoseOptions, compare_pulls, diagnose_pull_table, load_twin_document, simulate_campaign,
+    Library, Location, PullDiagnoseOptions, compare_pulls, diagnose_pull_table, load_twin_document,
+    simulate_campaign,
 };
 use std::time::Instant;
 
@@ -45,7 +46,7 @@ fn main() {
         let once_s = started.elapsed().as_secs_f64();
         let started = Instant::now();
         let options = PullDiagnoseOptions { jobs, without: &[] };
-        let found = diagnose_pull_table(&measured, &twin, &options, &|_| {}).unwrap();
+        let found = diagnose_pull_table(&measured, &twin, &library, &options, &|_| {}).unwrap();
         let seconds = started.elapsed().as_secs_f64();
         let named: Vec<&str> = found.diagnosis.effects.iter().map(|e| e.name.as_str()).collect();
         println!("{name:20} {seconds:10.1} {:14.0}  {}", seconds / once_s, named.join(", "));

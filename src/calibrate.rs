@@ -1,6 +1,7 @@
 //! Calibration of a twin from measured pulls.
 
-use crate::diagnose::{UnknownPartError, given_model, pull_values};
+use crate::diagnose::{PullTwinError, check_fit, given_model, pull_values};
+use crate::library::Library;
 use crate::predict::PullPredictor;
 use crate::twin_edits::TwinEdits;
 use gripgen_identify::pulls::calibrate::{
@@ -15,9 +16,9 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibratePullsError {
-    /// A part that the twin lacks.
+    /// The twin.
     #[error(transparent)]
-    Part(#[from] UnknownPartError),
+    Twin(#[from] PullTwinError),
     /// The fit.
     #[error(transparent)]
     Fit(#[from] CalibrateError),
@@ -29,11 +30,13 @@ pub enum CalibratePullsError {
 pub fn calibrate_twin(
     measured: &MeasuredPulls,
     twin: &Twin,
+    library: &Library,
     request: &CalibrateRequest,
     jobs: usize,
 ) -> Result<(PullCalibration, TwinEdits), CalibratePullsError> {
-    let predictor = PullPredictor::new(measured, twin, jobs);
-    let given = given_model(twin, predictor.part_names())?;
+    check_fit(measured, twin)?;
+    let predictor = PullPredictor::new(measured, twin, library, jobs);
+    let given = given_model(twin, predictor.part_names()).map_err(PullTwinError::from)?;
     let found = calibrate_pulls(measured, &predictor, &given, request)?;
     let (low, high) = found.grip_force_n;
     let evidence = format!("gripgen calibrate pulls, {} pulls at {low} to {high} N", measured.pulls.len());

@@ -68,10 +68,12 @@ pub fn compare_pulls(
         measured.pulls.iter().enumerate().filter_map(|(i, p)| Some((i, p.trace.as_ref()?))).collect();
     let differences = in_parallel(traced.len(), jobs, |k| {
         let (row, trace) = traced[k];
-        let readings = expectations.readings(&quiet, row).measured_n;
+        let readings = expectations.readings(&quiet, row, 1.0).measured_n;
         let pulled = trace.rows().filter(|r| r.time_s >= 0.0);
         let at = |time_s: f64| readings.get((time_s * twin.wrist.rate_hz).round() as usize);
-        pulled.map_while(|r| Some(at(r.time_s)? - r.measured_force_n)).fold((0.0, 0_usize), |(s, n), d| (s + d * d, n + 1))
+        pulled
+            .map_while(|r| Some(at(r.time_s)? - r.measured_force_n))
+            .fold((0.0, 0_usize), |(s, n), d| (s + d * d, n + 1))
     });
     let (square, readings) = differences.iter().fold((0.0, 0), |(s, n), d| (s + d.0, n + d.1));
     let all = || measured.pulls.iter().zip(&label_n);

@@ -8,8 +8,8 @@ mod sensor;
 
 pub use next::NextPulls;
 pub use presses::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses, is_optics_effect};
-pub(crate) use pulls::{check_parts, pull_values};
-pub use pulls::{PullDiagnoseOptions, UnknownPartError, diagnose_pull_table, given_model};
+pub use pulls::{PullDiagnoseOptions, PullTwinError, UnknownPartError, diagnose_pull_table, given_model};
+pub(crate) use pulls::{check_fit, check_parts, pull_values};
 pub use sensor::{
     calibrate_sensor_table, compare_sensor_table, diagnose_sensor_table, is_sensor_table, load_sensor_table,
     sensor_calibration_edits,

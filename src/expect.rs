@@ -8,9 +8,7 @@ use crate::cache::Cache;
 use crate::generate::{PatchFriction, SampleError, sensor_chain};
 use crate::gripped::{Press, grip_point, held, jaw_forces_n};
 use crate::library::Library;
-use gripgen_physics::{
-    Command, Held, JawFriction, PullSession, Signals, label_moments,
-};
+use gripgen_physics::{Command, Held, JawFriction, PullSession, Signals, label_moments};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::Mechanics;
 use gripgen_twin::effects::{CommandChain, OutsideFit, imprint_volume_m3, jaw_tilt_rad};
@@ -41,8 +39,11 @@ const SMOOTH_NODES: [(f64, f64); 9] = [
     (4.512_745_863_399_783, 2.234_584_400_774_66e-5),
 ];
 
-/// Nodes where it is not: a force that falls after the slip makes the label jump from step to step of the staircase.
-const STRATA: usize = 40;
+/// Where it is not: a force that falls by so much after the slip makes the label jump by as much from step to step of the
+/// staircase. Falls below this are lost in the scatter.
+const SMALL_FALL_N: f64 = 0.1;
+/// Equal parts of the distribution then, and one more for each so many newtons of the fall, up to the most.
+const STRATA: (usize, f64, usize) = (12, 0.05, 40);
 
 /// Standard deviations of noise within which a reading counts as possible.
 const WIDE: f64 = 7.0;
@@ -114,10 +115,16 @@ impl<'a> Expectations<'a> {
             let plain = known
                 .entry([p.increment_n.to_bits(), p.step_s.to_bits()])
                 .or_insert_with(|| Arc::new(Staircase::constant(p.increment_n, p.step_s, MAX_TIME_S)));
-            let own = p.trace.as_ref().and_then(|t| Staircase::of_trace(t, p.increment_n, p.step_s, MAX_TIME_S));
+            let own =
+                p.trace.as_ref().and_then(|t| Staircase::of_trace(t, p.increment_n, p.step_s, MAX_TIME_S));
             own.map_or_else(|| plain.clone(), Arc::new)
         });
         Self { measured, library, staircases: staircases.collect(), patches: Cache::new(PATCHES) }
+    }
+
+    /// The commands of the pull at `row`; pulls with the same ones share them.
+    pub(crate) fn staircase(&self, row: usize) -> &Arc<Staircase> {
+        &self.staircases[row]
     }
 
     /// What is expected of the pull at `row` on a twin, its friction multiplied by `factor`.
@@ -125,17 +132,16 @@ impl<'a> Expectations<'a> {
         let Ok(prepared) = self.prepared(quiet, row) else { return Expected::default() };
         let factor = factor * table_factor(&quiet.twin, &prepared.scenario);
         let part = &quiet.twin.parts[&prepared.scenario.part];
-        let (mut sums, mut limit_n) = ((0.0, 0.0, 0.0), 0.0);
+        let mean = prepared.friction(&quiet.twin, factor);
+        let limit_n = mean.left.limit_n() + mean.right.limit_n();
+        let mut sums = (0.0, 0.0, 0.0);
         let decided_n = self.measured.label_tolerance_n + WIDE * quiet.noise_n;
-        for (weight, z) in nodes(part.scatter, part.kinetic_ratio) {
+        for (weight, z) in nodes(part.scatter, (1.0 - part.kinetic_ratio) * limit_n) {
             let friction = prepared.friction(&quiet.twin, (factor * (1.0 + part.scatter * z)).max(0.0));
-            if z == 0.0 {
-                limit_n = friction.left.limit_n() + friction.right.limit_n();
-            }
             let Ok(readings) = self.pull(quiet, row, &prepared, &friction, decided_n) else { continue };
             let both = readings.desired_n.iter().zip(&readings.measured_n);
-            let (mean, variance) =
-                label_moments(both, self.measured.label_tolerance_n, quiet.noise_n).unwrap_or_else(|| {
+            let (mean, variance) = label_moments(both, self.measured.label_tolerance_n, quiet.noise_n)
+                .unwrap_or_else(|| {
                     // A reading that was never near the command: the reading at the slip stands in.
                     let at = readings.slip_tick.unwrap_or(readings.measured_n.len()).saturating_sub(1);
                     (readings.measured_n.get(at).copied().unwrap_or(0.0), 0.0)
@@ -147,26 +153,15 @@ impl<'a> Expectations<'a> {
             return Expected { limit_n, ..Expected::default() };
         }
         let label_n = mean / weight;
-        if limit_n == 0.0 {
-            let friction = prepared.friction(&quiet.twin, factor);
-            limit_n = friction.left.limit_n() + friction.right.limit_n();
-        }
         Expected { limit_n, label_n, label_sd_n: (square / weight - label_n * label_n).max(0.0).sqrt() }
     }
 
-    /// Readings of the pull at `row` without scatter and noise, to its end.
-    pub(crate) fn readings(&self, quiet: &QuietTwin, row: usize) -> Readings {
+    /// Readings of the pull at `row` without scatter and noise, to its end, its friction multiplied by `factor`.
+    pub(crate) fn readings(&self, quiet: &QuietTwin, row: usize, factor: f64) -> Readings {
         let Ok(prepared) = self.prepared(quiet, row) else { return Readings::default() };
-        let factor = table_factor(&quiet.twin, &prepared.scenario);
+        let factor = factor * table_factor(&quiet.twin, &prepared.scenario);
         let friction = prepared.friction(&quiet.twin, factor);
         self.pull(quiet, row, &prepared, &friction, f64::INFINITY).unwrap_or_default()
-    }
-
-    /// What the jaws of the pull at `row` hold, without scatter.
-    pub(crate) fn limit_n(&self, quiet: &QuietTwin, row: usize) -> f64 {
-        let Ok(prepared) = self.prepared(quiet, row) else { return 0.0 };
-        let friction = prepared.friction(&quiet.twin, table_factor(&quiet.twin, &prepared.scenario));
-        friction.left.limit_n() + friction.right.limit_n()
     }
 
     fn scenario(&self, row: usize) -> Scenario {
@@ -273,15 +268,17 @@ impl Prepared {
     }
 }
 
-/// Weights and standard normal nodes over which friction scatters.
-fn nodes(scatter: f64, kinetic_ratio: f64) -> Vec<(f64, f64)> {
+/// Weights and standard normal nodes over which friction scatters, for a force that falls by `fall_n` after the slip.
+fn nodes(scatter: f64, fall_n: f64) -> Vec<(f64, f64)> {
     if scatter == 0.0 {
         return vec![(1.0, 0.0)];
     }
-    if kinetic_ratio == 1.0 {
+    if fall_n < SMALL_FALL_N {
         return SMOOTH_NODES[1..8].iter().map(|&(z, w)| (w, z)).collect();
     }
-    (0..STRATA).map(|i| (1.0, normal_quantile((i as f64 + 0.5) / STRATA as f64))).collect()
+    let (fewest, each_n, most) = STRATA;
+    let n = (fewest + (fall_n / each_n) as usize).min(most);
+    (0..n).map(|i| (1.0, normal_quantile((i as f64 + 0.5) / n as f64))).collect()
 }
 
 fn patch_key(twin: &Twin, scenario: &Scenario, force_n: &PerJaw<f64>) -> PatchKey {

@@ -14,8 +14,8 @@ use gripgen_twin::config::{Backend, ConfigError, ImageStorage, Mechanics, TraceS
 use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    ContactPatch, FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw, Pulled, Sample,
-    Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
+    ContactPatch, FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw,
+    Pulled, Sample, Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
 };
 use std::sync::Arc;
 

@@ -86,7 +86,8 @@ pub fn load_pulls_of(folders: &[&Path]) -> Result<LoadedPulls, LoadPullsError> {
     for path in rest {
         join(path, &mut all, load_pulls(path)?)?;
     }
-    if folders.len() > 1 {
+    // Samples of a sweep know no rests, so those of several are not counted either.
+    if folders.len() > 1 && !folders.iter().any(|path| is_sweep(path)) {
         all.pulls.count_rests();
     }
     Ok(all)
@@ -157,6 +158,11 @@ impl LeftOut {
         }
         notes
     }
+}
+
+/// Whether a folder holds samples of a sweep.
+fn is_sweep(path: &Path) -> bool {
+    RunFolder::open(path).is_ok_and(|folder| folder.info().source != RIG_SOURCE)
 }
 
 fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {

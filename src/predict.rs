@@ -1,14 +1,17 @@
-//! Predictions of measured pulls by the reduced mechanics without inertia: expected values over scatter and noise.
+//! Predictions of measured pulls for fits: by the reduced mechanics without inertia, which is fast, and through the simulator,
+//! which is what a twin is judged by. Expected values over scatter and noise.
 
 mod signals;
 mod table;
 
 use crate::cache::Cache;
+use crate::expect::{Expectations, QuietTwin};
+use crate::library::Library;
 use crate::parallel::in_parallel;
 use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
-use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
+use gripgen_physics::{QuasiStatic, StuckPull};
 use gripgen_twin::config::Feedback;
-use gripgen_twin::effects::{CommandChain, GripPoint, SensorChain};
+use gripgen_twin::effects::{CommandChain, Effect, GripPoint, OutsideFit, Per, SensorChain};
 use gripgen_twin::{Jaw, MeasuredPulls, Robot, Staircase, Twin};
 use signals::Signals;
 use std::cell::RefCell;
@@ -39,11 +42,13 @@ const CLOCKS: [&str; 2] = ["sensor_drift", "sensor_gain_drift"];
 /// Predicts the pulls of a campaign on a rig.
 pub struct PullPredictor<'a> {
     measured: &'a MeasuredPulls,
+    /// The twin that models are variations of, and its pulls through the simulator.
+    twin: Twin,
+    expectations: Expectations<'a>,
     robot: Robot,
     rate_hz: f64,
-    /// Commands of the campaign: height and length of a step.
-    profiles: Vec<(f64, f64)>,
-    staircases: Vec<Staircase>,
+    /// Commands of the campaign: those planned, and those that traces bring themselves.
+    staircases: Vec<Arc<Staircase>>,
     profile_of: Vec<usize>,
     part_names: Vec<String>,
     part_of: Vec<usize>,
@@ -98,21 +103,20 @@ fn acts_on_signals(model: &PullModel) -> bool {
 type Key = (usize, bool, Vec<u64>);
 
 impl<'a> PullPredictor<'a> {
-    /// For the pulls of a campaign on the rig of `twin`. `jobs` threads share the work.
-    pub fn new(measured: &'a MeasuredPulls, twin: &Twin, jobs: usize) -> Self {
-        let mut profiles: Vec<(f64, f64)> = Vec::new();
-        let profile_of = measured
-            .pulls
-            .iter()
-            .map(|p| {
-                let own = (p.increment_n, p.step_s);
-                profiles.iter().position(|q| *q == own).unwrap_or_else(|| {
-                    profiles.push(own);
-                    profiles.len() - 1
+    /// For the pulls of a campaign on the rig of `twin`, whose files `library` holds. `jobs` threads share the work.
+    pub fn new(measured: &'a MeasuredPulls, twin: &Twin, library: &'a Library, jobs: usize) -> Self {
+        let expectations = Expectations::new(measured, library);
+        // Pulls with the same commands share a staircase, and then a profile.
+        let mut staircases: Vec<Arc<Staircase>> = Vec::new();
+        let profile_of = (0..measured.pulls.len())
+            .map(|row| {
+                let own = expectations.staircase(row);
+                staircases.iter().position(|known| Arc::ptr_eq(known, own)).unwrap_or_else(|| {
+                    staircases.push(own.clone());
+                    staircases.len() - 1
                 })
             })
             .collect();
-        let staircases = profiles.iter().map(|&(n, s)| Staircase::constant(n, s, MOST_TIME_S)).collect();
         let mut part_names: Vec<String> = measured.pulls.iter().map(|p| p.part.clone()).collect();
         part_names.sort();
         part_names.dedup();
@@ -125,9 +129,10 @@ impl<'a> PullPredictor<'a> {
         robot.feedback = measured.feedback.unwrap_or(robot.feedback);
         Self {
             measured,
+            twin: twin.clone(),
+            expectations,
             robot,
             rate_hz: twin.wrist.rate_hz,
-            profiles,
             staircases,
             profile_of,
             part_names,
@@ -146,29 +151,52 @@ impl<'a> PullPredictor<'a> {
         &self.part_names
     }
 
-    /// Readings of pull `row` at `times_s` without scatter and noise, as far as the pull lasts.
-    pub fn expected_trace_n(&self, model: &PullModel, row: usize, times_s: &[f64]) -> Vec<f64> {
-        let stuck = self.stuck(model, row);
-        let (sensor, command) = (self.sensor(model, row), self.command(model, row));
-        let mut slip = SlipPull::default();
-        let staircase = &self.staircases[self.profile_of[row]];
-        let rig = self.rig(model);
-        let limit_n = self.limit_n(model, row);
-        rig.slip(
-            &stuck,
-            staircase,
-            limit_n,
-            model.kinetic_ratio,
-            f64::INFINITY,
-            &sensor,
-            &command,
-            &mut slip,
-        );
-        let at = |tick: usize| match tick.checked_sub(slip.slip_tick) {
-            None => stuck.reading_n.get(tick).copied(),
-            Some(after) => slip.reading_n.get(after).copied(),
+    /// The twin that a model describes: the one that is written for it.
+    pub fn twin_of(&self, model: &PullModel) -> Twin {
+        let mut twin = self.twin.clone();
+        twin.tables.clear();
+        (twin.robot.lag_s, twin.robot.dead_time_s) = (model.lag_s, model.dead_time_s);
+        twin.robot.feedback = self.robot.feedback;
+        if model.damping_n_s_per_m != twin.robot.damping_n_s_per_m {
+            twin.robot.damping_n_s_per_m = model.damping_n_s_per_m;
+            twin.robot.speed_limit_m_per_s = speed_limit_m_per_s(model.damping_n_s_per_m);
+        }
+        let both = twin.gel.left.shear_stiffness_n_per_m + twin.gel.right.shear_stiffness_n_per_m;
+        if model.stiffness_n_per_m != both {
+            for jaw in Jaw::BOTH {
+                twin.gel[jaw].shear_stiffness_n_per_m = 0.5 * model.stiffness_n_per_m;
+            }
+        }
+        twin.wrist.noise_n = model.noise_n;
+        for (name, mu) in self.part_names.iter().zip(&model.mu) {
+            if let Some(part) = twin.parts.get_mut(name) {
+                (part.mu, part.scatter) = (*mu, model.scatter);
+                (part.kinetic_ratio, part.kinetic_fall_s) = (model.kinetic_ratio, model.fall_s);
+            }
+        }
+        let named = |effect: &ModelEffect| Effect {
+            spec: effect.spec,
+            part: effect.part.map(|p| self.part_names[p].clone()),
+            values: effect.values.clone(),
+            fitted_grip_force_n: None,
+            outside_fit: OutsideFit::Extrapolate,
+            per: Per::Jaw,
+            reference_area_m2: None,
         };
-        times_s.iter().map_while(|t| at((t * self.rate_hz).round().max(0.0) as usize)).collect()
+        twin.effects = model.effects.iter().map(named).collect();
+        twin
+    }
+
+    /// Readings of pull `row` at `times_s` of the twin that `model` describes, without scatter and noise, as far as the pull
+    /// lasts.
+    pub fn simulated_trace_n(&self, model: &PullModel, row: usize, times_s: &[f64]) -> Vec<f64> {
+        let quiet = QuietTwin::new(&self.twin_of(model));
+        let factor = model.factor.get(row).copied().unwrap_or(1.0);
+        let readings = self.expectations.readings(&quiet, row, factor).measured_n;
+        times_s
+            .iter()
+            .map_while(|t| readings.get((t * self.rate_hz).round().max(0.0) as usize).copied())
+            .collect()
     }
 
     /// What the force loop closes on.
@@ -181,8 +209,9 @@ impl<'a> PullPredictor<'a> {
         robot.lag_s = model.lag_s;
         robot.dead_time_s = model.dead_time_s;
         robot.damping_n_s_per_m = model.damping_n_s_per_m;
-        // A loop that yields easily moves fast: its limit is a force of 40 N beyond the contact, as in the shipped twin.
-        robot.speed_limit_m_per_s = robot.speed_limit_m_per_s.max(40.0 / model.damping_n_s_per_m);
+        if model.damping_n_s_per_m != self.twin.robot.damping_n_s_per_m {
+            robot.speed_limit_m_per_s = speed_limit_m_per_s(model.damping_n_s_per_m);
+        }
         QuasiStatic {
             robot,
             stiffness_n_per_m: model.stiffness_n_per_m,
@@ -278,7 +307,7 @@ impl<'a> PullPredictor<'a> {
     }
 
     fn slots(&self) -> usize {
-        2 * self.profiles.len()
+        2 * self.staircases.len()
     }
 
     /// Pulls of one profile and direction share a place.
@@ -368,6 +397,11 @@ impl<'a> PullPredictor<'a> {
     }
 }
 
+/// A loop that yields easily moves fast: its limit is a force of 40 N beyond the contact, as in the shipped twin.
+pub(crate) fn speed_limit_m_per_s(damping_n_s_per_m: f64) -> f64 {
+    (40.0 / damping_n_s_per_m).clamp(0.02, 1.5)
+}
+
 impl PredictPulls for PullPredictor<'_> {
     fn pulls(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
         let clock = model
@@ -386,6 +420,14 @@ impl PredictPulls for PullPredictor<'_> {
                 first.at(limit_n).mixed(&second.at(limit_n), *weight)
             })
             .collect()
+    }
+
+    fn labels_n(&self, model: &PullModel, rows: &[usize]) -> Vec<f64> {
+        let quiet = QuietTwin::new(&self.twin_of(model));
+        in_parallel(rows.len(), self.jobs, |k| {
+            let factor = model.factor.get(rows[k]).copied().unwrap_or(1.0);
+            self.expectations.expected(&quiet, rows[k], factor).label_n
+        })
     }
 
     fn slips(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {

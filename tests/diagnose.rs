@@ -26,7 +26,8 @@ fn library(twin: &Twin) -> Library {
 
 fn diagnose(measured: &MeasuredPulls, without: &[&str]) -> Diagnosed {
     let options = PullDiagnoseOptions { jobs: 2, without };
-    diagnose_pull_table(measured, &twin_at(&baseline()), &options, &|_| {}).unwrap()
+    let twin = twin_at(&baseline());
+    diagnose_pull_table(measured, &twin, &library(&twin), &options, &|_| {}).unwrap()
 }
 
 fn names(diagnosis: &Diagnosis) -> Vec<&str> {
@@ -140,6 +141,29 @@ fn an_effect_of_the_simulator_is_found_and_put_into_the_twin() {
     let plain = Twin::new(&plain).unwrap();
     assert_eq!(plain.effects.len(), 0);
     assert!(compare_pulls(&measured, &plain, &library(&plain), 2).unwrap().pulls.rmse_n > after);
+}
+
+/// The twin that is written is the fitted model: with a force that falls after the slip, and with an effect, the error that is
+/// stated is the one that a comparison with that twin gets on those pulls.
+#[test]
+fn the_stated_error_is_that_of_the_written_twin() {
+    let falls = ("parts.long_shaft.kinetic_fall_s", "0.012");
+    let kinetic = ("parts.long_shaft.kinetic_ratio", "0.88");
+    let gain = "[[effects]]\nname = \"sensor_gain_drift\"\nrate_per_h = 0.05\n";
+    for (effects, sets) in [("", vec![falls, kinetic]), (gain, vec![]), (gain, vec![falls, kinetic])] {
+        let measured = simulated(effects, 90, &sets);
+        let found = diagnose(&measured, &[]);
+        let stated = found.diagnosis.error.as_ref().unwrap().after.rmse_n.unwrap();
+        let floor = found.diagnosis.noise_floor_n.unwrap();
+        let with = Twin::new(&edited_twin(&baseline(), &[], &found.edits).unwrap()).unwrap();
+        let compared = compare_pulls(&measured, &with, &library(&with), 2).unwrap().pulls.rmse_n;
+        println!(
+            "{sets:?}: {:?}, stated {stated:.3} N, compared {compared:.3} N, floor {floor:.3} N",
+            names(&found.diagnosis)
+        );
+        assert!((0.95..=1.05).contains(&(compared / stated)), "{sets:?}: {compared} against {stated}");
+        assert!(stated < 1.15 * floor, "{sets:?}: {stated}, floor {floor}");
+    }
 }
 
 #[test]
@@ -297,7 +321,8 @@ fn the_offset_law_is_fitted_with_its_uncertainty() {
     let law = "[[effects]]\nname = \"load_offset\"\npart = \"long_shaft\"\na = 1.05\nb_n = -3.2\n";
     let measured = simulated(law, 120, &[]);
     let request = CalibrateRequest { offset_law: true, effects: vec![] };
-    let (found, edits) = calibrate_twin(&measured, &twin_at(&baseline()), &request, 2).unwrap();
+    let twin = twin_at(&baseline());
+    let (found, edits) = calibrate_twin(&measured, &twin, &library(&twin), &request, 2).unwrap();
     let fitted = &found.laws[0];
     assert!((fitted.a.value - 1.05).abs() < 0.04, "{fitted:?}");
     assert!((fitted.b_n.value + 3.2).abs() < 0.6, "{fitted:?}");

@@ -277,6 +277,7 @@ fn check(path: &Path, folder: &RunFolder, pulls: &[RigPull], made: usize) {
     let compared = compare_pulls(&measured, twin.twin(), &twin.project().library, 2).unwrap();
     assert_eq!((compared.pulls.n, measured.pulls.len()), (made - 1, made - 1));
     let options = PullDiagnoseOptions { jobs: 2, without: &[] };
-    let found = diagnose_pull_table(&measured, twin.twin(), &options, &|_| {}).unwrap();
+    let found =
+        diagnose_pull_table(&measured, twin.twin(), &twin.project().library, &options, &|_| {}).unwrap();
     assert_eq!(found.diagnosis.data.pulls, Some(made - 1));
 }

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
+// A pull, integrated by other code.
+mod bristles;
 // Campaigns: planned, made on a twin, written, and read as measurements.
 mod campaign;
 // What several tests share.

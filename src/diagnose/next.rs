@@ -1,5 +1,6 @@
 //! The next pulls: those that best tell apart what a diagnosis could not.
 
+use crate::library::Library;
 use crate::predict::PullPredictor;
 use gripgen_identify::pulls::answer::PullFits;
 use gripgen_identify::pulls::fitting::Fitted;
@@ -79,6 +80,7 @@ pub(crate) fn next_pulls(
     fits: &PullFits,
     measured: &MeasuredPulls,
     twin: &Twin,
+    library: &Library,
     jobs: usize,
 ) -> Option<NextPulls> {
     // An accepted effect, what is tied with it, and the model with that in its place.
@@ -95,7 +97,7 @@ pub(crate) fn next_pulls(
     }
     let (planned, after_rest) = grid(measured, twin);
     let candidates = as_measured(measured, &planned, &after_rest);
-    let predictor = PullPredictor::new(&candidates, twin, jobs);
+    let predictor = PullPredictor::new(&candidates, twin, library, jobs);
     let rows: Vec<usize> = (0..planned.len()).collect();
     let labels =
         |model: &PullModel| -> Vec<f64> { predictor.pulls(model, &rows).iter().map(|p| p.label_n).collect() };

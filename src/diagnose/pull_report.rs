@@ -3,7 +3,6 @@
 use crate::predict::PullPredictor;
 use crate::report::{EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
 use gripgen_identify::pulls::answer::{PullAnswer, PullFits};
-use gripgen_identify::pulls::model::PredictPulls;
 use gripgen_identify::pulls::search::{Entry, Rival};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::find;
@@ -191,20 +190,14 @@ fn curves(measured: &MeasuredPulls, predictor: &PullPredictor<'_>, fits: &PullFi
     let shown = CURVES.min(traced.len());
     let rows: Vec<usize> = (0..shown).map(|k| traced[k * (traced.len() - 1) / (shown.max(2) - 1)]).collect();
     let model = &fits.after.model;
-    let slips = predictor.slips(model, &rows);
     rows.iter()
-        .zip(slips)
-        .filter_map(|(&row, slip)| {
+        .filter_map(|&row| {
             let pull = &measured.pulls[row];
             let trace = pull.trace.as_ref()?;
             // What follows the slip is a tool that runs to its stop.
             let kept = trace.until_displacement(measured.stop_m);
-            let predicted = predictor.trace(model, row, &kept.time_s);
-            let mut slipped = false;
-            let simulated = kept.time_s.iter().zip(&predicted.stuck_n).map(|(&t, &stuck_n)| {
-                slipped |= stuck_n >= slip.limit_reading_n;
-                (t, if slipped { model.kinetic_ratio * slip.limit_reading_n } else { stuck_n })
-            });
+            let pulled: Vec<f64> = kept.time_s.iter().copied().filter(|t| *t >= 0.0).collect();
+            let simulated = predictor.simulated_trace_n(model, row, &pulled);
             let line = |name: &str, points: Vec<(f64, f64)>| Series {
                 name: name.into(),
                 mark: Mark::Line,
@@ -219,7 +212,7 @@ fn curves(measured: &MeasuredPulls, predictor: &PullPredictor<'_>, fits: &PullFi
                 x_words: Vec::new(),
                 series: vec![
                     line("measured", column(&kept.measured_force_n)),
-                    line("twin", simulated.collect()),
+                    line("twin", pulled.iter().copied().zip(simulated).collect()),
                     line("command", column(&kept.desired_force_n)),
                 ],
             })

@@ -2,7 +2,8 @@
 
 use super::next::next_pulls;
 use super::pull_report::pull_report;
-use crate::predict::PullPredictor;
+use crate::library::Library;
+use crate::predict::{PullPredictor, speed_limit_m_per_s};
 use crate::report::Diagnosed;
 use crate::twin_edits::{EditedValue, TwinEdits};
 use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
@@ -11,7 +12,7 @@ use gripgen_identify::pulls::data::{Column, PullData};
 use gripgen_identify::pulls::fitting::Fitted;
 use gripgen_identify::pulls::model::PullModel;
 use gripgen_identify::{Diagnosis, ParameterEstimate};
-use gripgen_twin::config::{CalibrationFile, EffectFile};
+use gripgen_twin::config::{CalibrationFile, EffectFile, Twist};
 use gripgen_twin::effects::OutsideFit;
 use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Twin};
 use std::collections::BTreeMap;
@@ -44,6 +45,41 @@ pub(crate) fn check_parts(measured: &MeasuredPulls, twin: &Twin) -> Result<(), U
     measured.pulls.iter().try_for_each(|pull| known_part(twin, &pull.part).map(drop))
 }
 
+/// Why pulls cannot be held against a twin.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PullTwinError {
+    /// A part that the twin lacks.
+    #[error(transparent)]
+    Part(#[from] UnknownPartError),
+    /// A twin whose grips turn: what an off-centre pull loses then is no effect that could be fitted.
+    #[error("robot.twist = \"free\": fits need a grip that does not turn")]
+    FreeTwist,
+}
+
+impl PullTwinError {
+    /// What to do about it.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            PullTwinError::Part(_) => {
+                "name a twin that has this part with --twin, or the column `part` as the twin does"
+            }
+            PullTwinError::FreeTwist => {
+                "set robot.twist = \"stiff\"; the effect `off_centre` then stands for what is lost"
+            }
+        }
+    }
+}
+
+/// Whether fits can start from this twin.
+pub(crate) fn check_fit(measured: &MeasuredPulls, twin: &Twin) -> Result<(), PullTwinError> {
+    check_parts(measured, twin)?;
+    if twin.robot.twist == Twist::Free {
+        return Err(PullTwinError::FreeTwist);
+    }
+    Ok(())
+}
+
 /// What a twin says of pulls, without its effects: where fits start.
 pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPartError> {
     let found = parts.iter().map(|name| known_part(twin, name)).collect::<Result<Vec<_>, _>>()?;
@@ -70,16 +106,18 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
 const MOST_PULLS: usize = 2000;
 
 /// Diagnoses a campaign of pulls. `progress` is told the share that is done. Of a very long campaign every so many pulls are
-/// looked at, and a note says so.
+/// looked at, and a note says so. `library` holds the files of the twin.
 pub fn diagnose_pull_table(
     measured: &MeasuredPulls,
     twin: &Twin,
+    library: &Library,
     options: &PullDiagnoseOptions<'_>,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<Diagnosed, UnknownPartError> {
+) -> Result<Diagnosed, PullTwinError> {
+    check_fit(measured, twin)?;
     let step = measured.pulls.len().div_ceil(MOST_PULLS);
     if step > 1 {
-        let mut found = diagnose_pull_table(&measured.every(step), twin, options, progress)?;
+        let mut found = diagnose_pull_table(&measured.every(step), twin, library, options, progress)?;
         let note = format!(
             "one of every {step} of {} pulls was looked at, {} of them",
             measured.pulls.len(),
@@ -88,7 +126,7 @@ pub fn diagnose_pull_table(
         found.diagnosis.notes.insert(0, note);
         return Ok(found);
     }
-    let predictor = PullPredictor::new(measured, twin, options.jobs);
+    let predictor = PullPredictor::new(measured, twin, library, options.jobs);
     let given = given_model(twin, predictor.part_names())?;
     let asked = PullOptions { without: options.without };
     let answer = diagnose_pulls(measured, &predictor, &given, &asked, progress);
@@ -96,7 +134,7 @@ pub fn diagnose_pull_table(
         answer.fits.as_ref().map(|f| edits(f, &answer.diagnosis, measured, &predictor)).unwrap_or_default();
     let report = pull_report(measured, &predictor, &answer);
     let next = match &answer.fits {
-        Some(fits) => next_pulls(fits, measured, twin, options.jobs),
+        Some(fits) => next_pulls(fits, measured, twin, library, options.jobs),
         None => None,
     };
     let mut diagnosis = answer.diagnosis;
@@ -126,14 +164,14 @@ pub(crate) fn pull_values(
     for (name, mu) in parts.iter().zip(&model.mu) {
         set(format!("parts.{name}.mu"), *mu, interval(&format!("parts.{name}.mu")));
         set(format!("parts.{name}.kinetic_ratio"), model.kinetic_ratio, interval("kinetic_ratio"));
+        set(format!("parts.{name}.kinetic_fall_s"), model.fall_s, None);
         set(format!("parts.{name}.scatter"), scatter, None);
     }
     set("robot.lag_s".into(), model.lag_s, interval("robot.lag_s"));
     set("robot.dead_time_s".into(), model.dead_time_s, interval("robot.dead_time_s"));
     if baseline.contains_key("robot.damping_n_s_per_m") {
         set("robot.damping_n_s_per_m".into(), model.damping_n_s_per_m, None);
-        let fast_mm_s = (40.0 / model.damping_n_s_per_m * 1e3).clamp(20.0, 1500.0);
-        set("robot.speed_limit_mm_s".into(), fast_mm_s, None);
+        set("robot.speed_limit_mm_s".into(), 1e3 * speed_limit_m_per_s(model.damping_n_s_per_m), None);
         set("wrist.noise_n".into(), model.noise_n, None);
         for jaw in ["left", "right"] {
             set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), model.stiffness_n_per_m * 0.5e-3, None);

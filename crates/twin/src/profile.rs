@@ -122,6 +122,29 @@ mod tests {
         }
     }
 
+    /// A trace of rows every 10 ms brings steps that nobody planned, each begun between two rows; nominal steps are left alone.
+    #[test]
+    fn a_trace_brings_its_own_staircase() {
+        let mut lengths = [0.13, 0.09, 0.1, 0.075].into_iter().cycle();
+        let made = Staircase::from_steps(1.0, 3.0, || lengths.next().unwrap());
+        let plain = Staircase::constant(1.0, 0.104, 3.0);
+        let traced = |stairs: &Staircase| -> PullTrace {
+            let row = |i: i32| {
+                let time_s = 0.01 * f64::from(i);
+                let desired_force_n = stairs.desired_n(time_s);
+                crate::TraceRow { time_s, desired_force_n, measured_force_n: 0.0, displacement_m: 0.0 }
+            };
+            (0..200).map(row).collect()
+        };
+        assert_eq!(Staircase::of_trace(&traced(&plain), 1.0, 0.104, 3.0), None);
+        let found = Staircase::of_trace(&traced(&made), 1.0, 0.104, 3.0).unwrap();
+        for (a, b) in found.starts_s.iter().zip(&made.starts_s).take_while(|(_, b)| **b < 1.98) {
+            assert!((a - b).abs() <= 0.0101, "{a} and {b}");
+        }
+        assert!(found.starts_s.last().unwrap() > &2.8, "it goes on after the trace");
+        assert_eq!(Staircase::of_trace(&traced(&made), 0.7, 0.104, 3.0), None, "no staircase of 0.7 N");
+    }
+
     #[test]
     fn uneven_steps_keep_their_lengths_and_never_fall() {
         let mut lengths = [0.1, 0.3, 0.05].into_iter().cycle();

@@ -1,6 +1,6 @@
 //! `gripgen calibrate pulls`: fit a twin to measured pulls.
 
-use super::diagnose::{folders, jobs, load_twin, no_pulls};
+use super::diagnose::{folders, jobs, load_library, load_twin, no_pulls};
 use crate::args::CalibratePullsArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, writable};
@@ -19,19 +19,23 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     let measured = folders(&args.measured, &args.also);
     let loaded = load_pulls_of(&measured).map_err(|e| no_pulls(&measured, e))?;
     let twin = load_twin(&args.twin, &args.set)?;
+    let library = load_library(&twin, &args.twin)?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let request = CalibrateRequest { offset_law: args.law.is_some(), effects: args.fit.clone() };
-    let (found, mut edits) = calibrate_twin(&loaded.pulls, &twin, &request, jobs()).map_err(|e| {
-        let hint = match &e {
-            CalibratePullsError::Part(_) => "name a twin that has this part with --twin",
-            CalibratePullsError::Fit(CalibrateError::UnknownEffect(_)) => "docs/model.md lists the effects",
-            CalibratePullsError::Fit(CalibrateError::NotExcited { .. }) => {
-                "`gripgen campaign` plans pulls that vary everything"
-            }
-            _ => "`gripgen campaign` plans pulls that can be calibrated",
-        };
-        Failure::usage(e).hint(hint)
-    })?;
+    let (found, mut edits) =
+        calibrate_twin(&loaded.pulls, &twin, &library, &request, jobs()).map_err(|e| {
+            let hint = match &e {
+                CalibratePullsError::Twin(e) => e.hint(),
+                CalibratePullsError::Fit(CalibrateError::UnknownEffect(_)) => {
+                    "docs/model.md lists the effects"
+                }
+                CalibratePullsError::Fit(CalibrateError::NotExcited { .. }) => {
+                    "`gripgen campaign` plans pulls that vary everything"
+                }
+                _ => "`gripgen campaign` plans pulls that can be calibrated",
+            };
+            Failure::usage(e).hint(hint)
+        })?;
     let twin_at = Location::parse(&args.twin);
     let imprints = calibrate_imprints(&args.measured, &loaded.pulls, &twin_at, &args.set).map_err(|e| {
         Failure::usage(e).hint("images/<pull_id>_left.png and _right.png have the size of the twin's sensor")

@@ -1,7 +1,7 @@
 //! `gripgen campaign`: plan a campaign.
 
 use super::diagnose::output::next_toml;
-use super::diagnose::{diagnose_folders, load_twin, within_rig};
+use super::diagnose::{diagnose_folders, load_library, load_twin, within_rig};
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, program, writable, write_file};
@@ -83,7 +83,8 @@ fn first(args: &CampaignArgs, twin: &Twin) -> Result<Campaign, Failure> {
 
 /// The pulls that separate what a diagnosis of `measured` leaves tied.
 fn separating(args: &CampaignArgs, measured: &Path, twin: &Twin) -> Result<NextPulls, Failure> {
-    let diagnosed = diagnose_folders(&[measured], twin, &[], &args.talk)?;
+    let library = load_library(twin, &args.twin)?;
+    let diagnosed = diagnose_folders(&[measured], twin, &library, &[], &args.talk)?;
     diagnosed.next.ok_or_else(|| {
         let found =
             format!("--separate: {} leaves nothing tied that pulls could separate", measured.display());

@@ -11,8 +11,8 @@ use crate::progress::Share;
 use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
 use gripgen::{
-    Diagnosed, Library, Location, PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_press_set,
-    is_sensor_table, load_pulls_of, load_sensor_table, load_twin_document,
+    Diagnosed, Library, Location, PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table,
+    is_press_set, is_sensor_table, load_pulls_of, load_sensor_table, load_twin_document,
 };
 use std::path::{Path, PathBuf};
 
@@ -87,7 +87,8 @@ fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
             .hint(format!("the effects: {}", ids.join(", "))));
     }
     let without: Vec<&str> = args.without.iter().map(String::as_str).collect();
-    diagnose_folders(&folders(&args.measured, &args.also), &twin, &without, &args.talk)
+    let library = load_library(&twin, &args.twin)?;
+    diagnose_folders(&folders(&args.measured, &args.also), &twin, &library, &without, &args.talk)
 }
 
 /// Folders that are read as one campaign.
@@ -99,18 +100,16 @@ pub fn folders<'a>(measured: &'a Path, also: &'a [PathBuf]) -> Vec<&'a Path> {
 pub fn diagnose_folders(
     measured: &[&Path],
     twin: &Twin,
+    library: &Library,
     without: &[&str],
     talk: &TalkArgs,
 ) -> Result<Diagnosed, Failure> {
     let loaded = load_pulls_of(measured).map_err(|e| no_pulls(measured, e))?;
     let options = PullDiagnoseOptions { jobs: jobs(), without };
     let share = Share::start("diagnosing", talk);
-    let diagnosed = diagnose_pull_table(&loaded.pulls, twin, &options, &|x| share.at(x));
+    let diagnosed = diagnose_pull_table(&loaded.pulls, twin, library, &options, &|x| share.at(x));
     share.finish();
-    let mut diagnosed = diagnosed.map_err(|e| {
-        Failure::usage(e)
-            .hint("name a twin that has this part with --twin, or the column `part` as the twin does")
-    })?;
+    let mut diagnosed = diagnosed.map_err(|e| Failure::usage(&e).hint(e.hint()))?;
     diagnosed.diagnosis.notes.extend(loaded.notes);
     Ok(diagnosed)
 }

@@ -2,7 +2,7 @@
 
 use super::{assert_code, gripgen, run, text};
 use gripgen::twin::Twin;
-use gripgen::{BASELINE_TWIN, Location, PullDiagnoseOptions, diagnose_pull_table, load_pulls_of};
+use gripgen::{BASELINE_TWIN, Library, Location, PullDiagnoseOptions, diagnose_pull_table, load_pulls_of};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
@@ -68,6 +68,7 @@ fn pulls_needed(first: &Path, second: &Path) -> Option<usize> {
     let file =
         gripgen::load_twin_document(&Location::parse(BASELINE_TWIN), &[]).unwrap().read_twin().unwrap();
     let twin = Twin::new(&file).unwrap();
+    let library = Library::of_twin(&twin, &Location::parse(BASELINE_TWIN)).unwrap();
     let mut all = load_pulls_of(&[first, second]).unwrap().pulls;
     let before = load_pulls_of(&[first]).unwrap().pulls.pulls.len();
     let mut needed = None;
@@ -75,7 +76,7 @@ fn pulls_needed(first: &Path, second: &Path) -> Option<usize> {
         let more = more.min(all.pulls.len() - before);
         all.pulls.truncate(before + more);
         let options = PullDiagnoseOptions { jobs: 2, without: &[] };
-        let diagnosis = diagnose_pull_table(&all, &twin, &options, &|_| ()).unwrap().diagnosis;
+        let diagnosis = diagnose_pull_table(&all, &twin, &library, &options, &|_| ()).unwrap().diagnosis;
         let names = diagnosis.effects.first().map(|e| {
             let rivals = e.indistinguishable_from.iter().map(|r| r.name.clone());
             std::iter::once(e.name.clone()).chain(rivals).collect::<Vec<_>>()

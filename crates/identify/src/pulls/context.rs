@@ -138,15 +138,10 @@ impl<'a> Context<'a> {
         let rows: Vec<usize> = (0..self.data.len()).collect();
         let mut fitted = fitted.clone();
         fitted.terms.stated = true;
-        for _ in 0..2 {
-            fitted.model.misread_n = 0.0;
-            context.correct_at(&fitted.model);
-            match context.fit_again(&fitted.model, &fitted.terms, &rows) {
-                Some(found) => fitted = found,
-                None => break,
-            }
-        }
-        (context, fitted)
+        fitted.model.misread_n = 0.0;
+        context.correct_at(&fitted.model);
+        let found = context.fit_again(&fitted.model, &fitted.terms, &rows);
+        (context, found.unwrap_or(fitted))
     }
 
     fn look_at(&mut self, raw: &[TraceObservation]) {

@@ -118,6 +118,23 @@ fn kinetic_friction_acts_as_soon_as_the_jaws_slide() {
     }
 }
 
+/// The force after the slip is r L + (1 - r) L exp(-t / tau).
+#[test]
+fn a_force_falls_to_its_kinetic_value_in_its_own_time() {
+    let bench = bench(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+    let mut jaw = JawFriction::uniform(10.0, 0.7);
+    jaw.kinetic_fall_s = 0.03;
+    let noise = Stream::new(1, 2, Purpose::ForceNoise);
+    let mut session = bench.held().pull(&PerJaw { left: jaw.clone(), right: jaw }, noise);
+    let trace = pull(&mut session, Until::Stopped).trace;
+    let force = &trace.measured_force_n;
+    let slip = force.iter().position(|f| *f > 20.0 - 1e-9).unwrap();
+    for (k, f) in force[slip..].iter().enumerate().take(60) {
+        let exact = 14.0 + 6.0 * (-(k as f64) * STEP_S / 0.03).exp();
+        assert!((f - exact).abs() < 0.03 * 6.0, "{k} steps after the slip: {f} N, {exact} N");
+    }
+}
+
 /// A pull that ends when its label is decided has that label, and the same trace up to there.
 #[test]
 fn an_early_end_leaves_the_label() {
