@@ -304,6 +304,7 @@ fn measured(
         max_pull_force_n: sample.max_pull_force_n?,
         grip_force_n: sample.grip_force_n,
         increment_n: sample.force_increment_n,
+        start_n: sample.force_start_n,
         step_s: sample.step_time_s,
         covariates: Covariates {
             gel_id: sample.gel_id,
@@ -341,6 +342,7 @@ mod tests {
             part: "p".into(),
             grip_force_n: 10.0,
             increment_n: 1.0,
+            start_n: None,
             step_s: 0.1,
             covariates: Covariates::default(),
             max_pull_force_n: 3.0,

@@ -41,8 +41,8 @@ pub struct PullPredictor<'a> {
     measured: &'a MeasuredPulls,
     robot: Robot,
     rate_hz: f64,
-    /// Commands of the campaign: height and length of a step.
-    profiles: Vec<(f64, f64)>,
+    /// Commands of the campaign: height and length of a step, start force.
+    profiles: Vec<(f64, f64, Option<f64>)>,
     staircases: Vec<Staircase>,
     profile_of: Vec<usize>,
     part_names: Vec<String>,
@@ -100,19 +100,22 @@ type Key = (usize, bool, Vec<u64>);
 impl<'a> PullPredictor<'a> {
     /// For the pulls of a campaign on the rig of `twin`. `jobs` threads share the work.
     pub fn new(measured: &'a MeasuredPulls, twin: &Twin, jobs: usize) -> Self {
-        let mut profiles: Vec<(f64, f64)> = Vec::new();
+        let mut profiles: Vec<(f64, f64, Option<f64>)> = Vec::new();
         let profile_of = measured
             .pulls
             .iter()
             .map(|p| {
-                let own = (p.increment_n, p.step_s);
+                let own = (p.increment_n, p.step_s, p.start_n);
                 profiles.iter().position(|q| *q == own).unwrap_or_else(|| {
                     profiles.push(own);
                     profiles.len() - 1
                 })
             })
             .collect();
-        let staircases = profiles.iter().map(|&(n, s)| Staircase::constant(n, s, MOST_TIME_S)).collect();
+        let staircase = |&(n, s, start_n): &(f64, f64, Option<f64>)| {
+            Staircase::constant(n, s, MOST_TIME_S).starting_at(start_n)
+        };
+        let staircases = profiles.iter().map(staircase).collect();
         let mut part_names: Vec<String> = measured.pulls.iter().map(|p| p.part.clone()).collect();
         part_names.sort();
         part_names.dedup();
