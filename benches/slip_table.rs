@@ -79,6 +79,7 @@ fn measure(twin: &Twin, mechanics: Mechanics, shape: &PartShape, mu: f64, grip_f
     let limit_n = 2.0 * mu * grip_force_n;
     let settings = PullSettings {
         increment_n: 1.0,
+        start_n: None,
         step_s: 0.104,
         step_jitter: 0.0,
         stop_m: STOP_M,

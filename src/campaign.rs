@@ -152,6 +152,7 @@ fn scenario(
         ..Covariates::default()
     };
     scenario.pull.increment_n = planned.force_increment_n;
+    scenario.pull.start_n = planned.force_start_n;
     scenario.pull.step_s = planned.step_time_s;
     scenario.pull.step_jitter = 0.0;
     scenario.pull.stop_m = campaign.stop_m;
@@ -181,6 +182,7 @@ fn pull(project: &Project, scenario: &Scenario, index: u64) -> Option<MeasuredPu
         grip_pose: scenario.grip_pose,
         grip_force_n: scenario.grip_force_n,
         increment_n: scenario.pull.increment_n,
+        start_n: scenario.pull.start_n,
         step_s: scenario.pull.step_s,
         covariates: scenario.covariates.clone(),
         max_pull_force_n: (pulled.label.max_pull_force_n * 1e3).round() / 1e3,

@@ -110,13 +110,14 @@ pub(crate) struct Readings {
 
 impl<'a> Expectations<'a> {
     pub(crate) fn new(measured: &'a MeasuredPulls, library: &'a Library) -> Self {
-        let mut known: BTreeMap<[u64; 2], Arc<Staircase>> = BTreeMap::new();
+        let mut known: BTreeMap<[u64; 3], Arc<Staircase>> = BTreeMap::new();
         let staircases = measured.pulls.iter().map(|p| {
-            let plain = known
-                .entry([p.increment_n.to_bits(), p.step_s.to_bits()])
-                .or_insert_with(|| Arc::new(Staircase::constant(p.increment_n, p.step_s, MAX_TIME_S)));
-            let own =
-                p.trace.as_ref().and_then(|t| Staircase::of_trace(t, p.increment_n, p.step_s, MAX_TIME_S));
+            let start_n = p.start_n.unwrap_or(p.increment_n);
+            let plain = known.entry([p.increment_n, p.step_s, start_n].map(f64::to_bits)).or_insert_with(|| {
+                let plain = Staircase::constant(p.increment_n, p.step_s, MAX_TIME_S);
+                Arc::new(plain.starting_at(p.start_n))
+            });
+            let own = p.trace.as_ref().and_then(|t| plain.of_trace(t, p.step_s, MAX_TIME_S));
             own.map_or_else(|| plain.clone(), Arc::new)
         });
         Self { measured, library, staircases: staircases.collect(), patches: Cache::new(PATCHES) }
@@ -177,6 +178,7 @@ impl<'a> Expectations<'a> {
             covariates: pull.covariates.clone(),
             pull: PullSettings {
                 increment_n: pull.increment_n,
+                start_n: pull.start_n,
                 step_s: pull.step_s,
                 step_jitter: 0.0,
                 stop_m: self.measured.stop_m,

@@ -311,6 +311,7 @@ fn measured(
         grip_pose: sample.grip_pose as usize,
         grip_force_n: sample.grip_force_n,
         increment_n: sample.force_increment_n,
+        start_n: sample.force_start_n,
         step_s: sample.step_time_s,
         covariates: Covariates {
             gel_id: sample.gel_id,
@@ -349,6 +350,7 @@ mod tests {
             grip_pose: 0,
             grip_force_n: 10.0,
             increment_n: 1.0,
+            start_n: None,
             step_s: 0.1,
             covariates: Covariates::default(),
             max_pull_force_n: 3.0,

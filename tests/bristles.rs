@@ -81,6 +81,7 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
         covariates: pull.covariates.clone(),
         pull: PullSettings {
             increment_n: pull.increment_n,
+            start_n: pull.start_n,
             step_s: pull.step_s,
             step_jitter: 0.0,
             stop_m,
@@ -118,7 +119,8 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
     let mut measured = read(0.0, 0.0, 0.0);
     for tick in 0..(120.0 / dt) as usize {
         let t = tick as f64 * dt;
-        let desired = pull.increment_n * (((t + 1e-9) / pull.step_s).floor() + 1.0);
+        let first_n = pull.start_n.unwrap_or(pull.increment_n);
+        let desired = first_n + pull.increment_n * ((t + 1e-9) / pull.step_s).floor();
         if (measured - desired).abs() < tolerance_n {
             label_n = measured;
         }

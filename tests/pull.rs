@@ -243,6 +243,33 @@ fn a_press_through_the_gel_fails_the_sample_with_both_numbers() {
     assert_eq!((sample.scenario.index, sample.scenario.part.as_str()), (1, "gear"));
 }
 
+/// F_des = F0 + (i - 1) dF: the label stays 2 mu F_G, the time until it falls by (F0 - dF) / dF steps, and what stands in the
+/// sample predicts the same label.
+#[test]
+fn a_staircase_may_start_at_any_force() {
+    let only =
+        ["vary.part=[\"gear\"]", "vary.grip_force_n=[40]", "pull.increment_n=0.5", "mechanics=reduced"];
+    let at = |more: &[&str]| {
+        let p = quiet(&[&only[..], more].concat());
+        let sample = generate(&p, 0, SimdLevel::best());
+        (sample.scenario.pull.start_n, pulled(sample))
+    };
+    let (start_n, plain) = at(&[]);
+    assert_eq!((start_n, plain.trace.desired_force_n[0]), (None, 0.5));
+    for start_n in [0.0, 3.0, 8.0] {
+        let (recorded_n, own) = at(&[&format!("pull.start_n={start_n}")]);
+        assert_eq!((recorded_n, own.trace.desired_force_n[0]), (Some(start_n), start_n));
+        assert!((own.label.max_pull_force_n / 12.0 - 1.0).abs() < 5e-3, "{} N", own.label.max_pull_force_n);
+        let earlier_s = plain.label.slip_time_s - own.label.slip_time_s;
+        assert!(
+            (earlier_s - (start_n - 0.5) / 0.5 * 0.104).abs() < 0.05,
+            "from {start_n} N: {earlier_s} s earlier"
+        );
+    }
+    let (_, same) = at(&["pull.start_n=0.5"]);
+    assert_eq!(same.trace, plain.trace, "a start of one increment is the staircase without a start");
+}
+
 /// A staircase that climbs faster than the force loop follows is flagged, never refused.
 #[test]
 fn a_lag_beyond_the_label_tolerance_is_flagged() {

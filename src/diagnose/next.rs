@@ -257,6 +257,7 @@ fn as_measured(campaign: &MeasuredPulls, planned: &[PlannedPull], after_rest: &[
             grip_pose: 0,
             grip_force_n: p.grip_force_n,
             increment_n: p.force_increment_n,
+            start_n: p.force_start_n,
             step_s: p.step_time_s,
             covariates,
             max_pull_force_n: 2.0 * p.grip_force_n,

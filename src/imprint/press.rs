@@ -192,6 +192,7 @@ fn scenario_of(pull: &MeasuredPull, grip_pose: usize) -> Scenario {
         covariates: pull.covariates.clone(),
         pull: PullSettings {
             increment_n: pull.increment_n,
+            start_n: pull.start_n,
             step_s: pull.step_s,
             step_jitter: 0.0,
             stop_m: 5e-3,

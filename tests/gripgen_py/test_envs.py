@@ -51,6 +51,12 @@ def test_a_harder_grip_holds_more():
     assert held == sorted(held) and held[2] > 2.5 * held[0]
 
 
+def test_a_staircase_rises_from_its_start_force():
+    observation = {"force": np.array([0.0, 0.0, 0.25], dtype=np.float32)}  # in its third step of 0.104 s
+    wanted = {None: 1.5, 0.5: 1.5, 5.0: 6.0, 0.0: 1.0}
+    assert {f: gg.Staircase(0.5, start_n=f)(observation)[0] for f in wanted} == wanted
+
+
 def test_the_vector_environment_is_several_single_ones():
     options = {"images": False, "part": "gear", "vary": {"grip_force_n": 30.0}}
     vector = gym.make_vec("gripgen/Pull-v0", 3, vectorization_mode="vector_entry_point", **options)

@@ -27,11 +27,12 @@ pub enum Until {
 /// The staircase of a pull; `jitter` is asked only if the steps vary.
 pub fn staircase_of(pull: &PullSettings, jitter: &mut Stream) -> Staircase {
     if pull.step_jitter == 0.0 {
-        return Staircase::constant(pull.increment_n, pull.step_s, pull.max_time_s);
+        return Staircase::constant(pull.increment_n, pull.step_s, pull.max_time_s).starting_at(pull.start_n);
     }
     Staircase::from_steps(pull.increment_n, pull.max_time_s, || {
         pull.step_s * (1.0 + pull.step_jitter * (2.0 * jitter.uniform() - 1.0))
     })
+    .starting_at(pull.start_n)
 }
 
 /// Runs `session` up the staircase until displacement, force or time ends it.

@@ -112,6 +112,7 @@ impl Bench {
 pub(crate) fn settings() -> PullSettings {
     PullSettings {
         increment_n: 1.0,
+        start_n: None,
         step_s: 0.104,
         step_jitter: 0.0,
         stop_m: 5e-3,

@@ -141,6 +141,9 @@ fn check_pull(pull: &PlannedPull) -> Result<(), String> {
             return Err(format!("`{key}` is {value}, it must be a number {wanted}"));
         }
     }
+    if let Some(start_n) = pull.force_start_n.filter(|n| !(n.is_finite() && *n >= 0.0)) {
+        return Err(format!("`force_start_n` is {start_n}, it must be a number of at least 0"));
+    }
     if !(pull.pause_s.is_finite() && pull.pause_s >= 0.0) {
         return Err(format!("`pause_s` is {}, it must be a number of at least 0", pull.pause_s));
     }
@@ -171,7 +174,7 @@ pub fn campaign_toml(campaign: &Campaign, about: &str) -> String {
             PullKind::NoLoad => format!("kind = \"no_load\", dwell_s = {}", number(pull.dwell_s)),
             PullKind::Pull => format!(
                 "kind = \"pull\", part = {}, grip_force_n = {}, force_increment_n = {}, step_time_s = {}, dwell_s = {}, \
-                 pull_direction = {}, grip_offset_mm = {}, grip_angle_deg = {}",
+                 pull_direction = {}, grip_offset_mm = {}, grip_angle_deg = {}{}",
                 word(&pull.part),
                 number(pull.grip_force_n),
                 number(pull.force_increment_n),
@@ -180,6 +183,7 @@ pub fn campaign_toml(campaign: &Campaign, about: &str) -> String {
                 number(pull.pull_direction),
                 number(pull.grip_offset_mm),
                 number(pull.grip_angle_deg),
+                pull.force_start_n.map(|n| format!(", force_start_n = {}", number(n))).unwrap_or_default(),
             ),
         };
         let (pause, session, gel) = (number(pull.pause_s), word(&pull.session), word(&pull.gel_id));
@@ -211,8 +215,14 @@ mod tests {
     #[test]
     fn a_campaign_that_was_written_is_read_back() {
         let pull = PlannedPull { part: "gear \"a\"".into(), grip_force_n: 0.1 + 0.2, ..Default::default() };
-        let second =
-            PlannedPull { pull_direction: -1.0, pause_s: 1500.0, session: "2".into(), ..pull.clone() };
+        let pull = PlannedPull { force_start_n: Some(4.5), ..pull };
+        let second = PlannedPull {
+            force_start_n: None,
+            pull_direction: -1.0,
+            pause_s: 1500.0,
+            session: "2".into(),
+            ..pull.clone()
+        };
         let none = PlannedPull { kind: PullKind::NoLoad, dwell_s: 5.0, ..Default::default() };
         let campaign = Campaign {
             label_tolerance_n: 2.5,
@@ -241,6 +251,9 @@ mod tests {
         );
         // (25 s + 1 s + 11 steps of 0.104 s): 2 x 0.2 x 20 N and 3 N in steps of 1 N.
         assert!((campaign.estimated_minutes() * 60.0 - 27.144).abs() < 1e-9);
+        // From 5 N the steps to 1, 2, 3 and 4 N are not made.
+        let from = read(&format!("{text}force_start_n = 5\n")).unwrap();
+        assert!((from.estimated_minutes() * 60.0 - (27.144 - 4.0 * 0.104)).abs() < 1e-9);
     }
 
     #[test]
@@ -253,6 +266,7 @@ mod tests {
             (pull.replace("part = \"gear\"", ""), "pulls[0]: a pull needs a `part`"),
             (format!("{pull}pull_direction = 0\n"), "1 (up) or -1 (down)"),
             (format!("{pull}step_time_s = nan\n"), "`step_time_s` is NaN"),
+            (format!("{pull}force_start_n = -1\n"), "`force_start_n` is -1"),
             (format!("{pull}pause_s = -1\n"), "`pause_s` is -1"),
             (format!("stop_mm = 0\n{pull}"), "`stop_mm` is 0"),
         ] {

@@ -131,6 +131,7 @@ pub(crate) fn scenario_message(s: &Scenario, timestamp: Option<Timestamp>) -> pr
         session: c.session.clone(),
         grip_force_n: s.grip_force_n,
         force_increment_n: pull.increment_n,
+        force_start_n: pull.start_n,
         step_time_s: pull.step_s,
         dwell_s: c.dwell_s,
         pull_index: c.pull_index,

@@ -172,6 +172,7 @@ fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<Meas
             grip_pose: 0,
             grip_force_n: 0.0,
             increment_n: plain.increment_n,
+            start_n: None,
             step_s: cells::DEFAULT_STEP_S,
             covariates: Covariates::default(),
             max_pull_force_n: 0.0,

@@ -26,6 +26,9 @@ pub struct PlannedPull {
     pub grip_force_n: f64,
     /// Height of a step of the staircase.
     pub force_increment_n: f64,
+    /// Command of the first step; one increment where it is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_start_n: Option<f64>,
     /// Length of a step.
     pub step_time_s: f64,
     /// Time from closing the jaws to the start of the pull; without a load, how long the sensor is read.
@@ -52,6 +55,7 @@ impl Default for PlannedPull {
             part: String::new(),
             grip_force_n: 0.0,
             force_increment_n: 1.0,
+            force_start_n: None,
             step_time_s: 0.104,
             dwell_s: 1.0,
             pull_direction: 1.0,
@@ -91,7 +95,8 @@ impl PlannedPull {
             PullKind::NoLoad => self.pause_s + self.dwell_s,
             PullKind::Pull => {
                 let highest_n = 2.0 * GUESSED_MU * self.grip_force_n + label_tolerance_n;
-                let steps = (highest_n / self.force_increment_n).ceil();
+                let first_n = self.force_start_n.map_or(0.0, |start_n| start_n - self.force_increment_n);
+                let steps = ((highest_n - first_n) / self.force_increment_n).ceil().max(1.0);
                 self.pause_s + HANDLING_S + self.dwell_s + steps * self.step_time_s
             }
         }

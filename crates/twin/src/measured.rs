@@ -40,6 +40,8 @@ pub struct MeasuredPull {
     pub grip_force_n: f64,
     /// Height of a step of the staircase.
     pub increment_n: f64,
+    /// Command of the first step; one increment where it is `None`.
+    pub start_n: Option<f64>,
     /// Length of a step.
     pub step_s: f64,
     /// Circumstances; those that nobody wrote down have their defaults.
@@ -174,6 +176,7 @@ mod tests {
             grip_pose: 0,
             grip_force_n: 10.0,
             increment_n: 1.0,
+            start_n: None,
             step_s: 0.1,
             covariates: Covariates { pull_index: i, session: session.into(), time_s, ..Default::default() },
             max_pull_force_n: 3.0,

@@ -2,13 +2,16 @@
 
 use crate::PullTrace;
 
-/// A staircase `F_des(t) = i dF` with steps that need not be equally long.
+/// A staircase `F_des(t) = F0 + (i - 1) dF` with steps that need not be equally long (Wucherer et al. 2023, who count
+/// steps from 0).
 ///
-/// Step `i` (counted from 1) begins at the end of step `i - 1`; step 1 begins at time 0 and already commands
-/// one increment, as in the measured campaigns. Forces are in newtons along the pull, times in seconds.
+/// Step `i` (counted from 1) begins at the end of step `i - 1`; step 1 begins at time 0 and already commands the
+/// start force F0: one increment, as in the measured campaigns, unless [`Staircase::starting_at`] says otherwise.
+/// Forces are in newtons along the pull, times in seconds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Staircase {
     increment_n: f64,
+    start_n: f64,
     /// Start of each step; strictly increasing, the first at 0.
     starts_s: Vec<f64>,
 }
@@ -17,7 +20,7 @@ impl Staircase {
     /// A staircase of constant steps that covers `duration_s`.
     pub fn constant(increment_n: f64, step_s: f64, duration_s: f64) -> Self {
         let steps = (duration_s / step_s).ceil().max(1.0) as usize;
-        Self { increment_n, starts_s: (0..steps).map(|i| i as f64 * step_s).collect() }
+        Self { increment_n, start_n: increment_n, starts_s: (0..steps).map(|i| i as f64 * step_s).collect() }
     }
 
     /// A staircase whose step lengths come from `step_s` (called once per step) until `duration_s` is covered.
@@ -28,22 +31,41 @@ impl Staircase {
             starts_s.push(end);
             end += step_s();
         }
-        Self { increment_n, starts_s }
+        Self { increment_n, start_n: increment_n, starts_s }
+    }
+
+    /// The same steps from another start force; `None` leaves it at one increment.
+    #[must_use]
+    pub fn starting_at(self, start_n: Option<f64>) -> Self {
+        Self { start_n: start_n.unwrap_or(self.increment_n), ..self }
+    }
+
+    /// The command while the last of `begun` steps lasts.
+    fn command_n(&self, begun: usize) -> f64 {
+        if begun == 0 {
+            return 0.0;
+        }
+        // Not `start + (begun - 1) increment`, which rounds to other bits.
+        if self.start_n == self.increment_n {
+            return begun as f64 * self.increment_n;
+        }
+        self.start_n + (begun - 1) as f64 * self.increment_n
     }
 
     /// The staircase that a trace carries: a step begins where its command does, within the time between two rows. `None` if
-    /// the steps are those of `step_s` as far as the rows can tell, or if the commands are no staircase of `increment_n`.
+    /// the steps are those of this staircase as far as the rows can tell, or if the commands have another height or start.
     /// After the last row the steps go on with `step_s` until `duration_s`.
-    pub fn of_trace(trace: &PullTrace, increment_n: f64, step_s: f64, duration_s: f64) -> Option<Self> {
+    pub fn of_trace(&self, trace: &PullTrace, step_s: f64, duration_s: f64) -> Option<Self> {
+        let increment_n = self.increment_n;
         let rows: Vec<_> = trace.rows().filter(|row| row.time_s >= 0.0).collect();
         let first = rows.first()?;
-        if (first.desired_force_n - increment_n).abs() > 0.01 * increment_n {
+        if (first.desired_force_n - self.start_n).abs() > 0.01 * increment_n {
             return None;
         }
         let (mut starts_s, mut nominal) = (vec![0.0], true);
         for pair in rows.windows(2) {
-            let begun = (pair[1].desired_force_n / increment_n).round();
-            if (begun * increment_n - pair[1].desired_force_n).abs() > 0.01 * increment_n {
+            let begun = ((pair[1].desired_force_n - self.start_n) / increment_n).round() + 1.0;
+            if (self.command_n(begun.max(0.0) as usize) - pair[1].desired_force_n).abs() > 0.01 * increment_n {
                 return None;
             }
             let new = begun - starts_s.len() as f64;
@@ -68,7 +90,7 @@ impl Staircase {
             starts_s.push(next);
             next += step_s;
         }
-        Some(Self { increment_n, starts_s })
+        Some(Self { increment_n, start_n: self.start_n, starts_s })
     }
 
     /// Height of one step.
@@ -80,7 +102,7 @@ impl Staircase {
     pub fn desired_n(&self, time_s: f64) -> f64 {
         // A start that rounding puts a hair after the tick still belongs to the tick.
         let begun = self.starts_s.partition_point(|&start| start <= time_s + 1e-9);
-        begun as f64 * self.increment_n
+        self.command_n(begun)
     }
 
     /// For commands at times that never fall, the first of them at `time_s`.
@@ -106,7 +128,7 @@ impl StaircaseCursor<'_> {
         while self.begun < starts_s.len() && starts_s[self.begun] <= time_s + 1e-9 {
             self.begun += 1;
         }
-        self.begun as f64 * self.staircase.increment_n
+        self.staircase.command_n(self.begun)
     }
 }
 
@@ -136,13 +158,37 @@ mod tests {
             };
             (0..200).map(row).collect()
         };
-        assert_eq!(Staircase::of_trace(&traced(&plain), 1.0, 0.104, 3.0), None);
-        let found = Staircase::of_trace(&traced(&made), 1.0, 0.104, 3.0).unwrap();
+        assert_eq!(plain.of_trace(&traced(&plain), 0.104, 3.0), None);
+        let found = plain.of_trace(&traced(&made), 0.104, 3.0).unwrap();
         for (a, b) in found.starts_s.iter().zip(&made.starts_s).take_while(|(_, b)| **b < 1.98) {
             assert!((a - b).abs() <= 0.0101, "{a} and {b}");
         }
         assert!(found.starts_s.last().unwrap() > &2.8, "it goes on after the trace");
-        assert_eq!(Staircase::of_trace(&traced(&made), 0.7, 0.104, 3.0), None, "no staircase of 0.7 N");
+        let other = Staircase::constant(0.7, 0.104, 3.0);
+        assert_eq!(other.of_trace(&traced(&made), 0.104, 3.0), None, "no staircase of 0.7 N");
+    }
+
+    #[test]
+    fn the_start_force_shifts_the_first_step_and_all_after_it() {
+        let plain = Staircase::constant(0.7, 0.1, 2.0);
+        for (start_n, increment_n) in [(5.0, 0.7), (0.0, 0.7), (0.2, 1.5)] {
+            let s = Staircase::constant(increment_n, 0.1, 2.0).starting_at(Some(start_n));
+            assert_eq!(s.desired_n(-1e-3), 0.0, "before the pull");
+            let mut cursor = s.from(0.0);
+            for i in 0..20 {
+                let time_s = f64::from(i) * 0.1 + 0.05;
+                // The paper's formula, its steps counted from 0.
+                let wanted = start_n + f64::from(i) * increment_n;
+                assert!((s.desired_n(time_s) - wanted).abs() < 1e-12, "{time_s} s");
+                assert_eq!(cursor.desired_n(time_s), s.desired_n(time_s), "{time_s} s");
+            }
+        }
+        for same in [plain.clone().starting_at(None), plain.clone().starting_at(Some(0.7))] {
+            for i in 0..40 {
+                let time_s = f64::from(i) * 0.05;
+                assert_eq!(same.desired_n(time_s).to_bits(), plain.desired_n(time_s).to_bits(), "{time_s} s");
+            }
+        }
     }
 
     #[test]

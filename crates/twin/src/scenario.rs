@@ -50,6 +50,8 @@ impl Default for Covariates {
 pub struct PullSettings {
     /// Height of a step of the staircase.
     pub increment_n: f64,
+    /// Command of the first step; one increment where it is `None`.
+    pub start_n: Option<f64>,
     /// Mean length of a step.
     pub step_s: f64,
     /// Half width of the uniform jitter of a step, as a fraction of its mean length.

@@ -23,6 +23,7 @@ pub const SCENARIO_KEYS: &[&str] = &[
 /// Keys of `[pull]` that can vary.
 pub const PULL_KEYS: &[&str] = &[
     "pull.increment_n",
+    "pull.start_n",
     "pull.step_s",
     "pull.step_s.jitter",
     "pull.stop_mm",
@@ -120,6 +121,7 @@ pub(crate) fn set_pull(pull: &mut PullFile, key: &str, value: &Drawn) -> Result<
     };
     match key {
         "increment_n" => pull.increment_n = any(value)?,
+        "start_n" => pull.start_n = Some(any(value)?),
         "step_s" | "step_s.value" => {
             pull.step_s = StepFile::Jittered(JitteredStep { value: any(value)?, jitter });
         }

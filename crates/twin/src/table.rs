@@ -304,6 +304,7 @@ mod tests {
     fn scenario(part: &str, extra: &[(&str, Drawn)]) -> Scenario {
         let pull = PullSettings {
             increment_n: 0.5,
+            start_n: None,
             step_s: 0.1,
             step_jitter: 0.0,
             stop_m: 5e-3,

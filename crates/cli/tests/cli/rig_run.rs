@@ -21,6 +21,7 @@ fn unfinished(path: &Path) -> RunFolder {
 fn pull(index: u64, result: RigResult) -> RigPull {
     let settings = PullSettings {
         increment_n: 1.0,
+        start_n: None,
         step_s: 0.1,
         step_jitter: 0.0,
         stop_m: 5e-3,

@@ -114,6 +114,7 @@ impl<'a> PullData<'a> {
             let numbers = [
                 p.grip_force_n,
                 p.increment_n,
+                p.start_n.unwrap_or(p.increment_n),
                 p.step_s,
                 c.dwell_s,
                 c.grip_offset_m,

@@ -94,6 +94,9 @@ impl Table {
             };
             columns.push((name.into(), column));
         }
+        if pulls.iter().any(|p| p.start_n.is_some()) {
+            columns.push(("force_start_n".into(), numbers(&|p| p.start_n.unwrap_or(p.increment_n))));
+        }
         for extra in measured.extra.iter().filter(|e| e.name != PULLS_SINCE_REST) {
             let cell = |p: &MeasuredPull| p.covariates.extra.get(&extra.name).cloned();
             let is_text = pulls.iter().any(|p| matches!(cell(p), Some(Drawn::Text(_))));

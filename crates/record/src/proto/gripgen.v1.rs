@@ -91,6 +91,9 @@ pub struct Sample {
         ::prost::alloc::string::String,
         ::prost::alloc::string::String,
     >,
+    /// Command of the staircase's first step; one increment where it is absent.
+    #[prost(double, optional, tag = "28")]
+    pub force_start_n: ::core::option::Option<f64>,
     #[prost(enumeration = "Status", tag = "30")]
     pub status: i32,
     /// The label. 0 without contact, absent for a failed sample, never NaN.

@@ -95,6 +95,12 @@ fn setter(name: &str) -> Option<Setter> {
         // A sensor that is off may read less than nothing.
         "max_pull_force_n" => |cell, pull| number(cell, &mut pull.max_pull_force_n),
         "force_increment_n" => |cell, pull| above_zero(cell, &mut pull.increment_n),
+        "force_start_n" => |cell, pull| {
+            let mut start_n = 0.0;
+            not_negative(cell, &mut start_n)?;
+            pull.start_n = Some(start_n);
+            Ok(())
+        },
         "step_time_s" => |cell, pull| above_zero(cell, &mut pull.step_s),
         "dwell_s" => |cell, pull| not_negative(cell, &mut pull.covariates.dwell_s),
         "time_s" => |cell, pull| number(cell, &mut pull.covariates.time_s),

@@ -47,6 +47,19 @@ fn columns_stand_in_any_order_and_the_rest_are_covariates_of_unknown_meaning() {
 }
 
 #[test]
+fn the_start_force_of_a_staircase_is_read_and_written() {
+    let table = "pull_id,part,grip_force_n,force_start_n,max_pull_force_n\na,gear,20,4.5,6\nb,gear,20,,6\n";
+    let folder = folder(table, &[]);
+    let read = read_pull_folder(folder.path()).unwrap();
+    let starts = |m: &MeasuredPulls| m.pulls.iter().map(|p| p.start_n).collect::<Vec<_>>();
+    assert_eq!(starts(&read), [Some(4.5), None]);
+    assert_eq!((read.extra.len(), read.recorded.len()), (0, 2), "a setting, no covariate");
+    let copy = tempfile::tempdir().unwrap();
+    write_pull_folder(copy.path(), &read).unwrap();
+    assert_eq!(starts(&read_pull_folder(copy.path()).unwrap()), [Some(4.5), None]);
+}
+
+#[test]
 fn faults_name_file_line_column_and_value() {
     let cell = |part: &str, force: &str, label: &str| {
         format!("pull_id,part,grip_force_n,max_pull_force_n\na,g,1,1\nb,{part},{force},{label}\n")
@@ -57,6 +70,7 @@ fn faults_name_file_line_column_and_value() {
         (&cell("g", "5", "nan"), "line 3, `max_pull_force_n` is `nan`, it must be a number"),
         (&cell("g", "5", "inf"), "`max_pull_force_n` is `inf`"),
         (&cell("g", "5", ""), "`max_pull_force_n` is ``"),
+        ("pull_id,part,grip_force_n,force_start_n,max_pull_force_n\na,g,1,-2,1\n", "`force_start_n` is `-2`"),
         (&cell("g", "0", "1"), "line 3, `grip_force_n` is `0`, it must be a number above 0"),
         (&cell("g", "-7", "1"), "`grip_force_n` is `-7`"),
         (&cell("g", "five", "1"), "`grip_force_n` is `five`"),

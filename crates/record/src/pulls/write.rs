@@ -42,6 +42,7 @@ fn table_csv(measured: &MeasuredPulls) -> Result<Vec<u8>, String> {
         .iter()
         .copied()
         .filter(|c| ["part", "grip_force_n"].contains(c) || measured.recorded.iter().any(|r| r == c))
+        .chain(measured.pulls.iter().any(|p| p.start_n.is_some()).then_some("force_start_n"))
         .collect();
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut write = |cells: Vec<String>| writer.write_record(&cells).map_err(|e| e.to_string());
@@ -77,6 +78,7 @@ fn cell(pull: &MeasuredPull, column: &str) -> String {
         "pull_index" => return c.pull_index.to_string(),
         "grip_force_n" => pull.grip_force_n,
         "force_increment_n" => pull.increment_n,
+        "force_start_n" => return pull.start_n.map(|n| n.to_string()).unwrap_or_default(),
         "step_time_s" => pull.step_s,
         "dwell_s" => c.dwell_s,
         "time_s" => c.time_s,

@@ -60,6 +60,7 @@ fn pull(index: u64, result: RigResult) -> RigPull {
     let covariates = Covariates { pull_index: index, time_s: 60.0 * index as f64, ..Covariates::default() };
     let settings = PullSettings {
         increment_n: 1.0,
+        start_n: None,
         step_s: 0.104,
         step_jitter: 0.0,
         stop_m: 5e-3,

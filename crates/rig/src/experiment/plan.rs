@@ -80,6 +80,7 @@ pub fn pull_program(config: &RigConfig, campaign: &Campaign, planned: &PlannedPu
     PullProgram {
         run,
         increment_n: planned.force_increment_n,
+        start_n: planned.force_start_n.unwrap_or(planned.force_increment_n),
         step_s: planned.step_time_s,
         direction: planned.pull_direction,
         stop_mm: 1e3 * campaign.stop_m,

@@ -11,6 +11,8 @@ pub struct PullProgram {
     pub run: i32,
     /// Height of a step.
     pub increment_n: f64,
+    /// Command of the first step.
+    pub start_n: f64,
     /// Length of a step; the controller rounds it to its own steps.
     pub step_s: f64,
     /// +1 up, -1 down.
@@ -46,6 +48,7 @@ impl Default for PullProgram {
         Self {
             run: 1,
             increment_n: 1.0,
+            start_n: 1.0,
             step_s: 0.104,
             direction: 1.0,
             stop_mm: 5.0,
@@ -69,6 +72,7 @@ impl PullProgram {
         let mut limits = vec![
             ("the number of the run", f64::from(self.run), "", 1.0, 1e9),
             ("the increment", self.increment_n, "N", 0.1, 5.0),
+            ("the start force", self.start_n, "N", 0.0, self.max_force_n),
             ("the step", self.step_s, "s", 0.01, 5.0),
             ("the direction", self.direction.abs(), "", 1.0, 1.0),
             ("the displacement stop", self.stop_mm, "mm", 0.5, 20.0),
@@ -86,10 +90,11 @@ impl PullProgram {
         check_limits(&limits)
     }
 
-    fn numbers(&self) -> [(&'static str, f64); 18] {
+    fn numbers(&self) -> [(&'static str, f64); 19] {
         let ([x, y, z], [tool_x, tool_y, tool_z]) = (self.centre_of_gravity_mm, self.tool_mm);
         [
             ("increment_n", self.increment_n),
+            ("start_n", self.start_n),
             ("step_s", self.step_s),
             ("direction", self.direction),
             ("stop_mm", self.stop_mm),
@@ -124,6 +129,7 @@ impl PullProgram {
         let program = Self {
             run,
             increment_n: of("increment_n")?,
+            start_n: of("start_n")?,
             step_s: of("step_s")?,
             direction: of("direction")?,
             stop_mm: of("stop_mm")?,
@@ -203,7 +209,7 @@ fn body() -> String {
       now = floor(elapsed / step_s) + 1
       if now != step:
         step = now
-        desired = step * increment_n
+        desired = start_n + (step - 1) * increment_n
         if desired > max_force_n:
           reason = {largest}
         else:

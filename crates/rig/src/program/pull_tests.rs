@@ -69,12 +69,14 @@ fn the_watchdog_is_set_after_the_first_heartbeat_and_before_anything_moves() {
 #[test]
 fn the_numbers_of_the_pull_stand_in_the_program() {
     let text = script(|p| {
-        (p.run, p.increment_n, p.step_s, p.stop_mm) = (7, 0.5, 0.2, 3.0);
+        (p.run, p.increment_n, p.start_n, p.step_s, p.stop_mm) = (7, 0.5, 2.0, 0.2, 3.0);
         (p.max_force_n, p.abort_force_n, p.speed_mm_s, p.direction) = (30.0, 35.0, 10.0, -1.0);
     });
     for wanted in [
         "  run_id = 7\n",
         "  increment_n = 0.500000\n",
+        "  start_n = 2.000000\n",
+        "desired = start_n + (step - 1) * increment_n",
         "  step_s = 0.200000\n",
         "  max_force_n = 30.000000\n",
         "  abort_force_n = 35.000000\n",
@@ -95,12 +97,15 @@ fn the_numbers_of_the_pull_stand_in_the_program() {
 
 #[test]
 fn a_program_is_read_back_and_nothing_else_is_taken_for_one() {
-    let program = PullProgram { run: 12, increment_n: 0.7, direction: -1.0, ..PullProgram::default() };
+    let program =
+        PullProgram { run: 12, increment_n: 0.7, start_n: 3.5, direction: -1.0, ..PullProgram::default() };
     let text = program.script().unwrap();
     assert_eq!(PullProgram::from_script(&text), Some(program));
     for (good, bad) in [
         ("stopl(2.0)", "stopl(0.1)"),
         ("increment_n = 0.7", "increment_n = 7.0"),
+        ("start_n = 3.5", "start_n = 75.0"),
+        ("(step - 1)", "step"),
         ("  run_id = 12", "  run_id = 0"),
         ("  end\nend\n", "  end\nend\nmovel(p[0,0,0,0,0,0])\n"),
     ] {
@@ -120,6 +125,7 @@ fn nothing_beyond_the_limits_becomes_a_program() {
     };
     assert_eq!(refused(|p| p.max_force_n = 60.0), "the largest command is 60 N, it must be from 1 to 45 N");
     assert!(refused(|p| p.abort_force_n = 40.0).contains("40 N, it must be from 45 to 50 N"));
+    assert!(refused(|p| p.start_n = 46.0).contains("the start force is 46 N, it must be from 0 to 45 N"));
     assert!(refused(|p| p.speed_mm_s = 1500.0).contains("1500 mm/s"));
     assert!(refused(|p| p.direction = 0.5).contains("the direction is 0.5"));
     assert!(refused(|p| p.step_s = f64::NAN).contains("NaN"));

@@ -200,7 +200,7 @@ impl Running {
         let mut reason = None;
         if now != step {
             step = now;
-            desired_n = f64::from(step) * p.increment_n;
+            desired_n = p.start_n + f64::from(step - 1) * p.increment_n;
             if desired_n > p.max_force_n {
                 reason = Some(StopReason::LargestCommand);
             } else {

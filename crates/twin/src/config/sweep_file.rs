@@ -126,6 +126,9 @@ pub enum TraceStorage {
 pub struct PullFile {
     /// Height of a step of the force staircase.
     pub increment_n: f64,
+    /// Force of the first step; one increment where it is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start_n: Option<f64>,
     /// Length of a step.
     pub step_s: StepFile,
     /// Displacement at which the pull ends.
@@ -147,6 +150,7 @@ impl Default for PullFile {
     fn default() -> Self {
         Self {
             increment_n: 1.0,
+            start_n: None,
             step_s: StepFile::Constant(0.104),
             stop_mm: 5.0,
             direction: [0.0, 0.0, 1.0],

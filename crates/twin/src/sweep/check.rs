@@ -249,6 +249,10 @@ pub(super) fn pull_settings(file: &PullFile) -> Result<PullSettings, ConfigError
     let max_time_s = in_range("pull.max_time_s", file.max_time_s, 0.1..=3600.0, "s")?;
     let settings = PullSettings {
         increment_n: in_range("pull.increment_n", file.increment_n, 0.01..=50.0, "N")?,
+        start_n: file
+            .start_n
+            .map(|force| in_range("pull.start_n", force, 0.0..=10_000.0, "N"))
+            .transpose()?,
         step_s: in_range("pull.step_s", step, 0.004..=10.0, "s")?,
         step_jitter: in_range("pull.step_s.jitter", jitter, 0.0..=0.9, "1")?,
         stop_m: in_range("pull.stop_mm", file.stop_mm, 0.05..=100.0, "mm")? * 1e-3,
@@ -263,6 +267,13 @@ pub(super) fn pull_settings(file: &PullFile) -> Result<PullSettings, ConfigError
     if settings.step_s > max_time_s {
         let problem = format!("one step of {} s is longer than max_time_s = {max_time_s} s", settings.step_s);
         return Err(ConfigError::new("pull.step_s", problem));
+    }
+    if let (Some(start_n), Some(max_n)) = (settings.start_n, settings.max_force_n)
+        && start_n > max_n
+    {
+        let problem =
+            format!("{start_n} N is above max_force_n = {max_n} N: the pull would end before it begins");
+        return Err(ConfigError::new("pull.start_n", problem));
     }
     Ok(settings)
 }

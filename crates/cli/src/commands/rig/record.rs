@@ -91,6 +91,7 @@ fn scenario(
         },
         pull: PullSettings {
             increment_n: planned.force_increment_n,
+            start_n: planned.force_start_n,
             step_s: planned.step_time_s,
             step_jitter: 0.0,
             stop_m: campaign.stop_m,
