@@ -55,12 +55,10 @@ fn cells(twin: &Twin, library: &Library, pull: &MeasuredPull, scenario: &Scenari
             mu
         };
         let limits: Vec<f64> = patch.cells.iter().map(|c| mu(c.pressure_pa()) * c.force_n).collect();
-        let (area, held): (f64, f64) = (patch.cells.iter().map(|c| c.area_m2).sum(), limits.iter().sum());
+        let area: f64 = patch.cells.iter().map(|c| c.area_m2).sum();
         let cell = |(c, limit_n): (&gripgen::twin::PressureCell, f64)| Cell {
             limit_n,
-            stiffness_n_per_m: twin.gel[jaw].shear_stiffness_n_per_m
-                * (0.25 * c.area_m2 / area
-                    + 0.75 * if held > 0.0 { limit_n / held } else { c.area_m2 / area }),
+            stiffness_n_per_m: twin.gel[jaw].shear_stiffness_n_per_m * c.area_m2 / area,
             foot_m: 0.0,
         };
         patch.cells.iter().zip(limits).map(cell).collect()

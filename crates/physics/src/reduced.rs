@@ -4,10 +4,14 @@
 //! m dv/dt = F_applied - F_c,    F_c = sum_i clamp(k_i (x - s_i), -L_i, L_i)
 //! ```
 //!
-//! Each cell i of the contact patches is a bristle: its share k_i of the gel's shear stiffness, its friction limit L_i, and
-//! the place s_i on the part where it stands. A bristle at its limit drags its foot along. Cells with little pressure
+//! Each cell i of the contact patches is a bristle: its share k_i of the gel's shear stiffness, which is that of its area,
+//! its friction limit L_i, and the place s_i on the part where it stands. A bristle at its limit drags its foot along. Cells with little pressure
 //! reach their limit first, so slip begins at the rim of the contact and runs inwards (incipient slip) until the last
 //! cell slips and the force has reached `sum L_i` (parallel Jenkin elements: Iwan 1966).
+//!
+//! On the pressure of a Hertz contact such bristles start and end as Cattaneo's and Mindlin's solution for a half-space
+//! does, with whole slip at 1.5 times the mean shear, and hold up to 4.5 % of the limit more in between (6 % on 64 cells; 16 %
+//! with three quarters of the stiffness shared by force). A layer much thinner than the contact is wide shears as bristles do.
 //!
 //! A time step is implicit in the velocity. The force is a non-decreasing, piecewise linear function of it, so Newton's
 //! method inside a bracket finds the one solution, for any stiffness, and momentum balances to rounding.
@@ -18,11 +22,6 @@ use gripgen_twin::{Gel, PerJaw};
 
 /// Cells are padded to a multiple of this, so that sums have one fixed order whatever the vector unit.
 const LANES: usize = 8;
-
-/// Share of the gel's shear stiffness that cells have by what they hold, the rest by their area: a pressed gel is stiffer.
-/// Our choice. By area alone the middle of a ball's contact would hold on to twice the mean shear; by force alone all
-/// cells would slip at once.
-const BY_FORCE: f64 = 0.75;
 
 /// Newton steps of a time step at most; a staircase takes one or two.
 const MOST_ITERATIONS: usize = 100;
@@ -64,12 +63,7 @@ impl ReducedPull {
         let mut boundary = 0;
         for (jaw, friction) in friction.iter() {
             boundary = bristles.limit_n.len().max(boundary);
-            let area_m2: f64 = friction.cells.iter().map(|c| c.area_m2).sum();
-            let limit_n = friction.limit_n();
-            for cell in &friction.cells {
-                let by_area = cell.area_m2 / area_m2;
-                let by_force = if limit_n > 0.0 { cell.limit_n / limit_n } else { by_area };
-                let share = (1.0 - BY_FORCE) * by_area + BY_FORCE * by_force;
+            for (cell, share) in friction.cells.iter().zip(friction.stiffness_shares()) {
                 bristles.stiffness_n_per_m.push(gel[jaw].shear_stiffness_n_per_m * share);
                 bristles.limit_n.push(cell.limit_n);
             }
@@ -119,6 +113,10 @@ impl ReducedPull {
                 high = speed;
             }
             let newton = speed - residual / (inertia + slope * step_s);
+            if newton == speed {
+                // The forces balance as far as numbers can tell speeds apart.
+                break;
+            }
             // Between two kinks Newton may jump to and fro; the bracket then halves.
             speed = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             (force, slope) = self.bristles.force(self.position_m + speed * step_s);

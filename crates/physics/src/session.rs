@@ -57,6 +57,13 @@ impl JawFriction {
         self.kinetic_ratio + (1.0 - self.kinetic_ratio) * libm::exp(-slid_s / self.kinetic_fall_s)
     }
 
+    /// Share of each cell in the gel's shear stiffness: that of its area.
+    pub fn stiffness_shares(&self) -> impl Iterator<Item = f64> {
+        let area_m2: f64 = self.cells.iter().map(|c| c.area_m2).sum();
+        let even = 1.0 / self.cells.len() as f64;
+        self.cells.iter().map(move |c| if area_m2 > 0.0 { c.area_m2 / area_m2 } else { even })
+    }
+
     /// Largest tangential force before the jaw slips: the sum over its cells.
     pub fn limit_n(&self) -> f64 {
         self.cells.iter().map(|c| c.limit_n).sum()
