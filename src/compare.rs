@@ -33,6 +33,8 @@ pub struct PullComparison {
     pub traces: (usize, f64),
     /// Label predicted for each pull.
     pub label_n: Vec<f64>,
+    /// Readings predicted for the rows of each pull's trace from time 0 on, as far as the pull lasts; empty without a trace.
+    pub trace_n: Vec<Vec<f64>>,
 }
 
 impl LabelErrors {
@@ -100,6 +102,7 @@ pub fn compare_pulls(
     let mut model = model_of(twin, &parts)?;
     apply_tables(&mut model, twin, measured, &predictor);
     let mut label_n = vec![0.0; measured.pulls.len()];
+    let mut trace_n = vec![vec![]; measured.pulls.len()];
     let (mut square, mut readings, mut traces) = (0.0, 0_usize, 0);
     for name in &parts {
         let part = &twin.parts[name];
@@ -118,6 +121,7 @@ pub fn compare_pulls(
             square += pairs.map(|(p, m)| (p - m) * (p - m)).sum::<f64>();
             readings += predicted.len();
             traces += 1;
+            trace_n[i] = predicted;
         }
     }
     let all = || measured.pulls.iter().zip(&label_n);
@@ -140,5 +144,6 @@ pub fn compare_pulls(
         outside_fit: measured.pulls.iter().filter(|p| outside(p)).count(),
         traces: (traces, (square / readings.max(1) as f64).sqrt()),
         label_n,
+        trace_n,
     })
 }
