@@ -6,12 +6,16 @@
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
 
+mod guard;
+
 use gripgen::identify::{CampaignOptions, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
 use gripgen::{
     Library, Location, PullDiagnoseOptions, compare_pulls, diagnose_pull_table, load_twin_document,
     simulate_campaign,
 };
+use guard::baseline::Unit;
+use std::process::ExitCode;
 use std::time::Instant;
 
 const PULLS: usize = 440;
@@ -28,10 +32,11 @@ const CASES: [(&str, &str); 4] = [
     ),
 ];
 
-fn main() {
-    // `cargo test --benches` only asks whether it starts.
-    if std::env::args().any(|a| a == "--test") {
-        return;
+fn main() -> ExitCode {
+    let Some(mut run) = guard::Run::from_args("diagnosis") else { return ExitCode::SUCCESS };
+    let cases: Vec<_> = CASES.iter().filter(|(name, _)| run.wants(&format!("diagnosis/{name}"))).collect();
+    if cases.is_empty() {
+        return ExitCode::SUCCESS;
     }
     let base = Location::parse("asset:configs/twin-baseline.toml");
     let twin = Twin::new(&load_twin_document(&base, &[]).unwrap().read_twin().unwrap()).unwrap();
@@ -39,7 +44,7 @@ fn main() {
     let jobs = std::thread::available_parallelism().map_or(1, usize::from);
     println!("{PULLS} pulls, {} traces, {jobs} threads", PULLS.div_ceil(TRACE_EVERY));
     println!("{:20} {:>10} {:>14}  found", "campaign", "seconds", "comparisons");
-    for (name, effects) in CASES {
+    for (name, effects) in cases {
         let measured = campaign(effects);
         let started = Instant::now();
         compare_pulls(&measured, &twin, &library, jobs).unwrap();
@@ -50,7 +55,9 @@ fn main() {
         let seconds = started.elapsed().as_secs_f64();
         let named: Vec<&str> = found.diagnosis.effects.iter().map(|e| e.name.as_str()).collect();
         println!("{name:20} {seconds:10.1} {:14.0}  {}", seconds / once_s, named.join(", "));
+        run.measured(&format!("diagnosis/{name}"), Unit::Seconds, vec![seconds]);
     }
+    run.finish()
 }
 
 fn campaign(effects: &str) -> MeasuredPulls {

@@ -2,9 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
 
+mod guard;
 mod scenes;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput};
 use gripgen::physics::{
     Arm, FrictionCell, Grip, GripSetup, Held, JawFriction, Mount, Until, grip, pull_staircase,
 };
@@ -16,6 +17,7 @@ use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Jaw, PerJaw, Staircase};
 use gripgen::{Location, Project, generate, press_only};
 use std::hint::black_box;
+use std::process::ExitCode;
 
 const PARTS: [&str; 4] = ["ball_bearing", "long_shaft", "gear", "roller_bearing"];
 
@@ -174,5 +176,15 @@ fn record(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, physics, tactile, ball, record);
-criterion_main!(benches);
+fn main() -> ExitCode {
+    let run = guard::Run::from_args("gripgen");
+    let folder = guard::criterion_folder();
+    let mut c = Criterion::default().output_directory(&folder).configure_from_args();
+    for group in [physics, tactile, ball, record] {
+        group(&mut c);
+    }
+    c.final_summary();
+    let Some(mut run) = run else { return ExitCode::SUCCESS };
+    run.take_criterion(&folder);
+    run.finish()
+}

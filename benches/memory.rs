@@ -5,21 +5,30 @@
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
 
+mod guard;
+
 use gripgen::tactile::SimdLevel;
 use gripgen::{Location, Project, SweepOptions, sweep};
-use std::process::Command;
+use guard::baseline::Unit;
+use std::process::{Command, ExitCode};
 use std::sync::atomic::AtomicBool;
 
 /// Set in the child processes: samples and jobs.
 const CHILD: &str = "GRIPGEN_MEMORY_BENCH";
 
-fn main() {
+fn main() -> ExitCode {
     if let Ok(task) = std::env::var(CHILD) {
-        return child(&task);
+        child(&task);
+        return ExitCode::SUCCESS;
     }
+    let Some(mut run) = guard::Run::from_args("memory") else { return ExitCode::SUCCESS };
     println!("{:>8} {:>5} {:>8} {:>12} {:>14}", "samples", "jobs", "sensors", "peak MB", "on disk MB");
     for (jobs, sensors) in [(1, "one"), (2, "one"), (2, "varied")] {
         for samples in [64, 640] {
+            let name = format!("memory/{sensors}/{jobs}_jobs/{samples}_samples");
+            if !run.wants(&name) {
+                continue;
+            }
             let output = Command::new(std::env::current_exe().unwrap())
                 .env(CHILD, format!("{samples} {jobs} {sensors}"))
                 .output()
@@ -27,8 +36,11 @@ fn main() {
             assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
             let text = String::from_utf8(output.stdout).unwrap();
             println!("{samples:>8} {jobs:>5} {sensors:>8} {}", text.trim_end());
+            let peak_mb = text.split_whitespace().next().and_then(|word| word.parse().ok());
+            run.measured(&name, Unit::Megabytes, Vec::from_iter(peak_mb));
         }
     }
+    run.finish()
 }
 
 fn child(task: &str) {

@@ -1,7 +1,9 @@
 //! Slip force, label, creep and speed of both mechanics on the pulls of `docs/peers.md`, as the JSON that
-//! `benches/peers/table.py` reads: `cargo bench --bench slip_table -- FILE`.
+//! `benches/peers/table.py` reads: `cargo bench --bench slip_table -- FILE.json`.
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
+
+mod guard;
 
 use gripgen::physics::{
     Arm, Command, FrictionCell, Grip, GripSetup, Held, JawFriction, Mount, PartShape, PullSession, Until,
@@ -13,6 +15,8 @@ use gripgen::twin::parts::SteppedShaft;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{PerJaw, PullSettings, Staircase, Twin, slip_label};
 use gripgen::{BASELINE_TWIN, Location, Project};
+use guard::baseline::Unit;
+use std::process::ExitCode;
 use std::time::Instant;
 
 /// The pulls whose speed is stated.
@@ -21,10 +25,13 @@ const TIMED: [(&str, f64, f64); 2] = [("box", 0.168, 40.0), ("vertical_shaft", 0
 const CELLS: usize = 64;
 const STOP_M: f64 = 5e-3;
 
-fn main() {
+fn main() -> ExitCode {
+    let Some(mut run) = guard::Run::from_args("slip_table").filter(|run| run.wants_some_of("slip_table"))
+    else {
+        return ExitCode::SUCCESS;
+    };
     let sets = [("twin", BASELINE_TWIN), ("wrist.noise_n", "0")].map(|(k, v)| (k.into(), v.into()));
     let twin = Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap().twin;
-    let file = std::env::args().skip(1).find(|a| !a.starts_with("--"));
     let mut rows = Vec::new();
     for (mechanics, name) in [(Mechanics::Rapier, "rapier"), (Mechanics::Reduced, "reduced")] {
         let mut worst = 0.0_f64;
@@ -42,6 +49,8 @@ fn main() {
                         json["us_per_step"] = row.us_per_step.into();
                         json["steps"] = row.steps.into();
                         json["pulls_per_s"] = row.pulls_per_s.into();
+                        let name = format!("slip_table/{name}/{shape_name}");
+                        run.measured(&name, Unit::Nanoseconds, vec![1e3 * row.us_per_step]);
                     }
                     rows.push(json);
                 }
@@ -49,9 +58,10 @@ fn main() {
         }
         println!("{name}: worst slip force {:.4} % off 2 mu F_G", 100.0 * worst);
     }
-    if let Some(file) = file {
-        std::fs::write(&file, serde_json::to_string_pretty(&rows).unwrap()).unwrap();
+    if let Some(file) = run.file() {
+        std::fs::write(file, serde_json::to_string_pretty(&rows).unwrap()).unwrap();
     }
+    run.finish()
 }
 
 struct Row {

@@ -1,9 +1,10 @@
 //! Times of the tactile stages on one core, as the JSON that `benches/peers/tactile.py` reads:
-//! `cargo bench --bench tactile_stages -- FILE`. The press and the surface that belong to it go into FILE.f32, so that
+//! `cargo bench --bench tactile_stages -- FILE.json`. The press and the surface that belong to it go into FILE.json.f32, so that
 //! the peers work on the same contact.
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
 
+mod guard;
 mod scenes;
 
 use gripgen::tactile::{
@@ -11,11 +12,17 @@ use gripgen::tactile::{
 };
 use gripgen::twin::Jaw;
 use gripgen::{Location, Project};
+use guard::baseline::Unit;
 use std::hint::black_box;
+use std::process::ExitCode;
 use std::time::Instant;
 
-fn main() {
-    let file = std::env::args().skip(1).find(|a| !a.starts_with("--"));
+fn main() -> ExitCode {
+    let Some(mut run) =
+        guard::Run::from_args("tactile_stages").filter(|run| run.wants_some_of("tactile_stages"))
+    else {
+        return ExitCode::SUCCESS;
+    };
     let project = Project::load(&Location::parse("asset:configs/quickstart.toml"), &[]).unwrap();
     let twin = &project.twin;
     let sensor = project.library.sensor(&twin.optics[Jaw::Left]).unwrap();
@@ -35,9 +42,12 @@ fn main() {
     let contact = imprint.depth_px.values.iter().filter(|&&d| d > 0.0).count() as f64 / grid.len() as f64;
 
     let mut stages = serde_json::Map::new();
-    let mut stage = |name: String, us: f64| {
-        println!("{name:<28} {us:8.1} us");
-        stages.insert(name, us.into());
+    let mut stage = |name: String, us: Vec<f64>| {
+        let least_us = us.iter().copied().fold(f64::INFINITY, f64::min);
+        println!("{name:<28} {least_us:8.1} us");
+        let path = format!("tactile_stages/{}", name.replace(", ", "/").replace(' ', "_"));
+        run.measured(&path, Unit::Nanoseconds, us.iter().map(|us| 1e3 * us).collect());
+        stages.insert(name, least_us.into());
     };
     stage("raster, whole gel".into(), us(|| clustered.raster(&at, &grid, depth_px)));
     stage("indent".into(), us(|| indent(&heights, &grid, &pressed, scenes::FORCE_N)));
@@ -63,24 +73,25 @@ fn main() {
         }
     }
     println!("{} triangles, {:.1} % of the image in contact", mesh.triangles().len(), 100.0 * contact);
-    let Some(file) = file else { return };
+    let Some(file) = run.file() else { return run.finish() };
     let json = serde_json::json!({
         "width_px": grid.width_px, "height_px": grid.height_px, "triangles": mesh.triangles().len(),
         "contact_share": contact, "press_px": imprint.press_depth_m / grid.metres_per_px,
         "kernels_px": gel.kernels_px, "restore_depth_fraction": gel.restore_depth_fraction, "us": stages,
     });
-    std::fs::write(&file, serde_json::to_string_pretty(&json).unwrap()).unwrap();
+    std::fs::write(file, serde_json::to_string_pretty(&json).unwrap()).unwrap();
     let bytes = |plane: &Plane| plane.values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
-    std::fs::write(file + ".f32", [bytes(&imprint.depth_px), bytes(&surface)].concat()).unwrap();
+    let arrays = format!("{}.f32", file.display());
+    std::fs::write(arrays, [bytes(&imprint.depth_px), bytes(&surface)].concat()).unwrap();
+    run.finish()
 }
 
-/// The shortest of many runs, which is the one that was not interrupted, in microseconds.
-fn us<T>(mut run: impl FnMut() -> T) -> f64 {
-    let mut best = f64::INFINITY;
-    for _ in 0..300 {
+/// Many runs, in microseconds; the shortest is the one that was not interrupted.
+fn us<T>(mut run: impl FnMut() -> T) -> Vec<f64> {
+    let once = |_| {
         let start = Instant::now();
         black_box(run());
-        best = best.min(start.elapsed().as_secs_f64());
-    }
-    1e6 * best
+        1e6 * start.elapsed().as_secs_f64()
+    };
+    (0..300).map(once).collect()
 }

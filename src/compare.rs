@@ -33,6 +33,8 @@ pub struct PullComparison {
     pub traces: (usize, f64),
     /// Label predicted for each pull.
     pub label_n: Vec<f64>,
+    /// Readings predicted for the rows of each pull's trace from time 0 on, as far as the pull lasts; empty without a trace.
+    pub trace_n: Vec<Vec<f64>>,
 }
 
 impl LabelErrors {
@@ -66,16 +68,20 @@ pub fn compare_pulls(
     let label_n = in_parallel(n, jobs, |row| expectations.expected(&quiet, row, 1.0).label_n);
     let traced: Vec<(usize, &PullTrace)> =
         measured.pulls.iter().enumerate().filter_map(|(i, p)| Some((i, p.trace.as_ref()?))).collect();
-    let differences = in_parallel(traced.len(), jobs, |k| {
+    let traces = in_parallel(traced.len(), jobs, |k| {
         let (row, trace) = traced[k];
         let readings = expectations.readings(&quiet, row, 1.0).measured_n;
-        let pulled = trace.rows().filter(|r| r.time_s >= 0.0);
-        let at = |time_s: f64| readings.get((time_s * twin.wrist.rate_hz).round() as usize);
-        pulled
-            .map_while(|r| Some(at(r.time_s)? - r.measured_force_n))
-            .fold((0.0, 0_usize), |(s, n), d| (s + d * d, n + 1))
+        let at = |time_s: f64| readings.get((time_s * twin.wrist.rate_hz).round() as usize).copied();
+        trace.time_s.iter().filter(|t| **t >= 0.0).map_while(|&t| at(t)).collect::<Vec<f64>>()
     });
-    let (square, readings) = differences.iter().fold((0.0, 0), |(s, n), d| (s + d.0, n + d.1));
+    let mut trace_n = vec![vec![]; n];
+    let (mut square, mut readings) = (0.0, 0);
+    for (&(row, trace), predicted) in traced.iter().zip(traces) {
+        let pulled = &trace.measured_force_n[trace.time_s.partition_point(|t| *t < 0.0)..];
+        square += predicted.iter().zip(pulled).map(|(p, m)| (p - m) * (p - m)).sum::<f64>();
+        readings += predicted.len();
+        trace_n[row] = predicted;
+    }
     let all = || measured.pulls.iter().zip(&label_n);
     let names: BTreeSet<&str> = measured.pulls.iter().map(|p| p.part.as_str()).collect();
     let by_part = names
@@ -97,5 +103,6 @@ pub fn compare_pulls(
         outside_fit: measured.pulls.iter().filter(|p| outside(p)).count(),
         traces: (traced.len(), (square / readings.max(1) as f64).sqrt()),
         label_n,
+        trace_n,
     })
 }

@@ -113,10 +113,11 @@ impl<'a> Expectations<'a> {
         let mut known: BTreeMap<[u64; 3], Arc<Staircase>> = BTreeMap::new();
         let staircases = measured.pulls.iter().map(|p| {
             let start_n = p.start_n.unwrap_or(p.increment_n);
-            let plain = known.entry([p.increment_n, p.step_s, start_n].map(f64::to_bits)).or_insert_with(|| {
-                let plain = Staircase::constant(p.increment_n, p.step_s, MAX_TIME_S);
-                Arc::new(plain.starting_at(p.start_n))
-            });
+            let plain =
+                known.entry([p.increment_n, p.step_s, start_n].map(f64::to_bits)).or_insert_with(|| {
+                    let plain = Staircase::constant(p.increment_n, p.step_s, MAX_TIME_S);
+                    Arc::new(plain.starting_at(p.start_n))
+                });
             let own = p.trace.as_ref().and_then(|t| plain.of_trace(t, p.step_s, MAX_TIME_S));
             own.map_or_else(|| plain.clone(), Arc::new)
         });

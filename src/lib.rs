@@ -46,6 +46,7 @@ mod cache;
 mod calibrate;
 mod campaign;
 mod compare;
+mod compare_report;
 mod diagnose;
 mod expect;
 mod generate;
@@ -54,6 +55,7 @@ mod gripped;
 mod hold;
 mod imprint;
 mod init;
+mod levels;
 mod library;
 mod location;
 mod measured;
@@ -67,6 +69,7 @@ mod press_columns;
 mod press_report;
 mod presses;
 mod project;
+mod ratio;
 mod report;
 mod resolve;
 mod rig_run;
@@ -80,6 +83,7 @@ pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use calibrate::{CalibratePullsError, calibrate_twin};
 pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use compare::{LabelErrors, PullComparison, compare_pulls};
+pub use compare_report::{pull_comparison_page, pull_ratios};
 pub use diagnose::{
     NextPulls, PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions, calibrate_sensor_table,
     compare_sensor_table, diagnose_presses, diagnose_pull_table, diagnose_sensor_table, given_model,
@@ -98,6 +102,7 @@ pub use imprint::{
     CalibrateImprintsError, ImprintCalibration, ImprintCalibrations, ImprintImagesError, calibrate_imprints,
 };
 pub use init::{InitError, PartStarter, Proposal, StarterFile, part_starter, starter};
+pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError};
 pub use measured::{LoadPullsError, LoadedPulls, load_pulls, load_pulls_of};
@@ -117,6 +122,7 @@ pub use presses::{
     load_presses, load_sensor, load_twin_sensor,
 };
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
+pub use ratio::{PartRatio, RatioFit};
 pub use report::{
     Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
 };

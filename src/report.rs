@@ -2,12 +2,14 @@
 
 mod axis;
 mod bars;
+mod comparison;
 mod page;
 mod plot;
 mod sentence;
 #[cfg(test)]
 mod tests;
 
+pub use comparison::{PageTable, comparison_page};
 pub use page::diagnosis_page;
 
 use gripgen_identify::Diagnosis;
@@ -19,6 +21,8 @@ pub enum Mark {
     Points,
     /// Joined by a line.
     Line,
+    /// The outline of an area, which is filled.
+    Band,
 }
 
 /// Points of a plot.

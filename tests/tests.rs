@@ -2,12 +2,16 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
+// The guard of the benchmarks.
+mod bench_guard;
 // A pull, integrated by other code.
 mod bristles;
 // Campaigns: planned, made on a twin, written, and read as measurements.
 mod campaign;
 // What several tests share.
 mod common;
+// The paper's panels for any measurements.
+mod compare_report;
 // Every configuration fault is one clear error that names its key.
 mod config;
 // The same bytes for any number of threads, slices, vector units, and after an interruption.

@@ -2,7 +2,7 @@
 
     python benches/peers/tactile.py --gripgen FILE [--gripgen-command COMMAND] [--taxim]
 
-FILE is written by `cargo bench --bench tactile_stages -- FILE`, which COMMAND may be; FILE.f32 beside it holds the
+FILE is written by `cargo bench --bench tactile_stages -- FILE.json`, which COMMAND may be; FILE.f32 beside it holds the
 contact and the surface of gripgen, so that both work on the same press and their heights can be compared. With --taxim
 the package `taxim` (1.4.1, on JAX) is timed too, if it is installed. One thread, CPU time, the shortest of many runs.
 """

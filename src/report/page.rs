@@ -18,10 +18,10 @@ const SERIES_POINTS: usize = 800;
 const PLOTS: usize = 60;
 const SERIES: usize = 12;
 /// Rows of a table.
-const ROWS: usize = 40;
+pub(super) const ROWS: usize = 40;
 /// Letters of a name and of a sentence.
-const NAME: usize = 60;
-const SENTENCE: usize = 600;
+pub(super) const NAME: usize = 60;
+pub(super) const SENTENCE: usize = 600;
 
 /// The report of a diagnosis: one HTML page with its plots inside, which needs neither a network nor a script.
 ///
@@ -68,6 +68,11 @@ pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
         "notes": d.notes.iter().take(ROWS).map(|n| clean(n, SENTENCE)).collect::<Vec<_>>(),
         "left_out": left_out(diagnosed),
     });
+    rendered(&page)
+}
+
+/// The page as HTML; sections that it lacks are left out.
+pub(super) fn rendered(page: &Value) -> String {
     let mut environment = minijinja::Environment::new();
     environment
         .add_template("diagnosis.html", assets::text("templates/diagnosis.html"))
@@ -77,7 +82,7 @@ pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
 }
 
 /// A text of the data without control characters, not longer than `most`. The template escapes it.
-fn clean(text: &str, most: usize) -> String {
+pub(super) fn clean(text: &str, most: usize) -> String {
     let plain: String =
         text.chars().filter(|c| !c.is_control() && !('\u{fffe}'..='\u{ffff}').contains(c)).collect();
     shorten(&plain, most)
@@ -176,7 +181,7 @@ fn names(names: &[String]) -> Vec<String> {
     shown
 }
 
-fn groups(groups: &[PlotGroup]) -> Vec<Value> {
+pub(super) fn groups(groups: &[PlotGroup]) -> Vec<Value> {
     let drawn = |g: &PlotGroup| g.plots.iter().map(|p| p.series.len().min(SERIES)).sum::<usize>();
     let series: usize = groups.iter().map(drawn).sum();
     let most = (ALL_POINTS / series.max(1)).clamp(8, SERIES_POINTS);

@@ -137,7 +137,7 @@ fn thin(series: &Series, most: usize) -> Thinned {
         return Thinned { points, errors };
     }
     let points = match series.mark {
-        Mark::Points => (0..most).map(|i| points[i * points.len() / most]).collect(),
+        Mark::Points | Mark::Band => (0..most).map(|i| points[i * points.len() / most]).collect(),
         Mark::Line => {
             let stretch = points.len().div_ceil(most / 2);
             points.chunks(stretch).flat_map(ends).collect()
@@ -174,7 +174,7 @@ fn marks(mark: Mark, series: &Thinned, colour: usize, at: &dyn Fn(f64, f64) -> (
         let _ = match mark {
             // A line of no length with round ends is a dot.
             Mark::Points => write!(path, "M{x:.1} {y:.1}h0"),
-            Mark::Line => write!(path, "{}{x:.1} {y:.1}", if i == 0 { 'M' } else { 'L' }),
+            Mark::Line | Mark::Band => write!(path, "{}{x:.1} {y:.1}", if i == 0 { 'M' } else { 'L' }),
         };
         if series.errors && error > 0.0 {
             let _ = write!(bars, "M{x:.1} {:.1}V{:.1}", at(px, py - error).1, at(px, py + error).1);
@@ -184,6 +184,7 @@ fn marks(mark: Mark, series: &Thinned, colour: usize, at: &dyn Fn(f64, f64) -> (
         Mark::Points if series.points.len() > 120 => "dots many",
         Mark::Points => "dots",
         Mark::Line => "line",
+        Mark::Band => "band",
     };
     let bars = if bars.is_empty() { bars } else { format!("<path class=\"bars c{colour}\" d=\"{bars}\"/>") };
     format!("{bars}<path class=\"{class} c{colour}\" d=\"{path}\"/>")

@@ -2,6 +2,8 @@
 //!
 //! `cargo xtask test` sets up what the tests need and runs all of them; `cargo xtask test --all` adds the slow ones;
 //! `cargo xtask blind` runs the whole blind benchmark of the diagnosis (hours) and writes docs/loop/blind.md;
+//! `cargo xtask bench record [--profile NAME] [FILTER]` runs the benchmarks and writes their numbers down as those of this machine,
+//! which `cargo bench` compares with;
 //! `cargo xtask assets [--check]` makes the shipped meshes and the shipped sensor from the numbers beside them.
 
 mod python;
@@ -23,9 +25,10 @@ fn main() -> ExitCode {
         ["test"] => test(false),
         ["test", "--all"] => test(true),
         ["blind"] => blind(),
+        ["bench", "record", ref rest @ ..] => record_benches(rest),
         ["assets"] => assets(false),
         ["assets", "--check"] => assets(true),
-        _ => Err("usage: cargo xtask test [--all] | blind | assets [--check]".into()),
+        _ => Err("usage: cargo xtask test [--all] | blind | bench record [--profile NAME] [FILTER] | assets [--check]".into()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -93,6 +96,17 @@ fn blind() -> Result<(), String> {
     all.args(["--doc", "docs/loop/blind.md"]);
     all.env("GRIPGEN_BIN", python::target(&root()).join("release/gripgen"));
     run("blind benchmark", &mut all)
+}
+
+/// The benchmarks write the file themselves (`benches/guard/`): only they know what they measured.
+fn record_benches(words: &[&str]) -> Result<(), String> {
+    let (profile, rest) = match words {
+        ["--profile", name, rest @ ..] => (vec!["--profile", *name], rest),
+        rest => (vec![], rest),
+    };
+    let mut benches = cargo(&["bench", "--package", "gripgen", "--benches"]);
+    benches.args(profile).arg("--").args(rest).env("GRIPGEN_BENCH", "record");
+    run("benchmarks", &mut benches)
 }
 
 fn assets(check: bool) -> Result<(), String> {

@@ -153,7 +153,7 @@ pub struct SweepArgs {
 /// `gripgen info`
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    /// A run folder.
+    /// A run folder, or a folder with pulls.csv.
     pub run: PathBuf,
     /// JSON.
     #[command(flatten)]
@@ -279,7 +279,8 @@ pub struct CompareArgs {
     /// A twin; its left sensor is taken where --sensor is left out.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,
-    /// Write a page with the error of each press and pictures of the worst.
+    /// Write a page: of pulls mean and RMS over grip force, a pull profile and the ratio to what is predicted with its fit; of presses
+    /// the error of each and pictures of the worst.
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
     /// JSON: the errors.

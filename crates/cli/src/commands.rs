@@ -12,6 +12,7 @@ pub mod completions;
 pub mod diagnose;
 pub mod export;
 pub mod info;
+mod info_pulls;
 pub mod init;
 pub mod rig;
 pub mod schema;

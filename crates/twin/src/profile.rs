@@ -65,7 +65,8 @@ impl Staircase {
         let (mut starts_s, mut nominal) = (vec![0.0], true);
         for pair in rows.windows(2) {
             let begun = ((pair[1].desired_force_n - self.start_n) / increment_n).round() + 1.0;
-            if (self.command_n(begun.max(0.0) as usize) - pair[1].desired_force_n).abs() > 0.01 * increment_n {
+            if (self.command_n(begun.max(0.0) as usize) - pair[1].desired_force_n).abs() > 0.01 * increment_n
+            {
                 return None;
             }
             let new = begun - starts_s.len() as f64;

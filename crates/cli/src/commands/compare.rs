@@ -9,9 +9,9 @@ use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, PressSet, Scores, compare_presses, predict_press};
 use gripgen::tactile::{Sensor, finish};
 use gripgen::{
-    FoundCircles, LabelErrors, LoadPressesError, LoadSensorError, Location, PressGeometry, PressReportText,
-    compare_pulls, find_missing_circles, is_press_set, is_sensor_table, load_presses, load_pulls_of,
-    load_sensor, load_twin_sensor, press_report,
+    FoundCircles, LabelErrors, LoadPressesError, LoadSensorError, Location, PartRatio, PressGeometry,
+    PressReportText, compare_pulls, find_missing_circles, is_press_set, is_sensor_table, load_presses,
+    load_pulls_of, load_sensor, load_twin_sensor, press_report, pull_comparison_page, pull_ratios,
 };
 use serde_json::{Value, json};
 use std::path::Path;
@@ -118,6 +118,9 @@ pub fn load_sensor_and_presses(
 
 /// A twin against measured pulls.
 fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
+    if let Some(report) = &args.report {
+        writable(report)?;
+    }
     let measured = folders(&args.measured, &args.also);
     let loaded = load_pulls_of(&measured).map_err(|e| no_pulls(&measured, e))?;
     let twin = load_twin(&args.twin, &[])?;
@@ -125,6 +128,10 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
     let library = load_library(&twin, &args.twin)?;
     let found = compare_pulls(&loaded.pulls, &twin, &library, jobs())
         .map_err(|e| Failure::usage(e).hint("name a twin that has this part with --twin"))?;
+    if let Some(path) = &args.report {
+        let title = format!("{} against {}", args.measured.display(), args.twin);
+        write_file(path, pull_comparison_page(&title, &loaded.pulls, &found).as_bytes())?;
+    }
     let errors =
         |e: &LabelErrors| json!({"n": e.n, "rmse_n": e.rmse_n, "mape_pct": e.mape_pct, "bias_n": e.bias_n});
     if sink.wanted() {
@@ -133,6 +140,11 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
             .by_part
             .iter()
             .map(|(name, e)| (name.clone(), errors(e)))
+            .collect::<serde_json::Map<_, _>>()
+            .into();
+        pulls["ratio"] = pull_ratios(&loaded.pulls, &found)
+            .iter()
+            .map(|(name, r)| (name.clone(), ratio_json(r)))
             .collect::<serde_json::Map<_, _>>()
             .into();
         pulls["n_outside_fit"] = json!(found.outside_fit);
@@ -161,6 +173,15 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
         }
     }
     Ok(0)
+}
+
+/// Measured over predicted labels of a part: the fit `a + b / F_G`, and errors before and after it.
+fn ratio_json(ratio: &PartRatio) -> Value {
+    let fit = ratio.fit.map(|f| json!({"a": f.a, "b_n": f.b_n, "covariance": f.covariance}));
+    json!({
+        "n": ratio.points.len(), "fit": fit, "before_pct": ratio.before_pct, "after_pct": ratio.after_pct,
+        "left_out_pct": ratio.left_out_pct,
+    })
 }
 
 /// The scores of presses as they stand in `--json`.

@@ -1,9 +1,10 @@
-//! `gripgen info`: what a run folder holds.
+//! `gripgen info`: what a run folder holds, or a folder of measured pulls.
 
 use crate::args::InfoArgs;
-use crate::commands::open_run;
+use crate::commands::{info_pulls, open_run};
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, size};
+use gripgen::levels;
 use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -16,6 +17,8 @@ struct PartSummary {
     sum_n: f64,
     low_n: Option<f64>,
     high_n: Option<f64>,
+    /// Grip force and label of the pulls that slipped: the label of another is a bound, or none.
+    slipped: Vec<(f64, f64)>,
 }
 
 impl PartSummary {
@@ -36,10 +39,14 @@ impl PartSummary {
 
 /// Runs the verb.
 pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
+    if args.run.join("pulls.csv").is_file() {
+        return info_pulls::run(args);
+    }
     let folder = open_run(&args.run)?;
     let info = folder.info();
     let at = |name: &str| INDEX_COLUMNS.iter().position(|c| *c == name).unwrap_or(0);
     let (status, part, label) = (at("status"), at("part"), at("max_pull_force_n"));
+    let force = at("grip_force_n");
     let mut statuses: BTreeMap<String, u64> = BTreeMap::new();
     let mut parts: BTreeMap<String, PartSummary> = BTreeMap::new();
     let (mut done, mut failed, mut shards, mut bytes) = (0, 0, 0, 0);
@@ -51,9 +58,16 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
         bytes += sidecar.bytes;
         for row in &sidecar.rows {
             *statuses.entry(row[status].clone()).or_default() += 1;
-            parts.entry(row[part].clone()).or_default().add(row[label].parse().ok());
+            let summary = parts.entry(row[part].clone()).or_default();
+            summary.add(row[label].parse().ok());
+            if let ("slipped", Ok(force_n), Ok(label_n)) =
+                (row[status].as_str(), row[force].parse(), row[label].parse())
+            {
+                summary.slipped.push((force_n, label_n));
+            }
         }
     }
+    let by_level: BTreeMap<_, _> = parts.iter().map(|(name, p)| (name.clone(), levels(&p.slipped))).collect();
     let missing = info.samples.saturating_sub(done);
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     if sink.wanted() {
@@ -63,6 +77,7 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
                 let value = json!({
                     "samples": p.samples, "mean_max_pull_force_n": p.mean_n(),
                     "low_n": p.low_n, "high_n": p.high_n,
+                    "levels": info_pulls::levels_json(&by_level[name]),
                 });
                 (name, value)
             })
@@ -104,6 +119,7 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
         let (mean, low, high) = (number(p.mean_n()), number(p.low_n), number(p.high_n));
         text += &format!("{name:<20} {:>8} {mean:>8} {low:>7} {high:>7}\n", p.samples);
     }
+    text += &info_pulls::levels_table(&by_level);
     print(&text)?;
     Ok(0)
 }

@@ -45,6 +45,34 @@ fn a_fitted_twin_predicts_the_pulls_it_was_fitted_to() {
 }
 
 #[test]
+fn mean_and_rms_over_grip_force_of_any_folder() {
+    let folder = folder(&pulls(12));
+    let at = folder.path().to_str().unwrap();
+    let info = run(&["info", at, "--json"]);
+    assert_code(&info, 0);
+    let json: serde_json::Value = serde_json::from_slice(&info.stdout).unwrap();
+    let levels = json["parts"]["long_shaft"]["levels"].as_array().unwrap();
+    assert_eq!(levels.len(), 3);
+    // Labels at 40 N: 16 N times 1 + 0.01 (i - 5.5) for i = 1, 4, 7, 10.
+    let near = |key: &str, wanted: f64| (levels[1][key].as_f64().unwrap() - wanted).abs() < 1e-3;
+    assert!(levels[1]["n"] == 4 && near("grip_force_n", 40.0), "{json}");
+    assert!(near("mean_n", 16.0) && near("rms_n", 0.16 * (11.25_f64).sqrt()), "{json}");
+    assert!(near("low_n", 15.28) && near("high_n", 16.72), "{json}");
+    assert!(text(&run(&["info", at]).stdout).contains("16.000   0.537  15.280  16.720"));
+
+    let page = folder.path().join("page.html");
+    let compared = run(&["compare", at, "--report", page.to_str().unwrap(), "--json"]);
+    assert_code(&compared, 0);
+    let json: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
+    let ratio = &json["pulls"]["ratio"]["long_shaft"];
+    // mu 0.168 of the plain twin against 0.2, whatever the grip force.
+    assert!((ratio["fit"]["a"].as_f64().unwrap() - 0.2 / 0.168).abs() < 0.1, "{json}");
+    assert!(ratio["before_pct"].as_f64().unwrap() > 10.0 && ratio["after_pct"].as_f64().unwrap() < 3.0);
+    let page = std::fs::read_to_string(page).unwrap();
+    assert!(page.contains("Measured over predicted") && page.contains("<svg"));
+}
+
+#[test]
 fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
     let one = folder(&pulls(1));
     let out = one.path().join("out.toml");
