@@ -178,6 +178,10 @@ fn check_reference_area(
 ) -> Result<Option<f64>, ConfigError> {
     let area = key("reference_area_mm2");
     match (effect.per, effect.reference_area_mm2) {
+        (Per::Cell, _) if spec.of_pressure => {
+            let problem = format!("`{}` is a law of the pressure, it has a value per cell as it is", spec.id);
+            Err(ConfigError::new(key("per"), problem).hint("leave per and reference_area_mm2 out"))
+        }
         (Per::Cell, _) if !spec.is_load_law() => {
             let problem =
                 format!("`{}` does not depend on the grip force, it has no value per cell", spec.id);
