@@ -1,17 +1,21 @@
-//! How much the jaws hold: the friction law on the cells of the contact, and the limit surface.
+//! How much the jaws hold: the friction law on the cells of the contact, and what their rotation takes of it.
 
-use crate::gripped::{pull_direction, world_from_part};
-use gripgen_physics::{FrictionCell, JawFriction, LimitCell, free_twist_capacity_n};
+use crate::gripped::pull_direction;
+use gripgen_physics::{
+    FrictionCell, JawFriction, LimitCell, TwistCell, compliant_twist_capacity_n, free_twist_capacity_n,
+};
 use gripgen_twin::config::Twist;
 use gripgen_twin::frames::world_from_gel;
-use gripgen_twin::{ContactPatch, PerJaw, Scenario, Twin};
+use gripgen_twin::{ContactPatch, Jaw, PerJaw, Scenario, Twin};
 use nalgebra::{Point3, Vector3};
 
 /// The friction of both jaws. `mu` has a coefficient for each cell of each patch.
 ///
-/// An arm that holds the grip's rotation (`twist = "stiff"`) makes every cell slide along the pull: the jaws hold the
-/// sum over their cells. One that does not (`"free"`) lets the grip turn about the jaw axis; the jaws then hold what
-/// the limit surface of both patches says for the pull line at `grip_offset_mm`, and all cells are scaled to it.
+/// The pull acts through the grip centre, between the middles of the gels, as the robot's program pulls its tool centre
+/// point. Where the contact lies beside that line it also turns the grip about the jaw axis. A twist that is held
+/// (`twist = "stiff"`) makes every cell slide along the pull: the jaws hold the sum over their cells. One that is not
+/// (`"free"`) leaves what the limit surface of both patches says, and all cells are scaled to it; a spring
+/// (`"compliant"`) leaves what is reached within the way at which the pull stops.
 pub(crate) fn hold(
     twin: &Twin,
     scenario: &Scenario,
@@ -25,34 +29,55 @@ pub(crate) fn hold(
         let kinetic_fall_s = twin.parts[&scenario.part].kinetic_fall_s;
         JawFriction { cells: cells.collect(), kinetic_ratio, kinetic_fall_s }
     });
-    if twin.robot.twist == Twist::Free {
-        let share = free_share(scenario, patches, &friction);
-        for jaw in gripgen_twin::Jaw::BOTH {
-            friction[jaw].cells.iter_mut().for_each(|cell| cell.limit_n *= share);
+    let straight: f64 = friction.iter().map(|(_, f)| f.limit_n()).sum();
+    if twin.robot.twist == Twist::Stiff || straight == 0.0 {
+        return friction;
+    }
+    let cells = cells(twin, scenario, patches, &friction);
+    let held_n = match (twin.robot.twist, twin.robot.twist_stiffness_n_m_per_rad) {
+        (Twist::Compliant, Some(stiffness)) => {
+            compliant_twist_capacity_n(&cells, stiffness, scenario.pull.stop_m, kinetic_ratio)
+        }
+        _ => {
+            let limits = cells.iter().map(|c| LimitCell {
+                across_m: c.across_m,
+                along_m: c.along_m,
+                limit_n: c.limit_n,
+            });
+            free_twist_capacity_n(&limits.collect::<Vec<_>>(), 0.0)
+        }
+    };
+    if held_n < straight {
+        for jaw in Jaw::BOTH {
+            friction[jaw].cells.iter_mut().for_each(|cell| cell.limit_n *= held_n / straight);
         }
     }
     friction
 }
 
-/// What the jaws hold with a free twist, as a share of what they hold with a stiff one.
-fn free_share(scenario: &Scenario, patches: &PerJaw<&ContactPatch>, friction: &PerJaw<JawFriction>) -> f64 {
+/// The cells of both jaws in the plane of the gels, seen from the line of the pull.
+fn cells(
+    twin: &Twin,
+    scenario: &Scenario,
+    patches: &PerJaw<&ContactPatch>,
+    friction: &PerJaw<JawFriction>,
+) -> Vec<TwistCell> {
     let along = Vector3::from(pull_direction(scenario));
     // The jaws turn about y, so across is what is left in the plane of the gels.
     let across = Vector3::y().cross(&along);
     let mut cells = Vec::new();
     for (jaw, patch) in patches.iter() {
         let world_from_gel = world_from_gel(jaw, 0.0);
-        for (cell, held) in patch.cells.iter().zip(&friction[jaw].cells) {
+        let shares = friction[jaw].stiffness_shares();
+        for ((cell, held), share) in patch.cells.iter().zip(&friction[jaw].cells).zip(shares) {
             let at = (world_from_gel * Point3::new(cell.x_m, cell.y_m, 0.0)).coords;
-            cells.push(LimitCell {
+            cells.push(TwistCell {
                 across_m: at.dot(&across),
                 along_m: at.dot(&along),
                 limit_n: held.limit_n,
+                stiffness_n_per_m: twin.gel[jaw].shear_stiffness_n_per_m * share,
             });
         }
     }
-    // The pull line passes through the origin of the part, which the offset moved off the grip centre.
-    let lever_m = world_from_part(scenario).translation.vector.dot(&across);
-    let straight: f64 = cells.iter().map(|c| c.limit_n).sum();
-    if straight == 0.0 { 1.0 } else { free_twist_capacity_n(&cells, lever_m) / straight }
+    cells
 }

@@ -157,6 +157,98 @@ fn effects_that_show_elsewhere_do() {
     }
 }
 
+/// A cube of 10 mm between the jaws, in outlined text (OBJ), and its twin with these effects.
+fn stamp(effects: &str, mechanics: &str) -> Box<Pulled> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut mesh = String::new();
+    for i in 0..8 {
+        let at = |bit: i32| if i >> bit & 1 == 1 { 5 } else { -5 };
+        mesh += &format!("v {} {} {}\n", at(0), at(1), at(2));
+    }
+    for [a, b, c, d] in [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]] {
+        mesh += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+    }
+    std::fs::write(folder.path().join("cube.obj"), mesh).unwrap();
+    let twin = format!(
+        "[parts.cube]\nmesh = \"cube.obj\"\nmu = 0.2\nimprint_mm3_per_n = 1.5\n[wrist]\nnoise_n = 0.0\n\
+         [optics.left]\nimage_noise = \"off\"\n{effects}"
+    );
+    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
+    let sweep = format!(
+        "twin = \"twin.toml\"\nsamples = 1\nmechanics = \"{mechanics}\"\n[vary]\ngrip_force_n = [40]\n"
+    );
+    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
+    pulled(&Project::load(&Location::Disk(folder.path().join("sweep.toml")), &[]).unwrap())
+}
+
+/// A rigid flat punch, tilted by t on a Winkler bed of foundation constant 1 / c: p = (d + y tan t) / c as long as the whole
+/// face touches, d = c F / A; beyond, a wedge of the length sqrt(2 c F / (w tan t)). Felt as pressure and seen in the image,
+/// in both jaws and both mechanics.
+#[test]
+fn tilted_jaws_press_a_flat_face_as_a_tilted_punch_does() {
+    const C: f64 = 1.5e-9;
+    for mechanics in ["reduced", "rapier"] {
+        let tilted =
+            |deg: f64| stamp(&format!("[[effects]]\nname = \"jaw_tilt\"\ntilt_deg = {deg}\n"), mechanics);
+        let flat = tilted(0.0);
+        for deg in [1.0_f64, 3.0, -3.0] {
+            let p = tilted(deg);
+            let slope = deg.to_radians().tan();
+            for (jaw, imprint) in p.imprint.iter() {
+                let cells = &imprint.patch.cells;
+                let (n, y): (f64, f64) =
+                    cells.iter().fold((0.0, 0.0), |(n, y), c| (n + c.area_m2, y + c.area_m2 * c.y_m));
+                let middle = y / n;
+                let (mut pressure, mut steep, mut square) = (0.0, 0.0, 0.0);
+                for c in cells {
+                    pressure += c.force_n;
+                    steep += c.force_n * (c.y_m - middle);
+                    square += c.area_m2 * (c.y_m - middle).powi(2);
+                }
+                let (found, by_hand) = (steep / square, slope / C);
+                assert!(
+                    (found / by_hand - 1.0).abs() < 0.03,
+                    "{mechanics}, {jaw} {deg}: {found} and {by_hand} Pa/m"
+                );
+                assert!((pressure / n / (40.0 / 1e-4) - 1.0).abs() < 0.03, "the mean is that of the force");
+                let deepest = C * 40.0 / 1e-4 + 5e-3 * slope.abs();
+                assert!(
+                    (imprint.press_depth_m / deepest - 1.0).abs() < 0.03,
+                    "{} {deepest}",
+                    imprint.press_depth_m
+                );
+            }
+        }
+        let wedge = tilted(10.0);
+        let length = (2.0 * C * 40.0 / (0.01 * 10f64.to_radians().tan())).sqrt();
+        for (jaw, imprint) in wedge.imprint.iter() {
+            let area = imprint.patch.area_m2();
+            assert!((area / (0.01 * length) - 1.0).abs() < 0.03, "{mechanics}, {jaw}: {area} m2");
+        }
+        // Lights answer to slopes in proportion: what one tilt adds in the middle of the face, the other takes off.
+        let (up, down) = (tilted(3.0), tilted(-3.0));
+        let mean = |p: &Pulled, jaw| {
+            let image = &p.images.as_ref().unwrap()[jaw];
+            let mut sum = [0.0; 3];
+            for (x, y) in (140..180).flat_map(|x| (100..140).map(move |y| (x, y))) {
+                for (s, v) in sum.iter_mut().zip(image.pixel(x, y)) {
+                    *s += f64::from(v) / 1600.0;
+                }
+            }
+            sum
+        };
+        for jaw in gripgen::twin::Jaw::BOTH {
+            let [plain, up, down] = [&flat, &up, &down].map(|p| mean(p, jaw));
+            let most = (0..3).map(|i| (up[i] - plain[i]).abs()).fold(0.0, f64::max);
+            assert!(most > 2.0, "{mechanics}, {jaw}: {most} grey levels");
+            for i in 0..3 {
+                let (a, b) = (up[i] - plain[i], down[i] - plain[i]);
+                assert!((a + b).abs() < 0.2 * most + 0.5, "{mechanics}, {jaw}: {a} and {b} grey levels");
+            }
+        }
+    }
+}
+
 /// A law per cell sees the pressure: with the same grip force a sharp contact holds less than a flat one if friction
 /// falls with pressure.
 #[test]

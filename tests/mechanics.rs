@@ -108,42 +108,58 @@ fn repetitions_differ_in_scatter_and_noise_only() {
     }
 }
 
-/// An arm that does not hold the grip's rotation slips earlier beside the grip centre, alike in both mechanics, and not
-/// at all for a lever along the pull.
+/// A contact beside the line of the pull, which goes through the grip centre, slips earlier where the grip can turn: a gear
+/// held off its middle loses, alike in both mechanics; a shaft that fills the gels does not, nor does a lever along the pull.
+/// Between free and stiff a spring holds ever more the stiffer it is, and the shipped one all.
 #[test]
-fn a_free_twist_falls_with_the_lever() {
-    let label = |mechanics: &str, twist: &str, offset_mm: f64, angle_deg: f64| {
+fn a_grip_that_turns_falls_with_the_lever_of_its_contact() {
+    let label = |part: &str, mechanics: &str, twist: &str, offset_mm: f64, angle_deg: f64| {
+        let (twist, stiffness) = twist.split_once(' ').unwrap_or((twist, "1000"));
         let p = project(
             "asset:configs/quickstart.toml",
             &[
                 "twin=asset:configs/twin-baseline.toml",
                 "images=none",
                 "wrist.noise_n=0",
-                "parts.long_shaft.scatter=0",
-                "vary.part=[\"long_shaft\"]",
+                &format!("parts.{part}.scatter=0"),
+                &format!("parts.{part}.mu=0.168"),
+                &format!("vary.part=[\"{part}\"]"),
                 "vary.grip_pose=[0]",
                 "vary.grip_force_n=[40]",
                 &format!("vary.grip_offset_mm=[{offset_mm}]"),
                 &format!("vary.grip_angle_deg=[{angle_deg}]"),
                 &format!("mechanics={mechanics}"),
                 &format!("robot.twist={twist}"),
+                &format!("robot.twist_stiffness_n_m_per_rad={stiffness}"),
             ],
         );
         pulled(&p, 0).unwrap().label.max_pull_force_n
     };
     let straight = 2.0 * 0.168 * 40.0;
     let mut before = f64::INFINITY;
-    for offset_mm in [0.0, 4.0, 10.0, 20.0] {
-        assert!((label("reduced", "stiff", offset_mm, 0.0) / straight - 1.0).abs() < 1e-3);
-        let (a, b) = (label("reduced", "free", offset_mm, 0.0), label("rapier", "free", offset_mm, 0.0));
+    for offset_mm in [0.0, 3.0, 6.0, 9.0] {
+        let of = |mechanics: &str, twist: &str| label("ball_bearing", mechanics, twist, offset_mm, 0.0);
+        assert!((of("reduced", "stiff") / straight - 1.0).abs() < 1e-3);
+        assert!((of("reduced", "compliant 1000") / straight - 1.0).abs() < 1e-3);
+        let (a, b) = (of("reduced", "free"), of("rapier", "free"));
         assert!((a / b - 1.0).abs() < 0.01, "{offset_mm} mm: {a} and {b}");
         assert!(a < before - 1e-3, "{offset_mm} mm: {a} N after {before} N");
         before = a;
+        let mut softer = a * (1.0 - 1e-3);
+        for stiffness in ["0.003", "0.01", "0.03", "0.1", "1"] {
+            let held = of("reduced", &format!("compliant {stiffness}"));
+            assert!(
+                held > softer * (1.0 - 1e-6) && held < straight * 1.001,
+                "{offset_mm} mm, {stiffness}: {held} N"
+            );
+            softer = held;
+        }
     }
-    assert!(before < 0.6 * straight, "{before} N at 20 mm");
-    // Turned by a quarter the shaft's axis lies along the pull, and so does the lever.
-    let along = label("reduced", "free", 20.0, 90.0);
-    assert!((along / straight - 1.0).abs() < 0.01, "{along}");
+    assert!(before < 0.6 * straight, "{before} N at 9 mm");
+    let along = label("ball_bearing", "reduced", "free", 9.0, 90.0);
+    assert!((along / straight - 1.0).abs() < 0.02, "a lever along the pull: {along}");
+    let shaft = label("long_shaft", "reduced", "free", 6.0, 0.0);
+    assert!((shaft / straight - 1.0).abs() < 0.01, "a shaft that fills the gels: {shaft}");
 }
 
 /// Strong pulls at the default stop: both mechanics reach the limit of the friction law.
@@ -164,6 +180,7 @@ fn strong_grips_slip_before_the_stop() {
                     "vary.grip_force_n=[80]",
                     "vary.grip_pose=[0, 1]",
                     "vary.grip_angle_deg=[0]",
+                    "vary.grip_offset_mm=[0]",
                     &format!("mechanics={mechanics}"),
                 ],
             );

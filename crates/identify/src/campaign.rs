@@ -19,6 +19,8 @@ pub struct CampaignOptions {
     pub sessions: usize,
     /// Seed of the order.
     pub seed: u64,
+    /// Smallest grip force, per jaw: where the laws of the twin begin.
+    pub min_force_n: f64,
     /// Largest grip force, per jaw.
     pub max_force_n: f64,
     /// Grip angles to use.
@@ -40,6 +42,7 @@ impl Default for CampaignOptions {
             pulls: 120,
             sessions: 3,
             seed: 1,
+            min_force_n: 0.0,
             max_force_n: 80.0,
             angles_deg: vec![0.0],
             offsets_mm: vec![0.0],
@@ -104,7 +107,7 @@ const TRIES: u64 = 60;
 /// Plans a first campaign. The same options give the same plan.
 pub fn plan_campaign(options: &CampaignOptions) -> Result<Campaign, CampaignError> {
     check(options)?;
-    let forces_n = levels_n(options.max_force_n);
+    let forces_n = levels_n(options.min_force_n, options.max_force_n);
     let references = options.pulls.div_ceil(options.reference_every + 1);
     let design = options.pulls - references;
     // Each setting is made twice.
@@ -163,17 +166,20 @@ fn check(options: &CampaignOptions) -> Result<(), CampaignError> {
     Ok(())
 }
 
-/// The forces that a gripper reaches; of a weak one, as many in equal ratios below its limit.
-fn levels_n(max_force_n: f64) -> Vec<f64> {
-    if max_force_n >= 30.0 {
-        let mut levels: Vec<f64> = FORCES_N.iter().copied().filter(|&f| f <= max_force_n).collect();
+/// The forces that a gripper reaches and a twin knows; in a short range, or of a weak gripper, six in equal ratios.
+fn levels_n(min_force_n: f64, max_force_n: f64) -> Vec<f64> {
+    let reached = |f: &f64| (min_force_n..=max_force_n).contains(f);
+    if max_force_n >= 30.0 && FORCES_N.iter().filter(|&f| reached(f)).count() >= 4 {
+        let mut levels: Vec<f64> = FORCES_N.iter().copied().filter(reached).collect();
         // The upper end itself, where it lies well above the last.
         if levels.last().is_some_and(|&last| max_force_n > 1.2 * last) {
             levels.push(max_force_n);
         }
         return levels;
     }
-    (0..6).map(|i| (max_force_n * libm::pow(0.62, f64::from(5 - i)) * 100.0).round() / 100.0).collect()
+    let least = (max_force_n * libm::pow(0.62, 5.0)).max(min_force_n).min(max_force_n);
+    let level = |i| max_force_n * libm::pow(least / max_force_n, f64::from(5 - i) / 5.0);
+    (0..6).map(|i| (level(i) * 100.0).round() / 100.0).map(|f| f.clamp(least, max_force_n)).collect()
 }
 
 /// Settings in blocks that hold each force once; every other factor is balanced and independent.
@@ -377,6 +383,11 @@ mod tests {
                 "{forces:?}"
             );
             assert!(*forces.last().unwrap() > 0.8 * max_force_n, "{forces:?}");
+            let known =
+                CampaignOptions { min_force_n: 0.5 * max_force_n, max_force_n, ..options(&["gear"], 60) };
+            let within = levels(&loaded(&plan_campaign(&known).unwrap()), |p| p.grip_force_n);
+            let inside = within.iter().all(|f| (0.5 * max_force_n..=max_force_n).contains(f));
+            assert!(within.len() >= 4 && inside, "{within:?}");
             assert!(forces.iter().filter(|&&f| f < 20.0).count() >= 3);
         }
     }

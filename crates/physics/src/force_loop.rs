@@ -96,6 +96,7 @@ mod tests {
             speed_limit_m_per_s: 0.02,
             feedback,
             twist: gripgen_twin::config::Twist::Stiff,
+            twist_stiffness_n_m_per_rad: None,
         }
     }
 

@@ -26,6 +26,7 @@ mod scene;
 mod session;
 mod shape;
 mod staircase;
+mod twist;
 mod urdf;
 mod world;
 
@@ -36,6 +37,7 @@ pub use quasi_static::{QuasiStatic, SlipPull, StuckPull, label_moments};
 pub use session::{Command, FrictionCell, JawFriction, PullError, PullSession, PullState, Signals};
 pub use shape::{PartShape, ShapeError};
 pub use staircase::{StaircaseResult, Until, pull_staircase, staircase_of};
+pub use twist::{TwistCell, compliant_twist_capacity_n};
 pub use urdf::UrdfError;
 
 #[cfg(test)]

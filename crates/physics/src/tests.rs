@@ -50,6 +50,7 @@ impl Bench {
                 speed_limit_m_per_s: 0.02,
                 feedback: Feedback::Measured,
                 twist: Twist::Stiff,
+                twist_stiffness_n_m_per_rad: None,
             },
             gel: PerJaw { left: gel.clone(), right: gel },
             shape,

@@ -45,6 +45,7 @@ mod sensor_hysteresis;
 mod sensor_lowpass;
 mod sensor_quadratic;
 mod sensor_saturation;
+mod shear_strength;
 mod temperature;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -67,6 +68,7 @@ pub const LIBRARY: &[&EffectSpec] = &[
     &load_power_law::SPEC,
     &area_saturation::SPEC,
     &regime_transition::SPEC,
+    &shear_strength::SPEC,
     &rate_dependence::SPEC,
     &dwell_ageing::SPEC,
     &anisotropy::SPEC,
@@ -135,6 +137,8 @@ pub struct EffectSpec {
     pub references: &'static [&'static str],
     /// Columns of a pull table that it needs.
     pub covariates: &'static [&'static str],
+    /// Its friction law is one of the contact pressure: it is always taken for each pressure cell.
+    pub of_pressure: bool,
     /// Acts on the friction coefficient of a jaw.
     pub friction: Option<FrictionHook>,
     /// Acts on the normal force of a jaw, before imprint, friction and mechanics.
@@ -161,6 +165,7 @@ impl EffectSpec {
         parameters: &[],
         references: &[],
         covariates: &[],
+        of_pressure: false,
         friction: None,
         normal_force: None,
         imprint_volume: None,
@@ -172,7 +177,7 @@ impl EffectSpec {
 
     /// Whether the effect is a friction law of the grip force, which can be taken per pressure cell.
     pub fn is_load_law(&self) -> bool {
-        self.friction.is_some() && self.covariates.contains(&"grip_force_n")
+        self.friction.is_some() && self.covariates.contains(&"grip_force_n") && !self.of_pressure
     }
 }
 
@@ -256,5 +261,10 @@ impl Effect {
     /// Reference area of a law that is evaluated per cell.
     pub fn cell_area_m2(&self) -> Option<f64> {
         self.reference_area_m2.filter(|_| self.per == Per::Cell)
+    }
+
+    /// Whether its friction law may differ from cell to cell of a contact.
+    pub fn differs_by_cell(&self) -> bool {
+        self.spec.of_pressure || self.cell_area_m2().is_some()
     }
 }

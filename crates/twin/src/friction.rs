@@ -72,7 +72,7 @@ pub fn grip_friction(
         outside_fit |= law.outside_fit;
         mu = law.on_jaw(mu, at);
         if mu < 0.0 {
-            if law.effect.outside_fit != OutsideFit::Extrapolate && law.effect.cell_area_m2().is_none() {
+            if law.effect.outside_fit != OutsideFit::Extrapolate && !law.effect.differs_by_cell() {
                 return Err(FrictionError::Negative {
                     effect: law.effect.spec.id,
                     part: part_name.into(),
@@ -99,7 +99,7 @@ pub fn cell_friction(
 ) -> Result<(Vec<f64>, GripFriction), FrictionError> {
     let mut jaw = grip_friction(twin, part_name, part, at)?;
     let laws = laws(twin, part_name, at).collect::<Result<Vec<_>, _>>()?;
-    if laws.iter().all(|law| law.effect.cell_area_m2().is_none()) {
+    if laws.iter().all(|law| !law.effect.differs_by_cell()) {
         return Ok((vec![jaw.mu; patch.cells.len()], jaw));
     }
     let mu_of =
@@ -110,7 +110,8 @@ pub fn cell_friction(
         .map(|cell| if cell.area_m2 > 0.0 { mu_of(cell.pressure_pa()) } else { jaw.mu })
         .collect();
     let normal_n = patch.normal_force_n();
-    if normal_n > 0.0 {
+    // Where no cell differs the mean is the value itself, without rounding.
+    if normal_n > 0.0 && cells.iter().any(|&mu| mu != jaw.mu) {
         jaw.mu = cells.iter().zip(&patch.cells).map(|(mu, cell)| mu * cell.force_n).sum::<f64>() / normal_n;
     }
     Ok((cells, jaw))
@@ -127,13 +128,18 @@ struct Law<'a> {
 
 impl Law<'_> {
     fn on_jaw(&self, mu: f64, at: &GripPoint<'_>) -> f64 {
-        match self.effect.cell_area_m2() {
-            Some(_) if at.contact_area_m2 > 0.0 => self.on_cell(mu, self.force_n / at.contact_area_m2, at),
-            _ => self.at_force(mu, self.force_n, at),
+        if self.effect.differs_by_cell() && at.contact_area_m2 > 0.0 {
+            self.on_cell(mu, self.force_n / at.contact_area_m2, at)
+        } else {
+            self.at_force(mu, self.force_n, at)
         }
     }
 
     fn on_cell(&self, mu: f64, pressure_pa: f64, at: &GripPoint<'_>) -> f64 {
+        if self.effect.spec.of_pressure {
+            // The hook takes force over area: here those of one square metre.
+            return self.at_force(mu, pressure_pa, &GripPoint { contact_area_m2: 1.0, ..*at });
+        }
         let Some(area_m2) = self.effect.cell_area_m2() else { return self.at_force(mu, self.force_n, at) };
         let force_n = pressure_pa * area_m2;
         // The law is held to the forces it was fitted on, which are those it sees.

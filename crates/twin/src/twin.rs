@@ -10,7 +10,7 @@ use crate::frames::{Pose, pose};
 use crate::table::{TABLE_EFFECT, Table, check_table};
 use crate::{Jaw, PerJaw};
 pub(crate) use check::unknown_part_hint;
-use check::{check_arm, check_effect, check_gel, check_part};
+use check::{check_arm, check_effect, check_gel, check_part, check_twist};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -73,8 +73,10 @@ pub struct Robot {
     pub speed_limit_m_per_s: f64,
     /// What the loop closes on.
     pub feedback: Feedback,
-    /// Whether the arm holds the grip's rotation about the jaw axis.
+    /// What holds the grip's rotation about the jaw axis.
     pub twist: Twist,
+    /// Moment per rotation of arm, gripper, fingers and fixture in series; there with a compliant twist.
+    pub twist_stiffness_n_m_per_rad: Option<f64>,
 }
 
 /// The gripper.
@@ -200,6 +202,7 @@ impl Twin {
             )? * 1e-3,
             feedback: r.feedback,
             twist: r.twist,
+            twist_stiffness_n_m_per_rad: check_twist(r)?,
         };
         let arm = match r.model {
             RobotModel::Carriage => None,
@@ -264,13 +267,6 @@ impl Twin {
             }
         }
         let named = |ids: &[&str]| file.effects.iter().position(|e| ids.contains(&e.name.as_str()));
-        if robot.twist == Twist::Free
-            && let Some(i) = named(&["off_centre"])
-        {
-            let problem = "`off_centre` and robot.twist = \"free\" are the same loss, counted twice";
-            return Err(ConfigError::new(format!("effects[{i}].name"), problem)
-                .hint("leave the effect out, or set robot.twist = \"stiff\""));
-        }
         if gel.iter().any(|(_, gel)| gel.model == GelModel::Elastic)
             && let Some(i) = named(&["imprint_nonlinearity", "gel_kernel"])
         {

@@ -107,7 +107,8 @@ pub struct CampaignArgs {
     /// Override a key of the twin; may be given many times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
-    /// Plan only what this rig's gripper can do (the rig.toml of `gripgen rig pull`).
+    /// Plan only what this rig's gripper can do (the rig.toml of `gripgen rig pull`); the shipped rig where this is left
+    /// out, 40 N per jaw.
     #[arg(long, value_name = "RIG.toml")]
     pub rig: Option<String>,
     /// Parts to pull; all of the twin where this is left out.

@@ -7,17 +7,22 @@ use crate::failure::Failure;
 use crate::output::{JsonSink, print, program, writable, write_file};
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};
+use gripgen::twin::effects::OutsideFit;
 use gripgen::twin::{Campaign, PullKind, Twin};
 use gripgen::{Location, NextPulls, simulate_campaign};
 use serde_json::json;
 use std::path::Path;
+
+/// The rig whose gripper limits a plan for no rig in particular.
+const SHIPPED_RIG: &str = "asset:configs/rig.toml";
 
 /// Runs the verb.
 pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     writable(&args.out)?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let at = Location::parse(&args.twin);
-    let twin = within_rig(load_twin(&args.twin, &args.set)?, args.rig.as_deref())?;
+    let rig = args.rig.as_deref().unwrap_or(SHIPPED_RIG);
+    let twin = within_rig(load_twin(&args.twin, &args.set)?, Some(rig))?;
     let (campaign, separating) = match &args.separate {
         Some(measured) => {
             let next = separating(args, measured, &twin)?;
@@ -105,16 +110,26 @@ fn options(args: &CampaignArgs, twin: &Twin) -> Result<CampaignOptions, Failure>
             parts.push(part.clone());
         }
     }
+    let fitted = fitted_range_n(twin, &parts);
     Ok(CampaignOptions {
         parts,
         pulls: args.pulls,
         sessions: args.sessions,
         seed: args.seed,
-        max_force_n: twin.gripper.max_force_n,
+        min_force_n: fitted.0,
+        max_force_n: fitted.1.min(twin.gripper.max_force_n),
         angles_deg: args.angles_deg.clone(),
         offsets_mm: args.offsets_mm.clone(),
         ..CampaignOptions::default()
     })
+}
+
+/// The grip forces at which no law of these parts refuses.
+fn fitted_range_n(twin: &Twin, parts: &[String]) -> (f64, f64) {
+    let refusing = twin.effects.iter().filter(|e| e.outside_fit == OutsideFit::Error);
+    let ranges =
+        refusing.filter(|e| parts.iter().any(|p| e.acts_on(p))).filter_map(|e| e.fitted_grip_force_n);
+    ranges.fold((0.0, f64::INFINITY), |(low, high), (l, h)| (low.max(l), high.min(h)))
 }
 
 fn count(campaign: &Campaign) -> usize {

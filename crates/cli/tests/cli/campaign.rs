@@ -16,6 +16,23 @@ fn a_campaign_is_planned_and_made_once() {
     assert!(std::fs::read_to_string(&file).unwrap().contains("kind = \"no_load\""));
     assert_eq!(std::fs::read_to_string(at("measured/pulls.csv")).unwrap().lines().count(), 25);
 
+    // Without a rig the plan is one for the shipped rig, inside the range of the twin's laws: nothing fails.
+    let forces = |twin: &str, name: &str| {
+        let (file, made) = (at(&format!("{name}.toml")), at(name));
+        let output = run(&["campaign", "-o", &file, "--twin", twin, "--pulls", "24", "--simulate", &made]);
+        assert_code(&output, 0);
+        assert!(!text(&output.stderr).contains("left out"), "{}", text(&output.stderr));
+        let plan = std::fs::read_to_string(&file).unwrap();
+        let forces = plan.lines().filter_map(|line| line.strip_prefix("grip_force_n = "));
+        let forces: Vec<f64> = forces.map(|f| f.parse().unwrap()).collect();
+        assert!(forces.len() >= 24, "{plan}");
+        forces
+    };
+    let within =
+        |all: Vec<f64>, low: f64| all.iter().filter(|f| **f != 0.0).all(|f| (low..=40.0).contains(f));
+    assert!(within(forces("asset:configs/twin-baseline.toml", "plain"), 0.1));
+    assert!(within(forces("asset:configs/twin.toml", "papers"), 20.0));
+
     let again = run(&plan);
     assert_code(&again, 1);
     assert!(text(&again.stderr).contains("holds measurements"), "{}", text(&again.stderr));

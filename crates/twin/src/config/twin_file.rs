@@ -80,14 +80,16 @@ pub enum Feedback {
     Independent,
 }
 
-/// Whether the arm holds the grip's rotation about the jaw axis.
+/// What holds the grip's rotation about the jaw axis against the moment of a contact beside the pull line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Twist {
-    /// It does: a pull beside the grip centre slips like a centred one.
+    /// All does: a contact beside the pull line slips like a centred one.
     #[default]
     Stiff,
-    /// It does not: such a pull turns the grip, and slips as the limit surface says.
+    /// A spring does, of `twist_stiffness_n_m_per_rad`: the grip turns until the spring holds the moment.
+    Compliant,
+    /// Nothing does: such a grip turns, and slips as the limit surface says.
     Free,
 }
 
@@ -109,9 +111,12 @@ pub struct RobotFile {
     pub speed_limit_mm_s: f64,
     /// What the force loop closes on.
     pub feedback: Feedback,
-    /// Whether the arm holds the grip's rotation about the jaw axis.
+    /// What holds the grip's rotation about the jaw axis.
     #[serde(default)]
     pub twist: Twist,
+    /// Moment per rotation of arm, gripper, fingers and fixture in series; used with `twist = "compliant"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twist_stiffness_n_m_per_rad: Option<f64>,
     /// The arm's links and stance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmFile>,

@@ -26,6 +26,12 @@ impl GripPoint<'_> {
     pub(super) fn positive_force_n(&self) -> f64 {
         positive(self.grip_force_n)
     }
+
+    /// Force over area, where the area is known: the mean pressure of the jaw, that of a cell inside a law of the
+    /// pressure.
+    pub(super) fn pressure_pa(&self) -> Option<f64> {
+        (self.contact_area_m2 > 0.0).then(|| self.grip_force_n / self.contact_area_m2)
+    }
 }
 
 pub(super) fn positive(force_n: f64) -> f64 {

@@ -3,7 +3,11 @@
 use super::hooks::values;
 use super::{EffectSpec, GripPoint, ParameterSpec};
 
-/// `off_centre`: on the elliptic limit surface `(F / F0)^2 + (M / M0)^2 = 1` a force with the lever `x` slips at
+/// `off_centre`: a law of the offset alone, whatever the grip angle, for what the mechanics of the twin leave out. What a
+/// grip that turns loses follows from the contact itself, with `robot.twist`. The two differ (an offset along the pull has
+/// no lever there), and both act where both stand in a twin.
+///
+/// On the elliptic limit surface `(F / F0)^2 + (M / M0)^2 = 1` a force with the lever `x` slips at
 /// `F0 / sqrt(1 + (x / m)^2)`, `m = M0 / F0`. The parameter is the inverse of `m`, so that 0 means no fall.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "off_centre",

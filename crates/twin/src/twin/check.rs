@@ -1,7 +1,9 @@
 //! Checking the sections of a twin file and converting them to SI units. Errors name the key.
 
 use super::{Elastic, Gel, Part, RobotArm};
-use crate::config::{ArmFile, ConfigError, GelFile, GelModel, PartFile, TwinFile, in_range, suggestion};
+use crate::config::{
+    ArmFile, ConfigError, GelFile, GelModel, PartFile, RobotFile, TwinFile, Twist, in_range, suggestion,
+};
 use crate::effects::{self, Effect, EffectSpec, OutsideFit, Per};
 use crate::frames::{pose, rotation_from_fixed_xyz};
 use nalgebra::Point3;
@@ -25,6 +27,21 @@ pub(super) fn check_arm(arm: Option<&ArmFile>) -> Result<RobotArm, ConfigError> 
         tip_to_grip_m: 1e-3 * in_range("robot.arm.tip_to_grip_mm", arm.tip_to_grip_mm, 0.0..=2000.0, "mm")?,
         rotor_inertia_kg_m2,
     })
+}
+
+/// The stiffness against rotation, checked wherever it stands and needed with a compliant twist.
+pub(super) fn check_twist(robot: &RobotFile) -> Result<Option<f64>, ConfigError> {
+    let key = "robot.twist_stiffness_n_m_per_rad";
+    let stiffness = robot.twist_stiffness_n_m_per_rad;
+    if stiffness.is_none() && robot.twist == Twist::Compliant {
+        return Err(ConfigError::new(
+            key,
+            "twist = \"compliant\" needs the stiffness of arm, fingers and fixture",
+        )
+        .hint("a UR5e with a WSG 50 has some 1000 N m/rad"));
+    }
+    let hint = "a grip that does not turn is twist = \"stiff\", one that nothing holds is \"free\"";
+    stiffness.map(|k| in_range(key, k, 1e-3..=1e6, "N m/rad").map_err(|e| e.hint(hint))).transpose()
 }
 
 pub(super) fn check_gel(gel: &GelFile, key: &str) -> Result<Gel, ConfigError> {
@@ -179,6 +196,10 @@ fn check_reference_area(
 ) -> Result<Option<f64>, ConfigError> {
     let area = key("reference_area_mm2");
     match (effect.per, effect.reference_area_mm2) {
+        (Per::Cell, _) if spec.of_pressure => {
+            let problem = format!("`{}` is a law of the pressure, it has a value per cell as it is", spec.id);
+            Err(ConfigError::new(key("per"), problem).hint("leave per and reference_area_mm2 out"))
+        }
         (Per::Cell, _) if !spec.is_load_law() => {
             let problem =
                 format!("`{}` does not depend on the grip force, it has no value per cell", spec.id);
