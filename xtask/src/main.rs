@@ -104,7 +104,8 @@ fn record_benches(words: &[&str]) -> Result<(), String> {
         ["--profile", name, rest @ ..] => (vec!["--profile", *name], rest),
         rest => (vec![], rest),
     };
-    let mut benches = cargo(&["bench", "--package", "gripgen", "--benches"]);
+    // The same selection as in `cargo bench`, so that the same build is measured.
+    let mut benches = cargo(&["bench"]);
     benches.args(profile).arg("--").args(rest).env("GRIPGEN_BENCH", "record");
     run("benchmarks", &mut benches)
 }
