@@ -17,6 +17,7 @@ static FILES: &[(&str, &[u8])] = embedded![
     "configs/rig.toml",
     "configs/twin-large.toml",
     "configs/twin-baseline.toml",
+    "configs/twin-contact.toml",
     "configs/twin.toml",
     "robots/ur5e/ur5e.urdf",
     "parts/ball_bearing/part.stl",

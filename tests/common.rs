@@ -20,10 +20,12 @@ pub fn project(config: &str, sets: &[&str]) -> Project {
     Project::load(&Location::parse(config), &sets).unwrap_or_else(|e| panic!("{config}: {e}"))
 }
 
-/// A small sweep: 12 samples in shards of 5, all parts, cheap pulls.
+/// A small sweep with the paper's twin: 12 samples in shards of 5, all parts, cheap pulls.
 pub fn small_project(sets: &[&str]) -> Project {
     let mut all = vec![
+        "twin=asset:configs/twin.toml",
         "vary.grip_force_n=[20, 25, 30]",
+        "vary.grip_offset_mm=[0]",
         "vary.grip_pose=[0]",
         "vary.grip_angle_deg=[30]",
         "shard_samples=5",

@@ -12,7 +12,8 @@ use gripgen::twin::Outcome;
 #[test]
 fn a_softer_gel_is_pressed_deeper_under_the_same_force() {
     let sample = |mpa: &str| {
-        let sets = ["vary.part=[\"gear\"]", "vary.grip_force_n=[40]", "vary.grip_pose=[0]"];
+        let at = ["vary.grip_pose=[0]", "vary.grip_offset_mm=[0]"];
+        let sets = ["vary.part=[\"gear\"]", "vary.grip_force_n=[40]", at[0], at[1]];
         let modulus = format!("gel.left.young_modulus_mpa={mpa}");
         let p = project(
             "asset:configs/quickstart.toml",

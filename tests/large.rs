@@ -1,4 +1,4 @@
-//! The images of the large set carry information about its labels.
+//! The images of the shipped sets carry information about their labels.
 
 use crate::common::project;
 use gripgen::generate;
@@ -28,46 +28,163 @@ fn left_after_cubic(points: &[(f64, f64)]) -> f64 {
     rest.iter().map(|r| r * r).sum::<f64>() / n as f64
 }
 
-/// Share of the label's variance that part and grip force leave open.
-fn share_left(sets: &[&str]) -> f64 {
-    let mut all = vec!["samples=2000", "images=none"];
+/// A sample as a predictor sees it.
+struct Row {
+    part: String,
+    pose: usize,
+    force_n: f64,
+    label_n: f64,
+    /// Mean pressure of the left jaw.
+    pressure_pa: f64,
+    /// Means of 20 x 20 pixels of each channel of both images.
+    seen: Vec<f64>,
+}
+
+fn rows(config: &str, samples: u64, sets: &[&str]) -> Vec<Row> {
+    let samples = format!("samples={samples}");
+    let mut all = vec!["design=random", "mechanics=reduced", "trace=none", &samples];
     all.extend(sets);
-    let p = project("asset:configs/large.toml", &all);
-    let mut by_part: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
-    let mut labels = Vec::new();
+    let p = project(config, &all);
+    let mut rows = Vec::new();
     for index in 0..p.sweep.samples {
         let sample = generate(&p, index, SimdLevel::best());
-        let label = match sample.outcome {
-            Outcome::Pulled(pulled) => pulled.label.max_pull_force_n,
+        let pulled = match sample.outcome {
+            Outcome::Pulled(pulled) => pulled,
             Outcome::NoContact { .. } => continue,
             Outcome::Failed { reason } => panic!("{reason}"),
         };
-        labels.push(label);
-        by_part.entry(sample.scenario.part).or_default().push((sample.scenario.grip_force_n, label));
+        let mut seen = Vec::new();
+        for (_, image) in pulled.images.iter().flat_map(|images| images.iter()) {
+            for (x0, y0) in (0..16).flat_map(|x| (0..12).map(move |y| (20 * x, 20 * y))) {
+                let mut sum = [0.0; 3];
+                for (x, y) in (x0..x0 + 20).flat_map(|x| (y0..y0 + 20).map(move |y| (x, y))) {
+                    sum.iter_mut().zip(image.pixel(x, y)).for_each(|(s, v)| *s += f64::from(v) / 400.0);
+                }
+                seen.extend(sum);
+            }
+        }
+        rows.push(Row {
+            part: sample.scenario.part,
+            pose: sample.scenario.grip_pose,
+            force_n: sample.scenario.grip_force_n,
+            label_n: pulled.label.max_pull_force_n,
+            pressure_pa: pulled.imprint.left.patch.normal_force_n() / pulled.imprint.left.patch.area_m2(),
+            seen,
+        });
     }
-    let n = labels.len() as f64;
-    let mean = labels.iter().sum::<f64>() / n;
-    let variance = labels.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / n;
-    let left: f64 = by_part.values().map(|points| left_after_cubic(points) * points.len() as f64 / n).sum();
-    left / variance
+    rows
 }
 
-/// At least a fifth of the label's variance is not in (part, grip force), and most of that is geometry that the camera
-/// sees, not scatter that it does not.
+/// Variance of the labels.
+fn variance(rows: &[Row]) -> f64 {
+    let n = rows.len() as f64;
+    let mean = rows.iter().map(|r| r.label_n).sum::<f64>() / n;
+    rows.iter().map(|r| (r.label_n - mean).powi(2)).sum::<f64>() / n
+}
+
+/// Share of the labels' variance that a cubic in the grip force for each key leaves open.
+fn left_after<K: Ord>(rows: &[Row], key: impl Fn(&Row) -> K) -> f64 {
+    let mut groups: BTreeMap<K, Vec<(f64, f64)>> = BTreeMap::new();
+    for row in rows {
+        groups.entry(key(row)).or_default().push((row.force_n, row.label_n));
+    }
+    let left: f64 = groups.values().map(|points| left_after_cubic(points) * points.len() as f64).sum();
+    left / rows.len() as f64 / variance(rows)
+}
+
+/// Overrides without scatter and noise of the force.
+const QUIET: [&str; 5] = [
+    "parts.ball_bearing.scatter=0",
+    "parts.long_shaft.scatter=0",
+    "parts.gear.scatter=0",
+    "parts.roller_bearing.scatter=0",
+    "wrist.noise_n=0",
+];
+
+/// A good part of the label's variance is not in (part, grip force), and most of that is geometry that the camera sees, not
+/// scatter that it does not.
 #[test]
 fn part_and_grip_force_do_not_tell_the_label() {
-    let left = share_left(&[]);
-    let quiet: Vec<String> = ["ball_bearing", "long_shaft", "gear", "roller_bearing"]
-        .map(|part| format!("parts.{part}.scatter=0"))
-        .into_iter()
-        .chain(["wrist.noise_n=0".to_string()])
-        .collect();
-    let seen = share_left(&quiet.iter().map(String::as_str).collect::<Vec<_>>());
-    println!(
-        "label variance left after (part, grip force): {:.1} %, without scatter and noise {:.1} %",
-        100.0 * left,
-        100.0 * seen
-    );
-    assert!(left > 0.2, "{left}");
-    assert!(seen > 0.8 * left, "{seen} of {left}");
+    for (config, least) in [("asset:configs/large.toml", 0.14), ("asset:configs/quickstart.toml", 0.14)] {
+        let shares = |more: &[&str]| {
+            let rows = rows(config, 2000, &[&["images=none"], more].concat());
+            // Light contacts are Coulomb's, mu p < tau0 / 10, and the strongest would be far above their strength.
+            let pressures = rows.iter().map(|r| r.pressure_pa);
+            let (low, high) = pressures.fold((f64::INFINITY, 0.0_f64), |(l, h), p| (l.min(p), h.max(p)));
+            println!("{config}: mean pressures of {:.3} to {:.2} MPa", low / 1e6, high / 1e6);
+            assert!(
+                0.15 * high > 0.05e6 && (0.15 * low < 0.005e6 || config.contains("quick")),
+                "{low} {high}"
+            );
+            (left_after(&rows, |r| r.part.clone()), left_after(&rows, |r| (r.part.clone(), r.pose)))
+        };
+        let ((left, posed), (quiet, quiet_posed)) = (shares(&[]), shares(&QUIET));
+        println!(
+            "{config}: label variance left after (part, F_G) {:.1} %, (part, pose, F_G) {:.1} %; without scatter and \
+             noise {:.1} %, {:.1} %",
+            100.0 * left,
+            100.0 * posed,
+            100.0 * quiet,
+            100.0 * quiet_posed
+        );
+        assert!(left > least && quiet > 0.7 * left, "{config}: {left} {quiet}");
+    }
+}
+
+/// Share of the labels' variance of the last quarter of `rows` that a ridge regression on the others leaves open. It is
+/// given part, pose if `posed`, a cubic in the grip force for each, and the images if `sighted`.
+fn left_after_ridge(rows: &[Row], posed: bool, sighted: bool) -> f64 {
+    let mut groups: Vec<(&str, usize)> =
+        rows.iter().map(|r| (r.part.as_str(), r.pose * usize::from(posed))).collect();
+    let own = groups.clone();
+    groups.sort_unstable();
+    groups.dedup();
+    let features = |i: usize| {
+        let row = &rows[i];
+        let here = groups.iter().map(|g| f64::from(u8::from(*g == own[i])));
+        let cubic = here.flat_map(|on| (0..4).map(move |k| on * (row.force_n / 40.0).powi(k)));
+        let mut all: Vec<f64> = cubic.collect();
+        if sighted {
+            all.extend(row.seen.iter().map(|v| v / 30.0));
+            all.extend(row.seen.iter().map(|v| v / 30.0 * row.force_n / 40.0));
+        }
+        all
+    };
+    let train = rows.len() * 3 / 4;
+    let width = features(0).len();
+    let made: Vec<Vec<f64>> = (0..rows.len()).map(features).collect();
+    let x = nalgebra::DMatrix::from_fn(train, width, |i, j| made[i][j]);
+    let y = nalgebra::DVector::from_fn(train, |i, _| rows[i].label_n);
+    let (gram, moment) = (x.tr_mul(&x), x.tr_mul(&y));
+    let held = &rows[train..];
+    let mut best = f64::INFINITY;
+    for ridge in [1e-3, 0.1, 1.0, 10.0] {
+        let mut own = gram.clone();
+        (0..width).for_each(|j| own[(j, j)] += if j < 4 * groups.len() { 1e-6 } else { ridge });
+        let weights = own.cholesky().unwrap().solve(&moment);
+        let error = |i: usize| {
+            made[train + i].iter().zip(weights.iter()).map(|(a, b)| a * b).sum::<f64>() - held[i].label_n
+        };
+        let left =
+            (0..held.len()).map(|i| error(i).powi(2)).sum::<f64>() / held.len() as f64 / variance(held);
+        best = best.min(left);
+    }
+    best
+}
+
+/// The table of docs/training.md.
+#[test]
+#[ignore = "takes some minutes; prints the table of docs/training.md"]
+fn what_images_tell_of_the_labels() {
+    for config in ["asset:configs/quickstart.toml", "asset:configs/large.toml"] {
+        let rows = rows(config, 4000, &[]);
+        for (name, posed, sighted) in [
+            ("part, F_G", false, false),
+            ("part, pose, F_G", true, false),
+            ("part, F_G, images", false, true),
+            ("part, pose, F_G, images", true, true),
+        ] {
+            println!("{config}: {name}: {:.1} % left", 100.0 * left_after_ridge(&rows, posed, sighted));
+        }
+    }
 }

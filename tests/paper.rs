@@ -48,7 +48,7 @@ fn at(grip_force_n: f64) -> GripPoint<'static> {
 
 #[test]
 fn the_shipped_twin_holds_the_papers_friction_table() {
-    let p = project("asset:configs/quickstart.toml", &[]);
+    let p = project("asset:configs/paper.toml", &[]);
     for (name, mu, a, b) in TABLE {
         let part = &p.twin.parts[name];
         assert_eq!(part.mu, mu);
@@ -63,7 +63,7 @@ fn the_shipped_twin_holds_the_papers_friction_table() {
 /// The gear's law is negative below 8.9 N. It refuses there, holds its last value, or stays at 0, as it is told.
 #[test]
 fn laws_refuse_hold_or_extrapolate_outside_their_fit() {
-    let p = project("asset:configs/quickstart.toml", &[]);
+    let p = project("asset:configs/paper.toml", &[]);
     let gear = &p.twin.parts["gear"];
     let error = grip_friction(&p.twin, "gear", gear, &at(5.0)).unwrap_err();
     assert!(matches!(error, FrictionError::OutsideFit { .. }));
@@ -72,7 +72,7 @@ fn laws_refuse_hold_or_extrapolate_outside_their_fit() {
     }
     let with = |outside: &str| {
         let p = project(
-            "asset:configs/quickstart.toml",
+            "asset:configs/paper.toml",
             &[&format!("effects.load_offset.gear.outside_fit={outside}")],
         );
         grip_friction(&p.twin, "gear", &p.twin.parts["gear"], &at(5.0))

@@ -6,9 +6,10 @@ use gripgen::twin::{Outcome, Pulled, Sample};
 use gripgen::{Project, generate};
 
 /// A twin without effects, scatter and noise: labels are closed forms.
-const QUIET: [&str; 7] = [
+const QUIET: [&str; 8] = [
     "twin=asset:configs/twin-baseline.toml",
     "images=none",
+    "vary.grip_offset_mm=[0]",
     "wrist.noise_n=0",
     "parts.long_shaft.scatter=0",
     "parts.gear.scatter=0",
@@ -199,6 +200,39 @@ fn the_patch_carries_the_grip_force() {
     }
 }
 
+/// The lightest grips, a pixel wide: finite in both gels, and slipping at 2 mu F_G like all others.
+#[test]
+fn the_lightest_grips_slip_at_their_limit_in_both_gels() {
+    // A sweep asks for 0.05 N at least; with a loss they are 0.01 to 0.1 N.
+    let forces_n = [0.05, 0.06, 0.07, 0.09, 0.1, 0.14];
+    let loss = "effects=[{name = \"grip_force_loss\", loss_n = 0.04}]";
+    for gel in
+        [&["gel.left.model=pyramid"][..], &["gel.left.model=elastic", "gel.left.young_modulus_mpa=0.2"]]
+    {
+        for (part, mu) in [("long_shaft", 0.168), ("gear", 0.15), ("ball_bearing", 0.14)] {
+            let vary = [format!("vary.part=[\"{part}\"]"), format!("vary.grip_force_n={forces_n:?}")];
+            let at = [
+                "mechanics=reduced",
+                "vary.grip_pose=[0, 1]",
+                "vary.grip_angle_deg=[20]",
+                &vary[0],
+                &vary[1],
+            ];
+            let p = quiet(&[&at[..], gel, &[loss]].concat());
+            for index in 0..p.sweep.samples {
+                let sample = generate(&p, index, SimdLevel::best());
+                let ideal = 2.0 * mu * (sample.scenario.grip_force_n - 0.04);
+                let trace = pulled(sample).trace;
+                let peak = trace.measured_force_n.iter().fold(0.0_f64, |a, &b| a.max(b));
+                assert!(
+                    (peak / ideal - 1.0).abs() < 1e-3,
+                    "{gel:?}, {part}, {index}: {peak} N, not {ideal} N"
+                );
+            }
+        }
+    }
+}
+
 /// Mirroring part and jaws mirrors the image: the shaft is its own mirror image, turned by the opposite angle.
 #[test]
 fn the_two_jaws_see_mirror_images_of_a_symmetric_part() {
@@ -208,6 +242,7 @@ fn the_two_jaws_see_mirror_images_of_a_symmetric_part() {
             "vary.part=[\"ball_bearing\"]",
             "vary.grip_pose=[0]",
             "vary.grip_angle_deg=[30]",
+            "vary.grip_offset_mm=[0]",
             "wrist.noise_n=0",
         ],
     );
@@ -232,6 +267,7 @@ fn a_press_through_the_gel_fails_the_sample_with_both_numbers() {
             "vary.part=[\"gear\"]",
             "vary.grip_pose=[0]",
             "vary.grip_force_n=[80]",
+            "vary.grip_offset_mm=[0]",
             "gel.left.thickness_mm=1.0",
         ],
     );

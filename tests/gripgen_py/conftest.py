@@ -11,6 +11,8 @@ import gripgen as gg
 CONFIG = "asset:configs/quickstart.toml"
 #: 16 samples in three shards; the reduced mechanics make them in a second.
 SMALL = {
+    "twin": "asset:configs/twin.toml",
+    "vary.grip_offset_mm": [0],
     "mechanics": "reduced",
     "vary.grip_force_n": [20, 30],
     "vary.grip_angle_deg": [30],

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 SMALL = [
+    "--set", "twin=asset:configs/twin.toml",
+    "--set", "vary.grip_offset_mm=[0]",
     "--set", "vary.grip_force_n=[20, 30]",
     "--set", "vary.grip_angle_deg=[30]",
     "--set", "shard_samples=6",

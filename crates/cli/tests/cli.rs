@@ -137,7 +137,14 @@ fn check_and_dry_run_say_what_it_takes_and_write_nothing() {
     assert_code(&check, 0);
     assert!(text(&check.stderr).contains("200 samples") && text(&check.stderr).contains("about"));
     // A sweep whose samples fail is told before it is run.
-    let failing = run(&["check", QUICKSTART, "--set", "vary.grip_force_n=[10]"]);
+    let failing = run(&[
+        "check",
+        QUICKSTART,
+        "--set",
+        "twin=asset:configs/twin.toml",
+        "--set",
+        "vary.grip_force_n=[10]",
+    ]);
     assert_code(&failing, 4);
     assert!(text(&failing.stderr).contains("20..=80 N"), "{}", text(&failing.stderr));
 }
