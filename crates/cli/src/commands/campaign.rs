@@ -8,7 +8,7 @@ use crate::output::{JsonSink, print, program, writable, write_file};
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};
 use gripgen::twin::{Campaign, PullKind, Twin};
-use gripgen::{Location, NextPulls, simulate_campaign};
+use gripgen::{Location, NextPulls, Suspects, simulate_campaign};
 use serde_json::json;
 use std::path::Path;
 
@@ -83,7 +83,7 @@ fn first(args: &CampaignArgs, twin: &Twin) -> Result<Campaign, Failure> {
 
 /// The pulls that separate what a diagnosis of `measured` leaves tied.
 fn separating(args: &CampaignArgs, measured: &Path, twin: &Twin) -> Result<NextPulls, Failure> {
-    let diagnosed = diagnose_folders(&[measured], twin, &[], &args.talk)?;
+    let diagnosed = diagnose_folders(&[measured], twin, &[], Suspects::Screen, &args.talk)?;
     diagnosed.next.ok_or_else(|| {
         let found =
             format!("--separate: {} leaves nothing tied that pulls could separate", measured.display());

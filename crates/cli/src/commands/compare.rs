@@ -1,6 +1,6 @@
 //! `gripgen compare`: how far a twin or a sensor file is from measurements.
 
-use super::diagnose::{folders, jobs, load_twin, no_pulls};
+use super::diagnose::{folders, jobs, load_twin, no_pulls, suspects};
 use crate::args::{CompareArgs, TalkArgs};
 use crate::commands::compare_sensor;
 use crate::failure::Failure;
@@ -10,7 +10,7 @@ use gripgen::tactile::presses::{PressComparison, PressSet, Scores, compare_press
 use gripgen::tactile::{Sensor, finish};
 use gripgen::{
     FoundCircles, LabelErrors, LoadPressesError, LoadSensorError, Location, PressGeometry, PressReportText,
-    compare_pulls, find_missing_circles, is_press_set, is_sensor_table, load_presses, load_pulls_of,
+    compare_pulls, find_missing_circles, is_press_set, is_sensor_table, load_presses, load_pulls_with,
     load_sensor, load_twin_sensor, press_report,
 };
 use serde_json::{Value, json};
@@ -119,8 +119,9 @@ pub fn load_sensor_and_presses(
 /// A twin against measured pulls.
 fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
     let measured = folders(&args.measured, &args.also);
-    let loaded = load_pulls_of(&measured).map_err(|e| no_pulls(&measured, e))?;
     let twin = load_twin(&args.twin, &[])?;
+    let loaded = load_pulls_with(&measured, suspects(args.include_suspect, &twin, &[]))
+        .map_err(|e| no_pulls(&measured, e))?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let found = compare_pulls(&loaded.pulls, &twin, jobs())
         .map_err(|e| Failure::usage(e).hint("name a twin that has this part with --twin"))?;

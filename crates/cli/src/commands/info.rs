@@ -51,7 +51,9 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
         bytes += sidecar.bytes;
         for row in &sidecar.rows {
             *statuses.entry(row[status].clone()).or_default() += 1;
-            parts.entry(row[part].clone()).or_default().add(row[label].parse().ok());
+            // A suspect label is none to average.
+            let label = row[label].parse().ok().filter(|_| row[status] != "suspect");
+            parts.entry(row[part].clone()).or_default().add(label);
         }
     }
     let missing = info.samples.saturating_sub(done);
