@@ -12,6 +12,7 @@ use gripgen_tactile::gpu::GpuError;
 use gripgen_tactile::{Imprint, IndentError, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ConfigError, ImageStorage, Mechanics, TraceStorage};
 use gripgen_twin::effects::{CommandChain, SensorChain};
+use gripgen_twin::evidence::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
     ContactPatch, FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw,
@@ -264,6 +265,8 @@ fn pull(
     let until = if options.trace { Until::Stopped } else { Until::Decided };
     let result = pull_staircase(&mut session, &staircase, &scenario.pull, until)?;
     let label = slip_label(&result.trace, scenario.pull.label_tolerance_n, result.slid)?;
+    // A pull that ends as soon as its label is decided has no whole trace.
+    let suspect = if options.trace { suspect_simulated(twin, scenario, &result.trace, &label) } else { None };
     let Contact { held, imprint, force_n } = contact;
     let summary =
         imprint.map(|_, i| ImprintSummary { press_depth_m: i.press_depth_m, patch: i.patch.clone() });
@@ -276,6 +279,7 @@ fn pull(
         lag_exceeds_tolerance: lag_exceeds_tolerance(twin, scenario),
         trace: result.trace,
         label,
+        suspect,
     })))
 }
 

@@ -105,7 +105,7 @@ pub use init::{InitError, PartStarter, Proposal, StarterFile, part_starter, star
 pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError};
-pub use measured::{LoadPullsError, LoadedPulls, load_pulls, load_pulls_of};
+pub use measured::{LoadPullsError, LoadedPulls, Suspects, load_pulls, load_pulls_of, load_pulls_with};
 pub use paper::{PaperError, PaperReport, paper_report};
 pub use parallel::in_parallel;
 pub use picture::{

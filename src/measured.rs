@@ -1,9 +1,13 @@
 //! Measured pulls from wherever they are: a folder with a table, or a run folder.
 
+mod suspects;
+
+pub use suspects::Suspects;
+
 use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_record::{
-    FolderError, PullFolderError, RIG_SOURCE, ReadError, RigCampaign, RunFolder, ShardReader,
-    read_pull_folder, rig_campaign, sha256_hex,
+    FolderError, JudgedPulls, PullFolderError, RIG_SOURCE, ReadError, RigCampaign, RunFolder, ShardReader,
+    Standing, read_judged_pulls, rig_campaign, sha256_hex,
 };
 use gripgen_twin::config::Feedback;
 use gripgen_twin::draw::Drawn;
@@ -53,6 +57,14 @@ pub enum LoadPullsError {
         /// Displacement stop of this one.
         other_m: f64,
     },
+    /// Every pull of a table was left out.
+    #[error("{}: no pull of this table can be used: {notes}", .path.display())]
+    Unusable {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        notes: String,
+    },
     /// Every pull of a run folder was left out.
     #[error("{}: no pull of this run can be used: {notes}", .path.display())]
     Nothing {
@@ -68,23 +80,41 @@ pub enum LoadPullsError {
 /// Of a run folder, pulls without a slip (failed, without contact, censored) are left out and counted in the notes, and so
 /// are those whose label rule is not that of the first. Its covariates are those stored with each sample; what a sweep
 /// drew beside them (`parts.gear.mu`) is not known to an experiment and stays out, what a rig measured beside them is a
-/// covariate of unknown meaning.
+/// covariate of unknown meaning. Pulls whose label is suspect are left out too.
 pub fn load_pulls(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
+    load_one(path, Suspects::LeaveOut)
+}
+
+fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsError> {
     if path.join("run.json").is_file() {
-        return load_run(path);
+        return load_run(path, suspects);
     }
-    Ok(LoadedPulls { pulls: read_pull_folder(path)?, notes: Vec::new() })
+    let JudgedPulls { pulls, standing } = read_judged_pulls(path)?;
+    let mut left_out = LeftOut { rig: false, ..LeftOut::default() };
+    standing.iter().for_each(|s| left_out.count(s.status));
+    let ids: Vec<&str> = pulls.pulls.iter().map(|p| p.id.as_str()).collect();
+    let (keep, note) = suspects::kept(&standing, &ids, suspects);
+    let notes: Vec<String> = left_out.notes().into_iter().chain(note).collect();
+    if !keep.contains(&true) {
+        return Err(LoadPullsError::Unusable { path: path.into(), notes: notes.join("; ") });
+    }
+    Ok(LoadedPulls { pulls: pulls.kept(|i| keep[i]), notes })
 }
 
 /// Loads several folders as one campaign, in their order: what was measured later on the same rig. Pulls whose ids are taken get the
 /// name of their folder before them; what only some of the folders recorded counts as not recorded.
 pub fn load_pulls_of(folders: &[&Path]) -> Result<LoadedPulls, LoadPullsError> {
+    load_pulls_with(folders, Suspects::LeaveOut)
+}
+
+/// The same, with what becomes of pulls whose label is suspect.
+pub fn load_pulls_with(folders: &[&Path], suspects: Suspects) -> Result<LoadedPulls, LoadPullsError> {
     let Some((first, rest)) = folders.split_first() else {
         return Err(LoadPullsError::Nothing { path: PathBuf::new(), notes: "no folder was named".into() });
     };
-    let mut all = load_pulls(first)?;
+    let mut all = load_one(first, suspects)?;
     for path in rest {
-        join(path, &mut all, load_pulls(path)?)?;
+        join(path, &mut all, load_one(path, suspects)?)?;
     }
     // Samples of a sweep know no rests, so those of several are not counted either.
     if folders.len() > 1 && !folders.iter().any(|path| is_sweep(path)) {
@@ -139,6 +169,15 @@ struct LeftOut {
 }
 
 impl LeftOut {
+    fn count(&mut self, status: Status) {
+        match status {
+            Status::Slipped | Status::Suspect => {}
+            Status::Censored => self.censored += 1,
+            Status::NoContact => self.no_contact += 1,
+            _ => self.failed += 1,
+        }
+    }
+
     fn notes(&self) -> Vec<String> {
         let counted = [
             (self.failed, "failed"),
@@ -165,11 +204,11 @@ fn is_sweep(path: &Path) -> bool {
     RunFolder::open(path).is_ok_and(|folder| folder.info().source != RIG_SOURCE)
 }
 
-fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
+fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsError> {
     let folder = RunFolder::open(path)?;
     let rig = (folder.info().source == RIG_SOURCE).then(|| rig_campaign(&folder)).transpose()?;
     let mut left_out = LeftOut { rig: rig.is_some(), ..LeftOut::default() };
-    let (mut pulls, mut hashes) = (Vec::new(), String::new());
+    let (mut pulls, mut standing, mut hashes) = (Vec::new(), Vec::new(), String::new());
     let mut rule: Option<(f64, f64)> = None;
     for shard in 0..folder.info().shards {
         let Some(sidecar) = folder.finished(shard)? else {
@@ -180,24 +219,29 @@ fn load_run(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
         let reader = ShardReader::open(&folder.shard_path(shard))?;
         for index in reader.indices() {
             let (sample, trace) = reader.pull(index)?;
-            let counter = match sample.status() {
-                Status::Slipped => {
-                    let mine = (sample.label_tolerance_n, sample.stop_mm);
-                    if *rule.get_or_insert(mine) == mine {
-                        let beside = if rig.is_some() { measured_beside(&sample) } else { BTreeMap::new() };
-                        pulls.extend(measured(sample, trace.as_ref(), beside));
-                        continue;
-                    }
-                    &mut left_out.other_rule
-                }
-                Status::Censored => &mut left_out.censored,
-                Status::NoContact => &mut left_out.no_contact,
-                _ => &mut left_out.failed,
-            };
-            *counter += 1;
+            left_out.count(sample.status());
+            if !matches!(sample.status(), Status::Slipped | Status::Suspect) {
+                continue;
+            }
+            let mine = (sample.label_tolerance_n, sample.stop_mm);
+            if *rule.get_or_insert(mine) != mine {
+                left_out.other_rule += 1;
+                continue;
+            }
+            let beside = if rig.is_some() { measured_beside(&sample) } else { BTreeMap::new() };
+            let stands = suspects::standing_of(&sample, trace.as_ref());
+            if let Some(pull) = measured(sample, trace.as_ref(), beside) {
+                pulls.push(pull);
+                standing.push(stands);
+            }
         }
     }
-    let mut notes = left_out.notes();
+    let ids: Vec<&str> = pulls.iter().map(|p: &MeasuredPull| p.id.as_str()).collect();
+    let (keep, note) = suspects::kept(&standing, &ids, suspects);
+    let mut notes: Vec<String> = left_out.notes().into_iter().chain(note).collect();
+    let mut keeps = keep.iter();
+    pulls.retain(|_| keeps.next().is_some_and(|keep| *keep));
+    let rule = rule.filter(|_| !pulls.is_empty());
     let Some((label_tolerance_n, stop_mm)) = rule else {
         return Err(LoadPullsError::Nothing { path: path.into(), notes: notes.join("; ") });
     };

@@ -95,6 +95,8 @@ pub struct SweepSummary {
     pub censored: u64,
     /// Of these, grips that missed the part.
     pub no_contact: u64,
+    /// Of these, pulls whose trace contradicts their label.
+    pub suspect: u64,
     /// The run was interrupted before its end.
     pub interrupted: bool,
     /// All shards of the run are done and `index.csv` is written.
@@ -224,6 +226,7 @@ fn count(summary: &mut SweepSummary, sidecar: &Sidecar) {
     summary.failed += sidecar.failed;
     summary.censored += with_status(Status::Censored);
     summary.no_contact += with_status(Status::NoContact);
+    summary.suspect += with_status(Status::Suspect);
 }
 
 /// The shards of a slice: every `count`-th one.

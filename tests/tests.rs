@@ -51,6 +51,8 @@ mod real_force;
 mod rig_run;
 // Shadows learnt from real presses.
 mod shadows;
+// Labels against their own traces.
+mod suspect;
 // Files of Taxim.
 mod taxim;
 // Heights of Taxim.

@@ -124,6 +124,7 @@ pub(super) fn heading(s: &Sample) -> String {
     let label = match (s.status(), s.max_pull_force_n) {
         (Status::Slipped, Some(force)) => format!("slips at {force:.2} N"),
         (Status::Censored, Some(force)) => format!("held {force:.2} N (censored)"),
+        (Status::Suspect, Some(force)) => format!("{force:.2} N (suspect)"),
         (status, _) => status_name(status).replace('_', " "),
     };
     format!("{}  {}  {label}", s.index, s.part)
@@ -131,6 +132,9 @@ pub(super) fn heading(s: &Sample) -> String {
 
 /// One line: how it was gripped.
 pub(super) fn details(s: &Sample) -> String {
+    if s.status() == Status::Suspect {
+        return s.status_reason.chars().take(58).collect();
+    }
     if s.status() == Status::Failed {
         return s.failure.chars().take(58).collect();
     }

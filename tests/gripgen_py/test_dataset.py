@@ -188,6 +188,18 @@ def test_measured_pulls_are_loaded_by_the_same_call(run, tmp_path):
     assert {len(train), len(test)} == {1, 2}, "the two pulls with 20 N stay together"
 
 
+def test_suspect_labels_are_left_out_unless_asked_for(tmp_path):
+    (tmp_path / "pulls.csv").write_text(
+        "pull_id,part,grip_force_n,max_pull_force_n,status,status_reason\n"
+        "a,gear,20,6.5,,\nb,gear,20,3,suspect,a hand was there\nc,gear,30,,failed,part lost\n"
+    )
+    assert gg.load(tmp_path).labels.tolist() == [6.5]
+    both = gg.load(tmp_path, suspect=True)
+    assert both.labels.tolist() == [6.5, 3.0]
+    assert both.column("status_reason").tolist() == ["", "a hand was there"]
+    assert both[1].values["status"] == "suspect"
+
+
 def test_failed_samples_are_left_out_unless_asked_for(tmp_path):
     # An imprint of 9 mm^3/N at 80 N goes through the gel.
     keys = {"mechanics": "reduced", "vary.grip_force_n": [20, 80], "vary.part": ["gear"], "images": "none",

@@ -273,6 +273,9 @@ pub struct CompareArgs {
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]
     pub also: Vec<PathBuf>,
+    /// Of pulls: take those whose label is suspect too: evidence that was recorded contradicts it.
+    #[arg(long)]
+    pub include_suspect: bool,
     /// A sensor file.
     #[arg(long, value_name = "FILE.npz")]
     pub sensor: Option<String>,

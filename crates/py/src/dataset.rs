@@ -116,7 +116,7 @@ impl Dataset {
                     || DatasetError::Missing { path: self.rows.path().into(), row, what: "contact forces" };
                 let sample = self.rows.record(row)?.ok_or_else(missing)?.sample;
                 // A rig does not know them; zeros would say that nothing was touched.
-                let touched = matches!(sample.status(), Status::Slipped | Status::Censored);
+                let touched = matches!(sample.status(), Status::Slipped | Status::Censored | Status::Suspect);
                 if touched && sample.left.is_none() && sample.right.is_none() {
                     return Err(missing());
                 }

@@ -131,7 +131,14 @@ fn dict_of(py: Python<'_>, sample: Sample, trace: bool) -> PyResult<Bound<'_, Py
             found.set_item("images", images.as_ref().map(|i| image_array(py, i)).transpose()?)?;
         }
         Outcome::Pulled(pulled) => {
-            status(if pulled.label.censored { Status::Censored } else { Status::Slipped })?;
+            status(match (&pulled.suspect, pulled.label.censored) {
+                (Some(_), _) => Status::Suspect,
+                (None, true) => Status::Censored,
+                (None, false) => Status::Slipped,
+            })?;
+            if let Some(reason) = &pulled.suspect {
+                found.set_item("status_reason", reason)?;
+            }
             found.set_item("max_pull_force_n", pulled.label.max_pull_force_n)?;
             found.set_item("slip_time_s", pulled.label.slip_time_s)?;
             found.set_item("mu", pulled.mu)?;

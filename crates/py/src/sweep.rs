@@ -123,6 +123,7 @@ fn dict_of<'py>(py: Python<'py>, summary: &SweepSummary) -> PyResult<Bound<'py, 
     found.set_item("failed", summary.failed)?;
     found.set_item("censored", summary.censored)?;
     found.set_item("no_contact", summary.no_contact)?;
+    found.set_item("suspect", summary.suspect)?;
     found.set_item("interrupted", summary.interrupted)?;
     found.set_item("complete", summary.complete)?;
     Ok(found)

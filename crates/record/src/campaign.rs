@@ -21,6 +21,26 @@ pub struct CampaignHeader {
     /// What the force loop closed on, where it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feedback: Option<Feedback>,
+    /// Whether the traces say anything of the labels.
+    #[serde(skip_serializing_if = "LabelEvidenceKind::is_trace")]
+    pub label_evidence: LabelEvidenceKind,
+}
+
+/// What the labels of a campaign may be judged by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LabelEvidenceKind {
+    /// The traces, where there are any.
+    #[default]
+    Trace,
+    /// Nothing: the labels are from elsewhere.
+    None,
+}
+
+impl LabelEvidenceKind {
+    fn is_trace(&self) -> bool {
+        *self == Self::Trace
+    }
 }
 
 impl Default for CampaignHeader {
@@ -31,6 +51,7 @@ impl Default for CampaignHeader {
             label_tolerance_n: 3.0,
             stop_mm: 5.0,
             feedback: None,
+            label_evidence: LabelEvidenceKind::Trace,
         }
     }
 }
@@ -196,8 +217,7 @@ pub fn campaign_toml(campaign: &Campaign, about: &str) -> String {
 pub(crate) fn header_toml(label_tolerance_n: f64, stop_m: f64, feedback: Option<Feedback>) -> String {
     // Without the last bits that the way to metres and back costs.
     let stop_mm = (stop_m * 1e12).round() / 1e9;
-    let header =
-        CampaignHeader { force_convention: ForceConvention::PerJaw, label_tolerance_n, stop_mm, feedback };
+    let header = CampaignHeader { label_tolerance_n, stop_mm, feedback, ..CampaignHeader::default() };
     toml::to_string(&header).unwrap_or_else(|e| unreachable!("four plain keys are always TOML: {e}"))
 }
 

@@ -11,7 +11,9 @@ pub use columns::{Column, Table};
 
 use crate::folder::{FolderError, RunFolder};
 use crate::picture::{decode_png_into, encode_png};
-use crate::pulls::{PullFolderError, PullImagesError, pulls_with_images, read_pull_folder, read_pull_images};
+use crate::pulls::{
+    PullFolderError, PullImagesError, pulls_with_images, read_judged_pulls, read_pull_images,
+};
 use crate::reader::{ReadError, Record, ShardReader};
 use crate::rig_run::RIG_SOURCE;
 use gripgen_twin::{Jaw, MeasuredPulls, PerJaw, PullTrace, TactileImage};
@@ -161,9 +163,9 @@ impl Dataset {
     }
 
     fn open_pulls(path: &Path) -> Result<Self, DatasetError> {
-        let measured = read_pull_folder(path)?;
+        let judged = read_judged_pulls(path)?;
         let with_images = pulls_with_images(path)?;
-        let first = measured.pulls.iter().find(|p| with_images.contains(&p.id));
+        let first = judged.pulls.pulls.iter().find(|p| with_images.contains(&p.id));
         let image_size_px = match first {
             Some(pull) => {
                 let image = read_pull_images(path, &pull.id)?.grip.left;
@@ -171,8 +173,8 @@ impl Dataset {
             }
             None => None,
         };
-        let table = Table::of_pulls(&measured);
-        let source = Source::Pulls { measured: Box::new(measured), with_images };
+        let table = Table::of_pulls(&judged);
+        let source = Source::Pulls { measured: Box::new(judged.pulls), with_images };
         Ok(Self { path: path.into(), table, source, image_size_px })
     }
 

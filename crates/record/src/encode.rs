@@ -158,6 +158,7 @@ fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sampl
     match &sample.outcome {
         Outcome::Pulled(p) => {
             set_label(&mut message, &p.label);
+            set_suspect(&mut message, p.suspect.as_deref());
             message.mu = Some(p.mu);
             message.outside_fit = p.outside_fit;
             message.lag_exceeds_tolerance = p.lag_exceeds_tolerance;
@@ -185,6 +186,14 @@ pub(crate) fn set_label(message: &mut proto::Sample, label: &SlipLabel) {
     message.max_pull_force_n = Some(label.max_pull_force_n);
     message.slip_time_s = Some(label.slip_time_s);
     message.censored = label.censored;
+}
+
+/// The status of a label that evidence contradicts; the label stays.
+pub(crate) fn set_suspect(message: &mut proto::Sample, reason: Option<&str>) {
+    if let Some(reason) = reason {
+        message.set_status(proto::Status::Suspect);
+        message.status_reason = reason.into();
+    }
 }
 
 fn contact_message(normal_force_n: f64, pose: &Pose, imprint: &ImprintSummary) -> proto::JawContact {

@@ -38,6 +38,7 @@ pub fn status_name(status: Status) -> &'static str {
         Status::Censored => "censored",
         Status::NoContact => "no_contact",
         Status::Failed => "failed",
+        Status::Suspect => "suspect",
     }
 }
 
@@ -68,6 +69,8 @@ pub fn index_row(sample: &Sample, extra_columns: &[String]) -> Vec<String> {
             "mu" => optional(sample.mu),
             "group" => sample.group.to_string(),
             "repetition" => sample.repetition.to_string(),
+            // One column for both: why there is no label, or none to be relied on.
+            "failure" if sample.status() == Status::Suspect => sample.status_reason.clone(),
             "failure" => sample.failure.clone(),
             _ => String::new(),
         })

@@ -40,8 +40,8 @@ pub use presses::{
     read_press_folder,
 };
 pub use pulls::{
-    PULLS_FILE, PullFolderError, PullImages, PullImagesError, TRACES_FOLDER, pulls_with_images,
-    read_pull_folder, read_pull_images, write_pull_folder,
+    JudgedPulls, PULLS_FILE, PullFolderError, PullImages, PullImagesError, Standing, TRACES_FOLDER,
+    pulls_with_images, read_judged_pulls, read_pull_folder, read_pull_images, write_pull_folder,
 };
 pub use reader::{ReadError, Record, ShardReader};
 pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};

@@ -2,15 +2,18 @@
 
 mod cells;
 mod images;
+mod standing;
 #[cfg(test)]
 mod tests;
 mod trace;
 mod write;
 
 pub use images::{PullImages, PullImagesError, pulls_with_images, read_pull_images};
+pub use standing::{JudgedPulls, Standing};
 pub use write::write_pull_folder;
 
-use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, parse_header};
+use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, LabelEvidenceKind, parse_header};
+use crate::proto::gripgen_v1::Status;
 use cells::{Cells, Column};
 use gripgen_twin::config::PullFile;
 use gripgen_twin::draw::Drawn;
@@ -107,17 +110,25 @@ pub enum PullFolderError {
 /// another known column is a value that nobody wrote down and has the default of [`Covariates`] (1 N and 0.104 s of the
 /// staircase); a column without any value was not recorded. Further columns are covariates of unknown meaning: numbers
 /// if every cell is one or empty, else words; columns without a name or without a value are left out. Pulls stay in
-/// the order of the table.
+/// the order of the table. Pulls that did not slip, and those whose label is suspect, are left out.
 pub fn read_pull_folder(folder: &Path) -> Result<MeasuredPulls, PullFolderError> {
+    let judged = read_judged_pulls(folder)?;
+    Ok(judged.pulls.kept(|i| judged.standing[i].status == Status::Slipped))
+}
+
+/// The same with all pulls of the table, and how each of them stands: by its `status` and `status_reason`, where there are
+/// such columns, and by what its trace says of its label.
+pub fn read_judged_pulls(folder: &Path) -> Result<JudgedPulls, PullFolderError> {
     let path = folder.join(PULLS_FILE);
     let bytes = read(&path)?;
     let mut hash = Sha256::new();
     feed(&mut hash, PULLS_FILE, &bytes);
     let header = campaign_header(folder, &mut hash)?;
-    let mut found = read_table(&path, &bytes, &header)?;
+    let (mut found, mut standing) = read_table(&path, &bytes, &header)?;
+    let mut after_n = vec![Vec::new(); found.pulls.len()];
     let traces = folder.join(TRACES_FOLDER);
     let stored = trace_files(&traces)?;
-    for pull in found.pulls.iter_mut().filter(|_| !stored.is_empty()) {
+    for (pull, after_n) in found.pulls.iter_mut().zip(&mut after_n).filter(|_| !stored.is_empty()) {
         let name = format!("{}.csv", pull.id);
         if !stored.contains(name.as_str()) {
             continue;
@@ -125,10 +136,14 @@ pub fn read_pull_folder(folder: &Path) -> Result<MeasuredPulls, PullFolderError>
         let path = traces.join(&name);
         let bytes = read(&path)?;
         feed(&mut hash, &name, &bytes);
-        pull.trace = Some(trace::read_trace(&path, &bytes)?);
+        let (trace, after) = trace::read_trace(&path, &bytes)?;
+        (pull.trace, *after_n) = (Some(trace), after);
     }
     found.sha256 = hex(&hash.finalize());
-    Ok(found)
+    if header.label_evidence == LabelEvidenceKind::Trace {
+        standing::judge_labels(&found, &after_n, &mut standing);
+    }
+    Ok(JudgedPulls { pulls: found, standing })
 }
 
 fn campaign_header(folder: &Path, hash: &mut Sha256) -> Result<CampaignHeader, PullFolderError> {
@@ -156,12 +171,16 @@ fn trace_files(folder: &Path) -> Result<HashSet<String>, PullFolderError> {
     }
 }
 
-fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<MeasuredPulls, PullFolderError> {
+fn read_table(
+    path: &Path,
+    bytes: &[u8],
+    header: &CampaignHeader,
+) -> Result<(MeasuredPulls, Vec<Standing>), PullFolderError> {
     let table = |e: csv::Error| PullFolderError::Table { path: path.into(), problem: e.to_string() };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
     let mut columns = cells::columns(path, reader.headers().map_err(table)?)?;
     let mut lines: HashMap<String, u64> = HashMap::new();
-    let mut pulls = Vec::new();
+    let (mut pulls, mut lines_of) = (Vec::new(), Vec::new());
     let mut row = csv::StringRecord::new();
     let plain = PullFile::default();
     while reader.read_record(&mut row).map_err(table)? {
@@ -192,10 +211,18 @@ fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<Meas
             return Err(PullFolderError::Duplicate { path: path.into(), first, second: line, id: pull.id });
         }
         pulls.push(pull);
+        lines_of.push(line);
     }
     if pulls.is_empty() {
         return Err(PullFolderError::Empty { path: path.into() });
     }
+    let standing = standing::stated(&columns, &mut pulls).map_err(|row| PullFolderError::Cell {
+        path: path.into(),
+        line: lines_of[row],
+        column: "max_pull_force_n".into(),
+        value: String::new(),
+        wanted: "a number",
+    })?;
     let recorded = columns.iter().filter_map(Column::recorded).collect();
     let extra: Vec<ExtraColumn> = columns.into_iter().filter_map(extra_column).collect();
     for column in &extra {
@@ -219,7 +246,7 @@ fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<Meas
         sha256: String::new(),
     };
     measured.count_rests();
-    Ok(measured)
+    Ok((measured, standing))
 }
 
 /// A column of unknown meaning that holds something.

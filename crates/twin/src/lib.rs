@@ -12,6 +12,7 @@ mod campaign;
 pub mod config;
 pub mod draw;
 pub mod effects;
+pub mod evidence;
 pub mod frames;
 mod friction;
 mod grasp;

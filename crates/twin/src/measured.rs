@@ -122,15 +122,24 @@ impl MeasuredPulls {
     #[must_use]
     pub fn every(&self, step: usize) -> Self {
         let step = step.max(1);
+        self.kept(|i| i % step == 0)
+    }
+
+    /// The pulls for whose place `keep` is true, in order, with their columns.
+    #[must_use]
+    pub fn kept(&self, keep: impl Fn(usize) -> bool) -> Self {
+        fn of<T: Clone>(all: &[T], keep: &impl Fn(usize) -> bool) -> Vec<T> {
+            all.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, x)| x.clone()).collect()
+        }
         let extra = self.extra.iter().map(|column| ExtraColumn {
             name: column.name.clone(),
             values: match &column.values {
-                ExtraValues::Number(x) => ExtraValues::Number(x.iter().copied().step_by(step).collect()),
-                ExtraValues::Text(words) => ExtraValues::Text(words.iter().step_by(step).cloned().collect()),
+                ExtraValues::Number(x) => ExtraValues::Number(of(x, &keep)),
+                ExtraValues::Text(words) => ExtraValues::Text(of(words, &keep)),
             },
         });
         Self {
-            pulls: self.pulls.iter().step_by(step).cloned().collect(),
+            pulls: of(&self.pulls, &keep),
             recorded: self.recorded.clone(),
             extra: extra.collect(),
             sha256: self.sha256.clone(),

@@ -48,6 +48,8 @@ pub struct Pulled {
     pub trace: PullTrace,
     /// The label.
     pub label: SlipLabel,
+    /// Why the trace contradicts the label, with numbers; `None` if it does not, and without a trace.
+    pub suspect: Option<String>,
 }
 
 /// The contact of one jaw in numbers.

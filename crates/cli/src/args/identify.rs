@@ -12,6 +12,9 @@ pub struct CalibratePullsArgs {
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]
     pub also: Vec<PathBuf>,
+    /// Of pulls: take those whose label is suspect too: evidence that was recorded contradicts it.
+    #[arg(long)]
+    pub include_suspect: bool,
     /// The twin to start from.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,
@@ -69,6 +72,9 @@ pub struct DiagnoseArgs {
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]
     pub also: Vec<PathBuf>,
+    /// Of pulls: take those whose label is suspect too: evidence that was recorded contradicts it.
+    #[arg(long)]
+    pub include_suspect: bool,
     /// The twin to start from.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,

@@ -1,13 +1,13 @@
 //! `gripgen calibrate pulls`: fit a twin to measured pulls.
 
-use super::diagnose::{folders, jobs, load_library, load_twin, no_pulls};
+use super::diagnose::{folders, jobs, load_library, load_twin, no_pulls, suspects};
 use crate::args::CalibratePullsArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, writable};
 use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
 use gripgen::{
-    CalibratePullsError, ImprintCalibrations, Location, calibrate_imprints, calibrate_twin, load_pulls_of,
+    CalibratePullsError, ImprintCalibrations, Location, calibrate_imprints, calibrate_twin, load_pulls_with,
     write_twin,
 };
 use serde_json::{Map, Value, json};
@@ -17,9 +17,10 @@ use std::fmt::Write;
 pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     writable(&args.out)?;
     let measured = folders(&args.measured, &args.also);
-    let loaded = load_pulls_of(&measured).map_err(|e| no_pulls(&measured, e))?;
     let twin = load_twin(&args.twin, &args.set)?;
     let library = load_library(&twin, &args.twin)?;
+    let loaded = load_pulls_with(&measured, suspects(args.include_suspect, &twin, &args.fit))
+        .map_err(|e| no_pulls(&measured, e))?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let request = CalibrateRequest { offset_law: args.law.is_some(), effects: args.fit.clone() };
     let (found, mut edits) =

@@ -9,7 +9,7 @@ use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};
 use gripgen::twin::effects::OutsideFit;
 use gripgen::twin::{Campaign, PullKind, Twin};
-use gripgen::{Location, NextPulls, simulate_campaign};
+use gripgen::{Location, NextPulls, Suspects, simulate_campaign};
 use serde_json::json;
 use std::path::Path;
 
@@ -89,7 +89,7 @@ fn first(args: &CampaignArgs, twin: &Twin) -> Result<Campaign, Failure> {
 /// The pulls that separate what a diagnosis of `measured` leaves tied.
 fn separating(args: &CampaignArgs, measured: &Path, twin: &Twin) -> Result<NextPulls, Failure> {
     let library = load_library(twin, &args.twin)?;
-    let diagnosed = diagnose_folders(&[measured], twin, &library, &[], &args.talk)?;
+    let diagnosed = diagnose_folders(&[measured], twin, &library, &[], Suspects::Screen, &args.talk)?;
     diagnosed.next.ok_or_else(|| {
         let found =
             format!("--separate: {} leaves nothing tied that pulls could separate", measured.display());

@@ -1,6 +1,6 @@
 //! `gripgen compare`: how far a twin or a sensor file is from measurements.
 
-use super::diagnose::{folders, jobs, load_library, load_twin, no_pulls};
+use super::diagnose::{folders, jobs, load_library, load_twin, no_pulls, suspects};
 use crate::args::{CompareArgs, TalkArgs};
 use crate::commands::compare_sensor;
 use crate::failure::Failure;
@@ -11,7 +11,7 @@ use gripgen::tactile::{Sensor, finish};
 use gripgen::{
     FoundCircles, LabelErrors, LoadPressesError, LoadSensorError, Location, PartRatio, PressGeometry,
     PressReportText, compare_pulls, find_missing_circles, is_press_set, is_sensor_table, load_presses,
-    load_pulls_of, load_sensor, load_twin_sensor, press_report, pull_comparison_page, pull_ratios,
+    load_pulls_with, load_sensor, load_twin_sensor, press_report, pull_comparison_page, pull_ratios,
 };
 use serde_json::{Value, json};
 use std::path::Path;
@@ -122,8 +122,9 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
         writable(report)?;
     }
     let measured = folders(&args.measured, &args.also);
-    let loaded = load_pulls_of(&measured).map_err(|e| no_pulls(&measured, e))?;
     let twin = load_twin(&args.twin, &[])?;
+    let loaded = load_pulls_with(&measured, suspects(args.include_suspect, &twin, &[]))
+        .map_err(|e| no_pulls(&measured, e))?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let library = load_library(&twin, &args.twin)?;
     let found = compare_pulls(&loaded.pulls, &twin, &library, jobs())

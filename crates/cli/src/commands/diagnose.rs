@@ -11,8 +11,8 @@ use crate::progress::Share;
 use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
 use gripgen::{
-    Diagnosed, Library, Location, PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table,
-    is_press_set, is_sensor_table, load_pulls_of, load_sensor_table, load_twin_document,
+    Diagnosed, Library, Location, PullDiagnoseOptions, Suspects, diagnose_pull_table, diagnose_sensor_table,
+    is_press_set, is_sensor_table, load_pulls_with, load_sensor_table, load_twin_document,
 };
 use std::path::{Path, PathBuf};
 
@@ -63,6 +63,19 @@ pub fn jobs() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
+/// What becomes of suspect labels where a twin is fitted or compared: what effects of the twin on its sensor or its force loop
+/// predict is no reason.
+pub fn suspects(include: bool, twin: &Twin, fit: &[String]) -> Suspects {
+    let fitted = LIBRARY.iter().copied().filter(|spec| fit.iter().any(|id| id == spec.id));
+    let mut effects = twin.effects.iter().map(|e| e.spec).chain(fitted);
+    let predicts = effects.any(|spec| spec.sensor.is_some() || spec.command.is_some());
+    match (include, predicts) {
+        (true, _) => Suspects::Include,
+        (false, true) => Suspects::Screen,
+        (false, false) => Suspects::LeaveOut,
+    }
+}
+
 /// What cannot be read as pulls.
 pub fn no_pulls(paths: &[&Path], e: impl std::fmt::Display) -> Failure {
     let known = paths.iter().all(|path| path.join("pulls.csv").is_file() || path.join("run.json").is_file());
@@ -88,7 +101,9 @@ fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
     }
     let without: Vec<&str> = args.without.iter().map(String::as_str).collect();
     let library = load_library(&twin, &args.twin)?;
-    diagnose_folders(&folders(&args.measured, &args.also), &twin, &library, &without, &args.talk)
+    let suspects = if args.include_suspect { Suspects::Include } else { Suspects::Screen };
+    let measured = folders(&args.measured, &args.also);
+    diagnose_folders(&measured, &twin, &library, &without, suspects, &args.talk)
 }
 
 /// Folders that are read as one campaign.
@@ -102,9 +117,10 @@ pub fn diagnose_folders(
     twin: &Twin,
     library: &Library,
     without: &[&str],
+    suspects: Suspects,
     talk: &TalkArgs,
 ) -> Result<Diagnosed, Failure> {
-    let loaded = load_pulls_of(measured).map_err(|e| no_pulls(measured, e))?;
+    let loaded = load_pulls_with(measured, suspects).map_err(|e| no_pulls(measured, e))?;
     let options = PullDiagnoseOptions { jobs: jobs(), without };
     let share = Share::start("diagnosing", talk);
     let diagnosed = diagnose_pull_table(&loaded.pulls, twin, library, &options, &|x| share.at(x));

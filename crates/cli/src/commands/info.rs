@@ -58,10 +58,12 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
         bytes += sidecar.bytes;
         for row in &sidecar.rows {
             *statuses.entry(row[status].clone()).or_default() += 1;
+            // A suspect label is none to average.
+            let label_n = row[label].parse().ok().filter(|_| row[status] != "suspect");
             let summary = parts.entry(row[part].clone()).or_default();
-            summary.add(row[label].parse().ok());
-            if let ("slipped", Ok(force_n), Ok(label_n)) =
-                (row[status].as_str(), row[force].parse(), row[label].parse())
+            summary.add(label_n);
+            if let ("slipped", Ok(force_n), Some(label_n)) =
+                (row[status].as_str(), row[force].parse(), label_n)
             {
                 summary.slipped.push((force_n, label_n));
             }

@@ -140,7 +140,8 @@ impl<'a> Watch<'a> {
         }
         self.line(&json!({
             "event": "done", "out": out, "samples": summary.samples, "failed": summary.failed,
-            "censored": summary.censored, "no_contact": summary.no_contact, "interrupted": summary.interrupted, "complete": summary.complete, "seconds": took,
+            "censored": summary.censored, "no_contact": summary.no_contact, "suspect": summary.suspect,
+            "interrupted": summary.interrupted, "complete": summary.complete, "seconds": took,
         }));
         if !self.args.talk.quiet {
             self.tell(out, summary, took);
@@ -173,6 +174,10 @@ impl<'a> Watch<'a> {
         for (n, what) in [
             (summary.no_contact, "missed the part (label 0)"),
             (summary.censored, "ended before the jaws slipped (label is a lower bound)"),
+            (
+                summary.suspect,
+                "are suspect: their trace contradicts their label (column `failure` of index.csv)",
+            ),
         ] {
             if n > 0 {
                 eprintln!("{n} of {} samples {what}", summary.samples);

@@ -53,19 +53,22 @@ def load(
     path: str | os.PathLike[str],
     *,
     status: Sequence[str] = LABELLED,
+    suspect: bool = False,
     cache_dir: str | os.PathLike[str] | None = None,
 ) -> Dataset:
     """Open a run folder or a folder with `pulls.csv`; an fsspec URL (`s3://...`) is copied into `cache_dir` first.
 
     Rows are kept whose status is in `status`. A censored pull ended before the jaws slipped: its label is a lower
-    bound, so it is left out unless asked for; a failed sample has neither label nor images.
+    bound, so it is left out unless asked for; a failed sample has neither label nor images. A suspect pull has a label
+    that recorded evidence contradicts, and says in `status_reason` how: with `suspect=True` its row is kept too.
 
     Raises DataError, naming the file, for what is no such folder or is damaged.
     """
     text = os.fspath(path)
     if remote.is_url(text):
         text = remote.fetch(text, cache_dir)
-    return Dataset(text, status=tuple(status), _opened=(os.getpid(), _core.Dataset(text)))
+    kept = (*status, "suspect") if suspect and "suspect" not in status else tuple(status)
+    return Dataset(text, status=kept, _opened=(os.getpid(), _core.Dataset(text)))
 
 
 @dataclass(frozen=True, eq=False)

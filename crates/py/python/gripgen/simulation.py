@@ -27,7 +27,8 @@ class Pull:
     grip_force_n: float
     seed: int
     index: int
-    #: "slipped", "censored" (the label is a lower bound), "no_contact" (the label is 0) or "failed" (there is none).
+    #: "slipped", "censored" (the label is a lower bound), "no_contact" (the label is 0), "failed" (there is none) or
+    #: "suspect" (the trace contradicts the label; only with a trace).
     status: str
     #: The pull force at slip, N; NaN if the sample failed.
     max_pull_force_n: float = float("nan")
@@ -38,6 +39,8 @@ class Pull:
     outside_fit: bool = False
     #: Why a sample failed.
     failure: str = ""
+    #: Why a label is suspect.
+    status_reason: str = ""
     #: uint8[2, H, W, 3], left jaw first; None where they were not asked for.
     images: NDArray[np.uint8] | None = field(default=None, repr=False)
     #: float64[T] each; None where the trace was not asked for.

@@ -26,6 +26,8 @@ class SweepSummary:
     censored: int = 0
     #: Of these, grips that missed the part: their label is 0.
     no_contact: int = 0
+    #: Of these, pulls whose trace contradicts their label.
+    suspect: int = 0
     #: All shards are done and `index.csv` is written.
     complete: bool = False
     #: The run was stopped before its end; the same call continues it.

@@ -1,11 +1,15 @@
 //! The table of a dataset: columns of numbers or of words.
 
-use crate::index::{INDEX_COLUMNS, index_header};
+use crate::index::{INDEX_COLUMNS, index_header, status_name};
+use crate::pulls::JudgedPulls;
 use gripgen_twin::draw::Drawn;
-use gripgen_twin::{KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST};
+use gripgen_twin::{KNOWN_COLUMNS, MeasuredPull, PULLS_SINCE_REST};
 
 /// Columns of an index that hold words whatever stands in them.
 const WORDS: [&str; 5] = ["status", "part", "gel_id", "session", "failure"];
+
+/// The column that says why a row failed or is suspect; in an index it is `failure`, whatever the status.
+const REASON: &str = "status_reason";
 
 /// A column.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,17 +66,24 @@ impl Table {
                 *column = Column::Number(numbers);
             }
         }
+        let reasons =
+            self.columns.iter().find(|(name, _)| name == "failure").map(|(_, column)| column.clone());
+        self.columns.extend(reasons.map(|column| (REASON.to_string(), column)));
         self
     }
 
     /// The table of measured pulls: what was recorded of the known columns, and every further column.
-    pub(super) fn of_pulls(measured: &MeasuredPulls) -> Self {
+    pub(super) fn of_pulls(judged: &JudgedPulls) -> Self {
+        let JudgedPulls { pulls: measured, standing } = judged;
         let pulls = &measured.pulls;
         let words = |of: &dyn Fn(&MeasuredPull) -> String| Column::Text(pulls.iter().map(of).collect());
         let numbers = |of: &dyn Fn(&MeasuredPull) -> f64| Column::Number(pulls.iter().map(of).collect());
         let mut columns = vec![
             ("pull_id".to_string(), words(&|p| p.id.clone())),
-            ("status".to_string(), words(&|_| "slipped".into())),
+            (
+                "status".to_string(),
+                Column::Text(standing.iter().map(|s| status_name(s.status).into()).collect()),
+            ),
         ];
         let is_there =
             |c: &str| ["part", "grip_force_n"].contains(&c) || measured.recorded.iter().any(|r| r == c);
@@ -110,6 +121,7 @@ impl Table {
             columns.push((extra.name.clone(), column));
         }
         columns.push(("max_pull_force_n".into(), numbers(&|p| p.max_pull_force_n)));
+        columns.push((REASON.into(), Column::Text(standing.iter().map(|s| s.reason.clone()).collect())));
         Self { columns, rows: pulls.len() }
     }
 

@@ -106,6 +106,9 @@ pub struct Sample {
     /// Why the sample failed.
     #[prost(string, tag = "34")]
     pub failure: ::prost::alloc::string::String,
+    /// Why the label is suspect.
+    #[prost(string, tag = "35")]
+    pub status_reason: ::prost::alloc::string::String,
     /// Static friction coefficient of this grip, scatter included.
     #[prost(double, optional, tag = "40")]
     pub mu: ::core::option::Option<f64>,
@@ -166,6 +169,8 @@ pub enum Status {
     NoContact = 3,
     /// Nothing could be simulated or measured: there is no label.
     Failed = 4,
+    /// Evidence that was recorded contradicts the label; `status_reason` says what, with numbers. Not to be fitted or trained on.
+    Suspect = 5,
 }
 impl Status {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -179,6 +184,7 @@ impl Status {
             Self::Censored => "STATUS_CENSORED",
             Self::NoContact => "STATUS_NO_CONTACT",
             Self::Failed => "STATUS_FAILED",
+            Self::Suspect => "STATUS_SUSPECT",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -189,6 +195,7 @@ impl Status {
             "STATUS_CENSORED" => Some(Self::Censored),
             "STATUS_NO_CONTACT" => Some(Self::NoContact),
             "STATUS_FAILED" => Some(Self::Failed),
+            "STATUS_SUSPECT" => Some(Self::Suspect),
             _ => None,
         }
     }

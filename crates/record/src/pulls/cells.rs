@@ -1,6 +1,7 @@
 //! What each column of a pull table means.
 
 use super::PullFolderError;
+use crate::proto::gripgen_v1::Status;
 use gripgen_twin::{KNOWN_COLUMNS, MeasuredPull};
 use std::path::Path;
 
@@ -23,6 +24,10 @@ pub(super) enum Cells {
     Known { set: Setter, required: bool },
     /// A covariate of unknown meaning.
     Extra(Vec<Box<str>>),
+    /// How the pull ended.
+    Status(Vec<Status>),
+    /// Why.
+    Reason(Vec<String>),
     /// Nowhere: a column without a name.
     Unnamed,
 }
@@ -38,6 +43,14 @@ impl Column {
             Cells::Known { set, .. } => set(cell, pull),
             Cells::Extra(cells) => {
                 cells.push(cell.into());
+                Ok(())
+            }
+            Cells::Status(found) => {
+                found.push(status(cell)?);
+                Ok(())
+            }
+            Cells::Reason(reasons) => {
+                reasons.push(cell.into());
                 Ok(())
             }
             Cells::Unnamed => Ok(()),
@@ -68,11 +81,25 @@ pub(super) fn columns(path: &Path, header: &csv::StringRecord) -> Result<Vec<Col
         let cells = match setter(name) {
             Some(set) => Cells::Known { set, required: REQUIRED.contains(&name) },
             None if name.is_empty() => Cells::Unnamed,
+            None if name == "status" => Cells::Status(Vec::new()),
+            None if name == "status_reason" => Cells::Reason(Vec::new()),
             None => Cells::Extra(Vec::new()),
         };
         Column { name: name.into(), cells, filled: 0 }
     };
     Ok(names.iter().map(column).collect())
+}
+
+/// The status of a name, `slipped` where nobody wrote one down.
+fn status(cell: &str) -> Result<Status, &'static str> {
+    match cell {
+        "" | "slipped" => Ok(Status::Slipped),
+        "censored" => Ok(Status::Censored),
+        "no_contact" => Ok(Status::NoContact),
+        "failed" => Ok(Status::Failed),
+        "suspect" => Ok(Status::Suspect),
+        _ => Err("slipped, censored, no_contact, failed or suspect"),
+    }
 }
 
 /// A number, NaN where there is none; `None` if it is a word.
@@ -92,8 +119,14 @@ fn setter(name: &str) -> Option<Setter> {
         "gel_id" => |cell, pull| text(cell, &mut pull.covariates.gel_id),
         "session" => |cell, pull| text(cell, &mut pull.covariates.session),
         "grip_force_n" => |cell, pull| above_zero(cell, &mut pull.grip_force_n),
-        // A sensor that is off may read less than nothing.
-        "max_pull_force_n" => |cell, pull| number(cell, &mut pull.max_pull_force_n),
+        // A sensor that is off may read less than nothing. A pull that failed has none, which its status decides.
+        "max_pull_force_n" => |cell, pull| match cell {
+            "" => {
+                pull.max_pull_force_n = f64::NAN;
+                Ok(())
+            }
+            _ => number(cell, &mut pull.max_pull_force_n),
+        },
         "force_increment_n" => |cell, pull| above_zero(cell, &mut pull.increment_n),
         "force_start_n" => |cell, pull| {
             let mut start_n = 0.0;

@@ -7,8 +7,9 @@ use std::path::Path;
 
 const COLUMNS: [&str; 4] = ["time_s", "desired_force_n", "measured_force_n", "displacement_mm"];
 
-/// Reads a trace from the content of its file: four columns in any order, times that increase.
-pub(super) fn read_trace(path: &Path, bytes: &[u8]) -> Result<PullTrace, PullFolderError> {
+/// Reads a trace from the content of its file: four columns in any order, times that increase. Rows at its end that command
+/// nothing any more are the reading without a load after the pull, and come apart from it.
+pub(super) fn read_trace(path: &Path, bytes: &[u8]) -> Result<(PullTrace, Vec<f64>), PullFolderError> {
     let table = |e: csv::Error| PullFolderError::Table { path: path.into(), problem: e.to_string() };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
     let header = reader.headers().map_err(table)?.clone();
@@ -50,5 +51,15 @@ pub(super) fn read_trace(path: &Path, bytes: &[u8]) -> Result<PullTrace, PullFol
     if trace.is_empty() {
         return Err(PullFolderError::Empty { path: path.into() });
     }
-    Ok(trace)
+    let after_n = match trace.desired_force_n.iter().rposition(|&force_n| force_n != 0.0) {
+        Some(last) if trace.time_s[last] >= 0.0 => {
+            let after_n = trace.measured_force_n.split_off(last + 1);
+            for column in [&mut trace.time_s, &mut trace.desired_force_n, &mut trace.displacement_m] {
+                column.truncate(last + 1);
+            }
+            after_n
+        }
+        _ => Vec::new(),
+    };
+    Ok((trace, after_n))
 }

@@ -1,8 +1,8 @@
 //! A measured pull, and the messages that it is stored as.
 
 use crate::encode::{
-    EncodedRig, EncodedSample, VIEW_RATE_HZ, image_message, scenario_message, set_label, state_messages,
-    timestamp, trace_message,
+    EncodedRig, EncodedSample, VIEW_RATE_HZ, image_message, scenario_message, set_label, set_suspect,
+    state_messages, timestamp, trace_message,
 };
 use crate::index::index_row;
 use crate::picture::PictureError;
@@ -24,6 +24,13 @@ pub enum RigResult {
     Censored {
         /// The label.
         label: SlipLabel,
+    },
+    /// There is a label, and evidence that contradicts it.
+    Suspect {
+        /// The label.
+        label: SlipLabel,
+        /// What contradicts it, with the numbers.
+        reason: String,
     },
     /// The jaws closed without touching the part: the label is 0.
     NoContact,
@@ -111,6 +118,10 @@ impl RigPull {
         match &self.result {
             RigResult::Slipped { label } => set_label(&mut message, &SlipLabel { censored: false, ..*label }),
             RigResult::Censored { label } => set_label(&mut message, &SlipLabel { censored: true, ..*label }),
+            RigResult::Suspect { label, reason } => {
+                set_label(&mut message, label);
+                set_suspect(&mut message, Some(reason));
+            }
             RigResult::NoContact => {
                 message.set_status(Status::NoContact);
                 message.max_pull_force_n = Some(0.0);
@@ -152,7 +163,10 @@ impl RigPull {
     }
 
     fn check(&self) -> Result<(), RigPullError> {
-        if let RigResult::Slipped { label } | RigResult::Censored { label } = &self.result {
+        if let RigResult::Slipped { label }
+        | RigResult::Censored { label }
+        | RigResult::Suspect { label, .. } = &self.result
+        {
             let SlipLabel { max_pull_force_n, slip_time_s, .. } = *label;
             if !(max_pull_force_n.is_finite() && slip_time_s.is_finite()) {
                 return Err(RigPullError::Label { max_pull_force_n, slip_time_s });

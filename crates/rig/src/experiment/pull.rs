@@ -14,6 +14,8 @@ use std::time::{Duration, Instant};
 
 /// How long the sensor is read without a load before the grip, by the robot's clock.
 const NO_LOAD_S: f64 = 0.5;
+/// How long it is read without a load after the pull, jaws open.
+const NO_LOAD_AFTER_S: f64 = 0.25;
 /// Slack of this machine on what the robot times.
 const SLACK: Duration = Duration::from_secs(3);
 /// Height from which the way back is fast.
@@ -62,6 +64,10 @@ pub struct MeasuredPull {
     pub unix_s: f64,
     /// Force along the pull before it, N.
     pub preload_n: f64,
+    /// Readings along the pull after it, jaws open and before anything moves or is zeroed again.
+    pub no_load_after_n: Vec<f64>,
+    /// What the gripper said of the force of a jaw while it held, N.
+    pub reported_force_n: Option<f64>,
     /// Everything that the robot said.
     pub rows: Vec<RobotRow>,
     /// Seconds since 1970 of each row's arrival.
@@ -78,6 +84,10 @@ struct Parts {
     frames: Vec<FrameStamp>,
     /// Robot's clock: from and to when nothing loaded the sensor.
     no_load_s: Option<(f64, f64)>,
+    /// The same after the pull.
+    no_load_after_s: Option<(f64, f64)>,
+    /// Of a jaw.
+    reported_force_n: Option<f64>,
     held_s: Option<f64>,
     run: Option<i32>,
     preload_n: f64,
@@ -201,7 +211,7 @@ impl Experiment<'_> {
             _ => return Err(Fault::NotHolding { state }),
         }
         // The device clamps a force beyond its own settings without a word: what it reports goes into the record.
-        self.ask_gripper(Query::Force)?;
+        parts.reported_force_n = Some(0.5 * self.ask_gripper(Query::Force)?);
         let held_s = parts.held_s.unwrap_or_default();
         self.wait_until("settling", held_s + self.config.images.settle_s)?;
         self.tell(RigEvent::Step("grip images"));
@@ -220,7 +230,13 @@ impl Experiment<'_> {
         self.check_gaps(run)?;
         self.check_force(campaign, planned, run, parts.preload_n)?;
         parts.outcome = self.label(campaign, planned, parts, reason);
-        self.retract(&poses)
+        self.tell(RigEvent::Step("releasing"));
+        self.release()?;
+        // The next program zeroes the sensor.
+        let from_s = self.robot_time_s()?;
+        self.wait_until("the reading without a load after the pull", from_s + NO_LOAD_AFTER_S)?;
+        parts.no_load_after_s = Some((from_s, self.robot_time_s()?));
+        self.go_up(&poses)
     }
 
     /// Up to a safe height, over the part, ready to go down.
@@ -369,6 +385,10 @@ impl Experiment<'_> {
     fn retract(&mut self, poses: &GripPoses) -> Result<(), Fault> {
         self.tell(RigEvent::Step("releasing"));
         self.release()?;
+        self.go_up(poses)
+    }
+
+    fn go_up(&mut self, poses: &GripPoses) -> Result<(), Fault> {
         let here = self.reading()?.tcp;
         self.move_to("the way up", here.raised(CLEAR_M), self.config.motion.approach_speed_mm_s)?;
         self.move_to("the way back", poses.approach, self.config.motion.speed_mm_s)
@@ -396,7 +416,17 @@ impl Experiment<'_> {
         }
         let mut log = std::mem::take(&mut self.log);
         log.sort_by_key(|line| line.at);
-        let rows = thinned(std::mem::take(&mut self.rows), parts.run, parts.no_load_s);
+        let no_load_after_n = match parts.no_load_after_s {
+            Some((from_s, to_s)) => self
+                .rows
+                .iter()
+                .filter(|row| row.timestamp_s >= from_s && row.timestamp_s < to_s)
+                .map(|row| self.signed(planned, row.force[2]))
+                .collect(),
+            None => Vec::new(),
+        };
+        let without = [parts.no_load_s, parts.no_load_after_s];
+        let rows = thinned(std::mem::take(&mut self.rows), parts.run, without);
         MeasuredPull {
             planned: planned.clone(),
             outcome,
@@ -409,6 +439,8 @@ impl Experiment<'_> {
             robot_time_s,
             unix_s,
             preload_n: parts.preload_n,
+            no_load_after_n,
+            reported_force_n: parts.reported_force_n,
             rows_unix_s: rows.iter().map(|row| self.clock.unix_s(row.at)).collect(),
             rows,
             log: log.into_iter().map(|line| (self.clock.unix_s(line.at), line)).collect(),
@@ -418,13 +450,14 @@ impl Experiment<'_> {
 
 /// Readings that are recorded: all of the pull, of the moment before it and of the sensor without a load; of the way there and back,
 /// and of the dwell, one in so many.
-fn thinned(rows: Vec<RobotRow>, run: Option<i32>, no_load_s: Option<(f64, f64)>) -> Vec<RobotRow> {
+fn thinned(rows: Vec<RobotRow>, run: Option<i32>, without_s: [Option<(f64, f64)>; 2]) -> Vec<RobotRow> {
     let begins_s = rows.iter().find(|row| run.is_some_and(|run| row.phase_of(run) == Some(Phase::Pulling)));
     let begins_s = begins_s.map_or(f64::INFINITY, |row| row.timestamp_s);
     let matters = |row: &RobotRow| {
         let phase = run.and_then(|run| row.phase_of(run));
         let before = row.timestamp_s > begins_s - BEFORE_S && row.timestamp_s < begins_s;
-        let without = no_load_s.is_some_and(|(from, to)| row.timestamp_s >= from && row.timestamp_s < to);
+        let within = |(from_s, to_s): &(f64, f64)| row.timestamp_s >= *from_s && row.timestamp_s < *to_s;
+        let without = without_s.iter().flatten().any(within);
         before || without || matches!(phase, Some(Phase::Pulling | Phase::Braking))
     };
     rows.into_iter()

@@ -86,8 +86,18 @@ impl Live {
     }
 
     /// A pull is over.
-    pub fn pulled(&mut self, standing: &Standing, measured: &MeasuredPull) -> Result<(), Failure> {
+    pub fn pulled(
+        &mut self,
+        standing: &Standing,
+        measured: &MeasuredPull,
+        suspect: Option<&str>,
+    ) -> Result<(), Failure> {
         let (status, words, force_n) = match &measured.outcome {
+            PullOutcome::Labelled(l) if suspect.is_some() => (
+                "suspect",
+                format!("{:.2} N is suspect: {}", l.max_pull_force_n, suspect.unwrap_or_default()),
+                Some(l.max_pull_force_n),
+            ),
             PullOutcome::Labelled(l) if l.censored => {
                 ("censored", format!("held {:.2} N", l.max_pull_force_n), Some(l.max_pull_force_n))
             }
@@ -113,6 +123,7 @@ impl Live {
             "time_s": standing.time_s,
             "dwell_s": measured.dwell_s,
             "failure": reason,
+            "status_reason": suspect.unwrap_or(reason),
             "still": measured.stopped.as_ref().map(|s| s.still),
         }))
     }

@@ -2,7 +2,7 @@
 
 use super::live::Live;
 use super::load::load_rig;
-use super::record::{Standing, rig_pull};
+use super::record::{Standing, rig_pull, suspect};
 use super::standing::CampaignClock;
 use crate::args::RigPullArgs;
 use crate::failure::{Failure, code};
@@ -242,15 +242,21 @@ impl Job<'_> {
         let recorded = Recorded { outcome: measured.outcome.clone(), stopped: measured.stopped.clone() };
         let standing = clock.standing(place, &measured);
         // A pull is recorded, whether or not somebody still listens.
-        let told = self.live.borrow_mut().pulled(&standing, &measured);
-        self.record(standing, measured)?;
+        let suspect = suspect(self.config, self.campaign, &measured);
+        let told = self.live.borrow_mut().pulled(&standing, &measured, suspect.as_deref());
+        self.record(standing, measured, suspect)?;
         told?;
         Ok(recorded)
     }
 
-    fn record(&self, standing: Standing, measured: MeasuredPull) -> Result<(), Failure> {
+    fn record(
+        &self,
+        standing: Standing,
+        measured: MeasuredPull,
+        suspect: Option<String>,
+    ) -> Result<(), Failure> {
         discard_failed(self.folder, standing.index).map_err(Failure::new)?;
-        let pull = rig_pull(self.config, self.campaign, standing, measured);
+        let pull = rig_pull(self.config, self.campaign, standing, measured, suspect);
         write_rig_pull(self.folder, &pull).map_err(Failure::new)?;
         Ok(())
     }

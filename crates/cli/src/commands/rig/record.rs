@@ -1,6 +1,7 @@
 //! From what the rig measured to what the recorder stores.
 
 use gripgen::record::{RigLog, RigLogEvent, RigPull, RigResult, RigStream};
+use gripgen::twin::evidence::{Expected, GripForceEvidence, LabelEvidence, WrenchRow, judge};
 use gripgen::twin::{Campaign, Covariates, Jaw, PlannedPull, PullKind, PullSettings, Scenario};
 use gripgen_rig::experiment::pull::{FrameStamp, MeasuredPull};
 use gripgen_rig::experiment::{PullOutcome, RigConfig, RobotRow};
@@ -18,12 +19,18 @@ pub struct Standing {
 }
 
 /// A measured pull as it is stored.
-pub fn rig_pull(config: &RigConfig, campaign: &Campaign, standing: Standing, m: MeasuredPull) -> RigPull {
-    let result = match &m.outcome {
-        PullOutcome::Labelled(label) if label.censored => RigResult::Censored { label: *label },
-        PullOutcome::Labelled(label) => RigResult::Slipped { label: *label },
-        PullOutcome::NoContact => RigResult::NoContact,
-        PullOutcome::Failed { reason } => RigResult::Failed { reason: reason.clone() },
+///
+/// `suspect` is what [`suspect`] says of it.
+pub fn rig_pull(
+    config: &RigConfig,
+    campaign: &Campaign,
+    standing: Standing,
+    m: MeasuredPull,
+    suspect: Option<String>,
+) -> RigPull {
+    let result = match (&m.outcome, suspect) {
+        (PullOutcome::Labelled(label), Some(reason)) => RigResult::Suspect { label: *label, reason },
+        (outcome, _) => result_of(outcome),
     };
     let scenario = scenario(config, campaign, standing, &m.planned, m.dwell_s);
     let mut streams = vec![robot(&m.rows, &m.rows_unix_s)];
@@ -56,6 +63,66 @@ pub fn rig_pull(config: &RigConfig, campaign: &Campaign, standing: Standing, m: 
         trace: m.trace.filter(|trace| trace.len() > 1),
         log: RigLog { streams, events },
     }
+}
+
+fn result_of(outcome: &PullOutcome) -> RigResult {
+    match outcome {
+        PullOutcome::Labelled(label) if label.censored => RigResult::Censored { label: *label },
+        PullOutcome::Labelled(label) => RigResult::Slipped { label: *label },
+        PullOutcome::NoContact => RigResult::NoContact,
+        PullOutcome::Failed { reason } => RigResult::Failed { reason: reason.clone() },
+    }
+}
+
+/// How far a grip force that the gripper reports may be from the one that was asked, N and as a share: without
+/// force-measuring fingers a WSG 50 knows its force from the motor current, badly below 20 N.
+const GRIP_FORCE_N: f64 = 2.5;
+const GRIP_FORCE_SHARE: f64 = 0.1;
+/// Less than the time between two rows, s.
+const ROW_S: f64 = 1e-3;
+
+/// Why the label of a pull is suspect, by all that was recorded of it; `None` if it is not, or if there is none.
+pub fn suspect(config: &RigConfig, campaign: &Campaign, m: &MeasuredPull) -> Option<String> {
+    let PullOutcome::Labelled(label) = &m.outcome else { return None };
+    let asked_n = m.planned.grip_force_n;
+    let allowed_n = GRIP_FORCE_N.max(GRIP_FORCE_SHARE * asked_n);
+    let sign = config.robot.force_sign * config.robot.force_gain * m.planned.pull_direction;
+    let times = m.trace.as_ref().map_or(&[][..], |trace| &trace.time_s);
+    // Rows of the trace only: between the reading without a load and the pull the jaws closed.
+    let unloaded_s = times.iter().rev().find(|t| **t < 0.0);
+    let span = |from_s: Option<&f64>, to_s: Option<&f64>, time_s: f64| {
+        from_s.is_some_and(|t| time_s > t - ROW_S) && to_s.is_some_and(|t| time_s < t + ROW_S)
+    };
+    let of_trace = |time_s: f64| match time_s < 0.0 {
+        true => span(times.first(), unloaded_s, time_s),
+        false => span(Some(&0.0), times.last(), time_s),
+    };
+    let wrench: Vec<WrenchRow> = m
+        .rows
+        .iter()
+        .map(|row| {
+            let [x, y, z, rx, ry, rz] = row.force;
+            let across_n = [x, y].map(|force_n| force_n * config.robot.force_gain);
+            let time_s = row.timestamp_s - m.robot_time_s;
+            WrenchRow { time_s, pull_n: sign * z, across_n, torque_nm: [rx, ry, rz] }
+        })
+        .filter(|row| of_trace(row.time_s))
+        .collect();
+    let of_trace = LabelEvidence::of_trace(
+        label.max_pull_force_n,
+        campaign.label_tolerance_n,
+        campaign.stop_m,
+        m.trace.as_ref(),
+    );
+    let evidence = LabelEvidence {
+        censored: label.censored,
+        every_reading: true,
+        no_load_after_n: &m.no_load_after_n,
+        grip_force: m.reported_force_n.map(|reported_n| GripForceEvidence { asked_n, reported_n, allowed_n }),
+        wrench: &wrench,
+        ..of_trace
+    };
+    judge(&evidence, &Expected::default()).reason()
 }
 
 /// Source of the event that ties the clocks of a pull together.

@@ -1,0 +1,97 @@
+//! How measured pulls stand: what their table says, and what their traces say of their labels.
+
+use super::cells::{Cells, Column};
+use crate::proto::gripgen_v1::Status;
+use gripgen_twin::evidence::{Expected, LabelEvidence, Verdict, judge};
+use gripgen_twin::{MeasuredPull, MeasuredPulls, slip_label};
+
+/// Labels and readings of files agree to two decimals.
+const ROUNDING_N: f64 = 6e-3;
+
+/// Measured pulls of a table, whatever became of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JudgedPulls {
+    /// The pulls, those without a label too: it is NaN.
+    pub pulls: MeasuredPulls,
+    /// How each of them stands.
+    pub standing: Vec<Standing>,
+}
+
+/// How a pull stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Standing {
+    /// How it ended.
+    pub status: Status,
+    /// Why, with numbers; empty where it slipped.
+    pub reason: String,
+    /// It is suspect, and an effect of sensor or robot may be why.
+    pub may_be_the_rig: bool,
+    /// Its label was compared with evidence.
+    pub judged: bool,
+}
+
+/// What the table says. A pull that slipped, held or is suspect has a label: the error is the row of one that has none.
+pub(super) fn stated(columns: &[Column], pulls: &mut [MeasuredPull]) -> Result<Vec<Standing>, usize> {
+    let statuses = columns.iter().find_map(|column| match &column.cells {
+        Cells::Status(found) => Some(found),
+        _ => None,
+    });
+    let reasons = columns.iter().find_map(|column| match &column.cells {
+        Cells::Reason(found) => Some(found),
+        _ => None,
+    });
+    let mut standing = Vec::with_capacity(pulls.len());
+    for (row, pull) in pulls.iter_mut().enumerate() {
+        let status = statuses.and_then(|s| s.get(row)).copied().unwrap_or(Status::Slipped);
+        match status {
+            Status::NoContact if pull.max_pull_force_n.is_nan() => pull.max_pull_force_n = 0.0,
+            Status::NoContact | Status::Failed => {}
+            _ if pull.max_pull_force_n.is_nan() => return Err(row),
+            _ => {}
+        }
+        let reason = reasons.and_then(|r| r.get(row)).cloned().unwrap_or_default();
+        standing.push(Standing { status, reason, may_be_the_rig: false, judged: false });
+    }
+    Ok(standing)
+}
+
+/// Judges the labels of pulls with a trace; `after_n` are their readings without a load after the pull.
+pub(super) fn judge_labels(measured: &MeasuredPulls, after_n: &[Vec<f64>], standing: &mut [Standing]) {
+    let every_reading = labels_are_rows(measured, standing);
+    for ((pull, after_n), standing) in measured.pulls.iter().zip(after_n).zip(standing) {
+        let censored = standing.status == Status::Censored;
+        if standing.status != Status::Slipped && !censored {
+            continue;
+        }
+        let (tolerance_n, stop_m) = (measured.label_tolerance_n, measured.stop_m);
+        let of_trace =
+            LabelEvidence::of_trace(pull.max_pull_force_n, tolerance_n, stop_m, pull.trace.as_ref());
+        let evidence = LabelEvidence { censored, every_reading, no_load_after_n: after_n, ..of_trace };
+        let judgement = judge(&evidence, &Expected::default());
+        standing.judged = judgement.verdict != Verdict::NoEvidence;
+        if let Some(reason) = judgement.reason() {
+            *standing = Standing {
+                status: Status::Suspect,
+                reason,
+                may_be_the_rig: judgement.may_be_the_rig(),
+                judged: true,
+            };
+        }
+    }
+}
+
+/// Whether the labels of a campaign are rows of their traces: most of them are. In traces with fewer rows than the label was
+/// chosen from, few are.
+fn labels_are_rows(measured: &MeasuredPulls, standing: &[Standing]) -> bool {
+    let slipped = measured.pulls.iter().zip(standing).filter(|(_, s)| s.status == Status::Slipped);
+    let (mut traced, mut equal) = (0, 0);
+    for (pull, _) in slipped {
+        let Some(trace) = &pull.trace else { continue };
+        let found = slip_label(&trace.until_displacement(measured.stop_m), measured.label_tolerance_n, true);
+        traced += 1;
+        equal += usize::from(
+            found.is_ok_and(|l| (l.max_pull_force_n - pull.max_pull_force_n).abs() <= ROUNDING_N),
+        );
+    }
+    traced > 0 && 2 * equal >= traced
+}

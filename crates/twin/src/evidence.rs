@@ -1,0 +1,290 @@
+//! A label proves itself: whether what was recorded of a pull agrees with its label.
+//!
+//! One pure function, [`judge`], for pulls that were simulated, imported or made on a rig. It looks only at evidence that
+//! is there; what is missing is no reason. A difference counts where it is larger than both the noise explains and a
+//! label may be off ([`cap_n`]).
+
+mod beside;
+mod budget;
+mod follow;
+mod rule;
+mod signal;
+mod slip;
+#[cfg(test)]
+mod tests;
+mod zero;
+
+pub use beside::{GripForceEvidence, WrenchRow};
+pub use budget::LabelBudget;
+
+use crate::{PullTrace, Scenario, SlipLabel, Twin};
+use signal::Signal;
+use std::fmt;
+
+/// A label may be off by this much before anything is a reason, N: the least of UR's precision and of the label rule that
+/// can be asked for.
+const CAP_N: f64 = 0.5;
+
+/// The same as a share of the label.
+const CAP_SHARE: f64 = 0.05;
+
+/// Standard deviations that chance explains: some ten comparisons a pull, and less than one false alarm in 10000 pulls.
+const SIGMAS: f64 = 4.5;
+
+/// By how much a label of this size may be off, N.
+pub fn cap_n(label_n: f64) -> f64 {
+    CAP_N.max(CAP_SHARE * label_n.abs())
+}
+
+/// By how much the zero of its readings may be off: less, because noise and rule have their share.
+fn zero_cap_n(label_n: f64) -> f64 {
+    0.6 * cap_n(label_n)
+}
+
+/// What was recorded of a pull.
+#[derive(Debug, Clone, Copy)]
+pub struct LabelEvidence<'a> {
+    /// The label.
+    pub label_n: f64,
+    /// It is a lower bound.
+    pub censored: bool,
+    /// Tolerance of the label rule.
+    pub tolerance_n: f64,
+    /// Displacement stop.
+    pub stop_m: f64,
+    /// The force over time; rows before 0 are the reading without a load.
+    pub trace: Option<&'a PullTrace>,
+    /// The trace holds every reading that the label was chosen from; otherwise the label may lie between its rows.
+    pub every_reading: bool,
+    /// Readings without a load after the pull, along the pull.
+    pub no_load_after_n: &'a [f64],
+    /// What the gripper said of its force.
+    pub grip_force: Option<GripForceEvidence>,
+    /// Forces across the pull and torques, row by row.
+    pub wrench: &'a [WrenchRow],
+}
+
+impl<'a> LabelEvidence<'a> {
+    /// A label with its trace and nothing else.
+    pub fn of_trace(label_n: f64, tolerance_n: f64, stop_m: f64, trace: Option<&'a PullTrace>) -> Self {
+        Self {
+            label_n,
+            censored: false,
+            tolerance_n,
+            stop_m,
+            trace,
+            every_reading: false,
+            no_load_after_n: &[],
+            grip_force: None,
+            wrench: &[],
+        }
+    }
+}
+
+/// What is known of the rig beforehand. The default knows nothing: noise and time constant are estimated from the trace.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Expected {
+    /// Noise of a reading.
+    pub noise_n: Option<f64>,
+    /// Time constant and dead time of the force loop together.
+    pub lag_s: Option<f64>,
+    /// The twin has effects on its sensor or its command, or a loop so slow that the label rule may fire before the slip: what
+    /// they do to a trace is predicted, and no reason. Only label and trace have to agree then.
+    pub own_effects: bool,
+}
+
+impl Expected {
+    /// What a twin says of a pull that it simulates.
+    pub fn of(twin: &Twin, scenario: &Scenario) -> Self {
+        let acts = |e: &&crate::effects::Effect| e.acts_on(&scenario.part);
+        let on_signals = |e: &crate::effects::Effect| e.spec.sensor.is_some() || e.spec.command.is_some();
+        let pull = &scenario.pull;
+        let lag_s = twin.robot.lag_s + twin.robot.dead_time_s;
+        let trails_n = pull.increment_n / pull.step_s * lag_s;
+        Self {
+            noise_n: Some(twin.wrist.noise_n),
+            lag_s: Some(lag_s),
+            own_effects: twin.effects.iter().filter(acts).any(on_signals)
+                || crate::table_offset_n(twin, scenario) != 0.0
+                || trails_n > 0.5 * pull.label_tolerance_n,
+        }
+    }
+}
+
+/// What a finding is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FindingKind {
+    /// The label rule, applied to the trace, gives another label.
+    Rule,
+    /// The force still rose after the label: the loop trailed, the jaws had not slipped.
+    Early,
+    /// A larger force before the label.
+    LargerBefore,
+    /// The displacement begins at another force.
+    Displacement,
+    /// The sensor reads something without a load.
+    Zero,
+    /// The zero is another one after the pull, or in it.
+    ZeroShift,
+    /// The reading leaves the command all at once while the part is held.
+    Jump,
+    /// The gripper reports another force than was asked.
+    GripForce,
+    /// A force across the pull, which friction holds too.
+    Lateral,
+    /// A torque that no constant lever of the force explains.
+    Torque,
+}
+
+impl FindingKind {
+    /// Whether an effect of sensor or robot that all pulls of a campaign have may be behind it.
+    pub fn may_be_the_rig(self) -> bool {
+        matches!(self, Self::Early | Self::Zero | Self::ZeroShift | Self::Displacement)
+    }
+}
+
+/// Two numbers that should agree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finding {
+    /// What they are of.
+    pub kind: FindingKind,
+    /// What the evidence says, N (Nm for a torque).
+    pub found: f64,
+    /// What it should be by the label or the command.
+    pub wanted: f64,
+    /// How far they may be apart.
+    pub allowed: f64,
+    /// Seconds into the pull, where it has a time.
+    pub time_s: Option<f64>,
+}
+
+impl Finding {
+    /// Whether they are farther apart than they may be.
+    pub fn is_reason(&self) -> bool {
+        // What is not a number contradicts nothing.
+        (self.found - self.wanted).abs() > self.allowed
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { found, wanted, allowed, .. } = self;
+        match self.kind {
+            FindingKind::Rule if found.is_finite() => {
+                write!(f, "the label rule gives {found:.2} N on the trace, the label is {wanted:.2} N")?;
+            }
+            FindingKind::Rule => {
+                return write!(f, "no reading of the trace is near its command, the label is {wanted:.2} N");
+            }
+            FindingKind::Early => {
+                write!(f, "the force rose to {found:.2} N after the label of {wanted:.2} N")?;
+            }
+            FindingKind::LargerBefore => {
+                write!(f, "the jaws held {found:.2} N before the label of {wanted:.2} N")?;
+            }
+            FindingKind::Displacement => {
+                write!(f, "the jaws begin to move at {found:.2} N, the label is {wanted:.2} N")?;
+            }
+            FindingKind::Zero => write!(f, "the sensor reads {found:.2} N without a load")?,
+            FindingKind::ZeroShift => {
+                write!(f, "the sensor's zero is {found:.2} N, and was {wanted:.2} N before the pull")?;
+            }
+            FindingKind::Jump => write!(f, "the reading jumps by {found:.2} N while the part is held")?,
+            FindingKind::GripForce => {
+                write!(f, "the gripper reports {found:.2} N a jaw, {wanted:.2} N were asked")?;
+            }
+            FindingKind::Lateral => {
+                write!(
+                    f,
+                    "with the force across it the pull takes {found:.2} N of friction, its label is {wanted:.2} N"
+                )?;
+            }
+            FindingKind::Torque => {
+                write!(f, "{found:.2} Nm of torque are no lever of the pull")?;
+            }
+        }
+        let unit = if self.kind == FindingKind::Torque { "Nm" } else { "N" };
+        write!(f, " ({allowed:.2} {unit} are allowed")?;
+        match self.time_s {
+            Some(time_s) => write!(f, "; at {time_s:.2} s)"),
+            None => write!(f, ")"),
+        }
+    }
+}
+
+/// What the evidence says of a label.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// There is no evidence.
+    NoEvidence,
+    /// Nothing contradicts the label.
+    Holds,
+    /// Something does.
+    Suspect,
+}
+
+/// A label judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judgement {
+    /// What came out.
+    pub verdict: Verdict,
+    /// All comparisons that could be made.
+    pub findings: Vec<Finding>,
+    /// By how much the label may be off.
+    pub budget: LabelBudget,
+}
+
+impl Judgement {
+    /// The findings that contradict the label.
+    pub fn reasons(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| finding.is_reason())
+    }
+
+    /// Why the label is suspect, with numbers; `None` if it is not.
+    pub fn reason(&self) -> Option<String> {
+        (self.verdict == Verdict::Suspect)
+            .then(|| self.reasons().map(Finding::to_string).collect::<Vec<_>>().join("; "))
+    }
+
+    /// Whether all that contradicts the label may be an effect of sensor or robot.
+    pub fn may_be_the_rig(&self) -> bool {
+        self.verdict == Verdict::Suspect && self.reasons().all(|finding| finding.kind.may_be_the_rig())
+    }
+}
+
+/// Judges a label by the evidence that is there.
+pub fn judge(evidence: &LabelEvidence<'_>, expected: &Expected) -> Judgement {
+    let mut findings = Vec::new();
+    let mut budget = LabelBudget::default();
+    let signal = evidence.trace.and_then(|trace| Signal::of(trace, evidence, expected));
+    if let Some(signal) = &signal {
+        budget.noise_n = signal.noise_n;
+        findings.push(rule::label_rule(signal, evidence));
+        if !expected.own_effects {
+            zero::without_load(signal, evidence, &mut findings, &mut budget);
+            slip::slip(signal, evidence, expected, &mut findings, &mut budget);
+        }
+    }
+    beside::grip_force(evidence, &mut findings);
+    beside::across(evidence, &mut findings);
+    let verdict = match () {
+        () if findings.iter().any(Finding::is_reason) => Verdict::Suspect,
+        () if findings.is_empty() => Verdict::NoEvidence,
+        () => Verdict::Holds,
+    };
+    Judgement { verdict, findings, budget }
+}
+
+/// Why the label of a simulated pull is suspect; `None` if it is not, as it ought to be. The trace holds every reading.
+pub fn suspect_simulated(
+    twin: &Twin,
+    scenario: &Scenario,
+    trace: &PullTrace,
+    label: &SlipLabel,
+) -> Option<String> {
+    let pull = &scenario.pull;
+    let of_trace =
+        LabelEvidence::of_trace(label.max_pull_force_n, pull.label_tolerance_n, pull.stop_m, Some(trace));
+    let evidence = LabelEvidence { censored: label.censored, every_reading: true, ..of_trace };
+    judge(&evidence, &Expected::of(twin, scenario)).reason()
+}
