@@ -114,9 +114,9 @@ impl Grip {
                 break;
             }
             if moment < 0.0 {
-                low = angle
+                low = angle;
             } else {
-                high = angle
+                high = angle;
             }
             let newton = angle - moment / slope;
             if newton == angle {
