@@ -56,7 +56,12 @@ pub fn observe(row: usize, trace: &PullTrace, noise_n: f64) -> TraceObservation 
     let no_load: Vec<f64> = trace.rows().filter(|r| r.time_s < 0.0).map(|r| r.measured_force_n).collect();
     let pulled: Vec<_> = trace.rows().filter(|r| r.time_s >= 0.0).collect();
     let slip =
-        slip_row(&pulled.iter().map(|r| (r.measured_force_n, r.displacement_m)).collect::<Vec<_>>(), noise_n);
+        slip_row(&pulled.iter().map(|r| (r.measured_force_n, r.displacement_m)).collect::<Vec<_>>(), noise_n)
+            .map(|by_displacement| {
+                let rows: Vec<_> = pulled.iter().map(|r| (r.time_s, r.measured_force_n)).collect();
+                let from = rows.partition_point(|r| r.0 < START_S);
+                force_levels(&rows[from..]).map_or(by_displacement, |row| from + row)
+            });
     let held = slip.unwrap_or(pulled.len());
     let mut observation = TraceObservation {
         row,
@@ -86,8 +91,29 @@ fn mean(x: &[f64]) -> Option<(f64, usize)> {
     (!x.is_empty()).then(|| (x.iter().sum::<f64>() / x.len() as f64, x.len()))
 }
 
+/// The first row at which a force stops to follow its staircase, of (time, reading) rows: a line up to it, a level from it on,
+/// by least squares. Unlike the displacement this knows nothing of how the gels bend before they slip.
+fn force_levels(rows: &[(f64, f64)]) -> Option<usize> {
+    let n = rows.len();
+    // Sums of 1, t, t^2, y, t y, y^2 over the rows before each.
+    let mut sums = vec![[0.0; 6]; n + 1];
+    for (i, (t, y)) in rows.iter().enumerate() {
+        let row = [1.0, *t, t * t, *y, t * y, y * y];
+        for (k, x) in row.into_iter().enumerate() {
+            sums[i + 1][k] = sums[i][k] + x;
+        }
+    }
+    let cost = |at: usize| {
+        let [n0, t, tt, y, ty, yy] = sums[at];
+        let (vt, cty, vy) = (tt - t * t / n0, ty - t * y / n0, yy - y * y / n0);
+        let after: Vec<f64> = sums[n].iter().zip(&sums[at]).map(|(a, b)| a - b).collect();
+        vy - cty * cty / vt + after[5] - after[3] * after[3] / after[0]
+    };
+    (8..n.saturating_sub(3)).min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
+}
+
 /// The first row after the slip of (reading, displacement) rows: from there on the displacement is beyond that of the
-/// sheared gels for good.
+/// sheared gels for good. Late where the jaws slide slowly at first, early where the rim slips first.
 fn slip_row(rows: &[(f64, f64)], noise_n: f64) -> Option<usize> {
     let n = rows.len();
     if n < 8 {
