@@ -109,7 +109,9 @@ fn main() {
         }
         let found: Mutex<BTreeMap<usize, Vec<(String, f64, ParameterEstimate)>>> = Mutex::default();
         let begun = std::time::Instant::now();
+        let from: usize = std::env::var("FROM").ok().and_then(|f| f.parse().ok()).unwrap_or(0);
         in_parallel(count, 2, |index| {
+            let index = index + from;
             let world = world(&line, index as u64);
             let plan = Plan {
                 pulls: 48,

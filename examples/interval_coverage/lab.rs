@@ -145,12 +145,16 @@ pub fn campaign(world: &World, plan: &Plan, seed: u64) -> MeasuredPulls {
     let mut time_s = 0.0;
     let mut draw = |n: usize| ((order.uniform() * n as f64) as usize).min(n - 1);
     for i in 0..plan.pulls {
-        let part = i % world.mu.len();
+        // Every second pull may have a trace, so parts change every second pull.
+        let part = (i / 2) % world.mu.len();
         let grip_force_n = plan.grip_force_n[draw(plan.grip_force_n.len())];
         let increment_n = plan.increment_n[draw(plan.increment_n.len())];
         let mut noise = Stream::new(seed, 1 + i as u64, Purpose::ForceNoise);
         let mu = world.law.map_or(world.mu[part], |(a, b)| world.mu[part] * (a + b / grip_force_n));
         let limit_n = 2.0 * mu * grip_force_n * (1.0 + world.scatter * noise.normal());
+        if std::env::var_os("DEBUG_SLIP").is_some() {
+            eprintln!("TRUE {i} L {limit_n:.4} r {}", world.kinetic_ratio);
+        }
         let (label, trace) = pull(world, limit_n, increment_n, step_s, &mut noise);
         time_s += 40.0;
         pulls.push(MeasuredPull {

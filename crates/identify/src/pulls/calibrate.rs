@@ -10,6 +10,7 @@ use super::heldout::{errors, folds, predicted};
 use super::intervals::NormalFit;
 use super::model::{PredictPulls, PullModel};
 use super::scatter::scatter;
+use super::slip::Slips;
 use crate::diagnosis::{HeldOutError, ParameterEstimate};
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::effects::find;
@@ -136,7 +137,7 @@ pub fn calibrate_pulls(
     let fitted = context.fit(&start, &first.terms, &rows).ok_or(CalibrateError::NoFit)?;
     let scattered = scatter(&context, &fitted, &rows);
     context.free_lag = false;
-    let normal = NormalFit::new(&fitted, data.len(), data.parts.len());
+    let normal = NormalFit::new(&fitted, data.len(), data.parts.len(), context.assumed_ratio());
     let held = predicted(&context, &fitted, &folds(data.len()), false);
     let forces = || measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces().fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
@@ -148,7 +149,7 @@ pub fn calibrate_pulls(
         .map(|(c, _)| (c.spec.id.to_string(), parameters(&fitted, c)))
         .collect();
     Ok(PullCalibration {
-        baseline: intervals(baseline(&fitted, &context), &fitted, &normal, dynamics, scattered),
+        baseline: intervals(baseline(&fitted, &context), &fitted, &normal, context.slips.as_ref(), dynamics, scattered),
         effects,
         laws,
         error: errors(&data.label_n, &held, &held, &data.group_of, &rows).map(|pair| pair.after),
@@ -162,6 +163,7 @@ fn intervals(
     mut baseline: BTreeMap<String, ParameterEstimate>,
     fitted: &Fitted,
     normal: &NormalFit,
+    slips: Option<&Slips>,
     dynamics: Option<Dynamics>,
     scattered: (f64, f64, f64),
 ) -> BTreeMap<String, ParameterEstimate> {
@@ -169,6 +171,11 @@ fn intervals(
         if let Some(estimate) = baseline.get_mut(name) {
             (estimate.low90, estimate.high90) = normal.of_parameter(k);
         }
+    }
+    if let (Some(slips), Some(estimate)) = (slips, baseline.get_mut("kinetic_ratio")) {
+        let (low, high) = slips.ratio90();
+        // The fit may have moved the value a little.
+        (estimate.low90, estimate.high90) = (low.min(estimate.value), high.max(estimate.value));
     }
     let known = dynamics.into_iter().flatten().zip(["robot.lag_s", "robot.dead_time_s"]);
     for ((value, low, high), name) in known.chain([(scattered, "scatter")]) {
@@ -197,7 +204,7 @@ fn laws(
         .collect();
     let few = if levels.len() > 3 { context.fit(&fitted.model, terms, &rows) } else { None };
     let few = few.map(|few| {
-        let normal = NormalFit::new(&few, rows.len(), 2 * context.data.parts.len());
+        let normal = NormalFit::new(&few, rows.len(), 2 * context.data.parts.len(), context.assumed_ratio());
         (few, normal)
     });
     let of = |fitted: &Fitted, normal: &NormalFit, part: usize| {

@@ -214,9 +214,11 @@ impl<'a> Context<'a> {
     /// Force per speed of the sliding jaws: displacement after the slip against the force that nobody holds.
     fn damping(&self, raw: &[TraceObservation]) -> Option<f64> {
         let mut each = Vec::new();
+        let rigid = PullModel { stiffness_n_per_m: 1e9, ..self.base.clone() };
         for trace in raw.iter().filter(|t| t.slid_rows.len() >= 5) {
             let times: Vec<f64> = trace.slid_rows.iter().map(|r| r.0).collect();
-            let applied = self.predictor.trace(&self.base, trace.row, &times).stuck_n;
+            // The force of the loop itself: that on a tool of a contact that does not yield.
+            let applied = self.predictor.trace(&rigid, trace.row, &times).stuck_n;
             let held = trace.slid_n?.0;
             let mut impulse = 0.0;
             for k in 1..times.len() {
@@ -377,12 +379,17 @@ impl<'a> Context<'a> {
         r
     }
 
+    /// Kinetic ratio that is taken for granted where no trace shows it, with its standard deviation.
+    pub(super) fn assumed_ratio(&self) -> Option<(f64, f64)> {
+        self.kinetic.is_none().then(|| (self.given.2.min(0.95), 0.05))
+    }
+
     /// What is known beside the pulls, as residuals.
     pub(super) fn priors(&self, model: &PullModel, signals: bool) -> Vec<f64> {
         let mut r = vec![model.misread_n / MISREAD_N];
         match self.kinetic {
             Some((ratio, error)) => r.push((model.kinetic_ratio - ratio) / error),
-            None => r.push((model.kinetic_ratio - self.given.2.min(0.95)) / 0.05),
+            None => r.extend(self.assumed_ratio().map(|(mean, sd)| (model.kinetic_ratio - mean) / sd)),
         }
         if self.free_lag || signals {
             let (wide_lag, wide_dead) = if self.observations.is_empty() { (0.04, 0.02) } else { (0.5, 0.5) };

@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::model::PullModel;
+use super::observe::START_S;
 use crate::bounded::interval90;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 use nalgebra::{DMatrix, DVector};
@@ -25,18 +26,23 @@ impl Context<'_> {
         let rows: Vec<(usize, Vec<f64>, Vec<f64>)> = self
             .observations
             .iter()
-            .map(|o| {
+            .filter_map(|o| {
+                let trace = self.data.measured.pulls[o.row].trace.as_ref()?;
                 let most = o.limit_n.map_or(f64::INFINITY, |l| STIFF * l.value_n);
                 let load = o.no_load_n.map_or(0.0, |b| b.0);
-                let taken = o.readings_n.iter().take_while(|r| **r < most).count();
-                let readings = o.readings_n[..taken].iter().map(|r| r - load).collect();
-                (o.row, o.times_s[..taken].to_vec(), readings)
+                let last_s = o.times_s.iter().zip(&o.readings_n).take_while(|(_, r)| **r < most).last()?.0;
+                let held = trace.rows().filter(|r| r.time_s >= START_S && r.time_s <= *last_s);
+                // Readings one by one: their means over a step of the staircase would hide how it is followed.
+                let (times, readings) = held.map(|r| (r.time_s, r.measured_force_n - load)).unzip();
+                Some((o.row, times, readings))
             })
-            .filter(|(_, times, _)| times.len() >= 3)
+            .filter(|(_, times, _): &(_, Vec<f64>, _)| times.len() >= 5)
             .collect();
-        if rows.len() < FEWEST || self.predictor.winds_up() {
+        if rows.len() < FEWEST {
             return None;
         }
+        // How fast jaws slide says nothing about the damping of a loop that winds up.
+        let (relaxation, most) = if self.predictor.winds_up() { (1.0, 10.0) } else { (RELAXATION, 2.0) };
         let asked: Vec<(usize, &[f64])> = rows.iter().map(|(row, times, _)| (*row, times.as_slice())).collect();
         let free = |name: &str, start: f64, bounds: (f64, f64), scale: f64| FreeParameter {
             name: name.into(),
@@ -47,7 +53,7 @@ impl Context<'_> {
         let parameters = [
             free("lag_s", self.base.lag_s, (0.0, 1.0), 0.02),
             free("dead_time_s", self.base.dead_time_s, (0.0, 0.5), 0.4),
-            free("relaxation", 1.0, (0.5, 2.0), 0.1),
+            free("relaxation", 1.0, (1.0 / most, most), 0.1),
         ];
         let model_of = |v: &[f64]| PullModel {
             lag_s: v[0],
@@ -56,15 +62,35 @@ impl Context<'_> {
             ..self.base.clone()
         };
         let noise_n = self.base.noise_n;
-        let found = fit(&parameters, FitOptions { most_steps: 15, least_gain: 1e-6 }, |v| {
+        let residuals = |v: &[f64]| {
             let predicted = self.predictor.traces(&model_of(v), &asked);
-            let mut r = vec![(v[2] - 1.0) / RELAXATION];
+            let mut r = vec![libm::log(v[2]) / relaxation];
             for ((_, _, readings), p) in rows.iter().zip(&predicted) {
                 r.extend(readings.iter().zip(&p.stuck_n).map(|(a, b)| (a - b) / noise_n));
             }
             r
-        })
-        .ok()?;
+        };
+        // A dead time acts by whole readings: each that may be has its lag.
+        let mut best: Option<(f64, Vec<f64>)> = None;
+        for step in -8..=8 {
+            let dead_time_s = self.base.dead_time_s + 0.002 * f64::from(step);
+            if dead_time_s < -1e-9 {
+                continue;
+            }
+            let mut tried = parameters.clone();
+            tried[1].start = dead_time_s.max(0.0);
+            tried[1].bounds = (tried[1].start, tried[1].start);
+            let options = FitOptions { most_steps: 6, least_gain: 1e-5 };
+            if let Ok(found) = fit(&tried, options, residuals)
+                && best.as_ref().is_none_or(|b| found.cost < b.0)
+            {
+                best = Some((found.cost, found.values));
+            }
+        }
+        let (_, values) = best?;
+        let settled: Vec<FreeParameter> =
+            parameters.iter().zip(&values).map(|(p, v)| FreeParameter { start: *v, ..p.clone() }).collect();
+        let found = fit(&settled, FitOptions { most_steps: 1, least_gain: 1.0 }, residuals).ok()?;
         let informed = found.jacobian.tr_mul(&found.jacobian);
         let inverse = informed.cholesky()?.inverse();
         let own = |from: usize, count: usize| -> DVector<f64> {

@@ -20,6 +20,12 @@ pub struct NormalFit {
     freedom: f64,
 }
 
+/// Standard deviations of what is assumed of the kinetic ratio that its range has to either side: nine of ten values are inside.
+const RANGE: f64 = 1.4;
+
+/// Standard deviation of a kinetic ratio of which nothing is known.
+const WIDE: f64 = 0.5;
+
 /// Bounds of the parameters that end.
 fn bounds(name: &str) -> Option<(f64, f64)> {
     match name {
@@ -31,15 +37,34 @@ fn bounds(name: &str) -> Option<(f64, f64)> {
 }
 
 impl NormalFit {
-    /// Of a fit to so many pulls of so many parts.
-    pub fn new(fitted: &Fitted, pulls: usize, parts: usize) -> Self {
+    /// Of a fit to so many pulls of so many parts. `assumed` is the kinetic ratio that is taken for granted where no trace shows it,
+    /// with its standard deviation.
+    pub fn new(fitted: &Fitted, pulls: usize, parts: usize, assumed: Option<(f64, f64)>) -> Self {
         let n = fitted.values.len();
+        let mut fitted = fitted.clone();
+        let ratio = fitted.names.iter().position(|name| name == "kinetic_ratio");
+        if let (Some((mean, sd)), Some(ratio)) = (assumed, ratio) {
+            // What is assumed is no measurement: it is a range, in which no value is better than another.
+            let known = DMatrix::from_fn(n, n, |i, j| if i == j && i == ratio { sd.powi(-2) - WIDE.powi(-2) } else { 0.0 });
+            let whole = &fitted.information * DVector::from_column_slice(&fitted.beyond);
+            fitted.information -= &known;
+            let pull = &known * DVector::from_fn(n, |_, _| mean);
+            if let Some(free) = fitted.information.clone().cholesky() {
+                fitted.beyond = free.solve(&(whole - pull)).as_slice().to_vec();
+            }
+        }
+        let fitted = &fitted;
+        let range = assumed.map(|(mean, sd)| (mean - RANGE * sd, (mean + RANGE * sd).min(1.0)));
         // A parameter that was held has no say.
         let open = |i: usize| fitted.information[(i, i)] > 0.0;
         let information =
             DMatrix::from_fn(n, n, |i, j| fitted.information[(i, j)] + if i == j && !open(i) { 1e30 } else { 0.0 });
         let covariance = information.clone().cholesky().map_or_else(|| fitted.covariance.clone(), |c| c.inverse());
-        let ends = (0..n).filter_map(|i| Some((i, bounds(&fitted.names[i])?))).collect();
+        let end = |i: usize| {
+            let own = bounds(&fitted.names[i])?;
+            Some((i, if Some(i) == ratio { range.unwrap_or(own) } else { own }))
+        };
+        let ends = (0..n).filter_map(end).collect();
         Self {
             free: DVector::from_column_slice(&fitted.beyond),
             fitted: DVector::from_column_slice(&fitted.values),

@@ -13,7 +13,7 @@ const SLID_M: f64 = 0.03e-3;
 const SOFTER: f64 = 0.12;
 
 /// Time at the start of a pull that is left out: the response of an arm is of higher order than its model.
-const START_S: f64 = 0.25;
+pub const START_S: f64 = 0.25;
 
 /// The numbers of one trace.
 #[derive(Debug, Clone, PartialEq)]

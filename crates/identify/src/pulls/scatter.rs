@@ -15,9 +15,8 @@ const FREEDOM: f64 = 6.0;
 /// is 1.
 const SCALE: f64 = 0.875_318;
 
-/// What twice a difference of these logarithms is, for normal residuals, over a chi-squared variable: variance of the score over
-/// its mean slope (White 1982).
-const RATIO: f64 = 0.776_814;
+/// Scatter that is a prediction's own.
+const MODEL: f64 = 0.001;
 
 /// Largest scatter that is tried, and the number of values.
 const MOST: f64 = 0.3;
@@ -30,7 +29,7 @@ pub(super) fn scatter(context: &Context<'_>, fitted: &Fitted, rows: &[usize]) ->
     still.scatter = 0.0;
     let noise = context.deviations(&still, rows);
     let n = rows.len() as f64;
-    let parts = fitted.model.mu.len() as f64;
+    let parts = fitted.model.mu.len() as f64 + 1.0;
     let few = n / (n - parts).max(1.0);
     let square = fitted.model.scatter * fitted.model.scatter;
     let each: Vec<(f64, f64, f64)> = fitted
@@ -40,7 +39,8 @@ pub(super) fn scatter(context: &Context<'_>, fitted: &Fitted, rows: &[usize]) ->
         .zip(&noise)
         .map(|((r, sd), noise)| {
             let v = noise * noise;
-            (few * r * r * sd * sd, v, ((sd * sd - v) / square).max(0.0))
+            let b = ((sd * sd - v) / square).max(0.0);
+            (few * r * r * sd * sd, v + b * MODEL * MODEL, b)
         })
         .collect();
     let cost = |scatter: f64| -> f64 {
@@ -58,7 +58,7 @@ pub(super) fn scatter(context: &Context<'_>, fitted: &Fitted, rows: &[usize]) ->
     let best = (0..=VALUES).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
     let memory = fitted.likelihood.memory;
     let stretch = (1.0 + memory) / (1.0 - memory);
-    let critical = costs[best] + RATIO * stretch * t_quantile_95(n - parts).powi(2);
+    let critical = costs[best] + stretch * t_quantile_95(n - parts).powi(2);
     let end = |inside: usize, outside: usize| {
         let share = (critical - costs[inside]) / (costs[outside] - costs[inside]);
         at(inside) + share.clamp(0.0, 1.0) * (at(outside) - at(inside))

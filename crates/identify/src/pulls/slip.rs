@@ -22,8 +22,11 @@ const BEFORE_S: f64 = 0.4;
 /// How far they may differ: a force and a part of it.
 const OFFSET_N: (f64, f64) = (0.03, 0.02);
 
-/// Limits that are tried in a trace.
-const LIMITS: usize = 90;
+/// Limits that are tried in a trace, twice.
+const LIMITS: usize = 100;
+
+/// Squares, in those of the noise, above the least that leave a limit in.
+const LEFT: f64 = 25.0;
 
 /// Steps of the softening contact between two rows.
 const SUBSTEPS: usize = 2;
@@ -148,6 +151,34 @@ pub fn read_slips(traces: &[SlipTrace], rig: SlipRig) -> Option<Slips> {
     Some(Slips { profile, ratio, ratio_sd, limits })
 }
 
+/// How far from the ratio of a model the ratio of a contact is, beside noise.
+const RATIO_SD: f64 = 0.001;
+
+impl Slips {
+    /// 90 % interval of the ratio: the likelihood ratio inverted, with its own shape (it is steep where a drop would have been
+    /// seen, and flat towards 1, where a small drop hides in the noise).
+    pub fn ratio90(&self) -> (f64, f64) {
+        let fine: Vec<(f64, f64)> = self
+            .profile
+            .windows(2)
+            .flat_map(|w| {
+                (0..8).map(move |k| f64::from(k) / 8.0).map(move |s| {
+                    (w[0].0 * (1.0 - s) + w[1].0 * s, w[0].1 * (1.0 - s) + w[1].1 * s)
+                })
+            })
+            .chain(self.profile.last().copied())
+            .collect();
+        let inside = |ratio: f64| {
+            let cost = |(r, c): &(f64, f64)| c + ((ratio - r) / RATIO_SD).powi(2);
+            fine.iter().map(cost).fold(f64::INFINITY, f64::min) <= 2.705_543
+        };
+        let step = 0.000_1;
+        let held: Vec<f64> =
+            (0..8000).map(|i| 1.0 - step * f64::from(i)).filter(|r| inside(*r)).collect();
+        (held.last().copied().unwrap_or(self.ratio), held.first().copied().unwrap_or(self.ratio))
+    }
+}
+
 /// Lowest point of the parabola through the least cost and its neighbours.
 fn vertex(profile: &[(f64, f64)], least: usize) -> f64 {
     if least == 0 || least + 1 >= profile.len() {
@@ -186,27 +217,57 @@ fn sums(trace: &SlipTrace, rig: SlipRig, softness: f64) -> Vec<Sums> {
     let kappa: Vec<f64> =
         (0..=KAPPAS).map(|i| libm::pow(1.0 - i as f64 / KAPPAS as f64, exponent)).collect();
     let mut force = vec![0.0; n];
-    (0..LIMITS)
-        .map(|i| low + (high - low) * i as f64 / (LIMITS - 1) as f64)
-        .map(|limit| {
-            let slip_s = follow(trace, rig, softness, &kappa, limit, &mut force);
-            let mut s = Sums { limit, ..Sums::default() };
-            for j in first..n {
-                let (t, y) = (trace.time_s[j], trace.reading_n[j]);
-                if t < slip_s {
-                    let d = y - force[j];
-                    s.before[0] += 1.0;
-                    s.before[1] += d;
-                    s.before[2] += d * d;
-                } else {
-                    let e = if rig.fall_s > 0.0 { libm::exp((slip_s - t) / rig.fall_s) } else { 0.0 };
-                    let row = [1.0, e, e * e, y, y * e, y * y];
-                    s.after.iter_mut().zip(row).for_each(|(a, b)| *a += b);
-                }
+    let mut tried = |low: f64, high: f64| -> Vec<Sums> {
+        (0..LIMITS)
+            .map(|i| low + (high - low) * i as f64 / (LIMITS - 1) as f64)
+            .map(|limit| {
+                let slip_s = follow(trace, rig, softness, &kappa, limit, &mut force);
+                Sums::of(limit, trace, rig, first..n, slip_s, &force)
+            })
+            .collect()
+    };
+    // Where the force drops by much, one row on the wrong side rules a limit out: the limits that are left are tried more finely.
+    let coarse = tried(low, high);
+    let costs: Vec<f64> = coarse.iter().map(|s| s.free_cost(rig.noise_n)).collect();
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let left = |c: &f64| *c < least + LEFT;
+    let from = costs.iter().position(left).unwrap_or(0).saturating_sub(2);
+    let to = (costs.iter().rposition(left).unwrap_or(LIMITS - 1) + 2).min(LIMITS - 1);
+    tried(coarse[from].limit, coarse[to].limit)
+}
+
+impl Sums {
+    fn of(
+        limit: f64,
+        trace: &SlipTrace,
+        rig: SlipRig,
+        rows: std::ops::Range<usize>,
+        slip_s: f64,
+        force: &[f64],
+    ) -> Self {
+        let mut s = Self { limit, ..Self::default() };
+        for j in rows {
+            let (t, y) = (trace.time_s[j], trace.reading_n[j]);
+            if t < slip_s {
+                let d = y - force[j];
+                s.before[0] += 1.0;
+                s.before[1] += d;
+                s.before[2] += d * d;
+            } else {
+                let e = if rig.fall_s > 0.0 { libm::exp((slip_s - t) / rig.fall_s) } else { 0.0 };
+                let row = [1.0, e, e * e, y, y * e, y * y];
+                s.after.iter_mut().zip(row).for_each(|(a, b)| *a += b);
             }
-            s
-        })
-        .collect()
+        }
+        s
+    }
+
+    /// Squares about the mean before and about the mean after, in those of the noise: whatever the kinetic ratio is.
+    fn free_cost(&self, noise_n: f64) -> f64 {
+        let about = |n: f64, sum: f64, squares: f64| squares - sum * sum / n.max(1.0);
+        let [n, _, _, y, _, yy] = self.after;
+        (about(self.before[0], self.before[1], self.before[2]) + about(n, y, yy)) / (noise_n * noise_n)
+    }
 }
 
 /// The force of a contact with this limit at every row, until it slips; when that is.
