@@ -92,7 +92,6 @@ fn world(line: &Line, index: u64) -> World {
 struct Tally {
     errors: Vec<f64>,
     widths: Vec<f64>,
-    deviations: Vec<f64>,
     held: usize,
     below: usize,
 }
@@ -160,7 +159,6 @@ fn main() {
             let unit = if name == "mu" || name == "a" { truth } else { 1.0 };
             t.errors.push((p.value - truth) / unit);
             t.widths.push((p.high90 - p.low90) / unit);
-            t.deviations.push((p.value - truth) / ((p.high90 - p.low90) / 3.29).max(1e-12));
             let slack = 1e-9;
             t.held += usize::from(p.low90 <= truth + slack && truth <= p.high90 + slack);
             t.below += usize::from(p.high90 < truth - slack);

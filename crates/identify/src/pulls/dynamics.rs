@@ -8,7 +8,7 @@ use crate::least_squares::{FitOptions, FreeParameter, fit};
 use nalgebra::{DMatrix, DVector};
 
 /// Share of the limit up to which the gels are taken for springs.
-const STIFF: f64 = 0.6;
+const STIFF: f64 = 0.4;
 
 /// Standard deviation of the damping over the stiffness, as traces show both.
 const RELAXATION: f64 = 0.05;
@@ -38,11 +38,10 @@ impl Context<'_> {
             })
             .filter(|(_, times, _): &(_, Vec<f64>, _)| times.len() >= 5)
             .collect();
-        if rows.len() < FEWEST {
+        // How fast jaws slide says nothing about the damping of a loop that winds up, nor then readings about its lag.
+        if rows.len() < FEWEST || self.predictor.winds_up() {
             return None;
         }
-        // How fast jaws slide says nothing about the damping of a loop that winds up.
-        let (relaxation, most) = if self.predictor.winds_up() { (1.0, 10.0) } else { (RELAXATION, 2.0) };
         let asked: Vec<(usize, &[f64])> = rows.iter().map(|(row, times, _)| (*row, times.as_slice())).collect();
         let free = |name: &str, start: f64, bounds: (f64, f64), scale: f64| FreeParameter {
             name: name.into(),
@@ -51,9 +50,10 @@ impl Context<'_> {
             scale,
         };
         let parameters = [
-            free("lag_s", self.base.lag_s, (0.0, 1.0), 0.02),
+            // A lag below the time of a reading hardly acts: slopes are taken over that time.
+            free("lag_s", self.base.lag_s, (0.0, 1.0), 0.2),
             free("dead_time_s", self.base.dead_time_s, (0.0, 0.5), 0.4),
-            free("relaxation", 1.0, (1.0 / most, most), 0.1),
+            free("relaxation", 1.0, (0.5, 2.0), 0.1),
         ];
         let model_of = |v: &[f64]| PullModel {
             lag_s: v[0],
@@ -64,7 +64,7 @@ impl Context<'_> {
         let noise_n = self.base.noise_n;
         let residuals = |v: &[f64]| {
             let predicted = self.predictor.traces(&model_of(v), &asked);
-            let mut r = vec![libm::log(v[2]) / relaxation];
+            let mut r = vec![libm::log(v[2]) / RELAXATION];
             for ((_, _, readings), p) in rows.iter().zip(&predicted) {
                 r.extend(readings.iter().zip(&p.stuck_n).map(|(a, b)| (a - b) / noise_n));
             }

@@ -41,32 +41,32 @@ impl NormalFit {
     /// with its standard deviation.
     pub fn new(fitted: &Fitted, pulls: usize, parts: usize, assumed: Option<(f64, f64)>) -> Self {
         let n = fitted.values.len();
-        let mut fitted = fitted.clone();
         let ratio = fitted.names.iter().position(|name| name == "kinetic_ratio");
-        if let (Some((mean, sd)), Some(ratio)) = (assumed, ratio) {
-            // What is assumed is no measurement: it is a range, in which no value is better than another.
-            let known = DMatrix::from_fn(n, n, |i, j| if i == j && i == ratio { sd.powi(-2) - WIDE.powi(-2) } else { 0.0 });
-            let whole = &fitted.information * DVector::from_column_slice(&fitted.beyond);
-            fitted.information -= &known;
-            let pull = &known * DVector::from_fn(n, |_, _| mean);
-            if let Some(free) = fitted.information.clone().cholesky() {
-                fitted.beyond = free.solve(&(whole - pull)).as_slice().to_vec();
+        let mut known = fitted.information.clone();
+        // A parameter that was held has no say.
+        for i in (0..n).filter(|&i| fitted.information[(i, i)] <= 0.0) {
+            known[(i, i)] = 1e30;
+        }
+        let mut free = fitted.beyond.clone();
+        if let (Some(_), Some(ratio)) = (assumed, ratio) {
+            // What is assumed is no measurement but a range, in which no value is better than another; and what labels say of the
+            // ratio beside its product with mu hangs on their branch, which is no matter of slopes.
+            let others = known.clone().remove_row(ratio).remove_column(ratio);
+            let cross = known.column(ratio).clone_owned().remove_row(ratio);
+            if let Some(others) = others.cholesky() {
+                known[(ratio, ratio)] = cross.dot(&others.solve(&cross)) + WIDE.powi(-2);
+                free.clone_from(&fitted.values);
             }
         }
-        let fitted = &fitted;
         let range = assumed.map(|(mean, sd)| (mean - RANGE * sd, (mean + RANGE * sd).min(1.0)));
-        // A parameter that was held has no say.
-        let open = |i: usize| fitted.information[(i, i)] > 0.0;
-        let information =
-            DMatrix::from_fn(n, n, |i, j| fitted.information[(i, j)] + if i == j && !open(i) { 1e30 } else { 0.0 });
-        let covariance = information.clone().cholesky().map_or_else(|| fitted.covariance.clone(), |c| c.inverse());
+        let covariance = known.cholesky().map_or_else(|| fitted.covariance.clone(), |c| c.inverse());
         let end = |i: usize| {
             let own = bounds(&fitted.names[i])?;
             Some((i, if Some(i) == ratio { range.unwrap_or(own) } else { own }))
         };
         let ends = (0..n).filter_map(end).collect();
         Self {
-            free: DVector::from_column_slice(&fitted.beyond),
+            free: DVector::from_vec(free),
             fitted: DVector::from_column_slice(&fitted.values),
             covariance,
             ends,

@@ -154,3 +154,28 @@ fn slip_row(rows: &[(f64, f64)], noise_n: f64) -> Option<usize> {
     // The rows just before the threshold belong to the slide already.
     Some(first.saturating_sub(1).max(1))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draws::Draws;
+
+    /// A sphere on a soft gel (Mindlin 1949) moves by half as much again before it slips, at 1.6 s: the displacement leaves that
+    /// of the gels half a second earlier, the force follows until then.
+    #[test]
+    fn a_contact_that_bends_has_not_slipped() {
+        let mut draws = Draws::new(2, 0);
+        let rows: Vec<(f64, f64, f64)> = (0..200)
+            .map(|i| {
+                let t = 0.01 * f64::from(i);
+                let force = 8.0 * t.min(1.6);
+                let sheared = 1.5 * (1.0 - (1.0 - force / 12.8).powf(2.0 / 3.0)) * 12.8 / 20e3;
+                (t, force + 0.1 * draws.normal(), sheared + 0.02 * (t - 1.6).max(0.0))
+            })
+            .collect();
+        let by_displacement = slip_row(&rows.iter().map(|r| (r.1, r.2)).collect::<Vec<_>>(), 0.1).unwrap();
+        assert!(rows[by_displacement].0 < 1.4, "what the force is for: {by_displacement}");
+        let by_force = force_levels(&rows.iter().map(|r| (r.0, r.1)).collect::<Vec<_>>()).unwrap();
+        assert!((rows[by_force].0 - 1.6).abs() < 0.04, "{by_force}");
+    }
+}

@@ -15,8 +15,8 @@ const FREEDOM: f64 = 6.0;
 /// is 1.
 const SCALE: f64 = 0.875_318;
 
-/// Scatter that is a prediction's own.
-const MODEL: f64 = 0.001;
+/// Scatter that is a prediction's own: of a slip in a trace, and of a label.
+const MODEL: (f64, f64) = (0.001, 0.003);
 
 /// Largest scatter that is tried, and the number of values.
 const MOST: f64 = 0.3;
@@ -37,10 +37,12 @@ pub(super) fn scatter(context: &Context<'_>, fitted: &Fitted, rows: &[usize]) ->
         .iter()
         .zip(&sd)
         .zip(&noise)
-        .map(|((r, sd), noise)| {
+        .zip(rows)
+        .map(|(((r, sd), noise), &row)| {
+            let own = if context.observed[row].is_some() { MODEL.0 } else { MODEL.1 };
             let v = noise * noise;
             let b = ((sd * sd - v) / square).max(0.0);
-            (few * r * r * sd * sd, v + b * MODEL * MODEL, b)
+            (few * r * r * sd * sd, v + b * own * own, b)
         })
         .collect();
     let cost = |scatter: f64| -> f64 {
