@@ -145,10 +145,17 @@ fn main() {
                 println!("{index} {world:?}");
                 for (name, truth, p) in &rows {
                     let hit = if p.low90 <= *truth && *truth <= p.high90 { "" } else { "MISS" };
-                    println!("   {name} {truth:.5} est {:.5} [{:.5}, {:.5}] {hit}", p.value, p.low90, p.high90);
+                    println!(
+                        "   {name} {truth:.5} est {:.5} [{:.5}, {:.5}] {hit}",
+                        p.value, p.low90, p.high90
+                    );
                 }
-                println!("   k {:?} d {:?} T {:?}",
-                    fit.fitted.model.stiffness_n_per_m, fit.fitted.model.damping_n_s_per_m, fit.fitted.model.dead_time_s);
+                println!(
+                    "   k {:?} d {:?} T {:?}",
+                    fit.fitted.model.stiffness_n_per_m,
+                    fit.fitted.model.damping_n_s_per_m,
+                    fit.fitted.model.dead_time_s
+                );
             }
             found.lock().unwrap().insert(index, rows);
         });

@@ -141,7 +141,8 @@ pub fn calibrate_pulls(
     let held = predicted(&context, &fitted, &folds(data.len()), false);
     let forces = || measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces().fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
-    let laws = if request.offset_law { laws(&context, &fitted, &normal, &terms, given, range) } else { vec![] };
+    let laws =
+        if request.offset_law { laws(&context, &fitted, &normal, &terms, given, range) } else { vec![] };
     let effects = terms
         .effects
         .iter()
@@ -149,7 +150,14 @@ pub fn calibrate_pulls(
         .map(|(c, _)| (c.spec.id.to_string(), parameters(&fitted, c)))
         .collect();
     Ok(PullCalibration {
-        baseline: intervals(baseline(&fitted, &context), &fitted, &normal, context.slips.as_ref(), dynamics, scattered),
+        baseline: intervals(
+            baseline(&fitted, &context),
+            &fitted,
+            &normal,
+            context.slips.as_ref(),
+            dynamics,
+            scattered,
+        ),
         effects,
         laws,
         error: errors(&data.label_n, &held, &held, &data.group_of, &rows).map(|pair| pair.after),

@@ -26,6 +26,9 @@ const MISREAD_N: f64 = 0.05;
 /// prediction lacks.
 const CLOSED_LOOP: f64 = 5.0;
 
+/// Time before the slip whose readings do not set the scale of the tool that holds: the rim may slip.
+const UNSCALED_S: f64 = 0.15;
+
 /// Readings of a trace that are looked at before the slip.
 const READINGS: usize = 36;
 
@@ -236,8 +239,7 @@ impl<'a> Context<'a> {
     /// Limits and kinetic ratio of the traces that slipped.
     pub(super) fn read_slips(&mut self) {
         let seen = self.observations.iter().enumerate();
-        let slipped: Vec<(usize, f64, SlipTrace)> =
-            seen.filter_map(|(k, o)| self.slip_trace(k, o)).collect();
+        let slipped: Vec<(usize, f64, SlipTrace)> = seen.filter_map(|(k, o)| self.slip_trace(k, o)).collect();
         let rig = SlipRig {
             noise_n: self.base.noise_n,
             relaxation_s: self.base.damping_n_s_per_m / self.base.stiffness_n_per_m,
@@ -264,8 +266,18 @@ impl<'a> Context<'a> {
         let pulled = rows.rows().filter(|r| r.time_s >= 0.0);
         let (time_s, reading_n): (Vec<f64>, Vec<f64>) =
             pulled.map(|r| (r.time_s, r.measured_force_n - no_load_n)).unzip();
-        let stuck_n = self.predictor.trace(&self.base, trace.row, &time_s).stuck_n;
+        let mut stuck_n = self.predictor.trace(&self.base, trace.row, &time_s).stuck_n;
         let enough = time_s.len() >= 16 && stuck_n.len() == time_s.len();
+        // A sensor or a loop whose scale nobody has named yet is no slip: the tool that holds reads what this one did.
+        let held = time_s.partition_point(|t| *t < slip_s - UNSCALED_S);
+        let (by, of) = stuck_n[..held.min(stuck_n.len())]
+            .iter()
+            .zip(&reading_n)
+            .fold((0.0, 0.0), |(by, of), (s, r)| (by + s * r, of + s * s));
+        if held >= 16 && of > 0.0 {
+            let scale = (by / of).clamp(0.3, 3.0);
+            stuck_n.iter_mut().for_each(|s| *s *= scale);
+        }
         enough.then_some((k, no_load_n, SlipTrace { time_s, reading_n, stuck_n, slip_s }))
     }
 

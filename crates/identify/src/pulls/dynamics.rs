@@ -42,7 +42,8 @@ impl Context<'_> {
         if rows.len() < FEWEST || self.predictor.winds_up() {
             return None;
         }
-        let asked: Vec<(usize, &[f64])> = rows.iter().map(|(row, times, _)| (*row, times.as_slice())).collect();
+        let asked: Vec<(usize, &[f64])> =
+            rows.iter().map(|(row, times, _)| (*row, times.as_slice())).collect();
         let free = |name: &str, start: f64, bounds: (f64, f64), scale: f64| FreeParameter {
             name: name.into(),
             start,

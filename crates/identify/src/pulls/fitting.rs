@@ -317,7 +317,13 @@ const LOCATION: f64 = 1.394;
 
 /// What a fit says of its parameters, from its weighted slopes: those of the pulls first, with their weights taken out
 /// again, then everything else.
-fn information(slopes: &DMatrix<f64>, weights: &[f64], scale: f64, stretch: f64, parts: usize) -> DMatrix<f64> {
+fn information(
+    slopes: &DMatrix<f64>,
+    weights: &[f64],
+    scale: f64,
+    stretch: f64,
+    parts: usize,
+) -> DMatrix<f64> {
     let n = weights.len();
     let few = n as f64 / n.saturating_sub(parts).max(1) as f64;
     let variance = LOCATION * scale * scale * few * stretch;

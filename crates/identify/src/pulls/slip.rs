@@ -103,9 +103,8 @@ pub fn read_slips(traces: &[SlipTrace], rig: SlipRig) -> Option<Slips> {
     let softness = if rig.relaxation_s < 0.004 { &SOFTNESS[..1] } else { &SOFTNESS[..] };
     let sums: Vec<Vec<Vec<Sums>>> =
         softness.iter().map(|&q| traces.iter().map(|t| sums(t, rig, q)).collect()).collect();
-    let cost = |q: usize, ratio: f64| -> f64 {
-        sums[q].iter().map(|s| evidence(s, ratio, rig.noise_n).0).sum()
-    };
+    let cost =
+        |q: usize, ratio: f64| -> f64 { sums[q].iter().map(|s| evidence(s, ratio, rig.noise_n).0).sum() };
     let best_of = |ratios: &[f64]| {
         let mut best = (f64::INFINITY, 0, 1.0);
         for q in 0..softness.len() {
@@ -118,7 +117,8 @@ pub fn read_slips(traces: &[SlipTrace], rig: SlipRig) -> Option<Slips> {
         }
         best
     };
-    let coarse: Vec<f64> = (0..=28).map(|i| 1.0 - 0.0125 * f64::from(i)).chain([0.6, 0.5, 0.4, 0.3]).collect();
+    let coarse: Vec<f64> =
+        (0..=28).map(|i| 1.0 - 0.0125 * f64::from(i)).chain([0.6, 0.5, 0.4, 0.3]).collect();
     let (_, q, near) = best_of(&coarse);
     let step = if near < 0.65 { 0.01 } else { 0.001 };
     let fine: Vec<f64> =
@@ -162,9 +162,9 @@ impl Slips {
             .profile
             .windows(2)
             .flat_map(|w| {
-                (0..8).map(move |k| f64::from(k) / 8.0).map(move |s| {
-                    (w[0].0 * (1.0 - s) + w[1].0 * s, w[0].1 * (1.0 - s) + w[1].1 * s)
-                })
+                (0..8)
+                    .map(move |k| f64::from(k) / 8.0)
+                    .map(move |s| (w[0].0 * (1.0 - s) + w[1].0 * s, w[0].1 * (1.0 - s) + w[1].1 * s))
             })
             .chain(self.profile.last().copied())
             .collect();
@@ -173,8 +173,7 @@ impl Slips {
             fine.iter().map(cost).fold(f64::INFINITY, f64::min) <= 2.705_543
         };
         let step = 0.000_1;
-        let held: Vec<f64> =
-            (0..8000).map(|i| 1.0 - step * f64::from(i)).filter(|r| inside(*r)).collect();
+        let held: Vec<f64> = (0..8000).map(|i| 1.0 - step * f64::from(i)).filter(|r| inside(*r)).collect();
         (held.last().copied().unwrap_or(self.ratio), held.first().copied().unwrap_or(self.ratio))
     }
 }
@@ -208,14 +207,10 @@ fn sums(trace: &SlipTrace, rig: SlipRig, softness: f64) -> Vec<Sums> {
     let first = trace.time_s.partition_point(|t| *t < trace.slip_s - BEFORE_S);
     let slid = trace.time_s.partition_point(|t| *t < trace.slip_s).clamp(1, n - 1);
     let level = mean(&trace.reading_n[slid.min(n - 2)..]);
-    let highest = trace.reading_n[first..(slid + 8).min(n)]
-        .windows(3)
-        .map(mean)
-        .fold(level, f64::max);
+    let highest = trace.reading_n[first..(slid + 8).min(n)].windows(3).map(mean).fold(level, f64::max);
     let (low, high) = ((level - 4.0 * rig.noise_n).max(0.02), highest + 2.0 * rig.noise_n + 0.02 * highest);
     let exponent = softness / (softness + 1.0);
-    let kappa: Vec<f64> =
-        (0..=KAPPAS).map(|i| libm::pow(1.0 - i as f64 / KAPPAS as f64, exponent)).collect();
+    let kappa: Vec<f64> = (0..=KAPPAS).map(|i| libm::pow(1.0 - i as f64 / KAPPAS as f64, exponent)).collect();
     let mut force = vec![0.0; n];
     let mut tried = |low: f64, high: f64| -> Vec<Sums> {
         (0..LIMITS)
@@ -271,7 +266,14 @@ impl Sums {
 }
 
 /// The force of a contact with this limit at every row, until it slips; when that is.
-fn follow(trace: &SlipTrace, rig: SlipRig, softness: f64, kappa: &[f64], limit: f64, force: &mut [f64]) -> f64 {
+fn follow(
+    trace: &SlipTrace,
+    rig: SlipRig,
+    softness: f64,
+    kappa: &[f64],
+    limit: f64,
+    force: &mut [f64],
+) -> f64 {
     let (time, stuck) = (&trace.time_s, &trace.stuck_n);
     let mut f = stuck[0].min(limit);
     force[0] = f;
