@@ -21,7 +21,7 @@ pub struct NormalFit {
 }
 
 /// Standard deviations of what is assumed of the kinetic ratio that its range has to either side: nine of ten values are inside.
-const RANGE: f64 = 1.4;
+const RANGE: f64 = 1.3;
 
 /// Standard deviation of a kinetic ratio of which nothing is known.
 const WIDE: f64 = 0.5;

@@ -78,6 +78,8 @@ pub struct Slips {
     pub ratio: f64,
     /// Its standard deviation, from what likelihoods of ratios differ by.
     pub ratio_sd: f64,
+    /// How far contacts of this kind are from their model.
+    pub model_sd: f64,
     /// Limit of each trace, less its reading without load.
     pub limits: Vec<SlipLimit>,
 }
@@ -148,11 +150,13 @@ pub fn read_slips(traces: &[SlipTrace], rig: SlipRig) -> Option<Slips> {
             SlipLimit { value_n: here.1, sd_n: here.2.sqrt(), slope_n: (b.1 - a.1) / (high - low).max(1e-6) }
         })
         .collect();
-    Some(Slips { profile, ratio, ratio_sd, limits })
+    let model_sd = if softness[q] > 0.0 { RATIO_SD.1 } else { RATIO_SD.0 };
+    Some(Slips { profile, ratio, ratio_sd, model_sd, limits })
 }
 
-/// How far from the ratio of a model the ratio of a contact is, beside noise.
-const RATIO_SD: f64 = 0.0008;
+/// How far from the ratio of a model the ratio of a contact is, beside noise: of one that gives way all at once, and of one that
+/// softens, whose shape is known less well.
+const RATIO_SD: (f64, f64) = (0.0005, 0.003);
 
 impl Slips {
     /// 90 % interval of the ratio: the likelihood ratio inverted, with its own shape (it is steep where a drop would have been
@@ -169,7 +173,7 @@ impl Slips {
             .chain(self.profile.last().copied())
             .collect();
         let inside = |ratio: f64| {
-            let cost = |(r, c): &(f64, f64)| c + ((ratio - r) / RATIO_SD).powi(2);
+            let cost = |(r, c): &(f64, f64)| c + ((ratio - r) / self.model_sd).powi(2);
             fine.iter().map(cost).fold(f64::INFINITY, f64::min) <= 2.705_543
         };
         let step = 0.000_1;
