@@ -27,6 +27,8 @@ mod elastic;
 // Images by a graphics processor are those of the processor, within the tolerance.
 mod gpu;
 mod imprint;
+// Intervals of calibrations, against a lab of its own.
+mod intervals;
 // What the large set can teach.
 mod large;
 // Measured pulls from every place they may be in.

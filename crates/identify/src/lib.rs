@@ -4,6 +4,7 @@
 //! parameters, and returns fitted values with intervals, and a [`Diagnosis`]: what the model lacks, what cannot be told
 //! apart, and what to measure next. `docs/diagnosis.md` describes the method.
 
+mod bounded;
 mod campaign;
 mod diagnosis;
 mod draws;

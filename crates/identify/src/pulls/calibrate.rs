@@ -4,13 +4,23 @@ use super::answer::{baseline, insufficient, parameters};
 use super::candidates::{Candidate, candidate};
 use super::context::Context;
 use super::data::PullData;
+use super::dynamics::Dynamics;
 use super::fitting::{Fitted, Terms};
 use super::heldout::{errors, folds, predicted};
+use super::intervals::NormalFit;
 use super::model::{PredictPulls, PullModel};
+use super::scatter::scatter;
+use super::slip::Slips;
 use crate::diagnosis::{HeldOutError, ParameterEstimate};
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::effects::find;
 use std::collections::BTreeMap;
+
+/// Least scatter with which a fit weighs residuals.
+const LEAST_SCATTER: f64 = 0.002;
+
+/// a, b, their covariance, and their intervals.
+type Law = (f64, f64, [f64; 3], [(f64, f64); 2]);
 
 /// What a calibration fits beside the baseline.
 #[derive(Debug, Clone, Default)]
@@ -119,12 +129,23 @@ pub fn calibrate_pulls(
     let mut context = Context::new(&data, predictor, given);
     let rows: Vec<usize> = (0..data.len()).collect();
     context.learn_lag(&rows);
-    let found = context.fit(&context.base, &terms, &rows).ok_or(CalibrateError::NoFit)?;
-    let (context, fitted) = context.stated(&found);
-    let held = predicted(&context, &fitted, &folds(data.len()), false);
+    let dynamics = context.settle_dynamics();
+    // Without traces lag and dead time stay free, so that mu knows what they are not known to.
+    context.free_lag = context.observations.is_empty();
+    let first = context.fit(&context.base, &terms, &rows).ok_or(CalibrateError::NoFit)?;
+    let start = PullModel { scatter: scatter(&context, &first, &rows).0.max(LEAST_SCATTER), ..first.model };
+    context.correct_at(&start);
+    let found = context.fit(&start, &first.terms, &rows).ok_or(CalibrateError::NoFit)?;
+    let scattered = scatter(&context, &found, &rows);
+    context.free_lag = false;
+    let normal = NormalFit::new(&found, data.len(), data.parts.len(), context.assumed_ratio());
+    // What is stated and written has no nuisance; how well it is known is that of the fit with it.
+    let (stated, fitted) = context.stated(&found);
+    let held = predicted(&stated, &fitted, &folds(data.len()), false);
     let forces = || measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces().fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
-    let laws = if request.offset_law { laws(&context, &fitted, &terms, given, range) } else { vec![] };
+    let laws =
+        if request.offset_law { laws(&context, &found, &normal, &terms, given, range) } else { vec![] };
     let effects = terms
         .effects
         .iter()
@@ -132,7 +153,14 @@ pub fn calibrate_pulls(
         .map(|(c, _)| (c.spec.id.to_string(), parameters(&fitted, c)))
         .collect();
     Ok(PullCalibration {
-        baseline: baseline(&fitted, &context),
+        baseline: intervals(
+            baseline(&fitted, &stated),
+            &found,
+            &normal,
+            context.slips.as_ref(),
+            dynamics,
+            scattered,
+        ),
         effects,
         laws,
         error: errors(&data.label_n, &held, &held, &data.group_of, &rows).map(|pair| pair.after),
@@ -141,10 +169,42 @@ pub fn calibrate_pulls(
     })
 }
 
+/// The baseline with its intervals.
+fn intervals(
+    mut baseline: BTreeMap<String, ParameterEstimate>,
+    fitted: &Fitted,
+    normal: &NormalFit,
+    slips: Option<&Slips>,
+    dynamics: Option<Dynamics>,
+    scattered: (f64, f64, f64),
+) -> BTreeMap<String, ParameterEstimate> {
+    for (k, name) in fitted.names.iter().enumerate() {
+        if let Some(estimate) = baseline.get_mut(name) {
+            let (low, high) = normal.of_parameter(k);
+            // About the value that is stated.
+            let moved = estimate.value - fitted.values[k];
+            (estimate.low90, estimate.high90) = (low + moved, high + moved);
+        }
+    }
+    if let (Some(slips), Some(estimate)) = (slips, baseline.get_mut("kinetic_ratio")) {
+        let (low, high) = slips.ratio90();
+        // The fit may have moved the value a little.
+        (estimate.low90, estimate.high90) = (low.min(estimate.value), high.max(estimate.value));
+    }
+    let known = dynamics.into_iter().flatten().zip(["robot.lag_s", "robot.dead_time_s"]);
+    for ((value, low, high), name) in known.chain([(scattered, "scatter")]) {
+        if let Some(estimate) = baseline.get_mut(name) {
+            (estimate.value, estimate.low90, estimate.high90) = (value, low, high);
+        }
+    }
+    baseline
+}
+
 /// From (mu', b') of a fit with the coefficient mu' (1 + b' / F) to (a, b) of mu (a + b / F).
 fn laws(
     context: &Context<'_>,
     fitted: &Fitted,
+    normal: &NormalFit,
     terms: &Terms,
     given: &PullModel,
     range: (f64, f64),
@@ -157,22 +217,30 @@ fn laws(
         .filter(|&i| three.contains(&context.data.measured.pulls[i].grip_force_n))
         .collect();
     let few = if levels.len() > 3 { context.fit(&fitted.model, terms, &rows) } else { None };
-    let of = |fitted: &Fitted, part: usize| {
+    let few = few.map(|few| {
+        let normal = NormalFit::new(&few, rows.len(), 2 * context.data.parts.len(), context.assumed_ratio());
+        (few, normal)
+    });
+    let of = |fitted: &Fitted, normal: &NormalFit, part: usize| {
         let name = &context.data.parts[part];
         let at = |wanted: &str| fitted.names.iter().position(|n| n == wanted);
         let (m, b) = (at(&format!("parts.{name}.mu"))?, at(&format!("load_offset@{name}.b_n"))?);
         let (mu, b_n) = (fitted.values[m], fitted.values[b]);
         let mu_given = given.mu[part];
         // a = mu' / mu, b = mu' b' / mu.
-        let (a, law_b) = (mu / mu_given, mu * b_n / mu_given);
-        let c = |i, j| fitted.covariance[(i, j)];
-        let square = mu_given * mu_given;
-        let aa = c(m, m) / square;
-        let ab = (b_n * c(m, m) + mu * c(m, b)) / square;
-        let bb = (b_n * b_n * c(m, m) + 2.0 * b_n * mu * c(m, b) + mu * mu * c(b, b)) / square;
-        Some((a, law_b, [aa, ab, bb]))
+        let mut slopes = [vec![0.0; fitted.values.len()], vec![0.0; fitted.values.len()]];
+        slopes[0][m] = 1.0 / mu_given;
+        (slopes[1][m], slopes[1][b]) = (b_n / mu_given, mu / mu_given);
+        let both = [(mu / mu_given, &slopes[0]), (mu * b_n / mu_given, &slopes[1])];
+        let shared = |i: usize, j: usize| {
+            let (u, v) = (&slopes[i], &slopes[j]);
+            let c = normal.covariance();
+            [m, b].iter().flat_map(|&p| [m, b].map(|q| u[p] * v[q] * c[(p, q)])).sum::<f64>()
+        };
+        let ends = both.map(|(value, slope)| normal.of(value, slope));
+        Some((both[0].0, both[1].0, [shared(0, 0), shared(0, 1), shared(1, 1)], ends))
     };
-    let largest = |(a, b, [aa, ab, bb]): (f64, f64, [f64; 3])| {
+    let largest = |(a, b, [aa, ab, bb], _): Law| {
         (0..=40)
             .map(|k| range.0 + (range.1 - range.0) * f64::from(k) / 40.0)
             .map(|f| (aa + 2.0 * ab / f + bb / (f * f)).max(0.0).sqrt() / (a + b / f).abs().max(1e-9))
@@ -180,19 +248,21 @@ fn laws(
     };
     (0..context.data.parts.len())
         .filter_map(|part| {
-            let law = of(fitted, part)?;
-            let (a, b, covariance) = law;
-            let estimate = |value: f64, variance: f64, unit: &str| {
-                let half = 1.645 * variance.max(0.0).sqrt();
-                ParameterEstimate { value, low90: value - half, high90: value + half, unit: unit.into() }
+            let law = of(fitted, normal, part)?;
+            let (a, b, covariance, ends) = law;
+            let estimate = |value: f64, (low90, high90): (f64, f64), unit: &str| ParameterEstimate {
+                value,
+                low90,
+                high90,
+                unit: unit.into(),
             };
             Some(OffsetLaw {
                 part: context.data.parts[part].clone(),
-                a: estimate(a, covariance[0], "1"),
-                b_n: estimate(b, covariance[2], "N"),
+                a: estimate(a, ends[0], "1"),
+                b_n: estimate(b, ends[1], "N"),
                 covariance,
                 largest_relative_sigma: largest(law),
-                of_three_levels: few.as_ref().and_then(|few| of(few, part)).map(largest),
+                of_three_levels: few.as_ref().and_then(|(few, normal)| of(few, normal, part)).map(largest),
             })
         })
         .collect()

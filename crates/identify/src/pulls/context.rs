@@ -4,6 +4,7 @@ use super::data::PullData;
 use super::fitting::{Fitted, Terms};
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, noise_n, observe};
+use super::slip::{SlipLimit, SlipRig, SlipTrace, Slips, read_slips};
 use super::trace_residuals::TraceResiduals;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 
@@ -24,6 +25,9 @@ const MISREAD_N: f64 = 0.05;
 /// By how much more both differ where the loop closes on its sensor: it then answers with the arm's inertia, which the fast
 /// prediction lacks.
 const CLOSED_LOOP: f64 = 5.0;
+
+/// Time before the slip whose readings do not set the scale of the tool that holds: the rim may slip.
+const UNSCALED_S: f64 = 0.15;
 
 /// Readings of a trace that are looked at before the slip.
 const READINGS: usize = 36;
@@ -46,8 +50,10 @@ pub struct Observation {
     pub each: usize,
     /// Level of force of each.
     pub levels: Vec<usize>,
-    /// Reading at which the jaws slipped.
-    pub limit_n: Option<f64>,
+    /// Where the force stops to follow, roughly.
+    pub slip_s: Option<f64>,
+    /// Reading at which the jaws slipped, given the kinetic ratio of the context.
+    pub limit_n: Option<SlipLimit>,
     /// Mean reading while the jaws slid and the number of readings.
     pub slid_n: Option<(f64, usize)>,
 }
@@ -63,8 +69,10 @@ pub struct Context<'a> {
     pub observations: Vec<Observation>,
     /// Observation of each pull.
     pub observed: Vec<Option<usize>>,
-    /// Ratio of sliding to slipping readings over all traces, and its standard error.
+    /// Ratio of sliding to slipping forces over all traces, and its standard error.
     pub kinetic: Option<(f64, f64)>,
+    /// What the slips of all traces say.
+    pub slips: Option<Slips>,
     /// The baseline as the traces see it.
     pub base: PullModel,
     /// Lag and dead time of the twin that was given, for campaigns without traces.
@@ -99,6 +107,7 @@ impl<'a> Context<'a> {
             observations: vec![],
             observed: vec![None; data.len()],
             kinetic: None,
+            slips: None,
             given: (given.lag_s, given.dead_time_s, given.kinetic_ratio),
             base,
             free_lag: false,
@@ -167,23 +176,6 @@ impl<'a> Context<'a> {
             self.observed[trace.row] = Some(self.observations.len());
             self.observations.push(observation);
         }
-        let mut ratios: Vec<f64> = self
-            .observations
-            .iter()
-            .filter_map(|o| {
-                let bias = o.no_load_n.map_or(0.0, |b| b.0);
-                let (limit, slid) = (o.limit_n? - bias, o.slid_n?.0 - bias);
-                (limit > 8.0 * self.base.noise_n).then(|| slid / limit)
-            })
-            .collect();
-        ratios.sort_by(f64::total_cmp);
-        if ratios.len() >= 3 {
-            let n = ratios.len();
-            let median = ratios[n / 2];
-            let spread = 0.741 * (ratios[(3 * n) / 4] - ratios[n / 4]);
-            self.kinetic = Some((median, 1.2533 * spread / (n as f64).sqrt() + 0.003));
-            self.base.kinetic_ratio = median.clamp(0.3, 1.0);
-        }
         // Lag and dead time once more, now against what effects on the readings will be judged by.
         let rows: Vec<usize> = (0..self.data.len()).collect();
         let mut best = (f64::INFINITY, self.base.lag_s, self.base.dead_time_s);
@@ -207,6 +199,7 @@ impl<'a> Context<'a> {
             }
         }
         (self.base.lag_s, self.base.dead_time_s) = (best.1, best.2);
+        self.read_slips();
         self.baseline_trace_cost = self.trace_residuals(&self.base, &rows).cost();
     }
 
@@ -251,9 +244,11 @@ impl<'a> Context<'a> {
     /// Force per speed of the sliding jaws: displacement after the slip against the force that nobody holds.
     fn damping(&self, raw: &[TraceObservation]) -> Option<f64> {
         let mut each = Vec::new();
+        let rigid = PullModel { stiffness_n_per_m: 1e9, ..self.base.clone() };
         for trace in raw.iter().filter(|t| t.slid_rows.len() >= 5) {
             let times: Vec<f64> = trace.slid_rows.iter().map(|r| r.0).collect();
-            let applied = self.predictor.trace(&self.base, trace.row, &times).stuck_n;
+            // The force of the loop itself: that on a tool of a contact that does not yield.
+            let applied = self.predictor.trace(&rigid, trace.row, &times).stuck_n;
             let held = trace.slid_n?.0;
             let mut impulse = 0.0;
             for k in 1..times.len() {
@@ -268,6 +263,51 @@ impl<'a> Context<'a> {
         (each.len() >= 3).then(|| each[each.len() / 2].clamp(10.0, 2e4))
     }
 
+    /// Limits and kinetic ratio of the traces that slipped.
+    pub(super) fn read_slips(&mut self) {
+        let seen = self.observations.iter().enumerate();
+        let slipped: Vec<(usize, f64, SlipTrace)> = seen.filter_map(|(k, o)| self.slip_trace(k, o)).collect();
+        let rig = SlipRig {
+            noise_n: self.base.noise_n,
+            relaxation_s: self.base.damping_n_s_per_m / self.base.stiffness_n_per_m,
+            fall_s: self.base.fall_s,
+        };
+        let traces: Vec<SlipTrace> = slipped.iter().map(|(_, _, t)| t.clone()).collect();
+        let Some(slips) = read_slips(&traces, rig) else { return };
+        for ((k, no_load_n, _), limit) in slipped.iter().zip(&slips.limits) {
+            let reading = SlipLimit { value_n: limit.value_n + no_load_n, ..*limit };
+            self.observations[*k].limit_n = Some(reading);
+        }
+        if slipped.len() >= 3 {
+            self.kinetic = Some((slips.ratio, slips.ratio_sd.hypot(slips.model_sd)));
+            self.base.kinetic_ratio = slips.ratio;
+            self.slips = Some(slips);
+        }
+    }
+
+    /// The rows of a trace that slipped, with its number and its reading without load.
+    fn slip_trace(&self, k: usize, trace: &Observation) -> Option<(usize, f64, SlipTrace)> {
+        let slip_s = trace.slip_s.filter(|_| trace.slid_n.is_some())?;
+        let no_load_n = trace.no_load_n.map_or(0.0, |b| b.0);
+        let rows = self.data.measured.pulls[trace.row].trace.as_ref()?;
+        let pulled = rows.rows().filter(|r| r.time_s >= 0.0);
+        let (time_s, reading_n): (Vec<f64>, Vec<f64>) =
+            pulled.map(|r| (r.time_s, r.measured_force_n - no_load_n)).unzip();
+        let mut stuck_n = self.predictor.trace(&self.base, trace.row, &time_s).stuck_n;
+        let enough = time_s.len() >= 16 && stuck_n.len() == time_s.len();
+        // A sensor or a loop whose scale nobody has named yet is no slip: the tool that holds reads what this one did.
+        let held = time_s.partition_point(|t| *t < slip_s - UNSCALED_S);
+        let (by, of) = stuck_n[..held.min(stuck_n.len())]
+            .iter()
+            .zip(&reading_n)
+            .fold((0.0, 0.0), |(by, of), (s, r)| (by + s * r, of + s * s));
+        if held >= 16 && of > 0.0 {
+            let scale = (by / of).clamp(0.3, 3.0);
+            stuck_n.iter_mut().for_each(|s| *s *= scale);
+        }
+        enough.then_some((k, no_load_n, SlipTrace { time_s, reading_n, stuck_n, slip_s }))
+    }
+
     fn observation(&self, trace: &TraceObservation) -> Observation {
         let each = trace.held_s.len().div_ceil(READINGS).max(1);
         let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
@@ -276,21 +316,6 @@ impl<'a> Context<'a> {
         let stuck = self.predictor.trace(&self.base, trace.row, &times_s).stuck_n;
         let levels =
             stuck.iter().map(|f| EDGES_N.iter().position(|e| f <= e).unwrap_or(LEVELS - 1)).collect();
-        // The reading at the slip: what the last readings before it lie above the stuck tool, on top of that tool.
-        let limit_n = trace.slip_s.and_then(|slip_s| {
-            let n = trace.held_s.len();
-            let from = n.saturating_sub(6);
-            let last = &trace.held_s[from..n.saturating_sub(1)];
-            if last.len() < 3 {
-                return None;
-            }
-            let mut times = last.to_vec();
-            times.push(slip_s - 0.005);
-            let stuck = self.predictor.trace(&self.base, trace.row, &times).stuck_n;
-            let above: f64 = trace.held_n[from..n - 1].iter().zip(&stuck).map(|(r, s)| r - s).sum::<f64>()
-                / last.len() as f64;
-            Some(stuck[last.len()] + above)
-        });
         Observation {
             row: trace.row,
             no_load_n: trace.no_load_n.filter(|(_, n)| *n >= 5),
@@ -298,7 +323,8 @@ impl<'a> Context<'a> {
             readings_n,
             each,
             levels,
-            limit_n,
+            slip_s: trace.slip_s,
+            limit_n: None,
             slid_n: trace.slid_n,
         }
     }
@@ -316,23 +342,27 @@ impl<'a> Context<'a> {
     /// Standard deviation of what is compared of each pull: its slip where there is a trace, its label otherwise.
     pub(super) fn deviations(&self, model: &PullModel, rows: &[usize]) -> Vec<f64> {
         let each = |(&i, p): (&usize, &PullPrediction)| match self.limit_of(i) {
-            Some(_) => {
+            Some(limit) => {
                 let scatter = model.scatter * p.limit_n;
-                (scatter * scatter + 0.2 * model.noise_n * model.noise_n + 0.03 * 0.03).sqrt()
+                (scatter * scatter + limit.sd_n * limit.sd_n + 0.03 * 0.03).sqrt()
             }
             None => (p.label_sd_n * p.label_sd_n + 0.03 * 0.03).sqrt(),
         };
         rows.iter().zip(&self.predicted(model, rows)).map(each).collect()
     }
 
-    fn limit_of(&self, row: usize) -> Option<f64> {
+    fn limit_of(&self, row: usize) -> Option<SlipLimit> {
         self.observations[self.observed[row]?].limit_n
     }
 
     /// What was measured less what is predicted, in standard deviations, of the pulls at `rows`.
     pub(super) fn friction_residuals(&self, model: &PullModel, rows: &[usize], sd: &[f64]) -> Vec<f64> {
         let each = |((&i, p), sd): ((&usize, &PullPrediction), &f64)| match self.limit_of(i) {
-            Some(limit_n) => (limit_n - p.limit_reading_n - model.misread_n) / sd,
+            Some(limit) => {
+                let read_at = self.kinetic.map_or(model.kinetic_ratio, |k| k.0);
+                let limit_n = limit.value_n + limit.slope_n * (model.kinetic_ratio - read_at);
+                (limit_n - p.limit_reading_n - model.misread_n) / sd
+            }
             None => {
                 let predicted_n = p.label_n + self.above_fast_n[i] + model.misread_n;
                 (self.data.label_n[i] - predicted_n) / sd
@@ -391,12 +421,17 @@ impl<'a> Context<'a> {
         r
     }
 
+    /// Kinetic ratio that is taken for granted where no trace shows it, with its standard deviation.
+    pub(super) fn assumed_ratio(&self) -> Option<(f64, f64)> {
+        self.kinetic.is_none().then(|| (self.given.2.min(0.95), 0.05))
+    }
+
     /// What is known beside the pulls, as residuals.
     pub(super) fn priors(&self, model: &PullModel, signals: bool) -> Vec<f64> {
         let mut r = vec![model.misread_n / MISREAD_N];
         match self.kinetic {
-            Some((ratio, error)) => r.push((model.kinetic_ratio - ratio.min(1.0)) / error),
-            None => r.push((model.kinetic_ratio - self.given.2.min(0.95)) / 0.05),
+            Some((ratio, error)) => r.push((model.kinetic_ratio - ratio) / error),
+            None => r.extend(self.assumed_ratio().map(|(mean, sd)| (model.kinetic_ratio - mean) / sd)),
         }
         if self.free_lag || signals {
             let (wide_lag, wide_dead) = if self.observations.is_empty() { (0.04, 0.02) } else { (0.5, 0.5) };

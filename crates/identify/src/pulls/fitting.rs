@@ -6,7 +6,7 @@ use super::curves::Curve;
 use super::likelihood::{Likelihood, likelihood, scale, weight_of};
 use super::model::PullModel;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Rounds of weights.
 const ROUNDS: usize = 3;
@@ -55,6 +55,10 @@ pub struct Fitted {
     pub values: Vec<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
+    /// What pulls, traces and what is known beside them say of the values: the inverse of a covariance, for normal residuals.
+    pub information: DMatrix<f64>,
+    /// The values as if they had no bounds, from the slopes at the fit.
+    pub beyond: Vec<f64>,
     /// Of the pulls, in units of their predicted standard deviations.
     pub residuals: Vec<f64>,
     /// How likely they are.
@@ -262,9 +266,9 @@ impl Context<'_> {
             for (p, v) in parameters.iter_mut().zip(&found.values) {
                 p.start = *v;
             }
-            outcome = Some(found);
+            outcome = Some((found, weights.iter().map(|w| w / s).collect::<Vec<f64>>()));
         }
-        let found = outcome?;
+        let (found, weights) = outcome?;
         let model = self.model_at(start, terms, &layout, &found.values);
         let sd = self.deviations(&model, rows);
         let residuals = self.friction_residuals(&model, rows, &sd);
@@ -286,7 +290,17 @@ impl Context<'_> {
         }
         // Neighbours that remember each other say less than their number.
         let stretch = (1.0 + judged.memory) / (1.0 - judged.memory);
+        let informed = found.jacobian.tr_mul(&found.jacobian);
+        let gradient = found.jacobian.tr_mul(&DVector::from_column_slice(&found.residuals));
+        let step = informed.cholesky().map(|c| c.solve(&gradient));
+        let beyond = match step {
+            Some(step) => found.values.iter().zip(step.iter()).map(|(v, s)| v - s).collect(),
+            None => found.values.clone(),
+        };
+        let information = information(&found.jacobian, &weights, scale(&residuals), stretch, layout.parts);
         Some(Fitted {
+            information,
+            beyond,
             terms: fitted_terms,
             model,
             names: parameters.iter().map(|p| p.name.clone()).collect(),
@@ -297,6 +311,29 @@ impl Context<'_> {
             trace_cost,
         })
     }
+}
+
+/// Variance of a location that is fitted with Student's t, over that of its residuals' scale, if they are normal: the integral
+/// of the squared score over the squared integral of its slope.
+const LOCATION: f64 = 1.394;
+
+/// What a fit says of its parameters, from its weighted slopes: those of the pulls first, with their weights taken out
+/// again, then everything else.
+fn information(
+    slopes: &DMatrix<f64>,
+    weights: &[f64],
+    scale: f64,
+    stretch: f64,
+    parts: usize,
+) -> DMatrix<f64> {
+    let n = weights.len();
+    let few = n as f64 / n.saturating_sub(parts).max(1) as f64;
+    let variance = LOCATION * scale * scale * few * stretch;
+    let mut plain = slopes.clone();
+    for (i, w) in weights.iter().enumerate() {
+        plain.row_mut(i).scale_mut(1.0 / (w * variance.sqrt()));
+    }
+    plain.tr_mul(&plain)
 }
 
 /// Half of Huber's cost.

@@ -13,7 +13,7 @@ const SLID_M: f64 = 0.03e-3;
 const SOFTER: f64 = 0.12;
 
 /// Time at the start of a pull that is left out: the response of an arm is of higher order than its model.
-const START_S: f64 = 0.25;
+pub const START_S: f64 = 0.25;
 
 /// The numbers of one trace.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,9 +55,15 @@ pub fn noise_n(pulls: &[MeasuredPull]) -> Option<f64> {
 pub fn observe(row: usize, trace: &PullTrace, noise_n: f64) -> TraceObservation {
     let no_load: Vec<f64> = trace.rows().filter(|r| r.time_s < 0.0).map(|r| r.measured_force_n).collect();
     let pulled: Vec<_> = trace.rows().filter(|r| r.time_s >= 0.0).collect();
-    let slip =
+    let by_displacement =
         slip_row(&pulled.iter().map(|r| (r.measured_force_n, r.displacement_m)).collect::<Vec<_>>(), noise_n);
-    let held = slip.unwrap_or(pulled.len());
+    let slip = by_displacement.map(|row| {
+        let rows: Vec<_> = pulled.iter().map(|r| (r.time_s, r.measured_force_n)).collect();
+        let from = rows.partition_point(|r| r.0 < START_S);
+        force_levels(&rows[from..]).map_or(row, |row| from + row)
+    });
+    // While the rim slips nothing has let go, but the gels are no springs any more.
+    let held = by_displacement.into_iter().chain(slip).min().unwrap_or(pulled.len());
     let mut observation = TraceObservation {
         row,
         no_load_n: mean(&no_load),
@@ -86,8 +92,29 @@ fn mean(x: &[f64]) -> Option<(f64, usize)> {
     (!x.is_empty()).then(|| (x.iter().sum::<f64>() / x.len() as f64, x.len()))
 }
 
+/// The first row at which a force stops to follow its staircase, of (time, reading) rows: a line up to it, a level from it on,
+/// by least squares. Unlike the displacement this knows nothing of how the gels bend before they slip.
+fn force_levels(rows: &[(f64, f64)]) -> Option<usize> {
+    let n = rows.len();
+    // Sums of 1, t, t^2, y, t y, y^2 over the rows before each.
+    let mut sums = vec![[0.0; 6]; n + 1];
+    for (i, (t, y)) in rows.iter().enumerate() {
+        let row = [1.0, *t, t * t, *y, t * y, y * y];
+        for (k, x) in row.into_iter().enumerate() {
+            sums[i + 1][k] = sums[i][k] + x;
+        }
+    }
+    let cost = |at: usize| {
+        let [n0, t, tt, y, ty, yy] = sums[at];
+        let (vt, cty, vy) = (tt - t * t / n0, ty - t * y / n0, yy - y * y / n0);
+        let after: Vec<f64> = sums[n].iter().zip(&sums[at]).map(|(a, b)| a - b).collect();
+        vy - cty * cty / vt + after[5] - after[3] * after[3] / after[0]
+    };
+    (8..n.saturating_sub(3)).min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
+}
+
 /// The first row after the slip of (reading, displacement) rows: from there on the displacement is beyond that of the
-/// sheared gels for good.
+/// sheared gels for good. Late where the jaws slide slowly at first, early where the rim slips first.
 fn slip_row(rows: &[(f64, f64)], noise_n: f64) -> Option<usize> {
     let n = rows.len();
     if n < 8 {
@@ -127,4 +154,29 @@ fn slip_row(rows: &[(f64, f64)], noise_n: f64) -> Option<usize> {
     }
     // The rows just before the threshold belong to the slide already.
     Some(first.saturating_sub(1).max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draws::Draws;
+
+    /// A sphere on a soft gel (Mindlin 1949) moves by half as much again before it slips, at 1.6 s: the displacement leaves that
+    /// of the gels earlier, the force follows until then.
+    #[test]
+    fn a_contact_that_bends_has_not_slipped() {
+        let mut draws = Draws::new(2, 0);
+        let rows: Vec<(f64, f64, f64)> = (0..200)
+            .map(|i| {
+                let t = 0.01 * f64::from(i);
+                let force = 8.0 * t.min(1.6);
+                let sheared = 1.5 * (1.0 - (1.0 - force / 12.8).powf(2.0 / 3.0)) * 12.8 / 20e3;
+                (t, force + 0.1 * draws.normal(), sheared + 0.02 * (t - 1.6).max(0.0))
+            })
+            .collect();
+        let by_displacement = slip_row(&rows.iter().map(|r| (r.1, r.2)).collect::<Vec<_>>(), 0.1).unwrap();
+        assert!(rows[by_displacement].0 < 1.5, "what the force is for: {by_displacement}");
+        let by_force = force_levels(&rows.iter().map(|r| (r.0, r.1)).collect::<Vec<_>>()).unwrap();
+        assert!((rows[by_force].0 - 1.6).abs() < 0.04, "{by_force}");
+    }
 }
