@@ -12,7 +12,7 @@ use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::twin::Twin;
 use gripgen::twin::config::Feedback;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen::{Location, calibrate_twin, in_parallel, load_twin_document};
+use gripgen::{Library, Location, calibrate_twin, in_parallel, load_twin_document};
 use lab::{Contact, Plan, World, campaign};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -102,6 +102,7 @@ fn main() {
     let verbose = std::env::var_os("VERBOSE").is_some();
     let file = load_twin_document(&Location::parse("asset:configs/twin-baseline.toml"), &[]).unwrap();
     let twin = Twin::new(&file.read_twin().unwrap()).unwrap();
+    let library = Library::of_twin(&twin, &Location::parse("asset:configs/twin-baseline.toml")).unwrap();
     for line in lines() {
         if arguments.len() > 1 && !arguments[1..].iter().any(|a| a == line.name) {
             continue;
@@ -120,7 +121,7 @@ fn main() {
             };
             let measured = campaign(&world, &plan, 1000 + index as u64);
             let request = CalibrateRequest { offset_law: line.law, effects: vec![] };
-            let Ok((fit, _)) = calibrate_twin(&measured, &twin, &request, 1) else { return };
+            let Ok((fit, _)) = calibrate_twin(&measured, &twin, &library, &request, 1) else { return };
             let mut rows: Vec<(String, f64, ParameterEstimate)> = Vec::new();
             let mut note = |name: &str, key: &str, truth: f64| {
                 if let Some(p) = fit.baseline.get(key) {

@@ -6,7 +6,7 @@ mod lab;
 use gripgen::identify::pulls::calibrate::{CalibrateRequest, PullCalibration};
 use gripgen::twin::Twin;
 use gripgen::twin::config::Feedback;
-use gripgen::{Location, calibrate_twin, load_twin_document};
+use gripgen::{Library, Location, calibrate_twin, load_twin_document};
 use lab::{Contact, Plan, World, campaign};
 
 fn world(index: u64, contact: Contact, kinetic_ratio: f64) -> World {
@@ -34,7 +34,9 @@ fn calibrated(world: &World, seed: u64) -> PullCalibration {
         grip_force_n: vec![20.0, 30.0, 40.0, 60.0],
         increment_n: vec![0.5, 1.0],
     };
-    calibrate_twin(&campaign(world, &plan, seed), &twin, &CalibrateRequest::default(), 2).unwrap().0
+    let library = Library::of_twin(&twin, &Location::parse("asset:configs/twin-baseline.toml")).unwrap();
+    let measured = campaign(world, &plan, seed);
+    calibrate_twin(&measured, &twin, &library, &CalibrateRequest::default(), 2).unwrap().0
 }
 
 /// Spheres whose rim slips first and flat contacts, kinetic ratio 1 and 0.9: mu comes back, nine of ten intervals hold it (binomial: 10 or

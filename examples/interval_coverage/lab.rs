@@ -152,16 +152,15 @@ pub fn campaign(world: &World, plan: &Plan, seed: u64) -> MeasuredPulls {
         let mut noise = Stream::new(seed, 1 + i as u64, Purpose::ForceNoise);
         let mu = world.law.map_or(world.mu[part], |(a, b)| world.mu[part] * (a + b / grip_force_n));
         let limit_n = 2.0 * mu * grip_force_n * (1.0 + world.scatter * noise.normal());
-        if std::env::var_os("DEBUG_SLIP").is_some() {
-            eprintln!("TRUE {i} L {limit_n:.4} r {}", world.kinetic_ratio);
-        }
         let (label, trace) = pull(world, limit_n, increment_n, step_s, &mut noise);
         time_s += 40.0;
         pulls.push(MeasuredPull {
             id: format!("p{i:04}"),
             part: ["gear", "long_shaft", "roller_bearing"][part].into(),
+            grip_pose: 0,
             grip_force_n,
             increment_n,
+            start_n: None,
             step_s,
             covariates: Covariates { pull_index: i as u64, time_s, ..Covariates::default() },
             max_pull_force_n: label,
