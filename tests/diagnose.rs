@@ -7,8 +7,8 @@ use gripgen::physics::label_moments;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{MeasuredPulls, PullTrace, TraceRow, Twin, slip_label};
 use gripgen::{
-    Diagnosed, Library, Location, PullDiagnoseOptions, calibrate_twin, compare_pulls, diagnose_pull_table,
-    edited_twin, load_pulls, load_twin_document, simulate_campaign,
+    Diagnosed, Library, Location, PullDiagnoseOptions, Suspects, calibrate_twin, compare_pulls,
+    diagnose_pull_table, edited_twin, load_pulls, load_pulls_with, load_twin_document, simulate_campaign,
 };
 
 fn baseline() -> Location {
@@ -345,7 +345,7 @@ fn measured_campaigns_have_their_answers() {
         ("lab-e", vec!["regime_transition"], vec![]),
         ("lab-f", vec!["temperature"], vec![]),
     ] {
-        let measured = load_pulls(&shared.join(lab)).unwrap().pulls;
+        let measured = load_pulls_with(&[&shared.join(lab)], Suspects::Screen).unwrap().pulls;
         let d = diagnose(&measured, &[]).diagnosis;
         let named: Vec<&str> = d.unknown.iter().map(|u| u.covariate.as_str()).collect();
         assert_eq!((names(&d), named), (effects, unknown), "{lab}");

@@ -1,9 +1,9 @@
 //! Measured pulls from every place they may be in.
 
 use crate::common::{jobs, run, small_project};
-use gripgen::load_pulls;
 use gripgen::record::ShardReader;
 use gripgen::twin::config::Feedback;
+use gripgen::{Suspects, load_pulls, load_pulls_with};
 
 #[test]
 fn a_run_folder_is_a_campaign() {
@@ -58,7 +58,7 @@ fn the_shared_campaigns_are_read() {
         [("a", 80, 80, 0), ("b", 110, 28, 0), ("c", 220, 55, 0), ("d", 84, 21, 0), ("f", 110, 28, 1)]
     {
         let folder = crate::common::root().join(format!("../shared/measured/lab-{name}"));
-        let loaded = load_pulls(&folder).unwrap().pulls;
+        let loaded = load_pulls_with(&[&folder], Suspects::Include).unwrap().pulls;
         let traced = loaded.pulls.iter().filter(|p| p.trace.is_some()).count();
         assert_eq!((loaded.pulls.len(), traced, loaded.extra.len()), (pulls, traces, extra), "{name}");
         assert_eq!(loaded.recorded.len(), 13);

@@ -5,8 +5,9 @@ use super::{Finding, FindingKind, LabelEvidence};
 
 /// Standard deviations of the noise by which a label may differ from the rows around it.
 const SIGMAS: f64 = 4.0;
-/// The share of it for a label above all rows.
+/// The share of it for a label above the last row, where the command goes on, and beyond all rows that it may lie between.
 const SHARE_ABOVE: f64 = 0.875;
+const BEYOND: f64 = 0.5;
 
 /// What the rule gives, against the label.
 ///
@@ -43,10 +44,11 @@ pub(super) fn label_rule(signal: &Signal<'_>, evidence: &LabelEvidence<'_>) -> F
         true => 0.0,
         false => signal.spacing_s * signal.desired_n[last] / signal.time_s[last].max(signal.spacing_s),
     };
+    // The rows between them have their noise in them already.
+    let beyond_n = BEYOND * noise_n;
     let allowed = match label_n < found {
-        true => found - low_n + noise_n,
-        // The rows that chance carried farthest up are in it already.
-        false => high_n - found + rise_n + SHARE_ABOVE * noise_n,
+        true => (found - low_n + beyond_n).max(noise_n),
+        false => (high_n - found + beyond_n).max(SHARE_ABOVE * noise_n) + rise_n,
     };
     finding(found, allowed + ROUNDING_N, at_s)
 }

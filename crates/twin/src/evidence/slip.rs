@@ -77,9 +77,12 @@ fn held_rows(signal: &Signal<'_>) -> usize {
 fn start(signal: &Signal<'_>, evidence: &LabelEvidence<'_>, loop_: &Follow) -> Finding {
     let before_n = mean(signal.before_n);
     let rows = signal.rows(START_S).clamp(1, signal.len());
-    let model = response(signal.time_s, signal.desired_n, loop_.lag_s).take(rows);
-    let first_n = model.zip(signal.measured_n).map(|(y, f)| f - y).sum::<f64>() / rows as f64;
-    let smaller_n = match (first_n - before_n, loop_.zero_n - before_n) {
+    let of_loop_n =
+        response(signal.time_s, signal.desired_n, loop_.lag_s).take(rows).sum::<f64>() / rows as f64;
+    let read_n = signal.mean_n(0, rows) - before_n;
+    // An arm that gives way first is slower than its loop: the reading is anywhere between nothing and what the loop gives.
+    let first_n = read_n - read_n.min(of_loop_n).max(0.0);
+    let smaller_n = match (first_n, loop_.zero_n - before_n) {
         (a, b) if a * b <= 0.0 => 0.0,
         (a, b) if a.abs() < b.abs() => a,
         (_, b) => b,
