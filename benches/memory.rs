@@ -22,23 +22,25 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let Some(mut run) = guard::Run::from_args("memory") else { return ExitCode::SUCCESS };
-    println!("{:>8} {:>5} {:>8} {:>12} {:>14}", "samples", "jobs", "sensors", "peak MB", "on disk MB");
-    for (jobs, sensors) in [(1, "one"), (2, "one"), (2, "varied")] {
-        for samples in [64, 640] {
-            let name = format!("memory/{sensors}/{jobs}_jobs/{samples}_samples");
-            if !run.wants(&name) {
-                continue;
-            }
-            let output = Command::new(std::env::current_exe().unwrap())
-                .env(CHILD, format!("{samples} {jobs} {sensors}"))
-                .output()
-                .unwrap();
-            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-            let text = String::from_utf8(output.stdout).unwrap();
-            println!("{samples:>8} {jobs:>5} {sensors:>8} {}", text.trim_end());
-            let peak_mb = text.split_whitespace().next().and_then(|word| word.parse().ok());
-            run.measured(&name, Unit::Megabytes, Vec::from_iter(peak_mb));
-        }
+    let cases = [(1, "one"), (2, "one"), (2, "varied")];
+    let all = cases.into_iter().flat_map(|(jobs, sensors)| [64, 640].map(|samples| (jobs, sensors, samples)));
+    let named = all.map(|case @ (jobs, sensors, samples)| {
+        (format!("memory/{sensors}/{jobs}_jobs/{samples}_samples"), case)
+    });
+    let wanted: Vec<_> = named.filter(|(name, _)| run.wants(name)).collect();
+    if !wanted.is_empty() {
+        println!("{:>8} {:>5} {:>8} {:>12} {:>14}", "samples", "jobs", "sensors", "peak MB", "on disk MB");
+    }
+    for (name, (jobs, sensors, samples)) in wanted {
+        let output = Command::new(std::env::current_exe().unwrap())
+            .env(CHILD, format!("{samples} {jobs} {sensors}"))
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = String::from_utf8(output.stdout).unwrap();
+        println!("{samples:>8} {jobs:>5} {sensors:>8} {}", text.trim_end());
+        let peak_mb = text.split_whitespace().next().and_then(|word| word.parse().ok());
+        run.measured(&name, Unit::Megabytes, Vec::from_iter(peak_mb));
     }
     run.finish()
 }
