@@ -88,6 +88,9 @@ fn world(line: &Line, index: u64) -> World {
     }
 }
 
+/// A parameter, what is true, and what was stated.
+type Row = (String, f64, ParameterEstimate);
+
 #[derive(Default)]
 struct Tally {
     errors: Vec<f64>,
@@ -107,7 +110,7 @@ fn main() {
         if arguments.len() > 1 && !arguments[1..].iter().any(|a| a == line.name) {
             continue;
         }
-        let found: Mutex<BTreeMap<usize, Vec<(String, f64, ParameterEstimate)>>> = Mutex::default();
+        let found: Mutex<BTreeMap<usize, Vec<Row>>> = Mutex::default();
         let begun = std::time::Instant::now();
         let from: usize = std::env::var("FROM").ok().and_then(|f| f.parse().ok()).unwrap_or(0);
         in_parallel(count, 2, |index| {
@@ -122,7 +125,7 @@ fn main() {
             let measured = campaign(&world, &plan, 1000 + index as u64);
             let request = CalibrateRequest { offset_law: line.law, effects: vec![] };
             let Ok((fit, _)) = calibrate_twin(&measured, &twin, &library, &request, 1) else { return };
-            let mut rows: Vec<(String, f64, ParameterEstimate)> = Vec::new();
+            let mut rows: Vec<Row> = Vec::new();
             let mut note = |name: &str, key: &str, truth: f64| {
                 if let Some(p) = fit.baseline.get(key) {
                     rows.push((name.into(), truth, p.clone()));

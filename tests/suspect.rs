@@ -30,9 +30,9 @@ fn project(effects: &str, samples: usize, vary: &str) -> Project {
 const MANY: &str =
     "pull.increment_n = [0.5, 1, 2]\nparts.gear.kinetic_ratio = [1.0, 0.8]\nrobot.lag_s = [0.02, 0.05]\n";
 
-fn pulled(project: &Project, samples: usize) -> Vec<Box<Pulled>> {
+fn pulled(project: &Project, samples: usize) -> Vec<Pulled> {
     let sample = |i| match generate(project, i as u64, SimdLevel::best()).outcome {
-        Outcome::Pulled(pulled) => Some(pulled),
+        Outcome::Pulled(pulled) => Some(*pulled),
         Outcome::NoContact { .. } => None,
         Outcome::Failed { reason } => panic!("{reason}"),
     };
@@ -50,8 +50,7 @@ fn clean_simulated_pulls_are_not_suspect() {
     assert_eq!(pulls.len(), 400);
     let simulated: Vec<&String> = pulls.iter().filter_map(|p| p.suspect.as_ref()).collect();
     assert!(simulated.len() <= 2, "{} of 400: {simulated:#?}", simulated.len());
-    let measured: Vec<String> =
-        pulls.iter().filter(|p| !p.label.censored).filter_map(|p| as_measured(p)).collect();
+    let measured: Vec<String> = pulls.iter().filter(|p| !p.label.censored).filter_map(as_measured).collect();
     assert!(measured.len() <= 2, "{} of 400: {measured:#?}", measured.len());
 }
 
@@ -173,7 +172,7 @@ fn a_zero_that_all_pulls_have_is_the_rig() {
         let folder = tempfile::tempdir().unwrap();
         table(folder.path(), |i, pulls| {
             if which(i) {
-                add(i, pulls)
+                add(i, pulls);
             }
         });
         load_pulls_with(&[folder.path()], suspects).map_or(0, |loaded| loaded.pulls.pulls.len())
