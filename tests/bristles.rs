@@ -44,6 +44,12 @@ fn cells(twin: &Twin, library: &Library, pull: &MeasuredPull, scenario: &Scenari
             let mut mu = twin.parts[&pull.part].mu;
             for e in twin.effects.iter().filter(|e| e.acts_on(&pull.part)) {
                 let Some(hook) = e.spec.friction else { continue };
+                if e.spec.of_pressure {
+                    // A law of the local pressure: the force on a square metre.
+                    let at = GripPoint { contact_area_m2: 1.0, ..point(pull, jaw, pressure_pa) };
+                    mu = hook(&e.values, mu, &at).max(0.0);
+                    continue;
+                }
                 let range = e.fitted_grip_force_n.filter(|_| e.outside_fit == OutsideFit::Hold);
                 let within = |f: f64| range.map_or(f, |(low, high)| f.max(low).min(high));
                 let seen_n = match (e.per, e.reference_area_m2) {

@@ -222,7 +222,8 @@ fn pairs(n: usize) -> Vec<Case> {
 fn the_expected_label_is_the_mean_of_many_noisy_pulls() {
     const PULLS: usize = 300;
     let kinetic = |ratio: &str| set("parts.long_shaft.kinetic_ratio", ratio);
-    let cases: [(&str, Vec<(String, String)>, &str); 8] = [
+    type Sets = Vec<(String, String)>;
+    let cases: [(&str, Sets, &str); 8] = [
         ("plain", vec![], ""),
         ("kinetic", vec![kinetic("0.8")], ""),
         ("kinetic, no scatter", vec![kinetic("0.85"), set("parts.long_shaft.scatter", "0")], ""),

@@ -195,7 +195,9 @@ fn another_run_in_the_folder_is_exit_code_3() {
 fn failed_samples_are_exit_code_4_and_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
-    let output = run(&sweep_args(out.to_str().unwrap(), &["--set", "vary.grip_force_n=[10, 20, 30]"]));
+    // The laws of the paper's twin refuse below 20 N.
+    let paper = ["--set", "twin=\"asset:configs/twin.toml\"", "--set", "vary.grip_force_n=[10, 20, 30]"];
+    let output = run(&sweep_args(out.to_str().unwrap(), &paper));
     assert_code(&output, 4);
     let message = text(&output.stderr);
     assert!(message.contains("8 of 24 samples failed") && message.contains("sample 0 failed"), "{message}");

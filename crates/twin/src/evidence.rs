@@ -100,7 +100,11 @@ impl Expected {
         let on_signals = |e: &crate::effects::Effect| e.spec.sensor.is_some() || e.spec.command.is_some();
         let pull = &scenario.pull;
         let lag_s = twin.robot.lag_s + twin.robot.dead_time_s;
-        let trails_n = pull.increment_n / pull.step_s * lag_s;
+        // Gels that give way let the arm move, which takes its damping over their stiffness.
+        let stiffness_n_per_m =
+            twin.gel.left.shear_stiffness_n_per_m + twin.gel.right.shear_stiffness_n_per_m;
+        let trails_s = lag_s + twin.robot.damping_n_s_per_m / stiffness_n_per_m;
+        let trails_n = pull.increment_n / pull.step_s * trails_s;
         Self {
             noise_n: Some(twin.wrist.noise_n),
             lag_s: Some(lag_s),

@@ -70,7 +70,7 @@ impl Staircase {
                 return None;
             }
             let new = begun - starts_s.len() as f64;
-            if new < 0.0 || new > 1e4 {
+            if !(0.0..=1e4).contains(&new) {
                 return None;
             }
             for k in 0..new as usize {

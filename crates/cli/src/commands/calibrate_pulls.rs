@@ -19,8 +19,8 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &args.set)?;
     let library = load_library(&twin, &args.twin)?;
-    let loaded = load_pulls_with(&measured, suspects(args.include_suspect, &twin, &args.fit))
-        .map_err(|e| no_pulls(&measured, e))?;
+    let loaded =
+        load_pulls_with(&measured, suspects(args.include_suspect)).map_err(|e| no_pulls(&measured, e))?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let request = CalibrateRequest { offset_law: args.law.is_some(), effects: args.fit.clone() };
     let (found, mut edits) =

@@ -123,8 +123,8 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
     }
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &[])?;
-    let loaded = load_pulls_with(&measured, suspects(args.include_suspect, &twin, &[]))
-        .map_err(|e| no_pulls(&measured, e))?;
+    let loaded =
+        load_pulls_with(&measured, suspects(args.include_suspect)).map_err(|e| no_pulls(&measured, e))?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let library = load_library(&twin, &args.twin)?;
     let found = compare_pulls(&loaded.pulls, &twin, &library, jobs())

@@ -63,17 +63,9 @@ pub fn jobs() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// What becomes of suspect labels where a twin is fitted or compared: what effects of the twin on its sensor or its force loop
-/// predict is no reason.
-pub fn suspects(include: bool, twin: &Twin, fit: &[String]) -> Suspects {
-    let fitted = LIBRARY.iter().copied().filter(|spec| fit.iter().any(|id| id == spec.id));
-    let mut effects = twin.effects.iter().map(|e| e.spec).chain(fitted);
-    let predicts = effects.any(|spec| spec.sensor.is_some() || spec.command.is_some());
-    match (include, predicts) {
-        (true, _) => Suspects::Include,
-        (false, true) => Suspects::Screen,
-        (false, false) => Suspects::LeaveOut,
-    }
+/// What becomes of suspect labels: what an effect of sensor or robot does to many pulls is no reason to leave them out.
+pub fn suspects(include: bool) -> Suspects {
+    if include { Suspects::Include } else { Suspects::Screen }
 }
 
 /// What cannot be read as pulls.
@@ -101,7 +93,7 @@ fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
     }
     let without: Vec<&str> = args.without.iter().map(String::as_str).collect();
     let library = load_library(&twin, &args.twin)?;
-    let suspects = if args.include_suspect { Suspects::Include } else { Suspects::Screen };
+    let suspects = suspects(args.include_suspect);
     let measured = folders(&args.measured, &args.also);
     diagnose_folders(&measured, &twin, &library, &without, suspects, &args.talk)
 }

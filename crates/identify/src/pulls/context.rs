@@ -1,6 +1,7 @@
 //! A campaign with what its traces say, and the residuals of a model against both.
 
 use super::data::PullData;
+use super::dynamics::fall_s;
 use super::fitting::{Fitted, Terms};
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, noise_n, observe};
@@ -130,8 +131,7 @@ impl<'a> Context<'a> {
         self.free_lag = false;
     }
 
-    /// Learns what the labels of the simulator lie above those of the fast prediction at a model. Fits near it then are fits
-    /// through the simulator.
+    /// Learns what the simulator's labels lie above the fast prediction at a model: fits near it are fits through the simulator.
     pub fn correct_at(&mut self, model: &PullModel) {
         let rows: Vec<usize> = (0..self.data.len()).filter(|&i| self.limit_of(i).is_none()).collect();
         let exact = self.predictor.labels_n(model, &rows);
@@ -452,34 +452,6 @@ fn dynamics(base: &PullModel) -> [FreeParameter; 2] {
     [("lag_s", base.lag_s, 1.0), ("dead_time_s", base.dead_time_s, 0.5)].map(|(name, start, most)| {
         FreeParameter { name: name.into(), start, bounds: (0.0, most), scale: 0.02 }
     })
-}
-
-/// Time constant of the fall after a slip: the area above the kinetic force, over the drop, of all traces that drop by much.
-fn fall_s(raw: &[TraceObservation], noise_n: f64) -> Option<f64> {
-    let mut each: Vec<f64> = raw
-        .iter()
-        .filter_map(|t| {
-            let n = t.held_n.len();
-            if n < 8 || t.slid_rows.len() < 8 {
-                return None;
-            }
-            // The kinetic force is that of the second half of the slide; the limit that of the last readings before.
-            let half = &t.slid_rows[t.slid_rows.len() / 2..];
-            let kinetic = half.iter().map(|r| r.1).sum::<f64>() / half.len() as f64;
-            let limit = t.held_n[n - 4..].iter().sum::<f64>() / 4.0;
-            let step_s = t.slid_rows[1].0 - t.slid_rows[0].0;
-            let drop = limit - kinetic;
-            // From the last reading near the limit on: nothing, on average, of a force that falls at once.
-            let first = t.held_n[n - 4..].iter().copied();
-            let share: Vec<f64> =
-                first.chain(t.slid_rows.iter().map(|r| r.1)).map(|f| (f - kinetic) / drop).collect();
-            let near = share.iter().rposition(|u| *u > 0.75)?;
-            let area: f64 = share[near + 1..].iter().take(8).sum::<f64>() * step_s;
-            (drop > 0.6 && drop > 6.0 * noise_n).then_some(area)
-        })
-        .collect();
-    each.sort_by(f64::total_cmp);
-    (each.len() >= 4).then(|| each[each.len() / 2].clamp(0.0, 0.1))
 }
 
 /// Shear stiffness of both gels: median over the traces of reading over displacement.

@@ -15,6 +15,9 @@ const SOFTER: f64 = 0.12;
 /// Time at the start of a pull that is left out: the response of an arm is of higher order than its model.
 pub const START_S: f64 = 0.25;
 
+/// Readings before the slip that are kept beside those while the jaws held.
+const BEFORE_SLIP: usize = 6;
+
 /// The numbers of one trace.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceObservation {
@@ -30,6 +33,8 @@ pub struct TraceObservation {
     pub held_m: Vec<f64>,
     /// Time of the first row after the slip, if there is one.
     pub slip_s: Option<f64>,
+    /// The last readings before the slip, the rim's included.
+    pub before_slip_n: Vec<f64>,
     /// Mean reading while the jaws slid, and how many readings.
     pub slid_n: Option<(f64, usize)>,
     /// Time, reading and displacement while the jaws slid.
@@ -71,6 +76,7 @@ pub fn observe(row: usize, trace: &PullTrace, noise_n: f64) -> TraceObservation 
         held_n: vec![],
         held_m: vec![],
         slip_s: slip.map(|i| pulled[i].time_s),
+        before_slip_n: vec![],
         slid_n: None,
         slid_rows: vec![],
     };
@@ -80,6 +86,8 @@ pub fn observe(row: usize, trace: &PullTrace, noise_n: f64) -> TraceObservation 
         observation.held_m.push(r.displacement_m);
     }
     if let Some(slip) = slip {
+        let last = &pulled[slip.saturating_sub(BEFORE_SLIP)..slip];
+        observation.before_slip_n = last.iter().map(|r| r.measured_force_n).collect();
         let slid: Vec<f64> = pulled[slip..].iter().skip(1).map(|r| r.measured_force_n).collect();
         observation.slid_n = mean(&slid).filter(|(_, n)| *n >= 3);
         observation.slid_rows =
