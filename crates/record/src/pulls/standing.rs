@@ -87,11 +87,20 @@ fn labels_are_rows(measured: &MeasuredPulls, standing: &[Standing]) -> bool {
     let (mut traced, mut equal) = (0, 0);
     for (pull, _) in slipped {
         let Some(trace) = &pull.trace else { continue };
-        let found = slip_label(&trace.until_displacement(measured.stop_m), measured.label_tolerance_n, true);
+        let kept = trace.until_displacement(measured.stop_m);
+        let Ok(found) = slip_label(&kept, measured.label_tolerance_n, true) else {
+            traced += 1;
+            continue;
+        };
+        let is = |force_n: f64| (found.max_pull_force_n - force_n).abs() <= ROUNDING_N;
+        // Of a force that stands still every reading is the label: that says nothing.
+        let row = kept.time_s.partition_point(|&t| t < found.slip_time_s);
+        let still = |i: usize| kept.measured_force_n.get(i).is_some_and(|&n| is(n));
+        if still(row + 1) || row.checked_sub(1).is_some_and(still) {
+            continue;
+        }
         traced += 1;
-        equal += usize::from(
-            found.is_ok_and(|l| (l.max_pull_force_n - pull.max_pull_force_n).abs() <= ROUNDING_N),
-        );
+        equal += usize::from(is(pull.max_pull_force_n));
     }
     traced > 0 && 2 * equal >= traced
 }
