@@ -1,15 +1,13 @@
 //! The label rule, applied to the trace again.
 
 use super::signal::{ROUNDING_N, Signal};
-use super::{Finding, FindingKind, LabelEvidence, cap_n};
+use super::{Finding, FindingKind, LabelEvidence};
 
 /// Standard deviations of the noise by which a label may differ from the rows around it.
 const SIGMAS: f64 = 4.0;
 /// The share of it for a label above the last row, where the command goes on, and beyond all rows that it may lie between.
 const SHARE_ABOVE: f64 = 0.875;
 const BEYOND: f64 = 0.5;
-/// Share of what a label may be off by that a thinned trace may hide between its rows.
-const SWING_SHARE: f64 = 0.25;
 
 /// What the rule gives, against the label.
 ///
@@ -52,7 +50,5 @@ pub(super) fn label_rule(signal: &Signal<'_>, evidence: &LabelEvidence<'_>) -> F
         true => (found - low_n + beyond_n).max(noise_n),
         false => (high_n - found + beyond_n).max(SHARE_ABOVE * noise_n) + rise_n,
     };
-    // An arm that swings leaves the rows between two readings, by less than a label may be off.
-    let swing_n = if evidence.every_reading { 0.0 } else { SWING_SHARE * cap_n(label_n) };
-    finding(found, allowed + ROUNDING_N + swing_n, at_s)
+    finding(found, allowed + ROUNDING_N, at_s)
 }
