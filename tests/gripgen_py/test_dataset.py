@@ -86,7 +86,8 @@ def test_the_table_is_the_index(run):
     with open(run / "index.csv", newline="") as file:
         wanted = list(csv.DictReader(file))
     table = gg.load(run).table(to="arrow").to_pylist()
-    assert list(table[0]) == list(wanted[0])
+    # Why a pull is suspect stands in the index as its failure.
+    assert [name for name in table[0] if name != "status_reason"] == list(wanted[0])
     for row, cells in zip(table, wanted):
         for name, cell in cells.items():
             assert row[name] == pytest.approx(float(cell)) if isinstance(row[name], float) and cell else True
