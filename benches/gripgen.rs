@@ -53,7 +53,12 @@ fn physics(c: &mut Criterion) {
         let arms = [("carriage", Arm::Carriage), ("ur5e", Arm::Multibody(arm.as_deref().unwrap()))];
         let staircase = Staircase::constant(pull.increment_n, pull.step_s, pull.max_time_s);
         let cell = FrictionCell { limit_n: 0.168 * 40.0 / 64.0, area_m2: 1e-6 };
-        let jaw = JawFriction { cells: vec![cell; 64], kinetic_ratio: 1.0, kinetic_fall_s: 0.0 };
+        let jaw = JawFriction {
+            cells: vec![cell; 64],
+            kinetic_ratio: 1.0,
+            kinetic_fall_s: 0.0,
+            shear_by_area: 1.0,
+        };
         let friction = PerJaw { left: jaw.clone(), right: jaw };
         for (name, arm) in arms {
             group.bench_function(format!("pull/{mechanics}/{name}"), |b| {

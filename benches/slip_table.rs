@@ -135,8 +135,12 @@ fn session(twin: &Twin, mechanics: Mechanics, shape: &PartShape, mu: f64, grip_f
     let weight = |i: usize| 1.0 - ((i as f64 + 0.5) / CELLS as f64 * 2.0 - 1.0).powi(2);
     let sum: f64 = (0..CELLS).map(weight).sum();
     let cell = |i| FrictionCell { limit_n: mu * grip_force_n * weight(i) / sum, area_m2: 1e-6 };
-    let friction =
-        JawFriction { cells: (0..CELLS).map(cell).collect(), kinetic_ratio: 1.0, kinetic_fall_s: 0.0 };
+    let friction = JawFriction {
+        cells: (0..CELLS).map(cell).collect(),
+        kinetic_ratio: 1.0,
+        kinetic_fall_s: 0.0,
+        shear_by_area: 1.0,
+    };
     let noise = Stream::new(1, 2, Purpose::ForceNoise);
     held(twin, mechanics, shape, grip_force_n)
         .pull(&PerJaw { left: friction.clone(), right: friction }, noise)

@@ -141,13 +141,7 @@ impl<'a> Expectations<'a> {
         for (weight, z) in nodes(part.scatter, (1.0 - part.kinetic_ratio) * limit_n) {
             let friction = prepared.friction(&quiet.twin, (factor * (1.0 + part.scatter * z)).max(0.0));
             let Ok(readings) = self.pull(quiet, row, &prepared, &friction, decided_n) else { continue };
-            let both = readings.desired_n.iter().zip(&readings.measured_n);
-            let (mean, variance) = label_moments(both, self.measured.label_tolerance_n, quiet.noise_n)
-                .unwrap_or_else(|| {
-                    // A reading that was never near the command: the reading at the slip stands in.
-                    let at = readings.slip_tick.unwrap_or(readings.measured_n.len()).saturating_sub(1);
-                    (readings.measured_n.get(at).copied().unwrap_or(0.0), 0.0)
-                });
+            let (mean, variance) = self.label(quiet, &readings);
             sums = (sums.0 + weight, sums.1 + weight * mean, sums.2 + weight * (mean * mean + variance));
         }
         let (weight, mean, square) = sums;
@@ -156,6 +150,16 @@ impl<'a> Expectations<'a> {
         }
         let label_n = mean / weight;
         Expected { limit_n, label_n, label_sd_n: (square / weight - label_n * label_n).max(0.0).sqrt() }
+    }
+
+    /// Mean and variance of a label over the noise of the readings.
+    fn label(&self, quiet: &QuietTwin, readings: &Readings) -> (f64, f64) {
+        let both = readings.desired_n.iter().zip(&readings.measured_n);
+        label_moments(both, self.measured.label_tolerance_n, quiet.noise_n).unwrap_or_else(|| {
+            // A reading that was never near the command: the reading at the slip stands in.
+            let at = readings.slip_tick.unwrap_or(readings.measured_n.len()).saturating_sub(1);
+            (readings.measured_n.get(at).copied().unwrap_or(0.0), 0.0)
+        })
     }
 
     /// Readings of the pull at `row` without scatter and noise, to its end, its friction multiplied by `factor`.
@@ -218,6 +222,16 @@ impl<'a> Expectations<'a> {
         })?;
         let law = PatchFriction::new(twin, &scenario, &PerJaw::from_fn(|jaw| &patches[jaw]))?;
         Ok(Prepared { scenario, held, patches, law })
+    }
+
+    /// Of each cell of both patches of a pull its share of the area and of what the jaws hold; nothing where there is none.
+    pub(crate) fn contact(&self, quiet: &QuietTwin, row: usize) -> Vec<(f64, f64)> {
+        let Ok(prepared) = self.prepared(quiet, row) else { return vec![] };
+        let friction = prepared.friction(&quiet.twin, 1.0);
+        let cells = || friction.iter().flat_map(|(_, f)| &f.cells);
+        let (area_m2, limit_n) =
+            cells().fold((0.0, 0.0), |(area, limit), c| (area + c.area_m2, limit + c.limit_n));
+        cells().map(|c| (c.area_m2 / area_m2, c.limit_n / limit_n)).collect()
     }
 
     fn pull(

@@ -27,7 +27,12 @@ pub(crate) fn hold(
         let cells = patch.cells.iter().zip(&mu[jaw]);
         let cells = cells.map(|(c, mu)| FrictionCell { limit_n: mu * c.force_n, area_m2: c.area_m2 });
         let kinetic_fall_s = twin.parts[&scenario.part].kinetic_fall_s;
-        JawFriction { cells: cells.collect(), kinetic_ratio, kinetic_fall_s }
+        JawFriction {
+            cells: cells.collect(),
+            kinetic_ratio,
+            kinetic_fall_s,
+            shear_by_area: twin.gel[jaw].shear_by_area,
+        }
     });
     let straight: f64 = friction.iter().map(|(_, f)| f.limit_n()).sum();
     if twin.robot.twist == Twist::Stiff || straight == 0.0 {

@@ -1,6 +1,7 @@
 //! Predictions of measured pulls for fits: by the reduced mechanics without inertia, which is fast, and through the simulator,
 //! which is what a twin is judged by. Expected values over scatter and noise.
 
+mod kept;
 mod signals;
 mod table;
 
@@ -12,11 +13,11 @@ use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullP
 use gripgen_physics::{QuasiStatic, StuckPull};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::effects::{CommandChain, Effect, GripPoint, OutsideFit, Per, SensorChain};
-use gripgen_twin::{Jaw, MeasuredPulls, Robot, Staircase, Twin};
+use gripgen_twin::{Backbone, Jaw, MeasuredPulls, Robot, Staircase, Twin};
+use kept::Kept;
 use signals::Signals;
-use std::cell::RefCell;
 use std::convert::Infallible;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use table::{LabelTable, Scattered};
 
 /// Longest pull that is looked at.
@@ -29,6 +30,9 @@ const TABLES: usize = 96;
 /// the model itself again.
 const SIGNAL_PULLS: usize = 320;
 const SIGNAL_TABLES: usize = 192;
+
+/// Pulls whose contacts are looked at.
+const CONTACTS: usize = 12;
 
 /// Distance of the kinetic ratios for which there are tables; those between are interpolated.
 const RATIO_STEP: f64 = 0.025;
@@ -54,45 +58,13 @@ pub struct PullPredictor<'a> {
     part_of: Vec<usize>,
     /// Force up to which pulls are looked at.
     most_n: f64,
+    /// Cells of contacts from all over the campaign: shares of area and limit.
+    contacts: OnceLock<Vec<(f64, f64)>>,
     jobs: usize,
     stuck: Cache<Key, Kept>,
     tables: Cache<Key, LabelTable>,
     signal_stuck: Cache<Key, Kept>,
     signal_tables: Cache<Key, LabelTable>,
-}
-
-thread_local! {
-    static SPARE: RefCell<Vec<StuckPull>> = const { RefCell::new(Vec::new()) };
-}
-
-/// A pull whose memory is used again: fits make thousands a second, and the system would clear every page of each.
-struct Kept(StuckPull);
-
-impl Kept {
-    fn spare() -> Self {
-        Self(SPARE.with_borrow_mut(Vec::pop).unwrap_or_default())
-    }
-}
-
-impl Drop for Kept {
-    fn drop(&mut self) {
-        let pull = std::mem::take(&mut self.0);
-        // Threads that end have nowhere to keep it.
-        let _ = SPARE.try_with(|spare| {
-            let mut spare = spare.borrow_mut();
-            if spare.len() < 64 {
-                spare.push(pull);
-            }
-        });
-    }
-}
-
-impl std::ops::Deref for Kept {
-    type Target = StuckPull;
-
-    fn deref(&self) -> &StuckPull {
-        &self.0
-    }
 }
 
 fn acts_on_signals(model: &PullModel) -> bool {
@@ -138,6 +110,7 @@ impl<'a> PullPredictor<'a> {
             part_names,
             part_of,
             most_n: most_n.min(2000.0),
+            contacts: OnceLock::new(),
             jobs: jobs.max(1),
             stuck: Cache::new(TABLES),
             tables: Cache::new(TABLES),
@@ -166,6 +139,9 @@ impl<'a> PullPredictor<'a> {
             for jaw in Jaw::BOTH {
                 twin.gel[jaw].shear_stiffness_n_per_m = 0.5 * model.stiffness_n_per_m;
             }
+        }
+        for jaw in Jaw::BOTH {
+            twin.gel[jaw].shear_by_area = model.shear_by_area;
         }
         twin.wrist.noise_n = model.noise_n;
         for (name, mu) in self.part_names.iter().zip(&model.mu) {
@@ -267,12 +243,19 @@ impl<'a> PullPredictor<'a> {
         cache.get(self.key(model, row, &[]), make).unwrap_or_else(|never| match never {})
     }
 
-    fn scattered<'s>(&'s self, model: &'s PullModel, row: usize, stuck: &'s StuckPull) -> Scattered<'s> {
+    fn scattered<'s>(
+        &'s self,
+        model: &'s PullModel,
+        row: usize,
+        stuck: &'s StuckPull,
+        backbone: &'s Backbone,
+    ) -> Scattered<'s> {
         Scattered {
             rig: self.rig(model),
             stuck,
             staircase: &self.staircases[self.profile_of[row]],
             kinetic_ratio: model.kinetic_ratio,
+            backbone,
             scatter: model.scatter,
             noise_n: model.noise_n,
             tolerance_n: self.measured.label_tolerance_n,
@@ -281,21 +264,34 @@ impl<'a> PullPredictor<'a> {
         }
     }
 
+    /// The mean contact of the campaign.
+    fn backbone(&self, model: &PullModel) -> Backbone {
+        let cells = self.contacts.get_or_init(|| {
+            let n = self.measured.pulls.len();
+            let rows = (0..n).step_by(n.div_ceil(CONTACTS).max(1));
+            rows.flat_map(|row| self.expectations.contact(&QuietTwin::new(&self.twin), row)).collect()
+        });
+        Backbone::new(cells, model.shear_by_area)
+    }
+
     /// The tables of two kinetic ratios around the model's, and the weight of the second.
     fn table(&self, model: &PullModel, row: usize) -> Tables {
         let never = |made: Result<Arc<LabelTable>, Infallible>| made.unwrap_or_else(|never| match never {});
         let build = |model: &PullModel| {
             let stuck = self.stuck(model, row);
-            Ok::<_, Infallible>(LabelTable::new(&self.scattered(model, row, &stuck), self.most_n))
+            Ok::<_, Infallible>(LabelTable::new(
+                &self.scattered(model, row, &stuck, &self.backbone(model)),
+                self.most_n,
+            ))
         };
         if acts_on_signals(model) {
-            let own = [model.kinetic_ratio, model.scatter, model.noise_n];
+            let own = [model.kinetic_ratio, model.scatter, model.noise_n, model.shear_by_area];
             let table = never(self.signal_tables.get(self.key(model, row, &own), || build(model)));
             return (table.clone(), table, 0.0);
         }
         let steps = (model.kinetic_ratio / RATIO_STEP).min(1.0 / RATIO_STEP);
         let at = |ratio: f64| {
-            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n]);
+            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n, model.shear_by_area]);
             let model = PullModel { kinetic_ratio: ratio, ..model.clone() };
             never(self.tables.get(key, || build(&model)))
         };
@@ -327,9 +323,10 @@ impl<'a> PullPredictor<'a> {
     /// and direction, and a parabola in time between them. Signals of one part are taken pull by pull.
     fn pulls_by_clock(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
         let time = |row: usize| self.measured.pulls[row].covariates.time_s;
+        let backbone = self.backbone(model);
         let alone = |row: usize| {
             let stuck = self.stuck(model, row);
-            self.scattered(model, row, &stuck).predict(self.limit_n(model, row))
+            self.scattered(model, row, &stuck, &backbone).predict(self.limit_n(model, row))
         };
         let of_part = model.effects.iter().any(|e| e.acts_on_signals() && e.part.is_some());
         let mut places: Vec<Vec<usize>> = vec![vec![]; self.slots()];
@@ -428,6 +425,10 @@ impl PredictPulls for PullPredictor<'_> {
             let factor = model.factor.get(rows[k]).copied().unwrap_or(1.0);
             self.expectations.expected(&quiet, rows[k], factor).label_n
         })
+    }
+
+    fn contact(&self, model: &PullModel, row: usize) -> Vec<(f64, f64)> {
+        self.expectations.contact(&QuietTwin::new(&self.twin_of(model)), row)
     }
 
     fn slips(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {

@@ -62,9 +62,11 @@ fn cells(twin: &Twin, library: &Library, pull: &MeasuredPull, scenario: &Scenari
         };
         let limits: Vec<f64> = patch.cells.iter().map(|c| mu(c.pressure_pa()) * c.force_n).collect();
         let area: f64 = patch.cells.iter().map(|c| c.area_m2).sum();
+        let (limit, by_area): (f64, f64) = (limits.iter().sum(), twin.gel[jaw].shear_by_area);
         let cell = |(c, limit_n): (&gripgen::twin::PressureCell, f64)| Cell {
             limit_n,
-            stiffness_n_per_m: twin.gel[jaw].shear_stiffness_n_per_m * c.area_m2 / area,
+            stiffness_n_per_m: twin.gel[jaw].shear_stiffness_n_per_m
+                * (by_area * c.area_m2 / area + (1.0 - by_area) * limit_n / limit),
             foot_m: 0.0,
         };
         patch.cells.iter().zip(limits).map(cell).collect()

@@ -45,7 +45,7 @@ fn calibrated(world: &World, seed: u64) -> PullCalibration {
 #[test]
 fn calibrated_intervals_hold_the_truth_of_a_foreign_lab() {
     for (contact, ratio) in [(Contact::Mindlin, 1.0), (Contact::Flat, 1.0), (Contact::Flat, 0.9)] {
-        let (mut held, mut ratios, mut bias) = (0, 0, 0.0);
+        let (mut held, mut ratios, mut bias, mut bent) = (0, 0, 0.0, vec![]);
         for index in 0..8 {
             let world = world(index, contact, ratio);
             let found = calibrated(&world, 40 + index);
@@ -54,11 +54,21 @@ fn calibrated_intervals_hold_the_truth_of_a_foreign_lab() {
                 held += usize::from(p.low90 <= *mu && *mu <= p.high90);
                 bias += (p.value / mu - 1.0) / 16.0;
             }
+            let model = &found.fitted.model;
+            bent.push((model.shear_by_area, model.stiffness_n_per_m));
             let p = &found.baseline["kinetic_ratio"];
             ratios += usize::from(p.low90 <= ratio && ratio <= p.high90 + 1e-9);
         }
         assert!(held > 10, "{contact:?}, ratio {ratio}: {held} of 16 intervals of mu");
         assert!(bias.abs() < 0.01, "{contact:?}, ratio {ratio}: mu off by {bias}");
+        // How far the contact bends, and the stiffness at which it begins to.
+        for (by_area, stiffness_n_per_m) in bent {
+            let bends = contact == Contact::Mindlin;
+            assert!((by_area > 0.3) == bends && (bends || by_area < 0.15), "{contact:?}: {by_area}");
+            let off = (stiffness_n_per_m / 20e3 - 1.0).abs();
+            // A bed of springs is not Mindlin's contact: it holds a little more in between.
+            assert!(off < if bends { 0.1 } else { 0.02 }, "{contact:?}: {stiffness_n_per_m} N/m, {by_area}");
+        }
         assert!(ratios >= 5 || contact == Contact::Mindlin, "{contact:?}, ratio {ratio}: {ratios} of 8");
     }
 }

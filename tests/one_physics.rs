@@ -160,6 +160,8 @@ fn rigs() -> Vec<Case> {
         ("damping", own("robot.damping_n_s_per_m", "800")),
         ("fast", own("robot.speed_limit_mm_s", "100")),
         ("soft gels", own("gel.left.shear_stiffness_n_per_mm", "4")),
+        ("slips at once", own("gel.left.shear_by_area", "0.0")),
+        ("bends half", own("gel.right.shear_by_area", "0.5")),
         ("falls", own("parts.long_shaft.kinetic_fall_s", "0.02")),
         ("rate", own("wrist.rate_hz", "1000")),
     ]);

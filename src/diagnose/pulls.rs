@@ -92,6 +92,7 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
         lag_s: twin.robot.lag_s,
         dead_time_s: twin.robot.dead_time_s,
         stiffness_n_per_m: twin.gel.left.shear_stiffness_n_per_m + twin.gel.right.shear_stiffness_n_per_m,
+        shear_by_area: 0.5 * (twin.gel.left.shear_by_area + twin.gel.right.shear_by_area),
         damping_n_s_per_m: twin.robot.damping_n_s_per_m,
         fall_s: 0.0,
         misread_n: 0.0,
@@ -175,6 +176,7 @@ pub(crate) fn pull_values(
         set("wrist.noise_n".into(), model.noise_n, None);
         for jaw in ["left", "right"] {
             set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), model.stiffness_n_per_m * 0.5e-3, None);
+            set(format!("gel.{jaw}.shear_by_area"), model.shear_by_area, None);
         }
     }
     values

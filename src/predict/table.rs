@@ -2,8 +2,8 @@
 
 use gripgen_identify::pulls::model::PullPrediction;
 use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
-use gripgen_twin::Staircase;
 use gripgen_twin::effects::{CommandChain, SensorChain};
+use gripgen_twin::{Backbone, Staircase};
 
 /// Distance of two small forces in a table.
 const STEP_N: f64 = 0.2;
@@ -28,6 +28,7 @@ pub(super) struct Scattered<'a> {
     pub stuck: &'a StuckPull,
     pub staircase: &'a Staircase,
     pub kinetic_ratio: f64,
+    pub backbone: &'a Backbone,
     pub scatter: f64,
     pub noise_n: f64,
     pub tolerance_n: f64,
@@ -44,6 +45,7 @@ impl Scattered<'_> {
             self.staircase,
             limit_n,
             self.kinetic_ratio,
+            self.backbone,
             decided_n,
             &self.sensor,
             &self.command,

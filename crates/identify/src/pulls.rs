@@ -1,6 +1,7 @@
 //! Pulls: calibration of the baseline and diagnosis.
 
 pub mod answer;
+mod bend;
 pub mod calibrate;
 pub mod candidates;
 mod choose;
@@ -21,5 +22,6 @@ mod screen;
 pub mod search;
 mod simulate;
 pub mod slip;
+mod stated;
 mod trace_residuals;
 mod words;

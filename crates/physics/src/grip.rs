@@ -120,7 +120,7 @@ pub struct Held {
 #[derive(Clone)]
 enum Start {
     Rapier(Box<RapierStart>),
-    Reduced { mass_kg: f64, gel: PerJaw<Gel> },
+    Reduced { mass_kg: f64, gel: Box<PerJaw<Gel>> },
 }
 
 /// Closes the jaws on the part and lets them settle, without friction.
@@ -146,7 +146,7 @@ pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
                     }
                     Arm::Multibody(arm) => arm.held_mass_kg(&setup.gripper, setup.direction),
                 },
-                gel: setup.gel.clone(),
+                gel: Box::new(setup.gel.clone()),
             },
         })));
     }

@@ -6,13 +6,16 @@
 //! d dx/dt = F - F_c,   F_c = k x while the jaws hold,  kinetic_ratio L once k x has reached L
 //! ```
 //!
+//! Contacts that bend have F_c = L b(k x / L) with the backbone b of the contact ([`Backbone`]) from [`BENDS_FROM`] of L on.
+//!
+//!
 //! with the force loop of [`crate::PullSession`], its sensor and command effects, and the same order of readings and
-//! commands. What is missing against the reduced mechanics is the ringing of the arm's mass on the gel and the slip that
-//! begins at the rim; `a_pull_without_inertia_is_the_reduced_one` says how much that is.
+//! commands. What is missing against the reduced mechanics is the ringing of the arm's mass on the gel and the
+//! differences between contacts; `a_pull_without_inertia_is_the_reduced_one` says how much that is.
 
 use crate::force_loop::ForceLoop;
 use gripgen_twin::effects::{CommandChain, SensorChain};
-use gripgen_twin::{Robot, Staircase};
+use gripgen_twin::{Backbone, Robot, Staircase};
 
 /// What all pulls of a rig share.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,9 +54,9 @@ pub struct StuckPull {
 /// What follows after a slip.
 #[derive(Debug, Clone, Default)]
 pub struct SlipPull {
-    /// The first tick at which the jaws slide, or one past the last tick of a pull that ends before.
+    /// The first tick at which the jaws slide, or bend, or one past the last tick of a pull that ends before.
     pub slip_tick: usize,
-    /// Command at each tick from the slip on.
+    /// Command at each tick from there on.
     pub desired_n: Vec<f64>,
     /// Noise-free reading at each of them.
     pub reading_n: Vec<f64>,
@@ -63,6 +66,10 @@ pub struct SlipPull {
 
 /// Ticks between two copies of the sensor's memory.
 const SNAPSHOT_TICKS: usize = 64;
+
+/// Share of the limit up to which contacts that bend are taken for springs: what they trail more below is forgotten, within
+/// the time in which gels and damping relax, before they slip.
+const BENDS_FROM: f64 = 0.3;
 
 impl QuasiStatic {
     fn ticks(&self) -> usize {
@@ -116,6 +123,7 @@ impl QuasiStatic {
         staircase: &Staircase,
         limit_n: f64,
         kinetic_ratio: f64,
+        backbone: &Backbone,
         decided_n: f64,
         sensor: &SensorChain,
         command: &CommandChain,
@@ -124,8 +132,9 @@ impl QuasiStatic {
         let step_s = 1.0 / self.rate_hz;
         pull.desired_n.clear();
         pull.reading_n.clear();
+        let from_n = if backbone.bends() { BENDS_FROM * limit_n } else { limit_n };
+        let held = stuck.largest_n.partition_point(|&f| f < from_n);
         pull.displacement_m = limit_n / self.stiffness_n_per_m;
-        let held = stuck.largest_n.partition_point(|&f| f < limit_n);
         pull.slip_tick = held;
         if held >= stuck.desired_n.len() {
             return;
@@ -149,22 +158,50 @@ impl QuasiStatic {
         let held_s = held as f64 / self.rate_hz;
         let (mut stairs, mut due) =
             (staircase.from(held_s), staircase.from((held_s - dead_ticks * step_s).max(0.0)));
+        // Shear and displacement of a contact that bends, until all of it has slipped.
+        let mut bent = backbone.bends().then(|| {
+            let shear = backbone.shear_of(stuck.contact_n[held] / limit_n);
+            (shear, backbone.at(shear))
+        });
+        let shear_of_m = self.stiffness_n_per_m / limit_n;
         for tick in held..=self.ticks() {
             let time_s = tick as f64 / self.rate_hz;
-            let contact_n = kinetic_n + above_n;
-            above_n *= kept;
+            let contact_n = match bent {
+                Some((_, (share, _))) => limit_n * share,
+                None => kinetic_n + above_n,
+            };
+            if bent.is_none() {
+                above_n *= kept;
+            }
             let reading_n = sensor.read(contact_n, time_s, step_s);
             let desired_n = stairs.desired_n(time_s);
             pull.desired_n.push(desired_n);
             pull.reading_n.push(reading_n);
-            if pull.displacement_m > self.stop_m || desired_n - reading_n > decided_n {
+            if let Some((shear, _)) = bent {
+                pull.displacement_m = shear / shear_of_m;
+            }
+            let decided = bent.is_none() && desired_n - reading_n > decided_n;
+            if pull.displacement_m > self.stop_m || decided {
                 break;
             }
             // Commands under way at the slip go on arriving: the loop is given the one that is due.
             let due_n = due.desired_n((time_s - dead_ticks * step_s).max(0.0));
             let commanded_n = command.apply(due_n, reading_n);
             let applied_n = control.advance_due(step_s, commanded_n, reading_n, contact_n);
-            pull.displacement_m += ((applied_n - contact_n) / self.robot.damping_n_s_per_m).max(0.0) * step_s;
+            let step_m = (applied_n - contact_n) / self.robot.damping_n_s_per_m * step_s;
+            bent = match bent {
+                Some((shear, (_, slope))) => {
+                    // Implicit in x while it holds.
+                    let slope_n_per_m = self.stiffness_n_per_m * slope;
+                    let share = 1.0 / (1.0 + step_s * slope_n_per_m / self.robot.damping_n_s_per_m);
+                    let next = shear + step_m * share * shear_of_m;
+                    (next < backbone.slips_at()).then(|| (next, backbone.at(next)))
+                }
+                None => {
+                    pull.displacement_m += step_m.max(0.0);
+                    None
+                }
+            };
         }
     }
 }

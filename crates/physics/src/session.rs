@@ -40,12 +40,19 @@ pub struct JawFriction {
     pub kinetic_ratio: f64,
     /// Time constant with which friction falls to that once the jaws slide; 0: at once.
     pub kinetic_fall_s: f64,
+    /// Share of the gel's shear stiffness that cells have by their area; the rest they have by their limit.
+    pub shear_by_area: f64,
 }
 
 impl JawFriction {
     /// A jaw that slips as a whole.
     pub fn uniform(limit_n: f64, kinetic_ratio: f64) -> Self {
-        Self { cells: vec![FrictionCell { limit_n, area_m2: 1.0 }], kinetic_ratio, kinetic_fall_s: 0.0 }
+        Self {
+            cells: vec![FrictionCell { limit_n, area_m2: 1.0 }],
+            kinetic_ratio,
+            kinetic_fall_s: 0.0,
+            shear_by_area: 1.0,
+        }
     }
 
     /// Share of its limit that a jaw keeps once it has slid for `slid_s`: `r + (1 - r) exp(-t / tau)` with the kinetic
@@ -57,11 +64,17 @@ impl JawFriction {
         self.kinetic_ratio + (1.0 - self.kinetic_ratio) * libm::exp(-slid_s / self.kinetic_fall_s)
     }
 
-    /// Share of each cell in the gel's shear stiffness: that of its area.
+    /// Share of each cell in the gel's shear stiffness: that of its area, or of its limit, or between. By area is a bed of
+    /// springs, whose rim slips first as that of a sphere on a half-space does (Mindlin 1949; a paraboloid of pressure moves by
+    /// twice `limit / stiffness` before all of it slips, his sphere by 1.5 times). By limit all cells slip together.
     pub fn stiffness_shares(&self) -> impl Iterator<Item = f64> {
-        let area_m2: f64 = self.cells.iter().map(|c| c.area_m2).sum();
+        let (area_m2, limit_n) = (self.cells.iter().map(|c| c.area_m2).sum::<f64>(), self.limit_n());
         let even = 1.0 / self.cells.len() as f64;
-        self.cells.iter().map(move |c| if area_m2 > 0.0 { c.area_m2 / area_m2 } else { even })
+        let by_area = self.shear_by_area;
+        self.cells.iter().map(move |c| {
+            let area = if area_m2 > 0.0 { c.area_m2 / area_m2 } else { even };
+            if limit_n > 0.0 { by_area * area + (1.0 - by_area) * c.limit_n / limit_n } else { area }
+        })
     }
 
     /// Largest tangential force before the jaw slips: the sum over its cells.

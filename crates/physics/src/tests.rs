@@ -34,6 +34,7 @@ impl Bench {
             width_m: 28e-3,
             height_m: 21e-3,
             shear_stiffness_n_per_m: 2e4,
+            shear_by_area: 1.0,
             kernels_px: vec![],
             restore_depth_fraction: 0.4,
             model: gripgen_twin::config::GelModel::Pyramid,

@@ -149,6 +149,7 @@ mod tests {
             width_m: 26e-3,
             height_m: 19.5e-3,
             shear_stiffness_n_per_m: 4e4,
+            shear_by_area: 1.0,
             kernels_px: KERNELS_PX.to_vec(),
             restore_depth_fraction: 0.4,
         }

@@ -8,6 +8,7 @@
 //! This crate opens no file, reads no clock and starts no thread. Inside, all quantities are in SI units; names in
 //! files carry their unit (`_n`, `_mm`, `_s`, `_deg`). Frames are described in [`frames`].
 
+mod backbone;
 mod campaign;
 pub mod config;
 pub mod draw;
@@ -35,6 +36,7 @@ mod table;
 mod trace;
 mod twin;
 
+pub use backbone::Backbone;
 pub use campaign::{Campaign, PlannedPull, PullKind};
 pub use friction::{FrictionError, GripFriction, cell_friction, grip_friction};
 pub use grasp::Grasp;

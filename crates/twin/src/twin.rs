@@ -121,6 +121,8 @@ pub struct Gel {
     pub height_m: f64,
     /// Tangential force per shear displacement.
     pub shear_stiffness_n_per_m: f64,
+    /// Share of it that cells have by their area; the rest they have by their load.
+    pub shear_by_area: f64,
     /// Blur kernels, in pixels of the sensor's image.
     pub kernels_px: Vec<u32>,
     /// Start of the restored contact, as a share of the press depth.

@@ -148,10 +148,10 @@ pub fn diagnose_pulls(
     }
     let heldout = [heldout_before, heldout_after];
     progress(0.9);
-    let labels = [&stated_before, &after].map(|fitted| {
+    let labels = [(&before_context, &stated_before), (&after_context, &after)].map(|(context, fitted)| {
         let mut model = fitted.model.clone();
         model.scatter = scatter(&model, fitted.likelihood.scale);
-        predictor.labels_n(&model, &rows)
+        context.labels_n(&model, &rows)
     });
     let own: Vec<f64> = counted.iter().map(|&i| data.label_n[i] - labels[1][i]).collect();
     let groups: Vec<usize> = counted.iter().map(|&i| data.group_of[i]).collect();

@@ -2,7 +2,7 @@
 
 use super::data::PullData;
 use super::dynamics::fall_s;
-use super::fitting::{Fitted, Terms};
+use super::fitting::Terms;
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, noise_n, observe};
 use super::slip::{SlipLimit, SlipRig, SlipTrace, Slips, read_slips};
@@ -131,28 +131,6 @@ impl<'a> Context<'a> {
         self.free_lag = false;
     }
 
-    /// Learns what the simulator's labels lie above the fast prediction at a model: fits near it are fits through the simulator.
-    pub fn correct_at(&mut self, model: &PullModel) {
-        let rows: Vec<usize> = (0..self.data.len()).filter(|&i| self.limit_of(i).is_none()).collect();
-        let exact = self.predictor.labels_n(model, &rows);
-        let fast = self.predictor.pulls(model, &rows);
-        for ((&row, exact_n), fast) in rows.iter().zip(exact).zip(fast) {
-            self.above_fast_n[row] = exact_n - fast.label_n;
-        }
-    }
-
-    /// The fit as it is written into a twin: at labels of the simulator, and without a nuisance that no twin has.
-    pub fn stated(&self, fitted: &Fitted) -> (Self, Fitted) {
-        let mut context = self.clone();
-        let rows: Vec<usize> = (0..self.data.len()).collect();
-        let mut fitted = fitted.clone();
-        fitted.terms.stated = true;
-        fitted.model.misread_n = 0.0;
-        context.correct_at(&fitted.model);
-        let found = context.fit_again(&fitted.model, &fitted.terms, &rows);
-        (context, found.unwrap_or(fitted))
-    }
-
     fn look_at(&mut self, raw: &[TraceObservation]) {
         if raw.is_empty() {
             return;
@@ -200,6 +178,7 @@ impl<'a> Context<'a> {
         }
         (self.base.lag_s, self.base.dead_time_s) = (best.1, best.2);
         self.read_slips();
+        self.read_bend();
         self.baseline_trace_cost = self.trace_residuals(&self.base, &rows).cost();
     }
 
@@ -351,7 +330,7 @@ impl<'a> Context<'a> {
         rows.iter().zip(&self.predicted(model, rows)).map(each).collect()
     }
 
-    fn limit_of(&self, row: usize) -> Option<SlipLimit> {
+    pub(super) fn limit_of(&self, row: usize) -> Option<SlipLimit> {
         self.observations[self.observed[row]?].limit_n
     }
 

@@ -33,8 +33,8 @@ pub fn by_value(of: &[u64]) -> Vec<Vec<usize>> {
 }
 
 /// Labels predicted for pulls by a fit that has not seen them. NaN where no fit was possible. With `hold_signals` what acts on
-/// signals, which traces show rather than labels, stays as all pulls gave it. A fit that is stated predicts through the
-/// simulator, as a twin of its model would.
+/// signals, which traces show rather than labels, stays as all pulls gave it. Of a fit that is stated, in its context, these
+/// are the labels of the simulator to second order in what a fold changes of the model.
 pub fn predicted(
     context: &Context<'_>,
     fitted: &Fitted,
@@ -50,13 +50,7 @@ pub fn predicted(
         let Some(found) = context.fit_again(&fitted.model, terms, &rows) else { return };
         let mut model = found.model;
         model.scatter = scatter(&model, found.likelihood.scale);
-        let labels: Vec<f64> = if terms.stated {
-            context.predictor.labels_n(&model, out)
-        } else {
-            let fast = context.predictor.pulls(&model, out);
-            let above = out.iter().map(|&i| context.above_fast_n[i] + model.misread_n);
-            fast.iter().zip(above).map(|(p, above_n)| p.label_n + above_n).collect()
-        };
+        let labels = context.labels_n(&model, out);
         if let Ok(mut result) = result.lock() {
             out.iter().zip(&labels).for_each(|(&i, label_n)| result[i] = *label_n);
         }

@@ -40,6 +40,9 @@ pub struct PullModel {
     pub dead_time_s: f64,
     /// Shear stiffness of both gels together.
     pub stiffness_n_per_m: f64,
+    /// Share of it that the points of a contact have by their area, as the traces show it. Fits leave it alone: it says how
+    /// far a contact bends before it slips, and not what it holds.
+    pub shear_by_area: f64,
     /// Force per speed that the force loop yields to.
     pub damping_n_s_per_m: f64,
     /// Time constant with which the force falls after a slip: as the traces show it.
@@ -112,6 +115,11 @@ pub trait PredictPulls: Sync {
 
     /// Readings of pulls if they never slipped: for each a row and times.
     fn traces(&self, model: &PullModel, asked: &[(usize, &[f64])]) -> Vec<TracePrediction>;
+
+    /// The contact of one pull: of each point its share of the area and its share of what the jaws hold.
+    fn contact(&self, _model: &PullModel, _row: usize) -> Vec<(f64, f64)> {
+        vec![]
+    }
 
     /// Readings of one pull.
     fn trace(&self, model: &PullModel, row: usize, times_s: &[f64]) -> TracePrediction {

@@ -17,6 +17,7 @@ fn session_with_cells(bench: &Bench, mu: f64, cells: usize, kinetic_ratio: f64) 
             .collect(),
         kinetic_ratio,
         kinetic_fall_s: 0.0,
+        shear_by_area: 1.0,
     };
     let noise = Stream::new(1, 2, Purpose::ForceNoise);
     bench.held().pull(&PerJaw { left: friction.clone(), right: friction }, noise)
@@ -100,7 +101,7 @@ fn a_hertz_contact_follows_mindlins_curve() {
     let sum: f64 = cells.iter().map(|c| c.limit_n).sum();
     cells.iter_mut().for_each(|c| c.limit_n *= 10.0 / sum);
     cells.retain(|c| c.area_m2 > 0.0);
-    let friction = JawFriction { cells, kinetic_ratio: 1.0, kinetic_fall_s: 0.0 };
+    let friction = JawFriction { cells, kinetic_ratio: 1.0, kinetic_fall_s: 0.0, shear_by_area: 1.0 };
     let noise = Stream::new(1, 2, Purpose::ForceNoise);
     let mut session = bench.held().pull(&PerJaw { left: friction.clone(), right: friction }, noise);
     // Both gels: 2 mu N = 20 N, 8 a G* = 4e4 N/m, x_slip = 1.5 x 20 N / 4e4 N/m.

@@ -103,6 +103,7 @@ pub(super) fn gel(kernels_px: &[u32]) -> Gel {
         width_m: 28e-3,
         height_m: 21e-3,
         shear_stiffness_n_per_m: 1e4,
+        shear_by_area: 1.0,
         kernels_px: kernels_px.to_vec(),
         restore_depth_fraction: 0.4,
         model: gripgen_twin::config::GelModel::Pyramid,

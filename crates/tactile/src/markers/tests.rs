@@ -205,6 +205,7 @@ fn markers_of_a_sensor_file_are_read_and_moved() {
         width_m: 6e-3,
         height_m: 5e-3,
         shear_stiffness_n_per_m: 2e4,
+        shear_by_area: 1.0,
         kernels_px: vec![5],
         restore_depth_fraction: 0.4,
         model,

@@ -87,6 +87,7 @@ pub(super) fn rig() -> Rig {
         width_m: 28e-3,
         height_m: 21e-3,
         shear_stiffness_n_per_m: 2e4,
+        shear_by_area: 1.0,
         kernels_px: vec![41, 31, 13, 7, 5],
         restore_depth_fraction: 0.4,
     };

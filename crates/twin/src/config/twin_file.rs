@@ -199,6 +199,10 @@ pub struct GelFile {
     pub height_mm: f64,
     /// Tangential force per shear displacement of the pad.
     pub shear_stiffness_n_per_mm: f64,
+    /// Share of that stiffness which the points of a contact have by their area, from 0 to 1; the rest they have by their
+    /// load. 1: the rim of a round contact slips long before its middle (Mindlin 1949). 0: the contact lets go at once.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub shear_by_area: f64,
     /// Sizes of the blurs in pixels of the sensor's image, in order; odd numbers. A calibrated sensor file has its own
     /// blurs and share below, which are used instead.
     pub kernels_px: Vec<u32>,
@@ -284,6 +288,10 @@ pub struct PartFile {
 
 fn one() -> f64 {
     1.0
+}
+
+fn is_one(x: &f64) -> bool {
+    *x == 1.0
 }
 
 fn is_zero(x: &f64) -> bool {

@@ -65,6 +65,7 @@ pub(super) fn check_gel(gel: &GelFile, key: &str) -> Result<Gel, ConfigError> {
                 0.1..=1e4,
                 "N/mm",
             )?,
+        shear_by_area: in_range(&format!("{key}.shear_by_area"), gel.shear_by_area, 0.0..=1.0, "1")?,
         kernels_px: gel.kernels_px.clone(),
         restore_depth_fraction: in_range(
             &format!("{key}.restore_depth_fraction"),
