@@ -129,6 +129,9 @@ def watchdog():
         while stopped is None and receive.getTimestamp() < last + 2.0:
             if receive.getRuntimeState() == 1:
                 stopped = receive.getTimestamp() - last
+        # Two connections hear of the stop one after the other.
+        while control.isProgramRunning() and receive.getTimestamp() < last + 3.0:
+            time.sleep(0.01)
         seen["stopped after"], seen["runs without"] = stopped, control.isProgramRunning()
         control.reuploadScript()
         time.sleep(0.3)
