@@ -254,10 +254,18 @@ pub(crate) fn pull_direction(scenario: &Scenario) -> [f64; 3] {
     scenario.pull.direction.map(|x| x * scenario.covariates.pull_direction)
 }
 
+/// Mass with which the tool of a rig answers along +z. Of an arm whose description cannot be read, that of its carriage.
+pub(crate) fn answering_mass_kg(twin: &Twin, library: &Library) -> f64 {
+    let carried_kg = twin.robot.moving_mass_kg + twin.gripper.mass_kg + 2.0 * twin.gripper.jaw_mass_kg;
+    let arm = twin.arm.as_ref().and_then(|arm| library.arm(arm).ok());
+    let of_rig_kg = arm.map_or(carried_kg, |arm| arm.held_mass_kg(&twin.gripper, [0.0, 0.0, 1.0]));
+    twin.robot.apparent_mass_kg.unwrap_or(of_rig_kg)
+}
+
 /// Damping that stops more than the arm's mass within one step of the force loop makes it unstable.
 pub(crate) fn check_damping(twin: &Twin, arm: &PlacedArm, direction: [f64; 3]) -> Result<(), SampleError> {
     let (damping, step_s) = (twin.robot.damping_n_s_per_m, twin.wrist.step_s());
-    let mass_kg = arm.held_mass_kg(&twin.gripper, direction);
+    let mass_kg = twin.robot.apparent_mass_kg.unwrap_or_else(|| arm.held_mass_kg(&twin.gripper, direction));
     if damping * step_s < mass_kg {
         return Ok(());
     }

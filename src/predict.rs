@@ -7,6 +7,7 @@ mod table;
 
 use crate::cache::Cache;
 use crate::expect::{Expectations, QuietTwin};
+use crate::gripped::answering_mass_kg;
 use crate::library::Library;
 use crate::parallel::in_parallel;
 use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
@@ -50,6 +51,8 @@ pub struct PullPredictor<'a> {
     twin: Twin,
     expectations: Expectations<'a>,
     robot: Robot,
+    /// Mass with which the tool answers.
+    mass_kg: f64,
     rate_hz: f64,
     /// Commands of the campaign: those planned, and those that traces bring themselves.
     staircases: Vec<Arc<Staircase>>,
@@ -104,6 +107,7 @@ impl<'a> PullPredictor<'a> {
             twin: twin.clone(),
             expectations,
             robot,
+            mass_kg: answering_mass_kg(twin, library),
             rate_hz: twin.wrist.rate_hz,
             staircases,
             profile_of,
@@ -134,6 +138,7 @@ impl<'a> PullPredictor<'a> {
             twin.robot.damping_n_s_per_m = model.damping_n_s_per_m;
             twin.robot.speed_limit_m_per_s = speed_limit_m_per_s(model.damping_n_s_per_m);
         }
+        twin.robot.apparent_mass_kg = model.apparent_mass_kg.or(twin.robot.apparent_mass_kg);
         let both = twin.gel.left.shear_stiffness_n_per_m + twin.gel.right.shear_stiffness_n_per_m;
         if model.stiffness_n_per_m != both {
             for jaw in Jaw::BOTH {
@@ -458,6 +463,10 @@ impl PredictPulls for PullPredictor<'_> {
                 stuck_n: signals.stuck_n(*row, times_s),
             })
             .collect()
+    }
+
+    fn mass_kg(&self) -> f64 {
+        self.mass_kg
     }
 
     fn winds_up(&self) -> bool {

@@ -101,7 +101,8 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
     let jaws = cells(twin, library, pull, &scenario);
     let mut bristles: Vec<Cell> = jaws.left.into_iter().chain(jaws.right).collect();
     let part = &twin.parts[&pull.part];
-    let mass_kg = twin.robot.moving_mass_kg + twin.gripper.mass_kg + 2.0 * twin.gripper.jaw_mass_kg;
+    let carried_kg = twin.robot.moving_mass_kg + twin.gripper.mass_kg + 2.0 * twin.gripper.jaw_mass_kg;
+    let mass_kg = twin.robot.apparent_mass_kg.unwrap_or(carried_kg);
     let (robot, dt) = (&twin.robot, 1.0 / twin.wrist.rate_hz);
     let dead = (robot.dead_time_s / dt - 1e-6).ceil() as usize;
     let side = if pull.covariates.pull_direction < 0.0 { -1.0 } else { 1.0 };

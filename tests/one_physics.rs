@@ -158,6 +158,7 @@ fn rigs() -> Vec<Case> {
         ("dead time", own("robot.dead_time_s", "0.03")),
         ("independent", own("robot.feedback", "\"independent\"")),
         ("damping", own("robot.damping_n_s_per_m", "800")),
+        ("light", own("robot.apparent_mass_kg", "6")),
         ("fast", own("robot.speed_limit_mm_s", "100")),
         ("soft gels", own("gel.left.shear_stiffness_n_per_mm", "4")),
         ("slips at once", own("gel.left.shear_by_area", "0.0")),

@@ -94,6 +94,7 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
         stiffness_n_per_m: twin.gel.left.shear_stiffness_n_per_m + twin.gel.right.shear_stiffness_n_per_m,
         shear_by_area: 0.5 * (twin.gel.left.shear_by_area + twin.gel.right.shear_by_area),
         damping_n_s_per_m: twin.robot.damping_n_s_per_m,
+        apparent_mass_kg: None,
         fall_s: 0.0,
         misread_n: 0.0,
         noise_n: twin.wrist.noise_n,
@@ -173,6 +174,9 @@ pub(crate) fn pull_values(
     if baseline.contains_key("robot.damping_n_s_per_m") {
         set("robot.damping_n_s_per_m".into(), model.damping_n_s_per_m, None);
         set("robot.speed_limit_mm_s".into(), 1e3 * speed_limit_m_per_s(model.damping_n_s_per_m), None);
+        if let Some(mass_kg) = model.apparent_mass_kg {
+            set("robot.apparent_mass_kg".into(), mass_kg, None);
+        }
         set("wrist.noise_n".into(), model.noise_n, None);
         for jaw in ["left", "right"] {
             set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), model.stiffness_n_per_m * 0.5e-3, None);

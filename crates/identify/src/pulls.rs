@@ -21,6 +21,7 @@ mod scatter;
 mod screen;
 pub mod search;
 mod simulate;
+mod slide;
 pub mod slip;
 mod stated;
 mod trace_residuals;

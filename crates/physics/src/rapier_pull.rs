@@ -85,6 +85,20 @@ impl RapierPull {
         self.rig.arm_mass_kg(&self.world, self.direction)
     }
 
+    /// The force on the tool with which a mass M moves as one of m does, of an admittance that measures what the contact takes:
+    ///
+    /// ```text
+    /// F = F_contact + M / m (F_free - F_contact)
+    /// ```
+    ///
+    /// Jaws that hold do not move, whatever their mass.
+    pub(crate) fn answering_n(&self, free_n: f64, apparent_mass_kg: f64) -> f64 {
+        if !self.sliding {
+            return free_n;
+        }
+        self.contact_force_n + self.mass_kg() / apparent_mass_kg * (free_n - self.contact_force_n)
+    }
+
     /// Way of the tool along the pull.
     pub(crate) fn position_m(&self) -> f64 {
         (self.rig.arm.position(&self.world) - self.start).dot(self.direction)

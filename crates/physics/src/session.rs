@@ -151,6 +151,14 @@ impl Plant {
         }
     }
 
+    /// The force to apply for a tool that answers `free_n` as one of `apparent_mass_kg` does. The reduced arm has that mass.
+    fn answering_n(&self, free_n: f64, apparent_mass_kg: f64) -> f64 {
+        match self {
+            Plant::Rapier(pull) => pull.answering_n(free_n, apparent_mass_kg),
+            Plant::Reduced(_) => free_n,
+        }
+    }
+
     fn position_m(&self) -> f64 {
         match self {
             Plant::Rapier(pull) => pull.position_m(),
@@ -277,7 +285,8 @@ impl PullSession {
                     before.measured_force_n,
                     before.contact_force_n,
                 );
-                force - self.robot.damping_n_s_per_m * before.speed_m_per_s
+                let free_n = force - self.robot.damping_n_s_per_m * before.speed_m_per_s;
+                self.robot.apparent_mass_kg.map_or(free_n, |mass_kg| self.plant.answering_n(free_n, mass_kg))
             }
             Command::SpeedMPerS(speed) => {
                 let speed = speed.clamp(-self.robot.speed_limit_m_per_s, self.robot.speed_limit_m_per_s);

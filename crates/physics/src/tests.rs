@@ -45,6 +45,7 @@ impl Bench {
             arm: None,
             robot: Robot {
                 moving_mass_kg: 8.0,
+                apparent_mass_kg: None,
                 lag_s: 0.05,
                 dead_time_s: 0.0,
                 damping_n_s_per_m: 2000.0,

@@ -63,6 +63,8 @@ pub struct RobotArm {
 pub struct Robot {
     /// Mass the arm moves along the pull, without the gripper.
     pub moving_mass_kg: f64,
+    /// Mass with which the force loop answers along the pull, gripper included; that of the arm where it is `None`.
+    pub apparent_mass_kg: Option<f64>,
     /// Time constant of the force loop.
     pub lag_s: f64,
     /// Time before the force loop answers.
@@ -193,6 +195,10 @@ impl Twin {
         let r = &file.robot;
         let robot = Robot {
             moving_mass_kg: in_range("robot.moving_mass_kg", r.moving_mass_kg, 0.1..=200.0, "kg")?,
+            apparent_mass_kg: r
+                .apparent_mass_kg
+                .map(|m| in_range("robot.apparent_mass_kg", m, 1e-3..=200.0, "kg"))
+                .transpose()?,
             lag_s: in_range("robot.lag_s", r.lag_s, 0.0..=2.0, "s")?,
             dead_time_s: in_range("robot.dead_time_s", r.dead_time_s, 0.0..=2.0, "s")?,
             damping_n_s_per_m: in_range("robot.damping_n_s_per_m", r.damping_n_s_per_m, 1.0..=1e5, "N s/m")?,
@@ -222,16 +228,18 @@ impl Twin {
             noise_n: in_range("wrist.noise_n", file.wrist.noise_n, 0.0..=20.0, "N")?,
             rate_hz: in_range("wrist.rate_hz", file.wrist.rate_hz, 500.0..=4000.0, "Hz")?,
         };
-        let mass_kg = robot.moving_mass_kg + gripper.mass_kg + 2.0 * gripper.jaw_mass_kg;
+        let carried_kg = robot.moving_mass_kg + gripper.mass_kg + 2.0 * gripper.jaw_mass_kg;
+        let mass_kg = robot.apparent_mass_kg.unwrap_or(carried_kg);
         // The mass of an arm with links is known where its description is read.
-        if arm.is_none() && robot.damping_n_s_per_m * wrist.step_s() >= mass_kg {
+        if (arm.is_none() || robot.apparent_mass_kg.is_some())
+            && robot.damping_n_s_per_m * wrist.step_s() >= mass_kg {
             let problem = format!(
                 "{} N s/m stop more than the moving {mass_kg} kg within one step of {} s",
                 robot.damping_n_s_per_m,
                 wrist.step_s()
             );
             return Err(ConfigError::new("robot.damping_n_s_per_m", problem)
-                .hint("lower the damping, raise robot.moving_mass_kg or raise wrist.rate_hz"));
+                .hint("lower the damping, raise the mass that moves or raise wrist.rate_hz"));
         }
         let gel = PerJaw::try_from_fn(|jaw| {
             let section = file.gel.right.as_ref().filter(|_| jaw == Jaw::Right).unwrap_or(&file.gel.left);

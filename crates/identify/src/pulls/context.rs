@@ -143,11 +143,7 @@ impl<'a> Context<'a> {
             if let Some(fall_s) = fall_s(raw, self.base.noise_n) {
                 self.base.fall_s = fall_s;
             }
-            if !self.predictor.winds_up()
-                && let Some(damping) = self.damping(raw)
-            {
-                self.base.damping_n_s_per_m = damping;
-            }
+            self.read_slides(raw);
         }
         for trace in raw {
             let observation = self.observation(trace);
@@ -218,28 +214,6 @@ impl<'a> Context<'a> {
         if let Ok(found) = found {
             (self.base.lag_s, self.base.dead_time_s) = (found.values[0], found.values[1]);
         }
-    }
-
-    /// Force per speed of the sliding jaws: displacement after the slip against the force that nobody holds.
-    fn damping(&self, raw: &[TraceObservation]) -> Option<f64> {
-        let mut each = Vec::new();
-        let rigid = PullModel { stiffness_n_per_m: 1e9, ..self.base.clone() };
-        for trace in raw.iter().filter(|t| t.slid_rows.len() >= 5) {
-            let times: Vec<f64> = trace.slid_rows.iter().map(|r| r.0).collect();
-            // The force of the loop itself: that on a tool of a contact that does not yield.
-            let applied = self.predictor.trace(&rigid, trace.row, &times).stuck_n;
-            let held = trace.slid_n?.0;
-            let mut impulse = 0.0;
-            for k in 1..times.len() {
-                impulse += (0.5 * (applied[k] + applied[k - 1]) - held).max(0.0) * (times[k] - times[k - 1]);
-            }
-            let travel = trace.slid_rows[times.len() - 1].2 - trace.slid_rows[0].2;
-            if travel > 5e-4 && impulse > 0.0 {
-                each.push(impulse / travel);
-            }
-        }
-        each.sort_by(f64::total_cmp);
-        (each.len() >= 3).then(|| each[each.len() / 2].clamp(10.0, 2e4))
     }
 
     /// Limits and kinetic ratio of the traces that slipped.

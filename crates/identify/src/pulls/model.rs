@@ -45,6 +45,8 @@ pub struct PullModel {
     pub shear_by_area: f64,
     /// Force per speed that the force loop yields to.
     pub damping_n_s_per_m: f64,
+    /// Mass with which the tool answers, where the traces show another than the rig's own.
+    pub apparent_mass_kg: Option<f64>,
     /// Time constant with which the force falls after a slip: as the traces show it.
     pub fall_s: f64,
     /// What labels and slips are read too high by; known to be small. A nuisance of fits: it is in no twin, and in no error that
@@ -124,6 +126,11 @@ pub trait PredictPulls: Sync {
     /// Readings of one pull.
     fn trace(&self, model: &PullModel, row: usize, times_s: &[f64]) -> TracePrediction {
         self.traces(model, &[(row, times_s)]).pop().unwrap_or_default()
+    }
+
+    /// Mass with which the tool of the rig answers along the pull.
+    fn mass_kg(&self) -> f64 {
+        0.0
     }
 
     /// Whether the force loop closes on its sensor: it then winds up while the jaws slide, and how fast they do says nothing

@@ -283,6 +283,39 @@ fn both_mechanics_grip_and_label_alike() {
     assert!(matches!(wide.grip(), Ok(Grip::NoContact)));
 }
 
+/// Sliding jaws under a constant excess E answer with the mass m of the admittance, whatever moves:
+/// v = E / d (1 - exp(-t d / m)), in both mechanics; before the slip nothing changes.
+#[test]
+fn sliding_jaws_answer_with_the_apparent_mass() {
+    const EXCESS_N: f64 = 4.0;
+    for mechanics in [Mechanics::Reduced, Mechanics::Rapier] {
+        for mass_kg in [1.5, 4.0, 30.0] {
+            let mut bench = bench(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0);
+            bench.mechanics = mechanics;
+            // The loop has no lag, so its force is the command.
+            (bench.robot.lag_s, bench.robot.feedback) = (0.0, Feedback::Independent);
+            (bench.robot.damping_n_s_per_m, bench.robot.speed_limit_m_per_s) = (100.0, 1.0);
+            bench.robot.apparent_mass_kg = Some(mass_kg);
+            let mut session = session_with_cells(&bench, 0.2, 1, 0.9);
+            for i in 0..800 {
+                session.step(Command::ForceN(15.5 * f64::from(i) / 800.0), STEP_S).unwrap();
+            }
+            assert!(!session.state().sliding, "{mechanics:?} {mass_kg} kg slides below its limit");
+            while !session.state().sliding {
+                session.step(Command::ForceN(16.5), STEP_S).unwrap();
+            }
+            let started = session.state().speed_m_per_s;
+            for k in 1..150 {
+                session.step(Command::ForceN(14.4 + EXCESS_N), STEP_S).unwrap();
+                let (t, last) = (f64::from(k) * STEP_S, EXCESS_N / 100.0);
+                let exact = last + (started - last) * (-t * 100.0 / mass_kg).exp();
+                let speed = session.state().speed_m_per_s;
+                assert!((speed - exact).abs() < 0.07 * last, "{mechanics:?} {mass_kg} kg, {t} s: {speed} and {exact}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_clone_continues_like_the_original() {
     let mut bench = bench(PartShape::ball(0.01), 40.0);

@@ -101,6 +101,10 @@ pub struct RobotFile {
     pub model: RobotModel,
     /// Mass that the arm moves along the pull, without the gripper; used with `model = "carriage"`.
     pub moving_mass_kg: f64,
+    /// Mass with which the force loop answers along the pull, gripper included: that of the admittance which the controller
+    /// imposes. Left out, it is the inertia of the arm and of what it carries.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub apparent_mass_kg: Option<f64>,
     /// Time constant of the force loop.
     pub lag_s: f64,
     /// Time before the force loop answers.
