@@ -282,16 +282,19 @@ impl<'a> PullPredictor<'a> {
     /// The tables of two kinetic ratios around the model's, and the weight of the second.
     fn table(&self, model: &PullModel, row: usize) -> Tables {
         let never = |made: Result<Arc<LabelTable>, Infallible>| made.unwrap_or_else(|never| match never {});
-        let build = |model: &PullModel| {
-            let stuck = self.stuck(model, row);
-            Ok::<_, Infallible>(LabelTable::new(
-                &self.scattered(model, row, &stuck, &self.backbone(model)),
-                self.most_n,
-            ))
-        };
+        let build = |model: &PullModel| Ok::<_, Infallible>(self.label_table(model, row));
         if acts_on_signals(model) {
-            let own = [model.kinetic_ratio, model.scatter, model.noise_n, model.shear_by_area];
-            let table = never(self.signal_tables.get(self.key(model, row, &own), || build(model)));
+            let (bent_lag_s, bent_dead_s) = model.bent_at_s;
+            let own = [
+                model.kinetic_ratio,
+                model.scatter,
+                model.noise_n,
+                model.shear_by_area,
+                bent_lag_s,
+                bent_dead_s,
+            ];
+            let make = || Ok(self.signal_table(model, row));
+            let table = never(self.signal_tables.get(self.key(model, row, &own), make));
             return (table.clone(), table, 0.0);
         }
         let steps = (model.kinetic_ratio / RATIO_STEP).min(1.0 / RATIO_STEP);
@@ -305,6 +308,25 @@ impl<'a> PullPredictor<'a> {
         let first = at(low * RATIO_STEP);
         let second = if weight > 0.0 { at((low + 1.0) * RATIO_STEP) } else { first.clone() };
         (first, second, weight)
+    }
+
+    fn label_table(&self, model: &PullModel, row: usize) -> LabelTable {
+        let stuck = self.stuck(model, row);
+        LabelTable::new(&self.scattered(model, row, &stuck, &self.backbone(model)), self.most_n)
+    }
+
+    /// Labels of a model whose effects act on signals: those of a contact that lets go at once, and what a bend adds to labels
+    /// without these effects, at the lag and dead time of `bent_at_s`. Fits try thousands of such models, and a contact that
+    /// bends takes five times as long.
+    fn signal_table(&self, model: &PullModel, row: usize) -> LabelTable {
+        if !self.backbone(model).bends() {
+            return self.label_table(model, row);
+        }
+        let straight = self.label_table(&PullModel { shear_by_area: 0.0, ..model.clone() }, row);
+        let (lag_s, dead_time_s) = model.bent_at_s;
+        let plain = PullModel { effects: vec![], factor: vec![], lag_s, dead_time_s, ..model.clone() };
+        let unbent = PullModel { shear_by_area: 0.0, ..plain.clone() };
+        straight.bent(&self.table(&plain, row), &self.table(&unbent, row))
     }
 
     fn slots(&self) -> usize {

@@ -92,6 +92,7 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
         lag_s: twin.robot.lag_s,
         dead_time_s: twin.robot.dead_time_s,
         stiffness_n_per_m: twin.gel.left.shear_stiffness_n_per_m + twin.gel.right.shear_stiffness_n_per_m,
+        bent_at_s: (twin.robot.lag_s, twin.robot.dead_time_s),
         shear_by_area: 0.5 * (twin.gel.left.shear_by_area + twin.gel.right.shear_by_area),
         damping_n_s_per_m: twin.robot.damping_n_s_per_m,
         apparent_mass_kg: None,

@@ -1,5 +1,6 @@
 //! Labels as a function of what the jaws hold, over scatter and noise.
 
+use super::Tables;
 use gripgen_identify::pulls::model::PullPrediction;
 use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
 use gripgen_twin::effects::{CommandChain, SensorChain};
@@ -130,6 +131,17 @@ impl LabelTable {
             })
             .collect();
         Self { rows }
+    }
+
+    /// With what labels of a contact that bends lie above those of one that does not. All tables have the same forces.
+    pub fn bent(mut self, bent: &Tables, straight: &Tables) -> Self {
+        let row = |tables: &Tables, i: usize| tables.0.rows[i].mixed(&tables.1.rows[i], tables.2);
+        for (i, own) in self.rows.iter_mut().enumerate() {
+            let (with, without) = (row(bent, i), row(straight, i));
+            own.label_n += with.label_n - without.label_n;
+            own.label_sd_n = (own.label_sd_n + with.label_sd_n - without.label_sd_n).max(0.5 * own.label_sd_n);
+        }
+        self
     }
 
     /// The prediction for jaws that hold `limit_n`.

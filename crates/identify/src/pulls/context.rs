@@ -131,6 +131,21 @@ impl<'a> Context<'a> {
         self.free_lag = false;
     }
 
+    /// Lag and dead time that labels, slips and readings say together, before effects compete: those on signals are fitted
+    /// with both free, and would win by them alone.
+    pub(super) fn share_lag(&mut self, rows: &[usize]) {
+        if self.observations.is_empty() {
+            return self.learn_lag(rows);
+        }
+        self.free_lag = true;
+        let found = self.fit(&self.base, &Terms::default(), rows);
+        self.free_lag = false;
+        let Some(found) = found else { return };
+        (self.base.lag_s, self.base.dead_time_s) = (found.model.lag_s, found.model.dead_time_s);
+        self.read_slips();
+        self.baseline_trace_cost = self.trace_residuals(&self.base, rows).cost();
+    }
+
     fn look_at(&mut self, raw: &[TraceObservation]) {
         if raw.is_empty() {
             return;

@@ -221,7 +221,7 @@ impl Context<'_> {
     ) -> Option<Fitted> {
         let layout = self.layout(start, terms);
         let mut parameters = layout.parameters.clone();
-        let acts = terms.act_on_signals();
+        let acts = terms.act_on_signals() || (self.free_lag && !self.observations.is_empty());
         // What is held predicts the same readings whatever friction does.
         let signals = acts && !terms.hold_signals;
         let mut outcome = None;

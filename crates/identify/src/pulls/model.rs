@@ -43,6 +43,8 @@ pub struct PullModel {
     /// Share of it that the points of a contact have by their area, as the traces show it. Fits leave it alone: it says how
     /// far a contact bends before it slips, and not what it holds.
     pub shear_by_area: f64,
+    /// Lag and dead time at which predictions of effects on signals work out what the bend does. Fits leave it alone.
+    pub bent_at_s: (f64, f64),
     /// Force per speed that the force loop yields to.
     pub damping_n_s_per_m: f64,
     /// Mass with which the tool answers, where the traces show another than the rig's own.
