@@ -151,6 +151,34 @@ fn fits_see_what_the_simulator_does() {
     }
 }
 
+/// Effects on readings are fitted with lag and dead time free. Where the baseline has not had both first, they win by them
+/// alone: `sensor_saturation` in these two campaigns, in which nothing acts.
+#[test]
+fn nothing_is_found_in_campaigns_of_the_shipped_twin() {
+    for seed in [5, 6] {
+        let options = CampaignOptions {
+            parts: ["ball_bearing", "gear", "long_shaft"].map(String::from).to_vec(),
+            pulls: 180,
+            sessions: 3,
+            seed,
+            ..Default::default()
+        };
+        let plan = plan_campaign(&options).unwrap();
+        let mut measured = simulate_campaign(&baseline(), &[], &plan, seed).unwrap().pulls;
+        for (i, pull) in measured.pulls.iter_mut().enumerate() {
+            if i % 4 != 0 {
+                pull.trace = None;
+            }
+        }
+        let diagnosis = diagnose(&measured, &[]).diagnosis;
+        assert_eq!(
+            (diagnosis.verdict, names(&diagnosis)),
+            (Verdict::None, vec![]),
+            "seed {seed}: {diagnosis:?}"
+        );
+    }
+}
+
 /// The loop as a user closes it: a twin with an effect is measured, the effect is named with its value, the twin that comes
 /// out predicts as well as the floor, and without the entry it is the fitted baseline again.
 #[test]

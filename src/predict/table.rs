@@ -139,7 +139,8 @@ impl LabelTable {
         for (i, own) in self.rows.iter_mut().enumerate() {
             let (with, without) = (row(bent, i), row(straight, i));
             own.label_n += with.label_n - without.label_n;
-            own.label_sd_n = (own.label_sd_n + with.label_sd_n - without.label_sd_n).max(0.5 * own.label_sd_n);
+            own.label_sd_n =
+                (own.label_sd_n + with.label_sd_n - without.label_sd_n).max(0.5 * own.label_sd_n);
         }
         self
     }

@@ -90,7 +90,7 @@ mod tests {
     fn robot(feedback: Feedback) -> Robot {
         Robot {
             moving_mass_kg: 8.0,
-                apparent_mass_kg: None,
+            apparent_mass_kg: None,
             lag_s: 0.05,
             dead_time_s: 0.02,
             damping_n_s_per_m: 2000.0,

@@ -232,7 +232,8 @@ impl Twin {
         let mass_kg = robot.apparent_mass_kg.unwrap_or(carried_kg);
         // The mass of an arm with links is known where its description is read.
         if (arm.is_none() || robot.apparent_mass_kg.is_some())
-            && robot.damping_n_s_per_m * wrist.step_s() >= mass_kg {
+            && robot.damping_n_s_per_m * wrist.step_s() >= mass_kg
+        {
             let problem = format!(
                 "{} N s/m stop more than the moving {mass_kg} kg within one step of {} s",
                 robot.damping_n_s_per_m,

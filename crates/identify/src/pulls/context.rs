@@ -239,6 +239,7 @@ impl<'a> Context<'a> {
             noise_n: self.base.noise_n,
             relaxation_s: self.base.damping_n_s_per_m / self.base.stiffness_n_per_m,
             fall_s: self.base.fall_s,
+            winds_per_s: if self.predictor.winds_up() { 1.0 / self.base.lag_s.max(2e-3) } else { 0.0 },
         };
         let traces: Vec<SlipTrace> = slipped.iter().map(|(_, _, t)| t.clone()).collect();
         let Some(slips) = read_slips(&traces, rig) else { return };

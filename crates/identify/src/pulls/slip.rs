@@ -6,6 +6,9 @@
 //! F = r L + (1 - r) L exp(-(t - T) / t_f)       from T on, where F = L
 //! ```
 //!
+//! A loop of lag tau that closes on its sensor winds up by dA = (F_stuck - F) dt / tau over what the rim no longer holds, and
+//! `F_stuck + A` drives the second line in its place.
+//!
 //! `F_stuck` is the force on a tool that holds, `t_r` the damping of the arm over the stiffness of the gels, L the limit, r
 //! the kinetic ratio. q = 0 is a contact that gives way all at once; q = 1/2 is F = L (1 - (1 - x / s)^(3/2)), the sphere of
 //! Cattaneo 1938 and Mindlin 1949. The second line is the first-order arm d dx/dt = F_a - F with that backbone: a contact
@@ -56,6 +59,8 @@ pub struct SlipRig {
     pub relaxation_s: f64,
     /// Time constant of the fall after a slip.
     pub fall_s: f64,
+    /// Rate at which a loop that closes on its sensor winds up over a force that is missing; 0 of one that does not.
+    pub winds_per_s: f64,
 }
 
 /// The limit of a trace, given the kinetic ratio.
@@ -280,6 +285,7 @@ fn follow(
 ) -> f64 {
     let (time, stuck) = (&trace.time_s, &trace.stuck_n);
     let mut f = stuck[0].min(limit);
+    let mut wound = 0.0;
     force[0] = f;
     for j in 1..time.len() {
         let (dt, ds) = (time[j] - time[j - 1], stuck[j] - stuck[j - 1]);
@@ -299,11 +305,12 @@ fn follow(
             let soft = (kappa[i] * (1.0 - w) + kappa[i + 1] * w).max(0.05);
             // Implicit in F, which stays below what holds.
             let pull = soft * h / rig.relaxation_s;
-            let next = (f + soft * step + pull * held) / (1.0 + pull);
+            let next = (f + soft * step + pull * (held + wound)) / (1.0 + pull);
             if next >= limit {
                 let share = if next > f { (limit - f) / (next - f) } else { 1.0 };
                 return time[j - 1] + (k as f64 + share) * h;
             }
+            wound += (held - next) * h * rig.winds_per_s;
             f = next;
         }
         force[j] = f;
@@ -356,24 +363,40 @@ mod tests {
 
     /// A trace of a first-order arm on a contact with the backbone F(x) of its own: the force of the loop rises by 8 N/s, and
     /// the arm yields by d dx/dt = F_a - F. Rows at 100 Hz, steps of 0.1 ms.
-    fn trace(limit_n: f64, ratio: f64, sphere: bool, damping: f64, draws: &mut Draws) -> SlipTrace {
+    /// With `lag_s` the loop closes on its sensor: tau dF_a/dt = 8 t - F, and winds up.
+    fn trace(
+        limit_n: f64,
+        ratio: f64,
+        sphere: bool,
+        damping: f64,
+        lag_s: Option<f64>,
+        draws: &mut Draws,
+    ) -> SlipTrace {
         let reach = if sphere { 1.5 } else { 1.0 } * limit_n / STIFFNESS;
         let backbone = |x: f64| {
             let share = (x / reach).min(1.0);
             limit_n * if sphere { 1.0 - (1.0 - share).powf(1.5) } else { share }
         };
         let (mut x, mut stuck, mut slid) = (0.0, 0.0, false);
+        let (mut applied, mut holding) = (0.0, 0.0);
         let mut t = SlipTrace::default();
         for step in 0..(10_000.0 * (limit_n / 8.0 + 0.6)) as usize {
-            let loop_n = 8.0e-4 * step as f64;
+            let command_n = 8.0e-4 * step as f64;
             let force = if slid { ratio * limit_n } else { backbone(x) };
+            match lag_s {
+                None => (applied, holding) = (command_n, command_n),
+                Some(lag_s) => {
+                    applied += 1e-4 * (command_n - force) / lag_s;
+                    holding += 1e-4 * (command_n - STIFFNESS * stuck) / lag_s;
+                }
+            }
             if step % 100 == 0 {
                 t.time_s.push(1e-4 * step as f64);
                 t.reading_n.push(force + NOISE_N * draws.normal());
                 t.stuck_n.push(STIFFNESS * stuck);
             }
-            x += 1e-4 * (loop_n - force) / damping;
-            stuck += 1e-4 * (loop_n - STIFFNESS * stuck) / damping;
+            x += 1e-4 * (applied - force) / damping;
+            stuck += 1e-4 * (holding - STIFFNESS * stuck) / damping;
             if x >= reach && !slid {
                 slid = true;
                 t.slip_s = 1e-4 * step as f64;
@@ -383,11 +406,20 @@ mod tests {
     }
 
     fn slips(ratio: f64, sphere: bool, damping: f64, seed: u64) -> (Slips, f64) {
+        slips_with(ratio, sphere, damping, None, seed)
+    }
+
+    fn slips_with(ratio: f64, sphere: bool, damping: f64, lag_s: Option<f64>, seed: u64) -> (Slips, f64) {
         let mut draws = Draws::new(seed, 0);
         let limits: Vec<f64> = (0..14).map(|i| 8.0 + 1.3 * f64::from(i)).collect();
         let traces: Vec<SlipTrace> =
-            limits.iter().map(|l| trace(*l, ratio, sphere, damping, &mut draws)).collect();
-        let rig = SlipRig { noise_n: NOISE_N, relaxation_s: damping / STIFFNESS, fall_s: 0.0 };
+            limits.iter().map(|l| trace(*l, ratio, sphere, damping, lag_s, &mut draws)).collect();
+        let rig = SlipRig {
+            noise_n: NOISE_N,
+            relaxation_s: damping / STIFFNESS,
+            fall_s: 0.0,
+            winds_per_s: lag_s.map_or(0.0, |lag_s| 1.0 / lag_s),
+        };
         let found = read_slips(&traces, rig).unwrap();
         let error = found.limits.iter().zip(&limits).map(|(f, l)| f.value_n / l - 1.0).sum::<f64>() / 14.0;
         (found, error)
@@ -407,6 +439,16 @@ mod tests {
             let (found, error) = slips(ratio, sphere, damping, 3);
             assert!(error.abs() < most, "{ratio} {sphere} {damping}: limits off by {error}");
             assert!((found.ratio - ratio).abs() < most, "{ratio} {sphere} {damping}: ratio {}", found.ratio);
+        }
+    }
+
+    /// A loop that closes on its sensor winds up over what the rim lets go, and pulls harder for it.
+    #[test]
+    fn limits_and_ratio_come_back_from_a_loop_that_winds_up() {
+        for (ratio, damping) in [(1.0, 1000.0), (0.9, 1000.0), (1.0, 400.0)] {
+            let (found, error) = slips_with(ratio, true, damping, Some(0.05), 3);
+            assert!(error.abs() < 0.006, "{ratio} {damping}: limits off by {error}");
+            assert!((found.ratio - ratio).abs() < 0.006, "{ratio} {damping}: ratio {}", found.ratio);
         }
     }
 

@@ -310,7 +310,10 @@ fn sliding_jaws_answer_with_the_apparent_mass() {
                 let (t, last) = (f64::from(k) * STEP_S, EXCESS_N / 100.0);
                 let exact = last + (started - last) * (-t * 100.0 / mass_kg).exp();
                 let speed = session.state().speed_m_per_s;
-                assert!((speed - exact).abs() < 0.07 * last, "{mechanics:?} {mass_kg} kg, {t} s: {speed} and {exact}");
+                assert!(
+                    (speed - exact).abs() < 0.07 * last,
+                    "{mechanics:?} {mass_kg} kg, {t} s: {speed} and {exact}"
+                );
             }
         }
     }
