@@ -69,7 +69,8 @@ fn differences(case: &Case, pulls: usize) -> Result<[f64; 2], ConfigError> {
         sums.1 += (expected - own).abs();
         sums.2 += p.max_pull_force_n;
     }
-    assert!(measured.pulls.len() > pulls / 2, "{}: {} pulls", case.name, measured.pulls.len());
+    // On soft gels strong grips reach the stop without a slip, and have no label.
+    assert!(measured.pulls.len() * 3 > pulls, "{}: {} pulls", case.name, measured.pulls.len());
     Ok([sums.0 / sums.2, sums.1 / sums.2])
 }
 
