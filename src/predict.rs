@@ -41,9 +41,6 @@ const RATIO_STEP: f64 = 0.025;
 /// Tables of two kinetic ratios and the weight of the second.
 type Tables = (Arc<LabelTable>, Arc<LabelTable>, f64);
 
-/// Ids of sensor effects that depend on the campaign's clock.
-const CLOCKS: [&str; 2] = ["sensor_drift", "sensor_gain_drift"];
-
 /// Predicts the pulls of a campaign on a rig.
 pub struct PullPredictor<'a> {
     measured: &'a MeasuredPulls,
@@ -221,7 +218,7 @@ impl<'a> PullPredictor<'a> {
         let mut bits: Vec<u64> = rig.iter().chain(more).map(|x| x.to_bits()).collect();
         let mut signed = false;
         for effect in model.effects.iter().filter(|e| e.acts_on_signals()) {
-            if CLOCKS.contains(&effect.spec.id) {
+            if effect.spec.reads_clock {
                 bits.push(self.measured.pulls[row].covariates.time_s.to_bits());
             }
             if let Some(part) = effect.part {
@@ -340,10 +337,7 @@ impl<'a> PullPredictor<'a> {
 
     /// Whether pulls of one profile and direction have the same signals.
     fn shares_signals(&self, model: &PullModel) -> bool {
-        !model
-            .effects
-            .iter()
-            .any(|e| CLOCKS.contains(&e.spec.id) || (e.acts_on_signals() && e.part.is_some()))
+        !model.effects.iter().any(|e| e.spec.reads_clock || (e.acts_on_signals() && e.part.is_some()))
     }
 
     /// Labels with signals that depend on the clock: tables at the first, the middle and the last pull of each profile
@@ -428,10 +422,8 @@ pub(crate) fn speed_limit_m_per_s(damping_n_s_per_m: f64) -> f64 {
 
 impl PredictPulls for PullPredictor<'_> {
     fn pulls(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
-        let clock = model
-            .effects
-            .iter()
-            .any(|e| CLOCKS.contains(&e.spec.id) || (e.acts_on_signals() && e.part.is_some()));
+        let clock =
+            model.effects.iter().any(|e| e.spec.reads_clock || (e.acts_on_signals() && e.part.is_some()));
         if clock {
             return self.pulls_by_clock(model, rows);
         }

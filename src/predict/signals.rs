@@ -5,9 +5,6 @@ use gripgen_identify::pulls::model::PullModel;
 use gripgen_twin::config::Feedback;
 use std::sync::Arc;
 
-/// Ids of sensor effects that remember what was read.
-const MEMORIES: [&str; 3] = ["sensor_lowpass", "sensor_creep", "sensor_hysteresis"];
-
 /// The signals of a model.
 pub(super) struct Signals<'a> {
     predictor: &'a PullPredictor<'a>,
@@ -22,8 +19,7 @@ pub(super) struct Signals<'a> {
 
 impl<'a> Signals<'a> {
     pub(super) fn new(predictor: &'a PullPredictor<'a>, model: &'a PullModel) -> Self {
-        let sensors_only =
-            model.effects.iter().all(|e| e.spec.command.is_none() && !MEMORIES.contains(&e.spec.id));
+        let sensors_only = model.effects.iter().all(|e| e.spec.command.is_none() && !e.spec.remembers);
         let plain = PullModel { effects: vec![], factor: vec![], ..model.clone() };
         Self {
             pointwise: !acts_on_signals(model)

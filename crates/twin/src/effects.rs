@@ -120,6 +120,32 @@ pub struct ParameterSpec {
     pub about: &'static str,
 }
 
+/// How large an effect has to be for more than what a first-order loop gets wrong of an arm: less is none, however often it was
+/// measured. Sizes are those of the first parameter that is fitted, less its neutral value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Visible {
+    /// However small.
+    Always,
+    /// From this size on.
+    From(f64),
+    /// What has grown to this from the first pull of a campaign to the last; the size is one per hour.
+    OverTheCampaign(f64),
+    /// What has grown to this at the largest label of a campaign; the size is one per newton.
+    AtTheLargestForce(f64),
+}
+
+impl Visible {
+    /// Whether a size is enough, in a campaign of so many hours with such a largest label.
+    pub fn holds(self, size: f64, hours: f64, largest_n: f64) -> bool {
+        match self {
+            Visible::Always => true,
+            Visible::From(least) => size >= least,
+            Visible::OverTheCampaign(least) => size * hours >= least,
+            Visible::AtTheLargestForce(least) => size * largest_n >= least,
+        }
+    }
+}
+
 /// The description of an effect.
 #[derive(Clone, Copy)]
 pub struct EffectSpec {
@@ -139,6 +165,16 @@ pub struct EffectSpec {
     pub covariates: &'static [&'static str],
     /// Its friction law is one of the contact pressure: it is always taken for each pressure cell.
     pub of_pressure: bool,
+    /// Its sensor hook depends on the clock of the campaign.
+    pub reads_clock: bool,
+    /// Its sensor hook depends on readings before.
+    pub remembers: bool,
+    /// Its formula knows pulls up and down, and no other direction.
+    pub upright_only: bool,
+    /// An effect of the surface, which parts may have each in their own way. Those of gel, gripper, sensor and robot are common.
+    pub per_part: bool,
+    /// The size from which on it is an effect.
+    pub visible: Visible,
     /// Acts on the friction coefficient of a jaw.
     pub friction: Option<FrictionHook>,
     /// Acts on the normal force of a jaw, before imprint, friction and mechanics.
@@ -166,6 +202,11 @@ impl EffectSpec {
         references: &[],
         covariates: &[],
         of_pressure: false,
+        reads_clock: false,
+        remembers: false,
+        upright_only: false,
+        per_part: false,
+        visible: Visible::Always,
         friction: None,
         normal_force: None,
         imprint_volume: None,

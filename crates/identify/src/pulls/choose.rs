@@ -87,8 +87,7 @@ impl Search<'_> {
         session.filter(|s| clock && s.gain > best.gain - RATHER_SESSION).unwrap_or(best).clone()
     }
 
-    /// Whether an effect on signals is larger than what a first-order loop gets wrong of an arm: less than 2 % of the
-    /// readings, or of a few hundredths of a newton or a second, is no effect, however often it was measured.
+    /// Whether an effect is large enough for one, of what it says itself.
     pub(super) fn visible(&self, entry: &Entry) -> bool {
         let Rival::Effect(i) = entry.rival else { return true };
         let spec = self.candidates[i].spec;
@@ -101,15 +100,7 @@ impl Search<'_> {
         let first_s = pulls.iter().map(|p| p.covariates.time_s).fold(last_s, f64::min);
         let hours = (last_s - first_s) / 3600.0;
         let most_n = self.context.data.label_n.iter().copied().fold(0.0, f64::max);
-        match spec.id {
-            "sensor_gain" | "controller_gain" | "sensor_creep" => size >= 0.02,
-            "sensor_gain_drift" => size * hours >= 0.02,
-            "sensor_quadratic" => size * most_n >= 0.02,
-            "sensor_bias" | "sensor_hysteresis" => size >= 0.05,
-            "sensor_drift" => size * hours >= 0.05,
-            "sensor_lowpass" => size >= 0.02,
-            _ => true,
-        }
+        spec.visible.holds(size, hours, most_n)
     }
 
     /// The entry that is accepted, if one is.

@@ -17,17 +17,6 @@ const REFIT_WITHIN: f64 = 6.0;
 
 const MOST_REFITS: usize = 6;
 
-/// Effects of the surface, which parts may have each in their own way; those of gel, gripper, sensor and robot are common.
-const PER_PART: [&str; 7] = [
-    "load_offset",
-    "load_power_law",
-    "area_saturation",
-    "rate_dependence",
-    "dwell_ageing",
-    "anisotropy",
-    "temperature",
-];
-
 /// Parts at most, and pulls of each at least, of an effect that differs by part.
 const MOST_PARTS: usize = 6;
 
@@ -171,7 +160,7 @@ impl Search<'_> {
         let fewest = (0..parts).map(|p| data.part_of.iter().filter(|&&q| q == p).count()).min();
         (2..=MOST_PARTS).contains(&parts)
             && fewest >= Some(FEWEST_OF_PART)
-            && PER_PART.contains(&self.candidates[i].spec.id)
+            && self.candidates[i].spec.per_part
     }
 
     /// A fit with everything free.

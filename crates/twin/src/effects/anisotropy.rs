@@ -28,6 +28,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &["grip_angle_deg"],
     friction: Some(friction),
+    upright_only: true,
+    per_part: true,
     ..EffectSpec::BARE
 };
 

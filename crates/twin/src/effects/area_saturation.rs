@@ -30,6 +30,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &["grip_force_n"],
     references: &["sharpness"],
     friction: Some(friction),
+    per_part: true,
     ..EffectSpec::BARE
 };
 

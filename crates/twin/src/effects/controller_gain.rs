@@ -1,7 +1,7 @@
 //! A force loop that settles at a multiple of its command.
 
 use super::hooks::values;
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, ParameterSpec, Visible};
 
 /// `controller_gain`: the loop follows a share of the desired force.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -17,6 +17,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         about: "settled over desired force",
     }],
     command: Some(command),
+    visible: Visible::From(0.02),
     ..EffectSpec::BARE
 };
 

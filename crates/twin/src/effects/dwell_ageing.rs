@@ -28,6 +28,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     references: &["t0_s"],
     covariates: &["dwell_s"],
     friction: Some(friction),
+    per_part: true,
     ..EffectSpec::BARE
 };
 

@@ -25,6 +25,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &["pull_direction"],
     friction: Some(friction),
     tilt_rad: Some(tilt_rad),
+    upright_only: true,
     ..EffectSpec::BARE
 };
 

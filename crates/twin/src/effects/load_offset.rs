@@ -28,6 +28,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &["grip_force_n"],
     friction: Some(friction),
+    per_part: true,
     ..EffectSpec::BARE
 };
 

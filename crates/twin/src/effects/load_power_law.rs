@@ -23,6 +23,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     references: &["f_ref_n"],
     covariates: &["grip_force_n"],
     friction: Some(friction),
+    per_part: true,
     ..EffectSpec::BARE
 };
 

@@ -32,6 +32,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     references: &["r0_n_per_s"],
     covariates: &["force_increment_n", "step_time_s"],
     friction: Some(friction),
+    per_part: true,
     ..EffectSpec::BARE
 };
 

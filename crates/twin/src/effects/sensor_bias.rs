@@ -1,7 +1,7 @@
 //! A force sensor with a wrong zero.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, ParameterSpec, Visible};
 
 /// `sensor_bias`: a constant in every reading, without load too: a wrong zero, or a payload that the robot does
 /// not know. It keeps its sign when the pull is reversed, so it raises the reading one way and lowers it the other.
@@ -18,6 +18,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         about: "reading without load, along the sensor's axis (up)",
     }],
     sensor: Some(sensor),
+    upright_only: true,
+    visible: Visible::From(0.05),
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,7 @@
 //! A force sensor that creeps under load.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, ParameterSpec, Visible};
 
 /// `sensor_creep`: part of the reading follows the force slowly. Starts settled; the memory's state is the slow
 /// force.
@@ -27,6 +27,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         },
     ],
     sensor: Some(sensor),
+    remembers: true,
+    visible: Visible::From(0.02),
     ..EffectSpec::BARE
 };
 

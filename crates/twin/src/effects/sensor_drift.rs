@@ -1,7 +1,7 @@
 //! A force sensor whose zero wanders with the clock.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, ParameterSpec, Visible};
 
 /// `sensor_drift`: a bias that grows linearly from 0 at the start of the campaign.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -18,6 +18,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     covariates: &["time_s"],
     sensor: Some(sensor),
+    reads_clock: true,
+    upright_only: true,
+    visible: Visible::OverTheCampaign(0.05),
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,7 @@
 //! A force sensor with a wrong gain.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, ParameterSpec, Visible};
 
 /// `sensor_gain`: every reading times a factor.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -17,6 +17,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         about: "measured over true force",
     }],
     sensor: Some(sensor),
+    visible: Visible::From(0.02),
     ..EffectSpec::BARE
 };
 

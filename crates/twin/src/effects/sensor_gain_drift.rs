@@ -1,7 +1,7 @@
 //! A force sensor whose gain wanders with the clock.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, ParameterSpec, Visible};
 
 /// `sensor_gain_drift`: a gain that leaves 1 linearly from the start of the campaign on.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -18,6 +18,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     covariates: &["time_s"],
     sensor: Some(sensor),
+    reads_clock: true,
+    visible: Visible::OverTheCampaign(0.02),
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,7 @@
 //! A force sensor that reads less on the way up than on the way down.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, ParameterSpec, Visible};
 
 /// `sensor_hysteresis`: a Bouc-Wen loop (exponent 1, beta = gamma), integrated exactly over each step. Its state
 /// tends to +1 while the force rises and to -1 while it falls, over `force_scale_n`, whatever the speed. A sensor
@@ -28,6 +28,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         },
     ],
     sensor: Some(sensor),
+    remembers: true,
+    visible: Visible::From(0.05),
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,7 @@
 //! A force sensor that is filtered.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, ParameterSpec, Visible};
 
 /// `sensor_lowpass`: first order, exact for a force that is constant over the step. Starts settled; the memory's
 /// state is the reading before.
@@ -18,6 +18,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         about: "time constant",
     }],
     sensor: Some(sensor),
+    remembers: true,
+    visible: Visible::From(0.02),
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,7 @@
 //! A force sensor whose line is bent.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, ParameterSpec, Visible};
 
 /// `sensor_quadratic`: the second term of the sensor's curve. A load cell bends the same way whatever the sign of the
 /// force (an even term); one that is made of two springs may bend alike in both directions (an odd one). Only pulls in both
@@ -29,6 +29,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     references: &["odd"],
     sensor: Some(sensor),
+    visible: Visible::AtTheLargestForce(0.02),
     ..EffectSpec::BARE
 };
 

@@ -28,6 +28,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     references: &["t0_c"],
     covariates: &["temperature_c"],
     friction: Some(friction),
+    per_part: true,
     ..EffectSpec::BARE
 };
 

@@ -388,6 +388,46 @@ fn only_laws_of_the_load_are_taken_per_cell_and_only_with_an_area() {
     assert_eq!(twin("[[effects]]\nname = \"load_offset\"\nper = \"jaw\"").unwrap().effects[0].per, Per::Jaw);
 }
 
+/// What a spec says of its sensor hook is what the hook does: at another time, and after other readings.
+#[test]
+fn declared_traits_are_those_of_the_hooks() {
+    for spec in LIBRARY {
+        let between = |p: &ParameterSpec| {
+            let far = if (p.bounds.1 - p.neutral).abs() > (p.neutral - p.bounds.0).abs() {
+                p.bounds.1
+            } else {
+                p.bounds.0
+            };
+            p.neutral + 0.2 * (far - p.neutral)
+        };
+        let parameters: Vec<f64> = spec.parameters.iter().map(between).collect();
+        let Some(hook) = spec.sensor else {
+            assert!(!spec.reads_clock && !spec.remembers, "{}", spec.id);
+            continue;
+        };
+        let last = |before: &[f64], clock_s: f64| {
+            let (mut memory, mut reading) = (SensorMemory::default(), 0.0);
+            for (k, force_n) in before.iter().chain(&[7.0]).enumerate() {
+                let at = SensorPoint { clock_s: clock_s + 0.01 * k as f64, step_s: 0.01 };
+                reading = hook(&parameters, *force_n, &mut memory, &at);
+            }
+            reading
+        };
+        let (rising, falling) = ([1.0, 3.0, 6.0], [19.0, 15.0, 9.0]);
+        assert_eq!(last(&rising, 0.0) != last(&rising, 7200.0), spec.reads_clock, "{}: clock", spec.id);
+        assert_eq!(last(&rising, 0.0) != last(&falling, 0.0), spec.remembers, "{}: memory", spec.id);
+    }
+}
+
+/// Laws that parts may have each in their own way are laws of friction, and nothing else of the rig.
+#[test]
+fn only_friction_differs_by_part() {
+    for spec in LIBRARY.iter().filter(|s| s.per_part) {
+        let of_rig = spec.normal_force.is_some() || spec.sensor.is_some() || spec.command.is_some();
+        assert!(spec.friction.is_some() && !of_rig, "{}", spec.id);
+    }
+}
+
 /// What a pull session holds of them has to travel between threads and be copied.
 #[test]
 fn chains_are_clone_and_send() {

@@ -117,12 +117,9 @@ impl Sweep {
     }
 }
 
-/// Effects whose formulas know a pull up (`pull_direction` 1) and down (-1) and no other.
-const UPRIGHT_EFFECTS: [&str; 4] = ["anisotropy", "jaw_tilt", "sensor_bias", "sensor_drift"];
-
 fn check_direction(direction: [f64; 3], twin: &Twin) -> Result<(), ConfigError> {
     let upright = direction[0] == 0.0 && direction[1] == 0.0 && direction[2] > 0.0;
-    match twin.effects.iter().find(|e| UPRIGHT_EFFECTS.contains(&e.spec.id)) {
+    match twin.effects.iter().find(|e| e.spec.upright_only) {
         Some(effect) if !upright => {
             let problem = format!(
                 "the effect `{}` of the twin knows pulls along z only, not {direction:?}",
