@@ -256,7 +256,7 @@ pub(crate) fn pull_direction(scenario: &Scenario) -> [f64; 3] {
 
 /// Mass with which the tool of a rig answers along +z. Of an arm whose description cannot be read, that of its carriage.
 pub(crate) fn answering_mass_kg(twin: &Twin, library: &Library) -> f64 {
-    let carried_kg = twin.robot.moving_mass_kg + twin.gripper.mass_kg + 2.0 * twin.gripper.jaw_mass_kg;
+    let carried_kg = twin.robot.carriage_mass_kg(&twin.gripper);
     let arm = twin.arm.as_ref().and_then(|arm| library.arm(arm).ok());
     let of_rig_kg = arm.map_or(carried_kg, |arm| arm.held_mass_kg(&twin.gripper, [0.0, 0.0, 1.0]));
     twin.robot.apparent_mass_kg.unwrap_or(of_rig_kg)

@@ -141,9 +141,7 @@ pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
             wrist: setup.wrist,
             start: Start::Reduced {
                 mass_kg: setup.robot.apparent_mass_kg.unwrap_or_else(|| match setup.arm {
-                    Arm::Carriage => {
-                        setup.robot.moving_mass_kg + setup.gripper.mass_kg + 2.0 * setup.gripper.jaw_mass_kg
-                    }
+                    Arm::Carriage => setup.robot.carriage_mass_kg(&setup.gripper),
                     Arm::Multibody(arm) => arm.held_mass_kg(&setup.gripper, setup.direction),
                 }),
                 gel: Box::new(setup.gel.clone()),

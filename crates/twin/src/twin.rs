@@ -81,6 +81,13 @@ pub struct Robot {
     pub twist_stiffness_n_m_per_rad: Option<f64>,
 }
 
+impl Robot {
+    /// Mass of a carriage with the gripper on it, jaws included.
+    pub fn carriage_mass_kg(&self, gripper: &Gripper) -> f64 {
+        self.moving_mass_kg + gripper.mass_kg + 2.0 * gripper.jaw_mass_kg
+    }
+}
+
 /// The gripper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gripper {
@@ -228,8 +235,7 @@ impl Twin {
             noise_n: in_range("wrist.noise_n", file.wrist.noise_n, 0.0..=20.0, "N")?,
             rate_hz: in_range("wrist.rate_hz", file.wrist.rate_hz, 500.0..=4000.0, "Hz")?,
         };
-        let carried_kg = robot.moving_mass_kg + gripper.mass_kg + 2.0 * gripper.jaw_mass_kg;
-        let mass_kg = robot.apparent_mass_kg.unwrap_or(carried_kg);
+        let mass_kg = robot.apparent_mass_kg.unwrap_or(robot.carriage_mass_kg(&gripper));
         // The mass of an arm with links is known where its description is read.
         if (arm.is_none() || robot.apparent_mass_kg.is_some())
             && robot.damping_n_s_per_m * wrist.step_s() >= mass_kg
