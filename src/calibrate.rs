@@ -8,7 +8,7 @@ use gripgen_identify::pulls::calibrate::{
     CalibrateError, CalibrateRequest, PullCalibration, calibrate_pulls,
 };
 use gripgen_twin::config::{CalibrationFile, EffectFile};
-use gripgen_twin::effects::{OutsideFit, Per};
+use gripgen_twin::effects::{OFFSET_LAW, OutsideFit, Per};
 use gripgen_twin::{MeasuredPulls, Twin};
 use std::collections::BTreeMap;
 
@@ -64,7 +64,7 @@ pub fn calibrate_twin(
     };
     let mut effects = Vec::new();
     for law in &found.laws {
-        let mut file = plain("load_offset", Some(law.part.clone()), true);
+        let mut file = plain(OFFSET_LAW.id, Some(law.part.clone()), true);
         for (name, p) in [("a", &law.a), ("b_n", &law.b_n)] {
             file.parameters.insert(name.into(), toml::Value::Float(p.value));
             file.calibration.insert(name.into(), calibration(p.low90, p.high90));

@@ -45,6 +45,7 @@ mod bench;
 mod cache;
 mod calibrate;
 mod campaign;
+mod catalogue;
 mod compare;
 mod compare_report;
 mod diagnose;
@@ -82,6 +83,7 @@ mod twin_project;
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use calibrate::{CalibratePullsError, calibrate_twin};
 pub use campaign::{SimulateCampaignError, simulate_campaign};
+pub use catalogue::{EffectCurve, effect_curve};
 pub use compare::{LabelErrors, PullComparison, compare_pulls};
 pub use compare_report::{pull_comparison_page, pull_ratios};
 pub use diagnose::{

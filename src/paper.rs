@@ -3,6 +3,7 @@
 use crate::picture::paper_picture;
 use crate::project::{LoadError, Project};
 use gripgen_record::{FolderError, INDEX_COLUMNS, ReadError, RunFolder, ShardReader};
+use gripgen_twin::effects::OFFSET_LAW;
 use gripgen_twin::{PullTrace, Twin};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -120,7 +121,7 @@ fn parts(folder: &RunFolder) -> Result<Vec<PartCells>, PaperError> {
             if cells.len() < 3 {
                 return Err(PaperError::Foreign { what: format!("three grip forces of {name}") });
             }
-            let law = twin.effects.iter().find(|e| e.spec.id == "load_offset" && e.acts_on(name));
+            let law = twin.effects.iter().find(|e| e.spec == OFFSET_LAW && e.acts_on(name));
             let law = law.map(|e| (e.values[0], e.values[1]));
             Ok(PartCells { name: name.clone(), mu: part.mu, law, cells })
         })

@@ -8,6 +8,8 @@ mod bench_guard;
 mod bristles;
 // Campaigns: planned, made on a twin, written, and read as measurements.
 mod campaign;
+// The catalogue of effects.
+mod catalogue;
 // What several tests share.
 mod common;
 // The paper's panels for any measurements.

@@ -104,50 +104,137 @@ fn packages_depend_on_each_other_as_drawn() {
     }
 }
 
-/// `twin` opens no file, reads no clock, starts no thread; only `rig` opens sockets, in files of their own.
+/// A Rust file without its tests: items under `#[cfg(test)]` are left out, whatever follows them stays. Strings and comments
+/// stay as they are.
+fn without_tests(text: &str) -> String {
+    let mut kept = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find("#[cfg(test)]") {
+        kept.push_str(&rest[..at]);
+        rest = &rest[at + item_len(&rest[at..])..];
+    }
+    kept + rest
+}
+
+/// Bytes of an item from its attributes on: up to the `;` or the closing brace that ends it, outside strings, characters and comments.
+fn item_len(text: &str) -> usize {
+    let bytes = text.as_bytes();
+    let (mut depth, mut i) = (0usize, 0);
+    while i < bytes.len() {
+        match bytes[i] {
+            b'/' if text[i..].starts_with("//") => i += text[i..].find('\n').unwrap_or(text.len() - i),
+            b'r' if text[i..].starts_with("r#\"") => i += 3 + text[i + 3..].find("\"#").unwrap_or(0) + 1,
+            b'"' => {
+                i += 1;
+                while i < bytes.len() && bytes[i] != b'"' {
+                    i += 1 + usize::from(bytes[i] == b'\\');
+                }
+            }
+            // A character, and no lifetime.
+            b'\'' if text[i..].chars().nth(2) == Some('\'') => i += 2,
+            b'\'' if text[i..].starts_with("'\\") => i += 3,
+            b'{' | b'(' | b'[' => depth += 1,
+            b'}' if depth == 1 => return i + 1,
+            b'}' | b')' | b']' => depth -= 1,
+            b';' if depth == 0 => return i + 1,
+            _ => {}
+        }
+        i += 1;
+    }
+    text.len()
+}
+
+/// Names of functions whose last bit depends on the host's mathematical library.
+const TRANSCENDENTAL: [&str; 25] = [
+    "sin", "cos", "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh",
+    "acosh", "atanh", "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "cbrt",
+    "hypot",
+];
+
+/// What a package or a folder may not use, outside tests and examples.
+fn absent_from(relative: &str) -> (&'static [&'static str], bool) {
+    let starts = |folder: &str| relative.starts_with(folder);
+    let no_world = &["std::fs", "std::time", "std::thread", "std::net", "Instant::now"];
+    if starts("crates/twin/src") || starts("crates/physics/src") || starts("crates/tactile/src") {
+        (no_world, true)
+    } else if starts("crates/identify/src") || starts("src/") {
+        (&["std::net"], true)
+    } else if starts("crates/rig/src") && relative.ends_with("/socket.rs") {
+        (&["std::fs"], false)
+    } else if starts("crates/rig/src/experiment") {
+        // The experiment waits and hurries, on connections that others made.
+        (&["std::fs", "TcpStream", "TcpListener"], false)
+    } else if starts("crates/rig/src") {
+        // Protocols are sessions without sockets.
+        (&["std::fs", "std::time", "std::thread", "TcpStream", "TcpListener", "Instant::now"], false)
+    } else if starts("crates/cli/src/commands/rig") {
+        (&["TcpStream", "TcpListener"], false)
+    } else {
+        (&["std::net"], false)
+    }
+}
+
+/// `twin` opens no file, reads no clock, starts no thread; only `rig` opens sockets, in files of their own; what a sample or a
+/// diagnosis depends on takes no function of the host's mathematical library.
 #[test]
 fn absences_that_the_architecture_promises() {
+    let mut exact = 0;
     for path in with_extension(&["rs"]) {
         let text = std::fs::read_to_string(&path).unwrap();
         let relative = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
         if relative.ends_with("tests.rs")
+            || relative.ends_with("/testing.rs")
             || relative.contains("/src/tests/")
             || relative.contains("/examples/")
+            || relative == "tests/tidy.rs"
         {
             continue;
         }
-        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-        let absent: &[&str] = if relative.starts_with("crates/twin/src") {
-            &["std::fs", "std::time", "std::thread", "std::net", "Instant::now"]
-        } else if relative.starts_with("crates/physics/src") || relative.starts_with("crates/tactile/src") {
-            &[
-                "std::fs",
-                "std::time",
-                "std::thread",
-                "std::net",
-                "Instant::now",
-                ".sin()",
-                ".cos()",
-                ".exp()",
-                ".ln()",
-            ]
-        } else if relative.starts_with("crates/rig/src") && relative.ends_with("/socket.rs") {
-            &["std::fs"]
-        } else if relative.starts_with("crates/rig/src/experiment") {
-            // The experiment waits and hurries, on connections that others made.
-            &["std::fs", "TcpStream", "TcpListener"]
-        } else if relative.starts_with("crates/rig/src") {
-            // Protocols are sessions without sockets.
-            &["std::fs", "std::time", "std::thread", "TcpStream", "TcpListener", "Instant::now"]
-        } else if relative.starts_with("crates/cli/src/commands/rig") {
-            &["TcpStream", "TcpListener"]
-        } else {
-            &["std::net"]
-        };
+        let code = without_tests(&text);
+        let (absent, deterministic) = absent_from(&relative);
         for word in absent {
             assert!(!code.contains(word), "{relative} uses {word}");
         }
+        exact += usize::from(deterministic);
+        for name in TRANSCENDENTAL.iter().filter(|_| deterministic) {
+            assert!(!code.contains(&format!(".{name}(")), "{relative} uses {name} of the host, not of libm");
+        }
     }
+    assert!(exact > 200, "only {exact} files checked");
+}
+
+/// Items under test are left out wherever they stand, and what follows them is read.
+#[test]
+fn only_tests_are_left_out() {
+    let text = "a;\n#[cfg(test)]\nmod tests;\nb.sin();\n#[cfg(test)]\nfn f() -> [u8; 2] { \"}\"; '{'; [1, 2] } // }\nc;";
+    assert_eq!(without_tests(text), "a;\n\nb.sin();\n // }\nc;");
+}
+
+/// Who else names an effect than its own file, tests and benchmarks is listed in ARCHITECTURE.md with its reason.
+#[test]
+fn effects_are_named_in_their_own_files() {
+    let architecture = read("ARCHITECTURE.md");
+    let (_, list) = architecture.split_once("## Who names an effect").unwrap();
+    let list = list.split("\n## ").next().unwrap();
+    let mut listed = 0;
+    for path in with_extension(&["rs", "py", "wgsl", "html"]) {
+        let relative = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
+        let elsewhere =
+            ["crates/twin/src/effects/", "tests/", "benches/"].iter().any(|f| relative.starts_with(f))
+                || relative.contains("/tests/")
+                || relative.ends_with("tests.rs");
+        if elsewhere {
+            continue;
+        }
+        let text = without_tests(&std::fs::read_to_string(&path).unwrap());
+        for spec in gripgen::twin::effects::LIBRARY {
+            if ['"', '\'', '`'].iter().any(|quote| text.contains(&format!("{quote}{}{quote}", spec.id))) {
+                assert!(list.contains(&format!("`{relative}`")), "{relative} names `{}`", spec.id);
+                listed += 1;
+            }
+        }
+    }
+    assert!(listed > 0, "the list is empty");
 }
 
 /// Keys of configuration files carry their unit.

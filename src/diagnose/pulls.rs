@@ -65,7 +65,7 @@ impl PullTwinError {
                 "name a twin that has this part with --twin, or the column `part` as the twin does"
             }
             PullTwinError::FreeTwist => {
-                "set robot.twist = \"stiff\"; the effect `off_centre` then stands for what is lost"
+                "set robot.twist = \"stiff\"; an effect of the grip offset then stands for what is lost"
             }
         }
     }
@@ -272,7 +272,7 @@ fn table(
     }
     let column = data.columns.get(&curve.name)?;
     let sum = |i: usize| curve.basis[i].iter().zip(coefficients).map(|(b, c)| b * c).sum::<f64>();
-    let value = |i: usize| if curve.additive { sum(i) } else { sum(i).clamp(-3.0, 3.0).exp() };
+    let value = |i: usize| if curve.additive { sum(i) } else { libm::exp(sum(i).clamp(-3.0, 3.0)) };
     let mut parameters = BTreeMap::from([
         ("covariate".to_string(), toml::Value::String(curve.name.clone())),
         ("physical".to_string(), toml::Value::Boolean(false)),

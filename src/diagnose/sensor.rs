@@ -9,7 +9,7 @@ use gripgen_identify::{
 use gripgen_record::{ExtraValues, SensorTable, SensorTableError, read_sensor_table};
 use gripgen_twin::Twin;
 use gripgen_twin::config::{CalibrationFile, EffectFile};
-use gripgen_twin::effects::{EffectSpec, OutsideFit, Per};
+use gripgen_twin::effects::{EffectSpec, OutsideFit, Per, SENSOR_LINE};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -128,14 +128,15 @@ pub fn sensor_calibration_edits(calibration: &SensorCalibration, sha256: &str) -
     };
     let (low, high) = calibration.reference_range_n;
     let evidence = format!("{} rows, reference {low:.2} to {high:.2} N", session.rows);
-    let effect = |name: &str, parameter: &str, value: &ParameterEstimate| {
-        let mut file = bare_effect(name, "gripgen calibrate sensor");
+    let effect = |spec: &EffectSpec, value: &ParameterEstimate| {
+        let mut file = bare_effect(spec.id, "gripgen calibrate sensor");
+        let parameter = spec.parameters[0].name;
         file.parameters.insert(parameter.into(), toml::Value::Float(value.value));
         file.calibration.insert(parameter.into(), interval(value, Some(evidence.clone()), sha256));
         file
     };
-    let effects =
-        vec![effect("sensor_gain", "gain", &session.gain), effect("sensor_bias", "bias_n", &session.offset)];
+    let [gain, bias] = SENSOR_LINE;
+    let effects = vec![effect(gain, &session.gain), effect(bias, &session.offset)];
     Ok(TwinEdits { values: Vec::new(), effects: Some(effects) })
 }
 

@@ -106,8 +106,8 @@ fn fit_grip(
         return Ok(None);
     };
     let (low, high) = (TRIED_MM3_PER_N[k.saturating_sub(1)], TRIED_MM3_PER_N[(k + 1).min(tried.len() - 1)]);
-    let (c, left) = least(low.ln(), high.ln(), |ln_c| unexplained(ln_c.exp()));
-    Ok(Some(BestPress { imprint_mm3_per_n: c.exp(), explained: 1.0 - left }))
+    let (c, left) = least(libm::log(low), libm::log(high), |ln_c| unexplained(libm::exp(ln_c)));
+    Ok(Some(BestPress { imprint_mm3_per_n: libm::exp(c), explained: 1.0 - left }))
 }
 
 fn options() -> SimulateOptions {

@@ -141,7 +141,7 @@ fn opposite(
             (farthest, facing) = (distance, (b - a).cross(&(c - a)).normalize() * outwards);
         }
     }
-    let opposed = facing.dot(&-normal) > OPPOSITE_RAD.cos();
+    let opposed = facing.dot(&-normal) > libm::cos(OPPOSITE_RAD);
     let axis = snapped(normal);
     opposed.then(|| Pair { middle: from - normal * (farthest / 2.0), axis, width_m: farthest })
 }
@@ -166,12 +166,12 @@ fn hit([a, b, c]: &[Point3<f64>; 3], from: Point3<f64>, direction: Vector3<f64>)
 /// An axis of the mesh, if the direction is nearly one. The sign does not matter to a gripper.
 fn snapped(direction: Vector3<f64>) -> Vector3<f64> {
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-    axes.into_iter().find(|a| a.dot(&direction).abs() > SNAP_RAD.cos()).unwrap_or(direction)
+    axes.into_iter().find(|a| a.dot(&direction).abs() > libm::cos(SNAP_RAD)).unwrap_or(direction)
 }
 
 /// How different two pairs are: place in part sizes, axis in radians.
 fn distance(a: &Pair, b: &Pair, size: f64) -> f64 {
-    let angle = a.axis.dot(&b.axis).abs().min(1.0).acos();
+    let angle = libm::acos(a.axis.dot(&b.axis).abs().min(1.0));
     (a.middle - b.middle).norm() / size + angle
 }
 

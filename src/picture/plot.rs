@@ -25,14 +25,14 @@ pub(crate) struct Curve<'a> {
 /// Distance of two grid lines that divides `range` into about `wanted` pieces: 1, 2 or 5 times a power of ten.
 fn tick(range: f64, wanted: f64) -> f64 {
     let raw = range / wanted;
-    let power = 10f64.powf(raw.log10().floor());
+    let power = libm::pow(10.0, libm::log10(raw).floor());
     let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= raw).unwrap_or(10.0);
     factor * power
 }
 
 /// A number with as many decimals as its grid needs.
 fn label(value: f64, step: f64) -> String {
-    let decimals = if step >= 1.0 { 0 } else { (-step.log10()).ceil() as usize };
+    let decimals = if step >= 1.0 { 0 } else { (-libm::log10(step)).ceil() as usize };
     format!("{value:.decimals$}")
 }
 

@@ -119,6 +119,26 @@ pub(super) fn draw(plot: &Plot, most: usize) -> String {
     svg
 }
 
+/// What the style sheet of a page says of plots, for a picture of its own.
+const STYLE: &str = "text { font: 12px system-ui, sans-serif; fill: #1d2328 } .x { text-anchor: middle } \
+    .y { text-anchor: end } path { fill: none; stroke: #0072b2 } .grid { stroke: #e6e9ed } .zero { stroke: #5b6670 } \
+    .line { stroke-width: 2 } .dots { stroke-width: 5.5; stroke-linecap: round } .c1 { stroke: #d55e00 }";
+
+impl Plot {
+    /// The plot as an SVG file of its own, with its title above it.
+    pub fn to_svg(&self) -> String {
+        let inner = draw(self, 800).replace("<svg class=\"plot\"", "<svg y=\"24\"");
+        let title = escape(&shorten(&self.title, 60));
+        let (width, height) = (WIDTH, INNER_HEIGHT + 100.0);
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
+             height=\"{height}\"><style>{STYLE}</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\
+             <text x=\"{}\" y=\"18\" class=\"x\">{title}</text>{inner}</svg>\n",
+            WIDTH / 2.0
+        )
+    }
+}
+
 /// Points with the half lengths of their error bars, few enough to draw.
 struct Thinned {
     points: Vec<(f64, f64, f64)>,

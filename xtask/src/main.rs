@@ -63,6 +63,7 @@ fn test(all: bool) -> Result<(), String> {
     let vulkan = vulkan::set_up();
     let python = python::set_up(&root(), all)?;
     run("format", &mut cargo(&["fmt", "--all", "--check"]))?;
+    run("format of the effects", &mut rustfmt_effects()?)?;
     let clippy = ["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"];
     run("clippy", &mut cargo(&clippy))?;
     let mut rust = cargo(&["test", "--workspace", "--no-fail-fast"]);
@@ -86,6 +87,16 @@ fn test(all: bool) -> Result<(), String> {
     run("Python checks", &mut checks)?;
     eprintln!("\nall tests passed in {:.0} s", start.elapsed().as_secs_f64());
     Ok(())
+}
+
+/// The effects are modules of a macro, which `cargo fmt` does not look into.
+fn rustfmt_effects() -> Result<Command, String> {
+    let folder = root().join("crates/twin/src/effects");
+    let entries = std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut rustfmt = Command::new("rustfmt");
+    rustfmt.args(["--check", "--edition", "2024"]);
+    rustfmt.args(entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|x| x == "rs")));
+    Ok(rustfmt)
 }
 
 fn blind() -> Result<(), String> {

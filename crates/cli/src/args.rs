@@ -42,6 +42,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Find out where a twin is wrong, and why: pulls, force-sensor tables, presses.
     Diagnose(DiagnoseArgs),
+    /// List what a twin may be missing, or explain one effect: formula, source, what it does, what to do about it.
+    Effects(EffectsArgs),
     /// Plan the pulls of a campaign.
     Campaign(CampaignArgs),
     /// The experiment on a robot, and a virtual one that speaks the same protocols.
@@ -292,6 +294,19 @@ pub struct CompareArgs {
     /// How much is said.
     #[command(flatten)]
     pub talk: TalkArgs,
+}
+
+/// `gripgen effects`
+#[derive(Debug, Args)]
+pub struct EffectsArgs {
+    /// An effect; all of them in a list where it is left out.
+    pub id: Option<String>,
+    /// Draw what it does to the pull force at slip.
+    #[arg(long, value_name = "FILE.svg", requires = "id")]
+    pub plot: Option<PathBuf>,
+    /// JSON: everything that is known of the effect, or of each.
+    #[command(flatten)]
+    pub json: JsonArgs,
 }
 
 /// Where tactile images are made.

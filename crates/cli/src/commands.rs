@@ -10,6 +10,7 @@ pub mod compare;
 pub mod compare_sensor;
 pub mod completions;
 pub mod diagnose;
+pub mod effects;
 pub mod export;
 pub mod info;
 mod info_pulls;

@@ -31,8 +31,8 @@ pub fn imprint_constant(presses: &[FittedPress]) -> Option<ImprintEstimate> {
     if presses.len() < 2 {
         return None;
     }
-    let ln_c: Vec<f64> = presses.iter().map(|p| p.imprint_mm3_per_n.ln()).collect();
-    let ln_f: Vec<f64> = presses.iter().map(|p| p.force_n.ln()).collect();
+    let ln_c: Vec<f64> = presses.iter().map(|p| libm::log(p.imprint_mm3_per_n)).collect();
+    let ln_f: Vec<f64> = presses.iter().map(|p| libm::log(p.force_n)).collect();
     let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
     let (c, f) = (mean(&ln_c), mean(&ln_f));
     let sum = |a: &[f64], a0: f64, b: &[f64], b0: f64| -> f64 {
@@ -48,14 +48,14 @@ pub fn imprint_constant(presses: &[FittedPress]) -> Option<ImprintEstimate> {
     };
     let (least, most) =
         ln_f.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), &x| (l.min(x), m.max(x)));
-    let exponent = (presses.len() > 2 && most - least >= LEAST_RATIO.ln()).then(|| {
+    let exponent = (presses.len() > 2 && most - least >= libm::log(LEAST_RATIO)).then(|| {
         let slope = cf / ff;
         let sd = ((cc - slope * cf).max(0.0) / (n - 2.0) / ff).sqrt();
         let half = t_quantile_95(n - 2.0) * sd;
         estimate(1.0 + slope, 1.0 + slope - half, 1.0 + slope + half, "1")
     });
     Some(ImprintEstimate {
-        imprint_mm3_per_n: estimate(c.exp(), (c - half).exp(), (c + half).exp(), "mm^3/N"),
+        imprint_mm3_per_n: estimate(libm::exp(c), libm::exp(c - half), libm::exp(c + half), "mm^3/N"),
         exponent,
     })
 }

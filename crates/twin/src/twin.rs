@@ -3,9 +3,9 @@
 mod check;
 
 use crate::config::{
-    ConfigError, Feedback, ForceConvention, GelModel, ImageNoise, RobotModel, TwinFile, Twist,
+    ConfigError, EffectFile, Feedback, ForceConvention, GelModel, ImageNoise, RobotModel, TwinFile, Twist,
 };
-use crate::effects::Effect;
+use crate::effects::{self, Effect};
 use crate::frames::{Pose, pose};
 use crate::table::{TABLE_EFFECT, Table, check_table};
 use crate::{Jaw, PerJaw};
@@ -283,16 +283,13 @@ impl Twin {
                 effects.push(check_effect(file, i)?);
             }
         }
-        let named = |ids: &[&str]| file.effects.iter().position(|e| ids.contains(&e.name.as_str()));
+        let without_meaning = |(i, e): (usize, &EffectFile)| {
+            let reason = effects::find(&e.name)?.not_on_elastic_gel?;
+            Some((i, format!("`{}` {reason}", e.name)))
+        };
         if gel.iter().any(|(_, gel)| gel.model == GelModel::Elastic)
-            && let Some(i) = named(&["imprint_nonlinearity", "gel_kernel"])
+            && let Some((i, problem)) = file.effects.iter().enumerate().find_map(without_meaning)
         {
-            let problem = match file.effects[i].name.as_str() {
-                "gel_kernel" => {
-                    "`gel_kernel` scales the blurs of the gel, which an elastic gel does not have"
-                }
-                _ => "`imprint_nonlinearity` changes the imprint constant, which an elastic gel does not use",
-            };
             return Err(ConfigError::new(format!("effects[{i}].name"), problem)
                 .hint("leave the effect out, or set gel.left.model = \"pyramid\""));
         }

@@ -1,6 +1,6 @@
 //! From what was found to the answer, the twin's edits and the report.
 
-use super::candidates::{STEP_PARAMETER, main_parameter, optics_effects};
+use super::candidates::{press_effects, tried};
 use super::search::{Found, MATERIAL, SURE};
 use super::unnamed::{PressCovariate, PressValues};
 use super::work::{Acting, Work, for_each, optics_at};
@@ -15,7 +15,7 @@ use gripgen_identify::{
 use gripgen_tactile::presses::frame_mse;
 use gripgen_twin::OpticsState;
 use gripgen_twin::config::{CalibrationFile, EffectFile};
-use gripgen_twin::effects::{EffectSpec, OutsideFit, Per};
+use gripgen_twin::effects::{EffectSpec, Measured, OutsideFit, Per, separating};
 use std::collections::BTreeMap;
 
 /// Everything that the answer is made of.
@@ -155,11 +155,11 @@ impl Answer<'_> {
                         parameters.insert(p.name.to_string(), estimate);
                     }
                 }
-                if let Some(j) = acting.spec.parameters.iter().position(|p| p.name == STEP_PARAMETER) {
+                if let Some(j) = tried(acting.spec) {
                     let value = acting.values[j];
                     let (low90, high90) = if value > 0.0 { (value - 1.0, value + 1.0) } else { (0.0, 0.0) };
                     let estimate = ParameterEstimate { value, low90, high90, unit: "1".into() };
-                    parameters.insert(STEP_PARAMETER.into(), estimate);
+                    parameters.insert(acting.spec.parameters[j].name.into(), estimate);
                 }
                 let (own, rivals) = self.weights(e);
                 let mut class = vec![acting.spec.id.to_string()];
@@ -219,14 +219,14 @@ impl Answer<'_> {
     fn would_have_seen(&self) -> BTreeMap<String, Detectable> {
         let base = self.found.cost;
         let mut sizes = BTreeMap::new();
-        for spec in optics_effects() {
+        for (spec, fit) in press_effects() {
             if self.found.model.acting.iter().any(|a| a.spec == spec) {
                 continue;
             }
             let scatter =
                 self.found.trials.iter().rev().find(|t| t.name == spec.id).map_or(0.0, |t| t.standard_error);
             let wanted = (MATERIAL * base).max(SURE * scatter) + 0.84 * scatter;
-            let j = main_parameter(spec);
+            let Some(j) = spec.position(fit.main) else { continue };
             if let Some(value) = self.size_of(spec, j, wanted) {
                 let parameter = spec.parameters[j].name.into();
                 sizes.insert(spec.id.to_string(), Detectable { parameter, value, power: 0.8 });
@@ -264,7 +264,7 @@ impl Answer<'_> {
             if now <= 0.0 {
                 return None;
             }
-            size = (size * (wanted / now).powf(0.4)).clamp(1e-4 * room, room);
+            size = (size * libm::pow(wanted / now, 0.4)).clamp(1e-4 * room, room);
         }
         Some(p.neutral + size)
     }
@@ -376,27 +376,10 @@ fn interval(errors: &[f64]) -> HeldOutError {
 
 /// What tells an effect from its rivals.
 fn separate_by(name: &str, rivals: &[Rival]) -> String {
-    let mut all = vec![name];
-    all.extend(rivals.iter().map(|r| r.name.as_str()));
-    let has = |id: &str| all.contains(&id);
-    let mut text: Vec<&str> = Vec::new();
-    if (has("exposure") || has("light_drift")) && (has("rest_offset") || has("background_change")) {
-        text.push("take a frame without contact before and after the presses: light and camera change it, an offset of the colours does not");
+    let suspects: Vec<&str> = std::iter::once(name).chain(rivals.iter().map(|r| r.name.as_str())).collect();
+    let steps = separating(Measured::Presses, &suspects);
+    if steps.is_empty() {
+        return "more presses, at other places and depths".into();
     }
-    if has("light_drift") && (has("exposure") || has("rest_offset") || has("background_change")) {
-        text.push("repeat the first press after an hour and write down the time of every press");
-    }
-    if has("defocus") && (has("cad_mismatch") || has("gel_kernel")) {
-        text.push("press another shape with edges: focus is the camera's, blunt edges and outlines are the part's; gel kernels grow with the depth");
-    }
-    if has("misregistration") || has("gel_dome") {
-        text.push("press near all four corners, at two depths, and mark the contacts");
-    }
-    if has("cast_shadow") {
-        text.push("press at several depths: shadows grow with the height of the contact");
-    }
-    if text.is_empty() {
-        text.push("more presses, at other places and depths");
-    }
-    text.join("; ")
+    steps.iter().map(|step| step.text()).collect::<Vec<_>>().join("; ")
 }

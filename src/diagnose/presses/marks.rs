@@ -2,7 +2,7 @@
 //!
 //! Circles marked by hand are unsure by a pixel or two, each in its own way, and at the rim of a contact that outweighs
 //! most of what is looked for. Each press is therefore registered by itself. What the presses have in common in that,
-//! as a whole and along the frame, is left in: it is what `misregistration` is about.
+//! as a whole and along the frame, is left in: it is what an effect of the library is about.
 
 use super::work::{Work, for_each};
 use gripgen_tactile::presses::{Circle, Zone};

@@ -1,6 +1,6 @@
 //! Candidates fitted and scored on presses that their fit has not seen.
 
-use super::candidates::{STEP_PARAMETER, is_drawn};
+use super::candidates::{is_drawn, tried};
 use super::work::{Acting, Head, NamedModel, Work};
 use gripgen_identify::{
     FreeParameter, GroupMoments, GroupedFit, fit_grouped, fold_steps, grouped_step, held_out_costs,
@@ -131,7 +131,7 @@ pub(super) fn with(
 ) -> Scored {
     let mut acting = base.acting.to_vec();
     acting.push(Acting::start(spec, &work.scene));
-    if let Some(at) = spec.parameters.iter().position(|p| p.name == STEP_PARAMETER) {
+    if let Some(at) = tried(spec) {
         let place = step_place(work, design, &acting, at);
         if let Some(last) = acting.last_mut() {
             last.values[at] = place;

@@ -1,6 +1,6 @@
 //! Which effects act: added one after another, exchanged, dropped, and compared with what has no name.
 
-use super::candidates::optics_effects;
+use super::candidates::press_effects;
 use super::score::{Base, Design, Scored, differences, scored, with};
 use super::unnamed::{Fields, PressCovariate, Unnamed};
 use super::work::Work;
@@ -253,5 +253,5 @@ fn values_text(scored: &Scored) -> String {
 
 /// The candidates that these data can speak of.
 pub(super) fn candidates(marked: bool) -> Vec<&'static EffectSpec> {
-    optics_effects().filter(|s| marked || s.id != "misregistration").collect()
+    press_effects().filter(|(_, fit)| marked || !fit.needs_marks).map(|(spec, _)| spec).collect()
 }

@@ -27,9 +27,9 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
         calibrate_twin(&loaded.pulls, &twin, &library, &request, jobs()).map_err(|e| {
             let hint = match &e {
                 CalibratePullsError::Twin(e) => e.hint(),
-                CalibratePullsError::Fit(CalibrateError::UnknownEffect(_)) => {
-                    "docs/model.md lists the effects"
-                }
+                CalibratePullsError::Fit(
+                    CalibrateError::UnknownEffect(_) | CalibrateError::NotInPulls { .. },
+                ) => "`gripgen effects` lists the effects, and what shows them",
                 CalibratePullsError::Fit(CalibrateError::NotExcited { .. }) => {
                     "`gripgen campaign` plans pulls that vary everything"
                 }

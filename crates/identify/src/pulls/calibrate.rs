@@ -13,7 +13,7 @@ use super::scatter::scatter;
 use super::slip::Slips;
 use crate::diagnosis::{HeldOutError, ParameterEstimate};
 use gripgen_twin::MeasuredPulls;
-use gripgen_twin::effects::find;
+use gripgen_twin::effects::{EffectSpec, OFFSET_LAW, find};
 use std::collections::BTreeMap;
 
 /// Least scatter with which a fit weighs residuals.
@@ -75,6 +75,14 @@ pub enum CalibrateError {
     /// No such effect.
     #[error("there is no effect `{0}`")]
     UnknownEffect(String),
+    /// An effect that no pull can show.
+    #[error("pulls cannot show `{effect}`: {reason}")]
+    NotInPulls {
+        /// The effect.
+        effect: String,
+        /// Why.
+        reason: &'static str,
+    },
     /// An effect that these pulls cannot show.
     #[error("these pulls cannot show `{effect}`: it acts on nothing that was varied (it needs {needs})")]
     NotExcited {
@@ -101,20 +109,17 @@ pub fn calibrate_pulls(
     }
     let most_n = data.label_n.iter().copied().fold(0.0, f64::max);
     let mut terms = Terms::default();
-    let asked = |id: &str| -> Result<Candidate, CalibrateError> {
-        let spec = find(id).ok_or_else(|| CalibrateError::UnknownEffect(id.into()))?;
-        let needs = || {
-            if spec.covariates.is_empty() {
-                "no column, but pulls".into()
-            } else {
-                spec.covariates.join(", ")
-            }
-        };
+    let asked = |spec: &'static EffectSpec| -> Result<Candidate, CalibrateError> {
+        if let Err(reason) = spec.pulls {
+            return Err(CalibrateError::NotInPulls { effect: spec.id.into(), reason });
+        }
+        let spans = spec.pulls.map_or(&[][..], |fit| fit.spans);
+        let needs = || [spec.covariates, spans].concat().join(", ");
         candidate(spec, &data, most_n)
-            .ok_or_else(|| CalibrateError::NotExcited { effect: id.into(), needs: needs() })
+            .ok_or_else(|| CalibrateError::NotExcited { effect: spec.id.into(), needs: needs() })
     };
     if request.offset_law {
-        let law = asked("load_offset")?;
+        let law = asked(OFFSET_LAW)?;
         for part in 0..data.parts.len() {
             let own = Candidate { part: Some((part, data.parts[part].clone())), ..law.clone() };
             let start = own.starts[0].clone();
@@ -122,7 +127,8 @@ pub fn calibrate_pulls(
         }
     }
     for id in &request.effects {
-        let candidate = asked(id)?;
+        let spec = find(id).ok_or_else(|| CalibrateError::UnknownEffect(id.clone()))?;
+        let candidate = asked(spec)?;
         let start = candidate.starts[candidate.starts.len() / 2].clone();
         terms.effects.push((candidate, start));
     }

@@ -4,7 +4,7 @@ use super::data::{Column, PullData};
 use super::model::ModelEffect;
 use crate::least_squares::FreeParameter;
 use gripgen_twin::PULLS_SINCE_REST;
-use gripgen_twin::effects::{EffectSpec, LIBRARY};
+use gripgen_twin::effects::{EffectSpec, Fit, LIBRARY, PullSpan};
 
 /// An effect that competes.
 #[derive(Debug, Clone)]
@@ -39,16 +39,7 @@ impl Candidate {
             .iter()
             .map(|&(i, scale)| {
                 let p = &self.spec.parameters[i];
-                let mut bounds = p.bounds;
-                // A gel that settles once to less friction is worn, which is another effect.
-                match (self.spec.id, p.name) {
-                    ("conditioning", "depth") if start[2] == 0.0 => bounds.0 = 0.0,
-                    // A wider one is no transition but a saturation or a power law.
-                    ("regime_transition", "width_n") => bounds.1 = 6.0,
-                    // What comes late is a part of the response; one that goes back is a lag of another kind.
-                    ("sensor_creep", "fraction") => bounds.0 = 0.0,
-                    _ => {}
-                }
+                let bounds = self.spec.pulls.map_or(p.bounds, |fit| (fit.bounds)(p.name, start, p.bounds));
                 FreeParameter { name: self.name_of(p.name), start: start[i], bounds, scale }
             })
             .collect()
@@ -69,7 +60,7 @@ impl Candidate {
 
     /// Whether it changes readings or commands.
     pub fn acts_on_signals(&self) -> bool {
-        self.spec.sensor.is_some() || self.spec.command.is_some()
+        self.spec.acts_on_signals()
     }
 
     /// Position of the parameter that says how large the effect is.
@@ -78,145 +69,38 @@ impl Candidate {
     }
 }
 
-/// Values of `names`, the others neutral.
-fn values(spec: &EffectSpec, named: &[(&str, f64)]) -> Vec<f64> {
-    let value =
-        |name: &str, neutral: f64| named.iter().find(|(n, _)| *n == name).map_or(neutral, |(_, v)| *v);
-    spec.parameters.iter().map(|p| value(p.name, p.neutral)).collect()
-}
-
 /// The effects of the library that can show in these pulls: those whose covariates vary. `without` are ids that must not
 /// compete.
-pub fn candidates(data: &PullData<'_>, most_reading_n: f64, without: &[&str]) -> Vec<Candidate> {
+pub fn candidates(data: &PullData<'_>, largest_reading_n: f64, without: &[&str]) -> Vec<Candidate> {
     LIBRARY
         .iter()
         .filter(|s| !without.contains(&s.id))
-        .filter_map(|spec| candidate(spec, data, most_reading_n))
+        .filter_map(|spec| candidate(spec, data, largest_reading_n))
         .collect()
 }
 
-pub(super) fn candidate(spec: &'static EffectSpec, data: &PullData<'_>, most_n: f64) -> Option<Candidate> {
+/// An effect as it competes in these pulls; `None` if its covariates do not vary or no pull can show it.
+pub(super) fn candidate(
+    spec: &'static EffectSpec,
+    data: &PullData<'_>,
+    largest_reading_n: f64,
+) -> Option<Candidate> {
+    let fit = spec.pulls.ok()?;
     let varies = |name: &str| data.varies(name);
-    let rate = varies("force_increment_n") || varies("step_time_s");
-    // A clock and a count of pulls always run.
-    let last_pull = numbers(data, "pull_index").into_iter().fold(0.0, f64::max).max(4.0);
-    let plain = |starts: &[&[(&str, f64)]], free: &[(&str, f64)], searched: usize| {
-        let starts = starts.iter().map(|s| values(spec, s)).collect();
-        let free = free
-            .iter()
-            .filter_map(|(name, scale)| Some((spec.parameters.iter().position(|p| p.name == *name)?, *scale)))
-            .collect();
-        Some(Candidate { spec, starts, free, part: None, searched })
-    };
-    let over = |name: &str, at: &[f64], other: (&str, f64), free: &[(&str, f64)], searched: usize| {
-        let starts = at.iter().map(|x| values(spec, &[(name, *x), other])).collect();
-        let free = free
-            .iter()
-            .filter_map(|(name, scale)| Some((spec.parameters.iter().position(|p| p.name == *name)?, *scale)))
-            .collect();
-        Some(Candidate { spec, starts, free, part: None, searched })
-    };
-    let force = varies("grip_force_n");
-    match spec.id {
-        "load_offset" if force => plain(&[&[("b_n", 0.0)]], &[("b_n", 1.0)], 0),
-        "load_power_law" if force => plain(&[&[("n", 0.0)]], &[("n", 0.05)], 0),
-        "area_saturation" if force => {
-            over("sharpness", &[1.0, 2.5], ("saturation_per_n", 0.004), &[("saturation_per_n", 0.002)], 1)
-        }
-        "regime_transition" if force => {
-            let mut starts = Vec::new();
-            for f_c in [10.0, 15.0, 20.0, 25.0, 35.0, 50.0] {
-                for step in [0.15, -0.15] {
-                    starts.push(values(spec, &[("f_c_n", f_c), ("step", step), ("width_n", 2.0)]));
-                }
-            }
-            Some(Candidate {
-                spec,
-                starts,
-                free: vec![(0, 0.1), (1, 3.0), (2, 1.0)],
-                part: None,
-                searched: 0,
-            })
-        }
-        "rate_dependence" if rate => plain(&[&[("k", 0.0)]], &[("k", 0.02)], 0),
-        "dwell_ageing" if varies("dwell_s") => plain(&[&[("beta", 0.01)]], &[("beta", 0.01)], 0),
-        "anisotropy" if varies("grip_angle_deg") => over(
-            "axis_deg",
-            &[-67.5, -22.5, 22.5, 67.5],
-            ("amplitude", 0.08),
-            &[("amplitude", 0.05), ("axis_deg", 10.0)],
-            0,
-        ),
-        "contamination" if varies("pull_index") => {
-            let at = splits(data);
-            over("at_pull_index", &at, ("drop", 0.0), &[("drop", 0.05)], 1)
-        }
-        "wear" if varies("pull_index") => over(
-            "n0",
-            &[0.1 * last_pull, 0.5 * last_pull, 3.0 * last_pull],
-            ("depth", 0.1),
-            &[("depth", 0.05), ("n0", 0.3 * last_pull)],
-            0,
-        ),
-        "conditioning" if varies("pull_index") => {
-            let rested =
-                data.measured.pulls.iter().any(|p| p.covariates.extra.contains_key(PULLS_SINCE_REST));
-            let mut starts = Vec::new();
-            for n0 in [2.0, 6.0, 20.0] {
-                starts.push(values(spec, &[("n0", n0), ("depth", 0.1)]));
-                if rested {
-                    starts.push(values(spec, &[("n0", n0), ("depth", 0.1), ("rests", 1.0)]));
-                    starts.push(values(spec, &[("n0", n0), ("depth", -0.1), ("rests", 1.0)]));
-                }
-            }
-            let free = vec![(0, 0.05), (1, 2.0)];
-            Some(Candidate { spec, starts, free, part: None, searched: usize::from(rested) })
-        }
-        "temperature" if varies("temperature_c") => plain(&[&[("k_per_k", 0.0)]], &[("k_per_k", 0.005)], 0),
-        "grip_relaxation" if varies("dwell_s") => {
-            over("tau_s", &[1.0, 8.0, 60.0], ("depth", 0.08), &[("depth", 0.05), ("tau_s", 5.0)], 0)
-        }
-        "jaw_tilt" if varies("pull_direction") => plain(&[&[("tilt_deg", 0.0)]], &[("tilt_deg", 0.3)], 0),
-        "off_centre" if varies("grip_offset_mm") => over(
-            "inverse_lever_per_mm",
-            &[0.04, 0.12],
-            ("inverse_lever_per_mm", 0.08),
-            &[("inverse_lever_per_mm", 0.02)],
-            0,
-        ),
-        "grip_force_loss" if force => plain(&[&[("loss_n", 0.0)]], &[("loss_n", 0.5)], 0),
-        "sensor_gain" => plain(&[&[("gain", 1.0)]], &[("gain", 0.05)], 0),
-        "sensor_bias" => plain(&[&[("bias_n", 0.0)]], &[("bias_n", 0.2)], 0),
-        "sensor_drift" if varies("time_s") => plain(&[&[("rate_n_per_h", 0.0)]], &[("rate_n_per_h", 0.2)], 0),
-        "sensor_gain_drift" if varies("time_s") => {
-            plain(&[&[("rate_per_h", 0.0)]], &[("rate_per_h", 0.02)], 0)
-        }
-        "sensor_hysteresis" => over(
-            "force_scale_n",
-            &[3.0, 15.0],
-            ("amplitude_n", 0.3),
-            &[("amplitude_n", 0.3), ("force_scale_n", 3.0)],
-            0,
-        ),
-        "sensor_quadratic" if force => {
-            let odd: &[f64] = if varies("pull_direction") { &[0.0, 1.0] } else { &[0.0] };
-            over("odd", odd, ("quadratic_per_n", 0.0), &[("quadratic_per_n", 0.001)], 0)
-        }
-        "sensor_saturation" => over(
-            "limit_n",
-            &[0.7 * most_n, 0.95 * most_n],
-            ("limit_n", 0.8 * most_n),
-            &[("limit_n", 0.03 * most_n)],
-            0,
-        ),
-        "sensor_lowpass" => over("tau_s", &[0.03, 0.15], ("tau_s", 0.05), &[("tau_s", 0.02)], 0),
-        "sensor_creep" => {
-            over("tau_s", &[1.0, 8.0], ("fraction", 0.05), &[("fraction", 0.03), ("tau_s", 1.0)], 0)
-        }
-        "controller_gain" => plain(&[&[("gain", 1.0)]], &[("gain", 0.05)], 0),
-        "deadband" => plain(&[&[("width_n", 1.0)], &[("width_n", 2.0)]], &[("width_n", 0.2)], 0),
-        _ => None,
+    let has_range = spec.covariates.is_empty() || spec.covariates.iter().any(|c| varies(c));
+    if !has_range || !fit.spans.iter().all(|c| varies(c)) {
+        return None;
     }
+    let Fit { starts, free, searched } = (fit.fit)(&PullSpan {
+        varies: &varies,
+        largest_reading_n,
+        last_pull_index: numbers(data, "pull_index").into_iter().fold(0.0, f64::max).max(4.0),
+        splits: splits(data),
+        rests: data.measured.pulls.iter().any(|p| p.covariates.extra.contains_key(PULLS_SINCE_REST)),
+    });
+    let starts = starts.iter().map(|s| spec.values(s)).collect();
+    let free = free.iter().filter_map(|(name, scale)| Some((spec.position(name)?, *scale))).collect();
+    Some(Candidate { spec, starts, free, part: None, searched })
 }
 
 fn numbers(data: &PullData<'_>, name: &str) -> Vec<f64> {

@@ -25,10 +25,9 @@ impl Search<'_> {
     pub(super) fn stands_beside(&self, rival: &Rival, effects: &[usize], curves: &[usize]) -> bool {
         match rival {
             Rival::Effect(i) | Rival::ByPart(i) => {
-                // A drift that is not straight looks like a straight one from another start.
-                let of_drift = self.candidates[*i].spec.id == "sensor_bias"
-                    && effects.iter().any(|&k| self.candidates[k].spec.id == "sensor_drift");
-                !of_drift && !curves.iter().any(|&k| self.shares_covariate(*i, k))
+                let id = &self.candidates[*i].spec.id;
+                let left = effects.iter().any(|&k| self.candidates[k].spec.leaves.contains(id));
+                !left && !curves.iter().any(|&k| self.shares_covariate(*i, k))
             }
             Rival::Curve(k) => !effects.iter().any(|&i| self.shares_covariate(i, *k)),
         }

@@ -248,7 +248,7 @@ impl<'a> Context<'a> {
             self.observations[*k].limit_n = Some(reading);
         }
         if slipped.len() >= 3 {
-            self.kinetic = Some((slips.ratio, slips.ratio_sd.hypot(slips.model_sd)));
+            self.kinetic = Some((slips.ratio, libm::hypot(slips.ratio_sd, slips.model_sd)));
             self.base.kinetic_ratio = slips.ratio;
             self.slips = Some(slips);
         }

@@ -107,8 +107,8 @@ impl<'a> ScoreTest<'a> {
 
     /// What an effect promises from a start.
     pub fn effect(&self, candidate: &Candidate, from: &[f64]) -> f64 {
-        // These have no slope at nothing.
-        if candidate.free.is_empty() || ["sensor_saturation", "deadband"].contains(&candidate.spec.id) {
+        let flat = candidate.spec.pulls.is_ok_and(|fit| fit.flat_at_neutral);
+        if candidate.free.is_empty() || flat {
             return f64::INFINITY;
         }
         let raw = self.direction(candidate, from);

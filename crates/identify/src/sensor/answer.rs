@@ -1,7 +1,7 @@
 //! The diagnosis of a force sensor.
 
 use super::calibrate::estimate;
-use super::candidates::{Candidate, FORCE_RATE, candidates, force_rate};
+use super::candidates::{Candidate, candidates, force_rate};
 use super::choose::{Choice, choose, model_of, ties};
 use super::errors::{Errors, errors};
 use super::moments::{Model, Moments};
@@ -14,7 +14,7 @@ use crate::diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, Rival,
     UnknownCovariate, Verdict,
 };
-use gripgen_twin::effects::EffectSpec;
+use gripgen_twin::effects::{EffectSpec, FORCE_RATE};
 use std::collections::BTreeMap;
 
 /// A candidate in the table of evidence.

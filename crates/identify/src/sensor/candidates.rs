@@ -3,21 +3,12 @@
 use super::prepare::{Prepared, range};
 use super::{SensorData, moments::Model};
 use crate::permutation::Covariate;
-use gripgen_twin::effects::{EffectSpec, SensorMemory, SensorPoint, find};
+use gripgen_twin::effects::{EffectSpec, FORCE_RATE, LIBRARY, REFERENCE_FORCE, SensorMemory, SensorPoint};
 
 /// Effects that compete. Gain and bias are the baseline.
-pub(crate) const EFFECTS: [&str; 7] = [
-    "sensor_drift",
-    "sensor_gain_drift",
-    "sensor_quadratic",
-    "sensor_saturation",
-    "sensor_lowpass",
-    "sensor_creep",
-    "sensor_hysteresis",
-];
-
-/// Name of the derivative of the reference in an answer.
-pub(crate) const FORCE_RATE: &str = "force_rate_n_per_s";
+pub(crate) fn effects() -> impl Iterator<Item = &'static EffectSpec> {
+    LIBRARY.iter().copied().filter(|spec| spec.table.is_some())
+}
 
 /// How a candidate enters the model at one point of its grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,6 +65,23 @@ impl Candidate {
     pub fn is_effect(&self) -> bool {
         matches!(self.kind, Kind::Effect(_))
     }
+
+    /// Covariates through which an effect acts.
+    pub fn acts_through(&self) -> &'static [&'static str] {
+        match &self.kind {
+            Kind::Effect(spec) => spec.table.map_or(&[], |fit| fit.acts_through),
+            Kind::Curve(_) => &[],
+        }
+    }
+
+    /// Whether a larger value of the first parameter is more of the effect: of a filter, and not of a limit, whose neutral
+    /// value is the largest.
+    pub fn grows_with_its_shape(&self) -> bool {
+        match &self.kind {
+            Kind::Effect(spec) => spec.parameters[0].neutral < spec.parameters[0].bounds.1,
+            Kind::Curve(_) => true,
+        }
+    }
 }
 
 /// Reading of a chain of effects on the reference forces, each session from the start.
@@ -102,52 +110,21 @@ pub(crate) fn size_parameter(spec: &EffectSpec) -> usize {
     0
 }
 
-/// Bounds of a parameter in this table. Those of the library are for campaigns of hours; in a table of seconds a change
-/// by the whole range is no more than that, whatever it would be in an hour.
+/// Bounds of a parameter in this table.
 pub(crate) fn bounds(spec: &EffectSpec, parameter: usize, prepared: &Prepared) -> (f64, f64) {
-    let (low, high) = spec.parameters[parameter].bounds;
-    let hours = prepared.whole_s() / 3600.0;
-    let (bottom, top) = range(prepared.reference_n.iter().copied());
-    let most = top.abs().max(bottom.abs());
-    let wide = match (spec.id, spec.parameters[parameter].name) {
-        ("sensor_drift", _) => (top - bottom) / hours,
-        ("sensor_gain_drift", _) => 0.9 / hours,
-        ("sensor_quadratic", _) => 0.9 / most,
-        ("sensor_saturation", _) => return (low.min(0.2 * most), most),
-        _ => return (low, high),
-    };
-    (low.min(-wide), high.max(wide))
+    let library = spec.parameters[parameter].bounds;
+    spec.table.map_or(library, |fit| (fit.bounds)(&prepared.span(), library))
 }
 
 /// Values of the inner parameter of an effect that are tried.
 fn grid(spec: &EffectSpec, prepared: &Prepared) -> Option<(usize, Vec<f64>)> {
-    let (bottom, top) = range(prepared.reference_n.iter().copied());
-    let most = top.abs().max(bottom.abs());
-    let mut steps = prepared.step_s.clone();
-    steps.sort_by(f64::total_cmp);
-    let step_s = steps[steps.len() / 2];
-    let between = |low: f64, high: f64, count: usize| -> Vec<f64> {
-        let ratio = libm::log(high / low) / (count - 1) as f64;
-        (0..count).map(|k| low * libm::exp(ratio * k as f64)).collect()
-    };
-    match spec.id {
-        "sensor_saturation" => {
-            Some((0, (0..24).map(|k| most * (0.4 + 0.599 * f64::from(k) / 23.0)).collect()))
-        }
-        "sensor_lowpass" => {
-            let low = (0.3 * step_s).min(0.5);
-            Some((0, between(low, (0.1 * prepared.longest_s()).clamp(2.0 * low, 2.0), 14)))
-        }
-        "sensor_creep" => {
-            let low = (1.5 * step_s).max(0.1);
-            Some((1, between(low, prepared.longest_s().clamp(4.0 * low, 3600.0), 14)))
-        }
-        "sensor_hysteresis" => {
-            let low = (0.01 * (top - bottom)).max(0.1);
-            Some((1, between(low, (top - bottom).clamp(2.0 * low, 100.0), 8)))
-        }
-        _ => None,
-    }
+    let (name, values) = spec.table?.grid?(&prepared.span());
+    Some((spec.position(name)?, values))
+}
+
+/// Whether an effect has no size but its inner parameter: it changes the force, and no coefficient goes with it.
+pub(crate) fn is_shape_only(spec: &EffectSpec, prepared: &Prepared) -> bool {
+    grid(spec, prepared).is_some_and(|(parameter, _)| parameter == size_parameter(spec))
 }
 
 /// Candidates and their columns; columns 0 (constant) and 1 (reference) come first, the measured force is not among
@@ -164,7 +141,7 @@ pub(crate) fn candidates(
     let reference = prepared.grouped(&prepared.reference_n);
     let mut columns = vec![vec![1.0; reference.len()], reference];
     let mut all = Vec::new();
-    for spec in EFFECTS.into_iter().filter_map(find) {
+    for spec in effects() {
         let neutral: Vec<f64> = spec.parameters.iter().map(|p| p.neutral).collect();
         let inner = grid(spec, prepared);
         let places: Vec<Option<(usize, f64)>> = match &inner {
@@ -215,7 +192,7 @@ pub(crate) fn candidates(
     let clock = hats(&prepared.clock_s, 5);
     add(curve("time_s", clock.clone()));
     add(curve("time_s", times(&clock)));
-    add(curve("reference_force_n", hats(x, 3)));
+    add(curve(REFERENCE_FORCE, hats(x, 3)));
     add(curve(FORCE_RATE, hats(&force_rate(prepared), 3)));
     for (name, covariate) in &data.extra {
         if let Some(shapes) = shapes(covariate, prepared) {

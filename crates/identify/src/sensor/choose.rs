@@ -1,7 +1,7 @@
 //! From scores to names: one effect after the other, then what they cannot be told apart from.
 
 use super::SensorOptions;
-use super::candidates::{FORCE_RATE, Kind};
+use super::candidates::Kind;
 use super::moments::Model;
 use super::search::{Round, Score, Weighing, Workspace};
 use super::statistics::mean_and_error;
@@ -40,16 +40,6 @@ pub(crate) struct Choice {
 pub(crate) struct Tie {
     pub candidate: usize,
     pub weight: f64,
-}
-
-/// Covariates through which an effect acts.
-fn own(effect: &str) -> &'static [&'static str] {
-    match effect {
-        "sensor_drift" | "sensor_gain_drift" => &["time_s"],
-        "sensor_quadratic" | "sensor_saturation" => &["reference_force_n"],
-        "sensor_creep" => &["time_s", FORCE_RATE],
-        _ => &[FORCE_RATE],
-    }
 }
 
 /// The model with everything that was picked.
@@ -108,7 +98,7 @@ pub(crate) fn choose(ws: &mut Workspace<'_>, options: &SensorOptions) -> Choice 
 fn is_misfit(ws: &Workspace<'_>, picked: &[(usize, usize)], k: usize) -> bool {
     let curve = &ws.candidates[k];
     let named =
-        |p: usize| ws.candidates[p].is_effect() && own(ws.candidates[p].name()).contains(&curve.name());
+        |p: usize| ws.candidates[p].is_effect() && ws.candidates[p].acts_through().contains(&curve.name());
     !curve.is_effect() && picked.iter().any(|&(p, _)| named(p))
 }
 
@@ -133,7 +123,7 @@ fn pick(ws: &Workspace<'_>, base: &Model, round: &Round) -> Option<usize> {
     let (with_effect, with_curve) = (at(e, named.point), at(c, free.point));
     let (mean, error) = mean_and_error(&ws.held_out_gain(&with_effect, &with_curve));
     let clearly = mean > error && free.evidence > named.evidence + 3.0;
-    let same = own(ws.candidates[e].name()).contains(&ws.candidates[c].name());
+    let same = ws.candidates[e].acts_through().contains(&ws.candidates[c].name());
     let right_name = same && named.gain >= SAME_SHAPE * free.gain;
     Some(if clearly && !right_name { c } else { e })
 }

@@ -75,9 +75,7 @@ fn smallest(candidate: &Candidate, gain: f64, error: impl Fn(usize, f64) -> f64)
         }
     }
     if sizes.is_empty() {
-        // Points go from weak to strong for a filter, from strong to weak for a limit.
-        let rising = candidate.name() != "sensor_saturation";
-        return if rising {
+        return if candidate.grows_with_its_shape() {
             shapes.into_iter().min_by(f64::total_cmp)
         } else {
             shapes.into_iter().max_by(f64::total_cmp)

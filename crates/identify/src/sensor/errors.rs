@@ -1,6 +1,6 @@
 //! Errors on blocks and sessions that the fit has not seen.
 
-use super::candidates::{chain, size_parameter};
+use super::candidates::{chain, is_shape_only, size_parameter};
 use super::moments::{Model, Moments};
 use super::noise::{Noise, Whitener};
 use super::search::{Weighing, Workspace, combined};
@@ -34,7 +34,7 @@ pub(crate) fn errors(ws: &Workspace<'_>, effects: &[(&'static EffectSpec, Vec<f6
         let difference: Vec<f64> = after.iter().zip(&before).map(|(a, b)| a - b).collect();
         let grouped = prepared.grouped(&difference);
         let spec = list[k].0;
-        let has_size = !matches!(spec.id, "sensor_lowpass" | "sensor_saturation");
+        let has_size = !is_shape_only(spec, prepared);
         debug_assert_eq!(size_parameter(spec), 0);
         if has_size {
             columns.push(grouped.iter().zip(&sessions).map(|(v, &s)| v * gains[s]).collect());

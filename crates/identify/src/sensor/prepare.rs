@@ -2,6 +2,7 @@
 
 use super::SensorData;
 use super::moments::Unit;
+use gripgen_twin::effects::TableSpan;
 
 /// Folds of every session.
 pub(crate) const FOLDS: usize = 6;
@@ -65,6 +66,15 @@ impl Prepared {
     /// Time between the first and the last row.
     pub fn whole_s(&self) -> f64 {
         self.clock_s.iter().fold(0.0, |m, t| t.max(m))
+    }
+
+    /// What the fits of effects need to know of it.
+    pub fn span(&self) -> TableSpan {
+        let (lowest_n, highest_n) = range(self.reference_n.iter().copied());
+        let mut steps = self.step_s.clone();
+        steps.sort_by(f64::total_cmp);
+        let step_s = steps[steps.len() / 2];
+        TableSpan { lowest_n, highest_n, step_s, longest_s: self.longest_s(), whole_s: self.whole_s() }
     }
 }
 

@@ -207,7 +207,7 @@ fn what_cannot_be_told_apart_is_said() {
     let weights: f64 =
         d.effects[0].weight + d.effects[0].indistinguishable_from.iter().map(|r| r.weight).sum::<f64>();
     assert!(weights <= 1.0 + 1e-9);
-    assert_eq!(d.not_excited, [super::candidates::FORCE_RATE]);
+    assert_eq!(d.not_excited, [gripgen_twin::effects::FORCE_RATE]);
 }
 
 /// Two effects are both named.

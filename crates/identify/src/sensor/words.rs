@@ -7,6 +7,7 @@ use super::refine::values_at;
 use super::search::Workspace;
 use super::statistics::mean_and_error;
 use crate::diagnosis::SeparateBy;
+use gripgen_twin::effects::{Experiment, Measured, separating};
 
 /// All candidates against the baseline, best first, "none" last.
 pub(crate) fn evidence(ws: &Workspace<'_>, choice: &Choice) -> Vec<SensorEvidence> {
@@ -91,25 +92,8 @@ pub(crate) fn separate_by(class: &[String]) -> Option<SeparateBy> {
     if class.len() < 2 {
         return None;
     }
-    let has = |id: &str| class.iter().any(|c| c == id);
-    let mut steps: Vec<&str> = Vec::new();
-    if has("sensor_drift") || has("sensor_gain_drift") {
-        steps.push(
-            "read the unloaded sensor and one known load at the start, in the middle and at the end: only a zero that drifts changes the unloaded reading",
-        );
-    }
-    if has("sensor_quadratic") || has("sensor_saturation") {
-        steps.push(
-            "apply five known loads up to the largest, each twice and in random order: a bent line shows in their second difference, a limit only at the top",
-        );
-    }
-    if has("sensor_creep") {
-        steps.push("hold a constant load for a minute, then unload and wait a minute: creep dies out");
-    }
-    if has("sensor_lowpass") || has("sensor_hysteresis") {
-        steps.push(
-            "load and unload at two speeds a factor of 10 apart: the loop of a filter grows with the speed, that of hysteresis does not",
-        );
-    }
+    let suspects: Vec<&str> = class.iter().map(String::as_str).collect();
+    let steps: Vec<&str> =
+        separating(Measured::SensorTable, &suspects).into_iter().map(Experiment::text).collect();
     Some(SeparateBy { text: steps.join("; "), campaign: None })
 }

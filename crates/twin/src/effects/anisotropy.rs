@@ -1,12 +1,13 @@
 //! Friction that depends on the direction of the pull on the part.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `anisotropy`: a ground, turned or toothed surface has a lay; friction across it differs from friction along
 /// it, and is the same after half a turn.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "anisotropy",
+    group: Group::Friction,
     about: "friction coefficient with the angle of the grip, the same every half turn",
     formula: "mu' = mu (1 + amplitude cos(2 (grip_angle - axis_deg)))",
     source: "two-fold term of the angle; amplitude 0.05 to 0.3. Ma and Rodriguez 2018 on anisotropy in data",
@@ -30,6 +31,17 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     friction: Some(friction),
     upright_only: true,
     per_part: true,
+    plainly: "The surface holds more along one direction than across it.",
+    number_means: "amplitude = 0.1: 10 % more than the mean along axis_deg, 10 % less at a right angle to it.",
+    remedy: "Look for a lay of machining on the part or a weave of the gel's coating; keep the law in the twin.",
+    typical: &[("amplitude", 0.15)],
+    pulls: Ok(PullFit {
+        fit: |_| {
+            let free = [("amplitude", 0.05), ("axis_deg", 10.0)];
+            Fit::over("axis_deg", &[-67.5, -22.5, 22.5, 67.5], ("amplitude", 0.08), &free)
+        },
+        ..PullFit::PLAIN
+    }),
     ..EffectSpec::BARE
 };
 

@@ -1,13 +1,14 @@
 //! A soft pad whose friction force stops growing with the load.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `area_saturation`: once the pad is in full contact, more load brings no more area. The parameter is the
 /// inverse of the saturation force `F_s`, so that 0 means none; the friction force tends to `mu F_s`. How suddenly it
 /// levels off is not known: a sharpness of 1 is the rational law, 2.5 lies within 3 % of a hyperbolic tangent.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "area_saturation",
+    group: Group::Friction,
     about: "friction force that levels off at high grip force",
     formula: "mu' = mu / (1 + (saturation_per_n F_G)^sharpness)^(1 / sharpness)",
     source: "soft fingertips: Fujihira et al.; saturation force 50 to 200 N",
@@ -31,6 +32,18 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     references: &["sharpness"],
     friction: Some(friction),
     per_part: true,
+    plainly: "Friction stops growing at strong grips, because the contact cannot get any larger.",
+    number_means: "1 / saturation_per_n is the grip force that friction levels off at: 0.005 stands for 200 N.",
+    remedy: "Keep the law in the twin. Gripping harder than that force brings nothing.",
+    typical: &[("saturation_per_n", 0.006)],
+    pulls: Ok(PullFit {
+        fit: |_| {
+            let free = [("saturation_per_n", 0.002)];
+            Fit::over("sharpness", &[1.0, 2.5], ("saturation_per_n", 0.004), &free).searching(1)
+        },
+        ..PullFit::PLAIN
+    }),
+    experiments: &[Experiment::WiderGripForces],
     ..EffectSpec::BARE
 };
 

@@ -1,13 +1,14 @@
 //! Two gels that do not rub alike.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, GripPoint, Group, ParameterSpec};
 use crate::Jaw;
 
 /// `asymmetric_jaws`: the coefficient of one jaw is higher and that of the other lower by the same share; the
 /// mean is the baseline's.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "asymmetric_jaws",
+    group: Group::Jaws,
     about: "friction coefficients that differ between the jaws",
     formula: "mu_left' = mu (1 + asymmetry), mu_right' = mu (1 - asymmetry)",
     source: "definition; 5 to 30 % between two gels",
@@ -20,6 +21,11 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     covariates: &[],
     friction: Some(friction),
+    plainly: "The two gels do not hold the same.",
+    number_means: "asymmetry = 0.1: the left jaw has a coefficient 10 % above the mean, the right one 10 % below it.",
+    remedy: "Swap the gels: what stays with the gel is the gel's. Their sum, and so the label, does not change.",
+    typical: &[("asymmetry", 0.2)],
+    pulls: Err("the jaws hold the sum of both coefficients, which it leaves as it is"),
     ..EffectSpec::BARE
 };
 

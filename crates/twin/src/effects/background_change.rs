@@ -1,7 +1,8 @@
 //! A background that is another one from one pull on.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use crate::OpticsState;
 use crate::optics::BACKGROUND_TERMS;
 
 /// `background_change`: a smooth pattern is added to the frame, with and without contact. u and v run from -1 to 1
@@ -9,6 +10,7 @@ use crate::optics::BACKGROUND_TERMS;
 /// its mean), so that a constant is left to `rest_offset` and `light_drift`.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "background_change",
+    group: Group::Optics,
     about: "pattern added to the frame from one pull on",
     formula: "I_c' = I_c + c_u u + c_v v + c_uu u^2 + c_uv u v + c_vv v^2 from pull at_pull_index on, c = red, green, blue",
     source: "a gel or its fabric that was changed; polynomial of second degree is ours, as the lights' fall-off",
@@ -38,6 +40,19 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &["pull_index"],
     optics: Some(optics),
+    sizes: 15,
+    plainly: "From one press on the frame without contact looks different: gel, fabric or lights were touched.",
+    number_means: "Grey levels that are added: green_u = 5 makes the right edge 5 levels greener and the left edge as much less.",
+    remedy: "Take a new frame without contact after every change of gel or mounting.",
+    typical: &[("green_u", 8.0), ("at_pull_index", 0.0)],
+    presses: Some(PressFit {
+        main: "green_u",
+        start: |_, _| (0.0, 2.0),
+        tried: Some("at_pull_index"),
+        drawn: false,
+        ..PressFit::DRAWN
+    }),
+    not_shown_by: &[Experiment::FrameWithoutContact, Experiment::FirstPressAgain],
     ..EffectSpec::BARE
 };
 

@@ -1,13 +1,15 @@
 //! A part that is not the one of the mesh.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use crate::OpticsState;
 
 /// `cad_mismatch`: the real part's outlines (of teeth, rings, ends) lie outside those of its mesh, and its convex edges
 /// are blunt. The image shows the real part; forces and friction stay those of the mesh, as all optics effects leave
 /// them.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "cad_mismatch",
+    group: Group::Optics,
     about: "part with wider outlines and blunter edges than its mesh",
     formula: "z' = max of min(z, z * N(0, blunting_mm)) within offset_mm, at one volume; z = gel surface",
     source: "reworked edges, other teeth and rings, 0.05 to 0.5 mm (Wucherer et al. 2023); dilation: Serra 1982",
@@ -29,6 +31,17 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &[],
     optics: Some(optics),
+    sizes: 2,
+    plainly: "The part is not its drawing: outlines stand elsewhere, edges are blunter.",
+    number_means: "blunting_mm = 0.1: convex edges are rounded over about 0.1 mm; offset_mm = 0.1: outlines lie 0.1 mm further out.",
+    remedy: "Measure the part, and correct its mesh.",
+    typical: &[("offset_mm", 0.1), ("blunting_mm", 0.1)],
+    presses: Some(PressFit {
+        main: "blunting_mm",
+        start: |name, px_mm| if name == "offset_mm" { (0.0, px_mm) } else { (2.0 * px_mm, px_mm) },
+        ..PressFit::DRAWN
+    }),
+    not_shown_by: &[Experiment::AnotherShape],
     ..EffectSpec::BARE
 };
 

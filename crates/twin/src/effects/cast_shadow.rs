@@ -1,13 +1,15 @@
 //! Shadows that the gel around a contact throws.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use crate::OpticsState;
 
 /// `cast_shadow`: a channel's light, which comes from the side towards which its colour model is brightest, does not
 /// reach the gel behind a contact. Outside the contact only: inside, the colours were measured with it. A negative
 /// strength takes away from shadows that the sensor file draws.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "cast_shadow",
+    group: Group::Optics,
     about: "darkening behind a contact, away from each channel's light",
     formula: "I_c' = I_c - strength I_c,rest s(max over d of (z(x + d l_c) - z(x)) / (d tan(elevation_deg)))",
     source: "horizon mapping, Max 1988; lights of GelSight sensors stand low: shadows of -10 to -75 grey levels in Taxim",
@@ -29,6 +31,16 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &[],
     optics: Some(optics),
+    plainly: "Contacts throw shadows away from the lights that the twin does not draw.",
+    number_means: "strength = 0.1: in a full shadow 10 % of the light's brightness are missing.",
+    remedy: "Calibrate the shadows of the sensor with presses at several depths.",
+    typical: &[("strength", 0.15)],
+    presses: Some(PressFit {
+        main: "strength",
+        start: |name, _| if name == "strength" { (0.03, 0.05) } else { (20.0, 5.0) },
+        ..PressFit::DRAWN
+    }),
+    experiments: &[Experiment::PressesAtSeveralDepths],
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,7 @@
 //! A new gel that takes a few cycles to settle.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 use crate::PULLS_SINCE_REST;
 use crate::draw::Drawn;
 
@@ -10,6 +10,7 @@ use crate::draw::Drawn;
 /// gel, where only a rise is told from `wear`.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "conditioning",
+    group: Group::Friction,
     about: "friction coefficient that settles in the first pulls of a gel, or after a rest",
     formula: "mu' = mu (1 - depth exp(-n / n0)), n = (1 - rests) pull_index + rests pulls_since_rest",
     source: "Mullins softening, 5 to 30 % in the first cycle, over in 3 to 10",
@@ -39,6 +40,29 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &["pull_index"],
     references: &["rests"],
     friction: Some(friction),
+    plainly: "The first pulls of a gel, or the first after a rest, hold less (or more) until it has settled.",
+    number_means: "depth = 0.2: the first pull lacks 20 % of the settled coefficient, a third of that is left after n0 pulls.",
+    remedy: "Make some five pulls that do not count before a campaign and after every pause.",
+    typical: &[("depth", 0.2)],
+    pulls: Ok(PullFit {
+        fit: |span| {
+            let starts = [2.0, 6.0, 20.0].into_iter().flat_map(|n0| {
+                let again = |depth| vec![("n0", n0), ("depth", depth), ("rests", 1.0)];
+                let mut starts = vec![vec![("n0", n0), ("depth", 0.1)]];
+                starts.extend([0.1, -0.1].into_iter().filter(|_| span.rests).map(again));
+                starts
+            });
+            let free = Fit::new(&[], &[("depth", 0.05), ("n0", 2.0)]).searching(usize::from(span.rests));
+            Fit { starts: starts.collect(), ..free }
+        },
+        // A gel that settles once to less friction is worn, which is another effect.
+        bounds: |name, at, (low, high)| {
+            let [_, _, rests] = values(at);
+            if name == "depth" && rests == 0.0 { (0.0, high) } else { (low, high) }
+        },
+        ..PullFit::PLAIN
+    }),
+    experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };
 

@@ -1,11 +1,12 @@
 //! Oil, dust or wear particles between part and gel, from one pull on.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `contamination`: the coefficient steps at a pull. A negative drop is a cleaning.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "contamination",
+    group: Group::Friction,
     about: "friction coefficient that steps at one pull",
     formula: "mu' = mu (1 - drop) from pull at_pull_index on",
     source: "third bodies take 10 to 60 % of the friction, until they are cleaned off",
@@ -27,6 +28,15 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &["pull_index"],
     friction: Some(friction),
+    plainly: "From one pull on friction is another one: something came onto the gel or the part, or went off it.",
+    number_means: "drop = 0.2: 20 % of the coefficient are lost from pull at_pull_index on.",
+    remedy: "Look up what happened before that pull (oil, dust, a touched part); clean gel and part, and repeat a few of the pulls before it.",
+    typical: &[("drop", 0.2), ("at_pull_index", 150.0)],
+    pulls: Ok(PullFit {
+        fit: |span| Fit::over("at_pull_index", &span.splits, ("drop", 0.0), &[("drop", 0.05)]).searching(1),
+        ..PullFit::PLAIN
+    }),
+    experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };
 

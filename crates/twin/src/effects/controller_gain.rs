@@ -1,11 +1,12 @@
 //! A force loop that settles at a multiple of its command.
 
 use super::hooks::values;
-use super::{EffectSpec, ParameterSpec, Visible};
+use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, Visible};
 
 /// `controller_gain`: the loop follows a share of the desired force.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "controller_gain",
+    group: Group::Robot,
     about: "factor on the force that the force loop goes for",
     formula: "F_cmd = gain F_des",
     source: "UR5e set to 10 N gave 8.95 to 13.26 N over its workspace (Trochimczuk et al. 2026)",
@@ -18,6 +19,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     command: Some(command),
     visible: Visible::From(0.02),
+    plainly: "The robot goes for a force that is the same share above or below the one it was told.",
+    number_means: "gain = 0.95: where 100 N were asked for the robot pulls with 95 N.",
+    remedy: "Compare the commanded with the measured force of a part that holds; check the payload and the force mode's damping.",
+    typical: &[("gain", 0.95)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::KnownMasses],
     ..EffectSpec::BARE
 };
 

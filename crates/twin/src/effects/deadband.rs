@@ -1,12 +1,13 @@
 //! A force loop that lets small errors be.
 
 use super::hooks::values;
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, Fit, Group, ParameterSpec, PullFit};
 
 /// `deadband`: closer than the band to what it measures, the loop takes the measured force as its command and
 /// so sees no error.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "deadband",
+    group: Group::Robot,
     about: "force loop that ignores errors inside a band",
     formula: "F_cmd = F_measured where abs(F_des - F_measured) < width_n, else F_des",
     source: "dead band of force controllers, 0.5 to 3 N",
@@ -18,6 +19,15 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         about: "largest error that is ignored, on each side",
     }],
     command: Some(command),
+    plainly: "The robot's force loop does nothing about small errors of the force.",
+    number_means: "width_n = 1: an error of up to 1 N stays as it is.",
+    remedy: "Pull in larger steps than the band, or narrow it in the controller.",
+    typical: &[("width_n", 1.5)],
+    pulls: Ok(PullFit {
+        fit: |_| Fit::new(&[&[("width_n", 1.0)], &[("width_n", 2.0)]], &[("width_n", 0.2)]),
+        flat_at_neutral: true,
+        ..PullFit::PLAIN
+    }),
     ..EffectSpec::BARE
 };
 

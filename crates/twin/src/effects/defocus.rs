@@ -1,12 +1,14 @@
 //! A camera that is out of focus.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use crate::OpticsState;
 
 /// `defocus`: a Gaussian blur of what the contact changes in the image. The rest frame is smooth and was taken with the
 /// same lens: it stays as it is.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "defocus",
+    group: Group::Optics,
     about: "blur of the contact in the image",
     formula: "dI' = dI * N(0, sigma_mm)",
     source: "Gaussian point spread function; sigma up to 3 px",
@@ -19,6 +21,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     covariates: &[],
     optics: Some(optics),
+    plainly: "Contacts look blurred: the camera is out of focus.",
+    number_means: "sigma_mm = 0.1: a point on the gel is smeared over about 0.2 mm.",
+    remedy: "Focus the camera on the gel, and clean its window.",
+    typical: &[("sigma_mm", 0.1)],
+    presses: Some(PressFit { main: "sigma_mm", start: |_, px_mm| (1.5 * px_mm, px_mm), ..PressFit::DRAWN }),
+    experiments: &[Experiment::AnotherShape],
     ..EffectSpec::BARE
 };
 

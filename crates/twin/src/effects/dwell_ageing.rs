@@ -1,11 +1,12 @@
 //! Static friction that grows while the contact rests.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `dwell_ageing`: the real contact area creeps up with the logarithm of the time under load.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "dwell_ageing",
+    group: Group::Friction,
     about: "friction coefficient with the logarithm of the dwell before the pull",
     formula: "mu' = mu (1 + beta ln(1 + t_dwell / t0_s))",
     source: "static ageing: 0.01 to 0.05 per e-fold of solids, up to 0.1 of polymers; Farain and Bonn",
@@ -29,6 +30,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &["dwell_s"],
     friction: Some(friction),
     per_part: true,
+    plainly: "The longer the jaws rest on the part before the pull, the more they hold.",
+    number_means: "beta = 0.02: ten times the dwell has a coefficient about 4.6 % higher.",
+    remedy: "Wait equally long before every pull, or keep the law in the twin.",
+    typical: &[("beta", 0.03)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("beta", 0.01)]], &[("beta", 0.01)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::DwellTimes],
     ..EffectSpec::BARE
 };
 

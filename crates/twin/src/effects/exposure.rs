@@ -1,12 +1,14 @@
 //! A camera with another exposure or response.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use crate::OpticsState;
 
 /// `exposure`: gain and gamma of the camera, the same for all channels, with and without contact. Two of them one after
 /// the other are one.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "exposure",
+    group: Group::Optics,
     about: "gain and gamma of the camera",
     formula: "I' = 255 (gain I / 255)^gamma",
     source: "power law of camera responses; gamma 0.8 to 1.2",
@@ -28,6 +30,14 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &[],
     optics: Some(optics),
+    sizes: 2,
+    plainly: "The camera's exposure or its curve is another one.",
+    number_means: "gain = 1.1: the picture is exposed 10 % more; gamma below 1 brightens dark places.",
+    remedy: "Fix exposure, gain and white balance of the camera, and take a new frame without contact.",
+    typical: &[("gain", 1.1)],
+    presses: Some(PressFit { main: "gain", start: |_, _| (1.0, 0.05), drawn: false, ..PressFit::DRAWN }),
+    experiments: &[Experiment::FrameWithoutContact],
+    not_shown_by: &[Experiment::FirstPressAgain],
     ..EffectSpec::BARE
 };
 

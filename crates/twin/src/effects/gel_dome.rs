@@ -1,12 +1,14 @@
 //! A gel that is more or less domed than its sensor file says.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use crate::OpticsState;
 
 /// `gel_dome`: a paraboloid is added to the gel's shape at rest. The imprint has the same volume on another surface: a
 /// domed gel is touched nearer to its apex, in the middle of the image, and deeper there.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "gel_dome",
+    group: Group::Optics,
     about: "sag of the gel at the corners of the image",
     formula: "z_rest' = z_rest - sag_mm r^2 / r_corner^2, towards the part",
     source: "GelSight gels are domed: 1.4 mm in Taxim's gel map (Si and Yuan 2022); paraboloid for the cap is ours",
@@ -19,6 +21,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     covariates: &[],
     optics: Some(optics),
+    plainly: "The gel is domed: it lies deeper at the corners than in the middle.",
+    number_means: "sag_mm = 0.5: the corners lie 0.5 mm below the apex.",
+    remedy: "Measure the gel at rest, or calibrate with presses near all corners.",
+    typical: &[("sag_mm", 0.5)],
+    presses: Some(PressFit { main: "sag_mm", start: |_, _| (0.0, 0.3), ..PressFit::DRAWN }),
+    experiments: &[Experiment::PressesNearTheCorners],
     ..EffectSpec::BARE
 };
 

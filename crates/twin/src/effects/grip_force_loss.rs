@@ -1,12 +1,13 @@
 //! A gripper that does not bring its command to the jaws.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `grip_force_loss`: drive friction takes a constant force. A gain of the drive is no parameter: friction
 /// coefficient and imprint constant absorb it.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "grip_force_loss",
+    group: Group::Jaws,
     about: "normal force below the commanded grip force",
     formula: "F_N = max(0, F_G - loss_n)",
     source: "friction and resolution of parallel grippers, 1 to 5 N",
@@ -19,6 +20,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     covariates: &["grip_force_n"],
     normal_force: Some(normal_force),
+    plainly: "The jaws press less than the gripper was told to.",
+    number_means: "loss_n = 2: of 20 N per jaw that were commanded 18 N arrive.",
+    remedy: "Measure the grip force with a load cell between the jaws; grease or tare the drive.",
+    typical: &[("loss_n", 2.0)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("loss_n", 0.0)]], &[("loss_n", 0.5)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::GripForceWithALoadCell],
     ..EffectSpec::BARE
 };
 

@@ -1,12 +1,13 @@
 //! A grip that loosens while it is held at constant width.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `grip_relaxation`: the gel's stress relaxes with one time constant while the jaws keep their width. It acts
 /// on the normal force, so the imprint shows it too; that tells it from ageing of the friction.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "grip_relaxation",
+    group: Group::Jaws,
     about: "normal force that falls during the dwell",
     formula: "F_N = F_G (1 - depth (1 - exp(-t_dwell / tau_s)))",
     source: "one term of a Prony series; 5 to 25 % in 100 s, tau 0.3 to 100 s. Tiezzi and Kao 2007",
@@ -28,6 +29,18 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &["dwell_s"],
     normal_force: Some(normal_force),
+    plainly: "The jaws press less and less while they wait: gel or drive give way.",
+    number_means: "depth = 0.1: 10 % of the normal force are lost in the end, two thirds of it after tau_s.",
+    remedy: "Let the gripper hold its force rather than its width, or wait equally long before every pull.",
+    typical: &[("depth", 0.15)],
+    pulls: Ok(PullFit {
+        fit: |_| {
+            let free = [("depth", 0.05), ("tau_s", 5.0)];
+            Fit::over("tau_s", &[1.0, 8.0, 60.0], ("depth", 0.08), &free)
+        },
+        ..PullFit::PLAIN
+    }),
+    experiments: &[Experiment::DwellTimes],
     ..EffectSpec::BARE
 };
 

@@ -1,12 +1,13 @@
 //! An imprint that grows with another power of the grip force than the first.
 
 use super::hooks::{positive, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, Group, ParameterSpec};
 
 /// `imprint_nonlinearity`: `V = c F` becomes a power law through the same volume at `f_ref_n`. A Hertzian
 /// half-space under a sphere has 4/3; a thin layer on a hard backing has less than 1.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "imprint_nonlinearity",
+    group: Group::Jaws,
     about: "imprint volume as a power of the normal force",
     formula: "V = c f_ref_n (F_N / f_ref_n)^exponent",
     source: "Hertz: 4/3 for a sphere; Wucherer et al. 2023 take 1, their images differ more at 55 N than at 25 N",
@@ -23,6 +24,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     references: &["f_ref_n"],
     covariates: &["grip_force_n"],
     imprint_volume: Some(imprint_volume),
+    plainly: "The imprint does not grow in proportion to the force that presses it.",
+    number_means: "exponent = 0.9: twice the force displaces 1.87 times the volume.",
+    remedy: "Calibrate the gel at the grip forces that are used; compare pictures of one grip at several forces.",
+    typical: &[("exponent", 0.85)],
+    not_on_elastic_gel: Some("changes the imprint constant, which an elastic gel does not use"),
+    pulls: Err("it changes imprints, which labels of a constant coefficient do not feel"),
     ..EffectSpec::BARE
 };
 

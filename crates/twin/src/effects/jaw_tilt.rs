@@ -1,7 +1,7 @@
 //! Jaws that are not parallel: the grip is a wedge.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// Largest coefficient of a wedge that locks.
 const LOCKED_MU: f64 = 100.0;
@@ -12,6 +12,7 @@ const LOCKED_MU: f64 = 100.0;
 /// the part, and makes an upward pull harder.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "jaw_tilt",
+    group: Group::Jaws,
     about: "wedge angle of the jaws",
     formula: "mu' = (mu + s tan(tilt_deg)) / (1 - s mu tan(tilt_deg)), s = pull_direction",
     source: "statics of a wedge; 3 deg change a coefficient of 0.15 by 35 %",
@@ -26,6 +27,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     friction: Some(friction),
     tilt_rad: Some(tilt_rad),
     upright_only: true,
+    plainly: "The jaws are not parallel: they hold as a wedge, more in one direction of the pull than in the other.",
+    number_means: "tilt_deg = 1: a coefficient of 0.3 is about 0.02 higher pulling up and as much lower pulling down.",
+    remedy: "Measure the jaws with feeler gauges on a flat part, and shim them.",
+    typical: &[("tilt_deg", 1.5)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("tilt_deg", 0.0)]], &[("tilt_deg", 0.3)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::KnownMasses],
     ..EffectSpec::BARE
 };
 

@@ -1,18 +1,32 @@
 //! Lights whose brightness drifts with the clock.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use crate::OpticsState;
 
 /// `light_drift`: every channel is multiplied, with and without contact, by a factor that starts at 1 and changes
 /// linearly with the clock of the campaign; never below 0.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "light_drift",
+    group: Group::Optics,
     about: "brightness of each channel that changes with time",
     formula: "I_c' = I_c (1 + c_per_h t), c = red, green, blue",
     source: "temperature and ageing of LEDs, up to 5 % a channel",
     parameters: &[rate("red_per_h", "red"), rate("green_per_h", "green"), rate("blue_per_h", "blue")],
     covariates: &["time_s"],
     optics: Some(optics),
+    sizes: 3,
+    plainly: "The lights get brighter or darker with time.",
+    number_means: "green_per_h = 0.02: the green light is 2 % brighter after an hour.",
+    remedy: "Let the lights warm up for half an hour; take a frame without contact before every press.",
+    typical: &[("red_per_h", 0.05), ("green_per_h", 0.05), ("blue_per_h", 0.05)],
+    presses: Some(PressFit {
+        main: "green_per_h",
+        start: |_, _| (0.0, 0.05),
+        drawn: false,
+        ..PressFit::DRAWN
+    }),
+    experiments: &[Experiment::FrameWithoutContact, Experiment::FirstPressAgain],
     ..EffectSpec::BARE
 };
 

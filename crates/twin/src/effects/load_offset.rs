@@ -1,12 +1,13 @@
 //! A constant part of the friction force: adhesion, or a force offset that looks like it.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `load_offset`: Wucherer et al. 2023 correct the simulated friction with `mu_corr = mu (a + b / F_G)`, that
 /// is, with a friction force `mu a F_G + mu b`. Negative where `b < -a F_G`.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "load_offset",
+    group: Group::Friction,
     about: "friction force with a constant part",
     formula: "mu' = mu (a + b_n / F_G)",
     source: "Wucherer et al. 2023, correction of the friction coefficient and its table of fits",
@@ -29,6 +30,13 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &["grip_force_n"],
     friction: Some(friction),
     per_part: true,
+    sizes: 2,
+    plainly: "Part of the friction force does not grow with the grip force, so light grips hold more (or less) than the coefficient says.",
+    number_means: "a is the factor on the coefficient at strong grips; b_n is the constant force per jaw over mu, so at F_G = b_n friction is doubled.",
+    remedy: "Keep the law in the twin. A gripper that presses less than it says looks the same: check the grip force with a load cell first.",
+    typical: &[("b_n", 3.0)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("b_n", 0.0)]], &[("b_n", 1.0)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::GripForceWithALoadCell],
     ..EffectSpec::BARE
 };
 

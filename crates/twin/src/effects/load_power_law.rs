@@ -1,12 +1,13 @@
 //! A coefficient that falls, or rises, as a power of the load.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `load_power_law`: adhesive friction of constant shear stress is proportional to the contact area, which
 /// grows with less than the load; `n = -1/3` for a Hertzian sphere.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "load_power_law",
+    group: Group::Friction,
     about: "friction coefficient as a power of the grip force",
     formula: "mu' = mu (F_G / f_ref_n)^n",
     source: "Hertz contact with constant shear stress; Xydas and Kao 1999; Lyashenko and Popov 2024",
@@ -24,6 +25,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &["grip_force_n"],
     friction: Some(friction),
     per_part: true,
+    plainly: "The friction coefficient changes smoothly with the grip force, usually falling: a strong grip holds less than in proportion.",
+    number_means: "n = -0.1: twice the grip force has a coefficient 7 % lower.",
+    remedy: "Keep the law in the twin, and stay within the grip forces it was fitted on.",
+    typical: &[("n", -0.15)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("n", 0.0)]], &[("n", 0.05)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::OtherPullRates, Experiment::WiderGripForces],
     ..EffectSpec::BARE
 };
 

@@ -1,8 +1,9 @@
 //! A contact that is seen elsewhere than it is thought to be.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, OpticsState, ParameterSpec};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
 use crate::Jaw;
+use crate::OpticsState;
 
 /// `misregistration`: the part lies displaced and turned between the jaws, or the camera has another pixel size or a
 /// distortion that the sensor file does not know. What the contact changes in the image moves; the rest frame, which
@@ -10,6 +11,7 @@ use crate::Jaw;
 /// are those of the left image and have the other sign in the right one.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "misregistration",
+    group: Group::Optics,
     about: "contact displaced, turned, scaled or distorted in the image",
     formula: "at x is seen what lies at R(-rotation_deg) (1 + k1 r^2) (x - shift) / scale, r = abs(x - shift) in half image widths",
     source: "pose errors of 0.2 to 1 mm and 1 to 3 deg, which Wucherer et al. 2023 name; radial term: Brown 1966",
@@ -40,6 +42,23 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &[],
     optics: Some(optics),
+    sizes: 5,
+    plainly: "The contact stands elsewhere in the picture than it should: moved, turned, or at another scale.",
+    number_means: "shift_x_mm = 0.5: the contact is seen 0.5 mm too far to the right in the left image.",
+    remedy: "Measure the pose of sensor and part again; mark the contacts of a few presses.",
+    typical: &[("shift_x_mm", 0.5)],
+    presses: Some(PressFit {
+        main: "shift_x_mm",
+        start: |name, px_mm| match name {
+            "shift_x_mm" | "shift_y_mm" => (0.0, px_mm),
+            "rotation_deg" => (0.0, 1.0),
+            "scale" => (1.0, 0.02),
+            _ => (0.0, 0.02),
+        },
+        needs_marks: true,
+        ..PressFit::DRAWN
+    }),
+    experiments: &[Experiment::PressesNearTheCorners],
     ..EffectSpec::BARE
 };
 

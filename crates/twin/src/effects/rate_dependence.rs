@@ -1,7 +1,7 @@
 //! A coefficient that depends on how fast the force rises.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// Slowest pull the logarithm is taken at.
 const SLOWEST_N_PER_S: f64 = 1e-3;
@@ -10,6 +10,7 @@ const SLOWEST_N_PER_S: f64 = 1e-3;
 /// the logarithm of the rate.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "rate_dependence",
+    group: Group::Friction,
     about: "friction coefficient with the logarithm of the pull rate",
     formula: "mu' = mu (1 + k ln(r / r0_n_per_s)), r = force increment / step time",
     source: "Juvekar and Singh, gel on glass; break-away ratio with force rate: Song et al. 2013",
@@ -33,6 +34,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &["force_increment_n", "step_time_s"],
     friction: Some(friction),
     per_part: true,
+    plainly: "Friction depends on how fast the pull rises.",
+    number_means: "k = 0.02: ten times the rate has a coefficient 4.6 % higher.",
+    remedy: "Pull at the rate of the application, or keep the law in the twin.",
+    typical: &[("k", 0.04)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("k", 0.0)]], &[("k", 0.02)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::OtherPullRates],
     ..EffectSpec::BARE
 };
 

@@ -1,12 +1,13 @@
 //! Two regimes of friction with a transition at a grip force.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `regime_transition`: one coefficient below a grip force, another above. The lower one is `mu`; a factor on
 /// both would be `mu` again. Wucherer et al. 2023 see a "phase transition" near 20 N and do not explain it.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "regime_transition",
+    group: Group::Friction,
     about: "another friction coefficient above a grip force",
     formula: "mu' = mu (1 + step / (1 + exp(-(F_G - f_c_n) / width_n)))",
     source: "Wucherer et al. 2023, transition near 20 N; logistic step is ours",
@@ -35,6 +36,25 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &["grip_force_n"],
     friction: Some(friction),
+    plainly: "Friction is another one above some grip force, as if something in the contact or the gripper changed there.",
+    number_means: "step = 0.15: the coefficient is 15 % higher far above f_c_n than far below it.",
+    remedy: "Look for what changes at that force: a gripper that switches its control, a coating pressed through, a part that shifts in its fixture.",
+    typical: &[("step", 0.2)],
+    pulls: Ok(PullFit {
+        fit: |_| {
+            let forces_n = [10.0, 15.0, 20.0, 25.0, 35.0, 50.0];
+            let steps = forces_n.iter().flat_map(|f_c_n| [0.15, -0.15].map(|step| (*f_c_n, step)));
+            let start = |(f_c_n, step)| vec![("f_c_n", f_c_n), ("step", step), ("width_n", 2.0)];
+            Fit {
+                starts: steps.map(start).collect(),
+                ..Fit::new(&[], &[("step", 0.1), ("f_c_n", 3.0), ("width_n", 1.0)])
+            }
+        },
+        // A wider one is no transition but a saturation or a power law.
+        bounds: |name, _, (low, high)| if name == "width_n" { (low, 6.0) } else { (low, high) },
+        ..PullFit::PLAIN
+    }),
+    experiments: &[Experiment::WiderGripForces],
     ..EffectSpec::BARE
 };
 

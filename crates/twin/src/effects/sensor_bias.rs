@@ -1,12 +1,13 @@
 //! A force sensor with a wrong zero.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec, Visible};
+use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, Visible};
 
 /// `sensor_bias`: a constant in every reading, without load too: a wrong zero, or a payload that the robot does
 /// not know. It keeps its sign when the pull is reversed, so it raises the reading one way and lowers it the other.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_bias",
+    group: Group::Robot,
     about: "constant added to the measured force",
     formula: "F_m = F + bias_n",
     source: "UR5e data sheet: accuracy 4 N; a payload of 0.1 kg that is not set is 1 N",
@@ -20,6 +21,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     sensor: Some(sensor),
     upright_only: true,
     visible: Visible::From(0.05),
+    plainly: "The force sensor reads the same number of newtons too much or too little at every force.",
+    number_means: "bias_n = 1: with nothing on it the sensor reads 1 N.",
+    remedy: "Zero the sensor without load before every pull, and set the payload of the gripper.",
+    typical: &[("bias_n", 1.0)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("bias_n", 0.0)]], &[("bias_n", 0.2)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::NoLoadReading, Experiment::PullsUpAndDown],
     ..EffectSpec::BARE
 };
 

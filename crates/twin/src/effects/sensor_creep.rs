@@ -1,12 +1,15 @@
 //! A force sensor that creeps under load.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec, Visible};
+use super::{
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, log_spaced,
+};
 
 /// `sensor_creep`: part of the reading follows the force slowly. Starts settled; the memory's state is the slow
 /// force.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_creep",
+    group: Group::Robot,
     about: "measured force that goes on rising under constant load",
     formula: "F_m = F + fraction F_slow, tau_s dF_slow/dt = F - F_slow",
     source: "one term of viscoelastic creep of the sensor's body",
@@ -29,6 +32,28 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     sensor: Some(sensor),
     remembers: true,
     visible: Visible::From(0.02),
+    plainly: "The force sensor goes on rising under a load that stays the same, and forgets it slowly afterwards.",
+    number_means: "fraction = 0.05: a load that stays ends up 5 % above its first reading, two thirds of it after tau_s.",
+    remedy: "Unload the sensor between pulls for as long as it creeps, and zero it again.",
+    typical: &[("fraction", 0.05)],
+    pulls: Ok(PullFit {
+        fit: |_| {
+            let free = [("fraction", 0.03), ("tau_s", 1.0)];
+            Fit::over("tau_s", &[1.0, 8.0], ("fraction", 0.05), &free)
+        },
+        // What comes late is a part of the response; one that goes back is a lag of another kind.
+        bounds: |name, _, (low, high)| if name == "fraction" { (0.0, high) } else { (low, high) },
+        ..PullFit::PLAIN
+    }),
+    table: Some(TableFit {
+        acts_through: &["time_s", FORCE_RATE],
+        grid: Some(|span| {
+            let low_s = (1.5 * span.step_s).max(0.1);
+            ("tau_s", log_spaced(low_s, span.longest_s.clamp(4.0 * low_s, 3600.0), 14))
+        }),
+        ..TableFit::PLAIN
+    }),
+    experiments: &[Experiment::ConstantLoad],
     ..EffectSpec::BARE
 };
 

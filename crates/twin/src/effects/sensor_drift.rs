@@ -1,11 +1,12 @@
 //! A force sensor whose zero wanders with the clock.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec, Visible};
+use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, wider};
 
 /// `sensor_drift`: a bias that grows linearly from 0 at the start of the campaign.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_drift",
+    group: Group::Robot,
     about: "constant added to the measured force that grows with time",
     formula: "F_m = F + rate_n_per_h t",
     source: "0.1 to 3 N/h; 26 N from temperature alone in small sensors without compensation (arXiv 2502.17528)",
@@ -21,6 +22,26 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     reads_clock: true,
     upright_only: true,
     visible: Visible::OverTheCampaign(0.05),
+    plainly: "The zero of the force sensor moves with time.",
+    number_means: "rate_n_per_h = 1: after an hour the sensor reads 1 N more than at the start.",
+    remedy: "Zero the sensor before every pull; let it warm up.",
+    typical: &[("rate_n_per_h", 0.5)],
+    pulls: Ok(PullFit {
+        fit: |_| Fit::new(&[&[("rate_n_per_h", 0.0)]], &[("rate_n_per_h", 0.2)]),
+        ..PullFit::PLAIN
+    }),
+    table: Some(TableFit {
+        acts_through: &["time_s"],
+        bounds: |span, own| wider(own, (span.highest_n - span.lowest_n) / span.hours()),
+        ..TableFit::PLAIN
+    }), // A drift that is not straight looks like a straight one from another start.
+    leaves: &["sensor_bias"],
+    experiments: &[
+        Experiment::NoLoadReading,
+        Experiment::PullsUpAndDown,
+        Experiment::LongPause,
+        Experiment::ZeroAndLoadOverTime,
+    ],
     ..EffectSpec::BARE
 };
 

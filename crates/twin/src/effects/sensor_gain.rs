@@ -1,11 +1,12 @@
 //! A force sensor with a wrong gain.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec, Visible};
+use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, Visible};
 
 /// `sensor_gain`: every reading times a factor.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_gain",
+    group: Group::Robot,
     about: "factor on the measured force",
     formula: "F_m = gain F",
     source: "0.95 to 1.05 is normal; Wucherer et al. 2023 found 0.709 in their simulation",
@@ -18,6 +19,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     sensor: Some(sensor),
     visible: Visible::From(0.02),
+    plainly: "The force sensor reads the same share too much or too little at every force.",
+    number_means: "gain = 0.95: a true force of 100 N reads 95 N.",
+    remedy: "Hang a known mass on the flange and set the sensor's scale.",
+    typical: &[("gain", 0.95)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::KnownMasses],
     ..EffectSpec::BARE
 };
 

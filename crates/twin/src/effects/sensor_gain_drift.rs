@@ -1,11 +1,12 @@
 //! A force sensor whose gain wanders with the clock.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec, Visible};
+use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, wider};
 
 /// `sensor_gain_drift`: a gain that leaves 1 linearly from the start of the campaign on.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_gain_drift",
+    group: Group::Robot,
     about: "factor on the measured force that changes with time",
     formula: "F_m = F (1 + rate_per_h t)",
     source: "first order of a drifting gain; warm-up of the sensor's electronics",
@@ -20,6 +21,20 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     sensor: Some(sensor),
     reads_clock: true,
     visible: Visible::OverTheCampaign(0.02),
+    plainly: "The scale of the force sensor changes with time.",
+    number_means: "rate_per_h = 0.01: after an hour every force reads 1 % more than at the start.",
+    remedy: "Let sensor and electronics warm up; check a known mass at the start and at the end of the day.",
+    typical: &[("rate_per_h", 0.02)],
+    pulls: Ok(PullFit {
+        fit: |_| Fit::new(&[&[("rate_per_h", 0.0)]], &[("rate_per_h", 0.02)]),
+        ..PullFit::PLAIN
+    }),
+    table: Some(TableFit {
+        acts_through: &["time_s"],
+        bounds: |span, own| wider(own, 0.9 / span.hours()),
+        ..TableFit::PLAIN
+    }),
+    experiments: &[Experiment::LongPause, Experiment::ZeroAndLoadOverTime],
     ..EffectSpec::BARE
 };
 

@@ -1,13 +1,16 @@
 //! A force sensor that reads less on the way up than on the way down.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec, Visible};
+use super::{
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, log_spaced,
+};
 
 /// `sensor_hysteresis`: a Bouc-Wen loop (exponent 1, beta = gamma), integrated exactly over each step. Its state
 /// tends to +1 while the force rises and to -1 while it falls, over `force_scale_n`, whatever the speed. A sensor
 /// starts without history.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_hysteresis",
+    group: Group::Robot,
     about: "measured force that lags behind the direction of change",
     formula: "F_m = F - amplitude_n z, dz = (sign(dF) - z) abs(dF) / force_scale_n",
     source: "Bouc-Wen model; 0.5 to 3 % of the range",
@@ -30,6 +33,27 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     sensor: Some(sensor),
     remembers: true,
     visible: Visible::From(0.05),
+    plainly: "The force sensor reads less while the force rises than while it falls.",
+    number_means: "amplitude_n = 0.5: rising and falling readings of one force differ by 1 N.",
+    remedy: "Approach every force from the same side, or load the sensor fully once before it is used.",
+    typical: &[("amplitude_n", 0.5)],
+    pulls: Ok(PullFit {
+        fit: |_| {
+            let free = [("amplitude_n", 0.3), ("force_scale_n", 3.0)];
+            Fit::over("force_scale_n", &[3.0, 15.0], ("amplitude_n", 0.3), &free)
+        },
+        ..PullFit::PLAIN
+    }),
+    table: Some(TableFit {
+        acts_through: &[FORCE_RATE],
+        grid: Some(|span| {
+            let range_n = span.highest_n - span.lowest_n;
+            let low_n = (0.01 * range_n).max(0.1);
+            ("force_scale_n", log_spaced(low_n, range_n.clamp(2.0 * low_n, 100.0), 8))
+        }),
+        ..TableFit::PLAIN
+    }),
+    experiments: &[Experiment::LoadingAtTwoSpeeds],
     ..EffectSpec::BARE
 };
 

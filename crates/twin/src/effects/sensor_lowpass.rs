@@ -1,12 +1,15 @@
 //! A force sensor that is filtered.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec, Visible};
+use super::{
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, log_spaced,
+};
 
 /// `sensor_lowpass`: first order, exact for a force that is constant over the step. Starts settled; the memory's
 /// state is the reading before.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_lowpass",
+    group: Group::Robot,
     about: "measured force behind a low-pass filter",
     formula: "tau_s dF_m/dt = F - F_m",
     source: "first-order filter; tau 5 to 50 ms",
@@ -20,6 +23,23 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     sensor: Some(sensor),
     remembers: true,
     visible: Visible::From(0.02),
+    plainly: "The force sensor follows late: fast changes are smoothed away.",
+    number_means: "tau_s = 0.05: two thirds of a sudden change are seen after 50 ms.",
+    remedy: "Lower the sensor's filter, or pull more slowly.",
+    typical: &[("tau_s", 0.1)],
+    pulls: Ok(PullFit {
+        fit: |_| Fit::new(&[&[("tau_s", 0.03)], &[("tau_s", 0.15)]], &[("tau_s", 0.02)]),
+        ..PullFit::PLAIN
+    }),
+    table: Some(TableFit {
+        acts_through: &[FORCE_RATE],
+        grid: Some(|span| {
+            let low_s = (0.3 * span.step_s).min(0.5);
+            ("tau_s", log_spaced(low_s, (0.1 * span.longest_s).clamp(2.0 * low_s, 2.0), 14))
+        }),
+        ..TableFit::PLAIN
+    }),
+    experiments: &[Experiment::OtherPullRates, Experiment::LoadingAtTwoSpeeds],
     ..EffectSpec::BARE
 };
 

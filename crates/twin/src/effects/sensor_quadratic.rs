@@ -1,13 +1,16 @@
 //! A force sensor whose line is bent.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec, Visible};
+use super::{
+    EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, REFERENCE_FORCE, TableFit, Visible, wider,
+};
 
 /// `sensor_quadratic`: the second term of the sensor's curve. A load cell bends the same way whatever the sign of the
 /// force (an even term); one that is made of two springs may bend alike in both directions (an odd one). Only pulls in both
 /// directions tell.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_quadratic",
+    group: Group::Robot,
     about: "measured force with a quadratic term",
     formula: "F_m = F + quadratic_per_n F^2, with F abs(F) for F^2 where odd = 1",
     source: "non-linearity of load cells, 0.5 to 3 % of the range",
@@ -30,6 +33,24 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     references: &["odd"],
     sensor: Some(sensor),
     visible: Visible::AtTheLargestForce(0.02),
+    plainly: "The force sensor's line is bent: small forces read right, large ones too much or too little.",
+    number_means: "quadratic_per_n = 0.0005: at 100 N the reading is 5 % too large.",
+    remedy: "Load the sensor with five known masses over its range and store its curve.",
+    typical: &[("quadratic_per_n", 0.0005)],
+    pulls: Ok(PullFit {
+        spans: &["grip_force_n"],
+        fit: |span| {
+            let odd: &[f64] = if (span.varies)("pull_direction") { &[0.0, 1.0] } else { &[0.0] };
+            Fit::over("odd", odd, ("quadratic_per_n", 0.0), &[("quadratic_per_n", 0.001)])
+        },
+        ..PullFit::PLAIN
+    }),
+    table: Some(TableFit {
+        acts_through: &[REFERENCE_FORCE],
+        bounds: |span, own| wider(own, 0.9 / span.largest_n()),
+        ..TableFit::PLAIN
+    }),
+    experiments: &[Experiment::KnownMasses, Experiment::KnownLoads],
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,7 @@
 //! A force sensor at the end of its range.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, REFERENCE_FORCE, TableFit};
 
 /// No force here comes near it.
 const NO_LIMIT_N: f64 = 1e6;
@@ -9,6 +9,7 @@ const NO_LIMIT_N: f64 = 1e6;
 /// `sensor_saturation`: readings are clipped on both sides of the range.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "sensor_saturation",
+    group: Group::Robot,
     about: "measured force that stops at the end of the sensor's range",
     formula: "F_m = clamp(F, -limit_n, limit_n)",
     source: "UR5e data sheet: range 50 N",
@@ -20,6 +21,30 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         about: "largest reading",
     }],
     sensor: Some(sensor),
+    plainly: "The force sensor stops at the end of its range: whatever is larger reads the same.",
+    number_means: "limit_n = 50: no force reads more than 50 N.",
+    remedy: "Keep pulls below the limit, or use a sensor with a larger range; labels at the limit are lower bounds.",
+    typical: &[("limit_n", 20.0)],
+    pulls: Ok(PullFit {
+        fit: |span| {
+            let most_n = span.largest_reading_n;
+            Fit::new(
+                &[&[("limit_n", 0.7 * most_n)], &[("limit_n", 0.95 * most_n)]],
+                &[("limit_n", 0.03 * most_n)],
+            )
+        },
+        flat_at_neutral: true,
+        ..PullFit::PLAIN
+    }),
+    table: Some(TableFit {
+        acts_through: &[REFERENCE_FORCE],
+        grid: Some(|span| {
+            let limit_n = |k: u32| span.largest_n() * (0.4 + 0.599 * f64::from(k) / 23.0);
+            ("limit_n", (0..24).map(limit_n).collect())
+        }),
+        bounds: |span, (low, _)| (low.min(0.2 * span.largest_n()), span.largest_n()),
+    }),
+    experiments: &[Experiment::KnownMasses, Experiment::KnownLoads],
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,7 @@
 //! A contact that holds no more per area than its shear strength, however hard it is pressed.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, GripPoint, Group, ParameterSpec};
 
 /// No interface here comes near it.
 const NO_LIMIT_MPA: f64 = 1e6;
@@ -16,6 +16,7 @@ const NO_LIMIT_MPA: f64 = 1e6;
 /// It is a law of the local pressure: every cell of the contact has its own coefficient.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "shear_strength",
+    group: Group::Friction,
     about: "friction stress that stops at the shear strength of the interface",
     formula: "mu' = strength_mpa erf(sqrt(pi) mu p / (2 strength_mpa)) / p, p = pressure of the cell",
     source: "F = strength x real area: Bowden and Tabor 1950; share of real area: Persson 2001; rough silicone: \
@@ -30,6 +31,13 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &["grip_force_n"],
     of_pressure: true,
     friction: Some(friction),
+    plainly: "The surface lets go at a shear stress of its own, so points that are pressed hard hold less than in proportion.",
+    number_means: "strength_mpa is the largest shear stress that the interface holds anywhere.",
+    remedy: "Keep the law in the twin if pressure fields are known; on pulls alone use area_saturation or load_power_law.",
+    typical: &[("strength_mpa", 0.05)],
+    pulls: Err(
+        "it is a law of the pressure field, which pulls do not show; area_saturation and load_power_law stand for it",
+    ),
     ..EffectSpec::BARE
 };
 

@@ -1,11 +1,12 @@
 //! A gel whose friction changes as it warms.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `temperature`: friction of elastomers falls with temperature, here by the same share for each kelvin.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "temperature",
+    group: Group::Friction,
     about: "friction coefficient that falls with the temperature of the gel",
     formula: "mu' = mu exp(-k_per_k (T - t0_c))",
     source: "Arrhenius law over a small range; 0.5 to 3 % a kelvin",
@@ -29,6 +30,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &["temperature_c"],
     friction: Some(friction),
     per_part: true,
+    plainly: "Friction changes with the temperature of the gel.",
+    number_means: "k_per_k = 0.01: a gel that is 1 K warmer has a coefficient 1 % lower.",
+    remedy: "Record the temperature with every pull, let lights and robot warm up first, and keep the law in the twin.",
+    typical: &[("k_per_k", 0.01)],
+    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("k_per_k", 0.0)]], &[("k_per_k", 0.005)]), ..PullFit::PLAIN }),
+    experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };
 

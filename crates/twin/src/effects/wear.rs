@@ -1,11 +1,12 @@
 //! A gel that wears from pull to pull.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
 
 /// `wear`: the coating loses friction at a rate that falls off, until `depth` of it is gone.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "wear",
+    group: Group::Friction,
     about: "friction coefficient that falls with the number of pulls",
     formula: "mu' = mu (1 - depth (1 - exp(-pull_index / n0)))",
     source: "saturating wear of the coating, n0 500 to 5000; GelSlim was tested for more than 3000 grasps",
@@ -27,6 +28,19 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     ],
     covariates: &["pull_index"],
     friction: Some(friction),
+    plainly: "Friction falls slowly from pull to pull, because the coating wears.",
+    number_means: "depth = 0.1: 10 % of the coefficient are lost in the end, two thirds of it after n0 pulls.",
+    remedy: "Compare with a new gel; plan pulls in random order so that wear is not taken for something else.",
+    typical: &[("depth", 0.2), ("n0", 150.0)],
+    pulls: Ok(PullFit {
+        fit: |span| {
+            let last = span.last_pull_index;
+            let free = [("depth", 0.05), ("n0", 0.3 * last)];
+            Fit::over("n0", &[0.1 * last, 0.5 * last, 3.0 * last], ("depth", 0.1), &free)
+        },
+        ..PullFit::PLAIN
+    }),
+    experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };
 

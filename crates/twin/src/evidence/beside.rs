@@ -63,11 +63,11 @@ pub(super) fn across(evidence: &LabelEvidence<'_>, findings: &mut Vec<Finding>) 
     let mean = |of: &dyn Fn(&WrenchRow) -> f64| {
         near.iter().map(|row| of(row)).sum::<f64>() / near.len() as f64 - zero(of)
     };
-    let across_n = mean(&|row| row.across_n[0]).hypot(mean(&|row| row.across_n[1]));
+    let across_n = libm::hypot(mean(&|row| row.across_n[0]), mean(&|row| row.across_n[1]));
     let label_n = evidence.label_n;
     findings.push(Finding {
         kind: FindingKind::Lateral,
-        found: label_n.hypot(across_n),
+        found: libm::hypot(label_n, across_n),
         wanted: label_n,
         allowed: cap_n(label_n),
         time_s: Some(pulled[most].time_s),

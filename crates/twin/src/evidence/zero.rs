@@ -32,7 +32,7 @@ pub(super) fn without_load(
         let found = mean(after);
         // Without a reading before there is nothing to compare with but zero.
         let chance_n =
-            chance_n(after.len()).hypot(if before.is_empty() { 0.0 } else { chance_n(before.len()) });
+            libm::hypot(chance_n(after.len()), if before.is_empty() { 0.0 } else { chance_n(before.len()) });
         findings.push(Finding {
             kind: FindingKind::ZeroShift,
             found,

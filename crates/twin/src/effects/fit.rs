@@ -1,0 +1,156 @@
+//! How an effect is fitted: to pulls, to a table of a force sensor beside a reference, to presses.
+//!
+//! Data of the specs. What a fit does with them stands in `identify`.
+
+/// Name of the time derivative of the reference force, a covariate of sensor tables.
+pub const FORCE_RATE: &str = "force_rate_n_per_s";
+
+/// Name of the reference force, a covariate of sensor tables.
+pub const REFERENCE_FORCE: &str = "reference_force_n";
+
+/// A parameter by its name, with a value or a scale.
+pub type Named = (&'static str, f64);
+
+/// What the fits need to know of a campaign of pulls.
+pub struct PullSpan<'a> {
+    /// Whether a column was recorded and has more than one value.
+    pub varies: &'a dyn Fn(&str) -> bool,
+    /// Largest reading of the wrist sensor.
+    pub largest_reading_n: f64,
+    /// Index of the last pull, at least 4.
+    pub last_pull_index: f64,
+    /// Pull indices at which something may have happened.
+    pub splits: Vec<f64>,
+    /// Whether pulls since the last rest were counted.
+    pub rests: bool,
+}
+
+/// Where a fit starts, and what is free in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// Each start by its values; parameters that are left out are neutral. The best of the fits counts.
+    pub starts: Vec<Vec<Named>>,
+    /// Parameters that are fitted with the scale of a step. The first one says how large the effect is.
+    pub free: Vec<Named>,
+    /// Number of parameters that are tried at the starts only, which the data pay for too.
+    pub searched: usize,
+}
+
+impl Fit {
+    /// A fit from some starts.
+    pub fn new(starts: &[&[Named]], free: &[Named]) -> Self {
+        Self { starts: starts.iter().map(|s| s.to_vec()).collect(), free: free.to_vec(), searched: 0 }
+    }
+
+    /// A fit from some values of one parameter, each with the same value of another one.
+    pub fn over(name: &'static str, values: &[f64], other: Named, free: &[Named]) -> Self {
+        let starts = values.iter().map(|value| vec![(name, *value), other]).collect();
+        Self { starts, free: free.to_vec(), searched: 0 }
+    }
+
+    /// The same with a number of parameters that are tried at the starts only.
+    pub fn searching(self, searched: usize) -> Self {
+        Self { searched, ..self }
+    }
+}
+
+/// How an effect is fitted to pulls.
+#[derive(Clone, Copy)]
+pub struct PullFit {
+    /// Columns that have to vary besides the covariates of the effect.
+    pub spans: &'static [&'static str],
+    /// The fit in a campaign.
+    pub fit: fn(&PullSpan<'_>) -> Fit,
+    /// Bounds of a parameter in a fit, from its name, the values of a start and the bounds of the library.
+    pub bounds: fn(&str, &[f64], (f64, f64)) -> (f64, f64),
+    /// The derivative by its size vanishes at the neutral value, so that no slope promises anything.
+    pub flat_at_neutral: bool,
+}
+
+impl PullFit {
+    /// No fit: what the specs fill in.
+    pub(super) const PLAIN: PullFit = PullFit {
+        spans: &[],
+        fit: |_| Fit { starts: Vec::new(), free: Vec::new(), searched: 0 },
+        bounds: |_, _, library| library,
+        flat_at_neutral: false,
+    };
+}
+
+/// What the fits need to know of a table of a force sensor beside a reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableSpan {
+    /// Smallest reference force.
+    pub lowest_n: f64,
+    /// Largest reference force.
+    pub highest_n: f64,
+    /// Median time between two rows.
+    pub step_s: f64,
+    /// Duration of the longest session.
+    pub longest_s: f64,
+    /// Time from the first row to the last.
+    pub whole_s: f64,
+}
+
+impl TableSpan {
+    /// Largest absolute value of the reference force.
+    pub fn largest_n(&self) -> f64 {
+        self.highest_n.abs().max(self.lowest_n.abs())
+    }
+
+    /// Time from the first row to the last, in hours.
+    pub fn hours(&self) -> f64 {
+        self.whole_s / 3600.0
+    }
+}
+
+/// How an effect is fitted to a table of a force sensor. An effect with a grid in its first parameter has no other size.
+#[derive(Clone, Copy)]
+pub struct TableFit {
+    /// Covariates through which it acts.
+    pub acts_through: &'static [&'static str],
+    /// The parameter that is tried on a grid, and its values.
+    pub grid: Option<fn(&TableSpan) -> (&'static str, Vec<f64>)>,
+    /// Bounds of its parameters from those of the library, which are for campaigns of hours: in a table of seconds a
+    /// change by the whole range is no more than that, whatever it would be in an hour.
+    pub bounds: fn(&TableSpan, (f64, f64)) -> (f64, f64),
+}
+
+impl TableFit {
+    /// No covariate and no grid: what the specs fill in.
+    pub(super) const PLAIN: TableFit =
+        TableFit { acts_through: &[], grid: None, bounds: |_, library| library };
+}
+
+/// How an effect is fitted to presses.
+#[derive(Clone, Copy)]
+pub struct PressFit {
+    /// The parameter that says how large it is.
+    pub main: &'static str,
+    /// Start and scale of a parameter, from its name and the side of a pixel in millimetres. Where the derivative
+    /// vanishes at the neutral value (the width of a blur, the strength of a shadow) the fit starts beside it.
+    pub start: fn(&str, f64) -> (f64, f64),
+    /// The parameter whose value is found by trying, not by slopes.
+    pub tried: Option<&'static str>,
+    /// It changes the picture of the contact, which has to be drawn anew, and not only light and camera.
+    pub drawn: bool,
+    /// It shows only where the contacts are marked by hand: a place that is found moves with it.
+    pub needs_marks: bool,
+}
+
+impl PressFit {
+    /// An effect that is drawn: what the specs fill in.
+    pub(super) const DRAWN: PressFit =
+        PressFit { main: "", start: |_, _| (0.0, 1.0), tried: None, drawn: true, needs_marks: false };
+}
+
+/// `count` values from `low` to `high` in equal ratios.
+pub(super) fn log_spaced(low: f64, high: f64, count: usize) -> Vec<f64> {
+    let ratio = libm::log(high / low) / (count - 1) as f64;
+    (0..count).map(|k| low * libm::exp(ratio * k as f64)).collect()
+}
+
+/// Bounds that reach to `to` on both sides of 0 at least.
+pub(super) fn wider((low, high): (f64, f64), to: f64) -> (f64, f64) {
+    (low.min(-to), high.max(to))
+}
