@@ -8,9 +8,10 @@ pub mod camera;
 pub mod dashboard;
 pub mod experiment;
 pub mod gcl;
+pub mod link;
 pub mod primary;
 pub mod program;
 pub mod robot_state;
 pub mod rtde;
-pub mod stamped;
+
 pub mod virtual_rig;

@@ -43,7 +43,7 @@ fn led() -> (SocketAddr, Sender<Vec<u8>>) {
     (address, lead)
 }
 
-fn number(frame: &crate::stamped::Stamped<std::sync::Arc<CameraFrame>>) -> u8 {
+fn number(frame: &crate::link::Stamped<std::sync::Arc<CameraFrame>>) -> u8 {
     frame.event.jpeg[2]
 }
 
@@ -128,7 +128,7 @@ fn what_is_no_camera_is_said() {
     let client = CameraClient::connect(address, "camera", TIMEOUT).unwrap();
     let e = client.frame_after(Instant::now(), TIMEOUT).unwrap_err();
     assert_eq!(e.to_string(), format!("{address}: the camera answers `HTTP/1.0 404 Not Found`"));
-    assert!(matches!(client.ended(), Some(CameraLinkError::Stream { .. })));
+    assert!(matches!(client.ended(), Some(CameraLinkError::Session { .. })));
     let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let e = CameraClient::connect(nobody, "camera", TIMEOUT).err().unwrap();
     assert!(matches!(e, CameraLinkError::Io { .. }), "{e}");

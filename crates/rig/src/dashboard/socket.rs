@@ -1,51 +1,14 @@
-//! The session on a socket: the caller waits for each answer, a controller gives them at once.
+//! The session on a socket: the caller waits for each answer, a controller gives them at once. No thread reads: nothing comes
+//! that was not asked for, and a stop must not depend on one.
 
 use super::command::{DashboardCommand, DashboardReply, DashboardReplyError};
 use super::session::{DashboardEvent, DashboardLink, DashboardSendError, DashboardSessionError};
-use crate::stamped::connect;
-use std::io::{ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use crate::link::{LinkError, Socket, time_left};
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-/// Why a connection was not made, or ended.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DashboardLinkError {
-    /// The network.
-    #[error("{address}: {source}")]
-    Io {
-        /// Where to.
-        address: SocketAddr,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The protocol.
-    #[error("{address}: {source}")]
-    Session {
-        /// Where to.
-        address: SocketAddr,
-        /// What is wrong.
-        source: DashboardSessionError,
-    },
-    /// The connection is closed.
-    #[error("{address}: the connection to the dashboard is closed")]
-    Closed {
-        /// Where to.
-        address: SocketAddr,
-    },
-    /// The controller says nothing.
-    #[error("{address}: no answer to `{awaited}` came for {waited_s:.3} s, {limit_s:.3} s are allowed")]
-    Timeout {
-        /// Where to.
-        address: SocketAddr,
-        /// What was to be answered.
-        awaited: &'static str,
-        /// For how long.
-        waited_s: f64,
-        /// The longest that was allowed.
-        limit_s: f64,
-    },
-}
+/// Why a connection to a dashboard was not made, or ended.
+pub type DashboardLinkError = LinkError<DashboardSessionError>;
 
 /// Why a command was not done.
 #[derive(Debug, thiserror::Error)]
@@ -64,8 +27,7 @@ pub enum DashboardError {
 
 /// A connected client. Dropping it closes the connection.
 pub struct DashboardClient {
-    address: SocketAddr,
-    stream: TcpStream,
+    socket: Socket<DashboardSessionError>,
     link: DashboardLink,
     greeting: String,
 }
@@ -73,9 +35,8 @@ pub struct DashboardClient {
 impl DashboardClient {
     /// Connects and waits for the greeting, each for at most `timeout`.
     pub fn connect(address: SocketAddr, timeout: Duration) -> Result<Self, DashboardLinkError> {
-        let stream =
-            connect(address, timeout).map_err(|source| DashboardLinkError::Io { address, source })?;
-        let mut client = Self { address, stream, link: DashboardLink::default(), greeting: String::new() };
+        let socket = Socket::connect(address, timeout, "the connection to the dashboard is closed")?;
+        let mut client = Self { socket, link: DashboardLink::default(), greeting: String::new() };
         client.greeting = client.wait("the connection", timeout, |event| match event {
             DashboardEvent::Greeting(line) => Some(line),
             _ => None,
@@ -105,10 +66,8 @@ impl DashboardClient {
         command: DashboardCommand,
         timeout: Duration,
     ) -> Result<String, DashboardError> {
-        let address = self.address;
         let sent = self.link.send(command)?;
-        let outgoing = self.link.take_outgoing();
-        self.stream.write_all(&outgoing).map_err(|source| DashboardLinkError::Io { address, source })?;
+        self.socket.write(&self.link.take_outgoing())?;
         let line = self.wait(command.line(), timeout, |event| match event {
             DashboardEvent::Reply { number, line, .. } if number == sent => Some(line),
             _ => None,
@@ -123,33 +82,21 @@ impl DashboardClient {
         timeout: Duration,
         wanted: impl Fn(DashboardEvent) -> Option<String>,
     ) -> Result<String, DashboardLinkError> {
-        let (address, started) = (self.address, Instant::now());
-        let io = |source| DashboardLinkError::Io { address, source };
+        let started = Instant::now();
         let mut buffer = [0; 4096];
         loop {
-            let session = |source| DashboardLinkError::Session { address, source };
-            while let Some(event) = self.link.next_event().map_err(session)? {
+            while let Some(event) = self.link.next_event().map_err(|e| self.socket.refused(e))? {
                 if let Some(found) = wanted(event) {
                     return Ok(found);
                 }
             }
-            let waited = started.elapsed();
-            let Some(left) = timeout.checked_sub(waited).filter(|left| !left.is_zero()) else {
-                let (waited_s, limit_s) = (waited.as_secs_f64(), timeout.as_secs_f64());
-                return Err(DashboardLinkError::Timeout { address, awaited, waited_s, limit_s });
+            let Some(left) = time_left(started, timeout) else {
+                return Err(self.socket.no_answer(awaited, started, timeout));
             };
-            self.stream.set_read_timeout(Some(left)).map_err(io)?;
-            match self.stream.read(&mut buffer) {
-                Ok(0) => return Err(DashboardLinkError::Closed { address }),
-                Ok(n) => self.link.push(&buffer[..n]),
-                // The time is looked at above.
-                Err(e) if is_pause(&e) => {}
-                Err(e) => return Err(io(e)),
+            self.socket.limit_read(left)?;
+            if let Some(n) = self.socket.read(&mut buffer)? {
+                self.link.push(&buffer[..n]);
             }
         }
     }
-}
-
-fn is_pause(e: &std::io::Error) -> bool {
-    matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }

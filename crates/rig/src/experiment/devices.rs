@@ -1,7 +1,6 @@
 //! All devices of a rig, connected.
 
 use super::config::RigConfig;
-use super::fault::Fault;
 use super::robot::{Heart, session_plan, unfit};
 use crate::camera::{CameraClient, CameraLinkError};
 use crate::dashboard::{DashboardClient, DashboardLinkError};
@@ -35,9 +34,6 @@ pub enum ConnectError {
     /// Its data are of other types than those of the guide.
     #[error("RTDE: {0}")]
     Types(String),
-    /// Its inputs.
-    #[error("RTDE: {0}")]
-    Heart(Box<Fault>),
     /// Its dashboard.
     #[error("dashboard: {0}")]
     Dashboard(#[from] DashboardLinkError),
@@ -131,7 +127,7 @@ impl Devices {
     /// Connects everything. Nothing moves.
     pub fn connect(config: &RigConfig) -> Result<Self, ConnectError> {
         let robot = connect_robot(config)?;
-        let heart = Heart::start(&robot).map_err(|e| ConnectError::Heart(Box::new(e)))?;
+        let heart = Heart::start(&robot);
         Ok(Self {
             heart,
             robot,

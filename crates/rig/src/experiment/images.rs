@@ -3,7 +3,7 @@
 use super::fault::Fault;
 use super::run::Experiment;
 use crate::camera::{CameraFrame, CameraWaitError, SHIPPED_FRAME_LIMITS, decode_jpeg};
-use crate::stamped::Stamped;
+use crate::link::Stamped;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -1,10 +1,10 @@
 //! The robot's readings, and the heartbeat that keeps its program alive.
 
 use super::fault::Fault;
+use crate::link::lock;
 use crate::program::{Phase, TcpPose, registers};
 use crate::robot_state::{RobotMode, SafetyStatus};
 use crate::rtde::{Recipe, RtdeClient, SessionPlan, Value};
-use crate::stamped::lock;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -182,8 +182,8 @@ struct Hand {
 
 impl Heart {
     /// Begins to beat.
-    pub(super) fn start(client: &RtdeClient) -> Result<Self, Fault> {
-        let writer = client.writer()?;
+    pub(super) fn start(client: &RtdeClient) -> Self {
+        let writer = client.writer();
         let hand = Arc::new(Hand {
             go: AtomicI32::new(0),
             alive: Mutex::new(Instant::now()),
@@ -203,7 +203,7 @@ impl Heart {
                 std::thread::sleep(BEAT);
             }
         });
-        Ok(Self { hand, thread: Some(thread) })
+        Self { hand, thread: Some(thread) }
     }
 
     /// The experiment is alive.

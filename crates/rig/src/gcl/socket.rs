@@ -3,13 +3,11 @@
 
 use super::command::{GclCommand, GclLimits, Query};
 use super::session::{GclEvent, GclLink, GclSessionError, SendError, status_meaning};
-use crate::stamped::{ReadEnd, Stamped, connect, lock, read_until_end};
+use crate::link::{Connection, LinkError, Reading, Shared, Socket, Stamped};
 use std::collections::VecDeque;
-use std::io::Write;
-use std::net::{Shutdown, SocketAddr, TcpStream};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::thread::JoinHandle;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};
 
 /// How long a goodbye is waited for.
@@ -23,33 +21,10 @@ const MOST_LOG_LINES: usize = 65_536;
 /// How far a setting that is repeated may be off: devices print two decimals.
 const ECHO_TOLERANCE: f64 = 0.01;
 
-/// Why a connection was not made, or ended.
-#[derive(Debug, Clone, thiserror::Error)]
-#[non_exhaustive]
-pub enum GclLinkError {
-    /// The network.
-    #[error("{address}: {source}")]
-    Io {
-        /// Where to.
-        address: SocketAddr,
-        /// What the system says.
-        source: Arc<std::io::Error>,
-    },
-    /// The protocol.
-    #[error("{address}: {source}")]
-    Session {
-        /// Where to.
-        address: SocketAddr,
-        /// What is wrong.
-        source: GclSessionError,
-    },
-    /// The connection is closed.
-    #[error("{address}: the connection to the gripper is closed")]
-    Closed {
-        /// Where to.
-        address: SocketAddr,
-    },
-}
+const READING: Reading = Reading { thread: "gcl", silence: None, cut_at_end: true };
+
+/// Why a connection to a gripper was not made, or ended.
+pub type GclLinkError = LinkError<GclSessionError>;
 
 /// Why a command was not sent.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -127,23 +102,14 @@ pub struct GclLogLine {
 /// A connected client. A gripper may be silent for ever, only requests have deadlines. [`close`](Self::close) says goodbye;
 /// dropping the client cuts the connection, which a gripper takes for a fast stop.
 pub struct GclClient {
-    shared: Arc<Shared>,
+    connection: Connection<State, GclSessionError>,
     events: Receiver<Stamped<GclEvent>>,
-    reader: Option<JoinHandle<()>>,
 }
 
 /// Sends a fast stop from any thread, also while the client waits.
 #[derive(Clone)]
 pub struct GclStopper {
-    shared: Arc<Shared>,
-}
-
-struct Shared {
-    address: SocketAddr,
-    stream: TcpStream,
-    state: Mutex<State>,
-    /// An answer, a fast stop, or the end.
-    changed: Condvar,
+    shared: Arc<Shared<State, GclSessionError>>,
 }
 
 struct State {
@@ -154,28 +120,30 @@ struct State {
     answers: VecDeque<GclEvent>,
     /// A fast stop was sent after the last motion.
     stopped: bool,
-    ended: Option<GclLinkError>,
 }
 
 impl GclClient {
     /// Connects to a gripper of these limits. Nothing is sent yet.
     pub fn connect(address: SocketAddr, limits: GclLimits, timeout: Duration) -> Result<Self, GclLinkError> {
-        let io = |source| GclLinkError::Io { address, source: Arc::new(source) };
-        let stream = connect(address, timeout).map_err(io)?;
+        let socket = Socket::connect(address, timeout, "the connection to the gripper is closed")?;
         let state = State {
             session: GclLink::new(limits),
             line: Vec::new(),
             log: VecDeque::new(),
             answers: VecDeque::new(),
             stopped: false,
-            ended: None,
         };
-        let shared = Arc::new(Shared { address, stream, state: Mutex::new(state), changed: Condvar::new() });
         let (tell, events) = sync_channel(MOST_EVENTS);
-        let reading = shared.clone();
-        let reader = std::thread::Builder::new().name("gcl".into());
-        let reader = reader.spawn(move || read_on(&reading, &tell)).map_err(io)?;
-        Ok(Self { shared, events, reader: Some(reader) })
+        let connection = Connection::start(socket, READING, state, move |shared, bytes, at| {
+            for piece in bytes.split_inclusive(|&b| b == b'\n') {
+                let events = shared.known().state.receive(piece, at)?;
+                shared.notify();
+                // A full channel is one that nobody reads.
+                events.into_iter().for_each(|event| drop(tell.try_send(Stamped { at, event })));
+            }
+            Ok(())
+        })?;
+        Ok(Self { connection, events })
     }
 
     /// What the gripper said, in its order; the end of the channel is the end of the connection.
@@ -185,28 +153,28 @@ impl GclClient {
 
     /// Why the connection ended, once it has.
     pub fn ended(&self) -> Option<GclLinkError> {
-        lock(&self.shared.state).ended.clone()
+        self.connection.shared.known().ended.clone()
     }
 
     /// All lines since the last call, both ways, in their order.
     pub fn take_log(&self) -> Vec<GclLogLine> {
-        std::mem::take(&mut lock(&self.shared.state).log).into()
+        std::mem::take(&mut self.connection.shared.known().state.log).into()
     }
 
     /// A handle that can stop the gripper from another thread.
     pub fn stopper(&self) -> GclStopper {
-        GclStopper { shared: self.shared.clone() }
+        GclStopper { shared: self.connection.shared.clone() }
     }
 
     /// Sends a command and waits for nothing.
     pub fn send(&self, command: &GclCommand) -> Result<(), GclSendError> {
-        self.shared.send(command)
+        self.connection.shared.send(command)
     }
 
     /// Waits for the end of a command that was sent: the FIN of a motion, the value of a question or a setting, the ACK of
     /// the others. The protocol numbers nothing: an answer that comes after its time counts for the next command of its name.
     pub fn wait_for(&mut self, command: &GclCommand, timeout: Duration) -> Result<(), GclRunError> {
-        let taken = self.shared.wait(command, timeout, |event| Some(number_of(event)))?;
+        let taken = self.connection.shared.wait_for(command, timeout, |event| Some(number_of(event)))?;
         match (setting_of(command), taken) {
             (Some(asked), Some(taken)) if (asked - taken).abs() > ECHO_TOLERANCE => {
                 Err(GclRunError::Echo { command: command.name(), asked, taken })
@@ -225,23 +193,13 @@ impl GclClient {
     pub fn ask(&mut self, query: Query, timeout: Duration) -> Result<f64, GclRunError> {
         let command = GclCommand::Ask(query);
         self.send(&command)?;
-        self.shared.wait(&command, timeout, number_of)
+        self.connection.shared.wait_for(&command, timeout, number_of)
     }
 
     /// Says goodbye, so that the gripper keeps what it holds, and closes the connection. The answer is waited for half a second;
     /// the connection is closed in any case.
     pub fn close(mut self) -> Result<(), GclRunError> {
         self.run(&GclCommand::Bye, BYE)
-    }
-}
-
-impl Drop for GclClient {
-    fn drop(&mut self) {
-        // Wakes the reader; a connection that is gone already is closed all the same.
-        let _ = self.shared.stream.shutdown(Shutdown::Both);
-        if let Some(reader) = self.reader.take() {
-            let _ = reader.join();
-        }
     }
 }
 
@@ -252,12 +210,13 @@ impl GclStopper {
     }
 }
 
-impl Shared {
+impl Shared<State, GclSessionError> {
     fn send(&self, command: &GclCommand) -> Result<(), GclSendError> {
-        let mut state = lock(&self.state);
-        if let Some(ended) = &state.ended {
+        let mut known = self.known();
+        if let Some(ended) = &known.ended {
             return Err(ended.clone().into());
         }
+        let state = &mut known.state;
         state.session.send(command)?;
         // What is left of an earlier command of this name is no answer to this one.
         state.answers.retain(|event| !is_answer(event, command));
@@ -268,52 +227,42 @@ impl Shared {
         }
         // One line, one write: the lock keeps lines of two threads apart and the log in the order of the wire.
         let bytes = state.session.take_outgoing();
-        let at = Instant::now();
-        state.log(at, true, &bytes);
-        let written = (&self.stream).write_all(&bytes);
-        if let Err(e) = &written {
-            let source = Arc::new(std::io::Error::from(e.kind()));
-            state.ended.get_or_insert(GclLinkError::Io { address: self.address, source });
-            let _ = self.stream.shutdown(Shutdown::Both);
+        state.log(Instant::now(), true, &bytes);
+        let written = self.socket.write(&bytes);
+        if let Err(end) = &written {
+            known.ended.get_or_insert_with(|| end.clone());
+            self.socket.cut();
         }
-        drop(state);
-        self.changed.notify_all();
-        written.map_err(|e| GclLinkError::Io { address: self.address, source: Arc::new(e) }.into())
+        drop(known);
+        self.notify();
+        Ok(written?)
     }
 
     /// Waits for the answer that ends a command, and takes what `read` finds in it.
-    fn wait<T>(
+    fn wait_for<T>(
         &self,
         command: &GclCommand,
         timeout: Duration,
         read: impl Fn(&GclEvent) -> Option<T>,
     ) -> Result<T, GclRunError> {
-        let (started, name) = (Instant::now(), command.name());
-        let mut state = lock(&self.state);
-        loop {
+        let name = command.name();
+        let look = |state: &mut State| {
             let answer = state.answers.iter().position(|event| is_answer(event, command));
             if let Some(answer) = answer.and_then(|at| state.answers.remove(at)) {
                 if let GclEvent::Failed { status, line, .. } = answer {
                     let meaning = status.map_or("it gives no status", status_meaning);
-                    return Err(GclRunError::Failed { command: name, status, meaning, line });
+                    return Some(Err(GclRunError::Failed { command: name, status, meaning, line }));
                 }
                 if let Some(found) = read(&answer) {
-                    return Ok(found);
+                    return Some(Ok(found));
                 }
             }
-            if state.stopped && command.moves() {
-                return Err(GclRunError::Stopped { command: name });
-            }
-            if let Some(ended) = &state.ended {
-                return Err(ended.clone().into());
-            }
-            let waited = started.elapsed();
-            let Some(left) = timeout.checked_sub(waited).filter(|left| !left.is_zero()) else {
-                let (waited_s, limit_s) = (waited.as_secs_f64(), timeout.as_secs_f64());
-                return Err(GclRunError::Timeout { awaited: awaited(command), waited_s, limit_s });
-            };
-            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
-        }
+            (state.stopped && command.moves()).then_some(Err(GclRunError::Stopped { command: name }))
+        };
+        self.wait(timeout, look, |_, waited| {
+            let (waited_s, limit_s) = (waited.as_secs_f64(), timeout.as_secs_f64());
+            GclRunError::Timeout { awaited: awaited(command), waited_s, limit_s }
+        })
     }
 }
 
@@ -384,26 +333,4 @@ fn awaited(command: &GclCommand) -> String {
         command if setting_of(command).is_some() => format!("{name}="),
         _ => format!("ACK {name}"),
     }
-}
-
-/// The reader's loop, until the connection ends.
-fn read_on(shared: &Shared, tell: &SyncSender<Stamped<GclEvent>>) {
-    let end = read_until_end(&shared.stream, |bytes, at| {
-        for piece in bytes.split_inclusive(|&b| b == b'\n') {
-            let events = lock(&shared.state).receive(piece, at)?;
-            shared.changed.notify_all();
-            // A full channel is one that nobody reads.
-            events.into_iter().for_each(|event| drop(tell.try_send(Stamped { at, event })));
-        }
-        Ok(())
-    });
-    let address = shared.address;
-    let error = match end {
-        ReadEnd::Closed => GclLinkError::Closed { address },
-        ReadEnd::Io(source) => GclLinkError::Io { address, source: Arc::new(source) },
-        ReadEnd::Refused(source) => GclLinkError::Session { address, source },
-    };
-    lock(&shared.state).ended.get_or_insert(error);
-    let _ = shared.stream.shutdown(Shutdown::Both);
-    shared.changed.notify_all();
 }

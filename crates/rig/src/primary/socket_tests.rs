@@ -1,7 +1,7 @@
 //! The client against a small controller on loopback, which runs a program, finds it wrong, or goes away.
 
 use super::*;
-use crate::stamped::Stamped;
+use crate::link::Stamped;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::{Duration, Instant};
@@ -118,6 +118,6 @@ fn the_mode_is_an_event_where_it_changes() {
     assert_eq!(events, [PrimaryEvent::RobotMode(modes[0]), PrimaryEvent::RobotMode(modes[2])]);
     assert_eq!(client.newest_mode().map(|m| m.event), Some(modes[4]));
     let e = client.ended().unwrap();
-    assert!(matches!(e, PrimaryLinkError::Stream { .. }) && e.to_string().contains("has 1 bytes"), "{e}");
+    assert!(matches!(e, PrimaryLinkError::Session { .. }) && e.to_string().contains("has 1 bytes"), "{e}");
     assert_eq!((client.skipped(), client.events_lost()), (5, 0));
 }

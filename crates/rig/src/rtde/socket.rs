@@ -3,12 +3,10 @@
 use super::session::{Event, Link, SessionError, SessionPlan, WriteInputError};
 use super::value::Value;
 use super::{Recipe, RecipeError};
-use crate::stamped::{Stamped, lock};
-use std::io::{ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpStream};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use crate::link::{Connection, LOOK, Reading, Shared, Socket, Stamped, lock};
+use std::net::SocketAddr;
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// A controller that says nothing for so long is gone.
@@ -16,62 +14,23 @@ const SILENCE: Duration = Duration::from_secs(1);
 /// Attempts to get inputs that an old connection may still have, and the pause between them.
 const IN_USE_ATTEMPTS: usize = 4;
 const IN_USE_PAUSE: Duration = Duration::from_millis(500);
-/// Time between two looks at whether the client is still wanted.
-const LOOK: Duration = Duration::from_millis(50);
+/// A robot that is not heard any more may still hear that it has to stop: the end of reading leaves the way out open.
+const READING: Reading = Reading { thread: "rtde", silence: Some(SILENCE), cut_at_end: false };
 
-/// Why a connection was not made, or ended.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LinkError {
-    /// The network.
-    #[error("{address}: {source}")]
-    Io {
-        /// Where to.
-        address: SocketAddr,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The protocol.
-    #[error("{address}: {source}")]
-    Session {
-        /// Where to.
-        address: SocketAddr,
-        /// What is wrong.
-        source: SessionError,
-    },
-    /// The controller closed the connection.
-    #[error("{address}: the controller closed the connection")]
-    Closed {
-        /// Where to.
-        address: SocketAddr,
-    },
-    /// The controller says nothing.
-    #[error("{address}: nothing came for {silent_s:.1} s")]
-    Silent {
-        /// Where to.
-        address: SocketAddr,
-        /// For how long.
-        silent_s: f64,
-    },
-}
+/// Why a connection to a controller was not made, or ended.
+pub type LinkError = crate::link::LinkError<SessionError>;
 
 /// A connected client. Events come in their order through [`events`](Self::events), the newest values also through
 /// [`newest`](Self::newest). Dropping it closes the connection.
 pub struct RtdeClient {
-    shared: Arc<Shared>,
-    stream: TcpStream,
-    address: SocketAddr,
+    connection: Connection<Newest, SessionError>,
+    session: Arc<Mutex<Link>>,
     recipe: Recipe,
     events: Receiver<Stamped<Event>>,
-    reader: Option<JoinHandle<()>>,
 }
 
-struct Shared {
-    link: Mutex<Link>,
-    newest: Mutex<Option<Vec<Value>>>,
-    ended: Mutex<Option<LinkError>>,
-    wanted: Mutex<bool>,
-}
+/// The newest values, apart from the session: whoever asks for them never waits for a write.
+type Newest = Option<Vec<Value>>;
 
 impl RtdeClient {
     /// Connects, sets up all recipes and starts. Inputs that another connection has are tried a few times: an old
@@ -91,46 +50,39 @@ impl RtdeClient {
     }
 
     fn connect_once(address: SocketAddr, plan: &SessionPlan, timeout: Duration) -> Result<Self, LinkError> {
-        let io = |source| LinkError::Io { address, source };
-        let session = |source| LinkError::Session { address, source };
-        let deadline = Instant::now() + timeout;
-        let mut stream = TcpStream::connect_timeout(&address, timeout).map_err(io)?;
-        stream.set_nodelay(true).map_err(io)?;
-        stream.set_read_timeout(Some(LOOK)).map_err(io)?;
-        stream.set_write_timeout(Some(SILENCE)).map_err(io)?;
-        let mut link = Link::new(plan.clone()).map_err(session)?;
+        let began = Instant::now();
+        let socket = Socket::connect(address, timeout, "the controller closed the connection")?;
+        socket.limit_read(LOOK)?;
+        let mut session = Link::new(plan.clone()).map_err(|e| socket.refused(e))?;
         let (tell, events) = channel();
         let mut newest = None;
         let mut buffer = [0; 8192];
-        while !link.is_running() {
-            stream.write_all(&link.take_outgoing()).map_err(io)?;
-            let n = match stream.read(&mut buffer) {
-                Ok(0) => return Err(LinkError::Closed { address }),
-                Ok(n) => n,
-                Err(e) if would_block(&e) => {
-                    if Instant::now() > deadline {
-                        return Err(LinkError::Silent { address, silent_s: timeout.as_secs_f64() });
-                    }
-                    continue;
+        while !session.is_running() {
+            socket.write(&session.take_outgoing())?;
+            let Some(n) = socket.read(&mut buffer)? else {
+                if began.elapsed() > timeout {
+                    return Err(socket.silent(began, timeout));
                 }
-                Err(e) => return Err(io(e)),
+                continue;
             };
-            for event in link.receive(&buffer[..n]).map_err(session)? {
+            for event in session.receive(&buffer[..n]).map_err(|e| socket.refused(e))? {
                 keep_newest(&event, &mut newest);
                 let _ = tell.send(Stamped { at: Instant::now(), event });
             }
         }
-        let recipe = link.output().cloned().expect("a session that runs has its outputs");
-        let shared = Arc::new(Shared {
-            link: Mutex::new(link),
-            newest: Mutex::new(newest),
-            ended: Mutex::new(None),
-            wanted: Mutex::new(true),
-        });
-        let (reading, own) = (shared.clone(), stream.try_clone().map_err(io)?);
-        let reader = std::thread::Builder::new().name("rtde".into());
-        let reader = reader.spawn(move || read_on(&reading, own, address, &tell)).map_err(io)?;
-        Ok(Self { shared, stream, address, recipe, events, reader: Some(reader) })
+        let recipe = session.output().cloned().expect("a session that runs has its outputs");
+        let session = Arc::new(Mutex::new(session));
+        let reading = session.clone();
+        let connection = Connection::start(socket, READING, newest, move |shared, bytes, at| {
+            let events = lock(&reading).receive(bytes)?;
+            for event in events {
+                keep_newest(&event, &mut shared.known().state);
+                // Nobody reads the log: the newest values are still there.
+                let _ = tell.send(Stamped { at, event });
+            }
+            Ok(())
+        })?;
+        Ok(Self { connection, session, recipe, events })
     }
 
     /// Names and types of the values.
@@ -145,54 +97,40 @@ impl RtdeClient {
 
     /// The newest values, for control: never older than what has arrived.
     pub fn newest(&self) -> Option<Vec<Value>> {
-        lock(&self.shared.newest).clone()
+        self.connection.shared.known().state.clone()
     }
 
     /// Why the connection ended, once it has.
     pub fn ended(&self) -> Option<LinkError> {
-        lock(&self.shared.ended).take()
+        self.connection.shared.known().ended.clone()
     }
 
     /// Writes the values of an input recipe at once.
     pub fn write_input(&self, recipe: usize, values: &[Value]) -> Result<(), WriteError> {
-        write_input(&self.shared, &self.stream, self.address, recipe, values)
+        self.writer().write_input(recipe, values)
     }
 
     /// A second hand that writes inputs: for a heartbeat, in a thread of its own.
-    pub fn writer(&self) -> Result<RtdeWriter, LinkError> {
-        let address = self.address;
-        let stream = self.stream.try_clone().map_err(|source| LinkError::Io { address, source })?;
-        Ok(RtdeWriter { shared: self.shared.clone(), stream, address })
+    pub fn writer(&self) -> RtdeWriter {
+        RtdeWriter { shared: self.connection.shared.clone(), session: self.session.clone() }
     }
 }
 
 /// Writes inputs of a client's connection. It does not keep the connection open.
 pub struct RtdeWriter {
-    shared: Arc<Shared>,
-    stream: TcpStream,
-    address: SocketAddr,
+    shared: Arc<Shared<Newest, SessionError>>,
+    session: Arc<Mutex<Link>>,
 }
 
 impl RtdeWriter {
     /// Writes the values of an input recipe at once.
     pub fn write_input(&self, recipe: usize, values: &[Value]) -> Result<(), WriteError> {
-        write_input(&self.shared, &self.stream, self.address, recipe, values)
+        // The lock is kept over the write: two hands never mix their frames.
+        let mut session = lock(&self.session);
+        session.write_input(recipe, values)?;
+        self.shared.socket.write(&session.take_outgoing())?;
+        Ok(())
     }
-}
-
-fn write_input(
-    shared: &Shared,
-    mut stream: &TcpStream,
-    address: SocketAddr,
-    recipe: usize,
-    values: &[Value],
-) -> Result<(), WriteError> {
-    // The lock is kept over the write: two hands never mix their frames.
-    let mut link = lock(&shared.link);
-    link.write_input(recipe, values)?;
-    let outgoing = link.take_outgoing();
-    stream.write_all(&outgoing).map_err(|source| LinkError::Io { address, source })?;
-    Ok(())
 }
 
 /// Why inputs were not written.
@@ -207,57 +145,8 @@ pub enum WriteError {
     Link(#[from] LinkError),
 }
 
-impl Drop for RtdeClient {
-    fn drop(&mut self) {
-        *lock(&self.shared.wanted) = false;
-        // Wakes the reader; a connection that is gone already is closed all the same.
-        let _ = self.stream.shutdown(std::net::Shutdown::Both);
-        if let Some(reader) = self.reader.take() {
-            let _ = reader.join();
-        }
-    }
-}
-
-fn would_block(e: &std::io::Error) -> bool {
-    matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
-}
-
 fn keep_newest(event: &Event, newest: &mut Option<Vec<Value>>) {
     if let Event::Data(values) = event {
         *newest = Some(values.clone());
     }
-}
-
-/// The reader's loop, until the connection ends or nobody wants it any more.
-fn read_on(shared: &Shared, mut stream: TcpStream, address: SocketAddr, tell: &Sender<Stamped<Event>>) {
-    let mut buffer = [0; 65_536];
-    let mut heard = Instant::now();
-    let end = loop {
-        let read = stream.read(&mut buffer);
-        if !*lock(&shared.wanted) {
-            return;
-        }
-        match read {
-            Ok(0) => break LinkError::Closed { address },
-            Ok(n) => {
-                heard = Instant::now();
-                let events = match lock(&shared.link).receive(&buffer[..n]) {
-                    Ok(events) => events,
-                    Err(source) => break LinkError::Session { address, source },
-                };
-                for event in events {
-                    keep_newest(&event, &mut lock(&shared.newest));
-                    // Nobody reads the log: the newest values are still there.
-                    let _ = tell.send(Stamped { at: heard, event });
-                }
-            }
-            Err(e) if would_block(&e) => {
-                if heard.elapsed() > SILENCE {
-                    break LinkError::Silent { address, silent_s: heard.elapsed().as_secs_f64() };
-                }
-            }
-            Err(source) => break LinkError::Io { address, source },
-        }
-    };
-    *lock(&shared.ended) = Some(end);
 }

@@ -1,8 +1,8 @@
 //! What RTDE clients get: every control step, in time, whatever another client does.
 
 use super::{TIMEOUT, serve};
+use gripgen_rig::link::Stamped;
 use gripgen_rig::rtde::{Event, Kind, RtdeClient, SessionPlan, Value, encode_frame};
-use gripgen_rig::stamped::Stamped;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};

@@ -1,6 +1,6 @@
 //! One connection: a queue with an end, a thread that empties it, a loop that reads.
 
-use crate::stamped::lock;
+use crate::link::lock;
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};

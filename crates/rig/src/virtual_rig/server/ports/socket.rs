@@ -3,7 +3,7 @@
 use super::super::socket::ServeError;
 use super::super::{RigAddresses, version_message};
 use crate::camera::CameraView;
-use crate::stamped::lock;
+use crate::link::lock;
 use crate::virtual_rig::arm::STEP_S;
 use crate::virtual_rig::dashboard;
 use crate::virtual_rig::faults::Device;
