@@ -115,7 +115,7 @@ pub use picture::{
     sample_picture,
 };
 pub use plan::{Plan, Probe, plan};
-pub use plant::{Fixture, PlantGrip, PlantPull, PlantReading, TwinPlant};
+pub use plant::{Fixture, OpenPlantError, TwinPlant};
 pub use predict::PullPredictor;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};
 pub use press_report::{PressReportText, press_report};

@@ -10,11 +10,13 @@ use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::SensorChain;
 use gripgen_twin::frames::Pose;
+use gripgen_twin::plant::{EmptyGrip, Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
     Covariates, PULLS_SINCE_REST, PerJaw, RestCount, Scenario, TactileImage, Twin, table_offset_n,
 };
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use std::fmt::Display;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Height of the grip centres above the robot's base, and how far the first is in front of it.
@@ -42,6 +44,20 @@ pub struct TwinPlant {
     fixtures: Vec<Fixture>,
     seed: u64,
     counted: Arc<Mutex<Counted>>,
+    /// What is seen where a sensor file has become unreadable since the start.
+    rest: PerJaw<TactileImage>,
+}
+
+/// Why a twin cannot be moved.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OpenPlantError {
+    /// Its configuration, or a file that it names.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// What its cameras see with the jaws open.
+    #[error(transparent)]
+    Rest(#[from] SampleError),
 }
 
 #[derive(Default)]
@@ -52,14 +68,18 @@ struct Counted {
 
 impl TwinPlant {
     /// Loads a twin with its files and mounts its parts side by side along the base's y axis, in the order of their names.
-    pub fn open(twin: &Location, sets: &[(String, String)], seed: u64) -> Result<Self, LoadError> {
+    ///
+    /// # Errors
+    ///
+    /// Where it cannot be loaded, or what its cameras see with the jaws open cannot be rendered.
+    pub fn open(twin: &Location, sets: &[(String, String)], seed: u64) -> Result<Self, OpenPlantError> {
         let document = load_twin_document(twin, sets)?;
         let checked = document.read_twin().and_then(|file| Twin::new(&file));
         let checked = checked.map_err(|e| LoadError::from(document.located(e)))?;
         let parts: Vec<&str> = checked.parts.keys().map(String::as_str).collect();
         let project = Arc::new(Project::of_twin(twin, &parts, true, sets)?);
         let first_y_m = -0.5 * FIXTURE_STEP_M * (parts.len().max(1) - 1) as f64;
-        let fixtures = parts.iter().enumerate().map(|(i, part)| {
+        let mounted = parts.iter().enumerate().map(|(i, part)| {
             let position_m = Vector3::new(FIXTURE_X_M, first_y_m + i as f64 * FIXTURE_STEP_M, FIXTURE_Z_M);
             let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
             Fixture {
@@ -67,7 +87,9 @@ impl TwinPlant {
                 base_from_tool: Pose::from_parts(Translation3::from(position_m), down),
             }
         });
-        Ok(Self { fixtures: fixtures.collect(), project, seed, counted: Arc::default() })
+        let fixtures: Vec<Fixture> = mounted.collect();
+        let rest = rest_images(&project, &scenario_of_part(&project, &fixtures[0].part, seed, 0.0))?;
+        Ok(Self { project, fixtures, seed, counted: Arc::default(), rest })
     }
 
     /// Where the parts are.
@@ -80,51 +102,22 @@ impl TwinPlant {
         &self.project.twin
     }
 
-    /// What the cameras see with the jaws open; nothing where a sensor file cannot be read.
-    pub fn rest_images(&self, time_s: f64) -> Result<PerJaw<TactileImage>, SampleError> {
-        let mut scenario = self.scenario_of_part(&self.fixtures[0].part);
-        scenario.covariates.time_s = time_s;
-        let Project { twin, library, .. } = &*self.project;
-        Gripped::at_rest(twin, library, &scenario, options(true))?.images(twin, &scenario, None)
-    }
-
-    /// What the wrist sensor says along +z without a load.
-    pub fn offset_n(&self, time_s: f64) -> f64 {
-        let mut scenario = self.scenario_of_part(&self.fixtures[0].part);
-        scenario.covariates.time_s = time_s;
-        let twin = &self.project.twin;
-        let chain = SensorChain::new(twin, &scenario.part, time_s);
-        chain.along(1.0).plus(table_offset_n(twin, &scenario)).read(0.0, 0.0, 0.0)
-    }
-
-    /// Noise of its reading number `tick` without a load.
-    pub fn noise_n(&self, tick: u64) -> f64 {
-        // Lanes 0 and 1 are those of pulls and of their no-load readings.
-        let mut noise = Stream::with_lane(self.seed, tick, Purpose::ForceNoise, 2);
-        self.project.twin.wrist.noise_n * noise.normal()
+    /// A pull without a load at this time.
+    fn at_rest(&self, time_s: f64) -> Scenario {
+        scenario_of_part(&self.project, &self.fixtures[0].part, self.seed, time_s)
     }
 
     /// The jaws close where the tool is. `None` if nothing is there.
-    pub fn grip(
-        &self,
-        base_from_tool: &Pose,
-        force_per_jaw_n: f64,
-        time_s: f64,
-    ) -> Result<Option<PlantGrip>, SampleError> {
-        let Some((part, offset_m, angle_rad)) = self.part_at(base_from_tool) else { return Ok(None) };
-        let mut scenario = self.scenario_of_part(part);
-        scenario.grip_force_n = force_per_jaw_n;
+    fn close(&self, how: &GripRequest) -> Result<Option<PlantGrip>, SampleError> {
+        let Some((part, offset_m, angle_rad)) = self.part_at(&how.base_from_tool) else { return Ok(None) };
+        let mut scenario = scenario_of_part(&self.project, part, self.seed, how.time_s);
+        scenario.grip_force_n = how.force_per_jaw_n;
         {
             let counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
             (scenario.index, scenario.group) = (counted.pulls, counted.pulls);
         }
-        scenario.covariates = Covariates {
-            pull_index: scenario.index,
-            time_s,
-            grip_offset_m: offset_m,
-            grip_angle_rad: angle_rad,
-            ..Covariates::default()
-        };
+        scenario.covariates.pull_index = scenario.index;
+        (scenario.covariates.grip_offset_m, scenario.covariates.grip_angle_rad) = (offset_m, angle_rad);
         let Project { twin, library, .. } = &*self.project;
         let gripped = Gripped::new(twin, library, &scenario, options(true))?;
         let images = gripped.images(twin, &scenario, None)?;
@@ -148,47 +141,56 @@ impl TwinPlant {
         let turned = pose.rotation * Vector3::x();
         Some((&nearest.part, x_m, libm::atan2(-turned.z, turned.x)))
     }
+}
 
-    fn scenario_of_part(&self, part: &str) -> Scenario {
-        let mut scenario = self.project.sweep.scenario(0, &self.project.twin).0;
-        (scenario.seed, scenario.index, scenario.group, scenario.repetition) = (self.seed, 0, 0, 0);
-        scenario.part = part.into();
-        scenario.grip_pose = 0;
-        scenario.drawn.clear();
-        scenario.covariates = Covariates::default();
-        scenario.pull.step_jitter = 0.0;
-        scenario
+impl Plant for TwinPlant {
+    fn rest_images(&self, time_s: f64) -> PerJaw<TactileImage> {
+        rest_images(&self.project, &self.at_rest(time_s)).unwrap_or_else(|_| self.rest.clone())
+    }
+
+    fn grip(&self, how: &GripRequest) -> Result<Box<dyn Grip>, PlantError> {
+        Ok(match self.close(how).map_err(problem)? {
+            Some(grip) => Box::new(grip),
+            None => Box::new(EmptyGrip { images: self.rest_images(how.time_s) }),
+        })
+    }
+
+    fn offset_n(&self, time_s: f64) -> f64 {
+        let (twin, scenario) = (&self.project.twin, self.at_rest(time_s));
+        let chain = SensorChain::new(twin, &scenario.part, time_s);
+        chain.along(1.0).plus(table_offset_n(twin, &scenario)).read(0.0, 0.0, 0.0)
+    }
+
+    fn noise_n(&self, tick: u64) -> f64 {
+        // Lanes 0 and 1 are those of pulls and of their no-load readings.
+        let mut noise = Stream::with_lane(self.seed, tick, Purpose::ForceNoise, 2);
+        self.project.twin.wrist.noise_n * noise.normal()
     }
 }
 
-/// What a pull is, beside its grip.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlantPull {
-    /// +1 up, -1 down.
-    pub direction: f64,
-    /// Height of a step.
-    pub increment_n: f64,
-    /// Length of a step.
-    pub step_s: f64,
-    /// Time since the jaws closed.
-    pub dwell_s: f64,
-    /// Clock of the rig.
-    pub time_s: f64,
+fn problem(e: impl Display) -> PlantError {
+    PlantError { problem: e.to_string() }
 }
 
-/// A reading of a pull: force along the pull as the wrist sensor says it, displacement and speed of the tool.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlantReading {
-    /// Force.
-    pub measured_n: f64,
-    /// Displacement.
-    pub displacement_m: f64,
-    /// Speed.
-    pub speed_m_s: f64,
+fn scenario_of_part(project: &Project, part: &str, seed: u64, time_s: f64) -> Scenario {
+    let mut scenario = project.sweep.scenario(0, &project.twin).0;
+    (scenario.seed, scenario.index, scenario.group, scenario.repetition) = (seed, 0, 0, 0);
+    scenario.part = part.into();
+    scenario.grip_pose = 0;
+    scenario.drawn.clear();
+    scenario.covariates = Covariates { time_s, ..Covariates::default() };
+    scenario.pull.step_jitter = 0.0;
+    scenario
+}
+
+/// What the cameras see with the jaws open.
+fn rest_images(project: &Project, scenario: &Scenario) -> Result<PerJaw<TactileImage>, SampleError> {
+    let Project { twin, library, .. } = project;
+    Gripped::at_rest(twin, library, scenario, options(true))?.images(twin, scenario, None)
 }
 
 /// Jaws closed on a part.
-pub struct PlantGrip {
+struct PlantGrip {
     project: Arc<Project>,
     counted: Arc<Mutex<Counted>>,
     scenario: Scenario,
@@ -198,18 +200,8 @@ pub struct PlantGrip {
 }
 
 impl PlantGrip {
-    /// What the cameras see.
-    pub fn images(&self) -> &PerJaw<TactileImage> {
-        &self.images
-    }
-
-    /// Opening of the jaws.
-    pub fn width_m(&self) -> f64 {
-        self.width_m
-    }
-
-    /// The pull begins: friction is that of this dwell, this loading rate, and as many pulls as there were.
-    pub fn begin_pull(&mut self, pull: &PlantPull) -> Result<PlantReading, SampleError> {
+    /// Friction is that of this dwell, this loading rate, and as many pulls as there were.
+    fn begin(&mut self, pull: &PullRequest) -> Result<(), SampleError> {
         let s = &mut self.scenario;
         (s.covariates.dwell_s, s.covariates.time_s) = (pull.dwell_s, pull.time_s);
         s.covariates.pull_direction = pull.direction;
@@ -226,24 +218,42 @@ impl PlantGrip {
         if let Some(contact) = &gripped.contact {
             self.session = Some(pull_session(twin, &self.scenario, contact)?.0);
         }
-        Ok(self.reading())
+        Ok(())
     }
 
-    /// The arm pulls with this force along the pull.
-    pub fn pull(&mut self, force_n: f64, step_s: f64) -> Result<PlantReading, SampleError> {
-        if let Some(session) = &mut self.session {
-            session.step(Command::ForceN(force_n), step_s)?;
-        }
-        Ok(self.reading())
-    }
-
-    fn reading(&self) -> PlantReading {
+    fn reading(&self) -> PullReading {
         let state = self.session.as_ref().map(PullSession::state);
-        PlantReading {
-            measured_n: state.map_or(0.0, |s| s.measured_force_n),
-            displacement_m: state.map_or(0.0, |s| s.displacement_m),
-            speed_m_s: state.map_or(0.0, |s| s.speed_m_per_s),
+        state.map_or(PullReading::default(), |s| PullReading {
+            measured_n: s.measured_force_n,
+            displacement_m: s.displacement_m,
+            speed_m_s: s.speed_m_per_s,
+        })
+    }
+}
+
+impl Grip for PlantGrip {
+    fn width_mm(&self) -> f64 {
+        1e3 * self.width_m
+    }
+
+    fn holds(&self) -> bool {
+        true
+    }
+
+    fn images(&self) -> &PerJaw<TactileImage> {
+        &self.images
+    }
+
+    fn begin_pull(&mut self, pull: &PullRequest) -> Result<PullReading, PlantError> {
+        self.begin(pull).map_err(problem)?;
+        Ok(self.reading())
+    }
+
+    fn pull(&mut self, force_n: f64, step_s: f64) -> Result<PullReading, PlantError> {
+        if let Some(session) = &mut self.session {
+            session.step(Command::ForceN(force_n), step_s).map_err(|e| problem(SampleError::from(e)))?;
         }
+        Ok(self.reading())
     }
 }
 
@@ -266,6 +276,10 @@ mod tests {
         TwinPlant::open(&Location::parse("asset:configs/twin-baseline.toml"), &[], 3).unwrap()
     }
 
+    fn request(base_from_tool: &Pose, force_per_jaw_n: f64, time_s: f64) -> GripRequest {
+        GripRequest { base_from_tool: *base_from_tool, force_per_jaw_n, time_s }
+    }
+
     #[test]
     fn the_tool_says_which_part_is_gripped_and_where() {
         let plant = plant();
@@ -278,7 +292,9 @@ mod tests {
         }
         let mut away = fixture.base_from_tool;
         away.translation.z += 0.1;
-        assert!(plant.grip(&away, 20.0, 0.0).unwrap().is_none());
+        let mut grip = plant.grip(&request(&away, 20.0, 0.0)).unwrap();
+        assert!(!grip.holds() && grip.width_mm() == 0.0 && *grip.images() == plant.rest);
+        assert_eq!(grip.pull(9.0, 0.1).unwrap(), PullReading::default());
     }
 
     /// The same pull as that of a sweep: what the rig reads is what the staircase reads.
@@ -286,10 +302,10 @@ mod tests {
     fn a_pull_on_the_plant_is_a_pull_of_the_twin() {
         let plant = plant();
         let fixture = plant.fixtures().iter().find(|f| f.part == "long_shaft").unwrap();
-        let mut grip = plant.grip(&fixture.base_from_tool, 40.0, 5.0).unwrap().unwrap();
-        let width_mm = 1e3 * grip.width_m();
-        assert!(width_mm > 1.0 && width_mm < 60.0, "{width_mm}");
-        let pull = PlantPull { direction: 1.0, increment_n: 1.0, step_s: 0.104, dwell_s: 1.0, time_s: 7.0 };
+        let mut grip = plant.close(&request(&fixture.base_from_tool, 40.0, 5.0)).unwrap().unwrap();
+        let width_mm = grip.width_mm();
+        assert!(grip.holds() && width_mm > 1.0 && width_mm < 60.0, "{width_mm}");
+        let pull = PullRequest { direction: 1.0, increment_n: 1.0, step_s: 0.104, dwell_s: 1.0, time_s: 7.0 };
         let mut reading = grip.begin_pull(&pull).unwrap();
         let (mut tick, mut largest_n) = (0, 0.0_f64);
         while reading.displacement_m < 5e-3 && tick < 20_000 {

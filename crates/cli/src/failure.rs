@@ -3,7 +3,7 @@
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use gripgen::record::{ExportError, FolderError, ReadError};
 use gripgen::twin::config::{ConfigError, Place};
-use gripgen::{BenchError, LoadError, SweepError};
+use gripgen::{BenchError, LoadError, OpenPlantError, SweepError};
 use std::fmt::Display;
 
 /// Exit codes.
@@ -116,6 +116,15 @@ impl From<LoadError> for Failure {
             LoadError::Config(e) => e.into(),
             LoadError::Read(e) => Failure::usage(e),
             other => Failure::usage(other),
+        }
+    }
+}
+
+impl From<OpenPlantError> for Failure {
+    fn from(e: OpenPlantError) -> Self {
+        match e {
+            OpenPlantError::Load(e) => e.into(),
+            other => Failure::new(other),
         }
     }
 }

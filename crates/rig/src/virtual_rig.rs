@@ -1,4 +1,4 @@
-//! The virtual rig: the devices' side of the same protocols, driven by a [`plant::Plant`].
+//! The virtual rig: the devices' side of the same protocols, driven by a [`gripgen_twin::plant::Plant`].
 //!
 //! ```text
 //! script, RTDE inputs, dashboard --> controller --> arm --> plant        GCL lines --> gripper --> plant
@@ -24,7 +24,6 @@ pub mod mjpeg;
 #[cfg(test)]
 mod mjpeg_tests;
 pub mod panel;
-pub mod plant;
 pub mod robot;
 pub mod rtde;
 mod rtde_control;

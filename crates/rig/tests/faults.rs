@@ -17,7 +17,7 @@ mod plant;
 #[path = "faults/watch.rs"]
 mod watch;
 
-use gripgen_rig::virtual_rig::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
+use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
 use gripgen_twin::{PerJaw, TactileImage};
 use injection::{ALL, Injection, injections};
 use judge::{Ended, Report, judge};

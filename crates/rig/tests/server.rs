@@ -15,8 +15,8 @@ mod plant;
 
 use gripgen_rig::camera::CameraView;
 use gripgen_rig::program::TcpPose;
-use gripgen_rig::virtual_rig::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
 use gripgen_rig::virtual_rig::server::{RigAddresses, ServeOptions, ServedRig};
+use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
 use gripgen_twin::{PerJaw, TactileImage};
 use plant::Spring;
 use std::sync::Arc;

@@ -25,6 +25,7 @@ mod mesh;
 mod optics;
 pub mod parts;
 mod patch;
+pub mod plant;
 mod profile;
 pub mod random;
 mod sample;

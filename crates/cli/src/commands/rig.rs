@@ -3,7 +3,6 @@
 pub mod check;
 mod live;
 mod load;
-mod plant;
 pub mod pull;
 mod record;
 pub mod serve;

@@ -1,5 +1,5 @@
-//! The session on a socket: the caller waits for each answer, a controller gives them at once. No thread reads: nothing comes
-//! that was not asked for, and a stop must not depend on one.
+//! The session on a socket: the caller waits for each answer, a controller gives them at once. No thread reads: what
+//! comes unasked matters to nobody, and a stop must not depend on one.
 
 use super::command::{DashboardCommand, DashboardReply, DashboardReplyError};
 use super::session::{DashboardEvent, DashboardLink, DashboardSendError, DashboardSessionError};

@@ -1,7 +1,7 @@
 //! The virtual arm: where it is, what moves it, what it feels.
 
-use super::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
 use crate::program::{STOP_DECELERATION_M_S2, TcpPose};
+use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
 use std::sync::Arc;
 
 /// Control step of an e-Series robot.
@@ -150,7 +150,7 @@ impl Arm {
 
     /// How the jaws would close now.
     pub fn grip_request(&self, force_per_jaw_n: f64, time_s: f64) -> GripRequest {
-        GripRequest { tcp: self.tcp, force_per_jaw_n, time_s }
+        GripRequest { base_from_tool: self.tcp.base_from_tool(), force_per_jaw_n, time_s }
     }
 
     /// The jaws have closed.

@@ -1,13 +1,13 @@
 //! The virtual robot's controller: power, safety, programs, watchdog, one control step after the other.
 
 use super::arm::{Arm, ArmError, STEP_S};
-use super::plant::Plant;
 use super::robot::{Registers, Robot, RuntimeState};
 use super::rtde_control::RtdeControl;
 use super::running::{Kind, Progress, Running};
 use crate::program::{HEARTBEAT_LEAST_HZ, MotionProgram, PullProgram, TcpPose, registers};
 use crate::robot_state::{RobotMode, SafetyStatus};
 use crate::rtde::Value;
+use gripgen_twin::plant::Plant;
 use std::sync::Arc;
 
 /// Time on the controller's clock when the rig starts: clients do not trust a controller in its first seconds.

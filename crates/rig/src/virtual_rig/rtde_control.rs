@@ -6,10 +6,10 @@
 //! in every control step, and the answer stays ready: the client does not wait for it and does not take it back.
 
 use super::arm::{Arm, Drive, STEP_S};
-use super::plant::PullRequest;
 use super::robot::Robot;
 use super::running::Progress;
 use crate::program::TcpPose;
+use gripgen_twin::plant::PullRequest;
 
 const MOVE_L: i32 = 3;
 const FORCE_MODE: i32 = 6;

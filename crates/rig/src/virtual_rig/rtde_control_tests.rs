@@ -1,9 +1,9 @@
 use super::arm::Arm;
 use super::controller::Controller;
-use super::plant::{Grip, GripRequest, Plant, PlantError};
 use super::robot::RuntimeState;
 use crate::program::TcpPose;
 use crate::rtde::Value;
+use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError};
 use gripgen_twin::{PerJaw, TactileImage};
 use std::sync::Arc;
 

@@ -1,12 +1,12 @@
 //! What the programs of [`crate::program`] do, control step by control step.
 
 use super::arm::{Arm, Drive, STEP_S};
-use super::plant::PullRequest;
 use super::robot::Robot;
 use crate::program::{
     ACKNOWLEDGE_S, GO_WAIT_S, HEARTBEAT_WAIT_S, MotionProgram, PRELOAD_S, Phase, PullProgram, SETTLE_S,
     StopReason, TcpPose, ZERO_REST_S, registers,
 };
+use gripgen_twin::plant::PullRequest;
 
 /// What a program asks of the controller beside moving the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

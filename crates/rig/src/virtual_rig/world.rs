@@ -3,10 +3,10 @@
 use super::arm::STEP_S;
 use super::controller::{Announcement, Controller};
 use super::gripper::{Closed, Jaws, VirtualGripper};
-use super::plant::{Grip, GripRequest, Plant, PlantError};
 use super::rtde::InputOwners;
 use crate::gcl::{GripState, SHIPPED_LIMITS};
 use crate::program::TcpPose;
+use gripgen_twin::plant::{EmptyGrip, Grip, GripRequest, Plant, PlantError};
 use gripgen_twin::{PerJaw, TactileImage};
 use std::sync::Arc;
 
@@ -141,7 +141,7 @@ impl World {
             Err(e) => {
                 // Jaws that meet nothing: the client hears it, the operator reads why.
                 self.closing =
-                    Closing::Ready(Box::new(Nothing { images: self.plant.rest_images(self.time_s()) }));
+                    Closing::Ready(Box::new(EmptyGrip { images: self.plant.rest_images(self.time_s()) }));
                 self.controller.announce_problem(&e.to_string());
             }
         }
@@ -171,32 +171,5 @@ impl Jaws for Meets<'_> {
 
     fn open(&mut self) {
         self.opened = true;
-    }
-}
-
-/// Jaws that closed on nothing.
-struct Nothing {
-    images: PerJaw<TactileImage>,
-}
-
-impl Grip for Nothing {
-    fn width_mm(&self) -> f64 {
-        0.0
-    }
-
-    fn holds(&self) -> bool {
-        false
-    }
-
-    fn images(&self) -> &PerJaw<TactileImage> {
-        &self.images
-    }
-
-    fn begin_pull(&mut self, _: &super::plant::PullRequest) -> Result<super::plant::PullReading, PlantError> {
-        Ok(super::plant::PullReading::default())
-    }
-
-    fn pull(&mut self, _: f64, _: f64) -> Result<super::plant::PullReading, PlantError> {
-        Ok(super::plant::PullReading::default())
     }
 }

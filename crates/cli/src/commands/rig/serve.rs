@@ -1,7 +1,6 @@
 //! `gripgen rig serve`: a virtual rig.
 
 use super::load::SHIPPED_RIG;
-use super::plant::Moved;
 use super::teach::taught;
 use crate::args::RigServeArgs;
 use crate::failure::Failure;
@@ -39,7 +38,6 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     if let Some(path) = &args.write_rig {
         writable(path)?;
     }
-    let plant = Moved::new(plant).map_err(Failure::new)?;
     let options = ServeOptions {
         addresses: addresses(args),
         clock_rate: args.speed,

@@ -1,7 +1,7 @@
-//! What the virtual rig moves: the seam to a simulator, which this crate does not know.
+//! What a virtual rig moves: the seam between its protocols and a simulator, neither of which knows the other.
 
-use crate::program::TcpPose;
-use gripgen_twin::{PerJaw, TactileImage};
+use crate::frames::Pose;
+use crate::{PerJaw, TactileImage};
 
 /// A part that can be gripped, and the sensors that look at it.
 pub trait Plant: Send + Sync {
@@ -9,6 +9,10 @@ pub trait Plant: Send + Sync {
     fn rest_images(&self, time_s: f64) -> PerJaw<TactileImage>;
 
     /// The jaws close. May take its time: it is not called from the robot's clock.
+    ///
+    /// # Errors
+    ///
+    /// Where the simulator cannot say what they close on.
     fn grip(&self, how: &GripRequest) -> Result<Box<dyn Grip>, PlantError>;
 
     /// What the wrist sensor says along +z without a load, before it is zeroed, in N: its offset at this time of the plant's
@@ -30,10 +34,18 @@ pub trait Grip: Send {
     /// What the cameras see.
     fn images(&self) -> &PerJaw<TactileImage>;
 
-    /// The pull begins.
+    /// The pull begins; gives its first reading.
+    ///
+    /// # Errors
+    ///
+    /// Where the simulator cannot pull so.
     fn begin_pull(&mut self, pull: &PullRequest) -> Result<PullReading, PlantError>;
 
-    /// The arm pulls with this force for so long.
+    /// The arm pulls with this force along the pull for so long; gives the reading after it.
+    ///
+    /// # Errors
+    ///
+    /// Where the simulator cannot go on.
     fn pull(&mut self, force_n: f64, step_s: f64) -> Result<PullReading, PlantError>;
 }
 
@@ -41,10 +53,10 @@ pub trait Grip: Send {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GripRequest {
     /// Where the tool is.
-    pub tcp: TcpPose,
+    pub base_from_tool: Pose,
     /// Force of one jaw.
     pub force_per_jaw_n: f64,
-    /// Clock of the virtual rig.
+    /// Clock of the rig.
     pub time_s: f64,
 }
 
@@ -59,7 +71,7 @@ pub struct PullRequest {
     pub step_s: f64,
     /// Time since the jaws closed.
     pub dwell_s: f64,
-    /// Clock of the virtual rig.
+    /// Clock of the rig.
     pub time_s: f64,
 }
 
@@ -80,4 +92,33 @@ pub struct PullReading {
 pub struct PlantError {
     /// What is wrong, with its numbers.
     pub problem: String,
+}
+
+/// Jaws that closed on each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EmptyGrip {
+    /// What the cameras see.
+    pub images: PerJaw<TactileImage>,
+}
+
+impl Grip for EmptyGrip {
+    fn width_mm(&self) -> f64 {
+        0.0
+    }
+
+    fn holds(&self) -> bool {
+        false
+    }
+
+    fn images(&self) -> &PerJaw<TactileImage> {
+        &self.images
+    }
+
+    fn begin_pull(&mut self, _: &PullRequest) -> Result<PullReading, PlantError> {
+        Ok(PullReading::default())
+    }
+
+    fn pull(&mut self, _: f64, _: f64) -> Result<PullReading, PlantError> {
+        Ok(PullReading::default())
+    }
 }
