@@ -13,7 +13,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time between two looks at a device whose silence is watched.
 pub(crate) const LOOK: Duration = Duration::from_millis(50);
 
-/// Why a connection was not made, or ended. `E` is the error of its session.
+/// Why a connection was not made, or ended. `E` is the error of its session: what is wrong with the bytes that came.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError<E> {

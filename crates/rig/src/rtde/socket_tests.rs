@@ -126,6 +126,24 @@ fn a_controller_that_falls_silent_is_noticed() {
     assert!(matches!(e, LinkError::Silent { .. }), "{e}");
 }
 
+/// The way in may be dead while the way out is not: a stop still gets through.
+#[test]
+fn a_controller_that_is_not_heard_any_more_still_hears() {
+    let (tell, heard) = std::sync::mpsc::channel();
+    let address = controller(move |_, mut stream| {
+        set_up(&mut stream, b"\x07DOUBLE");
+        let _ = tell.send(next(&mut stream));
+    });
+    let client = RtdeClient::connect(address, &plan(), TIMEOUT).unwrap();
+    client.events().iter().for_each(drop);
+    let end = client.ended().unwrap();
+    assert!(matches!(end, LinkError::Silent { limit_s: 1.0, .. }), "{end}");
+    assert!(end.to_string().ends_with("s, 1.000 s are allowed"), "{end}");
+    assert!(client.ended().is_some(), "the end stays known");
+    client.write_input(0, &[Value::Double(1.0)]).unwrap();
+    assert_eq!(heard.recv_timeout(TIMEOUT).unwrap().unwrap().0, b'U');
+}
+
 #[test]
 fn inputs_of_a_connection_that_lingers_are_asked_for_again() {
     let address = controller(|connection, mut stream| {
