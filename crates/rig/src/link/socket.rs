@@ -1,5 +1,6 @@
 //! A socket whose errors name their device, a thread that reads it until its end, and waiting for what that thread finds.
 
+use super::LinkError;
 use std::io::{ErrorKind, Read, Write};
 use std::marker::PhantomData;
 use std::net::{Shutdown, SocketAddr, TcpStream};
@@ -12,58 +13,6 @@ use std::time::{Duration, Instant};
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time between two looks at a device whose silence is watched.
 pub(crate) const LOOK: Duration = Duration::from_millis(50);
-
-/// Why a connection was not made, or ended. `E` is the error of its session: what is wrong with the bytes that came.
-#[derive(Debug, Clone, thiserror::Error)]
-#[non_exhaustive]
-pub enum LinkError<E> {
-    /// The network.
-    #[error("{address}: {source}")]
-    Io {
-        /// Where to.
-        address: SocketAddr,
-        /// What the system says.
-        source: Arc<std::io::Error>,
-    },
-    /// What the device sends is not its protocol, or is a refusal.
-    #[error("{address}: {source}")]
-    Session {
-        /// Where to.
-        address: SocketAddr,
-        /// What is wrong.
-        source: E,
-    },
-    /// The connection is closed.
-    #[error("{address}: {what}")]
-    Closed {
-        /// Where to.
-        address: SocketAddr,
-        /// Which connection, and who closed it where that is known.
-        what: &'static str,
-    },
-    /// A device that speaks all the time says nothing.
-    #[error("{address}: nothing came for {silent_s:.3} s, {limit_s:.3} s are allowed")]
-    Silent {
-        /// Where to.
-        address: SocketAddr,
-        /// For how long.
-        silent_s: f64,
-        /// The longest that was allowed.
-        limit_s: f64,
-    },
-    /// A device that was asked says nothing.
-    #[error("{address}: no answer to `{awaited}` came for {waited_s:.3} s, {limit_s:.3} s are allowed")]
-    Timeout {
-        /// Where to.
-        address: SocketAddr,
-        /// What was to be answered.
-        awaited: &'static str,
-        /// For how long.
-        waited_s: f64,
-        /// The longest that was allowed.
-        limit_s: f64,
-    },
-}
 
 /// Something that came, and when it did by the clock of this host. The network's delay is in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,15 +56,18 @@ impl<E> Socket<E> {
 
     /// Gives the number of bytes read; `None` where nothing came in the time that a read has.
     pub(crate) fn read(&self, buffer: &mut [u8]) -> Result<Option<usize>, LinkError<E>> {
-        let limited = || self.stream.read_timeout().is_ok_and(|limit| limit.is_some());
+        let pause = |e: &std::io::Error| match e.kind() {
+            ErrorKind::Interrupted => true,
+            // Where a read may take for ever, this time is up in the network: it gave the device up.
+            ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+                self.stream.read_timeout().is_ok_and(|limit| limit.is_some())
+            }
+            _ => false,
+        };
         match (&self.stream).read(buffer) {
             Ok(0) => Err(self.closed()),
             Ok(n) => Ok(Some(n)),
-            Err(e) if e.kind() == ErrorKind::Interrupted => Ok(None),
-            // Where a read may take for ever, this time is up in the network: it gave the device up.
-            Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) && limited() => {
-                Ok(None)
-            }
+            Err(e) if pause(&e) => Ok(None),
             Err(e) => Err(self.io(e)),
         }
     }
