@@ -1,9 +1,10 @@
 //! A campaign made on a twin instead of on a rig, and the options of a first one from a twin.
 
-use crate::generate::{SimulateOptions, simulate};
+use crate::generate::simulate;
 use crate::location::Location;
 use crate::measured::LoadedPulls;
 use crate::project::{LoadError, Project, load_twin_document};
+use crate::sample::SimulateOptions;
 use gripgen_record::sha256_hex;
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, Mechanics};

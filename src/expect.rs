@@ -5,9 +5,10 @@
 //! the scatter of friction by quadrature, the noise of the readings by [`label_moments`].
 
 use crate::cache::Cache;
-use crate::generate::{PatchFriction, SampleError, sensor_chain};
+use crate::generate::{PatchFriction, sensor_chain};
 use crate::gripped::{Press, grip_point, held, jaw_forces_n};
 use crate::library::Library;
+use crate::sample::SampleError;
 use gripgen_physics::{Command, Held, JawFriction, PullSession, Signals, label_moments};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::Mechanics;

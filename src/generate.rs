@@ -3,82 +3,20 @@
 use crate::gpu::Gpu;
 use crate::gripped::{Contact, Gripped, grip_point};
 use crate::hold::hold;
-use crate::library::{Library, LibraryError};
+use crate::library::Library;
 use crate::project::Project;
-use gripgen_physics::{
-    GripError, JawFriction, PullError, PullSession, Signals, Until, pull_staircase, staircase_of,
-};
-use gripgen_tactile::gpu::GpuError;
-use gripgen_tactile::{Imprint, IndentError, Sensor, SimdLevel};
-use gripgen_twin::config::{Backend, ConfigError, ImageStorage, Mechanics, TraceStorage};
+use crate::sample::{SampleError, SimulateOptions};
+use gripgen_physics::{JawFriction, PullSession, Signals, Until, pull_staircase, staircase_of};
+use gripgen_tactile::{Imprint, Sensor, SimdLevel};
+use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::evidence::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    ContactPatch, FrictionError, GripFriction, ImprintSummary, Jaw, LabelError, Outcome, Part, PerJaw,
-    Pulled, Sample, Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
+    ContactPatch, FrictionError, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled, Sample,
+    Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
 };
 use std::sync::Arc;
-
-/// Why a sample failed. It keeps its place in the data set.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SampleError {
-    /// Drawn values that the twin or the scenario does not allow.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// A file.
-    #[error(transparent)]
-    Library(#[from] LibraryError),
-    /// The force loop would be unstable.
-    #[error(
-        "{damping_n_s_per_m} N s/m stop more than the arm's {mass_kg:.1} kg along the pull within one step of {step_s} s"
-    )]
-    Damping {
-        /// Damping of the force loop.
-        damping_n_s_per_m: f64,
-        /// Mass that the arm has along the pull.
-        mass_kg: f64,
-        /// Time step.
-        step_s: f64,
-    },
-    /// An effect leaves no grip force.
-    #[error("the {jaw} jaw presses with {force_n:.4} N of the commanded {commanded_n} N: nothing is gripped")]
-    NoForce {
-        /// Which jaw.
-        jaw: Jaw,
-        /// Its real force.
-        force_n: f64,
-        /// The commanded force.
-        commanded_n: f64,
-    },
-    /// Jaws that miss the part in its middle, where it was measured to be held.
-    #[error("the jaws miss the part")]
-    Missed,
-    /// The grip.
-    #[error(transparent)]
-    Grip(#[from] GripError),
-    /// The imprint.
-    #[error("{jaw} jaw: {source}")]
-    Indent {
-        /// Which jaw.
-        jaw: Jaw,
-        /// What is wrong.
-        source: IndentError,
-    },
-    /// The graphics processor.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    /// The friction law.
-    #[error(transparent)]
-    Friction(#[from] FrictionError),
-    /// The pull.
-    #[error(transparent)]
-    Pull(#[from] PullError),
-    /// The label.
-    #[error(transparent)]
-    Label(#[from] LabelError),
-}
 
 /// What a sample shows of a grip beside the data that is stored: for pictures.
 pub struct Press {
@@ -86,35 +24,6 @@ pub struct Press {
     pub imprint: PerJaw<Imprint>,
     /// Sensors of both jaws.
     pub sensors: PerJaw<Arc<Sensor>>,
-}
-
-/// What a simulation is made with and for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SimulateOptions {
-    /// Which mechanics.
-    pub mechanics: Mechanics,
-    /// Whether images are wanted.
-    pub images: bool,
-    /// Whether the trace is wanted; without it the pull ends as soon as its label is decided, which leaves the label.
-    pub trace: bool,
-    /// Where images are made.
-    pub backend: Backend,
-    /// The vector unit of the image pipeline; the result does not depend on it.
-    pub level: SimdLevel,
-}
-
-impl SimulateOptions {
-    /// What the samples of a sweep are made with.
-    pub(crate) fn of(project: &Project, level: SimdLevel) -> Self {
-        let sweep = &project.sweep;
-        Self {
-            mechanics: sweep.mechanics,
-            images: sweep.images != ImageStorage::None,
-            trace: sweep.trace == TraceStorage::Full,
-            backend: sweep.backend,
-            level,
-        }
-    }
 }
 
 /// Simulates sample `index` of a sweep. Depends on the project and the index alone; `level` changes no bit.
@@ -142,7 +51,7 @@ fn try_generate(
     let (scenario, usable) = project.sweep.scenario(index, &twin);
     *known = scenario;
     usable?;
-    let options = SimulateOptions::of(project, level);
+    let options = SimulateOptions::of(&project.sweep, level);
     let grip = || Gripped::new(&twin, &project.library, known, options);
     // Repetitions of a configuration share their grip.
     let gripped = match project.sweep.repetitions {

@@ -2,9 +2,9 @@
 //!
 //! Repetitions of a configuration share it; scatter, noise and the pull itself are drawn anew for each.
 
-use crate::generate::{SampleError, SimulateOptions};
 use crate::gpu::{Gpu, ImageFault, ImageJob, PlacedPart};
 use crate::library::Library;
+use crate::sample::{SampleError, SimulateOptions};
 use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip};
 use gripgen_tactile::{ClusteredMesh, Imprint, Plane, Renderer, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};

@@ -4,9 +4,9 @@
 mod images;
 mod press;
 
-use crate::generate::SampleError;
 use crate::location::Location;
 use crate::project::{LoadError, Project};
+use crate::sample::SampleError;
 use crate::twin_edits::EditedValue;
 use gripgen_identify::{FittedPress, ImprintEstimate, imprint_constant};
 use gripgen_twin::config::{CalibrationFile, GelModel};

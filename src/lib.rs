@@ -74,11 +74,13 @@ mod ratio;
 mod report;
 mod resolve;
 mod rig_run;
+mod sample;
 mod schema;
 mod simulator;
 mod sweep;
 mod twin_edits;
 mod twin_project;
+mod version;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use calibrate::{CalibratePullsError, calibrate_twin};
@@ -91,9 +93,7 @@ pub use diagnose::{
     compare_sensor_table, diagnose_presses, diagnose_pull_table, diagnose_sensor_table, given_model,
     is_optics_effect, is_sensor_table, load_sensor_table, sensor_calibration_edits,
 };
-pub use generate::{
-    Press, SampleError, SimulateOptions, StartedPull, generate, press_only, simulate, start_pull,
-};
+pub use generate::{Press, StartedPull, generate, press_only, simulate, start_pull};
 pub use gpu::Gpu;
 pub use gripgen_identify as identify;
 pub use gripgen_physics as physics;
@@ -129,7 +129,9 @@ pub use report::{
     Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
 };
 pub use rig_run::{plain_campaign, rig_run_toml};
+pub use sample::{SampleError, SimulateOptions};
 pub use schema::{sweep_schema, twin_schema};
 pub use simulator::{Draw, Simulator};
-pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, VERSION, prepare_run, run_info, sweep};
+pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, prepare_run, run_info, sweep};
 pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, write_twin};
+pub use version::VERSION;

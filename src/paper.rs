@@ -1,7 +1,11 @@
 //! The experiment of Wucherer et al. 2023, evaluated: `examples/paper_report.rs` runs it and writes the report.
 
+mod cells;
+
 use crate::picture::paper_picture;
 use crate::project::{LoadError, Project};
+use cells::Cell;
+pub(crate) use cells::PartCells;
 use gripgen_record::{FolderError, INDEX_COLUMNS, ReadError, RunFolder, ShardReader};
 use gripgen_twin::effects::OFFSET_LAW;
 use gripgen_twin::{PullTrace, Twin};
@@ -35,34 +39,6 @@ pub struct PaperReport {
     pub markdown: String,
     /// Ratio over grip force for each part, and the pull profile, as PNG.
     pub picture_png: Vec<u8>,
-}
-
-/// Repetitions of one part at one grip force.
-pub(crate) struct Cell {
-    pub(crate) grip_force_n: f64,
-    pub(crate) labels_n: Vec<f64>,
-}
-
-impl Cell {
-    pub(crate) fn mean_n(&self) -> f64 {
-        self.labels_n.iter().sum::<f64>() / self.labels_n.len() as f64
-    }
-
-    /// Root mean square deviation from the mean.
-    pub(crate) fn rms_n(&self) -> f64 {
-        let mean = self.mean_n();
-        let square: f64 = self.labels_n.iter().map(|l| (l - mean).powi(2)).sum();
-        (square / self.labels_n.len() as f64).sqrt()
-    }
-}
-
-/// All cells of a part.
-pub(crate) struct PartCells {
-    pub(crate) name: String,
-    pub(crate) mu: f64,
-    /// a and b (in N) of the paper's correction, where the twin has it.
-    pub(crate) law: Option<(f64, f64)>,
-    pub(crate) cells: Vec<Cell>,
 }
 
 /// Least squares of `F_max / (2 mu F_G) = a + b / F_G`, with standard errors.

@@ -2,6 +2,7 @@
 
 mod canvas;
 mod colours;
+mod layout;
 mod paper;
 mod plot;
 mod rig;

@@ -1,9 +1,10 @@
 //! The twin as what a virtual rig moves: grips where the tool is, pulls that somebody else commands.
 
-use crate::generate::{SampleError, SimulateOptions, pull_session};
+use crate::generate::pull_session;
 use crate::gripped::Gripped;
 use crate::location::Location;
 use crate::project::{LoadError, Project, load_twin_document};
+use crate::sample::{SampleError, SimulateOptions};
 use gripgen_physics::{Command, PullSession};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, Mechanics};

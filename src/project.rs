@@ -2,13 +2,13 @@
 
 use crate::assets;
 use crate::cache::Cache;
-use crate::generate::SimulateOptions;
 use crate::gpu::Gpu;
 use crate::gripped::{Gripped, check_damping};
 use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
 use crate::resolve::{Files, Named, Resolved, config_hash, resolve};
-use crate::sweep::VERSION;
+use crate::sample::SimulateOptions;
+use crate::version::VERSION;
 use gripgen_record::{RunFolder, sha256_hex};
 use gripgen_tactile::gpu::GpuError;
 use gripgen_twin::config::{Backend, ConfigError, Document, ImageStorage, SweepFile};

@@ -1,8 +1,9 @@
 //! Single pulls on a twin: for Python, policies and the virtual rig.
 
-use crate::generate::{SampleError, SimulateOptions, StartedPull, simulate, start_pull};
+use crate::generate::{StartedPull, simulate, start_pull};
 use crate::location::Location;
 use crate::project::{LoadError, Project, load_twin_document};
+use crate::sample::{SampleError, SimulateOptions};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, ConfigError, Mechanics};
 use gripgen_twin::draw::Drawn;

@@ -6,6 +6,7 @@ mod shards;
 
 use crate::generate::{drawn_scenario, generate};
 use crate::project::Project;
+use crate::version::VERSION;
 use differences::differences;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_record::{
@@ -21,9 +22,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-
-/// Version of gripgen, part of every run.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Time between two looks at a shard that another process is writing.
 const WAIT: Duration = Duration::from_millis(200);

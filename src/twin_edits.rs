@@ -2,7 +2,7 @@
 
 use crate::location::Location;
 use crate::project::{LoadError, load_twin_document};
-use crate::sweep::VERSION;
+use crate::version::VERSION;
 use gripgen_twin::config::{CalibrationFile, ConfigError, EffectFile, TwinFile};
 use gripgen_twin::{TWIN_SCHEMA, Twin};
 use std::path::{Component, Path, PathBuf};

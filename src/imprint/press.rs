@@ -1,9 +1,9 @@
 //! One press: the imprint constant with which the twin's images are most like those of a pull.
 
 use super::CalibrateImprintsError;
-use crate::generate::{SampleError, SimulateOptions};
 use crate::gripped::{Gripped, placed_parts};
 use crate::library::Library;
+use crate::sample::{SampleError, SimulateOptions};
 use gripgen_tactile::{Plane, Renderer, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::draw::Drawn;

@@ -2,7 +2,7 @@
 
 use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
 use super::colours::{INK, PAPER, SOFT_INK};
-use super::sample::{
+use super::layout::{
     CAPTION, CURVE_HEIGHT, HEADER, IMAGE, MARGIN, draw_curve, fit, frame, pixel, second_line,
 };
 use super::sheet::heading;

@@ -1,22 +1,18 @@
 //! One sample in full: images, height, pressure, pull curve.
 
-use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
-use super::colours::{COMMAND, DISPLACEMENT, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK, scale};
-use super::plot::{Area, Curve, pull_curve};
+use super::canvas::{Anchor, Canvas, TextStyle};
+use super::colours::{INK, PAPER, SLIP, SOFT_INK, scale};
+use super::layout::{
+    CAPTION, CURVE_HEIGHT, HEADER, IMAGE, MARGIN, draw_curve, fit, frame, pixel, placement, second_line,
+};
 use super::rig::rig_picture;
-use super::sheet::{details, heading};
+use super::sheet::heading;
 use crate::generate::{Press, press_only};
 use crate::project::Project;
-use gripgen_record::proto::gripgen_v1::{JawContact, Sample};
+use gripgen_record::proto::gripgen_v1::JawContact;
 use gripgen_record::{FolderError, RIG_SOURCE, ReadError, Record, RunFolder, ShardReader};
 use gripgen_tactile::Plane;
-use gripgen_twin::{Jaw, TactileImage};
-
-pub(super) const MARGIN: u32 = 16;
-pub(super) const IMAGE: (u32, u32) = (400, 300);
-pub(super) const HEADER: u32 = 64;
-pub(super) const CAPTION: u32 = 24;
-pub(super) const CURVE_HEIGHT: u32 = 380;
+use gripgen_twin::Jaw;
 
 /// Why a sample could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -77,20 +73,6 @@ fn press_again(folder: &RunFolder, index: u64) -> Option<Press> {
     press_only(&twin, &project.library, &scenario, project.sweep.mechanics).ok()?
 }
 
-pub(super) fn second_line(s: &Sample) -> String {
-    let mut text = details(s);
-    if let Some(mu) = s.mu {
-        text += &format!(", mu {mu:.4}");
-    }
-    if s.lag_exceeds_tolerance {
-        text += ", force loop lags beyond the label tolerance";
-    }
-    if s.outside_fit {
-        text += ", friction law outside its fitted range";
-    }
-    text
-}
-
 /// Image and height map of a jaw side by side.
 fn draw_jaw(canvas: &mut Canvas, at: (u32, u32), jaw: Jaw, record: &Record, press: Option<&Press>) {
     let (x, y) = (at.0, at.1 + CAPTION);
@@ -128,36 +110,6 @@ fn draw_jaw(canvas: &mut Canvas, at: (u32, u32), jaw: Jaw, record: &Record, pres
     }
 }
 
-pub(super) fn frame(canvas: &mut Canvas, x: u32, y: u32) {
-    canvas.rect(f64::from(x), f64::from(y), f64::from(IMAGE.0), f64::from(IMAGE.1), PANEL);
-}
-
-pub(super) fn pixel(image: &TactileImage, u: u32, v: u32) -> Rgb {
-    let [r, g, b] = image.pixel(u, v);
-    Rgb(r, g, b)
-}
-
-/// Draws an image into the frame, as large as it fits, centred.
-pub(super) fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour: impl Fn(u32, u32) -> Rgb) {
-    let (zoom, left, top) = placement(size);
-    let (width, height) = ((f64::from(size.0) * zoom) as u32, (f64::from(size.1) * zoom) as u32);
-    for row in 0..height {
-        for column in 0..width {
-            let u = ((f64::from(column) + 0.5) / zoom) as u32;
-            let v = ((f64::from(row) + 0.5) / zoom) as u32;
-            let ink = colour(u.min(size.0 - 1), v.min(size.1 - 1));
-            canvas.put(x + left + column, y + top + row, ink);
-        }
-    }
-}
-
-/// Zoom and margins of an image of this size in the frame.
-fn placement(size: (u32, u32)) -> (f64, u32, u32) {
-    let zoom = (f64::from(IMAGE.0) / f64::from(size.0)).min(f64::from(IMAGE.1) / f64::from(size.1));
-    let rest = |frame: u32, n: u32| ((f64::from(frame) - f64::from(n) * zoom) / 2.0).max(0.0) as u32;
-    (zoom, rest(IMAGE.0, size.0), rest(IMAGE.1, size.1))
-}
-
 /// The pressure cells over the depth map: a dot each, its area proportional to the force.
 fn draw_cells(
     canvas: &mut Canvas,
@@ -190,37 +142,5 @@ fn draw_cells_alone(canvas: &mut Canvas, x: u32, y: u32, contact: &JawContact) {
         let (cx, cy) = (f64::from(x) + f64::from(IMAGE.0) / 2.0, f64::from(y) + f64::from(IMAGE.1) / 2.0);
         let (dx, dy) = (f64::from(contact.cell_x_mm[i]) * zoom, f64::from(contact.cell_y_mm[i]) * zoom);
         canvas.disc(cx + dx, cy + dy, radius, SLIP);
-    }
-}
-
-pub(super) fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Record) {
-    let mut x = f64::from(MARGIN);
-    for (text, ink) in [
-        ("force / N:", INK),
-        ("command", COMMAND),
-        ("measured", MEASURED),
-        ("slip", SLIP),
-        ("displacement / mm (right)", DISPLACEMENT),
-    ] {
-        canvas.text(text, x, f64::from(top), Anchor::Left, TextStyle::small(ink));
-        x += 8.0 * (text.chars().count() + 2) as f64;
-    }
-    let area = Area {
-        x: f64::from(MARGIN),
-        y: f64::from(top + CAPTION),
-        width: f64::from(width - 2 * MARGIN),
-        height: f64::from(CURVE_HEIGHT),
-    };
-    canvas.rect(area.x, area.y, area.width, area.height, PANEL);
-    let s = &record.sample;
-    match &record.trace {
-        Some(trace) => {
-            let slip = s.slip_time_s.zip(s.max_pull_force_n);
-            pull_curve(canvas, area, &Curve { trace, slip, full: true });
-        }
-        None => {
-            let why = if s.failure.is_empty() { "this run stores no traces" } else { &s.failure };
-            canvas.text(why, area.x + 12.0, area.y + 12.0, Anchor::Left, TextStyle::small(SOFT_INK));
-        }
     }
 }

@@ -1,8 +1,9 @@
 //! A shard being written, and what stands in it beside the samples.
 
 use super::pipeline::Run;
-use super::{SweepError, SweepEvent, SweepSummary, VERSION, count, samples_of_shard};
+use super::{SweepError, SweepEvent, SweepSummary, count, samples_of_shard};
 use crate::project::Project;
+use crate::version::VERSION;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_record::{
     EncodeOptions, EncodedSample, INDEX_COLUMNS, PartialShard, ShardInfo, ShardWriter, VIEW_RATE_HZ,

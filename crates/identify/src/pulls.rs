@@ -24,5 +24,6 @@ mod simulate;
 mod slide;
 pub mod slip;
 mod stated;
+pub mod terms;
 mod trace_residuals;
 mod words;

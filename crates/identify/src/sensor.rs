@@ -22,9 +22,10 @@ mod statistics;
 mod tests;
 mod words;
 
-pub use answer::{SensorBlock, SensorDiagnosis, SensorEvidence, SensorRow, diagnose_sensor};
+pub use answer::{SensorBlock, SensorDiagnosis, SensorRow, diagnose_sensor};
 pub use calibrate::{SensorCalibration, SessionCalibration, calibrate_sensor};
 pub use predict::{SensorComparison, compare_sensor};
+pub use words::SensorEvidence;
 
 use crate::permutation::Covariate;
 

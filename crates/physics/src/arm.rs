@@ -11,20 +11,11 @@ mod placed;
 pub use model::{ArmJoint, ArmMesh, ArmModel, LinkInertia};
 pub use placed::{ArmError, PlacedArm};
 
-use crate::grip::GripSetup;
+use crate::setup::{Arm, GripSetup};
 use crate::world::World;
 use carriage::Carriage;
 use multibody::ArmBodies;
 use rapier3d_f64::prelude::{RigidBodyHandle, Vector};
-
-/// The arm of a grip.
-#[derive(Debug, Clone, Copy)]
-pub enum Arm<'a> {
-    /// One body on a rail along the pull: the arm's inertia as one number, all other motion locked.
-    Carriage,
-    /// The whole arm, link by link. Its inertia comes from the model; `Robot::moving_mass_kg` is not used.
-    Multibody(&'a PlacedArm),
-}
 
 /// The arm's part of the scene.
 #[derive(Clone)]

@@ -1,7 +1,7 @@
 //! The whole arm: slip against the closed form, the wrist sensor against the engine, and what the arm adds.
 
 use super::*;
-use crate::grip::Mount;
+use crate::setup::Mount;
 use crate::tests::{Bench, STEP_S, assert_clones_agree, hull_of_64, shapes};
 use gripgen_twin::config::{Document, Feedback, Mechanics};
 use gripgen_twin::frames::{pose, rotation_about_axis};

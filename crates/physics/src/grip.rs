@@ -1,15 +1,16 @@
 //! Closing the jaws on a part.
 
-use crate::arm::Arm;
+use crate::convert::{rapier_pose, vector};
+use crate::jaw_friction::JawFriction;
 use crate::rapier_pull::{RapierPull, RapierStart};
 use crate::reduced::ReducedPull;
-use crate::scene::{Rig, build, pad_shape, rapier_pose, vector};
-use crate::session::{JawFriction, Plant, PullSession, Signals};
-use crate::shape::PartShape;
+use crate::scene::{Rig, build, pad_shape};
+use crate::session::{Plant, PullSession, Signals};
+use crate::setup::{Arm, GripSetup, Mount};
 use crate::world::World;
 use gripgen_twin::config::Mechanics;
-use gripgen_twin::frames::{Pose, world_from_gel};
-use gripgen_twin::{Gel, Grasp, Gripper, Jaw, PerJaw, Robot, Wrist};
+use gripgen_twin::frames::world_from_gel;
+use gripgen_twin::{Gel, Grasp, Jaw, PerJaw, Robot, Wrist};
 use rapier3d_f64::parry::query::{ShapeCastOptions, cast_shapes};
 use rapier3d_f64::prelude as rapier;
 
@@ -18,47 +19,6 @@ const SETTLED_FRACTION: f64 = 1e-4;
 
 /// Shortest and longest time a grip settles.
 const SETTLE_S: (f64, f64) = (0.1, 2.0);
-
-/// How the part is held besides the jaws.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Mount {
-    /// Fixed to the world, as in the experiment.
-    Fixed,
-    /// Free: only the jaws carry it against gravity, which acts along -z of `world`.
-    Free {
-        /// Its mass.
-        mass_kg: f64,
-        /// Strength of gravity.
-        gravity_m_per_s2: f64,
-    },
-}
-
-/// All that a grip depends on.
-#[derive(Clone)]
-pub struct GripSetup<'a> {
-    /// What computes grip and pull.
-    pub mechanics: Mechanics,
-    /// The arm's body.
-    pub arm: Arm<'a>,
-    /// The arm's force loop.
-    pub robot: Robot,
-    /// The gripper.
-    pub gripper: Gripper,
-    /// The wrist sensor; its step is the time step.
-    pub wrist: Wrist,
-    /// The gels.
-    pub gel: &'a PerJaw<Gel>,
-    /// The part's contact shape.
-    pub shape: &'a PartShape,
-    /// Where the part is.
-    pub world_from_part: Pose,
-    /// Normal force of each jaw.
-    pub grip_force_n: PerJaw<f64>,
-    /// Unit vector of the pull, at right angles to the jaw axis (y of `world`).
-    pub direction: [f64; 3],
-    /// What else holds the part. The arm carries the gripper's own weight.
-    pub mount: Mount,
-}
 
 /// What became of a grip.
 pub enum Grip {

@@ -16,25 +16,31 @@
 
 mod arm;
 mod contact;
+mod convert;
 mod force_loop;
 mod grip;
+mod jaw_friction;
 mod limit_surface;
+mod motion;
 mod quasi_static;
 mod rapier_pull;
 mod reduced;
 mod scene;
 mod session;
+mod setup;
 mod shape;
 mod staircase;
 mod twist;
 mod urdf;
 mod world;
 
-pub use arm::{Arm, ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm};
-pub use grip::{Grip, GripError, GripSetup, Held, Mount, grip};
+pub use arm::{ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm};
+pub use grip::{Grip, GripError, Held, grip};
+pub use jaw_friction::{FrictionCell, JawFriction};
 pub use limit_surface::{LimitCell, free_twist_capacity_n};
 pub use quasi_static::{QuasiStatic, SlipPull, StuckPull, label_moments};
-pub use session::{Command, FrictionCell, JawFriction, PullError, PullSession, PullState, Signals};
+pub use session::{Command, PullError, PullSession, PullState, Signals};
+pub use setup::{Arm, GripSetup, Mount};
 pub use shape::{PartShape, ShapeError};
 pub use staircase::{StaircaseResult, Until, pull_staircase, staircase_of};
 pub use twist::{TwistCell, compliant_twist_capacity_n};

@@ -2,8 +2,9 @@
 
 #[cfg(test)]
 use crate::contact::ContactForce;
+use crate::jaw_friction::JawFriction;
+use crate::motion::Motion;
 use crate::scene::Rig;
-use crate::session::{JawFriction, Motion};
 use crate::world::{NotFinite, World};
 #[cfg(test)]
 use gripgen_twin::Jaw;

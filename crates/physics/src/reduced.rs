@@ -16,7 +16,8 @@
 //! A time step is implicit in the velocity. The force is a non-decreasing, piecewise linear function of it, so Newton's
 //! method inside a bracket finds the one solution, for any stiffness, and momentum balances to rounding.
 
-use crate::session::{JawFriction, Motion};
+use crate::jaw_friction::JawFriction;
+use crate::motion::Motion;
 use crate::world::NotFinite;
 use gripgen_twin::{Gel, PerJaw};
 

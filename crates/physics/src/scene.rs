@@ -2,15 +2,14 @@
 
 use crate::arm::ArmRig;
 use crate::contact::{ContactForce, contact_force};
-use crate::grip::{GripSetup, Mount};
+use crate::convert::{compact, rapier_pose};
+use crate::setup::{GripSetup, Mount};
 use crate::world::World;
-use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gel, Jaw, PerJaw};
-use nalgebra::Vector3;
 use rapier3d_f64::prelude as rapier;
 use rapier3d_f64::prelude::{
-    CoefficientCombineRule, ColliderBuilder, ColliderHandle, LockedAxes, MassProperties, RigidBodyBuilder,
-    RigidBodyHandle, Shape,
+    CoefficientCombineRule, ColliderBuilder, ColliderHandle, LockedAxes, RigidBodyBuilder, RigidBodyHandle,
+    Shape,
 };
 
 /// Damping of a closing jaw, per jaw mass: a jaw comes to rest within a few hundredths of a second.
@@ -116,11 +115,6 @@ pub(crate) fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64
     Rig { part, part_shape, arm, jaws, pads: PerJaw { left: pads[0], right: pads[1] } }
 }
 
-/// Mass properties of a compact body of steel density. The carriage locks rotations, so only the order matters.
-pub(crate) fn compact(mass_kg: f64) -> MassProperties {
-    MassProperties::new(rapier::Vector::ZERO, mass_kg, rapier::Vector::splat(mass_kg * 5e-3))
-}
-
 /// Half sides of a pad: the gel's width along x, its thickness along the jaw axis, its height along z.
 fn pad_half_extents(gel: &Gel) -> rapier::Vector {
     rapier::Vector::new(gel.width_m / 2.0, gel.thickness_m / 2.0, gel.height_m / 2.0)
@@ -128,17 +122,4 @@ fn pad_half_extents(gel: &Gel) -> rapier::Vector {
 
 pub(crate) fn pad_shape(gel: &Gel) -> impl Shape + use<> {
     rapier::Cuboid::new(pad_half_extents(gel))
-}
-
-pub(crate) fn vector(v: [f64; 3]) -> rapier::Vector {
-    rapier::Vector::new(v[0], v[1], v[2])
-}
-
-pub(crate) fn rapier_pose(pose: &Pose) -> rapier::Pose {
-    let t: Vector3<f64> = pose.translation.vector;
-    let q = pose.rotation.quaternion();
-    rapier::Pose::from_parts(
-        rapier::Vector::new(t.x, t.y, t.z),
-        rapier::Rotation::from_xyzw(q.i, q.j, q.k, q.w),
-    )
 }

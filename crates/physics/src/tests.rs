@@ -1,7 +1,8 @@
 //! Slip against the closed form, and a regression test for each trap of the engine.
 
 use super::*;
-use crate::grip::{Grip, GripSetup, Mount, grip};
+use crate::grip::{Grip, grip};
+use crate::setup::{GripSetup, Mount};
 use gripgen_twin::config::{Feedback, ForceConvention, Mechanics, Twist};
 use gripgen_twin::frames::{Pose, pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};

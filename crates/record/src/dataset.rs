@@ -15,7 +15,7 @@ use crate::pulls::{
     PullFolderError, PullImagesError, pulls_with_images, read_judged_pulls, read_pull_images,
 };
 use crate::reader::{ReadError, Record, ShardReader};
-use crate::rig_run::RIG_SOURCE;
+use crate::shard::RIG_SOURCE;
 use gripgen_twin::{Jaw, MeasuredPulls, PerJaw, PullTrace, TactileImage};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -46,9 +46,9 @@ pub use pulls::{
 pub use reader::{ReadError, Record, ShardReader};
 pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};
 pub use rig_run::{
-    RIG_SOURCE, RigCampaign, RigPull, RigPullError, RigResult, RigRunError, RigRunInfo, create_rig_run,
-    discard_failed, failed_pulls, missing_pulls, rig_campaign, write_rig_pull,
+    RigCampaign, RigPull, RigPullError, RigResult, RigRunError, RigRunInfo, create_rig_run, discard_failed,
+    failed_pulls, missing_pulls, rig_campaign, write_rig_pull,
 };
 pub use sensor_table::{ExtraValues, SENSOR_FILE, SensorTable, SensorTableError, read_sensor_table};
-pub use shard::{LAYOUT_VERSION, METADATA_NAME, ShardError, ShardInfo, ShardWriter};
+pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
 pub use verify::{Verification, verify};

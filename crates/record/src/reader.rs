@@ -5,7 +5,7 @@ mod rig;
 use crate::picture::{PictureError, decode};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
-use crate::rig_run::RIG_SOURCE;
+use crate::shard::RIG_SOURCE;
 use crate::shard::{LAYOUT_VERSION, METADATA_NAME};
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use mcap::records::{AttachmentIndex, ChunkIndex, MetadataIndex};

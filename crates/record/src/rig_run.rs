@@ -12,14 +12,11 @@ pub use pull::{RigPull, RigPullError, RigResult};
 use crate::folder::{FolderError, RUN_SCHEMA, RunFolder, RunInfo, ShardStart, Sidecar, sha256_hex};
 use crate::index::extra_columns;
 use crate::proto::gripgen_v1::Status;
-use crate::shard::{ShardError, ShardInfo, ShardWriter};
+use crate::shard::{RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
 use gripgen_twin::config::{Feedback, ImageStorage};
 use serde::Deserialize;
 use std::io::{BufWriter, ErrorKind};
 use std::path::Path;
-
-/// What the `source` of a run and of a shard is where a rig made it.
-pub const RIG_SOURCE: &str = "rig";
 
 /// What a run of a rig is.
 #[derive(Debug, Clone, PartialEq, Eq)]

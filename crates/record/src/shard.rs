@@ -2,7 +2,6 @@
 
 use crate::encode::EncodedSample;
 use crate::proto::{COMPRESSED_IMAGE_DESCRIPTOR, PULL_DESCRIPTOR, RAW_IMAGE_DESCRIPTOR, RIG_DESCRIPTOR};
-use crate::rig_run::RIG_SOURCE;
 use gripgen_twin::PerJaw;
 use gripgen_twin::config::ImageStorage;
 use mcap::records::{MessageHeader, Metadata};
@@ -10,6 +9,9 @@ use mcap::{Attachment, McapError, WriteOptions, Writer};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
+
+/// What the `source` of a run and of a shard is where a rig made it.
+pub const RIG_SOURCE: &str = "rig";
 
 /// Version of the layout, in the shard's metadata.
 pub const LAYOUT_VERSION: u32 = 1;

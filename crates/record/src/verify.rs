@@ -3,7 +3,7 @@
 use crate::folder::{FolderError, RunFolder, hash_file};
 use crate::index::{csv_lines, index_header, index_row};
 use crate::reader::ShardReader;
-use crate::rig_run::RIG_SOURCE;
+use crate::shard::RIG_SOURCE;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};

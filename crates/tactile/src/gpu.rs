@@ -7,6 +7,7 @@
 
 mod around;
 mod batch;
+mod buffers;
 mod cast;
 mod colour;
 mod device;
@@ -14,6 +15,7 @@ mod layout;
 mod mesh;
 mod pipelines;
 mod readback;
+mod regression;
 mod rest;
 mod source;
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! `gripgen calibrate presses`: a sensor file from presses of a ball.
 
 use crate::args::{CalibratePressesArgs, TalkArgs};
-use crate::commands::compare::{comparison_json, say_circles, table};
+use crate::commands::compare::{comparison_json, table};
 use crate::failure::Failure;
+use crate::load::say_circles;
 use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::tactile::presses::{
     CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PressSet, calibrate_presses,

@@ -1,8 +1,8 @@
 //! `gripgen calibrate pulls`: fit a twin to measured pulls.
 
-use super::diagnose::{folders, jobs, load_library, load_twin, no_pulls, suspects};
 use crate::args::CalibratePullsArgs;
 use crate::failure::Failure;
+use crate::load::{folders, jobs, load_library, load_twin, no_pulls, suspects};
 use crate::output::{JsonSink, print, writable};
 use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};

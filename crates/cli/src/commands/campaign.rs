@@ -1,9 +1,10 @@
 //! `gripgen campaign`: plan a campaign.
 
+use super::diagnose::diagnose_folders;
 use super::diagnose::output::next_toml;
-use super::diagnose::{diagnose_folders, load_library, load_twin, within_rig};
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
+use crate::load::{load_library, load_twin, within_rig};
 use crate::output::{JsonSink, print, program, writable, write_file};
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};

@@ -1,21 +1,20 @@
 //! `gripgen compare`: how far a twin or a sensor file is from measurements.
 
-use super::diagnose::{folders, jobs, load_library, load_twin, no_pulls, suspects};
-use crate::args::{CompareArgs, TalkArgs};
+use crate::args::CompareArgs;
 use crate::commands::compare_sensor;
 use crate::failure::Failure;
+use crate::load::{
+    folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls, say_circles, suspects,
+};
 use crate::output::{JsonSink, print, writable, write_file};
+use gripgen::tactile::finish;
 use gripgen::tactile::metrics::Score;
-use gripgen::tactile::presses::{PressComparison, PressSet, Scores, compare_presses, predict_press};
-use gripgen::tactile::{Sensor, finish};
+use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
-    FoundCircles, LabelErrors, LoadPressesError, LoadSensorError, Location, PartRatio, PressGeometry,
-    PressReportText, compare_pulls, find_missing_circles, is_press_set, is_sensor_table, load_presses,
-    load_pulls_with, load_sensor, load_twin_sensor, press_report, pull_comparison_page, pull_ratios,
+    LabelErrors, PartRatio, PressReportText, compare_pulls, find_missing_circles, is_press_set,
+    is_sensor_table, load_pulls_with, press_report, pull_comparison_page, pull_ratios,
 };
 use serde_json::{Value, json};
-use std::path::Path;
-use std::sync::Arc;
 
 /// Runs the verb.
 pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
@@ -69,51 +68,6 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
         print(&table(&comparison))?;
     }
     Ok(0)
-}
-
-/// Says which contacts were not marked.
-pub fn say_circles(circles: &FoundCircles, talk: &TalkArgs) {
-    if talk.quiet {
-        return;
-    }
-    if !circles.found.is_empty() {
-        eprintln!("note: nobody marked the contact of {} presses, it was looked for", circles.found.len());
-    }
-    if !circles.without_contact.is_empty() {
-        eprintln!("warning: no contact is visible in {}; left out", circles.without_contact.join(", "));
-    }
-}
-
-/// The sensor file of `--sensor`, or the twin's, and presses that have its size.
-pub fn load_sensor_and_presses(
-    measured: &Path,
-    sensor: Option<&str>,
-    twin: &str,
-) -> Result<(Arc<Sensor>, PressSet), Failure> {
-    let sensor = match sensor {
-        Some(path) => load_sensor(&Location::parse(path)),
-        None => load_twin_sensor(&Location::parse(twin)),
-    };
-    let sensor = sensor.map_err(|e| match e {
-        LoadSensorError::Twin(e) => Failure::from(e),
-        other => Failure::usage(other).hint("`gripgen calibrate presses` writes a sensor file for --sensor"),
-    })?;
-    let geometry = PressGeometry { ball_m: sensor.ball_m, metres_per_px: Some(sensor.grid.metres_per_px) };
-    let set = load_presses(measured, geometry).map_err(|e| match e {
-        LoadPressesError::Geometry { .. } => Failure::usage(e)
-            .hint("a sensor file of `gripgen calibrate presses` holds both; name it with --sensor"),
-        other => Failure::usage(other),
-    })?;
-    if let Some(press) = set.presses.first() {
-        let (found, wanted) =
-            ((press.image.width_px, press.image.height_px), (sensor.grid.width_px, sensor.grid.height_px));
-        if (found.0 as usize, found.1 as usize) != wanted {
-            let sizes = format!("{}x{} pixels, the sensor has {}x{}", found.0, found.1, wanted.0, wanted.1);
-            return Err(Failure::usage(format!("{}: the images are {sizes}", measured.display()))
-                .hint("name the sensor file that belongs to these presses with --sensor"));
-        }
-    }
-    Ok((sensor, set))
 }
 
 /// A twin against measured pulls.

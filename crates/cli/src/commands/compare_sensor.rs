@@ -1,8 +1,8 @@
 //! `gripgen compare` of a force-sensor table.
 
 use crate::args::CompareArgs;
-use crate::commands::diagnose::load_twin;
 use crate::failure::Failure;
+use crate::load::load_twin;
 use crate::output::{JsonSink, print};
 use gripgen::{compare_sensor_table, load_sensor_table};
 use serde_json::{Map, json};

@@ -1,8 +1,8 @@
 //! `gripgen effects`: the catalogue.
 
-use super::diagnose::{load_library, load_twin};
 use crate::args::EffectsArgs;
 use crate::failure::Failure;
+use crate::load::{load_library, load_twin};
 use crate::output::{JsonSink, print};
 use gripgen::twin::config::suggestion;
 use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, ParameterSpec, find};

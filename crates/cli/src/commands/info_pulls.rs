@@ -1,8 +1,8 @@
 //! `gripgen info` of pulls: labels over grip force, and folders with pulls.csv.
 
-use super::diagnose::no_pulls;
 use crate::args::InfoArgs;
 use crate::failure::Failure;
+use crate::load::no_pulls;
 use crate::output::{JsonSink, print};
 use gripgen::{Level, levels, load_pulls_of};
 use serde_json::{Value, json};

@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, candidates};
 use super::context::Context;
 use super::data::PullData;
-use super::fitting::{Fitted, Terms};
+use super::fitting::Fitted;
 use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
 };
@@ -12,6 +12,7 @@ use super::power::ScoreTest;
 use super::screen::test;
 use super::search::{Accepted, Search, TIED_WITHIN};
 use super::simulate::{recalibrate, trusted};
+use super::terms::Terms;
 use super::words::separation;
 use crate::diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate,

@@ -1,9 +1,10 @@
 //! Fits of all rivals beside a model.
 
-use super::fitting::{Fitted, Terms};
+use super::fitting::Fitted;
 use super::model::PullModel;
 use super::power::ScoreTest;
 use super::search::{Entry, Rival, Search};
+use super::terms::Terms;
 use std::sync::Mutex;
 
 /// Gain of log-likelihood that the slope at nothing has to promise for an effect on signals to be fitted, and for anything

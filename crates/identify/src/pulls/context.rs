@@ -1,11 +1,10 @@
 //! A campaign with what its traces say, and the residuals of a model against both.
 
 use super::data::PullData;
-use super::dynamics::fall_s;
-use super::fitting::Terms;
 use super::model::{PredictPulls, PullModel, PullPrediction};
-use super::observe::{LEVELS, TraceObservation, noise_n, observe};
+use super::observe::{LEVELS, TraceObservation, fall_s, noise_n, observe};
 use super::slip::{SlipLimit, SlipRig, SlipTrace, Slips, read_slips};
+use super::terms::Terms;
 use super::trace_residuals::TraceResiduals;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 

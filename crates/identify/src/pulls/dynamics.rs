@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::model::PullModel;
-use super::observe::{START_S, TraceObservation};
+use super::observe::START_S;
 use crate::bounded::interval90;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 use nalgebra::{DMatrix, DVector};
@@ -122,32 +122,4 @@ impl Context<'_> {
         self.read_slips();
         Some(answer)
     }
-}
-
-/// Time constant of the fall after a slip: the area above the kinetic force, over the drop, of all traces that drop by much.
-pub(super) fn fall_s(raw: &[TraceObservation], noise_n: f64) -> Option<f64> {
-    let mut each: Vec<f64> = raw
-        .iter()
-        .filter_map(|t| {
-            if t.held_n.len() < 8 || t.slid_rows.len() < 8 {
-                return None;
-            }
-            // The kinetic force is that of the second half of the slide; the limit the largest mean of three around the slip.
-            let half = &t.slid_rows[t.slid_rows.len() / 2..];
-            let kinetic = half.iter().map(|r| r.1).sum::<f64>() / half.len() as f64;
-            let slid = t.slid_rows.iter().map(|r| r.1);
-            let force: Vec<f64> = t.before_slip_n.iter().copied().chain(slid).collect();
-            let threes = force.windows(3).take(2 * t.before_slip_n.len() + 1);
-            let limit = threes.map(|w| w.iter().sum::<f64>() / 3.0).fold(f64::NEG_INFINITY, f64::max);
-            let step_s = t.slid_rows[1].0 - t.slid_rows[0].0;
-            let drop = limit - kinetic;
-            // From the last reading near the limit on: nothing, on average, of a force that falls at once.
-            let share: Vec<f64> = force.iter().map(|f| (f - kinetic) / drop).collect();
-            let near = share.iter().rposition(|u| *u > 0.75)?;
-            let area: f64 = share[near + 1..].iter().take(8).sum::<f64>() * step_s;
-            (drop > 0.6 && drop > 6.0 * noise_n).then_some(area)
-        })
-        .collect();
-    each.sort_by(f64::total_cmp);
-    (each.len() >= 4).then(|| each[each.len() / 2].clamp(0.0, 0.1))
 }

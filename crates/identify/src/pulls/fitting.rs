@@ -1,46 +1,14 @@
 //! Fitting a model to a campaign: friction from labels and slips, readings from traces, all parameters together.
 
-use super::candidates::Candidate;
 use super::context::Context;
-use super::curves::Curve;
 use super::likelihood::{Likelihood, likelihood, scale, weight_of};
 use super::model::PullModel;
+use super::terms::Terms;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 use nalgebra::{DMatrix, DVector};
 
 /// Rounds of weights.
 const ROUNDS: usize = 3;
-
-/// What is fitted: effects of the library, each from a start, and unnamed curves.
-#[derive(Debug, Clone, Default)]
-pub struct Terms {
-    /// Effects with the values that their fits start from.
-    pub effects: Vec<(Candidate, Vec<f64>)>,
-    /// Unnamed dependences with their coefficients.
-    pub curves: Vec<(Curve, Vec<f64>)>,
-    /// Whether lag, dead time, kinetic ratio and what acts on signals stay as they are given, which makes fits of friction
-    /// beside them fast.
-    pub hold_signals: bool,
-    /// Whether the model is one that a twin can hold: without the nuisance of labels that are read too high.
-    pub stated: bool,
-}
-
-impl Terms {
-    /// Whether readings or commands are changed.
-    pub fn act_on_signals(&self) -> bool {
-        self.effects.iter().any(|(c, _)| c.acts_on_signals())
-    }
-
-    fn holds(&self, candidate: &Candidate) -> bool {
-        self.hold_signals && candidate.acts_on_signals()
-    }
-
-    /// Parameters that the data have to pay for.
-    pub fn cost(&self) -> usize {
-        self.effects.iter().map(|(c, _)| c.cost()).sum::<usize>()
-            + self.curves.iter().map(|(c, _)| c.cost).sum::<usize>()
-    }
-}
 
 /// A fitted model.
 #[derive(Debug, Clone)]
@@ -334,10 +302,4 @@ fn information(
         plain.row_mut(i).scale_mut(1.0 / (w * variance.sqrt()));
     }
     plain.tr_mul(&plain)
-}
-
-/// Half of Huber's cost.
-pub fn huber(residuals: &[f64]) -> f64 {
-    const K: f64 = 2.5;
-    residuals.iter().map(|r| if r.abs() <= K { 0.5 * r * r } else { K * (r.abs() - 0.5 * K) }).sum()
 }

@@ -1,8 +1,9 @@
 //! The error on pulls that a fit has not seen.
 
 use super::context::Context;
-use super::fitting::{Fitted, Terms};
+use super::fitting::Fitted;
 use super::model::PullModel;
+use super::terms::Terms;
 use crate::diagnosis::{ErrorPair, HeldOutError};
 use crate::draws::Draws;
 use std::sync::Mutex;

@@ -77,6 +77,12 @@ fn log_density(x: f64) -> f64 {
     libm::log(CONSTANT) - 0.5 * (FREEDOM + 1.0) * libm::log1p(x * x / FREEDOM)
 }
 
+/// Half of Huber's cost.
+pub fn huber(residuals: &[f64]) -> f64 {
+    const K: f64 = 2.5;
+    residuals.iter().map(|r| if r.abs() <= K { 0.5 * r * r } else { K * (r.abs() - 0.5 * K) }).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,8 +3,8 @@
 use super::candidates::Candidate;
 use super::context::Context;
 use super::curves::Curve;
-use super::fitting::Terms;
 use super::model::PullModel;
+use super::terms::Terms;
 use crate::diagnosis::Detectable;
 use nalgebra::{DMatrix, DVector, Dyn, SVD};
 

@@ -4,7 +4,8 @@
 use super::candidates::Candidate;
 use super::context::Context;
 use super::curves::{Curve, curves_in, periodic, product};
-use super::fitting::{Fitted, Terms};
+use super::fitting::Fitted;
+use super::terms::Terms;
 use std::sync::Mutex;
 
 /// Score that a named effect has to gain: odds of 20 to 1, beyond what its parameters cost. Set on the development split of

@@ -1,7 +1,6 @@
 //! How far readings of traces lie from a model, and what that says.
 
-use super::fitting::huber;
-use super::likelihood::scale;
+use super::likelihood::{huber, scale};
 
 /// What the readings of traces differ from a model by, in the deviations that arms and sensors are known to have.
 pub(super) struct TraceResiduals {

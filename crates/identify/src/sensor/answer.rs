@@ -8,7 +8,7 @@ use super::moments::{Model, Moments};
 use super::prepare::{Prepared, prepare, range};
 use super::refine::{JointFit, Refined, joint_fit, values_at};
 use super::search::{Weighing, Workspace};
-use super::words::{evidence, separate_by};
+use super::words::{SensorEvidence, evidence, separate_by};
 use super::{SensorData, SensorOptions, detect};
 use crate::diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, Rival,
@@ -16,25 +16,6 @@ use crate::diagnosis::{
 };
 use gripgen_twin::effects::{EffectSpec, FORCE_RATE};
 use std::collections::BTreeMap;
-
-/// A candidate in the table of evidence.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SensorEvidence {
-    /// Id of the effect, or `curve in` a covariate, or `none`.
-    pub name: String,
-    /// Held-out gain in log-likelihood over gain and offset alone.
-    pub heldout_gain: f64,
-    /// Its standard error over blocks.
-    pub standard_error: f64,
-    /// Held-out error with it, in the unit of the measured column.
-    pub heldout_rmse_n: f64,
-    /// Chance of as good a fit in data without any effect.
-    pub p_value: f64,
-    /// Fitted values for people.
-    pub values: String,
-    /// What became of it.
-    pub fate: String,
-}
 
 /// A group of rows with what was predicted from the other blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,5 @@
 //! The table of evidence, and experiments in words.
 
-use super::answer::SensorEvidence;
 use super::choose::{Choice, model_of, ties};
 use super::moments::Model;
 use super::refine::values_at;
@@ -8,6 +7,25 @@ use super::search::Workspace;
 use super::statistics::mean_and_error;
 use crate::diagnosis::SeparateBy;
 use gripgen_twin::effects::{Experiment, Measured, separating};
+
+/// A candidate in the table of evidence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorEvidence {
+    /// Id of the effect, or `curve in` a covariate, or `none`.
+    pub name: String,
+    /// Held-out gain in log-likelihood over gain and offset alone.
+    pub heldout_gain: f64,
+    /// Its standard error over blocks.
+    pub standard_error: f64,
+    /// Held-out error with it, in the unit of the measured column.
+    pub heldout_rmse_n: f64,
+    /// Chance of as good a fit in data without any effect.
+    pub p_value: f64,
+    /// Fitted values for people.
+    pub values: String,
+    /// What became of it.
+    pub fate: String,
+}
 
 /// All candidates against the baseline, best first, "none" last.
 pub(crate) fn evidence(ws: &Workspace<'_>, choice: &Choice) -> Vec<SensorEvidence> {

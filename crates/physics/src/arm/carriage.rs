@@ -1,7 +1,7 @@
 //! The arm as one body on a rail along the pull.
 
-use crate::grip::GripSetup;
-use crate::scene::{compact, vector};
+use crate::convert::{compact, vector};
+use crate::setup::GripSetup;
 use crate::world::World;
 use rapier3d_f64::prelude::{PrismaticJointBuilder, RigidBodyBuilder, RigidBodyHandle, Vector};
 

@@ -19,8 +19,8 @@
 
 use crate::arm::model::LinkInertia;
 use crate::arm::placed::{PlacedArm, gripper_inertia};
-use crate::grip::GripSetup;
-use crate::scene::rapier_pose;
+use crate::convert::rapier_pose;
+use crate::setup::GripSetup;
 use crate::world::World;
 use gripgen_twin::frames::Pose;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};

@@ -1,7 +1,7 @@
 //! An arm model in the pose in which it grips.
 
 use crate::arm::model::{ArmModel, LinkInertia};
-use crate::scene::compact;
+use crate::convert::compact;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gripper, RobotArm};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};

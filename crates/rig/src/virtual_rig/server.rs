@@ -4,12 +4,14 @@
 //! controller's clock. Of the other states that a controller sends there they have none. The real-time port takes programs and
 //! sends nothing: its state packets are out of date beside RTDE, and no client of this rig reads them.
 
+mod error;
 mod ports;
 mod socket;
 #[cfg(test)]
 mod tests;
 
-pub use socket::{RigStatus, ServeError, ServeOptions, ServedRig};
+pub use error::ServeError;
+pub use socket::{RigStatus, ServeOptions, ServedRig};
 
 use crate::primary::{
     ErrorCodeMessage, KeyMessage, MessageHeader, PROGRAM_STARTED, PROGRAM_STOPPED, RobotModeData,

@@ -16,6 +16,7 @@
 //!
 //! Every term is 0 for a gel at rest: no contact, no change.
 
+mod block;
 mod draw;
 mod near;
 mod pyramid;

@@ -1,7 +1,7 @@
 //! Shadows on the device. CPU twin: src/shadow.rs.
 
 use super::GpuError;
-use super::batch::{Pass, Planes, bind_at, empty, resident, with_content};
+use super::buffers::{Pass, Planes, bind_at, empty, resident, with_content};
 use super::device::Device;
 use super::layout::{ShadowBlur, Shadows};
 use super::pipelines::Pipelines;

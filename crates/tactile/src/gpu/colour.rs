@@ -1,8 +1,8 @@
 //! Colour models as the stage `shade` wants them.
 
 use super::GpuError;
-use super::around::{around_coefficients, near_coefficients, regression};
 use super::layout::Regression;
+use super::regression::{around_coefficients, near_coefficients, regression};
 use super::source::Shade;
 use crate::colour::ColourModel;
 use crate::sensor::Sensor;

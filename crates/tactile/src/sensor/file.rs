@@ -18,7 +18,7 @@
 //! | `marker_px`, `marker_radius_px`, `marker_darkness_rgb` | (N, 2), scalar, (3,), optional | dots on the gel: column and row at rest, radius, share of light that a dot takes |
 //! | `ball_mm` | scalar, optional | diameter of the ball of the calibration |
 
-use super::{GelShape, Pyramid, Sensor, SensorError};
+use super::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError};
 use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
 use crate::colour::{ColourModel, Lambert, Regressor, TaximTable};
 use crate::deform::gaussian;
@@ -27,9 +27,6 @@ use crate::markers::Markers;
 use crate::npz::{Array, ElementType, Npz, NpzError, parse_npy, write_npz};
 use crate::shadow::{Shadow, ShadowKind, ShadowTable};
 use gripgen_twin::TactileImage;
-
-/// Version of the sensor file format, stored under the key `gripgen_sensor`.
-pub const SENSOR_VERSION: f64 = 1.0;
 
 /// A sensor file and what a twin may name beside it.
 #[derive(Debug, Clone, Copy)]

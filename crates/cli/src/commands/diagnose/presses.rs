@@ -1,8 +1,8 @@
 //! Presses: what a sensor file lacks.
 
 use crate::args::DiagnoseArgs;
-use crate::commands::compare::{load_sensor_and_presses, say_circles};
 use crate::failure::Failure;
+use crate::load::{load_sensor_and_presses, say_circles};
 use crate::progress::Share;
 use gripgen::tactile::finish;
 use gripgen::{

@@ -1,7 +1,7 @@
 //! Starting, the clock, and what stops it.
 
 use super::ports::socket::Shared;
-use super::{RigAddresses, announcement_message, robot_mode_packet};
+use super::{RigAddresses, ServeError, announcement_message, robot_mode_packet};
 use crate::camera::CameraView;
 use crate::gcl::GripState;
 use crate::link::lock;
@@ -11,7 +11,6 @@ use crate::virtual_rig::arm::STEP_S;
 use crate::virtual_rig::faults::{Device, Fault};
 use crate::virtual_rig::world::World;
 use gripgen_twin::plant::{GripRequest, Plant};
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -38,38 +37,6 @@ pub struct ServeOptions {
     pub tcp: TcpPose,
     /// How a client turns the cameras' frames; the cameras send what this makes upright.
     pub view: CameraView,
-}
-
-/// Why the rig is not served.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ServeError {
-    /// Another machine could reach it.
-    #[error("{what}: {address} is not on loopback; the virtual rig is for this machine alone")]
-    NotLoopback {
-        /// Which port.
-        what: &'static str,
-        /// Its address.
-        address: SocketAddr,
-    },
-    /// A clock that nothing can keep up with, or none.
-    #[error("the clock would run {rate} times faster than real time, it can run from 0.01 to {most} times")]
-    Rate {
-        /// What was asked.
-        rate: f64,
-        /// Largest.
-        most: f64,
-    },
-    /// A port that cannot be had.
-    #[error("{what}: {address}: {source}")]
-    Port {
-        /// Which port.
-        what: &'static str,
-        /// Its address.
-        address: SocketAddr,
-        /// What the system says.
-        source: std::io::Error,
-    },
 }
 
 /// Largest clock rate.

@@ -1,6 +1,7 @@
 //! Drawing of the regression: the surroundings on cells, which are spread bilinearly over the pixels, then row by row
 //! the part of displaced pixels. Only fused multiply-adds and sums in a fixed order, so that all vector units agree.
 
+use super::block::{BLOCK, CHANNELS, block_of, by_monomial};
 use super::near::Near;
 use super::pyramid::{DERIVATIVES, SURROUNDINGS, Surroundings, cell_px, double, surroundings};
 use super::terrain::Terrain;
@@ -8,13 +9,8 @@ use super::{AROUND_FIELD, Place, Regressor, between_cells, cell_centre_px};
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
 
-/// Pixels or cells that are computed together: the widest vector.
-pub(super) const BLOCK: usize = 16;
-
 /// Pixels between two centres of cells that are written at once.
 const STRETCH: usize = 8;
-
-pub(super) const CHANNELS: usize = 3;
 
 /// Memory to draw in, to be used again.
 #[derive(Debug, Default)]
@@ -99,24 +95,6 @@ fn around<L: Lanes>(
         }
     }
     spread
-}
-
-/// Coefficients by monomial, then feature and channel, out of channel, feature, monomial.
-#[inline(always)]
-pub(super) fn by_monomial<const FIELD: usize>(coefficients: &[f32], features: usize) -> Vec<f32> {
-    let mut out = vec![0.0; coefficients.len()];
-    for (i, of_feature) in coefficients.as_chunks::<FIELD>().0.iter().enumerate() {
-        let to = CHANNELS * (i % features) + i / features;
-        for (monomial, c) in of_feature.iter().enumerate() {
-            out[monomial * CHANNELS * features + to] = *c;
-        }
-    }
-    out
-}
-
-#[inline(always)]
-pub(super) fn block_of(row: &[f32], start: usize) -> &[f32; BLOCK] {
-    row[start..].first_chunk().expect("rows are padded to whole blocks")
 }
 
 /// The surroundings on cells.

@@ -1,6 +1,6 @@
 //! The part of displaced pixels, block by block along a row.
 
-use super::draw::{BLOCK, CHANNELS, block_of, by_monomial};
+use super::block::{BLOCK, CHANNELS, block_of, by_monomial};
 use super::terrain::Terrain;
 use super::{NEAR, NEAR_FIELD, Place, Regressor, limited_normal, near_terms};
 use crate::simd::Lanes;

@@ -1,6 +1,6 @@
 //! Connections of each kind, and what they share.
 
-use super::super::socket::ServeError;
+use super::super::ServeError;
 use super::super::{RigAddresses, version_message};
 use crate::camera::CameraView;
 use crate::link::lock;

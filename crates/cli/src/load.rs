@@ -1,0 +1,106 @@
+//! What verbs read before they begin: twins, their files, measurements.
+
+use crate::args::TalkArgs;
+use crate::commands::rig::load_rig;
+use crate::failure::Failure;
+use gripgen::tactile::Sensor;
+use gripgen::tactile::presses::PressSet;
+use gripgen::twin::Twin;
+use gripgen::{
+    FoundCircles, Library, LoadPressesError, LoadSensorError, Location, PressGeometry, Suspects,
+    load_presses, load_sensor, load_twin_document, load_twin_sensor,
+};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The twin that a verb starts from.
+pub fn load_twin(path: &str, sets: &[(String, String)]) -> Result<Twin, Failure> {
+    let document = load_twin_document(&Location::parse(path), sets)?;
+    let file = document.read_twin().map_err(|e| Failure::from(document.located(e)))?;
+    Twin::new(&file).map_err(|e| Failure::from(document.located(e)))
+}
+
+/// The files that the grips of a twin need. `path` is the twin's own.
+pub fn load_library(twin: &Twin, path: &str) -> Result<Library, Failure> {
+    let unread = |e| Failure::usage(e).hint("paths in a twin are relative to its file");
+    Library::of_twin(twin, &Location::parse(path)).map_err(unread)
+}
+
+/// The twin with no more grip force than the gripper of a rig has.
+pub fn within_rig(mut twin: Twin, rig: Option<&str>) -> Result<Twin, Failure> {
+    if let Some(rig) = rig {
+        let [_, most_n] = load_rig(rig, &[])?.gripper.force_per_jaw_n;
+        twin.gripper.max_force_n = twin.gripper.max_force_n.min(most_n);
+    }
+    Ok(twin)
+}
+
+/// Worker threads.
+pub fn jobs() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// What becomes of suspect labels: what an effect of sensor or robot does to many pulls is no reason to leave them out.
+pub fn suspects(include: bool) -> Suspects {
+    if include { Suspects::Include } else { Suspects::Screen }
+}
+
+/// What cannot be read as pulls.
+pub fn no_pulls(paths: &[&Path], e: impl std::fmt::Display) -> Failure {
+    let known = paths.iter().all(|path| path.join("pulls.csv").is_file() || path.join("run.json").is_file());
+    let failure = Failure::usage(e);
+    if known {
+        return failure;
+    }
+    failure.hint("measurements are a folder with pulls.csv, sensor.csv or presses.csv, a run folder, or a dataPack.npz")
+}
+
+/// Folders that are read as one campaign.
+pub fn folders<'a>(measured: &'a Path, also: &'a [PathBuf]) -> Vec<&'a Path> {
+    std::iter::once(measured).chain(also.iter().map(PathBuf::as_path)).collect()
+}
+
+/// Says which contacts were not marked.
+pub fn say_circles(circles: &FoundCircles, talk: &TalkArgs) {
+    if talk.quiet {
+        return;
+    }
+    if !circles.found.is_empty() {
+        eprintln!("note: nobody marked the contact of {} presses, it was looked for", circles.found.len());
+    }
+    if !circles.without_contact.is_empty() {
+        eprintln!("warning: no contact is visible in {}; left out", circles.without_contact.join(", "));
+    }
+}
+
+/// The sensor file of `--sensor`, or the twin's, and presses that have its size.
+pub fn load_sensor_and_presses(
+    measured: &Path,
+    sensor: Option<&str>,
+    twin: &str,
+) -> Result<(Arc<Sensor>, PressSet), Failure> {
+    let sensor = match sensor {
+        Some(path) => load_sensor(&Location::parse(path)),
+        None => load_twin_sensor(&Location::parse(twin)),
+    };
+    let sensor = sensor.map_err(|e| match e {
+        LoadSensorError::Twin(e) => Failure::from(e),
+        other => Failure::usage(other).hint("`gripgen calibrate presses` writes a sensor file for --sensor"),
+    })?;
+    let geometry = PressGeometry { ball_m: sensor.ball_m, metres_per_px: Some(sensor.grid.metres_per_px) };
+    let set = load_presses(measured, geometry).map_err(|e| match e {
+        LoadPressesError::Geometry { .. } => Failure::usage(e)
+            .hint("a sensor file of `gripgen calibrate presses` holds both; name it with --sensor"),
+        other => Failure::usage(other),
+    })?;
+    if let Some(press) = set.presses.first() {
+        let (found, wanted) =
+            ((press.image.width_px, press.image.height_px), (sensor.grid.width_px, sensor.grid.height_px));
+        if (found.0 as usize, found.1 as usize) != wanted {
+            let sizes = format!("{}x{} pixels, the sensor has {}x{}", found.0, found.1, wanted.0, wanted.1);
+            return Err(Failure::usage(format!("{}: the images are {sizes}", measured.display()))
+                .hint("name the sensor file that belongs to these presses with --sensor"));
+        }
+    }
+    Ok((sensor, set))
+}

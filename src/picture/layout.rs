@@ -1,0 +1,95 @@
+//! What the pictures of a sample and of a measured pull share.
+
+use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
+use super::colours::{COMMAND, DISPLACEMENT, INK, MEASURED, PANEL, SLIP, SOFT_INK};
+use super::plot::{Area, Curve, pull_curve};
+use super::sheet::details;
+use gripgen_record::Record;
+use gripgen_record::proto::gripgen_v1::Sample;
+use gripgen_twin::TactileImage;
+
+pub(super) const MARGIN: u32 = 16;
+
+pub(super) const IMAGE: (u32, u32) = (400, 300);
+
+pub(super) const HEADER: u32 = 64;
+
+pub(super) const CAPTION: u32 = 24;
+
+pub(super) const CURVE_HEIGHT: u32 = 380;
+
+pub(super) fn second_line(s: &Sample) -> String {
+    let mut text = details(s);
+    if let Some(mu) = s.mu {
+        text += &format!(", mu {mu:.4}");
+    }
+    if s.lag_exceeds_tolerance {
+        text += ", force loop lags beyond the label tolerance";
+    }
+    if s.outside_fit {
+        text += ", friction law outside its fitted range";
+    }
+    text
+}
+
+pub(super) fn frame(canvas: &mut Canvas, x: u32, y: u32) {
+    canvas.rect(f64::from(x), f64::from(y), f64::from(IMAGE.0), f64::from(IMAGE.1), PANEL);
+}
+
+pub(super) fn pixel(image: &TactileImage, u: u32, v: u32) -> Rgb {
+    let [r, g, b] = image.pixel(u, v);
+    Rgb(r, g, b)
+}
+
+/// Draws an image into the frame, as large as it fits, centred.
+pub(super) fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour: impl Fn(u32, u32) -> Rgb) {
+    let (zoom, left, top) = placement(size);
+    let (width, height) = ((f64::from(size.0) * zoom) as u32, (f64::from(size.1) * zoom) as u32);
+    for row in 0..height {
+        for column in 0..width {
+            let u = ((f64::from(column) + 0.5) / zoom) as u32;
+            let v = ((f64::from(row) + 0.5) / zoom) as u32;
+            let ink = colour(u.min(size.0 - 1), v.min(size.1 - 1));
+            canvas.put(x + left + column, y + top + row, ink);
+        }
+    }
+}
+
+pub(super) fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Record) {
+    let mut x = f64::from(MARGIN);
+    for (text, ink) in [
+        ("force / N:", INK),
+        ("command", COMMAND),
+        ("measured", MEASURED),
+        ("slip", SLIP),
+        ("displacement / mm (right)", DISPLACEMENT),
+    ] {
+        canvas.text(text, x, f64::from(top), Anchor::Left, TextStyle::small(ink));
+        x += 8.0 * (text.chars().count() + 2) as f64;
+    }
+    let area = Area {
+        x: f64::from(MARGIN),
+        y: f64::from(top + CAPTION),
+        width: f64::from(width - 2 * MARGIN),
+        height: f64::from(CURVE_HEIGHT),
+    };
+    canvas.rect(area.x, area.y, area.width, area.height, PANEL);
+    let s = &record.sample;
+    match &record.trace {
+        Some(trace) => {
+            let slip = s.slip_time_s.zip(s.max_pull_force_n);
+            pull_curve(canvas, area, &Curve { trace, slip, full: true });
+        }
+        None => {
+            let why = if s.failure.is_empty() { "this run stores no traces" } else { &s.failure };
+            canvas.text(why, area.x + 12.0, area.y + 12.0, Anchor::Left, TextStyle::small(SOFT_INK));
+        }
+    }
+}
+
+/// Zoom and margins of an image of this size in the frame.
+pub(super) fn placement(size: (u32, u32)) -> (f64, u32, u32) {
+    let zoom = (f64::from(IMAGE.0) / f64::from(size.0)).min(f64::from(IMAGE.1) / f64::from(size.1));
+    let rest = |frame: u32, n: u32| ((f64::from(frame) - f64::from(n) * zoom) / 2.0).max(0.0) as u32;
+    (zoom, rest(IMAGE.0, size.0), rest(IMAGE.1, size.1))
+}

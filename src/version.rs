@@ -1,0 +1,4 @@
+//! The version of gripgen.
+
+/// Version of gripgen, part of every run.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
