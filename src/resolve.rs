@@ -6,7 +6,7 @@
 use crate::assets::ASSET_PREFIX;
 use crate::location::Location;
 use gripgen_record::sha256_hex;
-use gripgen_twin::config::{ConfigError, Document, RobotModel, SweepFile, TwinFile};
+use gripgen_twin::config::{ConfigError, Document, SweepFile, TwinFile};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::{Sweep, TWIN_SCHEMA, is_twin_key};
 use std::collections::BTreeMap;
@@ -112,8 +112,7 @@ impl<L: Fn(&str) -> Location> Resolver<L> {
                 part.mesh = NOT_USED.into();
             }
         }
-        let linked =
-            twin.robot.model == RobotModel::Ur5e || sweep.vary.iter().any(|v| v.key == "robot.model");
+        let linked = twin.robot.model.has_links() || sweep.vary.iter().any(|v| v.key == "robot.model");
         if let Some(arm) = &mut twin.robot.arm {
             let key = "robot.arm.urdf".to_string();
             if linked {

@@ -1,9 +1,10 @@
 //! Data-driven: every file in `configs/invalid` has one fault and says in its head what the answer must contain.
 
 use crate::common::{project, root};
+use gripgen::twin::Twin;
 use gripgen::twin::config::ConfigError;
 use gripgen::twin::draw::Drawn;
-use gripgen::{LoadError, Location, Project};
+use gripgen::{LoadError, Location, Project, load_twin_document};
 use std::path::Path;
 
 struct Expected {
@@ -316,6 +317,21 @@ fn refused(sets: Sets<'_>) -> Option<ConfigError> {
         Err(LoadError::Config(e)) => Some(e),
         Err(e) => panic!("{e}"),
     }
+}
+
+/// An arm with links has one model under two names, and the name of a gripper changes nothing.
+#[test]
+fn names_of_models_change_no_number() {
+    let at = Location::parse("asset:configs/twin-baseline.toml");
+    let twin = |key: &str, value: &str| {
+        Twin::new(&load_twin_document(&at, &[(key.into(), value.into())]).unwrap().read_twin().unwrap())
+            .unwrap()
+    };
+    let shipped = twin("robot.model", "\"ur5e\"");
+    assert!(shipped.arm.is_some());
+    assert_eq!(twin("robot.model", "\"arm\""), shipped);
+    assert_eq!(twin("gripper.model", "\"a gripper of our own\""), shipped);
+    assert!(twin("robot.model", "\"carriage\"").arm.is_none());
 }
 
 #[test]

@@ -221,7 +221,7 @@ impl Twin {
         };
         let arm = match r.model {
             RobotModel::Carriage => None,
-            RobotModel::Ur5e => Some(check_arm(r.arm.as_ref())?),
+            RobotModel::Arm | RobotModel::Ur5e => Some(check_arm(r.arm.as_ref())?),
         };
         let g = &file.gripper;
         let gripper = Gripper {

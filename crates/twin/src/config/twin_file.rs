@@ -51,10 +51,19 @@ pub enum RobotModel {
     /// The gripper hangs on a carriage that moves along the pull; the arm is its mass and its force loop.
     Carriage,
     /// The arm of `[robot.arm]`, link by link; its inertia comes from its URDF.
+    Arm,
+    /// The same by the name that it had first, whatever arm the URDF describes.
     Ur5e,
 }
 
-/// `[robot.arm]`: an arm with six joints, and how it stands when it grips. Used with `model = "ur5e"`.
+impl RobotModel {
+    /// Whether the arm has links, which `[robot.arm]` describes.
+    pub fn has_links(self) -> bool {
+        self != RobotModel::Carriage
+    }
+}
+
+/// `[robot.arm]`: an arm with six joints, and how it stands when it grips. Used with `model = "arm"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ArmFile {
@@ -129,14 +138,6 @@ pub struct RobotFile {
     pub calibration: BTreeMap<String, CalibrationFile>,
 }
 
-/// Which model of the gripper.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum GripperModel {
-    /// Schunk WSG 50-110.
-    Wsg50,
-}
-
 /// What a grip force means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -151,8 +152,9 @@ pub enum ForceConvention {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GripperFile {
-    /// Model of the gripper.
-    pub model: GripperModel,
+    /// Name of the gripper, for people: no number depends on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
     /// What `grip_force_n` means in a sweep with this twin. Files that gripgen writes are per jaw.
     pub force_convention: ForceConvention,
     /// Mass of the gripper without its jaws.

@@ -10,7 +10,7 @@ use nalgebra::Point3;
 
 pub(super) fn check_arm(arm: Option<&ArmFile>) -> Result<RobotArm, ConfigError> {
     let arm = arm.ok_or_else(|| {
-        ConfigError::new("robot.model", "`ur5e` needs the section [robot.arm]")
+        ConfigError::new("robot.model", "an arm with links needs the section [robot.arm]")
             .hint("the shipped one stands in asset:configs/twin-baseline.toml; or use model = \"carriage\"")
     })?;
     let (mut joints_rad, mut rotor_inertia_kg_m2) = ([0.0; 6], [0.0; 6]);
