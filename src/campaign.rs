@@ -7,13 +7,14 @@ use crate::project::{LoadError, Project, load_twin_document};
 use crate::sample::SimulateOptions;
 use gripgen_record::sha256_hex;
 use gripgen_tactile::SimdLevel;
+use gripgen_twin::columns::covariates;
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::SensorChain;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    Campaign, Covariates, KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, Outcome, PULLS_SINCE_REST, PlannedPull,
-    PullKind, PullTrace, RestCount, Scenario, TraceRow, Twin, table_offset_n,
+    Campaign, Covariates, MeasuredPull, MeasuredPulls, Outcome, PULLS_SINCE_REST, PlannedPull, PullKind,
+    PullTrace, RestCount, Scenario, TraceRow, Twin, table_offset_n,
 };
 
 /// Time between readings of a stored trace; the label is taken at the full rate.
@@ -91,7 +92,7 @@ pub fn simulate_campaign(
     Ok(LoadedPulls {
         pulls: MeasuredPulls {
             pulls,
-            recorded: KNOWN_COLUMNS.iter().map(ToString::to_string).collect(),
+            recorded: covariates().map(|c| c.name.into()).collect(),
             extra: Vec::new(),
             label_tolerance_n: campaign.label_tolerance_n,
             stop_m: campaign.stop_m,
@@ -141,16 +142,10 @@ fn scenario(
     (scenario.grip_pose, scenario.grip_force_n) = (0, planned.grip_force_n);
     scenario.drawn.clear();
     scenario.covariates = Covariates {
-        gel_id: planned.gel_id.clone(),
-        session: planned.session.clone(),
         pull_index: index,
         // A pull's clock is that of its start.
         time_s: ((clock_s + planned.dwell_s) * 1e3).round() / 1e3,
-        dwell_s: planned.dwell_s,
-        grip_offset_m: planned.grip_offset_mm * 1e-3,
-        grip_angle_rad: planned.grip_angle_deg.to_radians(),
-        pull_direction: planned.pull_direction,
-        ..Covariates::default()
+        ..planned.covariates()
     };
     scenario.pull.increment_n = planned.force_increment_n;
     scenario.pull.start_n = planned.force_start_n;

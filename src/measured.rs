@@ -7,13 +7,12 @@ pub use suspects::Suspects;
 use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_record::{
     FolderError, JudgedPulls, PullFolderError, RIG_SOURCE, ReadError, RigCampaign, RunFolder, ShardReader,
-    Standing, read_judged_pulls, rig_campaign, sha256_hex,
+    Standing, read_judged_pulls, rig_campaign, sample_covariates, sha256_hex,
 };
+use gripgen_twin::columns::{Column, covariate, covariates, recorded_covariates};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::draw::Drawn;
-use gripgen_twin::{
-    Covariates, ExtraColumn, ExtraValues, KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, PullTrace,
-};
+use gripgen_twin::{ExtraColumn, ExtraValues, MeasuredPull, MeasuredPulls, PullTrace};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -245,9 +244,11 @@ fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     let Some((label_tolerance_n, stop_mm)) = rule else {
         return Err(LoadPullsError::Nothing { path: path.into(), notes: notes.join("; ") });
     };
+    let there = |column: &&Column| pulls.iter().any(|p: &MeasuredPull| column.value(p.view()).is_some());
+    let recorded = covariates().filter(there).map(|c| c.name.into()).collect();
     let mut pulls = MeasuredPulls {
         pulls,
-        recorded: KNOWN_COLUMNS.iter().map(ToString::to_string).collect(),
+        recorded,
         extra: Vec::new(),
         label_tolerance_n,
         stop_m: stop_mm * 1e-3,
@@ -266,8 +267,7 @@ fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
 fn as_made(pulls: &mut MeasuredPulls, campaign: RigCampaign) {
     pulls.feedback = campaign.feedback;
     if let Some(recorded) = campaign.recorded {
-        let always = ["part", "grip_force_n"];
-        pulls.recorded.retain(|c| always.contains(&c.as_str()) || recorded.contains(c));
+        pulls.recorded = recorded_covariates(&recorded).map(|c| c.name.into()).collect();
     }
     if pulls.recorded.iter().any(|c| c == "time_s") {
         // A pull that failed at first was made again after the others.
@@ -275,7 +275,8 @@ fn as_made(pulls: &mut MeasuredPulls, campaign: RigCampaign) {
     }
     let names: BTreeSet<String> =
         pulls.pulls.iter().flat_map(|p| p.covariates.extra.keys().cloned()).collect();
-    pulls.extra = names.into_iter().map(|name| extra_column(name, &pulls.pulls)).collect();
+    let names = names.into_iter().filter(|name| covariate(name).is_none());
+    pulls.extra = names.map(|name| extra_column(name, &pulls.pulls)).collect();
     pulls.count_rests();
 }
 
@@ -302,7 +303,7 @@ fn measured_beside(sample: &Sample) -> BTreeMap<String, Drawn> {
     let numbers = numbers.map(|(name, x)| (name.clone(), Drawn::Number(*x)));
     let words = sample.drawn_text.iter().filter(|(_, word)| !word.is_empty());
     let words = words.map(|(name, word)| (name.clone(), Drawn::Text(word.clone())));
-    numbers.chain(words).filter(|(name, _)| !KNOWN_COLUMNS.contains(&name.as_str())).collect()
+    numbers.chain(words).filter(|(name, _)| covariate(name).is_none()).collect()
 }
 
 /// Traces that are always used, and the share of them beyond that. The model of arm and loop is good to about a hundredth: with
@@ -349,6 +350,8 @@ fn measured(
     trace: Option<&PullTrace>,
     extra: BTreeMap<String, Drawn>,
 ) -> Option<MeasuredPull> {
+    let mut covariates = sample_covariates(&sample);
+    covariates.extra.extend(extra);
     Some(MeasuredPull {
         id: sample.index.to_string(),
         max_pull_force_n: sample.max_pull_force_n?,
@@ -357,18 +360,7 @@ fn measured(
         increment_n: sample.force_increment_n,
         start_n: sample.force_start_n,
         step_s: sample.step_time_s,
-        covariates: Covariates {
-            gel_id: sample.gel_id,
-            session: sample.session,
-            pull_index: sample.pull_index,
-            time_s: sample.time_s,
-            temperature_c: sample.temperature_c,
-            dwell_s: sample.dwell_s,
-            grip_offset_m: sample.grip_offset_mm * 1e-3,
-            grip_angle_rad: sample.grip_angle_deg.to_radians(),
-            pull_direction: f64::from(sample.pull_direction),
-            extra,
-        },
+        covariates,
         part: sample.part,
         trace: trace.map(thinned),
     })
@@ -384,7 +376,7 @@ fn feedback_of(config_toml: &str) -> Option<Feedback> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gripgen_twin::TraceRow;
+    use gripgen_twin::{Covariates, TraceRow};
 
     #[test]
     fn of_many_traces_some_are_used_and_all_of_a_few() {

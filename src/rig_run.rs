@@ -1,25 +1,10 @@
 //! What a run of a rig is made with, as one text.
 
 use gripgen_record::campaign_toml;
+use gripgen_twin::columns::covariates;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Campaign, PlannedPull};
 use serde::Serialize;
-
-/// Covariates that a rig knows of its pulls; the temperature is not among them.
-const RECORDED: [&str; 12] = [
-    "part",
-    "grip_force_n",
-    "gel_id",
-    "session",
-    "force_increment_n",
-    "step_time_s",
-    "dwell_s",
-    "pull_index",
-    "time_s",
-    "grip_offset_mm",
-    "grip_angle_deg",
-    "pull_direction",
-];
 
 /// Keys of a rig's file that no measurement depends on: where the devices are, and how patient the host is.
 const OF_THE_NETWORK: [(&[&str], &[&str]); 6] = [
@@ -37,7 +22,7 @@ pub fn rig_run_toml(rig: &impl Serialize, campaign: &Campaign) -> Result<String,
     let campaign = campaign_toml(campaign, "");
     let mut campaign: toml::Table =
         campaign.parse().unwrap_or_else(|e| unreachable!("what campaign_toml writes can be read: {e}"));
-    let recorded: Vec<toml::Value> = RECORDED.iter().map(|&name| name.into()).collect();
+    let recorded: Vec<toml::Value> = covariates().filter(|c| c.known_to_rig).map(|c| c.name.into()).collect();
     campaign.insert("recorded".into(), recorded.into());
     let mut run = toml::Table::new();
     let mut rig = toml::Table::try_from(rig)?;

@@ -237,17 +237,11 @@ fn as_measured(campaign: &MeasuredPulls, planned: &[PlannedPull], after_rest: &[
     degrees.sort_by(f64::total_cmp);
     let pull = |(i, (p, rest)): (usize, (&PlannedPull, &bool))| {
         let mut covariates = gripgen_twin::Covariates {
-            gel_id: p.gel_id.clone(),
-            session: p.session.clone(),
             // Half of the plan lies before any pull of it, on average.
             pull_index: index + MOST_PULLS as u64 / 2,
             time_s: time_s + 600.0 + if *rest { REST_S } else { 0.0 },
             temperature_c: degrees[degrees.len() / 2],
-            dwell_s: p.dwell_s,
-            grip_offset_m: p.grip_offset_mm * 1e-3,
-            grip_angle_rad: p.grip_angle_deg.to_radians(),
-            pull_direction: p.pull_direction,
-            ..Default::default()
+            ..p.covariates()
         };
         let since = if *rest { 2.0 } else { 12.0 };
         covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since));

@@ -4,9 +4,10 @@ use crate::predict::PullPredictor;
 use crate::report::{EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
 use gripgen_identify::pulls::answer::{PullAnswer, PullFits};
 use gripgen_identify::pulls::search::{Entry, Rival};
+use gripgen_twin::MeasuredPulls;
+use gripgen_twin::columns::{covariates, value};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::find;
-use gripgen_twin::{KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, covariate};
 use std::collections::BTreeMap;
 
 /// Pull curves shown, rows of the tables.
@@ -62,12 +63,8 @@ fn important(answer: &PullAnswer) -> Vec<String> {
 
 fn residuals(measured: &MeasuredPulls, fits: &PullFits, first: &[String]) -> Vec<Plot> {
     let extra = measured.extra.iter().map(|e| e.name.as_str());
-    let mut names: Vec<&str> = KNOWN_COLUMNS
-        .iter()
-        .copied()
-        .filter(|c| measured.recorded.iter().any(|r| r == c))
-        .chain(extra)
-        .collect();
+    let known = covariates().map(|c| c.name).filter(|c| measured.recorded.iter().any(|r| r == c));
+    let mut names: Vec<&str> = known.chain(extra).collect();
     // A stable sort: the rest keeps its order.
     names.sort_by_key(|name| first.iter().position(|f| f == name).unwrap_or(first.len()));
     names.into_iter().filter_map(|name| residual(measured, fits, name)).collect()
@@ -75,7 +72,7 @@ fn residuals(measured: &MeasuredPulls, fits: &PullFits, first: &[String]) -> Vec
 
 /// The plot over one column; none where it does not vary.
 fn residual(measured: &MeasuredPulls, fits: &PullFits, name: &str) -> Option<Plot> {
-    let values: Vec<Option<Drawn>> = measured.pulls.iter().map(|p| value(p, name)).collect();
+    let values: Vec<Option<Drawn>> = measured.pulls.iter().map(|p| value(name, p.view())).collect();
     let mut words: Vec<String> = values
         .iter()
         .filter_map(|v| match v {
@@ -113,10 +110,6 @@ fn residual(measured: &MeasuredPulls, fits: &PullFits, name: &str) -> Option<Plo
         x_words: words,
         series: vec![series("before", &fits.heldout_label_n[0]), series("after", &fits.heldout_label_n[1])],
     })
-}
-
-fn value(pull: &MeasuredPull, name: &str) -> Option<Drawn> {
-    covariate(name, &pull.part, [pull.grip_force_n, pull.increment_n, pull.step_s], &pull.covariates)
 }
 
 /// The name of a column in words, with the unit that its name ends in.

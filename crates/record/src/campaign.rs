@@ -1,5 +1,6 @@
 //! `campaign.toml`: how a campaign of pulls was made, or is to be made.
 
+use gripgen_twin::columns::{COLUMNS, InTable};
 use gripgen_twin::config::{Feedback, ForceConvention};
 use gripgen_twin::{Campaign, PlannedPull, PullKind};
 use serde::{Deserialize, Serialize};
@@ -145,36 +146,25 @@ pub fn read_campaign(path: &Path) -> Result<Campaign, CampaignFileError> {
     Ok(Campaign { label_tolerance_n, stop_m: stop_mm * 1e-3, feedback, pulls })
 }
 
+/// Checks an entry; a pull may be what a table of measured pulls may say of it.
 fn check_pull(pull: &PlannedPull) -> Result<(), String> {
     let loaded = pull.kind == PullKind::Pull;
     if loaded && pull.part.is_empty() {
         return Err("a pull needs a `part`".into());
     }
-    let above_zero = [
-        ("grip_force_n", pull.grip_force_n, loaded),
-        ("force_increment_n", pull.force_increment_n, loaded),
-        ("step_time_s", pull.step_time_s, loaded),
-        ("dwell_s", pull.dwell_s, !loaded),
-    ];
-    for (key, value, strict) in above_zero {
-        if !value.is_finite() || value < 0.0 || (strict && value == 0.0) {
-            let wanted = if strict { "above 0" } else { "of at least 0" };
-            return Err(format!("`{key}` is {value}, it must be a number {wanted}"));
-        }
-    }
-    if let Some(start_n) = pull.force_start_n.filter(|n| !(n.is_finite() && *n >= 0.0)) {
-        return Err(format!("`force_start_n` is {start_n}, it must be a number of at least 0"));
+    let covariates = pull.covariates();
+    for column in COLUMNS.iter().filter(|column| column.in_table != InTable::Absent) {
+        let Some(x) = column.number(pull.view(&covariates)) else { continue };
+        let checked = match column.name {
+            // Without a load there is no grip and no staircase, and the dwell is how long the sensor is read.
+            "grip_force_n" | "force_increment_n" | "step_time_s" if !loaded && x == 0.0 => Ok(x),
+            "dwell_s" if !loaded && x <= 0.0 => Err("a number above 0".into()),
+            _ => column.check_measured(x),
+        };
+        checked.map_err(|wanted| format!("`{}` is {x}, it must be {wanted}", column.name))?;
     }
     if !(pull.pause_s.is_finite() && pull.pause_s >= 0.0) {
         return Err(format!("`pause_s` is {}, it must be a number of at least 0", pull.pause_s));
-    }
-    if pull.pull_direction.abs() != 1.0 {
-        return Err(format!("`pull_direction` is {}, it must be 1 (up) or -1 (down)", pull.pull_direction));
-    }
-    for (key, value) in [("grip_offset_mm", pull.grip_offset_mm), ("grip_angle_deg", pull.grip_angle_deg)] {
-        if !value.is_finite() {
-            return Err(format!("`{key}` is {value}, it must be a number"));
-        }
     }
     Ok(())
 }

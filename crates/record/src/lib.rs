@@ -26,7 +26,9 @@ mod verify;
 
 pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
 pub use dataset::{Column, Dataset, DatasetError, Table};
-pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
+pub use encode::{
+    EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode, sample_covariates, sample_view,
+};
 pub use export::{ExportError, export_sample};
 pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,

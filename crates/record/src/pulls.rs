@@ -19,6 +19,7 @@ use gripgen_twin::config::PullFile;
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::{Covariates, ExtraColumn, ExtraValues, MeasuredPull, MeasuredPulls};
 use sha2::{Digest, Sha256};
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -71,7 +72,7 @@ pub enum PullFolderError {
         /// What stands there.
         value: String,
         /// What should.
-        wanted: &'static str,
+        wanted: Cow<'static, str>,
     },
     /// Two pulls have the same name.
     #[error("{}: lines {first} and {second} are both pull `{id}`", .path.display())]
@@ -221,7 +222,7 @@ fn read_table(
         line: lines_of[row],
         column: "max_pull_force_n".into(),
         value: String::new(),
-        wanted: "a number",
+        wanted: "a number".into(),
     })?;
     let recorded = columns.iter().filter_map(Column::recorded).collect();
     let extra: Vec<ExtraColumn> = columns.into_iter().filter_map(extra_column).collect();

@@ -4,23 +4,6 @@ use crate::config::Feedback;
 use crate::draw::Drawn;
 use crate::{Covariates, PullTrace};
 
-/// The columns of a pull table whose meaning is known, without `pull_id` and the label.
-pub const KNOWN_COLUMNS: &[&str] = &[
-    "part",
-    "grip_force_n",
-    "gel_id",
-    "session",
-    "force_increment_n",
-    "step_time_s",
-    "dwell_s",
-    "pull_index",
-    "time_s",
-    "temperature_c",
-    "grip_offset_mm",
-    "grip_angle_deg",
-    "pull_direction",
-];
-
 /// The covariate [`MeasuredPulls::count_rests`] adds.
 pub const PULLS_SINCE_REST: &str = "pulls_since_rest";
 
@@ -75,7 +58,7 @@ pub struct ExtraColumn {
 pub struct MeasuredPulls {
     /// The pulls.
     pub pulls: Vec<MeasuredPull>,
-    /// Those of [`KNOWN_COLUMNS`] that were written down.
+    /// Names of those of [`crate::columns::covariates`] that were written down.
     pub recorded: Vec<String>,
     /// Columns whose meaning is not known.
     pub extra: Vec<ExtraColumn>,

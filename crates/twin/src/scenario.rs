@@ -24,7 +24,8 @@ pub struct Covariates {
     pub grip_angle_rad: f64,
     /// +1 along the pull direction of the sweep, -1 against it.
     pub pull_direction: f64,
-    /// Columns of unknown meaning that a table of the twin may depend on.
+    /// Columns without a field of their own, in the units of the columns: mostly of unknown meaning. A table of the twin may
+    /// depend on them.
     pub extra: BTreeMap<String, Drawn>,
 }
 

@@ -147,10 +147,10 @@ impl Sweep {
         (scenario.group, scenario.repetition) = (index / self.repetitions, index % self.repetitions);
         let mut problem = Ok(());
         for (key, value) in &drawn {
-            let put = match key.strip_prefix("pull.") {
-                Some(key) => scenario_keys::set_pull(&mut pull, key, value),
-                None if is_twin_key(key) => Ok(()),
-                None => scenario_keys::set(&mut scenario, key, value),
+            let put = match key {
+                key if key.starts_with("pull.") => scenario_keys::set_pull(&mut pull, key, value),
+                key if is_twin_key(key) => Ok(()),
+                key => scenario_keys::set(&mut scenario, key, value),
             };
             problem = problem.and(put.map_err(|e| e.into_config_error(key)));
         }

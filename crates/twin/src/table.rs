@@ -4,16 +4,14 @@
 //! over one covariate. It repeats what was seen and says nothing about why: it is marked `physical = false`, and outside
 //! its range it is held.
 
+use crate::columns::{self, Column, PullView};
 use crate::config::{ConfigError, EffectFile, TwinFile, in_range, suggestion};
 use crate::draw::Drawn;
 use crate::effects::{OutsideFit, Per};
-use crate::{Covariates, KNOWN_COLUMNS, Scenario, Twin};
+use crate::{Scenario, Twin};
 
 /// The `name` of a table among the effects of a twin file. It is not in the library.
 pub const TABLE_EFFECT: &str = "table";
-
-/// Columns of a pull table that hold words.
-const WORD_COLUMNS: [&str; 3] = ["part", "gel_id", "session"];
 
 /// Where a table has its values.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,18 +61,12 @@ impl Table {
         }
     }
 
-    fn of(&self, scenario: &Scenario) -> Option<f64> {
-        let pull = &scenario.pull;
-        let forces = [scenario.grip_force_n, pull.increment_n, pull.step_s];
-        self.at(&scenario.part, forces, &scenario.covariates)
-    }
-
-    /// The value at a pull; `None` where the table says nothing. `forces` are those of [`covariate`].
-    pub fn at(&self, part: &str, forces: [f64; 3], c: &Covariates) -> Option<f64> {
-        if self.part.as_ref().is_some_and(|own| own != part) {
+    /// The value at a pull; `None` where the table says nothing.
+    pub fn at(&self, pull: PullView<'_>) -> Option<f64> {
+        if self.part.as_ref().is_some_and(|own| own != pull.part) {
             return None;
         }
-        let column = |name: &str| covariate(name, part, forces, c);
+        let column = |name: &str| columns::value(name, pull);
         let at = match (self.centre, self.covariate.split_once('*')) {
             (Some([a, b]), Some((first, second))) => match (column(first)?, column(second)?) {
                 (Drawn::Number(x), Drawn::Number(y)) => Drawn::Number((x - a) * (y - b)),
@@ -99,41 +91,16 @@ fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
     y[after - 1] + share * (y[after] - y[after - 1])
 }
 
-/// A covariate of a pull by the name of its column, in the unit of that column; `None` if nobody wrote it down.
-///
-/// `forces` are grip force per jaw, height of a step and length of a step.
-pub fn covariate(name: &str, part: &str, forces: [f64; 3], c: &Covariates) -> Option<Drawn> {
-    let [grip_force_n, increment_n, step_s] = forces;
-    let text = |text: &str| Some(Drawn::Text(text.into()));
-    let number = |x| Some(Drawn::Number(x));
-    match name {
-        "part" => text(part),
-        "gel_id" => text(&c.gel_id),
-        "session" => text(&c.session),
-        "grip_force_n" => number(grip_force_n),
-        "force_increment_n" => number(increment_n),
-        "step_time_s" => number(step_s),
-        "dwell_s" => number(c.dwell_s),
-        "pull_index" => number(c.pull_index as f64),
-        "time_s" => number(c.time_s),
-        "temperature_c" => number(c.temperature_c),
-        "grip_offset_mm" => number(c.grip_offset_m * 1e3),
-        "grip_angle_deg" => number(c.grip_angle_rad.to_degrees()),
-        "pull_direction" => number(c.pull_direction),
-        other => c.extra.get(other).cloned(),
-    }
-}
-
 /// By what the tables of a twin multiply the friction of a pull; 1 without any.
 pub fn table_factor(twin: &Twin, scenario: &Scenario) -> f64 {
     let factors = twin.tables.iter().filter(|t| t.target == TableTarget::Factor);
-    factors.filter_map(|t| t.of(scenario)).product()
+    factors.filter_map(|t| t.at(scenario.view())).product()
 }
 
 /// What the tables of a twin add to the readings of the wrist sensor, in newtons; 0 without any.
 pub fn table_offset_n(twin: &Twin, scenario: &Scenario) -> f64 {
     let offsets = twin.tables.iter().filter(|t| t.target == TableTarget::Offset);
-    offsets.filter_map(|t| t.of(scenario)).fold(0.0, |sum, x| sum + x)
+    offsets.filter_map(|t| t.at(scenario.view())).fold(0.0, |sum, x| sum + x)
 }
 
 const KEYS: [&str; 7] = ["covariate", "centre", "x", "words", "factor", "offset_n", "physical"];
@@ -159,13 +126,13 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
         }
     };
     let centre = centre(&covariate, get("centre"), &key)?;
-    let known = KNOWN_COLUMNS.contains(&covariate.as_str());
+    let known = columns::covariate(&covariate);
     let axis = match (get("x"), get("words")) {
-        (Some(_), None) if WORD_COLUMNS.contains(&covariate.as_str()) => {
+        (Some(_), None) if known.is_some_and(Column::holds_words) => {
             let problem = format!("`{covariate}` holds words, not numbers");
             return Err(ConfigError::new(key("x"), problem).hint("give its values in words = [...]"));
         }
-        (None, Some(_)) if (known || centre.is_some()) && !WORD_COLUMNS.contains(&covariate.as_str()) => {
+        (None, Some(_)) if centre.is_some() || known.is_some_and(|column| !column.holds_words()) => {
             let problem = format!("`{covariate}` holds numbers, not words");
             return Err(ConfigError::new(key("words"), problem).hint("give its values in x = [...]"));
         }
@@ -209,8 +176,8 @@ fn centre(
             Err(ConfigError::new(key("centre"), problem).hint("leave centre out"))
         }
         (Some((a, b)), value) => {
-            if let Some(word) = [a, b].into_iter().find(|name| WORD_COLUMNS.contains(name) || name.is_empty())
-            {
+            let holds_words = |name: &str| columns::covariate(name).is_some_and(Column::holds_words);
+            if let Some(word) = [a, b].into_iter().find(|name| holds_words(name) || name.is_empty()) {
                 let problem = format!("`{word}` holds no numbers, it has no product");
                 return Err(ConfigError::new(key("covariate"), problem));
             }
@@ -299,7 +266,7 @@ fn distinct(value: &toml::Value, key: &str) -> Result<Vec<String>, ConfigError> 
 mod tests {
     use super::*;
     use crate::effects::testing::twin;
-    use crate::{PullSettings, TWIN_SCHEMA};
+    use crate::{Covariates, PullSettings, TWIN_SCHEMA};
 
     fn scenario(part: &str, extra: &[(&str, Drawn)]) -> Scenario {
         let pull = PullSettings {

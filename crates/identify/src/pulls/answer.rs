@@ -18,7 +18,8 @@ use crate::diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate,
     Rival, SeparateBy, UnknownCovariate, Verdict,
 };
-use gripgen_twin::{KNOWN_COLUMNS, MeasuredPulls};
+use gripgen_twin::MeasuredPulls;
+use gripgen_twin::columns::covariates;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
@@ -242,8 +243,7 @@ fn confirmed(
 }
 
 fn blank(data: &PullData<'_>) -> Diagnosis {
-    let known: Vec<&str> =
-        KNOWN_COLUMNS.iter().copied().filter(|c| !["part", "gel_id", "session"].contains(c)).collect();
+    let known: Vec<&str> = covariates().filter(|c| !c.holds_words()).map(|c| c.name).collect();
     Diagnosis {
         schema: DIAGNOSIS_SCHEMA,
         channel: Channel::Pulls,

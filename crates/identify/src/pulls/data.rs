@@ -1,5 +1,6 @@
 //! A campaign as numbers.
 
+use gripgen_twin::columns::covariates;
 use gripgen_twin::{ExtraValues, MeasuredPulls};
 use std::collections::BTreeMap;
 
@@ -55,6 +56,14 @@ fn words(values: impl Iterator<Item = String>) -> Column {
     Column::Word(at, names)
 }
 
+/// Numbers; gaps get the median, which says nothing.
+fn without_gaps(values: impl Iterator<Item = f64> + Clone) -> Column {
+    let mut known: Vec<f64> = values.clone().filter(|x| x.is_finite()).collect();
+    known.sort_by(f64::total_cmp);
+    let median = known.get(known.len() / 2).copied().unwrap_or(0.0);
+    Column::Number(values.map(|x| if x.is_finite() { x } else { median }).collect())
+}
+
 /// Numbers of consecutive runs of equal keys, in the order of their first pulls.
 fn numbered<K: Ord + Clone>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     let mut known = BTreeMap::new();
@@ -69,37 +78,18 @@ impl<'a> PullData<'a> {
     /// Looks at a campaign.
     pub fn new(measured: &'a MeasuredPulls) -> Self {
         let pulls = &measured.pulls;
-        let number = |f: &dyn Fn(usize) -> f64| Column::Number((0..pulls.len()).map(f).collect());
         let mut columns = BTreeMap::new();
-        for name in &measured.recorded {
-            let column = match name.as_str() {
-                "part" => words(pulls.iter().map(|p| p.part.clone())),
-                "gel_id" => words(pulls.iter().map(|p| p.covariates.gel_id.clone())),
-                "session" => words(pulls.iter().map(|p| p.covariates.session.clone())),
-                "grip_force_n" => number(&|i| pulls[i].grip_force_n),
-                "force_increment_n" => number(&|i| pulls[i].increment_n),
-                "step_time_s" => number(&|i| pulls[i].step_s),
-                "dwell_s" => number(&|i| pulls[i].covariates.dwell_s),
-                "pull_index" => number(&|i| pulls[i].covariates.pull_index as f64),
-                "time_s" => number(&|i| pulls[i].covariates.time_s),
-                "temperature_c" => number(&|i| pulls[i].covariates.temperature_c),
-                "grip_offset_mm" => number(&|i| pulls[i].covariates.grip_offset_m * 1e3),
-                "grip_angle_deg" => number(&|i| pulls[i].covariates.grip_angle_rad.to_degrees()),
-                "pull_direction" => number(&|i| pulls[i].covariates.pull_direction),
-                _ => continue,
+        for column in covariates().filter(|c| measured.recorded.iter().any(|name| name == c.name)) {
+            let values = match column.holds_words() {
+                true => words(pulls.iter().map(|p| column.word(p.view()).unwrap_or_default().into())),
+                false => without_gaps(pulls.iter().map(|p| column.number(p.view()).unwrap_or(f64::NAN))),
             };
-            columns.insert(name.clone(), column);
+            columns.insert(column.name.into(), values);
         }
         for extra in &measured.extra {
             let column = match &extra.values {
                 ExtraValues::Text(values) => words(values.iter().cloned()),
-                ExtraValues::Number(values) => {
-                    // Gaps get the median, which says nothing.
-                    let mut known: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
-                    known.sort_by(f64::total_cmp);
-                    let median = known.get(known.len() / 2).copied().unwrap_or(0.0);
-                    Column::Number(values.iter().map(|x| if x.is_finite() { *x } else { median }).collect())
-                }
+                ExtraValues::Number(values) => without_gaps(values.iter().copied()),
             };
             columns.insert(extra.name.clone(), column);
         }

@@ -2,11 +2,14 @@
 
 use crate::index::{INDEX_COLUMNS, index_header, status_name};
 use crate::pulls::JudgedPulls;
+use gripgen_twin::columns::{find, recorded_covariates};
 use gripgen_twin::draw::Drawn;
-use gripgen_twin::{KNOWN_COLUMNS, MeasuredPull, PULLS_SINCE_REST};
+use gripgen_twin::{MeasuredPull, PULLS_SINCE_REST};
 
-/// Columns of an index that hold words whatever stands in them.
-const WORDS: [&str; 5] = ["status", "part", "gel_id", "session", "failure"];
+/// Whether a column of an index holds words whatever stands in it.
+fn holds_words(name: &str) -> bool {
+    ["status", "failure"].contains(&name) || find(name).is_some_and(|c| c.indexed && c.holds_words())
+}
 
 /// The column that says why a row failed or is suspect; in an index it is `failure`, whatever the status.
 const REASON: &str = "status_reason";
@@ -31,7 +34,7 @@ impl Table {
     /// An empty table for the rows of an index.
     pub(super) fn of_index(extra_columns: &[String]) -> Self {
         let columns = index_header(extra_columns).into_iter().map(|name| {
-            let column = match WORDS.contains(&name.as_str()) || !INDEX_COLUMNS.contains(&name.as_str()) {
+            let column = match holds_words(&name) || !INDEX_COLUMNS.contains(&name.as_str()) {
                 true => Column::Text(Vec::new()),
                 false => Column::Number(Vec::new()),
             };
@@ -57,7 +60,7 @@ impl Table {
     pub(super) fn finished(mut self) -> Self {
         for (name, column) in &mut self.columns {
             let Column::Text(words) = column else { continue };
-            if WORDS.contains(&name.as_str()) || words.iter().all(String::is_empty) {
+            if holds_words(name) || words.iter().all(String::is_empty) {
                 continue;
             }
             let numbers: Option<Vec<f64>> =
@@ -85,25 +88,12 @@ impl Table {
                 Column::Text(standing.iter().map(|s| status_name(s.status).into()).collect()),
             ),
         ];
-        let is_there =
-            |c: &str| ["part", "grip_force_n"].contains(&c) || measured.recorded.iter().any(|r| r == c);
-        for &name in KNOWN_COLUMNS.iter().filter(|c| is_there(c)) {
-            let column = match name {
-                "part" => words(&|p| p.part.clone()),
-                "gel_id" => words(&|p| p.covariates.gel_id.clone()),
-                "session" => words(&|p| p.covariates.session.clone()),
-                "grip_force_n" => numbers(&|p| p.grip_force_n),
-                "force_increment_n" => numbers(&|p| p.increment_n),
-                "step_time_s" => numbers(&|p| p.step_s),
-                "dwell_s" => numbers(&|p| p.covariates.dwell_s),
-                "pull_index" => numbers(&|p| p.covariates.pull_index as f64),
-                "time_s" => numbers(&|p| p.covariates.time_s),
-                "temperature_c" => numbers(&|p| p.covariates.temperature_c),
-                "grip_offset_mm" => numbers(&|p| p.covariates.grip_offset_m * 1e3),
-                "grip_angle_deg" => numbers(&|p| p.covariates.grip_angle_rad.to_degrees()),
-                _ => numbers(&|p| p.covariates.pull_direction),
+        for column in recorded_covariates(&measured.recorded) {
+            let values = match column.holds_words() {
+                true => words(&|p| column.word(p.view()).unwrap_or_default().into()),
+                false => numbers(&|p| column.number(p.view()).unwrap_or(f64::NAN)),
             };
-            columns.push((name.into(), column));
+            columns.push((column.name.into(), values));
         }
         if pulls.iter().any(|p| p.start_n.is_some()) {
             columns.push(("force_start_n".into(), numbers(&|p| p.start_n.unwrap_or(p.increment_n))));

@@ -2,13 +2,16 @@
 
 use super::PullFolderError;
 use crate::proto::gripgen_v1::Status;
-use gripgen_twin::{KNOWN_COLUMNS, MeasuredPull};
+use gripgen_twin::MeasuredPull;
+use gripgen_twin::columns::{COLUMNS, Column as PullColumn, InTable};
+use std::borrow::Cow;
 use std::path::Path;
 
 /// Length of a step where nobody wrote it down: the mean of Wucherer et al. 2023.
 pub(super) const DEFAULT_STEP_S: f64 = 0.104;
 
-const REQUIRED: [&str; 4] = ["pull_id", "part", "grip_force_n", "max_pull_force_n"];
+const ID: &str = "pull_id";
+const LABEL: &str = "max_pull_force_n";
 
 /// A column of the table.
 pub(super) struct Column {
@@ -20,8 +23,12 @@ pub(super) struct Column {
 
 /// Where a column's cells go.
 pub(super) enum Cells {
-    /// Into the pull; the setter says what a cell must be.
-    Known { set: Setter, required: bool },
+    /// Into the pull.
+    Known(&'static PullColumn),
+    /// The name of the pull.
+    Id,
+    /// Its label.
+    Label,
     /// A covariate of unknown meaning.
     Extra(Vec<Box<str>>),
     /// How the pull ended.
@@ -32,15 +39,27 @@ pub(super) enum Cells {
     Unnamed,
 }
 
-type Setter = fn(&str, &mut MeasuredPull) -> Result<(), &'static str>;
-
 impl Column {
     /// Takes the next cell; otherwise what it must be.
-    pub(super) fn take(&mut self, cell: &str, pull: &mut MeasuredPull) -> Result<(), &'static str> {
+    pub(super) fn take(&mut self, cell: &str, pull: &mut MeasuredPull) -> Result<(), Cow<'static, str>> {
         self.filled += usize::from(!cell.is_empty());
         match &mut self.cells {
-            Cells::Known { required: false, .. } if cell.is_empty() => Ok(()),
-            Cells::Known { set, .. } => set(cell, pull),
+            Cells::Known(column) if cell.is_empty() && column.in_table != InTable::Required => Ok(()),
+            Cells::Known(column) => column.read_cell(cell, &mut pull.edit()),
+            Cells::Id => {
+                file_name(cell)?;
+                pull.id = cell.into();
+                Ok(())
+            }
+            // A sensor that is off may read less than nothing. A pull that failed has none, which its status decides.
+            Cells::Label if cell.is_empty() => {
+                pull.max_pull_force_n = f64::NAN;
+                Ok(())
+            }
+            Cells::Label => {
+                pull.max_pull_force_n = number(cell)?;
+                Ok(())
+            }
             Cells::Extra(cells) => {
                 cells.push(cell.into());
                 Ok(())
@@ -59,14 +78,21 @@ impl Column {
 
     /// Its name, if it is a covariate of known meaning that somebody wrote down.
     pub(super) fn recorded(&self) -> Option<String> {
-        (self.filled > 0 && KNOWN_COLUMNS.contains(&self.name.as_str())).then(|| self.name.clone())
+        let known = matches!(self.cells, Cells::Known(column) if column.is_covariate());
+        (self.filled > 0 && known).then(|| self.name.clone())
     }
+}
+
+/// The columns that every table has.
+fn required() -> impl Iterator<Item = &'static str> {
+    let of_pulls = COLUMNS.iter().filter(|c| c.in_table == InTable::Required).map(|c| c.name);
+    [ID].into_iter().chain(of_pulls).chain([LABEL])
 }
 
 /// The columns of a header; those that are required have to be there.
 pub(super) fn columns(path: &Path, header: &csv::StringRecord) -> Result<Vec<Column>, PullFolderError> {
     let names: Vec<&str> = header.iter().map(|name| name.trim_start_matches('\u{feff}').trim()).collect();
-    for column in REQUIRED {
+    for column in required() {
         if !names.contains(&column) {
             let found = names.join(", ");
             return Err(PullFolderError::Column { path: path.into(), column, found });
@@ -77,17 +103,21 @@ pub(super) fn columns(path: &Path, header: &csv::StringRecord) -> Result<Vec<Col
             return Err(PullFolderError::TwoColumns { path: path.into(), column: name.into() });
         }
     }
-    let column = |&name: &&str| {
-        let cells = match setter(name) {
-            Some(set) => Cells::Known { set, required: REQUIRED.contains(&name) },
-            None if name.is_empty() => Cells::Unnamed,
-            None if name == "status" => Cells::Status(Vec::new()),
-            None if name == "status_reason" => Cells::Reason(Vec::new()),
-            None => Cells::Extra(Vec::new()),
-        };
-        Column { name: name.into(), cells, filled: 0 }
-    };
+    let column = |&name: &&str| Column { name: name.into(), cells: cells(name), filled: 0 };
     Ok(names.iter().map(column).collect())
+}
+
+fn cells(name: &str) -> Cells {
+    let of_pulls = COLUMNS.iter().find(|c| c.name == name && c.in_table != InTable::Absent);
+    match (name, of_pulls) {
+        (_, Some(column)) => Cells::Known(column),
+        ("", _) => Cells::Unnamed,
+        (ID, _) => Cells::Id,
+        (LABEL, _) => Cells::Label,
+        ("status", _) => Cells::Status(Vec::new()),
+        ("status_reason", _) => Cells::Reason(Vec::new()),
+        _ => Cells::Extra(Vec::new()),
+    }
 }
 
 /// The status of a name, `slipped` where nobody wrote one down.
@@ -112,100 +142,17 @@ pub(super) fn loose_number(cell: &str) -> Option<f64> {
     }
 }
 
-fn setter(name: &str) -> Option<Setter> {
-    let setter: Setter = match name {
-        "pull_id" => |cell, pull| text(cell, &mut pull.id).and_then(|()| file_name(cell)),
-        "part" => |cell, pull| text(cell, &mut pull.part),
-        "gel_id" => |cell, pull| text(cell, &mut pull.covariates.gel_id),
-        "session" => |cell, pull| text(cell, &mut pull.covariates.session),
-        "grip_force_n" => |cell, pull| above_zero(cell, &mut pull.grip_force_n),
-        // A sensor that is off may read less than nothing. A pull that failed has none, which its status decides.
-        "max_pull_force_n" => |cell, pull| match cell {
-            "" => {
-                pull.max_pull_force_n = f64::NAN;
-                Ok(())
-            }
-            _ => number(cell, &mut pull.max_pull_force_n),
-        },
-        "force_increment_n" => |cell, pull| above_zero(cell, &mut pull.increment_n),
-        "force_start_n" => |cell, pull| {
-            let mut start_n = 0.0;
-            not_negative(cell, &mut start_n)?;
-            pull.start_n = Some(start_n);
-            Ok(())
-        },
-        "step_time_s" => |cell, pull| above_zero(cell, &mut pull.step_s),
-        "dwell_s" => |cell, pull| not_negative(cell, &mut pull.covariates.dwell_s),
-        "time_s" => |cell, pull| number(cell, &mut pull.covariates.time_s),
-        "temperature_c" => |cell, pull| number(cell, &mut pull.covariates.temperature_c),
-        "grip_offset_mm" => |cell, pull| {
-            number(cell, &mut pull.covariates.grip_offset_m)?;
-            pull.covariates.grip_offset_m *= 1e-3;
-            Ok(())
-        },
-        "grip_angle_deg" => |cell, pull| {
-            number(cell, &mut pull.covariates.grip_angle_rad)?;
-            pull.covariates.grip_angle_rad = pull.covariates.grip_angle_rad.to_radians();
-            Ok(())
-        },
-        "pull_index" => |cell, pull| {
-            let mut index = 0.0;
-            number(cell, &mut index)?;
-            if !(0.0..=1e15).contains(&index) || index.fract() != 0.0 {
-                return Err("a whole number of at least 0");
-            }
-            pull.covariates.pull_index = index as u64;
-            Ok(())
-        },
-        "pull_direction" => |cell, pull| {
-            let mut direction = 0.0;
-            number(cell, &mut direction)?;
-            if direction.abs() != 1.0 {
-                return Err("1 (up) or -1 (down)");
-            }
-            pull.covariates.pull_direction = direction;
-            Ok(())
-        },
-        _ => return None,
-    };
-    Some(setter)
-}
-
-fn text(cell: &str, target: &mut String) -> Result<(), &'static str> {
-    if cell.is_empty() {
-        return Err("a name");
-    }
-    target.clear();
-    target.push_str(cell);
-    Ok(())
-}
-
 /// A pull's name is also that of its trace's file.
 fn file_name(cell: &str) -> Result<(), &'static str> {
     let path = cell.contains(['/', '\\', '\0', ':']) || cell == "." || cell == "..";
-    if path { Err("a name without `/`, `\\` and `:`") } else { Ok(()) }
-}
-
-pub(super) fn number(cell: &str, target: &mut f64) -> Result<(), &'static str> {
-    match cell.parse::<f64>() {
-        Ok(x) if x.is_finite() => {
-            *target = x;
-            Ok(())
-        }
-        _ => Err("a number"),
+    match cell {
+        "" => Err("a name"),
+        _ if path => Err("a name without `/`, `\\` and `:`"),
+        _ => Ok(()),
     }
 }
 
-fn above_zero(cell: &str, target: &mut f64) -> Result<(), &'static str> {
-    match number(cell, target) {
-        Ok(()) if *target > 0.0 => Ok(()),
-        _ => Err("a number above 0"),
-    }
-}
-
-fn not_negative(cell: &str, target: &mut f64) -> Result<(), &'static str> {
-    match number(cell, target) {
-        Ok(()) if *target >= 0.0 => Ok(()),
-        _ => Err("a number of at least 0"),
-    }
+/// A number of a cell; otherwise what it must be.
+pub(super) fn number(cell: &str) -> Result<f64, &'static str> {
+    cell.parse().ok().filter(|x: &f64| x.is_finite()).ok_or("a number")
 }

@@ -27,15 +27,15 @@ pub(super) fn read_trace(path: &Path, bytes: &[u8]) -> Result<(PullTrace, Vec<f6
     while reader.read_record(&mut row).map_err(table)? {
         let line = row.position().map_or(0, csv::Position::line);
         let mut values = [0.0; 4];
-        let bad = |i: usize, wanted| PullFolderError::Cell {
+        let bad = |i: usize, wanted: &'static str| PullFolderError::Cell {
             path: path.into(),
             line,
             column: COLUMNS[i].into(),
             value: row.get(at[i]).unwrap_or_default().into(),
-            wanted,
+            wanted: wanted.into(),
         };
         for (i, value) in values.iter_mut().enumerate() {
-            number(row.get(at[i]).unwrap_or_default(), value).map_err(|wanted| bad(i, wanted))?;
+            *value = number(row.get(at[i]).unwrap_or_default()).map_err(|wanted| bad(i, wanted))?;
         }
         let [time_s, desired_force_n, measured_force_n, displacement_mm] = values;
         if trace.time_s.last().is_some_and(|&last| time_s <= last) {

@@ -2,7 +2,8 @@
 
 use super::{PULLS_FILE, PullFolderError, TRACES_FOLDER};
 use crate::campaign::{CAMPAIGN_FILE, header_toml};
-use gripgen_twin::{ExtraValues, KNOWN_COLUMNS, MeasuredPull, MeasuredPulls, PullTrace};
+use gripgen_twin::columns::{COLUMNS, Column, InTable, Scale, recorded_covariates};
+use gripgen_twin::{ExtraValues, MeasuredPulls, PullTrace};
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
@@ -38,21 +39,20 @@ pub fn write_pull_folder(folder: &Path, measured: &MeasuredPulls) -> Result<(), 
 }
 
 fn table_csv(measured: &MeasuredPulls) -> Result<Vec<u8>, String> {
-    let known: Vec<&str> = KNOWN_COLUMNS
-        .iter()
-        .copied()
-        .filter(|c| ["part", "grip_force_n"].contains(c) || measured.recorded.iter().any(|r| r == c))
-        .chain(measured.pulls.iter().any(|p| p.start_n.is_some()).then_some("force_start_n"))
-        .collect();
+    let used = |column: &&Column| {
+        column.in_table == InTable::Setting && measured.pulls.iter().any(|p| column.value(p.view()).is_some())
+    };
+    let known: Vec<&Column> =
+        recorded_covariates(&measured.recorded).chain(COLUMNS.iter().filter(used)).collect();
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut write = |cells: Vec<String>| writer.write_record(&cells).map_err(|e| e.to_string());
     let extra = measured.extra.iter().map(|e| e.name.as_str());
     let header =
-        ["pull_id"].into_iter().chain(known.iter().copied()).chain(extra).chain(["max_pull_force_n"]);
+        ["pull_id"].into_iter().chain(known.iter().map(|c| c.name)).chain(extra).chain(["max_pull_force_n"]);
     write(header.map(String::from).collect())?;
     for (row, pull) in measured.pulls.iter().enumerate() {
         let mut cells = vec![pull.id.clone()];
-        cells.extend(known.iter().map(|column| cell(pull, column)));
+        cells.extend(known.iter().map(|column| column.cell(pull.view()).into_owned()));
         cells.extend(measured.extra.iter().map(|extra| match &extra.values {
             ExtraValues::Number(x) if x[row].is_nan() => String::new(),
             ExtraValues::Number(x) => x[row].to_string(),
@@ -64,36 +64,10 @@ fn table_csv(measured: &MeasuredPulls) -> Result<Vec<u8>, String> {
     writer.into_inner().map_err(|e| e.to_string())
 }
 
-/// Without the last bits.
-fn as_written(x: f64) -> f64 {
-    (x * 1e9).round() / 1e9
-}
-
-fn cell(pull: &MeasuredPull, column: &str) -> String {
-    let c = &pull.covariates;
-    let number = match column {
-        "part" => return pull.part.clone(),
-        "gel_id" => return c.gel_id.clone(),
-        "session" => return c.session.clone(),
-        "pull_index" => return c.pull_index.to_string(),
-        "grip_force_n" => pull.grip_force_n,
-        "force_increment_n" => pull.increment_n,
-        "force_start_n" => return pull.start_n.map(|n| n.to_string()).unwrap_or_default(),
-        "step_time_s" => pull.step_s,
-        "dwell_s" => c.dwell_s,
-        "time_s" => c.time_s,
-        "temperature_c" => c.temperature_c,
-        "grip_offset_mm" => as_written(c.grip_offset_m * 1e3),
-        "grip_angle_deg" => as_written(c.grip_angle_rad.to_degrees()),
-        _ => c.pull_direction,
-    };
-    number.to_string()
-}
-
 fn trace_csv(trace: &PullTrace) -> String {
     let mut text = String::from("time_s,desired_force_n,measured_force_n,displacement_mm\n");
     for row in trace.rows() {
-        let millimetres = as_written(row.displacement_m * 1e3);
+        let millimetres = Scale::Thousandth.as_written(row.displacement_m);
         text += &format!("{},{},{},{millimetres}\n", row.time_s, row.desired_force_n, row.measured_force_n);
     }
     text

@@ -2,7 +2,7 @@
 
 use super::{ConfigError, suggestion};
 use crate::draw::{Distribution, Drawn, VariedKey};
-use crate::scenario_keys::{PULL_KEYS, SCENARIO_KEYS};
+use crate::scenario_keys::{pull_keys, scenario_keys};
 
 /// Names of the distributions.
 const NAMES: [&str; 4] = ["uniform", "normal", "log_uniform", "from"];
@@ -30,8 +30,8 @@ fn collect(table: &toml::Table, prefix: &str, keys: &mut Vec<VariedKey>) -> Resu
 /// them or customary elsewhere. Other tables are sections of keys.
 fn is_distribution(key: &str, table: &toml::Table) -> bool {
     const CUSTOMARY: [&str; 9] = ["min", "max", "low", "high", "mean", "std", "sigma", "choice", "values"];
-    let takes_values =
-        SCENARIO_KEYS.contains(&key) || (PULL_KEYS.contains(&key) && !table.contains_key("jitter"));
+    let takes_values = scenario_keys().any(|known| known == key)
+        || (pull_keys().any(|known| known == key) && !table.contains_key("jitter"));
     let pair = |v: &toml::Value| v.as_array().is_some_and(|a| a.len() == 2);
     takes_values
         || table.iter().any(|(k, v)| {

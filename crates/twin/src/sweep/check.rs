@@ -1,12 +1,13 @@
 //! Checking a sweep against the twin it names, before any work is done.
 
 use super::{MAX_SAMPLES, Sweep, is_twin_key, put, read_twin};
+use crate::columns::{self, Column};
 use crate::config::{
     Backend, ConfigError, DesignFile, Document, PullFile, StepFile, SweepFile, in_range, read_vary,
     suggestion,
 };
 use crate::draw::{Distribution, Drawn, VariedKey};
-use crate::scenario_keys::{self, KeyError, LISTED_KEYS, PULL_KEYS, SCENARIO_KEYS};
+use crate::scenario_keys::{self, KeyError, drawn_column, pull_keys, scenario_keys};
 use crate::{PullSettings, Twin, sobol};
 
 impl Sweep {
@@ -77,7 +78,7 @@ impl Sweep {
     }
 
     fn check_value(&self, twin: &Document, checked: &Twin, key: &str, value: &Drawn) -> Result<(), KeyError> {
-        if let Some(key) = key.strip_prefix("pull.") {
+        if key.starts_with("pull.") {
             let mut pull = self.pull.clone();
             scenario_keys::set_pull(&mut pull, key, value)?;
             pull_settings(&pull)?;
@@ -138,16 +139,19 @@ fn unknown_key(place: String, key: &str) -> ConfigError {
         return ConfigError::new(place, format!("`{key}` cannot vary: it is one for the whole sweep"));
     }
     let problem = format!("neither the scenario, `pull` nor the twin has a key `{key}`");
-    let known = SCENARIO_KEYS.iter().chain(PULL_KEYS).copied();
-    ConfigError::new(place, problem).hint(match suggestion(key, known) {
+    // The name of a column in tables is close enough.
+    let column = columns::find(key).map(Column::sweep_key);
+    let close = column.or_else(|| suggestion(key, scenario_keys().chain(pull_keys())));
+    ConfigError::new(place, problem).hint(match close {
         Some(close) => format!("did you mean `{close}`?"),
-        None => format!("keys of a scenario: {}", SCENARIO_KEYS.join(", ")),
+        None => format!("keys of a scenario: {}", scenario_keys().collect::<Vec<_>>().join(", ")),
     })
 }
 
 /// Names and whole numbers are drawn from a list: a distribution would hit no valid value.
 fn check_listed(varied: &VariedKey) -> Result<(), ConfigError> {
-    if !LISTED_KEYS.contains(&varied.key.as_str()) || matches!(varied.distribution, Distribution::Choice(_)) {
+    let listed = drawn_column(&varied.key).is_some_and(Column::is_listed);
+    if !listed || matches!(varied.distribution, Distribution::Choice(_)) {
         return Ok(());
     }
     let problem =
@@ -244,13 +248,11 @@ pub(super) fn pull_settings(file: &PullFile) -> Result<PullSettings, ConfigError
             .hint("the arm pulls at right angles to the jaws; set y to 0"));
     }
     let max_time_s = in_range("pull.max_time_s", file.max_time_s, 0.1..=3600.0, "s")?;
+    let column = |key: &str, x: f64| columns::find(key).map_or(Ok(x), |column| column.check_drawn(key, x));
     let settings = PullSettings {
-        increment_n: in_range("pull.increment_n", file.increment_n, 0.01..=50.0, "N")?,
-        start_n: file
-            .start_n
-            .map(|force| in_range("pull.start_n", force, 0.0..=10_000.0, "N"))
-            .transpose()?,
-        step_s: in_range("pull.step_s", step, 0.004..=10.0, "s")?,
+        increment_n: column("pull.increment_n", file.increment_n)?,
+        start_n: file.start_n.map(|force| column("pull.start_n", force)).transpose()?,
+        step_s: column("pull.step_s", step)?,
         step_jitter: in_range("pull.step_s.jitter", jitter, 0.0..=0.9, "1")?,
         stop_m: in_range("pull.stop_mm", file.stop_mm, 0.05..=100.0, "mm")? * 1e-3,
         direction,

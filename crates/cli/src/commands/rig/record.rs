@@ -146,15 +146,10 @@ fn scenario(
         grip_pose: 0,
         grip_force_n: planned.grip_force_n,
         covariates: Covariates {
-            gel_id: planned.gel_id.clone(),
-            session: planned.session.clone(),
             pull_index: standing.made,
             time_s: thousandth(standing.time_s),
             dwell_s: thousandth(dwell_s),
-            grip_offset_m: planned.grip_offset_mm * 1e-3,
-            grip_angle_rad: planned.grip_angle_deg.to_radians(),
-            pull_direction: planned.pull_direction,
-            ..Covariates::default()
+            ..planned.covariates()
         },
         pull: PullSettings {
             increment_n: planned.force_increment_n,
