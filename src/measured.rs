@@ -12,7 +12,7 @@ use gripgen_record::{
 use gripgen_twin::columns::{Column, covariate, covariates, recorded_covariates};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::draw::Drawn;
-use gripgen_twin::{ExtraColumn, ExtraValues, MeasuredPull, MeasuredPulls, PullTrace};
+use gripgen_twin::{ExtraColumn, MeasuredPull, MeasuredPulls, PullTrace, Values};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -138,11 +138,8 @@ fn join(path: &Path, all: &mut LoadedPulls, next: LoadedPulls) -> Result<(), Loa
     mine.recorded.retain(|name| theirs.recorded.contains(name));
     mine.extra.retain(|column| theirs.extra.iter().any(|c| same_kind(column, c)));
     for column in &mut mine.extra {
-        let more = theirs.extra.iter().find(|c| c.name == column.name).map(|c| &c.values);
-        match (&mut column.values, more) {
-            (ExtraValues::Number(x), Some(ExtraValues::Number(more))) => x.extend(more),
-            (ExtraValues::Text(words), Some(ExtraValues::Text(more))) => words.extend(more.iter().cloned()),
-            _ => {}
+        if let Some(more) = theirs.extra.iter().find(|c| c.name == column.name) {
+            column.values.append(&more.values);
         }
     }
     mine.feedback = mine.feedback.filter(|f| theirs.feedback.is_none_or(|other| *f == other));
@@ -153,7 +150,7 @@ fn join(path: &Path, all: &mut LoadedPulls, next: LoadedPulls) -> Result<(), Loa
 }
 
 fn same_kind(a: &ExtraColumn, b: &ExtraColumn) -> bool {
-    a.name == b.name && std::mem::discriminant(&a.values) == std::mem::discriminant(&b.values)
+    a.name == b.name && a.values.same_kind(&b.values)
 }
 
 /// Pulls of a run that are left out, by reason.
@@ -276,25 +273,12 @@ fn as_made(pulls: &mut MeasuredPulls, campaign: RigCampaign) {
     let names: BTreeSet<String> =
         pulls.pulls.iter().flat_map(|p| p.covariates.extra.keys().cloned()).collect();
     let names = names.into_iter().filter(|name| covariate(name).is_none());
-    pulls.extra = names.map(|name| extra_column(name, &pulls.pulls)).collect();
-    pulls.count_rests();
-}
-
-/// A column of unknown meaning: numbers if every value is one.
-fn extra_column(name: String, pulls: &[MeasuredPull]) -> ExtraColumn {
-    let values = || pulls.iter().map(|p| p.covariates.extra.get(&name));
-    let values = match values().any(|v| matches!(v, Some(Drawn::Text(_)))) {
-        true => ExtraValues::Text(values().map(|v| v.map_or(String::new(), Drawn::to_string)).collect()),
-        false => ExtraValues::Number(
-            values()
-                .map(|v| match v {
-                    Some(Drawn::Number(x)) => *x,
-                    _ => f64::NAN,
-                })
-                .collect(),
-        ),
+    let extra = |name: String| {
+        let values = Values::of_drawn(pulls.pulls.iter().map(|p| p.covariates.extra.get(&name)));
+        ExtraColumn { name, values }
     };
-    ExtraColumn { name, values }
+    pulls.extra = names.map(extra).collect();
+    pulls.count_rests();
 }
 
 /// What was measured of a pull beside the known covariates.

@@ -8,7 +8,7 @@ use gripgen::record::{
 use gripgen::twin::config::{Feedback, Mechanics};
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::{
-    Campaign, ExtraValues, MeasuredPull, Outcome, PerJaw, PlannedPull, Scenario, SlipLabel, TactileImage,
+    Campaign, MeasuredPull, Outcome, PerJaw, PlannedPull, Scenario, SlipLabel, TactileImage, Values,
     slip_label,
 };
 use gripgen::{
@@ -161,8 +161,8 @@ fn a_rig_run_is_a_campaign_that_was_measured() {
     }
     let names: Vec<&str> = measured.extra.iter().map(|e| e.name.as_str()).collect();
     assert_eq!(names, ["humidity_pct", "operator"]);
-    assert_eq!(measured.extra[0].values, ExtraValues::Number(vec![41.0, 42.0, 43.0, 44.0, 46.0]));
-    assert_eq!(measured.extra[1].values, ExtraValues::Text(vec!["ann".into(); 5]));
+    assert_eq!(measured.extra[0].values, Values::Numbers(vec![41.0, 42.0, 43.0, 44.0, 46.0]));
+    assert_eq!(measured.extra[1].values, Values::Words(vec!["ann".into(); 5]));
     assert_eq!(measured.pulls[3].covariates.extra["pulls_since_rest"], Drawn::Number(0.0), "a new session");
 
     // The one that failed is made again, after the others.
@@ -173,7 +173,7 @@ fn a_rig_run_is_a_campaign_that_was_measured() {
     write_rig_pull(&folder, &again).unwrap();
     let loaded = load_pulls(at.path()).unwrap();
     assert_eq!(loaded.pulls.pulls.last().unwrap().id, "0", "in the order in which they were made");
-    assert_eq!(loaded.pulls.extra[0].values, ExtraValues::Number(vec![41.0, 42.0, 43.0, 44.0, 46.0, 40.0]));
+    assert_eq!(loaded.pulls.extra[0].values, Values::Numbers(vec![41.0, 42.0, 43.0, 44.0, 46.0, 40.0]));
 }
 
 /// The dirt stands in the recorded rest frames and not in that of the sensor file.

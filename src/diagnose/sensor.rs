@@ -6,7 +6,7 @@ use gripgen_identify::{
     Covariate, NamedEffect, ParameterEstimate, SensorCalibration, SensorComparison, SensorData,
     SensorDiagnosis, SensorOptions, Verdict, calibrate_sensor, compare_sensor, diagnose_sensor,
 };
-use gripgen_record::{ExtraValues, SensorTable, SensorTableError, read_sensor_table};
+use gripgen_record::{SensorTable, SensorTableError, read_sensor_table};
 use gripgen_twin::Twin;
 use gripgen_twin::config::{CalibrationFile, EffectFile};
 use gripgen_twin::effects::{EffectSpec, OutsideFit, Per, SENSOR_LINE};
@@ -52,17 +52,13 @@ pub fn compare_sensor_table(table: &SensorTable, twin: &Twin) -> Result<SensorCo
 }
 
 fn data(table: &SensorTable) -> SensorData {
-    let covariate = |values: &ExtraValues| match values {
-        ExtraValues::Numbers(numbers) => Covariate::Number(numbers.clone()),
-        ExtraValues::Words(words) => Covariate::words(words.iter().map(String::as_str)),
-    };
     SensorData {
         time_s: table.time_s.clone(),
         reference_force_n: table.reference_force_n.clone(),
         measured_force_n: table.measured_force_n.clone(),
         session: table.session.clone(),
         sessions: table.sessions.clone(),
-        extra: table.extra.iter().map(|(name, values)| (name.clone(), covariate(values))).collect(),
+        extra: table.extra.iter().map(|(name, values)| (name.clone(), Covariate::from(values))).collect(),
     }
 }
 

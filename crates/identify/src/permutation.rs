@@ -7,6 +7,7 @@
 //! correlation times, a session, an event. With one observation a block this is the ordinary permutation test.
 
 use crate::draws::Draws;
+use gripgen_twin::Values;
 use nalgebra::{DMatrix, DVector};
 
 /// Values on which a residual may depend, one for each observation.
@@ -16,6 +17,15 @@ pub enum Covariate {
     Number(Vec<f64>),
     /// Words, as numbers from 0 on that stand for them; `u32::MAX` where nothing was written down.
     Word(Vec<u32>),
+}
+
+impl From<&Values> for Covariate {
+    fn from(values: &Values) -> Self {
+        match values {
+            Values::Numbers(numbers) => Covariate::Number(numbers.clone()),
+            Values::Words(words) => Covariate::words(words.iter().map(String::as_str)),
+        }
+    }
 }
 
 impl Covariate {

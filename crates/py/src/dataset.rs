@@ -2,7 +2,8 @@
 
 use crate::error;
 use gripgen::record::proto::gripgen_v1::{JawContact, Status};
-use gripgen::record::{Column, Dataset as Rows, DatasetError};
+use gripgen::record::{Dataset as Rows, DatasetError};
+use gripgen::twin::Values;
 use gripgen::twin::{ContactPatch, Jaw};
 use gripgen::{Project, in_parallel, press_only};
 use numpy::{IntoPyArray, PyArray, PyArray1, PyArray3, PyArray4, PyArray5, PyArrayMethods};
@@ -56,8 +57,8 @@ impl Dataset {
         let found = PyDict::new(py);
         for (name, column) in self.rows.table().columns() {
             match column {
-                Column::Number(x) => found.set_item(name, PyArray1::from_slice(py, x))?,
-                Column::Text(words) => found.set_item(name, PyList::new(py, words)?)?,
+                Values::Numbers(x) => found.set_item(name, PyArray1::from_slice(py, x))?,
+                Values::Words(words) => found.set_item(name, PyList::new(py, words)?)?,
             }
         }
         Ok(found)

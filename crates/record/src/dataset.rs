@@ -7,7 +7,7 @@ mod columns;
 #[cfg(test)]
 mod tests;
 
-pub use columns::{Column, Table};
+pub use columns::Table;
 
 use crate::folder::{FolderError, RunFolder};
 use crate::picture::{decode_png_into, encode_png};

@@ -25,7 +25,7 @@ mod shard;
 mod verify;
 
 pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
-pub use dataset::{Column, Dataset, DatasetError, Table};
+pub use dataset::{Dataset, DatasetError, Table};
 pub use encode::{
     EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode, sample_covariates, sample_view,
 };
@@ -51,6 +51,6 @@ pub use rig_run::{
     RigCampaign, RigPull, RigPullError, RigResult, RigRunError, RigRunInfo, create_rig_run, discard_failed,
     failed_pulls, missing_pulls, rig_campaign, write_rig_pull,
 };
-pub use sensor_table::{ExtraValues, SENSOR_FILE, SensorTable, SensorTableError, read_sensor_table};
+pub use sensor_table::{SENSOR_FILE, SensorTable, SensorTableError, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
 pub use verify::{Verification, verify};

@@ -5,7 +5,8 @@
 //! `trace_desired_force_n`, `trace_measured_force_n` and `trace_displacement_mm` (lists of float). What is not there is
 //! null. Nothing in the file depends on time, host or path.
 
-use crate::dataset::{Column, Dataset, DatasetError};
+use crate::dataset::{Dataset, DatasetError};
+use gripgen_twin::Values;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType};
 use parquet::errors::ParquetError;
@@ -54,8 +55,8 @@ pub fn export_parquet<W: Write + Send>(
         let mut out = writer.next_row_group()?;
         for (_, column) in dataset.table().columns() {
             match column {
-                Column::Number(x) => write_numbers(&mut out, group.iter().map(|&row| x[row]))?,
-                Column::Text(words) => {
+                Values::Numbers(x) => write_numbers(&mut out, group.iter().map(|&row| x[row]))?,
+                Values::Words(words) => {
                     let cell = |row: usize| Some(words[row].as_bytes().to_vec()).filter(|w| !w.is_empty());
                     write_bytes(&mut out, group.iter().map(|&row| cell(row)))?;
                 }
@@ -102,8 +103,8 @@ fn schema(dataset: &Dataset, options: ParquetOptions) -> Result<TypePtr, Parquet
     let mut fields = Vec::new();
     for (name, column) in dataset.table().columns() {
         fields.push(match column {
-            Column::Number(_) => leaf(name, Physical::DOUBLE, None, Repetition::OPTIONAL)?,
-            Column::Text(_) => {
+            Values::Numbers(_) => leaf(name, Physical::DOUBLE, None, Repetition::OPTIONAL)?,
+            Values::Words(_) => {
                 leaf(name, Physical::BYTE_ARRAY, Some(LogicalType::String), Repetition::OPTIONAL)?
             }
         });

@@ -16,8 +16,7 @@ use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, LabelEvi
 use crate::proto::gripgen_v1::Status;
 use cells::{Cells, Column};
 use gripgen_twin::config::PullFile;
-use gripgen_twin::draw::Drawn;
-use gripgen_twin::{Covariates, ExtraColumn, ExtraValues, MeasuredPull, MeasuredPulls};
+use gripgen_twin::{Covariates, ExtraColumn, MeasuredPull, MeasuredPulls, Values};
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -228,13 +227,9 @@ fn read_table(
     let extra: Vec<ExtraColumn> = columns.into_iter().filter_map(extra_column).collect();
     for column in &extra {
         for (i, pull) in pulls.iter_mut().enumerate() {
-            let value = match &column.values {
-                ExtraValues::Number(x) if x[i].is_nan() => continue,
-                ExtraValues::Number(x) => Drawn::Number(x[i]),
-                ExtraValues::Text(words) if words[i].is_empty() => continue,
-                ExtraValues::Text(words) => Drawn::Text(words[i].clone()),
-            };
-            pull.covariates.extra.insert(column.name.clone(), value);
+            if let Some(value) = column.values.at(i) {
+                pull.covariates.extra.insert(column.name.clone(), value);
+            }
         }
     }
     let mut measured = MeasuredPulls {
@@ -253,14 +248,7 @@ fn read_table(
 /// A column of unknown meaning that holds something.
 fn extra_column(column: Column) -> Option<ExtraColumn> {
     let Cells::Extra(cells) = column.cells else { return None };
-    if column.filled == 0 {
-        return None;
-    }
-    let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cells::loose_number(cell)).collect();
-    let values = match numbers {
-        Some(numbers) => ExtraValues::Number(numbers),
-        None => ExtraValues::Text(cells.into_iter().map(String::from).collect()),
-    };
+    let values = Values::of_cells(cells.iter().map(|cell| &**cell))?;
     Some(ExtraColumn { name: column.name, values })
 }
 

@@ -1,6 +1,7 @@
 //! A folder with `sensor.csv`: a force sensor read beside a reference.
 
 use crate::folder::sha256_hex;
+use gripgen_twin::Values;
 use std::path::{Path, PathBuf};
 
 /// The table of a force-sensor folder.
@@ -12,15 +13,6 @@ const SESSION: &str = "session";
 
 /// The session of a table that names none.
 const ONLY_SESSION: &str = "1";
-
-/// A column of unknown meaning.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ExtraValues {
-    /// All cells are numbers; NaN where a cell is empty.
-    Numbers(Vec<f64>),
-    /// Some cell is none.
-    Words(Vec<String>),
-}
 
 /// A table, column by column.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +28,7 @@ pub struct SensorTable {
     /// Names of the sessions in order of appearance.
     pub sessions: Vec<String>,
     /// Further columns with their names.
-    pub extra: Vec<(String, ExtraValues)>,
+    pub extra: Vec<(String, Values)>,
     /// Hash of the file.
     pub sha256: String,
 }
@@ -223,10 +215,10 @@ impl Extra {
         }
     }
 
-    fn values(self) -> ExtraValues {
+    fn values(self) -> Values {
         match self.words {
-            Some(words) => ExtraValues::Words(words),
-            None => ExtraValues::Numbers(self.numbers),
+            Some(words) => Values::Words(words),
+            None => Values::Numbers(self.numbers),
         }
     }
 }
@@ -253,8 +245,8 @@ mod tests {
         assert_eq!(table.measured_force_n, [-0.1, -0.2, -0.3, -4.0]);
         assert_eq!(table.reference_force_n, [1.0, 2.0, 3.0, 4.0]);
         let words = ["ann", "ann", "7", ""].map(String::from).to_vec();
-        assert_eq!(table.extra[0], ("operator".into(), ExtraValues::Words(words)));
-        let ExtraValues::Numbers(humidity) = &table.extra[1].1 else { panic!("{:?}", table.extra[1]) };
+        assert_eq!(table.extra[0], ("operator".into(), Values::Words(words)));
+        let Values::Numbers(humidity) = &table.extra[1].1 else { panic!("{:?}", table.extra[1]) };
         assert!(humidity[1].is_nan() && humidity[3] == 42.0);
         assert_eq!(table.sha256.len(), 64);
         let one = read("\u{feff}time_s,reference_force_n,measured_force_n\n0,1,2\n").unwrap();

@@ -37,6 +37,7 @@ mod sweep;
 mod table;
 mod trace;
 mod twin;
+pub mod values;
 
 pub use backbone::Backbone;
 pub use campaign::{Campaign, PlannedPull, PullKind};
@@ -45,7 +46,7 @@ pub use grasp::Grasp;
 pub use image::TactileImage;
 pub use jaw::{Jaw, PerJaw};
 pub use label::{LabelError, PullEnd, SlipLabel, slip_label};
-pub use measured::{ExtraColumn, ExtraValues, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, RestCount};
+pub use measured::{ExtraColumn, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, RestCount};
 pub use mesh::{EXTENT_RANGE_M, MAX_TRIANGLES, MeshError, TriMesh, write_binary_stl};
 pub use optics::{BACKGROUND_TERMS, OpticsState};
 pub use patch::{ContactPatch, PressureCell};
@@ -54,8 +55,9 @@ pub use sample::{ImprintSummary, Outcome, Pulled, Sample};
 pub use scenario::{Covariates, PullSettings, Scenario};
 pub use scenario_keys::{pull_keys, scenario_keys};
 pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep, is_twin_key};
-pub use table::{TABLE_EFFECT, Table, TableAxis, TableTarget, table_factor, table_offset_n};
+pub use table::{TABLE_EFFECT, Table, TableTarget, table_factor, table_offset_n};
 pub use trace::{PullTrace, TraceRow};
 pub use twin::{
     DEFAULTED_SECTIONS, Elastic, Gel, Gripper, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist,
 };
+pub use values::Values;

@@ -2,7 +2,7 @@
 
 use crate::config::Feedback;
 use crate::draw::Drawn;
-use crate::{Covariates, PullTrace};
+use crate::{Covariates, PullTrace, Values};
 
 /// The covariate [`MeasuredPulls::count_rests`] adds.
 pub const PULLS_SINCE_REST: &str = "pulls_since_rest";
@@ -35,22 +35,13 @@ pub struct MeasuredPull {
     pub trace: Option<PullTrace>,
 }
 
-/// The values of a column whose meaning is not known.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ExtraValues {
-    /// Numbers; NaN where the cell is empty.
-    Number(Vec<f64>),
-    /// Words.
-    Text(Vec<String>),
-}
-
 /// A column whose meaning is not known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtraColumn {
     /// Its name.
     pub name: String,
-    /// One value a pull.
-    pub values: ExtraValues,
+    /// One value per pull.
+    pub values: Values,
 }
 
 /// A campaign of measured pulls, in the order in which they were made.
@@ -111,18 +102,12 @@ impl MeasuredPulls {
     /// The pulls for whose place `keep` is true, in order, with their columns.
     #[must_use]
     pub fn kept(&self, keep: impl Fn(usize) -> bool) -> Self {
-        fn of<T: Clone>(all: &[T], keep: &impl Fn(usize) -> bool) -> Vec<T> {
-            all.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, x)| x.clone()).collect()
-        }
-        let extra = self.extra.iter().map(|column| ExtraColumn {
-            name: column.name.clone(),
-            values: match &column.values {
-                ExtraValues::Number(x) => ExtraValues::Number(of(x, &keep)),
-                ExtraValues::Text(words) => ExtraValues::Text(of(words, &keep)),
-            },
-        });
+        let extra = self
+            .extra
+            .iter()
+            .map(|column| ExtraColumn { name: column.name.clone(), values: column.values.kept(&keep) });
         Self {
-            pulls: of(&self.pulls, &keep),
+            pulls: self.pulls.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, p)| p.clone()).collect(),
             recorded: self.recorded.clone(),
             extra: extra.collect(),
             sha256: self.sha256.clone(),

@@ -8,19 +8,10 @@ use crate::columns::{self, Column, PullView};
 use crate::config::{ConfigError, EffectFile, TwinFile, in_range, suggestion};
 use crate::draw::Drawn;
 use crate::effects::{OutsideFit, Per};
-use crate::{Scenario, Twin};
+use crate::{Scenario, Twin, Values};
 
 /// The `name` of a table among the effects of a twin file. It is not in the library.
 pub const TABLE_EFFECT: &str = "table";
-
-/// Where a table has its values.
-#[derive(Debug, Clone, PartialEq)]
-pub enum TableAxis {
-    /// At numbers that increase; in between it is linear, outside it is held.
-    Numbers(Vec<f64>),
-    /// At words; at others it does nothing.
-    Words(Vec<String>),
-}
 
 /// What a table changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,8 +31,9 @@ pub struct Table {
     pub centre: Option<[f64; 2]>,
     /// The only part it acts on, or all of them.
     pub part: Option<String>,
-    /// Where its values are.
-    pub axis: TableAxis,
+    /// Where its values are: at numbers that increase, linear in between and held outside; or at words, at others it does
+    /// nothing.
+    pub axis: Values,
     /// One value for each place of the axis.
     pub values: Vec<f64>,
     /// What it changes.
@@ -52,12 +44,12 @@ impl Table {
     /// The value where the covariate is `at`; `None` where the table says nothing.
     pub fn value(&self, at: &Drawn) -> Option<f64> {
         match (&self.axis, at) {
-            (TableAxis::Words(words), at) => {
+            (Values::Words(words), at) => {
                 let at = at.to_string();
                 words.iter().position(|w| *w == at).map(|i| self.values[i])
             }
-            (TableAxis::Numbers(x), Drawn::Number(at)) => Some(interpolate(x, &self.values, *at)),
-            (TableAxis::Numbers(_), Drawn::Text(_)) => None,
+            (Values::Numbers(x), Drawn::Number(at)) => Some(interpolate(x, &self.values, *at)),
+            (Values::Numbers(_), Drawn::Text(_)) => None,
         }
     }
 
@@ -136,8 +128,8 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
             let problem = format!("`{covariate}` holds numbers, not words");
             return Err(ConfigError::new(key("words"), problem).hint("give its values in x = [...]"));
         }
-        (Some(x), None) => TableAxis::Numbers(increasing(numbers(x, &key("x"))?, &key("x"))?),
-        (None, Some(words)) => TableAxis::Words(distinct(words, &key("words"))?),
+        (Some(x), None) => Values::Numbers(increasing(numbers(x, &key("x"))?, &key("x"))?),
+        (None, Some(words)) => Values::Words(distinct(words, &key("words"))?),
         _ => return Err(ConfigError::new(key("x"), "a table has either `x` or `words`")),
     };
     let (values, target, name) = match (get("factor"), get("offset_n")) {
@@ -145,10 +137,7 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
         (None, Some(v)) => (numbers(v, &key("offset_n"))?, TableTarget::Offset, "offset_n"),
         _ => return Err(ConfigError::new(key("factor"), "a table has either `factor` or `offset_n`")),
     };
-    let places = match &axis {
-        TableAxis::Numbers(x) => x.len(),
-        TableAxis::Words(words) => words.len(),
-    };
+    let places = axis.len();
     if values.len() != places {
         let problem = format!("{} values for {places} places of `{covariate}`", values.len());
         return Err(ConfigError::new(key(name), problem));

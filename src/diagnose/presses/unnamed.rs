@@ -6,6 +6,7 @@
 use super::score::{Design, Scored};
 use super::work::{NamedModel, Work, for_each};
 use gripgen_identify::{FreeParameter, GroupMoments, GroupedFit, held_out_costs};
+pub use gripgen_twin::Values as PressValues;
 use nalgebra::{DMatrix, DVector};
 
 /// Terms of a field in each channel: 1, u, v, u2, uv, v2, the level, the change by the contact, level of the other two
@@ -28,15 +29,6 @@ pub struct PressCovariate {
     pub name: String,
     /// Its value at each press.
     pub values: PressValues,
-}
-
-/// The values of a covariate.
-#[derive(Debug, Clone, PartialEq)]
-pub enum PressValues {
-    /// Numbers.
-    Numbers(Vec<f64>),
-    /// Words.
-    Words(Vec<String>),
 }
 
 /// How the size of a field goes with a covariate.

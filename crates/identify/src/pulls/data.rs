@@ -1,7 +1,8 @@
 //! A campaign as numbers.
 
 use gripgen_twin::columns::covariates;
-use gripgen_twin::{ExtraValues, MeasuredPulls};
+use gripgen_twin::values::distinct;
+use gripgen_twin::{MeasuredPulls, Values};
 use std::collections::BTreeMap;
 
 /// A column of a campaign.
@@ -13,17 +14,25 @@ pub enum Column {
     Word(Vec<usize>, Vec<String>),
 }
 
+impl From<Values> for Column {
+    /// Numbers without gaps, words as positions.
+    fn from(values: Values) -> Self {
+        match values.without_gaps() {
+            Values::Numbers(x) => Column::Number(x),
+            Values::Words(words) => {
+                let (at, names) = Values::coded(&words);
+                Column::Word(at, names)
+            }
+        }
+    }
+}
+
 impl Column {
     /// Number of different values.
     pub fn distinct(&self) -> usize {
         match self {
             Column::Word(_, words) => words.len(),
-            Column::Number(x) => {
-                let mut bits: Vec<u64> = x.iter().map(|x| (x + 0.0).to_bits()).collect();
-                bits.sort_unstable();
-                bits.dedup();
-                bits.len()
-            }
+            Column::Number(x) => distinct(x),
         }
     }
 }
@@ -47,23 +56,6 @@ pub struct PullData<'a> {
     pub group_of: Vec<usize>,
 }
 
-fn words(values: impl Iterator<Item = String>) -> Column {
-    let values: Vec<String> = values.collect();
-    let mut names = values.clone();
-    names.sort();
-    names.dedup();
-    let at = values.iter().map(|v| names.partition_point(|n| n < v)).collect();
-    Column::Word(at, names)
-}
-
-/// Numbers; gaps get the median, which says nothing.
-fn without_gaps(values: impl Iterator<Item = f64> + Clone) -> Column {
-    let mut known: Vec<f64> = values.clone().filter(|x| x.is_finite()).collect();
-    known.sort_by(f64::total_cmp);
-    let median = known.get(known.len() / 2).copied().unwrap_or(0.0);
-    Column::Number(values.map(|x| if x.is_finite() { x } else { median }).collect())
-}
-
 /// Numbers of consecutive runs of equal keys, in the order of their first pulls.
 fn numbered<K: Ord + Clone>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     let mut known = BTreeMap::new();
@@ -80,24 +72,12 @@ impl<'a> PullData<'a> {
         let pulls = &measured.pulls;
         let mut columns = BTreeMap::new();
         for column in covariates().filter(|c| measured.recorded.iter().any(|name| name == c.name)) {
-            let values = match column.holds_words() {
-                true => words(pulls.iter().map(|p| column.word(p.view()).unwrap_or_default().into())),
-                false => without_gaps(pulls.iter().map(|p| column.number(p.view()).unwrap_or(f64::NAN))),
-            };
-            columns.insert(column.name.into(), values);
+            columns.insert(column.name.into(), column.values(pulls).into());
         }
         for extra in &measured.extra {
-            let column = match &extra.values {
-                ExtraValues::Text(values) => words(values.iter().cloned()),
-                ExtraValues::Number(values) => without_gaps(values.iter().copied()),
-            };
-            columns.insert(extra.name.clone(), column);
+            columns.insert(extra.name.clone(), extra.values.clone().into());
         }
-        let parts = match words(pulls.iter().map(|p| p.part.clone())) {
-            Column::Word(_, names) => names,
-            Column::Number(_) => vec![],
-        };
-        let part_of = pulls.iter().map(|p| parts.partition_point(|n| *n < p.part)).collect();
+        let (part_of, parts) = Values::coded(&pulls.iter().map(|p| p.part.clone()).collect::<Vec<_>>());
         let session_of = numbered(pulls.iter().map(|p| p.covariates.session.clone()));
         let group_of = numbered(pulls.iter().map(|p| {
             let c = &p.covariates;

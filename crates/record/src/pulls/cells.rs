@@ -132,16 +132,6 @@ fn status(cell: &str) -> Result<Status, &'static str> {
     }
 }
 
-/// A number, NaN where there is none; `None` if it is a word.
-pub(super) fn loose_number(cell: &str) -> Option<f64> {
-    match cell.parse::<f64>() {
-        _ if cell.is_empty() => Some(f64::NAN),
-        Ok(x) if x.is_finite() => Some(x),
-        Ok(_) => Some(f64::NAN),
-        Err(_) => None,
-    }
-}
-
 /// A pull's name is also that of its trace's file.
 fn file_name(cell: &str) -> Result<(), &'static str> {
     let path = cell.contains(['/', '\\', '\0', ':']) || cell == "." || cell == "..";

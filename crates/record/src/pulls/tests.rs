@@ -1,5 +1,6 @@
 use super::*;
 use gripgen_twin::config::Feedback;
+use gripgen_twin::draw::Drawn;
 
 fn folder(table: &str, files: &[(&str, &str)]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -33,13 +34,13 @@ fn columns_stand_in_any_order_and_the_rest_are_covariates_of_unknown_meaning() {
     let recorded = ["part", "grip_force_n", "grip_angle_deg", "dwell_s", "session", "pull_direction"];
     assert_eq!(read.recorded, recorded, "a column without a value was not recorded");
     let [humidity, operator] = &read.extra[..] else { panic!("{:?}", read.extra) };
-    let ExtraValues::Number(humidity) = &humidity.values else { panic!("numbers") };
+    let Values::Numbers(humidity) = &humidity.values else { panic!("numbers") };
     assert_eq!(humidity[0], 40.0);
     assert!(humidity[1].is_nan());
     assert_eq!(a.covariates.extra["humidity_pct"], Drawn::Number(40.0));
     assert!(!b.covariates.extra.contains_key("humidity_pct"), "nobody wrote it down");
     assert_eq!(b.covariates.extra["operator"], Drawn::Text("bo".into()));
-    assert_eq!(operator.values, ExtraValues::Text(vec!["ann".into(), "bo".into()]));
+    assert_eq!(operator.values, Values::Words(vec!["ann".into(), "bo".into()]));
     assert_eq!((read.label_tolerance_n, read.stop_m, read.feedback), (2.0, 5e-3, Some(Feedback::Measured)));
     assert!(a.trace.is_none());
     let trace = b.trace.as_ref().unwrap();

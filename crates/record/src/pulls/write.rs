@@ -3,7 +3,7 @@
 use super::{PULLS_FILE, PullFolderError, TRACES_FOLDER};
 use crate::campaign::{CAMPAIGN_FILE, header_toml};
 use gripgen_twin::columns::{COLUMNS, Column, InTable, Scale, recorded_covariates};
-use gripgen_twin::{ExtraValues, MeasuredPulls, PullTrace};
+use gripgen_twin::{MeasuredPulls, PullTrace};
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
@@ -53,11 +53,7 @@ fn table_csv(measured: &MeasuredPulls) -> Result<Vec<u8>, String> {
     for (row, pull) in measured.pulls.iter().enumerate() {
         let mut cells = vec![pull.id.clone()];
         cells.extend(known.iter().map(|column| column.cell(pull.view()).into_owned()));
-        cells.extend(measured.extra.iter().map(|extra| match &extra.values {
-            ExtraValues::Number(x) if x[row].is_nan() => String::new(),
-            ExtraValues::Number(x) => x[row].to_string(),
-            ExtraValues::Text(words) => words[row].clone(),
-        }));
+        cells.extend(measured.extra.iter().map(|extra| extra.values.cell(row).into_owned()));
         cells.push(pull.max_pull_force_n.to_string());
         write(cells)?;
     }
