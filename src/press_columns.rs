@@ -1,8 +1,9 @@
 //! The columns of a press table that say in which circumstances each press was made.
 
-use crate::diagnose::{PressCovariate, PressValues};
-use gripgen_record::{PRESSES_FILE, PressFolderError, read_press_columns, sha256_hex};
+use crate::diagnose::PressCovariate;
+use gripgen_record::{PRESSES_FILE, TableError, read_press_columns, sha256_hex};
 use gripgen_tactile::presses::PressSet;
+use gripgen_twin::Values;
 use std::path::Path;
 
 /// Columns that are marks of the contact, not circumstances.
@@ -28,10 +29,7 @@ impl PressColumns {
             retain(times, &keep);
         }
         for covariate in &mut self.covariates {
-            match &mut covariate.values {
-                PressValues::Numbers(values) => retain(values, &keep),
-                PressValues::Words(words) => retain(words, &keep),
-            }
+            covariate.values = covariate.values.kept(|row| keep.get(row).copied().unwrap_or(true));
         }
     }
 }
@@ -44,28 +42,23 @@ fn retain<T>(list: &mut Vec<T>, keep: &[bool]) {
     });
 }
 
-/// Reads them from the table of a folder; a `dataPack.npz` has none. Numbers that are missing in some rows are words.
-pub fn load_press_columns(path: &Path) -> Result<PressColumns, PressFolderError> {
+/// Reads them from the table of a folder; a `dataPack.npz` has none. A clock with gaps is a covariate only.
+///
+/// # Errors
+/// What is wrong with the table.
+pub fn load_press_columns(path: &Path) -> Result<PressColumns, TableError> {
     if !path.join(PRESSES_FILE).is_file() {
         return Ok(PressColumns::default());
     }
     let table = read_press_columns(path)?;
     let mut columns = PressColumns { names: table.names, ..Default::default() };
-    for (name, cells) in table.columns {
-        let numbers: Option<Vec<f64>> =
-            cells.iter().map(|c| c.parse::<f64>().ok().filter(|x| x.is_finite())).collect();
-        if MARKS.contains(&name.as_str()) {
-            continue;
-        }
-        match numbers {
-            Some(times) if name == "time_s" => {
+    for (name, values) in table.columns.into_iter().filter(|(name, _)| !MARKS.contains(&name.as_str())) {
+        match values {
+            Values::Numbers(times) if name == "time_s" && times.iter().all(|t| t.is_finite()) => {
                 let first = times.iter().fold(f64::INFINITY, |m, t| m.min(*t));
                 columns.time_s = Some(times.iter().map(|t| t - first).collect());
             }
-            Some(numbers) => {
-                columns.covariates.push(PressCovariate { name, values: PressValues::Numbers(numbers) });
-            }
-            None => columns.covariates.push(PressCovariate { name, values: PressValues::Words(cells) }),
+            values => columns.covariates.push(PressCovariate { name, values }),
         }
     }
     Ok(columns)

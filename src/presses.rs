@@ -4,7 +4,7 @@ use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
 use crate::project::{LoadError, load_twin_document};
 use crate::resolve::Files;
-use gripgen_record::{PRESSES_FILE, PressFolder, PressFolderError, PressRecord, read_press_folder};
+use gripgen_record::{PRESSES_FILE, PressFolder, PressRecord, TableError, read_press_folder};
 use gripgen_tactile::presses::{
     Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, Press, PressSet, find_circle,
     reference_frame,
@@ -36,7 +36,7 @@ pub enum LoadPressesError {
     Read(#[from] ReadFileError),
     /// A folder of presses.
     #[error(transparent)]
-    Folder(#[from] PressFolderError),
+    Folder(#[from] TableError),
     /// Taxim's file.
     #[error("{}: {source}", .path.display())]
     DataPack {

@@ -91,6 +91,11 @@ fn covariates(input: &PressDiagnosisInput<'_>) -> Vec<PressCovariate> {
         numbers("y_px", &|i| circles[i].y_px),
         numbers("radius_px", &|i| circles[i].radius_px),
     ];
-    list.extend(input.covariates.iter().cloned());
+    list.extend(
+        input
+            .covariates
+            .iter()
+            .map(|c| PressCovariate { name: c.name.clone(), values: c.values.clone().without_gaps() }),
+    );
     list
 }

@@ -6,7 +6,7 @@ use gripgen_identify::{
     Covariate, NamedEffect, ParameterEstimate, SensorCalibration, SensorComparison, SensorData,
     SensorDiagnosis, SensorOptions, Verdict, calibrate_sensor, compare_sensor, diagnose_sensor,
 };
-use gripgen_record::{SensorTable, SensorTableError, read_sensor_table};
+use gripgen_record::{SensorTable, TableError, read_sensor_table};
 use gripgen_twin::Twin;
 use gripgen_twin::config::{CalibrationFile, EffectFile};
 use gripgen_twin::effects::{EffectSpec, OutsideFit, Per, SENSOR_LINE};
@@ -24,7 +24,7 @@ pub fn is_sensor_table(path: &Path) -> bool {
 }
 
 /// Reads the table of a folder.
-pub fn load_sensor_table(folder: &Path) -> Result<SensorTable, SensorTableError> {
+pub fn load_sensor_table(folder: &Path) -> Result<SensorTable, TableError> {
     read_sensor_table(folder)
 }
 

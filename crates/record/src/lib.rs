@@ -22,6 +22,7 @@ mod rig_log;
 mod rig_run;
 mod sensor_table;
 mod shard;
+mod table;
 mod verify;
 
 pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
@@ -38,8 +39,7 @@ pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row
 pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};
 pub use picture::{PictureError, decode as decode_picture, encode_png};
 pub use presses::{
-    PRESSES_FILE, PressColumnTable, PressFolder, PressFolderError, PressRecord, read_press_columns,
-    read_press_folder,
+    PRESSES_FILE, PressColumnTable, PressFolder, PressRecord, read_press_columns, read_press_folder,
 };
 pub use pulls::{
     JudgedPulls, PULLS_FILE, PullFolderError, PullImages, PullImagesError, Standing, TRACES_FOLDER,
@@ -51,6 +51,7 @@ pub use rig_run::{
     RigCampaign, RigPull, RigPullError, RigResult, RigRunError, RigRunInfo, create_rig_run, discard_failed,
     failed_pulls, missing_pulls, rig_campaign, write_rig_pull,
 };
-pub use sensor_table::{SENSOR_FILE, SensorTable, SensorTableError, read_sensor_table};
+pub use sensor_table::{SENSOR_FILE, SensorTable, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
+pub use table::TableError;
 pub use verify::{Verification, verify};

@@ -1,11 +1,15 @@
 //! A folder of ball presses: `presses.csv`, the images that it names, and `rest.png`.
 
 use crate::picture::decode;
-use gripgen_twin::TactileImage;
-use std::path::{Path, PathBuf};
+use crate::table::{TableError, TableReader, TextCells, number, read_bytes};
+use gripgen_twin::{TactileImage, Values};
+use std::path::Path;
 
 /// The table of a press folder.
 pub const PRESSES_FILE: &str = "presses.csv";
+
+/// The column that names the image of a row.
+const IMAGE: &str = "image";
 
 /// Names under which a frame without contact is looked for.
 const REST_FILES: [&str; 3] = ["rest.png", "rest.jpg", "rest.jpeg"];
@@ -34,78 +38,24 @@ pub struct PressFolder {
     pub presses: Vec<PressRecord>,
 }
 
-/// Why a press folder could not be read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PressFolderError {
-    /// A file cannot be read.
-    #[error("{}: {problem}", .path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        problem: String,
-    },
-    /// The table lacks a column.
-    #[error("{}: there is no column `{column}`; found: {found}", .path.display())]
-    Column {
-        /// The table.
-        path: PathBuf,
-        /// The column.
-        column: &'static str,
-        /// Columns found.
-        found: String,
-    },
-    /// A cell is not what its column holds.
-    #[error("{}: line {line}, `{column}` is `{value}`, it must be {wanted}", .path.display())]
-    Cell {
-        /// The table.
-        path: PathBuf,
-        /// Line of the file, the header is line 1.
-        line: u64,
-        /// The column.
-        column: &'static str,
-        /// What stands there.
-        value: String,
-        /// What should.
-        wanted: &'static str,
-    },
-    /// Rows that the table's format forbids.
-    #[error("{}: {problem}", .path.display())]
-    Table {
-        /// The table.
-        path: PathBuf,
-        /// What the parser says.
-        problem: String,
-    },
-}
-
 /// Reads a press folder. Columns: `image`, and where somebody measured them `x_px`, `y_px`, `radius_px` or
 /// `depth_mm`; an empty cell is a number that nobody measured. Further columns are left alone.
-pub fn read_press_folder(folder: &Path) -> Result<PressFolder, PressFolderError> {
+///
+/// # Errors
+/// [`TableError`], with line, column and value, or with the image.
+pub fn read_press_folder(folder: &Path) -> Result<PressFolder, TableError> {
     let path = folder.join(PRESSES_FILE);
-    let table = |e: csv::Error| PressFolderError::Table { path: path.clone(), problem: e.to_string() };
-    let bytes = read(&path)?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&bytes[..]);
-    let header = reader.headers().map_err(table)?.clone();
-    let column = |name: &str| header.iter().position(|h| h.trim_start_matches('\u{feff}') == name);
-    let image_column = column("image").ok_or_else(|| PressFolderError::Column {
-        path: path.clone(),
-        column: "image",
-        found: header.iter().collect::<Vec<_>>().join(", "),
-    })?;
-    let numbers = ["x_px", "y_px", "radius_px", "depth_mm"].map(|name| (name, column(name)));
+    let bytes = read_bytes(&path)?;
+    let mut table = TableReader::new(&path, &bytes)?;
+    let image_column = table.required(IMAGE)?;
+    let numbers = ["x_px", "y_px", "radius_px", "depth_mm"].map(|name| (name, table.place(name)));
     let mut presses = Vec::new();
-    for row in reader.records() {
-        let row = row.map_err(table)?;
-        let line = row.position().map_or(0, csv::Position::line);
-        let name = row.get(image_column).unwrap_or_default().to_string();
+    while let Some(row) = table.row()? {
+        let name = row.cell(image_column).to_string();
         let mut found = [None; 4];
-        for (slot, (column, at)) in found.iter_mut().zip(numbers) {
-            *slot = number(at.and_then(|i| row.get(i)).unwrap_or_default(), column).map_err(|wanted| {
-                let value = at.and_then(|i| row.get(i)).unwrap_or_default().to_string();
-                PressFolderError::Cell { path: path.clone(), line, column, value, wanted }
-            })?;
+        for (slot, (column, place)) in found.iter_mut().zip(numbers) {
+            let Some(place) = place else { continue };
+            *slot = measured(row.cell(place), column).map_err(|wanted| row.bad(place, wanted))?;
         }
         let [x, y, radius_px, depth_mm] = found;
         presses.push(PressRecord {
@@ -120,55 +70,51 @@ pub fn read_press_folder(folder: &Path) -> Result<PressFolder, PressFolderError>
     Ok(PressFolder { rest: rest.map(|p| picture(&p)).transpose()?, presses })
 }
 
-/// All columns of a press table as they stand.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// All columns of a press table, as numbers or words.
+#[derive(Debug, Clone, PartialEq)]
 pub struct PressColumnTable {
     /// The image of each row.
     pub names: Vec<String>,
-    /// Name and cells of each column.
-    pub columns: Vec<(String, Vec<String>)>,
+    /// Name and values of each column that was recorded, that of the images among them.
+    pub columns: Vec<(String, Values)>,
 }
 
-/// Reads the columns of a press table, and no image.
-pub fn read_press_columns(folder: &Path) -> Result<PressColumnTable, PressFolderError> {
+/// Reads the columns of a press table, and no image. An empty cell is a value that nobody wrote down, a column of nothing but
+/// empty cells is not recorded, and one without a name is left out.
+///
+/// # Errors
+/// [`TableError`].
+pub fn read_press_columns(folder: &Path) -> Result<PressColumnTable, TableError> {
     let path = folder.join(PRESSES_FILE);
-    let table = |e: csv::Error| PressFolderError::Table { path: path.clone(), problem: e.to_string() };
-    let bytes = read(&path)?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&bytes[..]);
-    let header = reader.headers().map_err(table)?.clone();
-    let mut columns: Vec<(String, Vec<String>)> =
-        header.iter().map(|h| (h.trim_start_matches('\u{feff}').to_string(), Vec::new())).collect();
-    for row in reader.records() {
-        let row = row.map_err(table)?;
-        for ((_, cells), cell) in columns.iter_mut().zip(row.iter()) {
-            cells.push(cell.to_string());
-        }
+    let bytes = read_bytes(&path)?;
+    let mut table = TableReader::new(&path, &bytes)?;
+    let mut columns: Vec<(String, TextCells)> =
+        table.names().iter().map(|name| (name.clone(), TextCells::default())).collect();
+    let image_column = table.place(IMAGE);
+    let mut names = Vec::new();
+    while let Some(row) = table.row()? {
+        columns.iter_mut().enumerate().for_each(|(place, (_, cells))| cells.push(row.cell(place)));
+        names.extend(image_column.map(|place| row.cell(place).to_string()));
     }
-    let names = columns.iter().find(|(name, _)| name == "image").map(|(_, cells)| cells.clone());
-    Ok(PressColumnTable { names: names.unwrap_or_default(), columns })
+    let columns = columns.into_iter().filter(|(name, _)| !name.is_empty());
+    let columns = columns.filter_map(|(name, cells)| Some((name, cells.values()?)));
+    Ok(PressColumnTable { names, columns: columns.collect() })
 }
 
 /// A number of a cell, none where it is empty; otherwise what it must be.
-fn number(cell: &str, column: &str) -> Result<Option<f64>, &'static str> {
-    if cell.is_empty() {
-        return Ok(None);
-    }
+fn measured(cell: &str, column: &str) -> Result<Option<f64>, &'static str> {
     let length = matches!(column, "radius_px" | "depth_mm");
-    match cell.parse::<f64>() {
-        Ok(x) if x.is_finite() && !length => Ok(Some(x)),
-        Ok(x) if x.is_finite() && x > 0.0 => Ok(Some(x)),
+    match number(cell) {
+        _ if cell.is_empty() => Ok(None),
+        Some(x) if !length || x > 0.0 => Ok(Some(x)),
         _ if length => Err("a number above 0"),
         _ => Err("a number"),
     }
 }
 
-fn picture(path: &Path) -> Result<TactileImage, PressFolderError> {
-    let bytes = read(path)?;
-    decode(&bytes).map_err(|e| PressFolderError::Io { path: path.into(), problem: e.to_string() })
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, PressFolderError> {
-    std::fs::read(path).map_err(|e| PressFolderError::Io { path: path.into(), problem: e.to_string() })
+fn picture(path: &Path) -> Result<TactileImage, TableError> {
+    let bytes = read_bytes(path)?;
+    decode(&bytes).map_err(|e| TableError::Io { path: path.into(), problem: e.to_string() })
 }
 
 #[cfg(test)]
@@ -197,12 +143,14 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_read_as_they_stand() {
-        let folder = folder("image, lamp, time_s\na.png, on, 3.5\na.png,off,\n");
+    fn columns_are_numbers_or_words_and_an_empty_cell_is_neither() {
+        let folder = folder("image, lamp, time_s, blank\na.png, on, 3.5,\na.png,off,,\n");
         let read = read_press_columns(folder.path()).unwrap();
         assert_eq!(read.names, ["a.png", "a.png"]);
-        assert_eq!(read.columns[1], ("lamp".to_string(), vec!["on".to_string(), "off".to_string()]));
-        assert_eq!(read.columns[2].1, ["3.5", ""]);
+        assert_eq!(read.columns[1], ("lamp".to_string(), Values::Words(vec!["on".into(), "off".into()])));
+        let Values::Numbers(time_s) = &read.columns[2].1 else { panic!("{:?}", read.columns[2]) };
+        assert!(time_s[0] == 3.5 && time_s[1].is_nan(), "{time_s:?}");
+        assert_eq!(read.columns.len(), 3, "a column of nothing but empty cells is not recorded");
     }
 
     #[test]

@@ -14,14 +14,14 @@ pub use write::write_pull_folder;
 
 use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, LabelEvidenceKind, parse_header};
 use crate::proto::gripgen_v1::Status;
+use crate::table::{TableError, TableReader, bad_cell, read_bytes};
 use cells::{Cells, Column};
 use gripgen_twin::config::PullFile;
-use gripgen_twin::{Covariates, ExtraColumn, MeasuredPull, MeasuredPulls, Values};
+use gripgen_twin::{Covariates, ExtraColumn, MeasuredPull, MeasuredPulls};
 use sha2::{Digest, Sha256};
-use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The table of a folder of measured pulls.
 pub const PULLS_FILE: &str = "pulls.csv";
@@ -33,72 +33,9 @@ pub const TRACES_FOLDER: &str = "traces";
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PullFolderError {
-    /// A file cannot be read.
-    #[error("{}: {problem}", .path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        problem: String,
-    },
-    /// A table lacks a column.
-    #[error("{}: there is no column `{column}`; found: {found}", .path.display())]
-    Column {
-        /// The table.
-        path: PathBuf,
-        /// The column.
-        column: &'static str,
-        /// Columns found.
-        found: String,
-    },
-    /// Two columns have the same name.
-    #[error("{}: there are two columns `{column}`", .path.display())]
-    TwoColumns {
-        /// The table.
-        path: PathBuf,
-        /// Their name.
-        column: String,
-    },
-    /// A cell is not what its column holds.
-    #[error("{}: line {line}, `{column}` is `{value}`, it must be {wanted}", .path.display())]
-    Cell {
-        /// The table.
-        path: PathBuf,
-        /// Line of the file, the header is line 1.
-        line: u64,
-        /// The column.
-        column: String,
-        /// What stands there.
-        value: String,
-        /// What should.
-        wanted: Cow<'static, str>,
-    },
-    /// Two pulls have the same name.
-    #[error("{}: lines {first} and {second} are both pull `{id}`", .path.display())]
-    Duplicate {
-        /// The table.
-        path: PathBuf,
-        /// Line of the first.
-        first: u64,
-        /// Line of the second.
-        second: u64,
-        /// Their name.
-        id: String,
-    },
-    /// A table without rows.
-    #[error("{}: the table holds no rows", .path.display())]
-    Empty {
-        /// The table.
-        path: PathBuf,
-    },
-    /// Rows that the table's format forbids.
-    #[error("{}: {problem}", .path.display())]
-    Table {
-        /// The table.
-        path: PathBuf,
-        /// What the parser says.
-        problem: String,
-    },
+    /// The table, a trace or their folder.
+    #[error(transparent)]
+    Table(#[from] TableError),
     /// The campaign file.
     #[error(transparent)]
     Campaign(#[from] CampaignFileError),
@@ -120,7 +57,7 @@ pub fn read_pull_folder(folder: &Path) -> Result<MeasuredPulls, PullFolderError>
 /// such columns, and by what its trace says of its label.
 pub fn read_judged_pulls(folder: &Path) -> Result<JudgedPulls, PullFolderError> {
     let path = folder.join(PULLS_FILE);
-    let bytes = read(&path)?;
+    let bytes = read_bytes(&path)?;
     let mut hash = Sha256::new();
     feed(&mut hash, PULLS_FILE, &bytes);
     let header = campaign_header(folder, &mut hash)?;
@@ -134,7 +71,7 @@ pub fn read_judged_pulls(folder: &Path) -> Result<JudgedPulls, PullFolderError> 
             continue;
         }
         let path = traces.join(&name);
-        let bytes = read(&path)?;
+        let bytes = read_bytes(&path)?;
         feed(&mut hash, &name, &bytes);
         let (trace, after) = trace::read_trace(&path, &bytes)?;
         (pull.trace, *after_n) = (Some(trace), after);
@@ -151,17 +88,17 @@ fn campaign_header(folder: &Path, hash: &mut Sha256) -> Result<CampaignHeader, P
     let bytes = match std::fs::read(&path) {
         Ok(bytes) => bytes,
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(CampaignHeader::default()),
-        Err(e) => return Err(PullFolderError::Io { path, problem: e.to_string() }),
+        Err(e) => return Err(TableError::Io { path, problem: e.to_string() }.into()),
     };
     feed(hash, CAMPAIGN_FILE, &bytes);
     let text = String::from_utf8(bytes)
-        .map_err(|e| PullFolderError::Io { path: path.clone(), problem: format!("not text: {e}") })?;
+        .map_err(|e| TableError::Io { path: path.clone(), problem: format!("not text: {e}") })?;
     Ok(parse_header(&path, &text)?)
 }
 
 /// Names of the files in the folder of the traces; none where there is no such folder.
-fn trace_files(folder: &Path) -> Result<HashSet<String>, PullFolderError> {
-    let at = |e: std::io::Error| PullFolderError::Io { path: folder.into(), problem: e.to_string() };
+fn trace_files(folder: &Path) -> Result<HashSet<String>, TableError> {
+    let at = |e: std::io::Error| TableError::Io { path: folder.into(), problem: e.to_string() };
     match std::fs::read_dir(folder) {
         Ok(entries) => entries
             .map(|entry| entry.map(|e| e.file_name().to_string_lossy().into_owned()).map_err(at))
@@ -175,16 +112,13 @@ fn read_table(
     path: &Path,
     bytes: &[u8],
     header: &CampaignHeader,
-) -> Result<(MeasuredPulls, Vec<Standing>), PullFolderError> {
-    let table = |e: csv::Error| PullFolderError::Table { path: path.into(), problem: e.to_string() };
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-    let mut columns = cells::columns(path, reader.headers().map_err(table)?)?;
+) -> Result<(MeasuredPulls, Vec<Standing>), TableError> {
+    let mut table = TableReader::new(path, bytes)?;
+    let mut columns = cells::columns(&table)?;
     let mut lines: HashMap<String, u64> = HashMap::new();
     let (mut pulls, mut lines_of) = (Vec::new(), Vec::new());
-    let mut row = csv::StringRecord::new();
     let plain = PullFile::default();
-    while reader.read_record(&mut row).map_err(table)? {
-        let line = row.position().map_or(0, csv::Position::line);
+    while let Some(row) = table.row()? {
         let mut pull = MeasuredPull {
             id: String::new(),
             part: String::new(),
@@ -197,32 +131,22 @@ fn read_table(
             max_pull_force_n: 0.0,
             trace: None,
         };
-        for (column, cell) in columns.iter_mut().zip(row.iter()) {
-            column.take(cell, &mut pull).map_err(|wanted| PullFolderError::Cell {
-                path: path.into(),
-                line,
-                column: column.name.clone(),
-                value: cell.into(),
-                wanted,
-            })?;
+        for (place, column) in columns.iter_mut().enumerate() {
+            column.take(row.cell(place), &mut pull).map_err(|wanted| row.bad(place, wanted))?;
         }
         pull.grip_force_n = header.per_jaw_n(pull.grip_force_n);
-        if let Some(first) = lines.insert(pull.id.clone(), line) {
-            return Err(PullFolderError::Duplicate { path: path.into(), first, second: line, id: pull.id });
+        if let Some(first) = lines.insert(pull.id.clone(), row.line) {
+            let problem = format!("lines {first} and {} are both pull `{}`", row.line, pull.id);
+            return Err(TableError::Rows { path: path.into(), problem });
         }
+        lines_of.push(row.line);
         pulls.push(pull);
-        lines_of.push(line);
     }
     if pulls.is_empty() {
-        return Err(PullFolderError::Empty { path: path.into() });
+        return Err(TableError::Empty { path: path.into() });
     }
-    let standing = standing::stated(&columns, &mut pulls).map_err(|row| PullFolderError::Cell {
-        path: path.into(),
-        line: lines_of[row],
-        column: "max_pull_force_n".into(),
-        value: String::new(),
-        wanted: "a number".into(),
-    })?;
+    let standing = standing::stated(&columns, &mut pulls)
+        .map_err(|row| bad_cell(path, lines_of[row], cells::LABEL.into(), "", "a number".into()))?;
     let recorded = columns.iter().filter_map(Column::recorded).collect();
     let extra: Vec<ExtraColumn> = columns.into_iter().filter_map(extra_column).collect();
     for column in &extra {
@@ -248,12 +172,7 @@ fn read_table(
 /// A column of unknown meaning that holds something.
 fn extra_column(column: Column) -> Option<ExtraColumn> {
     let Cells::Extra(cells) = column.cells else { return None };
-    let values = Values::of_cells(cells.iter().map(|cell| &**cell))?;
-    Some(ExtraColumn { name: column.name, values })
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, PullFolderError> {
-    std::fs::read(path).map_err(|e| PullFolderError::Io { path: path.into(), problem: e.to_string() })
+    Some(ExtraColumn { name: column.name, values: cells.values()? })
 }
 
 /// Adds a file to the hash: its name, its length, its content.

@@ -1,8 +1,9 @@
 //! A folder with `sensor.csv`: a force sensor read beside a reference.
 
 use crate::folder::sha256_hex;
+use crate::table::{TableError, TableReader, TextCells, read_bytes};
 use gripgen_twin::Values;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The table of a force-sensor folder.
 pub const SENSOR_FILE: &str = "sensor.csv";
@@ -33,108 +34,31 @@ pub struct SensorTable {
     pub sha256: String,
 }
 
-/// Why a table could not be read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SensorTableError {
-    /// The file.
-    #[error("{}: {problem}", .path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        problem: String,
-    },
-    /// A column is missing.
-    #[error("{}: there is no column `{column}`; found: {found}", .path.display())]
-    Column {
-        /// The table.
-        path: PathBuf,
-        /// The column.
-        column: &'static str,
-        /// Columns found.
-        found: String,
-    },
-    /// A column stands there twice.
-    #[error("{}: there are two columns `{column}`", .path.display())]
-    Twice {
-        /// The table.
-        path: PathBuf,
-        /// The column.
-        column: String,
-    },
-    /// A cell is not what its column holds.
-    #[error("{}: line {line}, `{column}` is `{value}`, it must be a finite number", .path.display())]
-    Cell {
-        /// The table.
-        path: PathBuf,
-        /// Line of the file, the header is line 1.
-        line: u64,
-        /// The column.
-        column: &'static str,
-        /// What stands there.
-        value: String,
-    },
-    /// Time stands still or runs backwards within a session.
-    #[error(
-        "{}: line {line}, `time_s` is {found} after {before} in session `{session}`, it must rise",
-        .path.display()
-    )]
-    Order {
-        /// The table.
-        path: PathBuf,
-        /// Line of the file.
-        line: u64,
-        /// Time of the row.
-        found: f64,
-        /// Time of the row before.
-        before: f64,
-        /// The session.
-        session: String,
-    },
-    /// Rows that the table's format forbids.
-    #[error("{}: {problem}", .path.display())]
-    Table {
-        /// The table.
-        path: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
-}
-
 /// Reads the table of a folder. Rows of a session stand in the order of their time; sessions may take turns. A table
 /// without `session` is one session. Further columns are kept: numbers where every cell is one or empty, words
-/// otherwise.
-pub fn read_sensor_table(folder: &Path) -> Result<SensorTable, SensorTableError> {
+/// otherwise; a column of nothing but empty cells is not recorded.
+///
+/// # Errors
+/// [`TableError`], with line, column and value.
+pub fn read_sensor_table(folder: &Path) -> Result<SensorTable, TableError> {
     let path = folder.join(SENSOR_FILE);
-    let bytes = std::fs::read(&path)
-        .map_err(|e| SensorTableError::Io { path: path.clone(), problem: e.to_string() })?;
-    parse(&path, &bytes)
+    parse(&path, &read_bytes(&path)?)
 }
 
-fn parse(path: &Path, bytes: &[u8]) -> Result<SensorTable, SensorTableError> {
-    let bad = |e: csv::Error| SensorTableError::Table { path: path.to_path_buf(), problem: e.to_string() };
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
-    let headers = reader.headers().map_err(bad)?.clone();
-    let names: Vec<&str> = headers.iter().collect();
-    for (i, name) in names.iter().enumerate() {
-        if !name.is_empty() && names[..i].contains(name) {
-            return Err(SensorTableError::Twice { path: path.into(), column: (*name).into() });
-        }
-    }
+fn parse(path: &Path, bytes: &[u8]) -> Result<SensorTable, TableError> {
+    let mut reader = TableReader::new(path, bytes)?;
+    reader.check_single()?;
     let mut places = [0; 3];
     for (place, column) in places.iter_mut().zip(REQUIRED) {
-        *place = names.iter().position(|n| *n == column).ok_or_else(|| SensorTableError::Column {
-            path: path.into(),
-            column,
-            found: names.join(", "),
-        })?;
+        *place = reader.required(column)?;
     }
-    let session_at = names.iter().position(|n| *n == SESSION);
-    let extra_at: Vec<usize> = (0..names.len())
-        .filter(|i| !places.contains(i) && Some(*i) != session_at && !names[*i].is_empty())
-        .collect();
+    let session_at = reader.place(SESSION);
+    let mut extra: Vec<(usize, String, TextCells)> = Vec::new();
+    for (i, name) in reader.names().iter().enumerate() {
+        if !places.contains(&i) && Some(i) != session_at && !name.is_empty() {
+            extra.push((i, name.clone(), TextCells::default()));
+        }
+    }
     let mut table = SensorTable {
         time_s: Vec::new(),
         reference_force_n: Vec::new(),
@@ -144,19 +68,13 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<SensorTable, SensorTableError> {
         extra: Vec::new(),
         sha256: sha256_hex(bytes),
     };
-    let mut extra: Vec<Extra> = extra_at.iter().map(|_| Extra::default()).collect();
     let mut last_s: Vec<f64> = Vec::new();
-    let mut row = csv::StringRecord::new();
-    while reader.read_record(&mut row).map_err(bad)? {
-        let line = row.position().map_or(0, csv::Position::line);
+    while let Some(row) = reader.row()? {
         let mut numbers = [0.0; 3];
-        for ((number, &place), column) in numbers.iter_mut().zip(&places).zip(REQUIRED) {
-            let cell = row.get(place).unwrap_or_default();
-            *number = cell.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| {
-                SensorTableError::Cell { path: path.into(), line, column, value: cell.into() }
-            })?;
+        for (number, &place) in numbers.iter_mut().zip(&places) {
+            *number = row.number(place, "a finite number")?;
         }
-        let name = session_at.and_then(|i| row.get(i)).unwrap_or(ONLY_SESSION);
+        let name = session_at.map_or(ONLY_SESSION, |place| row.cell(place));
         let known = match table.session.last() {
             Some(&s) if table.sessions[s] == name => Some(s),
             _ => table.sessions.iter().position(|s| s == name),
@@ -168,66 +86,29 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<SensorTable, SensorTableError> {
         });
         let [time_s, reference, measured] = numbers;
         if time_s <= last_s[session] {
-            return Err(SensorTableError::Order {
-                path: path.into(),
-                line,
-                found: time_s,
-                before: last_s[session],
-                session: name.into(),
-            });
+            let (line, before) = (row.line, last_s[session]);
+            let problem =
+                format!("line {line}, `time_s` is {time_s} after {before} in session `{name}`, it must rise");
+            return Err(TableError::Rows { path: path.into(), problem });
         }
         last_s[session] = time_s;
         table.time_s.push(time_s);
         table.reference_force_n.push(reference);
         table.measured_force_n.push(measured);
         table.session.push(session);
-        for (column, &i) in extra.iter_mut().zip(&extra_at) {
-            column.push(row.get(i).unwrap_or_default());
+        for (place, _, cells) in &mut extra {
+            cells.push(row.cell(*place));
         }
     }
-    table.extra =
-        extra_at.iter().zip(extra).map(|(&i, column)| (names[i].to_string(), column.values())).collect();
+    table.extra = extra.into_iter().filter_map(|(_, name, cells)| Some((name, cells.values()?))).collect();
     Ok(table)
-}
-
-/// A column whose kind is not known yet. Cells are kept as text only from the first word on.
-#[derive(Default)]
-struct Extra {
-    numbers: Vec<f64>,
-    words: Option<Vec<String>>,
-}
-
-impl Extra {
-    fn push(&mut self, cell: &str) {
-        if let Some(words) = &mut self.words {
-            words.push(cell.into());
-            return;
-        }
-        match cell.parse::<f64>() {
-            Ok(x) => self.numbers.push(x),
-            Err(_) if cell.is_empty() => self.numbers.push(f64::NAN),
-            Err(_) => {
-                let text = |x: &f64| if x.is_finite() { format!("{x}") } else { String::new() };
-                let mut words: Vec<String> = self.numbers.iter().map(text).collect();
-                words.push(cell.into());
-                self.words = Some(words);
-            }
-        }
-    }
-
-    fn values(self) -> Values {
-        match self.words {
-            Some(words) => Values::Words(words),
-            None => Values::Numbers(self.numbers),
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn read(table: &str) -> Result<SensorTable, SensorTableError> {
+    fn read(table: &str) -> Result<SensorTable, TableError> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join(SENSOR_FILE), table).unwrap();
         read_sensor_table(folder.path())
@@ -278,7 +159,7 @@ mod tests {
         }
         assert!(matches!(
             read_sensor_table(Path::new("/nowhere/at/all")).unwrap_err(),
-            SensorTableError::Io { .. }
+            TableError::Io { .. }
         ));
         let empty = read("time_s,reference_force_n,measured_force_n\n").unwrap();
         assert!(empty.time_s.is_empty() && empty.sessions.is_empty());

@@ -1,17 +1,16 @@
 //! What each column of a pull table means.
 
-use super::PullFolderError;
 use crate::proto::gripgen_v1::Status;
+use crate::table::{TableError, TableReader, TextCells, number};
 use gripgen_twin::MeasuredPull;
 use gripgen_twin::columns::{COLUMNS, Column as PullColumn, InTable};
 use std::borrow::Cow;
-use std::path::Path;
 
 /// Length of a step where nobody wrote it down: the mean of Wucherer et al. 2023.
 pub(super) const DEFAULT_STEP_S: f64 = 0.104;
 
 const ID: &str = "pull_id";
-const LABEL: &str = "max_pull_force_n";
+pub(super) const LABEL: &str = "max_pull_force_n";
 
 /// A column of the table.
 pub(super) struct Column {
@@ -30,7 +29,7 @@ pub(super) enum Cells {
     /// Its label.
     Label,
     /// A covariate of unknown meaning.
-    Extra(Vec<Box<str>>),
+    Extra(TextCells),
     /// How the pull ended.
     Status(Vec<Status>),
     /// Why.
@@ -57,11 +56,11 @@ impl Column {
                 Ok(())
             }
             Cells::Label => {
-                pull.max_pull_force_n = number(cell)?;
+                pull.max_pull_force_n = number(cell).ok_or("a number")?;
                 Ok(())
             }
             Cells::Extra(cells) => {
-                cells.push(cell.into());
+                cells.push(cell);
                 Ok(())
             }
             Cells::Status(found) => {
@@ -90,21 +89,11 @@ fn required() -> impl Iterator<Item = &'static str> {
 }
 
 /// The columns of a header; those that are required have to be there.
-pub(super) fn columns(path: &Path, header: &csv::StringRecord) -> Result<Vec<Column>, PullFolderError> {
-    let names: Vec<&str> = header.iter().map(|name| name.trim_start_matches('\u{feff}').trim()).collect();
-    for column in required() {
-        if !names.contains(&column) {
-            let found = names.join(", ");
-            return Err(PullFolderError::Column { path: path.into(), column, found });
-        }
-    }
-    for (i, &name) in names.iter().enumerate() {
-        if !name.is_empty() && names[..i].contains(&name) {
-            return Err(PullFolderError::TwoColumns { path: path.into(), column: name.into() });
-        }
-    }
-    let column = |&name: &&str| Column { name: name.into(), cells: cells(name), filled: 0 };
-    Ok(names.iter().map(column).collect())
+pub(super) fn columns(table: &TableReader<'_>) -> Result<Vec<Column>, TableError> {
+    required().try_for_each(|name| table.required(name).map(|_| ()))?;
+    table.check_single()?;
+    let column = |name: &String| Column { name: name.clone(), cells: cells(name), filled: 0 };
+    Ok(table.names().iter().map(column).collect())
 }
 
 fn cells(name: &str) -> Cells {
@@ -116,7 +105,7 @@ fn cells(name: &str) -> Cells {
         (LABEL, _) => Cells::Label,
         ("status", _) => Cells::Status(Vec::new()),
         ("status_reason", _) => Cells::Reason(Vec::new()),
-        _ => Cells::Extra(Vec::new()),
+        _ => Cells::Extra(TextCells::default()),
     }
 }
 
@@ -140,9 +129,4 @@ fn file_name(cell: &str) -> Result<(), &'static str> {
         _ if path => Err("a name without `/`, `\\` and `:`"),
         _ => Ok(()),
     }
-}
-
-/// A number of a cell; otherwise what it must be.
-pub(super) fn number(cell: &str) -> Result<f64, &'static str> {
-    cell.parse().ok().filter(|x: &f64| x.is_finite()).ok_or("a number")
 }

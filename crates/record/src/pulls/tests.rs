@@ -1,4 +1,5 @@
 use super::*;
+use gripgen_twin::Values;
 use gripgen_twin::config::Feedback;
 use gripgen_twin::draw::Drawn;
 

@@ -1,7 +1,8 @@
 //! Writing a folder of measured pulls: the inverse of reading one.
 
-use super::{PULLS_FILE, PullFolderError, TRACES_FOLDER};
+use super::{PULLS_FILE, TRACES_FOLDER};
 use crate::campaign::{CAMPAIGN_FILE, header_toml};
+use crate::table::TableError;
 use gripgen_twin::columns::{COLUMNS, Column, InTable, Scale, recorded_covariates};
 use gripgen_twin::{MeasuredPulls, PullTrace};
 use std::fs::File;
@@ -12,17 +13,17 @@ use std::path::Path;
 ///
 /// Columns that were not recorded are left out. A number is written so that it is read back as it was, in the unit of its
 /// column; millimetres and degrees without the last bits that the way to SI and back costs.
-pub fn write_pull_folder(folder: &Path, measured: &MeasuredPulls) -> Result<(), PullFolderError> {
+pub fn write_pull_folder(folder: &Path, measured: &MeasuredPulls) -> Result<(), TableError> {
     let at = |path: &Path| {
         let path = path.to_path_buf();
-        move |e: std::io::Error| PullFolderError::Io { path, problem: e.to_string() }
+        move |e: std::io::Error| TableError::Io { path, problem: e.to_string() }
     };
     let table = folder.join(PULLS_FILE);
     std::fs::create_dir_all(folder).map_err(at(folder))?;
     // Made first and only if it is not there, so that nobody's measurements are lost.
     let mut file = File::create_new(&table).map_err(at(&table))?;
     file.write_all(
-        &table_csv(measured).map_err(|problem| PullFolderError::Table { path: table.clone(), problem })?,
+        &table_csv(measured).map_err(|problem| TableError::Rows { path: table.clone(), problem })?,
     )
     .map_err(at(&table))?;
     let campaign = folder.join(CAMPAIGN_FILE);

@@ -1,0 +1,319 @@
+//! Tables that people hand in: CSV with a header, read row by row, with one kind of error.
+
+use gripgen_twin::Values;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+/// Why a table could not be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// A file or folder cannot be read.
+    #[error("{}: {problem}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        problem: String,
+    },
+    /// The table lacks a column.
+    #[error("{}: there is no column `{column}`; found: {found}{}", .path.display(), in_brackets(.hint))]
+    Column {
+        /// The table.
+        path: PathBuf,
+        /// The column.
+        column: &'static str,
+        /// Columns found.
+        found: String,
+        /// What may be the matter.
+        hint: Option<String>,
+    },
+    /// Two columns have the same name.
+    #[error("{}: there are two columns `{column}`", .path.display())]
+    TwoColumns {
+        /// The table.
+        path: PathBuf,
+        /// Their name.
+        column: String,
+    },
+    /// A cell is not what its column holds.
+    #[error(
+        "{}: line {line}, `{column}` is `{value}`, it must be {wanted}{}",
+        .path.display(),
+        in_brackets(.hint)
+    )]
+    Cell {
+        /// The table.
+        path: PathBuf,
+        /// Line of the file, the header is line 1.
+        line: u64,
+        /// The column.
+        column: String,
+        /// What stands there.
+        value: String,
+        /// What should.
+        wanted: Cow<'static, str>,
+        /// What may be the matter.
+        hint: Option<String>,
+    },
+    /// Rows that do not fit together.
+    #[error("{}: {problem}", .path.display())]
+    Rows {
+        /// The table.
+        path: PathBuf,
+        /// Which, and why.
+        problem: String,
+    },
+    /// A table without rows.
+    #[error("{}: the table holds no rows", .path.display())]
+    Empty {
+        /// The table.
+        path: PathBuf,
+    },
+    /// What CSV forbids.
+    #[error("{}: {problem}{}", .path.display(), in_brackets(.hint))]
+    Format {
+        /// The table.
+        path: PathBuf,
+        /// What the parser says.
+        problem: String,
+        /// What may be the matter.
+        hint: Option<String>,
+    },
+}
+
+fn in_brackets(hint: &Option<String>) -> String {
+    hint.as_ref().map_or(String::new(), |hint| format!(" ({hint})"))
+}
+
+/// The content of a file.
+///
+/// # Errors
+/// [`TableError::Io`].
+pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, TableError> {
+    std::fs::read(path).map_err(|e| TableError::Io { path: path.into(), problem: e.to_string() })
+}
+
+/// A table that is read row by row.
+pub(crate) struct TableReader<'a> {
+    path: &'a Path,
+    names: Vec<String>,
+    reader: csv::Reader<&'a [u8]>,
+    record: csv::StringRecord,
+}
+
+/// A row of a table.
+pub(crate) struct Row<'r> {
+    path: &'r Path,
+    names: &'r [String],
+    record: &'r csv::StringRecord,
+    /// Line of the file, the header is line 1.
+    pub(crate) line: u64,
+}
+
+impl<'a> TableReader<'a> {
+    /// Reads the header; `path` is for errors.
+    ///
+    /// # Errors
+    /// [`TableError::Format`].
+    pub(crate) fn new(path: &'a Path, bytes: &'a [u8]) -> Result<Self, TableError> {
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
+        let header = reader.headers().map_err(|e| format_error(path, &e))?;
+        let names = header.iter().map(|name| name.trim_start_matches('\u{feff}').trim().into()).collect();
+        Ok(Self { path, names, reader, record: csv::StringRecord::new() })
+    }
+
+    /// Names of the columns, empty where a column has none.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The place of a column; the first of them where there are two.
+    pub(crate) fn place(&self, column: &str) -> Option<usize> {
+        self.names.iter().position(|name| name == column)
+    }
+
+    /// The place of a column that has to be there.
+    ///
+    /// # Errors
+    /// [`TableError::Column`] with the columns found.
+    pub(crate) fn required(&self, column: &'static str) -> Result<usize, TableError> {
+        self.place(column).ok_or_else(|| {
+            let semicolons = self.names.len() == 1 && self.names[0].contains(';');
+            let hint =
+                semicolons.then(|| "the header is one cell with `;` in it: save it with commas".into());
+            TableError::Column { path: self.path.into(), column, found: self.names.join(", "), hint }
+        })
+    }
+
+    /// Checks that no two columns have the same name.
+    ///
+    /// # Errors
+    /// [`TableError::TwoColumns`].
+    pub(crate) fn check_single(&self) -> Result<(), TableError> {
+        let twice = |(i, name): &(usize, &String)| !name.is_empty() && self.names[..*i].contains(name);
+        match self.names.iter().enumerate().find(twice) {
+            Some((_, name)) => Err(TableError::TwoColumns { path: self.path.into(), column: name.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    /// The next row; `None` after the last.
+    ///
+    /// # Errors
+    /// [`TableError::Format`].
+    pub(crate) fn row(&mut self) -> Result<Option<Row<'_>>, TableError> {
+        let more = self.reader.read_record(&mut self.record).map_err(|e| format_error(self.path, &e))?;
+        let line = self.record.position().map_or(0, csv::Position::line);
+        Ok(more.then_some(Row { path: self.path, names: &self.names, record: &self.record, line }))
+    }
+}
+
+fn format_error(path: &Path, e: &csv::Error) -> TableError {
+    let hint = match e.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } if len > expected_len => {
+            Some("a number with a decimal comma counts as two cells".into())
+        }
+        _ => None,
+    };
+    TableError::Format { path: path.into(), problem: e.to_string(), hint }
+}
+
+impl Row<'_> {
+    /// The cell of a column; empty where there is none.
+    pub(crate) fn cell(&self, place: usize) -> &str {
+        self.record.get(place).unwrap_or_default()
+    }
+
+    /// A number.
+    ///
+    /// # Errors
+    /// [`TableError::Cell`] if it is none, or not finite: it must be what is `wanted`.
+    pub(crate) fn number(&self, place: usize, wanted: &'static str) -> Result<f64, TableError> {
+        number(self.cell(place)).ok_or_else(|| self.bad(place, wanted))
+    }
+
+    /// What is wrong with a cell that must be what is `wanted`.
+    pub(crate) fn bad(&self, place: usize, wanted: impl Into<Cow<'static, str>>) -> TableError {
+        let column = self.names.get(place).cloned().unwrap_or_default();
+        bad_cell(self.path, self.line, column, self.cell(place), wanted.into())
+    }
+}
+
+/// What is wrong with a cell that must be what is `wanted`.
+pub(crate) fn bad_cell(
+    path: &Path,
+    line: u64,
+    column: String,
+    cell: &str,
+    wanted: Cow<'static, str>,
+) -> TableError {
+    let with_point = cell.replacen(',', ".", 1);
+    let comma = cell.contains(',') && number(&with_point).is_some();
+    let hint = comma.then(|| format!("`{cell}` has a decimal comma, write {with_point}"));
+    TableError::Cell { path: path.into(), line, column, value: cell.into(), wanted, hint }
+}
+
+/// A finite number.
+pub(crate) fn number(cell: &str) -> Option<f64> {
+    cell.parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+/// The cells of a column whose kind is not known yet, one behind the other: a table may have a million of them.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct TextCells {
+    text: String,
+    ends: Vec<usize>,
+}
+
+impl TextCells {
+    /// Adds a cell.
+    pub(crate) fn push(&mut self, cell: &str) {
+        self.text.push_str(cell);
+        self.ends.push(self.text.len());
+    }
+
+    /// What they hold; `None` if all of them are empty.
+    pub(crate) fn values(&self) -> Option<Values> {
+        Values::of_cells((0..self.ends.len()).map(|i| {
+            let begins = i.checked_sub(1).map_or(0, |before| self.ends[before]);
+            &self.text[begins..self.ends[i]]
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault(text: &str) -> String {
+        let read = |text: &str| {
+            let mut table = TableReader::new(Path::new("a.csv"), text.as_bytes())?;
+            table.check_single()?;
+            let place = table.required("force_n")?;
+            while let Some(row) = table.row()? {
+                row.number(place, "a number")?;
+            }
+            Ok::<(), TableError>(())
+        };
+        read(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn faults_name_path_row_column_value_and_what_is_wanted() {
+        for (text, wanted) in [
+            ("time_s,force\n", "a.csv: there is no column `force_n`; found: time_s, force"),
+            ("", "a.csv: there is no column `force_n`; found: "),
+            ("force_n,force_n\n", "a.csv: there are two columns `force_n`"),
+            ("force_n,a\n1,2\nx,2\n", "a.csv: line 3, `force_n` is `x`, it must be a number"),
+            ("force_n,a\ninf,2\n", "a.csv: line 2, `force_n` is `inf`, it must be a number"),
+            ("force_n,a\n,2\n", "a.csv: line 2, `force_n` is ``, it must be a number"),
+        ] {
+            assert_eq!(fault(text), wanted, "{text:?}");
+        }
+        let short = fault("force_n,a\n1\n");
+        assert!(short.contains("line: 2") && !short.contains("comma"), "{short}");
+    }
+
+    #[test]
+    fn semicolons_and_decimal_commas_are_named() {
+        let semicolons = fault("time_s;force_n\n0;12,5\n");
+        assert!(semicolons.contains("no column `force_n`; found: time_s;force_n"), "{semicolons}");
+        assert!(
+            semicolons.ends_with("(the header is one cell with `;` in it: save it with commas)"),
+            "{semicolons}"
+        );
+        let quoted = fault("force_n,a\n\"12,5\",2\n");
+        assert!(quoted.ends_with("it must be a number (`12,5` has a decimal comma, write 12.5)"), "{quoted}");
+        let bare = fault("force_n,a\n12,5,2\n");
+        assert!(
+            bare.contains("line: 2") && bare.ends_with("(a number with a decimal comma counts as two cells)"),
+            "{bare}"
+        );
+        assert!(!fault("force_n,a\n\"1,2,3\",2\n").contains("decimal comma"));
+    }
+
+    #[test]
+    fn a_byte_order_mark_and_blanks_are_no_part_of_a_name() {
+        let text = "\u{feff}\"force_n\" , a\n 1 ,2\n";
+        let mut table = TableReader::new(Path::new("a.csv"), text.as_bytes()).unwrap();
+        assert_eq!(table.names(), ["force_n", "a"]);
+        assert_eq!((table.place("a"), table.place("b")), (Some(1), None));
+        let row = table.row().unwrap().unwrap();
+        assert_eq!((row.cell(0), row.cell(7), row.line), ("1", "", 2));
+        assert!(table.row().unwrap().is_none());
+    }
+
+    #[test]
+    fn cells_become_values() {
+        let mut cells = TextCells::default();
+        assert_eq!(cells.values(), None);
+        cells.push("");
+        assert_eq!(cells.values(), None, "nobody wrote anything down");
+        cells.push("7.0");
+        assert!(matches!(cells.values(), Some(Values::Numbers(x)) if x[0].is_nan() && x[1] == 7.0));
+        cells.push("ann");
+        assert_eq!(cells.values(), Some(Values::Words(vec!["".into(), "7.0".into(), "ann".into()])));
+    }
+}
