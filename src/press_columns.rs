@@ -73,3 +73,25 @@ pub fn presses_sha256(set: &PressSet) -> String {
     }
     sha256_hex(text.as_bytes())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_leaves_a_column_of_numbers_and_takes_the_clock() {
+        let folder = tempfile::tempdir().unwrap();
+        let load = |text: &str| {
+            std::fs::write(folder.path().join(PRESSES_FILE), text).unwrap();
+            load_press_columns(folder.path()).unwrap()
+        };
+        let whole = load("image,time_s,lamp_v,x_px\na.png,100,1.5,3\nb.png,103,,4\n");
+        assert_eq!((whole.time_s, whole.covariates.len()), (Some(vec![0.0, 3.0]), 1));
+        let Values::Numbers(lamp_v) = &whole.covariates[0].values else { panic!("{:?}", whole.covariates) };
+        assert!(lamp_v[0] == 1.5 && lamp_v[1].is_nan(), "{lamp_v:?}");
+        let mut gap = load("image,time_s,lamp\na.png,100,on\nb.png,,off\n");
+        assert_eq!((gap.time_s.clone(), gap.covariates.len()), (None, 2));
+        gap.leave_out(&["a.png".into()]);
+        assert_eq!(gap.covariates[1].values, Values::Words(vec!["off".into()]));
+    }
+}

@@ -276,3 +276,21 @@ pub(super) fn pull_settings(file: &PullFile) -> Result<PullSettings, ConfigError
     }
     Ok(settings)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_a_column_in_tables_leads_to_its_key() {
+        let hint = |key: &str| unknown_key(format!("vary.{key}"), key).hint.unwrap_or_default();
+        assert_eq!(hint("force_increment_n"), "did you mean `pull.increment_n`?");
+        assert_eq!(hint("step_time_s"), "did you mean `pull.step_s`?");
+        assert_eq!(hint("grip_forc_n"), "did you mean `grip_force_n`?");
+        let other = hint("humidity");
+        assert!(
+            other.starts_with("keys of a scenario: part, grip_pose, gel_id, session, grip_force_n, dwell_s"),
+            "{other}"
+        );
+    }
+}

@@ -1,0 +1,146 @@
+//! Tables that people hand in: what is written is read back, and what is wrong is named.
+
+use gripgen_record::{
+    TableError, read_press_columns, read_press_folder, read_pull_folder, read_sensor_table, write_pull_folder,
+};
+use gripgen_twin::columns::{COLUMNS, Column, InTable, Kind, covariates};
+use gripgen_twin::draw::Drawn;
+use gripgen_twin::random::{Purpose, Stream};
+use gripgen_twin::{Covariates, ExtraColumn, MeasuredPull, MeasuredPulls, Values};
+use std::path::Path;
+
+/// A cell that a column may hold, drawn at random.
+fn cell(column: &Column, random: &mut Stream) -> String {
+    // Six decimals: finer ones of millimetres and degrees get lost on the way to SI and back.
+    let number = ((random.uniform() * 2e8).round() + 1.0) / 1e6;
+    match column.kind {
+        Kind::Name | Kind::Word => format!("{} \"{}\", {}", column.name, number, random.uniform() < 0.5),
+        Kind::Whole => (random.uniform() * 1e9).floor().to_string(),
+        Kind::Direction => if random.uniform() < 0.5 { "1" } else { "-1" }.into(),
+        Kind::Number => number.to_string(),
+    }
+}
+
+fn campaign(seed: u64) -> MeasuredPulls {
+    let mut random = Stream::new(seed, 0, Purpose::Draw);
+    let recorded: Vec<&Column> =
+        covariates().filter(|c| c.in_table == InTable::Required || random.uniform() < 0.6).collect();
+    let starts = random.uniform() < 0.5;
+    let rows = 1 + (random.uniform() * 5.0) as usize;
+    let mut pulls = Vec::new();
+    for i in 0..rows {
+        let mut pull = MeasuredPull {
+            id: format!("pull {i}"),
+            part: String::new(),
+            grip_pose: 0,
+            grip_force_n: 0.0,
+            increment_n: 1.0,
+            start_n: None,
+            step_s: 0.104,
+            covariates: Covariates::default(),
+            max_pull_force_n: random.uniform() * 30.0 - 1.0,
+            trace: None,
+        };
+        let settings = COLUMNS.iter().filter(|c| c.in_table == InTable::Setting && starts);
+        for column in recorded.iter().copied().chain(settings) {
+            column.read_cell(&cell(column, &mut random), &mut pull.edit()).unwrap();
+        }
+        pulls.push(pull);
+    }
+    let numbers: Vec<f64> =
+        (0..rows).map(|_| if random.uniform() < 0.3 { f64::NAN } else { random.uniform() - 0.5 }).collect();
+    let words = (0..rows).map(|i| if i % 2 == 0 { "ann, b".into() } else { String::new() }).collect();
+    let extra = [("gloves", Values::Words(words)), ("lamp_v", Values::Numbers(numbers))];
+    let mut measured = MeasuredPulls {
+        pulls,
+        recorded: recorded.iter().map(|c| c.name.into()).collect(),
+        extra: extra.map(|(name, values)| ExtraColumn { name: name.into(), values }).into(),
+        label_tolerance_n: 2.5,
+        stop_m: 4e-3,
+        feedback: None,
+        sha256: String::new(),
+    };
+    // A column without any value is not written down.
+    measured.extra.retain(|column| (0..rows).any(|i| column.values.at(i).is_some()));
+    for column in &measured.extra {
+        for (i, pull) in measured.pulls.iter_mut().enumerate() {
+            let value: Option<Drawn> = column.values.at(i);
+            pull.covariates.extra.extend(value.map(|value| (column.name.clone(), value)));
+        }
+    }
+    measured.count_rests();
+    measured
+}
+
+/// For any values of any columns: what the writer writes the reader reads back, bit by bit.
+#[test]
+fn campaigns_of_any_columns_are_read_back_as_they_were_written() {
+    let folder = tempfile::tempdir().unwrap();
+    for seed in 0..300 {
+        let (wanted, out) = (campaign(seed), folder.path().join(seed.to_string()));
+        write_pull_folder(&out, &wanted).unwrap();
+        let mut read = read_pull_folder(&out).unwrap();
+        read.sha256.clear();
+        // What nobody wrote down is no number, which is not equal to itself.
+        assert_eq!(format!("{read:?}"), format!("{wanted:?}"), "seed {seed}");
+    }
+}
+
+fn with_file(name: &str, text: &str, read: &dyn Fn(&Path) -> String) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("traces")).unwrap();
+    let pulls = "pull_id,part,grip_force_n,max_pull_force_n\na,gear,20,6\n";
+    std::fs::write(folder.path().join("pulls.csv"), pulls).unwrap();
+    std::fs::write(folder.path().join(name), text).unwrap();
+    read(folder.path())
+}
+
+/// The two mistakes of spreadsheets are named, whichever table has them.
+#[test]
+fn every_table_names_semicolons_and_decimal_commas() {
+    let pulls: &dyn Fn(&Path) -> String = &|p| read_pull_folder(p).unwrap_err().to_string();
+    let sensor: &dyn Fn(&Path) -> String = &|p| read_sensor_table(p).unwrap_err().to_string();
+    let presses: &dyn Fn(&Path) -> String = &|p| read_press_folder(p).unwrap_err().to_string();
+    for (file, header, row, read) in [
+        ("pulls.csv", "pull_id,part,grip_force_n,max_pull_force_n", "a,gear,\"12,5\",6", pulls),
+        ("traces/a.csv", "time_s,desired_force_n,measured_force_n,displacement_mm", "0,1,\"12,5\",0", pulls),
+        ("sensor.csv", "time_s,reference_force_n,measured_force_n", "0,\"12,5\",2", sensor),
+        ("presses.csv", "image,x_px", "a.png,\"12,5\"", presses),
+    ] {
+        let name = file.rsplit('/').next().unwrap();
+        let comma = with_file(file, &format!("{header}\n{row}\n"), read);
+        assert!(comma.contains(name) && comma.contains("line 2"), "{comma}");
+        assert!(comma.contains("`12,5` has a decimal comma, write 12.5"), "{comma}");
+        let semicolons = with_file(file, &format!("{header}\n{row}\n").replace(',', ";"), read);
+        assert!(semicolons.contains(name) && semicolons.contains("save it with commas"), "{semicolons}");
+    }
+}
+
+/// An empty cell is a value that nobody wrote down, and a column of nothing else is not recorded, in every table.
+#[test]
+fn an_empty_cell_means_the_same_in_every_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write(
+        "pulls.csv",
+        "pull_id,part,grip_force_n,max_pull_force_n,lamp_v,blank\na,g,20,6,1.5,\nb,g,20,6,,\n",
+    );
+    write("sensor.csv", "time_s,reference_force_n,measured_force_n,lamp_v,blank\n0,1,2,1.5,\n1,1,2,,\n");
+    write("presses.csv", "image,lamp_v,blank\na.png,1.5,\nb.png,,\n");
+    let pulls = read_pull_folder(folder.path()).unwrap().extra;
+    let found = [
+        pulls.into_iter().map(|c| (c.name, c.values)).collect(),
+        read_sensor_table(folder.path()).unwrap().extra,
+        read_press_columns(folder.path()).unwrap().columns.into_iter().filter(|c| c.0 != "image").collect(),
+    ];
+    for columns in found {
+        let [(name, Values::Numbers(x))] = &columns[..] else { panic!("{columns:?}") };
+        assert!(name == "lamp_v" && x[0] == 1.5 && x[1].is_nan(), "{columns:?}");
+    }
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named() {
+    let error = read_sensor_table(Path::new("/nowhere/at/all")).unwrap_err();
+    assert!(matches!(&error, TableError::Io { path, .. } if path.ends_with("sensor.csv")), "{error}");
+}
