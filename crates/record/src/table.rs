@@ -117,9 +117,9 @@ impl<'a> TableReader<'a> {
     /// # Errors
     /// [`TableError::Format`].
     pub(crate) fn new(path: &'a Path, bytes: &'a [u8]) -> Result<Self, TableError> {
-        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
         let header = reader.headers().map_err(|e| format_error(path, &e))?;
+        // The parser takes a byte order mark off the file; a header pasted behind another has one inside.
         let names = header.iter().map(|name| name.trim_start_matches('\u{feff}').trim().into()).collect();
         Ok(Self { path, names, reader, record: csv::StringRecord::new() })
     }
