@@ -23,6 +23,8 @@ mod rig_run;
 mod sensor_table;
 mod shard;
 mod table;
+#[cfg(test)]
+mod tests;
 mod verify;
 
 pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};

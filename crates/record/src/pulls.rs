@@ -14,7 +14,7 @@ pub use write::write_pull_folder;
 
 use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, LabelEvidenceKind, parse_header};
 use crate::proto::gripgen_v1::Status;
-use crate::table::{TableError, TableReader, bad_cell, read_bytes};
+use crate::table::{TableError, TableReader, read_bytes};
 use cells::{Cells, Column};
 use gripgen_twin::config::PullFile;
 use gripgen_twin::{Covariates, ExtraColumn, MeasuredPull, MeasuredPulls};
@@ -145,8 +145,13 @@ fn read_table(
     if pulls.is_empty() {
         return Err(TableError::Empty { path: path.into() });
     }
-    let standing = standing::stated(&columns, &mut pulls)
-        .map_err(|row| bad_cell(path, lines_of[row], cells::LABEL.into(), "", "a number".into()))?;
+    let standing = standing::stated(&columns, &mut pulls).map_err(|row| TableError::Cell {
+        path: path.into(),
+        line: lines_of[row],
+        column: cells::LABEL.into(),
+        value: String::new(),
+        wanted: "a number".into(),
+    })?;
     let recorded = columns.iter().filter_map(Column::recorded).collect();
     let extra: Vec<ExtraColumn> = columns.into_iter().filter_map(extra_column).collect();
     for column in &extra {

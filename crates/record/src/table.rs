@@ -17,7 +17,7 @@ pub enum TableError {
         problem: String,
     },
     /// The table lacks a column.
-    #[error("{}: there is no column `{column}`; found: {found}{}", .path.display(), in_brackets(.hint))]
+    #[error("{}: there is no column `{column}`; found: {found}{}", .path.display(), semicolons(.found))]
     Column {
         /// The table.
         path: PathBuf,
@@ -25,8 +25,6 @@ pub enum TableError {
         column: &'static str,
         /// Columns found.
         found: String,
-        /// What may be the matter.
-        hint: Option<String>,
     },
     /// Two columns have the same name.
     #[error("{}: there are two columns `{column}`", .path.display())]
@@ -40,7 +38,7 @@ pub enum TableError {
     #[error(
         "{}: line {line}, `{column}` is `{value}`, it must be {wanted}{}",
         .path.display(),
-        in_brackets(.hint)
+        decimal_comma(.value)
     )]
     Cell {
         /// The table.
@@ -53,8 +51,6 @@ pub enum TableError {
         value: String,
         /// What should.
         wanted: Cow<'static, str>,
-        /// What may be the matter.
-        hint: Option<String>,
     },
     /// Rows that do not fit together.
     #[error("{}: {problem}", .path.display())]
@@ -71,19 +67,28 @@ pub enum TableError {
         path: PathBuf,
     },
     /// What CSV forbids.
-    #[error("{}: {problem}{}", .path.display(), in_brackets(.hint))]
+    #[error("{}: {problem}{}", .path.display(), .hint)]
     Format {
         /// The table.
         path: PathBuf,
         /// What the parser says.
         problem: String,
-        /// What may be the matter.
-        hint: Option<String>,
+        /// What may be the matter, in brackets; empty where nobody knows.
+        hint: &'static str,
     },
 }
 
-fn in_brackets(hint: &Option<String>) -> String {
-    hint.as_ref().map_or(String::new(), |hint| format!(" ({hint})"))
+/// What may be the matter with a header.
+fn semicolons(found: &str) -> &'static str {
+    let one_cell = found.contains(';') && !found.contains(", ");
+    if one_cell { " (the header is one cell with `;` in it: save it with commas)" } else { "" }
+}
+
+/// What may be the matter with a cell.
+fn decimal_comma(cell: &str) -> String {
+    let with_point = cell.replacen(',', ".", 1);
+    let comma = cell.contains(',') && number(&with_point).is_some();
+    if comma { format!(" (`{cell}` has a decimal comma, write {with_point})") } else { String::new() }
 }
 
 /// The content of a file.
@@ -139,11 +144,10 @@ impl<'a> TableReader<'a> {
     /// # Errors
     /// [`TableError::Column`] with the columns found.
     pub(crate) fn required(&self, column: &'static str) -> Result<usize, TableError> {
-        self.place(column).ok_or_else(|| {
-            let semicolons = self.names.len() == 1 && self.names[0].contains(';');
-            let hint =
-                semicolons.then(|| "the header is one cell with `;` in it: save it with commas".into());
-            TableError::Column { path: self.path.into(), column, found: self.names.join(", "), hint }
+        self.place(column).ok_or_else(|| TableError::Column {
+            path: self.path.into(),
+            column,
+            found: self.names.join(", "),
         })
     }
 
@@ -173,9 +177,9 @@ impl<'a> TableReader<'a> {
 fn format_error(path: &Path, e: &csv::Error) -> TableError {
     let hint = match e.kind() {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } if len > expected_len => {
-            Some("a number with a decimal comma counts as two cells".into())
+            " (a number with a decimal comma counts as two cells)"
         }
-        _ => None,
+        _ => "",
     };
     TableError::Format { path: path.into(), problem: e.to_string(), hint }
 }
@@ -197,22 +201,9 @@ impl Row<'_> {
     /// What is wrong with a cell that must be what is `wanted`.
     pub(crate) fn bad(&self, place: usize, wanted: impl Into<Cow<'static, str>>) -> TableError {
         let column = self.names.get(place).cloned().unwrap_or_default();
-        bad_cell(self.path, self.line, column, self.cell(place), wanted.into())
+        let (path, value) = (self.path.into(), self.cell(place).into());
+        TableError::Cell { path, line: self.line, column, value, wanted: wanted.into() }
     }
-}
-
-/// What is wrong with a cell that must be what is `wanted`.
-pub(crate) fn bad_cell(
-    path: &Path,
-    line: u64,
-    column: String,
-    cell: &str,
-    wanted: Cow<'static, str>,
-) -> TableError {
-    let with_point = cell.replacen(',', ".", 1);
-    let comma = cell.contains(',') && number(&with_point).is_some();
-    let hint = comma.then(|| format!("`{cell}` has a decimal comma, write {with_point}"));
-    TableError::Cell { path: path.into(), line, column, value: cell.into(), wanted, hint }
 }
 
 /// A finite number.

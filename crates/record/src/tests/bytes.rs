@@ -1,7 +1,7 @@
 //! The bytes of tables: names and order of columns, numbers as they are written.
 
-use gripgen_record::proto::gripgen_v1::{Sample, Status};
-use gripgen_record::{
+use crate::proto::gripgen_v1::{Sample, Status};
+use crate::{
     Dataset, csv_lines, extra_columns, index_header, index_row, read_pull_folder, write_pull_folder,
 };
 use std::collections::HashMap;

@@ -1,0 +1,4 @@
+//! Tests of several files at once.
+
+mod bytes;
+mod tables;
