@@ -4,12 +4,12 @@ use crate::index::index_row;
 use crate::picture::{PictureError, encode_png};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1 as proto;
-use gripgen_twin::columns::{COLUMNS, Held, PullView, Scale};
+use gripgen_twin::columns::Scale;
 use gripgen_twin::config::{ImageStorage, TraceStorage};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{
-    Covariates, ImprintSummary, Jaw, Outcome, PerJaw, PullTrace, Sample, Scenario, SlipLabel, TactileImage,
+    ImprintSummary, Jaw, Outcome, PerJaw, PullTrace, Sample, Scenario, SlipLabel, TactileImage,
 };
 use prost::Message;
 use prost_types::Timestamp;
@@ -146,41 +146,6 @@ pub(crate) fn scenario_message(s: &Scenario, timestamp: Option<Timestamp>) -> pr
         }
     }
     message
-}
-
-/// The circumstances of a stored sample: the inverse of [`scenario_message`]. Columns without a field of their own are those
-/// that were drawn or measured beside the others.
-pub fn sample_covariates(s: &proto::Sample) -> Covariates {
-    let drawn = |name: &str| {
-        let number = s.drawn_number.get(name).map(|x| Drawn::Number(*x));
-        number.or_else(|| s.drawn_text.get(name).map(|word| Drawn::Text(word.clone())))
-    };
-    let extra = COLUMNS.iter().filter(|column| matches!(column.held, Held::Extra));
-    Covariates {
-        gel_id: s.gel_id.clone(),
-        session: s.session.clone(),
-        pull_index: s.pull_index,
-        time_s: s.time_s,
-        temperature_c: s.temperature_c,
-        dwell_s: s.dwell_s,
-        grip_offset_m: Scale::Thousandth.to_si(s.grip_offset_mm),
-        grip_angle_rad: Scale::Degree.to_si(s.grip_angle_deg),
-        pull_direction: f64::from(s.pull_direction),
-        extra: extra.filter_map(|column| Some((column.name.into(), drawn(column.name)?))).collect(),
-    }
-}
-
-/// A stored sample as the columns read it, beside its circumstances.
-pub fn sample_view<'a>(s: &'a proto::Sample, covariates: &'a Covariates) -> PullView<'a> {
-    PullView {
-        part: &s.part,
-        grip_pose: s.grip_pose as usize,
-        grip_force_n: s.grip_force_n,
-        increment_n: s.force_increment_n,
-        start_n: s.force_start_n,
-        step_s: s.step_time_s,
-        covariates,
-    }
 }
 
 fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sample {

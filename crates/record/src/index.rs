@@ -1,7 +1,7 @@
 //! The index of a run: one row a sample, so that tables can be filtered without opening a shard.
 
-use crate::encode::{sample_covariates, sample_view};
 use crate::proto::gripgen_v1::{Sample, Status};
+use crate::stored::{sample_covariates, sample_view};
 use gripgen_twin::columns::{COLUMNS, find};
 use std::sync::LazyLock;
 

@@ -22,6 +22,7 @@ mod rig_log;
 mod rig_run;
 mod sensor_table;
 mod shard;
+mod stored;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -29,9 +30,7 @@ mod verify;
 
 pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
 pub use dataset::{Dataset, DatasetError, Table};
-pub use encode::{
-    EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode, sample_covariates, sample_view,
-};
+pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
 pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
@@ -55,5 +54,6 @@ pub use rig_run::{
 };
 pub use sensor_table::{SENSOR_FILE, SensorTable, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
+pub use stored::{sample_covariates, sample_view};
 pub use table::TableError;
 pub use verify::{Verification, verify};

@@ -85,6 +85,18 @@ pub fn suggestion<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> 
         .map(|(_, _, name)| name)
 }
 
+/// Adds the hint for a part name that the twin does not have.
+pub(crate) fn unknown_part_hint<'a>(
+    error: ConfigError,
+    typed: &str,
+    parts: impl Iterator<Item = &'a String> + Clone,
+) -> ConfigError {
+    match suggestion(typed, parts.clone().map(String::as_str)) {
+        Some(name) => error.hint(format!("did you mean `{name}`?")),
+        None => error.hint(format!("its parts: {}", parts.cloned().collect::<Vec<_>>().join(", "))),
+    }
+}
+
 /// Checks that a number is finite and inside `range`.
 pub(crate) fn in_range(
     key: &str,

@@ -4,11 +4,15 @@
 //! over one covariate. It repeats what was seen and says nothing about why: it is marked `physical = false`, and outside
 //! its range it is held.
 
+mod acting;
+
+pub use acting::{table_factor, table_offset_n};
+
+use crate::Values;
 use crate::columns::{self, Column, PullView};
 use crate::config::{ConfigError, EffectFile, TwinFile, in_range, suggestion};
 use crate::draw::Drawn;
 use crate::effects::{OutsideFit, Per};
-use crate::{Scenario, Twin, Values};
 
 /// The `name` of a table among the effects of a twin file. It is not in the library.
 pub const TABLE_EFFECT: &str = "table";
@@ -83,18 +87,6 @@ fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
     y[after - 1] + share * (y[after] - y[after - 1])
 }
 
-/// By what the tables of a twin multiply the friction of a pull; 1 without any.
-pub fn table_factor(twin: &Twin, scenario: &Scenario) -> f64 {
-    let factors = twin.tables.iter().filter(|t| t.target == TableTarget::Factor);
-    factors.filter_map(|t| t.at(scenario.view())).product()
-}
-
-/// What the tables of a twin add to the readings of the wrist sensor, in newtons; 0 without any.
-pub fn table_offset_n(twin: &Twin, scenario: &Scenario) -> f64 {
-    let offsets = twin.tables.iter().filter(|t| t.target == TableTarget::Offset);
-    offsets.filter_map(|t| t.at(scenario.view())).fold(0.0, |sum, x| sum + x)
-}
-
 const KEYS: [&str; 7] = ["covariate", "centre", "x", "words", "factor", "offset_n", "physical"];
 
 /// Checks a table of a twin file. Errors name the key.
@@ -104,7 +96,7 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
     refuse_foreign(effect, &key)?;
     if let Some(part) = effect.part.as_ref().filter(|part| !file.parts.contains_key(*part)) {
         let error = ConfigError::new(key("part"), format!("the twin has no part `{part}`"));
-        return Err(crate::twin::unknown_part_hint(error, part, file.parts.keys()));
+        return Err(crate::config::unknown_part_hint(error, part, file.parts.keys()));
     }
     let get = |name: &str| effect.parameters.get(name);
     if get("physical") != Some(&toml::Value::Boolean(false)) {

@@ -3,6 +3,7 @@
 use super::{Elastic, Gel, Part, RobotArm};
 use crate::config::{
     ArmFile, ConfigError, GelFile, GelModel, PartFile, RobotFile, TwinFile, Twist, in_range, suggestion,
+    unknown_part_hint,
 };
 use crate::effects::{self, Effect, EffectSpec, OutsideFit, Per};
 use crate::frames::{pose, rotation_from_fixed_xyz};
@@ -214,17 +215,5 @@ fn check_reference_area(
         (Per::Jaw, Some(_)) => Err(ConfigError::new(area, "it is used with per = \"cell\" only")
             .hint("add per = \"cell\" or leave it out")),
         (Per::Jaw, None) => Ok(None),
-    }
-}
-
-/// Adds the hint for a part name that the twin does not have.
-pub(crate) fn unknown_part_hint<'a>(
-    error: ConfigError,
-    typed: &str,
-    parts: impl Iterator<Item = &'a String> + Clone,
-) -> ConfigError {
-    match suggestion(typed, parts.clone().map(String::as_str)) {
-        Some(name) => error.hint(format!("did you mean `{name}`?")),
-        None => error.hint(format!("its parts: {}", parts.cloned().collect::<Vec<_>>().join(", "))),
     }
 }

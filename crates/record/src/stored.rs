@@ -1,0 +1,41 @@
+//! A stored sample as the columns of a pull see it.
+
+use crate::proto::gripgen_v1 as proto;
+use gripgen_twin::Covariates;
+use gripgen_twin::columns::{COLUMNS, Held, PullView, Scale};
+use gripgen_twin::draw::Drawn;
+
+/// The circumstances of a stored sample: the inverse of the message of a scenario. Columns without a field of their own are those
+/// that were drawn or measured beside the others.
+pub fn sample_covariates(s: &proto::Sample) -> Covariates {
+    let drawn = |name: &str| {
+        let number = s.drawn_number.get(name).map(|x| Drawn::Number(*x));
+        number.or_else(|| s.drawn_text.get(name).map(|word| Drawn::Text(word.clone())))
+    };
+    let extra = COLUMNS.iter().filter(|column| matches!(column.held, Held::Extra));
+    Covariates {
+        gel_id: s.gel_id.clone(),
+        session: s.session.clone(),
+        pull_index: s.pull_index,
+        time_s: s.time_s,
+        temperature_c: s.temperature_c,
+        dwell_s: s.dwell_s,
+        grip_offset_m: Scale::Thousandth.to_si(s.grip_offset_mm),
+        grip_angle_rad: Scale::Degree.to_si(s.grip_angle_deg),
+        pull_direction: f64::from(s.pull_direction),
+        extra: extra.filter_map(|column| Some((column.name.into(), drawn(column.name)?))).collect(),
+    }
+}
+
+/// A stored sample as the columns read it, beside its circumstances.
+pub fn sample_view<'a>(s: &'a proto::Sample, covariates: &'a Covariates) -> PullView<'a> {
+    PullView {
+        part: &s.part,
+        grip_pose: s.grip_pose as usize,
+        grip_force_n: s.grip_force_n,
+        increment_n: s.force_increment_n,
+        start_n: s.force_start_n,
+        step_s: s.step_time_s,
+        covariates,
+    }
+}
