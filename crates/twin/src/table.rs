@@ -247,7 +247,7 @@ fn distinct(value: &toml::Value, key: &str) -> Result<Vec<String>, ConfigError> 
 mod tests {
     use super::*;
     use crate::effects::testing::twin;
-    use crate::{Covariates, PullSettings, TWIN_SCHEMA};
+    use crate::{Covariates, PullSettings, Scenario, TWIN_SCHEMA};
 
     fn scenario(part: &str, extra: &[(&str, Drawn)]) -> Scenario {
         let pull = PullSettings {
