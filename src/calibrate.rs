@@ -3,14 +3,13 @@
 use crate::diagnose::{PullTwinError, check_fit, given_model, pull_values};
 use crate::library::Library;
 use crate::predict::PullPredictor;
-use crate::twin_edits::TwinEdits;
+use crate::twin_edits::{TwinEdits, effect_entry, put_estimate};
 use gripgen_identify::pulls::calibrate::{
     CalibrateError, CalibrateRequest, PullCalibration, calibrate_pulls,
 };
-use gripgen_twin::config::{CalibrationFile, EffectFile};
-use gripgen_twin::effects::{OFFSET_LAW, OutsideFit, Per};
+use gripgen_twin::config::EffectFile;
+use gripgen_twin::effects::{EffectSpec, OFFSET_LAW, find};
 use gripgen_twin::{MeasuredPulls, Twin};
-use std::collections::BTreeMap;
 
 /// Why a twin could not be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -40,46 +39,31 @@ pub fn calibrate_twin(
     let found = calibrate_pulls(measured, &predictor, &given, request)?;
     let (low, high) = found.grip_force_n;
     let evidence = format!("gripgen calibrate pulls, {} pulls at {low} to {high} N", measured.pulls.len());
-    let calibration = |low90: f64, high90: f64| CalibrationFile {
-        low90,
-        high90,
-        evidence: Some(evidence.clone()),
-        data_sha256: Some(measured.sha256.clone()),
-    };
-    let mut values = pull_values(&found.fitted, &found.baseline, predictor.part_names(), &calibration);
+    let mut values =
+        pull_values(&found.fitted, &found.baseline, predictor.part_names(), &evidence, &measured.sha256);
     // With the law the coefficient stays that of the twin: a is a factor on it.
     if !found.laws.is_empty() {
         values.retain(|v| !(v.key.starts_with("parts.") && v.key.ends_with(".mu")));
     }
-    let plain = |name: &str, part: Option<String>, load_law: bool| EffectFile {
-        name: name.into(),
+    let plain = |spec: &EffectSpec, part: Option<String>| EffectFile {
         part,
-        fitted_grip_force_n: load_law.then_some([low, high]),
-        outside_fit: OutsideFit::Extrapolate,
-        per: Per::Jaw,
-        reference_area_mm2: None,
-        source: Some(evidence.clone()),
-        calibration: BTreeMap::new(),
-        parameters: BTreeMap::new(),
+        fitted_grip_force_n: spec.is_load_law().then_some([low, high]),
+        ..effect_entry(spec.id, &evidence)
     };
     let mut effects = Vec::new();
     for law in &found.laws {
-        let mut file = plain(OFFSET_LAW.id, Some(law.part.clone()), true);
+        let mut entry = plain(OFFSET_LAW, Some(law.part.clone()));
         for (name, p) in [("a", &law.a), ("b_n", &law.b_n)] {
-            file.parameters.insert(name.into(), toml::Value::Float(p.value));
-            file.calibration.insert(name.into(), calibration(p.low90, p.high90));
+            put_estimate(&mut entry, name, p, &evidence, &measured.sha256);
         }
-        effects.push(file);
+        effects.push(entry);
     }
-    for (name, parameters) in &found.effects {
-        let load_law =
-            gripgen_twin::effects::find(name).is_some_and(gripgen_twin::effects::EffectSpec::is_load_law);
-        let mut file = plain(name, None, load_law);
-        for (parameter, p) in parameters {
-            file.parameters.insert(parameter.clone(), toml::Value::Float(p.value));
-            file.calibration.insert(parameter.clone(), calibration(p.low90, p.high90));
+    for (spec, parameters) in found.effects.iter().filter_map(|(name, p)| Some((find(name)?, p))) {
+        let mut entry = plain(spec, None);
+        for (name, p) in parameters {
+            put_estimate(&mut entry, name, p, &evidence, &measured.sha256);
         }
-        effects.push(file);
+        effects.push(entry);
     }
     Ok((found, TwinEdits { values, effects: Some(effects) }))
 }

@@ -1,13 +1,15 @@
 //! Diagnoses: measurements and a twin in, an answer and a better twin out. One file a channel.
 
+mod measured_presses;
 mod next;
 mod presses;
 mod pull_report;
 mod pulls;
 mod sensor;
 
+pub use measured_presses::{MeasuredPresses, diagnose_measured_presses, measured_presses};
 pub use next::NextPulls;
-pub use presses::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses, is_optics_effect};
+pub use presses::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses};
 pub use pulls::{PullDiagnoseOptions, PullTwinError, UnknownPartError, diagnose_pull_table, given_model};
 pub(crate) use pulls::{check_fit, check_parts, pull_values};
 pub use sensor::{

@@ -7,9 +7,9 @@ mod press;
 use crate::location::Location;
 use crate::project::{LoadError, Project};
 use crate::sample::SampleError;
-use crate::twin_edits::EditedValue;
+use crate::twin_edits::{EditedValue, calibration_entry};
 use gripgen_identify::{FittedPress, ImprintEstimate, imprint_constant};
-use gripgen_twin::config::{CalibrationFile, GelModel};
+use gripgen_twin::config::GelModel;
 use gripgen_twin::{Jaw, MeasuredPull, MeasuredPulls};
 use images::ImageSource;
 pub use images::ImprintImagesError;
@@ -83,12 +83,7 @@ impl ImprintCalibrations {
             EditedValue {
                 key: format!("parts.{}.imprint_mm3_per_n", found.part),
                 value: c.value,
-                calibration: Some(CalibrationFile {
-                    low90: c.low90,
-                    high90: c.high90,
-                    evidence: Some(evidence),
-                    data_sha256: Some(measured.sha256.clone()),
-                }),
+                calibration: Some(calibration_entry(c, &evidence, &measured.sha256)),
             }
         };
         self.parts.iter().map(value).collect()

@@ -89,9 +89,10 @@ pub use catalogue::{EffectCurve, effect_curve};
 pub use compare::{LabelErrors, PullComparison, compare_pulls};
 pub use compare_report::{pull_comparison_page, pull_ratios};
 pub use diagnose::{
-    NextPulls, PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions, calibrate_sensor_table,
-    compare_sensor_table, diagnose_presses, diagnose_pull_table, diagnose_sensor_table, given_model,
-    is_optics_effect, is_sensor_table, load_sensor_table, sensor_calibration_edits,
+    MeasuredPresses, NextPulls, PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions,
+    calibrate_sensor_table, compare_sensor_table, diagnose_measured_presses, diagnose_presses,
+    diagnose_pull_table, diagnose_sensor_table, given_model, is_sensor_table, load_sensor_table,
+    measured_presses, sensor_calibration_edits,
 };
 pub use generate::{Press, StartedPull, generate, press_only, simulate, start_pull};
 pub use gpu::Gpu;
@@ -120,8 +121,8 @@ pub use predict::PullPredictor;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};
 pub use press_report::{PressReportText, press_report};
 pub use presses::{
-    FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_missing_circles, is_press_set,
-    load_presses, load_sensor, load_twin_sensor,
+    FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_circles_with_sensor,
+    find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor,
 };
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
 pub use ratio::{PartRatio, RatioFit};

@@ -9,7 +9,7 @@ use gripgen_tactile::presses::{
     Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, Press, PressSet, find_circle,
     reference_frame,
 };
-use gripgen_tactile::{Pyramid, Sensor};
+use gripgen_tactile::{Pyramid, Sensor, finish};
 use gripgen_twin::config::ImageNoise;
 use gripgen_twin::{Optics, TactileImage, Twin};
 use std::path::{Path, PathBuf};
@@ -218,11 +218,22 @@ pub fn find_missing_circles(set: &mut PressSet) -> FoundCircles {
     FoundCircles { found, without_contact }
 }
 
+/// The same, against the sensor file's frame without contact where the set has none of its own.
+pub fn find_circles_with_sensor(set: &mut PressSet, sensor: &Sensor) -> FoundCircles {
+    if set.rest.is_some() {
+        return find_missing_circles(set);
+    }
+    set.rest = Some(finish(sensor, None, None));
+    let circles = find_missing_circles(set);
+    set.rest = None;
+    circles
+}
+
 fn unmarked_names(set: &PressSet) -> Vec<String> {
     set.presses.iter().filter(|press| press.circle.is_none()).map(|press| press.name.clone()).collect()
 }
 
-/// What [`find_missing_circles`] found.
+/// What [`find_missing_circles`] and [`find_circles_with_sensor`] found.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FoundCircles {
     /// Presses whose contact was found.

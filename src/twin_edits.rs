@@ -1,5 +1,9 @@
 //! A twin that was changed by a calibration or a diagnosis: what changes, and the new file.
 
+mod entry;
+
+pub(crate) use entry::{calibration_entry, effect_entry, put_estimate};
+
 use crate::location::Location;
 use crate::project::{LoadError, load_twin_document};
 use crate::version::VERSION;

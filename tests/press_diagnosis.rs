@@ -5,7 +5,9 @@ use gripgen::identify::{Diagnosis, Verdict};
 use gripgen::tactile::presses::{Circle, Press, PressScene, PressSet};
 use gripgen::tactile::{Sensor, finish};
 use gripgen::twin::{OpticsState, TactileImage};
-use gripgen::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses};
+use gripgen::{
+    PressColumns, PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses, measured_presses,
+};
 
 const PRESSES: usize = 12;
 const BALL_M: f64 = 6e-3;
@@ -128,4 +130,32 @@ fn three_presses_are_too_few() {
     let d = diagnosis(&set, &sensor, Vec::new());
     assert_eq!(d.verdict, Verdict::Insufficient);
     assert!(d.notes[0].contains("3 presses with a visible contact, 4 are needed"), "{:?}", d.notes);
+}
+
+/// Without marks and without a frame at rest the sensor file's shows where the contacts are; a press without one takes its row
+/// of the table with it.
+#[test]
+fn contacts_that_nobody_marked_are_found_beside_the_sensor_file() {
+    let sensor = sensor();
+    let mut set = presses(&sensor, |_, _, p| p);
+    let truth: Vec<Circle> = set.presses.iter().filter_map(|p| p.circle).collect();
+    set.rest = None;
+    set.presses.iter_mut().for_each(|p| p.circle = None);
+    let blank = Press { name: "blank".into(), image: finish(&sensor, None, None), circle: None };
+    set.presses.insert(3, blank);
+    let columns = PressColumns {
+        names: set.presses.iter().map(|p| p.name.clone()).collect(),
+        time_s: Some((0..set.presses.len()).map(|i| i as f64).collect()),
+        covariates: Vec::new(),
+    };
+    let measured = measured_presses(set, columns, &sensor);
+    assert_eq!(measured.circles.without_contact, ["blank"]);
+    assert_eq!(measured.circles.found.len(), PRESSES);
+    assert_eq!(measured.columns.time_s.unwrap()[..5], [0.0, 1.0, 2.0, 4.0, 5.0]);
+    assert!(!measured.marked && measured.set.rest.is_none());
+    for (press, truth) in measured.set.presses.iter().zip(truth) {
+        let found = press.circle.unwrap();
+        let off = (found.x_px - truth.x_px).hypot(found.y_px - truth.y_px);
+        assert!(off < 4.0, "{}: {found:?} for {truth:?}", press.name);
+    }
 }

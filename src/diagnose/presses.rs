@@ -1,32 +1,24 @@
 //! Diagnosis of ball presses: what a sensor file lacks.
 //!
-//! The baseline is the sensor file as it stands; nothing of it is refitted. Each optics effect of the library is fitted
-//! to the presses, scored on presses that its fit has not seen, and compared with the others, with nothing, and with
-//! smooth fields that have no name. The press is the unit of all of it: pixels of one image err together.
+//! What presses look like under any effects is drawn here; what acts is found by [`gripgen_identify::diagnose_presses`].
 //! `docs/diagnosis-presses.md`.
 
 mod answer;
-mod candidates;
 mod marks;
 mod page;
-mod score;
-mod search;
-mod unnamed;
 mod work;
 
-pub use unnamed::{PressCovariate, PressValues};
+pub use gripgen_identify::{PressCovariate, PressValues};
 
+use crate::TwinEdits;
 use crate::report::Diagnosed;
-use answer::{Answer, insufficient};
+use answer::{edits, remark};
+use gripgen_identify::{FEWEST_DIAGNOSED_PRESSES, PressData, too_few_presses};
 use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::PressSet;
 use gripgen_twin::Covariates;
 use gripgen_twin::config::EffectFile;
-use search::{candidates, search};
-use work::Work;
-
-/// Presses at least.
-const FEWEST_PRESSES: usize = 4;
+use work::{Work, noise_mse};
 
 /// Time from one press to the next where nobody wrote it down.
 pub(crate) const ASSUMED_PRESS_S: f64 = 60.0;
@@ -52,10 +44,18 @@ pub struct PressDiagnosisInput<'a> {
 
 /// Diagnoses presses. `progress` hears how far it is, from 0 to 1, and what is tried.
 pub fn diagnose_presses(input: &PressDiagnosisInput<'_>, progress: &mut dyn FnMut(f64, &str)) -> Diagnosed {
+    let data = PressData {
+        names: input.set.presses.iter().map(|p| p.name.clone()).collect(),
+        sha256: input.sha256.clone(),
+        noise_mse: noise_mse(input.sensor),
+        covariates: covariates(input),
+        marked: input.marked,
+    };
     let n = input.set.presses.iter().filter(|p| p.circle.is_some()).count();
-    if n < FEWEST_PRESSES || n < input.set.presses.len() {
-        let missing = format!("{n} presses with a visible contact, {FEWEST_PRESSES} are needed");
-        return insufficient(input, &missing);
+    if n < FEWEST_DIAGNOSED_PRESSES || n < input.set.presses.len() {
+        let diagnosis = too_few_presses(&data, n);
+        let report = page::without_answer(&diagnosis);
+        return Diagnosed { diagnosis, edits: TwinEdits::default(), report, next: None };
     }
     let circumstances: Vec<Covariates> = (0..n)
         .map(|i| Covariates {
@@ -67,15 +67,10 @@ pub fn diagnose_presses(input: &PressDiagnosisInput<'_>, progress: &mut dyn FnMu
     progress(0.0, "drawing the presses");
     let mut work = Work::new(input.set, input.sensor, circumstances);
     let scatter_px = marks::straighten(&mut work);
-    let covariates = covariates(input);
-    let found = search(&mut work, &covariates, &candidates(input.marked), progress);
-    progress(0.97, "whole frames");
-    Answer { input, work: &work, found: &found, covariates: &covariates, scatter_px }.diagnosed()
-}
-
-/// Whether a name is that of an effect on images.
-pub fn is_optics_effect(name: &str) -> bool {
-    gripgen_twin::effects::find(name).is_some_and(|spec| spec.optics.is_some())
+    let mut found = gripgen_identify::diagnose_presses(&work, &data, progress);
+    remark(&mut found.diagnosis, input, &work, &found.acting, scatter_px);
+    let report = page::report(input, &data.covariates, &found);
+    Diagnosed { edits: edits(input, &found.diagnosis), diagnosis: found.diagnosis, report, next: None }
 }
 
 /// What the residual may depend on: order, place and size of the contact, further columns.

@@ -5,15 +5,14 @@ use super::pull_report::pull_report;
 use crate::library::Library;
 use crate::predict::{PullPredictor, speed_limit_m_per_s};
 use crate::report::Diagnosed;
-use crate::twin_edits::{EditedValue, TwinEdits};
+use crate::twin_edits::{EditedValue, TwinEdits, calibration_entry, effect_entry};
 use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
 use gripgen_identify::pulls::curves::Curve;
 use gripgen_identify::pulls::data::{Column, PullData};
 use gripgen_identify::pulls::fitting::Fitted;
 use gripgen_identify::pulls::model::PullModel;
 use gripgen_identify::{Diagnosis, ParameterEstimate};
-use gripgen_twin::config::{CalibrationFile, EffectFile, Twist};
-use gripgen_twin::effects::OutsideFit;
+use gripgen_twin::config::{EffectFile, Twist};
 use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Twin};
 use std::collections::BTreeMap;
 
@@ -155,14 +154,16 @@ pub(crate) fn pull_values(
     fitted: &Fitted,
     baseline: &BTreeMap<String, ParameterEstimate>,
     parts: &[String],
-    calibration: &dyn Fn(f64, f64) -> CalibrationFile,
+    evidence: &str,
+    sha256: &str,
 ) -> Vec<EditedValue> {
     let model = &fitted.model;
     let mut values = Vec::new();
-    let mut set = |key: String, value: f64, known: Option<(f64, f64)>| {
-        values.push(EditedValue { key, value, calibration: known.map(|(low, high)| calibration(low, high)) });
+    let mut set = |key: String, value: f64, known: Option<&ParameterEstimate>| {
+        let calibration = known.map(|estimate| calibration_entry(estimate, evidence, sha256));
+        values.push(EditedValue { key, value, calibration });
     };
-    let interval = |name: &str| baseline.get(name).map(|e| (e.low90, e.high90));
+    let interval = |name: &str| baseline.get(name);
     let scatter = baseline.get("scatter").map_or(model.scatter, |e| e.value);
     for (name, mu) in parts.iter().zip(&model.mu) {
         set(format!("parts.{name}.mu"), *mu, interval(&format!("parts.{name}.mu")));
@@ -196,43 +197,24 @@ fn edits(
 ) -> TwinEdits {
     let model = &fits.after.model;
     let evidence = format!("gripgen diagnose of {} pulls", measured.pulls.len());
-    let calibration = |low90: f64, high90: f64| CalibrationFile {
-        low90,
-        high90,
-        evidence: Some(evidence.clone()),
-        data_sha256: Some(measured.sha256.clone()),
-    };
-    let values = pull_values(&fits.after, &diagnosis.baseline, predictor.part_names(), &calibration);
+    let values =
+        pull_values(&fits.after, &diagnosis.baseline, predictor.part_names(), &evidence, &measured.sha256);
     let forces = measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces.fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
     let effects = model.effects.iter().map(|effect| {
         let part = effect.part.map(|p| predictor.part_names()[p].clone());
         let named = diagnosis.effects.iter().find(|e| e.name == effect.spec.id && e.part == part);
-        let known = |name: &str| named.and_then(|n| n.parameters.get(name));
-        EffectFile {
-            name: effect.spec.id.into(),
-            part,
-            fitted_grip_force_n: effect.spec.friction.map(|_| [range.0, range.1]),
-            outside_fit: OutsideFit::Extrapolate,
-            per: gripgen_twin::effects::Per::Jaw,
-            reference_area_mm2: None,
-            source: Some(evidence.clone()),
-            calibration: effect
-                .spec
-                .parameters
-                .iter()
-                .filter_map(|p| {
-                    Some((p.name.to_string(), calibration(known(p.name)?.low90, known(p.name)?.high90)))
-                })
-                .collect::<BTreeMap<_, _>>(),
-            parameters: effect
-                .spec
-                .parameters
-                .iter()
-                .zip(&effect.values)
-                .map(|(p, v)| (p.name.to_string(), toml::Value::Float(*v)))
-                .collect(),
+        let mut entry = effect_entry(effect.spec.id, &evidence);
+        entry.part = part;
+        entry.fitted_grip_force_n = effect.spec.friction.map(|_| [range.0, range.1]);
+        for (p, value) in effect.spec.parameters.iter().zip(&effect.values) {
+            entry.parameters.insert(p.name.into(), toml::Value::Float(*value));
+            if let Some(known) = named.and_then(|n| n.parameters.get(p.name)) {
+                let calibration = calibration_entry(known, &evidence, &measured.sha256);
+                entry.calibration.insert(p.name.into(), calibration);
+            }
         }
+        entry
     });
     let mut effects: Vec<EffectFile> = effects.collect();
     effects.extend(
@@ -256,17 +238,7 @@ fn table(
     evidence: &str,
 ) -> Option<EffectFile> {
     let data = PullData::new(measured);
-    let entry = |parameters| EffectFile {
-        name: TABLE_EFFECT.into(),
-        part: None,
-        fitted_grip_force_n: None,
-        outside_fit: OutsideFit::Extrapolate,
-        per: gripgen_twin::effects::Per::Jaw,
-        reference_area_mm2: None,
-        source: Some(evidence.into()),
-        calibration: BTreeMap::new(),
-        parameters,
-    };
+    let entry = |parameters| EffectFile { parameters, ..effect_entry(TABLE_EFFECT, evidence) };
     if let Some((a, b)) = curve.name.split_once('*') {
         return Some(entry(product_table(&data, curve, coefficients, a, b)?));
     }

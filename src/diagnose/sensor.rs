@@ -1,16 +1,15 @@
 //! Force-sensor tables: diagnosis, calibration, comparison.
 
 use crate::report::{Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
-use crate::twin_edits::TwinEdits;
+use crate::twin_edits::{TwinEdits, calibration_entry, effect_entry, put_estimate};
 use gripgen_identify::{
     Covariate, NamedEffect, ParameterEstimate, SensorCalibration, SensorComparison, SensorData,
     SensorDiagnosis, SensorOptions, Verdict, calibrate_sensor, compare_sensor, diagnose_sensor,
 };
 use gripgen_record::{SensorTable, TableError, read_sensor_table};
 use gripgen_twin::Twin;
-use gripgen_twin::config::{CalibrationFile, EffectFile};
-use gripgen_twin::effects::{EffectSpec, OutsideFit, Per, SENSOR_LINE};
-use std::collections::BTreeMap;
+use gripgen_twin::config::EffectFile;
+use gripgen_twin::effects::{EffectSpec, SENSOR_LINE};
 use std::path::Path;
 
 /// Most points of a plot.
@@ -85,33 +84,15 @@ fn edits(answer: &mut SensorDiagnosis, sha256: &str) -> TwinEdits {
 }
 
 fn effect_file(spec: &EffectSpec, values: &[f64], named: Option<&NamedEffect>, sha256: &str) -> EffectFile {
-    let mut file = bare_effect(spec.id, "gripgen diagnose of a force-sensor table");
+    let mut file = effect_entry(spec.id, "gripgen diagnose of a force-sensor table");
     for (p, value) in spec.parameters.iter().zip(values) {
         file.parameters.insert(p.name.into(), toml::Value::Float(*value));
-        if let Some(estimate) = named.and_then(|e| e.parameters.get(p.name)) {
-            let evidence = named.map(|e| format!("weight {:.2} among {}", e.weight, e.class.join(", ")));
-            file.calibration.insert(p.name.into(), interval(estimate, evidence, sha256));
+        if let Some((e, estimate)) = named.and_then(|e| Some((e, e.parameters.get(p.name)?))) {
+            let evidence = format!("weight {:.2} among {}", e.weight, e.class.join(", "));
+            file.calibration.insert(p.name.into(), calibration_entry(estimate, &evidence, sha256));
         }
     }
     file
-}
-
-fn bare_effect(name: &str, source: &str) -> EffectFile {
-    EffectFile {
-        name: name.into(),
-        part: None,
-        fitted_grip_force_n: None,
-        outside_fit: OutsideFit::Extrapolate,
-        per: Per::Jaw,
-        reference_area_mm2: None,
-        source: Some(source.into()),
-        calibration: BTreeMap::new(),
-        parameters: BTreeMap::new(),
-    }
-}
-
-fn interval(value: &ParameterEstimate, evidence: Option<String>, sha256: &str) -> CalibrationFile {
-    CalibrationFile { low90: value.low90, high90: value.high90, evidence, data_sha256: Some(sha256.into()) }
 }
 
 /// Gain and offset of a table as effects of a twin. A twin holds those of one session; the error names both numbers.
@@ -125,10 +106,9 @@ pub fn sensor_calibration_edits(calibration: &SensorCalibration, sha256: &str) -
     let (low, high) = calibration.reference_range_n;
     let evidence = format!("{} rows, reference {low:.2} to {high:.2} N", session.rows);
     let effect = |spec: &EffectSpec, value: &ParameterEstimate| {
-        let mut file = bare_effect(spec.id, "gripgen calibrate sensor");
+        let mut file = effect_entry(spec.id, "gripgen calibrate sensor");
         let parameter = spec.parameters[0].name;
-        file.parameters.insert(parameter.into(), toml::Value::Float(value.value));
-        file.calibration.insert(parameter.into(), interval(value, Some(evidence.clone()), sha256));
+        put_estimate(&mut file, parameter, value, &evidence, sha256);
         file
     };
     let [gain, bias] = SENSOR_LINE;

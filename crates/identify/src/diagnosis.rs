@@ -213,3 +213,34 @@ pub struct Diagnosis {
     /// Remarks for people: what is missing, what was left out, what to beware of.
     pub notes: Vec<String>,
 }
+
+impl Diagnosis {
+    /// An answer that says nothing yet.
+    pub fn blank(channel: Channel, data: DataSummary) -> Self {
+        Self {
+            schema: DIAGNOSIS_SCHEMA,
+            channel,
+            data,
+            noise_floor_n: None,
+            noise_floor_mse: None,
+            verdict: Verdict::Insufficient,
+            effects: Vec::new(),
+            unknown: Vec::new(),
+            would_have_seen: BTreeMap::new(),
+            not_excited: Vec::new(),
+            not_recorded: Vec::new(),
+            baseline: BTreeMap::new(),
+            error: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Puts the verdict that follows from what was found: an effect before a dependence that none explains.
+    pub fn conclude(&mut self) {
+        self.verdict = match (self.effects.is_empty(), self.unknown.is_empty()) {
+            (false, _) => Verdict::Effect,
+            (true, false) => Verdict::Unknown,
+            (true, true) => Verdict::None,
+        };
+    }
+}

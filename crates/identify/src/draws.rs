@@ -1,6 +1,6 @@
 //! Random numbers of permutation tests and of simulated data.
 
-use gripgen_twin::random::normal_quantile;
+use gripgen_twin::random::{normal_quantile, splitmix64};
 
 /// SplitMix64 (Steele, Lea, Flood 2014): every number is a function of the seed and of how many were drawn before it.
 #[derive(Debug, Clone)]
@@ -18,11 +18,7 @@ impl Draws {
 
     /// The next 64 random bits.
     pub fn bits(&mut self) -> u64 {
-        self.state = self.state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+        splitmix64(&mut self.state)
     }
 
     /// Uniform in the open interval (0, 1), 53 bits.

@@ -12,6 +12,7 @@ mod grouped;
 mod imprint;
 mod least_squares;
 mod permutation;
+mod presses;
 pub mod pulls;
 mod sensor;
 mod separate;
@@ -29,6 +30,10 @@ pub use grouped::{
 pub use imprint::{FittedPress, ImprintEstimate, imprint_constant};
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
+pub use presses::{
+    ActingEffect, FEWEST_DIAGNOSED_PRESSES, PRESS_ZONES, PredictPresses, PressCovariate, PressData,
+    PressDiagnosis, PressPixels, PressTrial, PressValues, diagnose_presses, too_few_presses,
+};
 pub use sensor::{
     SensorBlock, SensorCalibration, SensorComparison, SensorData, SensorDiagnosis, SensorEvidence,
     SensorOptions, SensorRow, SessionCalibration, calibrate_sensor, compare_sensor, diagnose_sensor,

@@ -21,7 +21,9 @@ mod tests;
 
 pub use chain::{CommandChain, SensorChain, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 pub use experiment::{Experiment, Measured, separating};
-pub use fit::{FORCE_RATE, Fit, Named, PressFit, PullFit, PullSpan, REFERENCE_FORCE, TableFit, TableSpan};
+pub use fit::{
+    Bounds, FORCE_RATE, Fit, Grid, Named, PressFit, PullFit, PullSpan, REFERENCE_FORCE, TableFit, TableSpan,
+};
 use fit::{log_spaced, wider};
 pub use hooks::{
     CommandHook, FrictionHook, GripPoint, ImprintHook, NormalForceHook, OpticsHook, SensorHook, SensorMemory,

@@ -61,6 +61,15 @@ impl Stream {
     }
 }
 
+/// SplitMix64 (Steele, Lea, Flood 2014): the next 64 random bits after a state, which moves on.
+pub fn splitmix64(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
 /// The quantile function of the standard normal distribution.
 ///
 /// Wichura (1988), algorithm AS 241 (PPND16), relative accuracy about 1e-16.

@@ -20,7 +20,7 @@ const ROUNDS: usize = 2;
 
 /// Moves the circles of the presses by what they deviate from a common displacement. Returns the root mean square of
 /// the moves of centre and radius, in pixels.
-pub(super) fn straighten(work: &mut Work) -> [f64; 2] {
+pub(super) fn straighten(work: &mut Work<'_>) -> [f64; 2] {
     let n = work.views.len();
     let marked = work.circles.clone();
     for _ in 0..ROUNDS {
@@ -63,7 +63,7 @@ pub(super) fn straighten(work: &mut Work) -> [f64; 2] {
 
 /// How far one press lies off its circle, (x, y, radius) in pixels of the images: linear least squares on the contact
 /// and its rim, beside an offset and a gain of each channel.
-fn deviation(work: &Work, press: usize) -> [f64; 3] {
+fn deviation(work: &Work<'_>, press: usize) -> [f64; 3] {
     let Some(circle) = work.circles[press] else { return [0.0; 3] };
     let plain = OpticsState::default();
     let view = &work.views[press];
@@ -118,7 +118,7 @@ fn deviation(work: &Work, press: usize) -> [f64; 3] {
 
 /// The part of the moves that the presses share: their mean, with slopes along rows, columns and radii where there are
 /// enough presses.
-fn common(work: &Work, moved: &[[f64; 3]]) -> Vec<[f64; 3]> {
+fn common(work: &Work<'_>, moved: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let n = moved.len();
     let grid = &work.scene.sensor().grid;
     let full = work.scene.factor() as f64;

@@ -1,26 +1,30 @@
 //! What the report of presses shows.
 
-use super::answer::Answer;
-use super::unnamed::PressValues;
+use super::PressDiagnosisInput;
 use crate::report::{EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
-use gripgen_identify::{Diagnosis, Verdict};
+use gripgen_identify::{Diagnosis, PressCovariate, PressDiagnosis, PressTrial, PressValues, Verdict};
 use gripgen_tactile::presses::ZONES;
 
-/// The page; `frames` are the errors of each press before and after.
-pub(super) fn report(
-    diagnosis: &Diagnosis,
-    answer: Option<&Answer<'_>>,
-    frames: &[(f64, f64)],
-) -> ReportData {
-    let mut report = ReportData {
+/// The page where nothing can be said.
+pub(super) fn without_answer(diagnosis: &Diagnosis) -> ReportData {
+    ReportData {
         title: "Diagnosis of presses".into(),
         sentence: sentence(diagnosis),
         error_unit: "grey levels^2".into(),
         ..Default::default()
-    };
-    let Some(answer) = answer else { return report };
-    report.groups = vec![by_zone(answer), by_covariate(answer, frames)];
-    report.evidence = evidence(diagnosis, answer);
+    }
+}
+
+/// The page.
+pub(super) fn report(
+    input: &PressDiagnosisInput<'_>,
+    covariates: &[PressCovariate],
+    found: &PressDiagnosis,
+) -> ReportData {
+    let mut report = without_answer(&found.diagnosis);
+    let frames = &found.frame_mse;
+    report.groups = vec![by_zone(&found.zone_mse), by_covariate(covariates, frames)];
+    report.evidence = evidence(&found.diagnosis, &found.trials);
     let mut worst: Vec<usize> = (0..frames.len()).collect();
     worst.sort_by(|&a, &b| frames[b].1.total_cmp(&frames[a].1));
     let mean = frames.iter().map(|f| f.1).sum::<f64>() / frames.len() as f64;
@@ -30,7 +34,7 @@ pub(super) fn report(
         .into_iter()
         .take(8)
         .map(|i| {
-            let press = &answer.input.set.presses[i];
+            let press = &input.set.presses[i];
             let circle = press.circle.map_or(String::new(), |c| {
                 format!("at ({:.0}, {:.0}), radius {:.0} px", c.x_px, c.y_px, c.radius_px)
             });
@@ -76,15 +80,8 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     }
 }
 
-fn by_zone(answer: &Answer<'_>) -> PlotGroup {
-    let mean = |list: Vec<[f64; ZONES.len()]>| -> Vec<(f64, f64)> {
-        (0..ZONES.len())
-            .map(|z| {
-                let there: Vec<f64> = list.iter().map(|s| s[z]).filter(|s| s.is_finite()).collect();
-                (z as f64, there.iter().sum::<f64>() / there.len().max(1) as f64)
-            })
-            .collect()
-    };
+fn by_zone([before, after]: &[[f64; ZONES.len()]; 2]) -> PlotGroup {
+    let points = |mse: &[f64]| mse.iter().enumerate().map(|(z, mse)| (z as f64, *mse)).collect();
     let series =
         |name: &str, points| Series { name: name.into(), mark: Mark::Points, points, errors: Vec::new() };
     PlotGroup {
@@ -96,16 +93,15 @@ fn by_zone(answer: &Answer<'_>) -> PlotGroup {
             y_label: "mean squared residual, grey levels^2".into(),
             x_words: ZONES.iter().map(|z| z.name().to_string()).collect(),
             series: vec![
-                series("before", mean(answer.work.zone_squares(&[]))),
-                series("after", mean(answer.work.zone_squares(&answer.found.model.acting))),
+                series("before", points(before)),
+                series("after", points(after)),
             ],
         }],
     }
 }
 
-fn by_covariate(answer: &Answer<'_>, frames: &[(f64, f64)]) -> PlotGroup {
-    let plots = answer
-        .covariates
+fn by_covariate(covariates: &[PressCovariate], frames: &[(f64, f64)]) -> PlotGroup {
+    let plots = covariates
         .iter()
         .map(|covariate| {
             let (x, words) = match &covariate.values {
@@ -140,10 +136,8 @@ fn by_covariate(answer: &Answer<'_>, frames: &[(f64, f64)]) -> PlotGroup {
     }
 }
 
-fn evidence(diagnosis: &Diagnosis, answer: &Answer<'_>) -> Vec<EvidenceRow> {
-    answer
-        .found
-        .trials
+fn evidence(diagnosis: &Diagnosis, trials: &[PressTrial]) -> Vec<EvidenceRow> {
+    trials
         .iter()
         .map(|trial| {
             let tied = diagnosis

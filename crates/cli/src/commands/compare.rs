@@ -7,11 +7,10 @@ use crate::load::{
     folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls, say_circles, suspects,
 };
 use crate::output::{JsonSink, print, writable, write_file};
-use gripgen::tactile::finish;
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
-    LabelErrors, PartRatio, PressReportText, compare_pulls, find_missing_circles, is_press_set,
+    LabelErrors, PartRatio, PressReportText, compare_pulls, find_circles_with_sensor, is_press_set,
     is_sensor_table, load_pulls_with, press_report, pull_comparison_page, pull_ratios,
 };
 use serde_json::{Value, json};
@@ -32,10 +31,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
     }
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let (sensor, mut set) = load_sensor_and_presses(&args.measured, args.sensor.as_deref(), &args.twin)?;
-    if set.rest.is_none() {
-        set.rest = Some(finish(&sensor, None, None));
-    }
-    say_circles(&find_missing_circles(&mut set), &args.talk);
+    say_circles(&find_circles_with_sensor(&mut set, &sensor), &args.talk);
     let comparison = compare_presses(&set, &sensor)
         .map_err(|e| Failure::usage(format!("{}: {e}", args.measured.display())))?;
     if let Some(path) = &args.report {

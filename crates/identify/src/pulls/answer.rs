@@ -15,8 +15,8 @@ use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
 use super::words::separation;
 use crate::diagnosis::{
-    Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate,
-    Rival, SeparateBy, UnknownCovariate, Verdict,
+    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate, Rival,
+    SeparateBy, UnknownCovariate,
 };
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::columns::covariates;
@@ -132,11 +132,7 @@ pub fn diagnose_pulls(
     let heldout_after = predicted(&after_context, &after, &repetitions, false);
     diagnosis.effects = named(&search, &before, &accepted);
     diagnosis.unknown = unknown(&search, &before, &accepted, &data);
-    diagnosis.verdict = match (diagnosis.effects.is_empty(), diagnosis.unknown.is_empty()) {
-        (false, _) => Verdict::Effect,
-        (true, false) => Verdict::Unknown,
-        (true, true) => Verdict::None,
-    };
+    diagnosis.conclude();
     diagnosis.baseline = baseline(&after, &context);
     let named_rows = outliers(&after);
     diagnosis.data.outliers = named_rows.iter().map(|&i| measured.pulls[i].id.clone()).collect();
@@ -243,32 +239,22 @@ fn confirmed(
 }
 
 fn blank(data: &PullData<'_>) -> Diagnosis {
-    let known: Vec<&str> = covariates().filter(|c| !c.holds_words()).map(|c| c.name).collect();
-    Diagnosis {
-        schema: DIAGNOSIS_SCHEMA,
-        channel: Channel::Pulls,
-        data: DataSummary {
-            pulls: Some(data.len()),
-            traces: Some(data.measured.pulls.iter().filter(|p| p.trace.is_some()).count()),
-            sha256: data.measured.sha256.clone(),
-            ..DataSummary::default()
-        },
-        noise_floor_n: None,
-        noise_floor_mse: None,
-        verdict: Verdict::Insufficient,
-        effects: vec![],
-        unknown: vec![],
-        would_have_seen: BTreeMap::new(),
-        not_excited: known
-            .iter()
-            .filter(|c| data.columns.contains_key(**c) && !data.varies(c))
-            .map(|c| (*c).into())
-            .collect(),
-        not_recorded: known.iter().filter(|c| !data.columns.contains_key(**c)).map(|c| (*c).into()).collect(),
-        baseline: BTreeMap::new(),
-        error: None,
-        notes: vec![],
+    let known = covariates().filter(|c| !c.holds_words()).map(|c| c.name);
+    let data_summary = DataSummary {
+        pulls: Some(data.len()),
+        traces: Some(data.measured.pulls.iter().filter(|p| p.trace.is_some()).count()),
+        sha256: data.measured.sha256.clone(),
+        ..DataSummary::default()
+    };
+    let mut diagnosis = Diagnosis::blank(Channel::Pulls, data_summary);
+    for name in known {
+        match data.columns.contains_key(name) {
+            true if data.varies(name) => {}
+            true => diagnosis.not_excited.push(name.into()),
+            false => diagnosis.not_recorded.push(name.into()),
+        }
     }
+    diagnosis
 }
 
 /// What the data lack, if they cannot be diagnosed at all.

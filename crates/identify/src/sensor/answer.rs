@@ -11,11 +11,9 @@ use super::search::{Weighing, Workspace};
 use super::words::{SensorEvidence, evidence, separate_by};
 use super::{SensorData, SensorOptions, detect};
 use crate::diagnosis::{
-    Channel, DIAGNOSIS_SCHEMA, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, Rival,
-    UnknownCovariate, Verdict,
+    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, Rival, UnknownCovariate,
 };
 use gripgen_twin::effects::{EffectSpec, FORCE_RATE};
-use std::collections::BTreeMap;
 
 /// A group of rows with what was predicted from the other blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,11 +134,7 @@ fn finish(
     }
     diagnosis.effects.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     diagnosis.unknown.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-    diagnosis.verdict = match (diagnosis.effects.is_empty(), diagnosis.unknown.is_empty()) {
-        (false, _) => Verdict::Effect,
-        (true, false) => Verdict::Unknown,
-        (true, true) => Verdict::None,
-    };
+    diagnosis.conclude();
     baseline_values(diagnosis, prepared, &fit);
     diagnosis.would_have_seen = detect::detectable(ws, &choice.picked, options.seed);
     answer.evidence = evidence(ws, choice);
@@ -248,22 +242,10 @@ fn report_errors(
 
 fn bare(data: &SensorData) -> SensorDiagnosis {
     SensorDiagnosis {
-        diagnosis: Diagnosis {
-            schema: DIAGNOSIS_SCHEMA,
-            channel: Channel::Sensor,
-            data: DataSummary { rows: Some(data.time_s.len()), ..DataSummary::default() },
-            noise_floor_n: None,
-            noise_floor_mse: None,
-            verdict: Verdict::Insufficient,
-            effects: Vec::new(),
-            unknown: Vec::new(),
-            would_have_seen: BTreeMap::new(),
-            not_excited: Vec::new(),
-            not_recorded: Vec::new(),
-            baseline: BTreeMap::new(),
-            error: None,
-            notes: Vec::new(),
-        },
+        diagnosis: Diagnosis::blank(
+            Channel::Sensor,
+            DataSummary { rows: Some(data.time_s.len()), ..DataSummary::default() },
+        ),
         effects: Vec::new(),
         sessions: Vec::new(),
         rows: Vec::new(),

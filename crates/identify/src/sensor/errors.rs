@@ -4,8 +4,9 @@ use super::candidates::{chain, is_shape_only, size_parameter};
 use super::moments::{Model, Moments};
 use super::noise::{Noise, Whitener};
 use super::search::{Weighing, Workspace, combined};
-use super::statistics::{mean_and_error, t95};
+use super::statistics::mean_and_error;
 use crate::diagnosis::{ErrorPair, HeldOutError};
+use crate::grouped::t_quantile_95;
 use gripgen_twin::effects::EffectSpec;
 
 /// Held-out errors before and after.
@@ -125,7 +126,7 @@ fn summary(ws: &Workspace<'_>, by_unit: &[f64], y: &[f64]) -> HeldOutError {
     let squares: Vec<f64> = blocks.iter().map(|b| b.1 / b.2.max(1.0)).collect();
     let (_, deviation) = mean_and_error(&squares);
     let half = if mean > 0.0 && deviation.is_finite() {
-        0.5 * NEW_DATA * t95(squares.len() as f64 - 1.0) * (deviation / mean).min(3.0)
+        0.5 * NEW_DATA * t_quantile_95(squares.len() as f64 - 1.0) * (deviation / mean).min(3.0)
     } else {
         0.0
     };

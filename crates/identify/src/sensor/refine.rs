@@ -3,8 +3,8 @@
 use super::candidates::{Candidate, Kind, bounds, chain, size_parameter};
 use super::noise::{Noise, Whitener, draw};
 use super::prepare::Prepared;
-use super::statistics::t95;
 use crate::draws::Draws;
+use crate::grouped::t_quantile_95;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 use gripgen_twin::effects::EffectSpec;
 use nalgebra::{DMatrix, DVector};
@@ -105,7 +105,7 @@ pub(crate) fn joint_fit(
     } else {
         spread.of_white(size, &follow)
     };
-    let quantile = t95((n - used).max(1.0));
+    let quantile = t_quantile_95((n - used).max(1.0));
     let refined = effects
         .iter()
         .zip(at(&theta))

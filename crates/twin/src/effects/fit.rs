@@ -54,6 +54,12 @@ impl Fit {
     }
 }
 
+/// Smallest and largest value.
+pub type Bounds = (f64, f64);
+
+/// Values of one parameter on a grid, by its name.
+pub type Grid = (&'static str, Vec<f64>);
+
 /// How an effect is fitted to pulls.
 #[derive(Clone, Copy)]
 pub struct PullFit {
@@ -62,7 +68,7 @@ pub struct PullFit {
     /// The fit in a campaign.
     pub fit: fn(&PullSpan<'_>) -> Fit,
     /// Bounds of a parameter in a fit, from its name, the values of a start and the bounds of the library.
-    pub bounds: fn(&str, &[f64], (f64, f64)) -> (f64, f64),
+    pub bounds: fn(&str, &[f64], Bounds) -> Bounds,
     /// The derivative by its size vanishes at the neutral value, so that no slope promises anything.
     pub flat_at_neutral: bool,
 }
@@ -110,10 +116,10 @@ pub struct TableFit {
     /// Covariates through which it acts.
     pub acts_through: &'static [&'static str],
     /// The parameter that is tried on a grid, and its values.
-    pub grid: Option<fn(&TableSpan) -> (&'static str, Vec<f64>)>,
+    pub grid: Option<fn(&TableSpan) -> Grid>,
     /// Bounds of its parameters from those of the library, which are for campaigns of hours: in a table of seconds a
     /// change by the whole range is no more than that, whatever it would be in an hour.
-    pub bounds: fn(&TableSpan, (f64, f64)) -> (f64, f64),
+    pub bounds: fn(&TableSpan, Bounds) -> Bounds,
 }
 
 impl TableFit {

@@ -11,6 +11,7 @@ use crate::gradient::gradient;
 use crate::grid::{Grid, Plane};
 use crate::sensor::{GelShape, Pyramid};
 use crate::simd::SimdLevel;
+use gripgen_twin::random::splitmix64;
 
 /// Inputs of a pixel: the terms of the displaced gel, then the features of the surroundings.
 pub(super) const INPUTS: usize = NEAR + SURROUNDINGS;
@@ -140,7 +141,7 @@ fn choose(index: u64, circle: &Circle, grid: &Grid) -> (Vec<usize>, Vec<f32>) {
         let area_mm2 = zone.len() as f64 * mm_per_px * mm_per_px;
         let n = wanted.min(zone.len());
         for i in 0..n {
-            let j = i + (random(&mut state) % (zone.len() - i) as u64) as usize;
+            let j = i + (splitmix64(&mut state) % (zone.len() - i) as u64) as usize;
             zone.swap(i, j);
         }
         zone.truncate(n);
@@ -149,13 +150,4 @@ fn choose(index: u64, circle: &Circle, grid: &Grid) -> (Vec<usize>, Vec<f32>) {
         pixels.extend(zone);
     }
     (pixels, weights)
-}
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-fn random(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

@@ -4,6 +4,7 @@ use super::PressScene;
 use super::reduce::means;
 use crate::optics::level_at;
 use crate::presses::Circle;
+use gripgen_twin::random::splitmix64;
 use gripgen_twin::{OpticsState, TactileImage};
 
 /// Where a pixel lies beside the contact.
@@ -84,7 +85,7 @@ impl PressView {
         for (zone, mut list) in ZONES.into_iter().zip(by_zone) {
             let n = PIXELS_A_ZONE.min(list.len());
             for i in 0..n {
-                let j = i + (random(&mut state) % (list.len() - i) as u64) as usize;
+                let j = i + (splitmix64(&mut state) % (list.len() - i) as u64) as usize;
                 list.swap(i, j);
             }
             list.truncate(n);
@@ -191,13 +192,4 @@ pub fn surface_part(optics: &OpticsState) -> OpticsState {
         rest_offset: neutral.rest_offset,
         ..*optics
     }
-}
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-fn random(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

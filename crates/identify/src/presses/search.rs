@@ -1,9 +1,8 @@
 //! Which effects act: added one after another, exchanged, dropped, and compared with what has no name.
 
-use super::candidates::press_effects;
+use super::observed::Observed;
 use super::score::{Base, Design, Scored, differences, scored, with};
 use super::unnamed::{Fields, PressCovariate, Unnamed};
-use super::work::Work;
 use gripgen_twin::effects::EffectSpec;
 
 /// A gain of less than this share of the error is no effect, however surely it is there: every sensor file misfits its
@@ -33,15 +32,20 @@ const MOST_EFFECTS: usize = 3;
 const NEAR: f64 = 0.05;
 
 /// How one candidate did.
-#[derive(Debug, Clone)]
-pub(super) struct Trial {
-    pub(super) round: usize,
-    pub(super) name: String,
-    pub(super) gain: f64,
-    pub(super) standard_error: f64,
-    /// Mean held-out cost with it; 1 is what the zones had before this round.
-    pub(super) cost: f64,
-    pub(super) values: String,
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressTrial {
+    /// Round of the search, from 0 on; curves without a name come in a round of their own after the others.
+    pub round: usize,
+    /// Id of the effect, or `curve in` with the name of the covariate.
+    pub name: String,
+    /// What the mean held-out cost falls by; 1 is what the zones had before this round.
+    pub gain: f64,
+    /// Standard error of the gain over the presses.
+    pub standard_error: f64,
+    /// Mean held-out cost with the candidate.
+    pub cost: f64,
+    /// Fitted values, for people; at most five.
+    pub values: String,
 }
 
 /// A rival of a named effect.
@@ -61,7 +65,7 @@ pub(super) struct Found {
     /// Gain of each effect: what the error rises by without it.
     pub(super) gains: Vec<f64>,
     pub(super) unknown: Vec<(String, f64, f64)>,
-    pub(super) trials: Vec<Trial>,
+    pub(super) trials: Vec<PressTrial>,
     pub(super) design: Design,
     /// Mean cost with the model.
     pub(super) cost: f64,
@@ -74,35 +78,35 @@ fn counts(gain: f64, standard_error: f64, least: f64) -> bool {
 
 /// Runs the search. `progress` hears what is done, from 0 to 1.
 pub(super) fn search(
-    work: &mut Work,
+    observed: &mut Observed<'_>,
     covariates: &[PressCovariate],
     candidates: &[&'static EffectSpec],
     progress: &mut dyn FnMut(f64, &str),
 ) -> Found {
-    let mut design = Design::new(work.views.len());
-    let mut model = scored(work, &design, Vec::new());
+    let mut design = Design::new(observed.count());
+    let mut model = scored(observed, &design, Vec::new());
     let mut trials = Vec::new();
     for round in 0..=MOST_EFFECTS {
-        work.rescale(&model.acting);
-        let costs: Vec<f64> = scored(work, &design, Vec::new()).held_out;
-        model = scored(work, &design, model.acting);
+        observed.rescale(&model.acting);
+        let costs: Vec<f64> = scored(observed, &design, Vec::new()).held_out;
+        model = scored(observed, &design, model.acting);
         let now: Vec<f64> = model.fit.moments.iter().map(|m| m.cost).collect();
         design.reweigh(&now);
-        model = scored(work, &design, model.acting);
+        model = scored(observed, &design, model.acting);
         let base = design.mean(&model.held_out).0;
         let explained = (design.mean(&costs).0 - base).max(0.0);
         let mut best: Option<(f64, Scored)> = None;
         let left: Vec<_> =
             candidates.iter().filter(|s| model.acting.iter().all(|a| a.spec != **s)).copied().collect();
-        let ground = Base::new(work, &model);
+        let ground = Base::new(observed, &model);
         for (k, spec) in left.iter().enumerate() {
             let share = (round as f64 + k as f64 / left.len() as f64) / (MOST_EFFECTS + 1) as f64;
             progress(share, spec.id);
             let material = if model.acting.is_empty() { MATERIAL } else { MATERIAL_FURTHER };
             let least = (material * base).max(FURTHER * explained);
-            let tried = with(work, &design, &ground, spec, 0.5 * least);
+            let tried = with(observed, &design, &ground, spec, 0.5 * least);
             let (gain, standard_error) = design.mean(&differences(&model.held_out, &tried.held_out));
-            trials.push(Trial {
+            trials.push(PressTrial {
                 round,
                 name: spec.id.into(),
                 gain,
@@ -115,21 +119,21 @@ pub(super) fn search(
             }
         }
         match best {
-            Some((_, tried)) if round < MOST_EFFECTS => model = scored(work, &design, tried.acting),
+            Some((_, tried)) if round < MOST_EFFECTS => model = scored(observed, &design, tried.acting),
             _ => break,
         }
-        model = dropped(work, &design, model, MATERIAL * base / 2.0);
+        model = dropped(observed, &design, model, MATERIAL * base / 2.0);
     }
-    finish(work, covariates, candidates, design, model, trials, progress)
+    finish(observed, covariates, candidates, design, model, trials, progress)
 }
 
 /// Without those effects whose loss is not felt any more.
-fn dropped(work: &Work, design: &Design, mut model: Scored, least: f64) -> Scored {
+fn dropped(observed: &Observed<'_>, design: &Design, mut model: Scored, least: f64) -> Scored {
     let mut e = 0;
     while model.acting.len() > 1 && e < model.acting.len() {
         let mut rest = model.acting.clone();
         rest.remove(e);
-        let without = scored(work, design, rest);
+        let without = scored(observed, design, rest);
         if design.mean(&differences(&without.held_out, &model.held_out)).0 < least {
             model = without;
         } else {
@@ -141,16 +145,16 @@ fn dropped(work: &Work, design: &Design, mut model: Scored, least: f64) -> Score
 
 /// Exchanges, ties and what has no name, in the scale of the final model.
 fn finish(
-    work: &mut Work,
+    observed: &mut Observed<'_>,
     covariates: &[PressCovariate],
     candidates: &[&'static EffectSpec],
     design: Design,
     mut model: Scored,
-    mut trials: Vec<Trial>,
+    mut trials: Vec<PressTrial>,
     progress: &mut dyn FnMut(f64, &str),
 ) -> Found {
-    work.rescale(&model.acting);
-    model = scored(work, &design, model.acting);
+    observed.rescale(&model.acting);
+    model = scored(observed, &design, model.acting);
     let (mut rivals, mut gains) = (Vec::new(), Vec::new());
     let mut e = 0;
     let mut exchanges = 0;
@@ -158,14 +162,14 @@ fn finish(
         let spec = model.acting[e].spec;
         let mut rest = model.acting.clone();
         rest.remove(e);
-        let without = scored(work, &design, rest);
-        let ground = Base::new(work, &without);
+        let without = scored(observed, &design, rest);
+        let ground = Base::new(observed, &without);
         let gain = design.mean(&differences(&without.held_out, &model.held_out)).0;
         let mut tied = Vec::new();
         let mut better: Option<(f64, Scored)> = None;
         for other in candidates.iter().filter(|s| model.acting.iter().all(|a| a.spec != **s)) {
             progress(0.9, other.id);
-            let tried = with(work, &design, &ground, other, 0.7 * gain);
+            let tried = with(observed, &design, &ground, other, 0.7 * gain);
             let (loss, standard_error) = design.mean(&differences(&tried.held_out, &model.held_out));
             if loss < 0.0 && better.as_ref().is_none_or(|(l, _)| loss < *l) {
                 better = Some((loss, tried));
@@ -177,7 +181,7 @@ fn finish(
         match better {
             Some((loss, tried)) if exchanges < 3 && loss < -0.01 * gain => {
                 debug_assert!(tried.acting.last().is_some_and(|a| a.spec != spec));
-                model = scored(work, &design, tried.acting);
+                model = scored(observed, &design, tried.acting);
                 exchanges += 1;
                 (rivals, gains, e) = (Vec::new(), Vec::new(), 0);
             }
@@ -188,17 +192,17 @@ fn finish(
             }
         }
     }
-    let costs = scored(work, &design, Vec::new()).held_out;
+    let costs = scored(observed, &design, Vec::new()).held_out;
     let base = design.mean(&model.held_out).0;
     let explained = (design.mean(&costs).0 - base).max(0.0);
     let least = (MATERIAL_UNNAMED * base).max(LEFT * explained);
     progress(0.95, "what has no name");
-    let fields = Fields::new(work, &model);
+    let fields = Fields::new(observed, &model);
     let found = fields.rivals(covariates, &design);
     let mut unknown: Vec<(&Unnamed, f64, f64)> = Vec::new();
     for rival in &found {
         let (gain, standard_error) = design.mean(&differences(&model.held_out, &rival.held_out));
-        trials.push(Trial {
+        trials.push(PressTrial {
             round: MOST_EFFECTS + 1,
             name: format!("curve in {}", rival.covariate),
             gain,
@@ -218,9 +222,9 @@ fn finish(
         while e < model.acting.len() {
             let mut rest = model.acting.clone();
             rest.remove(e);
-            let with_it = Fields::new(work, &model).beside(rival, &design);
-            let without = scored(work, &design, rest);
-            let without_it = Fields::new(work, &without).beside(rival, &design);
+            let with_it = Fields::new(observed, &model).beside(rival, &design);
+            let without = scored(observed, &design, rest);
+            let without_it = Fields::new(observed, &without).beside(rival, &design);
             let loss = design.mean(&differences(&without_it, &with_it)).0;
             if loss < MATERIAL * base || loss < 0.1 * gains[e] {
                 model = without;
@@ -249,9 +253,4 @@ fn values_text(scored: &Scored) -> String {
     let Some(last) = scored.acting.last() else { return String::new() };
     let pairs = last.spec.parameters.iter().zip(&last.values).take(5);
     pairs.map(|(p, v)| format!("{} {v:.3}", p.name)).collect::<Vec<_>>().join(", ")
-}
-
-/// The candidates that these data can speak of.
-pub(super) fn candidates(marked: bool) -> Vec<&'static EffectSpec> {
-    press_effects().filter(|(_, fit)| marked || !fit.needs_marks).map(|(spec, _)| spec).collect()
 }

@@ -3,9 +3,11 @@
 //! All of them are linear: columns are a term of the field at a pixel times a term of the curve at a press. The moments
 //! of the field's terms in each press therefore give those of every curve.
 
+use super::model::NamedModel;
+use super::observed::Observed;
+use super::predict::PressPixels;
 use super::score::{Design, Scored};
-use super::work::{NamedModel, Work, for_each};
-use gripgen_identify::{FreeParameter, GroupMoments, GroupedFit, held_out_costs};
+use crate::{FreeParameter, GroupMoments, GroupedFit, held_out_costs};
 pub use gripgen_twin::Values as PressValues;
 use nalgebra::{DMatrix, DVector};
 
@@ -22,12 +24,12 @@ const CONTRAST: &[usize] = &[7];
 /// Rivals that are the same in all presses.
 const CONSTANT: [&str; 2] = ["colour", "x_px*y_px"];
 
-/// What a column of the table says about each press.
+/// A covariate of presses: what a column of the table says about each of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressCovariate {
     /// Its name.
     pub name: String,
-    /// Its value at each press.
+    /// Its values, one a press.
     pub values: PressValues,
 }
 
@@ -57,22 +59,22 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    pub(super) fn new(work: &Work, scored: &Scored) -> Self {
+    pub(super) fn new(observed: &Observed<'_>, scored: &Scored) -> Self {
         let model = NamedModel {
-            work,
+            observed,
             acting: scored.acting.clone(),
             free: scored.free.clone(),
             parameters: scored.parameters.clone(),
         };
         let k = model.parameters.len();
-        let moments = for_each(work.views.len(), |i| {
+        let moments = observed.for_each(observed.count(), |i| {
             let (levels, slopes) = model.derivatives(i, &scored.fit.values);
-            let contact = work.contact(i, &work.optics(i, &model.acting));
-            let places = work.views[i].places(&work.scene);
-            let weights = work.pixel_weights(i);
+            let contact = observed.predictor.contact_levels(i, &model.acting);
+            let PressPixels { measured, places, .. } = &observed.pixels[i];
+            let weights = observed.pixel_weights(i);
             let mut moments = GroupMoments::zero(k + 3 * TERMS);
             let mut row = vec![0.0; k + 3 * TERMS];
-            for (p, measured) in work.views[i].measured().iter().enumerate() {
+            for (p, measured) in measured.iter().enumerate() {
                 let [u, v] = places[p];
                 for c in 0..3 {
                     row[k..].fill(0.0);

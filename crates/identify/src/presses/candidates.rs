@@ -1,7 +1,6 @@
 //! The effects of the library that presses can show, as candidates.
 
-use gripgen_identify::FreeParameter;
-use gripgen_tactile::presses::PressScene;
+use crate::FreeParameter;
 use gripgen_twin::effects::{EffectSpec, LIBRARY, PressFit};
 
 /// Effects that presses can show, with how they are fitted.
@@ -24,10 +23,14 @@ pub(super) fn fitted(spec: &EffectSpec) -> Vec<usize> {
     (0..spec.parameters.len()).filter(|&j| tried(spec) != Some(j)).collect()
 }
 
-/// A fitted parameter with its start.
-pub(super) fn free_parameter(spec: &EffectSpec, j: usize, scene: &PressScene) -> FreeParameter {
+/// A fitted parameter with its start; `px_mm`: side of a pixel on the gel.
+pub(super) fn free_parameter(spec: &EffectSpec, j: usize, px_mm: f64) -> FreeParameter {
     let p = &spec.parameters[j];
-    let px_mm = scene.sensor().grid.metres_per_px * 1e3;
     let (start, scale) = spec.presses.map_or((p.neutral, 1.0), |fit| (fit.start)(p.name, px_mm));
     FreeParameter { name: p.name.into(), start, bounds: p.bounds, scale }
+}
+
+/// The candidates that presses can speak of; some show only where the contacts were marked.
+pub(super) fn candidates(marked: bool) -> Vec<&'static EffectSpec> {
+    press_effects().filter(|(_, fit)| marked || !fit.needs_marks).map(|(spec, _)| spec).collect()
 }

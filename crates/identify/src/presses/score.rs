@@ -1,11 +1,15 @@
 //! Candidates fitted and scored on presses that their fit has not seen.
 
 use super::candidates::{is_drawn, tried};
-use super::work::{Acting, Head, NamedModel, Work};
-use gripgen_identify::{
-    FreeParameter, GroupMoments, GroupedFit, fit_grouped, fold_steps, grouped_step, held_out_costs,
+use super::model::{Head, NamedModel};
+use super::observed::Observed;
+use super::predict::ActingEffect;
+use crate::{
+    FreeParameter, GroupMoments, GroupedFit, GroupedModel, fit_grouped, fold_steps, grouped_step,
+    held_out_costs,
 };
 use gripgen_twin::effects::EffectSpec;
+use gripgen_twin::random::splitmix64;
 
 /// Steps of a fit at most.
 const MOST_STEPS: usize = 4;
@@ -52,17 +56,15 @@ impl Design {
     }
 }
 
+/// Random bits that are a function of `i` alone.
 pub(super) fn hash(i: u64) -> u64 {
-    let mut z = i.wrapping_add(7).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+    splitmix64(&mut i.wrapping_add(6).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
 /// A set of effects, fitted and scored.
 #[derive(Debug, Clone)]
 pub(super) struct Scored {
-    pub(super) acting: Vec<Acting>,
+    pub(super) acting: Vec<ActingEffect>,
     pub(super) free: Vec<(usize, usize)>,
     pub(super) parameters: Vec<FreeParameter>,
     pub(super) fit: GroupedFit,
@@ -72,7 +74,7 @@ pub(super) struct Scored {
 
 impl Scored {
     /// The effects as the fit without each fold has them.
-    pub(super) fn by_fold(&self, weights: &[f64], folds: &[usize]) -> Vec<Vec<Acting>> {
+    pub(super) fn by_fold(&self, weights: &[f64], folds: &[usize]) -> Vec<Vec<ActingEffect>> {
         fold_steps(&self.parameters, &self.fit, weights, folds)
             .iter()
             .map(|step| {
@@ -87,14 +89,14 @@ impl Scored {
 }
 
 /// Fits and scores a set of effects together.
-pub(super) fn scored(work: &Work, design: &Design, acting: Vec<Acting>) -> Scored {
+pub(super) fn scored(observed: &Observed<'_>, design: &Design, acting: Vec<ActingEffect>) -> Scored {
     if acting.is_empty() {
-        let costs = NamedModel::new(work, acting).moments_alone();
+        let costs = NamedModel::new(observed, acting).moments_alone();
         let moments = costs.iter().map(|&cost| GroupMoments { cost, ..GroupMoments::zero(0) }).collect();
         let fit = GroupedFit { values: Vec::new(), moments };
         return Scored { acting: Vec::new(), free: Vec::new(), parameters: Vec::new(), fit, held_out: costs };
     }
-    let model = NamedModel::new(work, acting);
+    let model = NamedModel::new(observed, acting);
     let fit = fit_grouped(&model.parameters, MOST_STEPS, &design.weights, &model);
     let held_out = held_out_costs(&model.parameters, &fit, &design.weights, &design.folds);
     Scored { acting: model.at(&fit.values), free: model.free, parameters: model.parameters, fit, held_out }
@@ -107,14 +109,14 @@ pub(super) fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {
 
 /// What a candidate is added to: accepted effects with what their parameters do.
 pub(super) struct Base<'a> {
-    pub(super) acting: &'a [Acting],
+    pub(super) acting: &'a [ActingEffect],
     pub(super) held_out: &'a [f64],
     pub(super) head: Head,
 }
 
 impl<'a> Base<'a> {
-    pub(super) fn new(work: &Work, scored: &'a Scored) -> Self {
-        let head = Head::new(work, &scored.acting);
+    pub(super) fn new(observed: &Observed<'_>, scored: &'a Scored) -> Self {
+        let head = Head::new(observed, &scored.acting);
         Self { acting: &scored.acting, held_out: &scored.held_out, head }
     }
 }
@@ -123,21 +125,21 @@ impl<'a> Base<'a> {
 /// would count; a candidate whose first step does not show it is not drawn for a fit. A change of background is tried
 /// from every press on.
 pub(super) fn with(
-    work: &Work,
+    observed: &Observed<'_>,
     design: &Design,
     base: &Base<'_>,
     spec: &'static EffectSpec,
     least: f64,
 ) -> Scored {
     let mut acting = base.acting.to_vec();
-    acting.push(Acting::start(spec, &work.scene));
+    acting.push(ActingEffect::start(spec, observed.predictor.px_mm()));
     if let Some(at) = tried(spec) {
-        let place = step_place(work, design, &acting, at);
+        let place = step_place(observed, design, &acting, at);
         if let Some(last) = acting.last_mut() {
             last.values[at] = place;
         }
     }
-    let model = NamedModel::last(work, acting);
+    let model = NamedModel::last(observed, acting);
     let (free, parameters) = model.behind(&base.head);
     let whole = |tail: &[f64]| -> GroupedFit {
         let values = base.head.values().chain(tail.iter().copied()).collect();
@@ -160,13 +162,13 @@ pub(super) fn with(
 }
 
 /// The pull index from which on the last effect of a model explains most, held out.
-fn step_place(work: &Work, design: &Design, acting: &[Acting], at: usize) -> f64 {
-    let model = NamedModel::last(work, acting.to_vec());
+fn step_place(observed: &Observed<'_>, design: &Design, acting: &[ActingEffect], at: usize) -> f64 {
+    let model = NamedModel::last(observed, acting.to_vec());
     let values: Vec<f64> = model.parameters.iter().map(|p| p.start).collect();
-    let moments = gripgen_identify::GroupedModel::moments(&model, &values);
+    let moments = GroupedModel::moments(&model, &values);
     let own = vec![true; model.free.len()];
     let n = moments.len();
-    let index = |i: usize| work.circumstances[i].pull_index as f64;
+    let index = |i: usize| observed.predictor.circumstances()[i].pull_index as f64;
     let neutral = acting.last().map_or(0.0, |a| a.spec.parameters[at].neutral);
     let places =
         std::iter::once(0).chain(FEWEST_ON_A_SIDE..(n + 1).saturating_sub(FEWEST_ON_A_SIDE)).map(|first| {
@@ -184,7 +186,7 @@ fn step_place(work: &Work, design: &Design, acting: &[Acting], at: usize) -> f64
 }
 
 /// Moments of a press on which some parameters do not act.
-pub(super) fn without(moments: &GroupMoments, own: &[bool]) -> GroupMoments {
+fn without(moments: &GroupMoments, own: &[bool]) -> GroupMoments {
     let mut masked = moments.clone();
     for (k, _) in own.iter().enumerate().filter(|(_, own)| **own) {
         masked.gradient[k] = 0.0;
@@ -196,6 +198,6 @@ pub(super) fn without(moments: &GroupMoments, own: &[bool]) -> GroupMoments {
 
 impl NamedModel<'_> {
     fn moments_alone(&self) -> Vec<f64> {
-        gripgen_identify::GroupedModel::costs(self, &[])
+        GroupedModel::costs(self, &[])
     }
 }

@@ -1,0 +1,216 @@
+//! From what was found to the answer.
+
+use super::candidates::tried;
+use super::observed::Observed;
+use super::power::would_have_seen;
+use super::score::hash;
+use super::search::Found;
+use super::unnamed::{PressCovariate, PressValues};
+use super::{PressData, PressDiagnosis};
+use crate::{
+    Channel, DataSummary, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, HeldOutError, NamedEffect,
+    ParameterEstimate, Rival, SeparateBy, UnknownCovariate, grouped_intervals,
+};
+use gripgen_twin::effects::{Measured, separating};
+use std::collections::BTreeMap;
+
+/// Everything that the answer is made of.
+pub(super) struct Answer<'a> {
+    pub(super) data: &'a PressData,
+    pub(super) observed: &'a Observed<'a>,
+    pub(super) found: Found,
+}
+
+/// The error of each press over its whole frame.
+struct FrameErrors {
+    before: Vec<f64>,
+    /// Held out in folds that were drawn.
+    after: Vec<f64>,
+    /// Held out in blocks of neighbours.
+    after_blocks: Vec<f64>,
+}
+
+/// A diagnosis that says nothing yet.
+pub(super) fn bare(data: &PressData) -> Diagnosis {
+    let summary = DataSummary {
+        presses: Some(data.names.len()),
+        sha256: data.sha256.clone(),
+        ..DataSummary::default()
+    };
+    // Rounding to whole grey levels adds a twelfth.
+    let noise_floor_mse = Some(data.noise_mse + 1.0 / 12.0);
+    Diagnosis { noise_floor_mse, ..Diagnosis::blank(Channel::Presses, summary) }
+}
+
+impl Answer<'_> {
+    pub(super) fn diagnosed(self) -> PressDiagnosis {
+        let errors = self.frame_errors();
+        let mut diagnosis = bare(self.data);
+        diagnosis.effects = self.effects();
+        let unknown = |(covariate, strength, p): &(String, f64, f64)| UnknownCovariate {
+            covariate: covariate.clone(),
+            strength: *strength,
+            p_value: p.max(1e-6),
+        };
+        diagnosis.unknown = self.found.unknown.iter().map(unknown).collect();
+        diagnosis.conclude();
+        diagnosis.would_have_seen = would_have_seen(self.observed, &self.found);
+        diagnosis.not_excited = self.not_excited();
+        diagnosis.data.outliers = self.outliers();
+        let pair = |after: &[f64]| ErrorPair { before: interval(&errors.before), after: interval(after) };
+        let drawn = pair(&errors.after);
+        diagnosis.error = Some(ErrorReport {
+            heldout: "presses".into(),
+            before: drawn.before,
+            after: drawn.after,
+            by: ErrorsBy { levels: None, sessions: Some(pair(&errors.after_blocks)) },
+        });
+        diagnosis.notes.push("`by.sessions` holds out blocks of presses that follow one another".into());
+        let acting = &self.found.model.acting;
+        PressDiagnosis {
+            diagnosis,
+            zone_mse: [self.observed.zone_mse(&[]), self.observed.zone_mse(acting)],
+            frame_mse: errors.before.iter().copied().zip(errors.after.iter().copied()).collect(),
+            acting: self.found.model.acting,
+            trials: self.found.trials,
+        }
+    }
+
+    fn effects(&self) -> Vec<NamedEffect> {
+        let model = &self.found.model;
+        let intervals = grouped_intervals(&model.parameters, &model.fit, &self.found.design.weights);
+        let mut list: Vec<(f64, NamedEffect)> = model
+            .acting
+            .iter()
+            .enumerate()
+            .map(|(e, acting)| {
+                let mut parameters = BTreeMap::new();
+                for (k, &(effect, j)) in model.free.iter().enumerate() {
+                    if effect == e {
+                        let p = &acting.spec.parameters[j];
+                        let (low90, high90) = intervals[k];
+                        let estimate =
+                            ParameterEstimate { value: acting.values[j], low90, high90, unit: p.unit.into() };
+                        parameters.insert(p.name.to_string(), estimate);
+                    }
+                }
+                if let Some(j) = tried(acting.spec) {
+                    let value = acting.values[j];
+                    let (low90, high90) = if value > 0.0 { (value - 1.0, value + 1.0) } else { (0.0, 0.0) };
+                    let estimate = ParameterEstimate { value, low90, high90, unit: "1".into() };
+                    parameters.insert(acting.spec.parameters[j].name.into(), estimate);
+                }
+                let (own, rivals) = self.weights(e);
+                let mut class = vec![acting.spec.id.to_string()];
+                class.extend(rivals.iter().map(|r| r.name.clone()));
+                let named = NamedEffect {
+                    name: acting.spec.id.into(),
+                    part: None,
+                    separate_by: (!rivals.is_empty())
+                        .then(|| SeparateBy { text: separate_by(acting.spec.id, &rivals), campaign: None }),
+                    class,
+                    weight: own,
+                    parameters,
+                    indistinguishable_from: rivals,
+                };
+                (self.found.gains.get(e).copied().unwrap_or(0.0), named)
+            })
+            .collect();
+        list.sort_by(|a, b| b.1.weight.total_cmp(&a.1.weight).then(b.0.total_cmp(&a.0)));
+        list.into_iter().map(|(_, named)| named).collect()
+    }
+
+    /// Shares of the evidence: an effect, and its rivals.
+    fn weights(&self, e: usize) -> (f64, Vec<Rival>) {
+        let Some(tied) = self.found.rivals.get(e) else { return (0.95, Vec::new()) };
+        let gain = self.found.gains[e].max(1e-12);
+        let evidence: Vec<f64> = tied
+            .iter()
+            .map(|r| {
+                let width = r.standard_error.max(0.03 * gain);
+                let t = r.loss.max(0.0) / width;
+                libm::exp(-0.5 * t * t)
+            })
+            .collect();
+        let sum = 1.05 + evidence.iter().sum::<f64>();
+        let mut rivals: Vec<Rival> = tied
+            .iter()
+            .zip(&evidence)
+            .map(|(r, w)| Rival { name: r.spec.id.into(), weight: w / sum })
+            .collect();
+        rivals.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        (1.0 / sum, rivals)
+    }
+
+    /// Presses that the model explains far worse than the others.
+    fn outliers(&self) -> Vec<String> {
+        let costs: Vec<f64> = self.found.model.fit.moments.iter().map(|m| m.cost).collect();
+        let mut sorted = costs.clone();
+        sorted.sort_by(f64::total_cmp);
+        let median = sorted[sorted.len() / 2];
+        let mut list: Vec<usize> = (0..costs.len()).filter(|&i| costs[i] > 6.0 * median).collect();
+        list.sort_by(|&a, &b| costs[b].total_cmp(&costs[a]));
+        list.into_iter().map(|i| self.data.names[i].clone()).collect()
+    }
+
+    fn not_excited(&self) -> Vec<String> {
+        let constant = |covariate: &&PressCovariate| match &covariate.values {
+            PressValues::Numbers(values) => {
+                let (low, high) = values
+                    .iter()
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+                let narrow = covariate.name == "radius_px" && high - low < 0.05 * high;
+                high <= low || narrow
+            }
+            PressValues::Words(words) => words.iter().all(|w| *w == words[0]),
+        };
+        self.data.covariates.iter().filter(constant).map(|c| c.name.clone()).collect()
+    }
+
+    /// Errors over whole frames at the resolution of the images.
+    fn frame_errors(&self) -> FrameErrors {
+        let n = self.observed.count();
+        let predictor = self.observed.predictor;
+        let before = self.observed.for_each(n, |i| predictor.frame_mse(i, &[]));
+        let model = &self.found.model;
+        let held_out = |folds: &[usize]| {
+            if model.acting.is_empty() {
+                return before.clone();
+            }
+            let by_fold = model.by_fold(&self.found.design.weights, folds);
+            self.observed.for_each(n, |i| predictor.frame_mse(i, &by_fold[folds[i]]))
+        };
+        let after = held_out(&self.found.design.folds);
+        let after_blocks = held_out(&self.found.design.blocks);
+        FrameErrors { before, after, after_blocks }
+    }
+}
+
+/// Mean over the presses with a 90 % interval by resampling them.
+fn interval(errors: &[f64]) -> HeldOutError {
+    let n = errors.len();
+    let mean = |list: &mut dyn Iterator<Item = f64>| list.sum::<f64>() / n as f64;
+    let mut means: Vec<f64> = (0..2000u64)
+        .map(|draw| {
+            let pick = |k: usize| errors[(hash(draw * 7919 + k as u64 * 104_729) % n as u64) as usize];
+            mean(&mut (0..n).map(pick))
+        })
+        .collect();
+    means.sort_by(f64::total_cmp);
+    HeldOutError {
+        mse: Some(mean(&mut errors.iter().copied())),
+        low90: means[99],
+        high90: means[1899],
+        ..Default::default()
+    }
+}
+
+/// What tells an effect from its rivals.
+fn separate_by(name: &str, rivals: &[Rival]) -> String {
+    let suspects: Vec<&str> = std::iter::once(name).chain(rivals.iter().map(|r| r.name.as_str())).collect();
+    let steps = separating(Measured::Presses, &suspects);
+    if steps.is_empty() {
+        return "more presses, at other places and depths".into();
+    }
+    steps.iter().map(|step| step.text()).collect::<Vec<_>>().join("; ")
+}
