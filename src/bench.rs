@@ -3,7 +3,7 @@
 use gripgen_tactile::gpu::{
     AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRenderer, GpuRequest, GpuSensor,
 };
-use gripgen_tactile::{ClusteredMesh, ColourModel, IndentError, Renderer, Sensor, SensorError, SimdLevel};
+use gripgen_tactile::{ClusteredMesh, IndentError, Renderer, Sensor, SensorError, SimdLevel};
 use gripgen_twin::config::Backend;
 use gripgen_twin::frames::{Pose, pose, rotation_from_fixed_xyz};
 use gripgen_twin::parts::SteppedShaft;
@@ -176,11 +176,7 @@ pub fn bench(options: &BenchOptions) -> Result<BenchReport, BenchError> {
         adapter: gpu.as_ref().map(|gpu| gpu.adapter().clone()),
         batch: None,
         level: SimdLevel::best(),
-        colour: match work.sensor.colour {
-            ColourModel::Lambert(_) => "lambert",
-            ColourModel::Taxim(_) => "taxim",
-            ColourModel::Regressor(_) => "regressor",
-        },
+        colour: work.sensor.colour.name(),
         size_px: (work.sensor.grid.width_px, work.sensor.grid.height_px),
         triangles: work.mesh.triangles().len(),
         rates: vec![],

@@ -1,6 +1,6 @@
 //! From the surface of a pressed gel to the change of its image: stages `gradient`, `shade` and `shadow`.
 
-use crate::colour::{ColourModel, shade};
+use crate::colour::shade;
 use crate::gradient::gradient;
 use crate::grid::Plane;
 use crate::sensor::Sensor;
@@ -39,10 +39,7 @@ pub(crate) fn appearance_on(
     });
     let surface_px = whole.as_ref().unwrap_or(raised_px);
     let (along_x, along_y) = gradient(surface_px);
-    let rest_slope = match (&sensor.colour, &rest) {
-        (ColourModel::Taxim(_), _) | (_, None) => None,
-        (_, Some(rest)) => Some(gradient(rest)),
-    };
+    let rest_slope = rest.as_ref().filter(|_| !sensor.colour.takes_whole_slope()).map(gradient);
     let mut change = shade(&sensor.colour, raised_px, &along_x, &along_y, rest_slope.as_ref());
     if let Some(table) = &sensor.shadow {
         let core: Vec<u8> = (0..raised_px.values.len()).map(|i| u8::from(core(i))).collect();
@@ -55,7 +52,7 @@ pub(crate) fn appearance_on(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::colour::{Lambert, Light};
+    use crate::colour::{ColourModel, Lambert, Light};
     use crate::grid::Grid;
     use crate::sensor::GelShape;
     use crate::shadow::{Shadow, ShadowKind, ShadowTable};

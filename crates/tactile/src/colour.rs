@@ -26,6 +26,76 @@ pub enum ColourModel {
     Regressor(Box<Regressor>),
 }
 
+/// Models that draw the displacement of the gel alone.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum LocalColours<'a> {
+    /// Lights.
+    Lambert(&'a Lambert),
+    /// Regression.
+    Regressor(&'a Regressor),
+}
+
+impl ColourModel {
+    /// Its name on screens and in reports.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Lambert(_) => "lambert",
+            Self::Taxim(_) => "taxim",
+            Self::Regressor(_) => "regressor",
+        }
+    }
+
+    /// Names of the arrays of a sensor file that make it unusable, because a number in them is not finite; `None` for one that
+    /// can be used.
+    pub(crate) fn unusable_arrays(&self) -> Option<&'static str> {
+        match self {
+            Self::Lambert(lambert) => (!lambert.is_finite()).then_some("lambert"),
+            Self::Taxim(table) => (!table.is_finite()).then_some("grad_r, grad_g, grad_b"),
+            Self::Regressor(model) => {
+                (!model.is_usable()).then_some("regressor_near, regressor_around, regressor_limits")
+            }
+        }
+    }
+
+    /// Whether it is a function of the slope of the whole surface, as Taxim's is, and not of what the contact changes.
+    pub(crate) fn takes_whole_slope(&self) -> bool {
+        match self {
+            Self::Taxim(_) => true,
+            Self::Lambert(_) | Self::Regressor(_) => false,
+        }
+    }
+
+    /// The model for pixels `factor` times as wide; `means` takes the means of a plane over them.
+    pub(crate) fn of_wider_pixels(&self, factor: usize, means: impl Fn(&[f32]) -> Vec<f32>) -> Self {
+        match self {
+            Self::Lambert(lambert) => Self::Lambert(lambert.clone()),
+            Self::Taxim(table) => Self::Taxim(Box::new(table.with_planes(means))),
+            Self::Regressor(model) => {
+                let mut model = model.clone();
+                model.mm_per_px *= factor as f64;
+                Self::Regressor(model)
+            }
+        }
+    }
+
+    /// The colours where the image is a function of the displacement of the gel alone; `flat` says that the gel is flat at rest.
+    pub(crate) fn local(&self, flat: bool) -> Option<LocalColours<'_>> {
+        match self {
+            Self::Lambert(lambert) => flat.then_some(LocalColours::Lambert(lambert)),
+            Self::Taxim(_) => None,
+            Self::Regressor(model) => Some(LocalColours::Regressor(model)),
+        }
+    }
+
+    /// Taxim's table, whose shadows are made with it.
+    pub(crate) fn taxim(&self) -> Option<&TaximTable> {
+        match self {
+            Self::Taxim(table) => Some(table),
+            Self::Lambert(_) | Self::Regressor(_) => None,
+        }
+    }
+}
+
 /// Colour change against the frame at rest, in grey levels: planes of red, green and blue.
 ///
 /// `raised_px` is the height of the gel surface above its rest state, towards the camera, in pixels. `along_x`, `along_y`

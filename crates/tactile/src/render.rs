@@ -3,7 +3,7 @@
 mod scratch;
 
 use crate::appearance::appearance;
-use crate::colour::ColourModel;
+use crate::colour::LocalColours;
 use crate::elastic::{Base, ElasticGel, press_elastic};
 use crate::grid::Plane;
 use crate::indent::{Imprint, IndentError, Press, PressedGel, indent};
@@ -11,7 +11,7 @@ use crate::markers::{MarkerGel, Shear, draw_markers, marker_displacements, witho
 use crate::noise::finish_on;
 use crate::raster::ClusteredMesh;
 use crate::sensor::Sensor;
-use crate::shading::{LocalColours, change};
+use crate::shading::change;
 use crate::simd::SimdLevel;
 use gripgen_twin::config::GelModel;
 use gripgen_twin::frames::Pose;
@@ -166,20 +166,14 @@ impl Renderer<'_> {
 
     /// The colours where the image is a function of the displacement of the gel alone.
     fn local_colours(&self, prepared: &Prepared) -> Option<LocalColours<'_>> {
-        match &self.sensor.colour {
-            _ if self.sensor.shadow.is_some() => None,
-            ColourModel::Lambert(lambert) if prepared.rest_px.is_none() => {
-                Some(LocalColours::Lambert(lambert))
-            }
-            ColourModel::Regressor(model) => Some(LocalColours::Regressor(model)),
-            ColourModel::Lambert(_) | ColourModel::Taxim(_) => None,
-        }
+        let flat = prepared.rest_px.is_none();
+        self.sensor.colour.local(flat).filter(|_| self.sensor.shadow.is_none())
     }
 
     /// Whether the deformation blurs the gel as a whole, as Taxim does, which moves a gel that is not flat at rest even
     /// far from the contact. With other colours it blurs the displacement alone: far from a contact nothing moves.
     pub(crate) fn blurs_whole_gel(&self) -> bool {
-        matches!(self.sensor.colour, ColourModel::Taxim(_))
+        self.sensor.colour.takes_whole_slope()
     }
 
     /// Kernels and restored share of the deformation. A calibrated sensor says which; without its word those of the

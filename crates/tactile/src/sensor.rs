@@ -64,19 +64,8 @@ impl Sensor {
                 return Err(SensorError::BackgroundSize { found: (w, h), wanted });
             }
         }
-        match &self.colour {
-            ColourModel::Lambert(lambert) if !lambert.is_finite() => {
-                return Err(SensorError::NotFinite { key: "lambert" });
-            }
-            ColourModel::Regressor(model) if !model.is_usable() => {
-                return Err(SensorError::NotFinite {
-                    key: "regressor_near, regressor_around, regressor_limits",
-                });
-            }
-            ColourModel::Taxim(table) if !table.is_finite() => {
-                return Err(SensorError::NotFinite { key: "grad_r, grad_g, grad_b" });
-            }
-            _ => {}
+        if let Some(key) = self.colour.unusable_arrays() {
+            return Err(SensorError::NotFinite { key });
         }
         if let Some(&sigma) = self.noise_rgb.iter().find(|s| !(0.0..=64.0).contains(*s)) {
             let value = f64::from(sigma);

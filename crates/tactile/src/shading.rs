@@ -1,7 +1,7 @@
 //! Stages `gradient` and `shade` in one walk over the part of the surface that is not flat.
 
 use crate::colour::regressor::{DrawScratch, Terrain};
-use crate::colour::{Lambert, LambertRow, Regressor};
+use crate::colour::{LambertRow, LocalColours};
 use crate::convolve::{Area, Sheet};
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
@@ -32,15 +32,6 @@ fn draw(
         }
         LocalColours::Regressor(model) => model.shade(&slopes, change, scratch, level),
     }
-}
-
-/// Models that draw the displacement of the gel alone.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum LocalColours<'a> {
-    /// Lights.
-    Lambert(&'a Lambert),
-    /// Regression.
-    Regressor(&'a Regressor),
 }
 
 /// Memory for the change of colour of one image.

@@ -60,7 +60,7 @@ impl Shadow {
         let step_px = table.step_m / metres_per_px;
         let mut blurs = vec![Blur { weights: one_side(SIGMA_STEPS * step_px), border: Border::EdgeTwice }];
         let mut base = None;
-        if let (ShadowKind::Ceiling, ColourModel::Taxim(colour)) = (table.kind, colour) {
+        if let (ShadowKind::Ceiling, Some(colour)) = (table.kind, colour.taxim()) {
             let half = ((LAST_KERNEL_STEPS * step_px - 1.0) / 2.0).round().clamp(0.0, 127.0) as usize;
             let weights = if half == 0 { vec![1.0] } else { gaussian(2 * half as u32 + 1)[half..].to_vec() };
             let last = Blur { weights, border: Border::EdgeOnce };
@@ -97,7 +97,7 @@ pub fn shadow(
     let rim = rim(relief.core, width, shadow.rim_px);
     let height = &relief.surface_px.values;
     let lowered = |pixels: &mut Vec<[f32; 4]>| shadow.rays.cast(relief, &rim, pixels);
-    if let (Some(base), ColourModel::Taxim(colour)) = (&shadow.base, colour) {
+    if let (Some(base), Some(colour)) = (&shadow.base, colour.taxim()) {
         for (plane, offset) in change.iter_mut().zip(colour.offset()) {
             for (value, offset) in plane.values.iter_mut().zip(offset) {
                 *value -= offset;

@@ -1,6 +1,5 @@
 //! A sensor with fewer, larger pixels.
 
-use crate::colour::ColourModel;
 use crate::grid::Grid;
 use crate::sensor::{GelShape, Pyramid, Sensor};
 use crate::shadow::Shadow;
@@ -18,15 +17,7 @@ pub(super) fn reduced_sensor(sensor: &Sensor, factor: usize) -> Option<Sensor> {
         metres_per_px: sensor.grid.metres_per_px * factor as f64,
     };
     let means = |plane: &[f32]| means(plane, w, h, factor);
-    let colour = match &sensor.colour {
-        ColourModel::Lambert(lambert) => ColourModel::Lambert(lambert.clone()),
-        ColourModel::Regressor(model) => {
-            let mut model = model.clone();
-            model.mm_per_px *= factor as f64;
-            ColourModel::Regressor(model)
-        }
-        ColourModel::Taxim(table) => ColourModel::Taxim(Box::new(table.with_planes(means))),
-    };
+    let colour = sensor.colour.of_wider_pixels(factor, means);
     let gel_shape = match &sensor.gel_shape {
         GelShape::Map(heights) => {
             GelShape::Map(means(heights).into_iter().map(|v| v / factor as f32).collect())
