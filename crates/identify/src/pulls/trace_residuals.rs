@@ -49,18 +49,23 @@ impl TraceResiduals {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gripgen_twin::random::normal_quantile;
 
     fn of(own: Vec<f64>) -> TraceResiduals {
         TraceResiduals { shared: vec![0.5], own, traces: 20 }
     }
 
-    /// Deviations as expected count one by one.
+    /// Deviations that are those of a standard normal variable cost what a Gaussian likelihood says: half of one each, on
+    /// average (the mean of chi-squared is its number of degrees of freedom).
     #[test]
     fn traces_that_agree_count_fully() {
-        let r = of((0..80).map(|i| if i % 2 == 0 { 0.4 } else { -0.4 }).collect());
-        assert_eq!(r.widening(), 1.0);
-        let plain = 0.5 * 0.25 + 80.0 * 0.5 * 0.16;
-        assert!((r.cost() - plain).abs() < 1e-9, "{} {plain}", r.cost());
+        let mut own: Vec<f64> = (0..80).map(|i| normal_quantile((f64::from(i) + 0.5) / 80.0)).collect();
+        // Each trace has levels of both signs.
+        own.rotate_left(37);
+        let r = of(own);
+        assert!((r.widening() - 1.0).abs() < 0.05, "{}", r.widening());
+        let gaussian = 0.5 * 0.25 + 0.5 * 80.0;
+        assert!((r.cost() / gaussian - 1.0).abs() < 0.05, "{} {gaussian}", r.cost());
         assert_eq!(r.widened(1.0).len(), 81);
     }
 
