@@ -7,7 +7,7 @@ use crate::project::{LoadError, Project, load_twin_document};
 use crate::sample::SimulateOptions;
 use gripgen_record::sha256_hex;
 use gripgen_tactile::SimdLevel;
-use gripgen_twin::columns::covariates;
+use gripgen_twin::columns::{Column, covariates};
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::SensorChain;
@@ -88,11 +88,13 @@ pub fn simulate_campaign(
         0 => Vec::new(),
         n => vec![format!("{n} of {made} pulls were left out: they failed or did not slip")],
     };
+    let there = |column: &&Column| pulls.iter().any(|p: &MeasuredPull| column.value(p.view()).is_some());
+    let recorded = covariates().filter(there).map(|c| c.name.into()).collect();
     let text = format!("{}{seed}{:?}", project.config_sha256, campaign);
     Ok(LoadedPulls {
         pulls: MeasuredPulls {
             pulls,
-            recorded: covariates().map(|c| c.name.into()).collect(),
+            recorded,
             extra: Vec::new(),
             label_tolerance_n: campaign.label_tolerance_n,
             stop_m: campaign.stop_m,

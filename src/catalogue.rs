@@ -13,14 +13,14 @@ const POINTS: usize = 25;
 /// Grip force where something else is varied.
 const GRIP_FORCE_N: f64 = 40.0;
 
-/// The pull force at slip with an effect over that without it, as a function of what the effect depends on.
+/// The label (the measured force at slip) with an effect over that without it, as a function of what the effect depends on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectCurve {
     /// Name of the column that is varied, with its unit.
     pub covariate: &'static str,
     /// Its values.
     pub x: Vec<f64>,
-    /// F_max with the typical values of the effect over F_max without it, per value.
+    /// Label with the typical values of the effect over the label without it, per value.
     pub ratio: Vec<f64>,
 }
 
@@ -150,7 +150,7 @@ impl EffectCurve {
         Plot {
             title: title.into(),
             x_label: self.covariate.into(),
-            y_label: "F_max with over without".into(),
+            y_label: "label with over without".into(),
             x_words: Vec::new(),
             series: vec![Series { name: title.into(), mark: Mark::Line, points, errors: Vec::new() }],
         }

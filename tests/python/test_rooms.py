@@ -15,22 +15,34 @@ USE = re.compile(r"\b(pub(?:\([^)]*\))?\s+)?use\s+([^;]+);")
 PATH = re.compile(r"\b(?:crate|super)(?:::\w+)+")
 
 
+def end_of(text, word, start):
+    """Where `word` stands from `start` on; the end of the text if it does not."""
+    at = text.find(word, start)
+    return len(text) if at < 0 else at
+
+
 def item_end(text, start):
     """End of the item at `start`: its `;` or its closing brace, outside strings and comments."""
     depth, i = 0, start
     while i < len(text):
         c = text[i]
         if text.startswith("//", i):
-            i = text.find("\n", i)
+            i = end_of(text, "\n", i)
+        elif text.startswith('r#"', i):
+            i = end_of(text, '"#', i + 3)
         elif c == '"':
             i += 1
-            while text[i] != '"':
+            while i < len(text) and text[i] != '"':
                 i += 2 if text[i] == "\\" else 1
+        elif text.startswith("'\\", i):
+            i = end_of(text, "'", i + 3)
         elif c == "'" and text[i + 2:i + 3] == "'":
             i += 2
         elif c in "{([":
             depth += 1
         elif c in "})]":
+            if depth == 0:
+                return i
             depth -= 1
             if c == "}" and depth == 0:
                 return i + 1
@@ -41,8 +53,8 @@ def item_end(text, start):
 
 
 def source(path):
-    """A file without comments, strings' insides and what is compiled for tests only."""
-    text = path.read_text()
+    """A file without comments and without what is compiled for tests only."""
+    text = path.read_text(encoding="utf-8")
     while (at := text.find("#[cfg(test)]")) >= 0:
         text = text[:at] + text[item_end(text, at):]
     return re.sub(r"//[^\n]*", "", text)
@@ -151,6 +163,8 @@ def test_the_reader_follows_reexports_and_leaves_tests_out():
     assert expanded("crate::{a::{B, C as D}, e::*}") == [["crate", "a", "B"], ["crate", "a", "C"], ["crate", "e", "*"]]
     text = '#[cfg(test)]\nmod tests { fn f() { "}" } }\nfn g() {}'
     assert text[item_end(text, 0):] == "\nfn g() {}"
+    assert item_end("#[cfg(test)]\nmod t { // x", 0) == 25, "a comment that nothing ends"
+    assert item_end('#[cfg(test)] field: u8 }', 0) == 23, "a field ends where its struct does"
     physics = Package(ROOT / "crates/physics/src")
     assert physics.home(("grip",), ["crate", "arm", "PlacedArm"]) == ("arm", "placed")
     assert ("setup",) in physics.needs(("scene",))

@@ -94,6 +94,8 @@ def move_and_force(start):
         seen["drift"] = receive.getActualTCPPose()[2] - after[2]
         aside = [start[0] + 0.02, start[1] - 0.01, start[2] + 0.05, *start[3:]]
         seen["moved"] = control.moveL(aside, 0.25, 1.2)
+        # The pose comes over another connection.
+        time.sleep(0.1)
         seen["arrived"] = [a - b for a, b in zip(receive.getActualTCPPose(), aside, strict=True)]
         begun = time.monotonic()
         control.moveL([*aside[:2], aside[2] + 0.05, *aside[3:]], 0.1, 1.2)

@@ -301,7 +301,7 @@ pub struct CompareArgs {
 pub struct EffectsArgs {
     /// An effect; all of them in a list where it is left out.
     pub id: Option<String>,
-    /// Draw what it does to the pull force at slip.
+    /// Draw what it does to the label, the measured force at slip.
     #[arg(long, value_name = "FILE.svg", requires = "id")]
     pub plot: Option<PathBuf>,
     /// JSON: everything that is known of the effect, or of each.

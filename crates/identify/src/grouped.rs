@@ -213,12 +213,15 @@ pub fn grouped_intervals(parameters: &[FreeParameter], fit: &GroupedFit, weights
         .collect()
 }
 
-/// 95 % quantile of Student's t (Hill 1970, leading terms; within 1 % from 2 degrees of freedom on).
+/// 95 % quantile of Student's t (Hill 1970, leading terms; within 1 % from 3 degrees of freedom on, that of the table below).
 pub fn t_quantile_95(freedom: f64) -> f64 {
     let z: f64 = 1.644_853_6;
     let v = freedom.max(1.0);
     if v < 1.5 {
         return 6.313_752;
+    }
+    if v < 2.5 {
+        return 2.919_986;
     }
     let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
     z + (z3 + z) / (4.0 * v)

@@ -13,5 +13,4 @@ pub mod primary;
 pub mod program;
 pub mod robot_state;
 pub mod rtde;
-
 pub mod virtual_rig;

@@ -3,7 +3,7 @@
 use crate::args::EffectsArgs;
 use crate::failure::Failure;
 use crate::load::{load_library, load_twin};
-use crate::output::{JsonSink, print};
+use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::twin::config::suggestion;
 use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, ParameterSpec, find};
 use gripgen::{BASELINE_TWIN, EffectCurve, effect_curve};
@@ -19,6 +19,9 @@ const LINE: usize = 96;
 
 /// Runs the verb.
 pub fn run(args: &EffectsArgs) -> Result<u8, Failure> {
+    if let Some(path) = &args.plot {
+        writable(path)?;
+    }
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let Some(id) = &args.id else {
         if sink.wanted() {
@@ -35,8 +38,7 @@ pub fn run(args: &EffectsArgs) -> Result<u8, Failure> {
     let curve = effect_curve(spec, &twin, &library, 1).map_err(Failure::new)?;
     if let Some(path) = &args.plot {
         let title = format!("{} ({})", spec.id, typical(spec));
-        std::fs::write(path, curve.plot(&title).to_svg())
-            .map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+        write_file(path, curve.plot(&title).to_svg().as_bytes())?;
     }
     if sink.wanted() {
         let mut whole = document(spec);
@@ -127,8 +129,14 @@ fn page(spec: &EffectSpec) -> String {
     paragraph(&mut text, "its number", spec.number_means);
     let found = match (found_in(spec), spec.pulls) {
         (found, Err(why)) if found.is_empty() => format!("nothing: {why}"),
-        (found, _) if spec.covariates.is_empty() => found.join(", "),
-        (found, _) => format!("{}, where {} varies", found.join(", "), spec.covariates.join(" or ")),
+        (found, pulls) => {
+            let spans = pulls.map_or(&[][..], |fit| fit.spans);
+            let vary = [spec.covariates, spans].concat().join(" or ");
+            let only =
+                if vary.is_empty() { String::new() } else { format!(", of pulls where {vary} varies") };
+            let only = if pulls.is_ok() { only } else { only.replace(", of pulls where", ", where") };
+            format!("{}{only}", found.join(", "))
+        }
     };
     paragraph(&mut text, "found in", &found);
     for (k, experiment) in spec.experiments.iter().enumerate() {
@@ -139,9 +147,9 @@ fn page(spec: &EffectSpec) -> String {
 }
 
 fn curve_text(spec: &EffectSpec, curve: &EffectCurve) -> String {
-    let mut text = format!("\n  pull force at slip over that without it, for {}\n", typical(spec));
+    let mut text = format!("\n  label over that without it, for {}\n", typical(spec));
     if curve.ratio.iter().all(|r| (r - 1.0).abs() < 1e-9) {
-        text += "  1 everywhere: it does not change the force\n";
+        text += "  1 everywhere: it does not change the label\n";
         return text;
     }
     let largest = curve.ratio.iter().copied().filter(|r| r.is_finite()).fold(1.0, f64::max);

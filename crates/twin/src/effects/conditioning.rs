@@ -42,7 +42,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     friction: Some(friction),
     plainly: "The first pulls of a gel, or the first after a rest, hold less (or more) until it has settled.",
     number_means: "depth = 0.2: the first pull lacks 20 % of the settled coefficient, a third of that is left after n0 pulls.",
-    remedy: "Make some five pulls that do not count before a campaign and after every pause.",
+    remedy: "Make two or three times n0 pulls that do not count before a campaign and after every pause; ten where n0 is not known.",
     typical: &[("depth", 0.2)],
     pulls: Ok(PullFit {
         fit: |span| {

@@ -22,7 +22,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     covariates: &[],
     optics: Some(optics),
     plainly: "The gel is domed: it lies deeper at the corners than in the middle.",
-    number_means: "sag_mm = 0.5: the corners lie 0.5 mm below the apex.",
+    number_means: "sag_mm = 0.5: the corners lie 0.5 mm deeper than the sensor file says.",
     remedy: "Measure the gel at rest, or calibrate with presses near all corners.",
     typical: &[("sag_mm", 0.5)],
     presses: Some(PressFit { main: "sag_mm", start: |_, _| (0.0, 0.3), ..PressFit::DRAWN }),

@@ -32,7 +32,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     per_part: true,
     sizes: 2,
     plainly: "Part of the friction force does not grow with the grip force, so light grips hold more (or less) than the coefficient says.",
-    number_means: "a is the factor on the coefficient at strong grips; b_n is the constant force per jaw over mu, so at F_G = b_n friction is doubled.",
+    number_means: "a is the factor on the coefficient at strong grips; b_n is the constant force per jaw over mu, so with a = 1 friction is doubled at F_G = b_n.",
     remedy: "Keep the law in the twin. A gripper that presses less than it says looks the same: check the grip force with a load cell first.",
     typical: &[("b_n", 3.0)],
     pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("b_n", 0.0)]], &[("b_n", 1.0)]), ..PullFit::PLAIN }),

@@ -25,7 +25,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     visible: Visible::From(0.02),
     plainly: "The force sensor follows late: fast changes are smoothed away.",
     number_means: "tau_s = 0.05: two thirds of a sudden change are seen after 50 ms.",
-    remedy: "Lower the sensor's filter, or pull more slowly.",
+    remedy: "Give the sensor's filter a higher cut-off frequency, or pull more slowly.",
     typical: &[("tau_s", 0.1)],
     pulls: Ok(PullFit {
         fit: |_| Fit::new(&[&[("tau_s", 0.03)], &[("tau_s", 0.15)]], &[("tau_s", 0.02)]),
