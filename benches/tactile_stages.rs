@@ -43,11 +43,11 @@ fn main() -> ExitCode {
 
     let mut stages = serde_json::Map::new();
     let mut stage = |name: String, us: Vec<f64>| {
-        let least_us = us.iter().copied().fold(f64::INFINITY, f64::min);
-        println!("{name:<28} {least_us:8.1} us");
+        let min_us = us.iter().copied().fold(f64::INFINITY, f64::min);
+        println!("{name:<28} {min_us:8.1} us");
         let path = format!("tactile_stages/{}", name.replace(", ", "/").replace(' ', "_"));
         run.measured(&path, Unit::Nanoseconds, us.iter().map(|us| 1e3 * us).collect());
-        stages.insert(name, least_us.into());
+        stages.insert(name, min_us.into());
     };
     stage("raster, whole gel".into(), us(|| clustered.raster(&at, &grid, depth_px)));
     stage("indent".into(), us(|| indent(&heights, &grid, &pressed, scenes::FORCE_N)));

@@ -40,14 +40,14 @@ pub enum SimulateCampaignError {
         known: String,
     },
     /// More force than the gripper has.
-    #[error("pulls[{index}]: {force_n} N per jaw, the gripper has at most {most_n} N per jaw")]
+    #[error("pulls[{index}]: {force_n} N per jaw, the gripper has at most {max_n} N per jaw")]
     Force {
         /// Which entry of the campaign.
         index: usize,
         /// Its grip force.
         force_n: f64,
         /// Limit of the gripper.
-        most_n: f64,
+        max_n: f64,
     },
 }
 
@@ -120,8 +120,8 @@ fn load(
             return Err(SimulateCampaignError::Part { index, part: pull.part.clone(), known });
         }
         if pull.grip_force_n > checked.gripper.max_force_n {
-            let (force_n, most_n) = (pull.grip_force_n, checked.gripper.max_force_n);
-            return Err(SimulateCampaignError::Force { index, force_n, most_n });
+            let (force_n, max_n) = (pull.grip_force_n, checked.gripper.max_force_n);
+            return Err(SimulateCampaignError::Force { index, force_n, max_n });
         }
         if !parts.contains(&pull.part.as_str()) {
             parts.push(&pull.part);

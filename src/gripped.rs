@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 use std::sync::Arc;
 
 /// Smallest normal force of a jaw that still grips.
-const LEAST_FORCE_N: f64 = 1e-3;
+const MIN_FORCE_N: f64 = 1e-3;
 
 /// A grip with its imprints.
 pub(crate) struct Gripped {
@@ -144,7 +144,7 @@ pub(crate) fn jaw_forces_n(twin: &Twin, scenario: &Scenario) -> Result<PerJaw<f6
     PerJaw::try_from_fn(|jaw| {
         let force_n = normal_force_n(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
         let commanded_n = scenario.grip_force_n;
-        if force_n < LEAST_FORCE_N {
+        if force_n < MIN_FORCE_N {
             Err(SampleError::NoForce { jaw, force_n, commanded_n })
         } else {
             Ok(force_n)

@@ -18,9 +18,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Pulls of a part that are looked at, spread evenly over their grip forces.
-const MOST_PULLS: usize = 24;
+const MAX_PULLS: usize = 24;
 /// Share of the change in the images that the twin has to explain for a press to count.
-const LEAST_EXPLAINED: f64 = 0.3;
+const MIN_EXPLAINED: f64 = 0.3;
 
 /// The imprint constant of a part.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,12 +118,12 @@ pub fn calibrate_imprints(
     plain.tables.clear();
     for (part, mut pulls) in of_part {
         pulls.sort_by(|a, b| a.grip_force_n.total_cmp(&b.grip_force_n).then_with(|| a.id.cmp(&b.id)));
-        let step = pulls.len().div_ceil(MOST_PULLS).max(1);
+        let step = pulls.len().div_ceil(MAX_PULLS).max(1);
         let (mut presses, mut explained, mut strange) = (Vec::new(), 0.0, Vec::new());
         for pull in pulls.into_iter().step_by(step) {
             let images = source.read(&pull.id)?;
             let best = fit_press(&plain, &library, pull, &images)?;
-            match best.filter(|b| b.explained >= LEAST_EXPLAINED) {
+            match best.filter(|b| b.explained >= MIN_EXPLAINED) {
                 Some(best) => {
                     explained += best.explained;
                     let imprint_mm3_per_n = best.imprint_mm3_per_n;

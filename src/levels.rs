@@ -1,7 +1,7 @@
 //! Labels over grip force: mean and RMS of the repetitions, as Wucherer et al. 2023 show them, of any pulls.
 
 /// Different grip forces of a part that are levels of their own; where there are more, grips of nearby forces are put together.
-const MOST_LEVELS: usize = 24;
+const MAX_LEVELS: usize = 24;
 /// Ranges of equal width in their place.
 const RANGES: usize = 12;
 
@@ -36,7 +36,7 @@ pub fn levels(pulls: &[(f64, f64)]) -> Vec<Level> {
     let range = |i: usize| {
         ((pulls[i].0 - low_n) / (high_n - low_n) * RANGES as f64).min(RANGES as f64 - 1.0) as usize
     };
-    let together = |a: usize, b: usize| match different > MOST_LEVELS {
+    let together = |a: usize, b: usize| match different > MAX_LEVELS {
         true => range(a) == range(b),
         false => pulls[a].0 == pulls[b].0,
     };

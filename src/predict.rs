@@ -22,7 +22,7 @@ use std::sync::{Arc, OnceLock};
 use table::{LabelTable, Scattered};
 
 /// Longest pull that is looked at.
-const MOST_TIME_S: f64 = 120.0;
+const MAX_TIME_S: f64 = 120.0;
 
 /// Tables kept: those of a model and of its neighbours for a derivative.
 const TABLES: usize = 96;
@@ -57,7 +57,7 @@ pub struct PullPredictor<'a> {
     part_names: Vec<String>,
     part_of: Vec<usize>,
     /// Force up to which pulls are looked at.
-    most_n: f64,
+    max_n: f64,
     /// Cells of contacts from all over the campaign: shares of area and limit.
     contacts: OnceLock<Vec<(f64, f64)>>,
     jobs: usize,
@@ -96,7 +96,7 @@ impl<'a> PullPredictor<'a> {
         let labels = measured.pulls.iter().map(|p| p.max_pull_force_n);
         let traces = measured.pulls.iter().filter_map(|p| p.trace.as_ref());
         let readings = traces.flat_map(|t| t.measured_force_n.iter().copied());
-        let most_n = 1.4 * labels.chain(readings).fold(1.0, f64::max) + 6.0;
+        let max_n = 1.4 * labels.chain(readings).fold(1.0, f64::max) + 6.0;
         let mut robot = twin.robot;
         robot.feedback = measured.feedback.unwrap_or(robot.feedback);
         Self {
@@ -110,7 +110,7 @@ impl<'a> PullPredictor<'a> {
             profile_of,
             part_names,
             part_of,
-            most_n: most_n.min(2000.0),
+            max_n: max_n.min(2000.0),
             contacts: OnceLock::new(),
             jobs: jobs.max(1),
             stuck: Cache::new(TABLES),
@@ -196,7 +196,7 @@ impl<'a> PullPredictor<'a> {
             rate_hz: self.rate_hz,
             fall_s: model.fall_s,
             stop_m: self.measured.stop_m,
-            max_time_s: MOST_TIME_S,
+            max_time_s: MAX_TIME_S,
         }
     }
 
@@ -237,7 +237,7 @@ impl<'a> PullPredictor<'a> {
             let (sensor, command) = (self.sensor(model, row), self.command(model, row));
             let staircase = &self.staircases[self.profile_of[row]];
             let mut kept = Kept::spare();
-            self.rig(model).stuck(staircase, &sensor, &command, self.most_n, &mut kept.0);
+            self.rig(model).stuck(staircase, &sensor, &command, self.max_n, &mut kept.0);
             Ok::<_, Infallible>(kept)
         };
         // What a fit tries of an effect on signals would push everything else out: it has a place of its own.
@@ -309,7 +309,7 @@ impl<'a> PullPredictor<'a> {
 
     fn label_table(&self, model: &PullModel, row: usize) -> LabelTable {
         let stuck = self.stuck(model, row);
-        LabelTable::new(&self.scattered(model, row, &stuck, &self.backbone(model)), self.most_n)
+        LabelTable::new(&self.scattered(model, row, &stuck, &self.backbone(model)), self.max_n)
     }
 
     /// Labels of a model whose effects act on signals: those of a contact that lets go at once, and what a bend adds to labels

@@ -78,16 +78,16 @@ pub enum LoadPressesError {
         radius_mm: f64,
     },
     /// A length that cannot be.
-    #[error("{what} is {value_mm} mm, it must be from {least_mm} to {most_mm} mm")]
+    #[error("{what} is {value_mm} mm, it must be from {min_mm} to {max_mm} mm")]
     Length {
         /// Which length.
         what: &'static str,
         /// Its value.
         value_mm: f64,
         /// Smallest.
-        least_mm: f64,
+        min_mm: f64,
         /// Largest.
-        most_mm: f64,
+        max_mm: f64,
     },
     /// No press set.
     #[error("{}: neither a `dataPack.npz` nor a folder with `{PRESSES_FILE}`", .path.display())]
@@ -107,11 +107,11 @@ pub fn is_press_set(path: &Path) -> bool {
 /// Loads a press set. A `dataPack.npz` has Taxim's geometry (4.0 mm, 0.0295 mm per pixel) unless another one is given;
 /// for a folder both have to be.
 pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, LoadPressesError> {
-    let length = |what, value_m: Option<f64>, least_mm: f64, most_mm: f64| match value_m
+    let length = |what, value_m: Option<f64>, min_mm: f64, max_mm: f64| match value_m
         .map(|m| (m * 1e9).round() * 1e-6)
     {
-        Some(value_mm) if !(least_mm..=most_mm).contains(&value_mm) => {
-            Err(LoadPressesError::Length { what, value_mm, least_mm, most_mm })
+        Some(value_mm) if !(min_mm..=max_mm).contains(&value_mm) => {
+            Err(LoadPressesError::Length { what, value_mm, min_mm, max_mm })
         }
         _ => Ok(value_m),
     };

@@ -3,9 +3,9 @@
 use crate::levels::{Level, levels};
 
 /// Predictions smaller than this have no ratio.
-const LEAST_N: f64 = 0.1;
+const MIN_N: f64 = 0.1;
 /// Levels from which a left-out one is predicted.
-const LEAST_LEVELS: usize = 4;
+const MIN_LEVELS: usize = 4;
 
 /// The line `a + b / F_G`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,7 +83,7 @@ impl RatioFit {
 
 /// The ratios of a part's pulls, given as grip force, measured and predicted label.
 pub fn part_ratio(pulls: &[(f64, f64, f64)]) -> PartRatio {
-    let known: Vec<_> = pulls.iter().copied().filter(|p| p.2 >= LEAST_N).collect();
+    let known: Vec<_> = pulls.iter().copied().filter(|p| p.2 >= MIN_N).collect();
     let labels: Vec<(f64, f64)> = known.iter().map(|p| (p.0, p.1)).collect();
     let points: Vec<(f64, f64)> = known.iter().map(|p| (p.0, p.1 / p.2)).collect();
     let measured = levels(&labels);
@@ -107,7 +107,7 @@ pub fn part_ratio(pulls: &[(f64, f64, f64)]) -> PartRatio {
         predicted_n: measured.iter().map(|level| predicted(level, &|_| 1.0)).collect(),
         before_pct: mean(measured.iter().map(|l| off_pct(l, &|_| 1.0)).collect()),
         after_pct: fit.map(|fit| mean(measured.iter().map(|l| off_pct(l, &|n| fit.at(n))).collect())),
-        left_out_pct: left_out.filter(|each| each.len() >= LEAST_LEVELS).map(mean),
+        left_out_pct: left_out.filter(|each| each.len() >= MIN_LEVELS).map(mean),
         measured,
         points,
         fit,

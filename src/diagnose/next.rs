@@ -12,16 +12,16 @@ use gripgen_twin::{Campaign, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, Plan
 use nalgebra::{DMatrix, DVector};
 
 /// Pulls that are planned at most.
-const MOST_PULLS: usize = 40;
+const MAX_PULLS: usize = 40;
 
 /// Pulls that are planned at least.
-const FEWEST_PULLS: usize = 6;
+const MIN_PULLS: usize = 6;
 
 /// Noise variances between two models from which on one is rarely taken for the other: see [`plan_separating`].
 const ENOUGH: f64 = 16.0;
 
 /// Models that are told apart at most.
-const MOST_RIVALS: usize = 5;
+const MAX_RIVALS: usize = 5;
 
 /// The rest between both halves of the plan: what comes with time moves on, what comes with use does not.
 const REST_S: f64 = 1800.0;
@@ -90,7 +90,7 @@ pub(crate) fn next_pulls(
         .iter()
         .flat_map(|(i, tied)| tied.iter().map(move |t| (*i, t)))
         .map(|(i, t)| (id(fits, i), id(fits, t.effect), libm::exp(t.less), &t.fitted))
-        .take(MOST_RIVALS)
+        .take(MAX_RIVALS)
         .collect();
     if tied.is_empty() {
         return None;
@@ -119,7 +119,7 @@ pub(crate) fn next_pulls(
     let of = |which: &[usize]| {
         let chosen = which.iter().map(|&k| rivals[k].clone());
         let all: Vec<SeparableRival> = std::iter::once(accepted.clone()).chain(chosen).collect();
-        plan_separating(&costs, &all, MOST_PULLS, ENOUGH).ok()
+        plan_separating(&costs, &all, MAX_PULLS, ENOUGH).ok()
     };
     // What no pull shows would draw all of them: such rivals are left to other experiments.
     let alone = |k: usize| of(&[k]).is_some_and(|plan| plan.separation[0].2 >= HOPELESS);
@@ -131,7 +131,7 @@ pub(crate) fn next_pulls(
     let left = left.into_iter().map(|k| tied[k].1.into()).collect();
     // One pull may be a bad one.
     let chosen: Vec<usize> =
-        plan.pulls.iter().copied().cycle().take(plan.pulls.len().max(FEWEST_PULLS)).collect();
+        plan.pulls.iter().copied().cycle().take(plan.pulls.len().max(MIN_PULLS)).collect();
     let halves = [false, true].map(|rest| {
         chosen.iter().filter(|&&i| after_rest[i] == rest).map(|&i| planned[i].clone()).collect::<Vec<_>>()
     });
@@ -238,7 +238,7 @@ fn as_measured(campaign: &MeasuredPulls, planned: &[PlannedPull], after_rest: &[
     let pull = |(i, (p, rest)): (usize, (&PlannedPull, &bool))| {
         let mut covariates = gripgen_twin::Covariates {
             // Half of the plan lies before any pull of it, on average.
-            pull_index: index + MOST_PULLS as u64 / 2,
+            pull_index: index + MAX_PULLS as u64 / 2,
             time_s: time_s + 600.0 + if *rest { REST_S } else { 0.0 },
             temperature_c: degrees[degrees.len() / 2],
             ..p.covariates()

@@ -13,7 +13,7 @@ pub use gripgen_identify::{PressCovariate, PressValues};
 use crate::TwinEdits;
 use crate::report::Diagnosed;
 use answer::{edits, remark};
-use gripgen_identify::{FEWEST_DIAGNOSED_PRESSES, PressData, too_few_presses};
+use gripgen_identify::{MIN_DIAGNOSED_PRESSES, PressData, too_few_presses};
 use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::PressSet;
 use gripgen_twin::Covariates;
@@ -52,7 +52,7 @@ pub fn diagnose_presses(input: &PressDiagnosisInput<'_>, progress: &mut dyn FnMu
         marked: input.marked,
     };
     let n = input.set.presses.iter().filter(|p| p.circle.is_some()).count();
-    if n < FEWEST_DIAGNOSED_PRESSES || n < input.set.presses.len() {
+    if n < MIN_DIAGNOSED_PRESSES || n < input.set.presses.len() {
         let diagnosis = too_few_presses(&data, n);
         let report = page::without_answer(&diagnosis);
         return Diagnosed { diagnosis, edits: TwinEdits::default(), report, next: None };

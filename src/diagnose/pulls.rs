@@ -105,7 +105,7 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
 }
 
 /// Pulls that are looked at most: what so many do not show is too small to matter, and a fit takes as long as it has pulls.
-const MOST_PULLS: usize = 2000;
+const MAX_PULLS: usize = 2000;
 
 /// Diagnoses a campaign of pulls. `progress` is told the share that is done. Of a very long campaign every so many pulls are
 /// looked at, and a note says so. `library` holds the files of the twin.
@@ -117,7 +117,7 @@ pub fn diagnose_pull_table(
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Diagnosed, PullTwinError> {
     check_fit(measured, twin)?;
-    let step = measured.pulls.len().div_ceil(MOST_PULLS);
+    let step = measured.pulls.len().div_ceil(MAX_PULLS);
     if step > 1 {
         let mut found = diagnose_pull_table(&measured.every(step), twin, library, options, progress)?;
         let note = format!(

@@ -13,7 +13,7 @@ use gripgen_twin::effects::{EffectSpec, SENSOR_LINE};
 use std::path::Path;
 
 /// Most points of a plot.
-const MOST_POINTS: usize = 1500;
+const MAX_POINTS: usize = 1500;
 /// Blocks in the list of the worst.
 const WORST: usize = 6;
 
@@ -190,7 +190,7 @@ fn sentence(answer: &SensorDiagnosis) -> String {
 }
 
 fn groups(answer: &SensorDiagnosis) -> Vec<PlotGroup> {
-    let step = answer.rows.len().div_ceil(MOST_POINTS);
+    let step = answer.rows.len().div_ceil(MAX_POINTS);
     let rows: Vec<_> = answer.rows.iter().step_by(step).collect();
     let residuals = |x: &dyn Fn(&gripgen_identify::SensorRow) -> f64| -> Vec<Series> {
         let series = |name: &str, predicted: &dyn Fn(&gripgen_identify::SensorRow) -> f64| Series {

@@ -109,9 +109,9 @@ fn force_n(place: f64) -> f64 {
 }
 
 impl LabelTable {
-    pub fn new(pull: &Scattered<'_>, most_n: f64) -> Self {
+    pub fn new(pull: &Scattered<'_>, max_n: f64) -> Self {
         // Beyond by what scatter adds.
-        let count = place(most_n * (1.0 + 3.3 * pull.scatter)).ceil() as usize + 2;
+        let count = place(max_n * (1.0 + 3.3 * pull.scatter)).ceil() as usize + 2;
         let mut slip = SlipPull::default();
         let exact: Vec<(f64, f64)> = (0..count).map(|i| pull.label(force_n(i as f64), &mut slip)).collect();
         let between = |limit_n: f64| {
@@ -119,7 +119,7 @@ impl LabelTable {
             let (i, w) = (x as usize, x.fract());
             (exact[i].0 * (1.0 - w) + exact[i + 1].0 * w, exact[i].1 * (1.0 - w) + exact[i + 1].1 * w)
         };
-        let wanted = place(most_n).ceil() as usize + 2;
+        let wanted = place(max_n).ceil() as usize + 2;
         let rows = (0..wanted)
             .map(|i| {
                 let limit_n = force_n(i as f64);

@@ -29,8 +29,8 @@ pub fn load_library(twin: &Twin, path: &str) -> Result<Library, Failure> {
 /// The twin with no more grip force than the gripper of a rig has.
 pub fn within_rig(mut twin: Twin, rig: Option<&str>) -> Result<Twin, Failure> {
     if let Some(rig) = rig {
-        let [_, most_n] = load_rig(rig, &[])?.gripper.force_per_jaw_n;
-        twin.gripper.max_force_n = twin.gripper.max_force_n.min(most_n);
+        let [_, max_n] = load_rig(rig, &[])?.gripper.force_per_jaw_n;
+        twin.gripper.max_force_n = twin.gripper.max_force_n.min(max_n);
     }
     Ok(twin)
 }

@@ -121,17 +121,17 @@ pub fn grouped_step(
     step
 }
 
-/// Gauss-Newton with halved steps over groups: at most `most_steps` of them.
+/// Gauss-Newton with halved steps over groups: at most `max_steps` of them.
 pub fn fit_grouped(
     parameters: &[FreeParameter],
-    most_steps: usize,
+    max_steps: usize,
     weights: &[f64],
     model: &impl GroupedModel,
 ) -> GroupedFit {
     let total = |costs: &[f64]| costs.iter().zip(weights).map(|(c, w)| c * w).sum::<f64>();
     let mut values: Vec<f64> = parameters.iter().map(|p| p.start.clamp(p.bounds.0, p.bounds.1)).collect();
     let mut moments = model.moments(&values);
-    for _ in 0..most_steps {
+    for _ in 0..max_steps {
         let now: f64 = total(&moments.iter().map(|m| m.cost).collect::<Vec<_>>());
         let step = grouped_step(parameters, &values, &moments, weights);
         let mut length = 1.0;

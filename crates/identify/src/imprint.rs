@@ -22,7 +22,7 @@ pub struct ImprintEstimate {
 }
 
 /// Smallest ratio of the forces at which an exponent is looked for.
-const LEAST_RATIO: f64 = 1.5;
+const MIN_RATIO: f64 = 1.5;
 
 /// Geometric mean of the constants with its 90 % interval (Student's t on the logarithms), and the exponent by the
 /// regression of ln V on ln F. `None` for fewer than two presses, which have no interval.
@@ -48,7 +48,7 @@ pub fn imprint_constant(presses: &[FittedPress]) -> Option<ImprintEstimate> {
     };
     let (least, most) =
         ln_f.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), &x| (l.min(x), m.max(x)));
-    let exponent = (presses.len() > 2 && most - least >= libm::log(LEAST_RATIO)).then(|| {
+    let exponent = (presses.len() > 2 && most - least >= libm::log(MIN_RATIO)).then(|| {
         let slope = cf / ff;
         let sd = ((cc - slope * cf).max(0.0) / (n - 2.0) / ff).sqrt();
         let half = t_quantile_95(n - 2.0) * sd;

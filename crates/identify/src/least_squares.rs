@@ -19,14 +19,14 @@ pub struct FreeParameter {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitOptions {
     /// Steps that are accepted or refused at most.
-    pub most_steps: usize,
+    pub max_steps: usize,
     /// The fit ends when a step lowers the cost by less than this part of it.
-    pub least_gain: f64,
+    pub min_gain: f64,
 }
 
 impl Default for FitOptions {
     fn default() -> Self {
-        Self { most_steps: 40, least_gain: 1e-6 }
+        Self { max_steps: 40, min_gain: 1e-6 }
     }
 }
 
@@ -79,7 +79,7 @@ pub fn fit(
     let mut jacobian = derivatives(parameters, &values, &r, &mut residuals);
     let mut damping = 1e-3;
     let mut growth = 2.0;
-    for _ in 0..options.most_steps {
+    for _ in 0..options.max_steps {
         if n == 0 {
             break;
         }
@@ -125,12 +125,12 @@ pub fn fit(
             let c = 2.0 * quality - 1.0;
             damping = (damping * (1.0 - c * c * c).max(1.0 / 3.0)).max(1e-12);
             growth = 2.0;
-            if gain < options.least_gain {
+            if gain < options.min_gain {
                 break;
             }
         } else {
             let small = moved.iter().zip(parameters).all(|(m, p)| m.abs() < 1e-9 * p.scale);
-            if small || predicted.abs() < options.least_gain * 1e-3 * cost {
+            if small || predicted.abs() < options.min_gain * 1e-3 * cost {
                 break;
             }
             damping *= growth;
@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn the_bottom_of_a_curved_valley_is_found() {
         let parameters = [free("x", -1.2, (-5.0, 5.0)), free("y", 1.0, (-5.0, 5.0))];
-        let options = FitOptions { most_steps: 200, least_gain: 0.0 };
+        let options = FitOptions { max_steps: 200, min_gain: 0.0 };
         let found = fit(&parameters, options, |v| vec![10.0 * (v[1] - v[0] * v[0]), 1.0 - v[0]]).unwrap();
         assert!((found.values[0] - 1.0).abs() < 1e-3 && (found.values[1] - 1.0).abs() < 1e-3, "{found:?}");
     }

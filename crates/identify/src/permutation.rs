@@ -99,11 +99,11 @@ impl Dependence {
 }
 
 /// Largest number of distinct numbers that get a mean each.
-const MOST_LEVELS: usize = 6;
+const MAX_LEVELS: usize = 6;
 /// Inner knots of the curve of a number.
 const INNER_KNOTS: usize = 3;
 /// Smallest part of the observations on one side of a step.
-const LEAST_SIDE: f64 = 0.05;
+const MIN_SIDE: f64 = 0.05;
 
 /// Dependence of `residual` on a covariate: word means, level means, a piecewise linear curve over the ranks, or one
 /// step anywhere, whichever explains most, against the same maximum after permutation of the blocks.
@@ -298,7 +298,7 @@ fn step_order(covariate: &Covariate) -> Vec<(usize, bool)> {
     let mut rows: Vec<usize> = (0..values.len()).collect();
     rows.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
     let n = rows.len();
-    let least = ((n as f64 * LEAST_SIDE) as usize).max(2);
+    let least = ((n as f64 * MIN_SIDE) as usize).max(2);
     let may_end = |k: usize| {
         k + 1 >= least && k + 1 + least <= n && rows.get(k + 1).is_some_and(|&j| values[j] != values[rows[k]])
     };
@@ -313,7 +313,7 @@ fn main_columns(covariate: &Covariate) -> Vec<Vec<f64>> {
             let mut levels = values.clone();
             levels.sort_by(f64::total_cmp);
             levels.dedup();
-            if levels.len() <= MOST_LEVELS {
+            if levels.len() <= MAX_LEVELS {
                 let number = |x: &f64| levels.iter().position(|l| l == x).unwrap_or(0) as u32;
                 return indicators(&values.iter().map(number).collect::<Vec<u32>>());
             }

@@ -28,7 +28,7 @@ use observed::Observed;
 use search::search;
 
 /// Presses that a diagnosis needs at least.
-pub const FEWEST_DIAGNOSED_PRESSES: usize = 4;
+pub const MIN_DIAGNOSED_PRESSES: usize = 4;
 
 /// What is known of presses beside their pixels.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -62,7 +62,7 @@ pub struct PressDiagnosis {
 }
 
 /// Diagnoses presses, whose names in `data` are as many as `predictor` has presses. `progress` hears how far it is, from
-/// 0 to 1, and what is tried. With fewer than [`FEWEST_DIAGNOSED_PRESSES`] the verdict is
+/// 0 to 1, and what is tried. With fewer than [`MIN_DIAGNOSED_PRESSES`] the verdict is
 /// [`Verdict::Insufficient`].
 pub fn diagnose_presses(
     predictor: &dyn PredictPresses,
@@ -70,7 +70,7 @@ pub fn diagnose_presses(
     progress: &mut dyn FnMut(f64, &str),
 ) -> PressDiagnosis {
     let n = predictor.circumstances().len().min(data.names.len());
-    if n < FEWEST_DIAGNOSED_PRESSES || n < predictor.circumstances().len() {
+    if n < MIN_DIAGNOSED_PRESSES || n < predictor.circumstances().len() {
         return PressDiagnosis {
             diagnosis: too_few_presses(data, n),
             acting: Vec::new(),
@@ -90,7 +90,7 @@ pub fn too_few_presses(data: &PressData, visible: usize) -> Diagnosis {
     let mut diagnosis = bare(data);
     diagnosis.verdict = Verdict::Insufficient;
     diagnosis.notes.push(format!(
-        "too little to go by: {visible} presses with a visible contact, {FEWEST_DIAGNOSED_PRESSES} are needed"
+        "too little to go by: {visible} presses with a visible contact, {MIN_DIAGNOSED_PRESSES} are needed"
     ));
     diagnosis
 }

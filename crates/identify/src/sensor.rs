@@ -56,11 +56,11 @@ pub struct SensorOptions {
     /// Chance of a first effect where there is none.
     pub false_alarm: f64,
     /// Rows that are worked with; more are averaged in groups.
-    pub most_rows: usize,
+    pub max_rows: usize,
 }
 
 impl Default for SensorOptions {
     fn default() -> Self {
-        Self { seed: 1, simulations: 300, false_alarm: 0.02, most_rows: 12_000 }
+        Self { seed: 1, simulations: 300, false_alarm: 0.02, max_rows: 12_000 }
     }
 }

@@ -25,7 +25,7 @@ use gripgen_twin::{Gel, PerJaw};
 const LANES: usize = 8;
 
 /// Newton steps of a time step at most; a staircase takes one or two.
-const MOST_ITERATIONS: usize = 100;
+const MAX_ITERATIONS: usize = 100;
 
 /// Part of the forces by which they may fail to balance.
 const ROUNDING: f64 = 1e-13;
@@ -102,7 +102,7 @@ impl ReducedPull {
         let mut speed = self.speed_m_per_s;
         let (mut force, mut slope) = self.bristles.force(self.position_m + speed * step_s);
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let gained = inertia * (speed - self.speed_m_per_s);
             let residual = gained - applied_n + force;
             if residual.abs() <= ROUNDING * (gained.abs() + applied_n.abs() + force.abs()) {

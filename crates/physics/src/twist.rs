@@ -33,7 +33,7 @@ const STEPS: u32 = 120;
 const ALL: f64 = 1.0 - 1e-6;
 
 /// Newton steps at most.
-const MOST_ITERATIONS: usize = 60;
+const MAX_ITERATIONS: usize = 60;
 
 /// Largest force along the pull while the tool moves by `way_m` after the last cell could have begun to slip.
 ///
@@ -108,7 +108,7 @@ impl Grip {
     fn settle(&self, x: f64, start: f64) -> f64 {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut angle = start;
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let (moment, slope, size) = self.moment(x, angle);
             if moment.abs() <= 1e-12 * size {
                 break;

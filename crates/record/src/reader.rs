@@ -335,11 +335,11 @@ impl ShardReader {
 }
 
 /// Smallest record: its kind and its length.
-const LEAST_RECORD: u64 = 8;
+const MIN_RECORD: u64 = 8;
 
 /// Some bytes of a file that is `bytes` long.
 fn piece(file: &File, bytes: u64, start: u64, length: u64) -> Result<Vec<u8>, McapError> {
-    let fits = start.checked_add(length).is_some_and(|end| end <= bytes) && length >= LEAST_RECORD;
+    let fits = start.checked_add(length).is_some_and(|end| end <= bytes) && length >= MIN_RECORD;
     if !fits {
         return Err(McapError::BadIndex);
     }

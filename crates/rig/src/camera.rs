@@ -14,5 +14,5 @@ mod view_tests;
 
 pub use decode::{DecodeFrameError, FrameLimits, SHIPPED_FRAME_LIMITS, decode_jpeg};
 pub use socket::{CameraClient, CameraLinkError, CameraWaitError};
-pub use stream::{CameraFrame, CameraStream, CameraStreamError, MOST_FRAME, stream_request};
+pub use stream::{CameraFrame, CameraStream, CameraStreamError, MAX_FRAME, stream_request};
 pub use view::{CameraView, ViewError};

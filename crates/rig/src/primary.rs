@@ -25,5 +25,5 @@ pub use message::{
     ErrorCodeMessage, KeyMessage, MessageHeader, PROGRAM_STARTED, PROGRAM_STOPPED, PrimaryEvent,
     RobotMessage, RobotModeData, RuntimeException, SafetyModeMessage, VersionMessage,
 };
-pub use packet::{MOST_PACKET, PrimaryStream, PrimaryStreamError};
+pub use packet::{MAX_PACKET, PrimaryStream, PrimaryStreamError};
 pub use socket::{PrimaryClient, PrimaryLinkError, ScriptError};

@@ -125,13 +125,13 @@ where
     for k in 0..count {
         let input = corpus.get(k).cloned().unwrap_or_else(|| mutate::input(&mut random, &corpus));
         let said = Input(name, &input);
-        let (whole, held) = held::most_held(|| parse(&[&input]));
+        let (whole, held) = held::peak_held(|| parse(&[&input]));
         let allowed = holds.own + holds.per_byte * input.len();
         assert!(held <= allowed, "{held} bytes are held for {} of input, {allowed} are allowed", input.len());
         most = most.max(held as f64 / allowed as f64);
         failed += usize::from(whole.error.is_some());
         let pieces = mutate::pieces(&mut random, &input);
-        let (cut, held) = held::most_held(|| parse(&pieces));
+        let (cut, held) = held::peak_held(|| parse(&pieces));
         assert!(held <= allowed, "{held} bytes are held in pieces, {allowed} are allowed");
         assert!(same(&whole, &cut), "whole {whole:?}\nin pieces {cut:?}");
         drop(said);

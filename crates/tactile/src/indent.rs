@@ -113,7 +113,7 @@ pub fn indent(heights: &Plane, grid: &Grid, gel: &PressedGel, force_n: f64) -> R
 const FIRST_DEPTH_PX: f64 = 4.0;
 /// What an estimate of the next piece is enlarged by, and how much deeper than before it is at least.
 const MARGIN: f64 = 1.1;
-const LEAST_GROWTH: f64 = 1.5;
+const MIN_GROWTH: f64 = 1.5;
 
 fn cube(a: f64) -> f64 {
     a * a * a
@@ -159,7 +159,7 @@ impl Press<'_> {
             // Deeper than `enough` it cannot be, since more pixels only make it shallower; and on a round part the
             // volume grows with the square of the depth.
             let enough = depth_px + (wanted - volume) / count + 1e-6;
-            let round = (MARGIN * (wanted / volume).sqrt()).max(LEAST_GROWTH);
+            let round = (MARGIN * (wanted / volume).sqrt()).max(MIN_GROWTH);
             depth_px = enough.min(round * depth_px).min(thickness_px);
         }
     }

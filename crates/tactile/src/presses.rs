@@ -8,7 +8,7 @@ mod mark;
 mod seen;
 
 pub use calibrate::{
-    CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, FEWEST_PRESSES, Smoothness, calibrate_presses,
+    CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MIN_PRESSES, Smoothness, calibrate_presses,
 };
 pub use circle::{find_circle, reference_frame};
 pub use compare::{

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 const SLOPES_FROM: usize = 8;
 
 /// Largest correction, in pixels of the images.
-const MOST_PX: f64 = 8.0;
+const MAX_PX: f64 = 8.0;
 
 /// Rounds of registration.
 const ROUNDS: usize = 2;
@@ -42,7 +42,7 @@ pub(super) fn straighten(work: &mut Work<'_>) -> [f64; 2] {
         for i in 0..n {
             if let Some(then) = marked[i] {
                 let d: [f64; 3] =
-                    std::array::from_fn(|k| (moved[i][k] - common[i][k]).clamp(-MOST_PX, MOST_PX));
+                    std::array::from_fn(|k| (moved[i][k] - common[i][k]).clamp(-MAX_PX, MAX_PX));
                 work.circles[i] = Some(Circle {
                     x_px: then.x_px + d[0],
                     y_px: then.y_px + d[1],
@@ -112,7 +112,7 @@ fn deviation(work: &Work<'_>, press: usize) -> [f64; 3] {
     }
     normal.cholesky().map_or([0.0; 3], |c| {
         let solved = c.solve(&right);
-        [0, 1, 2].map(|k| solved[k].clamp(-MOST_PX, MOST_PX))
+        [0, 1, 2].map(|k| solved[k].clamp(-MAX_PX, MAX_PX))
     })
 }
 

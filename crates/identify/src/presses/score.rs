@@ -12,10 +12,10 @@ use gripgen_twin::effects::EffectSpec;
 use gripgen_twin::random::splitmix64;
 
 /// Steps of a fit at most.
-const MOST_STEPS: usize = 4;
+const MAX_STEPS: usize = 4;
 
 /// Presses before and after a change of background at least.
-const FEWEST_ON_A_SIDE: usize = 2;
+const MIN_ON_A_SIDE: usize = 2;
 
 /// Presses, how much each counts, and which are held out together.
 #[derive(Debug, Clone)]
@@ -97,7 +97,7 @@ pub(super) fn scored(observed: &Observed<'_>, design: &Design, acting: Vec<Actin
         return Scored { acting: Vec::new(), free: Vec::new(), parameters: Vec::new(), fit, held_out: costs };
     }
     let model = NamedModel::new(observed, acting);
-    let fit = fit_grouped(&model.parameters, MOST_STEPS, &design.weights, &model);
+    let fit = fit_grouped(&model.parameters, MAX_STEPS, &design.weights, &model);
     let held_out = held_out_costs(&model.parameters, &fit, &design.weights, &design.folds);
     Scored { acting: model.at(&fit.values), free: model.free, parameters: model.parameters, fit, held_out }
 }
@@ -153,7 +153,7 @@ pub(super) fn with(
     let known = base.head.values().count();
     let mut values: Vec<f64> = (known..fit.values.len()).map(|k| fit.values[k] + step[k]).collect();
     if !is_drawn(spec) || promise > least {
-        let found = fit_grouped(&model.parameters, MOST_STEPS, &design.weights, &model);
+        let found = fit_grouped(&model.parameters, MAX_STEPS, &design.weights, &model);
         fit = whole(&found.values);
         values = found.values;
     }
@@ -171,7 +171,7 @@ fn step_place(observed: &Observed<'_>, design: &Design, acting: &[ActingEffect],
     let index = |i: usize| observed.predictor.circumstances()[i].pull_index as f64;
     let neutral = acting.last().map_or(0.0, |a| a.spec.parameters[at].neutral);
     let places =
-        std::iter::once(0).chain(FEWEST_ON_A_SIDE..(n + 1).saturating_sub(FEWEST_ON_A_SIDE)).map(|first| {
+        std::iter::once(0).chain(MIN_ON_A_SIDE..(n + 1).saturating_sub(MIN_ON_A_SIDE)).map(|first| {
             let masked: Vec<GroupMoments> = moments
                 .iter()
                 .enumerate()

@@ -26,7 +26,7 @@ const FURTHER: f64 = 0.03;
 const LEFT: f64 = 0.15;
 
 /// Effects at most.
-const MOST_EFFECTS: usize = 3;
+const MAX_EFFECTS: usize = 3;
 
 /// A rival whose loss is less than this share of the gain is named beside the effect.
 const NEAR: f64 = 0.05;
@@ -86,7 +86,7 @@ pub(super) fn search(
     let mut design = Design::new(observed.count());
     let mut model = scored(observed, &design, Vec::new());
     let mut trials = Vec::new();
-    for round in 0..=MOST_EFFECTS {
+    for round in 0..=MAX_EFFECTS {
         observed.rescale(&model.acting);
         let costs: Vec<f64> = scored(observed, &design, Vec::new()).held_out;
         model = scored(observed, &design, model.acting);
@@ -100,7 +100,7 @@ pub(super) fn search(
             candidates.iter().filter(|s| model.acting.iter().all(|a| a.spec != **s)).copied().collect();
         let ground = Base::new(observed, &model);
         for (k, spec) in left.iter().enumerate() {
-            let share = (round as f64 + k as f64 / left.len() as f64) / (MOST_EFFECTS + 1) as f64;
+            let share = (round as f64 + k as f64 / left.len() as f64) / (MAX_EFFECTS + 1) as f64;
             progress(share, spec.id);
             let material = if model.acting.is_empty() { MATERIAL } else { MATERIAL_FURTHER };
             let least = (material * base).max(FURTHER * explained);
@@ -119,7 +119,7 @@ pub(super) fn search(
             }
         }
         match best {
-            Some((_, tried)) if round < MOST_EFFECTS => model = scored(observed, &design, tried.acting),
+            Some((_, tried)) if round < MAX_EFFECTS => model = scored(observed, &design, tried.acting),
             _ => break,
         }
         model = dropped(observed, &design, model, MATERIAL * base / 2.0);
@@ -203,7 +203,7 @@ fn finish(
     for rival in &found {
         let (gain, standard_error) = design.mean(&differences(&model.held_out, &rival.held_out));
         trials.push(PressTrial {
-            round: MOST_EFFECTS + 1,
+            round: MAX_EFFECTS + 1,
             name: format!("curve in {}", rival.covariate),
             gain,
             standard_error,

@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 /// Fewest pulls that are diagnosed.
-const FEWEST: usize = 8;
+const MIN_PULLS: usize = 8;
 
 /// Standard deviations beyond which a pull is named as an outlier.
 const OUTLIER: f64 = 4.5;
@@ -44,7 +44,7 @@ const WORSE: f64 = 1.03;
 const BAD: f64 = 5.0;
 
 /// Least standard deviation of a parameter, as a share of its distance from nothing: formulas are not that good.
-const LEAST_SD: f64 = 0.02;
+const MIN_SD: f64 = 0.02;
 
 /// Odds are taken to this power, because no model here is exactly right.
 const TEMPER: f64 = 0.6;
@@ -107,8 +107,8 @@ pub fn diagnose_pulls(
     if let Some(plain) = context.fit(&context.base, &Terms::default(), &rows) {
         context.correct_at(&plain.model);
     }
-    let most_n = data.label_n.iter().copied().fold(0.0, f64::max);
-    let search = Search::new(&context, candidates(&data, most_n, options.without));
+    let max_n = data.label_n.iter().copied().fold(0.0, f64::max);
+    let search = Search::new(&context, candidates(&data, max_n, options.without));
     if search.candidates.is_empty() && search.curves.is_empty() {
         diagnosis
             .notes
@@ -260,8 +260,8 @@ fn blank(data: &PullData<'_>) -> Diagnosis {
 /// What the data lack, if they cannot be diagnosed at all.
 pub(super) fn insufficient(data: &PullData<'_>) -> Option<String> {
     let n = data.len();
-    if n < FEWEST {
-        return Some(format!("{n} pulls are too few, a diagnosis needs {FEWEST} at least"));
+    if n < MIN_PULLS {
+        return Some(format!("{n} pulls are too few, a diagnosis needs {MIN_PULLS} at least"));
     }
     if data.label_n.iter().all(|x| *x == data.label_n[0]) {
         return Some(format!("all {n} labels are {} N", data.label_n[0]));
@@ -374,7 +374,7 @@ pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<Str
         let name = candidate.name_of(p.name);
         let half = fitted.names.iter().position(|n| *n == name).map_or(0.0, |at| {
             let sd = fitted.covariance[(at, at)].max(0.0).sqrt();
-            HALF90 * sd.max(LEAST_SD * (value - p.neutral).abs())
+            HALF90 * sd.max(MIN_SD * (value - p.neutral).abs())
         });
         let estimate = ParameterEstimate {
             value,

@@ -9,7 +9,7 @@ use super::context::Context;
 use gripgen_twin::Backbone;
 
 /// Fewest traces.
-const FEWEST: usize = 3;
+const MIN_TRACES: usize = 3;
 
 /// Rows of a trace that are looked at.
 const ROWS: usize = 60;
@@ -35,7 +35,7 @@ impl Context<'_> {
     pub(super) fn read_bend(&mut self) {
         let bent: Vec<Bent> =
             self.observations.iter().enumerate().filter_map(|(k, _)| self.bent(k)).collect();
-        if bent.len() < FEWEST {
+        if bent.len() < MIN_TRACES {
             return;
         }
         let given = self.base.shear_by_area;
@@ -89,9 +89,9 @@ impl Bent {
             let off = self.rows.iter().map(|(force_n, x_m)| force_n - self.limit_n * curve.at(per_m * x_m).0);
             0.5 * off.map(|r| r * r).sum::<f64>() / variance
         };
-        let most_m = self.rows.iter().map(|r| r.1).fold(1e-6, f64::max);
+        let max_m = self.rows.iter().map(|r| r.1).fold(1e-6, f64::max);
         // Stiffnesses around the one with which springs reach the limit at the slip.
-        let middle = libm::log(self.limit_n / most_m);
+        let middle = libm::log(self.limit_n / max_m);
         let found = lowest(middle - 0.7, middle + 1.4, cost);
         (libm::exp(found), cost(found))
     }

@@ -18,7 +18,7 @@ use gripgen_twin::effects::{EffectSpec, OFFSET_LAW, find};
 use std::collections::BTreeMap;
 
 /// Least scatter with which a fit weighs residuals.
-const LEAST_SCATTER: f64 = 0.002;
+const MIN_SCATTER: f64 = 0.002;
 
 /// a, b, their covariance, and their intervals.
 type Law = (f64, f64, [f64; 3], [(f64, f64); 2]);
@@ -108,7 +108,7 @@ pub fn calibrate_pulls(
     if let Some(missing) = insufficient(&data) {
         return Err(CalibrateError::Insufficient(missing));
     }
-    let most_n = data.label_n.iter().copied().fold(0.0, f64::max);
+    let max_n = data.label_n.iter().copied().fold(0.0, f64::max);
     let mut terms = Terms::default();
     let asked = |spec: &'static EffectSpec| -> Result<Candidate, CalibrateError> {
         if let Err(reason) = spec.pulls {
@@ -116,7 +116,7 @@ pub fn calibrate_pulls(
         }
         let spans = spec.pulls.map_or(&[][..], |fit| fit.spans);
         let needs = || [spec.covariates, spans].concat().join(", ");
-        candidate(spec, &data, most_n)
+        candidate(spec, &data, max_n)
             .ok_or_else(|| CalibrateError::NotExcited { effect: spec.id.into(), needs: needs() })
     };
     if request.offset_law {
@@ -140,7 +140,7 @@ pub fn calibrate_pulls(
     // Without traces lag and dead time stay free, so that mu knows what they are not known to.
     context.free_lag = context.observations.is_empty();
     let first = context.fit(&context.base, &terms, &rows).ok_or(CalibrateError::NoFit)?;
-    let start = PullModel { scatter: scatter(&context, &first, &rows).0.max(LEAST_SCATTER), ..first.model };
+    let start = PullModel { scatter: scatter(&context, &first, &rows).0.max(MIN_SCATTER), ..first.model };
     context.correct_at(&start);
     let found = context.fit(&start, &first.terms, &rows).ok_or(CalibrateError::NoFit)?;
     let scattered = scatter(&context, &found, &rows);

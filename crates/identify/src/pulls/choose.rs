@@ -98,8 +98,8 @@ impl Search<'_> {
         let last_s = pulls.iter().map(|p| p.covariates.time_s).fold(0.0, f64::max);
         let first_s = pulls.iter().map(|p| p.covariates.time_s).fold(last_s, f64::min);
         let hours = (last_s - first_s) / 3600.0;
-        let most_n = self.context.data.label_n.iter().copied().fold(0.0, f64::max);
-        spec.visible.holds(size, hours, most_n)
+        let max_n = self.context.data.label_n.iter().copied().fold(0.0, f64::max);
+        spec.visible.holds(size, hours, max_n)
     }
 
     /// The entry that is accepted, if one is.

@@ -9,19 +9,19 @@ use std::sync::Mutex;
 
 /// Gain of log-likelihood that the slope at nothing has to promise for an effect on signals to be fitted, and for anything
 /// beside such an effect: these fits are slow.
-const LEAST_PROMISE: f64 = 1.5;
+const MIN_PROMISE: f64 = 1.5;
 
-const LEAST_PROMISE_BESIDE: f64 = 2.5;
+const MIN_PROMISE_BESIDE: f64 = 2.5;
 
 /// Entries within this score of the best, and how many at most, are fitted again with everything free.
 const REFIT_WITHIN: f64 = 6.0;
 
-const MOST_REFITS: usize = 6;
+const MAX_REFITS: usize = 6;
 
 /// Parts at most, and pulls of each at least, of an effect that differs by part.
-const MOST_PARTS: usize = 6;
+const MAX_PARTS: usize = 6;
 
-const FEWEST_OF_PART: usize = 10;
+const MIN_PULLS_OF_PART: usize = 10;
 
 impl Search<'_> {
     pub(super) fn score(&self, fitted: &Fitted) -> f64 {
@@ -48,7 +48,7 @@ impl Search<'_> {
         match rival {
             Rival::Curve(i) => {
                 let curve = &self.curves[*i];
-                if slow && test.curve(curve) < LEAST_PROMISE_BESIDE {
+                if slow && test.curve(curve) < MIN_PROMISE_BESIDE {
                     return None;
                 }
                 let mut terms = terms.clone();
@@ -68,8 +68,8 @@ impl Search<'_> {
             Rival::Effect(i) => {
                 let candidate = &self.candidates[*i];
                 let least = match (slow, candidate.acts_on_signals()) {
-                    (true, _) => LEAST_PROMISE_BESIDE,
-                    (false, true) => LEAST_PROMISE,
+                    (true, _) => MIN_PROMISE_BESIDE,
+                    (false, true) => MIN_PROMISE,
                     (false, false) => 0.0,
                 };
                 for from in &candidate.starts {
@@ -122,8 +122,7 @@ impl Search<'_> {
     pub(super) fn refit(&self, entries: &mut [Entry], old: f64) {
         let Some(best) = entries.first().map(|e| e.gain) else { return };
         let held = |e: &Entry| e.fitted.terms.hold_signals && e.gain > best - REFIT_WITHIN && e.gain > 0.0;
-        let chosen: Vec<usize> =
-            (0..entries.len()).filter(|&k| held(&entries[k])).take(MOST_REFITS).collect();
+        let chosen: Vec<usize> = (0..entries.len()).filter(|&k| held(&entries[k])).take(MAX_REFITS).collect();
         let results: Vec<Mutex<Option<Fitted>>> = chosen.iter().map(|_| Mutex::new(None)).collect();
         self.context.predictor.for_each(chosen.len(), &|i| {
             let entry = &entries[chosen[i]];
@@ -159,8 +158,8 @@ impl Search<'_> {
         let data = self.context.data;
         let parts = data.parts.len();
         let fewest = (0..parts).map(|p| data.part_of.iter().filter(|&&q| q == p).count()).min();
-        (2..=MOST_PARTS).contains(&parts)
-            && fewest >= Some(FEWEST_OF_PART)
+        (2..=MAX_PARTS).contains(&parts)
+            && fewest >= Some(MIN_PULLS_OF_PART)
             && self.candidates[i].spec.per_part
     }
 

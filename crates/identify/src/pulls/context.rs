@@ -171,7 +171,7 @@ impl<'a> Context<'a> {
             // Every dead time has its lag; the best of both is where effects start from.
             let dead_time_s = 0.004 * f64::from(step);
             let lag = [dynamics(&self.base)[0].clone()];
-            let found = fit(&lag, FitOptions { most_steps: 10, least_gain: 1e-5 }, |v| {
+            let found = fit(&lag, FitOptions { max_steps: 10, min_gain: 1e-5 }, |v| {
                 let model = PullModel { lag_s: v[0], dead_time_s, ..self.base.clone() };
                 let mut r = self.trace_residuals(&model, &rows).widened(1.0);
                 // Huber's cost as a sum of squares.
@@ -210,7 +210,7 @@ impl<'a> Context<'a> {
                 (t.row, pick(&t.held_s), pick(&t.held_n))
             })
             .collect();
-        let found = fit(&parameters, FitOptions { most_steps: 15, least_gain: 1e-4 }, |v| {
+        let found = fit(&parameters, FitOptions { max_steps: 15, min_gain: 1e-4 }, |v| {
             let mut model = self.base.clone();
             (model.lag_s, model.dead_time_s) = (v[0], v[1]);
             let mut r = Vec::new();

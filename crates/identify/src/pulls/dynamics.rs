@@ -14,7 +14,7 @@ const STIFF: f64 = 0.4;
 const RELAXATION: f64 = 0.05;
 
 /// Fewest traces.
-const FEWEST: usize = 4;
+const MIN_TRACES: usize = 4;
 
 /// Lag and dead time: value and 90 % interval.
 pub(super) type Dynamics = [(f64, f64, f64); 2];
@@ -39,7 +39,7 @@ impl Context<'_> {
             .filter(|(_, times, _): &(_, Vec<f64>, _)| times.len() >= 5)
             .collect();
         // How fast jaws slide says nothing about the damping of a loop that winds up, nor then readings about its lag.
-        if rows.len() < FEWEST || self.predictor.winds_up() {
+        if rows.len() < MIN_TRACES || self.predictor.winds_up() {
             return None;
         }
         let asked: Vec<(usize, &[f64])> =
@@ -81,7 +81,7 @@ impl Context<'_> {
             let mut tried = parameters.clone();
             tried[1].start = dead_time_s.max(0.0);
             tried[1].bounds = (tried[1].start, tried[1].start);
-            let options = FitOptions { most_steps: 6, least_gain: 1e-5 };
+            let options = FitOptions { max_steps: 6, min_gain: 1e-5 };
             if let Ok(found) = fit(&tried, options, residuals)
                 && best.as_ref().is_none_or(|b| found.cost < b.0)
             {
@@ -91,7 +91,7 @@ impl Context<'_> {
         let (_, values) = best?;
         let settled: Vec<FreeParameter> =
             parameters.iter().zip(&values).map(|(p, v)| FreeParameter { start: *v, ..p.clone() }).collect();
-        let found = fit(&settled, FitOptions { most_steps: 1, least_gain: 1.0 }, residuals).ok()?;
+        let found = fit(&settled, FitOptions { max_steps: 1, min_gain: 1.0 }, residuals).ok()?;
         let informed = found.jacobian.tr_mul(&found.jacobian);
         let inverse = informed.cholesky()?.inverse();
         let own = |from: usize, count: usize| -> DVector<f64> {

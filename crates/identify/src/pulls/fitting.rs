@@ -213,10 +213,10 @@ impl Context<'_> {
                 .collect();
             let trace_weights: Vec<f64> = traces.iter().map(|r| (2.5 / r.abs().max(2.5)).sqrt()).collect();
             let options = match (signals, round) {
-                (false, 0) => FitOptions { most_steps: 12, least_gain: 1e-4 },
-                (false, _) => FitOptions { most_steps: 8, least_gain: 1e-4 },
-                (true, 0) => FitOptions { most_steps: 8, least_gain: 1e-3 },
-                (true, _) => FitOptions { most_steps: 3, least_gain: 1e-3 },
+                (false, 0) => FitOptions { max_steps: 12, min_gain: 1e-4 },
+                (false, _) => FitOptions { max_steps: 8, min_gain: 1e-4 },
+                (true, 0) => FitOptions { max_steps: 8, min_gain: 1e-3 },
+                (true, _) => FitOptions { max_steps: 3, min_gain: 1e-3 },
             };
             let found = fit(&parameters, options, |values| {
                 let model = self.model_at(start, terms, &layout, values);

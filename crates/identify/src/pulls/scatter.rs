@@ -19,7 +19,7 @@ const SCALE: f64 = 0.875_318;
 const MODEL: (f64, f64) = (0.001, 0.003);
 
 /// Largest scatter that is tried, and the number of values.
-const MOST: f64 = 0.3;
+const MAX_SCATTER: f64 = 0.3;
 const VALUES: usize = 600;
 
 /// Value and 90 % interval of the scatter of a fit.
@@ -55,7 +55,7 @@ pub(super) fn scatter(context: &Context<'_>, fitted: &Fitted, rows: &[usize]) ->
             .sum()
     };
     // Evenly in the square root: fine at the bound.
-    let at = |i: usize| MOST * (i as f64 / VALUES as f64).powi(2);
+    let at = |i: usize| MAX_SCATTER * (i as f64 / VALUES as f64).powi(2);
     let costs: Vec<f64> = (0..=VALUES).map(|i| cost(at(i))).collect();
     let best = (0..=VALUES).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
     let memory = fitted.likelihood.memory;
@@ -66,6 +66,6 @@ pub(super) fn scatter(context: &Context<'_>, fitted: &Fitted, rows: &[usize]) ->
         at(inside) + share.clamp(0.0, 1.0) * (at(outside) - at(inside))
     };
     let low = (1..=best).rev().find(|&i| costs[i - 1] > critical).map_or(0.0, |i| end(i, i - 1));
-    let high = (best..VALUES).find(|&i| costs[i + 1] > critical).map_or(MOST, |i| end(i, i + 1));
+    let high = (best..VALUES).find(|&i| costs[i + 1] > critical).map_or(MAX_SCATTER, |i| end(i, i + 1));
     (at(best), low, high)
 }

@@ -14,11 +14,11 @@ use super::model::PullModel;
 use super::observe::TraceObservation;
 
 /// Fewest rows of a slide, and fewest slides.
-const FEWEST_ROWS: usize = 5;
-const FEWEST: usize = 3;
+const MIN_ROWS: usize = 5;
+const MIN_SLIDES: usize = 3;
 
 /// Displacement that a slide has to reach.
-const LEAST_M: f64 = 5e-4;
+const MIN_M: f64 = 5e-4;
 
 /// Masses over dampings that are tried. A loop of 500 Hz answers no faster than the first.
 const TAU_S: [f64; 11] = [0.004, 0.006, 0.009, 0.013, 0.02, 0.03, 0.045, 0.065, 0.1, 0.15, 0.22];
@@ -41,7 +41,7 @@ impl Context<'_> {
             return;
         }
         let slides: Vec<Slide> = raw.iter().filter_map(|t| self.slide(t)).collect();
-        if slides.len() < FEWEST {
+        if slides.len() < MIN_SLIDES {
             return;
         }
         let own_kg = self.predictor.mass_kg();
@@ -60,7 +60,7 @@ impl Context<'_> {
     fn slide(&self, trace: &TraceObservation) -> Option<Slide> {
         let rows = &trace.slid_rows;
         let travel = rows.last()?.2 - rows[0].2;
-        if rows.len() < FEWEST_ROWS || travel <= LEAST_M {
+        if rows.len() < MIN_ROWS || travel <= MIN_M {
             return None;
         }
         let time_s: Vec<f64> = rows.iter().map(|r| r.0).collect();

@@ -69,7 +69,7 @@ pub struct SensorDiagnosis {
 /// Diagnoses a table. Never fails: what cannot be diagnosed is `insufficient`, and the notes say what is missing.
 pub fn diagnose_sensor(data: &SensorData, options: &SensorOptions) -> SensorDiagnosis {
     let mut answer = bare(data);
-    let prepared = match prepare(data, options.most_rows) {
+    let prepared = match prepare(data, options.max_rows) {
         Ok(prepared) => prepared,
         Err(reason) => return insufficient(answer, reason),
     };

@@ -39,7 +39,7 @@ pub struct SensorCalibration {
 /// Fits gain and offset of every session by least squares. The 90 % intervals hold for residuals as correlated as the
 /// measured ones: white noise beside a first-order autoregression, simulated. The error says what is missing.
 pub fn calibrate_sensor(data: &SensorData) -> Result<SensorCalibration, String> {
-    let prepared = prepare(data, SensorOptions::default().most_rows)?;
+    let prepared = prepare(data, SensorOptions::default().max_rows)?;
     let noise = baseline_noise(&prepared);
     let fit = joint_fit(&prepared, &[], noise, true);
     let estimates: Vec<SessionCalibration> = fit

@@ -8,16 +8,16 @@ use super::statistics::mean_and_error;
 use crate::draws::Draws;
 
 /// Most effects and curves in an answer.
-const MOST: usize = 3;
+const MAX_PICKED: usize = 3;
 /// Chance of a further effect where there is none.
 const FURTHER_FALSE_ALARM: f64 = 0.01;
 /// A further effect explains at least this part of what the first one does; less is the first one's formula.
-const LEAST_SHARE: f64 = 0.06;
+const MIN_SHARE: f64 = 0.06;
 /// Chance of a first effect where there is none, where only blocks decide: they are few, and what they cannot decide is
 /// said beside the name.
 const BLOCKS_FALSE_ALARM: f64 = 0.1;
 /// Where only blocks decide: what is less significant by itself is none.
-const LEAST_SIGNIFICANT: f64 = 0.1;
+const MAX_P_VALUE: f64 = 0.1;
 /// An effect that explains this part of what a free curve in its own covariate does has the right name.
 const SAME_SHAPE: f64 = 0.6;
 
@@ -51,7 +51,7 @@ pub(crate) fn model_of(ws: &Workspace<'_>, picked: &[(usize, usize)]) -> Model {
 pub(crate) fn choose(ws: &mut Workspace<'_>, options: &SensorOptions) -> Choice {
     let mut choice = Choice::default();
     let mut first_gain = 0.0;
-    for turn in 0..MOST {
+    for turn in 0..MAX_PICKED {
         let base = model_of(ws, &choice.picked);
         let skip: Vec<usize> = choice.picked.iter().map(|p| p.0).collect();
         let round = ws.round(&base, &skip, options.simulations, options.seed);
@@ -80,7 +80,7 @@ pub(crate) fn choose(ws: &mut Workspace<'_>, options: &SensorOptions) -> Choice 
         let Some((k, point, gain, p_value)) = found else { break };
         if turn == 0 {
             first_gain = gain;
-        } else if gain < LEAST_SHARE * first_gain || is_misfit(ws, &choice.picked, k) {
+        } else if gain < MIN_SHARE * first_gain || is_misfit(ws, &choice.picked, k) {
             break;
         }
         choice.picked.push((k, point));
@@ -105,7 +105,7 @@ fn is_misfit(ws: &Workspace<'_>, picked: &[(usize, usize)], k: usize) -> bool {
 /// The best effect, or the best curve where it is clearly better.
 fn pick(ws: &Workspace<'_>, base: &Model, round: &Round) -> Option<usize> {
     let blocks = ws.weighing == Weighing::Blocks;
-    let counts = |score: &Score| !blocks || (score.p_value <= LEAST_SIGNIFICANT && ws.is_worth(score));
+    let counts = |score: &Score| !blocks || (score.p_value <= MAX_P_VALUE && ws.is_worth(score));
     let best = |effects: bool| {
         let scored = (0..ws.candidates.len()).filter(|&k| ws.candidates[k].is_effect() == effects);
         scored

@@ -7,11 +7,11 @@ use gripgen_twin::effects::TableSpan;
 /// Folds of every session.
 pub(crate) const FOLDS: usize = 6;
 /// Fewest rows of a session.
-const LEAST_SESSION_ROWS: usize = 24;
+const MIN_SESSION_ROWS: usize = 24;
 /// Fewest rows of a unit.
-const LEAST_UNIT_ROWS: usize = 20;
+const MIN_UNIT_ROWS: usize = 20;
 /// Most units of a fold.
-const MOST_UNITS: usize = 4;
+const MAX_UNITS: usize = 4;
 /// A row is a spike if it leaves its neighbours by this many robust standard deviations.
 const SPIKE: f64 = 12.0;
 
@@ -79,14 +79,14 @@ impl Prepared {
 }
 
 /// Why a table cannot be diagnosed, in a sentence.
-pub(crate) fn prepare(data: &SensorData, most_rows: usize) -> Result<Prepared, String> {
+pub(crate) fn prepare(data: &SensorData, max_rows: usize) -> Result<Prepared, String> {
     let n = data.time_s.len();
     let lengths = [data.reference_force_n.len(), data.measured_force_n.len(), data.session.len()];
     if lengths.iter().any(|&l| l != n) {
         return Err(format!("{n} times, but {lengths:?} references, readings and sessions"));
     }
     if n < 2 {
-        return Err(format!("{n} rows: a diagnosis needs {LEAST_SESSION_ROWS} of a session at least"));
+        return Err(format!("{n} rows: a diagnosis needs {MIN_SESSION_ROWS} of a session at least"));
     }
     let mut notes = Vec::new();
     let mut rows: Vec<usize> = Vec::with_capacity(n);
@@ -95,11 +95,8 @@ pub(crate) fn prepare(data: &SensorData, most_rows: usize) -> Result<Prepared, S
     for (s, name) in data.sessions.iter().enumerate() {
         let of: Vec<usize> = (0..n).filter(|&i| data.session[i] == s && finite(data, i)).collect();
         let (low, high) = range(of.iter().map(|&i| data.reference_force_n[i]));
-        if of.len() < LEAST_SESSION_ROWS {
-            notes.push(format!(
-                "session {name}: {} rows, {LEAST_SESSION_ROWS} are needed; left out",
-                of.len()
-            ));
+        if of.len() < MIN_SESSION_ROWS {
+            notes.push(format!("session {name}: {} rows, {MIN_SESSION_ROWS} are needed; left out", of.len()));
         } else if high - low <= 1e-6 * high.abs().max(low.abs()) {
             notes.push(format!("session {name}: the reference force is {low} N all the time; left out"));
         } else {
@@ -138,7 +135,7 @@ pub(crate) fn prepare(data: &SensorData, most_rows: usize) -> Result<Prepared, S
         let (count, all) = (spikes.len(), rows.len());
         notes.push(format!("{count} of {all} readings leave their neighbours alone and were not used"));
     }
-    let size = rows.len().div_ceil(most_rows.max(100));
+    let size = rows.len().div_ceil(max_rows.max(100));
     let mut groups = Vec::new();
     for pair in starts.windows(2) {
         let count = ((pair[1] - pair[0]) / size).max(1);
@@ -190,7 +187,7 @@ fn units(groups: &[(usize, usize)], session: &[usize]) -> Vec<Unit> {
         let s = session[groups[from].0];
         let to = (from..groups.len()).find(|&k| session[groups[k].0] != s).unwrap_or(groups.len());
         let n = to - from;
-        let parts = (n / (FOLDS * LEAST_UNIT_ROWS)).clamp(1, MOST_UNITS);
+        let parts = (n / (FOLDS * MIN_UNIT_ROWS)).clamp(1, MAX_UNITS);
         let all = FOLDS * parts;
         units.extend((0..all).map(|k| Unit {
             session: s,

@@ -70,7 +70,7 @@ pub(crate) fn joint_fit(
         weighed(prepared.grouped(&chain(prepared, &list)))
     };
     let profile = |theta: &[f64]| profile(&y, &one, &force(theta), &sessions);
-    let options = FitOptions { most_steps: 40, least_gain: 1e-7 };
+    let options = FitOptions { max_steps: 40, min_gain: 1e-7 };
     let start: Vec<f64> = parameters.iter().map(|p| p.start).collect();
     let found =
         if parameters.is_empty() { None } else { fit(&parameters, options, |theta| profile(theta).1).ok() };

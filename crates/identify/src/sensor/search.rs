@@ -78,7 +78,7 @@ impl Round {
 }
 
 /// Where only blocks decide: what takes away less of the held-out squared error is not worth a name.
-const LEAST_OF_ERROR: f64 = 0.1;
+const MIN_SHARE_OF_ERROR: f64 = 0.1;
 
 impl<'a> Workspace<'a> {
     /// Finds noise and weighing. `columns` end with the measured force.
@@ -281,7 +281,7 @@ impl<'a> Workspace<'a> {
     /// Whether a candidate takes away enough to be named.
     pub fn is_worth(&self, score: &Score) -> bool {
         self.weighing == Weighing::Likelihood
-            || score.held_out.iter().sum::<f64>() >= LEAST_OF_ERROR * 0.5 * self.rows()
+            || score.held_out.iter().sum::<f64>() >= MIN_SHARE_OF_ERROR * 0.5 * self.rows()
     }
 
     fn scores(&self, moments: &Moments, base: &Model, skip: &[usize]) -> Vec<Option<Score>> {

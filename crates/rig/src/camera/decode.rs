@@ -31,7 +31,7 @@ pub enum DecodeFrameError {
     },
     /// Too large.
     #[error(
-        "a frame of {width_px} x {height_px} px, at most {most_width_px} x {most_height_px} px are decoded"
+        "a frame of {width_px} x {height_px} px, at most {max_width_px} x {max_height_px} px are decoded"
     )]
     Size {
         /// Columns.
@@ -39,9 +39,9 @@ pub enum DecodeFrameError {
         /// Rows.
         height_px: u32,
         /// Most columns.
-        most_width_px: u32,
+        max_width_px: u32,
         /// Most rows.
-        most_height_px: u32,
+        max_height_px: u32,
     },
     /// The decoder gave up.
     #[error("the frame is no JPEG that can be decoded: {reason}")]
@@ -65,8 +65,8 @@ pub fn decode_jpeg(bytes: &[u8], limits: &FrameLimits) -> Result<TactileImage, D
     let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(jpeg)?;
     let (width_px, height_px) = decoder.dimensions();
     if width_px > limits.width_px || height_px > limits.height_px {
-        let (most_width_px, most_height_px) = (limits.width_px, limits.height_px);
-        return Err(DecodeFrameError::Size { width_px, height_px, most_width_px, most_height_px });
+        let (max_width_px, max_height_px) = (limits.width_px, limits.height_px);
+        return Err(DecodeFrameError::Size { width_px, height_px, max_width_px, max_height_px });
     }
     let rgb = DynamicImage::from_decoder(decoder).map_err(jpeg)?.into_rgb8().into_raw();
     Ok(TactileImage { width_px, height_px, rgb })

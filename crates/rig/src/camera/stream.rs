@@ -1,11 +1,11 @@
 //! `multipart/x-mixed-replace` (RFC 2046, 5.1) as mjpg-streamer writes it: a boundary line, a few headers, the frame.
 
 /// Largest frame that is taken: a JPEG of 640 x 480 at the best quality is a tenth of it.
-pub const MOST_FRAME: usize = 4 << 20;
+pub const MAX_FRAME: usize = 4 << 20;
 /// Longest headers.
-const MOST_HEADERS: usize = 8 << 10;
+const MAX_HEADERS: usize = 8 << 10;
 /// What may come without their end: its last byte may still be on the way.
-const MOST_WITHOUT_END: usize = MOST_HEADERS + b"\r\n\r\n".len() - 1;
+const MAX_WITHOUT_END: usize = MAX_HEADERS + b"\r\n\r\n".len() - 1;
 
 /// The request for a stream of the camera at `host`.
 pub fn stream_request(host: &str) -> Vec<u8> {
@@ -38,13 +38,13 @@ pub enum CameraStreamError {
         content_type: String,
     },
     /// Headers without an end.
-    #[error("headers of {bytes} bytes without an end, at most {MOST_HEADERS} are read")]
+    #[error("headers of {bytes} bytes without an end, at most {MAX_HEADERS} are read")]
     Headers {
         /// Bytes so far.
         bytes: usize,
     },
     /// A frame that is too large.
-    #[error("a frame of {bytes} bytes, at most {MOST_FRAME} are read")]
+    #[error("a frame of {bytes} bytes, at most {MAX_FRAME} are read")]
     Frame {
         /// Its size, or what came of it so far.
         bytes: usize,
@@ -97,13 +97,13 @@ impl CameraStream {
             [&b"\r\n\r\n"[..], b"\n\n"].map(|end| find(&self.bytes, end).map(|at| (at, at + end.len())));
         let Some((end, after)) = ends.into_iter().flatten().min() else {
             let bytes = self.bytes.len();
-            return if bytes > MOST_WITHOUT_END {
+            return if bytes > MAX_WITHOUT_END {
                 Err(CameraStreamError::Headers { bytes })
             } else {
                 Ok(None)
             };
         };
-        if end > MOST_HEADERS {
+        if end > MAX_HEADERS {
             return Err(CameraStreamError::Headers { bytes: end });
         }
         let text = String::from_utf8_lossy(&self.bytes[..end]).into_owned();
@@ -123,7 +123,7 @@ impl CameraStream {
         let after = &self.bytes[at + boundary.len()..];
         if find(after, b"\r\n\r\n").or_else(|| find(after, b"\n\n")).is_none() {
             let bytes = after.len();
-            return if bytes > MOST_WITHOUT_END {
+            return if bytes > MAX_WITHOUT_END {
                 Err(CameraStreamError::Headers { bytes })
             } else {
                 Ok(false)
@@ -144,7 +144,7 @@ impl CameraStream {
                         let body = &self.bytes[..at];
                         body.strip_suffix(b"\r\n").or(body.strip_suffix(b"\n")).unwrap_or(body).len()
                     }
-                    None if self.bytes.len() > MOST_FRAME => {
+                    None if self.bytes.len() > MAX_FRAME => {
                         return Err(CameraStreamError::Frame { bytes: self.bytes.len() });
                     }
                     None => return Ok(None),
@@ -189,7 +189,7 @@ fn boundary_of(headers: &[String]) -> Result<Vec<u8>, CameraStreamError> {
 
 fn part_of(headers: &[String]) -> Result<Part, CameraStreamError> {
     let length: Option<usize> = header(headers, "Content-Length").and_then(|v| v.parse().ok());
-    if let Some(bytes) = length.filter(|&bytes| bytes > MOST_FRAME) {
+    if let Some(bytes) = length.filter(|&bytes| bytes > MAX_FRAME) {
         return Err(CameraStreamError::Frame { bytes });
     }
     let device_time_s =

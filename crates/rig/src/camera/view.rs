@@ -7,7 +7,7 @@ use image::RgbImage;
 use image::imageops::{FilterType, crop_imm, resize};
 
 /// Longest side of an image that is made or taken.
-const MOST_SIDE_PX: u32 = 4096;
+const MAX_SIDE_PX: u32 = 4096;
 
 /// How the frame is looked at. The steps come in the order of the fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +34,7 @@ pub enum ViewError {
         rotate_deg: u32,
     },
     /// No image, or one that is too large.
-    #[error("an image of {width_px} x {height_px} px, each side must be from 1 to {MOST_SIDE_PX} px")]
+    #[error("an image of {width_px} x {height_px} px, each side must be from 1 to {MAX_SIDE_PX} px")]
     Size {
         /// Columns.
         width_px: u32,
@@ -168,7 +168,7 @@ fn bytes_of(width_px: u32, height_px: u32) -> u64 {
 }
 
 fn check_sides(width_px: u32, height_px: u32) -> Result<(), ViewError> {
-    let sides = 1..=MOST_SIDE_PX;
+    let sides = 1..=MAX_SIDE_PX;
     let good = sides.contains(&width_px) && sides.contains(&height_px);
     if good { Ok(()) } else { Err(ViewError::Size { width_px, height_px }) }
 }

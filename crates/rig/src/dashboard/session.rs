@@ -6,9 +6,9 @@ use std::collections::VecDeque;
 /// How the first line begins.
 pub const GREETING: &str = "Connected: Universal Robots Dashboard Server";
 /// Longest line of a controller; a path of a program is the longest thing it says.
-const MOST_LINE: usize = 4096;
+const MAX_LINE: usize = 4096;
 /// Commands that wait for their answers.
-const MOST_OUTSTANDING: usize = 16;
+const MAX_OUTSTANDING: usize = 16;
 
 /// What the controller said.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub enum DashboardSessionError {
         line: String,
     },
     /// A line without an end.
-    #[error("a line of {bytes} bytes, at most {MOST_LINE} are read")]
+    #[error("a line of {bytes} bytes, at most {MAX_LINE} are read")]
     Line {
         /// Its bytes so far.
         bytes: usize,
@@ -53,7 +53,7 @@ pub enum DashboardSessionError {
 pub enum DashboardSendError {
     /// Too many wait for their answers.
     #[error(
-        "`{asked}` has to wait: {outstanding} commands have no answer yet, at most {MOST_OUTSTANDING} may"
+        "`{asked}` has to wait: {outstanding} commands have no answer yet, at most {MAX_OUTSTANDING} may"
     )]
     Outstanding {
         /// What was asked.
@@ -89,7 +89,7 @@ impl DashboardLink {
             return Err(DashboardSendError::Closed { asked });
         }
         let outstanding = self.outstanding.len();
-        if outstanding == MOST_OUTSTANDING {
+        if outstanding == MAX_OUTSTANDING {
             return Err(DashboardSendError::Outstanding { asked, outstanding });
         }
         self.outgoing.extend(asked.bytes());
@@ -119,10 +119,10 @@ impl DashboardLink {
     /// The next event, if its line is whole. After an error nothing else comes.
     pub fn next_event(&mut self) -> Result<Option<DashboardEvent>, DashboardSessionError> {
         loop {
-            let end = self.incoming.iter().take(MOST_LINE + 1).position(|&b| b == b'\n');
+            let end = self.incoming.iter().take(MAX_LINE + 1).position(|&b| b == b'\n');
             let Some(end) = end else {
-                let bytes = self.incoming.len().min(MOST_LINE + 1);
-                return if bytes > MOST_LINE { Err(DashboardSessionError::Line { bytes }) } else { Ok(None) };
+                let bytes = self.incoming.len().min(MAX_LINE + 1);
+                return if bytes > MAX_LINE { Err(DashboardSessionError::Line { bytes }) } else { Ok(None) };
             };
             let line = String::from_utf8_lossy(&self.incoming[..end]).trim().to_string();
             if !line.is_empty() && !self.greeted && !line.starts_with(GREETING) {

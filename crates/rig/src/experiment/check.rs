@@ -348,12 +348,12 @@ pub enum ReadPoseError {
         wanted_mm: [f64; 3],
     },
     /// It moves.
-    #[error("the tool moves with {speed_mm_s:.1} mm/s, it must stand (below {most_mm_s} mm/s)")]
+    #[error("the tool moves with {speed_mm_s:.1} mm/s, it must stand (below {max_mm_s} mm/s)")]
     Moving {
         /// Its speed.
         speed_mm_s: f64,
         /// What counts as standing.
-        most_mm_s: f64,
+        max_mm_s: f64,
     },
 }
 
@@ -368,7 +368,7 @@ pub fn read_pose(config: &RigConfig) -> Result<crate::program::TcpPose, ReadPose
     let Some(last) = rows.last() else { return Err(ReadPoseError::Silent) };
     let speed_m_s = rows.iter().map(RobotRow::speed_m_s).fold(0.0, f64::max);
     if speed_m_s > STILL_M_S {
-        return Err(ReadPoseError::Moving { speed_mm_s: 1e3 * speed_m_s, most_mm_s: 1e3 * STILL_M_S });
+        return Err(ReadPoseError::Moving { speed_mm_s: 1e3 * speed_m_s, max_mm_s: 1e3 * STILL_M_S });
     }
     Ok(last.tcp)
 }

@@ -84,13 +84,13 @@ pub enum Fault {
     },
     /// Something pulls at the tool already.
     #[error(
-        "the preload is {preload_n:.1} N along the pull, {most_n} N are allowed: something else pulls at the tool"
+        "the preload is {preload_n:.1} N along the pull, {max_n} N are allowed: something else pulls at the tool"
     )]
     Preload {
         /// What was measured before the first step.
         preload_n: f64,
         /// The most that is allowed, in either direction.
-        most_n: f64,
+        max_n: f64,
     },
     /// A program that could not be sent.
     #[error("the primary interface: {0}")]

@@ -253,7 +253,7 @@ impl Experiment<'_> {
     }
 
     /// Says go and watches until the program has stopped.
-    fn staircase(&mut self, run: i32, planned: &PlannedPull, most_s: f64) -> Result<StopReason, Fault> {
+    fn staircase(&mut self, run: i32, planned: &PlannedPull, max_s: f64) -> Result<StopReason, Fault> {
         self.tell(RigEvent::Step("pulling"));
         self.devices.heart.set_go(run);
         let is_pulling = |x: &mut Self| {
@@ -262,12 +262,12 @@ impl Experiment<'_> {
         };
         self.wait("the start of the pull", SLACK, is_pulling)?;
         let preload_n = self.preload_n(planned);
-        let most_n = self.config.limits.preload_n;
-        if preload_n.abs() > most_n {
-            return Err(Fault::Preload { preload_n, most_n });
+        let max_n = self.config.limits.preload_n;
+        if preload_n.abs() > max_n {
+            return Err(Fault::Preload { preload_n, max_n });
         }
         let began = Instant::now();
-        let limit = Duration::from_secs_f64(most_s) + SLACK;
+        let limit = Duration::from_secs_f64(max_s) + SLACK;
         let (mut shown, mut start_s) = (0, None);
         self.wait("the pull", limit, |x| {
             for i in shown..x.rows.len() {

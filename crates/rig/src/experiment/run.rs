@@ -21,7 +21,7 @@ pub(super) const PROGRAM: Duration = Duration::from_secs(3);
 /// Slack on the times that the devices themselves keep.
 pub(super) const SLACK: Duration = Duration::from_secs(3);
 /// Largest number of a run.
-const MOST_RUN: i32 = 1_000_000_000;
+const MAX_RUN: i32 = 1_000_000_000;
 /// A tool that is closer to a pose than this is there.
 const THERE_M: f64 = 1e-4;
 
@@ -92,7 +92,7 @@ impl<'a> Experiment<'a> {
         // Numbers of runs differ between experiments: an old program's registers are not taken for the new one's. No run is as
         // short as a millisecond, so they count up more slowly than the clock that they begin at.
         let clock = HostClock::start();
-        let run = ((clock.unix_s(Instant::now()) * 1e3) as i64 % i64::from(MOST_RUN)) as i32;
+        let run = ((clock.unix_s(Instant::now()) * 1e3) as i64 % i64::from(MAX_RUN)) as i32;
         Self {
             config,
             devices,
@@ -120,7 +120,7 @@ impl<'a> Experiment<'a> {
     }
 
     pub(super) fn next_run(&mut self) -> i32 {
-        self.run = if self.run >= MOST_RUN { 1 } else { self.run + 1 };
+        self.run = if self.run >= MAX_RUN { 1 } else { self.run + 1 };
         self.run
     }
 

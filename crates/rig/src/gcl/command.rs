@@ -135,7 +135,7 @@ pub const SHIPPED_LIMITS: GclLimits =
 pub enum LimitError {
     /// A force.
     #[error(
-        "{force_per_jaw_n} N per jaw are {sum_n} N for the gripper, which allows {least_n} to {most_n} N (sum of both jaws)"
+        "{force_per_jaw_n} N per jaw are {sum_n} N for the gripper, which allows {min_n} to {max_n} N (sum of both jaws)"
     )]
     Force {
         /// What was asked of each jaw.
@@ -143,29 +143,29 @@ pub enum LimitError {
         /// The sum.
         sum_n: f64,
         /// Smallest sum.
-        least_n: f64,
+        min_n: f64,
         /// Largest sum.
-        most_n: f64,
+        max_n: f64,
     },
     /// A width.
-    #[error("a width of {width_mm} mm is outside {least_mm} to {most_mm} mm")]
+    #[error("a width of {width_mm} mm is outside {min_mm} to {max_mm} mm")]
     Width {
         /// What was asked.
         width_mm: f64,
         /// Smallest.
-        least_mm: f64,
+        min_mm: f64,
         /// Largest.
-        most_mm: f64,
+        max_mm: f64,
     },
     /// A speed.
-    #[error("a speed of {speed_mm_s} mm/s is outside {least_mm_s} to {most_mm_s} mm/s")]
+    #[error("a speed of {speed_mm_s} mm/s is outside {min_mm_s} to {max_mm_s} mm/s")]
     Speed {
         /// What was asked.
         speed_mm_s: f64,
         /// Smallest.
-        least_mm_s: f64,
+        min_mm_s: f64,
         /// Largest.
-        most_mm_s: f64,
+        max_mm_s: f64,
     },
 }
 
@@ -197,9 +197,9 @@ impl GclCommand {
     /// The line on the wire. Numbers beyond `limits`, and those that are none, are refused.
     pub fn line(&self, limits: &GclLimits) -> Result<String, LimitError> {
         let width = |width_mm: f64| {
-            let (least_mm, most_mm) = limits.width_mm;
-            let inside = width_mm >= least_mm && width_mm <= most_mm;
-            if inside { Ok(width_mm) } else { Err(LimitError::Width { width_mm, least_mm, most_mm }) }
+            let (min_mm, max_mm) = limits.width_mm;
+            let inside = width_mm >= min_mm && width_mm <= max_mm;
+            if inside { Ok(width_mm) } else { Err(LimitError::Width { width_mm, min_mm, max_mm }) }
         };
         let mut line = String::new();
         let _ = match *self {
@@ -210,17 +210,17 @@ impl GclCommand {
             GclCommand::Release { pull_back_mm } => write!(line, "RELEASE({})", width(pull_back_mm)?),
             GclCommand::Grip { force_per_jaw_n, part_width_mm, speed_mm_s } => {
                 let sum_n = JAWS * force_per_jaw_n;
-                let (least_n, most_n) = limits.force_sum_n;
-                if !(sum_n >= least_n && sum_n <= most_n) {
-                    return Err(LimitError::Force { force_per_jaw_n, sum_n, least_n, most_n });
+                let (min_n, max_n) = limits.force_sum_n;
+                if !(sum_n >= min_n && sum_n <= max_n) {
+                    return Err(LimitError::Force { force_per_jaw_n, sum_n, min_n, max_n });
                 }
                 let _ = write!(line, "GRIP({sum_n}");
                 if let Some(part_width_mm) = part_width_mm {
                     let _ = write!(line, ", {}", width(part_width_mm)?);
                     if let Some(speed_mm_s) = speed_mm_s {
-                        let (least_mm_s, most_mm_s) = limits.speed_mm_s;
-                        if !(speed_mm_s >= least_mm_s && speed_mm_s <= most_mm_s) {
-                            return Err(LimitError::Speed { speed_mm_s, least_mm_s, most_mm_s });
+                        let (min_mm_s, max_mm_s) = limits.speed_mm_s;
+                        if !(speed_mm_s >= min_mm_s && speed_mm_s <= max_mm_s) {
+                            return Err(LimitError::Speed { speed_mm_s, min_mm_s, max_mm_s });
                         }
                         let _ = write!(line, ", {speed_mm_s}");
                     }

@@ -3,7 +3,7 @@
 use super::command::{GclCommand, GclLimits, LimitError};
 
 /// Longest line of a device; its own are below a hundred bytes.
-const MOST_LINE: usize = 1024;
+const MAX_LINE: usize = 1024;
 
 /// What the gripper said.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +42,7 @@ pub enum GclEvent {
 
 /// Why a session ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a line of more than {MOST_LINE} bytes without an end: this is no gripper")]
+#[error("a line of more than {MAX_LINE} bytes without an end: this is no gripper")]
 pub struct GclSessionError;
 
 /// Why a command was not sent.
@@ -133,7 +133,7 @@ impl GclLink {
         let mut events = Vec::new();
         let mut start = 0;
         while let Some(end) = self.incoming[start..].iter().position(|&b| b == b'\n') {
-            if end > MOST_LINE {
+            if end > MAX_LINE {
                 return Err(GclSessionError);
             }
             let line = String::from_utf8_lossy(&self.incoming[start..start + end]).trim().to_string();
@@ -145,7 +145,7 @@ impl GclLink {
             }
         }
         self.incoming.drain(..start);
-        if self.incoming.len() > MOST_LINE {
+        if self.incoming.len() > MAX_LINE {
             return Err(GclSessionError);
         }
         Ok(events)

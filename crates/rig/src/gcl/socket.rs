@@ -13,11 +13,11 @@ use std::time::{Duration, Instant};
 /// How long a goodbye is waited for.
 const BYE: Duration = Duration::from_millis(500);
 /// Events that wait to be read; later ones are left out of the channel, and stand in the log alone.
-const MOST_EVENTS: usize = 4096;
+const MAX_EVENTS: usize = 4096;
 /// Answers that nobody has waited for yet.
-const MOST_ANSWERS: usize = 256;
+const MAX_ANSWERS: usize = 256;
 /// Lines in the log; the oldest make room.
-const MOST_LOG_LINES: usize = 65_536;
+const MAX_LOG_LINES: usize = 65_536;
 /// How far a setting that is repeated may be off: devices print two decimals.
 const ECHO_TOLERANCE: f64 = 0.01;
 
@@ -133,7 +133,7 @@ impl GclClient {
             answers: VecDeque::new(),
             stopped: false,
         };
-        let (tell, events) = sync_channel(MOST_EVENTS);
+        let (tell, events) = sync_channel(MAX_EVENTS);
         let connection = Connection::start(socket, READING, state, move |shared, bytes, at| {
             for piece in bytes.split_inclusive(|&b| b == b'\n') {
                 let events = shared.known().state.receive(piece, at)?;
@@ -268,7 +268,7 @@ impl Shared<State, GclSessionError> {
 
 impl State {
     fn log(&mut self, at: Instant, sent: bool, bytes: &[u8]) {
-        if self.log.len() == MOST_LOG_LINES {
+        if self.log.len() == MAX_LOG_LINES {
             self.log.pop_front();
         }
         let line = String::from_utf8_lossy(bytes).trim().to_string();
@@ -285,7 +285,7 @@ impl State {
         }
         for event in &events {
             if !matches!(event, GclEvent::Streamed { .. } | GclEvent::Other(_)) {
-                if self.answers.len() == MOST_ANSWERS {
+                if self.answers.len() == MAX_ANSWERS {
                     self.answers.pop_front();
                 }
                 self.answers.push_back(event.clone());

@@ -4,14 +4,14 @@ use super::message::{
     ErrorCodeMessage, KeyMessage, MessageHeader, RobotModeData, RuntimeException, SafetyModeMessage,
     VersionMessage,
 };
-use super::packet::{HEADER, MOST_PACKET, ROBOT_MODE_DATA, message_kind, packet_type};
+use super::packet::{HEADER, MAX_PACKET, ROBOT_MODE_DATA, message_kind, packet_type};
 
 /// Longest text at the end of a packet: what is before it always fits into the rest.
-const MOST_TEXT: usize = MOST_PACKET - 512;
+const MAX_TEXT: usize = MAX_PACKET - 512;
 
 /// Words.
 pub fn encode_text_message(header: MessageHeader, text: &str) -> Vec<u8> {
-    message(header, message_kind::TEXT, cut(text, MOST_TEXT).as_bytes())
+    message(header, message_kind::TEXT, cut(text, MAX_TEXT).as_bytes())
 }
 
 /// The first message of a connection.
@@ -20,7 +20,7 @@ pub fn encode_version_message(header: MessageHeader, version: &VersionMessage) -
     content.extend([version.major, version.minor]);
     content.extend(version.bugfix.to_be_bytes());
     content.extend(version.build.to_be_bytes());
-    content.extend(cut(&version.date, MOST_TEXT).bytes());
+    content.extend(cut(&version.date, MAX_TEXT).bytes());
     message(header, message_kind::VERSION, &content)
 }
 
@@ -38,7 +38,7 @@ pub fn encode_error_code_message(header: MessageHeader, error: &ErrorCodeMessage
     let mut content = numbers(&[error.code, error.argument, error.level]);
     content.extend(error.data_type.to_be_bytes());
     content.extend(error.data.to_be_bytes());
-    content.extend(cut(&error.text, MOST_TEXT).bytes());
+    content.extend(cut(&error.text, MAX_TEXT).bytes());
     message(header, message_kind::ERROR_CODE, &content)
 }
 
@@ -46,7 +46,7 @@ pub fn encode_error_code_message(header: MessageHeader, error: &ErrorCodeMessage
 pub fn encode_key_message(header: MessageHeader, key: &KeyMessage) -> Vec<u8> {
     let mut content = numbers(&[key.code, key.argument]);
     content.extend(short_text(&key.title, 255));
-    content.extend(cut(&key.text, MOST_TEXT).bytes());
+    content.extend(cut(&key.text, MAX_TEXT).bytes());
     message(header, message_kind::KEY, &content)
 }
 
@@ -55,7 +55,7 @@ pub fn encode_runtime_exception_message(header: MessageHeader, exception: &Runti
     let mut content = Vec::new();
     content.extend(exception.line.to_be_bytes());
     content.extend(exception.column.to_be_bytes());
-    content.extend(cut(&exception.text, MOST_TEXT).bytes());
+    content.extend(cut(&exception.text, MAX_TEXT).bytes());
     message(header, message_kind::RUNTIME_EXCEPTION, &content)
 }
 
@@ -89,7 +89,7 @@ fn message(header: MessageHeader, kind: u8, content: &[u8]) -> Vec<u8> {
     packet(packet_type::ROBOT_MESSAGE, &bytes)
 }
 
-/// Packets and sub-packets begin alike. No content is longer than [`MOST_PACKET`].
+/// Packets and sub-packets begin alike. No content is longer than [`MAX_PACKET`].
 fn packet(kind: u8, content: &[u8]) -> Vec<u8> {
     let size = (HEADER + content.len()) as u32;
     let mut bytes = size.to_be_bytes().to_vec();

@@ -14,7 +14,7 @@ use super::message::{
 };
 
 /// Largest packet that is read: the state of an arm has 1.4 kB, a list of global variables some ten.
-pub const MOST_PACKET: usize = 64 << 10;
+pub const MAX_PACKET: usize = 64 << 10;
 /// Size and type.
 pub(super) const HEADER: usize = 5;
 
@@ -42,7 +42,7 @@ pub(super) const ROBOT_MODE_DATA: u8 = 0;
 #[non_exhaustive]
 pub enum PrimaryStreamError {
     /// A size that no packet has.
-    #[error("a packet says that it has {size} bytes, packets have {HEADER} to {MOST_PACKET}")]
+    #[error("a packet says that it has {size} bytes, packets have {HEADER} to {MAX_PACKET}")]
     Size {
         /// What it says.
         size: i32,
@@ -90,7 +90,7 @@ impl PrimaryStream {
         loop {
             let rest = &self.bytes[self.taken..];
             let Some(size) = rest.first_chunk().map(|b| i32::from_be_bytes(*b)) else { return Ok(None) };
-            let bytes = usize::try_from(size).ok().filter(|size| (HEADER..=MOST_PACKET).contains(size));
+            let bytes = usize::try_from(size).ok().filter(|size| (HEADER..=MAX_PACKET).contains(size));
             let bytes = bytes.ok_or(PrimaryStreamError::Size { size })?;
             let Some([_, _, _, _, kind, content @ ..]) = rest.get(..bytes) else { return Ok(None) };
             let event = match *kind {

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Events that wait to be read; later ones are lost, and counted.
-const MOST_EVENTS: usize = 4096;
+const MAX_EVENTS: usize = 4096;
 
 const READING: Reading = Reading { thread: "primary", silence: None, cut_at_end: true };
 
@@ -52,7 +52,7 @@ impl PrimaryClient {
     /// Connects. The first event is the version of the controller.
     pub fn connect(address: SocketAddr, timeout: Duration) -> Result<Self, PrimaryLinkError> {
         let socket = Socket::connect(address, timeout, "the connection to the primary interface is closed")?;
-        let (tell, events) = sync_channel(MOST_EVENTS);
+        let (tell, events) = sync_channel(MAX_EVENTS);
         let mut primary = PrimaryStream::default();
         let connection = Connection::start(socket, READING, State::default(), move |shared, bytes, at| {
             primary.push(bytes);

@@ -172,7 +172,7 @@ fn texts_that_do_not_fit_are_cut_between_characters() {
     let title = format!("{}\u{e9}", "x".repeat(254));
     let long = KeyMessage { title, text: "y".repeat(1 << 17), ..key() };
     let wire = encode_key_message(HEADER, &long);
-    assert!(wire.len() <= MOST_PACKET, "{}", wire.len());
+    assert!(wire.len() <= MAX_PACKET, "{}", wire.len());
     let (events, end, _) = read(&wire, wire.len());
     let [PrimaryEvent::Message { message: RobotMessage::Key(key), .. }] = &events[..] else {
         panic!("{end:?}")

@@ -13,7 +13,7 @@ use super::recipe::{KnownTypes, Recipe, RecipeError};
 use super::value::{Value, ValueError};
 
 /// Longest list of names that a controller takes.
-const MOST_NAMES: usize = 2048;
+const MAX_NAMES: usize = 2048;
 
 /// What a client wants.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,7 +72,7 @@ pub enum SessionError {
     #[error("no outputs are asked for: a controller starts with at least one")]
     NoOutputs,
     /// Names longer than a controller takes.
-    #[error("the names of a recipe are {bytes} bytes long, a controller takes at most {MOST_NAMES}")]
+    #[error("the names of a recipe are {bytes} bytes long, a controller takes at most {MAX_NAMES}")]
     Names {
         /// Their length.
         bytes: usize,
@@ -181,7 +181,7 @@ impl Link {
         }
         for names in plan.inputs.iter().chain([&plan.outputs]) {
             let bytes = names.join(",").len();
-            if bytes > MOST_NAMES {
+            if bytes > MAX_NAMES {
                 return Err(SessionError::Names { bytes });
             }
         }

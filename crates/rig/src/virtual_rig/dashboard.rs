@@ -6,7 +6,7 @@
 use crate::robot_state::{RobotMode, SafetyStatus};
 
 /// Longest piece of an unknown line that is repeated.
-const MOST_REPEATED: usize = 200;
+const MAX_REPEATED: usize = 200;
 
 /// What the program on the robot does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,7 +119,7 @@ pub fn reply(line: &str, robot: &mut dyn DashboardRobot) -> Reply {
         "quit" => return Reply { text: "Disconnected".into(), close: true },
         _ => {
             let repeated: String =
-                line.trim().chars().filter(|c| !c.is_control()).take(MOST_REPEATED).collect();
+                line.trim().chars().filter(|c| !c.is_control()).take(MAX_REPEATED).collect();
             format!("could not understand: \"{repeated}\"")
         }
     };

@@ -256,12 +256,10 @@ impl VirtualGripper {
         if !self.homed && !matches!(asked, Asked::Home { .. }) {
             return Err(status::NOT_INITIALISED);
         }
-        let (least_mm, most_mm) = self.limits.width_mm;
+        let (min_mm, max_mm) = self.limits.width_mm;
         let holding = self.state == GripState::Holding;
         let (kind, speed_mm_s) = match asked {
-            Asked::Home { outwards } => {
-                (Kind::Home { to_mm: if outwards { most_mm } else { least_mm } }, None)
-            }
+            Asked::Home { outwards } => (Kind::Home { to_mm: if outwards { max_mm } else { min_mm } }, None),
             Asked::Move { to_mm, speed_mm_s } => {
                 if self.blocked || (holding && to_mm < self.width_mm) {
                     return Err(status::AXIS_BLOCKED);
@@ -273,8 +271,8 @@ impl VirtualGripper {
                 if holding {
                     return Err(status::NOT_AVAILABLE);
                 }
-                let (least_n, most_n) = self.limits.force_sum_n;
-                let force_sum_n = force_sum_n.unwrap_or(DEFAULT_FORCE_SUM_N.min(most_n).max(least_n));
+                let (min_n, max_n) = self.limits.force_sum_n;
+                let force_sum_n = force_sum_n.unwrap_or(DEFAULT_FORCE_SUM_N.min(max_n).max(min_n));
                 (Kind::Grip { force_sum_n, part_width_mm }, speed_mm_s)
             }
             Asked::Release { pull_back_mm, speed_mm_s } => {
@@ -283,12 +281,12 @@ impl VirtualGripper {
                 }
                 let to_mm = self.width_mm + pull_back_mm.unwrap_or(DEFAULT_PULL_BACK_MM);
                 // The drive ends at its stop.
-                (Kind::Release { to_mm: to_mm.min(most_mm) }, speed_mm_s)
+                (Kind::Release { to_mm: to_mm.min(max_mm) }, speed_mm_s)
             }
             _ => return Err(status::UNKNOWN_COMMAND),
         };
-        let (least_mm_s, most_mm_s) = self.limits.speed_mm_s;
-        let speed_mm_s = speed_mm_s.unwrap_or(DEFAULT_SPEED_MM_S.min(most_mm_s).max(least_mm_s));
+        let (min_mm_s, max_mm_s) = self.limits.speed_mm_s;
+        let speed_mm_s = speed_mm_s.unwrap_or(DEFAULT_SPEED_MM_S.min(max_mm_s).max(min_mm_s));
         self.gripped = matches!(kind, Kind::Grip { .. });
         self.let_go |= !self.gripped;
         self.blocked = false;

@@ -8,9 +8,9 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
 /// Longest headers of a request.
-const MOST_HEADERS: usize = 8 << 10;
+const MAX_HEADERS: usize = 8 << 10;
 /// Longest side of a JPEG.
-const MOST_JPEG_SIDE_PX: u32 = u16::MAX as u32;
+const MAX_JPEG_SIDE_PX: u32 = u16::MAX as u32;
 /// The line between frames, without its dashes.
 const BOUNDARY: &str = "boundarydonotcross";
 /// What mjpg-streamer says with every answer: nobody is to keep a frame.
@@ -42,14 +42,14 @@ pub struct HttpRequest {
 impl HttpRequest {
     /// Takes in what came from the wire; what is wanted, once the headers are whole. Headers without an end are a bad request.
     pub fn receive(&mut self, bytes: &[u8]) -> Option<CameraRequest> {
-        let room = MOST_HEADERS.saturating_sub(self.bytes.len());
+        let room = MAX_HEADERS.saturating_sub(self.bytes.len());
         self.bytes.extend(bytes.iter().take(room));
         let whole =
             [&b"\r\n\r\n"[..], b"\n\n"].iter().any(|end| self.bytes.windows(end.len()).any(|w| w == *end));
         if whole {
             return Some(request_of(&self.bytes));
         }
-        (self.bytes.len() >= MOST_HEADERS).then_some(CameraRequest::Bad)
+        (self.bytes.len() >= MAX_HEADERS).then_some(CameraRequest::Bad)
     }
 }
 
@@ -131,7 +131,7 @@ pub enum EncodeFrameError {
     },
     /// No image, or one that is too large for a JPEG.
     #[error(
-        "an image of {width_px} x {height_px} px as a JPEG, each side must be from 1 to {MOST_JPEG_SIDE_PX} px"
+        "an image of {width_px} x {height_px} px as a JPEG, each side must be from 1 to {MAX_JPEG_SIDE_PX} px"
     )]
     Size {
         /// Columns.
@@ -161,7 +161,7 @@ pub fn encode_jpeg(image: &TactileImage, quality: u8) -> Result<Vec<u8>, EncodeF
     if !(1..=100).contains(&quality) {
         return Err(EncodeFrameError::Quality { quality });
     }
-    let sides = 1..=MOST_JPEG_SIDE_PX;
+    let sides = 1..=MAX_JPEG_SIDE_PX;
     if !sides.contains(&width_px) || !sides.contains(&height_px) {
         return Err(EncodeFrameError::Size { width_px, height_px });
     }

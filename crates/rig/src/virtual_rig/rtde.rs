@@ -9,9 +9,9 @@ pub const CONTROLLER_VERSION: [u32; 4] = [5, 12, 0, 0];
 /// Rate of an e-Series controller, and how often protocol 1 sends.
 const FULL_RATE_HZ: f64 = 500.0;
 /// Longest list of names.
-const MOST_NAMES: usize = 2048;
+const MAX_NAMES: usize = 2048;
 /// Output recipes are one a connection, input recipes have one byte for their number.
-const MOST_INPUT_RECIPES: usize = 255;
+const MAX_INPUT_RECIPES: usize = 255;
 
 /// Who writes which input: one connection at a time.
 #[derive(Debug, Clone, Default)]
@@ -182,7 +182,7 @@ impl RtdeServer {
 
     fn set_up_inputs(&mut self, payload: &[u8], owners: &mut InputOwners) -> Option<Vec<u8>> {
         let names = names_of(payload)?;
-        if self.inputs.len() >= MOST_INPUT_RECIPES {
+        if self.inputs.len() >= MAX_INPUT_RECIPES {
             return None;
         }
         let mut usable = !names.is_empty();
@@ -233,7 +233,7 @@ impl RtdeServer {
 
 /// Names between commas; a comma at the end is no name.
 fn names_of(bytes: &[u8]) -> Option<Vec<String>> {
-    if bytes.len() > MOST_NAMES {
+    if bytes.len() > MAX_NAMES {
         return None;
     }
     let text = std::str::from_utf8(bytes).ok()?;

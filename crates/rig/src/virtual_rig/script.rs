@@ -2,7 +2,7 @@
 //! program of one line.
 
 /// Longest program that is taken in; the one that ur_rtde uploads is 42 kB.
-const MOST_SCRIPT: usize = 1 << 20;
+const MAX_SCRIPT: usize = 1 << 20;
 
 /// Finds programs in a stream.
 #[derive(Debug, Clone, Default)]
@@ -12,7 +12,7 @@ pub struct ScriptReader {
 
 /// More text than a program has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{bytes} bytes without the end of a program, at most {MOST_SCRIPT} are read")]
+#[error("{bytes} bytes without the end of a program, at most {MAX_SCRIPT} are read")]
 pub struct ScriptTooLongError {
     /// Bytes so far.
     pub bytes: usize,
@@ -32,7 +32,7 @@ impl ScriptReader {
             }
         }
         self.bytes.drain(..start);
-        if self.bytes.len() > MOST_SCRIPT {
+        if self.bytes.len() > MAX_SCRIPT {
             return Err(ScriptTooLongError { bytes: self.bytes.len() });
         }
         Ok(programs)

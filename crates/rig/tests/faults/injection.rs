@@ -10,7 +10,7 @@ const SHORT_S: f64 = 0.02;
 /// Hung on the tool it weighs more than any motion may meet.
 pub const HEAVY_KG: f64 = 3.0;
 /// Largest delay after the beginning of a moment: 0.6 s of the rig's time.
-const MOST_DELAY_MS: u64 = 30;
+const MAX_DELAY_MS: u64 = 30;
 
 /// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -175,12 +175,7 @@ pub fn injections(most: usize) -> Vec<Injection> {
         let (kind, round) = (number % ALL.len(), number / ALL.len());
         // 5 and 14 have nothing in common: all moments come before one comes again.
         let moment = MOMENTS[(kind * 3 + round * 5) % MOMENTS.len()];
-        Injection {
-            number,
-            kind: ALL[kind],
-            moment,
-            delay_ms: scattered(number as u64) % (MOST_DELAY_MS + 1),
-        }
+        Injection { number, kind: ALL[kind], moment, delay_ms: scattered(number as u64) % (MAX_DELAY_MS + 1) }
     };
     (0..most).map(one).collect()
 }

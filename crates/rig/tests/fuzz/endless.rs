@@ -1,11 +1,11 @@
 //! Streams without an end: what a parser holds has a limit that does not grow with them.
 
-use super::held::most_held;
+use super::held::peak_held;
 use super::robot::Served;
-use gripgen_rig::camera::{CameraStream, MOST_FRAME};
+use gripgen_rig::camera::{CameraStream, MAX_FRAME};
 use gripgen_rig::dashboard::DashboardLink;
 use gripgen_rig::gcl::{GclLink, SHIPPED_LIMITS};
-use gripgen_rig::primary::{MOST_PACKET, PrimaryStream};
+use gripgen_rig::primary::{MAX_PACKET, PrimaryStream};
 use gripgen_rig::rtde::{Kind, Link, SessionPlan, encode_frame};
 use gripgen_rig::virtual_rig::mjpeg::HttpRequest;
 use gripgen_rig::virtual_rig::script::ScriptReader;
@@ -36,7 +36,7 @@ fn feed(mut take: Take, first: &[u8], again: &[u8], allowed: usize) -> usize {
         // Freed inside, as it was taken inside.
         drop(take);
     };
-    most_held(feed).1
+    peak_held(feed).1
 }
 
 fn link() -> Take {
@@ -109,7 +109,7 @@ fn nothing_grows_with_a_stream_without_end() {
     let long_text = encode_frame(Kind::Text, &[b'x'; 65_532]).unwrap();
     let stream = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace;boundary=b\r\n\r\n--b\r\n";
     let part = b"Content-Length: 5\r\n\r\nABCDE\r\n--b\r\n";
-    let packet = [&(MOST_PACKET as i32).to_be_bytes()[..], &[20; MOST_PACKET - 4]].concat();
+    let packet = [&(MAX_PACKET as i32).to_be_bytes()[..], &[20; MAX_PACKET - 4]].concat();
     let greeting = b"Connected: Universal Robots Dashboard Server\n";
     // What a piece becomes is there beside what is kept: events and answers of 1 KiB.
     let given = 160 * PIECE;
@@ -130,12 +130,12 @@ fn nothing_grows_with_a_stream_without_end() {
             camera(),
             &[&stream[..], b"\r\n"].concat(),
             b"x",
-            GROWS * (MOST_FRAME + LARGE_PIECE),
+            GROWS * (MAX_FRAME + LARGE_PIECE),
         ),
         ("headers of a request", request(), &[], b"X: y\r\n", headers),
         ("a line of the dashboard", dashboard(), greeting, b"x", GROWS * (4096 + PIECE)),
         ("lines of the dashboard", dashboard(), greeting, b"x\n", GROWS * (4096 + PIECE) + given),
-        ("packets", primary(), &[], &packet, GROWS * (MOST_PACKET + PIECE) + 4 * MOST_PACKET),
+        ("packets", primary(), &[], &packet, GROWS * (MAX_PACKET + PIECE) + 4 * MAX_PACKET),
         ("a program", script(), b"def a():\n", b"  x = 1\n", GROWS * ((1 << 20) + LARGE_PIECE)),
     ];
     for (what, take, first, again, allowed) in streams {

@@ -8,14 +8,14 @@ pub struct Counting;
 
 thread_local! {
     static HELD: Cell<isize> = const { Cell::new(0) };
-    static MOST: Cell<isize> = const { Cell::new(0) };
+    static PEAK: Cell<isize> = const { Cell::new(0) };
 }
 
 fn add(bytes: isize) {
     // A thread that ends may free after its counters are gone.
     let _ = HELD.try_with(|held| {
         held.set(held.get() + bytes);
-        let _ = MOST.try_with(|most| most.set(most.get().max(held.get())));
+        let _ = PEAK.try_with(|most| most.set(most.get().max(held.get())));
     });
 }
 
@@ -45,9 +45,9 @@ unsafe impl GlobalAlloc for Counting {
 }
 
 /// What `work` gives, and the most bytes that this thread held for it at one time.
-pub fn most_held<T>(work: impl FnOnce() -> T) -> (T, usize) {
+pub fn peak_held<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let before = HELD.get();
-    MOST.set(before);
+    PEAK.set(before);
     let given = work();
-    (given, (MOST.get() - before).max(0) as usize)
+    (given, (PEAK.get() - before).max(0) as usize)
 }

@@ -1,9 +1,9 @@
 //! Inputs made from the corpus: damaged, cut, spliced, repeated.
 
 /// Longest input, but for the few that are stretched.
-const MOST_INPUT: usize = 4096;
+const MAX_INPUT: usize = 4096;
 /// Longest input of all.
-const MOST_STRETCHED: usize = 24 << 10;
+const MAX_STRETCHED: usize = 24 << 10;
 /// One input in so many is stretched.
 const STRETCHED: usize = 500;
 
@@ -75,14 +75,14 @@ pub fn input(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = random.pick(corpus).clone();
     for _ in 0..=random.below(5) {
         change(random, corpus, &mut bytes);
-        bytes.truncate(MOST_INPUT);
+        bytes.truncate(MAX_INPUT);
     }
     if random.below(STRETCHED) == 0 && !bytes.is_empty() {
         let piece = bytes[range(random, &bytes, 64)].to_vec();
         let at = random.below(bytes.len() + 1);
-        let times = random.below(MOST_STRETCHED / (piece.len() + 1));
+        let times = random.below(MAX_STRETCHED / (piece.len() + 1));
         bytes.splice(at..at, piece.repeat(times));
-        bytes.truncate(MOST_STRETCHED);
+        bytes.truncate(MAX_STRETCHED);
     }
     bytes
 }

@@ -4,7 +4,7 @@
 use crate::fft::Convolver;
 
 /// Most steps; contacts of 50 to 300 pixels across take 7 to 20.
-const MOST_STEPS: usize = 300;
+const MAX_STEPS: usize = 300;
 
 /// A part over a gel. Lengths in pixels of this grid, pressures in contact moduli.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,7 +142,7 @@ pub(super) fn solve(problem: &Problem, start: &[f64], convolver: &mut Convolver,
     let (mut u, mut direction, mut pull) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     convolver.apply(&p, &mut u);
     let (mut last, mut last_square, mut press) = (vec![0.0; n], f64::INFINITY, 0.0);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         press = mean_in_contact(&p, |i| u[i] - below[i]);
         let (mut square, mut change, mut count) = (0.0, 0.0, 0usize);
         for i in 0..n {

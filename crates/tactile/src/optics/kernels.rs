@@ -23,7 +23,7 @@ pub(super) fn scaled(size_px: u32, factor: f64) -> Vec<f32> {
 }
 
 /// Weights below this are left out.
-const LEAST_WEIGHT: f64 = 1e-7;
+const MIN_WEIGHT: f64 = 1e-7;
 
 /// The discrete Gaussian of standard deviation `sigma_px` (Lindeberg 1990): `w_n = exp(-t) I_n(t)` with `t = sigma^2`
 /// and the modified Bessel functions I_n. Unlike a sampled Gaussian it has exactly that variance however small it is, so
@@ -46,7 +46,7 @@ pub(super) fn discrete_gaussian(sigma_px: f64) -> Vec<f32> {
         }
     }
     let sum = values[0] + 2.0 * values[1..].iter().sum::<f64>();
-    let half = values.iter().rposition(|v| v / sum >= LEAST_WEIGHT).unwrap_or(0);
+    let half = values.iter().rposition(|v| v / sum >= MIN_WEIGHT).unwrap_or(0);
     (0..=2 * half).map(|i| (values[i.abs_diff(half)] / sum) as f32).collect()
 }
 

@@ -6,7 +6,7 @@ use crate::sensor::Sensor;
 use gripgen_twin::OpticsState;
 
 /// A pixel with less contact than this lies outside of it.
-const LEAST_DEPTH_PX: f32 = 0.05;
+const MIN_DEPTH_PX: f32 = 0.05;
 
 /// Slope at which a colour model is asked where its light comes from.
 const PROBE_SLOPE: f32 = 0.1;
@@ -40,7 +40,7 @@ pub(super) fn cast(
         for y in 0..surface.height {
             for x in 0..surface.width {
                 let at = y * surface.width + x;
-                if depth_px.values[at] > LEAST_DEPTH_PX || raised.is_behind(x, y, light) {
+                if depth_px.values[at] > MIN_DEPTH_PX || raised.is_behind(x, y, light) {
                     continue;
                 }
                 let horizon = horizon(surface, (x, y), light, top, PENUMBRA * slope);

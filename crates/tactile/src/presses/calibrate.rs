@@ -26,7 +26,7 @@ use ridge::{Folds, solve};
 use samples::{GelModel, Samples};
 
 /// Fewest presses that can be calibrated with: less do not cover the frame, and leave none to hold out.
-pub const FEWEST_PRESSES: usize = 4;
+pub const MIN_PRESSES: usize = 4;
 
 /// With fewer presses the error is that of leaving out one at a time, and is not to be relied on.
 pub const FEW_PRESSES: usize = 12;
@@ -89,7 +89,7 @@ pub struct Calibration {
 #[non_exhaustive]
 pub enum CalibrateError {
     /// Too few presses.
-    #[error("{found} presses, a calibration needs at least {FEWEST_PRESSES}")]
+    #[error("{found} presses, a calibration needs at least {MIN_PRESSES}")]
     TooFew {
         /// Presses found.
         found: usize,
@@ -209,7 +209,7 @@ fn trusted(set: &PressSet, marked: &[Marked<'_>]) -> Result<(Vec<bool>, usize), 
     }
     let trusted: Vec<bool> = seen.iter().map(|s| *s == Seen::Here).collect();
     let count = trusted.iter().filter(|&&t| t).count();
-    if count < FEWEST_PRESSES || 4 * count < 3 * marked.len() {
+    if count < MIN_PRESSES || 4 * count < 3 * marked.len() {
         return Ok((vec![true; marked.len()], marked.len() - count));
     }
     Ok((trusted, 0))
@@ -354,7 +354,7 @@ fn domes(grid: &Grid) -> [GelShape; 2] {
 
 /// The grid of a set whose numbers make sense.
 fn check(set: &PressSet) -> Result<Grid, CalibrateError> {
-    if set.presses.len() < FEWEST_PRESSES {
+    if set.presses.len() < MIN_PRESSES {
         return Err(CalibrateError::TooFew { found: set.presses.len() });
     }
     let lengths =

@@ -18,7 +18,7 @@ const DOUBTFUL: f64 = 0.3;
 const MEDIAN_OF: usize = 15;
 
 /// Least change of a contact, in grey levels summed over the channels.
-const LEAST_CHANGE: f32 = 6.0;
+const MIN_CHANGE: f32 = 6.0;
 
 /// Where a press differs most from the frame at rest: the circle whose inside differs most from its surroundings.
 ///
@@ -62,7 +62,7 @@ fn find_in(change: &Plane, ball_radius_px: f64) -> Option<Circle> {
     let mut sorted = change.values.clone();
     sorted.sort_by(f32::total_cmp);
     let high = sorted[(sorted.len() - 1) * 995 / 1000];
-    if high < LEAST_CHANGE {
+    if high < MIN_CHANGE {
         return None;
     }
     let start = start(change, 0.5 * high, ball_radius_px);

@@ -15,7 +15,7 @@ const REACH_M: f64 = 3e-3;
 /// in a larger one.
 const HEIGHT_STEP_M: f64 = 0.02e-3;
 /// A ray ends where it is less dark than this in all channels.
-const LEAST_GREY_LEVELS: f32 = 0.5;
+const MIN_GREY_LEVELS: f32 = 0.5;
 /// Directions on either side that are averaged with one.
 const SMOOTHED_DIRECTIONS: isize = 2;
 
@@ -140,7 +140,7 @@ impl Means {
             let seen: Vec<(f64, f64)> = (0..self.steps).map(|s| (smoothed(s, c), smoothed(s, 3))).collect();
             fading(&seen)
         });
-        let dark = |s: &usize| channels.iter().any(|channel| channel[*s] < -LEAST_GREY_LEVELS);
+        let dark = |s: &usize| channels.iter().any(|channel| channel[*s] < -MIN_GREY_LEVELS);
         let length = (0..self.steps).rev().find(dark).map_or(0, |s| s + 1);
         channels.map(|mut channel| {
             channel.truncate(length);

@@ -27,10 +27,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     typical: &[("limit_n", 20.0)],
     pulls: Ok(PullFit {
         fit: |span| {
-            let most_n = span.largest_reading_n;
+            let max_n = span.largest_reading_n;
             Fit::new(
-                &[&[("limit_n", 0.7 * most_n)], &[("limit_n", 0.95 * most_n)]],
-                &[("limit_n", 0.03 * most_n)],
+                &[&[("limit_n", 0.7 * max_n)], &[("limit_n", 0.95 * max_n)]],
+                &[("limit_n", 0.03 * max_n)],
             )
         },
         flat_at_neutral: true,

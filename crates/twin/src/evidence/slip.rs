@@ -129,11 +129,11 @@ fn jump(
     };
     let counts = |i: usize| step_n(i) > 0.0 || follows(i);
     let chance_n = SIGMAS * signal.noise_n * (2.0 / w as f64).sqrt();
-    let (least_n, highest_n) = (zero_cap_n(evidence.label_n).max(chance_n), signal.largest_step_n());
+    let (min_n, highest_n) = (zero_cap_n(evidence.label_n).max(chance_n), signal.largest_step_n());
     let settled_s = SETTLED_S.max(SETTLED_LAGS * loop_.lag_s);
     let allowed_n = |i: usize| {
         let share = if signal.time_s[i] < settled_s { STARTING_SHARE } else { STEP_SHARE };
-        least_n.max(share * highest_n)
+        min_n.max(share * highest_n)
     };
     let mut most = None;
     for i in w..=end - w {

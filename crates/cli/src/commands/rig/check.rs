@@ -8,7 +8,7 @@ use gripgen_rig::experiment::check::{CheckLine, check, check_force};
 use serde_json::{Value, json};
 
 /// Free space that a day of pulls needs.
-const LEAST_FREE: u64 = 2_000_000_000;
+const MIN_FREE: u64 = 2_000_000_000;
 
 /// Runs the verb.
 pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
@@ -58,7 +58,7 @@ pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
 
 fn free_space() -> CheckLine {
     let (ok, found) = match fs4::available_space(".") {
-        Ok(bytes) => (bytes >= LEAST_FREE, format!("{} free here", size(bytes))),
+        Ok(bytes) => (bytes >= MIN_FREE, format!("{} free here", size(bytes))),
         Err(e) => (false, e.to_string()),
     };
     CheckLine { what: "disk", ok, found }

@@ -25,7 +25,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Pulls in a row without a label after which somebody has to look.
-const MOST_FAILED_IN_A_ROW: usize = 3;
+const MAX_FAILED_IN_A_ROW: usize = 3;
 
 /// Runs the verb.
 pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
@@ -203,11 +203,10 @@ impl Job<'_> {
                 return Ok(End::Stopped { reason: stopped.reason.clone(), still: stopped.still });
             }
             match pull.outcome {
-                PullOutcome::Failed { reason } if in_a_row + 1 >= MOST_FAILED_IN_A_ROW => {
+                PullOutcome::Failed { reason } if in_a_row + 1 >= MAX_FAILED_IN_A_ROW => {
                     experiment.close();
-                    let words = format!(
-                        "{MOST_FAILED_IN_A_ROW} pulls in a row have no label, the last one: {reason}"
-                    );
+                    let words =
+                        format!("{MAX_FAILED_IN_A_ROW} pulls in a row have no label, the last one: {reason}");
                     return Err(Failure::new(words).hint("look at the rig; the same command goes on"));
                 }
                 PullOutcome::Failed { .. } => in_a_row += 1,

@@ -3,9 +3,9 @@
 use crate::gcl::GclLimits;
 
 /// Longest line; the longest command is a fifth of it.
-const MOST_LINE: usize = 256;
+const MAX_LINE: usize = 256;
 /// Longest name that an answer repeats.
-const MOST_NAME: usize = 16;
+const MAX_NAME: usize = 16;
 /// Shortest and longest period of values that are sent by themselves, ms; 0 ends them.
 const AUTOSEND_MS: (f64, f64) = (10.0, 60_000.0);
 
@@ -92,7 +92,7 @@ pub(super) struct Refused {
 
 /// Reads a line; a name in capitals and its command, `None` of an empty line.
 pub(super) fn read(line: &str, limits: &GclLimits) -> Result<Option<(String, Asked)>, Refused> {
-    if line.len() > MOST_LINE {
+    if line.len() > MAX_LINE {
         return Err(Refused { name: String::new(), status: status::OVERRUN });
     }
     let line = line.trim();
@@ -106,7 +106,7 @@ pub(super) fn read(line: &str, limits: &GclLimits) -> Result<Option<(String, Ask
         Ok(asked) => Ok(Some((name, asked))),
         Err(status) => {
             // A number in place of the name would read like a status.
-            let repeat = name.len() <= MOST_NAME && name.starts_with(|c: char| c.is_ascii_alphabetic());
+            let repeat = name.len() <= MAX_NAME && name.starts_with(|c: char| c.is_ascii_alphabetic());
             Err(Refused { name: if repeat { name } else { String::new() }, status })
         }
     }

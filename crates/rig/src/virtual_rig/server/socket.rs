@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 /// Longest sleep of the clock.
 const NAP: Duration = Duration::from_millis(1);
 /// A clock that is further behind than this, in real time, gives up what it lost: the rig then runs slower than asked.
-const MOST_BEHIND_S: f64 = 0.25;
+const MAX_BEHIND_S: f64 = 0.25;
 /// Control steps between two packets with the robot's mode: ten a second.
 const STEPS_A_MODE: u64 = 50;
 /// Control steps without a look at the clients.
@@ -40,7 +40,7 @@ pub struct ServeOptions {
 }
 
 /// Largest clock rate.
-const MOST_RATE: f64 = 200.0;
+const MAX_RATE: f64 = 200.0;
 
 /// The rig as somebody sees it who stands beside it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,8 +80,8 @@ impl ServedRig {
             }
         }
         let rate = options.clock_rate;
-        if !(0.01..=MOST_RATE).contains(&rate) {
-            return Err(ServeError::Rate { rate, most: MOST_RATE });
+        if !(0.01..=MAX_RATE).contains(&rate) {
+            return Err(ServeError::Rate { rate, most: MAX_RATE });
         }
         let world = World::new(plant.clone(), options.tcp, rate);
         let shared = Arc::new(Shared::new(world, rate, options.view));
@@ -157,7 +157,7 @@ fn run_clock(shared: &Shared, ask: &Sender<GripRequest>) {
         let due = steps_at_origin + (origin.elapsed().as_secs_f64() * shared.rate / STEP_S) as u64;
         let mut world = lock(&shared.world);
         let behind = due.saturating_sub(world.step_number());
-        if behind as f64 * STEP_S > MOST_BEHIND_S * shared.rate {
+        if behind as f64 * STEP_S > MAX_BEHIND_S * shared.rate {
             (origin, steps_at_origin) = (Instant::now(), world.step_number());
         }
         let mut batches = shared.batches();

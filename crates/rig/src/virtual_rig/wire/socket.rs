@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// Time between two looks at whether the rig is still wanted.
 const LOOK: Duration = Duration::from_millis(50);
 /// A client that leaves so much unread is cut off: it must not fill the memory, and nobody waits for it.
-const MOST_UNREAD: usize = 8 << 20;
+const MAX_UNREAD: usize = 8 << 20;
 
 /// What faults do to the connections of a device.
 #[derive(Default)]
@@ -112,7 +112,7 @@ impl Outbox {
         }
         let mut queue = lock(&self.queue);
         queue.bytes += piece.len();
-        queue.closed |= queue.bytes > MOST_UNREAD;
+        queue.closed |= queue.bytes > MAX_UNREAD;
         queue.pieces.push_back(piece);
         drop(queue);
         self.ready.notify_one();
@@ -139,13 +139,13 @@ impl Outbox {
     }
 
     fn overflows(&self) -> bool {
-        lock(&self.queue).bytes > MOST_UNREAD
+        lock(&self.queue).bytes > MAX_UNREAD
     }
 
     fn next(&self) -> Option<Vec<u8>> {
         let mut queue = lock(&self.queue);
         loop {
-            if queue.bytes > MOST_UNREAD {
+            if queue.bytes > MAX_UNREAD {
                 return None;
             }
             if let Some(piece) = queue.pieces.pop_front() {

@@ -29,7 +29,7 @@ const SHORTEST_FRAME: Duration = Duration::from_millis(5);
 /// Quality of the R1.5's frames.
 const JPEG_QUALITY: u8 = 100;
 /// Longest line of a text port.
-const MOST_LINE: usize = 1024;
+const MAX_LINE: usize = 1024;
 
 /// What all threads of a rig share.
 pub(crate) struct Shared {
@@ -372,6 +372,6 @@ impl Lines {
                 return false;
             }
         }
-        self.bytes.len() <= MOST_LINE
+        self.bytes.len() <= MAX_LINE
     }
 }
