@@ -6,7 +6,7 @@
 
 use crate::cache::Cache;
 use crate::generate::{PatchFriction, sensor_chain};
-use crate::gripped::{Press, grip_point, held, jaw_forces_n};
+use crate::gripped::{Indenter, grip_point, held, jaw_forces_n};
 use crate::library::Library;
 use crate::sample::SampleError;
 use gripgen_physics::{Command, Held, JawFriction, PullSession, Signals, label_moments};
@@ -213,7 +213,8 @@ impl<'a> Expectations<'a> {
         }
         let held = found.ok_or(SampleError::Missed)?;
         let patches = self.patches.get(patch_key(twin, &pressed, &force_n), || {
-            let press = Press::new(twin, self.library, &pressed, &force_n, &held.grasp, SimdLevel::best())?;
+            let press =
+                Indenter::new(twin, self.library, &pressed, &force_n, &held.grasp, SimdLevel::best())?;
             let whole = |jaw: Jaw| ContactPatch::uniform(force_n[jaw], WHOLE_AREA_M2);
             // Deeper than the gel: the shape of the contact is not known, its force is.
             Ok::<_, SampleError>(match press.imprints(None) {

@@ -19,7 +19,7 @@ use gripgen_twin::{
 use std::sync::Arc;
 
 /// What a sample shows of a grip beside the data that is stored: for pictures.
-pub struct Press {
+pub struct GripImprints {
     /// Imprints of both jaws.
     pub imprint: PerJaw<Imprint>,
     /// Sensors of both jaws.
@@ -198,7 +198,7 @@ pub fn press_only(
     library: &Library,
     scenario: &Scenario,
     mechanics: Mechanics,
-) -> Result<Option<Press>, SampleError> {
+) -> Result<Option<GripImprints>, SampleError> {
     let options = SimulateOptions {
         mechanics,
         images: false,
@@ -207,7 +207,7 @@ pub fn press_only(
         level: SimdLevel::best(),
     };
     let Gripped { sensors, contact, .. } = Gripped::new(twin, library, scenario, options)?;
-    Ok(contact.map(|c| Press { imprint: c.imprint, sensors }))
+    Ok(contact.map(|c| GripImprints { imprint: c.imprint, sensors }))
 }
 
 /// Whether the steady lag error of the force loop, `dF / dt (tau + T)`, is more than half the label tolerance.

@@ -58,7 +58,7 @@ impl Gripped {
         let Some(held) = held(twin, library, scenario, force_n, options.mechanics)? else {
             return Self::at_rest(twin, library, scenario, options);
         };
-        let press = Press::new(twin, library, scenario, &force_n, &held.grasp, options.level)?;
+        let press = Indenter::new(twin, library, scenario, &force_n, &held.grasp, options.level)?;
         let imprint = press.imprints(None)?;
         let look = if !options.images {
             None
@@ -173,7 +173,7 @@ pub(crate) fn held(
 }
 
 /// A part in front of both gels, ready to be pressed in.
-pub(crate) struct Press<'a> {
+pub(crate) struct Indenter<'a> {
     twin: &'a Twin,
     sensors: PerJaw<Arc<Sensor>>,
     parts: PerJaw<PlacedPart>,
@@ -181,7 +181,7 @@ pub(crate) struct Press<'a> {
     level: SimdLevel,
 }
 
-impl<'a> Press<'a> {
+impl<'a> Indenter<'a> {
     pub(crate) fn new(
         twin: &'a Twin,
         library: &Library,

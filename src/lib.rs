@@ -94,7 +94,7 @@ pub use diagnose::{
     diagnose_pull_table, diagnose_sensor_table, given_model, is_sensor_table, load_sensor_table,
     measured_presses, sensor_calibration_edits,
 };
-pub use generate::{Press, StartedPull, generate, press_only, simulate, start_pull};
+pub use generate::{GripImprints, StartedPull, generate, press_only, simulate, start_pull};
 pub use gpu::Gpu;
 pub use gripgen_identify as identify;
 pub use gripgen_physics as physics;

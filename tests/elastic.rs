@@ -36,7 +36,7 @@ fn a_softer_gel_is_pressed_deeper_under_the_same_force() {
 }
 
 /// Real presses of a ball of 4 mm at half resolution (320 x 240 of 0.059 mm): change of each channel, centre, radius.
-struct Press {
+struct MeasuredPress {
     change: [Vec<f64>; 3],
     centre_px: (f64, f64),
     radius_px: f64,
@@ -45,7 +45,7 @@ struct Press {
 const GRID: Grid = Grid { width_px: 320, height_px: 240, metres_per_px: 0.059e-3 };
 const BALL_M: f64 = 2.0e-3;
 
-fn presses(every: usize) -> Vec<Press> {
+fn presses(every: usize) -> Vec<MeasuredPress> {
     let bytes = std::fs::read(root().join("../shared/real/taxim/gelsight/dataPack.npz")).unwrap();
     let mut npz = Npz::open(&bytes).unwrap();
     let mut array = |key: &str| npz.array(key).unwrap().values;
@@ -62,7 +62,7 @@ fn presses(every: usize) -> Vec<Press> {
     };
     (0..radii.len())
         .step_by(every)
-        .map(|i| Press {
+        .map(|i| MeasuredPress {
             change: [0, 1, 2].map(|c| change(i, c)),
             centre_px: (centres[2 * i] / 2.0 - 0.25, centres[2 * i + 1] / 2.0 - 0.25),
             radius_px: radii[i] / 2.0,
@@ -70,7 +70,7 @@ fn presses(every: usize) -> Vec<Press> {
         .collect()
 }
 
-impl Press {
+impl MeasuredPress {
     fn distance_px(&self, i: usize) -> f64 {
         (((i % 320) as f64) - self.centre_px.0).hypot(((i / 320) as f64) - self.centre_px.1)
     }

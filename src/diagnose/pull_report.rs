@@ -3,7 +3,7 @@
 use crate::predict::PullPredictor;
 use crate::report::{EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
 use gripgen_identify::pulls::answer::{PullAnswer, PullFits};
-use gripgen_identify::pulls::search::{Entry, Rival};
+use gripgen_identify::pulls::search::{Entry, ModelTerm};
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::columns::{covariates, value};
 use gripgen_twin::draw::Drawn;
@@ -215,11 +215,11 @@ fn curves(measured: &MeasuredPulls, predictor: &PullPredictor<'_>, fits: &PullFi
 
 fn evidence(fits: &PullFits, answer: &PullAnswer) -> Vec<EvidenceRow> {
     let name = |entry: &Entry| match entry.rival {
-        Rival::Effect(i) => fits.candidates.get(i).map_or("?", |c| c.spec.id).to_string(),
-        Rival::ByPart(i) => {
+        ModelTerm::Effect(i) => fits.candidates.get(i).map_or("?", |c| c.spec.id).to_string(),
+        ModelTerm::ByPart(i) => {
             format!("{}, by part", fits.candidates.get(i).map_or("?", |c| c.spec.id))
         }
-        Rival::Curve(i) => format!("curve in {}", fits.curve_names.get(i).map_or("?", String::as_str)),
+        ModelTerm::Curve(i) => format!("curve in {}", fits.curve_names.get(i).map_or("?", String::as_str)),
     };
     let values = |entry: &Entry| {
         let Some(candidate) = entry.rival.effect().and_then(|i| fits.candidates.get(i)) else {

@@ -7,7 +7,7 @@ use super::layout::{
 };
 use super::rig::rig_picture;
 use super::sheet::heading;
-use crate::generate::{Press, press_only};
+use crate::generate::{GripImprints, press_only};
 use crate::project::Project;
 use gripgen_record::proto::gripgen_v1::JawContact;
 use gripgen_record::{FolderError, RIG_SOURCE, ReadError, Record, RunFolder, ShardReader};
@@ -65,7 +65,7 @@ pub fn sample_picture(folder: &RunFolder, index: u64) -> Result<Vec<u8>, Picture
 }
 
 /// The imprints of a simulated sample.
-fn press_again(folder: &RunFolder, index: u64) -> Option<Press> {
+fn press_again(folder: &RunFolder, index: u64) -> Option<GripImprints> {
     let project = Project::from_run(folder).ok()?;
     let twin = project.twin_of(index).ok()?;
     let (scenario, usable) = project.sweep.scenario(index, &twin);
@@ -74,7 +74,7 @@ fn press_again(folder: &RunFolder, index: u64) -> Option<Press> {
 }
 
 /// Image and height map of a jaw side by side.
-fn draw_jaw(canvas: &mut Canvas, at: (u32, u32), jaw: Jaw, record: &Record, press: Option<&Press>) {
+fn draw_jaw(canvas: &mut Canvas, at: (u32, u32), jaw: Jaw, record: &Record, press: Option<&GripImprints>) {
     let (x, y) = (at.0, at.1 + CAPTION);
     let small = TextStyle::small(INK);
     canvas.text(&format!("{jaw} jaw, image"), f64::from(x), f64::from(at.1), Anchor::Left, small);

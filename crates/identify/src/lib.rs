@@ -38,4 +38,4 @@ pub use sensor::{
     SensorBlock, SensorCalibration, SensorComparison, SensorData, SensorDiagnosis, SensorEvidence,
     SensorOptions, SensorRow, SessionCalibration, calibrate_sensor, compare_sensor, diagnose_sensor,
 };
-pub use separate::{CandidatePull, Rival as SeparableRival, SeparateError, SeparatingPlan, plan_separating};
+pub use separate::{CandidatePull, SeparableRival, SeparateError, SeparatingPlan, plan_separating};

@@ -25,7 +25,7 @@ pub struct CandidatePull {
 
 /// A model that the data at hand do not rule out, fitted to them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rival {
+pub struct SeparableRival {
     /// Its share of the evidence.
     pub weight: f64,
     /// What it predicts for each candidate.
@@ -91,7 +91,7 @@ pub enum SeparateError {
 /// Gaussian noise).
 pub fn plan_separating(
     candidates: &[CandidatePull],
-    rivals: &[Rival],
+    rivals: &[SeparableRival],
     most: usize,
     enough: f64,
 ) -> Result<SeparatingPlan, SeparateError> {
@@ -132,7 +132,7 @@ pub fn plan_separating(
     Ok(plan)
 }
 
-fn check(candidates: &[CandidatePull], rivals: &[Rival]) -> Result<(), SeparateError> {
+fn check(candidates: &[CandidatePull], rivals: &[SeparableRival]) -> Result<(), SeparateError> {
     if rivals.len() < 2 {
         return Err(SeparateError::Rivals(rivals.len()));
     }
@@ -186,7 +186,7 @@ struct Pair {
 }
 
 impl Pair {
-    fn new(truth: usize, other: usize, rivals: &[Rival]) -> Option<Self> {
+    fn new(truth: usize, other: usize, rivals: &[SeparableRival]) -> Option<Self> {
         let mut information = rivals[other].information.clone();
         // Directions on which the data hold nothing are free; without a trace of information they would have no inverse.
         let largest = information.diagonal().iter().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -199,7 +199,7 @@ impl Pair {
     }
 
     /// Difference that remains at a candidate, its variance with that of the refit, and the gain vector of the refit.
-    fn innovation(&self, rivals: &[Rival], i: usize, noise_n: f64) -> (f64, f64, DVector<f64>) {
+    fn innovation(&self, rivals: &[SeparableRival], i: usize, noise_n: f64) -> (f64, f64, DVector<f64>) {
         let derivative = rivals[self.other].jacobian.row(i).transpose();
         let difference = rivals[self.truth].predicted_n[i] - rivals[self.other].predicted_n[i];
         let left = difference - derivative.dot(&self.moved);
@@ -208,14 +208,14 @@ impl Pair {
     }
 
     /// What candidate `i` would take off the bound on the probability of a mistake.
-    fn gain(&self, rivals: &[Rival], i: usize, noise_n: f64) -> f64 {
+    fn gain(&self, rivals: &[SeparableRival], i: usize, noise_n: f64) -> f64 {
         let (left, variance, _) = self.innovation(rivals, i, noise_n);
         let more = left * left / variance;
         self.weight * libm::exp(-self.t / 8.0) * -libm::expm1(-more / 8.0)
     }
 
     /// Adds candidate `i` to the pulls; recursive least squares, so that T needs no refit.
-    fn add(&mut self, rivals: &[Rival], i: usize, noise_n: f64) {
+    fn add(&mut self, rivals: &[SeparableRival], i: usize, noise_n: f64) {
         let (left, variance, gain) = self.innovation(rivals, i, noise_n);
         self.t += left * left / variance;
         self.moved += gain * (left / variance);

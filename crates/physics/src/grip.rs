@@ -4,8 +4,8 @@ use crate::convert::{rapier_pose, vector};
 use crate::jaw_friction::JawFriction;
 use crate::rapier_pull::{RapierPull, RapierStart};
 use crate::reduced::ReducedPull;
-use crate::scene::{Rig, build, pad_shape};
-use crate::session::{Plant, PullSession, Signals};
+use crate::scene::{SceneBodies, build, pad_shape};
+use crate::session::{PullMechanics, PullSession, Signals};
 use crate::setup::{Arm, GripSetup, Mount};
 use crate::world::World;
 use gripgen_twin::config::Mechanics;
@@ -144,9 +144,9 @@ impl Held {
     /// Starts a pull. `friction` is what each jaw can hold, `signals` what arm and sensor make of the mechanics.
     pub fn pull(self, friction: &PerJaw<JawFriction>, signals: impl Into<Signals>) -> PullSession {
         let plant = match self.start {
-            Start::Rapier(start) => Plant::Rapier(Box::new(RapierPull::new(*start, friction))),
+            Start::Rapier(start) => PullMechanics::Rapier(Box::new(RapierPull::new(*start, friction))),
             Start::Reduced { mass_kg, gel } => {
-                Plant::Reduced(Box::new(ReducedPull::new(mass_kg, &gel, friction)))
+                PullMechanics::Reduced(Box::new(ReducedPull::new(mass_kg, &gel, friction)))
             }
         };
         PullSession::new(plant, self.robot, self.wrist, friction, signals.into())
@@ -180,7 +180,7 @@ fn first_touch(setup: &GripSetup<'_>, jaw: Jaw) -> Result<Option<f64>, GripError
 }
 
 /// Lets the jaws close until each presses with its force.
-fn settle(world: &mut World, rig: &Rig, setup: &GripSetup<'_>) -> Result<(), GripError> {
+fn settle(world: &mut World, rig: &SceneBodies, setup: &GripSetup<'_>) -> Result<(), GripError> {
     let step_s = setup.wrist.step_s();
     let mut time_s = 0.0;
     loop {

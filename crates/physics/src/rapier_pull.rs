@@ -4,7 +4,7 @@
 use crate::contact::ContactForce;
 use crate::jaw_friction::JawFriction;
 use crate::motion::Motion;
-use crate::scene::Rig;
+use crate::scene::SceneBodies;
 use crate::world::{NotFinite, World};
 #[cfg(test)]
 use gripgen_twin::Jaw;
@@ -25,7 +25,7 @@ const STICKING_M_PER_S: f64 = 1e-5;
 #[derive(Clone)]
 pub(crate) struct RapierStart {
     pub(crate) world: World,
-    pub(crate) rig: Rig,
+    pub(crate) rig: SceneBodies,
     pub(crate) jaw_mass_kg: f64,
     pub(crate) grip_force_n: PerJaw<f64>,
     pub(crate) direction: rapier::Vector,
@@ -37,7 +37,7 @@ pub(crate) struct RapierStart {
 #[derive(Clone)]
 pub(crate) struct RapierPull {
     world: World,
-    rig: Rig,
+    rig: SceneBodies,
     jaw_mass_kg: f64,
     grip_force_n: PerJaw<f64>,
     direction: rapier::Vector,

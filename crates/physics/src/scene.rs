@@ -20,7 +20,7 @@ const CLOSING_GAP_M: f64 = 0.2e-3;
 
 /// The bodies of the scene.
 #[derive(Clone)]
-pub(crate) struct Rig {
+pub(crate) struct SceneBodies {
     part: RigidBodyHandle,
     part_shape: ColliderHandle,
     pub(crate) arm: ArmRig,
@@ -28,7 +28,7 @@ pub(crate) struct Rig {
     pub(crate) pads: PerJaw<ColliderHandle>,
 }
 
-impl Rig {
+impl SceneBodies {
     /// Lets a free part go, once the jaws have friction to hold it.
     pub(crate) fn release_part(&self, world: &mut World) {
         let part = &mut world.bodies[self.part];
@@ -72,7 +72,7 @@ impl Rig {
 }
 
 /// Puts part, arm, jaws and pads into the world; the jaws stand [`CLOSING_GAP_M`] off the part.
-pub(crate) fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64>) -> Rig {
+pub(crate) fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64>) -> SceneBodies {
     // The pads alone carry friction: the larger of the two coefficients of a pair counts, the part's is 0.
     let part_collider = ColliderBuilder::new(setup.shape.shared().clone())
         .friction(0.0)
@@ -112,7 +112,7 @@ pub(crate) fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64
         body
     });
     arm.finish(world);
-    Rig { part, part_shape, arm, jaws, pads: PerJaw { left: pads[0], right: pads[1] } }
+    SceneBodies { part, part_shape, arm, jaws, pads: PerJaw { left: pads[0], right: pads[1] } }
 }
 
 /// Half sides of a pad: the gel's width along x, its thickness along the jaw axis, its height along z.

@@ -71,38 +71,38 @@ pub struct PullError {
 
 /// What moves when the arm pulls: one file each.
 #[derive(Clone)]
-pub(crate) enum Plant {
+pub(crate) enum PullMechanics {
     Rapier(Box<RapierPull>),
     Reduced(Box<ReducedPull>),
 }
 
-impl Plant {
+impl PullMechanics {
     fn mass_kg(&self) -> f64 {
         match self {
-            Plant::Rapier(pull) => pull.mass_kg(),
-            Plant::Reduced(pull) => pull.mass_kg(),
+            PullMechanics::Rapier(pull) => pull.mass_kg(),
+            PullMechanics::Reduced(pull) => pull.mass_kg(),
         }
     }
 
     /// The force to apply for a tool that answers `free_n` as one of `apparent_mass_kg` does. The reduced arm has that mass.
     fn answering_n(&self, free_n: f64, apparent_mass_kg: f64) -> f64 {
         match self {
-            Plant::Rapier(pull) => pull.answering_n(free_n, apparent_mass_kg),
-            Plant::Reduced(_) => free_n,
+            PullMechanics::Rapier(pull) => pull.answering_n(free_n, apparent_mass_kg),
+            PullMechanics::Reduced(_) => free_n,
         }
     }
 
     fn position_m(&self) -> f64 {
         match self {
-            Plant::Rapier(pull) => pull.position_m(),
-            Plant::Reduced(pull) => pull.position_m(),
+            PullMechanics::Rapier(pull) => pull.position_m(),
+            PullMechanics::Reduced(pull) => pull.position_m(),
         }
     }
 
     fn advance(&mut self, applied_n: f64, step_s: f64) -> Result<Motion, NotFinite> {
         match self {
-            Plant::Rapier(pull) => pull.advance(applied_n, step_s),
-            Plant::Reduced(pull) => pull.advance(applied_n, step_s),
+            PullMechanics::Rapier(pull) => pull.advance(applied_n, step_s),
+            PullMechanics::Reduced(pull) => pull.advance(applied_n, step_s),
         }
     }
 }
@@ -110,7 +110,7 @@ impl Plant {
 /// A pull under way. `Send` and `Clone`: a clone continues exactly as the original would.
 #[derive(Clone)]
 pub struct PullSession {
-    plant: Plant,
+    plant: PullMechanics,
     robot: Robot,
     wrist: Wrist,
     control: ForceLoop,
@@ -124,7 +124,7 @@ pub struct PullSession {
 
 impl PullSession {
     pub(crate) fn new(
-        plant: Plant,
+        plant: PullMechanics,
         robot: Robot,
         wrist: Wrist,
         friction: &PerJaw<JawFriction>,
@@ -188,7 +188,7 @@ impl PullSession {
     /// Normal force, friction and penetration of each pad, read back from the engine.
     #[cfg(test)]
     pub(crate) fn contact_forces(&self) -> PerJaw<ContactForce> {
-        let Plant::Rapier(pull) = &self.plant else { panic!("only the engine has contacts") };
+        let PullMechanics::Rapier(pull) = &self.plant else { panic!("only the engine has contacts") };
         PerJaw::from_fn(|jaw| pull.contact(jaw))
     }
 
@@ -201,7 +201,7 @@ impl PullSession {
     /// Where the tool is, relative to the start of the pull.
     #[cfg(test)]
     pub(crate) fn tool_travel_m(&self) -> rapier3d_f64::prelude::Vector {
-        let Plant::Rapier(pull) = &self.plant else { panic!("only the engine has a tool in space") };
+        let PullMechanics::Rapier(pull) = &self.plant else { panic!("only the engine has a tool in space") };
         pull.tool_travel_m()
     }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! rig.toml, campaign --check--> plan --connect--> rest images, program, zero --grip--> images --go--> staircase on the robot
 //!                                                                                                   |
-//!      MeasuredPull <-- release, retract <-- reason, still? <-------------- slip, limit, or safe stop
+//!      ExecutedPull <-- release, retract <-- reason, still? <-------------- slip, limit, or safe stop
 //! ```
 //!
 //! Safety comes first. Every number is checked before anything moves; the robot's program has the same limits again and is
@@ -29,7 +29,7 @@ pub use config::RigConfig;
 pub use devices::Devices;
 pub use fault::Fault;
 pub use plan::{PlanError, check_campaign};
-pub use pull::{MeasuredPull, PullOutcome};
+pub use pull::{ExecutedPull, PullOutcome};
 pub use robot::RobotRow;
 pub use run::{Experiment, RigEvent};
 pub use stop::Stopped;

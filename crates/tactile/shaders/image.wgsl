@@ -1,7 +1,7 @@
 // Stages gradient, shade and noise in one pass: four pixels a thread, whose RGB are three words of the packed image.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> presses: array<Press>;
+@group(0) @binding(1) var<storage, read> presses: array<PressInput>;
 // Rest frame: planes of red, green and blue, in grey levels; see shade_taxim.wgsl for what may follow.
 @group(0) @binding(2) var<storage, read> rest: array<f32>;
 // Binding 3 is `colour`, the coefficients of the colour model: see shade_*.wgsl.

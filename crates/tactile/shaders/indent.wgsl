@@ -10,7 +10,7 @@ const BLOCK = 16u;
 const MAX_STEPS = 24u;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> presses: array<Press>;
+@group(0) @binding(1) var<storage, read> presses: array<PressInput>;
 @group(0) @binding(2) var<storage, read> heights: array<u32>;
 @group(0) @binding(3) var<storage, read_write> outcomes: array<Outcome>;
 // The gel surface at rest towards the part, in pixels, at most 0.

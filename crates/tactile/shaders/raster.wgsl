@@ -15,7 +15,7 @@ const LARGE_PX = 128;
 @group(0) @binding(2) var<storage, read> clusters: array<Cluster>;
 @group(0) @binding(3) var<storage, read> vertices: array<i32>;
 @group(0) @binding(4) var<storage, read> triangles: array<u32>;
-@group(0) @binding(5) var<storage, read> presses: array<Press>;
+@group(0) @binding(5) var<storage, read> presses: array<PressInput>;
 // Whole pixels of the highest sampled vertex inside the window, sign bit flipped; 0 where there is none.
 @group(0) @binding(6) var<storage, read_write> tops: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read_write> heights: array<atomic<u32>>;

@@ -33,7 +33,7 @@ use crate::sensor::Sensor;
 use device::Device;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gel, TactileImage, TriMesh};
-use layout::{HAS_NOISE, HAS_PART, Outcome, Press};
+use layout::{HAS_NOISE, HAS_PART, Outcome, PressInput};
 use pipelines::Pipelines;
 
 /// Values that a thread makes on a software adapter. 40 are a tenth faster and take three times as long to build.
@@ -258,7 +258,7 @@ impl GpuRenderer {
         requests: &[GpuRequest<'_>],
         batch: &[usize],
     ) -> wgpu::CommandEncoder {
-        let presses: Vec<Press> = batch.iter().map(|&i| press_of(&requests[i], &sensor.grid)).collect();
+        let presses: Vec<PressInput> = batch.iter().map(|&i| press_of(&requests[i], &sensor.grid)).collect();
         let mut runs: Vec<(usize, usize, &GpuMesh)> = vec![];
         for (i, &place) in batch.iter().enumerate() {
             let Some(press) = &requests[place].press else { continue };
@@ -278,8 +278,8 @@ fn by_mesh(requests: &[GpuRequest<'_>]) -> Vec<usize> {
     order
 }
 
-fn press_of(request: &GpuRequest<'_>, grid: &crate::Grid) -> Press {
-    let mut press: Press = bytemuck::Zeroable::zeroed();
+fn press_of(request: &GpuRequest<'_>, grid: &crate::Grid) -> PressInput {
+    let mut press: PressInput = bytemuck::Zeroable::zeroed();
     if let Some(part) = &request.press {
         part.mesh.steps.place(&part.gel_from_mesh, grid, &mut press);
         let a = grid.metres_per_px;

@@ -105,7 +105,7 @@ pub fn indent(heights: &Plane, grid: &Grid, gel: &PressedGel, force_n: f64) -> R
     let level = SimdLevel::best();
     let map = HeightMap::of(heights);
     let top = map.top(None, level);
-    let press = Press { grid, gel, force_n, rest: None, level };
+    let press = Indentation { grid, gel, force_n, rest: None, level };
     press.finish(&map, top, press.thickness_px())
 }
 
@@ -120,7 +120,7 @@ fn cube(a: f64) -> f64 {
 }
 
 /// A gel and what presses on it.
-pub(crate) struct Press<'a> {
+pub(crate) struct Indentation<'a> {
     pub(crate) grid: &'a Grid,
     pub(crate) gel: &'a PressedGel,
     pub(crate) force_n: f64,
@@ -129,7 +129,7 @@ pub(crate) struct Press<'a> {
     pub(crate) level: SimdLevel,
 }
 
-impl Press<'_> {
+impl Indentation<'_> {
     fn thickness_px(&self) -> f64 {
         self.gel.thickness_m / self.grid.metres_per_px
     }

@@ -6,7 +6,7 @@ use crate::appearance::appearance;
 use crate::colour::LocalColours;
 use crate::elastic::{Base, ElasticGel, press_elastic};
 use crate::grid::Plane;
-use crate::indent::{Imprint, IndentError, Press, PressedGel, indent};
+use crate::indent::{Imprint, IndentError, Indentation, PressedGel, indent};
 use crate::markers::{MarkerGel, Shear, draw_markers, marker_displacements, without_markers};
 use crate::noise::finish_on;
 use crate::raster::ClusteredMesh;
@@ -55,7 +55,7 @@ impl Renderer<'_> {
             let map = &mut scratch.map;
             map.start(mesh, gel_from_mesh, grid);
             let rest = prepared.rest_px.as_ref();
-            Press { grid, gel: &gel, force_n, rest, level: self.level }.sink(map, mesh)
+            Indentation { grid, gel: &gel, force_n, rest, level: self.level }.sink(map, mesh)
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::fitting::Fitted;
 use super::screen::test;
-use super::search::{CURVE_GAIN, Entry, Rival, Search};
+use super::search::{CURVE_GAIN, Entry, ModelTerm, Search};
 
 /// Share of what the best curve in its own covariate explains that a named effect has to explain.
 const EXPLAINED: f64 = 0.75;
@@ -22,14 +22,14 @@ const LEVEL: f64 = 0.02;
 
 impl Search<'_> {
     /// Whether a rival says something else than the effects and curves that are there already.
-    pub(super) fn stands_beside(&self, rival: &Rival, effects: &[usize], curves: &[usize]) -> bool {
+    pub(super) fn stands_beside(&self, rival: &ModelTerm, effects: &[usize], curves: &[usize]) -> bool {
         match rival {
-            Rival::Effect(i) | Rival::ByPart(i) => {
+            ModelTerm::Effect(i) | ModelTerm::ByPart(i) => {
                 let id = &self.candidates[*i].spec.id;
                 let left = effects.iter().any(|&k| self.candidates[k].spec.leaves.contains(id));
                 !left && !curves.iter().any(|&k| self.shares_covariate(*i, k))
             }
-            Rival::Curve(k) => !effects.iter().any(|&i| self.shares_covariate(i, *k)),
+            ModelTerm::Curve(k) => !effects.iter().any(|&i| self.shares_covariate(i, *k)),
         }
     }
 
@@ -63,8 +63,8 @@ impl Search<'_> {
         i: usize,
         tick: &(dyn Fn() + Sync),
     ) -> Option<Entry> {
-        let own: Vec<Rival> =
-            (0..self.curves.len()).filter(|&k| self.shares_covariate(i, k)).map(Rival::Curve).collect();
+        let own: Vec<ModelTerm> =
+            (0..self.curves.len()).filter(|&k| self.shares_covariate(i, k)).map(ModelTerm::Curve).collect();
         let beside = self.compete(&winner.fitted, &winner.fitted.terms, &own, tick);
         let best = beside.first().filter(|e| e.gain >= CURVE_GAIN)?;
         let left = best.fitted.likelihood.scale / winner.fitted.likelihood.scale;
@@ -78,7 +78,7 @@ impl Search<'_> {
     /// Sessions themselves rather than a clock that runs along with them.
     pub(super) fn rather_session(&self, best: &Entry, entries: &[Entry]) -> Entry {
         let name = |e: &Entry| match e.rival {
-            Rival::Curve(k) => self.curves[k].name.as_str(),
+            ModelTerm::Curve(k) => self.curves[k].name.as_str(),
             _ => "",
         };
         let clock = name(best).split('*').all(|c| ["time_s", "pull_index"].contains(&c));
@@ -88,7 +88,7 @@ impl Search<'_> {
 
     /// Whether an effect is large enough for one, of what it says itself.
     pub(super) fn visible(&self, entry: &Entry) -> bool {
-        let Rival::Effect(i) = entry.rival else { return true };
+        let ModelTerm::Effect(i) = entry.rival else { return true };
         let spec = self.candidates[i].spec;
         let Some(effect) = entry.fitted.model.effects.iter().find(|e| e.spec == spec) else { return true };
         let size = (effect.values[self.candidates[i].size()]
@@ -113,7 +113,7 @@ impl Search<'_> {
         let named =
             entries.iter().find(|e| e.rival.effect().is_some() && e.gain >= named_gain && self.visible(e));
         let curve = entries.iter().filter(|e| e.gain >= curve_gain).find(|e| match e.rival {
-            Rival::Curve(k) => {
+            ModelTerm::Curve(k) => {
                 let found = test(self.context.data, before, &before.residuals, &self.curves[k]);
                 found.p_value <= LEVEL
             }

@@ -3,7 +3,7 @@
 use super::fitting::Fitted;
 use super::model::PullModel;
 use super::power::ScoreTest;
-use super::search::{Entry, Rival, Search};
+use super::search::{Entry, ModelTerm, Search};
 use super::terms::Terms;
 use std::sync::Mutex;
 
@@ -33,7 +33,7 @@ impl Search<'_> {
         &self,
         start: &PullModel,
         terms: &Terms,
-        rival: &Rival,
+        rival: &ModelTerm,
         test: &ScoreTest<'_>,
     ) -> Option<Fitted> {
         let slow = terms.act_on_signals();
@@ -46,7 +46,7 @@ impl Search<'_> {
             }
         };
         match rival {
-            Rival::Curve(i) => {
+            ModelTerm::Curve(i) => {
                 let curve = &self.curves[*i];
                 if slow && test.curve(curve) < MIN_PROMISE_BESIDE {
                     return None;
@@ -56,7 +56,7 @@ impl Search<'_> {
                 terms.curves.push((curve.clone(), vec![0.0; curve.len()]));
                 keep(self.context.fit(start, &terms, &self.rows), &mut best);
             }
-            Rival::ByPart(i) => {
+            ModelTerm::ByPart(i) => {
                 let candidates = self.candidates[*i].by_part(&self.context.data.parts);
                 for from in &self.candidates[*i].starts {
                     let mut terms = terms.clone();
@@ -65,7 +65,7 @@ impl Search<'_> {
                     keep(self.context.fit(start, &terms, &self.rows), &mut best);
                 }
             }
-            Rival::Effect(i) => {
+            ModelTerm::Effect(i) => {
                 let candidate = &self.candidates[*i];
                 let least = match (slow, candidate.acts_on_signals()) {
                     (true, _) => MIN_PROMISE_BESIDE,
@@ -91,7 +91,7 @@ impl Search<'_> {
         &self,
         before: &Fitted,
         terms: &Terms,
-        rivals: &[Rival],
+        rivals: &[ModelTerm],
         done: &(dyn Fn() + Sync),
     ) -> Vec<Entry> {
         let results: Vec<Mutex<Option<Fitted>>> = rivals.iter().map(|_| Mutex::new(None)).collect();
@@ -140,16 +140,16 @@ impl Search<'_> {
         entries.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     }
 
-    pub(super) fn all(&self, without: &[usize]) -> Vec<Rival> {
+    pub(super) fn all(&self, without: &[usize]) -> Vec<ModelTerm> {
         // The slow ones first, so that threads end together.
         let mut effects: Vec<usize> = (0..self.candidates.len()).filter(|i| !without.contains(i)).collect();
         effects.sort_by_key(|&i| !self.candidates[i].acts_on_signals());
         let differing: Vec<usize> = effects.iter().copied().filter(|&i| self.may_differ(i)).collect();
         effects
             .into_iter()
-            .map(Rival::Effect)
-            .chain(differing.into_iter().map(Rival::ByPart))
-            .chain((0..self.curves.len()).map(Rival::Curve))
+            .map(ModelTerm::Effect)
+            .chain(differing.into_iter().map(ModelTerm::ByPart))
+            .chain((0..self.curves.len()).map(ModelTerm::Curve))
             .collect()
     }
 

@@ -23,7 +23,7 @@ pub const TIED_WITHIN: f64 = 3.0;
 
 /// Something that may be added to a model.
 #[derive(Debug, Clone)]
-pub enum Rival {
+pub enum ModelTerm {
     /// An effect of the library, by position.
     Effect(usize),
     /// The same with parameters of its own for each part.
@@ -36,19 +36,19 @@ pub enum Rival {
 #[derive(Debug, Clone)]
 pub struct Entry {
     /// What was added.
-    pub rival: Rival,
+    pub rival: ModelTerm,
     /// The model with it.
     pub fitted: Fitted,
     /// Its score less that of the model without it.
     pub gain: f64,
 }
 
-impl Rival {
+impl ModelTerm {
     /// Position of the effect, if it is one.
     pub fn effect(&self) -> Option<usize> {
         match self {
-            Rival::Effect(i) | Rival::ByPart(i) => Some(*i),
-            Rival::Curve(_) => None,
+            ModelTerm::Effect(i) | ModelTerm::ByPart(i) => Some(*i),
+            ModelTerm::Curve(_) => None,
         }
     }
 }
@@ -166,8 +166,8 @@ impl<'a> Search<'a> {
             };
             // One unnamed curve at most, and two effects.
             let full = match winner.rival {
-                Rival::Curve(_) => !accepted.curves.is_empty(),
-                Rival::Effect(_) | Rival::ByPart(_) => accepted.effects.len() >= 2,
+                ModelTerm::Curve(_) => !accepted.curves.is_empty(),
+                ModelTerm::Effect(_) | ModelTerm::ByPart(_) => accepted.effects.len() >= 2,
             };
             if full {
                 break;
@@ -202,8 +202,8 @@ impl<'a> Search<'a> {
     fn accept(&self, accepted: &mut Accepted, winner: &Entry, entries: &[Entry]) {
         accepted.fitted = self.freed(&winner.fitted);
         match winner.rival {
-            Rival::Curve(i) => accepted.curves.push(i),
-            Rival::Effect(i) | Rival::ByPart(i) => {
+            ModelTerm::Curve(i) => accepted.curves.push(i),
+            ModelTerm::Effect(i) | ModelTerm::ByPart(i) => {
                 accepted.effects.push((i, tied(i, winner.gain, entries)));
             }
         }

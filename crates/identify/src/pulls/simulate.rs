@@ -5,7 +5,7 @@
 //! fit. Noise is Gaussian with the memory of the fitted residuals. Traces are left out: this is about labels and slips.
 
 use super::power::ScoreTest;
-use super::search::{Accepted, CURVE_GAIN, NAMED_GAIN, Rival, Search, Tied};
+use super::search::{Accepted, CURVE_GAIN, ModelTerm, NAMED_GAIN, Search, Tied};
 use crate::diagnosis::Diagnosis;
 use crate::draws::Draws;
 use nalgebra::DVector;
@@ -26,7 +26,7 @@ pub struct Trusted {
 
 /// Directions in which a rival moves the residuals, orthonormal.
 struct Direction {
-    rival: Rival,
+    rival: ModelTerm,
     cost: f64,
     vectors: Vec<DVector<f64>>,
 }
@@ -72,7 +72,7 @@ fn of_effect(search: &Search<'_>, accepted: &Accepted, effect: usize, set: &[usi
     test.scale = fitted.likelihood.scale.max(0.1);
     let each = 0.5 * libm::log(search.rows.len().max(2) as f64);
     let mut directions = Vec::new();
-    let mut add = |rival: Rival, cost: usize, columns: Vec<DVector<f64>>| {
+    let mut add = |rival: ModelTerm, cost: usize, columns: Vec<DVector<f64>>| {
         directions.push(Direction { rival, cost: each * cost as f64, vectors: orthonormal(columns) });
     };
     for (i, candidate) in search.candidates.iter().enumerate().filter(|(_, c)| !c.acts_on_signals()) {
@@ -80,12 +80,12 @@ fn of_effect(search: &Search<'_>, accepted: &Accepted, effect: usize, set: &[usi
             continue;
         }
         for from in &candidate.starts {
-            add(Rival::Effect(i), candidate.cost(), vec![test.direction(candidate, from)]);
+            add(ModelTerm::Effect(i), candidate.cost(), vec![test.direction(candidate, from)]);
         }
     }
     // Effects that are bent in their parameters, as they were fitted.
     for (candidate, values) in fitted.terms.effects.iter().filter(|(c, _)| c.spec == spec) {
-        add(Rival::Effect(effect), candidate.cost(), vec![test.direction(candidate, values)]);
+        add(ModelTerm::Effect(effect), candidate.cost(), vec![test.direction(candidate, values)]);
     }
     for entry in &accepted.entries {
         let Some(i) = entry.rival.effect().filter(|&i| !search.candidates[i].acts_on_signals()) else {
@@ -100,8 +100,8 @@ fn of_effect(search: &Search<'_>, accepted: &Accepted, effect: usize, set: &[usi
         add(entry.rival.clone(), cost, own.iter().map(|(c, values)| test.direction(c, values)).collect());
     }
     for (k, curve) in search.curves.iter().enumerate() {
-        if search.stands_beside(&Rival::Curve(k), &[effect], &[]) {
-            add(Rival::Curve(k), curve.cost, test.directions_of(curve));
+        if search.stands_beside(&ModelTerm::Curve(k), &[effect], &[]) {
+            add(ModelTerm::Curve(k), curve.cost, test.directions_of(curve));
         }
     }
     let signal = test.free(&test.own(&(test.residuals_of(&without) - test.residuals_of(&fitted.model))));

@@ -7,9 +7,9 @@ fn candidates(n: usize) -> Vec<CandidatePull> {
     vec![CandidatePull { noise_n: NOISE_N, minutes: 1.0 }; n]
 }
 
-fn rival(predicted: Vec<f64>, columns: &[Vec<f64>], information: f64) -> Rival {
+fn rival(predicted: Vec<f64>, columns: &[Vec<f64>], information: f64) -> SeparableRival {
     let n = predicted.len();
-    Rival {
+    SeparableRival {
         weight: 0.5,
         predicted_n: DVector::from_vec(predicted),
         jacobian: DMatrix::from_fn(n, columns.len(), |i, j| columns[j][i]),
@@ -48,7 +48,7 @@ fn the_criterion_is_the_minimum_over_the_refit() {
     let a = rival(numbers(n), &[numbers(n), numbers(n)], 2.0);
     let b = rival(numbers(n), &[numbers(n), numbers(n), numbers(n)], 0.7);
     let plan = plan_separating(&candidates(n), &[a.clone(), b.clone()], 5, 1e9).unwrap();
-    let criterion = |truth: &Rival, other: &Rival| {
+    let criterion = |truth: &SeparableRival, other: &SeparableRival| {
         let rows = plan.pulls.len();
         let weight = 1.0 / (NOISE_N * NOISE_N);
         let d = DVector::from_fn(rows, |k, _| {
@@ -91,13 +91,13 @@ fn it_stops_when_all_are_apart_or_none_can_be() {
 #[test]
 fn what_cannot_be_planned_is_refused() {
     let good = || rival(vec![0.0, 1.0], &[vec![1.0, 1.0]], 1.0);
-    let message = |pulls: &[CandidatePull], rivals: &[Rival]| {
+    let message = |pulls: &[CandidatePull], rivals: &[SeparableRival]| {
         plan_separating(pulls, rivals, 5, 9.0).unwrap_err().to_string()
     };
     assert!(message(&candidates(2), &[good()]).contains("1 rivals"));
     assert!(message(&candidates(3), &[good(), good()]).contains("`predicted_n` has 2 rows"));
     assert!(
-        message(&candidates(2), &[good(), Rival { weight: 0.0, ..good() }])
+        message(&candidates(2), &[good(), SeparableRival { weight: 0.0, ..good() }])
             .contains("weight of rival 1 is 0")
     );
     let free = [CandidatePull { noise_n: 1.0, minutes: 0.0 }; 2];
@@ -105,7 +105,7 @@ fn what_cannot_be_planned_is_refused() {
     let mut odd = good();
     odd.predicted_n[0] = f64::NAN;
     assert!(message(&candidates(2), &[good(), odd]).contains("not a number"));
-    let negative = Rival { information: DMatrix::from_element(1, 1, -1.0), ..good() };
+    let negative = SeparableRival { information: DMatrix::from_element(1, 1, -1.0), ..good() };
     assert!(message(&candidates(2), &[good(), negative]).contains("rival 1: its information"));
     assert!(
         plan_separating(&[], &[rival(vec![], &[vec![]], 1.0), rival(vec![], &[vec![]], 1.0)], 5, 9.0)
@@ -148,7 +148,7 @@ fn planned_pulls_separate_sooner_than_random_ones() {
             sum + 10.0 / noise(f).powi(2) * &j * j.transpose()
         })
     };
-    let build = |predict: &dyn Fn(f64) -> f64, columns: &dyn Fn(f64) -> [f64; 2]| Rival {
+    let build = |predict: &dyn Fn(f64) -> f64, columns: &dyn Fn(f64) -> [f64; 2]| SeparableRival {
         weight: 0.5,
         predicted_n: DVector::from_fn(8, |i, _| predict(forces[i])),
         jacobian: DMatrix::from_fn(8, 2, |i, c| columns(forces[i])[c]),
@@ -180,7 +180,7 @@ fn planned_pulls_separate_sooner_than_random_ones() {
 /// Pulls of the first rival, with noise, until the evidence against the refitted second one is 20 : 1.
 fn pulls_until_decided(
     order: &[usize],
-    rivals: &[Rival],
+    rivals: &[SeparableRival],
     candidates: &[CandidatePull],
     draws: &mut Draws,
 ) -> usize {

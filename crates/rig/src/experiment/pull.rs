@@ -41,7 +41,7 @@ pub enum PullOutcome {
 
 /// A pull with all that came during it.
 #[derive(Debug, Clone)]
-pub struct MeasuredPull {
+pub struct ExecutedPull {
     /// What was asked.
     pub planned: PlannedPull,
     /// What came of it.
@@ -96,7 +96,7 @@ struct Parts {
 
 impl Experiment<'_> {
     /// Makes a pull. Whatever goes wrong ends in a safe stop; then no further pull may follow on this experiment.
-    pub fn pull(&mut self, campaign: &Campaign, planned: &PlannedPull) -> MeasuredPull {
+    pub fn pull(&mut self, campaign: &Campaign, planned: &PlannedPull) -> ExecutedPull {
         let mut parts = Parts::default();
         let made = self.make(campaign, planned, &mut parts);
         let stopped = made.as_ref().err().map(|fault| self.safe_stop(fault));
@@ -104,7 +104,7 @@ impl Experiment<'_> {
     }
 
     /// A pull that cannot be made because of what came before it: everything is stopped.
-    pub fn give_up(&mut self, planned: &PlannedPull, fault: &Fault) -> MeasuredPull {
+    pub fn give_up(&mut self, planned: &PlannedPull, fault: &Fault) -> ExecutedPull {
         let stopped = self.safe_stop(fault);
         self.measured(planned, Parts::default(), Some(stopped))
     }
@@ -394,7 +394,7 @@ impl Experiment<'_> {
         self.move_to("the way back", poses.approach, self.config.motion.speed_mm_s)
     }
 
-    fn measured(&mut self, planned: &PlannedPull, parts: Parts, stopped: Option<Stopped>) -> MeasuredPull {
+    fn measured(&mut self, planned: &PlannedPull, parts: Parts, stopped: Option<Stopped>) -> ExecutedPull {
         let trace = self.trace(planned, &parts);
         let start = parts
             .run
@@ -427,7 +427,7 @@ impl Experiment<'_> {
         };
         let without = [parts.no_load_s, parts.no_load_after_s];
         let rows = thinned(std::mem::take(&mut self.rows), parts.run, without);
-        MeasuredPull {
+        ExecutedPull {
             planned: planned.clone(),
             outcome,
             stopped,

@@ -21,7 +21,7 @@ mod pulls;
 const START: TcpPose = TcpPose { position_m: [0.3, 0.0, 0.2], rotation_rad: [0.0; 3] };
 
 /// A robot whose host writes its heartbeat.
-struct Rig {
+struct HostedRobot {
     controller: Controller,
     spring: Spring,
     beat: i32,
@@ -29,16 +29,16 @@ struct Rig {
     told: Vec<Announcement>,
 }
 
-fn rig_around(spring: Spring) -> Rig {
+fn rig_around(spring: Spring) -> HostedRobot {
     let controller = Controller::new(Arc::new(spring), START, 1.0);
-    Rig { controller, spring, beat: 0, beats: true, told: Vec::new() }
+    HostedRobot { controller, spring, beat: 0, beats: true, told: Vec::new() }
 }
 
-fn rig() -> Rig {
+fn rig() -> HostedRobot {
     rig_around(Spring::default())
 }
 
-impl Rig {
+impl HostedRobot {
     fn go(&mut self, go: i32) {
         self.controller.write_input("input_int_register_25", Value::Int32(go));
     }
@@ -120,7 +120,7 @@ fn motion(of: impl FnOnce(&mut MotionProgram)) -> MotionProgram {
 }
 
 /// A rig on its way.
-fn moving(of: impl FnOnce(&mut MotionProgram)) -> Rig {
+fn moving(of: impl FnOnce(&mut MotionProgram)) -> HostedRobot {
     let mut rig = rig();
     rig.go(4);
     rig.controller.run_script(&motion(of).script().unwrap());
@@ -286,7 +286,7 @@ fn a_motion_arrives_and_every_other_way_out_stops_it() {
     rig.run(0.1);
     assert_eq!(rig.controller.program_title(), None, "acknowledged");
 
-    let broken_off = |of: fn(&mut MotionProgram), with: fn(&mut Rig), reason| {
+    let broken_off = |of: fn(&mut MotionProgram), with: fn(&mut HostedRobot), reason| {
         let mut rig = moving(of);
         with(&mut rig);
         rig.until_phase(Phase::Stopped);

@@ -4,7 +4,7 @@ use super::injection::{HEAVY_KG, Injection, Kind, Moment};
 use super::plant::Spring;
 use super::watch::{Progress, Watch};
 use gripgen_rig::camera::CameraView;
-use gripgen_rig::experiment::pull::MeasuredPull;
+use gripgen_rig::experiment::pull::ExecutedPull;
 use gripgen_rig::experiment::{Devices, Experiment, RigConfig};
 use gripgen_rig::program::TcpPose;
 use gripgen_rig::rtde::{Kind as Frame, encode_frame};
@@ -37,7 +37,7 @@ const HANGS: Duration = Duration::from_millis(1500);
 /// What came of an injection.
 pub struct Made {
     /// The pull; nothing where its thread died.
-    pub pull: Option<MeasuredPull>,
+    pub pull: Option<ExecutedPull>,
     /// The moment came before the pull was over.
     pub came: bool,
     /// Time from the injection to the return of the call.
@@ -51,7 +51,7 @@ pub struct Made {
     /// What is wrong with the way the jaws let go.
     pub let_go: Option<String>,
     /// A second pull after the fault is gone, where there can be one.
-    pub again: Option<Result<MeasuredPull, String>>,
+    pub again: Option<Result<ExecutedPull, String>>,
 }
 
 pub fn config(at: RigAddresses) -> RigConfig {
@@ -89,7 +89,7 @@ fn pull(
     config: &RigConfig,
     stop: &AtomicBool,
     emit: &mut dyn FnMut(gripgen_rig::experiment::RigEvent),
-) -> Result<MeasuredPull, String> {
+) -> Result<ExecutedPull, String> {
     let devices = Devices::connect(config).map_err(|e| e.to_string())?;
     let mut experiment = Experiment::new(config, devices, stop, emit);
     experiment.begin().map_err(|e| e.to_string())?;
@@ -181,7 +181,7 @@ pub fn make(injection: &Injection) -> Made {
 }
 
 /// The same again when the fault is gone, where it goes without a person.
-fn again(injection: &Injection, rig: &ServedRig, config: &RigConfig) -> Option<Result<MeasuredPull, String>> {
+fn again(injection: &Injection, rig: &ServedRig, config: &RigConfig) -> Option<Result<ExecutedPull, String>> {
     match injection.kind {
         // What weighed on the tool when the sensor was zeroed is missing afterwards: a person has to look at it.
         Kind::Rig(Fault::Hang(_)) | Kind::Touch if injection.moment == Moment::Zeroing => return None,

@@ -3,7 +3,7 @@
 use super::bench_tests::{LONGEST, Made};
 use super::injection::{Injection, Kind, Moment};
 use gripgen_rig::experiment::PullOutcome;
-use gripgen_rig::experiment::pull::MeasuredPull;
+use gripgen_rig::experiment::pull::ExecutedPull;
 use gripgen_rig::virtual_rig::faults::{Device, Fault};
 use gripgen_twin::PerJaw;
 use std::fmt::{Display, Formatter};
@@ -78,7 +78,7 @@ pub fn judge(injection: &Injection, made: Made) -> Report {
 }
 
 /// The outcome of a pull, which has to be one of those that this fault may have.
-fn outcome(pull: &MeasuredPull, kind: Kind, moment: Moment) -> Ended {
+fn outcome(pull: &ExecutedPull, kind: Kind, moment: Moment) -> Ended {
     match &pull.outcome {
         PullOutcome::Labelled(label) => {
             assert!(!must_fail(kind, moment), "a pull is labelled that was disturbed");
@@ -104,7 +104,7 @@ fn outcome(pull: &MeasuredPull, kind: Kind, moment: Moment) -> Ended {
 }
 
 /// Label, trace and images are those of the plant.
-fn check_data(pull: &MeasuredPull) {
+fn check_data(pull: &ExecutedPull) {
     let PullOutcome::Labelled(label) = &pull.outcome else { return };
     assert!(
         (label.max_pull_force_n - SLIPS_N).abs() < TOLERANCE_N && !label.censored,

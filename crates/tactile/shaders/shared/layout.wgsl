@@ -19,7 +19,7 @@ struct Frame {
 }
 
 // One image: where the part is, how hard it is pressed, which noise.
-struct Press {
+struct PressInput {
     // Rotation times scale: pixels per step of the mesh's vertices, in units of 2^-fraction_bits.
     // Rows: image x, image y, height.
     matrix: array<i32, 9>,

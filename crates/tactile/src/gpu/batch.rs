@@ -6,7 +6,7 @@ use super::buffers::{Pass, Planes, bind, bind_at, empty, new_planes, resident, w
 use super::cast::{Cast, Scene, ceiling};
 use super::colour::Colours;
 use super::device::Device;
-use super::layout::{Cluster, Frame, Group, Outcome, Press};
+use super::layout::{Cluster, Frame, Group, Outcome, PressInput};
 use super::mesh::{Clusters, Steps};
 use super::pipelines::{Pipelines, Stage};
 use super::readback::Ring;
@@ -125,7 +125,7 @@ impl GpuSensor {
         let noise = resident(device, "noise", levels());
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let buffer = |label, bytes: u64| empty(device, label, batch * bytes, storage);
-        let presses = buffer("presses", size_of::<Press>() as u64);
+        let presses = buffer("presses", size_of::<PressInput>() as u64);
         let tops = buffer("tops", 4);
         let heights = buffer("heights", 4 * pixels);
         let outcomes = buffer("outcomes", size_of::<Outcome>() as u64);
@@ -231,7 +231,7 @@ impl GpuSensor {
     pub(super) fn encode(
         &self,
         device: &Device,
-        presses: &[Press],
+        presses: &[PressInput],
         runs: &[(usize, usize, &GpuMesh)],
     ) -> wgpu::CommandEncoder {
         let images = presses.len() as u32;

@@ -22,7 +22,7 @@ pub(super) struct Frame {
 /// One image.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Press {
+pub(super) struct PressInput {
     pub(super) matrix: [i32; 9],
     pub(super) shift: [u32; 6],
     pub(super) fraction_bits: u32,
@@ -33,9 +33,9 @@ pub(super) struct Press {
     pub(super) key: [u32; 2],
 }
 
-/// [`Press::flags`]: a part is there.
+/// [`PressInput::flags`]: a part is there.
 pub(super) const HAS_PART: u32 = 1;
-/// [`Press::flags`]: the image has noise.
+/// [`PressInput::flags`]: the image has noise.
 pub(super) const HAS_NOISE: u32 = 2;
 
 /// How a press ended.
@@ -147,7 +147,7 @@ mod tests {
             noise_green,
             noise_blue
         );
-        compare!(Press, matrix, shift, fraction_bits, bound_px, wanted_px3, pixels_per_step, flags, key);
+        compare!(PressInput, matrix, shift, fraction_bits, bound_px, wanted_px3, pixels_per_step, flags, key);
         compare!(Outcome, status, press_px, available_px3, core_px);
         compare!(Cluster, first_vertex, vertices, first_triangle, triangles, centre, half);
         compare!(Group, first_image, clusters);

@@ -1,6 +1,6 @@
 //! Meshes and poses as the stage `raster` wants them: clusters of triangles, and fixed-point numbers.
 
-use super::layout::{Cluster, Press};
+use super::layout::{Cluster, PressInput};
 use crate::grid::Grid;
 use gripgen_twin::TriMesh;
 use gripgen_twin::frames::Pose;
@@ -132,7 +132,7 @@ fn in_space_order(mesh: &TriMesh, placed: &[[i32; 3]]) -> Vec<[u32; 3]> {
 
 impl Steps {
     /// Writes the pose of a mesh in front of a gel into `press`: `raster.wgsl` multiplies with 64-bit integers.
-    pub(super) fn place(&self, gel_from_mesh: &Pose, grid: &Grid, press: &mut Press) {
+    pub(super) fn place(&self, gel_from_mesh: &Pose, grid: &Grid, press: &mut PressInput) {
         let scale = 1.0 / grid.metres_per_px;
         let rotation = gel_from_mesh.rotation.to_rotation_matrix();
         let centre = gel_from_mesh * nalgebra::Point3::from(self.centre_m);
@@ -178,7 +178,7 @@ mod tests {
     use nalgebra::{Point3, Vector3};
 
     /// What `placed` of raster.wgsl computes, in pixels.
-    fn placed_px(press: &Press, row: usize, v: &[i32]) -> f64 {
+    fn placed_px(press: &PressInput, row: usize, v: &[i32]) -> f64 {
         let shift = i64::from(press.shift[2 * row + 1] as i32) << 32 | i64::from(press.shift[2 * row]);
         let sum: i64 = (0..3).map(|a| i64::from(press.matrix[3 * row + a]) * i64::from(v[a])).sum();
         (shift + sum) as f64 / power_of_two(press.fraction_bits as i32)
@@ -194,7 +194,7 @@ mod tests {
                 &rotation_from_fixed_xyz([0.7 * i as f64, 0.2, 1.1]),
                 Vector3::new(0.02 * i as f64, -1e-3, z),
             );
-            let mut press: Press = bytemuck::Zeroable::zeroed();
+            let mut press: PressInput = bytemuck::Zeroable::zeroed();
             clusters.steps.place(&at, &grid, &mut press);
             let mut highest = f64::NEG_INFINITY;
             for v in clusters.vertices.chunks_exact(3) {

@@ -33,12 +33,12 @@ const CASES: [(&str, &[f64], &[f64]); 10] = [
 ];
 
 /// The images of the series, as one vector.
-fn images(rig: &Rig, scenes: &[Scene], id: &str, parameters: &[f64]) -> DVector<f64> {
+fn images(rig: &TestSensor, scenes: &[Scene], id: &str, parameters: &[f64]) -> DVector<f64> {
     let all = scenes.iter().flat_map(|scene| rig.with(scene, id, parameters));
     DVector::from_iterator(scenes.len() * 3 * GRID.len(), all.flat_map(|plane| plane.values).map(f64::from))
 }
 
-fn without(rig: &Rig, scenes: &[Scene]) -> DVector<f64> {
+fn without(rig: &TestSensor, scenes: &[Scene]) -> DVector<f64> {
     let all = scenes.iter().flat_map(|scene| rig.change(scene, &OpticsState::default()));
     DVector::from_iterator(scenes.len() * 3 * GRID.len(), all.flat_map(|plane| plane.values).map(f64::from))
 }
@@ -49,7 +49,7 @@ fn fitted(spec: &EffectSpec) -> Vec<usize> {
 }
 
 /// Derivatives of the images by the fitted parameters, from steps of a hundredth of a bound to both sides.
-fn derivatives(rig: &Rig, scenes: &[Scene], id: &str, parameters: &[f64]) -> DMatrix<f64> {
+fn derivatives(rig: &TestSensor, scenes: &[Scene], id: &str, parameters: &[f64]) -> DMatrix<f64> {
     let columns: Vec<DVector<f64>> = fitted(spec(id))
         .into_iter()
         .map(|j| {
@@ -68,7 +68,7 @@ fn derivatives(rig: &Rig, scenes: &[Scene], id: &str, parameters: &[f64]) -> DMa
 }
 
 /// Gauss-Newton from `start`, kept inside the bounds, with halved steps where the error would rise.
-fn fit(rig: &Rig, scenes: &[Scene], id: &str, start: &[f64], measured: &DVector<f64>) -> Vec<f64> {
+fn fit(rig: &TestSensor, scenes: &[Scene], id: &str, start: &[f64], measured: &DVector<f64>) -> Vec<f64> {
     let mut now = start.to_vec();
     let mut error = (measured - images(rig, scenes, id, &now)).norm_squared();
     for _ in 0..12 {
@@ -140,7 +140,7 @@ struct Table {
 
 /// The signatures of all effects, then for each effect what each of its parameters does alone: a column each, and which
 /// columns are whose. Secants, because some derivatives vanish at the neutral value.
-fn columns(rig: &Rig, scenes: &[Scene]) -> (DMatrix<f64>, Vec<Vec<usize>>) {
+fn columns(rig: &TestSensor, scenes: &[Scene]) -> (DMatrix<f64>, Vec<Vec<usize>>) {
     let plain = without(rig, scenes);
     let mut all: Vec<DVector<f64>> =
         CASES.iter().map(|(id, size, _)| images(rig, scenes, id, size) - &plain).collect();

@@ -41,13 +41,13 @@ pub(super) const fn scene(shape: Shape, centre_mm: [f64; 2], force_n: f64, hours
     Scene { shape, centre_mm, force_n, hours, pull_index: (10.0 * hours) as u64 }
 }
 
-pub(super) struct Rig {
+pub(super) struct TestSensor {
     pub(super) sensor: Sensor,
     pub(super) gel: Gel,
 }
 
 /// Red, green and blue lights at 30, 150 and 270 degrees, each mainly in its channel.
-pub(super) fn rig() -> Rig {
+pub(super) fn rig() -> TestSensor {
     let light = |azimuth_deg: f64, colour| Light {
         azimuth_rad: azimuth_deg.to_radians(),
         elevation_rad: 0.66,
@@ -91,10 +91,10 @@ pub(super) fn rig() -> Rig {
         kernels_px: vec![41, 31, 13, 7, 5],
         restore_depth_fraction: 0.4,
     };
-    Rig { sensor, gel }
+    TestSensor { sensor, gel }
 }
 
-impl Rig {
+impl TestSensor {
     pub(super) fn renderer(&self) -> Renderer<'_> {
         Renderer { sensor: &self.sensor, gel: &self.gel, level: SimdLevel::best() }
     }

@@ -8,9 +8,9 @@ use crate::slip_label;
 const TOLERANCE_N: f64 = 3.0;
 const STOP_M: f64 = 5e-3;
 
-/// A rig and a pull on it.
+/// A pull made up, and the rig it was made on.
 #[derive(Clone, Copy)]
-struct Rig {
+struct SyntheticPull {
     slips_at_n: f64,
     kinetic: f64,
     increment_n: f64,
@@ -21,7 +21,7 @@ struct Rig {
     rate_hz: f64,
 }
 
-const RIG: Rig = Rig {
+const SYNTHETIC: SyntheticPull = SyntheticPull {
     slips_at_n: 12.0,
     kinetic: 1.0,
     increment_n: 1.0,
@@ -33,7 +33,7 @@ const RIG: Rig = Rig {
 };
 
 /// A trace: `tau dy/dt = F_des - y` behind a damper of 2 kN s/m, against a spring of 30 N/mm in series with dry friction.
-fn pull(rig: Rig, seed: u64) -> PullTrace {
+fn pull(rig: SyntheticPull, seed: u64) -> PullTrace {
     let mut noise = Stream::new(41, seed, Purpose::ForceNoise);
     let step_s = 1.0 / rig.rate_hz;
     let before = (0..rig.no_load).map(|i| (i as f64 - rig.no_load as f64) * step_s);
@@ -88,17 +88,17 @@ fn thinned(trace: &PullTrace) -> PullTrace {
 }
 
 /// Pulls of many forces, staircases, loops and frictions.
-fn rig_of(seed: u64) -> Rig {
+fn rig_of(seed: u64) -> SyntheticPull {
     let mut draw = Stream::new(7, seed, Purpose::Scatter);
     let increment_n = [0.5, 1.0, 2.0][(draw.bits() % 3) as usize];
-    Rig {
+    SyntheticPull {
         slips_at_n: 4.0 + 31.0 * draw.uniform(),
         kinetic: [1.0, 1.0, 0.9, 0.8][(draw.bits() % 4) as usize],
         increment_n,
         start_n: [0.0, 0.0, 2.0][(draw.bits() % 3) as usize],
         lag_s: 0.02 + 0.06 * draw.uniform(),
         noise_n: 0.05 + 0.15 * draw.uniform(),
-        ..RIG
+        ..SYNTHETIC
     }
 }
 
@@ -122,7 +122,7 @@ fn labels_that_are_not_those_of_their_traces_are_noticed() {
     for thin in [false, true] {
         let (mut smaller, mut larger) = (0, 0);
         for seed in 0..48 {
-            let rig = Rig { slips_at_n: 9.0 + 0.5 * seed as f64, kinetic: 1.0, ..rig_of(seed) };
+            let rig = SyntheticPull { slips_at_n: 9.0 + 0.5 * seed as f64, kinetic: 1.0, ..rig_of(seed) };
             let full = pull(rig, seed);
             let label_n = label_of(&full).unwrap();
             let trace = if thin { thinned(&full) } else { full };
@@ -135,7 +135,7 @@ fn labels_that_are_not_those_of_their_traces_are_noticed() {
 
 #[test]
 fn a_trace_with_every_reading_gives_the_label_to_the_last_digit() {
-    let trace = pull(RIG, 3);
+    let trace = pull(SYNTHETIC, 3);
     let label_n = label_of(&trace).unwrap();
     let of = |label_n: f64| {
         let of_trace = LabelEvidence::of_trace(label_n, TOLERANCE_N, STOP_M, Some(&trace));
@@ -149,10 +149,15 @@ fn a_trace_with_every_reading_gives_the_label_to_the_last_digit() {
 }
 
 /// A pull is suspect, or its label is that of the rig by at most what a label may be off.
-fn found_or_right(change: impl Fn(&Rig, &mut PullTrace), pulls: u64) -> (usize, Vec<String>) {
+fn found_or_right(change: impl Fn(&SyntheticPull, &mut PullTrace), pulls: u64) -> (usize, Vec<String>) {
     let (mut found, mut missed) = (0, Vec::new());
     for seed in 0..pulls {
-        let rig = Rig { slips_at_n: 8.0 + 0.6 * seed as f64, kinetic: 1.0, increment_n: 1.0, ..rig_of(seed) };
+        let rig = SyntheticPull {
+            slips_at_n: 8.0 + 0.6 * seed as f64,
+            kinetic: 1.0,
+            increment_n: 1.0,
+            ..rig_of(seed)
+        };
         let mut trace = pull(rig, seed);
         let true_n = rig.slips_at_n;
         change(&rig, &mut trace);
@@ -174,7 +179,7 @@ fn slow_loops_are_found_or_harmless() {
         let lag_s = 0.05 * f64::from(tenth);
         // The loop is slow, so the force is late.
         let (of_loop, missed) =
-            found_or_right(|rig, trace| *trace = pull(Rig { lag_s, ..*rig }, tenth.into()), 24);
+            found_or_right(|rig, trace| *trace = pull(SyntheticPull { lag_s, ..*rig }, tenth.into()), 24);
         assert!(missed.is_empty(), "loop of {lag_s} s: {missed:#?}");
         // The reading is late, and the force is not.
         let (of_sensor, missed) = found_or_right(
@@ -216,7 +221,7 @@ fn zero_errors_are_found_or_harmless() {
 
 #[test]
 fn a_zero_that_moved_shows_in_the_readings_after_the_pull() {
-    let trace = pull(RIG, 5);
+    let trace = pull(SYNTHETIC, 5);
     let label_n = label_of(&trace).unwrap();
     let of_trace = LabelEvidence::of_trace(label_n, TOLERANCE_N, STOP_M, Some(&trace));
     let after = |zero_n: f64| {
@@ -234,9 +239,9 @@ fn a_zero_that_moved_shows_in_the_readings_after_the_pull() {
 fn missing_evidence_is_no_reason() {
     let nothing = LabelEvidence::of_trace(1e9, TOLERANCE_N, STOP_M, None);
     assert_eq!(judge(&nothing, &Expected::default()).verdict, Verdict::NoEvidence);
-    let few = pull(RIG, 1).rows().take(RIG.no_load + 3).collect();
+    let few = pull(SYNTHETIC, 1).rows().take(SYNTHETIC.no_load + 3).collect();
     assert_eq!(judged(&few, 1e9).verdict, Verdict::NoEvidence, "three rows of a pull");
-    let trace = pull(Rig { no_load: 0, ..RIG }, 2);
+    let trace = pull(SyntheticPull { no_load: 0, ..SYNTHETIC }, 2);
     let judgement = judged(&trace, label_of(&trace).unwrap());
     assert_eq!(judgement.verdict, Verdict::Holds);
     assert!(judgement.findings.iter().all(|f| f.kind != FindingKind::Zero));
@@ -245,7 +250,7 @@ fn missing_evidence_is_no_reason() {
 #[test]
 fn nothing_panics_on_what_is_no_trace() {
     for bad in [f64::NAN, f64::INFINITY, -1e300] {
-        let mut trace = pull(RIG, 1);
+        let mut trace = pull(SYNTHETIC, 1);
         trace.measured_force_n[400] = bad;
         trace.displacement_m[500] = bad;
         judged(&trace, bad);

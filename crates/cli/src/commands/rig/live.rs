@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::output::{JsonSink, print, program};
 use crate::progress::Progress;
 use gripgen::twin::PlannedPull;
-use gripgen_rig::experiment::pull::MeasuredPull;
+use gripgen_rig::experiment::pull::ExecutedPull;
 use gripgen_rig::experiment::{PullOutcome, RigEvent};
 use serde_json::json;
 use std::path::Path;
@@ -89,7 +89,7 @@ impl Live {
     pub fn pulled(
         &mut self,
         standing: &Standing,
-        measured: &MeasuredPull,
+        measured: &ExecutedPull,
         suspect: Option<&str>,
     ) -> Result<(), Failure> {
         let (status, words, force_n) = match &measured.outcome {

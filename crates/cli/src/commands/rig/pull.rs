@@ -16,7 +16,7 @@ use gripgen::twin::{Campaign, PlannedPull, PullKind};
 use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_toml};
 use gripgen_rig::experiment::plan::pull_program;
 use gripgen_rig::experiment::prepare::Permit;
-use gripgen_rig::experiment::pull::MeasuredPull;
+use gripgen_rig::experiment::pull::ExecutedPull;
 use gripgen_rig::experiment::{Devices, Experiment, Fault, PullOutcome, RigConfig, check_campaign};
 use serde_json::json;
 use std::cell::RefCell;
@@ -251,7 +251,7 @@ impl Job<'_> {
     fn record(
         &self,
         standing: Standing,
-        measured: MeasuredPull,
+        measured: ExecutedPull,
         suspect: Option<String>,
     ) -> Result<(), Failure> {
         discard_failed(self.folder, standing.index).map_err(Failure::new)?;

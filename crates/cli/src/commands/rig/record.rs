@@ -3,7 +3,7 @@
 use gripgen::record::{RigLog, RigLogEvent, RigPull, RigResult, RigStream};
 use gripgen::twin::evidence::{Expected, GripForceEvidence, LabelEvidence, WrenchRow, judge};
 use gripgen::twin::{Campaign, Covariates, Jaw, PlannedPull, PullKind, PullSettings, Scenario};
-use gripgen_rig::experiment::pull::{FrameStamp, MeasuredPull};
+use gripgen_rig::experiment::pull::{ExecutedPull, FrameStamp};
 use gripgen_rig::experiment::{PullOutcome, RigConfig, RobotRow};
 use std::collections::BTreeMap;
 
@@ -25,7 +25,7 @@ pub fn rig_pull(
     config: &RigConfig,
     campaign: &Campaign,
     standing: Standing,
-    m: MeasuredPull,
+    m: ExecutedPull,
     suspect: Option<String>,
 ) -> RigPull {
     let result = match (&m.outcome, suspect) {
@@ -82,7 +82,7 @@ const GRIP_FORCE_SHARE: f64 = 0.1;
 const ROW_S: f64 = 1e-3;
 
 /// Why the label of a pull is suspect, by all that was recorded of it; `None` if it is not, or if there is none.
-pub fn suspect(config: &RigConfig, campaign: &Campaign, m: &MeasuredPull) -> Option<String> {
+pub fn suspect(config: &RigConfig, campaign: &Campaign, m: &ExecutedPull) -> Option<String> {
     let PullOutcome::Labelled(label) = &m.outcome else { return None };
     let asked_n = m.planned.grip_force_n;
     let allowed_n = GRIP_FORCE_N.max(GRIP_FORCE_SHARE * asked_n);
@@ -220,7 +220,7 @@ fn robot(rows: &[RobotRow], unix_s: &[f64]) -> RigStream {
 }
 
 /// Stamps of the frames that were taken; nothing where there are none.
-fn camera(jaw: Jaw, m: &MeasuredPull) -> Option<RigStream> {
+fn camera(jaw: Jaw, m: &ExecutedPull) -> Option<RigStream> {
     let frames: Vec<&FrameStamp> = m.frames.iter().filter(|frame| frame.jaw == jaw).collect();
     // Host stamps lie on the robot's: both are this machine's clock.
     let origin = m.rows.first().zip(m.rows_unix_s.first());

@@ -3,7 +3,7 @@
 use super::record::{START, Standing};
 use crate::failure::Failure;
 use gripgen::record::{RunFolder, ShardReader, missing_pulls};
-use gripgen_rig::experiment::pull::MeasuredPull;
+use gripgen_rig::experiment::pull::ExecutedPull;
 
 /// The clock of a campaign: the robot's while it runs on, this machine's over its restarts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -40,7 +40,7 @@ impl CampaignClock {
     }
 
     /// Where this pull stands.
-    pub fn standing(&mut self, index: u64, measured: &MeasuredPull) -> Standing {
+    pub fn standing(&mut self, index: u64, measured: &ExecutedPull) -> Standing {
         let (robot_s, unix_s) = (measured.robot_time_s, measured.unix_s);
         let time_s = match self.last {
             None => 0.0,

@@ -4,7 +4,7 @@
 use super::*;
 
 /// A pull of a gripped part, up to its first step.
-fn pulling(spring: Spring, of: impl FnOnce(&mut PullProgram)) -> Rig {
+fn pulling(spring: Spring, of: impl FnOnce(&mut PullProgram)) -> HostedRobot {
     let mut program = PullProgram { run: 3, ..PullProgram::default() };
     of(&mut program);
     let mut rig = rig_around(spring);
@@ -16,12 +16,12 @@ fn pulling(spring: Spring, of: impl FnOnce(&mut PullProgram)) -> Rig {
     rig
 }
 
-fn double(rig: &Rig, register: u8) -> f64 {
+fn double(rig: &HostedRobot, register: u8) -> f64 {
     rig.controller.robot().outputs.double[usize::from(register)]
 }
 
 /// What the load is for a tool that pulls along `direction`.
-fn felt_n(rig: &Rig, direction: f64) -> f64 {
+fn felt_n(rig: &HostedRobot, direction: f64) -> f64 {
     -direction * rig.controller.robot().wrench[2]
 }
 
