@@ -1,5 +1,6 @@
 //! Diagnoses of made-up sensors whose formulas are not those of the library.
 
+mod benchmark;
 mod generator;
 
 use super::noise::{Noise, draw};
@@ -26,103 +27,6 @@ const NAMED: [(Effect, &str); 7] = [
     (Effect::Creep, "sensor_creep"),
     (Effect::Hysteresis, "sensor_hysteresis"),
 ];
-
-/// Everything, printed: `cargo test -p gripgen-identify sensor_benchmark -- --ignored --nocapture`.
-#[test]
-#[ignore = "a benchmark that takes minutes"]
-fn sensor_benchmark() {
-    let count: u64 = std::env::var("CASES").ok().and_then(|c| c.parse().ok()).unwrap_or(12);
-    for noise in [NoiseKind::White, NoiseKind::Slow, NoiseKind::Mixed, NoiseKind::Smooth] {
-        let mut false_alarms = Vec::new();
-        for seed in 0..2 * count {
-            let made = make(&case(Effect::None, 1.0, noise, seed));
-            let d = answer(&made).diagnosis;
-            if d.verdict != Verdict::None {
-                false_alarms.push((
-                    seed,
-                    d.effects.iter().map(|e| e.name.clone()).collect::<Vec<_>>(),
-                    d.unknown.iter().map(|u| u.covariate.clone()).collect::<Vec<_>>(),
-                ));
-            }
-        }
-        println!("{noise:?}: none: {} of {} false: {false_alarms:?}", false_alarms.len(), 2 * count);
-        for size in [1.0, 2.0, 4.0] {
-            let (mut top, mut all, mut extra, mut inside, mut covered) = (0, 0, 0, 0, 0);
-            let mut ratios = Vec::new();
-            let mut misses = Vec::new();
-            for (effect, name) in NAMED {
-                let mut right = 0;
-                for seed in 0..count {
-                    let made = make(&case(effect, size, noise, 100 + seed));
-                    let answer = answer(&made);
-                    let d = &answer.diagnosis;
-                    all += 1;
-                    let first = d.effects.first();
-                    let hit = first.is_some_and(|e| e.name == name);
-                    let set = first.is_some_and(|e| e.class.iter().any(|c| c == name));
-                    right += u32::from(hit);
-                    inside += u32::from(set);
-                    extra += d.effects.len().saturating_sub(1) + d.unknown.len();
-                    if !hit {
-                        misses.push(format!(
-                            "{name}->{}{}",
-                            first.map_or("-", |e| e.name.as_str()),
-                            d.unknown.first().map_or(String::new(), |u| format!("({})", u.covariate))
-                        ));
-                    }
-                    let stated = d.error.as_ref().unwrap();
-                    let real = made.error_of(&answer.effects);
-                    ratios.push(stated.after.rmse_n.unwrap() / real);
-                    covered += u32::from((stated.after.low90..=stated.after.high90).contains(&real));
-                }
-                top += right;
-            }
-            ratios.sort_by(f64::total_cmp);
-            println!(
-                "{noise:?} size {size}: top-1 {top}/{all}, in set {inside}, extra {extra}, stated/real {:.2} {:.2} {:.2}, covered {covered}; {misses:?}",
-                ratios[ratios.len() / 10],
-                ratios[ratios.len() / 2],
-                ratios[ratios.len() * 9 / 10]
-            );
-        }
-        let mut named = 0;
-        let mut wrong = Vec::new();
-        for seed in 0..count {
-            for effect in [Effect::Temperature, Effect::TemperatureGain] {
-                let d = answer(&make(&case(effect, 2.0, noise, 200 + seed))).diagnosis;
-                let right =
-                    d.unknown.first().is_some_and(|u| u.covariate == "temperature_c") && d.effects.is_empty();
-                named += u32::from(right);
-                if !right {
-                    wrong.push(format!(
-                        "{:?} {:?}",
-                        d.effects.iter().map(|e| &e.name).collect::<Vec<_>>(),
-                        d.unknown.iter().map(|e| &e.covariate).collect::<Vec<_>>()
-                    ));
-                }
-            }
-        }
-        println!("{noise:?}: unknown named {named} of {}: {wrong:?}", 2 * count);
-    }
-}
-
-/// How often something is found where nothing is.
-#[test]
-#[ignore = "a benchmark that takes minutes"]
-fn sensor_nulls() {
-    let count: u64 = std::env::var("CASES").ok().and_then(|c| c.parse().ok()).unwrap_or(40);
-    for noise in [NoiseKind::White, NoiseKind::Slow, NoiseKind::Mixed, NoiseKind::Smooth] {
-        let mut found = Vec::new();
-        for seed in 0..count {
-            let d = answer(&make(&case(Effect::None, 1.0, noise, 1000 + seed))).diagnosis;
-            if d.verdict != Verdict::None {
-                let names = d.effects.iter().map(|e| e.name.clone());
-                found.push(names.chain(d.unknown.iter().map(|u| u.covariate.clone())).collect::<Vec<_>>());
-            }
-        }
-        println!("{noise:?}: {} of {count}: {found:?}", found.len());
-    }
-}
 
 /// Autocorrelated noise is not an effect.
 #[test]
@@ -320,35 +224,4 @@ fn comparisons_refit_gain_and_offset() {
     assert!(with.rmse_n < 1e-9 && without.rmse_n > 0.1, "{with:?} {without:?}");
     assert_eq!(with.by_session.len(), 2);
     assert!(compare_sensor(&SensorData::default(), &[]).is_err());
-}
-
-/// Both of two effects, with noise of three kinds: prints how often.
-#[test]
-#[ignore = "a benchmark that takes minutes"]
-fn sensor_pairs() {
-    let count: u64 = std::env::var("CASES").ok().and_then(|c| c.parse().ok()).unwrap_or(6);
-    for noise in [NoiseKind::White, NoiseKind::Slow, NoiseKind::Mixed] {
-        let (mut both, mut one, mut extra, mut all) = (0, 0, 0, 0);
-        let mut wrong = Vec::new();
-        for (i, (a, name_a)) in NAMED.into_iter().enumerate() {
-            for (b, name_b) in NAMED.into_iter().skip(i + 1) {
-                for seed in 0..count {
-                    let mut two = case(a, 6.0, noise, 300 + seed);
-                    two.effects.push(b);
-                    let d = answer(&make(&two)).diagnosis;
-                    let named = |n: &str| d.effects.iter().any(|e| e.name == n);
-                    let hits = u32::from(named(name_a)) + u32::from(named(name_b));
-                    all += 1;
-                    both += u32::from(hits == 2);
-                    one += u32::from(hits >= 1);
-                    extra += d.effects.len() as u32 - hits + d.unknown.len() as u32;
-                    if hits < 2 {
-                        let names: Vec<&str> = d.effects.iter().map(|e| &e.name[7..]).collect();
-                        wrong.push(format!("{}+{}->{}", &name_a[7..], &name_b[7..], names.join("+")));
-                    }
-                }
-            }
-        }
-        println!("{noise:?}: both {both}, one at least {one} of {all}, extra {extra}: {wrong:?}");
-    }
 }
