@@ -4,6 +4,7 @@ use crate::compare::compare_pulls;
 use crate::diagnose::UnknownPartError;
 use crate::library::Library;
 use crate::report::{Mark, Plot, Series};
+use gripgen_twin::columns::{self, Column, Kind};
 use gripgen_twin::effects::{Effect, EffectSpec, OutsideFit, Per};
 use gripgen_twin::{Covariates, MeasuredPull, MeasuredPulls, Twin};
 
@@ -24,56 +25,34 @@ pub struct EffectCurve {
     pub ratio: Vec<f64>,
 }
 
-/// How one column is varied: its range, and whether in equal ratios.
+/// How one column is varied: its range in its unit, and whether in equal ratios.
 struct Sweep {
     column: &'static str,
     range: (f64, f64),
     log: bool,
-    set: fn(&mut MeasuredPull, f64),
 }
 
 /// Ranges that a rig covers in a day.
 const SWEEPS: [Sweep; 9] = [
-    Sweep { column: "grip_force_n", range: (5.0, 80.0), log: false, set: |p, x| p.grip_force_n = x },
-    Sweep { column: "force_increment_n", range: (0.2, 5.0), log: true, set: |p, x| p.increment_n = x },
-    Sweep { column: "dwell_s", range: (0.1, 300.0), log: true, set: |p, x| p.covariates.dwell_s = x },
-    Sweep {
-        column: "pull_index",
-        range: (0.0, 480.0),
-        log: false,
-        set: |p, x| p.covariates.pull_index = x as u64,
-    },
-    Sweep { column: "time_s", range: (0.0, 28_800.0), log: false, set: |p, x| p.covariates.time_s = x },
-    Sweep {
-        column: "temperature_c",
-        range: (15.0, 35.0),
-        log: false,
-        set: |p, x| p.covariates.temperature_c = x,
-    },
-    Sweep {
-        column: "grip_offset_mm",
-        range: (-15.0, 15.0),
-        log: false,
-        set: |p, x| p.covariates.grip_offset_m = x * 1e-3,
-    },
-    Sweep {
-        column: "grip_angle_deg",
-        range: (-90.0, 90.0),
-        log: false,
-        set: |p, x| p.covariates.grip_angle_rad = x.to_radians(),
-    },
-    Sweep {
-        column: "pull_direction",
-        range: (-1.0, 1.0),
-        log: false,
-        set: |p, x| p.covariates.pull_direction = x,
-    },
+    Sweep { column: "grip_force_n", range: (5.0, 80.0), log: false },
+    Sweep { column: "force_increment_n", range: (0.2, 5.0), log: true },
+    Sweep { column: "dwell_s", range: (0.1, 300.0), log: true },
+    Sweep { column: "pull_index", range: (0.0, 480.0), log: false },
+    Sweep { column: "time_s", range: (0.0, 28_800.0), log: false },
+    Sweep { column: "temperature_c", range: (15.0, 35.0), log: false },
+    Sweep { column: "grip_offset_mm", range: (-15.0, 15.0), log: false },
+    Sweep { column: "grip_angle_deg", range: (-90.0, 90.0), log: false },
+    Sweep { column: "pull_direction", range: (-1.0, 1.0), log: false },
 ];
 
 impl Sweep {
+    fn column(&self) -> &'static Column {
+        columns::find(self.column).expect("a sweep names a column")
+    }
+
     fn values(&self) -> Vec<f64> {
         let (low, high) = self.range;
-        if self.column == "pull_direction" {
+        if self.column().kind == Kind::Direction {
             return vec![low, high];
         }
         let at = |k: usize| {
@@ -112,7 +91,7 @@ pub fn effect_curve(
             max_pull_force_n: 0.0,
             trace: None,
         };
-        (sweep.set)(&mut pull, *x);
+        sweep.column().set_number(&mut pull.edit(), *x);
         pull
     };
     let measured = MeasuredPulls {

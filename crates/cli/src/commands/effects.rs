@@ -67,6 +67,23 @@ fn found_in(spec: &EffectSpec) -> Vec<&'static str> {
     channels.into_iter().filter(|(finds, _)| *finds).map(|(_, name)| name).collect()
 }
 
+/// The same with what has to vary, or why nothing finds it.
+fn found_text(spec: &EffectSpec) -> String {
+    let channels = found_in(spec).join(", ");
+    let varies = |spans| [spec.covariates, spans].concat().join(" or ");
+    match spec.pulls {
+        Err(why) if channels.is_empty() => format!("nothing: {why}"),
+        Err(_) => match varies(&[]) {
+            names if names.is_empty() => channels,
+            names => format!("{channels}, where {names} varies"),
+        },
+        Ok(fit) => match varies(fit.spans) {
+            names if names.is_empty() => channels,
+            names => format!("{channels}, of pulls where {names} varies"),
+        },
+    }
+}
+
 fn list() -> String {
     let mut text = String::new();
     for group in Group::ALL {
@@ -127,18 +144,7 @@ fn page(spec: &EffectSpec) -> String {
         paragraph(&mut text, if k == 0 { "parameters" } else { "" }, &body);
     }
     paragraph(&mut text, "its number", spec.number_means);
-    let found = match (found_in(spec), spec.pulls) {
-        (found, Err(why)) if found.is_empty() => format!("nothing: {why}"),
-        (found, pulls) => {
-            let spans = pulls.map_or(&[][..], |fit| fit.spans);
-            let vary = [spec.covariates, spans].concat().join(" or ");
-            let only =
-                if vary.is_empty() { String::new() } else { format!(", of pulls where {vary} varies") };
-            let only = if pulls.is_ok() { only } else { only.replace(", of pulls where", ", where") };
-            format!("{}{only}", found.join(", "))
-        }
-    };
-    paragraph(&mut text, "found in", &found);
+    paragraph(&mut text, "found in", &found_text(spec));
     for (k, experiment) in spec.experiments.iter().enumerate() {
         paragraph(&mut text, if k == 0 { "shown by" } else { "" }, experiment.text());
     }
