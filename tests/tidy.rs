@@ -1,6 +1,7 @@
 //! The repository itself.
 
 use crate::common::root;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 fn read(path: &str) -> String {
@@ -233,7 +234,9 @@ fn effects_are_named_in_their_own_files() {
     let architecture = read("ARCHITECTURE.md");
     let (_, list) = architecture.split_once("## Who names an effect").unwrap();
     let list = list.split("\n## ").next().unwrap();
-    let mut listed = 0;
+    let listed: BTreeSet<&str> =
+        list.lines().filter_map(|l| l.strip_prefix("- `")?.split('`').next()).collect();
+    let mut naming = BTreeSet::new();
     for path in with_extension(&["rs", "py", "wgsl", "html"]) {
         let relative = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
         let elsewhere =
@@ -246,12 +249,12 @@ fn effects_are_named_in_their_own_files() {
         let text = without_tests(&std::fs::read_to_string(&path).unwrap());
         for spec in gripgen::twin::effects::LIBRARY {
             if ['"', '\'', '`'].iter().any(|quote| text.contains(&format!("{quote}{}{quote}", spec.id))) {
-                assert!(list.contains(&format!("`{relative}`")), "{relative} names `{}`", spec.id);
-                listed += 1;
+                assert!(listed.contains(&*relative), "{relative} names `{}`", spec.id);
+                naming.insert(relative.clone());
             }
         }
     }
-    assert!(listed > 0, "the list is empty");
+    assert!(listed.iter().eq(&naming), "{listed:?} are listed, {naming:?} name effects");
 }
 
 /// Keys of configuration files carry their unit.

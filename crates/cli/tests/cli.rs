@@ -5,6 +5,9 @@
 // Planning a campaign, and making it on a twin.
 #[path = "cli/campaign.rs"]
 mod campaign;
+// The catalogue of effects.
+#[path = "cli/effects.rs"]
+mod effects;
 // Calibrating a sensor and comparing with it.
 #[path = "cli/measured.rs"]
 mod measured;
@@ -417,28 +420,6 @@ fn schema_and_completions_print() {
         assert_code(&output, 0);
         assert!(text(&output.stdout).contains("gripgen"));
     }
-}
-
-/// The catalogue lists every effect, explains one with its curve, draws it, and helps with a typing error.
-#[test]
-fn effects_are_listed_explained_and_drawn() {
-    let text = |output: &Output| String::from_utf8(output.stdout.clone()).unwrap();
-    let list = run(&["effects"]);
-    assert!(list.status.success() && text(&list).contains("  sensor_creep "));
-    let all: serde_json::Value = serde_json::from_slice(&run(&["effects", "--json"]).stdout).unwrap();
-    assert!(all.as_array().unwrap().len() > 30);
-    let folder = tempfile::tempdir().unwrap();
-    let svg = folder.path().join("curve.svg");
-    let page = run(&["effects", "load_power_law", "--plot", svg.to_str().unwrap()]);
-    assert!(text(&page).contains("mu' = mu (F_G / f_ref_n)^n") && text(&page).contains("grip_force_n"));
-    assert!(std::fs::read_to_string(&svg).unwrap().starts_with("<svg xmlns"));
-    let one: serde_json::Value =
-        serde_json::from_slice(&run(&["effects", "load_power_law", "--json"]).stdout).unwrap();
-    assert_eq!(one["f_max"]["covariate"], "grip_force_n");
-    assert_eq!(one["f_max"]["x"].as_array().unwrap().len(), one["f_max"]["ratio"].as_array().unwrap().len());
-    let typo = run(&["effects", "load_powerlaw"]);
-    assert_eq!(typo.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&typo.stderr).contains("did you mean `load_power_law`?"));
 }
 
 /// `gripgen schema | head -1` is no failure.

@@ -184,17 +184,28 @@ fn experiments_separate_what_they_show_from_what_they_leave() {
     }
 }
 
-/// A slope that vanishes at the neutral value is that of an effect of which a little does nothing.
+/// A slope that vanishes at the neutral value is that of an effect of which a little does nothing, and the other way round.
 #[test]
 fn flat_effects_do_nothing_while_they_are_small() {
-    for spec in LIBRARY.iter().filter(|s| s.pulls.is_ok_and(|fit| fit.flat_at_neutral)) {
+    let mut flat = 0;
+    for spec in LIBRARY {
+        let Ok(fit) = spec.pulls else { continue };
         let p = spec.parameters[0];
         let far = if p.neutral > 0.0 { p.bounds.0 } else { p.bounds.1 };
         let mut values = spec.values(&[]);
         values[0] = p.neutral + 1e-4 * (far - p.neutral);
-        let at = SensorPoint { clock_s: 0.0, step_s: 0.01 };
-        let read = spec.sensor.map(|hook| hook(&values, 80.0, &mut SensorMemory::default(), &at));
-        let sent = spec.command.map(|hook| hook(&values, 80.0, 79.0));
-        assert_eq!(read.or(sent), Some(80.0), "{}", spec.id);
+        // Two forces, a microsecond apart and an hour after the start, so that what has a memory or reads the clock does something.
+        let mut memory = SensorMemory::default();
+        let mut read = |hook: SensorHook, force_n, clock_s| {
+            hook(&values, force_n, &mut memory, &SensorPoint { clock_s, step_s: 1e-6 })
+        };
+        let felt = match (spec.sensor, spec.command) {
+            (Some(hook), _) => [read(hook, 40.0, 3600.0) - 40.0, read(hook, 80.0, 3600.0) - 80.0],
+            (_, Some(hook)) => [hook(&values, 80.0, 79.0) - 80.0, 0.0],
+            (None, None) => continue,
+        };
+        assert_eq!(felt == [0.0, 0.0], fit.flat_at_neutral, "{}: {felt:?}", spec.id);
+        flat += usize::from(fit.flat_at_neutral);
     }
+    assert!(flat > 0, "no effect is flat");
 }
