@@ -36,7 +36,7 @@ fn project(part: &str, mechanics: &str, images: &str) -> Project {
 }
 
 /// `physics/sample/<mechanics>/<part>`: grip, imprint and pull, no images. `physics/pull/<mechanics>/<arm>`: grip and
-/// pull of the shaft at 40 N with 64 cells a jaw, noise and trace.
+/// pull of the shaft at 40 N with 64 cells per jaw, noise and trace.
 fn physics(c: &mut Criterion) {
     let mut group = c.benchmark_group("physics");
     group.sample_size(20).throughput(Throughput::Elements(1));

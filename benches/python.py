@@ -23,7 +23,7 @@ SECONDS = 4.0
 
 
 def rate(of, per_call: int) -> float:
-    """Things a second: the best of three goes."""
+    """Things per second: the best of three goes."""
     best = 0.0
     for _ in range(3):
         started, n = time.perf_counter(), 0
@@ -79,7 +79,7 @@ def main() -> None:
 
 
 def environments() -> None:
-    """Steps a second under the staircase, restarts included."""
+    """Steps per second under the staircase, restarts included."""
     import gymnasium as gym
 
     policy = gg.Staircase()

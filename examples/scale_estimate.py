@@ -2,7 +2,7 @@
 
     python examples/scale_estimate.py
 
-measures this machine (samples a second and core, bytes a sample) with small sweeps, then simulates clusters: workers that make a shard
+measures this machine (samples per second and core, bytes per sample) with small sweeps, then simulates clusters: workers that make a shard
 and upload it through a store whose bandwidth they share, nodes that die and lose the shard under way. Prints a Markdown
 table; `docs/scale.md` has that of one run. Prices and bandwidths are assumptions, given as options.
 """

@@ -1,4 +1,4 @@
-//! How many tactile images a second, on this machine: from a pose to an image with noise.
+//! How many tactile images per second, on this machine: from a pose to an image with noise.
 
 use gripgen_tactile::gpu::{
     AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRenderer, GpuRequest, GpuSensor,
@@ -74,7 +74,7 @@ pub struct BenchRate {
 }
 
 impl BenchRate {
-    /// Images a second.
+    /// Images per second.
     pub fn images_per_s(&self) -> f64 {
         self.images as f64 / self.seconds
     }
@@ -160,6 +160,10 @@ impl Work {
 }
 
 /// Measures.
+///
+/// # Errors
+///
+/// A twin, part or sensor that cannot be loaded, no device for the GPU backend, or a press that fails.
 pub fn bench(options: &BenchOptions) -> Result<BenchReport, BenchError> {
     // The adapter first: without one there is nothing to wait for.
     let gpu = match options.backend {

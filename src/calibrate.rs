@@ -26,6 +26,10 @@ pub enum CalibratePullsError {
 /// Fits the baseline of `twin` to measured pulls, with the law and the effects asked for, and returns what changes in the
 /// twin. Its own effects on pulls are replaced by those fitted; laws are written for the range they were fitted on, and
 /// extrapolated.
+///
+/// # Errors
+///
+/// A part that the twin lacks, a twist that fits cannot follow, or pulls that allow no fit.
 pub fn calibrate_twin(
     measured: &MeasuredPulls,
     twin: &Twin,

@@ -56,6 +56,10 @@ pub enum SimulateCampaignError {
 ///
 /// Pull `i` of the campaign has the id `p` and four digits; its clock is the time that the campaign took so far. Pulls
 /// that fail or do not slip are left out and counted in the notes; entries without a load only take their time.
+///
+/// # Errors
+///
+/// A twin that cannot be loaded, a part that it lacks, or a grip force beyond its gripper.
 pub fn simulate_campaign(
     twin: &Location,
     sets: &[(String, String)],

@@ -53,6 +53,10 @@ impl LabelErrors {
 
 /// Predicts every pull of a campaign through the simulator, with expected values over scatter and noise, and compares.
 /// `library` holds the files of the twin.
+///
+/// # Errors
+///
+/// A part that the twin lacks.
 pub fn compare_pulls(
     measured: &MeasuredPulls,
     twin: &Twin,

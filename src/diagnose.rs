@@ -1,4 +1,4 @@
-//! Diagnoses: measurements and a twin in, an answer and a better twin out. One file a channel.
+//! Diagnoses: measurements and a twin in, an answer and a better twin out. One file per channel.
 
 mod measured_presses;
 mod next;

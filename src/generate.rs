@@ -63,6 +63,10 @@ fn try_generate(
 }
 
 /// Simulates one scenario on a twin. `gpu` makes the images where `options` say so.
+///
+/// # Errors
+///
+/// What makes a sample fail: a grip, an imprint, a friction law, a pull or the GPU ([`SampleError`]).
 pub fn simulate(
     twin: &Twin,
     library: &Library,
@@ -82,6 +86,10 @@ pub struct StartedPull {
 }
 
 /// Grips for a scenario and stops before the pull, which the caller commands step by step.
+///
+/// # Errors
+///
+/// What makes a sample fail before its pull: a grip, an imprint or a friction law ([`SampleError`]).
 pub fn start_pull(
     twin: &Twin,
     library: &Library,
@@ -193,6 +201,10 @@ fn pull(
 }
 
 /// The imprints of a scenario's grip, without pulling; `None` without contact.
+///
+/// # Errors
+///
+/// A grip or an imprint that fails.
 pub fn press_only(
     twin: &Twin,
     library: &Library,

@@ -59,6 +59,10 @@ struct Resident {
 
 impl Gpu {
     /// Opens an adapter: the one named, or the first graphics processor.
+    ///
+    /// # Errors
+    ///
+    /// No adapter, or one that cannot do what the stages need.
     pub fn open(adapter: Option<&str>) -> Result<Self, GpuError> {
         let choice = adapter.map_or(AdapterChoice::Hardware, |name| AdapterChoice::Named(name.into()));
         Ok(Self {

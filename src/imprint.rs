@@ -92,6 +92,10 @@ impl ImprintCalibrations {
 
 /// Fits the imprint constant of every part with images in `folder`, the folder that `measured` was read from. Effects of the
 /// twin are left aside: c is that of `V = c F` with the commanded force. Parts without images are left as they are.
+///
+/// # Errors
+///
+/// Images or a twin that cannot be loaded, a grip that fails, or images of another size than those of the sensor.
 pub fn calibrate_imprints(
     folder: &Path,
     measured: &MeasuredPulls,

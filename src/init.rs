@@ -74,6 +74,10 @@ pub fn starter() -> Vec<StarterFile> {
 }
 
 /// A sweep, a twin with proposed grips, and a picture, for the mesh file at `path`.
+///
+/// # Errors
+///
+/// A file that is no mesh, or a part on which no grip is found.
 pub fn part_starter(path: &Path, folder: &Path, scale_mm_per_unit: f64) -> Result<PartStarter, InitError> {
     let location = Location::Disk(path.into());
     let bytes = location.read()?;

@@ -10,7 +10,7 @@ use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh, Twin};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Meshes, shapes and sensors kept at a time. A sweep that draws a scale or a resolution makes a new one a sample.
+/// Meshes, shapes and sensors kept at a time. A sweep that draws a scale or a resolution makes a new one per sample.
 const MESHES: usize = 64;
 const SHAPES: usize = 256;
 const SENSORS: usize = 8;
@@ -126,6 +126,10 @@ impl LibraryError {
 
 impl Library {
     /// The files that the grips of a twin need: meshes, robot and sensors. `beside` is where the twin lies.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read.
     pub fn of_twin(twin: &Twin, beside: &Location) -> Result<Self, ReadFileError> {
         let meshes = twin.parts.values().map(|part| &part.mesh);
         let sensors = twin.optics.iter().flat_map(|(_, o)| {
@@ -170,6 +174,10 @@ impl Library {
     }
 
     /// The mesh of a part, in metres.
+    ///
+    /// # Errors
+    ///
+    /// A file that is not of this twin, or no mesh.
     pub fn mesh(&self, part: &Part) -> Result<Arc<TriMesh>, LibraryError> {
         let key = (part.mesh.clone(), part.metres_per_unit.to_bits());
         self.meshes.get(key, || {
@@ -180,12 +188,20 @@ impl Library {
     }
 
     /// The mesh of a part, prepared for the tactile images.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::mesh`].
     pub fn clustered_mesh(&self, part: &Part) -> Result<Arc<ClusteredMesh>, LibraryError> {
         let key = (part.mesh.clone(), part.metres_per_unit.to_bits());
         self.clustered.get(key, || Ok(ClusteredMesh::new(&*self.mesh(part)?)))
     }
 
     /// The contact shape of a part in one of its grips, in the part frame.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::mesh`], or a contact shape that cannot be built.
     pub fn shape(&self, part: &Part, grip_pose: usize) -> Result<Arc<PartShape>, LibraryError> {
         let pose = &part.grips[grip_pose];
         let (t, q) = (pose.translation.vector, pose.rotation.coords);
@@ -199,6 +215,10 @@ impl Library {
     }
 
     /// An arm in its stance.
+    ///
+    /// # Errors
+    ///
+    /// A file that is not of this twin or no URDF, or a stance that the arm cannot take.
     pub fn arm(&self, arm: &RobotArm) -> Result<Arc<PlacedArm>, LibraryError> {
         self.arms.get(arm.clone(), || {
             // Where its meshes are was checked when the configuration was loaded; they are not used.
@@ -230,6 +250,10 @@ impl Library {
     }
 
     /// The tactile sensor that a twin's optics name.
+    ///
+    /// # Errors
+    ///
+    /// A file that is not of this twin or no sensor, or one that does not fit the gel.
     pub fn sensor(&self, optics: &Optics) -> Result<Arc<Sensor>, LibraryError> {
         let named = [
             Some(optics.sensor.clone()),

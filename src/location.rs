@@ -70,6 +70,10 @@ impl Location {
     }
 
     /// Reads the file.
+    ///
+    /// # Errors
+    ///
+    /// No such file or asset, or one that cannot be read.
     pub fn read(&self) -> Result<Cow<'static, [u8]>, ReadFileError> {
         let error = |problem: String| ReadFileError { location: self.clone(), problem };
         match self {
@@ -83,6 +87,10 @@ impl Location {
     }
 
     /// Reads a text file.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`], or bytes that are not UTF-8.
     pub fn read_text(&self) -> Result<String, ReadFileError> {
         String::from_utf8(self.read()?.into_owned())
             .map_err(|e| ReadFileError { location: self.clone(), problem: format!("not text: {e}") })

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 pub struct LoadedPulls {
     /// The pulls.
     pub pulls: MeasuredPulls,
-    /// Remarks, one a sentence.
+    /// Remarks, one per sentence.
     pub notes: Vec<String>,
 }
 
@@ -80,6 +80,10 @@ pub enum LoadPullsError {
 /// are those whose label rule is not that of the first. Its covariates are those stored with each sample; what a sweep
 /// drew beside them (`parts.gear.mu`) is not known to an experiment and stays out, what a rig measured beside them is a
 /// covariate of unknown meaning. Pulls whose label is suspect are left out too.
+///
+/// # Errors
+///
+/// A folder that cannot be read, or in which no pull can be used.
 pub fn load_pulls(path: &Path) -> Result<LoadedPulls, LoadPullsError> {
     load_one(path, Suspects::LeaveOut)
 }
@@ -102,11 +106,19 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
 
 /// Loads several folders as one campaign, in their order: what was measured later on the same rig. Pulls whose ids are taken get the
 /// name of their folder before them; what only some of the folders recorded counts as not recorded.
+///
+/// # Errors
+///
+/// As [`load_pulls`], or folders whose labels are taken by two rules.
 pub fn load_pulls_of(folders: &[&Path]) -> Result<LoadedPulls, LoadPullsError> {
     load_pulls_with(folders, Suspects::LeaveOut)
 }
 
 /// The same, with what becomes of pulls whose label is suspect.
+///
+/// # Errors
+///
+/// As [`load_pulls_of`].
 pub fn load_pulls_with(folders: &[&Path], suspects: Suspects) -> Result<LoadedPulls, LoadPullsError> {
     let Some((first, rest)) = folders.split_first() else {
         return Err(LoadPullsError::Nothing { path: PathBuf::new(), notes: "no folder was named".into() });
@@ -394,7 +406,7 @@ mod tests {
             measured_force_n: time_s,
             displacement_m: 0.0,
         };
-        // 500 a second, some before the pull, with a gap.
+        // 500 per second, some before the pull, with a gap.
         let before = (0..21).map(|i| at(-3.0 + 0.002 * f64::from(i)));
         let trace: PullTrace = before.chain((0..501).map(|i| at(0.002 * f64::from(i)))).collect();
         let thin = thinned(&trace);

@@ -51,6 +51,10 @@ pub(crate) struct OffsetFit {
 }
 
 /// Evaluates a run of `paper.toml` beside one of the same sweep on the twin without effects.
+///
+/// # Errors
+///
+/// A run that cannot be read, or is not one of `paper.toml`.
 pub fn paper_report(corrected: &RunFolder, plain: &RunFolder) -> Result<PaperReport, PaperError> {
     let (with, without) = (parts(corrected)?, parts(plain)?);
     if let Some(part) = with.iter().find(|part| part.law.is_none()) {

@@ -40,6 +40,10 @@ pub struct Probe {
 }
 
 /// Tries out a few samples spread over the sweep and extrapolates. Writes nothing.
+///
+/// # Errors
+///
+/// No device for the GPU backend, or an image that cannot be compressed.
 pub fn plan(project: &Project, simd: SimdLevel) -> Result<Plan, SweepError> {
     project.prepare_gpu()?;
     let samples = project.sweep.samples;

@@ -106,6 +106,10 @@ pub fn is_press_set(path: &Path) -> bool {
 
 /// Loads a press set. A `dataPack.npz` has Taxim's geometry (4.0 mm, 0.0295 mm per pixel) unless another one is given;
 /// for a folder both have to be.
+///
+/// # Errors
+///
+/// A path that is no press set, files that cannot be read, images of two sizes, or a missing or impossible geometry.
 pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, LoadPressesError> {
     let length = |what, value_m: Option<f64>, min_mm: f64, max_mm: f64| match value_m
         .map(|m| (m * 1e9).round() * 1e-6)
@@ -258,6 +262,10 @@ pub enum LoadSensorError {
 }
 
 /// Reads a sensor file.
+///
+/// # Errors
+///
+/// A file that cannot be read, or is no sensor.
 pub fn load_sensor(location: &Location) -> Result<Arc<Sensor>, LoadSensorError> {
     let optics = Optics {
         sensor: location.to_string(),
@@ -272,6 +280,10 @@ pub fn load_sensor(location: &Location) -> Result<Arc<Sensor>, LoadSensorError> 
 
 /// The sensor of a twin's left jaw, with what the twin puts beside it; the deformation is that of the twin's gel unless the
 /// sensor file has one.
+///
+/// # Errors
+///
+/// A twin that cannot be loaded, or as [`load_sensor`].
 pub fn load_twin_sensor(twin: &Location) -> Result<Arc<Sensor>, LoadSensorError> {
     let document = load_twin_document(twin, &[])?;
     let read = document.read_twin().map_err(LoadError::from)?;

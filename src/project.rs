@@ -73,6 +73,10 @@ pub enum LoadError {
 }
 
 /// Loads a twin: its text, the overrides meant for it, and defaults for what it leaves out.
+///
+/// # Errors
+///
+/// A file that cannot be read or is no TOML, or an override of a key that cannot be set.
 pub fn load_twin_document(location: &Location, sets: &[(String, String)]) -> Result<Document, LoadError> {
     let mut document = Document::parse(&location.to_string(), &location.read_text()?)?;
     let baseline: toml::Table =
@@ -86,6 +90,10 @@ pub fn load_twin_document(location: &Location, sets: &[(String, String)]) -> Res
 
 impl Project {
     /// Loads a sweep and all files it names. `sets` are overrides `key=value`, for the sweep or for the twin.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, or a key with a value out of range.
     pub fn load(location: &Location, sets: &[(String, String)]) -> Result<Self, LoadError> {
         let mut document = Document::parse(&location.to_string(), &location.read_text()?)?;
         for (key, value) in sets.iter().filter(|(key, _)| !is_twin_key(key)) {
@@ -117,6 +125,10 @@ impl Project {
 
     /// Loads the sweep that made a run folder, from what the folder holds. Refuses what this gripgen would not make
     /// again bit for bit.
+    ///
+    /// # Errors
+    ///
+    /// A run of another version, or whose files were changed.
     pub fn from_run(folder: &RunFolder) -> Result<Self, LoadError> {
         let info = folder.info();
         if info.gripgen_version != VERSION {
@@ -140,6 +152,10 @@ impl Project {
     }
 
     /// The graphics processor that makes the images; `None` if the processor does.
+    ///
+    /// # Errors
+    ///
+    /// No adapter, or one that cannot do what the sweep asks for.
     pub fn gpu(&self) -> Result<Option<&Gpu>, GpuError> {
         if self.sweep.backend == Backend::Cpu || self.sweep.images == ImageStorage::None {
             return Ok(None);
@@ -162,6 +178,10 @@ impl Project {
     }
 
     /// The twin of sample `index`.
+    ///
+    /// # Errors
+    ///
+    /// Values drawn for this sample that make no twin.
     pub fn twin_of(&self, index: u64) -> Result<Cow<'_, Twin>, ConfigError> {
         if !self.sweep.varies_twin() {
             return Ok(Cow::Borrowed(&self.twin));

@@ -18,6 +18,10 @@ const OF_THE_NETWORK: [(&[&str], &[&str]); 6] = [
 
 /// Sections `[rig]` and `[campaign]`: limits and poses, and every pull that is to be made. Two campaigns of the same text are the
 /// same run, wherever the devices are.
+///
+/// # Errors
+///
+/// A configuration that TOML cannot hold.
 pub fn rig_run_toml(rig: &impl Serialize, campaign: &Campaign) -> Result<String, toml::ser::Error> {
     let campaign = campaign_toml(campaign, "");
     let mut campaign: toml::Table =

@@ -28,6 +28,10 @@ pub struct Draw {
 
 impl Simulator {
     /// Loads a twin with its files. `sets` are overrides of the twin, and of the pull (`pull.increment_n`).
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, or a key with a value out of range.
     pub fn open(
         twin: &Location,
         sets: &[(String, String)],
@@ -90,6 +94,10 @@ impl Simulator {
     }
 
     /// Simulates a pull. What the configuration forbids is an error; what physics forbids is a failed sample.
+    ///
+    /// # Errors
+    ///
+    /// An unknown key, or a value out of range.
     pub fn pull(
         &self,
         values: &BTreeMap<String, Drawn>,
@@ -105,6 +113,10 @@ impl Simulator {
     }
 
     /// Grips, and is ready to pull: what follows is up to the caller's commands.
+    ///
+    /// # Errors
+    ///
+    /// An unknown key, a value out of range, or what makes a sample fail before its pull.
     pub fn start(
         &self,
         values: &BTreeMap<String, Drawn>,

@@ -156,12 +156,20 @@ pub fn run_info(project: &Project) -> RunInfo {
 
 /// Makes the folder of a run, or opens it: `run.json` and the files that it depends on, no sample yet. Refuses a folder that
 /// holds another run.
+///
+/// # Errors
+///
+/// A folder that cannot be written, or that holds another run.
 pub fn prepare_run(project: &Project, out: &Path) -> Result<RunFolder, SweepError> {
     RunFolder::create(out, run_info(project), &project.library.disk_files())
         .map_err(|e| explain_refusal(project, e))
 }
 
 /// Runs a sweep into `out`, or what is missing of it. `stop` ends it after the shards under way.
+///
+/// # Errors
+///
+/// As [`prepare_run`]; a slice that there is not, a shard that cannot be written, or no device for the GPU backend.
 pub fn sweep(
     project: &Project,
     out: &Path,

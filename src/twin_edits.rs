@@ -52,6 +52,10 @@ pub enum WriteTwinError {
 }
 
 /// The twin at `base` with overrides and edits applied, its paths as they stand there.
+///
+/// # Errors
+///
+/// A twin that cannot be loaded, or edits that make none.
 pub fn edited_twin(
     base: &Location,
     sets: &[(String, String)],
@@ -79,6 +83,10 @@ pub fn edited_twin(
 ///
 /// The paths in it are written anew so that they name the same files from where `out` lies; those inside gripgen and
 /// absolute ones stay. Comments of the old file are not kept.
+///
+/// # Errors
+///
+/// As [`edited_twin`], or a file that cannot be written.
 pub fn write_twin(
     base: &Location,
     sets: &[(String, String)],

@@ -7,6 +7,10 @@ use gripgen_twin::config::ConfigError;
 impl Project {
     /// Loads a twin for pulls of `parts`. Its sweep has the shipped pull settings and draws nothing of use; `images` says
     /// whether files of the sensors are needed. `sets` are overrides of the twin, and of the sweep's settings.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, a part that the twin lacks, or a key with a value out of range.
     pub fn of_twin(
         twin: &Location,
         parts: &[&str],

@@ -283,7 +283,7 @@ fn an_effect_that_the_library_lacks_comes_back_as_its_covariate() {
         };
         comes_back(&simulated_at(&effect, 90, &[], places), id, columns);
     }
-    // The planner does not heat: a temperature is made up, and labels fall by 2 % a kelvin.
+    // The planner does not heat: a temperature is made up, and labels fall by 2 % per kelvin.
     let mut measured = simulated("", 90, &[]);
     for (i, pull) in measured.pulls.iter_mut().enumerate() {
         let degrees = 23.0 + 4.0 * (i as f64 * 0.7).sin();

@@ -265,7 +265,7 @@ fn check(path: &Path, folder: &RunFolder, pulls: &[RigPull], made: usize) {
         let picture = decode_picture(&png).unwrap();
         (picture.width_px, picture.height_px)
     };
-    // Three images a jaw and no heights, also of the pull that failed.
+    // Three images per jaw and no heights, also of the pull that failed.
     for pull in [1, 2] {
         assert_eq!(size(sample_picture(folder, pull).unwrap()).0, 3 * 416 + 16);
     }

@@ -43,7 +43,7 @@ pub struct Entry {
     pub target: String,
     /// What the numbers are.
     pub unit: Unit,
-    /// One number a sample, in the order in which they were taken.
+    /// One number per sample, in the order in which they were taken.
     pub samples: Vec<f64>,
 }
 

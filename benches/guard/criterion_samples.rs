@@ -18,7 +18,7 @@ struct Sample {
     times: Vec<f64>,
 }
 
-/// Nanoseconds a call, by name, of the benchmarks that were measured since `started`.
+/// Nanoseconds per call, by name, of the benchmarks that were measured since `started`.
 pub fn since(folder: &Path, started: SystemTime) -> BTreeMap<String, Vec<f64>> {
     let mut found = BTreeMap::new();
     let mut open = vec![folder.to_path_buf()];

@@ -30,7 +30,7 @@ pub struct PressDiagnosisInput<'a> {
     pub set: &'a PressSet,
     /// The sensor file as it stands.
     pub sensor: &'a Sensor,
-    /// Seconds since the first press, where it was written down; one press a minute is assumed otherwise.
+    /// Seconds since the first press, where it was written down; one press per minute is assumed otherwise.
     pub time_s: Option<Vec<f64>>,
     /// Further columns of the table, a value for each press.
     pub covariates: Vec<PressCovariate>,

@@ -80,6 +80,10 @@ pub(crate) fn check_fit(measured: &MeasuredPulls, twin: &Twin) -> Result<(), Pul
 }
 
 /// What a twin says of pulls, without its effects: where fits start.
+///
+/// # Errors
+///
+/// A part that the twin lacks.
 pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPartError> {
     let found = parts.iter().map(|name| known_part(twin, name)).collect::<Result<Vec<_>, _>>()?;
     let mean = |f: &dyn Fn(&gripgen_twin::Part) -> f64| {
@@ -109,6 +113,10 @@ const MAX_PULLS: usize = 2000;
 
 /// Diagnoses a campaign of pulls. `progress` is told the share that is done. Of a very long campaign every so many pulls are
 /// looked at, and a note says so. `library` holds the files of the twin.
+///
+/// # Errors
+///
+/// A part that the twin lacks, or a twist that fits cannot follow.
 pub fn diagnose_pull_table(
     measured: &MeasuredPulls,
     twin: &Twin,

@@ -23,6 +23,10 @@ pub fn is_sensor_table(path: &Path) -> bool {
 }
 
 /// Reads the table of a folder.
+///
+/// # Errors
+///
+/// A table that cannot be read.
 pub fn load_sensor_table(folder: &Path) -> Result<SensorTable, TableError> {
     read_sensor_table(folder)
 }
@@ -38,12 +42,20 @@ pub fn diagnose_sensor_table(table: &SensorTable) -> Diagnosed {
 }
 
 /// Gain and offset of each session; the error says what the table lacks.
+///
+/// # Errors
+///
+/// A table from which gain and offset do not follow; the text says why.
 pub fn calibrate_sensor_table(table: &SensorTable) -> Result<SensorCalibration, String> {
     calibrate_sensor(&data(table))
 }
 
 /// Error of the sensor effects of a twin on a table, gain and offset of each session refitted; the error says what the
 /// table lacks. Gain and bias effects of the twin are part of what is refitted.
+///
+/// # Errors
+///
+/// A table from which gain and offset do not follow; the text says why.
 pub fn compare_sensor_table(table: &SensorTable, twin: &Twin) -> Result<SensorComparison, String> {
     let acting = twin.effects.iter().filter(|e| e.spec.sensor.is_some() && e.part.is_none());
     let effects: Vec<(&EffectSpec, &[f64])> = acting.map(|e| (e.spec, e.values.as_slice())).collect();
@@ -96,6 +108,10 @@ fn effect_file(spec: &EffectSpec, values: &[f64], named: Option<&NamedEffect>, s
 }
 
 /// Gain and offset of a table as effects of a twin. A twin holds those of one session; the error names both numbers.
+///
+/// # Errors
+///
+/// Any number of sessions but one.
 pub fn sensor_calibration_edits(calibration: &SensorCalibration, sha256: &str) -> Result<TwinEdits, String> {
     let [session] = calibration.sessions.as_slice() else {
         return Err(format!(

@@ -14,7 +14,7 @@ const GAIN: i32 = 2;
 /// Drawn where nothing changed.
 const MIDDLE: i32 = 128;
 
-/// A PNG of a measured pull: a row a jaw, then the curve.
+/// A PNG of a measured pull: a row per jaw, then the curve.
 pub(super) fn rig_picture(record: &Record, rest: Option<&PerJaw<TactileImage>>) -> Vec<u8> {
     let row = CAPTION + IMAGE.1 + MARGIN;
     let width = 3 * (IMAGE.0 + MARGIN) + MARGIN;

@@ -37,6 +37,10 @@ pub enum PictureSampleError {
 /// A PNG of one sample of a run. Height and pressure maps are made again from the run's configuration; where that is
 /// not possible the stored pressure cells are drawn instead. Of a measured pull the images before and in the grip and their
 /// difference are drawn.
+///
+/// # Errors
+///
+/// A sample that is not done, or that cannot be read.
 pub fn sample_picture(folder: &RunFolder, index: u64) -> Result<Vec<u8>, PictureSampleError> {
     let shard = index / folder.info().shard_samples;
     if folder.finished(shard)?.is_none() {

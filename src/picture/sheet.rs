@@ -36,11 +36,19 @@ pub enum SheetError {
 pub const CONTACT_SHEET: &str = "contact-sheet.png";
 
 /// Draws the overview of a run into its folder.
+///
+/// # Errors
+///
+/// As [`contact_sheet`], or a file that cannot be written.
 pub fn publish_contact_sheet(folder: &RunFolder) -> Result<(), SheetError> {
     Ok(folder.publish(CONTACT_SHEET, &contact_sheet(folder)?)?)
 }
 
 /// A PNG of a few samples, spread over parts and labels.
+///
+/// # Errors
+///
+/// A run that cannot be read.
 pub fn contact_sheet(folder: &RunFolder) -> Result<Vec<u8>, SheetError> {
     let chosen = contact_sheet_samples(folder)?;
     let rows = chosen.len().div_ceil(COLUMNS).max(1) as u32;
@@ -63,6 +71,10 @@ pub fn contact_sheet(folder: &RunFolder) -> Result<Vec<u8>, SheetError> {
 }
 
 /// Samples that [`contact_sheet`] shows: parts in turn, and of each part labels from small to large.
+///
+/// # Errors
+///
+/// A run that cannot be read.
 pub fn contact_sheet_samples(folder: &RunFolder) -> Result<Vec<u64>, FolderError> {
     let at = |name: &str| INDEX_COLUMNS.iter().position(|c| *c == name).unwrap_or(0);
     let (part, label) = (at("part"), at("max_pull_force_n"));

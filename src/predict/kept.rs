@@ -7,7 +7,7 @@ thread_local! {
     static SPARE: RefCell<Vec<StuckPull>> = const { RefCell::new(Vec::new()) };
 }
 
-/// A pull whose memory is used again: fits make thousands a second, and the system would clear every page of each.
+/// A pull whose memory is used again: fits make thousands per second, and the system would clear every page of each.
 pub(super) struct Kept(pub StuckPull);
 
 impl Kept {

@@ -19,7 +19,7 @@ PAGE = """# Blind benchmark
 formula with gripgen. {dev} of them (the development split) and 180 more drawn alike (`--split dev --cases 180`) were used while the
 method was made; the {sealed} sealed ones only for this table. sha256 over the sealed truths: `{seal}`.
 
-Rates carry their exact 95 % interval. All errors are on 120 pulls a campaign that no tool has seen; the floor is the error
+Rates carry their exact 95 % interval. All errors are on 120 pulls per campaign that no tool has seen; the floor is the error
 of an oracle that knows all but scatter and noise. Re-run: `{command}`.
 
 ## Sealed split

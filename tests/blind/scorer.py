@@ -69,7 +69,7 @@ def table(columns):
 
 
 def details(records):
-    """One line a campaign, truth included."""
+    """One line per campaign, truth included."""
     lines = []
     for name, r in records.items():
         good = [k for k in ("null", "top1", "top1_class", "both", "unknown_right", "covered", "small_named") if k in r]

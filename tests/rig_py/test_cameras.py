@@ -62,7 +62,7 @@ def test_curl_gets_a_snapshot_and_a_stream(rig):
     got = curl("--max-time", "2", rig.camera("left", "stream"))
     assert got.returncode == 28, got.stderr
     parts = got.stdout.split(b"--boundarydonotcross\r\n")[1:-1]
-    assert 40 < len(parts) < 130, "60 frames a second at most, in 2 s"
+    assert 40 < len(parts) < 130, "60 frames per second at most, in 2 s"
     stamps = []
     for part in parts:
         head, _, rest = part.partition(b"\r\n\r\n")

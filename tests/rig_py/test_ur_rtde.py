@@ -104,7 +104,7 @@ def test_a_watchdog_that_is_not_kicked_stops_the_program(rig):
 
 @pytest.fixture
 def gripped(rig):
-    """The shaft between the jaws: 40 N in the gripper's own count, 20 N a jaw."""
+    """The shaft between the jaws: 40 N in the gripper's own count, 20 N per jaw."""
     assert run_scenario("go_to", rig.start_pose)
     with Gripper(rig.ports["gripper"]) as gripper:
         gripper.move("GRIP(40)")

@@ -49,7 +49,7 @@ pub enum Command {
     /// The experiment on a robot, and a virtual one that speaks the same protocols.
     #[command(subcommand)]
     Rig(RigCommand),
-    /// Measure how many tactile images a second this machine makes.
+    /// Measure how many tactile images per second this machine makes.
     Bench(BenchArgs),
     /// Print the JSON Schema of a configuration file.
     Schema(SchemaArgs),

@@ -1,5 +1,11 @@
 //! The command line of gripgen: arguments in, exit code out.
 //!
+//! ```
+//! let run = |words: &str| gripgen_cli::run(words.split(' ').map(Into::into));
+//! assert_eq!(run("gripgen effects load_power_law"), 0);
+//! assert_eq!(run("gripgen effects load_powerlaw"), 2, "usage: no such effect");
+//! ```
+//!
 //! Standard output is data, standard error is talk. Exit codes: 0 ok, 1 failed, 2 usage or configuration, 3 the folder
 //! holds another run, 4 finished but samples failed, 5 verification found a mismatch, 130 interrupted.
 
@@ -34,6 +40,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 
 /// The same for a caller that shows errors itself and wants nothing on standard output. `Ok` is the exit code of work that
 /// was done.
+///
+/// # Errors
+///
+/// Arguments that are wrong, or work that failed.
 pub fn try_run(arguments: impl IntoIterator<Item = OsString>) -> Result<u8, Failure> {
     let cli = parsed(arguments).map_err(|e| Failure::usage(e.to_string().trim_end()))?;
     output::silently(|| execute(&cli))

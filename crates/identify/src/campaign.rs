@@ -105,6 +105,10 @@ pub const NO_LOAD_S: f64 = 5.0;
 const TRIES: u64 = 60;
 
 /// Plans a first campaign. The same options give the same plan.
+///
+/// # Errors
+///
+/// No parts, too few pulls for the parts or the sessions, or an option that is no number above 0.
 pub fn plan_campaign(options: &CampaignOptions) -> Result<Campaign, CampaignError> {
     check(options)?;
     let forces_n = levels_n(options.min_force_n, options.max_force_n);

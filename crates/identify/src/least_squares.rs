@@ -63,6 +63,10 @@ pub enum FitError {
 /// Minimises the sum of squares of `residuals(values)` inside the bounds: Levenberg-Marquardt with finite differences
 /// (Marquardt 1963; damping after Nielsen 1999), steps clipped to the bounds. A trial whose residuals are not finite
 /// counts as a step that is too long. Nothing is drawn: the same input gives the same output.
+///
+/// # Errors
+///
+/// Residuals that are not finite at the start.
 pub fn fit(
     parameters: &[FreeParameter],
     options: FitOptions,

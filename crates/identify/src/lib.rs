@@ -1,5 +1,19 @@
 //! Calibration and diagnosis: numbers in, parameters and causes out.
 //!
+//! ```
+//! use gripgen_identify::{FitOptions, FreeParameter, fit};
+//!
+//! // Labels that fall with grip force as mu = 0.3 (F / 40 N)^-0.15: the exponent comes back.
+//! let forces_n = [5.0, 10.0, 20.0, 40.0, 80.0_f64];
+//! let mu = |n: f64, force_n: f64| 0.3 * (force_n / 40.0).powf(n);
+//! let exponent = FreeParameter { name: "n".into(), start: 0.0, bounds: (-0.9, 0.5), scale: 0.05 };
+//! let found = fit(&[exponent], FitOptions::default(), |v| {
+//!     forces_n.iter().map(|&f| mu(v[0], f) - mu(-0.15, f)).collect()
+//! })?;
+//! assert!((found.values[0] + 0.15).abs() < 1e-6);
+//! # Ok::<(), gripgen_identify::FitError>(())
+//! ```
+//!
 //! This crate does not know how predictions are made. It is given observations and a way to predict them from
 //! parameters, and returns fitted values with intervals, and a [`Diagnosis`]: what the model lacks, what cannot be told
 //! apart, and what to measure next. `docs/diagnosis.md` describes the method.

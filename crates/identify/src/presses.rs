@@ -39,7 +39,7 @@ pub struct PressData {
     pub sha256: String,
     /// Mean square of the camera's noise at a pixel of the image, in grey levels squared.
     pub noise_mse: f64,
-    /// What the residual may depend on, one value a press.
+    /// What the residual may depend on, one value per press.
     pub covariates: Vec<PressCovariate>,
     /// Whether the contacts were marked: places that were found in the images say nothing of where they should be.
     pub marked: bool,

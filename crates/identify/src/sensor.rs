@@ -29,7 +29,7 @@ pub use words::SensorEvidence;
 
 use crate::permutation::Covariate;
 
-/// A table of a force sensor beside a reference. All columns have one value a row.
+/// A table of a force sensor beside a reference. All columns have one value per row.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SensorData {
     /// Time, rising within a session.

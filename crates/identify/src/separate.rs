@@ -89,6 +89,11 @@ pub enum SeparateError {
 /// Chooses up to `most` pulls, one after the other, and stops early where every pair is separated by `enough` noise
 /// variances. Of two equal rivals 16 of them apart, one is taken for the other in at most 7 % (by the bound; 2.3 % with
 /// Gaussian noise).
+///
+/// # Errors
+///
+/// Fewer than two rivals, arrays of other sizes than the candidates and parameters ask for, or numbers that are not
+/// finite and above 0 where they must be.
 pub fn plan_separating(
     candidates: &[CandidatePull],
     rivals: &[SeparableRival],

@@ -86,6 +86,11 @@ enum Start {
 /// Closes the jaws on the part and lets them settle, without friction.
 ///
 /// Without an engine the jaws stop where they first touch the part and press with their commanded force.
+///
+/// # Errors
+///
+/// A part wider than the open gripper, jaws that do not settle, a contact shape that cannot be gripped, or bodies that
+/// become non-finite.
 pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
     let mut touch = PerJaw { left: 0.0, right: 0.0 };
     for jaw in Jaw::BOTH {

@@ -177,6 +177,10 @@ impl PullSession {
     }
 
     /// Carries out `command` for `duration_s`, in steps no longer than the sensor's.
+    ///
+    /// # Errors
+    ///
+    /// Bodies that become non-finite.
     pub fn step(&mut self, command: Command, duration_s: f64) -> Result<PullState, PullError> {
         let steps = (duration_s / self.wrist.step_s() - 1e-6).ceil().max(1.0);
         for _ in 0..steps as usize {

@@ -36,6 +36,10 @@ impl PartShape {
     /// The convex hull of a mesh, of its vertices that are outermost in about 200 evenly spread directions.
     ///
     /// Fewer vertices make contact search fast; flat faces stay flat because all kept points are vertices.
+    ///
+    /// # Errors
+    ///
+    /// Vertices of which no convex hull can be built.
     pub fn hull(mesh: &TriMesh, part_from_mesh: &Pose) -> Result<Self, ShapeError> {
         let points: Vec<Point3<f64>> = mesh.vertices_m().iter().map(|v| part_from_mesh * v).collect();
         let mut kept: Vec<usize> = directions().flat_map(|d| outermost(&points, d)).collect();

@@ -39,6 +39,10 @@ pub fn staircase_of(pull: &PullSettings, jitter: &mut Stream) -> Staircase {
 ///
 /// A row holds the command and the reading at its time; the command then acts until the next row. The first row,
 /// at time 0, is the reading before the pull.
+///
+/// # Errors
+///
+/// As [`PullSession::step`].
 pub fn pull_staircase(
     session: &mut PullSession,
     staircase: &Staircase,

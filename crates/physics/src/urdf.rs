@@ -15,6 +15,11 @@ impl ArmModel {
     ///
     /// What is fixed to a link counts as part of it. What hangs on the tip is ignored: the gripper has its own
     /// model. `find_mesh` turns a mesh reference (`package://...`) into a place; nothing is opened here.
+    ///
+    /// # Errors
+    ///
+    /// Text that is no URDF, no link `tip`, a joint or an inertia that a chain of revolute joints cannot have, or a
+    /// mesh that `find_mesh` does not find.
     pub fn from_urdf(
         text: &str,
         tip: &str,

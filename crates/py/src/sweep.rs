@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 const BETWEEN_LOOKS: Duration = Duration::from_millis(100);
 
 /// Makes a run, or what is missing of it. Without `config` the run is the one that `out` already is (see prepare_run).
-/// `on_progress(done, samples)` is called about ten times a second. Returns counts and whether the run is complete.
+/// `on_progress(done, samples)` is called about ten times per second. Returns counts and whether the run is complete.
 #[pyfunction]
 #[pyo3(signature = (config, out, overrides = None, jobs = 1, slice = None, on_progress = None))]
 pub fn sweep<'py>(

@@ -126,6 +126,10 @@ struct CampaignFile {
 
 /// Reads a campaign with its list of pulls, grip forces per jaw. Unknown keys of the file are left alone, those of a pull
 /// are errors: a misspelt dwell would be made as if it were not there.
+///
+/// # Errors
+///
+/// A file that cannot be read or is no campaign, with its line.
 pub fn read_campaign(path: &Path) -> Result<Campaign, CampaignFileError> {
     let text = std::fs::read_to_string(path)
         .map_err(|e| CampaignFileError::Io { path: path.into(), problem: e.to_string() })?;
@@ -169,7 +173,7 @@ fn check_pull(pull: &PlannedPull) -> Result<(), String> {
     Ok(())
 }
 
-/// The text of a campaign file, a line a pull; `about` becomes its comment. [`read_campaign`] reads it back.
+/// The text of a campaign file, a line per pull; `about` becomes its comment. [`read_campaign`] reads it back.
 pub fn campaign_toml(campaign: &Campaign, about: &str) -> String {
     let mut text = String::new();
     for line in about.lines() {

@@ -191,7 +191,7 @@ impl Dataset {
         }
     }
 
-    /// One row a sample: what was varied, the label, how it ended. Of measured pulls the columns of their table.
+    /// One row per sample: what was varied, the label, how it ended. Of measured pulls the columns of their table.
     pub fn table(&self) -> &Table {
         &self.table
     }

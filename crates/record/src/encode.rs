@@ -71,11 +71,15 @@ pub struct EncodedRig {
     pub rest: Option<PerJaw<Vec<u8>>>,
     /// `/rig/log`, one a stream
     pub streams: Vec<Vec<u8>>,
-    /// `/rig/events`, one an event
+    /// `/rig/events`, one per event
     pub events: Vec<Vec<u8>>,
 }
 
 /// Encodes a sample. Pure: the same sample gives the same bytes.
+///
+/// # Errors
+///
+/// An image that cannot be compressed.
 pub fn encode(sample: &Sample, options: &EncodeOptions) -> Result<EncodedSample, PictureError> {
     let start_ns = (sample.scenario.index - options.first_sample) * options.slot_ns;
     let timestamp = Some(timestamp(start_ns));

@@ -24,6 +24,10 @@ pub enum ExportError {
 
 /// The bytes of a one-sample MCAP file: the messages of the shard, starting at time 0, and every row of the trace as
 /// a `/pull/state` message.
+///
+/// # Errors
+///
+/// A sample that is not in the shard or cannot be read.
 pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, ExportError> {
     let raw = reader.raw(index)?;
     let storage = match (&raw.images, raw.raw_images) {

@@ -80,6 +80,10 @@ impl RunFolder {
     /// `inputs` are name and content of the files that the run depends on and that gripgen does not hold itself;
     /// copies of them go into the folder, so that it can be read and repeated anywhere. A run that is there already
     /// keeps its name.
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be written, that holds another run, or that holds something else.
     pub fn create(path: &Path, info: RunInfo, inputs: &[(&str, &[u8])]) -> Result<Self, FolderError> {
         let at = io_at(path);
         if let Some(found) = Self::open_same(path, &info)? {
@@ -122,6 +126,10 @@ impl RunFolder {
     }
 
     /// Opens a run folder for reading.
+    ///
+    /// # Errors
+    ///
+    /// A folder without a valid `run.json`.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let file = path.join("run.json");
         let bytes = std::fs::read(&file).map_err(io_at(&file))?;
@@ -149,6 +157,10 @@ impl RunFolder {
     }
 
     /// Writes `index.csv` if every shard is done; returns whether it did.
+    ///
+    /// # Errors
+    ///
+    /// A shard or sidecar that cannot be read, or a file that cannot be written.
     pub fn write_index(&self) -> Result<bool, FolderError> {
         if (0..self.info.shards).any(|shard| !self.sidecar_path(shard).exists()) {
             return Ok(false);
@@ -172,6 +184,10 @@ impl RunFolder {
     }
 
     /// Writes a file at once: under a temporary name first, then renamed.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
     pub fn publish(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
         let temporary = self.written(name, bytes)?;
         std::fs::rename(&temporary, self.path.join(name)).map_err(io_at(&temporary))
@@ -216,6 +232,10 @@ impl RunFolder {
 }
 
 /// SHA-256 and size of a file.
+///
+/// # Errors
+///
+/// A file that cannot be read.
 pub fn hash_file(path: &Path) -> Result<(String, u64), FolderError> {
     let at = io_at(path);
     let mut file = File::open(path).map_err(&at)?;

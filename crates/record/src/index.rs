@@ -1,4 +1,4 @@
-//! The index of a run: one row a sample, so that tables can be filtered without opening a shard.
+//! The index of a run: one row per sample, so that tables can be filtered without opening a shard.
 
 use crate::proto::gripgen_v1::{Sample, Status};
 use crate::stored::{sample_covariates, sample_view};

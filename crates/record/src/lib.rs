@@ -1,5 +1,15 @@
 //! Samples and run folders on disk.
 //!
+//! ```
+//! use gripgen_record::{decode_picture, encode_png};
+//! use gripgen_twin::TactileImage;
+//!
+//! // Images of a sample are PNG: rows from the top, three bytes per pixel, red, green, blue.
+//! let image = TactileImage { width_px: 2, height_px: 1, rgb: vec![255, 0, 0, 10, 20, 30] };
+//! assert_eq!(decode_picture(&encode_png(&image)?)?, image);
+//! # Ok::<(), gripgen_record::PictureError>(())
+//! ```
+//!
 //! A run folder holds `run.json`, shards (`shard-00000.mcap`) with a sidecar each (`shard-00000.json`, written last),
 //! and `index.csv`. A shard is an MCAP file of protobuf messages with embedded descriptors, so that Foxglove, Rerun
 //! and the stock MCAP libraries read it without knowing gripgen. `docs/format.md` describes all of it.

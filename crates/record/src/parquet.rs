@@ -41,6 +41,10 @@ pub enum ExportParquetError {
 }
 
 /// Writes all rows of `dataset` into `out`; `on_rows` is told how many are written so far.
+///
+/// # Errors
+///
+/// A row that cannot be read, or an `out` that cannot be written.
 pub fn export_parquet<W: Write + Send>(
     dataset: &Dataset,
     options: ParquetOptions,

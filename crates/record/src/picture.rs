@@ -11,6 +11,10 @@ pub struct PictureError(String);
 
 /// A PNG of an RGB image. Fast compression and one filter for all rows: slower settings gain nothing on noisy tactile
 /// images, choosing a filter for each row costs a third more time for 4 % of the size.
+///
+/// # Errors
+///
+/// Bytes that do not fit the size of the image.
 pub fn encode_png(image: &TactileImage) -> Result<Vec<u8>, PictureError> {
     let mut bytes = Vec::with_capacity(image.rgb.len() / 2);
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub)
@@ -20,6 +24,10 @@ pub fn encode_png(image: &TactileImage) -> Result<Vec<u8>, PictureError> {
 }
 
 /// Decodes a PNG or JPEG into RGB.
+///
+/// # Errors
+///
+/// Bytes that are no picture.
 pub fn decode(bytes: &[u8]) -> Result<TactileImage, PictureError> {
     let decoded = image::load_from_memory(bytes).map_err(|e| PictureError(e.to_string()))?.into_rgb8();
     Ok(TactileImage { width_px: decoded.width(), height_px: decoded.height(), rgb: decoded.into_raw() })

@@ -105,6 +105,10 @@ pub enum ReadError {
 
 impl ShardReader {
     /// Opens a shard and checks that it is one.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be opened, is no MCAP file or no shard of gripgen.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let at = |source| ReadError::Open { path: path.into(), source };
         let file = File::open(path).map_err(at)?;
@@ -173,6 +177,10 @@ impl ShardReader {
     }
 
     /// The configuration it was made with.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read.
     pub fn config_toml(&self) -> Result<String, ReadError> {
         let foreign = |problem: &str| ReadError::Foreign { path: self.path.clone(), problem: problem.into() };
         let index = self
@@ -189,6 +197,10 @@ impl ShardReader {
     }
 
     /// The `/sample` message of a sample, without its images and trace.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::record`].
     pub fn sample(&self, index: u64) -> Result<Sample, ReadError> {
         let mut found = None;
         self.each_message(index, |topic, data| {
@@ -201,6 +213,10 @@ impl ShardReader {
     }
 
     /// Everything of a sample.
+    ///
+    /// # Errors
+    ///
+    /// A sample that is not in the shard, or a message that cannot be read.
     pub fn record(&self, index: u64) -> Result<Record, ReadError> {
         let raw = self.raw(index)?;
         let bad = |topic: &str, problem: String| self.damaged(index, topic, &problem);
@@ -225,6 +241,10 @@ impl ShardReader {
     }
 
     /// The `/sample` message of a sample and its force over time, where it is stored, without its images.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::record`].
     pub fn pull(&self, index: u64) -> Result<(Sample, Option<gripgen_twin::PullTrace>), ReadError> {
         let (mut sample, mut trace) = (None, None);
         self.each_message(index, |topic, data| {

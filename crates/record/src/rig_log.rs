@@ -24,7 +24,7 @@ pub struct RigStream {
     pub host_time_s: Vec<f64>,
     /// When the device took each row by its own clock; empty if it has none.
     pub device_time_s: Vec<f64>,
-    /// Columns by their names, each with a value a row: NaN where the device gave none.
+    /// Columns by their names, each with a value per row: NaN where the device gave none.
     pub columns: Vec<(String, Vec<f64>)>,
 }
 

@@ -105,6 +105,10 @@ impl<W: Write + Seek> ShardWriter<W> {
     /// Starts a file. Nothing in it depends on time, host or path.
     ///
     /// Chunks are not compressed: images are PNG already, and no sample depends on a compressor's version.
+    ///
+    /// # Errors
+    ///
+    /// What `to` says.
     pub fn new(to: W, info: &ShardInfo, images: ImageStorage) -> Result<Self, ShardError> {
         let options = WriteOptions::new()
             .profile("")
@@ -165,6 +169,10 @@ impl<W: Write + Seek> ShardWriter<W> {
 
     /// Appends a sample: one chunk with what training reads, one with what viewers draw; of a rig one with the images
     /// without contact and one with the log between them.
+    ///
+    /// # Errors
+    ///
+    /// What the writer says.
     pub fn push(&mut self, sample: &EncodedSample) -> Result<(), ShardError> {
         let sequence = self.written as u32;
         let mut write = |channel_id, time_ns, data: &[u8]| {
@@ -221,6 +229,10 @@ impl<W: Write + Seek> ShardWriter<W> {
     }
 
     /// Ends the file and gives back what it was written to.
+    ///
+    /// # Errors
+    ///
+    /// What the writer says, or another number of samples than was announced.
     pub fn finish(mut self) -> Result<W, ShardError> {
         if self.written != self.expected {
             return Err(ShardError::Count { expected: self.expected, written: self.written });

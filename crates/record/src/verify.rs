@@ -24,6 +24,10 @@ pub struct Verification {
 /// Reads every shard of a run: hash and size against the sidecar, checksums, every message, every row of the index.
 ///
 /// `progress` is called after each shard.
+///
+/// # Errors
+///
+/// A folder that is no run, or a file of it that cannot be read. All other faults stand in the answer.
 pub fn verify(path: &Path, mut progress: impl FnMut(u64)) -> Result<Verification, FolderError> {
     let folder = RunFolder::open(path)?;
     let mut result = Verification::default();

@@ -1,5 +1,5 @@
 //! The primary interface of Universal Robots controllers (TCP port 30001): messages of the controller and of the program, the
-//! robot's mode ten times a second, and the way in for programs as text.
+//! robot's mode ten times per second, and the way in for programs as text.
 //!
 //! A controller acknowledges no program on this connection. That one has started is a key message ([`PROGRAM_STARTED`]), that it
 //! is wrong a runtime exception with line and column.

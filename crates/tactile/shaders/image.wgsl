@@ -1,4 +1,4 @@
-// Stages gradient, shade and noise in one pass: four pixels a thread, whose RGB are three words of the packed image.
+// Stages gradient, shade and noise in one pass: four pixels per thread, whose RGB are three words of the packed image.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> presses: array<PressInput>;

@@ -81,7 +81,7 @@ fn vertex(image: u32, index: u32) -> Corner {
     return corner(image, vertices[3u * index], vertices[3u * index + 1u], vertices[3u * index + 2u]);
 }
 
-// One thread a cluster: its first vertex stands for all. What lies deeper than the gel below the highest of them
+// One thread per cluster: its first vertex stands for all. What lies deeper than the gel below the highest of them
 // cannot be touched.
 @compute @workgroup_size(THREADS)
 fn top(@builtin(global_invocation_id) id: vec3<u32>) {

@@ -1,7 +1,7 @@
 // Stage shade, regression: what the surroundings of a pixel change, on cells. CPU twins: src/colour/regressor/pyramid.rs
 // and `combine` in src/colour/regressor.rs.
 //
-// A pass a step; each runs one thread a cell of level LEVEL and image. `cells` holds, for each image, the planes that
+// A pass per step; each runs one thread per cell of level LEVEL and image. `cells` holds, for each image, the planes that
 // `Regression` names. `around` holds six coefficients for each feature: red, green, blue, and in place of a fourth
 // channel the limit of the feature.
 

@@ -85,6 +85,10 @@ impl Kernel<'_> {
 ///
 /// Of the result `depth_px` is the depth of the part where there is pressure (below 0 where the gel has risen to meet
 /// it); the patch is that of the pressure. 15 ms for a ball on 320 x 240 pixels, 50 to 100 for parts that fill the window.
+///
+/// # Errors
+///
+/// No surface in front of the gel, or a press deeper than the gel.
 pub fn press_elastic(
     heights: &Plane,
     grid: &Grid,

@@ -29,7 +29,7 @@ impl Grid {
     }
 }
 
-/// One number a pixel, row by row.
+/// One number per pixel, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plane {
     /// Columns.

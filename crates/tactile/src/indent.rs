@@ -101,6 +101,10 @@ pub(crate) fn nothing_in_front(grid: &Grid) -> IndentError {
 ///
 /// For a gel that is not flat at rest, `heights` are those above the gel plane plus the rest surface
 /// ([`crate::GelShape::rest_px`]); [`crate::Renderer::press`] adds it.
+///
+/// # Errors
+///
+/// No surface in front of the gel, or a press deeper than the gel.
 pub fn indent(heights: &Plane, grid: &Grid, gel: &PressedGel, force_n: f64) -> Result<Imprint, IndentError> {
     let level = SimdLevel::best();
     let map = HeightMap::of(heights);

@@ -1,5 +1,28 @@
 //! Tactile images: from a part in front of a gel to what the camera behind it sees.
 //!
+//! ```
+//! use gripgen_tactile::{Grid, Plane, PressedGel, indent};
+//!
+//! // A ball of 4 mm radius in front of a gel: heights in pixels, one per pixel of 160 x 200.
+//! let grid = Grid { width_px: 200, height_px: 160, metres_per_px: 5e-5 };
+//! let mut heights = Plane::filled(grid.width_px, grid.height_px, 0.0);
+//! for row in 0..grid.height_px {
+//!     for column in 0..grid.width_px {
+//!         let (x_m, y_m) = grid.centre_m(column, row);
+//!         let z_m = (4e-3_f64.powi(2) - x_m * x_m - y_m * y_m).max(0.0).sqrt() - 7e-3;
+//!         heights.values[row * grid.width_px + column] = (z_m / grid.metres_per_px) as f32;
+//!     }
+//! }
+//! // 5 N displace 5 mm3 of gel: the cap of a ball, pi d^2 (R - d / 3).
+//! let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
+//! let imprint = indent(&heights, &grid, &gel, 5.0)?;
+//! let d_m = imprint.press_depth_m;
+//! let cap_m3 = std::f64::consts::PI * d_m * d_m * (4e-3 - d_m / 3.0);
+//! assert!((cap_m3 / 5e-9 - 1.0).abs() < 5e-3);
+//! assert!((imprint.patch.normal_force_n() - 5.0).abs() < 1e-9, "the pressure integrates to the force");
+//! # Ok::<(), gripgen_tactile::IndentError>(())
+//! ```
+//!
 //! One stage a file: [`raster`] (mesh to height map), [`indent`] (press depth and pressure), [`deform`] (the gel
 //! around the contact), [`gradient`], [`shade`] (colour), [`shadow()`] (what a contact
 //! keeps from the light), [`finish`] (noise and rounding). For an elastic gel

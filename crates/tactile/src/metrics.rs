@@ -38,6 +38,10 @@ pub struct Score {
 }
 
 /// All differences between two images.
+///
+/// # Errors
+///
+/// Images of two sizes, or smaller than the window of [`structural_similarity`].
 pub fn score(a: &TactileImage, b: &TactileImage) -> Result<Score, MetricError> {
     let mse = mean_squared_error(a, b)?;
     let l1 = mean_absolute_error(a, b)?;
@@ -45,6 +49,10 @@ pub fn score(a: &TactileImage, b: &TactileImage) -> Result<Score, MetricError> {
 }
 
 /// Mean squared difference over all channels, in squared grey levels.
+///
+/// # Errors
+///
+/// Images of two sizes.
 pub fn mean_squared_error(a: &TactileImage, b: &TactileImage) -> Result<f64, MetricError> {
     same_size(a, b)?;
     let sum: u64 = a.rgb.iter().zip(&b.rgb).map(|(&x, &y)| u64::from(x.abs_diff(y)).pow(2)).sum();
@@ -52,6 +60,10 @@ pub fn mean_squared_error(a: &TactileImage, b: &TactileImage) -> Result<f64, Met
 }
 
 /// Mean absolute difference over all channels, in grey levels.
+///
+/// # Errors
+///
+/// Images of two sizes.
 pub fn mean_absolute_error(a: &TactileImage, b: &TactileImage) -> Result<f64, MetricError> {
     same_size(a, b)?;
     let sum: u64 = a.rgb.iter().zip(&b.rgb).map(|(&x, &y)| u64::from(x.abs_diff(y))).sum();
@@ -75,6 +87,10 @@ const WINDOW_PX: usize = 7;
 ///
 /// Windows of 7 x 7 pixels of equal weight, sample covariance, `K1 = 0.01`, `K2 = 0.03`, range 255: the defaults of
 /// scikit-image, with which it agrees (`channel_axis = 2`). Sums are whole numbers, so they are exact.
+///
+/// # Errors
+///
+/// Images of two sizes, or smaller than the window.
 pub fn structural_similarity(a: &TactileImage, b: &TactileImage) -> Result<f64, MetricError> {
     same_size(a, b)?;
     let (w, h) = (a.width_px as usize, a.height_px as usize);

@@ -50,6 +50,10 @@ pub struct Npz<'a> {
 
 impl<'a> Npz<'a> {
     /// Opens the bytes of an npz file.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no zip archive.
     pub fn open(bytes: &'a [u8]) -> Result<Self, NpzError> {
         let archive =
             zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| NpzError::Archive(e.to_string()))?;
@@ -73,12 +77,20 @@ impl<'a> Npz<'a> {
     }
 
     /// Reads an array; numbers of any type become f64.
+    ///
+    /// # Errors
+    ///
+    /// No array of this key, or one that cannot be read as numbers.
     pub fn array(&mut self, key: &str) -> Result<Array, NpzError> {
         let bytes = self.file(key)?;
         parse_npy(&bytes).map_err(|problem| NpzError::Array { key: key.into(), problem })
     }
 
     /// Reads an array of bytes (`|u1`) in C order as it stands: shape and values. Eight times smaller than f64.
+    ///
+    /// # Errors
+    ///
+    /// No array of this key, or one that is not of bytes.
     pub fn bytes(&mut self, key: &str) -> Result<(Vec<usize>, Vec<u8>), NpzError> {
         let mut file = self.file(key)?;
         let bad = |problem: String| NpzError::Array { key: key.into(), problem };
@@ -118,6 +130,10 @@ impl<'a> Npz<'a> {
     }
 
     /// Reads an array that must have the given shape; `None` stands for any length.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::array`], or an array of another shape.
     pub fn array_of_shape(&mut self, key: &str, shape: &[Option<usize>]) -> Result<Array, NpzError> {
         let array = self.array(key)?;
         let fits = array.shape.len() == shape.len()
@@ -263,6 +279,10 @@ pub enum ElementType {
 }
 
 /// Writes arrays into the bytes of a compressed npz file. The same arrays give the same bytes.
+///
+/// # Errors
+///
+/// An array that does not fit its shape or its type.
 pub fn write_npz(arrays: &[(&str, Array, ElementType)]) -> Result<Vec<u8>, NpzError> {
     let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
     let failed = |e: String| NpzError::Archive(e);

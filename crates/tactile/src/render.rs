@@ -34,6 +34,10 @@ pub struct Renderer<'a> {
 
 impl Renderer<'_> {
     /// Presses a part into the gel: stages `raster` and `indent`. An elastic gel needs no imprint constant.
+    ///
+    /// # Errors
+    ///
+    /// No surface in front of the gel, or a press deeper than the gel.
     pub fn press(
         &self,
         mesh: &ClusteredMesh,

@@ -1,4 +1,4 @@
-//! The effects library: what a twin may be missing, one file an effect.
+//! The effects library: what a twin may be missing, one file per effect.
 //!
 //! An effect is a pure function on one or two hooks of the simulation, with named parameters that have a unit, a
 //! neutral value and physical bounds. The simulator and the identification use the same function. At the
@@ -31,7 +31,7 @@ pub use hooks::{
 };
 pub use spec::{EffectSpec, Group, ParameterSpec, Visible};
 
-/// Declares the modules of the effects and lists their specs: one line an effect.
+/// Declares the modules of the effects and lists their specs: one line per effect.
 macro_rules! library {
     ($(mod $id:ident;)*) => {
         $(mod $id;)*

@@ -28,7 +28,7 @@ const CAP_N: f64 = 0.5;
 /// The same as a share of the label.
 const CAP_SHARE: f64 = 0.05;
 
-/// Standard deviations that chance explains: some ten comparisons a pull, and less than one false alarm in 10000 pulls.
+/// Standard deviations that chance explains: some ten comparisons per pull, and less than one false alarm in 10000 pulls.
 const SIGMAS: f64 = 4.5;
 
 /// By how much a label of this size may be off, N.
@@ -195,7 +195,7 @@ impl fmt::Display for Finding {
             }
             FindingKind::Jump => write!(f, "the reading jumps by {found:.2} N while the part is held")?,
             FindingKind::GripForce => {
-                write!(f, "the gripper reports {found:.2} N a jaw, {wanted:.2} N were asked")?;
+                write!(f, "the gripper reports {found:.2} N per jaw, {wanted:.2} N were asked")?;
             }
             FindingKind::Lateral => {
                 write!(

@@ -59,6 +59,10 @@ pub enum FrictionError {
 ///
 /// `at` has the commanded grip force; the laws see the real normal force, which follows from it. A law per cell
 /// is taken at the mean pressure, or like one per jaw where the contact area is not known.
+///
+/// # Errors
+///
+/// A grip force outside the fit of a law that says `outside_fit = "error"`, or a coefficient below 0.
 pub fn grip_friction(
     twin: &Twin,
     part_name: &str,
@@ -90,6 +94,10 @@ pub fn grip_friction(
 ///
 /// Without a law per cell every coefficient is that of [`grip_friction`] bit for bit. With one, the coefficient
 /// of the jaw is the mean of the cells, weighted with their forces, and a cell whose law goes negative has 0.
+///
+/// # Errors
+///
+/// As [`grip_friction`], for any cell.
 pub fn cell_friction(
     twin: &Twin,
     part_name: &str,

@@ -1,6 +1,6 @@
 //! Tactile images.
 
-/// An 8-bit RGB image, row by row from the top, three bytes a pixel. Up in the image is +z of `world`.
+/// An 8-bit RGB image, row by row from the top, three bytes per pixel. Up in the image is +z of `world`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TactileImage {
     /// Columns.

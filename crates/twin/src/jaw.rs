@@ -55,6 +55,10 @@ impl<T> PerJaw<T> {
     }
 
     /// Like [`PerJaw::from_fn`] for a function that can fail.
+    ///
+    /// # Errors
+    ///
+    /// The first error of `f`, of the left jaw before the right one.
     pub fn try_from_fn<E>(mut f: impl FnMut(Jaw) -> Result<T, E>) -> Result<Self, E> {
         let left = f(Jaw::Left)?;
         let right = f(Jaw::Right)?;

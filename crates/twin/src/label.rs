@@ -63,6 +63,10 @@ pub struct LabelError {
 /// let label = slip_label(&trace, 3.0, true).unwrap();
 /// assert_eq!((label.slip_time_s, label.max_pull_force_n), (0.2, 11.0));
 /// ```
+///
+/// # Errors
+///
+/// A measured force that never comes within `tolerance_n` of the command.
 pub fn slip_label(trace: &PullTrace, tolerance_n: f64, slid: bool) -> Result<SlipLabel, LabelError> {
     let mut last = None;
     let mut closest_n = f64::INFINITY;

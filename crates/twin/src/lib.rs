@@ -1,5 +1,25 @@
 //! The vocabulary of gripgen: what all its packages talk about.
 //!
+//! ```
+//! use gripgen_twin::effects::LIBRARY;
+//! use gripgen_twin::{PullTrace, TraceRow, slip_label};
+//!
+//! // A staircase of 5 N per step: the measured force follows the command up to 11 N, then the jaws slip.
+//! let rows = [(0.0, 3.0, 2.0), (0.1, 8.0, 7.0), (0.2, 13.0, 11.0), (0.3, 18.0, 4.0)];
+//! let trace: PullTrace = rows
+//!     .map(|(time_s, desired_force_n, measured_force_n)| TraceRow {
+//!         time_s, desired_force_n, measured_force_n, displacement_m: 0.0,
+//!     })
+//!     .into_iter()
+//!     .collect();
+//! let label = slip_label(&trace, 3.0, true)?;
+//! assert_eq!((label.slip_time_s, label.max_pull_force_n), (0.2, 11.0));
+//!
+//! // What may stand between a simulated label and a measured one is in the library of effects.
+//! assert!(LIBRARY.iter().any(|effect| effect.covariates == ["grip_force_n"]));
+//! # Ok::<(), gripgen_twin::LabelError>(())
+//! ```
+//!
 //! One experiment is simulated and measured: a gripper with a tactile sensor in each jaw grips a fixed part, two
 //! images are taken, and the arm pulls with a rising force until the jaws slip. A [`Scenario`] is one such pull,
 //! fully specified; a [`Twin`] is the rig and the parts it is made on; a [`Sweep`] says which scenario belongs to

@@ -110,7 +110,12 @@ pub enum MeshError {
 impl TriMesh {
     /// Builds a mesh and checks that indices are in range and coordinates finite.
     ///
+    /// # Errors
+    ///
+    /// No triangles or more than [`MAX_TRIANGLES`], or a coordinate that is not finite.
+    ///
     /// # Panics
+    ///
     /// If a triangle names a vertex that does not exist: meshes are built by this crate only.
     pub fn new(vertices_m: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         if triangles.is_empty() {
@@ -135,6 +140,11 @@ impl TriMesh {
     /// Reads an STL or OBJ file's bytes; `extension` (any case, without the dot) names the format.
     ///
     /// `metres_per_unit` is the length of one unit of the file. Equal vertices are merged.
+    ///
+    /// # Errors
+    ///
+    /// An extension that is neither `stl` nor `obj`, a file that is empty, cut off or malformed, and whatever
+    /// [`Self::new`] refuses.
     pub fn from_file_bytes(bytes: &[u8], extension: &str, metres_per_unit: f64) -> Result<Self, MeshError> {
         let extension = extension.to_ascii_lowercase();
         let soup = match extension.as_str() {

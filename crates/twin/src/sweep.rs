@@ -165,6 +165,10 @@ impl Sweep {
     }
 
     /// The twin of sample `index`: a copy of `base` with the drawn values put in.
+    ///
+    /// # Errors
+    ///
+    /// Values drawn for this sample that make no twin.
     pub fn twin_of(&self, index: u64, base: &toml::Table) -> Result<Twin, ConfigError> {
         let mut table = base.clone();
         for (key, value) in self.drawn(index) {
@@ -176,6 +180,10 @@ impl Sweep {
     }
 
     /// The twin of `base` with one value put in.
+    ///
+    /// # Errors
+    ///
+    /// A key that the twin lacks, or a value that makes no twin.
     pub fn twin_with(base: &toml::Table, key: &str, value: &Drawn) -> Result<Twin, ConfigError> {
         let mut table = base.clone();
         put(&mut table, key, value)?;
@@ -183,6 +191,10 @@ impl Sweep {
     }
 
     /// The twin of `base` with values put in; `None` if there are none.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::twin_with`], with all values set.
     pub fn twin_with_all<'a>(
         base: &toml::Table,
         values: impl IntoIterator<Item = (&'a String, &'a Drawn)>,

@@ -190,6 +190,10 @@ pub struct Part {
 
 impl Twin {
     /// Checks a file's values and converts them. Errors name the key.
+    ///
+    /// # Errors
+    ///
+    /// A value out of its range, or two that do not go together.
     pub fn new(file: &TwinFile) -> Result<Self, ConfigError> {
         use crate::config::in_range;
         if let Some(schema) = &file.schema

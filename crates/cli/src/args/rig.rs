@@ -161,7 +161,7 @@ pub struct RigServeArgs {
     /// Write a rig.toml for this rig: its ports, and the fixtures of its parts as taught poses.
     #[arg(long, value_name = "RIG.toml")]
     pub write_rig: Option<PathBuf>,
-    /// Read faults from standard input, one a line, and let them happen: `drop rtde`, `delay gripper 0.5`, `estop`, `freeze left`.
+    /// Read faults from standard input, one per line, and let them happen: `drop rtde`, `delay gripper 0.5`, `estop`, `freeze left`.
     #[arg(long)]
     pub faults: bool,
     /// JSON: the `ready` line.

@@ -1,4 +1,4 @@
-//! `gripgen bench`: images a second on this machine.
+//! `gripgen bench`: images per second on this machine.
 
 use crate::args::BenchArgs;
 use crate::commands::check::cores;

@@ -20,7 +20,7 @@ pub fn run(args: &CalibrateSensorArgs) -> Result<u8, Failure> {
     let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
     let calibration = calibrate_sensor_table(&table).map_err(|reason| {
         Failure::usage(format!("{}: {reason}", args.measured.display()))
-            .hint("press the sensor to several forces beside the reference, 30 rows a session at least")
+            .hint("press the sensor to several forces beside the reference, 30 rows per session at least")
     })?;
     if let Some(out) = &args.out {
         let edits = sensor_calibration_edits(&calibration, &table.sha256)

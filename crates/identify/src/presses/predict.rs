@@ -27,7 +27,7 @@ impl ActingEffect {
     }
 }
 
-/// The pixels of a press that are looked at. All lists have one entry a pixel, in one order.
+/// The pixels of a press that are looked at. All lists have one entry per pixel, in one order.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PressPixels {
     /// Grey levels of red, green and blue that were measured.

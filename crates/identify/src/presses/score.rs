@@ -15,7 +15,7 @@ use gripgen_twin::random::splitmix64;
 const MAX_STEPS: usize = 4;
 
 /// Presses before and after a change of background at least.
-const MIN_ON_A_SIDE: usize = 2;
+const MIN_PRESSES_PER_SIDE: usize = 2;
 
 /// Presses, how much each counts, and which are held out together.
 #[derive(Debug, Clone)]
@@ -170,8 +170,9 @@ fn step_place(observed: &Observed<'_>, design: &Design, acting: &[ActingEffect],
     let n = moments.len();
     let index = |i: usize| observed.predictor.circumstances()[i].pull_index as f64;
     let neutral = acting.last().map_or(0.0, |a| a.spec.parameters[at].neutral);
-    let places =
-        std::iter::once(0).chain(MIN_ON_A_SIDE..(n + 1).saturating_sub(MIN_ON_A_SIDE)).map(|first| {
+    let places = std::iter::once(0)
+        .chain(MIN_PRESSES_PER_SIDE..(n + 1).saturating_sub(MIN_PRESSES_PER_SIDE))
+        .map(|first| {
             let masked: Vec<GroupMoments> = moments
                 .iter()
                 .enumerate()

@@ -6,7 +6,7 @@ use gripgen_twin::effects::GripPoint;
 use gripgen_twin::{Covariates, Jaw, OpticsState};
 
 const PRESSES: usize = 14;
-const PIXELS_A_ZONE: usize = 15;
+const PIXELS_PER_ZONE: usize = 15;
 
 /// A press every ten minutes.
 const PRESS_H: f64 = 1.0 / 6.0;
@@ -36,8 +36,8 @@ impl Camera {
             camera.circumstances.push(Covariates { pull_index: press as u64, time_s, ..Default::default() });
             let common = [0; 3].map(|_| 0.05 * draws.normal());
             let (mut pixels, mut rest, mut contact) = (PressPixels::default(), Vec::new(), Vec::new());
-            for k in 0..PRESS_ZONES * PIXELS_A_ZONE {
-                let zone = k / PIXELS_A_ZONE;
+            for k in 0..PRESS_ZONES * PIXELS_PER_ZONE {
+                let zone = k / PIXELS_PER_ZONE;
                 let place = [0; 2].map(|_| 2.0 * draws.uniform() - 1.0);
                 let level = [0; 3].map(|_| 60.0 + 100.0 * draws.uniform());
                 let pressed = [0; 3].map(|_| if zone < 2 { 20.0 * draws.normal() } else { 0.0 });

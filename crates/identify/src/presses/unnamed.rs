@@ -29,7 +29,7 @@ const CONSTANT: [&str; 2] = ["colour", "x_px*y_px"];
 pub struct PressCovariate {
     /// Its name.
     pub name: String,
-    /// Its values, one a press.
+    /// Its values, one per press.
     pub values: PressValues,
 }
 

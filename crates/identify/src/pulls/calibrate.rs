@@ -98,6 +98,10 @@ pub enum CalibrateError {
 }
 
 /// Fits the baseline of a campaign and what is asked for.
+///
+/// # Errors
+///
+/// Too few pulls, an effect that is unknown or that these pulls cannot show, or labels that no fit predicts.
 pub fn calibrate_pulls(
     measured: &MeasuredPulls,
     predictor: &dyn PredictPulls,

@@ -116,7 +116,7 @@ pub fn curves_in(name: &str, column: &Column) -> Vec<Curve> {
 
 /// Sines of many frequencies over a clock (Lomb 1976): at least one and a half cycles, at most one in four pulls.
 pub struct Waves {
-    /// For each frequency an orthonormal pair, one number a pull.
+    /// For each frequency an orthonormal pair, one number per pull.
     pairs: Vec<[Vec<f64>; 2]>,
 }
 

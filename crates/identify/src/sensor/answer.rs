@@ -24,7 +24,7 @@ pub struct SensorRow {
     pub session: usize,
     /// Mean reference force.
     pub reference_n: f64,
-    /// Mean change of the reference in a second.
+    /// Mean change of the reference per second.
     pub rate_n_per_s: f64,
     /// Mean reading.
     pub measured_n: f64,

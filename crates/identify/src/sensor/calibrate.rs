@@ -38,6 +38,10 @@ pub struct SensorCalibration {
 
 /// Fits gain and offset of every session by least squares. The 90 % intervals hold for residuals as correlated as the
 /// measured ones: white noise beside a first-order autoregression, simulated. The error says what is missing.
+///
+/// # Errors
+///
+/// A table from which gain and offset do not follow; the text says why.
 pub fn calibrate_sensor(data: &SensorData) -> Result<SensorCalibration, String> {
     let prepared = prepare(data, SensorOptions::default().max_rows)?;
     let noise = baseline_noise(&prepared);

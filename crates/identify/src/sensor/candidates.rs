@@ -203,7 +203,7 @@ pub(crate) fn candidates(
     (all, columns)
 }
 
-/// Change of the reference in a second, over two steps.
+/// Change of the reference per second, over two steps.
 pub(crate) fn force_rate(prepared: &Prepared) -> Vec<f64> {
     let n = prepared.reference_n.len();
     let same = |a: usize, b: usize| prepared.session[a] == prepared.session[b];

@@ -22,6 +22,10 @@ pub struct SensorComparison {
 
 /// Compares a table with what `effects` (spec and values in its order) make of its reference forces. The error says what
 /// the table lacks.
+///
+/// # Errors
+///
+/// A table from which gain and offset do not follow; the text says why.
 pub fn compare_sensor(
     data: &SensorData,
     effects: &[(&EffectSpec, &[f64])],

@@ -68,6 +68,10 @@ pub struct PlacedArm {
 
 impl PlacedArm {
     /// Checks the stance and places the arm.
+    ///
+    /// # Errors
+    ///
+    /// Another number of joints than 6, a joint beyond its limits, a value that is not finite, or a singular stance.
     pub fn new(model: ArmModel, stance: &RobotArm) -> Result<Self, ArmError> {
         let joints = model.joints.len();
         if joints != JOINTS {

@@ -26,6 +26,10 @@ pub enum ShardStart {
 
 impl PartialShard {
     /// A second handle of the file, for a writer that wants to own one; the lock stays with this one.
+    ///
+    /// # Errors
+    ///
+    /// What the system says of the file.
     pub fn duplicate(&self) -> Result<File, FolderError> {
         self.file.try_clone().map_err(io_at(&self.path))
     }
@@ -44,6 +48,10 @@ impl PartialShard {
 impl RunFolder {
     /// The sidecar of a shard; `None` if the shard is not done: no sidecar, a damaged one, or a shard of another
     /// size than it says.
+    ///
+    /// # Errors
+    ///
+    /// A sidecar that is there and cannot be read.
     pub fn finished(&self, shard: u64) -> Result<Option<Sidecar>, FolderError> {
         let path = self.sidecar_path(shard);
         let bytes = match std::fs::read(&path) {
@@ -63,6 +71,10 @@ impl RunFolder {
     }
 
     /// Starts a shard, unless another process is writing it or has finished it since it was looked for.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be made or locked, and a sidecar as in [`Self::finished`].
     pub fn start_shard(&self, shard: u64) -> Result<ShardStart, FolderError> {
         let path = self.path.join(format!("shard-{shard:05}.mcap.partial"));
         let at = io_at(&path);
@@ -115,6 +127,10 @@ impl RunFolder {
     }
 
     /// Publishes a written shard: sync, rename, then the sidecar.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, renamed or written.
     #[expect(clippy::needless_pass_by_value, reason = "the lock ends with the partial shard")]
     pub fn finish_shard(
         &self,

@@ -28,6 +28,10 @@ pub struct PullImagesError {
 }
 
 /// Ids of the pulls that have the images of both jaws, sorted; none where there is no such folder.
+///
+/// # Errors
+///
+/// A folder that cannot be read.
 pub fn pulls_with_images(folder: &Path) -> Result<BTreeSet<String>, PullImagesError> {
     let path = folder.join(IMAGES_FOLDER);
     let at = |e: std::io::Error| PullImagesError { path: path.clone(), problem: e.to_string() };
@@ -43,6 +47,10 @@ pub fn pulls_with_images(folder: &Path) -> Result<BTreeSet<String>, PullImagesEr
 }
 
 /// Reads the images of a pull.
+///
+/// # Errors
+///
+/// Images that are missing for one jaw, or cannot be read.
 pub fn read_pull_images(folder: &Path, id: &str) -> Result<PullImages, PullImagesError> {
     let path = |kind: &str| folder.join(IMAGES_FOLDER).join(format!("{id}_{kind}.png"));
     let read = |path: PathBuf| {

@@ -13,6 +13,10 @@ use std::path::Path;
 ///
 /// Columns that were not recorded are left out. A number is written so that it is read back as it was, in the unit of its
 /// column; millimetres and degrees without the last bits that the way to SI and back costs.
+///
+/// # Errors
+///
+/// A file that cannot be written.
 pub fn write_pull_folder(folder: &Path, measured: &MeasuredPulls) -> Result<(), TableError> {
     let at = |path: &Path| {
         let path = path.to_path_buf();

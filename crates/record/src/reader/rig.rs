@@ -10,6 +10,10 @@ const LOG: [&str; 2] = ["/rig/log", "/rig/events"];
 
 impl ShardReader {
     /// The images without contact of a measured pull, where there are any.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::record`].
     pub fn rest(&self, index: u64) -> Result<Option<PerJaw<TactileImage>>, ReadError> {
         let Some(both) = self.raw_rest(index)? else { return Ok(None) };
         let image = |jaw: Jaw| {
@@ -19,6 +23,10 @@ impl ShardReader {
     }
 
     /// Everything that was received during a measured pull; empty for a simulated one.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::record`].
     pub fn rig_log(&self, index: u64) -> Result<RigLog, ReadError> {
         let mut log = RigLog::default();
         self.each_message_of(index, &LOG, |topic, data| {

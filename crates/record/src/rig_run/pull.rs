@@ -98,7 +98,7 @@ pub enum RigPullError {
         width_px: u32,
         /// Rows.
         height_px: u32,
-        /// Its bytes; three a pixel are needed.
+        /// Its bytes; three per pixel are needed.
         bytes: usize,
     },
     /// The image cannot be coded.

@@ -52,6 +52,10 @@ pub enum DecodeFrameError {
 }
 
 /// Decodes a JPEG into RGB; one of a single channel becomes grey.
+///
+/// # Errors
+///
+/// A frame that is cut off, larger than the limits, or no JPEG.
 pub fn decode_jpeg(bytes: &[u8], limits: &FrameLimits) -> Result<TactileImage, DecodeFrameError> {
     let cut = |missing| DecodeFrameError::Cut { bytes: bytes.len(), missing };
     if !bytes.starts_with(&[0xff, 0xd8]) {

@@ -52,6 +52,10 @@ struct State {
 impl CameraClient {
     /// Connects and asks for the stream; `host_header` is the camera's name as HTTP wants it (`gsr15001.local:8080`). What the
     /// camera answers is known with the first frame, or from [`ended`](Self::ended).
+    ///
+    /// # Errors
+    ///
+    /// No connection, or an answer that is no stream of frames.
     pub fn connect(
         address: SocketAddr,
         host_header: &str,
@@ -80,6 +84,10 @@ impl CameraClient {
 
     /// The first frame that arrives after `at`; where several have by now, the newest of them. An `at` that lies ahead is
     /// waited for.
+    ///
+    /// # Errors
+    ///
+    /// No frame after that time came within the timeout, or the connection ended.
     pub fn frame_after(
         &self,
         at: Instant,

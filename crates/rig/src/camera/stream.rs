@@ -69,6 +69,10 @@ struct Part {
 
 impl CameraStream {
     /// Takes in what came from the wire and gives the frames that are whole.
+    ///
+    /// # Errors
+    ///
+    /// An answer that is no stream of frames, or headers or a frame beyond their limits.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Vec<CameraFrame>, CameraStreamError> {
         self.bytes.extend_from_slice(bytes);
         let mut frames = Vec::new();

@@ -83,6 +83,10 @@ pub enum ViewError {
 
 impl CameraView {
     /// The frame as it is seen. A view that changes nothing gives the same bytes.
+    ///
+    /// # Errors
+    ///
+    /// A view that does not fit the frame, or bytes that do not fit its size.
     pub fn apply(&self, frame: &TactileImage) -> Result<TactileImage, ViewError> {
         checked(frame)?;
         let [width_px, height_px] = self.size_px;
@@ -116,6 +120,10 @@ impl CameraView {
 
     /// The frame that is seen as this image: turn and mirror undone. Only of a view that cuts nothing out, and of an image of its
     /// size.
+    ///
+    /// # Errors
+    ///
+    /// A view that cuts something out, or an image of another size than it gives.
     pub fn unapply(&self, image: &TactileImage) -> Result<TactileImage, ViewError> {
         checked(image)?;
         if let Some(crop_px) = self.crop_px {

@@ -73,7 +73,7 @@ fn another_size_keeps_means_and_slopes() {
     let flat = TactileImage { width_px: 480, height_px: 640, rgb: vec![77; 480 * 640 * 3] };
     let small = view(90, false, [320, 240]).apply(&flat).unwrap();
     assert!(small.rgb.iter().all(|&b| b == 77) && small.rgb.len() == 320 * 240 * 3);
-    // A slope of one grey value a pixel is one of two at half the size, and its middle stays.
+    // A slope of one grey value per pixel is one of two at half the size, and its middle stays.
     let half = view(0, false, [50, 20]).apply(&frame(100, 40)).unwrap();
     for x in 2..48_u32 {
         assert!((f64::from(half.pixel(x, 10)[0]) - (2.0 * f64::from(x) + 0.5)).abs() <= 0.51, "{x}");

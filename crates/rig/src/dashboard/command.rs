@@ -157,6 +157,10 @@ impl DashboardCommand {
     }
 
     /// Reads the answer to this command.
+    ///
+    /// # Errors
+    ///
+    /// A line that is no answer to this command.
     pub fn reply(self, line: &str) -> Result<DashboardReply, DashboardReplyError> {
         let (command, wanted) = self.words();
         let line = line.trim();

@@ -83,6 +83,10 @@ pub struct DashboardLink {
 
 impl DashboardLink {
     /// Sends a command and gives its number: the first is 0. Commands may be sent before the greeting.
+    ///
+    /// # Errors
+    ///
+    /// Too many commands without an answer, or one after `quit`.
     pub fn send(&mut self, command: DashboardCommand) -> Result<u64, DashboardSendError> {
         let asked = command.line();
         if self.closed {
@@ -117,6 +121,10 @@ impl DashboardLink {
     }
 
     /// The next event, if its line is whole. After an error nothing else comes.
+    ///
+    /// # Errors
+    ///
+    /// A greeting of something else, or a line that is too long.
     pub fn next_event(&mut self) -> Result<Option<DashboardEvent>, DashboardSessionError> {
         loop {
             let end = self.incoming.iter().take(MAX_LINE + 1).position(|&b| b == b'\n');

@@ -34,6 +34,10 @@ pub struct DashboardClient {
 
 impl DashboardClient {
     /// Connects and waits for the greeting, each for at most `timeout`.
+    ///
+    /// # Errors
+    ///
+    /// No connection, or no greeting of a dashboard server.
     pub fn connect(address: SocketAddr, timeout: Duration) -> Result<Self, DashboardLinkError> {
         let socket = Socket::connect(address, timeout, "the connection to the dashboard is closed")?;
         let mut client = Self { socket, link: DashboardLink::default(), greeting: String::new() };
@@ -50,6 +54,10 @@ impl DashboardClient {
     }
 
     /// Sends a command and reads its answer.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::command_line`], or an answer that is none to this command.
     pub fn command(
         &mut self,
         command: DashboardCommand,
@@ -61,6 +69,10 @@ impl DashboardClient {
 
     /// Sends a command and gives its answer as it came. An answer that comes after its time is known for what it is: it is
     /// never taken for that of a later command.
+    ///
+    /// # Errors
+    ///
+    /// A command that may not be sent, a connection that ended, or no answer within the timeout.
     pub fn command_line(
         &mut self,
         command: DashboardCommand,

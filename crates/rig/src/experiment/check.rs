@@ -238,7 +238,7 @@ fn camera(config: &RigConfig, left: bool) -> Result<(bool, String), String> {
         _ => "without stamps",
     };
     let words = format!(
-        "{rate_hz:.0} frames a second of {} x {} px, {stamped}, images of {} x {} px",
+        "{rate_hz:.0} frames per second of {} x {} px, {stamped}, images of {} x {} px",
         frame.width_px, frame.height_px, image.width_px, image.height_px
     );
     Ok((rate_hz > 5.0, words))
@@ -283,6 +283,10 @@ pub enum ForceCheckError {
 }
 
 /// Finds sign and gain of the force sensor: reads it, says that the mass is to be hung, and reads it again. Nothing moves.
+///
+/// # Errors
+///
+/// No connection, too few readings, or a change of the reading that is no weight.
 pub fn check_force(
     config: &RigConfig,
     mass_kg: f64,
@@ -358,6 +362,10 @@ pub enum ReadPoseError {
 }
 
 /// Where the tool stands: what is taught.
+///
+/// # Errors
+///
+/// No connection, no reading, a tool that moves, or another grip centre than that of the configuration.
 pub fn read_pose(config: &RigConfig) -> Result<crate::program::TcpPose, ReadPoseError> {
     let found_mm = read_tool_mm(config)?;
     if !same_tool(found_mm, config) {

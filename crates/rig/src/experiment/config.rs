@@ -254,6 +254,10 @@ fn landscape() -> [u32; 2] {
 
 impl RigConfig {
     /// Reads and checks a file.
+    ///
+    /// # Errors
+    ///
+    /// An unknown or missing key, or a value out of its range.
     pub fn read(document: &Document) -> Result<Self, ConfigError> {
         let config: Self = document.read()?;
         config.check().map_err(|e| document.located(e))?;

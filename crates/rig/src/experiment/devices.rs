@@ -125,6 +125,10 @@ pub(super) fn connect_primary(config: &RigConfig) -> Result<PrimaryClient, Conne
 
 impl Devices {
     /// Connects everything. Nothing moves.
+    ///
+    /// # Errors
+    ///
+    /// The first device that does not answer as it should.
     pub fn connect(config: &RigConfig) -> Result<Self, ConnectError> {
         let robot = connect_robot(config)?;
         let heart = Heart::start(&robot);

@@ -129,6 +129,11 @@ pub fn outside_workspace(config: &RigConfig, pose: &TcpPose) -> Option<(char, f6
 }
 
 /// Checks every entry of a campaign: poses, grip forces, programs.
+///
+/// # Errors
+///
+/// A part that nobody taught, a grip that the gripper cannot do, or a pull that leaves the workspace or the limits of
+/// its program.
 pub fn check_campaign(config: &RigConfig, campaign: &Campaign) -> Result<(), PlanError> {
     let pulls = campaign.pulls.iter().enumerate().filter(|(_, p)| p.kind == PullKind::Pull);
     for (index, planned) in pulls {

@@ -66,6 +66,10 @@ pub enum PrepareError {
 
 impl Devices {
     /// Makes the robot ready, as far as somebody allowed it.
+    ///
+    /// # Errors
+    ///
+    /// A robot in local control, in a stop or without power that `permit` does not end, or one that stays where it is.
     pub fn prepare(&mut self, permit: Permit) -> Result<(), PrepareError> {
         match self.ask(DashboardCommand::IsInRemoteControl)? {
             DashboardReply::RemoteControl(false) => return Err(PrepareError::Local),

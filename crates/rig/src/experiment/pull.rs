@@ -110,6 +110,10 @@ impl Experiment<'_> {
     }
 
     /// The robot answers, may move, and runs nobody's program; the gripper takes commands, and the jaws are open.
+    ///
+    /// # Errors
+    ///
+    /// Whatever keeps robot or gripper from being ready.
     pub fn begin(&mut self) -> Result<(), Fault> {
         self.ready()?;
         let began = Instant::now();
@@ -133,6 +137,10 @@ impl Experiment<'_> {
     }
 
     /// Reads the sensor without a load for so long; nothing moves.
+    ///
+    /// # Errors
+    ///
+    /// What ends a pull: see [`Fault`].
     pub fn read_no_load(&mut self, seconds: f64) -> Result<(), Fault> {
         self.tell(RigEvent::Step("reading the sensor without a load"));
         let until_s = self.robot_time_s()? + seconds;
@@ -140,6 +148,10 @@ impl Experiment<'_> {
     }
 
     /// Waits by the robot's clock.
+    ///
+    /// # Errors
+    ///
+    /// What ends a pull: see [`Fault`].
     pub fn pause(&mut self, seconds: f64) -> Result<(), Fault> {
         if seconds > 0.0 {
             self.tell(RigEvent::Step("pause"));

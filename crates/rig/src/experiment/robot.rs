@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 /// Rate that readings are asked for.
 const RATE_HZ: f64 = 500.0;
-/// Time between two beats: the program wants ten a second at least.
+/// Time between two beats: the program wants ten per second at least.
 const BEAT: Duration = Duration::from_millis(10);
 /// An experiment that has not looked at its robot for so long is taken for dead.
 const ALIVE: Duration = Duration::from_millis(500);

@@ -195,6 +195,10 @@ impl GclCommand {
     }
 
     /// The line on the wire. Numbers beyond `limits`, and those that are none, are refused.
+    ///
+    /// # Errors
+    ///
+    /// A force, a width or a speed beyond `limits`.
     pub fn line(&self, limits: &GclLimits) -> Result<String, LimitError> {
         let width = |width_mm: f64| {
             let (min_mm, max_mm) = limits.width_mm;

@@ -100,6 +100,10 @@ impl GclLink {
     }
 
     /// Sends a command, if it is allowed now. A fast stop always is.
+    ///
+    /// # Errors
+    ///
+    /// A command beyond the limits, one before the last has ended, a grip of jaws that hold, or one after `BYE`.
     pub fn send(&mut self, command: &GclCommand) -> Result<(), SendError> {
         let asked = command.name();
         if self.closed {
@@ -128,6 +132,10 @@ impl GclLink {
     }
 
     /// Takes in what came from the wire.
+    ///
+    /// # Errors
+    ///
+    /// A line without an end.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Vec<GclEvent>, GclSessionError> {
         self.incoming.extend_from_slice(bytes);
         let mut events = Vec::new();

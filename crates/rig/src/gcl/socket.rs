@@ -124,6 +124,10 @@ struct State {
 
 impl GclClient {
     /// Connects to a gripper of these limits. Nothing is sent yet.
+    ///
+    /// # Errors
+    ///
+    /// No connection.
     pub fn connect(address: SocketAddr, limits: GclLimits, timeout: Duration) -> Result<Self, GclLinkError> {
         let socket = Socket::connect(address, timeout, "the connection to the gripper is closed")?;
         let state = State {
@@ -167,12 +171,20 @@ impl GclClient {
     }
 
     /// Sends a command and waits for nothing.
+    ///
+    /// # Errors
+    ///
+    /// As [`GclLink::send`], or a connection that ended.
     pub fn send(&self, command: &GclCommand) -> Result<(), GclSendError> {
         self.connection.shared.send(command)
     }
 
     /// Waits for the end of a command that was sent: the FIN of a motion, the value of a question or a setting, the ACK of
     /// the others. The protocol numbers nothing: an answer that comes after its time counts for the next command of its name.
+    ///
+    /// # Errors
+    ///
+    /// An answer that says no, a fast stop, a connection that ended, or none within the timeout.
     pub fn wait_for(&mut self, command: &GclCommand, timeout: Duration) -> Result<(), GclRunError> {
         let taken = self.connection.shared.wait_for(command, timeout, |event| Some(number_of(event)))?;
         match (setting_of(command), taken) {
@@ -184,12 +196,20 @@ impl GclClient {
     }
 
     /// Sends a command and waits for its end.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::send`] and [`Self::wait_for`].
     pub fn run(&mut self, command: &GclCommand, timeout: Duration) -> Result<(), GclRunError> {
         self.send(command)?;
         self.wait_for(command, timeout)
     }
 
     /// Asks for a value, in the unit of the query; also while the jaws move.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::run`].
     pub fn ask(&mut self, query: Query, timeout: Duration) -> Result<f64, GclRunError> {
         let command = GclCommand::Ask(query);
         self.send(&command)?;
@@ -198,6 +218,10 @@ impl GclClient {
 
     /// Says goodbye, so that the gripper keeps what it holds, and closes the connection. The answer is waited for half a second;
     /// the connection is closed in any case.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::run`].
     pub fn close(mut self) -> Result<(), GclRunError> {
         self.run(&GclCommand::Bye, BYE)
     }
@@ -205,6 +229,10 @@ impl GclClient {
 
 impl GclStopper {
     /// Stops the jaws at once. Whoever waits for a motion is told; before the next one the stop is acknowledged.
+    ///
+    /// # Errors
+    ///
+    /// A connection that ended.
     pub fn fast_stop(&self) -> Result<(), GclSendError> {
         self.shared.send(&GclCommand::FastStop)
     }

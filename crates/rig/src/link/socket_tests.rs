@@ -24,7 +24,7 @@ fn peer(with: impl FnOnce(TcpStream) + Send + 'static) -> SocketAddr {
 
 type Numbers = Connection<Vec<u32>, NoNumber>;
 
-/// A client that reads numbers, one a line: they are known, and come out of the channel.
+/// A client that reads numbers, one per line: they are known, and come out of the channel.
 fn numbers(address: SocketAddr, reading: Reading) -> (Numbers, Receiver<Stamped<u32>>) {
     let (tell, events) = channel();
     let mut line = String::new();

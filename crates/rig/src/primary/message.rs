@@ -156,6 +156,6 @@ pub enum PrimaryEvent {
         /// What it says.
         message: RobotMessage,
     },
-    /// State of the robot as a whole, ten times a second.
+    /// State of the robot as a whole, ten times per second.
     RobotMode(RobotModeData),
 }

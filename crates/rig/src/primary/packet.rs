@@ -86,6 +86,10 @@ impl PrimaryStream {
     }
 
     /// The next event, if its packet is whole. After an error nothing else comes.
+    ///
+    /// # Errors
+    ///
+    /// A packet of an impossible size, or one that is too short for its kind.
     pub fn next_event(&mut self) -> Result<Option<PrimaryEvent>, PrimaryStreamError> {
         loop {
             let rest = &self.bytes[self.taken..];

@@ -50,6 +50,10 @@ struct State {
 
 impl PrimaryClient {
     /// Connects. The first event is the version of the controller.
+    ///
+    /// # Errors
+    ///
+    /// No connection, or nothing within the timeout.
     pub fn connect(address: SocketAddr, timeout: Duration) -> Result<Self, PrimaryLinkError> {
         let socket = Socket::connect(address, timeout, "the connection to the primary interface is closed")?;
         let (tell, events) = sync_channel(MAX_EVENTS);
@@ -99,6 +103,10 @@ impl PrimaryClient {
 
     /// Sends a program; a last line without an end gets one. It replaces the program that runs, unless it is a `sec`. Whether
     /// the controller takes it, the events tell: see the [module](super).
+    ///
+    /// # Errors
+    ///
+    /// A program that is empty or holds a zero byte, or a connection that ended.
     pub fn send_script(&mut self, text: &str) -> Result<(), ScriptError> {
         if text.trim().is_empty() {
             return Err(ScriptError::Empty);

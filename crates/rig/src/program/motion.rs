@@ -76,6 +76,10 @@ pub struct MotionProgram {
 
 impl MotionProgram {
     /// Checks every number; those that are none are outside.
+    ///
+    /// # Errors
+    ///
+    /// The first number out of its range.
     pub fn check(&self) -> Result<(), ProgramLimitError> {
         let mut limits = vec![
             ("the number of the run", f64::from(self.run), "", 1.0, 1e9),
@@ -94,6 +98,10 @@ impl MotionProgram {
     }
 
     /// The program. It ends itself on every way out.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::check`].
     pub fn script(&self) -> Result<String, ProgramLimitError> {
         self.check()?;
         let [x, y, z, rx, ry, rz] = self.target.numbers();

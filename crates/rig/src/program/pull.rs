@@ -68,6 +68,10 @@ impl Default for PullProgram {
 
 impl PullProgram {
     /// Checks every number; those that are none are outside.
+    ///
+    /// # Errors
+    ///
+    /// The first number out of its range.
     pub fn check(&self) -> Result<(), ProgramLimitError> {
         let mut limits = vec![
             ("the number of the run", f64::from(self.run), "", 1.0, 1e9),
@@ -116,6 +120,10 @@ impl PullProgram {
     }
 
     /// The program. One function that is called once; it ends itself on every way out.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::check`].
     pub fn script(&self) -> Result<String, ProgramLimitError> {
         self.check()?;
         let head = head::write(NAME, self.run, &self.numbers());

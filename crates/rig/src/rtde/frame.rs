@@ -86,6 +86,10 @@ pub struct FrameTooLongError {
 }
 
 /// A frame as bytes.
+///
+/// # Errors
+///
+/// A payload that is longer than a frame holds.
 pub fn encode_frame(kind: Kind, payload: &[u8]) -> Result<Vec<u8>, FrameTooLongError> {
     let most = usize::from(u16::MAX) - HEADER;
     let length = u16::try_from(payload.len() + HEADER)
@@ -116,6 +120,10 @@ impl Framer {
     }
 
     /// The next whole frame, if it is there.
+    ///
+    /// # Errors
+    ///
+    /// A length below that of a header, or an unknown kind.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, FrameError> {
         let rest = &self.bytes[self.taken..];
         let [high, low, kind, ..] = rest else { return Ok(None) };

@@ -175,6 +175,10 @@ pub struct Link {
 
 impl Link {
     /// Begins a session: its first bytes are in [`take_outgoing`](Self::take_outgoing).
+    ///
+    /// # Errors
+    ///
+    /// A plan without outputs, or with names that a controller does not take.
     pub fn new(plan: SessionPlan) -> Result<Self, SessionError> {
         if plan.outputs.is_empty() {
             return Err(SessionError::NoOutputs);
@@ -215,6 +219,10 @@ impl Link {
     }
 
     /// Takes in what came from the wire and says what it means. After an error the session is over.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no frame, an answer that was not awaited, a recipe that is refused, or a clock that goes back.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Vec<Event>, SessionError> {
         self.framer.push(bytes);
         let mut events = Vec::new();
@@ -225,6 +233,10 @@ impl Link {
     }
 
     /// Writes the values of input recipe `recipe`, counted from 0 in the order of the plan.
+    ///
+    /// # Errors
+    ///
+    /// Before the start, no such recipe, or values of another number or type.
     pub fn write_input(&mut self, recipe: usize, values: &[Value]) -> Result<(), WriteInputError> {
         if self.state != State::Running {
             return Err(WriteInputError::NotStarted);
@@ -241,6 +253,10 @@ impl Link {
     }
 
     /// Asks the controller to stop sending.
+    ///
+    /// # Errors
+    ///
+    /// A request that does not fit a frame.
     pub fn pause(&mut self) -> Result<(), SessionError> {
         if self.state == State::Running {
             self.state = State::Pause;

@@ -35,6 +35,10 @@ type Newest = Option<Vec<Value>>;
 impl RtdeClient {
     /// Connects, sets up all recipes and starts. Inputs that another connection has are tried a few times: an old
     /// connection of a client that died lingers.
+    ///
+    /// # Errors
+    ///
+    /// No connection, no answer within the timeout, or what [`Link::receive`] refuses.
     pub fn connect(address: SocketAddr, plan: &SessionPlan, timeout: Duration) -> Result<Self, LinkError> {
         for attempt in 1.. {
             match Self::connect_once(address, plan, timeout) {
@@ -106,6 +110,10 @@ impl RtdeClient {
     }
 
     /// Writes the values of an input recipe at once.
+    ///
+    /// # Errors
+    ///
+    /// As [`Link::write_input`], or a connection that ended.
     pub fn write_input(&self, recipe: usize, values: &[Value]) -> Result<(), WriteError> {
         self.writer().write_input(recipe, values)
     }
@@ -124,6 +132,10 @@ pub struct RtdeWriter {
 
 impl RtdeWriter {
     /// Writes the values of an input recipe at once.
+    ///
+    /// # Errors
+    ///
+    /// As [`RtdeClient::write_input`].
     pub fn write_input(&self, recipe: usize, values: &[Value]) -> Result<(), WriteError> {
         // The lock is kept over the write: two hands never mix their frames.
         let mut session = lock(&self.session);

@@ -183,6 +183,10 @@ impl Arm {
     }
 
     /// One control step of physics.
+    ///
+    /// # Errors
+    ///
+    /// A fixed part that the arm would carry along, or a plant that cannot go on.
     pub fn advance(&mut self, time_s: f64) -> Result<(), ArmError> {
         self.tick += 1;
         let before = self.tcp;

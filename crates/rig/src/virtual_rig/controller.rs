@@ -202,6 +202,10 @@ impl Controller {
     }
 
     /// Leaves a protective stop, or says why not yet. The program stays where it is.
+    ///
+    /// # Errors
+    ///
+    /// Less than five seconds after the stop.
     pub fn unlock(&mut self) -> Result<(), String> {
         let passed_s = self.robot.timestamp_s - self.stopped_s;
         if self.robot.safety != SafetyStatus::ProtectiveStop {

@@ -156,6 +156,10 @@ pub enum EncodeFrameError {
 }
 
 /// A JPEG of an image. `quality` is 1 to 100; the sensor sends 100.
+///
+/// # Errors
+///
+/// A quality or a size that JPEG does not have, or bytes that do not fit the size.
 pub fn encode_jpeg(image: &TactileImage, quality: u8) -> Result<Vec<u8>, EncodeFrameError> {
     let (width_px, height_px) = (image.width_px, image.height_px);
     if !(1..=100).contains(&quality) {

@@ -70,6 +70,10 @@ impl RtdeServer {
     }
 
     /// Takes in what came and gives the answers. After an error the connection is closed.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no frame or no request, or data that fit no recipe.
     pub fn receive(
         &mut self,
         bytes: &[u8],

@@ -20,6 +20,10 @@ pub struct ScriptTooLongError {
 
 impl ScriptReader {
     /// Takes in what came and gives the programs that are whole, each ending with a line end.
+    ///
+    /// # Errors
+    ///
+    /// A program that is too long.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Vec<String>, ScriptTooLongError> {
         self.bytes.extend_from_slice(bytes);
         let mut programs = Vec::new();

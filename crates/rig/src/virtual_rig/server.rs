@@ -1,6 +1,6 @@
 //! The virtual rig on loopback: its ports, its clock.
 //!
-//! The primary and the secondary port take programs and send messages, and the robot's mode ten times a second of the
+//! The primary and the secondary port take programs and send messages, and the robot's mode ten times per second of the
 //! controller's clock. Of the other states that a controller sends there they have none. The real-time port takes programs and
 //! sends nothing: its state packets are out of date beside RTDE, and no client of this rig reads them.
 

@@ -95,7 +95,7 @@ fn a_client_that_never_reads_is_cut_off_and_takes_nothing_from_the_others() {
     let address = rig.addresses().rtde;
     let clients = [client(address), client(address)];
     let mut mute = TcpStream::connect(address).unwrap();
-    // The longest recipe there is: 11 kB a frame, 27 MB a second.
+    // The longest recipe there is: 11 kB per frame, 27 MB per second.
     let names = [&500.0_f64.to_be_bytes()[..], "actual_q,".repeat(227).as_bytes()].concat();
     mute.write_all(&[0, 5, b'V', 0, 2]).unwrap();
     mute.write_all(&encode_frame(Kind::SetUpOutputs, &names).unwrap()).unwrap();

@@ -31,7 +31,7 @@ fn code(value: f32) -> u32 {
     }
 }
 
-/// Where a target lies, 16 bits an axis. Images are not that large.
+/// Where a target lies, 16 bits per axis. Images are not that large.
 fn packed([dx, dy]: [i32; 2]) -> u32 {
     (dx.clamp(-0x8000, 0x7fff) as u32 & 0xffff) | (dy.clamp(-0x8000, 0x7fff) as u32) << 16
 }

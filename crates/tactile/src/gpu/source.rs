@@ -15,7 +15,7 @@ const BINOMIAL_PX: usize = 17;
 /// the arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Variant {
-    /// `r32float` texture arrays and many values a thread: 10 times faster than buffers on Mesa's lavapipe.
+    /// `r32float` texture arrays and many values per thread: 10 times faster than buffers on Mesa's lavapipe.
     Texture {
         /// Neighbouring values that a thread makes.
         run: u32,
@@ -258,7 +258,7 @@ pub(super) fn around(variant: Variant, step: Step) -> String {
         + include_str!("../../shaders/shared/field.wgsl")
 }
 
-/// Lanes and values a thread of the tiled blur, as large as the workgroup memory allows; `None` if none does.
+/// Lanes and values per thread of the tiled blur, as large as the workgroup memory allows; `None` if none does.
 fn tile_of(kernel_px: u32, workgroup_bytes: u32) -> Option<(u32, u32)> {
     [(32, 8), (32, 4), (16, 4), (16, 2), (8, 2), (8, 1), (4, 1)].into_iter().find(|&(lanes, run)| {
         let length = TILE_THREADS / lanes * run + kernel_px - 1;

@@ -92,6 +92,10 @@ impl PressComparison {
 
 /// Compares the images that `sensor` predicts for the contacts with the real ones. Contacts that nobody marked are
 /// looked for.
+///
+/// # Errors
+///
+/// A set without presses, images of another size than those of the sensor, or a press without a valid mark.
 pub fn compare_presses(set: &PressSet, sensor: &Sensor) -> Result<PressComparison, CompareError> {
     let mut completed = None;
     if set.presses.iter().any(|press| press.circle.is_none()) {
@@ -108,6 +112,10 @@ pub fn compare_presses(set: &PressSet, sensor: &Sensor) -> Result<PressCompariso
 }
 
 /// The image that `sensor` predicts for a press, without noise.
+///
+/// # Errors
+///
+/// A press without a valid mark, or an image of another size than those of the sensor.
 pub fn predict_press(press: &Press, ball_m: f64, sensor: &Sensor) -> Result<TactileImage, CompareError> {
     let found = (press.image.width_px, press.image.height_px);
     let wanted = (sensor.grid.width_px as u32, sensor.grid.height_px as u32);
@@ -187,6 +195,10 @@ pub(super) fn gel_of(sensor: &Sensor) -> Gel {
 }
 
 /// How a predicted image differs from the real one.
+///
+/// # Errors
+///
+/// Images of two sizes, or too small for the structural similarity.
 pub fn score_press(press: &Press, predicted: &TactileImage) -> Result<Scores, MetricError> {
     let centre = press
         .circle

@@ -41,6 +41,10 @@ pub enum DataPackError {
 
 impl PressSet {
     /// Reads the bytes of a `dataPack.npz`. The file says neither what ball was used nor how large a pixel is.
+    ///
+    /// # Errors
+    ///
+    /// No archive, a missing array, or arrays whose shapes do not go together.
     pub fn from_data_pack(bytes: &[u8], ball_m: f64, metres_per_px: f64) -> Result<Self, DataPackError> {
         let mut npz = Npz::open(bytes)?;
         let (shape, mut images) = pixels(&mut npz, "imgs")?;

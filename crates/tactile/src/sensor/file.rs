@@ -48,6 +48,10 @@ impl Sensor {
     ///
     /// `metres_per_px` replaces the file's pixel size, `background` is the frame without contact; a Taxim
     /// calibration needs both, since it holds neither.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::from_files`].
     pub fn from_npz(
         bytes: &[u8],
         metres_per_px: Option<f64>,
@@ -58,6 +62,11 @@ impl Sensor {
     }
 
     /// Reads a sensor file and what is named beside it. A gel map and a shadow table replace those of the file.
+    ///
+    /// # Errors
+    ///
+    /// A file that is no sensor, is of another version or lacks an array; arrays of another size than the rest frame;
+    /// numbers that are not finite or out of range.
     pub fn from_files(files: &SensorFiles<'_>) -> Result<Self, SensorError> {
         let mut npz = Npz::open(files.sensor)?;
         let mut sensor = if npz.has("gripgen_sensor") {

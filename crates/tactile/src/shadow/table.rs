@@ -43,6 +43,10 @@ pub struct ShadowTable {
 impl ShadowTable {
     /// Reads Taxim's table as plain arrays: `directions` (n,) in rad, `lengths` (3, n, h), `values` (3, n, h, l) of
     /// which the first `lengths` count; channel 0 is blue. Its own `shadowTable.npz` holds the same as Python lists.
+    ///
+    /// # Errors
+    ///
+    /// No archive, a missing array, or one of another shape.
     pub fn from_npz(bytes: &[u8]) -> Result<Self, NpzError> {
         let mut npz = Npz::open(bytes)?;
         if npz.has("shadowTable") && !npz.has("values") {

@@ -40,6 +40,10 @@ pub struct Document {
 
 impl Document {
     /// Parses `text`; `file` is the name shown in errors.
+    ///
+    /// # Errors
+    ///
+    /// Text that is no TOML, with the place.
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
         let shared: Arc<str> = text.into();
         let spanned = DeTable::parse(text).map_err(|e| ConfigError {
@@ -81,6 +85,10 @@ impl Document {
     }
 
     /// Applies `key=value` from a command line. A value that is not TOML counts as text.
+    ///
+    /// # Errors
+    ///
+    /// A key that no TOML key can be, a value that cannot be read, or a key below one that is no table.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), ConfigError> {
         let parsed = parse_value(value);
         let argument: Arc<str> = format!("--set {key}={value}").into();
@@ -95,6 +103,10 @@ impl Document {
     }
 
     /// Puts `value` at `key` and returns the key as it stands in the table.
+    ///
+    /// # Errors
+    ///
+    /// A key below one that is no table.
     pub fn assign(&mut self, key: &str, value: toml::Value) -> Result<String, ConfigError> {
         assign(&mut self.table, key, value)
     }
@@ -105,11 +117,19 @@ impl Document {
     }
 
     /// Reads the values into a struct that mirrors the file.
+    ///
+    /// # Errors
+    ///
+    /// An unknown key, a missing one or a value of another type, with the place.
     pub fn read<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
         read_table(&self.table).map_err(|e| self.located(e))
     }
 
     /// Reads a twin: a right jaw that names some keys only has the others from the left one.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`].
     pub fn read_twin(&self) -> Result<TwinFile, ConfigError> {
         read_twin_table(&self.table).map_err(|e| self.located(e))
     }

@@ -57,7 +57,7 @@ mod tests {
             friction(&[0.03, 0.1], 0.2, &grip(&c, 40.0))
         };
         assert_eq!(mu(0.0), 0.2, "no dwell, no ageing");
-        // 0.2 x 0.03 x ln 10 a decade
+        // 0.2 x 0.03 x ln 10 per decade
         assert!((mu(1000.0) - mu(100.0) - 0.013_815_51).abs() < 1e-5);
         // 0.2 x (1 + 0.03 ln 2) at the cut-off
         assert!((mu(0.1) - 0.204_158_883_08).abs() < 1e-11);

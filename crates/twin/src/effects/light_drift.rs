@@ -11,7 +11,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     group: Group::Optics,
     about: "brightness of each channel that changes with time",
     formula: "I_c' = I_c (1 + c_per_h t), c = red, green, blue",
-    source: "temperature and ageing of LEDs, up to 5 % a channel",
+    source: "temperature and ageing of LEDs, up to 5 % per channel",
     parameters: &[rate("red_per_h", "red"), rate("green_per_h", "green"), rate("blue_per_h", "blue")],
     covariates: &["time_s"],
     optics: Some(optics),

@@ -9,7 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     group: Group::Friction,
     about: "friction coefficient that falls with the temperature of the gel",
     formula: "mu' = mu exp(-k_per_k (T - t0_c))",
-    source: "Arrhenius law over a small range; 0.5 to 3 % a kelvin",
+    source: "Arrhenius law over a small range; 0.5 to 3 % per kelvin",
     parameters: &[
         ParameterSpec {
             name: "k_per_k",

@@ -274,7 +274,7 @@ fn other_devices_speak_against_a_label() {
     assert_eq!(says(20.4).verdict, Verdict::Holds);
     assert_eq!(
         says(14.0).reason().unwrap(),
-        "the gripper reports 14.00 N a jaw, 20.00 N were asked (1.00 N are allowed)"
+        "the gripper reports 14.00 N per jaw, 20.00 N were asked (1.00 N are allowed)"
     );
     let wrench = |across: f64, arm_m: f64, torque_nm: f64| {
         let row = |i: i32| {

@@ -12,6 +12,10 @@ use crate::{PullSettings, Twin, sobol};
 
 impl Sweep {
     /// Checks a sweep against the twin it names. `twin` is the twin's document with all defaults filled in.
+    ///
+    /// # Errors
+    ///
+    /// A key that neither the scenario nor the twin has, or a value out of its range; the error names the key.
     pub fn new(file: &SweepFile, twin: &Document) -> Result<Self, ConfigError> {
         let checked_twin = Twin::new(&twin.read_twin()?).map_err(|e| twin.located(e))?;
         check_size(file)?;

@@ -21,8 +21,8 @@ use std::time::{Duration, Instant};
 const NAP: Duration = Duration::from_millis(1);
 /// A clock that is further behind than this, in real time, gives up what it lost: the rig then runs slower than asked.
 const MAX_BEHIND_S: f64 = 0.25;
-/// Control steps between two packets with the robot's mode: ten a second.
-const STEPS_A_MODE: u64 = 50;
+/// Control steps between two packets with the robot's mode: ten per second.
+const STEPS_PER_MODE: u64 = 50;
 /// Control steps without a look at the clients.
 const STEPS_AT_ONCE: u64 = 64;
 
@@ -73,6 +73,10 @@ pub struct ServedRig {
 
 impl ServedRig {
     /// Opens the ports and starts the clock.
+    ///
+    /// # Errors
+    ///
+    /// An address beyond loopback, a rate out of range, or a port that is taken.
     pub fn start(plant: Arc<dyn Plant>, options: &ServeOptions) -> Result<Self, ServeError> {
         for (what, address) in options.addresses.all() {
             if !address.ip().is_loopback() {
@@ -172,7 +176,7 @@ fn run_clock(shared: &Shared, ask: &Sender<GripRequest>) {
             for announcement in told.robot {
                 shared.announce(&announcement_message(&announcement, time_s));
             }
-            if world.step_number().is_multiple_of(STEPS_A_MODE) {
+            if world.step_number().is_multiple_of(STEPS_PER_MODE) {
                 shared.announce(&robot_mode_packet(&world.controller));
             }
         }

@@ -18,7 +18,7 @@ pub(super) const DERIVATIVES: usize = 10;
 /// Features of the surroundings.
 pub(crate) const SURROUNDINGS: usize = LEVELS * DERIVATIVES;
 
-/// The features that are the height itself, one a level.
+/// The features that are the height itself, one per level.
 pub(crate) const AROUND_HEIGHTS: [usize; LEVELS] = [0, DERIVATIVES, 2 * DERIVATIVES, 3 * DERIVATIVES];
 
 /// Cells that are computed together.

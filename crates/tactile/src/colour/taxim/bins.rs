@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Cells of the first guess: octant and sine of the angle to the nearer axis.
 const CELLS: usize = 128;
-/// Cells a unit of that sine, which is at most sqrt(1/2).
+/// Cells per unit of that sine, which is at most sqrt(1/2).
 const CELLS_PER_UNIT: f32 = 180.0;
 
 /// Marks a guess that the borders have to decide.

@@ -45,7 +45,7 @@ impl Zone {
 }
 
 /// Pixels of a zone that are looked at in a press.
-const PIXELS_A_ZONE: usize = 600;
+const PIXELS_PER_ZONE: usize = 600;
 
 /// Chosen pixels of one press, or of a frame without contact.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,7 +83,7 @@ impl PressView {
         let mut state = (index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(11);
         let (mut pixels, mut zones) = (Vec::new(), Vec::new());
         for (zone, mut list) in ZONES.into_iter().zip(by_zone) {
-            let n = PIXELS_A_ZONE.min(list.len());
+            let n = PIXELS_PER_ZONE.min(list.len());
             for i in 0..n {
                 let j = i + (splitmix64(&mut state) % (list.len() - i) as u64) as usize;
                 list.swap(i, j);

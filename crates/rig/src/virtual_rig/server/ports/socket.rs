@@ -22,7 +22,7 @@ use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// Frames of a camera a second.
+/// Frames of a camera per second.
 const FRAMES_HZ: f64 = 60.0;
 /// A clock that runs faster does not make the cameras faster than this.
 const SHORTEST_FRAME: Duration = Duration::from_millis(5);
