@@ -3,14 +3,14 @@
 //! ```
 //! use gripgen_identify::{FitOptions, FreeParameter, fit};
 //!
-//! // Labels that fall with grip force as mu = 0.3 (F / 40 N)^-0.15: the exponent comes back.
-//! let forces_n = [5.0, 10.0, 20.0, 40.0, 80.0_f64];
-//! let mu = |n: f64, force_n: f64| 0.3 * (force_n / 40.0).powf(n);
-//! let exponent = FreeParameter { name: "n".into(), start: 0.0, bounds: (-0.9, 0.5), scale: 0.05 };
-//! let found = fit(&[exponent], FitOptions::default(), |v| {
-//!     forces_n.iter().map(|&f| mu(v[0], f) - mu(-0.15, f)).collect()
+//! // A coefficient that falls with grip force, mu = 0.3 (1 + b / F): b comes back from five forces.
+//! let forces_n = [5.0, 10.0, 20.0, 40.0, 80.0];
+//! let mu = |b_n: f64, force_n: f64| 0.3 * (1.0 + b_n / force_n);
+//! let b_n = FreeParameter { name: "b_n".into(), start: 0.0, bounds: (-4.0, 10.0), scale: 0.5 };
+//! let found = fit(&[b_n], FitOptions::default(), |v| {
+//!     forces_n.iter().map(|&f| mu(v[0], f) - mu(2.5, f)).collect()
 //! })?;
-//! assert!((found.values[0] + 0.15).abs() < 1e-6);
+//! assert!((found.values[0] - 2.5).abs() < 1e-6);
 //! # Ok::<(), gripgen_identify::FitError>(())
 //! ```
 //!
