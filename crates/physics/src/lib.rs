@@ -6,7 +6,7 @@
 //! // Two contact cells 4 mm apart across the pull, which hold 5 N each.
 //! let cell = |across_m| LimitCell { across_m, along_m: 0.0, limit_n: 5.0 };
 //! let patch = [cell(-2e-3), cell(2e-3)];
-//! assert_eq!(free_twist_capacity_n(&patch, 0.0), 10.0);
+//! assert!((free_twist_capacity_n(&patch, 0.0) - 10.0).abs() < 1e-6);
 //! // A pull 8 mm beside the middle turns the part about the far cell: 5 N at 4 mm balance it at 10 mm.
 //! let turned_n = free_twist_capacity_n(&patch, 8e-3);
 //! assert!((turned_n - 2.0).abs() < 1e-6, "{turned_n}");
