@@ -1,13 +1,14 @@
 //! The columns of a press table that say in which circumstances each press was made.
 
 use crate::diagnose::PressCovariate;
-use gripgen_record::{PRESSES_FILE, TableError, read_press_columns, sha256_hex};
+use gripgen_record::{TableError, press_table, read_press_columns, sha256_hex};
 use gripgen_tactile::presses::PressSet;
 use gripgen_twin::Values;
 use std::path::Path;
 
 /// Columns that are marks of the contact, not circumstances.
-const MARKS: [&str; 6] = ["image", "x_px", "y_px", "radius_px", "depth_mm", "pull_index"];
+const MARKS: [&str; 9] =
+    ["image", "x_px", "y_px", "radius_px", "depth_mm", "pull_index", "mesh", "shape", "rotation_deg"];
 
 /// What a table says beside images and marks.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,7 +48,7 @@ fn retain<T>(list: &mut Vec<T>, keep: &[bool]) {
 /// # Errors
 /// What is wrong with the table.
 pub fn load_press_columns(path: &Path) -> Result<PressColumns, TableError> {
-    if !path.join(PRESSES_FILE).is_file() {
+    if press_table(path).is_none() {
         return Ok(PressColumns::default());
     }
     let table = read_press_columns(path)?;
@@ -77,6 +78,7 @@ pub fn presses_sha256(set: &PressSet) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gripgen_record::PRESSES_FILE;
 
     #[test]
     fn a_gap_leaves_a_column_of_numbers_and_takes_the_clock() {

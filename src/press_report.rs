@@ -45,6 +45,7 @@ pub fn press_report(
             mean_row("whole frame", &comparison.mean.full),
             mean_row("400 x 400 px around the contact", &comparison.mean.crop400),
             mean_row("200 x 200 px around the contact", &comparison.mean.crop200),
+            mean_row("160 x 160 px around the contact", &comparison.mean.window),
         ],
         "pictures": pictures(set, comparison, &order, predict),
         "presses": press_rows(set, comparison, &order),
@@ -152,7 +153,7 @@ mod tests {
     #[test]
     fn a_page_names_every_press_and_draws_the_worst() {
         let image = TactileImage { width_px: 16, height_px: 16, rgb: vec![100; 16 * 16 * 3] };
-        let press = |name: &str| Press { name: name.into(), image: image.clone(), circle: None };
+        let press = |name: &str| Press::of_ball(name, image.clone(), None);
         let names = ["one", "two <b>", "three", "four", "five"];
         let presses = names.map(press).to_vec();
         let set = PressSet { metres_per_px: 1e-4, ball_m: 4e-3, rest: None, presses };
@@ -162,7 +163,14 @@ mod tests {
             .zip([3.0, 9.0, 1.0, 2.0, 5.0])
             .map(|(name, mse)| PressScore {
                 name: (*name).into(),
-                scores: Scores { full: score(mse), crop400: score(mse), crop200: score(mse) },
+                shape: "ball".into(),
+                scores: Scores {
+                    full: score(mse),
+                    crop400: score(mse),
+                    crop200: score(mse),
+                    window: score(mse),
+                },
+                zones: vec![],
             })
             .collect();
         let comparison = PressComparison::from_each(each).unwrap();

@@ -1,13 +1,16 @@
 //! Press sets from disk: Taxim's `dataPack.npz`, or a folder with a table and images.
 
+mod bodies;
+
 use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
 use crate::project::{LoadError, load_twin_document};
 use crate::resolve::Files;
-use gripgen_record::{PRESSES_FILE, PressFolder, PressRecord, TableError, read_press_folder};
+use bodies::PressBodies;
+use gripgen_record::{PRESSES_FILE, PressFolder, PressRecord, TableError, press_table, read_press_folder};
 use gripgen_tactile::presses::{
-    Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, Press, PressSet, find_circle,
-    reference_frame,
+    Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, IndenterError, IndenterPose, Press,
+    PressSet, USUAL_SINK_IN, find_circle, reference_frame,
 };
 use gripgen_tactile::{Pyramid, Sensor, finish};
 use gripgen_twin::config::ImageNoise;
@@ -77,6 +80,17 @@ pub enum LoadPressesError {
         /// Radius of the ball.
         radius_mm: f64,
     },
+    /// The mesh of a body.
+    #[error(transparent)]
+    Mesh(#[from] LibraryError),
+    /// A body that cannot be pressed in.
+    #[error("{}: {source}", .path.display())]
+    Body {
+        /// The folder.
+        path: PathBuf,
+        /// What is wrong.
+        source: IndenterError,
+    },
     /// A length that cannot be.
     #[error("{what} is {value_mm} mm, it must be from {min_mm} to {max_mm} mm")]
     Length {
@@ -100,7 +114,7 @@ pub enum LoadPressesError {
 /// Whether a path looks like a press set.
 pub fn is_press_set(path: &Path) -> bool {
     path.extension().is_some_and(|e| e == "npz")
-        || path.join(PRESSES_FILE).is_file()
+        || press_table(path).is_some()
         || path.join(DATA_PACK).is_file()
 }
 
@@ -122,11 +136,14 @@ pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, Lo
     let ball_m = length("the ball", geometry.ball_m, 0.1, 100.0)?;
     let metres_per_px = length("a pixel", geometry.metres_per_px, 1e-4, 1.0)?;
     let pack = if path.is_dir() { path.join(DATA_PACK) } else { path.to_path_buf() };
-    if path.join(PRESSES_FILE).is_file() {
+    if press_table(path).is_some() {
         let missing = |missing| LoadPressesError::Geometry { path: path.into(), missing };
-        let ball_m = ball_m.ok_or_else(|| missing("how large the ball is"))?;
+        let folder = read_press_folder(path)?;
+        // Where there is no ball its size is not asked for, and nothing looks at it.
+        let no_ball = folder.presses.iter().all(|press| press.body.is_some()).then_some(DATA_PACK_BALL_M);
+        let ball_m = ball_m.or(no_ball).ok_or_else(|| missing("how large the ball is"))?;
         let metres_per_px = metres_per_px.ok_or_else(|| missing("how large a pixel is"))?;
-        return one_size(path, from_folder(path, read_press_folder(path)?, ball_m, metres_per_px)?);
+        return one_size(path, from_folder(path, folder, ball_m, metres_per_px)?);
     }
     if !pack.is_file() {
         return Err(LoadPressesError::Unknown { path: path.into() });
@@ -160,33 +177,40 @@ fn from_folder(
     metres_per_px: f64,
 ) -> Result<PressSet, LoadPressesError> {
     let radius_px = |record: &PressRecord| match record.depth_m {
-        Some(depth_m) if record.radius_px.is_none() && depth_m > ball_m / 2.0 => {
+        Some(depth_m) if record.body.is_none() && record.radius_px.is_none() && depth_m > ball_m / 2.0 => {
             Err(LoadPressesError::Depth {
-                path: path.join(PRESSES_FILE),
+                path: press_table(path).unwrap_or_else(|| path.join(PRESSES_FILE)),
                 name: record.name.clone(),
                 depth_mm: depth_m * 1e3,
                 radius_mm: ball_m * 0.5e3,
             })
         }
-        depth_m => Ok(record
-            .radius_px
-            .or(depth_m.map(|depth_m| Circle::radius_px_at_depth(ball_m, depth_m, metres_per_px)))),
+        // The circle that is seen is smaller than the ball's cut with the gel at rest, since the gel gives way.
+        depth_m => Ok(record.radius_px.or(depth_m.map(|depth_m| {
+            Circle::radius_px_at_depth(ball_m, (1.0 - USUAL_SINK_IN) * depth_m, metres_per_px)
+        }))),
     };
     let known = folder
         .presses
         .iter()
         .map(|record| Ok((record.centre_px, radius_px(record)?)))
         .collect::<Result<Vec<Known>, LoadPressesError>>()?;
-    let presses = folder
-        .presses
-        .into_iter()
-        .zip(&known)
-        .map(|(record, &(centre, radius))| Press {
-            name: record.name,
-            image: record.image,
-            circle: centre.zip(radius).map(|((x_px, y_px), radius_px)| Circle { x_px, y_px, radius_px }),
-        })
-        .collect();
+    let mut bodies = PressBodies::new(path, metres_per_px);
+    let mut presses = Vec::with_capacity(known.len());
+    for (record, &(centre, radius)) in folder.presses.into_iter().zip(&known) {
+        presses.push(match (&record.body, centre, record.depth_m) {
+            (Some(body), Some((x_px, y_px)), Some(travel_m)) => {
+                let at = IndenterPose { x_px, y_px, rotation_rad: body.rotation_rad };
+                let indenter = bodies.indenter(body, at, travel_m, &record.image)?;
+                Press::of_body(record.name, record.image, indenter)
+            }
+            _ => {
+                let circle =
+                    centre.zip(radius).map(|((x_px, y_px), radius_px)| Circle { x_px, y_px, radius_px });
+                Press { travel_m: record.depth_m, ..Press::of_ball(record.name, record.image, circle) }
+            }
+        });
+    }
     let mut set = PressSet { metres_per_px, ball_m, rest: folder.rest, presses };
     complete(&mut set, &known);
     Ok(set)
@@ -203,7 +227,9 @@ fn complete(set: &mut PressSet, known: &[Known]) {
     let Some(rest) = reference_frame(set) else { return };
     let ball_radius_px = set.ball_m / 2.0 / set.metres_per_px;
     for (press, &(centre, radius)) in set.presses.iter_mut().zip(known) {
-        let half = centre.is_some() != radius.is_some() && press.image.rgb.len() == 3 * rest[0].len();
+        let half = press.indenter.is_none()
+            && centre.is_some() != radius.is_some()
+            && press.image.rgb.len() == 3 * rest[0].len();
         let Some(found) = half.then(|| find_circle(&press.image, &rest, ball_radius_px)).flatten() else {
             continue;
         };
@@ -289,8 +315,11 @@ pub fn load_twin_sensor(twin: &Location) -> Result<Arc<Sensor>, LoadSensorError>
     let read = document.read_twin().map_err(LoadError::from)?;
     let Twin { optics, gel, .. } = Twin::new(&read).map_err(|e| LoadError::from(document.located(e)))?;
     let sensor = sensor_of(&optics.left, |path| twin.beside(path))?;
-    let pyramid =
-        Pyramid { kernels_px: gel.left.kernels_px, restore_depth_fraction: gel.left.restore_depth_fraction };
+    let pyramid = Pyramid {
+        kernels_px: gel.left.kernels_px,
+        restore_depth_fraction: gel.left.restore_depth_fraction,
+        sink_in_fraction: 0.0,
+    };
     Ok(Arc::new(Sensor { pyramid: sensor.pyramid.clone().or(Some(pyramid)), ..(*sensor).clone() }))
 }
 

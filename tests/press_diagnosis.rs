@@ -37,7 +37,7 @@ fn presses(sensor: &Sensor, change: impl Fn(f64, [f64; 2], [f64; 3]) -> [f64; 3]
                 .map(|v| v.round().clamp(0.0, 255.0) as u8)
         });
         let image = TactileImage { rgb: rgb.collect(), ..image };
-        Press { name: format!("press-{i:02}"), image, circle: Some(circle) }
+        Press::of_ball(format!("press-{i:02}"), image, Some(circle))
     };
     PressSet {
         metres_per_px: sensor.grid.metres_per_px,
@@ -141,7 +141,7 @@ fn contacts_that_nobody_marked_are_found_beside_the_sensor_file() {
     let truth: Vec<Circle> = set.presses.iter().filter_map(|p| p.circle).collect();
     set.rest = None;
     set.presses.iter_mut().for_each(|p| p.circle = None);
-    let blank = Press { name: "blank".into(), image: finish(&sensor, None, None), circle: None };
+    let blank = Press::of_ball("blank", finish(&sensor, None, None), None);
     set.presses.insert(3, blank);
     let columns = PressColumns {
         names: set.presses.iter().map(|p| p.name.clone()).collect(),

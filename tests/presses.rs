@@ -1,10 +1,15 @@
 //! Real presses of a ball, calibrated with and predicted.
 
 use crate::common::root;
+use gripgen::record::encode_png;
+use gripgen::tactile::finish;
 use gripgen::tactile::presses::{
-    CalibrateOptions, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, PressSet, calibrate_presses, find_circle,
-    reference_frame,
+    CalibrateOptions, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, PressSet, calibrate_presses,
+    compare_presses, find_circle, predict_press, reference_frame, score_press,
 };
+use gripgen::twin::{TriMesh, write_binary_stl};
+use gripgen::{Location, PressGeometry, load_presses, load_sensor};
+use nalgebra::Point3;
 use std::time::Instant;
 
 fn gelsight() -> PressSet {
@@ -30,8 +35,8 @@ fn presses_that_were_held_out_are_predicted() {
     assert!(found.doubtful.is_empty(), "{:?}", found.doubtful);
     assert!(mean.full.mse <= 12.0);
     assert!(mean.crop400.mse <= 12.0 && mean.crop400.psnr_db >= 37.5 && mean.crop400.ssim >= 0.98);
-    // Measured: 6.5 and 14.5; a step back shows here before it shows above.
-    assert!(mean.crop400.mse <= 7.0 && mean.crop200.mse <= 16.0);
+    // Measured: 6.6 and 12.2; a step back shows here before it shows above.
+    assert!(mean.crop400.mse <= 7.0 && mean.crop200.mse <= 13.5);
 }
 
 /// The circles were marked by hand, and are themselves unsure by one or two pixels.
@@ -56,4 +61,95 @@ fn circles_are_found_where_people_marked_them() {
     println!("median and worst: centre {centre:.1?} px, radius {radius:.1?} px");
     assert!(centre.0 < 2.0 && centre.1 < 6.0);
     assert!(radius.0 < 1.5 && radius.1 < 4.0);
+}
+
+/// Fitted to balls alone, drawn for a ball and a flat prism on a mesh, at the travel that the stage was set to: window of
+/// 160 px. The frame at rest alone has 864 on average; a plain table of polynomials after Taxim's manner, fitted to the same
+/// balls, 172.
+#[test]
+#[cfg_attr(not(shared_data), ignore = "the folder of shared measured data is not beside this checkout")]
+fn shapes_that_no_ball_shows_are_drawn() {
+    let folder = root().join("../shared/real/gelsight_shapes");
+    let geometry = PressGeometry { ball_m: Some(5.84e-3), metres_per_px: Some(0.059_259_259_2e-3) };
+    let balls = load_presses(&folder.join("balls"), geometry).unwrap();
+    let shapes = load_presses(&folder.join("shapes"), PressGeometry { ball_m: None, ..geometry }).unwrap();
+    let sensor = calibrate_presses(&balls, &CalibrateOptions::default()).unwrap().sensor;
+    let found = compare_presses(&shapes, &sensor).unwrap();
+    let rest = finish(&sensor, None, None);
+    for (press, scored) in shapes.presses.iter().zip(&found.each) {
+        let undrawn = score_press(press, &rest).unwrap().scores.window.mse;
+        let mse = scored.scores.window.mse;
+        println!("{}: {mse:.0}, rest frame {undrawn:.0}", press.name);
+        assert!(mse < 1.1 * undrawn, "{}: {mse} against {undrawn}", press.name);
+    }
+    println!("mean {:.1}, by shape {:?}", found.mean.window.mse, found.by_shape);
+    // Measured: 86.5; 426 before the gel gave way around a contact.
+    assert!(found.mean.window.mse < 95.0);
+    // Balls and the prism show the ball of the shapes.
+    let with = |shape: &str| {
+        let mut set = balls.clone();
+        set.presses.extend(shapes.presses.iter().filter(|p| p.shape() == shape).cloned());
+        let sensor = calibrate_presses(&set, &CalibrateOptions::default()).unwrap().sensor;
+        compare_presses(&shapes, &sensor).unwrap().by_shape
+    };
+    let by_shape = with("prism");
+    println!("with the prism: {by_shape:?}");
+    let of = |name: &str| by_shape.iter().find(|(shape, _, _)| shape == name).unwrap().2.mse;
+    assert!(of("sphere") < 40.0 && of("prism") < 115.0);
+}
+
+/// A table that names meshes, from a folder on disk to scores by shape.
+#[test]
+fn a_table_may_name_a_mesh_instead_of_a_ball() {
+    let folder = tempfile::tempdir().unwrap();
+    let sensor = load_sensor(&Location::parse("asset:sensors/gelsight_r15/sensor.npz")).unwrap();
+    let rest = finish(&sensor, None, None);
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    write("a.png", &encode_png(&rest).unwrap());
+    write("block.stl", &write_binary_stl(&block(), "a block of 4 x 2 mm", 1e-3));
+    let head = "image,mesh,depth_mm,x_px,y_px,rotation_deg\n";
+    let geometry = PressGeometry { ball_m: None, metres_per_px: Some(sensor.grid.metres_per_px) };
+    let load = |table: &str, row: &str| {
+        for name in ["presses.csv", "shapes.csv"] {
+            let _ = std::fs::remove_file(folder.path().join(name));
+        }
+        write(table, format!("{head}{row}").as_bytes());
+        load_presses(folder.path(), geometry)
+    };
+    for table in ["presses.csv", "shapes.csv"] {
+        let set = load(table, "a.png,block.stl,0.5,160,120,90\n").unwrap();
+        assert_eq!(set.presses[0].shape(), "block");
+        let drawn = predict_press(&set.presses[0], set.ball_m, &sensor).unwrap();
+        let changed = |x: usize, y: usize| {
+            let at = 3 * (y * rest.width_px as usize + x);
+            drawn.rgb[at..at + 3] != rest.rgb[at..at + 3]
+        };
+        // Turned by 90 degrees its long side stands upright: an edge above its place, none beside it at that distance.
+        let px = |mm: f64| (mm * 1e-3 / sensor.grid.metres_per_px).round() as usize;
+        assert!(changed(160, 120 - px(2.0)) && changed(160 - px(1.0), 120));
+        assert!(!changed(160, 120), "the flat contact keeps the colour of the lights at rest");
+        let found = compare_presses(&set, &sensor).unwrap();
+        assert_eq!((found.by_shape[0].0.as_str(), found.by_shape[0].1), ("block", 1));
+    }
+    for (row, part) in [
+        ("a.png,block.stl,,160,120,0\n", "line 2, `depth_mm` is ``, it must be given: a mesh needs"),
+        ("a.png,gone.stl,0.5,160,120,0\n", "gone.stl"),
+        ("a.png,block.stl,0.5,1600,120,0\n", "nothing of `block` lies over the 320x240 image"),
+        ("a.png,block.stl,12,160,120,0\n", "`block` travels 12 mm"),
+        ("a.png,,0.5,160,120,0\n", "how large the ball is"),
+    ] {
+        let error = load("presses.csv", row).unwrap_err().to_string();
+        assert!(error.contains(part), "{row}: {error}");
+    }
+}
+
+/// 4 mm along x, 2 mm along y, its face at z = 3 mm.
+fn block() -> TriMesh {
+    let corner = |i: usize| {
+        let side = |bit: usize, half: f64| if i >> bit & 1 == 1 { half } else { -half };
+        Point3::new(side(0, 2e-3), side(1, 1e-3), if i >> 2 & 1 == 1 { 3e-3 } else { 0.0 })
+    };
+    let faces = [[4, 5, 7, 6], [0, 2, 3, 1], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    TriMesh::new((0..8).map(corner).collect(), triangles).unwrap()
 }

@@ -102,7 +102,7 @@ fn presses(sensor: &Sensor) -> PressSet {
             height_px: grid.height_px as u32,
             rgb: vec![0; 3 * grid.len()],
         };
-        let mut press = Press { name: i.to_string(), image: blank, circle: Some(circle) };
+        let mut press = Press::of_ball(i.to_string(), blank, Some(circle));
         press.image = predict_press(&press, BALL_M, sensor).expect("one size");
         press
     };

@@ -50,7 +50,8 @@ pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row
 pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};
 pub use picture::{PictureError, decode as decode_picture, encode_png};
 pub use presses::{
-    PRESSES_FILE, PressColumnTable, PressFolder, PressRecord, read_press_columns, read_press_folder,
+    PRESSES_FILE, PressColumnTable, PressFolder, PressRecord, PressedBody, press_table, read_press_columns,
+    read_press_folder,
 };
 pub use pulls::{
     JudgedPulls, PULLS_FILE, PullFolderError, PullImages, PullImagesError, Standing, TRACES_FOLDER,

@@ -1,12 +1,28 @@
-//! A folder of ball presses: `presses.csv`, the images that it names, and `rest.png`.
+//! A folder of presses, of a ball or of other bodies: `presses.csv`, the images that it names, and `rest.png`.
 
 use crate::picture::decode;
 use crate::table::{TableError, TableReader, TextCells, number, read_bytes};
 use gripgen_twin::{TactileImage, Values};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The table of a press folder.
 pub const PRESSES_FILE: &str = "presses.csv";
+
+/// Another name under which the table of presses of bodies that are no balls is found.
+const SHAPES_FILE: &str = "shapes.csv";
+
+/// Files that a folder of presses is known by.
+const TABLES: [&str; 2] = [PRESSES_FILE, SHAPES_FILE];
+
+/// The table of a folder of presses; `None` where there is none.
+pub fn press_table(folder: &Path) -> Option<PathBuf> {
+    TABLES.iter().map(|name| folder.join(name)).find(|path| path.is_file())
+}
+
+/// The table that is read: the one that is there, or the one that ought to be.
+fn table_path(folder: &Path) -> PathBuf {
+    press_table(folder).unwrap_or_else(|| folder.join(PRESSES_FILE))
+}
 
 /// The column that names the image of a row.
 const IMAGE: &str = "image";
@@ -25,8 +41,21 @@ pub struct PressRecord {
     pub centre_px: Option<(f64, f64)>,
     /// Radius of the contact.
     pub radius_px: Option<f64>,
-    /// How deep the ball sank in.
+    /// How far it travelled after first contact.
     pub depth_m: Option<f64>,
+    /// The body, where it is no ball.
+    pub body: Option<PressedBody>,
+}
+
+/// A body that is no ball, as a row of the table says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressedBody {
+    /// Its mesh (STL or OBJ, millimetres): the path as written in the table.
+    pub mesh: String,
+    /// What its shape is called: the column `shape`, or the name of the mesh.
+    pub shape: String,
+    /// Turn about its own z, counter-clockwise as seen in the image.
+    pub rotation_rad: f64,
 }
 
 /// What a press folder holds, in the order of its table.
@@ -39,31 +68,55 @@ pub struct PressFolder {
 }
 
 /// Reads a press folder. Columns: `image`, and where somebody measured them `x_px`, `y_px`, `radius_px` or
-/// `depth_mm`; an empty cell is a number that nobody measured. Further columns are left alone.
+/// `depth_mm`; an empty cell is a number that nobody measured. A row with a `mesh` is of that body and no ball: `depth_mm`,
+/// `x_px` and `y_px` of the mesh's origin are needed then, `rotation_deg` and `shape` may stand beside. Further columns are
+/// left alone. The table may be called `shapes.csv` too.
 ///
 /// # Errors
 /// [`TableError`], with line, column and value, or with the image.
 pub fn read_press_folder(folder: &Path) -> Result<PressFolder, TableError> {
-    let path = folder.join(PRESSES_FILE);
+    let path = table_path(folder);
     let bytes = read_bytes(&path)?;
     let mut table = TableReader::new(&path, &bytes)?;
     let image_column = table.required(IMAGE)?;
-    let numbers = ["x_px", "y_px", "radius_px", "depth_mm"].map(|name| (name, table.place(name)));
+    let numbers =
+        ["x_px", "y_px", "radius_px", "depth_mm", "rotation_deg"].map(|name| (name, table.place(name)));
+    let words = ["mesh", "shape"].map(|name| table.place(name));
     let mut presses = Vec::new();
     while let Some(row) = table.row()? {
         let name = row.cell(image_column).to_string();
-        let mut found = [None; 4];
+        let mut found = [None; 5];
         for (slot, (column, place)) in found.iter_mut().zip(numbers) {
             let Some(place) = place else { continue };
             *slot = measured(row.cell(place), column).map_err(|wanted| row.bad(place, wanted))?;
         }
-        let [x, y, radius_px, depth_mm] = found;
+        let [x, y, radius_px, depth_mm, rotation_deg] = found;
+        let word = |place: Option<usize>| place.map(|p| row.cell(p).trim()).filter(|w| !w.is_empty());
+        let body = match word(words[0]) {
+            None => None,
+            Some(mesh) => {
+                for (slot, (name, place)) in found.iter().zip(numbers) {
+                    let needed = matches!(name, "x_px" | "y_px" | "depth_mm");
+                    if needed && slot.is_none() {
+                        let wanted = "given: a mesh needs x_px, y_px and depth_mm";
+                        return Err(row.bad(place.or(words[0]).unwrap_or(image_column), wanted));
+                    }
+                }
+                let stem = Path::new(mesh).file_stem().map_or(mesh, |stem| stem.to_str().unwrap_or(mesh));
+                Some(PressedBody {
+                    mesh: mesh.into(),
+                    shape: word(words[1]).unwrap_or(stem).into(),
+                    rotation_rad: rotation_deg.unwrap_or(0.0).to_radians(),
+                })
+            }
+        };
         presses.push(PressRecord {
             image: picture(&folder.join(&name))?,
             name,
             centre_px: x.zip(y),
             radius_px,
             depth_m: depth_mm.map(|mm| mm * 1e-3),
+            body,
         });
     }
     let rest = REST_FILES.iter().map(|name| folder.join(name)).find(|p| p.is_file());
@@ -85,7 +138,7 @@ pub struct PressColumnTable {
 /// # Errors
 /// [`TableError`].
 pub fn read_press_columns(folder: &Path) -> Result<PressColumnTable, TableError> {
-    let path = folder.join(PRESSES_FILE);
+    let path = table_path(folder);
     let bytes = read_bytes(&path)?;
     let mut table = TableReader::new(&path, &bytes)?;
     let mut columns: Vec<(String, TextCells)> =

@@ -92,15 +92,66 @@ const WINDOW_PX: usize = 7;
 ///
 /// Images of two sizes, or smaller than the window.
 pub fn structural_similarity(a: &TactileImage, b: &TactileImage) -> Result<f64, MetricError> {
+    let (mut total, mut count) = (0.0, 0usize);
+    each_window(a, b, |_, similarity| {
+        total += similarity;
+        count += 1;
+    })?;
+    Ok(total / count as f64)
+}
+
+/// All differences between two images at the pixels that are `inside` (of their number, row by row), with how many there are;
+/// `None` without any. The similarity is that of the windows around them, those at the border of the frame have none.
+///
+/// # Errors
+///
+/// Images of two sizes, or smaller than the window of [`structural_similarity`].
+pub fn score_where(
+    a: &TactileImage,
+    b: &TactileImage,
+    inside: impl Fn(usize) -> bool,
+) -> Result<Option<(usize, Score)>, MetricError> {
+    let (mut similarity, mut windows) = (0.0, 0usize);
+    each_window(a, b, |pixel, value| {
+        if inside(pixel) {
+            similarity += value;
+            windows += 1;
+        }
+    })?;
+    let (mut squares, mut sizes, mut count) = (0u64, 0u64, 0usize);
+    for (pixel, (x, y)) in a.rgb.chunks_exact(3).zip(b.rgb.chunks_exact(3)).enumerate() {
+        if inside(pixel) {
+            count += 1;
+            for (x, y) in x.iter().zip(y) {
+                let difference = u64::from(x.abs_diff(*y));
+                squares += difference * difference;
+                sizes += difference;
+            }
+        }
+    }
+    if count == 0 {
+        return Ok(None);
+    }
+    let mean = |sum: u64| sum as f64 / (3 * count) as f64;
+    let mse = mean(squares);
+    let ssim = similarity / windows.max(1) as f64;
+    Ok(Some((count, Score { mse, psnr_db: psnr_db(mse), ssim, l1: mean(sizes) })))
+}
+
+/// Visits every window of every channel: the pixel in its middle, and the similarity.
+fn each_window(
+    a: &TactileImage,
+    b: &TactileImage,
+    mut visit: impl FnMut(usize, f64),
+) -> Result<(), MetricError> {
     same_size(a, b)?;
     let (w, h) = (a.width_px as usize, a.height_px as usize);
     if w < WINDOW_PX || h < WINDOW_PX {
         return Err(MetricError::Window { size: (a.width_px, a.height_px), window_px: WINDOW_PX as u32 });
     }
-    let per_channel = |c: usize| {
+    for c in 0..3 {
         // Column sums over the rows of the window, moved down row by row.
         let mut columns = vec![Sums::default(); w];
-        let mut total = 0.0;
         for y in 0..h {
             for x in 0..w {
                 let at = |row: usize| 3 * (row * w + x) + c;
@@ -110,28 +161,26 @@ pub fn structural_similarity(a: &TactileImage, b: &TactileImage) -> Result<f64, 
                 }
             }
             if y + 1 >= WINDOW_PX {
-                total += row_of_windows(&columns);
+                let middle = (y - WINDOW_PX / 2) * w;
+                row_of_windows(&columns, |x, similarity| visit(middle + x, similarity));
             }
         }
-        total / ((w - WINDOW_PX + 1) * (h - WINDOW_PX + 1)) as f64
-    };
-    Ok((0..3).map(per_channel).sum::<f64>() / 3.0)
+    }
+    Ok(())
 }
 
-/// Sum of the similarities of all windows of one row.
-fn row_of_windows(columns: &[Sums]) -> f64 {
+/// The windows of one row: the column of the middle, and the similarity.
+fn row_of_windows(columns: &[Sums], mut visit: impl FnMut(usize, f64)) {
     let mut window = Sums::default();
-    let mut total = 0.0;
     for (x, column) in columns.iter().enumerate() {
         window.join(column);
         if x >= WINDOW_PX {
             window.part(&columns[x - WINDOW_PX]);
         }
         if x + 1 >= WINDOW_PX {
-            total += window.similarity();
+            visit(x - WINDOW_PX / 2, window.similarity());
         }
     }
-    total
 }
 
 /// Sums over a window: `a, b, a^2, b^2, a b`.

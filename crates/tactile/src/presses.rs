@@ -1,9 +1,11 @@
-//! Presses of a ball into a sensor, and how well a sensor file predicts their images.
+//! Presses of a ball or of other bodies into a sensor, and how well a sensor file predicts their images.
 
 mod calibrate;
 mod circle;
 mod compare;
+mod contact;
 mod data_pack;
+mod indenter;
 mod mark;
 mod seen;
 
@@ -12,17 +14,20 @@ pub use calibrate::{
 };
 pub use circle::{find_circle, reference_frame};
 pub use compare::{
-    CROPS_PX, CompareError, PressComparison, PressScore, Scores, compare_presses, crop, predict_press,
-    score_press,
+    CROPS_PX, CompareError, PressComparison, PressScore, Scores, WINDOW_PX, compare_presses, crop,
+    predict_press, score_press,
 };
 pub use data_pack::{DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError};
 
 use gripgen_twin::TactileImage;
+use std::sync::Arc;
 
+pub(crate) use contact::Contact;
+pub use indenter::{Indenter, IndenterError, IndenterPose, USUAL_SINK_IN};
 pub use mark::MarkError;
 pub use seen::{PressScene, PressView, ZONES, Zone, frame_mse, surface_part};
 
-/// Images of one sensor into which a ball was pressed, in the order in which they were taken.
+/// Images of one sensor into which a ball or other bodies were pressed, in the order in which they were taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressSet {
     /// Side of a pixel on the gel.
@@ -42,8 +47,30 @@ pub struct Press {
     pub name: String,
     /// The image.
     pub image: TactileImage,
-    /// Where the ball touches, where somebody marked it.
+    /// Where the ball touches, where somebody marked it. Of another body: a circle as large as its contact around its origin.
     pub circle: Option<Circle>,
+    /// How far the ball travelled after first contact, where that was measured.
+    pub travel_m: Option<f64>,
+    /// The body, where it is no ball.
+    pub indenter: Option<Arc<Indenter>>,
+}
+
+impl Press {
+    /// A press of a ball; `circle` where somebody marked it.
+    pub fn of_ball(name: impl Into<String>, image: TactileImage, circle: Option<Circle>) -> Self {
+        Self { name: name.into(), image, circle, travel_m: None, indenter: None }
+    }
+
+    /// A press of another body.
+    pub fn of_body(name: impl Into<String>, image: TactileImage, indenter: Arc<Indenter>) -> Self {
+        let circle = Some(indenter.circle());
+        Self { name: name.into(), image, circle, travel_m: Some(indenter.travel_m), indenter: Some(indenter) }
+    }
+
+    /// What was pressed in, as reports call it.
+    pub fn shape(&self) -> &str {
+        self.indenter.as_ref().map_or("ball", |indenter| &indenter.shape)
+    }
 }
 
 /// The rim of the contact of a ball, in pixels from the centre of the image's first pixel.

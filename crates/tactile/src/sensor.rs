@@ -44,6 +44,10 @@ pub struct Pyramid {
     pub kernels_px: Vec<u32>,
     /// Share of the press below which the gel follows the part.
     pub restore_depth_fraction: f64,
+    /// Share of the press by which the gel gives way around a contact: where the rim of the contact is seen, the part's
+    /// own surface lies this share of the press below the gel at rest. 0: the rim is where the part cuts the gel at rest;
+    /// 0.5: an elastic half-space under a ball (Hertz: `a^2 = R d`).
+    pub sink_in_fraction: f64,
 }
 
 impl Sensor {
@@ -90,6 +94,11 @@ impl Sensor {
             if !(0.0..=1.0).contains(&share) {
                 let range = "from 0 to 1";
                 return Err(SensorError::Value { key: "restore_depth_fraction", value: share, range });
+            }
+            let share = pyramid.sink_in_fraction;
+            if !(0.0..=0.9).contains(&share) {
+                let range = "from 0 to 0.9";
+                return Err(SensorError::Value { key: "sink_in_fraction", value: share, range });
             }
         }
         Ok(self)

@@ -45,6 +45,7 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
     let options = CalibrateOptions::default();
     let calibration = calibrate_presses(&set, &options).map_err(|e| failure(&args.presses, &e))?;
     warn(&calibration, set.presses.len(), &args.talk);
+    say_what_is_not_shown(&set, &args.talk);
     let bytes = match calibration.sensor.to_npz() {
         Some(bytes) => bytes.map_err(Failure::new)?,
         None => return Err(Failure::new("the fitted colours have no place in a sensor file")),
@@ -102,6 +103,24 @@ fn warn(calibration: &Calibration, presses: usize, talk: &TalkArgs) {
     }
 }
 
+/// What the shapes of the presses leave open.
+fn say_what_is_not_shown(set: &PressSet, talk: &TalkArgs) {
+    let bodies = set.presses.iter().any(|press| press.indenter.is_some());
+    if talk.quiet || bodies {
+        return;
+    }
+    eprintln!(
+        "note: balls do not show flat contacts and edges, which are drawn from what they have in common; a press of a known \
+         mesh would show them (columns mesh, depth_mm)"
+    );
+    if set.presses.iter().all(|press| press.travel_m.is_none()) {
+        eprintln!(
+            "note: one ball and no depths: nothing here shows a wrong diameter; the column depth_mm, a ball of another \
+             size or a press of a known mesh would"
+        );
+    }
+}
+
 fn failure(presses: &Path, e: &CalibrateError) -> Failure {
     let failure = Failure::usage(format!("{}: {e}", presses.display()));
     match e {
@@ -133,7 +152,18 @@ fn fitted(sensor: &Sensor) -> Value {
         "noise_rgb": sensor.noise_rgb,
         "gel": if dome_mm.is_some() { "dome" } else { "flat" },
         "dome_sag_mm": dome_mm,
+        "sink_in_fraction": sensor.pyramid.as_ref().map(|p| p.sink_in_fraction),
+        "kernels_px": sensor.pyramid.as_ref().map(|p| p.kernels_px.clone()),
     })
+}
+
+/// How the gel gives way, in words.
+fn gives_way(sensor: &Sensor) -> String {
+    let Some(pyramid) = &sensor.pyramid else { return "as the twin says".into() };
+    let widest_mm =
+        pyramid.kernels_px.first().map_or(0.0, |&k| f64::from(k) * sensor.grid.metres_per_px * 1e3);
+    let percent = 100.0 * pyramid.sink_in_fraction;
+    format!("{percent:.0} % of the press at the rim, widest kernel {widest_mm:.1} mm")
 }
 
 fn text(args: &CalibratePressesArgs, set: &PressSet, calibration: &Calibration) -> PressReportText {
@@ -166,6 +196,7 @@ fn text(args: &CalibratePressesArgs, set: &PressSet, calibration: &Calibration) 
             ),
             ("ball".into(), format!("{:.3} mm", set.ball_m * 1e3)),
             ("gel at rest".into(), gel),
+            ("gel around a contact".into(), gives_way(sensor)),
             ("noise of red, green, blue".into(), format!("{red:.2}, {green:.2}, {blue:.2} grey levels")),
         ],
     }

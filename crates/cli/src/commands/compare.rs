@@ -143,12 +143,21 @@ pub fn comparison_json(comparison: &PressComparison) -> Value {
         .map(|press| {
             let mut scores = scores_json(&press.scores);
             scores["name"] = json!(press.name);
+            scores["shape"] = json!(press.shape);
             scores
         })
         .collect();
     let mut all = scores_json(&comparison.mean);
     all["n"] = json!(comparison.each.len());
     all["each"] = json!(each);
+    let named = |(name, n, score): (&str, usize, &Score)| {
+        let value = json!({"n": n, "mse": score.mse, "psnr": score.psnr_db, "ssim": score.ssim});
+        (name.to_string(), value)
+    };
+    let shapes = comparison.by_shape.iter().map(|(shape, n, score)| named((shape, *n, score)));
+    all["by_shape"] = Value::Object(shapes.collect());
+    let zones = comparison.by_zone.iter().map(|(zone, n, score)| named((zone.name(), *n, score)));
+    all["by_zone"] = Value::Object(zones.collect());
     all
 }
 
@@ -157,6 +166,7 @@ fn scores_json(scores: &Scores) -> Value {
         "full": score_json(&scores.full),
         "crop400": score_json(&scores.crop400),
         "crop200": score_json(&scores.crop200),
+        "window": score_json(&scores.window),
     })
 }
 
@@ -168,11 +178,18 @@ fn score_json(score: &Score) -> Value {
 /// The mean scores for people.
 pub fn table(comparison: &PressComparison) -> String {
     let mut text = format!("{} presses           MSE    PSNR     SSIM     L1\n", comparison.each.len());
-    let mean = &comparison.mean;
-    for (name, s) in
-        [("whole frame", mean.full), ("400 px crop", mean.crop400), ("200 px crop", mean.crop200)]
-    {
+    let mut row = |name: &str, s: &Score| {
         text += &format!("{name:<15} {:>9.2} {:>7.2} {:>8.4} {:>6.2}\n", s.mse, s.psnr_db, s.ssim, s.l1);
+    };
+    let mean = &comparison.mean;
+    row("whole frame", &mean.full);
+    row("400 px crop", &mean.crop400);
+    row("200 px crop", &mean.crop200);
+    if comparison.by_shape.iter().any(|(shape, _, _)| shape != "ball") {
+        row("160 px window", &mean.window);
+        for (shape, n, score) in &comparison.by_shape {
+            row(&format!("  {shape} ({n})"), score);
+        }
     }
     text
 }

@@ -18,7 +18,7 @@ fn press_folder(count: usize) -> tempfile::TempDir {
         let x_px = 40.0 + 240.0 * (i as f64 * 0.754_877_666).fract();
         let y_px = 40.0 + 160.0 * (i as f64 * 0.569_840_291).fract();
         let circle = Circle { x_px, y_px, radius_px: 20.0 + (i % 3) as f64 };
-        let press = Press { name: String::new(), image: rest.clone(), circle: Some(circle) };
+        let press = Press::of_ball("", rest.clone(), Some(circle));
         let name = format!("press-{i:02}.png");
         save(&name, &predict_press(&press, 5e-3, &sensor).unwrap());
         // Every fourth contact is left for the program to find.

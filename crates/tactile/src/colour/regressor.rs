@@ -9,7 +9,8 @@
 //!
 //! `T`: monomials of the normal (degrees 1 to 4) and of height times normal (degrees 0 to 2); `S`: the height around
 //! the pixel at four scales with its derivatives up to third order (see `pyramid`), which stands for cast shadows and
-//! for light that the dent throws onto its surroundings. u and v run over the image, -1 to 1 along its width, with
+//! for light that the dent throws onto its surroundings. Calibrations fit eleven of the forty: those that make presses of
+//! shapes better that the fit has not seen, see `AROUND_FITTED`. u and v run over the image, -1 to 1 along its width, with
 //! total degrees of at most 3 and 2. Beyond what the presses showed, the normal and the derivatives in S are held at
 //! their largest values, so that other parts than a ball stay within the colours that the sensor has shown. Heights are
 //! not held: over a wide flat contact they cancel.
@@ -25,7 +26,7 @@ mod terrain;
 mod tests;
 
 pub(crate) use draw::DrawScratch;
-pub(crate) use pyramid::{AROUND_HEIGHTS, SURROUNDINGS, cell_px};
+pub(crate) use pyramid::{AROUND_FITTED, AROUND_HEIGHTS, SURROUNDINGS, cell_px};
 pub(crate) use terrain::{Planes, Terrain};
 
 use crate::grid::{Grid, Plane};
@@ -42,9 +43,6 @@ const NORMAL_TERMS: usize = (NORMAL_DEGREE + 1) * (NORMAL_DEGREE + 2) / 2 - 1;
 
 /// Terms of a displaced pixel.
 pub(crate) const NEAR: usize = NORMAL_TERMS + (HEIGHT_DEGREE + 1) * (HEIGHT_DEGREE + 2) / 2;
-
-/// The term that is the height alone.
-pub(crate) const HEIGHT_INPUT: usize = NORMAL_TERMS;
 
 /// Monomials `u^i v^j` of degree at most 3, and of degree at most 2. Order: `1, u, v, u^2, u v, v^2, u^3, ...`.
 pub(crate) const NEAR_FIELD: usize = 10;
@@ -126,13 +124,16 @@ fn product<const N: usize>(a: &[f32; N], b: &[f32; N]) -> [f32; N] {
     out
 }
 
-/// The features of the surroundings of a surface on its finest cells, one plane a feature.
-pub(crate) fn around_planes(surface: &Plane, mm_per_px: f64) -> Vec<Plane> {
-    let Surroundings { mut fine, coarse } =
+/// The features of the surroundings that calibrations fit, [`AROUND_FITTED`]: one plane for each, on the finest cells.
+pub(crate) fn fitted_surroundings(surface: &Plane, mm_per_px: f64) -> Vec<Plane> {
+    let Surroundings { fine, coarse } =
         surroundings(&Planes::of_heights(surface), cell_px(mm_per_px), mm_per_px);
     let (w, h) = (fine[0].width, fine[0].height);
-    fine.extend(coarse.iter().map(|plane| double(plane, w, h)));
-    fine
+    let plane = |feature: usize| match feature.checked_sub(fine.len()) {
+        None => fine[feature].clone(),
+        Some(coarser) => double(&coarse[coarser], w, h),
+    };
+    AROUND_FITTED.map(plane).to_vec()
 }
 
 /// Where pixels lie in the image.

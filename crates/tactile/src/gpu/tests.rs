@@ -254,7 +254,8 @@ fn colours_by_regression_agree_with_the_processor() {
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn the_deformation_of_the_calibration_is_used() {
     let mut calibrated = sensor(160, 120, regression(160));
-    calibrated.pyramid = Some(Pyramid { kernels_px: vec![31, 15, 5], restore_depth_fraction: 0.25 });
+    calibrated.pyramid =
+        Some(Pyramid { kernels_px: vec![31, 15, 5], restore_depth_fraction: 0.25, sink_in_fraction: 0.0 });
     for gpu in both_variants() {
         compare(&gpu, &calibrated, &gel(&[71, 5]), 0.0);
     }

@@ -1,5 +1,6 @@
 //! A sensor from presses of a ball: rest frame, noise, gel and colours, with the error on presses held out.
 
+mod gel;
 mod moments;
 mod rest;
 mod ridge;
@@ -10,20 +11,20 @@ mod tests;
 pub use ridge::Smoothness;
 
 use super::circle::{Seen, look, reference_frame};
-use super::compare::{CompareError, PressComparison, PressScore, predict_ball, score_press};
+use super::compare::{CompareError, PressComparison, predict_contact, score_press};
 use super::mark::{self, MarkError};
-use super::{Circle, Press, PressSet};
-use crate::colour::regressor::AROUND_HEIGHTS;
+use super::{Circle, Contact, Press, PressSet};
+use crate::colour::regressor::{AROUND_FITTED, AROUND_HEIGHTS, SURROUNDINGS};
 use crate::colour::{ColourModel, Regressor, shade};
 use crate::gradient::gradient;
 use crate::grid::Grid;
 use crate::metrics::MetricError;
-use crate::sensor::{GelShape, Pyramid, Sensor};
+use crate::sensor::{GelShape, Sensor};
+use gel::{Candidate, Gels};
 use gripgen_twin::TactileImage;
 use moments::Moments;
 use rest::{noise_rgb, rest_frame};
-use ridge::{Folds, solve};
-use samples::{GelModel, Samples};
+use ridge::solve;
 
 /// Fewest presses that can be calibrated with: less do not cover the frame, and leave none to hold out.
 pub const MIN_PRESSES: usize = 4;
@@ -31,21 +32,9 @@ pub const MIN_PRESSES: usize = 4;
 /// With fewer presses the error is that of leaving out one at a time, and is not to be relied on.
 pub const FEW_PRESSES: usize = 12;
 
-/// Sizes of the blurs of the deformation, in millimetres.
-const KERNELS_MM: [f64; 3] = [2.1, 1.0, 0.5];
-
-/// Share of the press below which the gel follows the ball.
-const RESTORE_DEPTH_FRACTION: f64 = 0.4;
-
 /// Radii of curvature that are tried for a domed gel: that of Taxim's gel map (1.4 mm of sag on a half diagonal of 11.8 mm),
 /// and twice it.
 const DOME_RADII_M: [f64; 2] = [0.1, 0.05];
-
-/// A dome has to be better than a flat gel by this factor.
-const DOME_GAIN: f64 = 0.98;
-
-/// Height of a gel pressed flat as a whole, see `Samples::flat`.
-const FLAT_HEIGHT_MM: f32 = 1.0;
 
 /// Features of the surroundings may exceed those of the presses by this factor, since they are sampled on cells.
 const AROUND_MARGIN: f32 = 1.1;
@@ -136,8 +125,8 @@ pub enum CalibrateError {
     Metric(#[from] MetricError),
 }
 
-/// A press with its checked circle.
-type Marked<'a> = (&'a Press, Circle);
+/// A press with its checked contact.
+type Marked<'a> = (&'a Press, Contact);
 
 /// Calibrates a sensor, and says how well it predicts presses that it has not seen.
 ///
@@ -163,14 +152,8 @@ fn calibrate_marked(
         .map(|p| Ok((p, mark::checked(p, set.ball_m, grid.metres_per_px)?)))
         .collect::<Result<Vec<Marked<'_>>, MarkError>>()?;
     let (trusted, distrusted) = trusted(set, &marked)?;
-    let shapes = match &options.gel_shape {
-        Some(shape) => vec![shape.clone()],
-        None => std::iter::once(GelShape::Flat).chain(domes(&grid)).collect(),
-    };
-    let candidates: Vec<Candidate> =
-        shapes.into_iter().map(|shape| Candidate::new(shape, &marked, set.ball_m, &grid)).collect();
-    let flat = Moments::of_inputs(&Samples::flat(FLAT_HEIGHT_MM, &grid));
-    let fit = Fit { set, grid, marked: &marked, candidates: &candidates, flat };
+    let gels = Gels::new(options.gel_shape.as_ref(), &marked, set.ball_m, grid);
+    let fit = Fit { set, grid, marked: &marked, gels: &gels };
 
     let usual = if marked.len() < FEW_PRESSES { marked.len() } else { 4 };
     let folds = options.folds.unwrap_or(usual).clamp(2, marked.len());
@@ -180,19 +163,16 @@ fn calibrate_marked(
         seen.retain(|&i| trusted[i]);
         let (sensor, _) = fit.fit(&seen)?;
         for i in unseen {
-            predicted[i] = Some(predict_ball(&marked[i].1, set.ball_m, &sensor));
+            predicted[i] = Some(predict_contact(&marked[i].1, set.ball_m, &sensor));
         }
     }
     let predicted: Vec<TactileImage> = predicted.into_iter().flatten().collect();
-    let scored = set.presses.iter().zip(&predicted).map(|(press, image)| {
-        let scores = score_press(press, image)?;
-        Ok(PressScore { name: press.name.clone(), scores })
-    });
+    let scored = set.presses.iter().zip(&predicted).map(|(press, image)| score_press(press, image));
     let each = scored.collect::<Result<Vec<_>, MetricError>>()?;
     let held_out = PressComparison::from_each(each).ok_or(CompareError::Empty)?;
     let everything: Vec<usize> = (0..marked.len()).filter(|&i| trusted[i]).collect();
     let (sensor, smoothness) = fit.fit(&everything)?;
-    let circles = marked.iter().map(|(_, circle)| *circle).collect();
+    let circles = marked.iter().map(|(_, contact)| contact.circle).collect();
     let doubtful = (0..marked.len()).filter(|&i| !trusted[i]).map(|i| marked[i].0.name.clone()).collect();
     Ok(Calibration { sensor, held_out, predicted, folds, smoothness, circles, doubtful, distrusted })
 }
@@ -202,8 +182,12 @@ fn calibrate_marked(
 fn trusted(set: &PressSet, marked: &[Marked<'_>]) -> Result<(Vec<bool>, usize), CalibrateError> {
     let ball_radius_px = set.ball_m / 2.0 / set.metres_per_px;
     let Some(rest) = reference_frame(set) else { return Ok((vec![true; marked.len()], 0)) };
-    let seen: Vec<Seen> =
-        marked.iter().map(|(press, circle)| look(&press.image, &rest, circle, ball_radius_px)).collect();
+    // Who gives a body its place has seen it.
+    let seen = |(press, contact): &Marked<'_>| match &contact.indenter {
+        Some(_) => Seen::Here,
+        None => look(&press.image, &rest, &contact.circle, ball_radius_px),
+    };
+    let seen: Vec<Seen> = marked.iter().map(seen).collect();
     if seen.iter().all(|s| *s == Seen::Nothing) {
         return Err(CalibrateError::Nothing);
     }
@@ -215,64 +199,21 @@ fn trusted(set: &PressSet, marked: &[Marked<'_>]) -> Result<(Vec<bool>, usize), 
     Ok((trusted, 0))
 }
 
-/// One gel to try, with what the presses look like on it.
-struct Candidate {
-    gel: GelModel,
-    samples: Vec<Samples>,
-    moments: Vec<Moments>,
-}
-
-impl Candidate {
-    fn new(shape: GelShape, marked: &[Marked<'_>], ball_m: f64, grid: &Grid) -> Self {
-        let gel = GelModel { shape, pyramid: pyramid(grid) };
-        let samples: Vec<Samples> = marked
-            .iter()
-            .enumerate()
-            .map(|(i, (_, circle))| Samples::draw(i, circle, ball_m, grid, &gel))
-            .collect();
-        let moments = samples.iter().map(Moments::of_inputs).collect();
-        Self { gel, samples, moments }
-    }
-
-    /// The sums of some presses with their colours against a rest frame.
-    fn coloured(&self, marked: &[Marked<'_>], which: &[usize], rest: &[Vec<f32>; 3]) -> Vec<Moments> {
-        which
-            .iter()
-            .map(|&i| {
-                let mut moments = self.moments[i].clone();
-                moments.set_targets(&self.samples[i], &self.samples[i].targets(marked[i].0, rest));
-                moments
-            })
-            .collect()
-    }
-}
-
-/// The deformation at this resolution: kernels of fixed size on the gel.
-fn pyramid(grid: &Grid) -> Pyramid {
-    let mm_per_px = grid.metres_per_px * 1e3;
-    let mut kernels_px: Vec<u32> =
-        KERNELS_MM.iter().map(|mm| 2 * (mm / mm_per_px / 2.0).floor() as u32 + 1).collect();
-    kernels_px.retain(|&k| k >= 3);
-    kernels_px.iter_mut().for_each(|k| *k = (*k).min(255));
-    Pyramid { kernels_px, restore_depth_fraction: RESTORE_DEPTH_FRACTION }
-}
-
 /// All that a fit to some of the presses needs.
 struct Fit<'a> {
     set: &'a PressSet,
     grid: Grid,
     marked: &'a [Marked<'a>],
-    candidates: &'a [Candidate],
-    flat: Moments,
+    gels: &'a Gels<'a>,
 }
 
 impl Fit<'_> {
     /// Fits to the presses `seen` and to nothing else.
     fn fit(&self, seen: &[usize]) -> Result<(Sensor, Smoothness), CalibrateError> {
-        let presses: Vec<Marked<'_>> = seen.iter().map(|&i| self.marked[i]).collect();
+        let presses: Vec<Marked<'_>> = seen.iter().map(|&i| self.marked[i].clone()).collect();
         let raw = self.set.rest.as_ref();
         let mut rest = rest_frame(&presses, |_| None, raw, &self.grid);
-        let (candidate, smoothness) = self.choose(seen, &rest);
+        let (candidate, smoothness) = self.gels.choose(seen, &rest);
         let mut colour = self.colours(candidate, &smoothness, seen, &rest)?;
         // Once more, now that the change of each press is known.
         let change = |i: usize| {
@@ -298,21 +239,6 @@ impl Fit<'_> {
         Ok((sensor, smoothness))
     }
 
-    /// The gel and the smoothness with the least error on presses of `seen` that are held out in turn.
-    fn choose(&self, seen: &[usize], rest: &[Vec<f32>; 3]) -> (&Candidate, Smoothness) {
-        let mut best: Option<(&Candidate, Folds<'_>, f64)> = None;
-        for candidate in self.candidates {
-            let moments = candidate.coloured(self.marked, seen, rest);
-            let folds = Folds::split(&moments, &self.flat, 4);
-            let error = folds.error(&Smoothness::USUAL);
-            if best.as_ref().is_none_or(|(_, _, least)| error < DOME_GAIN * least) {
-                best = Some((candidate, folds, error));
-            }
-        }
-        let (candidate, folds, _) = best.expect("there is at least one candidate");
-        (candidate, folds.choose())
-    }
-
     fn colours(
         &self,
         candidate: &Candidate,
@@ -324,22 +250,20 @@ impl Fit<'_> {
         for moments in candidate.coloured(self.marked, seen, rest) {
             sums.add(&moments);
         }
-        let solution = solve(&sums, &self.flat, smoothness).ok_or(CalibrateError::Nothing)?;
+        let solution = solve(&sums, smoothness).ok_or(CalibrateError::Nothing)?;
         let (near, around) = solution.near_and_around();
-        let largest = seen.iter().map(|&i| &candidate.samples[i].largest);
-        let mut slope_limit = 0.0f32;
-        let mut around_limit = vec![0.0f32; candidate.samples[seen[0]].largest.1.len()];
-        for (slope, features) in largest {
-            slope_limit = slope_limit.max(*slope);
-            around_limit.iter_mut().zip(features).for_each(|(l, f)| *l = l.max(AROUND_MARGIN * f));
+        // Heights may grow, over a wide flat contact they cancel; derivatives are held at the largest that were seen.
+        let mut around_limit = vec![NO_LIMIT; SURROUNDINGS];
+        for (i, &feature) in AROUND_FITTED.iter().enumerate().filter(|(_, f)| !AROUND_HEIGHTS.contains(f)) {
+            let seen = seen.iter().map(|&press| candidate.samples[press].largest[i]);
+            around_limit[feature] = AROUND_MARGIN * seen.fold(0.0, f32::max);
         }
-        // Heights alone may grow: over a wide flat contact they cancel, see `Samples::flat`.
-        AROUND_HEIGHTS.iter().for_each(|&level| around_limit[level] = NO_LIMIT);
+        let steepest = seen.iter().map(|&i| candidate.samples[i].steepest);
         Ok(ColourModel::Regressor(Box::new(Regressor {
             mm_per_px: self.grid.metres_per_px * 1e3,
             near,
             around,
-            slope_limit,
+            slope_limit: steepest.fold(0.0, f32::max),
             height_limit_mm: NO_LIMIT,
             around_limit,
         })))

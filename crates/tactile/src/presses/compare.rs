@@ -1,18 +1,20 @@
 //! A sensor file against presses: predicted and real image of each.
 
 use super::mark::{self, MarkError};
-use super::{Circle, Press, PressSet};
-use crate::grid::{Grid, Plane};
-use crate::indent::Imprint;
-use crate::metrics::{MetricError, Score, score};
+use super::seen::{ZONES, Zone};
+use super::{Contact, Press, PressSet};
+use crate::metrics::{MetricError, Score, score, score_where};
 use crate::render::Renderer;
-use crate::sensor::{GelShape, Pyramid, Sensor};
+use crate::sensor::{Pyramid, Sensor};
 use crate::simd::SimdLevel;
 use gripgen_twin::config::GelModel;
-use gripgen_twin::{ContactPatch, Gel, TactileImage};
+use gripgen_twin::{Gel, TactileImage};
 
 /// Sides of the crops around the contact, at the resolution of the calibration.
 pub const CROPS_PX: [u32; 2] = [400, 200];
+
+/// Side of the window around the place of a body, in which shapes are compared.
+pub const WINDOW_PX: u32 = 160;
 
 /// Why presses and a sensor cannot be compared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -39,7 +41,7 @@ pub enum CompareError {
     Metric(#[from] MetricError),
 }
 
-/// The scores of one press: the whole frame, and the crops of [`CROPS_PX`].
+/// The scores of one press: the whole frame, the crops of [`CROPS_PX`], the window of [`WINDOW_PX`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scores {
     /// The whole frame.
@@ -48,6 +50,8 @@ pub struct Scores {
     pub crop400: Score,
     /// 200 x 200 pixels.
     pub crop200: Score,
+    /// 160 x 160 pixels around the ball, or the origin of another body.
+    pub window: Score,
 }
 
 /// One press.
@@ -55,8 +59,12 @@ pub struct Scores {
 pub struct PressScore {
     /// Its name.
     pub name: String,
+    /// What was pressed in.
+    pub shape: String,
     /// How its prediction differs from it.
     pub scores: Scores,
+    /// The same by zone around the contact, of those that the image has.
+    pub zones: Vec<(Zone, Score)>,
 }
 
 /// All presses.
@@ -66,28 +74,51 @@ pub struct PressComparison {
     pub mean: Scores,
     /// Each press, in the order of the set.
     pub each: Vec<PressScore>,
+    /// By what was pressed in, in the order in which it first comes: how many, and the mean over their windows.
+    pub by_shape: Vec<(String, usize, Score)>,
+    /// By zone around the contact: how many presses have it, and the mean over them.
+    pub by_zone: Vec<(Zone, usize, Score)>,
 }
 
 impl PressComparison {
     /// From the scores of each press; `None` without any.
     pub fn from_each(each: Vec<PressScore>) -> Option<Self> {
-        let n = each.len() as f64;
         if each.is_empty() {
             return None;
         }
-        let mean = |of: fn(&Scores) -> Score| {
-            let sum = |value: fn(&Score) -> f64| each.iter().map(|p| value(&of(&p.scores))).sum::<f64>() / n;
-            Score {
-                mse: sum(|s| s.mse),
-                psnr_db: sum(|s| s.psnr_db),
-                ssim: sum(|s| s.ssim),
-                l1: sum(|s| s.l1),
-            }
+        let over = |of: fn(&Scores) -> Score| mean_score(each.iter().map(|press| of(&press.scores)));
+        let mean = Scores {
+            full: over(|s| s.full),
+            crop400: over(|s| s.crop400),
+            crop200: over(|s| s.crop200),
+            window: over(|s| s.window),
         };
-        let mean =
-            Scores { full: mean(|s| s.full), crop400: mean(|s| s.crop400), crop200: mean(|s| s.crop200) };
-        Some(Self { mean, each })
+        let mut shapes: Vec<&str> = Vec::new();
+        for press in &each {
+            if !shapes.contains(&press.shape.as_str()) {
+                shapes.push(&press.shape);
+            }
+        }
+        let of_shape = |shape: &str| {
+            let windows: Vec<Score> =
+                each.iter().filter(|p| p.shape == shape).map(|p| p.scores.window).collect();
+            (shape.to_string(), windows.len(), mean_score(windows.iter().copied()))
+        };
+        let by_shape = shapes.into_iter().map(of_shape).collect();
+        let of_zone = |zone: Zone| {
+            let there = each.iter().flat_map(|press| &press.zones).filter(|(z, _)| *z == zone);
+            let scores: Vec<Score> = there.map(|(_, score)| *score).collect();
+            (zone, scores.len(), mean_score(scores.iter().copied()))
+        };
+        let by_zone = ZONES.into_iter().map(of_zone).filter(|(_, n, _)| *n > 0).collect();
+        Some(Self { mean, each, by_shape, by_zone })
     }
+}
+
+fn mean_score(scores: impl Iterator<Item = Score> + Clone) -> Score {
+    let n = scores.clone().count().max(1) as f64;
+    let sum = |value: fn(&Score) -> f64| scores.clone().map(|s| value(&s)).sum::<f64>() / n;
+    Score { mse: sum(|s| s.mse), psnr_db: sum(|s| s.psnr_db), ssim: sum(|s| s.ssim), l1: sum(|s| s.l1) }
 }
 
 /// Compares the images that `sensor` predicts for the contacts with the real ones. Contacts that nobody marked are
@@ -105,8 +136,7 @@ pub fn compare_presses(set: &PressSet, sensor: &Sensor) -> Result<PressCompariso
     let mut each = Vec::with_capacity(set.presses.len());
     for press in &set.presses {
         let predicted = predict_press(press, set.ball_m, sensor)?;
-        let scores = score_press(press, &predicted)?;
-        each.push(PressScore { name: press.name.clone(), scores });
+        each.push(score_press(press, &predicted)?);
     }
     PressComparison::from_each(each).ok_or(CompareError::Empty)
 }
@@ -122,64 +152,30 @@ pub fn predict_press(press: &Press, ball_m: f64, sensor: &Sensor) -> Result<Tact
     if found != wanted {
         return Err(CompareError::Size { press: press.name.clone(), found, wanted });
     }
-    let circle = mark::checked(press, ball_m, sensor.grid.metres_per_px)?;
-    Ok(predict_ball(&circle, ball_m, sensor))
+    let contact = mark::checked(press, ball_m, sensor.grid.metres_per_px)?;
+    Ok(predict_contact(&contact, ball_m, sensor))
 }
 
-/// The image of a ball whose rim of contact is `circle`, without noise.
-pub(crate) fn predict_ball(circle: &Circle, ball_m: f64, sensor: &Sensor) -> TactileImage {
+/// The image of a contact, without noise.
+pub(crate) fn predict_contact(contact: &Contact, ball_m: f64, sensor: &Sensor) -> TactileImage {
     let gel = gel_of(sensor);
     let renderer = Renderer { sensor, gel: &gel, level: SimdLevel::best() };
-    let imprint = ball_imprint(circle, ball_m, &sensor.grid, &sensor.gel_shape);
+    let imprint = contact.imprint(ball_m, &sensor.grid, &sensor.gel_shape, sink_in_fraction(sensor));
     renderer.image(Some(&imprint), None)
 }
 
-/// The imprint of a ball whose rim of contact is `circle`, relative to the gel at rest.
-///
-/// On a flat gel that is the cap of the ball below the plane of the circle. On a curved one the circle lies on the
-/// slope of the gel under it: the ball's centre stands off the circle's by `sqrt(R^2 - a^2)` along the gel's normal.
-pub(crate) fn ball_imprint(circle: &Circle, ball_m: f64, grid: &Grid, shape: &GelShape) -> Imprint {
-    let press_depth_m = circle.depth_m(ball_m, grid.metres_per_px);
-    let radius_px = ball_m / 2.0 / grid.metres_per_px;
-    let sunk_px = radius_px - press_depth_m / grid.metres_per_px;
-    let (w, h) = (grid.width_px, grid.height_px);
-    let rest = shape.rest_px(grid);
-    let rest_at = |x: f64, y: f64| {
-        let inside = |v: f64, n: usize| v.round().clamp(0.0, (n - 1) as f64) as usize;
-        rest.as_ref().map_or(0.0, |rest| f64::from(rest.at(inside(x, w), inside(y, h))))
-    };
-    let (cx, cy, a) = (circle.x_px, circle.y_px, circle.radius_px);
-    let slope = [
-        (rest_at(cx + a, cy) - rest_at(cx - a, cy)) / (2.0 * a),
-        (rest_at(cx, cy + a) - rest_at(cx, cy - a)) / (2.0 * a),
-    ];
-    let ball = [cx - sunk_px * slope[0], cy - sunk_px * slope[1]];
-    let rim = [(a, 0.0), (-a, 0.0), (0.0, a), (0.0, -a)];
-    let above_rim = |x: f64, y: f64| {
-        let (dx, dy) = (x - ball[0], y - ball[1]);
-        (radius_px * radius_px - dx * dx - dy * dy).max(0.0).sqrt() - rest_at(x, y)
-    };
-    let level = match &rest {
-        None => sunk_px,
-        Some(_) => rim.iter().map(|(dx, dy)| above_rim(cx + dx, cy + dy)).sum::<f64>() / 4.0,
-    };
-    let mut depth_px = Plane::filled(w, h, 0.0);
-    for (i, depth) in depth_px.values.iter_mut().enumerate() {
-        let (x, y) = ((i % w) as f64, (i / w) as f64);
-        // Far from the ball the gel itself falls away; only the ball's own cap counts.
-        let (dx, dy) = (x - ball[0], y - ball[1]);
-        if dx * dx + dy * dy < radius_px * radius_px {
-            *depth = (above_rim(x, y) - level).max(0.0) as f32;
-        }
-    }
-    let deepest = depth_px.values.iter().fold(0.0f32, |m, &d| m.max(d));
-    let press_depth_m = if rest.is_some() { f64::from(deepest) * grid.metres_per_px } else { press_depth_m };
-    Imprint { depth_px, press_depth_m, patch: ContactPatch { cells: Vec::new() }, elastic: None }
+/// The sink-in that a sensor file knows.
+pub(super) fn sink_in_fraction(sensor: &Sensor) -> f64 {
+    sensor.pyramid.as_ref().map_or(0.0, |pyramid| pyramid.sink_in_fraction)
 }
 
 /// What the renderer needs of a gel: the deformation of the calibration, or that of Wucherer et al. 2023.
 pub(super) fn gel_of(sensor: &Sensor) -> Gel {
-    let usual = || Pyramid { kernels_px: vec![71, 51, 21, 11, 5], restore_depth_fraction: 0.4 };
+    let usual = || Pyramid {
+        kernels_px: vec![71, 51, 21, 11, 5],
+        restore_depth_fraction: 0.4,
+        sink_in_fraction: 0.0,
+    };
     let pyramid = sensor.pyramid.clone().unwrap_or_else(usual);
     Gel {
         model: GelModel::Pyramid,
@@ -199,18 +195,32 @@ pub(super) fn gel_of(sensor: &Sensor) -> Gel {
 /// # Errors
 ///
 /// Images of two sizes, or too small for the structural similarity.
-pub fn score_press(press: &Press, predicted: &TactileImage) -> Result<Scores, MetricError> {
+pub fn score_press(press: &Press, predicted: &TactileImage) -> Result<PressScore, MetricError> {
     let centre = press
         .circle
         .map_or((f64::from(predicted.width_px) / 2.0, f64::from(predicted.height_px) / 2.0), |c| {
             (c.x_px, c.y_px)
         });
     let cropped = |side_px| score(&crop(predicted, centre, side_px), &crop(&press.image, centre, side_px));
-    Ok(Scores {
+    let scores = Scores {
         full: score(predicted, &press.image)?,
         crop400: cropped(CROPS_PX[0])?,
         crop200: cropped(CROPS_PX[1])?,
-    })
+        window: cropped(WINDOW_PX)?,
+    };
+    let mut zones = Vec::new();
+    if let Some(circle) = press.circle {
+        let contact = Contact::of_press(press, circle);
+        let width_px = predicted.width_px as usize;
+        let zone_of =
+            |pixel: usize| Zone::at(contact.from_rim_px(pixel, width_px) / circle.radius_px.max(1.0));
+        let of_pixel: Vec<Zone> = (0..width_px * predicted.height_px as usize).map(zone_of).collect();
+        for zone in ZONES {
+            let found = score_where(predicted, &press.image, |pixel| of_pixel[pixel] == zone)?;
+            zones.extend(found.map(|(_, score)| (zone, score)));
+        }
+    }
+    Ok(PressScore { name: press.name.clone(), shape: press.shape().into(), scores, zones })
 }
 
 /// A square around `centre`, shifted inside the frame; a frame smaller than the square is taken whole.
@@ -244,17 +254,5 @@ mod tests {
         assert_eq!(first((11.0, 9.0), 4), 6 * 12 + 8);
         let whole = crop(&image, (3.0, 3.0), 400);
         assert_eq!(whole, image);
-    }
-
-    #[test]
-    fn a_ball_is_as_deep_as_its_circle_says() {
-        let grid = Grid { width_px: 101, height_px: 81, metres_per_px: 1e-4 };
-        let circle = Circle { x_px: 50.0, y_px: 40.0, radius_px: 17.320_508 };
-        let imprint = ball_imprint(&circle, 4e-3, &grid, &GelShape::Flat);
-        // A circle of sqrt(3) mm is a cap of 1 mm.
-        assert!((imprint.press_depth_m - 1e-3).abs() < 1e-9);
-        assert!((imprint.depth_px.at(50, 40) - 10.0).abs() < 1e-4);
-        assert_eq!(imprint.depth_px.at(50, 40 + 18), 0.0);
-        assert!(imprint.depth_px.at(50 + 17, 40) > 0.0);
     }
 }

@@ -82,10 +82,10 @@ impl PressSet {
         let presses = images
             .chunks_exact(width.saturating_mul(height).saturating_mul(3).max(1))
             .enumerate()
-            .map(|(i, rgb)| Press {
-                name: i.to_string(),
-                image: TactileImage { width_px: width as u32, height_px: height as u32, rgb: rgb.to_vec() },
-                circle: circle(i, centres.as_deref(), radii.as_deref()),
+            .map(|(i, rgb)| {
+                let image =
+                    TactileImage { width_px: width as u32, height_px: height as u32, rgb: rgb.to_vec() };
+                Press::of_ball(i.to_string(), image, circle(i, centres.as_deref(), radii.as_deref()))
             })
             .collect();
         Ok(Self { metres_per_px, ball_m, rest, presses })

@@ -1,6 +1,6 @@
 //! Marks that can be: where a ball touches, checked against the image and the ball.
 
-use super::{Circle, Press};
+use super::{Circle, Contact, Press};
 
 /// Hand-drawn circles are unsure by a few per cent: one up to so much wider than the ball is taken for its equator.
 const WIDEST: f64 = 1.05;
@@ -41,8 +41,11 @@ pub enum MarkError {
     },
 }
 
-/// The mark of a press, its radius at most that of the ball.
-pub(super) fn checked(press: &Press, ball_m: f64, metres_per_px: f64) -> Result<Circle, MarkError> {
+/// The contact of a press; the circle of a ball is at most as wide as the ball.
+pub(super) fn checked(press: &Press, ball_m: f64, metres_per_px: f64) -> Result<Contact, MarkError> {
+    if let (Some(_), Some(circle)) = (&press.indenter, press.circle) {
+        return Ok(Contact::of_press(press, circle));
+    }
     let name = || press.name.clone();
     let circle = press.circle.ok_or_else(|| MarkError::Missing { press: name() })?;
     let (width_px, height_px) = (press.image.width_px, press.image.height_px);
@@ -56,5 +59,6 @@ pub(super) fn checked(press: &Press, ball_m: f64, metres_per_px: f64) -> Result<
         let radius_mm = circle.radius_px * metres_per_px * 1e3;
         return Err(MarkError::Radius { press: name(), radius_mm, ball_mm: ball_m / 2.0 * 1e3 });
     }
-    Ok(Circle { radius_px: circle.radius_px.min(0.999 * ball_px), ..circle })
+    let circle = Circle { radius_px: circle.radius_px.min(0.999 * ball_px), ..circle };
+    Ok(Contact::of_press(press, circle))
 }

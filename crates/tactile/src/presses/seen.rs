@@ -5,7 +5,8 @@ mod view;
 
 pub use view::{PressView, ZONES, Zone, surface_part};
 
-use super::compare::{ball_imprint, gel_of};
+use super::compare::{gel_of, sink_in_fraction};
+use super::contact::{Deeper, ball_imprint};
 use super::{Circle, PressSet};
 use crate::grid::Plane;
 use crate::render::Renderer;
@@ -72,10 +73,10 @@ impl PressScene {
     pub fn change_seen(&self, circle: Option<&Circle>, optics: &OpticsState) -> [Plane; 3] {
         let imprint = circle.map(|circle| {
             let circle = self.circle_here(circle);
-            match self.dome(optics) {
-                Some(shape) => ball_imprint(&circle, self.ball_m, &self.sensor.grid, &shape),
-                None => ball_imprint(&circle, self.ball_m, &self.sensor.grid, &self.sensor.gel_shape),
-            }
+            let deeper = Deeper::By(sink_in_fraction(&self.sensor));
+            let dome = self.dome(optics);
+            let shape = dome.as_ref().unwrap_or(&self.sensor.gel_shape);
+            ball_imprint(&circle, deeper, self.ball_m, &self.sensor.grid, shape)
         });
         let renderer = Renderer { sensor: &self.sensor, gel: &self.gel, level: SimdLevel::best() };
         renderer.change_seen(imprint.as_ref(), optics)

@@ -14,6 +14,7 @@
 //! | `dome_sag_mm` | scalar, optional | a domed gel: how much its corners lie below its apex |
 //! | `gel_height_px` | (H, W), optional | a gel of any shape: height at rest, relative to its highest point |
 //! | `kernels_px`, `restore_depth_fraction` | (K,), scalar, optional | the deformation that the colours were calibrated with |
+//! | `sink_in_fraction` | scalar, optional | share of the press by which the gel gives way at the rim of a contact; 0 without it |
 //! | `shadow_values`, `shadow_heights_mm`, `shadow_step_mm` | (N, H, L, 3), (2,), scalar, optional | shadows: change of grey level by direction, height of the gel beside the contact (first, step) and distance; NaN after the end of a ray |
 //! | `marker_px`, `marker_radius_px`, `marker_darkness_rgb` | (N, 2), scalar, (3,), optional | dots on the gel: column and row at rest, radius, share of light that a dot takes |
 //! | `ball_mm` | scalar, optional | diameter of the ball of the calibration |
@@ -183,6 +184,9 @@ impl Sensor {
             arrays.push(("kernels_px", list(kernels), ElementType::F64));
             let share = pyramid.restore_depth_fraction;
             arrays.push(("restore_depth_fraction", scalar(share), ElementType::F64));
+            if pyramid.sink_in_fraction > 0.0 {
+                arrays.push(("sink_in_fraction", scalar(pyramid.sink_in_fraction), ElementType::F64));
+            }
         }
         if let Some(shadow) = self.shadow.as_ref().filter(|s| s.table().kind == ShadowKind::Darkening) {
             arrays.extend(shadow.table().arrays());
@@ -293,7 +297,8 @@ fn pyramid(npz: &mut Npz<'_>) -> Result<Option<Pyramid>, NpzError> {
     }
     let kernels_px = npz.array_of_shape("kernels_px", &[None])?.values.iter().map(|&k| k as u32).collect();
     let restore_depth_fraction = npz.array_of_shape("restore_depth_fraction", &[])?.values[0];
-    Ok(Some(Pyramid { kernels_px, restore_depth_fraction }))
+    let sink_in_fraction = scalar(npz, "sink_in_fraction")?.unwrap_or(0.0);
+    Ok(Some(Pyramid { kernels_px, restore_depth_fraction, sink_in_fraction }))
 }
 
 fn planes(interleaved: &[f64]) -> [Vec<f32>; 3] {

@@ -1,6 +1,8 @@
+use super::pyramid::{Surroundings, double, surroundings};
 use super::*;
 use crate::colour::{ColourModel, shade};
 use crate::gradient::gradient;
+use crate::grid::Plane;
 use crate::simd::SimdLevel;
 
 /// Reproducible numbers between -1 and 1.
@@ -27,6 +29,15 @@ fn dent() -> Plane {
         *z = (6.0 - 0.03 * (x * x + y * y)).max(0.0);
     }
     surface
+}
+
+/// The features of the surroundings of a surface on its finest cells, one plane a feature.
+fn around_planes(surface: &Plane, mm_per_px: f64) -> Vec<Plane> {
+    let Surroundings { mut fine, coarse } =
+        surroundings(&Planes::of_heights(surface), cell_px(mm_per_px), mm_per_px);
+    let (w, h) = (fine[0].width, fine[0].height);
+    fine.extend(coarse.iter().map(|plane| double(plane, w, h)));
+    fine
 }
 
 fn change(model: Regressor, surface: &Plane) -> [Plane; 3] {

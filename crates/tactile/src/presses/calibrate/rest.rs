@@ -1,8 +1,7 @@
 //! The frame at rest and its noise, from pixels far from the contact over all presses.
 
-use super::samples::from_rim_px;
 use crate::grid::{Grid, Plane};
-use crate::presses::{Circle, Press};
+use crate::presses::{Contact, Press};
 use gripgen_twin::TactileImage;
 
 /// Distance from the rim of a contact beyond which a pixel counts as far.
@@ -19,7 +18,7 @@ const RAW_REST_WEIGHT: f64 = 0.02;
 /// Without a model (no `change`) the pixels close to a contact count next to nothing, so they only fill what no
 /// press leaves far; with one they count more.
 pub(super) fn rest_frame(
-    presses: &[(&Press, Circle)],
+    presses: &[(&Press, Contact)],
     change: impl Fn(usize) -> Option<[Plane; 3]>,
     raw: Option<&TactileImage>,
     grid: &Grid,
@@ -27,10 +26,10 @@ pub(super) fn rest_frame(
     let far_px = FAR_MM * 1e-3 / grid.metres_per_px;
     let mut sums = [const { Vec::new() }; 3].map(|_: Vec<f64>| vec![0.0f64; grid.len()]);
     let mut weights = vec![0.0f64; grid.len()];
-    for (i, (press, circle)) in presses.iter().enumerate() {
+    for (i, (press, contact)) in presses.iter().enumerate() {
         let change = change(i);
         for (pixel, total) in weights.iter_mut().enumerate() {
-            let t = (from_rim_px(pixel, circle, grid.width_px) / far_px).clamp(0.0, 1.0);
+            let t = (contact.from_rim_px(pixel, grid.width_px) / far_px).clamp(0.0, 1.0);
             let weight = match &change {
                 None => 1e-4 + t * t * t * t,
                 Some(_) => 1e-2 + t * t,
@@ -55,15 +54,15 @@ pub(super) fn rest_frame(
 
 /// Standard deviation of the noise of red, green and blue: the median over far squares of the variance within the
 /// square, less the 1/12 of rounding to whole grey levels.
-pub(super) fn noise_rgb(presses: &[(&Press, Circle)], rest: &[Vec<f32>; 3], grid: &Grid) -> [f32; 3] {
+pub(super) fn noise_rgb(presses: &[(&Press, Contact)], rest: &[Vec<f32>; 3], grid: &Grid) -> [f32; 3] {
     let side = ((SQUARE_MM * 1e-3 / grid.metres_per_px).round() as usize).clamp(3, 64);
     let far_px = FAR_MM * 1e-3 / grid.metres_per_px;
     let mut variances = [const { Vec::new() }; 3];
-    for (press, circle) in presses {
+    for (press, contact) in presses {
         for top in (0..grid.height_px.saturating_sub(side - 1)).step_by(side) {
             for left in (0..grid.width_px.saturating_sub(side - 1)).step_by(side) {
                 let middle = (top + side / 2) * grid.width_px + left + side / 2;
-                if from_rim_px(middle, circle, grid.width_px) < far_px {
+                if contact.from_rim_px(middle, grid.width_px) < far_px {
                     continue;
                 }
                 for (c, list) in variances.iter_mut().enumerate() {

@@ -2,7 +2,7 @@
 
 use super::moments::{Feature, Moments, exponents};
 use super::samples::INPUTS;
-use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
+use crate::colour::regressor::{AROUND_FIELD, AROUND_FITTED, NEAR, NEAR_FIELD, SURROUNDINGS};
 use nalgebra::{Cholesky, DMatrix};
 
 /// How freely the colours may vary.
@@ -20,7 +20,7 @@ impl Smoothness {
 }
 
 /// Strengths that are tried, from stiff to free.
-const RIDGES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
+const RIDGES: [f64; 6] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 const STIFFNESSES: [f64; 3] = [100.0, 10.0, 1.0];
 
 fn features() -> Vec<Feature> {
@@ -34,17 +34,11 @@ pub(super) struct Solution {
     coefficients: DMatrix<f64>,
 }
 
-/// Weight of the gel pressed flat, of which nothing is known but that its colour hardly changes, beside all pixels.
-const FLAT_WEIGHT: f64 = 0.001;
-
 /// The coefficients with the least squared error plus ridge; `None` if the sums hold no information.
-pub(super) fn solve(sums: &Moments, flat: &Moments, smoothness: &Smoothness) -> Option<Solution> {
+pub(super) fn solve(sums: &Moments, smoothness: &Smoothness) -> Option<Solution> {
     let features = features();
     let weight = sums.energy_and_weight().1;
     let scale: Vec<f64> = features.iter().map(|&f| (sums.product(f, f) / weight).max(1e-18).sqrt()).collect();
-    let mut all = sums.clone();
-    all.add_unchanged(flat, FLAT_WEIGHT * weight);
-    let sums = &all;
     let n = features.len();
     let mut gram = gram(sums, &features);
     for (j, mut column) in gram.column_iter_mut().enumerate() {
@@ -93,7 +87,8 @@ impl Solution {
         error / (3.0 * weight)
     }
 
-    /// Coefficients in the order of a sensor file; fields of lower degree are filled up with zeros.
+    /// Coefficients in the order of a sensor file: channel, term or feature, monomial. Of the features of the surroundings the
+    /// fitted ones alone have any.
     pub(super) fn near_and_around(&self) -> (Vec<f32>, Vec<f32>) {
         let mut near = vec![0.0; 3 * NEAR * NEAR_FIELD];
         let mut around = vec![0.0; 3 * SURROUNDINGS * AROUND_FIELD];
@@ -103,7 +98,9 @@ impl Solution {
                 let value = self.coefficients[(row, c)] as f32;
                 match input.checked_sub(NEAR) {
                     None => near[(c * NEAR + input) * NEAR_FIELD + m] = value,
-                    Some(feature) => around[(c * SURROUNDINGS + feature) * AROUND_FIELD + m] = value,
+                    Some(level) => {
+                        around[(c * SURROUNDINGS + AROUND_FITTED[level]) * AROUND_FIELD + m] = value;
+                    }
                 }
             }
         }
@@ -112,14 +109,13 @@ impl Solution {
 }
 
 /// Presses split into those that a fit sees and those that it does not, several times.
-pub(super) struct Folds<'a> {
+pub(super) struct Folds {
     folds: Vec<(Moments, Moments)>,
-    flat: &'a Moments,
 }
 
-impl<'a> Folds<'a> {
+impl Folds {
     /// Press i is unseen in fold `i % folds`.
-    pub(super) fn split(presses: &[Moments], flat: &'a Moments, folds: usize) -> Self {
+    pub(super) fn split(presses: &[Moments], folds: usize) -> Self {
         let folds = folds.min(presses.len()).max(2);
         let split = |fold: usize| {
             let (mut seen, mut unseen) = (Moments::zero(), Moments::zero());
@@ -128,13 +124,13 @@ impl<'a> Folds<'a> {
             }
             (seen, unseen)
         };
-        Self { folds: (0..folds).map(split).collect(), flat }
+        Self { folds: (0..folds).map(split).collect() }
     }
 
     /// Mean squared error on unseen presses.
     pub(super) fn error(&self, smoothness: &Smoothness) -> f64 {
         let error = |(seen, unseen): &(Moments, Moments)| {
-            solve(seen, self.flat, smoothness).map_or(f64::INFINITY, |solution| solution.error_on(unseen))
+            solve(seen, smoothness).map_or(f64::INFINITY, |solution| solution.error_on(unseen))
         };
         self.folds.iter().map(error).sum::<f64>() / self.folds.len() as f64
     }

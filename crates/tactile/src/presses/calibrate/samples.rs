@@ -1,10 +1,8 @@
 //! Pixels of a press and what the regressor sees there.
 
-use super::super::compare::ball_imprint;
-use super::super::{Circle, Press};
+use super::super::{Contact, Press};
 use crate::colour::regressor::{
-    AROUND_HEIGHTS, HEIGHT_INPUT, NEAR, Place, SURROUNDINGS, around_planes, between_cells, cell_px,
-    limited_normal, near_terms,
+    AROUND_FITTED, NEAR, Place, between_cells, cell_px, fitted_surroundings, limited_normal, near_terms,
 };
 use crate::deform::deform;
 use crate::gradient::gradient;
@@ -13,14 +11,12 @@ use crate::sensor::{GelShape, Pyramid};
 use crate::simd::SimdLevel;
 use gripgen_twin::random::splitmix64;
 
-/// Inputs of a pixel: the terms of the displaced gel, then the features of the surroundings.
-pub(super) const INPUTS: usize = NEAR + SURROUNDINGS;
+/// Inputs of a pixel: the terms of the displaced gel, then the features of its surroundings.
+pub(super) const INPUTS: usize = NEAR + AROUND_FITTED.len();
 
-/// Zones around the contact: distance from its rim up to which they reach, and the pixels drawn from them.
-const ZONES_MM: [(f64, usize); 3] = [(0.8, 1500), (4.2, 1000), (f64::INFINITY, 600)];
-
-/// Places along a side at which the gel pressed flat is looked at.
-const FLAT_SIDE: usize = 9;
+/// Zones around the contact: distance from its rim up to which they reach, the pixels drawn from them, and how much a square
+/// millimetre counts.
+const ZONES_MM: [(f64, usize, f64); 3] = [(0.8, 3000, 3.0), (4.2, 2500, 1.0), (f64::INFINITY, 600, 0.1)];
 
 /// A gel to fit: its shape at rest and its deformation.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,9 +27,9 @@ pub(super) struct GelModel {
 
 impl GelModel {
     /// Height of the gel surface around a press, above its rest state.
-    pub(super) fn surface(&self, circle: &Circle, ball_m: f64, grid: &Grid) -> Plane {
-        let imprint = ball_imprint(circle, ball_m, grid, &self.shape);
-        let Pyramid { kernels_px, restore_depth_fraction } = &self.pyramid;
+    pub(super) fn surface(&self, contact: &Contact, ball_m: f64, grid: &Grid) -> Plane {
+        let Pyramid { kernels_px, restore_depth_fraction, sink_in_fraction } = &self.pyramid;
+        let imprint = contact.imprint(ball_m, grid, &self.shape, *sink_in_fraction);
         let metres_per_px = grid.metres_per_px;
         deform(&imprint, kernels_px, *restore_depth_fraction, metres_per_px, None, SimdLevel::best())
     }
@@ -43,24 +39,26 @@ impl GelModel {
 pub(super) struct Samples {
     /// Row by row from the top left.
     pub(super) pixels: Vec<usize>,
-    /// Weight of each, so that a zone counts by the root of its area.
+    /// Weight of each, so that a zone counts by its area and its weight.
     pub(super) weights: Vec<f32>,
     /// [`INPUTS`] numbers for each pixel.
     pub(super) inputs: Vec<f32>,
     /// Position of each pixel, as the regressor measures it.
     pub(super) places: Vec<[f32; 2]>,
-    /// Largest magnitudes in the whole image: sine of the slope, each feature.
-    pub(super) largest: (f32, Vec<f32>),
+    /// Largest sine of the slope in the whole image.
+    pub(super) steepest: f32,
+    /// Largest magnitude of each feature of the surroundings in the whole image.
+    pub(super) largest: Vec<f32>,
 }
 
 impl Samples {
     /// Draws pixels of press number `index`; the same ones each time.
-    pub(super) fn draw(index: usize, circle: &Circle, ball_m: f64, grid: &Grid, gel: &GelModel) -> Self {
-        let (pixels, weights) = choose(index as u64, circle, grid);
-        let surface = gel.surface(circle, ball_m, grid);
+    pub(super) fn draw(index: usize, contact: &Contact, ball_m: f64, grid: &Grid, gel: &GelModel) -> Self {
+        let (pixels, weights) = choose(index as u64, contact, grid);
+        let surface = gel.surface(contact, ball_m, grid);
         let (along_x, along_y) = gradient(&surface);
         let mm_per_px = grid.metres_per_px * 1e3;
-        let around = around_planes(&surface, mm_per_px);
+        let around = fitted_surroundings(&surface, mm_per_px);
         let cell = cell_px(mm_per_px);
         let place = Place::in_grid(grid);
         let mut inputs = Vec::with_capacity(pixels.len() * INPUTS);
@@ -79,29 +77,9 @@ impl Samples {
             let [nx, ny] = limited_normal(gx, gy, 1.0);
             nx * nx + ny * ny
         });
-        let largest = (slope.fold(0.0, f32::max).sqrt(), around.iter().map(magnitude).collect());
-        Self { pixels, weights, inputs, places, largest }
-    }
-
-    /// A gel pressed flat as a whole, to `height_mm`: no slope anywhere, so its colour is taken to stay. Balls do not
-    /// show this; without it the fit would make up what a wide flat part looks like.
-    pub(super) fn flat(height_mm: f32, grid: &Grid) -> Self {
-        let mut input = [0.0; INPUTS];
-        input[HEIGHT_INPUT] = height_mm;
-        for level in AROUND_HEIGHTS {
-            input[NEAR + level] = height_mm;
-        }
-        let places: Vec<[f32; 2]> = (0..FLAT_SIDE * FLAT_SIDE)
-            .map(|i| [i % FLAT_SIDE, i / FLAT_SIDE].map(|k| 2.0 * (k as f32 + 0.5) / FLAT_SIDE as f32 - 1.0))
-            .map(|[u, v]| [u, v * (grid.height_px as f32 / grid.width_px as f32).max(1.0)])
-            .collect();
-        Self {
-            pixels: (0..places.len()).collect(),
-            weights: vec![1.0 / places.len() as f32; places.len()],
-            inputs: places.iter().flat_map(|_| input).collect(),
-            places,
-            largest: (0.0, vec![0.0; SURROUNDINGS]),
-        }
+        let steepest = slope.fold(0.0, f32::max).sqrt();
+        let largest = around.iter().map(magnitude).collect();
+        Self { pixels, weights, inputs, places, steepest, largest }
     }
 
     /// Colour of each pixel against a rest frame.
@@ -120,24 +98,17 @@ fn between(plane: &Plane, (x0, x1, wx): (usize, usize, f32), (y0, y1, wy): (usiz
     row(y0) + wy * (row(y1) - row(y0))
 }
 
-/// Distance of a pixel from the rim of a contact, negative inside.
-pub(super) fn from_rim_px(pixel: usize, circle: &Circle, width_px: usize) -> f64 {
-    let x = (pixel % width_px) as f64 - circle.x_px;
-    let y = (pixel / width_px) as f64 - circle.y_px;
-    (x * x + y * y).sqrt() - circle.radius_px
-}
-
-fn choose(index: u64, circle: &Circle, grid: &Grid) -> (Vec<usize>, Vec<f32>) {
+fn choose(index: u64, contact: &Contact, grid: &Grid) -> (Vec<usize>, Vec<f32>) {
     let mm_per_px = grid.metres_per_px * 1e3;
     let mut zones = [const { Vec::new() }; ZONES_MM.len()];
     for pixel in 0..grid.len() {
-        let mm = from_rim_px(pixel, circle, grid.width_px) * mm_per_px;
-        let zone = ZONES_MM.iter().position(|&(up_to, _)| mm < up_to).unwrap_or(ZONES_MM.len() - 1);
+        let mm = contact.from_rim_px(pixel, grid.width_px) * mm_per_px;
+        let zone = ZONES_MM.iter().position(|&(up_to, _, _)| mm < up_to).unwrap_or(ZONES_MM.len() - 1);
         zones[zone].push(pixel);
     }
     let mut state = index.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(1);
     let (mut pixels, mut weights) = (Vec::new(), Vec::new());
-    for (mut zone, (_, wanted)) in zones.into_iter().zip(ZONES_MM) {
+    for (mut zone, (_, wanted, weight)) in zones.into_iter().zip(ZONES_MM) {
         let area_mm2 = zone.len() as f64 * mm_per_px * mm_per_px;
         let n = wanted.min(zone.len());
         for i in 0..n {
@@ -146,7 +117,7 @@ fn choose(index: u64, circle: &Circle, grid: &Grid) -> (Vec<usize>, Vec<f32>) {
         }
         zone.truncate(n);
         zone.sort_unstable();
-        weights.extend(std::iter::repeat_n(area_mm2.sqrt() as f32 / n.max(1) as f32, n));
+        weights.extend(std::iter::repeat_n((weight * area_mm2) as f32 / n.max(1) as f32, n));
         pixels.extend(zone);
     }
     (pixels, weights)

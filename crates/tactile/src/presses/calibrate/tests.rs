@@ -1,6 +1,8 @@
 use super::*;
 use crate::colour::{Lambert, Light};
 use crate::presses::{compare_presses, find_circle};
+use crate::sensor::Pyramid;
+use samples::GelModel;
 
 const GRID: Grid = Grid { width_px: 128, height_px: 96, metres_per_px: 0.15e-3 };
 const NOISE: f32 = 1.5;
@@ -29,7 +31,11 @@ fn truth() -> Sensor {
         noise_rgb: [NOISE; 3],
         colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&lights))),
         gel_shape: GelShape::Flat,
-        pyramid: Some(Pyramid { kernels_px: vec![13, 9, 5], restore_depth_fraction: 0.3 }),
+        pyramid: Some(Pyramid {
+            kernels_px: vec![13, 9, 5],
+            restore_depth_fraction: 0.3,
+            sink_in_fraction: 0.0,
+        }),
         markers: None,
         shadow: None,
         ball_m: None,
@@ -46,7 +52,7 @@ fn presses(sensor: &Sensor, count: usize) -> PressSet {
             y_px: spread(0.569_840_291, GRID.height_px),
             radius_px: 9.0 + (i % 4) as f64,
         };
-        Press { name: i.to_string(), image: noisy(sensor, &circle, i as u64), circle: Some(circle) }
+        Press::of_ball(i.to_string(), noisy(sensor, &circle, i as u64), Some(circle))
     };
     PressSet {
         metres_per_px: GRID.metres_per_px,
@@ -57,9 +63,13 @@ fn presses(sensor: &Sensor, count: usize) -> PressSet {
 }
 
 fn noisy(sensor: &Sensor, circle: &Circle, key: u64) -> TactileImage {
-    let clean = predict_ball(circle, 4e-3, sensor);
+    let clean = predict_contact(&Contact::of_circle(*circle), 4e-3, sensor);
     let exact = Sensor { noise_rgb: [0.0; 3], ..sensor.clone() };
-    assert_eq!(clean, predict_ball(circle, 4e-3, &exact), "predictions carry no noise");
+    assert_eq!(
+        clean,
+        predict_contact(&Contact::of_circle(*circle), 4e-3, &exact),
+        "predictions carry no noise"
+    );
     // The noise of the renderer, on the predicted image as the frame at rest.
     let rest = [0, 1, 2].map(|c| clean.rgb.iter().skip(c).step_by(3).map(|&v| f32::from(v)).collect());
     crate::finish(&Sensor { rest, ..sensor.clone() }, None, Some(key))
@@ -168,14 +178,19 @@ fn sets_that_cannot_be_are_refused_with_both_numbers() {
 fn a_modelled_change_is_taken_off_the_rest_frame() {
     let circle = Circle { x_px: 60.0, y_px: 50.0, radius_px: 11.0 };
     let grey = |value: u8| TactileImage { width_px: 128, height_px: 96, rgb: vec![value; 3 * GRID.len()] };
-    let press = Press { name: "0".into(), image: grey(107), circle: Some(circle) };
+    let press = Press::of_ball("0", grey(107), Some(circle));
     let change = |_: usize| Some([0, 1, 2].map(|_| crate::Plane::filled(128, 96, 7.0)));
-    let rest = rest_frame(&[(&press, circle)], change, None, &GRID);
+    let rest = rest_frame(&[(&press, Contact::of_circle(circle))], change, None, &GRID);
     assert!(rest.iter().flatten().all(|v| (v - 100.0).abs() < 1e-4));
     // Without a model the far pixels of one press outweigh the near ones of another.
-    let other = Press { name: "1".into(), image: grey(50), circle: None };
+    let other = Press::of_ball("1", grey(50), None);
     let far = Circle { x_px: 5.0, y_px: 5.0, radius_px: 11.0 };
-    let rest = rest_frame(&[(&press, circle), (&other, far)], |_| None, None, &GRID);
+    let rest = rest_frame(
+        &[(&press, Contact::of_circle(circle)), (&other, Contact::of_circle(far))],
+        |_| None,
+        None,
+        &GRID,
+    );
     assert!((rest[0][50 * 128 + 60] - 50.0).abs() < 0.1);
     assert!((rest[0][5 * 128 + 5] - 107.0).abs() < 0.1);
 }
@@ -184,13 +199,14 @@ fn a_modelled_change_is_taken_off_the_rest_frame() {
 fn the_error_from_sums_is_the_error_over_pixels() {
     let truth = truth();
     let set = presses(&truth, 5);
-    let marked: Vec<Marked<'_>> = set.presses.iter().filter_map(|p| Some((p, p.circle?))).collect();
-    let candidate = Candidate::new(GelShape::Flat, &marked, 4e-3, &GRID);
+    let marked: Vec<Marked<'_>> =
+        set.presses.iter().filter_map(|p| Some((p, Contact::of_circle(p.circle?)))).collect();
+    let gel = GelModel { shape: GelShape::Flat, pyramid: truth.pyramid.clone().unwrap() };
+    let candidate = Candidate::new(gel, &marked, 4e-3, &GRID);
     let moments = candidate.coloured(&marked, &[0, 1, 2, 3, 4], &truth.rest);
     let mut seen = Moments::zero();
     moments[..4].iter().for_each(|m| seen.add(m));
-    let flat = Moments::of_inputs(&Samples::flat(1.0, &GRID));
-    let solution = solve(&seen, &flat, &Smoothness::USUAL).unwrap();
+    let solution = solve(&seen, &Smoothness::USUAL).unwrap();
     let (near, around) = solution.near_and_around();
     // The fifth press, feature by feature.
     let samples = &candidate.samples[4];
@@ -206,7 +222,7 @@ fn the_error_from_sums_is_the_error_over_pixels() {
             for (i, &input) in inputs.iter().enumerate() {
                 let coefficients = match i.checked_sub(near_inputs) {
                     None => &near[(c * near_inputs + i) * 10..][..10],
-                    Some(f) => &around[(c * (inputs.len() - near_inputs) + f) * 6..][..6],
+                    Some(f) => &around[(c * SURROUNDINGS + AROUND_FITTED[f]) * 6..][..6],
                 };
                 let value: f64 = coefficients.iter().zip(field).map(|(&k, m)| f64::from(k) * m).sum();
                 predicted += value * f64::from(input);

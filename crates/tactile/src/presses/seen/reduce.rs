@@ -27,6 +27,7 @@ pub(super) fn reduced_sensor(sensor: &Sensor, factor: usize) -> Option<Sensor> {
     let pyramid = sensor.pyramid.as_ref().map(|pyramid| Pyramid {
         kernels_px: pyramid.kernels_px.iter().map(|&k| reduced_kernel(k, factor)).collect(),
         restore_depth_fraction: pyramid.restore_depth_fraction,
+        sink_in_fraction: pyramid.sink_in_fraction,
     });
     let shadow = sensor.shadow.as_ref().map(|shadow| {
         Box::new(Shadow::new(shadow.table().clone(), grid.metres_per_px, grid.width_px, &colour))

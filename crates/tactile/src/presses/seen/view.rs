@@ -34,9 +34,10 @@ impl Zone {
         }
     }
 
-    fn at(radii_from_rim: f64) -> Zone {
+    /// The zone at a distance from the rim of the contact, in its radii; 0 and less is inside.
+    pub(crate) fn at(radii_from_rim: f64) -> Zone {
         match radii_from_rim {
-            d if d < 0.0 => Zone::Contact,
+            d if d <= 0.0 => Zone::Contact,
             d if d < 0.4 => Zone::Rim,
             d if d < 2.2 => Zone::Shadow,
             _ => Zone::Far,

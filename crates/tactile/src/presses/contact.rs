@@ -1,0 +1,180 @@
+//! Where something touches in a press: the circle of a ball, or a body at its place. From it follows the imprint.
+
+use super::indenter::Indenter;
+use super::{Circle, Press};
+use crate::grid::{Grid, Plane};
+use crate::indent::Imprint;
+use crate::sensor::GelShape;
+use gripgen_twin::ContactPatch;
+use std::sync::Arc;
+
+/// The checked contact of a press.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Contact {
+    /// The rim of the contact of a ball; of another body a circle of the same place.
+    pub(crate) circle: Circle,
+    /// How far a ball travelled after first contact, where that was measured.
+    pub(crate) travel_m: Option<f64>,
+    /// A body that is no ball.
+    pub(crate) indenter: Option<Arc<Indenter>>,
+}
+
+impl Contact {
+    /// A ball that is known by its circle alone.
+    #[cfg(test)]
+    pub(crate) fn of_circle(circle: Circle) -> Self {
+        Self { circle, travel_m: None, indenter: None }
+    }
+
+    /// What a press shows, with a circle that was checked.
+    pub(crate) fn of_press(press: &Press, circle: Circle) -> Self {
+        Self { circle, travel_m: press.travel_m, indenter: press.indenter.clone() }
+    }
+
+    /// Distance of a pixel from the rim of the contact; negative inside a circle, 0 inside another contact.
+    pub(crate) fn from_rim_px(&self, pixel: usize, width_px: usize) -> f64 {
+        match &self.indenter {
+            Some(indenter) => indenter.distance_px(pixel),
+            None => {
+                let x = (pixel % width_px) as f64 - self.circle.x_px;
+                let y = (pixel / width_px) as f64 - self.circle.y_px;
+                (x * x + y * y).sqrt() - self.circle.radius_px
+            }
+        }
+    }
+
+    /// The imprint of the undeformed body, relative to the gel at rest.
+    ///
+    /// `sink_in_fraction`: see [`crate::Pyramid`]. The press of a ball known by the circle that is seen follows from it: the
+    /// cap below the circle is the rest of the press.
+    pub(crate) fn imprint(
+        &self,
+        ball_m: f64,
+        grid: &Grid,
+        shape: &GelShape,
+        sink_in_fraction: f64,
+    ) -> Imprint {
+        match &self.indenter {
+            Some(indenter) => {
+                let press_px = indenter.travel_m / grid.metres_per_px;
+                let depth_px = indenter.depth_px(press_px, shape.rest_px(grid).as_ref());
+                imprint(depth_px, indenter.travel_m)
+            }
+            None => {
+                let deeper = match self.travel_m {
+                    Some(travel_m) => Deeper::To(travel_m / grid.metres_per_px),
+                    None => Deeper::By(sink_in_fraction),
+                };
+                ball_imprint(&self.circle, deeper, ball_m, grid, shape)
+            }
+        }
+    }
+}
+
+fn imprint(depth_px: Plane, press_depth_m: f64) -> Imprint {
+    Imprint { depth_px, press_depth_m, patch: ContactPatch { cells: Vec::new() }, elastic: None }
+}
+
+/// How deep a ball is pressed in.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Deeper {
+    /// The cap below its circle is all of the press but this share, by which the gel gives way.
+    By(f64),
+    /// As far as this many pixels after first contact.
+    To(f64),
+}
+
+/// The imprint of a ball whose rim of contact is `circle`, relative to the gel at rest.
+///
+/// On a flat gel without sink-in that is the cap of the ball below the plane of the circle. On a curved one the circle lies on
+/// the slope of the gel under it: the ball's centre stands off the circle's by `sqrt(R^2 - a^2)` along the gel's normal.
+pub(crate) fn ball_imprint(
+    circle: &Circle,
+    deeper: Deeper,
+    ball_m: f64,
+    grid: &Grid,
+    shape: &GelShape,
+) -> Imprint {
+    let cap_px = circle.depth_m(ball_m, grid.metres_per_px) / grid.metres_per_px;
+    let radius_px = ball_m / 2.0 / grid.metres_per_px;
+    let sunk_px = radius_px - cap_px;
+    let (w, h) = (grid.width_px, grid.height_px);
+    let rest = shape.rest_px(grid);
+    let rest_at = |x: f64, y: f64| {
+        let inside = |v: f64, n: usize| v.round().clamp(0.0, (n - 1) as f64) as usize;
+        rest.as_ref().map_or(0.0, |rest| f64::from(rest.at(inside(x, w), inside(y, h))))
+    };
+    let (cx, cy, a) = (circle.x_px, circle.y_px, circle.radius_px);
+    let slope = [
+        (rest_at(cx + a, cy) - rest_at(cx - a, cy)) / (2.0 * a),
+        (rest_at(cx, cy + a) - rest_at(cx, cy - a)) / (2.0 * a),
+    ];
+    let ball = [cx - sunk_px * slope[0], cy - sunk_px * slope[1]];
+    let rim = [(a, 0.0), (-a, 0.0), (0.0, a), (0.0, -a)];
+    let squared = |x: f64, y: f64| {
+        let (dx, dy) = (x - ball[0], y - ball[1]);
+        dx * dx + dy * dy
+    };
+    let above_rest = |x: f64, y: f64| (radius_px * radius_px - squared(x, y)).max(0.0).sqrt() - rest_at(x, y);
+    let level = match &rest {
+        None => sunk_px,
+        Some(_) => rim.iter().map(|(dx, dy)| above_rest(cx + dx, cy + dy)).sum::<f64>() / 4.0,
+    };
+    // Far from the ball the gel itself falls away; only the ball's own cap counts.
+    let over_ball = |x: f64, y: f64| squared(x, y) < radius_px * radius_px;
+    let deepest_px = match &rest {
+        None => cap_px,
+        Some(_) => (0..w * h)
+            .map(|i| ((i % w) as f64, (i / w) as f64))
+            .filter(|&(x, y)| over_ball(x, y))
+            .fold(0.0, |m: f64, (x, y)| m.max(above_rest(x, y) - level)),
+    };
+    let press_px = match deeper {
+        Deeper::By(share) => deepest_px / (1.0 - share),
+        Deeper::To(press_px) => press_px,
+    };
+    // A ball sinks in up to its equator; the rest of a deeper press is the gel closing around it.
+    let more = press_px.min(radius_px).max(deepest_px) - deepest_px;
+    let mut depth_px = Plane::filled(w, h, 0.0);
+    for (i, depth) in depth_px.values.iter_mut().enumerate() {
+        let (x, y) = ((i % w) as f64, (i / w) as f64);
+        if over_ball(x, y) {
+            *depth = (above_rest(x, y) - level + more).max(0.0) as f32;
+        }
+    }
+    imprint(depth_px, press_px * grid.metres_per_px)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { width_px: 101, height_px: 81, metres_per_px: 1e-4 };
+
+    #[test]
+    fn a_ball_is_as_deep_as_its_circle_says() {
+        let circle = Circle { x_px: 50.0, y_px: 40.0, radius_px: 17.320_508 };
+        let imprint = ball_imprint(&circle, Deeper::By(0.0), 4e-3, &GRID, &GelShape::Flat);
+        // A circle of sqrt(3) mm is a cap of 1 mm.
+        assert!((imprint.press_depth_m - 1e-3).abs() < 1e-9);
+        assert!((imprint.depth_px.at(50, 40) - 10.0).abs() < 1e-4);
+        assert_eq!(imprint.depth_px.at(50, 40 + 18), 0.0);
+        assert!(imprint.depth_px.at(50 + 17, 40) > 0.0);
+    }
+
+    /// Hertz: on an elastic half-space the contact of a ball at depth d has a^2 = R d, half of what a gel that does not give
+    /// way shows.
+    #[test]
+    fn a_gel_that_gives_way_is_pressed_deeper_for_the_same_circle() {
+        let (radius_m, depth_m) = (20e-3, 0.2e-3_f64);
+        let circle = Circle { x_px: 50.0, y_px: 40.0, radius_px: (radius_m * depth_m).sqrt() / 1e-4 };
+        for shape in [GelShape::Flat, GelShape::Dome { sag_m: 1e-6 }] {
+            let imprint = ball_imprint(&circle, Deeper::By(0.5), 2.0 * radius_m, &GRID, &shape);
+            assert!((imprint.press_depth_m / depth_m - 1.0).abs() < 0.01, "{}", imprint.press_depth_m);
+            let at_rim = f64::from(imprint.depth_px.at(50 + 20, 40)) * 1e-4;
+            assert!((at_rim / depth_m - 0.5).abs() < 0.02, "{at_rim}");
+            let travel = ball_imprint(&circle, Deeper::To(2.0), 2.0 * radius_m, &GRID, &shape);
+            assert!((f64::from(travel.depth_px.at(50, 40)) - 2.0).abs() < 0.01);
+        }
+    }
+}
