@@ -60,6 +60,7 @@ mod levels;
 mod library;
 mod location;
 mod measured;
+mod mesh_file;
 mod paper;
 mod parallel;
 mod picture;
@@ -71,6 +72,7 @@ mod press_report;
 mod presses;
 mod project;
 mod ratio;
+mod render;
 mod report;
 mod resolve;
 mod rig_run;
@@ -109,6 +111,7 @@ pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError};
 pub use measured::{LoadPullsError, LoadedPulls, Suspects, load_pulls, load_pulls_of, load_pulls_with};
+pub use mesh_file::MeshFileError;
 pub use paper::{PaperError, PaperReport, paper_report};
 pub use parallel::in_parallel;
 pub use picture::{
@@ -126,6 +129,7 @@ pub use presses::{
 };
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
 pub use ratio::{PartRatio, RatioFit};
+pub use render::{RenderError, render_mesh};
 pub use report::{
     Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
 };

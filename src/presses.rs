@@ -4,6 +4,7 @@ mod bodies;
 
 use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
+use crate::mesh_file::MeshFileError;
 use crate::project::{LoadError, load_twin_document};
 use crate::resolve::Files;
 use bodies::PressBodies;
@@ -82,7 +83,7 @@ pub enum LoadPressesError {
     },
     /// The mesh of a body.
     #[error(transparent)]
-    Mesh(#[from] LibraryError),
+    Mesh(#[from] MeshFileError),
     /// A body that cannot be pressed in.
     #[error("{}: {source}", .path.display())]
     Body {

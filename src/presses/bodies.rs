@@ -1,8 +1,7 @@
 //! Bodies that are pressed into a sensor, from their meshes.
 
 use super::LoadPressesError;
-use crate::library::LibraryError;
-use crate::location::Location;
+use crate::mesh_file::read_mesh;
 use gripgen_record::PressedBody;
 use gripgen_tactile::Grid;
 use gripgen_tactile::presses::{Indenter, IndenterPose};
@@ -40,18 +39,11 @@ impl PressBodies {
             metres_per_px: self.metres_per_px,
         };
         if !self.meshes.contains_key(&body.mesh) {
-            self.meshes.insert(body.mesh.clone(), read_mesh(&self.folder.join(&body.mesh))?);
+            self.meshes.insert(body.mesh.clone(), read_mesh(&self.folder.join(&body.mesh), METRES_PER_UNIT)?);
         }
         let indenter = Indenter::of_mesh(&body.shape, &self.meshes[&body.mesh], at, travel_m, &grid);
         let indenter =
             indenter.map_err(|source| LoadPressesError::Body { path: self.folder.clone(), source })?;
         Ok(Arc::new(indenter))
     }
-}
-
-fn read_mesh(path: &Path) -> Result<TriMesh, LoadPressesError> {
-    let location = Location::Disk(path.into());
-    let bytes = location.read()?;
-    let mesh = TriMesh::from_file_bytes(&bytes, location.extension(), METRES_PER_UNIT);
-    Ok(mesh.map_err(|source| LibraryError::Mesh { location, source })?)
 }

@@ -1,11 +1,13 @@
 //! What was typed.
 
 mod identify;
+mod render;
 mod rig;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
 pub use identify::{CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, DiagnoseArgs};
+pub use render::RenderArgs;
 pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigServeArgs, RigTeachArgs};
 use std::path::PathBuf;
 
@@ -42,6 +44,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Find out where a twin is wrong, and why: pulls, force-sensor tables, presses.
     Diagnose(DiagnoseArgs),
+    /// Draw what a sensor sees of a mesh that is pressed in.
+    Render(RenderArgs),
     /// List what a twin may be missing, or explain one effect: formula, source, what it does, what to do about it.
     Effects(EffectsArgs),
     /// Plan the pulls of a campaign.

@@ -15,6 +15,7 @@ pub mod export;
 pub mod info;
 mod info_pulls;
 pub mod init;
+pub mod render;
 pub mod rig;
 pub mod schema;
 pub mod show;

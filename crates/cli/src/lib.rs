@@ -73,6 +73,7 @@ fn execute(cli: &Cli) -> Result<u8, Failure> {
         Command::Rig(RigCommand::Serve(args)) => commands::rig::serve::run(args),
         Command::Compare(args) => commands::compare::run(args),
         Command::Diagnose(args) => commands::diagnose::run(args),
+        Command::Render(args) => commands::render::run(args),
         Command::Effects(args) => commands::effects::run(args),
         Command::Campaign(args) => commands::campaign::run(args),
         Command::Bench(args) => commands::bench::run(args),

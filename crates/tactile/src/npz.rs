@@ -291,12 +291,13 @@ pub fn write_npz(arrays: &[(&str, Array, ElementType)]) -> Result<Vec<u8>, NpzEr
         .last_modified_time(zip::DateTime::default());
     for (key, array, element) in arrays {
         writer.start_file(format!("{key}.npy"), options).map_err(|e| failed(e.to_string()))?;
-        writer.write_all(&npy_bytes(array, *element)).map_err(|e| failed(e.to_string()))?;
+        writer.write_all(&write_npy(array, *element)).map_err(|e| failed(e.to_string()))?;
     }
     Ok(writer.finish().map_err(|e| failed(e.to_string()))?.into_inner())
 }
 
-fn npy_bytes(array: &Array, element: ElementType) -> Vec<u8> {
+/// Writes an array into the bytes of an npy file. Its values have to fill its shape.
+pub fn write_npy(array: &Array, element: ElementType) -> Vec<u8> {
     let descr = match element {
         ElementType::U8 => "|u1",
         ElementType::F32 => "<f4",

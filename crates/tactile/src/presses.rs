@@ -1,5 +1,6 @@
 //! Presses of a ball or of other bodies into a sensor, and how well a sensor file predicts their images.
 
+mod body;
 mod calibrate;
 mod circle;
 mod compare;
@@ -9,6 +10,7 @@ mod indenter;
 mod mark;
 mod seen;
 
+pub use body::{RenderedBody, render_body};
 pub use calibrate::{
     CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MIN_PRESSES, Smoothness, calibrate_presses,
 };

@@ -103,3 +103,55 @@ fn presses_that_cannot_be_are_refused_before_the_fit() {
     }
     assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 0, "nothing was written");
 }
+
+/// A mesh drawn with the shipped sensor: what it is in the image, in the surface, and what is refused.
+#[test]
+fn a_mesh_is_rendered_with_its_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    // A tetrahedron that stands on its tip: 4 mm wide 2 mm above it.
+    let corners = [[0.0, 0.0, 5.0], [-2.0, -2.0, 3.0], [2.0, -2.0, 3.0], [0.0, 2.5, 3.0]];
+    let mut obj: String = corners.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    obj += "f 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n";
+    std::fs::write(file("tip.obj"), obj).unwrap();
+    let sensor = "asset:sensors/gelsight_r15/sensor.npz";
+    let tip = file("tip.obj");
+    let (image, heights, normals, mask) = (file("out.png"), file("h.npy"), file("n.npy"), file("m.png"));
+    let wanted = ["--heights", &heights, "--normals", &normals, "--mask", &mask, "-o", &image, "--json"];
+    let arguments = [&["render", &tip, "--depth-mm", "0.5", "--sensor", sensor][..], &wanted].concat();
+    let output = run(&arguments);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((told["x_px"].as_f64(), told["y_px"].as_f64()), (Some(159.5), Some(119.5)));
+    let area_mm2 = told["contact_area_mm2"].as_f64().unwrap();
+    // The section of the tip at 0.4 of the depth below the gel, 0.3 mm above the tip: 0.15^2 of 9 mm2.
+    assert!((area_mm2 - 0.0225 * 9.0).abs() < 0.1, "{area_mm2}");
+    let floats = |name: &str, header: usize| -> Vec<f32> {
+        let bytes = std::fs::read(name).unwrap();
+        let (words, _) = bytes[header..].as_chunks::<4>();
+        words.iter().map(|word| f32::from_le_bytes(*word)).collect()
+    };
+    let heights = floats(&heights, 128);
+    assert_eq!(heights.len(), 320 * 240);
+    let deepest = heights.iter().fold(0.0f32, |m, &h| m.max(h));
+    // The last blur rounds the tip off.
+    assert!(deepest > 0.25 && deepest <= 0.5, "{deepest} mm");
+    let normals = floats(&normals, 128);
+    let unit = |n: &[f32]| (n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1.0).abs() < 1e-5;
+    assert!(normals.chunks_exact(3).all(unit));
+    // Right of the tip the surface looks to the right, above it to the top.
+    let at = |x: usize, y: usize| &normals[3 * (320 * y + x)..][..3];
+    assert!(at(163, 120)[0] > 0.05 && at(156, 120)[0] < -0.05 && at(160, 116)[1] > 0.05);
+    // The same depth 100 times as large is not to be had, and a place beside the image neither.
+    for (more, part) in [
+        (["--depth-mm", "50", "--rotation-deg", "0"], "travels 50 mm"),
+        (["--depth-mm", "0.5", "--x-px", "-900"], "nothing of `tip` lies over the 320x240 image"),
+    ] {
+        let arguments = [&["render", &tip, "--sensor", sensor, "-o", &image][..], &more].concat();
+        let refused = run(&arguments);
+        assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
+        assert!(text(&refused.stderr).contains(part), "{}", text(&refused.stderr));
+    }
+    let same = run(&["render", &tip, "--depth-mm", "1", "--sensor", sensor, "-o", &file("tip.obj")]);
+    assert_eq!(same.status.code(), Some(2));
+}

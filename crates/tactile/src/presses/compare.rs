@@ -86,7 +86,9 @@ impl PressComparison {
         if each.is_empty() {
             return None;
         }
-        let over = |of: fn(&Scores) -> Score| mean_score(each.iter().map(|press| of(&press.scores)));
+        let over = |of: fn(&Scores) -> Score| {
+            mean_score(&each.iter().map(|press| of(&press.scores)).collect::<Vec<_>>())
+        };
         let mean = Scores {
             full: over(|s| s.full),
             crop400: over(|s| s.crop400),
@@ -102,22 +104,22 @@ impl PressComparison {
         let of_shape = |shape: &str| {
             let windows: Vec<Score> =
                 each.iter().filter(|p| p.shape == shape).map(|p| p.scores.window).collect();
-            (shape.to_string(), windows.len(), mean_score(windows.iter().copied()))
+            (shape.to_string(), windows.len(), mean_score(&windows))
         };
         let by_shape = shapes.into_iter().map(of_shape).collect();
         let of_zone = |zone: Zone| {
             let there = each.iter().flat_map(|press| &press.zones).filter(|(z, _)| *z == zone);
             let scores: Vec<Score> = there.map(|(_, score)| *score).collect();
-            (zone, scores.len(), mean_score(scores.iter().copied()))
+            (zone, scores.len(), mean_score(&scores))
         };
         let by_zone = ZONES.into_iter().map(of_zone).filter(|(_, n, _)| *n > 0).collect();
         Some(Self { mean, each, by_shape, by_zone })
     }
 }
 
-fn mean_score(scores: impl Iterator<Item = Score> + Clone) -> Score {
-    let n = scores.clone().count().max(1) as f64;
-    let sum = |value: fn(&Score) -> f64| scores.clone().map(|s| value(&s)).sum::<f64>() / n;
+fn mean_score(scores: &[Score]) -> Score {
+    let n = scores.len().max(1) as f64;
+    let sum = |value: fn(&Score) -> f64| scores.iter().map(value).sum::<f64>() / n;
     Score { mse: sum(|s| s.mse), psnr_db: sum(|s| s.psnr_db), ssim: sum(|s| s.ssim), l1: sum(|s| s.l1) }
 }
 
@@ -213,7 +215,7 @@ pub fn score_press(press: &Press, predicted: &TactileImage) -> Result<PressScore
         let contact = Contact::of_press(press, circle);
         let width_px = predicted.width_px as usize;
         let zone_of =
-            |pixel: usize| Zone::at(contact.from_rim_px(pixel, width_px) / circle.radius_px.max(1.0));
+            |pixel: usize| Zone::at(contact.beyond_rim_px(pixel, width_px) / circle.radius_px.max(1.0));
         let of_pixel: Vec<Zone> = (0..width_px * predicted.height_px as usize).map(zone_of).collect();
         for zone in ZONES {
             let found = score_where(predicted, &press.image, |pixel| of_pixel[pixel] == zone)?;

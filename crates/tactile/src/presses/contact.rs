@@ -32,7 +32,7 @@ impl Contact {
     }
 
     /// Distance of a pixel from the rim of the contact; negative inside a circle, 0 inside another contact.
-    pub(crate) fn from_rim_px(&self, pixel: usize, width_px: usize) -> f64 {
+    pub(crate) fn beyond_rim_px(&self, pixel: usize, width_px: usize) -> f64 {
         match &self.indenter {
             Some(indenter) => indenter.distance_px(pixel),
             None => {

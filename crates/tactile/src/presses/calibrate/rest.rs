@@ -29,7 +29,7 @@ pub(super) fn rest_frame(
     for (i, (press, contact)) in presses.iter().enumerate() {
         let change = change(i);
         for (pixel, total) in weights.iter_mut().enumerate() {
-            let t = (contact.from_rim_px(pixel, grid.width_px) / far_px).clamp(0.0, 1.0);
+            let t = (contact.beyond_rim_px(pixel, grid.width_px) / far_px).clamp(0.0, 1.0);
             let weight = match &change {
                 None => 1e-4 + t * t * t * t,
                 Some(_) => 1e-2 + t * t,
@@ -62,7 +62,7 @@ pub(super) fn noise_rgb(presses: &[(&Press, Contact)], rest: &[Vec<f32>; 3], gri
         for top in (0..grid.height_px.saturating_sub(side - 1)).step_by(side) {
             for left in (0..grid.width_px.saturating_sub(side - 1)).step_by(side) {
                 let middle = (top + side / 2) * grid.width_px + left + side / 2;
-                if contact.from_rim_px(middle, grid.width_px) < far_px {
+                if contact.beyond_rim_px(middle, grid.width_px) < far_px {
                     continue;
                 }
                 for (c, list) in variances.iter_mut().enumerate() {

@@ -102,7 +102,7 @@ fn choose(index: u64, contact: &Contact, grid: &Grid) -> (Vec<usize>, Vec<f32>) 
     let mm_per_px = grid.metres_per_px * 1e3;
     let mut zones = [const { Vec::new() }; ZONES_MM.len()];
     for pixel in 0..grid.len() {
-        let mm = contact.from_rim_px(pixel, grid.width_px) * mm_per_px;
+        let mm = contact.beyond_rim_px(pixel, grid.width_px) * mm_per_px;
         let zone = ZONES_MM.iter().position(|&(up_to, _, _)| mm < up_to).unwrap_or(ZONES_MM.len() - 1);
         zones[zone].push(pixel);
     }
