@@ -9,6 +9,7 @@ mod data_pack;
 mod indenter;
 mod mark;
 mod seen;
+mod zone;
 
 pub use body::{RenderedBody, render_body};
 pub use calibrate::{
@@ -27,7 +28,8 @@ use std::sync::Arc;
 pub(crate) use contact::Contact;
 pub use indenter::{Indenter, IndenterError, IndenterPose, USUAL_SINK_IN};
 pub use mark::MarkError;
-pub use seen::{PressScene, PressView, ZONES, Zone, frame_mse, surface_part};
+pub use seen::{PressScene, PressView, frame_mse, surface_part};
+pub use zone::{ZONES, Zone};
 
 /// Images of one sensor into which a ball or other bodies were pressed, in the order in which they were taken.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! A sensor file against presses: predicted and real image of each.
 
 use super::mark::{self, MarkError};
-use super::seen::{ZONES, Zone};
+use super::zone::{ZONES, Zone};
 use super::{Contact, Press, PressSet};
 use crate::metrics::{MetricError, Score, score, score_where};
 use crate::render::Renderer;

@@ -3,7 +3,7 @@
 mod reduce;
 mod view;
 
-pub use view::{PressView, ZONES, Zone, surface_part};
+pub use view::{PressView, surface_part};
 
 use super::compare::{gel_of, sink_in_fraction};
 use super::contact::{Deeper, ball_imprint};
