@@ -174,7 +174,8 @@ fn stated_and_measured(text: &mut String, set: &PressSet, sensor: &Sensor) -> Re
     let scene = PressScene::new(sensor, set.ball_m);
     let n = unseen.presses.len();
     let mean = |effects: &[NamedEffect]| {
-        (0..n).map(|i| frame_mse(&unseen, i, &scene, &optics(effects, 3 * i + 2))).sum::<f64>() / n as f64
+        (0..n).map(|i| frame_mse(&unseen, i, &scene, &optics(effects, 3 * i + 2), None)).sum::<f64>()
+            / n as f64
     };
     let names: Vec<&str> = found.diagnosis.effects.iter().map(|e| e.name.as_str()).collect();
     let stated = found.diagnosis.error.as_ref().and_then(|e| e.after.mse).unwrap_or(f64::NAN);
@@ -198,6 +199,7 @@ fn optics(effects: &[NamedEffect], index: usize) -> OpticsState {
         contact_area_m2: 0.0,
         pull_rate_n_per_s: 0.0,
         covariates: &covariates,
+        grip: (0, 0),
     };
     let mut state = OpticsState::default();
     for effect in effects {

@@ -280,6 +280,7 @@ pub(crate) fn grip_point(scenario: &Scenario, jaw: Jaw, contact_area_m2: f64) ->
         contact_area_m2,
         pull_rate_n_per_s: scenario.pull.increment_n / scenario.pull.step_s,
         covariates: &scenario.covariates,
+        grip: (scenario.seed, scenario.group),
     }
 }
 

@@ -129,7 +129,7 @@ pub use presses::{
 };
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
 pub use ratio::{PartRatio, RatioFit};
-pub use render::{RenderError, render_mesh};
+pub use render::{RenderError, RenderOptions, is_height_map, render_file, render_surface};
 pub use report::{
     Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
 };

@@ -395,6 +395,7 @@ impl<'a> PullPredictor<'a> {
                 contact_area_m2: 0.0,
                 pull_rate_n_per_s: pull.increment_n / pull.step_s,
                 covariates: &pull.covariates,
+                grip: (0, 0),
             };
             let own = || model.effects.iter().filter(|e| e.part.is_none_or(|p| p == part));
             let force_n = own().fold(at.grip_force_n, |f, e| match e.spec.normal_force {

@@ -31,6 +31,7 @@ fn point(pull: &MeasuredPull, jaw: Jaw, grip_force_n: f64) -> GripPoint<'_> {
         contact_area_m2: 0.0,
         pull_rate_n_per_s: pull.increment_n / pull.step_s,
         covariates: &pull.covariates,
+        grip: (0, 0),
     }
 }
 

@@ -15,7 +15,12 @@ fn table(group: Group) -> String {
             let reference = if spec.references.contains(&p.name) { ", reference" } else { "" };
             format!("`{}` {}..{}{unit} ({}{reference})", p.name, p.bounds.0, p.bounds.1, p.neutral)
         };
-        let parameters: Vec<String> = spec.parameters.iter().map(parameter).collect();
+        // Of many of a kind the first and the last.
+        let mut parameters: Vec<String> = spec.parameters.iter().map(parameter).collect();
+        if parameters.len() > 30 {
+            let middle = parameters.len() - 17;
+            parameters.splice(15..15 + middle, [format!("{middle} more of this kind")]);
+        }
         writeln!(text, "| `{}` | {} | {} | {} |", spec.id, spec.formula, parameters.join("; "), spec.source)
             .unwrap();
     }

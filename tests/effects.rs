@@ -282,6 +282,9 @@ const OPTICS: &[(&str, &str)] = &[
     ("rest_offset", "red = 3.0"),
     ("cast_shadow", "strength = 0.4\nelevation_deg = 15.0"),
     ("gel_dome", "sag_mm = 0.5"),
+    ("press_gain", "red_sd = 0.1\ngreen_sd = 0.1\nblue_sd = 0.1"),
+    ("press_depth", "offset_mm = 0.1"),
+    ("edge_rounding", "radius_mm = 0.3"),
 ];
 
 /// A part that is not gripped.
@@ -323,7 +326,7 @@ fn without_contact_only_light_and_camera_show() {
     let plain = rest("");
     for (name, values) in OPTICS {
         let seen = rest(&format!("[[effects]]\nname = \"{name}\"\n{values}\n"));
-        let frame = ["light_drift", "background_change", "exposure"].contains(name);
+        let frame = ["light_drift", "background_change", "exposure", "press_gain"].contains(name);
         assert_eq!(seen != plain, frame, "{name}");
     }
 }

@@ -43,6 +43,7 @@ fn at(grip_force_n: f64) -> GripPoint<'static> {
         contact_area_m2: 1e-4,
         pull_rate_n_per_s: 1.0 / 0.104,
         covariates: &COVARIATES,
+        grip: (0, 0),
     }
 }
 

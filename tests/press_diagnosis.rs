@@ -2,7 +2,7 @@
 
 use crate::common::root;
 use gripgen::identify::{Diagnosis, Verdict};
-use gripgen::tactile::presses::{Circle, Press, PressScene, PressSet};
+use gripgen::tactile::presses::{Circle, Press, PressContact, PressScene, PressSet};
 use gripgen::tactile::{Sensor, finish};
 use gripgen::twin::{OpticsState, TactileImage};
 use gripgen::{
@@ -28,7 +28,7 @@ fn presses(sensor: &Sensor, change: impl Fn(f64, [f64; 2], [f64; 3]) -> [f64; 3]
             y_px: h as f64 * (0.25 + 0.5 * place(5)),
             radius_px: 18.0 + 8.0 * place(7),
         };
-        let seen = scene.change_seen(Some(&circle), &OpticsState::default());
+        let seen = scene.change_seen(Some(&PressContact::of_circle(circle)), &OpticsState::default());
         let image = finish(sensor, Some(&seen), Some(i as u64 + 1));
         let rgb = image.rgb.chunks_exact(3).enumerate().flat_map(|(p, rgb)| {
             let at = |k: usize, n: usize| 2.0 * k as f64 / n as f64 - 1.0;

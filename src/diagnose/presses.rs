@@ -18,6 +18,7 @@ use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::PressSet;
 use gripgen_twin::Covariates;
 use gripgen_twin::config::EffectFile;
+use gripgen_twin::effects::PressNeeds;
 use work::{Work, noise_mse};
 
 /// Time from one press to the next where nobody wrote it down.
@@ -49,7 +50,8 @@ pub fn diagnose_presses(input: &PressDiagnosisInput<'_>, progress: &mut dyn FnMu
         sha256: input.sha256.clone(),
         noise_mse: noise_mse(input.sensor),
         covariates: covariates(input),
-        marked: input.marked,
+        known: known(input),
+        press_gain_sd: input.sensor.press_gain_sd.map(|sd| sd.map(f64::from)),
     };
     let n = input.set.presses.iter().filter(|p| p.circle.is_some()).count();
     if n < MIN_DIAGNOSED_PRESSES || n < input.set.presses.len() {
@@ -71,6 +73,15 @@ pub fn diagnose_presses(input: &PressDiagnosisInput<'_>, progress: &mut dyn FnMu
     remark(&mut found.diagnosis, input, &work, &found.acting, scatter_px);
     let report = page::report(input, &data.covariates, &found);
     Diagnosed { edits: edits(input, &found.diagnosis), diagnosis: found.diagnosis, report, next: None }
+}
+
+/// What is known of the presses beside their images.
+fn known(input: &PressDiagnosisInput<'_>) -> Vec<PressNeeds> {
+    let presses = &input.set.presses;
+    let edges = presses.iter().any(|press| press.indenter.is_some());
+    let depths = presses.iter().all(|press| press.travel_m.is_some());
+    let all = [(input.marked, PressNeeds::Marks), (depths, PressNeeds::Depths), (edges, PressNeeds::Edges)];
+    all.into_iter().filter(|(is_known, _)| *is_known).map(|(_, need)| need).collect()
 }
 
 /// What the residual may depend on: order, place and size of the contact, further columns.

@@ -2,8 +2,9 @@
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use gripgen::record::{ExportError, FolderError, ReadError};
+use gripgen::tactile::presses::HeightsError;
 use gripgen::twin::config::{ConfigError, Place};
-use gripgen::{BenchError, LoadError, OpenPlantError, SweepError};
+use gripgen::{BenchError, LoadError, LoadSensorError, OpenPlantError, RenderError, SweepError};
 use std::fmt::Display;
 
 /// Exit codes.
@@ -116,6 +117,44 @@ impl From<LoadError> for Failure {
             LoadError::Config(e) => e.into(),
             LoadError::Read(e) => Failure::usage(e),
             other => Failure::usage(other),
+        }
+    }
+}
+
+impl From<LoadSensorError> for Failure {
+    fn from(e: LoadSensorError) -> Self {
+        match e {
+            LoadSensorError::Twin(e) => e.into(),
+            other => Failure::usage(other).hint(
+                "`gripgen calibrate presses` writes a sensor file; one of ours is asset:sensors/gelsight_r15/sensor.npz",
+            ),
+        }
+    }
+}
+
+impl From<RenderError> for Failure {
+    fn from(e: RenderError) -> Self {
+        let hint = match &e {
+            RenderError::Body { .. } => Some(
+                "--x-px and --y-px are the place of the mesh's origin in the image; --scale-mm-per-unit is the size of its unit",
+            ),
+            RenderError::NoTravel { .. } => Some("--depth-mm 0.5, say"),
+            RenderError::Placed => Some("move and turn the array itself, or render a mesh"),
+            RenderError::Heights { source: HeightsError::Shape { .. }, .. } => {
+                Some("one height for each pixel of the sensor's image, rows first")
+            }
+            RenderError::Heights { source: HeightsError::NotANumber { .. }, .. } => {
+                Some("-inf is where there is no surface")
+            }
+            RenderError::Heights { source: HeightsError::Travel { .. }, .. } => {
+                Some("heights are in mm, or in --scale-mm-per-unit; above 0 is into the gel")
+            }
+            _ => None,
+        };
+        let failure = Failure::usage(&e);
+        match hint {
+            Some(hint) => failure.hint(hint),
+            None => failure,
         }
     }
 }

@@ -7,6 +7,7 @@
 
 mod answer;
 mod candidates;
+mod gains;
 mod model;
 mod observed;
 mod power;
@@ -18,12 +19,13 @@ mod tests;
 mod unnamed;
 
 pub use predict::{ActingEffect, PRESS_ZONES, PredictPresses, PressPixels};
-pub use search::PressTrial;
+pub use score::PressTrial;
 pub use unnamed::{PressCovariate, PressValues};
 
 use crate::{Diagnosis, Verdict};
 use answer::{Answer, bare};
 use candidates::candidates;
+use gripgen_twin::effects::PressNeeds;
 use observed::Observed;
 use search::search;
 
@@ -41,8 +43,10 @@ pub struct PressData {
     pub noise_mse: f64,
     /// What the residual may depend on, one value per press.
     pub covariates: Vec<PressCovariate>,
-    /// Whether the contacts were marked: places that were found in the images say nothing of where they should be.
-    pub marked: bool,
+    /// What of the presses is known: places that were found in the images say nothing of where they should be.
+    pub known: Vec<PressNeeds>,
+    /// Standard deviation of the logarithm of each channel's gain from press to press, where the sensor file knows it.
+    pub press_gain_sd: Option<[f64; 3]>,
 }
 
 /// What is found out about presses.
@@ -80,7 +84,8 @@ pub fn diagnose_presses(
         };
     }
     let mut observed = Observed::new(predictor);
-    let found = search(&mut observed, &data.covariates, &candidates(data.marked), progress);
+    let candidates = candidates(&data.known);
+    let found = search(&mut observed, &data.covariates, &candidates, data.press_gain_sd, progress);
     progress(0.97, "whole frames");
     Answer { data, observed: &observed, found }.diagnosed()
 }

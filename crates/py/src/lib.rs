@@ -8,6 +8,7 @@
 mod dataset;
 mod error;
 mod pulls;
+mod render;
 mod simulator;
 mod sweep;
 mod values;
@@ -41,6 +42,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<pulls::Pulls>()?;
     module.add_function(wrap_pyfunction!(run_cli, module)?)?;
     module.add_function(wrap_pyfunction!(run_verb, module)?)?;
+    module.add_function(wrap_pyfunction!(render::render, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::sweep, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::contact_sheet_shards, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::prepare_run, module)?)

@@ -108,6 +108,7 @@ fn sensor_npz(text: &str) -> Vec<u8> {
         shadow: None,
         pyramid: None,
         ball_m: None,
+        press_gain_sd: None,
     };
     sensor.to_npz().expect("it is our own colour model").expect("arrays fit into an npz")
 }

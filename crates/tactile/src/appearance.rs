@@ -70,6 +70,7 @@ mod tests {
             shadow: None,
             pyramid: None,
             ball_m: None,
+            press_gain_sd: None,
         }
     }
 

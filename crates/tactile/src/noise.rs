@@ -216,6 +216,7 @@ mod tests {
             shadow: None,
             pyramid: None,
             ball_m: None,
+            press_gain_sd: None,
         };
         let change = [0, 1, 2].map(|c| Plane::filled(53, 7, 0.3 + c as f32));
         for key in [None, Some(5)] {

@@ -181,7 +181,11 @@ fn parse_header(bytes: &[u8]) -> Result<Header, String> {
 }
 
 /// Parses the bytes of a `.npy` file.
-pub(crate) fn parse_npy(bytes: &[u8]) -> Result<Array, String> {
+///
+/// # Errors
+///
+/// What is wrong with them, in words: another format, Python objects, a size that is not the shape's.
+pub fn parse_npy(bytes: &[u8]) -> Result<Array, String> {
     let Header { descr, fortran, shape, count, data_start } = parse_header(bytes)?;
     let (swap, kind) = match descr.strip_prefix('>') {
         Some(kind) => (true, kind),

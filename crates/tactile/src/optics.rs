@@ -1,6 +1,7 @@
 //! The image as the optics effects of a twin change it.
 //!
-//! An [`OpticsState`] acts in this order, whatever the order of the effects: the shape of the gel at rest (here), the
+//! An [`OpticsState`] acts in this order, whatever the order of the effects: the edges of the part (`rounding`), the depth of
+//! the press and the shape of the gel at rest (here), the
 //! kernels of the gel (`kernels`), the shape of the part (`shape`), where the contact is seen (`warp`), shadow,
 //! focus and offset of what the contact changes (`shadow`, here), light and camera on the whole frame (`camera`). A
 //! stage in which nothing is changed is the plain one, bit for bit. Noise comes after all of it: it is the camera's.
@@ -9,6 +10,8 @@ mod camera;
 #[cfg(test)]
 mod fit_tests;
 mod kernels;
+mod pattern;
+mod rounding;
 mod shadow;
 mod shape;
 #[cfg(test)]
@@ -18,6 +21,7 @@ mod tests;
 mod warp;
 
 pub(crate) use camera::level_at;
+pub(crate) use rounding::rounded;
 
 use crate::appearance::appearance_on;
 use crate::deform::{blurred, deform_with};
@@ -52,12 +56,33 @@ impl Renderer<'_> {
         force_n: f64,
         optics: &OpticsState,
     ) -> Result<Imprint, IndentError> {
-        if optics.dome_sag_m == 0.0 {
+        if !optics.changes_press() {
             return self.press(mesh, gel_from_mesh, imprint_m3_per_n, force_n);
         }
+        let grid = &self.sensor.grid;
         let rest = self.rest_seen(optics);
-        let heights = mesh.raster(gel_from_mesh, &self.sensor.grid, self.reach_px(rest.as_ref()));
-        self.press_heights(&added(heights, rest.as_ref()), imprint_m3_per_n, force_n)
+        let heights = mesh.raster(gel_from_mesh, grid, self.reach_px(rest.as_ref()));
+        let heights = added(self.rounded_as_seen(heights, optics), rest.as_ref());
+        let imprint = self.press_heights(&heights, imprint_m3_per_n, force_n)?;
+        Ok(if optics.changes_depth() { self.at_depth(imprint, &heights, optics) } else { imprint })
+    }
+
+    /// The part's surface with its edges as they are.
+    fn rounded_as_seen(&self, heights: Plane, optics: &OpticsState) -> Plane {
+        if optics.edge_rounding_m == 0.0 {
+            return heights;
+        }
+        rounded(&heights, optics.edge_rounding_m / self.sensor.grid.metres_per_px)
+    }
+
+    /// The imprint at the depth that is seen instead of its own, at most the thickness of the gel.
+    fn at_depth(&self, imprint: Imprint, heights: &Plane, optics: &OpticsState) -> Imprint {
+        let press_depth_m = optics.press_depth_m(imprint.press_depth_m).min(self.gel.thickness_m);
+        let press_px = (press_depth_m / self.sensor.grid.metres_per_px) as f32;
+        let highest = heights.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h));
+        let depth = |&h: &f32| (h - highest + press_px).max(0.0);
+        let depth_px = Plane { values: heights.values.iter().map(depth).collect(), ..*heights };
+        Imprint { depth_px, press_depth_m, ..imprint }
     }
 
     /// The gel's shape at rest with what the effects add to it, in pixels towards the part.

@@ -6,6 +6,8 @@ mod circle;
 mod compare;
 mod contact;
 mod data_pack;
+mod gain;
+mod heights;
 mod indenter;
 mod mark;
 mod seen;
@@ -26,9 +28,10 @@ use gripgen_twin::TactileImage;
 use std::sync::Arc;
 
 pub(crate) use contact::Contact;
+pub use heights::{HeightsError, render_heights};
 pub use indenter::{Indenter, IndenterError, IndenterPose, USUAL_SINK_IN};
 pub use mark::MarkError;
-pub use seen::{PressScene, PressView, frame_mse, surface_part};
+pub use seen::{PressContact, PressScene, PressView, frame_mse, surface_part};
 pub use zone::{ZONES, Zone};
 
 /// Images of one sensor into which a ball or other bodies were pressed, in the order in which they were taken.

@@ -35,6 +35,9 @@ pub struct Sensor {
     pub pyramid: Option<Pyramid>,
     /// Diameter of the ball of the calibration, where there was one.
     pub ball_m: Option<f64>,
+    /// Standard deviation of the logarithm of the gain of red, green and blue from one press to the next, where the camera of the
+    /// calibration had an automatic white balance. Images are compared and fitted without it, and drawn without it.
+    pub press_gain_sd: Option<[f32; 3]>,
 }
 
 /// The blurs that stand for the deformation of the gel.
@@ -80,6 +83,10 @@ impl Sensor {
             let range = "from 0 to 255 grey levels";
             return Err(SensorError::Value { key: "rest_rgb", value: f64::from(value), range });
         }
+        if let Some(&sd) = self.press_gain_sd.iter().flatten().find(|s| !(0.0..=1.0).contains(*s)) {
+            let range = "from 0 to 1";
+            return Err(SensorError::Value { key: "press_gain_sd_rgb", value: f64::from(sd), range });
+        }
         self.gel_shape.check(&self.grid)?;
         if let Some(ball_m) = self.ball_m.filter(|d| !(1e-4..=0.1).contains(d)) {
             let range = "from 0.1 to 100 mm";
@@ -124,6 +131,7 @@ mod tests {
             ("lambert", array("lambert", &[3, 3, 6], 2.0), ElementType::F64),
             ("ball_mm", array("ball_mm", &[], 4.0), ElementType::F64),
             ("dome_sag_mm", array("dome_sag_mm", &[], 0.5), ElementType::F64),
+            ("press_gain_sd_rgb", array("press_gain_sd_rgb", &[3], 0.05), ElementType::F64),
             ("kernels_px", array("kernels_px", &[2], 21.0), ElementType::F64),
             ("restore_depth_fraction", array("restore_depth_fraction", &[], 0.4), ElementType::F64),
         ]);
@@ -140,6 +148,7 @@ mod tests {
             ("rest_rgb", f64::NAN, "from 0 to 255"),
             ("noise_rgb", -1.0, "from 0 to 64"),
             ("ball_mm", 0.01, "from 0.1 to 100 mm"),
+            ("press_gain_sd_rgb", -0.1, "from 0 to 1"),
             ("dome_sag_mm", -1.0, "from 0 to 20 mm"),
             ("kernels_px", 70.0, "odd and from 3 to 255"),
             ("restore_depth_fraction", 1.5, "from 0 to 1"),

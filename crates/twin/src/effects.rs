@@ -22,7 +22,8 @@ mod tests;
 pub use chain::{CommandChain, SensorChain, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 pub use experiment::{Experiment, Measured, separating};
 pub use fit::{
-    Bounds, FORCE_RATE, Fit, Grid, Named, PressFit, PullFit, PullSpan, REFERENCE_FORCE, TableFit, TableSpan,
+    Bounds, FORCE_RATE, Fit, Grid, Named, PressFit, PressNeeds, PullFit, PullSpan, REFERENCE_FORCE, TableFit,
+    TableSpan,
 };
 use fit::{log_spaced, wider};
 pub use hooks::{
@@ -81,6 +82,9 @@ library! {
     mod rest_offset;
     mod cast_shadow;
     mod gel_dome;
+    mod press_gain;
+    mod press_depth;
+    mod edge_rounding;
 }
 
 /// The correction of the friction coefficient of Wucherer et al. 2023, mu (a + b / F_G), which is fitted per part.

@@ -3,6 +3,15 @@
 /// Terms of a background pattern: `u, v, u^2, u v, v^2`.
 pub const BACKGROUND_TERMS: usize = 5;
 
+/// Degrees (i, j) in u and v of the finer terms of a background pattern, `P_i(u) P_j(v)` of Legendre polynomials.
+#[rustfmt::skip]
+pub const FINER_TERMS: [(usize, usize); 22] = [
+    (3, 0), (2, 1), (1, 2), (0, 3),
+    (4, 0), (3, 1), (2, 2), (1, 3), (0, 4),
+    (5, 0), (4, 1), (3, 2), (2, 3), (1, 4), (0, 5),
+    (6, 0), (5, 1), (4, 2), (3, 3), (2, 4), (1, 5), (0, 6),
+];
+
 /// One sensor against its file: what the camera, its light, the gel and the part's surface do that the file and the
 /// mesh do not say. The default is neutral and leaves every pixel as it is.
 ///
@@ -15,6 +24,8 @@ pub struct OpticsState {
     /// Coefficients of a pattern that is added to each channel, in grey levels: `u, v, u^2, u v, v^2`, each with mean 0
     /// over the frame; u and v run from -1 to 1 along the rows and columns.
     pub background: [[f64; BACKGROUND_TERMS]; 3],
+    /// Coefficients of the same for [`FINER_TERMS`], each with mean 0 over the frame.
+    pub finer_background: [[f64; FINER_TERMS.len()]; 3],
     /// Factor on what reaches the camera, all channels.
     pub exposure_gain: f64,
     /// Exponent of the camera's response, all channels.
@@ -43,6 +54,12 @@ pub struct OpticsState {
     pub light_elevation_rad: f64,
     /// How much deeper the corners of the gel lie below its apex, seen from the part.
     pub dome_sag_m: f64,
+    /// Depth of the press over the one it is thought to be, before [`OpticsState::press_offset_m`].
+    pub press_factor: f64,
+    /// How much deeper the press is beyond that.
+    pub press_offset_m: f64,
+    /// Radius of the part's convex edges.
+    pub edge_rounding_m: f64,
 }
 
 impl Default for OpticsState {
@@ -50,6 +67,7 @@ impl Default for OpticsState {
         Self {
             light_gain: [1.0; 3],
             background: [[0.0; BACKGROUND_TERMS]; 3],
+            finer_background: [[0.0; FINER_TERMS.len()]; 3],
             exposure_gain: 1.0,
             gamma: 1.0,
             shift_m: [0.0; 2],
@@ -64,6 +82,9 @@ impl Default for OpticsState {
             shadow_strength: 0.0,
             light_elevation_rad: std::f64::consts::FRAC_PI_6,
             dome_sag_m: 0.0,
+            press_factor: 1.0,
+            press_offset_m: 0.0,
+            edge_rounding_m: 0.0,
         }
     }
 }
@@ -76,12 +97,22 @@ impl OpticsState {
 
     /// Whether the part is pressed into another gel: the image needs an imprint of its own.
     pub fn changes_press(&self) -> bool {
-        self.dome_sag_m != 0.0
+        self.dome_sag_m != 0.0 || self.edge_rounding_m != 0.0 || self.changes_depth()
+    }
+
+    /// Whether the press is deeper or less deep than it is thought to be.
+    pub fn changes_depth(&self) -> bool {
+        self.press_factor != 1.0 || self.press_offset_m != 0.0
+    }
+
+    /// The depth of a press that is thought to be `depth_m` deep, never negative.
+    pub fn press_depth_m(&self, depth_m: f64) -> f64 {
+        (self.press_factor * depth_m + self.press_offset_m).max(0.0)
     }
 
     /// Whether the gel surface is seen in another shape or place than a plain press gives it.
     pub fn changes_surface(&self) -> bool {
-        self.dome_sag_m != 0.0
+        self.changes_press()
             || self.kernel_scale != 1.0
             || self.part_offset_m != 0.0
             || self.edge_blunting_m != 0.0
@@ -97,6 +128,7 @@ impl OpticsState {
     pub fn changes_frame(&self) -> bool {
         self.light_gain != [1.0; 3]
             || self.background != [[0.0; BACKGROUND_TERMS]; 3]
+            || self.finer_background != [[0.0; FINER_TERMS.len()]; 3]
             || self.exposure_gain != 1.0
             || self.gamma != 1.0
     }

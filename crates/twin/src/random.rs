@@ -23,6 +23,8 @@ pub enum Purpose {
     ImageNoiseLeft = 5,
     /// Image noise of the right sensor.
     ImageNoiseRight = 6,
+    /// Gain of the cameras from grip to grip, keyed by the group of repetitions.
+    PressGain = 7,
 }
 
 /// A stream of random numbers for one sample and one purpose.

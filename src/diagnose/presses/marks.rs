@@ -124,7 +124,11 @@ fn common(work: &Work<'_>, moved: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let full = work.scene.factor() as f64;
     let terms = if n >= SLOPES_FROM { 3 } else { 1 };
     let row = |i: usize| -> [f64; 3] {
-        let c = work.views[i].circle().copied().unwrap_or(Circle { x_px: 0.0, y_px: 0.0, radius_px: 1.0 });
+        let c = work.views[i].press().map(|p| *p.circle()).unwrap_or(Circle {
+            x_px: 0.0,
+            y_px: 0.0,
+            radius_px: 1.0,
+        });
         [1.0, c.x_px / (grid.width_px as f64 * full) - 0.5, c.y_px / (grid.height_px as f64 * full) - 0.5]
     };
     let design = DMatrix::from_fn(n, terms, |i, k| row(i)[k]);

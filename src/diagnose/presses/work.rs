@@ -3,8 +3,10 @@
 use crate::parallel::in_parallel;
 use gripgen_identify::{ActingEffect, PRESS_ZONES, PredictPresses, PressPixels};
 use gripgen_tactile::Sensor;
-use gripgen_tactile::presses::{Circle, PressScene, PressSet, PressView, ZONES, frame_mse, surface_part};
-use gripgen_twin::effects::GripPoint;
+use gripgen_tactile::presses::{
+    Circle, PressContact, PressScene, PressSet, PressView, ZONES, frame_mse, surface_part,
+};
+use gripgen_twin::effects::{EffectSpec, GripPoint};
 use gripgen_twin::{Covariates, Jaw, OpticsState};
 use std::sync::{Arc, Mutex};
 
@@ -23,7 +25,7 @@ pub(super) struct Work<'a> {
     pub(super) full: PressScene,
     pub(super) views: Vec<PressView>,
     pub(super) circumstances: Vec<Covariates>,
-    /// Where the contact is taken to be, of each press.
+    /// Where the contact of a ball is taken to be, of each press.
     pub(super) circles: Vec<Option<Circle>>,
     kept: Vec<Mutex<Vec<(OpticsState, Contact)>>>,
 }
@@ -34,13 +36,13 @@ impl<'a> Work<'a> {
         let scene = PressScene::for_fits(sensor, set.ball_m);
         let views = for_each(set.presses.len(), |i| {
             let press = &set.presses[i];
-            PressView::draw(i, &press.image, press.circle, &full, &scene)
+            PressView::draw(i, &press.image, PressContact::of(press), &full, &scene)
         });
         Self {
             set,
             scene,
             full,
-            circles: views.iter().map(|v| v.circle().copied()).collect(),
+            circles: views.iter().map(|v| v.press().filter(|p| p.is_ball()).map(|p| *p.circle())).collect(),
             kept: views.iter().map(|_| Mutex::new(Vec::new())).collect(),
             views,
             circumstances,
@@ -85,6 +87,11 @@ pub(super) fn for_each<T: Send>(n: usize, of: impl Fn(usize) -> T + Sync) -> Vec
     in_parallel(n, std::thread::available_parallelism().map_or(1, usize::from), of)
 }
 
+/// Whether an effect differs from press to press by chance: each press says how.
+fn scatters(spec: &EffectSpec) -> bool {
+    spec.presses.is_some_and(|fit| fit.scatters)
+}
+
 /// What effects make of the optics in some circumstances.
 pub(super) fn optics_at(covariates: &Covariates, acting: &[ActingEffect]) -> OpticsState {
     let at = GripPoint {
@@ -93,9 +100,10 @@ pub(super) fn optics_at(covariates: &Covariates, acting: &[ActingEffect]) -> Opt
         contact_area_m2: 0.0,
         pull_rate_n_per_s: 0.0,
         covariates,
+        grip: (0, 0),
     };
     let mut state = OpticsState::default();
-    for effect in acting {
+    for effect in acting.iter().filter(|effect| !scatters(effect.spec)) {
         if let Some(hook) = effect.spec.optics {
             hook(&effect.values, &mut state, &at);
         }
@@ -140,7 +148,10 @@ impl PredictPresses for Work<'_> {
     }
 
     fn frame_mse(&self, press: usize, acting: &[ActingEffect]) -> f64 {
-        frame_mse(self.set, press, &self.full, &self.optics(press, acting))
+        let scatter = acting.iter().find(|effect| scatters(effect.spec));
+        let named = scatter.and_then(|effect| effect.values.clone().try_into().ok());
+        let known = self.full.sensor().press_gain_sd.map(|sd| sd.map(f64::from));
+        frame_mse(self.set, press, &self.full, &self.optics(press, acting), named.or(known))
     }
 
     fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync)) {

@@ -7,11 +7,12 @@ use std::path::PathBuf;
 /// `gripgen render`
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// A mesh (STL, OBJ). Its tip points along its +z into the gel; +x is the image's right, +y the image's top.
+    /// A mesh (STL, OBJ): its tip points along its +z into the gel, +x is the image's right, +y the image's top. Or heights
+    /// above the gel at rest in mm (.npy, rows and columns of the sensor's image).
     pub mesh: PathBuf,
-    /// Travel after the highest vertex touched the gel.
+    /// Travel after the highest point touched the gel. Without it heights are taken as they are.
     #[arg(long, value_name = "MM")]
-    pub depth_mm: f64,
+    pub depth_mm: Option<f64>,
     /// A sensor file: size, colours and frame at rest are its own.
     #[arg(long, value_name = "FILE.npz")]
     pub sensor: String,
@@ -24,7 +25,7 @@ pub struct RenderArgs {
     /// Turn, counter-clockwise in the image.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     pub rotation_deg: f64,
-    /// Millimetres per unit of the mesh file.
+    /// Millimetres per unit of the file.
     #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = super::scale)]
     pub scale_mm_per_unit: f64,
     /// Write how far the gel stands above its rest, in mm: a (rows, columns) array.

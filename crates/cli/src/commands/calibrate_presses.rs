@@ -98,6 +98,12 @@ fn warn(calibration: &Calibration, presses: usize, talk: &TalkArgs) {
             "warning: {presses} presses are few: elsewhere on the gel the error may be twice the one below"
         );
     }
+    if let Some([red, green, blue]) = calibration.sensor.press_gain_sd.map(|sd| sd.map(|s| 100.0 * s)) {
+        eprintln!(
+            "warning: red, green and blue have another gain in each press ({red:.1}, {green:.1}, {blue:.1} %), as a camera with an \
+             automatic white balance has; it was divided out. Switch it off where that can be done"
+        );
+    }
     if calibration.sensor.noise_rgb == [0.0; 3] {
         eprintln!("warning: no pixel was far from the contacts, so the noise is not known and set to 0");
     }
@@ -154,6 +160,7 @@ fn fitted(sensor: &Sensor) -> Value {
         "dome_sag_mm": dome_mm,
         "sink_in_fraction": sensor.pyramid.as_ref().map(|p| p.sink_in_fraction),
         "kernels_px": sensor.pyramid.as_ref().map(|p| p.kernels_px.clone()),
+        "press_gain_sd_rgb": sensor.press_gain_sd,
     })
 }
 

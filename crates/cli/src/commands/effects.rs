@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::load::{load_library, load_twin};
 use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::twin::config::suggestion;
-use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, ParameterSpec, find};
+use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, ParameterSpec, PressNeeds, find};
 use gripgen::{BASELINE_TWIN, EffectCurve, effect_curve};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -202,7 +202,7 @@ fn document(spec: &EffectSpec) -> Value {
             "per_part": spec.per_part,
             "seen_in_images": spec.optics.is_some() || spec.imprint_volume.is_some() || spec.normal_force.is_some() || spec.tilt_rad.is_some(),
             "drawn": spec.presses.is_some_and(|fit| fit.drawn),
-            "needs_marks": spec.presses.is_some_and(|fit| fit.needs_marks),
+            "needs_marks": spec.presses.is_some_and(|fit| fit.needs == PressNeeds::Marks),
         },
     })
 }

@@ -1,13 +1,13 @@
-//! `gripgen render`: the image of any mesh, without noise.
+//! `gripgen render`: the image of any mesh or surface, without noise.
 
 use crate::args::RenderArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::record::encode_png;
 use gripgen::tactile::npz::{Array, ElementType, write_npy};
-use gripgen::tactile::presses::{IndenterPose, RenderedBody};
+use gripgen::tactile::presses::RenderedBody;
 use gripgen::twin::TactileImage;
-use gripgen::{Location, RenderError, load_sensor, render_mesh};
+use gripgen::{Location, RenderOptions, is_height_map, load_sensor, render_file};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -26,17 +26,15 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
         }
     }
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
-    let sensor = load_sensor(&Location::parse(&args.sensor)).map_err(|e| {
-        Failure::usage(e).hint("`gripgen calibrate presses` writes a sensor file; one of ours is asset:sensors/gelsight_r15/sensor.npz")
-    })?;
-    let middle = |n: usize| (n as f64 - 1.0) / 2.0;
-    let at = IndenterPose {
-        x_px: args.x_px.unwrap_or(middle(sensor.grid.width_px)),
-        y_px: args.y_px.unwrap_or(middle(sensor.grid.height_px)),
+    let sensor = load_sensor(&Location::parse(&args.sensor))?;
+    let options = RenderOptions {
+        travel_m: args.depth_mm.map(|mm| mm * 1e-3),
+        x_px: args.x_px,
+        y_px: args.y_px,
         rotation_rad: args.rotation_deg.to_radians(),
+        metres_per_unit: args.scale_mm_per_unit * 1e-3,
     };
-    let rendered = render_mesh(&args.mesh, args.scale_mm_per_unit * 1e-3, at, args.depth_mm * 1e-3, &sensor)
-        .map_err(|e| failure(args, &e))?;
+    let rendered = render_file(&args.mesh, &options, &sensor)?;
     write_file(&args.out, &encode_png(&rendered.image).map_err(Failure::new)?)?;
     let size = (rendered.heights_mm.height, rendered.heights_mm.width);
     if let Some(path) = &args.heights {
@@ -57,11 +55,13 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
     }
     if sink.wanted() {
         let pixels = rendered.contact.iter().filter(|&&c| c).count();
+        let at = (!is_height_map(&args.mesh)).then(|| options.pose(&sensor.grid));
         let side_mm = sensor.grid.metres_per_px * 1e3;
         sink.document(&json!({
             "schema": "gripgen.render/1", "image": args.out, "heights": args.heights, "normals": args.normals,
             "mask": args.mask, "width_px": size.1, "height_px": size.0,
-            "x_px": at.x_px, "y_px": at.y_px, "contact_area_mm2": pixels as f64 * side_mm * side_mm,
+            "x_px": at.map(|at| at.x_px), "y_px": at.map(|at| at.y_px),
+            "contact_area_mm2": pixels as f64 * side_mm * side_mm,
         }))?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
@@ -74,14 +74,4 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
 fn mask(rendered: &RenderedBody) -> TactileImage {
     let rgb = rendered.contact.iter().flat_map(|&c| [if c { 255 } else { 0 }; 3]).collect();
     TactileImage { rgb, ..rendered.image }
-}
-
-fn failure(args: &RenderArgs, error: &RenderError) -> Failure {
-    let failure = Failure::usage(format!("{}: {error}", args.mesh.display()));
-    match error {
-        RenderError::Body(_) => failure.hint(
-            "--x-px and --y-px are the place of the mesh's origin in the image; --scale-mm-per-unit is the size of its unit",
-        ),
-        _ => Failure::usage(error),
-    }
 }

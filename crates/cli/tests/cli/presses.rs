@@ -1,6 +1,7 @@
 //! `gripgen calibrate presses` and `gripgen compare`.
 
 use super::{assert_code, run, text};
+use gripgen::tactile::npz::{Array, ElementType, write_npy};
 
 /// Presses of a ball as a folder of pictures, drawn with the shipped sensor.
 fn press_folder(count: usize) -> tempfile::TempDir {
@@ -154,4 +155,43 @@ fn a_mesh_is_rendered_with_its_surface() {
     }
     let same = run(&["render", &tip, "--depth-mm", "1", "--sensor", sensor, "-o", &file("tip.obj")]);
     assert_eq!(same.status.code(), Some(2));
+    let still = run(&["render", &tip, "--sensor", sensor, "-o", &image]);
+    assert_eq!(still.status.code(), Some(2));
+    assert!(text(&still.stderr).contains("not said how far") && text(&still.stderr).contains("--depth-mm"));
+}
+
+#[test]
+fn a_surface_is_rendered_from_its_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let sensor = "asset:sensors/gelsight_r15/sensor.npz";
+    // Ridges along y, 0.2 mm high, the gel reached by the upper half of them.
+    let ridge = |i: usize| 0.2 * f64::sin((i % 320) as f64 / 8.0);
+    let array =
+        |shape: [usize; 2]| Array { shape: shape.to_vec(), values: (0..320 * 240).map(ridge).collect() };
+    std::fs::write(file("ridges.npy"), write_npy(&array([240, 320]), ElementType::F64)).unwrap();
+    std::fs::write(file("turned.npy"), write_npy(&array([320, 240]), ElementType::F64)).unwrap();
+    std::fs::write(file("no.npy"), "no array").unwrap();
+    let (ridges, image) = (file("ridges.npy"), file("out.png"));
+    let output = run(&["render", &ridges, "--sensor", sensor, "-o", &image, "--json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(told["x_px"].is_null() && told["width_px"] == 320, "{told}");
+    let area_mm2 = told["contact_area_mm2"].as_f64().unwrap();
+    // The gel follows where a ridge is deeper than 0.4 of its height.
+    let columns = (0..320).filter(|&i| ridge(i) > 0.08).count();
+    let expected_mm2 = columns as f64 * 240.0 * 0.0877 * 0.0877;
+    assert!((area_mm2 / expected_mm2 - 1.0).abs() < 0.01, "{area_mm2} {expected_mm2}");
+    for (name, more, part) in [
+        ("turned.npy", vec![], "the heights have the shape [320, 240], the sensor's image has [240, 320]"),
+        ("no.npy", vec![], "not in numpy's npy format"),
+        ("ridges.npy", vec!["--x-px", "3"], "no place and no turn"),
+        ("ridges.npy", vec!["--depth-mm", "11"], "pressed in by 11 mm"),
+        ("ridges.npy", vec!["--scale-mm-per-unit", "100"], "pressed in by 19.99"),
+    ] {
+        let path = file(name);
+        let refused = run(&[vec!["render", &path, "--sensor", sensor, "-o", &image], more].concat());
+        assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
+        assert!(text(&refused.stderr).contains(part), "{}", text(&refused.stderr));
+    }
 }

@@ -55,6 +55,7 @@ impl Answer<'_> {
         diagnosis.unknown = self.found.unknown.iter().map(unknown).collect();
         diagnosis.conclude();
         diagnosis.would_have_seen = would_have_seen(self.observed, &self.found);
+        diagnosis.would_have_seen.extend(self.found.scatter.seen_from.clone());
         diagnosis.not_excited = self.not_excited();
         diagnosis.data.outliers = self.outliers();
         let pair = |after: &[f64]| ErrorPair { before: interval(&errors.before), after: interval(after) };
@@ -66,12 +67,11 @@ impl Answer<'_> {
             by: ErrorsBy { levels: None, sessions: Some(pair(&errors.after_blocks)) },
         });
         diagnosis.notes.push("`by.sessions` holds out blocks of presses that follow one another".into());
-        let acting = &self.found.model.acting;
         PressDiagnosis {
             diagnosis,
-            zone_mse: [self.observed.zone_mse(&[]), self.observed.zone_mse(acting)],
+            zone_mse: [self.found.zone_mse, self.observed.zone_mse(&self.found.model.acting)],
             frame_mse: errors.before.iter().copied().zip(errors.after.iter().copied()).collect(),
-            acting: self.found.model.acting,
+            acting: self.found.acting(),
             trials: self.found.trials,
         }
     }
@@ -116,8 +116,29 @@ impl Answer<'_> {
                 (self.found.gains.get(e).copied().unwrap_or(0.0), named)
             })
             .collect();
+        list.extend(self.scatter());
         list.sort_by(|a, b| b.1.weight.total_cmp(&a.1.weight).then(b.0.total_cmp(&a.0)));
         list.into_iter().map(|(_, named)| named).collect()
+    }
+
+    /// Gains that differ from press to press, with what they took off.
+    fn scatter(&self) -> Option<(f64, NamedEffect)> {
+        let acting = self.found.scatter.named.as_ref()?;
+        let values = acting.values.iter().zip(&self.found.scatter.intervals);
+        let estimates = values.map(|(&value, &(low90, high90))| (value, low90, high90));
+        let parameters = acting.spec.parameters.iter().zip(estimates).map(|(p, (value, low90, high90))| {
+            (p.name.to_string(), ParameterEstimate { value, low90, high90, unit: p.unit.into() })
+        });
+        let named = NamedEffect {
+            name: acting.spec.id.into(),
+            part: None,
+            separate_by: None,
+            class: vec![acting.spec.id.into()],
+            weight: 0.95,
+            parameters: parameters.collect(),
+            indistinguishable_from: Vec::new(),
+        };
+        Some((self.found.scatter.trial.as_ref().map_or(0.0, |trial| trial.gain), named))
     }
 
     /// Shares of the evidence: an effect, and its rivals.
@@ -173,11 +194,13 @@ impl Answer<'_> {
         let predictor = self.observed.predictor;
         let before = self.observed.for_each(n, |i| predictor.frame_mse(i, &[]));
         let model = &self.found.model;
+        let scatter = &self.found.scatter.named;
         let held_out = |folds: &[usize]| {
-            if model.acting.is_empty() {
+            if model.acting.is_empty() && scatter.is_none() {
                 return before.clone();
             }
-            let by_fold = model.by_fold(&self.found.design.weights, folds);
+            let mut by_fold = model.by_fold(&self.found.design.weights, folds);
+            by_fold.iter_mut().for_each(|acting| acting.extend(scatter.clone()));
             self.observed.for_each(n, |i| predictor.frame_mse(i, &by_fold[folds[i]]))
         };
         let after = held_out(&self.found.design.folds);

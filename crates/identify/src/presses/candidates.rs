@@ -1,7 +1,7 @@
 //! The effects of the library that presses can show, as candidates.
 
 use crate::FreeParameter;
-use gripgen_twin::effects::{EffectSpec, LIBRARY, PressFit};
+use gripgen_twin::effects::{EffectSpec, LIBRARY, PressFit, PressNeeds};
 
 /// Effects that presses can show, with how they are fitted.
 pub(super) fn press_effects() -> impl Iterator<Item = (&'static EffectSpec, PressFit)> {
@@ -20,7 +20,8 @@ pub(super) fn tried(spec: &EffectSpec) -> Option<usize> {
 
 /// Positions of the parameters that are fitted.
 pub(super) fn fitted(spec: &EffectSpec) -> Vec<usize> {
-    (0..spec.parameters.len()).filter(|&j| tried(spec) != Some(j)).collect()
+    let scatters = spec.presses.is_some_and(|fit| fit.scatters);
+    (0..spec.parameters.len()).filter(|&j| !scatters && tried(spec) != Some(j)).collect()
 }
 
 /// A fitted parameter with its start; `px_mm`: side of a pixel on the gel.
@@ -30,7 +31,8 @@ pub(super) fn free_parameter(spec: &EffectSpec, j: usize, px_mm: f64) -> FreePar
     FreeParameter { name: p.name.into(), start, bounds: p.bounds, scale }
 }
 
-/// The candidates that presses can speak of; some show only where the contacts were marked.
-pub(super) fn candidates(marked: bool) -> Vec<&'static EffectSpec> {
-    press_effects().filter(|(_, fit)| marked || !fit.needs_marks).map(|(spec, _)| spec).collect()
+/// The candidates that are fitted, of those that presses can speak of.
+pub(super) fn candidates(known: &[PressNeeds]) -> Vec<&'static EffectSpec> {
+    let speaks = |fit: &PressFit| fit.needs == PressNeeds::Nothing || known.contains(&fit.needs);
+    press_effects().filter(|(_, fit)| !fit.scatters && speaks(fit)).map(|(spec, _)| spec).collect()
 }

@@ -1,6 +1,6 @@
 //! Sets of effects whose parameters are fitted together, as moments of the presses.
 
-use super::candidates::{fitted, free_parameter};
+use super::candidates::free_parameter;
 use super::observed::Observed;
 use super::predict::ActingEffect;
 use crate::{FreeParameter, GroupMoments, GroupedModel};
@@ -19,7 +19,7 @@ impl<'a> NamedModel<'a> {
         let mut free = Vec::new();
         let mut parameters = Vec::new();
         for (e, one) in acting.iter().enumerate() {
-            for j in fitted(one.spec) {
+            for j in one.free() {
                 free.push((e, j));
                 let start = one.values[j];
                 parameters
@@ -112,14 +112,55 @@ fn moments_of(
     base: &[[f32; 3]],
     slopes: &[&Vec<[f32; 3]>],
 ) -> GroupMoments {
+    let off = |k: usize, c: usize| f64::from(base[k][c] - observed.pixels[press].measured[k][c]);
+    moments_from(observed, press, slopes.len(), off, |k, c, row| {
+        row.iter_mut().zip(slopes).for_each(|(r, s)| *r = f64::from(s[k][c]));
+    })
+}
+
+/// Moments of a press from what its levels are `off` by at a pixel and channel, and the derivatives of them by `n` parameters,
+/// which `fill` writes. Where presses have gains of their own, those are taken out of both and stand beside.
+pub(super) fn moments_from(
+    observed: &Observed<'_>,
+    press: usize,
+    n: usize,
+    off: impl Fn(usize, usize) -> f64,
+    fill: impl Fn(usize, usize, &mut [f64]),
+) -> GroupMoments {
     let weights = observed.pixel_weights(press);
-    let mut moments = GroupMoments::zero(slopes.len());
-    let mut row = vec![0.0; slopes.len()];
-    for (k, measured) in observed.pixels[press].measured.iter().enumerate() {
-        for c in 0..3 {
-            row.iter_mut().zip(slopes).for_each(|(r, s)| *r = f64::from(s[k][c]));
-            moments.add(f64::from(base[k][c] - measured[c]), &row, weights[k]);
+    let gain_weight = observed.gain_weight(press);
+    let mut moments = GroupMoments::zero(n);
+    let mut row = vec![0.0; n];
+    if gain_weight == 0.0 {
+        for (k, weight) in weights.iter().enumerate() {
+            for c in 0..3 {
+                fill(k, c, &mut row);
+                moments.add(off(k, c), &row, *weight);
+            }
         }
+        moments.finish();
+        return moments;
+    }
+    // [pixel][channel] x n derivatives.
+    let mut rows = vec![0.0; 3 * weights.len() * n];
+    for (i, row) in rows.chunks_exact_mut(n.max(1)).enumerate() {
+        fill(i / 3, i % 3, row);
+    }
+    let gain = observed.gain_of(press, &off);
+    let gains: Vec<[f64; 3]> =
+        (0..n).map(|j| observed.gain_of(press, |k, c| rows[(3 * k + c) * n + j])).collect();
+    for (k, weight) in weights.iter().enumerate() {
+        let level = observed.gained(press, k, [1.0; 3]);
+        for c in 0..3 {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value = rows[(3 * k + c) * n + j] - gains[j][c] * level[c];
+            }
+            moments.add(off(k, c) - gain[c] * level[c], &row, *weight);
+        }
+    }
+    for c in 0..3 {
+        row.iter_mut().zip(&gains).for_each(|(r, g)| *r = g[c]);
+        moments.add(gain[c], &row, gain_weight);
     }
     moments.finish();
     moments
@@ -137,11 +178,9 @@ impl GroupedModel for NamedModel<'_> {
         let acting = self.at(values);
         self.observed.for_each(self.observed.count(), |i| {
             let levels = self.observed.levels(i, &acting);
-            let weights = self.observed.pixel_weights(i);
-            let square = |((l, m), w): ((&[f32; 3], &[f32; 3]), f64)| {
-                w * (0..3).map(|c| f64::from(l[c] - m[c]).powi(2)).sum::<f64>()
-            };
-            levels.iter().zip(&self.observed.pixels[i].measured).zip(weights).map(square).sum()
+            let measured = &self.observed.pixels[i].measured;
+            let off = |k: usize, c: usize| f64::from(levels[k][c] - measured[k][c]);
+            moments_from(self.observed, i, 0, off, |_, _, _| {}).cost
         })
     }
 }

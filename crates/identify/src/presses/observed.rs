@@ -9,14 +9,83 @@ pub(super) struct Observed<'a> {
     /// Of each press.
     pub(super) pixels: Vec<PressPixels>,
     /// Mean square that counts as 1, of each zone.
-    zone_scale: [f64; PRESS_ZONES],
+    zone_scale: [f64; ZONES],
+    /// Where each press has gains of its own: the levels at its pixels without effects, on which they act.
+    gains: Option<Vec<Vec<[f32; 3]>>>,
 }
+
+/// The zones of the pixels, and the gains of the press as a further one.
+const ZONES: usize = PRESS_ZONES + 1;
+
+/// Smallest scatter of gains that counts as 1.
+const MIN_GAIN: f64 = 1e-3;
 
 impl<'a> Observed<'a> {
     /// All zones count by their own scatter after [`Observed::rescale`] only.
     pub(super) fn new(predictor: &'a dyn PredictPresses) -> Self {
         let pixels = (0..predictor.circumstances().len()).map(|i| predictor.pixels(i)).collect();
-        Self { predictor, pixels, zone_scale: [1.0; PRESS_ZONES] }
+        Self { predictor, pixels, zone_scale: [1.0; ZONES], gains: None }
+    }
+
+    /// From here on each press has gains of its own: pixels are compared without them, and the gains with those that a model
+    /// predicts, as a zone of their own.
+    pub(super) fn divide_gains(&mut self) {
+        self.gains = Some(self.for_each(self.count(), |i| self.levels(i, &[])));
+    }
+
+    /// As before [`Observed::divide_gains`].
+    pub(super) fn keep_gains(&mut self) {
+        self.gains = None;
+    }
+
+    /// The gain of each channel that a change of the levels at the pixels of a press amounts to, as a share; 0 where nothing is
+    /// away from the contact, or presses have no gains of their own.
+    pub(super) fn gain_of(&self, press: usize, change: impl Fn(usize, usize) -> f64) -> [f64; 3] {
+        self.gain_in(press, |_| true, change)
+    }
+
+    /// The same over a part of the pixels.
+    pub(super) fn gain_in(
+        &self,
+        press: usize,
+        within: impl Fn(usize) -> bool,
+        change: impl Fn(usize, usize) -> f64,
+    ) -> [f64; 3] {
+        let Some(levels) = self.gains.as_ref().map(|levels| &levels[press]) else { return [0.0; 3] };
+        let (mut products, mut squares) = ([0.0; 3], [0.0; 3]);
+        let away = |k: usize| away(self.pixels[press].zones[k]) && within(k);
+        for (k, level) in levels.iter().enumerate().filter(|(k, _)| away(*k)) {
+            for c in 0..3 {
+                let level = f64::from(level[c]);
+                products[c] += level * change(k, c);
+                squares[c] += level * level;
+            }
+        }
+        [0, 1, 2].map(|c| if squares[c] > 0.0 { products[c] / squares[c] } else { 0.0 })
+    }
+
+    /// The part of a change at a pixel that is a gain of its press.
+    pub(super) fn gained(&self, press: usize, pixel: usize, gain: [f64; 3]) -> [f64; 3] {
+        match &self.gains {
+            Some(levels) => [0, 1, 2].map(|c| gain[c] * f64::from(levels[press][pixel][c])),
+            None => [0.0; 3],
+        }
+    }
+
+    /// Weight of each of the three gains of a press; 0 where presses have none of their own.
+    pub(super) fn gain_weight(&self, press: usize) -> f64 {
+        if self.gains.is_none() {
+            return 0.0;
+        }
+        1.0 / (self.zones_there(press) * 3.0 * self.zone_scale[PRESS_ZONES])
+    }
+
+    /// Zones that a press has.
+    fn zones_there(&self, press: usize) -> f64 {
+        let mut there = [false; PRESS_ZONES];
+        self.pixels[press].zones.iter().for_each(|z| there[place(*z)] = true);
+        let gains = usize::from(self.gains.is_some());
+        (there.iter().filter(|t| **t).count() + gains) as f64
     }
 
     /// How many presses there are.
@@ -50,24 +119,39 @@ impl<'a> Observed<'a> {
         for (z, scale) in self.zone_scale.iter_mut().enumerate() {
             let mut list: Vec<f64> = squares.iter().map(|s| s[z]).filter(|s| s.is_finite()).collect();
             list.sort_by(f64::total_cmp);
-            *scale = list.get(list.len() / 2).copied().unwrap_or(1.0).max(noise).max(0.02);
+            let least = if z < PRESS_ZONES { noise.max(0.02) } else { MIN_GAIN * MIN_GAIN };
+            *scale = list.get(list.len() / 2).copied().unwrap_or(1.0).max(least);
         }
     }
 
     /// Mean squared residual in each zone of each press; NaN where a zone is empty.
-    fn zone_squares(&self, model: &[ActingEffect]) -> Vec<[f64; PRESS_ZONES]> {
+    fn zone_squares(&self, model: &[ActingEffect]) -> Vec<[f64; ZONES]> {
         self.for_each(self.count(), |i| {
             let levels = self.levels(i, model);
-            let (mut sums, mut counts) = ([0.0; PRESS_ZONES], [0.0; PRESS_ZONES]);
+            let (mut sums, mut counts) = ([0.0; ZONES], [0.0; ZONES]);
             let pixels = &self.pixels[i];
-            for ((zone, level), measured) in pixels.zones.iter().zip(&levels).zip(&pixels.measured) {
-                for c in 0..3 {
-                    sums[place(*zone)] += f64::from(level[c] - measured[c]).powi(2);
+            let off = |k: usize, c: usize| f64::from(levels[k][c] - pixels.measured[k][c]);
+            let gain = self.gain_of(i, off);
+            for (k, zone) in pixels.zones.iter().enumerate() {
+                let gained = self.gained(i, k, gain);
+                for (c, gained) in gained.iter().enumerate() {
+                    sums[place(*zone)] += (off(k, c) - gained).powi(2);
                     counts[place(*zone)] += 1.0;
                 }
             }
+            (sums[PRESS_ZONES], counts[PRESS_ZONES]) = (gain.iter().map(|g| g * g).sum(), 3.0);
             std::array::from_fn(|z| sums[z] / counts[z])
         })
+    }
+
+    /// Cost of the pixels of each press under a model, all zones alike.
+    pub(super) fn pixel_costs(&self, model: &[ActingEffect]) -> Vec<f64> {
+        let of_press = |squares: [f64; ZONES]| {
+            let there = squares.iter().zip(&self.zone_scale).take(PRESS_ZONES).filter(|(s, _)| s.is_finite());
+            let (n, sum) = there.fold((0.0, 0.0), |(n, sum), (s, scale)| (n + 1.0, sum + s / scale));
+            sum / f64::max(n, 1.0)
+        };
+        self.zone_squares(model).into_iter().map(of_press).collect()
     }
 
     /// Mean squared residual in each zone over the presses that have it; 0 where none has.
@@ -84,10 +168,15 @@ impl<'a> Observed<'a> {
         let zones = &self.pixels[press].zones;
         let mut counts = [0.0; PRESS_ZONES];
         zones.iter().for_each(|z| counts[place(*z)] += 3.0);
-        let there = counts.iter().filter(|c| **c > 0.0).count() as f64;
+        let there = self.zones_there(press);
         let weight = |z: &u8| 1.0 / (there * counts[place(*z)] * self.zone_scale[place(*z)]);
         zones.iter().map(weight).collect()
     }
+}
+
+/// Whether a zone lies away from the contact: the last one.
+fn away(zone: u8) -> bool {
+    place(zone) == PRESS_ZONES - 1
 }
 
 /// Position of a zone in lists of them.

@@ -3,7 +3,8 @@
 use super::candidates::press_effects;
 use super::observed::Observed;
 use super::predict::ActingEffect;
-use super::search::{Found, MATERIAL, SURE};
+use super::score::{MATERIAL, SURE};
+use super::search::Found;
 use crate::Detectable;
 use gripgen_twin::effects::EffectSpec;
 use std::collections::BTreeMap;
@@ -14,7 +15,7 @@ pub(super) fn would_have_seen(observed: &Observed<'_>, found: &Found) -> BTreeMa
     let base = found.cost;
     let mut sizes = BTreeMap::new();
     for (spec, fit) in press_effects() {
-        if found.model.acting.iter().any(|a| a.spec == spec) {
+        if fit.scatters || found.model.acting.iter().any(|a| a.spec == spec) {
             continue;
         }
         let scatter = found.trials.iter().rev().find(|t| t.name == spec.id).map_or(0.0, |t| t.standard_error);
@@ -46,7 +47,7 @@ fn size_of(
             let i = some[k];
             let mut acting = named.to_vec();
             let plain = observed.levels(i, &acting);
-            acting.push(ActingEffect { spec, values: values.clone() });
+            acting.push(ActingEffect { spec, values: values.clone(), fitted: 0 });
             let levels = observed.levels(i, &acting);
             let weights = observed.pixel_weights(i);
             let one = |((a, b), w): ((&[f32; 3], &[f32; 3]), f64)| {

@@ -14,16 +14,25 @@ pub struct ActingEffect {
     pub spec: &'static EffectSpec,
     /// Values in the order of the spec.
     pub values: Vec<f64>,
+    /// How many of its leading parameters are fitted; the others stay neutral, but for the one that is tried.
+    pub fitted: usize,
 }
 
 impl ActingEffect {
     /// The effect with its values at the start of a fit; `px_mm`: side of a pixel on the gel.
     pub(super) fn start(spec: &'static EffectSpec, px_mm: f64) -> Self {
         let mut values: Vec<f64> = spec.parameters.iter().map(|p| p.neutral).collect();
-        for j in fitted(spec) {
+        let orders = spec.presses.map_or(&[] as &[usize], |fit| fit.orders);
+        let first = orders.first().copied().unwrap_or(values.len());
+        for j in fitted(spec).into_iter().filter(|&j| j < first) {
             values[j] = free_parameter(spec, j, px_mm).start;
         }
-        Self { spec, values }
+        Self { spec, values, fitted: first }
+    }
+
+    /// Positions of the parameters that are fitted.
+    pub(super) fn free(&self) -> impl Iterator<Item = usize> {
+        fitted(self.spec).into_iter().filter(|&j| j < self.fitted)
     }
 }
 

@@ -11,11 +11,21 @@ use crate::{
 use gripgen_twin::effects::EffectSpec;
 use gripgen_twin::random::splitmix64;
 
+/// A gain of less than this share of the error is no effect, however surely it is there: every sensor file misfits its
+/// own presses by some of everything.
+pub(super) const MATERIAL: f64 = 0.02;
+
+/// Gains are this many standard errors above 0 at least.
+pub(super) const SURE: f64 = 3.0;
+
 /// Steps of a fit at most.
 const MAX_STEPS: usize = 4;
 
 /// Presses before and after a change of background at least.
 const MIN_PRESSES_PER_SIDE: usize = 2;
+
+/// Finer terms of an effect lower the error by this share at least.
+const FINER: f64 = 0.01;
 
 /// Presses, how much each counts, and which are held out together.
 #[derive(Debug, Clone)]
@@ -59,6 +69,23 @@ impl Design {
 /// Random bits that are a function of `i` alone.
 pub(super) fn hash(i: u64) -> u64 {
     splitmix64(&mut i.wrapping_add(6).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+}
+
+/// How one candidate did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressTrial {
+    /// Round of the search, from 0 on; curves without a name come in a round of their own after the others.
+    pub round: usize,
+    /// Id of the effect, or `curve in` with the name of the covariate.
+    pub name: String,
+    /// What the mean held-out cost falls by; 1 is what the zones had before this round.
+    pub gain: f64,
+    /// Standard error of the gain over the presses.
+    pub standard_error: f64,
+    /// Mean held-out cost with the candidate.
+    pub cost: f64,
+    /// Fitted values, for people; at most five.
+    pub values: String,
 }
 
 /// A set of effects, fitted and scored.
@@ -123,7 +150,7 @@ impl<'a> Base<'a> {
 
 /// The accepted effects with one more, which alone is fitted; the others follow to first order. `least`: a gain that
 /// would count; a candidate whose first step does not show it is not drawn for a fit. A change of background is tried
-/// from every press on.
+/// from every press on, and with finer terms as long as they predict better.
 pub(super) fn with(
     observed: &Observed<'_>,
     design: &Design,
@@ -139,6 +166,31 @@ pub(super) fn with(
             last.values[at] = place;
         }
     }
+    let mut best = fitted_behind(observed, design, base, acting, least);
+    for &order in spec.presses.iter().flat_map(|fit| fit.orders).skip(1) {
+        let mut acting = best.acting.clone();
+        if let Some(last) = acting.last_mut() {
+            last.fitted = order;
+        }
+        let finer = fitted_behind(observed, design, base, acting, least);
+        let (gain, error) = design.mean(&differences(&best.held_out, &finer.held_out));
+        if gain < FINER * design.mean(&best.held_out).0 || gain < error {
+            break;
+        }
+        best = finer;
+    }
+    best
+}
+
+/// The last of some effects fitted, those before it following to first order.
+fn fitted_behind(
+    observed: &Observed<'_>,
+    design: &Design,
+    base: &Base<'_>,
+    acting: Vec<ActingEffect>,
+    least: f64,
+) -> Scored {
+    let is_drawn = acting.last().is_some_and(|last| is_drawn(last.spec));
     let model = NamedModel::last(observed, acting);
     let (free, parameters) = model.behind(&base.head);
     let whole = |tail: &[f64]| -> GroupedFit {
@@ -152,7 +204,7 @@ pub(super) fn with(
     let promise = design.mean(&differences(base.held_out, &reached)).0;
     let known = base.head.values().count();
     let mut values: Vec<f64> = (known..fit.values.len()).map(|k| fit.values[k] + step[k]).collect();
-    if !is_drawn(spec) || promise > least {
+    if !is_drawn || promise > least {
         let found = fit_grouped(&model.parameters, MAX_STEPS, &design.weights, &model);
         fit = whole(&found.values);
         values = found.values;

@@ -81,6 +81,7 @@ impl PredictPresses for Camera {
             contact_area_m2: 0.0,
             pull_rate_n_per_s: 0.0,
             covariates,
+            grip: (0, 0),
         };
         let mut optics = OpticsState::default();
         for effect in acting {
@@ -127,7 +128,8 @@ fn data(covariates: Vec<PressCovariate>) -> PressData {
         sha256: "0".into(),
         noise_mse: 1.0,
         covariates: all,
-        marked: true,
+        known: vec![PressNeeds::Marks],
+        press_gain_sd: None,
     }
 }
 

@@ -3,7 +3,7 @@
 //! All of them are linear: columns are a term of the field at a pixel times a term of the curve at a press. The moments
 //! of the field's terms in each press therefore give those of every curve.
 
-use super::model::NamedModel;
+use super::model::{NamedModel, moments_from};
 use super::observed::Observed;
 use super::predict::PressPixels;
 use super::score::{Design, Scored};
@@ -71,40 +71,33 @@ impl Fields {
             let (levels, slopes) = model.derivatives(i, &scored.fit.values);
             let contact = observed.predictor.contact_levels(i, &model.acting);
             let PressPixels { measured, places, .. } = &observed.pixels[i];
-            let weights = observed.pixel_weights(i);
-            let mut moments = GroupMoments::zero(k + 3 * TERMS);
-            let mut row = vec![0.0; k + 3 * TERMS];
-            for (p, measured) in measured.iter().enumerate() {
+            let off = |p: usize, c: usize| f64::from(levels[p][c] - measured[p][c]);
+            moments_from(observed, i, k + 3 * TERMS, off, |p, c, row| {
                 let [u, v] = places[p];
-                for c in 0..3 {
-                    row[k..].fill(0.0);
-                    row[..k].iter_mut().zip(&slopes).for_each(|(r, s)| *r = f64::from(s[p][c]));
-                    let level = |d: usize| f64::from(levels[p][(c + d) % 3]) / 64.0;
-                    let change = |d: usize| f64::from(contact[p][(c + d) % 3]) / 16.0;
-                    let terms = [
-                        1.0,
-                        u,
-                        v,
-                        u * u,
-                        u * v,
-                        v * v,
-                        level(0),
-                        change(0),
-                        level(1),
-                        level(2),
-                        u * u * u,
-                        u * u * v,
-                        u * v * v,
-                        v * v * v,
-                        change(1),
-                        change(2),
-                    ];
-                    row[k + c * TERMS..k + (c + 1) * TERMS].copy_from_slice(&terms);
-                    moments.add(f64::from(levels[p][c] - measured[c]), &row, weights[p]);
-                }
-            }
-            moments.finish();
-            moments
+                row[k..].fill(0.0);
+                row[..k].iter_mut().zip(&slopes).for_each(|(r, s)| *r = f64::from(s[p][c]));
+                let level = |d: usize| f64::from(levels[p][(c + d) % 3]) / 64.0;
+                let change = |d: usize| f64::from(contact[p][(c + d) % 3]) / 16.0;
+                let terms = [
+                    1.0,
+                    u,
+                    v,
+                    u * u,
+                    u * v,
+                    v * v,
+                    level(0),
+                    change(0),
+                    level(1),
+                    level(2),
+                    u * u * u,
+                    u * u * v,
+                    u * v * v,
+                    v * v * v,
+                    change(1),
+                    change(2),
+                ];
+                row[k + c * TERMS..k + (c + 1) * TERMS].copy_from_slice(&terms);
+            })
         });
         Self { moments, named: scored.parameters.clone(), values: scored.fit.values.clone() }
     }

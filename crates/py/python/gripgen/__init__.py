@@ -16,6 +16,7 @@ from ._core import ConfigError, DataError, GripgenError, __version__
 from .dataset import Batch, Dataset, Sample, load
 from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, diagnose
 from .policies import Staircase
+from .rendering import Rendered, render
 from .simulation import Pull, Sim
 from .sweeps import SweepSummary, sweep
 
@@ -29,6 +30,7 @@ __all__ = [
     "Diagnosis",
     "GripgenError",
     "Pull",
+    "Rendered",
     "Sample",
     "Sim",
     "Staircase",
@@ -38,6 +40,7 @@ __all__ = [
     "compare",
     "diagnose",
     "load",
+    "render",
     "sweep",
 ]
 

@@ -17,6 +17,7 @@ __all__ = [
     "__version__",
     "contact_sheet_shards",
     "prepare_run",
+    "render",
     "run_cli",
     "run_verb",
     "sweep",
@@ -94,6 +95,15 @@ class Pulls:
 
 def run_cli(arguments: Sequence[str]) -> int: ...
 def run_verb(arguments: Sequence[str]) -> int: ...
+def render(
+    source: str | os.PathLike[str] | NDArray[np.float64],
+    sensor: str,
+    depth_mm: float | None = None,
+    x_px: float | None = None,
+    y_px: float | None = None,
+    rotation_deg: float = 0.0,
+    scale_mm_per_unit: float = 1.0,
+) -> dict[str, Any]: ...
 def sweep(
     config: str | None,
     out: str | os.PathLike[str],

@@ -94,6 +94,7 @@ pub(super) fn sensor(width_px: usize, height_px: usize, colour: ColourModel) -> 
         markers: None,
         pyramid: None,
         ball_m: None,
+        press_gain_sd: None,
     }
 }
 

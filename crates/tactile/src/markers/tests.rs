@@ -185,6 +185,7 @@ fn markers_of_a_sensor_file_are_read_and_moved() {
         shadow: None,
         pyramid: None,
         ball_m: None,
+        press_gain_sd: None,
     };
     let bytes = sensor.to_npz().unwrap().unwrap();
     let again = Sensor::from_npz(&bytes, None, None).unwrap();

@@ -1,5 +1,6 @@
 //! Light and camera on the whole frame, with and without contact.
 
+use super::pattern::{FinerPattern, mean_square, normalised};
 use crate::grid::{Grid, Plane};
 use gripgen_twin::{BACKGROUND_TERMS, OpticsState};
 
@@ -16,8 +17,10 @@ pub(super) fn apply(optics: &OpticsState, rest: &[Vec<f32>; 3], change: &mut [Pl
         let pattern = &optics.background[channel];
         let has_pattern = pattern.iter().any(|c| *c != 0.0);
         let (w, h) = (plane.width, plane.height);
+        let finer = FinerPattern::new(&optics.finer_background[channel], w, h);
         for y in 0..h {
             let [c0, c1, c2] = row_polynomial(pattern, w, h, y).map(|c| c as f32);
+            let finer_row = finer.as_ref().map(|finer| finer.row(y));
             for x in 0..w {
                 let at = y * w + x;
                 let still = rest[channel][at];
@@ -25,6 +28,9 @@ pub(super) fn apply(optics: &OpticsState, rest: &[Vec<f32>; 3], change: &mut [Pl
                 if has_pattern {
                     let u = normalised(x, w) as f32;
                     seen += c0 + u * (c1 + u * c2);
+                }
+                if let (Some(finer), Some(row)) = (&finer, &finer_row) {
+                    seen += finer.at(row, x);
                 }
                 if let Some(response) = &response {
                     seen = response.of(seen);
@@ -44,6 +50,9 @@ pub(crate) fn level_at(optics: &OpticsState, grid: &Grid, pixel: usize, channel:
         let [c0, c1, c2] = row_polynomial(pattern, w, h, pixel / w).map(|c| c as f32);
         let u = normalised(pixel % w, w) as f32;
         seen += c0 + u * (c1 + u * c2);
+    }
+    if let Some(finer) = FinerPattern::new(&optics.finer_background[channel], w, h) {
+        seen += finer.at(&finer.row(pixel / w), pixel % w);
     }
     if optics.exposure_gain != 1.0 || optics.gamma != 1.0 {
         let light = (optics.exposure_gain * f64::from(seen) / 255.0).max(0.0);
@@ -89,17 +98,6 @@ impl Response {
     }
 }
 
-/// Position of pixel `i` of `n`, from -1 at one edge of the frame to 1 at the other.
-fn normalised(i: usize, n: usize) -> f64 {
-    (2 * i + 1) as f64 / n as f64 - 1.0
-}
-
-/// Mean of the square of [`normalised`] over `n` pixels.
-fn mean_square(n: usize) -> f64 {
-    let n = n as f64;
-    (1.0 - 1.0 / (n * n)) / 3.0
-}
-
 /// A pattern in one row: coefficients of 1, u and u^2.
 fn row_polynomial(pattern: &[f64; BACKGROUND_TERMS], width: usize, height: usize, y: usize) -> [f64; 3] {
     let [u, v, uu, uv, vv] = *pattern;
@@ -111,14 +109,18 @@ fn row_polynomial(pattern: &[f64; BACKGROUND_TERMS], width: usize, height: usize
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gripgen_twin::FINER_TERMS;
 
     /// Terms have mean 0, and a linear one goes from -1 to 1.
     #[test]
     fn patterns_have_mean_zero_whatever_the_size_of_the_frame() {
         for (w, h) in [(320, 240), (17, 16), (64, 1)] {
-            for term in 0..BACKGROUND_TERMS {
+            for term in 0..BACKGROUND_TERMS + FINER_TERMS.len() {
                 let mut optics = OpticsState::default();
-                optics.background[1][term] = 10.0;
+                match term.checked_sub(BACKGROUND_TERMS) {
+                    None => optics.background[1][term] = 10.0,
+                    Some(finer) => optics.finer_background[1][finer] = 10.0,
+                }
                 let rest = [vec![90.0; w * h], vec![90.0; w * h], vec![90.0; w * h]];
                 let mut change = [0, 1, 2].map(|_| Plane::filled(w, h, 0.0));
                 apply(&optics, &rest, &mut change);

@@ -15,13 +15,12 @@ const SERIES: [Scene; 4] = [
 ];
 
 /// Effects with a value of middling size for each parameter, and where a fit of them starts.
-const CASES: [(&str, &[f64], &[f64]); 10] = [
+///
+/// What stands at its neutral value in the second column is not fitted: the place of a step is found by trying, and two
+/// of the finer terms of a background stand for all.
+const CASES: [(&str, &[f64], &[f64]); 13] = [
     ("light_drift", &[0.02, -0.015, 0.03], &[0.0; 3]),
-    (
-        "background_change",
-        &[3.0, -2.0, 4.0, 1.5, -3.0, -2.5, 3.0, 2.0, -2.0, 1.5, 2.0, 2.5, -3.0, 2.0, 3.0, 0.0],
-        &[0.0; 16],
-    ),
+    ("background_change", &PATTERN, &[0.0; PATTERN.len()]),
     ("misregistration", &[0.25, -0.15, 2.0, 1.03, 0.04], &[0.0, 0.0, 0.0, 1.0, 0.0]),
     ("exposure", &[0.95, 1.06], &[1.0, 1.0]),
     ("defocus", &[0.25], &[0.1]),
@@ -30,7 +29,24 @@ const CASES: [(&str, &[f64], &[f64]); 10] = [
     ("rest_offset", &[2.0, -3.0, 1.5], &[0.0; 3]),
     ("cast_shadow", &[0.3, 15.0], &[0.1, 25.0]),
     ("gel_dome", &[0.8], &[0.0]),
+    ("press_gain", &[0.04, 0.02, 0.03], &[0.0; 3]),
+    ("press_depth", &[0.8, 0.06], &[1.0, 0.0]),
+    ("edge_rounding", &[0.7], &[0.5]),
 ];
+
+/// All coarse terms of a background and one each of the fourth and the sixth degree.
+const PATTERN: [f64; 82] = {
+    let coarse = [3.0, -2.0, 4.0, 1.5, -3.0, -2.5, 3.0, 2.0, -2.0, 1.5, 2.0, 2.5, -3.0, 2.0, 3.0];
+    let mut all = [0.0; 82];
+    let mut i = 0;
+    while i < coarse.len() {
+        all[i] = coarse[i];
+        i += 1;
+    }
+    all[30] = 2.5;
+    all[60] = -3.0;
+    all
+};
 
 /// The images of the series, as one vector.
 fn images(rig: &TestSensor, scenes: &[Scene], id: &str, parameters: &[f64]) -> DVector<f64> {
@@ -43,9 +59,10 @@ fn without(rig: &TestSensor, scenes: &[Scene]) -> DVector<f64> {
     DVector::from_iterator(scenes.len() * 3 * GRID.len(), all.flat_map(|plane| plane.values).map(f64::from))
 }
 
-/// Parameters that are fitted: the place of a step is found by trying.
+/// Parameters of an effect that are fitted.
 fn fitted(spec: &EffectSpec) -> Vec<usize> {
-    (0..spec.parameters.len()).filter(|&j| spec.parameters[j].name != "at_pull_index").collect()
+    let (_, size, _) = CASES.into_iter().find(|(id, ..)| *id == spec.id).expect("a case");
+    (0..spec.parameters.len()).filter(|&j| size[j] != spec.parameters[j].neutral).collect()
 }
 
 /// Derivatives of the images by the fitted parameters, from steps of a hundredth of a bound to both sides.
@@ -147,9 +164,8 @@ fn columns(rig: &TestSensor, scenes: &[Scene]) -> (DMatrix<f64>, Vec<Vec<usize>>
     let mut whose = Vec::new();
     for (id, size, _) in CASES {
         let parameters = spec(id).parameters;
-        let moved = fitted(spec(id)).into_iter().filter(|&j| size[j] != parameters[j].neutral);
         let mut own = Vec::new();
-        for j in moved {
+        for j in fitted(spec(id)) {
             let mut one: Vec<f64> = parameters.iter().map(|p| p.neutral).collect();
             if id == "cast_shadow" {
                 // The elevation of a light without shadow says nothing.

@@ -79,6 +79,7 @@ pub(super) fn rig() -> TestSensor {
         shadow: None,
         pyramid: None,
         ball_m: None,
+        press_gain_sd: None,
     };
     let gel = Gel {
         model: gripgen_twin::config::GelModel::Pyramid,
@@ -120,7 +121,10 @@ impl TestSensor {
         });
         let heights = Plane { width: GRID.width_px, height: GRID.height_px, values: values.collect() };
         let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n: IMPRINT_M3_PER_N };
-        Some(indent(&added(heights, dome(&GRID, optics).as_ref()), &GRID, &gel, scene.force_n).unwrap())
+        let renderer = self.renderer();
+        let heights = added(renderer.rounded_as_seen(heights, optics), dome(&GRID, optics).as_ref());
+        let imprint = indent(&heights, &GRID, &gel, scene.force_n).unwrap();
+        Some(if optics.changes_depth() { renderer.at_depth(imprint, &heights, optics) } else { imprint })
     }
 
     /// What the camera sees of a scene, minus the rest frame.
@@ -154,6 +158,7 @@ pub(super) fn state(id: &str, parameters: &[f64], scene: &Scene, jaw: Jaw) -> Op
         contact_area_m2: 0.0,
         pull_rate_n_per_s: 10.0,
         covariates: &covariates,
+        grip: (0, scene.pull_index),
     };
     let mut state = OpticsState::default();
     spec(id).optics.expect("an optics effect")(parameters, &mut state, &at);

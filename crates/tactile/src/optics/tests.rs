@@ -110,7 +110,8 @@ fn light_drift_is_a_constant_ratio_that_grows_with_time() {
 #[test]
 fn background_change_is_one_pattern_whatever_touches_the_gel() {
     let rig = rig();
-    let mut parameters: Vec<f64> = (0..15).map(|i| 6.0 - f64::from(i)).collect();
+    let terms = spec("background_change").parameters.len() - 1;
+    let mut parameters: Vec<f64> = (0..terms).map(|i| 6.0 - (i % 13) as f64).collect();
     parameters.push(20.0);
     let from = |scene: Scene, pull_index| {
         rig.signature(&Scene { pull_index, ..scene }, "background_change", &parameters)

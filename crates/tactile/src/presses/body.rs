@@ -5,6 +5,7 @@ use super::compare::{gel_of, sink_in_fraction};
 use super::indenter::Indenter;
 use crate::gradient::gradient;
 use crate::grid::Plane;
+use crate::indent::Imprint;
 use crate::render::Renderer;
 use crate::sensor::Sensor;
 use crate::simd::SimdLevel;
@@ -26,12 +27,17 @@ pub struct RenderedBody {
 
 /// Presses a body in and looks at it.
 pub fn render_body(indenter: &Arc<Indenter>, sensor: &Sensor) -> RenderedBody {
-    let gel = gel_of(sensor);
-    let renderer = Renderer { sensor, gel: &gel, level: SimdLevel::best() };
     let contact = Contact { circle: indenter.circle(), travel_m: None, indenter: Some(Arc::clone(indenter)) };
     // No ball is looked at.
-    let imprint = contact.imprint(0.0, &sensor.grid, &sensor.gel_shape, sink_in_fraction(sensor));
-    let surface_px = renderer.surface(&imprint);
+    render_imprint(&contact.imprint(0.0, &sensor.grid, &sensor.gel_shape, sink_in_fraction(sensor)), sensor)
+}
+
+/// Looks at an imprint. One without any depth is the gel at rest.
+pub(super) fn render_imprint(imprint: &Imprint, sensor: &Sensor) -> RenderedBody {
+    let gel = gel_of(sensor);
+    let renderer = Renderer { sensor, gel: &gel, level: SimdLevel::best() };
+    let touched = imprint.depth_px.values.iter().any(|&d| d > 0.0);
+    let surface_px = renderer.surface(imprint);
     let (along_x, along_y) = gradient(&surface_px);
     let mut normals = [0, 1, 2].map(|_| Plane::filled(surface_px.width, surface_px.height, 0.0));
     for (pixel, (&gx, &gy)) in along_x.values.iter().zip(&along_y.values).enumerate() {
@@ -41,12 +47,12 @@ pub fn render_body(indenter: &Arc<Indenter>, sensor: &Sensor) -> RenderedBody {
             plane.values[pixel] = component;
         }
     }
-    let core_px = renderer.core_px(&imprint) as f32;
+    let core_px = renderer.core_px(imprint) as f32;
     let mm_per_px = (sensor.grid.metres_per_px * 1e3) as f32;
     let mut heights_mm = surface_px;
     heights_mm.values.iter_mut().for_each(|h| *h *= mm_per_px);
     RenderedBody {
-        image: renderer.image(Some(&imprint), None),
+        image: renderer.image(touched.then_some(imprint), None),
         heights_mm,
         normals,
         contact: imprint.depth_px.values.iter().map(|&d| d > core_px).collect(),

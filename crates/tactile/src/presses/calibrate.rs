@@ -11,9 +11,10 @@ mod tests;
 pub use ridge::Smoothness;
 
 use super::circle::{Seen, look, reference_frame};
-use super::compare::{CompareError, PressComparison, predict_contact, score_press};
-use super::mark::{self, MarkError};
-use super::{Circle, Contact, Press, PressSet};
+use super::compare::{CompareError, PressComparison, predict_taken, score_press};
+use super::gain::{gains, without_gains};
+use super::mark::{self, MarkError, Marked};
+use super::{Circle, PressSet};
 use crate::colour::regressor::{AROUND_FITTED, AROUND_HEIGHTS, SURROUNDINGS};
 use crate::colour::{ColourModel, Regressor, shade};
 use crate::gradient::gradient;
@@ -125,10 +126,10 @@ pub enum CalibrateError {
     Metric(#[from] MetricError),
 }
 
-/// A press with its checked contact.
-type Marked<'a> = (&'a Press, Contact);
-
 /// Calibrates a sensor, and says how well it predicts presses that it has not seen.
+///
+/// Where each press has a gain of its own (an automatic white balance), it is taken from the pixels away from the contact and
+/// divided out; of a press held out too, of which nothing else is looked at.
 ///
 /// Contacts that nobody marked are looked for.
 pub fn calibrate_presses(set: &PressSet, options: &CalibrateOptions) -> Result<Calibration, CalibrateError> {
@@ -151,9 +152,15 @@ fn calibrate_marked(
         .iter()
         .map(|p| Ok((p, mark::checked(p, set.ball_m, grid.metres_per_px)?)))
         .collect::<Result<Vec<Marked<'_>>, MarkError>>()?;
+    let gains = gains(&marked, set.rest.as_ref(), &grid);
+    let balanced = gains.as_ref().map(|gains| without_gains(set, gains));
+    let (as_taken, set) = (set, balanced.as_ref().unwrap_or(set));
+    let marked: Vec<Marked<'_>> =
+        set.presses.iter().zip(marked).map(|(press, (_, contact))| (press, contact)).collect();
     let (trusted, distrusted) = trusted(set, &marked)?;
     let gels = Gels::new(options.gel_shape.as_ref(), &marked, set.ball_m, grid);
-    let fit = Fit { set, grid, marked: &marked, gels: &gels };
+    let press_gain_sd = gains.as_ref().map(|gains| gains.sd);
+    let fit = Fit { set, grid, marked: &marked, gels: &gels, press_gain_sd };
 
     let usual = if marked.len() < FEW_PRESSES { marked.len() } else { 4 };
     let folds = options.folds.unwrap_or(usual).clamp(2, marked.len());
@@ -163,11 +170,11 @@ fn calibrate_marked(
         seen.retain(|&i| trusted[i]);
         let (sensor, _) = fit.fit(&seen)?;
         for i in unseen {
-            predicted[i] = Some(predict_contact(&marked[i].1, set.ball_m, &sensor));
+            predicted[i] = Some(predict_taken(&as_taken.presses[i], &marked[i].1, set.ball_m, &sensor));
         }
     }
     let predicted: Vec<TactileImage> = predicted.into_iter().flatten().collect();
-    let scored = set.presses.iter().zip(&predicted).map(|(press, image)| score_press(press, image));
+    let scored = as_taken.presses.iter().zip(&predicted).map(|(press, image)| score_press(press, image));
     let each = scored.collect::<Result<Vec<_>, MetricError>>()?;
     let held_out = PressComparison::from_each(each).ok_or(CompareError::Empty)?;
     let everything: Vec<usize> = (0..marked.len()).filter(|&i| trusted[i]).collect();
@@ -205,6 +212,7 @@ struct Fit<'a> {
     grid: Grid,
     marked: &'a [Marked<'a>],
     gels: &'a Gels<'a>,
+    press_gain_sd: Option<[f32; 3]>,
 }
 
 impl Fit<'_> {
@@ -235,6 +243,7 @@ impl Fit<'_> {
             gel_shape: candidate.gel.shape.clone(),
             pyramid: Some(candidate.gel.pyramid.clone()),
             ball_m: Some(self.set.ball_m),
+            press_gain_sd: self.press_gain_sd,
         };
         Ok((sensor, smoothness))
     }

@@ -1,5 +1,6 @@
 //! A sensor file against presses: predicted and real image of each.
 
+use super::gain::within_gain;
 use super::mark::{self, MarkError};
 use super::zone::{ZONES, Zone};
 use super::{Contact, Press, PressSet};
@@ -143,7 +144,8 @@ pub fn compare_presses(set: &PressSet, sensor: &Sensor) -> Result<PressCompariso
     PressComparison::from_each(each).ok_or(CompareError::Empty)
 }
 
-/// The image that `sensor` predicts for a press, without noise.
+/// The image that `sensor` predicts for a press, without noise; in the white balance of that press, taken from its pixels away
+/// from the contact, where the sensor's camera has an automatic one.
 ///
 /// # Errors
 ///
@@ -155,7 +157,16 @@ pub fn predict_press(press: &Press, ball_m: f64, sensor: &Sensor) -> Result<Tact
         return Err(CompareError::Size { press: press.name.clone(), found, wanted });
     }
     let contact = mark::checked(press, ball_m, sensor.grid.metres_per_px)?;
-    Ok(predict_contact(&contact, ball_m, sensor))
+    Ok(predict_taken(press, &contact, ball_m, sensor))
+}
+
+/// The image of a contact in the gain with which a press was taken, where the camera's gain wanders.
+pub(super) fn predict_taken(press: &Press, contact: &Contact, ball_m: f64, sensor: &Sensor) -> TactileImage {
+    let image = predict_contact(contact, ball_m, sensor);
+    match sensor.press_gain_sd {
+        Some(sd) => within_gain(&press.image, &image, contact, &sensor.grid, sd.map(f64::from)),
+        None => image,
+    }
 }
 
 /// The image of a contact, without noise.

@@ -5,7 +5,7 @@ use super::{Circle, Press};
 use crate::grid::{Grid, Plane};
 use crate::indent::Imprint;
 use crate::sensor::GelShape;
-use gripgen_twin::ContactPatch;
+use gripgen_twin::{ContactPatch, OpticsState};
 use std::sync::Arc;
 
 /// The checked contact of a press.
@@ -54,24 +54,55 @@ impl Contact {
         shape: &GelShape,
         sink_in_fraction: f64,
     ) -> Imprint {
+        self.imprint_seen(ball_m, grid, shape, sink_in_fraction, &OpticsState::default())
+    }
+
+    /// The same where optics effects change the depth of the press and the edges of the body. A depth that follows from a circle
+    /// stays: the circle was seen.
+    pub(crate) fn imprint_seen(
+        &self,
+        ball_m: f64,
+        grid: &Grid,
+        shape: &GelShape,
+        sink_in_fraction: f64,
+        optics: &OpticsState,
+    ) -> Imprint {
         match &self.indenter {
             Some(indenter) => {
-                let press_px = indenter.travel_m / grid.metres_per_px;
-                let depth_px = indenter.depth_px(press_px, shape.rest_px(grid).as_ref());
-                imprint(depth_px, indenter.travel_m)
+                let travel_m = optics.press_depth_m(indenter.travel_m);
+                let rounded = (optics.edge_rounding_m > 0.0)
+                    .then(|| indenter.rounded(optics.edge_rounding_m / grid.metres_per_px));
+                let indenter = rounded.as_ref().unwrap_or(indenter);
+                let rest = shape.rest_px(grid);
+                imprint(indenter.depth_px(travel_m / grid.metres_per_px, rest.as_ref()), travel_m)
             }
             None => {
                 let deeper = match self.travel_m {
-                    Some(travel_m) => Deeper::To(travel_m / grid.metres_per_px),
+                    Some(travel_m) => Deeper::To(optics.press_depth_m(travel_m) / grid.metres_per_px),
                     None => Deeper::By(sink_in_fraction),
                 };
                 ball_imprint(&self.circle, deeper, ball_m, grid, shape)
             }
         }
     }
+
+    /// The contact in an image whose pixels are `factor` times as wide.
+    pub(crate) fn in_wider_pixels(&self, factor: usize) -> Self {
+        let f = factor as f64;
+        let circle = Circle {
+            x_px: (self.circle.x_px + 0.5) / f - 0.5,
+            y_px: (self.circle.y_px + 0.5) / f - 0.5,
+            radius_px: self.circle.radius_px / f,
+        };
+        let indenter = self.indenter.as_ref().map(|indenter| match factor {
+            1 => Arc::clone(indenter),
+            _ => Arc::new(indenter.in_wider_pixels(factor)),
+        });
+        Self { circle, travel_m: self.travel_m, indenter }
+    }
 }
 
-fn imprint(depth_px: Plane, press_depth_m: f64) -> Imprint {
+pub(super) fn imprint(depth_px: Plane, press_depth_m: f64) -> Imprint {
     Imprint { depth_px, press_depth_m, patch: ContactPatch { cells: Vec::new() }, elastic: None }
 }
 

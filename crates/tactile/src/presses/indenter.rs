@@ -1,6 +1,7 @@
 //! A body of any shape that is pressed in: where its surface is, and how far each pixel lies from its contact.
 
 use crate::grid::{Grid, Plane};
+use crate::optics::rounded;
 use crate::raster::ClusteredMesh;
 use gripgen_twin::TriMesh;
 use gripgen_twin::frames::pose;
@@ -24,6 +25,14 @@ pub struct IndenterPose {
     pub y_px: f64,
     /// Turn about its own z, counter-clockwise as seen in the image.
     pub rotation_rad: f64,
+}
+
+impl IndenterPose {
+    /// In the middle of an image, not turned.
+    pub fn middle_of(grid: &Grid) -> Self {
+        let middle = |n: usize| (n as f64 - 1.0) / 2.0;
+        Self { x_px: middle(grid.width_px), y_px: middle(grid.height_px), rotation_rad: 0.0 }
+    }
 }
 
 /// A body in front of a gel, and how far it travels after first contact.
@@ -75,7 +84,7 @@ pub enum IndenterError {
 }
 
 /// Longest travel, far beyond the thickness of any gel.
-const MAX_TRAVEL_M: f64 = 0.01;
+pub(super) const MAX_TRAVEL_M: f64 = 0.01;
 
 impl Indenter {
     /// A mesh at its place in an image of `grid`, `travel_m` after its highest vertex touched the gel.
@@ -167,6 +176,44 @@ impl Indenter {
         let inside = self.distance_px.iter().filter(|&&d| d == 0.0).count().max(1);
         let IndenterPose { x_px, y_px, .. } = self.pose;
         super::Circle { x_px, y_px, radius_px: (inside as f64 / PI).sqrt() }
+    }
+
+    /// The body with its convex edges rounded. Its place and its travel stay, and what counts as its contact.
+    pub(crate) fn rounded(&self, radius_px: f64) -> Self {
+        Self {
+            heights_px: self.scaled(FINE as f32, |fine| rounded(fine, radius_px * FINE as f64)),
+            ..self.clone()
+        }
+    }
+
+    /// `of` the heights in units of `1 / units` pixels.
+    fn scaled(&self, units: f32, of: impl Fn(&Plane) -> Plane) -> Plane {
+        let times = |plane: &Plane, factor: f32| Plane {
+            values: plane.values.iter().map(|h| h * factor).collect(),
+            ..*plane
+        };
+        times(&of(&times(&self.heights_px, units)), 1.0 / units)
+    }
+
+    /// The body in an image whose pixels are `factor` times as wide: the middle one of each square of points.
+    pub(crate) fn in_wider_pixels(&self, factor: usize) -> Self {
+        let by = 1.0 / factor as f32;
+        let every = |values: &[f32], width: usize, (w, h): (usize, usize)| -> Vec<f32> {
+            let middle = |i: usize| i * factor + factor / 2;
+            (0..w * h).map(|i| values[middle(i / w) * width + middle(i % w)] * by).collect()
+        };
+        let (width, height) = (self.heights_px.width / FINE, self.heights_px.height / FINE);
+        let (w, h) = (width / factor, height / factor);
+        let fine = every(&self.heights_px.values, self.heights_px.width, (w * FINE, h * FINE));
+        let heights_px = Plane { width: w * FINE, height: h * FINE, values: fine };
+        let distance_px = every(&self.distance_px, width, (w, h));
+        let f = factor as f64;
+        let pose = IndenterPose {
+            x_px: (self.pose.x_px + 0.5) / f - 0.5,
+            y_px: (self.pose.y_px + 0.5) / f - 0.5,
+            ..self.pose
+        };
+        Self { shape: self.shape.clone(), pose, travel_m: self.travel_m, heights_px, distance_px }
     }
 
     /// Distance of a pixel from the contact, 0 inside.

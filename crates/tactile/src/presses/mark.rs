@@ -41,6 +41,9 @@ pub enum MarkError {
     },
 }
 
+/// A press with its checked contact.
+pub(super) type Marked<'a> = (&'a Press, Contact);
+
 /// The contact of a press; the circle of a ball is at most as wide as the ball.
 pub(super) fn checked(press: &Press, ball_m: f64, metres_per_px: f64) -> Result<Contact, MarkError> {
     if let (Some(_), Some(circle)) = (&press.indenter, press.circle) {

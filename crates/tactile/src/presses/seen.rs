@@ -6,8 +6,8 @@ mod view;
 pub use view::{PressView, surface_part};
 
 use super::compare::{gel_of, sink_in_fraction};
-use super::contact::{Deeper, ball_imprint};
-use super::{Circle, PressSet};
+use super::gain::within_gain;
+use super::{Circle, Contact, Press, PressSet};
 use crate::grid::Plane;
 use crate::render::Renderer;
 use crate::sensor::{GelShape, Sensor};
@@ -17,6 +17,40 @@ use reduce::reduced_sensor;
 
 /// Widest image that is looked at pixel by pixel: larger ones are averaged over squares of pixels for fits.
 const FIT_WIDTH_PX: usize = 300;
+
+/// Where something is pressed in, in pixels of the images.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressContact(Contact);
+
+impl PressContact {
+    /// Of a press whose contact is known.
+    pub fn of(press: &Press) -> Option<Self> {
+        Some(Self(Contact::of_press(press, press.circle?)))
+    }
+
+    /// A ball that is known by its circle alone.
+    pub fn of_circle(circle: Circle) -> Self {
+        Self(Contact { circle, travel_m: None, indenter: None })
+    }
+
+    /// The same with another circle; of a body that is no ball, which has its own place, the same.
+    pub fn at(&self, circle: Circle) -> Self {
+        match self.is_ball() {
+            true => Self(Contact { circle, ..self.0.clone() }),
+            false => self.clone(),
+        }
+    }
+
+    /// Its circle: the rim of a ball, or one around another body.
+    pub fn circle(&self) -> &Circle {
+        &self.0.circle
+    }
+
+    /// Whether it is a ball's.
+    pub fn is_ball(&self) -> bool {
+        self.0.indenter.is_none()
+    }
+}
 
 /// A sensor, its gel and a ball: everything but where it is pressed in.
 #[derive(Debug, Clone)]
@@ -56,27 +90,18 @@ impl PressScene {
         self.factor
     }
 
-    /// A circle of the images in pixels of the scene.
-    fn circle_here(&self, circle: &Circle) -> Circle {
-        let f = self.factor as f64;
-        Circle {
-            x_px: (circle.x_px + 0.5) / f - 0.5,
-            y_px: (circle.y_px + 0.5) / f - 0.5,
-            radius_px: circle.radius_px / f,
-        }
-    }
-
-    /// What the camera sees of a press whose rim of contact is `circle`, in pixels of the images, minus the rest frame
-    /// of the sensor file; without a circle, of no contact. Grey levels of red, green and blue.
+    /// What the camera sees of a press, minus the rest frame of the sensor file; without a contact, of the gel alone. Grey levels
+    /// of red, green and blue.
     ///
-    /// A dome of the effects is one that the marked circle lies on: the rim is where it was seen, whatever the gel.
-    pub fn change_seen(&self, circle: Option<&Circle>, optics: &OpticsState) -> [Plane; 3] {
-        let imprint = circle.map(|circle| {
-            let circle = self.circle_here(circle);
-            let deeper = Deeper::By(sink_in_fraction(&self.sensor));
+    /// A dome of the effects is one that a marked circle lies on: the rim is where it was seen, whatever the gel.
+    pub fn change_seen(&self, press: Option<&PressContact>, optics: &OpticsState) -> [Plane; 3] {
+        let imprint = press.map(|PressContact(contact)| {
+            let here = (self.factor > 1).then(|| contact.in_wider_pixels(self.factor));
             let dome = self.dome(optics);
             let shape = dome.as_ref().unwrap_or(&self.sensor.gel_shape);
-            ball_imprint(&circle, deeper, self.ball_m, &self.sensor.grid, shape)
+            let sink_in = sink_in_fraction(&self.sensor);
+            let contact = here.as_ref().unwrap_or(contact);
+            contact.imprint_seen(self.ball_m, &self.sensor.grid, shape, sink_in, optics)
         });
         let renderer = Renderer { sensor: &self.sensor, gel: &self.gel, level: SimdLevel::best() };
         renderer.change_seen(imprint.as_ref(), optics)
@@ -100,10 +125,23 @@ impl PressScene {
 
 /// Mean squared difference of an image to what is seen of it, over the whole frame and all channels, in grey levels
 /// squared; both rounded to whole levels as `compare` has them.
-pub fn frame_mse(set: &PressSet, index: usize, scene: &PressScene, optics: &OpticsState) -> f64 {
+///
+/// `gain_sd`: how much the gains of the camera scatter from press to press. The image then has the gain of its press, as far as
+/// such a camera may have it.
+pub fn frame_mse(
+    set: &PressSet,
+    index: usize,
+    scene: &PressScene,
+    optics: &OpticsState,
+    gain_sd: Option<[f64; 3]>,
+) -> f64 {
     let press = &set.presses[index];
-    let change = scene.change_seen(press.circle.as_ref(), optics);
-    let image = crate::finish(&scene.sensor, Some(&change), None);
+    let contact = PressContact::of(press);
+    let change = scene.change_seen(contact.as_ref(), optics);
+    let mut image = crate::finish(&scene.sensor, Some(&change), None);
+    if let (Some(sd), Some(PressContact(contact))) = (gain_sd, &contact) {
+        image = within_gain(&press.image, &image, contact, &scene.sensor.grid, sd);
+    }
     let squares = |(&a, &b): (&u8, &u8)| (f64::from(a) - f64::from(b)) * (f64::from(a) - f64::from(b));
     image.rgb.iter().zip(&press.image.rgb).map(squares).sum::<f64>() / image.rgb.len().max(1) as f64
 }

@@ -18,6 +18,7 @@
 //! | `shadow_values`, `shadow_heights_mm`, `shadow_step_mm` | (N, H, L, 3), (2,), scalar, optional | shadows: change of grey level by direction, height of the gel beside the contact (first, step) and distance; NaN after the end of a ray |
 //! | `marker_px`, `marker_radius_px`, `marker_darkness_rgb` | (N, 2), scalar, (3,), optional | dots on the gel: column and row at rest, radius, share of light that a dot takes |
 //! | `ball_mm` | scalar, optional | diameter of the ball of the calibration |
+//! | `press_gain_sd_rgb` | (3,), optional | how much the gain of each colour differs from press to press: standard deviation of its logarithm |
 
 use super::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError};
 use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
@@ -109,6 +110,7 @@ impl Sensor {
         let gel_shape = gel_shape(npz, height_px, width_px)?;
         let pyramid = pyramid(npz)?;
         let ball_m = scalar(npz, "ball_mm")?.map(|mm| mm * 1e-3);
+        let press_gain_sd = triple(npz, "press_gain_sd_rgb")?;
         let grid = Grid { width_px, height_px, metres_per_px: metres_per_px.unwrap_or(mm_per_px * 1e-3) };
         Ok(Self {
             grid,
@@ -120,6 +122,7 @@ impl Sensor {
             shadow: None,
             pyramid,
             ball_m,
+            press_gain_sd,
         })
     }
 
@@ -145,6 +148,7 @@ impl Sensor {
             shadow: None,
             pyramid: None,
             ball_m: None,
+            press_gain_sd: None,
         })
     }
 
@@ -194,6 +198,9 @@ impl Sensor {
         arrays.extend(self.markers.iter().flat_map(Markers::arrays));
         if let Some(ball_m) = self.ball_m {
             arrays.push(("ball_mm", scalar(ball_m * 1e3), ElementType::F64));
+        }
+        if let Some(sd) = self.press_gain_sd {
+            arrays.push(("press_gain_sd_rgb", list(sd.map(f64::from).to_vec()), ElementType::F64));
         }
         Some(write_npz(&arrays))
     }
@@ -258,6 +265,14 @@ fn scalar(npz: &mut Npz<'_>, key: &str) -> Result<Option<f64>, NpzError> {
         return Ok(None);
     }
     Ok(Some(npz.array_of_shape(key, &[])?.values[0]))
+}
+
+fn triple(npz: &mut Npz<'_>, key: &str) -> Result<Option<[f32; 3]>, NpzError> {
+    if !npz.has(key) {
+        return Ok(None);
+    }
+    let values = npz.array_of_shape(key, &[Some(3)])?.values;
+    Ok(Some([values[0] as f32, values[1] as f32, values[2] as f32]))
 }
 
 fn gel_shape(npz: &mut Npz<'_>, rows: usize, columns: usize) -> Result<GelShape, NpzError> {

@@ -56,6 +56,7 @@ fn effects_that_are_not_drawn_change_light_and_camera_only() {
         let frame = OpticsState {
             light_gain: seen.light_gain,
             background: seen.background,
+            finer_background: seen.finer_background,
             exposure_gain: seen.exposure_gain,
             gamma: seen.gamma,
             rest_offset: seen.rest_offset,

@@ -138,16 +138,42 @@ pub struct PressFit {
     pub start: fn(&str, f64) -> (f64, f64),
     /// The parameter whose value is found by trying, not by slopes.
     pub tried: Option<&'static str>,
+    /// Numbers of leading parameters that are fitted one after the other, as long as more of them predict presses better that
+    /// were held out; empty where all are fitted at once.
+    pub orders: &'static [usize],
     /// It changes the picture of the contact, which has to be drawn anew, and not only light and camera.
     pub drawn: bool,
-    /// It shows only where the contacts are marked by hand: a place that is found moves with it.
-    pub needs_marks: bool,
+    /// What presses have to be known of, for it to show.
+    pub needs: PressNeeds,
+    /// It is a gain of each colour that differs from press to press: each press says its own away from the contact, nothing is
+    /// fitted, and its parameters are how much the gains of red, green and blue scatter.
+    pub scatters: bool,
 }
 
 impl PressFit {
     /// An effect that is drawn: what the specs fill in.
-    pub(super) const DRAWN: PressFit =
-        PressFit { main: "", start: |_, _| (0.0, 1.0), tried: None, drawn: true, needs_marks: false };
+    pub(super) const DRAWN: PressFit = PressFit {
+        main: "",
+        start: |_, _| (0.0, 1.0),
+        tried: None,
+        orders: &[],
+        drawn: true,
+        needs: PressNeeds::Nothing,
+        scatters: false,
+    };
+}
+
+/// What has to be known of presses for an effect to show in them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PressNeeds {
+    /// Nothing beside the images.
+    Nothing,
+    /// Contacts that were marked by hand: a place that is found moves with the effect.
+    Marks,
+    /// How far something travelled into the gel: a depth that follows from the rim moves with the effect.
+    Depths,
+    /// Bodies with edges: balls have none.
+    Edges,
 }
 
 /// `count` values from `low` to `high` in equal ratios.

@@ -19,6 +19,9 @@ pub struct GripPoint<'a> {
     pub pull_rate_n_per_s: f64,
     /// Circumstances of the pull.
     pub covariates: &'a Covariates,
+    /// Seed of the sweep and number of the grip in it: what an effect draws for each grip is a function of them. 0 where nothing
+    /// is drawn.
+    pub grip: (u64, u64),
 }
 
 impl GripPoint<'_> {

@@ -1,7 +1,7 @@
 //! A contact that is seen elsewhere than it is thought to be.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, PressNeeds};
 use crate::Jaw;
 use crate::OpticsState;
 
@@ -55,7 +55,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
             "scale" => (1.0, 0.02),
             _ => (0.0, 0.02),
         },
-        needs_marks: true,
+        needs: PressNeeds::Marks,
         ..PressFit::DRAWN
     }),
     experiments: &[Experiment::PressesNearTheCorners],

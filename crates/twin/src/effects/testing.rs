@@ -6,7 +6,8 @@ use crate::{Covariates, Jaw, Twin};
 
 /// The left jaw with a patch of 1 cm2, pulled at 10 N/s.
 pub(crate) fn grip(covariates: &Covariates, grip_force_n: f64) -> GripPoint<'_> {
-    GripPoint { jaw: Jaw::Left, grip_force_n, contact_area_m2: 1e-4, pull_rate_n_per_s: 10.0, covariates }
+    let (contact_area_m2, pull_rate_n_per_s) = (1e-4, 10.0);
+    GripPoint { jaw: Jaw::Left, grip_force_n, contact_area_m2, pull_rate_n_per_s, covariates, grip: (0, 0) }
 }
 
 /// Readings of true forces, `step_s` apart from clock 0 on.

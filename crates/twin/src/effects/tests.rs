@@ -90,6 +90,7 @@ fn numbers(state: &OpticsState) -> Vec<f64> {
     let OpticsState {
         light_gain,
         background,
+        finer_background,
         exposure_gain,
         gamma,
         shift_m,
@@ -104,9 +105,14 @@ fn numbers(state: &OpticsState) -> Vec<f64> {
         shadow_strength,
         light_elevation_rad,
         dome_sag_m,
+        press_factor,
+        press_offset_m,
+        edge_rounding_m,
     } = *state;
     let mut all = vec![exposure_gain, gamma, rotation_rad, scale, distortion_k1, defocus_m, kernel_scale];
     all.extend([part_offset_m, edge_blunting_m, shadow_strength, light_elevation_rad, dome_sag_m]);
+    all.extend([press_factor, press_offset_m, edge_rounding_m]);
+    all.extend(finer_background.into_iter().flatten());
     all.extend(
         light_gain.into_iter().chain(shift_m).chain(rest_offset).chain(background.into_iter().flatten()),
     );
@@ -137,7 +143,7 @@ fn ids_and_parameter_names_are_unique_and_neutral_values_lie_inside_the_bounds()
 /// Every corner of the bounds of a spec's parameters; of one with many, those with one or all but one at the other end.
 fn corners(spec: &EffectSpec) -> impl Iterator<Item = Vec<f64>> {
     let n = spec.parameters.len();
-    let few: Vec<u32> = if n <= 6 {
+    let few: Vec<u128> = if n <= 6 {
         (0..1 << n).collect()
     } else {
         (0..n).map(|i| 1 << i).flat_map(|one| [one, !one, 0, !0]).collect()
@@ -246,7 +252,7 @@ fn optics_effects_act_on_their_part_and_on_no_force() {
         })
         .collect();
     let (plain, seen) = (twin("").unwrap(), twin(&list).unwrap());
-    assert_eq!(seen.effects.len(), 10);
+    assert_eq!(seen.effects.len(), 13);
     each_grip(|at| {
         assert!(
             !optics_state(&seen, "rod", at).is_neutral() && optics_state(&seen, "plate", at).is_neutral()

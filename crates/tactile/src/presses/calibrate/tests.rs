@@ -1,5 +1,7 @@
 use super::*;
 use crate::colour::{Lambert, Light};
+use crate::presses::compare::predict_contact;
+use crate::presses::{Contact, Press};
 use crate::presses::{compare_presses, find_circle};
 use crate::sensor::Pyramid;
 use samples::GelModel;
@@ -39,6 +41,7 @@ fn truth() -> Sensor {
         markers: None,
         shadow: None,
         ball_m: None,
+        press_gain_sd: None,
     }
 }
 
@@ -251,4 +254,24 @@ fn images_without_any_contact_are_refused_and_marks_beside_it_are_counted() {
     }
     let found = calibrate_presses(&mirrored, &options).unwrap();
     assert!(found.doubtful.is_empty() && (4..=6).contains(&found.distrusted), "{}", found.distrusted);
+}
+
+/// Each press with gains of its own: they are found, divided out, and the image of a press that the fit has not seen has the gain
+/// that its pixels away from the contact show.
+#[test]
+fn gains_of_presses_are_divided_out() {
+    let gain = |i: usize| [0, 1, 2].map(|c| 1.0 + 0.12 * (((i * (5 + 2 * c) + c) % 11) as f64 / 10.0 - 0.5));
+    let sensor = truth();
+    let plain = presses(&sensor, 14);
+    let mut taken = plain.clone();
+    for (i, press) in taken.presses.iter_mut().enumerate() {
+        press.image = super::super::gain::with_gain(&press.image, gain(i));
+    }
+    let error = |set: &PressSet| calibrate_presses(set, &CalibrateOptions::default()).unwrap();
+    let (without, with) = (error(&plain), error(&taken));
+    assert_eq!(without.sensor.press_gain_sd, None);
+    let sd = with.sensor.press_gain_sd.expect("gains that scatter");
+    assert!(sd.iter().all(|sd| (0.025..0.055).contains(sd)), "{sd:?}");
+    let (before, after) = (without.held_out.mean.full.mse, with.held_out.mean.full.mse);
+    assert!(after < 1.2 * before + 0.2, "{after}, without gains {before}");
 }

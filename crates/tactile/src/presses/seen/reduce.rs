@@ -42,6 +42,7 @@ pub(super) fn reduced_sensor(sensor: &Sensor, factor: usize) -> Option<Sensor> {
         shadow,
         pyramid,
         ball_m: sensor.ball_m,
+        press_gain_sd: sensor.press_gain_sd,
     })
 }
 

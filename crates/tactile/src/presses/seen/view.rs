@@ -1,7 +1,7 @@
 //! Chosen pixels of one press: what was measured there, and what is seen under any optics.
 
-use super::PressScene;
 use super::reduce::means;
+use super::{PressContact, PressScene};
 use crate::optics::level_at;
 use crate::presses::Circle;
 use crate::presses::zone::{ZONES, Zone};
@@ -14,7 +14,7 @@ const PIXELS_PER_ZONE: usize = 600;
 /// Chosen pixels of one press, or of a frame without contact.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressView {
-    circle: Option<Circle>,
+    press: Option<PressContact>,
     pixels: Vec<usize>,
     zones: Vec<Zone>,
     measured: Vec<[f32; 3]>,
@@ -29,18 +29,17 @@ impl PressView {
     pub fn draw(
         index: usize,
         image: &TactileImage,
-        circle: Option<Circle>,
+        press: Option<PressContact>,
         full: &PressScene,
         scene: &PressScene,
     ) -> Self {
         let grid = &scene.sensor.grid;
         let (w, h, f) = (grid.width_px, grid.height_px, scene.factor);
-        let here = circle.map(|c| scene.circle_here(&c));
+        let here = press.as_ref().map(|PressContact(contact)| contact.in_wider_pixels(f));
         let mut by_zone = [const { Vec::new() }; ZONES.len()];
         for pixel in 0..grid.len() {
-            let zone = here.map_or(Zone::Far, |c| {
-                let (x, y) = ((pixel % w) as f64 - c.x_px, (pixel / w) as f64 - c.y_px);
-                Zone::at((libm::hypot(x, y) - c.radius_px) / c.radius_px.max(1.0))
+            let zone = here.as_ref().map_or(Zone::Far, |contact| {
+                Zone::at(contact.beyond_rim_px(pixel, w) / contact.circle.radius_px.max(1.0))
             });
             by_zone[zone as usize].push(pixel);
         }
@@ -63,10 +62,10 @@ impl PressView {
             means(&plane, full_w, full_h, f)
         });
         let plain = OpticsState::default();
-        let finer = match circle {
+        let finer = match &press {
             Some(_) if f > 1 => {
                 let (fine, coarse) =
-                    (full.change_seen(circle.as_ref(), &plain), scene.change_seen(circle.as_ref(), &plain));
+                    (full.change_seen(press.as_ref(), &plain), scene.change_seen(press.as_ref(), &plain));
                 let fine = [0, 1, 2].map(|c| means(&fine[c].values, full_w, full_h, f));
                 pixels.iter().map(|&p| [0, 1, 2].map(|c| fine[c][p] - coarse[c].values[p])).collect()
             }
@@ -74,7 +73,7 @@ impl PressView {
         };
         debug_assert_eq!(planes[0].len(), w * h);
         Self {
-            circle,
+            press,
             measured: pixels.iter().map(|&p| [0, 1, 2].map(|c| planes[c][p])).collect(),
             rest: pixels.iter().map(|&p| [0, 1, 2].map(|c| scene.sensor.rest[c][p])).collect(),
             finer,
@@ -104,30 +103,29 @@ impl PressView {
     }
 
     /// What the contact changes at each pixel under the part of `optics` that needs a picture of its own
-    /// ([`surface_part`]); for [`PressView::levels`]. `circle` takes the place of the marked one.
+    /// ([`surface_part`]); for [`PressView::levels`]. `circle` takes the place of a ball's marked one.
     pub fn contact(
         &self,
         scene: &PressScene,
         optics: &OpticsState,
         circle: Option<&Circle>,
     ) -> Vec<[f32; 3]> {
-        if self.circle.is_none() {
-            return vec![[0.0; 3]; self.pixels.len()];
-        }
-        let change = scene.change_seen(circle.or(self.circle.as_ref()), &surface_part(optics));
+        let Some(press) = &self.press else { return vec![[0.0; 3]; self.pixels.len()] };
+        let moved = circle.map(|circle| press.at(*circle));
+        let change = scene.change_seen(Some(moved.as_ref().unwrap_or(press)), &surface_part(optics));
         let at = |(&p, finer): (&usize, &[f32; 3])| [0, 1, 2].map(|c| change[c].values[p] + finer[c]);
         self.pixels.iter().zip(&self.finer).map(at).collect()
     }
 
-    /// The circle of the press.
-    pub fn circle(&self) -> Option<&Circle> {
-        self.circle.as_ref()
+    /// Where something is pressed in.
+    pub fn press(&self) -> Option<&PressContact> {
+        self.press.as_ref()
     }
 
     /// Grey levels that the camera shows at each pixel, within 0 to 255.
     pub fn levels(&self, scene: &PressScene, contact: &[[f32; 3]], optics: &OpticsState) -> Vec<[f32; 3]> {
         let grid = &scene.sensor.grid;
-        let offset = match self.circle {
+        let offset = match self.press {
             Some(_) => optics.rest_offset.map(|o| o as f32),
             None => [0.0; 3],
         };
@@ -151,6 +149,7 @@ pub fn surface_part(optics: &OpticsState) -> OpticsState {
     OpticsState {
         light_gain: neutral.light_gain,
         background: neutral.background,
+        finer_background: neutral.finer_background,
         exposure_gain: neutral.exposure_gain,
         gamma: neutral.gamma,
         rest_offset: neutral.rest_offset,

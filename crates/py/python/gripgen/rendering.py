@@ -1,0 +1,59 @@
+"""What a sensor sees of any mesh or surface."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import _core
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered:
+    """The image of something that is pressed in, without noise, and the surface of the gel that it shows."""
+
+    #: uint8[H, W, 3].
+    image: NDArray[np.uint8] = field(repr=False)
+    #: float32[H, W]: how far the gel stands above its rest towards the camera, mm; 0 where nothing moves it.
+    heights_mm: NDArray[np.float32] = field(repr=False)
+    #: float32[H, W, 3]: unit normals of that surface: to the image's right, to its top, towards the camera.
+    normals: NDArray[np.float32] = field(repr=False)
+    #: bool[H, W]: where the gel follows what is pressed in.
+    contact: NDArray[np.bool_] = field(repr=False)
+
+
+def render(
+    mesh_or_heights: str | os.PathLike[str] | ArrayLike,
+    *,
+    sensor: str | os.PathLike[str],
+    depth_mm: float | None = None,
+    x_px: float | None = None,
+    y_px: float | None = None,
+    rotation_deg: float = 0.0,
+    scale_mm_per_unit: float = 1.0,
+) -> Rendered:
+    """Press a mesh or a surface into a sensor and look at it.
+
+    With the path of a mesh (STL, OBJ) it is `gripgen render`: the tip of the mesh points along its +z into the gel and
+    travels `depth_mm` after its highest vertex touched; +x is the image's right, +y its top; `x_px`, `y_px` are the place of
+    the mesh's origin (default: the middle of the image), `rotation_deg` turns it counter-clockwise.
+
+    With an array (H, W), or a path of one (`.npy`), its values are how far the pressed surface stands above the gel at rest,
+    in mm: above 0 it indents, `-inf` is no surface. `depth_mm` moves the whole surface until its highest point is so deep.
+
+    `sensor` is a sensor file (`asset:sensors/gelsight_r15/sensor.npz` is a shipped one), `scale_mm_per_unit` the unit of mesh
+    or heights. Raises ConfigError where a file, a shape or a length cannot be.
+    """
+    source = mesh_or_heights
+    if not isinstance(source, str | os.PathLike):
+        source = np.asarray(source, dtype=np.float64)
+    found = _core.render(
+        source, os.fspath(sensor), depth_mm, x_px, y_px, rotation_deg, scale_mm_per_unit
+    )
+    return Rendered(**found)
