@@ -125,3 +125,11 @@ pub struct Diagnosed {
     /// The pulls that would tell apart what these could not.
     pub next: Option<crate::NextPulls>,
 }
+
+impl Diagnosed {
+    /// An answer, with its sentence for a technician.
+    pub(crate) fn new(mut diagnosis: Diagnosis, edits: crate::TwinEdits, report: ReportData) -> Self {
+        diagnosis.plain = Some(gripgen_identify::plain(&diagnosis));
+        Self { diagnosis, edits, report, next: None }
+    }
+}

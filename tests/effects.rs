@@ -282,7 +282,7 @@ const OPTICS: &[(&str, &str)] = &[
     ("rest_offset", "red = 3.0"),
     ("cast_shadow", "strength = 0.4\nelevation_deg = 15.0"),
     ("gel_dome", "sag_mm = 0.5"),
-    ("press_gain", "red_sd = 0.1\ngreen_sd = 0.1\nblue_sd = 0.1"),
+    ("press_gain", "red = 1.05\nblue = 0.95\nred_sd = 0.1\ngreen_sd = 0.1\nblue_sd = 0.1"),
     ("press_depth", "offset_mm = 0.1"),
     ("edge_rounding", "radius_mm = 0.3"),
 ];

@@ -57,7 +57,7 @@ pub fn diagnose_presses(input: &PressDiagnosisInput<'_>, progress: &mut dyn FnMu
     if n < MIN_DIAGNOSED_PRESSES || n < input.set.presses.len() {
         let diagnosis = too_few_presses(&data, n);
         let report = page::without_answer(&diagnosis);
-        return Diagnosed { diagnosis, edits: TwinEdits::default(), report, next: None };
+        return Diagnosed::new(diagnosis, TwinEdits::default(), report);
     }
     let circumstances: Vec<Covariates> = (0..n)
         .map(|i| Covariates {
@@ -72,7 +72,8 @@ pub fn diagnose_presses(input: &PressDiagnosisInput<'_>, progress: &mut dyn FnMu
     let mut found = gripgen_identify::diagnose_presses(&work, &data, progress);
     remark(&mut found.diagnosis, input, &work, &found.acting, scatter_px);
     let report = page::report(input, &data.covariates, &found);
-    Diagnosed { edits: edits(input, &found.diagnosis), diagnosis: found.diagnosis, report, next: None }
+    let edits = edits(input, &found.diagnosis);
+    Diagnosed::new(found.diagnosis, edits, report)
 }
 
 /// What is known of the presses beside their images.

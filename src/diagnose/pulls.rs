@@ -154,7 +154,7 @@ pub fn diagnose_pull_table(
             separate.text = format!("{}; or {}", separate.text, next.text());
         }
     }
-    Ok(Diagnosed { diagnosis, edits, report, next })
+    Ok(Diagnosed { next, ..Diagnosed::new(diagnosis, edits, report) })
 }
 
 /// Fitted baseline values as they stand in a twin.

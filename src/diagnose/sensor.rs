@@ -38,7 +38,7 @@ pub fn diagnose_sensor_table(table: &SensorTable) -> Diagnosed {
     answer.diagnosis.data.sha256.clone_from(&table.sha256);
     let edits = edits(&mut answer, &table.sha256);
     let report = report(&answer);
-    Diagnosed { diagnosis: answer.diagnosis, edits, report, next: None }
+    Diagnosed::new(answer.diagnosis, edits, report)
 }
 
 /// Gain and offset of each session; the error says what the table lacks.

@@ -34,6 +34,7 @@ pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
     let said = if report.sentence.is_empty() { sentence(d) } else { report.sentence.clone() };
     let page = json!({
         "title": clean(&report.title, NAME),
+        "plain": d.plain.as_ref().map(|plain| clean(plain, SENTENCE)),
         "sentence": clean(&said, SENTENCE),
         "verdict": verdict(d.verdict),
         "facts": facts(d, floor, unit),

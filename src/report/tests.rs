@@ -12,7 +12,7 @@ fn held_out(rmse: f64) -> HeldOutError {
 }
 
 fn estimate(value: f64, unit: &str) -> ParameterEstimate {
-    ParameterEstimate { value, low90: 0.9 * value, high90: 1.1 * value, unit: unit.into() }
+    ParameterEstimate::new(value, (0.9 * value, 1.1 * value), unit)
 }
 
 /// A number that looks random.
@@ -70,6 +70,8 @@ fn diagnosis() -> Diagnosis {
                 sessions: Some(ErrorPair { before: held_out(2.4), after: held_out(0.41) }),
             },
         }),
+        hints: Vec::new(),
+        plain: None,
         notes: vec!["3 pulls were left out: they failed".into()],
     }
 }

@@ -1,5 +1,6 @@
 //! What a diagnosis says, as it stands in `diagnose --json` (DESIGN 5.4).
 
+use gripgen_twin::effects::find;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -53,6 +54,12 @@ pub struct DataSummary {
     pub outliers: Vec<String>,
 }
 
+/// A value nearer than this share of its range to a bound stands at it.
+const NEAR_BOUND: f64 = 1e-3;
+
+/// Weight at most of an effect with a value at a bound.
+const MAX_WEIGHT_AT_BOUND: f64 = 0.5;
+
 /// A fitted parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParameterEstimate {
@@ -64,6 +71,32 @@ pub struct ParameterEstimate {
     pub high90: f64,
     /// Unit, `1` for a plain number.
     pub unit: String,
+    /// Whether the fit ended at a bound of the parameter that is not its neutral value: something else may look like it.
+    #[serde(skip_serializing_if = "is_false")]
+    pub at_bound: bool,
+}
+
+impl ParameterEstimate {
+    /// A value with its 90 % interval, inside its bounds.
+    pub fn new(value: f64, (low90, high90): (f64, f64), unit: &str) -> Self {
+        Self { value, low90, high90, unit: unit.into(), at_bound: false }
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_false(flag: &bool) -> bool {
+    !*flag
+}
+
+/// What looked like an effect and did not pay: it is not in the twin.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hint {
+    /// Id of the effect, or the covariate of a curve.
+    pub name: String,
+    /// Share of the root mean squared error that it takes off data that were held out.
+    pub gain: f64,
+    /// Why it is no name.
+    pub reason: String,
 }
 
 /// An effect that the data do not tell from the one named.
@@ -210,6 +243,12 @@ pub struct Diagnosis {
     /// The error before and after, where it could be measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorReport>,
+    /// What looked like an effect and did not pay.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hints: Vec<Hint>,
+    /// The answer in one sentence for a technician.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plain: Option<String>,
     /// Remarks for people: what is missing, what was left out, what to beware of.
     pub notes: Vec<String>,
 }
@@ -231,6 +270,8 @@ impl Diagnosis {
             not_recorded: Vec::new(),
             baseline: BTreeMap::new(),
             error: None,
+            hints: Vec::new(),
+            plain: None,
             notes: Vec::new(),
         }
     }
@@ -242,5 +283,29 @@ impl Diagnosis {
             (true, false) => Verdict::Unknown,
             (true, true) => Verdict::None,
         };
+        self.say_bounds();
+    }
+
+    /// Marks values that stand at a bound of their parameter, says so, and trusts their effects less.
+    fn say_bounds(&mut self) {
+        for effect in &mut self.effects {
+            let Some(spec) = find(&effect.name) else { continue };
+            for p in spec.parameters {
+                let Some(estimate) = effect.parameters.get_mut(p.name) else { continue };
+                let near = NEAR_BOUND * (p.bounds.1 - p.bounds.0);
+                let bounds =
+                    [p.bounds.0, p.bounds.1].into_iter().filter(|bound| (bound - p.neutral).abs() > near);
+                let Some(bound) = bounds.into_iter().find(|bound| (bound - estimate.value).abs() < near)
+                else {
+                    continue;
+                };
+                estimate.at_bound = true;
+                effect.weight = effect.weight.min(MAX_WEIGHT_AT_BOUND);
+                self.notes.push(format!(
+                    "{}.{} = {} stands at the bound of what is fitted, {bound}: something else may look like {0}",
+                    effect.name, p.name, estimate.value
+                ));
+            }
+        }
     }
 }

@@ -40,11 +40,8 @@ pub fn imprint_constant(presses: &[FittedPress]) -> Option<ImprintEstimate> {
     };
     let (cc, cf, ff) = (sum(&ln_c, c, &ln_c, c), sum(&ln_c, c, &ln_f, f), sum(&ln_f, f, &ln_f, f));
     let half = t_quantile_95(n - 1.0) * (cc / (n - 1.0) / n).sqrt();
-    let estimate = |value: f64, low90: f64, high90: f64, unit: &str| ParameterEstimate {
-        value,
-        low90,
-        high90,
-        unit: unit.into(),
+    let estimate = |value: f64, low90: f64, high90: f64, unit: &str| {
+        ParameterEstimate::new(value, (low90, high90), unit)
     };
     let (least, most) =
         ln_f.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), &x| (l.min(x), m.max(x)));

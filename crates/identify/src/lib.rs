@@ -26,6 +26,7 @@ mod grouped;
 mod imprint;
 mod least_squares;
 mod permutation;
+mod plain;
 mod presses;
 pub mod pulls;
 mod sensor;
@@ -34,7 +35,7 @@ mod separate;
 pub use campaign::{CampaignError, CampaignOptions, DWELLS_S, FORCES_N, NO_LOAD_S, plan_campaign};
 pub use diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy,
-    HeldOutError, NamedEffect, ParameterEstimate, Rival, SeparateBy, UnknownCovariate, Verdict,
+    HeldOutError, Hint, NamedEffect, ParameterEstimate, Rival, SeparateBy, UnknownCovariate, Verdict,
 };
 pub use draws::Draws;
 pub use grouped::{
@@ -44,6 +45,7 @@ pub use grouped::{
 pub use imprint::{FittedPress, ImprintEstimate, imprint_constant};
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
+pub use plain::{left, plain};
 pub use presses::{
     ActingEffect, MIN_DIAGNOSED_PRESSES, PRESS_ZONES, PredictPresses, PressCovariate, PressData,
     PressDiagnosis, PressPixels, PressTrial, PressValues, diagnose_presses, too_few_presses,

@@ -8,6 +8,7 @@
 mod answer;
 mod candidates;
 mod gains;
+mod left;
 mod model;
 mod observed;
 mod power;

@@ -6,13 +6,13 @@ use crate::twin_edits::{TwinEdits, effect_entry, put_estimate};
 use gripgen_identify::{ActingEffect, Diagnosis};
 
 /// Says before the other notes what was not recorded, and how the marks and the frame without contact fit; `scatter_px`:
-/// how far circles were moved before anything was fitted, centres and radii.
+/// how far circles were moved before anything was fitted, centres and radii, where there are any.
 pub(super) fn remark(
     diagnosis: &mut Diagnosis,
     input: &PressDiagnosisInput<'_>,
     work: &Work<'_>,
     acting: &[ActingEffect],
-    scatter_px: [f64; 2],
+    scatter_px: Option<[f64; 2]>,
 ) {
     let mut notes = Vec::new();
     if input.time_s.is_none() {
@@ -21,10 +21,11 @@ pub(super) fn remark(
             "no column `time_s`: the order of the presses is their clock, {ASSUMED_PRESS_S} s from one to the next"
         ));
     }
-    let [centre, radius] = scatter_px;
-    notes.push(format!(
-        "the marks scatter by {centre:.1} px in the centre and {radius:.1} px in the radius; fits are on straightened ones, errors on the marks as they are"
-    ));
+    if let Some([centre, radius]) = scatter_px {
+        notes.push(format!(
+            "the marks scatter by {centre:.1} px in the centre and {radius:.1} px in the radius; fits are on straightened ones, errors on the marks as they are"
+        ));
+    }
     if !input.marked {
         diagnosis.not_recorded.extend(["x_px".into(), "y_px".into()]);
         notes.push(

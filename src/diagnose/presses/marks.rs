@@ -19,10 +19,14 @@ const MAX_PX: f64 = 8.0;
 const ROUNDS: usize = 2;
 
 /// Moves the circles of the presses by what they deviate from a common displacement. Returns the root mean square of
-/// the moves of centre and radius, in pixels.
-pub(super) fn straighten(work: &mut Work<'_>) -> [f64; 2] {
+/// the moves of centre and radius, in pixels; `None` without balls.
+pub(super) fn straighten(work: &mut Work<'_>) -> Option<[f64; 2]> {
     let n = work.views.len();
     let marked = work.circles.clone();
+    let balls = marked.iter().flatten().count();
+    if balls == 0 {
+        return None;
+    }
     for _ in 0..ROUNDS {
         let off = for_each(n, |i| deviation(work, i));
         let moved: Vec<[f64; 3]> = (0..n)
@@ -54,11 +58,11 @@ pub(super) fn straighten(work: &mut Work<'_>) -> [f64; 2] {
     }
     let square = |of: &dyn Fn(&Circle, &Circle) -> f64| {
         let all = work.circles.iter().zip(&marked).filter_map(|(a, b)| Some(of(a.as_ref()?, b.as_ref()?)));
-        (all.sum::<f64>() / n as f64).sqrt()
+        (all.sum::<f64>() / balls as f64).sqrt()
     };
     let centre = square(&|a, b| 0.5 * ((a.x_px - b.x_px).powi(2) + (a.y_px - b.y_px).powi(2)));
     let radius = square(&|a, b| (a.radius_px - b.radius_px).powi(2));
-    [centre, radius]
+    Some([centre, radius])
 }
 
 /// How far one press lies off its circle, (x, y, radius) in pixels of the images: linear least squares on the contact

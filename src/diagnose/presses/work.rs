@@ -87,9 +87,16 @@ pub(super) fn for_each<T: Send>(n: usize, of: impl Fn(usize) -> T + Sync) -> Vec
     in_parallel(n, std::thread::available_parallelism().map_or(1, usize::from), of)
 }
 
-/// Whether an effect differs from press to press by chance: each press says how.
-fn scatters(spec: &EffectSpec) -> bool {
-    spec.presses.is_some_and(|fit| fit.scatters)
+/// How many of the last parameters of an effect say how it differs from press to press by chance: each press says how.
+fn scatters(spec: &EffectSpec) -> usize {
+    spec.presses.map_or(0, |fit| fit.scatters)
+}
+
+/// An effect without what differs from press to press.
+fn shared(effect: &ActingEffect) -> Vec<f64> {
+    let own = effect.values.len() - scatters(effect.spec);
+    let neutral = effect.spec.parameters.iter().skip(own).map(|p| p.neutral);
+    effect.values.iter().take(own).copied().chain(neutral).collect()
 }
 
 /// What effects make of the optics in some circumstances.
@@ -103,9 +110,9 @@ pub(super) fn optics_at(covariates: &Covariates, acting: &[ActingEffect]) -> Opt
         grip: (0, 0),
     };
     let mut state = OpticsState::default();
-    for effect in acting.iter().filter(|effect| !scatters(effect.spec)) {
+    for effect in acting {
         if let Some(hook) = effect.spec.optics {
-            hook(&effect.values, &mut state, &at);
+            hook(&shared(effect), &mut state, &at);
         }
     }
     state
@@ -148,8 +155,11 @@ impl PredictPresses for Work<'_> {
     }
 
     fn frame_mse(&self, press: usize, acting: &[ActingEffect]) -> f64 {
-        let scatter = acting.iter().find(|effect| scatters(effect.spec));
-        let named = scatter.and_then(|effect| effect.values.clone().try_into().ok());
+        let named = acting.iter().find_map(|effect| {
+            let own = effect.values.len() - scatters(effect.spec);
+            let sd: [f64; 3] = effect.values[own..].try_into().ok()?;
+            (sd != [0.0; 3]).then_some(sd)
+        });
         let known = self.full.sensor().press_gain_sd.map(|sd| sd.map(f64::from));
         frame_mse(self.set, press, &self.full, &self.optics(press, acting), named.or(known))
     }

@@ -1,6 +1,7 @@
 //! From what was found to the answer.
 
 use super::candidates::tried;
+use super::left::Left;
 use super::observed::Observed;
 use super::power::would_have_seen;
 use super::score::hash;
@@ -9,7 +10,7 @@ use super::unnamed::{PressCovariate, PressValues};
 use super::{PressData, PressDiagnosis};
 use crate::{
     Channel, DataSummary, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, HeldOutError, NamedEffect,
-    ParameterEstimate, Rival, SeparateBy, UnknownCovariate, grouped_intervals,
+    ParameterEstimate, Rival, SeparateBy, UnknownCovariate, grouped_intervals, left,
 };
 use gripgen_twin::effects::{Measured, separating};
 use std::collections::BTreeMap;
@@ -53,6 +54,7 @@ impl Answer<'_> {
             p_value: p.max(1e-6),
         };
         diagnosis.unknown = self.found.unknown.iter().map(unknown).collect();
+        diagnosis.hints.clone_from(&self.found.hints);
         diagnosis.conclude();
         diagnosis.would_have_seen = would_have_seen(self.observed, &self.found);
         diagnosis.would_have_seen.extend(self.found.scatter.seen_from.clone());
@@ -66,6 +68,9 @@ impl Answer<'_> {
             after: drawn.after,
             by: ErrorsBy { levels: None, sessions: Some(pair(&errors.after_blocks)) },
         });
+        if let Some(times) = left(&diagnosis) {
+            diagnosis.notes.push(Left::of(self.observed, &self.found.model.acting).text(times));
+        }
         diagnosis.notes.push("`by.sessions` holds out blocks of presses that follow one another".into());
         PressDiagnosis {
             diagnosis,
@@ -88,16 +93,14 @@ impl Answer<'_> {
                 for (k, &(effect, j)) in model.free.iter().enumerate() {
                     if effect == e {
                         let p = &acting.spec.parameters[j];
-                        let (low90, high90) = intervals[k];
-                        let estimate =
-                            ParameterEstimate { value: acting.values[j], low90, high90, unit: p.unit.into() };
+                        let estimate = ParameterEstimate::new(acting.values[j], intervals[k], p.unit);
                         parameters.insert(p.name.to_string(), estimate);
                     }
                 }
                 if let Some(j) = tried(acting.spec) {
                     let value = acting.values[j];
-                    let (low90, high90) = if value > 0.0 { (value - 1.0, value + 1.0) } else { (0.0, 0.0) };
-                    let estimate = ParameterEstimate { value, low90, high90, unit: "1".into() };
+                    let interval = if value > 0.0 { (value - 1.0, value + 1.0) } else { (0.0, 0.0) };
+                    let estimate = ParameterEstimate::new(value, interval, "1");
                     parameters.insert(acting.spec.parameters[j].name.into(), estimate);
                 }
                 let (own, rivals) = self.weights(e);
@@ -116,19 +119,23 @@ impl Answer<'_> {
                 (self.found.gains.get(e).copied().unwrap_or(0.0), named)
             })
             .collect();
-        list.extend(self.scatter());
+        self.add_scatter(&mut list);
         list.sort_by(|a, b| b.1.weight.total_cmp(&a.1.weight).then(b.0.total_cmp(&a.0)));
         list.into_iter().map(|(_, named)| named).collect()
     }
 
-    /// Gains that differ from press to press, with what they took off.
-    fn scatter(&self) -> Option<(f64, NamedEffect)> {
-        let acting = self.found.scatter.named.as_ref()?;
-        let values = acting.values.iter().zip(&self.found.scatter.intervals);
-        let estimates = values.map(|(&value, &(low90, high90))| (value, low90, high90));
-        let parameters = acting.spec.parameters.iter().zip(estimates).map(|(p, (value, low90, high90))| {
-            (p.name.to_string(), ParameterEstimate { value, low90, high90, unit: p.unit.into() })
+    /// Adds gains that differ from press to press, with what they took off; to their like, where it was found.
+    fn add_scatter(&self, list: &mut Vec<(f64, NamedEffect)>) {
+        let Some(acting) = &self.found.scatter.named else { return };
+        let from = acting.values.len() - 3;
+        let values = acting.values[from..].iter().zip(&self.found.scatter.intervals);
+        let parameters = acting.spec.parameters[from..].iter().zip(values).map(|(p, (value, interval))| {
+            (p.name.to_string(), ParameterEstimate::new(*value, *interval, p.unit))
         });
+        if let Some((_, like)) = list.iter_mut().find(|(_, named)| named.name == acting.spec.id) {
+            like.parameters.extend(parameters);
+            return;
+        }
         let named = NamedEffect {
             name: acting.spec.id.into(),
             part: None,
@@ -138,7 +145,7 @@ impl Answer<'_> {
             parameters: parameters.collect(),
             indistinguishable_from: Vec::new(),
         };
-        Some((self.found.scatter.trial.as_ref().map_or(0.0, |trial| trial.gain), named))
+        list.push((self.found.scatter.trial.as_ref().map_or(0.0, |trial| trial.gain), named));
     }
 
     /// Shares of the evidence: an effect, and its rivals.
@@ -200,7 +207,7 @@ impl Answer<'_> {
                 return before.clone();
             }
             let mut by_fold = model.by_fold(&self.found.design.weights, folds);
-            by_fold.iter_mut().for_each(|acting| acting.extend(scatter.clone()));
+            by_fold.iter_mut().for_each(|acting| *acting = self.found.scatter.beside(std::mem::take(acting)));
             self.observed.for_each(n, |i| predictor.frame_mse(i, &by_fold[folds[i]]))
         };
         let after = held_out(&self.found.design.folds);

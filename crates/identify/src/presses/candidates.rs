@@ -20,8 +20,8 @@ pub(super) fn tried(spec: &EffectSpec) -> Option<usize> {
 
 /// Positions of the parameters that are fitted.
 pub(super) fn fitted(spec: &EffectSpec) -> Vec<usize> {
-    let scatters = spec.presses.is_some_and(|fit| fit.scatters);
-    (0..spec.parameters.len()).filter(|&j| !scatters && tried(spec) != Some(j)).collect()
+    let scatters = spec.presses.map_or(0, |fit| fit.scatters);
+    (0..spec.parameters.len() - scatters).filter(|&j| tried(spec) != Some(j)).collect()
 }
 
 /// A fitted parameter with its start; `px_mm`: side of a pixel on the gel.
@@ -34,5 +34,5 @@ pub(super) fn free_parameter(spec: &EffectSpec, j: usize, px_mm: f64) -> FreePar
 /// The candidates that are fitted, of those that presses can speak of.
 pub(super) fn candidates(known: &[PressNeeds]) -> Vec<&'static EffectSpec> {
     let speaks = |fit: &PressFit| fit.needs == PressNeeds::Nothing || known.contains(&fit.needs);
-    press_effects().filter(|(_, fit)| !fit.scatters && speaks(fit)).map(|(spec, _)| spec).collect()
+    press_effects().filter(|(_, fit)| speaks(fit)).map(|(spec, _)| spec).collect()
 }

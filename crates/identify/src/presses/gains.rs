@@ -30,12 +30,27 @@ const MIN_PRESSES_PER_SIDE: usize = 3;
 pub(super) struct Scatter {
     /// The effect, where it is one.
     pub(super) named: Option<ActingEffect>,
-    /// 90 % intervals of its values.
-    pub(super) intervals: Vec<(f64, f64)>,
+    /// 90 % intervals of the standard deviations.
+    pub(super) intervals: [(f64, f64); 3],
     /// How it did.
     pub(super) trial: Option<PressTrial>,
     /// The scatter that would have been found.
     pub(super) seen_from: Option<(String, Detectable)>,
+}
+
+impl Scatter {
+    /// Some effects with this one, as one with its like.
+    pub(super) fn beside(&self, mut acting: Vec<ActingEffect>) -> Vec<ActingEffect> {
+        let Some(own) = &self.named else { return acting };
+        match acting.iter_mut().find(|effect| effect.spec == own.spec) {
+            Some(like) => {
+                let from = like.values.len() - 3;
+                like.values[from..].copy_from_slice(&own.values[from..]);
+            }
+            None => acting.push(own.clone()),
+        }
+        acting
+    }
 }
 
 /// Looks whether presses have gains of their own, and lets `observed` divide them from then on if they have, or if the sensor
@@ -46,8 +61,8 @@ pub(super) fn scatter(
     covariates: &[PressCovariate],
     known: Option<[f64; 3]>,
 ) -> Scatter {
-    let nothing = Scatter { named: None, intervals: Vec::new(), trial: None, seen_from: None };
-    let Some((spec, _)) = press_effects().find(|(_, fit)| fit.scatters) else { return nothing };
+    let nothing = Scatter { named: None, intervals: [(0.0, 0.0); 3], trial: None, seen_from: None };
+    let Some((spec, _)) = press_effects().find(|(_, fit)| fit.scatters == 3) else { return nothing };
     observed.rescale(&[]);
     let plain = observed.pixel_costs(&[]);
     observed.divide_gains();
@@ -70,8 +85,9 @@ pub(super) fn scatter(
         && gain > least
         && share_off > SURE * share_error;
     let is_new = known.is_none_or(|known| square(&sd) > ABOVE_KNOWN * ABOVE_KNOWN * square(&known));
-    let values = sd.map(|sd| sd.clamp(0.0, 0.5));
-    let text = spec.parameters.iter().zip(values).map(|(p, v)| format!("{} {v:.3}", p.name));
+    let sd = sd.map(|sd| sd.clamp(0.0, 0.5));
+    let own = &spec.parameters[spec.parameters.len() - 3..];
+    let text = own.iter().zip(sd).map(|(p, v)| format!("{} {v:.3}", p.name));
     let trial = PressTrial {
         round: 0,
         name: spec.id.into(),
@@ -86,8 +102,10 @@ pub(super) fn scatter(
     if is_there && is_new {
         // Of the logarithm of a standard deviation: 1 / sqrt(2 freedom).
         let factor = libm::exp(1.645 / (2.0 * freedom.max(1.0)).sqrt());
-        let intervals = values.iter().map(|sd| (sd / factor, sd * factor)).collect();
-        let named = Some(ActingEffect { spec, values: values.to_vec(), fitted: 0 });
+        let intervals = sd.map(|sd| (sd / factor, sd * factor));
+        let neutral = spec.parameters.iter().map(|p| p.neutral);
+        let values = neutral.take(spec.parameters.len() - 3).chain(sd).collect();
+        let named = Some(ActingEffect { spec, values, fitted: 0 });
         return Scatter { named, intervals, trial: Some(trial), seen_from: None };
     }
     // The cost that a scatter takes off goes with its square.
@@ -95,7 +113,7 @@ pub(super) fn scatter(
     let of_known = known.map_or(0.0, |known| ABOVE_KNOWN * ABOVE_KNOWN * square(&known));
     let of_noise = ABOVE_NOISE * ABOVE_NOISE * square(&noise);
     let value = (of_cost.max(of_known).max(of_noise) / 3.0).sqrt().clamp(1e-4, 0.5);
-    let parameter = spec.presses.map_or("", |fit| fit.main).into();
+    let parameter = own[0].name.into();
     let seen_from = Some((spec.id.into(), Detectable { parameter, value, power: 0.8 }));
     Scatter { trial: Some(trial), seen_from, ..nothing }
 }

@@ -128,10 +128,9 @@ pub(super) fn moments_from(
     fill: impl Fn(usize, usize, &mut [f64]),
 ) -> GroupMoments {
     let weights = observed.pixel_weights(press);
-    let gain_weight = observed.gain_weight(press);
     let mut moments = GroupMoments::zero(n);
     let mut row = vec![0.0; n];
-    if gain_weight == 0.0 {
+    let Some(gain_weights) = observed.gain_weights(press) else {
         for (k, weight) in weights.iter().enumerate() {
             for c in 0..3 {
                 fill(k, c, &mut row);
@@ -140,7 +139,7 @@ pub(super) fn moments_from(
         }
         moments.finish();
         return moments;
-    }
+    };
     // [pixel][channel] x n derivatives.
     let mut rows = vec![0.0; 3 * weights.len() * n];
     for (i, row) in rows.chunks_exact_mut(n.max(1)).enumerate() {
@@ -160,7 +159,7 @@ pub(super) fn moments_from(
     }
     for c in 0..3 {
         row.iter_mut().zip(&gains).for_each(|(r, g)| *r = g[c]);
-        moments.add(gain[c], &row, gain_weight);
+        moments.add(gain[c], &row, gain_weights[c]);
     }
     moments.finish();
     moments

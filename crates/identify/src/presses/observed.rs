@@ -9,13 +9,15 @@ pub(super) struct Observed<'a> {
     /// Of each press.
     pub(super) pixels: Vec<PressPixels>,
     /// Mean square that counts as 1, of each zone.
-    zone_scale: [f64; ZONES],
+    zone_scale: [f64; PRESS_ZONES],
+    /// Square of a gain that counts as 1, of each channel: a camera that balances white leaves green alone.
+    gain_scale: [f64; 3],
     /// Where each press has gains of its own: the levels at its pixels without effects, on which they act.
     gains: Option<Vec<Vec<[f32; 3]>>>,
 }
 
-/// The zones of the pixels, and the gains of the press as a further one.
-const ZONES: usize = PRESS_ZONES + 1;
+/// Mean squared residual of a press in each zone, and the squares of its gains.
+type PressSquares = ([f64; PRESS_ZONES], [f64; 3]);
 
 /// Smallest scatter of gains that counts as 1.
 const MIN_GAIN: f64 = 1e-3;
@@ -24,7 +26,7 @@ impl<'a> Observed<'a> {
     /// All zones count by their own scatter after [`Observed::rescale`] only.
     pub(super) fn new(predictor: &'a dyn PredictPresses) -> Self {
         let pixels = (0..predictor.circumstances().len()).map(|i| predictor.pixels(i)).collect();
-        Self { predictor, pixels, zone_scale: [1.0; ZONES], gains: None }
+        Self { predictor, pixels, zone_scale: [1.0; PRESS_ZONES], gain_scale: [1.0; 3], gains: None }
     }
 
     /// From here on each press has gains of its own: pixels are compared without them, and the gains with those that a model
@@ -36,6 +38,11 @@ impl<'a> Observed<'a> {
     /// As before [`Observed::divide_gains`].
     pub(super) fn keep_gains(&mut self) {
         self.gains = None;
+    }
+
+    /// Whether presses have gains of their own.
+    pub(super) fn divides_gains(&self) -> bool {
+        self.gains.is_some()
     }
 
     /// The gain of each channel that a change of the levels at the pixels of a press amounts to, as a share; 0 where nothing is
@@ -72,12 +79,10 @@ impl<'a> Observed<'a> {
         }
     }
 
-    /// Weight of each of the three gains of a press; 0 where presses have none of their own.
-    pub(super) fn gain_weight(&self, press: usize) -> f64 {
-        if self.gains.is_none() {
-            return 0.0;
-        }
-        1.0 / (self.zones_there(press) * 3.0 * self.zone_scale[PRESS_ZONES])
+    /// Weights of the three gains of a press; `None` where presses have none of their own.
+    pub(super) fn gain_weights(&self, press: usize) -> Option<[f64; 3]> {
+        self.gains.as_ref()?;
+        Some(self.gain_scale.map(|scale| 1.0 / (self.zones_there(press) * 3.0 * scale)))
     }
 
     /// Zones that a press has.
@@ -115,20 +120,36 @@ impl<'a> Observed<'a> {
     /// Measures the zones by what a model leaves in them: the median over the presses, so that each counts alike.
     pub(super) fn rescale(&mut self, model: &[ActingEffect]) {
         let squares = self.zone_squares(model);
-        let noise = self.predictor.noise_mse();
-        for (z, scale) in self.zone_scale.iter_mut().enumerate() {
-            let mut list: Vec<f64> = squares.iter().map(|s| s[z]).filter(|s| s.is_finite()).collect();
+        let median = |of: &dyn Fn(&PressSquares) -> f64| {
+            let mut list: Vec<f64> = squares.iter().map(of).filter(|s| s.is_finite()).collect();
             list.sort_by(f64::total_cmp);
-            let least = if z < PRESS_ZONES { noise.max(0.02) } else { MIN_GAIN * MIN_GAIN };
-            *scale = list.get(list.len() / 2).copied().unwrap_or(1.0).max(least);
-        }
+            list.get(list.len() / 2).copied().unwrap_or(1.0)
+        };
+        let noise = self.predictor.noise_mse();
+        self.zone_scale = std::array::from_fn(|z| median(&|(zones, _)| zones[z]).max(noise.max(0.02)));
+        self.gain_scale = std::array::from_fn(|c| median(&|(_, gains)| gains[c]).max(MIN_GAIN * MIN_GAIN));
     }
 
-    /// Mean squared residual in each zone of each press; NaN where a zone is empty.
-    fn zone_squares(&self, model: &[ActingEffect]) -> Vec<[f64; ZONES]> {
+    /// Mean squared residual in each zone and channel of a press, without its gain; NaN where a zone is empty.
+    pub(super) fn squares(&self, press: usize, model: &[ActingEffect]) -> [[f64; 3]; PRESS_ZONES] {
+        let levels = self.levels(press, model);
+        let pixels = &self.pixels[press];
+        let off = |k: usize, c: usize| f64::from(levels[k][c] - pixels.measured[k][c]);
+        let gain = self.gain_of(press, off);
+        let (mut sums, mut counts) = ([[0.0; 3]; PRESS_ZONES], [0.0; PRESS_ZONES]);
+        for (k, zone) in pixels.zones.iter().enumerate() {
+            let gained = self.gained(press, k, gain);
+            (0..3).for_each(|c| sums[place(*zone)][c] += (off(k, c) - gained[c]).powi(2));
+            counts[place(*zone)] += 1.0;
+        }
+        std::array::from_fn(|z| sums[z].map(|sum| sum / counts[z]))
+    }
+
+    /// Mean squared residual in each zone of each press, NaN where a zone is empty, and the squares of its gains.
+    fn zone_squares(&self, model: &[ActingEffect]) -> Vec<PressSquares> {
         self.for_each(self.count(), |i| {
             let levels = self.levels(i, model);
-            let (mut sums, mut counts) = ([0.0; ZONES], [0.0; ZONES]);
+            let (mut sums, mut counts) = ([0.0; PRESS_ZONES], [0.0; PRESS_ZONES]);
             let pixels = &self.pixels[i];
             let off = |k: usize, c: usize| f64::from(levels[k][c] - pixels.measured[k][c]);
             let gain = self.gain_of(i, off);
@@ -139,15 +160,14 @@ impl<'a> Observed<'a> {
                     counts[place(*zone)] += 1.0;
                 }
             }
-            (sums[PRESS_ZONES], counts[PRESS_ZONES]) = (gain.iter().map(|g| g * g).sum(), 3.0);
-            std::array::from_fn(|z| sums[z] / counts[z])
+            (std::array::from_fn(|z| sums[z] / counts[z]), gain.map(|g| g * g))
         })
     }
 
     /// Cost of the pixels of each press under a model, all zones alike.
     pub(super) fn pixel_costs(&self, model: &[ActingEffect]) -> Vec<f64> {
-        let of_press = |squares: [f64; ZONES]| {
-            let there = squares.iter().zip(&self.zone_scale).take(PRESS_ZONES).filter(|(s, _)| s.is_finite());
+        let of_press = |(squares, _): PressSquares| {
+            let there = squares.iter().zip(&self.zone_scale).filter(|(s, _)| s.is_finite());
             let (n, sum) = there.fold((0.0, 0.0), |(n, sum), (s, scale)| (n + 1.0, sum + s / scale));
             sum / f64::max(n, 1.0)
         };
@@ -158,7 +178,7 @@ impl<'a> Observed<'a> {
     pub(super) fn zone_mse(&self, model: &[ActingEffect]) -> [f64; PRESS_ZONES] {
         let squares = self.zone_squares(model);
         std::array::from_fn(|z| {
-            let there: Vec<f64> = squares.iter().map(|s| s[z]).filter(|s| s.is_finite()).collect();
+            let there: Vec<f64> = squares.iter().map(|(s, _)| s[z]).filter(|s| s.is_finite()).collect();
             there.iter().sum::<f64>() / there.len().max(1) as f64
         })
     }

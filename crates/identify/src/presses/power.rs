@@ -15,7 +15,7 @@ pub(super) fn would_have_seen(observed: &Observed<'_>, found: &Found) -> BTreeMa
     let base = found.cost;
     let mut sizes = BTreeMap::new();
     for (spec, fit) in press_effects() {
-        if fit.scatters || found.model.acting.iter().any(|a| a.spec == spec) {
+        if found.model.acting.iter().any(|a| a.spec == spec) {
             continue;
         }
         let scatter = found.trials.iter().rev().find(|t| t.name == spec.id).map_or(0.0, |t| t.standard_error);

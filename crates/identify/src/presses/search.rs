@@ -6,6 +6,7 @@ use super::observed::Observed;
 use super::predict::{ActingEffect, PRESS_ZONES};
 use super::score::{Base, Design, MATERIAL, PressTrial, SURE, Scored, differences, scored, with};
 use super::unnamed::{Fields, PressCovariate, Unnamed};
+use crate::Hint;
 use gripgen_twin::effects::EffectSpec;
 
 /// Least gain, as [`MATERIAL`], of an effect that is drawn: the sharpness with which any sensor file draws a contact is not quite that of its
@@ -28,6 +29,12 @@ const LEFT: f64 = 0.15;
 /// Effects at most.
 const MAX_EFFECTS: usize = 3;
 
+/// Least gain, as [`MATERIAL`], of what is mentioned.
+const MIN_HINT: f64 = 0.01;
+
+/// An effect leaves each zone at most this factor worse.
+const WORSE: f64 = 1.05;
+
 /// A rival whose loss is less than this share of the gain is named beside the effect.
 const NEAR: f64 = 0.05;
 
@@ -48,6 +55,8 @@ pub(super) struct Found {
     /// Gain of each effect: what the error rises by without it.
     pub(super) gains: Vec<f64>,
     pub(super) unknown: Vec<(String, f64, f64)>,
+    /// What would have lowered the error by too little.
+    pub(super) hints: Vec<Hint>,
     pub(super) trials: Vec<PressTrial>,
     pub(super) design: Design,
     /// Mean cost with the model.
@@ -66,19 +75,28 @@ impl Found {
         scatter: Scatter,
         zone_mse: [f64; PRESS_ZONES],
     ) -> Self {
-        let (rivals, gains, unknown) = (Vec::new(), Vec::new(), Vec::new());
-        Self { model, rivals, gains, unknown, trials, design, cost: 0.0, scatter, zone_mse }
+        let (rivals, gains, unknown, hints) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { model, rivals, gains, unknown, hints, trials, design, cost: 0.0, scatter, zone_mse }
     }
 
     /// All effects that were named.
     pub(super) fn acting(&self) -> Vec<ActingEffect> {
-        self.model.acting.iter().chain(&self.scatter.named).cloned().collect()
+        self.scatter.beside(self.model.acting.clone())
     }
 }
 
 /// Whether a gain counts.
 fn counts(gain: f64, standard_error: f64, least: f64) -> bool {
     gain > least && gain > SURE * standard_error
+}
+
+/// Whether an effect lowers the costs of presses surely: by their differences, or by their shares where an effect that grows
+/// with the order does nothing to the first presses.
+fn is_sure(design: &Design, before: &[f64], after: &[f64]) -> bool {
+    let (gain, error) = design.mean(&differences(before, after));
+    let shares: Vec<f64> = before.iter().zip(after).map(|(b, a)| (b - a) / (b + a).max(1e-300)).collect();
+    let (share, share_error) = design.mean(&shares);
+    gain > SURE * error || gain > 0.0 && share > SURE * share_error
 }
 
 /// Runs the search. `progress` hears what is done, from 0 to 1.
@@ -95,6 +113,7 @@ pub(super) fn search(
     let zone_mse = if press_gain_sd.is_some() { observed.zone_mse(&[]) } else { plain };
     let mut model = scored(observed, &design, Vec::new());
     let mut trials: Vec<PressTrial> = scatter.trial.clone().into_iter().collect();
+    let mut hints: Vec<Hint> = Vec::new();
     for round in 0..=MAX_EFFECTS {
         observed.rescale(&model.acting);
         let costs: Vec<f64> = scored(observed, &design, Vec::new()).held_out;
@@ -108,6 +127,7 @@ pub(super) fn search(
         let left: Vec<_> =
             candidates.iter().filter(|s| model.acting.iter().all(|a| a.spec != **s)).copied().collect();
         let ground = Base::new(observed, &model);
+        hints.clear();
         for (k, spec) in left.iter().enumerate() {
             let share = (round as f64 + k as f64 / left.len() as f64) / (MAX_EFFECTS + 1) as f64;
             progress(share, spec.id);
@@ -124,7 +144,13 @@ pub(super) fn search(
                 cost: base - gain,
                 values: values_text(&tried),
             });
-            if counts(gain, standard_error, least) && best.as_ref().is_none_or(|(g, _)| gain > *g) {
+            hints.extend(hint(spec.id, gain, standard_error, least, base));
+            let is_sure = is_sure(&design, &model.held_out, &tried.held_out);
+            if gain > least
+                && is_sure
+                && best.as_ref().is_none_or(|(g, _)| gain > *g)
+                && spares_zones(observed, &model.acting, &tried.acting)
+            {
                 best = Some((gain, tried));
             }
         }
@@ -135,7 +161,35 @@ pub(super) fn search(
         model = dropped(observed, &design, model, MATERIAL * base / 2.0);
     }
     let found = Found::of(design, model, trials, scatter, zone_mse);
-    finish(observed, covariates, candidates, found, progress)
+    let mut found = finish(observed, covariates, candidates, found, progress);
+    hints.retain(|hint| found.acting().iter().all(|acting| acting.spec.id != hint.name));
+    hints.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    found.hints = hints;
+    found
+}
+
+/// A gain that is there and is too small to count.
+fn hint(name: &str, gain: f64, standard_error: f64, least: f64, base: f64) -> Option<Hint> {
+    let sure = gain > SURE * standard_error && gain > MIN_HINT * base;
+    (sure && gain <= least).then(|| Hint {
+        name: name.into(),
+        gain: 1.0 - (1.0 - gain / base).max(0.0).sqrt(),
+        reason: format!(
+            "it explains {:.1} % of the squared error, {:.0} % are needed for a name",
+            100.0 * gain / base,
+            100.0 * least / base
+        ),
+    })
+}
+
+/// Whether no zone gets worse by an effect, the last of `after`, and one of the whole frame is seen away from the contact: a
+/// field that is fitted to what the contact is drawn wrong by is not. Presses with gains of their own say the light there.
+fn spares_zones(observed: &Observed<'_>, before: &[ActingEffect], after: &[ActingEffect]) -> bool {
+    let (then, now) = (observed.zone_mse(before), observed.zone_mse(after));
+    let far = PRESS_ZONES - 1;
+    let of_frame = after.last().is_some_and(|last| !is_drawn(last.spec)) && !observed.divides_gains();
+    let seen_far = then[far] == 0.0 || now[far] < (1.0 - MATERIAL) * then[far];
+    (!of_frame || seen_far) && then.iter().zip(&now).all(|(then, now)| *now <= WORSE * then)
 }
 
 /// Without those effects whose loss is not felt any more.

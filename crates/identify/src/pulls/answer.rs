@@ -376,12 +376,9 @@ pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<Str
             let sd = fitted.covariance[(at, at)].max(0.0).sqrt();
             HALF90 * sd.max(MIN_SD * (value - p.neutral).abs())
         });
-        let estimate = ParameterEstimate {
-            value,
-            low90: (value - half).max(p.bounds.0.min(value)),
-            high90: (value + half).min(p.bounds.1.max(value)),
-            unit: p.unit.into(),
-        };
+        let low90 = (value - half).max(p.bounds.0.min(value));
+        let high90 = (value + half).min(p.bounds.1.max(value));
+        let estimate = ParameterEstimate::new(value, (low90, high90), p.unit);
         (p.name.to_string(), estimate)
     };
     spec.parameters.iter().enumerate().map(each).collect()
@@ -417,19 +414,17 @@ fn unknown(
 
 pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
     let mut values = BTreeMap::new();
-    let unit = |name: &str| if name.ends_with("_s") { "s" } else { "1" }.to_string();
+    let unit = |name: &str| if name.ends_with("_s") { "s" } else { "1" };
     for (k, name) in fitted.names.iter().enumerate() {
         if !(name.starts_with("parts.") || name.starts_with("robot.") || name == "kinetic_ratio") {
             continue;
         }
         let (value, half) = (fitted.values[k], HALF90 * fitted.covariance[(k, k)].max(0.0).sqrt());
-        let estimate =
-            ParameterEstimate { value, low90: value - half, high90: value + half, unit: unit(name) };
+        let estimate = ParameterEstimate::new(value, (value - half, value + half), unit(name));
         values.insert(name.clone(), estimate);
     }
     let m = &fitted.model;
-    let plain =
-        |value: f64, unit: &str| ParameterEstimate { value, low90: value, high90: value, unit: unit.into() };
+    let plain = |value: f64, unit: &str| ParameterEstimate::new(value, (value, value), unit);
     values.entry("robot.lag_s".into()).or_insert_with(|| plain(m.lag_s, "s"));
     values.entry("robot.dead_time_s".into()).or_insert_with(|| plain(m.dead_time_s, "s"));
     values.insert("scatter".into(), plain(scatter(m, fitted.likelihood.scale), "1"));

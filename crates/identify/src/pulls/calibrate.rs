@@ -261,16 +261,10 @@ fn laws(
         .filter_map(|part| {
             let law = of(fitted, normal, part)?;
             let (a, b, covariance, ends) = law;
-            let estimate = |value: f64, (low90, high90): (f64, f64), unit: &str| ParameterEstimate {
-                value,
-                low90,
-                high90,
-                unit: unit.into(),
-            };
             Some(OffsetLaw {
                 part: context.data.parts[part].clone(),
-                a: estimate(a, ends[0], "1"),
-                b_n: estimate(b, ends[1], "N"),
+                a: ParameterEstimate::new(a, ends[0], "1"),
+                b_n: ParameterEstimate::new(b, ends[1], "N"),
                 covariance,
                 largest_relative_sigma: largest(law),
                 of_three_levels: few.as_ref().and_then(|(few, normal)| of(few, normal, part)).map(largest),

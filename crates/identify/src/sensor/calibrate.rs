@@ -74,7 +74,7 @@ pub fn calibrate_sensor(data: &SensorData) -> Result<SensorCalibration, String> 
 
 /// Value and half length of its interval.
 pub(crate) fn estimate(value: f64, half90: f64, unit: &str) -> ParameterEstimate {
-    ParameterEstimate { value, low90: value - half90, high90: value + half90, unit: unit.into() }
+    ParameterEstimate::new(value, (value - half90, value + half90), unit)
 }
 
 /// The noise beside gain and offset.

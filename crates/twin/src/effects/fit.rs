@@ -145,9 +145,9 @@ pub struct PressFit {
     pub drawn: bool,
     /// What presses have to be known of, for it to show.
     pub needs: PressNeeds,
-    /// It is a gain of each colour that differs from press to press: each press says its own away from the contact, nothing is
-    /// fitted, and its parameters are how much the gains of red, green and blue scatter.
-    pub scatters: bool,
+    /// How many of its last parameters say how much it differs from press to press by chance. Each press says its own share
+    /// away from the contact, so these are not fitted: 3, of the gains of red, green and blue, or 0.
+    pub scatters: usize,
 }
 
 impl PressFit {
@@ -159,7 +159,7 @@ impl PressFit {
         orders: &[],
         drawn: true,
         needs: PressNeeds::Nothing,
-        scatters: false,
+        scatters: 0,
     };
 }
 

@@ -1,36 +1,48 @@
-//! A camera whose gains differ from grip to grip.
+//! A camera whose white balance is another one, or differs from grip to grip.
 
 use super::hooks::values;
 use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
 use crate::random::{Purpose, Stream};
 use crate::{Jaw, OpticsState};
 
-/// `press_gain`: the camera balances white, or exposes, by itself, so that each grip has a gain of its own for each colour,
-/// with and without contact. Repetitions of a grip share it, the jaws do not: each has its camera.
+/// `press_gain`: the camera balances white, or exposes, by itself, so that red and blue have another gain than green, and each
+/// grip has gains of its own, with and without contact. A gain that all colours share is one of `exposure`. Repetitions of
+/// a grip share their gains, the jaws do not: each has its camera.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "press_gain",
     group: Group::Optics,
-    about: "gain of each colour that differs from grip to grip",
-    formula: "I_c' = I_c exp(c_sd n), n a standard normal number for each grip, jaw and colour, c = red, green, blue",
+    about: "white balance that is another one, or differs from grip to grip",
+    formula: "I_c' = I_c g_c exp(c_sd n), g = red, 1, blue; n a standard normal number for each grip, jaw and colour, c = red, green, blue",
     source: "gains of 21 presses into a GelSight scatter by 4.6, 0.8 and 4.6 % (Zhao et al. 2024, FOTS: its published presses)",
-    parameters: &[scatter("red_sd"), scatter("green_sd"), scatter("blue_sd")],
+    parameters: &[
+        gain("red", "gain of red over that of green"),
+        gain("blue", "gain of blue over that of green"),
+        scatter("red_sd"),
+        scatter("green_sd"),
+        scatter("blue_sd"),
+    ],
     covariates: &[],
     optics: Some(optics),
-    sizes: 3,
-    plainly: "Each picture has a colour cast of its own: the camera balances white, or exposes, by itself.",
-    number_means: "red_sd = 0.05: the gain of red differs by 5 % (standard deviation) from grip to grip.",
+    sizes: 5,
+    plainly: "Pictures have a colour cast, all the same or each its own: the camera balances white, or exposes, by itself.",
+    number_means: "red = 1.05: red is 5 % brighter than it was; red_sd = 0.05: its gain differs by 5 % (standard deviation) from grip to grip.",
     remedy: "Switch the camera's automatic white balance, exposure and gain off, and take the presses again.",
     typical: &[("red_sd", 0.04), ("green_sd", 0.01), ("blue_sd", 0.04)],
     presses: Some(PressFit {
-        main: "red_sd",
-        start: |_, _| (0.0, 0.01),
+        main: "red",
+        start: |name, _| if name.ends_with("_sd") { (0.0, 0.01) } else { (1.0, 0.02) },
+        orders: &[2],
         drawn: false,
-        scatters: true,
+        scatters: 3,
         ..PressFit::DRAWN
     }),
     experiments: &[Experiment::FrameWithoutContact],
     ..EffectSpec::BARE
 };
+
+const fn gain(name: &'static str, about: &'static str) -> ParameterSpec {
+    ParameterSpec { name, unit: "1", neutral: 1.0, bounds: (0.5, 2.0), about }
+}
 
 const fn scatter(name: &'static str) -> ParameterSpec {
     let about = "standard deviation of the logarithm of the channel's gain";
@@ -38,7 +50,9 @@ const fn scatter(name: &'static str) -> ParameterSpec {
 }
 
 fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {
-    let sd: [f64; 3] = values(parameters);
+    let [red, blue, sd @ ..]: [f64; 5] = values(parameters);
+    state.light_gain[0] *= red;
+    state.light_gain[2] *= blue;
     let lane = match at.jaw {
         Jaw::Left => 0,
         Jaw::Right => 1,
@@ -55,10 +69,14 @@ mod tests {
     use crate::Covariates;
     use crate::effects::testing::grip;
 
-    fn gain(jaw: Jaw, grip_key: (u64, u64), parameters: [f64; 3]) -> [f64; 3] {
+    fn gain(jaw: Jaw, grip_key: (u64, u64), sd: [f64; 3]) -> [f64; 3] {
         let c = Covariates::default();
         let mut state = OpticsState::default();
-        optics(&parameters, &mut state, &GripPoint { jaw, grip: grip_key, ..grip(&c, 40.0) });
+        optics(
+            &[1.0, 1.0, sd[0], sd[1], sd[2]],
+            &mut state,
+            &GripPoint { jaw, grip: grip_key, ..grip(&c, 40.0) },
+        );
         state.light_gain
     }
 
@@ -93,5 +111,12 @@ mod tests {
         assert_eq!(gain(Jaw::Left, (1, 2), sd), gain(Jaw::Left, (1, 2), sd));
         assert_ne!(gain(Jaw::Left, (1, 2), sd), gain(Jaw::Left, (2, 2), sd));
         assert_eq!(gain(Jaw::Right, (1, 2), [0.0; 3]), [1.0; 3]);
+    }
+
+    #[test]
+    fn a_white_balance_that_stays_is_its_two_gains() {
+        let (c, mut state) = (Covariates::default(), OpticsState::default());
+        optics(&[1.06, 0.94, 0.0, 0.0, 0.0], &mut state, &grip(&c, 40.0));
+        assert_eq!(state.light_gain, [1.06, 1.0, 0.94]);
     }
 }

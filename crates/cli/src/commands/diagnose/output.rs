@@ -3,7 +3,7 @@
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print, write_file};
-use gripgen::identify::{Diagnosis, HeldOutError, Verdict};
+use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, Verdict};
 use gripgen::record::campaign_toml;
 use gripgen::{Diagnosed, Location, NextPulls, diagnosis_page, write_twin};
 use std::fmt::Write;
@@ -80,6 +80,19 @@ pub fn next_toml(next: &NextPulls, measured: &Path) -> String {
     campaign_toml(&next.campaign, &about)
 }
 
+/// Parameters of an effect that are shown; a background has dozens.
+const SHOWN: usize = 8;
+
+/// The parameters of an effect by name, the largest ones where there are many.
+fn largest(effect: &NamedEffect) -> Vec<(&String, &ParameterEstimate)> {
+    let mut all: Vec<_> = effect.parameters.iter().collect();
+    if all.len() > SHOWN {
+        all.sort_by(|a, b| b.1.value.abs().total_cmp(&a.1.value.abs()));
+        all.truncate(SHOWN);
+    }
+    all
+}
+
 /// A few lines for people.
 fn summary(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
@@ -90,11 +103,20 @@ fn summary(diagnosis: &Diagnosis) -> String {
         Verdict::Insufficient => "the data cannot answer",
     };
     let _ = writeln!(text, "verdict: {word}");
+    if let Some(plain) = &diagnosis.plain {
+        let _ = writeln!(text, "  {plain}");
+    }
     for effect in &diagnosis.effects {
         let _ = writeln!(text, "  {} (weight {:.2})", effect.name, effect.weight);
-        for (name, p) in &effect.parameters {
+        for (name, p) in largest(effect) {
             let unit = if p.unit == "1" { "" } else { &p.unit };
-            let _ = writeln!(text, "    {name} = {:.4} {unit} ({:.4} to {:.4})", p.value, p.low90, p.high90);
+            let end = if p.at_bound { ", at its bound" } else { "" };
+            let _ =
+                writeln!(text, "    {name} = {:.4} {unit} ({:.4} to {:.4}){end}", p.value, p.low90, p.high90);
+        }
+        let more = effect.parameters.len().saturating_sub(SHOWN);
+        if more > 0 {
+            let _ = writeln!(text, "    and {more} smaller ones (--json has them)");
         }
         for rival in &effect.indistinguishable_from {
             let _ = writeln!(text, "    not told apart from {} (weight {:.2})", rival.name, rival.weight);
@@ -102,6 +124,9 @@ fn summary(diagnosis: &Diagnosis) -> String {
         if let Some(separate) = &effect.separate_by {
             let _ = writeln!(text, "    to tell them apart: {}", separate.text);
         }
+    }
+    for hint in &diagnosis.hints {
+        let _ = writeln!(text, "  looked like {}: {}", hint.name, hint.reason);
     }
     for unknown in &diagnosis.unknown {
         let _ = writeln!(

@@ -11,14 +11,6 @@ use gripgen::{
 /// Diagnoses the presses of the arguments.
 pub fn presses(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
     let (sensor, set) = load_sensor_and_presses(&args.measured, args.sensor.as_deref(), &args.twin)?;
-    let bodies = set.presses.iter().filter(|press| press.indenter.is_some()).count();
-    if bodies > 0 {
-        let (path, n) = (args.measured.display(), set.presses.len());
-        return Err(Failure::usage(format!(
-            "{path}: {bodies} of {n} presses are of a mesh; diagnose reads presses of a ball"
-        ))
-        .hint("leave their rows out of presses.csv; `gripgen compare` and `calibrate presses` read them"));
-    }
     let columns = load_press_columns(&args.measured).map_err(Failure::usage)?;
     let presses = measured_presses(set, columns, &sensor);
     say_circles(&presses.circles, &args.talk);

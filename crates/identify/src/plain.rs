@@ -1,0 +1,133 @@
+//! The answer in a sentence or two for a technician: what acts in the words of the catalogue, and what it does to the error.
+
+use crate::diagnosis::{Channel, Diagnosis, HeldOutError, Verdict};
+use gripgen_twin::effects::find;
+
+/// From this many times the noise of the camera on what is left of images is said.
+pub const FAR_ABOVE_NOISE: f64 = 10.0;
+
+/// What a diagnosis says, without names of effects and parameters.
+pub fn plain(d: &Diagnosis) -> String {
+    let mut text = match d.verdict {
+        Verdict::Insufficient => {
+            return match d.notes.first() {
+                Some(note) => format!("The data cannot answer: {note}."),
+                None => "The data cannot answer.".into(),
+            };
+        }
+        Verdict::None => "Nothing was found that the model lacks.".into(),
+        Verdict::Unknown => format!("Something that the library has no name for goes with {}.", unknown(d)),
+        Verdict::Effect => named(d),
+    };
+    text += &error(d);
+    text += &left(d).map_or(String::new(), |times| {
+        format!(
+            " What is left is still {times:.0} times the noise of the camera: the model is not right there."
+        )
+    });
+    text
+}
+
+/// How many times the noise what is left of images is, where that is far.
+pub fn left(d: &Diagnosis) -> Option<f64> {
+    let times = d.error.as_ref()?.after.mse? / d.noise_floor_mse.filter(|floor| *floor > 0.0)?;
+    (times > FAR_ABOVE_NOISE).then_some(times)
+}
+
+fn named(d: &Diagnosis) -> String {
+    let mut sentences: Vec<String> = Vec::new();
+    for effect in &d.effects {
+        let plainly = find(&effect.name).map_or(effect.name.as_str(), |spec| spec.plainly);
+        let part = effect.part.as_ref().map_or(String::new(), |part| format!(" (Seen on {part} only.)"));
+        sentences.push(format!("{plainly}{part}"));
+        if effect.parameters.values().any(|p| p.at_bound) {
+            sentences.push(
+                "Its value stands at the end of what is fitted, so something else may look like it.".into(),
+            );
+        }
+    }
+    if !d.unknown.is_empty() {
+        sentences.push(format!("Beside it something without a name goes with {}.", unknown(d)));
+    }
+    sentences.join(" ")
+}
+
+fn unknown(d: &Diagnosis) -> String {
+    let names: Vec<&str> = d.unknown.iter().map(|u| u.covariate.as_str()).collect();
+    match names.as_slice() {
+        [] => "nothing that was written down".into(),
+        [one] => (*one).into(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+fn error(d: &Diagnosis) -> String {
+    let Some(error) = &d.error else { return String::new() };
+    let of = |e: &HeldOutError| e.rmse_n.or(e.mse).filter(|v| v.is_finite());
+    let (Some(before), Some(after)) = (of(&error.before), of(&error.after)) else { return String::new() };
+    let (what, unit) = match d.channel {
+        Channel::Pulls | Channel::Sensor => ("prediction error", "N"),
+        Channel::Presses => ("mean squared error of the images", "grey levels\u{b2}"),
+    };
+    match d.verdict {
+        Verdict::None => format!(" The {what} is {after:.2} {unit}."),
+        _ if after < before => format!(" The {what} falls from {before:.2} to {after:.2} {unit}."),
+        _ => format!(" The {what} does not fall: {before:.2} before, {after:.2} {unit} after."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::{DataSummary, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate};
+    use std::collections::BTreeMap;
+
+    fn of(mse: [f64; 2]) -> Diagnosis {
+        let error = |mse| HeldOutError { mse: Some(mse), ..Default::default() };
+        let [before, after] = mse.map(error);
+        let report = ErrorReport { heldout: "presses".into(), before, after, by: ErrorsBy::default() };
+        Diagnosis {
+            noise_floor_mse: Some(1.0),
+            error: Some(report),
+            ..Diagnosis::blank(Channel::Presses, DataSummary::default())
+        }
+    }
+
+    #[test]
+    fn a_residual_far_above_the_noise_is_no_clean_nothing() {
+        let (mut near, mut far) = (of([3.0, 3.0]), of([40.0, 40.0]));
+        near.conclude();
+        far.conclude();
+        assert!(!plain(&near).contains("times the noise"), "{}", plain(&near));
+        assert!(plain(&far).contains("still 40 times the noise"), "{}", plain(&far));
+    }
+
+    /// A scale of 0.8 is the lowest that is fitted: it is marked, said, and trusted by half at most.
+    #[test]
+    fn a_value_at_its_bound_is_said() {
+        let with = |scale: f64| {
+            let mut d = of([30.0, 5.0]);
+            d.effects.push(NamedEffect {
+                name: "misregistration".into(),
+                part: None,
+                class: vec!["misregistration".into()],
+                weight: 0.95,
+                parameters: BTreeMap::from([(
+                    "scale".into(),
+                    ParameterEstimate::new(scale, (scale, scale), "1"),
+                )]),
+                indistinguishable_from: Vec::new(),
+                separate_by: None,
+            });
+            d.conclude();
+            d
+        };
+        let (inside, at) = (with(0.9), with(0.8));
+        assert!(!inside.effects[0].parameters["scale"].at_bound && inside.notes.is_empty());
+        assert_eq!(inside.effects[0].weight, 0.95);
+        assert!(at.effects[0].parameters["scale"].at_bound && at.notes[0].contains("0.8"), "{:?}", at.notes);
+        assert!(at.effects[0].weight <= 0.5 && plain(&at).contains("something else may look like it"));
+        let neutral = with(1.0);
+        assert!(!neutral.effects[0].parameters["scale"].at_bound, "a neutral value is no end");
+    }
+}
