@@ -1,13 +1,15 @@
 //! Presses whose optics were changed by formulas of the test, diagnosed.
 
 use crate::common::root;
+use crate::presses::block;
 use gripgen::identify::{Diagnosis, Verdict};
-use gripgen::tactile::presses::{Circle, Press, PressContact, PressScene, PressSet};
+use gripgen::tactile::presses::{Circle, Indenter, IndenterPose, Press, PressContact, PressScene, PressSet};
 use gripgen::tactile::{Sensor, finish};
 use gripgen::twin::{OpticsState, TactileImage};
 use gripgen::{
     PressColumns, PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses, measured_presses,
 };
+use std::sync::Arc;
 
 const PRESSES: usize = 12;
 const BALL_M: f64 = 6e-3;
@@ -119,6 +121,60 @@ fn light_that_follows_a_lamp_is_unknown_by_the_name_of_its_column() {
     let column = PressCovariate { name: "lamp_v".into(), values: PressValues::Numbers(volts) };
     let d = diagnosis(&set, &sensor, vec![column]);
     assert_eq!((d.verdict, d.unknown[0].covariate.as_str()), (Verdict::Unknown, "lamp_v"), "{d:?}");
+}
+
+/// A white balance that is not that of the sensor file.
+#[test]
+fn a_colour_cast_that_all_presses_have_is_a_white_balance() {
+    let sensor = sensor();
+    let d = diagnosis(&presses(&sensor, |_, _, [r, g, b]| [1.05 * r, g, 0.95 * b]), &sensor, Vec::new());
+    assert_eq!(names(&d), ["press_gain"]);
+    let of = |name: &str| d.effects[0].parameters[name].value;
+    assert!(
+        (of("red") - 1.05).abs() < 0.005 && (of("blue") - 0.95).abs() < 0.005,
+        "{} {}",
+        of("red"),
+        of("blue")
+    );
+}
+
+/// Bodies on a stage whose zero is 0.12 mm off, at several depths and places: the depth is named with its offset.
+#[test]
+fn bodies_that_are_deeper_than_the_table_says_have_another_depth() {
+    let sensor = sensor();
+    let scene = PressScene::new(&sensor, BALL_M);
+    let press = |i: u32| {
+        let at = IndenterPose {
+            x_px: 110.0 + 33.0 * f64::from(i % 4),
+            y_px: 80.0 + 40.0 * f64::from(i % 3),
+            rotation_rad: 0.4 * f64::from(i),
+        };
+        let of = |travel_mm: f64, image| {
+            let indenter = Indenter::of_mesh("block", &block(), at, travel_mm * 1e-3, &sensor.grid).unwrap();
+            Press::of_body(format!("press-{i}"), image, Arc::new(indenter))
+        };
+        let stated_mm = 0.3 + 0.08 * f64::from(i % 5);
+        let there = PressContact::of(&of(stated_mm + 0.12, finish(&sensor, None, None)));
+        let change = scene.change_seen(there.as_ref(), &OpticsState::default());
+        of(stated_mm, finish(&sensor, Some(&change), Some(u64::from(i) + 1)))
+    };
+    let set = PressSet {
+        metres_per_px: sensor.grid.metres_per_px,
+        ball_m: BALL_M,
+        rest: Some(finish(&sensor, None, None)),
+        presses: (0..6).map(press).collect(),
+    };
+    let d = diagnosis(&set, &sensor, Vec::new());
+    assert_eq!(names(&d), ["press_depth"]);
+    let of = |name: &str| d.effects[0].parameters[name].value;
+    for depth_mm in [0.3, 0.6] {
+        let found_mm = of("factor") * depth_mm + of("offset_mm");
+        assert!((found_mm - depth_mm - 0.12).abs() < 0.03, "{depth_mm}: {found_mm}");
+    }
+    let (before, after) = mse(&d);
+    let floor = d.noise_floor_mse.unwrap();
+    assert!(after - floor < 0.15 * (before - floor), "{before} {after} {floor}");
+    assert!(d.plain.as_ref().is_some_and(|plain| plain.contains("pressed in deeper")), "{:?}", d.plain);
 }
 
 /// Too few presses are said to be too few.

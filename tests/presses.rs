@@ -144,7 +144,7 @@ fn a_table_may_name_a_mesh_instead_of_a_ball() {
 }
 
 /// 4 mm along x, 2 mm along y, its face at z = 3 mm.
-fn block() -> TriMesh {
+pub(crate) fn block() -> TriMesh {
     let corner = |i: usize| {
         let side = |bit: usize, half: f64| if i >> bit & 1 == 1 { half } else { -half };
         Point3::new(side(0, 2e-3), side(1, 1e-3), if i >> 2 & 1 == 1 { 3e-3 } else { 0.0 })
