@@ -1,15 +1,18 @@
 //! Real presses with changes of the optics that nobody declares, diagnosed: what is named, what is missed.
 //!
-//! A sensor is calibrated on some presses of a `dataPack.npz`; the others are changed by formulas that differ from those
-//! of the effects library, and diagnosed against it. Run with
-//! `cargo run --release --example press_cases -- PACK.npz [words of cases]`.
+//! A sensor is calibrated on some presses of a set; the others are changed by formulas that differ from those of the effects
+//! library, and diagnosed against it. Run with
+//! `cargo run --release --example press_cases -- PRESSES [--ball-mm D --mm-per-px P] [words of cases]`. `--untouched N` diagnoses
+//! N halves that are drawn, without any change.
 
 use gripgen::identify::{Diagnosis, Verdict};
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::{CalibrateOptions, Press, PressSet, calibrate_presses};
 use gripgen::twin::TactileImage;
+use gripgen::twin::random::{Purpose, Stream};
 use gripgen::{
     PressCovariate, PressDiagnosisInput, PressGeometry, PressValues, diagnose_presses, load_presses,
+    presses_sha256,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -43,6 +46,8 @@ fn cases() -> Vec<Case> {
         case("exposure-3", &["exposure"], &[Gain(0.96)]),
         case("exposure-8", &["exposure"], &[Gain(1.08)]),
         case("gamma-10", &["exposure"], &[Gamma(1.1)]),
+        case("balance", &["press_gain"], &[Balance([1.06, 1.0, 0.94])]),
+        case("balance-wanders", &["press_gain"], &[Wandering(0.05)]),
         case("defocus-2", &["defocus"], &[Blur(2)]),
         case("defocus-4", &["defocus"], &[Blur(4)]),
         case("defocus-8", &["defocus"], &[Blur(8)]),
@@ -79,17 +84,30 @@ fn cases() -> Vec<Case> {
 }
 
 fn main() {
-    let words: Vec<String> = std::env::args().skip(1).collect();
+    let mut words: Vec<String> = std::env::args().skip(1).collect();
+    let mut number = |option: &str| {
+        let at = words.iter().position(|w| w == option).filter(|at| at + 1 < words.len())?;
+        words.drain(at..at + 2).nth(1)?.parse::<f64>().ok()
+    };
+    let geometry = PressGeometry {
+        ball_m: number("--ball-mm").map(|mm| mm * 1e-3),
+        metres_per_px: number("--mm-per-px").map(|mm| mm * 1e-3),
+    };
+    let untouched = number("--untouched");
     let Some(pack) = words.first() else {
-        eprintln!("usage: press_cases PACK.npz [CASE...]");
+        eprintln!("usage: press_cases PRESSES [--ball-mm D --mm-per-px P] [--untouched N] [CASE...]");
         return;
     };
     let verbose = std::env::var("VERBOSE").is_ok();
-    let set = load_presses(Path::new(pack), PressGeometry::default()).expect("a press set");
+    let set = load_presses(Path::new(pack), geometry).expect("a press set");
+    if let Some(splits) = untouched {
+        halves(&set, splits as u64, verbose);
+        return;
+    }
+    let set_name = presses_sha256(&set);
     let splits: [(&str, usize, usize); 5] =
         [("half0", 2, 0), ("half1", 2, 1), ("third0", 3, 0), ("third1", 3, 1), ("third2", 3, 2)];
-    let mut right = 0;
-    let mut all = 0;
+    let (mut right, mut all) = (0, 0);
     for (split, every, at) in splits {
         if words[1..].iter().any(|w| w.starts_with("half") || w.starts_with("third"))
             && !words.iter().any(|w| w == split)
@@ -106,7 +124,7 @@ fn main() {
                 .collect(),
             ..set.clone()
         };
-        let sensor = sensor_of(&chosen(false), split);
+        let sensor = sensor_of(&chosen(false), &format!("{set_name}-{split}"));
         for case in cases() {
             let named: Vec<&String> =
                 words[1..].iter().filter(|w| !w.starts_with("half") && !w.starts_with("third")).collect();
@@ -132,6 +150,30 @@ fn main() {
         }
     }
     println!("{right} of {all}");
+}
+
+/// What is named in halves of a set that nobody changed, against a sensor of the other half.
+fn halves(set: &PressSet, splits: u64, verbose: bool) {
+    let mut with_a_name = 0;
+    for split in 0..splits {
+        let mut draws = Stream::new(split, 0, Purpose::Draw);
+        let mut order: Vec<(f64, usize)> = (0..set.presses.len()).map(|i| (draws.uniform(), i)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let fitted: Vec<usize> = order.iter().take(order.len() / 2).map(|o| o.1).collect();
+        let half = |test: bool| PressSet {
+            presses: (0..set.presses.len())
+                .filter(|i| fitted.contains(i) != test)
+                .map(|i| set.presses[i].clone())
+                .collect(),
+            ..set.clone()
+        };
+        let sensor =
+            calibrate_presses(&half(false), &CalibrateOptions::default()).expect("a calibration").sensor;
+        let d = diagnosed(&half(true), &sensor, &[], verbose);
+        with_a_name += usize::from(d.verdict != Verdict::None);
+        println!("split {split:>3} {}", summary(&d));
+    }
+    println!("{with_a_name} of {splits} with a name");
 }
 
 fn sensor_of(train: &PressSet, split: &str) -> Sensor {

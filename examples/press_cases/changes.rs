@@ -11,6 +11,10 @@ pub enum Change {
     Background { from: f64, levels: f64 },
     /// Exposure.
     Gain(f64),
+    /// Gains of red, green and blue that all presses share.
+    Balance([f64; 3]),
+    /// Gains of red and blue of each press, by sines of the order that no smooth curve follows.
+    Wandering(f64),
     /// A tone curve.
     Gamma(f64),
     /// Boxes of this half width, twice.
@@ -48,6 +52,11 @@ pub fn changed(image: &TactileImage, change: Change, share: f64, lamp: f64, cont
                 let hill = (-(u * u + 1.5 * v * v)).exp() - 0.55;
                 [p[0] + levels * wave, p[1] + levels * (0.5 * hill - 0.6 * wave), p[2] - levels * 1.2 * hill]
             })
+        }
+        Change::Balance(gains) => per_pixel(image, |_, _, p| [0, 1, 2].map(|c| p[c] * gains[c])),
+        Change::Wandering(size) => {
+            let gains = [size * (917.0 * share).sin(), 0.0, size * (1403.0 * share + 1.0).sin()];
+            per_pixel(image, |_, _, p| [0, 1, 2].map(|c| p[c] * (1.0 + 1.4 * gains[c])))
         }
         Change::Gain(gain) => per_pixel(image, |_, _, p| p.map(|v| v * gain)),
         Change::Gamma(gamma) => {
