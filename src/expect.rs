@@ -15,7 +15,8 @@ use gripgen_twin::config::Mechanics;
 use gripgen_twin::effects::{CommandChain, OutsideFit, imprint_volume_m3, jaw_tilt_rad};
 use gripgen_twin::random::{Purpose, Stream, normal_quantile};
 use gripgen_twin::{
-    ContactPatch, Jaw, MeasuredPulls, PerJaw, PullSettings, Scenario, Staircase, Twin, table_factor,
+    ContactPatch, Jaw, MeasuredPull, MeasuredPulls, PerJaw, PullSettings, Scenario, Staircase, Twin,
+    table_factor,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -90,6 +91,32 @@ pub(crate) struct Expectations<'a> {
     library: &'a Library,
     staircases: Vec<Arc<Staircase>>,
     patches: Cache<PatchKey, PerJaw<ContactPatch>>,
+}
+
+/// The scenario of a measured pull: what was recorded of it, without anything drawn.
+pub(crate) fn scenario_of(pull: &MeasuredPull, stop_m: f64, label_tolerance_n: f64) -> Scenario {
+    Scenario {
+        seed: 0,
+        index: 0,
+        group: 0,
+        repetition: 0,
+        part: pull.part.clone(),
+        grip_pose: pull.grip_pose,
+        grip_force_n: pull.grip_force_n,
+        covariates: pull.covariates.clone(),
+        pull: PullSettings {
+            increment_n: pull.increment_n,
+            start_n: pull.start_n,
+            step_s: pull.step_s,
+            step_jitter: 0.0,
+            stop_m,
+            direction: [0.0, 0.0, 1.0],
+            max_force_n: None,
+            max_time_s: MAX_TIME_S,
+            label_tolerance_n,
+        },
+        drawn: BTreeMap::new(),
+    }
 }
 
 /// The pull of one row on one twin, without its friction.
@@ -171,35 +198,10 @@ impl<'a> Expectations<'a> {
         self.pull(quiet, row, &prepared, &friction, f64::INFINITY).unwrap_or_default()
     }
 
-    fn scenario(&self, row: usize) -> Scenario {
-        let pull = &self.measured.pulls[row];
-        Scenario {
-            seed: 0,
-            index: 0,
-            group: 0,
-            repetition: 0,
-            part: pull.part.clone(),
-            grip_pose: pull.grip_pose,
-            grip_force_n: pull.grip_force_n,
-            covariates: pull.covariates.clone(),
-            pull: PullSettings {
-                increment_n: pull.increment_n,
-                start_n: pull.start_n,
-                step_s: pull.step_s,
-                step_jitter: 0.0,
-                stop_m: self.measured.stop_m,
-                direction: [0.0, 0.0, 1.0],
-                max_force_n: None,
-                max_time_s: MAX_TIME_S,
-                label_tolerance_n: self.measured.label_tolerance_n,
-            },
-            drawn: BTreeMap::new(),
-        }
-    }
-
     fn prepared(&self, quiet: &QuietTwin, row: usize) -> Result<Prepared, SampleError> {
         let twin = &quiet.twin;
-        let mut scenario = self.scenario(row);
+        let mut scenario =
+            scenario_of(&self.measured.pulls[row], self.measured.stop_m, self.measured.label_tolerance_n);
         let part = &twin.parts[&scenario.part];
         scenario.grip_pose = scenario.grip_pose.min(part.grips.len() - 1);
         let force_n = jaw_forces_n(twin, &scenario)?;

@@ -11,9 +11,10 @@ use crate::twin_edits::{EditedValue, calibration_entry};
 use gripgen_identify::{FittedPress, ImprintEstimate, imprint_constant};
 use gripgen_twin::config::GelModel;
 use gripgen_twin::{Jaw, MeasuredPull, MeasuredPulls};
-use images::ImageSource;
+pub(crate) use images::ImageSource;
 pub use images::ImprintImagesError;
 use press::fit_press;
+pub(crate) use press::{Seen, grips_tried};
 use std::collections::BTreeMap;
 use std::path::Path;
 

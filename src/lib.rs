@@ -47,6 +47,7 @@ mod calibrate;
 mod campaign;
 mod catalogue;
 mod compare;
+mod compare_images;
 mod compare_report;
 mod diagnose;
 mod expect;
@@ -89,6 +90,7 @@ pub use calibrate::{CalibratePullsError, calibrate_twin};
 pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use catalogue::{EffectCurve, effect_curve};
 pub use compare::{LabelErrors, PullComparison, compare_pulls};
+pub use compare_images::{CompareImagesError, ImageComparison, ImageScore, compare_images};
 pub use compare_report::{pull_comparison_page, pull_ratios};
 pub use diagnose::{
     MeasuredPresses, NextPulls, PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions,

@@ -12,6 +12,8 @@ mod campaign;
 mod catalogue;
 // What several tests share.
 mod common;
+// Images of measured pulls beside those of a twin.
+mod compare_images;
 // The paper's panels for any measurements.
 mod compare_report;
 // Every configuration fault is one clear error that names its key.

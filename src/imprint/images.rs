@@ -25,7 +25,7 @@ pub enum ImprintImagesError {
 }
 
 /// Where the images are.
-pub(super) enum ImageSource {
+pub(crate) enum ImageSource {
     /// `images/` beside `pulls.csv`.
     Files(PathBuf, BTreeSet<String>),
     /// The samples of a run; ids are their indices.
@@ -33,21 +33,21 @@ pub(super) enum ImageSource {
 }
 
 impl ImageSource {
-    pub(super) fn open(folder: &Path) -> Result<Self, ImprintImagesError> {
+    pub(crate) fn open(folder: &Path) -> Result<Self, ImprintImagesError> {
         if folder.join("run.json").is_file() {
             return Ok(Self::Run(Box::new(Dataset::open(folder)?)));
         }
         Ok(Self::Files(folder.into(), pulls_with_images(folder)?))
     }
 
-    pub(super) fn has(&self, id: &str) -> bool {
+    pub(crate) fn has(&self, id: &str) -> bool {
         match self {
             Self::Files(_, ids) => ids.contains(id),
             Self::Run(samples) => samples.image_size_px().is_some() && samples.row_of(id).is_some(),
         }
     }
 
-    pub(super) fn read(&self, id: &str) -> Result<Seen, ImprintImagesError> {
+    pub(crate) fn read(&self, id: &str) -> Result<Seen, ImprintImagesError> {
         let none = || ImprintImagesError::None { id: id.into() };
         match self {
             Self::Files(folder, _) => {

@@ -1,14 +1,15 @@
 //! One press: the imprint constant with which the twin's images are most like those of a pull.
 
 use super::CalibrateImprintsError;
+use crate::expect::scenario_of;
 use crate::gripped::{Gripped, placed_parts};
 use crate::library::Library;
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_tactile::{Plane, Renderer, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::draw::Drawn;
-use gripgen_twin::{MeasuredPull, PerJaw, PullSettings, Scenario, TactileImage, Twin};
-use std::collections::BTreeMap;
+use gripgen_twin::{MeasuredPull, PerJaw, Scenario, TactileImage, Twin};
+use std::ops::Range;
 
 /// Constants tried before the best is refined, mm^3/N.
 const TRIED_MM3_PER_N: [f64; 11] = [0.1, 0.16, 0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0];
@@ -16,11 +17,11 @@ const TRIED_MM3_PER_N: [f64; 11] = [0.1, 0.16, 0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4
 const REFINED: f64 = 2e-3;
 
 /// Images of a pull: gripped and, where there are, at rest.
-pub(super) struct Seen {
-    pub(super) grip: PerJaw<TactileImage>,
+pub(crate) struct Seen {
+    pub(crate) grip: PerJaw<TactileImage>,
     pub(super) rest: PerJaw<Option<TactileImage>>,
     /// Which of the part's grips, where that is known.
-    pub(super) grip_pose: Option<usize>,
+    pub(crate) grip_pose: Option<usize>,
 }
 
 /// The constant that explains the images of a pull best.
@@ -30,6 +31,15 @@ pub(super) struct BestPress {
     pub(super) explained: f64,
 }
 
+/// The grips that a pull may have been made with, of so many of its part: the one that is named, or all.
+pub(crate) fn grips_tried(pull: &MeasuredPull, known: Option<usize>, grips: usize) -> Range<usize> {
+    let named = match pull.covariates.extra.get("grip_pose") {
+        Some(Drawn::Number(x)) => Some(*x as usize),
+        _ => known,
+    };
+    named.filter(|&i| i < grips).map_or(0..grips, |i| i..i + 1)
+}
+
 /// The part's grips are tried where none is named; `None` if the twin does not touch the part, or nothing changes in the images.
 pub(super) fn fit_press(
     twin: &Twin,
@@ -37,12 +47,7 @@ pub(super) fn fit_press(
     pull: &MeasuredPull,
     images: &Seen,
 ) -> Result<Option<BestPress>, CalibrateImprintsError> {
-    let grips = &twin.parts[&pull.part].grips;
-    let named = match pull.covariates.extra.get("grip_pose") {
-        Some(Drawn::Number(x)) => Some(*x as usize).filter(|&i| i < grips.len()),
-        _ => images.grip_pose.filter(|&i| i < grips.len()),
-    };
-    let poses = named.map_or(0..grips.len(), |i| i..i + 1);
+    let poses = grips_tried(pull, images.grip_pose, twin.parts[&pull.part].grips.len());
     let mut best: Option<BestPress> = None;
     for pose in poses {
         let found = fit_grip(twin, library, pull, pose, images)?;
@@ -62,7 +67,8 @@ fn fit_grip(
 ) -> Result<Option<BestPress>, CalibrateImprintsError> {
     let at =
         |source: SampleError| CalibrateImprintsError::Grip { pull: pull.id.clone(), source: source.into() };
-    let scenario = scenario_of(pull, grip_pose);
+    // Neither the rule of the label nor the stop is looked at.
+    let scenario = Scenario { grip_pose, ..scenario_of(pull, 5e-3, 3.0) };
     // The grip does not depend on the constant; the smallest one presses through no gel.
     let mut soft = twin.clone();
     let part = soft.parts.get_mut(&pull.part).expect("asked for parts of the twin");
@@ -178,29 +184,4 @@ fn least(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> (f64, f64) {
         }
     }
     if value[0] <= value[1] { (inner[0], value[0]) } else { (inner[1], value[1]) }
-}
-
-fn scenario_of(pull: &MeasuredPull, grip_pose: usize) -> Scenario {
-    Scenario {
-        seed: 0,
-        index: 0,
-        group: 0,
-        repetition: 0,
-        part: pull.part.clone(),
-        grip_pose,
-        grip_force_n: pull.grip_force_n,
-        covariates: pull.covariates.clone(),
-        pull: PullSettings {
-            increment_n: pull.increment_n,
-            start_n: pull.start_n,
-            step_s: pull.step_s,
-            step_jitter: 0.0,
-            stop_m: 5e-3,
-            direction: [0.0, 0.0, 1.0],
-            max_force_n: None,
-            max_time_s: 1.0,
-            label_tolerance_n: 3.0,
-        },
-        drawn: BTreeMap::new(),
-    }
 }

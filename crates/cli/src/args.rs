@@ -274,7 +274,8 @@ pub struct CalibratePressesArgs {
 /// `gripgen compare`
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// Ball presses: Taxim's dataPack.npz, or a folder with presses.csv and images.
+    /// Pulls: a run folder, or a folder with pulls.csv; images that they have are compared too. Presses: Taxim's dataPack.npz, or
+    /// a folder with presses.csv and images. A force-sensor table: a folder with sensor.csv.
     pub measured: PathBuf,
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]
@@ -282,7 +283,7 @@ pub struct CompareArgs {
     /// Of pulls: take those whose label is suspect too: evidence that was recorded contradicts it.
     #[arg(long)]
     pub include_suspect: bool,
-    /// A sensor file.
+    /// Of presses: a sensor file.
     #[arg(long, value_name = "FILE.npz")]
     pub sensor: Option<String>,
     /// A twin; its left sensor is taken where --sensor is left out.

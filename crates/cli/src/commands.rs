@@ -7,6 +7,7 @@ pub mod calibrate_sensor;
 pub mod campaign;
 pub mod check;
 pub mod compare;
+mod compare_images;
 pub mod compare_sensor;
 pub mod completions;
 pub mod diagnose;

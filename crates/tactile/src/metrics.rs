@@ -37,6 +37,13 @@ pub struct Score {
     pub l1: f64,
 }
 
+/// The mean of each number over the scores of several pairs of images; zeros without any.
+pub fn mean_score(scores: &[Score]) -> Score {
+    let n = scores.len().max(1) as f64;
+    let mean = |value: fn(&Score) -> f64| scores.iter().map(value).sum::<f64>() / n;
+    Score { mse: mean(|s| s.mse), psnr_db: mean(|s| s.psnr_db), ssim: mean(|s| s.ssim), l1: mean(|s| s.l1) }
+}
+
 /// All differences between two images.
 ///
 /// # Errors

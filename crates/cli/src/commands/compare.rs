@@ -1,6 +1,7 @@
 //! `gripgen compare`: how far a twin or a sensor file is from measurements.
 
 use crate::args::CompareArgs;
+use crate::commands::compare_images::{images_json, images_table};
 use crate::commands::compare_sensor;
 use crate::failure::Failure;
 use crate::load::{
@@ -10,8 +11,8 @@ use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
-    LabelErrors, PartRatio, PressReportText, compare_pulls, find_circles_with_sensor, is_press_set,
-    is_sensor_table, load_pulls_with, press_report, pull_comparison_page, pull_ratios,
+    LabelErrors, PartRatio, PressReportText, compare_images, compare_pulls, find_circles_with_sensor,
+    is_press_set, is_sensor_table, load_pulls_with, press_report, pull_comparison_page, pull_ratios,
 };
 use serde_json::{Value, json};
 
@@ -73,12 +74,14 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
     }
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &[])?;
-    let loaded =
-        load_pulls_with(&measured, suspects(args.include_suspect)).map_err(|e| no_pulls(&measured, e))?;
+    let suspects = suspects(args.include_suspect);
+    let loaded = load_pulls_with(&measured, suspects).map_err(|e| no_pulls(&measured, e))?;
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let library = load_library(&twin, &args.twin)?;
     let found = compare_pulls(&loaded.pulls, &twin, &library, jobs())
         .map_err(|e| Failure::usage(e).hint("name a twin that has this part with --twin"))?;
+    let images =
+        compare_images(&measured, &loaded, suspects, &twin, &library, jobs()).map_err(Failure::usage)?;
     if let Some(path) = &args.report {
         let title = format!("{} against {}", args.measured.display(), args.twin);
         write_file(path, pull_comparison_page(&title, &loaded.pulls, &found).as_bytes())?;
@@ -100,7 +103,11 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
             .into();
         pulls["n_outside_fit"] = json!(found.outside_fit);
         let traces = json!({"n": found.traces.0, "rmse_n": found.traces.1});
-        sink.document(&json!({"schema": "gripgen.comparison/1", "pulls": pulls, "traces": traces}))?;
+        let mut document = json!({"schema": "gripgen.comparison/1", "pulls": pulls, "traces": traces});
+        if let Some(images) = images_json(&images) {
+            document["images"] = images;
+        }
+        sink.document(&document)?;
     }
     if !sink.on_stdout() {
         let mut text =
@@ -112,10 +119,11 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
         if found.traces.0 > 0 {
             text += &format!("{} traces: {:.3} N between their readings\n", found.traces.0, found.traces.1);
         }
+        text += &images_table(&images);
         print(&text)?;
     }
     if !args.talk.quiet {
-        loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        loaded.notes.iter().chain(&images.notes).for_each(|note| eprintln!("note: {note}"));
         if found.outside_fit > 0 {
             eprintln!(
                 "note: {} pulls lie outside the grip forces on which an effect was fitted",

@@ -73,6 +73,34 @@ fn mean_and_rms_over_grip_force_of_any_folder() {
 }
 
 #[test]
+fn images_of_a_run_are_compared_with_those_of_a_twin() {
+    let out = tempfile::tempdir().unwrap();
+    let at = out.path().join("run");
+    let at = at.to_str().unwrap();
+    let sets = ["mechanics=reduced", "vary.part=[\"gear\"]", "vary.grip_angle_deg=[0]", "vary.grip_pose=[0]"];
+    let sets = sets.iter().flat_map(|set| ["--set", set]);
+    assert_code(&run(&["sweep", super::QUICKSTART, "-o", at].into_iter().chain(sets).collect::<Vec<_>>()), 0);
+    let twin = ["compare", at, "--twin", "asset:configs/twin-contact.toml"];
+    let compared = run(&[&twin[..], &["--json"]].concat());
+    assert_code(&compared, 0);
+    let json: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
+    let (images, made) = (&json["images"], json["pulls"]["n"].as_u64().unwrap());
+    assert!(made >= 3 && images["n"] == 2 * made && images["by_part"]["gear"]["n"] == 2 * made, "{json}");
+    assert_eq!(images["each"].as_array().unwrap().len() as u64, 2 * made);
+    let number = |key: &str| images[key].as_f64().unwrap();
+    // The noise of the sensor, 1.08, and rounding.
+    assert!((1.1..1.3).contains(&number("mse")), "{images}");
+    assert!(number("psnr") > 45.0 && (0.97..1.0).contains(&number("ssim")) && number("l1") < 1.0, "{images}");
+    let table = text(&run(&twin).stdout);
+    assert!(table.contains("PSNR dB") && table.contains("least alike: pull "), "{table}");
+    // Pulls without images say nothing of them.
+    let without = folder(&pulls(3));
+    let compared = run(&["compare", without.path().to_str().unwrap(), "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
+    assert!(json["images"].is_null() && json["pulls"]["n"] == 3, "{json}");
+}
+
+#[test]
 fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
     let one = folder(&pulls(1));
     let out = one.path().join("out.toml");

@@ -4,7 +4,7 @@ use super::gain::within_gain;
 use super::mark::{self, MarkError};
 use super::zone::{ZONES, Zone};
 use super::{Contact, Press, PressSet};
-use crate::metrics::{MetricError, Score, score, score_where};
+use crate::metrics::{MetricError, Score, mean_score, score, score_where};
 use crate::render::Renderer;
 use crate::sensor::{Pyramid, Sensor};
 use crate::simd::SimdLevel;
@@ -116,12 +116,6 @@ impl PressComparison {
         let by_zone = ZONES.into_iter().map(of_zone).filter(|(_, n, _)| *n > 0).collect();
         Some(Self { mean, each, by_shape, by_zone })
     }
-}
-
-fn mean_score(scores: &[Score]) -> Score {
-    let n = scores.len().max(1) as f64;
-    let sum = |value: fn(&Score) -> f64| scores.iter().map(value).sum::<f64>() / n;
-    Score { mse: sum(|s| s.mse), psnr_db: sum(|s| s.psnr_db), ssim: sum(|s| s.ssim), l1: sum(|s| s.l1) }
 }
 
 /// Compares the images that `sensor` predicts for the contacts with the real ones. Contacts that nobody marked are
