@@ -69,6 +69,16 @@ pub enum LoadPressesError {
         /// Width and height of the first.
         wanted: (u32, u32),
     },
+    /// An image without colours.
+    #[error("{}: `{name}` is grey: red, green and blue are equal at all of its {pixels} pixels", .path.display())]
+    Grey {
+        /// The press set.
+        path: PathBuf,
+        /// The press, or the rest frame.
+        name: String,
+        /// Pixels of the image.
+        pixels: usize,
+    },
     /// A ball that sank in by more than its radius.
     #[error("{}: `{name}` is {depth_mm} mm deep, the ball's radius is {radius_mm} mm", .path.display())]
     Depth {
@@ -119,12 +129,28 @@ pub fn is_press_set(path: &Path) -> bool {
         || path.join(DATA_PACK).is_file()
 }
 
+impl LoadPressesError {
+    /// What to do about it, where there is something to say.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::Grey { .. } => Some(
+                "slopes are told apart by the colours of the lights: save the frames of the colour camera as they are, not converted to grey",
+            ),
+            Self::Folder(TableError::Jpeg { .. }) => Some(
+                "a JPEG moves colours by as much as a light contact does, and converting it does not bring them back: take the frames again as PNG",
+            ),
+            _ => None,
+        }
+    }
+}
+
 /// Loads a press set. A `dataPack.npz` has Taxim's geometry (4.0 mm, 0.0295 mm per pixel) unless another one is given;
 /// for a folder both have to be.
 ///
 /// # Errors
 ///
-/// A path that is no press set, files that cannot be read, images of two sizes, or a missing or impossible geometry.
+/// A path that is no press set, files that cannot be read, images of two sizes, grey images or JPEGs, or a missing or impossible
+/// geometry.
 pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, LoadPressesError> {
     let length = |what, value_m: Option<f64>, min_mm: f64, max_mm: f64| match value_m
         .map(|m| (m * 1e9).round() * 1e-6)
@@ -144,7 +170,7 @@ pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, Lo
         let no_ball = folder.presses.iter().all(|press| press.body.is_some()).then_some(DATA_PACK_BALL_M);
         let ball_m = ball_m.or(no_ball).ok_or_else(|| missing("how large the ball is"))?;
         let metres_per_px = metres_per_px.ok_or_else(|| missing("how large a pixel is"))?;
-        return one_size(path, from_folder(path, folder, ball_m, metres_per_px)?);
+        return one_kind(path, from_folder(path, folder, ball_m, metres_per_px)?);
     }
     if !pack.is_file() {
         return Err(LoadPressesError::Unknown { path: path.into() });
@@ -153,22 +179,25 @@ pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, Lo
     let ball_m = ball_m.unwrap_or(DATA_PACK_BALL_M);
     let metres_per_px = metres_per_px.unwrap_or(DATA_PACK_METRES_PER_PX);
     let set = PressSet::from_data_pack(&bytes, ball_m, metres_per_px);
-    one_size(path, set.map_err(|source| LoadPressesError::DataPack { path: pack, source })?)
+    one_kind(path, set.map_err(|source| LoadPressesError::DataPack { path: pack, source })?)
 }
 
-/// All images have one size.
-fn one_size(path: &Path, set: PressSet) -> Result<PressSet, LoadPressesError> {
+/// All images have one size, and colours.
+fn one_kind(path: &Path, set: PressSet) -> Result<PressSet, LoadPressesError> {
     let size = |image: &TactileImage| (image.width_px, image.height_px);
     let Some(wanted) = set.presses.first().map(|first| size(&first.image)) else { return Ok(set) };
     let rest = set.rest.as_ref().map(|image| ("rest frame", image));
-    let other =
-        set.presses.iter().map(|p| (p.name.as_str(), &p.image)).chain(rest).find(|(_, i)| size(i) != wanted);
-    match other {
-        None => Ok(set),
-        Some((name, image)) => {
-            Err(LoadPressesError::Size { path: path.into(), name: name.into(), found: size(image), wanted })
+    for (name, image) in set.presses.iter().map(|p| (p.name.as_str(), &p.image)).chain(rest) {
+        let (path, name) = (|| path.to_path_buf(), || name.to_string());
+        if size(image) != wanted {
+            return Err(LoadPressesError::Size { path: path(), name: name(), found: size(image), wanted });
+        }
+        let (pixels, _) = image.rgb.as_chunks::<3>();
+        if pixels.iter().all(|[red, green, blue]| red == green && green == blue) {
+            return Err(LoadPressesError::Grey { path: path(), name: name(), pixels: pixels.len() });
         }
     }
+    Ok(set)
 }
 
 fn from_folder(

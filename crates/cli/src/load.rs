@@ -73,6 +73,19 @@ pub fn say_circles(circles: &FoundCircles, talk: &TalkArgs) {
     }
 }
 
+/// What cannot be read as presses; `geometry`: what to do where sizes are missing.
+pub fn no_presses(e: &LoadPressesError, geometry: &str) -> Failure {
+    let hint = match e {
+        LoadPressesError::Geometry { .. } => Some(geometry),
+        other => other.hint(),
+    };
+    let failure = Failure::usage(e);
+    match hint {
+        Some(hint) => failure.hint(hint),
+        None => failure,
+    }
+}
+
 /// The sensor file of `--sensor`, or the twin's, and presses that have its size.
 pub fn load_sensor_and_presses(
     measured: &Path,
@@ -88,10 +101,8 @@ pub fn load_sensor_and_presses(
         other => Failure::usage(other).hint("`gripgen calibrate presses` writes a sensor file for --sensor"),
     })?;
     let geometry = PressGeometry { ball_m: sensor.ball_m, metres_per_px: Some(sensor.grid.metres_per_px) };
-    let set = load_presses(measured, geometry).map_err(|e| match e {
-        LoadPressesError::Geometry { .. } => Failure::usage(e)
-            .hint("a sensor file of `gripgen calibrate presses` holds both; name it with --sensor"),
-        other => Failure::usage(other),
+    let set = load_presses(measured, geometry).map_err(|e| {
+        no_presses(&e, "a sensor file of `gripgen calibrate presses` holds both; name it with --sensor")
     })?;
     if let Some(press) = set.presses.first() {
         let (found, wanted) =

@@ -23,6 +23,11 @@ pub fn encode_png(image: &TactileImage) -> Result<Vec<u8>, PictureError> {
     Ok(bytes)
 }
 
+/// Whether bytes begin like a JPEG, whatever their file is called.
+pub(crate) fn is_jpeg(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0xff, 0xd8, 0xff])
+}
+
 /// Decodes a PNG or JPEG into RGB.
 ///
 /// # Errors
@@ -62,6 +67,17 @@ pub(crate) fn decode_png_into(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What presses are refused for: a picture of one channel comes out as three equal ones.
+    #[test]
+    fn a_picture_of_one_channel_has_three_equal_ones() {
+        let levels: Vec<u8> = (0..17 * 9).map(|i| (i * 5 % 251) as u8).collect();
+        let mut png = Vec::new();
+        PngEncoder::new(&mut png).write_image(&levels, 17, 9, ExtendedColorType::L8).unwrap();
+        let read = decode(&png).unwrap();
+        assert!(read.rgb.chunks_exact(3).zip(&levels).all(|(rgb, level)| rgb == [*level; 3]));
+        assert!(!is_jpeg(&png));
+    }
 
     #[test]
     fn png_is_lossless() {

@@ -1,6 +1,6 @@
 //! A folder of presses, of a ball or of other bodies: `presses.csv`, the images that it names, and `rest.png`.
 
-use crate::picture::decode;
+use crate::picture::{decode, is_jpeg};
 use crate::table::{TableError, TableReader, TextCells, number, read_bytes};
 use gripgen_twin::{TactileImage, Values};
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ fn table_path(folder: &Path) -> PathBuf {
 /// The column that names the image of a row.
 const IMAGE: &str = "image";
 
-/// Names under which a frame without contact is looked for.
+/// Names under which a frame without contact is looked for; one that is a JPEG is refused, not overlooked.
 const REST_FILES: [&str; 3] = ["rest.png", "rest.jpg", "rest.jpeg"];
 
 /// One row of the table with its image.
@@ -70,7 +70,7 @@ pub struct PressFolder {
 /// Reads a press folder. Columns: `image`, and where somebody measured them `x_px`, `y_px`, `radius_px` or
 /// `depth_mm`; an empty cell is a number that nobody measured. A row with a `mesh` is of that body and no ball: `depth_mm`,
 /// `x_px` and `y_px` of the mesh's origin are needed then, `rotation_deg` and `shape` may stand beside. Further columns are
-/// left alone. The table may be called `shapes.csv` too.
+/// left alone. The table may be called `shapes.csv` too. Images are PNG: a JPEG moves colours by as much as a light contact does.
 ///
 /// # Errors
 /// [`TableError`], with line, column and value, or with the image.
@@ -167,6 +167,9 @@ fn measured(cell: &str, column: &str) -> Result<Option<f64>, &'static str> {
 
 fn picture(path: &Path) -> Result<TactileImage, TableError> {
     let bytes = read_bytes(path)?;
+    if is_jpeg(&bytes) {
+        return Err(TableError::Jpeg { path: path.into() });
+    }
     decode(&bytes).map_err(|e| TableError::Io { path: path.into(), problem: e.to_string() })
 }
 
@@ -180,6 +183,7 @@ mod tests {
         let image = TactileImage { width_px: 20, height_px: 16, rgb: vec![90; 20 * 16 * 3] };
         std::fs::write(folder.path().join("a.png"), encode_png(&image).unwrap()).unwrap();
         std::fs::write(folder.path().join("rest.png"), encode_png(&image).unwrap()).unwrap();
+        std::fs::write(folder.path().join("lossy.png"), [0xff, 0xd8, 0xff, 0xe0]).unwrap();
         std::fs::write(folder.path().join(PRESSES_FILE), table).unwrap();
         folder
     }
@@ -217,6 +221,7 @@ mod tests {
             ),
             ("image,depth_mm\na.png,nan\n", "`depth_mm` is `nan`"),
             ("image\nb.png\n", "b.png"),
+            ("image\nlossy.png\n", "lossy.png: the image is a JPEG, presses are read from PNG"),
             ("image,x_px\na.png,1,2\n", "line: 2"),
         ] {
             let error = read_press_folder(folder(table).path()).unwrap_err().to_string();

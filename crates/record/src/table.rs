@@ -16,6 +16,12 @@ pub enum TableError {
         /// What the system says.
         problem: String,
     },
+    /// An image that lost colours when it was stored.
+    #[error("{}: the image is a JPEG, presses are read from PNG", .path.display())]
+    Jpeg {
+        /// The image.
+        path: PathBuf,
+    },
     /// The table lacks a column.
     #[error("{}: there is no column `{column}`; found: {found}{}", .path.display(), semicolons(.found))]
     Column {

@@ -3,15 +3,13 @@
 use crate::args::{CalibratePressesArgs, TalkArgs};
 use crate::commands::compare::{comparison_json, table};
 use crate::failure::Failure;
-use crate::load::say_circles;
+use crate::load::{no_presses, say_circles};
 use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::tactile::presses::{
     CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PressSet, calibrate_presses,
 };
 use gripgen::tactile::{GelShape, Sensor};
-use gripgen::{
-    LoadPressesError, PressGeometry, PressReportText, find_missing_circles, load_presses, press_report,
-};
+use gripgen::{PressGeometry, PressReportText, find_missing_circles, load_presses, press_report};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -30,13 +28,11 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
     let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let metres = |mm: Option<f64>| mm.map(|mm| mm * 1e-3);
     let geometry = PressGeometry { ball_m: metres(args.ball_mm), metres_per_px: metres(args.mm_per_px) };
-    let mut set = load_presses(&args.presses, geometry).map_err(|e| match e {
-        LoadPressesError::Geometry { .. } => {
-            Failure::usage(e).hint(
+    let mut set = load_presses(&args.presses, geometry).map_err(|e| {
+        no_presses(
+            &e,
             "--ball-mm: measure the ball with calipers; --mm-per-px: measure a pixel by a known length on the gel",
         )
-        }
-        other => Failure::usage(other),
     })?;
     say_circles(&find_missing_circles(&mut set), &args.talk);
     if !args.talk.quiet {

@@ -105,6 +105,52 @@ fn presses_that_cannot_be_are_refused_before_the_fit() {
     assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 0, "nothing was written");
 }
 
+/// Images without colours, and images whose colours were lost, by every verb that reads presses.
+#[test]
+fn grey_images_and_jpegs_of_presses_are_refused() {
+    use gripgen::twin::TactileImage;
+    let presses = press_folder(4);
+    let path = presses.path().to_str().unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let (sensor, fitted) = (out.path().join("sensor.npz"), out.path().join("fitted.npz"));
+    let sensor = sensor.to_str().unwrap();
+    let bytes = gripgen::assets::get("sensors/gelsight_r15/sensor.npz").unwrap();
+    let mut with_ball = gripgen::tactile::Sensor::from_npz(bytes, None, None).unwrap();
+    with_ball.ball_m = Some(5e-3);
+    std::fs::write(sensor, with_ball.to_npz().unwrap().unwrap()).unwrap();
+    let size = ["--ball-mm", "5", "--mm-per-px", "0.0877"];
+    let verbs = [
+        [&["calibrate", "presses", path, "-o", fitted.to_str().unwrap()][..], &size].concat(),
+        vec!["compare", path, "--sensor", sensor],
+        vec!["diagnose", path, "--sensor", sensor],
+    ];
+    let refuse = |image: &[u8], name: &str, says: &str, hints: &str| {
+        let file = presses.path().join(name);
+        let good = std::fs::read(&file).unwrap();
+        std::fs::write(&file, image).unwrap();
+        for verb in &verbs {
+            let refused = run(verb);
+            assert_code(&refused, 2);
+            let stderr = text(&refused.stderr);
+            assert!(stderr.contains(says) && stderr.contains(hints), "{verb:?}: {stderr}");
+        }
+        std::fs::write(&file, good).unwrap();
+    };
+    let jpeg: Vec<u8> = [&[0xff, 0xd8, 0xff, 0xe0][..], &[0; 40]].concat();
+    for name in ["press-01.png", "rest.png"] {
+        let says = format!("{name}: the image is a JPEG, presses are read from PNG");
+        refuse(&jpeg, name, &says, "take the frames again as PNG");
+    }
+    let levels = (0..320 * 240u32).flat_map(|i| [(i % 251) as u8; 3]).collect();
+    let grey = TactileImage { width_px: 320, height_px: 240, rgb: levels };
+    let grey = gripgen::record::encode_png(&grey).unwrap();
+    for (name, called) in [("press-02.png", "press-02.png"), ("rest.png", "rest frame")] {
+        let says = format!("`{called}` is grey: red, green and blue are equal at all of its 76800 pixels");
+        refuse(&grey, name, &says, "not converted to grey");
+    }
+    assert!(!fitted.exists());
+}
+
 /// A mesh drawn with the shipped sensor: what it is in the image, in the surface, and what is refused.
 #[test]
 fn a_mesh_is_rendered_with_its_surface() {
