@@ -2,13 +2,14 @@
 
 use crate::common::root;
 use gripgen::record::encode_png;
-use gripgen::tactile::finish;
 use gripgen::tactile::presses::{
-    CalibrateOptions, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, PressSet, calibrate_presses,
-    compare_presses, find_circle, predict_press, reference_frame, score_press,
+    BallSizeBy, CalibrateOptions, Calibration, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, Press, PressSet,
+    calibrate_presses, check_ball_size, compare_presses, find_circle, predict_press, reference_frame,
+    score_press,
 };
+use gripgen::tactile::{GelShape, finish};
 use gripgen::twin::{TriMesh, write_binary_stl};
-use gripgen::{Location, PressGeometry, load_presses, load_sensor};
+use gripgen::{Location, PressGeometry, in_parallel, load_presses, load_sensor};
 use nalgebra::Point3;
 use std::time::Instant;
 
@@ -96,6 +97,41 @@ fn shapes_that_no_ball_shows_are_drawn() {
     println!("with the prism: {by_shape:?}");
     let of = |name: &str| by_shape.iter().find(|(shape, _, _)| shape == name).unwrap().2.mse;
     assert!(of("sphere") < 40.0 && of("prism") < 115.0);
+}
+
+/// A ball that is given 1.5 times too large or too small shows in presses of bodies, and in how far it travelled; the right
+/// one is not doubted. The marks of the balls know nothing of their size.
+#[test]
+#[cfg_attr(not(shared_data), ignore = "the folder of shared measured data is not beside this checkout")]
+fn a_wrong_diameter_shows_in_shapes_and_in_depths() {
+    let folder = root().join("../shared/real/gelsight_shapes");
+    let geometry = PressGeometry { ball_m: Some(5.84e-3), metres_per_px: Some(0.059_259_259_2e-3) };
+    let balls = load_presses(&folder.join("balls"), geometry).unwrap();
+    let shapes = load_presses(&folder.join("shapes"), geometry).unwrap().presses;
+    let options = CalibrateOptions { folds: Some(2), gel_shape: Some(GelShape::Flat) };
+    let calibration = calibrate_presses(&balls, &options).unwrap();
+    assert_eq!(check_ball_size(&balls, &calibration), None, "one ball says nothing of its size");
+    // The sphere of the shapes is the ball: its presses are some of known travel.
+    let rolled: Vec<Press> = shapes
+        .iter()
+        .filter(|press| press.shape() == "sphere")
+        .map(|press| Press { indenter: None, ..press.clone() })
+        .collect();
+    let found = in_parallel(6, 2, |i| {
+        let mut set = balls.clone();
+        set.presses.extend(if i < 3 { shapes.clone() } else { rolled.clone() });
+        set.ball_m *= [1.0, 1.5, 1.0 / 1.5][i % 3];
+        let circles = set.presses.iter().filter_map(|press| press.circle).collect();
+        check_ball_size(&set, &Calibration { circles, ..calibration.clone() }).unwrap()
+    });
+    for (size, given) in found.iter().zip([1.0, 1.5, 1.0 / 1.5].iter().cycle()) {
+        println!("given {given:.2}: {size:?}");
+        assert!(size.tells(), "{size:?}");
+        assert_eq!(size.is_wrong(), *given != 1.0, "{size:?}");
+        assert!((size.factor * given).ln().abs() < 0.2, "given {given}: {size:?}");
+    }
+    let by: Vec<BallSizeBy> = found.iter().map(|size| size.by).collect();
+    assert_eq!((&by[..3], &by[3..]), (&[BallSizeBy::Shapes; 3][..], &[BallSizeBy::Depths; 3][..]));
 }
 
 /// A table that names meshes, from a folder on disk to scores by shape.

@@ -1,5 +1,6 @@
 //! Presses of a ball or of other bodies into a sensor, and how well a sensor file predicts their images.
 
+mod ball_size;
 mod body;
 mod calibrate;
 mod circle;
@@ -13,6 +14,7 @@ mod mark;
 mod seen;
 mod zone;
 
+pub use ball_size::{BallSize, BallSizeBy, check_ball_size};
 pub use body::{RenderedBody, render_body};
 pub use calibrate::{
     CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MIN_PRESSES, Smoothness, calibrate_presses,

@@ -6,7 +6,8 @@ use crate::failure::Failure;
 use crate::load::{no_presses, say_circles};
 use crate::output::{JsonSink, print, writable, write_file};
 use gripgen::tactile::presses::{
-    CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PressSet, calibrate_presses,
+    BallSize, CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PressSet,
+    calibrate_presses, check_ball_size,
 };
 use gripgen::tactile::{GelShape, Sensor};
 use gripgen::{PressGeometry, PressReportText, find_missing_circles, load_presses, press_report};
@@ -41,7 +42,9 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
     let options = CalibrateOptions::default();
     let calibration = calibrate_presses(&set, &options).map_err(|e| failure(&args.presses, &e))?;
     warn(&calibration, set.presses.len(), &args.talk);
+    let ball_size = check_ball_size(&set, &calibration);
     say_what_is_not_shown(&set, &args.talk);
+    say_ball_size(&set, ball_size.as_ref(), &args.talk);
     let bytes = match calibration.sensor.to_npz() {
         Some(bytes) => bytes.map_err(Failure::new)?,
         None => return Err(Failure::new("the fitted colours have no place in a sensor file")),
@@ -52,9 +55,10 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
             .hint("are these presses of one ball into one sensor, with the camera's settings fixed?")
     })?;
     write_file(&args.out, &bytes)?;
-    let page = press_report(&text(args, &set, &calibration), &set, &calibration.held_out, |i| {
-        calibration.predicted.get(i).cloned()
-    });
+    let page =
+        press_report(&text(args, &set, &calibration, ball_size.as_ref()), &set, &calibration.held_out, |i| {
+            calibration.predicted.get(i).cloned()
+        });
     write_file(&report, page.as_bytes())?;
     if sink.wanted() {
         sink.document(&json!({
@@ -63,6 +67,7 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
             "report": report,
             "folds": calibration.folds,
             "fitted": fitted(&calibration.sensor),
+            "ball_size": ball_size_json(ball_size.as_ref()),
             "doubtful": calibration.doubtful,
             "held_out": comparison_json(&calibration.held_out),
         }))?;
@@ -115,12 +120,47 @@ fn say_what_is_not_shown(set: &PressSet, talk: &TalkArgs) {
         "note: balls do not show flat contacts and edges, which are drawn from what they have in common; a press of a known \
          mesh would show them (columns mesh, depth_mm)"
     );
-    if set.presses.iter().all(|press| press.travel_m.is_none()) {
+}
+
+/// Whether the ball is as large as was said.
+fn say_ball_size(set: &PressSet, size: Option<&BallSize>, talk: &TalkArgs) {
+    if talk.quiet || set.presses.iter().all(|press| press.indenter.is_some()) {
+        return;
+    }
+    let Some(size) = size else {
         eprintln!(
-            "note: one ball and no depths: nothing here shows a wrong diameter; the column depth_mm, a ball of another \
-             size or a press of a known mesh would"
+            "note: the ball's size cannot be checked, presses of one ball look the same with a wrong diameter; the column depth_mm, or \
+             two presses of a known mesh (another ball, too) would show it"
+        );
+        return;
+    };
+    if size.is_wrong() {
+        let (given_mm, true_mm) = (1e3 * set.ball_m, 1e3 * size.factor * set.ball_m);
+        eprintln!(
+            "warning: the ball looks {}, {true_mm:.2} mm and not {given_mm:.2} mm; measure it with calipers, and a pixel on the gel again",
+            in_words(size)
+        );
+    } else if !size.tells() {
+        eprintln!(
+            "note: the ball looks {}: a diameter that is wrong by a factor of 1.5 would not be seen",
+            in_words(size)
         );
     }
+}
+
+fn in_words(size: &BallSize) -> String {
+    let BallSize { factor, low90, high90, .. } = size;
+    format!("{factor:.2} times as large as given ({low90:.2} to {high90:.2}, by {})", size.by.name())
+}
+
+fn ball_size_json(size: Option<&BallSize>) -> Value {
+    json!({
+        "checked": size.is_some_and(BallSize::tells),
+        "by": size.map(|size| size.by.name()),
+        "factor": size.map(|size| size.factor),
+        "low90": size.map(|size| size.low90),
+        "high90": size.map(|size| size.high90),
+    })
 }
 
 fn failure(presses: &Path, e: &CalibrateError) -> Failure {
@@ -169,7 +209,12 @@ fn gives_way(sensor: &Sensor) -> String {
     format!("{percent:.0} % of the press at the rim, widest kernel {widest_mm:.1} mm")
 }
 
-fn text(args: &CalibratePressesArgs, set: &PressSet, calibration: &Calibration) -> PressReportText {
+fn text(
+    args: &CalibratePressesArgs,
+    set: &PressSet,
+    calibration: &Calibration,
+    ball_size: Option<&BallSize>,
+) -> PressReportText {
     let sensor = &calibration.sensor;
     let gel = match sensor.gel_shape {
         GelShape::Dome { sag_m } => format!("dome, {:.2} mm lower at the corners", sag_m * 1e3),
@@ -198,6 +243,7 @@ fn text(args: &CalibratePressesArgs, set: &PressSet, calibration: &Calibration) 
                 ),
             ),
             ("ball".into(), format!("{:.3} mm", set.ball_m * 1e3)),
+            ("its size".into(), ball_size.map_or_else(|| "not checked".into(), in_words)),
             ("gel at rest".into(), gel),
             ("gel around a contact".into(), gives_way(sensor)),
             ("noise of red, green, blue".into(), format!("{red:.2}, {green:.2}, {blue:.2} grey levels")),

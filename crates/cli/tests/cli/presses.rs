@@ -50,6 +50,10 @@ fn a_sensor_is_calibrated_from_a_folder_of_presses_and_compared_with_it() {
     let json: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!(json["held_out"]["n"], 16);
     assert_eq!(json["fitted"]["ball_mm"], 5.0);
+    // One ball, and nothing that would show how large it is.
+    assert_eq!(json["ball_size"]["checked"], false);
+    assert!(json["ball_size"]["by"].is_null() && json["ball_size"]["factor"].is_null(), "{json}");
+    assert!(text(&done.stderr).contains("the ball's size cannot be checked"), "{}", text(&done.stderr));
     assert!(std::fs::read_to_string(out.path().join("sensor.html")).unwrap().contains("press-07.png"));
     // The file holds ball and pixel size, so comparing takes no flags.
     let compared = run(&["compare", path, "--sensor", sensor.to_str().unwrap(), "--json"]);

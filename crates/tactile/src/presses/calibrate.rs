@@ -2,12 +2,14 @@
 
 mod gel;
 mod moments;
+mod resized;
 mod rest;
 mod ridge;
 mod samples;
 #[cfg(test)]
 mod tests;
 
+pub(super) use resized::Resized;
 pub use ridge::Smoothness;
 
 use super::circle::{Seen, look, reference_frame};
@@ -160,7 +162,7 @@ fn calibrate_marked(
     let (trusted, distrusted) = trusted(set, &marked)?;
     let gels = Gels::new(options.gel_shape.as_ref(), &marked, set.ball_m, grid);
     let press_gain_sd = gains.as_ref().map(|gains| gains.sd);
-    let fit = Fit { set, grid, marked: &marked, gels: &gels, press_gain_sd };
+    let fit = Fit { set, grid, marked: &marked, press_gain_sd };
 
     let usual = if marked.len() < FEW_PRESSES { marked.len() } else { 4 };
     let folds = options.folds.unwrap_or(usual).clamp(2, marked.len());
@@ -168,7 +170,7 @@ fn calibrate_marked(
     for fold in 0..folds {
         let (unseen, mut seen): (Vec<usize>, Vec<usize>) = (0..marked.len()).partition(|i| i % folds == fold);
         seen.retain(|&i| trusted[i]);
-        let (sensor, _) = fit.fit(&seen)?;
+        let (sensor, _) = fit.fit(&gels, &seen)?;
         for i in unseen {
             predicted[i] = Some(predict_taken(&as_taken.presses[i], &marked[i].1, set.ball_m, &sensor));
         }
@@ -178,7 +180,7 @@ fn calibrate_marked(
     let each = scored.collect::<Result<Vec<_>, MetricError>>()?;
     let held_out = PressComparison::from_each(each).ok_or(CompareError::Empty)?;
     let everything: Vec<usize> = (0..marked.len()).filter(|&i| trusted[i]).collect();
-    let (sensor, smoothness) = fit.fit(&everything)?;
+    let (sensor, smoothness) = fit.fit(&gels, &everything)?;
     let circles = marked.iter().map(|(_, contact)| contact.circle).collect();
     let doubtful = (0..marked.len()).filter(|&i| !trusted[i]).map(|i| marked[i].0.name.clone()).collect();
     Ok(Calibration { sensor, held_out, predicted, folds, smoothness, circles, doubtful, distrusted })
@@ -211,17 +213,28 @@ struct Fit<'a> {
     set: &'a PressSet,
     grid: Grid,
     marked: &'a [Marked<'a>],
-    gels: &'a Gels<'a>,
     press_gain_sd: Option<[f32; 3]>,
 }
 
 impl Fit<'_> {
     /// Fits to the presses `seen` and to nothing else.
-    fn fit(&self, seen: &[usize]) -> Result<(Sensor, Smoothness), CalibrateError> {
+    fn fit(&self, gels: &Gels<'_>, seen: &[usize]) -> Result<(Sensor, Smoothness), CalibrateError> {
+        let presses: Vec<Marked<'_>> = seen.iter().map(|&i| self.marked[i].clone()).collect();
+        let rest = rest_frame(&presses, |_| None, self.set.rest.as_ref(), &self.grid);
+        let (candidate, smoothness) = gels.choose(seen, &rest);
+        Ok((self.fit_on(candidate, smoothness, seen)?, smoothness))
+    }
+
+    /// The same on a gel that is known.
+    fn fit_on(
+        &self,
+        candidate: &Candidate,
+        smoothness: Smoothness,
+        seen: &[usize],
+    ) -> Result<Sensor, CalibrateError> {
         let presses: Vec<Marked<'_>> = seen.iter().map(|&i| self.marked[i].clone()).collect();
         let raw = self.set.rest.as_ref();
         let mut rest = rest_frame(&presses, |_| None, raw, &self.grid);
-        let (candidate, smoothness) = self.gels.choose(seen, &rest);
         let mut colour = self.colours(candidate, &smoothness, seen, &rest)?;
         // Once more, now that the change of each press is known.
         let change = |i: usize| {
@@ -233,7 +246,7 @@ impl Fit<'_> {
         colour = self.colours(candidate, &smoothness, seen, &rest)?;
         // A 64th of a grey level is far below the noise, and packs well.
         rest.iter_mut().flatten().for_each(|v| *v = (*v * 64.0).round() / 64.0);
-        let sensor = Sensor {
+        Ok(Sensor {
             markers: None,
             shadow: None,
             grid: self.grid,
@@ -244,8 +257,7 @@ impl Fit<'_> {
             pyramid: Some(candidate.gel.pyramid.clone()),
             ball_m: Some(self.set.ball_m),
             press_gain_sd: self.press_gain_sd,
-        };
-        Ok((sensor, smoothness))
+        })
     }
 
     fn colours(

@@ -1,10 +1,14 @@
 use super::*;
 use crate::colour::{Lambert, Light};
 use crate::presses::compare::predict_contact;
-use crate::presses::{Contact, Press};
-use crate::presses::{compare_presses, find_circle};
+use crate::presses::{
+    BallSizeBy, Contact, Indenter, IndenterPose, Press, check_ball_size, compare_presses, find_circle,
+};
 use crate::sensor::Pyramid;
+use gripgen_twin::TriMesh;
+use nalgebra::Point3;
 use samples::GelModel;
+use std::sync::Arc;
 
 const GRID: Grid = Grid { width_px: 128, height_px: 96, metres_per_px: 0.15e-3 };
 const NOISE: f32 = 1.5;
@@ -66,13 +70,13 @@ fn presses(sensor: &Sensor, count: usize) -> PressSet {
 }
 
 fn noisy(sensor: &Sensor, circle: &Circle, key: u64) -> TactileImage {
-    let clean = predict_contact(&Contact::of_circle(*circle), 4e-3, sensor);
+    noisy_contact(sensor, &Contact::of_circle(*circle), key)
+}
+
+fn noisy_contact(sensor: &Sensor, contact: &Contact, key: u64) -> TactileImage {
+    let clean = predict_contact(contact, 4e-3, sensor);
     let exact = Sensor { noise_rgb: [0.0; 3], ..sensor.clone() };
-    assert_eq!(
-        clean,
-        predict_contact(&Contact::of_circle(*circle), 4e-3, &exact),
-        "predictions carry no noise"
-    );
+    assert_eq!(clean, predict_contact(contact, 4e-3, &exact), "predictions carry no noise");
     // The noise of the renderer, on the predicted image as the frame at rest.
     let rest = [0, 1, 2].map(|c| clean.rgb.iter().skip(c).step_by(3).map(|&v| f32::from(v)).collect());
     crate::finish(&Sensor { rest, ..sensor.clone() }, None, Some(key))
@@ -105,6 +109,47 @@ fn a_sensor_is_found_again_from_its_presses() {
     let read = Sensor::from_npz(&found.sensor.to_npz().unwrap().unwrap(), None, None).unwrap();
     assert_eq!(read, found.sensor);
     assert_eq!(compare_presses(&fresh, &read).unwrap().mean, scores);
+}
+
+/// Balls given too large or too small by a half draw a tip of known slopes in the wrong colours.
+#[test]
+fn a_wrong_diameter_shows_in_a_body_of_known_slopes() {
+    let gel = Pyramid { kernels_px: vec![27, 13, 7, 3], restore_depth_fraction: 0.4, sink_in_fraction: 0.4 };
+    let truth = Sensor { pyramid: Some(gel), ..truth() };
+    let mut set = presses(&truth, 14);
+    for (i, press) in set.presses.iter_mut().enumerate() {
+        // Shallow enough for a ball of two thirds.
+        let mut circle = press.circle.unwrap();
+        circle.radius_px -= 4.0;
+        (press.image, press.circle) = (noisy(&truth, &circle, i as u64), Some(circle));
+    }
+    let at = |x: f64, y: f64, z: f64| Point3::new(x * 1e-3, y * 1e-3, z * 1e-3);
+    let corners = vec![at(0.0, 0.0, 3.0), at(-4.0, -4.0, 1.0), at(4.0, -4.0, 1.0), at(0.0, 5.0, 1.0)];
+    let tip = TriMesh::new(corners, vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]).unwrap();
+    for (i, (x_px, y_px)) in [(40.0, 50.0), (80.0, 40.0), (64.0, 60.0)].into_iter().enumerate() {
+        let place = IndenterPose { x_px, y_px, rotation_rad: i as f64 };
+        let indenter = Indenter::of_mesh("tip", &tip, place, (0.4 + 0.2 * i as f64) * 1e-3, &GRID).unwrap();
+        let blank = TactileImage { width_px: 128, height_px: 96, rgb: vec![] };
+        let mut press = Press::of_body(format!("tip {i}"), blank, Arc::new(indenter));
+        press.image = noisy_contact(&truth, &Contact::of_press(&press, press.circle.unwrap()), 90 + i as u64);
+        set.presses.push(press);
+    }
+    let options = CalibrateOptions { folds: Some(2), gel_shape: Some(GelShape::Flat) };
+    let calibration = calibrate_presses(&set, &options).unwrap();
+    for given in [1.0, 1.5, 1.0 / 1.5] {
+        // Of a calibration it takes nothing that depends on the ball.
+        let set = PressSet { ball_m: given * set.ball_m, ..set.clone() };
+        let size = check_ball_size(&set, &calibration).unwrap();
+        println!("given {given:.2}: {size:?}");
+        assert!(size.tells() && size.by == BallSizeBy::Shapes, "{size:?}");
+        assert!((size.factor * given).ln().abs() < 0.15, "given {given}: {size:?}");
+        assert_eq!(size.is_wrong(), given != 1.0, "given {given}: {size:?}");
+    }
+    // Balls alone, and one body, say nothing.
+    for presses in [14, 15] {
+        let few = PressSet { presses: set.presses[..presses].to_vec(), ..set.clone() };
+        assert_eq!(check_ball_size(&few, &calibration), None);
+    }
 }
 
 #[test]
