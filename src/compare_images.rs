@@ -89,7 +89,9 @@ pub fn compare_images(
     for jaw in Jaw::BOTH {
         still.optics[jaw].image_noise = ImageNoise::Off;
     }
-    still.effects.retain(|effect| !effect.spec.presses.is_some_and(|fit| fit.scatters));
+    for effect in &mut still.effects {
+        effect.values = effect.spec.without_scatter(&effect.values);
+    }
     let mut found = ImageComparison::default();
     for &folder in folders {
         let source = ImageSource::open(folder)?;

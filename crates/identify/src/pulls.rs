@@ -27,3 +27,4 @@ mod stated;
 pub mod terms;
 mod trace_residuals;
 mod words;
+mod zero_wander;

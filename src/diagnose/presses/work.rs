@@ -92,13 +92,6 @@ fn scatters(spec: &EffectSpec) -> usize {
     spec.presses.map_or(0, |fit| fit.scatters)
 }
 
-/// An effect without what differs from press to press.
-fn shared(effect: &ActingEffect) -> Vec<f64> {
-    let own = effect.values.len() - scatters(effect.spec);
-    let neutral = effect.spec.parameters.iter().skip(own).map(|p| p.neutral);
-    effect.values.iter().take(own).copied().chain(neutral).collect()
-}
-
 /// What effects make of the optics in some circumstances.
 pub(super) fn optics_at(covariates: &Covariates, acting: &[ActingEffect]) -> OpticsState {
     let at = GripPoint {
@@ -112,7 +105,7 @@ pub(super) fn optics_at(covariates: &Covariates, acting: &[ActingEffect]) -> Opt
     let mut state = OpticsState::default();
     for effect in acting {
         if let Some(hook) = effect.spec.optics {
-            hook(&shared(effect), &mut state, &at);
+            hook(&effect.spec.without_scatter(&effect.values), &mut state, &at);
         }
     }
     state

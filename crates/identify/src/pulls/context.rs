@@ -5,7 +5,8 @@ use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, fall_s, noise_n, observe};
 use super::slip::{SlipLimit, SlipRig, SlipTrace, Slips, read_slips};
 use super::terms::Terms;
-use super::trace_residuals::TraceResiduals;
+use super::trace_residuals::{TraceResiduals, Widening};
+use super::zero_wander::ZeroReadings;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 
 /// Scatter of friction from grip to grip with which residuals are weighed; their true scale is fitted.
@@ -173,7 +174,7 @@ impl<'a> Context<'a> {
             let lag = [dynamics(&self.base)[0].clone()];
             let found = fit(&lag, FitOptions { max_steps: 10, min_gain: 1e-5 }, |v| {
                 let model = PullModel { lag_s: v[0], dead_time_s, ..self.base.clone() };
-                let mut r = self.trace_residuals(&model, &rows).widened(1.0);
+                let mut r = self.trace_residuals(&model, &rows).widened(Widening::NONE);
                 // Huber's cost as a sum of squares.
                 r.iter_mut()
                     .filter(|x| x.abs() > 2.5)
@@ -350,7 +351,7 @@ impl<'a> Context<'a> {
         let asked: Vec<(usize, &[f64])> = seen.iter().map(|o| (o.row, o.times_s.as_slice())).collect();
         for (observation, predicted) in seen.iter().zip(self.predictor.traces(model, &asked)) {
             if let Some((mean, n)) = observation.no_load_n {
-                no_load.push((mean - predicted.no_load_n, n));
+                no_load.push((mean - predicted.no_load_n, n, self.data.session_of[observation.row]));
             }
             let mut sums = [(0.0, 0.0, 0_usize); LEVELS];
             for (k, level) in observation.levels.iter().enumerate() {
@@ -365,7 +366,8 @@ impl<'a> Context<'a> {
             }
         }
         let wide = if self.predictor.winds_up() { CLOSED_LOOP } else { 1.0 };
-        let mut r = TraceResiduals { shared: vec![], own: vec![], traces: seen.len() };
+        let zeros = ZeroReadings::new(&no_load, noise);
+        let mut r = TraceResiduals { shared: vec![], own: vec![], traces: seen.len(), zeros };
         for level in levels.iter().filter(|l| !l.is_empty()) {
             let count = level.len() as f64;
             let mean = level.iter().map(|x| x.0).sum::<f64>() / count;
@@ -377,14 +379,6 @@ impl<'a> Context<'a> {
                 let own = wide * (OWN_N.0 + OWN_N.1 * force.abs());
                 r.own.push((difference - mean) / (own * own + noise * noise / *n as f64).sqrt());
             }
-        }
-        if !no_load.is_empty() {
-            let mean = no_load.iter().map(|x| x.0).sum::<f64>() / no_load.len() as f64;
-            let readings: usize = no_load.iter().map(|x| x.1).sum();
-            r.shared.push(mean / (0.02 * 0.02 + noise * noise / readings as f64).sqrt());
-            r.shared.extend(
-                no_load.iter().map(|(x, n)| (x - mean) / (0.02 * 0.02 + noise * noise / *n as f64).sqrt()),
-            );
         }
         r
     }

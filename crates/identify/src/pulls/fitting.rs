@@ -4,6 +4,7 @@ use super::context::Context;
 use super::likelihood::{Likelihood, likelihood, scale, weight_of};
 use super::model::PullModel;
 use super::terms::Terms;
+use super::trace_residuals::Widening;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 use nalgebra::{DMatrix, DVector};
 
@@ -203,7 +204,7 @@ impl Context<'_> {
                 let widening = traces.widening();
                 (traces.widened(widening), widening)
             } else {
-                (vec![], 1.0)
+                (vec![], Widening::NONE)
             };
             let s = scale(&friction).max(0.2);
             // The first round does not know yet which pulls are bad.

@@ -5,6 +5,7 @@ use super::context::Context;
 use super::curves::Curve;
 use super::model::PullModel;
 use super::terms::Terms;
+use super::trace_residuals::Widening;
 use crate::diagnosis::Detectable;
 use nalgebra::{DMatrix, DVector, Dyn, SVD};
 
@@ -26,7 +27,7 @@ pub(super) struct ScoreTest<'a> {
     basis: DMatrix<f64>,
     svd: SVD<f64, Dyn, Dyn>,
     signals: bool,
-    widening: f64,
+    widening: Widening,
 }
 
 impl<'a> ScoreTest<'a> {
@@ -50,7 +51,7 @@ impl<'a> ScoreTest<'a> {
             basis: DMatrix::zeros(0, 0),
             svd: DMatrix::zeros(1, 1).svd(true, true),
             signals,
-            widening: if signals { context.trace_residuals(model, rows).widening() } else { 1.0 },
+            widening: if signals { context.trace_residuals(model, rows).widening() } else { Widening::NONE },
         };
         test.residuals = test.residuals_of(model);
         test.scale = super::likelihood::scale(&test.residuals.as_slice()[..rows.len()]).max(0.1);

@@ -202,6 +202,13 @@ impl EffectSpec {
         self.parameters.iter().position(|p| p.name == parameter)
     }
 
+    /// Some values without what differs from grip to grip by chance.
+    pub fn without_scatter(&self, values: &[f64]) -> Vec<f64> {
+        let own = values.len() - self.presses.map_or(0, |fit| fit.scatters).min(values.len());
+        let neutral = self.parameters.iter().skip(own).map(|p| p.neutral);
+        values.iter().take(own).copied().chain(neutral).collect()
+    }
+
     /// What it acts on, for people.
     pub fn acts_on(&self) -> Vec<&'static str> {
         let hooks = [
