@@ -146,7 +146,7 @@ pub(crate) fn ball_imprint(
         let (dx, dy) = (x - ball[0], y - ball[1]);
         dx * dx + dy * dy
     };
-    let above_rest = |x: f64, y: f64| (radius_px * radius_px - squared(x, y)).max(0.0).sqrt() - rest_at(x, y);
+    let above_rest = |x: f64, y: f64| (radius_px * radius_px - squared(x, y)).max(0.0).sqrt() + rest_at(x, y);
     let level = match &rest {
         None => sunk_px,
         Some(_) => rim.iter().map(|(dx, dy)| above_rest(cx + dx, cy + dy)).sum::<f64>() / 4.0,
@@ -179,6 +179,9 @@ pub(crate) fn ball_imprint(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::presses::IndenterPose;
+    use gripgen_twin::TriMesh;
+    use nalgebra::Point3;
 
     const GRID: Grid = Grid { width_px: 101, height_px: 81, metres_per_px: 1e-4 };
 
@@ -207,5 +210,69 @@ mod tests {
             let travel = ball_imprint(&circle, Deeper::To(2.0), 2.0 * radius_m, &GRID, &shape);
             assert!((f64::from(travel.depth_px.at(50, 40)) - 2.0).abs() < 0.01);
         }
+    }
+
+    /// On a slope the rim lies on the gel all around: the ball stands beside the middle of its circle.
+    #[test]
+    fn on_a_dome_the_rim_lies_on_the_gel() {
+        let shape = GelShape::Dome { sag_m: 1.2e-3 };
+        let circle = Circle { x_px: 76.0, y_px: 40.0, radius_px: 12.0 };
+        let depth = ball_imprint(&circle, Deeper::By(0.0), 4e-3, &GRID, &shape).depth_px;
+        for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+            let at = |r: i64| depth.at((76 + dx * r) as usize, (40 + dy * r) as usize);
+            // Inside it is as steep as the ball, 12 px beside its middle of 20: 0.75 px a pixel.
+            let inside = at(10);
+            assert!((0.8..2.2).contains(&inside) && at(14) == 0.0, "{dx} {dy}: {inside} {}", at(14));
+        }
+        let middle = depth.at(76, 40);
+        assert!((3.5..6.0).contains(&middle), "{middle}");
+    }
+
+    #[test]
+    fn a_ball_sinks_in_to_its_equator_at_most() {
+        let circle = Circle { x_px: 50.0, y_px: 40.0, radius_px: 17.0 };
+        let deep = ball_imprint(&circle, Deeper::To(35.0), 4e-3, &GRID, &GelShape::Flat);
+        assert!((deep.depth_px.at(50, 40) - 20.0).abs() < 1e-4, "{}", deep.depth_px.at(50, 40));
+        assert!((deep.press_depth_m - 3.5e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn wider_pixels_have_the_same_circle() {
+        let fine = Contact::of_circle(Circle { x_px: 50.0, y_px: 41.0, radius_px: 12.0 });
+        let wide = fine.in_wider_pixels(3).circle;
+        let middle = |px: f64| (px + 0.5) / 3.0 - 0.5;
+        assert_eq!((wide.x_px, wide.y_px, wide.radius_px), (middle(50.0), middle(41.0), 4.0));
+        // From the rim outwards, and negative inside.
+        assert_eq!(fine.beyond_rim_px(41 * GRID.width_px + 70, GRID.width_px), 8.0);
+        assert_eq!(fine.beyond_rim_px(41 * GRID.width_px + 50, GRID.width_px), -12.0);
+    }
+
+    /// Effects on the depth act on depths that were measured, not on circles that were seen; those on edges on bodies.
+    #[test]
+    fn effects_change_what_was_measured_and_not_what_was_seen() {
+        let deeper = OpticsState { press_factor: 1.5, press_offset_m: 0.1e-3, ..OpticsState::default() };
+        let rounder = OpticsState { edge_rounding_m: 0.6e-3, ..OpticsState::default() };
+        let depth_m = |contact: &Contact, optics: &OpticsState| {
+            let imprint = contact.imprint_seen(4e-3, &GRID, &GelShape::Flat, 0.4, optics);
+            (imprint.press_depth_m, imprint.depth_px.values.iter().fold(0.0f32, |m, &d| m.max(d)))
+        };
+        let circle = Circle { x_px: 50.0, y_px: 40.0, radius_px: 8.0 };
+        let seen = Contact::of_circle(circle);
+        assert_eq!(depth_m(&seen, &deeper), depth_m(&seen, &OpticsState::default()));
+        let measured = Contact { travel_m: Some(0.8e-3), ..seen };
+        assert!((depth_m(&measured, &deeper).0 - 1.3e-3).abs() < 1e-12);
+        let at = |x: f64, y: f64, z: f64| Point3::new(x * 1e-3, y * 1e-3, z * 1e-3);
+        let corners = vec![at(0.0, 0.0, 3.0), at(-2.0, -2.0, 1.0), at(2.0, -2.0, 1.0), at(0.0, 2.5, 1.0)];
+        let tip = TriMesh::new(corners, vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]).unwrap();
+        let place = IndenterPose { x_px: 50.0, y_px: 40.0, rotation_rad: 0.0 };
+        let body = Arc::new(Indenter::of_mesh("tip", &tip, place, 0.8e-3, &GRID).unwrap());
+        let body = Contact { circle, travel_m: None, indenter: Some(body) };
+        let (plain, pressed) = (depth_m(&body, &OpticsState::default()), depth_m(&body, &deeper));
+        assert!(
+            (pressed.0 - 1.3e-3).abs() < 1e-12 && (pressed.1 - plain.1 - 5.0).abs() < 1e-3,
+            "{pressed:?}"
+        );
+        let rounded = depth_m(&body, &rounder);
+        assert!(rounded.0 == plain.0 && rounded.1 < plain.1 - 1.0, "{rounded:?} {plain:?}");
     }
 }
