@@ -9,7 +9,7 @@ use gripgen::tactile::presses::{
 };
 use gripgen::tactile::{GelShape, finish};
 use gripgen::twin::{TriMesh, write_binary_stl};
-use gripgen::{Location, PressGeometry, in_parallel, load_presses, load_sensor};
+use gripgen::{Location, PressGeometry, RenderOptions, in_parallel, load_presses, load_sensor, render_file};
 use nalgebra::Point3;
 use std::time::Instant;
 
@@ -163,6 +163,17 @@ fn a_table_may_name_a_mesh_instead_of_a_ball() {
         // Turned by 90 degrees its long side stands upright: an edge above its place, none beside it at that distance.
         let px = |mm: f64| (mm * 1e-3 / sensor.grid.metres_per_px).round() as usize;
         assert!(changed(160, 120 - px(2.0)) && changed(160 - px(1.0), 120));
+        // The same that `render` draws of the mesh, at another place and turn.
+        let placed = load(table, "a.png,block.stl,0.5,150,110,30\n").unwrap();
+        let options = RenderOptions {
+            travel_m: Some(0.5e-3),
+            x_px: Some(150.0),
+            y_px: Some(110.0),
+            rotation_rad: 30.0_f64.to_radians(),
+            metres_per_unit: 1e-3,
+        };
+        let rendered = render_file(&folder.path().join("block.stl"), &options, &sensor).unwrap();
+        assert_eq!(predict_press(&placed.presses[0], placed.ball_m, &sensor).unwrap(), rendered.image);
         assert!(!changed(160, 120), "the flat contact keeps the colour of the lights at rest");
         let found = compare_presses(&set, &sensor).unwrap();
         assert_eq!((found.by_shape[0].0.as_str(), found.by_shape[0].1), ("block", 1));

@@ -193,6 +193,45 @@ fn a_mesh_is_rendered_with_its_surface() {
     // Right of the tip the surface looks to the right, above it to the top.
     let at = |x: usize, y: usize| &normals[3 * (320 * y + x)..][..3];
     assert!(at(163, 120)[0] > 0.05 && at(156, 120)[0] < -0.05 && at(160, 116)[1] > 0.05);
+    // The image shows it, and the mask is what was counted.
+    let picture = |name: &str| gripgen::record::decode_picture(&std::fs::read(file(name)).unwrap()).unwrap();
+    let bytes = gripgen::assets::get("sensors/gelsight_r15/sensor.npz").unwrap();
+    let rest =
+        gripgen::tactile::finish(&gripgen::tactile::Sensor::from_npz(bytes, None, None).unwrap(), None, None);
+    let change = |x: usize, y: usize| {
+        let at = 3 * (y * 320 + x);
+        picture("out.png").rgb[at..at + 3].iter().zip(&rest.rgb[at..at + 3]).any(|(a, b)| a.abs_diff(*b) > 10)
+    };
+    assert!(change(163, 120) && change(156, 120) && !change(20, 20));
+    let inside = |name: &str| -> Vec<(f64, f64)> {
+        let rgb = picture(name).rgb;
+        let white = (0..320 * 240).filter(|i| rgb[3 * i] == 255);
+        white.map(|i| ((i % 320) as f64, (i / 320) as f64)).collect()
+    };
+    assert!((inside("m.png").len() as f64 * 0.0877 * 0.0877 - area_mm2).abs() < 1e-6);
+    // Placed, turned by half a turn, and smaller: the middle of its section lies 0.5 mm times 0.6 beside its tip, 3.4 px.
+    let middle = |more: &[&str]| {
+        let placed = ["--x-px", "140", "--y-px", "90.5"];
+        let drawn = run(
+            &[&arguments[..2], &["--depth-mm", "2", "--sensor", sensor], &placed, &wanted, more].concat()
+        );
+        assert!(drawn.status.success(), "{}", text(&drawn.stderr));
+        let all = inside("m.png");
+        let n = all.len() as f64;
+        (all.iter().map(|p| p.0).sum::<f64>() / n, all.iter().map(|p| p.1).sum::<f64>() / n, n)
+    };
+    let (plain, turned) = (middle(&[]), middle(&["--rotation-deg", "180"]));
+    for ((x, y, n), wanted_y) in [(plain, 90.5 + 3.4), (turned, 90.5 - 3.4)] {
+        assert!((x - 140.0).abs() < 0.5 && (y - wanted_y).abs() < 0.6, "{x} {y}, wanted {wanted_y}");
+        // 0.6^2 of 9 mm2.
+        assert!((n * 0.0877 * 0.0877 - 0.36 * 9.0).abs() < 0.15, "{n} px");
+    }
+    // A quarter of the size lies in the gel as a whole, a sixteenth of 9 mm2.
+    let (_, _, n) = middle(&["--scale-mm-per-unit", "0.25"]);
+    assert!((n * 0.0877 * 0.0877 - 9.0 / 16.0).abs() < 0.15, "{n} px");
+    let twice = run(&["render", &tip, "--depth-mm", "1", "--sensor", sensor, "-o", &image, "--mask", &image]);
+    assert_code(&twice, 2);
+    assert!(text(&twice.stderr).contains("two files would be one"));
     // The same depth 100 times as large is not to be had, and a place beside the image neither.
     for (more, part) in [
         (["--depth-mm", "50", "--rotation-deg", "0"], "travels 50 mm"),

@@ -206,3 +206,91 @@ fn of_whole_frames(presses: &[Marked<'_>], pixels: &[Vec<usize>], frame: &[[f64;
     }
     balanced < (1.0 - WORTH) * plain
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::presses::Circle;
+
+    const GRID: Grid = Grid { width_px: 64, height_px: 48, metres_per_px: 0.2e-3 };
+
+    /// A frame of smooth colours times gains.
+    fn frame(gain: [f64; 3]) -> TactileImage {
+        let level = |i: usize| {
+            let (pixel, c) = (i / 3, i % 3);
+            gain[c] * (60.0 + (pixel % 64) as f64 + 1.5 * (pixel / 64) as f64)
+        };
+        let rgb = (0..3 * GRID.len()).map(|i| level(i).round().min(255.0) as u8).collect();
+        TactileImage { width_px: 64, height_px: 48, rgb }
+    }
+
+    fn contact(x_px: f64, y_px: f64) -> Contact {
+        Contact::of_circle(Circle { x_px, y_px, radius_px: 5.0 })
+    }
+
+    #[test]
+    fn a_gain_is_that_of_pixels_on_the_scale() {
+        let plain = frame([1.0; 3]);
+        let all = || 0..GRID.len();
+        let of = |image: &TactileImage| gain_of(image, |p, c| f64::from(plain.rgb[3 * p + c]), all());
+        // A fifth of the blue pixels is at the end of the scale.
+        let [red, green, blue] = of(&frame([0.8, 1.1, 1.7]));
+        assert!(
+            (red - 0.8).abs() < 2e-3 && (green - 1.1).abs() < 2e-3 && (blue - 1.7).abs() < 5e-3,
+            "{blue}"
+        );
+        // No camera has a fifth of the usual gain, and black shows none.
+        assert_eq!(of(&frame([0.2, 1.0, 0.0]))[0], 1.0);
+        assert_eq!(of(&frame([0.2, 1.0, 0.0]))[2], 1.0);
+    }
+
+    #[test]
+    fn a_prediction_follows_its_press_as_far_as_gains_scatter() {
+        let (predicted, at) = (frame([1.0; 3]), contact(20.0, 20.0));
+        let sd = [0.1, 0.1, 0.02];
+        let found = within_gain(&frame([0.9, 1.5, 1.2]), &predicted, &at, &GRID, sd);
+        let most = |sd: f64| libm::exp(2.5 * sd);
+        let wanted = with_gain(&predicted, [0.9, most(0.1), most(0.02)]);
+        let worst = found.rgb.iter().zip(&wanted.rgb).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst <= Some(1), "{worst:?}");
+    }
+
+    #[test]
+    fn pixels_away_are_those_far_from_the_contact() {
+        let at = Contact::of_circle(Circle { x_px: 20.0, y_px: 20.0, radius_px: 5.3 });
+        let found = away(&at, &GRID);
+        // 2.6 mm are 13 px.
+        let far = |p: usize| at.beyond_rim_px(p, 64) >= 13.0;
+        assert!(!found.is_empty() && (0..GRID.len()).all(|p| found.contains(&p) == far(p)));
+        // Where nothing is that far, the farthest quarter.
+        let close = Grid { metres_per_px: 1e-5, ..GRID };
+        let share = away(&at, &close).len() as f64 / close.len() as f64;
+        assert!((share - 0.25).abs() < 0.01, "{share}");
+    }
+
+    #[test]
+    fn gains_of_presses_are_relative_to_one_another() {
+        let own = [[0.9, 1.0, 1.2], [1.1, 1.0, 0.9], [1.0, 1.05, 1.0], [1.05, 0.95, 0.95]];
+        let presses: Vec<Press> =
+            own.iter().map(|gain| Press::of_ball("", frame(gain.map(|g| 1.2 * g)), None)).collect();
+        let places = [(14.0, 14.0), (50.0, 14.0), (14.0, 34.0), (50.0, 34.0)];
+        let marked: Vec<Marked<'_>> =
+            presses.iter().zip(places).map(|(press, (x, y))| (press, contact(x, y))).collect();
+        let found = gains(&marked, Some(&frame([1.2 * 1.3, 1.2, 1.2])), &GRID).unwrap();
+        for c in 0..3 {
+            let mean = own.iter().map(|gain| libm::log(gain[c])).sum::<f64>() / 4.0;
+            let logs = own.map(|gain| libm::log(gain[c]) - mean);
+            for (found, log) in found.of_press.iter().zip(logs) {
+                assert!((libm::log(found[c]) - log).abs() < 5e-3, "{found:?} {c}: {log}");
+            }
+            let sd = (logs.iter().map(|log| log * log).sum::<f64>() / 3.0).sqrt();
+            assert!((f64::from(found.sd[c]) - sd).abs() < 5e-3, "{:?} {sd}", found.sd);
+            let rest = [1.3, 1.0, 1.0][c] * libm::exp(-mean);
+            assert!((found.of_rest[c] - rest).abs() < 0.01, "{:?} {rest}", found.of_rest);
+        }
+        // One press is no frame to compare with.
+        let pixels = vec![away(&marked[0].1, &GRID)];
+        let alone = frame_away(&marked[..1], &pixels, &[[1.0; 3]], &GRID);
+        assert!(alone.iter().all(|levels| levels[0] < 0.0));
+    }
+}

@@ -134,6 +134,19 @@ mod tests {
         // A travel moves the surface to where it is so deep.
         let moved = render_heights(&top(-7.0, -8.0), Some(0.4e-3), &sensor).unwrap();
         assert_eq!(moved.image, of_mesh.image);
+        // What lies below the gel is not touched, however close it is.
+        let beside = render_heights(&top(0.4e-3, -1e-3), None, &sensor).unwrap();
+        assert_eq!(beside, of_heights);
+        // The gel follows a roof where it is deeper than a share of the travel, wherever that comes from.
+        let roof = |highest_m: f64| {
+            let height = |i: usize| highest_m - 5e-6 * ((i % w) as f64 - 160.0).abs();
+            Array { shape: vec![h, w], values: (0..w * h).map(height).collect() }
+        };
+        let plain = render_heights(&roof(0.4e-3), None, &sensor).unwrap();
+        let lowered = render_heights(&roof(-7.0), Some(0.4e-3), &sensor).unwrap();
+        let wide = |body: &RenderedBody| body.contact.iter().filter(|&&c| c).count() / h;
+        // 0.4 of the travel are left 0.24 mm below the ridge: 48 px to either side.
+        assert!(wide(&plain).abs_diff(96) <= 2 && wide(&plain) == wide(&lowered), "{}", wide(&plain));
         // Before it touches the gel is at rest.
         let before = render_heights(&top(-1e-4, -1.0), None, &sensor).unwrap();
         assert_eq!(before.image, crate::finish(&sensor, None, None));

@@ -313,6 +313,45 @@ mod tests {
     }
 
     #[test]
+    fn the_circle_of_a_body_has_the_area_of_its_contact() {
+        let at = IndenterPose { x_px: 60.0, y_px: 50.0, rotation_rad: 0.0 };
+        let circle = Indenter::of_mesh("wedge", &wedge(), at, 0.4e-3, &GRID).unwrap().circle();
+        // Deeper than 0.4 of 8 px: 4.8 px to either side of 20 px of ridge.
+        let area_px2 = PI * circle.radius_px * circle.radius_px;
+        assert!((area_px2 / 192.0 - 1.0).abs() < 0.15, "{area_px2} px2");
+        assert_eq!((circle.x_px, circle.y_px), (60.0, 50.0));
+    }
+
+    #[test]
+    fn in_wider_pixels_it_is_the_same_body() {
+        let at = IndenterPose { x_px: 60.0, y_px: 50.0, rotation_rad: 0.3 };
+        let fine = Indenter::of_mesh("wedge", &wedge(), at, 0.4e-3, &GRID).unwrap();
+        let wide = fine.in_wider_pixels(2);
+        assert_eq!((wide.pose.x_px, wide.pose.y_px), (29.75, 24.75));
+        let (of_fine, of_wide) = (fine.depth_px(8.0, None), wide.depth_px(4.0, None));
+        for i in 0..60 * 50 {
+            let (x, y) = (i % 60, i / 60);
+            let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| of_fine.at(2 * x + dx, 2 * y + dy));
+            let mean = four.iter().sum::<f32>() / 8.0;
+            let steep = four.iter().any(|d| (d - four[0]).abs() > 2.0);
+            assert!(steep || (of_wide.at(x, y) - mean).abs() < 0.4, "{x} {y}: {} {mean}", of_wide.at(x, y));
+            let (near, far) = (wide.distance_px(i), fine.distance_px(2 * y * 120 + 2 * x));
+            assert!((2.0 * near - far).abs() < 2.0, "{x} {y}: {near} {far}");
+        }
+    }
+
+    /// A ball that rolls inside a ridge of 90 degrees stays a radius times (sqrt 2 - 1) below it.
+    #[test]
+    fn a_rounded_ridge_is_lower_by_what_its_ball_does_not_reach() {
+        let at = IndenterPose { x_px: 60.0, y_px: 50.0, rotation_rad: 0.0 };
+        let sharp = Indenter::of_mesh("wedge", &wedge(), at, 0.4e-3, &GRID).unwrap();
+        let round = sharp.rounded(6.0).depth_px(8.0, None);
+        let lower = sharp.depth_px(8.0, None).at(60, 40) - round.at(60, 40);
+        // The mean over a pixel of the sharp ridge is a quarter of a pixel below it.
+        assert!((lower - (6.0 * (2.0f32.sqrt() - 1.0) - 0.25)).abs() < 0.3, "{lower}");
+    }
+
+    #[test]
     fn first_contact_is_that_with_the_gel_as_it_is() {
         let at = IndenterPose { x_px: 60.0, y_px: 50.0, rotation_rad: 0.0 };
         let indenter = Indenter::of_mesh("wedge", &wedge(), at, 0.4e-3, &GRID).unwrap();
