@@ -99,6 +99,10 @@ pub(super) fn scatter(
     if known.is_none() && !is_there {
         observed.keep_gains();
     }
+    observed.measure_gains_by(match known {
+        Some(known) if !(is_there && is_new) => known,
+        _ => sd,
+    });
     if is_there && is_new {
         // Of the logarithm of a standard deviation: 1 / sqrt(2 freedom).
         let factor = libm::exp(1.645 / (2.0 * freedom.max(1.0)).sqrt());

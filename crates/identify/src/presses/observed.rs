@@ -12,12 +12,17 @@ pub(super) struct Observed<'a> {
     zone_scale: [f64; PRESS_ZONES],
     /// Square of a gain that counts as 1, of each channel: a camera that balances white leaves green alone.
     gain_scale: [f64; 3],
+    /// Standard deviations by which the camera's gains are known to wander.
+    gain_sd: Option<[f64; 3]>,
     /// Where each press has gains of its own: the levels at its pixels without effects, on which they act.
     gains: Option<Vec<Vec<[f32; 3]>>>,
 }
 
 /// Mean squared residual of a press in each zone, and the squares of its gains.
 type PressSquares = ([f64; PRESS_ZONES], [f64; 3]);
+
+/// Gains count as 1 at this many standard deviations at most.
+const WIDE: f64 = 2.0;
 
 /// Smallest scatter of gains that counts as 1.
 const MIN_GAIN: f64 = 1e-3;
@@ -26,13 +31,26 @@ impl<'a> Observed<'a> {
     /// All zones count by their own scatter after [`Observed::rescale`] only.
     pub(super) fn new(predictor: &'a dyn PredictPresses) -> Self {
         let pixels = (0..predictor.circumstances().len()).map(|i| predictor.pixels(i)).collect();
-        Self { predictor, pixels, zone_scale: [1.0; PRESS_ZONES], gain_scale: [1.0; 3], gains: None }
+        Self {
+            predictor,
+            pixels,
+            zone_scale: [1.0; PRESS_ZONES],
+            gain_scale: [1.0; 3],
+            gain_sd: None,
+            gains: None,
+        }
     }
 
     /// From here on each press has gains of its own: pixels are compared without them, and the gains with those that a model
     /// predicts, as a zone of their own.
     pub(super) fn divide_gains(&mut self) {
         self.gains = Some(self.for_each(self.count(), |i| self.levels(i, &[])));
+    }
+
+    /// Gains that lie further apart than the camera's wander, by their standard deviations, are for effects to explain: they do
+    /// not set their own measure.
+    pub(super) fn measure_gains_by(&mut self, sd: [f64; 3]) {
+        self.gain_sd = Some(sd);
     }
 
     /// As before [`Observed::divide_gains`].
@@ -127,7 +145,9 @@ impl<'a> Observed<'a> {
         };
         let noise = self.predictor.noise_mse();
         self.zone_scale = std::array::from_fn(|z| median(&|(zones, _)| zones[z]).max(noise.max(0.02)));
-        self.gain_scale = std::array::from_fn(|c| median(&|(_, gains)| gains[c]).max(MIN_GAIN * MIN_GAIN));
+        let most = self.gain_sd.map_or([f64::INFINITY; 3], |sd| sd.map(|sd| (WIDE * sd).powi(2)));
+        self.gain_scale =
+            std::array::from_fn(|c| median(&|(_, gains)| gains[c]).min(most[c]).max(MIN_GAIN * MIN_GAIN));
     }
 
     /// Mean squared residual in each zone and channel of a press, without its gain; NaN where a zone is empty.
