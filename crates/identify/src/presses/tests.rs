@@ -196,6 +196,31 @@ fn sizes_that_would_have_been_seen_are_those_that_are() {
     }
 }
 
+/// A camera that balances white, as its sensor file knows: red and blue wander by 5 %, green by 1 %. What all presses share is
+/// told by green.
+#[test]
+fn beside_gains_that_wander_light_is_told_by_the_one_that_does_not() {
+    let sd = [0.05, 0.01, 0.05];
+    let wandering = |seed: u64, light: &dyn Fn(usize) -> f64| {
+        let mut draws = Draws::new(seed, 5);
+        let gains: Vec<[f64; 3]> =
+            (0..PRESSES).map(|_| sd.map(|sd| libm::exp(sd * draws.normal()))).collect();
+        let camera =
+            Camera::new(seed, |press, _, level| [0, 1, 2].map(|c| level[c] * gains[press][c] * light(press)));
+        let known = PressData { press_gain_sd: Some(sd), ..data(Vec::new()) };
+        diagnose_presses(&camera, &known, &mut |_, _| {})
+    };
+    for seed in 30..36 {
+        assert_eq!(names(&wandering(seed, &|_| 1.0)), [""; 0], "{seed}: nothing but the balance");
+        let (dimmer, drifting) =
+            (wandering(seed, &|_| 0.96), wandering(seed, &|press| 1.0 - 0.009 * press as f64));
+        for (found, name) in [(dimmer, "exposure"), (drifting, "light_drift")] {
+            assert_eq!(names(&found), [name], "{seed}");
+            assert!(found.diagnosis.effects[0].weight > 0.7, "{seed}: {:?}", found.diagnosis.effects);
+        }
+    }
+}
+
 /// A pattern from the sixth press on.
 #[test]
 fn a_background_that_changes_is_found_where_it_does() {
