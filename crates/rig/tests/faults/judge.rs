@@ -46,9 +46,12 @@ impl Display for Report {
     }
 }
 
+/// What is said of an injection that was never made.
+pub const NEVER_CAME: &str = "the moment never came";
+
 pub fn judge(injection: &Injection, made: Made) -> Report {
     let Injection { kind, moment, .. } = *injection;
-    assert!(made.came, "the moment never came: {:?}", made.pull.map(|pull| pull.outcome));
+    assert!(made.came, "{NEVER_CAME}: {:?}", made.pull.map(|pull| pull.outcome));
     let stood = made.stood.expect("the arm does not stand");
     assert!(made.stayed, "the arm does not stay where it is");
     assert_eq!(made.let_go.filter(|_| kind != Kind::Rig(Fault::PartLost)), None);
