@@ -40,19 +40,20 @@ pub fn imprint_constant(presses: &[FittedPress]) -> Option<ImprintEstimate> {
     };
     let (cc, cf, ff) = (sum(&ln_c, c, &ln_c, c), sum(&ln_c, c, &ln_f, f), sum(&ln_f, f, &ln_f, f));
     let half = t_quantile_95(n - 1.0) * (cc / (n - 1.0) / n).sqrt();
-    let estimate = |value: f64, low90: f64, high90: f64, unit: &str| {
-        ParameterEstimate::new(value, (low90, high90), unit)
-    };
     let (least, most) =
         ln_f.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), &x| (l.min(x), m.max(x)));
     let exponent = (presses.len() > 2 && most - least >= libm::log(MIN_RATIO)).then(|| {
         let slope = cf / ff;
         let sd = ((cc - slope * cf).max(0.0) / (n - 2.0) / ff).sqrt();
         let half = t_quantile_95(n - 2.0) * sd;
-        estimate(1.0 + slope, 1.0 + slope - half, 1.0 + slope + half, "1")
+        ParameterEstimate::new(1.0 + slope, (1.0 + slope - half, 1.0 + slope + half), "1")
     });
     Some(ImprintEstimate {
-        imprint_mm3_per_n: estimate(libm::exp(c), libm::exp(c - half), libm::exp(c + half), "mm^3/N"),
+        imprint_mm3_per_n: ParameterEstimate::new(
+            libm::exp(c),
+            (libm::exp(c - half), libm::exp(c + half)),
+            "mm^3/N",
+        ),
         exponent,
     })
 }

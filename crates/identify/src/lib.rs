@@ -45,7 +45,7 @@ pub use grouped::{
 pub use imprint::{FittedPress, ImprintEstimate, imprint_constant};
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
-pub use plain::{left, plain};
+pub use plain::plain;
 pub use presses::{
     ActingEffect, MIN_DIAGNOSED_PRESSES, PRESS_ZONES, PredictPresses, PressCovariate, PressData,
     PressDiagnosis, PressPixels, PressTrial, PressValues, diagnose_presses, too_few_presses,

@@ -4,7 +4,7 @@ use crate::diagnosis::{Channel, Diagnosis, HeldOutError, Verdict};
 use gripgen_twin::effects::find;
 
 /// From this many times the noise of the camera on what is left of images is said.
-pub const FAR_ABOVE_NOISE: f64 = 10.0;
+const FAR_ABOVE_NOISE: f64 = 10.0;
 
 /// What a diagnosis says, without names of effects and parameters.
 pub fn plain(d: &Diagnosis) -> String {
@@ -29,7 +29,7 @@ pub fn plain(d: &Diagnosis) -> String {
 }
 
 /// How many times the noise what is left of images is, where that is far.
-pub fn left(d: &Diagnosis) -> Option<f64> {
+pub(crate) fn left(d: &Diagnosis) -> Option<f64> {
     let times = d.error.as_ref()?.after.mse? / d.noise_floor_mse.filter(|floor| *floor > 0.0)?;
     (times > FAR_ABOVE_NOISE).then_some(times)
 }

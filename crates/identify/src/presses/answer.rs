@@ -8,9 +8,10 @@ use super::score::hash;
 use super::search::Found;
 use super::unnamed::{PressCovariate, PressValues};
 use super::{PressData, PressDiagnosis};
+use crate::plain::left;
 use crate::{
     Channel, DataSummary, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, HeldOutError, NamedEffect,
-    ParameterEstimate, Rival, SeparateBy, UnknownCovariate, grouped_intervals, left,
+    ParameterEstimate, Rival, SeparateBy, UnknownCovariate, grouped_intervals,
 };
 use gripgen_twin::effects::{Measured, separating};
 use std::collections::BTreeMap;

@@ -6,7 +6,7 @@
 use super::candidates::press_effects;
 use super::observed::Observed;
 use super::predict::ActingEffect;
-use super::score::{Design, MATERIAL, PressTrial, SURE, differences};
+use super::score::{Design, MATERIAL, PressTrial, SURE, differences, shares};
 use super::unnamed::{PressCovariate, PressValues};
 use crate::Detectable;
 use nalgebra::{DMatrix, DVector};
@@ -71,8 +71,7 @@ pub(super) fn scatter(
     let divided = observed.pixel_costs(&[]);
     let (gain, error) = design.mean(&differences(&plain, &divided));
     // Gains of the size of chance differ from press to press by nature, so how sure they are is a matter of shares.
-    let shares: Vec<f64> = plain.iter().zip(&divided).map(|(p, d)| (p - d) / (p + d).max(1e-300)).collect();
-    let (share_off, share_error) = design.mean(&shares);
+    let (share_off, share_error) = design.mean(&shares(&plain, &divided));
     let freedom = gains.len() as f64 - terms(gains.len()) as f64;
     let sd = left_over(&gains, covariates, freedom);
     let square = |values: &[f64; 3]| values.iter().map(|v| v * v).sum::<f64>();

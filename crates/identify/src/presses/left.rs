@@ -3,8 +3,8 @@
 use super::observed::Observed;
 use super::predict::{ActingEffect, PRESS_ZONES};
 
-/// Names of the zones, in their order.
-const ZONES: [&str; PRESS_ZONES] = ["inside the contact", "its rim", "near it", "far from it"];
+/// Names of the zones, in their order, as the report has them.
+const ZONES: [&str; PRESS_ZONES] = ["contact", "rim", "shadow zone", "far field"];
 
 const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
@@ -22,14 +22,13 @@ impl Left {
     /// What a model leaves of the presses, without the gain that each of them may have.
     pub(super) fn of(observed: &Observed<'_>, acting: &[ActingEffect]) -> Self {
         let count = observed.count();
-        let squares = observed.for_each(count, |i| observed.squares(i, acting));
+        let squares = observed.for_each(count, |i| observed.squares(i, acting).0);
         let mean = |of: &dyn Fn(usize, usize, usize) -> bool| {
             let (mut sum, mut n) = (0.0, 0.0);
             for (i, press) in squares.iter().enumerate() {
                 for (z, zone) in press.iter().enumerate() {
-                    for (c, square) in zone.iter().enumerate().filter(|(c, v)| v.is_finite() && of(i, z, *c))
+                    for (_, square) in zone.iter().enumerate().filter(|(c, v)| v.is_finite() && of(i, z, *c))
                     {
-                        debug_assert!(c < 3);
                         (sum, n) = (sum + square, n + 1.0);
                     }
                 }

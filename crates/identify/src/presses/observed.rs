@@ -150,8 +150,12 @@ impl<'a> Observed<'a> {
             std::array::from_fn(|c| median(&|(_, gains)| gains[c]).min(most[c]).max(MIN_GAIN * MIN_GAIN));
     }
 
-    /// Mean squared residual in each zone and channel of a press, without its gain; NaN where a zone is empty.
-    pub(super) fn squares(&self, press: usize, model: &[ActingEffect]) -> [[f64; 3]; PRESS_ZONES] {
+    /// Mean squared residual in each zone and channel of a press without its gain, NaN where a zone is empty, and its gain.
+    pub(super) fn squares(
+        &self,
+        press: usize,
+        model: &[ActingEffect],
+    ) -> ([[f64; 3]; PRESS_ZONES], [f64; 3]) {
         let levels = self.levels(press, model);
         let pixels = &self.pixels[press];
         let off = |k: usize, c: usize| f64::from(levels[k][c] - pixels.measured[k][c]);
@@ -162,25 +166,14 @@ impl<'a> Observed<'a> {
             (0..3).for_each(|c| sums[place(*zone)][c] += (off(k, c) - gained[c]).powi(2));
             counts[place(*zone)] += 1.0;
         }
-        std::array::from_fn(|z| sums[z].map(|sum| sum / counts[z]))
+        (std::array::from_fn(|z| sums[z].map(|sum| sum / counts[z])), gain)
     }
 
     /// Mean squared residual in each zone of each press, NaN where a zone is empty, and the squares of its gains.
     fn zone_squares(&self, model: &[ActingEffect]) -> Vec<PressSquares> {
         self.for_each(self.count(), |i| {
-            let levels = self.levels(i, model);
-            let (mut sums, mut counts) = ([0.0; PRESS_ZONES], [0.0; PRESS_ZONES]);
-            let pixels = &self.pixels[i];
-            let off = |k: usize, c: usize| f64::from(levels[k][c] - pixels.measured[k][c]);
-            let gain = self.gain_of(i, off);
-            for (k, zone) in pixels.zones.iter().enumerate() {
-                let gained = self.gained(i, k, gain);
-                for (c, gained) in gained.iter().enumerate() {
-                    sums[place(*zone)] += (off(k, c) - gained).powi(2);
-                    counts[place(*zone)] += 1.0;
-                }
-            }
-            (std::array::from_fn(|z| sums[z] / counts[z]), gain.map(|g| g * g))
+            let (zones, gain) = self.squares(i, model);
+            (zones.map(|channels| channels.iter().sum::<f64>() / 3.0), gain.map(|g| g * g))
         })
     }
 

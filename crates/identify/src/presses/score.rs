@@ -134,6 +134,11 @@ pub(super) fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
+/// What costs fall by, press by press, as shares of both: 1 where all of it goes, 0 where nothing does.
+pub(super) fn shares(before: &[f64], after: &[f64]) -> Vec<f64> {
+    before.iter().zip(after).map(|(b, a)| (b - a) / (b + a).max(1e-300)).collect()
+}
+
 /// What a candidate is added to: accepted effects with what their parameters do.
 pub(super) struct Base<'a> {
     pub(super) acting: &'a [ActingEffect],

@@ -4,7 +4,7 @@ use super::candidates::is_drawn;
 use super::gains::{Scatter, scatter};
 use super::observed::Observed;
 use super::predict::{ActingEffect, PRESS_ZONES};
-use super::score::{Base, Design, MATERIAL, PressTrial, SURE, Scored, differences, scored, with};
+use super::score::{Base, Design, MATERIAL, PressTrial, SURE, Scored, differences, scored, shares, with};
 use super::unnamed::{Fields, PressCovariate, Unnamed};
 use crate::Hint;
 use gripgen_twin::effects::EffectSpec;
@@ -94,8 +94,7 @@ fn counts(gain: f64, standard_error: f64, least: f64) -> bool {
 /// with the order does nothing to the first presses.
 fn is_sure(design: &Design, before: &[f64], after: &[f64]) -> bool {
     let (gain, error) = design.mean(&differences(before, after));
-    let shares: Vec<f64> = before.iter().zip(after).map(|(b, a)| (b - a) / (b + a).max(1e-300)).collect();
-    let (share, share_error) = design.mean(&shares);
+    let (share, share_error) = design.mean(&shares(before, after));
     gain > SURE * error || gain > 0.0 && share > SURE * share_error
 }
 
