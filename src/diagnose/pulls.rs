@@ -181,13 +181,13 @@ pub(crate) fn pull_values(
     }
     set("robot.lag_s".into(), model.lag_s, interval("robot.lag_s"));
     set("robot.dead_time_s".into(), model.dead_time_s, interval("robot.dead_time_s"));
+    set("wrist.noise_n".into(), model.noise_n, interval("wrist.noise_n"));
     if baseline.contains_key("robot.damping_n_s_per_m") {
         set("robot.damping_n_s_per_m".into(), model.damping_n_s_per_m, None);
         set("robot.speed_limit_mm_s".into(), 1e3 * speed_limit_m_per_s(model.damping_n_s_per_m), None);
         if let Some(mass_kg) = model.apparent_mass_kg {
             set("robot.apparent_mass_kg".into(), mass_kg, None);
         }
-        set("wrist.noise_n".into(), model.noise_n, None);
         for jaw in ["left", "right"] {
             set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), model.stiffness_n_per_m * 0.5e-3, None);
             set(format!("gel.{jaw}.shear_by_area"), model.shear_by_area, None);

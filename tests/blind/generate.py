@@ -25,10 +25,10 @@ def _job(job):
     return name, generator.build(case, seed, name, out, sealed)
 
 
-def plan(split, count, salt=0, groups=None):
+def plan(split, count, salt=0, groups=None, worlds=None):
     """The cases of a split with their seeds."""
     rng = np.random.default_rng([SPLITS[split], salt])
-    drawn = cases.draw_cases(count, rng)
+    drawn = cases.draw_cases(count, rng, worlds)
     seeds = [int(rng.integers(1 << 40)) for _ in drawn]
     return [(c, s, i) for i, (c, s) in enumerate(zip(drawn, seeds)) if not groups or c["group"] in groups]
 
@@ -40,12 +40,13 @@ def main(arguments=None):
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--salt", type=int, default=0, help="another set of seeds")
     parser.add_argument("--groups", default="", help="only these, as in ABC")
+    parser.add_argument("--worlds", default=None, help="so many of each of these harder worlds, as in ns3o")
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args(arguments)
     out, sealed = Path(args.out), Path(args.out + "-sealed")
     out.mkdir(parents=True, exist_ok=True)
     sealed.mkdir(parents=True, exist_ok=True)
-    jobs = [(c, s, f"c{i:03d}", out, sealed) for c, s, i in plan(args.split, args.cases, args.salt, args.groups)]
+    jobs = [(c, s, f"c{i:03d}", out, sealed) for c, s, i in plan(args.split, args.cases, args.salt, args.groups, args.worlds)]
     with Pool(args.jobs) as pool:
         done = {}
         for name, digest in pool.imap_unordered(_job, jobs):

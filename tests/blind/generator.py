@@ -24,11 +24,14 @@ def build(case, seed, name, open_folder, sealed_folder):
     n = len(led["pull_index"])
     factor = campaigns.scatter_factors(world, n, rng, case["kind"])
     bad = np.zeros(n, bool)
-    if case["kind"] == "outliers":
-        bad = rng.random(n) < 0.04
+    share = case.get("bad_share", 0.04 if case["kind"] == "outliers" else 0.0)
+    if share:
+        bad = rng.random(n) < share
         factor = np.where(bad, factor * rng.uniform(0.45, 0.75, n), factor)
     out = campaigns.run(world, mu, led, acting, factor)
     label, noisy = campaigns.labels(world, out, rng)
+    if case.get("rounded_n"):
+        label = np.round(label / case["rounded_n"]) * case["rounded_n"]
     seen = folders.measured_ledger(led, rng)
     place = Path(open_folder) / name
     folders.write_campaign(place, seen, label, design["distractors"])

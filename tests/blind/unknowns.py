@@ -48,6 +48,18 @@ def periodic(p, size, q):
     p.mu *= (1 + size * wave)[:, None]
 
 
+def session_ageing(p, size, q):
+    """Ageing with the dwell in one session alone: another gel cleaner, say."""
+    grown = 1 - np.exp(-((p.ledger["dwell_s"] / 20.0) ** 0.45))
+    p.mu *= (1 + size * grown * (p.ledger["session"] == q["session"]))[:, None]
+
+
+def part_humidity(p, size, q):
+    """One part takes up water, the other does not."""
+    h = (p.ledger["humidity_pct"] - 47) / 18
+    p.mu *= (1 + size * h * (p.ledger["part"] == q["part"]))[:, None]
+
+
 FORCE = ["grip_force_n"]
 RATE = ["force_increment_n", "step_time_s", "rate_n_s", "rate_n_per_s", "force_rate_n_s"]
 # name: (function, smallest and largest size, accepted covariates, columns added)
@@ -59,6 +71,8 @@ UNKNOWN = {
     "session": (session, 0.03, 0.4, ["session"], []),
     "gel": (gel, 0.03, 0.4, ["gel_id"], []),
     "force_rate": (force_rate, 0.03, 0.3, [f"{a}*{b}" for f in FORCE for r in RATE for a, b in ((f, r), (r, f))], []),
+    "session_ageing": (session_ageing, 0.03, 0.6, ["dwell_s*session", "session*dwell_s", "session"], []),
+    "part_humidity": (part_humidity, 0.03, 0.5, ["humidity_pct*part", "part*humidity_pct", "humidity_pct"], ["humidity_pct"]),
     "periodic": (periodic, 0.03, 0.3, ["time_s"], []),
 }
 
@@ -74,6 +88,10 @@ def constants(name, rng, design):
                 break
             levels = rng.permutation(levels)
         return {"levels": levels.tolist()}
+    if name == "session_ageing":
+        return {"session": int(rng.integers(1, design["sessions"] + 1))}
+    if name == "part_humidity":
+        return {"part": design["names"][0]}
     if name == "gel":
         return {"levels": [0.0, 1.0, -0.6]}
     if name == "periodic":

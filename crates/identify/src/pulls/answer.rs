@@ -7,6 +7,7 @@ use super::fitting::Fitted;
 use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
 };
+use super::paying::{by_chance, paying};
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::power::ScoreTest;
 use super::screen::test;
@@ -14,6 +15,7 @@ use super::search::{Accepted, Search, TIED_WITHIN};
 use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
 use super::words::separation;
+use super::zero_screen::{said, zeros_that_depend};
 use crate::diagnosis::{
     Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate, Rival,
     SeparateBy, UnknownCovariate,
@@ -123,7 +125,14 @@ pub fn diagnose_pulls(
     };
     let repetitions = folds(data.len());
     let fast_before = predicted(&context, &before, &repetitions, false);
-    let mut accepted = confirmed(&search, &before, accepted, &fast_before, &repetitions);
+    let accepted = confirmed(&search, &before, accepted, &fast_before, &repetitions);
+    let far = outliers(&accepted.fitted);
+    let near: Vec<usize> = rows.iter().copied().filter(|i| !far.contains(i)).collect();
+    let (mut accepted, hints) = paying(&search, &before, accepted, &repetitions, &near);
+    diagnosis.hints = hints;
+    if let Some(found) = &accepted.by_chance {
+        diagnosis.hints.push(by_chance(&search, &before, found, &repetitions, &near));
+    }
     // What is stated from here on is what a twin of these models says.
     let (before_context, stated_before) = context.stated(&before);
     let (after_context, after) = context.stated(&accepted.fitted);
@@ -132,6 +141,12 @@ pub fn diagnose_pulls(
     let heldout_after = predicted(&after_context, &after, &repetitions, false);
     diagnosis.effects = named(&search, &before, &accepted);
     diagnosis.unknown = unknown(&search, &before, &accepted, &data);
+    for zero in zeros_that_depend(&after_context, &after.model) {
+        diagnosis.notes.push(said(&zero));
+        if diagnosis.unknown.iter().all(|u| u.covariate != zero.covariate) {
+            diagnosis.unknown.push(zero);
+        }
+    }
     diagnosis.conclude();
     diagnosis.baseline = baseline(&after, &context);
     let named_rows = outliers(&after);
@@ -414,9 +429,13 @@ fn unknown(
 
 pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
     let mut values = BTreeMap::new();
-    let unit = |name: &str| if name.ends_with("_s") { "s" } else { "1" };
+    let unit = |name: &str| match name {
+        _ if name.ends_with("_s") => "s",
+        _ if name.ends_with("_n") => "N",
+        _ => "1",
+    };
     for (k, name) in fitted.names.iter().enumerate() {
-        if !(name.starts_with("parts.") || name.starts_with("robot.") || name == "kinetic_ratio") {
+        if !(name.starts_with("parts.") || name.starts_with("robot.") || name.starts_with("wrist.") || name == "kinetic_ratio") {
             continue;
         }
         let (value, half) = (fitted.values[k], HALF90 * fitted.covariance[(k, k)].max(0.0).sqrt());
@@ -428,8 +447,8 @@ pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<Strin
     values.entry("robot.lag_s".into()).or_insert_with(|| plain(m.lag_s, "s"));
     values.entry("robot.dead_time_s".into()).or_insert_with(|| plain(m.dead_time_s, "s"));
     values.insert("scatter".into(), plain(scatter(m, fitted.likelihood.scale), "1"));
+    values.entry("wrist.noise_n".into()).or_insert_with(|| plain(m.noise_n, "N"));
     if !context.observations.is_empty() {
-        values.insert("wrist.noise_n".into(), plain(m.noise_n, "N"));
         let each = m.stiffness_n_per_m * 0.5e-3;
         values.insert("gel.left.shear_stiffness_n_per_mm".into(), plain(each, "N/mm"));
         values.insert("robot.damping_n_s_per_m".into(), plain(m.damping_n_s_per_m, "N s/m"));

@@ -1,6 +1,7 @@
 //! Which of the rivals is accepted.
 
 use super::fitting::Fitted;
+use super::likelihood::log_density;
 use super::screen::test;
 use super::search::{CURVE_GAIN, Entry, ModelTerm, Search};
 
@@ -16,6 +17,13 @@ const RATHER_SESSION: f64 = 4.0;
 
 /// Correlation of ranks from which on two columns are the same clock.
 const SAME_CLOCK: f64 = 0.9;
+
+/// Chance at which the first effect, or the first curve, may be named where nothing acts.
+pub(super) const CHANCE: f64 = 0.025;
+
+/// Pulls without which something has to speak for a rival, and the share of its gain that the others have to give.
+const FEW: usize = 2;
+const OTHERS: f64 = 0.2;
 
 /// Level of the permutation test that a curve has to pass beside its score.
 const LEVEL: f64 = 0.02;
@@ -102,18 +110,40 @@ impl Search<'_> {
         spec.visible.holds(size, hours, max_n)
     }
 
-    /// The entry that is accepted, if one is.
+    /// Whether more than a pull or two speak for a rival: what explains one bad pull and nothing else is no effect.
+    fn broad(&self, before: &Fitted, entry: &Entry) -> bool {
+        let traces = !self.context.observations.is_empty();
+        if traces && entry.rival.effect().is_some_and(|i| self.candidates[i].acts_on_signals()) {
+            return true;
+        }
+        let log = |f: &Fitted, i: usize| {
+            let scale = f.likelihood.scale;
+            log_density(f.residuals[i] / scale) - libm::log(scale)
+        };
+        let of = |i: usize| log(&entry.fitted, i) - log(before, i);
+        let mut gains: Vec<f64> = (0..self.rows.len()).map(of).collect();
+        gains.sort_by(|a, b| b.total_cmp(a));
+        let all: f64 = gains.iter().sum();
+        gains.iter().skip(FEW).sum::<f64>() >= OTHERS * all
+    }
+
+    /// The entry that is accepted, if one is. `chance` is how often the best of all rivals gains as much where nothing acts.
     pub(super) fn winner(
         &self,
         before: &Fitted,
         entries: &[Entry],
-        named_gain: f64,
-        curve_gain: f64,
+        (named_gain, curve_gain): (f64, f64),
+        chance: &dyn Fn(&Entry) -> f64,
     ) -> Option<Entry> {
-        let named =
-            entries.iter().find(|e| e.rival.effect().is_some() && e.gain >= named_gain && self.visible(e));
+        let named = entries
+            .iter()
+            .find(|e| e.rival.effect().is_some() && e.gain >= named_gain && self.visible(e))
+            .filter(|e| chance(e) <= CHANCE && self.broad(before, e));
         let curve = entries.iter().filter(|e| e.gain >= curve_gain).find(|e| match e.rival {
             ModelTerm::Curve(k) => {
+                if chance(e) > CHANCE || !self.broad(before, e) {
+                    return false;
+                }
                 let found = test(self.context.data, before, &before.residuals, &self.curves[k]);
                 found.p_value <= LEVEL
             }

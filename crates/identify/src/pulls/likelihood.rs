@@ -71,7 +71,8 @@ pub fn weight_of(square: f64) -> f64 {
     (FREEDOM + 1.0) / (FREEDOM + square)
 }
 
-fn log_density(x: f64) -> f64 {
+/// Logarithm of the density of Student's t.
+pub(super) fn log_density(x: f64) -> f64 {
     // Gamma(3.5) / (sqrt(6 pi) Gamma(3)).
     const CONSTANT: f64 = 0.382_732_772_098_226_6;
     libm::log(CONSTANT) - 0.5 * (FREEDOM + 1.0) * libm::log1p(x * x / FREEDOM)

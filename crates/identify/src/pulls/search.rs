@@ -5,7 +5,9 @@ use super::candidates::Candidate;
 use super::context::Context;
 use super::curves::{Curve, curves_in, periodic, product};
 use super::fitting::Fitted;
+use super::null::null_gains;
 use super::terms::Terms;
+use std::cell::OnceCell;
 use std::sync::Mutex;
 
 /// Score that a named effect has to gain: odds of 20 to 1, beyond what its parameters cost. Set on the development split of
@@ -20,6 +22,9 @@ pub const CURVE_GAIN: f64 = 4.5;
 
 /// Rivals within this score of the best are not told apart: odds of about 20 to 1.
 pub const TIED_WITHIN: f64 = 3.0;
+
+/// Effects at most.
+const MAX_EFFECTS: usize = 3;
 
 /// Something that may be added to a model.
 #[derive(Debug, Clone)]
@@ -76,6 +81,17 @@ pub struct Accepted {
     pub curves: Vec<usize>,
     /// Everything that competed for the first place, best first.
     pub entries: Vec<Entry>,
+    /// What would have been accepted if it were not as good by chance.
+    pub by_chance: Option<ByChance>,
+}
+
+/// The best rival, where the best gains as much by chance.
+#[derive(Debug, Clone)]
+pub struct ByChance {
+    /// The rival.
+    pub entry: Entry,
+    /// Share of campaigns without an effect in which a rival of its kind gains as much.
+    pub chance: f64,
 }
 
 /// A competition on a campaign.
@@ -125,6 +141,14 @@ impl<'a> Search<'a> {
         Self { context, candidates, curves, rows: (0..n).collect() }
     }
 
+    /// Id of an effect, or the columns of a curve.
+    pub fn name_of(&self, rival: &ModelTerm) -> String {
+        match rival {
+            ModelTerm::Effect(i) | ModelTerm::ByPart(i) => self.candidates[*i].spec.id.into(),
+            ModelTerm::Curve(k) => self.curves[*k].name.clone(),
+        }
+    }
+
     /// How many terms of a fit are those of effect `i`: one, or one for each part.
     fn terms_of(&self, fitted: &Fitted, i: usize) -> usize {
         fitted.terms.effects.iter().filter(|(c, _)| c.spec == self.candidates[i].spec).count()
@@ -145,8 +169,14 @@ impl<'a> Search<'a> {
         };
         let first = self.compete(&baseline, &none, &rivals, &tick);
         let mut accepted =
-            Accepted { fitted: baseline.clone(), effects: vec![], curves: vec![], entries: first.clone() };
-        let Some(mut winner) = self.winner(&baseline, &first, NAMED_GAIN, CURVE_GAIN) else {
+            Accepted { fitted: baseline.clone(), effects: vec![], curves: vec![], entries: first.clone(), by_chance: None };
+        // Worked out for a campaign that has something to judge.
+        let null = OnceCell::new();
+        let chance =
+            |e: &Entry| null.get_or_init(|| null_gains(self, &baseline)).p_value(&e.rival, e.gain);
+        let Some(mut winner) = self.winner(&baseline, &first, (NAMED_GAIN, CURVE_GAIN), &chance) else {
+            let best = self.winner(&baseline, &first, (NAMED_GAIN, CURVE_GAIN), &|_| 0.0);
+            accepted.by_chance = best.map(|entry| ByChance { chance: chance(&entry), entry });
             return Some((baseline, accepted));
         };
         if let Some(i) = winner.rival.effect()
@@ -155,19 +185,20 @@ impl<'a> Search<'a> {
             winner = curve;
         }
         self.accept(&mut accepted, &winner, &first);
-        for _ in 0..2 {
+        for _ in 0..MAX_EFFECTS {
             let without: Vec<usize> = accepted.effects.iter().map(|(i, _)| *i).collect();
             let terms = accepted.fitted.terms.clone();
             let mut rivals = self.all(&without);
             rivals.retain(|r| self.stands_beside(r, &without, &accepted.curves));
             let entries = self.compete(&accepted.fitted, &terms, &rivals, &tick);
-            let Some(winner) = self.winner(&accepted.fitted, &entries, SECOND_GAIN, CURVE_GAIN + 1.0) else {
+            let Some(winner) = self.winner(&accepted.fitted, &entries, (SECOND_GAIN, CURVE_GAIN + 1.0), &|_| 0.0)
+            else {
                 break;
             };
-            // One unnamed curve at most, and two effects.
+            // One unnamed curve at most.
             let full = match winner.rival {
                 ModelTerm::Curve(_) => !accepted.curves.is_empty(),
-                ModelTerm::Effect(_) | ModelTerm::ByPart(_) => accepted.effects.len() >= 2,
+                ModelTerm::Effect(_) | ModelTerm::ByPart(_) => accepted.effects.len() >= MAX_EFFECTS,
             };
             if full {
                 break;

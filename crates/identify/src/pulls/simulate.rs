@@ -147,7 +147,7 @@ fn noise(search: &Search<'_>, memory: f64, draws: &mut Draws) -> DVector<f64> {
 }
 
 /// Gram and Schmidt, what depends on others left out.
-fn orthonormal(columns: Vec<DVector<f64>>) -> Vec<DVector<f64>> {
+pub(super) fn orthonormal(columns: Vec<DVector<f64>>) -> Vec<DVector<f64>> {
     let mut found: Vec<DVector<f64>> = Vec::new();
     for mut column in columns {
         let length = column.norm();

@@ -1,0 +1,117 @@
+//! Names that pay. What looks like an effect, and neither excludes nothing nor lowers the error on data that no fit has seen, is a
+//! hint: it is said and is not in the twin.
+
+use super::answer::parameters;
+use super::context::Context;
+use super::fitting::Fitted;
+use super::heldout::predicted;
+use super::model::PullModel;
+use super::search::{Accepted, ByChance, Search};
+use super::trace_residuals::Widening;
+use crate::diagnosis::Hint;
+
+/// Share of the error on held-out data that a name has to take off.
+const PAYS: f64 = 0.03;
+
+/// Least chance, in percent, that is put into a sentence.
+const LEAST_PERCENT: f64 = 0.5;
+
+/// The accepted model without the effects that do not pay, the last first, and these as hints. `rows` are the pulls that
+/// count: an error is not that of pulls that are known to be bad.
+pub(super) fn paying(
+    search: &Search<'_>,
+    before: &Fitted,
+    mut accepted: Accepted,
+    repetitions: &[Vec<usize>],
+    rows: &[usize],
+) -> (Accepted, Vec<Hint>) {
+    let context = search.context;
+    let mut hints = Vec::new();
+    for place in (0..accepted.effects.len()).rev() {
+        let spec = search.candidates[accepted.effects[place].0].spec;
+        let fewer = if accepted.effects.len() + accepted.curves.len() == 1 {
+            Some(before.clone())
+        } else {
+            let mut terms = accepted.fitted.terms.clone();
+            terms.effects.retain(|(c, _)| c.spec != spec);
+            context.fit(&before.model, &terms, &search.rows)
+        };
+        let Some(fewer) = fewer else { continue };
+        let mut gain = share([&fewer, &accepted.fitted].map(|f| held_out(context, f, repetitions, rows)));
+        if search.candidates[accepted.effects[place].0].acts_on_signals() {
+            gain = gain.max(share([&fewer, &accepted.fitted].map(|f| readings(context, &f.model))));
+        }
+        let reason = match neutral(&accepted.fitted, spec) {
+            Some(text) => text,
+            None if gain < PAYS => format!(
+                "it takes {:.1} % off the error on held-out pulls, a name needs {:.0} %",
+                100.0 * gain,
+                100.0 * PAYS
+            ),
+            None => continue,
+        };
+        hints.push(Hint { name: spec.id.into(), gain, reason });
+        accepted.effects.remove(place);
+        accepted.fitted = fewer;
+    }
+    (accepted, hints)
+}
+
+/// What the best rival gained where it gains as much by chance.
+pub(super) fn by_chance(
+    search: &Search<'_>,
+    before: &Fitted,
+    found: &ByChance,
+    repetitions: &[Vec<usize>],
+    rows: &[usize],
+) -> Hint {
+    let context = search.context;
+    Hint {
+        name: search.name_of(&found.entry.rival),
+        gain: share([before, &found.entry.fitted].map(|f| held_out(context, f, repetitions, rows))),
+        reason: format!(
+            "where nothing acts, the best of everything that competes looks as good in {:.0} % of campaigns like this one",
+            (100.0 * found.chance).max(LEAST_PERCENT)
+        ),
+    }
+}
+
+/// Error on held-out labels of the twin that is written for a fit. What traces show is held, which is fast.
+fn held_out(context: &Context<'_>, fitted: &Fitted, repetitions: &[Vec<usize>], rows: &[usize]) -> f64 {
+    let (context, fitted) = context.stated(fitted);
+    let held = predicted(&context, &fitted, repetitions, !context.observations.is_empty());
+    let errors = rows.iter().map(|&i| held[i] - context.data.label_n[i]);
+    root_mean_square(errors.filter(|e| e.is_finite()))
+}
+
+/// Why an effect may be nothing at all: its size holds its neutral value in all its terms.
+fn neutral(fitted: &Fitted, spec: &'static gripgen_twin::effects::EffectSpec) -> Option<String> {
+    let own: Vec<_> = fitted.terms.effects.iter().map(|(c, _)| c).filter(|c| c.spec == spec).collect();
+    let size = own.first().map(|c| &spec.parameters[c.size()])?;
+    let intervals = own.iter().filter_map(|c| parameters(fitted, c).remove(size.name));
+    let mut widest = None;
+    for p in intervals {
+        if p.low90 > size.neutral || p.high90 < size.neutral {
+            return None;
+        }
+        widest = Some(p);
+    }
+    let p = widest?;
+    let (low, high) = (p.low90, p.high90);
+    Some(format!("the 90 % interval of its {}, {low:.3} to {high:.3}, holds {}", size.name, size.neutral))
+}
+
+/// How far the readings of the traces are from a model, in the deviations that are known of arms and sensors.
+fn readings(context: &Context<'_>, model: &PullModel) -> f64 {
+    let rows: Vec<usize> = (0..context.data.len()).collect();
+    root_mean_square(context.trace_residuals(model, &rows).widened(Widening::NONE).into_iter())
+}
+
+fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0_usize), |(sum, n), v| (sum + v * v, n + 1));
+    (sum / n.max(1) as f64).sqrt()
+}
+
+fn share([before, after]: [f64; 2]) -> f64 {
+    if before > 0.0 { 1.0 - after / before } else { 0.0 }
+}
