@@ -13,26 +13,26 @@ use gripgen::{
     load_twin_document, simulate_campaign,
 };
 
-fn baseline() -> Location {
+pub(crate) fn baseline() -> Location {
     Location::parse("asset:configs/twin-baseline.toml")
 }
 
-fn twin_at(location: &Location) -> Twin {
+pub(crate) fn twin_at(location: &Location) -> Twin {
     Twin::new(&load_twin_document(location, &[]).unwrap().read_twin().unwrap()).unwrap()
 }
 
 /// The files of a twin that names embedded ones only.
-fn library(twin: &Twin) -> Library {
+pub(crate) fn library(twin: &Twin) -> Library {
     Library::of_twin(twin, &baseline()).unwrap()
 }
 
-fn diagnose(measured: &MeasuredPulls, without: &[&str]) -> Diagnosed {
+pub(crate) fn diagnose(measured: &MeasuredPulls, without: &[&str]) -> Diagnosed {
     let options = PullDiagnoseOptions { jobs: 2, without };
     let twin = twin_at(&baseline());
     diagnose_pull_table(measured, &twin, &library(&twin), &options, &|_| {}).unwrap()
 }
 
-fn names(diagnosis: &Diagnosis) -> Vec<&str> {
+pub(crate) fn names(diagnosis: &Diagnosis) -> Vec<&str> {
     diagnosis.effects.iter().map(|e| e.name.as_str()).collect()
 }
 
@@ -46,7 +46,7 @@ fn twin_with(effects: &str) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 /// A campaign of the simulator itself: `effects` are added to the baseline twin.
-fn simulated(effects: &str, pulls: usize, sets: &[(&str, &str)]) -> MeasuredPulls {
+pub(crate) fn simulated(effects: &str, pulls: usize, sets: &[(&str, &str)]) -> MeasuredPulls {
     simulated_at(effects, pulls, sets, CampaignOptions::default())
 }
 

@@ -22,6 +22,7 @@ mod config;
 mod determinism;
 // Diagnoses of pulls.
 mod diagnose;
+mod diagnose_awkward;
 // Lost grips of a real robot, by rows and by events.
 mod event_log;
 // Effects of the library, through the whole pipeline.

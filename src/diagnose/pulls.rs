@@ -247,16 +247,27 @@ fn table(
 ) -> Option<EffectFile> {
     let data = PullData::new(measured);
     let entry = |parameters| EffectFile { parameters, ..effect_entry(TABLE_EFFECT, evidence) };
-    if let Some((a, b)) = curve.name.split_once('*') {
+    let only = curve.only.as_ref();
+    if let Some((a, b)) = curve.name.split_once('*').filter(|_| only.is_none()) {
         return Some(entry(product_table(&data, curve, coefficients, a, b)?));
     }
-    let column = data.columns.get(&curve.name)?;
+    let name = only.and_then(|_| curve.name.split_once('*')).map_or(curve.name.as_str(), |(own, _)| own);
+    let column = data.columns.get(name)?;
     let sum = |i: usize| curve.basis[i].iter().zip(coefficients).map(|(b, c)| b * c).sum::<f64>();
     let value = |i: usize| if curve.additive { sum(i) } else { libm::exp(sum(i).clamp(-3.0, 3.0)) };
     let mut parameters = BTreeMap::from([
-        ("covariate".to_string(), toml::Value::String(curve.name.clone())),
+        ("covariate".to_string(), toml::Value::String(name.into())),
         ("physical".to_string(), toml::Value::Boolean(false)),
     ]);
+    let own: Vec<usize> = match only {
+        Some((other, word)) => {
+            let only = toml::Table::from_iter([(other.clone(), toml::Value::String(word.clone()))]);
+            parameters.insert("where".into(), toml::Value::Table(only));
+            let Some(Column::Word(at, words)) = data.columns.get(other) else { return None };
+            (0..at.len()).filter(|&i| words[at[i]] == *word).collect()
+        }
+        None => (0..data.len()).collect(),
+    };
     let numbers = |x: Vec<f64>| toml::Value::Array(x.into_iter().map(toml::Value::Float).collect());
     let target = if curve.additive { "offset_n" } else { "factor" };
     match column {
@@ -270,7 +281,7 @@ fn table(
             parameters.insert(target.into(), numbers(values?));
         }
         Column::Number(x) => {
-            let mut points: Vec<(f64, f64)> = x.iter().enumerate().map(|(i, x)| (*x, value(i))).collect();
+            let mut points: Vec<(f64, f64)> = own.iter().map(|&i| (x[i], value(i))).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             points.dedup_by(|a, b| a.0 == b.0);
             // Piecewise linear, or a wave of up to one cycle in four pulls.

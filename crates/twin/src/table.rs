@@ -35,6 +35,8 @@ pub struct Table {
     pub centre: Option<[f64; 2]>,
     /// The only part it acts on, or all of them.
     pub part: Option<String>,
+    /// Columns of words with the only word of each at which it acts.
+    pub only: Vec<(String, String)>,
     /// Where its values are: at numbers that increase, linear in between and held outside; or at words, at others it does
     /// nothing.
     pub axis: Values,
@@ -63,6 +65,9 @@ impl Table {
             return None;
         }
         let column = |name: &str| columns::value(name, pull);
+        if !self.only.iter().all(|(name, word)| column(name).is_some_and(|at| at.to_string() == *word)) {
+            return None;
+        }
         let at = match (self.centre, self.covariate.split_once('*')) {
             (Some([a, b]), Some((first, second))) => match (column(first)?, column(second)?) {
                 (Drawn::Number(x), Drawn::Number(y)) => Drawn::Number((x - a) * (y - b)),
@@ -87,7 +92,7 @@ fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
     y[after - 1] + share * (y[after] - y[after - 1])
 }
 
-const KEYS: [&str; 7] = ["covariate", "centre", "x", "words", "factor", "offset_n", "physical"];
+const KEYS: [&str; 8] = ["covariate", "centre", "where", "x", "words", "factor", "offset_n", "physical"];
 
 /// Checks a table of a twin file. Errors name the key.
 pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, ConfigError> {
@@ -110,6 +115,7 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
         }
     };
     let centre = centre(&covariate, get("centre"), &key)?;
+    let only = only(get("where"), &key)?;
     let known = columns::covariate(&covariate);
     let axis = match (get("x"), get("words")) {
         (Some(_), None) if known.is_some_and(Column::holds_words) => {
@@ -141,7 +147,7 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
             TableTarget::Offset => in_range(&at, value, -1e3..=1e3, "N")?,
         };
     }
-    Ok(Table { covariate, centre, part: effect.part.clone(), axis, values, target })
+    Ok(Table { covariate, centre, part: effect.part.clone(), only, axis, values, target })
 }
 
 /// What is taken off the factors of a product; a single column has none.
@@ -172,6 +178,31 @@ fn centre(
             Ok(Some(pair))
         }
     }
+}
+
+/// The words at which a table acts.
+fn only(
+    value: Option<&toml::Value>,
+    key: &dyn Fn(&str) -> String,
+) -> Result<Vec<(String, String)>, ConfigError> {
+    let Some(value) = value else { return Ok(Vec::new()) };
+    let needed = "where = { session = \"3\" }";
+    let Some(words) = value.as_table().filter(|words| !words.is_empty()) else {
+        let problem = format!("columns with a word each are needed, found {value}");
+        return Err(ConfigError::new(key("where"), problem).hint(needed));
+    };
+    let each = words.iter().map(|(name, word)| match word.as_str() {
+        Some(_) if columns::covariate(name).is_some_and(|column| !column.holds_words()) => {
+            let problem = format!("`{name}` holds numbers, not words");
+            Err(ConfigError::new(key(&format!("where.{name}")), problem).hint("put it into covariate and x"))
+        }
+        Some(word) => Ok((name.clone(), word.into())),
+        None => {
+            let problem = format!("a word is needed, found {word}");
+            Err(ConfigError::new(key(&format!("where.{name}")), problem).hint(needed))
+        }
+    });
+    each.collect()
 }
 
 /// Keys that a table does not have.
@@ -342,6 +373,24 @@ mod tests {
             let error = twin_of(&text.replacen(from, to, 1)).unwrap_err();
             assert_eq!(error.key, key, "{error}");
         }
+    }
+
+    /// A table of one session does nothing in any other.
+    #[test]
+    fn a_table_may_act_in_one_session_alone() {
+        let made = |only: &str| twin(&HUMIDITY.replace("physical", &format!("where = {only}\nphysical")));
+        let wet = [("humidity_pct", Drawn::Number(40.0)), ("operator", Drawn::Text("ann".into()))];
+        let rod = scenario("rod", &wet);
+        let factor = |only: &str| table_factor(&made(only).unwrap(), &rod);
+        assert_eq!(factor("{ session = \"2\" }"), 1.2);
+        assert_eq!(factor("{ session = \"3\" }"), 1.0);
+        assert_eq!(factor("{ session = \"2\", operator = \"ann\" }"), 1.2);
+        assert_eq!(factor("{ session = \"2\", operator = \"bo\" }"), 1.0);
+        assert_eq!(factor("{ supplier = \"a\" }"), 1.0, "nobody wrote it down");
+        for (only, key) in [("3", "where"), ("{}", "where"), ("{ session = 3 }", "where.session")] {
+            assert_eq!(made(only).unwrap_err().key, format!("effects[0].{key}"), "{only}");
+        }
+        assert_eq!(made("{ dwell_s = \"3\" }").unwrap_err().key, "effects[0].where.dwell_s");
     }
 
     #[test]

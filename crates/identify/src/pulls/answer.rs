@@ -7,8 +7,8 @@ use super::fitting::Fitted;
 use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
 };
-use super::paying::{by_chance, paying};
 use super::model::{PredictPulls, PullModel, PullPrediction};
+use super::paying::{by_chance, paying};
 use super::power::ScoreTest;
 use super::screen::test;
 use super::search::{Accepted, Search, TIED_WITHIN};
@@ -435,7 +435,11 @@ pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<Strin
         _ => "1",
     };
     for (k, name) in fitted.names.iter().enumerate() {
-        if !(name.starts_with("parts.") || name.starts_with("robot.") || name.starts_with("wrist.") || name == "kinetic_ratio") {
+        if !(name.starts_with("parts.")
+            || name.starts_with("robot.")
+            || name.starts_with("wrist.")
+            || name == "kinetic_ratio")
+        {
             continue;
         }
         let (value, half) = (fitted.values[k], HALF90 * fitted.covariance[(k, k)].max(0.0).sqrt());

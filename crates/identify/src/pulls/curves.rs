@@ -1,13 +1,14 @@
 //! Unnamed dependences: a smooth curve in a column, steps between its words, the product of two columns.
 
 use super::data::{Column, PullData};
+use nalgebra::{DMatrix, DVector};
 
 /// A dependence of friction on a column that no effect explains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// The column, or `a*b`.
     pub name: String,
-    /// One row of basis functions a pull; each has mean 0.
+    /// One row of basis functions per pull; each has mean 0, but at one word alone, where they are 0 elsewhere.
     pub basis: Vec<Vec<f64>>,
     /// Whether it adds a force to what the jaws hold; otherwise it multiplies it.
     pub additive: bool,
@@ -17,6 +18,8 @@ pub struct Curve {
     pub cost: usize,
     /// Whether it is a sine of one frequency.
     pub wave: bool,
+    /// A column of words and the only word of it at which the curve is not 0; `name` is then `a*b` with that column behind.
+    pub only: Option<(String, String)>,
 }
 
 impl Curve {
@@ -87,6 +90,7 @@ pub fn curves_in(name: &str, column: &Column) -> Vec<Curve> {
         most: 3.0,
         cost,
         wave: false,
+        only: None,
     };
     match column {
         Column::Word(at, names) => {
@@ -166,7 +170,7 @@ pub fn periodic(name: &str, x: &[f64], residuals: &[f64]) -> Option<Curve> {
     // Root mean squares of 1, like other curves.
     let scale = (x.len() as f64).sqrt();
     let basis = a.iter().zip(b).map(|(a, b)| vec![scale * a, scale * b]).collect();
-    Some(Curve { name: name.into(), basis, additive: false, most: 1.0, cost: 4, wave: true })
+    Some(Curve { name: name.into(), basis, additive: false, most: 1.0, cost: 4, wave: true, only: None })
 }
 
 /// The product of two columns of numbers, each about its mean. One more parameter is paid for the choice of the pair.
@@ -186,6 +190,46 @@ pub fn product(data: &PullData<'_>, a: &str, b: &str) -> Option<Curve> {
         most: 2.0,
         cost: 2,
         wave: false,
+        only: None,
+    })
+}
+
+/// Fewest pulls with a word, and with any other, that show a curve of their own.
+const MIN_OF_WORD: usize = 8;
+
+/// A curve in a column of numbers at one word of another column: something that acts in one session, on one part. The word is the one at which
+/// it explains most of `residuals`; the choice of the pair and that of the word are paid for like a parameter each.
+pub fn at_one_word(data: &PullData<'_>, name: &str, other: &str, residuals: &[f64]) -> Option<Curve> {
+    let Some(Column::Word(at, words)) = data.columns.get(other) else { return None };
+    let x = data.numbers(name)?;
+    let of = |word: usize| {
+        let rows: Vec<usize> = (0..x.len()).filter(|&i| at[i] == word).collect();
+        let own: Vec<f64> = rows.iter().map(|&i| x[i]).collect();
+        let enough = rows.len() >= MIN_OF_WORD && x.len() - rows.len() >= MIN_OF_WORD;
+        if !enough || own.iter().all(|v| *v == own[0]) {
+            return None;
+        }
+        let mut basis = vec![vec![0.0; 1]; x.len()];
+        for (&i, row) in rows.iter().zip(hinges(&own, 1)) {
+            basis[i] = std::iter::once(1.0).chain(row).collect();
+        }
+        let width = basis[rows[0]].len();
+        basis.iter_mut().for_each(|row| row.resize(width, 0.0));
+        let columns = DMatrix::from_fn(x.len(), width, |i, k| basis[i][k]);
+        let solved =
+            columns.clone().svd(true, true).solve(&DVector::from_column_slice(residuals), 1e-9).ok()?;
+        Some(((&columns * solved).norm_squared(), word, basis))
+    };
+    let found = (0..words.len()).filter_map(of).max_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, word, basis) = found?;
+    Some(Curve {
+        name: format!("{name}*{other}"),
+        additive: false,
+        most: 3.0,
+        cost: basis[0].len() + 2,
+        wave: false,
+        only: Some((other.into(), words[word].clone())),
+        basis,
     })
 }
 

@@ -3,7 +3,7 @@
 
 use super::candidates::Candidate;
 use super::context::Context;
-use super::curves::{Curve, curves_in, periodic, product};
+use super::curves::{Curve, at_one_word, curves_in, periodic, product};
 use super::fitting::Fitted;
 use super::null::null_gains;
 use super::terms::Terms;
@@ -14,6 +14,9 @@ use std::sync::Mutex;
 /// the blind benchmark.
 pub const NAMED_GAIN: f64 = 3.0;
 
+/// The same of the first one, which also has to be rarer than chance on the shuffled residuals of the campaign (`null.rs`).
+pub const FIRST_GAIN: f64 = 1.5;
+
 /// Score that a second effect has to gain: what the first one leaves imitates others.
 pub const SECOND_GAIN: f64 = 6.0;
 
@@ -22,6 +25,10 @@ pub const CURVE_GAIN: f64 = 4.5;
 
 /// Rivals within this score of the best are not told apart: odds of about 20 to 1.
 pub const TIED_WITHIN: f64 = 3.0;
+
+/// Pulls from which on pairs of columns are looked at, and words that a column of a pair may have.
+const MIN_OF_PRODUCT: usize = 40;
+const MAX_WORDS: usize = 12;
 
 /// Effects at most.
 const MAX_EFFECTS: usize = 3;
@@ -132,10 +139,19 @@ impl<'a> Search<'a> {
                 numbers.push(name.as_str());
             }
         }
-        curves.extend(wave(context, &["time_s", "pull_index"]));
+        let residuals = baseline_residuals(context);
+        curves.extend(residuals.as_ref().and_then(|r| wave(context, &["time_s", "pull_index"], r)));
         for (i, a) in numbers.iter().enumerate() {
             for b in &numbers[i + 1..] {
-                curves.extend(product(data, a, b).filter(|_| n >= 40));
+                curves.extend(product(data, a, b).filter(|_| n >= MIN_OF_PRODUCT));
+            }
+        }
+        if let Some(residuals) = residuals.filter(|_| n >= MIN_OF_PRODUCT) {
+            for (name, column) in &data.columns {
+                let words = matches!(column, super::data::Column::Word(..)) && column.distinct() <= MAX_WORDS;
+                for number in numbers.iter().filter(|_| words) {
+                    curves.extend(at_one_word(data, number, name, &residuals));
+                }
             }
         }
         Self { context, candidates, curves, rows: (0..n).collect() }
@@ -168,13 +184,17 @@ impl<'a> Search<'a> {
             }
         };
         let first = self.compete(&baseline, &none, &rivals, &tick);
-        let mut accepted =
-            Accepted { fitted: baseline.clone(), effects: vec![], curves: vec![], entries: first.clone(), by_chance: None };
+        let mut accepted = Accepted {
+            fitted: baseline.clone(),
+            effects: vec![],
+            curves: vec![],
+            entries: first.clone(),
+            by_chance: None,
+        };
         // Worked out for a campaign that has something to judge.
         let null = OnceCell::new();
-        let chance =
-            |e: &Entry| null.get_or_init(|| null_gains(self, &baseline)).p_value(&e.rival, e.gain);
-        let Some(mut winner) = self.winner(&baseline, &first, (NAMED_GAIN, CURVE_GAIN), &chance) else {
+        let chance = |e: &Entry| null.get_or_init(|| null_gains(self, &baseline)).p_value(&e.rival, e.gain);
+        let Some(mut winner) = self.winner(&baseline, &first, (FIRST_GAIN, CURVE_GAIN), &chance) else {
             let best = self.winner(&baseline, &first, (NAMED_GAIN, CURVE_GAIN), &|_| 0.0);
             accepted.by_chance = best.map(|entry| ByChance { chance: chance(&entry), entry });
             return Some((baseline, accepted));
@@ -191,7 +211,8 @@ impl<'a> Search<'a> {
             let mut rivals = self.all(&without);
             rivals.retain(|r| self.stands_beside(r, &without, &accepted.curves));
             let entries = self.compete(&accepted.fitted, &terms, &rivals, &tick);
-            let Some(winner) = self.winner(&accepted.fitted, &entries, (SECOND_GAIN, CURVE_GAIN + 1.0), &|_| 0.0)
+            let Some(winner) =
+                self.winner(&accepted.fitted, &entries, (SECOND_GAIN, CURVE_GAIN + 1.0), &|_| 0.0)
             else {
                 break;
             };
@@ -275,16 +296,18 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The sine in the first clock that was written down that fits the residuals of the baseline best.
-fn wave(context: &Context<'_>, clocks: &[&str]) -> Option<Curve> {
-    let data = context.data;
-    let name = *clocks.iter().find(|name| data.columns.contains_key(**name))?;
-    let at = data.numbers(name)?;
-    let rows: Vec<usize> = (0..data.len()).collect();
+/// What the baseline leaves of each pull, bad ones not by more than three deviations.
+fn baseline_residuals(context: &Context<'_>) -> Option<Vec<f64>> {
+    let rows: Vec<usize> = (0..context.data.len()).collect();
     let baseline = context.fit(&context.base, &Terms::default(), &rows)?;
     let most = 3.0 * baseline.likelihood.scale;
-    let residuals: Vec<f64> = baseline.residuals.iter().map(|r| r.clamp(-most, most)).collect();
-    periodic(name, &at, &residuals)
+    Some(baseline.residuals.iter().map(|r| r.clamp(-most, most)).collect())
+}
+
+/// The sine in the first clock that was written down that fits the residuals of the baseline best.
+fn wave(context: &Context<'_>, clocks: &[&str], residuals: &[f64]) -> Option<Curve> {
+    let name = *clocks.iter().find(|name| context.data.columns.contains_key(**name))?;
+    periodic(name, &context.data.numbers(name)?, residuals)
 }
 
 /// Rivals of effect `i` that the data do not tell from it.

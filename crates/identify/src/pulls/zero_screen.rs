@@ -42,7 +42,9 @@ pub(super) fn zeros_that_depend(context: &Context<'_>, model: &PullModel) -> Vec
         .iter()
         .filter(|(name, _)| !NOT_LOOKED_AT.contains(&name.as_str()))
         .filter_map(|(name, column)| match column {
-            Column::Number(x) => Some((name, difference(&seen.iter().map(|(row, _)| x[*row]).collect::<Vec<_>>()))),
+            Column::Number(x) => {
+                Some((name, difference(&seen.iter().map(|(row, _)| x[*row]).collect::<Vec<_>>())))
+            }
             Column::Word(..) => None,
         })
         .filter(|(_, steps)| steps.iter().any(|s| *s != 0.0))

@@ -1,0 +1,95 @@
+//! Campaigns that are harder than a simulator's own: noisy sensors without traces, bad pulls, effects of one session alone, a gripper
+//! that speaks into the sensor.
+
+use crate::diagnose::{baseline, diagnose, library, names, simulated, twin_at};
+use gripgen::identify::Verdict;
+use gripgen::identify::pulls::calibrate::CalibrateRequest;
+use gripgen::twin::random::{Purpose, Stream};
+use gripgen::twin::{MeasuredPulls, PullTrace, TraceRow};
+use gripgen::{calibrate_twin, edited_twin};
+
+/// Labels alone, as they are copied from a screen.
+fn labels_alone(mut measured: MeasuredPulls) -> MeasuredPulls {
+    for pull in &mut measured.pulls {
+        pull.trace = None;
+        pull.max_pull_force_n = (pull.max_pull_force_n * 10.0).round() / 10.0;
+    }
+    measured
+}
+
+/// A sensor with three times the noise that the twin says reads labels higher. That is its noise and no offset of the friction: the
+/// calibration says so, and the diagnosis names nothing.
+#[test]
+fn labels_say_how_noisy_their_sensor_is() {
+    let twin = twin_at(&baseline());
+    let noise = |measured: &MeasuredPulls| {
+        let found = calibrate_twin(measured, &twin, &library(&twin), &CalibrateRequest::default(), 2);
+        let noise = found.unwrap().0.baseline["wrist.noise_n"].clone();
+        assert!(noise.low90 < noise.value && noise.value < noise.high90, "{noise:?}");
+        noise.value
+    };
+    let noisy = labels_alone(simulated("", 60, &[("wrist.noise_n", "0.4")]));
+    let quiet = labels_alone(simulated("", 60, &[("wrist.noise_n", "0.05")]));
+    let (noisy_n, quiet_n) = (noise(&noisy), noise(&quiet));
+    assert!(noisy_n > 0.2 && quiet_n < 0.2 && noisy_n > 2.0 * quiet_n, "{noisy_n} {quiet_n}");
+    let found = diagnose(&noisy, &[]).diagnosis;
+    assert_eq!(found.verdict, Verdict::None, "{:?} {:?}", names(&found), found.unknown);
+}
+
+/// A first pull that went wrong is an outlier. A conditioning that lasts for half a pull explains it, and nothing else.
+#[test]
+fn one_bad_pull_is_no_effect() {
+    let mut measured = labels_alone(simulated("", 60, &[]));
+    measured.pulls[0].max_pull_force_n *= 0.5;
+    let found = diagnose(&measured, &[]).diagnosis;
+    assert_eq!(found.verdict, Verdict::None, "{:?} {:?}", names(&found), found.unknown);
+    assert_eq!(found.data.outliers, [measured.pulls[0].id.clone()]);
+}
+
+/// Friction that grows with the dwell in the second session alone comes back as that pair of columns, and the twin that is written
+/// has it in that session alone.
+#[test]
+fn what_acts_in_one_session_is_found_there() {
+    let table = "[[effects]]\nname = \"table\"\ncovariate = \"dwell_s\"\nwhere = { session = \"2\" }\nx = [0.5, 90.0]\n\
+                 factor = [1.0, 1.5]\nphysical = false\n";
+    let measured = simulated(table, 150, &[]);
+    assert!(measured.pulls.iter().any(|p| p.covariates.session == "2" && p.covariates.dwell_s > 5.0));
+    let found = diagnose(&measured, &[]);
+    let unknown: Vec<&str> = found.diagnosis.unknown.iter().map(|u| u.covariate.as_str()).collect();
+    assert_eq!(unknown, ["dwell_s*session"], "{:?}", names(&found.diagnosis));
+    let written = edited_twin(&baseline(), &[], &found.edits).unwrap();
+    let own = written.effects.iter().find(|e| e.name == "table").expect("a table");
+    assert_eq!(own.parameters["where"].as_table().unwrap()["session"].as_str(), Some("2"));
+    let error = found.diagnosis.error.unwrap();
+    assert!(error.after.rmse_n < error.before.rmse_n.map(|e| 0.8 * e), "{error:?}");
+}
+
+/// Readings that rise by 20 mN for each newton of the grip, with and without a load: mu takes it in, the readings without a load
+/// show it. A zero that walks about is nothing of the kind.
+#[test]
+fn cross_talk_of_the_grip_shows_without_a_load() {
+    let with = |zero_n: &dyn Fn(f64, usize) -> f64| {
+        let mut measured = simulated("", 60, &[]);
+        for (i, pull) in measured.pulls.iter_mut().enumerate() {
+            let more_n = zero_n(pull.grip_force_n, i);
+            let Some(trace) = &pull.trace else { continue };
+            let row = |r: TraceRow| TraceRow { measured_force_n: r.measured_force_n + more_n, ..r };
+            pull.trace = Some(trace.rows().map(row).collect::<PullTrace>());
+            pull.max_pull_force_n += more_n;
+        }
+        diagnose(&measured, &[]).diagnosis
+    };
+    let found = with(&|grip_n, _| 0.02 * grip_n);
+    let unknown: Vec<&str> = found.unknown.iter().map(|u| u.covariate.as_str()).collect();
+    assert!(unknown.contains(&"grip_force_n"), "{unknown:?} {:?}", names(&found));
+    assert!(found.notes.iter().any(|n| n.contains("cross-talk")), "{:?}", found.notes);
+    let mut noise = Stream::new(5, 0, Purpose::ForceNoise);
+    let walk: Vec<f64> = (0..60)
+        .scan(0.0, |zero, _| {
+            *zero = 0.95 * *zero + 0.05 * noise.normal();
+            Some(*zero)
+        })
+        .collect();
+    let found = with(&|_, i| walk[i]);
+    assert!(found.unknown.iter().all(|u| u.covariate != "grip_force_n"), "{:?}", found.unknown);
+}
