@@ -140,5 +140,5 @@ pub use sample::{SampleError, SimulateOptions};
 pub use schema::{sweep_schema, twin_schema};
 pub use simulator::{Draw, Simulator};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, prepare_run, run_info, sweep};
-pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, write_twin};
+pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, edited_twin_toml, write_twin};
 pub use version::VERSION;

@@ -79,20 +79,20 @@ pub fn edited_twin(
     Ok(file)
 }
 
-/// Writes the twin at `base` with overrides and edits applied into `out`, with every key spelt out.
+/// The text of the twin at `base` with overrides and edits applied, with every key spelt out, for a file `out`.
 ///
 /// The paths in it are written anew so that they name the same files from where `out` lies; those inside gripgen and
 /// absolute ones stay. Comments of the old file are not kept.
 ///
 /// # Errors
 ///
-/// As [`edited_twin`], or a file that cannot be written.
-pub fn write_twin(
+/// As [`edited_twin`], or no folder for `out`.
+pub fn edited_twin_toml(
     base: &Location,
     sets: &[(String, String)],
     edits: &TwinEdits,
     out: &Path,
-) -> Result<(), WriteTwinError> {
+) -> Result<String, WriteTwinError> {
     let mut file = edited_twin(base, sets, edits)?;
     let io = |problem: String| WriteTwinError::Io { path: out.into(), problem };
     let folder = match out.parent() {
@@ -104,7 +104,22 @@ pub fn write_twin(
         *path = path_from(&folder, &base.beside(path));
     }
     let body = toml::to_string_pretty(&file).map_err(|e| io(e.to_string()))?;
-    std::fs::write(out, header(base, sets, edits) + &body).map_err(|e| io(e.to_string()))
+    Ok(header(base, sets, edits) + &body)
+}
+
+/// Writes the text of [`edited_twin_toml`] over whatever `out` is.
+///
+/// # Errors
+///
+/// As [`edited_twin_toml`], or a file that cannot be written.
+pub fn write_twin(
+    base: &Location,
+    sets: &[(String, String)],
+    edits: &TwinEdits,
+    out: &Path,
+) -> Result<(), WriteTwinError> {
+    let text = edited_twin_toml(base, sets, edits, out)?;
+    std::fs::write(out, text).map_err(|e| WriteTwinError::Io { path: out.into(), problem: e.to_string() })
 }
 
 fn header(base: &Location, sets: &[(String, String)], edits: &TwinEdits) -> String {

@@ -5,7 +5,9 @@ use super::diagnose::output::next_toml;
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::load::{load_library, load_twin, within_rig};
-use crate::output::{JsonSink, print, program, writable, write_file};
+use crate::mark::Format;
+use crate::output::{JsonSink, print, program};
+use crate::outputs::Outputs;
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};
 use gripgen::twin::effects::OutsideFit;
@@ -19,10 +21,17 @@ const SHIPPED_RIG: &str = "asset:configs/rig.toml";
 
 /// Runs the verb.
 pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
-    writable(&args.out)?;
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let at = Location::parse(&args.twin);
     let rig = args.rig.as_deref().unwrap_or(SHIPPED_RIG);
+    let mut outputs = Outputs::of("campaign", args.json.force)
+        .reads_config(&args.twin, &args.set)
+        .reads_config(rig, &[])
+        .reads_all(&args.separate);
+    outputs.allow(&args.out)?;
+    if let Some(folder) = &args.simulate {
+        outputs.allow_measurements(folder)?;
+    }
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let twin = within_rig(load_twin(&args.twin, &args.set)?, Some(rig))?;
     let (campaign, separating) = match &args.separate {
         Some(measured) => {
@@ -42,13 +51,11 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         args.seed
     );
     let text = separating.unwrap_or_else(|| campaign_toml(&campaign, &about));
-    write_file(&args.out, text.as_bytes())?;
+    outputs.write(&args.out, Format::Toml, text.as_bytes())?;
     let simulated = match &args.simulate {
         Some(folder) => {
             let made = simulate_campaign(&at, &args.set, &campaign, args.seed).map_err(Failure::usage)?;
-            write_pull_folder(folder, &made.pulls).map_err(|e| {
-                Failure::new(e).hint("a folder that holds measurements is left alone; name a new one")
-            })?;
+            write_pull_folder(folder, &made.pulls).map_err(Failure::new)?;
             if !args.talk.quiet {
                 made.notes.iter().for_each(|note| eprintln!("{note}"));
             }

@@ -2,10 +2,12 @@
 
 use crate::args::InitArgs;
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, program, write_file};
-use gripgen::{StarterFile, part_starter, starter};
+use crate::mark::Format;
+use crate::output::{JsonSink, print, program};
+use crate::outputs::Outputs;
+use gripgen::{part_starter, starter};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Runs the verb.
 pub fn run(args: &InitArgs) -> Result<u8, Failure> {
@@ -27,15 +29,20 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
         }
         (args.target.clone(), starter(), String::new(), vec![])
     };
-    write_all(&folder, &files, args.force)?;
+    let mut outputs = Outputs::of("init", args.json.force).reads_all(is_mesh.then_some(&args.target));
+    let paths: Vec<PathBuf> = files.iter().map(|f| folder.join(&f.name)).collect();
+    paths.iter().try_for_each(|path| outputs.judge(path))?;
+    std::fs::create_dir_all(&folder).map_err(|e| Failure::new(format!("{}: {e}", folder.display())))?;
+    outputs.allow_all(paths.iter().map(PathBuf::as_path))?;
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    // They are there to be edited, and carry no mark: who runs it again means --force.
+    paths.iter().zip(&files).try_for_each(|(path, file)| outputs.write(path, Format::Bare, &file.bytes))?;
     if !args.talk.quiet {
         eprint!("{talk}");
         let sweep = folder.join("sweep.toml");
         eprintln!("next: {1} check {0}, then {1} sweep {0}", sweep.display(), program());
     }
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     if sink.wanted() {
-        let paths: Vec<PathBuf> = files.iter().map(|f| folder.join(&f.name)).collect();
         let grips: Vec<_> = grips
             .iter()
             .map(|g| {
@@ -50,16 +57,7 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
             return Ok(0);
         }
     }
-    let listed: String = files.iter().map(|f| format!("{}\n", folder.join(&f.name).display())).collect();
+    let listed: String = paths.iter().map(|path| format!("{}\n", path.display())).collect();
     print(&listed)?;
     Ok(0)
-}
-
-fn write_all(folder: &Path, files: &[StarterFile], force: bool) -> Result<(), Failure> {
-    if let Some(taken) = files.iter().map(|f| folder.join(&f.name)).find(|p| p.exists() && !force) {
-        return Err(Failure::usage(format!("{} exists already", taken.display()))
-            .hint("choose another folder, or replace it with --force"));
-    }
-    std::fs::create_dir_all(folder).map_err(|e| Failure::new(format!("{}: {e}", folder.display())))?;
-    files.iter().try_for_each(|f| write_file(&folder.join(&f.name), &f.bytes))
 }

@@ -5,6 +5,7 @@ use crate::commands::check;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
 use crate::output::{JsonSink, duration, print, program, size};
+use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{RunFolder, status_name};
 use gripgen::tactile::SimdLevel;
@@ -20,13 +21,17 @@ const FAILURES_SHOWN: u64 = 10;
 /// Runs the verb.
 pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
     if args.dry_run {
-        return check::check(&args.config, args.jobs, args.json.json.as_deref(), &args.talk);
+        return check::check("sweep", &args.config, args.jobs, &args.json, &args.talk);
     }
     let project = Project::load(&Location::parse(&args.config.config), &args.config.set)?;
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&project.name));
     let jobs = args.jobs.unwrap_or_else(check::cores).max(1);
     let options = SweepOptions { jobs, slice: args.slice, simd: simd_level(args)? };
-    let mut watch = Watch::new(args, &project)?;
+    let mut outputs = Outputs::of("sweep", args.json.force)
+        .reads_config(&args.config.config, &args.config.set)
+        .makes_run(&out);
+    let json = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let mut watch = Watch::new(args, &project, json);
     let stop = stop_flag("finishing the shards under way");
     let result = sweep(&project, &out, options, stop, |event| watch.on_event(&event));
     let summary = result?;
@@ -59,9 +64,8 @@ struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    fn new(args: &'a SweepArgs, project: &'a Project) -> Result<Self, Failure> {
-        let json = JsonSink::open(args.json.json.as_deref())?;
-        Ok(Self { args, project, json, progress: None, json_failure: None, failures: 0, bytes: 0, made: 0 })
+    fn new(args: &'a SweepArgs, project: &'a Project, json: JsonSink) -> Self {
+        Self { args, project, json, progress: None, json_failure: None, failures: 0, bytes: 0, made: 0 }
     }
 
     fn line(&mut self, value: &Value) {

@@ -4,13 +4,15 @@ use crate::args::VerifyArgs;
 use crate::commands::{maker, open_run};
 use crate::failure::{Failure, code};
 use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::verify;
 use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let mut outputs = Outputs::of("verify", args.json.force).reads(&args.run);
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let folder = open_run(&args.run)?;
     let mut progress = Progress::start("shards", 0, folder.info().shards, &args.talk);
     let result = verify(&args.run, |_| progress.step())?;
