@@ -4,12 +4,12 @@ mod entry;
 
 pub(crate) use entry::{calibration_entry, effect_entry, put_estimate};
 
-use crate::location::Location;
+use crate::location::{Location, path_from};
 use crate::project::{LoadError, load_twin_document};
 use crate::version::VERSION;
 use gripgen_twin::config::{CalibrationFile, ConfigError, EffectFile, TwinFile};
 use gripgen_twin::{TWIN_SCHEMA, Twin};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// A value of a twin that was fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,26 +152,4 @@ fn paths_of(file: &mut TwinFile) -> Vec<&mut String> {
         paths.extend(beside.into_iter().filter_map(Option::as_mut));
     }
     paths
-}
-
-/// How a file is called in a configuration that lies in `folder` (canonical): relative to it where there is a way.
-fn path_from(folder: &Path, file: &Location) -> String {
-    let Location::Disk(path) = file else { return file.to_string() };
-    if path.is_absolute() {
-        return path.display().to_string();
-    }
-    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-    // The folder of the file as it really lies, so that `..` does what it seems to do; its own name is kept.
-    let real = match (absolute.parent().map(Path::canonicalize), absolute.file_name()) {
-        (Some(Ok(parent)), Some(name)) => parent.join(name),
-        _ => absolute,
-    };
-    let same = folder.components().zip(real.components()).take_while(|(a, b)| a == b).count();
-    if same == 0 {
-        return real.display().to_string();
-    }
-    let up = folder.components().skip(same).map(|_| Component::ParentDir);
-    let relative: PathBuf = up.chain(real.components().skip(same)).collect();
-    // Written with slashes everywhere, which every system reads.
-    relative.iter().map(|part| part.to_string_lossy()).collect::<Vec<_>>().join("/")
 }

@@ -66,7 +66,7 @@ pub enum Command {
 pub struct ConfigArgs {
     /// The sweep configuration (a TOML file, or `asset:configs/quickstart.toml`).
     pub config: String,
-    /// Override a key of the sweep or of its twin; may be given many times.
+    /// Override a key of the sweep or of its twin; may be given many times. Paths are relative to where you are.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
 }
