@@ -168,6 +168,15 @@ impl Outputs {
         pending.publish(self).map(drop)
     }
 
+    /// Removes a file that this verb wrote and nobody edited; any other stays, whatever stands.
+    pub fn remove_own(&self, path: &Path) -> Result<(), Failure> {
+        let own = mark_of(path).is_some_and(|mark| mark.verb == self.verb && mark.whole);
+        if own && self.judge(path).is_ok() {
+            std::fs::remove_file(path).map_err(|e| unwritable(path, &e))?;
+        }
+        Ok(())
+    }
+
     /// Changes an input in its place, without a mark: a file of a person stays one.
     pub fn edit(&self, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let mut pending = self.begin(path)?;

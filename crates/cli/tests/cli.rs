@@ -374,6 +374,21 @@ fn init_gives_something_that_runs() {
     assert_code(&again, 2);
     assert!(text(&again.stderr).contains("--force"));
     assert_code(&run(&["init", at.to_str().unwrap(), "--force"]), 0);
+    // A file that is no mesh becomes no folder, nor does one that is not there.
+    for (name, there) in [("part.ply", false), ("part.step", true)] {
+        let file = folder.path().join(name);
+        if there {
+            std::fs::write(&file, "solid?").unwrap();
+        }
+        for more in [&[][..], &["-o", at.to_str().unwrap()]] {
+            let refused = run(&[&["init", file.to_str().unwrap()], more].concat());
+            assert_code(&refused, 2);
+            assert!(text(&refused.stderr).contains("STL or OBJ"), "{}", text(&refused.stderr));
+            assert!(!file.is_dir(), "{name}");
+        }
+    }
+    let version = folder.path().join("v1.2");
+    assert_code(&run(&["init", version.to_str().unwrap()]), 0);
 }
 
 #[test]

@@ -53,7 +53,7 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     if sink.wanted() {
         sink.document(&json_of(&found, &imprints, loaded.pulls.pulls.len(), &loaded.pulls.sha256))?;
     }
-    if !sink.on_stdout() {
+    if !sink.on_stdout() && !args.talk.quiet {
         print(&summary(&found, &imprints))?;
     }
     if !args.talk.quiet {

@@ -23,6 +23,10 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
     if !args.measured.exists() {
         return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
     }
+    if args.report.is_some() && is_sensor_table(&args.measured) {
+        return Err(Failure::usage("--report: a comparison with a force-sensor table has no page")
+            .hint("`gripgen diagnose FOLDER --report FILE.html` draws one of such a table"));
+    }
     let mut outputs = Outputs::of("compare", args.json.force)
         .reads(&args.measured)
         .reads_all(&args.also)
@@ -116,7 +120,7 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
         }
         sink.document(&document)?;
     }
-    if !sink.on_stdout() {
+    if !sink.on_stdout() && !args.talk.quiet {
         let mut text =
             format!("{:<16} {:>6} {:>9} {:>7} {:>8}\n", "part", "pulls", "RMSE N", "MAPE %", "bias N");
         for (name, e) in found.by_part.iter().map(|(n, e)| (n.as_str(), e)).chain([("all", &found.pulls)]) {

@@ -7,7 +7,7 @@ use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use gripgen::{part_starter, starter};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Runs the verb.
 pub fn run(args: &InitArgs) -> Result<u8, Failure> {
@@ -23,6 +23,7 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
         })?;
         (folder, made.files, made.summary, made.grips)
     } else {
+        no_mesh(&args.target)?;
         if let Some(out) = &args.out {
             let problem = format!("--out {} goes with a mesh; a folder is its own target", out.display());
             return Err(Failure::usage(problem));
@@ -60,4 +61,21 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     let listed: String = paths.iter().map(|path| format!("{}\n", path.display())).collect();
     print(&listed)?;
     Ok(0)
+}
+
+/// A target that is no mesh has to be a folder: a file of another kind, or one that is not there, makes none of its name.
+fn no_mesh(target: &Path) -> Result<(), Failure> {
+    if target.is_dir() {
+        return Ok(());
+    }
+    let ending = target.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
+    // `v1.2` is a folder to be.
+    let of_a_file = ending.chars().any(char::is_alphabetic);
+    let problem = match target.exists() {
+        true => "this is neither a folder nor a mesh that can be read",
+        false if of_a_file => "there is no such file, and .STL and .OBJ are the meshes that can be read",
+        false => return Ok(()),
+    };
+    Err(Failure::usage(format!("{}: {problem}", target.display()))
+        .hint("export the part as STL or OBJ; or name a folder, which is made"))
 }

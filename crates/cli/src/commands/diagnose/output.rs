@@ -33,7 +33,7 @@ pub fn write(
         let text = edited_twin_toml(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out);
         outputs.write(out, Format::Toml, text.map_err(Failure::new)?.as_bytes())?;
     }
-    if !sink.on_stdout() {
+    if !sink.on_stdout() && !args.talk.quiet {
         print(&summary(&diagnosed.diagnosis))?;
     }
     if !args.talk.quiet {
@@ -58,10 +58,12 @@ fn write_next(
         args.json.json.as_deref().filter(|p| *p != "-").map(Path::new),
         args.report.as_deref(),
     ];
-    let (Some(next), Some(beside)) = (&diagnosed.next, beside.into_iter().flatten().next()) else {
-        return Ok(None);
-    };
+    let Some(beside) = beside.into_iter().flatten().next() else { return Ok(None) };
     let path = beside.with_file_name("next.toml");
+    let Some(next) = &diagnosed.next else {
+        // Those of an earlier diagnosis hold no longer.
+        return outputs.remove_own(&path).map(|()| None);
+    };
     if outputs.judge(&path).is_err() {
         let note = format!(
             "{} is not of a diagnosis, or was edited, and was left alone: the next pulls were not written",
