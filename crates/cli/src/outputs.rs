@@ -6,7 +6,7 @@
 
 mod named;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, no_room};
 use crate::mark::{Format, Mark, mark_of, marked, short_hash};
 use crate::own_files::{IMAGES_FOLDER, owner};
 use gripgen::record::{CAMPAIGN_FILE, PULLS_FILE, TRACES_FOLDER};
@@ -284,9 +284,7 @@ impl Drop for Pending {
 fn unwritable(path: &Path, e: &io::Error) -> Failure {
     let failure = Failure::new(format!("{}: {e}", path.display()));
     match e.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            failure.hint("make room, or name a file on another disk")
-        }
+        _ if no_room(e) => failure.hint("make room, or name a file on another disk"),
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
             failure.hint("name a file where you may write")
         }

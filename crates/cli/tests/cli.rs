@@ -207,6 +207,29 @@ fn failed_samples_are_exit_code_4_and_are_named() {
     assert_code(&run(&["verify", out.to_str().unwrap()]), 0);
 }
 
+/// A file that may not grow is a full disk: path, cause, hint, nothing left; the same command goes on.
+#[cfg(unix)]
+#[test]
+fn a_shard_that_does_not_fit_says_where_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let arguments = sweep_args(out.to_str().unwrap(), &["-q", "--jobs", "1"]);
+    // With the signal ignored, writing past the limit is an error like any other.
+    let limited = Command::new("sh")
+        .args(["-c", "trap '' XFSZ; ulimit -f 300; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_gripgen")])
+        .args(&arguments)
+        .output()
+        .unwrap();
+    assert_code(&limited, 1);
+    let said = text(&limited.stderr);
+    let path = out.join("shard-00000.mcap.partial");
+    assert!(said.contains(path.to_str().unwrap()) && said.contains("File too large"), "{said}");
+    assert!(said.contains("hint: make room"), "{said}");
+    assert!(content(&out).keys().all(|name| name == "run.json"), "{:?}", content(&out).keys());
+    assert_code(&run(&arguments), 0);
+    assert_code(&run(&["verify", out.to_str().unwrap()]), 0);
+}
+
 #[test]
 fn a_damaged_run_is_exit_code_5() {
     let (_folder, out) = reference();
