@@ -127,6 +127,11 @@ pub fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
+/// So many of something: `1 shard`, `2 shards`.
+pub fn count(n: u64, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}
+
 /// A size for people.
 pub fn size(bytes: u64) -> String {
     let (mut x, mut unit) = (bytes as f64, "B");
@@ -158,6 +163,7 @@ mod tests {
 
     #[test]
     fn sizes_and_durations_read_well() {
+        assert_eq!([0, 1, 2].map(|n| count(n, "shard")), ["0 shards", "1 shard", "2 shards"]);
         for (bytes, text) in
             [(0, "0 B"), (999, "999 B"), (1000, "1.0 kB"), (123_456, "123 kB"), (2_500_000, "2.5 MB")]
         {

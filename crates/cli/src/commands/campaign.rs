@@ -6,7 +6,7 @@ use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::load::{load_library, load_twin, within_rig};
 use crate::mark::Format;
-use crate::output::{JsonSink, print, program};
+use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};
@@ -42,8 +42,7 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         None => (first(args, &twin)?, None),
     };
     let minutes = campaign.estimated_minutes();
-    let hours =
-        format!("{} pulls, about {} h {:02} min", count(&campaign), minutes as u64 / 60, minutes as u64 % 60);
+    let hours = format!("{}, about {}", count(pulls_of(&campaign), "pull"), duration(60.0 * minutes));
     let about = format!(
         "{hours} of the robot's time, pauses included.\n\
          Made by `gripgen campaign`, seed {}: settings in random order, each twice; one reference grip throughout.\n\
@@ -67,8 +66,8 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         sink.document(&json!({
             "schema": "gripgen.campaign/1",
             "campaign": args.out,
-            "pulls": count(&campaign),
-            "no_load": campaign.pulls.len() - count(&campaign),
+            "pulls": pulls_of(&campaign),
+            "no_load": campaign.pulls.len() as u64 - pulls_of(&campaign),
             "minutes": (minutes * 10.0).round() / 10.0,
             "simulated": simulated,
         }))?;
@@ -140,6 +139,6 @@ fn fitted_range_n(twin: &Twin, parts: &[String]) -> (f64, f64) {
     ranges.fold((0.0, f64::INFINITY), |(low, high), (l, h)| (low.max(l), high.min(h)))
 }
 
-fn count(campaign: &Campaign) -> usize {
-    campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).count()
+fn pulls_of(campaign: &Campaign) -> u64 {
+    campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).count() as u64
 }

@@ -2,7 +2,7 @@
 
 use crate::args::{CheckArgs, ConfigArgs, JsonArgs, TalkArgs};
 use crate::failure::{Failure, code};
-use crate::output::{JsonSink, duration, size};
+use crate::output::{JsonSink, count, duration, size};
 use crate::outputs::Outputs;
 use gripgen::record::{proto::gripgen_v1::Status, status_name};
 use gripgen::tactile::SimdLevel;
@@ -85,14 +85,14 @@ pub fn cores() -> usize {
 pub fn describe(project: &Project, plan: &Plan, jobs: usize) -> String {
     let sweep = &project.sweep;
     let mut text = format!(
-        "{}: {} samples in {} shards, about {}\n",
+        "{}: {} in {}, about {}\n",
         project.name,
-        plan.samples,
-        plan.shards,
+        count(plan.samples, "sample"),
+        count(plan.shards, "shard"),
         size(plan.estimated_bytes)
     );
     let cpu = plan.estimated_cpu.as_secs_f64();
-    text += &format!("about {} on {jobs} cores\n", duration(cpu / jobs as f64));
+    text += &format!("about {} on {}\n", duration(cpu / jobs as f64), count(jobs as u64, "core"));
     let varied: Vec<&str> = sweep.vary.iter().map(|v| v.key.as_str()).collect();
     text += &format!("varies: {}\n", varied.join(", "));
     text

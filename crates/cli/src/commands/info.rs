@@ -3,7 +3,7 @@
 use crate::args::InfoArgs;
 use crate::commands::{info_pulls, open_run};
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, size};
+use crate::output::{JsonSink, count, print, size};
 use crate::outputs::Outputs;
 use gripgen::levels;
 use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE};
@@ -104,11 +104,19 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     text += &format!("configuration {}\n", &info.config_sha256[..16.min(info.config_sha256.len())]);
     text += &match info.source == RIG_SOURCE {
         true => {
-            format!("{done} of {} pulls, {missing} missing, {failed} failed, {}\n", info.samples, size(bytes))
+            format!(
+                "{done} of {}, {missing} missing, {failed} failed, {}\n",
+                count(info.samples, "pull"),
+                size(bytes)
+            )
         }
         false => {
             let bytes = size(bytes);
-            format!("{done} of {} samples, {shards} of {} shards, {bytes}\n", info.samples, info.shards)
+            format!(
+                "{done} of {}, {shards} of {}, {bytes}\n",
+                count(info.samples, "sample"),
+                count(info.shards, "shard")
+            )
         }
     };
     let counts: Vec<String> = statuses.iter().map(|(name, n)| format!("{n} {name}")).collect();

@@ -3,7 +3,7 @@
 use crate::args::InfoArgs;
 use crate::failure::Failure;
 use crate::load::no_pulls;
-use crate::output::{JsonSink, print};
+use crate::output::{JsonSink, count, print};
 use gripgen::{Level, levels, load_pulls_of};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -79,7 +79,7 @@ pub fn run(args: &InfoArgs, mut sink: JsonSink) -> Result<u8, Failure> {
     if args.talk.quiet {
         return Ok(0);
     }
-    let mut text = format!("{} pulls, {traces} with a trace\n", measured.pulls.len());
+    let mut text = format!("{}, {traces} with a trace\n", count(measured.pulls.len() as u64, "pull"));
     text += &format!("recorded: {}\n", measured.recorded.join(", "));
     if !extra.is_empty() {
         text += &format!("further columns: {}\n", extra.join(", "));

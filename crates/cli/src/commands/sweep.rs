@@ -4,7 +4,7 @@ use crate::args::SweepArgs;
 use crate::commands::check;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
-use crate::output::{JsonSink, duration, print, program, size};
+use crate::output::{JsonSink, count, duration, print, program, size};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{RunFolder, status_name};
@@ -83,9 +83,18 @@ impl<'a> Watch<'a> {
                 }));
                 if !self.args.talk.quiet {
                     if *done > 0 {
-                        eprintln!("{}: {done} of {samples} samples are there already", self.project.name);
+                        eprintln!(
+                            "{}: {done} of {} are there already",
+                            self.project.name,
+                            count(*samples, "sample")
+                        );
                     } else {
-                        eprintln!("{}: {samples} samples in {shards} shards", self.project.name);
+                        eprintln!(
+                            "{}: {} in {}",
+                            self.project.name,
+                            count(*samples, "sample"),
+                            count(*shards, "shard")
+                        );
                     }
                 }
                 self.progress = Some(Progress::start("samples", *done, *samples, &self.args.talk));
@@ -121,7 +130,7 @@ impl<'a> Watch<'a> {
             }
             SweepEvent::Waiting { shards } => {
                 self.line(&json!({"event": "waiting", "shards": shards}));
-                self.say(&format!("waiting for {shards} shards that another process is writing"));
+                self.say(&format!("waiting for {} that another process is writing", count(*shards, "shard")));
             }
         }
     }
@@ -163,8 +172,8 @@ impl<'a> Watch<'a> {
         if self.made > 0 {
             let rate = self.made as f64 / took.max(1e-9);
             eprintln!(
-                "{} samples in {} ({rate:.0} per second), {} written",
-                self.made,
+                "{} in {} ({rate:.0} per second), {} written",
+                count(self.made, "sample"),
                 duration(took),
                 size(self.bytes)
             );

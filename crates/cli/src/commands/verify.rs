@@ -3,7 +3,7 @@
 use crate::args::VerifyArgs;
 use crate::commands::{maker, open_run};
 use crate::failure::{Failure, code};
-use crate::output::{JsonSink, print};
+use crate::output::{JsonSink, count, print};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::verify;
@@ -32,10 +32,14 @@ pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
     if !sink.on_stdout() && !args.talk.quiet {
         let missing = match result.missing_shards {
             0 => String::new(),
-            n => format!(", {n} shards not made yet"),
+            n => format!(", {} not made yet", count(n, "shard")),
         };
         let verdict = if good { "ok" } else { "mismatch" };
-        print(&format!("{verdict}: {} shards, {} samples{missing}\n", result.good_shards, result.samples))?;
+        print(&format!(
+            "{verdict}: {}, {}{missing}\n",
+            count(result.good_shards, "shard"),
+            count(result.samples, "sample")
+        ))?;
     }
     if !good {
         eprintln!(

@@ -7,7 +7,7 @@ use super::standing::CampaignClock;
 use crate::args::RigPullArgs;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
-use crate::output::{JsonSink, print, program};
+use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use gripgen::record::{
     RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls, read_campaign,
@@ -49,8 +49,7 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
         return print(&script).map(|()| 0);
     }
     let minutes = campaign.estimated_minutes();
-    let words =
-        format!("{} pulls, about {} h {:02} min", pulls.len(), minutes as u64 / 60, minutes as u64 % 60);
+    let words = format!("{}, about {}", count(pulls.len() as u64, "pull"), duration(60.0 * minutes));
     if args.dry_run {
         sink.line(&json!({"event": "checked", "pulls": pulls.len(), "minutes": minutes}))?;
         if !sink.on_stdout() {
