@@ -135,7 +135,7 @@ pub use render::{RenderError, RenderOptions, is_height_map, render_file, render_
 pub use report::{
     Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
 };
-pub use rig_run::{plain_campaign, rig_run_toml};
+pub use rig_run::{plain_campaign, rig_run_differences, rig_run_toml};
 pub use sample::{SampleError, SimulateOptions};
 pub use schema::{sweep_schema, twin_schema};
 pub use simulator::{Draw, Simulator};

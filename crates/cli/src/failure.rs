@@ -192,7 +192,8 @@ pub fn no_room(e: &io::Error) -> bool {
     )
 }
 
-fn another_run(error: &dyn Display) -> Failure {
+/// The folder of another run, which is left alone.
+pub fn another_run(error: &dyn Display) -> Failure {
     let failure = Failure { exit_code: code::ANOTHER_RUN, ..Failure::new(error) };
     failure.hint("choose another folder with --out; nothing was touched")
 }

@@ -5,16 +5,16 @@ use super::load::load_rig;
 use super::record::{Standing, rig_pull, suspect};
 use super::standing::CampaignClock;
 use crate::args::RigPullArgs;
-use crate::failure::{Failure, code};
+use crate::failure::{Failure, another_run, code};
 use crate::interrupt::stop_flag;
 use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use gripgen::record::{
-    RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls, read_campaign,
-    write_rig_pull,
+    FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls,
+    read_campaign, write_rig_pull,
 };
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
-use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_toml};
+use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_differences, rig_run_toml};
 use gripgen_rig::experiment::plan::pull_program;
 use gripgen_rig::experiment::prepare::Permit;
 use gripgen_rig::experiment::pull::ExecutedPull;
@@ -106,7 +106,15 @@ fn open_folder(
     let (name, out) = (name_of(args), folder_of(args));
     let config_toml = rig_run_toml(config, campaign).map_err(Failure::new)?;
     let info = RigRunInfo { name, gripgen_version: VERSION.into(), config_toml, pulls };
-    Ok(create_rig_run(&out, &info)?)
+    create_rig_run(&out, &info).map_err(|e| match &e {
+        FolderError::AnotherRun { what: "config_sha256", .. } => {
+            match rig_run_differences(&out, &info.config_toml) {
+                Some(keys) => another_run(&format!("{} holds another run: {keys}", out.display())),
+                None => e.into(),
+            }
+        }
+        _ => e.into(),
+    })
 }
 
 /// Pulls that are missing or failed.
