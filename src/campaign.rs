@@ -12,6 +12,7 @@ use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::SensorChain;
 use gripgen_twin::random::{Purpose, Stream};
+use gripgen_twin::rounded;
 use gripgen_twin::{
     Campaign, Covariates, MeasuredPull, MeasuredPulls, Outcome, PULLS_SINCE_REST, PlannedPull, PullKind,
     PullTrace, RestCount, Scenario, TraceRow, Twin, table_offset_n,
@@ -40,7 +41,7 @@ pub enum SimulateCampaignError {
         known: String,
     },
     /// More force than the gripper has.
-    #[error("pulls[{index}]: {force_n} N per jaw, the gripper has at most {max_n} N per jaw")]
+    #[error("pulls[{index}]: {} N per jaw, the gripper has at most {max_n} N per jaw", rounded(*.force_n, &[*.max_n]))]
     Force {
         /// Which entry of the campaign.
         index: usize,

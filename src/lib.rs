@@ -135,10 +135,10 @@ pub use render::{RenderError, RenderOptions, is_height_map, render_file, render_
 pub use report::{
     Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
 };
-pub use rig_run::{plain_campaign, rig_run_toml};
+pub use rig_run::{plain_campaign, rig_run_differences, rig_run_toml};
 pub use sample::{SampleError, SimulateOptions};
 pub use schema::{sweep_schema, twin_schema};
 pub use simulator::{Draw, Simulator};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, prepare_run, run_info, sweep};
-pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, write_twin};
+pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, edited_twin_toml, write_twin};
 pub use version::VERSION;

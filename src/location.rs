@@ -3,7 +3,7 @@
 use crate::assets::{self, ASSET_PREFIX};
 use std::borrow::Cow;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// A file on disk or an embedded one (`asset:configs/twin.toml`).
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -54,6 +54,23 @@ impl Location {
                 }
                 Location::Asset(parts.join("/"))
             }
+        }
+    }
+
+    /// What a path that was typed in a shell is called in a configuration that lies here.
+    pub(crate) fn named_from_shell(&self, path: &str) -> String {
+        if path.starts_with(ASSET_PREFIX) || Path::new(path).is_absolute() {
+            return path.into();
+        }
+        let folder = match self {
+            Location::Asset(_) => None,
+            Location::Disk(file) => {
+                file.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p })
+            }
+        };
+        match folder.and_then(|folder| folder.canonicalize().ok()) {
+            Some(folder) => path_from(&folder, &Location::Disk(path.into())),
+            None => std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string(),
         }
     }
 
@@ -118,6 +135,28 @@ impl Location {
             _ => stem,
         }
     }
+}
+
+/// How a file is called in a configuration that lies in `folder` (canonical): relative to it where there is a way.
+pub(crate) fn path_from(folder: &Path, file: &Location) -> String {
+    let Location::Disk(path) = file else { return file.to_string() };
+    if path.is_absolute() {
+        return path.display().to_string();
+    }
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+    // The folder of the file as it really lies, so that `..` does what it seems to do; its own name is kept.
+    let real = match (absolute.parent().map(Path::canonicalize), absolute.file_name()) {
+        (Some(Ok(parent)), Some(name)) => parent.join(name),
+        _ => absolute,
+    };
+    let same = folder.components().zip(real.components()).take_while(|(a, b)| a == b).count();
+    if same == 0 {
+        return real.display().to_string();
+    }
+    let up = folder.components().skip(same).map(|_| Component::ParentDir);
+    let relative: PathBuf = up.chain(real.components().skip(same)).collect();
+    // Written with slashes everywhere, which every system reads.
+    relative.iter().map(|part| part.to_string_lossy()).collect::<Vec<_>>().join("/")
 }
 
 impl fmt::Display for Location {

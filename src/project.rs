@@ -6,7 +6,7 @@ use crate::gpu::Gpu;
 use crate::gripped::{Gripped, check_damping};
 use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
-use crate::resolve::{Files, Named, Resolved, config_hash, resolve};
+use crate::resolve::{Files, Named, Resolved, config_hash, is_file_key, resolve};
 use crate::sample::SimulateOptions;
 use crate::version::VERSION;
 use gripgen_record::{RunFolder, sha256_hex};
@@ -83,9 +83,30 @@ pub fn load_twin_document(location: &Location, sets: &[(String, String)]) -> Res
         assets::text("configs/twin-baseline.toml").parse().expect("a test reads the baseline twin");
     document.fill_from(&baseline, DEFAULTED_SECTIONS);
     for (key, value) in sets.iter().filter(|(key, _)| is_twin_key(key)) {
-        document.set(key, value)?;
+        set(&mut document, location, key, value)?;
     }
     Ok(document)
+}
+
+/// Applies an override of a document that lies at `location`. A path in it is relative to the shell's folder.
+fn set(document: &mut Document, location: &Location, key: &str, value: &str) -> Result<(), ConfigError> {
+    document.set(key, value)?;
+    if key == "twin" || is_file_key(key.strip_prefix("vary.").unwrap_or(key)) {
+        let placed = document.get(key).cloned().map(|value| from_shell(location, value));
+        placed.map(|value| document.assign(key, value)).transpose()?;
+    }
+    Ok(())
+}
+
+/// A value with its paths as they are called from a configuration at `location`.
+fn from_shell(location: &Location, value: toml::Value) -> toml::Value {
+    match value {
+        toml::Value::String(path) => toml::Value::String(location.named_from_shell(&path)),
+        toml::Value::Array(all) => {
+            toml::Value::Array(all.into_iter().map(|value| from_shell(location, value)).collect())
+        }
+        other => other,
+    }
 }
 
 impl Project {
@@ -97,7 +118,7 @@ impl Project {
     pub fn load(location: &Location, sets: &[(String, String)]) -> Result<Self, LoadError> {
         let mut document = Document::parse(&location.to_string(), &location.read_text()?)?;
         for (key, value) in sets.iter().filter(|(key, _)| !is_twin_key(key)) {
-            document.set(key, value)?;
+            set(&mut document, location, key, value)?;
         }
         let file: SweepFile = document.read()?;
         let twin_location = location.beside(&file.twin);

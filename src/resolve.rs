@@ -86,7 +86,7 @@ fn keep_partial(twin: &mut toml::Value, typed: &toml::Table) {
 }
 
 /// Whether a key of a twin holds a path.
-fn is_file_key(key: &str) -> bool {
+pub(crate) fn is_file_key(key: &str) -> bool {
     let ends = [".mesh", ".sensor", ".background", ".gel_map", ".shadow_table", ".urdf"];
     is_twin_key(key) && ends.iter().any(|end| key.ends_with(end))
 }
@@ -169,7 +169,7 @@ impl<L: Fn(&str) -> Location> Resolver<L> {
                 let at = (self.locate)(path);
                 let bytes = at.read().map_err(|e| {
                     let hint =
-                        "paths are relative to the file that names them; `asset:...` is inside gripgen";
+                        "paths are relative to the file that names them, those of --set to where you are; `asset:...` is inside gripgen";
                     ConfigError::new(&key, e.to_string()).hint(hint)
                 })?;
                 let new_path = match &at {

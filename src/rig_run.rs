@@ -1,10 +1,12 @@
 //! What a run of a rig is made with, as one text.
 
-use gripgen_record::campaign_toml;
+use crate::sweep::differences::differences;
+use gripgen_record::{RunFolder, campaign_toml};
 use gripgen_twin::columns::covariates;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Campaign, PlannedPull};
 use serde::Serialize;
+use std::path::Path;
 
 /// Keys of a rig's file that no measurement depends on: where the devices are, and how patient the host is.
 const OF_THE_NETWORK: [(&[&str], &[&str]); 6] = [
@@ -39,6 +41,13 @@ pub fn rig_run_toml(rig: &impl Serialize, campaign: &Campaign) -> Result<String,
     run.insert("rig".into(), rig.into());
     run.insert("campaign".into(), campaign.into());
     Ok(run.to_string())
+}
+
+/// The keys in which the run of a folder differs from one that would be made with `config_toml` (of [`rig_run_toml`]), with both
+/// values; `None` where the folder cannot be read or is the same.
+pub fn rig_run_differences(folder: &Path, config_toml: &str) -> Option<String> {
+    let there = RunFolder::open(folder).ok()?;
+    differences(&there.info().config_toml, config_toml)
 }
 
 /// A campaign without a plan: every part with every grip force, so often, in an order drawn from the seed.

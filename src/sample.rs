@@ -5,7 +5,7 @@ use gripgen_physics::{GripError, PullError};
 use gripgen_tactile::gpu::GpuError;
 use gripgen_tactile::{IndentError, SimdLevel};
 use gripgen_twin::config::{Backend, ConfigError, ImageStorage, Mechanics, TraceStorage};
-use gripgen_twin::{FrictionError, Jaw, LabelError, Sweep};
+use gripgen_twin::{FrictionError, Jaw, LabelError, Sweep, rounded};
 
 /// What a simulation is made with and for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +58,7 @@ pub enum SampleError {
         step_s: f64,
     },
     /// An effect leaves no grip force.
-    #[error("the {jaw} jaw presses with {force_n:.4} N of the commanded {commanded_n} N: nothing is gripped")]
+    #[error("the {jaw} jaw presses with {force_n:.4} N of the commanded {} N: nothing is gripped", rounded(*.commanded_n, &[]))]
     NoForce {
         /// Which jaw.
         jaw: Jaw,

@@ -1,6 +1,6 @@
 //! Running a sweep: shards over threads, in order, resumable.
 
-mod differences;
+pub(crate) mod differences;
 mod pipeline;
 mod shards;
 

@@ -4,12 +4,12 @@ mod entry;
 
 pub(crate) use entry::{calibration_entry, effect_entry, put_estimate};
 
-use crate::location::Location;
+use crate::location::{Location, path_from};
 use crate::project::{LoadError, load_twin_document};
 use crate::version::VERSION;
 use gripgen_twin::config::{CalibrationFile, ConfigError, EffectFile, TwinFile};
 use gripgen_twin::{TWIN_SCHEMA, Twin};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// A value of a twin that was fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,20 +79,20 @@ pub fn edited_twin(
     Ok(file)
 }
 
-/// Writes the twin at `base` with overrides and edits applied into `out`, with every key spelt out.
+/// The text of the twin at `base` with overrides and edits applied, with every key spelt out, for a file `out`.
 ///
 /// The paths in it are written anew so that they name the same files from where `out` lies; those inside gripgen and
 /// absolute ones stay. Comments of the old file are not kept.
 ///
 /// # Errors
 ///
-/// As [`edited_twin`], or a file that cannot be written.
-pub fn write_twin(
+/// As [`edited_twin`], or no folder for `out`.
+pub fn edited_twin_toml(
     base: &Location,
     sets: &[(String, String)],
     edits: &TwinEdits,
     out: &Path,
-) -> Result<(), WriteTwinError> {
+) -> Result<String, WriteTwinError> {
     let mut file = edited_twin(base, sets, edits)?;
     let io = |problem: String| WriteTwinError::Io { path: out.into(), problem };
     let folder = match out.parent() {
@@ -104,7 +104,22 @@ pub fn write_twin(
         *path = path_from(&folder, &base.beside(path));
     }
     let body = toml::to_string_pretty(&file).map_err(|e| io(e.to_string()))?;
-    std::fs::write(out, header(base, sets, edits) + &body).map_err(|e| io(e.to_string()))
+    Ok(header(base, sets, edits) + &body)
+}
+
+/// Writes the text of [`edited_twin_toml`] over whatever `out` is.
+///
+/// # Errors
+///
+/// As [`edited_twin_toml`], or a file that cannot be written.
+pub fn write_twin(
+    base: &Location,
+    sets: &[(String, String)],
+    edits: &TwinEdits,
+    out: &Path,
+) -> Result<(), WriteTwinError> {
+    let text = edited_twin_toml(base, sets, edits, out)?;
+    std::fs::write(out, text).map_err(|e| WriteTwinError::Io { path: out.into(), problem: e.to_string() })
 }
 
 fn header(base: &Location, sets: &[(String, String)], edits: &TwinEdits) -> String {
@@ -137,26 +152,4 @@ fn paths_of(file: &mut TwinFile) -> Vec<&mut String> {
         paths.extend(beside.into_iter().filter_map(Option::as_mut));
     }
     paths
-}
-
-/// How a file is called in a configuration that lies in `folder` (canonical): relative to it where there is a way.
-fn path_from(folder: &Path, file: &Location) -> String {
-    let Location::Disk(path) = file else { return file.to_string() };
-    if path.is_absolute() {
-        return path.display().to_string();
-    }
-    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-    // The folder of the file as it really lies, so that `..` does what it seems to do; its own name is kept.
-    let real = match (absolute.parent().map(Path::canonicalize), absolute.file_name()) {
-        (Some(Ok(parent)), Some(name)) => parent.join(name),
-        _ => absolute,
-    };
-    let same = folder.components().zip(real.components()).take_while(|(a, b)| a == b).count();
-    if same == 0 {
-        return real.display().to_string();
-    }
-    let up = folder.components().skip(same).map(|_| Component::ParentDir);
-    let relative: PathBuf = up.chain(real.components().skip(same)).collect();
-    // Written with slashes everywhere, which every system reads.
-    relative.iter().map(|part| part.to_string_lossy()).collect::<Vec<_>>().join("/")
 }

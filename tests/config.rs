@@ -419,3 +419,32 @@ fn a_partial_right_jaw_follows_the_left_one() {
         );
     }
 }
+
+/// A path of `--set` is one of the shell, whatever folder the configuration lies in, and inside gripgen too.
+#[test]
+fn paths_of_overrides_are_relative_to_the_shell() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = std::env::current_dir().unwrap().canonicalize().unwrap();
+    let real = folder.path().canonicalize().unwrap();
+    // Up to the root and down again.
+    let up: std::path::PathBuf = here.components().skip(1).map(|_| "..").collect();
+    let from_here = up.join(real.components().skip(1).collect::<std::path::PathBuf>()).join("plate.stl");
+    std::fs::write(real.join("plate.stl"), gripgen::assets::get("parts/gear/part.stl").unwrap()).unwrap();
+    std::fs::create_dir(real.join("deep")).unwrap();
+    std::fs::write(real.join("deep/twin.toml"), gripgen::assets::get("configs/twin-baseline.toml").unwrap())
+        .unwrap();
+    let sweep = "twin = \"twin.toml\"\nsamples = 1\n[vary]\npart = [\"gear\"]\n";
+    std::fs::write(real.join("deep/sweep.toml"), sweep).unwrap();
+    let set = ("parts.gear.mesh".to_string(), from_here.display().to_string());
+    let on_disk = Location::Disk(real.join("deep/sweep.toml"));
+    for at in [on_disk, Location::parse("asset:configs/quickstart.toml")] {
+        let project = Project::load(&at, std::slice::from_ref(&set)).unwrap();
+        assert!(project.config_toml.contains("inputs/plate-"), "{at}");
+    }
+    // Typed beside the twin it is none.
+    let wrong = [("parts.gear.mesh".to_string(), "../plate.stl".to_string())];
+    let Err(e) = Project::load(&Location::Disk(real.join("deep/sweep.toml")), &wrong) else {
+        panic!("no such file")
+    };
+    assert!(e.to_string().contains("parts.gear.mesh"), "{e}");
+}

@@ -19,6 +19,8 @@ const IMAGE_HEIGHT: u32 = 174;
 const CURVE_HEIGHT: u32 = 150;
 const TILE_HEIGHT: u32 = IMAGE_HEIGHT + CURVE_HEIGHT + 44 + 3 * GAP;
 const HEADER: u32 = 52;
+/// Characters of a line in a tile.
+const LINE: usize = 58;
 
 /// Why a contact sheet could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -56,7 +58,7 @@ pub fn contact_sheet(folder: &RunFolder) -> Result<Vec<u8>, SheetError> {
     let height = HEADER + rows * (TILE_HEIGHT + GAP) + GAP;
     let mut canvas = Canvas::new(width, height, PAPER);
     let info = folder.info();
-    let title = format!("{}: {} samples", info.name, info.samples);
+    let title = format!("{}: {} sample{}", info.name, info.samples, if info.samples == 1 { "" } else { "s" });
     canvas.text(&title, 16.0, 8.0, Anchor::Left, TextStyle::title(INK));
     let legend =
         "left and right jaw; below: command (grey) and measured force (blue) in N over time in s, slip (red)";
@@ -70,7 +72,7 @@ pub fn contact_sheet(folder: &RunFolder) -> Result<Vec<u8>, SheetError> {
     Ok(canvas.into_png())
 }
 
-/// Samples that [`contact_sheet`] shows: parts in turn, and of each part labels from small to large.
+/// Samples that [`contact_sheet`] shows: parts in turn, and of each part labels from small to large; then samples that failed.
 ///
 /// # Errors
 ///
@@ -79,32 +81,45 @@ pub fn contact_sheet_samples(folder: &RunFolder) -> Result<Vec<u64>, FolderError
     let at = |name: &str| INDEX_COLUMNS.iter().position(|c| *c == name).unwrap_or(0);
     let (part, label) = (at("part"), at("max_pull_force_n"));
     let mut by_part: BTreeMap<String, Vec<(f64, u64)>> = BTreeMap::new();
+    let (mut failed, mut read) = (Vec::new(), 0);
     for shard in 0..folder.info().shards {
         let Some(sidecar) = folder.finished(shard)? else { continue };
         for (row, index) in sidecar.rows.iter().zip(sidecar.first_sample..) {
-            let label = row[label].parse().unwrap_or(-1.0);
-            by_part.entry(row[part].clone()).or_default().push((label, index));
+            // Whatever has no label failed.
+            match row[label].parse() {
+                Ok(label) => by_part.entry(row[part].clone()).or_default().push((label, index)),
+                Err(_) => failed.push(index),
+            }
         }
+        read += sidecar.rows.len();
         // Enough to choose from, also in a run of a billion samples.
-        if by_part.values().map(Vec::len).sum::<usize>() > 100_000 {
+        if read > 100_000 {
             break;
         }
     }
+    Ok(chosen(by_part, &failed))
+}
+
+/// Labelled samples by part, and failed ones behind them: a row of the sheet, or as much as the others leave.
+fn chosen(mut by_part: BTreeMap<String, Vec<(f64, u64)>>, failed: &[u64]) -> Vec<u64> {
+    let room = COLUMNS * ROWS;
+    let labelled: usize = by_part.values().map(Vec::len).sum();
+    let of_failed = failed.len().min(COLUMNS.max(room.saturating_sub(labelled)));
+    let per_part = (room - of_failed).div_ceil(by_part.len().max(1));
     let mut chosen = Vec::new();
     for samples in by_part.values_mut() {
         samples.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        chosen.extend(spread(samples, per_part).map(|sample| sample.1));
     }
-    let room = COLUMNS * ROWS;
-    let per_part = room.div_ceil(by_part.len().max(1));
-    for samples in by_part.values() {
-        let n = per_part.min(samples.len());
-        for k in 0..n {
-            let i = if n == 1 { samples.len() / 2 } else { k * (samples.len() - 1) / (n - 1) };
-            chosen.push(samples[i].1);
-        }
-    }
-    chosen.truncate(room);
-    Ok(chosen)
+    chosen.truncate(room - of_failed);
+    chosen.extend(spread(failed, of_failed));
+    chosen
+}
+
+/// So many of a list, from its first to its last; the middle one where it is one.
+fn spread<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
+    let n = most.min(all.len());
+    (0..n).map(move |k| &all[if n == 1 { all.len() / 2 } else { k * (all.len() - 1) / (n - 1) }])
 }
 
 fn tile(canvas: &mut Canvas, x: u32, y: u32, record: &Record) {
@@ -114,7 +129,11 @@ fn tile(canvas: &mut Canvas, x: u32, y: u32, record: &Record) {
     let ink = if s.status() == Status::Failed { FAILED } else { INK };
     canvas.text(&heading(s), left, top, Anchor::Left, TextStyle { ink, large: false, bold: true });
     top += 18.0;
-    canvas.text(&details(s), left, top, Anchor::Left, TextStyle::small(SOFT_INK));
+    // A failed sample has nothing but its reason, and the whole tile for it.
+    let most = if s.status() == Status::Failed { usize::MAX } else { 1 };
+    for (i, line) in lines(&details(s), LINE).iter().take(most).enumerate() {
+        canvas.text(line, left, top + 18.0 * i as f64, Anchor::Left, TextStyle::small(SOFT_INK));
+    }
     top += 22.0;
     if let Some(images) = &record.images {
         for (k, (_, image)) in images.iter().enumerate() {
@@ -145,15 +164,32 @@ pub(super) fn heading(s: &Sample) -> String {
 /// One line: how it was gripped.
 pub(super) fn details(s: &Sample) -> String {
     if s.status() == Status::Suspect {
-        return s.status_reason.chars().take(58).collect();
+        return s.status_reason.clone();
     }
     if s.status() == Status::Failed {
-        return s.failure.chars().take(58).collect();
+        return s.failure.clone();
     }
     format!(
         "grip {} with {:.0} N, {:.0}\u{b0}, offset {:.1} mm",
         s.grip_pose, s.grip_force_n, s.grip_angle_deg, s.grip_offset_mm
     )
+}
+
+/// A text broken between words into lines of at most so many characters; a longer word has a line of its own, cut.
+fn lines(text: &str, most: usize) -> Vec<String> {
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in text.split_whitespace() {
+        let word: String = word.chars().take(most).collect();
+        let last = lines.len() - 1;
+        if lines[last].is_empty() {
+            lines[last] = word;
+        } else if lines[last].chars().count() + 1 + word.chars().count() <= most {
+            lines[last] += &format!(" {word}");
+        } else {
+            lines.push(word);
+        }
+    }
+    lines
 }
 
 /// An image shrunk (or stretched) to the size of a tile's half, by averaging.
@@ -181,5 +217,33 @@ fn thumbnail(canvas: &mut Canvas, image: &gripgen_twin::TactileImage, x: u32, y:
             let [r, g, b] = sum.map(|s| (s / count) as u8);
             canvas.put(x + column, y + row, super::Rgb(r, g, b));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_come_last_and_take_a_row_at_most() {
+        let part = |name: &str, from: u64, n: u64| {
+            (name.to_string(), (from..from + n).map(|i| ((100 - i) as f64, i)).collect::<Vec<_>>())
+        };
+        let many: BTreeMap<_, _> = [part("a", 0, 20), part("b", 20, 20)].into();
+        let failed: Vec<u64> = (40..60).collect();
+        let sheet = chosen(many.clone(), &failed);
+        assert_eq!((sheet.len(), &sheet[9..]), (12, &[40, 49, 59][..]));
+        assert!(sheet[..9].iter().all(|i| *i < 40), "{sheet:?}");
+        assert_eq!(chosen(many, &[]).len(), 12);
+        // What has room is all there, the failures behind.
+        assert_eq!(chosen([part("a", 0, 2)].into(), &failed[..5]), [1, 0, 40, 41, 42, 43, 44]);
+        assert_eq!(chosen(BTreeMap::new(), &failed[..1]), [40]);
+    }
+
+    #[test]
+    fn reasons_are_broken_between_words() {
+        assert_eq!(lines("the part is deeper than the gel", 12), ["the part is", "deeper than", "the gel"]);
+        assert_eq!(lines("", 12), [""]);
+        assert_eq!(lines("abcdefghijklmnop x", 5), ["abcde", "x"]);
     }
 }

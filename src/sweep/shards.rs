@@ -6,8 +6,8 @@ use crate::project::Project;
 use crate::version::VERSION;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_record::{
-    EncodeOptions, EncodedSample, INDEX_COLUMNS, PartialShard, ShardInfo, ShardWriter, VIEW_RATE_HZ,
-    extra_columns,
+    EncodeOptions, EncodedSample, INDEX_COLUMNS, PartialShard, ShardError, ShardInfo, ShardWriter,
+    VIEW_RATE_HZ, extra_columns,
 };
 use std::io::BufWriter;
 
@@ -24,7 +24,10 @@ impl OpenShard {
     pub(super) fn new(project: &Project, shard: u64, partial: PartialShard) -> Result<Self, SweepError> {
         let info = shard_info(project, shard);
         let file = partial.duplicate()?;
-        let writer = ShardWriter::new(BufWriter::new(file), &info, project.sweep.images)?;
+        let writer = match ShardWriter::new(BufWriter::new(file), &info, project.sweep.images) {
+            Ok(writer) => writer,
+            Err(e) => return Err(lost(partial, e)),
+        };
         Ok(Self { shard, writer, partial, rows: Vec::with_capacity(info.samples as usize), failed: 0 })
     }
 
@@ -37,7 +40,10 @@ impl OpenShard {
         summary: &mut SweepSummary,
         on_event: &mut impl FnMut(SweepEvent),
     ) -> Result<Option<Self>, SweepError> {
-        self.writer.push(&encoded)?;
+        if let Err(e) = self.writer.push(&encoded) {
+            drop(self.writer);
+            return Err(lost(self.partial, e));
+        }
         let mut row = encoded.row;
         row[1] = self.shard.to_string();
         row[2] = self.rows.len().to_string();
@@ -51,13 +57,25 @@ impl OpenShard {
             return Ok(Some(self));
         }
         let first = self.shard * run.project.sweep.shard_samples;
-        self.writer.finish()?.into_inner().map_err(|e| self.partial.error(e.into_error()))?;
+        match self.writer.finish().map(BufWriter::into_inner) {
+            Ok(Ok(_)) => {}
+            Ok(Err(e)) => return Err(lost(self.partial, ShardError::Mcap(e.into_error().into()))),
+            Err(e) => return Err(lost(self.partial, e)),
+        }
         let sidecar = run.folder.finish_shard(self.shard, first, self.partial, self.failed, self.rows)?;
         count(summary, &sidecar);
         let (bytes, failed) = (sidecar.bytes, sidecar.failed);
         on_event(SweepEvent::Shard { shard: self.shard, bytes, failed });
         Ok(None)
     }
+}
+
+/// A shard that could not be written: a disk that is full gets its room back.
+fn lost(partial: PartialShard, e: ShardError) -> SweepError {
+    let failure = partial.blame(e);
+    // What cannot be removed is never read, and is written anew by the next run.
+    let _ = partial.give_up();
+    failure
 }
 
 /// The `failure` cell of an index row.

@@ -66,17 +66,20 @@ pub enum Command {
 pub struct ConfigArgs {
     /// The sweep configuration (a TOML file, or `asset:configs/quickstart.toml`).
     pub config: String,
-    /// Override a key of the sweep or of its twin; may be given many times.
+    /// Override a key of the sweep or of its twin; may be given many times. Paths are relative to where you are.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
 }
 
-/// Flags of commands that can print JSON.
+/// Flags of commands that write: files, or JSON.
 #[derive(Debug, Args)]
 pub struct JsonArgs {
     /// Print JSON to standard output, or to FILE.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub json: Option<String>,
+    /// Replace files that something else wrote, or that were edited. What is read, runs and measurements are never replaced.
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// How much is said on standard error.
@@ -102,9 +105,6 @@ pub struct InitArgs {
     /// Millimetres per unit of the mesh file.
     #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = scale)]
     pub scale_mm_per_unit: f64,
-    /// Replace files that exist.
-    #[arg(long)]
-    pub force: bool,
     /// JSON: the files and the grips proposed.
     #[command(flatten)]
     pub json: JsonArgs,

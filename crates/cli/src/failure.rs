@@ -6,6 +6,7 @@ use gripgen::tactile::presses::HeightsError;
 use gripgen::twin::config::{ConfigError, Place};
 use gripgen::{BenchError, LoadError, LoadSensorError, OpenPlantError, RenderError, SweepError};
 use std::fmt::Display;
+use std::io;
 
 /// Exit codes.
 pub mod code {
@@ -175,12 +176,24 @@ impl From<FolderError> for Failure {
             FolderError::Io { path, .. } if path.ends_with("run.json") => {
                 Self::new(&e).hint("a run folder is what `gripgen sweep` writes")
             }
+            FolderError::Io { source, .. } if no_room(source) => {
+                Self::new(&e).hint("make room, or choose a folder on another disk; what is done stays, and the same command goes on")
+            }
             _ => Self::new(&e),
         }
     }
 }
 
-fn another_run(error: &dyn Display) -> Failure {
+/// Whether a file did not fit.
+pub fn no_room(e: &io::Error) -> bool {
+    matches!(
+        e.kind(),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge
+    )
+}
+
+/// The folder of another run, which is left alone.
+pub fn another_run(error: &dyn Display) -> Failure {
     let failure = Failure { exit_code: code::ANOTHER_RUN, ..Failure::new(error) };
     failure.hint("choose another folder with --out; nothing was touched")
 }

@@ -14,7 +14,10 @@ mod commands;
 mod failure;
 mod interrupt;
 mod load;
+mod mark;
 mod output;
+mod outputs;
+mod own_files;
 mod progress;
 
 use args::{CalibrateCommand, Cli, Command, RigCommand};

@@ -1,12 +1,14 @@
 //! Data to standard output or a file.
 
 use crate::failure::Failure;
+use crate::mark::{Format, marked_json};
+use crate::outputs::Outputs;
 use serde_json::Value;
 use std::cell::Cell;
 use std::ffi::OsString;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::io::{self, Write};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
 /// Where JSON goes.
@@ -16,19 +18,28 @@ pub enum JsonSink {
     /// Standard output.
     Stdout,
     /// A file.
-    File(BufWriter<File>),
+    File(JsonFile),
+}
+
+/// JSON on its way into a file.
+pub struct JsonFile {
+    outputs: Outputs,
+    path: PathBuf,
+    /// Open where lines are written as things happen.
+    lines: Option<File>,
 }
 
 impl JsonSink {
-    /// The sink that `--json [FILE]` asks for.
-    pub fn open(asked: Option<&str>) -> Result<Self, Failure> {
+    /// The sink that `--json [FILE]` asks for. A file is not touched before there is something to write.
+    pub fn open(asked: Option<&str>, outputs: &mut Outputs) -> Result<Self, Failure> {
         match asked {
             None => Ok(JsonSink::None),
             Some("-") => Ok(JsonSink::Stdout),
-            Some(path) => match File::create(path) {
-                Ok(file) => Ok(JsonSink::File(BufWriter::new(file))),
-                Err(e) => Err(Failure::usage(format!("{path}: {e}")).hint("--json FILE writes to FILE")),
-            },
+            Some(path) => {
+                let path = PathBuf::from(path);
+                outputs.allow(&path)?;
+                Ok(JsonSink::File(JsonFile { outputs: outputs.clone(), path, lines: None }))
+            }
         }
     }
 
@@ -42,23 +53,39 @@ impl JsonSink {
         matches!(self, JsonSink::Stdout)
     }
 
-    /// Writes a value on one line.
+    /// Writes a value on one line, one of many. The first one in a file carries the mark.
     pub fn line(&mut self, value: &Value) -> Result<(), Failure> {
-        self.write(&format!("{value}\n"))
+        match self {
+            JsonSink::None => Ok(()),
+            JsonSink::Stdout => print(&format!("{value}\n")),
+            JsonSink::File(file) => file.line(value),
+        }
     }
 
     /// Writes a value for people to read.
     pub fn document(&mut self, value: &Value) -> Result<(), Failure> {
-        self.write(&format!("{value:#}\n"))
-    }
-
-    fn write(&mut self, text: &str) -> Result<(), Failure> {
-        let written = match self {
+        match self {
             JsonSink::None => Ok(()),
-            JsonSink::Stdout => return print(text),
-            JsonSink::File(file) => file.write_all(text.as_bytes()).and_then(|()| file.flush()),
-        };
-        written.map_err(|e| Failure::new(format!("writing JSON: {e}")))
+            JsonSink::Stdout => print(&format!("{value:#}\n")),
+            JsonSink::File(JsonFile { outputs, path, .. }) => {
+                let text = format!("{:#}\n", marked_json(outputs.verb(), value));
+                outputs.write(path, Format::Json, text.as_bytes())
+            }
+        }
+    }
+}
+
+impl JsonFile {
+    fn line(&mut self, value: &Value) -> Result<(), Failure> {
+        let failed = |e: io::Error| Failure::new(format!("writing JSON: {e}"));
+        if let Some(file) = &mut self.lines {
+            return file.write_all(format!("{value}\n").as_bytes()).map_err(failed);
+        }
+        let mut pending = self.outputs.begin(&self.path)?;
+        let first = format!("{}\n", marked_json(self.outputs.verb(), value));
+        pending.file.write_all(first.as_bytes()).map_err(failed)?;
+        self.lines = Some(pending.publish(&self.outputs)?);
+        Ok(())
     }
 }
 
@@ -100,27 +127,9 @@ pub fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// Writes a file, under a temporary name first.
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let failed = |e: io::Error| Failure::new(format!("{}: {e}", path.display()));
-    let mut partial = path.as_os_str().to_os_string();
-    partial.push(".partial");
-    std::fs::write(&partial, bytes).map_err(failed)?;
-    std::fs::rename(&partial, path).map_err(failed)
-}
-
-/// Whether a file can be written there, before the work and not after.
-pub fn writable(path: &Path) -> Result<(), Failure> {
-    if path.is_dir() {
-        return Err(Failure::usage(format!("{}: this is a folder", path.display())).hint("name a file in it"));
-    }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    match folder.filter(|folder| !folder.is_dir()) {
-        Some(folder) => {
-            Err(Failure::usage(format!("{}: there is no folder {}", path.display(), folder.display())))
-        }
-        None => Ok(()),
-    }
+/// So many of something: `1 shard`, `2 shards`.
+pub fn count(n: u64, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }
 
 /// A size for people.
@@ -154,6 +163,7 @@ mod tests {
 
     #[test]
     fn sizes_and_durations_read_well() {
+        assert_eq!([0, 1, 2].map(|n| count(n, "shard")), ["0 shards", "1 shard", "2 shards"]);
         for (bytes, text) in
             [(0, "0 B"), (999, "999 B"), (1000, "1.0 kB"), (123_456, "123 kB"), (2_500_000, "2.5 MB")]
         {

@@ -1,6 +1,7 @@
 //! One sample as a file of its own, with every reading as a message for viewers.
 
 use crate::encode::{EncodedSample, state_messages, timestamp};
+use crate::mark::EXPORT;
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::reader::{ReadError, ShardReader, trace_of};
@@ -77,6 +78,7 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
         row: vec![],
     };
     let mut writer = ShardWriter::new(Cursor::new(Vec::new()), &info(reader, index)?, storage)?;
+    writer.mark(EXPORT)?;
     writer.push(&encoded)?;
     Ok(writer.finish()?.into_inner())
 }

@@ -22,6 +22,7 @@ mod encode;
 mod export;
 mod folder;
 mod index;
+mod mark;
 mod parquet;
 mod picture;
 mod presses;
@@ -47,6 +48,7 @@ pub use folder::{
     sha256_hex,
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
+pub use mark::{MARK_NAME, parquet_mark, png_mark, png_with_mark};
 pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};
 pub use picture::{PictureError, decode as decode_picture, encode_png};
 pub use presses::{
@@ -57,7 +59,7 @@ pub use pulls::{
     JudgedPulls, PULLS_FILE, PullFolderError, PullImages, PullImagesError, Standing, TRACES_FOLDER,
     pulls_with_images, read_judged_pulls, read_pull_folder, read_pull_images, write_pull_folder,
 };
-pub use reader::{ReadError, Record, ShardReader};
+pub use reader::{ReadError, Record, ShardReader, mcap_mark};
 pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};
 pub use rig_run::{
     RigCampaign, RigPull, RigPullError, RigResult, RigRunError, RigRunInfo, create_rig_run, discard_failed,

@@ -6,10 +6,12 @@
 //! null. Nothing in the file depends on time, host or path.
 
 use crate::dataset::{Dataset, DatasetError};
+use crate::mark::{EXPORT, MARK_NAME};
 use gripgen_twin::Values;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
@@ -51,7 +53,11 @@ pub fn export_parquet<W: Write + Send>(
     out: W,
     mut on_rows: impl FnMut(usize),
 ) -> Result<(), ExportParquetError> {
-    let properties = WriterProperties::builder().set_created_by("gripgen".into()).build();
+    let mark = KeyValue::new(MARK_NAME.into(), EXPORT.to_string());
+    let properties = WriterProperties::builder()
+        .set_created_by("gripgen".into())
+        .set_key_value_metadata(Some(vec![mark]))
+        .build();
     let mut writer = SerializedFileWriter::new(out, schema(dataset, options)?, Arc::new(properties))?;
     let rows = dataset.table().rows();
     for first in (0..rows).step_by(GROUP_ROWS) {

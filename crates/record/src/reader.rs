@@ -2,6 +2,7 @@
 
 mod rig;
 
+use crate::mark::MARK_NAME;
 use crate::picture::{PictureError, decode};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
@@ -103,6 +104,41 @@ pub enum ReadError {
     },
 }
 
+/// An MCAP file, whole as far as its two ends say, and its size.
+fn open_mcap(path: &Path) -> Result<(File, u64), ReadError> {
+    let at = |source| ReadError::Open { path: path.into(), source };
+    let bad = |source| ReadError::Mcap { path: path.into(), source };
+    let file = File::open(path).map_err(at)?;
+    let bytes = file.metadata().map_err(at)?.len();
+    let magic = mcap::MAGIC.len() as u64;
+    for start in [0, bytes.saturating_sub(magic)] {
+        if piece(&file, bytes, start, magic).map_err(bad)? != mcap::MAGIC {
+            return Err(bad(McapError::BadMagic));
+        }
+    }
+    Ok((file, bytes))
+}
+
+/// The first metadata record of a name.
+fn metadata_record(
+    file: &File,
+    bytes: u64,
+    summary: &Summary,
+    name: &str,
+) -> Result<Option<BTreeMap<String, String>>, McapError> {
+    let Some(index) = summary.metadata_indexes.iter().find(|m| m.name == name) else { return Ok(None) };
+    let record = piece(file, bytes, index.offset, index.length)?;
+    let at_start = MetadataIndex { offset: 0, ..index.clone() };
+    Ok(Some(mcap::read::metadata(&record, &at_start)?.metadata))
+}
+
+/// The verb that wrote an MCAP file which is no shard of a run; `None` where nobody marked it.
+pub fn mcap_mark(path: &Path) -> Option<String> {
+    let (file, bytes) = open_mcap(path).ok()?;
+    let summary = read_summary(&file, bytes).ok()??;
+    metadata_record(&file, bytes, &summary, MARK_NAME).ok()??.remove("verb")
+}
+
 impl ShardReader {
     /// Opens a shard and checks that it is one.
     ///
@@ -110,27 +146,14 @@ impl ShardReader {
     ///
     /// A file that cannot be opened, is no MCAP file or no shard of gripgen.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let at = |source| ReadError::Open { path: path.into(), source };
-        let file = File::open(path).map_err(at)?;
-        let bytes = file.metadata().map_err(at)?.len();
-        let bad = |source| ReadError::Mcap { path: path.into(), source };
         let foreign = |problem: String| ReadError::Foreign { path: path.into(), problem };
-        let magic = mcap::MAGIC.len() as u64;
-        for start in [0, bytes.saturating_sub(magic)] {
-            if piece(&file, bytes, start, magic).map_err(bad)? != mcap::MAGIC {
-                return Err(bad(McapError::BadMagic));
-            }
-        }
+        let bad = |source| ReadError::Mcap { path: path.into(), source };
+        let (file, bytes) = open_mcap(path)?;
         let summary =
             read_summary(&file, bytes).map_err(bad)?.ok_or_else(|| foreign("it has no summary".into()))?;
-        let index = summary
-            .metadata_indexes
-            .iter()
-            .find(|m| m.name == METADATA_NAME)
+        let metadata = metadata_record(&file, bytes, &summary, METADATA_NAME)
+            .map_err(bad)?
             .ok_or_else(|| foreign(format!("it has no metadata record `{METADATA_NAME}`")))?;
-        let record = piece(&file, bytes, index.offset, index.length).map_err(bad)?;
-        let at_start = MetadataIndex { offset: 0, ..index.clone() };
-        let metadata = mcap::read::metadata(&record, &at_start).map_err(bad)?.metadata;
         let number = |key: &str| {
             metadata
                 .get(key)

@@ -160,9 +160,10 @@ pub fn write_rig_pull(folder: &RunFolder, pull: &RigPull) -> Result<Sidecar, Rig
         }
     };
     let file = BufWriter::new(partial.duplicate()?);
-    let mut writer = ShardWriter::new(file, &shard_info(folder, pull), ImageStorage::Png)?;
-    writer.push(&encoded)?;
-    writer.finish()?.into_inner().map_err(|e| partial.error(e.into_error()))?;
+    let blame = |e| partial.blame::<RigRunError>(e);
+    let mut writer = ShardWriter::new(file, &shard_info(folder, pull), ImageStorage::Png).map_err(blame)?;
+    writer.push(&encoded).map_err(blame)?;
+    writer.finish().map_err(blame)?.into_inner().map_err(|e| partial.error(e.into_error()))?;
     let mut row = encoded.row;
     (row[1], row[2]) = (index.to_string(), "0".into());
     let failed = u64::from(encoded.status == Status::Failed);

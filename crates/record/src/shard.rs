@@ -1,6 +1,7 @@
 //! Writing a shard: one MCAP file with a number of samples.
 
 use crate::encode::EncodedSample;
+use crate::mark::MARK_NAME;
 use crate::proto::{COMPRESSED_IMAGE_DESCRIPTOR, PULL_DESCRIPTOR, RAW_IMAGE_DESCRIPTOR, RIG_DESCRIPTOR};
 use gripgen_twin::PerJaw;
 use gripgen_twin::config::ImageStorage;
@@ -165,6 +166,16 @@ impl<W: Write + Seek> ShardWriter<W> {
         };
         let channels = Channels { sample, images, trace, state, rig };
         Ok(Self { writer, channels, written: 0, expected: info.samples })
+    }
+
+    /// Writes down which verb made a file that is no shard of a run (`mcap_mark` reads it). Shards have no mark.
+    ///
+    /// # Errors
+    ///
+    /// What the writer says.
+    pub(crate) fn mark(&mut self, verb: &str) -> Result<(), ShardError> {
+        let metadata = [("verb".to_string(), verb.to_string())].into();
+        Ok(self.writer.write_metadata(&Metadata { name: MARK_NAME.into(), metadata })?)
     }
 
     /// Appends a sample: one chunk with what training reads, one with what viewers draw; of a rig one with the images

@@ -6,6 +6,7 @@
 //! grip, and may differ from cell to cell of a contact patch.
 
 use crate::effects::{Effect, FrictionHook, GripPoint, OutsideFit, normal_force_n};
+use crate::rounded::rounded;
 use crate::{ContactPatch, Part, Twin};
 
 /// Friction of one grip.
@@ -25,7 +26,8 @@ pub struct GripFriction {
 pub enum FrictionError {
     /// The law was fitted elsewhere and says that extending it is an error.
     #[error(
-        "grip force {grip_force_n} N is outside the {low}..={high} N on which `{effect}` of part `{part}` was fitted"
+        "grip force {} N is outside the {low} to {high} N on which `{effect}` of part `{part}` was fitted",
+        rounded(*.grip_force_n, &[*.low, *.high])
     )]
     OutsideFit {
         /// Effect id.
@@ -41,7 +43,8 @@ pub enum FrictionError {
     },
     /// The law gives a negative coefficient.
     #[error(
-        "`{effect}` gives part `{part}` a friction coefficient of {mu:.4} at a grip force of {grip_force_n} N; it must not be negative"
+        "`{effect}` gives part `{part}` a friction coefficient of {mu:.4} at a grip force of {} N; it must not be negative",
+        rounded(*.grip_force_n, &[])
     )]
     Negative {
         /// Effect id.

@@ -49,6 +49,7 @@ mod patch;
 pub mod plant;
 mod profile;
 pub mod random;
+mod rounded;
 mod sample;
 mod scenario;
 mod scenario_keys;
@@ -71,6 +72,7 @@ pub use mesh::{EXTENT_RANGE_M, MAX_TRIANGLES, MeshError, TriMesh, write_binary_s
 pub use optics::{BACKGROUND_TERMS, FINER_TERMS, OpticsState};
 pub use patch::{ContactPatch, PressureCell};
 pub use profile::Staircase;
+pub use rounded::rounded;
 pub use sample::{ImprintSummary, Outcome, Pulled, Sample};
 pub use scenario::{Covariates, PullSettings, Scenario};
 pub use scenario_keys::{pull_keys, scenario_keys};

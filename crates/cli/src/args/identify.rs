@@ -18,7 +18,7 @@ pub struct CalibratePullsArgs {
     /// The twin to start from.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,
-    /// Override a key of the twin; may be given many times.
+    /// Override a key of the twin; may be given many times. Paths are relative to where you are.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
     /// A friction law to fit to each part: `offset` is mu (a + b / F_G).
@@ -78,7 +78,7 @@ pub struct DiagnoseArgs {
     /// The twin to start from.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,
-    /// Override a key of the twin; may be given many times.
+    /// Override a key of the twin; may be given many times. Paths are relative to where you are.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
     /// Plan only what this rig's gripper can do (the rig.toml of `gripgen rig pull`).
@@ -110,7 +110,7 @@ pub struct CampaignArgs {
     /// The twin.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,
-    /// Override a key of the twin; may be given many times.
+    /// Override a key of the twin; may be given many times. Paths are relative to where you are.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
     /// Plan only what this rig's gripper can do (the rig.toml of `gripgen rig pull`); the shipped rig where this is left

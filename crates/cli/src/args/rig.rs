@@ -119,7 +119,7 @@ pub struct RigServeArgs {
     /// The twin that moves it; it may hold effects that nobody else knows.
     #[arg(value_name = "TWIN", default_value = gripgen::BASELINE_TWIN)]
     pub twin: String,
-    /// Override a key of the twin; may be given many times.
+    /// Override a key of the twin; may be given many times. Paths are relative to where you are.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
     /// Seed of scatter and noise.

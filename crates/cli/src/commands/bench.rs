@@ -4,6 +4,7 @@ use crate::args::BenchArgs;
 use crate::commands::check::cores;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use gripgen::twin::config::Backend;
 use gripgen::{BenchOptions, BenchReport, bench};
 use serde_json::{Value, json};
@@ -14,7 +15,8 @@ pub fn run(args: &BenchArgs) -> Result<u8, Failure> {
     if args.adapter.is_some() && backend == Backend::Cpu {
         return Err(Failure::usage("--adapter goes with --backend gpu"));
     }
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let mut outputs = Outputs::of("bench", args.json.force).reads_all(&args.sensor);
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let options = BenchOptions {
         backend,
         sensor: args.sensor.clone(),

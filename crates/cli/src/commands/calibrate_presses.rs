@@ -4,7 +4,9 @@ use crate::args::{CalibratePressesArgs, TalkArgs};
 use crate::commands::compare::{comparison_json, table};
 use crate::failure::Failure;
 use crate::load::{no_presses, say_circles};
-use crate::output::{JsonSink, print, writable, write_file};
+use crate::mark::Format;
+use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use gripgen::tactile::presses::{
     BallSize, CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PressSet,
     calibrate_presses, check_ball_size,
@@ -23,10 +25,9 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
             Failure::usage(same).hint("end the sensor file in .npz, or name the report with --report")
         );
     }
-    for path in [&args.out, &report] {
-        writable(path)?;
-    }
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let mut outputs = Outputs::of("calibrate presses", args.json.force).reads(&args.presses);
+    outputs.allow_all([args.out.as_path(), &report])?;
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let metres = |mm: Option<f64>| mm.map(|mm| mm * 1e-3);
     let geometry = PressGeometry { ball_m: metres(args.ball_mm), metres_per_px: metres(args.mm_per_px) };
     let mut set = load_presses(&args.presses, geometry).map_err(|e| {
@@ -54,12 +55,12 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
         Failure::usage(format!("{}: the fitted sensor cannot be: {e}", args.presses.display()))
             .hint("are these presses of one ball into one sensor, with the camera's settings fixed?")
     })?;
-    write_file(&args.out, &bytes)?;
+    outputs.write(&args.out, Format::Npz, &bytes)?;
     let page =
         press_report(&text(args, &set, &calibration, ball_size.as_ref()), &set, &calibration.held_out, |i| {
             calibration.predicted.get(i).cloned()
         });
-    write_file(&report, page.as_bytes())?;
+    outputs.write(&report, Format::Html, page.as_bytes())?;
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.press_calibration/1",

@@ -3,25 +3,31 @@
 use crate::args::CalibratePullsArgs;
 use crate::failure::Failure;
 use crate::load::{folders, jobs, load_library, load_twin, no_pulls, suspects};
-use crate::output::{JsonSink, print, writable};
+use crate::mark::Format;
+use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
 use gripgen::{
-    CalibratePullsError, ImprintCalibrations, Location, calibrate_imprints, calibrate_twin, load_pulls_with,
-    write_twin,
+    CalibratePullsError, ImprintCalibrations, Location, calibrate_imprints, calibrate_twin, edited_twin_toml,
+    load_pulls_with,
 };
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
 /// Runs the verb.
 pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
-    writable(&args.out)?;
+    let mut outputs = Outputs::of("calibrate pulls", args.json.force)
+        .reads(&args.measured)
+        .reads_all(&args.also)
+        .reads_config(&args.twin, &args.set);
+    outputs.allow(&args.out)?;
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &args.set)?;
     let library = load_library(&twin, &args.twin)?;
     let loaded =
         load_pulls_with(&measured, suspects(args.include_suspect)).map_err(|e| no_pulls(&measured, e))?;
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let request = CalibrateRequest { offset_law: args.law.is_some(), effects: args.fit.clone() };
     let (found, mut edits) =
         calibrate_twin(&loaded.pulls, &twin, &library, &request, jobs()).map_err(|e| {
@@ -42,11 +48,12 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
         Failure::usage(e).hint("images/<pull_id>_left.png and _right.png have the size of the twin's sensor")
     })?;
     edits.values.extend(imprints.values(&loaded.pulls));
-    write_twin(&twin_at, &args.set, &edits, &args.out).map_err(Failure::new)?;
+    let text = edited_twin_toml(&twin_at, &args.set, &edits, &args.out).map_err(Failure::new)?;
+    outputs.write(&args.out, Format::Toml, text.as_bytes())?;
     if sink.wanted() {
         sink.document(&json_of(&found, &imprints, loaded.pulls.pulls.len(), &loaded.pulls.sha256))?;
     }
-    if !sink.on_stdout() {
+    if !sink.on_stdout() && !args.talk.quiet {
         print(&summary(&found, &imprints))?;
     }
     if !args.talk.quiet {

@@ -2,9 +2,13 @@
 
 use crate::args::CalibrateSensorArgs;
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, writable};
+use crate::mark::Format;
+use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use gripgen::identify::{ParameterEstimate, SensorCalibration};
-use gripgen::{Location, calibrate_sensor_table, load_sensor_table, sensor_calibration_edits, write_twin};
+use gripgen::{
+    Location, calibrate_sensor_table, edited_twin_toml, load_sensor_table, sensor_calibration_edits,
+};
 use serde_json::json;
 use std::fmt::Write;
 
@@ -13,10 +17,10 @@ pub fn run(args: &CalibrateSensorArgs) -> Result<u8, Failure> {
     if !args.measured.exists() {
         return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
     }
-    if let Some(out) = &args.out {
-        writable(out)?;
-    }
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let mut outputs =
+        Outputs::of("calibrate sensor", args.json.force).reads(&args.measured).reads_config(&args.twin, &[]);
+    outputs.allow_all(args.out.as_deref())?;
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
     let calibration = calibrate_sensor_table(&table).map_err(|reason| {
         Failure::usage(format!("{}: {reason}", args.measured.display()))
@@ -25,7 +29,8 @@ pub fn run(args: &CalibrateSensorArgs) -> Result<u8, Failure> {
     if let Some(out) = &args.out {
         let edits = sensor_calibration_edits(&calibration, &table.sha256)
             .map_err(|e| Failure::usage(format!("{}: {e}", args.measured.display())))?;
-        write_twin(&Location::parse(&args.twin), &[], &edits, out).map_err(Failure::new)?;
+        let text = edited_twin_toml(&Location::parse(&args.twin), &[], &edits, out).map_err(Failure::new)?;
+        outputs.write(out, Format::Toml, text.as_bytes())?;
     }
     if sink.wanted() {
         let sessions: Vec<_> = calibration

@@ -5,7 +5,9 @@ use super::diagnose::output::next_toml;
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::load::{load_library, load_twin, within_rig};
-use crate::output::{JsonSink, print, program, writable, write_file};
+use crate::mark::Format;
+use crate::output::{JsonSink, count, duration, print, program};
+use crate::outputs::Outputs;
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};
 use gripgen::twin::effects::OutsideFit;
@@ -19,10 +21,17 @@ const SHIPPED_RIG: &str = "asset:configs/rig.toml";
 
 /// Runs the verb.
 pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
-    writable(&args.out)?;
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let at = Location::parse(&args.twin);
     let rig = args.rig.as_deref().unwrap_or(SHIPPED_RIG);
+    let mut outputs = Outputs::of("campaign", args.json.force)
+        .reads_config(&args.twin, &args.set)
+        .reads_config(rig, &[])
+        .reads_all(&args.separate);
+    outputs.allow(&args.out)?;
+    if let Some(folder) = &args.simulate {
+        outputs.allow_measurements(folder)?;
+    }
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let twin = within_rig(load_twin(&args.twin, &args.set)?, Some(rig))?;
     let (campaign, separating) = match &args.separate {
         Some(measured) => {
@@ -33,8 +42,7 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         None => (first(args, &twin)?, None),
     };
     let minutes = campaign.estimated_minutes();
-    let hours =
-        format!("{} pulls, about {} h {:02} min", count(&campaign), minutes as u64 / 60, minutes as u64 % 60);
+    let hours = format!("{}, about {}", count(pulls_of(&campaign), "pull"), duration(60.0 * minutes));
     let about = format!(
         "{hours} of the robot's time, pauses included.\n\
          Made by `gripgen campaign`, seed {}: settings in random order, each twice; one reference grip throughout.\n\
@@ -42,13 +50,11 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         args.seed
     );
     let text = separating.unwrap_or_else(|| campaign_toml(&campaign, &about));
-    write_file(&args.out, text.as_bytes())?;
+    outputs.write(&args.out, Format::Toml, text.as_bytes())?;
     let simulated = match &args.simulate {
         Some(folder) => {
             let made = simulate_campaign(&at, &args.set, &campaign, args.seed).map_err(Failure::usage)?;
-            write_pull_folder(folder, &made.pulls).map_err(|e| {
-                Failure::new(e).hint("a folder that holds measurements is left alone; name a new one")
-            })?;
+            write_pull_folder(folder, &made.pulls).map_err(Failure::new)?;
             if !args.talk.quiet {
                 made.notes.iter().for_each(|note| eprintln!("{note}"));
             }
@@ -60,8 +66,8 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         sink.document(&json!({
             "schema": "gripgen.campaign/1",
             "campaign": args.out,
-            "pulls": count(&campaign),
-            "no_load": campaign.pulls.len() - count(&campaign),
+            "pulls": pulls_of(&campaign),
+            "no_load": campaign.pulls.len() as u64 - pulls_of(&campaign),
             "minutes": (minutes * 10.0).round() / 10.0,
             "simulated": simulated,
         }))?;
@@ -133,6 +139,6 @@ fn fitted_range_n(twin: &Twin, parts: &[String]) -> (f64, f64) {
     ranges.fold((0.0, f64::INFINITY), |(low, high), (l, h)| (low.max(l), high.min(h)))
 }
 
-fn count(campaign: &Campaign) -> usize {
-    campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).count()
+fn pulls_of(campaign: &Campaign) -> u64 {
+    campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).count() as u64
 }

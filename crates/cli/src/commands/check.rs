@@ -1,8 +1,9 @@
 //! `gripgen check`: what a sweep will be.
 
-use crate::args::{CheckArgs, ConfigArgs, TalkArgs};
+use crate::args::{CheckArgs, ConfigArgs, JsonArgs, TalkArgs};
 use crate::failure::{Failure, code};
-use crate::output::{JsonSink, duration, size};
+use crate::output::{JsonSink, count, duration, size};
+use crate::outputs::Outputs;
 use gripgen::record::{proto::gripgen_v1::Status, status_name};
 use gripgen::tactile::SimdLevel;
 use gripgen::{Location, Plan, Project, plan};
@@ -10,18 +11,20 @@ use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &CheckArgs) -> Result<u8, Failure> {
-    check(&args.config, None, args.json.json.as_deref(), &args.talk)
+    check("check", &args.config, None, &args.json, &args.talk)
 }
 
 /// Loads, tries out and reports; `sweep --dry-run` is the same.
 pub fn check(
+    verb: &'static str,
     config: &ConfigArgs,
     jobs: Option<usize>,
-    json: Option<&str>,
+    json: &JsonArgs,
     talk: &TalkArgs,
 ) -> Result<u8, Failure> {
+    let mut outputs = Outputs::of(verb, json.force).reads_config(&config.config, &config.set);
+    let mut sink = JsonSink::open(json.json.as_deref(), &mut outputs)?;
     let project = Project::load(&Location::parse(&config.config), &config.set)?;
-    let mut sink = JsonSink::open(json)?;
     let plan = plan(&project, SimdLevel::best())?;
     let jobs = jobs.unwrap_or_else(cores).max(1);
     let failed: Vec<_> = plan.probes.iter().filter(|p| p.failure.is_some()).collect();
@@ -82,14 +85,14 @@ pub fn cores() -> usize {
 pub fn describe(project: &Project, plan: &Plan, jobs: usize) -> String {
     let sweep = &project.sweep;
     let mut text = format!(
-        "{}: {} samples in {} shards, about {}\n",
+        "{}: {} in {}, about {}\n",
         project.name,
-        plan.samples,
-        plan.shards,
+        count(plan.samples, "sample"),
+        count(plan.shards, "shard"),
         size(plan.estimated_bytes)
     );
     let cpu = plan.estimated_cpu.as_secs_f64();
-    text += &format!("about {} on {jobs} cores\n", duration(cpu / jobs as f64));
+    text += &format!("about {} on {}\n", duration(cpu / jobs as f64), count(jobs as u64, "core"));
     let varied: Vec<&str> = sweep.vary.iter().map(|v| v.key.as_str()).collect();
     text += &format!("varies: {}\n", varied.join(", "));
     text

@@ -7,7 +7,9 @@ use crate::failure::Failure;
 use crate::load::{
     folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls, say_circles, suspects,
 };
-use crate::output::{JsonSink, print, writable, write_file};
+use crate::mark::Format;
+use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
@@ -21,16 +23,28 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
     if !args.measured.exists() {
         return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
     }
+    if args.report.is_some() && is_sensor_table(&args.measured) {
+        return Err(Failure::usage("--report: a comparison with a force-sensor table has no page")
+            .hint("`gripgen diagnose FOLDER --report FILE.html` draws one of such a table"));
+    }
+    let mut outputs = Outputs::of("compare", args.json.force)
+        .reads(&args.measured)
+        .reads_all(&args.also)
+        .reads_all(&args.sensor)
+        .reads_config(&args.twin, &[]);
+    outputs.allow_all(args.report.as_deref())?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     if is_sensor_table(&args.measured) {
-        return compare_sensor::run(args);
+        compare_sensor::run(args, sink)
+    } else if is_press_set(&args.measured) {
+        presses(args, &outputs, sink)
+    } else {
+        pulls(args, &outputs, sink)
     }
-    if !is_press_set(&args.measured) {
-        return pulls(args);
-    }
-    if let Some(report) = &args.report {
-        writable(report)?;
-    }
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+}
+
+/// A sensor file against presses.
+fn presses(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8, Failure> {
     let (sensor, mut set) = load_sensor_and_presses(&args.measured, args.sensor.as_deref(), &args.twin)?;
     say_circles(&find_circles_with_sensor(&mut set, &sensor), &args.talk);
     let comparison = compare_presses(&set, &sensor)
@@ -56,7 +70,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
         let page = press_report(&text, &set, &comparison, |i| {
             predict_press(&set.presses[i], set.ball_m, &sensor).ok()
         });
-        write_file(path, page.as_bytes())?;
+        outputs.write(path, Format::Html, page.as_bytes())?;
     }
     if sink.wanted() {
         sink.document(&json!({"schema": "gripgen.comparison/1", "presses": comparison_json(&comparison)}))?;
@@ -68,15 +82,11 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
 }
 
 /// A twin against measured pulls.
-fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
-    if let Some(report) = &args.report {
-        writable(report)?;
-    }
+fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8, Failure> {
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &[])?;
     let suspects = suspects(args.include_suspect);
     let loaded = load_pulls_with(&measured, suspects).map_err(|e| no_pulls(&measured, e))?;
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let library = load_library(&twin, &args.twin)?;
     let found = compare_pulls(&loaded.pulls, &twin, &library, jobs())
         .map_err(|e| Failure::usage(e).hint("name a twin that has this part with --twin"))?;
@@ -84,7 +94,8 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
         compare_images(&measured, &loaded, suspects, &twin, &library, jobs()).map_err(Failure::usage)?;
     if let Some(path) = &args.report {
         let title = format!("{} against {}", args.measured.display(), args.twin);
-        write_file(path, pull_comparison_page(&title, &loaded.pulls, &found).as_bytes())?;
+        let page = pull_comparison_page(&title, &loaded.pulls, &found);
+        outputs.write(path, Format::Html, page.as_bytes())?;
     }
     let errors =
         |e: &LabelErrors| json!({"n": e.n, "rmse_n": e.rmse_n, "mape_pct": e.mape_pct, "bias_n": e.bias_n});
@@ -109,7 +120,7 @@ fn pulls(args: &CompareArgs) -> Result<u8, Failure> {
         }
         sink.document(&document)?;
     }
-    if !sink.on_stdout() {
+    if !sink.on_stdout() && !args.talk.quiet {
         let mut text =
             format!("{:<16} {:>6} {:>9} {:>7} {:>8}\n", "part", "pulls", "RMSE N", "MAPE %", "bias N");
         for (name, e) in found.by_part.iter().map(|(n, e)| (n.as_str(), e)).chain([("all", &found.pulls)]) {

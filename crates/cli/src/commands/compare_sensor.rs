@@ -8,8 +8,7 @@ use gripgen::{compare_sensor_table, load_sensor_table};
 use serde_json::{Map, json};
 
 /// Runs the verb.
-pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+pub fn run(args: &CompareArgs, mut sink: JsonSink) -> Result<u8, Failure> {
     let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
     let twin = load_twin(&args.twin, &[])?;
     let found = compare_sensor_table(&table, &twin)

@@ -6,7 +6,8 @@ mod presses;
 use crate::args::{DiagnoseArgs, TalkArgs};
 use crate::failure::Failure;
 use crate::load::{folders, jobs, load_library, load_twin, no_pulls, suspects, within_rig};
-use crate::output::{JsonSink, writable};
+use crate::output::JsonSink;
+use crate::outputs::Outputs;
 use crate::progress::Share;
 use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
@@ -21,11 +22,14 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
     if !args.measured.exists() {
         return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
     }
-    for path in [args.out.as_deref(), args.report.as_deref()].into_iter().flatten() {
-        writable(path)?;
-    }
-    // Opened before the work, so that a path that cannot be written costs nothing.
-    let sink = JsonSink::open(args.json.json.as_deref())?;
+    let mut outputs = Outputs::of("diagnose", args.json.force)
+        .reads(&args.measured)
+        .reads_all(&args.also)
+        .reads_all(&args.rig)
+        .reads_all(&args.sensor)
+        .reads_config(&args.twin, &args.set);
+    outputs.allow_all([args.out.as_deref(), args.report.as_deref()].into_iter().flatten())?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let diagnosed = if is_press_set(&args.measured) {
         presses::presses(args)?
     } else if is_sensor_table(&args.measured) {
@@ -33,7 +37,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
     } else {
         pulls(args)?
     };
-    output::write(args, sink, diagnosed)
+    output::write(args, &outputs, sink, diagnosed)
 }
 
 fn sensor(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {

@@ -3,7 +3,8 @@
 use crate::args::InfoArgs;
 use crate::commands::{info_pulls, open_run};
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, size};
+use crate::output::{JsonSink, count, print, size};
+use crate::outputs::Outputs;
 use gripgen::levels;
 use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE};
 use serde_json::json;
@@ -39,8 +40,10 @@ impl PartSummary {
 
 /// Runs the verb.
 pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
+    let mut outputs = Outputs::of("info", args.json.force).reads(&args.run);
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     if args.run.join("pulls.csv").is_file() {
-        return info_pulls::run(args);
+        return info_pulls::run(args, sink);
     }
     let folder = open_run(&args.run)?;
     let info = folder.info();
@@ -71,7 +74,6 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     }
     let by_level: BTreeMap<_, _> = parts.iter().map(|(name, p)| (name.clone(), levels(&p.slipped))).collect();
     let missing = info.samples.saturating_sub(done);
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     if sink.wanted() {
         let by_part: BTreeMap<_, _> = parts
             .iter()
@@ -102,11 +104,19 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     text += &format!("configuration {}\n", &info.config_sha256[..16.min(info.config_sha256.len())]);
     text += &match info.source == RIG_SOURCE {
         true => {
-            format!("{done} of {} pulls, {missing} missing, {failed} failed, {}\n", info.samples, size(bytes))
+            format!(
+                "{done} of {}, {missing} missing, {failed} failed, {}\n",
+                count(info.samples, "pull"),
+                size(bytes)
+            )
         }
         false => {
             let bytes = size(bytes);
-            format!("{done} of {} samples, {shards} of {} shards, {bytes}\n", info.samples, info.shards)
+            format!(
+                "{done} of {}, {shards} of {}, {bytes}\n",
+                count(info.samples, "sample"),
+                count(info.shards, "shard")
+            )
         }
     };
     let counts: Vec<String> = statuses.iter().map(|(name, n)| format!("{n} {name}")).collect();

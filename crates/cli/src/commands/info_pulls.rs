@@ -3,7 +3,7 @@
 use crate::args::InfoArgs;
 use crate::failure::Failure;
 use crate::load::no_pulls;
-use crate::output::{JsonSink, print};
+use crate::output::{JsonSink, count, print};
 use gripgen::{Level, levels, load_pulls_of};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ pub fn levels_table(parts: &BTreeMap<String, Vec<Level>>) -> String {
 }
 
 /// A folder with pulls.csv.
-pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
+pub fn run(args: &InfoArgs, mut sink: JsonSink) -> Result<u8, Failure> {
     let folder = [args.run.as_path()];
     let loaded = load_pulls_of(&folder).map_err(|e| no_pulls(&folder, e))?;
     let measured = &loaded.pulls;
@@ -56,7 +56,6 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
         labels.iter().map(|(name, labels)| (name.clone(), levels(labels))).collect();
     let traces = measured.pulls.iter().filter(|p| p.trace.is_some()).count();
     let extra: Vec<&str> = measured.extra.iter().map(|e| e.name.as_str()).collect();
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     if sink.wanted() {
         let part = |(name, labels): (&String, &Vec<(f64, f64)>)| {
             let each = || labels.iter().map(|l| l.1);
@@ -80,7 +79,7 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     if args.talk.quiet {
         return Ok(0);
     }
-    let mut text = format!("{} pulls, {traces} with a trace\n", measured.pulls.len());
+    let mut text = format!("{}, {traces} with a trace\n", count(measured.pulls.len() as u64, "pull"));
     text += &format!("recorded: {}\n", measured.recorded.join(", "));
     if !extra.is_empty() {
         text += &format!("further columns: {}\n", extra.join(", "));

@@ -2,30 +2,26 @@
 
 use crate::args::RenderArgs;
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, writable, write_file};
+use crate::mark::{Format, short_hash};
+use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use gripgen::record::encode_png;
 use gripgen::tactile::npz::{Array, ElementType, write_npy};
 use gripgen::tactile::presses::RenderedBody;
 use gripgen::twin::TactileImage;
 use gripgen::{Location, RenderOptions, is_height_map, load_sensor, render_file};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
-    let outputs: Vec<&PathBuf> =
-        [Some(&args.out), args.heights.as_ref(), args.normals.as_ref(), args.mask.as_ref()]
-            .into_iter()
-            .flatten()
-            .collect();
-    for (i, path) in outputs.iter().enumerate() {
-        writable(path)?;
-        if **path == args.mesh || outputs[..i].contains(path) {
-            return Err(Failure::usage(format!("{}: two files would be one", path.display()))
-                .hint("give every output a name of its own"));
-        }
+    let mut outputs =
+        Outputs::of("render", args.json.force).reads(&args.mesh).reads_config(&args.sensor, &[]);
+    outputs.allow_all([Some(args.out.as_path()), args.mask.as_deref()].into_iter().flatten())?;
+    for path in [&args.heights, &args.normals].into_iter().flatten() {
+        outputs.allow_beside(path, &args.out)?;
     }
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let sensor = load_sensor(&Location::parse(&args.sensor))?;
     let options = RenderOptions {
         travel_m: args.depth_mm.map(|mm| mm * 1e-3),
@@ -35,23 +31,29 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
         metres_per_unit: args.scale_mm_per_unit * 1e-3,
     };
     let rendered = render_file(&args.mesh, &options, &sensor)?;
-    write_file(&args.out, &encode_png(&rendered.image).map_err(Failure::new)?)?;
     let size = (rendered.heights_mm.height, rendered.heights_mm.width);
+    let mut beside = Vec::new();
+    let mut bare = |path: &Path, array: &Array| {
+        let bytes = write_npy(array, ElementType::F32);
+        beside.push(short_hash(&bytes));
+        outputs.write(path, Format::Bare, &bytes)
+    };
     if let Some(path) = &args.heights {
         let values = rendered.heights_mm.values.iter().map(|&h| f64::from(h)).collect();
-        let array = Array { shape: vec![size.0, size.1], values };
-        write_file(path, &write_npy(&array, ElementType::F32))?;
+        bare(path, &Array { shape: vec![size.0, size.1], values })?;
     }
     if let Some(path) = &args.normals {
         let [x, y, z] = &rendered.normals;
         let values = (0..size.0 * size.1)
             .flat_map(|p| [x.values[p], y.values[p], z.values[p]].map(f64::from))
             .collect();
-        let array = Array { shape: vec![size.0, size.1, 3], values };
-        write_file(path, &write_npy(&array, ElementType::F32))?;
+        bare(path, &Array { shape: vec![size.0, size.1, 3], values })?;
     }
+    // Last, and after what it names.
+    let image = encode_png(&rendered.image).map_err(Failure::new)?;
+    outputs.write_with(&args.out, Format::Png, &image, &beside)?;
     if let Some(path) = &args.mask {
-        write_file(path, &encode_png(&mask(&rendered)).map_err(Failure::new)?)?;
+        outputs.write(path, Format::Png, &encode_png(&mask(&rendered)).map_err(Failure::new)?)?;
     }
     if sink.wanted() {
         let pixels = rendered.contact.iter().filter(|&&c| c).count();
@@ -65,7 +67,9 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
         }))?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
-        let lines: Vec<String> = outputs.iter().map(|path| format!("{}\n", path.display())).collect();
+        let written = [Some(&args.out), args.heights.as_ref(), args.normals.as_ref(), args.mask.as_ref()];
+        let lines: Vec<String> =
+            written.iter().flatten().map(|path| format!("{}\n", path.display())).collect();
         print(&lines.concat())?;
     }
     Ok(0)

@@ -4,7 +4,8 @@ use crate::args::SweepArgs;
 use crate::commands::check;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
-use crate::output::{JsonSink, duration, print, program, size};
+use crate::output::{JsonSink, count, duration, print, program, size};
+use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{RunFolder, status_name};
 use gripgen::tactile::SimdLevel;
@@ -20,13 +21,17 @@ const FAILURES_SHOWN: u64 = 10;
 /// Runs the verb.
 pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
     if args.dry_run {
-        return check::check(&args.config, args.jobs, args.json.json.as_deref(), &args.talk);
+        return check::check("sweep", &args.config, args.jobs, &args.json, &args.talk);
     }
     let project = Project::load(&Location::parse(&args.config.config), &args.config.set)?;
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&project.name));
     let jobs = args.jobs.unwrap_or_else(check::cores).max(1);
     let options = SweepOptions { jobs, slice: args.slice, simd: simd_level(args)? };
-    let mut watch = Watch::new(args, &project)?;
+    let mut outputs = Outputs::of("sweep", args.json.force)
+        .reads_config(&args.config.config, &args.config.set)
+        .makes_run(&out);
+    let json = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let mut watch = Watch::new(args, &project, json);
     let stop = stop_flag("finishing the shards under way");
     let result = sweep(&project, &out, options, stop, |event| watch.on_event(&event));
     let summary = result?;
@@ -59,9 +64,8 @@ struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    fn new(args: &'a SweepArgs, project: &'a Project) -> Result<Self, Failure> {
-        let json = JsonSink::open(args.json.json.as_deref())?;
-        Ok(Self { args, project, json, progress: None, json_failure: None, failures: 0, bytes: 0, made: 0 })
+    fn new(args: &'a SweepArgs, project: &'a Project, json: JsonSink) -> Self {
+        Self { args, project, json, progress: None, json_failure: None, failures: 0, bytes: 0, made: 0 }
     }
 
     fn line(&mut self, value: &Value) {
@@ -79,9 +83,18 @@ impl<'a> Watch<'a> {
                 }));
                 if !self.args.talk.quiet {
                     if *done > 0 {
-                        eprintln!("{}: {done} of {samples} samples are there already", self.project.name);
+                        eprintln!(
+                            "{}: {done} of {} are there already",
+                            self.project.name,
+                            count(*samples, "sample")
+                        );
                     } else {
-                        eprintln!("{}: {samples} samples in {shards} shards", self.project.name);
+                        eprintln!(
+                            "{}: {} in {}",
+                            self.project.name,
+                            count(*samples, "sample"),
+                            count(*shards, "shard")
+                        );
                     }
                 }
                 self.progress = Some(Progress::start("samples", *done, *samples, &self.args.talk));
@@ -117,7 +130,7 @@ impl<'a> Watch<'a> {
             }
             SweepEvent::Waiting { shards } => {
                 self.line(&json!({"event": "waiting", "shards": shards}));
-                self.say(&format!("waiting for {shards} shards that another process is writing"));
+                self.say(&format!("waiting for {} that another process is writing", count(*shards, "shard")));
             }
         }
     }
@@ -159,8 +172,8 @@ impl<'a> Watch<'a> {
         if self.made > 0 {
             let rate = self.made as f64 / took.max(1e-9);
             eprintln!(
-                "{} samples in {} ({rate:.0} per second), {} written",
-                self.made,
+                "{} in {} ({rate:.0} per second), {} written",
+                count(self.made, "sample"),
                 duration(took),
                 size(self.bytes)
             );

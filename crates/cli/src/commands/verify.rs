@@ -3,14 +3,16 @@
 use crate::args::VerifyArgs;
 use crate::commands::{maker, open_run};
 use crate::failure::{Failure, code};
-use crate::output::{JsonSink, print};
+use crate::output::{JsonSink, count, print};
+use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::verify;
 use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let mut outputs = Outputs::of("verify", args.json.force).reads(&args.run);
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let folder = open_run(&args.run)?;
     let mut progress = Progress::start("shards", 0, folder.info().shards, &args.talk);
     let result = verify(&args.run, |_| progress.step())?;
@@ -30,10 +32,14 @@ pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
     if !sink.on_stdout() && !args.talk.quiet {
         let missing = match result.missing_shards {
             0 => String::new(),
-            n => format!(", {n} shards not made yet"),
+            n => format!(", {} not made yet", count(n, "shard")),
         };
         let verdict = if good { "ok" } else { "mismatch" };
-        print(&format!("{verdict}: {} shards, {} samples{missing}\n", result.good_shards, result.samples))?;
+        print(&format!(
+            "{verdict}: {}, {}{missing}\n",
+            count(result.good_shards, "shard"),
+            count(result.samples, "sample")
+        ))?;
     }
     if !good {
         eprintln!(

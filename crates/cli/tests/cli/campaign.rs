@@ -34,7 +34,7 @@ fn a_campaign_is_planned_and_made_once() {
     assert!(within(forces("asset:configs/twin.toml", "papers"), 20.0));
 
     let again = run(&plan);
-    assert_code(&again, 1);
+    assert_code(&again, 2);
     assert!(text(&again.stderr).contains("holds measurements"), "{}", text(&again.stderr));
     for (arguments, part) in [
         (["--parts", "gaer"], "has no part `gaer`"),

@@ -19,6 +19,12 @@ fn folder(table: &str) -> tempfile::TempDir {
     folder
 }
 
+/// A TOML file as a verb leaves it.
+fn marked(verb: &str, text: &str) -> String {
+    let hash = &gripgen::record::sha256_hex(text.as_bytes())[..16];
+    format!("# gripgen.made_by: {verb} {hash}; replaced by the same verb until somebody edits it\n{text}")
+}
+
 #[test]
 fn a_fitted_twin_predicts_the_pulls_it_was_fitted_to() {
     let folder = folder(&pulls(12));
@@ -109,6 +115,16 @@ fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
     let json: serde_json::Value = serde_json::from_slice(&found.stdout).unwrap();
     assert_eq!((&json["schema"], &json["verdict"]), (&"gripgen.diagnosis/1".into(), &"insufficient".into()));
     assert!(json["notes"][0].as_str().unwrap().contains("too few") && out.is_file());
+    // Quiet is quiet, and the pulls of an earlier diagnosis go where there are none to make; a file of somebody stays.
+    let next = one.path().join("next.toml");
+    let quiet = ["diagnose", one.path().to_str().unwrap(), "-q", "-o", out.to_str().unwrap()];
+    for (text, stays) in [(marked("diagnose", "pulls = []\n"), false), ("pulls = []\n".into(), true)] {
+        std::fs::write(&next, text).unwrap();
+        let found = run(&quiet);
+        assert_code(&found, 0);
+        assert!(found.stdout.is_empty() && found.stderr.is_empty(), "{found:?}");
+        assert_eq!(next.exists(), stays);
+    }
     for (table, says) in [
         (pulls(12).replace("max_pull_force_n", "force"), "max_pull_force_n"),
         (pulls(12).replace("p3,", "p2,"), "p2"),

@@ -76,7 +76,7 @@ fn an_unfinished_run_of_a_rig_is_told_and_shown() {
 
     let verified = run(&["verify", path]);
     assert_code(&verified, 0);
-    assert_eq!(text(&verified.stdout), "ok: 2 shards, 2 samples, 1 shards not made yet\n");
+    assert_eq!(text(&verified.stdout), "ok: 2 shards, 2 samples, 1 shard not made yet\n");
     for (arguments, file) in
         [(vec!["show", path], "contact-sheet.png"), (vec!["show", path, "1"], "sample-000001.png")]
     {

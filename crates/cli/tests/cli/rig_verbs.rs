@@ -123,3 +123,25 @@ fn what_would_be_done_is_told_without_a_rig() {
 fn is_empty(folder: &Path) -> bool {
     std::fs::read_dir(folder).unwrap().next().is_none()
 }
+
+/// A folder of another rig is refused by the keys that differ, not by two hashes.
+#[test]
+fn a_changed_rig_names_the_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("day");
+    let pull =
+        |more: &[&str]| run(&[&["rig", "pull", "-o", out.to_str().unwrap()], &nothing()[..], more].concat());
+    // Nobody answers, but the folder is made.
+    assert_code(&pull(&[]), 1);
+    let before = std::fs::read(out.join("run.json")).unwrap();
+    let other = pull(&["--set", "limits.pull_force_n=40"]);
+    assert_code(&other, 3);
+    let said = text(&other.stderr);
+    assert!(
+        said.contains("holds another run: rig.limits.pull_force_n is ") && said.contains(", 40.0 here"),
+        "{said}"
+    );
+    assert!(said.contains("hint: choose another folder"), "{said}");
+    assert_eq!(std::fs::read(out.join("run.json")).unwrap(), before);
+    assert_code(&pull(&[]), 1);
+}

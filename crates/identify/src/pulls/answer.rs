@@ -22,6 +22,7 @@ use crate::diagnosis::{
 };
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::columns::covariates;
+use gripgen_twin::rounded;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
@@ -290,7 +291,8 @@ pub(super) fn insufficient(data: &PullData<'_>) -> Option<String> {
     let ratio = ratios[n / 2];
     if !(0.004..=4.0).contains(&ratio) {
         return Some(format!(
-            "the labels are {ratio:.3e} times twice the grip force, which no gel does (0.004 to 4): are all forces in newtons, per jaw?"
+            "the labels are {} times twice the grip force, which no gel does (0.004 to 4): are all forces in newtons, per jaw?",
+            rounded(ratio, &[0.004, 4.0])
         ));
     }
     None

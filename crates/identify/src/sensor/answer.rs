@@ -14,6 +14,7 @@ use crate::diagnosis::{
     Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, Rival, UnknownCovariate,
 };
 use gripgen_twin::effects::{EffectSpec, FORCE_RATE};
+use gripgen_twin::rounded;
 
 /// A group of rows with what was predicted from the other blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -306,8 +307,9 @@ fn plausible(prepared: &Prepared, gains: &[f64]) -> Result<(), String> {
     let gain = sizes[sizes.len() / 2];
     if !(4e-3..=250.0).contains(&gain) {
         return Err(format!(
-            "the measured column is {gain:.3e} times the reference: one of them is in another unit (a factor of \
-             1000?), or the sensor does not see this force"
+            "the measured column is {} times the reference: one of them is in another unit (a factor of \
+             1000?), or the sensor does not see this force",
+            rounded(gain, &[4e-3, 250.0])
         ));
     }
     Ok(())

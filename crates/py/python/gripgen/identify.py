@@ -69,12 +69,15 @@ def diagnose(
     out: _Path | None = None,
     report: _Path | None = None,
     set: Mapping[str, Any] | None = None,
+    force: bool = False,
 ) -> Diagnosis:
     """Find what the twin cannot explain of measured pulls, force-sensor tables or presses.
 
-    `out` is the twin to write, `report` the HTML page. See docs/diagnosis.md.
+    `out` is the twin to write, `report` the HTML page. Files of an earlier diagnosis are replaced, others with `force`
+    only (docs/outputs.md). See docs/diagnosis.md.
     """
-    found = _verb(["diagnose"], measured, twin, out, set, ["--report", os.fspath(report)] if report else [])
+    more = (["--report", os.fspath(report)] if report else []) + (["--force"] if force else [])
+    found = _verb(["diagnose"], measured, twin, out, set, more)
     return Diagnosis(
         verdict=found["verdict"],
         effects=found.get("effects", []),
@@ -94,12 +97,15 @@ def calibrate(
     law: str | None = None,
     fit: Sequence[str] = (),
     set: Mapping[str, Any] | None = None,
+    force: bool = False,
 ) -> Calibration:
     """Fit the baseline of a twin to measured pulls and write the new twin to `out`.
 
-    `law="offset"` fits the paper's mu (a + b / F_G) for each part, `fit` names effects to fit beside the baseline.
+    `law="offset"` fits the paper's mu (a + b / F_G) for each part, `fit` names effects to fit beside the baseline. A twin of
+    an earlier calibration is replaced, any other file with `force` only (docs/outputs.md).
     """
     more = (["--law", law] if law else []) + (["--fit", ",".join(fit)] if fit else [])
+    more += ["--force"] if force else []
     found = _verb(["calibrate", "pulls"], measured, twin, out, set, more)
     return Calibration(baseline=found["baseline"], data=found, twin=os.fspath(out))
 

@@ -3,6 +3,8 @@
 use super::documents::{SHARD_SCHEMA, Sidecar, json};
 use super::{FolderError, RunFolder, hash_file, io_at};
 use crate::index::INDEX_COLUMNS;
+use crate::shard::ShardError;
+use mcap::McapError;
 use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -34,8 +36,20 @@ impl PartialShard {
         self.file.try_clone().map_err(io_at(&self.path))
     }
 
-    /// Removes the file; nothing was written into it.
-    pub(crate) fn give_up(self) -> Result<(), FolderError> {
+    /// What went wrong while this file was written. Where the system said it, the file is named.
+    pub fn blame<E: From<FolderError> + From<ShardError>>(&self, e: ShardError) -> E {
+        match e {
+            ShardError::Mcap(McapError::Io(source)) => self.error(source).into(),
+            other => other.into(),
+        }
+    }
+
+    /// Removes the file; nothing in it is of use.
+    ///
+    /// # Errors
+    ///
+    /// What the system says of the file.
+    pub fn give_up(self) -> Result<(), FolderError> {
         std::fs::remove_file(&self.path).map_err(io_at(&self.path))
     }
 

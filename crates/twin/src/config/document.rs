@@ -98,6 +98,10 @@ impl Document {
             e.place.get_or_insert_with(|| Box::new(place.clone()));
             e
         })?;
+        // What stood below the key in the file is gone, and so are the places of it.
+        let below =
+            |known: &str| known.strip_prefix(&resolved).is_some_and(|rest| rest.starts_with(['.', '[']));
+        self.places.retain(|known, _| !below(known));
         self.places.insert(resolved, place);
         Ok(())
     }
@@ -306,6 +310,16 @@ mod tests {
             let e = d.set(key, "1").unwrap_err();
             assert!(e.problem.contains(part), "{key}: {e}");
         }
+    }
+
+    #[test]
+    fn what_an_override_replaced_has_its_place_on_the_command_line() {
+        let mut d = Document::parse("f.toml", TEXT).unwrap();
+        d.set("e", "[{ name = \"z\", v = 3 }]").unwrap();
+        for key in ["e", "e[0]", "e[0].v", "e[0].name", "e[1].v"] {
+            assert_eq!(place(&d, key).1, "e=[{ name = \"z\", v = 3 }]", "{key}");
+        }
+        assert_eq!(place(&d, "a.b"), (Some((3, 5)), "\"x\"".into()), "the rest keeps its place");
     }
 
     #[test]

@@ -2,30 +2,38 @@
 
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, write_file};
+use crate::mark::Format;
+use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, Verdict};
 use gripgen::record::campaign_toml;
-use gripgen::{Diagnosed, Location, NextPulls, diagnosis_page, write_twin};
+use gripgen::{Diagnosed, Location, NextPulls, diagnosis_page, edited_twin_toml};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Twin, report, JSON, and a summary for people.
-pub fn write(args: &DiagnoseArgs, mut sink: JsonSink, mut diagnosed: Diagnosed) -> Result<u8, Failure> {
+pub fn write(
+    args: &DiagnoseArgs,
+    outputs: &Outputs,
+    mut sink: JsonSink,
+    mut diagnosed: Diagnosed,
+) -> Result<u8, Failure> {
     if diagnosed.report.title.is_empty() {
         diagnosed.report.title = args.measured.display().to_string();
     }
-    let next = write_next(args, &mut diagnosed)?;
+    let next = write_next(args, outputs, &mut diagnosed)?;
     if let Some(report) = &args.report {
-        write_file(report, diagnosis_page(&diagnosed).as_bytes())?;
+        outputs.write(report, Format::Html, diagnosis_page(&diagnosed).as_bytes())?;
     }
     if sink.wanted() {
         let value = serde_json::to_value(&diagnosed.diagnosis).map_err(Failure::new)?;
         sink.document(&value)?;
     }
     if let Some(out) = &args.out {
-        write_twin(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out).map_err(Failure::new)?;
+        let text = edited_twin_toml(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out);
+        outputs.write(out, Format::Toml, text.map_err(Failure::new)?.as_bytes())?;
     }
-    if !sink.on_stdout() {
+    if !sink.on_stdout() && !args.talk.quiet {
         print(&summary(&diagnosed.diagnosis))?;
     }
     if !args.talk.quiet {
@@ -39,30 +47,32 @@ pub fn write(args: &DiagnoseArgs, mut sink: JsonSink, mut diagnosed: Diagnosed) 
     Ok(0)
 }
 
-/// First words of the comment of a campaign that a diagnosis planned.
-const PLANNED_BY: &str = "Planned by `gripgen diagnose`";
-
 /// The campaign that separates what is tied, beside the twin, the JSON or the report. Nobody's own file is written over.
-fn write_next(args: &DiagnoseArgs, diagnosed: &mut Diagnosed) -> Result<Option<PathBuf>, Failure> {
+fn write_next(
+    args: &DiagnoseArgs,
+    outputs: &Outputs,
+    diagnosed: &mut Diagnosed,
+) -> Result<Option<PathBuf>, Failure> {
     let beside = [
         args.out.as_deref(),
         args.json.json.as_deref().filter(|p| *p != "-").map(Path::new),
         args.report.as_deref(),
     ];
-    let (Some(next), Some(beside)) = (&diagnosed.next, beside.into_iter().flatten().next()) else {
-        return Ok(None);
-    };
+    let Some(beside) = beside.into_iter().flatten().next() else { return Ok(None) };
     let path = beside.with_file_name("next.toml");
-    let own = std::fs::read_to_string(&path).map_or(true, |text| text.contains(PLANNED_BY));
-    if !own {
+    let Some(next) = &diagnosed.next else {
+        // Those of an earlier diagnosis hold no longer.
+        return outputs.remove_own(&path).map(|()| None);
+    };
+    if outputs.judge(&path).is_err() {
         let note = format!(
-            "{} is not of a diagnosis and was left alone: the next pulls were not written",
+            "{} is not of a diagnosis, or was edited, and was left alone: the next pulls were not written",
             path.display()
         );
         diagnosed.diagnosis.notes.push(note);
         return Ok(None);
     }
-    write_file(&path, next_toml(next, &args.measured).as_bytes())?;
+    outputs.write(&path, Format::Toml, next_toml(next, &args.measured).as_bytes())?;
     let own = diagnosed.diagnosis.effects.iter_mut().filter(|e| next.separates(&e.name));
     for separate in own.filter_map(|e| e.separate_by.as_mut()) {
         separate.campaign = Some(path.display().to_string());
@@ -73,7 +83,7 @@ fn write_next(args: &DiagnoseArgs, diagnosed: &mut Diagnosed) -> Result<Option<P
 /// The text of the next pulls.
 pub fn next_toml(next: &NextPulls, measured: &Path) -> String {
     let about = format!(
-        "{PLANNED_BY} of {}.\n{}.\nKeys are described in docs/format.md. Run it with `gripgen rig pull`.",
+        "Planned by `gripgen diagnose` of {}.\n{}.\nKeys are described in docs/format.md. Run it with `gripgen rig pull`.",
         measured.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
         next.text(),
     );

@@ -4,6 +4,7 @@ use super::load::load_rig;
 use crate::args::RigCheckArgs;
 use crate::failure::{Failure, code};
 use crate::output::{JsonSink, print, size};
+use crate::outputs::Outputs;
 use gripgen_rig::experiment::check::{CheckLine, check, check_force};
 use serde_json::{Value, json};
 
@@ -12,8 +13,9 @@ const MIN_FREE: u64 = 2_000_000_000;
 
 /// Runs the verb.
 pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
+    let mut outputs = Outputs::of("rig check", args.json.force).reads_config(&args.rig, &args.set);
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&args.rig, &args.set)?;
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let (on_stdout, mut lines) = (sink.on_stdout(), Vec::new());
     let mut failed = Ok(());
     let mut tell = |line: CheckLine| {

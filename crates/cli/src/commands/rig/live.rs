@@ -3,7 +3,7 @@
 use super::record::Standing;
 use crate::args::TalkArgs;
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, program};
+use crate::output::{JsonSink, count, print, program};
 use crate::progress::Progress;
 use gripgen::twin::PlannedPull;
 use gripgen_rig::experiment::pull::ExecutedPull;
@@ -135,7 +135,10 @@ impl Live {
             return Ok(());
         }
         if failed > 0 {
-            self.say(&format!("{failed} pulls have no label; the same command makes them again"));
+            self.say(&format!(
+                "without a label: {}; the same command makes what is missing",
+                count(failed as u64, "pull")
+            ));
         }
         print(&format!("{}\n", folder.display()))?;
         if complete {

@@ -5,15 +5,16 @@ use super::load::load_rig;
 use super::record::{Standing, rig_pull, suspect};
 use super::standing::CampaignClock;
 use crate::args::RigPullArgs;
-use crate::failure::{Failure, code};
+use crate::failure::{Failure, another_run, code};
 use crate::interrupt::stop_flag;
-use crate::output::{JsonSink, print, program};
+use crate::output::{JsonSink, count, duration, print, program};
+use crate::outputs::Outputs;
 use gripgen::record::{
-    RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls, read_campaign,
-    write_rig_pull,
+    FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls,
+    read_campaign, write_rig_pull,
 };
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
-use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_toml};
+use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_differences, rig_run_toml};
 use gripgen_rig::experiment::plan::pull_program;
 use gripgen_rig::experiment::prepare::Permit;
 use gripgen_rig::experiment::pull::ExecutedPull;
@@ -35,15 +36,20 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
         Failure::usage(e).hint("nothing was sent and nothing moved; the limits stand in the rig's file and in the device's data sheet")
     })?;
     let pulls: Vec<&PlannedPull> = campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).collect();
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let out = folder_of(args);
+    let mut outputs = Outputs::of("rig pull", args.json.force)
+        .reads_config(&args.rig, &args.set)
+        .reads_all(&args.campaign)
+        .reads_all(&args.after)
+        .makes_run(&out);
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     if args.print_program {
         let Some(first) = pulls.first() else { return Ok(0) };
         let script = pull_program(&config, &campaign, first, 1).script().map_err(Failure::usage)?;
         return print(&script).map(|()| 0);
     }
     let minutes = campaign.estimated_minutes();
-    let words =
-        format!("{} pulls, about {} h {:02} min", pulls.len(), minutes as u64 / 60, minutes as u64 % 60);
+    let words = format!("{}, about {}", count(pulls.len() as u64, "pull"), duration(60.0 * minutes));
     if args.dry_run {
         sink.line(&json!({"event": "checked", "pulls": pulls.len(), "minutes": minutes}))?;
         if !sink.on_stdout() {
@@ -81,20 +87,34 @@ fn planned(args: &RigPullArgs, config: &RigConfig) -> Result<Campaign, Failure> 
     Ok(plain_campaign(parts, &args.grip_force_n, args.repetitions, args.seed))
 }
 
+fn name_of(args: &RigPullArgs) -> String {
+    let stem = args.campaign.as_ref().and_then(|path| path.file_stem());
+    stem.map_or("rig".into(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// The run folder.
+fn folder_of(args: &RigPullArgs) -> PathBuf {
+    args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(name_of(args)))
+}
+
 fn open_folder(
     args: &RigPullArgs,
     config: &RigConfig,
     campaign: &Campaign,
     pulls: u64,
 ) -> Result<RunFolder, Failure> {
-    let name = match &args.campaign {
-        Some(path) => path.file_stem().map_or("rig".into(), |stem| stem.to_string_lossy().into_owned()),
-        None => "rig".into(),
-    };
-    let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&name));
+    let (name, out) = (name_of(args), folder_of(args));
     let config_toml = rig_run_toml(config, campaign).map_err(Failure::new)?;
     let info = RigRunInfo { name, gripgen_version: VERSION.into(), config_toml, pulls };
-    Ok(create_rig_run(&out, &info)?)
+    create_rig_run(&out, &info).map_err(|e| match &e {
+        FolderError::AnotherRun { what: "config_sha256", .. } => {
+            match rig_run_differences(&out, &info.config_toml) {
+                Some(keys) => another_run(&format!("{} holds another run: {keys}", out.display())),
+                None => e.into(),
+            }
+        }
+        _ => e.into(),
+    })
 }
 
 /// Pulls that are missing or failed.

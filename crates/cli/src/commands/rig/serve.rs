@@ -5,7 +5,9 @@ use super::teach::taught;
 use crate::args::RigServeArgs;
 use crate::failure::Failure;
 use crate::interrupt::stop_flag;
-use crate::output::{JsonSink, print, writable, write_file};
+use crate::mark::Format;
+use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use gripgen::{Location, TwinPlant};
 use gripgen_rig::camera::CameraView;
 use gripgen_rig::program::TcpPose;
@@ -27,7 +29,9 @@ const LOOK: Duration = Duration::from_millis(100);
 
 /// Runs the verb.
 pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
+    let mut outputs = Outputs::of("rig serve", args.json.force).reads_config(&args.twin, &args.set);
+    outputs.allow_all(args.write_rig.as_deref())?;
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let plant = TwinPlant::open(&Location::parse(&args.twin), &args.set, args.seed)?;
     let tcp = begin_at(args, &plant)?;
     let fixtures: Vec<(String, TcpPose)> = plant
@@ -35,9 +39,6 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
         .iter()
         .map(|f| (f.part.clone(), TcpPose::from_base_from_tool(&f.base_from_tool)))
         .collect();
-    if let Some(path) = &args.write_rig {
-        writable(path)?;
-    }
     let options = ServeOptions {
         addresses: addresses(args),
         clock_rate: args.speed,
@@ -50,7 +51,7 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     let addresses = rig.addresses();
     // Before the line that says ready: who waits for that line finds the file.
     if let Some(path) = &args.write_rig {
-        write_file(path, rig_toml(&addresses, &fixtures)?.as_bytes())?;
+        outputs.write(path, Format::Toml, rig_toml(&addresses, &fixtures)?.as_bytes())?;
     }
     if sink.wanted() {
         let of = |(what, address): (&str, SocketAddr)| (what.to_string(), json!(address.to_string()));

@@ -3,7 +3,8 @@
 use super::load::load_rig;
 use crate::args::RigTeachArgs;
 use crate::failure::Failure;
-use crate::output::{JsonSink, print, write_file};
+use crate::output::{JsonSink, print};
+use crate::outputs::Outputs;
 use gripgen::twin::config::Document;
 use gripgen_rig::experiment::RigConfig;
 use gripgen_rig::experiment::check::read_pose;
@@ -14,8 +15,10 @@ use toml_edit::{Array, DocumentMut, Item, Table, value};
 /// Runs the verb.
 pub fn run(args: &RigTeachArgs) -> Result<u8, Failure> {
     let path = args.rig.display().to_string();
+    // The rig's file is read and changed in its place: that is what it is for. All else is left alone.
+    let mut outputs = Outputs::of("rig teach", args.json.force).reads_config(&path, &args.set);
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&path, &args.set)?;
-    let mut sink = JsonSink::open(args.json.json.as_deref())?;
     let pose = read_pose(&config)
         .map_err(|e| Failure::new(e).hint("`gripgen rig check` says which devices answer"))?;
     if let Some((axis, value_mm, low_mm, high_mm)) = outside_workspace(&config, &pose) {
@@ -30,7 +33,7 @@ pub fn run(args: &RigTeachArgs) -> Result<u8, Failure> {
     let text = document.to_string();
     // What was written is read once more before it replaces the file.
     RigConfig::read(&Document::parse(&path, &text)?)?;
-    write_file(&args.rig, text.as_bytes())?;
+    outputs.edit(&args.rig, text.as_bytes())?;
     let [x, y, z] = pose.position_m.map(|m| 1e3 * m);
     if sink.wanted() {
         sink.document(&json!({"name": args.name, "base_from_tool": pose.numbers(), "replaced": replaced}))?;

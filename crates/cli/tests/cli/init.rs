@@ -1,0 +1,63 @@
+//! `gripgen init`.
+
+use super::{assert_code, run, text};
+
+#[test]
+fn init_gives_something_that_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path().join("start");
+    let output = run(&["init", at.to_str().unwrap()]);
+    assert_code(&output, 0);
+    assert_eq!(text(&output.stdout).lines().count(), 2);
+    assert_code(&run(&["check", at.join("sweep.toml").to_str().unwrap()]), 0);
+    let again = run(&["init", at.to_str().unwrap()]);
+    assert_code(&again, 2);
+    assert!(text(&again.stderr).contains("--force"));
+    assert_code(&run(&["init", at.to_str().unwrap(), "--force"]), 0);
+    // A file that is no mesh becomes no folder, nor does one that is not there.
+    for (name, there) in [("part.ply", false), ("part.step", true)] {
+        let file = folder.path().join(name);
+        if there {
+            std::fs::write(&file, "solid?").unwrap();
+        }
+        for more in [&[][..], &["-o", at.to_str().unwrap()]] {
+            let refused = run(&[&["init", file.to_str().unwrap()], more].concat());
+            assert_code(&refused, 2);
+            assert!(text(&refused.stderr).contains("STL or OBJ"), "{}", text(&refused.stderr));
+            assert!(!file.is_dir(), "{name}");
+        }
+    }
+    let version = folder.path().join("v1.2");
+    assert_code(&run(&["init", version.to_str().unwrap()]), 0);
+}
+
+#[test]
+fn init_with_a_mesh_proposes_grips_that_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("My Gear.STL");
+    std::fs::write(&mesh, gripgen::assets::get("parts/gear/part.stl").unwrap()).unwrap();
+    let at = folder.path().join("gear");
+    let output = run(&["init", mesh.to_str().unwrap(), "-o", at.to_str().unwrap()]);
+    assert_code(&output, 0);
+    assert!(text(&output.stderr).contains("33.0") && text(&output.stderr).contains("grip 0"));
+    assert_eq!(&std::fs::read(at.join("grips.png")).unwrap()[..4], b"\x89PNG");
+    let check = run(&["check", at.join("sweep.toml").to_str().unwrap()]);
+    assert_code(&check, 0);
+    let again = run(&["init", mesh.to_str().unwrap(), "-o", at.to_str().unwrap(), "--force", "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(json["files"].as_array().unwrap().len(), 3);
+    assert!(json["grips"][0]["contact_mm2"].as_f64().unwrap() > 10.0);
+    assert_code(&run(&["init", mesh.to_str().unwrap(), "--scale-mm-per-unit", "0"]), 2);
+
+    let inches = run(&[
+        "init",
+        mesh.to_str().unwrap(),
+        "-o",
+        at.to_str().unwrap(),
+        "--scale-mm-per-unit",
+        "1000",
+        "--force",
+    ]);
+    assert_code(&inches, 2);
+    assert!(text(&inches.stderr).contains("33000") && text(&inches.stderr).contains("hint:"));
+}
