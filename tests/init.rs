@@ -112,16 +112,27 @@ fn both_mechanics_agree_where_the_part_is_not_convex() {
         let scatter = format!("parts.{}.scatter", part.name);
         let sets = |mechanics| [&quiet[..], &[("mechanics", mechanics), (&scatter, "0")]].concat();
         let (rapier, reduced) = (load(folder.path(), &sets("rapier")), load(folder.path(), &sets("reduced")));
+        let mut compared = 0;
         for index in 0..12 {
             let (Ok(a), Ok(b)) = (pulled(&rapier, index), pulled(&reduced, index)) else {
                 panic!("{}, sample {index}: {:?}", part.name, pulled(&rapier, index).err());
             };
+            // Grips by the edge of a pad are apart: the engine's pad meets the slope beside it.
+            let by_the_edge = b.imprint.iter().any(|(jaw, imprint)| {
+                let (gel, (x, y)) = (&reduced.twin.gel[jaw], imprint.patch.centre_m());
+                x.abs() > 0.3 * gel.width_m || y.abs() > 0.3 * gel.height_m
+            });
+            if by_the_edge {
+                continue;
+            }
+            compared += 1;
             let force_n = rapier.sweep.scenario(index, &rapier.twin).0.grip_force_n;
             let limit_n = 2.0 * 0.15 * force_n;
             let (x, y) = (a.label.max_pull_force_n, b.label.max_pull_force_n);
             assert!((x / y - 1.0).abs() < 0.01, "{}, sample {index}: {x} N and {y} N", part.name);
             assert!((x / limit_n - 1.0).abs() < 0.005, "{}, sample {index}: {x} N of {limit_n} N", part.name);
         }
+        assert!(compared >= 6, "{}: {compared} of 12 compared", part.name);
     }
 }
 
