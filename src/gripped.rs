@@ -307,3 +307,12 @@ pub(crate) fn placed_parts(
         PlacedPart { mesh: mesh.clone(), gel_from_mesh, imprint_m3_per_n, force_n: force_n[jaw] }
     }))
 }
+
+/// Grips and presses as a sample does, without images and pull: whether the jaws hold the part. Jaws stop at the surface in both
+/// mechanics, so the reduced one answers for both.
+pub(crate) fn try_grip(twin: &Twin, library: &Library, scenario: &Scenario) -> Result<bool, SampleError> {
+    let force_n = jaw_forces_n(twin, scenario)?;
+    let Some(held) = held(twin, library, scenario, force_n, Mechanics::Reduced)? else { return Ok(false) };
+    let press = Indenter::new(twin, library, scenario, &force_n, &held.grasp, SimdLevel::best())?;
+    press.imprints(None).map(|_| true)
+}

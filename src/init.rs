@@ -1,18 +1,51 @@
 //! Files to start from: commented configurations, and those for a part of one's own.
 
-mod antipodal;
 mod drawing;
+mod places;
+mod pose;
+mod propose;
+mod seen;
+mod text;
+mod trial;
 
 use crate::assets;
-use crate::library::LibraryError;
+use crate::library::{Library, LibraryError};
 use crate::location::Location;
 use crate::project::{BASELINE_TWIN, load_twin_document};
-pub use antipodal::Proposal;
-use antipodal::propose;
 use gripgen_physics::PartShape;
-use gripgen_twin::{TriMesh, Twin};
-use std::fmt::Write as _;
+use gripgen_twin::{MeshError, Part, TriMesh, Twin};
+use propose::Search;
+use std::collections::BTreeMap;
 use std::path::Path;
+pub use trial::Varied;
+
+/// Friction and imprint constant of a part of which nothing is known; `twin.toml` says so.
+const MU: f64 = 0.15;
+const IMPRINT_MM3_PER_N: f64 = 1.5;
+
+/// The smallest of the largest forces that a grip is tried with.
+const LEAST_FORCE_N: f64 = 10.0;
+
+/// A part smaller or larger than this is asked about its unit.
+const SMALL_MM: f64 = 8.0;
+const LARGE_MM: f64 = 2000.0;
+
+/// A grip proposed for a part, which worked wherever the sweep goes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposal {
+    /// As in `[[parts.NAME.grips]]`.
+    pub origin_mm: [f64; 3],
+    /// As in `[[parts.NAME.grips]]`.
+    pub orientation_deg: [f64; 3],
+    /// Distance between the gels where they first touch.
+    pub width_mm: f64,
+    /// Contact area of the jaw that has less of it, at 40 N or the largest force that fits.
+    pub contact_mm2: f64,
+    /// Distance of the middle of mass from the jaw axis.
+    pub lever_mm: f64,
+    /// How much lower than the contact the part lies beside the pads; negative where it rises towards a finger.
+    pub clearance_mm: f64,
+}
 
 /// A file that `init` writes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,8 +63,76 @@ pub struct PartStarter {
     pub files: Vec<StarterFile>,
     /// The grips proposed, the best first.
     pub grips: Vec<Proposal>,
+    /// What the sweep varies beside the grip.
+    pub varied: Varied,
+    /// What is to be said of the mesh, a sentence each.
+    pub mesh_words: Vec<String>,
     /// Size of the part and the grips found, a line each.
     pub summary: String,
+}
+
+/// Why a part has no grip.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoGrip {
+    /// The jaws do not open far enough.
+    #[error(
+        "the part is too wide: its narrowest place measures {narrowest_mm:.1} mm, the jaws open to {opening_mm:.0} mm and \
+         take {largest_mm:.1} mm"
+    )]
+    TooWide {
+        /// Narrowest place.
+        narrowest_mm: f64,
+        /// Opening of the gripper.
+        opening_mm: f64,
+        /// Widest grip.
+        largest_mm: f64,
+    },
+    /// No surfaces face each other.
+    #[error(
+        "the part is too round or too steep: where a gel rests its surface is inclined by {least_deg:.1} degrees or more, \
+         friction holds up to {allowed_deg:.1} degrees"
+    )]
+    TooSteep {
+        /// Smallest inclination found.
+        least_deg: f64,
+        /// Largest inclination that is proposed.
+        allowed_deg: f64,
+    },
+    /// The part presses through the gel.
+    #[error(
+        "the part is too small or too pointed, it presses through the gel: {force_n:.0} N need an imprint of {wanted_mm3:.1} \
+         mm3, the best place has {available_mm3:.1} mm3 before the gel is pressed through"
+    )]
+    TooDeep {
+        /// Smallest force tried.
+        force_n: f64,
+        /// Volume that it needs.
+        wanted_mm3: f64,
+        /// Largest volume found.
+        available_mm3: f64,
+    },
+    /// Something of the part is always in a jaw's way.
+    #[error(
+        "the part reaches beyond the open jaws at each of {places} places: they open to {opening_mm:.0} mm, half of it on \
+         either side"
+    )]
+    Beyond {
+        /// Places looked at.
+        places: usize,
+        /// Opening of the gripper.
+        opening_mm: f64,
+    },
+    /// Grips that look good fail when they are tried.
+    #[error(
+        "none of {tried} grips works when it is tried as a sweep does, from {LEAST_FORCE_N:.0} N on: {failure}"
+    )]
+    AllFail {
+        /// Grips tried.
+        tried: usize,
+        /// Why the first failed.
+        failure: String,
+    },
 }
 
 /// Why there is nothing to start from.
@@ -44,11 +145,18 @@ pub enum InitError {
     /// The mesh file.
     #[error(transparent)]
     Read(#[from] crate::location::ReadFileError),
-    /// No pair of opposite surfaces fits between the jaws.
+    /// The mesh encloses no volume.
     #[error(
-        "{path}: no grip found: the part measures {x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm, the jaws open to \
-         {opening_mm:.0} mm and need two opposite surfaces"
+        "{path}: the mesh is open: {open_edges} edges belong to one triangle only, gels would sink into its holes"
     )]
+    Open {
+        /// The mesh file.
+        path: String,
+        /// Edges of one triangle only.
+        open_edges: usize,
+    },
+    /// No grip works.
+    #[error("{path}: no grip found on {x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm: {source}")]
     NoGrip {
         /// The mesh file.
         path: String,
@@ -58,9 +166,41 @@ pub enum InitError {
         y_mm: f64,
         /// Size along z.
         z_mm: f64,
-        /// Opening of the gripper.
-        opening_mm: f64,
+        /// Why.
+        source: NoGrip,
     },
+}
+
+impl InitError {
+    /// What to do about it.
+    pub fn hint(&self) -> String {
+        let sizes_mm = match self {
+            InitError::Mesh(LibraryError::Mesh {
+                source: MeshError::Extent { x_mm, y_mm, z_mm }, ..
+            })
+            | InitError::NoGrip { x_mm, y_mm, z_mm, .. } => [*x_mm, *y_mm, *z_mm],
+            InitError::Open { .. } => {
+                return "close its holes (Meshlab, Blender), or go on with --accept-open-mesh".into();
+            }
+            _ => return "export the part as STL or OBJ".into(),
+        };
+        unit_guess(sizes_mm).unwrap_or_else(|| {
+            "--scale-mm-per-unit 1000 reads a file in metres, 25.4 one in inches".to_string()
+        })
+    }
+}
+
+/// What the file's unit may be, of a part whose size is not that of a part.
+fn unit_guess(sizes_mm: [f64; 3]) -> Option<String> {
+    let largest = sizes_mm.iter().fold(0.0_f64, |a, &b| a.max(b));
+    let (unit, scale) = match largest {
+        x if x < 0.5 => ("metres", 1000.0),
+        x if x < SMALL_MM => ("inches", 25.4),
+        x if x > LARGE_MM => ("micrometres", 1e-3),
+        _ => return None,
+    };
+    let as_mm = largest * scale;
+    Some(format!("in {unit} the largest side would be {as_mm:.1} mm: --scale-mm-per-unit {scale}"))
 }
 
 /// A commented sweep and twin.
@@ -73,54 +213,102 @@ pub fn starter() -> Vec<StarterFile> {
         .to_vec()
 }
 
-/// A sweep, a twin with proposed grips, and a picture, for the mesh file at `path`.
+/// What `part_starter` is told beside the mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartOptions {
+    /// Millimetres per unit of the mesh file.
+    pub scale_mm_per_unit: f64,
+    /// Whether an open mesh is taken as it is.
+    pub accept_open_mesh: bool,
+    /// Threads to try grips with; the result does not depend on them.
+    pub threads: usize,
+}
+
+/// A sweep, a twin with grips that were tried, a picture and a copy of the mesh, for the mesh file at `path`.
 ///
 /// # Errors
 ///
-/// A file that is no mesh, or a part on which no grip is found.
-pub fn part_starter(path: &Path, folder: &Path, scale_mm_per_unit: f64) -> Result<PartStarter, InitError> {
+/// A file that is no mesh, a mesh that is open, or a part on which no grip works.
+pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<PartStarter, InitError> {
     let location = Location::Disk(path.into());
     let bytes = location.read()?;
-    let mesh = TriMesh::from_file_bytes(&bytes, location.extension(), scale_mm_per_unit * 1e-3)
+    let metres_per_unit = options.scale_mm_per_unit * 1e-3;
+    let mesh = TriMesh::from_file_bytes(&bytes, location.extension(), metres_per_unit)
         .map_err(|source| LibraryError::Mesh { location: location.clone(), source })?;
+    let look = mesh.look();
+    if !look.is_closed() && !options.accept_open_mesh {
+        return Err(InitError::Open { path: path.display().to_string(), open_edges: look.open_edges });
+    }
     // The contact shape is built now, so that a mesh without volume is refused here.
     PartShape::hull(&mesh, &gripgen_twin::frames::Pose::identity())
-        .map_err(|source| LibraryError::Shape { location, source })?;
-    let [x_mm, y_mm, z_mm] = mesh.extent_m().map(|s| s * 1e3);
+        .map_err(|source| LibraryError::Shape { location: location.clone(), source })?;
+    let size_mm = mesh.extent_m().map(|s| s * 1e3);
+    let [x_mm, y_mm, z_mm] = size_mm;
     let twin = baseline();
-    let proposals = propose(&mesh, &twin);
-    if proposals.is_empty() {
-        let opening_mm = twin.gripper.opening_m * 1e3;
-        return Err(InitError::NoGrip { path: path.display().to_string(), x_mm, y_mm, z_mm, opening_mm });
-    }
+    let part = Part {
+        mesh: path.display().to_string(),
+        metres_per_unit,
+        grips: vec![],
+        mu: MU,
+        kinetic_ratio: 1.0,
+        kinetic_fall_s: 0.0,
+        scatter: 0.0,
+        imprint_m3_per_n: IMPRINT_MM3_PER_N * 1e-9,
+    };
+    let of_part = Twin { parts: BTreeMap::from([("part".to_string(), part.clone())]), ..twin.clone() };
+    // Paths are relative to where the program was started.
+    let library = Library::of_twin(&of_part, &Location::Disk("twin.toml".into()))?;
+    let search = Search {
+        twin: &twin,
+        library: &library,
+        surface: library.surface(&part)?,
+        mesh: library.clustered_mesh(&part)?,
+        part,
+        closed: look.is_closed(),
+        threads: options.threads,
+    };
+    let proposed = search.run().map_err(|source| InitError::NoGrip {
+        path: path.display().to_string(),
+        x_mm,
+        y_mm,
+        z_mm,
+        source,
+    })?;
     let name = part_name(path);
+    let (mesh_name, copy) = mesh_reference(path, folder);
+    let size = format!("{x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm");
+    let (proposals, varied) = (&proposed.grips, &proposed.varied);
     let fill = |template: &str| {
         template
             .replace("{{part}}", &name)
-            .replace("{{mesh}}", &mesh_reference(path, folder))
-            .replace("{{scale_mm_per_unit}}", &format!("{scale_mm_per_unit:?}"))
-            .replace("{{size}}", &format!("{x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm"))
-            .replace("{{grips}}", &grips_toml(&name, &proposals))
-            .replace("{{grip_poses}}", &pose_list(proposals.len()))
+            .replace("{{mesh}}", &mesh_name)
+            .replace("{{scale_mm_per_unit}}", &format!("{:?}", options.scale_mm_per_unit))
+            .replace("{{size}}", &size)
+            .replace("{{mu}}", &format!("{MU:?}"))
+            .replace("{{imprint_mm3_per_n}}", &format!("{IMPRINT_MM3_PER_N:?}"))
+            .replace("{{grips}}", &text::grips_toml(&name, proposals))
+            .replace("{{grip_poses}}", &text::pose_list(proposals.len()))
+            .replace("{{grip_force_n}}", &text::numbers(&[varied.grip_force_n.0, varied.grip_force_n.1]))
+            .replace("{{grip_offset_sd_mm}}", &format!("{:?}", varied.grip_offset_sd_mm))
+            .replace("{{grip_angle_deg}}", &text::numbers(&varied.grip_angle_deg))
+            .replace("{{narrowed}}", &text::narrowed_comment(&proposed))
             .into_bytes()
     };
-    let files = vec![
+    let mut files = vec![
         StarterFile { name: "sweep.toml".into(), bytes: fill(assets::text("templates/part-sweep.toml")) },
         StarterFile { name: "twin.toml".into(), bytes: fill(assets::text("templates/part-twin.toml")) },
-        StarterFile { name: "grips.png".into(), bytes: drawing::grips_picture(&name, &mesh, &proposals) },
+        StarterFile { name: "grips.png".into(), bytes: drawing::grips_picture(&name, &mesh, proposals) },
     ];
-    let mut summary =
-        format!("{name}: {x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm, {} grips proposed\n", proposals.len());
-    for (i, p) in proposals.iter().enumerate() {
-        let [ox, oy, oz] = p.origin_mm.map(|x| (x * 10.0).round() / 10.0 + 0.0);
-        let _ = writeln!(
-            summary,
-            "grip {i}: {:.1} mm between the jaws at [{ox:.1}, {oy:.1}, {oz:.1}] mm, {:.0} mm2 in contact at 40 N",
-            p.width_mm, p.contact_mm2
-        );
+    if copy {
+        files.push(StarterFile { name: mesh_name, bytes: bytes.into_owned() });
     }
-    summary += "look at grips.png; friction and imprint constant in twin.toml are assumptions\n";
-    Ok(PartStarter { files, grips: proposals, summary })
+    let mut mesh_words = look.words();
+    mesh_words.extend(
+        unit_guess(size_mm)
+            .map(|guess| format!("the part measures {size}; {guess}, if the file is not in mm")),
+    );
+    let summary = text::summary(&name, &size, &mesh_words, &proposed);
+    Ok(PartStarter { files, grips: proposed.grips, varied: proposed.varied, mesh_words, summary })
 }
 
 /// The rig that grips are proposed for.
@@ -138,26 +326,14 @@ fn part_name(path: &Path) -> String {
     if name.is_empty() { "part".into() } else { name }
 }
 
-/// How the twin in `folder` names the mesh: relative where they lie together, absolute elsewhere.
-fn mesh_reference(path: &Path, folder: &Path) -> String {
-    let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_path_buf());
-    let (path, folder) = (absolute(path), absolute(folder));
-    path.strip_prefix(&folder).unwrap_or(&path).to_string_lossy().replace('\\', "/")
-}
-
-fn grips_toml(part: &str, proposals: &[Proposal]) -> String {
-    let mut text = String::new();
-    for (i, p) in proposals.iter().enumerate() {
-        let _ = write!(
-            text,
-            "[[parts.{part}.grips]]     # grip_pose = {i}: {:.1} mm between the jaws\norigin_mm = {:?}\norientation_deg = {:?}\n\n",
-            p.width_mm, p.origin_mm, p.orientation_deg
-        );
+/// How the twin in `folder` names the mesh, and whether the file has to be copied there.
+fn mesh_reference(path: &Path, folder: &Path) -> (String, bool) {
+    let whole = |p: &Path| {
+        std::fs::canonicalize(p).or_else(|_| std::path::absolute(p)).unwrap_or_else(|_| p.to_path_buf())
+    };
+    if let Ok(inside) = whole(path).strip_prefix(whole(folder)) {
+        return (inside.to_string_lossy().replace('\\', "/"), false);
     }
-    text.trim_end().to_string()
-}
-
-fn pose_list(n: usize) -> String {
-    let poses: Vec<String> = (0..n).map(|i| i.to_string()).collect();
-    format!("[{}]", poses.join(", "))
+    let extension = path.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
+    (format!("{}.{extension}", part_name(path)), true)
 }

@@ -108,7 +108,9 @@ pub use gripgen_twin as twin;
 pub use imprint::{
     CalibrateImprintsError, ImprintCalibration, ImprintCalibrations, ImprintImagesError, calibrate_imprints,
 };
-pub use init::{InitError, PartStarter, Proposal, StarterFile, part_starter, starter};
+pub use init::{
+    InitError, NoGrip, PartOptions, PartStarter, Proposal, StarterFile, Varied, part_starter, starter,
+};
 pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError};
@@ -120,7 +122,7 @@ pub use picture::{
     CONTACT_SHEET, PictureSampleError, contact_sheet, contact_sheet_samples, publish_contact_sheet,
     sample_picture,
 };
-pub use plan::{Plan, Probe, plan};
+pub use plan::{Plan, Probe, TriedGrip, plan};
 pub use plant::{Fixture, OpenPlantError, TwinPlant};
 pub use predict::PullPredictor;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};

@@ -3,7 +3,7 @@
 use crate::cache::Cache;
 use crate::location::{Location, ReadFileError};
 use crate::resolve::Files;
-use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, UrdfError};
+use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, Surface, UrdfError};
 use gripgen_record::{decode_picture, sha256_hex};
 use gripgen_tactile::{ClusteredMesh, Sensor, SensorError, SensorFiles};
 use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh, Twin};
@@ -21,6 +21,7 @@ pub struct Library {
     files: Files,
     meshes: Cache<(String, u64), TriMesh>,
     clustered: Cache<(String, u64), ClusteredMesh>,
+    surfaces: Cache<(String, u64), Arc<Surface>>,
     shapes: Cache<(String, u64, [u64; 7]), PartShape>,
     arms: Cache<RobotArm, PlacedArm>,
     sensors: Cache<SensorKey, Sensor>,
@@ -152,6 +153,7 @@ impl Library {
             files,
             meshes: Cache::new(MESHES),
             clustered: Cache::new(MESHES),
+            surfaces: Cache::new(MESHES),
             shapes: Cache::new(SHAPES),
             arms: Cache::new(ARMS),
             sensors: Cache::new(SENSORS),
@@ -197,6 +199,13 @@ impl Library {
         self.clustered.get(key, || Ok(ClusteredMesh::new(&*self.mesh(part)?)))
     }
 
+    /// The surface of a part, prepared for what its jaws meet.
+    pub(crate) fn surface(&self, part: &Part) -> Result<Arc<Surface>, LibraryError> {
+        let key = (part.mesh.clone(), part.metres_per_unit.to_bits());
+        let make = || Ok::<_, LibraryError>(Arc::new(Surface::new(self.mesh(part)?)));
+        Ok((*self.surfaces.get(key, make)?).clone())
+    }
+
     /// The contact shape of a part in one of its grips, in the part frame.
     ///
     /// # Errors
@@ -207,9 +216,9 @@ impl Library {
         let (t, q) = (pose.translation.vector, pose.rotation.coords);
         let bits = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits);
         self.shapes.get((part.mesh.clone(), part.metres_per_unit.to_bits(), bits), || {
-            let mesh = self.mesh(part)?;
+            let surface = self.surface(part)?;
             let (location, _) = self.file(&part.mesh)?;
-            PartShape::hull(&mesh, pose)
+            PartShape::of_surface(surface, pose)
                 .map_err(|source| LibraryError::Shape { location: location.clone(), source })
         })
     }

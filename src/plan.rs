@@ -1,15 +1,23 @@
-//! What a sweep will be: size, time, and whether its first samples work.
+//! What a sweep will be: size, time, and whether its first samples and its outermost grips work.
 
+use crate::generate::drawn_scenario;
+use crate::gripped::try_grip;
 use crate::project::Project;
+use crate::sample::SampleError;
 use crate::sweep::{SweepError, encode_options, guarded};
 use gripgen_record::encode;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::Outcome;
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// Samples that a plan tries out.
 const PROBES: u64 = 6;
+
+/// Samples among which the outermost grips are looked for, and grips that are tried.
+const LOOKED_AT: u64 = 20_000;
+const TRIED: usize = 96;
 
 /// A sweep before it is run.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +32,23 @@ pub struct Plan {
     pub estimated_cpu: Duration,
     /// Samples tried out.
     pub probes: Vec<Probe>,
+    /// Outermost grips of each part and pose that were tried.
+    pub grips: Vec<TriedGrip>,
+    /// Parts whose mesh has holes, and its open edges.
+    pub open_meshes: Vec<(String, usize)>,
+}
+
+/// A grip of a part, at the ends of what the sweep draws for it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TriedGrip {
+    /// The part.
+    pub part: String,
+    /// Which of its grips.
+    pub grip_pose: usize,
+    /// Samples whose grip was tried.
+    pub tried: usize,
+    /// Samples whose grip fails or misses the part, and why.
+    pub failed: Vec<(u64, String)>,
 }
 
 /// A sample that was tried out.
@@ -75,5 +100,71 @@ pub fn plan(project: &Project, simd: SimdLevel) -> Result<Plan, SweepError> {
         estimated_bytes: (bytes as f64 * share) as u64,
         estimated_cpu: start.elapsed().mul_f64(share),
         probes: tried,
+        grips: outermost_grips(project),
+        open_meshes: open_meshes(project),
     })
+}
+
+/// Force, offset and angle of a sample.
+type Place = [f64; 3];
+
+/// Tries the grips of the samples that lie farthest out: largest and smallest force, offset and angle of each part and pose. The
+/// samples are those of the sweep; they are gripped and pressed in, without images and pull.
+fn outermost_grips(project: &Project) -> Vec<TriedGrip> {
+    let mut drawn: BTreeMap<(String, usize), Vec<(u64, Place)>> = BTreeMap::new();
+    for index in 0..project.sweep.samples.min(LOOKED_AT) {
+        let scenario = drawn_scenario(project, index);
+        let c = &scenario.covariates;
+        let place = [scenario.grip_force_n, c.grip_offset_m, c.grip_angle_rad];
+        drawn.entry((scenario.part, scenario.grip_pose)).or_default().push((index, place));
+    }
+    let each = (TRIED / drawn.len().max(1)).max(1);
+    let of_grip = |((part, grip_pose), samples): ((String, usize), Vec<(u64, Place)>)| {
+        let tried: Vec<u64> = corners(&samples).into_iter().take(each).collect();
+        let outcome = |&index: &u64| match grips(project, index) {
+            Ok(true) => None,
+            Ok(false) => Some((index, "the jaws miss the part".to_string())),
+            Err(e) => Some((index, e.to_string())),
+        };
+        TriedGrip { part, grip_pose, tried: tried.len(), failed: tried.iter().filter_map(outcome).collect() }
+    };
+    drawn.into_iter().map(of_grip).collect()
+}
+
+fn grips(project: &Project, index: u64) -> Result<bool, SampleError> {
+    let twin = project.twin_of(index)?;
+    let (scenario, usable) = project.sweep.scenario(index, &twin);
+    usable?;
+    try_grip(&twin, &project.library, &scenario)
+}
+
+/// The samples that lie farthest out towards each corner of what was drawn, high forces first.
+fn corners(samples: &[(u64, Place)]) -> Vec<u64> {
+    let range = |i: usize| {
+        let values = samples.iter().map(|(_, place)| place[i]);
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)))
+    };
+    let ranges = [range(0), range(1), range(2)];
+    // From -1 to 1; 0 for what does not vary.
+    let at = |place: &Place, i: usize| {
+        let (low, high) = ranges[i];
+        if high > low { 2.0 * (place[i] - low) / (high - low) - 1.0 } else { 0.0 }
+    };
+    let mut found = Vec::new();
+    for corner in 0..8 {
+        let sign = |bit: usize| if corner >> (2 - bit) & 1 == 0 { 1.0 } else { -1.0 };
+        let out = |place: &Place| (0..3).map(|i| sign(i) * at(place, i)).sum::<f64>();
+        let farthest = samples.iter().reduce(|best, s| if out(&s.1) > out(&best.1) { s } else { best });
+        found.extend(farthest.map(|(index, _)| *index).filter(|index| !found.contains(index)));
+    }
+    found
+}
+
+/// Parts of the twin whose mesh has holes.
+fn open_meshes(project: &Project) -> Vec<(String, usize)> {
+    let look = |(name, part): (&String, &gripgen_twin::Part)| {
+        let open_edges = project.library.mesh(part).ok()?.look().open_edges;
+        (open_edges > 0).then(|| (name.clone(), open_edges))
+    };
+    project.twin.parts.iter().filter_map(look).collect()
 }

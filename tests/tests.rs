@@ -32,6 +32,8 @@ mod elastic;
 // Images by a graphics processor are those of the processor, within the tolerance.
 mod gpu;
 mod imprint;
+// Parts of one's own.
+mod init;
 // Intervals of calibrations, against a lab of its own.
 mod intervals;
 // What the large set can teach.
@@ -58,6 +60,8 @@ mod real_force;
 mod rig_run;
 // Shadows learnt from real presses.
 mod shadows;
+// Parts for tests, as meshes and as formulas.
+mod solids;
 // Labels against their own traces.
 mod suspect;
 // Files of Taxim.

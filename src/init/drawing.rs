@@ -1,6 +1,6 @@
 //! The picture of proposed grips: part, jaws and axes with a scale.
 
-use super::antipodal::Proposal;
+use super::Proposal;
 use crate::picture::{Anchor, Canvas, Rgb, Scene, SceneMesh, TextStyle, View};
 use gripgen_twin::frames::{Pose, pose};
 use gripgen_twin::{Jaw, TriMesh};

@@ -105,7 +105,10 @@ pub struct InitArgs {
     /// Millimetres per unit of the mesh file.
     #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = scale)]
     pub scale_mm_per_unit: f64,
-    /// JSON: the files and the grips proposed.
+    /// Take a mesh with holes as it is.
+    #[arg(long)]
+    pub accept_open_mesh: bool,
+    /// JSON: the files, the grips proposed, what the sweep varies and what is to be said of the mesh.
     #[command(flatten)]
     pub json: JsonArgs,
     /// How much is said.

@@ -1,18 +1,17 @@
 //! Closing the jaws on a part.
 
-use crate::convert::{rapier_pose, vector};
+use crate::convert::vector;
 use crate::jaw_friction::JawFriction;
 use crate::rapier_pull::{RapierPull, RapierStart};
 use crate::reduced::ReducedPull;
-use crate::scene::{SceneBodies, build, pad_shape};
+use crate::scene::{SceneBodies, build};
 use crate::session::{PullMechanics, PullSession, Signals};
 use crate::setup::{Arm, GripSetup, Mount};
+use crate::touch::{Touch, touch};
 use crate::world::World;
 use gripgen_twin::config::Mechanics;
 use gripgen_twin::frames::world_from_gel;
 use gripgen_twin::{Gel, Grasp, Jaw, PerJaw, Robot, Wrist};
-use rapier3d_f64::parry::query::{ShapeCastOptions, cast_shapes};
-use rapier3d_f64::prelude as rapier;
 
 /// A grip has settled when each jaw's normal force is this close to the grip force, as a fraction.
 const SETTLED_FRACTION: f64 = 1e-4;
@@ -92,13 +91,7 @@ enum Start {
 /// A part wider than the open gripper, jaws that do not settle, a contact shape that cannot be gripped, or bodies that
 /// become non-finite.
 pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
-    let mut touch = PerJaw { left: 0.0, right: 0.0 };
-    for jaw in Jaw::BOTH {
-        match first_touch(setup, jaw)? {
-            Some(distance) => touch[jaw] = distance,
-            None => return Ok(Grip::NoContact),
-        }
-    }
+    let Some(Touch { distance_m: touch, shape }) = touch(setup)? else { return Ok(Grip::NoContact) };
     if setup.mechanics == Mechanics::Reduced {
         return Ok(Grip::Held(Box::new(Held {
             grasp: grasp(setup, &touch, setup.grip_force_n),
@@ -118,7 +111,7 @@ pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
         Mount::Free { gravity_m_per_s2, .. } => gravity_m_per_s2,
     };
     let mut world = World::new(setup.wrist.step_s(), gravity_m_per_s2);
-    let rig = build(&mut world, setup, &touch);
+    let rig = build(&mut world, setup, &touch, &shape.contact_shape(setup, &touch));
     settle(&mut world, &rig, setup)?;
     let distance = PerJaw::from_fn(|jaw| {
         let centre = world.bodies[rig.jaws[jaw]].translation().y * jaw.side();
@@ -155,32 +148,6 @@ impl Held {
             }
         };
         PullSession::new(plant, self.robot, self.wrist, friction, signals.into())
-    }
-}
-
-/// Distance from the grip centre at which the jaw's gel first touches the part; `None` if it never does.
-fn first_touch(setup: &GripSetup<'_>, jaw: Jaw) -> Result<Option<f64>, GripError> {
-    let gel = &setup.gel[jaw];
-    let open = setup.gripper.opening_m / 2.0;
-    let start = open + gel.thickness_m / 2.0;
-    let pad = rapier::Pose::from_translation(rapier::Vector::new(0.0, jaw.side() * start, 0.0));
-    let towards = rapier::Vector::new(0.0, -jaw.side(), 0.0);
-    let hit = cast_shapes(
-        &pad,
-        towards,
-        &pad_shape(gel),
-        &rapier_pose(&setup.world_from_part),
-        rapier::Vector::ZERO,
-        &**setup.shape.shared(),
-        ShapeCastOptions::with_max_time_of_impact(open),
-    )
-    .map_err(|e| GripError::Shape(e.to_string()))?;
-    match hit {
-        None => Ok(None),
-        Some(hit) if hit.time_of_impact <= 0.0 => {
-            Err(GripError::TooWide { jaw, opening_mm: setup.gripper.opening_m * 1e3 })
-        }
-        Some(hit) => Ok(Some(open - hit.time_of_impact)),
     }
 }
 

@@ -42,6 +42,8 @@ mod session;
 mod setup;
 mod shape;
 mod staircase;
+mod surface;
+mod touch;
 mod twist;
 mod urdf;
 mod world;
@@ -55,6 +57,7 @@ pub use session::{Command, PullError, PullSession, PullState, Signals};
 pub use setup::{Arm, GripSetup, Mount};
 pub use shape::{PartShape, ShapeError};
 pub use staircase::{StaircaseResult, Until, pull_staircase, staircase_of};
+pub use surface::{LineHit, Surface, Window};
 pub use twist::{TwistCell, compliant_twist_capacity_n};
 pub use urdf::UrdfError;
 
@@ -62,5 +65,7 @@ pub use urdf::UrdfError;
 mod arm_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod touch_tests;
 #[cfg(test)]
 mod urdf_tests;

@@ -9,7 +9,7 @@ use gripgen_twin::{Gel, Jaw, PerJaw};
 use rapier3d_f64::prelude as rapier;
 use rapier3d_f64::prelude::{
     CoefficientCombineRule, ColliderBuilder, ColliderHandle, LockedAxes, RigidBodyBuilder, RigidBodyHandle,
-    Shape,
+    Shape, SharedShape,
 };
 
 /// Damping of a closing jaw, per jaw mass: a jaw comes to rest within a few hundredths of a second.
@@ -72,9 +72,14 @@ impl SceneBodies {
 }
 
 /// Puts part, arm, jaws and pads into the world; the jaws stand [`CLOSING_GAP_M`] off the part.
-pub(crate) fn build(world: &mut World, setup: &GripSetup<'_>, touch: &PerJaw<f64>) -> SceneBodies {
+pub(crate) fn build(
+    world: &mut World,
+    setup: &GripSetup<'_>,
+    touch: &PerJaw<f64>,
+    shape: &SharedShape,
+) -> SceneBodies {
     // The pads alone carry friction: the larger of the two coefficients of a pair counts, the part's is 0.
-    let part_collider = ColliderBuilder::new(setup.shape.shared().clone())
+    let part_collider = ColliderBuilder::new(shape.clone())
         .friction(0.0)
         .friction_combine_rule(CoefficientCombineRule::Max)
         .density(0.0);

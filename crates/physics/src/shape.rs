@@ -1,14 +1,16 @@
-//! The contact shape of a part: a convex hull or a primitive, never a triangle mesh.
+//! The contact shape of a part: a convex hull, plates in front of the pads or a primitive, never a triangle mesh.
 //!
 //! Triangle meshes cost four times as much, creep in f64 and tilt contact normals; the true mesh is used where it
-//! matters, in the imprint.
+//! matters: in the imprint, and to say where the jaws stop ([`Surface`]).
 
+use crate::surface::Surface;
 use gripgen_twin::TriMesh;
 use gripgen_twin::frames::Pose;
 use nalgebra::{Point3, Vector3};
 use rapier3d_f64::parry::transformation::try_convex_hull;
 use rapier3d_f64::prelude as rapier;
 use rapier3d_f64::prelude::SharedShape;
+use std::sync::Arc;
 
 /// Directions in which the outermost vertex of a mesh is kept for its hull.
 const HULL_DIRECTIONS: usize = 200;
@@ -20,6 +22,8 @@ const LEVEL_M: f64 = 1e-9;
 #[derive(Clone)]
 pub struct PartShape {
     shape: SharedShape,
+    /// The true surface, and `part_from_mesh`; a primitive is its own surface.
+    surface: Option<(Arc<Surface>, Pose)>,
 }
 
 /// A mesh that encloses no volume.
@@ -51,17 +55,28 @@ impl PartShape {
         let (vertices, faces) = try_convex_hull(&corners).map_err(|e| error(e.to_string()))?;
         let shape = SharedShape::convex_mesh(vertices, &faces)
             .ok_or_else(|| error("its faces do not close to a solid".into()))?;
-        Ok(Self { shape })
+        Ok(Self { shape, surface: None })
+    }
+
+    /// The convex hull of a mesh that knows the mesh's surface: where the hull is not what a pad meets, the jaws stop at the
+    /// surface and touch a plate in its place.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::hull`].
+    pub fn of_surface(surface: Arc<Surface>, part_from_mesh: &Pose) -> Result<Self, ShapeError> {
+        let hull = Self::hull(surface.mesh(), part_from_mesh)?;
+        Ok(Self { surface: Some((surface, *part_from_mesh)), ..hull })
     }
 
     /// A box of the given side lengths, centred on the part frame's origin.
     pub fn cuboid(sides_m: [f64; 3]) -> Self {
-        Self { shape: SharedShape::cuboid(sides_m[0] / 2.0, sides_m[1] / 2.0, sides_m[2] / 2.0) }
+        Self::primitive(SharedShape::cuboid(sides_m[0] / 2.0, sides_m[1] / 2.0, sides_m[2] / 2.0))
     }
 
     /// A ball centred on the part frame's origin.
     pub fn ball(radius_m: f64) -> Self {
-        Self { shape: SharedShape::ball(radius_m) }
+        Self::primitive(SharedShape::ball(radius_m))
     }
 
     /// A cylinder centred on the part frame's origin, its axis along x, y or z (0, 1, 2).
@@ -71,15 +86,24 @@ impl PartShape {
         let about = match axis {
             0 => rapier::Vector::Z,
             2 => rapier::Vector::X,
-            _ => return Self { shape: cylinder },
+            _ => return Self::primitive(cylinder),
         };
         let turned =
             rapier::Pose::from_parts(rapier::Vector::ZERO, rapier::Rotation::from_axis_angle(about, quarter));
-        Self { shape: SharedShape::compound(vec![(turned, cylinder)]) }
+        Self::primitive(SharedShape::compound(vec![(turned, cylinder)]))
+    }
+
+    fn primitive(shape: SharedShape) -> Self {
+        Self { shape, surface: None }
     }
 
     pub(crate) fn shared(&self) -> &SharedShape {
         &self.shape
+    }
+
+    /// The true surface and `part_from_mesh`.
+    pub(crate) fn surface(&self) -> Option<(&Surface, &Pose)> {
+        self.surface.as_ref().map(|(surface, pose)| (&**surface, pose))
     }
 }
 

@@ -131,6 +131,22 @@ mod tests {
         assert!(crossed > 10_000);
     }
 
+    /// A plate far below the highest point of the part: all triangles over the window are drawn in one look.
+    #[test]
+    fn a_few_triangles_far_below_the_highest_point_are_seen() {
+        let corner = |x, y, z| Point3::new(x, y, z);
+        let vertices = vec![
+            corner(-0.02, -0.02, 0.03),
+            corner(0.02, -0.02, 0.03),
+            corner(0.0, 0.03, 0.03),
+            corner(0.02, -0.02, 0.0),
+        ];
+        let mesh = TriMesh::new(vertices, vec![[0, 1, 2], [1, 3, 2]]).unwrap();
+        let map = raster(&mesh, &gripgen_twin::frames::Pose::identity(), &GRID, 40.0);
+        let height = map.at(20, 30);
+        assert!((height + 300.0).abs() < 1e-3, "{height} px instead of -300 px");
+    }
+
     #[test]
     fn surfaces_too_deep_to_touch_are_left_out() {
         let at = pose(&Rotation3::identity(), Vector3::new(0.0, 0.0, 2e-3));

@@ -1,8 +1,10 @@
 //! Triangle meshes in metres, and reading them from the bytes of STL and OBJ files.
 
+mod look;
 mod obj;
 mod stl;
 
+pub use look::MeshLook;
 pub use stl::write_binary_stl;
 
 use nalgebra::Point3;

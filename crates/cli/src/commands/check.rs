@@ -34,6 +34,18 @@ pub fn check(
             .iter()
             .map(|p| json!({"index": p.index, "status": status_name(p.status), "failure": p.failure, "lag_exceeds_tolerance": p.lag_exceeds_tolerance}))
             .collect();
+        let grips: Vec<_> = plan
+            .grips
+            .iter()
+            .map(|g| {
+                let failed: Vec<_> = g
+                    .failed
+                    .iter()
+                    .map(|(index, failure)| json!({"index": index, "failure": failure}))
+                    .collect();
+                json!({"part": g.part, "grip_pose": g.grip_pose, "tried": g.tried, "failed": failed})
+            })
+            .collect();
         sink.document(&json!({
             "schema": "gripgen.plan/1",
             "name": project.name,
@@ -44,6 +56,7 @@ pub fn check(
             "estimated_cpu_s": plan.estimated_cpu.as_secs_f64(),
             "jobs": jobs,
             "probes": probes,
+            "grips": grips,
         }))?;
     }
     if !talk.quiet {
@@ -73,7 +86,36 @@ pub fn check(
             }
         }
     }
-    Ok(if failed.is_empty() { 0 } else { code::SAMPLES_FAILED })
+    if !talk.quiet {
+        eprint!("{}", warnings(&plan));
+    }
+    let grips_fail = plan.grips.iter().any(|g| !g.failed.is_empty());
+    Ok(if failed.is_empty() && !grips_fail { 0 } else { code::SAMPLES_FAILED })
+}
+
+/// What a sweep over these grips and meshes will run into.
+fn warnings(plan: &Plan) -> String {
+    let mut text = String::new();
+    for (part, open_edges) in &plan.open_meshes {
+        text += &format!(
+            "warning: the mesh of {part} is open: {open_edges} edges belong to one triangle only, gels sink into its holes\n"
+        );
+    }
+    for grip in plan.grips.iter().filter(|g| !g.failed.is_empty()) {
+        let (index, reason) = &grip.failed[0];
+        text += &format!(
+            "warning: {} of {} grips tried at the ends of the sweep's forces, offsets and angles fail with grip_pose {} of {}; \
+             sample {index}: {reason}\n",
+            grip.failed.len(),
+            grip.tried,
+            grip.grip_pose,
+            grip.part
+        );
+    }
+    if plan.grips.iter().any(|g| !g.failed.is_empty()) {
+        text += "hint: `gripgen init` tries grips before it proposes them; narrow [vary], or move the grips in the twin\n";
+    }
+    text
 }
 
 /// Worker threads where the user names none.

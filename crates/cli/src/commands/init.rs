@@ -1,36 +1,47 @@
 //! `gripgen init`: something to start from.
 
 use crate::args::InitArgs;
+use crate::commands::check::cores;
 use crate::failure::Failure;
 use crate::mark::Format;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
-use gripgen::{part_starter, starter};
+use gripgen::{PartOptions, part_starter, starter};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Runs the verb.
 pub fn run(args: &InitArgs) -> Result<u8, Failure> {
-    let is_mesh = args
-        .target
-        .extension()
-        .and_then(|e| e.to_str())
-        .is_some_and(|e| ["stl", "obj"].contains(&e.to_ascii_lowercase().as_str()));
-    let (folder, files, talk, grips) = if is_mesh {
+    let extension = args.target.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
+    if let Some(hint) = unread(&extension) {
+        let problem = format!(
+            "{}: gripgen reads meshes from STL and OBJ files, not from .{extension}",
+            args.target.display()
+        );
+        return Err(Failure::usage(problem).hint(hint));
+    }
+    let (folder, files, talk, made) = if ["stl", "obj"].contains(&extension.as_str()) {
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
-        let made = part_starter(&args.target, &folder, args.scale_mm_per_unit).map_err(|e| {
-            Failure::usage(e).hint("--scale-mm-per-unit 1000 reads a file in metres, 25.4 one in inches")
+        let options = PartOptions {
+            scale_mm_per_unit: args.scale_mm_per_unit,
+            accept_open_mesh: args.accept_open_mesh,
+            threads: cores(),
+        };
+        let mut made = part_starter(&args.target, &folder, options).map_err(|e| {
+            let hint = e.hint();
+            Failure::usage(e).hint(hint)
         })?;
-        (folder, made.files, made.summary, made.grips)
+        let files = std::mem::take(&mut made.files);
+        (folder, files, std::mem::take(&mut made.summary), Some(made))
     } else {
         no_mesh(&args.target)?;
         if let Some(out) = &args.out {
             let problem = format!("--out {} goes with a mesh; a folder is its own target", out.display());
             return Err(Failure::usage(problem));
         }
-        (args.target.clone(), starter(), String::new(), vec![])
+        (args.target.clone(), starter(), String::new(), None)
     };
-    let mut outputs = Outputs::of("init", args.json.force).reads_all(is_mesh.then_some(&args.target));
+    let mut outputs = Outputs::of("init", args.json.force).reads_all(made.is_some().then_some(&args.target));
     let paths: Vec<PathBuf> = files.iter().map(|f| folder.join(&f.name)).collect();
     paths.iter().try_for_each(|path| outputs.judge(path))?;
     std::fs::create_dir_all(&folder).map_err(|e| Failure::new(format!("{}: {e}", folder.display())))?;
@@ -44,16 +55,26 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
         eprintln!("next: {1} check {0}, then {1} sweep {0}", sweep.display(), program());
     }
     if sink.wanted() {
-        let grips: Vec<_> = grips
+        let grips: Vec<_> = made
             .iter()
+            .flat_map(|made| &made.grips)
             .map(|g| {
                 json!({
                     "origin_mm": g.origin_mm, "orientation_deg": g.orientation_deg, "width_mm": g.width_mm,
-                    "contact_mm2": g.contact_mm2,
+                    "contact_mm2": g.contact_mm2, "lever_mm": g.lever_mm, "clearance_mm": g.clearance_mm,
                 })
             })
             .collect();
-        sink.document(&json!({"schema": "gripgen.init/1", "files": paths, "grips": grips}))?;
+        let mut document = json!({"schema": "gripgen.init/1", "files": paths, "grips": grips});
+        if let Some(made) = &made {
+            let varied = &made.varied;
+            document["varied"] = json!({
+                "grip_force_n": varied.grip_force_n, "grip_offset_sd_mm": varied.grip_offset_sd_mm,
+                "grip_angle_deg": varied.grip_angle_deg,
+            });
+            document["mesh"] = json!(made.mesh_words);
+        }
+        sink.document(&document)?;
         if sink.on_stdout() {
             return Ok(0);
         }
@@ -61,6 +82,20 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     let listed: String = paths.iter().map(|path| format!("{}\n", path.display())).collect();
     print(&listed)?;
     Ok(0)
+}
+
+/// What to do with a file of a part that is not read; `None` for everything else.
+fn unread(extension: &str) -> Option<&'static str> {
+    match extension {
+        "step" | "stp" | "iges" | "igs" | "sldprt" | "ipt" | "f3d" | "fcstd" | "brep" => Some(
+            "it holds curved surfaces and no triangles: export it from your CAD as binary STL in millimetres, with a tolerance \
+             of 0.01 mm",
+        ),
+        "ply" | "glb" | "gltf" | "off" | "3mf" | "dae" | "fbx" | "x3d" | "wrl" => Some(
+            "convert it: python -c \"import trimesh; trimesh.load('part.ply', force='mesh').export('part.stl')\"",
+        ),
+        _ => None,
+    }
 }
 
 /// A target that is no mesh has to be a folder: a file of another kind, or one that is not there, makes none of its name.

@@ -23,7 +23,8 @@ fn init_gives_something_that_runs() {
         for more in [&[][..], &["-o", at.to_str().unwrap()]] {
             let refused = run(&[&["init", file.to_str().unwrap()], more].concat());
             assert_code(&refused, 2);
-            assert!(text(&refused.stderr).contains("STL or OBJ"), "{}", text(&refused.stderr));
+            let says = text(&refused.stderr);
+            assert!(says.contains("STL") && says.contains("hint:"), "{says}");
             assert!(!file.is_dir(), "{name}");
         }
     }
@@ -45,7 +46,19 @@ fn init_with_a_mesh_proposes_grips_that_run() {
     assert_code(&check, 0);
     let again = run(&["init", mesh.to_str().unwrap(), "-o", at.to_str().unwrap(), "--force", "--json"]);
     let json: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
-    assert_eq!(json["files"].as_array().unwrap().len(), 3);
+    // The mesh is copied beside the twin, whose path to it is relative: the folder can be moved.
+    assert_eq!(json["files"].as_array().unwrap().len(), 4);
+    assert_eq!(std::fs::read(at.join("my_gear.stl")).unwrap(), std::fs::read(&mesh).unwrap());
+    let moved = folder.path().join("moved");
+    std::fs::rename(&at, &moved).unwrap();
+    std::fs::rename(&mesh, folder.path().join("elsewhere.stl")).unwrap();
+    assert_code(&run(&["check", moved.join("sweep.toml").to_str().unwrap()]), 0);
+    std::fs::rename(&moved, &at).unwrap();
+    std::fs::rename(folder.path().join("elsewhere.stl"), &mesh).unwrap();
+    let inside =
+        run(&["init", at.join("my_gear.stl").to_str().unwrap(), "-o", at.to_str().unwrap(), "--force"]);
+    assert_code(&inside, 0);
+    assert_eq!(text(&inside.stdout).lines().count(), 3, "a mesh that is there is not copied onto itself");
     assert!(json["grips"][0]["contact_mm2"].as_f64().unwrap() > 10.0);
     assert_code(&run(&["init", mesh.to_str().unwrap(), "--scale-mm-per-unit", "0"]), 2);
 
@@ -60,4 +73,17 @@ fn init_with_a_mesh_proposes_grips_that_run() {
     ]);
     assert_code(&inches, 2);
     assert!(text(&inches.stderr).contains("33000") && text(&inches.stderr).contains("hint:"));
+}
+
+/// A file that is not read is no folder to write into.
+#[test]
+fn init_of_a_file_that_is_not_read_says_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, word) in [("part.step", "CAD"), ("part.PLY", "convert")] {
+        let at = folder.path().join(name);
+        let output = run(&["init", at.to_str().unwrap()]);
+        assert_code(&output, 2);
+        assert!(text(&output.stderr).contains("hint:") && text(&output.stderr).contains(word));
+        assert!(!at.exists(), "{name} became a folder");
+    }
 }

@@ -143,7 +143,10 @@ impl HeightMap {
         let mut top = self.top(rest, level);
         let highest = self.seen.iter().fold(f64::NEG_INFINITY, |m, s| m.max(s.top_px));
         let mut look = FIRST_LOOK_PX.min(depth_px);
-        while top == f32::NEG_INFINITY && self.draw_above(mesh, highest - look, level) {
+        let mut left = true;
+        while top == f32::NEG_INFINITY && left {
+            // The last triangles may be those that are seen.
+            left = self.draw_above(mesh, highest - look, level);
             top = self.top(rest, level);
             look *= 2.0;
         }

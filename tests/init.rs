@@ -1,0 +1,252 @@
+//! Parts of one's own: what `init` proposes holds wherever its sweep goes, and the jaws stop at the surface.
+
+use crate::solids::{Solid, SolidPart, ordinary};
+use gripgen::physics::Window;
+use gripgen::tactile::SimdLevel;
+use gripgen::twin::frames::{Pose, world_from_gel};
+use gripgen::twin::{Jaw, Outcome, Part, Pulled};
+use gripgen::{InitError, Location, NoGrip, PartOptions, PartStarter, Project, generate, part_starter, plan};
+use nalgebra::{Point3, Vector3};
+use std::path::Path;
+
+const OPTIONS: PartOptions = PartOptions { scale_mm_per_unit: 1.0, accept_open_mesh: false, threads: 2 };
+
+/// Writes the part and what `init` makes of it.
+fn start(part: &SolidPart, folder: &Path) -> Result<PartStarter, InitError> {
+    let made = part_starter(&part.write(folder), folder, OPTIONS)?;
+    for file in &made.files {
+        std::fs::write(folder.join(&file.name), &file.bytes).unwrap();
+    }
+    Ok(made)
+}
+
+fn load(folder: &Path, sets: &[(&str, &str)]) -> Project {
+    let sets: Vec<(String, String)> = sets.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
+    Project::load(&Location::Disk(folder.join("sweep.toml")), &sets).unwrap()
+}
+
+const BARE: [(&str, &str); 3] = [("mechanics", "reduced"), ("images", "none"), ("trace", "none")];
+
+fn pulled(project: &Project, index: u64) -> Result<Box<Pulled>, String> {
+    match generate(project, index, SimdLevel::best()).outcome {
+        Outcome::Pulled(pulled) => Ok(pulled),
+        Outcome::NoContact { .. } => Err("no contact".into()),
+        Outcome::Failed { reason } => Err(reason),
+    }
+}
+
+/// Distance from the grip centre at which rays from a pad meet the part, by its formulas: the nearest of a grid of rays that
+/// reaches the pad's edges.
+fn rays_meet_mm(part: &SolidPart, jaw: Jaw, world_from_mesh: &Pose, window: Window) -> f64 {
+    let far_mm = 60.0;
+    let mesh_from_gel = world_from_mesh.inverse() * world_from_gel(jaw, far_mm * 1e-3);
+    let along = mesh_from_gel * Vector3::z();
+    let mut nearest = f64::INFINITY;
+    for i in 0..=56 {
+        for j in 0..=42 {
+            let x = window.half_width_m * (f64::from(i) / 28.0 - 1.0);
+            let y = window.half_height_m * (f64::from(j) / 21.0 - 1.0);
+            let from = (mesh_from_gel * Point3::new(x, y, 0.0)) * 1e3;
+            nearest = nearest.min(part.meets_mm(from, along, 2.0 * far_mm).unwrap_or(f64::INFINITY));
+        }
+    }
+    far_mm - nearest
+}
+
+/// Every sample of the unedited sweep grips, both gels feel the part, and each stands where rays meet the part's formulas.
+#[test]
+#[ignore = "red: rays 0.5 mm apart miss a corner of the mug's handle, which a jaw meets 0.26 mm earlier"]
+fn proposed_grips_hold_and_the_jaws_stop_at_the_surface() {
+    for part in ordinary() {
+        let folder = tempfile::tempdir().unwrap();
+        let made = start(&part, folder.path()).unwrap_or_else(|e| panic!("{}: {e}", part.name));
+        let project = load(folder.path(), &BARE);
+        let of_part = &project.twin.parts[part.name];
+        let (mut failed, mut worst_mm) = (Vec::new(), 0.0_f64);
+        for index in 0..project.sweep.samples {
+            let scenario = project.sweep.scenario(index, &project.twin).0;
+            let pulled = match pulled(&project, index) {
+                Ok(pulled) => pulled,
+                Err(reason) => {
+                    failed.push(reason);
+                    continue;
+                }
+            };
+            for (jaw, imprint) in pulled.imprint.iter() {
+                assert!(imprint.patch.area_m2() > 1e-6, "{}, sample {index}, {jaw} jaw", part.name);
+                // The gels stand where their surfaces first touch: the part's origin lies that far in front of them.
+                let stands_mm = pulled.grasp.gel_from_part[jaw].translation.z * 1e3;
+                if index % 10 == 0 {
+                    let c = &scenario.covariates;
+                    let world_from_mesh = Part::world_from_part(c.grip_angle_rad, c.grip_offset_m)
+                        * of_part.grips[scenario.grip_pose];
+                    let gel = &project.twin.gel[jaw];
+                    let window =
+                        Window { half_width_m: gel.width_m / 2.0, half_height_m: gel.height_m / 2.0 };
+                    let met_mm = rays_meet_mm(&part, jaw, &world_from_mesh, window);
+                    worst_mm = worst_mm.max((stands_mm - met_mm).abs());
+                    assert!(
+                        (stands_mm - met_mm).abs() < 0.2,
+                        "{}, sample {index}, {jaw} jaw: stands at {stands_mm:.3} mm, rays meet the part at {met_mm:.3} mm",
+                        part.name
+                    );
+                }
+            }
+        }
+        println!(
+            "{}: {} grips, {} failed, within {worst_mm:.3} mm",
+            part.name,
+            made.grips.len(),
+            failed.len()
+        );
+        assert!(failed.len() <= 4, "{}: {} of 200 failed: {}", part.name, failed.len(), failed[0]);
+    }
+}
+
+/// Both mechanics and the sum of the patch limits, on parts whose hull is not what the pads touch.
+#[test]
+#[ignore = "red: a screw held by head and shank slips 1.3 % earlier in Rapier"]
+fn both_mechanics_agree_where_the_part_is_not_convex() {
+    let quiet = [("wrist.noise_n", "0"), ("images", "none"), ("trace", "none"), ("samples", "12")];
+    for part in ordinary().into_iter().filter(|p| p.name != "ball") {
+        let folder = tempfile::tempdir().unwrap();
+        start(&part, folder.path()).unwrap();
+        let scatter = format!("parts.{}.scatter", part.name);
+        let sets = |mechanics| [&quiet[..], &[("mechanics", mechanics), (&scatter, "0")]].concat();
+        let (rapier, reduced) = (load(folder.path(), &sets("rapier")), load(folder.path(), &sets("reduced")));
+        let mut compared = 0;
+        for index in 0..12 {
+            let (Ok(a), Ok(b)) = (pulled(&rapier, index), pulled(&reduced, index)) else {
+                panic!("{}, sample {index}: {:?}", part.name, pulled(&rapier, index).err());
+            };
+            // Grips by the edge of a pad are apart: the engine's pad meets the slope beside it.
+            let by_the_edge = b.imprint.iter().any(|(jaw, imprint)| {
+                let (gel, (x, y)) = (&reduced.twin.gel[jaw], imprint.patch.centre_m());
+                x.abs() > 0.3 * gel.width_m || y.abs() > 0.3 * gel.height_m
+            });
+            if by_the_edge {
+                continue;
+            }
+            compared += 1;
+            let force_n = rapier.sweep.scenario(index, &rapier.twin).0.grip_force_n;
+            let limit_n = 2.0 * 0.15 * force_n;
+            let (x, y) = (a.label.max_pull_force_n, b.label.max_pull_force_n);
+            assert!((x / y - 1.0).abs() < 0.01, "{}, sample {index}: {x} N and {y} N", part.name);
+            assert!((x / limit_n - 1.0).abs() < 0.005, "{}, sample {index}: {x} N of {limit_n} N", part.name);
+        }
+        assert!(compared >= 6, "{}: {compared} of 12 compared", part.name);
+    }
+}
+
+/// Four proposals are four grips: the shank and the head of a screw, not one of them four times.
+#[test]
+fn proposals_differ_and_local_features_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = ordinary();
+    let of = |name: &str| start(all.iter().find(|p| p.name == name).unwrap(), folder.path()).unwrap().grips;
+    let screw = of("m8_screw");
+    let has = |width: f64| screw.iter().any(|g| (g.width_mm - width).abs() < 0.2);
+    assert!(has(8.0) && has(13.0), "{screw:?}");
+    assert!(of("flange_shaft").iter().any(|g| (g.width_mm - 8.0).abs() < 0.2));
+    assert!(of("l_bracket").iter().any(|g| (g.width_mm - 4.0).abs() < 0.1));
+}
+
+/// A part without a grip is refused with the reason and both numbers.
+#[test]
+fn a_part_without_a_grip_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |name, solid| match start(&SolidPart { name, solids: vec![solid] }, folder.path()) {
+        Err(InitError::NoGrip { source, .. }) => source,
+        other => panic!("{name}: {other:?}"),
+    };
+    let wide = refused("wide", Solid::Box([0.0; 3], [150.0, 140.0, 130.0]));
+    assert!(
+        matches!(wide, NoGrip::TooWide { narrowest_mm, opening_mm, .. } if (narrowest_mm - 130.0).abs() < 0.1 && opening_mm == 110.0),
+        "{wide}"
+    );
+    let small = refused("small", Solid::Ball([0.0; 3], 1.0));
+    assert!(
+        matches!(small, NoGrip::TooDeep { wanted_mm3, available_mm3, .. } if available_mm3 < wanted_mm3 && (wanted_mm3 - 15.0).abs() < 1e-9),
+        "{small}"
+    );
+    let steep = refused("steep", Solid::Cone(20.0, 40.0));
+    assert!(
+        matches!(steep, NoGrip::TooSteep { least_deg, allowed_deg } if least_deg > allowed_deg)
+            || matches!(steep, NoGrip::TooDeep { .. }),
+        "{steep}"
+    );
+}
+
+/// A mesh with holes is refused with their number, or taken when that is asked for, and `check` says so.
+#[test]
+fn an_open_mesh_is_refused_unless_it_is_accepted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("open.stl");
+    let mesh = SolidPart { name: "open", solids: vec![Solid::Ball([0.0; 3], 15.0)] }.mesh();
+    let kept = mesh.triangles()[1..].to_vec();
+    let open = gripgen::twin::TriMesh::new(mesh.vertices_m().to_vec(), kept).unwrap();
+    std::fs::write(&path, gripgen::twin::write_binary_stl(&open, "open", 1e-3)).unwrap();
+    let error = part_starter(&path, folder.path(), OPTIONS).unwrap_err();
+    assert!(matches!(error, InitError::Open { open_edges: 3, .. }), "{error}");
+    let accepted = PartOptions { accept_open_mesh: true, ..OPTIONS };
+    let made = part_starter(&path, folder.path(), accepted).unwrap();
+    assert!(made.mesh_words.iter().any(|w| w.contains("3 edges")), "{:?}", made.mesh_words);
+    for file in &made.files {
+        std::fs::write(folder.path().join(&file.name), &file.bytes).unwrap();
+    }
+    let plan = plan(&load(folder.path(), &BARE), SimdLevel::best()).unwrap();
+    assert_eq!(plan.open_meshes, [("open".to_string(), 3)]);
+}
+
+/// `check` tries the outermost samples: those it warns of fail in the sweep, and a sweep that fails is warned of.
+#[test]
+fn check_warns_of_grips_that_fail() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = ordinary();
+    start(all.iter().find(|p| p.name == "flange_shaft").unwrap(), folder.path()).unwrap();
+    let sound = plan(&load(folder.path(), &BARE), SimdLevel::best()).unwrap();
+    assert!(sound.grips.iter().all(|g| g.failed.is_empty() && g.tried >= 4), "{:?}", sound.grips);
+    // Beyond the end of the shaft, which offsets reach or not.
+    let wide = [&BARE[..], &[("vary.grip_offset_mm", "{ normal = [0, 25] }")]].concat();
+    let project = load(folder.path(), &wide);
+    let plan = plan(&project, SimdLevel::best()).unwrap();
+    let warned: Vec<u64> = plan.grips.iter().flat_map(|g| g.failed.iter().map(|(index, _)| *index)).collect();
+    assert!(!warned.is_empty());
+    for index in warned {
+        assert!(pulled(&project, index).is_err(), "sample {index} works");
+    }
+}
+
+/// The same part gives the same files for any number of threads.
+#[test]
+fn proposals_do_not_depend_on_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = ordinary()[1].write(folder.path());
+    let make = |threads| part_starter(&path, folder.path(), PartOptions { threads, ..OPTIONS }).unwrap();
+    assert_eq!(make(1), make(3));
+}
+
+/// Which way faces look does not matter: a mesh that is inside out, or of which every third face is, gets the same grips.
+#[test]
+fn turned_faces_change_no_grip() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = ordinary();
+    let mesh = all.iter().find(|p| p.name == "t_profile").unwrap().mesh();
+    let grips = |every: usize| {
+        let turn = |(i, &[a, b, c]): (usize, &[u32; 3])| {
+            if every > 0 && i % every == 0 { [a, c, b] } else { [a, b, c] }
+        };
+        let triangles = mesh.triangles().iter().enumerate().map(turn).collect();
+        let turned = gripgen::twin::TriMesh::new(mesh.vertices_m().to_vec(), triangles).unwrap();
+        let path = folder.path().join("turned.stl");
+        std::fs::write(&path, gripgen::twin::write_binary_stl(&turned, "turned", 1e-3)).unwrap();
+        let made = part_starter(&path, folder.path(), OPTIONS).unwrap();
+        (made.grips.len(), made.grips[0].width_mm, made.mesh_words)
+    };
+    let (plain, inside_out, mixed) = (grips(0), grips(1), grips(3));
+    assert!((plain.1 - 4.0).abs() < 0.1 && plain.0 > 1, "{plain:?}");
+    assert_eq!((plain.0, plain.1), (inside_out.0, inside_out.1));
+    assert!((mixed.1 - 4.0).abs() < 0.1, "{mixed:?}");
+    assert!(inside_out.2.iter().any(|w| w.contains("inside out")), "{:?}", inside_out.2);
+    assert!(mixed.2.iter().any(|w| w.contains("opposite ways")), "{:?}", mixed.2);
+}
