@@ -52,6 +52,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
                 ("ball".into(), format!("{:.3} mm", set.ball_m * 1e3)),
                 ("pixel".into(), format!("{:.4} mm", set.metres_per_px * 1e3)),
             ],
+            map: None,
         };
         let page = press_report(&text, &set, &comparison, |i| {
             predict_press(&set.presses[i], set.ball_m, &sensor).ok()
