@@ -1,6 +1,6 @@
 //! Times of the tactile stages on one core, as the JSON that `benches/peers/tactile.py` reads:
-//! `cargo bench --bench tactile_stages -- FILE.json`. The press and the surface that belong to it go into FILE.json.f32, so that
-//! the peers work on the same contact.
+//! `cargo bench --bench tactile_stages -- FILE.json`. The press and the surfaces of the shipped and of a calibrated sensor that belong
+//! to it go into FILE.json.f32, so that the peers work on the same contact.
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on panics")]
 
@@ -64,9 +64,21 @@ fn main() -> ExitCode {
         stage(name("press and image"), us(|| renderer.image(Some(&press(&renderer)), Some(7))));
     }
     let known = scenes::with_modulus(gel);
-    for (kind, sensor) in scenes::sensors(&sensor) {
+    let kinds = scenes::sensors(&sensor);
+    // A sensor as `calibrate presses` writes it has blurs of its own.
+    let (_, calibrated) = kinds.iter().find(|(kind, _)| *kind == "regressor").unwrap();
+    let pyramid = calibrated.pyramid.as_ref().unwrap();
+    let calibrated_surface = Renderer { sensor: calibrated, gel: &known, ..best }.surface(&imprint);
+    let (cal_x, cal_y) = gradient(&calibrated_surface);
+    let renderer = Renderer { sensor: calibrated, gel: &known, ..best };
+    stage("surface of regressor".into(), us(|| renderer.surface(&imprint)));
+    stage(
+        "shade of regressor".into(),
+        us(|| shade(&calibrated.colour, &calibrated_surface, &cal_x, &cal_y, None)),
+    );
+    for (kind, sensor) in &kinds {
         for level in SimdLevel::available().into_iter().filter(|&l| l != SimdLevel::Portable) {
-            let renderer = Renderer { level, sensor: &sensor, gel: &known };
+            let renderer = Renderer { level, sensor, gel: &known };
             let name = |stage: &str| format!("{stage}, {kind}, {}", format!("{level:?}").to_lowercase());
             stage(name("image"), us(|| renderer.image(Some(&imprint), Some(7))));
             stage(name("press and image"), us(|| renderer.image(Some(&press(&renderer)), Some(7))));
@@ -78,11 +90,14 @@ fn main() -> ExitCode {
         "width_px": grid.width_px, "height_px": grid.height_px, "triangles": mesh.triangles().len(),
         "contact_share": contact, "press_px": imprint.press_depth_m / grid.metres_per_px,
         "kernels_px": gel.kernels_px, "restore_depth_fraction": gel.restore_depth_fraction, "us": stages,
+        "calibrated": {
+            "kernels_px": pyramid.kernels_px, "restore_depth_fraction": pyramid.restore_depth_fraction,
+        },
     });
     std::fs::write(file, serde_json::to_string_pretty(&json).unwrap()).unwrap();
     let bytes = |plane: &Plane| plane.values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
     let arrays = format!("{}.f32", file.display());
-    std::fs::write(arrays, [bytes(&imprint.depth_px), bytes(&surface)].concat()).unwrap();
+    std::fs::write(arrays, [&imprint.depth_px, &surface, &calibrated_surface].map(bytes).concat()).unwrap();
     run.finish()
 }
 

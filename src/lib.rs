@@ -126,7 +126,7 @@ pub use plan::{Plan, Probe, TriedGrip, plan};
 pub use plant::{Fixture, OpenPlantError, TwinPlant};
 pub use predict::PullPredictor;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};
-pub use press_report::{PressReportText, press_report};
+pub use press_report::{PressMap, PressReportText, press_report};
 pub use presses::{
     FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_circles_with_sensor,
     find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor,

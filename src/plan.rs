@@ -8,7 +8,8 @@ use crate::sweep::{SweepError, encode_options, guarded};
 use gripgen_record::encode;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_tactile::SimdLevel;
-use gripgen_twin::Outcome;
+use gripgen_twin::config::GelModel;
+use gripgen_twin::{Jaw, Outcome, Pulled, Twin};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -52,7 +53,7 @@ pub struct TriedGrip {
 }
 
 /// A sample that was tried out.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
     /// Its index.
     pub index: u64,
@@ -62,6 +63,9 @@ pub struct Probe {
     pub failure: Option<String>,
     /// Whether the force loop lags beyond half the label tolerance.
     pub lag_exceeds_tolerance: bool,
+    /// Mean pressure of the contact over Young's modulus of the gel, of the jaw where it is larger; `None` without an elastic gel.
+    /// Beyond [`gripgen_tactile::LINEAR_PRESSURE_SHARE`] linear elasticity is an extrapolation.
+    pub pressure_over_modulus: Option<f64>,
 }
 
 /// Tries out a few samples spread over the sweep and extrapolates. Writes nothing.
@@ -85,13 +89,19 @@ pub fn plan(project: &Project, simd: SimdLevel) -> Result<Plan, SweepError> {
             + encoded.images.as_ref().map_or(0, |both| both.left.len() + both.right.len())
             + encoded.trace.as_ref().map_or(0, Vec::len)
             + encoded.states.iter().map(|s| s.data.len() + 31).sum::<usize>();
-        let (mut failure, mut lag_exceeds_tolerance) = (None, false);
+        let (mut failure, mut lag_exceeds_tolerance, mut pressure_over_modulus) = (None, false, None);
         match sample.outcome {
             Outcome::Failed { reason } => failure = Some(reason),
-            Outcome::Pulled(pulled) => lag_exceeds_tolerance = pulled.lag_exceeds_tolerance,
+            Outcome::Pulled(pulled) => {
+                lag_exceeds_tolerance = pulled.lag_exceeds_tolerance;
+                // A sample that was pulled had a twin.
+                pressure_over_modulus =
+                    project.twin_of(index).ok().and_then(|twin| largest_pressure_share(&twin, &pulled));
+            }
             Outcome::NoContact { .. } => {}
         }
-        tried.push(Probe { index, status: encoded.status, failure, lag_exceeds_tolerance });
+        let status = encoded.status;
+        tried.push(Probe { index, status, failure, lag_exceeds_tolerance, pressure_over_modulus });
     }
     let share = samples as f64 / probes as f64;
     Ok(Plan {
@@ -167,4 +177,15 @@ fn open_meshes(project: &Project) -> Vec<(String, usize)> {
         (open_edges > 0).then(|| (name.clone(), open_edges))
     };
     project.twin.parts.iter().filter_map(look).collect()
+}
+
+/// Mean pressure over modulus of the jaw where it is larger; `None` where no gel is elastic.
+fn largest_pressure_share(twin: &Twin, pulled: &Pulled) -> Option<f64> {
+    let shares = Jaw::BOTH.into_iter().filter_map(|jaw| {
+        let gel = &twin.gel[jaw];
+        let elastic = gel.elastic.filter(|_| gel.model == GelModel::Elastic)?;
+        let patch = &pulled.imprint[jaw].patch;
+        Some(patch.normal_force_n() / patch.area_m2() / elastic.young_modulus_pa)
+    });
+    shares.reduce(f64::max)
 }

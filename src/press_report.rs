@@ -24,6 +24,17 @@ pub struct PressReportText {
     pub meaning: String,
     /// Names and values of what was found.
     pub facts: Vec<(String, String)>,
+    /// Where in the frame something was pressed.
+    pub map: Option<PressMap>,
+}
+
+/// A picture of the frame that shows where something was pressed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PressMap {
+    /// The picture.
+    pub image: TactileImage,
+    /// What it shows, in words.
+    pub text: String,
 }
 
 /// The page: scores of all presses, pictures of three of them. `predict` draws the prediction that was scored.
@@ -41,6 +52,7 @@ pub fn press_report(
         "summary": text.summary,
         "meaning": text.meaning,
         "facts": text.facts.iter().map(|(name, value)| json!({"name": name, "value": value})).collect::<Vec<_>>(),
+        "map": text.map.as_ref().map(|map| json!({"image": data_url(&map.image), "text": map.text})),
         "means": [
             mean_row("whole frame", &comparison.mean.full),
             mean_row("400 x 400 px around the contact", &comparison.mean.crop400),
@@ -179,7 +191,14 @@ mod tests {
             summary: "36 presses".into(),
             meaning: "Held-out presses.".into(),
             facts: vec![("ball".into(), "4 mm".into())],
+            map: None,
         };
+        let mapped = PressReportText {
+            map: Some(PressMap { image: image.clone(), text: "60 % of the frame".into() }),
+            ..text.clone()
+        };
+        let page = press_report(&mapped, &set, &comparison, |_| None);
+        assert!(page.contains("60 % of the frame") && page.matches("<img ").count() == 1, "the map");
         let page = press_report(&text, &set, &comparison, |_| Some(image.clone()));
         assert!(page.contains("two &lt;b&gt;: MSE 9.0 in the 400 px crop (the worst)"), "names are escaped");
         assert_eq!(page.matches("<img ").count(), 12, "worst three and best; the median is among them");

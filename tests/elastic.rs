@@ -4,7 +4,8 @@ use crate::common::{project, root};
 use gripgen::generate;
 use gripgen::tactile::npz::Npz;
 use gripgen::tactile::{
-    Base, ElasticGel, Grid, Imprint, Plane, PressedGel, SimdLevel, deform, gradient, indent, press_elastic,
+    Base, ElasticGel, Grid, Imprint, LINEAR_PRESSURE_SHARE, Plane, PressedGel, SimdLevel, deform, gradient,
+    indent, press_elastic,
 };
 use gripgen::twin::Outcome;
 
@@ -33,6 +34,99 @@ fn a_softer_gel_is_pressed_deeper_under_the_same_force() {
         let images = |p: &gripgen::twin::Pulled| p.images.as_ref().unwrap()[jaw].clone();
         assert!(images(&soft) != images(&hard));
     }
+}
+
+/// Press of the left jaw and area of its contact, in mm and mm2, for a part and a grip force.
+fn press(part: &str, force_n: f64, sets: &[&str]) -> (f64, f64) {
+    let (part, force) = (format!("vary.part=[\"{part}\"]"), format!("vary.grip_force_n=[{force_n}]"));
+    let at = [
+        "vary.grip_pose=[0]",
+        "vary.grip_offset_mm=[0]",
+        "vary.grip_angle_deg=[0]",
+        "images=none",
+        "trace=none",
+    ];
+    let p = project(
+        "asset:configs/quickstart.toml",
+        &[&[part.as_str(), &force, "mechanics=reduced", "gripper.max_force_n=80"], &at[..], sets].concat(),
+    );
+    match generate(&p, 0, SimdLevel::best()).outcome {
+        Outcome::Pulled(pulled) => {
+            let imprint = &pulled.imprint.left;
+            (1e3 * imprint.press_depth_m, 1e6 * imprint.patch.area_m2())
+        }
+        other => panic!("{part} at {force_n} N: {other:?}"),
+    }
+}
+
+/// The constants of the shipped gel are those of one material: the modulus of the elastic gel that is pressed as deep as
+/// `V = c F` says, and the shear stiffness that this modulus has (assets/gels/README.md).
+#[test]
+fn the_constants_of_the_shipped_gel_are_those_of_one_material() {
+    let mut logs = Vec::new();
+    let mut areas_mm2 = Vec::new();
+    for part in ["ball_bearing", "long_shaft", "gear", "roller_bearing"] {
+        for force_n in [20.0, 40.0] {
+            let (wanted_mm, area_mm2) = press(part, force_n, &[]);
+            let elastic = |mpa: f64| {
+                let modulus = format!("gel.left.young_modulus_mpa={mpa}");
+                press(part, force_n, &["gel.left.model=elastic", &modulus])
+            };
+            // The press is near a power of the modulus.
+            let (a, b) = (0.5, 1.0);
+            let (at_a, at_b) = (elastic(a).0, elastic(b).0);
+            let exponent = (at_b / at_a).ln() / (b / a).ln();
+            let mpa: f64 = a * (wanted_mm / at_a).powf(1.0 / exponent);
+            let (found_mm, found_mm2) = elastic(mpa);
+            println!(
+                "{part} {force_n} N: {wanted_mm:.2} mm, {area_mm2:.0} mm2 by c; {mpa:.2} MPa: {found_mm:.2} mm, {found_mm2:.0} mm2, \
+                 p / E {:.2}",
+                force_n / found_mm2 / mpa
+            );
+            assert!((found_mm / wanted_mm - 1.0).abs() < 0.1, "{found_mm} for {wanted_mm} mm");
+            logs.push(mpa.ln());
+            areas_mm2.push(area_mm2);
+        }
+    }
+    let mean = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+    println!("modulus {mean:.2} MPa");
+    assert!((mean / SHIPPED_MODULUS_MPA).ln().abs() < 0.05, "{mean} MPa");
+    // Sheared as a whole the layer has G A / t, a patch of it is held by what lies around it: more than G A / t with the area
+    // of the contact, less than with that of the pad.
+    let (g_mpa, thickness_mm) = (SHIPPED_MODULUS_MPA / 3.0, 4.0);
+    let stiffness = |area_mm2: f64| g_mpa * area_mm2 / thickness_mm;
+    let mean_mm2 = areas_mm2.iter().sum::<f64>() / areas_mm2.len() as f64;
+    let (low, high) = (stiffness(mean_mm2), stiffness(28.064 * 21.048));
+    println!("shear {low:.1} to {high:.1} N/mm, mean contact {mean_mm2:.0} mm2");
+    assert!(low < 20.0 && 20.0 < high, "20 N/mm are shipped, {low} to {high} follow");
+}
+
+/// Young's modulus that the shipped imprint constant stands for.
+const SHIPPED_MODULUS_MPA: f64 = 0.85;
+
+/// `check` says where an elastic gel is pressed beyond what linear elasticity holds for.
+#[test]
+fn a_plan_says_the_pressure_over_the_modulus() {
+    let share = |sets: &[&str]| {
+        let at = [
+            "vary.part=[\"long_shaft\"]",
+            "vary.grip_force_n=[40]",
+            "vary.grip_pose=[0]",
+            "vary.grip_offset_mm=[0]",
+        ];
+        let cheap = ["vary.grip_angle_deg=[0]", "images=none", "trace=none", "mechanics=reduced"];
+        let p = project("asset:configs/quickstart.toml", &[&at[..], &cheap, sets].concat());
+        gripgen::plan(&p, SimdLevel::best()).unwrap().probes[0].pressure_over_modulus
+    };
+    assert_eq!(share(&[]), None, "the pyramid has no modulus");
+    let of =
+        |mpa: &str| share(&["gel.left.model=elastic", &format!("gel.left.young_modulus_mpa={mpa}")]).unwrap();
+    let (soft, hard) = (of("0.3"), of("2"));
+    assert!(soft > LINEAR_PRESSURE_SHARE && hard < LINEAR_PRESSURE_SHARE, "{soft} {hard}");
+    // 40 N on the area that the contact of a gel of 2 MPa has.
+    let (_, area_mm2) =
+        press("long_shaft", 40.0, &["gel.left.model=elastic", "gel.left.young_modulus_mpa=2"]);
+    assert!((hard / (40.0 / area_mm2 / 2.0) - 1.0).abs() < 0.05, "{hard}, {area_mm2} mm2");
 }
 
 /// Real presses of a ball of 4 mm at half resolution (320 x 240 of 0.059 mm): change of each channel, centre, radius.

@@ -3,7 +3,8 @@
     python benches/peers/tactile.py --gripgen FILE [--gripgen-command COMMAND] [--taxim]
 
 FILE is written by `cargo bench --bench tactile_stages -- FILE.json`, which COMMAND may be; FILE.f32 beside it holds the
-contact and the surface of gripgen, so that both work on the same press and their heights can be compared. With --taxim
+contact and the surfaces of gripgen (with the shipped sensor's blurs and with those of a sensor that was calibrated anew), so that
+all work on the same press and their heights can be compared. With --taxim
 the package `taxim` (1.4.1, on JAX) is timed too, if it is installed. One thread, CPU time, the shortest of many runs.
 """
 
@@ -62,8 +63,8 @@ def finish(rest, change, stream):
     return np.clip(rest + change + noise + 0.5, 0, 255).astype(np.uint8)
 
 
-def taxim_us():
-    """The package's image at 320 x 240, without shadow; None if it is not installed."""
+def taxim_us(is_shadowed):
+    """The package's image at 320 x 240; None if it is not installed."""
     try:
         from taxim import Taxim
         sensor = Taxim(params={"sensor": {"w": 320, "h": 240, "pixmm": 0.059}}, backend="jax", device="cpu")
@@ -73,7 +74,7 @@ def taxim_us():
     y, x = np.mgrid[:240, :320]
     # A ball of 4 mm: distance from the gel in mm, growing away from it.
     heights = (((x - 160) ** 2 + (y - 120) ** 2) * 0.059**2 / 8.0).astype(np.float32)
-    return best_us(lambda: sensor.render(heights, with_shadow=False, press_depth=1.0), 20)
+    return best_us(lambda: sensor.render(heights, with_shadow=is_shadowed, press_depth=1.0), 20)
 
 
 def main():
@@ -88,10 +89,13 @@ def main():
         ours = json.load(file)
     cv2.setNumThreads(1)
     shape = (ours["height_px"], ours["width_px"])
-    depth, surface = np.fromfile(options.gripgen + ".f32", dtype="<f4").reshape(2, *shape)
+    depth, surface, wide_surface = np.fromfile(options.gripgen + ".f32", dtype="<f4").reshape(3, *shape)
     core = depth > np.float32(ours["restore_depth_fraction"] * ours["press_px"])
     kernels = ours["kernels_px"]
     deformed = deform(depth, core, kernels)
+    calibrated = ours["calibrated"]
+    wide_core = depth > np.float32(calibrated["restore_depth_fraction"] * ours["press_px"])
+    wide = deform(depth, wide_core, calibrated["kernels_px"])
     stream = np.random.default_rng(1)
     table = stream.normal(size=(3, 125, 125, 6))
     v, u = np.mgrid[: shape[0], : shape[1]]
@@ -105,6 +109,7 @@ def main():
         "colour": best_us(lambda: colour(x, y, table, places)),
         "noise and rounding": best_us(lambda: finish(rest, change, stream)),
     }
+    wide_us = best_us(lambda: deform(depth, wide_core, calibrated["kernels_px"]))
     us = ours["us"]
     fastest = [key.split(", ")[1] for key in us if key.startswith("surface, ")][-1]
     rows = [
@@ -113,6 +118,13 @@ def main():
         ("colour", us["shade"], peers["colour"]),
         ("noise and rounding", us["finish"], peers["noise and rounding"]),
         ("image from the contact", us[f"image, {fastest}"], sum(peers.values())),
+        ("deform, calibrated", us["surface of regressor"], wide_us),
+        ("colour, calibrated", us["shade of regressor"], peers["colour"]),
+        (
+            "image from the contact, calibrated",
+            us[f"image, regressor, {fastest}"],
+            sum(peers.values()) - peers["deform"] + wide_us,
+        ),
     ]
     print(f"Python {platform.python_version()}, OpenCV {cv2.__version__}, numpy {np.__version__}; gripgen on {fastest}\n")
     print(f"{shape[1]} x {shape[0]} pixels, {100 * ours['contact_share']:.1f} % in contact, kernels {kernels}\n")
@@ -120,10 +132,18 @@ def main():
     for name, a, b in rows:
         print(f"| {name} | {a:.0f} | {b:.0f} | {b / a:.1f} |")
     print(f"| press: {ours['triangles']} triangles to contact | {us[f'press, {fastest}']:.0f} | - | - |")
-    print(f"| all from the mesh | {us[f'press and image, {fastest}']:.0f} | - | - |")
-    if options.taxim and (package := taxim_us()):
-        print(f"| package taxim 1.4.1 (JAX), its image without shadow | - | {package:.0f} | - |")
-    print(f"\nLargest difference of the deformed heights: {np.abs(deformed - surface).max():.1e} px")
+    every = {kind: us[f"press and image, {kind}{fastest}"] for kind in ("", "regressor, ", "shadow, ", "regressor_shadow, ")}
+    print(f"| all from the mesh | {every['']:.0f} | - | - |")
+    print(f"| all from the mesh, calibrated | {every['regressor, ']:.0f} | - | - |")
+    print(f"| all from the mesh, with shadow | {every['shadow, ']:.0f} | - | - |")
+    print(f"| all from the mesh, calibrated, with shadow | {every['regressor_shadow, ']:.0f} | - | - |")
+    for is_shadowed, kind in ((False, "regressor, "), (True, "regressor_shadow, ")):
+        if options.taxim and (package := taxim_us(is_shadowed)):
+            name = f"package taxim 1.4.1 (JAX), its image {'with' if is_shadowed else 'without'} shadow"
+            print(f"| {name}, beside ours from the mesh | {every[kind]:.0f} | {package:.0f} | {package / every[kind]:.0f} |")
+    print(f"\nKernels of the calibrated sensor: {calibrated['kernels_px']}")
+    for name, a, b in (("shipped", deformed, surface), ("calibrated", wide, wide_surface)):
+        print(f"Largest difference of the deformed heights, {name}: {np.abs(a - b).max():.1e} px")
 
 
 if __name__ == "__main__":

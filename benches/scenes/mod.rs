@@ -3,7 +3,7 @@
 use gripgen::tactile::presses::{
     CalibrateOptions, Circle, Press, PressSet, calibrate_presses, predict_press,
 };
-use gripgen::tactile::{Markers, Sensor, Shadow, ShadowKind, ShadowTable, print_markers};
+use gripgen::tactile::{ColourModel, Markers, Sensor, Shadow, ShadowKind, ShadowTable, print_markers};
 use gripgen::twin::frames::{Pose, pose, rotation_from_fixed_xyz};
 use gripgen::twin::{Elastic, Gel, TactileImage, TriMesh};
 use nalgebra::{Point3, Vector3};
@@ -46,8 +46,8 @@ pub const IMPRINT_M3_PER_N: f64 = 1.5e-9;
 
 /// Kinds of sensor by name, with the frame, the pixels and the gel of a sensor with lights: `regressor`, calibrated with
 /// presses of a ball that the lights draw; `shadow`, with a table of shadows that fade over 3 mm; `markers`, with 14 x 11
-/// dots.
-pub fn sensors(lights: &Sensor) -> [(&'static str, Sensor); 3] {
+/// dots; `regressor_shadow`, calibrated and with that table.
+pub fn sensors(lights: &Sensor) -> [(&'static str, Sensor); 4] {
     let (grid, colour) = (lights.grid, &lights.colour);
     let regressor =
         calibrate_presses(&presses(lights), &CalibrateOptions { folds: Some(2), ..Default::default() })
@@ -66,14 +66,19 @@ pub fn sensors(lights: &Sensor) -> [(&'static str, Sensor); 3] {
         step_m: 37e-6,
         rays: rays.collect(),
     };
-    let shadow = Shadow::new(table, grid.metres_per_px, grid.width_px, colour);
+    let regressor = Sensor { gel_shape: lights.gel_shape.clone(), ..regressor };
+    let shadow = |colour: &ColourModel| {
+        Some(Box::new(Shadow::new(table.clone(), grid.metres_per_px, grid.width_px, colour)))
+    };
+    let both = Sensor { shadow: shadow(&regressor.colour), ..regressor.clone() };
     let markers = Markers::regular(&grid, 14, 11, 20.0, 3.0, [0.5; 3]);
     let mut marked = lights.clone();
     print_markers(&mut marked.rest, &grid, &markers);
     [
-        ("regressor", Sensor { gel_shape: lights.gel_shape.clone(), ..regressor }),
-        ("shadow", Sensor { shadow: Some(Box::new(shadow)), ..lights.clone() }),
+        ("regressor", regressor),
+        ("shadow", Sensor { shadow: shadow(colour), ..lights.clone() }),
         ("markers", Sensor { markers: Some(markers), ..marked }),
+        ("regressor_shadow", both),
     ]
 }
 

@@ -156,6 +156,7 @@ const LOVE_MIDDLE: f64 = 3.525_494_348_078_172;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     /// Long waves press a compressible layer as a column (`t / M`); short waves do not feel the base.
     #[test]
@@ -232,6 +233,31 @@ mod tests {
             assert!(q.at(0.0) < -1.0);
             let exact = simpson(40.0, 4000, |x| (normal_ratio(x, nu) - 1.0) * libm::j0(x * 0.77));
             assert!((q.at(0.77) - exact).abs() < 1e-5, "{} {exact}", q.at(0.77));
+        }
+    }
+
+    /// Mean displacement of a disc under an even shear q: `2 q integral of (J1(k a) / k)^2 C(k) / (G k) k dk`, C the mean of along and
+    /// across. On a half-space that is a little less stiff than a rigid disc, `8 G a / (2 - nu)`; a thin layer has `G A / t`.
+    #[test]
+    fn a_sheared_disc_has_the_stiffness_that_assets_say() {
+        let stiffness = |area: f64, shear_modulus: f64, thickness: f64| {
+            let a = (area / PI).sqrt();
+            let at = |k: f64| {
+                let both = in_plane(k * thickness, 0.0, 0.5);
+                let bessel = libm::j1(k * a) / k;
+                bessel * bessel * 0.5 * (both.along + both.across)
+            };
+            PI * a * a * shear_modulus / (2.0 * simpson(200.0 / a, 20_000, |k| at(k.max(1e-9))))
+        };
+        let rigid = 8.0 * PI.recip().sqrt() / 1.5;
+        let half_space = stiffness(1.0, 1.0, 300.0) / rigid;
+        assert!((0.9..1.0).contains(&half_space), "{half_space}");
+        let thin = stiffness(1.0, 1.0, 0.01) / 100.0;
+        assert!((thin - 1.0).abs() < 0.03, "{thin}");
+        // mm and MPa: the shipped gel, assets/gels/README.md.
+        for (area_mm2, wanted) in [(54.0, 8.8), (96.0, 13.2), (168.0, 20.0)] {
+            let found = stiffness(area_mm2, 0.85 / 3.0, 4.0);
+            assert!((found / wanted - 1.0).abs() < 0.01, "{area_mm2} mm2: {found} N/mm");
         }
     }
 }

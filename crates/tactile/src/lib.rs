@@ -65,7 +65,7 @@ mod simd;
 pub use appearance::appearance;
 pub use colour::{ColourModel, Lambert, Light, Regressor, TaximTable, shade};
 pub use deform::{BlurredRest, deform};
-pub use elastic::{Base, ElasticGel, press_elastic};
+pub use elastic::{Base, ElasticGel, LINEAR_PRESSURE_SHARE, press_elastic};
 pub use gradient::gradient;
 pub use grid::{Grid, Plane};
 pub use indent::{ElasticField, Imprint, IndentError, PressedGel, indent};

@@ -6,6 +6,7 @@ mod calibrate;
 mod circle;
 mod compare;
 mod contact;
+mod coverage;
 mod data_pack;
 mod gain;
 mod heights;
@@ -24,6 +25,7 @@ pub use compare::{
     CROPS_PX, CompareError, PressComparison, PressScore, Scores, WINDOW_PX, compare_presses, crop,
     predict_press, score_press,
 };
+pub use coverage::{PARTS, PressCoverage, RIM_M, SEEN_SHARE, press_coverage};
 pub use data_pack::{DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError};
 
 use gripgen_twin::TactileImage;

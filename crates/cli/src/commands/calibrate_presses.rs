@@ -8,11 +8,12 @@ use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::tactile::presses::{
-    BallSize, CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PressSet,
-    calibrate_presses, check_ball_size,
+    BallSize, CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PARTS, PressCoverage,
+    PressSet, RIM_M, calibrate_presses, check_ball_size, press_coverage,
 };
 use gripgen::tactile::{GelShape, Sensor};
-use gripgen::{PressGeometry, PressReportText, find_missing_circles, load_presses, press_report};
+use gripgen::twin::TactileImage;
+use gripgen::{PressGeometry, PressMap, PressReportText, find_missing_circles, load_presses, press_report};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -46,6 +47,8 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
     let ball_size = check_ball_size(&set, &calibration);
     say_what_is_not_shown(&set, &args.talk);
     say_ball_size(&set, ball_size.as_ref(), &args.talk);
+    let coverage = press_coverage(&set, &calibration.doubtful);
+    say_coverage(coverage.as_ref(), &args.talk);
     let bytes = match calibration.sensor.to_npz() {
         Some(bytes) => bytes.map_err(Failure::new)?,
         None => return Err(Failure::new("the fitted colours have no place in a sensor file")),
@@ -55,12 +58,23 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
         Failure::usage(format!("{}: the fitted sensor cannot be: {e}", args.presses.display()))
             .hint("are these presses of one ball into one sensor, with the camera's settings fixed?")
     })?;
+<<<<<<< HEAD
     outputs.write(&args.out, Format::Npz, &bytes)?;
     let page =
         press_report(&text(args, &set, &calibration, ball_size.as_ref()), &set, &calibration.held_out, |i| {
             calibration.predicted.get(i).cloned()
         });
     outputs.write(&report, Format::Html, page.as_bytes())?;
+=======
+    write_file(&args.out, &bytes)?;
+    let report_text = PressReportText {
+        map: coverage.as_ref().map(|coverage| map(coverage, &calibration.sensor)),
+        ..text(args, &set, &calibration, ball_size.as_ref())
+    };
+    let page =
+        press_report(&report_text, &set, &calibration.held_out, |i| calibration.predicted.get(i).cloned());
+    write_file(&report, page.as_bytes())?;
+>>>>>>> hB
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.press_calibration/1",
@@ -69,6 +83,7 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
             "folds": calibration.folds,
             "fitted": fitted(&calibration.sensor),
             "ball_size": ball_size_json(ball_size.as_ref()),
+            "coverage": coverage.as_ref().map(coverage_json),
             "doubtful": calibration.doubtful,
             "held_out": comparison_json(&calibration.held_out),
         }))?;
@@ -147,6 +162,60 @@ fn say_ball_size(set: &PressSet, size: Option<&BallSize>, talk: &TalkArgs) {
             in_words(size)
         );
     }
+}
+
+/// Where nothing was pressed.
+fn say_coverage(coverage: Option<&PressCoverage>, talk: &TalkArgs) {
+    let Some(coverage) = coverage.filter(|coverage| !talk.quiet && coverage.unseen_parts().next().is_some())
+    else {
+        return;
+    };
+    eprintln!("note: {}; press there too, or expect larger errors there", coverage_in_words(coverage));
+}
+
+/// How much of the frame was pressed, and where nothing was.
+fn coverage_in_words(coverage: &PressCoverage) -> String {
+    let (percent, rim_mm) = (100.0 * coverage.share, 1e3 * RIM_M);
+    let PressCoverage { farthest_m, farthest_px: (x, y), .. } = coverage;
+    let all = format!(
+        "{percent:.0} % of the frame lay in a contact or within {rim_mm:.1} mm of one; the farthest place, ({x}, {y}) px, is {:.1} mm \
+         from the nearest",
+        1e3 * farthest_m
+    );
+    let parts: Vec<String> = coverage
+        .unseen_parts()
+        .map(|(row, column)| format!("row {} column {}", row + 1, column + 1))
+        .collect();
+    if parts.is_empty() {
+        return all;
+    }
+    let (columns, rows) = PARTS;
+    format!("{all}; of {columns} x {rows} parts of the frame hardly pressed: {}", parts.join(", "))
+}
+
+fn coverage_json(coverage: &PressCoverage) -> Value {
+    let rounded = |share: f64| (1e4 * share).round() / 1e4;
+    let parts: Vec<f64> = coverage.part_shares.iter().map(|share| rounded(*share)).collect();
+    let unseen = coverage.unseen_parts().map(|(row, column)| json!({"row": row, "column": column}));
+    json!({
+        "rim_mm": 1e3 * RIM_M,
+        "share": rounded(coverage.share),
+        "part_shares": parts.chunks(PARTS.0).collect::<Vec<_>>(),
+        "unseen_parts": unseen.collect::<Vec<_>>(),
+        "farthest_mm": 1e3 * coverage.farthest_m,
+        "farthest_px": [coverage.farthest_px.0, coverage.farthest_px.1],
+    })
+}
+
+/// The frame at rest, dark and grey where nothing was pressed.
+fn map(coverage: &PressCoverage, sensor: &Sensor) -> PressMap {
+    let level = |pixel: usize, c: usize| match coverage.seen[pixel] {
+        true => sensor.rest[c][pixel].clamp(0.0, 255.0) as u8,
+        false => ((0..3).map(|c| sensor.rest[c][pixel]).sum::<f32>() / 9.0).clamp(0.0, 255.0) as u8,
+    };
+    let rgb = (0..sensor.grid.len()).flat_map(|pixel| [0, 1, 2].map(|c| level(pixel, c))).collect();
+    let (width_px, height_px) = (sensor.grid.width_px as u32, sensor.grid.height_px as u32);
+    PressMap { image: TactileImage { width_px, height_px, rgb }, text: coverage_in_words(coverage) }
 }
 
 fn in_words(size: &BallSize) -> String {
@@ -249,5 +318,6 @@ fn text(
             ("gel around a contact".into(), gives_way(sensor)),
             ("noise of red, green, blue".into(), format!("{red:.2}, {green:.2}, {blue:.2} grey levels")),
         ],
+        map: None,
     }
 }

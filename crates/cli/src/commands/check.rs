@@ -5,7 +5,7 @@ use crate::failure::{Failure, code};
 use crate::output::{JsonSink, count, duration, size};
 use crate::outputs::Outputs;
 use gripgen::record::{proto::gripgen_v1::Status, status_name};
-use gripgen::tactile::SimdLevel;
+use gripgen::tactile::{LINEAR_PRESSURE_SHARE, SimdLevel};
 use gripgen::{Location, Plan, Project, plan};
 use serde_json::json;
 
@@ -32,7 +32,7 @@ pub fn check(
         let probes: Vec<_> = plan
             .probes
             .iter()
-            .map(|p| json!({"index": p.index, "status": status_name(p.status), "failure": p.failure, "lag_exceeds_tolerance": p.lag_exceeds_tolerance}))
+            .map(|p| json!({"index": p.index, "status": status_name(p.status), "failure": p.failure, "lag_exceeds_tolerance": p.lag_exceeds_tolerance, "pressure_over_modulus": p.pressure_over_modulus}))
             .collect();
         let grips: Vec<_> = plan
             .grips
@@ -67,6 +67,13 @@ pub fn check(
                 eprintln!(
                     "warning: sample {index}: the force loop trails the staircase by more than half the label \
                      tolerance, its label may come before the slip; smaller increments or longer steps help"
+                );
+            }
+            if let Some(share) = probe.pressure_over_modulus.filter(|share| *share > LINEAR_PRESSURE_SHARE) {
+                eprintln!(
+                    "warning: sample {index}: the contact's mean pressure is {share:.2} times the gel's modulus, linear \
+                     elasticity holds to about {LINEAR_PRESSURE_SHARE}: press and image are an extrapolation; a lighter grip or \
+                     a stiffer gel (young_modulus_mpa) stays inside, `model = \"pyramid\"` has no such limit"
                 );
             }
             match probe.status {

@@ -66,6 +66,7 @@ fn presses(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<
                 ("ball".into(), format!("{:.3} mm", set.ball_m * 1e3)),
                 ("pixel".into(), format!("{:.4} mm", set.metres_per_px * 1e3)),
             ],
+            map: None,
         };
         let page = press_report(&text, &set, &comparison, |i| {
             predict_press(&set.presses[i], set.ball_m, &sensor).ok()

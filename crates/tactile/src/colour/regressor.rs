@@ -66,6 +66,15 @@ pub struct Regressor {
 }
 
 impl Regressor {
+    /// The features of the surroundings that have a say: with coefficients other than 0.
+    pub(crate) fn around_used(&self) -> [bool; SURROUNDINGS] {
+        let mut used = [false; SURROUNDINGS];
+        for (i, of_feature) in self.around.as_chunks::<AROUND_FIELD>().0.iter().enumerate() {
+            used[i % SURROUNDINGS] |= of_feature.iter().any(|&c| c != 0.0);
+        }
+        used
+    }
+
     /// Whether all coefficients are finite, all limits positive or 0, and the side of a pixel sensible.
     pub(crate) fn is_usable(&self) -> bool {
         let limits = || self.around_limit.iter().chain([&self.slope_limit, &self.height_limit_mm]);
@@ -126,14 +135,15 @@ fn product<const N: usize>(a: &[f32; N], b: &[f32; N]) -> [f32; N] {
 
 /// The features of the surroundings that calibrations fit, [`AROUND_FITTED`]: one plane for each, on the finest cells.
 pub(crate) fn fitted_surroundings(surface: &Plane, mm_per_px: f64) -> Vec<Plane> {
+    let mut wanted = [false; SURROUNDINGS];
+    AROUND_FITTED.iter().for_each(|&feature| wanted[feature] = true);
     let Surroundings { fine, coarse } =
-        surroundings(&Planes::of_heights(surface), cell_px(mm_per_px), mm_per_px);
-    let (w, h) = (fine[0].width, fine[0].height);
-    let plane = |feature: usize| match feature.checked_sub(fine.len()) {
-        None => fine[feature].clone(),
-        Some(coarser) => double(&coarse[coarser], w, h),
-    };
-    AROUND_FITTED.map(plane).to_vec()
+        surroundings(&Planes::of_heights(surface), cell_px(mm_per_px), mm_per_px, &wanted);
+    let (w, h) = fine.size;
+    let doubled = coarse.planes.iter().map(|(feature, plane)| (*feature, double(plane, w, h)));
+    let mut planes: Vec<(usize, Plane)> = fine.planes.into_iter().chain(doubled).collect();
+    planes.sort_by_key(|(feature, _)| AROUND_FITTED.iter().position(|fitted| fitted == feature));
+    planes.into_iter().map(|(_, plane)| plane).collect()
 }
 
 /// Where pixels lie in the image.

@@ -3,7 +3,7 @@
 
 use super::block::{BLOCK, CHANNELS, block_of, by_monomial};
 use super::near::Near;
-use super::pyramid::{DERIVATIVES, SURROUNDINGS, Surroundings, cell_px, double, surroundings};
+use super::pyramid::{Features, SURROUNDINGS, Surroundings, cell_px, double, surroundings};
 use super::terrain::Terrain;
 use super::{AROUND_FIELD, Place, Regressor, between_cells, cell_centre_px};
 use crate::grid::Plane;
@@ -74,13 +74,12 @@ fn around<L: Lanes>(
     cell: usize,
     scratch: &mut DrawScratch,
 ) -> Spread {
-    let Surroundings { fine, coarse } = surroundings(terrain, cell, model.mm_per_px);
+    let Surroundings { fine, coarse } = surroundings(terrain, cell, model.mm_per_px, &model.around_used());
     let fields = by_monomial::<AROUND_FIELD>(&model.around, SURROUNDINGS);
     let cells = Cells { model, fields: &fields, size: terrain.size() };
-    cells.combine::<L>(&coarse, DERIVATIVES, 2 * cell, &mut scratch.coarse);
-    cells.combine::<L>(&fine, 0, cell, &mut scratch.fine);
-    let (w, h) = (fine[0].width, fine[0].height);
-    let (coarse_w, coarse_h) = (coarse[0].width, coarse[0].height);
+    cells.combine::<L>(&coarse, 2 * cell, &mut scratch.coarse);
+    cells.combine::<L>(&fine, cell, &mut scratch.fine);
+    let ((w, h), (coarse_w, coarse_h)) = (fine.size, coarse.size);
     let spread = Spread::new(cell, w, h);
     scratch.wide.resize(spread.stride * CHANNELS * h, 0.0);
     for (channel, (fine, coarse)) in scratch.fine.iter_mut().zip(&scratch.coarse).enumerate() {
@@ -105,25 +104,24 @@ struct Cells<'a> {
 }
 
 impl Cells<'_> {
-    /// The sums over features from `first` on, on their cells of `cell_px` pixels. `out` gets some values more.
+    /// The sums over features on cells of `cell_px` pixels. `out` gets some values more.
     #[inline(always)]
-    fn combine<L: Lanes>(
-        &self,
-        features: &[Plane],
-        first: usize,
-        cell_px: usize,
-        out: &mut [Vec<f32>; CHANNELS],
-    ) {
-        let (w, h) = (features[0].width, features[0].height);
+    fn combine<L: Lanes>(&self, features: &Features, cell_px: usize, out: &mut [Vec<f32>; CHANNELS]) {
+        let Features { size: (w, h), planes } = features;
+        let (w, h) = (*w, *h);
         let place = Place::of(self.size);
         let u: Vec<f32> =
             (0..w.next_multiple_of(BLOCK)).map(|x| place.u(cell_centre_px(x, cell_px))).collect();
         out.iter_mut().for_each(|out| out.resize(w * h + BLOCK, 0.0));
-        let limits = &self.model.around_limit[first..first + features.len()];
-        let all = CHANNELS * SURROUNDINGS;
-        let n = CHANNELS * features.len();
-        let field = |m: usize| &self.fields[m * all + CHANNELS * first..][..n];
-        let (f0, f1, f2, f3, f4, f5) = (field(0), field(1), field(2), field(3), field(4), field(5));
+        let (all, n) = (CHANNELS * SURROUNDINGS, CHANNELS * planes.len());
+        // By monomial the coefficients of the features that are there.
+        let mut f = [[0.0f32; CHANNELS * SURROUNDINGS]; AROUND_FIELD];
+        for (m, f) in f.iter_mut().enumerate() {
+            for ((feature, _), to) in planes.iter().zip(f.as_chunks_mut::<CHANNELS>().0) {
+                to.copy_from_slice(&self.fields[m * all + CHANNELS * feature..][..CHANNELS]);
+            }
+        }
+        let [f0, f1, f2, f3, f4, f5] = f.each_ref().map(|f| &f[..n]);
         let mut c = [[0.0f32; CHANNELS * SURROUNDINGS]; 3];
         c[2][..n].copy_from_slice(f3);
         let mut held = [[0.0f32; BLOCK]; SURROUNDINGS];
@@ -140,7 +138,8 @@ impl Cells<'_> {
                 // A block may reach into the next row, whose own blocks come later.
                 let at = y * w + start;
                 let mut sums = [[0.0f32; BLOCK]; 3 * CHANNELS];
-                for (i, (feature, &limit)) in features.iter().zip(limits).enumerate() {
+                for (i, (number, feature)) in planes.iter().enumerate() {
+                    let limit = self.model.around_limit[*number];
                     let mut f = [0.0f32; BLOCK];
                     match feature.values[at..].first_chunk() {
                         Some(values) => f = *values,
@@ -153,7 +152,7 @@ impl Cells<'_> {
                     held[i] = f;
                 }
                 // SAFETY: the caller has the instructions of `L`.
-                unsafe { weigh::<L>(&held[..features.len()], &c, &mut sums) };
+                unsafe { weigh::<L>(&held[..planes.len()], &c, &mut sums) };
                 let u: &[f32; BLOCK] = block_of(&u, start);
                 for channel in 0..CHANNELS {
                     let out = &mut out[channel][at..at + BLOCK];

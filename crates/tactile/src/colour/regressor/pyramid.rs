@@ -63,27 +63,47 @@ pub(crate) fn cell_px(mm_per_px: f64) -> usize {
     ((CELL_MM / mm_per_px).round() as usize).max(1)
 }
 
-/// The features of a surface: the finest level on its own cells, the others on cells of twice that size.
+/// Which of the features are looked at.
+pub(super) type Wanted = [bool; SURROUNDINGS];
+
+/// Features of a surface: the finest level on its own cells, the others on cells of twice that size.
 pub(super) struct Surroundings {
-    pub(super) fine: Vec<Plane>,
-    pub(super) coarse: Vec<Plane>,
+    pub(super) fine: Features,
+    pub(super) coarse: Features,
 }
 
-/// Features of a surface, whose heights are in pixels.
+/// Features on cells of one size.
+pub(super) struct Features {
+    /// Cells along a row and a column.
+    pub(super) size: (usize, usize),
+    /// Each with its number among all.
+    pub(super) planes: Vec<(usize, Plane)>,
+}
+
+/// The wanted features of a surface, whose heights are in pixels, in the order of their numbers.
 #[inline(always)]
-pub(super) fn surroundings(terrain: &impl Terrain, cell_px: usize, mm_per_px: f64) -> Surroundings {
+pub(super) fn surroundings(
+    terrain: &impl Terrain,
+    cell_px: usize,
+    mm_per_px: f64,
+    wanted: &Wanted,
+) -> Surroundings {
     let mut level = smooth(&smooth(&cells(terrain, cell_px, mm_per_px)));
-    let fine = derivatives(&level);
-    let mut coarse = Vec::new();
+    let fine = Features { size: (level.width, level.height), planes: derivatives(&level, 0, wanted) };
+    let coarse_size = (level.width.div_ceil(2), level.height.div_ceil(2));
+    let mut coarse = Features { size: coarse_size, planes: Vec::new() };
     let mut sizes: Vec<(usize, usize)> = Vec::new();
-    for _ in 1..LEVELS {
+    for first in (DERIVATIVES..SURROUNDINGS).step_by(DERIVATIVES) {
+        if !wanted[first..].contains(&true) {
+            break;
+        }
         level = smooth(&smooth(&halve(&level)));
         sizes.push((level.width, level.height));
-        for mut plane in derivatives(&level) {
+        for (feature, mut plane) in derivatives(&level, first, wanted) {
             for &(width, height) in sizes[..sizes.len() - 1].iter().rev() {
                 plane = double(&plane, width, height);
             }
-            coarse.push(plane);
+            coarse.planes.push((feature, plane));
         }
     }
     Surroundings { fine, coarse }
@@ -211,15 +231,31 @@ pub(super) fn double(plane: &Plane, width: usize, height: usize) -> Plane {
     out
 }
 
-/// The plane and its central differences up to third order, per cell.
+/// Of which derivative each one is the difference along x (`false`) or y, behind the plane itself.
+const MADE_OF: [(usize, bool); DERIVATIVES - 1] =
+    [(0, false), (0, true), (1, false), (1, true), (2, true), (3, false), (3, true), (5, false), (5, true)];
+
+/// The plane of a level and its central differences up to third order, per cell: those that are wanted, the first of which has
+/// the number `first`.
 #[inline(always)]
-fn derivatives(z: &Plane) -> Vec<Plane> {
-    let (zx, zy) = (along_x(z), along_y(z));
-    let (zxx, zxy, zyy) = (along_x(&zx), along_y(&zx), along_y(&zy));
-    let third = [along_x(&zxx), along_y(&zxx), along_x(&zyy), along_y(&zyy)];
-    let mut all = vec![z.clone(), zx, zy, zxx, zxy, zyy];
-    all.extend(third);
-    all
+fn derivatives(z: &Plane, first: usize, wanted: &Wanted) -> Vec<(usize, Plane)> {
+    let mut needed = [false; DERIVATIVES];
+    needed.copy_from_slice(&wanted[first..first + DERIVATIVES]);
+    for (i, &(from, _)) in MADE_OF.iter().enumerate().rev() {
+        needed[from] |= needed[i + 1];
+    }
+    let mut planes: [Option<Plane>; DERIVATIVES] = [const { None }; DERIVATIVES];
+    for (i, &(from, is_along_y)) in MADE_OF.iter().enumerate() {
+        if needed[i + 1] {
+            let from = planes[from].as_ref().unwrap_or(z);
+            planes[i + 1] = Some(if is_along_y { along_y(from) } else { along_x(from) });
+        }
+    }
+    if needed[0] {
+        planes[0] = Some(z.clone());
+    }
+    let numbered = planes.into_iter().enumerate().filter_map(|(i, plane)| Some((first + i, plane?)));
+    numbered.filter(|(feature, _)| wanted[*feature]).collect()
 }
 
 #[inline(always)]
@@ -264,7 +300,7 @@ mod tests {
                 surface.values[y * 512 + x] = 1.0;
             }
         }
-        let found = surroundings(&Planes::of_heights(&surface), 8, 0.03);
+        let found = surroundings(&Planes::of_heights(&surface), 8, 0.03, &[true; SURROUNDINGS]);
         let variance = |plane: &Plane| {
             let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
             for (i, &z) in plane.values.iter().enumerate() {
@@ -276,10 +312,13 @@ mod tests {
             second / sum - (first / sum) * (first / sum)
         };
         // Smoothed twice by variance 2; the pin itself straddles two cells and adds 1/4.
-        assert!((variance(&found.fine[0]) - 4.25).abs() < 1e-3);
+        assert!((variance(&found.fine.planes[0].1) - 4.25).abs() < 1e-3);
         // A quarter of that in cells of twice the size, plus the pair's own spread, plus 4.
-        assert!((variance(&found.coarse[0]) - (4.25 / 4.0 + 0.0625 + 4.0)).abs() < 1e-2);
-        assert_eq!((found.fine.len(), found.coarse.len()), (DERIVATIVES, SURROUNDINGS - DERIVATIVES));
+        assert!((variance(&found.coarse.planes[0].1) - (4.25 / 4.0 + 0.0625 + 4.0)).abs() < 1e-2);
+        assert_eq!(
+            (found.fine.planes.len(), found.coarse.planes.len()),
+            (DERIVATIVES, SURROUNDINGS - DERIVATIVES)
+        );
     }
 
     #[test]
@@ -288,13 +327,38 @@ mod tests {
         for (i, z) in surface.values.iter_mut().enumerate() {
             *z = 0.1 * (i % 330) as f32 - 0.2 * (i / 330) as f32;
         }
-        let found = surroundings(&Planes::of_heights(&surface), 4, 0.06);
+        let found = surroundings(&Planes::of_heights(&surface), 4, 0.06, &[true; SURROUNDINGS]);
         let middle = |plane: &Plane| plane.at(plane.width / 2, plane.height / 2);
         // Millimetres per cell: slope times the cell's side, doubled from level to level.
         let close = |value: f32, exact: f32| assert!((value - exact).abs() < 2e-3, "{value} {exact}");
-        close(middle(&found.fine[1]), 0.1 * 0.24);
-        close(middle(&found.fine[2]), -0.2 * 0.24);
-        close(middle(&found.coarse[1]), 0.2 * 0.24);
-        close(middle(&found.fine[3]), 0.0);
+        close(middle(&found.fine.planes[1].1), 0.1 * 0.24);
+        close(middle(&found.fine.planes[2].1), -0.2 * 0.24);
+        close(middle(&found.coarse.planes[1].1), 0.2 * 0.24);
+        close(middle(&found.fine.planes[3].1), 0.0);
+    }
+
+    /// Each feature is the same whatever else is looked at.
+    #[test]
+    fn a_feature_alone_is_that_of_all() {
+        let mut surface = Plane::filled(83, 61, 0.0);
+        for (i, z) in surface.values.iter_mut().enumerate() {
+            let (x, y) = ((i % 83) as f32 - 50.0, (i / 83) as f32 - 27.0);
+            *z = (6.0 - 0.03 * (x * x + 0.6 * y * y + 0.3 * x * y)).max(0.0);
+        }
+        let of = |wanted: &Wanted| {
+            let found = surroundings(&Planes::of_heights(&surface), 2, 0.1, wanted);
+            [found.fine.planes, found.coarse.planes].concat()
+        };
+        let all = of(&[true; SURROUNDINGS]);
+        assert_eq!(
+            all.iter().map(|(feature, _)| *feature).collect::<Vec<_>>(),
+            Vec::from_iter(0..SURROUNDINGS)
+        );
+        for feature in 0..SURROUNDINGS {
+            let mut wanted = [false; SURROUNDINGS];
+            wanted[feature] = true;
+            assert_eq!(of(&wanted), [all[feature].clone()], "feature {feature}");
+        }
+        assert!(of(&[false; SURROUNDINGS]).is_empty());
     }
 }

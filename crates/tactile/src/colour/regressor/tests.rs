@@ -33,11 +33,12 @@ fn dent() -> Plane {
 
 /// The features of the surroundings of a surface on its finest cells, one plane a feature.
 fn around_planes(surface: &Plane, mm_per_px: f64) -> Vec<Plane> {
-    let Surroundings { mut fine, coarse } =
-        surroundings(&Planes::of_heights(surface), cell_px(mm_per_px), mm_per_px);
-    let (w, h) = (fine[0].width, fine[0].height);
-    fine.extend(coarse.iter().map(|plane| double(plane, w, h)));
-    fine
+    let all = [true; SURROUNDINGS];
+    let Surroundings { fine, coarse } =
+        surroundings(&Planes::of_heights(surface), cell_px(mm_per_px), mm_per_px, &all);
+    let (w, h) = fine.size;
+    let doubled = coarse.planes.iter().map(|(_, plane)| double(plane, w, h));
+    fine.planes.into_iter().map(|(_, plane)| plane).chain(doubled).collect()
 }
 
 fn change(model: Regressor, surface: &Plane) -> [Plane; 3] {
@@ -171,4 +172,25 @@ fn vector_units_give_the_same_bits() {
     for level in SimdLevel::available() {
         assert_eq!(at(level), portable, "{level:?}");
     }
+}
+
+/// A model that uses some of the features draws what it draws with all of them.
+#[test]
+fn features_without_coefficients_are_left_out() {
+    let surface = dent();
+    let mut few = model(0.0, 20.0);
+    for (i, c) in few.around.chunks_exact_mut(AROUND_FIELD).enumerate() {
+        if !AROUND_FITTED.contains(&(i % SURROUNDINGS)) {
+            c.fill(0.0);
+        }
+    }
+    assert_eq!(few.around_used().iter().filter(|used| **used).count(), AROUND_FITTED.len());
+    let drawn = change(few.clone(), &surface);
+    // One more feature with a say of nothing that a pixel can hold.
+    let mut all = few.clone();
+    all.around.iter_mut().filter(|c| **c == 0.0).for_each(|c| *c = 1e-30);
+    assert_eq!(all.around_used(), [true; SURROUNDINGS]);
+    assert_eq!(change(all, &surface), drawn);
+    few.around.fill(0.0);
+    assert!(change(few, &surface).iter().all(|plane| plane.values.iter().all(|&v| v == 0.0)));
 }
