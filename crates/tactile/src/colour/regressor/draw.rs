@@ -9,6 +9,9 @@ use super::{AROUND_FIELD, Place, Regressor, between_cells, cell_centre_px};
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
 
+/// Features below this are none: what is left of a contact far from it, too small for normal numbers once it is weighed.
+const NONE_BELOW: f32 = 1e-20;
+
 /// Pixels between two centres of cells that are written at once.
 const STRETCH: usize = 8;
 
@@ -148,6 +151,7 @@ impl Cells<'_> {
                     for f in &mut f {
                         *f = if *f > limit { limit } else { *f };
                         *f = if *f < -limit { -limit } else { *f };
+                        *f = if f.abs() < NONE_BELOW { 0.0 } else { *f };
                     }
                     held[i] = f;
                 }

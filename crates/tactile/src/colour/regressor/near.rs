@@ -5,6 +5,15 @@ use super::terrain::Terrain;
 use super::{NEAR, NEAR_FIELD, Place, Regressor, limited_normal, near_terms};
 use crate::simd::Lanes;
 
+/// Slopes, and heights in pixels, below this are none: no colour changes by a hundredth of a level. The blurs of a gel end in wide
+/// tails of 1e-10 and less, whose powers are too small for normal numbers; many processors take a hundred times as long for such.
+const NONE_BELOW: f32 = 1e-5;
+
+#[inline(always)]
+fn without_tail(x: f32) -> f32 {
+    if x.abs() < NONE_BELOW { 0.0 } else { x }
+}
+
 /// The part of displaced pixels.
 pub(super) struct Near<'a> {
     model: &'a Regressor,
@@ -97,23 +106,24 @@ impl<'a> Near<'a> {
         let scale = self.model.mm_per_px as f32;
         let (mut nx, mut ny, mut h) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
         for x in 0..BLOCK {
-            [nx[x], ny[x]] = limited_normal(gx[x], gy[x], self.model.slope_limit);
-            h[x] = (height[x] * scale).min(self.model.height_limit_mm);
+            let (gx, gy) = (without_tail(gx[x]), without_tail(gy[x]));
+            [nx[x], ny[x]] = limited_normal(gx, gy, self.model.slope_limit);
+            h[x] = (without_tail(height[x]) * scale).min(self.model.height_limit_mm);
         }
         near_terms(&nx, &ny, &h)
     }
 }
 
-/// Whether anything in a block is not 0.
+/// Whether anything in a block is displaced.
 #[inline(always)]
 fn moves(block: &[&[f32; BLOCK]; 3]) -> bool {
-    let mut bits = [0u32; BLOCK];
+    let mut largest = [0.0f32; BLOCK];
     for row in block {
-        for (bits, value) in bits.iter_mut().zip(*row) {
-            *bits |= value.to_bits() << 1;
+        for (largest, value) in largest.iter_mut().zip(*row) {
+            *largest = if value.abs() > *largest { value.abs() } else { *largest };
         }
     }
-    bits.iter().fold(0, |all, b| all | b) != 0
+    largest.iter().fold(0.0f32, |all, &v| if v > all { v } else { all }) >= NONE_BELOW
 }
 
 /// Sums over terms for a block of pixels, by channel: the fields, cubic in u, are taken as straight lines through their

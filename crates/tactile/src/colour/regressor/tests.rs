@@ -194,3 +194,29 @@ fn features_without_coefficients_are_left_out() {
     few.around.fill(0.0);
     assert!(change(few, &surface).iter().all(|plane| plane.values.iter().all(|&v| v == 0.0)));
 }
+
+/// The tail of a blur is no displacement, in blocks of pixels that it fills and beside others.
+#[test]
+fn tails_of_blurs_are_left_out() {
+    let surface = dent();
+    let far = |i: usize| {
+        let (x, y) = (i % 83, i / 83);
+        let at = |x: usize, y: usize| surface.at(x.min(82), y.min(60)) == 0.0;
+        at(x, y) && at(x + 1, y) && at(x.saturating_sub(1), y) && at(x, y + 1) && at(x, y.saturating_sub(1))
+    };
+    let largest = |tail: f32| {
+        let mut with_tail = surface.clone();
+        for (i, z) in with_tail.values.iter_mut().enumerate().filter(|(_, z)| **z == 0.0) {
+            *z = tail * number(i);
+        }
+        let change = change(model(30.0, 0.0), &with_tail);
+        let of_plane = |plane: &Plane| {
+            plane.values.iter().enumerate().filter(|(i, _)| far(*i)).fold(0.0f32, |m, (_, v)| m.max(v.abs()))
+        };
+        change.iter().map(of_plane).fold(0.0f32, f32::max)
+    };
+    assert!((0..surface.values.len()).filter(|i| far(*i)).count() > 2000);
+    assert_eq!(largest(1e-6), 0.0);
+    let of_more = largest(1e-3);
+    assert!(of_more > 1e-3, "a tail that is larger counts: {of_more}");
+}
