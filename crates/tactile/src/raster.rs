@@ -142,7 +142,7 @@ mod tests {
             corner(0.02, -0.02, 0.0),
         ];
         let mesh = TriMesh::new(vertices, vec![[0, 1, 2], [1, 3, 2]]).unwrap();
-        let map = raster(&mesh, &gripgen_twin::frames::Pose::identity(), &GRID, 40.0);
+        let map = raster(&mesh, &Pose::identity(), &GRID, 40.0);
         let height = map.at(20, 30);
         assert!((height + 300.0).abs() < 1e-3, "{height} px instead of -300 px");
     }

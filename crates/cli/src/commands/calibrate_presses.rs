@@ -58,23 +58,14 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
         Failure::usage(format!("{}: the fitted sensor cannot be: {e}", args.presses.display()))
             .hint("are these presses of one ball into one sensor, with the camera's settings fixed?")
     })?;
-<<<<<<< HEAD
     outputs.write(&args.out, Format::Npz, &bytes)?;
-    let page =
-        press_report(&text(args, &set, &calibration, ball_size.as_ref()), &set, &calibration.held_out, |i| {
-            calibration.predicted.get(i).cloned()
-        });
-    outputs.write(&report, Format::Html, page.as_bytes())?;
-=======
-    write_file(&args.out, &bytes)?;
     let report_text = PressReportText {
         map: coverage.as_ref().map(|coverage| map(coverage, &calibration.sensor)),
         ..text(args, &set, &calibration, ball_size.as_ref())
     };
     let page =
         press_report(&report_text, &set, &calibration.held_out, |i| calibration.predicted.get(i).cloned());
-    write_file(&report, page.as_bytes())?;
->>>>>>> hB
+    outputs.write(&report, Format::Html, page.as_bytes())?;
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.press_calibration/1",

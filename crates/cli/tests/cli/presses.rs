@@ -54,22 +54,6 @@ fn a_sensor_is_calibrated_from_a_folder_of_presses_and_compared_with_it() {
     assert_eq!(json["ball_size"]["checked"], false);
     assert!(json["ball_size"]["by"].is_null() && json["ball_size"]["factor"].is_null(), "{json}");
     assert!(text(&done.stderr).contains("the ball's size cannot be checked"), "{}", text(&done.stderr));
-<<<<<<< HEAD
-    assert!(std::fs::read_to_string(out.path().join("sensor.html")).unwrap().contains("press-07.png"));
-    // The same command again replaces its own files; another verb and an edited report are refused.
-    let mine = |path: &std::path::Path| std::fs::read(path).unwrap();
-    let before = mine(&sensor);
-    let again = [&flags[..5], &["--ball-mm", "5", "--mm-per-px", "0.0877", "-q"]].concat();
-    assert_code(&run(&again), 0);
-    assert!(mine(&sensor) == before, "the same bytes");
-    let onto =
-        run(&["compare", path, "--sensor", sensor.to_str().unwrap(), "--report", sensor.to_str().unwrap()]);
-    assert_code(&onto, 2);
-    assert!(text(&onto.stderr).contains("is what the command reads"), "{}", text(&onto.stderr));
-    let report = out.path().join("sensor.html");
-    std::fs::write(&report, [mine(&report), b"<!-- seen -->\n".to_vec()].concat()).unwrap();
-    assert_code(&run(&again), 2);
-=======
     let page = std::fs::read_to_string(out.path().join("sensor.html")).unwrap();
     assert!(page.contains("press-07.png") && page.contains("Where something was pressed"));
     // How much of the frame the presses cover, by parts too, and what is said of those that they do not.
@@ -86,7 +70,19 @@ fn a_sensor_is_calibrated_from_a_folder_of_presses_and_compared_with_it() {
     let words = format!("{:.0} % of the frame lay in a contact", 100.0 * share);
     assert!(page.contains(&words), "{words}");
     assert_eq!(text(&done.stderr).contains(&words), unseen > 0, "{}", text(&done.stderr));
->>>>>>> hB
+    // The same command again replaces its own files; another verb and an edited report are refused.
+    let mine = |path: &std::path::Path| std::fs::read(path).unwrap();
+    let before = mine(&sensor);
+    let again = [&flags[..5], &["--ball-mm", "5", "--mm-per-px", "0.0877", "-q"]].concat();
+    assert_code(&run(&again), 0);
+    assert!(mine(&sensor) == before, "the same bytes");
+    let onto =
+        run(&["compare", path, "--sensor", sensor.to_str().unwrap(), "--report", sensor.to_str().unwrap()]);
+    assert_code(&onto, 2);
+    assert!(text(&onto.stderr).contains("is what the command reads"), "{}", text(&onto.stderr));
+    let report = out.path().join("sensor.html");
+    std::fs::write(&report, [mine(&report), b"<!-- seen -->\n".to_vec()].concat()).unwrap();
+    assert_code(&run(&again), 2);
     // The file holds ball and pixel size, so comparing takes no flags.
     let compared = run(&["compare", path, "--sensor", sensor.to_str().unwrap(), "--json"]);
     assert_code(&compared, 0);
