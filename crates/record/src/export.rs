@@ -78,8 +78,9 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
         row: vec![],
     };
     let mut writer = ShardWriter::new(Cursor::new(Vec::new()), &info(reader, index)?, storage)?;
-    writer.mark(EXPORT)?;
     writer.push(&encoded)?;
+    // After the sample: a record between ends the chunk that holds the channels, which would then be one without messages.
+    writer.mark(EXPORT)?;
     Ok(writer.finish()?.into_inner())
 }
 

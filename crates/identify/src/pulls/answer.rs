@@ -105,7 +105,9 @@ pub fn diagnose_pulls(
     }
     let mut context = Context::new(&data, predictor, given);
     let rows: Vec<usize> = (0..data.len()).collect();
+    context.see_tails(&rows);
     context.share_lag(&rows);
+    context.see_tails(&rows);
     context.base.bent_at_s = (context.base.lag_s, context.base.dead_time_s);
     if let Some(plain) = context.fit(&context.base, &Terms::default(), &rows) {
         context.correct_at(&plain.model);

@@ -1,7 +1,6 @@
 //! Which of the rivals is accepted.
 
 use super::fitting::Fitted;
-use super::likelihood::log_density;
 use super::screen::test;
 use super::search::{CURVE_GAIN, Entry, ModelTerm, Search};
 
@@ -116,10 +115,7 @@ impl Search<'_> {
         if traces && entry.rival.effect().is_some_and(|i| self.candidates[i].acts_on_signals()) {
             return true;
         }
-        let log = |f: &Fitted, i: usize| {
-            let scale = f.likelihood.scale;
-            log_density(f.residuals[i] / scale) - libm::log(scale)
-        };
+        let log = |f: &Fitted, i: usize| self.context.tails.log_of(f.residuals[i], f.likelihood.scale);
         let of = |i: usize| log(&entry.fitted, i) - log(before, i);
         let mut gains: Vec<f64> = (0..self.rows.len()).map(of).collect();
         gains.sort_by(|a, b| b.total_cmp(a));

@@ -2,6 +2,7 @@
 
 use super::data::PullData;
 use super::fitting::NOISE_N;
+use super::likelihood::Tails;
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, fall_s, noise_n, observe};
 use super::slip::{SlipLimit, SlipRig, SlipTrace, Slips, read_slips};
@@ -83,6 +84,8 @@ pub struct Context<'a> {
     pub base: PullModel,
     /// Lag and dead time of the twin that was given, for campaigns without traces.
     pub given: (f64, f64, f64),
+    /// How heavy the tails of its residuals are.
+    pub tails: Tails,
     /// The same of the noise of its sensor.
     pub given_noise_n: f64,
     /// Whether lag and dead time are fitted with friction alone, which is slow.
@@ -117,6 +120,7 @@ impl<'a> Context<'a> {
             kinetic: None,
             slips: None,
             given: (given.lag_s, given.dead_time_s, given.kinetic_ratio),
+            tails: Tails::FEW,
             given_noise_n: given.noise_n.clamp(NOISE_N.0, NOISE_N.1),
             base,
             free_lag: false,
@@ -125,6 +129,13 @@ impl<'a> Context<'a> {
         };
         context.look_at(&raw);
         context
+    }
+
+    /// Looks how many pulls are bad: what of them the baseline leaves.
+    pub(super) fn see_tails(&mut self, rows: &[usize]) {
+        if let Some(plain) = self.fit(&self.base, &Terms::default(), rows) {
+            self.tails = Tails::of(&plain.residuals);
+        }
     }
 
     /// Whether labels have to say how noisy readings are. A label is the last reading near the command, so a noisy sensor

@@ -1,7 +1,7 @@
 //! Fitting a model to a campaign: friction from labels and slips, readings from traces, all parameters together.
 
 use super::context::Context;
-use super::likelihood::{Likelihood, likelihood, scale, weight_of};
+use super::likelihood::{Likelihood, likelihood};
 use super::model::PullModel;
 use super::terms::Terms;
 use super::trace_residuals::Widening;
@@ -228,11 +228,11 @@ impl Context<'_> {
             } else {
                 (vec![], Widening::NONE)
             };
-            let s = scale(&friction).max(0.2);
+            let s = self.tails.scale(&friction).max(0.2);
             // The first round does not know yet which pulls are bad.
             let weights: Vec<f64> = friction
                 .iter()
-                .map(|r| if round == 0 { 1.0 } else { weight_of((r / s).powi(2)).sqrt() })
+                .map(|r| if round == 0 { 1.0 } else { self.tails.weight_of(r / s).sqrt() })
                 .collect();
             let trace_weights: Vec<f64> = traces.iter().map(|r| (2.5 / r.abs().max(2.5)).sqrt()).collect();
             let options = match (signals, round) {
@@ -265,7 +265,7 @@ impl Context<'_> {
         let residuals = self.friction_residuals(&model, rows, &sd);
         let log_sd: Vec<f64> = sd.iter().map(|s| libm::log(*s)).collect();
         let sessions: Vec<usize> = rows.iter().map(|&i| self.data.session_of[i]).collect();
-        let judged = likelihood(&residuals, &log_sd, &sessions);
+        let judged = likelihood(&residuals, &log_sd, &sessions, self.tails);
         let traces = if acts { self.trace_residuals(&model, rows).cost() } else { 0.0 };
         let own = traces + 0.5 * self.priors(&model, acts).iter().map(|r| r * r).sum::<f64>();
         let trace_cost = if acts { own } else { own + self.baseline_trace_cost };
@@ -288,7 +288,13 @@ impl Context<'_> {
             Some(step) => found.values.iter().zip(step.iter()).map(|(v, s)| v - s).collect(),
             None => found.values.clone(),
         };
-        let information = information(&found.jacobian, &weights, scale(&residuals), stretch, layout.parts);
+        let information = information(
+            &found.jacobian,
+            &weights,
+            self.tails.location_variance(&residuals),
+            stretch,
+            layout.parts,
+        );
         Some(Fitted {
             information,
             beyond,
@@ -296,7 +302,7 @@ impl Context<'_> {
             model,
             names: parameters.iter().map(|p| p.name.clone()).collect(),
             values: found.values,
-            covariance: found.covariance * stretch,
+            covariance: found.covariance * stretch * self.tails.spread(),
             residuals,
             likelihood: judged,
             trace_cost,
@@ -304,22 +310,18 @@ impl Context<'_> {
     }
 }
 
-/// Variance of a location that is fitted with Student's t, over that of its residuals' scale, if they are normal: the integral
-/// of the squared score over the squared integral of its slope.
-const LOCATION: f64 = 1.394;
-
 /// What a fit says of its parameters, from its weighted slopes: those of the pulls first, with their weights taken out
-/// again, then everything else.
+/// again, then everything else. `variance` is that of a location.
 fn information(
     slopes: &DMatrix<f64>,
     weights: &[f64],
-    scale: f64,
+    variance: f64,
     stretch: f64,
     parts: usize,
 ) -> DMatrix<f64> {
     let n = weights.len();
     let few = n as f64 / n.saturating_sub(parts).max(1) as f64;
-    let variance = LOCATION * scale * scale * few * stretch;
+    let variance = variance * few * stretch;
     let mut plain = slopes.clone();
     for (i, w) in weights.iter().enumerate() {
         plain.row_mut(i).scale_mut(1.0 / (w * variance.sqrt()));

@@ -1,7 +1,98 @@
 //! How likely residuals are: heavy tails for bad pulls, one scale, memory within a session.
 
-/// Degrees of freedom of Student's t: a few pulls may lie far off.
-const FREEDOM: f64 = 6.0;
+/// How heavy the tails of residuals are: Student's t with so many degrees of freedom, and what follows from them for normal residuals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tails {
+    /// Degrees of freedom.
+    freedom: f64,
+    /// Logarithm of the density at 0.
+    log_peak: f64,
+    /// Its scale over that of a distribution with few bad pulls.
+    scale: f64,
+    /// Variance of a location over the square of the scale: the integral of the squared score over the squared integral of its slope.
+    location: f64,
+}
+
+impl Tails {
+    /// A few pulls may lie far off.
+    pub const FEW: Self =
+        // Gamma(3.5) / (sqrt(6 pi) Gamma(3)).
+        Self { freedom: 6.0, log_peak: -0.960_418_255_751_598_7, scale: 1.0, location: 1.394 };
+
+    /// One in ten does, say. Six degrees of freedom then make a scale of twice the one of the others, in which nothing shows.
+    pub const MANY: Self =
+        // Gamma(1.75) / (sqrt(2.5 pi) Gamma(1.25)).
+        Self {
+            freedom: 2.5,
+            log_peak: -1.016_639_593_460_450_2,
+            scale: 0.876_516_875_902_332,
+            location: 2.078,
+        };
+
+    /// Those that residuals have: many bad pulls have to be twice as likely.
+    pub fn of(residuals: &[f64]) -> Self {
+        let log = |tails: Self| {
+            let s = tails.raw_scale(residuals);
+            residuals.iter().map(|r| tails.log_density(r / s) - libm::log(s)).sum::<f64>()
+        };
+        if log(Self::MANY) > log(Self::FEW) + PRICE { Self::MANY } else { Self::FEW }
+    }
+
+    /// Most likely scale of residuals, in the meaning that it has for few bad pulls: 0.88 standard deviations of normal residuals.
+    pub fn scale(self, residuals: &[f64]) -> f64 {
+        self.raw_scale(residuals) / self.scale
+    }
+
+    /// The scale of the distribution itself.
+    fn raw_scale(self, residuals: &[f64]) -> f64 {
+        let n = residuals.len() as f64;
+        let mut sorted: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let mut square = sorted.get(sorted.len() / 2).map_or(1.0, |m| (m * 1.4826).powi(2)).max(1e-12);
+        for _ in 0..30 {
+            let new = residuals.iter().map(|r| self.weight(r * r / square) * r * r).sum::<f64>() / n;
+            let new = new.max(1e-12);
+            if (new / square - 1.0).abs() < 1e-6 {
+                break;
+            }
+            square = new;
+        }
+        square.sqrt()
+    }
+
+    fn weight(self, square: f64) -> f64 {
+        (self.freedom + 1.0) / (self.freedom + square)
+    }
+
+    /// Weight of a residual over a scale as [`Self::scale`] gives it.
+    pub fn weight_of(self, residual: f64) -> f64 {
+        self.weight((residual / self.scale).powi(2))
+    }
+
+    fn log_density(self, x: f64) -> f64 {
+        self.log_peak - 0.5 * (self.freedom + 1.0) * libm::log1p(x * x / self.freedom)
+    }
+
+    /// Variance of a location that is fitted to such residuals.
+    pub fn location_variance(self, residuals: &[f64]) -> f64 {
+        self.location * self.raw_scale(residuals).powi(2)
+    }
+
+    /// Variance of a location over what the weights and the scale of its fit say, against few bad pulls.
+    pub fn spread(self) -> f64 {
+        let own = |t: Self| t.location * t.scale * t.scale * t.weight(0.0);
+        own(self) / own(Self::FEW)
+    }
+
+    /// Logarithm of the density of a residual, with a scale as [`Self::scale`] gives it.
+    pub fn log_of(self, residual: f64, scale: f64) -> f64 {
+        let s = scale * self.scale;
+        self.log_density(residual / s) - libm::log(s)
+    }
+}
+
+/// By how much more likely many bad pulls have to be than few.
+const PRICE: f64 = 0.7;
 
 /// Residuals of pulls, judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,9 +108,9 @@ pub struct Likelihood {
 /// Judges residuals in the order of the pulls. They are in units of the standard deviation whose logarithms are given;
 /// their common scale and the correlation of neighbours (AR(1) within a session, never negative) are fitted: a slow
 /// wandering of the rig is no evidence for an effect.
-pub fn likelihood(residuals: &[f64], log_sd: &[f64], session_of: &[usize]) -> Likelihood {
+pub fn likelihood(residuals: &[f64], log_sd: &[f64], session_of: &[usize], tails: Tails) -> Likelihood {
     let n = residuals.len();
-    let plain_scale = scale(residuals);
+    let plain_scale = tails.scale(residuals);
     let clipped: Vec<f64> =
         residuals.iter().map(|r| r.clamp(-3.0 * plain_scale, 3.0 * plain_scale)).collect();
     let widths: f64 = log_sd.iter().sum();
@@ -37,10 +128,9 @@ pub fn likelihood(residuals: &[f64], log_sd: &[f64], session_of: &[usize]) -> Li
                 residuals[i] - memory * clipped[i - 1]
             };
         }
-        let s = scale(&innovations);
-        let log =
-            innovations.iter().map(|e| log_density(e / s)).sum::<f64>() - n as f64 * libm::log(s) - widths
-                + 0.5 * starts as f64 * libm::log(1.0 - memory * memory);
+        let s = tails.scale(&innovations);
+        let log = innovations.iter().map(|e| tails.log_of(*e, s)).sum::<f64>() - widths
+            + 0.5 * starts as f64 * libm::log(1.0 - memory * memory);
         // A memory has to pay for itself.
         if log > best.log + if best.memory == 0.0 && tenth > 0 { 0.5 } else { 0.0 } {
             best = Likelihood { log, scale: s, memory };
@@ -49,33 +139,9 @@ pub fn likelihood(residuals: &[f64], log_sd: &[f64], session_of: &[usize]) -> Li
     best
 }
 
-/// Most likely scale of residuals with heavy tails.
+/// Most likely scale of residuals of which a few may lie far off.
 pub fn scale(residuals: &[f64]) -> f64 {
-    let n = residuals.len() as f64;
-    let mut sorted: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let mut square = sorted.get(sorted.len() / 2).map_or(1.0, |m| (m * 1.4826).powi(2)).max(1e-12);
-    for _ in 0..30 {
-        let new = residuals.iter().map(|r| weight_of(r * r / square) * r * r).sum::<f64>() / n;
-        let new = new.max(1e-12);
-        if (new / square - 1.0).abs() < 1e-6 {
-            break;
-        }
-        square = new;
-    }
-    square.sqrt()
-}
-
-/// Weight of a residual whose square, in units of the scale, is given.
-pub fn weight_of(square: f64) -> f64 {
-    (FREEDOM + 1.0) / (FREEDOM + square)
-}
-
-/// Logarithm of the density of Student's t.
-pub(super) fn log_density(x: f64) -> f64 {
-    // Gamma(3.5) / (sqrt(6 pi) Gamma(3)).
-    const CONSTANT: f64 = 0.382_732_772_098_226_6;
-    libm::log(CONSTANT) - 0.5 * (FREEDOM + 1.0) * libm::log1p(x * x / FREEDOM)
+    Tails::FEW.raw_scale(residuals)
 }
 
 /// Half of Huber's cost.
@@ -96,9 +162,11 @@ mod tests {
 
     #[test]
     fn the_density_integrates_to_one() {
-        let sum: f64 =
-            (-4000..4000).map(|i| (f64::from(i) * 0.01, 0.01)).map(|(x, w)| log_density(x).exp() * w).sum();
-        assert!((sum - 1.0).abs() < 1e-4, "{sum}");
+        for (tails, within) in [(Tails::FEW, 1e-4), (Tails::MANY, 1e-3)] {
+            let each = (-100_000..100_000).map(|i| f64::from(i) * 0.01);
+            let sum: f64 = each.map(|x| tails.log_density(x).exp() * 0.01).sum();
+            assert!((sum - 1.0).abs() < within, "{tails:?} {sum}");
+        }
     }
 
     /// White noise has no memory, an AR(1) process has its own.
@@ -107,12 +175,12 @@ mod tests {
         let white = normal(400, 3);
         let session = vec![0; 400];
         let none = vec![0.0; 400];
-        assert!(likelihood(&white, &none, &session).memory <= 0.15);
+        assert!(likelihood(&white, &none, &session, Tails::FEW).memory <= 0.15);
         let mut ar = vec![0.0; 400];
         for i in 1..400 {
             ar[i] = 0.6 * ar[i - 1] + white[i];
         }
-        let judged = likelihood(&ar, &none, &session);
+        let judged = likelihood(&ar, &none, &session, Tails::FEW);
         assert!((judged.memory - 0.6).abs() < 0.15, "{judged:?}");
         // In terms of a normal distribution the scale of the core is a little smaller.
         assert!((judged.scale - 0.9).abs() < 0.15, "{judged:?}");
@@ -126,5 +194,18 @@ mod tests {
             r[i * 20] = 40.0;
         }
         assert!((scale(&r) / before) < 1.35, "{} {}", scale(&r), before);
+    }
+
+    /// With one pull in ten ten deviations off, the heavy tails are those that are more likely, and their scale stays that of the
+    /// others; without, they are not, and both scales are the same.
+    #[test]
+    fn tails_follow_the_bad_pulls() {
+        let good = normal(240, 11);
+        let mut bad = good.clone();
+        bad.iter_mut().step_by(9).for_each(|r| *r -= 10.0);
+        assert_eq!((Tails::of(&good), Tails::of(&bad)), (Tails::FEW, Tails::MANY));
+        let [few, many] = [Tails::FEW, Tails::MANY].map(|t| (t.scale(&good), t.scale(&bad)));
+        assert!((many.0 / few.0 - 1.0).abs() < 0.04, "{few:?} {many:?}");
+        assert!(many.1 < 1.3 * many.0 && few.1 > 1.5 * few.0, "{few:?} {many:?}");
     }
 }

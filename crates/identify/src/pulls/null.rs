@@ -9,7 +9,7 @@
 //! show is left out.
 
 use super::fitting::Fitted;
-use super::likelihood::{likelihood, scale, weight_of};
+use super::likelihood::{Tails, likelihood};
 use super::power::ScoreTest;
 use super::search::{ModelTerm, Search};
 use super::simulate::orthonormal;
@@ -61,11 +61,12 @@ pub fn null_gains(search: &Search<'_>, baseline: &Fitted) -> NullGains {
     let mut draws = Draws::new(29, 6);
     let mut order: Vec<usize> = (0..innovations.len()).collect();
     let log_sd = vec![0.0; innovations.len()];
+    let tails = search.context.tails;
     for _ in 0..CAMPAIGNS {
         draws.shuffle(&mut order);
         let shuffled: Vec<f64> = order.iter().map(|&i| innovations[i]).collect();
         let noise = test.free(&DVector::from_vec(remembered(&shuffled, memory, sessions)));
-        let before = likelihood(noise.as_slice(), &log_sd, sessions).log;
+        let before = likelihood(noise.as_slice(), &log_sd, sessions, tails).log;
         let clipped = noise.map(|x| x.clamp(-3.0, 3.0));
         for (named, best) in [(true, &mut effects), (false, &mut curves)] {
             let own = directions.iter().filter(|d| d.named == named);
@@ -73,8 +74,8 @@ pub fn null_gains(search: &Search<'_>, baseline: &Fitted) -> NullGains {
                 own.map(|d| (0.5 * d.vectors.tr_mul(&clipped).norm_squared() - d.cost, d)).collect();
             promised.sort_by(|a, b| b.0.total_cmp(&a.0));
             let judged = promised.iter().take(JUDGED).map(|(_, d)| {
-                let left = without(&noise, &d.vectors);
-                likelihood(left.as_slice(), &log_sd, sessions).log - before - d.cost
+                let left = without(&noise, &d.vectors, tails);
+                likelihood(left.as_slice(), &log_sd, sessions, tails).log - before - d.cost
             });
             best.push(judged.fold(f64::NEG_INFINITY, f64::max));
         }
@@ -118,11 +119,11 @@ fn directions(search: &Search<'_>, test: &ScoreTest<'_>) -> Vec<Direction> {
 }
 
 /// What is left of residuals when a rival has taken its part, bad pulls weighed as in a fit.
-fn without(residuals: &DVector<f64>, vectors: &DMatrix<f64>) -> DVector<f64> {
+fn without(residuals: &DVector<f64>, vectors: &DMatrix<f64>, tails: Tails) -> DVector<f64> {
     let mut left = residuals.clone();
     for _ in 0..ROUNDS {
-        let s = scale(left.as_slice());
-        let weights = left.map(|r| weight_of((r / s).powi(2)));
+        let s = tails.scale(left.as_slice());
+        let weights = left.map(|r| tails.weight_of(r / s));
         let mut weighted = vectors.clone();
         for (mut row, w) in weighted.row_iter_mut().zip(weights.iter()) {
             row.scale_mut(*w);
@@ -181,7 +182,7 @@ mod tests {
         let mut draws = Draws::new(4, 4);
         let mut residuals = 6.0 * &line + DVector::from_iterator(n, (0..n).map(|_| 0.3 * draws.normal()));
         residuals[n - 1] -= 30.0;
-        let left = without(&residuals, &DMatrix::from_columns(&[&line / line.norm()]));
+        let left = without(&residuals, &DMatrix::from_columns(&[&line / line.norm()]), Tails::FEW);
         assert!(left[n - 1] < -28.0, "{}", left[n - 1]);
         let slope = left.rows(0, n - 1).dot(&line.rows(0, n - 1)) / line.rows(0, n - 1).norm_squared();
         assert!(slope.abs() < 0.6, "{slope}");

@@ -38,7 +38,8 @@ pub(super) fn paying(
         };
         let Some(fewer) = fewer else { continue };
         let mut gain = share([&fewer, &accepted.fitted].map(|f| held_out(context, f, repetitions, rows)));
-        if search.candidates[accepted.effects[place].0].acts_on_signals() {
+        let traces = !context.observations.is_empty();
+        if traces && search.candidates[accepted.effects[place].0].acts_on_signals() {
             gain = gain.max(share([&fewer, &accepted.fitted].map(|f| readings(context, &f.model))));
         }
         let reason = match neutral(&accepted.fitted, spec) {

@@ -54,7 +54,7 @@ impl<'a> ScoreTest<'a> {
             widening: if signals { context.trace_residuals(model, rows).widening() } else { Widening::NONE },
         };
         test.residuals = test.residuals_of(model);
-        test.scale = super::likelihood::scale(&test.residuals.as_slice()[..rows.len()]).max(0.1);
+        test.scale = context.tails.scale(&test.residuals.as_slice()[..rows.len()]).max(0.1);
         let mut columns: Vec<DVector<f64>> =
             (0..model.mu.len()).map(|k| test.slope(&|m| m.mu[k] *= 1.01, 0.01 * model.mu[k])).collect();
         columns.push(test.slope(&|m| m.kinetic_ratio -= 0.01, -0.01));
