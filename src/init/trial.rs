@@ -174,6 +174,6 @@ pub(super) fn widest_first() -> Vec<(usize, Varied)> {
             }
         }
     }
-    all.sort_by(|a, b| a.0.cmp(&b.0));
+    all.sort_by_key(|a| a.0);
     all
 }

@@ -87,7 +87,7 @@ mod tests {
         let texts = &reader.info().uncompressed_latin1_text;
         assert_eq!((texts[0].keyword.as_str(), texts[0].text.as_str()), (MARK_NAME, "show 0123"));
         assert_eq!(decode_picture(&marked).unwrap(), image);
-        assert_eq!(png_mark(&marked), Some(("show 0123".into(), png.clone())));
+        assert_eq!(png_mark(&marked), Some(("show 0123".into(), png)));
         assert!(png_with_mark(b"no picture", "x").is_none() && png_mark(b"no picture").is_none());
         for cut in 0..marked.len() {
             let _ = png_mark(&marked[..cut]);
