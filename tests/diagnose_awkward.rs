@@ -57,6 +57,11 @@ fn what_acts_in_one_session_is_found_there() {
     let found = diagnose(&measured, &[]);
     let unknown: Vec<&str> = found.diagnosis.unknown.iter().map(|u| u.covariate.as_str()).collect();
     assert_eq!(unknown, ["dwell_s*session"], "{:?}", names(&found.diagnosis));
+    assert!(
+        found.diagnosis.notes.iter().any(|n| n.contains("where session is 2")),
+        "{:?}",
+        found.diagnosis.notes
+    );
     let written = edited_twin(&baseline(), &[], &found.edits).unwrap();
     let own = written.effects.iter().find(|e| e.name == "table").expect("a table");
     assert_eq!(own.parameters["where"].as_table().unwrap()["session"].as_str(), Some("2"));

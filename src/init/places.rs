@@ -28,6 +28,9 @@ pub(super) struct Places {
     pub(super) places: Vec<Place>,
     /// Smallest distance between surfaces that a line meets.
     pub(super) narrowest_m: Option<f64>,
+    /// Lines that are longer than the jaws open, and the shortest of them.
+    pub(super) too_wide: usize,
+    pub(super) narrowest_too_wide_m: Option<f64>,
     /// The smallest angle at which any line met both its surfaces.
     pub(super) steepest_rad: f64,
 }
@@ -108,6 +111,10 @@ impl Places {
         if width_m <= widest_m {
             let middle = through + axis * ((first.at_m + last.at_m) / 2.0);
             self.places.push(Place { middle, axis: snapped(axis) });
+        } else {
+            self.too_wide += 1;
+            let narrowest = self.narrowest_too_wide_m.map_or(width_m, |narrowest| narrowest.min(width_m));
+            self.narrowest_too_wide_m = Some(narrowest);
         }
     }
 }

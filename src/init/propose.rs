@@ -85,6 +85,16 @@ impl Search<'_> {
         let good: Vec<Candidate> = good.into_iter().filter_map(Result::ok).collect();
         let chosen = pick(&good, &body, TRIED, &|_| true);
         if chosen.is_empty() {
+            // A few lines across the corners of a part that is too wide are short, and too pointed.
+            if let Some(narrowest_m) =
+                found.narrowest_too_wide_m.filter(|_| found.too_wide > found.places.len())
+            {
+                return Err(NoGrip::TooWide {
+                    narrowest_mm: narrowest_m * 1e3,
+                    opening_mm: opening_m * 1e3,
+                    largest_mm: LARGEST_WIDTH * opening_m * 1e3,
+                });
+            }
             return Err(why_none(bad.into_iter().filter_map(Result::err), opening_m));
         }
         let tried: Vec<Candidate> = chosen.into_iter().map(|i| good[i].clone()).collect();

@@ -66,7 +66,7 @@ pub(super) fn summary(name: &str, size: &str, mesh_words: &[String], proposed: &
              beside the jaw axis",
             p.width_mm, p.contact_mm2, p.lever_mm
         );
-        if p.clearance_mm < 0.0 {
+        if p.clearance_mm < -0.05 {
             let _ =
                 write!(text, "; beside the pads the part rises {:.1} mm towards a finger", -p.clearance_mm);
         }

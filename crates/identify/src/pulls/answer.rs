@@ -10,15 +10,14 @@ use super::heldout::{
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::paying::{by_chance, paying};
 use super::power::ScoreTest;
-use super::screen::test;
 use super::search::{Accepted, Search, TIED_WITHIN};
 use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
+use super::unknown::unknown;
 use super::words::separation;
 use super::zero_screen::{said, zeros_that_depend};
 use crate::diagnosis::{
-    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate, Rival,
-    SeparateBy, UnknownCovariate,
+    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate, Rival, SeparateBy,
 };
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::columns::covariates;
@@ -48,6 +47,9 @@ const BAD: f64 = 5.0;
 
 /// Least standard deviation of a parameter, as a share of its distance from nothing: formulas are not that good.
 const MIN_SD: f64 = 0.02;
+
+/// How many times the noise that a twin states labels have to show before it is said.
+const NOISIER: f64 = 1.6;
 
 /// Odds are taken to this power, because no model here is exactly right.
 const TEMPER: f64 = 0.6;
@@ -144,11 +146,21 @@ pub fn diagnose_pulls(
     let heldout_after = predicted(&after_context, &after, &repetitions, false);
     diagnosis.effects = named(&search, &before, &accepted);
     diagnosis.unknown = unknown(&search, &before, &accepted, &data);
+    for (name, (column, word)) in accepted.curves.iter().filter_map(|&i| search.curves[i].at_word()) {
+        diagnosis.notes.push(format!("{name}: it was seen where {column} is {word}, and only there"));
+    }
     for zero in zeros_that_depend(&after_context, &after.model) {
         diagnosis.notes.push(said(&zero));
         if diagnosis.unknown.iter().all(|u| u.covariate != zero.covariate) {
             diagnosis.unknown.push(zero);
         }
+    }
+    if let Some((low_n, _)) = context.noise90_n.filter(|(low_n, _)| *low_n > NOISIER * given.noise_n) {
+        diagnosis.notes.push(format!(
+            "the labels are those of a force sensor with {low_n:.2} N of noise or more, the twin says {:.2} N: an offset of sensor, friction or grip force would look \
+             alike; a single trace shows the noise",
+            given.noise_n
+        ));
     }
     diagnosis.conclude();
     diagnosis.baseline = baseline(&after, &context);
@@ -403,34 +415,6 @@ pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<Str
     spec.parameters.iter().enumerate().map(each).collect()
 }
 
-/// The covariates of accepted curves.
-fn unknown(
-    search: &Search<'_>,
-    before: &Fitted,
-    accepted: &Accepted,
-    data: &PullData<'_>,
-) -> Vec<UnknownCovariate> {
-    // Residuals of everything but the curves.
-    let residuals = if accepted.effects.is_empty() {
-        before.residuals.clone()
-    } else {
-        let mut terms = accepted.fitted.terms.clone();
-        terms.curves.clear();
-        match search.context.fit(&accepted.fitted.model, &terms, &search.rows) {
-            Some(f) => f.residuals,
-            None => before.residuals.clone(),
-        }
-    };
-    let each = accepted.curves.iter().map(|&i| {
-        let curve = &search.curves[i];
-        let tested = test(data, &accepted.fitted, &residuals, curve);
-        UnknownCovariate { covariate: curve.name.clone(), strength: tested.strength, p_value: tested.p_value }
-    });
-    let mut found: Vec<UnknownCovariate> = each.collect();
-    found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-    found
-}
-
 pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
     let mut values = BTreeMap::new();
     let unit = |name: &str| match name {
@@ -439,11 +423,7 @@ pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<Strin
         _ => "1",
     };
     for (k, name) in fitted.names.iter().enumerate() {
-        if !(name.starts_with("parts.")
-            || name.starts_with("robot.")
-            || name.starts_with("wrist.")
-            || name == "kinetic_ratio")
-        {
+        if !(name.starts_with("parts.") || name.starts_with("robot.") || name == "kinetic_ratio") {
             continue;
         }
         let (value, half) = (fitted.values[k], HALF90 * fitted.covariance[(k, k)].max(0.0).sqrt());
@@ -455,7 +435,8 @@ pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<Strin
     values.entry("robot.lag_s".into()).or_insert_with(|| plain(m.lag_s, "s"));
     values.entry("robot.dead_time_s".into()).or_insert_with(|| plain(m.dead_time_s, "s"));
     values.insert("scatter".into(), plain(scatter(m, fitted.likelihood.scale), "1"));
-    values.entry("wrist.noise_n".into()).or_insert_with(|| plain(m.noise_n, "N"));
+    let noise90_n = context.noise90_n.unwrap_or((m.noise_n, m.noise_n));
+    values.insert("wrist.noise_n".into(), ParameterEstimate::new(m.noise_n, noise90_n, "N"));
     if !context.observations.is_empty() {
         let each = m.stiffness_n_per_m * 0.5e-3;
         values.insert("gel.left.shear_stiffness_n_per_mm".into(), plain(each, "N/mm"));

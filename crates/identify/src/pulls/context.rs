@@ -1,7 +1,6 @@
 //! A campaign with what its traces say, and the residuals of a model against both.
 
 use super::data::PullData;
-use super::fitting::NOISE_N;
 use super::likelihood::Tails;
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::observe::{LEVELS, TraceObservation, fall_s, noise_n, observe};
@@ -28,10 +27,6 @@ const MISREAD_N: f64 = 0.05;
 /// By how much more both differ where the loop closes on its sensor: it then answers with the arm's inertia, which the fast
 /// prediction lacks.
 const CLOSED_LOOP: f64 = 5.0;
-
-/// Standard deviation of the logarithm of a sensor's noise about what a twin says of it: recorded forces of URs have 0.07 to
-/// 0.19 N in quiet stretches, and more while they move.
-const NOISE_KNOWN: f64 = 0.7;
 
 /// Time before the slip whose readings do not set the scale of the tool that holds: the rim may slip.
 const UNSCALED_S: f64 = 0.15;
@@ -86,8 +81,8 @@ pub struct Context<'a> {
     pub given: (f64, f64, f64),
     /// How heavy the tails of its residuals are.
     pub tails: Tails,
-    /// The same of the noise of its sensor.
-    pub given_noise_n: f64,
+    /// 90 % interval of the noise of a reading, where labels alone say it.
+    pub noise90_n: Option<(f64, f64)>,
     /// Whether lag and dead time are fitted with friction alone, which is slow.
     pub free_lag: bool,
     /// Half the sum of squares of the traces under the baseline.
@@ -121,7 +116,7 @@ impl<'a> Context<'a> {
             slips: None,
             given: (given.lag_s, given.dead_time_s, given.kinetic_ratio),
             tails: Tails::FEW,
-            given_noise_n: given.noise_n.clamp(NOISE_N.0, NOISE_N.1),
+            noise90_n: None,
             base,
             free_lag: false,
             baseline_trace_cost: 0.0,
@@ -138,20 +133,14 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Whether labels have to say how noisy readings are. A label is the last reading near the command, so a noisy sensor
-    /// reads it higher by one or two deviations: an offset of some tenths of a newton, which is no effect.
-    pub(super) fn learns_noise(&self) -> bool {
-        self.free_lag && self.observations.is_empty()
-    }
-
     /// Without traces the labels are all that knows of force loop and sensor: lag, dead time and noise from them, once.
     pub(super) fn learn_lag(&mut self, rows: &[usize]) {
         if !self.observations.is_empty() {
             return;
         }
         self.free_lag = true;
-        if let Some(found) = self.fit(&self.base, &Terms::default(), rows) {
-            self.base = found.model;
+        if let Some((model, interval)) = self.noise_of_labels(rows) {
+            (self.base, self.noise90_n) = (model, Some(interval));
         }
         self.free_lag = false;
     }
@@ -429,9 +418,6 @@ impl<'a> Context<'a> {
             };
             r.push((model.lag_s - lag) / wide_lag);
             r.push((model.dead_time_s - dead) / wide_dead);
-        }
-        if self.learns_noise() {
-            r.push(libm::log(model.noise_n / self.given_noise_n) / NOISE_KNOWN);
         }
         r
     }

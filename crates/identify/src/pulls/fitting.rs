@@ -8,10 +8,6 @@ use super::trace_residuals::Widening;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 use nalgebra::{DMatrix, DVector};
 
-/// Name of the noise of a reading, and its bounds in newtons.
-const NOISE: &str = "wrist.noise_n";
-pub(super) const NOISE_N: (f64, f64) = (0.01, 1.0);
-
 /// Rounds of weights.
 const ROUNDS: usize = 3;
 
@@ -65,10 +61,6 @@ impl Fitted {
             (model.lag_s, model.dead_time_s) = (values[at].max(0.0), values[at + 1].max(0.0));
             at += 2;
         }
-        if self.names.get(at).is_some_and(|name| name == NOISE) {
-            model.noise_n = values[at];
-            at += 1;
-        }
         for ((candidate, _), effect) in self.terms.effects.iter().zip(&mut model.effects) {
             if held && candidate.acts_on_signals() {
                 continue;
@@ -86,7 +78,6 @@ impl Fitted {
 struct Layout {
     parts: usize,
     dynamics: bool,
-    noise: bool,
     parameters: Vec<FreeParameter>,
 }
 
@@ -127,15 +118,6 @@ impl Context<'_> {
                 });
             }
         }
-        let noise = dynamics && self.learns_noise();
-        if noise {
-            parameters.push(FreeParameter {
-                name: NOISE.into(),
-                start: start.noise_n.clamp(NOISE_N.0, NOISE_N.1),
-                bounds: NOISE_N,
-                scale: 0.1,
-            });
-        }
         for (candidate, from) in terms.effects.iter().filter(|(c, _)| !terms.holds(c)) {
             parameters.extend(candidate.parameters(from));
         }
@@ -149,7 +131,7 @@ impl Context<'_> {
                 });
             }
         }
-        Layout { parts: self.data.parts.len(), dynamics, noise, parameters }
+        Layout { parts: self.data.parts.len(), dynamics, parameters }
     }
 
     fn model_at(&self, start: &PullModel, terms: &Terms, layout: &Layout, values: &[f64]) -> PullModel {
@@ -161,10 +143,6 @@ impl Context<'_> {
         if layout.dynamics {
             (model.lag_s, model.dead_time_s) = (values[at], values[at + 1]);
             at += 2;
-        }
-        if layout.noise {
-            model.noise_n = values[at];
-            at += 1;
         }
         model.effects.clear();
         for (candidate, from) in &terms.effects {

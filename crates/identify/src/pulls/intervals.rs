@@ -4,7 +4,7 @@
 //! 0. A parameter that ends has the interval of Feldman and Cousins; any other the inverted likelihood ratio, with the
 //! parameters that end inside their bounds (profile likelihood).
 
-use super::fitting::{Fitted, NOISE_N};
+use super::fitting::Fitted;
 use crate::bounded::interval90;
 use crate::grouped::t_quantile_95;
 use nalgebra::{DMatrix, DVector};
@@ -32,7 +32,6 @@ fn bounds(name: &str) -> Option<(f64, f64)> {
         "kinetic_ratio" => Some((0.3, 1.0)),
         "robot.lag_s" => Some((0.0, 1.0)),
         "robot.dead_time_s" => Some((0.0, 0.5)),
-        "wrist.noise_n" => Some(NOISE_N),
         _ => None,
     }
 }

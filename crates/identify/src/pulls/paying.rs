@@ -13,6 +13,9 @@ use crate::diagnosis::Hint;
 /// Share of the error on held-out data that a name has to take off.
 const PAYS: f64 = 0.03;
 
+/// Least standard deviation of a label.
+const LEAST_SD_N: f64 = 0.03;
+
 /// Least chance, in percent, that is put into a sentence.
 const LEAST_PERCENT: f64 = 0.5;
 
@@ -26,6 +29,8 @@ pub(super) fn paying(
     rows: &[usize],
 ) -> (Accepted, Vec<Hint>) {
     let context = search.context;
+    let expected = context.predictor.pulls(&before.model, &search.rows);
+    let sd_n: Vec<f64> = expected.iter().map(|p| p.label_sd_n.max(LEAST_SD_N)).collect();
     let mut hints = Vec::new();
     for place in (0..accepted.effects.len()).rev() {
         let spec = search.candidates[accepted.effects[place].0].spec;
@@ -37,7 +42,12 @@ pub(super) fn paying(
             context.fit(&before.model, &terms, &search.rows)
         };
         let Some(fewer) = fewer else { continue };
-        let mut gain = share([&fewer, &accepted.fitted].map(|f| held_out(context, f, repetitions, rows)));
+        let errors = [&fewer, &accepted.fitted].map(|f| held_out(context, f, repetitions, rows));
+        let plain = share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(_, e)| *e))));
+        // A weak grip that is predicted well says as much as a strong one.
+        let weighed =
+            share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(i, e)| e / sd_n[*i]))));
+        let mut gain = plain.max(weighed);
         let traces = !context.observations.is_empty();
         if traces && search.candidates[accepted.effects[place].0].acts_on_signals() {
             gain = gain.max(share([&fewer, &accepted.fitted].map(|f| readings(context, &f.model))));
@@ -51,7 +61,7 @@ pub(super) fn paying(
             ),
             None => continue,
         };
-        hints.push(Hint { name: spec.id.into(), gain, reason });
+        hints.push(Hint { name: spec.id.into(), gain: plain, reason });
         accepted.effects.remove(place);
         accepted.fitted = fewer;
     }
@@ -69,7 +79,10 @@ pub(super) fn by_chance(
     let context = search.context;
     Hint {
         name: search.name_of(&found.entry.rival),
-        gain: share([before, &found.entry.fitted].map(|f| held_out(context, f, repetitions, rows))),
+        gain: share([before, &found.entry.fitted].map(|f| {
+            let errors = held_out(context, f, repetitions, rows);
+            root_mean_square(errors.into_iter().map(|(_, e)| e))
+        })),
         reason: format!(
             "where nothing acts, the best of everything that competes looks as good in {:.0} % of campaigns like this one",
             (100.0 * found.chance).max(LEAST_PERCENT)
@@ -77,12 +90,17 @@ pub(super) fn by_chance(
     }
 }
 
-/// Error on held-out labels of the twin that is written for a fit. What traces show is held, which is fast.
-fn held_out(context: &Context<'_>, fitted: &Fitted, repetitions: &[Vec<usize>], rows: &[usize]) -> f64 {
+/// Errors on held-out labels of the twin that is written for a fit, by pull. What traces show is held, which is fast.
+fn held_out(
+    context: &Context<'_>,
+    fitted: &Fitted,
+    repetitions: &[Vec<usize>],
+    rows: &[usize],
+) -> Vec<(usize, f64)> {
     let (context, fitted) = context.stated(fitted);
     let held = predicted(&context, &fitted, repetitions, !context.observations.is_empty());
-    let errors = rows.iter().map(|&i| held[i] - context.data.label_n[i]);
-    root_mean_square(errors.filter(|e| e.is_finite()))
+    let errors = rows.iter().map(|&i| (i, held[i] - context.data.label_n[i]));
+    errors.filter(|(_, e)| e.is_finite()).collect()
 }
 
 /// Why an effect may be nothing at all: its size holds its neutral value in all its terms.

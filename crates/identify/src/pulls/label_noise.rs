@@ -1,0 +1,78 @@
+//! How noisy a force sensor is of which there are labels alone.
+//!
+//! A label is the last reading near the command, so a noisy sensor reads it higher, by one or two deviations, and scatters it where the
+//! friction hardly does: at small forces. Together they are known from an offset of the friction or of the sensor, which moves labels
+//! without scattering them. What was taken for granted instead came back as such an offset.
+
+use super::context::Context;
+use super::model::PullModel;
+use super::terms::Terms;
+
+/// Noises that are tried, in newtons: a factor of 1.5 apart.
+const TRIED_N: [f64; 9] = [0.03, 0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9];
+
+/// Standard deviation of the logarithm of a sensor's noise about what a twin says of it: recorded forces of URs have 0.07 to
+/// 0.19 N in quiet stretches, and more while they move.
+const KNOWN: f64 = 0.7;
+
+/// Loss of log-likelihood at the ends of a 90 % interval.
+const HALF_CHI_SQUARED: f64 = 1.353;
+
+impl Context<'_> {
+    /// The baseline with lag, dead time and noise that labels say, and the 90 % interval of the noise (profile likelihood).
+    pub(super) fn noise_of_labels(&self, rows: &[usize]) -> Option<(PullModel, (f64, f64))> {
+        let given = libm::log(self.base.noise_n.clamp(TRIED_N[0], TRIED_N[TRIED_N.len() - 1]));
+        let at = |log_noise: f64| {
+            let start = PullModel { noise_n: libm::exp(log_noise), ..self.base.clone() };
+            let found = self.fit(&start, &Terms::default(), rows)?;
+            let prior = (log_noise - given) / KNOWN;
+            Some((log_noise, found.likelihood.log - found.trace_cost - 0.5 * prior * prior, found.model))
+        };
+        let tried: Vec<_> = TRIED_N.iter().filter_map(|n| at(libm::log(*n))).collect();
+        let best = (0..tried.len()).max_by(|&a, &b| tried[a].1.total_cmp(&tried[b].1))?;
+        let peak = match (best.checked_sub(1).map(|k| &tried[k]), tried.get(best + 1)) {
+            (Some(below), Some(above)) => summit([below, &tried[best], above].map(|t| (t.0, t.1))),
+            _ => tried[best].0,
+        };
+        let (log_noise, most, model) =
+            at(peak).filter(|found| found.1 >= tried[best].1).unwrap_or_else(|| tried[best].clone());
+        let profile: Vec<(f64, f64)> = tried.iter().map(|t| (t.0, t.1 - most + HALF_CHI_SQUARED)).collect();
+        let low = end(profile.iter().filter(|t| t.0 < log_noise).rev(), log_noise);
+        let high = end(profile.iter().filter(|t| t.0 > log_noise), log_noise);
+        Some((model, (libm::exp(low), libm::exp(high))))
+    }
+}
+
+/// Where the parabola through three points is highest.
+fn summit([a, b, c]: [(f64, f64); 3]) -> f64 {
+    let (left, right) = ((b.1 - a.1) / (b.0 - a.0), (c.1 - b.1) / (c.0 - b.0));
+    let bend = (right - left) / (0.5 * (c.0 - a.0));
+    if bend < 0.0 { (0.5 * (a.0 + b.0) - left / bend).clamp(a.0, c.0) } else { b.0 }
+}
+
+/// Where a profile goes through nothing on its way from the best value; the last point where it does not.
+fn end<'a>(points: impl Iterator<Item = &'a (f64, f64)>, best: f64) -> f64 {
+    let mut inside = (best, HALF_CHI_SQUARED);
+    for &(x, left) in points {
+        if left < 0.0 {
+            return inside.0 + (x - inside.0) * inside.1 / (inside.1 - left);
+        }
+        inside = (x, left);
+    }
+    inside.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A parabola has its summit at its middle, and its interval where it has lost 1.353.
+    #[test]
+    fn the_summit_and_the_ends_are_those_of_a_parabola() {
+        let of = |x: f64| (x, -0.5 * (x - 0.3) * (x - 0.3) / 0.04);
+        assert!((summit([of(0.0), of(0.25), of(0.7)]) - 0.3).abs() < 1e-9);
+        let points: Vec<(f64, f64)> =
+            (1..400).map(|k| of(0.3 + 0.002 * f64::from(k))).map(|p| (p.0, p.1 + HALF_CHI_SQUARED)).collect();
+        assert!((end(points.iter(), 0.3) - 0.3 - 1.645 * 0.2).abs() < 2e-3);
+    }
+}
