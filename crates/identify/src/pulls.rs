@@ -10,6 +10,7 @@ pub mod context;
 pub mod curves;
 pub mod data;
 mod dynamics;
+mod estimates;
 pub mod fitting;
 pub mod heldout;
 pub mod intervals;

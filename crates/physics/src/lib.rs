@@ -31,6 +31,7 @@ mod contact;
 mod convert;
 mod force_loop;
 mod grip;
+mod grip_error;
 mod jaw_friction;
 mod limit_surface;
 mod motion;
@@ -49,7 +50,8 @@ mod urdf;
 mod world;
 
 pub use arm::{ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm};
-pub use grip::{Grip, GripError, Held, grip};
+pub use grip::{Grip, Held, grip};
+pub use grip_error::GripError;
 pub use jaw_friction::{FrictionCell, JawFriction};
 pub use limit_surface::{LimitCell, free_twist_capacity_n};
 pub use quasi_static::{QuasiStatic, SlipPull, StuckPull, label_moments};

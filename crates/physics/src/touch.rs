@@ -4,7 +4,7 @@
 //! pads meet the surface where they meet the hull; else the engine gets a plate in front of each pad.
 
 use crate::convert::rapier_pose;
-use crate::grip::GripError;
+use crate::grip_error::GripError;
 use crate::scene::pad_shape;
 use crate::setup::GripSetup;
 use crate::surface::Window;

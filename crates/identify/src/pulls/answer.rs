@@ -3,6 +3,7 @@
 use super::candidates::{Candidate, candidates};
 use super::context::Context;
 use super::data::PullData;
+use super::estimates::{HALF90, parameters};
 use super::fitting::Fitted;
 use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
@@ -31,10 +32,6 @@ const MIN_PULLS: usize = 8;
 /// Standard deviations beyond which a pull is named as an outlier.
 const OUTLIER: f64 = 4.5;
 
-/// Half width of a 90 % interval of a normal variable, and by how much more the formulas here differ from what acts: set on
-/// the development split of the blind benchmark.
-const HALF90: f64 = 1.645 * 1.5;
-
 /// Rivals of the first place that are scored on held-out repetitions.
 const SCORED: usize = 8;
 
@@ -44,9 +41,6 @@ const WORSE: f64 = 1.03;
 
 /// Standard deviations beyond which the error of a held-out pull counts no more.
 const BAD: f64 = 5.0;
-
-/// Least standard deviation of a parameter, as a share of its distance from nothing: formulas are not that good.
-const MIN_SD: f64 = 0.02;
 
 /// How many times the noise that a twin states labels have to show before it is said.
 const NOISIER: f64 = 1.6;
@@ -391,28 +385,6 @@ fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize) ->
     found.sort();
     found.dedup();
     found
-}
-
-pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<String, ParameterEstimate> {
-    let part = candidate.part.as_ref().map(|p| p.0);
-    let own = |e: &&super::model::ModelEffect| e.spec == candidate.spec && e.part == part;
-    let Some(effect) = fitted.model.effects.iter().find(own) else {
-        return BTreeMap::new();
-    };
-    let spec = candidate.spec;
-    let each = |(k, p): (usize, &gripgen_twin::effects::ParameterSpec)| {
-        let value = effect.values[k];
-        let name = candidate.name_of(p.name);
-        let half = fitted.names.iter().position(|n| *n == name).map_or(0.0, |at| {
-            let sd = fitted.covariance[(at, at)].max(0.0).sqrt();
-            HALF90 * sd.max(MIN_SD * (value - p.neutral).abs())
-        });
-        let low90 = (value - half).max(p.bounds.0.min(value));
-        let high90 = (value + half).min(p.bounds.1.max(value));
-        let estimate = ParameterEstimate::new(value, (low90, high90), p.unit);
-        (p.name.to_string(), estimate)
-    };
-    spec.parameters.iter().enumerate().map(each).collect()
 }
 
 pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {

@@ -1,10 +1,11 @@
 //! Calibration of the baseline, with the effects that were asked for and no search.
 
-use super::answer::{baseline, insufficient, parameters};
+use super::answer::{baseline, insufficient};
 use super::candidates::{Candidate, candidate};
 use super::context::Context;
 use super::data::PullData;
 use super::dynamics::Dynamics;
+use super::estimates::parameters;
 use super::fitting::Fitted;
 use super::heldout::{errors, folds, predicted};
 use super::intervals::NormalFit;

@@ -49,8 +49,14 @@ struct Direction {
     vectors: DMatrix<f64>,
 }
 
-/// Shuffles the residuals of the baseline of a search and lets its rivals compete for them.
-pub fn null_gains(search: &Search<'_>, baseline: &Fitted) -> NullGains {
+impl Search<'_> {
+    /// Shuffles the residuals of the baseline and lets all rivals compete for them.
+    pub(super) fn null_gains(&self, baseline: &Fitted) -> NullGains {
+        null_gains(self, baseline)
+    }
+}
+
+fn null_gains(search: &Search<'_>, baseline: &Fitted) -> NullGains {
     let test = ScoreTest::new(search.context, &baseline.model, &Terms::default(), &search.rows, false);
     let directions = directions(search, &test);
     let residuals = test.own(&test.residuals_of(&baseline.model));

@@ -1,8 +1,8 @@
 //! Names that pay. What looks like an effect, and neither excludes nothing nor lowers the error on data that no fit has seen, is a
 //! hint: it is said and is not in the twin.
 
-use super::answer::parameters;
 use super::context::Context;
+use super::estimates::parameters;
 use super::fitting::Fitted;
 use super::heldout::predicted;
 use super::model::PullModel;

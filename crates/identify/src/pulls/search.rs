@@ -5,7 +5,6 @@ use super::candidates::Candidate;
 use super::context::Context;
 use super::curves::{Curve, at_one_word, curves_in, periodic, product};
 use super::fitting::Fitted;
-use super::null::null_gains;
 use super::terms::Terms;
 use std::cell::OnceCell;
 use std::sync::Mutex;
@@ -193,7 +192,7 @@ impl<'a> Search<'a> {
         };
         // Worked out for a campaign that has something to judge.
         let null = OnceCell::new();
-        let chance = |e: &Entry| null.get_or_init(|| null_gains(self, &baseline)).p_value(&e.rival, e.gain);
+        let chance = |e: &Entry| null.get_or_init(|| self.null_gains(&baseline)).p_value(&e.rival, e.gain);
         let Some(mut winner) = self.winner(&baseline, &first, (FIRST_GAIN, CURVE_GAIN), &chance) else {
             let best = self.winner(&baseline, &first, (NAMED_GAIN, CURVE_GAIN), &|_| 0.0);
             accepted.by_chance = best.map(|entry| ByChance { chance: chance(&entry), entry });
