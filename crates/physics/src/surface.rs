@@ -46,30 +46,13 @@ pub struct LineHit {
 }
 
 impl Surface {
-    /// Sorts the triangles of a mesh into boxes: halves them along the longest side until the pieces are small.
+    /// Sorts the triangles of a mesh into boxes.
     pub fn new(mesh: Arc<TriMesh>) -> Self {
-        let middles: Vec<[f64; 3]> = (0..mesh.triangles().len())
-            .map(|t| {
-                let [a, b, c] = mesh.corners(t);
-                [0, 1, 2].map(|i| (a[i] + b[i] + c[i]) / 3.0)
-            })
-            .collect();
-        let mut order: Vec<u32> = (0..middles.len() as u32).collect();
-        let mut groups = Vec::new();
-        let mut pieces = vec![(0, order.len())];
-        while let Some((start, end)) = pieces.pop() {
-            let piece = &mut order[start..end];
-            if piece.len() <= GROUP {
-                piece.sort_unstable();
-                groups.push(Group::new(&mesh, piece, start..end));
-                continue;
-            }
-            let axis = longest_side(&middles, piece);
-            let place = |t: &u32| middles[*t as usize][axis];
-            let half = piece.len() / 2;
-            piece.select_nth_unstable_by(half, |a, b| place(a).total_cmp(&place(b)).then(a.cmp(b)));
-            pieces.push((start + half, end));
-            pieces.push((start, start + half));
+        let (mut order, mut groups) = (Vec::with_capacity(mesh.triangles().len()), Vec::new());
+        for piece in mesh.pieces(GROUP) {
+            let start = order.len();
+            order.extend(&piece);
+            groups.push(Group::new(&mesh, &piece, start..order.len()));
         }
         Self { mesh, order, groups }
     }
@@ -206,17 +189,6 @@ impl Group {
         }
         enter <= leave
     }
-}
-
-fn longest_side(middles: &[[f64; 3]], piece: &[u32]) -> usize {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for &t in piece {
-        for i in 0..3 {
-            low[i] = low[i].min(middles[t as usize][i]);
-            high[i] = high[i].max(middles[t as usize][i]);
-        }
-    }
-    (0..3).fold(0, |a, b| if high[b] - low[b] > high[a] - low[a] { b } else { a })
 }
 
 /// The part of a convex polygon on the side where `inside` is not negative (Sutherland & Hodgman 1974).

@@ -2,6 +2,7 @@
 
 mod look;
 mod obj;
+mod pieces;
 mod stl;
 
 pub use look::MeshLook;

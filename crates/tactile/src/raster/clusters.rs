@@ -34,37 +34,16 @@ pub(super) struct Cluster {
 }
 
 impl ClusteredMesh {
-    /// Halves the mesh along its longest side, by the middles of the triangles, until the pieces are small.
+    /// Small pieces of the mesh, each with its vertices together.
     pub fn new(mesh: &TriMesh) -> Self {
-        let middles: Vec<[f64; 3]> = (0..mesh.triangles().len())
-            .map(|t| {
-                let [a, b, c] = mesh.corners(t);
-                [0, 1, 2].map(|i| (a[i] + b[i] + c[i]) / 3.0)
-            })
-            .collect();
-        let mut order: Vec<u32> = (0..middles.len() as u32).collect();
         let mut prepared = Self {
             clusters: Vec::new(),
             x_m: Vec::new(),
             y_m: Vec::new(),
             z_m: Vec::new(),
-            triangles: Vec::with_capacity(order.len()),
+            triangles: Vec::with_capacity(mesh.triangles().len()),
         };
-        let mut pieces = vec![&mut order[..]];
-        while let Some(piece) = pieces.pop() {
-            if piece.len() <= TRIANGLES {
-                piece.sort_unstable();
-                prepared.push(mesh, piece);
-                continue;
-            }
-            let axis = longest_axis(&middles, piece);
-            let place = |t: &u32| middles[*t as usize][axis];
-            let half = piece.len() / 2;
-            piece.select_nth_unstable_by(half, |a, b| place(a).total_cmp(&place(b)).then(a.cmp(b)));
-            let (low, high) = piece.split_at_mut(half);
-            pieces.push(high);
-            pieces.push(low);
-        }
+        mesh.pieces(TRIANGLES).iter().for_each(|piece| prepared.push(mesh, piece));
         prepared
     }
 
@@ -93,23 +72,5 @@ impl ClusteredMesh {
             middle_m: Point3::from([0, 1, 2].map(|i| (low[i] + high[i]) / 2.0)),
             half_m: [0, 1, 2].map(|i| (high[i] - low[i]) / 2.0),
         });
-    }
-}
-
-fn longest_axis(middles: &[[f64; 3]], piece: &[u32]) -> usize {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for &t in piece {
-        for i in 0..3 {
-            low[i] = low[i].min(middles[t as usize][i]);
-            high[i] = high[i].max(middles[t as usize][i]);
-        }
-    }
-    let side = |i: usize| high[i] - low[i];
-    if side(0) >= side(1) && side(0) >= side(2) {
-        0
-    } else if side(1) >= side(2) {
-        1
-    } else {
-        2
     }
 }
