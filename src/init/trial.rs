@@ -119,17 +119,6 @@ fn scenario(part: &str, grip: usize, angle_deg: f64, offset_mm: f64, force_n: f6
         grip_angle_rad: angle_deg.to_radians(),
         ..Covariates::default()
     };
-    let pull = PullSettings {
-        increment_n: 1.0,
-        start_n: None,
-        step_s: 0.104,
-        step_jitter: 0.0,
-        stop_m: 5e-3,
-        direction: [0.0, 0.0, 1.0],
-        max_force_n: None,
-        max_time_s: 60.0,
-        label_tolerance_n: 3.0,
-    };
     Scenario {
         seed: 1,
         index: 0,
@@ -139,7 +128,7 @@ fn scenario(part: &str, grip: usize, angle_deg: f64, offset_mm: f64, force_n: f6
         grip_pose: grip,
         grip_force_n: force_n,
         covariates,
-        pull,
+        pull: PullSettings::default(),
         drawn: BTreeMap::new(),
     }
 }

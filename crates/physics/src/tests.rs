@@ -114,17 +114,7 @@ impl Bench {
 }
 
 pub(crate) fn settings() -> PullSettings {
-    PullSettings {
-        increment_n: 1.0,
-        start_n: None,
-        step_s: 0.104,
-        step_jitter: 0.0,
-        stop_m: 5e-3,
-        direction: [0.0, 0.0, 1.0],
-        max_force_n: None,
-        max_time_s: 60.0,
-        label_tolerance_n: 3.0,
-    }
+    PullSettings::default()
 }
 
 /// A polygonal cylinder as a mesh hull, axis along z.

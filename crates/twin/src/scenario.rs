@@ -69,6 +69,23 @@ pub struct PullSettings {
     pub label_tolerance_n: f64,
 }
 
+impl Default for PullSettings {
+    /// The pull of a sweep that says nothing of it.
+    fn default() -> Self {
+        Self {
+            increment_n: 1.0,
+            start_n: None,
+            step_s: 0.104,
+            step_jitter: 0.0,
+            stop_m: 5e-3,
+            direction: [0.0, 0.0, 1.0],
+            max_force_n: None,
+            max_time_s: 60.0,
+            label_tolerance_n: 3.0,
+        }
+    }
+}
+
 /// One pull: everything a sample is a function of, beside the twin and the sweep seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {

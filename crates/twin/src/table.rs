@@ -281,17 +281,7 @@ mod tests {
     use crate::{Covariates, PullSettings, Scenario, TWIN_SCHEMA};
 
     fn scenario(part: &str, extra: &[(&str, Drawn)]) -> Scenario {
-        let pull = PullSettings {
-            increment_n: 0.5,
-            start_n: None,
-            step_s: 0.1,
-            step_jitter: 0.0,
-            stop_m: 5e-3,
-            direction: [0.0, 0.0, 1.0],
-            max_force_n: None,
-            max_time_s: 60.0,
-            label_tolerance_n: 3.0,
-        };
+        let pull = PullSettings { increment_n: 0.5, step_s: 0.1, ..Default::default() };
         let extra = extra.iter().map(|(k, v)| (k.to_string(), v.clone())).collect();
         Scenario {
             seed: 1,

@@ -58,17 +58,7 @@ fn label() -> SlipLabel {
 
 fn pull(index: u64, result: RigResult) -> RigPull {
     let covariates = Covariates { pull_index: index, time_s: 60.0 * index as f64, ..Covariates::default() };
-    let settings = PullSettings {
-        increment_n: 1.0,
-        start_n: None,
-        step_s: 0.104,
-        step_jitter: 0.0,
-        stop_m: 5e-3,
-        direction: [0.0, 0.0, 1.0],
-        max_force_n: None,
-        max_time_s: 120.0,
-        label_tolerance_n: 3.0,
-    };
+    let settings = PullSettings { max_time_s: 120.0, ..Default::default() };
     let scenario = Scenario {
         seed: 0,
         index,

@@ -11,17 +11,7 @@ fn scenario() -> Scenario {
         grip_pose: 0,
         grip_force_n: 0.0,
         covariates: Covariates::default(),
-        pull: PullSettings {
-            increment_n: 0.0,
-            start_n: None,
-            step_s: 0.0,
-            step_jitter: 0.0,
-            stop_m: 5e-3,
-            direction: [0.0, 0.0, 1.0],
-            max_force_n: None,
-            max_time_s: 60.0,
-            label_tolerance_n: 3.0,
-        },
+        pull: PullSettings { increment_n: 0.0, step_s: 0.0, ..Default::default() },
         drawn: Default::default(),
     }
 }

@@ -286,6 +286,11 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_sweep_that_says_nothing_of_the_pull_has_the_default_one() {
+        assert_eq!(pull_settings(&PullFile::default()).unwrap(), PullSettings::default());
+    }
+
+    #[test]
     fn the_name_of_a_column_in_tables_leads_to_its_key() {
         let hint = |key: &str| unknown_key(format!("vary.{key}"), key).hint.unwrap_or_default();
         assert_eq!(hint("force_increment_n"), "did you mean `pull.increment_n`?");
