@@ -103,7 +103,6 @@ pub fn diagnose_pulls(
     let rows: Vec<usize> = (0..data.len()).collect();
     context.see_tails(&rows);
     context.share_lag(&rows);
-    context.see_tails(&rows);
     context.base.bent_at_s = (context.base.lag_s, context.base.dead_time_s);
     if let Some(plain) = context.fit(&context.base, &Terms::default(), &rows) {
         context.correct_at(&plain.model);
@@ -140,8 +139,11 @@ pub fn diagnose_pulls(
     let heldout_after = predicted(&after_context, &after, &repetitions, false);
     diagnosis.effects = named(&search, &before, &accepted);
     diagnosis.unknown = unknown(&search, &before, &accepted, &data);
-    for (name, (column, word)) in accepted.curves.iter().filter_map(|&i| search.curves[i].at_word()) {
-        diagnosis.notes.push(format!("{name}: it was seen where {column} is {word}, and only there"));
+    for curve in accepted.curves.iter().map(|&i| &search.curves[i]) {
+        if let Some((column, word)) = &curve.only {
+            let name = &curve.name;
+            diagnosis.notes.push(format!("{name}: it was seen where {column} is {word}, and only there"));
+        }
     }
     for zero in zeros_that_depend(&after_context, &after.model) {
         diagnosis.notes.push(said(&zero));
@@ -389,11 +391,7 @@ fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize) ->
 
 pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
     let mut values = BTreeMap::new();
-    let unit = |name: &str| match name {
-        _ if name.ends_with("_s") => "s",
-        _ if name.ends_with("_n") => "N",
-        _ => "1",
-    };
+    let unit = |name: &str| if name.ends_with("_s") { "s" } else { "1" };
     for (k, name) in fitted.names.iter().enumerate() {
         if !(name.starts_with("parts.") || name.starts_with("robot.") || name == "kinetic_ratio") {
             continue;

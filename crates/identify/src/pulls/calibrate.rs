@@ -142,7 +142,6 @@ pub fn calibrate_pulls(
     let rows: Vec<usize> = (0..data.len()).collect();
     context.see_tails(&rows);
     context.learn_lag(&rows);
-    context.see_tails(&rows);
     let dynamics = context.settle_dynamics();
     // Without traces lag and dead time stay free, so that mu knows what they are not known to.
     context.free_lag = context.observations.is_empty();

@@ -18,7 +18,7 @@ const RATHER_SESSION: f64 = 4.0;
 const SAME_CLOCK: f64 = 0.9;
 
 /// Chance at which the first effect, or the first curve, may be named where nothing acts.
-pub(super) const CHANCE: f64 = 0.025;
+const CHANCE: f64 = 0.025;
 
 /// Pulls without which something has to speak for a rival, and the share of its gain that the others have to give.
 const FEW: usize = 2;
@@ -133,8 +133,11 @@ impl Search<'_> {
     ) -> Option<Entry> {
         let named = entries
             .iter()
-            .find(|e| e.rival.effect().is_some() && e.gain >= named_gain && self.visible(e))
-            .filter(|e| chance(e) <= CHANCE && self.broad(before, e));
+            .find(|e| {
+                let named = e.rival.effect().is_some() && e.gain >= named_gain;
+                named && self.visible(e) && self.broad(before, e)
+            })
+            .filter(|e| chance(e) <= CHANCE);
         let curve = entries.iter().filter(|e| e.gain >= curve_gain).find(|e| match e.rival {
             ModelTerm::Curve(k) => {
                 if chance(e) > CHANCE || !self.broad(before, e) {

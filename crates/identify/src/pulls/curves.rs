@@ -28,11 +28,6 @@ impl Curve {
         self.basis.first().map_or(0, Vec::len)
     }
 
-    /// Its name with the column and the word at which alone it acts, if it does.
-    pub fn at_word(&self) -> Option<(&str, &(String, String))> {
-        self.only.as_ref().map(|only| (self.name.as_str(), only))
-    }
-
     /// Whether it has no coefficient.
     pub fn is_empty(&self) -> bool {
         self.len() == 0

@@ -52,41 +52,37 @@ struct Direction {
 impl Search<'_> {
     /// Shuffles the residuals of the baseline and lets all rivals compete for them.
     pub(super) fn null_gains(&self, baseline: &Fitted) -> NullGains {
-        null_gains(self, baseline)
-    }
-}
-
-fn null_gains(search: &Search<'_>, baseline: &Fitted) -> NullGains {
-    let test = ScoreTest::new(search.context, &baseline.model, &Terms::default(), &search.rows, false);
-    let directions = directions(search, &test);
-    let residuals = test.own(&test.residuals_of(&baseline.model));
-    let sessions = &search.context.data.session_of;
-    let memory = baseline.likelihood.memory;
-    let innovations = innovations(residuals.as_slice(), memory, sessions);
-    let (mut effects, mut curves) = (Vec::new(), Vec::new());
-    let mut draws = Draws::new(29, 6);
-    let mut order: Vec<usize> = (0..innovations.len()).collect();
-    let log_sd = vec![0.0; innovations.len()];
-    let tails = search.context.tails;
-    for _ in 0..CAMPAIGNS {
-        draws.shuffle(&mut order);
-        let shuffled: Vec<f64> = order.iter().map(|&i| innovations[i]).collect();
-        let noise = test.free(&DVector::from_vec(remembered(&shuffled, memory, sessions)));
-        let before = likelihood(noise.as_slice(), &log_sd, sessions, tails).log;
-        let clipped = noise.map(|x| x.clamp(-3.0, 3.0));
-        for (named, best) in [(true, &mut effects), (false, &mut curves)] {
-            let own = directions.iter().filter(|d| d.named == named);
-            let mut promised: Vec<(f64, &Direction)> =
-                own.map(|d| (0.5 * d.vectors.tr_mul(&clipped).norm_squared() - d.cost, d)).collect();
-            promised.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let judged = promised.iter().take(JUDGED).map(|(_, d)| {
-                let left = without(&noise, &d.vectors, tails);
-                likelihood(left.as_slice(), &log_sd, sessions, tails).log - before - d.cost
-            });
-            best.push(judged.fold(f64::NEG_INFINITY, f64::max));
+        let test = ScoreTest::new(self.context, &baseline.model, &Terms::default(), &self.rows, false);
+        let directions = directions(self, &test);
+        let residuals = test.own(&test.residuals_of(&baseline.model));
+        let sessions = &self.context.data.session_of;
+        let memory = baseline.likelihood.memory;
+        let innovations = innovations(residuals.as_slice(), memory, sessions);
+        let (mut effects, mut curves) = (Vec::new(), Vec::new());
+        let mut draws = Draws::new(29, 6);
+        let mut order: Vec<usize> = (0..innovations.len()).collect();
+        let log_sd = vec![0.0; innovations.len()];
+        let tails = self.context.tails;
+        for _ in 0..CAMPAIGNS {
+            draws.shuffle(&mut order);
+            let shuffled: Vec<f64> = order.iter().map(|&i| innovations[i]).collect();
+            let noise = test.free(&DVector::from_vec(remembered(&shuffled, memory, sessions)));
+            let before = likelihood(noise.as_slice(), &log_sd, sessions, tails).log;
+            let clipped = noise.map(|x| x.clamp(-3.0, 3.0));
+            for (named, best) in [(true, &mut effects), (false, &mut curves)] {
+                let own = directions.iter().filter(|d| d.named == named);
+                let mut promised: Vec<(f64, &Direction)> =
+                    own.map(|d| (0.5 * d.vectors.tr_mul(&clipped).norm_squared() - d.cost, d)).collect();
+                promised.sort_by(|a, b| b.0.total_cmp(&a.0));
+                let judged = promised.iter().take(JUDGED).map(|(_, d)| {
+                    let left = without(&noise, &d.vectors, tails);
+                    likelihood(left.as_slice(), &log_sd, sessions, tails).log - before - d.cost
+                });
+                best.push(judged.fold(f64::NEG_INFINITY, f64::max));
+            }
         }
+        NullGains { effects, curves }
     }
-    NullGains { effects, curves }
 }
 
 /// The directions of all rivals that labels and slips can show.

@@ -16,9 +16,6 @@ const PAYS: f64 = 0.03;
 /// Least standard deviation of a label.
 const LEAST_SD_N: f64 = 0.03;
 
-/// Least chance, in percent, that is put into a sentence.
-const LEAST_PERCENT: f64 = 0.5;
-
 /// The accepted model without the effects that do not pay, the last first, and these as hints. `rows` are the pulls that
 /// count: an error is not that of pulls that are known to be bad.
 pub(super) fn paying(
@@ -85,7 +82,7 @@ pub(super) fn by_chance(
         })),
         reason: format!(
             "where nothing acts, the best of everything that competes looks as good in {:.0} % of campaigns like this one",
-            (100.0 * found.chance).max(LEAST_PERCENT)
+            100.0 * found.chance
         ),
     }
 }

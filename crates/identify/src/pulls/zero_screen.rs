@@ -22,8 +22,8 @@ const CHANCE: f64 = 0.01;
 /// Least share of the variance of the differences that a column explains.
 const LEAST_SHARE: f64 = 0.2;
 
-/// Columns that say when a pull was made, of which a drift is an effect, and the direction, in which a bias has another sign.
-const NOT_LOOKED_AT: [&str; 5] = ["time_s", "pull_index", "session", "pull_direction", "gel_id"];
+/// Columns of numbers that say when a pull was made, of which a drift is an effect, and the direction, in which a bias has another sign.
+const NOT_LOOKED_AT: [&str; 3] = ["time_s", "pull_index", "pull_direction"];
 
 /// Columns that the readings without a load go with, beyond what a model says of them.
 pub(super) fn zeros_that_depend(context: &Context<'_>, model: &PullModel) -> Vec<UnknownCovariate> {
