@@ -28,7 +28,7 @@ pub(super) struct Places {
     pub(super) places: Vec<Place>,
     /// Smallest distance between surfaces that a line meets.
     pub(super) narrowest_m: Option<f64>,
-    /// Lines that are longer than the jaws open, and the shortest of them.
+    /// Lines between surfaces that face each other and are farther apart than the jaws open, and the shortest of them.
     pub(super) too_wide: usize,
     pub(super) narrowest_too_wide_m: Option<f64>,
     /// The smallest angle at which any line met both its surfaces.
@@ -111,7 +111,7 @@ impl Places {
         if width_m <= widest_m {
             let middle = through + axis * ((first.at_m + last.at_m) / 2.0);
             self.places.push(Place { middle, axis: snapped(axis) });
-        } else {
+        } else if steep_rad <= OPPOSITE_RAD {
             self.too_wide += 1;
             let narrowest = self.narrowest_too_wide_m.map_or(width_m, |narrowest| narrowest.min(width_m));
             self.narrowest_too_wide_m = Some(narrowest);

@@ -13,13 +13,6 @@ use std::path::{Path, PathBuf};
 /// Runs the verb.
 pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     let extension = args.target.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
-    if let Some(hint) = unread(&extension) {
-        let problem = format!(
-            "{}: gripgen reads meshes from STL and OBJ files, not from .{extension}",
-            args.target.display()
-        );
-        return Err(Failure::usage(problem).hint(hint));
-    }
     let (folder, files, talk, made) = if ["stl", "obj"].contains(&extension.as_str()) {
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
         let options = PartOptions {
@@ -34,7 +27,7 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
         let files = std::mem::take(&mut made.files);
         (folder, files, std::mem::take(&mut made.summary), Some(made))
     } else {
-        no_mesh(&args.target)?;
+        no_mesh(&args.target, &extension)?;
         if let Some(out) = &args.out {
             let problem = format!("--out {} goes with a mesh; a folder is its own target", out.display());
             return Err(Failure::usage(problem));
@@ -99,18 +92,17 @@ fn unread(extension: &str) -> Option<&'static str> {
 }
 
 /// A target that is no mesh has to be a folder: a file of another kind, or one that is not there, makes none of its name.
-fn no_mesh(target: &Path) -> Result<(), Failure> {
+fn no_mesh(target: &Path, extension: &str) -> Result<(), Failure> {
     if target.is_dir() {
         return Ok(());
     }
-    let ending = target.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
     // `v1.2` is a folder to be.
-    let of_a_file = ending.chars().any(char::is_alphabetic);
+    let of_a_file = extension.chars().any(char::is_alphabetic);
     let problem = match target.exists() {
         true => "this is neither a folder nor a mesh that can be read",
         false if of_a_file => "there is no such file, and .STL and .OBJ are the meshes that can be read",
         false => return Ok(()),
     };
-    Err(Failure::usage(format!("{}: {problem}", target.display()))
-        .hint("export the part as STL or OBJ; or name a folder, which is made"))
+    let hint = unread(extension).unwrap_or("export the part as STL or OBJ; or name a folder, which is made");
+    Err(Failure::usage(format!("{}: {problem}", target.display())).hint(hint))
 }
