@@ -77,6 +77,16 @@ pub fn simulate(
     pull(twin, scenario, &Gripped::new(twin, library, scenario, options)?, options, gpu)
 }
 
+/// The same of a grip that is there, without images.
+pub(crate) fn pull_gripped(
+    twin: &Twin,
+    scenario: &Scenario,
+    gripped: &Gripped,
+    options: SimulateOptions,
+) -> Result<Outcome, SampleError> {
+    pull(twin, scenario, gripped, SimulateOptions { images: false, ..options }, None)
+}
+
 /// A grip that is ready to pull.
 pub struct StartedPull {
     /// What the cameras see, where images are wanted.

@@ -1,6 +1,6 @@
 //! Files to start from: commented configurations, and those for a part of one's own.
 
-mod drawing;
+pub(crate) mod drawing;
 mod places;
 mod pose;
 mod propose;
@@ -13,15 +13,20 @@ use crate::library::{Library, LibraryError};
 use crate::location::Location;
 use crate::project::{BASELINE_TWIN, load_twin_document};
 use gripgen_physics::PartShape;
-use gripgen_twin::{MeshError, Part, TriMesh, Twin};
+use gripgen_twin::{Jaw, MeshError, Part, TriMesh, Twin};
+pub(crate) use propose::Proposed;
 use propose::Search;
 use std::collections::BTreeMap;
 use std::path::Path;
 pub use trial::Varied;
+pub(crate) use trial::{ANGLES_DEG, HIGHEST_N, Trial, TrialCell};
 
 /// Friction and imprint constant of a part of which nothing is known; `twin.toml` says so.
-const MU: f64 = 0.15;
+pub(crate) const MU: f64 = 0.15;
 const IMPRINT_MM3_PER_N: f64 = 1.5;
+
+/// Name of the part while grips are looked for.
+pub(crate) const PART: &str = "part";
 
 /// The smallest of the largest forces that a grip is tried with.
 const LEAST_FORCE_N: f64 = 10.0;
@@ -224,14 +229,38 @@ pub struct PartOptions {
     pub threads: usize,
 }
 
-/// A sweep, a twin with grips that were tried, a picture and a copy of the mesh, for the mesh file at `path`.
-///
-/// # Errors
-///
-/// A file that is no mesh, a mesh that is open, or a part on which no grip works.
-pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<PartStarter, InitError> {
+/// A mesh that was read, looked at and searched for grips.
+pub(crate) struct Searched {
+    /// The file name as a TOML bare key.
+    pub(crate) name: String,
+    /// Content of the file.
+    pub(crate) bytes: Vec<u8>,
+    /// The mesh, in metres.
+    pub(crate) mesh: TriMesh,
+    /// Its extent along its axes.
+    pub(crate) size_mm: [f64; 3],
+    /// What is to be said of the mesh, a sentence each.
+    pub(crate) mesh_words: Vec<String>,
+    /// The rig, with a part named `part` that has the grips found.
+    pub(crate) twin: Twin,
+    /// The files of the twin.
+    pub(crate) library: Library,
+    /// The grips.
+    pub(crate) proposed: Proposed,
+}
+
+impl Searched {
+    /// Size of the part, for people.
+    pub(crate) fn size(&self) -> String {
+        let [x_mm, y_mm, z_mm] = self.size_mm;
+        format!("{x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm")
+    }
+}
+
+/// Reads a mesh, looks at it and tries grips on a rig.
+pub(crate) fn search(path: &Path, options: PartOptions, twin: Twin) -> Result<Searched, InitError> {
     let location = Location::Disk(path.into());
-    let bytes = location.read()?;
+    let bytes = location.read()?.into_owned();
     let metres_per_unit = options.scale_mm_per_unit * 1e-3;
     let mesh = TriMesh::from_file_bytes(&bytes, location.extension(), metres_per_unit)
         .map_err(|source| LibraryError::Mesh { location: location.clone(), source })?;
@@ -243,8 +272,6 @@ pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<
     PartShape::hull(&mesh, &gripgen_twin::frames::Pose::identity())
         .map_err(|source| LibraryError::Shape { location: location.clone(), source })?;
     let size_mm = mesh.extent_m().map(|s| s * 1e3);
-    let [x_mm, y_mm, z_mm] = size_mm;
-    let twin = baseline();
     let part = Part {
         mesh: path.display().to_string(),
         metres_per_unit,
@@ -255,9 +282,12 @@ pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<
         scatter: 0.0,
         imprint_m3_per_n: IMPRINT_MM3_PER_N * 1e-9,
     };
-    let of_part = Twin { parts: BTreeMap::from([("part".to_string(), part.clone())]), ..twin.clone() };
+    let mut twin = Twin { parts: BTreeMap::from([(PART.to_string(), part.clone())]), ..twin };
     // Paths are relative to where the program was started.
-    let library = Library::of_twin(&of_part, &Location::Disk("twin.toml".into()))?;
+    let library = Library::of_twin(&twin, &Location::Disk("twin.toml".into()))?;
+    for jaw in Jaw::BOTH {
+        library.check_sensor(&twin.optics[jaw], &twin.gel[jaw])?;
+    }
     let search = Search {
         twin: &twin,
         library: &library,
@@ -267,16 +297,29 @@ pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<
         closed: look.is_closed(),
         threads: options.threads,
     };
-    let proposed = search.run().map_err(|source| InitError::NoGrip {
-        path: path.display().to_string(),
-        x_mm,
-        y_mm,
-        z_mm,
-        source,
-    })?;
-    let name = part_name(path);
+    let [x_mm, y_mm, z_mm] = size_mm;
+    let path_shown = || path.display().to_string();
+    let proposed =
+        search.run().map_err(|source| InitError::NoGrip { path: path_shown(), x_mm, y_mm, z_mm, source })?;
+    let grips = proposed.grips.iter().map(Proposal::part_from_mesh).collect();
+    twin.parts.get_mut(PART).expect("it was put there").grips = grips;
+    let mut mesh_words = look.words();
+    mesh_words.extend(unit_guess(size_mm).map(|guess| {
+        format!("the part measures {x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm; {guess}, if the file is not in mm")
+    }));
+    Ok(Searched { name: part_name(path), bytes, mesh, size_mm, mesh_words, twin, library, proposed })
+}
+
+/// A sweep, a twin with grips that were tried, a picture and a copy of the mesh, for the mesh file at `path`.
+///
+/// # Errors
+///
+/// A file that is no mesh, a mesh that is open, or a part on which no grip works.
+pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<PartStarter, InitError> {
+    let searched = search(path, options, baseline())?;
+    let size = searched.size();
+    let Searched { name, bytes, mesh, mesh_words, proposed, .. } = searched;
     let (mesh_name, copy) = mesh_reference(path, folder);
-    let size = format!("{x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm");
     let (proposals, varied) = (&proposed.grips, &proposed.varied);
     let fill = |template: &str| {
         template
@@ -300,19 +343,14 @@ pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<
         StarterFile { name: "grips.png".into(), bytes: drawing::grips_picture(&name, &mesh, proposals) },
     ];
     if copy {
-        files.push(StarterFile { name: mesh_name, bytes: bytes.into_owned() });
+        files.push(StarterFile { name: mesh_name, bytes });
     }
-    let mut mesh_words = look.words();
-    mesh_words.extend(
-        unit_guess(size_mm)
-            .map(|guess| format!("the part measures {size}; {guess}, if the file is not in mm")),
-    );
     let summary = text::summary(&name, &size, &mesh_words, &proposed);
     Ok(PartStarter { files, grips: proposed.grips, varied: proposed.varied, mesh_words, summary })
 }
 
 /// The rig that grips are proposed for.
-fn baseline() -> Twin {
+pub(crate) fn baseline() -> Twin {
     let document = load_twin_document(&Location::parse(BASELINE_TWIN), &[]);
     let file = document.ok().and_then(|d| d.read_twin().ok());
     file.and_then(|f| Twin::new(&f).ok()).expect("a test loads the baseline twin")

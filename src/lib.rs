@@ -81,6 +81,7 @@ mod sample;
 mod schema;
 mod simulator;
 mod sweep;
+mod try_part;
 mod twin_edits;
 mod twin_project;
 mod version;
@@ -142,5 +143,8 @@ pub use sample::{SampleError, SimulateOptions};
 pub use schema::{sweep_schema, twin_schema};
 pub use simulator::{Draw, Simulator};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, prepare_run, run_info, sweep};
+pub use try_part::{
+    FrictionRange, GripTried, Holding, TriedPart, TryOptions, TryPartError, WorksAt, try_part,
+};
 pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, edited_twin_toml, write_twin};
 pub use version::VERSION;

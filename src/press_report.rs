@@ -1,6 +1,7 @@
 //! A report of predicted against real presses, as one HTML file.
 
 use crate::assets;
+use crate::report::png_url;
 use gripgen_record::encode_png;
 use gripgen_tactile::metrics::Score;
 use gripgen_tactile::presses::{PressComparison, PressSet};
@@ -152,9 +153,7 @@ fn difference(a: &TactileImage, b: &TactileImage) -> TactileImage {
 }
 
 fn data_url(image: &TactileImage) -> String {
-    use base64::Engine;
-    let png = encode_png(image).expect("an RGB image can be encoded");
-    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
+    png_url(&encode_png(image).expect("an RGB image can be encoded"))
 }
 
 #[cfg(test)]

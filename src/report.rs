@@ -5,12 +5,14 @@ mod bars;
 mod comparison;
 mod page;
 mod plot;
+mod sections;
 mod sentence;
 #[cfg(test)]
 mod tests;
 
 pub use comparison::{PageTable, comparison_page};
 pub use page::diagnosis_page;
+pub(crate) use sections::{PageFigure, PageSection, png_url, sections_page};
 
 use gripgen_identify::Diagnosis;
 

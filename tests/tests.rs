@@ -72,5 +72,7 @@ mod taxim_heights;
 mod taxim_stages;
 // The repository itself.
 mod tidy;
+// Parts at a glance.
+mod try_part;
 // Twins that were changed.
 mod twin_edits;

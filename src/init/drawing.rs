@@ -6,7 +6,7 @@ use gripgen_twin::frames::{Pose, pose};
 use gripgen_twin::{Jaw, TriMesh};
 use nalgebra::{Point3, Rotation3, Vector3};
 
-const PANEL: (u32, u32) = (620, 460);
+pub(crate) const PANEL: (u32, u32) = (620, 460);
 const HEADER: u32 = 56;
 const STEEL: Rgb = Rgb(176, 184, 194);
 const GEL: [Rgb; 2] = [Rgb(96, 150, 214), Rgb(232, 140, 70)];
@@ -34,7 +34,21 @@ pub(super) fn grips_picture(name: &str, mesh: &TriMesh, proposals: &[Proposal]) 
     canvas.into_png()
 }
 
-fn panel(canvas: &mut Canvas, (x, y): (u32, u32), index: usize, mesh: &TriMesh, proposal: &Proposal) {
+/// A PNG of one grip.
+pub(crate) fn grip_picture(index: usize, mesh: &TriMesh, proposal: &Proposal) -> Vec<u8> {
+    let mut canvas = Canvas::new(PANEL.0, PANEL.1, Rgb(255, 255, 255));
+    panel(&mut canvas, (0, 0), index, mesh, proposal);
+    canvas.into_png()
+}
+
+/// Part, jaws and axes of a grip, with the top left corner at a place.
+pub(crate) fn panel(
+    canvas: &mut Canvas,
+    (x, y): (u32, u32),
+    index: usize,
+    mesh: &TriMesh,
+    proposal: &Proposal,
+) {
     let part = proposal.part_from_mesh();
     let reach = mesh.vertices_m().iter().map(|v| (part * v).coords.norm()).fold(0.02, f64::max);
     let view = View {
@@ -57,7 +71,7 @@ fn panel(canvas: &mut Canvas, (x, y): (u32, u32), index: usize, mesh: &TriMesh, 
     Scene::new(view).draw(canvas, x, y, &meshes);
     draw_axes(canvas, (x, y), &view, reach);
     let text = format!(
-        "grip_pose = {index}: {:.1} mm between the jaws, {:.0} mm\u{b2} in contact at 40 N",
+        "grip_pose = {index}: {:.1} mm between the jaws, {:.0} mm\u{b2} in contact",
         proposal.width_mm, proposal.contact_mm2
     );
     canvas.text(&text, f64::from(x + 14), f64::from(y + 6), Anchor::Left, TextStyle::small(Rgb(33, 37, 43)));

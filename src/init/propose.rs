@@ -40,12 +40,14 @@ pub(super) struct Search<'a> {
 
 /// Grips that work, the best first, and what a sweep over them may vary.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Proposed {
-    pub(super) grips: Vec<Proposal>,
-    pub(super) varied: Varied,
+pub(crate) struct Proposed {
+    pub(crate) grips: Vec<Proposal>,
+    /// Where each of them works.
+    pub(crate) trials: Vec<Trial>,
+    pub(crate) varied: Varied,
     /// How many were tried, and what failed first where the sweep had to be narrowed.
-    pub(super) tried: usize,
-    pub(super) failure: Option<String>,
+    pub(crate) tried: usize,
+    pub(crate) failure: Option<String>,
 }
 
 /// A grip that looks good.
@@ -102,11 +104,12 @@ impl Search<'_> {
         let trials = Trials::new(self.twin, self.library, self.part.clone(), &at).run(self.threads);
         let (varied, grips) = widest(&tried, &trials, &body).ok_or_else(|| NoGrip::AllFail {
             tried: tried.len(),
-            failure: trials.iter().find_map(|t| t.failure.clone()).unwrap_or_default(),
+            failure: trials.iter().find_map(Trial::failure).cloned().unwrap_or_default(),
         })?;
-        let failure = trials.iter().find_map(|t| t.failure.clone());
-        let grips = grips.into_iter().map(|i| tried[i].proposal()).collect();
-        Ok(Proposed { grips, varied, tried: tried.len(), failure })
+        let failure = trials.iter().find_map(Trial::failure).cloned();
+        let proposals = grips.iter().map(|&i| tried[i].proposal()).collect();
+        let trials = grips.iter().map(|&i| trials[i].clone()).collect();
+        Ok(Proposed { grips: proposals, trials, varied, tried: tried.len(), failure })
     }
 
     /// The grip at a place, and the same moved to the middle of what it touches.

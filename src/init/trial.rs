@@ -10,9 +10,9 @@ use gripgen_twin::{Covariates, Part, PullSettings, Scenario, Twin};
 use std::collections::BTreeMap;
 
 /// Angles, offsets and forces that a sweep may have; a narrower one leaves some out.
-pub(super) const ANGLES_DEG: [f64; 4] = [0.0, 30.0, 60.0, 90.0];
+pub(crate) const ANGLES_DEG: [f64; 4] = [0.0, 30.0, 60.0, 90.0];
 const OFFSET_SDS_MM: [f64; 3] = [1.0, 0.5, 0.25];
-const HIGHEST_N: [f64; 3] = [40.0, 20.0, 10.0];
+pub(crate) const HIGHEST_N: [f64; 3] = [40.0, 20.0, 10.0];
 pub(super) const LOWEST_N: f64 = 5.0;
 /// Offsets are tried as far out as this many standard deviations: 1 draw in 370 lies beyond.
 const SDS: f64 = 3.0;
@@ -28,13 +28,22 @@ pub struct Varied {
     pub grip_angle_deg: Vec<f64>,
 }
 
-/// Where a grip works: the largest force that does, at each angle and offset.
-#[derive(Debug, Clone)]
-pub(super) struct Trial {
+/// Where a grip works.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Trial {
     /// In the order of [`ANGLES_DEG`], then of [`offsets_mm`].
-    largest_n: Vec<f64>,
-    /// Why the grip failed at the smallest of the highest forces, if it did anywhere.
-    pub(super) failure: Option<String>,
+    pub(crate) cells: Vec<TrialCell>,
+}
+
+/// How a grip does at an angle and an offset.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TrialCell {
+    pub(crate) angle_deg: f64,
+    pub(crate) offset_mm: f64,
+    /// The largest force that was tried and works; 0 if none does.
+    pub(crate) largest_n: f64,
+    /// Why a larger force, or every one, fails.
+    pub(crate) failure: Option<String>,
 }
 
 /// Offsets tried: the middle, and both ends of each spread.
@@ -63,25 +72,22 @@ impl<'a> Trials<'a> {
     }
 
     fn try_all(&self, grip: usize) -> Trial {
-        let (mut largest_n, mut failure) = (Vec::new(), None);
-        for angle_deg in ANGLES_DEG {
-            for offset_mm in offsets_mm() {
-                let (works_n, fails) = self.largest_n(grip, angle_deg, offset_mm);
-                failure = failure.or(fails);
-                largest_n.push(works_n);
-            }
-        }
-        Trial { largest_n, failure }
+        let places = ANGLES_DEG.iter().flat_map(|&angle| offsets_mm().into_iter().map(move |o| (angle, o)));
+        let cell = |(angle_deg, offset_mm)| {
+            let (largest_n, failure) = self.largest_n(grip, angle_deg, offset_mm);
+            TrialCell { angle_deg, offset_mm, largest_n, failure }
+        };
+        Trial { cells: places.map(cell).collect() }
     }
 
-    /// The largest force that works, 0 if none does, and why not where none does.
+    /// The largest force that works, 0 if none does, and why a larger one does not.
     fn largest_n(&self, grip: usize, angle_deg: f64, offset_mm: f64) -> (f64, Option<String>) {
         let mut failure = None;
         for force_n in HIGHEST_N {
             match self.holds(grip, angle_deg, offset_mm, force_n) {
                 // The smallest force needs less of everything but a contact.
                 Ok(true) => match self.holds(grip, angle_deg, offset_mm, LOWEST_N) {
-                    Ok(true) => return (force_n, None),
+                    Ok(true) => return (force_n, failure),
                     other => return (0.0, Some(said(&other))),
                 },
                 other => {
@@ -136,15 +142,16 @@ fn scenario(part: &str, grip: usize, angle_deg: f64, offset_mm: f64, force_n: f6
 impl Trial {
     /// Whether the grip works wherever a sweep goes.
     pub(super) fn works(&self, varied: &Varied) -> bool {
-        let offsets = offsets_mm();
-        ANGLES_DEG.iter().enumerate().filter(|(_, angle)| varied.grip_angle_deg.contains(angle)).all(
-            |(i, _)| {
-                let tried = offsets.iter().zip(&self.largest_n[i * offsets.len()..]);
-                tried
-                    .filter(|(offset, _)| offset.abs() <= SDS * varied.grip_offset_sd_mm + 1e-9)
-                    .all(|(_, &n)| n >= varied.grip_force_n.1)
-            },
-        )
+        let tried = self.cells.iter().filter(|cell| {
+            varied.grip_angle_deg.contains(&cell.angle_deg)
+                && cell.offset_mm.abs() <= SDS * varied.grip_offset_sd_mm + 1e-9
+        });
+        tried.clone().all(|cell| cell.largest_n >= varied.grip_force_n.1)
+    }
+
+    /// Why the grip failed where it first did.
+    pub(super) fn failure(&self) -> Option<&String> {
+        self.cells.iter().find_map(|cell| cell.failure.as_ref())
     }
 }
 

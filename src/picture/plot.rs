@@ -55,7 +55,7 @@ pub(crate) fn pull_curve(canvas: &mut Canvas, area: Area, curve: &Curve<'_>) {
     };
     let x = |time_s: f64| plot.x + plot.width * time_s / end_s;
     let y = |force_n: f64| plot.y + plot.height * (1.0 - force_n.max(0.0) / top_n);
-    axes(canvas, plot, end_s, top_n, curve.full);
+    axes(canvas, plot, end_s, top_n, curve.full.then_some("time / s"));
     let command: Vec<(f64, f64)> =
         t.rows().filter(|r| r.time_s >= 0.0).map(|r| (x(r.time_s), y(r.desired_force_n))).collect();
     canvas.line(&command, 1.2, COMMAND);
@@ -71,16 +71,17 @@ pub(crate) fn pull_curve(canvas: &mut Canvas, area: Area, curve: &Curve<'_>) {
     }
 }
 
-fn axes(canvas: &mut Canvas, plot: Area, end_s: f64, top_n: f64, full: bool) {
+/// Grid and numbers of forces over what runs to the right; a plot without its name is a thumbnail.
+pub(super) fn axes(canvas: &mut Canvas, plot: Area, end: f64, top_n: f64, name: Option<&str>) {
     let small = TextStyle::small(SOFT_INK);
-    let (columns, rows) = if full { (8.0, 6.0) } else { (3.0, 3.0) };
-    let step = tick(end_s, columns);
-    let mut time = 0.0;
-    while time <= end_s {
-        let x = plot.x + plot.width * time / end_s;
+    let (columns, rows) = if name.is_some() { (8.0, 6.0) } else { (3.0, 3.0) };
+    let step = tick(end, columns);
+    let mut at = 0.0;
+    while at <= end {
+        let x = plot.x + plot.width * at / end;
         canvas.line(&[(x, plot.y), (x, plot.y + plot.height)], 1.0, GRID);
-        canvas.text(&label(time, step), x, plot.y + plot.height + 3.0, Anchor::Middle, small);
-        time += step;
+        canvas.text(&label(at, step), x, plot.y + plot.height + 3.0, Anchor::Middle, small);
+        at += step;
     }
     let step = tick(top_n, rows);
     let mut force = 0.0;
@@ -90,9 +91,9 @@ fn axes(canvas: &mut Canvas, plot: Area, end_s: f64, top_n: f64, full: bool) {
         canvas.text(&label(force, step), plot.x - 4.0, y - 8.0, Anchor::Right, small);
         force += step;
     }
-    if full {
+    if let Some(name) = name {
         let (middle, below) = (plot.x + plot.width / 2.0, plot.y + plot.height + 21.0);
-        canvas.text("time / s", middle, below, Anchor::Middle, small);
+        canvas.text(name, middle, below, Anchor::Middle, small);
     }
 }
 

@@ -199,7 +199,7 @@ pub(super) fn groups(groups: &[PlotGroup]) -> Vec<Value> {
         .collect()
 }
 
-fn figure(plot: &Plot, most: usize) -> Value {
+pub(super) fn figure(plot: &Plot, most: usize) -> Value {
     let mut plot = plot.clone();
     plot.series.truncate(SERIES);
     let legend = plot

@@ -3,6 +3,7 @@
 mod identify;
 mod render;
 mod rig;
+mod try_part;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
@@ -10,6 +11,7 @@ pub use identify::{CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, Diagno
 pub use render::RenderArgs;
 pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigServeArgs, RigTeachArgs};
 use std::path::PathBuf;
+pub use try_part::TryArgs;
 
 /// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.
 #[derive(Debug, Parser)]
@@ -25,6 +27,8 @@ pub struct Cli {
 pub enum Command {
     /// Write a commented sweep and twin to start from, or those for a part of your own.
     Init(InitArgs),
+    /// Show what becomes of a part: grips that work, what the gels see, what it holds, what would fail.
+    Try(TryArgs),
     /// Check a sweep, try out a few samples, and say what it will take.
     Check(CheckArgs),
     /// Run a sweep. Running it again continues where it stopped.

@@ -21,6 +21,7 @@ pub mod rig;
 pub mod schema;
 pub mod show;
 pub mod sweep;
+pub mod try_part;
 pub mod verify;
 
 use crate::failure::Failure;

@@ -61,6 +61,7 @@ fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Er
 fn execute(cli: &Cli) -> Result<u8, Failure> {
     match &cli.command {
         Command::Init(args) => commands::init::run(args),
+        Command::Try(args) => commands::try_part::run(args),
         Command::Check(args) => commands::check::run(args),
         Command::Sweep(args) => commands::sweep::run(args),
         Command::Info(args) => commands::info::run(args),

@@ -29,6 +29,9 @@ mod rig_run;
 mod rig_served;
 #[path = "cli/rig_verbs.rs"]
 mod rig_verbs;
+// Parts at a glance.
+#[path = "cli/try_part.rs"]
+mod try_part;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -10,10 +10,13 @@ use gripgen::{PartOptions, part_starter, starter};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
+/// Endings of the meshes that are read.
+const MESHES: [&str; 2] = ["stl", "obj"];
+
 /// Runs the verb.
 pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     let extension = args.target.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
-    let (folder, files, talk, made) = if ["stl", "obj"].contains(&extension.as_str()) {
+    let (folder, files, talk, made) = if MESHES.contains(&extension.as_str()) {
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
         let options = PartOptions {
             scale_mm_per_unit: args.scale_mm_per_unit,
@@ -89,6 +92,17 @@ fn unread(extension: &str) -> Option<&'static str> {
         ),
         _ => None,
     }
+}
+
+/// A path that has to be a mesh.
+pub(super) fn mesh_wanted(path: &Path) -> Result<(), Failure> {
+    let extension = path.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
+    if MESHES.contains(&extension.as_str()) {
+        return Ok(());
+    }
+    let hint = unread(&extension).unwrap_or("export the part as STL or OBJ");
+    Err(Failure::usage(format!("{}: .STL and .OBJ are the meshes that can be read", path.display()))
+        .hint(hint))
 }
 
 /// A target that is no mesh has to be a folder: a file of another kind, or one that is not there, makes none of its name.

@@ -113,6 +113,8 @@ fn cases() -> Vec<Case> {
     let json = |verb, line, runs| case(verb, "json", "json", line, runs);
     vec![
         json("init", "out/start -q", true),
+        json("try", "part.stl --grip 0 -o out/tried.html -q", true),
+        case("try", "out", "html", "part.stl --grip 0 -q", true),
         json("check", "sweep.toml -q", true),
         json("sweep", "sweep.toml -o run -q", true),
         json("info", "run", true),
