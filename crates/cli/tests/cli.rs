@@ -16,6 +16,9 @@ mod init;
 mod measured;
 #[path = "cli/presses.rs"]
 mod presses;
+// A rig whose devices tell half the truth.
+#[path = "cli/rig_doubts.rs"]
+mod rig_doubts;
 // Faults in the middle of a campaign of a rig.
 #[path = "cli/rig_faults.rs"]
 mod rig_faults;

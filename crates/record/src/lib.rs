@@ -62,8 +62,8 @@ pub use pulls::{
 pub use reader::{ReadError, Record, ShardReader, mcap_mark};
 pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};
 pub use rig_run::{
-    RigCampaign, RigPull, RigPullError, RigResult, RigRunError, RigRunInfo, create_rig_run, discard_failed,
-    failed_pulls, missing_pulls, rig_campaign, write_rig_pull,
+    FAILED_FOLDER, RigCampaign, RigPull, RigPullError, RigResult, RigRunError, RigRunInfo, create_rig_run,
+    discard_failed, failed_pulls, missing_pulls, rig_campaign, suspect_pulls, write_rig_pull,
 };
 pub use sensor_table::{SENSOR_FILE, SensorTable, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};

@@ -16,7 +16,7 @@ use crate::shard::{RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
 use gripgen_twin::config::{Feedback, ImageStorage};
 use serde::Deserialize;
 use std::io::{BufWriter, ErrorKind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a run of a rig is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,7 +64,7 @@ pub enum RigRunError {
     #[error("{}: its source is `{found}`, pulls of a rig go into runs of a `{RIG_SOURCE}`", .path.display())]
     NoRig {
         /// The folder.
-        path: std::path::PathBuf,
+        path: PathBuf,
         /// Its source.
         found: String,
     },
@@ -82,7 +82,7 @@ pub enum RigRunError {
         /// The pull.
         pull: u64,
         /// Its shard.
-        shard: std::path::PathBuf,
+        shard: PathBuf,
     },
     /// Another process writes it at this moment.
     #[error("pull {pull} is being written by another process")]
@@ -96,7 +96,7 @@ pub enum RigRunError {
         /// The pull.
         pull: u64,
         /// Its shard.
-        shard: std::path::PathBuf,
+        shard: PathBuf,
     },
 }
 
@@ -216,8 +216,16 @@ fn pulls_where(folder: &RunFolder, is: impl Fn(Option<&Sidecar>) -> bool) -> Res
     Ok(found)
 }
 
-/// Takes a failed pull away, so that it can be made again; returns whether there was one. One with a label stays, which is
-/// an error. The index goes with it: it is written again when all pulls are done.
+/// Folder of a run that keeps the pulls that failed and were made again.
+pub const FAILED_FOLDER: &str = "failed";
+
+/// Puts a failed pull aside, so that it can be made again; returns whether there was one. Its shard and its sidecar, which has the
+/// reason, are kept as `failed/shard-00003-1.mcap` and `.json`, counted up. One with a label stays, which is an error. The index
+/// goes: it is written again when all pulls are done.
+///
+/// # Errors
+///
+/// A pull that the run does not have or that has a label, or a file that cannot be moved.
 pub fn discard_failed(folder: &RunFolder, pull: u64) -> Result<bool, RigRunError> {
     check_place(folder, pull)?;
     match folder.finished(pull)? {
@@ -229,13 +237,42 @@ pub fn discard_failed(folder: &RunFolder, pull: u64) -> Result<bool, RigRunError
     }
     // A process that dies between two of these leaves a shard without a sidecar: a pull that was not made.
     remove(&folder.path().join("index.csv"))?;
-    remove(&folder.sidecar_path(pull))?;
+    let aside = aside(folder, pull)?;
+    let io = |path: &Path| {
+        let path = path.to_path_buf();
+        move |source| FolderError::Io { path, source }
+    };
+    let (sidecar, shard) = (folder.sidecar_path(pull), folder.shard_path(pull));
+    std::fs::rename(&sidecar, aside.with_extension("json")).map_err(io(&sidecar))?;
     // Whoever is making it again by now replaces the shard.
     if let ShardStart::Begun(partial) = folder.start_shard(pull)? {
-        remove(&folder.shard_path(pull))?;
+        std::fs::rename(&shard, aside.with_extension("mcap")).map_err(io(&shard))?;
         partial.give_up()?;
     }
     Ok(true)
+}
+
+/// A name without its ending for a failed pull, in the folder of those, that none has yet.
+fn aside(folder: &RunFolder, pull: u64) -> Result<PathBuf, FolderError> {
+    let at = folder.path().join(FAILED_FOLDER);
+    std::fs::create_dir_all(&at).map_err(|source| FolderError::Io { path: at.clone(), source })?;
+    let mut times = 1_u64;
+    loop {
+        let name = at.join(format!("shard-{pull:05}-{times}"));
+        if !["json", "mcap"].iter().any(|ending| name.with_extension(ending).exists()) {
+            return Ok(name);
+        }
+        times += 1;
+    }
+}
+
+/// Pulls of a rig's run whose label is suspect, in order.
+///
+/// # Errors
+///
+/// A sidecar that cannot be read.
+pub fn suspect_pulls(folder: &RunFolder) -> Result<Vec<u64>, FolderError> {
+    pulls_where(folder, |sidecar| sidecar.is_some_and(|s| s.rows_with_status(Status::Suspect) > 0))
 }
 
 fn remove(path: &Path) -> Result<(), FolderError> {

@@ -162,6 +162,11 @@ impl Pulling {
         (status, took)
     }
 
+    /// Waits for its end and gives its code.
+    pub fn ends(&mut self) -> i32 {
+        self.end().0.code().unwrap()
+    }
+
     #[track_caller]
     pub fn ends_with(&mut self, code: i32) -> Duration {
         let (status, took) = self.end();

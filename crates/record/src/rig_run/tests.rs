@@ -205,7 +205,15 @@ fn a_campaign_goes_on_and_failed_pulls_are_made_again() {
     let checked = verify(at.path(), |_| {}).unwrap();
     assert_eq!((checked.missing_shards, checked.faults), (1, vec![]), "a whole folder with one pull less");
     let left: Vec<_> = std::fs::read_dir(at.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert_eq!(left.len(), 5, "{left:?}");
+    assert_eq!(left.len(), 6, "the folder of what failed beside them: {left:?}");
+    // What failed is kept, each time under a name of its own.
+    for times in [2, 3] {
+        write_rig_pull(&folder, &failed(0)).unwrap();
+        assert!(discard_failed(&folder, 0).unwrap());
+        let kept = at.path().join(format!("{FAILED_FOLDER}/shard-00000-{times}.mcap"));
+        let sample = crate::ShardReader::open(&kept).unwrap().sample(0).unwrap();
+        assert!(!sample.failure.is_empty() && kept.with_extension("json").exists());
+    }
     write_rig_pull(&folder, &slipped(0)).unwrap();
     assert!(folder.write_index().unwrap() && verify(at.path(), |_| {}).unwrap().faults.is_empty());
 }

@@ -18,8 +18,8 @@ pub struct CameraView {
     pub mirror: bool,
     /// What is cut out of the turned frame: first column, first row, columns, rows. Everything, without it.
     pub crop_px: Option<[u32; 4]>,
-    /// Columns and rows of the image. Another size than that of the cut-out is resampled (triangle filter, as wide as a new
-    /// pixel where it gets smaller).
+    /// Columns and rows of the image. A larger cut-out is resampled (triangle filter, as wide as a new pixel); a smaller one is
+    /// refused.
     pub size_px: [u32; 2],
 }
 
@@ -61,6 +61,17 @@ pub enum ViewError {
         width_px: u32,
         /// Rows of the turned frame.
         height_px: u32,
+    },
+    /// A frame with fewer pixels than the image: nothing would be seen in between.
+    #[error(
+        "a frame of {} x {} px would have to be enlarged to {} x {} px",
+        found_px[0], found_px[1], size_px[0], size_px[1]
+    )]
+    Enlarged {
+        /// Columns and rows of what is cut out of the turned frame.
+        found_px: [u32; 2],
+        /// Columns and rows of the image.
+        size_px: [u32; 2],
     },
     /// What was cut away cannot be put back.
     #[error("a view that cuts out {} x {} px cannot be undone", crop_px[2], crop_px[3])]
@@ -105,6 +116,9 @@ impl CameraView {
         let [x, y, columns, rows] = self.crop_px.unwrap_or([0, 0, turned.width_px, turned.height_px]);
         if [columns, rows] == [turned.width_px, turned.height_px] && [columns, rows] == self.size_px {
             return Ok(turned);
+        }
+        if columns < width_px || rows < height_px {
+            return Err(ViewError::Enlarged { found_px: [columns, rows], size_px: self.size_px });
         }
         let (bytes, wanted) = (turned.rgb.len() as u64, bytes_of(turned.width_px, turned.height_px));
         let whole = RgbImage::from_raw(turned.width_px, turned.height_px, turned.rgb)

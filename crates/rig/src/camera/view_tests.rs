@@ -1,4 +1,4 @@
-use super::{CameraView, FrameLimits, SHIPPED_FRAME_LIMITS, decode_jpeg};
+use super::{CameraView, FrameLimits, SHIPPED_FRAME_LIMITS, ViewError, decode_jpeg};
 use gripgen_twin::TactileImage;
 
 /// Each pixel tells where it was.
@@ -78,8 +78,11 @@ fn another_size_keeps_means_and_slopes() {
     for x in 2..48_u32 {
         assert!((f64::from(half.pixel(x, 10)[0]) - (2.0 * f64::from(x) + 0.5)).abs() <= 0.51, "{x}");
     }
-    let double = view(0, false, [200, 80]).apply(&frame(100, 40)).unwrap();
-    assert!((f64::from(double.pixel(100, 40)[0]) - 49.75).abs() <= 0.75);
+    // What was not seen is not made up, in either direction.
+    for size_px in [[200, 80], [101, 40], [100, 41]] {
+        let larger = view(0, false, size_px).apply(&frame(100, 40));
+        assert_eq!(larger, Err(ViewError::Enlarged { found_px: [100, 40], size_px }));
+    }
 }
 
 #[test]

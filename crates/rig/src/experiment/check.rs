@@ -4,6 +4,7 @@ use super::config::RigConfig;
 use super::devices::{
     connect_camera, connect_dashboard, connect_for, connect_gripper, connect_listener, connect_primary,
 };
+use super::prepare::unsupported;
 use super::robot::RobotRow;
 use crate::camera::{SHIPPED_FRAME_LIMITS, decode_jpeg};
 use crate::dashboard::{DashboardCommand, DashboardReply};
@@ -21,6 +22,11 @@ const COUNT: Duration = Duration::from_millis(1500);
 const GRAVITY_M_S2: f64 = 9.806_65;
 /// Readings that an average is made of.
 const AVERAGED: usize = 250;
+/// Largest force at rest: the accuracy of an e-Series' sensor is 4 N (data sheet), and a payload that is half a kilogram wrong
+/// shows with 5 N.
+const REST_N: f64 = 5.0;
+/// A payload is that of the rig's file if it differs by less: 1 N.
+const SAME_PAYLOAD_KG: f64 = 0.1;
 /// How long somebody has to hang a mass.
 const HANG: Duration = Duration::from_secs(60);
 
@@ -93,20 +99,30 @@ fn robot_data(config: &RigConfig) -> Vec<CheckLine> {
     let safety = SafetyStatus::from_number(last.safety);
     let ready = mode == RobotMode::Running.name() && safety.is_some_and(SafetyStatus::allows_motion);
     let state = format!(
-        "{mode}, {}, speed slider {:.0} %, program {}",
+        "{mode}, {}, speed slider {:.0} %, limiter {:.0} %, program {}",
         safety.map_or("unknown", SafetyStatus::name),
+        100.0 * last.speed_slider,
         100.0 * last.speed_scaling,
         if last.program_runs() { "running" } else { "stopped" }
     );
     let [fx, fy, fz] = [0, 1, 2].map(|i| rows.iter().map(|r| r.force[i]).sum::<f64>() / rows.len() as f64);
-    let force = format!("{fx:.2}, {fy:.2}, {fz:.2} N at rest; zeroed before every pull");
+    let rest_n = fx.hypot(fy).hypot(fz);
+    let zero = if rest_n < REST_N {
+        format!("below {REST_N} N; zeroed before every pull")
+    } else {
+        format!(
+            "{rest_n:.1} N, {REST_N} N are allowed: another payload than the robot counts with, a cable, or an old zero"
+        )
+    };
+    let force = format!("{fx:.2}, {fy:.2}, {fz:.2} N at rest, {zero}");
     let [x, y, z] = last.tcp.position_m.map(|m| 1e3 * m);
     vec![
         line::<String>("RTDE", Ok((gap_s <= config.limits.robot_gap_s, words))),
-        line::<String>("robot", Ok((ready && last.speed_scaling > 0.99, state))),
+        line::<String>("robot", Ok((ready && last.is_at_full_speed(), state))),
         line::<String>("tool", Ok((true, format!("at {x:.1}, {y:.1}, {z:.1} mm")))),
         line("tool offset", tool_offset(config)),
-        line::<String>("force", Ok((fx.hypot(fy).hypot(fz) < 20.0, force))),
+        line("payload", payload(config)),
+        line::<String>("force", Ok((rest_n < REST_N, force))),
     ]
 }
 
@@ -126,22 +142,47 @@ fn tool_offset(config: &RigConfig) -> Result<(bool, String), ReadPoseError> {
     ))
 }
 
+/// Weight that the robot counts with, beside that of the rig's file.
+fn payload(config: &RigConfig) -> Result<(bool, String), ReadPoseError> {
+    let wanted_kg = config.robot.payload_kg;
+    let found_kg = match read_one(config, "payload")? {
+        Value::Double(found_kg) => found_kg,
+        other => return Ok((false, format!("the robot answers {other:?} to payload"))),
+    };
+    let ok = (found_kg - wanted_kg).abs() < SAME_PAYLOAD_KG;
+    let words = match ok {
+        true => "as in the rig's file".to_string(),
+        false => format!(
+            "{wanted_kg:.2} kg in the rig's file: the reading at rest would be off by the difference's weight"
+        ),
+    };
+    Ok((ok, format!("{found_kg:.2} kg, {words}")))
+}
+
+/// The value of one output field.
+fn read_one(config: &RigConfig, field: &str) -> Result<Value, ReadPoseError> {
+    let robot = connect_for(config, &["timestamp", field], REPLY)?;
+    let began = Instant::now();
+    while let Some(left) = REPLY.checked_sub(began.elapsed()) {
+        let Ok(event) = robot.events().recv_timeout(left) else { break };
+        if let Event::Data(values) = event.event
+            && let Some(value) = values.get(1)
+        {
+            return Ok(*value);
+        }
+    }
+    Err(ReadPoseError::Silent)
+}
+
 fn same_tool(found_mm: [f64; 3], config: &RigConfig) -> bool {
     (0..3).all(|i| (found_mm[i] - config.robot.tool_mm[i]).abs() < SAME_TOOL_MM)
 }
 
 fn read_tool_mm(config: &RigConfig) -> Result<[f64; 3], ReadPoseError> {
-    let robot = connect_for(config, &["timestamp", "tcp_offset"], REPLY)?;
-    let began = Instant::now();
-    while let Some(left) = REPLY.checked_sub(began.elapsed()) {
-        let Ok(event) = robot.events().recv_timeout(left) else { break };
-        if let Event::Data(values) = event.event
-            && let Some(Value::Vector6d([x, y, z, ..])) = values.get(1)
-        {
-            return Ok([x, y, z].map(|m| 1e3 * m));
-        }
+    match read_one(config, "tcp_offset")? {
+        Value::Vector6d([x, y, z, ..]) => Ok([x, y, z].map(|m| 1e3 * m)),
+        _ => Err(ReadPoseError::Silent),
     }
-    Err(ReadPoseError::Silent)
 }
 
 /// Largest gap in the robot's clock, and how late 99 % of the readings are at most, beside the earliest, when a constant
@@ -175,10 +216,10 @@ fn dashboard(config: &RigConfig) -> Vec<CheckLine> {
                     let words = if remote { "remote" } else { "local: programs from outside are not taken" };
                     (remote, words.to_string())
                 }
-                DashboardReply::Version(v) => {
-                    // From version 10 on there is no such dashboard, and other interfaces.
-                    (v.major < 10, format!("PolyScope {}.{}.{}", v.major, v.minor, v.bugfix))
-                }
+                DashboardReply::Version(v) => match unsupported(&v) {
+                    None => (true, format!("PolyScope {}.{}.{}", v.major, v.minor, v.bugfix)),
+                    Some(why) => (false, why),
+                },
                 DashboardReply::SerialNumber(number) => (true, format!("serial number {number}")),
                 other => (true, format!("{other:?}")),
             }),

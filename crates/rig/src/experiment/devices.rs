@@ -46,6 +46,12 @@ pub enum ConnectError {
     /// A camera.
     #[error("camera: {0}")]
     Camera(#[from] CameraLinkError),
+    /// Both jaws would show one picture.
+    #[error("cameras.left and cameras.right are one camera: both are {at}")]
+    OneCamera {
+        /// Where it is.
+        at: SocketAddr,
+    },
 }
 
 /// The devices of a rig. Dropping them ends the heartbeat, and with it whatever the robot does.
@@ -71,8 +77,12 @@ fn resolve(what: &'static str, host: &str, port: u16) -> Result<SocketAddr, Conn
 
 /// Connects a camera.
 pub(super) fn connect_camera(config: &RigConfig, left: bool) -> Result<CameraClient, ConnectError> {
-    let camera = if left { &config.cameras.left } else { &config.cameras.right };
+    let cameras = [&config.cameras.left, &config.cameras.right];
+    let [camera, other] = if left { cameras } else { [cameras[1], cameras[0]] };
     let at = resolve("camera", &camera.address, camera.port)?;
+    if resolve("camera", &other.address, other.port).is_ok_and(|other| other == at) {
+        return Err(ConnectError::OneCamera { at });
+    }
     Ok(CameraClient::connect(at, &camera.address, TIMEOUT)?)
 }
 

@@ -37,10 +37,15 @@ pub enum Fault {
         number: i32,
     },
     /// The speed slider.
-    #[error("the robot runs at {percent:.0} % of its speed, a pull needs 100 %")]
+    #[error(
+        "the robot is slowed down: speed slider at {slider_percent:.0} %, trajectory limiter at {limiter_percent:.0} %, a pull \
+         needs 100 % of both"
+    )]
     Speed {
         /// What the slider says.
-        percent: f64,
+        slider_percent: f64,
+        /// What the limiter says.
+        limiter_percent: f64,
     },
     /// The robot's connection ended.
     #[error("the robot: {0}")]
@@ -165,6 +170,19 @@ pub enum Fault {
         jaw: Jaw,
         /// What is wrong.
         source: CameraWaitError,
+    },
+    /// A camera that sends one picture again and again, with new stamps.
+    #[error(
+        "the {jaw} camera is frozen: its frame in the grip is that of the open jaws {passed_s:.1} s before, byte by byte ({bytes} \
+         bytes)"
+    )]
+    SameBytes {
+        /// Which.
+        jaw: Jaw,
+        /// Time between both.
+        passed_s: f64,
+        /// Size of the frame.
+        bytes: usize,
     },
     /// A camera that shows the past.
     #[error("the {jaw} camera is frozen: its frame of {time_s:.3} s by its own clock came again")]

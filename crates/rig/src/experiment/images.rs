@@ -21,6 +21,8 @@ pub struct FrameStamp {
     pub device_time_s: Option<f64>,
     /// The robot's clock when it came.
     pub robot_time_s: f64,
+    /// The frame as it came.
+    pub jpeg: Arc<CameraFrame>,
 }
 
 /// Images with their stamps.
@@ -48,9 +50,26 @@ impl Experiment<'_> {
             at: frame.at,
             device_time_s: frame.event.device_time_s,
             robot_time_s: self.robot_time_at(frame.at),
+            jpeg: frame.event.clone(),
         };
         let stamps = vec![stamp(Jaw::Left, &left), stamp(Jaw::Right, &right)];
         Ok(Seen { images, stamps })
+    }
+
+    /// What is wrong with the cameras now, in words: those that ended, and those from which nothing comes any more.
+    pub(super) fn silent_cameras(&self) -> Vec<String> {
+        let limit_s = self.config.images.frame_s;
+        let silent = |jaw: Jaw| {
+            let camera = &self.devices.cameras[jaw];
+            if let Some(end) = camera.ended() {
+                return Some(format!("the {jaw} camera ended during the pull: {end}"));
+            }
+            let silent_s = camera.newest()?.at.elapsed().as_secs_f64();
+            (silent_s > limit_s).then(|| {
+                format!("the {jaw} camera sent nothing for {silent_s:.2} s during the pull, {limit_s} s are allowed")
+            })
+        };
+        Jaw::BOTH.into_iter().filter_map(silent).collect()
     }
 
     fn frame_after(
@@ -73,7 +92,14 @@ impl Experiment<'_> {
             if let Some(frame) = newest.as_ref().filter(|frame| frame.at > asked.at) {
                 match late {
                     Some((_, time_s)) => _ = first_late.get_or_insert(time_s),
-                    None => return Ok(frame.clone()),
+                    None => {
+                        // Jaws that closed on a part do not look like open ones, and no two frames have the same noise.
+                        if let Some(old) = old.filter(|old| old.jpeg.jpeg == frame.event.jpeg) {
+                            let passed_s = (frame.at - old.at).as_secs_f64();
+                            return Err(Fault::SameBytes { jaw, passed_s, bytes: frame.event.jpeg.len() });
+                        }
+                        return Ok(frame.clone());
+                    }
                 }
             }
             let wait = |source| Fault::Camera { jaw, source };

@@ -1,7 +1,7 @@
 //! Before anything moves: is the robot allowed to, and does somebody stand beside it who said so.
 
 use super::devices::Devices;
-use crate::dashboard::{DashboardCommand, DashboardError, DashboardReply};
+use crate::dashboard::{DashboardCommand, DashboardError, DashboardReply, PolyscopeVersion};
 use crate::robot_state::{RobotMode, SafetyStatus};
 use std::time::{Duration, Instant};
 
@@ -36,6 +36,12 @@ pub enum PrepareError {
         /// What came.
         found: DashboardReply,
     },
+    /// A controller that this was not written for.
+    #[error("{why}")]
+    Version {
+        /// Which it is, and why not.
+        why: String,
+    },
     /// Commands from outside are not taken.
     #[error("the robot is in local control: switch the teach pendant to remote control")]
     Local,
@@ -64,6 +70,20 @@ pub enum PrepareError {
     },
 }
 
+/// Why an experiment is not made with this PolyScope; `None` for 5.9.4 and later ones of major version 5. UR's own ROS driver asks
+/// for 5.9.4 as well; CB-Series robots (3.x) have no force sensor in the wrist; from 10 on (PolyScope X) there is no such dashboard,
+/// and nobody has seen the versions between.
+pub fn unsupported(v: &PolyscopeVersion) -> Option<String> {
+    let why = match (v.major, v.minor, v.bugfix) {
+        (5, 9, 4..) | (5, 10.., _) => return None,
+        (5, ..) => "it is older than 5.9.4: update it",
+        (0..=4, ..) => "a CB-Series robot has no force sensor in its wrist, an e-Series is needed",
+        (10.., ..) => "PolyScope X has other interfaces, 5.9.4 or a later 5.x is needed",
+        _ => "nobody has tried it, 5.9.4 or a later 5.x is needed",
+    };
+    Some(format!("PolyScope {}.{}.{}: {why}", v.major, v.minor, v.bugfix))
+}
+
 impl Devices {
     /// Makes the robot ready, as far as somebody allowed it.
     ///
@@ -71,6 +91,14 @@ impl Devices {
     ///
     /// A robot in local control, in a stop or without power that `permit` does not end, or one that stays where it is.
     pub fn prepare(&mut self, permit: Permit) -> Result<(), PrepareError> {
+        match self.ask(DashboardCommand::PolyscopeVersion)? {
+            DashboardReply::Version(version) => {
+                if let Some(why) = unsupported(&version) {
+                    return Err(PrepareError::Version { why });
+                }
+            }
+            found => return Err(PrepareError::Answer { asked: "PolyscopeVersion", found }),
+        }
         match self.ask(DashboardCommand::IsInRemoteControl)? {
             DashboardReply::RemoteControl(false) => return Err(PrepareError::Local),
             DashboardReply::RemoteControl(true) => {}
@@ -133,6 +161,30 @@ impl Devices {
                 return Err(PrepareError::Slow { mode, waited_s: began.elapsed().as_secs_f64() });
             }
             std::thread::sleep(ASK);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_that_this_was_not_written_for_are_named_with_the_reason() {
+        let of = |major, minor, bugfix| unsupported(&PolyscopeVersion { major, minor, bugfix, build: None });
+        for (major, minor, bugfix) in [(5, 9, 4), (5, 9, 5), (5, 12, 0), (5, 25, 1)] {
+            assert_eq!(of(major, minor, bugfix), None, "{major}.{minor}.{bugfix}");
+        }
+        for ((major, minor, bugfix), word) in [
+            ((3, 15, 4), "CB-Series"),
+            ((1, 8, 0), "CB-Series"),
+            ((5, 3, 0), "older than 5.9.4"),
+            ((5, 9, 3), "older than 5.9.4"),
+            ((6, 0, 0), "nobody has tried it"),
+            ((10, 5, 0), "PolyScope X"),
+        ] {
+            let why = of(major, minor, bugfix).unwrap();
+            assert!(why.contains(word) && why.contains(&format!("{major}.{minor}.{bugfix}")), "{why}");
         }
     }
 }

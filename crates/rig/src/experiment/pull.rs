@@ -68,6 +68,8 @@ pub struct ExecutedPull {
     pub no_load_after_n: Vec<f64>,
     /// What the gripper said of the force of a jaw while it held, N.
     pub reported_force_n: Option<f64>,
+    /// What is wrong with it beside its forces, a sentence each: its label is suspect.
+    pub doubts: Vec<String>,
     /// Everything that the robot said.
     pub rows: Vec<RobotRow>,
     /// Seconds since 1970 of each row's arrival.
@@ -91,6 +93,7 @@ struct Parts {
     held_s: Option<f64>,
     run: Option<i32>,
     preload_n: f64,
+    doubts: Vec<String>,
     outcome: Option<PullOutcome>,
 }
 
@@ -235,6 +238,7 @@ impl Experiment<'_> {
         parts.run = Some(run);
         let reason = self.staircase(run, planned, program.max_time_s)?;
         parts.preload_n = self.preload_n(planned);
+        parts.doubts = self.silent_cameras();
         let state = self.ask_gripper(Query::GripState)?;
         if GripState::from_number(state) != Some(GripState::Holding) {
             return Err(Fault::NotHolding { state });
@@ -453,6 +457,7 @@ impl Experiment<'_> {
             preload_n: parts.preload_n,
             no_load_after_n,
             reported_force_n: parts.reported_force_n,
+            doubts: parts.doubts,
             rows_unix_s: rows.iter().map(|row| self.clock.unix_s(row.at)).collect(),
             rows,
             log: log.into_iter().map(|line| (self.clock.unix_s(line.at), line)).collect(),

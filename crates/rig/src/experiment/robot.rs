@@ -40,8 +40,10 @@ pub struct RobotRow {
     pub safety_bits: u32,
     /// The program: 2 while it runs.
     pub runtime: u32,
-    /// Speed slider, 1 for 100 %.
+    /// What the trajectory limiter leaves of the speed, 1 for all of it.
     pub speed_scaling: f64,
+    /// The speed slider, 1 for 100 %.
+    pub speed_slider: f64,
     /// What the program says it does, as a number.
     pub phase: i32,
     /// Which step of the staircase.
@@ -60,7 +62,7 @@ pub struct RobotRow {
     pub preload_n: f64,
 }
 
-const OUTPUTS: [&str; 18] = [
+const OUTPUTS: [&str; 19] = [
     "timestamp",
     "actual_TCP_pose",
     "actual_TCP_speed",
@@ -79,6 +81,8 @@ const OUTPUTS: [&str; 18] = [
     "output_double_register_25",
     "output_double_register_26",
     "output_double_register_27",
+    // The slider: `speed_scaling` is the limiter's alone (RTDE guide).
+    "target_speed_fraction",
 ];
 
 /// What is asked of RTDE.
@@ -119,6 +123,7 @@ impl RobotRow {
             displacement_m: double(15)?,
             lateral_m: double(16)?,
             preload_n: double(17)?,
+            speed_slider: double(18)?,
         })
     }
 
@@ -137,6 +142,11 @@ impl RobotRow {
         self.speed[..3].iter().map(|v| v * v).sum::<f64>().sqrt()
     }
 
+    /// Whether neither the slider nor the limiter slows it down.
+    pub fn is_at_full_speed(&self) -> bool {
+        [self.speed_scaling, self.speed_slider].into_iter().all(|share| (share - 1.0).abs() <= 0.01)
+    }
+
     /// Whether the robot may move.
     pub(super) fn check(&self) -> Result<(), Fault> {
         let status = SafetyStatus::from_number(self.safety)
@@ -149,8 +159,9 @@ impl RobotRow {
         if mode != RobotMode::Running {
             return Err(Fault::Mode { mode });
         }
-        if (self.speed_scaling - 1.0).abs() > 0.01 {
-            return Err(Fault::Speed { percent: 100.0 * self.speed_scaling });
+        if !self.is_at_full_speed() {
+            let (slider_percent, limiter_percent) = (100.0 * self.speed_slider, 100.0 * self.speed_scaling);
+            return Err(Fault::Speed { slider_percent, limiter_percent });
         }
         Ok(())
     }
@@ -161,7 +172,7 @@ pub(super) fn unfit(recipe: &Recipe) -> Option<String> {
     use crate::rtde::FieldType::{Double, Int32, Uint32, Vector6d};
     let wanted = [
         Double, Vector6d, Vector6d, Vector6d, Vector6d, Int32, Int32, Uint32, Uint32, Double, Int32, Int32,
-        Int32, Int32, Double, Double, Double, Double,
+        Int32, Int32, Double, Double, Double, Double, Double,
     ];
     let pairs = recipe.fields.iter().zip(wanted);
     let wrong = pairs.filter(|((_, found), wanted)| found != wanted);

@@ -69,6 +69,8 @@ pub struct Arm {
     gripped_at: TcpPose,
     pulling: Option<Pulling>,
     hung_mass_kg: f64,
+    aside_n: f64,
+    aside_zero_n: f64,
     zero_n: f64,
     raw_n: f64,
     tick: u64,
@@ -88,6 +90,8 @@ impl Arm {
             gripped_at: tcp,
             pulling: None,
             hung_mass_kg: 0.0,
+            aside_n: 0.0,
+            aside_zero_n: 0.0,
             zero_n,
             raw_n: zero_n,
             tick: 0,
@@ -141,11 +145,22 @@ impl Arm {
     /// Takes what the sensor says now as zero. The controller averages its noise away.
     pub fn zero(&mut self, time_s: f64) {
         self.zero_n = self.load_n(time_s);
+        self.aside_zero_n = self.aside_n;
     }
 
     /// Hangs a mass on the tool, or takes it off.
     pub fn hang(&mut self, mass_kg: f64) {
         self.hung_mass_kg = mass_kg;
+    }
+
+    /// Something pulls aside, along the base's x.
+    pub fn pull_aside(&mut self, force_n: f64) {
+        self.aside_n = force_n;
+    }
+
+    /// Force on the tool along the base's x: zeroed, and raw.
+    pub fn aside_n(&self) -> (f64, f64) {
+        (self.aside_n - self.aside_zero_n, self.aside_n)
     }
 
     /// How the jaws would close now.

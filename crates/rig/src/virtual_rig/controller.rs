@@ -74,7 +74,15 @@ pub struct Controller {
     announcements: Vec<Announcement>,
 }
 
+/// Payload of the installation, as the shipped rig's file has it.
+const PAYLOAD_KG: f64 = 1.6;
+
 impl Controller {
+    /// The speed slider, moved by somebody.
+    pub fn set_speed_slider(&mut self, share: f64) {
+        self.robot.speed_slider = share;
+    }
+
     /// A controller that is powered on with its brakes released. `clock_rate` is how many times faster than real time it runs.
     pub fn new(plant: Arc<dyn Plant>, tcp: TcpPose, clock_rate: f64) -> Self {
         let robot = Robot {
@@ -86,7 +94,8 @@ impl Controller {
             velocity_m_s: [0.0; 3],
             wrench: [0.0; 6],
             raw_wrench: [0.0; 6],
-            payload_kg: 0.0,
+            speed_slider: 1.0,
+            payload_kg: PAYLOAD_KG,
             centre_of_gravity_m: [0.0; 3],
             tool_m: TOOL_M,
             inputs: Registers::default(),
@@ -299,5 +308,10 @@ impl Controller {
         self.robot.velocity_m_s = self.arm.velocity_m_s();
         let (force_n, raw_n) = self.arm.force_z_n();
         (self.robot.wrench[2], self.robot.raw_wrench[2]) = (force_n, raw_n);
+        // A force aside at the grip turns the flange about its lever, the tool.
+        let (aside_n, raw_aside_n) = self.arm.aside_n();
+        let lever_m = self.robot.tool_m[2];
+        (self.robot.wrench[0], self.robot.raw_wrench[0]) = (aside_n, raw_aside_n);
+        (self.robot.wrench[4], self.robot.raw_wrench[4]) = (aside_n * lever_m, raw_aside_n * lever_m);
     }
 }

@@ -60,19 +60,27 @@ pub enum Fault {
     ProtectiveStop,
     /// A camera sends the same frame with the same stamp for ever.
     Freeze(Jaw),
+    /// A camera sends the same frame for ever, each with a new stamp.
+    Repeat(Jaw),
     /// It sees again.
     Thaw(Jaw),
     /// The part slips out of the jaws.
     PartLost,
     /// A mass hangs on the tool, in kg; 0 takes it off.
     Hang(f64),
+    /// Something pulls aside at the tool, in N; 0 ends it.
+    Aside(f64),
+    /// Somebody moves the speed slider, 1 is 100 %.
+    Slider(f64),
+    /// The gripper reports this force, in N over both jaws, whatever it was asked.
+    Reports(f64),
 }
 
 /// Words that are no fault.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{line}` is none of: drop|truncate|garble|refuse|accept DEVICE, delay DEVICE S, estop, release-estop, protective-stop, \
-     freeze|thaw left|right, part-lost, hang KG; devices: rtde, dashboard, script, gripper, camera-left, camera-right"
+     freeze|repeat|thaw left|right, part-lost, hang KG, aside N, slider SHARE, reports N; devices: rtde, dashboard, script, gripper, camera-left, camera-right"
 )]
 pub struct FaultError {
     /// The words.
@@ -102,9 +110,13 @@ impl std::str::FromStr for Fault {
             ["release-estop"] => Some(Fault::ReleaseEmergencyStop),
             ["protective-stop"] => Some(Fault::ProtectiveStop),
             ["freeze", j] => jaw(j).map(Fault::Freeze),
+            ["repeat", j] => jaw(j).map(Fault::Repeat),
             ["thaw", j] => jaw(j).map(Fault::Thaw),
             ["part-lost"] => Some(Fault::PartLost),
             ["hang", kg] => number(kg, 5.0).map(Fault::Hang),
+            ["aside", n] => number(n, 100.0).map(Fault::Aside),
+            ["slider", share] => number(share, 1.0).map(Fault::Slider),
+            ["reports", n] => number(n, 200.0).map(Fault::Reports),
             _ => None,
         };
         fault.ok_or_else(|| FaultError { line: line.trim().chars().take(80).collect() })
@@ -124,10 +136,24 @@ mod tests {
             ("freeze right", Fault::Freeze(Jaw::Right)),
             ("estop", Fault::EmergencyStop),
             ("hang 1.0", Fault::Hang(1.0)),
+            ("repeat left", Fault::Repeat(Jaw::Left)),
+            ("aside 45", Fault::Aside(45.0)),
+            ("slider 0.3", Fault::Slider(0.3)),
+            ("reports 8.0", Fault::Reports(8.0)),
         ] {
             assert_eq!(line.parse(), Ok(fault));
         }
-        for bad in ["", "drop", "drop nothing", "delay rtde", "delay rtde -1", "hang nan", "estop now"] {
+        for bad in [
+            "",
+            "drop",
+            "drop nothing",
+            "delay rtde",
+            "delay rtde -1",
+            "hang nan",
+            "estop now",
+            "slider 1.5",
+            "aside -1",
+        ] {
             assert!(bad.parse::<Fault>().is_err(), "{bad}");
         }
     }

@@ -45,6 +45,8 @@ pub struct VirtualGripper {
     let_go: bool,
     motion: Option<Motion>,
     session: Session,
+    /// What it reports as its force, where that is not what it exerts.
+    reports_n: Option<f64>,
 }
 
 /// What belongs to one connection.
@@ -92,7 +94,13 @@ impl VirtualGripper {
             let_go: false,
             motion: None,
             session: Session::default(),
+            reports_n: None,
         }
+    }
+
+    /// From now on it reports this force over both jaws, whatever it exerts.
+    pub fn report(&mut self, force_sum_n: f64) {
+        self.reports_n = Some(force_sum_n);
     }
 
     /// The same gripper, homed or not.
@@ -355,7 +363,7 @@ impl VirtualGripper {
         match readable {
             Readable::Position => decimal(self.width_mm),
             Readable::Speed => decimal(self.speed_mm_s),
-            Readable::Force => decimal(self.force_sum_n),
+            Readable::Force => decimal(self.reports_n.unwrap_or(self.force_sum_n)),
             Readable::GripState => (self.state as u8).to_string(),
             Readable::PartWidthTolerance => decimal(self.session.tolerance_mm),
             Readable::ClampingTravel => decimal(self.session.clamping_travel_mm),

@@ -66,6 +66,8 @@ pub struct Robot {
     pub wrench: [f64; 6],
     /// The same before zeroing.
     pub raw_wrench: [f64; 6],
+    /// The speed slider, 1 for 100 %.
+    pub speed_slider: f64,
     /// Weight that the controller takes off, in kg.
     pub payload_kg: f64,
     /// Its centre of gravity at the flange, in m.
@@ -136,7 +138,8 @@ impl Robot {
             "robot_status_bits" => kind.value(&[self.status_bits().into()]),
             "safety_status_bits" => kind.value(&[self.safety_bits().into()]),
             "runtime_state" => kind.value(&[f64::from(self.runtime as u8)]),
-            "speed_scaling" | "target_speed_fraction" => kind.value(&[1.0]),
+            "speed_scaling" => kind.value(&[1.0]),
+            "target_speed_fraction" => kind.value(&[self.speed_slider]),
             "payload" => kind.value(&[self.payload_kg]),
             "payload_cog" => kind.value(&self.centre_of_gravity_m),
             _ => kind.value(&[]),
@@ -180,6 +183,7 @@ mod tests {
             velocity_m_s: [0.0; 3],
             wrench: [0.0; 6],
             raw_wrench: [0.0; 6],
+            speed_slider: 1.0,
             payload_kg: 0.0,
             centre_of_gravity_m: [0.0, 0.0, 0.04],
             tool_m: [0.0; 3],

@@ -129,7 +129,7 @@ impl Live {
     }
 
     /// Everything is over.
-    pub fn done(&self, folder: &Path, failed: usize, complete: bool) -> Result<(), Failure> {
+    pub fn done(&self, folder: &Path, failed: usize, suspect: usize, complete: bool) -> Result<(), Failure> {
         self.progress.finish();
         if self.sink.on_stdout() {
             return Ok(());
@@ -138,6 +138,14 @@ impl Live {
             self.say(&format!(
                 "without a label: {}; the same command makes what is missing",
                 count(failed as u64, "pull")
+            ));
+        }
+        if suspect > 0 {
+            self.say(&format!(
+                "{} with a suspect label: kept with the reason (`{} info {}`), and left out of fits and training",
+                count(suspect as u64, "pull"),
+                program(),
+                folder.display()
             ));
         }
         print(&format!("{}\n", folder.display()))?;

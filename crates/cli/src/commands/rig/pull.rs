@@ -11,7 +11,7 @@ use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use gripgen::record::{
     FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls,
-    read_campaign, write_rig_pull,
+    read_campaign, suspect_pulls, write_rig_pull,
 };
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
 use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_differences, rig_run_toml};
@@ -129,8 +129,9 @@ fn finish(folder: &RunFolder, live: &Live, failed: usize) -> Result<u8, Failure>
     if complete {
         publish_contact_sheet(folder).map_err(Failure::new)?;
     }
-    live.done(folder.path(), failed, complete)?;
-    Ok(if failed > 0 { code::SAMPLES_FAILED } else { 0 })
+    let suspect = suspect_pulls(folder)?.len();
+    live.done(folder.path(), failed, suspect, complete)?;
+    Ok(if failed > 0 || suspect > 0 { code::SAMPLES_FAILED } else { 0 })
 }
 
 /// What is to be made, and where it goes.

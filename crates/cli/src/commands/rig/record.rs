@@ -122,7 +122,9 @@ pub fn suspect(config: &RigConfig, campaign: &Campaign, m: &ExecutedPull) -> Opt
         wrench: &wrench,
         ..of_trace
     };
-    judge(&evidence, &Expected::default()).reason()
+    let by_force = judge(&evidence, &Expected::default()).reason();
+    let reasons: Vec<String> = by_force.into_iter().chain(m.doubts.iter().cloned()).collect();
+    (!reasons.is_empty()).then(|| reasons.join("; "))
 }
 
 /// Source of the event that ties the clocks of a pull together.
@@ -196,12 +198,13 @@ fn robot(rows: &[RobotRow], unix_s: &[f64]) -> RigStream {
         columns.push((format!("raw_force_{axis}_n"), column(&|r| r.raw_force[i])));
     }
     type Of = fn(&RobotRow) -> f64;
-    let single: [(&str, Of); 12] = [
+    let single: [(&str, Of); 13] = [
         ("robot_mode", |r| f64::from(r.mode)),
         ("safety_mode", |r| f64::from(r.safety)),
         ("safety_status_bits", |r| f64::from(r.safety_bits)),
         ("runtime_state", |r| f64::from(r.runtime)),
         ("speed_scaling", |r| r.speed_scaling),
+        ("speed_slider", |r| r.speed_slider),
         ("phase", |r| f64::from(r.phase)),
         ("step", |r| f64::from(r.step)),
         ("run", |r| f64::from(r.run)),

@@ -129,9 +129,10 @@ fn without_a_heartbeat_nothing_begins() {
     let mut rig = rig();
     rig.beats = false;
     rig.go(1);
-    rig.controller.run_script(&PullProgram::default().script().unwrap());
+    let heavier = PullProgram { payload_kg: 2.1, ..PullProgram::default() };
+    rig.controller.run_script(&heavier.script().unwrap());
     let waited_s = rig.until_phase(Phase::Stopped);
     assert!((10.0..10.02).contains(&waited_s), "{waited_s} s");
     assert_eq!((rig.reason(), rig.controller.robot().tcp), (Some(StopReason::NoHeartbeat), START));
-    assert_eq!(rig.controller.robot().payload_kg, 0.0, "not even the payload is set");
+    assert_eq!(rig.controller.robot().payload_kg, 1.6, "not even the payload is set");
 }

@@ -112,12 +112,16 @@ impl ServedRig {
             Fault::Refuse(device) => self.shared.faults(device).refuse(true),
             Fault::Accept(device) => self.shared.faults(device).refuse(false),
             Fault::Freeze(jaw) => self.shared.freeze(jaw, true),
+            Fault::Repeat(jaw) => self.shared.repeat(jaw),
             Fault::Thaw(jaw) => self.shared.freeze(jaw, false),
             Fault::EmergencyStop => lock(&self.shared.world).controller.emergency_stop(),
             Fault::ReleaseEmergencyStop => lock(&self.shared.world).controller.restart_safety(),
             Fault::ProtectiveStop => lock(&self.shared.world).controller.protective_stop(),
             Fault::PartLost => lock(&self.shared.world).lose_part(),
             Fault::Hang(mass_kg) => lock(&self.shared.world).controller.arm_mut().hang(mass_kg),
+            Fault::Aside(force_n) => lock(&self.shared.world).controller.arm_mut().pull_aside(force_n),
+            Fault::Slider(share) => lock(&self.shared.world).controller.set_speed_slider(share),
+            Fault::Reports(force_sum_n) => lock(&self.shared.world).gripper.report(force_sum_n),
         }
     }
 

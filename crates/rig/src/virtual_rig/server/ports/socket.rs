@@ -58,6 +58,8 @@ struct Camera {
     jpeg: Arc<Vec<u8>>,
     version: u64,
     frozen_s: Option<f64>,
+    /// Its picture stays, its stamps go on.
+    repeats: bool,
 }
 
 /// Data frames of one connection, sent together.
@@ -108,7 +110,12 @@ impl Shared {
 
     pub(crate) fn freeze(&self, jaw: Jaw, frozen: bool) {
         let now_s = self.time_s();
-        lock(&self.cameras[jaw]).frozen_s = frozen.then_some(now_s);
+        let mut camera = lock(&self.cameras[jaw]);
+        (camera.frozen_s, camera.repeats) = (frozen.then_some(now_s), false);
+    }
+
+    pub(crate) fn repeat(&self, jaw: Jaw) {
+        lock(&self.cameras[jaw]).repeats = true;
     }
 
     fn time_s(&self) -> f64 {
@@ -347,7 +354,8 @@ impl Shared {
             (images.0[jaw].clone(), images.1)
         };
         let mut camera = lock(&self.cameras[jaw]);
-        if camera.version != version && (camera.frozen_s.is_none() || camera.version == 0) {
+        if camera.version != version && (camera.frozen_s.is_none() && !camera.repeats || camera.version == 0)
+        {
             // An image that cannot be a frame is shown as none.
             let jpeg = self.view.unapply(&image).ok().and_then(|i| encode_jpeg(&i, JPEG_QUALITY).ok());
             (camera.jpeg, camera.version) = (Arc::new(jpeg.unwrap_or_default()), version);

@@ -1,0 +1,133 @@
+//! `gripgen rig pull` on a rig whose devices tell half the truth: nothing breaks, and no such label is taken for a good one.
+
+use super::rig_served::Served;
+use super::{assert_code, run, text};
+use gripgen::record::{RunFolder, ShardReader, status_name};
+use std::path::Path;
+
+const SPEED: [&str; 2] = ["--speed", "20"];
+
+/// Status and reason of each pull of a folder.
+fn pulls(out: &Path) -> Vec<(String, String)> {
+    let folder = RunFolder::open(out).unwrap();
+    let pull = |index: u64| {
+        let (sample, _) = ShardReader::open(&folder.shard_path(index)).unwrap().pull(index).unwrap();
+        let reason = if sample.failure.is_empty() { &sample.status_reason } else { &sample.failure }.clone();
+        (status_name(sample.status()).to_string(), reason)
+    };
+    (0..folder.info().shards).filter(|&shard| folder.sidecar_path(shard).exists()).map(pull).collect()
+}
+
+/// A pull during which something is said to the rig when it reaches a step; its exit code and what is stored.
+fn pulled(
+    rig: &mut Served,
+    out: &Path,
+    step: &str,
+    fault: &str,
+    again: &[(&str, &str)],
+) -> (i32, Vec<(String, String)>, String) {
+    let mut pulling = rig.pull(out, 1, &[]);
+    pulling.until(&["1/1", step]);
+    rig.inject(fault);
+    for (step, fault) in again {
+        pulling.until(&["1/1", step]);
+        rig.inject(fault);
+    }
+    let code = pulling.ends();
+    (code, pulls(out), pulling.said.clone())
+}
+
+/// A gripper that holds with another force than it was asked, a pull aside, a mass that is zeroed away and taken off, a camera that dies: kept,
+/// suspect with the reason, and the command ends with 4, also when nothing is left to make.
+#[test]
+fn labels_that_something_contradicts_are_suspect() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, step, fault, again, words) in [
+        (
+            "force",
+            ": the way down",
+            "reports 8.0",
+            &[][..],
+            "the gripper reports 4.00 N per jaw, 25.00 N were asked",
+        ),
+        ("aside", ": grip images", "aside 30", &[], "with the force across it the pull takes"),
+        ("mass", ": the way down", "hang 0.3", &[(": grip images", "hang 0")], "the sensor's zero is"),
+        ("camera", ": pulling", "refuse camera-left", &[], "the left camera ended during the pull"),
+    ] {
+        let out = folder.path().join(name);
+        let mut rig = Served::start(&SPEED);
+        let (code, found, said) = pulled(&mut rig, &out, step, fault, again);
+        assert_eq!(code, 4, "{name}: {said}");
+        assert_eq!((found.len(), found[0].0.as_str()), (1, "suspect"), "{name}: {found:?}");
+        assert!(found[0].1.contains(words), "{name}: {}", found[0].1);
+        assert!(said.contains("1 pull with a suspect label"), "{name}: {said}");
+        let verified = run(&["verify", out.to_str().unwrap()]);
+        assert_code(&verified, 0);
+        assert_eq!(
+            rig.pull(&out, 1, &[]).ends(),
+            4,
+            "{name}: nothing is left to make, and the label is as it was"
+        );
+    }
+}
+
+/// What would spoil every pull is refused before anything moves.
+#[test]
+fn a_rig_that_is_not_as_its_file_says_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = Served::start(&SPEED);
+    let place = rig.place();
+    rig.inject("slider 0.3");
+    while !rig.found("robot").contains("speed slider 30 %") {}
+    let (code, _) = rig.check();
+    assert_eq!(code, Some(1));
+    let mut refused = rig.pull(&folder.path().join("slow"), 1, &[]);
+    assert_eq!(refused.ends(), 1);
+    assert!(refused.said.contains("speed slider at 30 %"), "{}", refused.said);
+    rig.inject("slider 1");
+    while !rig.found("robot").contains("speed slider 100 %") {}
+
+    let left = rig.flags.iter().find(|flag| flag.starts_with("cameras.left.port=")).unwrap().clone();
+    let right = left.replace("left", "right");
+    let mut refused = rig.pull(&folder.path().join("one"), 1, &["--set", &right]);
+    assert_eq!(refused.ends(), 1);
+    assert!(refused.said.contains("are one camera"), "{}", refused.said);
+
+    let heavy = rig.rig("check", &["--json", "-q", "--set", "robot.payload_kg=2.4"]);
+    assert_code(&heavy, 1);
+    assert!(text(&heavy.stdout).contains("1.60 kg, 2.40 kg in the rig's file"), "{}", text(&heavy.stdout));
+    rig.inject("hang 1.5");
+    while !rig.found("force").contains("5 N are allowed") {}
+    assert_eq!(rig.check().0, Some(1));
+    assert_eq!(rig.place(), place, "nothing moved");
+    rig.inject("hang 0");
+
+    let mut refused =
+        rig.pull(&folder.path().join("large"), 1, &["--set", "cameras.left.size_px=[640, 480]"]);
+    assert_eq!(refused.ends(), 1);
+    assert!(refused.said.contains("enlarged to 640 x 480 px"), "{}", refused.said);
+}
+
+/// The same picture with new stamps is a camera that stands still.
+#[test]
+fn a_camera_that_repeats_itself_is_frozen() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("lab");
+    let mut rig = Served::start(&SPEED);
+    let (code, found, said) = pulled(&mut rig, &out, ": rest images", "repeat right", &[]);
+    assert_eq!(code, 1, "{said}");
+    assert_eq!(found[0].0, "failed");
+    assert!(
+        found[0].1.contains("the right camera is frozen") && found[0].1.contains("byte by byte"),
+        "{found:?}"
+    );
+    // It is made again; what failed is kept with its reason.
+    rig.inject("thaw right");
+    assert_eq!(rig.pull(&out, 1, &[]).ends(), 0);
+    assert_eq!(pulls(&out), [("slipped".to_string(), String::new())]);
+    let kept = std::fs::read_to_string(out.join("failed/shard-00000-1.json")).unwrap();
+    assert!(kept.contains("the right camera is frozen"), "{kept}");
+    let (sample, _) = ShardReader::open(&out.join("failed/shard-00000-1.mcap")).unwrap().pull(0).unwrap();
+    assert!(sample.failure.contains("byte by byte"));
+    assert_code(&run(&["verify", out.to_str().unwrap()]), 0);
+}
