@@ -80,6 +80,7 @@ mod rig_run;
 mod sample;
 mod schema;
 mod simulator;
+mod stream;
 mod sweep;
 mod try_part;
 mod twin_edits;
@@ -142,6 +143,7 @@ pub use rig_run::{plain_campaign, rig_run_differences, rig_run_toml};
 pub use sample::{SampleError, SimulateOptions};
 pub use schema::{sweep_schema, twin_schema};
 pub use simulator::{Draw, Simulator};
+pub use stream::{SampleStream, StreamError, StreamOptions, Streamed, StreamedSample};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, prepare_run, run_info, sweep};
 pub use try_part::{
     FrictionRange, GripTried, Holding, TriedPart, TryOptions, TryPartError, WorksAt, try_part,

@@ -10,6 +10,7 @@ mod error;
 mod pulls;
 mod render;
 mod simulator;
+mod stream;
 mod sweep;
 mod values;
 
@@ -39,6 +40,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("DataError", module.py().get_type::<error::DataError>())?;
     module.add_class::<dataset::Dataset>()?;
     module.add_class::<simulator::Simulator>()?;
+    module.add_class::<stream::Stream>()?;
     module.add_class::<pulls::Pulls>()?;
     module.add_function(wrap_pyfunction!(run_cli, module)?)?;
     module.add_function(wrap_pyfunction!(run_verb, module)?)?;

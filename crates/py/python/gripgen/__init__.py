@@ -5,6 +5,8 @@
     gg.sweep("sweep.toml", "runs/first")             # the bytes of `gripgen sweep`
     ds = gg.load("runs/first")                       # random access; simulated and measured runs alike
     images, labels = ds.batch([3, 1, 9])             # uint8[3, 2, 240, 320, 3], float32[3]
+    for images, labels in gg.stream("sweep.toml"):   # the same batches without a disk
+        ...
     pull = gg.Sim().pull(part="gear", grip_force_n=40.0, seed=1)
 
 Units stand in the names: `_n` newton, `_mm` millimetre, `_s` second, `_deg` degree. Grip forces are those of one jaw.
@@ -18,6 +20,7 @@ from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, di
 from .policies import Staircase
 from .rendering import Rendered, render
 from .simulation import Pull, Sim
+from .streams import Stream, StreamBatch, stream
 from .sweeps import SweepSummary, sweep
 
 __all__ = [
@@ -34,6 +37,8 @@ __all__ = [
     "Sample",
     "Sim",
     "Staircase",
+    "Stream",
+    "StreamBatch",
     "SweepSummary",
     "__version__",
     "calibrate",
@@ -41,6 +46,7 @@ __all__ = [
     "diagnose",
     "load",
     "render",
+    "stream",
     "sweep",
 ]
 

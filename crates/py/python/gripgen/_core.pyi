@@ -14,6 +14,7 @@ __all__ = [
     "GripgenError",
     "Pulls",
     "Simulator",
+    "Stream",
     "__version__",
     "contact_sheet_shards",
     "prepare_run",
@@ -49,6 +50,28 @@ class Dataset:
     def traces(self, rows: Sequence[int]) -> tuple[NDArray[np.float32], NDArray[np.int64]]: ...
     def forces(self, rows: Sequence[int]) -> NDArray[np.float32]: ...
     def heights(self, rows: Sequence[int], threads: int = 1) -> NDArray[np.float32]: ...
+
+@final
+class Stream:
+    """A sweep that is read while it is made. One reader at a time."""
+
+    def __new__(
+        cls,
+        config: str,
+        overrides: Mapping[str, Any] | None = None,
+        first: int = 0,
+        every: int = 1,
+        jobs: int = 1,
+        ahead: int = 64,
+        status: Sequence[str] | None = None,
+    ) -> Stream: ...
+    @property
+    def info(self) -> dict[str, Any]: ...
+    @property
+    def image_size_px(self) -> tuple[int, int] | None: ...
+    def batch(
+        self, size: int, columns: Sequence[str]
+    ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32], dict[str, Any], int]: ...
 
 @final
 class Simulator:

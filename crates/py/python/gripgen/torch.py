@@ -12,6 +12,7 @@ from torch.utils.data import IterableDataset as _TorchIterableDataset
 from torch.utils.data import get_worker_info
 
 from .dataset import Dataset
+from .streams import Stream
 
 
 class PullDataset(_TorchDataset):
@@ -80,6 +81,30 @@ class PullIterableDataset(_TorchIterableDataset):
         )
         for images, labels in batches:
             yield torch.from_numpy(images), torch.from_numpy(labels)
+
+
+class PullStream(_TorchIterableDataset):
+    """Batches of `gg.stream` as tensors: `(images, labels)`, or with columns a dictionary of columns as the third. Give it
+    to a loader with `batch_size=None`; the samples are shared out over its worker processes, each with `jobs` threads.
+    `num_workers=0` is usually faster: the threads need no interpreter, and nothing is sent between processes."""
+
+    def __init__(self, stream: Stream) -> None:
+        self.stream = stream
+
+    def state_dict(self) -> dict[str, Any]:
+        """Where the pass of this process is."""
+        return self.stream.state_dict()
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continues there."""
+        self.stream.load_state_dict(state)
+
+    def __iter__(self) -> Iterator[tuple[Any, ...]]:
+        worker = get_worker_info()
+        own = self.stream if worker is None else self.stream.share(worker.id, worker.num_workers)
+        for images, labels, *columns in own:
+            pixels = None if images is None else torch.from_numpy(images)
+            yield (pixels, torch.from_numpy(labels), *columns)
 
 
 def collate(rows: list[tuple[torch.Tensor, torch.Tensor]]) -> tuple[torch.Tensor, torch.Tensor]:

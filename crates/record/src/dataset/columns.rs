@@ -21,6 +21,16 @@ pub struct Table {
 }
 
 impl Table {
+    /// The table of rows of an index.
+    pub fn of_index_rows<'a>(
+        extra_columns: &[String],
+        rows: impl IntoIterator<Item = &'a Vec<String>>,
+    ) -> Self {
+        let mut table = Self::of_index(extra_columns);
+        rows.into_iter().for_each(|row| table.push(row));
+        table.finished()
+    }
+
     /// An empty table for the rows of an index.
     pub(super) fn of_index(extra_columns: &[String]) -> Self {
         let columns = index_header(extra_columns).into_iter().map(|name| {

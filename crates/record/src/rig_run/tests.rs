@@ -211,7 +211,7 @@ fn a_campaign_goes_on_and_failed_pulls_are_made_again() {
         write_rig_pull(&folder, &failed(0)).unwrap();
         assert!(discard_failed(&folder, 0).unwrap());
         let kept = at.path().join(format!("{FAILED_FOLDER}/shard-00000-{times}.mcap"));
-        let sample = crate::ShardReader::open(&kept).unwrap().sample(0).unwrap();
+        let sample = ShardReader::open(&kept).unwrap().sample(0).unwrap();
         assert!(!sample.failure.is_empty() && kept.with_extension("json").exists());
     }
     write_rig_pull(&folder, &slipped(0)).unwrap();

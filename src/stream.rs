@@ -1,0 +1,202 @@
+//! Samples of a sweep, made while somebody reads them, without a disk.
+//!
+//! Workers make samples ahead of the reader, who gets them in the order of their indices: each is the sample that a sweep would
+//! write, whatever the number of threads. No more than so many are kept, so that memory is bounded and a slow reader slows the
+//! workers down.
+
+use crate::project::Project;
+use crate::sweep::{encode_options, guarded};
+use gripgen_record::proto::gripgen_v1::Status;
+use gripgen_record::{EncodeOptions, PictureError, encode};
+use gripgen_tactile::SimdLevel;
+use gripgen_tactile::gpu::GpuError;
+use gripgen_twin::config::{ImageStorage, TraceStorage};
+use gripgen_twin::{Outcome, PerJaw, TactileImage};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Which samples of a sweep, and how they are made. Only `first` and `every` change what comes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StreamOptions {
+    /// Index of the first sample.
+    pub first: u64,
+    /// Distance of two indices: the number of readers who share the sweep.
+    pub every: u64,
+    /// Worker threads.
+    pub jobs: usize,
+    /// Samples that are kept at most.
+    pub ahead: usize,
+}
+
+/// A sample of a sweep, as its data set has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StreamedSample {
+    /// Its global index.
+    pub index: u64,
+    /// How it ended.
+    pub status: Status,
+    /// Its row of the index.
+    pub row: Vec<String>,
+    /// Both images, where the sweep makes some and the sample did not fail.
+    pub images: Option<PerJaw<TactileImage>>,
+}
+
+/// Why a stream ends before its end.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum StreamError {
+    /// The graphics processor was lost.
+    #[error(transparent)]
+    Gpu(#[from] Arc<GpuError>),
+    /// A row that cannot be written.
+    #[error(transparent)]
+    Row(#[from] Arc<PictureError>),
+}
+
+/// What a reader gets.
+#[derive(Debug, Clone)]
+pub enum Streamed {
+    /// The next sample.
+    Sample(Box<StreamedSample>),
+    /// Not yet: the time that the reader wanted to wait is over.
+    Pending,
+    /// There are no more.
+    End,
+}
+
+/// A sample that was made, or why it was not.
+type Made = Result<StreamedSample, StreamError>;
+
+struct State {
+    /// Places among the samples of this reader: that of the next to make, and of the next to read.
+    made: u64,
+    read: u64,
+    waiting: BTreeMap<u64, Made>,
+    stop: bool,
+}
+
+struct Shared {
+    project: Arc<Project>,
+    options: StreamOptions,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+/// Samples of a sweep in order, made ahead by threads that end with it.
+pub struct SampleStream {
+    shared: Arc<Shared>,
+    workers: Vec<JoinHandle<()>>,
+}
+
+impl SampleStream {
+    /// Begins to make samples.
+    pub fn new(project: Arc<Project>, options: StreamOptions) -> Self {
+        let state = State { made: 0, read: 0, waiting: BTreeMap::new(), stop: false };
+        let options = StreamOptions {
+            every: options.every.max(1),
+            jobs: options.jobs.max(1),
+            ahead: options.ahead.max(1),
+            ..options
+        };
+        let shared = Arc::new(Shared { project, options, state: Mutex::new(state), changed: Condvar::new() });
+        let workers = (0..options.jobs)
+            .map(|_| {
+                let shared = shared.clone();
+                std::thread::spawn(move || shared.work())
+            })
+            .collect();
+        Self { shared, workers }
+    }
+
+    /// The next sample, waiting for at most so long.
+    ///
+    /// # Errors
+    ///
+    /// A graphics processor that is lost, or a sample that cannot be written down; nothing comes after it.
+    pub fn next(&self, wait: Duration) -> Result<Streamed, StreamError> {
+        let shared = &self.shared;
+        let mut state = shared.lock();
+        if shared.index(state.read).is_none() {
+            return Ok(Streamed::End);
+        }
+        let place = state.read;
+        if !state.waiting.contains_key(&place) {
+            let waited = shared.changed.wait_timeout_while(state, wait, |s| !s.waiting.contains_key(&place));
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+        let Some(made) = state.waiting.remove(&place) else { return Ok(Streamed::Pending) };
+        let sample = made.inspect_err(|_| state.stop = true)?;
+        state.read += 1;
+        drop(state);
+        shared.changed.notify_all();
+        Ok(Streamed::Sample(Box::new(sample)))
+    }
+}
+
+impl Drop for SampleStream {
+    fn drop(&mut self) {
+        self.shared.lock().stop = true;
+        self.shared.changed.notify_all();
+        for worker in self.workers.drain(..) {
+            // A worker that panicked has nothing to say any more.
+            let _ = worker.join();
+        }
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The index of a place; `None` beyond the sweep.
+    fn index(&self, place: u64) -> Option<u64> {
+        let index = place.checked_mul(self.options.every)?.checked_add(self.options.first)?;
+        (index < self.project.sweep.samples).then_some(index)
+    }
+
+    fn work(&self) {
+        loop {
+            let place = {
+                let full = |s: &mut State| !s.stop && s.made - s.read >= self.options.ahead as u64;
+                let waited = self.changed.wait_while(self.lock(), full);
+                let mut state = waited.unwrap_or_else(PoisonError::into_inner);
+                if state.stop || self.index(state.made).is_none() {
+                    return;
+                }
+                state.made += 1;
+                state.made - 1
+            };
+            let Some(index) = self.index(place) else { return };
+            let made = self.make(index);
+            self.lock().waiting.insert(place, made);
+            self.changed.notify_all();
+        }
+    }
+
+    fn make(&self, index: u64) -> Made {
+        let sample = guarded(&self.project, index, SimdLevel::best());
+        let gpu = self.project.gpu().map_err(Arc::new)?;
+        if let Some(fault) = gpu.and_then(|gpu| gpu.fault()) {
+            return Err(Arc::new(fault).into());
+        }
+        // The row is that of the data set; pictures and traces are not encoded.
+        let options = EncodeOptions {
+            images: ImageStorage::None,
+            trace: TraceStorage::None,
+            ..encode_options(&self.project, index)
+        };
+        let encoded = encode(&sample, &options).map_err(Arc::new)?;
+        let shard_samples = self.project.sweep.shard_samples;
+        let mut row = encoded.row;
+        (row[1], row[2]) = ((index / shard_samples).to_string(), (index % shard_samples).to_string());
+        let images = match sample.outcome {
+            Outcome::Pulled(pulled) => pulled.images,
+            Outcome::NoContact { images } => images,
+            Outcome::Failed { .. } => None,
+        };
+        Ok(StreamedSample { index, status: encoded.status, row, images })
+    }
+}

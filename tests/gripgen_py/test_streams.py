@@ -1,0 +1,136 @@
+"""Streams: the batches of a run without its folder, in any number of threads, ranks, workers and passes."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import psutil
+import pytest
+
+import gripgen as gg
+
+from .conftest import CONFIG, SMALL
+
+
+def stream(**more):
+    return gg.stream(CONFIG, **{"set": SMALL, "batch_size": 5, **more})
+
+
+def test_a_stream_is_the_run_without_its_folder(run):
+    ds = gg.load(run)
+    wanted, labels = ds.batch(range(len(ds)))
+    columns = ["index", "part", "grip_force_n", "grip_pose", "mu", "shard", "in_shard", "status"]
+    for jobs, ahead in ((1, 1), (3, None), (2, 40)):
+        found = list(stream(jobs=jobs, ahead=ahead, columns=columns))
+        assert [len(batch.max_pull_force_n) for batch in found] == [5, 5, 5, 1]
+        images = np.concatenate([batch.images for batch in found])
+        assert images.dtype == np.uint8 and images.tobytes() == wanted.tobytes()
+        assert np.concatenate([batch.max_pull_force_n for batch in found]).tobytes() == labels.tobytes()
+        for name in columns:
+            values = np.concatenate([np.asarray(batch.columns[name]) for batch in found])
+            assert (values == ds.column(name)).all(), name
+    # A second pass is the same as the first; without columns a batch is a pair.
+    again = stream()
+    for _ in range(2):
+        pairs = list(again)
+        assert np.concatenate([pair[0] for pair in pairs]).tobytes() == wanted.tobytes()
+    assert [len(labels) for _, labels in stream(drop_last=True)] == [5, 5, 5]
+
+
+def test_ranks_and_workers_share_the_sweep_and_lose_nothing(run):
+    labels = gg.load(run).labels
+    found = {}
+    for rank in range(3):
+        for part in range(2):
+            own = stream(rank=rank, world_size=3, columns=["index"], batch_size=2).share(part, 2)
+            for batch in own:
+                found.update(zip(batch.columns["index"].astype(int), batch.max_pull_force_n))
+    assert found == dict(enumerate(labels))
+    with pytest.raises(gg.ConfigError, match="ranks count from 0"):
+        stream(rank=3, world_size=3)
+
+
+def test_a_stream_goes_on_where_it_was(run):
+    ds = gg.load(run)
+    first = stream(batch_size=4, columns=["index"])
+    passed = iter(first)
+    next(passed), next(passed)
+    state = first.state_dict()
+    copy = pickle.loads(pickle.dumps(stream(batch_size=4, columns=["index"])))
+    copy.load_state_dict(state)
+    assert np.concatenate([b.columns["index"] for b in copy]).tolist() == list(range(8, 16))
+    # The pass after it is a whole one.
+    assert sum(len(b.max_pull_force_n) for b in copy) == len(ds)
+    # Of a worker's share, too: what all of them have read together is read.
+    halves = [first.share(part, 2) for part in range(2)]
+    left = sorted(int(i) for half in halves for batch in half for i in batch.columns["index"])
+    assert left == list(range(8, 16))
+    with pytest.raises(gg.ConfigError, match="config_sha256"):
+        stream(set={**SMALL, "seed": 99}).load_state_dict(state)
+
+
+def test_statuses_are_those_that_were_asked_for(tmp_path):
+    # Offsets of up to 70 mm: some jaws miss the part, some samples may fail.
+    wide = {**SMALL, "vary.grip_offset_mm": [0, 70]}
+    gg.sweep(CONFIG, tmp_path / "run", jobs=2, set=wide)
+    for status in (("slipped",), ("slipped", "no_contact"), ("no_contact",)):
+        ds = gg.load(tmp_path / "run", status=status)
+        found = [b for b in stream(set=wide, status=status, columns=["index", "status"])]
+        assert [int(i) for b in found for i in b.columns["index"]] == ds.column("index").astype(int).tolist()
+    assert len(gg.load(tmp_path / "run", status=("no_contact",))) > 0
+
+
+def test_what_cannot_be_is_told_before_anything_is_made(tmp_path):
+    with pytest.raises(gg.ConfigError, match="nothing.toml"):
+        gg.stream(tmp_path / "nothing.toml")
+    with pytest.raises(gg.ConfigError, match="shard_samples"):
+        stream(set={**SMALL, "shard_samples": -1})
+    with pytest.raises(gg.DataError, match="there is no column 'colour'.*grip_force_n"):
+        stream(columns=["index", "colour"])
+    images, labels = next(iter(stream(set={**SMALL, "images": "none"})))
+    assert images is None and len(labels) == 5
+
+
+def test_threads_wait_for_a_slow_reader_and_end_with_it():
+    before = threading.active_count(), psutil.Process().num_threads()
+    endless = gg.stream(CONFIG, batch_size=1, jobs=2, ahead=3, set={**SMALL, "design": "random", "repetitions": 1, "samples": 10**9})
+    batches = iter(endless)
+    next(batches)
+    process = psutil.Process()
+    time.sleep(1.0)
+    held = process.memory_info().rss
+    spent = sum(process.cpu_times()[:2])
+    time.sleep(1.0)
+    assert sum(process.cpu_times()[:2]) - spent < 0.3, "a reader that waits lets the threads wait"
+    for _ in range(40):
+        next(batches)
+    assert process.memory_info().rss - held < 60e6, "nothing piles up"
+    batches.close()
+    del batches
+    deadline = time.monotonic() + 20
+    while process.num_threads() > before[1] and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert process.num_threads() <= before[1]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_ctrl_c_ends_a_stream():
+    code = (
+        "import gripgen as gg\n"
+        f"s = gg.stream({CONFIG!r}, batch_size=10**6, set={{**{SMALL!r}, 'design': 'random', 'repetitions': 1, 'samples': 10**6}})\n"
+        "print('begun', flush=True)\n"
+        "next(iter(s))\n"
+    )
+    child = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
+    )
+    assert child.stdout.readline() == "begun\n"
+    time.sleep(1.0)
+    child.send_signal(signal.SIGINT)
+    _, said = child.communicate(timeout=30)
+    assert child.returncode != 0 and "KeyboardInterrupt" in said
