@@ -187,7 +187,7 @@ impl InitError {
             InitError::Open { .. } => {
                 return "close its holes (Meshlab, Blender), or go on with --accept-open-mesh".into();
             }
-            _ => return "export the part as STL or OBJ".into(),
+            _ => return "export the part as STL, OBJ, PLY or GLB".into(),
         };
         unit_guess(sizes_mm).unwrap_or_else(|| {
             "--scale-mm-per-unit 1000 reads a file in metres, 25.4 one in inches".to_string()

@@ -17,7 +17,7 @@ pub enum MeshFileError {
     Mesh(#[from] LibraryError),
 }
 
-/// Reads an STL or OBJ file.
+/// Reads an STL, OBJ, PLY or GLB file.
 pub(crate) fn read_mesh(path: &Path, metres_per_unit: f64) -> Result<TriMesh, MeshFileError> {
     let location = Location::Disk(path.into());
     let bytes = location.read()?;

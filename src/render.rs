@@ -87,7 +87,7 @@ pub enum RenderError {
     },
 }
 
-/// Presses what a file holds into a sensor and looks at it: a mesh (STL, OBJ), or heights of a surface above the gel at rest
+/// Presses what a file holds into a sensor and looks at it: a mesh (STL, OBJ, PLY, GLB), or heights of a surface above the gel at rest
 /// (`.npy`, rows and columns of the sensor's image).
 ///
 /// # Errors

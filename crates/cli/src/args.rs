@@ -100,15 +100,15 @@ pub struct TalkArgs {
 /// `gripgen init`
 #[derive(Debug, Args)]
 pub struct InitArgs {
-    /// A folder to write into, or a mesh (STL, OBJ) of your part.
+    /// A folder to write into, or a mesh (STL, OBJ, PLY, GLB) of your part.
     #[arg(default_value = ".")]
     pub target: PathBuf,
     /// Folder to write into, where TARGET is a mesh.
     #[arg(short, long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// Millimetres per unit of the mesh file.
-    #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = scale)]
-    pub scale_mm_per_unit: f64,
+    /// Millimetres per unit of the mesh file; 1 where it is left out, 1000 of GLB, which is in metres.
+    #[arg(long, value_name = "MM", value_parser = scale)]
+    pub scale_mm_per_unit: Option<f64>,
     /// Take a mesh with holes as it is.
     #[arg(long)]
     pub accept_open_mesh: bool,

@@ -11,7 +11,7 @@ pub const IMAGES_FOLDER: &str = "images";
 /// Other names of the table of presses, and that of imprints.
 const OTHER_TABLES: [&str; 2] = ["shapes.csv", "imprints.csv"];
 /// Endings of what tables of measurements refer to.
-const DATA: [&str; 9] = ["png", "jpg", "jpeg", "csv", "npy", "npz", "stl", "obj", "mcap"];
+const DATA: [&str; 11] = ["png", "jpg", "jpeg", "csv", "npy", "npz", "stl", "obj", "ply", "glb", "mcap"];
 
 /// What a file belongs to, or would belong to if it were written; `None` where it is nobody's.
 ///

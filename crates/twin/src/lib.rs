@@ -68,7 +68,10 @@ pub use image::TactileImage;
 pub use jaw::{Jaw, PerJaw};
 pub use label::{LabelError, PullEnd, SlipLabel, slip_label};
 pub use measured::{ExtraColumn, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, RestCount};
-pub use mesh::{EXTENT_RANGE_M, MAX_TRIANGLES, MeshError, MeshLook, TriMesh, write_binary_stl};
+pub use mesh::{
+    EXTENT_RANGE_M, MAX_TRIANGLES, MESH_FORMATS, MeshError, MeshLook, TriMesh, usual_scale_mm_per_unit,
+    write_binary_stl,
+};
 pub use optics::{BACKGROUND_TERMS, FINER_TERMS, OpticsState};
 pub use patch::{ContactPatch, PressureCell};
 pub use profile::Staircase;

@@ -1,8 +1,10 @@
-//! Triangle meshes in metres, and reading them from the bytes of STL and OBJ files.
+//! Triangle meshes in metres, and reading them from the bytes of STL, OBJ, PLY and GLB files.
 
+mod glb;
 mod look;
 mod obj;
 mod pieces;
+mod ply;
 mod stl;
 
 pub use look::MeshLook;
@@ -71,6 +73,14 @@ pub enum MeshError {
         /// What is wrong on it.
         problem: String,
     },
+    /// What a library says of a file.
+    #[error("not a {format} file that can be read: {problem}")]
+    Unreadable {
+        /// The format.
+        format: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
     /// A coordinate is NaN or infinite.
     #[error("triangle {triangle}, corner {corner}: coordinate {axis} is {value}, not a finite number")]
     NotFinite {
@@ -103,11 +113,20 @@ pub enum MeshError {
         z_mm: f64,
     },
     /// The file name tells no known format.
-    #[error("`{extension}` is not a known mesh format; known are stl and obj")]
+    #[error("`{extension}` is not a known mesh format; known are stl, obj, ply and glb")]
     UnknownFormat {
         /// Lower-case extension, empty where there is none.
         extension: String,
     },
+}
+
+/// Endings of the mesh files that are read.
+pub const MESH_FORMATS: [&str; 4] = ["stl", "obj", "ply", "glb"];
+
+/// Millimetres per unit of a mesh file that does not say: glTF is in metres (specification 2.0, section 3.4), for the others millimetres
+/// are usual.
+pub fn usual_scale_mm_per_unit(extension: &str) -> f64 {
+    if extension.eq_ignore_ascii_case("glb") { 1000.0 } else { 1.0 }
 }
 
 impl TriMesh {
@@ -140,7 +159,7 @@ impl TriMesh {
         Ok(Self { vertices_m, triangles })
     }
 
-    /// Reads an STL or OBJ file's bytes; `extension` (any case, without the dot) names the format.
+    /// Reads the bytes of an STL, OBJ, PLY or GLB file; `extension` (any case, without the dot) names the format.
     ///
     /// `metres_per_unit` is the length of one unit of the file. Equal vertices are merged.
     ///
@@ -153,6 +172,8 @@ impl TriMesh {
         let soup = match extension.as_str() {
             "stl" => stl::read(bytes)?,
             "obj" => obj::read(bytes)?,
+            "ply" => ply::read(bytes)?,
+            "glb" => glb::read(bytes)?,
             _ => return Err(MeshError::UnknownFormat { extension }),
         };
         let mesh = Self::from_soup(&soup, metres_per_unit)?;
@@ -257,6 +278,89 @@ mod tests {
         let obj = b"v 0 0 0\nv 0 10 0\nv 10 0 0\nv 0 0 10\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 3 2 4\n";
         let obj = TriMesh::from_file_bytes(obj, "obj", 1e-3).unwrap();
         assert_eq!(obj.signed_volume_m3(), ascii.signed_volume_m3());
+    }
+
+    /// The tetrahedron as text and binary PLY, and as GLB in metres behind a node that turns and moves it.
+    fn other_formats() -> Vec<(&'static str, Vec<u8>, f64)> {
+        let points = [[0.0_f32, 0.0, 0.0], [0.0, 10.0, 0.0], [10.0, 0.0, 0.0], [0.0, 0.0, 10.0]];
+        let faces = [[0_u16, 1, 2], [0, 2, 3], [0, 3, 1], [2, 1, 3]];
+        let header = |format: &str| {
+            format!(
+                "ply\nformat {format} 1.0\ncomment by hand\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                 property uchar red\nelement face 4\nproperty list uchar int vertex_index\nend_header\n"
+            )
+        };
+        let mut text = header("ascii");
+        let mut binary = header("binary_little_endian").into_bytes();
+        for p in points {
+            text += &format!("{} {} {} 7\n", p[0], p[1], p[2]);
+            binary.extend(p.iter().flat_map(|x| x.to_le_bytes()));
+            binary.push(7);
+        }
+        for f in faces {
+            text += &format!("3 {} {} {}\n", f[0], f[1], f[2]);
+            binary.push(3);
+            binary.extend(f.iter().flat_map(|i| i32::from(*i).to_le_bytes()));
+        }
+        // Turned by a quarter about z and moved back: x = -y' , so the points are stored the other way round.
+        let mut data: Vec<u8> = Vec::new();
+        for [x, y, z] in points {
+            data.extend([y, -x, z].iter().flat_map(|v| (v * 1e-3 + 1.0).to_le_bytes()));
+        }
+        data.extend(faces.iter().flatten().flat_map(|i| i.to_le_bytes()));
+        let json = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+            "nodes":[{"children":[1],"rotation":[0,0,0.70710678,0.70710678]},{"mesh":0,"translation":[-1,-1,-1]}],
+            "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+            "buffers":[{"byteLength":72}],
+            "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":24}],
+            "accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[2,2,2]},
+                         {"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}]}"#;
+        let mut json = json.as_bytes().to_vec();
+        json.resize(json.len().next_multiple_of(4), b' ');
+        let mut glb = b"glTF\x02\0\0\0".to_vec();
+        glb.extend(((12 + 8 + json.len() + 8 + data.len()) as u32).to_le_bytes());
+        for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &data)] {
+            glb.extend((chunk.len() as u32).to_le_bytes());
+            glb.extend(kind);
+            glb.extend(chunk);
+        }
+        vec![("ply", text.into_bytes(), 1.0), ("ply", binary, 1.0), ("glb", glb, 1000.0)]
+    }
+
+    #[test]
+    fn ply_and_glb_give_the_same_mesh() {
+        let stl = tetrahedron();
+        for (extension, bytes, mm_per_unit) in other_formats() {
+            assert_eq!(usual_scale_mm_per_unit(extension), mm_per_unit);
+            let mesh = TriMesh::from_file_bytes(&bytes, extension, mm_per_unit * 1e-3).unwrap();
+            assert_eq!((mesh.vertices_m().len(), mesh.triangles().len()), (4, 4), "{extension}");
+            assert!((mesh.signed_volume_m3() - stl.signed_volume_m3()).abs() < 1e-12, "{extension}");
+            let (size, wanted) = (mesh.extent_m(), stl.extent_m());
+            assert!((0..3).all(|i| (size[i] - wanted[i]).abs() < 1e-6), "{extension}: {size:?}");
+        }
+    }
+
+    /// Damaged in every byte, cut off anywhere: an error or a mesh, never a panic, and never more than the file can hold.
+    #[test]
+    fn damaged_ply_and_glb_never_panic() {
+        for (extension, bytes, mm_per_unit) in other_formats() {
+            let read = |bytes: &[u8]| TriMesh::from_file_bytes(bytes, extension, mm_per_unit * 1e-3);
+            // The line break after the last word of a text may be missing.
+            for at in 0..bytes.len() - 1 {
+                assert!(read(&bytes[..at]).is_err(), "{extension} of {at} bytes");
+                for value in [0, 1, b'0', b'9', b'-', b'"', 127, 255] {
+                    let mut damaged = bytes.clone();
+                    damaged[at] = value;
+                    let _ = read(&damaged);
+                }
+            }
+        }
+        let many = "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n0\n";
+        assert!(error(many.as_bytes(), "ply").contains("promises 4000000000 of `vertex`, and has"));
+        let out = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                   element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n3 0 1 2\n";
+        assert!(error(out.as_bytes(), "ply").contains("face 0 (from 0) has vertex 1 of 1"));
+        assert!(error(b"glTF", "glb").contains("not a GLB file"));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 /// `gripgen render`
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// A mesh (STL, OBJ): its tip points along its +z into the gel, +x is the image's right, +y the image's top. Or heights
+    /// A mesh (STL, OBJ, PLY, GLB): its tip points along its +z into the gel, +x is the image's right, +y the image's top. Or heights
     /// above the gel at rest in mm (.npy, rows and columns of the sensor's image).
     pub mesh: PathBuf,
     /// Travel after the highest point touched the gel. Without it heights are taken as they are.
@@ -25,9 +25,9 @@ pub struct RenderArgs {
     /// Turn, counter-clockwise in the image.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     pub rotation_deg: f64,
-    /// Millimetres per unit of the file.
-    #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = super::scale)]
-    pub scale_mm_per_unit: f64,
+    /// Millimetres per unit of the file; 1 where it is left out, 1000 of GLB, which is in metres.
+    #[arg(long, value_name = "MM", value_parser = super::scale)]
+    pub scale_mm_per_unit: Option<f64>,
     /// Write how far the gel stands above its rest, in mm: a (rows, columns) array.
     #[arg(long, value_name = "FILE.npy")]
     pub heights: Option<PathBuf>,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 /// `gripgen try`
 #[derive(Debug, Args)]
 pub struct TryArgs {
-    /// A mesh (STL, OBJ) of the part.
+    /// A mesh (STL, OBJ, PLY, GLB) of the part.
     pub mesh: PathBuf,
     /// Show this grip only, counted from 0.
     #[arg(long, value_name = "K")]
@@ -21,9 +21,9 @@ pub struct TryArgs {
     /// A sensor file for both jaws in place of the shipped one.
     #[arg(long, value_name = "FILE.npz")]
     pub sensor: Option<String>,
-    /// Millimetres per unit of the mesh file.
-    #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = super::scale)]
-    pub scale_mm_per_unit: f64,
+    /// Millimetres per unit of the mesh file; 1 where it is left out, 1000 of GLB, which is in metres.
+    #[arg(long, value_name = "MM", value_parser = super::scale)]
+    pub scale_mm_per_unit: Option<f64>,
     /// Take a mesh with holes as it is.
     #[arg(long)]
     pub accept_open_mesh: bool,

@@ -6,20 +6,18 @@ use crate::failure::Failure;
 use crate::mark::Format;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
+use gripgen::twin::{MESH_FORMATS, usual_scale_mm_per_unit};
 use gripgen::{PartOptions, part_starter, starter};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Endings of the meshes that are read.
-const MESHES: [&str; 2] = ["stl", "obj"];
-
 /// Runs the verb.
 pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     let extension = args.target.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
-    let (folder, files, talk, made) = if MESHES.contains(&extension.as_str()) {
+    let (folder, files, talk, made) = if MESH_FORMATS.contains(&extension.as_str()) {
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
         let options = PartOptions {
-            scale_mm_per_unit: args.scale_mm_per_unit,
+            scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
             accept_open_mesh: args.accept_open_mesh,
             threads: cores(),
         };
@@ -87,22 +85,25 @@ fn unread(extension: &str) -> Option<&'static str> {
             "it holds curved surfaces and no triangles: export it from your CAD as binary STL in millimetres, with a tolerance \
              of 0.01 mm",
         ),
-        "ply" | "glb" | "gltf" | "off" | "3mf" | "dae" | "fbx" | "x3d" | "wrl" => Some(
-            "convert it: python -c \"import trimesh; trimesh.load('part.ply', force='mesh').export('part.stl')\"",
+        "gltf" | "off" | "3mf" | "dae" | "fbx" | "x3d" | "wrl" => Some(
+            "convert it: python -c \"import trimesh; trimesh.load('part.3mf', force='mesh').export('part.stl')\"",
         ),
         _ => None,
     }
 }
 
-/// A path that has to be a mesh.
-pub(super) fn mesh_wanted(path: &Path) -> Result<(), Failure> {
+/// The ending of a path that has to be a mesh.
+pub(super) fn mesh_wanted(path: &Path) -> Result<String, Failure> {
     let extension = path.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
-    if MESHES.contains(&extension.as_str()) {
-        return Ok(());
+    if MESH_FORMATS.contains(&extension.as_str()) {
+        return Ok(extension);
     }
-    let hint = unread(&extension).unwrap_or("export the part as STL or OBJ");
-    Err(Failure::usage(format!("{}: .STL and .OBJ are the meshes that can be read", path.display()))
-        .hint(hint))
+    let hint = unread(&extension).unwrap_or("export the part as STL, OBJ, PLY or GLB");
+    Err(Failure::usage(format!(
+        "{}: .STL, .OBJ, .PLY and .GLB are the meshes that can be read",
+        path.display()
+    ))
+    .hint(hint))
 }
 
 /// A target that is no mesh has to be a folder: a file of another kind, or one that is not there, makes none of its name.
@@ -114,9 +115,12 @@ fn no_mesh(target: &Path, extension: &str) -> Result<(), Failure> {
     let of_a_file = extension.chars().any(char::is_alphabetic);
     let problem = match target.exists() {
         true => "this is neither a folder nor a mesh that can be read",
-        false if of_a_file => "there is no such file, and .STL and .OBJ are the meshes that can be read",
+        false if of_a_file => {
+            "there is no such file, and .STL, .OBJ, .PLY and .GLB are the meshes that can be read"
+        }
         false => return Ok(()),
     };
-    let hint = unread(extension).unwrap_or("export the part as STL or OBJ; or name a folder, which is made");
+    let hint = unread(extension)
+        .unwrap_or("export the part as STL, OBJ, PLY or GLB; or name a folder, which is made");
     Err(Failure::usage(format!("{}: {problem}", target.display())).hint(hint))
 }

@@ -8,7 +8,7 @@ use crate::outputs::Outputs;
 use gripgen::record::encode_png;
 use gripgen::tactile::npz::{Array, ElementType, write_npy};
 use gripgen::tactile::presses::RenderedBody;
-use gripgen::twin::TactileImage;
+use gripgen::twin::{TactileImage, usual_scale_mm_per_unit};
 use gripgen::{Location, RenderOptions, is_height_map, load_sensor, render_file};
 use serde_json::json;
 use std::path::Path;
@@ -23,12 +23,13 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
     }
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let sensor = load_sensor(&Location::parse(&args.sensor))?;
+    let extension = args.mesh.extension().map_or_else(String::new, |e| e.to_string_lossy().into_owned());
     let options = RenderOptions {
         travel_m: args.depth_mm.map(|mm| mm * 1e-3),
         x_px: args.x_px,
         y_px: args.y_px,
         rotation_rad: args.rotation_deg.to_radians(),
-        metres_per_unit: args.scale_mm_per_unit * 1e-3,
+        metres_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)) * 1e-3,
     };
     let rendered = render_file(&args.mesh, &options, &sensor)?;
     let size = (rendered.heights_mm.height, rendered.heights_mm.width);

@@ -7,13 +7,14 @@ use crate::failure::Failure;
 use crate::mark::Format;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
+use gripgen::twin::usual_scale_mm_per_unit;
 use gripgen::{GripTried, PartOptions, TriedPart, TryOptions, TryPartError, try_part};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Runs the verb.
 pub fn run(args: &TryArgs) -> Result<u8, Failure> {
-    mesh_wanted(&args.mesh)?;
+    let extension = mesh_wanted(&args.mesh)?;
     let stem =
         args.mesh.file_stem().map_or_else(|| "part".into(), |stem| stem.to_string_lossy().into_owned());
     let page = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}-try.html")));
@@ -26,7 +27,7 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
     let mut sink = JsonSink::open(args.json.as_deref(), &mut outputs)?;
     let options = TryOptions {
         part: PartOptions {
-            scale_mm_per_unit: args.scale_mm_per_unit,
+            scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
             accept_open_mesh: args.accept_open_mesh,
             threads: cores(),
         },

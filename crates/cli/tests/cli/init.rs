@@ -15,7 +15,7 @@ fn init_gives_something_that_runs() {
     assert!(text(&again.stderr).contains("--force"));
     assert_code(&run(&["init", at.to_str().unwrap(), "--force"]), 0);
     // A file that is no mesh becomes no folder, nor does one that is not there.
-    for (name, there) in [("part.ply", false), ("part.step", true)] {
+    for (name, there) in [("part.3mf", false), ("part.step", true)] {
         let file = folder.path().join(name);
         if there {
             std::fs::write(&file, "solid?").unwrap();
@@ -75,11 +75,44 @@ fn init_with_a_mesh_proposes_grips_that_run() {
     assert!(text(&inches.stderr).contains("33000") && text(&inches.stderr).contains("hint:"));
 }
 
+/// Of a part in PLY the grips are those of the same part in STL, and the copy keeps its format.
+#[test]
+fn init_reads_ply() {
+    use std::fmt::Write as _;
+    let folder = tempfile::tempdir().unwrap();
+    let stl = gripgen::assets::get("parts/gear/part.stl").unwrap();
+    let mesh = gripgen::twin::TriMesh::from_file_bytes(stl, "stl", 1e-3).unwrap();
+    let mut ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nelement face {}\n\
+         property list uchar uint vertex_indices\nend_header\n",
+        mesh.vertices_m().len(),
+        mesh.triangles().len()
+    );
+    for v in mesh.vertices_m() {
+        writeln!(ply, "{} {} {}", v.x * 1e3, v.y * 1e3, v.z * 1e3).unwrap();
+    }
+    for t in mesh.triangles() {
+        writeln!(ply, "3 {} {} {}", t[0], t[1], t[2]).unwrap();
+    }
+    let grips = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let at = folder.path().join(format!("of-{name}"));
+        let output = run(&["init", path.to_str().unwrap(), "-o", at.to_str().unwrap(), "--json"]);
+        assert_code(&output, 0);
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        json["grips"].clone()
+    };
+    assert_eq!(grips("gear.ply", ply.as_bytes()), grips("gear.stl", stl));
+    assert!(folder.path().join("of-gear.ply/gear.ply").exists());
+    assert_code(&run(&["check", folder.path().join("of-gear.ply/sweep.toml").to_str().unwrap()]), 0);
+}
+
 /// A file that is not read is no folder to write into.
 #[test]
 fn init_of_a_file_that_is_not_read_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, word) in [("part.step", "CAD"), ("part.PLY", "convert")] {
+    for (name, word) in [("part.step", "CAD"), ("part.3MF", "convert")] {
         let at = folder.path().join(name);
         let output = run(&["init", at.to_str().unwrap()]);
         assert_code(&output, 2);

@@ -40,7 +40,7 @@ def render(
 ) -> Rendered:
     """Press a mesh or a surface into a sensor and look at it.
 
-    With the path of a mesh (STL, OBJ) it is `gripgen render`: the tip of the mesh points along its +z into the gel and
+    With the path of a mesh (STL, OBJ, PLY, GLB) it is `gripgen render`: the tip of the mesh points along its +z into the gel and
     travels `depth_mm` after its highest vertex touched; +x is the image's right, +y its top; `x_px`, `y_px` are the place of
     the mesh's origin (default: the middle of the image), `rotation_deg` turns it counter-clockwise.
 

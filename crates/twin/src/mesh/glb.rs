@@ -1,0 +1,271 @@
+//! Binary glTF 2.0 (GLB), after its specification (Khronos, 3.6 to 3.7, 4.4). Triangles of the default scene with the transforms of their
+//! nodes; materials, skins and animations are ignored. The structure is read by `serde_json`; what it names is looked up and bounded
+//! here, because the library for it indexes unchecked and panics on damaged files.
+
+use super::{MAX_TRIANGLES, MeshError};
+use nalgebra::{Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
+use serde::Deserialize;
+
+/// A tree of nodes that is deeper than this is none.
+const DEEPEST: usize = 64;
+
+type Triangle = [[f32; 3]; 3];
+
+/// Types of components: unsigned 8, 16 and 32 bits, and 32-bit floats.
+const WHOLE: [(u32, usize); 3] = [(5121, 1), (5123, 2), (5125, 4)];
+const FLOAT: [(u32, usize); 1] = [(5126, 4)];
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Document {
+    #[serde(default)]
+    scene: Option<usize>,
+    #[serde(default)]
+    scenes: Vec<Scene>,
+    #[serde(default)]
+    nodes: Vec<Node>,
+    #[serde(default)]
+    meshes: Vec<Mesh>,
+    #[serde(default)]
+    accessors: Vec<Accessor>,
+    #[serde(default)]
+    buffer_views: Vec<View>,
+    #[serde(default)]
+    buffers: Vec<Buffer>,
+    #[serde(default)]
+    extensions_required: Vec<String>,
+}
+
+#[derive(Deserialize)]
+struct Scene {
+    #[serde(default)]
+    nodes: Vec<usize>,
+}
+
+#[derive(Deserialize)]
+struct Node {
+    #[serde(default)]
+    children: Vec<usize>,
+    mesh: Option<usize>,
+    matrix: Option<[f32; 16]>,
+    translation: Option<[f32; 3]>,
+    rotation: Option<[f32; 4]>,
+    scale: Option<[f32; 3]>,
+}
+
+#[derive(Deserialize)]
+struct Mesh {
+    primitives: Vec<Primitive>,
+}
+
+#[derive(Deserialize)]
+struct Primitive {
+    attributes: Attributes,
+    indices: Option<usize>,
+    mode: Option<u32>,
+}
+
+#[derive(Deserialize)]
+struct Attributes {
+    #[serde(rename = "POSITION")]
+    position: Option<usize>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Accessor {
+    buffer_view: Option<usize>,
+    #[serde(default)]
+    byte_offset: usize,
+    component_type: u32,
+    count: usize,
+    #[serde(rename = "type")]
+    shape: String,
+    sparse: Option<serde_json::Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct View {
+    buffer: usize,
+    #[serde(default)]
+    byte_offset: usize,
+    byte_length: usize,
+    byte_stride: Option<usize>,
+}
+
+#[derive(Deserialize)]
+struct Buffer {
+    uri: Option<String>,
+}
+
+pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
+    if bytes.is_empty() {
+        return Err(MeshError::EmptyFile);
+    }
+    let (json, blob) = chunks(bytes)?;
+    let document: Document = serde_json::from_slice(json).map_err(|e| bad(e.to_string()))?;
+    if let Some(extension) = document.extensions_required.first() {
+        return Err(bad(format!("it needs the extension `{extension}`: export it without compression")));
+    }
+    let scene = look_up(&document.scenes, document.scene.unwrap_or(0), "scene")?;
+    let mut reading = Reading { document: &document, blob, triangles: Vec::new() };
+    for &node in &scene.nodes {
+        reading.node(node, &Matrix4::identity(), 0)?;
+    }
+    Ok(reading.triangles)
+}
+
+fn bad(problem: String) -> MeshError {
+    MeshError::Unreadable { format: "GLB", problem }
+}
+
+fn look_up<'a, T>(all: &'a [T], at: usize, what: &str) -> Result<&'a T, MeshError> {
+    all.get(at).ok_or_else(|| bad(format!("{what} {at} of {} is named, counted from 0", all.len())))
+}
+
+/// The JSON and the binary chunk.
+fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), MeshError> {
+    let word = |at: usize| {
+        let found = bytes.get(at..at.checked_add(4)?)?;
+        Some(u32::from_le_bytes([found[0], found[1], found[2], found[3]]) as usize)
+    };
+    let short = |wanted: usize| bad(format!("it is cut off: {} bytes, {wanted} are needed", bytes.len()));
+    if !bytes.starts_with(b"glTF") {
+        return Err(bad("it does not begin with `glTF`".into()));
+    }
+    match word(4) {
+        Some(2) => {}
+        Some(version) => return Err(bad(format!("version {version}, 2 is read"))),
+        None => return Err(short(12)),
+    }
+    let whole = word(8).ok_or_else(|| short(12))?;
+    if bytes.len() < whole {
+        return Err(short(whole));
+    }
+    let chunk = |at: usize, kind: &[u8]| {
+        let length = word(at)?;
+        let end = at.checked_add(8)?.checked_add(length)?;
+        let found = bytes.get(at + 8..end)?;
+        (bytes.get(at + 4..at + 8)? == kind).then_some((found, end))
+    };
+    let (json, next) = chunk(12, b"JSON").ok_or_else(|| bad("it has no JSON chunk".into()))?;
+    Ok((json, chunk(next, b"BIN\0").map_or(&[][..], |(blob, _)| blob)))
+}
+
+struct Reading<'a> {
+    document: &'a Document,
+    blob: &'a [u8],
+    triangles: Vec<Triangle>,
+}
+
+impl<'a> Reading<'a> {
+    fn node(&mut self, at: usize, above: &Matrix4<f32>, depth: usize) -> Result<(), MeshError> {
+        if depth > DEEPEST {
+            return Err(bad(format!("its nodes are nested more than {DEEPEST} deep")));
+        }
+        let document = self.document;
+        let node = look_up(&document.nodes, at, "node")?;
+        let here = above * node.transform();
+        if let Some(mesh) = node.mesh {
+            for primitive in &look_up(&document.meshes, mesh, "mesh")?.primitives {
+                self.primitive(primitive, &here)?;
+            }
+        }
+        node.children.iter().try_for_each(|&child| self.node(child, &here, depth + 1))
+    }
+
+    fn primitive(&mut self, primitive: &Primitive, here: &Matrix4<f32>) -> Result<(), MeshError> {
+        let places =
+            primitive.attributes.position.ok_or_else(|| bad("a primitive has no POSITION".into()))?;
+        let places: Vec<[f32; 3]> = self
+            .values(places, "VEC3", 3, &FLOAT)?
+            .map(|bytes| {
+                let float =
+                    |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
+                let moved = here * Point3::new(float(0), float(4), float(8)).to_homogeneous();
+                [moved.x, moved.y, moved.z]
+            })
+            .collect();
+        let order: Vec<usize> = match primitive.indices {
+            None => (0..places.len()).collect(),
+            Some(indices) => {
+                let number = |bytes: &[u8]| bytes.iter().rev().fold(0_usize, |n, b| n << 8 | usize::from(*b));
+                self.values(indices, "SCALAR", 1, &WHOLE)?.map(number).collect()
+            }
+        };
+        let corners: Vec<[usize; 3]> = match primitive.mode.unwrap_or(4) {
+            4 => order.as_chunks::<3>().0.to_vec(),
+            // Every other triangle of a strip is turned.
+            5 => order
+                .windows(3)
+                .enumerate()
+                .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] })
+                .collect(),
+            6 => order.get(1..).unwrap_or_default().windows(2).map(|w| [order[0], w[0], w[1]]).collect(),
+            // Points and lines have no surface.
+            _ => Vec::new(),
+        };
+        if self.triangles.len() + corners.len() > MAX_TRIANGLES {
+            let triangles = (self.triangles.len() + corners.len()) as u64;
+            return Err(MeshError::TooManyTriangles { triangles });
+        }
+        for [a, b, c] in corners {
+            let at = |i: usize| look_up(&places, i, "vertex").copied();
+            self.triangles.push([at(a)?, at(b)?, at(c)?]);
+        }
+        Ok(())
+    }
+
+    /// The values of an accessor, each as its bytes; `types` are those that are read, with the size of a component.
+    fn values(
+        &self,
+        at: usize,
+        shape: &str,
+        components: usize,
+        types: &[(u32, usize)],
+    ) -> Result<impl Iterator<Item = &'a [u8]> + use<'a>, MeshError> {
+        let accessor = look_up(&self.document.accessors, at, "accessor")?;
+        let size = types
+            .iter()
+            .find(|(kind, _)| *kind == accessor.component_type)
+            .map(|(_, size)| size * components);
+        let size =
+            size.filter(|_| accessor.shape == shape && accessor.sparse.is_none()).ok_or_else(|| {
+                let (found, kind) = (&accessor.shape, accessor.component_type);
+                bad(format!("accessor {at} ({found} of type {kind}) is not read, {shape} of {types:?} is"))
+            })?;
+        let view = accessor.buffer_view.ok_or_else(|| bad(format!("accessor {at} has no data")))?;
+        let view = look_up(&self.document.buffer_views, view, "view")?;
+        if look_up(&self.document.buffers, view.buffer, "buffer")?.uri.is_some() || view.buffer != 0 {
+            return Err(bad("its data lie in another file: export it as one binary file".into()));
+        }
+        let (count, stride) = (accessor.count, view.byte_stride.unwrap_or(size).max(size));
+        let last = count.checked_sub(1).and_then(|n| n.checked_mul(stride));
+        let length = if count == 0 { Some(0) } else { last.and_then(|last| last.checked_add(size)) };
+        let end = length.and_then(|length| accessor.byte_offset.checked_add(length));
+        let viewed = view
+            .byte_offset
+            .checked_add(view.byte_length)
+            .and_then(|end| self.blob.get(view.byte_offset..end));
+        let data = viewed.zip(end).and_then(|(viewed, end)| viewed.get(accessor.byte_offset..end));
+        let data = data.ok_or_else(|| {
+            bad(format!("accessor {at} has {count} values, which {} bytes do not hold", self.blob.len()))
+        })?;
+        Ok((0..count).map(move |i| &data[i * stride..i * stride + size]))
+    }
+}
+
+impl Node {
+    /// `parent_from_node`: a matrix by columns, or translation, rotation (x, y, z, w) and scale.
+    fn transform(&self) -> Matrix4<f32> {
+        if let Some(columns) = self.matrix {
+            return Matrix4::from_column_slice(&columns);
+        }
+        let [x, y, z, w] = self.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_homogeneous();
+        Matrix4::new_translation(&Vector3::from(self.translation.unwrap_or_default()))
+            * rotation
+            * Matrix4::new_nonuniform_scaling(&Vector3::from(self.scale.unwrap_or([1.0; 3])))
+    }
+}
