@@ -168,6 +168,7 @@ fn pull(project: &Project, scenario: &Scenario, index: u64) -> Option<MeasuredPu
     let options = SimulateOptions {
         mechanics: Mechanics::Reduced,
         images: false,
+        noise: true,
         trace: true,
         backend: Backend::Cpu,
         level: SimdLevel::best(),

@@ -191,6 +191,7 @@ fn expected_images(
     let options = SimulateOptions {
         mechanics: Mechanics::Reduced,
         images: true,
+        noise: true,
         trace: false,
         backend: Backend::Cpu,
         level: SimdLevel::best(),
@@ -201,5 +202,5 @@ fn expected_images(
         gripped = Gripped::new(twin, library, &scenario, options)?;
     }
     gripped.contact.as_ref().ok_or(SampleError::Missed)?;
-    gripped.images(twin, &scenario, None)
+    gripped.images(twin, &scenario, true, None)
 }

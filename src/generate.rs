@@ -107,7 +107,8 @@ pub fn start_pull(
     options: SimulateOptions,
 ) -> Result<StartedPull, SampleError> {
     let gripped = Gripped::new(twin, library, scenario, options)?;
-    let images = if options.images { Some(gripped.images(twin, scenario, None)?) } else { None };
+    let images =
+        if options.images { Some(gripped.images(twin, scenario, options.noise, None)?) } else { None };
     let session = match &gripped.contact {
         Some(contact) => Some(pull_session(twin, scenario, contact)?.0),
         None => None,
@@ -182,7 +183,8 @@ fn pull(
     options: SimulateOptions,
     gpu: Option<&Gpu>,
 ) -> Result<Outcome, SampleError> {
-    let images = if options.images { Some(gripped.images(twin, scenario, gpu)?) } else { None };
+    let images =
+        if options.images { Some(gripped.images(twin, scenario, options.noise, gpu)?) } else { None };
     let Some(contact) = &gripped.contact else {
         return Ok(Outcome::NoContact { images });
     };
@@ -224,6 +226,7 @@ pub fn press_only(
     let options = SimulateOptions {
         mechanics,
         images: false,
+        noise: true,
         trace: false,
         backend: Backend::Cpu,
         level: SimdLevel::best(),

@@ -10,7 +10,7 @@ use gripgen_tactile::{ClusteredMesh, Imprint, Plane, Renderer, Sensor, SimdLevel
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
 use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 use gripgen_twin::frames::{pose, rotation_about_axis};
-use gripgen_twin::random::{Purpose, Stream};
+use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Grasp, Jaw, OpticsState, Part, PerJaw, Scenario, TactileImage, Twin};
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -95,22 +95,17 @@ impl Gripped {
         Ok(Self { sensors, contact: None, look })
     }
 
-    /// The images of one repetition.
+    /// The images of one repetition, with the noise of the sensors or without.
     pub(crate) fn images(
         &self,
         twin: &Twin,
         scenario: &Scenario,
+        noise: bool,
         gpu: Option<&Gpu>,
     ) -> Result<PerJaw<TactileImage>, SampleError> {
-        let key = |jaw: Jaw| {
-            let purpose = match jaw {
-                Jaw::Left => Purpose::ImageNoiseLeft,
-                Jaw::Right => Purpose::ImageNoiseRight,
-            };
-            match twin.optics[jaw].image_noise {
-                ImageNoise::Off => None,
-                ImageNoise::Measured => Some(Stream::new(scenario.seed, scenario.index, purpose).bits()),
-            }
+        let key = |jaw: Jaw| match twin.optics[jaw].image_noise {
+            ImageNoise::Measured if noise => Some(PixelNoise::key_of(scenario.seed, scenario.index, jaw)),
+            _ => None,
         };
         let look = self.look.as_ref();
         if let (Some(Look::Parts(parts)), Some(gpu)) = (look, gpu) {

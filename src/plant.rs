@@ -121,7 +121,7 @@ impl TwinPlant {
         (scenario.covariates.grip_offset_m, scenario.covariates.grip_angle_rad) = (offset_m, angle_rad);
         let Project { twin, library, .. } = &*self.project;
         let gripped = Gripped::new(twin, library, &scenario, options(true))?;
-        let images = gripped.images(twin, &scenario, None)?;
+        let images = gripped.images(twin, &scenario, true, None)?;
         let Some(contact) = &gripped.contact else { return Ok(None) };
         let gel_from_part = &contact.held.grasp.gel_from_part;
         let width_m = gel_from_part.left.translation.z + gel_from_part.right.translation.z;
@@ -187,7 +187,7 @@ fn scenario_of_part(project: &Project, part: &str, seed: u64, time_s: f64) -> Sc
 /// What the cameras see with the jaws open.
 fn rest_images(project: &Project, scenario: &Scenario) -> Result<PerJaw<TactileImage>, SampleError> {
     let Project { twin, library, .. } = project;
-    Gripped::at_rest(twin, library, scenario, options(true))?.images(twin, scenario, None)
+    Gripped::at_rest(twin, library, scenario, options(true))?.images(twin, scenario, true, None)
 }
 
 /// Jaws closed on a part.
@@ -262,6 +262,7 @@ fn options(images: bool) -> SimulateOptions {
     SimulateOptions {
         mechanics: Mechanics::Reduced,
         images,
+        noise: true,
         trace: true,
         backend: Backend::Cpu,
         level: SimdLevel::best(),

@@ -14,6 +14,8 @@ pub struct SimulateOptions {
     pub mechanics: Mechanics,
     /// Whether images are wanted.
     pub images: bool,
+    /// Whether images have the noise of the sensor; without it they are what is stored under `images = "clean"`.
+    pub noise: bool,
     /// Whether the trace is wanted; without it the pull ends as soon as its label is decided, which leaves the label.
     pub trace: bool,
     /// Where images are made.
@@ -28,6 +30,7 @@ impl SimulateOptions {
         Self {
             mechanics: sweep.mechanics,
             images: sweep.images != ImageStorage::None,
+            noise: sweep.images != ImageStorage::Clean,
             trace: sweep.trace == TraceStorage::Full,
             backend: sweep.backend,
             level,

@@ -90,7 +90,14 @@ impl Simulator {
 
     fn options(&self, images: bool, trace: bool) -> SimulateOptions {
         let level = SimdLevel::best();
-        SimulateOptions { mechanics: self.mechanics, images, trace, backend: Backend::Cpu, level }
+        SimulateOptions {
+            mechanics: self.mechanics,
+            images,
+            noise: true,
+            trace,
+            backend: Backend::Cpu,
+            level,
+        }
     }
 
     /// Simulates a pull. What the configuration forbids is an error; what physics forbids is a failed sample.

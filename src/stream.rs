@@ -5,13 +5,14 @@
 //! workers down.
 
 use crate::project::Project;
-use crate::sweep::{encode_options, guarded};
+use crate::sweep::{encode_options, guarded, noise_rgb};
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_record::{EncodeOptions, PictureError, encode};
 use gripgen_tactile::SimdLevel;
 use gripgen_tactile::gpu::GpuError;
 use gripgen_twin::config::{ImageStorage, TraceStorage};
-use gripgen_twin::{Outcome, PerJaw, TactileImage};
+use gripgen_twin::pixel_noise::PixelNoise;
+use gripgen_twin::{Jaw, Outcome, PerJaw, TactileImage};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -192,11 +193,20 @@ impl Shared {
         let shard_samples = self.project.sweep.shard_samples;
         let mut row = encoded.row;
         (row[1], row[2]) = ((index / shard_samples).to_string(), (index % shard_samples).to_string());
-        let images = match sample.outcome {
+        let mut images = match sample.outcome {
             Outcome::Pulled(pulled) => pulled.images,
             Outcome::NoContact { images } => images,
             Outcome::Failed { .. } => None,
         };
+        // What a reader of the data set would add.
+        let apart =
+            (self.project.sweep.images == ImageStorage::Clean).then(|| noise_rgb(&self.project, index));
+        if let (Some(images), Some(sd_rgb)) = (&mut images, apart.flatten()) {
+            for jaw in Jaw::BOTH {
+                let key = PixelNoise::key_of(sample.scenario.seed, index, jaw);
+                PixelNoise { key, sd_rgb: sd_rgb[jaw] }.add(&mut images[jaw].rgb);
+            }
+        }
         Ok(StreamedSample { index, status: encoded.status, row, images })
     }
 }

@@ -16,7 +16,7 @@ use gripgen_tactile::SimdLevel;
 use gripgen_tactile::gpu::{GpuAdapter, GpuError};
 use gripgen_twin::{Outcome, Sample};
 use pipeline::Run;
-pub(crate) use shards::encode_options;
+pub(crate) use shards::{encode_options, noise_rgb};
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};

@@ -231,6 +231,7 @@ fn simulate_options(images: bool) -> SimulateOptions {
     SimulateOptions {
         mechanics: Mechanics::Reduced,
         images,
+        noise: true,
         trace: false,
         backend: Backend::Cpu,
         level: SimdLevel::best(),

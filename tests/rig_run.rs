@@ -242,6 +242,7 @@ fn check(path: &Path, folder: &RunFolder, pulls: &[RigPull], made: usize) {
         missing_shards: 8 - made as u64,
         samples: made as u64,
         faults: vec![],
+        ..Verification::default()
     };
     assert_eq!(checked, wanted);
     let rows = Dataset::open(path).unwrap();

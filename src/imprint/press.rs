@@ -120,6 +120,7 @@ fn options() -> SimulateOptions {
     SimulateOptions {
         mechanics: Mechanics::Reduced,
         images: false,
+        noise: true,
         trace: false,
         backend: Backend::Cpu,
         level: SimdLevel::best(),

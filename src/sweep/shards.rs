@@ -9,6 +9,8 @@ use gripgen_record::{
     EncodeOptions, EncodedSample, INDEX_COLUMNS, PartialShard, ShardError, ShardInfo, ShardWriter,
     VIEW_RATE_HZ, extra_columns,
 };
+use gripgen_twin::PerJaw;
+use gripgen_twin::config::{ImageNoise, ImageStorage};
 use std::io::BufWriter;
 
 /// A shard being written.
@@ -92,9 +94,20 @@ pub(crate) fn encode_options(project: &Project, index: u64) -> EncodeOptions {
         trace: sweep.trace,
         view_rate_hz: Some(VIEW_RATE_HZ),
         extra_columns: extra_columns(sweep.vary.iter().map(|v| v.key.as_str())),
+        noise_apart_rgb: (sweep.images == ImageStorage::Clean).then(|| noise_rgb(project, index)).flatten(),
         first_sample: index / sweep.shard_samples * sweep.shard_samples,
         slot_ns: slot_ns(project),
     }
+}
+
+/// Noise of both sensors of a sample, in levels; `None` where the sample's twin cannot be, and has no images either.
+pub(crate) fn noise_rgb(project: &Project, index: u64) -> Option<PerJaw<[f32; 3]>> {
+    let twin = project.twin_of(index).ok()?;
+    PerJaw::try_from_fn(|jaw| match twin.optics[jaw].image_noise {
+        ImageNoise::Off => Ok([0.0; 3]),
+        ImageNoise::Measured => project.library.sensor(&twin.optics[jaw]).map(|sensor| sensor.noise_rgb),
+    })
+    .ok()
 }
 
 /// Time between the starts of two samples in a file: longer than any pull, in whole seconds.

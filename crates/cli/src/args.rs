@@ -181,6 +181,9 @@ pub struct InfoArgs {
 pub struct VerifyArgs {
     /// A run folder.
     pub run: PathBuf,
+    /// Remove what is broken, so that the sweep makes it again. Measured pulls are never removed.
+    #[arg(long)]
+    pub repair: bool,
     /// JSON.
     #[command(flatten)]
     pub json: JsonArgs,
@@ -210,7 +213,7 @@ pub struct ShowArgs {
 /// `gripgen export`
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// A run folder; for Parquet also a folder of measured pulls.
+    /// A run folder; for --to also a folder of measured pulls.
     pub run: PathBuf,
     /// One sample as an MCAP file with every reading.
     #[arg(long, value_name = "K", required_unless_present = "to")]
@@ -240,6 +243,8 @@ pub struct ExportArgs {
 pub enum ExportFormat {
     /// One Apache Parquet file.
     Parquet,
+    /// A tar file for WebDataset, or with a number in its name (`train-%05d.tar`) one for each thousand rows.
+    Webdataset,
 }
 
 /// `gripgen calibrate`

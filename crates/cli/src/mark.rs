@@ -2,7 +2,7 @@
 //!
 //! `docs/outputs.md` lists it for each format.
 
-use gripgen::record::{MARK_NAME, mcap_mark, parquet_mark, png_mark, png_with_mark, sha256_hex};
+use gripgen::record::{MARK_NAME, mcap_mark, parquet_mark, png_mark, png_with_mark, sha256_hex, tar_mark};
 use gripgen::tactile::npz::{Npz, npz_with_text};
 use serde_json::Value;
 use std::fs::File;
@@ -31,7 +31,7 @@ pub enum Format {
     Json,
     /// The array `made_by`.
     Npz,
-    /// Who made the bytes has marked them already: MCAP, Parquet.
+    /// Who made the bytes has marked them already: MCAP, Parquet, tar.
     Marked,
     /// No room for a mark: `.npy`; files that people are to edit.
     Bare,
@@ -110,6 +110,9 @@ pub fn mark_of(path: &Path) -> Option<Mark> {
     }
     if magic.starts_with(b"PAR1") {
         return parquet_mark(path).map(unchecked);
+    }
+    if let Some(verb) = tar_mark(path) {
+        return Some(unchecked(verb));
     }
     if file.metadata().ok()?.len() > MAX_TEXT {
         return None;

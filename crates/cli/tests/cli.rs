@@ -257,6 +257,42 @@ fn a_damaged_run_is_exit_code_5() {
     assert!(report["faults"][0].as_str().unwrap().contains("shard-00002.mcap"));
 }
 
+/// What is broken is taken away, whatever is broken, and the same sweep gives the same bytes again; what is good is not touched.
+#[test]
+fn a_damaged_run_is_repaired_by_verify_and_the_same_sweep() {
+    let (_folder, out) = reference();
+    let whole = content(&out);
+    let flip = |name: &str| {
+        let mut bytes = std::fs::read(out.join(name)).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        std::fs::write(out.join(name), bytes).unwrap();
+    };
+    let cut = |name: &str| {
+        let bytes = std::fs::read(out.join(name)).unwrap();
+        std::fs::write(out.join(name), &bytes[..bytes.len() / 3]).unwrap();
+    };
+    let damage: [(&str, &dyn Fn(), usize); 5] = [
+        ("a flipped bit", &|| flip("shard-00002.mcap"), 3),
+        ("a shard that was cut off", &|| cut("shard-00001.mcap"), 3),
+        ("a shard that is gone", &|| std::fs::remove_file(out.join("shard-00000.mcap")).unwrap(), 2),
+        ("an index that was cut off", &|| cut("index.csv"), 1),
+        ("two at once", &|| (0..2).for_each(|i| flip(&format!("shard-0000{i}.mcap"))), 5),
+    ];
+    for (what, damage, removed) in damage {
+        damage();
+        let path = out.to_str().unwrap();
+        assert_code(&run(&["verify", path, "-q"]), 5);
+        let repaired = run(&["verify", path, "--repair", "--json"]);
+        assert_code(&repaired, 0);
+        let report: serde_json::Value = serde_json::from_slice(&repaired.stdout).unwrap();
+        assert_eq!(report["removed"].as_array().unwrap().len(), removed, "{what}: {report}");
+        assert_code(&run(&["verify", path, "-q"]), 0);
+        assert_code(&run(&sweep_args(path, &["-q"])), 0);
+        assert!(content(&out) == whole, "{what}");
+    }
+}
+
 fn spawn(out: &Path) -> Child {
     let mut command = gripgen();
     command.args(sweep_args(out.to_str().unwrap(), &["--jobs", "2"]));

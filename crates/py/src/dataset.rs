@@ -2,7 +2,7 @@
 
 use crate::error;
 use gripgen::record::proto::gripgen_v1::{JawContact, Status};
-use gripgen::record::{Dataset as Rows, DatasetError};
+use gripgen::record::{Dataset as Rows, DatasetError, NoiseMode};
 use gripgen::twin::Values;
 use gripgen::twin::{ContactPatch, Jaw};
 use gripgen::{Project, in_parallel, press_only};
@@ -37,6 +37,12 @@ impl Dataset {
         self.rows.image_size_px()
     }
 
+    /// Whether images are stored without their noise.
+    #[getter]
+    fn clean_images(&self, py: Python<'_>) -> PyResult<bool> {
+        py.detach(|| self.rows.has_clean_images()).map_err(|e| error::data(py, &e))
+    }
+
     /// What the run says of itself: name, source, gripgen_version, config_sha256, config_toml. Empty for a table of pulls.
     #[getter]
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -65,13 +71,22 @@ impl Dataset {
     }
 
     /// Images of these rows: uint8[B, 2, H, W, 3], left jaw first. `threads` share the decoding.
-    #[pyo3(signature = (rows, threads = 1))]
+    /// `noise`: "stored" (that of the sample), "off", or "again" (other noise, that of a `pass_`), where images are stored without it.
+    #[pyo3(signature = (rows, threads = 1, noise = "stored", pass_ = 0))]
     fn images<'py>(
         &self,
         py: Python<'py>,
         rows: Vec<usize>,
         threads: usize,
+        noise: &str,
+        pass_: u64,
     ) -> PyResult<Bound<'py, PyArray5<u8>>> {
+        let mode = match noise {
+            "stored" => NoiseMode::Stored,
+            "off" => NoiseMode::Off,
+            "again" => NoiseMode::Again { pass: pass_ },
+            _ => return Err(error::argument(py, &format!("noise = {noise:?}: stored, off or again"), None)),
+        };
         let Some((width, height)) = self.rows.image_size_px() else {
             let what = format!("{}: there are no images", self.rows.path().display());
             return Err(error::missing(py, &what, Some("sweep with images = \"png\"")));
@@ -80,7 +95,7 @@ impl Dataset {
         let each: usize = shape[1..].iter().product();
         let made = py.detach(|| {
             let mut pixels = vec![0_u8; rows.len() * each];
-            fill(&rows, &mut pixels, each, threads, |row, out| self.rows.images_into(row, out))?;
+            fill(&rows, &mut pixels, each, threads, |row, out| self.rows.images_with(row, mode, out))?;
             Ok(pixels)
         });
         let pixels = made.map_err(|e| error::data(py, &e))?;

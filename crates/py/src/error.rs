@@ -75,6 +75,7 @@ pub fn data(py: Python<'_>, e: &DatasetError) -> PyErr {
             Some("`gripgen verify` reads the whole run; sweeping again rebuilds what is broken")
         }
         DatasetError::Mixed { .. } => Some("delete the shard and sweep again"),
+        DatasetError::Noisy { .. } => Some("sweep with images = \"clean\" to choose the noise when reading"),
         DatasetError::Missing { .. } => Some("ds.table() says what there is"),
         _ => None,
     };

@@ -4,13 +4,15 @@
 //! row can be read at any time from any thread. Memory does not grow with what was read: the shards used last stay open.
 
 mod columns;
+mod images;
 #[cfg(test)]
 mod tests;
 
 pub use columns::Table;
+pub use images::NoiseMode;
 
 use crate::folder::{FolderError, RunFolder};
-use crate::picture::{decode_png_into, encode_png};
+use crate::picture::encode_png;
 use crate::pulls::{
     PullFolderError, PullImagesError, pulls_with_images, read_judged_pulls, read_pull_images,
 };
@@ -111,6 +113,12 @@ pub enum DatasetError {
         row: usize,
         /// What it lacks.
         what: &'static str,
+    },
+    /// Other noise of images that have theirs.
+    #[error("{}: the noise of its images is in them", .path.display())]
+    Noisy {
+        /// The dataset.
+        path: PathBuf,
     },
     /// Images of another size than the first.
     #[error("{}: an image of row {row} is {}x{} pixels, the first one {}x{}", .path.display(), .found.0, .found.1, .wanted.0, .wanted.1)]
@@ -229,7 +237,31 @@ impl Dataset {
 
     /// Both images of a row into `out`: `[2, height, width, 3]` bytes, left jaw first.
     pub fn images_into(&self, row: usize, out: &mut [u8]) -> Result<(), DatasetError> {
+        self.images_with(row, NoiseMode::Stored, out)
+    }
+
+    /// Whether the images of its rows are stored without their noise.
+    ///
+    /// # Errors
+    ///
+    /// A shard that cannot be read.
+    pub fn has_clean_images(&self) -> Result<bool, DatasetError> {
+        match &self.source {
+            Source::Run { .. } => Ok(self.shard_of(0)?.0.has_clean_images()),
+            Source::Pulls { .. } => Ok(false),
+        }
+    }
+
+    /// The same with other noise, where the noise is not in the stored images already.
+    ///
+    /// # Errors
+    ///
+    /// Other noise than that of the images, where they have it; a row without images, or a shard that cannot be read.
+    pub fn images_with(&self, row: usize, mode: NoiseMode, out: &mut [u8]) -> Result<(), DatasetError> {
         self.check_row(row)?;
+        if mode != NoiseMode::Stored && !self.has_clean_images()? {
+            return Err(DatasetError::Noisy { path: self.path.clone() });
+        }
         let missing = || DatasetError::Missing { path: self.path.clone(), row, what: "images" };
         let wanted = self.image_size_px.ok_or_else(missing)?;
         let size = |found| DatasetError::Size { path: self.path.clone(), row, found, wanted };
@@ -239,8 +271,12 @@ impl Dataset {
                 let (reader, index) = self.shard_of(row)?;
                 let raw = reader.raw(index)?;
                 let both = raw.images.as_ref().ok_or_else(missing)?;
+                let noise = reader.noise_of(index, &raw.sample)?;
                 for (jaw, out) in [(Jaw::Left, left), (Jaw::Right, right)] {
                     reader.image_into(index, jaw, &both[jaw], raw.raw_images, wanted, out)?.map_err(size)?;
+                    if let Some(noise) = noise[jaw].and_then(|noise| mode.of(noise)) {
+                        noise.add(out);
+                    }
                 }
             }
             Source::Pulls { measured, with_images } => {
@@ -273,7 +309,7 @@ impl Dataset {
         match &self.source {
             Source::Run { .. } => {
                 let (reader, index) = self.shard_of(row)?;
-                if reader.has_raw_images() {
+                if reader.has_raw_images() || reader.has_clean_images() {
                     let images = reader.record(index)?.images;
                     return images.map(|i| Ok([coded(&i.left)?, coded(&i.right)?])).transpose();
                 }
@@ -390,54 +426,5 @@ impl Dataset {
             }
         }
         Ok(None)
-    }
-}
-
-impl ShardReader {
-    /// Both images of a sample as they are stored.
-    fn images_png(&self, index: u64) -> Result<Option<[Vec<u8>; 2]>, ReadError> {
-        let both = self.raw(index)?.images;
-        both.map(|both| self.png_of(index, "", &both)).transpose()
-    }
-
-    /// The PNGs in two messages; `kind` is the end of their topics.
-    fn png_of(&self, index: u64, kind: &str, both: &PerJaw<Vec<u8>>) -> Result<[Vec<u8>; 2], ReadError> {
-        use crate::proto::foxglove::CompressedImage;
-        use prost::Message;
-        let png = |jaw: Jaw| {
-            let image = CompressedImage::decode(&both[jaw][..]);
-            image
-                .map(|image| image.data.to_vec())
-                .map_err(|e| self.damaged(index, &format!("/tactile/{jaw}{kind}"), &e.to_string()))
-        };
-        Ok([png(Jaw::Left)?, png(Jaw::Right)?])
-    }
-
-    /// One image of a sample into `out`; the inner error is the size of an image that is not of the wanted one.
-    fn image_into(
-        &self,
-        index: u64,
-        jaw: Jaw,
-        message: &[u8],
-        raw: bool,
-        wanted: (u32, u32),
-        out: &mut [u8],
-    ) -> Result<Result<(), (u32, u32)>, ReadError> {
-        use crate::proto::foxglove::{CompressedImage, RawImage};
-        use prost::Message;
-        let damaged = |problem: String| self.damaged(index, &format!("/tactile/{jaw}"), &problem);
-        if raw {
-            let image = RawImage::decode(message).map_err(|e| damaged(e.to_string()))?;
-            if (image.width, image.height) != wanted {
-                return Ok(Err((image.width, image.height)));
-            }
-            if image.data.len() != out.len() {
-                return Err(damaged(format!("{} bytes, expected {}", image.data.len(), out.len())));
-            }
-            out.copy_from_slice(&image.data);
-            return Ok(Ok(()));
-        }
-        let image = CompressedImage::decode(message).map_err(|e| damaged(e.to_string()))?;
-        decode_png_into(&image.data, wanted, out).map_err(|e| damaged(e.to_string()))
     }
 }

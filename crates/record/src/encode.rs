@@ -1,13 +1,14 @@
 //! From a sample to the messages of a shard.
 
 use crate::index::index_row;
-use crate::picture::{PictureError, encode_png};
+use crate::picture::{PictureError, encode_png, encode_small_png};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1 as proto;
 use gripgen_twin::columns::Scale;
 use gripgen_twin::config::{ImageStorage, TraceStorage};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::frames::Pose;
+use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{
     ImprintSummary, Jaw, Outcome, PerJaw, PullTrace, Sample, Scenario, SlipLabel, TactileImage,
 };
@@ -28,6 +29,8 @@ pub struct EncodeOptions {
     pub view_rate_hz: Option<f64>,
     /// Keys beside the fixed columns that get a column of their own in the index.
     pub extra_columns: Vec<String>,
+    /// Sensor noise of each image that is stored without it, levels of 0 to 255; `None` where it has it.
+    pub noise_apart_rgb: Option<PerJaw<[f32; 3]>>,
     /// Samples before this one in its file, and the time each of them takes up.
     pub first_sample: u64,
     /// Time between the starts of two samples of a file.
@@ -83,7 +86,15 @@ pub struct EncodedRig {
 pub fn encode(sample: &Sample, options: &EncodeOptions) -> Result<EncodedSample, PictureError> {
     let start_ns = (sample.scenario.index - options.first_sample) * options.slot_ns;
     let timestamp = Some(timestamp(start_ns));
-    let message = sample_message(sample, timestamp);
+    let mut message = sample_message(sample, timestamp);
+    if let Some(sd_rgb) = options.noise_apart_rgb.filter(|_| message.status() != proto::Status::Failed) {
+        let noise = |jaw: Jaw| {
+            let [red, green, blue] = sd_rgb[jaw];
+            let key = PixelNoise::key_of(sample.scenario.seed, sample.scenario.index, jaw);
+            (red > 0.0 || green > 0.0 || blue > 0.0).then_some(proto::ImageNoise { key, red, green, blue })
+        };
+        (message.left_image_noise, message.right_image_noise) = (noise(Jaw::Left), noise(Jaw::Right));
+    }
     let row = index_row(&message, &options.extra_columns);
     let status = message.status();
     let images = match &sample.outcome {
@@ -233,8 +244,11 @@ pub(crate) fn image_message(
             data: image.rgb.clone(),
         }
         .encode_to_vec(),
-        _ => CompressedImage { timestamp, frame_id, data: encode_png(image)?, format: "png".into() }
-            .encode_to_vec(),
+        _ => {
+            let data =
+                if storage == ImageStorage::Clean { encode_small_png(image) } else { encode_png(image) };
+            CompressedImage { timestamp, frame_id, data: data?, format: "png".into() }.encode_to_vec()
+        }
     })
 }
 

@@ -2,6 +2,7 @@
 
 use crate::encode::{EncodedSample, state_messages, timestamp};
 use crate::mark::EXPORT;
+use crate::picture::encode_png;
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::reader::{ReadError, ShardReader, trace_of};
@@ -40,6 +41,9 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
     let damaged = |topic: &str, e: prost::DecodeError| reader.damaged(index, topic, &e.to_string());
     let mut sample = Sample::decode(&raw.sample[..]).map_err(|e| damaged("/sample", e))?;
     sample.timestamp = zero;
+    // A file of its own has the images as they are read.
+    let whole = reader.has_clean_images().then(|| reader.record(index)).transpose()?.and_then(|r| r.images);
+    (sample.left_image_noise, sample.right_image_noise) = (None, None);
     let images = raw
         .images
         .map(|both| {
@@ -53,6 +57,10 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
                     let mut image =
                         CompressedImage::decode(&both[jaw][..]).map_err(|e| damaged(&topic, e))?;
                     image.timestamp = zero;
+                    if let Some(whole) = &whole {
+                        image.data = encode_png(&whole[jaw])
+                            .map_err(|e| reader.damaged(index, &topic, &e.to_string()))?;
+                    }
                     image.encode_to_vec()
                 })
             })

@@ -38,9 +38,10 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod verify;
+mod webdataset;
 
 pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
-pub use dataset::{Dataset, DatasetError, Table};
+pub use dataset::{Dataset, DatasetError, NoiseMode, Table};
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
 pub use folder::{
@@ -69,4 +70,7 @@ pub use sensor_table::{SENSOR_FILE, SensorTable, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
 pub use stored::{sample_covariates, sample_view};
 pub use table::TableError;
-pub use verify::{Verification, verify};
+pub use verify::{Verification, repair, verify};
+pub use webdataset::{
+    ExportWebDatasetError, WebDatasetOptions, export_webdataset, tar_mark, webdataset_rows,
+};

@@ -7,7 +7,8 @@ use crate::picture::{PictureError, decode};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::shard::RIG_SOURCE;
-use crate::shard::{LAYOUT_VERSION, METADATA_NAME};
+use crate::shard::{CLEAN, LAYOUT_VERSION, METADATA_NAME};
+use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use mcap::records::{AttachmentIndex, ChunkIndex, MetadataIndex};
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
@@ -189,6 +190,11 @@ impl ShardReader {
         self.summary.channels.values().any(|c| c.topic.starts_with("/tactile/"))
     }
 
+    /// Whether these are stored without their noise, which every reader here adds.
+    pub fn has_clean_images(&self) -> bool {
+        self.metadata.get("images").is_some_and(|images| images == CLEAN)
+    }
+
     /// Whether these are stored without PNG.
     pub(crate) fn has_raw_images(&self) -> bool {
         self.summary.schemas.values().any(|s| s.name == "foxglove.RawImage")
@@ -249,7 +255,11 @@ impl ShardReader {
             .map(|both| {
                 PerJaw::try_from_fn(|jaw| {
                     let image = if raw.raw_images { raw_image(&both[jaw]) } else { png_image(&both[jaw]) };
-                    image.map_err(|problem| bad(&format!("/tactile/{jaw}"), problem))
+                    let mut image = image.map_err(|problem| bad(&format!("/tactile/{jaw}"), problem))?;
+                    if let Some(noise) = noise_apart(&sample, jaw) {
+                        noise.add(&mut image.rgb);
+                    }
+                    Ok(image)
                 })
             })
             .transpose()?;
@@ -423,6 +433,15 @@ fn read_summary(file: &File, bytes: u64) -> Result<Option<Summary>, McapError> {
         }
     }
     Ok(reader.finish())
+}
+
+/// The noise that a stored image does not have; `None` where it has it, or there is none.
+pub(crate) fn noise_apart(sample: &Sample, jaw: Jaw) -> Option<PixelNoise> {
+    let noise = match jaw {
+        Jaw::Left => &sample.left_image_noise,
+        Jaw::Right => &sample.right_image_noise,
+    };
+    noise.as_ref().map(|n| PixelNoise { key: n.key, sd_rgb: [n.red, n.green, n.blue] })
 }
 
 fn raw_image(data: &[u8]) -> Result<TactileImage, String> {

@@ -20,6 +20,9 @@ pub const LAYOUT_VERSION: u32 = 1;
 /// Name of the metadata record.
 pub const METADATA_NAME: &str = "gripgen.shard";
 
+/// What the metadata say of images that are stored without their noise.
+pub const CLEAN: &str = "clean";
+
 /// What a shard says about itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ShardInfo {
@@ -117,7 +120,11 @@ impl<W: Write + Seek> ShardWriter<W> {
             .compression(None)
             .chunk_size(None);
         let mut writer = Writer::with_options(to, options)?;
-        writer.write_metadata(&Metadata { name: METADATA_NAME.into(), metadata: info.metadata() })?;
+        let mut metadata = info.metadata();
+        if images == ImageStorage::Clean {
+            metadata.insert("images".into(), CLEAN.into());
+        }
+        writer.write_metadata(&Metadata { name: METADATA_NAME.into(), metadata })?;
         writer.attach(&Attachment {
             log_time: 0,
             create_time: 0,
@@ -132,7 +139,9 @@ impl<W: Write + Seek> ShardWriter<W> {
         };
         let sample = channel("gripgen.v1.Sample", PULL_DESCRIPTOR, "/sample")?;
         let image_schema = match images {
-            ImageStorage::Png => Some(("foxglove.CompressedImage", COMPRESSED_IMAGE_DESCRIPTOR)),
+            ImageStorage::Png | ImageStorage::Clean => {
+                Some(("foxglove.CompressedImage", COMPRESSED_IMAGE_DESCRIPTOR))
+            }
             ImageStorage::Raw => Some(("foxglove.RawImage", RAW_IMAGE_DESCRIPTOR)),
             ImageStorage::None => None,
         };

@@ -5,7 +5,7 @@ use crate::index::{csv_lines, index_header, index_row};
 use crate::reader::ShardReader;
 use crate::shard::RIG_SOURCE;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// What a check found.
@@ -19,6 +19,40 @@ pub struct Verification {
     pub samples: u64,
     /// Faults, each naming its file.
     pub faults: Vec<String>,
+    /// Shards that a fault is about.
+    pub broken_shards: Vec<u64>,
+    /// A fault is about the index.
+    pub index_is_broken: bool,
+}
+
+/// Takes away what [`verify`] found to be broken, so that running the sweep again makes it anew: shards with their sidecars, and the
+/// index, which is written again when all shards are done: at once, if they are. Returns the files. Of a run of a rig nothing is taken away but the index: pulls
+/// that were measured cannot be computed again.
+///
+/// # Errors
+///
+/// A file that cannot be removed.
+pub fn repair(folder: &RunFolder, found: &Verification) -> Result<Vec<PathBuf>, FolderError> {
+    let measured = folder.info().source == RIG_SOURCE;
+    let shards = found.broken_shards.iter().filter(|_| !measured);
+    // The sidecar first: a shard without one is a shard that was not made.
+    let files = shards.flat_map(|&shard| [folder.sidecar_path(shard), folder.shard_path(shard)]);
+    let some = !measured && !found.broken_shards.is_empty();
+    let index = (found.index_is_broken || some).then(|| folder.path().join("index.csv"));
+    let whole = found.index_is_broken && found.missing_shards == 0 && found.broken_shards.is_empty();
+    let mut removed = Vec::new();
+    for path in files.chain(index) {
+        match std::fs::remove_file(&path) {
+            Ok(()) => removed.push(path),
+            Err(e) if e.kind() == ErrorKind::NotFound => {}
+            Err(source) => return Err(FolderError::Io { path, source }),
+        }
+    }
+    if whole {
+        // The sidecars hold its rows.
+        folder.write_index()?;
+    }
+    Ok(removed)
 }
 
 /// Reads every shard of a run: hash and size against the sidecar, checksums, every message, every row of the index.
@@ -38,6 +72,7 @@ pub fn verify(path: &Path, mut progress: impl FnMut(u64)) -> Result<Verification
         match sidecar {
             None if file.exists() || folder.sidecar_path(shard).exists() => {
                 result.faults.push(misfit(&folder, shard));
+                result.broken_shards.push(shard);
             }
             None => result.missing_shards += 1,
             Some(sidecar) => {
@@ -53,6 +88,8 @@ pub fn verify(path: &Path, mut progress: impl FnMut(u64)) -> Result<Verification
                 }
                 if result.faults.len() == before {
                     result.good_shards += 1;
+                } else {
+                    result.broken_shards.push(shard);
                 }
                 index.compare(&sidecar.rows);
             }
@@ -62,9 +99,11 @@ pub fn verify(path: &Path, mut progress: impl FnMut(u64)) -> Result<Verification
     if result.missing_shards > 0 && folder.path().join("index.csv").exists() {
         let problem = format!("it is there, but {} shards are not", result.missing_shards);
         result.faults.push(format!("{}: {problem}", folder.path().join("index.csv").display()));
+        result.index_is_broken = true;
     }
     if result.missing_shards == 0 && result.faults.is_empty() {
         result.faults.extend(index.finish());
+        result.index_is_broken = !result.faults.is_empty();
     }
     Ok(result)
 }

@@ -36,7 +36,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             for (var channel = 0u; channel < 3u; channel++) {
                 var value = rest[channel * pixels + pixel] + change[channel];
                 if noisy {
-                    value += noise[channel] * standard_normal(words, 3u * pixel + channel);
+                    // The clean frame is rounded first: noise can be added to a stored one later.
+                    value = f32(rounded(value)) + noise[channel] * standard_normal(words, 3u * pixel + channel);
                 }
                 let place = 3u * i + channel;
                 bytes[place / 4u] |= rounded(value) << (8u * (place % 4u));

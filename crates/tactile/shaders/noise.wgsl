@@ -1,4 +1,5 @@
-// Stage noise: sensor noise, rounding to 8 bits and packing. CPU twin: src/noise.rs, with the same hash and values.
+// Stage noise: sensor noise, rounding to 8 bits and packing. CPU twin: src/noise.rs and pixel_noise.rs of gripgen-twin, with the same
+// hash and values.
 
 fn scramble(word: u32) -> u32 {
     var h = word;

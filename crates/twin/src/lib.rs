@@ -46,6 +46,7 @@ mod mesh;
 mod optics;
 pub mod parts;
 mod patch;
+pub mod pixel_noise;
 pub mod plant;
 mod profile;
 pub mod random;

@@ -25,6 +25,8 @@ pub enum Purpose {
     ImageNoiseRight = 6,
     /// Gain of the cameras from grip to grip, keyed by the group of repetitions.
     PressGain = 7,
+    /// Image noise of another pass over stored samples, keyed by that of the image.
+    ImageNoiseAgain = 8,
 }
 
 /// A stream of random numbers for one sample and one purpose.

@@ -1,23 +1,30 @@
-//! `gripgen export`: a sample as a file of its own, or all of them as a table.
+//! `gripgen export`: a sample as a file of its own, or all of them as a table or for WebDataset.
 
 use crate::args::{ExportArgs, ExportFormat};
 use crate::commands::{maker, open_run};
 use crate::failure::Failure;
 use crate::mark::Format;
-use crate::output::{JsonSink, print};
+use crate::output::{JsonSink, count, print};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
-use gripgen::record::{Dataset, ParquetOptions, ShardReader, export_parquet, export_sample};
+use gripgen::record::{
+    Dataset, ParquetOptions, ShardReader, WebDatasetOptions, export_parquet, export_sample,
+    export_webdataset, webdataset_rows,
+};
 use serde_json::json;
+use std::path::PathBuf;
 
 /// Runs the verb.
 pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
     let mut outputs = Outputs::of("export", args.json.force).reads(&args.run);
+    if args.sample.is_none() && args.to == Some(ExportFormat::Webdataset) {
+        return webdataset(args, outputs);
+    }
     outputs.allow(&args.out)?;
     let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     match (args.sample, args.to) {
         (Some(sample), _) => one(args, sample, &outputs, sink),
-        (None, Some(ExportFormat::Parquet)) => table(args, &outputs, sink),
+        (None, Some(_)) => table(args, &outputs, sink),
         (None, None) => Err(Failure::usage("export what?").hint("--sample K, or --to parquet")),
     }
 }
@@ -43,6 +50,61 @@ fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Fai
     let bytes = file.metadata().map_err(Failure::new)?.len();
     let document = json!({"schema": "gripgen.export/1", "rows": rows, "file": args.out, "bytes": bytes});
     tell(args, sink, &document)
+}
+
+/// Rows of a tar file whose name has a number.
+const ROWS: usize = 1000;
+
+fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
+    let dataset = Dataset::open(&args.run).map_err(Failure::usage)?;
+    let options = WebDatasetOptions {
+        images: !args.no_images && dataset.image_size_px().is_some(),
+        traces: !args.no_traces,
+    };
+    let rows = webdataset_rows(&dataset, options);
+    let name = args.out.to_string_lossy();
+    let files: Vec<(PathBuf, &[usize])> = match numbered(&name) {
+        Some(numbered) => {
+            rows.chunks(ROWS).enumerate().map(|(i, rows)| (PathBuf::from(numbered(i)), rows)).collect()
+        }
+        None => vec![(args.out.clone(), &rows)],
+    };
+    outputs.allow_all(files.iter().map(|(path, _)| path.as_path()))?;
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let mut progress = Progress::start("rows", 0, rows.len() as u64, &args.talk);
+    let (mut written, mut bytes) = (0, 0);
+    for (path, rows) in &files {
+        let pending = outputs.begin(path)?;
+        let out = std::io::BufWriter::new(&pending.file);
+        let made = export_webdataset(&dataset, rows, options, out, || progress.step());
+        written += made.map_err(Failure::new)?;
+        bytes += pending.publish(&outputs)?.metadata().map_err(Failure::new)?.len();
+    }
+    progress.finish();
+    let left_out = dataset.table().rows() - written;
+    if left_out > 0 && !args.talk.quiet {
+        eprintln!("{} without images left out", count(left_out as u64, "row"));
+    }
+    let paths: Vec<&PathBuf> = files.iter().map(|(path, _)| path).collect();
+    if sink.wanted() {
+        sink.document(&json!({
+            "schema": "gripgen.export/1", "rows": written, "left_out": left_out, "file": args.out, "files": paths,
+            "bytes": bytes,
+        }))?;
+    }
+    if !sink.on_stdout() && !args.talk.quiet {
+        print(&paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>())?;
+    }
+    Ok(0)
+}
+
+/// The names that a name with `%d` or `%05d` in it stands for; `None` without one.
+fn numbered(name: &str) -> Option<impl Fn(usize) -> String> {
+    let (before, rest) = name.split_once('%')?;
+    let (digits, after) = rest.split_once('d')?;
+    let width: usize = if digits.is_empty() { 0 } else { digits.strip_prefix('0')?.parse().ok()? };
+    let (before, after) = (before.to_string(), after.to_string());
+    (width < 20).then_some(move |i: usize| format!("{before}{i:0width$}{after}"))
 }
 
 fn tell(args: &ExportArgs, mut sink: JsonSink, document: &serde_json::Value) -> Result<u8, Failure> {

@@ -3,10 +3,10 @@
 use crate::args::VerifyArgs;
 use crate::commands::{maker, open_run};
 use crate::failure::{Failure, code};
-use crate::output::{JsonSink, count, print};
+use crate::output::{JsonSink, count, print, program};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
-use gripgen::record::verify;
+use gripgen::record::{RIG_SOURCE, repair, verify};
 use serde_json::json;
 
 /// Runs the verb.
@@ -19,11 +19,15 @@ pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
     progress.finish();
     let complete = result.missing_shards == 0;
     let good = result.faults.is_empty();
+    let removed = if args.repair && !good { repair(&folder, &result)? } else { vec![] };
+    // What was measured stays, broken or not.
+    let repaired =
+        !removed.is_empty() && (folder.info().source != RIG_SOURCE || result.broken_shards.is_empty());
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.verification/1", "ok": good, "complete": complete,
             "good_shards": result.good_shards, "missing_shards": result.missing_shards,
-            "samples": result.samples, "faults": result.faults,
+            "samples": result.samples, "faults": result.faults, "removed": removed,
         }))?;
     }
     for fault in &result.faults {
@@ -41,11 +45,26 @@ pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
             count(result.samples, "sample")
         ))?;
     }
+    for path in &removed {
+        eprintln!("removed {}", path.display());
+    }
+    if repaired {
+        if !result.broken_shards.is_empty() {
+            eprintln!("next: run the {} again, which makes what was removed", maker(&folder));
+        }
+        return Ok(0);
+    }
     if !good {
         eprintln!(
-            "\nhint: running the {} again makes anew what has no fitting sidecar; where the content differs, \
-             delete the sidecar (shard-NNNNN.json) first",
-            maker(&folder)
+            "\nhint: {}",
+            match folder.info().source == RIG_SOURCE {
+                true => "measured pulls cannot be computed again: a copy of the run may have them whole"
+                    .to_string(),
+                false => format!(
+                    "`{} verify --repair` removes what is broken, and the same sweep makes it again",
+                    program()
+                ),
+            }
         );
     }
     Ok(if good { 0 } else { code::MISMATCH })

@@ -124,6 +124,7 @@ fn cases() -> Vec<Case> {
         json("export", "run --sample 0 -o out/exported.mcap", true),
         case("export", "out", "mcap", "run --sample 0", true),
         case("export", "out", "parquet", "run --to parquet", true),
+        case("export", "out", "tar", "run --to webdataset -q", true),
         json("calibrate presses", "presses -o out/s.npz", false),
         case("calibrate presses", "out", "npz", "presses", false),
         case("calibrate presses", "report", "html", "presses -o out/s.npz", false),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -54,6 +54,7 @@ def load(
     *,
     status: Sequence[str] = LABELLED,
     suspect: bool = False,
+    noise: str = "stored",
     cache_dir: str | os.PathLike[str] | None = None,
 ) -> Dataset:
     """Open a run folder or a folder with `pulls.csv`; an fsspec URL (`s3://...`) is copied into `cache_dir` first.
@@ -62,13 +63,17 @@ def load(
     bound, so it is left out unless asked for; a failed sample has neither label nor images. A suspect pull has a label
     that recorded evidence contradicts, and says in `status_reason` how: with `suspect=True` its row is kept too.
 
+    A run with `images = "clean"` has its images without the noise of the sensors, which is added when they are read: as the
+    sweep drew it (`noise="stored"`, the bytes of `images = "png"`), anew in every epoch ("resample"), or not at all ("off").
+
     Raises DataError, naming the file, for what is no such folder or is damaged.
     """
     text = os.fspath(path)
     if remote.is_url(text):
         text = remote.fetch(text, cache_dir)
     kept = (*status, "suspect") if suspect and "suspect" not in status else tuple(status)
-    return Dataset(text, status=kept, _opened=(os.getpid(), _core.Dataset(text)))
+    found = Dataset(text, status=kept, _opened=(os.getpid(), _core.Dataset(text)))
+    return found if noise == "stored" else found.with_noise(noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +89,9 @@ class Dataset(Sequence[Sample]):
     status: tuple[str, ...] = LABELLED
     #: Rows of the run that belong to this dataset.
     rows: NDArray[np.int64] | None = None
+    #: The noise that images are read with: "stored", "resample" or "off"; and the epoch that it is drawn for.
+    noise: str = "stored"
+    noise_epoch: int = 0
     # The open files, and the process that opened them.
     _opened: tuple[int, _core.Dataset] | None = field(default=None, repr=False)
     # Rows of the run when it was loaded.
@@ -101,7 +109,8 @@ class Dataset(Sequence[Sample]):
         object.__setattr__(self, "rows", rows)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"path": self.path, "status": self.status, "rows": self.rows, "_opened": None, "_total": self._total}
+        kept = ("path", "status", "rows", "noise", "noise_epoch", "_total")
+        return {**{name: getattr(self, name) for name in kept}, "_opened": None}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         for name, value in state.items():
@@ -186,7 +195,7 @@ class Dataset(Sequence[Sample]):
     def __getitems__(self, ids: Sequence[int]) -> list[Sample]:
         """Several rows at once; torch's loaders call it with the ids of a batch."""
         rows = self._rows_of(ids)
-        images = self._open().images(rows) if self.image_size_px else [None] * len(rows)
+        images = self._images(rows, 1) if self.image_size_px else [None] * len(rows)
         columns = self._columns()
         found = []
         for row, both in zip(rows, images):
@@ -216,7 +225,7 @@ class Dataset(Sequence[Sample]):
         rows = self._rows_of(ids)
         opened = self._open()
         labels = np.asarray(self._columns()["max_pull_force_n"])[rows].astype(np.float32)
-        pixels = opened.images(rows, threads) if images else None
+        pixels = self._images(rows, threads) if images else None
         if not (traces or heights or forces):
             return pixels, labels
         lines, lengths = opened.traces(rows) if traces else (None, None)
@@ -237,8 +246,24 @@ class Dataset(Sequence[Sample]):
         """The rows for which `keep` (bool[len]) is true."""
         return self._with(self.rows[np.asarray(keep, dtype=bool)])
 
+    def with_noise(self, noise: str, epoch: int = 0) -> Dataset:
+        """The same rows with other noise on their images, for runs with `images = "clean"`: "stored" is that of the sweep,
+        "resample" is drawn for this epoch (the same for the same epoch, of the same size), "off" is none."""
+        if noise not in ("stored", "resample", "off"):
+            raise _core.ConfigError(f"noise = {noise!r} is neither 'stored' nor 'resample' nor 'off'")
+        if noise != "stored" and not self._open().clean_images:
+            raise _core.DataError(
+                f"{self.path}: the noise of its images is in them\n"
+                'hint: sweep with images = "clean" to choose the noise when reading'
+            )
+        return replace(self, noise=noise, noise_epoch=epoch, _opened=(os.getpid(), self._open()))
+
+    def _images(self, rows: list[int], threads: int) -> NDArray[np.uint8]:
+        mode = "again" if self.noise == "resample" else self.noise
+        return self._open().images(rows, threads, mode, self.noise_epoch)
+
     def _with(self, rows: NDArray[np.int64]) -> Dataset:
-        return Dataset(self.path, self.status, rows, (os.getpid(), self._open()), self._total)
+        return replace(self, rows=rows, _opened=(os.getpid(), self._open()))
 
     def split(
         self, *, by: str | Sequence[str] = "group", test: float = 0.2, seed: int = 0
@@ -276,7 +301,9 @@ class Dataset(Sequence[Sample]):
         drop_last: bool = False,
         threads: int = 1,
     ) -> Iterator[tuple[NDArray[np.uint8] | None, NDArray[np.float32]]]:
-        """Batches of this rank in a seeded order, a new one every epoch; every row is seen by one rank."""
+        """Batches of this rank in a seeded order, a new one every epoch; every row is seen by one rank. With
+        `noise="resample"` the noise of the images is that of the epoch."""
+        own = self.with_noise(self.noise, epoch) if self.noise == "resample" else self
         order = np.arange(len(self))
         if shuffle:
             order = np.random.default_rng((seed, epoch)).permutation(order)
@@ -285,7 +312,7 @@ class Dataset(Sequence[Sample]):
             ids = order[first : first + batch_size]
             if drop_last and len(ids) < batch_size:
                 return
-            images, labels = self.batch(ids, images=self.image_size_px is not None, threads=threads)
+            images, labels = own.batch(ids, images=self.image_size_px is not None, threads=threads)
             yield images, labels
 
 

@@ -123,6 +123,25 @@ pub struct Sample {
     /// time)): the label rule may take a force from before the slip.
     #[prost(bool, tag = "44")]
     pub lag_exceeds_tolerance: bool,
+    /// Sensor noise that the stored images do not have (`images = "clean"`); absent where they have it or where there is none.
+    #[prost(message, optional, tag = "50")]
+    pub left_image_noise: ::core::option::Option<ImageNoise>,
+    #[prost(message, optional, tag = "51")]
+    pub right_image_noise: ::core::option::Option<ImageNoise>,
+}
+/// Noise to add to a stored image. Value i (row by row, pixel by pixel, red, green, blue) becomes round(value + sd z), clamped to 0 to
+/// 255; docs/format.md says how z follows from the key and i.
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+pub struct ImageNoise {
+    #[prost(fixed64, tag = "1")]
+    pub key: u64,
+    /// Standard deviation of each channel, in levels of 0 to 255.
+    #[prost(float, tag = "2")]
+    pub red: f32,
+    #[prost(float, tag = "3")]
+    pub green: f32,
+    #[prost(float, tag = "4")]
+    pub blue: f32,
 }
 /// The force over time, as packed columns of equal length.
 #[derive(Clone, PartialEq, ::prost::Message)]

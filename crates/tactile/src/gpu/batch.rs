@@ -13,10 +13,10 @@ use super::readback::Ring;
 use super::rest::RestShape;
 use super::source::{Axis, Blur, Variant};
 use crate::grid::{Grid, Plane};
-use crate::noise::levels;
 use crate::render::Renderer;
 use crate::sensor::Sensor;
 use crate::simd::SimdLevel;
+use gripgen_twin::pixel_noise::levels;
 use gripgen_twin::{Gel, TriMesh};
 use wgpu::BufferUsages;
 

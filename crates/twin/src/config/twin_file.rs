@@ -263,7 +263,7 @@ pub struct OpticsFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartFile {
-    /// Mesh file, STL or OBJ.
+    /// Mesh file: STL, OBJ, PLY or GLB.
     pub mesh: String,
     /// Millimetres per unit of the mesh file.
     #[serde(default = "one")]

@@ -1,0 +1,171 @@
+//! A dataset as tar files for WebDataset: a sample is the files of one name, `000000012.left.png`, `.right.png`, `.json`, `.trace.npy`.
+//!
+//! Rows without images are left out where images are wanted, so that all samples have the same keys. What is in a `__name__` folder is no
+//! sample to WebDataset: the mark and the card are there. Nothing in a file depends on time, host or path.
+
+use crate::dataset::{Dataset, DatasetError};
+use crate::mark::{EXPORT, MARK_NAME};
+use gripgen_twin::{PullTrace, Values};
+use serde_json::{Map, Value, json};
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::Path;
+use tar::{Archive, Builder, EntryType, Header};
+
+/// Where the mark and the card are.
+const ABOUT: &str = "__gripgen__";
+
+/// What of each row is written beside its cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WebDatasetOptions {
+    /// Both images; rows without them are left out.
+    pub images: bool,
+    /// The force over time.
+    pub traces: bool,
+}
+
+/// Why a dataset could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportWebDatasetError {
+    /// The dataset.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The file.
+    #[error("tar: {0}")]
+    Tar(#[from] std::io::Error),
+}
+
+/// Rows of a dataset that an export takes: with images all that have some. The others are failed samples.
+///
+/// # Errors
+///
+/// A row that cannot be read.
+pub fn webdataset_rows(dataset: &Dataset, options: WebDatasetOptions) -> Vec<usize> {
+    let statuses = dataset.table().words("status");
+    let failed = |row: usize| statuses.is_some_and(|words| words[row] == "failed");
+    (0..dataset.table().rows()).filter(|&row| !options.images || !failed(row)).collect()
+}
+
+/// Writes these rows as one tar file; `on_row` is called after each. Returns how many were written: a row of measured pulls may have no
+/// images.
+///
+/// # Errors
+///
+/// A row that cannot be read, or an `out` that cannot be written.
+pub fn export_webdataset<W: Write>(
+    dataset: &Dataset,
+    rows: &[usize],
+    options: WebDatasetOptions,
+    out: W,
+    mut on_row: impl FnMut(),
+) -> Result<usize, ExportWebDatasetError> {
+    let mut tar = Builder::new(out);
+    add(&mut tar, &format!("{ABOUT}/{MARK_NAME}"), EXPORT.as_bytes())?;
+    add(&mut tar, &format!("{ABOUT}/README.md"), card(dataset).as_bytes())?;
+    let mut written = 0;
+    for &row in rows {
+        on_row();
+        let key = match dataset.sample_index(row) {
+            Ok(index) => format!("{index:09}"),
+            Err(_) => format!("{row:09}"),
+        };
+        if options.images {
+            let Some([left, right]) = dataset.images_png(row)? else { continue };
+            add(&mut tar, &format!("{key}.left.png"), &left)?;
+            add(&mut tar, &format!("{key}.right.png"), &right)?;
+        }
+        let cells = serde_json::to_vec(&cells(dataset, row)).map_err(std::io::Error::from)?;
+        add(&mut tar, &format!("{key}.json"), &cells)?;
+        if options.traces
+            && let Some(trace) = dataset.trace(row)?
+        {
+            add(&mut tar, &format!("{key}.trace.npy"), &trace_npy(&trace))?;
+        }
+        written += 1;
+    }
+    tar.into_inner()?.flush()?;
+    Ok(written)
+}
+
+fn add<W: Write>(tar: &mut Builder<W>, name: &str, bytes: &[u8]) -> std::io::Result<()> {
+    let mut header = Header::new_ustar();
+    header.set_entry_type(EntryType::Regular);
+    header.set_mode(0o644);
+    header.set_size(bytes.len() as u64);
+    header.set_mtime(0);
+    tar.append_data(&mut header, name, bytes)
+}
+
+/// Columns that count something.
+const COUNTS: [&str; 8] =
+    ["index", "shard", "in_shard", "grip_pose", "pull_index", "pull_direction", "group", "repetition"];
+
+/// The cells of a row: numbers, counts as integers, words, and null where there is nothing.
+fn cells(dataset: &Dataset, row: usize) -> Value {
+    let cell = |name: &str, column: &Values| match column {
+        Values::Words(words) if words[row].is_empty() => Value::Null,
+        Values::Words(words) => json!(words[row]),
+        Values::Numbers(x) if x[row].fract() == 0.0 && COUNTS.contains(&name) => json!(x[row] as i64),
+        // What is not a number is null in JSON.
+        Values::Numbers(x) => json!(x[row]),
+    };
+    let all = dataset.table().columns().iter().map(|(name, column)| (name.clone(), cell(name, column)));
+    Value::Object(all.collect::<Map<_, _>>())
+}
+
+/// A trace as an array of numpy: float32, (rows, 4) with time_s, desired_force_n, measured_force_n, displacement_mm.
+fn trace_npy(trace: &PullTrace) -> Vec<u8> {
+    let shape = format!("({}, 4)", trace.len());
+    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+    // Magic, version and length take 10 bytes; all together are a multiple of 64 (NEP 1).
+    let whole = (10 + header.len() + 1).next_multiple_of(64);
+    header.extend(std::iter::repeat_n(' ', whole - 10 - header.len() - 1));
+    header.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    for row in trace.rows() {
+        let all = [row.time_s, row.desired_force_n, row.measured_force_n, row.displacement_m * 1e3];
+        bytes.extend(all.iter().flat_map(|x| (*x as f32).to_le_bytes()));
+    }
+    bytes
+}
+
+/// What somebody who only has the file wants to know.
+fn card(dataset: &Dataset) -> String {
+    let mut text = String::from(
+        "# Grips, pulls and slip\n\n\
+         Each sample is a grip by two jaws with a tactile sensor each and a pull until they slip, written by gripgen.\n\n\
+         - `KEY.left.png`, `KEY.right.png`: tactile images, RGB, 8 bits, with the noise of the sensor\n\
+         - `KEY.json`: `max_pull_force_n` is the label (N); `status` says what it is (`slipped`: the force at slip; `censored`: a lower\n\
+         \x20 bound; `no_contact`: 0; `suspect`: contradicted by the trace); everything that was set and drawn; units stand in the names\n\
+         - `KEY.trace.npy`: float32 (rows, 4): time_s, desired_force_n, measured_force_n, displacement_mm\n\n\
+         Grip forces are those of one jaw. Samples of one `group` are repetitions of one configuration: split by `group`, or by `part`.\n",
+    );
+    if let Some(run) = dataset.run() {
+        let info = run.info();
+        text += &format!(
+            "\nRun `{}`, {} samples, made by gripgen {} (source: {}), configuration {}.\n\n```toml\n{}```\n",
+            info.name, info.samples, info.gripgen_version, info.source, info.config_sha256, info.config_toml
+        );
+    }
+    text
+}
+
+/// The verb that wrote a tar file; `None` where there is no mark or no such file.
+pub fn tar_mark(path: &Path) -> Option<String> {
+    let mut magic = [0; 262];
+    let mut file = File::open(path).ok()?;
+    file.read_exact(&mut magic).ok()?;
+    if &magic[257..] != b"ustar" {
+        return None;
+    }
+    let mut archive = Archive::new(File::open(path).ok()?);
+    let mut first = archive.entries().ok()?.next()?.ok()?;
+    let named = first.path().ok()?.to_str().is_some_and(|name| name == format!("{ABOUT}/{MARK_NAME}"));
+    let mut verb = String::new();
+    // A mark is a word.
+    first.by_ref().take(64).read_to_string(&mut verb).ok()?;
+    named.then_some(verb)
+}
