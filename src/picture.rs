@@ -9,11 +9,12 @@ mod rig;
 mod sample;
 mod scene;
 mod sheet;
-mod tried;
 
 pub(crate) use canvas::{Anchor, Canvas, Rgb, TextStyle};
+pub(crate) use colours::{FAILED, INK, MEASURED, PANEL, PAPER, SOFT_INK};
+pub(crate) use layout::{CAPTION, HEADER, IMAGE, MARGIN, fit, frame, pixel};
 pub(crate) use paper::paper_picture;
+pub(crate) use plot::{Area, axes};
 pub use sample::{PictureSampleError, sample_picture};
 pub(crate) use scene::{Scene, SceneMesh, View};
 pub use sheet::{CONTACT_SHEET, contact_sheet, contact_sheet_samples, publish_contact_sheet};
-pub(crate) use tried::tried_picture;

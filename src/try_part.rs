@@ -2,6 +2,7 @@
 
 mod holding;
 mod page;
+mod picture;
 
 use crate::generate::{pull_gripped, start_pull};
 use crate::gripped::Gripped;
@@ -10,7 +11,6 @@ use crate::init::{
     search,
 };
 use crate::location::Location;
-use crate::picture::tried_picture;
 use crate::presses::{LoadSensorError, load_sensor};
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_tactile::SimdLevel;
@@ -18,6 +18,7 @@ use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
 use gripgen_twin::{Covariates, Jaw, PerJaw, PullSettings, Scenario, TactileImage, Twin};
 use holding::holding;
 pub use holding::{FrictionRange, Holding};
+use picture::tried_picture;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -8,17 +8,17 @@ use gripgen_record::Record;
 use gripgen_record::proto::gripgen_v1::Sample;
 use gripgen_twin::TactileImage;
 
-pub(super) const MARGIN: u32 = 16;
+pub(crate) const MARGIN: u32 = 16;
 
-pub(super) const IMAGE: (u32, u32) = (400, 300);
+pub(crate) const IMAGE: (u32, u32) = (400, 300);
 
-pub(super) const HEADER: u32 = 64;
+pub(crate) const HEADER: u32 = 64;
 
-pub(super) const CAPTION: u32 = 24;
+pub(crate) const CAPTION: u32 = 24;
 
-pub(super) const CURVE_HEIGHT: u32 = 380;
+pub(crate) const CURVE_HEIGHT: u32 = 380;
 
-pub(super) fn second_line(s: &Sample) -> String {
+pub(crate) fn second_line(s: &Sample) -> String {
     let mut text = details(s);
     if let Some(mu) = s.mu {
         text += &format!(", mu {mu:.4}");
@@ -32,17 +32,17 @@ pub(super) fn second_line(s: &Sample) -> String {
     text
 }
 
-pub(super) fn frame(canvas: &mut Canvas, x: u32, y: u32) {
+pub(crate) fn frame(canvas: &mut Canvas, x: u32, y: u32) {
     canvas.rect(f64::from(x), f64::from(y), f64::from(IMAGE.0), f64::from(IMAGE.1), PANEL);
 }
 
-pub(super) fn pixel(image: &TactileImage, u: u32, v: u32) -> Rgb {
+pub(crate) fn pixel(image: &TactileImage, u: u32, v: u32) -> Rgb {
     let [r, g, b] = image.pixel(u, v);
     Rgb(r, g, b)
 }
 
 /// Draws an image into the frame, as large as it fits, centred.
-pub(super) fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour: impl Fn(u32, u32) -> Rgb) {
+pub(crate) fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour: impl Fn(u32, u32) -> Rgb) {
     let (zoom, left, top) = placement(size);
     let (width, height) = ((f64::from(size.0) * zoom) as u32, (f64::from(size.1) * zoom) as u32);
     for row in 0..height {
@@ -55,7 +55,7 @@ pub(super) fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour:
     }
 }
 
-pub(super) fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Record) {
+pub(crate) fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Record) {
     let mut x = f64::from(MARGIN);
     for (text, ink) in [
         ("force / N:", INK),
@@ -88,7 +88,7 @@ pub(super) fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Rec
 }
 
 /// Zoom and margins of an image of this size in the frame.
-pub(super) fn placement(size: (u32, u32)) -> (f64, u32, u32) {
+pub(crate) fn placement(size: (u32, u32)) -> (f64, u32, u32) {
     let zoom = (f64::from(IMAGE.0) / f64::from(size.0)).min(f64::from(IMAGE.1) / f64::from(size.1));
     let rest = |frame: u32, n: u32| ((f64::from(frame) - f64::from(n) * zoom) / 2.0).max(0.0) as u32;
     (zoom, rest(IMAGE.0, size.0), rest(IMAGE.1, size.1))

@@ -72,7 +72,7 @@ pub(crate) fn pull_curve(canvas: &mut Canvas, area: Area, curve: &Curve<'_>) {
 }
 
 /// Grid and numbers of forces over what runs to the right; a plot without its name is a thumbnail.
-pub(super) fn axes(canvas: &mut Canvas, plot: Area, end: f64, top_n: f64, name: Option<&str>) {
+pub(crate) fn axes(canvas: &mut Canvas, plot: Area, end: f64, top_n: f64, name: Option<&str>) {
     let small = TextStyle::small(SOFT_INK);
     let (columns, rows) = if name.is_some() { (8.0, 6.0) } else { (3.0, 3.0) };
     let step = tick(end, columns);

@@ -1,11 +1,11 @@
 //! A part that was tried, as one picture: a row for each grip.
 
-use super::canvas::{Anchor, Canvas, TextStyle};
-use super::colours::{FAILED, INK, MEASURED, PANEL, PAPER, SOFT_INK};
-use super::layout::{CAPTION, HEADER, IMAGE, MARGIN, fit, frame, pixel};
-use super::plot::{Area, axes};
+use super::{FrictionRange, GripTried, TriedPart, friction_words};
 use crate::init::drawing::{PANEL as DRAWING, panel};
-use crate::try_part::{FrictionRange, GripTried, TriedPart, friction_words};
+use crate::picture::{
+    Anchor, Area, CAPTION, Canvas, FAILED, HEADER, IMAGE, INK, MARGIN, MEASURED, PANEL, PAPER, SOFT_INK,
+    TextStyle, axes, fit, frame, pixel,
+};
 use gripgen_twin::{Jaw, TriMesh};
 
 /// Size of the curve, and of a row.
@@ -18,7 +18,7 @@ const LETTERS: usize = 76;
 const SENTENCES: usize = 3;
 
 /// A PNG: of each grip the part between the jaws, both images, what it holds, and where it fails.
-pub(crate) fn tried_picture(part: &TriedPart, mesh: &TriMesh) -> Vec<u8> {
+pub(super) fn tried_picture(part: &TriedPart, mesh: &TriMesh) -> Vec<u8> {
     let width = 4 * MARGIN + DRAWING.0 + IMAGE.0 + CURVE.0;
     let words = lines(&friction_words(part.mu), 190);
     let top = HEADER + LINE * words.len() as u32;
