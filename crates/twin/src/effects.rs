@@ -22,12 +22,12 @@ mod tests;
 pub use chain::{CommandChain, SensorChain, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 pub use experiment::{Experiment, Measured, separating};
 pub use fit::{
-    Bounds, FORCE_RATE, Fit, Grid, Named, PressFit, PressNeeds, PullFit, PullSpan, REFERENCE_FORCE, TableFit,
+    Bounds, FORCE_RATE, Fit, GraspSpan, Grid, ImprintFit, Named, PressFit, PressNeeds, PullFit, PullSpan, REFERENCE_FORCE, TableFit,
     TableSpan,
 };
 use fit::{log_spaced, wider};
 pub use hooks::{
-    CommandHook, FrictionHook, GripPoint, ImprintHook, NormalForceHook, OpticsHook, SensorHook, SensorMemory,
+    CommandHook, FrictionHook, GraspForceHook, GripPoint, ImprintHook, NormalForceHook, OpticsHook, SensorHook, SensorMemory,
     SensorPoint, TiltHook,
 };
 pub use spec::{EffectSpec, Group, ParameterSpec, Visible};
@@ -55,6 +55,7 @@ library! {
     mod wear;
     mod conditioning;
     mod temperature;
+    mod imprint_delay;
     mod grip_relaxation;
     mod imprint_nonlinearity;
     mod jaw_tilt;

@@ -11,6 +11,8 @@ pub enum Measured {
     SensorTable,
     /// Presses into the gel.
     Presses,
+    /// Grasps beside a load cell.
+    Imprints,
 }
 
 /// Something a technician can do that shows some effects and not others. In the order in which they are proposed.
@@ -50,6 +52,12 @@ pub enum Experiment {
     PressesNearTheCorners,
     /// One place at several depths.
     PressesAtSeveralDepths,
+    /// Forces of one grasp that stand still for a while.
+    HeldForces,
+    /// Many forces of one grasp, up and down.
+    ForceLadder,
+    /// One force of one grasp, held long.
+    LongHold,
 }
 
 impl Experiment {
@@ -58,7 +66,8 @@ impl Experiment {
         match self {
             e if e <= Experiment::DwellTimes => Measured::Pulls,
             e if e <= Experiment::LoadingAtTwoSpeeds => Measured::SensorTable,
-            _ => Measured::Presses,
+            e if e <= Experiment::PressesAtSeveralDepths => Measured::Presses,
+            _ => Measured::Imprints,
         }
     }
 
@@ -101,6 +110,15 @@ impl Experiment {
             }
             Experiment::PressesAtSeveralDepths => {
                 "press at several depths: shadows grow with the height of the contact"
+            }
+            Experiment::HeldForces => {
+                "hold three forces of one grasp for a second each: a delay vanishes where the force stands still"
+            }
+            Experiment::ForceLadder => {
+                "climb six forces of one grasp from at most 10 N to the largest and down again: a curve is the same both ways"
+            }
+            Experiment::LongHold => {
+                "hold one force of one grasp for a minute with pictures all along, then open and take a frame without contact"
             }
         }
     }

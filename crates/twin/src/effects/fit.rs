@@ -163,6 +163,47 @@ impl PressFit {
     };
 }
 
+/// What the fits need to know of a set of imprints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GraspSpan {
+    /// Median force of the rows in contact.
+    pub middle_n: f64,
+    /// Median time between two rows of a grasp; infinite where no times are known.
+    pub step_s: f64,
+    /// Duration of the longest grasp; 0 where no times are known.
+    pub longest_s: f64,
+}
+
+/// How an effect is fitted to imprints of grasps beside a load cell: `V = c F` with c free for each grasp, the effects of the
+/// library in its order.
+#[derive(Clone, Copy)]
+pub struct ImprintFit {
+    /// It needs the times of the rows.
+    pub timed: bool,
+    /// Where it starts and what is free; the first free one says how large it is.
+    pub fit: fn(&GraspSpan) -> Fit,
+    /// Parameters that have the value of the first free one: what a volume does not tell apart.
+    pub alike: &'static [&'static str],
+    /// Values of references.
+    pub fixed: fn(&GraspSpan) -> Vec<Named>,
+    /// Bounds of a parameter in a fit, from those of the library.
+    pub bounds: fn(&GraspSpan, Bounds) -> Bounds,
+    /// Factor on the volume at so many seconds after the start of the grasp, of effects that have no hook for a volume.
+    pub factor: Option<fn(&[f64], f64) -> f64>,
+}
+
+impl ImprintFit {
+    /// No fit: what the specs fill in.
+    pub(super) const PLAIN: ImprintFit = ImprintFit {
+        timed: false,
+        fit: |_| Fit { starts: Vec::new(), free: Vec::new(), searched: 0 },
+        alike: &[],
+        fixed: |_| Vec::new(),
+        bounds: |_, library| library,
+        factor: None,
+    };
+}
+
 /// What has to be known of presses for an effect to show in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PressNeeds {

@@ -71,6 +71,10 @@ pub type NormalForceHook = fn(&[f64], f64, &GripPoint<'_>) -> f64;
 /// Changes the imprint volume: (parameters, volume so far in m3, normal force of the jaw in N) -> new one in m3.
 pub type ImprintHook = fn(&[f64], f64, f64) -> f64;
 
+/// Force that the imprints of one grasp show, from the readings of a load cell beside them: (parameters, times in s that rise,
+/// forces so far in N) -> new ones in N. Only measured grasps have such readings: a simulated grip holds its force.
+pub type GraspForceHook = fn(&[f64], &[f64], &[f64]) -> Vec<f64>;
+
 /// Turns a gel about its +x axis: (parameters, where) -> angle in rad. Positive angles bring its lower edge
 /// nearer to the part.
 pub type TiltHook = fn(&[f64], &GripPoint<'_>) -> f64;

@@ -1,7 +1,7 @@
 //! An imprint that grows with another power of the grip force than the first.
 
 use super::hooks::{positive, values};
-use super::{EffectSpec, Group, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, Group, ImprintFit, ParameterSpec};
 
 /// `imprint_nonlinearity`: `V = c F` becomes a power law through the same volume at `f_ref_n`. A Hertzian
 /// half-space under a sphere has 4/3; a thin layer on a hard backing has less than 1.
@@ -10,9 +10,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     group: Group::Jaws,
     about: "imprint volume as a power of the normal force",
     formula: "V = c f_ref_n (F_N / f_ref_n)^exponent",
-    source: "Hertz: 4/3 for a sphere; Wucherer et al. 2023 take 1, their images differ more at 55 N than at 25 N",
+    source: "Hertz: 4/3 for a sphere; Wucherer et al. 2023 take 1, their images differ more at 55 N than at 25 N; 0.5 to 1.2 on rigid objects in a GelSight Wedge",
     parameters: &[
-        ParameterSpec { name: "exponent", unit: "1", neutral: 1.0, bounds: (0.6, 1.5), about: "exponent" },
+        ParameterSpec { name: "exponent", unit: "1", neutral: 1.0, bounds: (0.4, 1.5), about: "exponent" },
         ParameterSpec {
             name: "f_ref_n",
             unit: "N",
@@ -30,6 +30,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     typical: &[("exponent", 0.85)],
     not_on_elastic_gel: Some("changes the imprint constant, which an elastic gel does not use"),
     pulls: Err("it changes imprints, which labels of a constant coefficient do not feel"),
+    imprints: Some(ImprintFit {
+        fit: |_| Fit::new(&[&[("exponent", 0.8)], &[("exponent", 1.15)]], &[("exponent", 0.1)]),
+        fixed: |span| vec![("f_ref_n", span.middle_n.clamp(1.0, 500.0))],
+        ..ImprintFit::PLAIN
+    }),
+    experiments: &[Experiment::ForceLadder],
     ..EffectSpec::BARE
 };
 

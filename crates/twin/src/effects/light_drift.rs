@@ -1,7 +1,7 @@
 //! Lights whose brightness drifts with the clock.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ImprintFit, ParameterSpec, PressFit};
 use crate::OpticsState;
 
 /// `light_drift`: every channel is multiplied, with and without contact, by a factor that starts at 1 and changes
@@ -26,7 +26,20 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         drawn: false,
         ..PressFit::DRAWN
     }),
-    experiments: &[Experiment::FrameWithoutContact, Experiment::FirstPressAgain],
+    // A volume that was integrated from colours grows with the light, whatever its colour; what came before a grasp is in its c.
+    imprints: Some(ImprintFit {
+        timed: true,
+        fit: |span| {
+            let scale = 180.0 / span.longest_s.max(1e-3);
+            Fit::new(&[&[("red_per_h", scale)], &[("red_per_h", -scale)]], &[("red_per_h", scale)])
+        },
+        alike: &["green_per_h", "blue_per_h"],
+        // Half of the light over a grasp of seconds is far more in an hour.
+        bounds: |span, library| super::wider(library, 1800.0 / span.longest_s.max(1e-3)),
+        factor: Some(|parameters, time_s| (1.0 + parameters[0] * (time_s / 3600.0)).max(0.0)),
+        ..ImprintFit::PLAIN
+    }),
+    experiments: &[Experiment::FrameWithoutContact, Experiment::FirstPressAgain, Experiment::LongHold],
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,7 @@
 //! What stands in the file of an effect: all that anybody knows of it.
 
 use super::{
-    CommandHook, Experiment, FrictionHook, ImprintHook, Named, NormalForceHook, OpticsHook, PressFit,
+    CommandHook, Experiment, FrictionHook, GraspForceHook, ImprintFit, ImprintHook, Named, NormalForceHook, OpticsHook, PressFit,
     PullFit, SensorHook, TableFit, TiltHook,
 };
 use std::fmt;
@@ -126,6 +126,8 @@ pub struct EffectSpec {
     pub table: Option<TableFit>,
     /// How it is fitted to presses, if they can show it.
     pub presses: Option<PressFit>,
+    /// How it is fitted to imprints of grasps beside a load cell, if they can show it.
+    pub imprints: Option<ImprintFit>,
     /// Experiments that show it.
     pub experiments: &'static [Experiment],
     /// Experiments that leave it as it is while they show its rivals.
@@ -136,6 +138,8 @@ pub struct EffectSpec {
     pub normal_force: Option<NormalForceHook>,
     /// Acts on the imprint volume of a jaw.
     pub imprint_volume: Option<ImprintHook>,
+    /// Acts on the force that imprints show beside readings of a load cell.
+    pub grasp_force: Option<GraspForceHook>,
     /// Acts on the angle of a gel.
     pub tilt_rad: Option<TiltHook>,
     /// Acts on the readings of the wrist sensor.
@@ -173,11 +177,13 @@ impl EffectSpec {
         pulls: Err("it changes images, and nothing that is felt"),
         table: None,
         presses: None,
+        imprints: None,
         experiments: &[],
         not_shown_by: &[],
         friction: None,
         normal_force: None,
         imprint_volume: None,
+        grasp_force: None,
         tilt_rad: None,
         sensor: None,
         command: None,
@@ -215,6 +221,7 @@ impl EffectSpec {
             (self.friction.is_some(), "friction coefficient of a jaw"),
             (self.normal_force.is_some(), "normal force of a jaw"),
             (self.imprint_volume.is_some(), "imprint volume"),
+            (self.grasp_force.is_some(), "force that imprints show beside a load cell"),
             (self.tilt_rad.is_some(), "angle of the gels"),
             (self.sensor.is_some(), "readings of the wrist sensor"),
             (self.command.is_some(), "command of the force loop"),

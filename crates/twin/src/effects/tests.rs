@@ -78,6 +78,15 @@ fn each_call(spec: &EffectSpec, parameters: &[f64], mut check: impl FnMut(&str, 
             }
         }
     }
+    if let Some(hook) = spec.grasp_force {
+        let time_s: Vec<f64> = (0..FORCES_N.len()).map(|i| 0.07 * i as f64).collect();
+        let held = [40.0; FORCES_N.len()];
+        for force_n in [&FORCES_N, &held] {
+            for (before, after) in force_n.iter().zip(hook(parameters, &time_s, force_n)) {
+                check("grasp_force", *before, after);
+            }
+        }
+    }
     if let Some(hook) = spec.command {
         for desired_n in FORCES_N {
             FORCES_N.iter().for_each(|&m| check("command", desired_n, hook(parameters, desired_n, m)));
