@@ -1,5 +1,6 @@
 //! Diagnoses: measurements and a twin in, an answer and a better twin out. One file per channel.
 
+mod imprints;
 mod measured_presses;
 mod next;
 mod presses;
@@ -7,6 +8,9 @@ mod pull_report;
 mod pulls;
 mod sensor;
 
+pub use imprints::{
+    calibrate_imprint_table, compare_imprint_table, diagnose_imprint_table, imprint_calibration_edits,
+};
 pub use measured_presses::{MeasuredPresses, diagnose_measured_presses, measured_presses};
 pub use next::NextPulls;
 pub use presses::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses};

@@ -56,6 +56,7 @@ mod gpu;
 mod gripped;
 mod hold;
 mod imprint;
+mod imprint_set;
 mod init;
 mod levels;
 mod library;
@@ -96,8 +97,9 @@ pub use compare_images::{CompareImagesError, ImageComparison, ImageScore, compar
 pub use compare_report::{pull_comparison_page, pull_ratios};
 pub use diagnose::{
     MeasuredPresses, NextPulls, PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions,
-    calibrate_sensor_table, compare_sensor_table, diagnose_measured_presses, diagnose_presses,
-    diagnose_pull_table, diagnose_sensor_table, given_model, is_sensor_table, load_sensor_table,
+    calibrate_imprint_table, calibrate_sensor_table, compare_imprint_table, compare_sensor_table,
+    diagnose_imprint_table, diagnose_measured_presses, diagnose_presses, diagnose_pull_table,
+    diagnose_sensor_table, given_model, imprint_calibration_edits, is_sensor_table, load_sensor_table,
     measured_presses, sensor_calibration_edits,
 };
 pub use generate::{GripImprints, StartedPull, generate, press_only, simulate, start_pull};
@@ -110,6 +112,7 @@ pub use gripgen_twin as twin;
 pub use imprint::{
     CalibrateImprintsError, ImprintCalibration, ImprintCalibrations, ImprintImagesError, calibrate_imprints,
 };
+pub use imprint_set::{ImprintSet, LoadImprintsError, imprint_data, is_imprint_set, load_imprint_set};
 pub use init::{
     InitError, NoGrip, PartOptions, PartStarter, Proposal, StarterFile, Varied, part_starter, starter,
 };

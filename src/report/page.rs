@@ -29,7 +29,7 @@ pub(super) const SENTENCE: usize = 600;
 /// was left out is said.
 pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
     let (d, report) = (&diagnosed.diagnosis, &diagnosed.report);
-    let floor = d.noise_floor_n.or(d.noise_floor_mse);
+    let floor = d.noise_floor_n.or(d.noise_floor_mse).or(d.noise_floor_mm3);
     let unit = if report.error_unit.is_empty() { error_unit(d.channel) } else { &report.error_unit };
     let said = if report.sentence.is_empty() { sentence(d) } else { report.sentence.clone() };
     let page = json!({
@@ -104,12 +104,15 @@ fn facts(d: &Diagnosis, floor: Option<f64>, unit: &str) -> Vec<Value> {
         Channel::Pulls => "pulls",
         Channel::Sensor => "force-sensor table",
         Channel::Presses => "tactile presses",
+        Channel::Imprints => "imprints of grasps",
     };
     let counts = [
         (d.data.pulls, "pulls"),
         (d.data.traces, "with a trace"),
         (d.data.rows, "rows"),
         (d.data.presses, "presses"),
+        (d.data.imprints, "imprints"),
+        (d.data.grasps, "grasps"),
     ];
     let size: Vec<String> = counts.iter().filter_map(|(n, what)| n.map(|n| format!("{n} {what}"))).collect();
     let mut facts =
@@ -131,7 +134,9 @@ fn error_bars(d: &Diagnosis) -> Option<Vec<Bar>> {
     let mut bars = Vec::new();
     for (name, pair) in pairs.into_iter().filter_map(|(name, pair)| Some((name, pair?))) {
         for (after, error) in [(false, pair.before), (true, pair.after)] {
-            let Some(value) = error.rmse_n.or(error.mse).filter(|v| v.is_finite()) else { continue };
+            let Some(value) = error.rmse_n.or(error.mse).or(error.rmse_mm3).filter(|v| v.is_finite()) else {
+                continue;
+            };
             let name = format!("held-out {name}, {}", if after { "after" } else { "before" });
             bars.push(Bar { name, after, value, interval: (error.low90, error.high90) });
         }

@@ -8,6 +8,7 @@ pub(super) fn error_unit(channel: Channel) -> &'static str {
     match channel {
         Channel::Pulls | Channel::Sensor => "N",
         Channel::Presses => "grey levels\u{b2}",
+        Channel::Imprints => "mm\u{b3}",
     }
 }
 
@@ -67,7 +68,7 @@ fn list(names: &[&str]) -> String {
 }
 
 fn value(e: &HeldOutError, channel: Channel) -> Option<String> {
-    let value = e.rmse_n.or(e.mse).filter(|v| v.is_finite())?;
+    let value = e.rmse_n.or(e.mse).or(e.rmse_mm3).filter(|v| v.is_finite())?;
     Some(format!("{} {}", number(value), error_unit(channel)))
 }
 
@@ -83,6 +84,6 @@ fn change(d: &Diagnosis, what: &str) -> String {
 }
 
 fn floor(d: &Diagnosis) -> String {
-    let floor = d.noise_floor_n.or(d.noise_floor_mse).filter(|v| v.is_finite());
+    let floor = d.noise_floor_n.or(d.noise_floor_mse).or(d.noise_floor_mm3).filter(|v| v.is_finite());
     floor.map(|v| format!(" (noise floor {} {})", number(v), error_unit(d.channel))).unwrap_or_default()
 }

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 fn held_out(rmse: f64) -> HeldOutError {
     let (low90, high90, mape_pct) = (0.9 * rmse, 1.1 * rmse, Some(6.0 * rmse));
-    HeldOutError { rmse_n: Some(rmse), mse: None, low90, high90, mape_pct }
+    HeldOutError { rmse_n: Some(rmse), mse: None, rmse_mm3: None, low90, high90, mape_pct }
 }
 
 fn estimate(value: f64, unit: &str) -> ParameterEstimate {
@@ -34,6 +34,7 @@ fn diagnosis() -> Diagnosis {
         },
         noise_floor_n: Some(0.31),
         noise_floor_mse: None,
+        noise_floor_mm3: None,
         verdict: Verdict::Effect,
         effects: vec![NamedEffect {
             name: "wear".into(),

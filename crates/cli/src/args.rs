@@ -7,7 +7,9 @@ mod try_part;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
-pub use identify::{CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, DiagnoseArgs};
+pub use identify::{
+    CalibrateImprintsArgs, CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, ConstantOf, DiagnoseArgs,
+};
 pub use render::RenderArgs;
 pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigServeArgs, RigTeachArgs};
 use std::path::PathBuf;
@@ -256,6 +258,8 @@ pub enum CalibrateCommand {
     Pulls(CalibratePullsArgs),
     /// Fit gain and offset of a force sensor to a table beside a reference.
     Sensor(CalibrateSensorArgs),
+    /// Fit the imprint constant of each part to grasps beside the normal force of the jaw.
+    Imprints(CalibrateImprintsArgs),
 }
 
 /// `gripgen calibrate presses`
@@ -287,7 +291,7 @@ pub struct CalibratePressesArgs {
 #[derive(Debug, Args)]
 pub struct CompareArgs {
     /// Pulls: a run folder, or a folder with pulls.csv; images that they have are compared too. Presses: Taxim's dataPack.npz, or
-    /// a folder with presses.csv and images. A force-sensor table: a folder with sensor.csv.
+    /// a folder with presses.csv and images. A force-sensor table: a folder with sensor.csv. Imprints: a folder with imprints.csv.
     pub measured: PathBuf,
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]
@@ -295,7 +299,7 @@ pub struct CompareArgs {
     /// Of pulls: take those whose label is suspect too: evidence that was recorded contradicts it.
     #[arg(long)]
     pub include_suspect: bool,
-    /// Of presses: a sensor file.
+    /// Of presses, and of imprints with images: a sensor file.
     #[arg(long, value_name = "FILE.npz")]
     pub sensor: Option<String>,
     /// A twin; its left sensor is taken where --sensor is left out.

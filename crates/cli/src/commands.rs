@@ -1,6 +1,7 @@
 //! One file a verb.
 
 pub mod bench;
+pub mod calibrate_imprints;
 pub mod calibrate_presses;
 pub mod calibrate_pulls;
 pub mod calibrate_sensor;
@@ -13,6 +14,7 @@ pub mod completions;
 pub mod diagnose;
 pub mod effects;
 pub mod export;
+pub mod imprints;
 pub mod info;
 mod info_pulls;
 pub mod init;

@@ -70,6 +70,7 @@ fn execute(cli: &Cli) -> Result<u8, Failure> {
         Command::Export(args) => commands::export::run(args),
         Command::Calibrate(CalibrateCommand::Presses(args)) => commands::calibrate_presses::run(args),
         Command::Calibrate(CalibrateCommand::Pulls(args)) => commands::calibrate_pulls::run(args),
+        Command::Calibrate(CalibrateCommand::Imprints(args)) => commands::calibrate_imprints::run(args),
         Command::Calibrate(CalibrateCommand::Sensor(args)) => commands::calibrate_sensor::run(args),
         Command::Rig(RigCommand::Check(args)) => commands::rig::check::run(args),
         Command::Rig(RigCommand::Pull(args)) => commands::rig::pull::run(args),

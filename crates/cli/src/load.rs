@@ -52,7 +52,7 @@ pub fn no_pulls(paths: &[&Path], e: impl std::fmt::Display) -> Failure {
     if known {
         return failure;
     }
-    failure.hint("measurements are a folder with pulls.csv, sensor.csv or presses.csv, a run folder, or a dataPack.npz")
+    failure.hint("measurements are a folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, or a dataPack.npz")
 }
 
 /// Folders that are read as one campaign.

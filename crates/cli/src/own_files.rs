@@ -2,7 +2,7 @@
 
 use crate::mark::mark_of;
 use gripgen::CONTACT_SHEET;
-use gripgen::record::{CAMPAIGN_FILE, PRESSES_FILE, PULLS_FILE, SENSOR_FILE, TRACES_FOLDER};
+use gripgen::record::{CAMPAIGN_FILE, IMPRINTS_FILE, PRESSES_FILE, PULLS_FILE, SENSOR_FILE, TRACES_FOLDER};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -38,7 +38,7 @@ pub fn owner(path: &Path, runs: &[&Path]) -> Option<String> {
     if let Some(above) = above.filter(|above| of_pulls && has(above, PULLS_FILE)) {
         return Some(measured(above));
     }
-    let tables = [SENSOR_FILE, PRESSES_FILE].into_iter().chain(OTHER_TABLES);
+    let tables = [SENSOR_FILE, PRESSES_FILE, IMPRINTS_FILE].into_iter().chain(OTHER_TABLES);
     for table in tables {
         if name == table && has(folder, table) {
             return Some(measured(folder));

@@ -17,6 +17,8 @@ pub enum Channel {
     Sensor,
     /// Presses of a ball on a tactile sensor.
     Presses,
+    /// Imprints of grasps beside the normal force of the jaw.
+    Imprints,
 }
 
 /// The answer in a word.
@@ -48,6 +50,12 @@ pub struct DataSummary {
     /// Presses, of the press channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub presses: Option<usize>,
+    /// Imprints, of the imprint channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub imprints: Option<usize>,
+    /// Their grasps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grasps: Option<usize>,
     /// Hash of the data.
     pub sha256: String,
     /// Names of observations that fit nothing and were given little weight: worst first.
@@ -169,6 +177,9 @@ pub struct HeldOutError {
     /// Mean squared error, of images in grey levels squared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mse: Option<f64>,
+    /// Root of the mean squared error, of volumes of imprints in mm^3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse_mm3: Option<f64>,
     /// Lower end of its 90 % interval.
     pub low90: f64,
     /// Upper end of its 90 % interval.
@@ -226,6 +237,9 @@ pub struct Diagnosis {
     /// Mean squared scatter that no model of this kind can predict, of images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_floor_mse: Option<f64>,
+    /// Scatter of a volume from row to row, of imprints in mm^3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor_mm3: Option<f64>,
     /// The answer in a word.
     pub verdict: Verdict,
     /// Effects that act, by weight.
@@ -262,6 +276,7 @@ impl Diagnosis {
             data,
             noise_floor_n: None,
             noise_floor_mse: None,
+            noise_floor_mm3: None,
             verdict: Verdict::Insufficient,
             effects: Vec::new(),
             unknown: Vec::new(),

@@ -24,6 +24,7 @@ mod diagnosis;
 mod draws;
 mod grouped;
 mod imprint;
+mod imprints;
 mod least_squares;
 mod permutation;
 mod plain;
@@ -43,6 +44,11 @@ pub use grouped::{
     held_out_costs, t_quantile_95,
 };
 pub use imprint::{FittedPress, ImprintEstimate, imprint_constant};
+pub use imprints::{
+    GraspConstant, ImprintComparison, ImprintConstants, ImprintData, ImprintDiagnosis, ImprintEvidence,
+    ImprintRow, MeasuredGrasp, PartConstant, SharedConstant, calibrate_imprint_set, compare_imprints,
+    diagnose_imprints,
+};
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
 pub use plain::plain;

@@ -63,11 +63,12 @@ fn unknown(d: &Diagnosis) -> String {
 
 fn error(d: &Diagnosis) -> String {
     let Some(error) = &d.error else { return String::new() };
-    let of = |e: &HeldOutError| e.rmse_n.or(e.mse).filter(|v| v.is_finite());
+    let of = |e: &HeldOutError| e.rmse_n.or(e.mse).or(e.rmse_mm3).filter(|v| v.is_finite());
     let (Some(before), Some(after)) = (of(&error.before), of(&error.after)) else { return String::new() };
     let (what, unit) = match d.channel {
         Channel::Pulls | Channel::Sensor => ("prediction error", "N"),
         Channel::Presses => ("mean squared error of the images", "grey levels\u{b2}"),
+        Channel::Imprints => ("prediction error of the volume", "mm\u{b3}"),
     };
     match d.verdict {
         Verdict::None => format!(" The {what} is {after:.2} {unit}."),

@@ -1,8 +1,9 @@
 //! A folder with `imprints.csv`: imprints of grasps beside the normal force of the jaw, without a pull.
 
 use crate::folder::sha256_hex;
+use crate::presses::picture;
 use crate::table::{Row, TableError, TableReader, TextCells, read_bytes};
-use gripgen_twin::Values;
+use gripgen_twin::{TactileImage, Values};
 use std::path::Path;
 
 /// The table of a folder of imprints.
@@ -56,6 +57,14 @@ pub struct ImprintTable {
 pub fn read_imprint_table(folder: &Path) -> Result<ImprintTable, TableError> {
     let path = folder.join(IMPRINTS_FILE);
     parse(&path, &read_bytes(&path)?)
+}
+
+/// Reads a picture that a table of imprints names. It is PNG: a JPEG moves colours by as much as a light contact does.
+///
+/// # Errors
+/// [`TableError`] with the path.
+pub fn read_imprint_picture(folder: &Path, name: &str) -> Result<TactileImage, TableError> {
+    picture(&folder.join(name))
 }
 
 /// Where the columns stand.
@@ -145,7 +154,8 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<ImprintTable, TableError> {
             return Err(row.bad(places.id, "a name"));
         }
         if !ids.insert(id.to_string()) {
-            let problem = format!("line {}, `imprint_id` is `{id}`, as in a row before; each needs its own", row.line);
+            let problem =
+                format!("line {}, `imprint_id` is `{id}`, as in a row before; each needs its own", row.line);
             return Err(TableError::Rows { path: path.into(), problem });
         }
         let force_n = row.number(places.force, "the normal force of the jaw in N, a finite number")?;
@@ -228,7 +238,10 @@ mod tests {
             ("imprint_id,grip_force_n,volume_mm3\na,x,1\n", "line 2, `grip_force_n` is `x`"),
             ("imprint_id,grip_force_n,volume_mm3\na,1,\n", "a row needs `volume_mm3` or `image`"),
             ("imprint_id,grip_force_n,volume_mm3\na,1,NaN\n", "`volume_mm3` is `NaN`"),
-            ("imprint_id,grip_force_n,volume_mm3\na,1,1\na,2,2\n", "line 3, `imprint_id` is `a`, as in a row before"),
+            (
+                "imprint_id,grip_force_n,volume_mm3\na,1,1\na,2,2\n",
+                "line 3, `imprint_id` is `a`, as in a row before",
+            ),
             (
                 "imprint_id,grip_force_n,volume_mm3,grasp,time_s\na,1,1,g,1\nb,2,2,h,0\nc,2,2,g,1\n",
                 "line 4, `time_s` is 1 after 1 in grasp `g`",

@@ -49,7 +49,9 @@ pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
     sha256_hex,
 };
-pub use imprint_table::{IMPRINTS_FILE, ImprintTable, MeasuredImprint, read_imprint_table};
+pub use imprint_table::{
+    IMPRINTS_FILE, ImprintTable, MeasuredImprint, read_imprint_picture, read_imprint_table,
+};
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
 pub use mark::{MARK_NAME, parquet_mark, png_mark, png_with_mark};
 pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};

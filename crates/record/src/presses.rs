@@ -165,7 +165,7 @@ fn measured(cell: &str, column: &str) -> Result<Option<f64>, &'static str> {
     }
 }
 
-fn picture(path: &Path) -> Result<TactileImage, TableError> {
+pub(crate) fn picture(path: &Path) -> Result<TactileImage, TableError> {
     let bytes = read_bytes(path)?;
     if is_jpeg(&bytes) {
         return Err(TableError::Jpeg { path: path.into() });

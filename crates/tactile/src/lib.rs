@@ -61,6 +61,7 @@ mod sensor;
 mod shading;
 mod shadow;
 mod simd;
+mod volume;
 
 pub use appearance::appearance;
 pub use colour::{ColourModel, Lambert, Light, Regressor, TaximTable, shade};
@@ -78,3 +79,4 @@ pub use render::Renderer;
 pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError, SensorFiles};
 pub use shadow::{BallPress, Relief, Shadow, ShadowKind, ShadowTable, shadow, shadow_from_presses};
 pub use simd::SimdLevel;
+pub use volume::{VolumeError, VolumeReader};

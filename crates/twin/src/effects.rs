@@ -22,13 +22,13 @@ mod tests;
 pub use chain::{CommandChain, SensorChain, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 pub use experiment::{Experiment, Measured, separating};
 pub use fit::{
-    Bounds, FORCE_RATE, Fit, GraspSpan, Grid, ImprintFit, Named, PressFit, PressNeeds, PullFit, PullSpan, REFERENCE_FORCE, TableFit,
-    TableSpan,
+    Bounds, FORCE_RATE, Fit, GraspSpan, Grid, ImprintFit, Named, PressFit, PressNeeds, PullFit, PullSpan,
+    REFERENCE_FORCE, TableFit, TableSpan,
 };
 use fit::{log_spaced, wider};
 pub use hooks::{
-    CommandHook, FrictionHook, GraspForceHook, GripPoint, ImprintHook, NormalForceHook, OpticsHook, SensorHook, SensorMemory,
-    SensorPoint, TiltHook,
+    CommandHook, FrictionHook, GraspForceHook, GripPoint, ImprintHook, NormalForceHook, OpticsHook,
+    SensorHook, SensorMemory, SensorPoint, TiltHook,
 };
 pub use spec::{EffectSpec, Group, ParameterSpec, Visible};
 

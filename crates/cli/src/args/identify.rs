@@ -64,10 +64,47 @@ pub struct CalibrateSensorArgs {
     pub talk: TalkArgs,
 }
 
+/// `gripgen calibrate imprints`
+#[derive(Debug, Args)]
+pub struct CalibrateImprintsArgs {
+    /// A folder with imprints.csv.
+    pub measured: PathBuf,
+    /// Of rows with an image: the sensor file through which volumes are read.
+    #[arg(long, value_name = "FILE.npz")]
+    pub sensor: Option<String>,
+    /// What has a constant of its own; that of a part is then the mean over its grasps.
+    #[arg(long, value_name = "WHAT", default_value = "grasp")]
+    pub constant: ConstantOf,
+    /// The part of rows that name none.
+    #[arg(long, value_name = "PART")]
+    pub part: Option<String>,
+    /// The twin to start from.
+    #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]
+    pub twin: String,
+    /// The twin to write.
+    #[arg(short, long, value_name = "FILE.toml")]
+    pub out: Option<PathBuf>,
+    /// JSON: the constants of parts and grasps.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// What has an imprint constant of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ConstantOf {
+    /// Each grasp.
+    Grasp,
+    /// Each part: all its rows have one constant.
+    Part,
+}
+
 /// `gripgen diagnose`
 #[derive(Debug, Args)]
 pub struct DiagnoseArgs {
-    /// A folder with pulls.csv, sensor.csv or presses.csv, a run folder, or a dataPack.npz.
+    /// A folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, or a dataPack.npz.
     pub measured: PathBuf,
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]
@@ -84,7 +121,7 @@ pub struct DiagnoseArgs {
     /// Plan only what this rig's gripper can do (the rig.toml of `gripgen rig pull`).
     #[arg(long, value_name = "RIG.toml")]
     pub rig: Option<String>,
-    /// Of presses: a sensor file in place of the twin's.
+    /// Of presses: a sensor file in place of the twin's. Of imprints with images: the sensor file through which volumes are read.
     #[arg(long, value_name = "FILE.npz")]
     pub sensor: Option<String>,
     /// Of pulls: effects that must not be named, because something else is known to rule them out.

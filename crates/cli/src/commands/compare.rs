@@ -3,6 +3,7 @@
 use crate::args::CompareArgs;
 use crate::commands::compare_images::{images_json, images_table};
 use crate::commands::compare_sensor;
+use crate::commands::imprints;
 use crate::failure::Failure;
 use crate::load::{
     folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls, say_circles, suspects,
@@ -14,7 +15,8 @@ use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
     LabelErrors, PartRatio, PressReportText, compare_images, compare_pulls, find_circles_with_sensor,
-    is_press_set, is_sensor_table, load_pulls_with, press_report, pull_comparison_page, pull_ratios,
+    is_imprint_set, is_press_set, is_sensor_table, load_pulls_with, press_report, pull_comparison_page,
+    pull_ratios,
 };
 use serde_json::{Value, json};
 
@@ -23,8 +25,9 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
     if !args.measured.exists() {
         return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
     }
-    if args.report.is_some() && is_sensor_table(&args.measured) {
-        return Err(Failure::usage("--report: a comparison with a force-sensor table has no page")
+    let is_table = is_sensor_table(&args.measured) || is_imprint_set(&args.measured);
+    if args.report.is_some() && is_table {
+        return Err(Failure::usage("--report: a comparison with a table has no page")
             .hint("`gripgen diagnose FOLDER --report FILE.html` draws one of such a table"));
     }
     let mut outputs = Outputs::of("compare", args.json.force)
@@ -34,7 +37,9 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
         .reads_config(&args.twin, &[]);
     outputs.allow_all(args.report.as_deref())?;
     let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
-    if is_sensor_table(&args.measured) {
+    if is_imprint_set(&args.measured) {
+        imprints::compare(args, sink)
+    } else if is_sensor_table(&args.measured) {
         compare_sensor::run(args, sink)
     } else if is_press_set(&args.measured) {
         presses(args, &outputs, sink)

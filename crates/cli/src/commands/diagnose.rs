@@ -4,6 +4,7 @@ pub mod output;
 mod presses;
 
 use crate::args::{DiagnoseArgs, TalkArgs};
+use crate::commands::imprints;
 use crate::failure::Failure;
 use crate::load::{folders, jobs, load_library, load_twin, no_pulls, suspects, within_rig};
 use crate::output::JsonSink;
@@ -13,7 +14,7 @@ use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
 use gripgen::{
     Diagnosed, Library, PullDiagnoseOptions, Suspects, diagnose_pull_table, diagnose_sensor_table,
-    is_press_set, is_sensor_table, load_pulls_with, load_sensor_table,
+    is_imprint_set, is_press_set, is_sensor_table, load_pulls_with, load_sensor_table,
 };
 use std::path::Path;
 
@@ -32,6 +33,8 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
     let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let diagnosed = if is_press_set(&args.measured) {
         presses::presses(args)?
+    } else if is_imprint_set(&args.measured) {
+        imprints::diagnose(args)?
     } else if is_sensor_table(&args.measured) {
         sensor(args)?
     } else {

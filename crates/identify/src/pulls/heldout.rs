@@ -163,6 +163,7 @@ pub fn errors(
         HeldOutError {
             rmse_n: Some(own),
             mse: None,
+            rmse_mm3: None,
             low90: new(found[RESAMPLES / 20]),
             high90: new(found[RESAMPLES - 1 - RESAMPLES / 20]),
             mape_pct: Some(100.0 * relative / known.len() as f64),

@@ -134,6 +134,7 @@ fn summary(ws: &Workspace<'_>, by_unit: &[f64], y: &[f64]) -> HeldOutError {
     HeldOutError {
         rmse_n: Some(rmse),
         mse: None,
+        rmse_mm3: None,
         low90: rmse * libm::exp(-half),
         high90: rmse * libm::exp(half),
         mape_pct: None,

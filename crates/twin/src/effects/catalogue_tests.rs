@@ -179,6 +179,7 @@ fn experiments_separate_what_they_show_from_what_they_leave() {
                 Measured::Pulls => spec.pulls.is_ok(),
                 Measured::SensorTable => spec.table.is_some(),
                 Measured::Presses => spec.presses.is_some(),
+                Measured::Imprints => spec.imprints.is_some(),
             };
             assert!(fits, "{}: {experiment:?}", spec.id);
         }

@@ -1,8 +1,8 @@
 //! What stands in the file of an effect: all that anybody knows of it.
 
 use super::{
-    CommandHook, Experiment, FrictionHook, GraspForceHook, ImprintFit, ImprintHook, Named, NormalForceHook, OpticsHook, PressFit,
-    PullFit, SensorHook, TableFit, TiltHook,
+    CommandHook, Experiment, FrictionHook, GraspForceHook, ImprintFit, ImprintHook, Named, NormalForceHook,
+    OpticsHook, PressFit, PullFit, SensorHook, TableFit, TiltHook,
 };
 use std::fmt;
 

@@ -154,7 +154,7 @@ fn summary(diagnosis: &Diagnosis) -> String {
             error.heldout,
             one(&error.before),
             one(&error.after),
-            diagnosis.noise_floor_n.map_or(String::new(), |f| format!(", floor {f:.3} N"))
+            floor(diagnosis)
         );
     }
     if !diagnosis.data.outliers.is_empty() {
@@ -166,8 +166,17 @@ fn summary(diagnosis: &Diagnosis) -> String {
     text
 }
 
+fn floor(diagnosis: &Diagnosis) -> String {
+    let (n, mm3) = (diagnosis.noise_floor_n, diagnosis.noise_floor_mm3);
+    let text = n.map(|f| format!(", floor {f:.3} N")).or(mm3.map(|f| format!(", floor {f:.3} mm^3")));
+    text.unwrap_or_default()
+}
+
 fn one(error: &HeldOutError) -> String {
-    match (error.rmse_n, error.mse) {
+    match (error.rmse_n.or(error.rmse_mm3), error.mse) {
+        (Some(rmse), _) if error.rmse_mm3.is_some() => {
+            format!("{rmse:.3} mm^3 ({:.3} to {:.3})", error.low90, error.high90)
+        }
         (Some(rmse), _) => format!("{rmse:.3} N ({:.3} to {:.3})", error.low90, error.high90),
         (None, Some(mse)) => format!("{mse:.2} grey levels^2 ({:.2} to {:.2})", error.low90, error.high90),
         (None, None) => "not measured".into(),
