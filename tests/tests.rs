@@ -32,6 +32,8 @@ mod elastic;
 // Images by a graphics processor are those of the processor, within the tolerance.
 mod gpu;
 mod imprint;
+// Imprints of grasps without a pull.
+mod imprint_sets;
 // Parts of one's own.
 mod init;
 // Intervals of calibrations, against a lab of its own.
