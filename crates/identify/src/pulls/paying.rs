@@ -88,7 +88,7 @@ pub(super) fn by_chance(
 }
 
 /// Errors on held-out labels of the twin that is written for a fit, by pull. What traces show is held, which is fast.
-fn held_out(
+pub(super) fn held_out(
     context: &Context<'_>,
     fitted: &Fitted,
     repetitions: &[Vec<usize>],
@@ -123,11 +123,11 @@ fn readings(context: &Context<'_>, model: &PullModel) -> f64 {
     root_mean_square(context.trace_residuals(model, &rows).widened(Widening::NONE).into_iter())
 }
 
-fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = values.fold((0.0, 0_usize), |(sum, n), v| (sum + v * v, n + 1));
     (sum / n.max(1) as f64).sqrt()
 }
 
-fn share([before, after]: [f64; 2]) -> f64 {
+pub(super) fn share([before, after]: [f64; 2]) -> f64 {
     if before > 0.0 { 1.0 - after / before } else { 0.0 }
 }
