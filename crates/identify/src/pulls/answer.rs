@@ -11,7 +11,7 @@ use super::heldout::{
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::paying::{by_chance, paying};
 use super::power::ScoreTest;
-use super::residual::kept;
+use super::residual::{in_place_of_curves, kept};
 use super::ridge::ahead;
 use super::search::{Accepted, Search, TIED_WITHIN};
 use super::simulate::{recalibrate, trusted};
@@ -137,7 +137,15 @@ pub fn diagnose_pulls(
     if let Some(found) = &accepted.by_chance {
         diagnosis.hints.push(by_chance(&search, &before, found, &repetitions, &near));
     }
-    let left = kept(&search, &accepted.fitted, &repetitions, &near);
+    let mut left = None;
+    if !accepted.curves.is_empty() {
+        left = in_place_of_curves(&search, &accepted.fitted, &repetitions, &near);
+        if left.is_some() {
+            accepted.curves.clear();
+        }
+    }
+    let replaced = left.is_some();
+    let left = left.or_else(|| kept(&search, &accepted.fitted, &repetitions, &near));
     if let Some(left) = &left {
         accepted.fitted = left.fitted.clone();
     }
@@ -157,7 +165,7 @@ pub fn diagnose_pulls(
     }
     if let Some(left) = left {
         diagnosis.notes.push(learnt_text(&left.report));
-        if diagnosis.effects.is_empty() && diagnosis.unknown.is_empty() {
+        if replaced || (diagnosis.effects.is_empty() && diagnosis.unknown.is_empty()) {
             diagnosis.unknown = left.unknown;
         }
         diagnosis.residual = Some(left.report);

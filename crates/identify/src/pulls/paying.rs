@@ -7,6 +7,7 @@ use super::fitting::Fitted;
 use super::heldout::predicted;
 use super::model::PullModel;
 use super::search::{Accepted, ByChance, Search};
+use super::terms::Terms;
 use super::trace_residuals::Widening;
 use crate::diagnosis::Hint;
 
@@ -62,7 +63,44 @@ pub(super) fn paying(
         accepted.effects.remove(place);
         accepted.fitted = fewer;
     }
+    if let Some((accepted, hint)) = without_curve(search, before, &accepted, repetitions, rows, &sd_n) {
+        hints.push(hint);
+        return (accepted, hints);
+    }
     (accepted, hints)
+}
+
+/// The accepted model without its unnamed curves, if these do not pay.
+fn without_curve(
+    search: &Search<'_>,
+    before: &Fitted,
+    accepted: &Accepted,
+    repetitions: &[Vec<usize>],
+    rows: &[usize],
+    sd_n: &[f64],
+) -> Option<(Accepted, Hint)> {
+    let context = search.context;
+    let curve = &search.curves[*accepted.curves.first()?];
+    let fewer = if accepted.effects.is_empty() {
+        before.clone()
+    } else {
+        let terms = Terms { curves: vec![], ..accepted.fitted.terms.clone() };
+        context.fit(&before.model, &terms, &search.rows)?
+    };
+    let errors = [&fewer, &accepted.fitted].map(|f| held_out(context, f, repetitions, rows));
+    let plain = share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(_, e)| *e))));
+    let weighed =
+        share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(i, e)| e / sd_n[*i]))));
+    if plain.max(weighed) >= PAYS {
+        return None;
+    }
+    let reason = format!(
+        "it takes {:.1} % off the error on held-out pulls, a dependence needs {:.0} %",
+        100.0 * plain.max(weighed),
+        100.0 * PAYS
+    );
+    let hint = Hint { name: curve.name.clone(), gain: plain, reason };
+    Some((Accepted { fitted: fewer, curves: vec![], ..accepted.clone() }, hint))
 }
 
 /// What the best rival gained where it gains as much by chance.

@@ -10,6 +10,7 @@ use super::model::PullModel;
 use super::paying::{held_out, root_mean_square, share};
 use super::search::Search;
 use super::smooth::smooths;
+use super::terms::Terms;
 use crate::diagnosis::{Residual, UnknownCovariate};
 use nalgebra::{DMatrix, DVector};
 
@@ -136,7 +137,9 @@ pub(super) fn kept(
     if data.len() < MIN_PULLS || curves.is_empty() {
         return None;
     }
-    let plain = context.fit_again(&fitted.model, &fitted.terms, &search.rows)?;
+    // What traces show of signals stays as it is, which is fast.
+    let held = Terms { hold_signals: fitted.terms.act_on_signals(), ..fitted.terms.clone() };
+    let plain = context.fit_again(&fitted.model, &held, &search.rows)?;
     let left = grouped(context, &plain, &search.rows, &curves)?;
     let learnt = left.learn();
     if learnt.groups.is_empty() {
@@ -188,7 +191,42 @@ pub(super) fn kept(
     }
     strengths.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let report = Residual { gain, covariates: strengths.iter().map(|u| u.covariate.clone()).collect() };
-    Some(Kept { fitted: chosen, report, unknown: strengths })
+    let mut fitted = chosen;
+    fitted.terms.hold_signals = false;
+    Some(Kept { fitted, report, unknown: strengths })
+}
+
+/// A residual in the place of the unnamed curves of `fitted`, where it predicts pulls and sessions that were held out better together:
+/// a curve of few knots, or one at one word, may stand for several columns.
+pub(super) fn in_place_of_curves(
+    search: &Search<'_>,
+    fitted: &Fitted,
+    repetitions: &[Vec<usize>],
+    near: &[usize],
+) -> Option<Kept> {
+    let context = search.context;
+    let terms = Terms { curves: vec![], hold_signals: fitted.terms.act_on_signals(), ..fitted.terms.clone() };
+    let bare = context.fit(&fitted.model, &terms, &search.rows)?;
+    let found = kept(search, &bare, repetitions, near)?;
+    let error =
+        |f: &Fitted| root_mean_square(held_out(context, f, repetitions, near).into_iter().map(|(_, e)| e));
+    let pulls = error(&found.fitted) / error(fitted).max(1e-300);
+    let session: Vec<u64> = context.data.session_of.iter().map(|&s| s as u64).collect();
+    let sessions = by_value(&session);
+    let together = if (3..=20).contains(&sessions.len()) {
+        pulls * error_on(context, &found.fitted, &sessions, near)
+            / error_on(context, fitted, &sessions, near).max(1e-300)
+    } else {
+        pulls
+    };
+    (together < 1.0 && pulls <= 1.0 + PAYS).then_some(found)
+}
+
+/// Error on sets that are held out, of the pulls of `near`.
+fn error_on(context: &Context<'_>, fitted: &Fitted, sets: &[Vec<usize>], near: &[usize]) -> f64 {
+    let labels = predicted(context, fitted, sets, true);
+    let known = near.iter().map(|&i| labels[i] - context.data.label_n[i]).filter(|e| e.is_finite());
+    root_mean_square(known)
 }
 
 /// Whether levels and sessions that were held out are predicted no worse with a residual, where there are enough of them.
@@ -200,11 +238,7 @@ fn holds(context: &Context<'_>, plain: &Fitted, with: &Fitted, near: &[usize]) -
         if !(3..=20).contains(&sets.len()) {
             return true;
         }
-        let errors = [plain, with].map(|f| {
-            let labels = predicted(context, f, sets, true);
-            let known = near.iter().map(|&i| labels[i] - data.label_n[i]).filter(|e| e.is_finite());
-            root_mean_square(known)
-        });
+        let errors = [plain, with].map(|f| error_on(context, f, sets, near));
         share(errors) >= -WORSE
     })
 }
