@@ -230,6 +230,7 @@ fn edits(
             .terms
             .curves
             .iter()
+            .chain(&fits.after.terms.learnt)
             .filter_map(|(curve, values)| table(curve, values, measured, &evidence)),
     );
     TwinEdits { values, effects: Some(effects) }

@@ -72,6 +72,7 @@ fn diagnosis() -> Diagnosis {
             },
         }),
         hints: Vec::new(),
+        residual: None,
         plain: None,
         notes: vec!["3 pulls were left out: they failed".into()],
     }

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import effects, physics, unknowns
+from . import effects, literature, physics, unknowns
 
 # Hidden in the labels by the free friction coefficient (or nearly so); the size is set by
 # convention from what a handful of traces show.
@@ -21,8 +21,12 @@ class Acting:
     constants: dict = field(default_factory=dict)
 
     def apply(self, pulls):
-        book = effects.LIBRARY if self.name in effects.LIBRARY else unknowns.UNKNOWN
-        book[self.name][0](pulls, self.size, self.constants)
+        book_of(self.name)[self.name][0](pulls, self.size, self.constants)
+
+
+def book_of(name):
+    """The table of functions that holds a name."""
+    return next(b for b in (effects.LIBRARY, unknowns.UNKNOWN, literature.BOOK) if name in b)
 
 
 def friction_of_parts(design, rng):

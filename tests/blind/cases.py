@@ -5,7 +5,7 @@ A none, B one library effect, C two, D outside the library, T tied by design, E 
 
 import numpy as np
 
-from . import effects, unknowns
+from . import effects, literature, unknowns
 
 SLOW_FAST = {"increments": [0.25, 1.0, 2.0], "steps": [0.104, 0.208]}
 # What a design needs so that the effect can show at all.
@@ -230,8 +230,55 @@ def one_session(i, rng):
     return {"group": "D", "kind": name, "acts": [(name, 3)], "design": fixed}
 
 
+def idle(i, rng):
+    """Nothing acts; of every other campaign some pulls have traces, whose zero wanders or whose steps are uneven."""
+    case = dict(nothing(i, rng), expected=True)
+    if i % 2:
+        case["design"]["traces"] = "fourth"
+        case.update([("wander_n", 0.15)] if i % 4 == 1 else [("jitter", 0.06)])
+    return case
+
+
+def formula(i, rng):
+    """One formula of the literature in 60 to 120 pulls, labels alone or an eighth of them traced."""
+    name = list(literature.BOOK)[i % len(literature.BOOK)]
+    needs = literature.BOOK[name][5]
+    fixed = dict(_extras(rng), count=int(rng.integers(60, 121)), parts=int(rng.integers(1, 3)),
+                 traces=str(rng.choice(["none", "few"])), distractors=list(literature.BOOK[name][4]))
+    return {"group": "L", "kind": name, "acts": [(name, None)], "design": {**fixed, **needs}, "expected": True}
+
+
+def awkward(i, rng):
+    """Three effects; one session or part; labels shifted or scaled against their traces; 12 to 24 pulls."""
+    kind = ["three", "one_session", "label_shift", "label_scale", "very_few"][i % 5]
+    if kind == "three":
+        case = three(int(rng.integers(len(PAIRS))), rng)
+        case["design"]["count"] = 160
+        case["design"]["traces"] = "few"
+        return dict(case, group="W", kind=kind, expected=True)
+    if kind == "one_session":
+        case = one_session(i // 5, rng)
+        case["design"]["traces"] = "few"
+        return dict(case, group="W", expected=True)
+    name = str(rng.choice(["load_offset", "wear", "temperature", "dwell_ageing"]))
+    fixed = dict(_extras(rng), parts=1, count=int(rng.integers(60, 121)), traces="fourth")
+    fixed.update({k: v for k, v in EXCITES[name].items() if k not in ("count", "parts")})
+    more = {"label_shift": {"label_shift_n": float(rng.uniform(-0.6, 0.6))}, "label_scale": {"label_scale": 1.03}}.get(kind, {})
+    if kind == "very_few":
+        fixed.update(count=int(rng.integers(12, 25)), traces="none")
+    return {"group": "W", "kind": kind, "acts": [(name, 3.0)], "design": fixed, "expected": True, **more}
+
+
+def plain(i, rng):
+    """Cases of the usual mix, smaller, with expected labels."""
+    case = [one, none, outside][i % 3](i, rng)
+    case["design"]["count"] = min(case["design"].get("count", 120), 120)
+    return dict(case, expected=True)
+
+
 MAKERS = {"A": none, "B": one, "C": two, "D": outside, "T": tied, "E": few,
-          "n": nothing, "s": small, "3": three, "o": one_session}
+          "n": nothing, "s": small, "3": three, "o": one_session,
+          "i": idle, "l": formula, "w": awkward, "p": plain}
 
 
 def class_of(name):

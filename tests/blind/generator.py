@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import campaigns, cases, effects, folders, ledger, physics, unknowns
+from . import campaigns, cases, effects, folders, ledger, literature, physics, unknowns
 
 UNSEEN = 120
 REPLICAS = 5
@@ -28,8 +28,11 @@ def build(case, seed, name, open_folder, sealed_folder):
     if share:
         bad = rng.random(n) < share
         factor = np.where(bad, factor * rng.uniform(0.45, 0.75, n), factor)
-    out = campaigns.run(world, mu, led, acting, factor)
+    out = campaigns.run(world, mu, _as_made(case, led, rng), acting, factor)
+    if case.get("wander_n"):
+        _wander(out, case["wander_n"] * ledger._slow(n, rng, 0.9))
     label, noisy = campaigns.labels(world, out, rng)
+    label = label * case.get("label_scale", 1.0) + case.get("label_shift_n", 0.0)
     if case.get("rounded_n"):
         label = np.round(label / case["rounded_n"]) * case["rounded_n"]
     seen = folders.measured_ledger(led, rng)
@@ -54,10 +57,29 @@ def build(case, seed, name, open_folder, sealed_folder):
     return folders.write_truth(hidden / "truth.json", _plain(truth))
 
 
+def _as_made(case, led, rng):
+    """The pulls as they were made, which is not quite what was written down: steps of another length."""
+    if not case.get("jitter"):
+        return led
+    spread = 1 + case["jitter"] * rng.standard_normal(len(led["pull_index"]))
+    return dict(led, step_time_s=led["step_time_s"] * np.clip(spread, 0.7, 1.3))
+
+
+def _wander(out, zero_n):
+    """The zero of the sensor, another one in each pull."""
+    out["force"] += zero_n[:, None].astype(np.float32)
+    out["idle"] += zero_n[:, None].astype(np.float32)
+
+
 def _acting(case, world, mu, led, design, rng):
     """Draws constants and sizes: the asked multiple of the detectable size, within bounds."""
     acting, told = [], []
     for name, multiple in case["acts"]:
+        if name in literature.BOOK:
+            acting.append(_formula(name, rng, design))
+            told.append({"name": name, "library": False, "size": acting[-1].size, "constants": acting[-1].constants,
+                         "multiple": float("nan"), "class": [], "always_tied": [], "accepted": literature.BOOK[name][3]})
+            continue
         known = name in effects.LIBRARY
         constant = (effects if known else unknowns).constants(name, rng, design)
         sign = cases.size_sign(name, rng)
@@ -72,6 +94,12 @@ def _acting(case, world, mu, led, design, rng):
             "accepted": [] if known else unknowns.UNKNOWN[name][3],
         })
     return acting, told
+
+
+def _formula(name, rng, design):
+    """A formula of the literature, its size drawn from its range."""
+    low, high = literature.BOOK[name][1:3]
+    return campaigns.Acting(name, float(rng.uniform(low, high)), literature.constants(name, rng, design))
 
 
 def _unseen(world, mu, design, acting, case, rng, place):
@@ -95,8 +123,29 @@ def _unseen(world, mu, design, acting, case, rng, place):
         draws.append(campaigns.labels(world, campaigns.run(world, mu, table, acting, factor), rng)[0])
     oracle = np.mean(draws[1:], axis=0)
     folders.write_campaign(place, folders.measured_ledger(table, rng), draws[0], design["distractors"], prefix="u")
+    if case.get("expected"):
+        few = {k: v[::2] for k, v in table.items()}
+        seen = folders.measured_ledger(few, rng)
+        mean = expected_labels(world, mu, few, acting, case, rng)
+        folders.write_campaign(place.parent / "expected", seen, mean, design["distractors"], prefix="e")
     others = REPLICAS - 1
     return float(np.sqrt(np.mean((draws[0] - oracle) ** 2) * others / (others + 1)))
+
+
+# Places of a standard normal variable that stand for a fifth of its values each.
+FIFTHS = [-1.3998, -0.5319, 0.0, 0.5319, 1.3998]
+
+
+def expected_labels(world, mu, table, acting, case, rng, draws=6):
+    """The mean label of each pull over scatter and noise: what nobody can predict better than."""
+    n = len(table["pull_index"])
+    total = np.zeros(n)
+    for z in FIFTHS:
+        factor = np.full(n, np.exp(1.04 * world.scatter * z - world.scatter**2 / 2))
+        out = campaigns.run(world, mu, table, acting, factor)
+        total += np.mean([campaigns.labels(world, out, rng)[0] for _ in range(draws)], axis=0)
+    mean = total / len(FIFTHS)
+    return mean * case.get("label_scale", 1.0) + case.get("label_shift_n", 0.0)
 
 
 def _plain(value):

@@ -107,6 +107,15 @@ pub struct Hint {
     pub reason: String,
 }
 
+/// What was learnt of the data without a name: it is in the twin as tables that are not physical.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Residual {
+    /// Share of the root mean squared error that it takes off data that were held out.
+    pub gain: f64,
+    /// The covariates it depends on, the strongest first; products as `a*b`.
+    pub covariates: Vec<String>,
+}
+
 /// An effect that the data do not tell from the one named.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rival {
@@ -260,6 +269,9 @@ pub struct Diagnosis {
     /// What looked like an effect and did not pay.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hints: Vec<Hint>,
+    /// What was learnt without a name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub residual: Option<Residual>,
     /// The answer in one sentence for a technician.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plain: Option<String>,
@@ -286,6 +298,7 @@ impl Diagnosis {
             baseline: BTreeMap::new(),
             error: None,
             hints: Vec::new(),
+            residual: None,
             plain: None,
             notes: Vec::new(),
         }
@@ -293,7 +306,8 @@ impl Diagnosis {
 
     /// Puts the verdict that follows from what was found: an effect before a dependence that none explains.
     pub fn conclude(&mut self) {
-        self.verdict = match (self.effects.is_empty(), self.unknown.is_empty()) {
+        let unexplained = !self.unknown.is_empty() || self.residual.is_some();
+        self.verdict = match (self.effects.is_empty(), !unexplained) {
             (false, _) => Verdict::Effect,
             (true, false) => Verdict::Unknown,
             (true, true) => Verdict::None,

@@ -11,6 +11,8 @@ use super::heldout::{
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::paying::{by_chance, paying};
 use super::power::ScoreTest;
+use super::residual::{in_place_of_curves, kept};
+use super::ridge::ahead;
 use super::search::{Accepted, Search, TIED_WITHIN};
 use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
@@ -18,7 +20,8 @@ use super::unknown::unknown;
 use super::words::separation;
 use super::zero_screen::{said, zeros_that_depend};
 use crate::diagnosis::{
-    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate, Rival, SeparateBy,
+    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate, Residual, Rival,
+    SeparateBy, UnknownCovariate,
 };
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::columns::covariates;
@@ -44,6 +47,9 @@ const BAD: f64 = 5.0;
 
 /// How many times the noise that a twin states labels have to show before it is said.
 const NOISIER: f64 = 1.6;
+
+/// How often chance lets the ridge be ahead by two standard errors.
+const RIVAL_P: f64 = 0.023;
 
 /// Odds are taken to this power, because no model here is exactly right.
 const TEMPER: f64 = 0.6;
@@ -131,6 +137,18 @@ pub fn diagnose_pulls(
     if let Some(found) = &accepted.by_chance {
         diagnosis.hints.push(by_chance(&search, &before, found, &repetitions, &near));
     }
+    let mut left = None;
+    if !accepted.curves.is_empty() {
+        left = in_place_of_curves(&search, &accepted.fitted, &repetitions, &near);
+        if left.is_some() {
+            accepted.curves.clear();
+        }
+    }
+    let replaced = left.is_some();
+    let left = left.or_else(|| kept(&search, &accepted.fitted, &repetitions, &near));
+    if let Some(left) = &left {
+        accepted.fitted = left.fitted.clone();
+    }
     // What is stated from here on is what a twin of these models says.
     let (before_context, stated_before) = context.stated(&before);
     let (after_context, after) = context.stated(&accepted.fitted);
@@ -143,6 +161,26 @@ pub fn diagnose_pulls(
         if let Some((column, word)) = &curve.only {
             let name = &curve.name;
             diagnosis.notes.push(format!("{name}: it was seen where {column} is {word}, and only there"));
+        }
+    }
+    if let Some(left) = left {
+        diagnosis.notes.push(learnt_text(&left.report));
+        if replaced || (diagnosis.effects.is_empty() && diagnosis.unknown.is_empty()) {
+            diagnosis.unknown = left.unknown;
+        }
+        diagnosis.residual = Some(left.report);
+    }
+    if let Some(rival) = ahead(&data, &heldout_after, &repetitions, &near) {
+        let names: Vec<&str> = rival.columns.iter().map(|c| c.0.as_str()).collect();
+        diagnosis.notes.push(format!(
+            "structure is left: a quadratic ridge on the table predicts held-out pulls better by {:.0} %, by {}",
+            100.0 * rival.share,
+            if names.is_empty() { "the grip force".into() } else { names.join(", ") },
+        ));
+        for (covariate, strength) in rival.columns {
+            if diagnosis.unknown.iter().all(|u| u.covariate != covariate) {
+                diagnosis.unknown.push(UnknownCovariate { covariate, strength, p_value: RIVAL_P });
+            }
         }
     }
     for zero in zeros_that_depend(&after_context, &after.model) {
@@ -221,6 +259,15 @@ pub fn diagnose_pulls(
         label_n: labels,
     };
     PullAnswer { diagnosis, fits: Some(fits) }
+}
+
+/// What is said of a residual that was learnt.
+fn learnt_text(residual: &Residual) -> String {
+    format!(
+        "beside what has a name, the error on held-out pulls falls by {:.0} % with what was learnt of {}: it stands in the twin as tables that are not physical",
+        100.0 * residual.gain,
+        residual.covariates.join(", ")
+    )
 }
 
 /// Standard deviations of labels, as a fit sees them.

@@ -155,8 +155,9 @@ impl Context<'_> {
             model.effects.push(candidate.with(&own));
         }
         model.factor.clear();
-        if !terms.curves.is_empty() {
+        if !terms.curves.is_empty() || !terms.learnt.is_empty() {
             let mut factor = vec![1.0; self.data.len()];
+            terms.learnt.iter().for_each(|(curve, values)| curve.apply(values, &[], &mut factor));
             let limits = if terms.curves.iter().any(|(c, _)| c.additive) {
                 self.predictor.limits_n(&model)
             } else {

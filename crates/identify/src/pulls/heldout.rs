@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::fitting::Fitted;
 use super::model::PullModel;
+use super::residual::learnt_again;
 use super::terms::Terms;
 use crate::diagnosis::{ErrorPair, HeldOutError};
 use crate::draws::Draws;
@@ -44,11 +45,14 @@ pub fn predicted(
 ) -> Vec<f64> {
     let n = context.data.len();
     let result = Mutex::new(vec![f64::NAN; n]);
-    let terms = &Terms { hold_signals, ..fitted.terms.clone() };
+    // What was learnt without a name is learnt again from the pulls of each fold.
+    let learns = !fitted.terms.learnt.is_empty();
+    let terms = &Terms { hold_signals, learnt: vec![], ..fitted.terms.clone() };
     context.predictor.for_each(held_out.len(), &|k| {
         let out = &held_out[k];
         let rows: Vec<usize> = (0..n).filter(|i| !out.contains(i)).collect();
         let Some(found) = context.fit_again(&fitted.model, terms, &rows) else { return };
+        let found = if learns { learnt_again(context, found, &rows, terms.learnt_share) } else { found };
         let mut model = found.model;
         model.scatter = scatter(&model, found.likelihood.scale);
         let labels = context.labels_n(&model, out);

@@ -7,6 +7,7 @@ use super::fitting::Fitted;
 use super::heldout::predicted;
 use super::model::PullModel;
 use super::search::{Accepted, ByChance, Search};
+use super::terms::Terms;
 use super::trace_residuals::Widening;
 use crate::diagnosis::Hint;
 
@@ -62,7 +63,44 @@ pub(super) fn paying(
         accepted.effects.remove(place);
         accepted.fitted = fewer;
     }
+    if let Some((accepted, hint)) = without_curve(search, before, &accepted, repetitions, rows, &sd_n) {
+        hints.push(hint);
+        return (accepted, hints);
+    }
     (accepted, hints)
+}
+
+/// The accepted model without its unnamed curves, if these do not pay.
+fn without_curve(
+    search: &Search<'_>,
+    before: &Fitted,
+    accepted: &Accepted,
+    repetitions: &[Vec<usize>],
+    rows: &[usize],
+    sd_n: &[f64],
+) -> Option<(Accepted, Hint)> {
+    let context = search.context;
+    let curve = &search.curves[*accepted.curves.first()?];
+    let fewer = if accepted.effects.is_empty() {
+        before.clone()
+    } else {
+        let terms = Terms { curves: vec![], ..accepted.fitted.terms.clone() };
+        context.fit(&before.model, &terms, &search.rows)?
+    };
+    let errors = [&fewer, &accepted.fitted].map(|f| held_out(context, f, repetitions, rows));
+    let plain = share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(_, e)| *e))));
+    let weighed =
+        share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(i, e)| e / sd_n[*i]))));
+    if plain.max(weighed) >= PAYS {
+        return None;
+    }
+    let reason = format!(
+        "it takes {:.1} % off the error on held-out pulls, a dependence needs {:.0} %",
+        100.0 * plain.max(weighed),
+        100.0 * PAYS
+    );
+    let hint = Hint { name: curve.name.clone(), gain: plain, reason };
+    Some((Accepted { fitted: fewer, curves: vec![], ..accepted.clone() }, hint))
 }
 
 /// What the best rival gained where it gains as much by chance.
@@ -88,7 +126,7 @@ pub(super) fn by_chance(
 }
 
 /// Errors on held-out labels of the twin that is written for a fit, by pull. What traces show is held, which is fast.
-fn held_out(
+pub(super) fn held_out(
     context: &Context<'_>,
     fitted: &Fitted,
     repetitions: &[Vec<usize>],
@@ -123,11 +161,11 @@ fn readings(context: &Context<'_>, model: &PullModel) -> f64 {
     root_mean_square(context.trace_residuals(model, &rows).widened(Widening::NONE).into_iter())
 }
 
-fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = values.fold((0.0, 0_usize), |(sum, n), v| (sum + v * v, n + 1));
     (sum / n.max(1) as f64).sqrt()
 }
 
-fn share([before, after]: [f64; 2]) -> f64 {
+pub(super) fn share([before, after]: [f64; 2]) -> f64 {
     if before > 0.0 { 1.0 - after / before } else { 0.0 }
 }

@@ -10,6 +10,10 @@ pub struct Terms {
     pub effects: Vec<(Candidate, Vec<f64>)>,
     /// Unnamed dependences with their coefficients.
     pub curves: Vec<(Curve, Vec<f64>)>,
+    /// What was learnt without a name: curves with coefficients that fits leave alone.
+    pub learnt: Vec<(Curve, Vec<f64>)>,
+    /// By how much it was shrunk, for who learns it again.
+    pub learnt_share: f64,
     /// Whether lag, dead time, kinetic ratio and what acts on signals stay as they are given, which makes fits of friction
     /// beside them fast.
     pub hold_signals: bool,
