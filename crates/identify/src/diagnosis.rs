@@ -211,6 +211,15 @@ pub struct ErrorReport {
     pub by: ErrorsBy,
 }
 
+/// A file of draws.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct PosteriorFile {
+    /// Its name: it lies beside the twin.
+    pub file: String,
+    /// Draws in it.
+    pub draws: usize,
+}
+
 /// The answer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -246,6 +255,9 @@ pub struct Diagnosis {
     /// What looked like an effect and did not pay.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hints: Vec<Hint>,
+    /// The draws of cause and parameters, where they were written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub posterior: Option<PosteriorFile>,
     /// The answer in one sentence for a technician.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plain: Option<String>,
@@ -271,6 +283,7 @@ impl Diagnosis {
             baseline: BTreeMap::new(),
             error: None,
             hints: Vec::new(),
+            posterior: None,
             plain: None,
             notes: Vec::new(),
         }

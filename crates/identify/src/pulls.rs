@@ -12,6 +12,7 @@ pub mod data;
 mod dynamics;
 mod estimates;
 pub mod few;
+pub mod few_diagnosis;
 pub mod fitting;
 pub mod heldout;
 pub mod intervals;

@@ -3,7 +3,8 @@
 //! A table of text, one draw in a row: `weight`, `cause`, then a column for each key of the twin. A cause is the ids of the effects
 //! that act, joined by `+`, or `none`. An effect whose cells are empty does not act in that draw.
 
-use crate::config::{ConfigError, assign};
+use crate::Twin;
+use crate::config::{ConfigError, assign, read_twin_table};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
@@ -57,6 +58,11 @@ impl Posterior {
         !key.contains([',', '"', '\n', '\r', '['])
     }
 
+    /// Name of the file beside a twin, from the name of the twin's.
+    pub fn name_beside(twin: &str) -> String {
+        format!("{}.posterior.csv", twin.strip_suffix(".toml").unwrap_or(twin))
+    }
+
     /// The text.
     pub fn to_csv(&self) -> String {
         let mut text = format!("weight,cause,{}\n", self.keys.join(","));
@@ -85,13 +91,18 @@ impl Posterior {
         let columns: Vec<&str> = header.split(',').map(str::trim).collect();
         let keys = match &columns[..] {
             ["weight", "cause", keys @ ..] => keys.iter().map(|k| k.to_string()).collect::<Vec<_>>(),
-            _ => return Err(wrong(0, format!("the columns begin with weight and cause, not with `{header}`"))),
+            _ => {
+                return Err(wrong(0, format!("the columns begin with weight and cause, not with `{header}`")));
+            }
         };
         let mut draws = Vec::new();
         for (line, row) in lines {
             let cells: Vec<&str> = row.split(',').map(str::trim).collect();
             if cells.len() != columns.len() {
-                return Err(wrong(line, format!("{} cells, there are {} columns", cells.len(), columns.len())));
+                return Err(wrong(
+                    line,
+                    format!("{} cells, there are {} columns", cells.len(), columns.len()),
+                ));
             }
             let number = |cell: &str| match cell.parse::<f64>() {
                 Ok(x) if x.is_finite() => Ok(x),
@@ -147,6 +158,17 @@ impl Posterior {
     /// Keys and values of a draw, of what acts in it.
     pub fn values<'a>(&'a self, draw: &'a PosteriorDraw) -> impl Iterator<Item = (&'a str, f64)> {
         self.keys.iter().zip(&draw.values).filter_map(|(key, value)| Some((key.as_str(), (*value)?)))
+    }
+
+    /// The twin of a draw; `base` is the table of the twin with all defaults filled in.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::put`], or values that make no twin.
+    pub fn twin(&self, draw: &PosteriorDraw, base: &toml::Table) -> Result<Twin, ConfigError> {
+        let mut table = base.clone();
+        self.put(draw, &mut table)?;
+        Twin::new(&read_twin_table(&table)?)
     }
 
     /// Puts a draw into the table of a twin: the effects of its cause are there, the other ones that the posterior knows are not.

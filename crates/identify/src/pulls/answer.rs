@@ -10,6 +10,7 @@ use super::heldout::{
 };
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::paying::{by_chance, paying};
+use super::posterior::of_diagnosis;
 use super::power::ScoreTest;
 use super::search::{Accepted, Search, TIED_WITHIN};
 use super::simulate::{recalibrate, trusted};
@@ -20,9 +21,9 @@ use super::zero_screen::{said, zeros_that_depend};
 use crate::diagnosis::{
     Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate, Rival, SeparateBy,
 };
-use gripgen_twin::MeasuredPulls;
 use gripgen_twin::columns::covariates;
 use gripgen_twin::rounded;
+use gripgen_twin::{MeasuredPulls, Posterior};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
@@ -76,6 +77,8 @@ pub struct PullFits {
     pub heldout_label_n: [Vec<f64>; 2],
     /// Labels predicted by the fits to all pulls, before and after.
     pub label_n: [Vec<f64>; 2],
+    /// Draws of cause and parameters.
+    pub posterior: Posterior,
 }
 
 /// What may be asked of a diagnosis.
@@ -210,7 +213,11 @@ pub fn diagnose_pulls(
     progress(0.96);
     diagnosis.would_have_seen = would_have_seen(&context, &after, &search.candidates);
     progress(1.0);
+    let size = (rows.len(), &data.parts[..]);
+    let posterior =
+        of_diagnosis(&stated_before, &after, &accepted, &diagnosis, size, context.assumed_ratio());
     let fits = PullFits {
+        posterior,
         before: stated_before,
         after,
         candidates: search.candidates.clone(),

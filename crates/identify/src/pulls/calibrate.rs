@@ -6,19 +6,20 @@ use super::context::Context;
 use super::data::PullData;
 use super::dynamics::Dynamics;
 use super::estimates::parameters;
+use super::few::{FEW_PULLS, calibrate_few, lacks_forces};
 use super::fitting::Fitted;
 use super::heldout::{errors, folds, predicted};
-use super::few::{FEW_PULLS, calibrate_few, lacks_forces};
 use super::intervals::NormalFit;
 use super::law::largest_relative_sigma;
 use super::model::{PredictPulls, PullModel};
+use super::posterior::of_calibration;
 use super::priors::PullPriors;
 use super::scatter::scatter;
 use super::slip::Slips;
 use super::terms::Terms;
 use crate::diagnosis::{HeldOutError, ParameterEstimate};
-use gripgen_twin::{MeasuredPulls, Posterior};
 use gripgen_twin::effects::{EffectSpec, OFFSET_LAW, find};
+use gripgen_twin::{MeasuredPulls, Posterior};
 use std::collections::BTreeMap;
 
 pub use super::law::OffsetLaw;
@@ -109,8 +110,8 @@ pub fn calibrate_pulls(
     let missing = insufficient(&data);
     let few = data.len() <= FEW_PULLS || missing.is_some() || (request.offset_law && lacks_forces(&data));
     if let Some(priors) = request.priors.as_ref().filter(|_| few && request.effects.is_empty()) {
-        let found =
-            calibrate_few(&data, predictor, given, priors, request.offset_law).ok_or(CalibrateError::NoFit)?;
+        let found = calibrate_few(&data, predictor, given, priors, request.offset_law)
+            .ok_or(CalibrateError::NoFit)?;
         return Ok(PullCalibration {
             model: found.model,
             baseline: found.baseline,
@@ -167,6 +168,8 @@ pub fn calibrate_pulls(
     // What is stated and written has no nuisance; how well it is known is that of the fit with it.
     let (stated, fitted) = context.stated(&found);
     let held = predicted(&stated, &fitted, &folds(data.len()), false);
+    let law_of = request.offset_law.then_some(&given.mu[..]);
+    let drawn = of_calibration(&found, &normal, &fitted, &data.parts, law_of);
     let laws =
         if request.offset_law { laws(&context, &found, &normal, &terms, given, range) } else { vec![] };
     let effects = terms

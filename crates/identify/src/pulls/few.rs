@@ -82,28 +82,27 @@ pub fn calibrate_few(
 ) -> Option<FewPulls> {
     let mut context = Context::new(data, predictor, given);
     context.see_few_slips();
-    let middle = Rig { lag_s: context.base.lag_s, noise_n: context.base.noise_n, scatter: priors.scatter.at(0.0) };
-    let first = places(&context, priors, &[middle], law)?;
+    let middle =
+        Rig { lag_s: context.base.lag_s, noise_n: context.base.noise_n, scatter: priors.scatter.at(0.0) };
+    let (first, _) = places(&context, priors, &[middle], law)?;
     context.correct_at(&means(&context, &first, law));
-    let all = places(&context, priors, &rigs(&context, priors), law)?;
+    let (all, log_evidence) = places(&context, priors, &rigs(&context, priors), law)?;
     let model = means(&context, &all, law);
-    let total = |p: &Place| p.parts.iter().map(|a| a.log_evidence).sum::<f64>();
-    let best = all.iter().map(total).fold(f64::NEG_INFINITY, f64::max);
     let rows: Vec<usize> = (0..data.len()).collect();
     let deviations = context.compared(&model, &rows).into_iter().map(|(d, sd)| d / sd).collect();
     Some(FewPulls {
         baseline: baseline(&context, &model, &all),
         laws: if law { laws(data, given, &all) } else { vec![] },
         posterior: posterior(data, given, &all, law),
-        log_evidence: best,
+        log_evidence,
         deviations,
         notes: notes(data, law),
         model,
     })
 }
 
-/// The points, weighed.
-fn places(context: &Context<'_>, priors: &PullPriors, rigs: &[Rig], law: bool) -> Option<Vec<Place>> {
+/// The points, weighed, and the logarithm of the evidence.
+fn places(context: &Context<'_>, priors: &PullPriors, rigs: &[Rig], law: bool) -> Option<(Vec<Place>, f64)> {
     let ratios = ratios(context, priors);
     let asked: Vec<(Rig, f64, f64)> =
         rigs.iter().flat_map(|rig| ratios.iter().map(move |&(k, weight)| (*rig, k, weight))).collect();
@@ -145,7 +144,8 @@ fn places(context: &Context<'_>, priors: &PullPriors, rigs: &[Rig], law: bool) -
     let sum: f64 = logs.iter().map(|l| libm::exp(l - most)).sum();
     all.iter_mut().zip(&logs).for_each(|(p, log)| p.weight = libm::exp(log - most) / sum);
     all.retain(|p| p.weight > 1e-9);
-    (!all.is_empty() && sum.is_finite()).then_some(all)
+    let log_evidence = most + libm::log(sum / rigs.len() as f64);
+    (!all.is_empty() && log_evidence.is_finite()).then_some((all, log_evidence))
 }
 
 /// Values of a quantity of the points, with weights.
@@ -155,7 +155,8 @@ fn of_places(all: &[Place], value: impl Fn(&Place) -> f64) -> Vec<(f64, f64)> {
 
 /// Values of a quantity of a part, with weights.
 fn of_part(all: &[Place], part: usize, value: impl Fn(&PartDraw) -> f64) -> Vec<(f64, f64)> {
-    let draws = |p: &Place| p.parts[part].draws.iter().map(|d| (value(d), p.weight * d.weight)).collect::<Vec<_>>();
+    let draws =
+        |p: &Place| p.parts[part].draws.iter().map(|d| (value(d), p.weight * d.weight)).collect::<Vec<_>>();
     all.iter().flat_map(draws).collect()
 }
 
@@ -233,7 +234,8 @@ fn law_of(d: &PartDraw, mu_given: f64) -> (f64, f64) {
 }
 
 fn laws(data: &PullData<'_>, given: &PullModel, all: &[Place]) -> Vec<OffsetLaw> {
-    let force = |f: fn(f64, f64) -> f64, from: f64| data.measured.pulls.iter().map(|p| p.grip_force_n).fold(from, f);
+    let force =
+        |f: fn(f64, f64) -> f64, from: f64| data.measured.pulls.iter().map(|p| p.grip_force_n).fold(from, f);
     let range = (force(f64::min, f64::INFINITY), force(f64::max, 0.0));
     let each = |(part, name): (usize, &String)| {
         let of = |value: &dyn Fn(f64, f64) -> f64| {

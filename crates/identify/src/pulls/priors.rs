@@ -38,7 +38,9 @@ impl Prior {
         if self.spread <= 0.0 {
             return self.centre.clamp(low, high);
         }
-        let value = |z: f64| if self.log { self.centre * libm::exp(self.spread * z) } else { self.centre + self.spread * z };
+        let value = |z: f64| {
+            if self.log { self.centre * libm::exp(self.spread * z) } else { self.centre + self.spread * z }
+        };
         let below = if self.log && low <= 0.0 { 0.0 } else { normal_below(place(low)) };
         let above = normal_below(place(high));
         let share = (below + (above - below) * normal_below(z)).clamp(1e-15, 1.0 - 1e-15);

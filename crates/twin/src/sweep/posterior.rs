@@ -1,6 +1,6 @@
 //! Sweeps that draw cause and parameters of the twin together.
 
-use super::{Sweep, is_twin_key, read_twin};
+use super::{Sweep, is_twin_key};
 use crate::config::{ConfigError, Document};
 use crate::draw::Distribution;
 use crate::{CAUSE_KEY, Posterior, PosteriorDraw};
@@ -18,10 +18,11 @@ impl Sweep {
             Distribution::Posterior { file } => Some(file.clone()),
             _ => None,
         })?;
-        Some(named.unwrap_or_else(|| {
-            let name = self.twin.rsplit('/').next().unwrap_or(&self.twin);
-            format!("{}.posterior.csv", name.strip_suffix(".toml").unwrap_or(name))
-        }))
+        Some(
+            named.unwrap_or_else(|| {
+                Posterior::name_beside(self.twin.rsplit('/').next().unwrap_or(&self.twin))
+            }),
+        )
     }
 
     /// The sweep with the draws of that file. `twin` is the twin's document with all defaults filled in.
@@ -54,8 +55,7 @@ impl Sweep {
             }
         }
         for draw in tried.values() {
-            let mut table = twin.table().clone();
-            posterior.put(draw, &mut table).and_then(|()| read_twin(&table)).map_err(|e| {
+            posterior.twin(draw, twin.table()).map_err(|e| {
                 fault(format!("a draw of the cause `{}` makes no twin: {e}", draw.cause))
                     .hint("the posterior belongs to the twin that was written with it")
             })?;

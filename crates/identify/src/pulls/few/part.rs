@@ -115,18 +115,24 @@ impl PartOnRig<'_> {
         .ok()?;
         let n = parameters.len();
         let root = (found.covariance.clone() * (WIDER * WIDER)).cholesky()?.l();
-        let log_width: f64 = (0..n).map(|i| libm::log(root[(i, i)])).sum();
+        // Logarithm of what both densities have before their exponents: of the draws, and of the prior.
+        let (freedom, size) = (FREEDOM as f64, n as f64);
+        let log_width: f64 = (0..n).map(|i| libm::log(root[(i, i)])).sum::<f64>()
+            + libm::lgamma(0.5 * freedom)
+            - libm::lgamma(0.5 * (freedom + size))
+            + 0.5 * size * libm::log(freedom * std::f64::consts::PI);
+        let log_prior = -0.5 * size * libm::log(std::f64::consts::TAU);
         let mut random = Draws::new(29, lane);
         let drawn = (0..DRAWS).map(|_| {
             let normal = DVector::from_fn(n, |_, _| random.normal());
             let chi2: f64 = (0..FREEDOM).map(|_| random.normal().powi(2)).sum();
-            let freedom = FREEDOM as f64;
             let stretched = &normal * (freedom / chi2.max(1e-12)).sqrt();
-            let z: Vec<f64> = (DVector::from_column_slice(&found.values) + &root * &stretched).iter().copied().collect();
+            let z: Vec<f64> =
+                (DVector::from_column_slice(&found.values) + &root * &stretched).iter().copied().collect();
             let drawn_from =
-                -0.5 * (freedom + n as f64) * libm::log1p(stretched.norm_squared() / freedom) - log_width;
+                -0.5 * (freedom + size) * libm::log1p(stretched.norm_squared() / freedom) - log_width;
             let friction = self.friction(&z);
-            let prior = -0.5 * z.iter().map(|z| z * z).sum::<f64>();
+            let prior = log_prior - 0.5 * z.iter().map(|z| z * z).sum::<f64>();
             (friction, self.log_likelihood(&self.model(friction)) + prior - drawn_from)
         });
         let drawn: Vec<((f64, f64), f64)> = drawn.filter(|(_, log)| log.is_finite()).collect();
