@@ -92,7 +92,10 @@ impl Posterior {
         let keys = match &columns[..] {
             ["weight", "cause", keys @ ..] => keys.iter().map(|k| k.to_string()).collect::<Vec<_>>(),
             _ => {
-                return Err(wrong(0, format!("the columns begin with weight and cause, not with `{header}`")));
+                return Err(wrong(
+                    0,
+                    format!("the columns begin with weight and cause, not with `{header}`"),
+                ));
             }
         };
         let mut draws = Vec::new();
@@ -259,7 +262,7 @@ mod tests {
     #[test]
     fn a_draw_brings_its_cause_and_takes_the_other_one_away() {
         let posterior = two();
-        let base: toml::Table = "[parts.gear]\nmu = 0.1\n[[effects]]\nname = \"wear\"\ndepth = 0.3\nscale_pulls = 50.0\n[[effects]]\nname = \"temperature\"\n"
+        let base: toml::Table = "[parts.gear]\nmu = 0.1\n[[effects]]\nname = \"wear\"\ndepth = 0.3\nn0 = 50.0\n[[effects]]\nname = \"temperature\"\n"
             .parse()
             .unwrap();
         let of = |k: usize| {
@@ -273,7 +276,7 @@ mod tests {
         let wear = of(0);
         assert_eq!(names(&wear), ["wear", "temperature"]);
         assert_eq!(wear["effects"][0]["depth"].as_float(), Some(0.1));
-        assert_eq!(wear["effects"][0]["scale_pulls"].as_float(), Some(50.0));
+        assert_eq!(wear["effects"][0]["n0"].as_float(), Some(50.0));
         let offset = of(1);
         assert_eq!(names(&offset), ["temperature", "load_offset"]);
         assert_eq!(offset["effects"][1]["part"].as_str(), Some("gear"));
