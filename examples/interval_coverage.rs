@@ -126,7 +126,7 @@ fn main() {
                 increment_n: vec![0.5, 1.0],
             };
             let measured = campaign(&world, &plan, 1000 + index as u64);
-            let request = CalibrateRequest { offset_law: line.law, effects: vec![] };
+            let request = CalibrateRequest { offset_law: line.law, ..CalibrateRequest::default() };
             let Ok((fit, _)) = calibrate_twin(&measured, &twin, &library, &request, 1) else { return };
             let mut rows: Vec<Row> = Vec::new();
             let mut note = |name: &str, key: &str, truth: f64| {
@@ -159,9 +159,7 @@ fn main() {
                 }
                 println!(
                     "   k {:?} d {:?} T {:?}",
-                    fit.fitted.model.stiffness_n_per_m,
-                    fit.fitted.model.damping_n_s_per_m,
-                    fit.fitted.model.dead_time_s
+                    fit.model.stiffness_n_per_m, fit.model.damping_n_s_per_m, fit.model.dead_time_s
                 );
             }
             found.lock().unwrap().insert(index, rows);

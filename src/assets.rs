@@ -19,6 +19,7 @@ static FILES: &[(&str, &[u8])] = embedded![
     "configs/twin-baseline.toml",
     "configs/twin-contact.toml",
     "configs/twin.toml",
+    "priors/pulls.toml",
     "robots/ur5e/ur5e.urdf",
     "parts/ball_bearing/part.stl",
     "parts/gear/part.stl",

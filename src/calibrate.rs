@@ -3,6 +3,7 @@
 use crate::diagnose::{PullTwinError, check_fit, given_model, pull_values};
 use crate::library::Library;
 use crate::predict::PullPredictor;
+use crate::priors::shipped_priors;
 use crate::twin_edits::{TwinEdits, effect_entry, put_estimate};
 use gripgen_identify::pulls::calibrate::{
     CalibrateError, CalibrateRequest, PullCalibration, calibrate_pulls,
@@ -25,7 +26,7 @@ pub enum CalibratePullsError {
 
 /// Fits the baseline of `twin` to measured pulls, with the law and the effects asked for, and returns what changes in the
 /// twin. Its own effects on pulls are replaced by those fitted; laws are written for the range they were fitted on, and
-/// extrapolated.
+/// extrapolated. Few pulls are weighed with the beliefs of the request, or those that are shipped.
 ///
 /// # Errors
 ///
@@ -40,11 +41,13 @@ pub fn calibrate_twin(
     check_fit(measured, twin)?;
     let predictor = PullPredictor::new(measured, twin, library, jobs);
     let given = given_model(twin, predictor.part_names()).map_err(PullTwinError::from)?;
-    let found = calibrate_pulls(measured, &predictor, &given, request)?;
+    let mut request = request.clone();
+    request.priors.get_or_insert_with(|| shipped_priors(twin));
+    let found = calibrate_pulls(measured, &predictor, &given, &request)?;
     let (low, high) = found.grip_force_n;
     let evidence = format!("gripgen calibrate pulls, {} pulls at {low} to {high} N", measured.pulls.len());
     let mut values =
-        pull_values(&found.fitted, &found.baseline, predictor.part_names(), &evidence, &measured.sha256);
+        pull_values(&found.model, &found.baseline, predictor.part_names(), &evidence, &measured.sha256);
     // With the law the coefficient stays that of the twin: a is a factor on it.
     if !found.laws.is_empty() {
         values.retain(|v| !(v.key.starts_with("parts.") && v.key.ends_with(".mu")));

@@ -4,6 +4,7 @@ use crate::diagnose::{UnknownPartError, check_parts};
 use crate::expect::{Expectations, QuietTwin};
 use crate::library::Library;
 use crate::parallel::in_parallel;
+use crate::predictive::share_below;
 use gripgen_twin::{MeasuredPull, MeasuredPulls, PullTrace, Twin};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,6 +28,8 @@ pub struct PullComparison {
     pub pulls: LabelErrors,
     /// Labels by part.
     pub by_part: BTreeMap<String, LabelErrors>,
+    /// Share of the labels inside their predictive 90 % interval: over scatter and noise, and the posterior of the twin where it has one.
+    pub coverage90: f64,
     /// Pulls outside the grip forces on which an effect was fitted; they count all the same.
     pub outside_fit: usize,
     /// Traces, and the root of the mean squared difference of their readings.
@@ -63,13 +66,45 @@ pub fn compare_pulls(
     library: &Library,
     jobs: usize,
 ) -> Result<PullComparison, UnknownPartError> {
+    compare_pulls_with(measured, twin, &[], library, jobs)
+}
+
+/// The same for a twin with a posterior, for which the twins of `draws` stand: they make its intervals wider.
+///
+/// # Errors
+///
+/// A part that the twin lacks.
+pub fn compare_pulls_with(
+    measured: &MeasuredPulls,
+    twin: &Twin,
+    draws: &[Twin],
+    library: &Library,
+    jobs: usize,
+) -> Result<PullComparison, UnknownPartError> {
     check_parts(measured, twin)?;
-    let mut twin = twin.clone();
-    twin.robot.feedback = measured.feedback.unwrap_or(twin.robot.feedback);
+    let as_measured = |twin: &Twin| {
+        let mut twin = twin.clone();
+        twin.robot.feedback = measured.feedback.unwrap_or(twin.robot.feedback);
+        twin
+    };
+    let twin = as_measured(twin);
     let quiet = QuietTwin::new(&twin);
+    let drawn: Vec<QuietTwin> = draws.iter().map(|draw| QuietTwin::new(&as_measured(draw))).collect();
     let expectations = Expectations::new(measured, library);
     let n = measured.pulls.len();
-    let label_n = in_parallel(n, jobs, |row| expectations.expected(&quiet, row, 1.0).label_n);
+    let predicted = in_parallel(n, jobs, |row| {
+        let label_n = measured.pulls[row].max_pull_force_n;
+        let (expected, curve) = expectations.expected_curve(&quiet, row, 1.0);
+        let of = |draw| share_below(&expectations.expected_curve(draw, row, 1.0).1, label_n);
+        let shares: Vec<f64> = drawn.iter().map(of).collect();
+        let below = match shares.len() {
+            0 => share_below(&curve, label_n),
+            count => shares.iter().sum::<f64>() / count as f64,
+        };
+        (expected.label_n, (0.05..=0.95).contains(&below))
+    });
+    let inside = predicted.iter().filter(|(_, inside)| *inside).count();
+    let label_n: Vec<f64> = predicted.into_iter().map(|(label_n, _)| label_n).collect();
     let traced: Vec<(usize, &PullTrace)> =
         measured.pulls.iter().enumerate().filter_map(|(i, p)| Some((i, p.trace.as_ref()?))).collect();
     let traces = in_parallel(traced.len(), jobs, |k| {
@@ -104,6 +139,7 @@ pub fn compare_pulls(
     Ok(PullComparison {
         pulls: LabelErrors::of(all().map(|(p, l)| (p.max_pull_force_n, *l))),
         by_part,
+        coverage90: inside as f64 / n.max(1) as f64,
         outside_fit: measured.pulls.iter().filter(|p| outside(p)).count(),
         traces: (traced.len(), (square / readings.max(1) as f64).sqrt()),
         label_n,

@@ -62,6 +62,7 @@ pub fn pull_comparison_page(title: &str, measured: &MeasuredPulls, found: &PullC
     let traces = format!("{}, {:.3} N between their readings", found.traces.0, found.traces.1);
     let facts = [
         ("pulls", e.n.to_string()),
+        ("labels in the 90 % interval", format!("{:.0} %", 100.0 * found.coverage90)),
         ("traces compared", if found.traces.0 > 0 { traces } else { "none".into() }),
         ("outside a fitted range", found.outside_fit.to_string()),
         ("SHA-256 of the data", measured.sha256.chars().take(12).collect()),

@@ -8,6 +8,7 @@ use crate::cache::Cache;
 use crate::generate::{PatchFriction, sensor_chain};
 use crate::gripped::{Indenter, grip_point, held, jaw_forces_n};
 use crate::library::Library;
+use crate::predictive::LabelCurve;
 use crate::sample::SampleError;
 use gripgen_physics::{Command, Held, JawFriction, PullSession, Signals, label_moments};
 use gripgen_tactile::SimdLevel;
@@ -159,7 +160,18 @@ impl<'a> Expectations<'a> {
 
     /// What is expected of the pull at `row` on a twin, its friction multiplied by `factor`.
     pub(crate) fn expected(&self, quiet: &QuietTwin, row: usize, factor: f64) -> Expected {
-        let Ok(prepared) = self.prepared(quiet, row) else { return Expected::default() };
+        self.expected_curve(quiet, row, factor).0
+    }
+
+    /// The same, and the label as a function of the scatter.
+    pub(crate) fn expected_curve(
+        &self,
+        quiet: &QuietTwin,
+        row: usize,
+        factor: f64,
+    ) -> (Expected, LabelCurve) {
+        let mut curve = LabelCurve::new();
+        let Ok(prepared) = self.prepared(quiet, row) else { return (Expected::default(), curve) };
         let factor = factor * table_factor(&quiet.twin, &prepared.scenario);
         let part = &quiet.twin.parts[&prepared.scenario.part];
         let mean = prepared.friction(&quiet.twin, factor);
@@ -170,14 +182,16 @@ impl<'a> Expectations<'a> {
             let friction = prepared.friction(&quiet.twin, (factor * (1.0 + part.scatter * z)).max(0.0));
             let Ok(readings) = self.pull(quiet, row, &prepared, &friction, decided_n) else { continue };
             let (mean, variance) = self.label(quiet, &readings);
+            curve.push((z, mean, variance));
             sums = (sums.0 + weight, sums.1 + weight * mean, sums.2 + weight * (mean * mean + variance));
         }
         let (weight, mean, square) = sums;
         if weight == 0.0 {
-            return Expected { limit_n, ..Expected::default() };
+            return (Expected { limit_n, ..Expected::default() }, curve);
         }
         let label_n = mean / weight;
-        Expected { limit_n, label_n, label_sd_n: (square / weight - label_n * label_n).max(0.0).sqrt() }
+        let label_sd_n = (square / weight - label_n * label_n).max(0.0).sqrt();
+        (Expected { limit_n, label_n, label_sd_n }, curve)
     }
 
     /// Mean and variance of a label over the noise of the readings.

@@ -69,9 +69,11 @@ mod picture;
 mod plan;
 mod plant;
 mod predict;
+mod predictive;
 mod press_columns;
 mod press_report;
 mod presses;
+mod priors;
 mod project;
 mod ratio;
 mod render;
@@ -92,7 +94,7 @@ pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use calibrate::{CalibratePullsError, calibrate_twin};
 pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use catalogue::{EffectCurve, effect_curve};
-pub use compare::{LabelErrors, PullComparison, compare_pulls};
+pub use compare::{LabelErrors, PullComparison, compare_pulls, compare_pulls_with};
 pub use compare_images::{CompareImagesError, ImageComparison, ImageScore, compare_images};
 pub use compare_report::{pull_comparison_page, pull_ratios};
 pub use diagnose::{
@@ -130,12 +132,14 @@ pub use picture::{
 pub use plan::{Plan, Probe, TriedGrip, plan};
 pub use plant::{Fixture, OpenPlantError, TwinPlant};
 pub use predict::PullPredictor;
+pub use predictive::posterior_twins;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};
 pub use press_report::{PressMap, PressReportText, press_report};
 pub use presses::{
     FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_circles_with_sensor,
     find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor,
 };
+pub use priors::{pull_priors, shipped_priors};
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
 pub use ratio::{PartRatio, RatioFit};
 pub use render::{RenderError, RenderOptions, is_height_map, render_file, render_surface};

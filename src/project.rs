@@ -12,7 +12,7 @@ use crate::version::VERSION;
 use gripgen_record::{RunFolder, sha256_hex};
 use gripgen_tactile::gpu::GpuError;
 use gripgen_twin::config::{Backend, ConfigError, Document, ImageStorage, SweepFile};
-use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, RobotArm, Sweep, Twin, is_twin_key};
+use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, Posterior, RobotArm, Sweep, Twin, is_twin_key};
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
@@ -220,7 +220,14 @@ impl Project {
         };
         let (document, twin_document) = (part("sweep")?, part("twin")?);
         let file: SweepFile = document.read()?;
-        let sweep = Sweep::new(&file, &twin_document).map_err(|e| document.located(e))?;
+        let mut sweep = Sweep::new(&file, &twin_document).map_err(|e| document.located(e))?;
+        if let Some(path) = sweep.posterior_file() {
+            let fault = |problem: String| document.located(ConfigError::new("vary.twin", problem));
+            let (at, bytes) = files.get(&path).ok_or_else(|| fault(format!("there is no {path}")))?;
+            let text = String::from_utf8_lossy(bytes);
+            let posterior = Posterior::parse(&text).map_err(|e| fault(format!("{at}: {e}")))?;
+            sweep = sweep.with_posterior(posterior, &twin_document).map_err(|e| document.located(e))?;
+        }
         let twin = Twin::new(&twin_document.read_twin()?).map_err(|e| twin_document.located(e))?;
         let config_sha256 = config_hash(&config_toml, &files);
         let twin_table = twin_document.table().clone();

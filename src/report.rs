@@ -15,6 +15,7 @@ pub use page::diagnosis_page;
 pub(crate) use sections::{PageFigure, PageSection, png_url, sections_page};
 
 use gripgen_identify::Diagnosis;
+use gripgen_twin::Posterior;
 
 /// How the points of a series are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,12 +127,14 @@ pub struct Diagnosed {
     pub report: ReportData,
     /// The pulls that would tell apart what these could not.
     pub next: Option<crate::NextPulls>,
+    /// Draws of cause and parameters, of pulls.
+    pub posterior: Option<Posterior>,
 }
 
 impl Diagnosed {
     /// An answer, with its sentence for a technician.
     pub(crate) fn new(mut diagnosis: Diagnosis, edits: crate::TwinEdits, report: ReportData) -> Self {
         diagnosis.plain = Some(gripgen_identify::plain(&diagnosis));
-        Self { diagnosis, edits, report, next: None }
+        Self { diagnosis, edits, report, next: None, posterior: None }
     }
 }

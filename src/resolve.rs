@@ -7,7 +7,7 @@ use crate::assets::ASSET_PREFIX;
 use crate::location::Location;
 use gripgen_record::sha256_hex;
 use gripgen_twin::config::{ConfigError, Document, SweepFile, TwinFile};
-use gripgen_twin::draw::Drawn;
+use gripgen_twin::draw::{Distribution, Drawn};
 use gripgen_twin::{Sweep, TWIN_SCHEMA, is_twin_key};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -148,6 +148,12 @@ impl<L: Fn(&str) -> Location> Resolver<L> {
     }
 
     fn vary(&mut self, sweep: &Sweep, file: &mut SweepFile) -> Result<(), ConfigError> {
+        if let Some(mut path) = sweep.posterior_file() {
+            self.name("vary.twin".into(), "vary.twin".into(), &mut path).map_err(|e| {
+                e.hint("`gripgen diagnose ... -o twin.toml` and `gripgen calibrate pulls ... -o twin.toml` write twin.posterior.csv beside the twin")
+            })?;
+            file.vary.insert("twin".into(), Distribution::Posterior { file: Some(path) }.to_toml());
+        }
         for varied in sweep.vary.iter().filter(|v| is_file_key(&v.key)) {
             let mut paths = Vec::new();
             for (i, value) in sweep.representatives(&varied.key).into_iter().enumerate() {

@@ -147,7 +147,7 @@ pub fn run_info(project: &Project) -> RunInfo {
         samples: sweep.samples,
         shard_samples: sweep.shard_samples,
         shards: sweep.shards(),
-        extra_columns: extra_columns(sweep.vary.iter().map(|v| v.key.as_str())),
+        extra_columns: extra_columns(sweep.drawn_keys()),
         files_sha256: project.library.files_sha256(),
         config_toml: project.config_toml.clone(),
         gpu_adapter: project.gpu().ok().flatten().map(|gpu| gpu.adapter().to_string()),

@@ -387,7 +387,7 @@ fn poor_data_are_insufficient() {
 fn the_offset_law_is_fitted_with_its_uncertainty() {
     let law = "[[effects]]\nname = \"load_offset\"\npart = \"long_shaft\"\na = 1.05\nb_n = -3.2\n";
     let measured = simulated(law, 120, &[]);
-    let request = CalibrateRequest { offset_law: true, effects: vec![] };
+    let request = CalibrateRequest { offset_law: true, ..CalibrateRequest::default() };
     let twin = twin_at(&baseline());
     let (found, edits) = calibrate_twin(&measured, &twin, &library(&twin), &request, 2).unwrap();
     let fitted = &found.laws[0];

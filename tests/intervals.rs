@@ -54,7 +54,7 @@ fn calibrated_intervals_hold_the_truth_of_a_foreign_lab() {
                 held += usize::from(p.low90 <= *mu && *mu <= p.high90);
                 bias += (p.value / mu - 1.0) / 16.0;
             }
-            let model = &found.fitted.model;
+            let model = &found.model;
             bent.push((model.shear_by_area, model.stiffness_n_per_m));
             let p = &found.baseline["kinetic_ratio"];
             ratios += usize::from(p.low90 <= ratio && ratio <= p.high90 + 1e-9);

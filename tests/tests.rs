@@ -46,6 +46,8 @@ mod measured;
 mod mechanics;
 // Numbers that Wucherer et al. 2023 print.
 mod paper;
+// Few pulls, and what pulls leave open.
+mod posterior;
 // Presses whose optics were changed, diagnosed.
 mod press_diagnosis;
 // Presses of a ball into a real sensor.

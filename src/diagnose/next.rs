@@ -65,6 +65,11 @@ impl NextPulls {
                 format!("{a} from {b} (mistaken in {:.0} % of cases)", mistaken.max(1.0))
             })
             .collect();
+        if each.is_empty() {
+            return format!(
+                "the planned campaign ({pulls} pulls, {minutes:.0} min) varies what the force may depend on"
+            );
+        }
         let mut text =
             format!("the planned campaign ({pulls} pulls, {minutes:.0} min) tells {}", each.join(" and "));
         if !self.left.is_empty() {

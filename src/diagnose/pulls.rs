@@ -1,17 +1,19 @@
 //! Diagnosis of pulls through the reduced mechanics.
 
+use super::few::diagnose_few_pulls;
 use super::next::next_pulls;
 use super::pull_report::pull_report;
+use super::pull_values::pull_values;
 use crate::library::Library;
-use crate::predict::{PullPredictor, speed_limit_m_per_s};
+use crate::predict::PullPredictor;
 use crate::report::Diagnosed;
-use crate::twin_edits::{EditedValue, TwinEdits, calibration_entry, effect_entry};
+use crate::twin_edits::{TwinEdits, calibration_entry, effect_entry};
+use gripgen_identify::Diagnosis;
 use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
 use gripgen_identify::pulls::curves::Curve;
 use gripgen_identify::pulls::data::{Column, PullData};
-use gripgen_identify::pulls::fitting::Fitted;
+use gripgen_identify::pulls::few_diagnosis::is_few;
 use gripgen_identify::pulls::model::PullModel;
-use gripgen_identify::{Diagnosis, ParameterEstimate};
 use gripgen_twin::config::{EffectFile, Twist};
 use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Twin};
 use std::collections::BTreeMap;
@@ -138,6 +140,9 @@ pub fn diagnose_pull_table(
     }
     let predictor = PullPredictor::new(measured, twin, library, options.jobs);
     let given = given_model(twin, predictor.part_names())?;
+    if is_few(measured) {
+        return Ok(diagnose_few_pulls(measured, &predictor, &given, twin));
+    }
     let asked = PullOptions { without: options.without };
     let answer = diagnose_pulls(measured, &predictor, &given, &asked, progress);
     let edits =
@@ -154,46 +159,8 @@ pub fn diagnose_pull_table(
             separate.text = format!("{}; or {}", separate.text, next.text());
         }
     }
-    Ok(Diagnosed { next, ..Diagnosed::new(diagnosis, edits, report) })
-}
-
-/// Fitted baseline values as they stand in a twin.
-pub(crate) fn pull_values(
-    fitted: &Fitted,
-    baseline: &BTreeMap<String, ParameterEstimate>,
-    parts: &[String],
-    evidence: &str,
-    sha256: &str,
-) -> Vec<EditedValue> {
-    let model = &fitted.model;
-    let mut values = Vec::new();
-    let mut set = |key: String, value: f64, known: Option<&ParameterEstimate>| {
-        let calibration = known.map(|estimate| calibration_entry(estimate, evidence, sha256));
-        values.push(EditedValue { key, value, calibration });
-    };
-    let interval = |name: &str| baseline.get(name);
-    let scatter = baseline.get("scatter").map_or(model.scatter, |e| e.value);
-    for (name, mu) in parts.iter().zip(&model.mu) {
-        set(format!("parts.{name}.mu"), *mu, interval(&format!("parts.{name}.mu")));
-        set(format!("parts.{name}.kinetic_ratio"), model.kinetic_ratio, interval("kinetic_ratio"));
-        set(format!("parts.{name}.kinetic_fall_s"), model.fall_s, None);
-        set(format!("parts.{name}.scatter"), scatter, None);
-    }
-    set("robot.lag_s".into(), model.lag_s, interval("robot.lag_s"));
-    set("robot.dead_time_s".into(), model.dead_time_s, interval("robot.dead_time_s"));
-    set("wrist.noise_n".into(), model.noise_n, interval("wrist.noise_n"));
-    if baseline.contains_key("robot.damping_n_s_per_m") {
-        set("robot.damping_n_s_per_m".into(), model.damping_n_s_per_m, None);
-        set("robot.speed_limit_mm_s".into(), 1e3 * speed_limit_m_per_s(model.damping_n_s_per_m), None);
-        if let Some(mass_kg) = model.apparent_mass_kg {
-            set("robot.apparent_mass_kg".into(), mass_kg, None);
-        }
-        for jaw in ["left", "right"] {
-            set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), model.stiffness_n_per_m * 0.5e-3, None);
-            set(format!("gel.{jaw}.shear_by_area"), model.shear_by_area, None);
-        }
-    }
-    values
+    let posterior = answer.fits.map(|fits| fits.posterior);
+    Ok(Diagnosed { next, posterior, ..Diagnosed::new(diagnosis, edits, report) })
 }
 
 /// The twin that the answer describes.
@@ -205,8 +172,7 @@ fn edits(
 ) -> TwinEdits {
     let model = &fits.after.model;
     let evidence = format!("gripgen diagnose of {} pulls", measured.pulls.len());
-    let values =
-        pull_values(&fits.after, &diagnosis.baseline, predictor.part_names(), &evidence, &measured.sha256);
+    let values = pull_values(model, &diagnosis.baseline, predictor.part_names(), &evidence, &measured.sha256);
     let forces = measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces.fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
     let effects = model.effects.iter().map(|effect| {

@@ -93,7 +93,7 @@ pub(crate) fn encode_options(project: &Project, index: u64) -> EncodeOptions {
         images: sweep.images,
         trace: sweep.trace,
         view_rate_hz: Some(VIEW_RATE_HZ),
-        extra_columns: extra_columns(sweep.vary.iter().map(|v| v.key.as_str())),
+        extra_columns: extra_columns(sweep.drawn_keys()),
         noise_apart_rgb: (sweep.images == ImageStorage::Clean).then(|| noise_rgb(project, index)).flatten(),
         first_sample: index / sweep.shard_samples * sweep.shard_samples,
         slot_ns: slot_ns(project),

@@ -18,6 +18,7 @@ mod mark;
 mod output;
 mod outputs;
 mod own_files;
+mod posterior;
 mod progress;
 
 use args::{CalibrateCommand, Cli, Command, RigCommand};

@@ -33,7 +33,7 @@ pub enum Format {
     Npz,
     /// Who made the bytes has marked them already: MCAP, Parquet, tar.
     Marked,
-    /// No room for a mark: `.npy`; files that people are to edit.
+    /// No room for a mark: `.npy`, `.csv`; files that people are to edit.
     Bare,
 }
 
@@ -57,13 +57,13 @@ pub fn short_hash(bytes: &[u8]) -> String {
 pub fn marked(format: Format, verb: &str, bytes: &[u8], beside: &[String]) -> Vec<u8> {
     let done = match format {
         Format::Toml => {
-            let line = format!("# {}\n", sentence(verb, &short_hash(bytes)));
+            let line = format!("# {}\n", sentence(verb, &short_hash(bytes), beside));
             Some([line.as_bytes(), bytes].concat())
         }
         Format::Html | Format::Svg => {
             let end = if bytes.ends_with(b"\n") { "" } else { "\n" };
             let ended = [bytes, end.as_bytes()].concat();
-            let line = format!("<!-- {} -->\n", sentence(verb, &short_hash(&ended)));
+            let line = format!("<!-- {} -->\n", sentence(verb, &short_hash(&ended), beside));
             Some([&ended[..], line.as_bytes()].concat())
         }
         Format::Png => {
@@ -95,8 +95,9 @@ fn name(verb: &str) -> String {
     format!("gripgen {verb}")
 }
 
-fn sentence(verb: &str, hash: &str) -> String {
-    format!("{MARK_NAME}: {verb} {hash}; replaced by the same verb until somebody edits it")
+fn sentence(verb: &str, hash: &str, beside: &[String]) -> String {
+    let with = if beside.is_empty() { String::new() } else { format!(" with {};", beside.join(" ")) };
+    format!("{MARK_NAME}: {verb} {hash};{with} replaced by the same verb until somebody edits it")
 }
 
 /// The mark of a file; `None` where it has none, or cannot be read.
@@ -136,8 +137,11 @@ fn of_text(bytes: &[u8]) -> Option<Mark> {
     let text = std::str::from_utf8(bytes).ok()?;
     let of = |line: &str, rest: &str, opening: &str| {
         let said = line.strip_prefix(opening)?.strip_prefix(MARK_NAME)?.strip_prefix(": ")?;
-        let (verb, hash) = said.split_once(';')?.0.rsplit_once(' ')?;
-        Some(Mark { verb: verb.into(), whole: short_hash(rest.as_bytes()) == hash, beside: vec![] })
+        let mut said = said.split(';');
+        let (verb, hash) = said.next()?.rsplit_once(' ')?;
+        let with = said.find_map(|words| words.strip_prefix(" with ")).unwrap_or_default();
+        let beside = with.split_whitespace().map(String::from).collect();
+        Some(Mark { verb: verb.into(), whole: short_hash(rest.as_bytes()) == hash, beside })
     };
     let first = text.find('\n').map(|end| text.split_at(end + 1));
     let last = text.strip_suffix('\n').and_then(|text| text.rfind('\n')).map(|end| text.split_at(end + 1));
@@ -179,6 +183,10 @@ mod tests {
             let edited = String::from_utf8(bytes).unwrap().replacen(['a', 'x', 'v'], "q", 1);
             assert_ne!(written(edited.as_bytes()).map(|m| m.whole), Some(true), "{format:?}: {edited}");
         }
+        let with = marked(Format::Toml, "diagnose", b"a = 1\n", &["0123".into(), "4567".into()]);
+        let found = written(&with).unwrap();
+        assert_eq!((found.verb.as_str(), found.whole), ("diagnose", true));
+        assert_eq!(found.beside, ["0123", "4567"]);
         // What only speaks of the mark has none.
         assert_eq!(written(b"one\n# gripgen.made_by: show 0123; x\nthree\n"), None);
     }

@@ -177,6 +177,18 @@ impl Outputs {
         Ok(())
     }
 
+    /// Removes a file without room for a mark that was written with another one, as that says.
+    pub fn remove_beside(&self, path: &Path, with: &Path) -> Result<(), Failure> {
+        let known = Self { bare: vec![(path.into(), with.into())], ..self.clone() };
+        if path.is_file()
+            && known.is_ours_beside(path)
+            && self.inputs.iter().all(|input| !same_file(input, path))
+        {
+            std::fs::remove_file(path).map_err(|e| unwritable(path, &e))?;
+        }
+        Ok(())
+    }
+
     /// Changes an input in its place, without a mark: a file of a person stays one.
     pub fn edit(&self, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let mut pending = self.begin(path)?;

@@ -231,6 +231,15 @@ pub struct ErrorReport {
     pub by: ErrorsBy,
 }
 
+/// A file of draws.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct PosteriorFile {
+    /// Its name: it lies beside the twin.
+    pub file: String,
+    /// Draws in it.
+    pub draws: usize,
+}
+
 /// The answer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -272,6 +281,9 @@ pub struct Diagnosis {
     /// What was learnt without a name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual: Option<Residual>,
+    /// The draws of cause and parameters, where they were written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub posterior: Option<PosteriorFile>,
     /// The answer in one sentence for a technician.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plain: Option<String>,
@@ -299,6 +311,7 @@ impl Diagnosis {
             error: None,
             hints: Vec::new(),
             residual: None,
+            posterior: None,
             plain: None,
             notes: Vec::new(),
         }

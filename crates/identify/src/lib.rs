@@ -36,8 +36,8 @@ mod separate;
 pub use campaign::{CampaignError, CampaignOptions, DWELLS_S, FORCES_N, NO_LOAD_S, plan_campaign};
 pub use diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy,
-    HeldOutError, Hint, NamedEffect, ParameterEstimate, Residual, Rival, SeparateBy, UnknownCovariate,
-    Verdict,
+    HeldOutError, Hint, NamedEffect, ParameterEstimate, PosteriorFile, Residual, Rival, SeparateBy,
+    UnknownCovariate, Verdict,
 };
 pub use draws::Draws;
 pub use grouped::{

@@ -123,7 +123,7 @@ impl Stream {
 
 impl Stream {
     fn table(&self, found: &[StreamedSample]) -> Table {
-        let extra = extra_columns(self.project.sweep.vary.iter().map(|v| v.key.as_str()));
+        let extra = extra_columns(self.project.sweep.drawn_keys());
         Table::of_index_rows(&extra, found.iter().map(|sample| &sample.row))
     }
 }

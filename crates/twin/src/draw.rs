@@ -60,6 +60,12 @@ pub enum Distribution {
     /// The calibrated uncertainty that stands beside the key in the twin; becomes `Normal` when a sweep is
     /// planned.
     Interval,
+    /// Of the key `twin`: cause and parameters together, from the draws in a file; the one beside the twin where it is `None`. A
+    /// sweep draws from it with [`crate::Sweep::with_posterior`].
+    Posterior {
+        /// The file, called from where the twin is.
+        file: Option<String>,
+    },
 }
 
 /// A key of `[vary]`.
@@ -75,7 +81,7 @@ impl Distribution {
     /// The value at probability `u` in (0, 1): the inverse of the distribution function.
     ///
     /// # Panics
-    /// For [`Distribution::Interval`], which planning replaces.
+    /// For [`Distribution::Interval`], which planning replaces, and [`Distribution::Posterior`], which is not one number.
     pub fn at(&self, u: f64) -> Drawn {
         Drawn::Number(match self {
             Distribution::Choice(values) => {
@@ -89,6 +95,7 @@ impl Distribution {
             }
             Distribution::Normal { mean, deviation } => mean + deviation * normal_quantile(u),
             Distribution::Interval => unreachable!("a planned sweep has no interval left"),
+            Distribution::Posterior { .. } => unreachable!("a posterior gives a draw of many keys"),
         })
     }
 
@@ -101,7 +108,7 @@ impl Distribution {
                 vec![Drawn::Number(*low), Drawn::Number(*high)]
             }
             Distribution::Normal { mean, .. } => vec![Drawn::Number(*mean)],
-            Distribution::Interval => vec![],
+            Distribution::Interval | Distribution::Posterior { .. } => vec![],
         }
     }
 
@@ -119,6 +126,11 @@ impl Distribution {
             Distribution::Interval => {
                 let from = ("from".to_string(), toml::Value::String("interval".into()));
                 toml::Value::Table(toml::Table::from_iter([from]))
+            }
+            Distribution::Posterior { file } => {
+                let from = ("from".to_string(), toml::Value::String("posterior".into()));
+                let file = file.iter().map(|file| ("file".to_string(), toml::Value::String(file.clone())));
+                toml::Value::Table(toml::Table::from_iter([from].into_iter().chain(file)))
             }
         }
     }

@@ -48,6 +48,7 @@ pub mod parts;
 mod patch;
 pub mod pixel_noise;
 pub mod plant;
+mod posterior;
 mod profile;
 pub mod random;
 mod rounded;
@@ -75,6 +76,7 @@ pub use mesh::{
 };
 pub use optics::{BACKGROUND_TERMS, FINER_TERMS, OpticsState};
 pub use patch::{ContactPatch, PressureCell};
+pub use posterior::{CAUSE_KEY, Posterior, PosteriorDraw, PosteriorError};
 pub use profile::Staircase;
 pub use rounded::rounded;
 pub use sample::{ImprintSummary, Outcome, Pulled, Sample};

@@ -1,6 +1,7 @@
 //! The checked sweep: which scenario belongs to which sample index.
 
 mod check;
+mod posterior;
 
 use crate::config::{
     Backend, ConfigError, DesignFile, ImageStorage, Mechanics, PullFile, SweepFile, TraceStorage, assign,
@@ -8,8 +9,9 @@ use crate::config::{
 };
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
 use crate::scenario_keys;
-use crate::{Covariates, PullSettings, Scenario, Twin, sobol};
+use crate::{CAUSE_KEY, Covariates, Posterior, PullSettings, Scenario, Twin, sobol};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Grip force per jaw (or in total, as the twin has it) where a sweep does not say: 40 N, the force of the
 /// pull profiles in Wucherer et al. 2023.
@@ -45,6 +47,7 @@ pub struct Sweep {
     pub shard_samples: u64,
     /// What varies, sorted by key; always contains `part` and `grip_force_n`.
     pub vary: Vec<VariedKey>,
+    posterior: Option<Arc<Posterior>>,
     pull: PullFile,
 }
 
@@ -61,7 +64,7 @@ impl Sweep {
 
     /// Whether keys of the twin vary, so that every sample has a twin of its own.
     pub fn varies_twin(&self) -> bool {
-        self.vary.iter().any(|v| is_twin_key(&v.key))
+        self.vary.iter().any(|v| is_twin_key(&v.key)) || self.posterior.is_some()
     }
 
     /// The parts that can be drawn.
@@ -117,15 +120,29 @@ impl Sweep {
                 }
             }
         }
-        let value = |dimension: usize, varied: &VariedKey| match self.design {
-            DesignFile::Grid if grid.contains_key(varied.key.as_str()) => grid[varied.key.as_str()].clone(),
-            DesignFile::Sobol => {
-                let shift = (self.seed ^ fnv1a(&varied.key)).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-                varied.distribution.at(sobol::coordinate(group, dimension, shift as u32))
+        let mut drawn = BTreeMap::new();
+        for (dimension, varied) in self.vary.iter().enumerate() {
+            if let Some(value) = grid.get(varied.key.as_str()) {
+                drawn.insert(varied.key.clone(), (*value).clone());
+            } else if let Distribution::Posterior { .. } = varied.distribution {
+                let Some((posterior, draw)) = self.posterior_draw(index) else { continue };
+                drawn.insert(CAUSE_KEY.into(), Drawn::Text(draw.cause.clone()));
+                drawn.extend(posterior.values(draw).map(|(key, x)| (key.to_string(), Drawn::Number(x))));
+            } else {
+                let u = self.coordinate(group, dimension, varied);
+                drawn.insert(varied.key.clone(), varied.distribution.at(u));
             }
-            _ => varied.distribution.at(random_coordinate(self.seed, group, &varied.key)),
-        };
-        self.vary.iter().enumerate().map(|(d, varied)| (varied.key.clone(), value(d, varied))).collect()
+        }
+        drawn
+    }
+
+    /// A number in (0, 1) for a key of configuration `group`.
+    fn coordinate(&self, group: u64, dimension: usize, varied: &VariedKey) -> f64 {
+        if self.design == DesignFile::Sobol {
+            let shift = (self.seed ^ fnv1a(&varied.key)).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+            return sobol::coordinate(group, dimension, shift as u32);
+        }
+        random_coordinate(self.seed, group, &varied.key)
     }
 
     /// The scenario of sample `index`, with forces per jaw by the convention of `twin`, and whether it can be
@@ -149,7 +166,7 @@ impl Sweep {
         for (key, value) in &drawn {
             let put = match key {
                 key if key.starts_with("pull.") => scenario_keys::set_pull(&mut pull, key, value),
-                key if is_twin_key(key) => Ok(()),
+                key if is_twin_key(key) || key == CAUSE_KEY => Ok(()),
                 key => scenario_keys::set(&mut scenario, key, value),
             };
             problem = problem.and(put.map_err(|e| e.into_config_error(key)));
@@ -171,6 +188,9 @@ impl Sweep {
     /// Values drawn for this sample that make no twin.
     pub fn twin_of(&self, index: u64, base: &toml::Table) -> Result<Twin, ConfigError> {
         let mut table = base.clone();
+        if let Some((posterior, draw)) = self.posterior_draw(index) {
+            posterior.put(draw, &mut table)?;
+        }
         for (key, value) in self.drawn(index) {
             if is_twin_key(&key) {
                 put(&mut table, &key, &value)?;

@@ -3,17 +3,18 @@
 use crate::args::CalibratePullsArgs;
 use crate::failure::Failure;
 use crate::load::{folders, jobs, load_library, load_twin, no_pulls, suspects};
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
+use crate::posterior;
 use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
 use gripgen::{
     CalibratePullsError, ImprintCalibrations, Location, calibrate_imprints, calibrate_twin, edited_twin_toml,
-    load_pulls_with,
+    load_pulls_with, load_twin_document, pull_priors,
 };
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
+use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
@@ -21,14 +22,20 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
         .reads(&args.measured)
         .reads_all(&args.also)
         .reads_config(&args.twin, &args.set);
-    outputs.allow(&args.out)?;
+    posterior::allow(&mut outputs, &args.out)?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &args.set)?;
     let library = load_library(&twin, &args.twin)?;
     let loaded =
         load_pulls_with(&measured, suspects(args.include_suspect)).map_err(|e| no_pulls(&measured, e))?;
-    let request = CalibrateRequest { offset_law: args.law.is_some(), effects: args.fit.clone() };
+    let twin_at = Location::parse(&args.twin);
+    let document = load_twin_document(&twin_at, &args.set)?;
+    let request = CalibrateRequest {
+        offset_law: args.law.is_some(),
+        effects: args.fit.clone(),
+        priors: Some(pull_priors(&twin, &document, &loaded.pulls)),
+    };
     let (found, mut edits) =
         calibrate_twin(&loaded.pulls, &twin, &library, &request, jobs()).map_err(|e| {
             let hint = match &e {
@@ -43,21 +50,30 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
             };
             Failure::usage(e).hint(hint)
         })?;
-    let twin_at = Location::parse(&args.twin);
     let imprints = calibrate_imprints(&args.measured, &loaded.pulls, &twin_at, &args.set).map_err(|e| {
         Failure::usage(e).hint("images/<pull_id>_left.png and _right.png have the size of the twin's sensor")
     })?;
     edits.values.extend(imprints.values(&loaded.pulls));
     let text = edited_twin_toml(&twin_at, &args.set, &edits, &args.out).map_err(Failure::new)?;
-    outputs.write(&args.out, Format::Toml, text.as_bytes())?;
+    posterior::write(&outputs, &args.out, &text, Some(&found.posterior))?;
     if sink.wanted() {
-        sink.document(&json_of(&found, &imprints, loaded.pulls.pulls.len(), &loaded.pulls.sha256))?;
+        let mut document = json_of(&found, &imprints, loaded.pulls.pulls.len(), &loaded.pulls.sha256);
+        if let Some(name) = posterior::beside(&args.out).as_deref().and_then(Path::file_name) {
+            let file = name.to_string_lossy();
+            document["posterior"] = json!({"file": file, "draws": found.posterior.draws.len()});
+        }
+        sink.document(&document)?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
         print(&summary(&found, &imprints))?;
     }
     if !args.talk.quiet {
-        loaded.notes.iter().chain(&imprints.notes).for_each(|note| eprintln!("note: {note}"));
+        loaded
+            .notes
+            .iter()
+            .chain(&imprints.notes)
+            .chain(&found.notes)
+            .for_each(|note| eprintln!("note: {note}"));
         eprintln!("the twin: {}", args.out.display());
     }
     Ok(0)
@@ -91,6 +107,7 @@ fn json_of(found: &PullCalibration, imprints: &ImprintCalibrations, pulls: usize
         "schema": "gripgen.calibration/1",
         "channel": "pulls",
         "data": {"pulls": pulls, "sha256": sha256},
+        "notes": found.notes,
         "fitted_grip_force_n": [found.grip_force_n.0, found.grip_force_n.1],
         "baseline": named(&found.baseline),
         "laws": laws,

@@ -14,9 +14,9 @@ use crate::outputs::Outputs;
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{
-    LabelErrors, PartRatio, PressReportText, compare_images, compare_pulls, find_circles_with_sensor,
-    is_imprint_set, is_press_set, is_sensor_table, load_pulls_with, press_report, pull_comparison_page,
-    pull_ratios,
+    LabelErrors, Location, PartRatio, PressReportText, compare_images, compare_pulls_with,
+    find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, load_pulls_with,
+    load_twin_document, posterior_twins, press_report, pull_comparison_page, pull_ratios,
 };
 use serde_json::{Value, json};
 
@@ -94,7 +94,9 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
     let suspects = suspects(args.include_suspect);
     let loaded = load_pulls_with(&measured, suspects).map_err(|e| no_pulls(&measured, e))?;
     let library = load_library(&twin, &args.twin)?;
-    let found = compare_pulls(&loaded.pulls, &twin, &library, jobs())
+    let twin_at = Location::parse(&args.twin);
+    let draws = posterior_twins(&twin_at, &load_twin_document(&twin_at, &[])?).map_err(Failure::from)?;
+    let found = compare_pulls_with(&loaded.pulls, &twin, &draws, &library, jobs())
         .map_err(|e| Failure::usage(e).hint("name a twin that has this part with --twin"))?;
     let images =
         compare_images(&measured, &loaded, suspects, &twin, &library, jobs()).map_err(Failure::usage)?;
@@ -119,8 +121,10 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
             .collect::<serde_json::Map<_, _>>()
             .into();
         pulls["n_outside_fit"] = json!(found.outside_fit);
+        pulls["coverage90"] = json!(found.coverage90);
         let traces = json!({"n": found.traces.0, "rmse_n": found.traces.1});
         let mut document = json!({"schema": "gripgen.comparison/1", "pulls": pulls, "traces": traces});
+        document["coverage90"] = json!(found.coverage90);
         if let Some(images) = images_json(&images) {
             document["images"] = images;
         }
@@ -133,6 +137,15 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
             text +=
                 &format!("{name:<16} {:>6} {:>9.3} {:>7.2} {:>8.3}\n", e.n, e.rmse_n, e.mape_pct, e.bias_n);
         }
+        let over = if draws.is_empty() {
+            "scatter and noise"
+        } else {
+            "scatter, noise and the posterior of the twin"
+        };
+        text += &format!(
+            "{:.0} % of the labels lie in their 90 % interval over {over}\n",
+            100.0 * found.coverage90
+        );
         if found.traces.0 > 0 {
             text += &format!("{} traces: {:.3} N between their readings\n", found.traces.0, found.traces.1);
         }

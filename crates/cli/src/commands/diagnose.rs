@@ -9,6 +9,7 @@ use crate::failure::Failure;
 use crate::load::{folders, jobs, load_library, load_twin, no_pulls, suspects, within_rig};
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
+use crate::posterior;
 use crate::progress::Share;
 use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
@@ -29,7 +30,8 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
         .reads_all(&args.rig)
         .reads_all(&args.sensor)
         .reads_config(&args.twin, &args.set);
-    outputs.allow_all([args.out.as_deref(), args.report.as_deref()].into_iter().flatten())?;
+    args.out.as_deref().map_or(Ok(()), |out| posterior::allow(&mut outputs, out))?;
+    outputs.allow_all(args.report.as_deref())?;
     let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let diagnosed = if is_press_set(&args.measured) {
         presses::presses(args)?

@@ -29,6 +29,8 @@ fn follow(path: &Path, depth: usize, found: &mut Vec<PathBuf>) {
     if path.extension().is_none_or(|e| e != "toml") {
         return;
     }
+    // The draws that a sweep may take from beside its twin.
+    follow(&path.with_extension("posterior.csv"), depth, found);
     let Some(document) = std::fs::read_to_string(path).ok().and_then(|text| text.parse::<DocumentMut>().ok())
     else {
         return;

@@ -137,3 +137,61 @@ fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
         assert!(text(&refused.stderr).contains(says), "{says}: {}", text(&refused.stderr));
     }
 }
+
+/// Three pulls are calibrated and their draws lie beside the twin; a second time they are replaced, edited ones are not. `compare` reads
+/// them, a sweep draws from them, and of one pull a diagnosis says what it shows.
+#[test]
+fn few_pulls_leave_draws_beside_their_twin() {
+    let three = folder(&pulls(3));
+    let (at, twin) = (three.path().to_str().unwrap(), three.path().join("few.toml"));
+    let draws = three.path().join("few.posterior.csv");
+    let arguments = ["calibrate", "pulls", at, "--law", "offset", "-o", twin.to_str().unwrap(), "--json"];
+    let fitted = run(&arguments);
+    assert_code(&fitted, 0);
+    let json: serde_json::Value = serde_json::from_slice(&fitted.stdout).unwrap();
+    assert_eq!(json["posterior"]["file"], "few.posterior.csv");
+    let table = std::fs::read_to_string(&draws).unwrap();
+    assert!(table.starts_with("weight,cause,"), "{table}");
+    assert_eq!(json["posterior"]["draws"].as_u64().unwrap() as usize, table.lines().count() - 1);
+    let law = &json["laws"][0]["b_n"];
+    assert!(law["low90"].as_f64().unwrap() < 0.0 && law["high90"].as_f64().unwrap() > 0.0, "{law}");
+    assert_code(&run(&arguments), 0);
+
+    let compared = run(&["compare", at, "--twin", twin.to_str().unwrap(), "--json"]);
+    assert_code(&compared, 0);
+    let json: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
+    assert_eq!(json["coverage90"], 1.0, "{json}");
+    assert_eq!(json["pulls"]["coverage90"], json["coverage90"]);
+
+    let sweep = three.path().join("sweep.toml");
+    let text_of = "twin = \"few.toml\"\nsamples = 6\nimages = \"none\"\nmechanics = \"reduced\"\n[vary]\npart = [\"long_shaft\"]\ntwin = { from = \"posterior\" }\n";
+    std::fs::write(&sweep, text_of).unwrap();
+    let out = three.path().join("run");
+    assert_code(&run(&["sweep", sweep.to_str().unwrap(), "-o", out.to_str().unwrap(), "-q"]), 0);
+    let index = std::fs::read_to_string(out.join("index.csv")).unwrap();
+    let header: Vec<&str> = index.lines().next().unwrap().split(',').collect();
+    let place = |name: &str| header.iter().position(|c| *c == name).unwrap();
+    let (cause, b_n) = (place("twin.cause"), place("effects.load_offset.long_shaft.b_n"));
+    let rows: Vec<Vec<&str>> = index.lines().skip(1).map(|row| row.split(',').collect()).collect();
+    assert!(rows.len() == 6 && rows.iter().all(|row| row[cause] == "load_offset"), "{index}");
+    assert!(rows.iter().any(|row| row[b_n] != rows[0][b_n]), "{index}");
+    assert_code(&run(&["verify", out.to_str().unwrap()]), 0);
+
+    // What somebody edited stays.
+    std::fs::write(&draws, table.replacen("load_offset", "none", 1)).unwrap();
+    assert_code(&run(&arguments), 2);
+    let mut forced = arguments.to_vec();
+    forced.push("--force");
+    assert_code(&run(&forced), 0);
+
+    let one = folder(&pulls(1));
+    let twin = one.path().join("one.toml");
+    let asked = ["diagnose", one.path().to_str().unwrap(), "-o", twin.to_str().unwrap(), "--json"];
+    let found = run(&asked);
+    assert_code(&found, 0);
+    let json: serde_json::Value = serde_json::from_slice(&found.stdout).unwrap();
+    assert_eq!(json["verdict"], "insufficient");
+    assert_eq!(json["posterior"]["file"], "one.posterior.csv");
+    assert!(one.path().join("one.posterior.csv").is_file() && one.path().join("next.toml").is_file());
+    assert_code(&run(&asked), 0);
+}

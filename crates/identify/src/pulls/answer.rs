@@ -10,6 +10,7 @@ use super::heldout::{
 };
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::paying::{by_chance, paying};
+use super::posterior::of_diagnosis;
 use super::power::ScoreTest;
 use super::residual::{in_place_of_curves, kept};
 use super::ridge::ahead;
@@ -23,9 +24,9 @@ use crate::diagnosis::{
     Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate, Residual, Rival,
     SeparateBy, UnknownCovariate,
 };
-use gripgen_twin::MeasuredPulls;
 use gripgen_twin::columns::covariates;
 use gripgen_twin::rounded;
+use gripgen_twin::{MeasuredPulls, Posterior};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
@@ -82,6 +83,8 @@ pub struct PullFits {
     pub heldout_label_n: [Vec<f64>; 2],
     /// Labels predicted by the fits to all pulls, before and after.
     pub label_n: [Vec<f64>; 2],
+    /// Draws of cause and parameters.
+    pub posterior: Posterior,
 }
 
 /// What may be asked of a diagnosis.
@@ -248,7 +251,11 @@ pub fn diagnose_pulls(
     progress(0.96);
     diagnosis.would_have_seen = would_have_seen(&context, &after, &search.candidates);
     progress(1.0);
+    let size = (rows.len(), &data.parts[..]);
+    let posterior =
+        of_diagnosis(&stated_before, &after, &accepted, &diagnosis, size, context.assumed_ratio());
     let fits = PullFits {
+        posterior,
         before: stated_before,
         after,
         candidates: search.candidates.clone(),
@@ -311,7 +318,7 @@ fn confirmed(
     }
 }
 
-fn blank(data: &PullData<'_>) -> Diagnosis {
+pub(super) fn blank(data: &PullData<'_>) -> Diagnosis {
     let known = covariates().filter(|c| !c.holds_words()).map(|c| c.name);
     let data_summary = DataSummary {
         pulls: Some(data.len()),
@@ -331,7 +338,7 @@ fn blank(data: &PullData<'_>) -> Diagnosis {
 }
 
 /// What the data lack, if they cannot be diagnosed at all.
-pub(super) fn insufficient(data: &PullData<'_>) -> Option<String> {
+pub fn insufficient(data: &PullData<'_>) -> Option<String> {
     let n = data.len();
     if n < MIN_PULLS {
         return Some(format!("{n} pulls are too few, a diagnosis needs {MIN_PULLS} at least"));
@@ -437,7 +444,7 @@ fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize) ->
 }
 
 pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
-    let mut values = BTreeMap::new();
+    let mut values = plain_baseline(&fitted.model, context);
     let unit = |name: &str| if name.ends_with("_s") { "s" } else { "1" };
     for (k, name) in fitted.names.iter().enumerate() {
         if !(name.starts_with("parts.") || name.starts_with("robot.") || name == "kinetic_ratio") {
@@ -447,11 +454,17 @@ pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<Strin
         let estimate = ParameterEstimate::new(value, (value - half, value + half), unit(name));
         values.insert(name.clone(), estimate);
     }
-    let m = &fitted.model;
+    let scattered = scatter(&fitted.model, fitted.likelihood.scale);
+    values.insert("scatter".into(), ParameterEstimate::new(scattered, (scattered, scattered), "1"));
+    values
+}
+
+/// What a model says of the rig, without intervals but that of the noise.
+pub(super) fn plain_baseline(m: &PullModel, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
+    let mut values = BTreeMap::new();
     let plain = |value: f64, unit: &str| ParameterEstimate::new(value, (value, value), unit);
-    values.entry("robot.lag_s".into()).or_insert_with(|| plain(m.lag_s, "s"));
-    values.entry("robot.dead_time_s".into()).or_insert_with(|| plain(m.dead_time_s, "s"));
-    values.insert("scatter".into(), plain(scatter(m, fitted.likelihood.scale), "1"));
+    values.insert("robot.lag_s".into(), plain(m.lag_s, "s"));
+    values.insert("robot.dead_time_s".into(), plain(m.dead_time_s, "s"));
     let noise90_n = context.noise90_n.unwrap_or((m.noise_n, m.noise_n));
     values.insert("wrist.noise_n".into(), ParameterEstimate::new(m.noise_n, noise90_n, "N"));
     if !context.observations.is_empty() {

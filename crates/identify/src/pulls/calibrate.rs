@@ -6,17 +6,23 @@ use super::context::Context;
 use super::data::PullData;
 use super::dynamics::Dynamics;
 use super::estimates::parameters;
+use super::few::{FEW_PULLS, calibrate_few, lacks_forces};
 use super::fitting::Fitted;
 use super::heldout::{errors, folds, predicted};
 use super::intervals::NormalFit;
+use super::law::largest_relative_sigma;
 use super::model::{PredictPulls, PullModel};
+use super::posterior::of_calibration;
+use super::priors::PullPriors;
 use super::scatter::scatter;
 use super::slip::Slips;
 use super::terms::Terms;
 use crate::diagnosis::{HeldOutError, ParameterEstimate};
-use gripgen_twin::MeasuredPulls;
 use gripgen_twin::effects::{EffectSpec, OFFSET_LAW, find};
+use gripgen_twin::{MeasuredPulls, Posterior};
 use std::collections::BTreeMap;
+
+pub use super::law::OffsetLaw;
 
 /// Least scatter with which a fit weighs residuals.
 const MIN_SCATTER: f64 = 0.002;
@@ -31,30 +37,15 @@ pub struct CalibrateRequest {
     pub offset_law: bool,
     /// Effects of the library, by id.
     pub effects: Vec<String>,
-}
-
-/// The offset law of a part: its coefficient is mu (a + b / F_G) with the mu of the twin.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OffsetLaw {
-    /// The part.
-    pub part: String,
-    /// Coefficient a, 1.
-    pub a: ParameterEstimate,
-    /// Coefficient b.
-    pub b_n: ParameterEstimate,
-    /// Covariance of (a, b): variance of a, covariance in N, variance of b in N^2.
-    pub covariance: [f64; 3],
-    /// Largest relative standard deviation of the coefficient over the grip forces of the fit.
-    pub largest_relative_sigma: f64,
-    /// The same, of a fit to the least, the middle and the largest grip force alone.
-    pub of_three_levels: Option<f64>,
+    /// What is believed before the first pull, which counts where there are few. Without it few pulls are refused.
+    pub priors: Option<PullPriors>,
 }
 
 /// A calibrated baseline.
 #[derive(Debug, Clone)]
 pub struct PullCalibration {
-    /// The fit.
-    pub fitted: Fitted,
+    /// The model.
+    pub model: PullModel,
     /// Baseline values by key.
     pub baseline: BTreeMap<String, ParameterEstimate>,
     /// Effects by id, with their parameters.
@@ -65,6 +56,10 @@ pub struct PullCalibration {
     pub error: Option<HeldOutError>,
     /// Grip forces of the pulls.
     pub grip_force_n: (f64, f64),
+    /// Draws of cause and parameters.
+    pub posterior: Posterior,
+    /// What is to be known beside it.
+    pub notes: Vec<String>,
 }
 
 /// Why there is no calibration.
@@ -110,7 +105,25 @@ pub fn calibrate_pulls(
     request: &CalibrateRequest,
 ) -> Result<PullCalibration, CalibrateError> {
     let data = PullData::new(measured);
-    if let Some(missing) = insufficient(&data) {
+    let forces = || measured.pulls.iter().map(|p| p.grip_force_n);
+    let range = forces().fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
+    let missing = insufficient(&data);
+    let few = data.len() <= FEW_PULLS || missing.is_some() || (request.offset_law && lacks_forces(&data));
+    if let Some(priors) = request.priors.as_ref().filter(|_| few && request.effects.is_empty()) {
+        let found = calibrate_few(&data, predictor, given, priors, request.offset_law)
+            .ok_or(CalibrateError::NoFit)?;
+        return Ok(PullCalibration {
+            model: found.model,
+            baseline: found.baseline,
+            effects: vec![],
+            laws: found.laws,
+            error: None,
+            grip_force_n: range,
+            posterior: found.posterior,
+            notes: found.notes,
+        });
+    }
+    if let Some(missing) = missing {
         return Err(CalibrateError::Insufficient(missing));
     }
     let max_n = data.label_n.iter().copied().fold(0.0, f64::max);
@@ -155,8 +168,8 @@ pub fn calibrate_pulls(
     // What is stated and written has no nuisance; how well it is known is that of the fit with it.
     let (stated, fitted) = context.stated(&found);
     let held = predicted(&stated, &fitted, &folds(data.len()), false);
-    let forces = || measured.pulls.iter().map(|p| p.grip_force_n);
-    let range = forces().fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
+    let law_of = request.offset_law.then_some(&given.mu[..]);
+    let drawn = of_calibration(&found, &normal, &fitted, &data.parts, law_of);
     let laws =
         if request.offset_law { laws(&context, &found, &normal, &terms, given, range) } else { vec![] };
     let effects = terms
@@ -170,7 +183,7 @@ pub fn calibrate_pulls(
             baseline(&fitted, &stated),
             &found,
             &normal,
-            context.slips.as_ref(),
+            context.slips.as_ref().filter(|_| context.kinetic.is_some()),
             dynamics,
             scattered,
         ),
@@ -178,7 +191,9 @@ pub fn calibrate_pulls(
         laws,
         error: errors(&data.label_n, &held, &held, &data.group_of, &rows).map(|pair| pair.after),
         grip_force_n: range,
-        fitted,
+        posterior: drawn,
+        notes: vec![],
+        model: fitted.model,
     })
 }
 
@@ -253,12 +268,7 @@ fn laws(
         let ends = both.map(|(value, slope)| normal.of(value, slope));
         Some((both[0].0, both[1].0, [shared(0, 0), shared(0, 1), shared(1, 1)], ends))
     };
-    let largest = |(a, b, [aa, ab, bb], _): Law| {
-        (0..=40)
-            .map(|k| range.0 + (range.1 - range.0) * f64::from(k) / 40.0)
-            .map(|f| (aa + 2.0 * ab / f + bb / (f * f)).max(0.0).sqrt() / (a + b / f).abs().max(1e-9))
-            .fold(0.0, f64::max)
-    };
+    let largest = |(a, b, covariance, _): Law| largest_relative_sigma((a, b), covariance, range);
     (0..context.data.parts.len())
         .filter_map(|part| {
             let law = of(fitted, normal, part)?;

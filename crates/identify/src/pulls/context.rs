@@ -73,7 +73,7 @@ pub struct Context<'a> {
     pub observed: Vec<Option<usize>>,
     /// Ratio of sliding to slipping forces over all traces, and its standard error.
     pub kinetic: Option<(f64, f64)>,
-    /// What the slips of all traces say.
+    /// What the slips of all traces say, be there as few as one.
     pub slips: Option<Slips>,
     /// The baseline as the traces see it.
     pub base: PullModel,
@@ -264,8 +264,8 @@ impl<'a> Context<'a> {
         if slipped.len() >= 3 {
             self.kinetic = Some((slips.ratio, libm::hypot(slips.ratio_sd, slips.model_sd)));
             self.base.kinetic_ratio = slips.ratio;
-            self.slips = Some(slips);
         }
+        self.slips = Some(slips);
     }
 
     /// The rows of a trace that slipped, with its number and its reading without load.
@@ -313,7 +313,7 @@ impl<'a> Context<'a> {
     }
 
     /// Predictions of the pulls at `rows`; those with a slip in their trace have no label.
-    fn predicted(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
+    pub(super) fn predicted(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
         let seen: Vec<usize> = rows.iter().copied().filter(|&i| self.limit_of(i).is_some()).collect();
         let unseen: Vec<usize> = rows.iter().copied().filter(|&i| self.limit_of(i).is_none()).collect();
         let mut slips = self.predictor.slips(model, &seen).into_iter();
@@ -324,14 +324,17 @@ impl<'a> Context<'a> {
 
     /// Standard deviation of what is compared of each pull: its slip where there is a trace, its label otherwise.
     pub(super) fn deviations(&self, model: &PullModel, rows: &[usize]) -> Vec<f64> {
-        let each = |(&i, p): (&usize, &PullPrediction)| match self.limit_of(i) {
+        rows.iter().zip(&self.predicted(model, rows)).map(|(&i, p)| self.deviation_n(model, i, p)).collect()
+    }
+
+    pub(super) fn deviation_n(&self, model: &PullModel, row: usize, p: &PullPrediction) -> f64 {
+        match self.limit_of(row) {
             Some(limit) => {
                 let scatter = model.scatter * p.limit_n;
                 (scatter * scatter + limit.sd_n * limit.sd_n + 0.03 * 0.03).sqrt()
             }
             None => (p.label_sd_n * p.label_sd_n + 0.03 * 0.03).sqrt(),
-        };
-        rows.iter().zip(&self.predicted(model, rows)).map(each).collect()
+        }
     }
 
     pub(super) fn limit_of(&self, row: usize) -> Option<SlipLimit> {
@@ -340,18 +343,22 @@ impl<'a> Context<'a> {
 
     /// What was measured less what is predicted, in standard deviations, of the pulls at `rows`.
     pub(super) fn friction_residuals(&self, model: &PullModel, rows: &[usize], sd: &[f64]) -> Vec<f64> {
-        let each = |((&i, p), sd): ((&usize, &PullPrediction), &f64)| match self.limit_of(i) {
+        let predicted = self.predicted(model, rows);
+        rows.iter().zip(&predicted).zip(sd).map(|((&i, p), sd)| self.difference_n(model, i, p) / sd).collect()
+    }
+
+    pub(super) fn difference_n(&self, model: &PullModel, row: usize, p: &PullPrediction) -> f64 {
+        match self.limit_of(row) {
             Some(limit) => {
                 let read_at = self.kinetic.map_or(model.kinetic_ratio, |k| k.0);
                 let limit_n = limit.value_n + limit.slope_n * (model.kinetic_ratio - read_at);
-                (limit_n - p.limit_reading_n - model.misread_n) / sd
+                limit_n - p.limit_reading_n - model.misread_n
             }
             None => {
-                let predicted_n = p.label_n + self.above_fast_n[i] + model.misread_n;
-                (self.data.label_n[i] - predicted_n) / sd
+                let predicted_n = p.label_n + self.above_fast_n[row] + model.misread_n;
+                self.data.label_n[row] - predicted_n
             }
-        };
-        rows.iter().zip(&self.predicted(model, rows)).zip(sd).map(each).collect()
+        }
     }
 
     /// What the readings of the traces at `rows` differ from a model by, in standard deviations: their mean over all

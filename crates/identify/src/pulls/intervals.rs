@@ -6,6 +6,7 @@
 
 use super::fitting::Fitted;
 use crate::bounded::interval90;
+use crate::draws::Draws;
 use crate::grouped::t_quantile_95;
 use nalgebra::{DMatrix, DVector};
 
@@ -25,6 +26,9 @@ const RANGE: f64 = 1.3;
 
 /// Standard deviation of a kinetic ratio of which nothing is known.
 const WIDE: f64 = 0.5;
+
+/// Draws that may lie beyond an end before one is put onto it.
+const TRIES: usize = 4000;
 
 /// Bounds of the parameters that end.
 fn bounds(name: &str) -> Option<(f64, f64)> {
@@ -77,6 +81,36 @@ impl NormalFit {
     /// Covariance of the parameters.
     pub fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
+    }
+
+    /// Draws of the parameters: normal inside the bounds, with the scale of Student's t, `wider` times as wide. `lane` keeps the draws of
+    /// several fits apart.
+    pub fn draws(&self, count: usize, wider: f64, lane: u64) -> Vec<Vec<f64>> {
+        let n = self.free.len();
+        let Some(root) = (self.covariance.clone() * (wider * wider)).cholesky().map(|c| c.l()) else {
+            return vec![self.fitted.iter().copied().collect(); count];
+        };
+        let mut random = Draws::new(43, lane);
+        let inside = |x: &DVector<f64>| self.ends.iter().all(|(i, b)| (b.0..=b.1).contains(&x[*i]));
+        let mut draw = || {
+            // A chi-squared variable over its degrees of freedom (Wilson and Hilferty 1931).
+            let few = 2.0 / (9.0 * self.freedom);
+            let chi2 = (1.0 - few + random.normal() * few.sqrt()).max(0.05).powi(3);
+            &self.free + &root * DVector::from_fn(n, |_, _| random.normal()) / chi2.sqrt()
+        };
+        (0..count)
+            .map(|_| {
+                let mut x = draw();
+                for _ in 0..TRIES {
+                    if inside(&x) {
+                        break;
+                    }
+                    x = draw();
+                }
+                self.ends.iter().for_each(|(i, b)| x[*i] = x[*i].clamp(b.0, b.1));
+                x.iter().copied().collect()
+            })
+            .collect()
     }
 
     /// 90 % interval of a parameter.

@@ -54,6 +54,7 @@ fn distribution(key: &str, value: &toml::Value) -> Result<Distribution, ConfigEr
                 .collect::<Result<_, _>>()?;
             Ok(Distribution::Choice(values))
         }
+        toml::Value::Table(table) if key == POSTERIOR_KEY => posterior(&place, table),
         toml::Value::Table(table) => {
             let [(name, argument)] = &table.iter().collect::<Vec<_>>()[..] else {
                 return Err(ConfigError::new(place, "a distribution has exactly one of its names as key")
@@ -63,6 +64,22 @@ fn distribution(key: &str, value: &toml::Value) -> Result<Distribution, ConfigEr
         }
         other => Ok(Distribution::Choice(vec![drawn(&place, other)?])),
     }
+}
+
+/// The key whose values are those of a posterior.
+const POSTERIOR_KEY: &str = "twin";
+
+/// `twin = { from = "posterior" }`, with the file where it is not the one beside the twin.
+fn posterior(place: &str, table: &toml::Table) -> Result<Distribution, ConfigError> {
+    let word = |key: &str| table.get(key).and_then(toml::Value::as_str).map(String::from);
+    let file = word("file");
+    let known = table.keys().all(|key| key == "from" || (key == "file" && file.is_some()));
+    if word("from").as_deref() == Some("posterior") && known {
+        return Ok(Distribution::Posterior { file });
+    }
+    let found = toml::Value::Table(table.clone());
+    Err(ConfigError::new(place, format!("the twin cannot be drawn from {found}"))
+        .hint("write twin = { from = \"posterior\" }, with file = \"NAME.csv\" where it is not the one beside the twin"))
 }
 
 fn named(place: &str, name: &str, argument: &toml::Value) -> Result<Distribution, ConfigError> {
@@ -91,7 +108,7 @@ fn named(place: &str, name: &str, argument: &toml::Value) -> Result<Distribution
         }
         "from" if argument.as_str() == Some("interval") => Ok(Distribution::Interval),
         "from" => Err(ConfigError::new(place, format!("cannot draw from {argument}"))
-            .hint("the only source is from = \"interval\", the calibrated uncertainty of the key")),
+            .hint("the calibrated uncertainty of the key is from = \"interval\"; twin = { from = \"posterior\" } draws all keys together")),
         other => {
             let error = ConfigError::new(place, format!("there is no distribution `{other}`"));
             Err(match suggestion(other, NAMES) {

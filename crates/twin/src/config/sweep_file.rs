@@ -45,6 +45,7 @@ pub struct SweepFile {
     /// Values that vary: any key of the scenario, of `[pull]` (`pull.increment_n`) or of the twin
     /// (`parts.gear.mu`, `effects.wear.depth`). A value is a list, a plain value, `{ uniform = [low, high] }`,
     /// `{ log_uniform = [low, high] }`, `{ normal = [mean, deviation] }` or `{ from = "interval" }`.
+    /// `twin = { from = "posterior" }` draws cause and parameters together from the posterior beside the twin.
     #[serde(default)]
     #[schemars(with = "std::collections::BTreeMap<String, serde_json::Value>")]
     pub vary: toml::Table,

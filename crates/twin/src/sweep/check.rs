@@ -58,6 +58,7 @@ impl Sweep {
             trace: file.trace,
             shard_samples: file.shard_samples,
             vary,
+            posterior: None,
             pull: file.pull.clone(),
         };
         sweep.check_values(twin, &checked_twin)?;

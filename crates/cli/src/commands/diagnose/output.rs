@@ -5,7 +5,8 @@ use crate::failure::Failure;
 use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
-use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, Verdict};
+use crate::posterior;
+use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, PosteriorFile, Verdict};
 use gripgen::record::campaign_toml;
 use gripgen::{Diagnosed, Location, NextPulls, diagnosis_page, edited_twin_toml};
 use std::fmt::Write;
@@ -22,6 +23,12 @@ pub fn write(
         diagnosed.report.title = args.measured.display().to_string();
     }
     let next = write_next(args, outputs, &mut diagnosed)?;
+    let draws = args.out.as_deref().and_then(posterior::beside);
+    if let (Some(draws), Some(posterior)) = (draws.as_deref().and_then(Path::file_name), &diagnosed.posterior)
+    {
+        let file = draws.to_string_lossy().into_owned();
+        diagnosed.diagnosis.posterior = Some(PosteriorFile { file, draws: posterior.draws.len() });
+    }
     if let Some(report) = &args.report {
         outputs.write(report, Format::Html, diagnosis_page(&diagnosed).as_bytes())?;
     }
@@ -31,14 +38,19 @@ pub fn write(
     }
     if let Some(out) = &args.out {
         let text = edited_twin_toml(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out);
-        outputs.write(out, Format::Toml, text.map_err(Failure::new)?.as_bytes())?;
+        posterior::write(outputs, out, &text.map_err(Failure::new)?, diagnosed.posterior.as_ref())?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
         print(&summary(&diagnosed.diagnosis))?;
     }
     if !args.talk.quiet {
-        for (path, what) in [(&args.out, "the twin"), (&args.report, "the report"), (&next, "the next pulls")]
-        {
+        let draws = draws.filter(|_| diagnosed.posterior.is_some());
+        for (path, what) in [
+            (&args.out, "the twin"),
+            (&draws, "its posterior"),
+            (&args.report, "the report"),
+            (&next, "the next pulls"),
+        ] {
             if let Some(path) = path {
                 eprintln!("{what}: {}", path.display());
             }
