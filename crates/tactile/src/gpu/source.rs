@@ -140,14 +140,68 @@ fn writable(variant: Variant, name: &str, binding: u32) -> String {
     }
 }
 
+/// What a stage looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Sampling {
+    /// The centres of pixels.
+    Centres,
+    /// Nine points of each pixel beside a step.
+    Points,
+}
+
 /// Stage `raster`: entry points `top` and `fill`.
-pub(super) fn raster() -> String {
+pub(super) fn raster(sampling: Sampling) -> String {
+    let (sub, steps, store, stepped) = match sampling {
+        Sampling::Centres => ("1", "", "atomicMax(&heights[start + u32(x)], ordered(h));", ""),
+        Sampling::Points => (
+            "3",
+            "@group(0) @binding(8) var<storage, read> steps: array<f32>;\n\
+             @group(0) @binding(9) var<storage, read> stepped: array<u32>;\n",
+            "let pixel = start + u32(x) / 3u;\n        \
+             if steps[pixel] > 0.0 {\n            \
+             atomicMax(&heights[9u * pixel + 3u * (u32(row) % 3u) + u32(x) % 3u], ordered(h));\n        }",
+            " && stepped[image] != 0u",
+        ),
+    };
     common(include_str!("../../shaders/raster.wgsl"))
+        .replace("/*SUB*/", sub)
+        .replace("/*STEPS*/", steps)
+        .replace("/*STORE*/", store)
+        .replace("/*STEPPED*/", stepped)
+}
+
+/// The pixels beside a step.
+pub(super) fn steps(variant: Variant) -> String {
+    common(include_str!("../../shaders/steps.wgsl")).replace("//#PLANES", &readable(variant, "contact", 4))
 }
 
 /// Stage `indent`.
-pub(super) fn indent(variant: Variant) -> String {
-    common(include_str!("../../shaders/indent.wgsl")).replace("//#PLANES", &writable(variant, "contact", 4))
+pub(super) fn indent(variant: Variant, sampling: Sampling) -> String {
+    let (second, steps, points, again) = match sampling {
+        Sampling::Centres => ("false", "", "", ""),
+        Sampling::Points => (
+            "true",
+            "@group(0) @binding(6) var<storage, read> steps: array<f32>;\n\
+             @group(0) @binding(7) var<storage, read> points: array<u32>;\n\
+             @group(0) @binding(8) var<storage, read> stepped: array<u32>;\n",
+            "let weight = steps[start + pixel];\n    \
+             if weight > 0.0 {\n        \
+             var sum = vec2<f32>();\n        \
+             for (var k = 0u; k < 9u; k++) {\n            \
+             sum += touch(points[9u * (start + pixel) + k], pixel, top, press);\n        }\n        \
+             here += weight * (sum / 9.0 - here);\n    }",
+            "let before = outcomes[image];\n        \
+             newton.press = before.press_px;\n        \
+             newton.available = before.available_px3;\n        \
+             if before.status != 0u || stepped[image] == 0u {\n            newton.running = 0u;\n        }",
+        ),
+    };
+    common(include_str!("../../shaders/indent.wgsl"))
+        .replace("//#PLANES", &writable(variant, "contact", 4))
+        .replace("/*SECOND*/", second)
+        .replace("/*STEPS*/", steps)
+        .replace("/*POINTS*/", points)
+        .replace("/*AGAIN*/", again)
 }
 
 /// The gel at rest: `whole_surface` and `slope_at_rest`.

@@ -33,14 +33,21 @@ fn no_markers(source: &str) {
 
 #[test]
 fn every_stage_validates() {
-    let raster = validate("raster", &source::raster());
-    // The least that WebGPU allows.
-    assert!(workgroup_bytes(&raster) <= 16_384, "{} bytes", workgroup_bytes(&raster));
+    for sampling in [Sampling::Centres, Sampling::Points] {
+        let raster = source::raster(sampling);
+        no_markers(&raster);
+        let raster = validate("raster", &raster);
+        // The least that WebGPU allows.
+        assert!(workgroup_bytes(&raster) <= 16_384, "{} bytes", workgroup_bytes(&raster));
+    }
     validate("blur of shadows", &source::shadow_blur());
     for variant in VARIANTS {
-        let indent = source::indent(variant);
-        no_markers(&indent);
-        assert!(workgroup_bytes(&validate("indent", &indent)) <= 16_384);
+        for sampling in [Sampling::Centres, Sampling::Points] {
+            let indent = source::indent(variant, sampling);
+            no_markers(&indent);
+            assert!(workgroup_bytes(&validate("indent", &indent)) <= 16_384);
+        }
+        validate("steps", &source::steps(variant));
         for (shade, domed) in [
             (Shade::Lambert, false),
             (Shade::Lambert, true),
