@@ -164,12 +164,16 @@ impl GpuSensor {
         };
         let indent = [press(Sampling::Centres)?, find_steps, press(Sampling::Points)?];
         let mut between = Vec::new();
-        for (i, (kernel_px, restore)) in
-            kernels_px.iter().map(|&k| (k, true)).chain([(crate::deform::FINAL_KERNEL_PX, false)]).enumerate()
+        let follow = Some(on_processor.follow());
+        for (i, (kernel_px, restore)) in kernels_px
+            .iter()
+            .map(|&k| (k, follow))
+            .chain([(crate::deform::FINAL_KERNEL_PX, None)])
+            .enumerate()
         {
             let from = if i == 0 { &contact } else { &surface };
             let lift = shape.lift_px.get(i).map(|lift| resident(device, "lift", lift));
-            let ways = [(Axis::Y, from, &half_way, false), (Axis::X, &half_way, &surface, restore)];
+            let ways = [(Axis::Y, from, &half_way, None), (Axis::X, &half_way, &surface, restore)];
             for (axis, source, blurred, restore) in ways {
                 let lift = lift.as_ref().filter(|_| axis == Axis::X);
                 let stage =
@@ -178,7 +182,7 @@ impl GpuSensor {
                 let all = all.into_iter().chain([source.binding(), blurred.binding()]);
                 let all = all.enumerate().map(|(i, r)| (i as u32, r));
                 let all: Vec<_> = all
-                    .chain(restore.then(|| (4, contact.binding())))
+                    .chain(restore.map(|_| (4, contact.binding())))
                     .chain(lift.map(|lift| (5, lift.as_entire_binding())))
                     .collect();
                 let bound = bind_at(device, &stage, all);

@@ -1,5 +1,6 @@
 //! WGSL sources: files put together, and the blurs with their weights written out.
 
+use crate::convolve::Follow;
 use crate::deform::gaussian;
 use std::fmt::Write;
 
@@ -96,8 +97,8 @@ pub(super) struct BlurShape {
 pub(super) struct Blur {
     pub(super) kernel_px: u32,
     pub(super) axis: Axis,
-    /// Whether the core of the contact gets its height back afterwards.
-    pub(super) restore: bool,
+    /// Whether and how the core of the contact gets its height back afterwards.
+    pub(super) restore: Option<Follow>,
     /// Whether the gel is not flat at rest, so that a blur moves it: added to the core, or to all after the last blur.
     pub(super) lifted: bool,
 }
@@ -326,7 +327,7 @@ pub(super) fn blur(variant: Variant, blur: Blur, workgroup_bytes: u32) -> Option
     let planes = [
         readable(variant, "source", 2),
         writable(variant, "blurred", 3),
-        if blur.restore { readable(variant, "contact", 4) } else { String::new() },
+        if blur.restore.is_some() { readable(variant, "contact", 4) } else { String::new() },
         match blur.lifted {
             true => "@group(0) @binding(5) var<storage, read> lift: array<f32>;\n".into(),
             false => String::new(),
@@ -343,13 +344,19 @@ pub(super) fn blur(variant: Variant, blur: Blur, workgroup_bytes: u32) -> Option
         let _ = writeln!(restore, "let lift_px = lift[{from_y} * frame.width_px + {from_x}];");
     }
     restore += &match (blur.restore, blur.lifted) {
-        (true, lifted) => format!(
-            "let depth = load_contact({from_x}, {from_y}, image);\n            \
-             if depth > outcomes[image].core_px {{ value = depth{}; }}",
-            if lifted { " + lift_px" } else { "" }
-        ),
+        (Some(follow), lifted) => {
+            let core = if lifted { "depth + lift_px" } else { "depth" };
+            let core = match follow {
+                Follow::Exactly => core.into(),
+                Follow::AtLeast => format!("max(value, {core})"),
+            };
+            format!(
+                "let depth = load_contact({from_x}, {from_y}, image);\n            \
+                 if depth > outcomes[image].core_px {{ value = {core}; }}"
+            )
+        }
         // Keeps the binding in use, so that all blurs have the same layout.
-        (false, lifted) => {
+        (None, lifted) => {
             format!("value += 0.0 * outcomes[image].core_px{};", if lifted { " + lift_px" } else { "" })
         }
     };

@@ -1,6 +1,7 @@
 //! Every WGSL source that can be generated, without an adapter. Whether it computes the right thing is for `tests.rs`.
 
-use super::source::{self, Axis, Blur, Ceiling, Shade, Step, Variant};
+use super::source::{self, Axis, Blur, Ceiling, Sampling, Shade, Step, Variant};
+use crate::convolve::Follow;
 use wgpu::naga;
 
 const VARIANTS: [Variant; 3] = [Variant::Texture { run: 16 }, Variant::Texture { run: 40 }, Variant::Tile];
@@ -87,7 +88,13 @@ fn every_blur_validates_and_fits_the_workgroup_memory() {
     for variant in VARIANTS {
         for kernel_px in KERNELS_PX {
             for axis in [Axis::X, Axis::Y] {
-                for (restore, lifted) in [(true, false), (false, false), (true, true), (false, true)] {
+                for (restore, lifted) in [
+                    (Some(Follow::Exactly), false),
+                    (Some(Follow::AtLeast), false),
+                    (None, false),
+                    (Some(Follow::Exactly), true),
+                    (None, true),
+                ] {
                     for bytes in [16_384, 32_768, 49_152] {
                         let blur = Blur { kernel_px, axis, restore, lifted };
                         let what = format!("{variant:?} {blur:?} {bytes}");
@@ -109,6 +116,6 @@ fn every_blur_validates_and_fits_the_workgroup_memory() {
 
 #[test]
 fn a_tile_that_fits_nowhere_is_refused() {
-    let blur = Blur { kernel_px: 71, axis: Axis::X, restore: true, lifted: false };
+    let blur = Blur { kernel_px: 71, axis: Axis::X, restore: Some(Follow::AtLeast), lifted: false };
     assert_eq!(source::blur(Variant::Tile, blur, 1024), None);
 }
