@@ -309,12 +309,16 @@ impl GpuSensor {
         let common = common.into_iter().enumerate().map(|(i, buffer)| (i as u32, buffer));
         let all = common.chain([(5, &self.presses), (6, &self.tops)]);
         let drawn = |into| all.clone().chain([(4, &mesh.triangles), (7, into)]);
-        let bound = |stage: usize, all: &mut dyn Iterator<Item = (u32, &wgpu::Buffer)>| {
-            let all = all.map(|(i, buffer)| (i, buffer.as_entire_binding()));
-            bind_at(device, &self.raster[stage], all.collect::<Vec<_>>())
+        let bound = |stage: usize, all: Vec<(u32, &wgpu::Buffer)>| {
+            let all = all.into_iter().map(|(i, buffer)| (i, buffer.as_entire_binding()));
+            bind_at(device, &self.raster[stage], all)
         };
         let points = drawn(&self.points).chain([(8, &self.steps), (9, &self.stepped)]);
-        [bound(0, &mut all.clone()), bound(1, &mut drawn(&self.heights)), bound(2, &mut { points })]
+        [
+            bound(0, all.clone().collect()),
+            bound(1, drawn(&self.heights).collect()),
+            bound(2, points.collect()),
+        ]
     }
 
     /// Adds the copy of a batch's images, then outcomes, to the ring's buffer.

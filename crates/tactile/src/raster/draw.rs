@@ -316,7 +316,7 @@ impl Kernel for DrawPoints<'_> {
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
         let HeightMap { seen, corners, steps, view, .. } = self.map;
-        for s in seen.iter() {
+        for s in &*seen {
             if s.top_px < self.floor_px || !steps.any_in(s.rows, s.columns) {
                 continue;
             }

@@ -16,8 +16,8 @@ use crate::grid::Grid;
 use crate::sensor::{GelShape, Pyramid};
 use std::cell::OnceCell;
 
-/// How the gel follows a part in the core of its contact.
-pub(super) const FOLLOW: Follow = Follow::AtLeast;
+/// How the gel follows a part in the core of its contact. The other way was not tried on presses that are held out.
+pub(super) const FOLLOW: Follow = Follow::Exactly;
 
 /// Finest of the blurs, and the widest that are tried, in millimetres.
 const FINEST_MM: f64 = 0.5;
