@@ -13,7 +13,7 @@ use gripgen_tactile::presses::{
     Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, IndenterError, IndenterPose, Press,
     PressSet, USUAL_SINK_IN, find_circle, reference_frame,
 };
-use gripgen_tactile::{Pyramid, Sensor, finish};
+use gripgen_tactile::{Follow, Pyramid, Sensor, finish};
 use gripgen_twin::config::ImageNoise;
 use gripgen_twin::{Optics, TactileImage, Twin};
 use std::path::{Path, PathBuf};
@@ -349,6 +349,7 @@ pub fn load_twin_sensor(twin: &Location) -> Result<Arc<Sensor>, LoadSensorError>
         kernels_px: gel.left.kernels_px,
         restore_depth_fraction: gel.left.restore_depth_fraction,
         sink_in_fraction: 0.0,
+        follow: Follow::AtLeast,
     };
     Ok(Arc::new(Sensor { pyramid: sensor.pyramid.clone().or(Some(pyramid)), ..(*sensor).clone() }))
 }

@@ -3,11 +3,14 @@
 // Newton's method on sum max(0, below + press) = wanted from the deep side, which converges monotonically and ends
 // when the set of touching pixels no longer changes. One workgroup an image; sums are taken in blocks of 16 values, so
 // that they lose no more than a few bits of 24.
+//
+// It runs twice: by the centres of pixels, then, in images with a step, with the points of the pixels beside it.
 
 const THREADS = 256u;
 const BLOCK = 16u;
 // Newton ends after 2 to 8 steps (median 6); this only bounds what rounding could make of it.
 const MAX_STEPS = 24u;
+const SECOND = /*SECOND*/;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> presses: array<PressInput>;
@@ -16,15 +19,16 @@ const MAX_STEPS = 24u;
 // The gel surface at rest towards the part, in pixels, at most 0.
 @group(0) @binding(5) var<storage, read> rest: array<f32>;
 //#PLANES
+/*STEPS*/
 
 var<workgroup> volumes: array<f32, THREADS>;
-var<workgroup> counts: array<u32, THREADS>;
+var<workgroup> counts: array<f32, THREADS>;
 var<workgroup> highest: atomic<u32>;
 var<workgroup> newton: Newton;
 
 struct Newton {
     press: f32,
-    touching: u32,
+    touching: f32,
     running: u32,
     available: f32,
 }
@@ -34,21 +38,30 @@ fn above_gel(code: u32, pixel: u32) -> f32 {
     return unordered(code) + rest[pixel];
 }
 
+// Depth at a height that is there, and whether it touches.
+fn touch(code: u32, pixel: u32, top: f32, press: f32) -> vec2<f32> {
+    let depth = (above_gel(code, pixel) - top) + press;
+    return select(vec2<f32>(), vec2<f32>(depth, 1.0), code != 0u && depth > 0.0);
+}
+
+// Depth of a pixel, and how much of it touches.
+fn pressed_in(start: u32, pixel: u32, top: f32, press: f32) -> vec2<f32> {
+    var here = touch(heights[start + pixel], pixel, top, press);
+    /*POINTS*/
+    return here;
+}
+
 // Volume and pixels in contact at a press, of all threads together, in place 0.
 fn measure(start: u32, pixels: u32, thread: u32, top: f32, press: f32) {
     var volume = 0.0;
-    var count = 0u;
+    var count = 0.0;
     for (var block = thread * BLOCK; block < pixels; block += THREADS * BLOCK) {
-        var part = 0.0;
+        var part = vec2<f32>();
         for (var i = block; i < min(block + BLOCK, pixels); i++) {
-            let code = heights[start + i];
-            let depth = (above_gel(code, i) - top) + press;
-            if code != 0u && depth > 0.0 {
-                part += depth;
-                count += 1u;
-            }
+            part += pressed_in(start, i, top, press);
         }
-        volume += part;
+        volume += part.x;
+        count += part.y;
     }
     volumes[thread] = volume;
     counts[thread] = count;
@@ -86,7 +99,8 @@ fn main(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) t
     let something = has_part && code != 0u;
     let top = select(0.0, unordered(code), something);
     if thread == 0u {
-        newton = Newton(frame.thickness_px, 0xffffffffu, select(0u, 1u, something), 0.0);
+        newton = Newton(frame.thickness_px, -1.0, select(0u, 1u, something), 0.0);
+        /*AGAIN*/
     }
     var step = 0u;
     loop {
@@ -96,28 +110,27 @@ fn main(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) t
         }
         measure(start, pixels, thread, top, now.press);
         if thread == 0u {
-            if step == 0u {
+            if step == 0u && !SECOND {
                 newton.available = volumes[0];
             }
-            if (step == 0u && volumes[0] < wanted) || counts[0] == now.touching || counts[0] == 0u {
+            if (step == 0u && !SECOND && volumes[0] < wanted) || counts[0] == now.touching || counts[0] < 1e-6 {
                 newton.running = 0u;
             } else {
                 newton.touching = counts[0];
-                newton.press = now.press - (volumes[0] - wanted) / f32(counts[0]);
+                newton.press = now.press - (volumes[0] - wanted) / counts[0];
             }
         }
         step += 1u;
     }
     let found = workgroupUniformLoad(&newton);
-    let deeper = something && found.available < wanted;
+    if SECOND && found.touching < 0.0 {
+        return;
+    }
+    let deeper = something && (found.available < wanted || found.press > frame.thickness_px);
     let press = found.press;
     let pressed = something && !deeper;
     for (var i = thread; i < pixels; i += THREADS) {
-        let height = heights[start + i];
-        var depth = 0.0;
-        if pressed && height != 0u {
-            depth = max((above_gel(height, i) - top) + press, 0.0);
-        }
+        let depth = select(0.0, pressed_in(start, i, top, press).x, pressed);
         store_contact(i % frame.width_px, i / frame.width_px, image, depth);
     }
     if thread == 0u {

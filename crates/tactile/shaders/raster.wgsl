@@ -3,8 +3,11 @@
 // Positions are whole pixels and a fraction, computed with integers: a 32-bit float has not the bits for 1e-6 pixels at
 // 500, no compiler rearranges integers, and a vertex has the same position in every cluster that uses it.
 // Heights are relative to `reference`, a whole pixel near the top; `indent` does not depend on it.
+//
+// The same source draws the points within pixels (src/raster/steps.rs), SUB to a side, where `steps` says so.
 
 const THREADS = 64u;
+const SUB = /*SUB*/;
 const MAX_VERTICES = 128u;
 const MAX_TRIANGLES = 128u;
 // Triangles over more pixels than this are filled by all threads of the group together.
@@ -19,6 +22,7 @@ const LARGE_PX = 128;
 // Whole pixels of the highest sampled vertex inside the window, sign bit flipped; 0 where there is none.
 @group(0) @binding(6) var<storage, read_write> tops: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read_write> heights: array<atomic<u32>>;
+/*STEPS*/
 
 struct Corner {
     x: i32,
@@ -79,6 +83,16 @@ fn corner(image: u32, x: i32, y: i32, z: i32) -> Corner {
 
 fn vertex(image: u32, index: u32) -> Corner {
     return corner(image, vertices[3u * index], vertices[3u * index + 1u], vertices[3u * index + 2u]);
+}
+
+// The same place counted in points; the middle point of a pixel is its centre.
+fn finer(c: Corner) -> Corner {
+    let fx = f32(SUB) * c.fx;
+    let fy = f32(SUB) * c.fy;
+    return Corner(
+        SUB * c.x + SUB / 2 + i32(floor(fx)), SUB * c.y + SUB / 2 + i32(floor(fy)), c.h,
+        fx - floor(fx), fy - floor(fy), c.fh,
+    );
 }
 
 // One thread per cluster: its first vertex stands for all. What lies deeper than the gel below the highest of them
@@ -190,16 +204,16 @@ fn fill_row(image: u32, a: Corner, b: Corner, c: Corner, row: i32, reference: i3
         return;
     }
     let first = max(left.x + i32(ceil(left.fx)), 0);
-    let last = min(right.x + i32(floor(right.fx)), i32(frame.width_px) - 1);
+    let last = min(right.x + i32(floor(right.fx)), SUB * i32(frame.width_px) - 1);
     let width = f32(right.x - left.x) + (right.fx - left.fx);
-    let start = (image * frame.height_px + u32(row)) * frame.width_px;
+    let start = (image * frame.height_px + u32(row) / u32(SUB)) * frame.width_px;
     for (var x = first; x <= last; x++) {
         var h = max(left.h, right.h);
         if width > 0.0 {
             // Not `mix`: a level row has to stay level to the bit.
             h = left.h + clamp((f32(x - left.x) - left.fx) / width, 0.0, 1.0) * (right.h - left.h);
         }
-        atomicMax(&heights[start + u32(x)], ordered(h));
+        /*STORE*/
     }
 }
 
@@ -213,12 +227,12 @@ fn fill_triangle(image: u32, packed: u32, offset: u32, step: u32, reference: i32
     let left = min(a.x, min(b.x, c.x));
     let right = max(a.x, max(b.x, c.x));
     let top_row = max(min(a.y, min(b.y, c.y)), 0);
-    let bottom_row = min(max(a.y, max(b.y, c.y)), i32(frame.height_px) - 1);
+    let bottom_row = min(max(a.y, max(b.y, c.y)), SUB * i32(frame.height_px) - 1);
     if f32(highest - reference) + 1.0 < floor_px || top_row > bottom_row
-        || right < 0 || left >= i32(frame.width_px) {
+        || right < 0 || left >= SUB * i32(frame.width_px) {
         return false;
     }
-    let columns = min(right, i32(frame.width_px)) - max(left, -1) + 1;
+    let columns = min(right, SUB * i32(frame.width_px)) - max(left, -1) + 1;
     if (bottom_row - top_row + 1) * columns > limit {
         return true;
     }
@@ -236,11 +250,11 @@ fn fill(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) t
     let found = atomicLoad(&tops[image]);
     let reference = select(bitcast<i32>(found ^ 0x80000000u), presses[image].bound_px, found == 0u);
     let floor_px = select(-frame.reach_px, -0x1p120f, found == 0u);
-    let seen = visible(image, cluster, reference, floor_px);
+    let seen = visible(image, cluster, reference, floor_px)/*STEPPED*/;
     let first_vertex = clusters[cluster].first_vertex;
     if seen {
         for (var i = thread; i < clusters[cluster].vertices; i += THREADS) {
-            corners[i] = vertex(image, first_vertex + i);
+            corners[i] = finer(vertex(image, first_vertex + i));
         }
     }
     if thread == 0u {

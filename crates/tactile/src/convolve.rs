@@ -203,6 +203,17 @@ impl Kernel for Transpose<'_> {
     }
 }
 
+/// What a blur leaves of the core of a contact, where the gel follows the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Follow {
+    /// The height of the part (Taxim). Where the core ends on a slanted wall, that lies below the blurred gel beside it: a
+    /// moat around the contact. Sensor files of before say nothing else.
+    Exactly,
+    /// The height of the part or of the blurred gel, whichever is deeper: the gel cannot lie inside the part, and where it is
+    /// deeper it has left it.
+    AtLeast,
+}
+
 /// What is put back after a blur: `core` where it is a number, plus `lift` where there is one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Restore<'a> {
@@ -212,6 +223,8 @@ pub(crate) struct Restore<'a> {
     pub(crate) area: Area,
     /// Added to them.
     pub(crate) lift: Option<&'a Sheet>,
+    /// Whether they stand for the blurred ones, or only where they are larger.
+    pub(crate) follow: Follow,
 }
 
 /// A surface that lies upright or transposed, and the memory to blur it in.
@@ -435,7 +448,10 @@ impl Columns<'_> {
             if let Some(lift) = restore.lift {
                 core = L::add(core, L::load(lift.values.as_ptr().add(lift.offset(y as isize) + x)));
             }
-            L::first_unless_nan(core, sum)
+            match restore.follow {
+                Follow::Exactly => L::first_unless_nan(core, sum),
+                Follow::AtLeast => L::larger_unless_nan(core, sum),
+            }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Stage `deform`: the gel around a contact, by a pyramid of blurs.
 
+use crate::convolve::Follow;
 use crate::convolve::{Area, Restore, Sheet, Surface};
 use crate::grid::Plane;
 use crate::indent::Imprint;
@@ -32,14 +33,14 @@ pub fn deform(
 ) -> Plane {
     let core_px = restore_depth_fraction * imprint.press_depth_m / metres_per_px;
     let mut scratch = DeformScratch::default();
-    scratch.deform(&imprint.depth_px, core_px, &weights(kernels_px), rest, level);
+    scratch.deform(&imprint.depth_px, (core_px, Follow::Exactly), &weights(kernels_px), rest, level);
     scratch.surface_plane()
 }
 
 /// [`deform`] with the weights of the kernels, of odd lengths, on a gel with any rest surface (towards the part).
 pub(crate) fn deform_with(
     depth_px: &Plane,
-    core_px: f64,
+    core: (f64, Follow),
     kernels: &[Vec<f32>],
     rest_px: Option<&Plane>,
     level: SimdLevel,
@@ -48,7 +49,7 @@ pub(crate) fn deform_with(
     let halves: Vec<Vec<f32>> = kernels.iter().chain([&last]).map(|k| k[k.len() / 2..].to_vec()).collect();
     let rest = rest_px.map(|rest| BlurredRest::with_weights(rest, &halves, level));
     let mut scratch = DeformScratch::default();
-    scratch.deform(depth_px, core_px, &halves, rest.as_ref(), level);
+    scratch.deform(depth_px, core, &halves, rest.as_ref(), level);
     scratch.surface_plane()
 }
 
@@ -137,11 +138,11 @@ pub(crate) struct DeformScratch {
 }
 
 impl DeformScratch {
-    /// The stage; the result stays here. `weights` are those of [`weights`].
+    /// The stage; the result stays here. `weights` are those of [`weights`]; the core is what is deeper than that.
     pub(crate) fn deform(
         &mut self,
         depth_px: &Plane,
-        core_px: f64,
+        (core_px, follow): (f64, Follow),
         weights: &[Vec<f32>],
         rest: Option<&BlurredRest>,
         level: SimdLevel,
@@ -161,8 +162,8 @@ impl DeformScratch {
         for (i, kernel) in restored.iter().enumerate() {
             let lift = rest.map(|r| &r.lowered[i]);
             let restore = [
-                Restore { core: &self.core[0], area: contact, lift },
-                Restore { core: &self.core[1], area: contact.transposed(), lift },
+                Restore { core: &self.core[0], area: contact, lift, follow },
+                Restore { core: &self.core[1], area: contact.transposed(), lift, follow },
             ];
             surface.blur(kernel, Some(&restore), 0, level);
         }
@@ -322,6 +323,36 @@ mod tests {
             rim > 0.05 * depth && rim < 0.9 * depth,
             "the gel rises around the contact: {rim} of {depth}"
         );
+    }
+
+    /// Real walls fall off monotonically. Where the core ends on a slanted wall, its own height lies below the blurred gel
+    /// beside it; to go back to it leaves a moat with a second slope behind.
+    #[test]
+    fn beside_a_slanted_wall_there_is_no_moat() {
+        for (press_px, steepness) in [(6.0, 1.0f32), (12.0, 1.0), (12.0, 2.0), (24.0, 2.0), (24.0, 4.0)] {
+            let mut depth = Plane::filled(240, 160, 0.0);
+            for (i, depth) in depth.values.iter_mut().enumerate() {
+                let (x, y) = ((i % 240) as f32, (i / 240) as f32);
+                let beyond = ((x - 100.0).abs() - 28.0).max(0.0);
+                *depth = if (y - 80.0).abs() < 40.0 { (press_px - beyond * steepness).max(0.0) } else { 0.0 };
+            }
+            let kernels = [71, 51, 21, 11, 5].map(gaussian);
+            let rise = |follow| {
+                let core = (0.4 * f64::from(press_px), follow);
+                let surface = deform_with(&depth, core, &kernels, None, SimdLevel::best());
+                let slope = |x: usize| (surface.at(x - 1, 80) - surface.at(x + 1, 80)) / 2.0;
+                let steepest = (120..180).fold(124, |m, x| if slope(x) > slope(m) { x } else { m });
+                let (mut least, mut rise) = (f32::INFINITY, 0.0f32);
+                for x in steepest..190 {
+                    least = least.min(slope(x));
+                    rise = rise.max(slope(x) - least);
+                }
+                rise / slope(steepest)
+            };
+            let (at_least, exactly) = (rise(Follow::AtLeast), rise(Follow::Exactly));
+            assert!(at_least < 0.002, "{press_px} px, {steepness}: the slope rises again by {at_least}");
+            assert!(exactly > 0.1, "{press_px} px, {steepness}: {exactly}");
+        }
     }
 
     #[test]

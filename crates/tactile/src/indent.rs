@@ -145,7 +145,8 @@ impl Indentation<'_> {
 
     /// Draws a part only as deep as the press reaches, and presses it in. `map` has been started.
     ///
-    /// A piece of the part is drawn, and deepened until the volume above its lower end is that of the force. The
+    /// A piece of the part is drawn, and deepened until the volume above its lower end is that of the force. Where that
+    /// contact has a step, the pixels beside it are drawn again at nine points each, and pressed in with those. The
     /// imprint is that of the part drawn through the whole gel.
     pub(crate) fn sink(&self, map: &mut HeightMap, mesh: &ClusteredMesh) -> Result<Imprint, IndentError> {
         let (wanted, thickness_px) = (self.wanted(), self.thickness_px());
@@ -153,12 +154,12 @@ impl Indentation<'_> {
         loop {
             let top = map.draw_down(mesh, depth_px, self.rest, self.level);
             if top == f32::NEG_INFINITY || depth_px >= thickness_px {
-                return self.finish(map, top, thickness_px);
+                return self.smooth(map, mesh, top, thickness_px);
             }
             let (below, count) = map.touched(self.rest, f64::from(top), depth_px, self.level);
             let volume = below + count * depth_px;
             if volume >= wanted {
-                return self.finish(map, top, depth_px);
+                return self.smooth(map, mesh, top, depth_px);
             }
             // Deeper than `enough` it cannot be, since more pixels only make it shallower; and on a round part the
             // volume grows with the square of the depth.
@@ -171,29 +172,85 @@ impl Indentation<'_> {
     /// The imprint of a map with the highest pixel `top`, complete as deep as `limit_px`, which is deep enough or
     /// the whole gel.
     fn finish(&self, map: &HeightMap, top: f32, limit_px: f64) -> Result<Imprint, IndentError> {
-        let a = self.grid.metres_per_px;
+        let press_px = self.press_px(map, top, limit_px)?;
+        let mut depth_px = Plane::filled(map.width, map.height, 0.0);
+        self.write_depths(map, press_px - f64::from(top), &mut depth_px);
+        Ok(self.imprint(depth_px, press_px))
+    }
+
+    /// The same with the pixels beside steps at their points.
+    fn smooth(
+        &self,
+        map: &mut HeightMap,
+        mesh: &ClusteredMesh,
+        top: f32,
+        limit_px: f64,
+    ) -> Result<Imprint, IndentError> {
+        let mut press_px = self.press_px(map, top, limit_px)?;
+        let mut depth_px = Plane::filled(map.width, map.height, 0.0);
+        let top_px = f64::from(top);
+        self.write_depths(map, press_px - top_px, &mut depth_px);
+        if map.find_steps(&depth_px, self.level) {
+            let (at_centres_px, mut limit_px) = (press_px, limit_px);
+            loop {
+                map.draw_steps(mesh, top_px - limit_px, self.level);
+                let touched = |press_px| map.touched_with_steps(self.rest, top_px, press_px, self.level);
+                press_px = self.settle(at_centres_px, touched);
+                if press_px <= limit_px {
+                    break;
+                }
+                if limit_px >= self.thickness_px() {
+                    let (below, count) = touched(limit_px);
+                    return Err(self.through_the_gel(below + count * limit_px));
+                }
+                limit_px = (MIN_GROWTH * press_px).min(self.thickness_px());
+                map.draw_down(mesh, limit_px, self.rest, self.level);
+            }
+            self.write_depths(map, press_px - top_px, &mut depth_px);
+            map.write_steps(self.rest, press_px - top_px, &mut depth_px);
+        }
+        Ok(self.imprint(depth_px, press_px))
+    }
+
+    /// How deep a map is pressed in by the centres of its pixels.
+    fn press_px(&self, map: &HeightMap, top: f32, limit_px: f64) -> Result<f64, IndentError> {
         if top == f32::NEG_INFINITY {
             return Err(nothing_in_front(self.grid));
         }
-        let top = f64::from(top);
-        let wanted = self.wanted();
-        let (mut press_px, mut touching) = (limit_px, f64::INFINITY);
-        loop {
-            let (below, count) = map.touched(self.rest, top, press_px, self.level);
-            let volume = below + count * press_px;
-            if press_px == self.thickness_px() && volume < wanted {
+        let touched = |press_px| map.touched(self.rest, f64::from(top), press_px, self.level);
+        if limit_px == self.thickness_px() {
+            let (below, count) = touched(limit_px);
+            let volume = below + count * limit_px;
+            if volume < self.wanted() {
                 return Err(self.through_the_gel(volume));
             }
-            if count == touching || count == 0.0 {
-                break;
+        }
+        Ok(self.settle(limit_px, touched))
+    }
+
+    /// Newton's method from a press, with what that press touches: sum of heights above the highest pixel, and number.
+    fn settle(&self, from_px: f64, touched: impl Fn(f64) -> (f64, f64)) -> f64 {
+        let (mut press_px, mut touching) = (from_px, f64::INFINITY);
+        // Only the first step may go deeper; from there on it is shallower with each.
+        let mut deepest_px = f64::INFINITY;
+        loop {
+            let (below, count) = touched(press_px);
+            if count == touching || count < 1e-9 {
+                return press_px;
             }
             touching = count;
-            press_px = ((wanted - below) / count).min(press_px);
+            press_px = ((self.wanted() - below) / count).min(deepest_px);
+            deepest_px = press_px;
         }
-        let mut depth_px = Plane::filled(map.width, map.height, 0.0);
-        self.level.run(Depths { map, rest: self.rest, lift: press_px - top, depth_px: &mut depth_px });
+    }
+
+    fn write_depths(&self, map: &HeightMap, lift: f64, depth_px: &mut Plane) {
+        self.level.run(Depths { map, rest: self.rest, lift, depth_px });
+    }
+
+    fn imprint(&self, depth_px: Plane, press_px: f64) -> Imprint {
         let patch = aggregate(&depth_px, self.grid, self.force_n, self.level);
-        Ok(Imprint { depth_px, press_depth_m: press_px * a, patch, elastic: None })
+        Imprint { depth_px, press_depth_m: press_px * self.grid.metres_per_px, patch, elastic: None }
     }
 
     fn through_the_gel(&self, available: f64) -> IndentError {

@@ -65,6 +65,7 @@ mod volume;
 
 pub use appearance::appearance;
 pub use colour::{ColourModel, Lambert, Light, Regressor, TaximTable, shade};
+pub use convolve::Follow;
 pub use deform::{BlurredRest, deform};
 pub use elastic::{Base, ElasticGel, LINEAR_PRESSURE_SHARE, press_elastic};
 pub use gradient::gradient;

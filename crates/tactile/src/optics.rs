@@ -159,6 +159,7 @@ impl Renderer<'_> {
         let scaled: Vec<Vec<f32>> =
             kernels_px.iter().map(|&k| kernels::scaled(k, optics.kernel_scale)).collect();
         let rest = self.rest_seen(optics).filter(|_| self.blurs_whole_gel());
-        deform_with(&imprint.depth_px, self.core_px(imprint), &scaled, rest.as_ref(), self.level)
+        let core = (self.core_px(imprint), self.follow());
+        deform_with(&imprint.depth_px, core, &scaled, rest.as_ref(), self.level)
     }
 }

@@ -2,6 +2,7 @@
 
 mod clusters;
 mod draw;
+mod steps;
 
 pub use clusters::ClusteredMesh;
 pub(crate) use draw::HeightMap;

@@ -67,6 +67,56 @@ fn press_px(heights: &Plane, wanted_px3: f64, thickness_px: f64) -> f64 {
     0.5 * (low + high)
 }
 
+/// Heights of a part above the gel at rest: at the centres of pixels, and at nine points of each.
+struct Sampled {
+    centres: Plane,
+    points: Vec<[f64; 9]>,
+}
+
+impl Sampled {
+    fn new(mesh: &TriMesh, gel_from_mesh: &Pose, grid: &Grid, rest: &Plane) -> Self {
+        let (w, h) = (grid.width_px, grid.height_px);
+        let fine = Grid { width_px: 3 * w, height_px: 3 * h, metres_per_px: grid.metres_per_px / 3.0 };
+        let fine = raster(mesh, gel_from_mesh, &fine);
+        let mut centres = raster(mesh, gel_from_mesh, grid);
+        centres.values.iter_mut().zip(&rest.values).for_each(|(h, r)| *h += r);
+        let at = |i: usize, k: usize| f64::from(fine.at(3 * (i % w) + k % 3, 3 * (i / w) + k / 3)) / 3.0;
+        let of = |i: usize| std::array::from_fn(|k| at(i, k) + f64::from(rest.values[i]));
+        Self { centres, points: (0..w * h).map(of).collect() }
+    }
+
+    /// Depths and press of a contact by their definition: the centres of pixels first, then nine points in each pixel beside
+    /// a step of more than half a pixel, which alone count from a whole one on.
+    fn pressed(&self, wanted_px3: f64) -> (Vec<f64>, f64) {
+        let (w, h) = (self.centres.width, self.centres.height);
+        let top = f64::from(self.centres.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h)));
+        let first_px = press_px(&self.centres, wanted_px3, 16.0);
+        let depth = |h: f64, press: f64| (h - top + press).max(0.0);
+        let at = |x: usize, y: usize| depth(f64::from(self.centres.at(x, y)), first_px);
+        let weight = |x: usize, y: usize| {
+            let beside =
+                [(x.max(1) - 1, y), ((x + 1).min(w - 1), y), (x, y.max(1) - 1), (x, (y + 1).min(h - 1))];
+            let step = beside.iter().fold(0.0, |m: f64, &(i, j)| m.max((at(x, y) - at(i, j)).abs()));
+            (2.0 * step - 1.0).clamp(0.0, 1.0)
+        };
+        let weights: Vec<f64> = (0..w * h).map(|i| weight(i % w, i / w)).collect();
+        let depths = |press: f64| -> Vec<f64> {
+            let of = |i: usize| {
+                let points = self.points[i].iter().map(|&h| depth(h, press)).sum::<f64>() / 9.0;
+                (1.0 - weights[i]) * depth(f64::from(self.centres.values[i]), press) + weights[i] * points
+            };
+            (0..w * h).map(of).collect()
+        };
+        let (mut low, mut high) = (0.0, 16.0);
+        for _ in 0..24 {
+            let middle = 0.5 * (low + high);
+            let volume: f64 = depths(middle).iter().sum();
+            (low, high) = if volume < wanted_px3 { (middle, high) } else { (low, middle) };
+        }
+        (depths(high), high)
+    }
+}
+
 /// A blur along both axes as plain sums.
 fn blur(values: &[f64], width: usize, height: usize, size: u32) -> Vec<f64> {
     let weights: Vec<f64> = gaussian(size).iter().map(|&w| f64::from(w)).collect();
@@ -183,19 +233,28 @@ mod tests {
             for shape in [GelShape::Flat, GelShape::Dome { sag_m: 0.6e-3 }] {
                 let (sensor, gel) = (sensor(shape), gel());
                 let rest = sensor.gel_shape.rest_px(&GRID).unwrap_or(Plane::filled(104, 78, 0.0));
-                let whole = raster(&mesh, &at, &GRID);
-                let above: Vec<f32> = whole.values.iter().zip(&rest.values).map(|(h, r)| h + r).collect();
-                let above = Plane { values: above, ..whole };
+                let sampled = Sampled::new(&mesh, &at, &GRID, &rest);
+                let above = &sampled.centres;
                 for force_n in [0.5, 10.0, 60.0] {
-                    let pressed = PressedGel { thickness_m: gel.thickness_m, imprint_m3_per_n: 1e-9 };
-                    let once = indent(&above, &GRID, &pressed, force_n).unwrap();
-                    let exact = press_px(&above, 1e-9 * force_n / GRID.metres_per_px.powi(3), 16.0);
-                    let found = once.press_depth_m / GRID.metres_per_px;
+                    let pressed_gel = PressedGel { thickness_m: gel.thickness_m, imprint_m3_per_n: 1e-9 };
+                    let wanted_px3 = 1e-9 * force_n / GRID.metres_per_px.powi(3);
+                    let by_centres = indent(above, &GRID, &pressed_gel, force_n).unwrap();
+                    let exact = press_px(above, wanted_px3, 16.0);
+                    let found = by_centres.press_depth_m / GRID.metres_per_px;
                     assert!((found - exact).abs() < 1e-9, "{name}, {force_n} N: {found}, not {exact}");
+                    let (depths, exact) = sampled.pressed(wanted_px3);
+                    let renderer = Renderer { sensor: &sensor, gel: &gel, level: SimdLevel::best() };
+                    let sunk = renderer.press(&clustered, &at, 1e-9, force_n).unwrap();
+                    let found = sunk.press_depth_m / GRID.metres_per_px;
+                    assert!((found - exact).abs() < 1e-4, "{name}, {force_n} N: {found}, not {exact}");
+                    let off =
+                        sunk.depth_px.values.iter().zip(&depths).map(|(&a, b)| (f64::from(a) - b).abs());
+                    let worst = off.fold(0.0, f64::max);
+                    assert!(worst < 1e-3, "{name}, {force_n} N: depths differ by {worst} px");
                     for level in SimdLevel::available() {
                         let renderer = Renderer { sensor: &sensor, gel: &gel, level };
-                        let sunk = renderer.press(&clustered, &at, 1e-9, force_n).unwrap();
-                        assert!(sunk == once, "{name}, {force_n} N, {level:?}");
+                        let again = renderer.press(&clustered, &at, 1e-9, force_n).unwrap();
+                        assert!(again == sunk, "{name}, {force_n} N, {level:?}");
                     }
                 }
             }

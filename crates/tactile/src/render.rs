@@ -4,6 +4,7 @@ mod scratch;
 
 use crate::appearance::appearance;
 use crate::colour::LocalColours;
+use crate::convolve::Follow;
 use crate::elastic::{Base, ElasticGel, press_elastic};
 use crate::grid::Plane;
 use crate::indent::{Imprint, IndentError, Indentation, PressedGel, indent};
@@ -194,9 +195,18 @@ impl Renderer<'_> {
         self.pyramid().1 * imprint.press_depth_m / self.sensor.grid.metres_per_px
     }
 
+    /// How the gel follows the part there: as the calibration says, and at least where nothing was calibrated.
+    pub(crate) fn follow(&self) -> Follow {
+        match &self.sensor.pyramid {
+            _ if self.blurs_whole_gel() => Follow::Exactly,
+            Some(pyramid) => pyramid.follow,
+            None => Follow::AtLeast,
+        }
+    }
+
     fn deform(&self, imprint: &Imprint, scratch: &mut Scratch, prepared: &Prepared) {
-        let core_px = self.core_px(imprint);
+        let core = (self.core_px(imprint), self.follow());
         let rest = prepared.blurred_rest.as_ref();
-        scratch.deform.deform(&imprint.depth_px, core_px, &prepared.weights, rest, self.level);
+        scratch.deform.deform(&imprint.depth_px, core, &prepared.weights, rest, self.level);
     }
 }

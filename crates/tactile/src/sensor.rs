@@ -9,6 +9,7 @@ pub use file::SensorFiles;
 pub use gel_shape::GelShape;
 
 use crate::colour::ColourModel;
+use crate::convolve::Follow;
 use crate::grid::Grid;
 use crate::markers::Markers;
 use crate::shadow::Shadow;
@@ -51,6 +52,8 @@ pub struct Pyramid {
     /// own surface lies this share of the press below the gel at rest. 0: the rim is where the part cuts the gel at rest;
     /// 0.5: an elastic half-space under a ball (Hertz: `a^2 = R d`).
     pub sink_in_fraction: f64,
+    /// How the gel follows the part there. Taxim's colours know the first way alone.
+    pub follow: Follow,
 }
 
 impl Sensor {

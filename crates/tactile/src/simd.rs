@@ -111,6 +111,8 @@ pub(crate) unsafe trait Lanes {
     unsafe fn fused(a: Self::Vector, b: Self::Vector, c: Self::Vector) -> Self::Vector;
     /// `first` where it is a number, `second` where it is NaN.
     unsafe fn first_unless_nan(first: Self::Vector, second: Self::Vector) -> Self::Vector;
+    /// The larger one; `second` where `first` is NaN.
+    unsafe fn larger_unless_nan(first: Self::Vector, second: Self::Vector) -> Self::Vector;
     /// Writes the transpose of the 8 x 8 values at `from` (rows `from_stride` apart) to `to`.
     ///
     /// # Safety
@@ -151,6 +153,10 @@ unsafe impl Lanes for Portable {
     #[inline(always)]
     unsafe fn first_unless_nan(first: [f32; 8], second: [f32; 8]) -> [f32; 8] {
         std::array::from_fn(|i| if first[i].is_nan() { second[i] } else { first[i] })
+    }
+    #[inline(always)]
+    unsafe fn larger_unless_nan(first: [f32; 8], second: [f32; 8]) -> [f32; 8] {
+        std::array::from_fn(|i| if first[i] > second[i] { first[i] } else { second[i] })
     }
     #[inline(always)]
     unsafe fn transpose8(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {

@@ -11,7 +11,7 @@ use super::mesh::{Clusters, Steps};
 use super::pipelines::{Pipelines, Stage};
 use super::readback::Ring;
 use super::rest::RestShape;
-use super::source::{Axis, Blur, Variant};
+use super::source::{Axis, Blur, Sampling, Variant};
 use crate::grid::{Grid, Plane};
 use crate::render::Renderer;
 use crate::sensor::Sensor;
@@ -52,6 +52,12 @@ impl GpuMesh {
     }
 }
 
+fn draw(pass: &mut wgpu::ComputePass<'_>, stage: &Stage, bound: &wgpu::BindGroup, groups: [u32; 3]) {
+    pass.set_pipeline(&stage.pipeline);
+    pass.set_bind_group(0, bound, &[]);
+    pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
+}
+
 /// A sensor with its gel on the device: rest frame, colours, blurs, and the planes of one batch.
 pub struct GpuSensor {
     pub(super) grid: Grid,
@@ -59,17 +65,22 @@ pub struct GpuSensor {
     pub(super) batch: usize,
     pub(super) image_bytes: usize,
     pub(super) ring: Ring,
-    raster: [Stage; 2],
+    raster: [Stage; 3],
     frame: wgpu::Buffer,
     presses: wgpu::Buffer,
     tops: wgpu::Buffer,
     heights: wgpu::Buffer,
+    /// Pixels beside steps, heights at their points, and whether an image has any.
+    steps: wgpu::Buffer,
+    points: wgpu::Buffer,
+    stepped: wgpu::Buffer,
     outcomes: wgpu::Buffer,
     /// What the rays of shadows leave; 0 at the start of a batch.
     lowest: Option<wgpu::Buffer>,
     packed: wgpu::Buffer,
     surface: Planes,
-    indent: Pass,
+    /// Press by centres, find steps, press by points.
+    indent: [Pass; 3],
     /// Between the stages `indent` and `gradient`: the blurs, the surroundings of colours by regression, shadows.
     between: Vec<Pass>,
     image: Pass,
@@ -94,8 +105,8 @@ impl GpuSensor {
         let allowed = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let most = if device.adapter.software { SOFTWARE_BATCH } else { HARDWARE_BATCH };
         let colours = Colours::new(sensor, gel)?;
-        let planes = if colours.shadows.is_some() { 3 * pixels } else { pixels };
-        let floats = planes.max(colours.regression.map_or(0, |r| u64::from(r.image_floats)));
+        // The heights at nine points of each pixel are the largest of the planes that all sensors have.
+        let floats = (9 * pixels).max(colours.regression.map_or(0, |r| u64::from(r.image_floats)));
         let batch = most.min(allowed / (4 * floats)).min(u64::from(limits.max_texture_array_layers));
         let image_groups = pixels.div_ceil(4).div_ceil(64);
         if batch == 0 || image_groups > u64::from(limits.max_compute_workgroups_per_dimension) {
@@ -128,25 +139,41 @@ impl GpuSensor {
         let presses = buffer("presses", size_of::<PressInput>() as u64);
         let tops = buffer("tops", 4);
         let heights = buffer("heights", 4 * pixels);
+        let steps = buffer("steps", 4 * pixels);
+        let points = buffer("points", 36 * pixels);
+        let stepped = buffer("stepped", 4);
         let outcomes = buffer("outcomes", size_of::<Outcome>() as u64);
         let packed = buffer("packed images", 4 * image_words);
         let planes = || new_planes(device, pipelines.variant(), &grid, batch);
         let (contact, half_way, surface) = (planes(), planes(), planes());
 
-        let indent = {
-            let stage = pipelines.indent(device)?;
+        let press = |sampling| -> Result<Pass, GpuError> {
+            let stage = pipelines.indent(device, sampling)?;
             let all = [&frame, &presses, &heights, &outcomes].map(wgpu::Buffer::as_entire_binding);
             let all = all.into_iter().chain([contact.binding(), gel_at_rest.as_entire_binding()]);
+            let of_points = [&steps, &points, &stepped].map(wgpu::Buffer::as_entire_binding);
+            let all = all.chain(of_points.into_iter().filter(|_| sampling == Sampling::Points));
             let bound = bind(device, &stage, all);
-            Pass { stage, bound, groups: [1, 1] }
+            Ok(Pass { stage, bound, groups: [1, 1] })
         };
+        let find_steps = {
+            let stage = pipelines.steps(device)?;
+            let all = [&frame, &steps, &points, &stepped].map(wgpu::Buffer::as_entire_binding);
+            let bound = bind(device, &stage, all.into_iter().chain([contact.binding()]));
+            Pass { stage, bound, groups: [pixels.div_ceil(64) as u32, 0] }
+        };
+        let indent = [press(Sampling::Centres)?, find_steps, press(Sampling::Points)?];
         let mut between = Vec::new();
-        for (i, (kernel_px, restore)) in
-            kernels_px.iter().map(|&k| (k, true)).chain([(crate::deform::FINAL_KERNEL_PX, false)]).enumerate()
+        let follow = Some(on_processor.follow());
+        for (i, (kernel_px, restore)) in kernels_px
+            .iter()
+            .map(|&k| (k, follow))
+            .chain([(crate::deform::FINAL_KERNEL_PX, None)])
+            .enumerate()
         {
             let from = if i == 0 { &contact } else { &surface };
             let lift = shape.lift_px.get(i).map(|lift| resident(device, "lift", lift));
-            let ways = [(Axis::Y, from, &half_way, false), (Axis::X, &half_way, &surface, restore)];
+            let ways = [(Axis::Y, from, &half_way, None), (Axis::X, &half_way, &surface, restore)];
             for (axis, source, blurred, restore) in ways {
                 let lift = lift.as_ref().filter(|_| axis == Axis::X);
                 let stage =
@@ -155,7 +182,7 @@ impl GpuSensor {
                 let all = all.into_iter().chain([source.binding(), blurred.binding()]);
                 let all = all.enumerate().map(|(i, r)| (i as u32, r));
                 let all: Vec<_> = all
-                    .chain(restore.then(|| (4, contact.binding())))
+                    .chain(restore.map(|_| (4, contact.binding())))
                     .chain(lift.map(|lift| (5, lift.as_entire_binding())))
                     .collect();
                 let bound = bind_at(device, &stage, all);
@@ -212,11 +239,18 @@ impl GpuSensor {
             batch: batch as usize,
             image_bytes: 4 * image_words as usize,
             ring: Ring::new(device, batch * (4 * image_words + size_of::<Outcome>() as u64)),
-            raster: [pipelines.raster_top(device)?, pipelines.raster_fill(device)?],
+            raster: [
+                pipelines.raster_top(device)?,
+                pipelines.raster_fill(device, Sampling::Centres)?,
+                pipelines.raster_fill(device, Sampling::Points)?,
+            ],
             frame,
             presses,
             tops,
             heights,
+            steps,
+            points,
+            stepped,
             outcomes,
             lowest,
             packed,
@@ -238,42 +272,53 @@ impl GpuSensor {
         device.queue.write_buffer(&self.presses, 0, bytemuck::cast_slice(presses));
         let mut encoder = device.device.create_command_encoder(&Default::default());
         encoder.clear_buffer(&self.tops, 0, Some(4 * u64::from(images)));
+        encoder.clear_buffer(&self.stepped, 0, Some(4 * u64::from(images)));
         encoder.clear_buffer(&self.heights, 0, Some(4 * u64::from(images) * self.grid.len() as u64));
         if let Some(lowest) = &self.lowest {
             encoder.clear_buffer(lowest, 0, Some(12 * u64::from(images) * self.grid.len() as u64));
         }
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            for &(first, count, mesh) in runs {
-                let group = Group { first_image: first as u32, clusters: mesh.count };
-                let group = with_content(device, "group", bytemuck::bytes_of(&group), BufferUsages::UNIFORM);
-                let groups = [mesh.count.div_ceil(64), mesh.count];
-                for (i, stage) in self.raster.iter().enumerate() {
-                    let all = [&self.frame, &group, &mesh.clusters, &mesh.vertices, &mesh.triangles];
-                    let all = all.into_iter().chain([&self.presses, &self.tops, &self.heights]);
-                    // The pass over tops has no use for triangles and heights.
-                    let used: Vec<_> = all
-                        .enumerate()
-                        .filter(|(binding, _)| i == 1 || ![4, 7].contains(binding))
-                        .map(|(binding, buffer)| (binding as u32, buffer.as_entire_binding()))
-                        .collect();
-                    pass.set_pipeline(&stage.pipeline);
-                    pass.set_bind_group(0, &bind_at(device, stage, used), &[]);
-                    pass.dispatch_workgroups(groups[i], count as u32, 1);
-                }
+            let drawn: Vec<_> = runs.iter().map(|run| (run, self.run_of(device, run))).collect();
+            for ((_, count, mesh), [top, fill, _]) in &drawn {
+                draw(&mut pass, &self.raster[0], top, [mesh.count.div_ceil(64), *count as u32, 1]);
+                draw(&mut pass, &self.raster[1], fill, [mesh.count, *count as u32, 1]);
             }
-            let mut run = |p: &Pass, groups: [u32; 3]| {
-                pass.set_pipeline(&p.stage.pipeline);
-                pass.set_bind_group(0, &p.bound, &[]);
-                pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
+            let run = |pass: &mut wgpu::ComputePass<'_>, p: &Pass, groups: [u32; 3]| {
+                draw(pass, &p.stage, &p.bound, groups);
             };
-            run(&self.indent, [images, 1, 1]);
-            for pass in &self.between {
-                run(pass, [pass.groups[0], pass.groups[1], images]);
+            run(&mut pass, &self.indent[0], [images, 1, 1]);
+            run(&mut pass, &self.indent[1], [self.indent[1].groups[0], images, 1]);
+            for ((_, count, mesh), [.., points]) in &drawn {
+                draw(&mut pass, &self.raster[2], points, [mesh.count, *count as u32, 1]);
             }
-            run(&self.image, [self.image.groups[0], images, 1]);
+            run(&mut pass, &self.indent[2], [images, 1, 1]);
+            for between in &self.between {
+                run(&mut pass, between, [between.groups[0], between.groups[1], images]);
+            }
+            run(&mut pass, &self.image, [self.image.groups[0], images, 1]);
         }
         encoder
+    }
+
+    /// What the three draws of images that show the same mesh read and write: tops, centres, points.
+    fn run_of(&self, device: &Device, &(first, _, mesh): &(usize, usize, &GpuMesh)) -> [wgpu::BindGroup; 3] {
+        let group = Group { first_image: first as u32, clusters: mesh.count };
+        let group = with_content(device, "group", bytemuck::bytes_of(&group), BufferUsages::UNIFORM);
+        let common = [&self.frame, &group, &mesh.clusters, &mesh.vertices];
+        let common = common.into_iter().enumerate().map(|(i, buffer)| (i as u32, buffer));
+        let all = common.chain([(5, &self.presses), (6, &self.tops)]);
+        let drawn = |into| all.clone().chain([(4, &mesh.triangles), (7, into)]);
+        let bound = |stage: usize, all: Vec<(u32, &wgpu::Buffer)>| {
+            let all = all.into_iter().map(|(i, buffer)| (i, buffer.as_entire_binding()));
+            bind_at(device, &self.raster[stage], all)
+        };
+        let points = drawn(&self.points).chain([(8, &self.steps), (9, &self.stepped)]);
+        [
+            bound(0, all.clone().collect()),
+            bound(1, drawn(&self.heights).collect()),
+            bound(2, points.collect()),
+        ]
     }
 
     /// Adds the copy of a batch's images, then outcomes, to the ring's buffer.

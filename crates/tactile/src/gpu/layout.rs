@@ -117,7 +117,7 @@ mod tests {
 
     /// Name and offset of each member of a WGSL struct, and the distance of two of them in an array.
     fn in_wgsl(name: &str) -> (Vec<(String, u32)>, u32) {
-        let module = naga::front::wgsl::parse_str(&source::raster()).unwrap();
+        let module = naga::front::wgsl::parse_str(&source::raster(source::Sampling::Centres)).unwrap();
         let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap().1;
         let naga::TypeInner::Struct { members, span } = &found.inner else { panic!("{name} is no struct") };
         (members.iter().map(|m| (m.name.clone().unwrap(), m.offset)).collect(), *span)

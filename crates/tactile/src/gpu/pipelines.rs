@@ -2,7 +2,7 @@
 
 use super::GpuError;
 use super::device::Device;
-use super::source::{self, Blur, BlurShape, Ceiling, Shade, Step, Variant};
+use super::source::{self, Blur, BlurShape, Ceiling, Sampling, Shade, Step, Variant};
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -17,8 +17,9 @@ pub(super) struct Stage {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Key {
     RasterTop,
-    RasterFill,
-    Indent,
+    RasterFill(Sampling),
+    Steps,
+    Indent(Sampling),
     Blur(Blur),
     Around(Step),
     Image(Shade, bool, Option<Ceiling>),
@@ -43,15 +44,20 @@ impl Pipelines {
     }
 
     pub(super) fn raster_top(&self, device: &Device) -> Result<Stage, GpuError> {
-        self.get(device, Key::RasterTop, "top", || Ok((source::raster(), None)))
+        self.get(device, Key::RasterTop, "top", || Ok((source::raster(Sampling::Centres), None)))
     }
 
-    pub(super) fn raster_fill(&self, device: &Device) -> Result<Stage, GpuError> {
-        self.get(device, Key::RasterFill, "fill", || Ok((source::raster(), None)))
+    pub(super) fn raster_fill(&self, device: &Device, sampling: Sampling) -> Result<Stage, GpuError> {
+        self.get(device, Key::RasterFill(sampling), "fill", || Ok((source::raster(sampling), None)))
     }
 
-    pub(super) fn indent(&self, device: &Device) -> Result<Stage, GpuError> {
-        self.get(device, Key::Indent, "main", || Ok((source::indent(self.variant), None)))
+    pub(super) fn steps(&self, device: &Device) -> Result<Stage, GpuError> {
+        self.get(device, Key::Steps, "main", || Ok((source::steps(self.variant), None)))
+    }
+
+    pub(super) fn indent(&self, device: &Device, sampling: Sampling) -> Result<Stage, GpuError> {
+        let source = || Ok((source::indent(self.variant, sampling), None));
+        self.get(device, Key::Indent(sampling), "main", source)
     }
 
     pub(super) fn image(

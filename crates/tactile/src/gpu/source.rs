@@ -1,5 +1,6 @@
 //! WGSL sources: files put together, and the blurs with their weights written out.
 
+use crate::convolve::Follow;
 use crate::deform::gaussian;
 use std::fmt::Write;
 
@@ -96,8 +97,8 @@ pub(super) struct BlurShape {
 pub(super) struct Blur {
     pub(super) kernel_px: u32,
     pub(super) axis: Axis,
-    /// Whether the core of the contact gets its height back afterwards.
-    pub(super) restore: bool,
+    /// Whether and how the core of the contact gets its height back afterwards.
+    pub(super) restore: Option<Follow>,
     /// Whether the gel is not flat at rest, so that a blur moves it: added to the core, or to all after the last blur.
     pub(super) lifted: bool,
 }
@@ -140,14 +141,68 @@ fn writable(variant: Variant, name: &str, binding: u32) -> String {
     }
 }
 
+/// What a stage looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Sampling {
+    /// The centres of pixels.
+    Centres,
+    /// Nine points of each pixel beside a step.
+    Points,
+}
+
 /// Stage `raster`: entry points `top` and `fill`.
-pub(super) fn raster() -> String {
+pub(super) fn raster(sampling: Sampling) -> String {
+    let (sub, steps, store, stepped) = match sampling {
+        Sampling::Centres => ("1", "", "atomicMax(&heights[start + u32(x)], ordered(h));", ""),
+        Sampling::Points => (
+            "3",
+            "@group(0) @binding(8) var<storage, read> steps: array<f32>;\n\
+             @group(0) @binding(9) var<storage, read> stepped: array<u32>;\n",
+            "let pixel = start + u32(x) / 3u;\n        \
+             if steps[pixel] > 0.0 {\n            \
+             atomicMax(&heights[9u * pixel + 3u * (u32(row) % 3u) + u32(x) % 3u], ordered(h));\n        }",
+            " && stepped[image] != 0u",
+        ),
+    };
     common(include_str!("../../shaders/raster.wgsl"))
+        .replace("/*SUB*/", sub)
+        .replace("/*STEPS*/", steps)
+        .replace("/*STORE*/", store)
+        .replace("/*STEPPED*/", stepped)
+}
+
+/// The pixels beside a step.
+pub(super) fn steps(variant: Variant) -> String {
+    common(include_str!("../../shaders/steps.wgsl")).replace("//#PLANES", &readable(variant, "contact", 4))
 }
 
 /// Stage `indent`.
-pub(super) fn indent(variant: Variant) -> String {
-    common(include_str!("../../shaders/indent.wgsl")).replace("//#PLANES", &writable(variant, "contact", 4))
+pub(super) fn indent(variant: Variant, sampling: Sampling) -> String {
+    let (second, steps, points, again) = match sampling {
+        Sampling::Centres => ("false", "", "", ""),
+        Sampling::Points => (
+            "true",
+            "@group(0) @binding(6) var<storage, read> steps: array<f32>;\n\
+             @group(0) @binding(7) var<storage, read> points: array<u32>;\n\
+             @group(0) @binding(8) var<storage, read> stepped: array<u32>;\n",
+            "let weight = steps[start + pixel];\n    \
+             if weight > 0.0 {\n        \
+             var sum = vec2<f32>();\n        \
+             for (var k = 0u; k < 9u; k++) {\n            \
+             sum += touch(points[9u * (start + pixel) + k], pixel, top, press);\n        }\n        \
+             here += weight * (sum / 9.0 - here);\n    }",
+            "let before = outcomes[image];\n        \
+             newton.press = before.press_px;\n        \
+             newton.available = before.available_px3;\n        \
+             if before.status != 0u || stepped[image] == 0u {\n            newton.running = 0u;\n        }",
+        ),
+    };
+    common(include_str!("../../shaders/indent.wgsl"))
+        .replace("//#PLANES", &writable(variant, "contact", 4))
+        .replace("/*SECOND*/", second)
+        .replace("/*STEPS*/", steps)
+        .replace("/*POINTS*/", points)
+        .replace("/*AGAIN*/", again)
 }
 
 /// The gel at rest: `whole_surface` and `slope_at_rest`.
@@ -272,7 +327,7 @@ pub(super) fn blur(variant: Variant, blur: Blur, workgroup_bytes: u32) -> Option
     let planes = [
         readable(variant, "source", 2),
         writable(variant, "blurred", 3),
-        if blur.restore { readable(variant, "contact", 4) } else { String::new() },
+        if blur.restore.is_some() { readable(variant, "contact", 4) } else { String::new() },
         match blur.lifted {
             true => "@group(0) @binding(5) var<storage, read> lift: array<f32>;\n".into(),
             false => String::new(),
@@ -289,13 +344,19 @@ pub(super) fn blur(variant: Variant, blur: Blur, workgroup_bytes: u32) -> Option
         let _ = writeln!(restore, "let lift_px = lift[{from_y} * frame.width_px + {from_x}];");
     }
     restore += &match (blur.restore, blur.lifted) {
-        (true, lifted) => format!(
-            "let depth = load_contact({from_x}, {from_y}, image);\n            \
-             if depth > outcomes[image].core_px {{ value = depth{}; }}",
-            if lifted { " + lift_px" } else { "" }
-        ),
+        (Some(follow), lifted) => {
+            let core = if lifted { "depth + lift_px" } else { "depth" };
+            let core = match follow {
+                Follow::Exactly => core.into(),
+                Follow::AtLeast => format!("max(value, {core})"),
+            };
+            format!(
+                "let depth = load_contact({from_x}, {from_y}, image);\n            \
+                 if depth > outcomes[image].core_px {{ value = {core}; }}"
+            )
+        }
         // Keeps the binding in use, so that all blurs have the same layout.
-        (false, lifted) => {
+        (None, lifted) => {
             format!("value += 0.0 * outcomes[image].core_px{};", if lifted { " + lift_px" } else { "" })
         }
     };

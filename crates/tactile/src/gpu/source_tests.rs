@@ -1,6 +1,7 @@
 //! Every WGSL source that can be generated, without an adapter. Whether it computes the right thing is for `tests.rs`.
 
-use super::source::{self, Axis, Blur, Ceiling, Shade, Step, Variant};
+use super::source::{self, Axis, Blur, Ceiling, Sampling, Shade, Step, Variant};
+use crate::convolve::Follow;
 use wgpu::naga;
 
 const VARIANTS: [Variant; 3] = [Variant::Texture { run: 16 }, Variant::Texture { run: 40 }, Variant::Tile];
@@ -33,14 +34,21 @@ fn no_markers(source: &str) {
 
 #[test]
 fn every_stage_validates() {
-    let raster = validate("raster", &source::raster());
-    // The least that WebGPU allows.
-    assert!(workgroup_bytes(&raster) <= 16_384, "{} bytes", workgroup_bytes(&raster));
+    for sampling in [Sampling::Centres, Sampling::Points] {
+        let raster = source::raster(sampling);
+        no_markers(&raster);
+        let raster = validate("raster", &raster);
+        // The least that WebGPU allows.
+        assert!(workgroup_bytes(&raster) <= 16_384, "{} bytes", workgroup_bytes(&raster));
+    }
     validate("blur of shadows", &source::shadow_blur());
     for variant in VARIANTS {
-        let indent = source::indent(variant);
-        no_markers(&indent);
-        assert!(workgroup_bytes(&validate("indent", &indent)) <= 16_384);
+        for sampling in [Sampling::Centres, Sampling::Points] {
+            let indent = source::indent(variant, sampling);
+            no_markers(&indent);
+            assert!(workgroup_bytes(&validate("indent", &indent)) <= 16_384);
+        }
+        validate("steps", &source::steps(variant));
         for (shade, domed) in [
             (Shade::Lambert, false),
             (Shade::Lambert, true),
@@ -80,7 +88,13 @@ fn every_blur_validates_and_fits_the_workgroup_memory() {
     for variant in VARIANTS {
         for kernel_px in KERNELS_PX {
             for axis in [Axis::X, Axis::Y] {
-                for (restore, lifted) in [(true, false), (false, false), (true, true), (false, true)] {
+                for (restore, lifted) in [
+                    (Some(Follow::Exactly), false),
+                    (Some(Follow::AtLeast), false),
+                    (None, false),
+                    (Some(Follow::Exactly), true),
+                    (None, true),
+                ] {
                     for bytes in [16_384, 32_768, 49_152] {
                         let blur = Blur { kernel_px, axis, restore, lifted };
                         let what = format!("{variant:?} {blur:?} {bytes}");
@@ -102,6 +116,6 @@ fn every_blur_validates_and_fits_the_workgroup_memory() {
 
 #[test]
 fn a_tile_that_fits_nowhere_is_refused() {
-    let blur = Blur { kernel_px: 71, axis: Axis::X, restore: true, lifted: false };
+    let blur = Blur { kernel_px: 71, axis: Axis::X, restore: Some(Follow::AtLeast), lifted: false };
     assert_eq!(source::blur(Variant::Tile, blur, 1024), None);
 }

@@ -5,6 +5,7 @@
 use super::*;
 use crate::colour::regressor::{AROUND_FIELD, AROUND_HEIGHTS, NEAR, NEAR_FIELD, SURROUNDINGS};
 use crate::colour::{ColourModel, Lambert, Light, Regressor, TaximTable};
+use crate::convolve::Follow;
 use crate::npz::{Array, ElementType, Npz, write_npz};
 use crate::sensor::{GelShape, Pyramid};
 use crate::shadow::{Shadow, ShadowKind, ShadowTable};
@@ -255,10 +256,17 @@ fn colours_by_regression_agree_with_the_processor() {
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn the_deformation_of_the_calibration_is_used() {
     let mut calibrated = sensor(160, 120, regression(160));
-    calibrated.pyramid =
-        Some(Pyramid { kernels_px: vec![31, 15, 5], restore_depth_fraction: 0.25, sink_in_fraction: 0.0 });
+    calibrated.pyramid = Some(Pyramid {
+        kernels_px: vec![31, 15, 5],
+        restore_depth_fraction: 0.25,
+        sink_in_fraction: 0.0,
+        follow: Follow::Exactly,
+    });
     for gpu in both_variants() {
-        compare(&gpu, &calibrated, &gel(&[71, 5]), 0.0);
+        for follow in [Follow::Exactly, Follow::AtLeast] {
+            calibrated.pyramid.iter_mut().for_each(|pyramid| pyramid.follow = follow);
+            compare(&gpu, &calibrated, &gel(&[71, 5]), 0.0);
+        }
     }
 }
 

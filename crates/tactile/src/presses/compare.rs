@@ -4,6 +4,7 @@ use super::gain::within_gain;
 use super::mark::{self, MarkError};
 use super::zone::{ZONES, Zone};
 use super::{Contact, Press, PressSet};
+use crate::convolve::Follow;
 use crate::metrics::{MetricError, Score, mean_score, score, score_where};
 use crate::render::Renderer;
 use crate::sensor::{Pyramid, Sensor};
@@ -182,6 +183,7 @@ pub(super) fn gel_of(sensor: &Sensor) -> Gel {
         kernels_px: vec![71, 51, 21, 11, 5],
         restore_depth_fraction: 0.4,
         sink_in_fraction: 0.0,
+        follow: Follow::AtLeast,
     };
     let pyramid = sensor.pyramid.clone().unwrap_or_else(usual);
     Gel {

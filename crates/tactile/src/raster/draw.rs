@@ -1,6 +1,7 @@
 //! Drawing the clusters of a mesh from the top down, as deep as needed.
 
 use super::clusters::{Cluster, ClusteredMesh, VERTICES};
+use super::steps::Steps;
 use crate::convolve::{Area, raise};
 use crate::grid::{Grid, Plane};
 use crate::simd::{Kernel, Lanes, SimdLevel};
@@ -35,6 +36,7 @@ pub(crate) struct HeightMap {
     view: View,
     seen: Vec<Seen>,
     corners: Corners,
+    pub(super) steps: Steps,
 }
 
 /// From mesh coordinates to pixels: the pose's rotation as a quaternion, its translation, pixels per metre and the
@@ -51,6 +53,9 @@ struct View {
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     cluster: usize,
+    /// Columns and rows of the window that its box reaches, both ends included.
+    columns: (usize, usize),
+    rows: (usize, usize),
     /// No point of it is higher.
     top_px: f64,
     /// The highest triangle that was not drawn yet.
@@ -114,6 +119,11 @@ impl HeightMap {
         let r = gel_from_mesh.rotation.to_rotation_matrix();
         let (last_x, last_y) = ((self.width - 1) as f64, (self.height - 1) as f64);
         let view = self.view;
+        // Points of pixels lie less than half a pixel from their centres.
+        let reached = |a: f64, reach: f64, last: f64| {
+            let (from, to) = ((a - reach).round().max(0.0), (a + reach).round().min(last));
+            (from <= to).then_some((from as usize, to as usize))
+        };
         self.seen.clear();
         for (cluster, c) in mesh.clusters.iter().enumerate() {
             let p = gel_from_mesh * c.middle_m;
@@ -123,10 +133,10 @@ impl HeightMap {
             };
             let (x, y) = (p.x * view.scale + origin_px.0, p.y * view.scale + origin_px.1);
             let (rx, ry) = (reach(0), reach(1));
-            if x + rx >= 0.0 && x - rx <= last_x && y + ry >= 0.0 && y - ry <= last_y {
+            if let (Some(columns), Some(rows)) = (reached(x, rx, last_x), reached(y, ry, last_y)) {
                 let top_px = -p.z * view.scale + reach(2);
                 let never = f64::INFINITY;
-                self.seen.push(Seen { cluster, top_px, left_px: never, drawn_px: never });
+                self.seen.push(Seen { cluster, columns, rows, top_px, left_px: never, drawn_px: never });
             }
         }
     }
@@ -160,6 +170,11 @@ impl HeightMap {
     /// Draws the triangles that reach above `floor_px`. Returns whether some are left.
     fn draw_above(&mut self, mesh: &ClusteredMesh, floor_px: f64, level: SimdLevel) -> bool {
         level.run(Draw { map: self, mesh, floor_px })
+    }
+
+    /// Draws the triangles that reach above `floor_px` at the points of pixels beside steps.
+    pub(super) fn draw_points(&mut self, mesh: &ClusteredMesh, floor_px: f64, level: SimdLevel) {
+        level.run(DrawPoints { map: self, mesh, floor_px });
     }
 
     /// The highest pixel.
@@ -290,6 +305,33 @@ impl Kernel for Draw<'_> {
     }
 }
 
+struct DrawPoints<'a> {
+    map: &'a mut HeightMap,
+    mesh: &'a ClusteredMesh,
+    floor_px: f64,
+}
+
+impl Kernel for DrawPoints<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let HeightMap { seen, corners, steps, view, .. } = self.map;
+        for s in &*seen {
+            if s.top_px < self.floor_px || !steps.any_in(s.rows, s.columns) {
+                continue;
+            }
+            let cluster = &self.mesh.clusters[s.cluster];
+            corners.transform(self.mesh, cluster, view);
+            for t in &self.mesh.triangles[cluster.triangles.clone()] {
+                let t = t.map(|v| corners.corner(v));
+                if higher(higher(t[0].height_px, t[1].height_px), t[2].height_px) >= self.floor_px {
+                    steps.fill(t);
+                }
+            }
+        }
+    }
+}
+
 impl Corners {
     #[inline(always)]
     fn corner(&self, number: u16) -> Corner {
@@ -374,12 +416,12 @@ impl Corners {
 
 /// The higher of two numbers, in one instruction.
 #[inline(always)]
-fn higher(a: f64, b: f64) -> f64 {
+pub(super) fn higher(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
 #[inline(always)]
-fn lower(a: f64, b: f64) -> f64 {
+pub(super) fn lower(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 

@@ -15,6 +15,7 @@
 //! | `gel_height_px` | (H, W), optional | a gel of any shape: height at rest, relative to its highest point |
 //! | `kernels_px`, `restore_depth_fraction` | (K,), scalar, optional | the deformation that the colours were calibrated with |
 //! | `sink_in_fraction` | scalar, optional | share of the press by which the gel gives way at the rim of a contact; 0 without it |
+//! | `core_at_least` | scalar, optional | 1: in the core of a contact the gel lies at least as deep as the part; exactly as deep without it |
 //! | `shadow_values`, `shadow_heights_mm`, `shadow_step_mm` | (N, H, L, 3), (2,), scalar, optional | shadows: change of grey level by direction, height of the gel beside the contact (first, step) and distance; NaN after the end of a ray |
 //! | `marker_px`, `marker_radius_px`, `marker_darkness_rgb` | (N, 2), scalar, (3,), optional | dots on the gel: column and row at rest, radius, share of light that a dot takes |
 //! | `ball_mm` | scalar, optional | diameter of the ball of the calibration |
@@ -23,6 +24,7 @@
 use super::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError};
 use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
 use crate::colour::{ColourModel, Lambert, Regressor, TaximTable};
+use crate::convolve::Follow;
 use crate::deform::gaussian;
 use crate::grid::Grid;
 use crate::markers::Markers;
@@ -188,6 +190,9 @@ impl Sensor {
             arrays.push(("kernels_px", list(kernels), ElementType::F64));
             let share = pyramid.restore_depth_fraction;
             arrays.push(("restore_depth_fraction", scalar(share), ElementType::F64));
+            if pyramid.follow == Follow::AtLeast {
+                arrays.push(("core_at_least", scalar(1.0), ElementType::F64));
+            }
             if pyramid.sink_in_fraction > 0.0 {
                 arrays.push(("sink_in_fraction", scalar(pyramid.sink_in_fraction), ElementType::F64));
             }
@@ -313,7 +318,9 @@ fn pyramid(npz: &mut Npz<'_>) -> Result<Option<Pyramid>, NpzError> {
     let kernels_px = npz.array_of_shape("kernels_px", &[None])?.values.iter().map(|&k| k as u32).collect();
     let restore_depth_fraction = npz.array_of_shape("restore_depth_fraction", &[])?.values[0];
     let sink_in_fraction = scalar(npz, "sink_in_fraction")?.unwrap_or(0.0);
-    Ok(Some(Pyramid { kernels_px, restore_depth_fraction, sink_in_fraction }))
+    let at_least = scalar(npz, "core_at_least")?.is_some_and(|one| one != 0.0);
+    let follow = if at_least { Follow::AtLeast } else { Follow::Exactly };
+    Ok(Some(Pyramid { kernels_px, restore_depth_fraction, sink_in_fraction, follow }))
 }
 
 fn planes(interleaved: &[f64]) -> [Vec<f32>; 3] {

@@ -52,6 +52,11 @@ unsafe impl Lanes for Avx2 {
         unsafe { _mm256_blendv_ps(second, first, _mm256_cmp_ps::<_CMP_ORD_Q>(first, first)) }
     }
     #[inline(always)]
+    unsafe fn larger_unless_nan(first: __m256, second: __m256) -> __m256 {
+        // The second operand where one of them is NaN.
+        unsafe { _mm256_max_ps(first, second) }
+    }
+    #[inline(always)]
     unsafe fn transpose8(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {
         // SAFETY: forwarded.
         unsafe {
@@ -121,6 +126,11 @@ unsafe impl Lanes for Avx512 {
     #[inline(always)]
     unsafe fn first_unless_nan(first: __m512, second: __m512) -> __m512 {
         unsafe { _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_ORD_Q>(first, first), second, first) }
+    }
+    #[inline(always)]
+    unsafe fn larger_unless_nan(first: __m512, second: __m512) -> __m512 {
+        // The second operand where one of them is NaN.
+        unsafe { _mm512_max_ps(first, second) }
     }
     #[inline(always)]
     unsafe fn transpose8(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {

@@ -11,9 +11,13 @@ use super::moments::Moments;
 use super::ridge::{Folds, Smoothness};
 use super::samples::{GelModel, Samples};
 use super::{Marked, domes};
+use crate::convolve::Follow;
 use crate::grid::Grid;
 use crate::sensor::{GelShape, Pyramid};
 use std::cell::OnceCell;
+
+/// How the gel follows a part in the core of its contact. The other way was not tried on presses that are held out.
+pub(super) const FOLLOW: Follow = Follow::Exactly;
 
 /// Finest of the blurs, and the widest that are tried, in millimetres.
 const FINEST_MM: f64 = 0.5;
@@ -105,6 +109,7 @@ impl<'a> Gels<'a> {
                 kernels_px: self.kernels_px[choice.widest].clone(),
                 restore_depth_fraction: share,
                 sink_in_fraction: share,
+                follow: FOLLOW,
             };
             let gel = GelModel { shape: self.shapes[choice.shape].clone(), pyramid };
             Candidate::new(gel, self.marked, self.ball_m, &self.grid)

@@ -4,7 +4,7 @@ use super::super::{Contact, Press};
 use crate::colour::regressor::{
     AROUND_FITTED, NEAR, Place, between_cells, cell_px, fitted_surroundings, limited_normal, near_terms,
 };
-use crate::deform::deform;
+use crate::deform::{deform_with, gaussian};
 use crate::gradient::gradient;
 use crate::grid::{Grid, Plane};
 use crate::sensor::{GelShape, Pyramid};
@@ -28,10 +28,11 @@ pub(super) struct GelModel {
 impl GelModel {
     /// Height of the gel surface around a press, above its rest state.
     pub(super) fn surface(&self, contact: &Contact, ball_m: f64, grid: &Grid) -> Plane {
-        let Pyramid { kernels_px, restore_depth_fraction, sink_in_fraction } = &self.pyramid;
+        let Pyramid { kernels_px, restore_depth_fraction, sink_in_fraction, follow } = &self.pyramid;
         let imprint = contact.imprint(ball_m, grid, &self.shape, *sink_in_fraction);
-        let metres_per_px = grid.metres_per_px;
-        deform(&imprint, kernels_px, *restore_depth_fraction, metres_per_px, None, SimdLevel::best())
+        let core_px = restore_depth_fraction * imprint.press_depth_m / grid.metres_per_px;
+        let kernels: Vec<Vec<f32>> = kernels_px.iter().map(|&k| gaussian(k)).collect();
+        deform_with(&imprint.depth_px, (core_px, *follow), &kernels, None, SimdLevel::best())
     }
 }
 

@@ -1,5 +1,7 @@
+use super::gel::FOLLOW;
 use super::*;
 use crate::colour::{Lambert, Light};
+use crate::convolve::Follow;
 use crate::presses::compare::predict_contact;
 use crate::presses::{
     BallSizeBy, Contact, Indenter, IndenterPose, Press, check_ball_size, compare_presses, find_circle,
@@ -41,6 +43,7 @@ fn truth() -> Sensor {
             kernels_px: vec![13, 9, 5],
             restore_depth_fraction: 0.3,
             sink_in_fraction: 0.0,
+            follow: Follow::Exactly,
         }),
         markers: None,
         shadow: None,
@@ -114,7 +117,12 @@ fn a_sensor_is_found_again_from_its_presses() {
 /// Balls given too large or too small by a half draw a tip of known slopes in the wrong colours.
 #[test]
 fn a_wrong_diameter_shows_in_a_body_of_known_slopes() {
-    let gel = Pyramid { kernels_px: vec![27, 13, 7, 3], restore_depth_fraction: 0.4, sink_in_fraction: 0.4 };
+    let gel = Pyramid {
+        kernels_px: vec![27, 13, 7, 3],
+        restore_depth_fraction: 0.4,
+        sink_in_fraction: 0.4,
+        follow: FOLLOW,
+    };
     let truth = Sensor { pyramid: Some(gel), ..truth() };
     let mut set = presses(&truth, 14);
     for (i, press) in set.presses.iter_mut().enumerate() {

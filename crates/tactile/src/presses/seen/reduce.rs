@@ -28,6 +28,7 @@ pub(super) fn reduced_sensor(sensor: &Sensor, factor: usize) -> Option<Sensor> {
         kernels_px: pyramid.kernels_px.iter().map(|&k| reduced_kernel(k, factor)).collect(),
         restore_depth_fraction: pyramid.restore_depth_fraction,
         sink_in_fraction: pyramid.sink_in_fraction,
+        follow: pyramid.follow,
     });
     let shadow = sensor.shadow.as_ref().map(|shadow| {
         Box::new(Shadow::new(shadow.table().clone(), grid.metres_per_px, grid.width_px, &colour))

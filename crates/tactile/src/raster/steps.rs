@@ -1,0 +1,319 @@
+//! Points within pixels, where a surface has a step: the border of a contact there lies between pixel centres.
+
+use super::clusters::ClusteredMesh;
+use super::draw::{Corner, Edge, HeightMap, higher, lower};
+use crate::convolve::Area;
+use crate::grid::Plane;
+use crate::simd::{Kernel, Lanes, SimdLevel};
+
+/// Points along a side of a pixel; the middle one is its centre.
+pub(super) const FINE: usize = 3;
+
+/// Points of a pixel.
+pub(super) const POINTS: usize = FINE * FINE;
+
+/// Where the depths of two neighbours differ by more than this, in pixels, points begin to count, and they alone count
+/// from [`STEP_PX`] on. In between both do, so that no last bit of a depth decides what a pixel is.
+const SLOPE_PX: f32 = 0.5;
+const STEP_PX: f32 = 1.0;
+
+/// The pixels of a map beside a step, and the height of the surface at the points of each. Memory to be used again.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Steps {
+    width: usize,
+    height: usize,
+    /// One bit for each pixel, rows in whole words.
+    bits: Vec<u64>,
+    words: usize,
+    /// Where in `pixels` those of a row begin.
+    rows: Vec<u32>,
+    pixels: Vec<SteppedPixel>,
+}
+
+/// A pixel beside a step.
+#[derive(Debug, Clone, Copy)]
+struct SteppedPixel {
+    /// Its place in the image.
+    pixel: usize,
+    /// How much its points count; the rest is its centre.
+    weight: f32,
+    /// Heights at its points, in the order of a map; `-inf` where there is nothing.
+    heights: [f32; POINTS],
+}
+
+impl HeightMap {
+    /// Finds the pixels beside a step of a contact that is so deep at the centres of pixels. Returns whether there are any.
+    pub(crate) fn find_steps(&mut self, depth_px: &Plane, level: SimdLevel) -> bool {
+        let steps = &mut self.steps;
+        (steps.width, steps.height) = (depth_px.width, depth_px.height);
+        steps.words = steps.width.div_ceil(64);
+        steps.bits.clear();
+        steps.bits.resize(steps.words * steps.height, 0);
+        steps.rows.clear();
+        steps.pixels.clear();
+        level.run(Find { steps, depth_px, area: self.area });
+        !steps.pixels.is_empty()
+    }
+
+    /// Draws these pixels at their points, all that reaches above `floor_px`.
+    pub(crate) fn draw_steps(&mut self, mesh: &ClusteredMesh, floor_px: f64, level: SimdLevel) {
+        self.steps.pixels.iter_mut().for_each(|p| p.heights = [f32::NEG_INFINITY; POINTS]);
+        self.draw_points(mesh, floor_px, level);
+    }
+
+    /// As [`HeightMap::touched`], with these pixels at their points.
+    pub(crate) fn touched_with_steps(
+        &self,
+        rest: Option<&Plane>,
+        top: f64,
+        press_px: f64,
+        level: SimdLevel,
+    ) -> (f64, f64) {
+        let (mut sum, mut count) = self.touched(rest, top, press_px, level);
+        let mut add = |height: f32, rest: f32, weight: f64| {
+            let below = f64::from(height + rest) - top;
+            if below + press_px > 0.0 {
+                sum += weight * below;
+                count += weight;
+            }
+        };
+        for p in &self.steps.pixels {
+            let rest = rest.map_or(0.0, |rest| rest.values[p.pixel]);
+            let weight = f64::from(p.weight);
+            add(self.values[p.pixel], rest, -weight);
+            p.heights.iter().for_each(|&h| add(h, rest, weight / POINTS as f64));
+        }
+        (sum, count)
+    }
+
+    /// Puts the mean depth at their points into these pixels; `lift` is what lies between heights and depths.
+    pub(crate) fn write_steps(&self, rest: Option<&Plane>, lift: f64, depth_px: &mut Plane) {
+        for p in &self.steps.pixels {
+            let rest = rest.map_or(0.0, |rest| rest.values[p.pixel]);
+            let depth = |h: &f32| (f64::from(h + rest) + lift).max(0.0);
+            let mean = p.heights.iter().map(depth).sum::<f64>() / POINTS as f64;
+            let at = &mut depth_px.values[p.pixel];
+            let (centre, weight) = (f64::from(*at), f64::from(p.weight));
+            *at = (centre + weight * (mean - centre)) as f32;
+        }
+    }
+}
+
+impl Steps {
+    /// Whether there are some in a box; both ends count.
+    #[inline(always)]
+    pub(super) fn any_in(&self, rows: (usize, usize), columns: (usize, usize)) -> bool {
+        (rows.0..=rows.1).any(|row| self.any(row, columns))
+    }
+
+    /// Whether there are some in a row, from one column up to another.
+    #[inline(always)]
+    fn any(&self, row: usize, (first, last): (usize, usize)) -> bool {
+        let words = &self.bits[row * self.words..][..self.words];
+        let (from, to) = (first / 64, last / 64);
+        let (low, high) = (u64::MAX << (first % 64), u64::MAX >> (63 - last % 64));
+        if from == to {
+            return words[from] & low & high != 0;
+        }
+        (words[from] & low) | (words[to] & high) != 0 || words[from + 1..to].iter().any(|&w| w != 0)
+    }
+
+    /// The pixels of a row from one column up to another.
+    #[inline(always)]
+    fn in_row(&mut self, row: usize, (first, last): (usize, usize)) -> &mut [SteppedPixel] {
+        let end = self.rows.get(row + 1).map_or(self.pixels.len(), |&e| e as usize);
+        let of_row = &mut self.pixels[self.rows[row] as usize..end];
+        let start = row * self.width;
+        let from = of_row.partition_point(|p| p.pixel < start + first);
+        let to = of_row.partition_point(|p| p.pixel <= start + last);
+        &mut of_row[from..to]
+    }
+
+    /// One triangle at the points of the pixels that it reaches.
+    #[inline(always)]
+    pub(super) fn fill(&mut self, t: [Corner; 3]) {
+        // Coordinates whose integers are points.
+        let fine = |px: f64| FINE as f64 * px + (FINE / 2) as f64;
+        let span = |a: f64, b: f64, c: f64, n: usize| {
+            let first = fine(lower(lower(a, b), c)).ceil().max(0.0);
+            let last = fine(higher(higher(a, b), c)).floor().min((FINE * n - 1) as f64);
+            (first <= last).then_some((first as usize, last as usize))
+        };
+        let columns = span(t[0].x_px, t[1].x_px, t[2].x_px, self.width);
+        let rows = span(t[0].y_px, t[1].y_px, t[2].y_px, self.height);
+        let (Some(columns), Some(rows)) = (columns, rows) else { return };
+        let reached = (columns.0 / FINE, columns.1 / FINE);
+        if !self.any_in((rows.0 / FINE, rows.1 / FINE), reached) {
+            return;
+        }
+        let t = t.map(|c| Corner { x_px: fine(c.x_px), y_px: fine(c.y_px), ..c });
+        let (ux, uy, uh) = (t[1].x_px - t[0].x_px, t[1].y_px - t[0].y_px, t[1].height_px - t[0].height_px);
+        let (vx, vy, vh) = (t[2].x_px - t[0].x_px, t[2].y_px - t[0].y_px, t[2].height_px - t[0].height_px);
+        let area = ux * vy - uy * vx;
+        if area == 0.0 {
+            return;
+        }
+        let (slope_x, slope_y) = ((uh * vy - vh * uy) / area, (vh * ux - uh * vx) / area);
+        let top = higher(higher(t[0].height_px, t[1].height_px), t[2].height_px);
+        let bottom = lower(lower(t[0].height_px, t[1].height_px), t[2].height_px);
+        let edges = [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])];
+        for row in rows.0..=rows.1 {
+            if !self.any(row / FINE, reached) {
+                continue;
+            }
+            let y = row as f64;
+            let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+            for x in edges.iter().filter_map(|edge| edge.crossing(y)) {
+                (from, to) = (lower(x, from), higher(x, to));
+            }
+            let (from, to) = (higher(from.ceil(), columns.0 as f64), lower(to.floor(), columns.1 as f64));
+            if from > to {
+                continue;
+            }
+            let (from, to) = (from as usize, to as usize);
+            let along_row = t[0].height_px + slope_y * (y - t[0].y_px);
+            let start = row / FINE * self.width;
+            for p in self.in_row(row / FINE, (from / FINE, to / FINE)) {
+                let first = FINE * (p.pixel - start);
+                for column in first.max(from)..=(first + FINE - 1).min(to) {
+                    let height = along_row + slope_x * (column as f64 - t[0].x_px);
+                    let height = lower(top, higher(bottom, height)) as f32;
+                    let at = &mut p.heights[row % FINE * FINE + column - first];
+                    *at = if height > *at { height } else { *at };
+                }
+            }
+        }
+    }
+}
+
+struct Find<'a> {
+    steps: &'a mut Steps,
+    depth_px: &'a Plane,
+    /// Around what is not 0.
+    area: Area,
+}
+
+impl Kernel for Find<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let Self { steps, depth_px, area } = self;
+        let (w, h) = (depth_px.width, depth_px.height);
+        let mut largest = vec![0.0f32; w];
+        for y in 0..h {
+            steps.rows.push(steps.pixels.len() as u32);
+            if y + 1 < area.y.0 || y > area.y.1 {
+                continue;
+            }
+            let (above, below) = (depth_px.row(y.max(1) - 1), depth_px.row((y + 1).min(h - 1)));
+            let (here, above, below) = (&depth_px.row(y)[..w], &above[..w], &below[..w]);
+            let largest = &mut largest[..w];
+            let most = |a: f32, b: f32| if a > b { a } else { b };
+            for x in 0..w {
+                largest[x] = most((here[x] - above[x]).abs(), (here[x] - below[x]).abs());
+            }
+            for x in 1..w {
+                largest[x] = most(largest[x], (here[x] - here[x - 1]).abs());
+            }
+            for x in 0..w - 1 {
+                largest[x] = most(largest[x], (here[x] - here[x + 1]).abs());
+            }
+            if !largest.iter().fold(false, |some, &l| some | (l > SLOPE_PX)) {
+                continue;
+            }
+            for (x, &l) in largest.iter().enumerate() {
+                if l > SLOPE_PX {
+                    steps.bits[y * steps.words + x / 64] |= 1 << (x % 64);
+                    let weight = ((l - SLOPE_PX) / (STEP_PX - SLOPE_PX)).min(1.0);
+                    let heights = [f32::NEG_INFINITY; POINTS];
+                    steps.pixels.push(SteppedPixel { pixel: y * w + x, weight, heights });
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Grid;
+    use crate::indent::{Indentation, PressedGel};
+    use gripgen_twin::TriMesh;
+    use gripgen_twin::frames::Pose;
+    use nalgebra::Point3;
+
+    const GRID: Grid = Grid { width_px: 150, height_px: 90, metres_per_px: 1e-4 };
+
+    /// A block with vertical walls whose outline, in pixels from the middle of the image, is given.
+    fn block(outline: [(f64, f64); 4]) -> TriMesh {
+        let at = |(x, y): (f64, f64), z_m: f64| Point3::new(x * 1e-4, y * 1e-4, z_m);
+        let corners = [0.0, 4e-3].map(|z_m| outline.map(|p| at(p, z_m))).concat();
+        let mut triangles = vec![[0, 1, 2], [0, 2, 3]];
+        for i in 0..4 {
+            let j = (i + 1) % 4;
+            triangles.extend([[i, i + 4, j + 4], [i, j + 4, j]]);
+        }
+        TriMesh::new(corners, triangles).unwrap()
+    }
+
+    fn press(mesh: &TriMesh, force_n: f64) -> (Plane, f64) {
+        let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
+        let mesh = ClusteredMesh::new(mesh);
+        let mut map = HeightMap::default();
+        map.start(&mesh, &Pose::identity(), &GRID);
+        let press = Indentation { grid: &GRID, gel: &gel, force_n, rest: None, level: SimdLevel::best() };
+        let imprint = press.sink(&mut map, &mesh).unwrap();
+        (imprint.depth_px, imprint.press_depth_m / GRID.metres_per_px)
+    }
+
+    /// Each row of a contact is as wide as the body there, to a ninth of a pixel and not to half of one.
+    #[test]
+    fn a_slanted_wall_stands_where_it_is_between_the_pixels() {
+        let wall = |y: f64| 30.2 + 0.11 * y;
+        let mesh = block([(-40.3, -35.0), (wall(-35.0), -35.0), (wall(35.0), 35.0), (-40.3, 35.0)]);
+        let (depth, press_px) = press(&mesh, 15.0);
+        let mut sum = 0.0;
+        for row in 15..75 {
+            let width = depth.row(row).iter().map(|&d| f64::from(d) / press_px).sum::<f64>();
+            let off = width - (wall(row as f64 - 44.5) + 40.3);
+            assert!(off.abs() < 0.25, "row {row}: {off} px");
+            sum += off / 60.0;
+        }
+        // The left wall is at one place for all rows, a third of a pixel at most from where it is.
+        assert!(sum.abs() < 0.2, "{sum} px on average");
+    }
+
+    /// V = c F holds with the points, wherever the walls lie.
+    #[test]
+    fn the_imprint_has_the_volume_of_its_force() {
+        for shift in [0.0, 0.2, 0.45, 0.7] {
+            let (x, y) = (10.0 + shift, 8.0 + 0.5 * shift);
+            let mesh = block([(-10.0, -8.0), (x, -8.0), (x, y), (-10.0, y)]);
+            let (depth, press_px) = press(&mesh, 4.0);
+            let volume: f64 = depth.values.iter().map(|&d| f64::from(d)).sum();
+            assert!((volume / 4000.0 - 1.0).abs() < 1e-5, "{shift}: {volume} px3");
+            let exact = 4000.0 / ((x + 10.0) * (y + 8.0));
+            assert!((press_px / exact - 1.0).abs() < 0.025, "{shift}: {press_px} px, not {exact}");
+        }
+    }
+
+    /// What is deeper on both sides alike has no step, and keeps the bits of its centres.
+    #[test]
+    fn a_slope_has_no_points() {
+        let mut map = HeightMap::default();
+        map.start(
+            &ClusteredMesh::new(&block([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])),
+            &Pose::identity(),
+            &GRID,
+        );
+        map.area = Area::whole(GRID.width_px, GRID.height_px);
+        let plane = |per_px: f32| {
+            let depth = |i: usize| per_px * (i % GRID.width_px) as f32;
+            Plane { values: (0..GRID.len()).map(depth).collect(), ..Plane::filled(150, 90, 0.0) }
+        };
+        assert!(!map.find_steps(&plane(0.45), SimdLevel::best()));
+        assert!(map.find_steps(&plane(0.6), SimdLevel::best()));
+        assert_eq!(map.steps.pixels.len(), GRID.len());
+        assert!(map.steps.pixels.iter().all(|p| (p.weight - 0.2).abs() < 1e-4));
+    }
+}
