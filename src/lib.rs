@@ -111,7 +111,8 @@ pub use imprint::{
     CalibrateImprintsError, ImprintCalibration, ImprintCalibrations, ImprintImagesError, calibrate_imprints,
 };
 pub use init::{
-    InitError, NoGrip, PartOptions, PartStarter, Proposal, StarterFile, Varied, part_starter, starter,
+    BenchmarkStarter, InitError, NoGrip, PartOptions, PartStarter, Proposal, StarterFile, Varied,
+    benchmark_starter, part_starter, starter,
 };
 pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};
