@@ -1,4 +1,9 @@
-//! The files of `assets/`, embedded, so that an installed gripgen needs no checkout.
+//! The files of `assets/`, embedded, so that an installed gripgen needs no checkout; and the meshes of the benchmark, which are
+//! made when they are asked for.
+
+use gripgen_twin::parts::benchmark;
+use gripgen_twin::write_binary_stl;
+use std::borrow::Cow;
 
 /// Prefix of a path that names an embedded file.
 pub const ASSET_PREFIX: &str = "asset:";
@@ -26,6 +31,8 @@ static FILES: &[(&str, &[u8])] = embedded![
     "parts/long_shaft/part.stl",
     "parts/roller_bearing/part.stl",
     "sensors/gelsight_r15/sensor.npz",
+    "templates/benchmark-sweep.toml",
+    "templates/benchmark-twin.toml",
     "templates/diagnosis.html",
     "templates/part-sweep.toml",
     "templates/part-twin.toml",
@@ -37,6 +44,31 @@ static FILES: &[(&str, &[u8])] = embedded![
 /// The content of an embedded file.
 pub fn get(path: &str) -> Option<&'static [u8]> {
     FILES.iter().find(|(name, _)| *name == path).map(|(_, bytes)| *bytes)
+}
+
+/// Folder of the parts that are made on demand: `parts/benchmark/shaft_007.stl`.
+pub(crate) const BENCHMARK: &str = "parts/benchmark/";
+
+/// The content of an embedded file, or of a mesh of the benchmark: binary STL in millimetres, the same bytes everywhere.
+pub fn read(path: &str) -> Option<Cow<'static, [u8]>> {
+    let Some(file) = path.strip_prefix(BENCHMARK) else { return get(path).map(Cow::Borrowed) };
+    let part = benchmark::part(file.strip_suffix(".stl")?)?;
+    Some(Cow::Owned(write_binary_stl(&part.mesh(), &part.name, 1e-3)))
+}
+
+/// What lies near a path that is none: files of its folder, for people.
+pub(crate) fn near(path: &str) -> String {
+    if path.starts_with(BENCHMARK.trim_end_matches('/')) {
+        let families = benchmark::FAMILIES.iter().map(|family| {
+            let last = benchmark::all().iter().rfind(|part| part.family == family.name);
+            last.map_or_else(String::new, |last| {
+                format!("{BENCHMARK}{}_000.stl to {}.stl", family.name, last.name)
+            })
+        });
+        return families.collect::<Vec<_>>().join(", ");
+    }
+    let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
+    paths().filter(|p| p.starts_with(folder)).collect::<Vec<_>>().join(", ")
 }
 
 /// The content of an embedded text file.

@@ -1,5 +1,6 @@
 //! Files to start from: commented configurations, and those for a part of one's own.
 
+mod benchmark;
 pub(crate) mod drawing;
 mod places;
 mod pose;
@@ -12,6 +13,7 @@ use crate::assets;
 use crate::library::{Library, LibraryError};
 use crate::location::Location;
 use crate::project::{BASELINE_TWIN, load_twin_document};
+pub use benchmark::{BenchmarkStarter, benchmark_starter};
 use gripgen_physics::PartShape;
 use gripgen_twin::{Jaw, MeshError, Part, TriMesh, Twin};
 pub(crate) use propose::Proposed;

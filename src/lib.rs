@@ -116,7 +116,8 @@ pub use imprint::{
 };
 pub use imprint_set::{ImprintSet, LoadImprintsError, imprint_data, is_imprint_set, load_imprint_set};
 pub use init::{
-    InitError, NoGrip, PartOptions, PartStarter, Proposal, StarterFile, Varied, part_starter, starter,
+    BenchmarkStarter, InitError, NoGrip, PartOptions, PartStarter, Proposal, StarterFile, Varied,
+    benchmark_starter, part_starter, starter,
 };
 pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};

@@ -10,9 +10,10 @@ use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh, Twin};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Meshes, shapes and sensors kept at a time. A sweep that draws a scale or a resolution makes a new one per sample.
-const MESHES: usize = 64;
-const SHAPES: usize = 256;
+/// Meshes, shapes and sensors kept at a time: those of a sweep over the whole benchmark. A sweep that draws a scale or a
+/// resolution makes a new one per sample.
+const MESHES: usize = 256;
+const SHAPES: usize = 512;
 const SENSORS: usize = 8;
 const ARMS: usize = 8;
 

@@ -95,11 +95,8 @@ impl Location {
         let error = |problem: String| ReadFileError { location: self.clone(), problem };
         match self {
             Location::Disk(path) => std::fs::read(path).map(Cow::Owned).map_err(|e| error(e.to_string())),
-            Location::Asset(path) => assets::get(path).map(Cow::Borrowed).ok_or_else(|| {
-                let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
-                let near: Vec<&str> = assets::paths().filter(|p| p.starts_with(folder)).collect();
-                error(format!("gripgen holds no such file; near it: {}", near.join(", ")))
-            }),
+            Location::Asset(path) => assets::read(path)
+                .ok_or_else(|| error(format!("gripgen holds no such file; near it: {}", assets::near(path)))),
         }
     }
 
@@ -183,6 +180,10 @@ mod tests {
         assert_eq!(asset.beside("../parts/x.stl"), Location::Asset("parts/x.stl".into()));
         assert_eq!((asset.run_name().as_str(), asset.extension()), ("quickstart", "toml"));
         assert_eq!(disk.run_name(), "a", "many configurations are called sweep.toml");
+        let made = Location::parse("asset:parts/benchmark/shaft_007.stl");
+        assert_eq!(made.read().unwrap()[..9], *b"shaft_007");
+        let none = Location::parse("asset:parts/benchmark/spoon_000.stl").read().unwrap_err().to_string();
+        assert!(none.contains("gear_000.stl to gear_016.stl"), "{none}");
         assert!(
             Location::parse("asset:configs/none.toml").read().unwrap_err().to_string().contains("quickstart")
         );

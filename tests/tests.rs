@@ -4,6 +4,8 @@
 
 // The guard of the benchmarks.
 mod bench_guard;
+// The benchmark of two hundred parts.
+mod benchmark;
 // A pull, integrated by other code.
 mod bristles;
 // Campaigns: planned, made on a twin, written, and read as measurements.
@@ -25,6 +27,8 @@ mod diagnose;
 mod diagnose_awkward;
 // Lost grips of a real robot, by rows and by events.
 mod event_log;
+// Random parts in random grips.
+mod fuzz_parts;
 // Effects of the library, through the whole pipeline.
 mod effects;
 // The elastic gel, also beside the pyramid on real presses.

@@ -63,6 +63,41 @@ struct Candidate {
 impl Search<'_> {
     /// Looks, compares and tries. The same mesh gives the same grips.
     pub(super) fn run(&self) -> Result<Proposed, NoGrip> {
+        let (body, tried) = self.promising()?;
+        let at: Vec<GripAt> = tried.iter().map(|c| c.at).collect();
+        let trials = Trials::new(self.twin, self.library, self.part.clone(), &at).run(self.threads);
+        let (varied, grips) = widest(&tried, &trials, &body).ok_or_else(|| NoGrip::AllFail {
+            tried: tried.len(),
+            failure: trials.iter().find_map(Trial::failure).cloned().unwrap_or_default(),
+        })?;
+        let failure = trials.iter().find_map(Trial::failure).cloned();
+        let proposals = grips.iter().map(|&i| tried[i].proposal()).collect();
+        let trials = grips.iter().map(|&i| trials[i].clone()).collect();
+        Ok(Proposed { grips: proposals, trials, varied, tried: tried.len(), failure })
+    }
+
+    /// The first `wanted` grips that stand a given variation, the most promising first; fewer if fewer do.
+    pub(super) fn run_over(&self, varied: &Varied, wanted: usize) -> Result<Vec<Proposal>, NoGrip> {
+        let (_, promising) = self.promising()?;
+        let (mut found, mut first) = (Vec::new(), None);
+        for (tried, candidate) in promising.iter().enumerate() {
+            let trials = Trials::new(self.twin, self.library, self.part.clone(), &[candidate.at]);
+            match trials.fails(varied) {
+                None => found.push(candidate.proposal()),
+                Some(failure) => first = first.or(Some((tried, failure))),
+            }
+            if found.len() == wanted {
+                break;
+            }
+        }
+        match (found.is_empty(), first) {
+            (true, Some((_, failure))) => Err(NoGrip::AllFail { tried: promising.len(), failure }),
+            _ => Ok(found),
+        }
+    }
+
+    /// Grips that look good and differ, the best first.
+    fn promising(&self) -> Result<(Body, Vec<Candidate>), NoGrip> {
         let body = Body::of(self.surface.mesh(), self.closed);
         let opening_m = self.twin.gripper.opening_m;
         let found = places(&self.surface, &body, LARGEST_WIDTH * opening_m);
@@ -99,17 +134,8 @@ impl Search<'_> {
             }
             return Err(why_none(bad.into_iter().filter_map(Result::err), opening_m));
         }
-        let tried: Vec<Candidate> = chosen.into_iter().map(|i| good[i].clone()).collect();
-        let at: Vec<GripAt> = tried.iter().map(|c| c.at).collect();
-        let trials = Trials::new(self.twin, self.library, self.part.clone(), &at).run(self.threads);
-        let (varied, grips) = widest(&tried, &trials, &body).ok_or_else(|| NoGrip::AllFail {
-            tried: tried.len(),
-            failure: trials.iter().find_map(Trial::failure).cloned().unwrap_or_default(),
-        })?;
-        let failure = trials.iter().find_map(Trial::failure).cloned();
-        let proposals = grips.iter().map(|&i| tried[i].proposal()).collect();
-        let trials = grips.iter().map(|&i| trials[i].clone()).collect();
-        Ok(Proposed { grips: proposals, trials, varied, tried: tried.len(), failure })
+        let promising = chosen.into_iter().map(|i| good[i].clone()).collect();
+        Ok((body, promising))
     }
 
     /// The grip at a place, and the same moved to the middle of what it touches.

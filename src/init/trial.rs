@@ -71,6 +71,22 @@ impl<'a> Trials<'a> {
         in_parallel(self.twin.parts[&self.name].grips.len(), threads, |grip| self.try_all(grip))
     }
 
+    /// Why the first grip does not stand a variation, at its outermost offsets and forces and at each of its angles; `None` if it does.
+    pub(super) fn fails(&self, varied: &Varied) -> Option<String> {
+        let out_mm = SDS * varied.grip_offset_sd_mm;
+        for &angle_deg in &varied.grip_angle_deg {
+            for offset_mm in [0.0, out_mm, -out_mm] {
+                for force_n in [varied.grip_force_n.1, varied.grip_force_n.0] {
+                    let outcome = self.holds(0, angle_deg, offset_mm, force_n);
+                    if !matches!(outcome, Ok(true)) {
+                        return Some(said(&outcome));
+                    }
+                }
+            }
+        }
+        None
+    }
+
     fn try_all(&self, grip: usize) -> Trial {
         let places = ANGLES_DEG.iter().flat_map(|&angle| offsets_mm().into_iter().map(move |o| (angle, o)));
         let cell = |(angle_deg, offset_mm)| {

@@ -25,6 +25,7 @@ NOT_RUN = {
     "gripgen render part.stl": "crates/cli/tests/cli/presses.rs runs it on a mesh",
     "gripgen sweep mine/sweep.toml": "10 000 samples",
     "python examples/train_grip_metric.py": "needs torch; docs/training.md has its figures",
+    "python examples/train_on_families.py": "minutes; docs/training.md has its figures",
     "python benches/python.py": "a benchmark",
 }
 

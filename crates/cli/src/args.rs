@@ -114,6 +114,12 @@ pub struct InitArgs {
     /// Take a mesh with holes as it is.
     #[arg(long)]
     pub accept_open_mesh: bool,
+    /// A sweep over the benchmark: two hundred parts in twelve families, with grips that were tried.
+    #[arg(long, conflicts_with_all = ["scale_mm_per_unit", "accept_open_mesh"])]
+    pub benchmark: bool,
+    /// The first so many parts of each family only.
+    #[arg(long, value_name = "N", requires = "benchmark", value_parser = clap::value_parser!(u64).range(1..))]
+    pub per_family: Option<u64>,
     /// JSON: the files, the grips proposed, what the sweep varies and what is to be said of the mesh.
     #[command(flatten)]
     pub json: JsonArgs,

@@ -1,12 +1,18 @@
-//! Parametric meshes of the four parts of the pull experiment.
+//! Parametric meshes: the four parts of the pull experiment, and the two hundred of the [`benchmark`].
 //!
 //! Every part is built around the x axis of its mesh frame (the axis of rotation), centred on the origin, in
 //! metres. Angles come from `libm`: the same parameters give the same bits everywhere, which is what lets
 //! `cargo xtask assets` compare the shipped STL files with these functions.
 
 mod bearing;
+pub mod benchmark;
 mod gear;
+mod grid;
+mod numbers;
+mod outline;
+mod prism;
 mod shaft;
+mod turned;
 
 pub use bearing::{BallBearing, RollerBearing};
 pub use gear::InvoluteGear;

@@ -7,14 +7,19 @@ use crate::mark::Format;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use gripgen::twin::{MESH_FORMATS, usual_scale_mm_per_unit};
-use gripgen::{PartOptions, part_starter, starter};
+use gripgen::{PartOptions, benchmark_starter, part_starter, starter};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Runs the verb.
 pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     let extension = args.target.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
-    let (folder, files, talk, made) = if MESH_FORMATS.contains(&extension.as_str()) {
+    let (folder, files, talk, made) = if args.benchmark {
+        let folder = args.out.clone().unwrap_or_else(|| args.target.clone());
+        no_mesh(&folder, "")?;
+        let made = benchmark_starter(args.per_family.map(|n| n as usize), cores()).map_err(Failure::new)?;
+        (folder, made.files, made.summary, None)
+    } else if MESH_FORMATS.contains(&extension.as_str()) {
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
         let options = PartOptions {
             scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),

@@ -108,6 +108,22 @@ fn init_reads_ply() {
     assert_code(&run(&["check", folder.path().join("of-gear.ply/sweep.toml").to_str().unwrap()]), 0);
 }
 
+/// The benchmark: a sweep that runs, without a mesh on disk; what belongs to a mesh is refused.
+#[test]
+fn init_writes_the_benchmark() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path().join("bench");
+    let output = run(&["init", "--benchmark", "--per-family", "1", "-o", at.to_str().unwrap()]);
+    assert_code(&output, 0);
+    assert_eq!(text(&output.stdout).lines().count(), 2);
+    assert!(text(&output.stderr).contains("connector (test): 1"), "{}", text(&output.stderr));
+    assert_code(&run(&["check", at.join("sweep.toml").to_str().unwrap()]), 0);
+    assert_code(&run(&["init", "--benchmark", "--per-family", "1", "-o", at.to_str().unwrap()]), 2);
+    for wrong in [&["--per-family", "1"][..], &["--benchmark", "--scale-mm-per-unit", "2"]] {
+        assert_code(&run(&[&["init"], wrong].concat()), 2);
+    }
+}
+
 /// A file that is not read is no folder to write into.
 #[test]
 fn init_of_a_file_that_is_not_read_says_what_to_do() {

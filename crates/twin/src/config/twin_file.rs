@@ -287,6 +287,12 @@ pub struct PartFile {
     /// Where the numbers come from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
+    /// The kind of part, for whoever trains on it: shaft, gear. Nothing that is simulated depends on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub family: Option<String>,
+    /// What its kind is kept for, for whoever trains on it: train, test. Nothing that is simulated depends on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub split: Option<String>,
     /// Uncertainty of values in this section.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub calibration: BTreeMap<String, CalibrationFile>,

@@ -1,0 +1,49 @@
+//! The benchmark of two hundred parts: made on demand, with grips that hold wherever its sweep goes.
+
+use gripgen::tactile::SimdLevel;
+use gripgen::twin::parts::benchmark;
+use gripgen::twin::{Outcome, TriMesh};
+use gripgen::{Location, Project, assets, benchmark_starter, generate};
+
+/// A part of each family: grips of all, no sample fails, and families and their split stand in what every run carries.
+#[test]
+fn a_sweep_over_the_benchmark_holds() {
+    let made = benchmark_starter(Some(1), 2).unwrap();
+    let again = benchmark_starter(Some(1), 1).unwrap();
+    assert_eq!(made, again, "for any number of threads");
+    assert!(made.parts >= 10 && made.parts + made.left_out.len() == 12, "{}", made.summary);
+    let folder = tempfile::tempdir().unwrap();
+    for file in &made.files {
+        std::fs::write(folder.path().join(&file.name), &file.bytes).unwrap();
+    }
+    let sets = [("images", "none"), ("samples", "60")].map(|(k, v)| (k.to_string(), v.to_string()));
+    let project = Project::load(&Location::Disk(folder.path().join("sweep.toml")), &sets).unwrap();
+    let config: toml::Table = project.config_toml.parse().unwrap();
+    let part = |name: &str, key: &str| config["twin"]["parts"][name][key].as_str().map(str::to_string);
+    for (name, parts) in project.twin.parts.iter().map(|(name, part)| (name, part.grips.len())) {
+        let of = benchmark::part(name).unwrap();
+        assert_eq!(parts, 2);
+        assert_eq!(part(name, "family").as_deref(), Some(of.family));
+        assert_eq!(part(name, "split").as_deref(), Some(of.split.name()));
+    }
+    for index in 0..60 {
+        let outcome = generate(&project, index, SimdLevel::best()).outcome;
+        assert!(matches!(outcome, Outcome::Pulled(_)), "sample {index}: {outcome:?}");
+    }
+}
+
+/// An asset like any other: the bytes of a mesh in millimetres, the same each time.
+#[test]
+fn parts_of_the_benchmark_are_assets() {
+    let path = "parts/benchmark/gear_003.stl";
+    let bytes = assets::read(path).unwrap();
+    assert_eq!(bytes, assets::read(path).unwrap());
+    let mesh = TriMesh::from_file_bytes(&bytes, "stl", 1e-3).unwrap();
+    let of = benchmark::part("gear_003").unwrap().mesh();
+    assert_eq!(mesh.triangles().len(), of.triangles().len());
+    assert!((mesh.signed_volume_m3() / of.signed_volume_m3() - 1.0).abs() < 1e-5);
+    assert!(
+        assets::read("parts/benchmark/gear_003.obj").is_none()
+            && assets::read("parts/gear/part.stl").is_some()
+    );
+}
