@@ -89,7 +89,7 @@ fn way(m: &MotionProgram, text: &str) -> Verdict {
         )?;
         near("the grip centre", 1e3 * bench.robot().tool_m[i], m.tool_mm[i], 1e-3)?;
     }
-    let (mut fastest, mut before, mut hardest) = (0.0_f64, 0.0, 0.0_f64);
+    let (mut fastest, mut before, mut hardest) = (0.0_f64, bench.arm().speed_m_s(), 0.0_f64);
     let most = ((2.0 * WAY_M / (1e-3 * m.speed_mm_s) + 3.0) / STEP_S) as u64;
     let mut k = 0;
     while bench.phase() == Some(Phase::Moving) && k < most {

@@ -333,6 +333,8 @@ pub(super) fn never_begins(bench: &mut Bench, start: TcpPose) -> Verdict {
     if bench.robot().tcp != start {
         return Err("the tool moved".into());
     }
+    let payload_kg = bench.robot().payload_kg;
+    near("the payload without a beat", payload_kg, crate::virtual_rig::controller::PAYLOAD_KG, 0.0)?;
     bench.ends_alone()
 }
 

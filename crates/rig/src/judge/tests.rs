@@ -65,7 +65,7 @@ fn other_numbers_are_another_program() {
 /// What is changed, the old words, the new words; all places of the old words.
 type Mutation = (&'static str, &'static str, &'static str);
 
-const OF_BOTH: [Mutation; 14] = [
+const OF_BOTH: [Mutation; 15] = [
     ("no watchdog", "rtde_set_watchdog(\"input_int_register_24\", 10.0, \"stop\")", "textmsg(\"no dog\")"),
     ("a slow watchdog", ", 10.0, \"stop\")", ", 1.0, \"stop\")"),
     ("a watchdog that pauses", "10.0, \"stop\"", "10.0, \"pause\""),
@@ -87,6 +87,7 @@ const OF_BOTH: [Mutation; 14] = [
         "set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000,",
         "set_tcp(p[tool_x_mm, tool_y_mm, tool_z_mm,",
     ),
+    ("a payload without a beat", "  first = read", "  set_payload(0.7)\n  first = read"),
     ("the payload in grams", "set_payload(payload_kg,", "set_payload(payload_kg * 1000,"),
 ];
 

@@ -134,8 +134,10 @@ impl MotionProgram {
 fn body() -> String {
     use registers::{GO, PHASE, STOP};
     format!(
-        "  set_payload(payload_kg, [centre_x_mm / 1000, centre_y_mm / 1000, centre_z_mm / 1000])
-  set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000, 0, 0, 0])
+        "  if reason == 0:
+    set_payload(payload_kg, [centre_x_mm / 1000, centre_y_mm / 1000, centre_z_mm / 1000])
+    set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000, 0, 0, 0])
+  end
   global gripgen_arrived = False
   global gripgen_target = p[target_x_m, target_y_m, target_z_m, target_rx_rad, target_ry_rad, target_rz_rad]
   global gripgen_speed = speed_mm_s / 1000

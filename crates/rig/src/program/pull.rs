@@ -152,12 +152,12 @@ fn body() -> String {
         .collect();
     // The preload is stored and not zeroed away: clamping may press the part along the pull.
     format!(
-        "  set_payload(payload_kg, [centre_x_mm / 1000, centre_y_mm / 1000, centre_z_mm / 1000])
-  set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000, 0, 0, 0])
-  step = 0
+        "  step = 0
   desired = 0.0
   waited = 0.0
   if reason == 0:
+    set_payload(payload_kg, [centre_x_mm / 1000, centre_y_mm / 1000, centre_z_mm / 1000])
+    set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000, 0, 0, 0])
     sleep({rest})
     zero_ftsensor()
     write_output_integer_register({PHASE}, {zeroed})

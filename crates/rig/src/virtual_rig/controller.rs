@@ -63,7 +63,7 @@ pub struct Controller {
 }
 
 /// Payload of the installation, as the shipped rig's file has it.
-const PAYLOAD_KG: f64 = 1.6;
+pub const PAYLOAD_KG: f64 = 1.6;
 
 impl Controller {
     /// The speed slider, moved by somebody.
