@@ -9,7 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
 pub use identify::{CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, DiagnoseArgs};
 pub use render::RenderArgs;
-pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigServeArgs, RigTeachArgs};
+pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigRehearseArgs, RigServeArgs, RigTeachArgs};
 use std::path::PathBuf;
 pub use try_part::TryArgs;
 
