@@ -101,6 +101,8 @@ pub struct ArmFaults {
     pub sensor_lag_s: f64,
     /// How the sensor's zero wanders, N per second.
     pub drift_n_s: f64,
+    /// What jaws that have closed on a part press across the pull, along the base's x.
+    pub clamp_n: f64,
 }
 
 /// The arm.
@@ -291,7 +293,7 @@ impl Arm {
     /// Takes what the sensor says now as zero. The controller averages its noise away.
     pub fn zero(&mut self) {
         self.zero_n = self.felt_n + self.drift_n;
-        self.aside_zero_n = self.aside_n;
+        self.aside_zero_n = self.across_n();
     }
 
     /// Hangs a mass on the tool, or takes it off.
@@ -306,7 +308,13 @@ impl Arm {
 
     /// Force on the tool along the base's x: zeroed, and raw.
     pub fn aside_n(&self) -> (f64, f64) {
-        (self.aside_n - self.aside_zero_n, self.aside_n)
+        (self.across_n() - self.aside_zero_n, self.across_n())
+    }
+
+    /// What loads the tool along the base's x.
+    fn across_n(&self) -> f64 {
+        let clamps = self.grip.as_ref().is_some_and(|grip| grip.holds());
+        self.aside_n + if clamps { self.faults.clamp_n } else { 0.0 }
     }
 
     /// How the jaws would close now.
@@ -413,7 +421,7 @@ impl Arm {
     fn applied(&self, mode: &ForceMode) -> Applied {
         let [_, _, _, rx, ry, rz] = mode.frame;
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(rx, ry, rz));
-        let load_n = Vector3::new(self.aside_n, 0.0, -self.hung_mass_kg * GRAVITY_M_S2);
+        let load_n = Vector3::new(self.across_n(), 0.0, -self.hung_mass_kg * GRAVITY_M_S2);
         let (mut force, mut free, mut turning) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
         let mut gives_way = false;
         let sign = |asked: f64, load: f64, least: f64| {

@@ -78,6 +78,8 @@ pub enum Fault {
     SensorLag(f64),
     /// The sensor's zero wanders, in N per minute; 0 ends it where it is.
     Drift(f64),
+    /// Jaws that close press so much across the pull, in N; 0 ends it.
+    Clamp(f64),
     /// Somebody moves the speed slider, 1 is 100 %.
     Slider(f64),
     /// The gripper reports this force, in N over both jaws, whatever it was asked.
@@ -88,7 +90,7 @@ pub enum Fault {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{line}` is none of: drop|truncate|garble|refuse|accept DEVICE, delay DEVICE S, estop, release-estop, protective-stop, \
-     freeze|repeat|thaw left|right, part-lost, hang KG, aside N, force-lag S, force-delay S, sensor-lag S, drift N_PER_MIN, slider SHARE, reports N; devices: rtde, dashboard, script, gripper, camera-left, camera-right"
+     freeze|repeat|thaw left|right, part-lost, hang KG, aside N, force-lag S, force-delay S, sensor-lag S, drift N_PER_MIN, clamp N, slider SHARE, reports N; devices: rtde, dashboard, script, gripper, camera-left, camera-right"
 )]
 pub struct FaultError {
     /// The words.
@@ -127,6 +129,7 @@ impl std::str::FromStr for Fault {
             ["force-delay", s] => number(s, 5.0).map(Fault::ForceDelay),
             ["sensor-lag", s] => number(s, 5.0).map(Fault::SensorLag),
             ["drift", n] => number(n, 100.0).map(Fault::Drift),
+            ["clamp", n] => number(n, 100.0).map(Fault::Clamp),
             ["slider", share] => number(share, 1.0).map(Fault::Slider),
             ["reports", n] => number(n, 200.0).map(Fault::Reports),
             _ => None,

@@ -124,6 +124,7 @@ impl ServedRig {
             Fault::ForceDelay(s) => self.arm_faults(|faults| faults.force_dead_s = s),
             Fault::SensorLag(s) => self.arm_faults(|faults| faults.sensor_lag_s = s),
             Fault::Drift(n_per_min) => self.arm_faults(|faults| faults.drift_n_s = n_per_min / 60.0),
+            Fault::Clamp(n) => self.arm_faults(|faults| faults.clamp_n = n),
             Fault::Slider(share) => lock(&self.shared.world).controller.set_speed_slider(share),
             Fault::Reports(force_sum_n) => lock(&self.shared.world).gripper.report(force_sum_n),
         }

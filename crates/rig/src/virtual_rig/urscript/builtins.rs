@@ -81,7 +81,20 @@ const KEYWORDS: [&str; 24] = [
 ];
 
 /// Functions of the language that are known by name and cannot be followed here: they need joints, tools or other machines.
-const MISSING: [&str; 48] = [
+const MISSING: [&str; 61] = [
+    "enable_external_ft_sensor",
+    "ft_rtde_input_enable",
+    "get_actual_joint_positions_history",
+    "get_actual_tool_flange_pose",
+    "get_coriolis_and_centrifugal_torques",
+    "get_freedrive_status",
+    "get_jacobian",
+    "get_jacobian_time_derivative",
+    "get_mass_matrix",
+    "get_target_joint_accelerations",
+    "get_target_payload_cog",
+    "get_target_payload_inertia",
+    "get_target_waypoint",
     "servoj",
     "servoc",
     "speedj",
