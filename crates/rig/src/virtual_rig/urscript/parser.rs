@@ -1,35 +1,41 @@
 //! From words to steps.
 
-use super::builtins::{self, Builtin, Run};
+mod expression;
+
+use super::builtins;
 use super::lexer::{Token, words};
-use super::operators::Binary;
 use super::program::{Function, Op, Program, ScriptError, Slot};
 use super::value::Value;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 /// How deep blocks and expressions may lie in each other.
 const MAX_DEPTH: usize = 64;
 
-/// Reads a text.
-pub(super) fn parse(text: &str) -> Result<Program, ScriptError> {
-    let mut parser = Parser { words: words(text)?, ..Parser::default() };
-    parser.skip_newlines();
-    if parser.is_name("def") {
-        parser.function(false)?;
+impl Program {
+    /// Reads a text: a `def`, or lines without one.
+    ///
+    /// # Errors
+    ///
+    /// The first word or line that is not understood.
+    pub fn parse(text: &str) -> Result<Self, ScriptError> {
+        let mut parser = Parser { words: words(text)?, ..Parser::default() };
         parser.skip_newlines();
-        if *parser.peek() != Token::End {
-            return Err(parser.wrong("something follows the program's end"));
+        if parser.is_name("def") {
+            parser.function(false)?;
+            parser.skip_newlines();
+            if *parser.peek() != Token::End {
+                return Err(parser.wrong("something follows the program's end"));
+            }
+        } else {
+            parser.open("", false);
+            parser.block()?;
+            if *parser.peek() != Token::End {
+                return Err(parser.wrong("an `end`, `elif` or `else` without its beginning"));
+            }
+            parser.close()?;
         }
-    } else {
-        parser.open("", false);
-        parser.block()?;
-        if *parser.peek() != Token::End {
-            return Err(parser.wrong("an `end`, `elif` or `else` without its beginning"));
-        }
-        parser.close()?;
+        parser.finish()
     }
-    parser.finish()
 }
 
 /// Where a `while` begins, and the jumps out of it.
@@ -48,6 +54,17 @@ struct Open {
     read: Vec<(String, u32)>,
 }
 
+/// A call of a function that may come later in the text.
+struct Call {
+    /// In which function it stands, and at which step.
+    number: usize,
+    place: usize,
+    name: String,
+    arguments: usize,
+    line: u32,
+    by_run: bool,
+}
+
 #[derive(Default)]
 struct Parser {
     words: Vec<(Token, u32)>,
@@ -60,8 +77,8 @@ struct Parser {
     globals: BTreeSet<String>,
     /// Names that were read and are none of a function's own.
     free: Vec<(String, u32)>,
-    /// Calls of functions of the text: function, place, name, arguments, line, whether by `run`.
-    calls: Vec<(usize, usize, String, usize, u32, bool)>,
+    /// Calls of functions of the text.
+    calls: Vec<Call>,
 }
 
 impl Parser {
@@ -416,204 +433,11 @@ impl Parser {
         Ok(())
     }
 
-    fn expression(&mut self) -> Result<(), ScriptError> {
-        self.deeper()?;
-        self.level(0)?;
-        self.depth -= 1;
-        Ok(())
-    }
-
-    /// Operators of a level and tighter: or and xor, and, not, comparisons, sums, products.
-    fn level(&mut self, level: usize) -> Result<(), ScriptError> {
-        match level {
-            2 if self.take_name("not") => {
-                self.deeper()?;
-                self.level(2)?;
-                self.depth -= 1;
-                self.emit(Op::Not)?;
-                return Ok(());
-            }
-            6 => return self.unary(),
-            _ => {}
-        }
-        self.level(level + 1)?;
-        while let Some(operator) = self.operator(level) {
-            self.at += 1;
-            self.level(level + 1)?;
-            self.emit(Op::Binary(operator))?;
-        }
-        Ok(())
-    }
-
-    fn operator(&self, level: usize) -> Option<Binary> {
-        Some(match (level, self.peek()) {
-            (0, Token::Name(word)) if word == "or" => Binary::Or,
-            (0, Token::Name(word)) if word == "xor" => Binary::Xor,
-            (1, Token::Name(word)) if word == "and" => Binary::And,
-            (3, Token::Symbol(symbol)) => match *symbol {
-                "==" => Binary::Equal,
-                "!=" => Binary::Unequal,
-                "<" => Binary::Less,
-                "<=" => Binary::LessEqual,
-                ">" => Binary::More,
-                ">=" => Binary::MoreEqual,
-                _ => return None,
-            },
-            (4, Token::Symbol("+")) => Binary::Add,
-            (4, Token::Symbol("-")) => Binary::Subtract,
-            (5, Token::Symbol("*")) => Binary::Multiply,
-            (5, Token::Symbol("/")) => Binary::Divide,
-            (5, Token::Symbol("%")) => Binary::Remainder,
-            _ => return None,
-        })
-    }
-
-    fn unary(&mut self) -> Result<(), ScriptError> {
-        if self.take_symbol("-") {
-            self.deeper()?;
-            self.unary()?;
-            self.depth -= 1;
-            self.emit(Op::Negate)?;
-            return Ok(());
-        }
-        self.primary()?;
-        while self.take_symbol("[") {
-            self.expression()?;
-            self.expect("]")?;
-            self.emit(Op::Element)?;
-        }
-        Ok(())
-    }
-
-    fn primary(&mut self) -> Result<(), ScriptError> {
-        let wrong = self.wrong("a value is missing");
-        match self.next() {
-            Token::Int(x) => drop(self.emit(Op::Const(Value::Int(x)))?),
-            Token::Float(x) => drop(self.emit(Op::Const(Value::Float(x)))?),
-            Token::Text(x) => drop(self.emit(Op::Const(Value::Text(Arc::from(x))))?),
-            Token::Symbol("(") => {
-                self.expression()?;
-                self.expect(")")?;
-            }
-            Token::Symbol("[") => {
-                let count = self.elements("]")?;
-                self.emit(Op::List(count))?;
-            }
-            Token::Name(name) => match name.as_str() {
-                "True" | "False" => drop(self.emit(Op::Const(Value::Bool(name == "True")))?),
-                "p" if self.take_symbol("[") => {
-                    if self.elements("]")? != 6 {
-                        return Err(self.wrong("a pose has six numbers"));
-                    }
-                    self.emit(Op::Pose)?;
-                }
-                "run" => {
-                    let name = self.own_name()?;
-                    self.expect("(")?;
-                    self.expect(")")?;
-                    self.call(name, 0, true)?;
-                }
-                _ if self.is_symbol("(") => self.called(name)?,
-                _ if builtins::is_word(&name) => {
-                    self.at -= 1;
-                    return Err(self.wrong(format!("`{name}` stands where a value is wanted")));
-                }
-                _ => {
-                    let line = wrong.line;
-                    let slot = self.slot(&name)?;
-                    self.here()?.read.push((name, line));
-                    self.emit(Op::Load(slot))?;
-                }
-            },
-            _ => {
-                self.at -= 1;
-                return Err(wrong);
-            }
-        }
-        Ok(())
-    }
-
-    /// Values up to a bracket.
-    fn elements(&mut self, close: &str) -> Result<usize, ScriptError> {
-        let mut count = 0;
-        while !self.take_symbol(close) {
-            self.expression()?;
-            count += 1;
-            if !self.is_symbol(close) {
-                self.expect(",")?;
-            }
-        }
-        Ok(count)
-    }
-
-    fn call(&mut self, name: String, arguments: usize, by_run: bool) -> Result<(), ScriptError> {
-        let line = self.line();
-        let place = self.emit(Op::Halt)?;
-        let number = self.here()?.number;
-        self.calls.push((number, place, name, arguments, line, by_run));
-        Ok(())
-    }
-
-    /// A call, from its bracket on.
-    fn called(&mut self, name: String) -> Result<(), ScriptError> {
-        self.expect("(")?;
-        let Some(builtin) = builtins::find(&name) else {
-            if builtins::is_word(&name) {
-                return Err(self.wrong(format!("`{name}` is no function")));
-            }
-            let count = self.elements(")")?;
-            return self.call(name, count, false);
-        };
-        let places = self.arguments(builtin)?;
-        self.emit(Op::Builtin(builtin, places.into_boxed_slice()))?;
-        Ok(())
-    }
-
-    /// Arguments of a function of the language, by place or by name; where each belongs.
-    fn arguments(&mut self, builtin: &'static Builtin) -> Result<Vec<usize>, ScriptError> {
-        let missing = matches!(builtin.run, Run::Missing);
-        let mut places: Vec<usize> = Vec::new();
-        while !self.take_symbol(")") {
-            let named = matches!(self.words.get(self.at + 1), Some((Token::Symbol("="), _)));
-            let place = match (self.peek().clone(), named) {
-                (Token::Name(word), true) => {
-                    self.at += 2;
-                    let place = builtin.parameters.iter().position(|parameter| **parameter == *word);
-                    match place {
-                        Some(place) => place,
-                        None if missing => places.len(),
-                        None => {
-                            return Err(self.wrong(format!("`{}` has no parameter `{word}`", builtin.name)));
-                        }
-                    }
-                }
-                _ => places.len(),
-            };
-            self.expression()?;
-            let most = builtin.parameters.len();
-            if !missing && place >= most {
-                return Err(self.wrong(format!("`{}` takes at most {most} values", builtin.name)));
-            }
-            if places.contains(&place) {
-                return Err(self.wrong(format!("`{}` is given a value twice", builtin.name)));
-            }
-            places.push(place);
-            if !self.is_symbol(")") {
-                self.expect(",")?;
-            }
-        }
-        let lacking = (0..builtin.required).find(|place| !places.contains(place));
-        match lacking.and_then(|place| builtin.parameters.get(place)) {
-            Some(parameter) => Err(self.wrong(format!("`{}` lacks `{parameter}`", builtin.name))),
-            None => Ok(places),
-        }
-    }
-
     /// Calls find their functions, and every name has a value somewhere.
     fn finish(self) -> Result<Program, ScriptError> {
         let Self { functions, calls, known, names, globals, free, .. } = self;
         let mut functions: Vec<Function> = functions.into_iter().flatten().collect();
-        for (number, place, name, arguments, line, by_run) in calls {
+        for Call { number, place, name, arguments, line, by_run } in calls {
             let wrong = |problem: String| ScriptError { line, problem };
             let Some(&to) = known.get(&name) else {
                 return Err(wrong(format!("`{name}` is no function that is known")));

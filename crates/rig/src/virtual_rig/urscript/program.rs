@@ -2,7 +2,6 @@
 
 use super::builtins::Builtin;
 use super::operators::Binary;
-use super::parser;
 use super::value::Value;
 
 /// What is wrong with a program, and where.
@@ -75,15 +74,6 @@ pub struct Program {
 }
 
 impl Program {
-    /// Reads a text: a `def`, or lines without one.
-    ///
-    /// # Errors
-    ///
-    /// The first word or line that is not understood.
-    pub fn parse(text: &str) -> Result<Self, ScriptError> {
-        parser::parse(text)
-    }
-
     /// Its name; nothing for lines without a `def`.
     pub fn title(&self) -> &str {
         self.functions.first().map_or("", |main| &main.name)
