@@ -126,7 +126,7 @@ impl TwinPlant {
         let gel_from_part = &contact.held.grasp.gel_from_part;
         let width_m = gel_from_part.left.translation.z + gel_from_part.right.translation.z;
         let (project, counted) = (self.project.clone(), self.counted.clone());
-        Ok(Some(PlantGrip { project, counted, scenario, images, width_m, session: None }))
+        Ok(Some(PlantGrip { project, counted, scenario, images, width_m, pull: None, session: None }))
     }
 
     /// The part between the jaws of a tool, the lever along its long axis, and the angle about the jaws' axis.
@@ -197,6 +197,8 @@ struct PlantGrip {
     scenario: Scenario,
     images: PerJaw<TactileImage>,
     width_m: f64,
+    /// Number of the pull in this grip, once it has begun.
+    pull: Option<u64>,
     session: Option<PullSession>,
 }
 
@@ -209,10 +211,14 @@ impl PlantGrip {
         (s.pull.increment_n, s.pull.step_s) = (pull.increment_n, pull.step_s);
         {
             let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
-            s.covariates.pull_index = counted.pulls;
-            counted.pulls += 1;
-            let since = counted.rests.since(&s.covariates);
-            s.covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since as f64));
+            let began_anew = self.pull.is_some();
+            let pull = *self.pull.get_or_insert(counted.pulls);
+            s.covariates.pull_index = pull;
+            if !began_anew {
+                counted.pulls += 1;
+                let since = counted.rests.since(&s.covariates);
+                s.covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since as f64));
+            }
         }
         let Project { twin, library, .. } = &*self.project;
         let gripped = Gripped::new(twin, library, &self.scenario, options(false))?;

@@ -11,7 +11,7 @@ pub use identify::{
     CalibrateImprintsArgs, CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, ConstantOf, DiagnoseArgs,
 };
 pub use render::RenderArgs;
-pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigServeArgs, RigTeachArgs};
+pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigRehearseArgs, RigServeArgs, RigTeachArgs};
 use std::path::PathBuf;
 pub use try_part::TryArgs;
 

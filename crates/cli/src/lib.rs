@@ -75,6 +75,7 @@ fn execute(cli: &Cli) -> Result<u8, Failure> {
         Command::Calibrate(CalibrateCommand::Sensor(args)) => commands::calibrate_sensor::run(args),
         Command::Rig(RigCommand::Check(args)) => commands::rig::check::run(args),
         Command::Rig(RigCommand::Pull(args)) => commands::rig::pull::run(args),
+        Command::Rig(RigCommand::Rehearse(args)) => commands::rig::rehearse::run(args),
         Command::Rig(RigCommand::Teach(args)) => commands::rig::teach::run(args),
         Command::Rig(RigCommand::Serve(args)) => commands::rig::serve::run(args),
         Command::Compare(args) => commands::compare::run(args),

@@ -20,6 +20,8 @@ mod images;
 pub mod plan;
 pub mod prepare;
 pub mod pull;
+pub mod rehearse;
+pub mod response;
 mod rest;
 mod robot;
 mod run;

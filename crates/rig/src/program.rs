@@ -1,16 +1,15 @@
 //! What the robot runs: the pull and the motions between grips, as programs of their own.
 //!
 //! A program carries its numbers as named assignments at its head; what follows them is always the same text. So a person can
-//! read what will happen, and [`PullProgram::from_script`] and [`MotionProgram::from_script`] give the numbers back from a
-//! text that is exactly such a program and from no other.
+//! read what will happen. What a text does is judged by [`crate::judge`], which runs it and knows only its numbers.
 //!
 //! The staircase runs on the controller, at its own rate: the commanded force arrives in the same packet as the measured one, and
 //! nothing depends on the host being in time. The host only says go and keeps a heartbeat; when it stops, the controller
 //! stops the program by itself. Functions of URScript are those of Universal Robots, "The URScript Programming Language"
 //! for e-Series (5.x).
 //!
-//! **Not run on a robot yet.** What is tested is the text: every limit, every way out, no line after the end; and what the text
-//! means, on the virtual rig.
+//! **Not run on a robot yet.** What is tested is the text, on the virtual rig, whose controller interprets it
+//! ([`crate::virtual_rig::urscript`]): every limit, every way out, and that nothing goes on after the end.
 
 mod head;
 mod motion;

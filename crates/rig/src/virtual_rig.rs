@@ -6,10 +6,10 @@
 //! ```
 //!
 //! Everything but [`server`] is without sockets and clocks: a control step is a call. The server listens on loopback alone.
-//! No arbitrary program runs here: those of [`crate::program`] are known word for word, and of ur_rtde's the commands that a
-//! test of the rig needs.
+//! Programs are not known here: [`urscript`] makes of their text what a controller would make of it.
 
 pub mod arm;
+mod body;
 pub mod controller;
 #[cfg(test)]
 mod controller_tests;
@@ -26,13 +26,10 @@ mod mjpeg_tests;
 pub mod panel;
 pub mod robot;
 pub mod rtde;
-mod rtde_control;
-#[cfg(test)]
-mod rtde_control_tests;
 #[cfg(test)]
 mod rtde_tests;
-mod running;
 pub mod script;
 pub mod server;
+pub mod urscript;
 mod wire;
 pub mod world;

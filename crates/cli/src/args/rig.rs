@@ -11,6 +11,8 @@ pub enum RigCommand {
     Check(RigCheckArgs),
     /// Store where the tool is as the pose of a part.
     Teach(RigTeachArgs),
+    /// Find out what the rig is like today: sensor, force mode, clocks; in air, then with a pull of 5 N.
+    Rehearse(RigRehearseArgs),
     /// Make pulls on a rig and record them. Running it again makes what is missing.
     Pull(RigPullArgs),
     /// Serve a virtual rig on this machine: RTDE, dashboard, script ports, gripper and cameras, moved by a twin.
@@ -26,10 +28,42 @@ pub struct RigCheckArgs {
     /// Override a key of the rig's file; may be given many times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
+    /// What `rig rehearse` found: versions, payload and tool have to be the same.
+    #[arg(long, value_name = "FILE")]
+    pub rehearsal: Option<PathBuf>,
     /// Find sign and gain of the force sensor with a known mass, which is to be hung on the tool when it says so.
     #[arg(long, value_name = "KG", value_parser = mass)]
     pub mass_kg: Option<f64>,
     /// JSON.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen rig rehearse`
+#[derive(Debug, Args)]
+pub struct RigRehearseArgs {
+    /// The rig.
+    #[arg(value_name = "RIG.toml", default_value = "asset:configs/rig.toml")]
+    pub rig: String,
+    /// Override a key of the rig's file; may be given many times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+    /// Part that is pulled; the first that is taught where it is left out.
+    #[arg(long, value_name = "NAME")]
+    pub part: Option<String>,
+    /// Grip force, of one jaw. It has to hold 5 N of pull.
+    #[arg(long, value_name = "N", default_value_t = 30.0)]
+    pub grip_force_n: f64,
+    /// How long the zeroed sensor is read.
+    #[arg(long, value_name = "S", default_value_t = 5.0)]
+    pub dwell_s: f64,
+    /// Where what was found is stored, for `rig check` and `rig pull`.
+    #[arg(short, long, value_name = "FILE", default_value = "rehearsal.json")]
+    pub out: PathBuf,
+    /// JSON: the same as the file.
     #[command(flatten)]
     pub json: JsonArgs,
     /// How much is said.
@@ -65,6 +99,9 @@ pub struct RigPullArgs {
     /// The pulls to make, as `gripgen campaign` plans them. Without it they are those of the flags below.
     #[arg(long, value_name = "CAMPAIGN.toml")]
     pub campaign: Option<PathBuf>,
+    /// What `rig rehearse` found: staircases are slowed until force mode and sensor can follow them.
+    #[arg(long, value_name = "FILE")]
+    pub rehearsal: Option<PathBuf>,
     /// Parts to pull; all that are taught where it is left out.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', conflicts_with = "campaign")]
     pub parts: Vec<String>,

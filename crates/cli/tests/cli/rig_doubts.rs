@@ -131,3 +131,51 @@ fn a_camera_that_repeats_itself_is_frozen() {
     assert!(sample.failure.contains("byte by byte"));
     assert_code(&run(&["verify", out.to_str().unwrap()]), 0);
 }
+
+/// Label of the first pull of a folder.
+fn label_n(out: &Path) -> f64 {
+    let folder = RunFolder::open(out).unwrap();
+    let (sample, _) = ShardReader::open(&folder.shard_path(0)).unwrap().pull(0).unwrap();
+    sample.max_pull_force_n.unwrap()
+}
+
+/// A force that trails: never a plain label that is off. Rehearsed, the staircase is slow enough to be followed, and the label is
+/// that of a rig without lag.
+#[test]
+fn a_lag_is_suspect_or_rehearsed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mut rig = Served::start(&SPEED);
+    let true_n = {
+        assert_eq!(rig.pull(&path("true"), 1, &[]).ends(), 0);
+        label_n(&path("true"))
+    };
+    for lag in ["force-lag", "sensor-lag"] {
+        rig.inject(&format!("{lag} 0.35"));
+        let out = path(lag);
+        let code = rig.pull(&out, 1, &[]).ends();
+        assert_eq!((code, pulls(&out)[0].0.as_str()), (4, "suspect"), "{lag}: {:?}", pulls(&out));
+        let stored = path(&format!("{lag}.json"));
+        let stored = stored.to_str().unwrap();
+        let slack = ["--set", "limits.robot_gap_s=1.0", "-o", stored, "--dwell-s", "1"];
+        let page = rig.rig("rehearse", &slack);
+        assert_code(&page, 0);
+        let found: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(stored).unwrap()).unwrap();
+        let response = &found["rehearsal"]["response"];
+        let trails =
+            |of: &str| response[of]["lag_s"].as_f64().unwrap() + response[of]["dead_s"].as_f64().unwrap();
+        assert!((trails("force") - 0.35).abs() < 0.05, "{lag}: {response}");
+        let of_the_loop_s = if lag == "force-lag" { 0.35 } else { 0.0 };
+        assert!((trails("displacement") - of_the_loop_s).abs() < 0.05, "{lag}: {response}");
+        assert!(text(&page.stdout).contains("staircase"), "{}", text(&page.stdout));
+        let out = path(&format!("{lag}-slow"));
+        let mut slow = rig.pull(&out, 1, &["--rehearsal", stored]);
+        let code = slow.ends();
+        assert!(slow.said.contains("staircases are slowed"), "{}", slow.said);
+        assert_eq!((code, pulls(&out)[0].0.as_str()), (0, "slipped"), "{lag}: {:?}", pulls(&out));
+        let off_n = label_n(&out) - true_n;
+        assert!(off_n.abs() < 1.0, "{lag}: {} N, without lag {true_n} N", label_n(&out));
+        rig.inject(&format!("{lag} 0"));
+    }
+}

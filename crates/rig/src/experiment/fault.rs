@@ -72,6 +72,12 @@ pub enum Fault {
     /// The primary interface, without which no program can be sent.
     #[error("the primary interface: {0}")]
     Primary(#[from] PrimaryLinkError),
+    /// A rehearsal that cannot go on.
+    #[error("{problem}")]
+    Rehearsal {
+        /// What is wrong, with its numbers.
+        problem: String,
+    },
     /// A force that neither the command nor a slip explains.
     #[error(
         "something else moved the tool: {measured_n:.1} N were measured at a command of {desired_n:.1} N, {low_n:.1} to {high_n:.1} N \

@@ -256,7 +256,7 @@ impl Experiment<'_> {
     }
 
     /// Up to a safe height, over the part, ready to go down.
-    fn approach(&mut self, poses: &GripPoses) -> Result<(), Fault> {
+    pub(super) fn approach(&mut self, poses: &GripPoses) -> Result<(), Fault> {
         let (motion, here) = (&self.config.motion, self.reading()?.tcp);
         let (speed, height_m) = (motion.speed_mm_s, here.position_m[2].max(poses.approach.position_m[2]));
         let mut up = here;
@@ -269,7 +269,12 @@ impl Experiment<'_> {
     }
 
     /// Says go and watches until the program has stopped.
-    fn staircase(&mut self, run: i32, planned: &PlannedPull, max_s: f64) -> Result<StopReason, Fault> {
+    pub(super) fn staircase(
+        &mut self,
+        run: i32,
+        planned: &PlannedPull,
+        max_s: f64,
+    ) -> Result<StopReason, Fault> {
         self.tell(RigEvent::Step("pulling"));
         self.devices.heart.set_go(run);
         let is_pulling = |x: &mut Self| {
@@ -306,12 +311,12 @@ impl Experiment<'_> {
     }
 
     /// What the program measured before the first step, along the pull.
-    fn preload_n(&self, planned: &PlannedPull) -> f64 {
+    pub(super) fn preload_n(&self, planned: &PlannedPull) -> f64 {
         self.signed(planned, self.newest().map_or(0.0, |row| row.preload_n * planned.pull_direction))
     }
 
     /// The force along the pull that a reading along z means.
-    fn signed(&self, planned: &PlannedPull, force_z: f64) -> f64 {
+    pub(super) fn signed(&self, planned: &PlannedPull, force_z: f64) -> f64 {
         self.config.robot.force_sign * self.config.robot.force_gain * planned.pull_direction * force_z
     }
 
@@ -404,7 +409,7 @@ impl Experiment<'_> {
         self.go_up(poses)
     }
 
-    fn go_up(&mut self, poses: &GripPoses) -> Result<(), Fault> {
+    pub(super) fn go_up(&mut self, poses: &GripPoses) -> Result<(), Fault> {
         let here = self.reading()?.tcp;
         self.move_to("the way up", here.raised(CLEAR_M), self.config.motion.approach_speed_mm_s)?;
         self.move_to("the way back", poses.approach, self.config.motion.speed_mm_s)

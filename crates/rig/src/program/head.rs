@@ -1,6 +1,5 @@
 //! The head of a program: its numbers as named assignments.
 
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Digits behind the point of every number.
@@ -13,17 +12,6 @@ pub(super) fn write(name: &str, run: i32, numbers: &[(&str, f64)]) -> String {
         let _ = writeln!(text, "  {name} = {value:.DIGITS$}");
     }
     text
-}
-
-/// Number of the run and the numbers of a text that begins like [`write`]'s.
-pub(super) fn read<'a>(name: &str, text: &'a str) -> Option<(i32, BTreeMap<&'a str, f64>)> {
-    let mut lines = text.strip_prefix("def ")?.strip_prefix(name)?.strip_prefix("():\n")?.lines();
-    let run = lines.next()?.strip_prefix("  run_id = ")?.parse().ok()?;
-    let number = |line: &'a str| {
-        let (name, value) = line.strip_prefix("  ")?.split_once(" = ")?;
-        Some((name, value.parse::<f64>().ok()?))
-    };
-    Some((run, lines.map_while(number).collect()))
 }
 
 /// Lines that every program begins with: it says which run it is, and waits for a heartbeat that changes; only then the watchdog

@@ -127,27 +127,6 @@ impl MotionProgram {
         let head = head::write(NAME, self.run, &numbers);
         Ok(head + &head::heartbeat() + &body() + &head::farewell())
     }
-
-    /// The numbers of a text that is such a program, word for word.
-    pub fn from_script(text: &str) -> Option<Self> {
-        let (run, numbers) = head::read(NAME, text)?;
-        let of = |name: &str| numbers.get(name).copied();
-        let target = TcpPose {
-            position_m: [of("target_x_m")?, of("target_y_m")?, of("target_z_m")?],
-            rotation_rad: [of("target_rx_rad")?, of("target_ry_rad")?, of("target_rz_rad")?],
-        };
-        let program = Self {
-            run,
-            target,
-            speed_mm_s: of("speed_mm_s")?,
-            abort_force_n: of("abort_force_n")?,
-            max_time_s: of("max_time_s")?,
-            payload_kg: of("payload_kg")?,
-            centre_of_gravity_mm: [of("centre_x_mm")?, of("centre_y_mm")?, of("centre_z_mm")?],
-            tool_mm: [of("tool_x_mm")?, of("tool_y_mm")?, of("tool_z_mm")?],
-        };
-        (program.script().ok()? == text).then_some(program)
-    }
 }
 
 /// What follows the head. The go may come a beat after the first: the host writes both, but from two hands. The motion is a thread of
@@ -155,8 +134,10 @@ impl MotionProgram {
 fn body() -> String {
     use registers::{GO, PHASE, STOP};
     format!(
-        "  set_payload(payload_kg, [centre_x_mm / 1000, centre_y_mm / 1000, centre_z_mm / 1000])
-  set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000, 0, 0, 0])
+        "  if reason == 0:
+    set_payload(payload_kg, [centre_x_mm / 1000, centre_y_mm / 1000, centre_z_mm / 1000])
+    set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000, 0, 0, 0])
+  end
   global gripgen_arrived = False
   global gripgen_target = p[target_x_m, target_y_m, target_z_m, target_rx_rad, target_ry_rad, target_rz_rad]
   global gripgen_speed = speed_mm_s / 1000

@@ -14,16 +14,6 @@ fn motion() -> MotionProgram {
 }
 
 #[test]
-fn a_motion_is_read_back_and_nothing_else_is_taken_for_one() {
-    let text = motion().script().unwrap();
-    assert_eq!(MotionProgram::from_script(&text), Some(motion()));
-    assert_eq!(MotionProgram::from_script(&text.replace("v=gripgen_speed", "v=3.0")), None);
-    assert_eq!(MotionProgram::from_script(&text.replace("speed_mm_s = 100", "speed_mm_s = 900")), None);
-    assert_eq!(PullProgram::from_script(&text), None);
-    assert!(text.ends_with("\nend\n"));
-}
-
-#[test]
 fn every_way_out_of_a_motion_kills_it_and_stops() {
     let text = motion().script().unwrap();
     let (kill, stop) = (text.find("kill handle").unwrap(), text.find("stopl(").unwrap());

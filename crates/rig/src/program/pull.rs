@@ -129,31 +129,6 @@ impl PullProgram {
         let head = head::write(NAME, self.run, &self.numbers());
         Ok(head + &head::heartbeat() + &body() + &head::farewell())
     }
-
-    /// The numbers of a text that is such a program, word for word.
-    pub fn from_script(text: &str) -> Option<Self> {
-        let (run, numbers) = head::read(NAME, text)?;
-        let of = |name: &str| numbers.get(name).copied();
-        let program = Self {
-            run,
-            increment_n: of("increment_n")?,
-            start_n: of("start_n")?,
-            step_s: of("step_s")?,
-            direction: of("direction")?,
-            stop_mm: of("stop_mm")?,
-            max_force_n: of("max_force_n")?,
-            abort_force_n: of("abort_force_n")?,
-            abort_torque_nm: of("abort_torque_nm")?,
-            speed_mm_s: of("speed_mm_s")?,
-            lateral_mm: of("lateral_mm")?,
-            max_time_s: of("max_time_s")?,
-            wait_s: of("wait_s")?,
-            payload_kg: of("payload_kg")?,
-            centre_of_gravity_mm: [of("centre_x_mm")?, of("centre_y_mm")?, of("centre_z_mm")?],
-            tool_mm: [of("tool_x_mm")?, of("tool_y_mm")?, of("tool_z_mm")?],
-        };
-        (program.script().ok()? == text).then_some(program)
-    }
 }
 
 /// What follows the head.
@@ -177,12 +152,12 @@ fn body() -> String {
         .collect();
     // The preload is stored and not zeroed away: clamping may press the part along the pull.
     format!(
-        "  set_payload(payload_kg, [centre_x_mm / 1000, centre_y_mm / 1000, centre_z_mm / 1000])
-  set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000, 0, 0, 0])
-  step = 0
+        "  step = 0
   desired = 0.0
   waited = 0.0
   if reason == 0:
+    set_payload(payload_kg, [centre_x_mm / 1000, centre_y_mm / 1000, centre_z_mm / 1000])
+    set_tcp(p[tool_x_mm / 1000, tool_y_mm / 1000, tool_z_mm / 1000, 0, 0, 0])
     sleep({rest})
     zero_ftsensor()
     write_output_integer_register({PHASE}, {zeroed})
@@ -214,7 +189,7 @@ fn body() -> String {
     write_output_integer_register({PHASE}, {pulling})
     while reason == 0:
       elapsed = ticks * get_steptime()
-      now = floor(elapsed / step_s) + 1
+      now = floor(elapsed / step_s + 0.000001) + 1
       if now != step:
         step = now
         desired = start_n + (step - 1) * increment_n

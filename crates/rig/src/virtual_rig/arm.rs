@@ -1,7 +1,12 @@
 //! The virtual arm: where it is, what moves it, what it feels.
 
-use crate::program::{STOP_DECELERATION_M_S2, TcpPose};
-use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
+mod force;
+
+use super::urscript::ForceMode;
+use crate::program::TcpPose;
+use force::Pulling;
+use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError};
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Control step of an e-Series robot.
@@ -10,30 +15,31 @@ pub const STEP_S: f64 = 0.002;
 const COLLISION_M: f64 = 2e-3;
 /// Standard gravity.
 const GRAVITY_M_S2: f64 = 9.806_65;
+/// How it brakes by itself.
+const BRAKE_M_S2: f64 = 2.0;
+/// Damping and gain of force mode until a program sets them (script manual).
+const DAMPING: f64 = 0.025;
+const GAIN: f64 = 1.0;
 
-/// What moves the arm.
+/// What moves the arm beside force mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Drive {
     /// Nothing.
     Hold,
-    /// Force mode along the base's z.
-    Force {
-        /// What the arm applies.
-        force_n: f64,
-        /// Largest speed.
-        speed_limit_m_s: f64,
-        /// What the pull is: its direction and steps.
-        pull: PullRequest,
-    },
     /// A straight line.
     Line {
         /// Where to.
         target: TcpPose,
         /// How fast.
         speed_m_s: f64,
+        /// How fast it gets there, and comes to rest.
+        acceleration_m_s2: f64,
     },
     /// It brakes.
-    Stop,
+    Stop {
+        /// How.
+        deceleration_m_s2: f64,
+    },
 }
 
 /// Why the arm stopped by itself.
@@ -51,11 +57,19 @@ pub enum ArmError {
     Plant(#[from] PlantError),
 }
 
-/// A pull under way, or ended with the jaws still closed.
-struct Pulling {
-    from: TcpPose,
-    direction: f64,
-    reading: PullReading,
+/// How far the arm is from one that follows at once and feels truly.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ArmFaults {
+    /// Time constant of force mode.
+    pub force_lag_s: f64,
+    /// Time before force mode begins to follow.
+    pub force_dead_s: f64,
+    /// Time constant of the sensor.
+    pub sensor_lag_s: f64,
+    /// How the sensor's zero wanders, N per second.
+    pub drift_n_s: f64,
+    /// What jaws that have closed on a part press across the pull, along the base's x.
+    pub clamp_n: f64,
 }
 
 /// The arm.
@@ -64,11 +78,21 @@ pub struct Arm {
     tcp: TcpPose,
     velocity_m_s: [f64; 3],
     drive: Drive,
+    force: Option<ForceMode>,
+    damping: f64,
+    gain: f64,
     grip: Option<Box<dyn Grip>>,
     closed_at_s: f64,
     gripped_at: TcpPose,
     pulling: Option<Pulling>,
     hung_mass_kg: f64,
+    faults: ArmFaults,
+    /// What was asked of force mode along z and has not come to it yet, oldest first; and what it applies.
+    asked_n: VecDeque<f64>,
+    applied_n: f64,
+    /// What the sensor feels along z, behind what loads it.
+    felt_n: f64,
+    drift_n: f64,
     aside_n: f64,
     aside_zero_n: f64,
     zero_n: f64,
@@ -85,11 +109,19 @@ impl Arm {
             tcp,
             velocity_m_s: [0.0; 3],
             drive: Drive::Hold,
+            force: None,
+            damping: DAMPING,
+            gain: GAIN,
             grip: None,
             closed_at_s: 0.0,
             gripped_at: tcp,
             pulling: None,
             hung_mass_kg: 0.0,
+            faults: ArmFaults::default(),
+            asked_n: VecDeque::new(),
+            applied_n: 0.0,
+            felt_n: -zero_n,
+            drift_n: 0.0,
             aside_n: 0.0,
             aside_zero_n: 0.0,
             zero_n,
@@ -113,28 +145,111 @@ impl Arm {
         self.velocity_m_s.iter().map(|v| v * v).sum::<f64>().sqrt()
     }
 
-    /// What moves it. A drive with a number that is none is a stop.
-    pub fn set_drive(&mut self, drive: Drive) {
-        let finite = match drive {
-            Drive::Hold | Drive::Stop => true,
-            Drive::Force { force_n, speed_limit_m_s, .. } => {
-                force_n.is_finite() && speed_limit_m_s.is_finite()
-            }
-            Drive::Line { target, speed_m_s } => {
-                speed_m_s.is_finite() && target.numbers().iter().all(|x| x.is_finite())
-            }
+    /// What moves it beside force mode.
+    pub fn drive(&self) -> Drive {
+        self.drive
+    }
+
+    /// Begins to move in a line. Numbers that are none are a stop.
+    ///
+    /// # Errors
+    ///
+    /// In force mode.
+    pub fn move_line(
+        &mut self,
+        target: TcpPose,
+        acceleration_m_s2: f64,
+        speed_m_s: f64,
+    ) -> Result<(), String> {
+        if self.force.is_some() {
+            return Err("a motion in force mode is not simulated".into());
+        }
+        let numbers = target.numbers();
+        let finite = numbers.iter().chain(&[acceleration_m_s2, speed_m_s]).all(|x| x.is_finite());
+        self.drive = match finite {
+            true => Drive::Line { target, speed_m_s, acceleration_m_s2 },
+            false => Drive::Stop { deceleration_m_s2: BRAKE_M_S2 },
         };
-        self.drive = if finite { drive } else { Drive::Stop };
+        Ok(())
+    }
+
+    /// Brakes what moves it. Force mode goes on.
+    pub fn brake(&mut self, deceleration_m_s2: f64) {
+        self.drive = Drive::Stop { deceleration_m_s2 };
+    }
+
+    /// Whether a line or a braking is under way.
+    pub fn is_driven(&self) -> bool {
+        self.drive != Drive::Hold
+    }
+
+    /// Force mode begins, or gets other numbers.
+    ///
+    /// # Errors
+    ///
+    /// A number that is none.
+    pub fn force_mode(&mut self, mode: ForceMode) -> Result<(), String> {
+        let numbers = [mode.frame, mode.wrench, mode.limits];
+        if !numbers.iter().flatten().all(|x| x.is_finite()) {
+            return Err("force mode with a number that is none".into());
+        }
+        if self.force.is_none() {
+            (self.applied_n, self.drive) = (0.0, Drive::Hold);
+            self.asked_n.clear();
+        }
+        self.force = Some(mode);
+        Ok(())
+    }
+
+    /// Force mode ends, and the arm brakes.
+    pub fn end_force_mode(&mut self) {
+        if self.force.take().is_some() {
+            self.drive = Drive::Stop { deceleration_m_s2: BRAKE_M_S2 };
+        }
+    }
+
+    /// Damping and gain of force mode. They stay until they are set again.
+    pub fn set_force_settings(&mut self, damping: Option<f64>, gain: Option<f64>) {
+        self.damping = damping.unwrap_or(self.damping);
+        self.gain = gain.unwrap_or(self.gain);
+    }
+
+    /// Damping and gain of force mode.
+    pub fn force_settings(&self) -> (f64, f64) {
+        (self.damping, self.gain)
     }
 
     /// Whether it is in force mode.
     pub fn applies_force(&self) -> bool {
-        matches!(self.drive, Drive::Force { .. })
+        self.force.is_some()
     }
 
-    /// Brakes, if it moves.
+    /// What force mode was last asked for.
+    pub fn force_command(&self) -> Option<ForceMode> {
+        self.force
+    }
+
+    /// Ends whatever moves it, and brakes.
     pub fn stop(&mut self) {
-        self.drive = Drive::Stop;
+        self.force = None;
+        self.drive = Drive::Stop { deceleration_m_s2: BRAKE_M_S2 };
+    }
+
+    /// Somebody pushes the tool by so much, against the stiffness of the arm.
+    pub fn push(&mut self, by_m: [f64; 3]) {
+        for (position_m, by_m) in self.tcp.position_m.iter_mut().zip(by_m) {
+            *position_m += by_m;
+        }
+    }
+
+    /// How far it is from a perfect arm.
+    pub fn faults(&self) -> ArmFaults {
+        self.faults
+    }
+
+    /// Makes it less perfect, or perfect again.
+    pub fn set_faults(&mut self, faults: ArmFaults) {
+        self.faults = faults;
     }
 
     /// Force on the tool along the base's z: zeroed, and raw. A pull upwards loads the tool downwards.
@@ -143,9 +258,9 @@ impl Arm {
     }
 
     /// Takes what the sensor says now as zero. The controller averages its noise away.
-    pub fn zero(&mut self, time_s: f64) {
-        self.zero_n = self.load_n(time_s);
-        self.aside_zero_n = self.aside_n;
+    pub fn zero(&mut self) {
+        self.zero_n = self.felt_n + self.drift_n;
+        self.aside_zero_n = self.across_n();
     }
 
     /// Hangs a mass on the tool, or takes it off.
@@ -160,7 +275,13 @@ impl Arm {
 
     /// Force on the tool along the base's x: zeroed, and raw.
     pub fn aside_n(&self) -> (f64, f64) {
-        (self.aside_n - self.aside_zero_n, self.aside_n)
+        (self.across_n() - self.aside_zero_n, self.across_n())
+    }
+
+    /// What loads the tool along the base's x.
+    fn across_n(&self) -> f64 {
+        let clamps = self.grip.as_ref().is_some_and(|grip| grip.holds());
+        self.aside_n + if clamps { self.faults.clamp_n } else { 0.0 }
     }
 
     /// How the jaws would close now.
@@ -191,7 +312,7 @@ impl Arm {
     /// The sensor without noise, not zeroed: load on the tool along z.
     fn load_n(&self, time_s: f64) -> f64 {
         let without_mass_n = match &self.pulling {
-            Some(p) => -p.direction * p.reading.measured_n,
+            Some(p) => -p.request.direction * p.reading.measured_n,
             None => -self.plant.offset_n(time_s),
         };
         without_mass_n - self.hung_mass_kg * GRAVITY_M_S2
@@ -205,69 +326,65 @@ impl Arm {
     pub fn advance(&mut self, time_s: f64) -> Result<(), ArmError> {
         self.tick += 1;
         let before = self.tcp;
-        match self.drive {
-            Drive::Hold => self.velocity_m_s = [0.0; 3],
-            Drive::Stop => {
-                let speed = self.speed_m_s();
-                let slower = (speed - STOP_DECELERATION_M_S2 * STEP_S).max(0.0);
-                let factor = if speed > 0.0 { slower / speed } else { 0.0 };
-                self.velocity_m_s = self.velocity_m_s.map(|v| v * factor);
-                for axis in 0..3 {
-                    self.tcp.position_m[axis] += self.velocity_m_s[axis] * STEP_S;
-                }
-                if slower == 0.0 {
-                    self.drive = Drive::Hold;
+        if let Some(mode) = self.force {
+            self.drive = Drive::Hold;
+            self.apply(&mode, time_s)?;
+        } else {
+            match self.drive {
+                Drive::Hold => self.velocity_m_s = [0.0; 3],
+                Drive::Stop { deceleration_m_s2 } => self.slow_down(deceleration_m_s2),
+                Drive::Line { target, speed_m_s, acceleration_m_s2 } => {
+                    self.follow(&target, speed_m_s, acceleration_m_s2)?;
                 }
             }
-            Drive::Line { target, speed_m_s } => self.follow(&target, speed_m_s)?,
-            Drive::Force { force_n, speed_limit_m_s, pull } => {
-                self.pull(force_n, speed_limit_m_s, &pull)?;
-            }
-        }
-        if !matches!(self.drive, Drive::Force { .. }) {
             self.velocity_m_s = [0, 1, 2].map(|i| (self.tcp.position_m[i] - before.position_m[i]) / STEP_S);
         }
         // While the simulator pulls, its sensor has its own noise.
-        let pulling = self.pulling.is_some() && matches!(self.drive, Drive::Force { .. });
-        let noise_n = if pulling { 0.0 } else { self.plant.noise_n(self.tick) };
-        self.raw_n = self.load_n(time_s) + noise_n;
+        let noise_n =
+            if self.pulling.is_some() && self.force.is_some() { 0.0 } else { self.plant.noise_n(self.tick) };
+        self.felt_n += (self.load_n(time_s) - self.felt_n) * share(self.faults.sensor_lag_s);
+        self.drift_n += self.faults.drift_n_s * STEP_S;
+        self.raw_n = self.felt_n + self.drift_n + noise_n;
         Ok(())
     }
 
-    fn follow(&mut self, target: &TcpPose, speed_m_s: f64) -> Result<(), ArmError> {
+    fn slow_down(&mut self, deceleration_m_s2: f64) {
+        let speed = self.speed_m_s();
+        let slower = (speed - deceleration_m_s2 * STEP_S).max(0.0);
+        let factor = if speed > 0.0 { slower / speed } else { 0.0 };
+        for axis in 0..3 {
+            self.tcp.position_m[axis] += factor * self.velocity_m_s[axis] * STEP_S;
+        }
+        if slower == 0.0 {
+            self.drive = Drive::Hold;
+        }
+    }
+
+    fn follow(&mut self, target: &TcpPose, speed_m_s: f64, acceleration_m_s2: f64) -> Result<(), ArmError> {
         let left_m = self.tcp.distance_m(target);
-        let share = if left_m <= speed_m_s * STEP_S { 1.0 } else { speed_m_s * STEP_S / left_m };
+        // As fast as it has become, and as it can still brake from.
+        let faster = self.speed_m_s() + acceleration_m_s2 * STEP_S;
+        let brakes = (2.0 * acceleration_m_s2 * left_m).sqrt().max(0.5 * acceleration_m_s2 * STEP_S);
+        let step_m = speed_m_s.min(faster).min(brakes) * STEP_S;
+        let share = if left_m <= step_m { 1.0 } else { step_m / left_m };
         for axis in 0..3 {
             self.tcp.position_m[axis] += share * (target.position_m[axis] - self.tcp.position_m[axis]);
             self.tcp.rotation_rad[axis] += share * (target.rotation_rad[axis] - self.tcp.rotation_rad[axis]);
         }
+        if share == 1.0 {
+            (self.tcp, self.drive) = (*target, Drive::Hold);
+        }
         let moved_m = self.tcp.distance_m(&self.gripped_at);
         let held = self.grip.as_ref().is_some_and(|g| g.holds()) && self.pulling.is_none();
         if held && moved_m > COLLISION_M {
-            self.drive = Drive::Stop;
+            self.brake(BRAKE_M_S2);
             return Err(ArmError::Collision { moved_mm: 1e3 * moved_m });
         }
         Ok(())
     }
+}
 
-    fn pull(&mut self, force_n: f64, limit_m_s: f64, pull: &PullRequest) -> Result<(), ArmError> {
-        let Some(grip) = self.grip.as_mut().filter(|grip| grip.holds()) else {
-            // Nothing holds the arm back.
-            let speed = if force_n == 0.0 { 0.0 } else { limit_m_s.copysign(force_n) };
-            self.velocity_m_s = [0.0, 0.0, speed];
-            self.tcp.position_m[2] += speed * STEP_S;
-            return Ok(());
-        };
-        if self.pulling.is_none() {
-            let reading = grip.begin_pull(pull)?;
-            self.pulling = Some(Pulling { from: self.tcp, direction: pull.direction, reading });
-        }
-        if let Some(p) = &mut self.pulling {
-            p.reading = grip.pull(p.direction * force_n, STEP_S)?;
-            let before = self.tcp.position_m[2];
-            self.tcp = p.from.raised(p.direction * p.reading.displacement_m);
-            self.velocity_m_s = [0.0, 0.0, (self.tcp.position_m[2] - before) / STEP_S];
-        }
-        Ok(())
-    }
+/// How much of the way a first-order lag goes in a control step.
+fn share(lag_s: f64) -> f64 {
+    if lag_s > 0.0 { 1.0 - (-STEP_S / lag_s).exp() } else { 1.0 }
 }

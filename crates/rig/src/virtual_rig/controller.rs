@@ -1,10 +1,10 @@
 //! The virtual robot's controller: power, safety, programs, watchdog, one control step after the other.
 
-use super::arm::{Arm, ArmError, STEP_S};
+use super::arm::{Arm, ArmError, Drive, STEP_S};
+use super::body::Body;
 use super::robot::{Registers, Robot, RuntimeState};
-use super::rtde_control::RtdeControl;
-use super::running::{Kind, Progress, Running};
-use crate::program::{HEARTBEAT_LEAST_HZ, MotionProgram, PullProgram, TcpPose, registers};
+use super::urscript::{Machine, Program, Progress, Watchdog, WatchdogAction};
+use crate::program::TcpPose;
 use crate::robot_state::{RobotMode, SafetyStatus};
 use crate::rtde::Value;
 use gripgen_twin::plant::Plant;
@@ -33,7 +33,12 @@ pub enum Announcement {
         /// Why, if not by itself.
         why: String,
     },
-    /// A program that this controller cannot run.
+    /// A program says something.
+    Said {
+        /// What.
+        text: String,
+    },
+    /// A program that this controller cannot run, or not any further.
     CannotRun {
         /// What is wrong.
         problem: String,
@@ -42,31 +47,14 @@ pub enum Announcement {
     Safety(SafetyStatus),
 }
 
-enum Program {
-    Own(Running),
-    RtdeControl(RtdeControl),
-}
-
-impl Program {
-    fn title(&self) -> &'static str {
-        match self {
-            Program::Own(running) => running.title(),
-            Program::RtdeControl(_) => "rtde_control",
-        }
-    }
-}
-
-struct Watchdog {
-    register: usize,
-    period_s: f64,
-}
-
 /// The controller.
 pub struct Controller {
     robot: Robot,
     arm: Arm,
-    program: Option<Program>,
+    program: Option<Machine>,
     watchdog: Option<Watchdog>,
+    /// A motion that a pause has broken off.
+    broken_off: Option<Drive>,
     /// When each integer register was last written.
     written_s: [f64; 48],
     clock_rate: f64,
@@ -75,7 +63,7 @@ pub struct Controller {
 }
 
 /// Payload of the installation, as the shipped rig's file has it.
-const PAYLOAD_KG: f64 = 1.6;
+pub const PAYLOAD_KG: f64 = 1.6;
 
 impl Controller {
     /// The speed slider, moved by somebody.
@@ -106,6 +94,7 @@ impl Controller {
             arm: Arm::new(plant, tcp),
             program: None,
             watchdog: None,
+            broken_off: None,
             written_s: [BOOTED_S; 48],
             clock_rate,
             stopped_s: f64::NEG_INFINITY,
@@ -134,8 +123,8 @@ impl Controller {
     }
 
     /// Name of the program that runs or is paused.
-    pub fn program_title(&self) -> Option<&'static str> {
-        self.program.as_ref().map(Program::title)
+    pub fn program_title(&self) -> Option<&str> {
+        self.program.as_ref().map(|machine| machine.program().title())
     }
 
     /// Somebody else has something to tell.
@@ -153,21 +142,11 @@ impl Controller {
         }
     }
 
-    /// A client sent a program. It replaces the one that runs.
+    /// A client sent a program. It replaces the one that runs; a text that is none replaces nothing.
     pub fn run_script(&mut self, text: &str) {
-        let program = PullProgram::from_script(text)
-            .map(Kind::Pull)
-            .or_else(|| MotionProgram::from_script(text).map(Kind::Motion))
-            .map(|kind| Program::Own(Running::new(kind, self.clock_rate)))
-            .or_else(|| RtdeControl::from_script(text).map(Program::RtdeControl));
-        let Some(program) = program else {
-            // A stop in one line is understood, as every client's last resort.
-            if matches!(text.trim(), "stopl(2.0)" | "halt" | "stopj(2.0)") {
-                return self.stop_program("a script said stop");
-            }
-            let first = text.lines().next().unwrap_or_default();
-            let problem = format!("this rig runs the programs of gripgen and of ur_rtde, not `{first}`");
-            return self.announcements.push(Announcement::CannotRun { problem });
+        let program = match Program::parse(text) {
+            Ok(program) => program,
+            Err(e) => return self.announce_problem(&e.to_string()),
         };
         self.stop_program("another program replaces it");
         if self.robot.mode != RobotMode::Running || self.robot.safety != SafetyStatus::Normal {
@@ -177,18 +156,19 @@ impl Controller {
         }
         self.announcements.push(Announcement::Started { title: program.title().into() });
         // A controller zeroes its sensor at the start of every program.
-        self.arm.zero(self.robot.timestamp_s);
-        self.program = Some(program);
+        self.arm.zero();
+        self.program = Some(Machine::new(Arc::new(program)));
         self.robot.runtime = RuntimeState::Playing;
     }
 
     /// Ends the program and brakes.
     pub fn stop_program(&mut self, why: &str) {
         if let Some(program) = self.program.take() {
-            let (title, why) = (program.title().into(), why.into());
+            let (title, why) = (program.program().title().into(), why.into());
             self.announcements.push(Announcement::Stopped { title, why });
         }
         self.watchdog = None;
+        self.broken_off = None;
         self.robot.runtime = RuntimeState::Stopped;
         self.arm.stop();
     }
@@ -202,10 +182,7 @@ impl Controller {
 
     /// The controller stops by itself; the program waits, and its watchdog with it.
     pub fn protective_stop(&mut self) {
-        self.arm.stop();
-        if self.program.is_some() {
-            self.robot.runtime = RuntimeState::Paused;
-        }
+        self.break_off();
         self.stopped_s = self.robot.timestamp_s;
         self.set_safety(SafetyStatus::ProtectiveStop);
     }
@@ -243,7 +220,17 @@ impl Controller {
     /// The program waits, the arm brakes.
     pub fn pause(&mut self) {
         if self.program.is_some() {
-            self.arm.stop();
+            self.break_off();
+        }
+    }
+
+    /// The arm brakes. A program that runs waits, and its motion with it; force mode is over.
+    fn break_off(&mut self) {
+        if self.robot.runtime == RuntimeState::Playing {
+            self.broken_off = Some(self.arm.drive()).filter(|drive| matches!(drive, Drive::Line { .. }));
+        }
+        self.arm.stop();
+        if self.program.is_some() {
             self.robot.runtime = RuntimeState::Paused;
         }
     }
@@ -252,6 +239,10 @@ impl Controller {
     pub fn play(&mut self) {
         if self.program.is_some() && self.robot.safety == SafetyStatus::Normal {
             self.robot.runtime = RuntimeState::Playing;
+            if let Some(Drive::Line { target, speed_m_s, acceleration_m_s2 }) = self.broken_off.take() {
+                // It is not in force mode: the pause has ended that.
+                let _ = self.arm.move_line(target, acceleration_m_s2, speed_m_s);
+            }
         }
     }
 
@@ -268,28 +259,33 @@ impl Controller {
         }
         if let Some(dog) = &self.watchdog {
             let silent_s = self.robot.timestamp_s - self.written_s[dog.register];
-            if silent_s > dog.period_s {
-                return self.stop_program("the host does not write its heartbeat any more");
+            // It watches the host, whose time is not that of a faster clock.
+            if silent_s > self.clock_rate / dog.rate_hz {
+                match dog.action {
+                    WatchdogAction::Stop => {
+                        return self.stop_program("the host does not write its heartbeat any more");
+                    }
+                    WatchdogAction::Pause => return self.pause(),
+                    WatchdogAction::Ignore => {}
+                }
             }
         }
-        let (robot, arm) = (&mut self.robot, &mut self.arm);
-        let (progress, register, rate_hz) = match &mut self.program {
-            Some(Program::Own(running)) => {
-                (running.step(robot, arm), usize::from(registers::HEARTBEAT), HEARTBEAT_LEAST_HZ)
-            }
-            Some(Program::RtdeControl(control)) => {
-                let progress = control.step(robot, arm);
-                (progress, control.command_register(), control.watchdog_hz(robot))
-            }
-            None => return,
-        };
+        let Some(machine) = &mut self.program else { return };
+        let mut body = Body::new(&mut self.robot, &mut self.arm);
+        let progress = machine.step(&mut body);
+        let (watchdog, said) = body.into_parts();
+        if let Some(dog) = watchdog {
+            self.written_s[dog.register] = self.robot.timestamp_s;
+            self.watchdog = Some(dog).filter(|dog| dog.rate_hz > 0.0);
+        }
+        self.announcements.extend(said.into_iter().map(|text| Announcement::Said { text }));
         match progress {
-            Progress::Running => {}
-            Progress::SetWatchdog => {
-                // It watches the host, whose time is not that of a faster clock.
-                self.watchdog = Some(Watchdog { register, period_s: self.clock_rate / rate_hz });
+            Ok(Progress::Running) => {}
+            Ok(Progress::Ended) => self.stop_program(""),
+            Err(e) => {
+                self.announce_problem(&e.to_string());
+                self.stop_program(&e.to_string());
             }
-            Progress::Ended => self.stop_program(""),
         }
     }
 
@@ -308,10 +304,7 @@ impl Controller {
         self.robot.velocity_m_s = self.arm.velocity_m_s();
         let (force_n, raw_n) = self.arm.force_z_n();
         (self.robot.wrench[2], self.robot.raw_wrench[2]) = (force_n, raw_n);
-        // A force aside at the grip turns the flange about its lever, the tool.
-        let (aside_n, raw_aside_n) = self.arm.aside_n();
-        let lever_m = self.robot.tool_m[2];
-        (self.robot.wrench[0], self.robot.raw_wrench[0]) = (aside_n, raw_aside_n);
-        (self.robot.wrench[4], self.robot.raw_wrench[4]) = (aside_n * lever_m, raw_aside_n * lever_m);
+        // At the grip a force has no lever; at the flange it has (see `Body::tcp_force`).
+        (self.robot.wrench[0], self.robot.raw_wrench[0]) = self.arm.aside_n();
     }
 }

@@ -230,17 +230,24 @@ fn the_watchdog_ends_the_program_a_tenth_of_a_second_after_the_last_heartbeat() 
     assert!(told, "{:?}", rig.told);
 }
 
+/// Words that are none are announced with their line, and what runs goes on; words that this robot cannot follow end their program.
 #[test]
-fn a_program_that_is_not_known_is_announced_and_not_run() {
-    let mut rig = rig();
-    rig.controller.run_script("def my_program():\n  movej([0,0,0,0,0,0])\nend\n");
+fn a_text_that_is_no_program_is_announced_and_replaces_nothing() {
+    let mut rig = moving(|_| ());
+    rig.told.clear();
+    rig.controller.run_script("def my_program():\n  x = 1\n  frobnicate(x)\nend\n");
     rig.step();
-    assert_eq!(rig.controller.program_title(), None);
+    assert_eq!(rig.controller.program_title(), Some("gripgen_move"));
     let [Announcement::CannotRun { problem }] = &rig.told[..] else { panic!("{:?}", rig.told) };
-    assert!(problem.contains("def my_program():"), "{problem}");
-    // A word changed in a known one, too.
-    let changed = motion(|_| ()).script().unwrap().replace("v=gripgen_speed", "v=3.0");
-    rig.controller.run_script(&changed);
+    assert_eq!(problem, "line 3: `frobnicate` is no function that is known");
+    rig.controller.run_script("def my_program():\n  movej([0,0,0,0,0,0])\nend\n");
+    rig.run(0.1);
+    assert_eq!(rig.controller.program_title(), None);
+    let Some(Announcement::Stopped { title, why }) = rig.told.last() else { panic!("{:?}", rig.told) };
+    assert_eq!(
+        (title.as_str(), why.as_str()),
+        ("my_program", "line 2: movej: movej to joints: this robot has no joints")
+    );
     assert!(rig.stands_still());
 }
 
@@ -256,6 +263,8 @@ fn another_program_replaces_the_one_that_runs() {
     assert_eq!(rig.told, [Announcement::Stopped { title, why }, started]);
     // The last resort of every client.
     rig.controller.run_script("stopl(2.0)\n");
+    assert_eq!(rig.controller.program_title(), Some(""));
+    rig.run(0.1);
     assert_eq!(rig.controller.program_title(), None);
 }
 

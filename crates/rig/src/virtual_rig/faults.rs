@@ -70,6 +70,16 @@ pub enum Fault {
     Hang(f64),
     /// Something pulls aside at the tool, in N; 0 ends it.
     Aside(f64),
+    /// Force mode follows with this time constant, in s; 0 ends it.
+    ForceLag(f64),
+    /// Force mode begins to follow after so many seconds; 0 ends it.
+    ForceDelay(f64),
+    /// The sensor follows its load with this time constant, in s; 0 ends it.
+    SensorLag(f64),
+    /// The sensor's zero wanders, in N per minute; 0 ends it where it is.
+    Drift(f64),
+    /// Jaws that close press so much across the pull, in N; 0 ends it.
+    Clamp(f64),
     /// Somebody moves the speed slider, 1 is 100 %.
     Slider(f64),
     /// The gripper reports this force, in N over both jaws, whatever it was asked.
@@ -80,7 +90,7 @@ pub enum Fault {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{line}` is none of: drop|truncate|garble|refuse|accept DEVICE, delay DEVICE S, estop, release-estop, protective-stop, \
-     freeze|repeat|thaw left|right, part-lost, hang KG, aside N, slider SHARE, reports N; devices: rtde, dashboard, script, gripper, camera-left, camera-right"
+     freeze|repeat|thaw left|right, part-lost, hang KG, aside N, force-lag S, force-delay S, sensor-lag S, drift N_PER_MIN, clamp N, slider SHARE, reports N; devices: rtde, dashboard, script, gripper, camera-left, camera-right"
 )]
 pub struct FaultError {
     /// The words.
@@ -115,6 +125,11 @@ impl std::str::FromStr for Fault {
             ["part-lost"] => Some(Fault::PartLost),
             ["hang", kg] => number(kg, 5.0).map(Fault::Hang),
             ["aside", n] => number(n, 100.0).map(Fault::Aside),
+            ["force-lag", s] => number(s, 5.0).map(Fault::ForceLag),
+            ["force-delay", s] => number(s, 5.0).map(Fault::ForceDelay),
+            ["sensor-lag", s] => number(s, 5.0).map(Fault::SensorLag),
+            ["drift", n] => number(n, 100.0).map(Fault::Drift),
+            ["clamp", n] => number(n, 100.0).map(Fault::Clamp),
             ["slider", share] => number(share, 1.0).map(Fault::Slider),
             ["reports", n] => number(n, 200.0).map(Fault::Reports),
             _ => None,
@@ -140,6 +155,8 @@ mod tests {
             ("aside 45", Fault::Aside(45.0)),
             ("slider 0.3", Fault::Slider(0.3)),
             ("reports 8.0", Fault::Reports(8.0)),
+            ("force-lag 0.35", Fault::ForceLag(0.35)),
+            ("drift 5", Fault::Drift(5.0)),
         ] {
             assert_eq!(line.parse(), Ok(fault));
         }

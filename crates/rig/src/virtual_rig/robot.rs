@@ -81,7 +81,7 @@ pub struct Robot {
 }
 
 /// Joints of a UR5e with the tool down in front of it. They do not follow the tool: no client of this rig asks where they are.
-const JOINTS_RAD: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
+pub(super) const JOINTS_RAD: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
 /// What joints, tool and boards of a robot at rest show, where a client wants to see something.
 const PART_TEMPERATURE_C: f64 = 30.0;
 const MAIN_VOLTAGE_V: f64 = 48.0;

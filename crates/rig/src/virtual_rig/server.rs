@@ -151,6 +151,7 @@ fn announcement_message(announcement: &Announcement, time_s: f64) -> Vec<u8> {
         Announcement::Started { title } => key(PROGRAM_STARTED, title),
         Announcement::Stopped { title, why } if why.is_empty() => key(PROGRAM_STOPPED, title),
         Announcement::Stopped { title, why } => key(PROGRAM_STOPPED, &format!("{title}: {why}")),
+        Announcement::Said { text } => key("", text),
         Announcement::CannotRun { problem } => {
             // C207: a problem with a client, as the controller reports a fieldbus that is gone.
             let error = ErrorCodeMessage {

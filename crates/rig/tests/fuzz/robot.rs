@@ -4,6 +4,7 @@ use super::Heard;
 use super::plant::Spring;
 use gripgen_rig::gcl::SHIPPED_LIMITS;
 use gripgen_rig::program::TcpPose;
+use gripgen_rig::rtde::Value;
 use gripgen_rig::virtual_rig::controller::Controller;
 use gripgen_rig::virtual_rig::dashboard;
 use gripgen_rig::virtual_rig::gripper::{Closed, Jaws, VirtualGripper};
@@ -23,6 +24,53 @@ pub fn reply(line: &str, controller: &mut Controller) -> String {
     dashboard::reply(line, &mut Panel(controller)).text
 }
 
+/// A program that does what its inputs say: command 3 goes to a pose, 6 pulls with a force, 7 ends that.
+const LISTENS: &str = "def listens():
+  global to = p[0, 0, 0, 0, 0, 0]
+  thread moves():
+    movel(to, a=0.5, v=0.1)
+  end
+  before = 0
+  while True:
+    command = read_input_integer_register(0)
+    if command == 3 and before != 3:
+      i = 0
+      while i < 6:
+        to[i] = read_input_float_register(i)
+        i = i + 1
+      end
+      run moves()
+    elif command == 6:
+      force_mode(p[0, 0, 0, 0, 0, 0], [0, 0, read_input_integer_register(4), 0, 0, 0], [0, 0, read_input_float_register(8), 0, 0, 0], 2, [0.1, 0.1, 0.05, 0.1, 0.1, 0.1])
+    elif command == 7:
+      end_force_mode()
+    end
+    before = command
+    write_output_float_register(0, read_input_float_register(6))
+    sync()
+  end
+end
+";
+
+/// Runs a text for 60 control steps, its host beating; what became of it, in words.
+pub fn run_program(text: &str) -> String {
+    let mut controller = controller();
+    controller.run_script(text);
+    let mut said = String::new();
+    for step in 0..60 {
+        controller.write_input("input_int_register_24", Value::Int32(step / 5));
+        controller.write_input("input_int_register_25", Value::Int32(1 + step / 40));
+        controller.begin_step();
+        controller.end_step();
+        for told in controller.take_announcements() {
+            said = format!("{told:?}");
+        }
+    }
+    let tcp = controller.robot().tcp.numbers();
+    assert!(tcp.iter().all(|x| x.is_finite()), "{tcp:?}");
+    format!("{said} {tcp:?}")
+}
+
 /// A connection to a robot whose program reads its inputs.
 pub struct Served {
     controller: Controller,
@@ -34,7 +82,7 @@ impl Served {
     /// Nothing was said yet; another client has an input.
     pub fn new() -> Self {
         let (mut controller, mut owners) = (controller(), InputOwners::default());
-        controller.run_script("def rtde_control():\nend\n");
+        controller.run_script(LISTENS);
         let mut other = RtdeServer::new(7);
         let taken = [&[0, 24, b'I'][..], b"input_int_register_47"].concat();
         assert!(other.receive(&taken, &mut controller, &mut owners).is_ok());

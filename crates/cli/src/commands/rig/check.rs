@@ -1,10 +1,14 @@
 //! `gripgen rig check`: does every device answer.
 
 use super::load::load_rig;
+use super::programs::judged;
+use super::rehearsal::{compared, load};
 use crate::args::RigCheckArgs;
 use crate::failure::{Failure, code};
 use crate::output::{JsonSink, print, size};
 use crate::outputs::Outputs;
+use gripgen::plain_campaign;
+use gripgen_rig::experiment::RigConfig;
 use gripgen_rig::experiment::check::{CheckLine, check, check_force};
 use serde_json::{Value, json};
 
@@ -16,6 +20,7 @@ pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
     let mut outputs = Outputs::of("rig check", args.json.force).reads_config(&args.rig, &args.set);
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&args.rig, &args.set)?;
+    let rehearsal = args.rehearsal.as_deref().map(load).transpose()?;
     let (on_stdout, mut lines) = (sink.on_stdout(), Vec::new());
     let mut failed = Ok(());
     let mut tell = |line: CheckLine| {
@@ -26,6 +31,11 @@ pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
         lines.push(line);
     };
     check(&config, &mut tell);
+    tell(programs(&config));
+    if let Some(stored) = &rehearsal {
+        let found = compared(stored, &lines);
+        tell(found);
+    }
     tell(free_space());
     failed?;
     let (mut force, mut force_ok) = (Value::Null, true);
@@ -56,6 +66,16 @@ pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
         eprintln!("an experiment needs all of them; nothing was moved");
     }
     Ok(if ok { 0 } else { code::FAILED })
+}
+
+/// What the robot would be sent, run on the virtual robot through every way out.
+fn programs(config: &RigConfig) -> CheckLine {
+    let campaign = plain_campaign(&["part".into()], &[20.0], 1, 0);
+    let (ok, found) = match judged(config, &campaign) {
+        Ok(count) => (true, format!("{count} do what their numbers say, on the virtual robot")),
+        Err(problem) => (false, problem),
+    };
+    CheckLine { what: "programs", ok, found }
 }
 
 fn free_space() -> CheckLine {

@@ -2,7 +2,9 @@
 
 use super::live::Live;
 use super::load::load_rig;
+use super::programs::judged;
 use super::record::{Standing, rig_pull, suspect};
+use super::rehearsal;
 use super::standing::CampaignClock;
 use crate::args::RigPullArgs;
 use crate::failure::{Failure, another_run, code};
@@ -18,6 +20,7 @@ use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_difference
 use gripgen_rig::experiment::plan::pull_program;
 use gripgen_rig::experiment::prepare::Permit;
 use gripgen_rig::experiment::pull::ExecutedPull;
+use gripgen_rig::experiment::rehearse::{StoredRehearsal, slowed};
 use gripgen_rig::experiment::{Devices, Experiment, Fault, PullOutcome, RigConfig, check_campaign};
 use serde_json::json;
 use std::cell::RefCell;
@@ -31,7 +34,10 @@ const MAX_FAILED_IN_A_ROW: usize = 3;
 /// Runs the verb.
 pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
     let config = load_rig(&args.rig, &args.set)?;
-    let campaign = planned(args, &config)?;
+    let mut campaign = planned(args, &config)?;
+    let rehearsal = args.rehearsal.as_deref().map(rehearsal::load).transpose()?;
+    let slow = rehearsal.as_ref().map(|stored| slowed_by(stored, &mut campaign)).transpose()?;
+    let campaign = campaign;
     check_campaign(&config, &campaign).map_err(|e| {
         Failure::usage(e).hint("nothing was sent and nothing moved; the limits stand in the rig's file and in the device's data sheet")
     })?;
@@ -48,6 +54,9 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
         let script = pull_program(&config, &campaign, first, 1).script().map_err(Failure::usage)?;
         return print(&script).map(|()| 0);
     }
+    judged(&config, &campaign).map_err(|problem| {
+        Failure::new(problem).hint("nothing was sent and nothing moved; `--print-program` shows the text")
+    })?;
     let minutes = campaign.estimated_minutes();
     let words = format!("{}, about {}", count(pulls.len() as u64, "pull"), duration(60.0 * minutes));
     if args.dry_run {
@@ -66,11 +75,26 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
     if todo.is_empty() {
         return finish(&folder, &live.borrow(), 0);
     }
+    if let Some(slow) = slow {
+        live.borrow().say(&slow);
+    }
     live.borrow().say(&format!("{words}; {} to make, into {}", todo.len(), folder.path().display()));
     let stop = stop_flag("stopping the robot safely");
     let job = Job { args, config: &config, campaign: &campaign, folder: &folder, before, live: &live, stop };
     let failed = job.make(&todo)?;
     finish(&folder, &live.borrow(), failed)
+}
+
+/// A rehearsal that speaks for pulls slows their staircases; what it did, in words.
+fn slowed_by(stored: &StoredRehearsal, campaign: &mut Campaign) -> Result<String, Failure> {
+    if let Some(doubt) = stored.doubts.first() {
+        return Err(Failure::new(format!("the rehearsal speaks against pulls: {doubt}"))
+            .hint("nothing was sent; mend it and rehearse again, or pull without --rehearsal"));
+    }
+    let trails_s = stored.rehearsal.trails_s().unwrap_or_default();
+    let count = slowed(campaign, trails_s);
+    let words = format!("rehearsed: the force trails by {trails_s:.3} s");
+    Ok(if count == 0 { words } else { format!("{words}, staircases are slowed for {count} of the pulls") })
 }
 
 /// The campaign of a file, or that of the flags.

@@ -45,6 +45,7 @@ pub fn rig_pull(
     events.extend(m.log.iter().map(|(at, line)| event(*at, None, line.source, line.text.clone())));
     let start = format!("time_s {:.6}, preload {:.3} N", standing.time_s, m.preload_n);
     events.push(event(m.unix_s, Some(m.robot_time_s), START, start));
+    events.push(event(m.unix_s, Some(m.robot_time_s), EVIDENCE, beside(config, &m)));
     if let Some(stopped) = &m.stopped {
         let still = if stopped.still {
             "the robot stood still"
@@ -125,6 +126,39 @@ pub fn suspect(config: &RigConfig, campaign: &Campaign, m: &ExecutedPull) -> Opt
     let by_force = judge(&evidence, &Expected::default()).reason();
     let reasons: Vec<String> = by_force.into_iter().chain(m.doubts.iter().cloned()).collect();
     (!reasons.is_empty()).then(|| reasons.join("; "))
+}
+
+/// Source of the event with what was measured beside the label.
+pub const EVIDENCE: &str = "evidence";
+/// So long before the pull the jaws have closed and nothing pulls yet.
+const CLAMPED_S: f64 = 0.3;
+
+/// What was measured beside the label: the gripper's word, the zero before and after, what was zeroed away, what the jaws press across the pull.
+fn beside(config: &RigConfig, m: &ExecutedPull) -> String {
+    let mean = |values: Vec<f64>| match values.len() {
+        0 => "none".to_string(),
+        n => format!("{:.3}", values.iter().sum::<f64>() / n as f64),
+    };
+    let gain = config.robot.force_gain;
+    let unloaded = m.trace.as_ref().map_or(Vec::new(), |trace| {
+        trace.rows().filter(|row| row.time_s < 0.0).map(|row| row.measured_force_n).collect()
+    });
+    let clamped: Vec<&RobotRow> =
+        m.rows.iter().filter(|row| (-CLAMPED_S..0.0).contains(&(row.timestamp_s - m.robot_time_s))).collect();
+    let of_clamped = |of: &dyn Fn(&RobotRow) -> f64| mean(clamped.iter().map(|row| of(row)).collect());
+    format!(
+        "reported_grip_force_n {}, no_load_before_n {}, no_load_after_n {}, zeroed_away_z_n {}, lateral_x_n {}, lateral_y_n {}, \
+         torque_x_nm {}, torque_y_nm {}, torque_z_nm {}",
+        m.reported_force_n.map_or("none".into(), |n| format!("{n:.3}")),
+        mean(unloaded),
+        mean(m.no_load_after_n.clone()),
+        of_clamped(&|row| row.raw_force[2] - row.force[2]),
+        of_clamped(&|row| gain * row.force[0]),
+        of_clamped(&|row| gain * row.force[1]),
+        of_clamped(&|row| row.force[3]),
+        of_clamped(&|row| row.force[4]),
+        of_clamped(&|row| row.force[5]),
+    )
 }
 
 /// Source of the event that ties the clocks of a pull together.

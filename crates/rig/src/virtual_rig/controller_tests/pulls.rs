@@ -1,7 +1,7 @@
-//! The pull. Its exits for a tool that moves aside and for torque cannot be reached here: this arm is pulled along z alone and
-//! feels no torque. Their lines are tested as text, with the program.
+//! The pull, and what is not perfect about arm and sensor. All exits of the program: [`crate::judge`].
 
 use super::*;
+use crate::virtual_rig::arm::ArmFaults;
 
 /// A pull of a gripped part, up to its first step.
 fn pulling(spring: Spring, of: impl FnOnce(&mut PullProgram)) -> HostedRobot {
@@ -135,4 +135,57 @@ fn without_a_heartbeat_nothing_begins() {
     assert!((10.0..10.02).contains(&waited_s), "{waited_s} s");
     assert_eq!((rig.reason(), rig.controller.robot().tcp), (Some(StopReason::NoHeartbeat), START));
     assert_eq!(rig.controller.robot().payload_kg, 1.6, "not even the payload is set");
+}
+
+/// The loop: a step is answered after the dead time with the time constant; the tool, which the gels let move, with it.
+#[test]
+fn force_mode_trails_as_it_is_asked_to() {
+    let strong = Spring { limit_n: 1000.0, ..Spring::default() };
+    let faults = ArmFaults { force_lag_s: 0.2, force_dead_s: 0.1, ..ArmFaults::default() };
+    let mut rig = rig_around(strong);
+    rig.controller.arm_mut().set_faults(faults);
+    let program = PullProgram { run: 3, start_n: 4.0, step_s: 5.0, ..PullProgram::default() };
+    rig.controller.run_script(&program.script().unwrap());
+    rig.until_phase(Phase::Zeroed);
+    rig.close_jaws();
+    rig.go(3);
+    rig.until_phase(Phase::Pulling);
+    let after = |lags: f64| 4.0 * (1.0 - f64::exp(-lags));
+    for (wait_s, wanted_n) in [(0.09, 0.0), (0.21, after(1.0)), (0.2, after(2.0)), (2.0, 4.0)] {
+        rig.run(wait_s);
+        let felt_n = felt_n(&rig, 1.0);
+        assert!((felt_n - wanted_n).abs() < 0.05, "{felt_n} N, {wanted_n} N after {wait_s} s more");
+        let raised_n = 50_000.0 * (rig.controller.robot().tcp.position_m[2] - START.position_m[2]);
+        assert!((raised_n - felt_n).abs() < 0.01, "the tool shows {raised_n} N");
+    }
+}
+
+/// The sensor: it trails its load, which the tool does not; its zero wanders; jaws press across the pull, and at the flange the
+/// tool is a lever.
+#[test]
+fn the_sensor_trails_wanders_and_feels_the_clamp() {
+    let mut rig = rig_around(Spring { limit_n: 1000.0, ..Spring::default() });
+    let faults = ArmFaults { sensor_lag_s: 0.2, drift_n_s: 0.05, clamp_n: 8.0, ..ArmFaults::default() };
+    rig.controller.arm_mut().set_faults(faults);
+    let program = PullProgram { run: 3, start_n: 4.0, step_s: 5.0, ..PullProgram::default() };
+    rig.controller.run_script(&program.script().unwrap());
+    rig.until_phase(Phase::Zeroed);
+    rig.run(2.0);
+    let drifted_n = rig.controller.robot().wrench[2];
+    assert!((drifted_n - 0.1).abs() < 0.01, "{drifted_n} N after 2 s");
+    rig.close_jaws();
+    rig.run(0.002);
+    assert_eq!(rig.controller.robot().wrench[0], 8.0);
+    rig.go(3);
+    rig.until_phase(Phase::Pulling);
+    rig.run(0.2);
+    let (felt_n, raised_m) =
+        (felt_n(&rig, 1.0), rig.controller.robot().tcp.position_m[2] - START.position_m[2]);
+    assert!((felt_n + drifted_n - 4.0 * (1.0 - f64::exp(-1.0))).abs() < 0.1, "{felt_n} N");
+    assert!((raised_m - 4.0 / 50_000.0).abs() < 1e-9, "the tool is there at once");
+    // 8 N at a lever of 0.2 m end nothing; with 34 N more they are 8.4 Nm.
+    rig.controller.arm_mut().pull_aside(34.0);
+    rig.until_phase(Phase::Stopped);
+    assert_eq!(rig.reason(), Some(StopReason::Torque));
+    assert_eq!(rig.controller.robot().wrench[4], 0.0, "RTDE has the torque at the grip, where no lever is");
 }

@@ -7,7 +7,7 @@ use crate::gcl::GripState;
 use crate::link::lock;
 use crate::program::TcpPose;
 use crate::robot_state::{RobotMode, SafetyStatus};
-use crate::virtual_rig::arm::STEP_S;
+use crate::virtual_rig::arm::{ArmFaults, STEP_S};
 use crate::virtual_rig::faults::{Device, Fault};
 use crate::virtual_rig::world::World;
 use gripgen_twin::plant::{GripRequest, Plant};
@@ -120,9 +120,21 @@ impl ServedRig {
             Fault::PartLost => lock(&self.shared.world).lose_part(),
             Fault::Hang(mass_kg) => lock(&self.shared.world).controller.arm_mut().hang(mass_kg),
             Fault::Aside(force_n) => lock(&self.shared.world).controller.arm_mut().pull_aside(force_n),
+            Fault::ForceLag(s) => self.arm_faults(|faults| faults.force_lag_s = s),
+            Fault::ForceDelay(s) => self.arm_faults(|faults| faults.force_dead_s = s),
+            Fault::SensorLag(s) => self.arm_faults(|faults| faults.sensor_lag_s = s),
+            Fault::Drift(n_per_min) => self.arm_faults(|faults| faults.drift_n_s = n_per_min / 60.0),
+            Fault::Clamp(n) => self.arm_faults(|faults| faults.clamp_n = n),
             Fault::Slider(share) => lock(&self.shared.world).controller.set_speed_slider(share),
             Fault::Reports(force_sum_n) => lock(&self.shared.world).gripper.report(force_sum_n),
         }
+    }
+
+    fn arm_faults(&self, change: impl FnOnce(&mut ArmFaults)) {
+        let mut world = lock(&self.shared.world);
+        let mut faults = world.controller.arm().faults();
+        change(&mut faults);
+        world.controller.arm_mut().set_faults(faults);
     }
 
     /// The rig now.
