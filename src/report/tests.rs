@@ -73,6 +73,7 @@ fn diagnosis() -> Diagnosis {
         }),
         hints: Vec::new(),
         residual: None,
+        posterior: None,
         plain: None,
         notes: vec!["3 pulls were left out: they failed".into()],
     }
@@ -154,6 +155,7 @@ fn diagnosed(n: usize) -> Diagnosed {
     ];
     let evidence = ["wear", "sensor_gain_drift", "none", "curve in humidity_pct"].iter().enumerate();
     Diagnosed {
+        posterior: None,
         next: None,
         diagnosis: diagnosis(),
         edits: TwinEdits::default(),

@@ -21,22 +21,23 @@ pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&args.rig, &args.set)?;
     let rehearsal = args.rehearsal.as_deref().map(load).transpose()?;
-    let (on_stdout, mut lines) = (sink.on_stdout(), Vec::new());
+    let on_stdout = sink.on_stdout();
     let mut failed = Ok(());
-    let mut tell = |line: CheckLine| {
+    let mut tell = |lines: &mut Vec<CheckLine>, line: CheckLine| {
         let mark = if line.ok { "ok  " } else { "BAD " };
         if !on_stdout && failed.is_ok() {
             failed = print(&format!("{mark} {:<18} {}\n", line.what, line.found));
         }
         lines.push(line);
     };
-    check(&config, &mut tell);
-    tell(programs(&config));
+    let mut lines = Vec::new();
+    check(&config, &mut |line| tell(&mut lines, line));
+    tell(&mut lines, programs(&config));
     if let Some(stored) = &rehearsal {
         let found = compared(stored, &lines);
-        tell(found);
+        tell(&mut lines, found);
     }
-    tell(free_space());
+    tell(&mut lines, free_space());
     failed?;
     let (mut force, mut force_ok) = (Value::Null, true);
     if let Some(mass_kg) = args.mass_kg {
