@@ -12,6 +12,7 @@ use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::paying::{by_chance, paying};
 use super::posterior::of_diagnosis;
 use super::power::ScoreTest;
+use super::recalibrated::recalibrated;
 use super::residual::{in_place_of_curves, kept};
 use super::ridge::ahead;
 use super::search::{Accepted, Search, TIED_WITHIN};
@@ -153,8 +154,15 @@ pub fn diagnose_pulls(
         accepted.fitted = left.fitted.clone();
     }
     // What is stated from here on is what a twin of these models says.
-    let (before_context, stated_before) = context.stated(&before);
-    let (after_context, after) = context.stated(&accepted.fitted);
+    let (before_context, stated_before) =
+        recalibrated(&data, predictor, given).unwrap_or_else(|| context.stated(&before));
+    // Where nothing was found, that is the baseline as a calibration writes it.
+    let found = !accepted.effects.is_empty() || !accepted.curves.is_empty() || left.is_some();
+    let (after_context, after) = if found {
+        context.stated(&accepted.fitted)
+    } else {
+        (before_context.clone(), stated_before.clone())
+    };
     accepted.fitted = after.clone();
     let heldout_before = predicted(&before_context, &stated_before, &repetitions, false);
     let heldout_after = predicted(&after_context, &after, &repetitions, false);
@@ -200,7 +208,7 @@ pub fn diagnose_pulls(
         ));
     }
     diagnosis.conclude();
-    diagnosis.baseline = baseline(&after, &context);
+    diagnosis.baseline = baseline(&after, &after_context);
     let named_rows = outliers(&after);
     diagnosis.data.outliers = named_rows.iter().map(|&i| measured.pulls[i].id.clone()).collect();
     let counted: Vec<usize> = rows.iter().copied().filter(|i| !named_rows.contains(i)).collect();

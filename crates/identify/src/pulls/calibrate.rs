@@ -14,7 +14,7 @@ use super::law::largest_relative_sigma;
 use super::model::{PredictPulls, PullModel};
 use super::posterior::of_calibration;
 use super::priors::PullPriors;
-use super::scatter::scatter;
+use super::recalibrated::corrected;
 use super::slip::Slips;
 use super::terms::Terms;
 use crate::diagnosis::{HeldOutError, ParameterEstimate};
@@ -23,9 +23,6 @@ use gripgen_twin::{MeasuredPulls, Posterior};
 use std::collections::BTreeMap;
 
 pub use super::law::OffsetLaw;
-
-/// Least scatter with which a fit weighs residuals.
-const MIN_SCATTER: f64 = 0.002;
 
 /// a, b, their covariance, and their intervals.
 type Law = (f64, f64, [f64; 3], [(f64, f64); 2]);
@@ -158,11 +155,7 @@ pub fn calibrate_pulls(
     let dynamics = context.settle_dynamics();
     // Without traces lag and dead time stay free, so that mu knows what they are not known to.
     context.free_lag = context.observations.is_empty();
-    let first = context.fit(&context.base, &terms, &rows).ok_or(CalibrateError::NoFit)?;
-    let start = PullModel { scatter: scatter(&context, &first, &rows).0.max(MIN_SCATTER), ..first.model };
-    context.correct_at(&start);
-    let found = context.fit(&start, &first.terms, &rows).ok_or(CalibrateError::NoFit)?;
-    let scattered = scatter(&context, &found, &rows);
+    let (found, scattered) = corrected(&mut context, &terms, &rows).ok_or(CalibrateError::NoFit)?;
     context.free_lag = false;
     let normal = NormalFit::new(&found, data.len(), data.parts.len(), context.assumed_ratio());
     // What is stated and written has no nuisance; how well it is known is that of the fit with it.

@@ -2,8 +2,8 @@
 
 use super::context::Context;
 use super::fitting::Fitted;
+use super::learnt::learnt_again;
 use super::model::PullModel;
-use super::residual::learnt_again;
 use super::terms::Terms;
 use crate::diagnosis::{ErrorPair, HeldOutError};
 use crate::draws::Draws;
@@ -51,7 +51,9 @@ pub fn predicted(
     context.predictor.for_each(held_out.len(), &|k| {
         let out = &held_out[k];
         let rows: Vec<usize> = (0..n).filter(|i| !out.contains(i)).collect();
-        let Some(found) = context.fit_again(&fitted.model, terms, &rows) else { return };
+        let Some(found) = context.fit_again(&fitted.model, &unseen_forgotten(terms, &rows), &rows) else {
+            return;
+        };
         let found = if learns { learnt_again(context, found, &rows, terms.learnt_share) } else { found };
         let mut model = found.model;
         model.scatter = scatter(&model, found.likelihood.scale);
@@ -61,6 +63,21 @@ pub fn predicted(
         }
     });
     result.into_inner().unwrap_or_default()
+}
+
+/// Terms without what all pulls said of words that no pull at `rows` has: a step of a session that is held out is not known.
+fn unseen_forgotten(terms: &Terms, rows: &[usize]) -> Terms {
+    let mut terms = terms.clone();
+    for (curve, values) in &mut terms.curves {
+        for (k, value) in values.iter_mut().enumerate() {
+            let mut own = rows.iter().map(|&i| curve.basis[i][k]);
+            let first = own.next();
+            if own.all(|v| Some(v) == first) {
+                *value = 0.0;
+            }
+        }
+    }
+    terms
 }
 
 /// How a rival predicts pulls that no fit has seen, against the model without it.
@@ -201,6 +218,19 @@ pub fn noise_floor_n(errors: &[f64], groups: &[usize], parameters: usize) -> f64
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Steps between three sessions: where the third is held out, its step is unknown and the other one stays.
+    #[test]
+    fn the_step_of_a_session_that_is_held_out_is_forgotten() {
+        let column = super::super::data::Column::Word(
+            vec![0, 0, 1, 1, 2, 2],
+            ["a", "b", "c"].map(String::from).to_vec(),
+        );
+        let curve = super::super::curves::curves_in("session", &column).remove(0);
+        let terms = Terms { curves: vec![(curve, vec![0.2, -0.3])], ..Terms::default() };
+        assert_eq!(unseen_forgotten(&terms, &[0, 1, 2, 3]).curves[0].1, vec![0.2, 0.0]);
+        assert_eq!(unseen_forgotten(&terms, &[0, 1, 2, 3, 5]).curves[0].1, vec![0.2, -0.3]);
+    }
 
     #[test]
     fn every_pull_is_held_out_once() {

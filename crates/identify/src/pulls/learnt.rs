@@ -1,0 +1,101 @@
+//! Learning a residual beside a model from some of the pulls.
+
+use super::context::Context;
+use super::curves::Curve;
+use super::evidence::Grouped;
+use super::fitting::Fitted;
+use super::model::PullModel;
+use super::smooth::smooths;
+use nalgebra::{DMatrix, DVector};
+
+/// Step of the logarithm of the friction by which the labels are differentiated.
+const STEP: f64 = 0.02;
+
+/// What is left of the pulls at `rows` beside a model, as groups of columns in units of the noise.
+pub(super) fn grouped(
+    context: &Context<'_>,
+    fitted: &Fitted,
+    rows: &[usize],
+    curves: &[Curve],
+) -> Option<Grouped> {
+    let model = &fitted.model;
+    let n = context.data.len();
+    let sd = context.deviations(model, rows);
+    let residuals = DVector::from_vec(context.friction_residuals(model, rows, &sd));
+    let slope = |changed: &PullModel, step: f64| {
+        (&residuals - DVector::from_vec(context.friction_residuals(changed, rows, &sd))) / step
+    };
+    let mut known = Vec::new();
+    for k in 0..model.mu.len() {
+        let mut moved = model.clone();
+        moved.mu[k] *= 1.0 + STEP;
+        known.push(slope(&moved, STEP));
+    }
+    for (e, (candidate, _)) in fitted.terms.effects.iter().enumerate() {
+        for &(i, scale) in &candidate.free {
+            let mut moved = model.clone();
+            let p = &candidate.spec.parameters[i];
+            let step = if moved.effects[e].values[i] + 0.1 * scale <= p.bounds.1 { 0.1 } else { -0.1 };
+            moved.effects[e].values[i] += step * scale;
+            known.push(slope(&moved, step));
+        }
+    }
+    let mut stronger = model.clone();
+    if stronger.factor.is_empty() {
+        stronger.factor = vec![1.0; n];
+    }
+    stronger.factor.iter_mut().for_each(|f| *f *= 1.0 + STEP);
+    let by_factor = slope(&stronger, STEP);
+    let scale = fitted.likelihood.scale.max(0.1);
+    let weights: Vec<f64> = residuals
+        .iter()
+        .map(|r| (context.tails.weight_of(r / scale) / context.tails.weight_of(0.0)).sqrt() / scale)
+        .collect();
+    let memory = fitted.likelihood.memory;
+    let sessions: Vec<usize> = rows.iter().map(|&i| context.data.session_of[i]).collect();
+    // Neighbours that remember each other: what is new in each pull.
+    let whitened = |raw: &dyn Fn(usize) -> f64| {
+        let own = |k: usize| weights[k] * raw(k);
+        DVector::from_iterator(
+            rows.len(),
+            (0..rows.len()).map(|k| match k.checked_sub(1).filter(|&last| sessions[last] == sessions[k]) {
+                Some(last) => (own(k) - memory * own(last)) / (1.0 - memory * memory).sqrt(),
+                None => own(k),
+            }),
+        )
+    };
+    let y = whitened(&|k| residuals[k]);
+    let known: Vec<DVector<f64>> = known.iter().map(|c| whitened(&|k| c[k])).collect();
+    let groups: Vec<DMatrix<f64>> = curves
+        .iter()
+        .map(|curve| {
+            let of = |j: usize| whitened(&|k| by_factor[k] * curve.basis[rows[k]][j]);
+            DMatrix::from_columns(&(0..curve.len()).map(of).collect::<Vec<_>>())
+        })
+        .collect();
+    Grouped::new(&y, &DMatrix::from_columns(&known), &groups)
+}
+
+/// `fitted` with what the pulls at `rows` teach beside it, shrunk once more to `share` of it.
+pub(super) fn with_residual(
+    context: &Context<'_>,
+    fitted: &Fitted,
+    rows: &[usize],
+    curves: &[Curve],
+    share: f64,
+) -> Option<Fitted> {
+    let learnt = grouped(context, fitted, rows, curves)?.learn();
+    if learnt.groups.is_empty() {
+        return None;
+    }
+    let shrunk = |c: Vec<f64>| c.into_iter().map(|c| share * c).collect::<Vec<f64>>();
+    let mut terms = fitted.terms.clone();
+    terms.learnt = learnt.groups.into_iter().map(|(g, c)| (curves[g].clone(), shrunk(c))).collect();
+    terms.learnt_share = share;
+    context.fit_again(&fitted.model, &terms, rows)
+}
+
+/// The fit of a fold, in which the residual of a model is learnt again.
+pub(super) fn learnt_again(context: &Context<'_>, fitted: Fitted, rows: &[usize], share: f64) -> Fitted {
+    with_residual(context, &fitted, rows, &smooths(context.data), share).unwrap_or(fitted)
+}
