@@ -320,14 +320,19 @@ fn urscript() {
         centre_of_gravity_mm: [0.0, 0.0, 80.0],
         tool_mm: [0.0, 0.0, 200.0],
     };
-    let made = vec![pull.into_bytes(), motion.script().unwrap().into_bytes()];
-    fuzz("urscript", 4, made, |pieces| {
+    let whole = [pull, motion.script().unwrap()].map(String::into_bytes).to_vec();
+    let programs: Vec<String> =
+        [whole.clone(), corpus("urscript")].concat().iter().map(|bytes| text(&[bytes])).collect();
+    fuzz("urscript", 8, whole, |pieces| {
         let text = text(pieces);
+        // Bytes that are damaged are seldom a program: words and lines of one, put together anew, often are.
+        let shuffled = mutate::shuffled(&mut Random::named(&text), &programs);
+        let ran = Program::parse(&shuffled).map(|_| robot::run_program(&shuffled)).map_err(|e| e.to_string());
         match Program::parse(&text) {
-            Ok(_) => Heard { events: vec![robot::run_program(&text)], error: None },
+            Ok(_) => Heard { events: vec![ran, Ok(robot::run_program(&text))], error: None },
             Err(error) => {
                 assert!(error.line >= 1 && error.problem.len() < 300 + text.len(), "{error}");
-                Heard { events: vec![], error: Some(error) }
+                Heard { events: vec![ran], error: Some(error) }
             }
         }
     });

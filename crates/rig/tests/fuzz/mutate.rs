@@ -146,3 +146,39 @@ pub fn pieces<'a>(random: &mut Random, bytes: &'a [u8]) -> Vec<&'a [u8]> {
     }
     pieces
 }
+
+/// A program whose lines and words are doubled, lost, exchanged, and taken from others.
+pub fn shuffled(random: &mut Random, programs: &[String]) -> String {
+    let mut lines: Vec<String> = random.pick(programs).lines().map(String::from).collect();
+    let line_of = |random: &mut Random, of: &[String]| {
+        let program: Vec<&str> = random.pick(of).lines().collect();
+        random.pick(&program).to_string()
+    };
+    for _ in 0..=random.below(3) {
+        let (i, j) = (random.below(lines.len()), random.below(lines.len()));
+        match random.below(6) {
+            0 => lines.swap(i, j),
+            1 => drop(lines.remove(i)),
+            2 => lines.insert(i, lines[j].clone()),
+            3 => lines.insert(i, line_of(random, programs)),
+            _ => {
+                // A word for one of another line.
+                let other = line_of(random, programs);
+                let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
+                let words = |line: &str| -> Vec<String> {
+                    line.split(|c| !is_word(c)).filter(|w| !w.is_empty()).map(String::from).collect()
+                };
+                let (mine, theirs) = (words(&lines[i]), words(&other));
+                if !mine.is_empty() && !theirs.is_empty() {
+                    let old: &String = random.pick(mine.as_slice());
+                    let new: &String = random.pick(theirs.as_slice());
+                    lines[i] = lines[i].replacen(old.as_str(), new, 1);
+                }
+            }
+        }
+        if lines.is_empty() {
+            break;
+        }
+    }
+    lines.join("\n") + "\n"
+}

@@ -118,7 +118,7 @@ fn cameras_stream_and_freeze() {
     assert!(stamp(&cameras[0]) > frozen_s + 0.15);
 }
 
-/// A program that this rig does not know, sent to each port that takes programs, is answered on the primary one.
+/// A program with a word that nobody knows, sent to each port that takes programs, is answered on the primary one.
 #[test]
 fn every_script_port_takes_programs_and_the_primary_one_tells() {
     let rig = serve(1.0);
@@ -136,10 +136,10 @@ fn every_script_port_takes_programs_and_the_primary_one_tells() {
     };
     assert!(matches!(next(), RobotMessage::Version(_)));
     for (name, port) in [("one", at.primary), ("two", at.secondary), ("three", at.real_time)] {
-        let script = format!("def {name}():\n  textmsg(1)\nend\n");
+        let script = format!("def program():\n  word_{name}(1)\nend\n");
         TcpStream::connect(port).unwrap().write_all(script.as_bytes()).unwrap();
         let RobotMessage::ErrorCode(error) = next() else { panic!("{name}") };
-        assert!(error.text.contains(&format!("def {name}():")), "{}", error.text);
+        assert_eq!(error.text, format!("line 2: `word_{name}` is no function that is known"));
     }
 }
 

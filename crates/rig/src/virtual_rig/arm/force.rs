@@ -14,6 +14,7 @@ const FIRST_STEP_S: f64 = 0.104;
 const FIRST_STEPS: usize = 2500;
 /// A part that moved so far has slipped.
 const STUCK_M: f64 = 1e-3;
+
 /// A pull under way, or ended with the jaws still closed.
 pub(super) struct Pulling {
     from: TcpPose,
