@@ -315,7 +315,7 @@ impl Kernel for DrawPoints<'_> {
     type Output = ();
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
-        let HeightMap { seen, corners, steps, view, .. } = self.map;
+        let HeightMap { seen, corners, steps, view, width, height, .. } = self.map;
         for s in &*seen {
             if s.top_px < self.floor_px || !steps.any_in(s.rows, s.columns) {
                 continue;
@@ -323,6 +323,17 @@ impl Kernel for DrawPoints<'_> {
             let cluster = &self.mesh.clusters[s.cluster];
             corners.transform(self.mesh, cluster, view);
             for t in &self.mesh.triangles[cluster.triangles.clone()] {
+                let around = |v: &[(i32, i32)], n: usize| {
+                    let [a, b, c] = t.map(|corner| v[usize::from(corner)]);
+                    let last = n as i32 - 1;
+                    // From the largest whole number before the corners to the smallest one after them.
+                    let (from, to) = (a.1.min(b.1).min(c.1).max(0), a.0.max(b.0).max(c.0).min(last));
+                    (from <= to).then_some((from as usize, to as usize))
+                };
+                let (rows, columns) = (around(&corners.rows, *height), around(&corners.columns, *width));
+                if !matches!((rows, columns), (Some(rows), Some(columns)) if steps.any_in(rows, columns)) {
+                    continue;
+                }
                 let t = t.map(|v| corners.corner(v));
                 if higher(higher(t[0].height_px, t[1].height_px), t[2].height_px) >= self.floor_px {
                     steps.fill(t);

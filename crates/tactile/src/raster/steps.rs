@@ -121,12 +121,14 @@ impl Steps {
     /// The pixels of a row from one column up to another.
     #[inline(always)]
     fn in_row(&mut self, row: usize, (first, last): (usize, usize)) -> &mut [SteppedPixel] {
-        let end = self.rows.get(row + 1).map_or(self.pixels.len(), |&e| e as usize);
-        let of_row = &mut self.pixels[self.rows[row] as usize..end];
-        let start = row * self.width;
-        let from = of_row.partition_point(|p| p.pixel < start + first);
-        let to = of_row.partition_point(|p| p.pixel <= start + last);
-        &mut of_row[from..to]
+        let words = &self.bits[row * self.words..][..self.words];
+        let count = |column: usize, mask: u64| {
+            let whole: u32 = words[..column / 64].iter().map(|w| w.count_ones()).sum();
+            self.rows[row] as usize + (whole + (words[column / 64] & mask).count_ones()) as usize
+        };
+        let before = count(first, !(u64::MAX << (first % 64)));
+        let up_to = count(last, u64::MAX >> (63 - last % 64));
+        &mut self.pixels[before..up_to]
     }
 
     /// One triangle at the points of the pixels that it reaches.
@@ -170,7 +172,12 @@ impl Steps {
             if from > to {
                 continue;
             }
+            // SAFETY: both lie between 0 and the last point of a row.
+            let (from, to) = unsafe { (from.to_int_unchecked::<i32>(), to.to_int_unchecked::<i32>()) };
             let (from, to) = (from as usize, to as usize);
+            if !self.any(row / FINE, (from / FINE, to / FINE)) {
+                continue;
+            }
             let along_row = t[0].height_px + slope_y * (y - t[0].y_px);
             let start = row / FINE * self.width;
             for p in self.in_row(row / FINE, (from / FINE, to / FINE)) {

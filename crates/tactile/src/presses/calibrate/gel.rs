@@ -16,7 +16,8 @@ use crate::grid::Grid;
 use crate::sensor::{GelShape, Pyramid};
 use std::cell::OnceCell;
 
-/// How the gel follows a part in the core of its contact. The other way was not tried on presses that are held out.
+/// How the gel follows a part in the core of its contact. At least as deep draws balls
+/// better (MSE held out 9.75 in place of 10.44, a sphere never shown 15 in place of 30) and a flat prism worse (207 in place of 143).
 pub(super) const FOLLOW: Follow = Follow::Exactly;
 
 /// Finest of the blurs, and the widest that are tried, in millimetres.
