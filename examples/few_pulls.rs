@@ -6,6 +6,8 @@
 //! Pulls come from the lab of `interval_coverage`, which shares no mechanics with the twin. `WIDER=2` makes all beliefs twice as wide,
 //! `WIDER=mu:0.5` that on mu half as wide.
 
+#![expect(clippy::unwrap_used, reason = "a measurement that cannot go on panics")]
+
 #[path = "interval_coverage/lab.rs"]
 #[allow(dead_code, reason = "the other example uses all of it")]
 mod lab;

@@ -180,7 +180,7 @@ fn a_sweep_draws_cause_and_parameters_together() {
     assert!((wear as f64 - 1500.0).abs() < 80.0, "{wear}");
     let keys: Vec<&str> = project.sweep.drawn_keys().collect();
     assert_eq!(keys[2..], [CAUSE_KEY, "parts.gear.mu", "effects.wear.depth", "effects.sensor_gain.gain"]);
-    let mut other = posterior.clone();
+    let mut other = posterior;
     other.draws[0].values[0] = Some(0.3);
     let changed = sweep_of(folder.path(), &other, "");
     assert_ne!(project.config_sha256, changed.config_sha256);

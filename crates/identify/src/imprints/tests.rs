@@ -36,7 +36,7 @@ fn made(world: World) -> ImprintData {
         // A standard linear solid, integrated in small steps: w follows the force that presses.
         let (mut w, step) = (0.0, 1.0 / 3000.0);
         for k in 0..7500 {
-            let t = k as f64 * step;
+            let t = f64::from(k) * step;
             let true_n = force_n(g, t);
             let pressing = true_n + world.relaxes * w;
             w += step / 0.8 * (pressing - w);
@@ -152,7 +152,10 @@ fn too_little_is_insufficient_and_says_what_is_missing() {
     let mut few = made(World { grasps: 1, ..PLAIN });
     let keep = |list: &mut Vec<f64>| list.truncate(8);
     [&mut few.grip_force_n, &mut few.volume_mm3, &mut few.time_s].into_iter().for_each(keep);
-    (few.ids.truncate(8), few.grasp.truncate(8), few.part.truncate(8), few.session.truncate(8));
+    few.ids.truncate(8);
+    for list in [&mut few.grasp, &mut few.part, &mut few.session] {
+        list.truncate(8);
+    }
     for data in [few, ImprintData::default()] {
         let d = diagnose_imprints(&data).diagnosis;
         assert_eq!(d.verdict, Verdict::Insufficient);

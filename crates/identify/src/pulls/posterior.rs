@@ -24,9 +24,12 @@ const FORMULA: f64 = 1.5;
 /// Least weight of a cause that is handed on.
 const LEAST: f64 = 0.005;
 
+/// A draw: its weight, its cause, its values by key.
+type Draw = (f64, String, Vec<(String, f64)>);
+
 /// Draws by key, each with its cause and weight: the keys of all become columns.
 #[derive(Default)]
-struct Drawn(Vec<(f64, String, Vec<(String, f64)>)>);
+struct Drawn(Vec<Draw>);
 
 impl Drawn {
     fn into_posterior(self) -> Posterior {

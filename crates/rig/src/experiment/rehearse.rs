@@ -110,7 +110,7 @@ impl Rehearsal {
         let mut doubts = Vec::new();
         let mut doubt = |is: bool, words: String| {
             if is {
-                doubts.push(words)
+                doubts.push(words);
             }
         };
         let noise_n = self.rest.noise_n[2];

@@ -160,7 +160,7 @@ mod tests {
             let size = mesh.extent_m().map(|s| s * 1e3);
             let smallest = size.iter().fold(f64::INFINITY, |a, &b| a.min(b));
             let largest = size.iter().fold(0.0_f64, |a, &b| a.max(b));
-            assert!(smallest >= 1.5 && smallest < 100.0 && largest < 130.0, "{}: {size:?}", part.name);
+            assert!((1.5..100.0).contains(&smallest) && largest < 130.0, "{}: {size:?}", part.name);
             most = most.max(mesh.triangles().len());
         }
         assert!(most < 60_000, "{most} triangles");

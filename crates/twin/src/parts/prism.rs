@@ -28,7 +28,7 @@ impl Prism {
             steps.iter().map(|&(behind, inside)| (low + behind, inside)).collect();
         let (from, to) = (rings[rings.len() - 1].0, high - steps[steps.len() - 1].0);
         let between = if self.twist == 0.0 { 1 } else { 8 };
-        rings.extend((1..between).map(|i| (from + (to - from) * i as f64 / between as f64, 0.0)));
+        rings.extend((1..between).map(|i| (from + (to - from) * f64::from(i) / f64::from(between), 0.0)));
         rings.extend(steps.iter().rev().map(|&(behind, inside)| (high - behind, inside)));
         let mut faces: [Vec<Vec<u32>>; 2] = [Vec::new(), Vec::new()];
         let mut flat: Vec<Vec<Point>> = Vec::new();
@@ -90,7 +90,7 @@ fn filled(loops: &[Vec<Point>]) -> Vec<[usize; 3]> {
         let hole = holes.remove(0);
         let rightmost =
             (0..hole.len()).fold(0, |a, b| if points[hole[b]][0] > points[hole[a]][0] { b } else { a });
-        let bridge = bridge(&points, &ring, hole[rightmost], std::iter::once(&hole).chain(&holes));
+        let bridge = bridge(&points, &ring, hole[rightmost], &std::iter::once(&hole).chain(&holes));
         let way: Vec<usize> = (0..=hole.len()).map(|k| hole[(rightmost + k) % hole.len()]).collect();
         let back = ring[bridge];
         ring.splice(bridge + 1..bridge + 1, way.into_iter().chain([back]));
@@ -103,7 +103,7 @@ fn bridge<'a>(
     points: &[Point],
     ring: &[usize],
     from: usize,
-    holes: impl Iterator<Item = &'a Vec<usize>> + Clone,
+    holes: &(impl Iterator<Item = &'a Vec<usize>> + Clone),
 ) -> usize {
     let p = points[from];
     let distance = |i: usize| {

@@ -191,7 +191,7 @@ mod tests {
         assert!((volume_mm3(&rod) / (PI * 250.0) - 1.0).abs() < 1e-3);
         let tube = rod.clone().bore(Section::Round(3.0), Edge::Sharp);
         assert!((volume_mm3(&tube) / (PI * 160.0) - 1.0).abs() < 1e-3);
-        let cup = rod.clone().recess(4.0, Section::Round(3.0), Edge::Chamfer(0.2));
+        let cup = rod.recess(4.0, Section::Round(3.0), Edge::Chamfer(0.2));
         assert!((volume_mm3(&cup) / (PI * (250.0 - 54.0)) - 1.0).abs() < 1e-2);
         let nut = Turned::new(96).step([0.0, 5.0], Section::Polygon(6.0, 6), sharp);
         assert!((volume_mm3(&nut) / (5.0 * 2.0 * 3.0_f64.sqrt() * 36.0) - 1.0).abs() < 1e-9, "exact corners");

@@ -29,7 +29,7 @@ pub fn run(args: &RigRehearseArgs) -> Result<u8, Failure> {
     if !(0.5..=3600.0).contains(&args.dwell_s) {
         return Err(Failure::usage(format!("--dwell-s: {} s, it must be from 0.5 to 3600 s", args.dwell_s)));
     }
-    let campaign = plain_campaign(&[part.clone()], &[args.grip_force_n], 1, 0);
+    let campaign = plain_campaign(std::slice::from_ref(&part), &[args.grip_force_n], 1, 0);
     check_campaign(&config, &campaign)
         .map_err(|e| Failure::usage(e).hint("nothing was sent and nothing moved"))?;
     judged(&config, &campaign).map_err(|e| Failure::new(e).hint("nothing was sent and nothing moved"))?;

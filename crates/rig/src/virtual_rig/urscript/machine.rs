@@ -133,14 +133,12 @@ impl Machine {
         if displaced
             && !hands.is_moving()
             && let Some((builtin, arguments)) = &self.threads[k].motion
+            && let Run::Hands(run) = &builtin.run
+            && builtin.name.starts_with("move")
         {
-            if let Run::Hands(run) = &builtin.run
-                && builtin.name.starts_with("move")
-            {
-                self.mover = self.threads[k].handle;
-                run(arguments, hands).map_err(|problem| ScriptError { line: self.line_of(k), problem })?;
-                return Ok(false);
-            }
+            self.mover = self.threads[k].handle;
+            run(arguments, hands).map_err(|problem| ScriptError { line: self.line_of(k), problem })?;
+            return Ok(false);
         }
         let wait = match self.threads[k].wait {
             Wait::None | Wait::Sync | Wait::Sleep(0 | 1) => Wait::None,

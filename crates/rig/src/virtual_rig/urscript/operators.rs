@@ -70,12 +70,14 @@ impl Binary {
                     Ok(Value::Text(Arc::from(format!("{a}{b}"))))
                 }
                 (Value::Int(a), Value::Int(b)) => self.whole(*a, *b),
-                _ => self.real(a.number().map_err(|e| self.hint(e))?, b.number().map_err(|e| self.hint(e))?),
+                _ => {
+                    self.real(a.number().map_err(|e| self.hint(&e))?, b.number().map_err(|e| self.hint(&e))?)
+                }
             },
         }
     }
 
-    fn hint(self, e: String) -> String {
+    fn hint(self, e: &str) -> String {
         format!("{e}, beside `{}`", self.word())
     }
 
