@@ -152,10 +152,10 @@ fn too_little_is_insufficient_and_says_what_is_missing() {
     let mut few = made(World { grasps: 1, ..PLAIN });
     let keep = |list: &mut Vec<f64>| list.truncate(8);
     [&mut few.grip_force_n, &mut few.volume_mm3, &mut few.time_s].into_iter().for_each(keep);
-    few.ids.truncate(8);
-    for list in [&mut few.grasp, &mut few.part, &mut few.session] {
+    for list in [&mut few.ids, &mut few.part, &mut few.session] {
         list.truncate(8);
     }
+    few.grasp.truncate(8);
     for data in [few, ImprintData::default()] {
         let d = diagnose_imprints(&data).diagnosis;
         assert_eq!(d.verdict, Verdict::Insufficient);
