@@ -2,6 +2,9 @@
 
 mod clusters;
 mod draw;
+mod edge;
+#[cfg(test)]
+mod step_tests;
 mod steps;
 
 pub use clusters::ClusteredMesh;
@@ -111,7 +114,7 @@ mod tests {
     /// Two triangles see their common edge from its two ends and compute the same crossing, to the bit.
     #[test]
     fn an_edge_crosses_a_row_at_one_place() {
-        use super::draw::{Corner, Edge};
+        use super::edge::{Corner, Edge};
         let mut stream = gripgen_twin::random::Stream::new(3, 0, gripgen_twin::random::Purpose::Draw);
         let mut corner = |vertex| Corner {
             x_px: 80.0 * stream.uniform(),

@@ -1,6 +1,7 @@
 //! Drawing the clusters of a mesh from the top down, as deep as needed.
 
 use super::clusters::{Cluster, ClusteredMesh, VERTICES};
+use super::edge::{Corner, Edge, higher, lower};
 use super::steps::Steps;
 use crate::convolve::{Area, raise};
 use crate::grid::{Grid, Plane};
@@ -13,16 +14,6 @@ const SLACK_PX: f64 = 1e-6;
 
 /// A first look at what is uppermost goes this deep, in pixels.
 const FIRST_LOOK_PX: f64 = 4.0;
-
-/// A triangle corner in pixels; `height_px` grows towards the gel.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Corner {
-    pub(super) x_px: f64,
-    pub(super) y_px: f64,
-    pub(super) height_px: f64,
-    /// Grows with the number of the vertex in the mesh.
-    pub(super) number: u32,
-}
 
 /// The map that a mesh is drawn into, and memory for it to be used again.
 #[derive(Debug, Clone, Default)]
@@ -172,9 +163,32 @@ impl HeightMap {
         level.run(Draw { map: self, mesh, floor_px })
     }
 
-    /// Draws the triangles that reach above `floor_px` at the points of pixels beside steps.
-    pub(super) fn draw_points(&mut self, mesh: &ClusteredMesh, floor_px: f64, level: SimdLevel) {
+    /// Finds the pixels beside a step of a contact that is so deep at the centres of pixels. Returns whether there are any.
+    pub(crate) fn find_steps(&mut self, depth_px: &Plane, level: SimdLevel) -> bool {
+        self.steps.find(depth_px, self.area, level)
+    }
+
+    /// Draws these pixels at their points, all that reaches above `floor_px`.
+    pub(crate) fn draw_steps(&mut self, mesh: &ClusteredMesh, floor_px: f64, level: SimdLevel) {
+        self.steps.empty();
         level.run(DrawPoints { map: self, mesh, floor_px });
+    }
+
+    /// As [`HeightMap::touched`], with these pixels at their points.
+    pub(crate) fn touched_with_steps(
+        &self,
+        rest: Option<&Plane>,
+        top: f64,
+        press_px: f64,
+        level: SimdLevel,
+    ) -> (f64, f64) {
+        let by_centres = self.touched(rest, top, press_px, level);
+        self.steps.touched(by_centres, &self.values, rest, top, press_px)
+    }
+
+    /// Puts the mean depth at their points into these pixels; `lift` is what lies between heights and depths.
+    pub(crate) fn write_steps(&self, rest: Option<&Plane>, lift: f64, depth_px: &mut Plane) {
+        self.steps.write(rest, lift, depth_px);
     }
 
     /// The highest pixel.
@@ -422,45 +436,6 @@ impl Corners {
         let range = |i: usize| (low[i] as usize, high[i] as usize);
         self.area = if count == 0 { Area::EMPTY } else { Area { x: range(0), y: range(1) } };
         left
-    }
-}
-
-/// The higher of two numbers, in one instruction.
-#[inline(always)]
-pub(super) fn higher(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-pub(super) fn lower(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-/// An edge, seen from the end with the lower number.
-pub(super) struct Edge {
-    x_px: f64,
-    y_px: f64,
-    slope: f64,
-    rows: (f64, f64),
-}
-
-impl Edge {
-    #[inline(always)]
-    pub(super) fn new(a: &Corner, b: &Corner) -> Self {
-        let (a, b) = if a.number <= b.number { (a, b) } else { (b, a) };
-        // A horizontal edge crosses no row.
-        let rows = if a.y_px == b.y_px {
-            (f64::INFINITY, f64::NEG_INFINITY)
-        } else {
-            (lower(a.y_px, b.y_px), higher(a.y_px, b.y_px))
-        };
-        Self { x_px: a.x_px, y_px: a.y_px, slope: (b.x_px - a.x_px) / (b.y_px - a.y_px), rows }
-    }
-
-    /// Where it crosses row `y`.
-    #[inline(always)]
-    pub(super) fn crossing(&self, y: f64) -> Option<f64> {
-        (y >= self.rows.0 && y <= self.rows.1).then_some(self.x_px + (y - self.y_px) * self.slope)
     }
 }
 

@@ -1,7 +1,6 @@
 //! Points within pixels, where a surface has a step: the border of a contact there lies between pixel centres.
 
-use super::clusters::ClusteredMesh;
-use super::draw::{Corner, Edge, HeightMap, higher, lower};
+use super::edge::{Corner, Edge, higher, lower};
 use crate::convolve::Area;
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
@@ -41,35 +40,35 @@ struct SteppedPixel {
     heights: [f32; POINTS],
 }
 
-impl HeightMap {
-    /// Finds the pixels beside a step of a contact that is so deep at the centres of pixels. Returns whether there are any.
-    pub(crate) fn find_steps(&mut self, depth_px: &Plane, level: SimdLevel) -> bool {
-        let steps = &mut self.steps;
-        (steps.width, steps.height) = (depth_px.width, depth_px.height);
-        steps.words = steps.width.div_ceil(64);
-        steps.bits.clear();
-        steps.bits.resize(steps.words * steps.height, 0);
-        steps.rows.clear();
-        steps.pixels.clear();
-        level.run(Find { steps, depth_px, area: self.area });
-        !steps.pixels.is_empty()
+impl Steps {
+    /// Finds the pixels beside a step of a contact that is so deep at the centres of pixels, 0 beyond `area`. Returns whether
+    /// there are any.
+    pub(super) fn find(&mut self, depth_px: &Plane, area: Area, level: SimdLevel) -> bool {
+        (self.width, self.height) = (depth_px.width, depth_px.height);
+        self.words = self.width.div_ceil(64);
+        self.bits.clear();
+        self.bits.resize(self.words * self.height, 0);
+        self.rows.clear();
+        self.pixels.clear();
+        level.run(Find { steps: self, depth_px, area });
+        !self.pixels.is_empty()
     }
 
-    /// Draws these pixels at their points, all that reaches above `floor_px`.
-    pub(crate) fn draw_steps(&mut self, mesh: &ClusteredMesh, floor_px: f64, level: SimdLevel) {
-        self.steps.pixels.iter_mut().for_each(|p| p.heights = [f32::NEG_INFINITY; POINTS]);
-        self.draw_points(mesh, floor_px, level);
+    /// Forgets what was drawn at the points.
+    pub(super) fn empty(&mut self) {
+        self.pixels.iter_mut().for_each(|p| p.heights = [f32::NEG_INFINITY; POINTS]);
     }
 
-    /// As [`HeightMap::touched`], with these pixels at their points.
-    pub(crate) fn touched_with_steps(
+    /// What a press touches (sum of `height + rest - top`, and number) by the centres, whose heights are `centres`, and by the
+    /// points where they count.
+    pub(super) fn touched(
         &self,
+        (mut sum, mut count): (f64, f64),
+        centres: &[f32],
         rest: Option<&Plane>,
         top: f64,
         press_px: f64,
-        level: SimdLevel,
     ) -> (f64, f64) {
-        let (mut sum, mut count) = self.touched(rest, top, press_px, level);
         let mut add = |height: f32, rest: f32, weight: f64| {
             let below = f64::from(height + rest) - top;
             if below + press_px > 0.0 {
@@ -77,18 +76,18 @@ impl HeightMap {
                 count += weight;
             }
         };
-        for p in &self.steps.pixels {
+        for p in &self.pixels {
             let rest = rest.map_or(0.0, |rest| rest.values[p.pixel]);
             let weight = f64::from(p.weight);
-            add(self.values[p.pixel], rest, -weight);
+            add(centres[p.pixel], rest, -weight);
             p.heights.iter().for_each(|&h| add(h, rest, weight / POINTS as f64));
         }
         (sum, count)
     }
 
     /// Puts the mean depth at their points into these pixels; `lift` is what lies between heights and depths.
-    pub(crate) fn write_steps(&self, rest: Option<&Plane>, lift: f64, depth_px: &mut Plane) {
-        for p in &self.steps.pixels {
+    pub(super) fn write(&self, rest: Option<&Plane>, lift: f64, depth_px: &mut Plane) {
+        for p in &self.pixels {
             let rest = rest.map_or(0.0, |rest| rest.values[p.pixel]);
             let depth = |h: &f32| (f64::from(h + rest) + lift).max(0.0);
             let mean = p.heights.iter().map(depth).sum::<f64>() / POINTS as f64;
@@ -97,9 +96,13 @@ impl HeightMap {
             *at = (centre + weight * (mean - centre)) as f32;
         }
     }
-}
 
-impl Steps {
+    /// The weight of each.
+    #[cfg(test)]
+    pub(super) fn weights(&self) -> Vec<f32> {
+        self.pixels.iter().map(|p| p.weight).collect()
+    }
+
     /// Whether there are some in a box; both ends count.
     #[inline(always)]
     pub(super) fn any_in(&self, rows: (usize, usize), columns: (usize, usize)) -> bool {
@@ -237,90 +240,5 @@ impl Kernel for Find<'_> {
                 }
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::grid::Grid;
-    use crate::indent::{Indentation, PressedGel};
-    use gripgen_twin::TriMesh;
-    use gripgen_twin::frames::Pose;
-    use nalgebra::Point3;
-
-    const GRID: Grid = Grid { width_px: 150, height_px: 90, metres_per_px: 1e-4 };
-
-    /// A block with vertical walls whose outline, in pixels from the middle of the image, is given.
-    fn block(outline: [(f64, f64); 4]) -> TriMesh {
-        let at = |(x, y): (f64, f64), z_m: f64| Point3::new(x * 1e-4, y * 1e-4, z_m);
-        let corners = [0.0, 4e-3].map(|z_m| outline.map(|p| at(p, z_m))).concat();
-        let mut triangles = vec![[0, 1, 2], [0, 2, 3]];
-        for i in 0..4 {
-            let j = (i + 1) % 4;
-            triangles.extend([[i, i + 4, j + 4], [i, j + 4, j]]);
-        }
-        TriMesh::new(corners, triangles).unwrap()
-    }
-
-    fn press(mesh: &TriMesh, force_n: f64) -> (Plane, f64) {
-        let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
-        let mesh = ClusteredMesh::new(mesh);
-        let mut map = HeightMap::default();
-        map.start(&mesh, &Pose::identity(), &GRID);
-        let press = Indentation { grid: &GRID, gel: &gel, force_n, rest: None, level: SimdLevel::best() };
-        let imprint = press.sink(&mut map, &mesh).unwrap();
-        (imprint.depth_px, imprint.press_depth_m / GRID.metres_per_px)
-    }
-
-    /// Each row of a contact is as wide as the body there, to a ninth of a pixel and not to half of one.
-    #[test]
-    fn a_slanted_wall_stands_where_it_is_between_the_pixels() {
-        let wall = |y: f64| 30.2 + 0.11 * y;
-        let mesh = block([(-40.3, -35.0), (wall(-35.0), -35.0), (wall(35.0), 35.0), (-40.3, 35.0)]);
-        let (depth, press_px) = press(&mesh, 15.0);
-        let mut sum = 0.0;
-        for row in 15..75 {
-            let width = depth.row(row).iter().map(|&d| f64::from(d) / press_px).sum::<f64>();
-            let off = width - (wall(row as f64 - 44.5) + 40.3);
-            assert!(off.abs() < 0.25, "row {row}: {off} px");
-            sum += off / 60.0;
-        }
-        // The left wall is at one place for all rows, a third of a pixel at most from where it is.
-        assert!(sum.abs() < 0.2, "{sum} px on average");
-    }
-
-    /// V = c F holds with the points, wherever the walls lie.
-    #[test]
-    fn the_imprint_has_the_volume_of_its_force() {
-        for shift in [0.0, 0.2, 0.45, 0.7] {
-            let (x, y) = (10.0 + shift, 8.0 + 0.5 * shift);
-            let mesh = block([(-10.0, -8.0), (x, -8.0), (x, y), (-10.0, y)]);
-            let (depth, press_px) = press(&mesh, 4.0);
-            let volume: f64 = depth.values.iter().map(|&d| f64::from(d)).sum();
-            assert!((volume / 4000.0 - 1.0).abs() < 1e-5, "{shift}: {volume} px3");
-            let exact = 4000.0 / ((x + 10.0) * (y + 8.0));
-            assert!((press_px / exact - 1.0).abs() < 0.025, "{shift}: {press_px} px, not {exact}");
-        }
-    }
-
-    /// What is deeper on both sides alike has no step, and keeps the bits of its centres.
-    #[test]
-    fn a_slope_has_no_points() {
-        let mut map = HeightMap::default();
-        map.start(
-            &ClusteredMesh::new(&block([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])),
-            &Pose::identity(),
-            &GRID,
-        );
-        map.area = Area::whole(GRID.width_px, GRID.height_px);
-        let plane = |per_px: f32| {
-            let depth = |i: usize| per_px * (i % GRID.width_px) as f32;
-            Plane { values: (0..GRID.len()).map(depth).collect(), ..Plane::filled(150, 90, 0.0) }
-        };
-        assert!(!map.find_steps(&plane(0.45), SimdLevel::best()));
-        assert!(map.find_steps(&plane(0.6), SimdLevel::best()));
-        assert_eq!(map.steps.pixels.len(), GRID.len());
-        assert!(map.steps.pixels.iter().all(|p| (p.weight - 0.2).abs() < 1e-4));
     }
 }
