@@ -19,7 +19,7 @@ const LEAST_SD_N: f64 = 0.03;
 pub(crate) type LabelCurve = Vec<(f64, f64, f64)>;
 
 /// Probability of a label below `label_n`: over noise it is normal, over scatter the curve is taken between its points.
-pub(crate) fn share_below(curve: &LabelCurve, label_n: f64) -> f64 {
+pub(crate) fn share_below(curve: &[(f64, f64, f64)], label_n: f64) -> f64 {
     let at = |z: f64| {
         let next = curve.partition_point(|p| p.0 < z).clamp(1, curve.len().max(2) - 1);
         match (curve.get(next - 1), curve.get(next)) {
@@ -79,6 +79,6 @@ mod tests {
             assert!((found - share).abs() < 2e-3, "{z}: {found}");
         }
         // Without scatter there is one point.
-        assert!((share_below(&vec![(0.0, 5.0, 0.01)], 5.0 + 0.1 * 1.644_854) - 0.95).abs() < 1e-6);
+        assert!((share_below(&[(0.0, 5.0, 0.01)], 5.0 + 0.1 * 1.644_854) - 0.95).abs() < 1e-6);
     }
 }
