@@ -11,6 +11,7 @@ use gripgen::plain_campaign;
 use gripgen_rig::experiment::RigConfig;
 use gripgen_rig::experiment::check::{CheckLine, check, check_force};
 use serde_json::{Value, json};
+use std::cell::RefCell;
 
 /// Free space that a day of pulls needs.
 const MIN_FREE: u64 = 2_000_000_000;
@@ -21,24 +22,24 @@ pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&args.rig, &args.set)?;
     let rehearsal = args.rehearsal.as_deref().map(load).transpose()?;
-    let on_stdout = sink.on_stdout();
+    let (on_stdout, lines) = (sink.on_stdout(), RefCell::new(Vec::new()));
     let mut failed = Ok(());
-    let mut tell = |lines: &mut Vec<CheckLine>, line: CheckLine| {
+    let mut tell = |line: CheckLine| {
         let mark = if line.ok { "ok  " } else { "BAD " };
         if !on_stdout && failed.is_ok() {
             failed = print(&format!("{mark} {:<18} {}\n", line.what, line.found));
         }
-        lines.push(line);
+        lines.borrow_mut().push(line);
     };
-    let mut lines = Vec::new();
-    check(&config, &mut |line| tell(&mut lines, line));
-    tell(&mut lines, programs(&config));
+    check(&config, &mut tell);
+    tell(programs(&config));
     if let Some(stored) = &rehearsal {
-        let found = compared(stored, &lines);
-        tell(&mut lines, found);
+        let found = compared(stored, &lines.borrow());
+        tell(found);
     }
-    tell(&mut lines, free_space());
+    tell(free_space());
     failed?;
+    let lines = lines.into_inner();
     let (mut force, mut force_ok) = (Value::Null, true);
     if let Some(mass_kg) = args.mass_kg {
         let hang = || eprintln!("hang {mass_kg} kg on the tool now, and let it come to rest");
