@@ -26,11 +26,13 @@ static FILES: &[(&str, &[u8])] = embedded![
     "parts/roller_bearing/part.stl",
     "sensors/gelsight_r15/sensor.npz",
     "templates/diagnosis.html",
+    "templates/page.css",
     "templates/part-sweep.toml",
     "templates/part-twin.toml",
     "templates/presses.html",
     "templates/sweep.toml",
     "templates/twin.toml",
+    "templates/view.html",
 ];
 
 /// The content of an embedded file.
