@@ -115,6 +115,10 @@ fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
     let json: serde_json::Value = serde_json::from_slice(&found.stdout).unwrap();
     assert_eq!((&json["schema"], &json["verdict"]), (&"gripgen.diagnosis/1".into(), &"insufficient".into()));
     assert!(json["notes"][0].as_str().unwrap().contains("too few") && out.is_file());
+    // In five lines, the last of which says what to do.
+    let said = text(&run(&["diagnose", one.path().to_str().unwrap()]).stdout);
+    assert!(said.lines().count() <= 5 && said.starts_with("The data cannot answer"), "{said}");
+    assert!(said.lines().last().unwrap().starts_with("next: ") && said.contains(" campaign -o "), "{said}");
     // Quiet is quiet, and the pulls of an earlier diagnosis go where there are none to make; a file of somebody stays.
     let next = one.path().join("next.toml");
     let quiet = ["diagnose", one.path().to_str().unwrap(), "-q", "-o", out.to_str().unwrap()];
