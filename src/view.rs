@@ -43,6 +43,6 @@ pub fn view_page(dataset: &Dataset, options: &ViewOptions) -> Result<ViewPage, D
         .map(|&row| card::card(dataset, &rows, expected.of_row(row), row))
         .collect::<Result<Vec<_>, _>>()?;
     let shown = cards.len();
-    let html = page::page(dataset, &rows, &expected, cards, options);
+    let html = page::page(dataset, &rows, &expected, &cards, options);
     Ok(ViewPage { html, shown, pulls: rows.len() })
 }

@@ -27,7 +27,7 @@ pub(super) fn page(
     dataset: &Dataset,
     rows: &Rows<'_>,
     expected: &ExpectedLabels,
-    cards: Vec<Value>,
+    cards: &[Value],
     options: &ViewOptions,
 ) -> String {
     let n = rows.len();

@@ -218,15 +218,14 @@ pub(crate) fn write_traces<W: Write + Send>(
     group: &mut Group<'_, W>,
     traces: &[Option<PullTrace>],
 ) -> Result<(), ParquetError> {
-    let columns: [fn(&PullTrace) -> (&[f64], f64); 4] = [
-        |t| (&t.time_s, 1.0),
-        |t| (&t.desired_force_n, 1.0),
-        |t| (&t.measured_force_n, 1.0),
-        |t| (&t.displacement_m, 1e3),
-    ];
-    for column in columns {
+    for name in TRACE {
         let narrow = |t: &PullTrace| {
-            let (x, factor) = column(t);
+            let (x, factor) = match name {
+                "time_s" => (&t.time_s, 1.0),
+                "desired_force_n" => (&t.desired_force_n, 1.0),
+                "measured_force_n" => (&t.measured_force_n, 1.0),
+                _ => (&t.displacement_m, 1e3),
+            };
             x.iter().map(|v| (v * factor) as f32).collect::<Vec<f32>>()
         };
         write_lists(group, &traces.iter().map(|t| t.as_ref().map(narrow)).collect::<Vec<_>>())?;
