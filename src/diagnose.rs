@@ -1,5 +1,6 @@
 //! Diagnoses: measurements and a twin in, an answer and a better twin out. One file per channel.
 
+mod decisive;
 mod few;
 mod imprints;
 mod measured_presses;

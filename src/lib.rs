@@ -89,6 +89,7 @@ mod try_part;
 mod twin_edits;
 mod twin_project;
 mod version;
+mod view;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use calibrate::{CalibratePullsError, calibrate_twin};
@@ -158,3 +159,4 @@ pub use try_part::{
 };
 pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, edited_twin_toml, write_twin};
 pub use version::VERSION;
+pub use view::{ViewOptions, ViewPage, view_page};

@@ -3,6 +3,7 @@
 mod axis;
 mod bars;
 mod comparison;
+mod histogram;
 mod page;
 mod plot;
 mod sections;
@@ -11,8 +12,10 @@ mod sentence;
 mod tests;
 
 pub use comparison::{PageTable, comparison_page};
+pub(crate) use histogram::Histogram;
 pub use page::diagnosis_page;
-pub(crate) use sections::{PageFigure, PageSection, png_url, sections_page};
+pub(crate) use page::{clean, figure, rendered_with};
+pub(crate) use sections::{PageFigure, PageSection, jpeg_url, png_url, sections_page};
 
 use gripgen_identify::Diagnosis;
 use gripgen_twin::Posterior;
@@ -108,6 +111,10 @@ pub struct ReportData {
     pub sentence: String,
     /// Plots in the order of the page.
     pub groups: Vec<PlotGroup>,
+    /// How many of these decide the answer: they stand before everything else.
+    pub decides: usize,
+    /// What to do next: a sentence, and a command or nothing.
+    pub next: Vec<(String, String)>,
     /// The candidates.
     pub evidence: Vec<EvidenceRow>,
     /// The worst observations.

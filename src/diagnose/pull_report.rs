@@ -1,5 +1,6 @@
 //! What the report of a diagnosis of pulls shows beside the answer itself.
 
+use super::decisive::decisive;
 use crate::predict::PullPredictor;
 use crate::report::{EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
 use gripgen_identify::pulls::answer::{PullAnswer, PullFits};
@@ -22,7 +23,8 @@ pub(super) fn pull_report(
     answer: &PullAnswer,
 ) -> ReportData {
     let Some(fits) = &answer.fits else { return ReportData::default() };
-    let groups = vec![
+    let mut groups: Vec<PlotGroup> = decisive(measured, fits, answer, axis_label).into_iter().collect();
+    groups.extend([
         PlotGroup {
             title: "Residual against each covariate".into(),
             about: "Measured less predicted label of held-out pulls, before and after what was found was added. Those that \
@@ -44,9 +46,11 @@ pub(super) fn pull_report(
                 .into(),
             plots: curves(measured, predictor, fits),
         },
-    ];
+    ]);
+    let decides = usize::from(groups.len() > 3);
     ReportData {
         groups,
+        decides,
         evidence: evidence(fits, answer),
         worst: worst(measured, fits),
         ..Default::default()

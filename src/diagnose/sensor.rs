@@ -163,6 +163,7 @@ fn report(answer: &SensorDiagnosis) -> ReportData {
             })
             .collect(),
         error_unit: "N".into(),
+        ..ReportData::default()
     }
 }
 

@@ -1,7 +1,7 @@
 //! The page: what its template is given.
 
 use super::bars::{self, Bar, number};
-use super::plot::{self, COLOURS, shorten};
+use super::plot::{self, shorten};
 use super::sentence::{error_unit, sentence};
 use super::{Diagnosed, Plot, PlotGroup};
 use crate::assets;
@@ -32,6 +32,9 @@ pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
     let floor = d.noise_floor_n.or(d.noise_floor_mse).or(d.noise_floor_mm3);
     let unit = if report.error_unit.is_empty() { error_unit(d.channel) } else { &report.error_unit };
     let said = if report.sentence.is_empty() { sentence(d) } else { report.sentence.clone() };
+    let all = groups(&report.groups);
+    // A group without plots is no section.
+    let decides = report.decides.min(all.len());
     let page = json!({
         "title": clean(&report.title, NAME),
         "plain": d.plain.as_ref().map(|plain| clean(plain, SENTENCE)),
@@ -44,7 +47,12 @@ pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
         "unknown": d.unknown.iter().take(ROWS).map(|u| json!({
             "name": clean(&u.covariate, NAME), "strength": number(100.0 * u.strength), "p": number(u.p_value),
         })).collect::<Vec<_>>(),
-        "groups": groups(&report.groups),
+        "decisive": all[..decides],
+        "groups": all[decides..],
+        "next": report.next.iter().map(|(text, command)| json!({
+            "text": clean(text, SENTENCE), "command": clean(command, SENTENCE),
+        })).collect::<Vec<_>>(),
+        "below_floor": below_floor(d, floor),
         "evidence": report.evidence.iter().take(ROWS).map(|e| json!({
             "name": clean(&e.name, NAME), "gain": number(e.heldout_gain), "error": number(e.standard_error),
             "heldout": number(e.heldout_error), "values": clean(&e.values, 2 * NAME), "fate": clean(&e.fate, 2 * NAME),
@@ -74,16 +82,23 @@ pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
 
 /// The page as HTML; sections that it lacks are left out.
 pub(super) fn rendered(page: &Value) -> String {
+    rendered_with("diagnosis.html", page)
+}
+
+/// The same with a template of `assets/templates/`; all pages share one style sheet.
+pub(crate) fn rendered_with(name: &str, page: &Value) -> String {
     let mut environment = minijinja::Environment::new();
-    environment
-        .add_template("diagnosis.html", assets::text("templates/diagnosis.html"))
-        .expect("a template of ours parses");
-    let template = environment.get_template("diagnosis.html").expect("it was just added");
+    for file in ["page.css", name] {
+        environment
+            .add_template_owned(file.to_string(), assets::text(&format!("templates/{file}")).to_string())
+            .expect("a template of ours parses");
+    }
+    let template = environment.get_template(name).expect("it was just added");
     template.render(page).expect("the template asks for nothing that the page lacks")
 }
 
 /// A text of the data without control characters, not longer than `most`. The template escapes it.
-pub(super) fn clean(text: &str, most: usize) -> String {
+pub(crate) fn clean(text: &str, most: usize) -> String {
     let plain: String =
         text.chars().filter(|c| !c.is_control() && !('\u{fffe}'..='\u{ffff}').contains(c)).collect();
     shorten(&plain, most)
@@ -144,6 +159,12 @@ fn error_bars(d: &Diagnosis) -> Option<Vec<Bar>> {
     (!bars.is_empty()).then_some(bars)
 }
 
+/// Whether the error after is below the noise floor, which then wants a word.
+fn below_floor(d: &Diagnosis, floor: Option<f64>) -> bool {
+    let after = d.error.as_ref().and_then(|error| error.after.rmse_n.or(error.after.mse));
+    after.zip(floor).is_some_and(|(after, floor)| after < floor)
+}
+
 /// The headline as a share of the measured value.
 fn percent(d: &Diagnosis) -> Option<String> {
     let error = d.error.as_ref()?;
@@ -156,7 +177,7 @@ fn parameter(name: &str, e: &ParameterEstimate) -> Value {
     let unit = if e.unit == "1" { String::new() } else { clean(&e.unit, NAME) };
     json!({
         "name": clean(name, NAME), "value": number(e.value), "low": number(e.low90), "high": number(e.high90),
-        "unit": unit,
+        "unit": unit, "fixed": e.low90 == e.value && e.high90 == e.value,
     })
 }
 
@@ -204,14 +225,14 @@ pub(super) fn groups(groups: &[PlotGroup]) -> Vec<Value> {
         .collect()
 }
 
-pub(super) fn figure(plot: &Plot, most: usize) -> Value {
+pub(crate) fn figure(plot: &Plot, most: usize) -> Value {
     let mut plot = plot.clone();
     plot.series.truncate(SERIES);
     let legend = plot
         .series
         .iter()
         .enumerate()
-        .map(|(i, s)| json!({"name": clean(&s.name, 30), "class": format!("c{}", i % COLOURS)}));
+        .map(|(i, s)| json!({"name": clean(&s.name, 30), "class": plot::class(&plot.series, i)}));
     let legend: Vec<Value> = if plot.series.len() > 1 { legend.collect() } else { Vec::new() };
     json!({"title": clean(&plot.title, NAME), "svg": plot::draw(&plot, most), "legend": legend})
 }

@@ -12,9 +12,24 @@ const RIGHT: f64 = 12.0;
 /// Width of a letter of the labels, in the mean.
 const LETTER: f64 = 6.6;
 /// Colours of series; the style sheet has as many.
-pub(super) const COLOURS: usize = 8;
+const COLOURS: usize = 8;
 /// Letters of a word on the x axis.
 const LONGEST_WORD: usize = 18;
+
+/// The class of a series, which gives it its colour: before and after have the same everywhere.
+pub(super) fn class(all: &[Series], i: usize) -> String {
+    let of = |name: &str| match name {
+        "before" => Some("cb"),
+        "after" => Some("ca"),
+        _ => None,
+    };
+    match of(&all[i].name) {
+        Some(class) => class.into(),
+        // The first colour is that of what is after.
+        None if all.iter().any(|s| of(&s.name).is_some()) => format!("c{}", 1 + i % (COLOURS - 1)),
+        None => format!("c{}", i % COLOURS),
+    }
+}
 
 /// A text that a page may hold: markup characters escaped, characters that XML forbids left out.
 pub(super) fn escape(text: &str) -> String {
@@ -104,10 +119,12 @@ pub(super) fn draw(plot: &Plot, most: usize) -> String {
     }
     let shown = plot.series.len().max(1) as f64;
     for (i, (own, thinned)) in plot.series.iter().zip(&mut series).enumerate() {
-        if !words.is_empty() && own.mark == Mark::Points {
+        // One point a word is a mean, which stands where it is.
+        let many = thinned.points.len() > words.len();
+        if !words.is_empty() && own.mark == Mark::Points && many {
             spread(&mut thinned.points, 0.7 * ((i as f64 + 0.5) / shown - 0.5), 0.5 / shown);
         }
-        svg.push_str(&marks(own.mark, thinned, i % COLOURS, &at));
+        svg.push_str(&marks(own.mark, thinned, &class(&plot.series, i), &at));
     }
     let (middle, x_label) = ((left + WIDTH - RIGHT) / 2.0, escape(&shorten(&plot.x_label, 60)));
     let _ = write!(svg, "<text x=\"{middle:.0}\" y=\"{:.0}\" class=\"x\">{x_label}</text>", whole - 6.0);
@@ -122,7 +139,7 @@ pub(super) fn draw(plot: &Plot, most: usize) -> String {
 /// What the style sheet of a page says of plots, for a picture of its own.
 const STYLE: &str = "text { font: 12px system-ui, sans-serif; fill: #1d2328 } .x { text-anchor: middle } \
     .y { text-anchor: end } path { fill: none; stroke: #0072b2 } .grid { stroke: #e6e9ed } .zero { stroke: #5b6670 } \
-    .line { stroke-width: 2 } .dots { stroke-width: 5.5; stroke-linecap: round } .c1 { stroke: #d55e00 }";
+    .line { stroke-width: 2 } .dots { stroke-width: 5.5; stroke-linecap: round } .c1 { stroke: #d55e00 } .cb { stroke: #87919b }";
 
 impl Plot {
     /// The plot as an SVG file of its own, with its title above it.
@@ -187,7 +204,7 @@ fn spread(points: &mut [(f64, f64, f64)], middle: f64, width: f64) {
     }
 }
 
-fn marks(mark: Mark, series: &Thinned, colour: usize, at: &dyn Fn(f64, f64) -> (f64, f64)) -> String {
+fn marks(mark: Mark, series: &Thinned, colour: &str, at: &dyn Fn(f64, f64) -> (f64, f64)) -> String {
     let (mut path, mut bars) = (String::new(), String::new());
     for (i, &(px, py, error)) in series.points.iter().enumerate() {
         let (x, y) = at(px, py);
@@ -206,6 +223,6 @@ fn marks(mark: Mark, series: &Thinned, colour: usize, at: &dyn Fn(f64, f64) -> (
         Mark::Line => "line",
         Mark::Band => "band",
     };
-    let bars = if bars.is_empty() { bars } else { format!("<path class=\"bars c{colour}\" d=\"{bars}\"/>") };
-    format!("{bars}<path class=\"{class} c{colour}\" d=\"{path}\"/>")
+    let bars = if bars.is_empty() { bars } else { format!("<path class=\"bars {colour}\" d=\"{bars}\"/>") };
+    format!("{bars}<path class=\"{class} {colour}\" d=\"{path}\"/>")
 }

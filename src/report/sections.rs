@@ -69,5 +69,14 @@ pub(crate) fn sections_page(
 
 /// A picture as it stands in a page.
 pub(crate) fn png_url(png: &[u8]) -> String {
-    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
+    data_url("png", png)
+}
+
+/// The same of a JPEG.
+pub(crate) fn jpeg_url(jpeg: &[u8]) -> String {
+    data_url("jpeg", jpeg)
+}
+
+fn data_url(kind: &str, bytes: &[u8]) -> String {
+    format!("data:image/{kind};base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes))
 }

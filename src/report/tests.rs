@@ -165,6 +165,11 @@ fn diagnosed(n: usize) -> Diagnosed {
                        adding it lowers the held-out error from 1.90 N to 0.33 N."
                 .into(),
             groups,
+            decides: 0,
+            next: vec![(
+                "Make the pulls that tell apart what these could not:".into(),
+                "gripgen rig pull rig.toml --campaign next.toml".into(),
+            )],
             evidence: evidence
                 .map(|(i, name)| EvidenceRow {
                     name: name.to_string(),

@@ -127,7 +127,7 @@ def test_every_reader_adds_it(run, clean, tmp_path):
     pictures = [(tmp_path / f"{name}.png").read_bytes() for name in ("noisy", "clean")]
     assert np.array_equal(*(np.asarray(Image.open(io.BytesIO(p))) for p in pictures))
     parquet = pytest.importorskip("pyarrow.parquet")
-    columns = [parquet.read_table(tmp_path / f"{name}.parquet").column("right_png")[9].as_py() for name in ("noisy", "clean")]
+    columns = [parquet.read_table(tmp_path / f"{name}.parquet").column("right_png")[9].as_py()["bytes"] for name in ("noisy", "clean")]
     assert np.array_equal(*(np.asarray(Image.open(io.BytesIO(p))) for p in columns))
 
 

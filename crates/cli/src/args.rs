@@ -4,6 +4,7 @@ mod identify;
 mod render;
 mod rig;
 mod try_part;
+mod view;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
@@ -14,6 +15,7 @@ pub use render::RenderArgs;
 pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigRehearseArgs, RigServeArgs, RigTeachArgs};
 use std::path::PathBuf;
 pub use try_part::TryArgs;
+pub use view::ViewArgs;
 
 /// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.
 #[derive(Debug, Parser)]
@@ -41,7 +43,9 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Draw samples of a run: images, height, pressure and the pull curve.
     Show(ShowArgs),
-    /// Write one sample of a run as a file of its own, with every reading.
+    /// Show a run, measured pulls or a shard on one page: pictures, distributions, curves, what is strange.
+    View(ViewArgs),
+    /// Write a run in another format (Parquet, WebDataset, LeRobot), or one sample as a file of its own with every reading.
     Export(ExportArgs),
     /// Fit a sensor file to measurements.
     #[command(subcommand)]
@@ -220,8 +224,12 @@ pub struct ShowArgs {
 
 /// `gripgen export`
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  gripgen export runs/quickstart --to parquet -o quickstart.parquet\n  \
+    gripgen export runs/quickstart --to lerobot -o quickstart-lerobot\n  \
+    gripgen export runs/quickstart --to webdataset -o train-%05d.tar\n  \
+    gripgen export runs/quickstart --sample 3 -o three.mcap")]
 pub struct ExportArgs {
-    /// A run folder; for --to also a folder of measured pulls.
+    /// A run folder; for --to also a folder of measured pulls, or a shard.
     pub run: PathBuf,
     /// One sample as an MCAP file with every reading.
     #[arg(long, value_name = "K", required_unless_present = "to")]
@@ -235,7 +243,7 @@ pub struct ExportArgs {
     /// Without traces.
     #[arg(long, requires = "to")]
     pub no_traces: bool,
-    /// The file to write.
+    /// The file to write; of lerobot a new folder.
     #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
     /// JSON: the file's path and size.
@@ -251,6 +259,8 @@ pub struct ExportArgs {
 pub enum ExportFormat {
     /// One Apache Parquet file.
     Parquet,
+    /// A folder in the LeRobot format 3.0: an episode for each pull, images as PNG.
+    Lerobot,
     /// A tar file for WebDataset, or with a number in its name (`train-%05d.tar`) one for each thousand rows.
     Webdataset,
 }

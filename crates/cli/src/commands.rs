@@ -25,6 +25,7 @@ pub mod show;
 pub mod sweep;
 pub mod try_part;
 pub mod verify;
+pub mod view;
 
 use crate::failure::Failure;
 use gripgen::record::{RIG_SOURCE, RunFolder};

@@ -68,6 +68,7 @@ fn execute(cli: &Cli) -> Result<u8, Failure> {
         Command::Info(args) => commands::info::run(args),
         Command::Verify(args) => commands::verify::run(args),
         Command::Show(args) => commands::show::run(args),
+        Command::View(args) => commands::view::run(args),
         Command::Export(args) => commands::export::run(args),
         Command::Calibrate(CalibrateCommand::Presses(args)) => commands::calibrate_presses::run(args),
         Command::Calibrate(CalibrateCommand::Pulls(args)) => commands::calibrate_pulls::run(args),

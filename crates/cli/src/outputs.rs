@@ -218,6 +218,41 @@ impl Outputs {
         Ok(())
     }
 
+    /// Asks for a folder of files, before the work: a new one, or an empty one. `--force` does not replace what is there.
+    pub fn allow_new_folder(&mut self, folder: &Path) -> Result<(), Failure> {
+        let parent = folder_of(folder);
+        if !parent.is_dir() {
+            let none = format!("{}: there is no folder {}", folder.display(), parent.display());
+            return Err(Failure::usage(none).hint("make it, or name a folder in one that is there"));
+        }
+        let taken = match std::fs::read_dir(folder) {
+            Ok(mut entries) => entries.next().is_some(),
+            Err(_) => std::fs::symlink_metadata(folder).is_ok(),
+        };
+        if taken {
+            let there = format!(
+                "{}: there is something of this name, which is not an empty folder",
+                folder.display()
+            );
+            return Err(Failure::usage(there)
+                .hint("name a new folder; --force does not replace one. Nothing was touched"));
+        }
+        let place = real(folder).unwrap_or_else(|| folder.into());
+        if let Some(owner) = owner(&place, &[]) {
+            let owned = format!("{}: this belongs to {owner}", folder.display());
+            return Err(Failure::usage(owned).hint("name another folder"));
+        }
+        self.planned.push(place);
+        Ok(())
+    }
+
+    /// A folder that is filled under another name, and has its own when it is published.
+    pub fn begin_folder(&self, folder: &Path) -> Result<PendingFolder, Failure> {
+        let temporary = unused_name(folder);
+        std::fs::create_dir(&temporary).map_err(|e| unwritable(folder, &e))?;
+        Ok(PendingFolder { temporary: Some(temporary), folder: folder.into() })
+    }
+
     /// A file that is written piece by piece. It has its name when it is published.
     pub fn begin(&self, path: &Path) -> Result<Pending, Failure> {
         if is_special(path) {
@@ -228,6 +263,44 @@ impl Outputs {
         let place = path.canonicalize().unwrap_or_else(|_| path.into());
         let (temporary, file) = temporary(&place).map_err(|e| unwritable(path, &e))?;
         Ok(Pending { file, path: place, temporary: Some(temporary) })
+    }
+}
+
+/// A folder under its temporary name; it is removed unless it is published.
+#[derive(Debug)]
+pub struct PendingFolder {
+    temporary: Option<PathBuf>,
+    folder: PathBuf,
+}
+
+impl PendingFolder {
+    /// Where the files go.
+    pub fn path(&self) -> &Path {
+        self.temporary.as_deref().unwrap_or(&self.folder)
+    }
+
+    /// Gives one of its files the mark of a verb.
+    pub fn mark(&self, name: &str, format: Format, verb: &str) -> Result<(), Failure> {
+        let path = self.path().join(name);
+        let failed = |e: io::Error| unwritable(&path, &e);
+        let bytes = std::fs::read(&path).map_err(failed)?;
+        std::fs::write(&path, marked(format, verb, &bytes, &[])).map_err(failed)
+    }
+
+    /// Gives the folder its name, if that is still free or an empty folder: renaming onto any other fails.
+    pub fn publish(mut self) -> Result<(), Failure> {
+        let Some(temporary) = self.temporary.take() else { return Ok(()) };
+        std::fs::rename(&temporary, &self.folder).map_err(|e| {
+            unwritable(&self.folder, &e).hint(format!("what was made is in {}", temporary.display()))
+        })
+    }
+}
+
+impl Drop for PendingFolder {
+    fn drop(&mut self) {
+        if let Some(temporary) = &self.temporary {
+            let _ = std::fs::remove_dir_all(temporary);
+        }
     }
 }
 
@@ -306,11 +379,17 @@ fn unwritable(path: &Path, e: &io::Error) -> Failure {
 
 /// A new file beside `path`, of a name that nobody else uses.
 fn temporary(path: &Path) -> io::Result<(PathBuf, File)> {
-    let mut name = path.as_os_str().to_os_string();
-    name.push(format!(".{:016x}.partial", RandomState::new().hash_one(std::process::id())));
-    let temporary = PathBuf::from(name);
+    let temporary = unused_name(path);
     let file = File::create_new(&temporary)?;
     Ok((temporary, file))
+}
+
+/// A name beside `path` that nobody else uses.
+fn unused_name(path: &Path) -> PathBuf {
+    // Without a slash at its end, which a folder may have.
+    let mut name = path.components().as_path().as_os_str().to_os_string();
+    name.push(format!(".{:016x}.partial", RandomState::new().hash_one(std::process::id())));
+    PathBuf::from(name)
 }
 
 /// A terminal, a pipe, `/dev/null`, `/dev/stdout`: nothing is replaced there, and nothing may be renamed onto it.

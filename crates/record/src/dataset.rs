@@ -12,7 +12,9 @@ pub use columns::Table;
 pub use images::NoiseMode;
 
 use crate::folder::{FolderError, RunFolder};
+use crate::index::{extra_columns, index_row};
 use crate::picture::encode_png;
+use crate::proto::gripgen_v1::Sample;
 use crate::pulls::{
     PullFolderError, PullImagesError, pulls_with_images, read_judged_pulls, read_pull_images,
 };
@@ -41,6 +43,7 @@ enum Source {
         shards: Vec<FinishedShard>,
         open: Mutex<Vec<(u64, Arc<ShardReader>)>>,
     },
+    Shard(Arc<ShardReader>),
     Pulls {
         measured: Box<MeasuredPulls>,
         with_images: BTreeSet<String>,
@@ -59,7 +62,7 @@ struct FinishedShard {
 #[non_exhaustive]
 pub enum DatasetError {
     /// Neither a run nor measured pulls.
-    #[error("{}: neither a run folder (run.json) nor a folder of measured pulls (pulls.csv)", .path.display())]
+    #[error("{}: neither a run folder (run.json), nor a folder of measured pulls (pulls.csv), nor a shard (.mcap)", .path.display())]
     Unknown {
         /// The path.
         path: PathBuf,
@@ -135,13 +138,17 @@ pub enum DatasetError {
 }
 
 impl Dataset {
-    /// Opens a run folder or a folder with `pulls.csv`. Reads its index, no shard.
+    /// Opens a run folder or a folder with `pulls.csv`, of which it reads the index and no shard; or a single shard, of which it
+    /// reads all samples without their images.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
         if path.join("run.json").is_file() {
             return Self::open_run(path);
         }
         if path.join(crate::PULLS_FILE).is_file() {
             return Self::open_pulls(path);
+        }
+        if path.is_file() {
+            return Self::open_shard(path);
         }
         Err(DatasetError::Unknown { path: path.into() })
     }
@@ -186,6 +193,24 @@ impl Dataset {
         Ok(Self { path: path.into(), table, source, image_size_px })
     }
 
+    fn open_shard(path: &Path) -> Result<Self, DatasetError> {
+        let reader = ShardReader::open(path)?;
+        let samples = reader.indices().map(|i| reader.sample(i)).collect::<Result<Vec<_>, _>>()?;
+        let drawn =
+            |s: &Sample| s.drawn_number.keys().chain(s.drawn_text.keys()).cloned().collect::<Vec<_>>();
+        let names: BTreeSet<String> = samples.iter().flat_map(drawn).collect();
+        let extra = extra_columns(names.iter().map(String::as_str));
+        let rows: Vec<Vec<String>> = samples.iter().map(|sample| index_row(sample, &extra)).collect();
+        if rows.is_empty() {
+            return Err(DatasetError::Empty { path: path.into() });
+        }
+        let source = Source::Shard(Arc::new(reader));
+        let table = Table::of_index_rows(&extra, &rows);
+        let mut found = Self { path: path.into(), table, source, image_size_px: None };
+        found.image_size_px = found.first_image_size()?;
+        Ok(found)
+    }
+
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
@@ -195,7 +220,7 @@ impl Dataset {
     pub fn run(&self) -> Option<&RunFolder> {
         match &self.source {
             Source::Run { folder, .. } => Some(folder),
-            Source::Pulls { .. } => None,
+            Source::Shard(_) | Source::Pulls { .. } => None,
         }
     }
 
@@ -217,6 +242,7 @@ impl Dataset {
                 let at = shards[shards.partition_point(|s| s.first_row <= row) - 1];
                 Ok(at.first_sample + (row - at.first_row) as u64)
             }
+            Source::Shard(reader) => Ok(reader.indices().start + row as u64),
             Source::Pulls { .. } => Ok(row as u64),
         }
     }
@@ -230,6 +256,10 @@ impl Dataset {
                 let row = shards[place].first_row + (index - shards[place].first_sample) as usize;
                 let end = shards.get(place + 1).map_or(self.table.rows(), |next| next.first_row);
                 (row < end).then_some(row)
+            }
+            Source::Shard(reader) => {
+                let row = id.parse::<u64>().ok()?.checked_sub(reader.indices().start)? as usize;
+                (row < self.table.rows()).then_some(row)
             }
             Source::Pulls { measured, .. } => measured.pulls.iter().position(|p| p.id == id),
         }
@@ -247,7 +277,7 @@ impl Dataset {
     /// A shard that cannot be read.
     pub fn has_clean_images(&self) -> Result<bool, DatasetError> {
         match &self.source {
-            Source::Run { .. } => Ok(self.shard_of(0)?.0.has_clean_images()),
+            Source::Run { .. } | Source::Shard(_) => Ok(self.shard_of(0)?.0.has_clean_images()),
             Source::Pulls { .. } => Ok(false),
         }
     }
@@ -267,7 +297,7 @@ impl Dataset {
         let size = |found| DatasetError::Size { path: self.path.clone(), row, found, wanted };
         let (left, right) = out.split_at_mut(out.len() / 2);
         match &self.source {
-            Source::Run { .. } => {
+            Source::Run { .. } | Source::Shard(_) => {
                 let (reader, index) = self.shard_of(row)?;
                 let raw = reader.raw(index)?;
                 let both = raw.images.as_ref().ok_or_else(missing)?;
@@ -307,7 +337,7 @@ impl Dataset {
             encode_png(image).map_err(|e| DatasetError::Images(problem(e)))
         };
         match &self.source {
-            Source::Run { .. } => {
+            Source::Run { .. } | Source::Shard(_) => {
                 let (reader, index) = self.shard_of(row)?;
                 if reader.has_raw_images() || reader.has_clean_images() {
                     let images = reader.record(index)?.images;
@@ -328,7 +358,11 @@ impl Dataset {
 
     /// Whether its rows may have images without contact that [`Dataset::rest_png`] knows: those of a rig.
     pub fn has_rest(&self) -> bool {
-        self.run().is_some_and(|run| run.info().source == RIG_SOURCE)
+        match &self.source {
+            Source::Run { folder, .. } => folder.info().source == RIG_SOURCE,
+            Source::Shard(reader) => reader.is_rig(),
+            Source::Pulls { .. } => false,
+        }
     }
 
     /// Both images of a row of a rig's run before the grip, where there are any.
@@ -356,7 +390,7 @@ impl Dataset {
     pub fn trace(&self, row: usize) -> Result<Option<PullTrace>, DatasetError> {
         self.check_row(row)?;
         match &self.source {
-            Source::Run { .. } => {
+            Source::Run { .. } | Source::Shard(_) => {
                 let (reader, index) = self.shard_of(row)?;
                 Ok(reader.pull(index)?.1)
             }
@@ -364,11 +398,32 @@ impl Dataset {
         }
     }
 
+    /// Both images of a row; `None` where it has none.
+    ///
+    /// # Errors
+    ///
+    /// A row that cannot be read.
+    pub fn images(&self, row: usize) -> Result<Option<PerJaw<TactileImage>>, DatasetError> {
+        self.check_row(row)?;
+        match &self.source {
+            Source::Run { .. } | Source::Shard(_) => {
+                let (reader, index) = self.shard_of(row)?;
+                Ok(reader.record(index)?.images)
+            }
+            Source::Pulls { measured, with_images } => {
+                let id = &measured.pulls[row].id;
+                let images =
+                    with_images.contains(id).then(|| read_pull_images(&self.path, id)).transpose()?;
+                Ok(images.map(|images| images.grip))
+            }
+        }
+    }
+
     /// Everything of a row of a run; `None` for measured pulls from a table.
     pub fn record(&self, row: usize) -> Result<Option<Record>, DatasetError> {
         self.check_row(row)?;
         match &self.source {
-            Source::Run { .. } => {
+            Source::Run { .. } | Source::Shard(_) => {
                 let (reader, index) = self.shard_of(row)?;
                 Ok(Some(reader.record(index)?))
             }
@@ -383,8 +438,10 @@ impl Dataset {
 
     /// The shard of a row and the global index of its sample.
     fn shard_of(&self, row: usize) -> Result<(Arc<ShardReader>, u64), DatasetError> {
-        let Source::Run { folder, shards, open } = &self.source else {
-            return Err(DatasetError::Unknown { path: self.path.clone() });
+        let (folder, shards, open) = match &self.source {
+            Source::Run { folder, shards, open } => (folder, shards, open),
+            Source::Shard(reader) => return Ok((reader.clone(), reader.indices().start + row as u64)),
+            Source::Pulls { .. } => return Err(DatasetError::Unknown { path: self.path.clone() }),
         };
         let at = shards[shards.partition_point(|s| s.first_row <= row) - 1];
         let index = at.first_sample + (row - at.first_row) as u64;

@@ -17,12 +17,14 @@
 //! This crate does not know how samples are made. Reading holds one sample in memory, writing one as well.
 
 mod campaign;
+mod card;
 mod dataset;
 mod encode;
 mod export;
 mod folder;
 mod imprint_table;
 mod index;
+mod lerobot;
 mod mark;
 mod parquet;
 mod picture;
@@ -53,9 +55,10 @@ pub use imprint_table::{
     IMPRINTS_FILE, ImprintTable, MeasuredImprint, read_imprint_picture, read_imprint_table,
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
+pub use lerobot::{ExportLeRobotError, LEROBOT_CARD, LeRobotOptions, export_lerobot};
 pub use mark::{MARK_NAME, parquet_mark, png_mark, png_with_mark};
 pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};
-pub use picture::{PictureError, decode as decode_picture, encode_png};
+pub use picture::{PictureError, decode as decode_picture, encode_jpeg, encode_png};
 pub use presses::{
     PRESSES_FILE, PressColumnTable, PressFolder, PressRecord, PressedBody, press_table, read_press_columns,
     read_press_folder,

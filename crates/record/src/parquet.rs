@@ -1,20 +1,24 @@
 //! A dataset as one Parquet file: for tools that read tables with images in them.
 //!
-//! Columns are those of the table, then `left_png` and `right_png` (the images as PNG bytes; of a rig also `left_rest_png`
+//! Columns are those of the table, then `left_png` and `right_png` (the images: a struct of `bytes`, the PNG, and an empty `path`; of a rig also `left_rest_png`
 //! and `right_rest_png`, those without contact), then `trace_time_s`,
 //! `trace_desired_force_n`, `trace_measured_force_n` and `trace_displacement_mm` (lists of float). What is not there is
-//! null. Nothing in the file depends on time, host or path.
+//! null; columns that count something are integers. Nothing in the file depends on time, host or path.
+
+mod columns;
+
+pub(crate) use columns::{
+    Field, Group, Kind, TRACE, write_all_numbers, write_bytes, write_images, write_lists, write_small,
+    write_traces, write_values, write_whole, write_word_lists,
+};
 
 use crate::dataset::{Dataset, DatasetError};
 use crate::mark::{EXPORT, MARK_NAME};
-use gripgen_twin::Values;
-use parquet::basic::{LogicalType, Repetition, Type as Physical};
-use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType};
+use columns::{huggingface, schema};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
-use parquet::schema::types::{Type, TypePtr};
+use parquet::file::writer::SerializedFileWriter;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -53,50 +57,25 @@ pub fn export_parquet<W: Write + Send>(
     out: W,
     mut on_rows: impl FnMut(usize),
 ) -> Result<(), ExportParquetError> {
-    let mark = KeyValue::new(MARK_NAME.into(), EXPORT.to_string());
-    let properties = WriterProperties::builder()
-        .set_created_by("gripgen".into())
-        .set_key_value_metadata(Some(vec![mark]))
-        .build();
-    let mut writer = SerializedFileWriter::new(out, schema(dataset, options)?, Arc::new(properties))?;
+    let fields = fields(dataset, options);
+    let mut writer = file(out, "pulls", &fields)?;
     let rows = dataset.table().rows();
     for first in (0..rows).step_by(GROUP_ROWS) {
         let group: Vec<usize> = (first..(first + GROUP_ROWS).min(rows)).collect();
         let mut out = writer.next_row_group()?;
-        for (_, column) in dataset.table().columns() {
-            match column {
-                Values::Numbers(x) => write_numbers(&mut out, group.iter().map(|&row| x[row]))?,
-                Values::Words(words) => {
-                    let cell = |row: usize| Some(words[row].as_bytes().to_vec()).filter(|w| !w.is_empty());
-                    write_bytes(&mut out, group.iter().map(|&row| cell(row)))?;
-                }
-            }
+        for ((_, column), field) in dataset.table().columns().iter().zip(&fields) {
+            write_values(&mut out, field.kind, column, &group)?;
         }
         if options.images {
-            let images: Vec<_> =
-                group.iter().map(|&row| dataset.images_png(row)).collect::<Result<_, DatasetError>>()?;
-            for jaw in 0..2 {
-                write_bytes(&mut out, images.iter().map(|both| both.as_ref().map(|b| b[jaw].clone())))?;
-            }
+            write_both(&mut out, &group, |row| dataset.images_png(row))?;
         }
         if options.images && dataset.has_rest() {
-            let rest: Vec<_> =
-                group.iter().map(|&row| dataset.rest_png(row)).collect::<Result<_, DatasetError>>()?;
-            for jaw in 0..2 {
-                write_bytes(&mut out, rest.iter().map(|both| both.as_ref().map(|b| b[jaw].clone())))?;
-            }
+            write_both(&mut out, &group, |row| dataset.rest_png(row))?;
         }
         if options.traces {
             let traces: Vec<_> =
                 group.iter().map(|&row| dataset.trace(row)).collect::<Result<_, DatasetError>>()?;
-            let lists = |of: &dyn Fn(&gripgen_twin::PullTrace) -> Vec<f32>| {
-                traces.iter().map(|t| t.as_ref().map(of)).collect::<Vec<_>>()
-            };
-            let narrow = |x: &[f64], factor: f64| x.iter().map(|v| (v * factor) as f32).collect();
-            write_lists(&mut out, &lists(&|t| narrow(&t.time_s, 1.0)))?;
-            write_lists(&mut out, &lists(&|t| narrow(&t.desired_force_n, 1.0)))?;
-            write_lists(&mut out, &lists(&|t| narrow(&t.measured_force_n, 1.0)))?;
-            write_lists(&mut out, &lists(&|t| narrow(&t.displacement_m, 1e3)))?;
+            write_traces(&mut out, &traces)?;
         }
         out.close()?;
         on_rows(first + group.len());
@@ -105,98 +84,59 @@ pub fn export_parquet<W: Write + Send>(
     Ok(())
 }
 
-fn schema(dataset: &Dataset, options: ParquetOptions) -> Result<TypePtr, ParquetError> {
-    let leaf = |name: &str, physical: Physical, logical: Option<LogicalType>, repetition: Repetition| {
-        let leaf = Type::primitive_type_builder(name, physical).with_repetition(repetition);
-        leaf.with_logical_type(logical).build().map(Arc::new)
-    };
-    let mut fields = Vec::new();
-    for (name, column) in dataset.table().columns() {
-        fields.push(match column {
-            Values::Numbers(_) => leaf(name, Physical::DOUBLE, None, Repetition::OPTIONAL)?,
-            Values::Words(_) => {
-                leaf(name, Physical::BYTE_ARRAY, Some(LogicalType::String), Repetition::OPTIONAL)?
-            }
-        });
+/// A writer of a marked file of these columns.
+pub(crate) fn file<W: Write + Send>(
+    out: W,
+    name: &str,
+    fields: &[Field],
+) -> Result<SerializedFileWriter<W>, ParquetError> {
+    file_with(out, name, fields, vec![KeyValue::new("huggingface".into(), huggingface(fields))])
+}
+
+/// The same with further keys of its metadata in place of the features.
+pub(crate) fn file_with<W: Write + Send>(
+    out: W,
+    name: &str,
+    fields: &[Field],
+    mut keys: Vec<KeyValue>,
+) -> Result<SerializedFileWriter<W>, ParquetError> {
+    keys.push(KeyValue::new(MARK_NAME.into(), EXPORT.to_string()));
+    let properties = WriterProperties::builder()
+        .set_created_by("gripgen".into())
+        .set_key_value_metadata(Some(keys))
+        .build();
+    SerializedFileWriter::new(out, schema(name, fields)?, Arc::new(properties))
+}
+
+/// Images of both jaws, a column each.
+fn write_both<W: Write + Send>(
+    out: &mut Group<'_, W>,
+    rows: &[usize],
+    of: impl Fn(usize) -> Result<Option<[Vec<u8>; 2]>, DatasetError>,
+) -> Result<(), ExportParquetError> {
+    let (mut left, mut right) = (Vec::new(), Vec::new());
+    for &row in rows {
+        let (l, r) = of(row)?.map_or((None, None), |[l, r]| (Some(l), Some(r)));
+        left.push(l);
+        right.push(r);
     }
+    write_images(out, left)?;
+    write_images(out, right)?;
+    Ok(())
+}
+
+fn fields(dataset: &Dataset, options: ParquetOptions) -> Vec<Field> {
+    let table = dataset.table();
+    let mut fields: Vec<Field> =
+        table.columns().iter().map(|(name, values)| Field::of(name, values, table.is_whole(name))).collect();
     if options.images {
         let rest = ["left_rest_png", "right_rest_png"].into_iter().filter(|_| dataset.has_rest());
-        for name in ["left_png", "right_png"].into_iter().chain(rest) {
-            fields.push(leaf(name, Physical::BYTE_ARRAY, None, Repetition::OPTIONAL)?);
-        }
+        fields.extend(
+            ["left_png", "right_png"].into_iter().chain(rest).map(|name| Field::new(name, Kind::Image)),
+        );
     }
     if options.traces {
-        let names = ["time_s", "desired_force_n", "measured_force_n", "displacement_mm"];
-        for name in names.map(|name| format!("trace_{name}")) {
-            let element = leaf("element", Physical::FLOAT, None, Repetition::REQUIRED)?;
-            let list = Type::group_type_builder("list")
-                .with_repetition(Repetition::REPEATED)
-                .with_fields(vec![element])
-                .build()?;
-            let outer = Type::group_type_builder(&name)
-                .with_repetition(Repetition::OPTIONAL)
-                .with_logical_type(Some(LogicalType::List))
-                .with_fields(vec![Arc::new(list)])
-                .build()?;
-            fields.push(Arc::new(outer));
-        }
+        fields.extend(TRACE.map(|name| Field::new(format!("trace_{name}"), Kind::List(None))));
     }
-    Ok(Arc::new(Type::group_type_builder("pulls").with_fields(fields).build()?))
-}
-
-type Group<'a, W> = SerializedRowGroupWriter<'a, W>;
-
-fn lacks_a_column() -> ParquetError {
-    ParquetError::General("the schema has fewer columns than the table".into())
-}
-
-fn write_numbers<W: Write + Send>(
-    group: &mut Group<'_, W>,
-    values: impl Iterator<Item = f64>,
-) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    let values: Vec<f64> = values.collect();
-    let levels: Vec<i16> = values.iter().map(|x| i16::from(!x.is_nan())).collect();
-    let there: Vec<f64> = values.into_iter().filter(|x| !x.is_nan()).collect();
-    column.typed::<DoubleType>().write_batch(&there, Some(&levels), None)?;
-    column.close()
-}
-
-fn write_bytes<W: Write + Send>(
-    group: &mut Group<'_, W>,
-    values: impl Iterator<Item = Option<Vec<u8>>>,
-) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    let (mut levels, mut there) = (Vec::new(), Vec::new());
-    for value in values {
-        levels.push(i16::from(value.is_some()));
-        there.extend(value.map(ByteArray::from));
-    }
-    column.typed::<ByteArrayType>().write_batch(&there, Some(&levels), None)?;
-    column.close()
-}
-
-/// Lists: level 0 is no list, 1 an empty one, 2 an element; elements after the first repeat at level 1.
-fn write_lists<W: Write + Send>(
-    group: &mut Group<'_, W>,
-    lists: &[Option<Vec<f32>>],
-) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    let (mut defined, mut repeated, mut there) = (Vec::new(), Vec::new(), Vec::new());
-    for list in lists {
-        match list {
-            None => defined.push(0),
-            Some(list) if list.is_empty() => defined.push(1),
-            Some(list) => {
-                defined.extend(std::iter::repeat_n(2, list.len()));
-                repeated.push(0);
-                repeated.extend(std::iter::repeat_n(1, list.len() - 1));
-                there.extend_from_slice(list);
-                continue;
-            }
-        }
-        repeated.push(0);
-    }
-    column.typed::<FloatType>().write_batch(&there, Some(&defined), Some(&repeated))?;
-    column.close()
+    fields
 }

@@ -1,6 +1,7 @@
 //! PNG and JPEG, through the `image` crate.
 
 use gripgen_twin::TactileImage;
+use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
@@ -32,6 +33,19 @@ pub fn encode_png(image: &TactileImage) -> Result<Vec<u8>, PictureError> {
 pub fn encode_small_png(image: &TactileImage) -> Result<Vec<u8>, PictureError> {
     let mut bytes = Vec::with_capacity(image.rgb.len() / 4);
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Level(4), FilterType::Up)
+        .write_image(&image.rgb, image.width_px, image.height_px, ExtendedColorType::Rgb8)
+        .map_err(|e| PictureError(e.to_string()))?;
+    Ok(bytes)
+}
+
+/// A JPEG of an RGB image without subsampled colours, for pages that people look at; nothing that is measured or trained on goes through it.
+///
+/// # Errors
+///
+/// As [`encode_png`].
+pub fn encode_jpeg(image: &TactileImage, quality: u8) -> Result<Vec<u8>, PictureError> {
+    let mut bytes = Vec::with_capacity(image.rgb.len() / 8);
+    JpegEncoder::new_with_quality(&mut bytes, quality)
         .write_image(&image.rgb, image.width_px, image.height_px, ExtendedColorType::Rgb8)
         .map_err(|e| PictureError(e.to_string()))?;
     Ok(bytes)

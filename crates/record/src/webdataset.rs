@@ -3,6 +3,7 @@
 //! Rows without images are left out where images are wanted, so that all samples have the same keys. What is in a `__name__` folder is no
 //! sample to WebDataset: the mark and the card are there. Nothing in a file depends on time, host or path.
 
+use crate::card;
 use crate::dataset::{Dataset, DatasetError};
 use crate::mark::{EXPORT, MARK_NAME};
 use gripgen_twin::{PullTrace, Values};
@@ -62,7 +63,7 @@ pub fn export_webdataset<W: Write>(
 ) -> Result<usize, ExportWebDatasetError> {
     let mut tar = Builder::new(out);
     add(&mut tar, &format!("{ABOUT}/{MARK_NAME}"), EXPORT.as_bytes())?;
-    add(&mut tar, &format!("{ABOUT}/README.md"), card(dataset).as_bytes())?;
+    add(&mut tar, &format!("{ABOUT}/README.md"), about(dataset).as_bytes())?;
     let mut written = 0;
     for &row in rows {
         on_row();
@@ -97,16 +98,12 @@ fn add<W: Write>(tar: &mut Builder<W>, name: &str, bytes: &[u8]) -> std::io::Res
     tar.append_data(&mut header, name, bytes)
 }
 
-/// Columns that count something.
-const COUNTS: [&str; 8] =
-    ["index", "shard", "in_shard", "grip_pose", "pull_index", "pull_direction", "group", "repetition"];
-
 /// The cells of a row: numbers, counts as integers, words, and null where there is nothing.
 fn cells(dataset: &Dataset, row: usize) -> Value {
     let cell = |name: &str, column: &Values| match column {
         Values::Words(words) if words[row].is_empty() => Value::Null,
         Values::Words(words) => json!(words[row]),
-        Values::Numbers(x) if x[row].fract() == 0.0 && COUNTS.contains(&name) => json!(x[row] as i64),
+        Values::Numbers(x) if x[row].is_finite() && dataset.table().is_whole(name) => json!(x[row] as i64),
         // What is not a number is null in JSON.
         Values::Numbers(x) => json!(x[row]),
     };
@@ -132,25 +129,18 @@ fn trace_npy(trace: &PullTrace) -> Vec<u8> {
     bytes
 }
 
-/// What somebody who only has the file wants to know.
-fn card(dataset: &Dataset) -> String {
-    let mut text = String::from(
+/// The card.
+fn about(dataset: &Dataset) -> String {
+    format!(
         "# Grips, pulls and slip\n\n\
          Each sample is a grip by two jaws with a tactile sensor each and a pull until they slip, written by gripgen.\n\n\
-         - `KEY.left.png`, `KEY.right.png`: tactile images, RGB, 8 bits, with the noise of the sensor\n\
-         - `KEY.json`: `max_pull_force_n` is the label (N); `status` says what it is (`slipped`: the force at slip; `censored`: a lower\n\
-         \x20 bound; `no_contact`: 0; `suspect`: contradicted by the trace); everything that was set and drawn; units stand in the names\n\
-         - `KEY.trace.npy`: float32 (rows, 4): time_s, desired_force_n, measured_force_n, displacement_mm\n\n\
-         Grip forces are those of one jaw. Samples of one `group` are repetitions of one configuration: split by `group`, or by `part`.\n",
-    );
-    if let Some(run) = dataset.run() {
-        let info = run.info();
-        text += &format!(
-            "\nRun `{}`, {} samples, made by gripgen {} (source: {}), configuration {}.\n\n```toml\n{}```\n",
-            info.name, info.samples, info.gripgen_version, info.source, info.config_sha256, info.config_toml
-        );
-    }
-    text
+         - `KEY.left.png`, `KEY.right.png`: tactile images\n\
+         - `KEY.json`: the columns below; `max_pull_force_n` is the label\n\
+         - `KEY.trace.npy`: float32 (rows, 4): time_s, desired_force_n, measured_force_n, displacement_mm\n\n{}\n{}{}",
+        card::facts(dataset),
+        card::columns(dataset, str::to_string),
+        card::configuration(dataset)
+    )
 }
 
 /// The verb that wrote a tar file; `None` where there is no mark or no such file.

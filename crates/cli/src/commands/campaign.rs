@@ -36,7 +36,7 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     let (campaign, separating) = match &args.separate {
         Some(measured) => {
             let next = separating(args, measured, &twin)?;
-            let text = next_toml(&next, measured);
+            let text = next_toml(&next, measured, &args.twin);
             (next.campaign, Some(text))
         }
         None => (first(args, &twin)?, None),

@@ -8,8 +8,8 @@ use crate::output::{JsonSink, count, print};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{
-    Dataset, ParquetOptions, ShardReader, WebDatasetOptions, export_parquet, export_sample,
-    export_webdataset, webdataset_rows,
+    Dataset, LEROBOT_CARD, LeRobotOptions, ParquetOptions, ShardReader, WebDatasetOptions, export_lerobot,
+    export_parquet, export_sample, export_webdataset, webdataset_rows,
 };
 use serde_json::json;
 use std::path::PathBuf;
@@ -19,6 +19,9 @@ pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
     let mut outputs = Outputs::of("export", args.json.force).reads(&args.run);
     if args.sample.is_none() && args.to == Some(ExportFormat::Webdataset) {
         return webdataset(args, outputs);
+    }
+    if args.sample.is_none() && args.to == Some(ExportFormat::Lerobot) {
+        return lerobot(args, outputs);
     }
     outputs.allow(&args.out)?;
     let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
@@ -50,6 +53,38 @@ fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Fai
     let bytes = file.metadata().map_err(Failure::new)?.len();
     let document = json!({"schema": "gripgen.export/1", "rows": rows, "file": args.out, "bytes": bytes});
     tell(args, sink, &document)
+}
+
+fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
+    let dataset = Dataset::open(&args.run).map_err(Failure::usage)?;
+    outputs.allow_new_folder(&args.out)?;
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let rows = dataset.table().rows();
+    let has_traces = (0..rows).find_map(|row| dataset.trace(row).ok().flatten()).is_some();
+    let options = LeRobotOptions {
+        images: !args.no_images && dataset.image_size_px().is_some(),
+        traces: !args.no_traces && has_traces,
+    };
+    let folder = outputs.begin_folder(&args.out)?;
+    let mut progress = Progress::start("rows", 0, rows as u64, &args.talk);
+    let made = export_lerobot(&dataset, options, folder.path(), || progress.step());
+    progress.finish();
+    let episodes = made.map_err(Failure::new)?;
+    folder.mark(LEROBOT_CARD, Format::Html, outputs.verb())?;
+    folder.publish()?;
+    let left_out = rows - episodes;
+    if left_out > 0 && !args.talk.quiet {
+        eprintln!("{} without images or trace left out", count(left_out as u64, "row"));
+    }
+    if sink.wanted() {
+        sink.document(&json!({
+            "schema": "gripgen.export/1", "rows": episodes, "left_out": left_out, "file": args.out,
+        }))?;
+    }
+    if !sink.on_stdout() && !args.talk.quiet {
+        print(&format!("{}\n", args.out.display()))?;
+    }
+    Ok(0)
 }
 
 /// Rows of a tar file whose name has a number.

@@ -9,9 +9,9 @@ use std::collections::BTreeSet;
 use std::ffi::OsString;
 
 /// Arguments that name what is read.
-const READ: [&str; 13] = [
+const READ: [&str; 14] = [
     "config", "run", "presses", "measured", "also", "sensor", "twin", "rig", "mesh", "campaign", "after",
-    "separate", "target",
+    "separate", "target", "data",
 ];
 /// Arguments that name a folder with rules of its own: a run (exit code 3), measurements, the files of `init`.
 const FOLDERS: [(&str, &str); 4] =
@@ -121,6 +121,8 @@ fn cases() -> Vec<Case> {
         json("verify", "run", true),
         json("show", "run 0 -o out/shown.png", true),
         case("show", "out", "png", "run 0", true),
+        json("view", "run -o out/viewed.html -q", true),
+        case("view", "out", "html", "run -q", true),
         json("export", "run --sample 0 -o out/exported.mcap", true),
         case("export", "out", "mcap", "run --sample 0", true),
         case("export", "out", "parquet", "run --to parquet", true),

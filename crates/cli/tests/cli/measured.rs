@@ -115,6 +115,10 @@ fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
     let json: serde_json::Value = serde_json::from_slice(&found.stdout).unwrap();
     assert_eq!((&json["schema"], &json["verdict"]), (&"gripgen.diagnosis/1".into(), &"insufficient".into()));
     assert!(json["notes"][0].as_str().unwrap().contains("too few") && out.is_file());
+    // In five lines, the last of which says what to do.
+    let said = text(&run(&["diagnose", one.path().to_str().unwrap()]).stdout);
+    assert!(said.lines().count() <= 5 && said.starts_with("The data cannot answer"), "{said}");
+    assert!(said.lines().last().unwrap().starts_with("next: ") && said.contains(" campaign -o "), "{said}");
     // Quiet is quiet. The pulls of an earlier diagnosis are planned anew, and go where there are none to make; a file of somebody stays.
     let equal: String = (0..14).map(|i| format!("p{i},long_shaft,40,16\n")).collect();
     let equal = folder(&format!("pull_id,part,grip_force_n,max_pull_force_n\n{equal}"));

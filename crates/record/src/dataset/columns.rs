@@ -2,7 +2,7 @@
 
 use crate::index::{INDEX_COLUMNS, index_header, status_name};
 use crate::pulls::JudgedPulls;
-use gripgen_twin::columns::{find, recorded_covariates};
+use gripgen_twin::columns::{Kind, find, recorded_covariates};
 use gripgen_twin::{MeasuredPull, PULLS_SINCE_REST, Values};
 
 /// Whether a column of an index holds words whatever stands in it.
@@ -12,6 +12,9 @@ fn holds_words(name: &str) -> bool {
 
 /// The column that says why a row failed or is suspect; in an index it is `failure`, whatever the status.
 const REASON: &str = "status_reason";
+
+/// Columns that count something and are no column of a pull.
+const COUNTS: [&str; 5] = ["index", "shard", "in_shard", "group", "repetition"];
 
 /// Columns of equal length, with names.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -104,6 +107,13 @@ impl Table {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.rows
+    }
+
+    /// Whether a column holds nothing but whole numbers, and stands for whole numbers: it counts something, or is a direction.
+    pub fn is_whole(&self, name: &str) -> bool {
+        let counts = COUNTS.contains(&name)
+            || find(name).is_some_and(|c| matches!(c.kind, Kind::Whole | Kind::Direction));
+        counts && self.numbers(name).is_some_and(|x| x.iter().all(|x| x.is_nan() || x.fract() == 0.0))
     }
 
     /// The columns in their order.

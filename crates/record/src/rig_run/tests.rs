@@ -323,8 +323,11 @@ fn a_parquet_file_has_the_images_at_rest_and_nulls() {
     let (slipped, failed) = (&found[0], &found[1]);
     assert_eq!((&slipped["mu"], &failed["max_pull_force_n"]), (&Field::Null, &Field::Null));
     assert_eq!(slipped["humidity_pct"], Field::Double(41.5));
-    let Field::Bytes(png) = &slipped["left_rest_png"] else { panic!("{:?}", slipped["left_rest_png"]) };
-    assert_eq!(crate::decode_picture(png.data()).unwrap(), image(60).left);
+    let Field::Group(image) = &slipped["left_rest_png"] else { panic!("{:?}", slipped["left_rest_png"]) };
+    let parts: BTreeMap<&String, &Field> = image.get_column_iter().collect();
+    let Field::Bytes(png) = parts[&"bytes".to_string()] else { panic!("{parts:?}") };
+    assert_eq!(slipped["index"], Field::Long(0), "a count is an integer");
+    assert_eq!(crate::decode_picture(png.data()).unwrap(), self::image(60).left);
     assert_eq!((&failed["right_rest_png"], &failed["trace_time_s"]), (&Field::Null, &Field::Null));
     assert_eq!(failed["failure"], Field::Str("the gripper did not close".into()));
 }

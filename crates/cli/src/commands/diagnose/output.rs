@@ -3,11 +3,12 @@
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
 use crate::mark::Format;
-use crate::output::{JsonSink, print};
+use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::posterior;
 use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, PosteriorFile, Verdict};
 use gripgen::record::campaign_toml;
+use gripgen::twin::rounded;
 use gripgen::{Diagnosed, Location, NextPulls, diagnosis_page, edited_twin_toml};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -29,6 +30,7 @@ pub fn write(
         let file = draws.to_string_lossy().into_owned();
         diagnosed.diagnosis.posterior = Some(PosteriorFile { file, draws: posterior.draws.len() });
     }
+    diagnosed.report.next = next_steps(args, &diagnosed.diagnosis, next.as_deref());
     if let Some(report) = &args.report {
         outputs.write(report, Format::Html, diagnosis_page(&diagnosed).as_bytes())?;
     }
@@ -41,7 +43,11 @@ pub fn write(
         posterior::write(outputs, out, &text.map_err(Failure::new)?, diagnosed.posterior.as_ref())?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
-        print(&summary(&diagnosed.diagnosis))?;
+        let mut text = in_short(&diagnosed.diagnosis, &diagnosed.report.next);
+        if args.talk.verbose {
+            text += &format!("\n{}", summary(&diagnosed.diagnosis));
+        }
+        print(&text)?;
     }
     if !args.talk.quiet {
         let draws = draws.filter(|_| diagnosed.posterior.is_some());
@@ -84,7 +90,7 @@ fn write_next(
         diagnosed.diagnosis.notes.push(note);
         return Ok(None);
     }
-    outputs.write(&path, Format::Toml, next_toml(next, &args.measured).as_bytes())?;
+    outputs.write(&path, Format::Toml, next_toml(next, &args.measured, &args.twin).as_bytes())?;
     let own = diagnosed.diagnosis.effects.iter_mut().filter(|e| next.separates(&e.name));
     for separate in own.filter_map(|e| e.separate_by.as_mut()) {
         separate.campaign = Some(path.display().to_string());
@@ -92,14 +98,114 @@ fn write_next(
     Ok(Some(path))
 }
 
-/// The text of the next pulls.
-pub fn next_toml(next: &NextPulls, measured: &Path) -> String {
+/// The text of the next pulls; `twin` is the name of the one that was diagnosed.
+pub fn next_toml(next: &NextPulls, measured: &Path, twin: &str) -> String {
     let about = format!(
-        "Planned by `gripgen diagnose` of {}.\n{}.\nKeys are described in docs/format.md. Run it with `gripgen rig pull`.",
+        "Planned by `gripgen diagnose` of {} with the twin {twin}.\n{}.\nKeys are described in docs/format.md. Run it with `gripgen rig pull`.",
         measured.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
         next.text(),
     );
     campaign_toml(&next.campaign, &about)
+}
+
+/// What to do next: a sentence, and a command or nothing. At most two.
+fn next_steps(args: &DiagnoseArgs, diagnosis: &Diagnosis, next: Option<&Path>) -> Vec<(String, String)> {
+    let program = program();
+    let mut steps = Vec::new();
+    if let Some(next) = next {
+        steps.push((
+            "Make the pulls that tell apart what these could not:".into(),
+            format!("{program} rig pull rig.toml --campaign {}", next.display()),
+        ));
+    }
+    let found = matches!(diagnosis.verdict, Verdict::Effect | Verdict::Unknown);
+    match &args.out {
+        Some(out) if found => {
+            let set = std::path::absolute(out).unwrap_or_else(|_| out.clone());
+            steps.push((
+                "Make training data with the corrected twin:".into(),
+                format!("{program} sweep sweep.toml --set twin={} -o runs/corrected", set.display()),
+            ));
+        }
+        None if found => steps.push((
+            "Write the corrected twin:".into(),
+            format!("{program} diagnose {} -o diagnosed.toml", args.measured.display()),
+        )),
+        _ if diagnosis.verdict == Verdict::Insufficient => {
+            steps
+                .push(("Plan pulls that can answer:".into(), format!("{program} campaign -o campaign.toml")));
+        }
+        _ => {}
+    }
+    steps
+}
+
+/// The answer in five lines, for somebody who reads nothing else; `-v` says the rest.
+fn in_short(diagnosis: &Diagnosis, next: &[(String, String)]) -> String {
+    let mut text = String::new();
+    let word = match diagnosis.verdict {
+        Verdict::None => "nothing beyond the baseline was found",
+        Verdict::Effect => "the twin lacks an effect",
+        Verdict::Unknown => "there is structure that no effect of the library explains",
+        Verdict::Insufficient => "the data cannot answer",
+    };
+    let plain = diagnosis.plain.as_deref().unwrap_or(word);
+    let _ = writeln!(text, "{plain}");
+    let names: Vec<String> = diagnosis.effects.iter().map(with_values).collect();
+    let unknown = diagnosis.unknown.iter().map(|u| format!("a curve in {}", u.covariate));
+    let names: Vec<String> = names.into_iter().chain(unknown).collect();
+    let names = if names.is_empty() { String::new() } else { format!(": {}", names.join("; ")) };
+    let _ = writeln!(text, "verdict: {word}{names}");
+    if let Some(error) = &diagnosis.error {
+        let floor = diagnosis.noise_floor_n.filter(|floor| floor.is_finite());
+        let after = error.after.rmse_n;
+        let floor = floor.map_or(String::new(), |floor| {
+            let below = after.is_some_and(|after| after < floor);
+            let nothing = if below { ", so nothing is left to explain" } else { "" };
+            format!("; repetitions scatter by {} N{nothing}", rounded(floor, &[]))
+        });
+        let (before, after) = (short(&error.before), short(&error.after));
+        let _ = writeln!(text, "error on held-out {}: {before} -> {after}{floor}", error.heldout);
+    }
+    let tied = diagnosis.effects.iter().filter(|e| !e.indistinguishable_from.is_empty());
+    let tied: Vec<String> = tied
+        .map(|e| {
+            let rivals: Vec<&str> = e.indistinguishable_from.iter().map(|r| r.name.as_str()).collect();
+            let how = e.separate_by.as_ref().map_or(String::new(), |s| format!(" ({})", s.text));
+            format!("{} is not told apart from {}{how}", e.name, rivals.join(", "))
+        })
+        .collect();
+    if !tied.is_empty() {
+        let _ = writeln!(text, "tied: {}", tied.join("; "));
+    }
+    if let Some((_, command)) = next.first() {
+        let _ = writeln!(text, "next: {command}");
+    }
+    text
+}
+
+/// An effect with its largest values; references that nobody fitted are left out.
+fn with_values(effect: &NamedEffect) -> String {
+    let fitted = largest(effect).into_iter().filter(|(_, p)| p.low90 != p.value || p.high90 != p.value);
+    let values: Vec<String> = fitted
+        .take(3)
+        .map(|(name, p)| {
+            let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+            let [value, low, high] = [p.value, p.low90, p.high90].map(|x| rounded(x, &[]));
+            format!("{name} {value}{unit} ({low} to {high})")
+        })
+        .collect();
+    let part = effect.part.as_ref().map_or(String::new(), |part| format!(" on {part}"));
+    let values = if values.is_empty() { String::new() } else { format!(", {}", values.join(", ")) };
+    format!("{}{part}{values}", effect.name)
+}
+
+fn short(error: &HeldOutError) -> String {
+    match (error.rmse_n, error.mse) {
+        (Some(rmse), _) => format!("{} N", rounded(rmse, &[])),
+        (None, Some(mse)) => format!("{} grey levels^2", rounded(mse, &[])),
+        (None, None) => "not measured".into(),
+    }
 }
 
 /// Parameters of an effect that are shown; a background has dozens.
@@ -115,26 +221,19 @@ fn largest(effect: &NamedEffect) -> Vec<(&String, &ParameterEstimate)> {
     all
 }
 
-/// A few lines for people.
+/// All of it, for people.
 fn summary(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
-    let word = match diagnosis.verdict {
-        Verdict::None => "nothing beyond the baseline was found",
-        Verdict::Effect => "the twin lacks an effect",
-        Verdict::Unknown => "there is structure that no effect of the library explains",
-        Verdict::Insufficient => "the data cannot answer",
-    };
-    let _ = writeln!(text, "verdict: {word}");
-    if let Some(plain) = &diagnosis.plain {
-        let _ = writeln!(text, "  {plain}");
-    }
     for effect in &diagnosis.effects {
         let _ = writeln!(text, "  {} (weight {:.2})", effect.name, effect.weight);
         for (name, p) in largest(effect) {
             let unit = if p.unit == "1" { "" } else { &p.unit };
             let end = if p.at_bound { ", at its bound" } else { "" };
-            let _ =
-                writeln!(text, "    {name} = {:.4} {unit} ({:.4} to {:.4}){end}", p.value, p.low90, p.high90);
+            let range = match p.low90 == p.value && p.high90 == p.value {
+                true => "fixed".to_string(),
+                false => format!("{:.4} to {:.4}", p.low90, p.high90),
+            };
+            let _ = writeln!(text, "    {name} = {:.4} {unit} ({range}){end}", p.value);
         }
         let more = effect.parameters.len().saturating_sub(SHOWN);
         if more > 0 {

@@ -1,0 +1,31 @@
+//! Arguments of `gripgen view`.
+
+use super::TalkArgs;
+use clap::Args;
+use std::path::PathBuf;
+
+/// `gripgen view`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  gripgen view runs/quickstart\n  gripgen view measured/ -o monday.html\n  \
+    gripgen view runs/quickstart/shard-00000.mcap --pulls 300"
+)]
+pub struct ViewArgs {
+    /// A run folder, a folder with pulls.csv, or a shard (.mcap).
+    pub data: PathBuf,
+    /// Pulls that are shown with images and curves; of more, the strangest, those that failed, and the others evenly.
+    #[arg(long, value_name = "N", default_value_t = 96, value_parser = clap::value_parser!(u32).range(1..=2000))]
+    pub pulls: u32,
+    /// The page to write; view.html in the folder, or beside the shard, where it is left out.
+    #[arg(short, long, value_name = "PAGE.html")]
+    pub out: Option<PathBuf>,
+    /// Print JSON to standard output, or to FILE: the page and how much of the data it shows.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    pub json: Option<String>,
+    /// Replace files that something else wrote, or that were edited. What is read, runs and measurements are never replaced.
+    #[arg(long)]
+    pub force: bool,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}

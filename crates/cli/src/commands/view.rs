@@ -1,0 +1,56 @@
+//! `gripgen view`: a run, measured pulls or a shard on one page.
+
+use crate::args::ViewArgs;
+use crate::failure::Failure;
+use crate::mark::Format;
+use crate::output::{JsonSink, print, size};
+use crate::outputs::Outputs;
+use gripgen::record::Dataset;
+use gripgen::{ViewOptions, view_page};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Name of the page in a folder.
+const PAGE: &str = "view.html";
+
+/// Runs the verb.
+pub fn run(args: &ViewArgs) -> Result<u8, Failure> {
+    if !args.data.exists() {
+        let none = format!("{}: there is no such file or folder", args.data.display());
+        return Err(Failure::usage(none).hint("name a run folder, a folder with pulls.csv, or a shard"));
+    }
+    let out = args.out.clone().unwrap_or_else(|| beside(&args.data));
+    let mut outputs = Outputs::of("view", args.force).reads(&args.data);
+    outputs.allow(&out)?;
+    let mut sink = JsonSink::open(args.json.as_deref(), &mut outputs)?;
+    let dataset = Dataset::open(&args.data).map_err(Failure::usage)?;
+    let absolute = std::path::absolute(&args.data).unwrap_or_else(|_| args.data.clone());
+    let title =
+        absolute.file_name().map_or_else(|| "pulls".into(), |name| name.to_string_lossy().into_owned());
+    let options = ViewOptions { title, pulls: args.pulls as usize };
+    let page = view_page(&dataset, &options).map_err(Failure::new)?;
+    outputs.write(&out, Format::Html, page.html.as_bytes())?;
+    if !args.talk.quiet {
+        let bytes = size(page.html.len() as u64);
+        eprintln!("{} of {} pulls with images and curves, {bytes}", page.shown, page.pulls);
+    }
+    if sink.wanted() {
+        sink.document(&json!({
+            "schema": "gripgen.view/1", "file": out, "pulls": page.pulls, "shown": page.shown,
+            "bytes": page.html.len(),
+        }))?;
+    }
+    if !sink.on_stdout() && !args.talk.quiet {
+        print(&format!("{}\n", out.display()))?;
+    }
+    Ok(0)
+}
+
+/// In a folder, or beside a shard.
+fn beside(data: &Path) -> PathBuf {
+    if data.is_dir() {
+        return data.join(PAGE);
+    }
+    let stem = data.file_stem().map_or_else(|| "shard".into(), |stem| stem.to_string_lossy().into_owned());
+    data.with_file_name(format!("{stem}-{PAGE}"))
+}
