@@ -29,6 +29,8 @@ mod event_log;
 mod effects;
 // The elastic gel, also beside the pyramid on real presses.
 mod elastic;
+// Films of pulls.
+mod film;
 // Images by a graphics processor are those of the processor, within the tolerance.
 mod gpu;
 mod imprint;

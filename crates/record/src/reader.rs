@@ -2,12 +2,13 @@
 
 mod rig;
 
+use crate::background::Background;
 use crate::mark::MARK_NAME;
 use crate::picture::{PictureError, decode};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::shard::RIG_SOURCE;
-use crate::shard::{CLEAN, LAYOUT_VERSION, METADATA_NAME};
+use crate::shard::{CLEAN, EVEN, LAYOUT_VERSION, METADATA_NAME, rest_name};
 use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use mcap::records::{AttachmentIndex, ChunkIndex, MetadataIndex};
@@ -30,6 +31,8 @@ pub struct ShardReader {
     slot_ns: u64,
     samples: u64,
     first_sample: u64,
+    /// What its images are stored without.
+    background: Option<PerJaw<Background>>,
 }
 
 /// One sample of a shard.
@@ -133,6 +136,14 @@ fn metadata_record(
     Ok(Some(mcap::read::metadata(&record, &at_start)?.metadata))
 }
 
+/// The first attachment of a name.
+fn attachment(file: &File, bytes: u64, summary: &Summary, name: &str) -> Result<Option<Vec<u8>>, McapError> {
+    let Some(index) = summary.attachment_indexes.iter().find(|a| a.name == name) else { return Ok(None) };
+    let record = piece(file, bytes, index.offset, index.length)?;
+    let at_start = AttachmentIndex { offset: 0, ..index.clone() };
+    Ok(Some(mcap::read::attachment(&record, &at_start)?.data.into_owned()))
+}
+
 /// The verb that wrote an MCAP file which is no shard of a run; `None` where nobody marked it.
 pub fn mcap_mark(path: &Path) -> Option<String> {
     let (file, bytes) = open_mcap(path).ok()?;
@@ -172,7 +183,18 @@ impl ShardReader {
         if slot_ns == 0 {
             return Err(foreign("its time slots are 0 ns long".into()));
         }
-        Ok(Self { path: path.into(), file, bytes, summary, slot_ns, samples, first_sample, metadata })
+        let background = match metadata.get("background").map(String::as_str) {
+            None => None,
+            Some(EVEN) => Some(PerJaw::try_from_fn(|jaw| {
+                let png = attachment(&file, bytes, &summary, rest_name(jaw))
+                    .map_err(bad)?
+                    .ok_or_else(|| foreign(format!("it has no attachment `{}`", rest_name(jaw))))?;
+                decode(&png).map(Background::new).map_err(|e| foreign(format!("{}: {e}", rest_name(jaw))))
+            })?),
+            Some(other) => return Err(foreign(format!("its images are without a background `{other}`"))),
+        };
+        let path = path.into();
+        Ok(Self { path, file, bytes, summary, slot_ns, samples, first_sample, metadata, background })
     }
 
     /// What the shard says about itself.
@@ -188,6 +210,11 @@ impl ShardReader {
     /// Whether its samples have images.
     pub fn has_images(&self) -> bool {
         self.summary.channels.values().any(|c| c.topic.starts_with("/tactile/"))
+    }
+
+    /// Whether it has a topic.
+    pub(crate) fn has_topic(&self, topic: &str) -> bool {
+        self.summary.channels.values().any(|c| c.topic == topic)
     }
 
     /// Whether these are stored without their noise, which every reader here adds.
@@ -212,17 +239,10 @@ impl ShardReader {
     /// A file that cannot be read.
     pub fn config_toml(&self) -> Result<String, ReadError> {
         let foreign = |problem: &str| ReadError::Foreign { path: self.path.clone(), problem: problem.into() };
-        let index = self
-            .summary
-            .attachment_indexes
-            .iter()
-            .find(|a| a.name == "config.toml")
+        let text = attachment(&self.file, self.bytes, &self.summary, "config.toml")
+            .map_err(|source| ReadError::Mcap { path: self.path.clone(), source })?
             .ok_or_else(|| foreign("it has no attachment `config.toml`"))?;
-        let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
-        let record = piece(&self.file, self.bytes, index.offset, index.length).map_err(bad)?;
-        let at_start = AttachmentIndex { offset: 0, ..index.clone() };
-        let attachment = mcap::read::attachment(&record, &at_start).map_err(bad)?;
-        String::from_utf8(attachment.data.into_owned()).map_err(|_| foreign("its configuration is not text"))
+        String::from_utf8(text).map_err(|_| foreign("its configuration is not text"))
     }
 
     /// The `/sample` message of a sample, without its images and trace.
@@ -256,6 +276,7 @@ impl ShardReader {
                 PerJaw::try_from_fn(|jaw| {
                     let image = if raw.raw_images { raw_image(&both[jaw]) } else { png_image(&both[jaw]) };
                     let mut image = image.map_err(|problem| bad(&format!("/tactile/{jaw}"), problem))?;
+                    self.put_back(jaw, &mut image.rgb);
                     if let Some(noise) = noise_apart(&sample, jaw) {
                         noise.add(&mut image.rgb);
                     }
@@ -271,6 +292,13 @@ impl ShardReader {
             })
             .transpose()?;
         Ok(Record { sample, images, trace })
+    }
+
+    /// Puts back what an image was stored without, but for its noise.
+    pub(crate) fn put_back(&self, jaw: Jaw, rgb: &mut [u8]) {
+        if let Some(background) = &self.background {
+            background[jaw].put_back(rgb);
+        }
     }
 
     /// The `/sample` message of a sample and its force over time, where it is stored, without its images.
@@ -350,8 +378,32 @@ impl ShardReader {
         Ok(())
     }
 
+    /// The same for every message of its film, with the time of each. The film has a chunk of its own.
+    pub(crate) fn each_film_message(
+        &self,
+        index: u64,
+        mut visit: impl FnMut(&str, u64, &[u8]),
+    ) -> Result<(), ReadError> {
+        let channels = &self.summary.channels;
+        let filmed = |id: &u16| channels.get(id).is_some_and(|c| c.topic.ends_with("/film"));
+        for chunk in self.slot_of(index)?.filter(|c| c.message_index_offsets.keys().any(filmed)) {
+            self.each_timed_in(chunk, index, |topic, time_ns, data| {
+                visit(topic, time_ns, data);
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
     /// Chunks of a sample whose messages are all from the start of its slot.
     fn chunks_of(&self, index: u64) -> Result<impl Iterator<Item = &ChunkIndex>, ReadError> {
+        let slot = self.slot_of(index)?;
+        let start = (index - self.first_sample) * self.slot_ns;
+        Ok(slot.filter(move |c| c.message_end_time == start))
+    }
+
+    /// All chunks of a sample.
+    fn slot_of(&self, index: u64) -> Result<impl Iterator<Item = &ChunkIndex>, ReadError> {
         if !self.indices().contains(&index) {
             let (first, end) = (self.first_sample, self.first_sample + self.samples);
             return Err(ReadError::NoSample { path: self.path.clone(), sample: index, first, end });
@@ -360,8 +412,7 @@ impl ShardReader {
         // Chunks are written in the order of their samples.
         let chunks = &self.summary.chunk_indexes;
         let first = chunks.partition_point(|c| c.message_start_time < start);
-        let slot = chunks[first..].iter().take_while(move |c| c.message_start_time < start + self.slot_ns);
-        Ok(slot.filter(move |c| c.message_end_time == start))
+        Ok(chunks[first..].iter().take_while(move |c| c.message_start_time < start + self.slot_ns))
     }
 
     fn each_message_in(
@@ -370,13 +421,22 @@ impl ShardReader {
         index: u64,
         mut visit: impl FnMut(&str, &[u8]) -> Result<(), String>,
     ) -> Result<(), ReadError> {
+        self.each_timed_in(chunk, index, |topic, _, data| visit(topic, data))
+    }
+
+    fn each_timed_in(
+        &self,
+        chunk: &ChunkIndex,
+        index: u64,
+        mut visit: impl FnMut(&str, u64, &[u8]) -> Result<(), String>,
+    ) -> Result<(), ReadError> {
         let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
         let record =
             piece(&self.file, self.bytes, chunk.chunk_start_offset, chunk.chunk_length).map_err(bad)?;
         let at_start = ChunkIndex { chunk_start_offset: 0, ..chunk.clone() };
         for message in self.summary.stream_chunk(&record, &at_start).map_err(bad)? {
             let message = message.map_err(bad)?;
-            visit(&message.channel.topic, &message.data)
+            visit(&message.channel.topic, message.log_time, &message.data)
                 .map_err(|problem| self.damaged(index, &message.channel.topic, &problem))?;
         }
         Ok(())
@@ -444,7 +504,7 @@ pub(crate) fn noise_apart(sample: &Sample, jaw: Jaw) -> Option<PixelNoise> {
     noise.as_ref().map(|n| PixelNoise { key: n.key, sd_rgb: [n.red, n.green, n.blue] })
 }
 
-fn raw_image(data: &[u8]) -> Result<TactileImage, String> {
+pub(crate) fn raw_image(data: &[u8]) -> Result<TactileImage, String> {
     let raw = RawImage::decode(data).map_err(|e| e.to_string())?;
     let bytes = 3 * raw.width as usize * raw.height as usize;
     if raw.encoding != "rgb8" || raw.data.len() != bytes {
@@ -453,7 +513,7 @@ fn raw_image(data: &[u8]) -> Result<TactileImage, String> {
     Ok(TactileImage { width_px: raw.width, height_px: raw.height, rgb: raw.data })
 }
 
-fn png_image(data: &[u8]) -> Result<TactileImage, String> {
+pub(crate) fn png_image(data: &[u8]) -> Result<TactileImage, String> {
     let compressed = CompressedImage::decode(data).map_err(|e| e.to_string())?;
     decode(&compressed.data).map_err(|e: PictureError| e.to_string())
 }
