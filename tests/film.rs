@@ -138,7 +138,7 @@ fn cells_of_the_engine_carry_its_force() {
 /// A run with films has the samples of one without, the same bytes for any number of threads, and reads back.
 #[test]
 fn films_are_stored_beside_what_there_is() {
-    let sets = ["mechanics=reduced", "samples=2", "shard_samples=2"];
+    let sets = ["mechanics=reduced", "vary.part=[\"gear\"]", "vary.grip_force_n=[20, 25]"];
     let film = "images={storage=\"clean\", during_pull={frames=4}}";
     let plain = small_project(&[&sets[..], &["images=clean"]].concat());
     let filmed = small_project(&[&sets[..], &[film]].concat());

@@ -270,7 +270,7 @@ fn the_index_speaks_the_language_of_pull_tables() {
 /// Frames that are stored small are those of `images = "clean"` when they are read, alone and as a data set.
 #[test]
 fn small_frames_are_read_as_they_were_made() {
-    let sets = ["mechanics=reduced", "samples=2", "shard_samples=2", "trace=none"];
+    let sets = ["mechanics=reduced", "vary.part=[\"gear\"]", "vary.grip_force_n=[20, 25]", "trace=none"];
     let clean = small_project(&[&sets[..], &["images=clean"]].concat());
     let small = small_project(&[&sets[..], &["images={storage=\"clean\", compression=\"small\"}"]].concat());
     let [a, b] = [0, 1].map(|_| tempfile::tempdir().unwrap());

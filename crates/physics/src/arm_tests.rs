@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::setup::Mount;
-use crate::tests::{Bench, STEP_S, assert_clones_agree, hull_of_64, shapes};
+use crate::tests::{Bench, STEP_S, assert_clones_agree, check_take_over, hull_of_64, shapes};
 use gripgen_twin::config::{Document, Feedback, Mechanics};
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};

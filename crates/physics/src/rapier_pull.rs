@@ -22,8 +22,9 @@ const AT_LIMIT: f64 = 0.99;
 /// takes what the arm applies. Well below the limit, so that all that can happen near a slip happens in the engine.
 const HELD_SHARE: f64 = 0.8;
 
-/// Steps in which the engine takes over the force that the jaws hold.
-const TAKE_OVER_STEPS: u32 = 16;
+/// Steps in which the engine takes over the force that the jaws hold, and steps in which it comes to rest under it: pads drift a
+/// little as their force rises.
+const TAKE_OVER_STEPS: (u32, u32) = (16, 24);
 
 /// Speed below which sliding jaws stick again.
 const STICKING_M_PER_S: f64 = 1e-5;
@@ -147,12 +148,13 @@ impl RapierPull {
         self.advance_engine(applied_n, step_s)
     }
 
-    /// Brings the engine to the force that is held, without time: in even steps, the arm told what the contact takes.
+    /// Brings the engine to the force that is held, without time: in even steps and some at rest, the arm told what the contact takes.
     fn take_over(&mut self, step_s: f64) -> Result<(), NotFinite> {
         self.held = false;
         let held_n = self.contact_force_n;
-        for i in 1..=TAKE_OVER_STEPS {
-            let force_n = held_n * f64::from(i) / f64::from(TAKE_OVER_STEPS);
+        let (rise, rest) = TAKE_OVER_STEPS;
+        for i in 1..=rise + rest {
+            let force_n = held_n * (f64::from(i) / f64::from(rise)).min(1.0);
             self.contact_force_n = force_n;
             self.rig.arm.expect(force_n);
             self.advance_engine(force_n, step_s)?;

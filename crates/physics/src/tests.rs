@@ -363,19 +363,19 @@ pub(crate) fn check_take_over(name: &str, bench: &Bench) {
     let label = |r: &StaircaseResult| slip_label(&r.trace, 3.0, r.slid).unwrap();
     let (wanted, found) = (label(&alone), label(&after));
     let off = found.max_pull_force_n / wanted.max_pull_force_n - 1.0;
-    println!("{name}: label {:.4} % off, {:.3} s", 100.0 * off, found.slip_time_s - wanted.slip_time_s);
-    assert!(off.abs() < 5e-4, "{name}: {:.4} %", 100.0 * off);
+    let (mut force_n, mut way_m) = (0.0_f64, 0.0_f64);
     for (a, b) in after.trace.rows().zip(alone.trace.rows()) {
-        if b.measured_force_n < 0.98 * 20.0 && b.time_s < wanted.slip_time_s - 0.5 {
+        if b.time_s < wanted.slip_time_s - 0.5 {
             let apart = (a.measured_force_n - b.measured_force_n).abs();
-            assert!(apart < 0.01, "{name}, {} s: {apart} N apart", b.time_s);
-            assert!(
-                (a.displacement_m - b.displacement_m).abs() < 10e-6,
-                "{name}, {} s: {a:?} {b:?}",
-                b.time_s
-            );
+            force_n = force_n.max(apart);
+            way_m = way_m.max((a.displacement_m - b.displacement_m).abs());
         }
     }
+    let later_s = found.slip_time_s - wanted.slip_time_s;
+    println!("{name}: {:.4} % off, {later_s:.3} s later, {force_n:.3} N, {:.1} um", 100.0 * off, way_m * 1e6);
+    assert!(off.abs() < 5e-4, "{name}: {:.4} %", 100.0 * off);
+    // The engine alone rings by 0.2 N where the force begins to rise, and drifts by 1 um per newton.
+    assert!(force_n < 0.25 && way_m < 20e-6, "{name}: {force_n} N, {way_m} m");
 }
 
 /// Trap: contact impulses were once over-counted by one solver iteration. A part that hangs in the jaws at rest
