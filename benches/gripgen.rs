@@ -175,6 +175,7 @@ fn record(c: &mut Criterion) {
             view_rate_hz: Some(VIEW_RATE_HZ),
             extra_columns: vec![],
             noise_apart_rgb: None,
+            background: None,
             first_sample: 0,
             slot_ns: 61_000_000_000,
         };

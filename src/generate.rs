@@ -1,20 +1,23 @@
 //! One sample: from a scenario to images, trace and label.
 
+use crate::film::{Film, Seen};
 use crate::gpu::Gpu;
 use crate::gripped::{Contact, Gripped, grip_point};
 use crate::hold::hold;
 use crate::library::Library;
 use crate::project::Project;
 use crate::sample::{SampleError, SimulateOptions};
-use gripgen_physics::{JawFriction, PullSession, Signals, Until, pull_staircase, staircase_of};
+use gripgen_physics::{
+    JawFriction, PullSession, PullState, Signals, Until, pull_staircase_seen, staircase_of,
+};
 use gripgen_tactile::{Imprint, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::evidence::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    ContactPatch, FrictionError, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled, Sample,
-    Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
+    ContactPatch, FilmPace, FrictionError, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled,
+    Sample, Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
 };
 use std::sync::Arc;
 
@@ -28,12 +31,21 @@ pub struct GripImprints {
 
 /// Simulates sample `index` of a sweep. Depends on the project and the index alone; `level` changes no bit.
 pub fn generate(project: &Project, index: u64, level: SimdLevel) -> Sample {
+    made(project, index, level, None).0
+}
+
+/// The same with the film of its pull, where the sweep has films and the pull took place.
+pub fn generate_filmed(project: &Project, index: u64, level: SimdLevel) -> (Sample, Option<Film>) {
+    made(project, index, level, project.sweep.film)
+}
+
+fn made(project: &Project, index: u64, level: SimdLevel, film: Option<FilmPace>) -> (Sample, Option<Film>) {
     let mut scenario = drawn_scenario(project, index);
-    let outcome = try_generate(project, index, level, &mut scenario).unwrap_or_else(|e| {
+    let (outcome, film) = try_generate(project, index, level, &mut scenario, film).unwrap_or_else(|e| {
         let reason = format!("{e} (sample {index}, seed {})", project.sweep.seed);
-        Outcome::Failed { reason }
+        (Outcome::Failed { reason }, None)
     });
-    Sample { scenario, outcome }
+    (Sample { scenario, outcome }, film)
 }
 
 /// What is known of a sample before its own twin is: enough to record one that fails.
@@ -46,7 +58,8 @@ fn try_generate(
     index: u64,
     level: SimdLevel,
     known: &mut Scenario,
-) -> Result<Outcome, SampleError> {
+    film: Option<FilmPace>,
+) -> Result<(Outcome, Option<Film>), SampleError> {
     let twin = project.twin_of(index)?;
     let (scenario, usable) = project.sweep.scenario(index, &twin);
     *known = scenario;
@@ -59,7 +72,8 @@ fn try_generate(
         _ => project.grips.get((known.group, options), grip)?,
     };
     let gpu = if options.images { project.gpu()? } else { None };
-    pull(&twin, known, &gripped, options, gpu)
+    let Some(pace) = film else { return Ok((pull(&twin, known, &gripped, options, gpu, |_| {})?, None)) };
+    filmed(&twin, &project.library, known, &gripped, options, pace)
 }
 
 /// Simulates one scenario on a twin. `gpu` makes the images where `options` say so.
@@ -74,7 +88,7 @@ pub fn simulate(
     options: SimulateOptions,
     gpu: Option<&Gpu>,
 ) -> Result<Outcome, SampleError> {
-    pull(twin, scenario, &Gripped::new(twin, library, scenario, options)?, options, gpu)
+    pull(twin, scenario, &Gripped::new(twin, library, scenario, options)?, options, gpu, |_| {})
 }
 
 /// The same of a grip that is there, without images.
@@ -84,7 +98,7 @@ pub(crate) fn pull_gripped(
     gripped: &Gripped,
     options: SimulateOptions,
 ) -> Result<Outcome, SampleError> {
-    pull(twin, scenario, gripped, SimulateOptions { images: false, ..options }, None)
+    pull(twin, scenario, gripped, SimulateOptions { images: false, ..options }, None, |_| {})
 }
 
 /// A grip that is ready to pull.
@@ -122,17 +136,25 @@ pub(crate) fn pull_session(
     scenario: &Scenario,
     contact: &Contact,
 ) -> Result<(PullSession, PerJaw<GripFriction>, f64), SampleError> {
-    let Contact { held, imprint, .. } = contact;
-    let patches = PerJaw::from_fn(|jaw| &imprint[jaw].patch);
-    let law = PatchFriction::new(twin, scenario, &patches)?;
-    let scatter = scatter(&twin.parts[&scenario.part], scenario) * table_factor(twin, scenario);
-    let friction = law.held(twin, scenario, &patches, scatter);
+    let (friction, law, scatter) = held_friction(twin, scenario, contact)?;
     let signals = Signals {
         noise: Stream::new(scenario.seed, scenario.index, Purpose::ForceNoise),
         sensor: sensor_chain(twin, scenario),
         command: CommandChain::new(twin, &scenario.part),
     };
-    Ok(((**held).clone().pull(&friction, signals), law.law, scatter))
+    Ok(((*contact.held).clone().pull(&friction, signals), law, scatter))
+}
+
+/// What the jaws hold in this repetition, the friction laws of both, and the factor of its scatter.
+fn held_friction(
+    twin: &Twin,
+    scenario: &Scenario,
+    contact: &Contact,
+) -> Result<(PerJaw<JawFriction>, PerJaw<GripFriction>, f64), SampleError> {
+    let patches = PerJaw::from_fn(|jaw| &contact.imprint[jaw].patch);
+    let law = PatchFriction::new(twin, scenario, &patches)?;
+    let scatter = scatter(&twin.parts[&scenario.part], scenario) * table_factor(twin, scenario);
+    Ok((law.held(twin, scenario, &patches, scatter), law.law, scatter))
 }
 
 /// The wrist sensor of a pull, with what tables of the twin add to its readings.
@@ -175,13 +197,41 @@ impl PatchFriction {
     }
 }
 
-/// The second half of a sample: friction of this repetition, pull, label, image noise.
+/// A pull and its film.
+fn filmed(
+    twin: &Twin,
+    library: &Library,
+    scenario: &Scenario,
+    gripped: &Gripped,
+    options: SimulateOptions,
+    pace: FilmPace,
+) -> Result<(Outcome, Option<Film>), SampleError> {
+    let mut states = Vec::new();
+    // A film goes to the end of the pull, whether its trace is stored or not.
+    let whole = SimulateOptions { trace: true, ..options };
+    let mut outcome = pull(twin, scenario, gripped, whole, None, |state| states.push(*state))?;
+    let (Outcome::Pulled(pulled), Some(contact)) = (&mut outcome, &gripped.contact) else {
+        return Ok((outcome, None));
+    };
+    if !options.trace {
+        // Only a trace that is stored is evidence.
+        pulled.suspect = None;
+    }
+    let friction = held_friction(twin, scenario, contact)?.0;
+    let seen = Seen { states: &states, trace: &pulled.trace, friction: &friction };
+    let film = Film::new(twin, library, scenario, gripped, contact, options, pace, &seen)?;
+    Ok((outcome, Some(film)))
+}
+
+/// The second half of a sample: friction of this repetition, pull, label, image noise. `see` is called with each state of
+/// the pull.
 fn pull(
     twin: &Twin,
     scenario: &Scenario,
     gripped: &Gripped,
     options: SimulateOptions,
     gpu: Option<&Gpu>,
+    see: impl FnMut(&PullState),
 ) -> Result<Outcome, SampleError> {
     let images =
         if options.images { Some(gripped.images(twin, scenario, options.noise, gpu)?) } else { None };
@@ -192,7 +242,7 @@ fn pull(
     let mut jitter = Stream::new(scenario.seed, scenario.index, Purpose::StepJitter);
     let staircase = staircase_of(&scenario.pull, &mut jitter);
     let until = if options.trace { Until::Stopped } else { Until::Decided };
-    let result = pull_staircase(&mut session, &staircase, &scenario.pull, until)?;
+    let result = pull_staircase_seen(&mut session, &staircase, &scenario.pull, until, see)?;
     let label = slip_label(&result.trace, scenario.pull.label_tolerance_n, result.slid)?;
     // A pull that ends as soon as its label is decided has no whole trace.
     let suspect = if options.trace { suspect_simulated(twin, scenario, &result.trace, &label) } else { None };

@@ -194,6 +194,11 @@ impl<'a> Indenter<'a> {
         })
     }
 
+    /// The part in front of a gel.
+    pub(crate) fn part(&self, jaw: Jaw) -> &PlacedPart {
+        &self.parts[jaw]
+    }
+
     fn renderer(&self, jaw: Jaw) -> Renderer<'_> {
         Renderer { sensor: &self.sensors[jaw], gel: &self.twin.gel[jaw], level: self.level }
     }

@@ -51,6 +51,7 @@ mod compare_images;
 mod compare_report;
 mod diagnose;
 mod expect;
+mod film;
 mod generate;
 mod gpu;
 mod gripped;
@@ -105,7 +106,8 @@ pub use diagnose::{
     diagnose_sensor_table, given_model, imprint_calibration_edits, is_sensor_table, load_sensor_table,
     measured_presses, sensor_calibration_edits,
 };
-pub use generate::{GripImprints, StartedPull, generate, press_only, simulate, start_pull};
+pub use film::Film;
+pub use generate::{GripImprints, StartedPull, generate, generate_filmed, press_only, simulate, start_pull};
 pub use gpu::Gpu;
 pub use gripgen_identify as identify;
 pub use gripgen_physics as physics;

@@ -2,6 +2,7 @@
 
 mod canvas;
 mod colours;
+mod film;
 mod layout;
 mod paper;
 mod plot;

@@ -4,8 +4,8 @@ use crate::generate::drawn_scenario;
 use crate::gripped::try_grip;
 use crate::project::Project;
 use crate::sample::SampleError;
-use crate::sweep::{SweepError, encode_options, guarded};
-use gripgen_record::encode;
+use crate::sweep::{SweepError, encode_filmed, guarded};
+use gripgen_record::EncodedFrame;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::GelModel;
@@ -83,11 +83,12 @@ pub fn plan(project: &Project, simd: SimdLevel) -> Result<Plan, SweepError> {
     let start = Instant::now();
     for i in 0..probes {
         let index = ((i as f64 + 0.5) / probes as f64 * samples as f64) as u64;
-        let sample = guarded(project, index, simd);
-        let encoded = encode(&sample, &encode_options(project, index))?;
+        let (sample, film) = guarded(project, index, simd);
+        let encoded = encode_filmed(project, &sample, film.as_ref())?;
         bytes += encoded.sample.len()
             + encoded.images.as_ref().map_or(0, |both| both.left.len() + both.right.len())
             + encoded.trace.as_ref().map_or(0, Vec::len)
+            + encoded.film.iter().map(EncodedFrame::bytes).sum::<usize>()
             + encoded.states.iter().map(|s| s.data.len() + 31).sum::<usize>();
         let (mut failure, mut lag_exceeds_tolerance, mut pressure_over_modulus) = (None, false, None);
         match sample.outcome {

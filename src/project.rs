@@ -9,12 +9,13 @@ use crate::location::{Location, ReadFileError};
 use crate::resolve::{Files, Named, Resolved, config_hash, is_file_key, resolve};
 use crate::sample::SimulateOptions;
 use crate::version::VERSION;
-use gripgen_record::{RunFolder, sha256_hex};
+use gripgen_record::{Background, RunFolder, sha256_hex};
+use gripgen_tactile::finish;
 use gripgen_tactile::gpu::GpuError;
-use gripgen_twin::config::{Backend, ConfigError, Document, ImageStorage, SweepFile};
-use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, Posterior, RobotArm, Sweep, Twin, is_twin_key};
+use gripgen_twin::config::{Backend, Compression, ConfigError, Document, ImageStorage, SweepFile};
+use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, PerJaw, Posterior, RobotArm, Sweep, Twin, is_twin_key};
 use std::borrow::Cow;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// The twin whose sections stand in for what a twin leaves out, and the default of `--twin`.
 pub const BASELINE_TWIN: &str = "asset:configs/twin-baseline.toml";
@@ -38,6 +39,8 @@ pub struct Project {
     pub(crate) grips: Cache<(u64, SimulateOptions), Gripped>,
     /// The graphics processor of `backend = "gpu"`, opened when it is first needed.
     gpu: OnceLock<Result<Gpu, GpuError>>,
+    /// What images are stored without, made when it is first needed.
+    background: OnceLock<Option<Arc<PerJaw<Background>>>>,
     /// The configuration as it was resolved: sweep and twin with all defaults and overrides.
     pub config_toml: String,
     /// SHA-256 of everything a sample is a function of, beside gripgen's version.
@@ -185,6 +188,20 @@ impl Project {
         opened.as_ref().map(Some).map_err(Clone::clone)
     }
 
+    /// What images are stored without under `compression = "small"`.
+    pub(crate) fn background(&self) -> Option<Arc<PerJaw<Background>>> {
+        if self.sweep.compression == Compression::Fast {
+            return None;
+        }
+        let made = self.background.get_or_init(|| {
+            // Without its sensors a sweep has no images.
+            let of = |jaw: Jaw| self.library.sensor(&self.twin.optics[jaw]);
+            let both = PerJaw::try_from_fn(|jaw| of(jaw).map(|s| Background::new(finish(&s, None, None))));
+            both.ok().map(Arc::new)
+        });
+        made.clone()
+    }
+
     /// Opens the graphics processor, if images are made there, and puts both sensors on it: what cannot be done shows
     /// before anything is written.
     pub(crate) fn prepare_gpu(&self) -> Result<Option<&Gpu>, GpuError> {
@@ -233,8 +250,19 @@ impl Project {
         let twin_table = twin_document.table().clone();
         let library = Library::new(files);
         let grips = Cache::new(GRIPS);
-        let gpu = OnceLock::new();
-        Ok(Self { name, sweep, twin, twin_table, library, grips, gpu, config_toml, config_sha256 })
+        let (gpu, background) = (OnceLock::new(), OnceLock::new());
+        Ok(Self {
+            name,
+            sweep,
+            twin,
+            twin_table,
+            library,
+            grips,
+            gpu,
+            background,
+            config_toml,
+            config_sha256,
+        })
     }
 
     /// Builds the arm in every stance that its varied keys can draw, and checks the force loop against its mass.

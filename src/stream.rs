@@ -178,7 +178,8 @@ impl Shared {
     }
 
     fn make(&self, index: u64) -> Made {
-        let sample = guarded(&self.project, index, SimdLevel::best());
+        // A film is what a data set is for: batches have none.
+        let sample = guarded(&self.project, index, SimdLevel::best()).0;
         let gpu = self.project.gpu().map_err(Arc::new)?;
         if let Some(fault) = gpu.and_then(|gpu| gpu.fault()) {
             return Err(Arc::new(fault).into());

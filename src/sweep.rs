@@ -4,7 +4,8 @@ pub(crate) mod differences;
 mod pipeline;
 mod shards;
 
-use crate::generate::{drawn_scenario, generate};
+use crate::film::Film;
+use crate::generate::{drawn_scenario, generate_filmed};
 use crate::project::Project;
 use crate::version::VERSION;
 use differences::differences;
@@ -16,7 +17,7 @@ use gripgen_tactile::SimdLevel;
 use gripgen_tactile::gpu::{GpuAdapter, GpuError};
 use gripgen_twin::{Outcome, Sample};
 use pipeline::Run;
-pub(crate) use shards::{encode_options, noise_rgb};
+pub(crate) use shards::{encode_filmed, encode_options, noise_rgb};
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -250,8 +251,8 @@ fn samples_of_shard(project: &Project, shard: u64) -> u64 {
 }
 
 /// Generates a sample; a panic (a bug, or the engine's) fails that sample instead of losing the run.
-pub(crate) fn guarded(project: &Project, index: u64, simd: SimdLevel) -> Sample {
-    catch_unwind(AssertUnwindSafe(|| generate(project, index, simd))).unwrap_or_else(|panic| {
+pub(crate) fn guarded(project: &Project, index: u64, simd: SimdLevel) -> (Sample, Option<Film>) {
+    catch_unwind(AssertUnwindSafe(|| generate_filmed(project, index, simd))).unwrap_or_else(|panic| {
         let what = panic
             .downcast_ref::<String>()
             .map(String::as_str)
@@ -259,6 +260,6 @@ pub(crate) fn guarded(project: &Project, index: u64, simd: SimdLevel) -> Sample 
             .unwrap_or("unknown panic");
         let seed = project.sweep.seed;
         let reason = format!("internal error: {what} (sample {index}, seed {seed}); please report it");
-        Sample { scenario: drawn_scenario(project, index), outcome: Outcome::Failed { reason } }
+        (Sample { scenario: drawn_scenario(project, index), outcome: Outcome::Failed { reason } }, None)
     })
 }

@@ -266,3 +266,38 @@ fn the_index_speaks_the_language_of_pull_tables() {
         assert!(INDEX_COLUMNS.contains(&column), "{column}");
     }
 }
+
+/// Frames that are stored small are those of `images = "clean"` when they are read, alone and as a data set.
+#[test]
+fn small_frames_are_read_as_they_were_made() {
+    let sets = ["mechanics=reduced", "vary.part=[\"gear\"]", "vary.grip_force_n=[20, 25]", "trace=none"];
+    let clean = small_project(&[&sets[..], &["images=clean"]].concat());
+    let small = small_project(&[&sets[..], &["images={storage=\"clean\", compression=\"small\"}"]].concat());
+    let [a, b] = [0, 1].map(|_| tempfile::tempdir().unwrap());
+    run(&clean, a.path(), jobs(2));
+    run(&small, b.path(), jobs(2));
+    assert!(verify(b.path(), |_| {}).unwrap().faults.is_empty());
+    let open =
+        |folder: &tempfile::TempDir| ShardReader::open(&folder.path().join("shard-00000.mcap")).unwrap();
+    let sets = [&a, &b].map(|folder| gripgen::record::Dataset::open(folder.path()).unwrap());
+    for index in 0..2 {
+        let (plain, found) = (open(&a).record(index).unwrap(), open(&b).record(index).unwrap());
+        assert!(plain == found, "sample {index}");
+        let size = 2 * 3 * 320 * 240;
+        let [mut plain, mut found] = [vec![0; size], vec![0; size]];
+        sets[0].images_into(index as usize, &mut plain).unwrap();
+        sets[1].images_into(index as usize, &mut found).unwrap();
+        assert!(plain == found, "row {index}");
+        let pngs = sets.each_ref().map(|set| set.images_png(index as usize).unwrap());
+        assert!(pngs[0] == pngs[1]);
+    }
+    let bytes = |index: usize| {
+        let message = |folder: &tempfile::TempDir| {
+            let path = folder.path().join("shard-00000.mcap");
+            std::fs::metadata(path).unwrap().len()
+        };
+        message(if index == 0 { &a } else { &b })
+    };
+    println!("{} bytes clean, {} small", bytes(0), bytes(1));
+    assert!(open(&b).has_clean_images() && open(&b).metadata()["background"] == "even");
+}

@@ -33,6 +33,8 @@ mod fuzz_parts;
 mod effects;
 // The elastic gel, also beside the pyramid on real presses.
 mod elastic;
+// Films of pulls.
+mod film;
 // Images by a graphics processor are those of the processor, within the tolerance.
 mod gpu;
 mod imprint;

@@ -2,6 +2,7 @@
 
 use super::canvas::{Anchor, Canvas, TextStyle};
 use super::colours::{INK, PAPER, SLIP, SOFT_INK, scale};
+use super::film::{STRIP_HEIGHT, draw_strip};
 use super::layout::{
     CAPTION, CURVE_HEIGHT, HEADER, IMAGE, MARGIN, draw_curve, fit, frame, pixel, placement, second_line,
 };
@@ -54,7 +55,9 @@ pub fn sample_picture(folder: &RunFolder, index: u64) -> Result<Vec<u8>, Picture
     let press = press_again(folder, index);
     let columns = 4;
     let width = columns * (IMAGE.0 + MARGIN) + MARGIN;
-    let height = HEADER + CAPTION + IMAGE.1 + MARGIN + CAPTION + CURVE_HEIGHT + MARGIN;
+    let film = reader.film(index)?;
+    let plain = HEADER + CAPTION + IMAGE.1 + MARGIN + CAPTION + CURVE_HEIGHT + MARGIN;
+    let height = plain + if film.is_some() { STRIP_HEIGHT } else { 0 };
     let mut canvas = Canvas::new(width, height, PAPER);
     let s = &record.sample;
     canvas.text(&heading(s), f64::from(MARGIN), 10.0, Anchor::Left, TextStyle::title(INK));
@@ -65,6 +68,9 @@ pub fn sample_picture(folder: &RunFolder, index: u64) -> Result<Vec<u8>, Picture
         draw_jaw(&mut canvas, (x, top), jaw, &record, press.as_ref());
     }
     draw_curve(&mut canvas, top + CAPTION + IMAGE.1 + MARGIN, width, &record);
+    if let Some(film) = &film {
+        draw_strip(&mut canvas, plain, film);
+    }
     Ok(canvas.into_png())
 }
 

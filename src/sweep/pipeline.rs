@@ -2,10 +2,10 @@
 
 use super::shards::OpenShard;
 use super::{
-    SweepError, SweepEvent, SweepOptions, SweepSummary, count, encode_options, guarded, samples_of_shard,
+    SweepError, SweepEvent, SweepOptions, SweepSummary, count, encode_filmed, guarded, samples_of_shard,
 };
 use crate::project::Project;
-use gripgen_record::{EncodedSample, FolderError, PartialShard, RunFolder, ShardStart, Sidecar, encode};
+use gripgen_record::{EncodedSample, FolderError, PartialShard, RunFolder, ShardStart, Sidecar};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -121,13 +121,12 @@ impl Run<'_> {
     }
 
     fn make_sample(&self, index: u64) -> Result<EncodedSample, SweepError> {
-        let options = encode_options(self.project, index);
-        let sample = guarded(self.project, index, self.options.simd);
+        let (sample, film) = guarded(self.project, index, self.options.simd);
         // A device that is lost is no fault of the sample: the run stops and can be continued.
         if let Some(fault) = self.project.gpu()?.and_then(|gpu| gpu.fault()) {
             return Err(fault.into());
         }
-        Ok(encode(&sample, &options)?)
+        Ok(encode_filmed(self.project, &sample, film.as_ref())?)
     }
 
     /// The writer: puts samples into shards in order.

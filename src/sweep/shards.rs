@@ -2,15 +2,16 @@
 
 use super::pipeline::Run;
 use super::{SweepError, SweepEvent, SweepSummary, count, samples_of_shard};
+use crate::film::Film;
 use crate::project::Project;
 use crate::version::VERSION;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_record::{
-    EncodeOptions, EncodedSample, INDEX_COLUMNS, PartialShard, ShardError, ShardInfo, ShardWriter,
-    VIEW_RATE_HZ, extra_columns,
+    EncodeOptions, EncodedSample, FilmOptions, INDEX_COLUMNS, PartialShard, PictureError, ShardError,
+    ShardInfo, ShardWriter, VIEW_RATE_HZ, encode, encode_frame, extra_columns,
 };
-use gripgen_twin::PerJaw;
 use gripgen_twin::config::{ImageNoise, ImageStorage};
+use gripgen_twin::{PerJaw, Sample};
 use std::io::BufWriter;
 
 /// A shard being written.
@@ -26,7 +27,14 @@ impl OpenShard {
     pub(super) fn new(project: &Project, shard: u64, partial: PartialShard) -> Result<Self, SweepError> {
         let info = shard_info(project, shard);
         let file = partial.duplicate()?;
-        let writer = match ShardWriter::new(BufWriter::new(file), &info, project.sweep.images) {
+        let images = project.sweep.images;
+        let background = project.background();
+        let writer = ShardWriter::without(BufWriter::new(file), &info, images, background.as_deref());
+        let writer = match project.sweep.film {
+            None => writer,
+            Some(_) => writer.and_then(|writer| writer.with_films(images)),
+        };
+        let writer = match writer {
             Ok(writer) => writer,
             Err(e) => return Err(lost(partial, e)),
         };
@@ -86,6 +94,28 @@ fn failure_of(row: &[String]) -> &str {
     &row[at]
 }
 
+/// Encodes a sample, and its film where there is one. A film ends where the part has left the window, or is pressed through the gel
+/// there.
+pub(crate) fn encode_filmed(
+    project: &Project,
+    sample: &Sample,
+    film: Option<&Film>,
+) -> Result<EncodedSample, PictureError> {
+    let mut encoded = encode(sample, &encode_options(project, sample.scenario.index))?;
+    let Some(film) = film else { return Ok(encoded) };
+    let options = FilmOptions {
+        images: project.sweep.images,
+        start_ns: encoded.start_ns,
+        incipient_slip_s: film.incipient_slip_s,
+        whole_slip_s: film.whole_slip_s,
+    };
+    for number in 0..film.len() {
+        let Ok(frame) = film.frame(number) else { break };
+        encoded.film.push(encode_frame(number, &frame, &options)?);
+    }
+    Ok(encoded)
+}
+
 /// How sample `index` of a project is encoded into its shard.
 pub(crate) fn encode_options(project: &Project, index: u64) -> EncodeOptions {
     let sweep = &project.sweep;
@@ -95,6 +125,7 @@ pub(crate) fn encode_options(project: &Project, index: u64) -> EncodeOptions {
         view_rate_hz: Some(VIEW_RATE_HZ),
         extra_columns: extra_columns(sweep.drawn_keys()),
         noise_apart_rgb: (sweep.images == ImageStorage::Clean).then(|| noise_rgb(project, index)).flatten(),
+        background: project.background(),
         first_sample: index / sweep.shard_samples * sweep.shard_samples,
         slot_ns: slot_ns(project),
     }

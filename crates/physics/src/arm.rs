@@ -70,6 +70,13 @@ impl ArmRig {
         }
     }
 
+    /// Says what the contact takes along the pull, at once.
+    pub(crate) fn expect(&mut self, contact_n: f64) {
+        if let Self::Multibody(arm) = self {
+            arm.expect(contact_n);
+        }
+    }
+
     /// Where the tool is.
     pub(crate) fn position(&self, world: &World) -> Vector {
         match self {

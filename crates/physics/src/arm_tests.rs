@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::setup::Mount;
-use crate::tests::{Bench, STEP_S, assert_clones_agree, hull_of_64, shapes};
+use crate::tests::{Bench, STEP_S, assert_clones_agree, check_take_over, hull_of_64, shapes};
 use gripgen_twin::config::{Document, Feedback, Mechanics};
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};
@@ -41,7 +41,7 @@ fn friction_n(session: &PullSession) -> f64 {
 /// force, the largest motion across the pull and the largest motion along it below 0.9 of the ideal force.
 fn ramp(bench: &Bench, mu: f64, step_s: f64) -> (f64, f64, f64) {
     let ideal_n = 2.0 * mu * bench.grip_force_n;
-    let mut session = bench.session(mu);
+    let mut session = bench.session_in_engine(mu);
     let (mut peak, mut across, mut early) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut time_s = 0.0;
     while session.tool_travel_m().z < 1e-3 {
@@ -107,7 +107,7 @@ fn arm_and_carriage_agree_on_the_label() {
 #[test]
 fn the_wrist_sensor_balances_what_the_engine_reads_back() {
     for (name, shape) in shapes() {
-        let mut session = bench(shape, 40.0).session(0.3);
+        let mut session = bench(shape, 40.0).session_in_engine(0.3);
         let (mut balance, mut engine, mut n, mut worst) = (0.0, 0.0, 0, 0.0_f64);
         for i in 0..1200 {
             let state = session.step(Command::ForceN(f64::from(i) * 0.03), STEP_S).unwrap();
@@ -166,7 +166,7 @@ fn steady_sliding_reads_the_friction() {
 #[test]
 fn normal_forces_read_back_as_the_grip_force_on_links() {
     for (name, shape) in shapes() {
-        let mut session = bench(shape, 20.0).session(0.3);
+        let mut session = bench(shape, 20.0).session_in_engine(0.3);
         for i in 0..300 {
             session.step(Command::ForceN(f64::from(i) * 0.04), STEP_S).unwrap();
             for (jaw, force) in session.contact_forces().iter() {
@@ -180,7 +180,7 @@ fn normal_forces_read_back_as_the_grip_force_on_links() {
 #[test]
 fn a_grip_below_its_limit_does_not_creep() {
     for (name, shape) in shapes() {
-        let mut session = bench(shape, 40.0).session(0.25);
+        let mut session = bench(shape, 40.0).session_in_engine(0.25);
         for i in 0..1000 {
             session.step(Command::ForceN(18.0 * (f64::from(i) / 900.0).min(1.0)), STEP_S).unwrap();
         }
@@ -251,11 +251,18 @@ fn a_free_part_reads_its_weight() {
     }
 }
 
+#[test]
+fn the_engine_takes_over_before_the_slip() {
+    for (name, shape) in shapes() {
+        check_take_over(name, &bench(shape, 40.0));
+    }
+}
+
 /// 100 N and a part that does not let go.
 #[test]
 fn a_hundred_newtons_do_not_push_the_arm_sideways() {
     let bench = bench(brick(), 80.0);
-    let mut session = bench.session(1.0);
+    let mut session = bench.session_in_engine(1.0);
     for i in 0..2000 {
         let state = session.step(Command::ForceN((f64::from(i) * 0.1).min(100.0)), STEP_S).unwrap();
         let travel = session.tool_travel_m();

@@ -89,6 +89,7 @@ pub fn grip(setup: &GripSetup<'_>) -> Result<Grip, GripError> {
         shear_stiffness_n_per_m: setup.gel.left.shear_stiffness_n_per_m
             + setup.gel.right.shear_stiffness_n_per_m,
         normal_force_n: grasp.normal_force_n,
+        fixed: matches!(setup.mount, Mount::Fixed),
     };
     let (robot, wrist, start) = (setup.robot, setup.wrist, Start::Rapier(Box::new(start)));
     Ok(Grip::Held(Box::new(Held { grasp, robot, wrist, start })))

@@ -27,6 +27,8 @@
 //! This crate knows no images and no files.
 
 mod arm;
+mod bristles;
+mod cells;
 mod contact;
 mod convert;
 mod force_loop;
@@ -50,6 +52,7 @@ mod urdf;
 mod world;
 
 pub use arm::{ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm};
+pub use cells::PullCells;
 pub use grip::{Grip, Held, grip};
 pub use grip_error::GripError;
 pub use jaw_friction::{FrictionCell, JawFriction};
@@ -58,7 +61,7 @@ pub use quasi_static::{QuasiStatic, SlipPull, StuckPull, label_moments};
 pub use session::{Command, PullError, PullSession, PullState, Signals};
 pub use setup::{Arm, GripSetup, Mount};
 pub use shape::{PartShape, ShapeError};
-pub use staircase::{StaircaseResult, Until, pull_staircase, staircase_of};
+pub use staircase::{StaircaseResult, Until, pull_staircase, pull_staircase_seen, staircase_of};
 pub use surface::{LineHit, Surface, Window};
 pub use twist::{TwistCell, compliant_twist_capacity_n};
 pub use urdf::UrdfError;

@@ -18,6 +18,14 @@ const SLIDING_M_PER_S: f64 = 1e-4;
 /// shear and the engine's own pre-slip drift, however fast the force rises.
 const AT_LIMIT: f64 = 0.99;
 
+/// Share of the jaws' static limits up to which the engine is not asked: jaws that hold a fixed part do not move, so that the contact
+/// takes what the arm applies. Well below the limit, so that all that can happen near a slip happens in the engine.
+const HELD_SHARE: f64 = 0.8;
+
+/// Steps in which the engine takes over the force that the jaws hold, and steps in which it comes to rest under it: pads drift a
+/// little as their force rises.
+const TAKE_OVER_STEPS: (u32, u32) = (16, 24);
+
 /// Speed below which sliding jaws stick again.
 const STICKING_M_PER_S: f64 = 1e-5;
 
@@ -31,6 +39,8 @@ pub(crate) struct RapierStart {
     pub(crate) direction: rapier::Vector,
     pub(crate) shear_stiffness_n_per_m: f64,
     pub(crate) normal_force_n: PerJaw<f64>,
+    /// The part does not move.
+    pub(crate) fixed: bool,
 }
 
 /// A pull in Rapier.
@@ -50,6 +60,8 @@ pub(crate) struct RapierPull {
     start: rapier::Vector,
     momentum_n_s: f64,
     contact_force_n: f64,
+    /// The jaws hold and have held since the grip: the engine has not begun.
+    held: bool,
     refresh_contacts: bool,
     sliding: bool,
     /// Time since the jaws began to slide.
@@ -73,6 +85,7 @@ impl RapierPull {
             limit_n: friction.left.limit_n() + friction.right.limit_n(),
             friction: friction.map(|_, f| JawFriction { cells: vec![], ..*f }),
             contact_force_n: 0.0,
+            held: start.fixed,
             refresh_contacts: false,
             sliding: false,
             slid_s: 0.0,
@@ -115,7 +128,47 @@ impl RapierPull {
     ///
     /// The contact force is a balance of momentum: what the arm applied and did not become momentum went into the
     /// contact. Gel shear is in series: it adds to the way of the tool.
+    ///
+    /// As long as jaws hold a fixed part well below their limit, nothing moves but the gels: `F_contact = F`, `x = F / k`. The engine
+    /// takes over at [`HELD_SHARE`] of the limit, and goes on whatever comes.
     pub(crate) fn advance(&mut self, applied_n: f64, step_s: f64) -> Result<Motion, NotFinite> {
+        if self.held {
+            if applied_n.abs() <= HELD_SHARE * self.limit_n {
+                self.contact_force_n = applied_n;
+                let displacement_m = applied_n / self.shear_stiffness_n_per_m;
+                return Ok(Motion {
+                    contact_force_n: applied_n,
+                    displacement_m,
+                    speed_m_per_s: 0.0,
+                    sliding: false,
+                });
+            }
+            self.take_over(step_s)?;
+        }
+        self.advance_engine(applied_n, step_s)
+    }
+
+    /// Brings the engine to the force that is held, without time: in even steps and some at rest, the arm told what the contact takes.
+    fn take_over(&mut self, step_s: f64) -> Result<(), NotFinite> {
+        self.held = false;
+        let held_n = self.contact_force_n;
+        let (rise, rest) = TAKE_OVER_STEPS;
+        for i in 1..=rise + rest {
+            let force_n = held_n * (f64::from(i) / f64::from(rise)).min(1.0);
+            self.contact_force_n = force_n;
+            self.rig.arm.expect(force_n);
+            self.advance_engine(force_n, step_s)?;
+        }
+        Ok(())
+    }
+
+    /// The engine from the start of the pull, which is what tests of it look at.
+    #[cfg(test)]
+    pub(crate) fn begin_engine(&mut self) {
+        self.held = false;
+    }
+
+    fn advance_engine(&mut self, applied_n: f64, step_s: f64) -> Result<Motion, NotFinite> {
         let jaws_n = self.rig.close_jaws(&mut self.world, &self.grip_force_n, self.jaw_mass_kg);
         let contact_n = self.contact_force_n;
         self.rig.arm.pull(&mut self.world, self.direction, applied_n, contact_n, jaws_n);

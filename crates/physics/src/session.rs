@@ -202,6 +202,14 @@ impl PullSession {
         self.plant.mass_kg()
     }
 
+    /// Lets the engine act from the start of the pull.
+    #[cfg(test)]
+    pub(crate) fn begin_engine(&mut self) {
+        if let PullMechanics::Rapier(pull) = &mut self.plant {
+            pull.begin_engine();
+        }
+    }
+
     /// Where the tool is, relative to the start of the pull.
     #[cfg(test)]
     pub(crate) fn tool_travel_m(&self) -> rapier3d_f64::prelude::Vector {

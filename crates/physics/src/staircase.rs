@@ -1,6 +1,6 @@
 //! The pull of the experiment: a force staircase until the jaws slip.
 
-use crate::session::{Command, PullError, PullSession};
+use crate::session::{Command, PullError, PullSession, PullState};
 use gripgen_twin::random::Stream;
 use gripgen_twin::{PullEnd, PullSettings, PullTrace, Staircase, TraceRow};
 
@@ -49,6 +49,21 @@ pub fn pull_staircase(
     pull: &PullSettings,
     until: Until,
 ) -> Result<StaircaseResult, PullError> {
+    pull_staircase_seen(session, staircase, pull, until, |_| {})
+}
+
+/// The same; `see` is called with the state of each row.
+///
+/// # Errors
+///
+/// As [`PullSession::step`].
+pub fn pull_staircase_seen(
+    session: &mut PullSession,
+    staircase: &Staircase,
+    pull: &PullSettings,
+    until: Until,
+    mut see: impl FnMut(&PullState),
+) -> Result<StaircaseResult, PullError> {
     let mut trace = PullTrace::default();
     let rate_hz = session.rate_hz();
     let mut tick = 0_u64;
@@ -56,6 +71,7 @@ pub fn pull_staircase(
         let time_s = tick as f64 / rate_hz;
         let desired_force_n = staircase.desired_n(time_s);
         let state = session.state();
+        see(&state);
         trace.push(TraceRow {
             time_s,
             desired_force_n,

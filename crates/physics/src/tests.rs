@@ -100,10 +100,15 @@ impl Bench {
         self.held().pull(&PerJaw { left: jaw.clone(), right: jaw }, Stream::new(1, 2, Purpose::ForceNoise))
     }
 
+    /// The same with the engine at work from the start of the pull, and not only near its slip.
+    pub(crate) fn session_in_engine(&self, mu: f64) -> PullSession {
+        let mut session = self.session(mu);
+        session.begin_engine();
+        session
+    }
+
     pub(crate) fn pull(&self, mu: f64) -> StaircaseResult {
-        let settings = settings();
-        let staircase = Staircase::constant(settings.increment_n, settings.step_s, settings.max_time_s);
-        pull_staircase(&mut self.session(mu), &staircase, &settings, Until::Stopped).unwrap()
+        pull_all(self.session(mu))
     }
 
     pub(crate) fn label_n(&self, mu: f64) -> f64 {
@@ -111,6 +116,12 @@ impl Bench {
         assert_eq!(result.end, PullEnd::Displacement);
         slip_label(&result.trace, 3.0, result.slid).unwrap().max_pull_force_n
     }
+}
+
+pub(crate) fn pull_all(mut session: PullSession) -> StaircaseResult {
+    let settings = settings();
+    let staircase = Staircase::constant(settings.increment_n, settings.step_s, settings.max_time_s);
+    pull_staircase(&mut session, &staircase, &settings, Until::Stopped).unwrap()
 }
 
 pub(crate) fn settings() -> PullSettings {
@@ -155,7 +166,7 @@ fn jaws_slip_at_twice_mu_times_grip_force() {
 #[test]
 fn normal_forces_read_back_as_the_grip_force() {
     for (name, shape) in shapes() {
-        let mut session = Bench::new(shape, 20.0).session(0.3);
+        let mut session = Bench::new(shape, 20.0).session_in_engine(0.3);
         for i in 0..600 {
             session.step(Command::ForceN(f64::from(i) * 0.02), STEP_S).unwrap();
             for (jaw, force) in session.contact_forces().iter() {
@@ -169,7 +180,7 @@ fn normal_forces_read_back_as_the_grip_force() {
 /// The engine's friction read-back and the momentum balance of the wrist sensor are two ways to one number.
 #[test]
 fn friction_read_back_equals_the_momentum_balance() {
-    let mut session = Bench::new(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0).session(0.3);
+    let mut session = Bench::new(PartShape::cuboid([0.06, 0.02, 0.12]), 40.0).session_in_engine(0.3);
     for i in 0..500 {
         let state = session.step(Command::ForceN(f64::from(i) * 0.03), STEP_S).unwrap();
         if i > 20 {
@@ -325,7 +336,7 @@ fn a_force_command_after_a_velocity_command_starts_from_the_force_that_acts() {
 #[test]
 fn a_grip_below_its_limit_does_not_creep() {
     for (name, shape) in shapes() {
-        let mut session = Bench::new(shape, 40.0).session(0.25);
+        let mut session = Bench::new(shape, 40.0).session_in_engine(0.25);
         for i in 0..1000 {
             session.step(Command::ForceN(18.0 * (f64::from(i) / 900.0).min(1.0)), STEP_S).unwrap();
         }
@@ -335,6 +346,36 @@ fn a_grip_below_its_limit_does_not_creep() {
         let creep = (end.displacement_m - start).abs() / 2.0;
         assert!(creep < 1e-6, "{name}: {} mm/s", creep * 1e3);
     }
+}
+
+/// Jaws that hold are not asked until 0.8 of their limit: the slip force is the one of the engine alone, and so is the trace but
+/// for the engine's own pre-slip drift.
+#[test]
+fn the_engine_takes_over_before_the_slip() {
+    for (name, shape) in shapes() {
+        let bench = Bench::new(shape, 40.0);
+        check_take_over(name, &bench);
+    }
+}
+
+pub(crate) fn check_take_over(name: &str, bench: &Bench) {
+    let (alone, after) = (pull_all(bench.session_in_engine(0.25)), bench.pull(0.25));
+    let label = |r: &StaircaseResult| slip_label(&r.trace, 3.0, r.slid).unwrap();
+    let (wanted, found) = (label(&alone), label(&after));
+    let off = found.max_pull_force_n / wanted.max_pull_force_n - 1.0;
+    let (mut force_n, mut way_m) = (0.0_f64, 0.0_f64);
+    for (a, b) in after.trace.rows().zip(alone.trace.rows()) {
+        if b.time_s < wanted.slip_time_s - 0.5 {
+            let apart = (a.measured_force_n - b.measured_force_n).abs();
+            force_n = force_n.max(apart);
+            way_m = way_m.max((a.displacement_m - b.displacement_m).abs());
+        }
+    }
+    let later_s = found.slip_time_s - wanted.slip_time_s;
+    println!("{name}: {:.4} % off, {later_s:.3} s later, {force_n:.3} N, {:.1} um", 100.0 * off, way_m * 1e6);
+    assert!(off.abs() < 5e-4, "{name}: {:.4} %", 100.0 * off);
+    // The engine alone rings by 0.2 N where the force begins to rise, and drifts by 1 um per newton.
+    assert!(force_n < 0.25 && way_m < 20e-6, "{name}: {force_n} N, {way_m} m");
 }
 
 /// Trap: contact impulses were once over-counted by one solver iteration. A part that hangs in the jaws at rest

@@ -1,6 +1,7 @@
 //! `_core.Dataset`: rows of a run or of measured pulls.
 
 use crate::error;
+use crate::film;
 use gripgen::record::proto::gripgen_v1::{JawContact, Status};
 use gripgen::record::{Dataset as Rows, DatasetError, NoiseMode};
 use gripgen::twin::Values;
@@ -41,6 +42,12 @@ impl Dataset {
     #[getter]
     fn clean_images(&self, py: Python<'_>) -> PyResult<bool> {
         py.detach(|| self.rows.has_clean_images()).map_err(|e| error::data(py, &e))
+    }
+
+    /// Whether pulls are filmed.
+    #[getter]
+    fn has_films(&self, py: Python<'_>) -> PyResult<bool> {
+        py.detach(|| self.rows.has_films()).map_err(|e| error::data(py, &e))
     }
 
     /// What the run says of itself: name, source, gripgen_version, config_sha256, config_toml. Empty for a table of pulls.
@@ -119,6 +126,12 @@ impl Dataset {
         }
         let values = PyArray::from_vec(py, values).reshape([rows.len(), longest, 4])?;
         Ok((values, lengths.into_pyarray(py)))
+    }
+
+    /// The film of a row's pull as a dict of arrays, F frames of 2 jaws; None where there is none.
+    fn film<'py>(&self, py: Python<'py>, row: usize) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let film = py.detach(|| self.rows.film(row)).map_err(|e| error::data(py, &e))?;
+        film.map(|film| film::arrays(py, &film)).transpose()
     }
 
     /// Pressure cells of these rows: float32[B, 2, 64, 4] with x_mm (right), y_mm (down), area_mm2 and normal force_n of each

@@ -7,6 +7,7 @@
 
 mod dataset;
 mod error;
+mod film;
 mod pulls;
 mod render;
 mod simulator;

@@ -11,6 +11,7 @@ mod tests;
 pub use columns::Table;
 pub use images::NoiseMode;
 
+use crate::film::Film;
 use crate::folder::{FolderError, RunFolder};
 use crate::index::{extra_columns, index_row};
 use crate::picture::encode_png;
@@ -304,6 +305,7 @@ impl Dataset {
                 let noise = reader.noise_of(index, &raw.sample)?;
                 for (jaw, out) in [(Jaw::Left, left), (Jaw::Right, right)] {
                     reader.image_into(index, jaw, &both[jaw], raw.raw_images, wanted, out)?.map_err(size)?;
+                    reader.put_back(jaw, out);
                     if let Some(noise) = noise[jaw].and_then(|noise| mode.of(noise)) {
                         noise.add(out);
                     }
@@ -384,6 +386,32 @@ impl Dataset {
         let (reader, index) = self.shard_of(row)?;
         let both = reader.raw_rest(index)?;
         Ok(both.map(|both| reader.png_of(index, "_rest", &both)).transpose()?)
+    }
+
+    /// Whether pulls of its rows are filmed.
+    ///
+    /// # Errors
+    ///
+    /// A shard that cannot be read.
+    pub fn has_films(&self) -> Result<bool, DatasetError> {
+        match &self.source {
+            Source::Run { .. } => Ok(self.shard_of(0)?.0.has_film()),
+            Source::Pulls { .. } => Ok(false),
+        }
+    }
+
+    /// The film of a row's pull, where there is one.
+    ///
+    /// # Errors
+    ///
+    /// A row that is not there, or a shard that cannot be read.
+    pub fn film(&self, row: usize) -> Result<Option<Film>, DatasetError> {
+        self.check_row(row)?;
+        if self.run().is_none() {
+            return Ok(None);
+        }
+        let (reader, index) = self.shard_of(row)?;
+        Ok(reader.film(index)?)
     }
 
     /// The force over time of a row, where it is stored.

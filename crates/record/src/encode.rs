@@ -1,7 +1,9 @@
 //! From a sample to the messages of a shard.
 
+use crate::background::Background;
+use crate::film::EncodedFrame;
 use crate::index::index_row;
-use crate::picture::{PictureError, encode_png, encode_small_png};
+use crate::picture::{PictureError, encode_png, encode_small_png, encode_smallest_png};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1 as proto;
 use gripgen_twin::columns::Scale;
@@ -14,6 +16,7 @@ use gripgen_twin::{
 };
 use prost::Message;
 use prost_types::Timestamp;
+use std::sync::Arc;
 
 /// Rows of `/pull/state` per second; a viewer needs no more.
 pub const VIEW_RATE_HZ: f64 = 50.0;
@@ -31,6 +34,8 @@ pub struct EncodeOptions {
     pub extra_columns: Vec<String>,
     /// Sensor noise of each image that is stored without it, levels of 0 to 255; `None` where it has it.
     pub noise_apart_rgb: Option<PerJaw<[f32; 3]>>,
+    /// What images are stored without, beside their noise; stands in the shard once.
+    pub background: Option<Arc<PerJaw<Background>>>,
     /// Samples before this one in its file, and the time each of them takes up.
     pub first_sample: u64,
     /// Time between the starts of two samples of a file.
@@ -59,6 +64,8 @@ pub struct EncodedSample {
     pub trace: Option<Vec<u8>>,
     /// `/pull/state`
     pub states: Vec<Timed>,
+    /// `/tactile/left/film`, `/tactile/right/film` and what is known beside them, if the pull is filmed.
+    pub film: Vec<EncodedFrame>,
     /// What only runs of a rig have.
     pub rig: Option<EncodedRig>,
     /// Its row of the index.
@@ -104,7 +111,15 @@ pub fn encode(sample: &Sample, options: &EncodeOptions) -> Result<EncodedSample,
     };
     let images = images
         .filter(|_| options.images != ImageStorage::None)
-        .map(|both| PerJaw::try_from_fn(|jaw| image_message(&both[jaw], jaw, options.images, timestamp)))
+        .map(|both| {
+            PerJaw::try_from_fn(|jaw| match options.background.as_deref() {
+                None => image_message(&both[jaw], jaw, options.images, timestamp),
+                Some(background) => {
+                    let data = encode_smallest_png(&background[jaw].taken_off(&both[jaw]))?;
+                    Ok(png_message(data, jaw, timestamp))
+                }
+            })
+        })
         .transpose()?;
     let trace = match &sample.outcome {
         Outcome::Pulled(pulled) if options.trace == TraceStorage::Full => Some(&pulled.trace),
@@ -116,6 +131,7 @@ pub fn encode(sample: &Sample, options: &EncodeOptions) -> Result<EncodedSample,
         images,
         trace: trace.map(|t| trace_message(t, timestamp).encode_to_vec()),
         states: trace.map(|t| state_messages(t, start_ns, options.view_rate_hz)).unwrap_or_default(),
+        film: vec![],
         rig: None,
         row,
         status,
@@ -247,9 +263,14 @@ pub(crate) fn image_message(
         _ => {
             let data =
                 if storage == ImageStorage::Clean { encode_small_png(image) } else { encode_png(image) };
-            CompressedImage { timestamp, frame_id, data: data?, format: "png".into() }.encode_to_vec()
+            png_message(data?, jaw, timestamp)
         }
     })
+}
+
+fn png_message(data: Vec<u8>, jaw: Jaw, timestamp: Option<Timestamp>) -> Vec<u8> {
+    let frame_id = format!("gel_{jaw}");
+    CompressedImage { timestamp, frame_id, data, format: "png".into() }.encode_to_vec()
 }
 
 pub(crate) fn trace_message(trace: &PullTrace, timestamp: Option<Timestamp>) -> proto::PullTrace {

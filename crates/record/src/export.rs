@@ -1,14 +1,15 @@
 //! One sample as a file of its own, with every reading as a message for viewers.
 
 use crate::encode::{EncodedSample, state_messages, timestamp};
+use crate::film::EncodedFrame;
 use crate::mark::EXPORT;
 use crate::picture::encode_png;
 use crate::proto::foxglove::{CompressedImage, RawImage};
-use crate::proto::gripgen_v1::{PullTrace, Sample};
+use crate::proto::gripgen_v1::{FilmFrame, PullTrace, Sample};
 use crate::reader::{ReadError, ShardReader, trace_of};
 use crate::shard::{ShardError, ShardInfo, ShardWriter};
-use gripgen_twin::PerJaw;
 use gripgen_twin::config::ImageStorage;
+use gripgen_twin::{Jaw, PerJaw};
 use prost::Message;
 use std::io::Cursor;
 
@@ -74,6 +75,7 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
         states = state_messages(&rows, 0, None);
         trace = Some(message.encode_to_vec());
     }
+    let film = film_from_zero(reader, index)?;
     let encoded = EncodedSample {
         start_ns: 0,
         status: sample.status(),
@@ -81,15 +83,45 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
         images,
         trace,
         states,
+        film,
         // A pull of a rig has a file of its own already, which starts at time 0.
         rig: reader.raw_rig(index)?,
         row: vec![],
     };
     let mut writer = ShardWriter::new(Cursor::new(Vec::new()), &info(reader, index)?, storage)?;
+    if reader.has_film() {
+        writer = writer.with_films(storage)?;
+    }
     writer.push(&encoded)?;
     // After the sample: a record between ends the chunk that holds the channels, which would then be one without messages.
     writer.mark(EXPORT)?;
     Ok(writer.finish()?.into_inner())
+}
+
+/// The film of a sample, starting at time 0.
+fn film_from_zero(reader: &ShardReader, index: u64) -> Result<Vec<EncodedFrame>, ReadError> {
+    let mut film = reader.raw_film(index)?;
+    let start_ns = film.first().map_or(0, |frame| frame.time_ns);
+    for frame in &mut film {
+        frame.time_ns -= start_ns;
+        let now = Some(timestamp(frame.time_ns));
+        for jaw in Jaw::BOTH {
+            let damaged = |e: prost::DecodeError| reader.damaged(index, "/tactile/film", &e.to_string());
+            let mut labels = FilmFrame::decode(&frame.labels[jaw][..]).map_err(damaged)?;
+            labels.timestamp = now;
+            frame.labels[jaw] = labels.encode_to_vec();
+            frame.image[jaw] = if reader.has_raw_images() {
+                let mut image = RawImage::decode(&frame.image[jaw][..]).map_err(damaged)?;
+                image.timestamp = now;
+                image.encode_to_vec()
+            } else {
+                let mut image = CompressedImage::decode(&frame.image[jaw][..]).map_err(damaged)?;
+                image.timestamp = now;
+                image.encode_to_vec()
+            };
+        }
+    }
+    Ok(film)
 }
 
 /// What the shard says about itself, for one of its samples.

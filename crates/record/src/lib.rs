@@ -16,11 +16,13 @@
 //!
 //! This crate does not know how samples are made. Reading holds one sample in memory, writing one as well.
 
+mod background;
 mod campaign;
 mod card;
 mod dataset;
 mod encode;
 mod export;
+mod film;
 mod folder;
 mod imprint_table;
 mod index;
@@ -43,10 +45,12 @@ mod tests;
 mod verify;
 mod webdataset;
 
+pub use background::Background;
 pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
 pub use dataset::{Dataset, DatasetError, NoiseMode, Table};
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
+pub use film::{EncodedFrame, Film, FilmOptions, encode_frame};
 pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
     sha256_hex,

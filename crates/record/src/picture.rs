@@ -51,6 +51,41 @@ pub fn encode_jpeg(image: &TactileImage, quality: u8) -> Result<Vec<u8>, Picture
     Ok(bytes)
 }
 
+/// The same of a frame whose background has been taken off: 18 kB.
+pub(crate) fn encode_smallest_png(image: &TactileImage) -> Result<Vec<u8>, PictureError> {
+    let mut bytes = Vec::with_capacity(image.rgb.len() / 8);
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Level(6), FilterType::Sub)
+        .write_image(&image.rgb, image.width_px, image.height_px, ExtendedColorType::Rgb8)
+        .map_err(|e| PictureError(e.to_string()))?;
+    Ok(bytes)
+}
+
+/// A PNG of one channel: bytes of `L8`, or of `L16` in the order of the machine. Labels are flat: the fast setting takes most.
+pub(crate) fn encode_grey(
+    values: &[u8],
+    size: (u32, u32),
+    kind: ExtendedColorType,
+) -> Result<Vec<u8>, PictureError> {
+    let mut bytes = Vec::with_capacity(values.len() / 8);
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Up)
+        .write_image(values, size.0, size.1, kind)
+        .map_err(|e| PictureError(e.to_string()))?;
+    Ok(bytes)
+}
+
+/// The values of a PNG of one channel, of 8 or 16 bits.
+pub(crate) fn decode_grey(bytes: &[u8], wanted: (u32, u32)) -> Result<Vec<u16>, PictureError> {
+    let decoded = image::load_from_memory(bytes).map_err(|e| PictureError(e.to_string()))?;
+    let size = (decoded.width(), decoded.height());
+    if size != wanted {
+        return Err(PictureError(format!("{size:?} pixels of {wanted:?}")));
+    }
+    Ok(match decoded {
+        image::DynamicImage::ImageLuma8(grey) => grey.into_raw().into_iter().map(u16::from).collect(),
+        other => other.into_luma16().into_raw(),
+    })
+}
+
 /// Whether bytes begin like a JPEG, whatever their file is called.
 pub(crate) fn is_jpeg(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0xff, 0xd8, 0xff])

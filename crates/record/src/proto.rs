@@ -19,6 +19,8 @@ pub mod foxglove {
 pub const PULL_DESCRIPTOR: &[u8] = include_bytes!("proto/gripgen.v1.pull.bin");
 /// `FileDescriptorSet` of `gripgen/v1/rig.proto` and what it imports.
 pub const RIG_DESCRIPTOR: &[u8] = include_bytes!("proto/gripgen.v1.rig.bin");
+/// `FileDescriptorSet` of `gripgen/v1/film.proto` and what it imports.
+pub const FILM_DESCRIPTOR: &[u8] = include_bytes!("proto/gripgen.v1.film.bin");
 /// `FileDescriptorSet` of `foxglove/CompressedImage.proto` and what it imports.
 pub const COMPRESSED_IMAGE_DESCRIPTOR: &[u8] = include_bytes!("proto/foxglove.CompressedImage.bin");
 /// `FileDescriptorSet` of `foxglove/RawImage.proto` and what it imports.
@@ -47,10 +49,17 @@ mod tests {
         let files = [
             "gripgen/v1/pull.proto",
             "gripgen/v1/rig.proto",
+            "gripgen/v1/film.proto",
             "foxglove/CompressedImage.proto",
             "foxglove/RawImage.proto",
         ];
-        let names = ["gripgen.v1.pull", "gripgen.v1.rig", "foxglove.CompressedImage", "foxglove.RawImage"];
+        let names = [
+            "gripgen.v1.pull",
+            "gripgen.v1.rig",
+            "gripgen.v1.film",
+            "foxglove.CompressedImage",
+            "foxglove.RawImage",
+        ];
         for (file, name) in files.iter().zip(names) {
             let mut set = protox::compile([root.join(file)], [&root]).unwrap();
             for descriptor in &mut set.file {

@@ -1,22 +1,23 @@
 //! Reading a shard: any sample, in any order, one at a time.
 
+mod file;
 mod rig;
 
+use crate::background::Background;
 use crate::mark::MARK_NAME;
 use crate::picture::{PictureError, decode};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::shard::RIG_SOURCE;
-use crate::shard::{CLEAN, LAYOUT_VERSION, METADATA_NAME};
+use crate::shard::{CLEAN, EVEN, LAYOUT_VERSION, METADATA_NAME, rest_name};
+use file::{attachment, piece, read_summary};
 use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
-use mcap::records::{AttachmentIndex, ChunkIndex, MetadataIndex};
-use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
+use mcap::records::{ChunkIndex, MetadataIndex};
 use mcap::{McapError, Summary};
 use prost::Message;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
 /// A shard opened for reading. Its summary is in memory; a sample is read when it is asked for. Nothing is mapped: a file
@@ -30,6 +31,8 @@ pub struct ShardReader {
     slot_ns: u64,
     samples: u64,
     first_sample: u64,
+    /// What its images are stored without.
+    background: Option<PerJaw<Background>>,
 }
 
 /// One sample of a shard.
@@ -172,7 +175,18 @@ impl ShardReader {
         if slot_ns == 0 {
             return Err(foreign("its time slots are 0 ns long".into()));
         }
-        Ok(Self { path: path.into(), file, bytes, summary, slot_ns, samples, first_sample, metadata })
+        let background = match metadata.get("background").map(String::as_str) {
+            None => None,
+            Some(EVEN) => Some(PerJaw::try_from_fn(|jaw| {
+                let png = attachment(&file, bytes, &summary, rest_name(jaw))
+                    .map_err(bad)?
+                    .ok_or_else(|| foreign(format!("it has no attachment `{}`", rest_name(jaw))))?;
+                decode(&png).map(Background::new).map_err(|e| foreign(format!("{}: {e}", rest_name(jaw))))
+            })?),
+            Some(other) => return Err(foreign(format!("its images are without a background `{other}`"))),
+        };
+        let path = path.into();
+        Ok(Self { path, file, bytes, summary, slot_ns, samples, first_sample, metadata, background })
     }
 
     /// What the shard says about itself.
@@ -188,6 +202,11 @@ impl ShardReader {
     /// Whether its samples have images.
     pub fn has_images(&self) -> bool {
         self.summary.channels.values().any(|c| c.topic.starts_with("/tactile/"))
+    }
+
+    /// Whether it has a topic.
+    pub(crate) fn has_topic(&self, topic: &str) -> bool {
+        self.summary.channels.values().any(|c| c.topic == topic)
     }
 
     /// Whether these are stored without their noise, which every reader here adds.
@@ -212,17 +231,10 @@ impl ShardReader {
     /// A file that cannot be read.
     pub fn config_toml(&self) -> Result<String, ReadError> {
         let foreign = |problem: &str| ReadError::Foreign { path: self.path.clone(), problem: problem.into() };
-        let index = self
-            .summary
-            .attachment_indexes
-            .iter()
-            .find(|a| a.name == "config.toml")
+        let text = attachment(&self.file, self.bytes, &self.summary, "config.toml")
+            .map_err(|source| ReadError::Mcap { path: self.path.clone(), source })?
             .ok_or_else(|| foreign("it has no attachment `config.toml`"))?;
-        let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
-        let record = piece(&self.file, self.bytes, index.offset, index.length).map_err(bad)?;
-        let at_start = AttachmentIndex { offset: 0, ..index.clone() };
-        let attachment = mcap::read::attachment(&record, &at_start).map_err(bad)?;
-        String::from_utf8(attachment.data.into_owned()).map_err(|_| foreign("its configuration is not text"))
+        String::from_utf8(text).map_err(|_| foreign("its configuration is not text"))
     }
 
     /// The `/sample` message of a sample, without its images and trace.
@@ -256,6 +268,7 @@ impl ShardReader {
                 PerJaw::try_from_fn(|jaw| {
                     let image = if raw.raw_images { raw_image(&both[jaw]) } else { png_image(&both[jaw]) };
                     let mut image = image.map_err(|problem| bad(&format!("/tactile/{jaw}"), problem))?;
+                    self.put_back(jaw, &mut image.rgb);
                     if let Some(noise) = noise_apart(&sample, jaw) {
                         noise.add(&mut image.rgb);
                     }
@@ -271,6 +284,13 @@ impl ShardReader {
             })
             .transpose()?;
         Ok(Record { sample, images, trace })
+    }
+
+    /// Puts back what an image was stored without, but for its noise.
+    pub(crate) fn put_back(&self, jaw: Jaw, rgb: &mut [u8]) {
+        if let Some(background) = &self.background {
+            background[jaw].put_back(rgb);
+        }
     }
 
     /// The `/sample` message of a sample and its force over time, where it is stored, without its images.
@@ -350,8 +370,32 @@ impl ShardReader {
         Ok(())
     }
 
+    /// The same for every message of its film, with the time of each. The film has a chunk of its own.
+    pub(crate) fn each_film_message(
+        &self,
+        index: u64,
+        mut visit: impl FnMut(&str, u64, &[u8]),
+    ) -> Result<(), ReadError> {
+        let channels = &self.summary.channels;
+        let filmed = |id: &u16| channels.get(id).is_some_and(|c| c.topic.ends_with("/film"));
+        for chunk in self.slot_of(index)?.filter(|c| c.message_index_offsets.keys().any(filmed)) {
+            self.each_timed_in(chunk, index, |topic, time_ns, data| {
+                visit(topic, time_ns, data);
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
     /// Chunks of a sample whose messages are all from the start of its slot.
     fn chunks_of(&self, index: u64) -> Result<impl Iterator<Item = &ChunkIndex>, ReadError> {
+        let slot = self.slot_of(index)?;
+        let start = (index - self.first_sample) * self.slot_ns;
+        Ok(slot.filter(move |c| c.message_end_time == start))
+    }
+
+    /// All chunks of a sample.
+    fn slot_of(&self, index: u64) -> Result<impl Iterator<Item = &ChunkIndex>, ReadError> {
         if !self.indices().contains(&index) {
             let (first, end) = (self.first_sample, self.first_sample + self.samples);
             return Err(ReadError::NoSample { path: self.path.clone(), sample: index, first, end });
@@ -360,8 +404,7 @@ impl ShardReader {
         // Chunks are written in the order of their samples.
         let chunks = &self.summary.chunk_indexes;
         let first = chunks.partition_point(|c| c.message_start_time < start);
-        let slot = chunks[first..].iter().take_while(move |c| c.message_start_time < start + self.slot_ns);
-        Ok(slot.filter(move |c| c.message_end_time == start))
+        Ok(chunks[first..].iter().take_while(move |c| c.message_start_time < start + self.slot_ns))
     }
 
     fn each_message_in(
@@ -370,13 +413,22 @@ impl ShardReader {
         index: u64,
         mut visit: impl FnMut(&str, &[u8]) -> Result<(), String>,
     ) -> Result<(), ReadError> {
+        self.each_timed_in(chunk, index, |topic, _, data| visit(topic, data))
+    }
+
+    fn each_timed_in(
+        &self,
+        chunk: &ChunkIndex,
+        index: u64,
+        mut visit: impl FnMut(&str, u64, &[u8]) -> Result<(), String>,
+    ) -> Result<(), ReadError> {
         let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
         let record =
             piece(&self.file, self.bytes, chunk.chunk_start_offset, chunk.chunk_length).map_err(bad)?;
         let at_start = ChunkIndex { chunk_start_offset: 0, ..chunk.clone() };
         for message in self.summary.stream_chunk(&record, &at_start).map_err(bad)? {
             let message = message.map_err(bad)?;
-            visit(&message.channel.topic, &message.data)
+            visit(&message.channel.topic, message.log_time, &message.data)
                 .map_err(|problem| self.damaged(index, &message.channel.topic, &problem))?;
         }
         Ok(())
@@ -385,54 +437,6 @@ impl ShardReader {
     pub(crate) fn damaged(&self, sample: u64, topic: &str, problem: &str) -> ReadError {
         ReadError::Message { path: self.path.clone(), sample, topic: topic.into(), problem: problem.into() }
     }
-}
-
-/// Smallest record: its kind and its length.
-const MIN_RECORD: u64 = 8;
-
-/// Some bytes of a file that is `bytes` long.
-fn piece(file: &File, bytes: u64, start: u64, length: u64) -> Result<Vec<u8>, McapError> {
-    let fits = start.checked_add(length).is_some_and(|end| end <= bytes) && length >= MIN_RECORD;
-    if !fits {
-        return Err(McapError::BadIndex);
-    }
-    let mut found = vec![0; length as usize];
-    read_exact_at(file, &mut found, start)?;
-    Ok(found)
-}
-
-#[cfg(unix)]
-fn read_exact_at(file: &File, out: &mut [u8], start: u64) -> std::io::Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, out, start)
-}
-
-#[cfg(windows)]
-fn read_exact_at(file: &File, mut out: &mut [u8], mut start: u64) -> std::io::Result<()> {
-    while !out.is_empty() {
-        let n = std::os::windows::fs::FileExt::seek_read(file, out, start)?;
-        if n == 0 {
-            return Err(std::io::ErrorKind::UnexpectedEof.into());
-        }
-        (out, start) = (&mut out[n..], start + n as u64);
-    }
-    Ok(())
-}
-
-fn read_summary(file: &File, bytes: u64) -> Result<Option<Summary>, McapError> {
-    let options =
-        SummaryReaderOptions::default().with_file_size(bytes).with_record_length_limit(bytes as usize);
-    let mut reader = SummaryReader::new_with_options(options);
-    let mut file = file;
-    while let Some(event) = reader.next_event() {
-        match event? {
-            SummaryReadEvent::ReadRequest(n) => {
-                let read = file.read(reader.insert(n))?;
-                reader.notify_read(read);
-            }
-            SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to)?),
-        }
-    }
-    Ok(reader.finish())
 }
 
 /// The noise that a stored image does not have; `None` where it has it, or there is none.
@@ -444,7 +448,7 @@ pub(crate) fn noise_apart(sample: &Sample, jaw: Jaw) -> Option<PixelNoise> {
     noise.as_ref().map(|n| PixelNoise { key: n.key, sd_rgb: [n.red, n.green, n.blue] })
 }
 
-fn raw_image(data: &[u8]) -> Result<TactileImage, String> {
+pub(crate) fn raw_image(data: &[u8]) -> Result<TactileImage, String> {
     let raw = RawImage::decode(data).map_err(|e| e.to_string())?;
     let bytes = 3 * raw.width as usize * raw.height as usize;
     if raw.encoding != "rgb8" || raw.data.len() != bytes {
@@ -453,7 +457,7 @@ fn raw_image(data: &[u8]) -> Result<TactileImage, String> {
     Ok(TactileImage { width_px: raw.width, height_px: raw.height, rgb: raw.data })
 }
 
-fn png_image(data: &[u8]) -> Result<TactileImage, String> {
+pub(crate) fn png_image(data: &[u8]) -> Result<TactileImage, String> {
     let compressed = CompressedImage::decode(data).map_err(|e| e.to_string())?;
     decode(&compressed.data).map_err(|e: PictureError| e.to_string())
 }

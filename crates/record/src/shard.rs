@@ -1,10 +1,15 @@
 //! Writing a shard: one MCAP file with a number of samples.
 
+use crate::background::Background;
 use crate::encode::EncodedSample;
+use crate::film::{film_topic, label_topic};
 use crate::mark::MARK_NAME;
-use crate::proto::{COMPRESSED_IMAGE_DESCRIPTOR, PULL_DESCRIPTOR, RAW_IMAGE_DESCRIPTOR, RIG_DESCRIPTOR};
-use gripgen_twin::PerJaw;
+use crate::picture::{PictureError, encode_small_png};
+use crate::proto::{
+    COMPRESSED_IMAGE_DESCRIPTOR, FILM_DESCRIPTOR, PULL_DESCRIPTOR, RAW_IMAGE_DESCRIPTOR, RIG_DESCRIPTOR,
+};
 use gripgen_twin::config::ImageStorage;
+use gripgen_twin::{Jaw, PerJaw};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, WriteOptions, Writer};
 use std::borrow::Cow;
@@ -22,6 +27,17 @@ pub const METADATA_NAME: &str = "gripgen.shard";
 
 /// What the metadata say of images that are stored without their noise.
 pub const CLEAN: &str = "clean";
+
+/// What they say of images that are stored without what the frame at rest adds to even rows.
+pub const EVEN: &str = "even";
+
+/// Name of the attachment with a jaw's frame at rest.
+pub(crate) fn rest_name(jaw: Jaw) -> &'static str {
+    match jaw {
+        Jaw::Left => "rest_left.png",
+        Jaw::Right => "rest_right.png",
+    }
+}
 
 /// What a shard says about itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -78,7 +94,14 @@ struct Channels {
     images: Option<PerJaw<u16>>,
     trace: u16,
     state: u16,
+    film: Option<FilmChannels>,
     rig: Option<RigChannels>,
+}
+
+/// Channels that only a shard with films has.
+struct FilmChannels {
+    image: PerJaw<u16>,
+    labels: PerJaw<u16>,
 }
 
 /// Channels that only a shard of a rig has.
@@ -95,6 +118,9 @@ pub enum ShardError {
     /// The file system, or the format's limits.
     #[error("writing the shard: {0}")]
     Mcap(#[from] McapError),
+    /// A frame at rest.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// Not as many samples as announced.
     #[error("the shard was announced with {expected} samples and ended after {written}")]
     Count {
@@ -114,6 +140,20 @@ impl<W: Write + Seek> ShardWriter<W> {
     ///
     /// What `to` says.
     pub fn new(to: W, info: &ShardInfo, images: ImageStorage) -> Result<Self, ShardError> {
+        Self::without(to, info, images, None)
+    }
+
+    /// The same of images that are stored without their background, which the file holds once.
+    ///
+    /// # Errors
+    ///
+    /// What `to` says, or a frame at rest that cannot be compressed.
+    pub fn without(
+        to: W,
+        info: &ShardInfo,
+        images: ImageStorage,
+        background: Option<&PerJaw<Background>>,
+    ) -> Result<Self, ShardError> {
         let options = WriteOptions::new()
             .profile("")
             .library(format!("gripgen/{}", info.gripgen_version))
@@ -124,6 +164,9 @@ impl<W: Write + Seek> ShardWriter<W> {
         if images == ImageStorage::Clean {
             metadata.insert("images".into(), CLEAN.into());
         }
+        if background.is_some() {
+            metadata.insert("background".into(), EVEN.into());
+        }
         writer.write_metadata(&Metadata { name: METADATA_NAME.into(), metadata })?;
         writer.attach(&Attachment {
             log_time: 0,
@@ -132,6 +175,16 @@ impl<W: Write + Seek> ShardWriter<W> {
             media_type: "text/x-toml".into(),
             data: Cow::Borrowed(info.config_toml.as_bytes()),
         })?;
+        for (jaw, background) in background.iter().flat_map(|both| both.iter()) {
+            let png = encode_small_png(background.rest())?;
+            writer.attach(&Attachment {
+                log_time: 0,
+                create_time: 0,
+                name: rest_name(jaw).into(),
+                media_type: "image/png".into(),
+                data: Cow::Owned(png),
+            })?;
+        }
         let none = BTreeMap::new();
         let mut channel = |schema: &str, descriptor: &[u8], topic: &str| -> Result<u16, McapError> {
             let schema = writer.add_schema(schema, "protobuf", descriptor)?;
@@ -173,8 +226,29 @@ impl<W: Write + Seek> ShardWriter<W> {
                 events: channel("gripgen.v1.RigEvent", RIG_DESCRIPTOR, "/rig/events")?,
             }),
         };
-        let channels = Channels { sample, images, trace, state, rig };
+        let channels = Channels { sample, images, trace, state, film: None, rig };
         Ok(Self { writer, channels, written: 0, expected: info.samples })
+    }
+
+    /// The same of samples whose pulls are filmed.
+    ///
+    /// # Errors
+    ///
+    /// What `to` says.
+    pub fn with_films(mut self, images: ImageStorage) -> Result<Self, ShardError> {
+        let none = BTreeMap::new();
+        let (name, descriptor) = match images {
+            ImageStorage::Raw => ("foxglove.RawImage", RAW_IMAGE_DESCRIPTOR),
+            _ => ("foxglove.CompressedImage", COMPRESSED_IMAGE_DESCRIPTOR),
+        };
+        let schema = self.writer.add_schema(name, "protobuf", descriptor)?;
+        let image =
+            PerJaw::try_from_fn(|jaw| self.writer.add_channel(schema, film_topic(jaw), "protobuf", &none))?;
+        let schema = self.writer.add_schema("gripgen.v1.FilmFrame", "protobuf", FILM_DESCRIPTOR)?;
+        let labels =
+            PerJaw::try_from_fn(|jaw| self.writer.add_channel(schema, label_topic(jaw), "protobuf", &none))?;
+        self.channels.film = Some(FilmChannels { image, labels });
+        Ok(self)
     }
 
     /// Writes down which verb made a file that is no shard of a run (`mcap_mark` reads it). Shards have no mark.
@@ -209,6 +283,7 @@ impl<W: Write + Seek> ShardWriter<W> {
             write(self.channels.trace, sample.start_ns, trace)?;
         }
         self.writer.flush()?;
+        self.push_film(sample, sequence)?;
         self.push_rig(sample, sequence)?;
         if !sample.states.is_empty() {
             for state in &sample.states {
@@ -220,6 +295,25 @@ impl<W: Write + Seek> ShardWriter<W> {
         }
         self.written += 1;
         Ok(())
+    }
+
+    /// The film, in a chunk of its own.
+    fn push_film(&mut self, sample: &EncodedSample, sequence: u32) -> Result<(), ShardError> {
+        let Some(channels) = self.channels.film.as_ref().filter(|_| !sample.film.is_empty()) else {
+            return Ok(());
+        };
+        for frame in &sample.film {
+            for jaw in Jaw::BOTH {
+                let of_jaw =
+                    [(channels.image[jaw], &frame.image[jaw]), (channels.labels[jaw], &frame.labels[jaw])];
+                for (channel_id, data) in of_jaw {
+                    let (log_time, publish_time) = (frame.time_ns, frame.time_ns);
+                    let header = MessageHeader { channel_id, sequence, log_time, publish_time };
+                    self.writer.write_to_known_channel(&header, data)?;
+                }
+            }
+        }
+        Ok(self.writer.flush()?)
     }
 
     /// What only a rig has, in chunks of its own.

@@ -136,6 +136,7 @@ fn check_shard(file: &Path, folder: &RunFolder, rows: &[Vec<String>]) -> Result<
         if reader.is_rig() {
             reader.rest(index).and_then(|_| reader.rig_log(index)).map_err(|e| e.to_string())?;
         }
+        reader.film(index).map_err(|e| e.to_string())?;
         let found = index_row(&record.sample, &folder.info().extra_columns);
         // Columns 1 and 2 (shard, in_shard) are filled in by the writer.
         if let Some(i) = (0..found.len()).find(|&i| !(1..=2).contains(&i) && found[i] != row[i]) {

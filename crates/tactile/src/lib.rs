@@ -72,9 +72,11 @@ pub use gradient::gradient;
 pub use grid::{Grid, Plane};
 pub use indent::{ElasticField, Imprint, IndentError, PressedGel, indent};
 pub use markers::{
-    MarkerGel, Markers, Shear, draw_markers, marker_displacements, print_markers, without_markers,
+    MarkerGel, Markers, Shear, draw_markers, marker_displacements, marker_displacements_by_cell,
+    print_markers, without_markers,
 };
 pub use noise::finish;
+pub use patch::CellMap;
 pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;
 pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError, SensorFiles};

@@ -134,16 +134,33 @@ pub fn marker_displacements(
         .map(|c| c.force_n * ((c.x_m - cx) * (c.x_m - cx) + (c.y_m - cy) * (c.y_m - cy)))
         .sum();
     let turn = if inertia > 0.0 { shear.moment_n_m / inertia } else { 0.0 };
-    let mut moved = vec![[0.0; 2]; rest_px.len()];
     if normal_n <= 0.0 {
-        return moved;
+        return vec![[0.0; 2]; rest_px.len()];
     }
-    for cell in &patch.cells {
-        let share = cell.force_n / normal_n;
-        let tangential = [
-            share * shear.force_n[0] - turn * cell.force_n * (cell.y_m - cy),
-            share * shear.force_n[1] + turn * cell.force_n * (cell.x_m - cx),
-        ];
+    let tangential_n: Vec<[f64; 2]> = patch
+        .cells
+        .iter()
+        .map(|cell| {
+            let share = cell.force_n / normal_n;
+            [
+                share * shear.force_n[0] - turn * cell.force_n * (cell.y_m - cy),
+                share * shear.force_n[1] + turn * cell.force_n * (cell.x_m - cx),
+            ]
+        })
+        .collect();
+    marker_displacements_by_cell(gel, patch, &tangential_n, grid, rest_px)
+}
+
+/// The same where the force of the part on the gel along image x and y is known of each cell.
+pub fn marker_displacements_by_cell(
+    gel: &MarkerGel,
+    patch: &ContactPatch,
+    tangential_n: &[[f64; 2]],
+    grid: &Grid,
+    rest_px: &[[f64; 2]],
+) -> Vec<[f64; 2]> {
+    let mut moved = vec![[0.0; 2]; rest_px.len()];
+    for (cell, &tangential) in patch.cells.iter().zip(tangential_n) {
         let load = gel.load(cell.force_n, tangential, cell.area_m2);
         for (rest, moved) in rest_px.iter().zip(&mut moved) {
             let x = (rest[0] + 0.5 - grid.width_px as f64 / 2.0) * grid.metres_per_px - cell.x_m;

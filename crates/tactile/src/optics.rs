@@ -31,8 +31,8 @@ use crate::markers::Shear;
 use crate::raster::ClusteredMesh;
 use crate::render::Renderer;
 use crate::sensor::GelShape;
-use gripgen_twin::OpticsState;
 use gripgen_twin::frames::Pose;
+use gripgen_twin::{ContactPatch, OpticsState};
 
 fn added(mut heights: Plane, rest: Option<&Plane>) -> Plane {
     if let Some(rest) = rest {
@@ -98,8 +98,10 @@ impl Renderer<'_> {
     /// imprint of [`Renderer::press_seen`] or without contact. [`crate::finish`] makes an image of it.
     pub fn change_seen(&self, imprint: Option<&Imprint>, optics: &OpticsState) -> [Plane; 3] {
         let grid = &self.sensor.grid;
+        let still =
+            |change: &mut [Plane; 3], imprint: &Imprint| self.mark(imprint, &Shear::default(), change);
         let mut change = match imprint {
-            Some(imprint) => self.contact_seen(imprint, optics),
+            Some(imprint) => self.contact_seen(imprint, optics, |change| still(change, imprint)),
             None => [0, 1, 2].map(|_| Plane::filled(grid.width_px, grid.height_px, 0.0)),
         };
         if optics.changes_frame() {
@@ -108,8 +110,32 @@ impl Renderer<'_> {
         change
     }
 
-    /// What the contact changes, as it reaches the camera.
-    fn contact_seen(&self, imprint: &Imprint, optics: &OpticsState) -> [Plane; 3] {
+    /// The same while the part also pulls at the gel: `tangential_n` is its force on each cell of `patch` along image x and y.
+    /// Also returns where the markers are; empty where there are none.
+    pub fn change_pulled(
+        &self,
+        imprint: &Imprint,
+        optics: &OpticsState,
+        patch: &ContactPatch,
+        tangential_n: &[[f64; 2]],
+    ) -> ([Plane; 3], Vec<[f64; 2]>) {
+        let mut markers_px = Vec::new();
+        let mut change = self.contact_seen(imprint, optics, |change| {
+            markers_px = self.mark_by_cell(patch, tangential_n, change);
+        });
+        if optics.changes_frame() {
+            camera::apply(optics, &self.sensor.rest, &mut change);
+        }
+        (change, markers_px)
+    }
+
+    /// What the contact changes, as it reaches the camera; `mark` is the stage `markers`.
+    fn contact_seen(
+        &self,
+        imprint: &Imprint,
+        optics: &OpticsState,
+        mark: impl FnOnce(&mut [Plane; 3]),
+    ) -> [Plane; 3] {
         let grid = &self.sensor.grid;
         let mut change = if !optics.changes_surface() && optics.shadow_strength == 0.0 {
             self.unmarked_change(imprint)
@@ -139,7 +165,7 @@ impl Renderer<'_> {
                 *plane = blurred(plane, &weights, self.level);
             }
         }
-        self.mark(imprint, &Shear::default(), &mut change);
+        mark(&mut change);
         for (plane, offset) in change.iter_mut().zip(optics.rest_offset) {
             if offset != 0.0 {
                 plane.values.iter_mut().for_each(|value| *value += offset as f32);

@@ -1,5 +1,9 @@
 //! From the pressure of every pixel to a few cells with the same force and moments.
 
+mod cell_map;
+
+pub use cell_map::CellMap;
+
 use crate::convolve::Area;
 use crate::grid::{Grid, Plane};
 use crate::simd::{Kernel, Lanes, SimdLevel};

@@ -8,7 +8,9 @@ use crate::convolve::Follow;
 use crate::elastic::{Base, ElasticGel, press_elastic};
 use crate::grid::Plane;
 use crate::indent::{Imprint, IndentError, Indentation, PressedGel, indent};
-use crate::markers::{MarkerGel, Shear, draw_markers, marker_displacements, without_markers};
+use crate::markers::{
+    MarkerGel, Shear, draw_markers, marker_displacements, marker_displacements_by_cell, without_markers,
+};
 use crate::noise::finish_on;
 use crate::raster::ClusteredMesh;
 use crate::sensor::Sensor;
@@ -16,7 +18,7 @@ use crate::shading::change;
 use crate::simd::SimdLevel;
 use gripgen_twin::config::GelModel;
 use gripgen_twin::frames::Pose;
-use gripgen_twin::{Gel, TactileImage};
+use gripgen_twin::{ContactPatch, Gel, TactileImage};
 use scratch::{Prepared, Scratch, with_scratch};
 
 /// One sensor with its gel.
@@ -120,6 +122,22 @@ impl Renderer<'_> {
         let mut change = self.unmarked_change(imprint);
         self.mark(imprint, shear, &mut change);
         change
+    }
+
+    /// Moves the markers as the cells of a patch pull at the gel, each with its force along image x and y. Returns where
+    /// they are; empty where there are none, or the modulus of the gel is not known.
+    pub(crate) fn mark_by_cell(
+        &self,
+        patch: &ContactPatch,
+        tangential_n: &[[f64; 2]],
+        change: &mut [Plane; 3],
+    ) -> Vec<[f64; 2]> {
+        let (Some(markers), Some(elastic)) = (&self.sensor.markers, self.gel.elastic) else { return vec![] };
+        let Sensor { grid, rest, .. } = self.sensor;
+        let gel = MarkerGel::new(self.gel.thickness_m, elastic.young_modulus_pa, elastic.poisson_ratio, 0.0);
+        let moved = marker_displacements_by_cell(&gel, patch, tangential_n, grid, &markers.rest_px);
+        draw_markers(markers, &moved, &without_markers(rest, grid, markers), change);
+        markers.rest_px.iter().zip(&moved).map(|(at, by)| [at[0] + by[0], at[1] + by[1]]).collect()
     }
 
     /// The stage `markers`.

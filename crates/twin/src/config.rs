@@ -7,6 +7,7 @@
 
 mod document;
 mod draw_file;
+mod images_file;
 mod keys;
 mod sweep_file;
 mod twin_file;
@@ -14,6 +15,7 @@ mod twin_file;
 pub(crate) use document::read_twin_table;
 pub use document::{Document, Place};
 pub(crate) use draw_file::read as read_vary;
+pub use images_file::{Compression, DuringPullFile, ImagesFile};
 pub(crate) use keys::{assign, check_part, get};
 pub use sweep_file::{
     Backend, DesignFile, ImageStorage, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,

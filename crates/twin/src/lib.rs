@@ -35,6 +35,7 @@ pub mod config;
 pub mod draw;
 pub mod effects;
 pub mod evidence;
+mod film;
 pub mod frames;
 mod friction;
 mod grasp;
@@ -64,6 +65,7 @@ pub mod values;
 
 pub use backbone::Backbone;
 pub use campaign::{Campaign, PlannedPull, PullKind};
+pub use film::{CellShear, FilmFrame, FilmPace, SlipState};
 pub use friction::{FrictionError, GripFriction, cell_friction, grip_friction};
 pub use grasp::Grasp;
 pub use image::TactileImage;

@@ -4,10 +4,11 @@ mod check;
 mod posterior;
 
 use crate::config::{
-    Backend, ConfigError, DesignFile, ImageStorage, Mechanics, PullFile, SweepFile, TraceStorage, assign,
-    check_part, get, read_twin_table,
+    Backend, Compression, ConfigError, DesignFile, ImageStorage, ImagesFile, Mechanics, PullFile, SweepFile,
+    TraceStorage, assign, check_part, get, read_twin_table,
 };
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
+use crate::film::FilmPace;
 use crate::scenario_keys;
 use crate::{CAUSE_KEY, Covariates, Posterior, PullSettings, Scenario, Twin, sobol};
 use std::collections::BTreeMap;
@@ -41,6 +42,10 @@ pub struct Sweep {
     pub gpu_adapter: Option<String>,
     /// How images are stored.
     pub images: ImageStorage,
+    /// How small images are stored.
+    pub compression: Compression,
+    /// Which frames there are of a pull, if it is filmed.
+    pub film: Option<FilmPace>,
     /// Whether traces are stored.
     pub trace: TraceStorage,
     /// Samples in one file.
@@ -97,7 +102,11 @@ impl Sweep {
             mechanics: self.mechanics,
             backend: self.backend,
             gpu_adapter: self.gpu_adapter.clone(),
-            images: self.images,
+            images: ImagesFile {
+                storage: self.images,
+                compression: self.compression,
+                during_pull: self.film.map(FilmPace::to_file),
+            },
             trace: self.trace,
             shard_samples: self.shard_samples,
             vary: self.vary.iter().map(|v| (v.key.clone(), v.distribution.to_toml())).collect(),

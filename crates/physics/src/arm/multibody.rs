@@ -159,6 +159,11 @@ impl ArmBodies {
         self.apply(world, wrench, jaws_n);
     }
 
+    /// Sets what the contact is expected to take along the pull.
+    pub(crate) fn expect(&mut self, contact_n: f64) {
+        self.contact_n = contact_n;
+    }
+
     pub(crate) fn position(&self, world: &World) -> Vector {
         (*world.bodies[self.last].position() * self.last_from_grip).translation
     }

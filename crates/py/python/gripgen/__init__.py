@@ -16,6 +16,7 @@ from importlib.util import find_spec as _find_spec
 
 from ._core import ConfigError, DataError, GripgenError, __version__
 from .dataset import Batch, Dataset, Sample, load
+from .films import Film
 from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, diagnose
 from .policies import Staircase
 from .rendering import Rendered, render
@@ -30,6 +31,7 @@ __all__ = [
     "ConfigError",
     "DataError",
     "Dataset",
+    "Film",
     "Diagnosis",
     "GripgenError",
     "Pull",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from . import _core, remote
+from .films import Film
 
 if TYPE_CHECKING:
     import pandas
@@ -30,6 +31,8 @@ class Sample(NamedTuple):
     max_pull_force_n: float
     #: The row of the table.
     values: dict[str, Any]
+    #: The film of the pull, where the dataset was loaded with `video=True`.
+    film: Film | None = None
 
 
 class Batch(NamedTuple):
@@ -55,6 +58,7 @@ def load(
     status: Sequence[str] = LABELLED,
     suspect: bool = False,
     noise: str = "stored",
+    video: bool = False,
     cache_dir: str | os.PathLike[str] | None = None,
 ) -> Dataset:
     """Open a run folder or a folder with `pulls.csv`; an fsspec URL (`s3://...`) is copied into `cache_dir` first.
@@ -66,6 +70,9 @@ def load(
     A run with `images = "clean"` has its images without the noise of the sensors, which is added when they are read: as the
     sweep drew it (`noise="stored"`, the bytes of `images = "png"`), anew in every epoch ("resample"), or not at all ("off").
 
+    With `video=True` every row has the film of its pull (`ds[i].film`), of a run with `[images] during_pull`; `ds.film(i)` reads one
+    in any case.
+
     Raises DataError, naming the file, for what is no such folder or is damaged.
     """
     text = os.fspath(path)
@@ -73,6 +80,12 @@ def load(
         text = remote.fetch(text, cache_dir)
     kept = (*status, "suspect") if suspect and "suspect" not in status else tuple(status)
     found = Dataset(text, status=kept, _opened=(os.getpid(), _core.Dataset(text)))
+    if video:
+        if not found._open().has_films:
+            raise _core.DataError(
+                f"{text}: its pulls are not filmed\nhint: sweep with images = {{ during_pull = {{ frames = 24 }} }}"
+            )
+        found = replace(found, video=True, _opened=(os.getpid(), found._open()))
     return found if noise == "stored" else found.with_noise(noise)
 
 
@@ -92,6 +105,8 @@ class Dataset(Sequence[Sample]):
     #: The noise that images are read with: "stored", "resample" or "off"; and the epoch that it is drawn for.
     noise: str = "stored"
     noise_epoch: int = 0
+    #: Whether rows have the films of their pulls.
+    video: bool = False
     # The open files, and the process that opened them.
     _opened: tuple[int, _core.Dataset] | None = field(default=None, repr=False)
     # Rows of the run when it was loaded.
@@ -109,7 +124,7 @@ class Dataset(Sequence[Sample]):
         object.__setattr__(self, "rows", rows)
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = ("path", "status", "rows", "noise", "noise_epoch", "_total")
+        kept = ("path", "status", "rows", "noise", "noise_epoch", "video", "_total")
         return {**{name: getattr(self, name) for name in kept}, "_opened": None}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
@@ -200,7 +215,8 @@ class Dataset(Sequence[Sample]):
         found = []
         for row, both in zip(rows, images):
             values = {name: column[row] for name, column in columns.items()}
-            found.append(Sample(both, float(values["max_pull_force_n"]), values))
+            film = self._film(row) if self.video else None
+            found.append(Sample(both, float(values["max_pull_force_n"]), values, film))
         return found
 
     def __iter__(self) -> Iterator[Sample]:
@@ -237,6 +253,14 @@ class Dataset(Sequence[Sample]):
             heights_mm=opened.heights(rows, threads) if heights else None,
             forces=opened.forces(rows) if forces else None,
         )
+
+    def film(self, i: int) -> Film | None:
+        """The film of a row's pull; None where there is none (no contact, or a run without films)."""
+        return self._film(self._rows_of([i])[0])
+
+    def _film(self, row: int) -> Film | None:
+        arrays = self._open().film(row)
+        return None if arrays is None else Film(**arrays)
 
     def subset(self, ids: ArrayLike) -> Dataset:
         """The rows with these numbers, in this order."""

@@ -258,3 +258,91 @@ pub struct RigEvent {
     #[prost(string, tag = "5")]
     pub text: ::prost::alloc::string::String,
 }
+/// One frame of one jaw, beside its image on `/tactile/left/film` or `/tactile/right/film`.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct FilmFrame {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    /// Number of the frame; 0 is the grip.
+    #[prost(uint32, tag = "2")]
+    pub frame: u32,
+    /// Time since the start of the pull.
+    #[prost(double, tag = "3")]
+    pub time_s: f64,
+    /// What both jaws take along the pull.
+    #[prost(double, tag = "4")]
+    pub contact_force_n: f64,
+    /// Way of the gripper along the pull.
+    #[prost(double, tag = "5")]
+    pub displacement_mm: f64,
+    #[prost(enumeration = "SlipState", tag = "6")]
+    pub state: i32,
+    /// Times at which the first and the last cell of both jaws left its place on the part; absent where none did.
+    #[prost(double, optional, tag = "7")]
+    pub incipient_slip_s: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "8")]
+    pub whole_slip_s: ::core::option::Option<f64>,
+    /// Direction of the pull in the image: right and down.
+    #[prost(double, tag = "10")]
+    pub pull_x: f64,
+    #[prost(double, tag = "11")]
+    pub pull_y: f64,
+    /// PNG, 8 bits of grey: number of the cell of each pixel in contact, from 1; 0 beside it. Cell n is entry n - 1 of the columns below,
+    /// and of those of `JawContact`.
+    #[prost(bytes = "vec", tag = "12")]
+    pub cell_png: ::prost::alloc::vec::Vec<u8>,
+    /// PNG, 16 bits of grey: micrometres by which the part lies below the surface of the gel at rest; 0 beside the contact.
+    #[prost(bytes = "vec", tag = "13")]
+    pub depth_png: ::prost::alloc::vec::Vec<u8>,
+    /// Of each cell, along the pull: how far the surface of the gel stays behind the gripper, how far it has moved over the part, what it
+    /// carries, and whether it has left its place (1) or not (0).
+    #[prost(float, repeated, tag = "20")]
+    pub cell_shear_mm: ::prost::alloc::vec::Vec<f32>,
+    #[prost(float, repeated, tag = "21")]
+    pub cell_slip_mm: ::prost::alloc::vec::Vec<f32>,
+    #[prost(float, repeated, tag = "22")]
+    pub cell_force_n: ::prost::alloc::vec::Vec<f32>,
+    #[prost(bytes = "vec", tag = "23")]
+    pub cell_slipped: ::prost::alloc::vec::Vec<u8>,
+    /// Markers: column and row of each.
+    #[prost(float, repeated, tag = "24")]
+    pub marker_x_px: ::prost::alloc::vec::Vec<f32>,
+    #[prost(float, repeated, tag = "25")]
+    pub marker_y_px: ::prost::alloc::vec::Vec<f32>,
+}
+/// How much of a jaw's contact has left its place on the part since the grip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum SlipState {
+    Unspecified = 0,
+    /// Nothing.
+    Stick = 1,
+    /// Some of it: incipient slip.
+    Incipient = 2,
+    /// All of it.
+    Slip = 3,
+}
+impl SlipState {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "SLIP_STATE_UNSPECIFIED",
+            Self::Stick => "SLIP_STATE_STICK",
+            Self::Incipient => "SLIP_STATE_INCIPIENT",
+            Self::Slip => "SLIP_STATE_SLIP",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "SLIP_STATE_UNSPECIFIED" => Some(Self::Unspecified),
+            "SLIP_STATE_STICK" => Some(Self::Stick),
+            "SLIP_STATE_INCIPIENT" => Some(Self::Incipient),
+            "SLIP_STATE_SLIP" => Some(Self::Slip),
+            _ => None,
+        }
+    }
+}

@@ -149,6 +149,7 @@ impl RigPull {
                 PullTraceMessage { rate_hz: 0.0, time_s: t.time_s.clone(), ..columns }.encode_to_vec()
             }),
             states: trace.map(|t| state_messages(t, 0, Some(VIEW_RATE_HZ))).unwrap_or_default(),
+            film: vec![],
             rig: Some(EncodedRig { rest: coded(&self.rest)?, streams, events }),
             row: index_row(&message, extra_columns),
             status: message.status(),

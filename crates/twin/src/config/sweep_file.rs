@@ -1,5 +1,6 @@
 //! The structs that mirror `sweep.toml`.
 
+use super::ImagesFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -33,9 +34,9 @@ pub struct SweepFile {
     /// processor. A software adapter (`llvmpipe`) is taken by name only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gpu_adapter: Option<String>,
-    /// How images are stored.
+    /// How images are stored, and whether the pull is filmed.
     #[serde(default)]
-    pub images: ImageStorage,
+    pub images: ImagesFile,
     /// Whether the force trace is stored.
     #[serde(default)]
     pub trace: TraceStorage,

@@ -3,10 +3,11 @@
 use super::{MAX_SAMPLES, Sweep, is_twin_key, put, read_twin};
 use crate::columns::{self, Column};
 use crate::config::{
-    Backend, ConfigError, DesignFile, Document, PullFile, StepFile, SweepFile, in_range, read_vary,
-    suggestion,
+    Backend, Compression, ConfigError, DesignFile, Document, ImageStorage, PullFile, StepFile, SweepFile,
+    in_range, read_vary, suggestion,
 };
 use crate::draw::{Distribution, Drawn, VariedKey};
+use crate::film::FilmPace;
 use crate::scenario_keys::{self, KeyError, drawn_column, pull_keys, scenario_keys};
 use crate::{PullSettings, Twin, sobol};
 
@@ -54,7 +55,9 @@ impl Sweep {
             mechanics: file.mechanics,
             backend: file.backend,
             gpu_adapter: file.gpu_adapter.clone(),
-            images: file.images,
+            images: file.images.storage,
+            compression: compression(file, &vary)?,
+            film: film(file)?,
             trace: file.trace,
             shard_samples: file.shard_samples,
             vary,
@@ -121,6 +124,36 @@ impl Sweep {
         }
         Ok(())
     }
+}
+
+/// What leaves out the frame at rest needs one for all samples.
+fn compression(file: &SweepFile, vary: &[VariedKey]) -> Result<Compression, ConfigError> {
+    let (key, images) = ("images.compression", file.images);
+    if images.compression == Compression::Small && images.storage != ImageStorage::Clean {
+        let problem = "only frames without noise can be stored small";
+        return Err(ConfigError::new(key, problem).hint("storage = \"clean\""));
+    }
+    let sensor = vary.iter().find(|v| v.key.starts_with("optics") && v.key.ends_with("sensor"));
+    if let (Compression::Small, Some(varied)) = (images.compression, sensor) {
+        let problem = format!("the frame at rest is left out, but `{}` varies", varied.key);
+        return Err(ConfigError::new(key, problem).hint("compression = \"fast\""));
+    }
+    Ok(images.compression)
+}
+
+/// The frames that a file asks for.
+fn film(file: &SweepFile) -> Result<Option<FilmPace>, ConfigError> {
+    let Some(asked) = file.images.during_pull else { return Ok(None) };
+    let pace = FilmPace::new(&asked)?;
+    if file.images.storage == ImageStorage::None {
+        let problem = "the pull is filmed, but storage is \"none\"";
+        return Err(ConfigError::new("images.during_pull", problem).hint("storage = \"clean\" or \"png\""));
+    }
+    if file.backend == Backend::Gpu {
+        let problem = "films are made by the processor, but backend is \"gpu\"";
+        return Err(ConfigError::new("images.during_pull", problem).hint("backend = \"cpu\""));
+    }
+    Ok(Some(pace))
 }
 
 fn check_direction(direction: [f64; 3], twin: &Twin) -> Result<(), ConfigError> {

@@ -1,0 +1,113 @@
+//! Which cell of the patch a pixel of the contact belongs to, also after the contact has moved.
+
+use super::{CELLS_PER_SIDE, cell_range};
+use crate::convolve::Area;
+use crate::grid::Plane;
+use crate::indent::Imprint;
+use crate::simd::SimdLevel;
+
+/// The cells of a contact as places in its bounding box.
+#[derive(Debug, Clone)]
+pub struct CellMap {
+    area: Area,
+    /// Number of the cell, from 1, at each place; a place without one has that of the nearest.
+    cell_at: [u8; CELLS_PER_SIDE * CELLS_PER_SIDE],
+}
+
+impl CellMap {
+    /// The cells of `imprint.patch`.
+    pub fn new(imprint: &Imprint, level: SimdLevel) -> Self {
+        let pressed = imprint.elastic.as_ref().map_or(&imprint.depth_px, |field| &field.pressure_pa);
+        let area = Area::of_positive(pressed, level);
+        let mut cell_at = [0; CELLS_PER_SIDE * CELLS_PER_SIDE];
+        if area.is_empty() {
+            return Self { area, cell_at };
+        }
+        let (nx, ny) = (area.x.1 - area.x.0, area.y.1 - area.y.0);
+        let holds = |place: usize| {
+            let (column, row) = (place % CELLS_PER_SIDE, place / CELLS_PER_SIDE);
+            cell_range(row, ny).any(|y| {
+                let row = pressed.row(area.y.0 + y);
+                cell_range(column, nx).any(|x| row[area.x.0 + x] > 0.0)
+            })
+        };
+        let mut count = 0;
+        for place in 0..cell_at.len() {
+            if holds(place) {
+                count += 1;
+                cell_at[place] = count;
+            }
+        }
+        let found = cell_at;
+        let apart = |a: usize, b: usize| {
+            let along = |f: fn(usize) -> usize| f(a).abs_diff(f(b));
+            let (x, y) = (along(|p| p % CELLS_PER_SIDE), along(|p| p / CELLS_PER_SIDE));
+            x * x + y * y
+        };
+        for place in 0..cell_at.len() {
+            let nearest = (0..found.len()).filter(|&p| found[p] > 0).min_by_key(|&p| apart(place, p));
+            cell_at[place] = nearest.map_or(0, |p| found[p]);
+        }
+        Self { area, cell_at }
+    }
+
+    /// The number of the cell, from 1, of each pixel of a contact that has moved by `moved_px` (columns, rows); 0 beside it.
+    pub fn of_contact(&self, depth_px: &Plane, moved_px: [f64; 2]) -> Vec<u8> {
+        let mut cells = vec![0; depth_px.values.len()];
+        if self.area.is_empty() {
+            return cells;
+        }
+        // The cell of column or row i of n is 8 i / n.
+        let place = |at: usize, first: usize, end: usize, moved: f64| {
+            let n = (end - first) as f64;
+            let from = at as f64 + 0.5 - moved - first as f64;
+            ((CELLS_PER_SIDE as f64 * from / n) as usize).min(CELLS_PER_SIDE - 1)
+        };
+        let columns: Vec<usize> =
+            (0..depth_px.width).map(|x| place(x, self.area.x.0, self.area.x.1, moved_px[0])).collect();
+        for (y, cells) in cells.chunks_exact_mut(depth_px.width).enumerate() {
+            let row = CELLS_PER_SIDE * place(y, self.area.y.0, self.area.y.1, moved_px[1]);
+            for ((cell, &depth), &column) in cells.iter_mut().zip(depth_px.row(y)).zip(&columns) {
+                if depth > 0.0 {
+                    *cell = self.cell_at[row + column];
+                }
+            }
+        }
+        cells
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Grid;
+    use crate::indent::{PressedGel, indent};
+
+    /// Pixels of a cell are as many as its area says, at rest; a contact that moves takes them along.
+    #[test]
+    fn pixels_belong_to_the_cells_of_the_patch() {
+        let grid = Grid { width_px: 96, height_px: 80, metres_per_px: 1e-4 };
+        let mut heights = Plane::filled(96, 80, -50.0);
+        for y in 0..80 {
+            for x in 0..96 {
+                let (u, v) = (x as f32 - 40.0, y as f32 - 37.0);
+                // A ring: its middle holds no cell.
+                heights.values[96 * y + x] = -((u * u + v * v).sqrt() - 20.0).abs();
+            }
+        }
+        let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
+        let imprint = indent(&heights, &grid, &gel, 10.0).unwrap();
+        let map = CellMap::new(&imprint, SimdLevel::best());
+        let cells = map.of_contact(&imprint.depth_px, [0.0, 0.0]);
+        for (k, cell) in imprint.patch.cells.iter().enumerate() {
+            let pixels = cells.iter().filter(|&&c| usize::from(c) == k + 1).count();
+            assert!((pixels as f64 * 1e-8 - cell.area_m2).abs() < 1e-12, "cell {k}: {pixels} pixels");
+        }
+        let mut moved = Plane::filled(96, 80, 0.0);
+        for y in 0..70 {
+            moved.values[96 * (y + 10)..96 * (y + 11)]
+                .copy_from_slice(&imprint.depth_px.values[96 * y..96 * (y + 1)]);
+        }
+        assert_eq!(map.of_contact(&moved, [0.0, 10.0])[96 * 10..], cells[..96 * 70]);
+    }
+}
