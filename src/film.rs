@@ -46,11 +46,12 @@ struct Moment {
     cells: PerJaw<Vec<CellShear>>,
 }
 
-/// A pull as it was seen: its states, and what its jaws held.
+/// A pull as it was seen: its states, what its jaws held, and when frames are taken of it.
 pub(crate) struct Seen<'a> {
     pub(crate) states: &'a [PullState],
     pub(crate) trace: &'a PullTrace,
     pub(crate) friction: &'a PerJaw<JawFriction>,
+    pub(crate) pace: FilmPace,
 }
 
 impl Film {
@@ -61,7 +62,6 @@ impl Film {
         gripped: &Gripped,
         contact: &Contact,
         options: SimulateOptions,
-        pace: FilmPace,
         seen: &Seen<'_>,
     ) -> Result<Self, SampleError> {
         let mut cells = PullCells::new(options.mechanics, &twin.gel, seen.friction);
@@ -77,7 +77,7 @@ impl Film {
                 break;
             }
         }
-        let rows = pace.rows(seen.trace, whole);
+        let rows = seen.pace.rows(seen.trace, whole);
         let mut cells = PullCells::new(options.mechanics, &twin.gel, seen.friction);
         let mut moments = Vec::with_capacity(rows.len());
         for (row, state) in seen.states.iter().enumerate() {

@@ -218,8 +218,8 @@ fn filmed(
         pulled.suspect = None;
     }
     let friction = held_friction(twin, scenario, contact)?.0;
-    let seen = Seen { states: &states, trace: &pulled.trace, friction: &friction };
-    let film = Film::new(twin, library, scenario, gripped, contact, options, pace, &seen)?;
+    let seen = Seen { states: &states, trace: &pulled.trace, friction: &friction, pace };
+    let film = Film::new(twin, library, scenario, gripped, contact, options, &seen)?;
     Ok((outcome, Some(film)))
 }
 

@@ -6,6 +6,9 @@ use numpy::{PyArray, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+/// A number of a cell.
+type OfCell = fn(&CellShear) -> f32;
+
 /// The arrays of `gripgen.Film`, by name.
 pub(crate) fn arrays<'py>(py: Python<'py>, film: &Film) -> PyResult<Bound<'py, PyDict>> {
     const CELLS: usize = ContactPatch::MAX_CELLS;
@@ -27,12 +30,12 @@ pub(crate) fn arrays<'py>(py: Python<'py>, film: &Film) -> PyResult<Bound<'py, P
         SlipState::Slip => 2,
     };
     found.set_item("state", PyArray::from_vec(py, all().map(state).collect()).reshape([frames, 2])?)?;
-    let of_cells = |of: fn(&CellShear) -> f32| -> Vec<f32> {
+    let of_cells = |of: OfCell| -> Vec<f32> {
         all()
             .flat_map(|f| (0..CELLS).map(|i| f.cells.get(i).map_or(f32::NAN, of)).collect::<Vec<_>>())
             .collect()
     };
-    let columns: [(&str, fn(&CellShear) -> f32); 3] = [
+    let columns: [(&str, OfCell); 3] = [
         ("cell_shear_mm", |c| (c.shear_m * 1e3) as f32),
         ("cell_slip_mm", |c| (c.slip_m * 1e3) as f32),
         ("cell_force_n", |c| c.force_n as f32),

@@ -395,7 +395,7 @@ impl Dataset {
     /// A shard that cannot be read.
     pub fn has_films(&self) -> Result<bool, DatasetError> {
         match &self.source {
-            Source::Run { .. } => Ok(self.shard_of(0)?.0.has_film()),
+            Source::Run { .. } | Source::Shard(_) => Ok(self.shard_of(0)?.0.has_film()),
             Source::Pulls { .. } => Ok(false),
         }
     }
@@ -407,7 +407,7 @@ impl Dataset {
     /// A row that is not there, or a shard that cannot be read.
     pub fn film(&self, row: usize) -> Result<Option<Film>, DatasetError> {
         self.check_row(row)?;
-        if self.run().is_none() {
+        if matches!(self.source, Source::Pulls { .. }) {
             return Ok(None);
         }
         let (reader, index) = self.shard_of(row)?;
