@@ -279,7 +279,7 @@ fn fuzz(seed: u64, parts: u64) -> Seen {
 
 #[test]
 fn random_parts_in_random_grips_have_the_contact_that_is_there() {
-    let seen = fuzz(1, 24);
+    let seen = fuzz(1, 8);
     println!("{seen:?}");
     assert!(seen.held >= 60, "{seen:?}");
     assert!(seen.wrong.is_empty(), "{:#?}", seen.wrong);
@@ -314,10 +314,12 @@ fn ratios(seed: u64, parts: u64, wanted: usize) -> Vec<(f64, String)> {
             }
             let Outcome::Pulled(b) = generate(&reduced, index, SimdLevel::best()).outcome else { continue };
             let name = format!("{} {number}, sample {index}", FAMILIES[family].name);
-            let ratio = match generate(&rapier, index, SimdLevel::best()).outcome {
-                Outcome::Pulled(a) => a.label.max_pull_force_n / b.label.max_pull_force_n,
-                _ => 0.0,
+            let (ratio, why) = match generate(&rapier, index, SimdLevel::best()).outcome {
+                Outcome::Pulled(a) => (a.label.max_pull_force_n / b.label.max_pull_force_n, String::new()),
+                Outcome::NoContact { .. } => (0.0, ": Rapier misses the part".to_string()),
+                Outcome::Failed { reason } => (0.0, format!(": {reason}")),
             };
+            let name = name + &why;
             of_part += 1;
             found.push((ratio, name));
         }
@@ -327,7 +329,7 @@ fn ratios(seed: u64, parts: u64, wanted: usize) -> Vec<(f64, String)> {
 
 /// Any grip that holds, in corners and on edges too.
 #[test]
-#[ignore = "slow: minutes"]
+#[ignore = "slow; red: 20 of 120 grips are apart, 19 of them because Rapier holds nothing where the reduced mechanics hold"]
 fn both_mechanics_agree_on_random_grips() {
     let parts = std::env::var("GRIPGEN_FUZZ_PARTS").ok().and_then(|n| n.parse().ok()).unwrap_or(120);
     let found = ratios(3, parts, 5);
