@@ -10,7 +10,8 @@ use gripgen::identify::{FitOptions, FreeParameter, fit};
 use gripgen::twin::effects::{GripPoint, find};
 use gripgen::twin::{Covariates, Jaw, Twin};
 use gripgen::{
-    BASELINE_TWIN, Library, Location, PullDiagnoseOptions, diagnose_pull_table, load_pulls, load_twin_document,
+    BASELINE_TWIN, Library, Location, PullDiagnoseOptions, diagnose_pull_table, load_pulls,
+    load_twin_document,
 };
 use std::error::Error;
 use std::fmt::Write as _;
@@ -42,10 +43,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let data = PathBuf::from(words.next().unwrap_or_else(|| "../shared/real/rock_velocity_steps".into()));
     let out = PathBuf::from(words.next().unwrap_or_else(|| "target/rock".into()));
-    for (name, file) in [
-        ("sepiolite", "velstep3_TR2_exp013_sepiolite.txt"),
-        ("basalt", "velstep4_BRAVA_expb819_basalt.txt"),
-    ] {
+    for (name, file) in
+        [("sepiolite", "velstep3_TR2_exp013_sepiolite.txt"), ("basalt", "velstep4_BRAVA_expb819_basalt.txt")]
+    {
         let path = data.join(file);
         if !path.is_file() {
             println!("{} is absent: nothing to do", path.display());
@@ -94,8 +94,10 @@ fn plateau(trace: &Trace, from: usize, to: usize) -> f64 {
 /// Stretches of both plateaus, each a pull at the rate of its speed, in turns; a fifth of the rows after the step is left out.
 fn as_pulls(trace: &Trace, speeds: (f64, f64), folder: &Path) -> Result<(), Box<dyn Error>> {
     let n = trace.time_s.len();
-    let mut table = String::from("pull_id,part,grip_force_n,max_pull_force_n,force_increment_n,step_time_s\n");
-    let plateaus = [(0, trace.step.saturating_sub(n / 50), speeds.0), (trace.step + (n - trace.step) / 5, n, speeds.1)];
+    let mut table =
+        String::from("pull_id,part,grip_force_n,max_pull_force_n,force_increment_n,step_time_s\n");
+    let plateaus =
+        [(0, trace.step.saturating_sub(n / 50), speeds.0), (trace.step + (n - trace.step) / 5, n, speeds.1)];
     for k in 0..PULLS {
         for (p, (from, to, speed)) in plateaus.into_iter().enumerate() {
             let (a, b) = (from + (to - from) * k / PULLS, from + (to - from) * (k + 1) / PULLS);
@@ -127,7 +129,11 @@ fn as_pulls(trace: &Trace, speeds: (f64, f64), folder: &Path) -> Result<(), Box<
     }
     if let Some(error) = &found.error {
         let rmse = |e: &gripgen::identify::HeldOutError| e.rmse_n.unwrap_or(f64::NAN) / (2.0 * GRIP_N);
-        println!("  held-out error of the coefficient: {:.5} -> {:.5}", rmse(&error.before), rmse(&error.after));
+        println!(
+            "  held-out error of the coefficient: {:.5} -> {:.5}",
+            rmse(&error.before),
+            rmse(&error.after)
+        );
     }
     Ok(())
 }
@@ -193,7 +199,8 @@ fn as_trace(trace: &Trace, speeds: (f64, f64)) {
         (Law::Rate, "rate_dependence"),
         (Law::RateAndState, "rate_dependence with the age of contacts"),
     ] {
-        let free = |name: &str, start, bounds, scale| FreeParameter { name: name.into(), start, bounds, scale };
+        let free =
+            |name: &str, start, bounds, scale| FreeParameter { name: name.into(), start, bounds, scale };
         let parameters = [
             free("mu", 0.5, (0.0, 2.0), 0.01),
             free("k", 0.01, (-0.1, 0.3), 0.01),
@@ -206,7 +213,10 @@ fn as_trace(trace: &Trace, speeds: (f64, f64)) {
                 parameters[3].start = start;
                 fit(&parameters, FitOptions::default(), |values| {
                     let predicted = predict(trace, &rows, law, speeds.0, values);
-                    (0..rows.len()).filter(|&k| used(k)).map(|k| trace.friction[rows[k]] - predicted[k]).collect()
+                    (0..rows.len())
+                        .filter(|&k| used(k))
+                        .map(|k| trace.friction[rows[k]] - predicted[k])
+                        .collect()
                 })
             });
             let found = best.into_iter().flatten().min_by(|a, b| a.cost.total_cmp(&b.cost));

@@ -67,7 +67,10 @@ fn the_growth_of_imprints_is_read_off_noisy_images() {
     let d = diagnose_imprint_table(&loaded(bent.path()), &twin).diagnosis;
     println!("{:?}\n{:?}", plain.effects, d.effects);
     let exponent = |d: &gripgen::identify::Diagnosis| {
-        d.effects.iter().find(|e| e.name == "imprint_nonlinearity").map_or(1.0, |e| e.parameters["exponent"].value)
+        d.effects
+            .iter()
+            .find(|e| e.name == "imprint_nonlinearity")
+            .map_or(1.0, |e| e.parameters["exponent"].value)
     };
     // Steep walls count too little, so that a straight line reads as a slightly bent one: the difference is that of the truth.
     assert!((exponent(&plain) - exponent(&d) - 0.4).abs() < 0.12, "{} {}", exponent(&plain), exponent(&d));
@@ -88,7 +91,10 @@ fn constants_stand_in_the_twin_with_their_evidence() {
     let edits = imprint_calibration_edits(&found, &twin, None, &set.sha256).unwrap();
     let out = folder.path().join("twin.toml");
     let text = edited_twin_toml(&Location::parse(TWIN), &[], &edits, &out).unwrap();
-    assert!(text.contains(&set.sha256) && text.contains("gripgen calibrate imprints, 12 rows of 2 grasps"), "{text}");
+    assert!(
+        text.contains(&set.sha256) && text.contains("gripgen calibrate imprints, 12 rows of 2 grasps"),
+        "{text}"
+    );
     std::fs::write(&out, text).unwrap();
     let new = load_twin_document(&Location::Disk(out), &[]).unwrap().read_twin().unwrap();
     let c = Twin::new(&new).unwrap().parts["gear"].imprint_m3_per_n * 1e9;
