@@ -13,7 +13,7 @@ pub struct Imprint {
     pub depth_px: Plane,
     /// Largest depth.
     pub press_depth_m: f64,
-    /// The pressure field as a few cells.
+    /// The pressure field as a few cells, from the centres of pixels.
     pub patch: ContactPatch,
     /// Surface and pressure, if the gel is elastic.
     pub elastic: Option<ElasticField>,
@@ -175,7 +175,8 @@ impl Indentation<'_> {
         let press_px = self.press_px(map, top, limit_px)?;
         let mut depth_px = Plane::filled(map.width, map.height, 0.0);
         self.write_depths(map, press_px - f64::from(top), &mut depth_px);
-        Ok(self.imprint(depth_px, press_px))
+        let patch = self.patch(&depth_px);
+        Ok(self.imprint(depth_px, press_px, patch))
     }
 
     /// The same with the pixels beside steps at their points.
@@ -190,6 +191,8 @@ impl Indentation<'_> {
         let mut depth_px = Plane::filled(map.width, map.height, 0.0);
         let top_px = f64::from(top);
         self.write_depths(map, press_px - top_px, &mut depth_px);
+        // Areas and moments are unbiased by pixels that are in contact or not; one whose mean depth is above 0 may be so in part.
+        let patch = self.patch(&depth_px);
         if map.find_steps(&depth_px, self.level) {
             let (at_centres_px, mut limit_px) = (press_px, limit_px);
             loop {
@@ -209,7 +212,7 @@ impl Indentation<'_> {
             self.write_depths(map, press_px - top_px, &mut depth_px);
             map.write_steps(self.rest, press_px - top_px, &mut depth_px);
         }
-        Ok(self.imprint(depth_px, press_px))
+        Ok(self.imprint(depth_px, press_px, patch))
     }
 
     /// How deep a map is pressed in by the centres of its pixels.
@@ -248,8 +251,11 @@ impl Indentation<'_> {
         self.level.run(Depths { map, rest: self.rest, lift, depth_px });
     }
 
-    fn imprint(&self, depth_px: Plane, press_px: f64) -> Imprint {
-        let patch = aggregate(&depth_px, self.grid, self.force_n, self.level);
+    fn patch(&self, depth_px: &Plane) -> ContactPatch {
+        aggregate(depth_px, self.grid, self.force_n, self.level)
+    }
+
+    fn imprint(&self, depth_px: Plane, press_px: f64, patch: ContactPatch) -> Imprint {
         Imprint { depth_px, press_depth_m: press_px * self.grid.metres_per_px, patch, elastic: None }
     }
 

@@ -61,7 +61,7 @@ pub struct Family {
     make: fn(&mut Numbers) -> TriMesh,
 }
 
-/// All families. The three for tests were drawn by lot before anything was trained.
+/// All families. The three for tests were chosen by hand, before anything was trained.
 pub const FAMILIES: [Family; 12] = [
     Family { name: "shaft", split: Split::Train, make: shaft::make },
     Family { name: "bearing", split: Split::Test, make: bearing::make },
