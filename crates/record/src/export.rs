@@ -1,7 +1,7 @@
 //! One sample as a file of its own, with every reading as a message for viewers.
 
 use crate::encode::{EncodedSample, state_messages, timestamp};
-use crate::film::EncodedFrame;
+use crate::film_frame::EncodedFrame;
 use crate::mark::EXPORT;
 use crate::picture::encode_png;
 use crate::proto::foxglove::{CompressedImage, RawImage};

@@ -23,6 +23,7 @@ mod dataset;
 mod encode;
 mod export;
 mod film;
+mod film_frame;
 mod folder;
 mod imprint_table;
 mod index;
@@ -50,7 +51,8 @@ pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_to
 pub use dataset::{Dataset, DatasetError, NoiseMode, Table};
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
-pub use film::{EncodedFrame, Film, FilmOptions, encode_frame};
+pub use film::{Film, FilmOptions, encode_frame};
+pub use film_frame::EncodedFrame;
 pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
     sha256_hex,

@@ -2,7 +2,7 @@
 
 use crate::background::Background;
 use crate::encode::EncodedSample;
-use crate::film::{film_topic, label_topic};
+use crate::film_frame::{film_topic, label_topic};
 use crate::mark::MARK_NAME;
 use crate::picture::{PictureError, encode_small_png};
 use crate::proto::{

@@ -15,10 +15,10 @@ mod twin_file;
 pub(crate) use document::read_twin_table;
 pub use document::{Document, Place};
 pub(crate) use draw_file::read as read_vary;
-pub use images_file::{Compression, DuringPullFile, ImagesFile};
+pub use images_file::{Compression, DuringPullFile, ImageStorage, ImagesFile};
 pub(crate) use keys::{assign, check_part, get};
 pub use sweep_file::{
-    Backend, DesignFile, ImageStorage, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,
+    Backend, DesignFile, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,
 };
 pub use twin_file::{
     ArmFile, CalibrationFile, EffectFile, Feedback, ForceConvention, GelFile, GelModel, GripFile,

@@ -1,6 +1,5 @@
 //! `images` of `sweep.toml`: a word, or a table that also says whether the pull is filmed.
 
-use super::ImageStorage;
 use schemars::JsonSchema;
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{MapAccess, Visitor};
@@ -17,6 +16,21 @@ pub struct ImagesFile {
     pub compression: Compression,
     /// Images while the part is pulled.
     pub during_pull: Option<DuringPullFile>,
+}
+
+/// How images are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ImageStorage {
+    /// PNG, lossless.
+    #[default]
+    Png,
+    /// PNG of the frames before sensor noise: a third of the size. What reads them adds the noise, bit for bit.
+    Clean,
+    /// Raw RGB: larger and faster to read.
+    Raw,
+    /// No images.
+    None,
 }
 
 /// How small frames without noise are stored.

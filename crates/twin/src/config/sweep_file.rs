@@ -98,21 +98,6 @@ pub enum Backend {
     Gpu,
 }
 
-/// How images are stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ImageStorage {
-    /// PNG, lossless.
-    #[default]
-    Png,
-    /// PNG of the frames before sensor noise: a third of the size. What reads them adds the noise, bit for bit.
-    Clean,
-    /// Raw RGB: larger and faster to read.
-    Raw,
-    /// No images.
-    None,
-}
-
 /// Whether the force trace is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
