@@ -4,6 +4,7 @@
 //! row can be read at any time from any thread. Memory does not grow with what was read: the shards used last stay open.
 
 mod columns;
+mod films;
 mod images;
 #[cfg(test)]
 mod tests;
@@ -11,7 +12,6 @@ mod tests;
 pub use columns::Table;
 pub use images::NoiseMode;
 
-use crate::film::Film;
 use crate::folder::{FolderError, RunFolder};
 use crate::index::{extra_columns, index_row};
 use crate::picture::encode_png;
@@ -386,32 +386,6 @@ impl Dataset {
         let (reader, index) = self.shard_of(row)?;
         let both = reader.raw_rest(index)?;
         Ok(both.map(|both| reader.png_of(index, "_rest", &both)).transpose()?)
-    }
-
-    /// Whether pulls of its rows are filmed.
-    ///
-    /// # Errors
-    ///
-    /// A shard that cannot be read.
-    pub fn has_films(&self) -> Result<bool, DatasetError> {
-        match &self.source {
-            Source::Run { .. } | Source::Shard(_) => Ok(self.shard_of(0)?.0.has_film()),
-            Source::Pulls { .. } => Ok(false),
-        }
-    }
-
-    /// The film of a row's pull, where there is one.
-    ///
-    /// # Errors
-    ///
-    /// A row that is not there, or a shard that cannot be read.
-    pub fn film(&self, row: usize) -> Result<Option<Film>, DatasetError> {
-        self.check_row(row)?;
-        if matches!(self.source, Source::Pulls { .. }) {
-            return Ok(None);
-        }
-        let (reader, index) = self.shard_of(row)?;
-        Ok(reader.film(index)?)
     }
 
     /// The force over time of a row, where it is stored.

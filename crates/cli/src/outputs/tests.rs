@@ -9,9 +9,22 @@ use std::collections::BTreeSet;
 use std::ffi::OsString;
 
 /// Arguments that name what is read.
-const READ: [&str; 14] = [
-    "config", "run", "presses", "measured", "also", "sensor", "twin", "rig", "mesh", "campaign", "after",
-    "separate", "target", "data",
+const READ: [&str; 15] = [
+    "rehearsal",
+    "config",
+    "run",
+    "presses",
+    "measured",
+    "also",
+    "sensor",
+    "twin",
+    "rig",
+    "mesh",
+    "campaign",
+    "after",
+    "separate",
+    "target",
+    "data",
 ];
 /// Arguments that name a folder with rules of its own: a run (exit code 3), measurements, the files of `init`.
 const FOLDERS: [(&str, &str); 4] =
@@ -70,6 +83,9 @@ impl World {
             sensor += &format!("{i},{force_n},{:.3},a\n", 1.05 * force_n + 0.2 + noise_n);
         }
         world.put("sensor/sensor.csv", sensor.as_bytes());
+        let imprints = (1..9).map(|i| format!("i{i},{},{},g\n", 5 * i, 7.5 * f64::from(i)));
+        let imprints = format!("imprint_id,grip_force_n,volume_mm3,grasp\n{}", imprints.collect::<String>());
+        world.put("imprints/imprints.csv", imprints.as_bytes());
         world.put("presses/presses.csv", b"image,x_px,y_px,radius_px\na.png,40,40,20\n");
         world.put("presses/a.png", b"no picture");
         world.put(
@@ -90,7 +106,7 @@ impl World {
     fn line(&self, line: &str) -> Result<u8, Failure> {
         let words = line.split(' ').map(|word| {
             let first = word.split('/').next().unwrap_or_default();
-            let folders = ["run", "pulls", "traced", "one", "sensor", "presses", "out"];
+            let folders = ["run", "pulls", "traced", "one", "sensor", "imprints", "presses", "out"];
             let files = ["sweep.toml", "twin.toml", "rig.toml", "part.stl", "sensor.npz"];
             let is_path = folders.contains(&first) || files.contains(&word);
             if is_path { self.root.join(word).into_os_string() } else { OsString::from(word) }
@@ -127,6 +143,8 @@ fn cases() -> Vec<Case> {
         case("export", "out", "mcap", "run --sample 0", true),
         case("export", "out", "parquet", "run --to parquet", true),
         case("export", "out", "tar", "run --to webdataset -q", true),
+        json("calibrate imprints", "imprints -q", true),
+        case("calibrate imprints", "out", "toml", "imprints --part gear --twin twin.toml -q", true),
         json("calibrate presses", "presses -o out/s.npz", false),
         case("calibrate presses", "out", "npz", "presses", false),
         case("calibrate presses", "report", "html", "presses -o out/s.npz", false),
@@ -150,6 +168,8 @@ fn cases() -> Vec<Case> {
         case("campaign", "out", "toml", "--parts gear --pulls 24 --twin twin.toml", true),
         json("rig check", "rig.toml", false),
         json("rig teach", "bolt --rig rig.toml", false),
+        json("rig rehearse", "rig.toml -o out/rehearsal.json", false),
+        case("rig rehearse", "out", "json", "rig.toml", false),
         json("rig pull", "rig.toml --dry-run -o out/day", true),
         json("rig serve", "", false),
         case("rig serve", "write_rig", "toml", "twin.toml", false),

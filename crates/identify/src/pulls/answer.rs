@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, candidates};
 use super::context::Context;
 use super::data::PullData;
-use super::estimates::{HALF90, parameters};
+use super::estimates::{baseline, parameters};
 use super::fitting::Fitted;
 use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
@@ -449,38 +449,6 @@ fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize) ->
     found.sort();
     found.dedup();
     found
-}
-
-pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
-    let mut values = plain_baseline(&fitted.model, context);
-    let unit = |name: &str| if name.ends_with("_s") { "s" } else { "1" };
-    for (k, name) in fitted.names.iter().enumerate() {
-        if !(name.starts_with("parts.") || name.starts_with("robot.") || name == "kinetic_ratio") {
-            continue;
-        }
-        let (value, half) = (fitted.values[k], HALF90 * fitted.covariance[(k, k)].max(0.0).sqrt());
-        let estimate = ParameterEstimate::new(value, (value - half, value + half), unit(name));
-        values.insert(name.clone(), estimate);
-    }
-    let scattered = scatter(&fitted.model, fitted.likelihood.scale);
-    values.insert("scatter".into(), ParameterEstimate::new(scattered, (scattered, scattered), "1"));
-    values
-}
-
-/// What a model says of the rig, without intervals but that of the noise.
-pub(super) fn plain_baseline(m: &PullModel, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
-    let mut values = BTreeMap::new();
-    let plain = |value: f64, unit: &str| ParameterEstimate::new(value, (value, value), unit);
-    values.insert("robot.lag_s".into(), plain(m.lag_s, "s"));
-    values.insert("robot.dead_time_s".into(), plain(m.dead_time_s, "s"));
-    let noise90_n = context.noise90_n.unwrap_or((m.noise_n, m.noise_n));
-    values.insert("wrist.noise_n".into(), ParameterEstimate::new(m.noise_n, noise90_n, "N"));
-    if !context.observations.is_empty() {
-        let each = m.stiffness_n_per_m * 0.5e-3;
-        values.insert("gel.left.shear_stiffness_n_per_mm".into(), plain(each, "N/mm"));
-        values.insert("robot.damping_n_s_per_m".into(), plain(m.damping_n_s_per_m, "N s/m"));
-    }
-    values
 }
 
 /// Pulls that lie far off, the farthest first.

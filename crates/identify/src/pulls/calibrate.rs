@@ -1,11 +1,11 @@
 //! Calibration of the baseline, with the effects that were asked for and no search.
 
-use super::answer::{baseline, insufficient};
+use super::answer::insufficient;
 use super::candidates::{Candidate, candidate};
 use super::context::Context;
 use super::data::PullData;
 use super::dynamics::Dynamics;
-use super::estimates::parameters;
+use super::estimates::{baseline, parameters};
 use super::few::{FEW_PULLS, calibrate_few, lacks_forces};
 use super::fitting::Fitted;
 use super::heldout::{errors, folds, predicted};

@@ -1,7 +1,10 @@
-//! Parameters of effects with their intervals, as they are reported.
+//! Parameters of effects and of the baseline with their intervals, as they are reported.
 
 use super::candidates::Candidate;
+use super::context::Context;
 use super::fitting::Fitted;
+use super::heldout::scatter;
+use super::model::PullModel;
 use crate::diagnosis::ParameterEstimate;
 use std::collections::BTreeMap;
 
@@ -33,4 +36,37 @@ pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<Str
         (p.name.to_string(), estimate)
     };
     spec.parameters.iter().enumerate().map(each).collect()
+}
+
+/// The baseline of a fit.
+pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
+    let mut values = plain_baseline(&fitted.model, context);
+    let unit = |name: &str| if name.ends_with("_s") { "s" } else { "1" };
+    for (k, name) in fitted.names.iter().enumerate() {
+        if !(name.starts_with("parts.") || name.starts_with("robot.") || name == "kinetic_ratio") {
+            continue;
+        }
+        let (value, half) = (fitted.values[k], HALF90 * fitted.covariance[(k, k)].max(0.0).sqrt());
+        let estimate = ParameterEstimate::new(value, (value - half, value + half), unit(name));
+        values.insert(name.clone(), estimate);
+    }
+    let scattered = scatter(&fitted.model, fitted.likelihood.scale);
+    values.insert("scatter".into(), ParameterEstimate::new(scattered, (scattered, scattered), "1"));
+    values
+}
+
+/// What a model says of the rig, without intervals but that of the noise.
+pub(super) fn plain_baseline(m: &PullModel, context: &Context<'_>) -> BTreeMap<String, ParameterEstimate> {
+    let mut values = BTreeMap::new();
+    let plain = |value: f64, unit: &str| ParameterEstimate::new(value, (value, value), unit);
+    values.insert("robot.lag_s".into(), plain(m.lag_s, "s"));
+    values.insert("robot.dead_time_s".into(), plain(m.dead_time_s, "s"));
+    let noise90_n = context.noise90_n.unwrap_or((m.noise_n, m.noise_n));
+    values.insert("wrist.noise_n".into(), ParameterEstimate::new(m.noise_n, noise90_n, "N"));
+    if !context.observations.is_empty() {
+        let each = m.stiffness_n_per_m * 0.5e-3;
+        values.insert("gel.left.shear_stiffness_n_per_mm".into(), plain(each, "N/mm"));
+        values.insert("robot.damping_n_s_per_m".into(), plain(m.damping_n_s_per_m, "N s/m"));
+    }
+    values
 }

@@ -7,9 +7,9 @@
 mod nodes;
 mod part;
 
-use super::answer::plain_baseline;
 use super::context::Context;
 use super::data::PullData;
+use super::estimates::plain_baseline;
 use super::law::{OffsetLaw, largest_relative_sigma};
 use super::model::{ModelEffect, PredictPulls, PullModel};
 use super::priors::PullPriors;
