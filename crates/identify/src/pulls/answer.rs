@@ -22,8 +22,8 @@ use super::unknown::unknown;
 use super::words::separation;
 use super::zero_screen::{said, zeros_that_depend};
 use crate::diagnosis::{
-    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, ParameterEstimate, Residual, Rival,
-    SeparateBy, UnknownCovariate,
+    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, Residual, Rival, SeparateBy,
+    UnknownCovariate,
 };
 use gripgen_twin::columns::covariates;
 use gripgen_twin::rounded;
