@@ -115,7 +115,13 @@ impl Steps {
     /// Whether there are some in a box; both ends count.
     #[inline(always)]
     pub(super) fn any_in(&self, rows: (usize, usize), columns: (usize, usize)) -> bool {
-        (rows.0..=rows.1).any(|row| self.any(row, columns))
+        // A closure would not be compiled for the vector unit.
+        for row in rows.0..=rows.1 {
+            if self.any(row, columns) {
+                return true;
+            }
+        }
+        false
     }
 
     /// Whether there are some in a row, from one column up to another.
@@ -132,7 +138,11 @@ impl Steps {
         if from == to {
             return words[from] & low & high != 0;
         }
-        (words[from] & low) | (words[to] & high) != 0 || words[from + 1..to].iter().any(|&w| w != 0)
+        let mut some = (words[from] & low) | (words[to] & high);
+        for word in &words[from + 1..to] {
+            some |= word;
+        }
+        some != 0
     }
 
     /// The pixels of a row, which has some, from one column up to another.
