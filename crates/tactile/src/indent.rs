@@ -195,19 +195,30 @@ impl Indentation<'_> {
         let patch = self.patch(&depth_px);
         if map.find_steps(&depth_px, self.level) {
             let (at_centres_px, mut limit_px) = (press_px, limit_px);
+            let by_centres = map.touched(self.rest, top_px, at_centres_px, self.level);
+            // Points change a press little: only what lies so deep is drawn at first.
+            let mut drawn_px = limit_px.min(MARGIN * at_centres_px);
             loop {
-                map.draw_steps(mesh, top_px - limit_px, self.level);
-                let touched = |press_px| map.touched_with_steps(self.rest, top_px, press_px, self.level);
+                map.draw_steps(mesh, top_px - drawn_px, self.level);
+                let touched = |press_px| {
+                    let known = press_px == at_centres_px;
+                    let by_centres =
+                        if known { by_centres } else { map.touched(self.rest, top_px, press_px, self.level) };
+                    map.with_steps(by_centres, self.rest, top_px, press_px)
+                };
                 press_px = self.settle(at_centres_px, touched);
-                if press_px <= limit_px {
+                if press_px <= drawn_px {
                     break;
                 }
-                if limit_px >= self.thickness_px() {
-                    let (below, count) = touched(limit_px);
-                    return Err(self.through_the_gel(below + count * limit_px));
+                if drawn_px >= self.thickness_px() {
+                    let (below, count) = touched(drawn_px);
+                    return Err(self.through_the_gel(below + count * drawn_px));
                 }
-                limit_px = (MIN_GROWTH * press_px).min(self.thickness_px());
-                map.draw_down(mesh, limit_px, self.rest, self.level);
+                if drawn_px >= limit_px {
+                    limit_px = (MIN_GROWTH * press_px).min(self.thickness_px());
+                    map.draw_down(mesh, limit_px, self.rest, self.level);
+                }
+                drawn_px = limit_px;
             }
             self.write_depths(map, press_px - top_px, &mut depth_px);
             map.write_steps(self.rest, press_px - top_px, &mut depth_px);

@@ -174,15 +174,14 @@ impl HeightMap {
         level.run(DrawPoints { map: self, mesh, floor_px });
     }
 
-    /// As [`HeightMap::touched`], with these pixels at their points.
-    pub(crate) fn touched_with_steps(
+    /// What a press touches, `by_centres` as [`HeightMap::touched`] says, with these pixels at their points.
+    pub(crate) fn with_steps(
         &self,
+        by_centres: (f64, f64),
         rest: Option<&Plane>,
         top: f64,
         press_px: f64,
-        level: SimdLevel,
     ) -> (f64, f64) {
-        let by_centres = self.touched(rest, top, press_px, level);
         self.steps.touched(by_centres, &self.values, rest, top, press_px)
     }
 
@@ -337,20 +336,22 @@ impl Kernel for DrawPoints<'_> {
             let cluster = &self.mesh.clusters[s.cluster];
             corners.transform(self.mesh, cluster, view);
             for t in &self.mesh.triangles[cluster.triangles.clone()] {
-                let around = |v: &[(i32, i32)], n: usize| {
-                    let [a, b, c] = t.map(|corner| v[usize::from(corner)]);
-                    let last = n as i32 - 1;
-                    // From the largest whole number before the corners to the smallest one after them.
-                    let (from, to) = (a.1.min(b.1).min(c.1).max(0), a.0.max(b.0).max(c.0).min(last));
-                    (from <= to).then_some((from as usize, to as usize))
-                };
-                let (rows, columns) = (around(&corners.rows, *height), around(&corners.columns, *width));
-                if !matches!((rows, columns), (Some(rows), Some(columns)) if steps.any_in(rows, columns)) {
+                let [a, b, c] = t.map(|v| corners.height[usize::from(v)]);
+                if higher(higher(a, b), c) < self.floor_px {
                     continue;
                 }
-                let t = t.map(|v| corners.corner(v));
-                if higher(higher(t[0].height_px, t[1].height_px), t[2].height_px) >= self.floor_px {
-                    steps.fill(t);
+                let around = |v: &[(i32, i32)], n: usize| {
+                    let [a, b, c] = t.map(|corner| v[usize::from(corner)]);
+                    // From the largest whole number before the corners to the smallest one after them.
+                    (a.1.min(b.1).min(c.1).max(0), a.0.max(b.0).max(c.0).min(n as i32 - 1))
+                };
+                let (rows, columns) = (around(&corners.rows, *height), around(&corners.columns, *width));
+                if rows.0 > rows.1 || columns.0 > columns.1 {
+                    continue;
+                }
+                let whole = |(from, to): (i32, i32)| (from as usize, to as usize);
+                if steps.any_in(whole(rows), whole(columns)) {
+                    steps.fill(t.map(|v| corners.corner(v)));
                 }
             }
         }

@@ -24,9 +24,13 @@ pub(super) struct Steps {
     /// One bit for each pixel, rows in whole words.
     bits: Vec<u64>,
     words: usize,
-    /// Where in `pixels` those of a row begin.
-    rows: Vec<u32>,
+    /// Where in `pixels` those of a word begin.
+    starts: Vec<u32>,
+    /// First and last column with one in each row; the first is larger where there is none.
+    spans: Vec<(u32, u32)>,
     pixels: Vec<SteppedPixel>,
+    /// Memory for a row.
+    largest: Vec<f32>,
 }
 
 /// A pixel beside a step.
@@ -48,9 +52,14 @@ impl Steps {
         self.words = self.width.div_ceil(64);
         self.bits.clear();
         self.bits.resize(self.words * self.height, 0);
-        self.rows.clear();
+        self.starts.clear();
+        self.starts.resize(self.words * self.height, 0);
+        self.spans.clear();
+        self.spans.resize(self.height, (u32::MAX, 0));
         self.pixels.clear();
-        level.run(Find { steps: self, depth_px, area });
+        if area.x.0 < area.x.1 && area.y.0 < area.y.1 {
+            level.run(Find { steps: self, depth_px, area });
+        }
         !self.pixels.is_empty()
     }
 
@@ -106,28 +115,42 @@ impl Steps {
     /// Whether there are some in a box; both ends count.
     #[inline(always)]
     pub(super) fn any_in(&self, rows: (usize, usize), columns: (usize, usize)) -> bool {
-        (rows.0..=rows.1).any(|row| self.any(row, columns))
+        // A closure would not be compiled for the vector unit.
+        for row in rows.0..=rows.1 {
+            if self.any(row, columns) {
+                return true;
+            }
+        }
+        false
     }
 
     /// Whether there are some in a row, from one column up to another.
     #[inline(always)]
     fn any(&self, row: usize, (first, last): (usize, usize)) -> bool {
+        let (span_first, span_last) = self.spans[row];
+        let (first, last) = (first.max(span_first as usize), last.min(span_last as usize));
+        if first > last {
+            return false;
+        }
         let words = &self.bits[row * self.words..][..self.words];
         let (from, to) = (first / 64, last / 64);
         let (low, high) = (u64::MAX << (first % 64), u64::MAX >> (63 - last % 64));
         if from == to {
             return words[from] & low & high != 0;
         }
-        (words[from] & low) | (words[to] & high) != 0 || words[from + 1..to].iter().any(|&w| w != 0)
+        let mut some = (words[from] & low) | (words[to] & high);
+        for word in &words[from + 1..to] {
+            some |= word;
+        }
+        some != 0
     }
 
-    /// The pixels of a row from one column up to another.
+    /// The pixels of a row, which has some, from one column up to another.
     #[inline(always)]
     fn in_row(&mut self, row: usize, (first, last): (usize, usize)) -> &mut [SteppedPixel] {
-        let words = &self.bits[row * self.words..][..self.words];
         let count = |column: usize, mask: u64| {
-            let whole: u32 = words[..column / 64].iter().map(|w| w.count_ones()).sum();
-            self.rows[row] as usize + (whole + (words[column / 64] & mask).count_ones()) as usize
+            let word = row * self.words + column / 64;
+            (self.starts[word] + (self.bits[word] & mask).count_ones()) as usize
         };
         let before = count(first, !(u64::MAX << (first % 64)));
         let up_to = count(last, u64::MAX >> (63 - last % 64));
@@ -162,34 +185,38 @@ impl Steps {
         let top = higher(higher(t[0].height_px, t[1].height_px), t[2].height_px);
         let bottom = lower(lower(t[0].height_px, t[1].height_px), t[2].height_px);
         let edges = [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])];
-        for row in rows.0..=rows.1 {
-            if !self.any(row / FINE, reached) {
+        for pixel_row in rows.0 / FINE..=rows.1 / FINE {
+            if !self.any(pixel_row, reached) {
                 continue;
             }
-            let y = row as f64;
-            let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
-            for x in edges.iter().filter_map(|edge| edge.crossing(y)) {
-                (from, to) = (lower(x, from), higher(x, to));
-            }
-            let (from, to) = (higher(from.ceil(), columns.0 as f64), lower(to.floor(), columns.1 as f64));
-            if from > to {
-                continue;
-            }
-            // SAFETY: both lie between 0 and the last point of a row.
-            let (from, to) = unsafe { (from.to_int_unchecked::<i32>(), to.to_int_unchecked::<i32>()) };
-            let (from, to) = (from as usize, to as usize);
-            if !self.any(row / FINE, (from / FINE, to / FINE)) {
-                continue;
-            }
-            let along_row = t[0].height_px + slope_y * (y - t[0].y_px);
-            let start = row / FINE * self.width;
-            for p in self.in_row(row / FINE, (from / FINE, to / FINE)) {
-                let first = FINE * (p.pixel - start);
-                for column in first.max(from)..=(first + FINE - 1).min(to) {
-                    let height = along_row + slope_x * (column as f64 - t[0].x_px);
-                    let height = lower(top, higher(bottom, height)) as f32;
-                    let at = &mut p.heights[row % FINE * FINE + column - first];
-                    *at = if height > *at { height } else { *at };
+            let first = FINE * pixel_row;
+            for row in first.max(rows.0)..=(first + FINE - 1).min(rows.1) {
+                let y = row as f64;
+                let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+                for edge in &edges {
+                    if let Some(x) = edge.crossing(y) {
+                        (from, to) = (lower(x, from), higher(x, to));
+                    }
+                }
+                let (from, to) = (higher(from.ceil(), columns.0 as f64), lower(to.floor(), columns.1 as f64));
+                if from > to {
+                    continue;
+                }
+                // SAFETY: both lie between 0 and the last point of a row.
+                let (from, to) = unsafe { (from.to_int_unchecked::<i32>(), to.to_int_unchecked::<i32>()) };
+                let (from, to) = (from as usize, to as usize);
+                let along_row = t[0].height_px + slope_y * (y - t[0].y_px);
+                let start = pixel_row * self.width;
+                for p in self.in_row(pixel_row, (from / FINE, to / FINE)) {
+                    let first = FINE * (p.pixel - start);
+                    let points = &mut p.heights[row % FINE * FINE..][..FINE];
+                    for (i, at) in points.iter_mut().enumerate() {
+                        let column = first + i;
+                        let height = along_row + slope_x * (f64::from(column as i32) - t[0].x_px);
+                        let height = lower(top, higher(bottom, height)) as f32;
+                        let drawn = (column >= from) & (column <= to) & (height > *at);
+                        *at = if drawn { height } else { *at };
+                    }
                 }
             }
         }
@@ -209,36 +236,45 @@ impl Kernel for Find<'_> {
     unsafe fn run<L: Lanes>(self) {
         let Self { steps, depth_px, area } = self;
         let (w, h) = (depth_px.width, depth_px.height);
-        let mut largest = vec![0.0f32; w];
-        for y in 0..h {
-            steps.rows.push(steps.pixels.len() as u32);
-            if y + 1 < area.y.0 || y > area.y.1 {
-                continue;
-            }
+        // One more on each side; what lies beyond is 0.
+        let (x0, x1) = (area.x.0.max(1) - 1, (area.x.1 + 1).min(w));
+        let n = x1 - x0;
+        let mut memory = std::mem::take(&mut steps.largest);
+        memory.resize(n, 0.0);
+        let largest = &mut memory[..n];
+        for y in area.y.0.max(1) - 1..(area.y.1 + 1).min(h) {
             let (above, below) = (depth_px.row(y.max(1) - 1), depth_px.row((y + 1).min(h - 1)));
-            let (here, above, below) = (&depth_px.row(y)[..w], &above[..w], &below[..w]);
-            let largest = &mut largest[..w];
+            let (here, above, below) = (&depth_px.row(y)[x0..x1], &above[x0..x1], &below[x0..x1]);
             let most = |a: f32, b: f32| if a > b { a } else { b };
-            for x in 0..w {
+            for x in 0..n {
                 largest[x] = most((here[x] - above[x]).abs(), (here[x] - below[x]).abs());
             }
-            for x in 1..w {
+            for x in 1..n {
                 largest[x] = most(largest[x], (here[x] - here[x - 1]).abs());
             }
-            for x in 0..w - 1 {
+            for x in 0..n - 1 {
                 largest[x] = most(largest[x], (here[x] - here[x + 1]).abs());
             }
             if !largest.iter().fold(false, |some, &l| some | (l > SLOPE_PX)) {
                 continue;
             }
-            for (x, &l) in largest.iter().enumerate() {
+            for (i, &l) in largest.iter().enumerate() {
                 if l > SLOPE_PX {
+                    let x = x0 + i;
                     steps.bits[y * steps.words + x / 64] |= 1 << (x % 64);
+                    let span = &mut steps.spans[y];
+                    *span = (span.0.min(x as u32), x as u32);
                     let weight = ((l - SLOPE_PX) / (STEP_PX - SLOPE_PX)).min(1.0);
                     let heights = [f32::NEG_INFINITY; POINTS];
                     steps.pixels.push(SteppedPixel { pixel: y * w + x, weight, heights });
                 }
             }
+        }
+        steps.largest = memory;
+        let mut count = 0;
+        for (start, bits) in steps.starts.iter_mut().zip(&steps.bits) {
+            *start = count;
+            count += bits.count_ones();
         }
     }
 }
