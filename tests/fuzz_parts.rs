@@ -329,11 +329,11 @@ fn ratios(seed: u64, parts: u64, wanted: usize) -> Vec<(f64, String)> {
 
 /// Any grip that holds, in corners and on edges too.
 #[test]
-#[ignore = "slow; red: 20 of 120 grips are apart, 19 of them because Rapier holds nothing where the reduced mechanics hold"]
+#[ignore = "slow: a minute"]
 fn both_mechanics_agree_on_random_grips() {
     let parts = std::env::var("GRIPGEN_FUZZ_PARTS").ok().and_then(|n| n.parse().ok()).unwrap_or(120);
     let found = ratios(3, parts, 5);
     let apart: Vec<_> = found.iter().filter(|(ratio, _)| (ratio - 1.0).abs() > 0.01).collect();
     println!("{} of {} apart by more than 1 %: {apart:#?}", apart.len(), found.len());
-    assert!(apart.len() * 10 <= found.len(), "{} of {}", apart.len(), found.len());
+    assert!(apart.len() * 100 <= found.len(), "{} of {}", apart.len(), found.len());
 }

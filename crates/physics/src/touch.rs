@@ -1,7 +1,9 @@
 //! Where the closing jaws meet the part, and what they touch there.
 //!
 //! The surface in front of each pad decides. The convex hull of the whole part is the contact shape of the engine as long as both
-//! pads meet the surface where they meet the hull; else the engine gets a plate in front of each pad.
+//! pads meet the surface where they meet the hull, and meet it flat: at its highest point. A pad that meets a lower point meets a slope
+//! with its edge. Its normal force would lean to the side, push an arm along the pull while the jaws close without friction, and
+//! add to the friction force. Else the engine gets a plate in front of each pad.
 
 use crate::convert::rapier_pose;
 use crate::grip_error::GripError;
@@ -18,6 +20,10 @@ use rapier3d_f64::prelude::SharedShape;
 /// A hull that a pad meets this close to the surface stands for it. A hull of few vertices cuts the facets of a round part by less;
 /// no force or image depends on it, only where the jaws are said to stand.
 const HULL_FITS_M: f64 = 0.1e-3;
+
+/// A hull that rises no higher than this above the place where a pad meets it is met flat. Much more than rounding, much less than what
+/// a slope rises beside a pad.
+const FLAT_M: f64 = 1e-7;
 
 /// Corners of a plate at most, and the smallest width it has.
 const PLATE_CORNERS: usize = 32;
@@ -63,7 +69,7 @@ pub(crate) fn touch(setup: &GripSetup<'_>) -> Result<Option<Touch>, GripError> {
             return Err(GripError::TooWide { jaw, opening_mm: setup.gripper.opening_m * 1e3 });
         }
         distance_m[jaw] = match whole {
-            Ok(Some(hull)) if (hull - height_m).abs() <= HULL_FITS_M => hull,
+            Ok(Some(hull)) if (hull - height_m).abs() <= HULL_FITS_M && meets_flat(setup, jaw, hull) => hull,
             Err(e @ GripError::Shape(_)) => return Err(e),
             _ => {
                 shape = TouchedShape::Plates;
@@ -89,6 +95,14 @@ impl TouchedShape {
         }
         .unwrap_or_else(|| setup.shape.shared().clone())
     }
+}
+
+/// Whether a pad at this distance meets the hull at its highest point, seen from the jaw, so that the normal force acts along the jaw axis.
+fn meets_flat(setup: &GripSetup<'_>, jaw: Jaw, distance_m: f64) -> bool {
+    let Some(hull) = setup.shape.shared().as_convex_polyhedron() else { return false };
+    let world_from_part = rapier_pose(&setup.world_from_part);
+    let reach = hull.points().iter().map(|p| jaw.side() * (world_from_part * *p).y);
+    reach.fold(f64::NEG_INFINITY, f64::max) - distance_m <= FLAT_M
 }
 
 /// `gel_from_mesh` of a gel whose surface stands at the grip centre; `None` for primitives.
