@@ -95,7 +95,7 @@ impl Film {
             optics: optics_state(twin, &scenario.part, &grip_point(scenario, jaw, 0.0)),
             pull: world_from_gel(jaw, 0.0).rotation.inverse() * along,
             patch: contact.imprint[jaw].patch.clone(),
-            cells: CellMap::new(&contact.imprint[jaw], options.level),
+            cells: CellMap::new(&contact.imprint[jaw].places),
         });
         let time_s = |row: usize| seen.states[row].time_s;
         Ok(Self {

@@ -48,6 +48,7 @@ fn heights_on_a_dome_are_taxims() {
             depth_px: Plane { values: depth, ..z0.clone() },
             press_depth_m: press_mm * 1e-3,
             patch: ContactPatch::default(),
+            places: Default::default(),
             elastic: None,
         };
         let threshold = 0.4 * press_mm / MM_PER_PX;

@@ -133,10 +133,12 @@ pub fn press_elastic(
         pixels.clone().map(|i| if touching(i) { part(i) as f32 } else { surface[i] as f32 }).collect();
     let modulus = gel.contact_modulus_pa();
     let pressure_pa = plane(pixels.map(|i| (modulus * contact.pressure[i]) as f32).collect());
+    let (patch, places) = aggregate(&pressure_pa, grid, force_n, level);
     Ok(Imprint {
         depth_px: plane(depth),
         press_depth_m: press_px * a,
-        patch: aggregate(&pressure_pa, grid, force_n, level),
+        patch,
+        places,
         elastic: Some(ElasticField { surface_px: plane(surface), pressure_pa }),
     })
 }

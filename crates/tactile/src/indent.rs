@@ -1,7 +1,7 @@
 //! Stage `indent`: how deep the part sinks into the gel, and the pressure that follows.
 
 use crate::grid::{Grid, Plane};
-use crate::patch::aggregate;
+use crate::patch::{CellPlaces, aggregate};
 use crate::raster::{ClusteredMesh, HeightMap};
 use crate::simd::{Kernel, Lanes, SimdLevel};
 use gripgen_twin::ContactPatch;
@@ -15,6 +15,8 @@ pub struct Imprint {
     pub press_depth_m: f64,
     /// The pressure field as a few cells, from the centres of pixels.
     pub patch: ContactPatch,
+    /// Where these cells are in the image.
+    pub places: CellPlaces,
     /// Surface and pressure, if the gel is elastic.
     pub elastic: Option<ElasticField>,
 }
@@ -262,12 +264,13 @@ impl Indentation<'_> {
         self.level.run(Depths { map, rest: self.rest, lift, depth_px });
     }
 
-    fn patch(&self, depth_px: &Plane) -> ContactPatch {
+    fn patch(&self, depth_px: &Plane) -> (ContactPatch, CellPlaces) {
         aggregate(depth_px, self.grid, self.force_n, self.level)
     }
 
-    fn imprint(&self, depth_px: Plane, press_px: f64, patch: ContactPatch) -> Imprint {
-        Imprint { depth_px, press_depth_m: press_px * self.grid.metres_per_px, patch, elastic: None }
+    fn imprint(&self, depth_px: Plane, press_px: f64, patch: (ContactPatch, CellPlaces)) -> Imprint {
+        let (patch, places) = patch;
+        Imprint { depth_px, press_depth_m: press_px * self.grid.metres_per_px, patch, places, elastic: None }
     }
 
     fn through_the_gel(&self, available: f64) -> IndentError {

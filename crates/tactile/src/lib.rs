@@ -76,7 +76,7 @@ pub use markers::{
     print_markers, without_markers,
 };
 pub use noise::finish;
-pub use patch::CellMap;
+pub use patch::{CellMap, CellPlaces};
 pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;
 pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError, SensorFiles};

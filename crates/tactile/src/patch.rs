@@ -12,6 +12,13 @@ use gripgen_twin::{ContactPatch, PressureCell};
 /// Cells along each side of the contact's bounding box.
 const CELLS_PER_SIDE: usize = 8;
 
+/// Where the cells of a patch are: the box that was cut, and one bit for each of its places that holds a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CellPlaces {
+    area: Area,
+    held: u64,
+}
+
 /// Sums of force over positions.
 #[derive(Debug, Clone, Copy, Default)]
 struct Moments {
@@ -122,10 +129,15 @@ fn cell_range(k: usize, n: usize) -> std::ops::Range<usize> {
 /// field's second moments over that of the cells') gives them back exactly.
 ///
 /// Sums run over the rows of a cell for each column, then over columns, then over cells.
-pub(crate) fn aggregate(depth_px: &Plane, grid: &Grid, force_n: f64, level: SimdLevel) -> ContactPatch {
+pub(crate) fn aggregate(
+    depth_px: &Plane,
+    grid: &Grid,
+    force_n: f64,
+    level: SimdLevel,
+) -> (ContactPatch, CellPlaces) {
     let area = Area::of_positive(depth_px, level);
     if area.is_empty() {
-        return ContactPatch::default();
+        return Default::default();
     }
     let sums = level.run(CellSums { depth_px, area });
     let total: f64 = sums.iter().map(|cell| cell.depth).sum();
@@ -150,7 +162,8 @@ pub(crate) fn aggregate(depth_px: &Plane, grid: &Grid, force_n: f64, level: Simd
         patch.cells.push(PressureCell { x_m, y_m, area_m2, force_n: m.force });
     }
     restore_second_moments(&mut patch, &all, &merged);
-    patch
+    let held = sums.iter().rev().fold(0, |bits, s| (bits << 1) | u64::from(s.pixels > 0.0));
+    (patch, CellPlaces { area, held })
 }
 
 fn restore_second_moments(patch: &mut ContactPatch, all: &Moments, merged: &Moments) {
@@ -235,7 +248,7 @@ mod tests {
                     exact.add(40.0 * f64::from(depth.at(x, y)) / total, px, py);
                 }
             }
-            let patch = aggregate(&depth, &grid, 40.0, SimdLevel::best());
+            let patch = aggregate(&depth, &grid, 40.0, SimdLevel::best()).0;
             assert!(patch.cells.len() <= ContactPatch::MAX_CELLS);
             let m = moments_of_patch(&patch);
             let close = |a: f64, b: f64, scale: f64| (a - b).abs() <= 1e-9 * scale;

@@ -1,10 +1,8 @@
 //! Which cell of the patch a pixel of the contact belongs to, also after the contact has moved.
 
-use super::{CELLS_PER_SIDE, cell_range};
+use super::{CELLS_PER_SIDE, CellPlaces};
 use crate::convolve::Area;
 use crate::grid::Plane;
-use crate::indent::Imprint;
-use crate::simd::SimdLevel;
 
 /// The cells of a contact as places in its bounding box.
 #[derive(Debug, Clone)]
@@ -15,27 +13,18 @@ pub struct CellMap {
 }
 
 impl CellMap {
-    /// The cells of `imprint.patch`.
-    pub fn new(imprint: &Imprint, level: SimdLevel) -> Self {
-        let pressed = imprint.elastic.as_ref().map_or(&imprint.depth_px, |field| &field.pressure_pa);
-        let area = Area::of_positive(pressed, level);
+    /// The cells of the patch that has these places.
+    pub fn new(places: &CellPlaces) -> Self {
+        let area = places.area;
         let mut cell_at = [0; CELLS_PER_SIDE * CELLS_PER_SIDE];
         if area.is_empty() {
             return Self { area, cell_at };
         }
-        let (nx, ny) = (area.x.1 - area.x.0, area.y.1 - area.y.0);
-        let holds = |place: usize| {
-            let (column, row) = (place % CELLS_PER_SIDE, place / CELLS_PER_SIDE);
-            cell_range(row, ny).any(|y| {
-                let row = pressed.row(area.y.0 + y);
-                cell_range(column, nx).any(|x| row[area.x.0 + x] > 0.0)
-            })
-        };
         let mut count = 0;
-        for place in 0..cell_at.len() {
-            if holds(place) {
+        for (place, cell) in cell_at.iter_mut().enumerate() {
+            if places.held >> place & 1 == 1 {
                 count += 1;
-                cell_at[place] = count;
+                *cell = count;
             }
         }
         let found = cell_at;
@@ -59,9 +48,8 @@ impl CellMap {
         }
         // The cell of column or row i of n is 8 i / n.
         let place = |at: usize, first: usize, end: usize, moved: f64| {
-            let n = (end - first) as f64;
-            let from = at as f64 + 0.5 - moved - first as f64;
-            ((CELLS_PER_SIDE as f64 * from / n) as usize).min(CELLS_PER_SIDE - 1)
+            let from = (at as f64 - moved - first as f64).round().max(0.0) as usize;
+            (CELLS_PER_SIDE * from / (end - first)).min(CELLS_PER_SIDE - 1)
         };
         let columns: Vec<usize> =
             (0..depth_px.width).map(|x| place(x, self.area.x.0, self.area.x.1, moved_px[0])).collect();
@@ -97,7 +85,7 @@ mod tests {
         }
         let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
         let imprint = indent(&heights, &grid, &gel, 10.0).unwrap();
-        let map = CellMap::new(&imprint, SimdLevel::best());
+        let map = CellMap::new(&imprint.places);
         let cells = map.of_contact(&imprint.depth_px, [0.0, 0.0]);
         for (k, cell) in imprint.patch.cells.iter().enumerate() {
             let pixels = cells.iter().filter(|&&c| usize::from(c) == k + 1).count();

@@ -5,7 +5,7 @@ use super::{Circle, Press};
 use crate::grid::{Grid, Plane};
 use crate::indent::Imprint;
 use crate::sensor::GelShape;
-use gripgen_twin::{ContactPatch, OpticsState};
+use gripgen_twin::OpticsState;
 use std::sync::Arc;
 
 /// The checked contact of a press.
@@ -103,7 +103,8 @@ impl Contact {
 }
 
 pub(super) fn imprint(depth_px: Plane, press_depth_m: f64) -> Imprint {
-    Imprint { depth_px, press_depth_m, patch: ContactPatch { cells: Vec::new() }, elastic: None }
+    let (patch, places) = Default::default();
+    Imprint { depth_px, press_depth_m, patch, places, elastic: None }
 }
 
 /// How deep a ball is pressed in.
