@@ -78,18 +78,19 @@ impl Steps {
         top: f64,
         press_px: f64,
     ) -> (f64, f64) {
-        let mut add = |height: f32, rest: f32, weight: f64| {
-            let below = f64::from(height + rest) - top;
-            if below + press_px > 0.0 {
-                sum += weight * below;
-                count += weight;
-            }
-        };
         for p in &self.pixels {
             let rest = rest.map_or(0.0, |rest| rest.values[p.pixel]);
             let weight = f64::from(p.weight);
-            add(centres[p.pixel], rest, -weight);
-            p.heights.iter().for_each(|&h| add(h, rest, weight / POINTS as f64));
+            let (mut heights, mut weights) = ([centres[p.pixel]; POINTS + 1], [-weight; POINTS + 1]);
+            heights[1..].copy_from_slice(&p.heights);
+            weights[1..].fill(weight / POINTS as f64);
+            // Without branches: which of them touch cannot be foreseen.
+            for (height, weight) in heights.iter().zip(weights) {
+                let below = f64::from(height + rest) - top;
+                let touches = below + press_px > 0.0;
+                sum += if touches { weight * below } else { 0.0 };
+                count += if touches { weight } else { 0.0 };
+            }
         }
         (sum, count)
     }
