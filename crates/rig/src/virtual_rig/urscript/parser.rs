@@ -69,6 +69,8 @@ struct Call {
 struct Parser {
     words: Vec<(Token, u32)>,
     at: usize,
+    /// Whether the value of the assignment that is being read stood in a later line.
+    carried: bool,
     depth: usize,
     open: Vec<Open>,
     functions: Vec<Option<Function>>,
@@ -134,9 +136,14 @@ impl Parser {
         match self.peek() {
             Token::Newline => {
                 self.at += 1;
+                self.carried = false;
                 Ok(())
             }
             Token::End => Ok(()),
+            _ if self.carried => {
+                self.carried = false;
+                Ok(())
+            }
             _ => Err(self.wrong("more than one statement in a line")),
         }
     }
@@ -364,11 +371,16 @@ impl Parser {
         self.end_of_line()
     }
 
+    /// Whether `p[` is an element of a variable of that name, and no pose: ur_rtde has such a parameter.
+    fn p_is_a_variable(&self) -> bool {
+        self.open.last().is_some_and(|open| open.assigned.contains("p"))
+    }
+
     /// Whether a line that begins with a name gives it, or one of its elements, a value.
     fn assigns(&self) -> bool {
         match self.words.get(self.at + 1).map(|(token, _)| token) {
             Some(Token::Symbol("=")) => true,
-            Some(Token::Symbol("[")) if !self.is_name("p") => {
+            Some(Token::Symbol("[")) if !self.is_name("p") || self.p_is_a_variable() => {
                 let line = self.words[self.at..].iter().take_while(|(t, _)| *t != Token::Newline);
                 line.into_iter().any(|(t, _)| *t == Token::Symbol("="))
             }
@@ -376,9 +388,10 @@ impl Parser {
         }
     }
 
-    /// From `=` on. The value may stand in a later line: a client of its own writes it so.
+    /// From `=` on. The value may stand in a later line, and the next statement behind it: ur_rtde puts its numbers in so.
     fn value_of_assignment(&mut self) -> Result<(), ScriptError> {
         self.expect("=")?;
+        self.carried = *self.peek() == Token::Newline;
         self.skip_newlines();
         self.expression()
     }

@@ -305,3 +305,13 @@ fn a_program_is_bounded() {
     let deep = format!("x = {}1{}\n", "(".repeat(100), ")".repeat(100));
     assert!(refused(&deep).contains("more than 64 blocks or brackets"));
 }
+
+/// ur_rtde puts the numbers of its registers into its script at the begin of the next line (1.6.5, as it is sent).
+#[test]
+fn a_value_may_stand_in_the_next_line_before_another_statement() {
+    let carried = "def p():\n  a = # of floats\n0  b = # of integers\n1  c = 2\nend\n";
+    assert!(Program::parse(carried).is_ok(), "{:?}", Program::parse(carried).err());
+    for wrong in ["def p():\n  a = 0  b = 1\nend\n", "def p():\n  a =\n0\n  b = 1  c = 2\nend\n"] {
+        assert!(Program::parse(wrong).is_err(), "{wrong}");
+    }
+}

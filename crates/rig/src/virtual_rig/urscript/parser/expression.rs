@@ -94,7 +94,7 @@ impl Parser {
             }
             Token::Name(name) => match name.as_str() {
                 "True" | "False" => drop(self.emit(Op::Const(Value::Bool(name == "True")))?),
-                "p" if self.take_symbol("[") => {
+                "p" if !self.p_is_a_variable() && self.take_symbol("[") => {
                     if self.elements("]")? != 6 {
                         return Err(self.wrong("a pose has six numbers"));
                     }
