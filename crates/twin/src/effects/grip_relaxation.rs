@@ -107,7 +107,9 @@ mod tests {
             let expected = end - (end - 10.0) * libm::exp(-(1.0 - depth) * late_s / tau_s);
             assert!((u - expected).abs() < 0.02, "{i}: {u} {expected}");
         }
-        assert!(grasp_force(&[depth, tau_s], &[0.0, 1.0, 2.0], &[4.0; 3]).iter().all(|u| (u - 5.0).abs() < 1e-12));
+        assert!(
+            grasp_force(&[depth, tau_s], &[0.0, 1.0, 2.0], &[4.0; 3]).iter().all(|u| (u - 5.0).abs() < 1e-12)
+        );
     }
 
     #[test]
