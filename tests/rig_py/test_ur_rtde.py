@@ -9,9 +9,6 @@ from .rig import PROGRAM_RUNS, UR_PORTS, Gripper, RtdeReader, run_scenario, wait
 
 pytest.importorskip("rtde_control", reason="ur-rtde is not installed")
 
-# The interpreter of the virtual controller does not run all of the script that ur_rtde sends yet: a known regression.
-pytestmark = pytest.mark.xfail(reason="the virtual controller may refuse the script of ur_rtde", strict=False)
-
 
 def test_it_is_ready_within_two_seconds_on_the_ports_that_ur_has(served):
     assert served.start_s < 2.0
