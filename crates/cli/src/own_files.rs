@@ -55,7 +55,11 @@ pub fn owner(path: &Path, runs: &[&Path]) -> Option<String> {
 fn of_run(name: &str) -> bool {
     let shard =
         name.strip_prefix("shard-").is_some_and(|rest| rest.ends_with(".mcap") || rest.ends_with(".json"));
-    shard || ["run.json", "index.csv", CONTACT_SHEET].contains(&name) || name.ends_with(".partial")
+    let rehearsal = name.starts_with("rehearsal-") && name.ends_with(".json");
+    shard
+        || rehearsal
+        || ["run.json", "index.csv", CONTACT_SHEET].contains(&name)
+        || name.ends_with(".partial")
 }
 
 fn is_data(path: &Path) -> bool {
@@ -89,6 +93,7 @@ mod tests {
             "run/run.json",
             "run/shard-00000.mcap",
             "run/shard-00007.json",
+            "run/rehearsal-0a1b2c3d.json",
             "run/index.csv",
             "run/contact-sheet.png",
             "run/inputs/a.stl",

@@ -153,9 +153,18 @@ fn a_lag_is_suspect() {
     }
 }
 
+/// What trails the command in the file of a rehearsal: the force and the displacement, s.
+fn trails_s(stored: &Path) -> [f64; 2] {
+    let found: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(stored).unwrap()).unwrap();
+    let response = &found["rehearsal"]["response"];
+    ["force", "displacement"].map(|of| {
+        let s = |key: &str| response[of][key].as_f64().unwrap();
+        s("lag_s") + s("dead_s")
+    })
+}
+
 /// Rehearsed, the staircase is slow enough to be followed, and the label is that of a rig without lag.
 #[test]
-#[ignore = "red: displacement trails by 0.70 s where the loop trails by 0.35 s, so loop and sensor are not told apart over the wire"]
 fn a_lag_is_rehearsed() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -164,27 +173,35 @@ fn a_lag_is_rehearsed() {
         assert_eq!(rig.pull(&path("true"), 1, &[]).ends(), 0);
         label_n(&path("true"))
     };
-    for lag in ["force-lag", "sensor-lag"] {
-        rig.inject(&format!("{lag} 0.35"));
-        let stored = path(&format!("{lag}.json"));
-        let stored = stored.to_str().unwrap();
-        let slack = ["--set", "limits.robot_gap_s=1.0", "-o", stored, "--dwell-s", "1"];
+    let rehearse = |rig: &mut Served, name: &str| {
+        let stored = path(name);
+        let slack = ["--set", "limits.robot_gap_s=1.0", "--dwell-s", "1", "-o", stored.to_str().unwrap()];
         let page = rig.rig("rehearse", &slack);
         assert_code(&page, 0);
-        let found: serde_json::Value =
-            serde_json::from_str(&std::fs::read_to_string(stored).unwrap()).unwrap();
-        let response = &found["rehearsal"]["response"];
-        let trails =
-            |of: &str| response[of]["lag_s"].as_f64().unwrap() + response[of]["dead_s"].as_f64().unwrap();
-        assert!((trails("force") - 0.35).abs() < 0.05, "{lag}: {response}");
+        (trails_s(&stored), text(&page.stdout))
+    };
+    // The plant's own force mode trails too.
+    let ([own_force_s, own_tool_s], _) = rehearse(&mut rig, "own.json");
+    for lag in ["force-lag", "sensor-lag"] {
+        rig.inject(&format!("{lag} 0.35"));
+        let stored = format!("{lag}.json");
+        let ([force_s, tool_s], page) = rehearse(&mut rig, &stored);
+        // Two lags in series are read up to a tenth too long.
+        assert!((force_s - own_force_s - 0.35).abs() < 0.06, "{lag}: {force_s} s, {own_force_s} s without");
         let of_the_loop_s = if lag == "force-lag" { 0.35 } else { 0.0 };
-        assert!((trails("displacement") - of_the_loop_s).abs() < 0.05, "{lag}: {response}");
-        assert!(text(&page.stdout).contains("staircase"), "{}", text(&page.stdout));
+        let more_s = tool_s - own_tool_s;
+        assert!((more_s - of_the_loop_s).abs() < 0.06, "{lag}: {tool_s} s, {own_tool_s} s without");
+        assert!(page.contains("staircase"), "{page}");
+        let stored = path(&stored);
+        let stored = stored.to_str().unwrap();
         let out = path(&format!("{lag}-slow"));
         let mut slow = rig.pull(&out, 1, &["--rehearsal", stored]);
         let code = slow.ends();
         assert!(slow.said.contains("staircases are slowed"), "{}", slow.said);
         assert_eq!((code, pulls(&out)[0].0.as_str()), (0, "slipped"), "{lag}: {:?}", pulls(&out));
+        let kept = |name: &str| name.starts_with("rehearsal-") && name.ends_with(".json");
+        let names = std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name());
+        assert_eq!(names.filter(|name| kept(&name.to_string_lossy())).count(), 1);
         let off_n = label_n(&out) - true_n;
         assert!(off_n.abs() < 1.0, "{lag}: {} N, without lag {true_n} N", label_n(&out));
         rig.inject(&format!("{lag} 0"));

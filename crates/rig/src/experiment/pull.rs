@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 const NO_LOAD_S: f64 = 0.5;
 /// How long it is read without a load after the pull, jaws open.
 const NO_LOAD_AFTER_S: f64 = 0.25;
+/// Time constants after which a reading has left the load: of 40 N 0.1 N are left.
+const SETTLED_LAGS: f64 = 6.0;
 /// Slack of this machine on what the robot times.
 const SLACK: Duration = Duration::from_secs(3);
 /// Height from which the way back is fast.
@@ -249,7 +251,7 @@ impl Experiment<'_> {
         self.tell(RigEvent::Step("releasing"));
         self.release()?;
         // The next program zeroes the sensor.
-        let from_s = self.robot_time_s()?;
+        let from_s = self.robot_time_s()? + SETTLED_LAGS * self.trails_s;
         self.wait_until("the reading without a load after the pull", from_s + NO_LOAD_AFTER_S)?;
         parts.no_load_after_s = Some((from_s, self.robot_time_s()?));
         self.go_up(&poses)

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// Largest command of the rehearsed pull, and its steps.
 pub const REHEARSED_N: f64 = 5.0;
 const STEP_N: f64 = 1.0;
-const STEP_S: f64 = 0.5;
+const STEP_S: f64 = 1.0;
 /// What rate times lag of a staircase may be, N: it is that much of the label that the loop trails.
 pub const TRAILS_N: f64 = 0.3;
 /// Rest after the grip.

@@ -1,5 +1,6 @@
 //! How force mode follows a staircase, and how the sensor follows force mode.
 
+use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 /// Time constants and dead times that are tried, s.
@@ -26,14 +27,16 @@ pub struct StepRow {
     pub displacement_m: f64,
 }
 
-/// What follows a command with a dead time and a time constant: `lag dy/dt = u(t - dead) - y`, `reading = zero + gain y`.
+/// What follows a command with a dead time and a time constant: `lag dy/dt = u(t - dead) - y`, `reading = zero + gain y`. Gels give
+/// way the more the nearer a pull is to the slip, so a displacement has terms in y^2 and y^3 beside it: without them such a gel looks
+/// like a lag of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Follows {
     /// Time constant.
     pub lag_s: f64,
     /// Dead time.
     pub dead_s: f64,
-    /// What a newton of command comes to.
+    /// What a newton of command comes to; of a displacement at no force.
     pub gain: f64,
     /// Root mean square of what is left.
     pub rest: f64,
@@ -69,8 +72,8 @@ pub fn response(rows: &[StepRow], noise_n: f64) -> Option<Response> {
     }
     let every = rows.len().div_ceil(MOST_ROWS);
     let rows: Vec<StepRow> = rows.iter().copied().step_by(every).collect();
-    let force = follows(&rows, |row| row.measured_n)?;
-    let displacement = follows(&rows, |row| row.displacement_m)?;
+    let force = follows::<2>(&rows, |row| row.measured_n)?;
+    let displacement = follows::<4>(&rows, |row| row.displacement_m)?;
     let over = |row: &StepRow| row.measured_n - row.desired_n - 4.0 * noise_n;
     Some(Response {
         force,
@@ -81,9 +84,9 @@ pub fn response(rows: &[StepRow], noise_n: f64) -> Option<Response> {
     })
 }
 
-/// The best dead time and time constant for a column, by least squares.
-fn follows(rows: &[StepRow], of: impl Fn(&StepRow) -> f64) -> Option<Follows> {
-    let with = |dead_s: f64, lag_s: f64| fitted(rows, &of, dead_s, lag_s);
+/// The best dead time and time constant for a column, by least squares; `TERMS` powers of what follows, from 0 on.
+fn follows<const TERMS: usize>(rows: &[StepRow], of: impl Fn(&StepRow) -> f64) -> Option<Follows> {
+    let with = |dead_s: f64, lag_s: f64| fitted::<TERMS>(rows, &of, dead_s, lag_s);
     let mut best: Option<Follows> = None;
     for (dead_s, lag_s) in DEAD_S.iter().flat_map(|dead| LAGS_S.iter().map(move |lag| (*dead, *lag))) {
         best = better(best, with(dead_s, lag_s));
@@ -110,10 +113,17 @@ fn better(a: Option<Follows>, b: Option<Follows>) -> Option<Follows> {
     }
 }
 
-fn fitted(rows: &[StepRow], of: &impl Fn(&StepRow) -> f64, dead_s: f64, lag_s: f64) -> Option<Follows> {
+fn fitted<const TERMS: usize>(
+    rows: &[StepRow],
+    of: &impl Fn(&StepRow) -> f64,
+    dead_s: f64,
+    lag_s: f64,
+) -> Option<Follows> {
     let first = rows.first()?;
     let (mut y, mut before_s, mut late) = (0.0, first.time_s, 0);
-    let (mut sums, n) = ([0.0; 5], rows.len() as f64);
+    let most_n = rows.iter().map(|row| row.desired_n.abs()).fold(0.0, f64::max);
+    let mut normal = SMatrix::<f64, TERMS, TERMS>::zeros();
+    let (mut right, mut squares) = (SVector::<f64, TERMS>::zeros(), 0.0);
     for row in rows {
         // The command a dead time ago.
         while late + 1 < rows.len() && rows[late + 1].time_s <= row.time_s - dead_s {
@@ -123,17 +133,18 @@ fn fitted(rows: &[StepRow], of: &impl Fn(&StepRow) -> f64, dead_s: f64, lag_s: f
         let passed_s = row.time_s - before_s;
         y += (asked_n - y) * if lag_s > 0.0 { 1.0 - (-passed_s / lag_s).exp() } else { 1.0 };
         before_s = row.time_s;
+        let powers = SVector::<f64, TERMS>::from_fn(|power, _| (y / most_n).powi(power as i32));
         let x = of(row);
-        sums = [sums[0] + y, sums[1] + x, sums[2] + y * y, sums[3] + y * x, sums[4] + x * x];
+        normal += powers * powers.transpose();
+        right += powers * x;
+        squares += x * x;
     }
-    let [y, x, yy, yx, xx] = sums.map(|sum| sum / n);
-    let (varies, together) = (yy - y * y, yx - y * x);
-    if varies.is_nan() || varies <= 1e-12 {
-        return None;
-    }
-    let gain = together / varies;
-    let rest = (xx - x * x - gain * together).max(0.0).sqrt();
-    rest.is_finite().then_some(Follows { lag_s, dead_s, gain, rest })
+    // A ridge far below what varies: steps of one height leave powers that are alike.
+    let ridge = SMatrix::<f64, TERMS, TERMS>::identity() * (1e-12 * normal.trace());
+    let terms = (normal + ridge).cholesky()?.solve(&right);
+    let gain = terms[1] / most_n;
+    let rest = ((squares - terms.dot(&right)).max(0.0) / rows.len() as f64).sqrt();
+    (rest.is_finite() && gain.is_finite()).then_some(Follows { lag_s, dead_s, gain, rest })
 }
 
 /// Largest difference between a command and the mean of the end of its step.
@@ -153,6 +164,11 @@ mod tests {
 
     /// A staircase of 1 N every 0.4 s through two first-order lags and a dead time, in fine steps of its own.
     fn rows(dead_s: f64, loop_s: f64, sensor_s: f64) -> Vec<StepRow> {
+        rows_on(|applied_n| 2e-5 * applied_n, dead_s, loop_s, sensor_s)
+    }
+
+    /// The same on a gel whose displacement is a function of the force.
+    fn rows_on(gel_m: impl Fn(f64) -> f64, dead_s: f64, loop_s: f64, sensor_s: f64) -> Vec<StepRow> {
         let (mut applied_n, mut felt_n) = (0.0, 0.0);
         let follow = |y: f64, u: f64, lag_s: f64| if lag_s > 0.0 { y + (u - y) * 0.0005 / lag_s } else { u };
         let desired = |t: f64| if t < 0.0 { 0.0 } else { (t / 0.4).floor() + 1.0 };
@@ -165,7 +181,7 @@ mod tests {
                     time_s,
                     desired_n: desired(time_s),
                     measured_n: 1.1 * felt_n + 0.2,
-                    displacement_m: 2e-5 * applied_n,
+                    displacement_m: gel_m(applied_n),
                 })
             })
             .collect()
@@ -185,8 +201,14 @@ mod tests {
             assert!((force_s - all_s).abs() < 0.01 + 0.1 * all_s, "{said}");
             assert!((found.sensor_s - sensor_s).abs() < 0.01 + 0.1 * all_s, "{said}");
         }
+        // A gel that gives way the more the nearer the slip (at 9 N), as one under a rim of pressure does.
+        let gel_m = |applied_n: f64| -3.6e-4 * (1.0 - applied_n / 9.0).ln();
+        for (loop_s, sensor_s) in [(0.35, 0.0), (0.0, 0.35), (0.1, 0.05)] {
+            let found = response(&rows_on(gel_m, 0.0, loop_s, sensor_s), 0.0).unwrap();
+            assert!((found.displacement.trails_s() - loop_s).abs() < 0.02, "{loop_s} {sensor_s}: {found:?}");
+        }
         let quick = response(&rows(0.0, 0.0, 0.0), 0.0).unwrap();
-        assert!((quick.force.gain - 1.1).abs() < 0.01 && quick.force.rest < 1e-6, "{quick:?}");
+        assert!((quick.force.gain - 1.1).abs() < 0.01 && quick.force.rest < 1e-4, "{quick:?}");
         // 0.2 N of zero and a tenth of gain beside 5 N.
         assert!((quick.deadband_n - 0.7).abs() < 0.01 && (quick.overshoot_n - 0.7).abs() < 0.01, "{quick:?}");
         assert!(response(&rows(0.0, 0.0, 0.0)[..20], 0.0).is_none());

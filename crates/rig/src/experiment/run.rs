@@ -79,6 +79,8 @@ pub struct Experiment<'a> {
     /// What must go on while it is waited: a program of this number.
     watched: Option<(i32, &'static str)>,
     pub(super) last_said: Option<String>,
+    /// How far a reading is known to trail, s.
+    pub(super) trails_s: f64,
 }
 
 impl<'a> Experiment<'a> {
@@ -107,7 +109,13 @@ impl<'a> Experiment<'a> {
             run,
             watched: None,
             last_said: None,
+            trails_s: 0.0,
         }
+    }
+
+    /// A reading trails by so much, as a rehearsal found it: what is read without a load after a pull waits for it.
+    pub fn trails(&mut self, trails_s: f64) {
+        self.trails_s = trails_s;
     }
 
     /// Says goodbye.

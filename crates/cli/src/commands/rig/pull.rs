@@ -17,6 +17,7 @@ use gripgen::record::{
 };
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
 use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_differences, rig_run_toml};
+use gripgen_rig::experiment::check::check;
 use gripgen_rig::experiment::plan::pull_program;
 use gripgen_rig::experiment::prepare::Permit;
 use gripgen_rig::experiment::pull::ExecutedPull;
@@ -66,10 +67,16 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
         }
         return Ok(0);
     }
+    if let Some(stored) = &rehearsal {
+        unchanged(&config, stored)?;
+    }
     // Before a folder is made.
     let before = args.after.as_deref().map(RunFolder::open).transpose()?;
     let before = before.as_ref().map(CampaignClock::of).transpose()?.unwrap_or_default();
     let folder = open_folder(args, &config, &campaign, pulls.len() as u64)?;
+    if let Some(path) = &args.rehearsal {
+        rehearsal::keep(path, folder.path())?;
+    }
     let todo = todo(&folder)?;
     let live = RefCell::new(Live::new(pulls.len() as u64, todo.len() as u64, &args.talk, sink));
     if todo.is_empty() {
@@ -80,9 +87,27 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
     }
     live.borrow().say(&format!("{words}; {} to make, into {}", todo.len(), folder.path().display()));
     let stop = stop_flag("stopping the robot safely");
-    let job = Job { args, config: &config, campaign: &campaign, folder: &folder, before, live: &live, stop };
+    let trails_s = rehearsal.and_then(|stored| stored.rehearsal.trails_s()).unwrap_or_default();
+    let job = Job {
+        args,
+        config: &config,
+        campaign: &campaign,
+        folder: &folder,
+        before,
+        live: &live,
+        stop,
+        trails_s,
+    };
     let failed = job.make(&todo)?;
     finish(&folder, &live.borrow(), failed)
+}
+
+/// Asks every device what a rehearsal asked it.
+fn unchanged(config: &RigConfig, stored: &StoredRehearsal) -> Result<(), Failure> {
+    let mut lines = Vec::new();
+    check(config, |line| lines.push(line));
+    let line = rehearsal::compared(stored, &lines);
+    if line.ok { Ok(()) } else { Err(Failure::new(line.found).hint("nothing was sent and nothing moved")) }
 }
 
 /// A rehearsal that speaks for pulls slows their staircases; what it did, in words.
@@ -167,6 +192,8 @@ struct Job<'a> {
     before: CampaignClock,
     live: &'a RefCell<Live>,
     stop: &'a AtomicBool,
+    /// How far a reading trails, as it was rehearsed.
+    trails_s: f64,
 }
 
 /// How a row of pulls ended.
@@ -218,6 +245,7 @@ impl Job<'_> {
         devices.prepare(permit).map_err(Failure::new)?;
         let mut emit = |event| self.live.borrow_mut().event(&event);
         let mut experiment = Experiment::new(self.config, devices, self.stop, &mut emit);
+        experiment.trails(self.trails_s);
         if let Err(fault) = experiment.begin() {
             if let Fault::Busy { .. } = fault {
                 // It is not ours to stop.

@@ -1,6 +1,7 @@
 //! What `gripgen rig rehearse` stored.
 
 use crate::failure::Failure;
+use gripgen::record::sha256_hex;
 use gripgen_rig::experiment::check::CheckLine;
 use gripgen_rig::experiment::rehearse::{SCHEMA, StoredRehearsal};
 use std::path::Path;
@@ -19,6 +20,14 @@ pub fn load(path: &Path) -> Result<StoredRehearsal, Failure> {
         return Err(wrong(format!("its schema is `{}`, this version reads `{SCHEMA}`", stored.schema)));
     }
     Ok(stored)
+}
+
+/// Puts a copy into a run, named by its content: a run may outlive a morning's rehearsal.
+pub fn keep(path: &Path, run: &Path) -> Result<(), Failure> {
+    let failed = |at: &Path, e: std::io::Error| Failure::new(format!("{}: {e}", at.display()));
+    let bytes = std::fs::read(path).map_err(|e| failed(path, e))?;
+    let copy = run.join(format!("rehearsal-{}.json", &sha256_hex(&bytes)[..8]));
+    std::fs::write(&copy, bytes).map_err(|e| failed(&copy, e))
 }
 
 /// Whether the rig is the one that rehearsed.
