@@ -34,6 +34,7 @@ static FILES: &[(&str, &[u8])] = embedded![
     "templates/benchmark-sweep.toml",
     "templates/benchmark-twin.toml",
     "templates/diagnosis.html",
+    "templates/live.html",
     "templates/page.css",
     "templates/part-sweep.toml",
     "templates/part-twin.toml",

@@ -61,6 +61,7 @@ mod imprint_set;
 mod init;
 mod levels;
 mod library;
+mod live;
 mod location;
 mod measured;
 mod mesh_file;
@@ -124,6 +125,7 @@ pub use init::{
 };
 pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};
+pub use live::{image_png, live_page};
 pub use location::{Location, ReadFileError};
 pub use measured::{LoadPullsError, LoadedPulls, Suspects, load_pulls, load_pulls_of, load_pulls_with};
 pub use mesh_file::MeshFileError;

@@ -58,6 +58,12 @@ pub enum SweepEvent {
         status: Status,
         /// Why, if it failed.
         failure: String,
+        /// Part.
+        part: String,
+        /// Grip force of a jaw.
+        grip_force_n: f64,
+        /// Label, where it has one.
+        label_n: Option<f64>,
     },
     /// A shard is done.
     Shard {

@@ -57,11 +57,17 @@ impl OpenShard {
         let mut row = encoded.row;
         row[1] = self.shard.to_string();
         row[2] = self.rows.len().to_string();
-        let failure =
-            if encoded.status == Status::Failed { failure_of(&row).to_string() } else { String::new() };
-        self.failed += u64::from(encoded.status == Status::Failed);
+        let failed = encoded.status == Status::Failed;
+        self.failed += u64::from(failed);
+        on_event(SweepEvent::Sample {
+            index,
+            status: encoded.status,
+            failure: if failed { cell(&row, "failure").to_string() } else { String::new() },
+            part: cell(&row, "part").to_string(),
+            grip_force_n: cell(&row, "grip_force_n").parse().unwrap_or_default(),
+            label_n: cell(&row, "max_pull_force_n").parse().ok(),
+        });
         self.rows.push(row);
-        on_event(SweepEvent::Sample { index, status: encoded.status, failure });
         let samples = samples_of_shard(run.project, self.shard);
         if (self.rows.len() as u64) < samples {
             return Ok(Some(self));
@@ -88,9 +94,9 @@ fn lost(partial: PartialShard, e: ShardError) -> SweepError {
     failure
 }
 
-/// The `failure` cell of an index row.
-fn failure_of(row: &[String]) -> &str {
-    let at = INDEX_COLUMNS.iter().position(|c| *c == "failure").expect("a fixed column");
+/// A cell of an index row.
+fn cell<'a>(row: &'a [String], column: &str) -> &'a str {
+    let at = INDEX_COLUMNS.iter().position(|c| *c == column).expect("a fixed column");
     &row[at]
 }
 

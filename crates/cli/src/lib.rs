@@ -13,6 +13,7 @@ mod args;
 mod commands;
 mod failure;
 mod interrupt;
+mod live;
 mod load;
 mod mark;
 mod output;

@@ -11,6 +11,9 @@ mod effects;
 // Files to start from.
 #[path = "cli/init.rs"]
 mod init;
+// A page of what is under way.
+#[path = "cli/live.rs"]
+mod live;
 // Calibrating a sensor and comparing with it.
 #[path = "cli/measured.rs"]
 mod measured;

@@ -135,6 +135,9 @@ pub struct RigPullArgs {
     /// How often a fault after which the robot stands still may be answered by a new connection, between two pulls.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub reconnect: u32,
+    /// Show it while it is under way on a page of this machine, --live=8080 for a port of your choice.
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    pub live: Option<u16>,
     /// JSON: one event a line.
     #[command(flatten)]
     pub json: JsonArgs,

@@ -4,11 +4,14 @@ use crate::args::SweepArgs;
 use crate::commands::check;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
+use crate::live::{LivePage, Made, Picture, State};
 use crate::output::{JsonSink, count, duration, print, program, size};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{RunFolder, status_name};
 use gripgen::tactile::SimdLevel;
+use gripgen::twin::Jaw;
+use gripgen::twin::config::ImageStorage;
 use gripgen::{
     CONTACT_SHEET, Location, Project, SweepEvent, SweepOptions, SweepSummary, publish_contact_sheet, sweep,
 };
@@ -32,6 +35,12 @@ pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
         .makes_run(&out);
     let json = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let mut watch = Watch::new(args, &project, json);
+    watch.out = out.clone();
+    if let Some(port) = args.live {
+        let page = LivePage::open(port, State::new(format!("sweep {}", project.name), "samples", 0, 0))?;
+        watch.say(&format!("live: {}", page.url()));
+        watch.page = Some(page);
+    }
     let stop = stop_flag("finishing the shards under way");
     let result = sweep(&project, &out, options, stop, |event| watch.on_event(&event));
     let summary = result?;
@@ -61,11 +70,24 @@ struct Watch<'a> {
     failures: u64,
     bytes: u64,
     made: u64,
+    page: Option<LivePage>,
+    out: PathBuf,
 }
 
 impl<'a> Watch<'a> {
     fn new(args: &'a SweepArgs, project: &'a Project, json: JsonSink) -> Self {
-        Self { args, project, json, progress: None, json_failure: None, failures: 0, bytes: 0, made: 0 }
+        Self {
+            args,
+            project,
+            json,
+            progress: None,
+            json_failure: None,
+            failures: 0,
+            bytes: 0,
+            made: 0,
+            page: None,
+            out: PathBuf::new(),
+        }
     }
 
     fn line(&mut self, value: &Value) {
@@ -74,7 +96,36 @@ impl<'a> Watch<'a> {
         }
     }
 
+    /// What the page shows of an event.
+    fn on_page(&self, event: &SweepEvent) {
+        let Some(page) = &self.page else { return };
+        match event {
+            SweepEvent::Planned { samples, done, .. } => page.tell(|state| state.plan(*done, *samples)),
+            SweepEvent::Sample { index, status, failure, part, grip_force_n, label_n } => {
+                let made = Made {
+                    index: *index,
+                    part: part.clone(),
+                    grip_force_n: *grip_force_n,
+                    status: status_name(*status).into(),
+                    label_n: *label_n,
+                    reason: failure.clone(),
+                };
+                page.tell(|state| state.made(made));
+            }
+            SweepEvent::Shard { shard, .. } if self.project.sweep.images != ImageStorage::None => {
+                let path = self.out.join(format!("shard-{shard:05}.mcap"));
+                page.tell(|state| {
+                    for jaw in Jaw::BOTH {
+                        state.picture(jaw, Picture::Shard(path.clone()));
+                    }
+                });
+            }
+            _ => {}
+        }
+    }
+
     fn on_event(&mut self, event: &SweepEvent) {
+        self.on_page(event);
         match event {
             SweepEvent::Planned { samples, done, shards } => {
                 self.line(&json!({
@@ -99,7 +150,7 @@ impl<'a> Watch<'a> {
                 }
                 self.progress = Some(Progress::start("samples", *done, *samples, &self.args.talk));
             }
-            SweepEvent::Sample { index, status, failure } => {
+            SweepEvent::Sample { index, status, failure, .. } => {
                 self.made += 1;
                 if !failure.is_empty() {
                     self.failures += 1;

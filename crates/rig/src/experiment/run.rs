@@ -6,10 +6,13 @@ use super::devices::Devices;
 use super::fault::Fault;
 use super::plan::{motion_program, outside_workspace};
 use super::robot::RobotRow;
+use crate::camera::CameraFrame;
 use crate::gcl::GclEvent;
 use crate::primary::{PrimaryEvent, RobotMessage};
 use crate::program::{Phase, StopReason, TcpPose};
 use crate::rtde::Event;
+use gripgen_twin::Jaw;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
@@ -22,6 +25,8 @@ pub(super) const PROGRAM: Duration = Duration::from_secs(3);
 pub(super) const SLACK: Duration = Duration::from_secs(3);
 /// Largest number of a run.
 const MAX_RUN: i32 = 1_000_000_000;
+/// Time between two frames that are told of.
+const FRAMES_EVERY: Duration = Duration::from_millis(200);
 /// A tool that is closer to a pose than this is there.
 const THERE_M: f64 = 1e-4;
 
@@ -41,6 +46,13 @@ pub enum RigEvent {
         measured_n: f64,
         /// Displacement.
         displacement_mm: f64,
+    },
+    /// A new frame of a camera as it came, where [`Experiment::show_frames`] asked for them.
+    Frame {
+        /// Which camera.
+        jaw: Jaw,
+        /// The frame.
+        frame: Arc<CameraFrame>,
     },
     /// Words of a device.
     Said {
@@ -81,6 +93,8 @@ pub struct Experiment<'a> {
     pub(super) last_said: Option<String>,
     /// How far a reading is known to trail, s.
     pub(super) trails_s: f64,
+    /// When frames were last told of; `None` where nobody looks.
+    frames_told: Option<Instant>,
 }
 
 impl<'a> Experiment<'a> {
@@ -110,6 +124,7 @@ impl<'a> Experiment<'a> {
             watched: None,
             last_said: None,
             trails_s: 0.0,
+            frames_told: None,
         }
     }
 
@@ -121,6 +136,22 @@ impl<'a> Experiment<'a> {
     /// Says goodbye.
     pub fn close(self) {
         self.devices.close();
+    }
+
+    /// Tells of the newest frames of both cameras, a few each second.
+    pub fn show_frames(&mut self) {
+        self.frames_told = Some(Instant::now());
+    }
+
+    fn tell_frames(&mut self) {
+        let Some(told) = self.frames_told.filter(|told| told.elapsed() >= FRAMES_EVERY) else { return };
+        self.frames_told = Some(Instant::now());
+        for jaw in Jaw::BOTH {
+            let newest = self.devices.cameras[jaw].newest().filter(|frame| frame.at > told);
+            if let Some(frame) = newest {
+                self.tell(RigEvent::Frame { jaw, frame: frame.event });
+            }
+        }
     }
 
     pub(super) fn tell(&mut self, event: RigEvent) {
@@ -157,6 +188,7 @@ impl<'a> Experiment<'a> {
             return Err(Fault::Silent { silent_s, limit_s });
         }
         self.check_program()?;
+        self.tell_frames();
         Ok(rows)
     }
 

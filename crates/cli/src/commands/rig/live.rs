@@ -3,9 +3,11 @@
 use super::record::Standing;
 use crate::args::TalkArgs;
 use crate::failure::Failure;
+use crate::live::{CurvePoint, LivePage, Made, Picture, State};
 use crate::output::{JsonSink, count, print, program};
 use crate::progress::Progress;
-use gripgen::twin::PlannedPull;
+use gripgen::twin::{PerJaw, PlannedPull};
+use gripgen_rig::camera::CameraView;
 use gripgen_rig::experiment::pull::ExecutedPull;
 use gripgen_rig::experiment::{PullOutcome, RigEvent};
 use serde_json::json;
@@ -26,9 +28,11 @@ pub struct Live {
     quiet: bool,
     verbose: bool,
     total: u64,
+    done: u64,
     label: String,
     curve: Vec<f64>,
     drawn: Instant,
+    page: Option<(LivePage, PerJaw<CameraView>)>,
 }
 
 impl Live {
@@ -40,9 +44,26 @@ impl Live {
             quiet: talk.quiet,
             verbose: talk.verbose,
             total,
+            done: total - todo,
             label: String::new(),
             curve: Vec::new(),
             drawn: Instant::now(),
+            page: None,
+        }
+    }
+
+    /// Opens a page of this machine and says where.
+    pub fn show_on_page(&mut self, port: u16, name: &str, views: PerJaw<CameraView>) -> Result<(), Failure> {
+        let page =
+            LivePage::open(port, State::new(format!("rig pull {name}"), "pulls", self.done, self.total))?;
+        self.say(&format!("live: {}", page.url()));
+        self.page = Some((page, views));
+        Ok(())
+    }
+
+    fn on_page(&self, change: impl FnOnce(&mut State)) {
+        if let Some((page, _)) = &self.page {
+            page.tell(change);
         }
     }
 
@@ -58,6 +79,7 @@ impl Live {
         self.label = format!("{}/{} {} {} N", place + 1, self.total, planned.part, planned.grip_force_n);
         self.curve.clear();
         self.progress.message(&self.label);
+        self.on_page(|state| state.begin(&self.label));
     }
 
     /// Something happens.
@@ -65,12 +87,20 @@ impl Live {
         match event {
             RigEvent::Step(step) => {
                 self.progress.message(&format!("{}: {step}", self.label));
+                self.on_page(|state| state.now = format!("{}: {step}", self.label));
                 if self.verbose {
                     self.say(&format!("{}: {step}", self.label));
                 }
             }
             RigEvent::Reading { time_s, desired_n, measured_n, displacement_mm } => {
                 self.curve.push(*measured_n);
+                let point = CurvePoint {
+                    time_s: *time_s,
+                    desired_n: *desired_n,
+                    measured_n: *measured_n,
+                    displacement_mm: *displacement_mm,
+                };
+                self.on_page(|state| state.reading(point));
                 if self.drawn.elapsed() >= REDRAW {
                     self.drawn = Instant::now();
                     let curve = sparkline(&self.curve);
@@ -78,6 +108,11 @@ impl Live {
                         "{}: {time_s:.1} s, {desired_n:.1} N asked, {measured_n:.1} N, {displacement_mm:.2} mm {curve}",
                         self.label
                     ));
+                }
+            }
+            RigEvent::Frame { jaw, frame } => {
+                if let Some((page, views)) = &self.page {
+                    page.tell(|state| state.picture(*jaw, Picture::Frame(frame.clone(), *views)));
                 }
             }
             RigEvent::Said { source, text } => self.say(&format!("{source}: {text}")),
@@ -113,6 +148,15 @@ impl Live {
             self.progress.step();
         }
         let reason = if let PullOutcome::Failed { reason } = &measured.outcome { reason } else { "" };
+        let made = Made {
+            index: standing.index,
+            part: measured.planned.part.clone(),
+            grip_force_n: measured.planned.grip_force_n,
+            status: status.into(),
+            label_n: force_n,
+            reason: suspect.unwrap_or(reason).into(),
+        };
+        self.on_page(|state| state.made(made));
         self.sink.line(&json!({
             "event": "pull",
             "index": standing.index,

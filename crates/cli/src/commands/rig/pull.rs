@@ -78,7 +78,11 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
         rehearsal::keep(path, folder.path())?;
     }
     let todo = todo(&folder)?;
-    let live = RefCell::new(Live::new(pulls.len() as u64, todo.len() as u64, &args.talk, sink));
+    let mut live = Live::new(pulls.len() as u64, todo.len() as u64, &args.talk, sink);
+    if let Some(port) = args.live {
+        live.show_on_page(port, &name_of(args), config.views())?;
+    }
+    let live = RefCell::new(live);
     if todo.is_empty() {
         return finish(&folder, &live.borrow(), 0);
     }
@@ -246,6 +250,9 @@ impl Job<'_> {
         let mut emit = |event| self.live.borrow_mut().event(&event);
         let mut experiment = Experiment::new(self.config, devices, self.stop, &mut emit);
         experiment.trails(self.trails_s);
+        if self.args.live.is_some() {
+            experiment.show_frames();
+        }
         if let Err(fault) = experiment.begin() {
             if let Fault::Busy { .. } = fault {
                 // It is not ours to stop.
