@@ -259,6 +259,17 @@ class Held:
         arrays |= {"rest": self.rest.astype(np.float32), "colour_to_slope": self.photometry.map}
         np.savez_compressed(path, mean=self.network.mean, sd=self.network.sd, half_width_ln=widths, **arrays)
 
+    @classmethod
+    def load(cls, path: Path) -> tuple["Held", np.ndarray]:
+        """What `save` wrote, and the half widths of ln F with and without mu."""
+        arrays = np.load(path)
+        held, network, photometry = cls.__new__(cls), Network.__new__(Network), Photometry.__new__(Photometry)
+        network.sees, network.mean, network.sd = True, arrays["mean"], arrays["sd"]
+        network.members = [[arrays[f"network{k}_{i}"].astype(float) for i in range(6)] for k in range(3)]
+        photometry.map = arrays["colour_to_slope"]
+        held.rest, held.network, held.photometry = arrays["rest"], network, photometry
+        return held, arrays["half_width_ln"]
+
 
 def train(data: Arrays, keep: np.ndarray, epochs: int, seed: int, sees: bool = True) -> Held:
     """From the rows in `keep` alone."""
@@ -345,7 +356,7 @@ def main() -> None:
     told_out, blind_out, _ = left_out(data, fit, 3, epochs, seed)
     widths = [width(data.label_n[fit], p[fit]) for p in (told_out, blind_out)]
     network = train(data, fit, epochs, seed)
-    told, blind = predict(network, data, test)
+    told, blind = told_test, blind_test = predict(network, data, test)
     found = {"test": figures(data, test, told, blind)}
     label_n = data.label_n[test]
     found["test"]["within_90_with_mu"] = within(label_n, told, widths[0])
@@ -371,6 +382,9 @@ def main() -> None:
             found["rotated"][f"within_90_{name}_by_group"] = inside
     (work / "figures.json").write_text(json.dumps(found, indent=2))
     network.save(work / "held.npz", widths)
+    again = predict(Held.load(work / "held.npz")[0], data, test)
+    if not all(np.allclose(a, b, rtol=1e-3) for a, b in zip(again, (told_test, blind_test))):
+        raise SystemExit("what was saved predicts otherwise than what was trained")
     (work / "card.md").write_text(card(data, found, (work / "held.npz").stat().st_size))
     print(json.dumps(found, indent=2))
     print(f"{time.time() - started:.0f} s in all; weights, card and figures are in {work}")
