@@ -7,8 +7,11 @@ use gripgen::{PressGeometry, load_presses};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Sets of presses: name, path, diameter of the ball and size of a pixel in millimetres, where no file says them.
-const SETS: [(&str, &str, Option<(f64, f64)>); 3] = [
+/// Diameter of a ball and size of a pixel in millimetres, where no file says them.
+type SizesMm = Option<(f64, f64)>;
+
+/// Sets of presses: name and path.
+const SETS: [(&str, &str, SizesMm); 3] = [
     ("Taxim's GelSight", "taxim/gelsight/dataPack.npz", None),
     ("shapes' GelSight", "gelsight_shapes/balls", Some((5.84, 0.059_259_259_2))),
     ("FOTS' GelSight", "gelsight_fots", Some((4.70, 0.051_072_5))),
@@ -45,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn load(path: &Path, sizes_mm: Option<(f64, f64)>) -> Result<PressSet, Box<dyn Error>> {
+fn load(path: &Path, sizes_mm: SizesMm) -> Result<PressSet, Box<dyn Error>> {
     let geometry = PressGeometry {
         ball_m: sizes_mm.map(|(ball, _)| 1e-3 * ball),
         metres_per_px: sizes_mm.map(|(_, pixel)| 1e-3 * pixel),
