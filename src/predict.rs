@@ -2,6 +2,7 @@
 //! which is what a twin is judged by. Expected values over scatter and noise.
 
 mod kept;
+mod limit;
 mod signals;
 mod table;
 
@@ -13,13 +14,13 @@ use crate::parallel::in_parallel;
 use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
 use gripgen_physics::{QuasiStatic, StuckPull};
 use gripgen_twin::config::Feedback;
-use gripgen_twin::effects::{CommandChain, Effect, GripPoint, OutsideFit, Per, SensorChain};
+use gripgen_twin::effects::{CommandChain, Effect, OutsideFit, Per, SensorChain};
 use gripgen_twin::{Backbone, Jaw, MeasuredPulls, Robot, Staircase, Twin};
 use kept::Kept;
 use signals::Signals;
 use std::convert::Infallible;
 use std::sync::{Arc, OnceLock};
-use table::{LabelTable, Scattered};
+use table::{ExactLabels, LabelTable, Scattered, enough_for};
 
 /// Longest pull that is looked at.
 const MAX_TIME_S: f64 = 120.0;
@@ -63,6 +64,7 @@ pub struct PullPredictor<'a> {
     jobs: usize,
     stuck: Cache<Key, Kept>,
     tables: Cache<Key, LabelTable>,
+    exact: Cache<Key, ExactLabels>,
     signal_stuck: Cache<Key, Kept>,
     signal_tables: Cache<Key, LabelTable>,
 }
@@ -115,6 +117,7 @@ impl<'a> PullPredictor<'a> {
             jobs: jobs.max(1),
             stuck: Cache::new(TABLES),
             tables: Cache::new(TABLES),
+            exact: Cache::new(TABLES),
             signal_stuck: Cache::new(SIGNAL_PULLS),
             signal_tables: Cache::new(SIGNAL_TABLES),
         }
@@ -309,7 +312,16 @@ impl<'a> PullPredictor<'a> {
 
     fn label_table(&self, model: &PullModel, row: usize) -> LabelTable {
         let stuck = self.stuck(model, row);
-        LabelTable::new(&self.scattered(model, row, &stuck, &self.backbone(model)), self.max_n)
+        let backbone = self.backbone(model);
+        let pull = self.scattered(model, row, &stuck, &backbone);
+        if acts_on_signals(model) {
+            return LabelTable::new(&pull, &ExactLabels::new(&pull, self.max_n, model.scatter), self.max_n);
+        }
+        let most = enough_for(model.scatter);
+        let own = [model.kinetic_ratio, most, model.noise_n, model.shear_by_area];
+        let make = || Ok::<_, Infallible>(ExactLabels::new(&pull, self.max_n, most));
+        let exact = self.exact.get(self.key(model, row, &own), make).unwrap_or_else(|never| match never {});
+        LabelTable::new(&pull, &exact, self.max_n)
     }
 
     /// Labels of a model whose effects act on signals: those of a contact that lets go at once, and what a bend adds to labels
@@ -381,38 +393,6 @@ impl<'a> PullPredictor<'a> {
             }
         }
         found
-    }
-
-    /// What the jaws of pull `row` hold, without scatter.
-    fn limit_n(&self, model: &PullModel, row: usize) -> f64 {
-        let pull = &self.measured.pulls[row];
-        let part = self.part_of[row];
-        let mut sum = 0.0;
-        for jaw in Jaw::BOTH {
-            let mut at = GripPoint {
-                jaw,
-                grip_force_n: pull.grip_force_n,
-                contact_area_m2: 0.0,
-                pull_rate_n_per_s: pull.increment_n / pull.step_s,
-                covariates: &pull.covariates,
-                grip: (0, 0),
-            };
-            let own = || model.effects.iter().filter(|e| e.part.is_none_or(|p| p == part));
-            let force_n = own().fold(at.grip_force_n, |f, e| match e.spec.normal_force {
-                Some(hook) => hook(&e.values, f, &at).max(0.0),
-                None => f,
-            });
-            at.grip_force_n = force_n;
-            let mu = own().fold(model.mu[part], |mu, e| match e.spec.friction {
-                Some(hook) => {
-                    let held = e.held_grip_force_n.map_or(force_n, |(low, high)| force_n.clamp(low, high));
-                    hook(&e.values, mu, &GripPoint { grip_force_n: held, ..at }).max(0.0)
-                }
-                None => mu,
-            });
-            sum += mu * force_n;
-        }
-        sum * model.factor.get(row).copied().unwrap_or(1.0)
     }
 }
 

@@ -108,12 +108,38 @@ fn force_n(place: f64) -> f64 {
     if place <= even { place * STEP_N } else { EVEN_N * libm::exp(place / even - 1.0) }
 }
 
-impl LabelTable {
-    pub fn new(pull: &Scattered<'_>, max_n: f64) -> Self {
-        // Beyond by what scatter adds.
-        let count = place(max_n * (1.0 + 3.3 * pull.scatter)).ceil() as usize + 2;
+/// Means and mean squares of labels of jaws that hold exactly the forces of a table: what is left where nothing scatters. Tables of all
+/// scatters, which differ from fold to fold, share them.
+pub(super) struct ExactLabels {
+    values: Vec<(f64, f64)>,
+}
+
+/// Scatters for which the same forces are looked at.
+const SCATTER_STEP: f64 = 0.1;
+
+/// How many forces a table over `scatter` needs: beyond the largest by what scatter adds.
+fn count(max_n: f64, scatter: f64) -> usize {
+    place(max_n * (1.0 + 3.3 * scatter)).ceil() as usize + 2
+}
+
+/// The scatter whose forces are enough for `scatter`.
+pub(super) fn enough_for(scatter: f64) -> f64 {
+    SCATTER_STEP * (scatter / SCATTER_STEP).ceil().max(1.0)
+}
+
+impl ExactLabels {
+    /// Of a pull, at the forces for any scatter up to `scatter`.
+    pub fn new(pull: &Scattered<'_>, max_n: f64, scatter: f64) -> Self {
         let mut slip = SlipPull::default();
-        let exact: Vec<(f64, f64)> = (0..count).map(|i| pull.label(force_n(i as f64), &mut slip)).collect();
+        let places = 0..count(max_n, scatter);
+        Self { values: places.map(|i| pull.label(force_n(i as f64), &mut slip)).collect() }
+    }
+}
+
+impl LabelTable {
+    /// Of a pull with the scatter of its jaws; `exact` are its labels without.
+    pub fn new(pull: &Scattered<'_>, exact: &ExactLabels, max_n: f64) -> Self {
+        let (count, exact) = (count(max_n, pull.scatter), &exact.values);
         let between = |limit_n: f64| {
             let x = place(limit_n).clamp(0.0, (count - 2) as f64);
             let (i, w) = (x as usize, x.fract());

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from . import campaigns, cases, effects, folders, generator, judge, ledger, physics, runner, scorer, unknowns
+from . import campaigns, cases, effects, folders, generate, generator, judge, ledger, physics, regret, runner, scorer, unknowns
 
 
 def quiet_world(ratio=1.0, spread=0.0):
@@ -253,3 +253,15 @@ def test_small_set_through_the_binary(tmp_path):
     assert all(r["unknown_listed"] for r in rows if r["group"] == "D"), shown
     ratios = [r["ratio"] for r in rows if r["group"] in "ABCD"]
     assert np.median(ratios) <= 1.3, shown
+
+
+@pytest.mark.skipif(not {"GRIPGEN_BIN", "GRIPGEN_BLIND_MORE"} <= set(os.environ), reason="no binary named, or not asked for")
+def test_a_warm_session_is_not_what_acts(tmp_path):
+    """Humidity and temperature act together, and one of three sessions is warm: on pulls of other sessions a twin that blames it is worse."""
+    case, seed, _ = generate.plan("dev", 12, salt=17, worlds="l")[0]
+    assert case["kind"] == "humid_heat"
+    out, sealed = tmp_path / "set", tmp_path / "set-sealed"
+    generator.build(case, seed, "c000", out, sealed)
+    line = regret.score(out / "c000", sealed / "c000", tmp_path / "work", os.environ["GRIPGEN_BIN"], 900, True)
+    assert not any("session" in covariate for covariate in line["unknown"]), line
+    assert line["after_n"] <= 1.02 * line["before_n"] + 0.01, line

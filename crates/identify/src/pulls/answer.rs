@@ -3,28 +3,26 @@
 use super::candidates::{Candidate, candidates};
 use super::context::Context;
 use super::data::PullData;
-use super::estimates::{baseline, parameters};
+use super::estimates::baseline;
 use super::fitting::Fitted;
 use super::heldout::{
     HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
 };
 use super::model::{PredictPulls, PullModel, PullPrediction};
+use super::naming::named;
 use super::paying::{by_chance, paying};
 use super::posterior::of_diagnosis;
 use super::power::ScoreTest;
 use super::recalibrated::recalibrated;
 use super::residual::{in_place_of_curves, kept};
 use super::ridge::ahead;
-use super::search::{Accepted, Search, TIED_WITHIN};
+use super::search::{Accepted, Search};
 use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
 use super::unknown::unknown;
-use super::words::separation;
+use super::worth::{HeldOut, hints, worse};
 use super::zero_screen::{said, zeros_that_depend};
-use crate::diagnosis::{
-    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, Residual, Rival, SeparateBy,
-    UnknownCovariate,
-};
+use crate::diagnosis::{Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, Residual, UnknownCovariate};
 use gripgen_twin::columns::covariates;
 use gripgen_twin::rounded;
 use gripgen_twin::{MeasuredPulls, Posterior};
@@ -45,16 +43,13 @@ const SCORED: usize = 8;
 const WORSE: f64 = 1.03;
 
 /// Standard deviations beyond which the error of a held-out pull counts no more.
-const BAD: f64 = 5.0;
+pub(super) const BAD: f64 = 5.0;
 
 /// How many times the noise that a twin states labels have to show before it is said.
 const NOISIER: f64 = 1.6;
 
 /// How often chance lets the ridge be ahead by two standard errors.
 const RIVAL_P: f64 = 0.023;
-
-/// Odds are taken to this power, because no model here is exactly right.
-const TEMPER: f64 = 0.6;
 
 /// An answer, with what a report and a twin need beside it.
 #[derive(Debug, Clone)]
@@ -112,6 +107,8 @@ pub fn diagnose_pulls(
     let mut context = Context::new(&data, predictor, given);
     let rows: Vec<usize> = (0..data.len()).collect();
     context.see_tails(&rows);
+    context.learn_lag(&rows);
+    let seen = context.clone();
     context.share_lag(&rows);
     context.base.bent_at_s = (context.base.lag_s, context.base.dead_time_s);
     if let Some(plain) = context.fit(&context.base, &Terms::default(), &rows) {
@@ -136,8 +133,8 @@ pub fn diagnose_pulls(
     let accepted = confirmed(&search, &before, accepted, &fast_before, &repetitions);
     let far = outliers(&accepted.fitted);
     let near: Vec<usize> = rows.iter().copied().filter(|i| !far.contains(i)).collect();
-    let (mut accepted, hints) = paying(&search, &before, accepted, &repetitions, &near);
-    diagnosis.hints = hints;
+    let (mut accepted, unpaid) = paying(&search, &before, accepted, &repetitions, &near);
+    diagnosis.hints = unpaid;
     if let Some(found) = &accepted.by_chance {
         diagnosis.hints.push(by_chance(&search, &before, found, &repetitions, &near));
     }
@@ -149,23 +146,34 @@ pub fn diagnose_pulls(
         }
     }
     let replaced = left.is_some();
-    let left = left.or_else(|| kept(&search, &accepted.fitted, &repetitions, &near));
+    let mut left = left.or_else(|| kept(&search, &accepted.fitted, &repetitions, &near));
     if let Some(left) = &left {
         accepted.fitted = left.fitted.clone();
     }
     // What is stated from here on is what a twin of these models says.
     let (before_context, stated_before) =
-        recalibrated(&data, predictor, given).unwrap_or_else(|| context.stated(&before));
-    // Where nothing was found, that is the baseline as a calibration writes it.
-    let found = !accepted.effects.is_empty() || !accepted.curves.is_empty() || left.is_some();
-    let (after_context, after) = if found {
-        context.stated(&accepted.fitted)
-    } else {
-        (before_context.clone(), stated_before.clone())
-    };
-    accepted.fitted = after.clone();
+        recalibrated(seen, &rows).unwrap_or_else(|| context.stated(&before));
     let heldout_before = predicted(&before_context, &stated_before, &repetitions, false);
-    let heldout_after = predicted(&after_context, &after, &repetitions, false);
+    // Where nothing was found, or nothing that predicts better, that is the baseline as a calibration writes it.
+    let mut found = !accepted.effects.is_empty() || !accepted.curves.is_empty() || left.is_some();
+    let mut written = None;
+    if found {
+        let (after_context, after) = search.stated(&accepted.fitted);
+        let after_n = predicted(&after_context, &after, &repetitions, false);
+        let sd_n = label_sd_n(&before, &predictor.pulls(&before.model, &rows));
+        let held = HeldOut { before_n: &heldout_before, after_n: &after_n, sd_n: &sd_n };
+        if let Some(reason) = worse(&search, &accepted, &held, &near) {
+            diagnosis.hints.extend(hints(&search, &accepted, &reason));
+            accepted.effects.clear();
+            accepted.curves.clear();
+            (left, found) = (None, false);
+        } else {
+            written = Some((after_context, after, after_n));
+        }
+    }
+    let (after_context, after, heldout_after) =
+        written.unwrap_or_else(|| (before_context.clone(), stated_before.clone(), heldout_before.clone()));
+    accepted.fitted = after.clone();
     diagnosis.effects = named(&search, &before, &accepted);
     diagnosis.unknown = unknown(&search, &before, &accepted, &data);
     for curve in accepted.curves.iter().map(|&i| &search.curves[i]) {
@@ -236,7 +244,7 @@ pub fn diagnose_pulls(
                 return None;
             }
             let b = predicted(&before_context, &stated_before, &sets, true);
-            let a = predicted(&after_context, &after, &sets, true);
+            let a = if found { predicted(&after_context, &after, &sets, true) } else { b.clone() };
             errors(&data.label_n, &b, &a, &data.group_of, &counted)
         };
         let force: Vec<u64> = measured.pulls.iter().map(|p| p.grip_force_n.to_bits()).collect();
@@ -307,9 +315,11 @@ fn confirmed(
         each.map(|((l, p), sd)| ((l - p) / sd).powi(2).min(BAD * BAD)).sum()
     };
     loop {
+        if accepted.effects.is_empty() && accepted.curves.is_empty() {
+            return accepted;
+        }
         let after = predicted(search.context, &accepted.fitted, repetitions, false);
-        let terms = accepted.effects.len() + accepted.curves.len();
-        if terms == 0 || squares(&after) <= WORSE * squares(heldout_before) {
+        if squares(&after) <= WORSE * squares(heldout_before) {
             return accepted;
         }
         let mut fewer = accepted.fitted.terms.clone();
@@ -368,87 +378,6 @@ pub fn insufficient(data: &PullData<'_>) -> Option<String> {
         ));
     }
     None
-}
-
-/// The accepted effects with their rivals.
-fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted) -> Vec<NamedEffect> {
-    let mut effects: Vec<NamedEffect> = accepted
-        .effects
-        .iter()
-        .flat_map(|(i, tied)| {
-            let candidate = &search.candidates[*i];
-            let odds: Vec<f64> = tied.iter().map(|t| libm::exp(TEMPER * t.less)).collect();
-            let total = 1.0 + odds.iter().sum::<f64>();
-            // What is left for "none" and for everything else.
-            let alone = accepted.entries.iter().find(|e| e.rival.effect() == Some(*i));
-            let rest = alone.map_or(0.05, |e| libm::exp(-TEMPER * e.gain.max(0.0)).min(0.5)).max(0.02);
-            let share = (1.0 - rest) / total;
-            let rivals: Vec<Rival> = tied
-                .iter()
-                .zip(&odds)
-                .map(|(t, odds)| Rival {
-                    name: search.candidates[t.effect].spec.id.into(),
-                    weight: share * odds,
-                })
-                .collect();
-            let mut class: Vec<String> = vec![candidate.spec.id.into()];
-            class.extend(tied.iter().map(|t| search.candidates[t.effect].spec.id.to_string()));
-            class.extend(
-                alike(search, before, accepted, *i)
-                    .into_iter()
-                    .filter(|c| !class.contains(c))
-                    .collect::<Vec<_>>(),
-            );
-            let names: Vec<&str> = tied.iter().map(|t| search.candidates[t.effect].spec.id).collect();
-            let named = NamedEffect {
-                name: candidate.spec.id.into(),
-                part: None,
-                class,
-                weight: share,
-                parameters: BTreeMap::new(),
-                indistinguishable_from: rivals,
-                separate_by: (!names.is_empty())
-                    .then(|| SeparateBy { text: separation(candidate.spec.id, &names), campaign: None }),
-            };
-            // One entry, or one for each part that shows it.
-            let own =
-                accepted.fitted.terms.effects.iter().map(|(c, _)| c).filter(|c| c.spec == candidate.spec);
-            let each = own.filter_map(|c| {
-                let parameters = parameters(&accepted.fitted, c);
-                let size = &c.spec.parameters[c.size()];
-                let seen = c.part.is_none()
-                    || parameters
-                        .get(size.name)
-                        .is_some_and(|p| p.low90 > size.neutral || p.high90 < size.neutral);
-                let part = c.part.as_ref().map(|(_, name)| name.clone());
-                seen.then(|| NamedEffect { part, parameters, ..named.clone() })
-            });
-            each.collect::<Vec<_>>()
-        })
-        .collect();
-    effects.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-    effects
-}
-
-/// Effects that explain nearly as much as effect `i` does alone: its class in this campaign.
-fn alike(search: &Search<'_>, before: &Fitted, accepted: &Accepted, i: usize) -> Vec<String> {
-    let gained = |f: &Fitted| (f.likelihood.log - f.trace_cost) - (before.likelihood.log - before.trace_cost);
-    let own = accepted.entries.iter().find(|e| e.rival.effect() == Some(i));
-    let Some(own) = own.map(|e| gained(&e.fitted)) else { return vec![] };
-    // What was found beside another effect was not seen alone: these entries say nothing of it.
-    let best = accepted.entries.iter().filter(|e| e.rival.effect().is_some()).map(|e| gained(&e.fitted));
-    if own < best.fold(f64::NEG_INFINITY, f64::max) - 3.0 * TIED_WITHIN {
-        return vec![];
-    }
-    let wide = (0.1 * own).clamp(TIED_WITHIN, 3.0 * TIED_WITHIN);
-    let near = |e: &super::search::Entry| match e.rival.effect() {
-        Some(k) if k != i && gained(&e.fitted) > own - wide => Some(search.candidates[k].spec.id.to_string()),
-        _ => None,
-    };
-    let mut found: Vec<String> = accepted.entries.iter().filter_map(near).collect();
-    found.sort();
-    found.dedup();
-    found
 }
 
 /// Pulls that lie far off, the farthest first.

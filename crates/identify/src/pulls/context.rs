@@ -133,9 +133,10 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Without traces the labels are all that knows of force loop and sensor: lag, dead time and noise from them, once.
+    /// Without traces the labels are all that knows of force loop and sensor: lag, dead time and noise from them, once. Where they have said
+    /// it already, that stands.
     pub(super) fn learn_lag(&mut self, rows: &[usize]) {
-        if !self.observations.is_empty() {
+        if !self.observations.is_empty() || self.noise90_n.is_some() {
             return;
         }
         self.free_lag = true;

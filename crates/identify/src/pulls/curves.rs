@@ -3,6 +3,9 @@
 use super::data::{Column, PullData};
 use nalgebra::{DMatrix, DVector};
 
+/// The column whose words do not come back.
+pub(super) const SESSION: &str = "session";
+
 /// A dependence of friction on a column that no effect explains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
@@ -22,7 +25,27 @@ pub struct Curve {
     pub only: Option<(String, String)>,
 }
 
+/// What a curve has to do with sessions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Session {
+    /// Nothing.
+    Elsewhere,
+    /// It is steps between sessions.
+    Steps,
+    /// It is a curve of one session.
+    Slope,
+}
+
 impl Curve {
+    /// What it has to do with sessions.
+    pub fn session(&self) -> Session {
+        match &self.only {
+            Some((column, _)) if column == SESSION => Session::Slope,
+            None if self.name == SESSION => Session::Steps,
+            _ => Session::Elsewhere,
+        }
+    }
+
     /// Number of coefficients.
     pub fn len(&self) -> usize {
         self.basis.first().map_or(0, Vec::len)
@@ -197,15 +220,19 @@ pub fn product(data: &PullData<'_>, a: &str, b: &str) -> Option<Curve> {
 /// Fewest pulls with a word, and with any other, that show a curve of their own.
 const MIN_OF_WORD: usize = 8;
 
+/// Fewest pulls of a session that show one: a session of a handful of pulls has no slope of its own.
+const MIN_OF_SESSION: usize = 16;
+
 /// A curve in a column of numbers at one word of another column: something that acts in one session, on one part. The word is the one at which
 /// it explains most of `residuals`; the choice of the pair and that of the word are paid for like a parameter each.
 pub fn at_one_word(data: &PullData<'_>, name: &str, other: &str, residuals: &[f64]) -> Option<Curve> {
     let Some(Column::Word(at, words)) = data.columns.get(other) else { return None };
     let x = data.numbers(name)?;
+    let least = if other == SESSION { MIN_OF_SESSION } else { MIN_OF_WORD };
     let of = |word: usize| {
         let rows: Vec<usize> = (0..x.len()).filter(|&i| at[i] == word).collect();
         let own: Vec<f64> = rows.iter().map(|&i| x[i]).collect();
-        let enough = rows.len() >= MIN_OF_WORD && x.len() - rows.len() >= MIN_OF_WORD;
+        let enough = rows.len() >= least && x.len() - rows.len() >= least;
         if !enough || own.iter().all(|v| *v == own[0]) {
             return None;
         }
@@ -236,6 +263,18 @@ pub fn at_one_word(data: &PullData<'_>, name: &str, other: &str, residuals: &[f6
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A curve at one word says whether that word is a session, steps say whether they are between sessions.
+    #[test]
+    fn sessions_are_known_from_other_words() {
+        let words = Column::Word(vec![0, 0, 1, 1], ["a", "b"].map(String::from).to_vec());
+        let steps = |name: &str| curves_in(name, &words).remove(0);
+        assert_eq!(steps("session").session(), Session::Steps);
+        assert_eq!(steps("operator").session(), Session::Elsewhere);
+        let at = |other: &str| Curve { only: Some((other.into(), "a".into())), ..steps("dwell_s") };
+        assert_eq!(at("session").session(), Session::Slope);
+        assert_eq!(at("operator").session(), Session::Elsewhere);
+    }
 
     /// A wave of 7.3 cycles, sampled unevenly, is found with its frequency and explains nearly everything.
     #[test]

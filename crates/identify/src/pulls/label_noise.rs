@@ -7,6 +7,7 @@
 use super::context::Context;
 use super::model::PullModel;
 use super::terms::Terms;
+use std::sync::Mutex;
 
 /// Noises that are tried, in newtons: a factor of 1.5 apart.
 const TRIED_N: [f64; 9] = [0.03, 0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9];
@@ -28,7 +29,15 @@ impl Context<'_> {
             let prior = (log_noise - given) / KNOWN;
             Some((log_noise, found.likelihood.log - found.trace_cost - 0.5 * prior * prior, found.model))
         };
-        let tried: Vec<_> = TRIED_N.iter().filter_map(|n| at(libm::log(*n))).collect();
+        // The fits with lag and dead time free are most of what a diagnosis of labels takes: threads share them.
+        let slots = TRIED_N.map(|_| Mutex::new(None));
+        self.predictor.for_each(slots.len(), &|k| {
+            let found = at(libm::log(TRIED_N[k]));
+            if let Ok(mut slot) = slots[k].lock() {
+                *slot = found;
+            }
+        });
+        let tried: Vec<_> = slots.into_iter().filter_map(|slot| slot.into_inner().ok().flatten()).collect();
         let best = (0..tried.len()).max_by(|&a, &b| tried[a].1.total_cmp(&tried[b].1))?;
         let peak = match (best.checked_sub(1).map(|k| &tried[k]), tried.get(best + 1)) {
             (Some(below), Some(above)) => summit([below, &tried[best], above].map(|t| (t.0, t.1))),

@@ -4,7 +4,6 @@
 use super::context::Context;
 use super::estimates::parameters;
 use super::fitting::Fitted;
-use super::heldout::predicted;
 use super::model::PullModel;
 use super::search::{Accepted, ByChance, Search};
 use super::terms::Terms;
@@ -40,7 +39,7 @@ pub(super) fn paying(
             context.fit(&before.model, &terms, &search.rows)
         };
         let Some(fewer) = fewer else { continue };
-        let errors = [&fewer, &accepted.fitted].map(|f| held_out(context, f, repetitions, rows));
+        let errors = [&fewer, &accepted.fitted].map(|f| search.held_out(f, repetitions, rows));
         let plain = share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(_, e)| *e))));
         // A weak grip that is predicted well says as much as a strong one.
         let weighed =
@@ -87,7 +86,7 @@ fn without_curve(
         let terms = Terms { curves: vec![], ..accepted.fitted.terms.clone() };
         context.fit(&before.model, &terms, &search.rows)?
     };
-    let errors = [&fewer, &accepted.fitted].map(|f| held_out(context, f, repetitions, rows));
+    let errors = [&fewer, &accepted.fitted].map(|f| search.held_out(f, repetitions, rows));
     let plain = share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(_, e)| *e))));
     let weighed =
         share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(i, e)| e / sd_n[*i]))));
@@ -111,11 +110,10 @@ pub(super) fn by_chance(
     repetitions: &[Vec<usize>],
     rows: &[usize],
 ) -> Hint {
-    let context = search.context;
     Hint {
         name: search.name_of(&found.entry.rival),
         gain: share([before, &found.entry.fitted].map(|f| {
-            let errors = held_out(context, f, repetitions, rows);
+            let errors = search.held_out(f, repetitions, rows);
             root_mean_square(errors.into_iter().map(|(_, e)| e))
         })),
         reason: format!(
@@ -123,19 +121,6 @@ pub(super) fn by_chance(
             100.0 * found.chance
         ),
     }
-}
-
-/// Errors on held-out labels of the twin that is written for a fit, by pull. What traces show is held, which is fast.
-pub(super) fn held_out(
-    context: &Context<'_>,
-    fitted: &Fitted,
-    repetitions: &[Vec<usize>],
-    rows: &[usize],
-) -> Vec<(usize, f64)> {
-    let (context, fitted) = context.stated(fitted);
-    let held = predicted(&context, &fitted, repetitions, !context.observations.is_empty());
-    let errors = rows.iter().map(|&i| (i, held[i] - context.data.label_n[i]));
-    errors.filter(|(_, e)| e.is_finite()).collect()
 }
 
 /// Why an effect may be nothing at all: its size holds its neutral value in all its terms.

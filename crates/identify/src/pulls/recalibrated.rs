@@ -1,9 +1,8 @@
 //! The recalibrated baseline: what a calibration writes, and a diagnosis that finds nothing.
 
 use super::context::Context;
-use super::data::PullData;
 use super::fitting::Fitted;
-use super::model::{PredictPulls, PullModel};
+use super::model::PullModel;
 use super::scatter::scatter;
 use super::terms::Terms;
 
@@ -11,19 +10,12 @@ use super::terms::Terms;
 const MIN_SCATTER: f64 = 0.002;
 
 /// The plain baseline as a calibration states and writes it, with the context that predicts it: what a diagnosis is compared with, and
-/// what it writes where it finds nothing.
-pub(super) fn recalibrated<'a>(
-    data: &'a PullData<'a>,
-    predictor: &'a dyn PredictPulls,
-    given: &PullModel,
-) -> Option<(Context<'a>, Fitted)> {
-    let mut context = Context::new(data, predictor, given);
-    let rows: Vec<usize> = (0..data.len()).collect();
-    context.see_tails(&rows);
-    context.learn_lag(&rows);
+/// what it writes where it finds nothing. `context` has seen the tails of the residuals and nothing else.
+pub(super) fn recalibrated<'a>(mut context: Context<'a>, rows: &[usize]) -> Option<(Context<'a>, Fitted)> {
+    context.learn_lag(rows);
     context.settle_dynamics();
     context.free_lag = context.observations.is_empty();
-    let (found, _) = corrected(&mut context, &Terms::default(), &rows)?;
+    let (found, _) = corrected(&mut context, &Terms::default(), rows)?;
     context.free_lag = false;
     Some(context.stated(&found))
 }

@@ -2,10 +2,11 @@
 //! shrunk (`evidence.rs`), and is kept where it is rarer than chance and pays on pulls, levels and sessions that it has not seen.
 
 use super::context::Context;
+use super::curves::Session;
 use super::fitting::Fitted;
 use super::heldout::{by_value, predicted};
 use super::learnt::{grouped, with_residual};
-use super::paying::{held_out, root_mean_square, share};
+use super::paying::{root_mean_square, share};
 use super::search::Search;
 use super::smooth::smooths;
 use super::terms::Terms;
@@ -20,6 +21,10 @@ const WORSE: f64 = 0.01;
 
 /// Fewest pulls.
 const MIN_PULLS: usize = 16;
+
+/// Share of what a slope of one session explains on held-out pulls that the other columns have to explain to be what acts. A slope that all of
+/// two sessions share explains half of what it would in one of them, of more sessions less.
+const OF_A_SESSION: f64 = 0.55;
 
 /// Part of a residual that held-out pulls have to confirm.
 const CONFIRMED: f64 = 0.4;
@@ -67,13 +72,14 @@ fn learnt_beside(
         return None;
     }
     let p_value = left.p_value();
-    if p_value > CHANCE {
+    // In the place of a curve the evidence is there already.
+    if strict && p_value > CHANCE {
         return None;
     }
     let full = with_residual(context, &plain, &search.rows, &curves, 1.0)?;
     // As much of it as held-out pulls confirm.
     let expected = context.predictor.pulls(&plain.model, &search.rows);
-    let [without, with] = [&plain, &full].map(|f| held_out(context, f, repetitions, near));
+    let [without, with] = [&plain, &full].map(|f| search.held_out(f, repetitions, near));
     let (mut along, mut square) = (0.0, 0.0);
     for ((i, before), (k, after)) in without.iter().zip(&with) {
         if i != k {
@@ -91,7 +97,7 @@ fn learnt_beside(
         return None;
     }
     let chosen = with_residual(context, &plain, &search.rows, &curves, confirmed)?;
-    let with = held_out(context, &chosen, repetitions, near);
+    let with = search.held_out(&chosen, repetitions, near);
     let error = |e: &[(usize, f64)]| root_mean_square(e.iter().map(|(_, e)| *e));
     let weighed =
         |e: &[(usize, f64)]| root_mean_square(e.iter().map(|(i, e)| e / expected[*i].label_sd_n.max(0.03)));
@@ -119,6 +125,9 @@ fn learnt_beside(
 
 /// A residual in the place of the unnamed curves of `fitted`, where it predicts pulls and sessions that were held out better together:
 /// a curve of few knots, or one at one word, may stand for several columns.
+///
+/// A session is the last explanation, because it does not come back: its steps are shrunk where that costs nothing, and a slope of its own
+/// has to explain on held-out pulls what the other columns cannot.
 pub(super) fn in_place_of_curves(
     search: &Search<'_>,
     fitted: &Fitted,
@@ -130,17 +139,31 @@ pub(super) fn in_place_of_curves(
     let bare = context.fit(&fitted.model, &terms, &search.rows)?;
     let found = learnt_beside(search, &bare, repetitions, near, false)?;
     let error =
-        |f: &Fitted| root_mean_square(held_out(context, f, repetitions, near).into_iter().map(|(_, e)| e));
-    let pulls = error(&found.fitted) / error(fitted).max(1e-300);
-    let session: Vec<u64> = context.data.session_of.iter().map(|&s| s as u64).collect();
-    let sessions = by_value(&session);
-    let together = if (3..=20).contains(&sessions.len()) {
-        pulls * error_on(context, &found.fitted, &sessions, near)
-            / error_on(context, fitted, &sessions, near).max(1e-300)
-    } else {
-        pulls
+        |f: &Fitted| root_mean_square(search.held_out(f, repetitions, near).into_iter().map(|(_, e)| e));
+    let [without, with, own] = [&bare, &found.fitted, fitted].map(error);
+    let pulls = with / own.max(1e-300);
+    let session = fitted.terms.curves.first().map_or(Session::Elsewhere, |(curve, _)| curve.session());
+    let instead = gives_way(session, without, with, own);
+    let sessions = by_value(&context.data.session_of.iter().map(|&s| s as u64).collect::<Vec<_>>());
+    let together = || match (3..=20).contains(&sessions.len()) {
+        true => {
+            pulls * error_on(context, &found.fitted, &sessions, near)
+                / error_on(context, fitted, &sessions, near).max(1e-300)
+        }
+        false => pulls,
     };
-    (pulls < 1.0 || (together < 1.0 && pulls <= 1.0 + PAYS)).then_some(found)
+    (instead || pulls < 1.0 || (pulls <= 1.0 + PAYS && together() < 1.0)).then_some(found)
+}
+
+/// Whether a curve of sessions gives way to what the other columns say: from the errors on held-out pulls without either, with the other
+/// columns, and with the curve.
+fn gives_way(session: Session, without: f64, columns: f64, curve: f64) -> bool {
+    let explained = |error: f64| without * without - error * error;
+    match session {
+        Session::Elsewhere => false,
+        Session::Steps => columns <= (1.0 + PAYS) * curve,
+        Session::Slope => explained(columns) > OF_A_SESSION * explained(curve).max(0.0),
+    }
 }
 
 /// Error on sets that are held out, of the pulls of `near`.
@@ -162,4 +185,22 @@ fn holds(context: &Context<'_>, plain: &Fitted, with: &Fitted, near: &[usize]) -
         let errors = [plain, with].map(|f| error_on(context, f, sets, near));
         share(errors) >= -WORSE
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Humidity and temperature explain three fifths of what a slope of the warmest of three sessions does: they are what acts. A slope that
+    /// acts in one of two sessions is half explained by one that both share, and stays.
+    #[test]
+    fn a_session_is_the_last_explanation() {
+        let error = |left: f64| left.sqrt();
+        assert!(gives_way(Session::Slope, 1.0, error(0.4), error(0.0)));
+        assert!(!gives_way(Session::Slope, 1.0, error(0.5), error(0.0)));
+        assert!(!gives_way(Session::Slope, 1.0, 1.01, error(0.2)));
+        assert!(gives_way(Session::Steps, 1.0, 0.51, 0.5));
+        assert!(!gives_way(Session::Steps, 1.0, 0.53, 0.5));
+        assert!(!gives_way(Session::Elsewhere, 1.0, 0.1, 0.5));
+    }
 }

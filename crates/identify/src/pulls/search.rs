@@ -6,6 +6,7 @@ use super::context::Context;
 use super::curves::{Curve, at_one_word, curves_in, periodic, product};
 use super::fitting::Fitted;
 use super::terms::Terms;
+use super::written::Written;
 use std::cell::OnceCell;
 use std::sync::Mutex;
 
@@ -110,6 +111,8 @@ pub struct Search<'a> {
     pub curves: Vec<Curve>,
     /// The pulls that are fitted.
     pub rows: Vec<usize>,
+    /// What was worked out of fits as they are written.
+    pub(super) written: Written<'a>,
 }
 
 impl<'a> Search<'a> {
@@ -153,7 +156,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        Self { context, candidates, curves, rows: (0..n).collect() }
+        Self { context, candidates, curves, rows: (0..n).collect(), written: Written::default() }
     }
 
     /// Id of an effect, or the columns of a curve.

@@ -1,7 +1,7 @@
 //! The groups of columns that a residual without a name may be made of: a smooth curve in every column of numbers, the product
 //! of two, steps between words, a slope at one word. Each can be written into a twin as a table.
 
-use super::curves::Curve;
+use super::curves::{Curve, SESSION};
 use super::data::{Column, PullData};
 
 /// Knots of a curve, and pulls for each.
@@ -50,7 +50,8 @@ pub(super) fn smooths(data: &PullData<'_>) -> Vec<Curve> {
     }
     for (other, column) in &data.columns {
         let Column::Word(at, words) = column else { continue };
-        if !(2..=MAX_WORDS_OF_PAIR).contains(&words.len()) {
+        // A session does not come back: what it teaches of a slope is of no use to pulls of another one.
+        if other == SESSION || !(2..=MAX_WORDS_OF_PAIR).contains(&words.len()) {
             continue;
         }
         for (word, text) in words.iter().enumerate() {
