@@ -180,12 +180,18 @@ fn absent_from(relative: &str) -> (&'static [&'static str], bool) {
         (&["std::fs", "std::time", "std::thread", "TcpStream", "TcpListener", "Instant::now"], false)
     } else if starts("crates/cli/src/commands/rig") {
         (&["TcpStream", "TcpListener"], false)
-    } else {
+    } else if relative == "crates/cli/tests/cli/live.rs" {
+        // A client of the page.
+        (&[], false)
+    } else if relative == "crates/cli/src/live.rs" {
+        // The one page that is served.
         (&["std::net"], false)
+    } else {
+        (&["std::net", "tiny_http"], false)
     }
 }
 
-/// `twin` opens no file, reads no clock, starts no thread; only `rig` opens sockets, in files of their own; what a sample or a
+/// `twin` opens no file, reads no clock, starts no thread; only `rig` opens sockets, in files of their own, and the page of `--live`; what a sample or a
 /// diagnosis depends on takes no function of the host's mathematical library.
 #[test]
 fn absences_that_the_architecture_promises() {
