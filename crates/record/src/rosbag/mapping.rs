@@ -188,7 +188,7 @@ impl BagPull {
         let marks = [self.begin_s, self.end_s, self.from_s, self.image_s, self.rest_s];
         let marks =
             marks.into_iter().chain(pairs.iter().flat_map(|(_, p)| p.map_or([None; 2], |p| p.map(Some))));
-        match marks.flatten().find(|x| !(x.abs() < 1e9)) {
+        match marks.flatten().find(|x| x.is_nan() || x.abs() >= 1e9) {
             Some(x) => Err(format!("a time is {x} s, it must be seconds from the start of the bag")),
             None => Ok(()),
         }

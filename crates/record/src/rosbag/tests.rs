@@ -87,7 +87,7 @@ fn bag(path: &Path) {
         .profile("ros2")
         .create(&mut bytes)
         .unwrap();
-    let mut channel = |writer: &mut Writer<&mut Cursor<Vec<u8>>>, topic: &str, kind: &str| {
+    let channel = |writer: &mut Writer<&mut Cursor<Vec<u8>>>, topic: &str, kind: &str| {
         let schema = writer.add_schema(kind, "ros2msg", b"not looked at").unwrap();
         writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap()
     };
