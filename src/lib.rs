@@ -127,7 +127,9 @@ pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};
 pub use live::{image_png, live_page};
 pub use location::{Location, ReadFileError};
-pub use measured::{LoadPullsError, LoadedPulls, Suspects, load_pulls, load_pulls_of, load_pulls_with};
+pub use measured::{
+    LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls, load_pulls_of, load_pulls_with,
+};
 pub use mesh_file::MeshFileError;
 pub use paper::{PaperError, PaperReport, paper_report};
 pub use parallel::in_parallel;
@@ -154,7 +156,7 @@ pub use report::{
 };
 pub use rig_run::{plain_campaign, rig_run_differences, rig_run_toml};
 pub use sample::{SampleError, SimulateOptions};
-pub use schema::{sweep_schema, twin_schema};
+pub use schema::{campaign_schema, rosbag_schema, sweep_schema, twin_schema};
 pub use simulator::{Draw, Simulator};
 pub use stream::{SampleStream, StreamError, StreamOptions, Streamed, StreamedSample};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, prepare_run, run_info, sweep};

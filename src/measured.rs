@@ -1,13 +1,15 @@
-//! Measured pulls from wherever they are: a folder with a table, or a run folder.
+//! Measured pulls from wherever they are: a folder with a table, a run folder, or recordings of ROS 2.
 
+mod bags;
 mod suspects;
 
 pub use suspects::Suspects;
 
 use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_record::{
-    FolderError, JudgedPulls, PullFolderError, RIG_SOURCE, ReadError, RigCampaign, RunFolder, ShardReader,
-    Standing, read_judged_pulls, rig_campaign, sample_covariates, sha256_hex,
+    FolderError, JudgedPulls, PULLS_FILE, PullFolderError, RIG_SOURCE, ReadError, RigCampaign, RosbagError,
+    RunFolder, ShardReader, Standing, is_rosbag, read_judged_pulls, rig_campaign, sample_covariates,
+    sha256_hex,
 };
 use gripgen_twin::columns::{Column, covariate, covariates, recorded_covariates};
 use gripgen_twin::config::Feedback;
@@ -39,6 +41,9 @@ pub enum LoadPullsError {
     /// A shard of it.
     #[error(transparent)]
     Shard(#[from] ReadError),
+    /// Recordings of ROS 2.
+    #[error(transparent)]
+    Bags(#[from] RosbagError),
     /// Folders whose labels mean different things.
     #[error(
         "{}: its labels are taken with {other_n} N and {:.1} mm, those of the first folder with {tolerance_n} N and {:.1} mm",
@@ -74,7 +79,23 @@ pub enum LoadPullsError {
     },
 }
 
-/// Loads measured pulls: a run folder of a sweep or of a rig if there is a `run.json`, else a folder with `pulls.csv`.
+impl LoadPullsError {
+    /// What to do about it, where that is known.
+    pub fn hint(&self) -> Option<&str> {
+        match self {
+            Self::Bags(e) if !e.hint.is_empty() => Some(&e.hint),
+            _ => None,
+        }
+    }
+}
+
+/// Whether a path holds pulls that [`load_pulls`] reads.
+pub fn is_pulls(path: &Path) -> bool {
+    path.join(PULLS_FILE).is_file() || path.join("run.json").is_file() || is_rosbag(path)
+}
+
+/// Loads measured pulls: a run folder of a sweep or of a rig if there is a `run.json`, else a folder with `pulls.csv`, else
+/// bags of ROS 2.
 ///
 /// Of a run folder, pulls without a slip (failed, without contact, censored) are left out and counted in the notes, and so
 /// are those whose label rule is not that of the first. Its covariates are those stored with each sample; what a sweep
@@ -92,16 +113,32 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     if path.join("run.json").is_file() {
         return load_run(path, suspects);
     }
-    let JudgedPulls { pulls, standing } = read_judged_pulls(path)?;
+    let is_bag = !path.join(PULLS_FILE).is_file() && is_rosbag(path);
+    let JudgedPulls { pulls, standing } =
+        if is_bag { bags::judged_bags(path)? } else { read_judged_pulls(path)? };
     let mut left_out = LeftOut { rig: false, ..LeftOut::default() };
     standing.iter().for_each(|s| left_out.count(s.status));
     let ids: Vec<&str> = pulls.pulls.iter().map(|p| p.id.as_str()).collect();
     let (keep, note) = suspects::kept(&standing, &ids, suspects);
-    let notes: Vec<String> = left_out.notes().into_iter().chain(note).collect();
+    let mut notes: Vec<String> = left_out.notes().into_iter().chain(note).collect();
     if !keep.contains(&true) {
+        let first = standing.iter().zip(&ids).find(|(s, _)| !s.reason.is_empty() && notes.len() == 1);
+        notes.extend(first.map(|(s, id)| format!("pull {id}: {}", s.reason)));
         return Err(LoadPullsError::Unusable { path: path.into(), notes: notes.join("; ") });
     }
-    Ok(LoadedPulls { pulls: pulls.kept(|i| keep[i]), notes })
+    let mut pulls = pulls.kept(|i| keep[i]);
+    if is_bag {
+        if pulls.pulls.iter().all(|pull| pull.trace.is_none()) {
+            notes.push(
+                "nobody recorded how the tool moved (topics.pose, topics.joint_states): traces are not used"
+                    .into(),
+            );
+        }
+        // As those of a run: every reading is there.
+        pulls.pulls.iter_mut().for_each(|pull| pull.trace = pull.trace.as_ref().map(thinned));
+        fewer_traces(&mut pulls.pulls, &mut notes);
+    }
+    Ok(LoadedPulls { pulls, notes })
 }
 
 /// Loads several folders as one campaign, in their order: what was measured later on the same rig. Pulls whose ids are taken get the

@@ -1,5 +1,6 @@
 //! JSON Schemas of the configuration files.
 
+use gripgen_record::{CampaignFile, RosbagFile};
 use gripgen_twin::DEFAULTED_SECTIONS;
 use gripgen_twin::config::{SweepFile, TwinFile};
 use serde_json::Value;
@@ -7,6 +8,16 @@ use serde_json::Value;
 /// Schema of `sweep.toml`.
 pub fn sweep_schema() -> Value {
     schemars::schema_for!(SweepFile).to_value()
+}
+
+/// Schema of `campaign.toml`.
+pub fn campaign_schema() -> Value {
+    schemars::schema_for!(CampaignFile).to_value()
+}
+
+/// Schema of `rosbag.toml`.
+pub fn rosbag_schema() -> Value {
+    schemars::schema_for!(RosbagFile).to_value()
 }
 
 /// Schema of `twin.toml`. Sections that fall back to the baseline twin, and their keys, may be left out.

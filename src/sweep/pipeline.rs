@@ -66,7 +66,7 @@ impl Run<'_> {
             permit_in.send(()).expect("the channel has room for all permits");
         }
         let permits = Mutex::new(permit_out);
-        std::thread::scope(|scope| {
+        let written = std::thread::scope(|scope| {
             for _ in 0..jobs {
                 let (queue, permits, done) = (&queue, &permits, done_in.clone());
                 scope.spawn(move || self.work(queue, permits, &done));
@@ -74,8 +74,13 @@ impl Run<'_> {
             drop(done_in);
             // Its ends of the channels go with the writer: if it fails, the workers stop.
             self.write(&queue, done_out, permit_in, summary, on_event)
-        })?;
+        });
         let queue = queue.into_inner().unwrap_or_else(PoisonError::into_inner);
+        // Shards that no sample came to, because the writer failed: nothing of them is left.
+        for (_, partial) in queue.begun {
+            let _ = partial.give_up();
+        }
+        written?;
         queue.done.iter().for_each(|sidecar| count(summary, sidecar));
         match queue.error {
             Some(e) => Err(e.into()),

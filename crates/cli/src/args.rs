@@ -105,6 +105,7 @@ pub struct TalkArgs {
 
 /// `gripgen init`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::INIT)]
 pub struct InitArgs {
     /// A folder to write into, or a mesh (STL, OBJ, PLY, GLB) of your part.
     #[arg(default_value = ".")]
@@ -134,6 +135,7 @@ pub struct InitArgs {
 
 /// `gripgen check`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::CHECK)]
 pub struct CheckArgs {
     /// What to check.
     #[command(flatten)]
@@ -148,6 +150,7 @@ pub struct CheckArgs {
 
 /// `gripgen sweep`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::SWEEP)]
 pub struct SweepArgs {
     /// What to run.
     #[command(flatten)]
@@ -180,8 +183,9 @@ pub struct SweepArgs {
 
 /// `gripgen info`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::INFO)]
 pub struct InfoArgs {
-    /// A run folder, or a folder with pulls.csv.
+    /// A run folder, a folder with pulls.csv, or a bag of ROS 2 with rosbag.toml.
     pub run: PathBuf,
     /// JSON.
     #[command(flatten)]
@@ -193,6 +197,7 @@ pub struct InfoArgs {
 
 /// `gripgen verify`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::VERIFY)]
 pub struct VerifyArgs {
     /// A run folder.
     pub run: PathBuf,
@@ -209,6 +214,7 @@ pub struct VerifyArgs {
 
 /// `gripgen show`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::SHOW)]
 pub struct ShowArgs {
     /// A run folder.
     pub run: PathBuf,
@@ -227,10 +233,7 @@ pub struct ShowArgs {
 
 /// `gripgen export`
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  gripgen export runs/quickstart --to parquet -o quickstart.parquet\n  \
-    gripgen export runs/quickstart --to lerobot -o quickstart-lerobot\n  \
-    gripgen export runs/quickstart --to webdataset -o train-%05d.tar\n  \
-    gripgen export runs/quickstart --sample 3 -o three.mcap")]
+#[command(after_help = crate::examples::EXPORT)]
 pub struct ExportArgs {
     /// A run folder; for --to also a folder of measured pulls, or a shard.
     pub run: PathBuf,
@@ -283,6 +286,7 @@ pub enum CalibrateCommand {
 
 /// `gripgen calibrate presses`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::CALIBRATE_PRESSES)]
 pub struct CalibratePressesArgs {
     /// Taxim's dataPack.npz, or a folder with presses.csv and images.
     pub presses: PathBuf,
@@ -308,8 +312,9 @@ pub struct CalibratePressesArgs {
 
 /// `gripgen compare`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::COMPARE)]
 pub struct CompareArgs {
-    /// Pulls: a run folder, or a folder with pulls.csv; images that they have are compared too. Presses: Taxim's dataPack.npz, or
+    /// Pulls: a run folder, a folder with pulls.csv, or a bag of ROS 2; images that they have are compared too. Presses: Taxim's dataPack.npz, or
     /// a folder with presses.csv and images. A force-sensor table: a folder with sensor.csv. Imprints: a folder with imprints.csv.
     pub measured: PathBuf,
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
@@ -338,6 +343,7 @@ pub struct CompareArgs {
 
 /// `gripgen effects`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::EFFECTS)]
 pub struct EffectsArgs {
     /// An effect; all of them in a list where it is left out.
     pub id: Option<String>,
@@ -369,6 +375,7 @@ impl From<BackendKind> for Backend {
 
 /// `gripgen bench`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::BENCH)]
 pub struct BenchArgs {
     /// Where images are made.
     #[arg(long, value_name = "cpu|gpu", default_value = "cpu")]
@@ -394,10 +401,17 @@ pub enum SchemaKind {
     Sweep,
     /// twin.toml
     Twin,
+    /// rig.toml
+    Rig,
+    /// campaign.toml
+    Campaign,
+    /// rosbag.toml
+    Rosbag,
 }
 
 /// `gripgen schema`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::SCHEMA)]
 pub struct SchemaArgs {
     /// Which file.
     #[arg(default_value = "sweep")]
@@ -406,6 +420,7 @@ pub struct SchemaArgs {
 
 /// `gripgen completions`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::COMPLETIONS)]
 pub struct CompletionsArgs {
     /// Which shell.
     pub shell: clap_complete::Shell,

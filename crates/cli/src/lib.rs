@@ -11,6 +11,7 @@
 
 mod args;
 mod commands;
+mod examples;
 mod failure;
 mod interrupt;
 mod live;

@@ -7,8 +7,8 @@ use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::PressSet;
 use gripgen::twin::Twin;
 use gripgen::{
-    FoundCircles, Library, LoadPressesError, LoadSensorError, Location, PressGeometry, Suspects,
-    load_presses, load_sensor, load_twin_document, load_twin_sensor,
+    FoundCircles, Library, LoadPressesError, LoadPullsError, LoadSensorError, Location, PressGeometry,
+    Suspects, is_pulls, load_presses, load_sensor, load_twin_document, load_twin_sensor,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -46,13 +46,16 @@ pub fn suspects(include: bool) -> Suspects {
 }
 
 /// What cannot be read as pulls.
-pub fn no_pulls(paths: &[&Path], e: impl std::fmt::Display) -> Failure {
-    let known = paths.iter().all(|path| path.join("pulls.csv").is_file() || path.join("run.json").is_file());
+pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
+    let known = paths.iter().all(|path| is_pulls(path));
     let failure = Failure::usage(e);
+    if let Some(hint) = e.hint() {
+        return failure.hint(hint);
+    }
     if known {
         return failure;
     }
-    failure.hint("measurements are a folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, or a dataPack.npz")
+    failure.hint("measurements are a folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, a bag of ROS 2 with rosbag.toml, or a dataPack.npz")
 }
 
 /// Folders that are read as one campaign.

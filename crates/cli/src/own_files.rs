@@ -2,14 +2,16 @@
 
 use crate::mark::mark_of;
 use gripgen::CONTACT_SHEET;
-use gripgen::record::{CAMPAIGN_FILE, IMPRINTS_FILE, PRESSES_FILE, PULLS_FILE, SENSOR_FILE, TRACES_FOLDER};
+use gripgen::record::{
+    CAMPAIGN_FILE, IMPRINTS_FILE, PRESSES_FILE, PULLS_FILE, ROSBAG_FILE, SENSOR_FILE, TRACES_FOLDER,
+};
 use std::ffi::OsStr;
 use std::path::Path;
 
 /// Folder of the images of pulls.
 pub const IMAGES_FOLDER: &str = "images";
-/// Other names of the table of presses, and that of imprints.
-const OTHER_TABLES: [&str; 2] = ["shapes.csv", "imprints.csv"];
+/// Other names of the table of presses, that of imprints, and the mapping of bags.
+const OTHER_TABLES: [&str; 3] = ["shapes.csv", "imprints.csv", ROSBAG_FILE];
 /// Endings of what tables of measurements refer to.
 const DATA: [&str; 11] = ["png", "jpg", "jpeg", "csv", "npy", "npz", "stl", "obj", "ply", "glb", "mcap"];
 
@@ -83,6 +85,8 @@ mod tests {
             "presses/balls/1.png",
             "sensor/sensor.csv",
             "plain/campaign.toml",
+            "bags/rosbag.toml",
+            "bags/one/one_0.mcap",
         ] {
             let path = root.join(file);
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -106,6 +110,8 @@ mod tests {
             "presses/shapes.csv",
             "presses/balls/1.png",
             "sensor/sensor.csv",
+            "bags/rosbag.toml",
+            "bags/one/one_0.mcap",
         ] {
             assert!(owned(name), "{name}");
         }
@@ -117,6 +123,8 @@ mod tests {
             "pulls/report.html",
             "presses/sensor.npz",
             "sensor/twin.toml",
+            "bags/report.html",
+            "bags/twin.toml",
         ] {
             assert!(!owned(name), "{name}");
         }

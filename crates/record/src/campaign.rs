@@ -3,6 +3,7 @@
 use gripgen_twin::columns::{COLUMNS, InTable};
 use gripgen_twin::config::{Feedback, ForceConvention};
 use gripgen_twin::{Campaign, PlannedPull, PullKind};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 pub const CAMPAIGN_FILE: &str = "campaign.toml";
 
 /// What holds for all pulls of a campaign. Keys that nobody wrote down have their defaults; further keys are left alone.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct CampaignHeader {
     /// What a grip force means in the campaign and in its table; one jaw's where it is left out.
@@ -28,7 +29,7 @@ pub struct CampaignHeader {
 }
 
 /// What the labels of a campaign may be judged by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum LabelEvidenceKind {
     /// The traces, where there are any.
@@ -105,7 +106,7 @@ pub(crate) fn parse<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> 
     })
 }
 
-fn check_header(path: &Path, header: &CampaignHeader) -> Result<(), CampaignFileError> {
+pub(crate) fn check_header(path: &Path, header: &CampaignHeader) -> Result<(), CampaignFileError> {
     for (key, value) in [("label_tolerance_n", header.label_tolerance_n), ("stop_mm", header.stop_mm)] {
         if !(value.is_finite() && value > 0.0) {
             let problem = format!("`{key}` is {value}, it must be a number above 0");
@@ -116,10 +117,12 @@ fn check_header(path: &Path, header: &CampaignHeader) -> Result<(), CampaignFile
 }
 
 /// A campaign file with its pulls.
-#[derive(Deserialize)]
-struct CampaignFile {
+#[derive(Debug, Deserialize, JsonSchema)]
+pub struct CampaignFile {
+    /// What holds for all of them.
     #[serde(flatten)]
     header: CampaignHeader,
+    /// The pulls, in order.
     #[serde(default)]
     pulls: Vec<PlannedPull>,
 }

@@ -218,9 +218,16 @@ impl RunFolder {
     fn written(&self, name: &str, bytes: &[u8]) -> Result<PathBuf, FolderError> {
         let temporary = self.temporary(name);
         let at = io_at(&temporary);
-        let mut file = File::create(&temporary).map_err(&at)?;
-        file.write_all(bytes).map_err(&at)?;
-        file.sync_all().map_err(&at)?;
+        let write = || {
+            let mut file = File::create(&temporary)?;
+            file.write_all(bytes)?;
+            file.sync_all()
+        };
+        write().map_err(|e| {
+            // A disk that is full gets its room back.
+            let _ = std::fs::remove_file(&temporary);
+            at(e)
+        })?;
         Ok(temporary)
     }
 

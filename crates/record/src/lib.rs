@@ -37,6 +37,7 @@ mod pulls;
 mod reader;
 mod rig_log;
 mod rig_run;
+mod rosbag;
 mod sensor_table;
 mod shard;
 mod stored;
@@ -47,7 +48,9 @@ mod verify;
 mod webdataset;
 
 pub use background::Background;
-pub use campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, campaign_toml, read_campaign};
+pub use campaign::{
+    CAMPAIGN_FILE, CampaignFile, CampaignFileError, CampaignHeader, campaign_toml, read_campaign,
+};
 pub use dataset::{Dataset, DatasetError, NoiseMode, Table};
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
@@ -78,6 +81,10 @@ pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};
 pub use rig_run::{
     FAILED_FOLDER, RigCampaign, RigPull, RigPullError, RigResult, RigRunError, RigRunInfo, create_rig_run,
     discard_failed, failed_pulls, missing_pulls, rig_campaign, suspect_pulls, write_rig_pull,
+};
+pub use rosbag::{
+    BagCell, BagClock, BagForce, BagImages, BagMotion, BagPull, BagTopics, ROSBAG_FILE, RosbagError,
+    RosbagFile, TipOfJoints, is_rosbag, read_judged_bags,
 };
 pub use sensor_table::{SENSOR_FILE, SensorTable, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};

@@ -8,7 +8,9 @@ mod tests;
 mod trace;
 mod write;
 
+pub(crate) use cells::DEFAULT_STEP_S;
 pub use images::{PullImages, PullImagesError, pulls_with_images, read_pull_images};
+pub(crate) use standing::judge_labels;
 pub use standing::{JudgedPulls, Standing};
 pub use write::write_pull_folder;
 
@@ -78,7 +80,7 @@ pub fn read_judged_pulls(folder: &Path) -> Result<JudgedPulls, PullFolderError> 
     }
     found.sha256 = hex(&hash.finalize());
     if header.label_evidence == LabelEvidenceKind::Trace {
-        standing::judge_labels(&found, &after_n, &mut standing);
+        judge_labels(&found, &after_n, &mut standing);
     }
     Ok(JudgedPulls { pulls: found, standing })
 }
@@ -108,7 +110,8 @@ fn trace_files(folder: &Path) -> Result<HashSet<String>, TableError> {
     }
 }
 
-fn read_table(
+/// Reads a table of pulls from its content; `path` is for errors.
+pub(crate) fn read_table(
     path: &Path,
     bytes: &[u8],
     header: &CampaignHeader,
@@ -126,7 +129,7 @@ fn read_table(
             grip_force_n: 0.0,
             increment_n: plain.increment_n,
             start_n: None,
-            step_s: cells::DEFAULT_STEP_S,
+            step_s: DEFAULT_STEP_S,
             covariates: Covariates::default(),
             max_pull_force_n: 0.0,
             trace: None,
@@ -181,13 +184,13 @@ fn extra_column(column: Column) -> Option<ExtraColumn> {
 }
 
 /// Adds a file to the hash: its name, its length, its content.
-fn feed(hash: &mut Sha256, name: &str, bytes: &[u8]) {
+pub(crate) fn feed(hash: &mut Sha256, name: &str, bytes: &[u8]) {
     hash.update(name.as_bytes());
     hash.update([0]);
     hash.update((bytes.len() as u64).to_le_bytes());
     hash.update(bytes);
 }
 
-fn hex(digest: &[u8]) -> String {
+pub(crate) fn hex(digest: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -27,7 +27,7 @@ mod robot;
 mod run;
 pub mod stop;
 
-pub use config::RigConfig;
+pub use config::{RigConfig, rig_schema};
 pub use devices::Devices;
 pub use fault::Fault;
 pub use plan::{PlanError, check_campaign};

@@ -1,10 +1,11 @@
 //! A campaign: pulls to make, in order.
 
 use crate::config::Feedback;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What is done at one place of a campaign.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PullKind {
     /// A part is gripped and pulled.
@@ -15,7 +16,7 @@ pub enum PullKind {
 }
 
 /// One entry of `pulls` of a campaign file, in its units.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlannedPull {
     /// What is done.

@@ -6,8 +6,9 @@ use std::path::PathBuf;
 
 /// `gripgen calibrate pulls`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::CALIBRATE_PULLS)]
 pub struct CalibratePullsArgs {
-    /// A folder with pulls.csv, or a run folder.
+    /// A folder with pulls.csv, a run folder, or a bag of ROS 2 with rosbag.toml.
     pub measured: PathBuf,
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]
@@ -47,6 +48,7 @@ pub enum LawKind {
 
 /// `gripgen calibrate sensor`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::CALIBRATE_SENSOR)]
 pub struct CalibrateSensorArgs {
     /// A folder with sensor.csv.
     pub measured: PathBuf,
@@ -66,6 +68,7 @@ pub struct CalibrateSensorArgs {
 
 /// `gripgen calibrate imprints`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::CALIBRATE_IMPRINTS)]
 pub struct CalibrateImprintsArgs {
     /// A folder with imprints.csv.
     pub measured: PathBuf,
@@ -103,8 +106,9 @@ pub enum ConstantOf {
 
 /// `gripgen diagnose`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::DIAGNOSE)]
 pub struct DiagnoseArgs {
-    /// A folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, or a dataPack.npz.
+    /// A folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, a bag of ROS 2 with rosbag.toml, or a dataPack.npz.
     pub measured: PathBuf,
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]
@@ -143,6 +147,7 @@ pub struct DiagnoseArgs {
 
 /// `gripgen campaign`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::CAMPAIGN)]
 pub struct CampaignArgs {
     /// The twin.
     #[arg(long, value_name = "FILE.toml", default_value = gripgen::BASELINE_TWIN)]

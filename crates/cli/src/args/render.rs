@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 /// `gripgen render`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::RENDER)]
 pub struct RenderArgs {
     /// A mesh (STL, OBJ, PLY, GLB): its tip points along its +z into the gel, +x is the image's right, +y the image's top. Or heights
     /// above the gel at rest in mm (.npy, rows and columns of the sensor's image).

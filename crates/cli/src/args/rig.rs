@@ -21,6 +21,7 @@ pub enum RigCommand {
 
 /// `gripgen rig check`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::RIG_CHECK)]
 pub struct RigCheckArgs {
     /// The rig.
     #[arg(value_name = "RIG.toml", default_value = "asset:configs/rig.toml")]
@@ -44,6 +45,7 @@ pub struct RigCheckArgs {
 
 /// `gripgen rig rehearse`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::RIG_REHEARSE)]
 pub struct RigRehearseArgs {
     /// The rig.
     #[arg(value_name = "RIG.toml", default_value = "asset:configs/rig.toml")]
@@ -73,6 +75,7 @@ pub struct RigRehearseArgs {
 
 /// `gripgen rig teach`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::RIG_TEACH)]
 pub struct RigTeachArgs {
     /// Name of the part, as in campaigns and twins.
     pub name: String,
@@ -89,6 +92,7 @@ pub struct RigTeachArgs {
 
 /// `gripgen rig pull`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::RIG_PULL)]
 pub struct RigPullArgs {
     /// The rig.
     #[arg(value_name = "RIG.toml", default_value = "asset:configs/rig.toml")]
@@ -155,6 +159,7 @@ fn mass(text: &str) -> Result<f64, String> {
 
 /// `gripgen rig serve`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::RIG_SERVE)]
 pub struct RigServeArgs {
     /// The twin that moves it; it may hold effects that nobody else knows.
     #[arg(value_name = "TWIN", default_value = gripgen::BASELINE_TWIN)]

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 /// `gripgen try`
 #[derive(Debug, Args)]
+#[command(after_help = crate::examples::TRY)]
 pub struct TryArgs {
     /// A mesh (STL, OBJ, PLY, GLB) of the part.
     pub mesh: PathBuf,

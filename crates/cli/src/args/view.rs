@@ -6,10 +6,7 @@ use std::path::PathBuf;
 
 /// `gripgen view`
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  gripgen view runs/quickstart\n  gripgen view measured/ -o monday.html\n  \
-    gripgen view runs/quickstart/shard-00000.mcap --pulls 300"
-)]
+#[command(after_help = crate::examples::VIEW)]
 pub struct ViewArgs {
     /// A run folder, a folder with pulls.csv, or a shard (.mcap).
     pub data: PathBuf,

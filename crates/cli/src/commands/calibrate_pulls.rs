@@ -28,7 +28,7 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     let twin = load_twin(&args.twin, &args.set)?;
     let library = load_library(&twin, &args.twin)?;
     let loaded =
-        load_pulls_with(&measured, suspects(args.include_suspect)).map_err(|e| no_pulls(&measured, e))?;
+        load_pulls_with(&measured, suspects(args.include_suspect)).map_err(|e| no_pulls(&measured, &e))?;
     let twin_at = Location::parse(&args.twin);
     let document = load_twin_document(&twin_at, &args.set)?;
     let request = CalibrateRequest {

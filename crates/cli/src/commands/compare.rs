@@ -92,7 +92,7 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &[])?;
     let suspects = suspects(args.include_suspect);
-    let loaded = load_pulls_with(&measured, suspects).map_err(|e| no_pulls(&measured, e))?;
+    let loaded = load_pulls_with(&measured, suspects).map_err(|e| no_pulls(&measured, &e))?;
     let library = load_library(&twin, &args.twin)?;
     let twin_at = Location::parse(&args.twin);
     let draws = posterior_twins(&twin_at, &load_twin_document(&twin_at, &[])?).map_err(Failure::from)?;

@@ -74,7 +74,7 @@ pub fn diagnose_folders(
     suspects: Suspects,
     talk: &TalkArgs,
 ) -> Result<Diagnosed, Failure> {
-    let loaded = load_pulls_with(measured, suspects).map_err(|e| no_pulls(measured, e))?;
+    let loaded = load_pulls_with(measured, suspects).map_err(|e| no_pulls(measured, &e))?;
     let options = PullDiagnoseOptions { jobs: jobs(), without };
     let share = Share::start("diagnosing", talk);
     let diagnosed = diagnose_pull_table(&loaded.pulls, twin, library, &options, &|x| share.at(x));

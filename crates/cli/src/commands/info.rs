@@ -5,8 +5,8 @@ use crate::commands::{info_pulls, open_run};
 use crate::failure::Failure;
 use crate::output::{JsonSink, count, print, size};
 use crate::outputs::Outputs;
-use gripgen::levels;
 use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE};
+use gripgen::{is_pulls, levels};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -42,7 +42,7 @@ impl PartSummary {
 pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     let mut outputs = Outputs::of("info", args.json.force).reads(&args.run);
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
-    if args.run.join("pulls.csv").is_file() {
+    if !args.run.join("run.json").is_file() && is_pulls(&args.run) {
         return info_pulls::run(args, sink);
     }
     let folder = open_run(&args.run)?;

@@ -13,7 +13,7 @@ use gripgen::tactile::SimdLevel;
 use gripgen::twin::Jaw;
 use gripgen::twin::config::ImageStorage;
 use gripgen::{
-    CONTACT_SHEET, Location, Project, SweepEvent, SweepOptions, SweepSummary, publish_contact_sheet, sweep,
+    CONTACT_SHEET, Location, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet, sweep,
 };
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -200,7 +200,8 @@ impl<'a> Watch<'a> {
         let took = self.progress.take().map_or(0.0, |p| p.finish().as_secs_f64());
         let sheet = out.join(CONTACT_SHEET);
         if summary.complete && (self.made > 0 || !sheet.exists()) {
-            publish_contact_sheet(&RunFolder::open(out)?).map_err(Failure::new)?;
+            let folder = RunFolder::open(out)?;
+            folder.publish(CONTACT_SHEET, &contact_sheet(&folder).map_err(Failure::new)?)?;
         }
         self.line(&json!({
             "event": "done", "out": out, "samples": summary.samples, "failed": summary.failed,

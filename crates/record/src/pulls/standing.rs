@@ -56,7 +56,7 @@ pub(super) fn stated(columns: &[Column], pulls: &mut [MeasuredPull]) -> Result<V
 }
 
 /// Judges the labels of pulls with a trace; `after_n` are their readings without a load after the pull.
-pub(super) fn judge_labels(measured: &MeasuredPulls, after_n: &[Vec<f64>], standing: &mut [Standing]) {
+pub(crate) fn judge_labels(measured: &MeasuredPulls, after_n: &[Vec<f64>], standing: &mut [Standing]) {
     let every_reading = labels_are_rows(measured, standing);
     for ((pull, after_n), standing) in measured.pulls.iter().zip(after_n).zip(standing) {
         let censored = standing.status == Status::Censored;

@@ -5,11 +5,12 @@ use crate::gcl::GclLimits;
 use crate::program::{PullProgram, TcpPose};
 use gripgen_twin::PerJaw;
 use gripgen_twin::config::{ConfigError, Document};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The whole file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RigConfig {
     /// The robot.
@@ -33,7 +34,7 @@ pub struct RigConfig {
 }
 
 /// `[robot]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {
     /// Name or number of the controller.
@@ -62,7 +63,7 @@ pub struct RobotSection {
 }
 
 /// `[gripper]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GripperSection {
     /// Name or number of the gripper.
@@ -85,7 +86,7 @@ pub struct GripperSection {
 }
 
 /// `[cameras]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PerJawSection {
     /// Behind the left gel.
@@ -95,7 +96,7 @@ pub struct PerJawSection {
 }
 
 /// `[cameras.left]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraSection {
     /// Name or number of the camera.
@@ -118,7 +119,7 @@ pub struct CameraSection {
 }
 
 /// `[limits]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LimitsSection {
     /// Lowest corner of the box in the base that the grip centre stays in.
@@ -148,7 +149,7 @@ pub struct LimitsSection {
 }
 
 /// `[motion]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionSection {
     /// Height above a grip from which it is approached.
@@ -160,7 +161,7 @@ pub struct MotionSection {
 }
 
 /// `[images]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImagesSection {
     /// Rest after gripping, before the image is taken.
@@ -170,7 +171,7 @@ pub struct ImagesSection {
 }
 
 /// `[poses.NAME]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TaughtPose {
     /// Position in metres and rotation vector in radians, as the robot shows them: the grip centre in the middle of the part,
@@ -250,6 +251,11 @@ fn quarter() -> u32 {
 }
 fn landscape() -> [u32; 2] {
     [320, 240]
+}
+
+/// JSON Schema of `rig.toml`.
+pub fn rig_schema() -> serde_json::Value {
+    schemars::schema_for!(RigConfig).to_value()
 }
 
 impl RigConfig {
