@@ -20,7 +20,7 @@ use super::search::{Accepted, Search};
 use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
 use super::unknown::unknown;
-use super::worth::{HeldOut, hints, worse};
+use super::worth::{BAD, HeldOut, hints, worse};
 use super::zero_screen::{said, zeros_that_depend};
 use crate::diagnosis::{Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, Residual, UnknownCovariate};
 use gripgen_twin::columns::covariates;
@@ -41,9 +41,6 @@ const SCORED: usize = 8;
 /// Part of the squared error by which labels that no fit has seen may be predicted worse, by chance, with an effect that
 /// shows in the traces only.
 const WORSE: f64 = 1.03;
-
-/// Standard deviations beyond which the error of a held-out pull counts no more.
-pub(super) const BAD: f64 = 5.0;
 
 /// How many times the noise that a twin states labels have to show before it is said.
 const NOISIER: f64 = 1.6;

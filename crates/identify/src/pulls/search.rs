@@ -159,6 +159,21 @@ impl<'a> Search<'a> {
         Self { context, candidates, curves, rows: (0..n).collect(), written: Written::default() }
     }
 
+    /// A fit as it is written into a twin, with the context that predicts it.
+    pub(super) fn stated(&self, fitted: &Fitted) -> (Context<'a>, Fitted) {
+        self.written.stated(self.context, fitted)
+    }
+
+    /// Errors on held-out labels of the twin that is written for a fit, by pull of `rows`. What traces show is held, which is fast.
+    pub(super) fn held_out(
+        &self,
+        fitted: &Fitted,
+        repetitions: &[Vec<usize>],
+        rows: &[usize],
+    ) -> Vec<(usize, f64)> {
+        self.written.held_out(self.context, fitted, repetitions, rows)
+    }
+
     /// Id of an effect, or the columns of a curve.
     pub fn name_of(&self, rival: &ModelTerm) -> String {
         match rival {

@@ -1,13 +1,15 @@
 //! Never worse: what was found is written only if it predicts held-out pulls no worse than the recalibrated baseline does, both as they would be
 //! written.
 
-use super::answer::BAD;
 use super::paying::root_mean_square;
 use super::search::{Accepted, Search};
 use crate::diagnosis::Hint;
 
 /// Share of the error by which effects that traces show may miss the labels by chance.
 const SHOWN_BY_TRACES: f64 = 1.02;
+
+/// Standard deviations beyond which the error of a held-out pull counts no more.
+pub(super) const BAD: f64 = 5.0;
 
 /// Labels predicted for held-out pulls, before and after.
 pub(super) struct HeldOut<'a> {

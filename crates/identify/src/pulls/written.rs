@@ -4,7 +4,6 @@ use super::context::Context;
 use super::fitting::Fitted;
 use super::heldout::predicted;
 use super::model::PullModel;
-use super::search::Search;
 use std::sync::Mutex;
 
 /// What a fit and all that follows from it depend on.
@@ -37,17 +36,17 @@ pub struct Written<'a> {
     labels_n: Mutex<Vec<(Key, Predicted)>>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> Written<'a> {
     /// A fit as it is written into a twin, with the context that predicts it.
-    pub(super) fn stated(&self, fitted: &Fitted) -> (Context<'a>, Fitted) {
+    pub(super) fn stated(&self, context: &Context<'a>, fitted: &Fitted) -> (Context<'a>, Fitted) {
         let key = Key::of(fitted);
-        if let Ok(known) = self.written.fits.lock()
+        if let Ok(known) = self.fits.lock()
             && let Some((_, found)) = known.iter().find(|(k, _)| *k == key)
         {
             return found.clone();
         }
-        let found = self.context.stated(fitted);
-        if let Ok(mut known) = self.written.fits.lock() {
+        let found = context.stated(fitted);
+        if let Ok(mut known) = self.fits.lock() {
             known.push((key, found.clone()));
         }
         found
@@ -56,26 +55,27 @@ impl<'a> Search<'a> {
     /// Errors on held-out labels of the twin that is written for a fit, by pull of `rows`. What traces show is held, which is fast.
     pub(super) fn held_out(
         &self,
+        context: &Context<'a>,
         fitted: &Fitted,
         repetitions: &[Vec<usize>],
         rows: &[usize],
     ) -> Vec<(usize, f64)> {
-        let labels_n = self.held_labels_n(fitted, repetitions);
-        let errors = rows.iter().map(|&i| (i, labels_n[i] - self.context.data.label_n[i]));
+        let labels_n = self.held_labels_n(context, fitted, repetitions);
+        let errors = rows.iter().map(|&i| (i, labels_n[i] - context.data.label_n[i]));
         errors.filter(|(_, e)| e.is_finite()).collect()
     }
 
-    fn held_labels_n(&self, fitted: &Fitted, repetitions: &[Vec<usize>]) -> Vec<f64> {
+    fn held_labels_n(&self, context: &Context<'a>, fitted: &Fitted, repetitions: &[Vec<usize>]) -> Vec<f64> {
         let key = Key::of(fitted);
-        if let Ok(known) = self.written.labels_n.lock()
+        if let Ok(known) = self.labels_n.lock()
             && let Some((_, (_, found))) =
                 known.iter().find(|(k, (sets, _))| *k == key && sets == repetitions)
         {
             return found.clone();
         }
-        let (context, stated) = self.stated(fitted);
+        let (context, stated) = self.stated(context, fitted);
         let found = predicted(&context, &stated, repetitions, !context.observations.is_empty());
-        if let Ok(mut known) = self.written.labels_n.lock() {
+        if let Ok(mut known) = self.labels_n.lock() {
             known.push((key, (repetitions.to_vec(), found.clone())));
         }
         found

@@ -75,7 +75,7 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
     let before = before.as_ref().map(CampaignClock::of).transpose()?.unwrap_or_default();
     let folder = open_folder(args, &config, &campaign, pulls.len() as u64)?;
     if let Some(path) = &args.rehearsal {
-        rehearsal::keep(path, folder.path())?;
+        rehearsal::keep(path, &folder)?;
     }
     let todo = todo(&folder)?;
     let mut live = Live::new(pulls.len() as u64, todo.len() as u64, &args.talk, sink);

@@ -1,7 +1,7 @@
 //! What `gripgen rig rehearse` stored.
 
 use crate::failure::Failure;
-use gripgen::record::sha256_hex;
+use gripgen::record::{RunFolder, sha256_hex};
 use gripgen_rig::experiment::check::CheckLine;
 use gripgen_rig::experiment::rehearse::{SCHEMA, StoredRehearsal};
 use std::path::Path;
@@ -23,11 +23,9 @@ pub fn load(path: &Path) -> Result<StoredRehearsal, Failure> {
 }
 
 /// Puts a copy into a run, named by its content: a run may outlive a morning's rehearsal.
-pub fn keep(path: &Path, run: &Path) -> Result<(), Failure> {
-    let failed = |at: &Path, e: std::io::Error| Failure::new(format!("{}: {e}", at.display()));
-    let bytes = std::fs::read(path).map_err(|e| failed(path, e))?;
-    let copy = run.join(format!("rehearsal-{}.json", &sha256_hex(&bytes)[..8]));
-    std::fs::write(&copy, bytes).map_err(|e| failed(&copy, e))
+pub fn keep(path: &Path, run: &RunFolder) -> Result<(), Failure> {
+    let bytes = std::fs::read(path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+    Ok(run.publish(&format!("rehearsal-{}.json", &sha256_hex(&bytes)[..8]), &bytes)?)
 }
 
 /// Whether the rig is the one that rehearsed.
