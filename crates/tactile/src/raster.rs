@@ -3,7 +3,6 @@
 mod clusters;
 mod draw;
 mod edge;
-mod fill;
 #[cfg(test)]
 mod step_tests;
 mod steps;

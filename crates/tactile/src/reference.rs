@@ -86,28 +86,18 @@ impl Sampled {
     }
 
     /// Depths and press of a contact by their definition: the centres of pixels first, then nine points in each pixel beside
-    /// a step that exceeds the slopes on both sides by more than half a pixel, which alone count from a whole one on.
+    /// a step of more than half a pixel, which alone count from a whole one on.
     fn pressed(&self, wanted_px3: f64) -> (Vec<f64>, f64) {
         let (w, h) = (self.centres.width, self.centres.height);
         let top = f64::from(self.centres.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h)));
         let first_px = press_px(&self.centres, wanted_px3, 16.0);
         let depth = |h: f64, press: f64| (h - top + press).max(0.0);
         let at = |x: usize, y: usize| depth(f64::from(self.centres.at(x, y)), first_px);
-        // A pixel and its neighbour in one of four directions: by how much they differ more than the two beyond them go on the
-        // same way.
-        let excess = |x: usize, y: usize, dx: isize, dy: isize| {
-            let at = |k: isize| {
-                let place =
-                    |v: usize, d: isize, n: usize| (v as isize + k * d).clamp(0, n as isize - 1) as usize;
-                at(place(x, dx, w), place(y, dy, h))
-            };
-            let jump = at(1) - at(0);
-            let going_on = [at(0) - at(-1), at(2) - at(1)].map(|slope| (slope * jump.signum()).max(0.0));
-            jump.abs() - going_on[0].max(going_on[1])
-        };
         let weight = |x: usize, y: usize| {
-            let step = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(dx, dy)| excess(x, y, dx, dy));
-            (2.0 * step.iter().fold(0.0, |m: f64, &s| m.max(s)) - 1.0).clamp(0.0, 1.0)
+            let beside =
+                [(x.max(1) - 1, y), ((x + 1).min(w - 1), y), (x, y.max(1) - 1), (x, (y + 1).min(h - 1))];
+            let step = beside.iter().fold(0.0, |m: f64, &(i, j)| m.max((at(x, y) - at(i, j)).abs()));
+            (2.0 * step - 1.0).clamp(0.0, 1.0)
         };
         let weights: Vec<f64> = (0..w * h).map(|i| weight(i % w, i / w)).collect();
         let depths = |press: f64| -> Vec<f64> {
