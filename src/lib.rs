@@ -125,7 +125,7 @@ pub use init::{
 };
 pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};
-pub use live::{image_png, live_page};
+pub use live::live_page;
 pub use location::{Location, ReadFileError};
 pub use measured::{
     LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls, load_pulls_of, load_pulls_with,

@@ -1,16 +1,10 @@
 //! The page of `--live`; the command line serves it.
 
 use crate::report::rendered_with;
-use gripgen_twin::TactileImage;
 use serde_json::json;
 
 /// The page as HTML. It asks the address that it came from for `/state` (`gripgen.live/1`), `/left.png` and `/right.png`, and
 /// nothing else.
 pub fn live_page() -> String {
     rendered_with("live.html", &json!({}))
-}
-
-/// An image as PNG; `None` where its bytes are not those of its size.
-pub fn image_png(image: &TactileImage) -> Option<Vec<u8>> {
-    gripgen_record::encode_png(image).ok()
 }

@@ -65,7 +65,7 @@ pub const RIG_CHECK: &str = "Examples:
 pub const RIG_TEACH: &str = "Examples:
   gripgen rig teach gear --rig rig.toml";
 pub const RIG_REHEARSE: &str = "Examples:
-  gripgen rig rehearse rig.toml -o rehearsal.toml";
+  gripgen rig rehearse rig.toml -o rehearsal.json";
 pub const RIG_PULL: &str = "Examples:
   gripgen rig pull --parts gear --grip-force-n 20,40 -o runs/first
   gripgen rig pull rig.toml --campaign campaign.toml -o runs/monday";

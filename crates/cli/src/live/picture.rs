@@ -1,7 +1,6 @@
 //! Pictures of the page, decoded when somebody looks at them.
 
-use gripgen::image_png;
-use gripgen::record::Dataset;
+use gripgen::record::{Dataset, encode_png};
 use gripgen::twin::{Jaw, PerJaw};
 use gripgen_rig::camera::{CameraFrame, CameraView, SHIPPED_FRAME_LIMITS, decode_jpeg};
 use std::path::PathBuf;
@@ -22,7 +21,7 @@ impl Picture {
         match self {
             Self::Frame(frame, views) => {
                 let frame = decode_jpeg(&frame.jpeg, &SHIPPED_FRAME_LIMITS).ok()?;
-                image_png(&views[jaw].apply(&frame).ok()?)
+                encode_png(&views[jaw].apply(&frame).ok()?).ok()
             }
             Self::Shard(path) => {
                 let shard = Dataset::open(path).ok()?;
