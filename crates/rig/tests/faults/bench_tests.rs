@@ -40,6 +40,8 @@ pub struct Made {
     pub pull: Option<ExecutedPull>,
     /// The moment came before the pull was over.
     pub came: bool,
+    /// Where the pull was when the fault was there: later than asked for on a machine that is busy.
+    pub moment: Option<Moment>,
     /// Time from the injection to the return of the call.
     pub returned: Duration,
     /// Time from the injection until the arm stood for good.
@@ -148,6 +150,7 @@ pub fn make(injection: &Injection) -> Made {
                 rig.inject(Fault::Hang(0.0));
             }
         }
+        let moment = watch.moment();
         let mut stands_since = None;
         let mut follow = |w: &mut Watch| {
             if w.stands() {
@@ -168,6 +171,7 @@ pub fn make(injection: &Injection) -> Made {
         let made = Made {
             pull,
             came,
+            moment,
             returned,
             stood,
             stayed,

@@ -132,7 +132,8 @@ pub enum Moment {
     Retract,
 }
 
-const MOMENTS: [Moment; 14] = [
+/// All of them.
+pub const MOMENTS: [Moment; 14] = [
     Moment::Approach,
     Moment::RestImages,
     Moment::WayDown,

@@ -56,9 +56,11 @@ pub fn judge(injection: &Injection, made: Made) -> Report {
     assert!(made.stayed, "the arm does not stay where it is");
     assert_eq!(made.let_go.filter(|_| kind != Kind::Rig(Fault::PartLost)), None);
     let seconds = made.returned.max(stood).as_secs_f64();
+    // A machine that is busy makes the injection late: whether a label may come of it is asked at the moment that it hit.
+    let must_fail = must_fail(kind, moment) && made.moment.is_none_or(|moment| must_fail(kind, moment));
     let ended = match &made.pull {
         None => Ended::Dead,
-        Some(pull) => outcome(pull, kind, moment),
+        Some(pull) => outcome(pull, kind, must_fail),
     };
     let limit = if matches!(ended, Ended::Labelled(_)) { UNDISTURBED } else { LONGEST };
     assert!(seconds < limit.as_secs_f64(), "it took {seconds:.2} s");
@@ -81,10 +83,10 @@ pub fn judge(injection: &Injection, made: Made) -> Report {
 }
 
 /// The outcome of a pull, which has to be one of those that this fault may have.
-fn outcome(pull: &ExecutedPull, kind: Kind, moment: Moment) -> Ended {
+fn outcome(pull: &ExecutedPull, kind: Kind, must_fail: bool) -> Ended {
     match &pull.outcome {
         PullOutcome::Labelled(label) => {
-            assert!(!must_fail(kind, moment), "a pull is labelled that was disturbed");
+            assert!(!must_fail, "a pull is labelled that was disturbed");
             assert!(pull.stopped.is_none());
             check_data(pull);
             Ended::Labelled(label.max_pull_force_n)

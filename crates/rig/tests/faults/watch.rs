@@ -1,6 +1,6 @@
 //! Where a pull is, as somebody sees it who looks on, and what the arm and the jaws do meanwhile.
 
-use super::injection::Moment;
+use super::injection::{MOMENTS, Moment};
 use gripgen_rig::experiment::RigEvent;
 use gripgen_rig::gcl::GripState;
 use gripgen_rig::virtual_rig::server::ServedRig;
@@ -120,6 +120,11 @@ impl<'a> Watch<'a> {
     /// Looks until a moment has begun, or the pull is over.
     pub fn until_moment(&mut self, moment: Moment, limit: Duration, over: impl Fn() -> bool) -> bool {
         self.until(limit, |w| w.progress.reached(moment, w.rig) || over()) && !over()
+    }
+
+    /// The last moment that has begun.
+    pub fn moment(&self) -> Option<Moment> {
+        MOMENTS.into_iter().rev().find(|moment| self.progress.reached(*moment, self.rig))
     }
 
     /// Whether the arm stands and no program runs.

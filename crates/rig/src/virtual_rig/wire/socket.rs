@@ -68,8 +68,8 @@ impl DeviceFaults {
         until.checked_duration_since(Instant::now()).filter(|wait| !wait.is_zero())
     }
 
-    /// What becomes of bytes that leave: `None` closes the connection after them.
-    fn spoil(&self, bytes: &mut Vec<u8>, stop: &AtomicBool) -> Option<()> {
+    /// What becomes of bytes that leave by a connection of this generation: `None` closes the connection after them.
+    fn spoil(&self, bytes: &mut Vec<u8>, generation: u64, stop: &AtomicBool) -> Option<()> {
         while let Some(wait) = self.silence() {
             // A rig that is not wanted any more does not wait for an hour of silence.
             if stop.load(Ordering::SeqCst) {
@@ -78,6 +78,11 @@ impl DeviceFaults {
             std::thread::sleep(wait.min(LOOK));
         }
         let mut state = lock(&self.state);
+        // A connection that was cut sends nothing more, however long its reader needs to see that.
+        if state.generation != generation {
+            bytes.clear();
+            return None;
+        }
         if std::mem::take(&mut state.garble) {
             bytes.iter_mut().step_by(3).for_each(|byte| *byte ^= 0x5a);
         }
@@ -167,9 +172,10 @@ pub(crate) fn spawn_writer(
     faults: Arc<DeviceFaults>,
     stop: Arc<AtomicBool>,
 ) {
+    let generation = faults.generation();
     std::thread::spawn(move || {
         while let Some(mut piece) = outbox.next() {
-            let last = faults.spoil(&mut piece, &stop).is_none();
+            let last = faults.spoil(&mut piece, generation, &stop).is_none();
             if stream.write_all(&piece).is_err() || last {
                 break;
             }
