@@ -161,7 +161,8 @@ impl Map {
             let sum: f64 = self.heights_m.iter().map(|&z| (depth - z).max(0.0)).sum();
             sum * self.cell_m * self.cell_m
         };
-        let (mut low, mut high) = (self.lowest_m(), self.lowest_m() + 5e-3);
+        // A needle of a damaged mesh may stand out by millimetres from what carries the load.
+        let (mut low, mut high) = (self.lowest_m(), self.lowest_m() + 20e-3);
         for _ in 0..50 {
             let middle = (low + high) / 2.0;
             if volume(middle) < volume_m3 { low = middle } else { high = middle }
@@ -232,7 +233,9 @@ fn check(seen: &mut Seen, project: &Project, mesh: &TriMesh, index: u64, pulled:
         }
         seen.worst = [0, 1, 2].map(|i| seen.worst[i].max(found[i]));
         if is_wrong(found) {
-            seen.wrong.push(format!("sample {index}, {jaw} jaw: {found:?}, {} mm2", area_m2 * 1e6));
+            let own_mm2 = patch.area_m2() * 1e6;
+            seen.wrong
+                .push(format!("sample {index}, {jaw} jaw: {found:?}, {own_mm2} for {} mm2", area_m2 * 1e6));
         }
     }
 }
@@ -254,9 +257,9 @@ fn check_missed(seen: &mut Seen, project: &Project, mesh: &TriMesh, index: u64) 
     }
 }
 
-fn fuzz(seed: u64, parts: u64) -> Seen {
+fn fuzz(seed: u64, parts: std::ops::Range<u64>) -> Seen {
     let mut seen = Seen::default();
-    for number in 0..parts {
+    for number in parts {
         let mut stream = Stream::new(seed, number, Purpose::Draw);
         let family = number as usize % FAMILIES.len();
         let damage = DAMAGES[(number as usize / FAMILIES.len() + number as usize) % DAMAGES.len()];
@@ -298,20 +301,24 @@ fn fuzz(seed: u64, parts: u64) -> Seen {
 
 #[test]
 fn random_parts_in_random_grips_have_the_contact_that_is_there() {
-    let seen = fuzz(1, 8);
+    let seen = fuzz(1, 0..8);
     println!("{seen:?}");
     assert!(seen.held >= 60, "{seen:?}");
     assert!(seen.wrong.is_empty(), "{:#?}", seen.wrong);
 }
 
-/// Ten thousand grips.
+/// Ten thousand grips, or `GRIPGEN_FUZZ_PARTS` times twenty; `GRIPGEN_FUZZ_PART=140` is one of those parts alone.
 #[test]
 #[ignore = "slow: minutes"]
 fn ten_thousand_random_grips_have_the_contact_that_is_there() {
-    let parts = std::env::var("GRIPGEN_FUZZ_PARTS").ok().and_then(|n| n.parse().ok()).unwrap_or(500);
+    let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
+    let parts = match number("GRIPGEN_FUZZ_PART") {
+        Some(one) => one..one + 1,
+        None => 0..number("GRIPGEN_FUZZ_PARTS").unwrap_or(500),
+    };
     let seen = fuzz(2, parts);
     println!("{seen:#?}");
-    assert!(seen.wrong.len() * 1000 <= seen.held, "{} of {}", seen.wrong.len(), seen.held);
+    assert!(seen.wrong.is_empty(), "{:#?}", seen.wrong);
 }
 
 /// Ratios of slip forces, Rapier over reduced, of grips that hold.
