@@ -11,6 +11,7 @@ use gripgen::tactile::{
     ClusteredMesh, Plane, PressedGel, Renderer, SimdLevel, finish, gradient, indent, shade,
 };
 use gripgen::twin::Jaw;
+use gripgen::twin::frames::world_from_gel;
 use gripgen::{Location, Project};
 use guard::baseline::Unit;
 use std::hint::black_box;
@@ -82,6 +83,17 @@ fn main() -> ExitCode {
             let name = |stage: &str| format!("{stage}, {kind}, {}", format!("{level:?}").to_lowercase());
             stage(name("image"), us(|| renderer.image(Some(&imprint), Some(7))));
             stage(name("press and image"), us(|| renderer.image(Some(&press(&renderer)), Some(7))));
+        }
+    }
+    // Presses of parts with sharp edges, in each of their grips.
+    for (name, part) in &twin.parts {
+        let mesh = project.library.clustered_mesh(part).unwrap();
+        for (i, grip) in part.grips.iter().enumerate() {
+            let at = world_from_gel(Jaw::Left, 0.03).inverse() * grip;
+            let press = || best.press(&mesh, &at, part.imprint_m3_per_n, 40.0);
+            if press().is_ok() {
+                stage(format!("press of {name}, {i}"), us(press));
+            }
         }
     }
     println!("{} triangles, {:.1} % of the image in contact", mesh.triangles().len(), 100.0 * contact);

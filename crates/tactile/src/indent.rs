@@ -201,12 +201,12 @@ impl Indentation<'_> {
             // Points change a press little: only what lies so deep is drawn at first.
             let mut drawn_px = limit_px.min(MARGIN * at_centres_px);
             loop {
-                map.draw_steps(mesh, top_px - drawn_px, self.level);
+                map.draw_steps(mesh, top_px - drawn_px, self.rest, self.level);
                 let touched = |press_px| {
                     let known = press_px == at_centres_px;
                     let by_centres =
                         if known { by_centres } else { map.touched(self.rest, top_px, press_px, self.level) };
-                    map.with_steps(by_centres, self.rest, top_px, press_px)
+                    map.with_steps(by_centres, top_px, press_px, self.level)
                 };
                 press_px = self.settle(at_centres_px, touched);
                 if press_px <= drawn_px {
@@ -223,7 +223,7 @@ impl Indentation<'_> {
                 drawn_px = limit_px;
             }
             self.write_depths(map, press_px - top_px, &mut depth_px);
-            map.write_steps(self.rest, press_px - top_px, &mut depth_px);
+            map.write_steps(press_px - top_px, &mut depth_px, self.level);
         }
         Ok(self.imprint(depth_px, press_px, patch))
     }

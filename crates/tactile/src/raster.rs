@@ -3,6 +3,7 @@
 mod clusters;
 mod draw;
 mod edge;
+mod fill;
 #[cfg(test)]
 mod step_tests;
 mod steps;

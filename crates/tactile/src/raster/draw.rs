@@ -1,7 +1,8 @@
 //! Drawing the clusters of a mesh from the top down, as deep as needed.
 
 use super::clusters::{Cluster, ClusteredMesh, VERTICES};
-use super::edge::{Corner, Edge, higher, lower};
+use super::edge::{Corner, higher};
+use super::fill::fill;
 use super::steps::Steps;
 use crate::convolve::{Area, raise};
 use crate::grid::{Grid, Plane};
@@ -169,25 +170,32 @@ impl HeightMap {
     }
 
     /// Draws these pixels at their points, all that reaches above `floor_px`.
-    pub(crate) fn draw_steps(&mut self, mesh: &ClusteredMesh, floor_px: f64, level: SimdLevel) {
+    pub(crate) fn draw_steps(
+        &mut self,
+        mesh: &ClusteredMesh,
+        floor_px: f64,
+        rest: Option<&Plane>,
+        level: SimdLevel,
+    ) {
         self.steps.empty();
         level.run(DrawPoints { map: self, mesh, floor_px });
+        self.steps.collect(&self.values, rest);
     }
 
     /// What a press touches, `by_centres` as [`HeightMap::touched`] says, with these pixels at their points.
     pub(crate) fn with_steps(
         &self,
         by_centres: (f64, f64),
-        rest: Option<&Plane>,
         top: f64,
         press_px: f64,
+        level: SimdLevel,
     ) -> (f64, f64) {
-        self.steps.touched(by_centres, &self.values, rest, top, press_px)
+        self.steps.touched(by_centres, top, press_px, level)
     }
 
     /// Puts the mean depth at their points into these pixels; `lift` is what lies between heights and depths.
-    pub(crate) fn write_steps(&self, rest: Option<&Plane>, lift: f64, depth_px: &mut Plane) {
-        self.steps.write(rest, lift, depth_px);
+    pub(crate) fn write_steps(&self, lift: f64, depth_px: &mut Plane, level: SimdLevel) {
+        self.steps.write(lift, depth_px, level);
     }
 
     /// The highest pixel.
@@ -330,7 +338,7 @@ impl Kernel for DrawPoints<'_> {
     unsafe fn run<L: Lanes>(self) {
         let HeightMap { seen, corners, steps, view, width, height, .. } = self.map;
         for s in &*seen {
-            if s.top_px < self.floor_px || !steps.any_in(s.rows, s.columns) {
+            if s.top_px < self.floor_px || !steps.may_be_in(s.rows, s.columns) {
                 continue;
             }
             let cluster = &self.mesh.clusters[s.cluster];
@@ -350,8 +358,9 @@ impl Kernel for DrawPoints<'_> {
                     continue;
                 }
                 let whole = |(from, to): (i32, i32)| (from as usize, to as usize);
-                if steps.any_in(whole(rows), whole(columns)) {
-                    steps.fill(t.map(|v| corners.corner(v)));
+                let (rows, columns) = (whole(rows), whole(columns));
+                if steps.may_be_in(rows, columns) {
+                    steps.fill(t.map(|v| corners.corner(v)), rows, columns);
                 }
             }
         }
@@ -437,48 +446,5 @@ impl Corners {
         let range = |i: usize| (low[i] as usize, high[i] as usize);
         self.area = if count == 0 { Area::EMPTY } else { Area { x: range(0), y: range(1) } };
         left
-    }
-}
-
-/// Writes one triangle into a map where it is nearer than what is there.
-#[inline(always)]
-fn fill(map: &mut [f32], width: usize, t: [Corner; 3], rows: (usize, usize)) {
-    // Plane through the corners, relative to the first one so that small triangles far away stay exact.
-    let (ux, uy, uh) = (t[1].x_px - t[0].x_px, t[1].y_px - t[0].y_px, t[1].height_px - t[0].height_px);
-    let (vx, vy, vh) = (t[2].x_px - t[0].x_px, t[2].y_px - t[0].y_px, t[2].height_px - t[0].height_px);
-    let area = ux * vy - uy * vx;
-    if area == 0.0 {
-        return;
-    }
-    let slope_x = (uh * vy - vh * uy) / area;
-    let slope_y = (vh * ux - uh * vx) / area;
-    let top = higher(higher(t[0].height_px, t[1].height_px), t[2].height_px);
-    let bottom = lower(lower(t[0].height_px, t[1].height_px), t[2].height_px);
-    let edges = [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])];
-    let last_column = (width - 1) as f64;
-    for row in rows.0..=rows.1 {
-        let y = f64::from(row as i32);
-        let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
-        for edge in &edges {
-            if let Some(x) = edge.crossing(y) {
-                from = lower(x, from);
-                to = higher(x, to);
-            }
-        }
-        let from = higher(from.ceil(), 0.0);
-        let to = lower(to.floor(), last_column);
-        if from > to {
-            continue;
-        }
-        // SAFETY: both lie between 0 and the last column.
-        let (from, to) = unsafe { (from.to_int_unchecked::<i32>(), to.to_int_unchecked::<i32>()) };
-        let along_row = t[0].height_px + slope_y * (y - t[0].y_px);
-        let cells = &mut map[row * width..][from as usize..=to as usize];
-        for (i, cell) in cells.iter_mut().enumerate() {
-            let column = from + i as i32;
-            let height = along_row + slope_x * (f64::from(column) - t[0].x_px);
-            let height = lower(top, higher(bottom, height)) as f32;
-            *cell = if height > *cell { height } else { *cell };
-        }
     }
 }

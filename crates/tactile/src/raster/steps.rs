@@ -1,20 +1,35 @@
 //! Points within pixels, where a surface has a step: the border of a contact there lies between pixel centres.
 
-use super::edge::{Corner, Edge, higher, lower};
+use super::edge::{Corner, Edge, higher, lower, reach};
 use crate::convolve::Area;
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
 
 /// Points along a side of a pixel; the middle one is its centre.
-pub(super) const FINE: usize = 3;
+const FINE: usize = 3;
 
 /// Points of a pixel.
-pub(super) const POINTS: usize = FINE * FINE;
+const POINTS: usize = FINE * FINE;
+
+/// Heights of a pixel in memory: its points, and what fills up a vector.
+const PLACES: usize = 16;
+
+/// Pixels that are summed side by side.
+const SIDE: usize = 8;
+
+/// Rows whose steps are looked for at once.
+const COARSE: usize = 8;
 
 /// Where the depths of two neighbours differ by more than this, in pixels, points begin to count, and they alone count
 /// from [`STEP_PX`] on. In between both do, so that no last bit of a depth decides what a pixel is.
 const SLOPE_PX: f32 = 0.5;
 const STEP_PX: f32 = 1.0;
+
+/// A triangle that is narrower than this, in pixels, has no points.
+const WALL_PX: f64 = 1e-4;
+
+/// A triangle over more rows than this is looked at row by row.
+const TALL: usize = 4;
 
 /// The pixels of a map beside a step, and the height of the surface at the points of each. Memory to be used again.
 #[derive(Debug, Clone, Default)]
@@ -23,26 +38,36 @@ pub(super) struct Steps {
     height: usize,
     /// One bit for each pixel, rows in whole words.
     bits: Vec<u64>,
+    /// The bits of [`COARSE`] rows in one.
+    coarse: Vec<u64>,
     words: usize,
     /// Where in `pixels` those of a word begin.
     starts: Vec<u32>,
-    /// First and last column with one in each row; the first is larger where there is none.
-    spans: Vec<(u32, u32)>,
-    pixels: Vec<SteppedPixel>,
+    /// Their places in the image.
+    pixels: Vec<u32>,
+    /// How much the points of each count; the rest is its centre.
+    weights: Vec<f32>,
+    /// Heights at the points of each, in the order of a map; `-inf` where there is nothing.
+    heights: Vec<[f32; PLACES]>,
+    /// The same above the gel, as they are summed.
+    blocks: Vec<Block>,
     /// Memory for a row.
     largest: Vec<f32>,
 }
 
-/// A pixel beside a step.
+/// Pixels side by side, heights above the gel at rest.
 #[derive(Debug, Clone, Copy)]
-struct SteppedPixel {
-    /// Its place in the image.
-    pixel: usize,
-    /// How much its points count; the rest is its centre.
-    weight: f32,
-    /// Heights at its points, in the order of a map; `-inf` where there is nothing.
-    heights: [f32; POINTS],
+struct Block {
+    weights: [f32; SIDE],
+    centres: [f32; SIDE],
+    points: [[f32; SIDE]; POINTS],
 }
+
+const NOTHING: Block = Block {
+    weights: [0.0; SIDE],
+    centres: [f32::NEG_INFINITY; SIDE],
+    points: [[f32::NEG_INFINITY; SIDE]; POINTS],
+};
 
 impl Steps {
     /// Finds the pixels beside a step of a contact that is so deep at the centres of pixels, 0 beyond `area`. Returns whether
@@ -50,178 +75,314 @@ impl Steps {
     pub(super) fn find(&mut self, depth_px: &Plane, area: Area, level: SimdLevel) -> bool {
         (self.width, self.height) = (depth_px.width, depth_px.height);
         self.words = self.width.div_ceil(64);
-        self.bits.clear();
-        self.bits.resize(self.words * self.height, 0);
-        self.starts.clear();
-        self.starts.resize(self.words * self.height, 0);
-        self.spans.clear();
-        self.spans.resize(self.height, (u32::MAX, 0));
+        for (bits, rows) in [(&mut self.bits, self.height), (&mut self.coarse, self.height.div_ceil(COARSE))]
+        {
+            bits.clear();
+            bits.resize(self.words * rows, 0);
+        }
         self.pixels.clear();
+        self.weights.clear();
         if area.x.0 < area.x.1 && area.y.0 < area.y.1 {
             level.run(Find { steps: self, depth_px, area });
         }
+        self.starts.clear();
+        let mut count = 0;
+        self.starts.extend(self.bits.iter().map(|bits| {
+            count += bits.count_ones();
+            count - bits.count_ones()
+        }));
         !self.pixels.is_empty()
     }
 
     /// Forgets what was drawn at the points.
     pub(super) fn empty(&mut self) {
-        self.pixels.iter_mut().for_each(|p| p.heights = [f32::NEG_INFINITY; POINTS]);
+        self.heights.clear();
+        self.heights.resize(self.pixels.len(), [f32::NEG_INFINITY; PLACES]);
     }
 
-    /// What a press touches (sum of `height + rest - top`, and number) by the centres, whose heights are `centres`, and by the
-    /// points where they count.
-    pub(super) fn touched(
-        &self,
-        (mut sum, mut count): (f64, f64),
-        centres: &[f32],
-        rest: Option<&Plane>,
-        top: f64,
-        press_px: f64,
-    ) -> (f64, f64) {
-        for p in &self.pixels {
-            let rest = rest.map_or(0.0, |rest| rest.values[p.pixel]);
-            let weight = f64::from(p.weight);
-            let (mut heights, mut weights) = ([centres[p.pixel]; POINTS + 1], [-weight; POINTS + 1]);
-            heights[1..].copy_from_slice(&p.heights);
-            weights[1..].fill(weight / POINTS as f64);
-            // Without branches: which of them touch cannot be foreseen.
-            for (height, weight) in heights.iter().zip(weights) {
-                let below = f64::from(height + rest) - top;
-                let touches = below + press_px > 0.0;
-                sum += if touches { weight * below } else { 0.0 };
-                count += if touches { weight } else { 0.0 };
+    /// Puts what was drawn at the points beside the centres, whose heights are `centres`, for [`Steps::touched`] and
+    /// [`Steps::write`].
+    pub(super) fn collect(&mut self, centres: &[f32], rest: Option<&Plane>) {
+        self.blocks.clear();
+        self.blocks.resize(self.pixels.len().div_ceil(SIDE), NOTHING);
+        for (i, (&pixel, heights)) in self.pixels.iter().zip(&self.heights).enumerate() {
+            let (block, i) = (&mut self.blocks[i / SIDE], i % SIDE);
+            let rest = rest.map_or(0.0, |rest| rest.values[pixel as usize]);
+            block.centres[i] = centres[pixel as usize] + rest;
+            for (points, height) in block.points.iter_mut().zip(heights) {
+                points[i] = height + rest;
             }
         }
-        (sum, count)
+        for (block, weights) in self.blocks.iter_mut().zip(self.weights.chunks(SIDE)) {
+            block.weights[..weights.len()].copy_from_slice(weights);
+        }
+    }
+
+    /// What a press touches (sum of `height + rest - top`, and number) by the centres, and by the points where they count.
+    pub(super) fn touched(
+        &self,
+        by_centres: (f64, f64),
+        top: f64,
+        press_px: f64,
+        level: SimdLevel,
+    ) -> (f64, f64) {
+        level.run(Touched { blocks: &self.blocks, by_centres, top, press_px })
     }
 
     /// Puts the mean depth at their points into these pixels; `lift` is what lies between heights and depths.
-    pub(super) fn write(&self, rest: Option<&Plane>, lift: f64, depth_px: &mut Plane) {
-        for p in &self.pixels {
-            let rest = rest.map_or(0.0, |rest| rest.values[p.pixel]);
-            let depth = |h: &f32| (f64::from(h + rest) + lift).max(0.0);
-            let mean = p.heights.iter().map(depth).sum::<f64>() / POINTS as f64;
-            let at = &mut depth_px.values[p.pixel];
-            let (centre, weight) = (f64::from(*at), f64::from(p.weight));
-            *at = (centre + weight * (mean - centre)) as f32;
-        }
+    pub(super) fn write(&self, lift: f64, depth_px: &mut Plane, level: SimdLevel) {
+        level.run(Write { steps: self, lift, depth_px });
     }
 
     /// The weight of each.
     #[cfg(test)]
-    pub(super) fn weights(&self) -> Vec<f32> {
-        self.pixels.iter().map(|p| p.weight).collect()
+    pub(super) fn weights(&self) -> &[f32] {
+        &self.weights
     }
 
-    /// Whether there are some in a box; both ends count.
+    /// Whether there may be some in a box; both ends count.
     #[inline(always)]
-    pub(super) fn any_in(&self, rows: (usize, usize), columns: (usize, usize)) -> bool {
+    pub(super) fn may_be_in(&self, rows: (usize, usize), columns: (usize, usize)) -> bool {
         // A closure would not be compiled for the vector unit.
-        for row in rows.0..=rows.1 {
-            if self.any(row, columns) {
+        for row in rows.0 / COARSE..=rows.1 / COARSE {
+            if any(self.row(&self.coarse, row), columns) {
                 return true;
             }
         }
         false
     }
 
-    /// Whether there are some in a row, from one column up to another.
+    /// One triangle at the points of the pixels that it reaches, which lie in `rows` and `columns`; both ends count.
+    ///
+    /// A point lies in a triangle if it is on no edge's far side. Two triangles compute the side of a common edge from the
+    /// same end, so that no point falls between them.
     #[inline(always)]
-    fn any(&self, row: usize, (first, last): (usize, usize)) -> bool {
-        let (span_first, span_last) = self.spans[row];
-        let (first, last) = (first.max(span_first as usize), last.min(span_last as usize));
-        if first > last {
-            return false;
-        }
-        let words = &self.bits[row * self.words..][..self.words];
-        let (from, to) = (first / 64, last / 64);
-        let (low, high) = (u64::MAX << (first % 64), u64::MAX >> (63 - last % 64));
-        if from == to {
-            return words[from] & low & high != 0;
-        }
-        let mut some = (words[from] & low) | (words[to] & high);
-        for word in &words[from + 1..to] {
-            some |= word;
-        }
-        some != 0
-    }
-
-    /// The pixels of a row, which has some, from one column up to another.
-    #[inline(always)]
-    fn in_row(&mut self, row: usize, (first, last): (usize, usize)) -> &mut [SteppedPixel] {
-        let count = |column: usize, mask: u64| {
-            let word = row * self.words + column / 64;
-            (self.starts[word] + (self.bits[word] & mask).count_ones()) as usize
-        };
-        let before = count(first, !(u64::MAX << (first % 64)));
-        let up_to = count(last, u64::MAX >> (63 - last % 64));
-        &mut self.pixels[before..up_to]
-    }
-
-    /// One triangle at the points of the pixels that it reaches.
-    #[inline(always)]
-    pub(super) fn fill(&mut self, t: [Corner; 3]) {
-        // Coordinates whose integers are points.
-        let fine = |px: f64| FINE as f64 * px + (FINE / 2) as f64;
-        let span = |a: f64, b: f64, c: f64, n: usize| {
-            let first = fine(lower(lower(a, b), c)).ceil().max(0.0);
-            let last = fine(higher(higher(a, b), c)).floor().min((FINE * n - 1) as f64);
-            (first <= last).then_some((first as usize, last as usize))
-        };
-        let columns = span(t[0].x_px, t[1].x_px, t[2].x_px, self.width);
-        let rows = span(t[0].y_px, t[1].y_px, t[2].y_px, self.height);
-        let (Some(columns), Some(rows)) = (columns, rows) else { return };
-        let reached = (columns.0 / FINE, columns.1 / FINE);
-        if !self.any_in((rows.0 / FINE, rows.1 / FINE), reached) {
-            return;
-        }
-        let t = t.map(|c| Corner { x_px: fine(c.x_px), y_px: fine(c.y_px), ..c });
+    pub(super) fn fill(&mut self, t: [Corner; 3], rows: (usize, usize), columns: (usize, usize)) {
         let (ux, uy, uh) = (t[1].x_px - t[0].x_px, t[1].y_px - t[0].y_px, t[1].height_px - t[0].height_px);
         let (vx, vy, vh) = (t[2].x_px - t[0].x_px, t[2].y_px - t[0].y_px, t[2].height_px - t[0].height_px);
         let area = ux * vy - uy * vx;
-        if area == 0.0 {
+        // Between the points of walls that are seen from their edge there is none; their rims are those of others, too.
+        if area.abs() <= WALL_PX * (ux.abs() + uy.abs() + vx.abs() + vy.abs()) {
             return;
         }
         let (slope_x, slope_y) = ((uh * vy - vh * uy) / area, (vh * ux - uh * vx) / area);
-        let top = higher(higher(t[0].height_px, t[1].height_px), t[2].height_px);
-        let bottom = lower(lower(t[0].height_px, t[1].height_px), t[2].height_px);
-        let edges = [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])];
-        for pixel_row in rows.0 / FINE..=rows.1 / FINE {
-            if !self.any(pixel_row, reached) {
+        let top = higher(higher(t[0].height_px, t[1].height_px), t[2].height_px) as f32;
+        let bottom = lower(lower(t[0].height_px, t[1].height_px), t[2].height_px) as f32;
+        let turn = if area > 0.0 { 1.0 } else { -1.0 };
+        let sides = [(0, 1), (1, 2), (2, 0)].map(|(a, b)| Side::new(&t[a], &t[b], turn));
+        // From the centre of a pixel to its points.
+        let plane = Offsets::new(slope_x, slope_y);
+        let across = sides.map(|s| Offsets::new(-s.y, s.x));
+        let tall = rows.1 - rows.0 >= TALL;
+        let edges = tall.then(|| [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])]);
+        for block in rows.0 / COARSE..=rows.1 / COARSE {
+            let first = rows.0.max(COARSE * block);
+            let last = rows.1.min(COARSE * block + COARSE - 1);
+            // Of a long and thin triangle little lies in a few rows.
+            let columns = match &edges {
+                Some(edges) => narrowed(edges, (first, last), columns),
+                None => columns,
+            };
+            if columns.0 > columns.1 || !any(self.row(&self.coarse, block), columns) {
                 continue;
             }
-            let first = FINE * pixel_row;
-            for row in first.max(rows.0)..=(first + FINE - 1).min(rows.1) {
-                let y = row as f64;
-                let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
-                for edge in &edges {
-                    if let Some(x) = edge.crossing(y) {
-                        (from, to) = (lower(x, from), higher(x, to));
-                    }
-                }
-                let (from, to) = (higher(from.ceil(), columns.0 as f64), lower(to.floor(), columns.1 as f64));
-                if from > to {
+            for row in first..=last {
+                if !any(self.row(&self.bits, row), columns) {
                     continue;
                 }
-                // SAFETY: both lie between 0 and the last point of a row.
-                let (from, to) = unsafe { (from.to_int_unchecked::<i32>(), to.to_int_unchecked::<i32>()) };
-                let (from, to) = (from as usize, to as usize);
+                let columns = match &edges {
+                    Some(edges) => narrowed(edges, (row, row), columns),
+                    None => columns,
+                };
+                if columns.0 > columns.1 {
+                    continue;
+                }
+                let y = row as f64;
                 let along_row = t[0].height_px + slope_y * (y - t[0].y_px);
-                let start = pixel_row * self.width;
-                for p in self.in_row(pixel_row, (from / FINE, to / FINE)) {
-                    let first = FINE * (p.pixel - start);
-                    let points = &mut p.heights[row % FINE * FINE..][..FINE];
-                    for (i, at) in points.iter_mut().enumerate() {
-                        let column = first + i;
-                        let height = along_row + slope_x * (f64::from(column as i32) - t[0].x_px);
-                        let height = lower(top, higher(bottom, height)) as f32;
-                        let drawn = (column >= from) & (column <= to) & (height > *at);
-                        *at = if drawn { height } else { *at };
+                for word in columns.0 / 64..=columns.1 / 64 {
+                    let bits = self.bits[row * self.words + word];
+                    let low = if word == columns.0 / 64 { u64::MAX << (columns.0 % 64) } else { u64::MAX };
+                    let high =
+                        if word == columns.1 / 64 { u64::MAX >> (63 - columns.1 % 64) } else { u64::MAX };
+                    let mut left = bits & low & high;
+                    while left != 0 {
+                        let bit = left.trailing_zeros();
+                        left &= left - 1;
+                        let x = (64 * word + bit as usize) as f64;
+                        let before = (bits & !(u64::MAX << bit)).count_ones();
+                        let at = (self.starts[row * self.words + word] + before) as usize;
+                        let centre = (along_row + slope_x * (x - t[0].x_px)) as f32;
+                        let side = [0, 1, 2].map(|i| sides[i].of(x, y));
+                        let heights = &mut self.heights[at];
+                        for i in 0..PLACES {
+                            let height = centre + plane.0[i];
+                            let height = if height > bottom { height } else { bottom };
+                            let height = if height < top { height } else { top };
+                            let within = (side[0] + across[0].0[i] >= 0.0)
+                                & (side[1] + across[1].0[i] >= 0.0)
+                                & (side[2] + across[2].0[i] >= 0.0);
+                            heights[i] = if within & (height > heights[i]) { height } else { heights[i] };
+                        }
                     }
                 }
             }
         }
     }
+
+    /// The words of a row of bits.
+    #[inline(always)]
+    fn row<'a>(&self, bits: &'a [u64], row: usize) -> &'a [u64] {
+        &bits[row * self.words..][..self.words]
+    }
+}
+
+/// Columns of pixels, of those given, whose points a triangle may reach in some rows.
+#[inline(always)]
+fn narrowed(edges: &[Edge; 3], rows: (usize, usize), columns: (usize, usize)) -> (usize, usize) {
+    let (from, to) = reach(edges, (rows.0 as f64 - 0.5, rows.1 as f64 + 0.5));
+    // Points lie a third of a pixel from its centre.
+    let from = lower(higher((from - 0.4).ceil(), columns.0 as f64), (columns.1 + 1) as f64);
+    let to = lower(higher((to + 0.4).floor(), -1.0), columns.1 as f64);
+    // SAFETY: both lie between -1 and a column after the last.
+    let (from, to) = unsafe { (from.to_int_unchecked::<i32>(), to.to_int_unchecked::<i32>()) };
+    if to < 0 { (1, 0) } else { (from as usize, to as usize) }
+}
+
+/// An edge as a line, seen from the end with the lower number: on which side of it a point lies.
+#[derive(Clone, Copy)]
+struct Side {
+    from: (f64, f64),
+    x: f64,
+    y: f64,
+}
+
+impl Side {
+    /// The edge from `a` to `b` of a triangle that lies on its left; if `turn` is -1, on its right.
+    #[inline(always)]
+    fn new(a: &Corner, b: &Corner, turn: f64) -> Self {
+        let (a, b, turn) = if a.number <= b.number { (a, b, turn) } else { (b, a, -turn) };
+        Self { from: (a.x_px, a.y_px), x: turn * (b.x_px - a.x_px), y: turn * (b.y_px - a.y_px) }
+    }
+
+    /// At least 0 on the triangle's side.
+    #[inline(always)]
+    fn of(&self, x: f64, y: f64) -> f32 {
+        (self.x * (y - self.from.1) - self.y * (x - self.from.0)) as f32
+    }
+}
+
+/// What a linear function adds from the centre of a pixel to its points.
+#[derive(Clone, Copy)]
+struct Offsets([f32; PLACES]);
+
+impl Offsets {
+    #[inline(always)]
+    fn new(per_column: f64, per_row: f64) -> Self {
+        let (per_column, per_row) = (per_column as f32, per_row as f32);
+        let mut offsets = [0.0; PLACES];
+        for i in 0..PLACES {
+            offsets[i] = per_column * COLUMNS[i] + per_row * ROWS[i];
+        }
+        Self(offsets)
+    }
+}
+
+/// Where the points of a pixel are, from its centre.
+const COLUMNS: [f32; PLACES] = off_centre(1);
+const ROWS: [f32; PLACES] = off_centre(FINE);
+
+const fn off_centre(step: usize) -> [f32; PLACES] {
+    let mut at = [0.0; PLACES];
+    let mut i = 0;
+    while i < POINTS {
+        at[i] = ((i / step % FINE) as f32 - 1.0) / FINE as f32;
+        i += 1;
+    }
+    at
+}
+
+/// Whether a bit of a row is set, from one column up to another.
+#[inline(always)]
+fn any(words: &[u64], (first, last): (usize, usize)) -> bool {
+    let (from, to) = (first / 64, last / 64);
+    let (low, high) = (u64::MAX << (first % 64), u64::MAX >> (63 - last % 64));
+    if from == to {
+        return words[from] & low & high != 0;
+    }
+    let mut some = (words[from] & low) | (words[to] & high);
+    for word in &words[from + 1..to] {
+        some |= word;
+    }
+    some != 0
+}
+
+struct Touched<'a> {
+    blocks: &'a [Block],
+    by_centres: (f64, f64),
+    top: f64,
+    press_px: f64,
+}
+
+impl Kernel for Touched<'_> {
+    type Output = (f64, f64);
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> (f64, f64) {
+        let Self { blocks, by_centres, top, press_px } = self;
+        let (mut sums, mut counts) = ([0.0; SIDE], [0.0; SIDE]);
+        for block in blocks {
+            let (mut sum, mut count) = ([0.0; SIDE], [0.0; SIDE]);
+            for points in &block.points {
+                for i in 0..SIDE {
+                    let below = f64::from(points[i]) - top;
+                    let touches = below + press_px > 0.0;
+                    sum[i] += if touches { below } else { 0.0 };
+                    count[i] += if touches { 1.0 } else { 0.0 };
+                }
+            }
+            for i in 0..SIDE {
+                let below = f64::from(block.centres[i]) - top;
+                let touches = below + press_px > 0.0;
+                let (centre, one) = if touches { (below, 1.0) } else { (0.0, 0.0) };
+                let weight = f64::from(block.weights[i]);
+                sums[i] += weight * (sum[i] / POINTS as f64 - centre);
+                counts[i] += weight * (count[i] / POINTS as f64 - one);
+            }
+        }
+        // From left to right, whatever the vector unit.
+        (by_centres.0 + sums.iter().sum::<f64>(), by_centres.1 + counts.iter().sum::<f64>())
+    }
+}
+
+struct Write<'a> {
+    steps: &'a Steps,
+    lift: f64,
+    depth_px: &'a mut Plane,
+}
+
+impl Kernel for Write<'_> {
+    type Output = ();
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let Self { steps, lift, depth_px } = self;
+        for (block, pixels) in steps.blocks.iter().zip(steps.pixels.chunks(SIDE)) {
+            let mut sum = [0.0; SIDE];
+            for points in &block.points {
+                for i in 0..SIDE {
+                    sum[i] += higher(f64::from(points[i]) + lift, 0.0);
+                }
+            }
+            for (i, &pixel) in pixels.iter().enumerate() {
+                let at = &mut depth_px.values[pixel as usize];
+                let (centre, weight) = (f64::from(*at), f64::from(block.weights[i]));
+                *at = (centre + weight * (sum[i] / POINTS as f64 - centre)) as f32;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn most(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 struct Find<'a> {
@@ -246,7 +407,6 @@ impl Kernel for Find<'_> {
         for y in area.y.0.max(1) - 1..(area.y.1 + 1).min(h) {
             let (above, below) = (depth_px.row(y.max(1) - 1), depth_px.row((y + 1).min(h - 1)));
             let (here, above, below) = (&depth_px.row(y)[x0..x1], &above[x0..x1], &below[x0..x1]);
-            let most = |a: f32, b: f32| if a > b { a } else { b };
             for x in 0..n {
                 largest[x] = most((here[x] - above[x]).abs(), (here[x] - below[x]).abs());
             }
@@ -256,26 +416,21 @@ impl Kernel for Find<'_> {
             for x in 0..n - 1 {
                 largest[x] = most(largest[x], (here[x] - here[x + 1]).abs());
             }
-            if !largest.iter().fold(false, |some, &l| some | (l > SLOPE_PX)) {
-                continue;
-            }
-            for (i, &l) in largest.iter().enumerate() {
-                if l > SLOPE_PX {
-                    let x = x0 + i;
-                    steps.bits[y * steps.words + x / 64] |= 1 << (x % 64);
-                    let span = &mut steps.spans[y];
-                    *span = (span.0.min(x as u32), x as u32);
-                    let weight = ((l - SLOPE_PX) / (STEP_PX - SLOPE_PX)).min(1.0);
-                    let heights = [f32::NEG_INFINITY; POINTS];
-                    steps.pixels.push(SteppedPixel { pixel: y * w + x, weight, heights });
+            for (c, chunk) in largest.chunks(16).enumerate() {
+                if !chunk.iter().fold(false, |some, &e| some | (e > SLOPE_PX)) {
+                    continue;
+                }
+                for (i, &e) in chunk.iter().enumerate() {
+                    if e > SLOPE_PX {
+                        let x = x0 + 16 * c + i;
+                        steps.bits[y * steps.words + x / 64] |= 1 << (x % 64);
+                        steps.coarse[y / COARSE * steps.words + x / 64] |= 1 << (x % 64);
+                        steps.pixels.push((y * w + x) as u32);
+                        steps.weights.push(((e - SLOPE_PX) / (STEP_PX - SLOPE_PX)).min(1.0));
+                    }
                 }
             }
         }
         steps.largest = memory;
-        let mut count = 0;
-        for (start, bits) in steps.starts.iter_mut().zip(&steps.bits) {
-            *start = count;
-            count += bits.count_ones();
-        }
     }
 }
