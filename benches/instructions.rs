@@ -151,6 +151,7 @@ fn expected_label(runs: u64) {
         step_s: 0.104,
         covariates: Covariates::default(),
         max_pull_force_n: 15.0,
+        zero_shift_n: 0.0,
         trace: None,
     };
     let measured = MeasuredPulls {

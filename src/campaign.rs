@@ -190,6 +190,7 @@ fn pull(project: &Project, scenario: &Scenario, index: u64) -> Option<MeasuredPu
         step_s: scenario.pull.step_s,
         covariates: scenario.covariates.clone(),
         max_pull_force_n: (pulled.label.max_pull_force_n * 1e3).round() / 1e3,
+        zero_shift_n: 0.0,
         trace: Some(stored(&project.twin, scenario, &pulled.trace)),
     })
 }

@@ -89,6 +89,7 @@ pub fn effect_curve(
             step_s: 0.104,
             covariates: Covariates::default(),
             max_pull_force_n: 0.0,
+            zero_shift_n: 0.0,
             trace: None,
         };
         sweep.column().set_number(&mut pull.edit(), *x);

@@ -2,6 +2,7 @@
 
 mod bags;
 mod suspects;
+mod zero;
 
 pub use suspects::Suspects;
 
@@ -138,6 +139,7 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
         pulls.pulls.iter_mut().for_each(|pull| pull.trace = pull.trace.as_ref().map(thinned));
         fewer_traces(&mut pulls.pulls, &mut notes);
     }
+    notes.extend(zero::without_shift(&mut pulls));
     Ok(LoadedPulls { pulls, notes })
 }
 
@@ -304,6 +306,7 @@ fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     if let Some(campaign) = rig {
         as_made(&mut pulls, campaign);
     }
+    notes.extend(zero::without_shift(&mut pulls));
     fewer_traces(&mut pulls.pulls, &mut notes);
     Ok(LoadedPulls { pulls, notes })
 }
@@ -388,6 +391,7 @@ fn measured(
     Some(MeasuredPull {
         id: sample.index.to_string(),
         max_pull_force_n: sample.max_pull_force_n?,
+        zero_shift_n: 0.0,
         grip_pose: sample.grip_pose as usize,
         grip_force_n: sample.grip_force_n,
         increment_n: sample.force_increment_n,
@@ -411,9 +415,8 @@ mod tests {
     use super::*;
     use gripgen_twin::{Covariates, TraceRow};
 
-    #[test]
-    fn of_many_traces_some_are_used_and_all_of_a_few() {
-        let pull = |i: usize| MeasuredPull {
+    pub(super) fn pull(i: usize) -> MeasuredPull {
+        MeasuredPull {
             id: i.to_string(),
             part: "p".into(),
             grip_pose: 0,
@@ -423,8 +426,13 @@ mod tests {
             step_s: 0.1,
             covariates: Covariates::default(),
             max_pull_force_n: 3.0,
+            zero_shift_n: 0.0,
             trace: Some(PullTrace::default()),
-        };
+        }
+    }
+
+    #[test]
+    fn of_many_traces_some_are_used_and_all_of_a_few() {
         for (n, kept) in [(5, 5), (24, 24), (25, 24), (60, 24), (120, 30), (1000, 250)] {
             let (mut pulls, mut notes): (Vec<_>, Vec<_>) = ((0..n).map(pull).collect(), vec![]);
             fewer_traces(&mut pulls, &mut notes);

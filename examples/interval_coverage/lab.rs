@@ -164,6 +164,7 @@ pub fn campaign(world: &World, plan: &Plan, seed: u64) -> MeasuredPulls {
             step_s,
             covariates: Covariates { pull_index: i as u64, time_s, ..Covariates::default() },
             max_pull_force_n: label,
+            zero_shift_n: 0.0,
             trace: (plan.trace_every > 0 && i % plan.trace_every == 0).then_some(trace),
         });
     }

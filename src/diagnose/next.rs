@@ -260,6 +260,7 @@ fn as_measured(campaign: &MeasuredPulls, planned: &[PlannedPull], after_rest: &[
             step_s: p.step_time_s,
             covariates,
             max_pull_force_n: 2.0 * p.grip_force_n,
+            zero_shift_n: 0.0,
             trace: None,
         }
     };

@@ -132,6 +132,7 @@ pub(crate) fn read_table(
             step_s: DEFAULT_STEP_S,
             covariates: Covariates::default(),
             max_pull_force_n: 0.0,
+            zero_shift_n: 0.0,
             trace: None,
         };
         for (place, column) in columns.iter_mut().enumerate() {

@@ -26,6 +26,7 @@ mod rest;
 mod robot;
 mod run;
 pub mod stop;
+mod zero;
 
 pub use config::{RigConfig, rig_schema};
 pub use devices::Devices;

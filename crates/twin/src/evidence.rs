@@ -16,6 +16,7 @@ mod zero;
 
 pub use beside::{GripForceEvidence, WrenchRow};
 pub use budget::LabelBudget;
+pub use zero::ZERO_SHIFT;
 
 use crate::{PullTrace, Scenario, SlipLabel, Twin};
 use signal::Signal;

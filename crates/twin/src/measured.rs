@@ -29,8 +29,11 @@ pub struct MeasuredPull {
     pub step_s: f64,
     /// Circumstances; those that nobody wrote down have their defaults.
     pub covariates: Covariates,
-    /// The label.
+    /// The label, less [`zero_shift_n`](Self::zero_shift_n).
     pub max_pull_force_n: f64,
+    /// How far the sensor's zero had moved along the pull when the jaws slipped, from readings without a load before and after;
+    /// readings of the trace still have it. 0 where nobody read them.
+    pub zero_shift_n: f64,
     /// The force over time. Rows before time 0 are the no-load reading.
     pub trace: Option<PullTrace>,
 }
@@ -157,6 +160,7 @@ mod tests {
             step_s: 0.1,
             covariates: Covariates { pull_index: i, session: session.into(), time_s, ..Default::default() },
             max_pull_force_n: 3.0,
+            zero_shift_n: 0.0,
             trace: None,
         };
         let mut measured = MeasuredPulls {

@@ -62,13 +62,14 @@ impl Context<'_> {
         let observation = &self.observations[k];
         let (slip_s, limit) = (observation.slip_s?, observation.limit_n?);
         let no_load_n = observation.no_load_n.map_or(0.0, |b| b.0);
-        let trace = self.data.measured.pulls[observation.row].trace.as_ref()?;
+        let pull = &self.data.measured.pulls[observation.row];
+        let (trace, shift_n) = (pull.trace.as_ref()?, pull.zero_shift_n);
         let pulled: Vec<_> = trace.rows().filter(|r| r.time_s >= 0.0 && r.time_s < slip_s).collect();
         let start_m = pulled.first()?.displacement_m;
         let step = pulled.len().div_ceil(ROWS).max(1);
         let rows = pulled.iter().step_by(step);
         let rows: Vec<(f64, f64)> =
-            rows.map(|r| (r.measured_force_n - no_load_n, r.displacement_m - start_m)).collect();
+            rows.map(|r| (r.measured_force_n - no_load_n - shift_n, r.displacement_m - start_m)).collect();
         let cells = self.predictor.contact(&self.base, observation.row);
         let limit_n = limit.value_n - no_load_n;
         (rows.len() >= 8 && !cells.is_empty() && limit_n > 6.0 * self.base.noise_n).then_some(Bent {

@@ -259,7 +259,9 @@ impl<'a> Context<'a> {
         let traces: Vec<SlipTrace> = slipped.iter().map(|(_, _, t)| t.clone()).collect();
         let Some(slips) = read_slips(&traces, rig) else { return };
         for ((k, no_load_n, _), limit) in slipped.iter().zip(&slips.limits) {
-            let reading = SlipLimit { value_n: limit.value_n + no_load_n, ..*limit };
+            // As the label, without what the zero moved since it was read.
+            let shift_n = self.data.measured.pulls[self.observations[*k].row].zero_shift_n;
+            let reading = SlipLimit { value_n: limit.value_n + no_load_n - shift_n, ..*limit };
             self.observations[*k].limit_n = Some(reading);
         }
         if slipped.len() >= 3 {

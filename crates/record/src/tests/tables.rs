@@ -39,6 +39,7 @@ fn campaign(seed: u64) -> MeasuredPulls {
             step_s: 0.104,
             covariates: Covariates::default(),
             max_pull_force_n: random.uniform() * 30.0 - 1.0,
+            zero_shift_n: 0.0,
             trace: None,
         };
         let settings = COLUMNS.iter().filter(|c| c.in_table == InTable::Setting && starts);

@@ -7,6 +7,7 @@ use super::robot::RobotRow;
 pub use super::run::LogLine;
 use super::run::{Experiment, PROGRAM, RigEvent};
 use super::stop::Stopped;
+use super::zero::{self, Unloaded};
 use crate::gcl::{GclCommand, GripState, Query};
 use crate::program::{PRELOAD_S, Phase, SETTLE_S, StopReason};
 use gripgen_twin::{Campaign, PerJaw, PlannedPull, PullTrace, SlipLabel, TactileImage, TraceRow, slip_label};
@@ -68,6 +69,8 @@ pub struct ExecutedPull {
     pub preload_n: f64,
     /// Readings along the pull after it, jaws open and before anything moves or is zeroed again.
     pub no_load_after_n: Vec<f64>,
+    /// How far the sensor's zero had moved along the pull when the jaws slipped; `None` without a label or without readings.
+    pub zero_shift_n: Option<f64>,
     /// What the gripper said of the force of a jaw while it held, N.
     pub reported_force_n: Option<f64>,
     /// What is wrong with it beside its forces, a sentence each: its label is suspect.
@@ -439,15 +442,22 @@ impl Experiment<'_> {
         }
         let mut log = std::mem::take(&mut self.log);
         log.sort_by_key(|line| line.at);
-        let no_load_after_n = match parts.no_load_after_s {
-            Some((from_s, to_s)) => self
-                .rows
+        let unloaded = |within: Option<(f64, f64)>| {
+            let (from_s, to_s) = within.unwrap_or((0.0, 0.0));
+            self.rows
                 .iter()
-                .filter(|row| row.timestamp_s >= from_s && row.timestamp_s < to_s)
-                .map(|row| self.signed(planned, row.force[2]))
-                .collect(),
-            None => Vec::new(),
+                .filter(move |row| row.timestamp_s >= from_s && row.timestamp_s < to_s)
+                .map(|row| (row.timestamp_s, self.signed(planned, row.force[2])))
         };
+        let zero_shift_n = match &outcome {
+            PullOutcome::Labelled(label) => zero::shift_n(
+                &Unloaded::of(unloaded(parts.no_load_s)),
+                &Unloaded::of(unloaded(parts.no_load_after_s)),
+                robot_time_s + label.slip_time_s,
+            ),
+            _ => None,
+        };
+        let no_load_after_n = unloaded(parts.no_load_after_s).map(|(_, force_n)| force_n).collect();
         let without = [parts.no_load_s, parts.no_load_after_s];
         let rows = thinned(std::mem::take(&mut self.rows), parts.run, without);
         ExecutedPull {
@@ -463,6 +473,7 @@ impl Experiment<'_> {
             unix_s,
             preload_n: parts.preload_n,
             no_load_after_n,
+            zero_shift_n,
             reported_force_n: parts.reported_force_n,
             doubts: parts.doubts,
             rows_unix_s: rows.iter().map(|row| self.clock.unix_s(row.at)).collect(),

@@ -3,6 +3,10 @@
 use super::signal::{Signal, mean};
 use super::{Finding, FindingKind, LabelBudget, LabelEvidence, SIGMAS, zero_cap_n};
 
+/// Column of how far the sensor's zero has moved along the pull when the jaws slip, N, from readings without a load before and
+/// after. It is no covariate: whoever reads measured pulls takes it off the label.
+pub const ZERO_SHIFT: &str = "zero_shift_n";
+
 /// Fewest readings that make a zero.
 const READINGS: usize = 3;
 

@@ -1,11 +1,11 @@
 //! From what the rig measured to what the recorder stores.
 
 use gripgen::record::{RigLog, RigLogEvent, RigPull, RigResult, RigStream};
-use gripgen::twin::evidence::{Expected, GripForceEvidence, LabelEvidence, WrenchRow, judge};
+use gripgen::twin::draw::Drawn;
+use gripgen::twin::evidence::{Expected, GripForceEvidence, LabelEvidence, WrenchRow, ZERO_SHIFT, judge};
 use gripgen::twin::{Campaign, Covariates, Jaw, PlannedPull, PullKind, PullSettings, Scenario};
 use gripgen_rig::experiment::pull::{ExecutedPull, FrameStamp};
 use gripgen_rig::experiment::{PullOutcome, RigConfig, RobotRow};
-use std::collections::BTreeMap;
 
 /// Where a pull stands in its campaign.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +32,7 @@ pub fn rig_pull(
         (PullOutcome::Labelled(label), Some(reason)) => RigResult::Suspect { label: *label, reason },
         (outcome, _) => result_of(outcome),
     };
-    let scenario = scenario(config, campaign, standing, &m.planned, m.dwell_s);
+    let scenario = scenario(config, campaign, standing, &m);
     let mut streams = vec![robot(&m.rows, &m.rows_unix_s)];
     streams.extend(Jaw::BOTH.map(|jaw| camera(jaw, &m)).into_iter().flatten());
     let mut events: Vec<RigLogEvent> = Vec::with_capacity(m.log.len() + 2);
@@ -133,6 +133,24 @@ pub const EVIDENCE: &str = "evidence";
 /// So long before the pull the jaws have closed and nothing pulls yet.
 const CLAMPED_S: f64 = 0.3;
 
+/// What was measured beside the label and may explain it: the shift of the zero, the gripper's word less what was asked, what the
+/// jaws press across the pull. Readers take it as columns.
+fn covariates_beside(config: &RigConfig, m: &ExecutedPull) -> Vec<(&'static str, f64)> {
+    let across_n = |row: &&RobotRow| config.robot.force_gain.abs() * row.force[0].hypot(row.force[1]);
+    let clamped = clamped(m);
+    let lateral_n = clamped.iter().map(across_n).sum::<f64>() / clamped.len().max(1) as f64;
+    let off_n = m.reported_force_n.map(|reported_n| reported_n - m.planned.grip_force_n);
+    let lateral_n = (!clamped.is_empty()).then_some(lateral_n);
+    let all = [(ZERO_SHIFT, m.zero_shift_n), ("grip_force_off_n", off_n), ("lateral_n", lateral_n)];
+    all.into_iter().filter_map(|(name, x)| Some((name, x.filter(|x| x.is_finite())?))).collect()
+}
+
+/// Readings of jaws that have closed while nothing pulls yet.
+fn clamped(m: &ExecutedPull) -> Vec<&RobotRow> {
+    let before = |row: &&RobotRow| (-CLAMPED_S..0.0).contains(&(row.timestamp_s - m.robot_time_s));
+    m.rows.iter().filter(before).collect()
+}
+
 /// What was measured beside the label: the gripper's word, the zero before and after, what was zeroed away, what the jaws press across the pull.
 fn beside(config: &RigConfig, m: &ExecutedPull) -> String {
     let mean = |values: Vec<f64>| match values.len() {
@@ -143,8 +161,7 @@ fn beside(config: &RigConfig, m: &ExecutedPull) -> String {
     let unloaded = m.trace.as_ref().map_or(Vec::new(), |trace| {
         trace.rows().filter(|row| row.time_s < 0.0).map(|row| row.measured_force_n).collect()
     });
-    let clamped: Vec<&RobotRow> =
-        m.rows.iter().filter(|row| (-CLAMPED_S..0.0).contains(&(row.timestamp_s - m.robot_time_s))).collect();
+    let clamped = clamped(m);
     let of_clamped = |of: &dyn Fn(&RobotRow) -> f64| mean(clamped.iter().map(|row| of(row)).collect());
     format!(
         "reported_grip_force_n {}, no_load_before_n {}, no_load_after_n {}, zeroed_away_z_n {}, lateral_x_n {}, lateral_y_n {}, \
@@ -164,13 +181,8 @@ fn beside(config: &RigConfig, m: &ExecutedPull) -> String {
 /// Source of the event that ties the clocks of a pull together.
 pub const START: &str = "start of the pull";
 
-fn scenario(
-    config: &RigConfig,
-    campaign: &Campaign,
-    standing: Standing,
-    planned: &PlannedPull,
-    dwell_s: f64,
-) -> Scenario {
+fn scenario(config: &RigConfig, campaign: &Campaign, standing: Standing, m: &ExecutedPull) -> Scenario {
+    let planned = &m.planned;
     let (group, repetition) = group_of(campaign, standing.index as usize);
     let thousandth = |x: f64| (x * 1e3).round() * 1e-3;
     Scenario {
@@ -184,7 +196,7 @@ fn scenario(
         covariates: Covariates {
             pull_index: standing.made,
             time_s: thousandth(standing.time_s),
-            dwell_s: thousandth(dwell_s),
+            dwell_s: thousandth(m.dwell_s),
             ..planned.covariates()
         },
         pull: PullSettings {
@@ -198,7 +210,10 @@ fn scenario(
             max_time_s: config.limits.pull_time_s,
             label_tolerance_n: campaign.label_tolerance_n,
         },
-        drawn: BTreeMap::new(),
+        drawn: covariates_beside(config, m)
+            .into_iter()
+            .map(|(name, x)| (name.into(), Drawn::Number(thousandth(x))))
+            .collect(),
     }
 }
 
