@@ -241,3 +241,30 @@ impl Drop for Heart {
         self.stop();
     }
 }
+
+/// Of readings that no label depends on, one in so many is recorded, and all from so long before the pull.
+const ONE_IN: usize = 10;
+const BEFORE_S: f64 = 0.5;
+
+/// Readings that are recorded: all of the pull, of the moment before it and of the sensor without a load; of the way there and back,
+/// and of the dwell, one in so many.
+pub(super) fn thinned(
+    rows: Vec<RobotRow>,
+    run: Option<i32>,
+    without_s: [Option<(f64, f64)>; 2],
+) -> Vec<RobotRow> {
+    let begins_s = rows.iter().find(|row| run.is_some_and(|run| row.phase_of(run) == Some(Phase::Pulling)));
+    let begins_s = begins_s.map_or(f64::INFINITY, |row| row.timestamp_s);
+    let matters = |row: &RobotRow| {
+        let phase = run.and_then(|run| row.phase_of(run));
+        let before = row.timestamp_s > begins_s - BEFORE_S && row.timestamp_s < begins_s;
+        let within = |(from_s, to_s): &(f64, f64)| row.timestamp_s >= *from_s && row.timestamp_s < *to_s;
+        let without = without_s.iter().flatten().any(within);
+        before || without || matches!(phase, Some(Phase::Pulling | Phase::Braking))
+    };
+    rows.into_iter()
+        .enumerate()
+        .filter(|(i, row)| i % ONE_IN == 0 || matters(row))
+        .map(|(_, row)| row)
+        .collect()
+}
