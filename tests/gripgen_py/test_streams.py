@@ -121,6 +121,8 @@ def test_threads_wait_for_a_slow_reader_and_end_with_it():
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_ends_a_stream():
     code = (
+        # Whoever runs in the background of a shell has inherited that Ctrl-C is ignored.
+        "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "import gripgen as gg\n"
         f"s = gg.stream({CONFIG!r}, batch_size=10**6, set={{**{SMALL!r}, 'design': 'random', 'repetitions': 1, 'samples': 10**6}})\n"
         "print('begun', flush=True)\n"
