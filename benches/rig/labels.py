@@ -18,31 +18,17 @@ import threading
 from collections import Counter
 from pathlib import Path
 
+from served import Rig
+
 FORCES_N = [10, 15, 20, 30, 40]
 PARTS = ["gear", "long_shaft", "ball_bearing", "roller_bearing"]
 
 
-class Rig:
-    """`gripgen rig serve` on ports of its own; ends with the block."""
+class Labelled(Rig):
+    """A rig whose friction does not scatter, that makes one pull at a time."""
 
-    def __init__(self, gripgen, work):
-        self.gripgen, self.file = gripgen, work / "rig.toml"
-        still = [x for part in PARTS for x in ("--set", f"parts.{part}.scatter=0")]
-        command = [gripgen, "rig", "serve", "--speed", "20", "--any-ports", "--faults", "--write-rig", self.file, "--force", *still]
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen([str(c) for c in command], stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
-        assert self.process.stdout.readline().startswith("ready")
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.terminate()
-        self.process.wait()
-
-    def fault(self, line):
-        self.process.stdin.write(line + "\n")
-        self.process.stdin.flush()
+    def __init__(self, gripgen, folder):
+        super().__init__(gripgen, folder, 20, [x for part in PARTS for x in ("--set", f"parts.{part}.scatter=0")])
 
     def pull(self, part, force_n, out, before="", after=""):
         """One pull; `before` is a fault until the jaws close, `after` from then on. Status, reason, label."""
@@ -87,7 +73,7 @@ def main():
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
     rng, rows, truth = random.Random(options.seed), [], {}
-    with Rig(options.gripgen, options.work) as rig:
+    with Labelled(options.gripgen, options.work) as rig:
         for part in PARTS:
             for force_n in FORCES_N:
                 truth[part, force_n] = rig.pull(part, force_n, options.work / "run")

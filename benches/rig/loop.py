@@ -4,7 +4,7 @@
 
 Each run serves a virtual rig of its own with a lag of force mode of up to 0.2 s and a zero that drifts, which are a nuisance and no effect of the
 grip, rehearses, pulls the campaign of 48 pulls that `gripgen campaign` plans, and diagnoses it. Every other rig has an undeclared effect. Names that no
-design tells apart count as right (`RIGHT`). Where something is hidden, `compare` gives the error on 24 pulls that no twin has seen, before and after.
+design tells apart count as right (`HIDDEN`). Where something is hidden, `compare` gives the error on 24 pulls that no twin has seen, before and after.
 One line of JSON a run, appended, so that a run can be continued. Needs no package. `docs/loop/rig.md` has the figures of one run.
 """
 
@@ -15,6 +15,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
+from served import Rig
+
 SPEED = 50
 # What is hidden, and the names under which it counts as found: those that labels of one campaign do not tell apart.
 HIDDEN = {
@@ -23,29 +25,6 @@ HIDDEN = {
     "wear": ('{{name="wear", depth={depth:.3f}, n0=20}}', {"wear", "conditioning"}),
     "rate_dependence": ('{{name="rate_dependence", k={k:.3f}}}', {"rate_dependence"}),
 }
-
-
-class Rig:
-    """`gripgen rig serve` on ports of its own; ends with the block."""
-
-    def __init__(self, gripgen, folder, seed, effects):
-        self.file = folder / "rig.toml"
-        command = [gripgen, "rig", "serve", "--speed", SPEED, "--any-ports", "--faults", "--seed", seed, "--write-rig", self.file, "--force"]
-        command += ["--set", f"effects=[{effects}]"] if effects else []
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen([str(c) for c in command], stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
-        assert self.process.stdout.readline().startswith("ready")
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.terminate()
-        self.process.wait()
-
-    def fault(self, line):
-        self.process.stdin.write(line + "\n")
-        self.process.stdin.flush()
 
 
 def drawn(rng, hidden):
@@ -72,7 +51,8 @@ def one(gripgen, folder, number, drift_n_min):
         return done
 
     try:
-        with Rig(gripgen, folder, number, line["effects"]) as rig:
+        hide = ["--set", f"effects=[{line['effects']}]"] if hidden else []
+        with Rig(gripgen, folder, SPEED, ["--seed", number, *hide]) as rig:
             rig.fault(f"force-lag {lag_s}")
             rig.fault(f"drift {drift_n_min}")
             patient = ["--set", "limits.robot_silence_s=1.0", "--set", "limits.robot_gap_s=1.0", "--set", "images.frame_s=5.0"]

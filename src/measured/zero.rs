@@ -1,12 +1,14 @@
 //! A zero of the force sensor that moves during a pull is measured with it, and taken off its label.
 
 use gripgen_twin::evidence::ZERO_SHIFT;
-use gripgen_twin::{MeasuredPulls, Values};
+use gripgen_twin::{ExtraColumn, MeasuredPulls, Values};
 
 /// Takes the shift of the sensor's zero off the labels. A column of that name is then no covariate any more: what is known of a
 /// pull needs no cause. Returns a remark where it matters.
 pub(super) fn without_shift(measured: &mut MeasuredPulls) -> Option<String> {
-    let at = measured.extra.iter().position(|column| column.name == ZERO_SHIFT)?;
+    let numbers =
+        |column: &ExtraColumn| column.name == ZERO_SHIFT && matches!(column.values, Values::Numbers(_));
+    let at = measured.extra.iter().position(numbers)?;
     let Values::Numbers(shifts_n) = measured.extra.remove(at).values else { return None };
     let mut most_n = 0.0_f64;
     for (pull, shift_n) in measured.pulls.iter_mut().zip(shifts_n) {
@@ -31,7 +33,6 @@ const WORTH_A_WORD_N: f64 = 0.1;
 mod tests {
     use super::*;
     use crate::measured::tests::pull;
-    use gripgen_twin::ExtraColumn;
 
     fn measured(extra: Vec<ExtraColumn>) -> MeasuredPulls {
         MeasuredPulls {
@@ -58,5 +59,9 @@ mod tests {
         let mut still = measured(vec![column(ZERO_SHIFT, vec![0.01, -0.02, 0.0])]);
         assert_eq!(without_shift(&mut still), None);
         assert_eq!(without_shift(&mut measured(vec![])), None);
+        // Words under that name are somebody's own column.
+        let words = ExtraColumn { name: ZERO_SHIFT.into(), values: Values::Words(vec!["small".into(); 3]) };
+        let mut spoken = measured(vec![words.clone()]);
+        assert_eq!((without_shift(&mut spoken), spoken.extra), (None, vec![words]));
     }
 }
