@@ -78,6 +78,11 @@ fn serve(server: &Server, state: &Mutex<State>, port: u16) {
         // Who asked may be gone.
         let _ = request.respond(answer);
     }
+    // Who asked while the command ended is answered like everybody before; without this the library would say 500.
+    while let Ok(Some(request)) = server.try_recv() {
+        let answer = answer(&request, state, port);
+        let _ = request.respond(answer);
+    }
 }
 
 fn answer(request: &Request, state: &Mutex<State>, port: u16) -> Answer {
