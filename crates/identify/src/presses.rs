@@ -18,6 +18,7 @@ mod search;
 #[cfg(test)]
 mod tests;
 mod unnamed;
+mod whole;
 
 pub use predict::{ActingEffect, PRESS_ZONES, PredictPresses, PressPixels};
 pub use score::PressTrial;
@@ -86,9 +87,10 @@ pub fn diagnose_presses(
     }
     let mut observed = Observed::new(predictor);
     let candidates = candidates(&data.known);
-    let found = search(&mut observed, &data.covariates, &candidates, data.press_gain_sd, progress);
+    let mut found = search(&mut observed, &data.covariates, &candidates, data.press_gain_sd, progress);
     progress(0.97, "whole frames");
-    Answer { data, observed: &observed, found }.diagnosed()
+    let errors = whole::borne_out(&observed, &mut found);
+    Answer { data, observed: &observed, found, errors }.diagnosed()
 }
 
 /// The answer where too few presses show a contact; `visible`: how many do.

@@ -7,6 +7,7 @@ use super::power::would_have_seen;
 use super::score::hash;
 use super::search::Found;
 use super::unnamed::{PressCovariate, PressValues};
+use super::whole::FrameErrors;
 use super::{PressData, PressDiagnosis};
 use crate::plain::left;
 use crate::{
@@ -21,15 +22,7 @@ pub(super) struct Answer<'a> {
     pub(super) data: &'a PressData,
     pub(super) observed: &'a Observed<'a>,
     pub(super) found: Found,
-}
-
-/// The error of each press over its whole frame.
-struct FrameErrors {
-    before: Vec<f64>,
-    /// Held out in folds that were drawn.
-    after: Vec<f64>,
-    /// Held out in blocks of neighbours.
-    after_blocks: Vec<f64>,
+    pub(super) errors: FrameErrors,
 }
 
 /// A diagnosis that says nothing yet.
@@ -46,7 +39,7 @@ pub(super) fn bare(data: &PressData) -> Diagnosis {
 
 impl Answer<'_> {
     pub(super) fn diagnosed(self) -> PressDiagnosis {
-        let errors = self.frame_errors();
+        let errors = &self.errors;
         let mut diagnosis = bare(self.data);
         diagnosis.effects = self.effects();
         let unknown = |(covariate, strength, p): &(String, f64, f64)| UnknownCovariate {
@@ -194,26 +187,6 @@ impl Answer<'_> {
             PressValues::Words(words) => words.iter().all(|w| *w == words[0]),
         };
         self.data.covariates.iter().filter(constant).map(|c| c.name.clone()).collect()
-    }
-
-    /// Errors over whole frames at the resolution of the images.
-    fn frame_errors(&self) -> FrameErrors {
-        let n = self.observed.count();
-        let predictor = self.observed.predictor;
-        let before = self.observed.for_each(n, |i| predictor.frame_mse(i, &[]));
-        let model = &self.found.model;
-        let scatter = &self.found.scatter.named;
-        let held_out = |folds: &[usize]| {
-            if model.acting.is_empty() && scatter.is_none() {
-                return before.clone();
-            }
-            let mut by_fold = model.by_fold(&self.found.design.weights, folds);
-            by_fold.iter_mut().for_each(|acting| *acting = self.found.scatter.beside(std::mem::take(acting)));
-            self.observed.for_each(n, |i| predictor.frame_mse(i, &by_fold[folds[i]]))
-        };
-        let after = held_out(&self.found.design.folds);
-        let after_blocks = held_out(&self.found.design.blocks);
-        FrameErrors { before, after, after_blocks }
     }
 }
 

@@ -32,7 +32,7 @@ const MAX_EFFECTS: usize = 3;
 /// Least gain, as [`MATERIAL`], of what is mentioned.
 const MIN_HINT: f64 = 0.01;
 
-/// An effect leaves each zone at most this factor worse.
+/// An effect leaves each zone at most this factor worse, and all effects together at most this factor worse than none.
 const WORSE: f64 = 1.05;
 
 /// A rival whose loss is less than this share of the gain is named beside the effect.
@@ -185,10 +185,12 @@ fn hint(name: &str, gain: f64, standard_error: f64, least: f64, base: f64) -> Op
 /// field that is fitted to what the contact is drawn wrong by is not. Presses with gains of their own say the light there.
 fn spares_zones(observed: &Observed<'_>, before: &[ActingEffect], after: &[ActingEffect]) -> bool {
     let (then, now) = (observed.zone_mse(before), observed.zone_mse(after));
+    let never = if before.is_empty() { then } else { observed.zone_mse(&[]) };
     let far = PRESS_ZONES - 1;
     let of_frame = after.last().is_some_and(|last| !is_drawn(last.spec)) && !observed.divides_gains();
     let seen_far = then[far] == 0.0 || now[far] < (1.0 - MATERIAL) * then[far];
-    (!of_frame || seen_far) && then.iter().zip(&now).all(|(then, now)| *now <= WORSE * then)
+    let spares = |ground: &[f64]| ground.iter().zip(&now).all(|(then, now)| *now <= WORSE * then);
+    (!of_frame || seen_far) && spares(&then) && spares(&never)
 }
 
 /// Without those effects whose loss is not felt any more.
