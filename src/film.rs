@@ -157,6 +157,7 @@ impl Film {
             contact_force_n: state.contact_force_n,
             displacement_m: state.displacement_m,
             pull_px: [pull.x, pull.y],
+            camera: None,
             image: finish(sensor, Some(&change), None),
             cell_of_px: map.of_contact(depth, [moved_m.x / a, moved_m.y / a]),
             depth_um: depth.values.iter().map(|&d| (d * um_per_px + 0.5) as u16).collect(),

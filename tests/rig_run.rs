@@ -106,6 +106,7 @@ fn rig_pull(twin: &Simulator, index: u64, made: &MeasuredPull, images: bool) -> 
         images: grip,
         rest,
         trace: Some(trace),
+        film: None,
         log: RigLog { streams: vec![stream], events: vec![] },
     }
 }

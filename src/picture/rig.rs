@@ -2,11 +2,12 @@
 
 use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
 use super::colours::{INK, PAPER, SOFT_INK};
+use super::film::{STRIP_HEIGHT, draw_strip};
 use super::layout::{
     CAPTION, CURVE_HEIGHT, HEADER, IMAGE, MARGIN, draw_curve, fit, frame, pixel, second_line,
 };
 use super::sheet::heading;
-use gripgen_record::Record;
+use gripgen_record::{Film, Record};
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 
 /// Difference of a pixel in grey levels to what is drawn of it: a press changes few levels.
@@ -15,10 +16,15 @@ const GAIN: i32 = 2;
 const MIDDLE: i32 = 128;
 
 /// A PNG of a measured pull: a row per jaw, then the curve.
-pub(super) fn rig_picture(record: &Record, rest: Option<&PerJaw<TactileImage>>) -> Vec<u8> {
+pub(super) fn rig_picture(
+    record: &Record,
+    rest: Option<&PerJaw<TactileImage>>,
+    film: Option<&Film>,
+) -> Vec<u8> {
     let row = CAPTION + IMAGE.1 + MARGIN;
     let width = 3 * (IMAGE.0 + MARGIN) + MARGIN;
-    let height = HEADER + 2 * row + CAPTION + CURVE_HEIGHT + MARGIN;
+    let plain = HEADER + 2 * row + CAPTION + CURVE_HEIGHT + MARGIN;
+    let height = plain + if film.is_some() { STRIP_HEIGHT } else { 0 };
     let mut canvas = Canvas::new(width, height, PAPER);
     let s = &record.sample;
     canvas.text(&heading(s), f64::from(MARGIN), 10.0, Anchor::Left, TextStyle::title(INK));
@@ -29,6 +35,9 @@ pub(super) fn rig_picture(record: &Record, rest: Option<&PerJaw<TactileImage>>) 
         top += row;
     }
     draw_curve(&mut canvas, top, width, record);
+    if let Some(film) = film {
+        draw_strip(&mut canvas, (plain, width), film);
+    }
     canvas.into_png()
 }
 
@@ -90,7 +99,7 @@ mod tests {
         let images = Some(PerJaw { left: plain(90), right: plain(220) });
         let rest = PerJaw { left: plain(60), right: plain(80) };
         let record = Record { sample, images, trace: None };
-        let found = decode_picture(&rig_picture(&record, Some(&rest))).unwrap();
+        let found = decode_picture(&rig_picture(&record, Some(&rest), None)).unwrap();
         let middle = |column: u32, row: u32| {
             let x = MARGIN + column * (IMAGE.0 + MARGIN) + IMAGE.0 / 2;
             found.pixel(x, HEADER + row * (CAPTION + IMAGE.1 + MARGIN) + CAPTION + IMAGE.1 / 2)
@@ -99,7 +108,7 @@ mod tests {
         assert_eq!([0, 1, 2].map(|i| middle(i, 0)), [grey(60), grey(90), grey(128 + 60)]);
         assert_eq!([0, 1, 2].map(|i| middle(i, 1)), [grey(80), grey(220), grey(255)], "it ends at white");
         // Without the images before the grip there is an empty frame, and no difference.
-        let found = decode_picture(&rig_picture(&record, None)).unwrap();
+        let found = decode_picture(&rig_picture(&record, None, None)).unwrap();
         let x = MARGIN + 2 * (IMAGE.0 + MARGIN) + IMAGE.0 / 2;
         let panel = found.pixel(x, HEADER + CAPTION + IMAGE.1 / 2);
         assert_eq!(panel, found.pixel(MARGIN + IMAGE.0 / 2, HEADER + CAPTION + IMAGE.1 / 2));

@@ -50,7 +50,7 @@ pub fn sample_picture(folder: &RunFolder, index: u64) -> Result<Vec<u8>, Picture
     let reader = ShardReader::open(&folder.shard_path(shard))?;
     let record = reader.record(index)?;
     if folder.info().source == RIG_SOURCE {
-        return Ok(rig_picture(&record, reader.rest(index)?.as_ref()));
+        return Ok(rig_picture(&record, reader.rest(index)?.as_ref(), reader.film(index)?.as_ref()));
     }
     let press = press_again(folder, index);
     let columns = 4;
@@ -69,7 +69,7 @@ pub fn sample_picture(folder: &RunFolder, index: u64) -> Result<Vec<u8>, Picture
     }
     draw_curve(&mut canvas, top + CAPTION + IMAGE.1 + MARGIN, width, &record);
     if let Some(film) = &film {
-        draw_strip(&mut canvas, plain, film);
+        draw_strip(&mut canvas, (plain, width), film);
     }
     Ok(canvas.into_png())
 }

@@ -1,7 +1,7 @@
 //! Films of pulls as arrays.
 
 use gripgen::record::Film;
-use gripgen::twin::{CellShear, ContactPatch, FilmFrame, SlipState};
+use gripgen::twin::{CameraStamp, CellShear, ContactPatch, FilmFrame, SlipState};
 use numpy::{PyArray, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -25,10 +25,21 @@ pub(crate) fn arrays<'py>(py: Python<'py>, film: &Film) -> PyResult<Bound<'py, P
     let depth: Vec<f32> = all().flat_map(|f| f.depth_um.iter().map(|&um| f32::from(um) * 1e-3)).collect();
     found.set_item("depth_mm", PyArray::from_vec(py, depth).reshape([frames, 2, height, width])?)?;
     let state = |f: &FilmFrame| match f.state() {
-        SlipState::Stick => 0_u8,
-        SlipState::Incipient => 1,
-        SlipState::Slip => 2,
+        Some(SlipState::Stick) => 0_u8,
+        Some(SlipState::Incipient) => 1,
+        Some(SlipState::Slip) => 2,
+        None => u8::MAX,
     };
+    let of_camera = |of: fn(&CameraStamp) -> Option<f64>| -> Vec<f64> {
+        all().map(|f| f.camera.as_ref().and_then(of).unwrap_or(f64::NAN)).collect()
+    };
+    let stamps = [
+        ("received_s", of_camera(|stamp| Some(stamp.received_s))),
+        ("device_time_s", of_camera(|stamp| stamp.device_time_s)),
+    ];
+    for (name, values) in stamps {
+        found.set_item(name, PyArray::from_vec(py, values).reshape([frames, 2])?)?;
+    }
     found.set_item("state", PyArray::from_vec(py, all().map(state).collect()).reshape([frames, 2])?)?;
     let of_cells = |of: OfCell| -> Vec<f32> {
         all()

@@ -101,7 +101,9 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
 /// The film of a sample, starting at time 0.
 fn film_from_zero(reader: &ShardReader, index: u64) -> Result<Vec<EncodedFrame>, ReadError> {
     let mut film = reader.raw_film(index)?;
-    let start_ns = film.first().map_or(0, |frame| frame.time_ns);
+    // That of a rig starts at the time of its trace already.
+    let of_rig = reader.has_topic("/rig/log");
+    let start_ns = film.first().map_or(0, |frame| if of_rig { 0 } else { frame.time_ns });
     for frame in &mut film {
         frame.time_ns -= start_ns;
         let now = Some(timestamp(frame.time_ns));

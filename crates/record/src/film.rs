@@ -5,6 +5,7 @@ use crate::film_frame::{EncodedFrame, film_topic, label_topic};
 use crate::picture::{PictureError, decode_grey, encode_grey};
 use crate::proto::gripgen_v1 as proto;
 use crate::reader::{ReadError, ShardReader, png_image, raw_image};
+use crate::rig_run::{camera_image, stamp_of};
 use gripgen_twin::config::ImageStorage;
 use gripgen_twin::{CellShear, FilmFrame, Jaw, PerJaw, SlipState, TactileImage};
 use image::ExtendedColorType;
@@ -61,11 +62,13 @@ pub fn encode_frame(
                 cell_slipped: f.cells.iter().map(|c| u8::from(c.slipped)).collect(),
                 marker_x_px: f.markers_px.iter().map(|m| m[0] as f32).collect(),
                 marker_y_px: f.markers_px.iter().map(|m| m[1] as f32).collect(),
+                camera: None,
             };
             message.set_state(match f.state() {
-                SlipState::Stick => proto::SlipState::Stick,
-                SlipState::Incipient => proto::SlipState::Incipient,
-                SlipState::Slip => proto::SlipState::Slip,
+                None => proto::SlipState::Unspecified,
+                Some(SlipState::Stick) => proto::SlipState::Stick,
+                Some(SlipState::Incipient) => proto::SlipState::Incipient,
+                Some(SlipState::Slip) => proto::SlipState::Slip,
             });
             Ok(message.encode_to_vec())
         })?,
@@ -103,8 +106,11 @@ impl ShardReader {
                 let label = proto::FilmFrame::decode(&encoded.labels[jaw][..])
                     .map_err(|e| bad(label_topic(jaw), e.to_string()))?;
                 (film.incipient_slip_s, film.whole_slip_s) = (label.incipient_slip_s, label.whole_slip_s);
-                let image =
-                    self.film_image(&encoded.image[jaw]).map_err(|problem| bad(film_topic(jaw), problem))?;
+                let image = match &label.camera {
+                    Some(camera) => camera_image(&encoded.image[jaw], camera),
+                    None => self.film_image(&encoded.image[jaw]),
+                };
+                let image = image.map_err(|problem| bad(film_topic(jaw), problem))?;
                 frame_of(&label, image).map_err(|problem| bad(label_topic(jaw), problem))
             };
             let both = PerJaw { left: read(Jaw::Left)?, right: read(Jaw::Right)? };
@@ -148,7 +154,11 @@ impl ShardReader {
 
 fn frame_of(label: &proto::FilmFrame, image: TactileImage) -> Result<FilmFrame, String> {
     let size = (image.width_px, image.height_px);
-    let grey = |png: &[u8]| decode_grey(png, size).map_err(|e| e.to_string());
+    let pixels = size.0 as usize * size.1 as usize;
+    let grey = |png: &[u8]| match label.camera {
+        Some(_) => Ok(vec![0; pixels]),
+        None => decode_grey(png, size).map_err(|e| e.to_string()),
+    };
     let cell_of_px = grey(&label.cell_png)?.into_iter().map(|v| v as u8).collect();
     let cells = label.cell_shear_mm.len();
     let counts = [label.cell_slip_mm.len(), label.cell_force_n.len(), label.cell_slipped.len()];
@@ -168,6 +178,7 @@ fn frame_of(label: &proto::FilmFrame, image: TactileImage) -> Result<FilmFrame, 
         displacement_m: label.displacement_mm * 1e-3,
         pull_px: [label.pull_x, label.pull_y],
         image,
+        camera: label.camera.as_ref().map(stamp_of),
         cell_of_px,
         depth_um: grey(&label.depth_png)?,
         cells: (0..cells).map(cell).collect(),

@@ -3,10 +3,13 @@
 //! A pull is done when its shard has a sidecar, as the shards of a sweep are. A campaign that was interrupted goes on with
 //! [`missing_pulls`]; pulls that failed can be made again after [`discard_failed`].
 
+mod film;
 mod pull;
 #[cfg(test)]
 mod tests;
 
+pub use film::{FrameView, RigFilm, RigFrame};
+pub(crate) use film::{camera_image, stamp_of};
 pub use pull::{RigPull, RigPullError, RigResult};
 
 use crate::folder::{FolderError, RUN_SCHEMA, RunFolder, RunInfo, ShardStart, Sidecar, sha256_hex};
@@ -162,6 +165,9 @@ pub fn write_rig_pull(folder: &RunFolder, pull: &RigPull) -> Result<Sidecar, Rig
     let file = BufWriter::new(partial.duplicate()?);
     let blame = |e| partial.blame::<RigRunError>(e);
     let mut writer = ShardWriter::new(file, &shard_info(folder, pull), ImageStorage::Png).map_err(blame)?;
+    if pull.film.is_some() {
+        writer = writer.with_films(ImageStorage::Png).map_err(blame)?;
+    }
     writer.push(&encoded).map_err(blame)?;
     writer.finish().map_err(blame)?.into_inner().map_err(|e| partial.error(e.into_error()))?;
     let mut row = encoded.row;

@@ -15,6 +15,7 @@ mod clock;
 pub mod config;
 pub mod devices;
 pub mod fault;
+pub mod film;
 mod gripper;
 mod images;
 pub mod plan;

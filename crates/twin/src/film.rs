@@ -38,6 +38,15 @@ pub struct CellShear {
     pub slipped: bool,
 }
 
+/// When the frame of a real camera came.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraStamp {
+    /// When it arrived, by the clock of the pull's trace.
+    pub received_s: f64,
+    /// The camera's own clock when it was taken, where it says so; it is nobody else's clock.
+    pub device_time_s: Option<f64>,
+}
+
 /// One frame of one jaw.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilmFrame {
@@ -49,8 +58,10 @@ pub struct FilmFrame {
     pub displacement_m: f64,
     /// Direction of the pull in the image, columns and rows; its length is the share that lies in the image.
     pub pull_px: [f64; 2],
-    /// What the camera sees, without its noise.
+    /// What the camera sees: without its noise in a simulation, as it was received from a real one.
     pub image: TactileImage,
+    /// Of the frame of a real camera, of which nothing below is known.
+    pub camera: Option<CameraStamp>,
     /// Number of the cell, from 1, of each pixel in contact; 0 beside it.
     pub cell_of_px: Vec<u8>,
     /// How deep the part lies below the surface of the gel at rest; 0 beside the contact.
@@ -62,13 +73,14 @@ pub struct FilmFrame {
 }
 
 impl FilmFrame {
-    /// How much of the contact has slipped.
-    pub fn state(&self) -> SlipState {
+    /// How much of the contact has slipped; `None` in the frame of a real camera.
+    pub fn state(&self) -> Option<SlipState> {
         let slipped = self.cells.iter().filter(|c| c.slipped).count();
         match slipped {
-            0 => SlipState::Stick,
-            n if n == self.cells.len() => SlipState::Slip,
-            _ => SlipState::Incipient,
+            _ if self.camera.is_some() => None,
+            0 => Some(SlipState::Stick),
+            n if n == self.cells.len() => Some(SlipState::Slip),
+            _ => Some(SlipState::Incipient),
         }
     }
 }

@@ -65,7 +65,7 @@ pub mod values;
 
 pub use backbone::Backbone;
 pub use campaign::{Campaign, PlannedPull, PullKind};
-pub use film::{CellShear, FilmFrame, FilmPace, SlipState};
+pub use film::{CameraStamp, CellShear, FilmFrame, FilmPace, SlipState};
 pub use friction::{FrictionError, GripFriction, cell_friction, grip_friction};
 pub use grasp::Grasp;
 pub use image::TactileImage;

@@ -80,6 +80,20 @@ fn a_campaign_is_watched() {
     // Turned as samples are, whatever the camera sends.
     assert!(gels.iter().all(|(_, png)| size_px(png) == [320, 240]));
     assert_ne!(gels[0].1, gels[1].1);
+    // What was shown is also there afterwards: both cameras from the grip to the stop, in the order of their clocks.
+    let run = gripgen::record::Dataset::open(&folder.path().join("run")).unwrap();
+    for row in 0..2 {
+        let film = run.film(row).unwrap().expect("the pull was filmed");
+        let times: Vec<f64> = film.frames.iter().map(|both| both.left.time_s).collect();
+        assert!(film.frames.len() > 10 && times.is_sorted() && times[0] < 0.0, "{times:?}");
+        assert!(times.iter().any(|time_s| *time_s > 1.0), "{times:?}");
+        let sizes = film.frames.iter().map(|both| [both.left.image.width_px, both.right.image.height_px]);
+        assert!(sizes.into_iter().all(|size| size == [320, 240]));
+        for jaw in gripgen::twin::Jaw::BOTH {
+            let clock = film.frames.iter().map(|both| both[jaw].camera.unwrap().device_time_s.unwrap());
+            assert!(clock.collect::<Vec<_>>().windows(2).all(|t| t[0] < t[1]), "a frame came twice");
+        }
+    }
 }
 
 /// Counts and labels of all samples, and an image once a shard is done.

@@ -55,6 +55,7 @@ fn pull(index: u64, result: RigResult) -> RigPull {
         images: Some(PerJaw { left: image(90), right: image(95) }),
         rest: Some(PerJaw { left: image(60), right: image(61) }),
         trace: Some(trace),
+        film: None,
         log: RigLog::default(),
     }
 }

@@ -16,14 +16,14 @@ STATES = ("stick", "incipient", "slip")
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """F frames of both jaws, left jaw first. The first one is the grip.
+    """F frames of both jaws, left jaw first. The first one of a simulation is the grip; those of a rig begin when the jaws close.
 
     Cell n of the contact is entry n - 1 of the arrays `cell_...`, NaN where a jaw has fewer than 64; lengths along the pull.
     """
 
-    #: uint8[F, 2, H, W, 3], without the noise of the sensors.
+    #: uint8[F, 2, H, W, 3]: without the noise of the sensors in a simulation, as the cameras sent it from a rig.
     images: NDArray[np.uint8]
-    #: uint8[F, 2]: 0 stick, 1 incipient slip, 2 slip (`STATES`).
+    #: uint8[F, 2]: 0 stick, 1 incipient slip, 2 slip (`STATES`); 255 of a rig, where nobody knows: `cells` and `depth_mm` are 0 then.
     state: NDArray[np.uint8]
     #: float64[F]: time since the start of the pull, what both jaws take, way of the gripper.
     time_s: NDArray[np.float64]
@@ -46,6 +46,10 @@ class Film:
     #: When the first and the last cell of both jaws left its place; None where none did.
     incipient_slip_s: float | None = None
     whole_slip_s: float | None = None
+    #: float64[F, 2]: when each frame of a rig arrived since the start of the pull, by the robot's clock, and when its camera took it, by
+    #: its own clock; NaN in a simulation, and where a camera does not say.
+    received_s: NDArray[np.float64] | None = None
+    device_time_s: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -309,6 +309,28 @@ pub struct FilmFrame {
     pub marker_x_px: ::prost::alloc::vec::Vec<f32>,
     #[prost(float, repeated, tag = "25")]
     pub marker_y_px: ::prost::alloc::vec::Vec<f32>,
+    /// Of the frame of a real camera, of which fields 6 to 8 and 10 to 25 are not known: when it came.
+    #[prost(message, optional, tag = "30")]
+    pub camera: ::core::option::Option<CameraStamp>,
+}
+/// When the frame of a real camera came, and how it is looked at: turned, mirrored, cut out, in this order.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct CameraStamp {
+    /// Arrival since the start of the pull, by the robot's clock.
+    #[prost(double, tag = "1")]
+    pub received_s: f64,
+    /// The camera's own clock when it took the frame, where it says so.
+    #[prost(double, optional, tag = "2")]
+    pub device_time_s: ::core::option::Option<f64>,
+    /// Clockwise, in quarters of a turn.
+    #[prost(uint32, tag = "3")]
+    pub quarters: u32,
+    /// Left and right changed.
+    #[prost(bool, tag = "4")]
+    pub mirror: bool,
+    /// First column, first row, columns and rows of the turned frame; all of it where it is empty.
+    #[prost(uint32, repeated, tag = "5")]
+    pub crop_px: ::prost::alloc::vec::Vec<u32>,
 }
 /// How much of a jaw's contact has left its place on the part since the grip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]

@@ -1,5 +1,6 @@
 //! A measured pull, and the messages that it is stored as.
 
+use super::film::RigFilm;
 use crate::encode::{
     EncodedRig, EncodedSample, VIEW_RATE_HZ, image_message, scenario_message, set_label, set_suspect,
     state_messages, timestamp, trace_message,
@@ -55,6 +56,8 @@ pub struct RigPull {
     pub rest: Option<PerJaw<TactileImage>>,
     /// The force over time; rows before time 0 are the reading without a load and the preload.
     pub trace: Option<PullTrace>,
+    /// The film of both cameras, where the rig films.
+    pub film: Option<RigFilm>,
     /// Everything that was received.
     pub log: RigLog,
 }
@@ -86,6 +89,14 @@ pub enum RigPullError {
         time_s: f64,
         /// The time of the row before; minus infinity for the first.
         before_s: f64,
+    },
+    /// A frame of its film without a time.
+    #[error("frame {frame} of its film came at {received_s} s")]
+    FrameTime {
+        /// The frame, counted from 0.
+        frame: usize,
+        /// Its time.
+        received_s: f64,
     },
     /// An image whose bytes are not those of its size.
     #[error("the image {what} of the {jaw} jaw is {width_px}x{height_px} pixels and has {bytes} bytes")]
@@ -149,7 +160,7 @@ impl RigPull {
                 PullTraceMessage { rate_hz: 0.0, time_s: t.time_s.clone(), ..columns }.encode_to_vec()
             }),
             states: trace.map(|t| state_messages(t, 0, Some(VIEW_RATE_HZ))).unwrap_or_default(),
-            film: vec![],
+            film: self.film.as_ref().map(|film| film.encode(trace)).unwrap_or_default(),
             rig: Some(EncodedRig { rest: coded(&self.rest)?, streams, events }),
             row: index_row(&message, extra_columns),
             status: message.status(),
@@ -181,6 +192,11 @@ impl RigPull {
                     let bytes = rgb.len();
                     return Err(RigPullError::Image { what, jaw, width_px, height_px, bytes });
                 }
+            }
+        }
+        for (frame, both) in self.film.iter().flat_map(|film| film.frames.iter().enumerate()) {
+            if let Some((_, bad)) = both.iter().find(|(_, one)| !one.received_s.is_finite()) {
+                return Err(RigPullError::FrameTime { frame, received_s: bad.received_s });
             }
         }
         self.trace.as_ref().map_or(Ok(()), check_trace)?;

@@ -72,7 +72,7 @@ fn pull(index: u64, result: RigResult) -> RigPull {
         drawn: BTreeMap::from([("humidity_pct".to_string(), Drawn::Number(41.5))]),
     };
     let (images, rest) = (Some(image(90)), Some(image(60)));
-    RigPull { scenario, result, images, rest, trace: Some(trace()), log: log() }
+    RigPull { scenario, result, images, rest, trace: Some(trace()), film: None, log: log() }
 }
 
 fn slipped(index: u64) -> RigPull {
@@ -81,6 +81,61 @@ fn slipped(index: u64) -> RigPull {
 
 fn failed(index: u64) -> RigPull {
     pull(index, RigResult::Failed { reason: "the gripper did not close".into() })
+}
+
+/// A film of two frames, one before the pull, of cameras that stand upright: 2 columns, 3 rows, the upper left pixel red.
+fn film() -> RigFilm {
+    let rgb: Vec<u8> = (0..6).flat_map(|i| if i == 0 { [250, 10, 10] } else { [10, 10, 10] }).collect();
+    let jpeg: std::sync::Arc<[u8]> =
+        crate::picture::encode_jpeg(&TactileImage { width_px: 2, height_px: 3, rgb }, 100).unwrap().into();
+    let frame = |received_s, device_time_s| RigFrame { received_s, device_time_s, jpeg: jpeg.clone() };
+    let both = |at: f64| PerJaw { left: frame(at, Some(40.0 + at)), right: frame(at - 0.005, None) };
+    let left = FrameView { quarters: 1, mirror: false, crop_px: None };
+    let right = FrameView { quarters: 0, mirror: true, crop_px: Some([0, 0, 2, 2]) };
+    RigFilm { views: PerJaw { left, right }, frames: vec![both(-0.4), both(0.5)] }
+}
+
+/// JPEG for JPEG as they came, turned and cut out when they are read, with the force of their moment and both clocks.
+#[test]
+fn a_film_is_stored_as_it_came_and_read_as_it_is_looked_at() {
+    let at = tempfile::tempdir().unwrap();
+    let folder = create_rig_run(at.path(), &info(2)).unwrap();
+    write_rig_pull(&folder, &RigPull { film: Some(film()), ..slipped(0) }).unwrap();
+    write_rig_pull(&folder, &RigPull { film: Some(RigFilm::default()), ..failed(1) }).unwrap();
+    let reader = ShardReader::open(&folder.shard_path(0)).unwrap();
+    assert!(reader.has_film());
+    let stored = reader.raw_film(0).unwrap();
+    let jpeg = &film().frames[0].left.jpeg;
+    assert!(stored[0].image.left.windows(jpeg.len()).any(|bytes| bytes == &jpeg[..]), "not as it came");
+    // 0.5 s without a load come first: the trace begins there.
+    assert_eq!([stored[0].time_ns, stored[1].time_ns], [100_000_000, 1_000_000_000]);
+    let read = reader.film(0).unwrap().unwrap();
+    assert_eq!((read.frames.len(), read.whole_slip_s), (2, None));
+    let [before, during] = &read.frames[..] else { panic!() };
+    // A quarter clockwise: the upper left corner goes to the upper right.
+    assert_eq!([before.left.image.width_px, before.left.image.height_px], [3, 2]);
+    assert_eq!([before.right.image.width_px, before.right.image.height_px], [2, 2]);
+    for (image, x, y) in [(&before.left.image, 2, 0), (&before.right.image, 1, 0)] {
+        let red = |x, y| image.pixel(x, y)[0];
+        assert!(red(x, y) > 150 && red(0, 0) < 100 && red(0, 1) < 100, "{image:?}");
+    }
+    assert_eq!((before.left.contact_force_n, before.left.displacement_m), (-0.25, 0.0));
+    // The row before: 2 N at 0.021 s.
+    assert_eq!((during.left.contact_force_n, during.left.displacement_m), (1.75, 1e-3 * 0.021));
+    let stamp = |f: &gripgen_twin::FilmFrame| f.camera.map(|c| (c.received_s, c.device_time_s));
+    assert_eq!(stamp(&during.left), Some((0.5, Some(40.5))));
+    assert_eq!(stamp(&during.right), Some((0.495, None)));
+    assert_eq!(during.left.state(), None, "nobody knows what slips");
+    let dataset = Dataset::open(at.path()).unwrap();
+    assert!(dataset.has_films().unwrap());
+    assert!(dataset.film(0).unwrap().is_some() && reader.film(0).unwrap().is_some());
+    assert_eq!(ShardReader::open(&folder.shard_path(1)).unwrap().film(1).unwrap(), None);
+    let elsewhere = tempfile::tempdir().unwrap();
+    let alone = elsewhere.path().join("alone.mcap");
+    std::fs::write(&alone, export_sample(&reader, 0).unwrap()).unwrap();
+    assert_eq!(ShardReader::open(&alone).unwrap().film(0).unwrap(), Some(read));
+    folder.write_index().unwrap();
+    assert_eq!(verify(at.path(), |_| {}).unwrap().faults, [""; 0]);
 }
 
 #[test]

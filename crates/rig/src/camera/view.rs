@@ -4,7 +4,7 @@
 
 use gripgen_twin::TactileImage;
 use image::RgbImage;
-use image::imageops::{FilterType, crop_imm, resize};
+use image::imageops::{FilterType, resize};
 
 /// Longest side of an image that is made or taken.
 const MAX_SIDE_PX: u32 = 4096;
@@ -103,32 +103,22 @@ impl CameraView {
         let [width_px, height_px] = self.size_px;
         check_sides(width_px, height_px)?;
         let turned = turn(frame, self.rotate_deg, self.mirror)?;
-        if let Some(crop_px) = self.crop_px {
-            let (width_px, height_px) = (turned.width_px, turned.height_px);
-            let [x, y, columns, rows] = crop_px;
-            let inside = |from: u32, size: u32, most: u32| {
-                size > 0 && from.checked_add(size).is_some_and(|end| end <= most)
-            };
-            if !inside(x, columns, width_px) || !inside(y, rows, height_px) {
-                return Err(ViewError::Crop { crop_px, width_px, height_px });
-            }
-        }
         let [x, y, columns, rows] = self.crop_px.unwrap_or([0, 0, turned.width_px, turned.height_px]);
         if [columns, rows] == [turned.width_px, turned.height_px] && [columns, rows] == self.size_px {
             return Ok(turned);
         }
+        let all = (turned.width_px, turned.height_px);
+        let outside = ViewError::Crop { crop_px: [x, y, columns, rows], width_px: all.0, height_px: all.1 };
+        let cut = turned.cut_out([x, y, columns, rows]).ok_or(outside)?;
         if columns < width_px || rows < height_px {
             return Err(ViewError::Enlarged { found_px: [columns, rows], size_px: self.size_px });
         }
-        let (bytes, wanted) = (turned.rgb.len() as u64, bytes_of(turned.width_px, turned.height_px));
-        let whole = RgbImage::from_raw(turned.width_px, turned.height_px, turned.rgb)
-            .ok_or(ViewError::Bytes { bytes, wanted })?;
-        let cut = crop_imm(&whole, x, y, columns, rows).to_image();
-        let seen = if [columns, rows] == self.size_px {
-            cut
-        } else {
-            resize(&cut, width_px, height_px, FilterType::Triangle)
-        };
+        if [columns, rows] == self.size_px {
+            return Ok(cut);
+        }
+        let (bytes, wanted) = (cut.rgb.len() as u64, bytes_of(columns, rows));
+        let cut = RgbImage::from_raw(columns, rows, cut.rgb).ok_or(ViewError::Bytes { bytes, wanted })?;
+        let seen = resize(&cut, width_px, height_px, FilterType::Triangle);
         Ok(TactileImage { width_px, height_px, rgb: seen.into_raw() })
     }
 
@@ -159,30 +149,10 @@ impl CameraView {
 
 /// Turned clockwise, then mirrored.
 fn turn(image: &TactileImage, rotate_deg: u32, mirror: bool) -> Result<TactileImage, ViewError> {
-    let (columns, rows) = (image.width_px as usize, image.height_px as usize);
-    let (width, height) = match rotate_deg {
-        0 | 180 => (columns, rows),
-        90 | 270 => (rows, columns),
-        _ => return Err(ViewError::Rotation { rotate_deg }),
-    };
-    if rotate_deg == 0 && !mirror {
-        return Ok(image.clone());
+    match rotate_deg {
+        0 | 90 | 180 | 270 => Ok(image.turned(rotate_deg / 90, mirror)),
+        _ => Err(ViewError::Rotation { rotate_deg }),
     }
-    let mut rgb = Vec::with_capacity(image.rgb.len());
-    for y in 0..height {
-        for x in 0..width {
-            let x = if mirror { width - 1 - x } else { x };
-            let (from_x, from_y) = match rotate_deg {
-                0 => (x, y),
-                90 => (y, rows - 1 - x),
-                180 => (columns - 1 - x, rows - 1 - y),
-                _ => (columns - 1 - y, x),
-            };
-            let at = 3 * (from_y * columns + from_x);
-            rgb.extend_from_slice(&image.rgb[at..at + 3]);
-        }
-    }
-    Ok(TactileImage { width_px: width as u32, height_px: height as u32, rgb })
 }
 
 fn bytes_of(width_px: u32, height_px: u32) -> u64 {

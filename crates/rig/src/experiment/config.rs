@@ -168,6 +168,10 @@ pub struct ImagesSection {
     pub settle_s: f64,
     /// How long a new frame may take.
     pub frame_s: f64,
+    /// Frames a second at most of the film of a pull, from the grip to the stop; 0 films nothing.
+    pub film_hz: f64,
+    /// JPEG at most that a film takes; a longer one loses every other frame and goes on at half the rate.
+    pub film_mib: f64,
 }
 
 /// `[poses.NAME]`
@@ -211,7 +215,7 @@ impl Default for MotionSection {
 
 impl Default for ImagesSection {
     fn default() -> Self {
-        Self { settle_s: 0.3, frame_s: 0.5 }
+        Self { settle_s: 0.3, frame_s: 0.5, film_hz: 10.0, film_mib: 64.0 }
     }
 }
 
@@ -295,6 +299,8 @@ impl RigConfig {
             ("motion.approach_speed_mm_s", motion.approach_speed_mm_s, 1.0, 250.0, "mm/s"),
             ("images.settle_s", images.settle_s, 0.0, 60.0, "s"),
             ("images.frame_s", images.frame_s, 0.02, 10.0, "s"),
+            ("images.film_hz", images.film_hz, 0.0, 60.0, "Hz"),
+            ("images.film_mib", images.film_mib, 1.0, 1024.0, "MiB"),
         ];
         for (key, value, least, most, unit) in numbers {
             if !(value >= least && value <= most) {

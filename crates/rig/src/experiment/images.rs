@@ -1,6 +1,7 @@
 //! Images of both jaws, new ones.
 
 use super::fault::Fault;
+use super::film::{FilmedFrame, Recorder};
 use super::run::Experiment;
 use crate::camera::{CameraFrame, CameraWaitError, SHIPPED_FRAME_LIMITS, decode_jpeg};
 use crate::link::Stamped;
@@ -70,6 +71,32 @@ impl Experiment<'_> {
             })
         };
         Jaw::BOTH.into_iter().filter_map(silent).collect()
+    }
+
+    /// Films from now on, if the rig films at all.
+    pub(super) fn start_film(&mut self) {
+        let images = &self.config.images;
+        let max_bytes = (images.film_mib * f64::from(1 << 20)) as usize;
+        self.film = (images.film_hz > 0.0).then(|| Recorder::new(images.film_hz, max_bytes));
+    }
+
+    /// Keeps what is new.
+    pub(super) fn film_on(&mut self) {
+        if let Some(film) = &mut self.film {
+            film.take(PerJaw::from_fn(|jaw| self.devices.cameras[jaw].newest()), Instant::now());
+        }
+    }
+
+    /// Ends the film.
+    pub(super) fn end_film(&mut self) -> Vec<PerJaw<FilmedFrame>> {
+        let frames = self.film.take().map(|film| film.frames).unwrap_or_default();
+        let stamped = |frame: Stamped<Arc<CameraFrame>>| FilmedFrame {
+            robot_time_s: self.robot_time_at(frame.at),
+            at: frame.at,
+            frame: frame.event,
+        };
+        let both = |PerJaw { left, right }| PerJaw { left: stamped(left), right: stamped(right) };
+        frames.into_iter().map(both).collect()
     }
 
     fn frame_after(

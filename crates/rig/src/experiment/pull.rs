@@ -1,6 +1,7 @@
 //! One pull, from the way to the part to the way back.
 
 use super::fault::Fault;
+use super::film::{self, FilmedFrame};
 pub use super::images::FrameStamp;
 use super::plan::{GripPoses, grip_command, grip_poses, pull_program};
 use super::robot::{RobotRow, thinned};
@@ -55,6 +56,8 @@ pub struct ExecutedPull {
     pub rest: Option<PerJaw<TactileImage>>,
     /// When the images came.
     pub frames: Vec<FrameStamp>,
+    /// The film of both cameras from the closing of the jaws to the stop; empty where the rig does not film.
+    pub film: Vec<PerJaw<FilmedFrame>>,
     /// Time from closing the jaws to the start of the pull, by the robot's clock.
     pub dwell_s: f64,
     /// The controller's clock at the start of the pull; that of the last reading where there was none.
@@ -85,6 +88,7 @@ struct Parts {
     rest: Option<PerJaw<TactileImage>>,
     images: Option<PerJaw<TactileImage>>,
     frames: Vec<FrameStamp>,
+    film: Vec<PerJaw<FilmedFrame>>,
     /// Robot's clock: from and to when nothing loaded the sensor.
     no_load_s: Option<(f64, f64)>,
     /// The same after the pull.
@@ -212,6 +216,7 @@ impl Experiment<'_> {
         self.wait_until("the reading without a load", from_s + NO_LOAD_S)?;
         parts.no_load_s = Some((from_s, self.robot_time_s()?));
         self.tell(RigEvent::Step("gripping"));
+        self.start_film();
         let command = grip_command(planned.grip_force_n);
         self.gripper(&command)?;
         parts.held_s = Some(self.robot_time_s()?);
@@ -239,7 +244,9 @@ impl Experiment<'_> {
         parts.run = Some(run);
         let reason = self.staircase(run, planned, program.max_time_s)?;
         parts.preload_n = self.preload_n(planned);
+        parts.film = self.end_film();
         parts.doubts = self.silent_cameras();
+        parts.doubts.extend(film::doubts(&parts.film, self.config.images.frame_s));
         let state = self.ask_gripper(Query::GripState)?;
         if GripState::from_number(state) != Some(GripState::Holding) {
             return Err(Fault::NotHolding { state });
@@ -416,7 +423,14 @@ impl Experiment<'_> {
         self.move_to("the way back", poses.approach, self.config.motion.speed_mm_s)
     }
 
-    fn measured(&mut self, planned: &PlannedPull, parts: Parts, stopped: Option<Stopped>) -> ExecutedPull {
+    fn measured(
+        &mut self,
+        planned: &PlannedPull,
+        mut parts: Parts,
+        stopped: Option<Stopped>,
+    ) -> ExecutedPull {
+        // Of a pull that was broken off it is still under way.
+        parts.film.extend(self.end_film());
         let trace = self.trace(planned, &parts);
         let start = parts
             .run
@@ -464,6 +478,7 @@ impl Experiment<'_> {
             images: parts.images,
             rest: parts.rest,
             frames: parts.frames,
+            film: parts.film,
             dwell_s: parts.held_s.zip(start).map_or(0.0, |(held_s, row)| row.timestamp_s - held_s),
             robot_time_s,
             unix_s,

@@ -4,6 +4,7 @@ use super::clock::HostClock;
 use super::config::RigConfig;
 use super::devices::Devices;
 use super::fault::Fault;
+use super::film::Recorder;
 use super::plan::{motion_program, outside_workspace};
 use super::robot::RobotRow;
 use crate::camera::CameraFrame;
@@ -95,6 +96,8 @@ pub struct Experiment<'a> {
     pub(super) trails_s: f64,
     /// When frames were last told of; `None` where nobody looks.
     frames_told: Option<Instant>,
+    /// The film of the pull under way.
+    pub(super) film: Option<Recorder>,
 }
 
 impl<'a> Experiment<'a> {
@@ -125,6 +128,7 @@ impl<'a> Experiment<'a> {
             last_said: None,
             trails_s: 0.0,
             frames_told: None,
+            film: None,
         }
     }
 
@@ -189,6 +193,7 @@ impl<'a> Experiment<'a> {
         }
         self.check_program()?;
         self.tell_frames();
+        self.film_on();
         Ok(rows)
     }
 

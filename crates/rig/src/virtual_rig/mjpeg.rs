@@ -89,6 +89,14 @@ pub fn stream_part(jpeg: &[u8], device_time_s: f64) -> Vec<u8> {
     part
 }
 
+/// A JPEG with words that no decoder shows (a COM segment, ITU T.81 B.2.4.5). No two frames of a real camera have the same bytes, by their
+/// noise; to draw that for every frame would cost more than all else that a virtual rig does.
+pub fn with_comment(jpeg: &[u8], words: &str) -> Vec<u8> {
+    let (Some(start), Some(rest)) = (jpeg.get(..2), jpeg.get(2..)) else { return jpeg.to_vec() };
+    let length = (words.len() as u16 + 2).to_be_bytes();
+    [start, &[0xff, 0xfe], &length, words.as_bytes(), rest].concat()
+}
+
 /// The whole answer to a snapshot; the connection is closed after it.
 pub fn snapshot(jpeg: &[u8], device_time_s: f64) -> Vec<u8> {
     let time = timestamp(device_time_s);

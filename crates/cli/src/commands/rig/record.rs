@@ -1,9 +1,10 @@
 //! From what the rig measured to what the recorder stores.
 
-use gripgen::record::{RigLog, RigLogEvent, RigPull, RigResult, RigStream};
+use gripgen::record::{FrameView, RigFilm, RigFrame, RigLog, RigLogEvent, RigPull, RigResult, RigStream};
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::evidence::{Expected, GripForceEvidence, LabelEvidence, WrenchRow, ZERO_SHIFT, judge};
-use gripgen::twin::{Campaign, Covariates, Jaw, PlannedPull, PullKind, PullSettings, Scenario};
+use gripgen::twin::{Campaign, Covariates, Jaw, PerJaw, PlannedPull, PullKind, PullSettings, Scenario};
+use gripgen_rig::experiment::film::FilmedFrame;
 use gripgen_rig::experiment::pull::{ExecutedPull, FrameStamp};
 use gripgen_rig::experiment::{PullOutcome, RigConfig, RobotRow};
 
@@ -61,8 +62,27 @@ pub fn rig_pull(
         result,
         images: m.images,
         rest: m.rest,
+        film: (config.images.film_hz > 0.0).then(|| film(config, &m.film, m.robot_time_s)),
         trace: m.trace.filter(|trace| trace.len() > 1),
         log: RigLog { streams, events },
+    }
+}
+
+/// The film, by the clock of the trace.
+fn film(config: &RigConfig, frames: &[PerJaw<FilmedFrame>], start_s: f64) -> RigFilm {
+    let views = config.views();
+    let frame = |filmed: &FilmedFrame| RigFrame {
+        received_s: ((filmed.robot_time_s - start_s) * 1e6).round() * 1e-6,
+        device_time_s: filmed.frame.device_time_s,
+        jpeg: filmed.frame.jpeg.as_slice().into(),
+    };
+    RigFilm {
+        views: PerJaw::from_fn(|jaw| FrameView {
+            quarters: views[jaw].rotate_deg / 90,
+            mirror: views[jaw].mirror,
+            crop_px: views[jaw].crop_px,
+        }),
+        frames: frames.iter().map(|both| PerJaw::from_fn(|jaw| frame(&both[jaw]))).collect(),
     }
 }
 

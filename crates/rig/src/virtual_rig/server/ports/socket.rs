@@ -9,6 +9,7 @@ use crate::virtual_rig::dashboard;
 use crate::virtual_rig::faults::Device;
 use crate::virtual_rig::mjpeg::{
     CameraRequest, HttpRequest, bad_request, encode_jpeg, not_found, snapshot, stream_header, stream_part,
+    with_comment,
 };
 use crate::virtual_rig::panel::Panel;
 use crate::virtual_rig::rtde::RtdeServer;
@@ -56,6 +57,9 @@ struct RtdeConnection {
 #[derive(Default)]
 struct Camera {
     jpeg: Arc<Vec<u8>>,
+    /// As it was sent last, and how many were sent.
+    sent: Arc<Vec<u8>>,
+    frames: u64,
     version: u64,
     frozen_s: Option<f64>,
     /// Its picture stays, its stamps go on.
@@ -360,7 +364,11 @@ impl Shared {
             let jpeg = self.view.unapply(&image).ok().and_then(|i| encode_jpeg(&i, JPEG_QUALITY).ok());
             (camera.jpeg, camera.version) = (Arc::new(jpeg.unwrap_or_default()), version);
         }
-        (camera.jpeg.clone(), camera.frozen_s.unwrap_or_else(|| self.time_s()))
+        if camera.frozen_s.is_none() && !camera.repeats || camera.sent.is_empty() {
+            camera.frames += 1;
+            camera.sent = Arc::new(with_comment(&camera.jpeg, &format!("frame {}", camera.frames)));
+        }
+        (camera.sent.clone(), camera.frozen_s.unwrap_or_else(|| self.time_s()))
     }
 }
 
