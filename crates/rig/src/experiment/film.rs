@@ -3,7 +3,7 @@
 //! Nothing is decoded while a pull is under way: a frame is kept by what the camera's own thread has received anyway. Memory is bounded:
 //! where a film would grow beyond its share, every other frame is let go and the film goes on at half the rate.
 
-use crate::camera::CameraFrame;
+use crate::camera::{CameraFrame, SHIPPED_FRAME_LIMITS, decode_jpeg};
 use crate::link::Stamped;
 use gripgen_twin::{Jaw, PerJaw};
 use std::sync::Arc;
@@ -100,6 +100,54 @@ pub(super) fn doubts(film: &[PerJaw<FilmedFrame>], frame_s: f64) -> Vec<String> 
     found
 }
 
+/// Changes of the light that the label does not hang on, a sentence each: exposure or white balance that is automatic. Looked at are a few frames, at
+/// the rim of the image, where no part presses.
+pub(super) fn exposure(film: &[PerJaw<FilmedFrame>]) -> Vec<String> {
+    let every = film.len().div_ceil(LOOKED_AT).max(1);
+    let of_jaw = |jaw: &Jaw| {
+        let levels = film.iter().step_by(every).filter_map(|both| rim_levels(&both[*jaw].frame.jpeg));
+        let levels: Vec<[f64; 3]> = levels.collect();
+        let first = levels.first()?;
+        let change = |now: &[f64; 3]| {
+            let each = [0, 1, 2].map(|c| now[c].max(DARK) / first[c].max(DARK) - 1.0);
+            each.into_iter().fold(0.0, |most: f64, x| if x.abs() > most.abs() { x } else { most })
+        };
+        let most =
+            levels.iter().map(change).fold(0.0, |most: f64, x| if x.abs() > most.abs() { x } else { most });
+        (most.abs() > EXPOSURE).then(|| {
+            let percent = 100.0 * most;
+            format!("the {jaw} camera's light at the rim changed by {percent:.0} % during the pull: is its exposure automatic?")
+        })
+    };
+    Jaw::BOTH.iter().filter_map(of_jaw).collect()
+}
+
+/// Share by which the levels at the rim change before it is said.
+const EXPOSURE: f64 = 0.1;
+
+/// Levels below which nothing is said of light.
+const DARK: f64 = 10.0;
+
+/// Frames that are looked at.
+const LOOKED_AT: usize = 8;
+
+/// Mean red, green and blue of the outermost tenth of the frame, on all sides.
+fn rim_levels(jpeg: &[u8]) -> Option<[f64; 3]> {
+    let frame = decode_jpeg(jpeg, &SHIPPED_FRAME_LIMITS).ok()?;
+    let (width, height) = (frame.width_px, frame.height_px);
+    let rim = (width.min(height) / 10).max(1);
+    let inside = |x: u32, y: u32| (rim..width - rim).contains(&x) && (rim..height - rim).contains(&y);
+    let (mut sums, mut count) = ([0.0; 3], 0.0);
+    for y in 0..height {
+        for x in (0..width).filter(|x| !inside(*x, y)) {
+            let pixel = frame.pixel(x, y);
+            (0..3).for_each(|c| sums[c] += f64::from(pixel[c]));
+            count += 1.0;
+        }
+    }
+    Some(sums.map(|sum| sum / f64::max(count, 1.0)))
+}
+
 /// Columns and rows of a JPEG, by its header.
 fn size_px(jpeg: &[u8]) -> Option<(u32, u32)> {
     let reader = image::ImageReader::with_format(std::io::Cursor::new(jpeg), image::ImageFormat::Jpeg);
@@ -178,6 +226,10 @@ mod tests {
         let mut other = good.clone();
         other[2].1 = jpeg(16, 12);
         assert!(doubts(&filmed(&other), 0.5)[0].contains("from 8 x 4 px to 16 x 4 px"));
+        let mut brighter = [(0, jpeg(8, 100)), (100, jpeg(8, 104)), (200, jpeg(8, 103))];
+        assert_eq!(exposure(&filmed(&brighter)), [""; 0]);
+        brighter[1].1 = jpeg(8, 120);
+        assert!(exposure(&filmed(&brighter))[0].contains("left camera's light at the rim changed by 20 %"));
         let mut late = good;
         late[2].0 = 1600;
         assert!(doubts(&filmed(&late), 0.5)[0].contains("sent nothing for 1.50 s"));

@@ -246,6 +246,7 @@ impl Experiment<'_> {
         parts.preload_n = self.preload_n(planned);
         parts.film = self.end_film();
         parts.doubts = self.silent_cameras();
+        film::exposure(&parts.film).into_iter().for_each(|words| self.note("camera", words));
         parts.doubts.extend(film::doubts(&parts.film, self.config.images.frame_s));
         let state = self.ask_gripper(Query::GripState)?;
         if GripState::from_number(state) != Some(GripState::Holding) {
