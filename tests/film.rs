@@ -129,7 +129,10 @@ fn cells_of_the_engine_carry_its_force() {
             assert!((force_n(&both) - carried_n).abs() <= 1e-6 * carried_n.abs().max(1.0), "{time_s} s");
         }
         if time_s >= pulled.label.slip_time_s {
-            assert_eq!((both.left.state(), both.right.state()), (Some(SlipState::Slip), Some(SlipState::Slip)));
+            assert_eq!(
+                (both.left.state(), both.right.state()),
+                (Some(SlipState::Slip), Some(SlipState::Slip))
+            );
         }
     }
     assert!(film.incipient_slip_s.unwrap() < pulled.label.slip_time_s);

@@ -17,8 +17,8 @@ const RATHER_SESSION: f64 = 4.0;
 /// Correlation of ranks from which on two columns are the same clock.
 const SAME_CLOCK: f64 = 0.9;
 
-/// Chance at which the first effect, or the first curve, may be named where nothing acts.
-const CHANCE: f64 = 0.025;
+/// Chance at which the first effect, or the first curve, may be named where nothing acts: both together are wrong in one campaign of fifty.
+const CHANCE: f64 = 0.01;
 
 /// Pulls without which something has to speak for a rival, and the share of its gain that the others have to give.
 const FEW: usize = 2;

@@ -15,6 +15,16 @@ pub(super) const HALF90: f64 = 1.645 * 1.5;
 /// Least standard deviation of a parameter, as a share of its distance from nothing: formulas are not that good.
 const MIN_SD: f64 = 0.02;
 
+/// How far a value is from nothing. Where nothing is a limit that nobody reaches, the value itself is the measure: 2 % of a million newtons
+/// are no doubt about 20.
+fn from_nothing(value: f64, neutral: f64) -> f64 {
+    let away = (value - neutral).abs();
+    if value != 0.0 && neutral.abs() > FAR * value.abs() { value.abs() } else { away }
+}
+
+/// A neutral value that is so many times the value is a limit that nobody reaches.
+const FAR: f64 = 1e3;
+
 /// Values of an effect in a fit, by name.
 pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<String, ParameterEstimate> {
     let part = candidate.part.as_ref().map(|p| p.0);
@@ -28,7 +38,7 @@ pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<Str
         let name = candidate.name_of(p.name);
         let half = fitted.names.iter().position(|n| *n == name).map_or(0.0, |at| {
             let sd = fitted.covariance[(at, at)].max(0.0).sqrt();
-            HALF90 * sd.max(MIN_SD * (value - p.neutral).abs())
+            HALF90 * sd.max(MIN_SD * from_nothing(value, p.neutral))
         });
         let low90 = (value - half).max(p.bounds.0.min(value));
         let high90 = (value + half).min(p.bounds.1.max(value));
@@ -69,4 +79,17 @@ pub(super) fn plain_baseline(m: &PullModel, context: &Context<'_>) -> BTreeMap<S
         values.insert("robot.damping_n_s_per_m".into(), plain(m.damping_n_s_per_m, "N s/m"));
     }
     values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_that_nobody_reaches_is_no_measure_of_doubt() {
+        assert_eq!(from_nothing(20.0, 1e6), 20.0);
+        assert_eq!(from_nothing(1.05, 1.0), 1.05_f64 - 1.0);
+        assert_eq!(from_nothing(0.3, 0.0), 0.3);
+        assert_eq!(from_nothing(0.0, 1.0), 1.0);
+    }
 }

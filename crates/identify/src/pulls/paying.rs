@@ -49,7 +49,8 @@ pub(super) fn paying(
         if traces && search.candidates[accepted.effects[place].0].acts_on_signals() {
             gain = gain.max(share([&fewer, &accepted.fitted].map(|f| readings(context, &f.model))));
         }
-        let reason = match neutral(&accepted.fitted, spec) {
+        let unfelt = || unfelt(search, &accepted.fitted, spec, &sd_n);
+        let reason = match neutral(&accepted.fitted, spec).or_else(unfelt) {
             Some(text) => text,
             None if gain < PAYS => format!(
                 "it takes {:.1} % off the error on held-out pulls, a name needs {:.0} %",
@@ -138,6 +139,46 @@ fn neutral(fitted: &Fitted, spec: &'static gripgen_twin::effects::EffectSpec) ->
     let p = widest?;
     let (low, high) = (p.low90, p.high90);
     Some(format!("the 90 % interval of its {}, {low:.3} to {high:.3}, holds {}", size.name, size.neutral))
+}
+
+/// Share of a label's standard deviation that is not felt.
+const UNFELT: f64 = 0.1;
+
+/// Why an effect that does nothing near its neutral value may be nothing at all: at the end of its interval towards that value no label and no reading
+/// is another. (A limit of 49 N is not excluded by pulls that end at 20 N.)
+fn unfelt(
+    search: &Search<'_>,
+    fitted: &Fitted,
+    spec: &'static gripgen_twin::effects::EffectSpec,
+    sd_n: &[f64],
+) -> Option<String> {
+    if !spec.pulls.is_ok_and(|fit| fit.flat_at_neutral) {
+        return None;
+    }
+    let candidate =
+        fitted.terms.effects.iter().map(|(c, _)| c).find(|c| c.spec == spec && c.part.is_none())?;
+    let size = &spec.parameters[candidate.size()];
+    let p = parameters(fitted, candidate).remove(size.name)?;
+    let end = if p.value < size.neutral { p.high90 } else { p.low90 };
+    let labels = |value: f64| {
+        let mut model = fitted.model.clone();
+        let own = model.effects.iter_mut().find(|e| e.spec == spec)?;
+        own.values[candidate.size()] = value;
+        Some(search.context.predictor.pulls(&model, &search.rows))
+    };
+    let (there, without) = (labels(end)?, labels(size.neutral)?);
+    let felt = there
+        .iter()
+        .zip(&without)
+        .zip(sd_n)
+        .any(|((a, b), sd_n)| (a.label_n - b.label_n).abs() > UNFELT * sd_n);
+    let (low, high) = (p.low90, p.high90);
+    (!felt).then(|| {
+        format!(
+            "the 90 % interval of its {}, {low:.3} to {high:.3}, holds {end:.3}, which changes no label",
+            size.name
+        )
+    })
 }
 
 /// How far the readings of the traces are from a model, in the deviations that are known of arms and sensors.
