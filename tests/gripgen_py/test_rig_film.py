@@ -7,26 +7,18 @@ import numpy as np
 
 import gripgen as gg
 
-PORTS = {
-    "rtde": "robot.rtde_port",
-    "dashboard": "robot.dashboard_port",
-    "primary": "robot.primary_port",
-    "gripper": "gripper.port",
-    "camera_left": "cameras.left.port",
-    "camera_right": "cameras.right.port",
-}
 PATIENT = ["limits.robot_silence_s=1.0", "limits.robot_gap_s=1.0", "images.frame_s=5.0"]
 COMMAND = [sys.executable, "-m", "gripgen", "rig"]
 
 
 def test_the_film_of_a_pull(tmp_path):
-    serve = [*COMMAND, "serve", "--any-ports", "-q", "--speed", "2"]
+    file = tmp_path / "rig.toml"
+    serve = [*COMMAND, "serve", "--any-ports", "-q", "--speed", "2", "--write-rig", file]
     with subprocess.Popen(serve, stdout=subprocess.PIPE, text=True) as rig:
         try:
-            words = dict(word.split("=") for word in rig.stdout.readline().split()[1:])
-            ports = [f"{key}={words[name].rsplit(':', 1)[1]}" for name, key in PORTS.items()]
-            settings = [part for setting in [*ports, *PATIENT] for part in ("--set", setting)]
-            pull = [*COMMAND, "pull", "--parts", "gear", "--grip-force-n", "25", "--repetitions", "1"]
+            assert rig.stdout.readline().startswith("ready")
+            settings = [part for setting in PATIENT for part in ("--set", setting)]
+            pull = [*COMMAND, "pull", file, "--parts", "gear", "--grip-force-n", "25", "--repetitions", "1"]
             run = tmp_path / "run"
             made = subprocess.run([*pull, "-o", run, *settings], capture_output=True, text=True, timeout=120, check=False)
             assert made.returncode == 0, made.stderr

@@ -73,15 +73,17 @@ fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
 }
 
 fn serve(server: &Server, state: &Mutex<State>, port: u16) {
-    while let Ok(request) = server.recv() {
+    let reply = |request: Request| {
         let answer = answer(&request, state, port);
         // Who asked may be gone.
         let _ = request.respond(answer);
+    };
+    while let Ok(request) = server.recv() {
+        reply(request);
     }
     // Who asked while the command ended is answered like everybody before; without this the library would say 500.
     while let Ok(Some(request)) = server.try_recv() {
-        let answer = answer(&request, state, port);
-        let _ = request.respond(answer);
+        reply(request);
     }
 }
 

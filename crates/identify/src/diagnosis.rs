@@ -335,16 +335,14 @@ impl Diagnosis {
             for p in spec.parameters {
                 let Some(estimate) = effect.parameters.get_mut(p.name) else { continue };
                 let range = p.bounds.1 - p.bounds.0;
-                let bounds = [p.bounds.0, p.bounds.1].into_iter();
+                let mut bounds = [p.bounds.0, p.bounds.1].into_iter();
                 // A range over orders of magnitude is no measure at its lower end: a limit of 11 N between 1 and a million.
-                let mut near = bounds.map(|bound| {
-                    let scale = if bound == 0.0 { range } else { range.min(bound.abs() / NEAR_BOUND) };
-                    (bound, NEAR_BOUND * scale)
-                });
-                let at = |(bound, near): &(f64, f64)| {
-                    (bound - p.neutral).abs() > *near && (bound - estimate.value).abs() < *near
+                let at = |bound: &f64| {
+                    let near = NEAR_BOUND * range;
+                    let near = if *bound == 0.0 { near } else { near.min(bound.abs()) };
+                    (bound - p.neutral).abs() > near && (bound - estimate.value).abs() < near
                 };
-                let Some((bound, _)) = near.find(at) else { continue };
+                let Some(bound) = bounds.find(at) else { continue };
                 estimate.at_bound = true;
                 effect.weight = effect.weight.min(MAX_WEIGHT_AT_BOUND);
                 self.notes.push(format!(

@@ -106,16 +106,16 @@ mod tests {
     /// A scale of 0.8 is the lowest that is fitted: it is marked, said, and trusted by half at most.
     #[test]
     fn a_value_at_its_bound_is_said() {
-        let with = |scale: f64| {
+        let with = |name: &str, parameter: &str, value: f64| {
             let mut d = of([30.0, 5.0]);
             d.effects.push(NamedEffect {
-                name: "misregistration".into(),
+                name: name.into(),
                 part: None,
-                class: vec!["misregistration".into()],
+                class: vec![name.into()],
                 weight: 0.95,
                 parameters: BTreeMap::from([(
-                    "scale".into(),
-                    ParameterEstimate::new(scale, (scale, scale), "1"),
+                    parameter.into(),
+                    ParameterEstimate::new(value, (value, value), "1"),
                 )]),
                 indistinguishable_from: Vec::new(),
                 separate_by: None,
@@ -123,12 +123,18 @@ mod tests {
             d.conclude();
             d
         };
-        let (inside, at) = (with(0.9), with(0.8));
+        let scaled = |scale: f64| with("misregistration", "scale", scale);
+        let (inside, at) = (scaled(0.9), scaled(0.8));
         assert!(!inside.effects[0].parameters["scale"].at_bound && inside.notes.is_empty());
         assert_eq!(inside.effects[0].weight, 0.95);
         assert!(at.effects[0].parameters["scale"].at_bound && at.notes[0].contains("0.8"), "{:?}", at.notes);
         assert!(at.effects[0].weight <= 0.5 && plain(&at).contains("something else may look like it"));
-        let neutral = with(1.0);
+        let neutral = scaled(1.0);
         assert!(!neutral.effects[0].parameters["scale"].at_bound, "a neutral value is no end");
+        // Between 1 N and a million newtons, which stand for no limit.
+        for (limit_n, end) in [(11.0, false), (1.0, true)] {
+            let limited = with("sensor_saturation", "limit_n", limit_n);
+            assert_eq!(limited.effects[0].parameters["limit_n"].at_bound, end, "{limit_n} N");
+        }
     }
 }

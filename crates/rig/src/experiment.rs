@@ -14,6 +14,7 @@ pub mod check;
 mod clock;
 pub mod config;
 pub mod devices;
+mod executed;
 pub mod fault;
 pub mod film;
 mod gripper;

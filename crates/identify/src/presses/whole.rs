@@ -27,7 +27,7 @@ pub(super) fn borne_out(observed: &Observed<'_>, found: &mut Found) -> FrameErro
             name: dropped.into(),
             gain: 0.0,
             reason: format!(
-                "it explains pixels around the contact, but whole frames that were held out become worse, by {:.0} %",
+                "it explains the pixels that were looked at, but whole frames that were held out become worse, by {:.0} %",
                 100.0 * (worse - 1.0)
             ),
         });

@@ -1,17 +1,16 @@
 //! One pull, from the way to the part to the way back.
 
+use super::executed::Parts;
+pub use super::executed::{ExecutedPull, PullOutcome};
 use super::fault::Fault;
-use super::film::{self, FilmedFrame};
+use super::film;
 pub use super::images::FrameStamp;
 use super::plan::{GripPoses, grip_command, grip_poses, pull_program};
-use super::robot::{RobotRow, thinned};
 pub use super::run::LogLine;
 use super::run::{Experiment, PROGRAM, RigEvent};
-use super::stop::Stopped;
-use super::zero::{self, Unloaded};
 use crate::gcl::{GclCommand, GripState, Query};
 use crate::program::{PRELOAD_S, Phase, SETTLE_S, StopReason};
-use gripgen_twin::{Campaign, PerJaw, PlannedPull, PullTrace, SlipLabel, TactileImage, TraceRow, slip_label};
+use gripgen_twin::{Campaign, PlannedPull};
 use std::time::{Duration, Instant};
 
 /// How long the sensor is read without a load before the grip, by the robot's clock.
@@ -24,83 +23,6 @@ const SETTLED_LAGS: f64 = 6.0;
 const SLACK: Duration = Duration::from_secs(3);
 /// Height from which the way back is fast.
 const CLEAR_M: f64 = 0.02;
-
-/// What came of a pull.
-#[derive(Debug, Clone, PartialEq)]
-pub enum PullOutcome {
-    /// The jaws slipped, or the pull ended before they did (`censored`).
-    Labelled(SlipLabel),
-    /// There was nothing between the jaws.
-    NoContact,
-    /// It has no label.
-    Failed {
-        /// Why.
-        reason: String,
-    },
-}
-
-/// A pull with all that came during it.
-#[derive(Debug, Clone)]
-pub struct ExecutedPull {
-    /// What was asked.
-    pub planned: PlannedPull,
-    /// What came of it.
-    pub outcome: PullOutcome,
-    /// How everything was stopped, where something went wrong.
-    pub stopped: Option<Stopped>,
-    /// The force over time; rows before 0 are those without a load.
-    pub trace: Option<PullTrace>,
-    /// Grip images.
-    pub images: Option<PerJaw<TactileImage>>,
-    /// Images with open jaws.
-    pub rest: Option<PerJaw<TactileImage>>,
-    /// When the images came.
-    pub frames: Vec<FrameStamp>,
-    /// The film of both cameras from the closing of the jaws to the stop; empty where the rig does not film.
-    pub film: Vec<PerJaw<FilmedFrame>>,
-    /// Time from closing the jaws to the start of the pull, by the robot's clock.
-    pub dwell_s: f64,
-    /// The controller's clock at the start of the pull; that of the last reading where there was none.
-    pub robot_time_s: f64,
-    /// The same moment, in seconds since 1970 by this machine's clock.
-    pub unix_s: f64,
-    /// Force along the pull before it, N.
-    pub preload_n: f64,
-    /// Readings along the pull after it, jaws open and before anything moves or is zeroed again.
-    pub no_load_after_n: Vec<f64>,
-    /// How far the sensor's zero had moved along the pull when the jaws slipped; `None` without a label or without readings.
-    pub zero_shift_n: Option<f64>,
-    /// What the gripper said of the force of a jaw while it held, N.
-    pub reported_force_n: Option<f64>,
-    /// What is wrong with it beside its forces, a sentence each: its label is suspect.
-    pub doubts: Vec<String>,
-    /// Everything that the robot said.
-    pub rows: Vec<RobotRow>,
-    /// Seconds since 1970 of each row's arrival.
-    pub rows_unix_s: Vec<f64>,
-    /// Words of all devices, with seconds since 1970.
-    pub log: Vec<(f64, LogLine)>,
-}
-
-/// What is known of a pull under way.
-#[derive(Default)]
-struct Parts {
-    rest: Option<PerJaw<TactileImage>>,
-    images: Option<PerJaw<TactileImage>>,
-    frames: Vec<FrameStamp>,
-    film: Vec<PerJaw<FilmedFrame>>,
-    /// Robot's clock: from and to when nothing loaded the sensor.
-    no_load_s: Option<(f64, f64)>,
-    /// The same after the pull.
-    no_load_after_s: Option<(f64, f64)>,
-    /// Of a jaw.
-    reported_force_n: Option<f64>,
-    held_s: Option<f64>,
-    run: Option<i32>,
-    preload_n: f64,
-    doubts: Vec<String>,
-    outcome: Option<PullOutcome>,
-}
 
 impl Experiment<'_> {
     /// Makes a pull. Whatever goes wrong ends in a safe stop; then no further pull may follow on this experiment.
@@ -364,47 +286,6 @@ impl Experiment<'_> {
         Ok(())
     }
 
-    /// The label of a pull that ended by itself.
-    fn label(
-        &self,
-        campaign: &Campaign,
-        planned: &PlannedPull,
-        parts: &Parts,
-        reason: StopReason,
-    ) -> Option<PullOutcome> {
-        let slid = reason == StopReason::Displacement;
-        if !slid && !matches!(reason, StopReason::LargestCommand | StopReason::Time) {
-            let reason = format!("the pull was broken off: {}", reason.meaning());
-            return Some(PullOutcome::Failed { reason });
-        }
-        let trace = self.trace(planned, parts)?;
-        let pulled: PullTrace = trace.rows().filter(|row| row.time_s >= 0.0).collect();
-        Some(
-            match slip_label(&pulled.until_displacement(campaign.stop_m), campaign.label_tolerance_n, slid) {
-                Ok(label) => PullOutcome::Labelled(label),
-                Err(e) => PullOutcome::Failed { reason: e.to_string() },
-            },
-        )
-    }
-
-    /// The force over time: readings without a load before 0, then the staircase.
-    fn trace(&self, planned: &PlannedPull, parts: &Parts) -> Option<PullTrace> {
-        let run = parts.run?;
-        let first = self.rows.iter().find(|r| r.phase_of(run) == Some(Phase::Pulling))?;
-        let (start_s, unloaded) = (first.timestamp_s, parts.no_load_s.unwrap_or((0.0, 0.0)));
-        let rows = self.rows.iter().filter_map(|row| {
-            let pulling = row.phase_of(run) == Some(Phase::Pulling);
-            let without = row.timestamp_s >= unloaded.0 && row.timestamp_s < unloaded.1;
-            (pulling || without).then(|| TraceRow {
-                time_s: ((row.timestamp_s - start_s) * 1e6).round() * 1e-6,
-                desired_force_n: if pulling { row.desired_n } else { 0.0 },
-                measured_force_n: self.signed(planned, row.force[2]),
-                displacement_m: if pulling { row.displacement_m } else { 0.0 },
-            })
-        });
-        Some(rows.collect())
-    }
-
     /// Lets a program go that was not needed, and the way back.
     fn leave(&mut self, run: i32, poses: &GripPoses) -> Result<(), Fault> {
         self.devices.heart.set_go(crate::program::registers::STOP);
@@ -422,75 +303,5 @@ impl Experiment<'_> {
         let here = self.reading()?.tcp;
         self.move_to("the way up", here.raised(CLEAR_M), self.config.motion.approach_speed_mm_s)?;
         self.move_to("the way back", poses.approach, self.config.motion.speed_mm_s)
-    }
-
-    fn measured(
-        &mut self,
-        planned: &PlannedPull,
-        mut parts: Parts,
-        stopped: Option<Stopped>,
-    ) -> ExecutedPull {
-        // Of a pull that was broken off it is still under way.
-        parts.film.extend(self.end_film());
-        let trace = self.trace(planned, &parts);
-        let start = parts
-            .run
-            .and_then(|run| self.rows.iter().find(|row| row.phase_of(run) == Some(Phase::Pulling)).copied());
-        let anchor = start.or(self.rows.last().copied());
-        let robot_time_s = anchor.map_or(0.0, |row| row.timestamp_s);
-        let unix_s = self.clock.unix_s(anchor.map_or_else(Instant::now, |row| row.at));
-        let outcome = match (&stopped, parts.outcome) {
-            (Some(stopped), _) => PullOutcome::Failed { reason: stopped.reason.clone() },
-            (None, Some(outcome)) => outcome,
-            (None, None) => PullOutcome::Failed { reason: "the robot said nothing during the pull".into() },
-        };
-        if let Some(gripper) = &self.devices.gripper {
-            let lines = gripper.take_log();
-            self.log.extend(lines.into_iter().map(|line| {
-                let text = format!("{} {}", if line.sent { ">" } else { "<" }, line.line);
-                LogLine { at: line.at, source: "gripper", text }
-            }));
-        }
-        let mut log = std::mem::take(&mut self.log);
-        log.sort_by_key(|line| line.at);
-        let unloaded = |within: Option<(f64, f64)>| {
-            let (from_s, to_s) = within.unwrap_or((0.0, 0.0));
-            self.rows
-                .iter()
-                .filter(move |row| row.timestamp_s >= from_s && row.timestamp_s < to_s)
-                .map(|row| (row.timestamp_s, self.signed(planned, row.force[2])))
-        };
-        let zero_shift_n = match &outcome {
-            PullOutcome::Labelled(label) => zero::shift_n(
-                &Unloaded::of(unloaded(parts.no_load_s)),
-                &Unloaded::of(unloaded(parts.no_load_after_s)),
-                robot_time_s + label.slip_time_s,
-            ),
-            _ => None,
-        };
-        let no_load_after_n = unloaded(parts.no_load_after_s).map(|(_, force_n)| force_n).collect();
-        let without = [parts.no_load_s, parts.no_load_after_s];
-        let rows = thinned(std::mem::take(&mut self.rows), parts.run, without);
-        ExecutedPull {
-            planned: planned.clone(),
-            outcome,
-            stopped,
-            trace,
-            images: parts.images,
-            rest: parts.rest,
-            frames: parts.frames,
-            film: parts.film,
-            dwell_s: parts.held_s.zip(start).map_or(0.0, |(held_s, row)| row.timestamp_s - held_s),
-            robot_time_s,
-            unix_s,
-            preload_n: parts.preload_n,
-            no_load_after_n,
-            zero_shift_n,
-            reported_force_n: parts.reported_force_n,
-            doubts: parts.doubts,
-            rows_unix_s: rows.iter().map(|row| self.clock.unix_s(row.at)).collect(),
-            rows,
-            log: log.into_iter().map(|line| (self.clock.unix_s(line.at), line)).collect(),
-        }
     }
 }
