@@ -85,6 +85,8 @@ pub enum StopReason {
     NoHeartbeat = 8,
     /// The pose is reached: the normal end of a motion.
     Arrived = 9,
+    /// No joints carry the tool to the pose.
+    Unreachable = 10,
 }
 
 impl StopReason {
@@ -92,8 +94,20 @@ impl StopReason {
     pub fn from_number(number: i32) -> Option<Self> {
         use StopReason::{
             Arrived, Displacement, Force, Host, LargestCommand, Lateral, NoHeartbeat, Time, Torque,
+            Unreachable,
         };
-        let all = [Displacement, LargestCommand, Force, Lateral, Torque, Time, Host, NoHeartbeat, Arrived];
+        let all = [
+            Displacement,
+            LargestCommand,
+            Force,
+            Lateral,
+            Torque,
+            Time,
+            Host,
+            NoHeartbeat,
+            Arrived,
+            Unreachable,
+        ];
         all.into_iter().find(|reason| *reason as i32 == number)
     }
 
@@ -109,6 +123,7 @@ impl StopReason {
             StopReason::Host => "the host said stop, or never said go",
             StopReason::NoHeartbeat => "the heartbeat of the host never came",
             StopReason::Arrived => "the pose is reached",
+            StopReason::Unreachable => "no joints of the arm carry the tool to the pose",
         }
     }
 }

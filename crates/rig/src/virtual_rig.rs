@@ -20,6 +20,7 @@ pub mod faults;
 pub mod gripper;
 #[cfg(test)]
 mod gripper_tests;
+pub mod kinematics;
 pub mod mjpeg;
 #[cfg(test)]
 mod mjpeg_tests;

@@ -4,9 +4,11 @@ use super::spring::Spring;
 use crate::program::{ACKNOWLEDGE_S, Phase, StopReason, TcpPose, registers};
 use crate::rtde::Value;
 use crate::virtual_rig::arm::{Arm, STEP_S};
-use crate::virtual_rig::controller::{Announcement, Controller};
+use crate::virtual_rig::controller::{Announcement, Controller, TOOL_M};
 use crate::virtual_rig::robot::Robot;
+use gripgen_twin::frames::Pose;
 use gripgen_twin::plant::{GripRequest, Plant};
+use nalgebra::Translation3;
 use std::sync::Arc;
 
 /// Control steps between two beats of the host: 100 per second.
@@ -33,16 +35,22 @@ pub(super) struct Bench {
     run: i32,
     steps: u64,
     beats: bool,
+    started_at: Pose,
     /// Phases in their order.
     pub(super) phases: Vec<Phase>,
 }
 
 impl Bench {
-    /// A robot at rest that is given a program.
-    pub(super) fn start(spring: Spring, tcp: TcpPose, run: i32, text: &str) -> Result<Self, String> {
-        let mut controller = Controller::new(Arc::new(spring), tcp, 1.0);
+    /// A robot at rest that is given a program, whose own tool is at `tcp`. What is judged is the text and not whether an arm reaches that far: a
+    /// way that is to take too long may begin anywhere.
+    pub(super) fn start(spring: Spring, tcp: TcpPose, tool_mm: [f64; 3], run: i32, text: &str) -> Result<Self, String> {
+        let [of_program, of_robot] = [tool_mm.map(|mm| 1e-3 * mm), TOOL_M].map(Translation3::from);
+        let from = TcpPose::from_base_from_tool(&(tcp.base_from_tool() * of_program.inverse() * of_robot));
+        let mut controller = Controller::new(Arc::new(spring), from, 1.0);
+        controller.arm_mut().reach_anything();
+        let started_at = controller.arm().base_from_flange();
         controller.run_script(text);
-        let mut bench = Self { controller, spring, run, steps: 0, beats: true, phases: Vec::new() };
+        let mut bench = Self { controller, spring, run, steps: 0, beats: true, started_at, phases: Vec::new() };
         bench.heard()?;
         Ok(bench)
     }
@@ -62,6 +70,14 @@ impl Bench {
     /// The host goes silent.
     pub(super) fn die(&mut self) {
         self.beats = false;
+    }
+
+    /// Whether the arm is where it was at first.
+    pub(super) fn stayed(&self) -> Verdict {
+        let (is, was) = (self.arm().base_from_flange(), self.started_at);
+        let moved_m = (is.translation.vector - was.translation.vector).norm();
+        let stays = moved_m < 1e-9 && is.rotation.angle_to(&was.rotation) < 1e-6;
+        if stays { Ok(()) } else { Err(format!("the tool moved by {:.3} mm", 1e3 * moved_m)) }
     }
 
     pub(super) fn go(&mut self, go: i32) {

@@ -37,7 +37,7 @@ const TARE_KG: f64 = 0.1;
 const PRELOAD_KG: f64 = 0.05;
 
 fn start(p: &PullProgram, text: &str, spring: Spring) -> Result<Bench, String> {
-    Bench::start(spring, START, p.run, text)
+    Bench::start(spring, START, p.tool_mm, p.run, text)
 }
 
 /// Up to the wait for the go.
@@ -294,7 +294,7 @@ fn host_stops_waiting(p: &PullProgram, text: &str) -> Verdict {
     let mut bench = zeroed(p, text, STRONG)?;
     bench.go(registers::STOP);
     bench.stops_for(StopReason::Host, 0.05)?;
-    if bench.robot().tcp == START { Ok(()) } else { Err("the tool moved".into()) }
+    bench.stayed()
 }
 
 fn host_dies(p: &PullProgram, text: &str) -> Verdict {
@@ -318,11 +318,11 @@ fn nobody_beats(p: &PullProgram, text: &str) -> Verdict {
     let mut bench = start(p, text, STRONG)?;
     bench.die();
     bench.go(p.run);
-    never_begins(&mut bench, START)
+    never_begins(&mut bench)
 }
 
 /// Without a beat nothing happens, and it ends by itself.
-pub(super) fn never_begins(bench: &mut Bench, start: TcpPose) -> Verdict {
+pub(super) fn never_begins(bench: &mut Bench) -> Verdict {
     let took_s = bench.stops_for(StopReason::NoHeartbeat, HEARTBEAT_WAIT_S + 0.1)?;
     near("the wait for a beat", took_s, HEARTBEAT_WAIT_S, 0.05)?;
     if bench.phases != [Phase::Started, Phase::Stopped]
@@ -330,9 +330,7 @@ pub(super) fn never_begins(bench: &mut Bench, start: TcpPose) -> Verdict {
     {
         return Err(format!("its phases without a beat are {:?}", bench.phases));
     }
-    if bench.robot().tcp != start {
-        return Err("the tool moved".into());
-    }
+    bench.stayed()?;
     let payload_kg = bench.robot().payload_kg;
     near("the payload without a beat", payload_kg, crate::virtual_rig::controller::PAYLOAD_KG, 0.0)?;
     bench.ends_alone()
@@ -345,5 +343,5 @@ fn nobody_says_go(p: &PullProgram, text: &str) -> Verdict {
     let mut bench = zeroed(p, text, STRONG)?;
     let took_s = bench.stops_for(StopReason::Host, p.wait_s + 0.2)?;
     near("the wait for the go", took_s, p.wait_s, 0.05 + 1e-3 * p.wait_s)?;
-    if bench.robot().tcp == START { Ok(()) } else { Err("the tool moved".into()) }
+    bench.stayed()
 }

@@ -129,7 +129,8 @@ impl MotionProgram {
     }
 }
 
-/// What follows the head. The go may come a beat after the first: the host writes both, but from two hands. The motion is a thread of
+/// What follows the head. A pose that the arm cannot reach is refused before it moves (`get_inverse_kin_has_solution`, PolyScope 5.9.4 and later, the
+/// oldest that this rig supports). The go may come a beat after the first: the host writes both, but from two hands. The motion is a thread of
 /// its own, so that the main one can watch and stop it.
 fn body() -> String {
     use registers::{GO, PHASE, STOP};
@@ -144,6 +145,9 @@ fn body() -> String {
   thread motion():
     movel(gripgen_target, a=0.5, v=gripgen_speed)
     gripgen_arrived = True
+  end
+  if reason == 0 and not get_inverse_kin_has_solution(gripgen_target):
+    reason = {unreachable}
   end
   waited = 0.0
   while read_input_integer_register({GO}) != run_id and reason == 0:
@@ -183,6 +187,7 @@ fn body() -> String {
         host = StopReason::Host as i32,
         time = StopReason::Time as i32,
         arrived = StopReason::Arrived as i32,
+        unreachable = StopReason::Unreachable as i32,
         stop = super::STOP_DECELERATION_M_S2,
     )
 }

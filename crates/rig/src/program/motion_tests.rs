@@ -19,7 +19,8 @@ fn every_way_out_of_a_motion_kills_it_and_stops() {
     let (kill, stop) = (text.find("kill handle").unwrap(), text.find("stopl(").unwrap());
     assert!(text.find("movel(").unwrap() < kill && kill < stop);
     assert!(text.find("rtde_set_watchdog").unwrap() < text.find("movel(").unwrap());
-    for reason in [StopReason::Force, StopReason::Host, StopReason::Time, StopReason::Arrived] {
+    use StopReason::{Arrived, Force, Host, Time, Unreachable};
+    for reason in [Force, Host, Time, Arrived, Unreachable] {
         assert!(text.contains(&format!("reason = {}\n", reason as i32)), "{}", reason.meaning());
     }
     assert!(!text.contains("break") && !text.contains("return") && !text.contains("halt"));

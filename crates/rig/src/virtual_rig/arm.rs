@@ -1,11 +1,14 @@
 //! The virtual arm: where it is, what moves it, what it feels.
 
 mod force;
+mod joints;
 
+use super::kinematics::{Joints, MAX_SPEED_RAD_S, OutOfReachError};
 use super::urscript::ForceMode;
 use crate::program::TcpPose;
 use force::Pulling;
 use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError};
+use nalgebra::UnitQuaternion;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -35,10 +38,24 @@ pub enum Drive {
         /// How fast it gets there, and comes to rest.
         acceleration_m_s2: f64,
     },
+    /// All joints at once, the one with the longest way as fast as is said.
+    Joints {
+        /// Where to.
+        target_rad: Joints,
+        /// How fast.
+        speed_rad_s: f64,
+        /// How fast it gets there, and comes to rest.
+        acceleration_rad_s2: f64,
+    },
     /// It brakes.
     Stop {
         /// How.
         deceleration_m_s2: f64,
+    },
+    /// Its joints brake.
+    StopJoints {
+        /// How.
+        deceleration_rad_s2: f64,
     },
 }
 
@@ -51,6 +68,17 @@ pub enum ArmError {
     Collision {
         /// How far.
         moved_mm: f64,
+    },
+    /// No joints carry the tool there.
+    #[error(transparent)]
+    OutOfReach(#[from] OutOfReachError),
+    /// A joint would have to turn faster than it can: near a singularity little ways of the tool are long ones of a joint.
+    #[error("joint {joint} would turn at {speed_rad_s:.1} rad/s, {MAX_SPEED_RAD_S:.1} rad/s are the most")]
+    TooFast {
+        /// From the base, 1 to 6.
+        joint: usize,
+        /// How fast.
+        speed_rad_s: f64,
     },
     /// The simulator.
     #[error(transparent)]
@@ -77,6 +105,14 @@ pub struct Arm {
     plant: Arc<dyn Plant>,
     tcp: TcpPose,
     velocity_m_s: [f64; 3],
+    /// Grip centre at the flange.
+    tool_m: [f64; 3],
+    joints_rad: Joints,
+    joint_speeds_rad_s: Joints,
+    /// Where these joints carry the tool.
+    carried: TcpPose,
+    /// Whether what joints cannot do stops it.
+    has_limits: bool,
     drive: Drive,
     force: Option<ForceMode>,
     damping: f64,
@@ -101,13 +137,18 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// An arm at rest.
-    pub fn new(plant: Arc<dyn Plant>, tcp: TcpPose) -> Self {
+    /// An arm at rest, its grip centre so far from the flange. Where no joints reach the pose, it cannot move from there.
+    pub fn new(plant: Arc<dyn Plant>, tcp: TcpPose, tool_m: [f64; 3]) -> Self {
         let zero_n = plant.offset_n(0.0);
         Self {
             plant,
             tcp,
             velocity_m_s: [0.0; 3],
+            tool_m,
+            joints_rad: joints::at_start(&tcp, tool_m),
+            joint_speeds_rad_s: [0.0; 6],
+            carried: tcp,
+            has_limits: true,
             drive: Drive::Hold,
             force: None,
             damping: DAMPING,
@@ -173,9 +214,13 @@ impl Arm {
         Ok(())
     }
 
-    /// Brakes what moves it. Force mode goes on.
+    /// Brakes what moves it; joints that turn, as joints. Force mode goes on.
     pub fn brake(&mut self, deceleration_m_s2: f64) {
-        self.drive = Drive::Stop { deceleration_m_s2 };
+        self.drive = match self.drive {
+            Drive::Joints { .. } => Drive::StopJoints { deceleration_rad_s2: joints::BRAKE_RAD_S2 },
+            brakes @ Drive::StopJoints { .. } => brakes,
+            _ => Drive::Stop { deceleration_m_s2 },
+        };
     }
 
     /// Whether a line or a braking is under way.
@@ -232,7 +277,7 @@ impl Arm {
     /// Ends whatever moves it, and brakes.
     pub fn stop(&mut self) {
         self.force = None;
-        self.drive = Drive::Stop { deceleration_m_s2: BRAKE_M_S2 };
+        self.brake(BRAKE_M_S2);
     }
 
     /// Somebody pushes the tool by so much, against the stiffness of the arm.
@@ -329,15 +374,25 @@ impl Arm {
         if let Some(mode) = self.force {
             self.drive = Drive::Hold;
             self.apply(&mode, time_s)?;
+            self.take_joints_along()?;
         } else {
+            let moves = matches!(self.drive, Drive::Line { .. } | Drive::Joints { .. });
             match self.drive {
                 Drive::Hold => self.velocity_m_s = [0.0; 3],
                 Drive::Stop { deceleration_m_s2 } => self.slow_down(deceleration_m_s2),
                 Drive::Line { target, speed_m_s, acceleration_m_s2 } => {
-                    self.follow(&target, speed_m_s, acceleration_m_s2)?;
+                    self.follow(&target, speed_m_s, acceleration_m_s2);
                 }
+                Drive::Joints { target_rad, speed_rad_s, acceleration_rad_s2 } => {
+                    self.turn(&target_rad, speed_rad_s, acceleration_rad_s2);
+                }
+                Drive::StopJoints { deceleration_rad_s2 } => self.slow_joints(deceleration_rad_s2),
             }
+            self.take_joints_along()?;
             self.velocity_m_s = [0, 1, 2].map(|i| (self.tcp.position_m[i] - before.position_m[i]) / STEP_S);
+            if moves {
+                self.carries_nothing_fixed()?;
+            }
         }
         // While the simulator pulls, its sensor has its own noise.
         let noise_n =
@@ -360,7 +415,7 @@ impl Arm {
         }
     }
 
-    fn follow(&mut self, target: &TcpPose, speed_m_s: f64, acceleration_m_s2: f64) -> Result<(), ArmError> {
+    fn follow(&mut self, target: &TcpPose, speed_m_s: f64, acceleration_m_s2: f64) {
         let left_m = self.tcp.distance_m(target);
         // As fast as it has become, and as it can still brake from.
         let faster = self.speed_m_s() + acceleration_m_s2 * STEP_S;
@@ -369,11 +424,20 @@ impl Arm {
         let share = if left_m <= step_m { 1.0 } else { step_m / left_m };
         for axis in 0..3 {
             self.tcp.position_m[axis] += share * (target.position_m[axis] - self.tcp.position_m[axis]);
-            self.tcp.rotation_rad[axis] += share * (target.rotation_rad[axis] - self.tcp.rotation_rad[axis]);
+        }
+        if self.tcp.rotation_rad != target.rotation_rad {
+            let (from, to) = (self.tcp.base_from_tool().rotation, target.base_from_tool().rotation);
+            // The shorter way round, about one axis.
+            let step = UnitQuaternion::from_scaled_axis(share * from.rotation_to(&to).scaled_axis());
+            self.tcp.rotation_rad = (step * from).scaled_axis().into();
         }
         if share == 1.0 {
             (self.tcp, self.drive) = (*target, Drive::Hold);
         }
+    }
+
+    /// A fixed part in the jaws lets itself be moved by little.
+    fn carries_nothing_fixed(&mut self) -> Result<(), ArmError> {
         let moved_m = self.tcp.distance_m(&self.gripped_at);
         let held = self.grip.as_ref().is_some_and(|g| g.holds()) && self.pulling.is_none();
         if held && moved_m > COLLISION_M {

@@ -49,7 +49,11 @@ impl Hands for Body<'_> {
     }
 
     fn joints(&self) -> [f64; 6] {
-        super::robot::JOINTS_RAD
+        self.robot.joints_rad
+    }
+
+    fn joint_speeds(&self) -> [f64; 6] {
+        self.robot.joint_speeds_rad_s
     }
 
     fn tool(&self) -> [f64; 6] {
@@ -99,8 +103,14 @@ impl Hands for Body<'_> {
         Ok(())
     }
 
-    fn set_tool(&mut self, [x, y, z, ..]: [f64; 6]) {
+    fn set_tool(&mut self, [x, y, z, rx, ry, rz]: [f64; 6]) -> Result<(), String> {
+        if [rx, ry, rz] != [0.0; 3] {
+            return Err("a tool that is turned at the flange is not simulated".into());
+        }
         self.robot.tool_m = [x, y, z];
+        self.arm.set_tool([x, y, z]);
+        self.robot.tcp = self.arm.tcp();
+        Ok(())
     }
 
     fn zero_sensor(&mut self) {
@@ -127,8 +137,16 @@ impl Hands for Body<'_> {
         self.arm.move_line(TcpPose::from_numbers(target), acceleration_m_s2, speed_m_s)
     }
 
+    fn move_joints(&mut self, target_rad: [f64; 6], acceleration_rad_s2: f64, speed_rad_s: f64) -> Result<(), String> {
+        self.arm.move_joints(target_rad, acceleration_rad_s2, speed_rad_s)
+    }
+
     fn brake(&mut self, deceleration_m_s2: f64) {
         self.arm.brake(deceleration_m_s2);
+    }
+
+    fn brake_joints(&mut self, deceleration_rad_s2: f64) {
+        self.arm.brake_joints(deceleration_rad_s2);
     }
 
     fn is_moving(&self) -> bool {

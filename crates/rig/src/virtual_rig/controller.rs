@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Time on the controller's clock when the rig starts: clients do not trust a controller in its first seconds.
 const BOOTED_S: f64 = 60.0;
 /// Grip centre at the flange that the teach pendant was told, as in the shipped rig.toml.
-const TOOL_M: [f64; 3] = [0.0, 0.0, 0.2];
+pub const TOOL_M: [f64; 3] = [0.0, 0.0, 0.2];
 /// How long a protective stop stays before it can be unlocked.
 const UNLOCK_AFTER_S: f64 = 5.0;
 
@@ -73,6 +73,7 @@ impl Controller {
 
     /// A controller that is powered on with its brakes released. `clock_rate` is how many times faster than real time it runs.
     pub fn new(plant: Arc<dyn Plant>, tcp: TcpPose, clock_rate: f64) -> Self {
+        let arm = Arm::new(plant, tcp, TOOL_M);
         let robot = Robot {
             timestamp_s: BOOTED_S,
             mode: RobotMode::Running,
@@ -80,6 +81,8 @@ impl Controller {
             runtime: RuntimeState::Stopped,
             tcp,
             velocity_m_s: [0.0; 3],
+            joints_rad: arm.joints_rad(),
+            joint_speeds_rad_s: [0.0; 6],
             wrench: [0.0; 6],
             raw_wrench: [0.0; 6],
             speed_slider: 1.0,
@@ -91,7 +94,7 @@ impl Controller {
         };
         Self {
             robot,
-            arm: Arm::new(plant, tcp),
+            arm,
             program: None,
             watchdog: None,
             broken_off: None,
@@ -227,7 +230,7 @@ impl Controller {
     /// The arm brakes. A program that runs waits, and its motion with it; force mode is over.
     fn break_off(&mut self) {
         if self.robot.runtime == RuntimeState::Playing {
-            self.broken_off = Some(self.arm.drive()).filter(|drive| matches!(drive, Drive::Line { .. }));
+            self.broken_off = Some(self.arm.drive()).filter(|drive| matches!(drive, Drive::Line { .. } | Drive::Joints { .. }));
         }
         self.arm.stop();
         if self.program.is_some() {
@@ -239,10 +242,16 @@ impl Controller {
     pub fn play(&mut self) {
         if self.program.is_some() && self.robot.safety == SafetyStatus::Normal {
             self.robot.runtime = RuntimeState::Playing;
-            if let Some(Drive::Line { target, speed_m_s, acceleration_m_s2 }) = self.broken_off.take() {
-                // It is not in force mode: the pause has ended that.
-                let _ = self.arm.move_line(target, acceleration_m_s2, speed_m_s);
-            }
+            // It is not in force mode: the pause has ended that.
+            let _ = match self.broken_off.take() {
+                Some(Drive::Line { target, speed_m_s, acceleration_m_s2 }) => {
+                    self.arm.move_line(target, acceleration_m_s2, speed_m_s)
+                }
+                Some(Drive::Joints { target_rad, speed_rad_s, acceleration_rad_s2 }) => {
+                    self.arm.move_joints(target_rad, acceleration_rad_s2, speed_rad_s)
+                }
+                _ => Ok(()),
+            };
         }
     }
 
@@ -295,6 +304,10 @@ impl Controller {
         match self.arm.advance(self.robot.timestamp_s) {
             Ok(()) => {}
             Err(ArmError::Collision { .. }) => self.protective_stop(),
+            Err(e @ (ArmError::OutOfReach(_) | ArmError::TooFast { .. })) => {
+                self.announce_problem(&e.to_string());
+                self.protective_stop();
+            }
             Err(e @ ArmError::Plant(_)) => {
                 self.announcements.push(Announcement::CannotRun { problem: e.to_string() });
                 self.stop_program("the plant cannot go on");
@@ -302,6 +315,8 @@ impl Controller {
         }
         self.robot.tcp = self.arm.tcp();
         self.robot.velocity_m_s = self.arm.velocity_m_s();
+        self.robot.joints_rad = self.arm.joints_rad();
+        self.robot.joint_speeds_rad_s = self.arm.joint_speeds_rad_s();
         let (force_n, raw_n) = self.arm.force_z_n();
         (self.robot.wrench[2], self.robot.raw_wrench[2]) = (force_n, raw_n);
         // At the grip a force has no lever; at the flange it has (see `Body::tcp_force`).

@@ -16,6 +16,7 @@ use std::sync::Arc;
 #[path = "../../tests/common/plant.rs"]
 pub(super) mod plant;
 
+mod joints;
 mod pulls;
 
 const START: TcpPose = TcpPose { position_m: [0.3, 0.0, 0.2], rotation_rad: [0.0; 3] };
@@ -240,13 +241,13 @@ fn a_text_that_is_no_program_is_announced_and_replaces_nothing() {
     assert_eq!(rig.controller.program_title(), Some("gripgen_move"));
     let [Announcement::CannotRun { problem }] = &rig.told[..] else { panic!("{:?}", rig.told) };
     assert_eq!(problem, "line 3: `frobnicate` is no function that is known");
-    rig.controller.run_script("def my_program():\n  movej([0,0,0,0,0,0])\nend\n");
+    rig.controller.run_script("def my_program():\n  movej([0,0,7,0,0,0])\nend\n");
     rig.run(0.1);
     assert_eq!(rig.controller.program_title(), None);
     let Some(Announcement::Stopped { title, why }) = rig.told.last() else { panic!("{:?}", rig.told) };
     assert_eq!(
         (title.as_str(), why.as_str()),
-        ("my_program", "line 2: movej: movej to joints: this robot has no joints")
+        ("my_program", "line 2: movej: joint 3 at 7.00 rad, 6.28 rad are the most")
     );
     assert!(rig.stands_still());
 }
@@ -306,6 +307,17 @@ fn a_motion_arrives_and_every_other_way_out_stops_it() {
     // 3 kg are 29.4 N.
     broken_off(|_| (), |rig| rig.controller.arm_mut().hang(3.0), StopReason::Force);
     broken_off(|m| m.max_time_s = 0.5, |_| (), StopReason::Time);
+}
+
+/// The program asks the controller before it moves.
+#[test]
+fn a_pose_beyond_the_reach_is_refused_before_anything_moves() {
+    let mut rig = rig();
+    rig.go(4);
+    rig.controller.run_script(&motion(|m| m.target.position_m[0] = 1.2).script().unwrap());
+    rig.until_phase(Phase::Stopped);
+    assert_eq!((rig.reason(), rig.controller.robot().tcp), (Some(StopReason::Unreachable), START));
+    assert_eq!(rig.controller.robot().safety, SafetyStatus::Normal);
 }
 
 #[test]

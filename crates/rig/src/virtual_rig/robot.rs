@@ -1,5 +1,6 @@
 //! What the virtual robot is at a moment, and what of it can be read and written by name.
 
+use super::kinematics::Joints;
 use crate::program::TcpPose;
 use crate::robot_state::{RobotMode, SafetyStatus};
 use crate::rtde::Value;
@@ -62,6 +63,10 @@ pub struct Robot {
     pub tcp: TcpPose,
     /// How fast it moves.
     pub velocity_m_s: [f64; 3],
+    /// Its joints, from the base to the flange.
+    pub joints_rad: Joints,
+    /// How fast they turn.
+    pub joint_speeds_rad_s: Joints,
     /// Load on the tool in the base frame, zeroed: force in N, torque in Nm.
     pub wrench: [f64; 6],
     /// The same before zeroing.
@@ -80,8 +85,6 @@ pub struct Robot {
     pub outputs: Registers,
 }
 
-/// Joints of a UR5e with the tool down in front of it. They do not follow the tool: no client of this rig asks where they are.
-pub(super) const JOINTS_RAD: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
 /// What joints, tool and boards of a robot at rest show, where a client wants to see something.
 const PART_TEMPERATURE_C: f64 = 30.0;
 const MAIN_VOLTAGE_V: f64 = 48.0;
@@ -119,7 +122,8 @@ impl Robot {
         }
         Some(match name {
             "timestamp" => kind.value(&[self.timestamp_s]),
-            "actual_q" | "target_q" => kind.value(&JOINTS_RAD),
+            "actual_q" | "target_q" => kind.value(&self.joints_rad),
+            "actual_qd" | "target_qd" => kind.value(&self.joint_speeds_rad_s),
             "joint_temperatures" => kind.value(&[PART_TEMPERATURE_C; 6]),
             "tool_temperature" => kind.value(&[PART_TEMPERATURE_C]),
             "actual_joint_voltage" => kind.value(&[MAIN_VOLTAGE_V; 6]),
@@ -181,6 +185,8 @@ mod tests {
             runtime: RuntimeState::Stopped,
             tcp,
             velocity_m_s: [0.0; 3],
+            joints_rad: [0.0, -1.5, 1.5, 0.0, 0.0, 0.1],
+            joint_speeds_rad_s: [0.0; 6],
             wrench: [0.0; 6],
             raw_wrench: [0.0; 6],
             speed_slider: 1.0,
@@ -194,6 +200,7 @@ mod tests {
             ("timestamp", Value::Double(61.5)),
             ("robot_mode", Value::Int32(7)),
             ("runtime_state", Value::Uint32(1)),
+            ("actual_q", Value::Vector6d([0.0, -1.5, 1.5, 0.0, 0.0, 0.1])),
             ("payload_cog", Value::Vector3d([0.0, 0.0, 0.04])),
             ("tool_mode", Value::Uint32(253)),
             // Of a part that nothing here uses.

@@ -14,6 +14,7 @@ mod builtins;
 mod hands;
 mod lexer;
 mod machine;
+mod motion;
 mod operators;
 mod parser;
 mod program;

@@ -1,6 +1,7 @@
 //! Functions of the language, by the names and the parameters of the manual.
 
 use super::hands::{ForceMode, Hands, Watchdog, WatchdogAction};
+use super::motion;
 use super::value::{MAX_TEXT, Value};
 use gripgen_twin::frames::Pose;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
@@ -80,12 +81,11 @@ const KEYWORDS: [&str; 24] = [
     "enter_critical",
 ];
 
-/// Functions of the language that are known by name and cannot be followed here: they need joints, tools or other machines.
-const MISSING: [&str; 61] = [
+/// Functions of the language that are known by name and cannot be followed here: they need masses, tools or other machines.
+const MISSING: [&str; 55] = [
     "enable_external_ft_sensor",
     "ft_rtde_input_enable",
     "get_actual_joint_positions_history",
-    "get_actual_tool_flange_pose",
     "get_coriolis_and_centrifugal_torques",
     "get_freedrive_status",
     "get_jacobian",
@@ -105,9 +105,6 @@ const MISSING: [&str; 61] = [
     "end_freedrive_mode",
     "teach_mode",
     "end_teach_mode",
-    "get_inverse_kin",
-    "get_inverse_kin_has_solution",
-    "get_forward_kin",
     "is_within_safety_limits",
     "tool_contact",
     "socket_open",
@@ -141,8 +138,6 @@ const MISSING: [&str; 61] = [
     "rpc_factory",
     "direct_torque",
     "set_gravity",
-    "get_actual_joint_speeds",
-    "get_target_joint_speeds",
 ];
 
 /// Whether this is a word of the language: no variable and no function of a program can have its name.
@@ -230,6 +225,8 @@ static TABLE: &[Builtin] = &[
     hands("get_tcp_force", &[], 0, |_, h| give(Value::Pose(h.tcp_force()))),
     hands("get_actual_joint_positions", &[], 0, |_, h| give(list(&h.joints()))),
     hands("get_target_joint_positions", &[], 0, |_, h| give(list(&h.joints()))),
+    hands("get_actual_joint_speeds", &[], 0, |_, h| give(list(&h.joint_speeds()))),
+    hands("get_target_joint_speeds", &[], 0, |_, h| give(list(&h.joint_speeds()))),
     hands("get_tcp_offset", &[], 0, |_, h| give(Value::Pose(h.tool()))),
     hands("get_target_payload", &[], 0, |_, h| give(Value::Float(h.payload_kg()))),
     hands("is_steady", &[], 0, |_, h| {
@@ -274,7 +271,7 @@ static TABLE: &[Builtin] = &[
     hands("set_payload", &["m", "cog"], 1, |a, h| payload(a, h)),
     hands("set_target_payload", &["m", "cog", "inertia"], 1, |a, h| payload(a, h)),
     hands("set_tcp", &["pose", "tcp_name"], 1, |a, h| {
-        h.set_tool(a[0].pose()?);
+        h.set_tool(a[0].pose()?)?;
         done()
     }),
     hands("zero_ftsensor", &[], 0, |_, h| {
@@ -296,15 +293,15 @@ static TABLE: &[Builtin] = &[
         done()
     }),
     // Motion.
-    hands("movel", &["pose", "a", "v", "t", "r"], 1, |a, h| move_to(a, h, 1.2, 0.25)),
-    hands("movej", &["q", "a", "v", "t", "r"], 1, |a, h| {
-        if matches!(a[0], Value::List(_)) {
-            return Err("movej to joints: this robot has no joints".into());
-        }
-        move_to(a, h, 1.4, 1.05)
-    }),
-    hands("stopl", &["a", "aRot"], 1, brake),
-    hands("stopj", &["a"], 1, brake),
+    hands("movel", &["pose", "a", "v", "t", "r"], 1, motion::move_line),
+    hands("movej", &["q", "a", "v", "t", "r"], 1, motion::move_joints),
+    hands("stopl", &["a", "aRot"], 1, motion::stop_line),
+    hands("stopj", &["a"], 1, motion::stop_joints),
+    // Joints.
+    hands("get_forward_kin", &["q", "tcp"], 0, motion::forward),
+    hands("get_inverse_kin", &motion::INVERSE, 1, motion::inverse),
+    hands("get_inverse_kin_has_solution", &motion::INVERSE, 1, motion::has_inverse),
+    hands("get_actual_tool_flange_pose", &[], 0, |_, h| give(motion::flange(h))),
     // The host.
     hands("rtde_set_watchdog", &["variable_name", "min_frequency", "action"], 2, watchdog),
     hands("textmsg", &["s1", "s2"], 1, |a, h| {
@@ -352,7 +349,7 @@ fn text(text: String) -> Result<Value, String> {
     Ok(Value::Text(Arc::from(text)))
 }
 
-fn list(numbers: &[f64]) -> Value {
+pub(super) fn list(numbers: &[f64]) -> Value {
     Value::List(Arc::new(numbers.iter().map(|x| Value::Float(*x)).collect()))
 }
 
@@ -377,13 +374,13 @@ fn norm(a: &[Value]) -> Result<Value, String> {
     }
 }
 
-fn pose(value: &Value) -> Result<Pose, String> {
+pub(super) fn pose(value: &Value) -> Result<Pose, String> {
     let [x, y, z, rx, ry, rz] = value.pose()?;
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(rx, ry, rz));
     Ok(Pose::from_parts(Translation3::new(x, y, z), turn))
 }
 
-fn numbers(pose: &Pose) -> Value {
+pub(super) fn numbers(pose: &Pose) -> Value {
     let (t, r) = (pose.translation.vector, pose.rotation.scaled_axis());
     Value::Pose([t.x, t.y, t.z, r.x, r.y, r.z])
 }
@@ -439,34 +436,6 @@ fn force_mode(a: &[Value], h: &mut dyn Hands) -> Result<Outcome, String> {
     }
     h.force_mode(ForceMode { frame, compliant: selection.map(|s| s == 1.0), wrench, limits })?;
     done()
-}
-
-fn move_to(a: &[Value], h: &mut dyn Hands, default_a: f64, default_v: f64) -> Result<Outcome, String> {
-    let or =
-        |value: &Value, default: f64| if matches!(value, Value::None) { Ok(default) } else { value.number() };
-    if or(&a[3], 0.0)? != 0.0 || or(&a[4], 0.0)? != 0.0 {
-        return Err(
-            "a motion with a time or a blend radius: this robot knows acceleration and speed alone".into()
-        );
-    }
-    let (acceleration, speed) = (or(&a[1], default_a)?, or(&a[2], default_v)?);
-    if !(acceleration > 0.0 && speed > 0.0) {
-        return Err(format!("a motion with an acceleration of {acceleration} and a speed of {speed}"));
-    }
-    if matches!(a[0], Value::List(_)) {
-        return Err("movel to joints: this robot has no joints".into());
-    }
-    h.move_line(a[0].pose()?, acceleration, speed)?;
-    Ok(Outcome::Motion)
-}
-
-fn brake(a: &[Value], h: &mut dyn Hands) -> Result<Outcome, String> {
-    let deceleration = a[0].number()?;
-    if deceleration <= 0.0 {
-        return Err(format!("a stop with a deceleration of {deceleration}"));
-    }
-    h.brake(deceleration);
-    Ok(Outcome::Motion)
 }
 
 fn watchdog(a: &[Value], h: &mut dyn Hands) -> Result<Outcome, String> {

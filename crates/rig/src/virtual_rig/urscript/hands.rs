@@ -45,6 +45,8 @@ pub trait Hands {
     fn tcp_force(&self) -> [f64; 6];
     /// Joint angles, rad.
     fn joints(&self) -> [f64; 6];
+    /// How fast they turn, rad/s.
+    fn joint_speeds(&self) -> [f64; 6];
     /// Grip centre at the flange.
     fn tool(&self) -> [f64; 6];
     /// Weight at the flange, kg.
@@ -70,7 +72,11 @@ pub trait Hands {
     /// A weight that the robot does not take.
     fn set_payload(&mut self, mass_kg: f64, centre_m: Option<[f64; 3]>) -> Result<(), String>;
     /// Grip centre at the flange.
-    fn set_tool(&mut self, tool: [f64; 6]);
+    ///
+    /// # Errors
+    ///
+    /// A tool that the robot does not take.
+    fn set_tool(&mut self, tool: [f64; 6]) -> Result<(), String>;
     /// What the sensor feels now becomes zero.
     fn zero_sensor(&mut self);
     /// Force mode begins, or gets other numbers.
@@ -92,8 +98,16 @@ pub trait Hands {
     ///
     /// Where the robot cannot.
     fn move_line(&mut self, target: [f64; 6], acceleration_m_s2: f64, speed_m_s: f64) -> Result<(), String>;
+    /// Begins to turn its joints to others.
+    ///
+    /// # Errors
+    ///
+    /// Where the robot cannot.
+    fn move_joints(&mut self, target_rad: [f64; 6], acceleration_rad_s2: f64, speed_rad_s: f64) -> Result<(), String>;
     /// Begins to brake.
     fn brake(&mut self, deceleration_m_s2: f64);
+    /// Begins to brake its joints.
+    fn brake_joints(&mut self, deceleration_rad_s2: f64);
     /// Whether a motion or a braking is still under way.
     fn is_moving(&self) -> bool;
 

@@ -26,8 +26,11 @@ impl Hands for Paper {
     fn joints(&self) -> [f64; 6] {
         [0.0; 6]
     }
-    fn tool(&self) -> [f64; 6] {
+    fn joint_speeds(&self) -> [f64; 6] {
         [0.0; 6]
+    }
+    fn tool(&self) -> [f64; 6] {
+        [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]
     }
     fn payload_kg(&self) -> f64 {
         0.0
@@ -54,7 +57,9 @@ impl Hands for Paper {
         self.asked.push(format!("payload {mass_kg} {centre_m:?}"));
         Ok(())
     }
-    fn set_tool(&mut self, _: [f64; 6]) {}
+    fn set_tool(&mut self, _: [f64; 6]) -> Result<(), String> {
+        Ok(())
+    }
     fn zero_sensor(&mut self) {}
     fn force_mode(&mut self, mode: ForceMode) -> Result<(), String> {
         self.asked.push(format!("force {:?} {:?}", mode.compliant, mode.wrench));
@@ -70,6 +75,15 @@ impl Hands for Paper {
     }
     fn brake(&mut self, a: f64) {
         self.asked.push(format!("brake {a}"));
+        self.moving = 2;
+    }
+    fn move_joints(&mut self, target_rad: [f64; 6], a: f64, v: f64) -> Result<(), String> {
+        self.asked.push(format!("turn to {:.3} with {a} and {v}", target_rad[0]));
+        self.moving = 5;
+        Ok(())
+    }
+    fn brake_joints(&mut self, a: f64) {
+        self.asked.push(format!("brake joints {a}"));
         self.moving = 2;
     }
     fn is_moving(&self) -> bool {
@@ -148,6 +162,28 @@ fn expressions_are_those_of_the_manual() {
     assert_eq!(said(back), ["True"]);
 }
 
+/// The flange with all joints at 0 lies 817.2 mm behind the base, by the lengths of its links; the tool of this robot is 100 mm long.
+#[test]
+fn joints_and_poses_lead_to_each_other() {
+    for (expression, wanted) in [
+        ("floor(get_forward_kin([0, 0, 0, 0, 0, 0], p[0, 0, 0, 0, 0, 0])[0] * 10000 + 0.5)", "-8172"),
+        ("floor(get_forward_kin([0, 0, 0, 0, 0, 0])[1] * 10000 + 0.5)", "-3329"),
+        ("norm(get_actual_tool_flange_pose()) == norm(get_forward_kin(tcp=p[0, 0, 0, 0, 0, 0]))", "True"),
+        ("get_inverse_kin_has_solution(p[0.4, 0, 0.2, 0, 3.14, 0])", "True"),
+        ("get_inverse_kin_has_solution(p[1.4, 0, 0.2, 0, 3.14, 0])", "False"),
+        ("get_inverse_kin_has_solution(p[0.95, 0, 0.2, 0, 1.57, 0], tcp=p[0, 0, 0.2, 0, 0, 0])", "True"),
+        ("get_inverse_kin_has_solution(p[0.95, 0, 0.2, 0, 1.57, 0], tcp=p[0, 0, -0.2, 0, 0, 0])", "False"),
+    ] {
+        assert_eq!(said(&format!("textmsg({expression})\n")), [wanted], "{expression}");
+    }
+    let back = "q = [0.3, -1.2, 1.4, -0.9, 1.1, 0.4]\nr = get_inverse_kin(get_forward_kin(q), qnear=q)\ntextmsg(norm([r[0] - q[0], r[2] - q[2], \
+                r[4] - q[4], r[5] - q[5]]) < 0.000001)\n";
+    assert_eq!(said(back), ["True"]);
+    assert_eq!(said("movej([0.5, 0, 0, 0, 0, 0], v=0.2)\nstopj(3)\n"), ["turn to 0.500 with 1.4 and 0.2", "brake joints 3"]);
+    assert_eq!(said("movel(get_forward_kin([0, 0, 0, 0, 0, 0]), a=0.5)\n"), said("movel([0, 0, 0, 0, 0, 0], a=0.5)\n"));
+    assert!(refused("x = get_inverse_kin(p[1.4, 0, 0.2, 0, 0, 0])\n").contains("no joints of a UR5e"));
+}
+
 #[test]
 fn what_is_wrong_is_said_with_its_line() {
     for (lines, wanted) in [
@@ -164,7 +200,7 @@ fn what_is_wrong_is_said_with_its_line() {
         ("sync(1)\n", "`sync` takes at most 0 values"),
         ("sleep()\n", "`sleep` lacks `t`"),
         ("movel(p[0,0,0,0,0,0], w=1)\n", "`movel` has no parameter `w`"),
-        ("movej([0,0,0,0,0,0])\n", "no joints"),
+        ("movej([0,0,0,0,0,0], t=2)\n", "a time or a blend radius"),
         ("servoj([0,0,0,0,0,0], t=0.1)\n", "`servoj` cannot be followed"),
         ("write_output_integer_register(48, 1)\n", "there is no register 48"),
         ("write_output_integer_register(24, 1.5)\n", "whole number"),
