@@ -102,9 +102,36 @@ def move_and_force(start):
         seen["seconds for 50 mm at 0.1 m/s"] = time.monotonic() - begun
         seen["payload"] = control.setPayload(1.25, [0.0, 0.0, 0.04])
         control.moveL(start, 0.25, 1.2)
-        seen["not simulated"] = control.setTcp([0] * 6)
+        there = receive.getActualTCPPose()
+        seen["another tool"] = control.setTcp([0] * 6)
+        time.sleep(0.1)
+        seen["flange"] = [a - b for a, b in zip(receive.getActualTCPPose(), there, strict=True)]
+        control.setTcp([0, 0, 0.2, 0, 0, 0])
     time.sleep(0.1)
     seen["runtime at the end"] = receive.getRuntimeState()
+    receive.disconnect()
+    return seen
+
+
+def joints(poses, near, start):
+    """The joints of poses, asked of the controller; then a motion of joints and one back.
+
+    Joints with a tool are not asked for their pose: ur_rtde 1.6.5 sends more numbers for that than it has told the controller.
+    """
+    receive, seen = receiver([*NAMED, "actual_q"]), {}
+    with controller() as control:
+        seen["inverse"] = [control.getInverseKinematics(pose, near, 1e-10, 1e-10) for pose in poses]
+        seen["reachable"] = [control.getInverseKinematicsHasSolution([x, 0.1, 0.3, 0, 3.1, 0]) for x in (0.4, 1.4)]
+        before = receive.getActualQ()
+        to = [before[0] + 0.3, before[1] - 0.1, *before[2:]]
+        begun = receive.getTimestamp()
+        seen["turned"] = control.moveJ(to, 0.5, 1.0)
+        seen["seconds"] = receive.getTimestamp() - begun
+        time.sleep(0.1)
+        seen["off"] = [a - b for a, b in zip(receive.getActualQ(), to, strict=True)]
+        seen["joints"], seen["pose"] = receive.getActualQ(), receive.getActualTCPPose()
+        seen["forward"] = control.getForwardKinematics()
+        seen["back"] = control.moveL(start, 0.25, 1.2)
     receive.disconnect()
     return seen
 

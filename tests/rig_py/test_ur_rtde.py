@@ -82,12 +82,14 @@ def test_force_mode_moves_a_free_arm_and_lines_arrive(rig):
         seen = run_scenario("move_and_force", rig.start_pose)
         states = reader.column("runtime_state")
     assert PROGRAM_RUNS in states and seen["runtime at the end"] == 1
-    for done in ("running", "at start", "zeroed", "force", "force stop", "moved", "payload", "not simulated"):
+    for done in ("running", "at start", "zeroed", "force", "force stop", "moved", "payload", "another tool"):
         assert seen[done] is True, done
     assert seen["speed"] == pytest.approx(0.05), "the limit, with nothing that holds it back"
     assert 0.02 < seen["rise"][2] < 0.1 and seen["rise"][:2] == [0, 0] and seen["rise"][3:] == [0] * 3
     assert seen["drift"] == 0.0, "it stands after forceModeStop"
     assert max(map(abs, seen["arrived"])) < 1e-6
+    # The tool points down.
+    assert seen["flange"] == pytest.approx([0, 0, 0.2, 0, 0, 0], abs=1e-6)
     assert 0.49 < seen["seconds for 50 mm at 0.1 m/s"] < 1.5
 
 
