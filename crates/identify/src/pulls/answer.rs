@@ -22,7 +22,9 @@ use super::terms::Terms;
 use super::unknown::unknown;
 use super::worth::{BAD, HeldOut, hints, worse};
 use super::zero_screen::{said, zeros_that_depend};
-use crate::diagnosis::{Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, Residual, UnknownCovariate};
+use crate::diagnosis::{
+    Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, ParameterEstimate, Residual, UnknownCovariate,
+};
 use gripgen_twin::columns::covariates;
 use gripgen_twin::rounded;
 use gripgen_twin::{MeasuredPulls, Posterior};
@@ -148,8 +150,10 @@ pub fn diagnose_pulls(
         accepted.fitted = left.fitted.clone();
     }
     // What is stated from here on is what a twin of these models says.
+    let again = recalibrated(seen, &rows);
+    let scattered = again.as_ref().map(|(.., scattered)| *scattered);
     let (before_context, stated_before) =
-        recalibrated(seen, &rows).unwrap_or_else(|| context.stated(&before));
+        again.map_or_else(|| context.stated(&before), |(context, fitted, _)| (context, fitted));
     let heldout_before = predicted(&before_context, &stated_before, &repetitions, false);
     // Where nothing was found, or nothing that predicts better, that is the baseline as a calibration writes it.
     let mut found = !accepted.effects.is_empty() || !accepted.curves.is_empty() || left.is_some();
@@ -214,6 +218,9 @@ pub fn diagnose_pulls(
     }
     diagnosis.conclude();
     diagnosis.baseline = baseline(&after, &after_context);
+    if let Some((value, low90, high90)) = scattered.filter(|_| !found) {
+        diagnosis.baseline.insert("scatter".into(), ParameterEstimate::new(value, (low90, high90), "1"));
+    }
     let named_rows = outliers(&after);
     diagnosis.data.outliers = named_rows.iter().map(|&i| measured.pulls[i].id.clone()).collect();
     let counted: Vec<usize> = rows.iter().copied().filter(|i| !named_rows.contains(i)).collect();

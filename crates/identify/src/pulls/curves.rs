@@ -6,6 +6,9 @@ use nalgebra::{DMatrix, DVector};
 /// The column whose words do not come back.
 pub(super) const SESSION: &str = "session";
 
+/// Fewest pulls with a word that show a step of it: two pulls that lie far off are two bad pulls.
+const MIN_STEP: usize = 3;
+
 /// A dependence of friction on a column that no effect explains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
@@ -117,9 +120,13 @@ pub fn curves_in(name: &str, column: &Column) -> Vec<Curve> {
     };
     match column {
         Column::Word(at, names) => {
-            let n = names.len() - 1;
-            let row = |w: &usize| (0..n).map(|k| f64::from(u8::from(*w == k + 1))).collect();
-            vec![curve(at.iter().map(row).collect(), n)]
+            let count = |word: usize| at.iter().filter(|w| **w == word).count();
+            let steps: Vec<usize> = (0..names.len()).filter(|&word| count(word) >= MIN_STEP).skip(1).collect();
+            if steps.is_empty() {
+                return vec![];
+            }
+            let row = |w: &usize| steps.iter().map(|word| f64::from(u8::from(w == word))).collect();
+            vec![curve(at.iter().map(row).collect(), steps.len())]
         }
         Column::Number(x) => {
             let distinct = column.distinct();
@@ -267,13 +274,24 @@ mod tests {
     /// A curve at one word says whether that word is a session, steps say whether they are between sessions.
     #[test]
     fn sessions_are_known_from_other_words() {
-        let words = Column::Word(vec![0, 0, 1, 1], ["a", "b"].map(String::from).to_vec());
+        let words = Column::Word(vec![0, 0, 0, 1, 1, 1], ["a", "b"].map(String::from).to_vec());
         let steps = |name: &str| curves_in(name, &words).remove(0);
         assert_eq!(steps("session").session(), Session::Steps);
         assert_eq!(steps("operator").session(), Session::Elsewhere);
         let at = |other: &str| Curve { only: Some((other.into(), "a".into())), ..steps("dwell_s") };
         assert_eq!(at("session").session(), Session::Slope);
         assert_eq!(at("operator").session(), Session::Elsewhere);
+    }
+
+    /// A word with two pulls has no step: they are drawn like the pulls of the first word, and alone make no curve.
+    #[test]
+    fn two_pulls_are_no_step() {
+        let words = ["a", "b", "c"].map(String::from).to_vec();
+        let curve = curves_in("session", &Column::Word(vec![0, 0, 1, 1, 1, 2, 2, 2], words.clone())).remove(0);
+        assert_eq!((curve.len(), curve.cost), (1, 1));
+        assert_eq!(curve.basis[0], curve.basis[3]);
+        assert_ne!(curve.basis[3], curve.basis[6]);
+        assert!(curves_in("session", &Column::Word(vec![0, 0, 1, 1, 1, 2, 2], words)).is_empty());
     }
 
     /// A wave of 7.3 cycles, sampled unevenly, is found with its frequency and explains nearly everything.
