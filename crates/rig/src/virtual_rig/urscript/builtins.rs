@@ -82,7 +82,7 @@ const KEYWORDS: [&str; 24] = [
 ];
 
 /// Functions of the language that are known by name and cannot be followed here: they need masses, tools or other machines.
-const MISSING: [&str; 55] = [
+const MISSING: [&str; 58] = [
     "enable_external_ft_sensor",
     "ft_rtde_input_enable",
     "get_actual_joint_positions_history",
@@ -138,11 +138,19 @@ const MISSING: [&str; 55] = [
     "rpc_factory",
     "direct_torque",
     "set_gravity",
+    "set_tool_voltage",
+    "optimovej",
+    "optimovel",
 ];
 
-/// Whether this is a word of the language: no variable and no function of a program can have its name.
+/// Whether this is a word of the language: no function of a program can have its name.
 pub fn is_word(name: &str) -> bool {
-    KEYWORDS.contains(&name) || name == "exit_critical" || find(name).is_some()
+    is_keyword(name) || find(name).is_some()
+}
+
+/// Whether this is a word that builds sentences: no variable can have its name. A variable may be called as a function is, `length` for example.
+pub(super) fn is_keyword(name: &str) -> bool {
+    KEYWORDS.contains(&name) || name == "exit_critical"
 }
 
 /// The function of this name.
@@ -224,6 +232,8 @@ static TABLE: &[Builtin] = &[
     hands("get_target_tcp_speed", &[], 0, |_, h| give(list(&h.tcp_speed()))),
     hands("get_tcp_force", &[], 0, |_, h| give(Value::Pose(h.tcp_force()))),
     hands("get_actual_joint_positions", &[], 0, |_, h| give(list(&h.joints()))),
+    // An older name, which UR's client library uses.
+    hands("get_joint_positions", &[], 0, |_, h| give(list(&h.joints()))),
     hands("get_target_joint_positions", &[], 0, |_, h| give(list(&h.joints()))),
     hands("get_actual_joint_speeds", &[], 0, |_, h| give(list(&h.joint_speeds()))),
     hands("get_target_joint_speeds", &[], 0, |_, h| give(list(&h.joint_speeds()))),
@@ -269,7 +279,7 @@ static TABLE: &[Builtin] = &[
     }),
     // Settings.
     hands("set_payload", &["m", "cog"], 1, |a, h| payload(a, h)),
-    hands("set_target_payload", &["m", "cog", "inertia"], 1, |a, h| payload(a, h)),
+    hands("set_target_payload", &["m", "cog", "inertia", "transition_time"], 1, |a, h| payload(a, h)),
     hands("set_tcp", &["pose", "tcp_name"], 1, |a, h| {
         h.set_tool(a[0].pose()?)?;
         done()

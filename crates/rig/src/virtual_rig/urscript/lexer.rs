@@ -17,10 +17,11 @@ pub(super) enum Token {
 const SYMBOLS: [&str; 19] =
     ["==", "!=", "<=", ">=", "<", ">", "=", "+", "-", "*", "/", "%", "(", ")", "[", "]", ",", ":", "."];
 
-/// Words with their lines; the last is [`Token::End`].
+/// Words with their lines; the last is [`Token::End`]. A line goes on in the next one while a bracket is open and behind an operator, as in the program that UR's own
+/// client library sends.
 pub(super) fn words(text: &str) -> Result<Vec<(Token, u32)>, ScriptError> {
     let mut words: Vec<(Token, u32)> = Vec::new();
-    let mut line = 0;
+    let (mut line, mut open) = (0, 0_u32);
     for row in text.lines() {
         line += 1;
         let wrong = |problem: String| ScriptError { line, problem };
@@ -31,13 +32,32 @@ pub(super) fn words(text: &str) -> Result<Vec<(Token, u32)>, ScriptError> {
         }
         while !rest.is_empty() && !rest.starts_with('#') {
             let (token, length) = word(rest).map_err(wrong)?;
+            match token {
+                Token::Symbol("(" | "[") => open += 1,
+                Token::Symbol(")" | "]") => open = open.saturating_sub(1),
+                _ => {}
+            }
             words.push((token, line));
             rest = rest[length..].trim_start();
         }
-        words.push((Token::Newline, line));
+        let goes_on = matches!(words.last(), Some((token, at)) if *at == line && wants_more(token));
+        if open == 0 && !goes_on {
+            words.push((Token::Newline, line));
+        }
     }
     words.push((Token::End, line));
     Ok(words)
+}
+
+/// Whether a value has to follow.
+fn wants_more(token: &Token) -> bool {
+    match token {
+        Token::Symbol(symbol) => {
+            ["==", "!=", "<=", ">=", "<", ">", "+", "-", "*", "/", "%", ","].contains(symbol)
+        }
+        Token::Name(name) => ["and", "or", "xor", "not"].contains(&name.as_str()),
+        _ => false,
+    }
 }
 
 /// The first word and its length in bytes.

@@ -250,7 +250,7 @@ impl Machine {
                     frame.at = *to;
                 }
             }
-            Op::Call(to, count) => self.call(k, *to, *count)?,
+            Op::Call(to, places) => self.call(k, *to, places)?,
             Op::Builtin(builtin, places) => {
                 let given = self.pop_many(k, places.len())?;
                 let mut arguments = vec![Value::None; builtin.parameters.len()];
@@ -316,14 +316,16 @@ impl Machine {
         }
     }
 
-    fn call(&mut self, k: usize, to: usize, count: usize) -> Result<(), String> {
-        let arguments = self.pop_many(k, count)?;
+    fn call(&mut self, k: usize, to: usize, places: &[usize]) -> Result<(), String> {
+        let arguments = self.pop_many(k, places.len())?;
         if self.threads[k].frames.len() >= MAX_CALLS {
             return Err(format!("more than {MAX_CALLS} calls in each other"));
         }
-        let mut locals = vec![None; self.program.functions[to].locals.len()];
-        for (local, value) in locals.iter_mut().zip(arguments) {
-            *local = Some(value);
+        let function = &self.program.functions[to];
+        let mut locals = function.parameters.clone();
+        locals.resize(function.locals.len(), None);
+        for (place, value) in places.iter().zip(arguments) {
+            locals[*place] = Some(value);
         }
         self.threads[k].frames.push(Frame { function: to, at: 0, locals });
         Ok(())

@@ -17,22 +17,25 @@ type Ends = Result<Outcome, String>;
 
 /// A pose in a line; joints are where the tool is with them.
 pub(super) fn move_line(a: &[Value], h: &mut dyn Hands) -> Ends {
-    let (acceleration_m_s2, speed_m_s) = pace(a, LINE)?;
     let target = match &a[0] {
         Value::List(_) => numbers(&(kinematics::base_from_flange(&a[0].numbers()?) * tool(&Value::None, h)?)).pose()?,
         value => value.pose()?,
     };
+    let from = h.tcp_pose();
+    let way_m = (0..3).map(|i| (target[i] - from[i]).powi(2)).sum::<f64>().sqrt();
+    let (acceleration_m_s2, speed_m_s) = pace(a, LINE, way_m)?;
     h.move_line(target, acceleration_m_s2, speed_m_s)?;
     Ok(Outcome::Motion)
 }
 
 /// All joints at once, to others or to those that reach a pose.
 pub(super) fn move_joints(a: &[Value], h: &mut dyn Hands) -> Ends {
-    let (acceleration_rad_s2, speed_rad_s) = pace(a, TURN)?;
-    let target_rad = match &a[0] {
+    let target_rad: Joints = match &a[0] {
         Value::List(_) => a[0].numbers()?,
         value => reaching(value, &Value::None, &Value::None, h)?.map_err(|e| e.to_string())?,
     };
+    let way_rad = h.joints().iter().zip(&target_rad).fold(0.0, |most: f64, (from, to)| most.max((to - from).abs()));
+    let (acceleration_rad_s2, speed_rad_s) = pace(a, TURN, way_rad)?;
     h.move_joints(target_rad, acceleration_rad_s2, speed_rad_s)?;
     Ok(Outcome::Motion)
 }
@@ -92,15 +95,23 @@ fn deceleration(value: &Value) -> Result<f64, String> {
     if deceleration > 0.0 { Ok(deceleration) } else { Err(format!("a stop with a deceleration of {deceleration}")) }
 }
 
-/// Acceleration and speed.
-fn pace(a: &[Value], or: (f64, f64)) -> Result<(f64, f64), String> {
+/// Acceleration and speed of a motion over `way` (m or rad); a time comes before both.
+fn pace(a: &[Value], or: (f64, f64), way: f64) -> Result<(f64, f64), String> {
     let given = |value: &Value, or: f64| if matches!(value, Value::None) { Ok(or) } else { value.number() };
-    if given(&a[3], 0.0)? != 0.0 || given(&a[4], 0.0)? != 0.0 {
-        return Err("a motion with a time or a blend radius: this robot knows acceleration and speed alone".into());
+    let (acceleration, speed, time_s) = (given(&a[1], or.0)?, given(&a[2], or.1)?, given(&a[3], 0.0)?);
+    if given(&a[4], 0.0)? != 0.0 {
+        return Err("a motion with a blend radius: this robot comes to rest at each pose".into());
     }
-    let (acceleration, speed) = (given(&a[1], or.0)?, given(&a[2], or.1)?);
-    if !(acceleration > 0.0 && speed > 0.0) {
-        return Err(format!("a motion with an acceleration of {acceleration} and a speed of {speed}"));
+    if !(acceleration > 0.0 && speed > 0.0 && time_s >= 0.0) {
+        return Err(format!("a motion with an acceleration of {acceleration}, a speed of {speed} and a time of {time_s}"));
     }
-    Ok((acceleration, speed))
+    Ok(if time_s > 0.0 && way > 0.0 { in_time(way, time_s, acceleration) } else { (acceleration, speed) })
+}
+
+/// Acceleration and speed of a way from rest to rest in a time: way = v (t - v / a). With too little acceleration half of the time speeds up and half
+/// brakes, with as much as that takes.
+fn in_time(way: f64, time_s: f64, acceleration: f64) -> (f64, f64) {
+    let least = 4.0 * way / (time_s * time_s);
+    let a = acceleration.max(least);
+    (a, 0.5 * a * time_s * (1.0 - (1.0 - least / a).max(0.0).sqrt()))
 }

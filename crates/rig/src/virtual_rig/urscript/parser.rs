@@ -1,5 +1,6 @@
 //! From words to steps.
 
+mod calls;
 mod expression;
 
 use super::builtins;
@@ -60,7 +61,8 @@ struct Call {
     number: usize,
     place: usize,
     name: String,
-    arguments: usize,
+    /// One for each argument: the parameter that it names.
+    arguments: Vec<Option<String>>,
     line: u32,
     by_run: bool,
 }
@@ -151,7 +153,7 @@ impl Parser {
     /// A name that a program may give.
     fn own_name(&mut self) -> Result<String, ScriptError> {
         match self.peek().clone() {
-            Token::Name(name) if !builtins::is_word(&name) => {
+            Token::Name(name) if !builtins::is_keyword(&name) => {
                 self.at += 1;
                 Ok(name)
             }
@@ -166,7 +168,7 @@ impl Parser {
         let function = Function {
             name: name.into(),
             is_thread,
-            parameters: 0,
+            parameters: Vec::new(),
             locals: Vec::new(),
             code: Vec::new(),
             lines: Vec::new(),
@@ -234,6 +236,9 @@ impl Parser {
         self.at += 1;
         self.deeper()?;
         let name = self.own_name()?;
+        if builtins::is_word(&name) {
+            return Err(self.wrong(format!("`{name}` is a word of the language")));
+        }
         if self.known.insert(name.clone(), self.functions.len()).is_some() {
             return Err(self.wrong(format!("`{name}` is defined twice")));
         }
@@ -246,12 +251,17 @@ impl Parser {
             }
             self.slot(&parameter)?;
             self.here()?.assigned.insert(parameter);
-            self.here()?.function.parameters += 1;
+            let default = if self.take_symbol("=") { Some(self.constant()?) } else { None };
+            let parameters = &mut self.here()?.function.parameters;
+            if default.is_none() && parameters.iter().any(Option::is_some) {
+                return Err(self.wrong("a parameter without a default behind one that has one"));
+            }
+            parameters.push(default);
             if !self.is_symbol(")") {
                 self.expect(",")?;
             }
         }
-        if is_thread && self.here()?.function.parameters > 0 {
+        if is_thread && !self.here()?.function.parameters.is_empty() {
             return Err(self.wrong("a thread has no parameters"));
         }
         self.expect(":")?;
@@ -339,7 +349,7 @@ impl Parser {
                 let name = self.own_name()?;
                 self.value_of_assignment()?;
                 let slot = self.slot(&name)?;
-                if word == "global" {
+                if word == "global" || self.open.len() == 1 {
                     self.globals.insert(name);
                     self.emit(Op::StoreGlobal(slot))?;
                 } else {
@@ -359,8 +369,14 @@ impl Parser {
                     self.emit(Op::StoreElement(slot))?;
                 } else {
                     self.value_of_assignment()?;
-                    self.here()?.assigned.insert(name);
-                    self.emit(Op::Store(slot))?;
+                    if self.open.len() == 1 {
+                        // On the first level all names are global (script manual, "Scoping rules").
+                        self.globals.insert(name);
+                        self.emit(Op::StoreGlobal(slot))?;
+                    } else {
+                        self.here()?.assigned.insert(name);
+                        self.emit(Op::Store(slot))?;
+                    }
                 }
             }
             _ => {
@@ -373,7 +389,7 @@ impl Parser {
 
     /// Whether `p[` is an element of a variable of that name, and no pose: ur_rtde has such a parameter.
     fn p_is_a_variable(&self) -> bool {
-        self.open.last().is_some_and(|open| open.assigned.contains("p"))
+        self.globals.contains("p") || self.open.last().is_some_and(|open| open.assigned.contains("p"))
     }
 
     /// Whether a line that begins with a name gives it, or one of its elements, a value.
@@ -450,20 +466,9 @@ impl Parser {
     fn finish(self) -> Result<Program, ScriptError> {
         let Self { functions, calls, known, names, globals, free, .. } = self;
         let mut functions: Vec<Function> = functions.into_iter().flatten().collect();
-        for Call { number, place, name, arguments, line, by_run } in calls {
-            let wrong = |problem: String| ScriptError { line, problem };
-            let Some(&to) = known.get(&name) else {
-                return Err(wrong(format!("`{name}` is no function that is known")));
-            };
-            let called = &functions[to];
-            if called.is_thread != by_run {
-                let how = if by_run { "only threads are run" } else { "a thread is run, not called" };
-                return Err(wrong(format!("`{name}`: {how}")));
-            }
-            if called.parameters != arguments {
-                return Err(wrong(format!("`{name}` takes {} values, not {arguments}", called.parameters)));
-            }
-            functions[number].code[place] = if by_run { Op::Run(to) } else { Op::Call(to, arguments) };
+        for call in calls {
+            let (number, place) = (call.number, call.place);
+            functions[number].code[place] = call.found(&functions, &known)?;
         }
         if let Some((name, line)) = free.into_iter().find(|(name, _)| !globals.contains(name)) {
             return Err(ScriptError { line, problem: format!("`{name}` is no name that is known") });

@@ -39,8 +39,8 @@ pub(super) enum Op {
     Binary(Binary),
     Jump(usize),
     JumpIfFalse(usize),
-    /// A function of the text, by its number, with so many arguments.
-    Call(usize, usize),
+    /// A function of the text, by its number; places of its arguments.
+    Call(usize, Box<[usize]>),
     /// A function of the language; places of its arguments.
     Builtin(&'static Builtin, Box<[usize]>),
     Pop,
@@ -56,7 +56,8 @@ pub(super) enum Op {
 pub(super) struct Function {
     pub(super) name: String,
     pub(super) is_thread: bool,
-    pub(super) parameters: usize,
+    /// Its parameters, with what they are where a call says nothing.
+    pub(super) parameters: Vec<Option<Value>>,
     /// Names of its locals; the parameters come first.
     pub(super) locals: Vec<String>,
     pub(super) code: Vec<Op>,

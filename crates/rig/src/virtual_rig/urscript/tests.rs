@@ -181,6 +181,10 @@ fn joints_and_poses_lead_to_each_other() {
     assert_eq!(said(back), ["True"]);
     assert_eq!(said("movej([0.5, 0, 0, 0, 0, 0], v=0.2)\nstopj(3)\n"), ["turn to 0.500 with 1.4 and 0.2", "brake joints 3"]);
     assert_eq!(said("movel(get_forward_kin([0, 0, 0, 0, 0, 0]), a=0.5)\n"), said("movel([0, 0, 0, 0, 0, 0], a=0.5)\n"));
+    // A time says the speed: 0.5 rad in 1 s are 0.6 rad/s with 3 rad/s^2, and need 2 rad/s^2 at least.
+    let turn = |words: &str| said(&format!("movej([0.5, 0, 0, 0, 0, 0], {words}, t=1)\n"))[0].clone();
+    assert!(turn("a=3").starts_with("turn to 0.500 with 3 and 0.63"), "{}", turn("a=3"));
+    assert_eq!(turn("a=1"), "turn to 0.500 with 2 and 1");
     assert!(refused("x = get_inverse_kin(p[1.4, 0, 0.2, 0, 0, 0])\n").contains("no joints of a UR5e"));
 }
 
@@ -200,7 +204,8 @@ fn what_is_wrong_is_said_with_its_line() {
         ("sync(1)\n", "`sync` takes at most 0 values"),
         ("sleep()\n", "`sleep` lacks `t`"),
         ("movel(p[0,0,0,0,0,0], w=1)\n", "`movel` has no parameter `w`"),
-        ("movej([0,0,0,0,0,0], t=2)\n", "a time or a blend radius"),
+        ("movej([0,0,0,0,0,0], r=0.1)\n", "a blend radius"),
+        ("movej([0,0,0,0,0,0], t=-1)\n", "a time of -1"),
         ("servoj([0,0,0,0,0,0], t=0.1)\n", "`servoj` cannot be followed"),
         ("write_output_integer_register(48, 1)\n", "there is no register 48"),
         ("write_output_integer_register(24, 1.5)\n", "whole number"),
@@ -228,7 +233,7 @@ fn what_is_wrong_is_said_with_its_line() {
 }
 
 #[test]
-fn a_name_is_global_where_it_was_made_so_and_else_local() {
+fn names_of_the_first_level_are_global_and_others_where_they_were_made_so() {
     let text = "def program():
   global a = 1
   b = 10
@@ -248,10 +253,13 @@ fn a_name_is_global_where_it_was_made_so_and_else_local() {
   textmsg(a)
 end
 ";
-    assert_eq!(run(text, 10).0.asked, ["2", "10", "101", "2"]);
+    assert_eq!(run(text, 10).0.asked, ["2", "20", "101", "2"]);
+    // Even where they are said to be local.
+    let text = "def program():\n  local b = 1\n  def f():\n    b = 2\n  end\n  f()\n  textmsg(b)\nend\n";
+    assert_eq!(run(text, 10).0.asked, ["2"]);
     // A local of another function is no name here.
-    let text = "def program():\n  b = 1\n  def f():\n    textmsg(b)\n  end\n  f()\nend\n";
-    assert!(refused(text).contains("line 4: `b` is no name that is known"));
+    let text = "def program():\n  def g():\n    b = 1\n  end\n  def f():\n    textmsg(b)\n  end\n  f()\nend\n";
+    assert!(refused(text).contains("line 6: `b` is no name that is known"));
 }
 
 #[test]
@@ -274,6 +282,28 @@ fn loops_and_branches() {
 end
 ";
     assert_eq!(run(text, 10).0.asked, ["1", "3", "4", "[1, 5, 3]"]);
+    // Parameters have defaults, and are named.
+    let text = "def program():\n  def f(a, b=-2, c=True):\n    if c:\n      return a + b\n    end\n    return a\n  end\n  \
+                textmsg(f(5))\n  textmsg(f(5, 1))\n  textmsg(f(5, c=False))\n  textmsg(f(b=1, a=2))\nend\n";
+    assert_eq!(run(text, 10).0.asked, ["3", "6", "5", "3"]);
+    for (call, wanted) in [
+        ("f()", "`f` takes 2 values, not 0"),
+        ("f(1, 2, 3)", "takes 2 values, not 3"),
+        ("f(1, a=2)", "a value twice"),
+        ("f(1, d=2)", "no parameter `d`"),
+    ] {
+        let text = format!("def program():\n  def f(a, b=1):\n  end\n  {call}\nend\n");
+        assert!(refused(&text).contains(wanted), "{call}: {}", refused(&text));
+    }
+    assert!(refused("def program():\n  def f(a=1, b):\n  end\nend\n").contains("without a default"));
+    assert!(refused("def program():\n  def f(a=[1]):\n  end\nend\n").contains("the default of a parameter"));
+    // A variable may have the name of a function.
+    assert_eq!(said("length = 3\ntextmsg(length + length([1, 2]))\n"), ["5"]);
+    assert!(refused("def program():\n  def norm(x):\n  end\nend\n").contains("`norm` is a word of the language"));
+    // Brackets hold lines together.
+    assert_eq!(said("textmsg(\n  str_cat(\"a\",  # first\n    \"b\"))\nl = [1,\n  2]\ntextmsg(l[1])\n"), ["ab", "2"]);
+    assert!(refused("x = (1\ny = 2\n").contains("line 2"));
+    assert_eq!(said("if False or  # first\n  True:\n  textmsg(1 +\n    2)\nend\n"), ["3"]);
     // A value may stand behind a comment: a client writes it so.
     assert_eq!(said("global x = # a number\n7\ntextmsg(\"x: \", x)\n"), ["x: 7"]);
 }

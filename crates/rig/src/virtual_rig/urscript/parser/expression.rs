@@ -5,7 +5,7 @@ use super::super::lexer::Token;
 use super::super::operators::Binary;
 use super::super::program::{Op, ScriptError};
 use super::super::value::Value;
-use super::{Call, Parser};
+use super::Parser;
 use std::sync::Arc;
 
 impl Parser {
@@ -104,10 +104,10 @@ impl Parser {
                     let name = self.own_name()?;
                     self.expect("(")?;
                     self.expect(")")?;
-                    self.call(name, 0, true)?;
+                    self.call(name, Vec::new(), true)?;
                 }
                 _ if self.is_symbol("(") => self.called(name)?,
-                _ if builtins::is_word(&name) => {
+                _ if builtins::is_keyword(&name) => {
                     self.at -= 1;
                     return Err(self.wrong(format!("`{name}` stands where a value is wanted")));
                 }
@@ -139,14 +139,6 @@ impl Parser {
         Ok(count)
     }
 
-    fn call(&mut self, name: String, arguments: usize, by_run: bool) -> Result<(), ScriptError> {
-        let line = self.line();
-        let place = self.emit(Op::Halt)?;
-        let number = self.here()?.number;
-        self.calls.push(Call { number, place, name, arguments, line, by_run });
-        Ok(())
-    }
-
     /// A call, from its bracket on.
     fn called(&mut self, name: String) -> Result<(), ScriptError> {
         self.expect("(")?;
@@ -154,8 +146,8 @@ impl Parser {
             if builtins::is_word(&name) {
                 return Err(self.wrong(format!("`{name}` is no function")));
             }
-            let count = self.elements(")")?;
-            return self.call(name, count, false);
+            let arguments = self.own_arguments()?;
+            return self.call(name, arguments, false);
         };
         let places = self.arguments(builtin)?;
         self.emit(Op::Builtin(builtin, places.into_boxed_slice()))?;
@@ -167,10 +159,8 @@ impl Parser {
         let missing = matches!(builtin.run, Run::Missing);
         let mut places: Vec<usize> = Vec::new();
         while !self.take_symbol(")") {
-            let named = matches!(self.words.get(self.at + 1), Some((Token::Symbol("="), _)));
-            let place = match (self.peek().clone(), named) {
-                (Token::Name(word), true) => {
-                    self.at += 2;
+            let place = match self.argument_name() {
+                Some(word) => {
                     let place = builtin.parameters.iter().position(|parameter| **parameter == *word);
                     match place {
                         Some(place) => place,
@@ -180,7 +170,7 @@ impl Parser {
                         }
                     }
                 }
-                _ => places.len(),
+                None => places.len(),
             };
             self.expression()?;
             let most = builtin.parameters.len();
