@@ -314,7 +314,7 @@ impl Kernel for Draw<'_> {
                 s.left_px = corners.select(mesh, cluster, (map.width, map.height), heights);
                 s.drawn_px = floor_px;
                 for r in &corners.reaching {
-                    let t = r.corners.map(|v| corners.corner(v));
+                    let t = corners.triangle(r.corners);
                     fill(&mut map.values, width, t, (r.first_row as usize, r.last_row as usize));
                 }
                 map.area.join(corners.area);
@@ -336,7 +336,7 @@ impl Kernel for DrawPoints<'_> {
     type Output = ();
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
-        let HeightMap { seen, corners, steps, view, width, height, .. } = self.map;
+        let HeightMap { seen, corners, steps, view, width, height: rows_px, .. } = self.map;
         for s in &*seen {
             if s.top_px < self.floor_px || !steps.may_be_in(s.rows, s.columns) {
                 continue;
@@ -344,23 +344,25 @@ impl Kernel for DrawPoints<'_> {
             let cluster = &self.mesh.clusters[s.cluster];
             corners.transform(self.mesh, cluster, view);
             for t in &self.mesh.triangles[cluster.triangles.clone()] {
-                let [a, b, c] = t.map(|v| corners.height[usize::from(v)]);
-                if higher(higher(a, b), c) < self.floor_px {
+                let [a, b, c] = [usize::from(t[0]), usize::from(t[1]), usize::from(t[2])];
+                let height = &corners.height;
+                if higher(higher(height[a], height[b]), height[c]) < self.floor_px {
                     continue;
                 }
                 let around = |v: &[(i32, i32)], n: usize| {
-                    let [a, b, c] = t.map(|corner| v[usize::from(corner)]);
+                    let (a, b, c) = (v[a], v[b], v[c]);
                     // From the largest whole number before the corners to the smallest one after them.
                     (a.1.min(b.1).min(c.1).max(0), a.0.max(b.0).max(c.0).min(n as i32 - 1))
                 };
-                let (rows, columns) = (around(&corners.rows, *height), around(&corners.columns, *width));
+                let (rows, columns) = (around(&corners.rows, *rows_px), around(&corners.columns, *width));
                 if rows.0 > rows.1 || columns.0 > columns.1 {
                     continue;
                 }
                 let whole = |(from, to): (i32, i32)| (from as usize, to as usize);
                 let (rows, columns) = (whole(rows), whole(columns));
                 if steps.may_be_in(rows, columns) {
-                    steps.fill(t.map(|v| corners.corner(v)), rows, columns);
+                    // SAFETY: the caller has the instructions of `L`.
+                    unsafe { steps.fill::<L>(corners.triangle(*t), rows, columns) };
                 }
             }
         }
@@ -372,6 +374,12 @@ impl Corners {
     fn corner(&self, number: u16) -> Corner {
         let i = usize::from(number);
         Corner { x_px: self.x[i], y_px: self.y[i], height_px: self.height[i], number: u32::from(number) }
+    }
+
+    /// Written out: the compiler does not take the functions of arrays into code for a vector unit.
+    #[inline(always)]
+    fn triangle(&self, [a, b, c]: [u16; 3]) -> [Corner; 3] {
+        [self.corner(a), self.corner(b), self.corner(c)]
     }
 
     /// The vertices of a cluster in pixels, with the operations of `gel_from_mesh * vertex` in their order.
@@ -423,7 +431,7 @@ impl Corners {
         let (mut low, mut high) = ([i32::MAX; 2], [0; 2]);
         self.reaching.resize(VERTICES / 3, Reaching::default());
         for &corners in &mesh.triangles[cluster.triangles.clone()] {
-            let [a, b, c] = corners.map(usize::from);
+            let [a, b, c] = [usize::from(corners[0]), usize::from(corners[1]), usize::from(corners[2])];
             let span = |v: &[(i32, i32)], n: usize| {
                 let first = v[a].0.min(v[b].0).min(v[c].0).max(0);
                 (first, v[a].1.max(v[b].1).max(v[c].1).min(n as i32 - 1))

@@ -14,8 +14,10 @@ const POINTS: usize = FINE * FINE;
 /// Heights of a pixel in memory: its points, and what fills up a vector.
 const PLACES: usize = 16;
 
-/// Pixels that are summed side by side.
-const SIDE: usize = 8;
+/// Pixels that are summed side by side, and the sums of which all are made: the pixels of a block go to them in turn. A block is so long that the
+/// compiler takes it for a loop; it writes out shorter ones and leaves them to single numbers.
+const SIDE: usize = 64;
+const SUMS: usize = 8;
 
 /// Rows whose steps are looked for at once.
 const COARSE: usize = 8;
@@ -156,8 +158,16 @@ impl Steps {
     ///
     /// A point lies in a triangle if it is on no edge's far side. Two triangles compute the side of a common edge from the
     /// same end, so that no point falls between them.
+    ///
+    /// # Safety
+    /// The processor must have the instructions of `L`.
     #[inline(always)]
-    pub(super) fn fill(&mut self, t: [Corner; 3], rows: (usize, usize), columns: (usize, usize)) {
+    pub(super) unsafe fn fill<L: Lanes>(
+        &mut self,
+        t: [Corner; 3],
+        rows: (usize, usize),
+        columns: (usize, usize),
+    ) {
         let (ux, uy, uh) = (t[1].x_px - t[0].x_px, t[1].y_px - t[0].y_px, t[1].height_px - t[0].height_px);
         let (vx, vy, vh) = (t[2].x_px - t[0].x_px, t[2].y_px - t[0].y_px, t[2].height_px - t[0].height_px);
         let area = ux * vy - uy * vx;
@@ -169,10 +179,10 @@ impl Steps {
         let top = higher(higher(t[0].height_px, t[1].height_px), t[2].height_px) as f32;
         let bottom = lower(lower(t[0].height_px, t[1].height_px), t[2].height_px) as f32;
         let turn = if area > 0.0 { 1.0 } else { -1.0 };
-        let sides = [(0, 1), (1, 2), (2, 0)].map(|(a, b)| Side::new(&t[a], &t[b], turn));
+        let sides = [Side::new(&t[0], &t[1], turn), Side::new(&t[1], &t[2], turn), Side::new(&t[2], &t[0], turn)];
         // From the centre of a pixel to its points.
         let plane = Offsets::new(slope_x, slope_y);
-        let across = sides.map(|s| Offsets::new(-s.y, s.x));
+        let across = [sides[0].offsets(), sides[1].offsets(), sides[2].offsets()];
         let tall = rows.1 - rows.0 >= TALL;
         let edges = tall.then(|| [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])]);
         for block in rows.0 / COARSE..=rows.1 / COARSE {
@@ -212,8 +222,8 @@ impl Steps {
                         let before = (bits & !(u64::MAX << bit)).count_ones();
                         let at = (self.starts[row * self.words + word] + before) as usize;
                         let centre = (along_row + slope_x * (x - t[0].x_px)) as f32;
-                        let side = [0, 1, 2].map(|i| sides[i].of(x, y));
-                        let heights = &mut self.heights[at];
+                        let side = [sides[0].of(x, y), sides[1].of(x, y), sides[2].of(x, y)];
+                        let mut heights = [0.0; PLACES];
                         for i in 0..PLACES {
                             let height = centre + plane.0[i];
                             let height = if height > bottom { height } else { bottom };
@@ -221,8 +231,10 @@ impl Steps {
                             let within = (side[0] + across[0].0[i] >= 0.0)
                                 & (side[1] + across[1].0[i] >= 0.0)
                                 & (side[2] + across[2].0[i] >= 0.0);
-                            heights[i] = if within & (height > heights[i]) { height } else { heights[i] };
+                            heights[i] = if within { height } else { f32::NEG_INFINITY };
                         }
+                        // SAFETY: the caller has the instructions of `L`, and a pixel's heights are whole vectors.
+                        unsafe { raise::<L>(&heights, &mut self.heights[at]) };
                     }
                 }
             }
@@ -233,6 +245,21 @@ impl Steps {
     #[inline(always)]
     fn row<'a>(&self, bits: &'a [u64], row: usize) -> &'a [u64] {
         &bits[row * self.words..][..self.words]
+    }
+}
+
+/// Heights of points where they are larger than before. Stored as a whole: writing some lanes alone is slow on many processors.
+///
+/// # Safety
+/// The processor must have the instructions of `L`.
+#[inline(always)]
+unsafe fn raise<L: Lanes>(heights: &[f32; PLACES], to: &mut [f32; PLACES]) {
+    for at in (0..PLACES).step_by(L::COUNT) {
+        // SAFETY: forwarded; `PLACES` is a multiple of the lanes.
+        unsafe {
+            let (new, old) = (L::load(heights.as_ptr().add(at)), L::load(to.as_ptr().add(at)));
+            L::store(to.as_mut_ptr().add(at), L::larger_unless_nan(new, old));
+        }
     }
 }
 
@@ -268,6 +295,14 @@ impl Side {
     #[inline(always)]
     fn of(&self, x: f64, y: f64) -> f32 {
         (self.x * (y - self.from.1) - self.y * (x - self.from.0)) as f32
+    }
+}
+
+impl Side {
+    /// What is added on the way to the points of a pixel.
+    #[inline(always)]
+    fn offsets(&self) -> Offsets {
+        Offsets::new(-self.y, self.x)
     }
 }
 
@@ -328,7 +363,7 @@ impl Kernel for Touched<'_> {
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) -> (f64, f64) {
         let Self { blocks, by_centres, top, press_px } = self;
-        let (mut sums, mut counts) = ([0.0; SIDE], [0.0; SIDE]);
+        let (mut sums, mut counts) = ([0.0; SUMS], [0.0; SUMS]);
         for block in blocks {
             let (mut sum, mut count) = ([0.0; SIDE], [0.0; SIDE]);
             for points in &block.points {
@@ -344,8 +379,14 @@ impl Kernel for Touched<'_> {
                 let touches = below + press_px > 0.0;
                 let (centre, one) = if touches { (below, 1.0) } else { (0.0, 0.0) };
                 let weight = f64::from(block.weights[i]);
-                sums[i] += weight * (sum[i] / POINTS as f64 - centre);
-                counts[i] += weight * (count[i] / POINTS as f64 - one);
+                sum[i] = weight * (sum[i] / POINTS as f64 - centre);
+                count[i] = weight * (count[i] / POINTS as f64 - one);
+            }
+            for (sum, count) in sum.as_chunks::<SUMS>().0.iter().zip(count.as_chunks::<SUMS>().0) {
+                for i in 0..SUMS {
+                    sums[i] += sum[i];
+                    counts[i] += count[i];
+                }
             }
         }
         // From left to right, whatever the vector unit.
