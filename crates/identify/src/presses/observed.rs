@@ -116,6 +116,15 @@ impl<'a> Observed<'a> {
         self.pixels.len()
     }
 
+    /// On which presses an effect acts that begins with one; `None` for any other.
+    pub(super) fn acts(&self, acting: &ActingEffect) -> Option<Vec<bool>> {
+        let from = acting.spec.presses.as_ref()?.tried?;
+        let at = acting.spec.parameters.iter().position(|p| p.name == from)?;
+        let first = *acting.values.get(at)?;
+        let all = self.predictor.circumstances();
+        Some(all.iter().map(|press| press.pull_index as f64 >= first).collect())
+    }
+
     /// Grey levels at the pixels of a press.
     pub(super) fn levels(&self, press: usize, acting: &[ActingEffect]) -> Vec<[f32; 3]> {
         self.predictor.levels(press, acting)

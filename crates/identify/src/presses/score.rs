@@ -66,6 +66,27 @@ impl Design {
     }
 }
 
+impl Design {
+    /// Standard error of the mean where presses are of two kinds: what they scatter about the mean of their kind.
+    pub(super) fn error_by_kind(&self, values: &[f64], kinds: &[bool]) -> f64 {
+        let sum: f64 = self.weights.iter().sum();
+        let of = |kind: bool| {
+            let own: Vec<(f64, f64)> = values
+                .iter()
+                .zip(&self.weights)
+                .zip(kinds)
+                .filter(|(_, k)| **k == kind)
+                .map(|((v, w), _)| (*v, *w))
+                .collect();
+            let total: f64 = own.iter().map(|(_, w)| w).sum();
+            let mean = own.iter().map(|(v, w)| v * w).sum::<f64>() / total.max(1e-12);
+            let n = own.len() as f64;
+            own.iter().map(|(v, w)| (w * (v - mean)).powi(2)).sum::<f64>() * n / (n - 1.0).max(1.0)
+        };
+        (of(true) + of(false)).sqrt() / sum
+    }
+}
+
 /// Random bits that are a function of `i` alone.
 pub(super) fn hash(i: u64) -> u64 {
     splitmix64(&mut i.wrapping_add(6).wrapping_mul(0x9e37_79b9_7f4a_7c15))

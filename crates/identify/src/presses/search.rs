@@ -26,6 +26,9 @@ const FURTHER: f64 = 0.03;
 /// What has no name explains at least this share of what the named effects do, beyond them.
 const LEFT: f64 = 0.15;
 
+/// Fewest presses that an effect acts on whose scatter says how sure it is: fewer do not say how much they scatter.
+const MIN_ACTED: usize = 4;
+
 /// Effects at most.
 const MAX_EFFECTS: usize = 3;
 
@@ -90,12 +93,19 @@ fn counts(gain: f64, standard_error: f64, least: f64) -> bool {
     gain > least && gain > SURE * standard_error
 }
 
-/// Whether an effect lowers the costs of presses surely: by their differences, or by their shares where an effect that grows
-/// with the order does nothing to the first presses.
-fn is_sure(design: &Design, before: &[f64], after: &[f64]) -> bool {
-    let (gain, error) = design.mean(&differences(before, after));
-    let (share, share_error) = design.mean(&shares(before, after));
-    gain > SURE * error || gain > 0.0 && share > SURE * share_error
+/// Whether the last effect of `acting` lowers the costs of presses surely: by their differences, or by their shares where an effect that grows
+/// with the order does nothing to the first presses. One that acts from a press on makes two kinds of presses, and how much these differ
+/// from each other is no doubt about it.
+fn is_sure(observed: &Observed<'_>, design: &Design, before: &[f64], after: &Scored) -> bool {
+    let gains = differences(before, &after.held_out);
+    let (gain, error) = design.mean(&gains);
+    let (share, share_error) = design.mean(&shares(before, &after.held_out));
+    let by_kind = || {
+        let acts = after.acting.last().and_then(|last| observed.acts(last));
+        let enough = |acts: &&Vec<bool>| acts.iter().filter(|acts| **acts).count() >= MIN_ACTED;
+        acts.as_ref().filter(enough).is_some_and(|acts| gain > SURE * design.error_by_kind(&gains, acts))
+    };
+    gain > SURE * error || gain > 0.0 && (share > SURE * share_error || by_kind())
 }
 
 /// Runs the search. `progress` hears what is done, from 0 to 1.
@@ -144,7 +154,7 @@ pub(super) fn search(
                 values: values_text(&tried),
             });
             hints.extend(hint(spec.id, gain, standard_error, least, base));
-            let is_sure = is_sure(&design, &model.held_out, &tried.held_out);
+            let is_sure = is_sure(observed, &design, &model.held_out, &tried);
             if gain > least
                 && is_sure
                 && best.as_ref().is_none_or(|(g, _)| gain > *g)

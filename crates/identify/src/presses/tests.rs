@@ -255,6 +255,20 @@ fn a_background_that_changes_is_found_where_it_does() {
     assert!((p["red_u"].value - 4.0).abs() < 0.3 && (p["green_v"].value + 3.0).abs() < 0.3, "{p:?}");
 }
 
+/// The presses that it acts on scatter little, and it is no doubt that the others do not change: four of fourteen suffice, three do not.
+#[test]
+fn a_background_that_changes_late_is_found() {
+    let late = |first: usize| {
+        Camera::new(11, move |press, [u, v], level| {
+            if press < first { level } else { [level[0] + 4.0 * u, level[1] - 3.0 * v, level[2] + 3.0 * u * v] }
+        })
+    };
+    let found = diagnosis(&late(10));
+    assert_eq!(names(&found), ["background_change"]);
+    assert_eq!(found.diagnosis.effects[0].parameters["at_pull_index"].value, 10.0);
+    assert_eq!(names(&diagnosis(&late(11))), [""; 0]);
+}
+
 /// What follows a column of the table alone is unknown by the name of the column.
 #[test]
 fn light_that_follows_a_column_is_unknown_by_its_name() {
