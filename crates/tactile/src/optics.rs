@@ -22,6 +22,7 @@ mod warp;
 
 pub(crate) use camera::level_at;
 pub(crate) use rounding::rounded;
+pub(crate) use warp::frame_at;
 
 use crate::appearance::appearance_on;
 use crate::deform::{blurred, deform_with};
@@ -105,7 +106,7 @@ impl Renderer<'_> {
             None => [0, 1, 2].map(|_| Plane::filled(grid.width_px, grid.height_px, 0.0)),
         };
         if optics.changes_frame() {
-            camera::apply(optics, &self.sensor.rest, &mut change);
+            camera::apply(optics, &self.sensor.grid, &self.sensor.rest, &mut change);
         }
         change
     }
@@ -124,7 +125,7 @@ impl Renderer<'_> {
             markers_px = self.mark_by_cell(patch, tangential_n, change);
         });
         if optics.changes_frame() {
-            camera::apply(optics, &self.sensor.rest, &mut change);
+            camera::apply(optics, &self.sensor.grid, &self.sensor.rest, &mut change);
         }
         (change, markers_px)
     }

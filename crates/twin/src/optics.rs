@@ -38,6 +38,8 @@ pub struct OpticsState {
     pub scale: f64,
     /// Radial distortion: at `r` half widths from the middle is seen what lies at `r (1 + k1 r^2)`.
     pub distortion_k1: f64,
+    /// How much of the way the frame at rest moves along with the contact: 0 if part or marks lie elsewhere, 1 if the camera does.
+    pub frame_moves: f64,
     /// Standard deviation of the blur of what a contact changes in the image.
     pub defocus_m: f64,
     /// Factor on the sizes of the kernels that deform the gel.
@@ -74,6 +76,7 @@ impl Default for OpticsState {
             rotation_rad: 0.0,
             scale: 1.0,
             distortion_k1: 0.0,
+            frame_moves: 0.0,
             defocus_m: 0.0,
             kernel_scale: 1.0,
             part_offset_m: 0.0,
@@ -124,9 +127,15 @@ impl OpticsState {
         self.shift_m != [0.0; 2] || self.rotation_rad != 0.0 || self.scale != 1.0 || self.distortion_k1 != 0.0
     }
 
+    /// Whether the frame at rest is seen elsewhere, too.
+    pub fn moves_frame(&self) -> bool {
+        self.frame_moves != 0.0 && self.moves_contact()
+    }
+
     /// Whether light or camera act on the whole frame, with and without contact.
     pub fn changes_frame(&self) -> bool {
-        self.light_gain != [1.0; 3]
+        self.moves_frame()
+            || self.light_gain != [1.0; 3]
             || self.background != [[0.0; BACKGROUND_TERMS]; 3]
             || self.finer_background != [[0.0; FINER_TERMS.len()]; 3]
             || self.exposure_gain != 1.0

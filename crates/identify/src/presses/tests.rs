@@ -260,7 +260,11 @@ fn a_background_that_changes_is_found_where_it_does() {
 fn a_background_that_changes_late_is_found() {
     let late = |first: usize| {
         Camera::new(11, move |press, [u, v], level| {
-            if press < first { level } else { [level[0] + 4.0 * u, level[1] - 3.0 * v, level[2] + 3.0 * u * v] }
+            if press < first {
+                level
+            } else {
+                [level[0] + 4.0 * u, level[1] - 3.0 * v, level[2] + 3.0 * u * v]
+            }
         })
     };
     let found = diagnosis(&late(10));

@@ -121,7 +121,8 @@ pub fn curves_in(name: &str, column: &Column) -> Vec<Curve> {
     match column {
         Column::Word(at, names) => {
             let count = |word: usize| at.iter().filter(|w| **w == word).count();
-            let steps: Vec<usize> = (0..names.len()).filter(|&word| count(word) >= MIN_STEP).skip(1).collect();
+            let steps: Vec<usize> =
+                (0..names.len()).filter(|&word| count(word) >= MIN_STEP).skip(1).collect();
             if steps.is_empty() {
                 return vec![];
             }
@@ -287,7 +288,8 @@ mod tests {
     #[test]
     fn two_pulls_are_no_step() {
         let words = ["a", "b", "c"].map(String::from).to_vec();
-        let curve = curves_in("session", &Column::Word(vec![0, 0, 1, 1, 1, 2, 2, 2], words.clone())).remove(0);
+        let curve =
+            curves_in("session", &Column::Word(vec![0, 0, 1, 1, 1, 2, 2, 2], words.clone())).remove(0);
         assert_eq!((curve.len(), curve.cost), (1, 1));
         assert_eq!(curve.basis[0], curve.basis[3]);
         assert_ne!(curve.basis[3], curve.basis[6]);

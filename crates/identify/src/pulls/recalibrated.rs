@@ -14,7 +14,10 @@ type Scatter = (f64, f64, f64);
 
 /// The plain baseline as a calibration states and writes it, with the context that predicts it and its scatter: what a diagnosis is compared
 /// with, and what it writes where it finds nothing. `context` has seen the tails of the residuals and nothing else.
-pub(super) fn recalibrated<'a>(mut context: Context<'a>, rows: &[usize]) -> Option<(Context<'a>, Fitted, Scatter)> {
+pub(super) fn recalibrated<'a>(
+    mut context: Context<'a>,
+    rows: &[usize],
+) -> Option<(Context<'a>, Fitted, Scatter)> {
     context.learn_lag(rows);
     context.settle_dynamics();
     context.free_lag = context.observations.is_empty();

@@ -43,14 +43,21 @@ pub(super) struct Bench {
 impl Bench {
     /// A robot at rest that is given a program, whose own tool is at `tcp`. What is judged is the text and not whether an arm reaches that far: a
     /// way that is to take too long may begin anywhere.
-    pub(super) fn start(spring: Spring, tcp: TcpPose, tool_mm: [f64; 3], run: i32, text: &str) -> Result<Self, String> {
+    pub(super) fn start(
+        spring: Spring,
+        tcp: TcpPose,
+        tool_mm: [f64; 3],
+        run: i32,
+        text: &str,
+    ) -> Result<Self, String> {
         let [of_program, of_robot] = [tool_mm.map(|mm| 1e-3 * mm), TOOL_M].map(Translation3::from);
         let from = TcpPose::from_base_from_tool(&(tcp.base_from_tool() * of_program.inverse() * of_robot));
         let mut controller = Controller::new(Arc::new(spring), from, 1.0);
         controller.arm_mut().reach_anything();
         let started_at = controller.arm().base_from_flange();
         controller.run_script(text);
-        let mut bench = Self { controller, spring, run, steps: 0, beats: true, started_at, phases: Vec::new() };
+        let mut bench =
+            Self { controller, spring, run, steps: 0, beats: true, started_at, phases: Vec::new() };
         bench.heard()?;
         Ok(bench)
     }

@@ -137,7 +137,12 @@ impl Hands for Body<'_> {
         self.arm.move_line(TcpPose::from_numbers(target), acceleration_m_s2, speed_m_s)
     }
 
-    fn move_joints(&mut self, target_rad: [f64; 6], acceleration_rad_s2: f64, speed_rad_s: f64) -> Result<(), String> {
+    fn move_joints(
+        &mut self,
+        target_rad: [f64; 6],
+        acceleration_rad_s2: f64,
+        speed_rad_s: f64,
+    ) -> Result<(), String> {
         self.arm.move_joints(target_rad, acceleration_rad_s2, speed_rad_s)
     }
 

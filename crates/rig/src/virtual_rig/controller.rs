@@ -230,7 +230,8 @@ impl Controller {
     /// The arm brakes. A program that runs waits, and its motion with it; force mode is over.
     fn break_off(&mut self) {
         if self.robot.runtime == RuntimeState::Playing {
-            self.broken_off = Some(self.arm.drive()).filter(|drive| matches!(drive, Drive::Line { .. } | Drive::Joints { .. }));
+            self.broken_off = Some(self.arm.drive())
+                .filter(|drive| matches!(drive, Drive::Line { .. } | Drive::Joints { .. }));
         }
         self.arm.stop();
         if self.program.is_some() {

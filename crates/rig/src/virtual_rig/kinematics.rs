@@ -71,7 +71,8 @@ pub fn solutions(base_from_flange: &Pose, near_rad: &Joints) -> Vec<Joints> {
     let towards_rad = wrist_m.y.atan2(wrist_m.x);
     let mut found = Vec::with_capacity(8);
     for q1 in [towards_rad + aside_rad, towards_rad + PI - aside_rad] {
-        let (normal, forward) = (Vector3::new(q1.sin(), -q1.cos(), 0.0), Vector3::new(q1.cos(), q1.sin(), 0.0));
+        let (normal, forward) =
+            (Vector3::new(q1.sin(), -q1.cos(), 0.0), Vector3::new(q1.cos(), q1.sin(), 0.0));
         let (along_x, along_y, c5) = (normal.dot(&x6), normal.dot(&y6), normal.dot(&z6));
         let aside = along_x.hypot(along_y);
         for s5 in [aside, -aside] {
@@ -80,13 +81,15 @@ pub fn solutions(base_from_flange: &Pose, near_rad: &Joints) -> Vec<Joints> {
             let (s6, c6) = q6.sin_cos();
             let (x5, y5, z5) = (c6 * x6 - s6 * y6, s6 * x6 + c6 * y6, z6);
             let (x4, z4) = (c5 * x5 - s5 * z5, -y5);
-            let elbow_to_wrist = wrist_m - WRIST_2_M * z4 - WRIST_1_M * normal - Vector3::new(0.0, 0.0, SHOULDER_M);
+            let elbow_to_wrist =
+                wrist_m - WRIST_2_M * z4 - WRIST_1_M * normal - Vector3::new(0.0, 0.0, SHOULDER_M);
             let (along_m, up_m) = (elbow_to_wrist.dot(&forward), elbow_to_wrist.z);
             let squares = UPPER_ARM_M * UPPER_ARM_M + FOREARM_M * FOREARM_M;
             let bent = (along_m * along_m + up_m * up_m - squares) / (2.0 * UPPER_ARM_M * FOREARM_M);
             let Some(c3) = cosine(bent) else { continue };
             for q3 in [c3.acos(), -c3.acos()] {
-                let q2 = up_m.atan2(along_m) - (FOREARM_M * q3.sin()).atan2(UPPER_ARM_M + FOREARM_M * q3.cos());
+                let q2 =
+                    up_m.atan2(along_m) - (FOREARM_M * q3.sin()).atan2(UPPER_ARM_M + FOREARM_M * q3.cos());
                 let q4 = x4.z.atan2(x4.dot(&forward)) - q2 - q3;
                 let mut joints = [q1, q2, q3, q4, q5, q6];
                 for (angle_rad, near_rad) in joints.iter_mut().zip(near_rad) {

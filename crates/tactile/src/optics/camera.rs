@@ -1,6 +1,7 @@
 //! Light and camera on the whole frame, with and without contact.
 
 use super::pattern::{FinerPattern, mean_square, normalised};
+use super::warp;
 use crate::grid::{Grid, Plane};
 use gripgen_twin::{BACKGROUND_TERMS, OpticsState};
 
@@ -10,7 +11,9 @@ use gripgen_twin::{BACKGROUND_TERMS, OpticsState};
 /// I  = (rest + change) gain_c + pattern_c(u, v)
 /// I' = 255 (exposure max(0, I) / 255)^gamma
 /// ```
-pub(super) fn apply(optics: &OpticsState, rest: &[Vec<f32>; 3], change: &mut [Plane; 3]) {
+///
+/// with the frame at rest where the camera sees it.
+pub(super) fn apply(optics: &OpticsState, grid: &Grid, rest: &[Vec<f32>; 3], change: &mut [Plane; 3]) {
     let response = (optics.exposure_gain != 1.0 || optics.gamma != 1.0).then(|| Response::new(optics));
     for (channel, plane) in change.iter_mut().enumerate() {
         let gain = optics.light_gain[channel] as f32;
@@ -18,13 +21,15 @@ pub(super) fn apply(optics: &OpticsState, rest: &[Vec<f32>; 3], change: &mut [Pl
         let has_pattern = pattern.iter().any(|c| *c != 0.0);
         let (w, h) = (plane.width, plane.height);
         let finer = FinerPattern::new(&optics.finer_background[channel], w, h);
+        let moved = optics.moves_frame().then(|| warp::frame(&rest[channel], grid, optics));
         for y in 0..h {
             let [c0, c1, c2] = row_polynomial(pattern, w, h, y).map(|c| c as f32);
             let finer_row = finer.as_ref().map(|finer| finer.row(y));
             for x in 0..w {
                 let at = y * w + x;
                 let still = rest[channel][at];
-                let mut seen = (still + plane.values[at]) * gain;
+                let light = moved.as_ref().map_or(still, |moved| moved[at]);
+                let mut seen = (light + plane.values[at]) * gain;
                 if has_pattern {
                     let u = normalised(x, w) as f32;
                     seen += c0 + u * (c1 + u * c2);
@@ -111,6 +116,10 @@ mod tests {
     use super::*;
     use gripgen_twin::FINER_TERMS;
 
+    fn grid_of(change: &[Plane; 3]) -> Grid {
+        Grid { width_px: change[0].width, height_px: change[0].height, metres_per_px: 1e-4 }
+    }
+
     /// Terms have mean 0, and a linear one goes from -1 to 1.
     #[test]
     fn patterns_have_mean_zero_whatever_the_size_of_the_frame() {
@@ -123,7 +132,7 @@ mod tests {
                 }
                 let rest = [vec![90.0; w * h], vec![90.0; w * h], vec![90.0; w * h]];
                 let mut change = [0, 1, 2].map(|_| Plane::filled(w, h, 0.0));
-                apply(&optics, &rest, &mut change);
+                apply(&optics, &grid_of(&change), &rest, &mut change);
                 let mean = change[1].values.iter().map(|&x| f64::from(x)).sum::<f64>() / (w * h) as f64;
                 assert!(mean.abs() < 1e-4, "{term}: {mean}");
                 assert!(change[0].values.iter().chain(&change[2].values).all(|&x| x == 0.0));
@@ -159,7 +168,7 @@ mod tests {
         let grid = Grid { width_px: 24, height_px: 17, metres_per_px: 1e-4 };
         let rest = [0, 1, 2].map(|c| (0..grid.len()).map(|i| (20 * c + i % 60) as f32).collect::<Vec<f32>>());
         let mut change = [0, 1, 2].map(|_| Plane::filled(24, 17, 7.0));
-        apply(&optics, &rest, &mut change);
+        apply(&optics, &grid_of(&change), &rest, &mut change);
         for c in 0..3 {
             for i in 0..grid.len() {
                 let one = level_at(&optics, &grid, i, c, rest[c][i] + 7.0);
@@ -174,7 +183,7 @@ mod tests {
             OpticsState { light_gain: [0.9, 1.0, 1.1], exposure_gain: 1.2, gamma: 0.8, ..Default::default() };
         let rest = [vec![90.0f32], vec![100.0], vec![0.0]];
         let mut change = [20.0, -30.0, -5.0].map(|c| Plane::filled(1, 1, c));
-        apply(&optics, &rest, &mut change);
+        apply(&optics, &grid_of(&change), &rest, &mut change);
         for c in 0..3 {
             let light = (f64::from(rest[c][0]) + [20.0, -30.0, -5.0][c]) * [0.9, 1.0, 1.1][c];
             let seen = 255.0 * (1.2 * light.max(0.0) / 255.0).powf(0.8);

@@ -21,7 +21,7 @@ const SERIES: [Scene; 4] = [
 const CASES: [(&str, &[f64], &[f64]); 13] = [
     ("light_drift", &[0.02, -0.015, 0.03], &[0.0; 3]),
     ("background_change", &PATTERN, &[0.0; PATTERN.len()]),
-    ("misregistration", &[0.25, -0.15, 2.0, 1.03, 0.04], &[0.0, 0.0, 0.0, 1.0, 0.0]),
+    ("misregistration", &[0.25, -0.15, 2.0, 1.03, 0.04, 0.0], &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
     ("exposure", &[0.95, 1.06], &[1.0, 1.0]),
     ("defocus", &[0.25], &[0.1]),
     ("gel_kernel", &[1.25], &[1.0]),

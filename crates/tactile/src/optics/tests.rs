@@ -1,7 +1,9 @@
 //! The signature of every optics effect, against what its cause must do to an image.
 
 use super::testing::*;
+use crate::finish;
 use crate::grid::Plane;
+use crate::presses::{Circle, PressContact, PressScene, PressView};
 use crate::render::Renderer;
 use crate::simd::SimdLevel;
 use gripgen_twin::effects::LIBRARY;
@@ -130,7 +132,7 @@ fn background_change_is_one_pattern_whatever_touches_the_gel() {
 fn misregistration_leaves_a_dipole_of_shift_times_gradient() {
     let rig = rig();
     let plain = rig.change(&BALL, &OpticsState::default());
-    let of = |shift_mm: f64| rig.signature(&BALL, "misregistration", &[shift_mm, 0.0, 0.0, 1.0, 0.0]);
+    let of = |shift_mm: f64| rig.signature(&BALL, "misregistration", &[shift_mm, 0.0, 0.0, 1.0, 0.0, 0.0]);
     let shift_mm = 0.03;
     let (left, right) = (of(-shift_mm), of(shift_mm));
     let shift_px = (shift_mm * 1e-3 / GRID.metres_per_px) as f32;
@@ -151,14 +153,53 @@ fn misregistration_leaves_a_dipole_of_shift_times_gradient() {
         assert!(sum.abs() < 0.05 * each, "both lobes weigh the same: {sum} of {each}");
     }
     // The other camera sees the part from the other side.
-    let right_jaw = state("misregistration", &[shift_mm, 0.0, 0.0, 1.0, 0.0], &BALL, Jaw::Right);
+    let right_jaw = state("misregistration", &[shift_mm, 0.0, 0.0, 1.0, 0.0, 0.0], &BALL, Jaw::Right);
     let seen = rig.change(&BALL, &right_jaw);
     assert!(rms(&[difference(&difference(&seen[0], &plain[0]), &left[0])]) < 1e-5);
-    let still = rig.signature(&NOTHING, "misregistration", &[1.0, 0.5, 3.0, 1.05, 0.05]);
+    let still = rig.signature(&NOTHING, "misregistration", &[1.0, 0.5, 3.0, 1.05, 0.05, 0.0]);
     assert!(still.iter().all(|p| p.values.iter().all(|&v| v == 0.0)));
+    // A camera that was moved sees its own frame elsewhere, too.
+    let moved = state("misregistration", &[0.3, 0.0, 0.0, 1.0, 0.0, 1.0], &NOTHING, Jaw::Left);
+    let seen = rig.change(&NOTHING, &moved);
+    let shift_px = (3e-4 / GRID.metres_per_px).round() as usize;
+    assert!((3e-4 / GRID.metres_per_px - shift_px as f64).abs() < 1e-9, "a whole number of pixels");
+    for c in 0..3 {
+        let rest = &rig.sensor.rest[c];
+        for i in (0..GRID.len())
+            .filter(|i| i % GRID.width_px > shift_px + 1 && i % GRID.width_px + 2 < GRID.width_px)
+        {
+            assert!((rest[i] + seen[c].values[i] - rest[i - shift_px]).abs() < 1e-3);
+        }
+    }
     // A ball in the middle of the image only sees the shift; turned about itself it stays.
-    let turned = rig.signature(&BALL, "misregistration", &[0.0, 0.0, 5.0, 1.0, 0.0]);
+    let turned = rig.signature(&BALL, "misregistration", &[0.0, 0.0, 5.0, 1.0, 0.0, 0.0]);
     assert!(rms(&turned) < 0.05 * rms(&plain), "{} of {}", rms(&turned), rms(&plain));
+}
+
+/// Fits look at the pixels of the frames that are drawn, under every effect: nothing is forgotten and nothing is there twice.
+#[test]
+fn the_pixels_of_a_press_are_those_of_its_frame() {
+    let rig = rig();
+    let scene = PressScene::new(&rig.sensor, 4e-3);
+    let press = PressContact::of_circle(Circle { x_px: 83.0, y_px: 55.0, radius_px: 9.0 });
+    let plain = scene.change_seen(Some(&press), &OpticsState::default());
+    let view =
+        PressView::draw(0, &finish(&rig.sensor, Some(&plain), None), Some(press.clone()), &scene, &scene);
+    for spec in LIBRARY.iter().filter(|spec| spec.presses.is_some()) {
+        let parameters: Vec<f64> =
+            spec.parameters.iter().map(|p| p.neutral + 0.2 * (p.bounds.1.min(20.0) - p.neutral)).collect();
+        let optics = state(spec.id, &parameters, &BALL, Jaw::Left);
+        let frame = scene.change_seen(Some(&press), &optics);
+        let levels = view.levels(&scene, &view.contact(&scene, &optics, None), &optics);
+        for (place, level) in view.places(&scene).iter().zip(&levels) {
+            let at = |place: f64, n: usize| (((place + 1.0) * n as f64 - 1.0) / 2.0).round() as usize;
+            let pixel = at(place[1], GRID.height_px) * GRID.width_px + at(place[0], GRID.width_px);
+            for c in 0..3 {
+                let drawn = (rig.sensor.rest[c][pixel] + frame[c].values[pixel]).clamp(0.0, 255.0);
+                assert!((drawn - level[c]).abs() < 2e-3, "{}: {drawn} in the frame, {}", spec.id, level[c]);
+            }
+        }
+    }
 }
 
 /// `exposure`: a new level is a function of the old level alone, the same for all channels and with or without contact.

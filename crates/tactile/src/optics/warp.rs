@@ -3,39 +3,102 @@
 use crate::grid::{Grid, Plane};
 use gripgen_twin::OpticsState;
 
-/// The surface as it is where the camera sees it. At x is seen what lies at `R(-rotation) (1 + k1 r^2) (x - shift) /
-/// scale`, with `r = |x - shift|` in half image widths and x from the middle of the image. Heights, which are in pixels
-/// like x, grow with the scale, so that slopes stay.
+/// Where a camera looks: at x is seen what lies at `R(-rotation) (1 + k1 r^2) (x - shift) / scale`, with `r = |x - shift|` in half image
+/// widths and x from the middle of the image.
+struct Sight {
+    shift: [f64; 2],
+    sin: f64,
+    cos: f64,
+    scale: f64,
+    k1: f64,
+    middle: [f64; 2],
+    half_width: f64,
+}
+
+impl Sight {
+    /// That of the contact.
+    fn of_contact(grid: &Grid, optics: &OpticsState) -> Self {
+        let (w, h) = (grid.width_px as f64, grid.height_px as f64);
+        Self {
+            shift: optics.shift_m.map(|m| m / grid.metres_per_px),
+            sin: libm::sin(optics.rotation_rad),
+            cos: libm::cos(optics.rotation_rad),
+            scale: optics.scale,
+            k1: optics.distortion_k1,
+            middle: [(w - 1.0) / 2.0, (h - 1.0) / 2.0],
+            half_width: w / 2.0,
+        }
+    }
+
+    /// That of the frame at rest, which goes along for some of the way. It has the size that the camera gave it.
+    fn of_frame(grid: &Grid, optics: &OpticsState) -> Self {
+        let share = optics.frame_moves;
+        let [x_m, y_m] = optics.shift_m;
+        let moved = OpticsState {
+            shift_m: [share * x_m, share * y_m],
+            rotation_rad: share * optics.rotation_rad,
+            ..OpticsState::default()
+        };
+        Self::of_contact(grid, &moved)
+    }
+
+    /// What is seen at a pixel lies here.
+    fn from(&self, x: usize, y: usize) -> (f64, f64) {
+        let dx = x as f64 - self.middle[0] - self.shift[0];
+        let dy = y as f64 - self.middle[1] - self.shift[1];
+        let r2 = (dx * dx + dy * dy) / (self.half_width * self.half_width);
+        let factor = (1.0 + self.k1 * r2) / self.scale;
+        let from = [factor * (self.cos * dx + self.sin * dy), factor * (self.cos * dy - self.sin * dx)];
+        (from[0] + self.middle[0], from[1] + self.middle[1])
+    }
+}
+
+/// The surface as it is where the camera sees it. Heights, which are in pixels like x, grow with the scale, so that slopes stay.
 ///
 /// Interpolated by Catmull-Rom splines, whose slopes are continuous; beyond the frame the border goes on.
 pub(super) fn surface(surface: &Plane, grid: &Grid, optics: &OpticsState) -> Plane {
     let (w, h) = (surface.width, surface.height);
-    let middle = [(w as f64 - 1.0) / 2.0, (h as f64 - 1.0) / 2.0];
-    let shift = optics.shift_m.map(|m| m / grid.metres_per_px);
-    let (sin, cos) = (libm::sin(optics.rotation_rad), libm::cos(optics.rotation_rad));
-    let half_width = w as f64 / 2.0;
+    let sight = Sight::of_contact(grid, optics);
     let mut seen = Plane::filled(w, h, 0.0);
     for y in 0..h {
         for x in 0..w {
-            let dx = x as f64 - middle[0] - shift[0];
-            let dy = y as f64 - middle[1] - shift[1];
-            let r2 = (dx * dx + dy * dy) / (half_width * half_width);
-            let factor = (1.0 + optics.distortion_k1 * r2) / optics.scale;
-            let from = [factor * (cos * dx + sin * dy), factor * (cos * dy - sin * dx)];
-            let height = interpolated(surface, from[0] + middle[0], from[1] + middle[1]);
+            let height = interpolated(&surface.values, (w, h), sight.from(x, y));
             seen.values[y * w + x] = (optics.scale * height) as f32;
         }
     }
     seen
 }
 
+/// The frame at rest where it is seen if it moves along, one plane of levels.
+pub(super) fn frame(levels: &[f32], grid: &Grid, optics: &OpticsState) -> Vec<f32> {
+    let sight = Sight::of_frame(grid, optics);
+    let (w, h) = (grid.width_px, grid.height_px);
+    (0..w * h).map(|at| interpolated(levels, (w, h), sight.from(at % w, at / w)) as f32).collect()
+}
+
+/// [`frame`] at some pixels, all channels.
+pub(crate) fn frame_at(
+    levels: &[Vec<f32>; 3],
+    grid: &Grid,
+    optics: &OpticsState,
+    pixels: &[usize],
+) -> Vec<[f32; 3]> {
+    let sight = Sight::of_frame(grid, optics);
+    let (w, h) = (grid.width_px, grid.height_px);
+    let at = |&pixel: &usize| {
+        let from = sight.from(pixel % w, pixel / w);
+        [0, 1, 2].map(|c| interpolated(&levels[c], (w, h), from) as f32)
+    };
+    pixels.iter().map(at).collect()
+}
+
 /// The value at a place between pixels.
-fn interpolated(plane: &Plane, x: f64, y: f64) -> f64 {
-    let (columns, wx) = taps(x, plane.width);
-    let (rows, wy) = taps(y, plane.height);
+fn interpolated(values: &[f32], (width, height): (usize, usize), (x, y): (f64, f64)) -> f64 {
+    let (columns, wx) = taps(x, width);
+    let (rows, wy) = taps(y, height);
     let mut sum = 0.0;
     for (row, wy) in rows.into_iter().zip(wy) {
-        let values = plane.row(row);
+        let values = &values[row * width..][..width];
         let along: f64 = columns.iter().zip(wx).map(|(&column, w)| w * f64::from(values[column])).sum();
         sum += wy * along;
     }
@@ -110,6 +173,24 @@ mod tests {
             let exact = 40.0 * r * (1.0 + 0.05 * (r * r + (0.5f64 / 40.0).powi(2)));
             assert!((f64::from(ramp.at(x, 30)) - exact).abs() < 1e-4);
         }
+    }
+
+    /// The frame goes along half of the way, and not without a way to go.
+    #[test]
+    fn a_frame_moves_along() {
+        let hills = plane(hill);
+        let optics = OpticsState { shift_m: [6e-4, -4e-4], frame_moves: 0.5, ..Default::default() };
+        let moved = frame(&hills.values, &GRID, &optics);
+        let exact = plane(|x, y| hill(x - 3.0, y + 2.0));
+        let inside = |i: &usize| (5..75).contains(&(i % 80)) && (5..55).contains(&(i / 80));
+        let off =
+            (0..GRID.len()).filter(inside).map(|i| (moved[i] - exact.values[i]).abs()).fold(0.0, f32::max);
+        assert!(off < 1e-5, "{off}");
+        let rest = [0, 1, 2].map(|_| hills.values.clone());
+        assert_eq!(frame_at(&rest, &GRID, &optics, &[2040])[0], [moved[2040]; 3]);
+        assert!(
+            optics.moves_frame() && !OpticsState { frame_moves: 1.0, ..Default::default() }.moves_frame()
+        );
     }
 
     #[test]

@@ -179,7 +179,8 @@ impl Steps {
         let top = higher(higher(t[0].height_px, t[1].height_px), t[2].height_px) as f32;
         let bottom = lower(lower(t[0].height_px, t[1].height_px), t[2].height_px) as f32;
         let turn = if area > 0.0 { 1.0 } else { -1.0 };
-        let sides = [Side::new(&t[0], &t[1], turn), Side::new(&t[1], &t[2], turn), Side::new(&t[2], &t[0], turn)];
+        let sides =
+            [Side::new(&t[0], &t[1], turn), Side::new(&t[1], &t[2], turn), Side::new(&t[2], &t[0], turn)];
         // From the centre of a pixel to its points.
         let plane = Offsets::new(slope_x, slope_y);
         let across = [sides[0].offsets(), sides[1].offsets(), sides[2].offsets()];

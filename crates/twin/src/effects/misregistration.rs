@@ -7,13 +7,13 @@ use crate::OpticsState;
 
 /// `misregistration`: the part lies displaced and turned between the jaws, or the camera has another pixel size or a
 /// distortion that the sensor file does not know. What the contact changes in the image moves; the rest frame, which
-/// that camera took, stays. Both cameras look at one part from opposite sides: `shift_x_mm` and `rotation_deg`
+/// that camera took, stays, unless the camera itself was moved since: `frame_moves` says how much of the way it goes along. Both cameras look at one part from opposite sides: `shift_x_mm` and `rotation_deg`
 /// are those of the left image and have the other sign in the right one.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "misregistration",
     group: Group::Optics,
     about: "contact displaced, turned, scaled or distorted in the image",
-    formula: "at x is seen what lies at R(-rotation_deg) (1 + k1 r^2) (x - shift) / scale, r = abs(x - shift) in half image widths",
+    formula: "at x is seen what lies at R(-rotation_deg) (1 + k1 r^2) (x - shift) / scale, r = abs(x - shift) in half image widths; in the frame at rest the same with shift and rotation_deg times frame_moves alone",
     source: "pose errors of 0.2 to 1 mm and 1 to 3 deg, which Wucherer et al. 2023 name; radial term: Brown 1966",
     parameters: &[
         length("shift_x_mm", "to the right in the left image, to the left in the right one"),
@@ -39,6 +39,13 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
             bounds: (-0.1, 0.1),
             about: "radial distortion half an image width from the middle, positive for a barrel",
         },
+        ParameterSpec {
+            name: "frame_moves",
+            unit: "1",
+            neutral: 0.0,
+            bounds: (0.0, 1.0),
+            about: "how much of the way the frame at rest moves along: 0 if the part lies elsewhere, 1 if the camera does",
+        },
     ],
     covariates: &[],
     optics: Some(optics),
@@ -53,6 +60,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
             "shift_x_mm" | "shift_y_mm" => (0.0, px_mm),
             "rotation_deg" => (0.0, 1.0),
             "scale" => (1.0, 0.02),
+            // Beside 0 and 1, between which the picture says.
+            "frame_moves" => (0.5, 0.5),
             _ => (0.0, 0.02),
         },
         needs: PressNeeds::Marks,
@@ -67,7 +76,7 @@ const fn length(name: &'static str, about: &'static str) -> ParameterSpec {
 }
 
 fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {
-    let [shift_x_mm, shift_y_mm, rotation_deg, scale, k1] = values(parameters);
+    let [shift_x_mm, shift_y_mm, rotation_deg, scale, k1, frame_moves] = values(parameters);
     let side = match at.jaw {
         Jaw::Left => 1.0,
         Jaw::Right => -1.0,
@@ -77,6 +86,10 @@ fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {
     state.rotation_rad += side * rotation_deg.to_radians();
     state.scale *= scale;
     state.distortion_k1 += k1;
+    // What goes nowhere takes nothing along.
+    if [shift_x_mm, shift_y_mm, rotation_deg, scale - 1.0, k1] != [0.0; 5] {
+        state.frame_moves = (state.frame_moves + frame_moves).min(1.0);
+    }
 }
 
 #[cfg(test)]
@@ -90,12 +103,13 @@ mod tests {
         let c = Covariates::default();
         let of = |jaw| {
             let mut state = OpticsState::default();
-            optics(&[0.5, 0.25, 2.0, 1.01, 0.02], &mut state, &GripPoint { jaw, ..grip(&c, 40.0) });
+            optics(&[0.5, 0.25, 2.0, 1.01, 0.02, 1.0], &mut state, &GripPoint { jaw, ..grip(&c, 40.0) });
             state
         };
         let (left, right) = (of(Jaw::Left), of(Jaw::Right));
         assert_eq!((left.shift_m, right.shift_m), ([5e-4, 2.5e-4], [-5e-4, 2.5e-4]));
         assert_eq!(left.rotation_rad, -right.rotation_rad);
         assert_eq!((left.scale, left.distortion_k1), (right.scale, right.distortion_k1));
+        assert_eq!((left.frame_moves, right.frame_moves), (1.0, 1.0));
     }
 }

@@ -56,7 +56,12 @@ impl Arm {
     /// # Errors
     ///
     /// In force mode, and for joints beyond their limits.
-    pub fn move_joints(&mut self, target_rad: Joints, acceleration_rad_s2: f64, speed_rad_s: f64) -> Result<(), String> {
+    pub fn move_joints(
+        &mut self,
+        target_rad: Joints,
+        acceleration_rad_s2: f64,
+        speed_rad_s: f64,
+    ) -> Result<(), String> {
         if self.force.is_some() {
             return Err("a motion in force mode is not simulated".into());
         }
@@ -67,7 +72,11 @@ impl Arm {
         }
         let finite = target_rad.iter().chain(&[acceleration_rad_s2, speed_rad_s]).all(|x| x.is_finite());
         self.drive = match finite {
-            true => Drive::Joints { target_rad, speed_rad_s: speed_rad_s.min(MAX_SPEED_RAD_S), acceleration_rad_s2 },
+            true => Drive::Joints {
+                target_rad,
+                speed_rad_s: speed_rad_s.min(MAX_SPEED_RAD_S),
+                acceleration_rad_s2,
+            },
             false => Drive::StopJoints { deceleration_rad_s2: BRAKE_RAD_S2 },
         };
         Ok(())
@@ -90,7 +99,8 @@ impl Arm {
             self.carry_to(*target_rad);
         } else {
             let share = step_rad / left_rad;
-            self.joint_speeds_rad_s = difference(target_rad, &self.joints_rad).map(|rad| share * rad / STEP_S);
+            self.joint_speeds_rad_s =
+                difference(target_rad, &self.joints_rad).map(|rad| share * rad / STEP_S);
             self.carry_to(added(&self.joints_rad, &self.joint_speeds_rad_s));
         }
     }
@@ -132,7 +142,9 @@ impl Arm {
         let speeds = self.joint_speeds_rad_s.map(f64::abs);
         // What a hand or a part that lets go does to the arm, and how it brakes, is no motion that was asked for.
         match (self.drive, speeds.iter().position(|rad_s| *rad_s > MAX_SPEED_RAD_S)) {
-            (Drive::Line { .. }, Some(i)) if self.has_limits => Err(ArmError::TooFast { joint: i + 1, speed_rad_s: speeds[i] }),
+            (Drive::Line { .. }, Some(i)) if self.has_limits => {
+                Err(ArmError::TooFast { joint: i + 1, speed_rad_s: speeds[i] })
+            }
             _ => Ok(()),
         }
     }

@@ -69,7 +69,9 @@ fn a_motion_of_joints_has_their_pace() {
     }
     // The last step ends where the way does.
     assert!(fastest < 0.4 + 1e-9 && hardest < 2.5, "{fastest} rad/s, {hardest} rad/s^2");
-    let mut rig = with("  thread moves():\n    movej([1, -1, 1, -1, -1, 0])\n  end\n  h = run moves()\n  sleep(0.5)\n  kill h\n  stopj(2)\n");
+    let mut rig = with(
+        "  thread moves():\n    movej([1, -1, 1, -1, -1, 0])\n  end\n  h = run moves()\n  sleep(0.5)\n  kill h\n  stopj(2)\n",
+    );
     rig.until(|c| c.program_title().is_none());
     assert!(rig.stands_still());
     assert_eq!(rig.controller.robot().joint_speeds_rad_s, [0.0; 6]);
@@ -79,7 +81,9 @@ fn a_motion_of_joints_has_their_pace() {
 #[test]
 fn a_line_that_leaves_the_reach_ends_in_a_protective_stop() {
     let ends = |speed_m_s: f64| {
-        let mut rig = with(&format!("  movel(p[0.88, 0, 0.2, 0, 0, 0])\n  movel(p[1.6, 0, 0.2, 0, 0, 0], a=0.5, v={speed_m_s})\n"));
+        let mut rig = with(&format!(
+            "  movel(p[0.88, 0, 0.2, 0, 0, 0])\n  movel(p[1.6, 0, 0.2, 0, 0, 0], a=0.5, v={speed_m_s})\n"
+        ));
         rig.until(|c| c.robot().safety == SafetyStatus::ProtectiveStop);
         rig.run(0.3);
         assert!(rig.stands_still());
@@ -89,14 +93,19 @@ fn a_line_that_leaves_the_reach_ends_in_a_protective_stop() {
     let (words, slowly_m) = ends(0.001);
     assert!(words.contains("no joints of a UR5e carry its flange to"), "{words}");
     let (words, fast_m) = ends(0.2);
-    assert!(words.contains("joint 3 would turn at") && words.contains(&format!("{MAX_SPEED_RAD_S:.1} rad/s are the most")), "{words}");
+    assert!(
+        words.contains("joint 3 would turn at")
+            && words.contains(&format!("{MAX_SPEED_RAD_S:.1} rad/s are the most")),
+        "{words}"
+    );
     assert!(fast_m < slowly_m && slowly_m < 0.9, "{fast_m} m and {slowly_m} m");
 }
 
 /// Close to its own axis the base would have to turn half around at once.
 #[test]
 fn a_line_through_a_singularity_ends_in_a_protective_stop() {
-    let mut rig = with("  movel(p[0.3, 0.136, 0.6, 0, 0, 0])\n  movel(p[-0.3, 0.136, 0.6, 0, 0, 0], a=2, v=0.5)\n");
+    let mut rig =
+        with("  movel(p[0.3, 0.136, 0.6, 0, 0, 0])\n  movel(p[-0.3, 0.136, 0.6, 0, 0, 0], a=2, v=0.5)\n");
     rig.until(|c| c.robot().safety == SafetyStatus::ProtectiveStop);
     assert!(told(&rig).contains(" would turn at "), "{}", told(&rig));
     rig.run(0.3);

@@ -103,7 +103,12 @@ pub trait Hands {
     /// # Errors
     ///
     /// Where the robot cannot.
-    fn move_joints(&mut self, target_rad: [f64; 6], acceleration_rad_s2: f64, speed_rad_s: f64) -> Result<(), String>;
+    fn move_joints(
+        &mut self,
+        target_rad: [f64; 6],
+        acceleration_rad_s2: f64,
+        speed_rad_s: f64,
+    ) -> Result<(), String>;
     /// Begins to brake.
     fn brake(&mut self, deceleration_m_s2: f64);
     /// Begins to brake its joints.

@@ -18,7 +18,9 @@ type Ends = Result<Outcome, String>;
 /// A pose in a line; joints are where the tool is with them.
 pub(super) fn move_line(a: &[Value], h: &mut dyn Hands) -> Ends {
     let target = match &a[0] {
-        Value::List(_) => numbers(&(kinematics::base_from_flange(&a[0].numbers()?) * tool(&Value::None, h)?)).pose()?,
+        Value::List(_) => {
+            numbers(&(kinematics::base_from_flange(&a[0].numbers()?) * tool(&Value::None, h)?)).pose()?
+        }
         value => value.pose()?,
     };
     let from = h.tcp_pose();
@@ -34,7 +36,8 @@ pub(super) fn move_joints(a: &[Value], h: &mut dyn Hands) -> Ends {
         Value::List(_) => a[0].numbers()?,
         value => reaching(value, &Value::None, &Value::None, h)?.map_err(|e| e.to_string())?,
     };
-    let way_rad = h.joints().iter().zip(&target_rad).fold(0.0, |most: f64, (from, to)| most.max((to - from).abs()));
+    let way_rad =
+        h.joints().iter().zip(&target_rad).fold(0.0, |most: f64, (from, to)| most.max((to - from).abs()));
     let (acceleration_rad_s2, speed_rad_s) = pace(a, TURN, way_rad)?;
     h.move_joints(target_rad, acceleration_rad_s2, speed_rad_s)?;
     Ok(Outcome::Motion)
@@ -71,7 +74,12 @@ pub(super) fn flange(h: &dyn Hands) -> Value {
     numbers(&kinematics::base_from_flange(&h.joints()))
 }
 
-fn reaching(at: &Value, near: &Value, with: &Value, h: &dyn Hands) -> Result<Result<Joints, OutOfReachError>, String> {
+fn reaching(
+    at: &Value,
+    near: &Value,
+    with: &Value,
+    h: &dyn Hands,
+) -> Result<Result<Joints, OutOfReachError>, String> {
     let base_from_flange = pose(at)? * tool(with, h)?.inverse();
     Ok(kinematics::nearest(&base_from_flange, &joints(near, h)?))
 }
@@ -92,7 +100,11 @@ fn tool(given: &Value, h: &dyn Hands) -> Result<Pose, String> {
 
 fn deceleration(value: &Value) -> Result<f64, String> {
     let deceleration = value.number()?;
-    if deceleration > 0.0 { Ok(deceleration) } else { Err(format!("a stop with a deceleration of {deceleration}")) }
+    if deceleration > 0.0 {
+        Ok(deceleration)
+    } else {
+        Err(format!("a stop with a deceleration of {deceleration}"))
+    }
 }
 
 /// Acceleration and speed of a motion over `way` (m or rad); a time comes before both.
@@ -103,7 +115,9 @@ fn pace(a: &[Value], or: (f64, f64), way: f64) -> Result<(f64, f64), String> {
         return Err("a motion with a blend radius: this robot comes to rest at each pose".into());
     }
     if !(acceleration > 0.0 && speed > 0.0 && time_s >= 0.0) {
-        return Err(format!("a motion with an acceleration of {acceleration}, a speed of {speed} and a time of {time_s}"));
+        return Err(format!(
+            "a motion with an acceleration of {acceleration}, a speed of {speed} and a time of {time_s}"
+        ));
     }
     Ok(if time_s > 0.0 && way > 0.0 { in_time(way, time_s, acceleration) } else { (acceleration, speed) })
 }

@@ -179,8 +179,14 @@ fn joints_and_poses_lead_to_each_other() {
     let back = "q = [0.3, -1.2, 1.4, -0.9, 1.1, 0.4]\nr = get_inverse_kin(get_forward_kin(q), qnear=q)\ntextmsg(norm([r[0] - q[0], r[2] - q[2], \
                 r[4] - q[4], r[5] - q[5]]) < 0.000001)\n";
     assert_eq!(said(back), ["True"]);
-    assert_eq!(said("movej([0.5, 0, 0, 0, 0, 0], v=0.2)\nstopj(3)\n"), ["turn to 0.500 with 1.4 and 0.2", "brake joints 3"]);
-    assert_eq!(said("movel(get_forward_kin([0, 0, 0, 0, 0, 0]), a=0.5)\n"), said("movel([0, 0, 0, 0, 0, 0], a=0.5)\n"));
+    assert_eq!(
+        said("movej([0.5, 0, 0, 0, 0, 0], v=0.2)\nstopj(3)\n"),
+        ["turn to 0.500 with 1.4 and 0.2", "brake joints 3"]
+    );
+    assert_eq!(
+        said("movel(get_forward_kin([0, 0, 0, 0, 0, 0]), a=0.5)\n"),
+        said("movel([0, 0, 0, 0, 0, 0], a=0.5)\n")
+    );
     // A time says the speed: 0.5 rad in 1 s are 0.6 rad/s with 3 rad/s^2, and need 2 rad/s^2 at least.
     let turn = |words: &str| said(&format!("movej([0.5, 0, 0, 0, 0, 0], {words}, t=1)\n"))[0].clone();
     assert!(turn("a=3").starts_with("turn to 0.500 with 3 and 0.63"), "{}", turn("a=3"));
@@ -258,7 +264,8 @@ end
     let text = "def program():\n  local b = 1\n  def f():\n    b = 2\n  end\n  f()\n  textmsg(b)\nend\n";
     assert_eq!(run(text, 10).0.asked, ["2"]);
     // A local of another function is no name here.
-    let text = "def program():\n  def g():\n    b = 1\n  end\n  def f():\n    textmsg(b)\n  end\n  f()\nend\n";
+    let text =
+        "def program():\n  def g():\n    b = 1\n  end\n  def f():\n    textmsg(b)\n  end\n  f()\nend\n";
     assert!(refused(text).contains("line 6: `b` is no name that is known"));
 }
 
@@ -299,9 +306,14 @@ end
     assert!(refused("def program():\n  def f(a=[1]):\n  end\nend\n").contains("the default of a parameter"));
     // A variable may have the name of a function.
     assert_eq!(said("length = 3\ntextmsg(length + length([1, 2]))\n"), ["5"]);
-    assert!(refused("def program():\n  def norm(x):\n  end\nend\n").contains("`norm` is a word of the language"));
+    assert!(
+        refused("def program():\n  def norm(x):\n  end\nend\n").contains("`norm` is a word of the language")
+    );
     // Brackets hold lines together.
-    assert_eq!(said("textmsg(\n  str_cat(\"a\",  # first\n    \"b\"))\nl = [1,\n  2]\ntextmsg(l[1])\n"), ["ab", "2"]);
+    assert_eq!(
+        said("textmsg(\n  str_cat(\"a\",  # first\n    \"b\"))\nl = [1,\n  2]\ntextmsg(l[1])\n"),
+        ["ab", "2"]
+    );
     assert!(refused("x = (1\ny = 2\n").contains("line 2"));
     assert_eq!(said("if False or  # first\n  True:\n  textmsg(1 +\n    2)\nend\n"), ["3"]);
     // A value may stand behind a comment: a client writes it so.

@@ -2,7 +2,7 @@
 
 use super::reduce::means;
 use super::{PressContact, PressScene};
-use crate::optics::level_at;
+use crate::optics::{frame_at, level_at};
 use crate::presses::Circle;
 use crate::presses::zone::{ZONES, Zone};
 use gripgen_twin::random::splitmix64;
@@ -130,8 +130,10 @@ impl PressView {
             None => [0.0; 3],
         };
         let frame = optics.changes_frame();
+        let moved = optics.moves_frame().then(|| frame_at(&scene.sensor.rest, grid, optics, &self.pixels));
+        let rest = moved.as_ref().unwrap_or(&self.rest);
         let mut levels = Vec::with_capacity(self.pixels.len());
-        for ((&pixel, rest), contact) in self.pixels.iter().zip(&self.rest).zip(contact) {
+        for ((&pixel, rest), contact) in self.pixels.iter().zip(rest).zip(contact) {
             levels.push([0, 1, 2].map(|c| {
                 let level = rest[c] + contact[c] + offset[c];
                 let seen = if frame { level_at(optics, grid, pixel, c, level) } else { level };
@@ -153,6 +155,7 @@ pub fn surface_part(optics: &OpticsState) -> OpticsState {
         exposure_gain: neutral.exposure_gain,
         gamma: neutral.gamma,
         rest_offset: neutral.rest_offset,
+        frame_moves: neutral.frame_moves,
         ..*optics
     }
 }

@@ -7,7 +7,12 @@ use super::{Call, Parser};
 use std::collections::BTreeMap;
 
 impl Parser {
-    pub(super) fn call(&mut self, name: String, arguments: Vec<Option<String>>, by_run: bool) -> Result<(), ScriptError> {
+    pub(super) fn call(
+        &mut self,
+        name: String,
+        arguments: Vec<Option<String>>,
+        by_run: bool,
+    ) -> Result<(), ScriptError> {
         let line = self.line();
         let place = self.emit(Op::Halt)?;
         let number = self.here()?.number;
@@ -60,7 +65,11 @@ impl Parser {
 
 impl Call {
     /// The step that calls its function.
-    pub(super) fn found(self, functions: &[Function], known: &BTreeMap<String, usize>) -> Result<Op, ScriptError> {
+    pub(super) fn found(
+        self,
+        functions: &[Function],
+        known: &BTreeMap<String, usize>,
+    ) -> Result<Op, ScriptError> {
         let Call { name, arguments, line, by_run, .. } = self;
         let wrong = |problem: String| ScriptError { line, problem };
         let to = *known.get(&name).ok_or_else(|| wrong(format!("`{name}` is no function that is known")))?;
@@ -86,7 +95,11 @@ impl Call {
         }
         let lacks = (0..parameters.len()).any(|i| called.parameters[i].is_none() && !places.contains(&i));
         if lacks || places.iter().any(|place| *place >= parameters.len()) {
-            return Err(wrong(format!("`{name}` takes {} values, not {}", parameters.len(), arguments.len())));
+            return Err(wrong(format!(
+                "`{name}` takes {} values, not {}",
+                parameters.len(),
+                arguments.len()
+            )));
         }
         Ok(if by_run { Op::Run(to) } else { Op::Call(to, places.into_boxed_slice()) })
     }
