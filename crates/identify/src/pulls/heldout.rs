@@ -223,13 +223,13 @@ mod tests {
     #[test]
     fn the_step_of_a_session_that_is_held_out_is_forgotten() {
         let column = super::super::data::Column::Word(
-            vec![0, 0, 1, 1, 2, 2],
+            vec![0, 0, 0, 1, 1, 1, 2, 2, 2],
             ["a", "b", "c"].map(String::from).to_vec(),
         );
         let curve = super::super::curves::curves_in("session", &column).remove(0);
         let terms = Terms { curves: vec![(curve, vec![0.2, -0.3])], ..Terms::default() };
-        assert_eq!(unseen_forgotten(&terms, &[0, 1, 2, 3]).curves[0].1, vec![0.2, 0.0]);
-        assert_eq!(unseen_forgotten(&terms, &[0, 1, 2, 3, 5]).curves[0].1, vec![0.2, -0.3]);
+        assert_eq!(unseen_forgotten(&terms, &[0, 1, 2, 3, 4, 5]).curves[0].1, vec![0.2, 0.0]);
+        assert_eq!(unseen_forgotten(&terms, &[0, 1, 3, 4, 8]).curves[0].1, vec![0.2, -0.3]);
     }
 
     #[test]
