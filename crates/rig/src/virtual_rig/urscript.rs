@@ -16,6 +16,7 @@ mod lexer;
 mod machine;
 mod motion;
 mod operators;
+mod outcome;
 mod parser;
 mod program;
 #[cfg(test)]

@@ -2,25 +2,15 @@
 
 use super::hands::{ForceMode, Hands, Watchdog, WatchdogAction};
 use super::motion;
+use super::outcome::{Outcome, list, numbers, pose};
 use super::value::{MAX_TEXT, Value};
 use gripgen_twin::frames::Pose;
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::Translation3;
 use std::fmt;
 use std::sync::Arc;
 
 /// Control step of an e-Series robot.
 const STEP_S: f64 = 0.002;
-
-/// What a function gives, or what its thread waits for.
-pub(super) enum Outcome {
-    Value(Value),
-    /// The next control step.
-    Sync,
-    /// So many seconds.
-    Sleep(f64),
-    /// The end of a motion.
-    Motion,
-}
 
 type Pure = fn(&[Value]) -> Result<Value, String>;
 type Handed = fn(&[Value], &mut dyn Hands) -> Result<Outcome, String>;
@@ -359,10 +349,6 @@ fn text(text: String) -> Result<Value, String> {
     Ok(Value::Text(Arc::from(text)))
 }
 
-pub(super) fn list(numbers: &[f64]) -> Value {
-    Value::List(Arc::new(numbers.iter().map(|x| Value::Float(*x)).collect()))
-}
-
 fn length(a: &[Value]) -> Result<Value, String> {
     match &a[0] {
         Value::List(list) => whole(list.len() as f64),
@@ -382,17 +368,6 @@ fn norm(a: &[Value]) -> Result<Value, String> {
         Value::Pose([x, y, z, ..]) => real((x * x + y * y + z * z).sqrt()),
         other => real(other.number()?.abs()),
     }
-}
-
-pub(super) fn pose(value: &Value) -> Result<Pose, String> {
-    let [x, y, z, rx, ry, rz] = value.pose()?;
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(rx, ry, rz));
-    Ok(Pose::from_parts(Translation3::new(x, y, z), turn))
-}
-
-pub(super) fn numbers(pose: &Pose) -> Value {
-    let (t, r) = (pose.translation.vector, pose.rotation.scaled_axis());
-    Value::Pose([t.x, t.y, t.z, r.x, r.y, r.z])
 }
 
 /// Positions are added, rotations follow each other.

@@ -1,8 +1,9 @@
 //! A program under way.
 
-use super::builtins::{Builtin, Outcome, Run};
+use super::builtins::{Builtin, Run};
 use super::hands::Hands;
 use super::operators::{element, negate, set_element};
+use super::outcome::Outcome;
 use super::program::{Op, Program, ScriptError, Slot};
 use super::value::Value;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! Motions and joints, by the names and the parameters of the manual.
 
-use super::builtins::{Outcome, list, numbers, pose};
 use super::hands::Hands;
+use super::outcome::{Outcome, list, numbers, pose};
 use super::value::Value;
 use crate::virtual_rig::kinematics::{self, Joints, OutOfReachError};
 use gripgen_twin::frames::Pose;
