@@ -1,5 +1,6 @@
 //! Presses at the pixels that are looked at, and how much each pixel counts.
 
+use super::candidates::tried;
 use super::predict::{ActingEffect, PRESS_ZONES, PredictPresses, PressPixels};
 use std::sync::Mutex;
 
@@ -118,9 +119,7 @@ impl<'a> Observed<'a> {
 
     /// On which presses an effect acts that begins with one; `None` for any other.
     pub(super) fn acts(&self, acting: &ActingEffect) -> Option<Vec<bool>> {
-        let from = acting.spec.presses.as_ref()?.tried?;
-        let at = acting.spec.parameters.iter().position(|p| p.name == from)?;
-        let first = *acting.values.get(at)?;
+        let first = *acting.values.get(tried(acting.spec)?)?;
         let all = self.predictor.circumstances();
         Some(all.iter().map(|press| press.pull_index as f64 >= first).collect())
     }

@@ -64,9 +64,7 @@ impl Design {
         let n = values.len() as f64;
         (mean, (squares * n / (n - 1.0).max(1.0)).sqrt() / sum)
     }
-}
 
-impl Design {
     /// Standard error of the mean where presses are of two kinds: what they scatter about the mean of their kind.
     pub(super) fn error_by_kind(&self, values: &[f64], kinds: &[bool]) -> f64 {
         let sum: f64 = self.weights.iter().sum();

@@ -93,7 +93,7 @@ fn counts(gain: f64, standard_error: f64, least: f64) -> bool {
     gain > least && gain > SURE * standard_error
 }
 
-/// Whether the last effect of `acting` lowers the costs of presses surely: by their differences, or by their shares where an effect that grows
+/// Whether the last effect of `after` lowers the costs of presses surely: by their differences, or by their shares where an effect that grows
 /// with the order does nothing to the first presses. One that acts from a press on makes two kinds of presses, and how much these differ
 /// from each other is no doubt about it.
 fn is_sure(observed: &Observed<'_>, design: &Design, before: &[f64], after: &Scored) -> bool {

@@ -123,11 +123,6 @@ fn within_limits(angle_rad: f64) -> f64 {
     if angle_rad.abs() > MAX_ANGLE_RAD { angle_rad - TAU.copysign(angle_rad) } else { angle_rad }
 }
 
-/// `flange_from_tool` of a pose as programs write it: metres and a rotation vector.
-pub fn rigid([x, y, z, rx, ry, rz]: [f64; 6]) -> Pose {
-    Pose::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_scaled_axis(Vector3::new(rx, ry, rz)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

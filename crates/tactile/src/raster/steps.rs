@@ -297,9 +297,7 @@ impl Side {
     fn of(&self, x: f64, y: f64) -> f32 {
         (self.x * (y - self.from.1) - self.y * (x - self.from.0)) as f32
     }
-}
 
-impl Side {
     /// What is added on the way to the points of a pixel.
     #[inline(always)]
     fn offsets(&self) -> Offsets {

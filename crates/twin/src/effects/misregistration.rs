@@ -7,8 +7,9 @@ use crate::OpticsState;
 
 /// `misregistration`: the part lies displaced and turned between the jaws, or the camera has another pixel size or a
 /// distortion that the sensor file does not know. What the contact changes in the image moves; the rest frame, which
-/// that camera took, stays, unless the camera itself was moved since: `frame_moves` says how much of the way it goes along. Both cameras look at one part from opposite sides: `shift_x_mm` and `rotation_deg`
-/// are those of the left image and have the other sign in the right one.
+/// that camera took, stays, unless the camera itself was moved since: `frame_moves` says how much of the way it goes
+/// along. Both cameras look at one part from opposite sides: `shift_x_mm` and `rotation_deg` are those of the left image
+/// and have the other sign in the right one.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "misregistration",
     group: Group::Optics,

@@ -92,8 +92,8 @@ fn joints(given: &Value, h: &dyn Hands) -> Result<Joints, String> {
 /// `flange_from_tool` that is given, or that of now. The name of the active one is a default of the manual.
 fn tool(given: &Value, h: &dyn Hands) -> Result<Pose, String> {
     match given {
-        Value::None => Ok(kinematics::rigid(h.tool())),
-        Value::Text(name) if &**name == "active_tcp" => Ok(kinematics::rigid(h.tool())),
+        Value::None => pose(&Value::Pose(h.tool())),
+        Value::Text(name) if &**name == "active_tcp" => pose(&Value::Pose(h.tool())),
         value => pose(value),
     }
 }
