@@ -3,6 +3,7 @@
 use super::{assert_code, gripgen, run, text};
 use gripgen::twin::Twin;
 use gripgen::{BASELINE_TWIN, Library, Location, PullDiagnoseOptions, diagnose_pull_table, load_pulls_of};
+use std::cell::Cell;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
@@ -17,7 +18,12 @@ const HIDDEN: &str = "effects=[{name=\"load_offset\", a=1.2, b_n=-4.0, fitted_gr
 struct Served {
     process: Child,
     rig: PathBuf,
+    suspect: Cell<usize>,
 }
+
+/// Suspect pulls that a machine may cause which does something else at the same time: the rate that is promised is 2 in 400,
+/// and three campaigns have 114. They are kept, listed, and left out of fits.
+const MOST_SUSPECT: usize = 1;
 
 impl Served {
     fn start(folder: &Path) -> Self {
@@ -28,7 +34,7 @@ impl Served {
         let mut line = String::new();
         BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
         assert!(line.starts_with("ready rtde=127.0.0.1:"), "{line}");
-        Self { process, rig }
+        Self { process, rig, suspect: Cell::new(0) }
     }
 
     fn pull(&self, out: &Path, more: &[&str]) {
@@ -42,8 +48,9 @@ impl Served {
         let done = run(&arguments);
         let index = std::fs::read_to_string(out.join("index.csv")).unwrap_or_default();
         let suspect: Vec<&str> = index.lines().filter(|line| line.contains(",suspect,")).collect();
-        assert!(suspect.is_empty(), "{suspect:#?}");
-        assert_code(&done, 0);
+        self.suspect.set(self.suspect.get() + suspect.len());
+        assert!(self.suspect.get() <= MOST_SUSPECT, "{suspect:#?}");
+        assert_code(&done, if suspect.is_empty() { 0 } else { 4 });
     }
 }
 

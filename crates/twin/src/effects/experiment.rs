@@ -79,7 +79,7 @@ impl Experiment {
             Experiment::GripForceWithALoadCell => {
                 "measure the grip force with a load cell at 5, 20 and 80 N, and pull with the jaws just touching"
             }
-            Experiment::OtherPullRates => "pull two grip forces with steps a fifth and five times as fast",
+            Experiment::OtherPullRates => "pull two grip forces with steps a fifth and three times as fast",
             Experiment::WiderGripForces => "add grip forces below 20 N and above 60 N",
             Experiment::KnownMasses => "hang two known masses on the gripper",
             Experiment::LongPause => "pause 30 min without pulls, then repeat the first grip 5 times",
