@@ -20,6 +20,7 @@ pub mod intervals;
 mod label_noise;
 mod law;
 mod learnt;
+mod levels;
 pub mod likelihood;
 pub mod model;
 mod naming;

@@ -1,5 +1,6 @@
 //! A campaign as numbers.
 
+use super::levels::levels;
 use gripgen_twin::columns::covariates;
 use gripgen_twin::values::distinct;
 use gripgen_twin::{MeasuredPulls, Values};
@@ -48,7 +49,7 @@ pub struct PullData<'a> {
     pub part_of: Vec<usize>,
     /// Labels.
     pub label_n: Vec<f64>,
-    /// Columns that were written down, by name, in a fixed order.
+    /// Columns that were written down, by name, in a fixed order; dwells as the levels that were meant (`levels.rs`).
     pub columns: BTreeMap<String, Column>,
     /// Session of each pull, as a position.
     pub session_of: Vec<usize>,
@@ -74,19 +75,24 @@ impl<'a> PullData<'a> {
         for column in covariates().filter(|c| measured.recorded.iter().any(|name| name == c.name)) {
             columns.insert(column.name.into(), column.values(pulls).into());
         }
+        let mut dwell_s: Vec<f64> = pulls.iter().map(|p| p.covariates.dwell_s).collect();
+        if let Some(Column::Number(carried_out)) = columns.get_mut("dwell_s") {
+            *carried_out = levels(carried_out);
+            dwell_s.clone_from(carried_out);
+        }
         for extra in &measured.extra {
             columns.insert(extra.name.clone(), extra.values.clone().into());
         }
         let (part_of, parts) = Values::coded(&pulls.iter().map(|p| p.part.clone()).collect::<Vec<_>>());
         let session_of = numbered(pulls.iter().map(|p| p.covariates.session.clone()));
-        let group_of = numbered(pulls.iter().map(|p| {
+        let group_of = numbered(pulls.iter().zip(&dwell_s).map(|(p, dwell_s)| {
             let c = &p.covariates;
             let numbers = [
                 p.grip_force_n,
                 p.increment_n,
                 p.start_n.unwrap_or(p.increment_n),
                 p.step_s,
-                c.dwell_s,
+                *dwell_s,
                 c.grip_offset_m,
                 c.grip_angle_rad,
                 c.pull_direction,
