@@ -5,6 +5,7 @@
 
 mod documents;
 mod shards;
+mod temporary;
 
 pub use documents::{RUN_SCHEMA, RunInfo, SHARD_SCHEMA, Sidecar};
 pub use shards::{PartialShard, ShardStart};
@@ -13,9 +14,9 @@ use crate::index::{csv_lines, index_header};
 use documents::{check_same, json, parse};
 use sha2::{Digest, Sha256};
 use std::fs::File;
-use std::hash::{BuildHasher, RandomState};
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use temporary::{Temporary, remove_left_over};
 
 /// Why a run folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -87,6 +88,7 @@ impl RunFolder {
     pub fn create(path: &Path, info: RunInfo, inputs: &[(&str, &[u8])]) -> Result<Self, FolderError> {
         let at = io_at(path);
         if let Some(found) = Self::open_same(path, &info)? {
+            remove_left_over(path);
             return Ok(found);
         }
         match std::fs::read_dir(path) {
@@ -165,21 +167,21 @@ impl RunFolder {
         if (0..self.info.shards).any(|shard| !self.sidecar_path(shard).exists()) {
             return Ok(false);
         }
-        let temporary = self.temporary("index.csv");
-        let at = io_at(&temporary);
-        let mut out = std::io::BufWriter::new(File::create(&temporary).map_err(&at)?);
+        let temporary = Temporary::new(&self.path, "index.csv")?;
+        let at = io_at(&temporary.path);
+        let mut out = std::io::BufWriter::new(&temporary.file);
         out.write_all(&csv_lines([&index_header(&self.info.extra_columns)])).map_err(&at)?;
         for shard in 0..self.info.shards {
             let Some(sidecar) = self.finished(shard)? else {
                 drop(out);
-                std::fs::remove_file(&temporary).map_err(&at)?;
+                temporary.give_up()?;
                 return Ok(false);
             };
             out.write_all(&csv_lines(&sidecar.rows)).map_err(&at)?;
         }
         let file = out.into_inner().map_err(|e| at(e.into_error()))?;
         file.sync_all().map_err(&at)?;
-        std::fs::rename(&temporary, self.path.join("index.csv")).map_err(&at)?;
+        std::fs::rename(&temporary.path, self.path.join("index.csv")).map_err(&at)?;
         Ok(true)
     }
 
@@ -190,51 +192,43 @@ impl RunFolder {
     /// A file that cannot be written.
     pub fn publish(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
         let temporary = self.written(name, bytes)?;
-        std::fs::rename(&temporary, self.path.join(name)).map_err(io_at(&temporary))
+        std::fs::rename(&temporary.path, self.path.join(name)).map_err(io_at(&temporary.path))
     }
 
     /// The same for a file that nobody may have written before; returns whether it was ours that was first.
     fn publish_new(&self, name: &str, bytes: &[u8]) -> Result<bool, FolderError> {
         let temporary = self.written(name, bytes)?;
-        let linked = std::fs::hard_link(&temporary, self.path.join(name));
+        let linked = std::fs::hard_link(&temporary.path, self.path.join(name));
         match linked {
             Ok(()) => {}
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {
-                std::fs::remove_file(&temporary).map_err(io_at(&temporary))?;
+                temporary.give_up()?;
                 return Ok(false);
             }
             // A file system without hard links.
             Err(_) => {
-                return std::fs::rename(&temporary, self.path.join(name))
-                    .map_err(io_at(&temporary))
+                return std::fs::rename(&temporary.path, self.path.join(name))
+                    .map_err(io_at(&temporary.path))
                     .map(|()| true);
             }
         }
-        std::fs::remove_file(&temporary).map_err(io_at(&temporary))?;
+        temporary.give_up()?;
         Ok(true)
     }
 
     /// A temporary file with this content.
-    fn written(&self, name: &str, bytes: &[u8]) -> Result<PathBuf, FolderError> {
-        let temporary = self.temporary(name);
-        let at = io_at(&temporary);
+    fn written(&self, name: &str, bytes: &[u8]) -> Result<Temporary, FolderError> {
+        let temporary = Temporary::new(&self.path, name)?;
         let write = || {
-            let mut file = File::create(&temporary)?;
-            file.write_all(bytes)?;
-            file.sync_all()
+            (&temporary.file).write_all(bytes)?;
+            temporary.file.sync_all()
         };
         write().map_err(|e| {
             // A disk that is full gets its room back.
-            let _ = std::fs::remove_file(&temporary);
-            at(e)
+            let _ = temporary.give_up();
+            io_at(&temporary.path)(e)
         })?;
         Ok(temporary)
-    }
-
-    /// A name that no other process uses: process numbers repeat across machines and containers.
-    fn temporary(&self, name: &str) -> PathBuf {
-        let random = RandomState::new().hash_one(std::process::id());
-        self.path.join(format!("{name}.{random:016x}.partial"))
     }
 }
 

@@ -56,12 +56,12 @@ impl TraceResiduals {
 
     /// Minus the logarithm of their likelihood, with the most likely scale between traces, of at least 1.
     pub fn cost(&self) -> f64 {
-        let (zero, zero_cost) = self.zeros.judged();
+        let (_, zero_cost) = self.zeros.judged();
         let s = if self.own.is_empty() { 1.0 } else { scale(&self.own).max(1.0) };
         let correlated = self.correlated(s);
         let own: Vec<f64> = self.own.iter().map(|r| r / (s * correlated)).collect();
         let apart = self.own.len() as f64 / (correlated * correlated);
-        huber(&self.shared) + huber(&own) + apart * libm::log(s) + zero_cost + huber(&self.zeros.mean(zero))
+        huber(&self.shared) + huber(&own) + apart * libm::log(s) + zero_cost
     }
 }
 

@@ -178,7 +178,7 @@ impl RunFolder {
 
 /// Whether an open file is still the one at `path`.
 #[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> std::io::Result<bool> {
+pub(super) fn is_at(file: &File, path: &Path) -> std::io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
     let open = file.metadata()?;
     match std::fs::metadata(path) {
@@ -190,7 +190,7 @@ fn is_at(file: &File, path: &Path) -> std::io::Result<bool> {
 
 /// Elsewhere an open file cannot be renamed, so it is where it was.
 #[cfg(not(unix))]
-fn is_at(_file: &File, path: &Path) -> std::io::Result<bool> {
+pub(super) fn is_at(_file: &File, path: &Path) -> std::io::Result<bool> {
     path.try_exists()
 }
 
