@@ -104,6 +104,7 @@ impl RunFolder {
             Err(e) if e.kind() == ErrorKind::NotFound => std::fs::create_dir_all(path).map_err(&at)?,
             Err(e) => return Err(at(e)),
         }
+        remove_left_over(path);
         let folder = Self { path: path.into(), info };
         if !inputs.is_empty() {
             std::fs::create_dir_all(path.join("inputs")).map_err(&at)?;

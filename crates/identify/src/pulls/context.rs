@@ -374,12 +374,15 @@ impl<'a> Context<'a> {
             rows.iter().filter_map(|&i| self.observed[i]).map(|o| &self.observations[o]).collect();
         let asked: Vec<(usize, &[f64])> = seen.iter().map(|o| (o.row, o.times_s.as_slice())).collect();
         for (observation, predicted) in seen.iter().zip(self.predictor.traces(model, &asked)) {
+            // The zero of a pull is in all of its readings: it is judged once, and the others are taken from it.
+            let mut zero_n = 0.0;
             if let Some((mean, n)) = observation.no_load_n {
-                no_load.push((mean - predicted.no_load_n, n, self.data.session_of[observation.row]));
+                zero_n = mean - predicted.no_load_n;
+                no_load.push((zero_n, n, self.data.session_of[observation.row]));
             }
             let mut sums = [(0.0, 0.0, 0_usize); LEVELS];
             for (k, level) in observation.levels.iter().enumerate() {
-                sums[*level].0 += observation.readings_n[k] - predicted.stuck_n[k];
+                sums[*level].0 += observation.readings_n[k] - predicted.stuck_n[k] - zero_n;
                 sums[*level].1 += observation.readings_n[k];
                 sums[*level].2 += 1;
             }

@@ -47,7 +47,11 @@ pub(super) fn paying(
         let mut gain = plain.max(weighed);
         let traces = !context.observations.is_empty();
         if traces && search.candidates[accepted.effects[place].0].acts_on_signals() {
-            gain = gain.max(share([&fewer, &accepted.fitted].map(|f| readings(context, &f.model))));
+            // A zero that wanders without the effect is no witness for it.
+            let rows: Vec<usize> = (0..context.data.len()).collect();
+            let zero = context.trace_residuals(&fewer.model, &rows).widening().zero;
+            let widening = Widening { zero, ..Widening::NONE };
+            gain = gain.max(share([&fewer, &accepted.fitted].map(|f| readings(context, &f.model, widening))));
         }
         let unfelt = || unfelt(search, &accepted.fitted, spec, &sd_n);
         let reason = match neutral(&accepted.fitted, spec).or_else(unfelt) {
@@ -181,10 +185,10 @@ fn unfelt(
     })
 }
 
-/// How far the readings of the traces are from a model, in the deviations that are known of arms and sensors.
-fn readings(context: &Context<'_>, model: &PullModel) -> f64 {
+/// How far the readings of the traces are from a model, in the deviations of `widening`.
+fn readings(context: &Context<'_>, model: &PullModel, widening: Widening) -> f64 {
     let rows: Vec<usize> = (0..context.data.len()).collect();
-    root_mean_square(context.trace_residuals(model, &rows).widened(Widening::NONE).into_iter())
+    root_mean_square(context.trace_residuals(model, &rows).widened(widening).into_iter())
 }
 
 pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
