@@ -10,7 +10,7 @@ const RATIO: f64 = 1.5;
 pub fn levels(x: &[f64]) -> Vec<f64> {
     let mut sorted = x.to_vec();
     sorted.sort_by(f64::total_cmp);
-    if sorted.first().is_none_or(|least| !(*least > 0.0)) {
+    if sorted.first().is_none_or(|least| least.is_nan() || *least <= 0.0) {
         return x.to_vec();
     }
     let groups: Vec<&[f64]> = sorted.chunk_by(|a, b| *b < RATIO * a).collect();
