@@ -15,7 +15,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from served import Rig
+from served import PATIENT, Rig
 
 SPEED = 50
 # What is hidden, and the names under which it counts as found: those that labels of one campaign do not tell apart.
@@ -55,9 +55,8 @@ def one(gripgen, folder, number, drift_n_min):
         with Rig(gripgen, folder, SPEED, ["--seed", number, *hide]) as rig:
             rig.fault(f"force-lag {lag_s}")
             rig.fault(f"drift {drift_n_min}")
-            patient = ["--set", "limits.robot_silence_s=1.0", "--set", "limits.robot_gap_s=1.0", "--set", "images.frame_s=5.0"]
-            call("rig", "rehearse", rig.file, "-o", "rehearsal.json", "-q", *patient, fine=(0, 4))
-            pull = ["rig", "pull", rig.file, "--rehearsal", "rehearsal.json", "-q", "--reconnect", "20", *patient]
+            call("rig", "rehearse", rig.file, "-o", "rehearsal.json", "-q", *PATIENT, fine=(0, 4))
+            pull = ["rig", "pull", rig.file, "--rehearsal", "rehearsal.json", "-q", "--reconnect", "20", *PATIENT]
             call("campaign", "--rig", rig.file, "--pulls", 48, "--sessions", 1, "--seed", number, "-o", "first.toml", "-q")
             call(*pull, "--campaign", "first.toml", "-o", "first", fine=(0, 4))
             call("diagnose", "first", "-o", "after.toml", "--json", "found.json", "-q")

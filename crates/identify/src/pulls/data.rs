@@ -133,3 +133,41 @@ impl<'a> PullData<'a> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gripgen_twin::{Covariates, MeasuredPull, PlannedPull};
+
+    /// A rig that should wait for 1 s and 10 s does so nearly: two settings, of two and three repetitions.
+    #[test]
+    fn pulls_that_waited_nearly_the_same_time_are_repetitions() {
+        let pull = |dwell_s: f64| MeasuredPull {
+            id: String::new(),
+            part: "rod".into(),
+            grip_pose: 0,
+            grip_force_n: 20.0,
+            increment_n: 1.0,
+            start_n: None,
+            step_s: 0.104,
+            covariates: Covariates { dwell_s, ..PlannedPull::default().covariates() },
+            max_pull_force_n: 8.0,
+            zero_shift_n: 0.0,
+            trace: None,
+        };
+        let measured = |dwells_s: &[f64]| MeasuredPulls {
+            pulls: dwells_s.iter().map(|s| pull(*s)).collect(),
+            recorded: vec!["dwell_s".into()],
+            extra: vec![],
+            label_tolerance_n: 3.0,
+            stop_m: 5e-3,
+            feedback: None,
+            sha256: String::new(),
+        };
+        let two = measured(&[1.02, 10.2, 1.11, 10.1, 10.4]);
+        let data = PullData::new(&two);
+        assert_eq!(data.group_of, [0, 1, 0, 1, 1]);
+        assert_eq!(data.columns["dwell_s"].distinct(), 2);
+        assert!(!PullData::new(&measured(&[1.02, 1.31, 1.11])).varies("dwell_s"), "planned as one");
+    }
+}

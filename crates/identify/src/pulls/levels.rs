@@ -5,8 +5,8 @@ const RATIO: f64 = 1.5;
 
 /// A rig that should wait 1 s waits 1.02 s, then 1.11 s: no two pulls have the same time, and a curve with a knot at each would
 /// fit noise. Where times fall into groups, each within a factor of 1.5 and each a factor of 1.5 away from the next, the times
-/// of a group are replaced by their median; all others (spread out on purpose) stay as they are. No effect of a dwell is visible
-/// within such a factor: forces grow by some 5 % for each factor e of waiting (Dieterich, Journal of Geophysical Research 77, 1972).
+/// of a group are replaced by their median; all others (spread out on purpose) stay as they are. Ageing goes with the
+/// logarithm of the wait (Dieterich, Journal of Geophysical Research 77, 1972): of 5 % for each factor e, 2 % lie within 1.5.
 pub fn levels(x: &[f64]) -> Vec<f64> {
     let mut sorted = x.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -1,10 +1,8 @@
 //! Names that pay. What looks like an effect, and neither excludes nothing nor lowers the error on data that no fit has seen, is a
 //! hint: it is said and is not in the twin.
 
-use super::context::Context;
 use super::estimates::parameters;
 use super::fitting::Fitted;
-use super::model::PullModel;
 use super::search::{Accepted, ByChance, Search};
 use super::terms::Terms;
 use super::trace_residuals::Widening;
@@ -48,10 +46,10 @@ pub(super) fn paying(
         let traces = !context.observations.is_empty();
         if traces && search.candidates[accepted.effects[place].0].acts_on_signals() {
             // A zero that wanders without the effect is no witness for it.
-            let rows: Vec<usize> = (0..context.data.len()).collect();
-            let zero = context.trace_residuals(&fewer.model, &rows).widening().zero;
-            let widening = Widening { zero, ..Widening::NONE };
-            gain = gain.max(share([&fewer, &accepted.fitted].map(|f| readings(context, &f.model, widening))));
+            let all: Vec<usize> = (0..context.data.len()).collect();
+            let readings = [&fewer, &accepted.fitted].map(|f| context.trace_residuals(&f.model, &all));
+            let widening = Widening { zero: readings[0].widening().zero, ..Widening::NONE };
+            gain = gain.max(share(readings.map(|r| root_mean_square(r.widened(widening).into_iter()))));
         }
         let unfelt = || unfelt(search, &accepted.fitted, spec, &sd_n);
         let reason = match neutral(&accepted.fitted, spec).or_else(unfelt) {
@@ -183,12 +181,6 @@ fn unfelt(
             size.name
         )
     })
-}
-
-/// How far the readings of the traces are from a model, in the deviations of `widening`.
-fn readings(context: &Context<'_>, model: &PullModel, widening: Widening) -> f64 {
-    let rows: Vec<usize> = (0..context.data.len()).collect();
-    root_mean_square(context.trace_residuals(model, &rows).widened(widening).into_iter())
 }
 
 pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
