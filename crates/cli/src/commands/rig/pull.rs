@@ -37,7 +37,7 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
     let config = load_rig(&args.rig, &args.set)?;
     let mut campaign = planned(args, &config)?;
     let rehearsal = args.rehearsal.as_deref().map(rehearsal::load).transpose()?;
-    let slow = rehearsal.as_ref().map(|stored| slowed_by(stored, &mut campaign)).transpose()?;
+    let slow = rehearsal.as_ref().map(|stored| slowed_by(stored, &config, &mut campaign)).transpose()?;
     let campaign = campaign;
     check_campaign(&config, &campaign).map_err(|e| {
         Failure::usage(e).hint("nothing was sent and nothing moved; the limits stand in the rig's file and in the device's data sheet")
@@ -115,13 +115,18 @@ fn unchanged(config: &RigConfig, stored: &StoredRehearsal) -> Result<(), Failure
 }
 
 /// A rehearsal that speaks for pulls slows their staircases; what it did, in words.
-fn slowed_by(stored: &StoredRehearsal, campaign: &mut Campaign) -> Result<String, Failure> {
+fn slowed_by(
+    stored: &StoredRehearsal,
+    config: &RigConfig,
+    campaign: &mut Campaign,
+) -> Result<String, Failure> {
     if let Some(doubt) = stored.doubts.first() {
         return Err(Failure::new(format!("the rehearsal speaks against pulls: {doubt}"))
             .hint("nothing was sent; mend it and rehearse again, or pull without --rehearsal"));
     }
     let trails_s = stored.rehearsal.trails_s().unwrap_or_default();
-    let count = slowed(campaign, trails_s);
+    let limits = &config.limits;
+    let count = slowed(campaign, trails_s, limits.pull_force_n / limits.pull_time_s);
     let words = format!("rehearsed: the force trails by {trails_s:.3} s");
     Ok(if count == 0 { words } else { format!("{words}, staircases are slowed for {count} of the pulls") })
 }
