@@ -27,6 +27,8 @@ mod diagnose;
 mod diagnose_awkward;
 // Lost grips of a real robot, by rows and by events.
 mod event_log;
+// Files that were changed at random.
+mod fuzz_inputs;
 // Random parts in random grips.
 mod fuzz_parts;
 // Effects of the library, through the whole pipeline.

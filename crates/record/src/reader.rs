@@ -10,7 +10,7 @@ use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::shard::RIG_SOURCE;
 use crate::shard::{CLEAN, EVEN, LAYOUT_VERSION, METADATA_NAME, rest_name};
-use file::{attachment, piece, read_summary};
+use file::{attachment, check_chunk, piece, read_summary};
 use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use mcap::records::{ChunkIndex, MetadataIndex};
@@ -425,6 +425,7 @@ impl ShardReader {
         let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
         let record =
             piece(&self.file, self.bytes, chunk.chunk_start_offset, chunk.chunk_length).map_err(bad)?;
+        check_chunk(&record).map_err(bad)?;
         let at_start = ChunkIndex { chunk_start_offset: 0, ..chunk.clone() };
         for message in self.summary.stream_chunk(&record, &at_start).map_err(bad)? {
             let message = message.map_err(bad)?;

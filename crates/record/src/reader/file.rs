@@ -1,6 +1,6 @@
 //! Pieces of an MCAP file.
 
-use mcap::records::AttachmentIndex;
+use mcap::records::{AttachmentIndex, Record, op};
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use mcap::{McapError, Summary};
 use std::fs::File;
@@ -19,8 +19,25 @@ pub(super) fn attachment(
     Ok(Some(mcap::read::attachment(&record, &at_start)?.data.into_owned()))
 }
 
-/// Smallest record: its kind and its length.
-const MIN_RECORD: u64 = 8;
+/// Smallest record: its kind, one byte, and its length, eight.
+const MIN_RECORD: u64 = 9;
+
+/// Checks that the records inside an uncompressed chunk fit into it: `mcap` adds lengths before it knows that (version 0.26), and
+/// panics on those near the largest number.
+pub(super) fn check_chunk(record: &[u8]) -> Result<(), McapError> {
+    let frame = MIN_RECORD as usize;
+    let body = record.get(frame..).ok_or(McapError::BadIndex)?;
+    let Record::Chunk { data, .. } = mcap::parse_record(op::CHUNK, body)? else {
+        return Err(McapError::BadIndex);
+    };
+    let mut rest: &[u8] = &data;
+    while !rest.is_empty() {
+        let length = rest.get(1..frame).and_then(|length| length.try_into().ok()).map(u64::from_le_bytes);
+        let end = length.and_then(|n| usize::try_from(n).ok()).and_then(|n| n.checked_add(frame));
+        rest = end.and_then(|end| rest.get(end..)).ok_or(McapError::UnexpectedEoc)?;
+    }
+    Ok(())
+}
 
 /// Some bytes of a file that is `bytes` long.
 pub(super) fn piece(file: &File, bytes: u64, start: u64, length: u64) -> Result<Vec<u8>, McapError> {
@@ -65,4 +82,38 @@ pub(super) fn read_summary(file: &File, bytes: u64) -> Result<Option<Summary>, M
         }
     }
     Ok(reader.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chunk with one record that says that it is so long.
+    fn chunk(length: u64) -> Vec<u8> {
+        let mut inner = vec![op::MESSAGE];
+        inner.extend(length.to_le_bytes());
+        inner.extend([0; 24]);
+        // Start, end, size and checksum of what is packed, no name of a compression, how much there is.
+        let mut body =
+            [0_u64.to_le_bytes(), 0_u64.to_le_bytes(), (inner.len() as u64).to_le_bytes()].concat();
+        body.extend([0; 8]);
+        body.extend((inner.len() as u64).to_le_bytes());
+        body.extend(inner);
+        let mut record = vec![op::CHUNK];
+        record.extend((body.len() as u64).to_le_bytes());
+        record.extend(body);
+        record
+    }
+
+    #[test]
+    fn records_of_a_chunk_fit_into_it() {
+        assert!(check_chunk(&chunk(24)).is_ok());
+        for length in [25, 1 << 40, u64::MAX - 9, u64::MAX - 8, u64::MAX] {
+            assert!(matches!(check_chunk(&chunk(length)), Err(McapError::UnexpectedEoc)), "{length}");
+        }
+        assert!(check_chunk(&chunk(23)).is_err(), "a byte is left");
+        for end in 0..chunk(24).len() {
+            assert!(check_chunk(&chunk(24)[..end]).is_err(), "{end} bytes");
+        }
+    }
 }
