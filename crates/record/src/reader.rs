@@ -10,7 +10,7 @@ use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::shard::RIG_SOURCE;
 use crate::shard::{CLEAN, EVEN, LAYOUT_VERSION, METADATA_NAME, rest_name};
-use file::{attachment, check_chunk, piece, read_summary};
+use file::{attachment, check_chunk, piece, read_summary, record};
 use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use mcap::records::{ChunkIndex, MetadataIndex};
@@ -131,7 +131,7 @@ fn metadata_record(
     name: &str,
 ) -> Result<Option<BTreeMap<String, String>>, McapError> {
     let Some(index) = summary.metadata_indexes.iter().find(|m| m.name == name) else { return Ok(None) };
-    let record = piece(file, bytes, index.offset, index.length)?;
+    let record = record(file, bytes, index.offset, index.length)?;
     let at_start = MetadataIndex { offset: 0, ..index.clone() };
     Ok(Some(mcap::read::metadata(&record, &at_start)?.metadata))
 }
@@ -424,7 +424,7 @@ impl ShardReader {
     ) -> Result<(), ReadError> {
         let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
         let record =
-            piece(&self.file, self.bytes, chunk.chunk_start_offset, chunk.chunk_length).map_err(bad)?;
+            record(&self.file, self.bytes, chunk.chunk_start_offset, chunk.chunk_length).map_err(bad)?;
         check_chunk(&record).map_err(bad)?;
         let at_start = ChunkIndex { chunk_start_offset: 0, ..chunk.clone() };
         for message in self.summary.stream_chunk(&record, &at_start).map_err(bad)? {

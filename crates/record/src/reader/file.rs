@@ -14,7 +14,7 @@ pub(super) fn attachment(
     name: &str,
 ) -> Result<Option<Vec<u8>>, McapError> {
     let Some(index) = summary.attachment_indexes.iter().find(|a| a.name == name) else { return Ok(None) };
-    let record = piece(file, bytes, index.offset, index.length)?;
+    let record = record(file, bytes, index.offset, index.length)?;
     let at_start = AttachmentIndex { offset: 0, ..index.clone() };
     Ok(Some(mcap::read::attachment(&record, &at_start)?.data.into_owned()))
 }
@@ -39,10 +39,14 @@ pub(super) fn check_chunk(record: &[u8]) -> Result<(), McapError> {
     Ok(())
 }
 
+/// A record of a file that is `bytes` long, with its kind and length.
+pub(super) fn record(file: &File, bytes: u64, start: u64, length: u64) -> Result<Vec<u8>, McapError> {
+    if length < MIN_RECORD { Err(McapError::BadIndex) } else { piece(file, bytes, start, length) }
+}
+
 /// Some bytes of a file that is `bytes` long.
 pub(super) fn piece(file: &File, bytes: u64, start: u64, length: u64) -> Result<Vec<u8>, McapError> {
-    let fits = start.checked_add(length).is_some_and(|end| end <= bytes) && length >= MIN_RECORD;
-    if !fits {
+    if start.checked_add(length).is_none_or(|end| end > bytes) {
         return Err(McapError::BadIndex);
     }
     let mut found = vec![0; length as usize];
