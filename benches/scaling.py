@@ -1,4 +1,4 @@
-"""What a sweep costs: against samples, threads, triangles of the part, pixels, frames of the pull, and kind of storage.
+"""What a sweep costs: against samples, threads, storage, frames of the pull, triangles of the part, and mechanics.
 
     python benches/scaling.py --gripgen target/release/gripgen --work /tmp/scaling
 
@@ -55,16 +55,17 @@ class Bench:
             best = min(best, time.perf_counter() - start)
         return best, sum(f.stat().st_size for f in (self.work / "run").glob("*.mcap"))
 
-    def table(self, title, column, rows):
-        """Prints rows of (level, samples, seconds, bytes), and the slope of the seconds of a sample."""
-        print(f"\n| {column} | samples | seconds | samples/s | kB a sample |\n|---|---|---|---|---|")
-        for level, samples, seconds, size in rows:
-            print(f"| {level} | {samples} | {seconds:.2f} | {samples / seconds:.0f} | {size / samples / 1e3:.1f} |")
-        numbers = [(math.log(float(level)), math.log(seconds / samples)) for level, samples, seconds, _ in rows if isinstance(level, int) and level > 0]
-        if len(numbers) > 2:
-            mx, my = (sum(x[i] for x in numbers) / len(numbers) for i in (0, 1))
-            slope = sum((x - mx) * (y - my) for x, y in numbers) / sum((x - mx) ** 2 for x, _ in numbers)
-            print(f"\n{title}: seconds a sample go with the power {slope:.2f}.", flush=True)
+
+def table(column, rows):
+    """Prints rows of (level, samples, seconds, bytes), and the slope of the seconds of a sample where levels are numbers."""
+    print(f"\n| {column} | samples | seconds | samples/s | kB a sample |\n|---|---|---|---|---|")
+    for level, samples, seconds, size in rows:
+        print(f"| {level} | {samples} | {seconds:.2f} | {samples / seconds:.0f} | {size / samples / 1e3:.1f} |")
+    numbers = [(math.log(float(level)), math.log(seconds / samples)) for level, samples, seconds, _ in rows if isinstance(level, int)]
+    if len(numbers) > 2:
+        mx, my = (sum(x[i] for x in numbers) / len(numbers) for i in (0, 1))
+        slope = sum((x - mx) * (y - my) for x, y in numbers) / sum((x - mx) ** 2 for x, _ in numbers)
+        print(f"\nSeconds a sample go with the power {slope:.2f}.")
 
 
 def own_part(work, name, rings):
@@ -92,24 +93,24 @@ def main():
 
     sizes = [n for n in (100, 1000, 10_000, 100_000) if n <= options.most]
     rows = [(n, n, *bench.sweep(samples=n, repeats=3 if n <= 1000 else 1, images="none", trace="none", shard_samples=min(1000, n // 4))) for n in sizes]
-    bench.table("labels alone", "samples, labels alone", rows)
+    table("samples, labels alone", rows)
     sizes = [n for n in sizes if n <= 10_000]
     rows = [(n, n, *bench.sweep(samples=n, repeats=3 if n <= 1000 else 1, shard_samples=min(250, n // 4))) for n in sizes]
-    bench.table("images and traces", "samples, images and traces", rows)
+    table("samples, images and traces", rows)
     rows = [(j, 1000, *bench.sweep(samples=1000, jobs=j, shard_samples=50)) for j in range(1, os.cpu_count() + 1)]
-    bench.table("threads", "threads", rows)
+    table("threads", rows)
     rows = [(f"{s}, {c}" if s == "clean" else s, 500, *bench.sweep(samples=500, shard_samples=50, images=f'{{storage="{s}", compression="{c}"}}'))
             for s, c in [("png", "fast"), ("clean", "fast"), ("clean", "small"), ("raw", "fast"), ("none", "fast")]]
-    bench.table("storage", "images stored as", rows)
+    table("images stored as", rows)
     rows = [(f, 100, *bench.sweep(samples=100, shard_samples=25, images=f"{{during_pull={{frames={f}}}}}")) for f in (4, 16, 64)]
-    bench.table("frames", "frames of the pull", rows)
+    table("frames of the pull", rows)
     rows = []
     for rings in (10, 30, 100, 300):
         triangles = own_part(options.work, "ball", rings)
         rows.append((triangles, 200, *bench.sweep(config=options.work / "ball.toml", samples=200, shard_samples=25)))
-    bench.table("triangles", "triangles of the part", rows)
+    table("triangles of the part", rows)
     rows = [(m, 200, *bench.sweep(samples=200, shard_samples=25, mechanics=f'"{m}"', repeats=1)) for m in ("reduced", "rapier")]
-    bench.table("mechanics", "mechanics", rows)
+    table("mechanics", rows)
 
 
 if __name__ == "__main__":

@@ -187,7 +187,6 @@ fn glb(positions: &[u8], indices: &[u8]) -> Vec<u8> {
 fn changed_meshes_never_panic() {
     let meshes = meshes();
     for (extension, bytes) in &meshes {
-        // glTF is in metres by its standard.
         let mesh =
             TriMesh::from_file_bytes(bytes, extension, 1e-3).unwrap_or_else(|e| panic!("{extension}: {e}"));
         assert_eq!(mesh.triangles().len(), 12, "{extension}");
@@ -239,7 +238,6 @@ fn changed_configurations_never_panic() {
     let at = |name: &str| folder.path().join(name);
     let configs = configs(folder.path());
     let plain = |name: &str| configs.iter().find(|(n, _)| *n == name).unwrap().1.clone();
-    std::fs::write(at("plain-twin.toml"), plain("twin")).unwrap();
     std::fs::write(at("twin-sweep.toml"), plain("sweep")).unwrap();
     std::fs::write(at("twin.toml"), plain("twin")).unwrap();
     let taken = |kind: &str, bytes: &[u8]| -> Result<(), String> {

@@ -25,6 +25,7 @@ mod export;
 mod film;
 mod film_frame;
 mod folder;
+mod frame;
 mod imprint_table;
 mod index;
 mod lerobot;

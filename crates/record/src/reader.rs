@@ -1,6 +1,7 @@
 //! Reading a shard: any sample, in any order, one at a time.
 
 mod file;
+mod messages;
 mod rig;
 
 use crate::background::Background;
@@ -10,10 +11,9 @@ use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::shard::RIG_SOURCE;
 use crate::shard::{CLEAN, EVEN, LAYOUT_VERSION, METADATA_NAME, rest_name};
-use file::{attachment, check_chunk, piece, read_summary, record};
+use file::{attachment, metadata_record, open_mcap, read_summary};
 use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
-use mcap::records::{ChunkIndex, MetadataIndex};
 use mcap::{McapError, Summary};
 use prost::Message;
 use std::collections::BTreeMap;
@@ -106,34 +106,6 @@ pub enum ReadError {
         /// What is wrong.
         problem: String,
     },
-}
-
-/// An MCAP file, whole as far as its two ends say, and its size.
-fn open_mcap(path: &Path) -> Result<(File, u64), ReadError> {
-    let at = |source| ReadError::Open { path: path.into(), source };
-    let bad = |source| ReadError::Mcap { path: path.into(), source };
-    let file = File::open(path).map_err(at)?;
-    let bytes = file.metadata().map_err(at)?.len();
-    let magic = mcap::MAGIC.len() as u64;
-    for start in [0, bytes.saturating_sub(magic)] {
-        if piece(&file, bytes, start, magic).map_err(bad)? != mcap::MAGIC {
-            return Err(bad(McapError::BadMagic));
-        }
-    }
-    Ok((file, bytes))
-}
-
-/// The first metadata record of a name.
-fn metadata_record(
-    file: &File,
-    bytes: u64,
-    summary: &Summary,
-    name: &str,
-) -> Result<Option<BTreeMap<String, String>>, McapError> {
-    let Some(index) = summary.metadata_indexes.iter().find(|m| m.name == name) else { return Ok(None) };
-    let record = record(file, bytes, index.offset, index.length)?;
-    let at_start = MetadataIndex { offset: 0, ..index.clone() };
-    Ok(Some(mcap::read::metadata(&record, &at_start)?.metadata))
 }
 
 /// The verb that wrote an MCAP file which is no shard of a run; `None` where nobody marked it.
@@ -338,101 +310,6 @@ impl ShardReader {
         };
         let raw_images = self.has_raw_images();
         Ok(RawRecord { sample, images, raw_images, trace })
-    }
-
-    /// Calls `visit` with topic and bytes of every core message of a sample.
-    fn each_message(
-        &self,
-        index: u64,
-        visit: impl FnMut(&str, &[u8]) -> Result<(), String>,
-    ) -> Result<(), ReadError> {
-        // The core chunk of a slot comes first in it.
-        match self.chunks_of(index)?.next() {
-            Some(chunk) => self.each_message_in(chunk, index, visit),
-            None => Err(self.damaged(index, "/sample", "its chunk is missing")),
-        }
-    }
-
-    /// The same for every message of these topics, in whichever chunks they are.
-    fn each_message_of(
-        &self,
-        index: u64,
-        topics: &[&str],
-        mut visit: impl FnMut(&str, &[u8]) -> Result<(), String>,
-    ) -> Result<(), ReadError> {
-        let channels = &self.summary.channels;
-        let wanted = |id: &u16| channels.get(id).is_some_and(|c| topics.contains(&c.topic.as_str()));
-        for chunk in self.chunks_of(index)?.filter(|c| c.message_index_offsets.keys().any(wanted)) {
-            self.each_message_in(chunk, index, |topic, data| {
-                if topics.contains(&topic) { visit(topic, data) } else { Ok(()) }
-            })?;
-        }
-        Ok(())
-    }
-
-    /// The same for every message of its film, with the time of each. The film has a chunk of its own.
-    pub(crate) fn each_film_message(
-        &self,
-        index: u64,
-        mut visit: impl FnMut(&str, u64, &[u8]),
-    ) -> Result<(), ReadError> {
-        let channels = &self.summary.channels;
-        let filmed = |id: &u16| channels.get(id).is_some_and(|c| c.topic.ends_with("/film"));
-        for chunk in self.slot_of(index)?.filter(|c| c.message_index_offsets.keys().any(filmed)) {
-            self.each_timed_in(chunk, index, |topic, time_ns, data| {
-                visit(topic, time_ns, data);
-                Ok(())
-            })?;
-        }
-        Ok(())
-    }
-
-    /// Chunks of a sample whose messages are all from the start of its slot.
-    fn chunks_of(&self, index: u64) -> Result<impl Iterator<Item = &ChunkIndex>, ReadError> {
-        let slot = self.slot_of(index)?;
-        let start = (index - self.first_sample) * self.slot_ns;
-        Ok(slot.filter(move |c| c.message_end_time == start))
-    }
-
-    /// All chunks of a sample.
-    fn slot_of(&self, index: u64) -> Result<impl Iterator<Item = &ChunkIndex>, ReadError> {
-        if !self.indices().contains(&index) {
-            let (first, end) = (self.first_sample, self.first_sample + self.samples);
-            return Err(ReadError::NoSample { path: self.path.clone(), sample: index, first, end });
-        }
-        let start = (index - self.first_sample) * self.slot_ns;
-        // Chunks are written in the order of their samples.
-        let chunks = &self.summary.chunk_indexes;
-        let first = chunks.partition_point(|c| c.message_start_time < start);
-        Ok(chunks[first..].iter().take_while(move |c| c.message_start_time < start + self.slot_ns))
-    }
-
-    fn each_message_in(
-        &self,
-        chunk: &ChunkIndex,
-        index: u64,
-        mut visit: impl FnMut(&str, &[u8]) -> Result<(), String>,
-    ) -> Result<(), ReadError> {
-        self.each_timed_in(chunk, index, |topic, _, data| visit(topic, data))
-    }
-
-    fn each_timed_in(
-        &self,
-        chunk: &ChunkIndex,
-        index: u64,
-        mut visit: impl FnMut(&str, u64, &[u8]) -> Result<(), String>,
-    ) -> Result<(), ReadError> {
-        let bad = |source| ReadError::Mcap { path: self.path.clone(), source };
-        let record =
-            record(&self.file, self.bytes, chunk.chunk_start_offset, chunk.chunk_length).map_err(bad)?;
-        check_chunk(&record).map_err(bad)?;
-        let at_start = ChunkIndex { chunk_start_offset: 0, ..chunk.clone() };
-        for message in self.summary.stream_chunk(&record, &at_start).map_err(bad)? {
-            let message = message.map_err(bad)?;
-            visit(&message.channel.topic, message.log_time, &message.data)
-                .map_err(|problem| self.damaged(index, &message.channel.topic, &problem))?;
-        }
-        Ok(())
     }
 
     pub(crate) fn damaged(&self, sample: u64, topic: &str, problem: &str) -> ReadError {

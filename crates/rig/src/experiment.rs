@@ -27,6 +27,7 @@ pub mod response;
 mod rest;
 mod robot;
 mod run;
+pub mod slowing;
 pub mod stop;
 mod zero;
 

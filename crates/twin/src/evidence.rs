@@ -7,6 +7,7 @@
 mod beside;
 mod budget;
 mod follow;
+mod recorded;
 mod rule;
 mod signal;
 mod slip;
@@ -16,6 +17,7 @@ mod zero;
 
 pub use beside::{GripForceEvidence, WrenchRow};
 pub use budget::LabelBudget;
+pub use recorded::recorded_may_be_the_rig;
 pub use zero::ZERO_SHIFT;
 
 use crate::{PullTrace, Scenario, SlipLabel, Twin};
@@ -141,10 +143,14 @@ pub enum FindingKind {
     Torque,
 }
 
+/// Kinds that an effect of sensor or robot may be behind.
+const OF_THE_RIG: [FindingKind; 4] =
+    [FindingKind::Early, FindingKind::Zero, FindingKind::ZeroShift, FindingKind::Displacement];
+
 impl FindingKind {
     /// Whether an effect of sensor or robot that all pulls of a campaign have may be behind it.
     pub fn may_be_the_rig(self) -> bool {
-        matches!(self, Self::Early | Self::Zero | Self::ZeroShift | Self::Displacement)
+        OF_THE_RIG.contains(&self)
     }
 }
 

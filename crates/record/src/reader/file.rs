@@ -1,10 +1,42 @@
 //! Pieces of an MCAP file.
 
-use mcap::records::{AttachmentIndex, Record, op};
+use super::ReadError;
+use crate::frame::{FRAME, framed};
+use mcap::records::{AttachmentIndex, MetadataIndex, Record, op};
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use mcap::{McapError, Summary};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek};
+use std::path::Path;
+
+/// An MCAP file, whole as far as its two ends say, and its size.
+pub(super) fn open_mcap(path: &Path) -> Result<(File, u64), ReadError> {
+    let at = |source| ReadError::Open { path: path.into(), source };
+    let bad = |source| ReadError::Mcap { path: path.into(), source };
+    let file = File::open(path).map_err(at)?;
+    let bytes = file.metadata().map_err(at)?.len();
+    let magic = mcap::MAGIC.len() as u64;
+    for start in [0, bytes.saturating_sub(magic)] {
+        if piece(&file, bytes, start, magic).map_err(bad)? != mcap::MAGIC {
+            return Err(bad(McapError::BadMagic));
+        }
+    }
+    Ok((file, bytes))
+}
+
+/// The first metadata record of a name.
+pub(super) fn metadata_record(
+    file: &File,
+    bytes: u64,
+    summary: &Summary,
+    name: &str,
+) -> Result<Option<BTreeMap<String, String>>, McapError> {
+    let Some(index) = summary.metadata_indexes.iter().find(|m| m.name == name) else { return Ok(None) };
+    let record = record(file, bytes, index.offset, index.length)?;
+    let at_start = MetadataIndex { offset: 0, ..index.clone() };
+    Ok(Some(mcap::read::metadata(&record, &at_start)?.metadata))
+}
 
 /// The first attachment of a name.
 pub(super) fn attachment(
@@ -19,21 +51,18 @@ pub(super) fn attachment(
     Ok(Some(mcap::read::attachment(&record, &at_start)?.data.into_owned()))
 }
 
-/// Smallest record: its kind, one byte, and its length, eight.
-const MIN_RECORD: u64 = 9;
-
 /// Checks that the records inside an uncompressed chunk fit into it: `mcap` adds lengths before it knows that (version 0.26), and
 /// panics on those near the largest number.
 pub(super) fn check_chunk(record: &[u8]) -> Result<(), McapError> {
-    let frame = MIN_RECORD as usize;
+    let frame = FRAME as usize;
     let body = record.get(frame..).ok_or(McapError::BadIndex)?;
     let Record::Chunk { data, .. } = mcap::parse_record(op::CHUNK, body)? else {
         return Err(McapError::BadIndex);
     };
     let mut rest: &[u8] = &data;
     while !rest.is_empty() {
-        let length = rest.get(1..frame).and_then(|length| length.try_into().ok()).map(u64::from_le_bytes);
-        let end = length.and_then(|n| usize::try_from(n).ok()).and_then(|n| n.checked_add(frame));
+        let (_, length) = rest.get(..frame).map(framed).ok_or(McapError::UnexpectedEoc)?;
+        let end = usize::try_from(length).ok().and_then(|n| n.checked_add(frame));
         rest = end.and_then(|end| rest.get(end..)).ok_or(McapError::UnexpectedEoc)?;
     }
     Ok(())
@@ -41,7 +70,7 @@ pub(super) fn check_chunk(record: &[u8]) -> Result<(), McapError> {
 
 /// A record of a file that is `bytes` long, with its kind and length.
 pub(super) fn record(file: &File, bytes: u64, start: u64, length: u64) -> Result<Vec<u8>, McapError> {
-    if length < MIN_RECORD { Err(McapError::BadIndex) } else { piece(file, bytes, start, length) }
+    if length < FRAME { Err(McapError::BadIndex) } else { piece(file, bytes, start, length) }
 }
 
 /// Some bytes of a file that is `bytes` long.

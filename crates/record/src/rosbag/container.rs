@@ -1,14 +1,12 @@
 //! The MCAP file of a bag, from its first byte to its last: recorders that were ended have no index.
 
 use super::error::RosbagError;
+use crate::frame::{FRAME, framed};
 use mcap::records::{Record, op};
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-
-/// Kind and length of a record.
-const FRAME: u64 = 9;
 
 /// What to do about a file that is not whole.
 const RECOVER: &str = "`mcap recover FILE.mcap -o WHOLE.mcap` saves what can be read";
@@ -204,12 +202,6 @@ pub(super) fn message_at(path: &Path, place: Place) -> Result<Vec<u8>, RosbagErr
         Ok(Record::Message { data, .. }) => Ok(data.into_owned()),
         _ => Err(RosbagError::new(path, format!("no message at byte {}: the file changed", place.record))),
     }
-}
-
-fn framed(frame: &[u8]) -> (u8, u64) {
-    let mut length = [0; 8];
-    length.copy_from_slice(&frame[1..9]);
-    (frame[0], u64::from_le_bytes(length))
 }
 
 /// The record at a place of a chunk, and the place of the next.

@@ -296,3 +296,25 @@ fn other_devices_speak_against_a_label() {
     assert!(aside.contains("21.5") && aside.contains("20.00 N"), "{aside}");
     assert!(wrench(0.0, 0.03, 0.8).reason().unwrap().contains("Nm of torque are no lever"));
 }
+
+#[test]
+fn a_recorded_reason_says_as_much_as_its_findings() {
+    use FindingKind as K;
+    let kinds = [K::Rule, K::Early, K::LargerBefore, K::Displacement, K::Zero, K::ZeroShift];
+    let kinds = kinds.into_iter().chain([K::Jump, K::GripForce, K::Lateral, K::Torque]);
+    let all: Vec<(FindingKind, String)> = kinds
+        .flat_map(|kind| [None, Some(0.104)].map(|time_s| (kind, time_s)))
+        .map(|(kind, time_s)| Finding { kind, found: -12.5, wanted: 3.25, allowed: 0.33, time_s })
+        .map(|finding| (finding.kind, finding.to_string()))
+        .collect();
+    for (kind, reason) in &all {
+        assert_eq!(recorded_may_be_the_rig(reason), kind.may_be_the_rig(), "{reason}");
+        for (other, second) in &all {
+            let both = format!("{reason}; {second}");
+            let rig = kind.may_be_the_rig() && other.may_be_the_rig();
+            assert_eq!(recorded_may_be_the_rig(&both), rig, "{both}");
+        }
+        assert!(!recorded_may_be_the_rig(&format!("{reason}; the left camera fell silent")));
+    }
+    assert!(!recorded_may_be_the_rig(""));
+}
