@@ -147,6 +147,11 @@ impl ShardReader {
         if slot_ns == 0 {
             return Err(foreign("its time slots are 0 ns long".into()));
         }
+        if samples.checked_mul(slot_ns).is_none() || first_sample.checked_add(samples).is_none() {
+            return Err(foreign(format!(
+                "{samples} samples from number {first_sample} on, {slot_ns} ns each, end beyond what can be counted"
+            )));
+        }
         let background = match metadata.get("background").map(String::as_str) {
             None => None,
             Some(EVEN) => Some(PerJaw::try_from_fn(|jaw| {

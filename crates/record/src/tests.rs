@@ -1,4 +1,5 @@
 //! Tests of several files at once.
 
 mod bytes;
+mod shards;
 mod tables;

@@ -13,6 +13,8 @@ mod held;
 mod mutate;
 #[path = "common/plant.rs"]
 mod plant;
+#[path = "fuzz/rig_file.rs"]
+mod rig_file;
 #[path = "fuzz/robot.rs"]
 mod robot;
 
@@ -39,6 +41,10 @@ static MEMORY: held::Counting = held::Counting;
 
 /// Inputs of each parser, where the environment does not say.
 const INPUTS: usize = 10_000;
+
+fn inputs() -> usize {
+    std::env::var("GRIPGEN_FUZZ_INPUTS").ok().map_or(INPUTS, |n| n.parse().unwrap())
+}
 
 /// The most bytes that a parser holds for one input, with all that it gives for it: a part of its own, and so many for each
 /// byte of input. A list of events takes more than the lines that it was read from, and a vector that grows is there twice.
@@ -118,11 +124,10 @@ where
 {
     let corpus = [corpus(name), made].concat();
     let holds = HOLDS.iter().find(|(n, _)| *n == name).unwrap().1;
-    let asked = std::env::var("GRIPGEN_FUZZ_INPUTS").ok().map_or(INPUTS, |n| n.parse().unwrap());
     let mut random = Random::named(name);
     let (mut most, mut failed) = (0.0_f64, 0);
     let started = std::time::Instant::now();
-    let count = corpus.len() + asked / every;
+    let count = corpus.len() + inputs() / every;
     for k in 0..count {
         let input = corpus.get(k).cloned().unwrap_or_else(|| mutate::input(&mut random, &corpus));
         let said = Input(name, &input);

@@ -3,8 +3,8 @@
 
 use super::estimates::parameters;
 use super::fitting::Fitted;
+use super::profiled::ended;
 use super::search::{Accepted, ByChance, Search};
-use super::terms::Terms;
 use super::trace_residuals::Widening;
 use crate::diagnosis::Hint;
 
@@ -51,8 +51,15 @@ pub(super) fn paying(
             let widening = Widening { zero: readings[0].widening().zero, ..Widening::NONE };
             gain = gain.max(share(readings.map(|r| root_mean_square(r.widened(widening).into_iter()))));
         }
+        let mut nothing = neutral(&accepted.fitted, spec);
+        if nothing.is_some()
+            && gain >= PAYS
+            && let Some(found) = ended(context, &accepted.fitted, spec, &search.rows)
+        {
+            (accepted.fitted, nothing) = (found, None);
+        }
         let unfelt = || unfelt(search, &accepted.fitted, spec, &sd_n);
-        let reason = match neutral(&accepted.fitted, spec).or_else(unfelt) {
+        let reason = match nothing.or_else(unfelt) {
             Some(text) => text,
             None if gain < PAYS => format!(
                 "it takes {:.1} % off the error on held-out pulls, a name needs {:.0} %",
@@ -65,14 +72,14 @@ pub(super) fn paying(
         accepted.effects.remove(place);
         accepted.fitted = fewer;
     }
-    if let Some((accepted, hint)) = without_curve(search, before, &accepted, repetitions, rows, &sd_n) {
+    while let Some((fewer, hint)) = without_curve(search, before, &accepted, repetitions, rows, &sd_n) {
         hints.push(hint);
-        return (accepted, hints);
+        accepted = fewer;
     }
     (accepted, hints)
 }
 
-/// The accepted model without its unnamed curves, if these do not pay.
+/// The accepted model without its last unnamed curve, if that does not pay.
 fn without_curve(
     search: &Search<'_>,
     before: &Fitted,
@@ -82,11 +89,13 @@ fn without_curve(
     sd_n: &[f64],
 ) -> Option<(Accepted, Hint)> {
     let context = search.context;
-    let curve = &search.curves[*accepted.curves.first()?];
-    let fewer = if accepted.effects.is_empty() {
+    let mut curves = accepted.curves.clone();
+    let curve = &search.curves[curves.pop()?];
+    let fewer = if accepted.effects.is_empty() && curves.is_empty() {
         before.clone()
     } else {
-        let terms = Terms { curves: vec![], ..accepted.fitted.terms.clone() };
+        let mut terms = accepted.fitted.terms.clone();
+        terms.curves.pop();
         context.fit(&before.model, &terms, &search.rows)?
     };
     let errors = [&fewer, &accepted.fitted].map(|f| search.held_out(f, repetitions, rows));
@@ -102,7 +111,7 @@ fn without_curve(
         100.0 * PAYS
     );
     let hint = Hint { name: curve.name.clone(), gain: plain, reason };
-    Some((Accepted { fitted: fewer, curves: vec![], ..accepted.clone() }, hint))
+    Some((Accepted { fitted: fewer, curves, ..accepted.clone() }, hint))
 }
 
 /// What the best rival gained where it gains as much by chance.
