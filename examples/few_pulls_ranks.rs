@@ -57,18 +57,23 @@ impl Truth {
     /// Overrides of the twin; `known` leaves scatter and noise away.
     fn sets(&self, known: bool) -> Vec<(String, String)> {
         let left = if known { 0.0 } else { 1.0 };
-        let mut sets = vec![
+        let sets = vec![
             (format!("parts.{PART}.mu"), self.mu),
             (format!("parts.{PART}.kinetic_ratio"), self.kinetic_ratio),
             (format!("parts.{PART}.scatter"), left * self.scatter),
             ("robot.lag_s".into(), self.lag_s),
             ("wrist.noise_n".into(), left * self.noise_n),
         ];
+        let mut sets: Vec<(String, String)> =
+            sets.into_iter().map(|(key, value)| (key, format!("{value}"))).collect();
         if self.offset_n != 0.0 {
-            sets.push((format!("effects.load_offset.{PART}.a"), 1.0));
-            sets.push((format!("effects.load_offset.{PART}.b_n"), self.offset_n));
+            let law = format!(
+                "[{{name = \"load_offset\", part = \"{PART}\", a = 1.0, b_n = {}, outside_fit = \"extrapolate\"}}]",
+                self.offset_n
+            );
+            sets.push(("effects".into(), law));
         }
-        sets.into_iter().map(|(key, value)| (key, format!("{value}"))).collect()
+        sets
     }
 
     /// Its pulls; `None` where one of them fails or does not slip.
