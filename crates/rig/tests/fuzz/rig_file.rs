@@ -31,7 +31,7 @@ fn changed_rigs_never_panic() {
     let (mut refused, mut taken) = (0, 0);
     for _ in 0..super::inputs().min(100_000) {
         let text = if random.below(3) == 0 {
-            shuffled(&mut random, &[shipped.clone()])
+            shuffled(&mut random, std::slice::from_ref(&shipped))
         } else {
             let mut lines: Vec<String> = shipped.lines().map(String::from).collect();
             for _ in 0..=random.below(3) {
