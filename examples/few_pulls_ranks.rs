@@ -103,8 +103,12 @@ impl Truth {
     }
 }
 
+/// A value of a draw by its key, and a quantity of such values.
+type Draw<'a> = dyn Fn(&str) -> f64 + 'a;
+type Quantity<'a> = dyn Fn(&Draw<'_>) -> f64 + 'a;
+
 /// Share of the posterior below a value; half of what equals it.
-fn share_below(posterior: &Posterior, of: &dyn Fn(&dyn Fn(&str) -> f64) -> f64, truth: f64) -> f64 {
+fn share_below(posterior: &Posterior, of: &Quantity<'_>, truth: f64) -> f64 {
     let share = posterior.draws.iter().map(|draw| {
         let value = of(&|key: &str| {
             let at = posterior.keys.iter().position(|k| k == key).unwrap();
@@ -151,11 +155,11 @@ fn main() {
                 ..CalibrateRequest::default()
             };
             let (fit, _) = calibrate_twin(&measured, &twin, &library, &request, 1).unwrap();
-            let a = |of: &dyn Fn(&str) -> f64| match law {
+            let a = |of: &Draw<'_>| match law {
                 true => given * of(&format!("effects.load_offset.{PART}.a")),
                 false => of(&format!("parts.{PART}.mu")),
             };
-            let b = |of: &dyn Fn(&str) -> f64| given * of(&format!("effects.load_offset.{PART}.b_n"));
+            let b = |of: &Draw<'_>| given * of(&format!("effects.load_offset.{PART}.b_n"));
             let mut shares = vec![share_below(&fit.posterior, &a, truth.mu)];
             if *law {
                 shares.push(share_below(&fit.posterior, &b, truth.mu * truth.offset_n));
