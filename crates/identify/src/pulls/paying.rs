@@ -44,9 +44,11 @@ pub(super) fn paying(
         let plain = share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(_, e)| *e))));
         let weighed =
             share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(i, e)| e / sd_n[*i]))));
-        let mut gain = paid(plain, weighed);
+        // A bias of the sensor shows at weak grips alone.
+        let signals = search.candidates[accepted.effects[place].0].acts_on_signals();
+        let mut gain = if signals { plain.max(weighed) } else { paid(plain, weighed) };
         let traces = !context.observations.is_empty();
-        if traces && search.candidates[accepted.effects[place].0].acts_on_signals() {
+        if traces && signals {
             // A zero that wanders without the effect is no witness for it.
             let all: Vec<usize> = (0..context.data.len()).collect();
             let readings = [&fewer, &accepted.fitted].map(|f| context.trace_residuals(&f.model, &all));
