@@ -5,7 +5,7 @@ use crate::diagnose::{baseline, diagnose, library, names, simulated, twin_at};
 use gripgen::identify::Verdict;
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen::twin::{ExtraColumn, MeasuredPulls, PullTrace, TraceRow, Values};
+use gripgen::twin::{MeasuredPulls, PullTrace, TraceRow};
 use gripgen::{calibrate_twin, edited_twin};
 
 /// Labels alone, as they are copied from a screen.
@@ -97,39 +97,4 @@ fn cross_talk_of_the_grip_shows_without_a_load() {
         .collect();
     let found = with(&|_, i| walk[i]);
     assert!(found.unknown.iter().all(|u| u.covariate != "grip_force_n"), "{:?}", found.unknown);
-}
-
-/// A wear that has hardly bent yet: depth and pull count say one product, and slopes leave a depth of nothing open. The likelihood does not:
-/// the wear is named, with an interval that ends before nothing.
-#[test]
-#[ignore = "slow: a minute"]
-fn a_wear_that_has_hardly_bent_is_a_name() {
-    let wear = "[[effects]]\nname = \"wear\"\ndepth = 0.8\nn0 = 250.0\n";
-    let found = diagnose(&labels_alone(simulated(wear, 90, &[])), &[]).diagnosis;
-    assert_eq!(names(&found), ["wear"], "{:?} {:?}", found.unknown, found.hints);
-    let depth = &found.effects[0].parameters["depth"];
-    assert!(depth.low90 > 0.05 && depth.high90 > 0.8, "{depth:?}");
-}
-
-/// Two columns without a name, each with a curve of its own, are both found, and the twin predicts with both.
-#[test]
-#[ignore = "slow: a minute"]
-fn two_columns_without_a_name_are_both_found() {
-    let mut measured = labels_alone(simulated("", 72, &[]));
-    let mut draw = Stream::new(12, 0, Purpose::Draw);
-    let mut columns = [("humidity_pct", vec![]), ("table_mm", vec![])];
-    for pull in &mut measured.pulls {
-        let (humidity, level) = (draw.uniform(), draw.uniform());
-        pull.max_pull_force_n *= 1.0 + 0.25 * humidity + 0.3 * (level - 0.5).abs();
-        columns[0].1.push(30.0 + 40.0 * humidity);
-        columns[1].1.push(200.0 * level);
-    }
-    let extra = columns.map(|(name, x)| ExtraColumn { name: name.into(), values: Values::Numbers(x) });
-    measured.extra.extend(extra);
-    let found = diagnose(&measured, &[]).diagnosis;
-    let mut unknown: Vec<&str> = found.unknown.iter().map(|u| u.covariate.as_str()).collect();
-    unknown.sort_unstable();
-    assert_eq!(unknown, ["humidity_pct", "table_mm"], "{:?}", names(&found));
-    let error = found.error.unwrap();
-    assert!(error.after.rmse_n < error.before.rmse_n.map(|e| 0.75 * e), "{error:?}");
 }

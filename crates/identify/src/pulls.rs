@@ -30,7 +30,6 @@ mod paying;
 pub mod posterior;
 pub mod power;
 pub mod priors;
-mod profiled;
 mod recalibrated;
 mod residual;
 mod ridge;

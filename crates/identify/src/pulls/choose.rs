@@ -36,21 +36,8 @@ impl Search<'_> {
                 let left = effects.iter().any(|&k| self.candidates[k].spec.leaves.contains(id));
                 !left && !curves.iter().any(|&k| self.shares_covariate(*i, k))
             }
-            ModelTerm::Curve(k) => {
-                !effects.iter().any(|&i| self.shares_covariate(i, *k))
-                    && (curves.is_empty() || self.second_curve(*k, curves))
-            }
+            ModelTerm::Curve(k) => !effects.iter().any(|&i| self.shares_covariate(i, *k)),
         }
-    }
-
-    /// Whether curve `k` may be a second one: in another covariate than those before it, and not by session, which explains anything.
-    fn second_curve(&self, k: usize, curves: &[usize]) -> bool {
-        let name = self.curves[k].name.as_str();
-        let new = |&c: &usize| {
-            let before = self.curves[c].name.as_str();
-            before != name && !self.same_clock(before, name)
-        };
-        name.split('*').all(|column| column != "session") && curves.iter().all(new)
     }
 
     /// Whether curve `k` is in a covariate of effect `i`, or in one that runs with it.

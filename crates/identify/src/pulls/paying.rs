@@ -3,16 +3,13 @@
 
 use super::estimates::parameters;
 use super::fitting::Fitted;
-use super::profiled::ended;
 use super::search::{Accepted, ByChance, Search};
+use super::terms::Terms;
 use super::trace_residuals::Widening;
 use crate::diagnosis::Hint;
 
 /// Share of the error on held-out data that a name has to take off.
 const PAYS: f64 = 0.03;
-
-/// Share of the error in newtons below which it does not fall.
-const FALLS: f64 = 0.01;
 
 /// Least standard deviation of a label.
 const LEAST_SD_N: f64 = 0.03;
@@ -42,28 +39,20 @@ pub(super) fn paying(
         let Some(fewer) = fewer else { continue };
         let errors = [&fewer, &accepted.fitted].map(|f| search.held_out(f, repetitions, rows));
         let plain = share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(_, e)| *e))));
+        // A weak grip that is predicted well says as much as a strong one.
         let weighed =
             share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(i, e)| e / sd_n[*i]))));
-        // A bias of the sensor shows at weak grips alone.
-        let signals = search.candidates[accepted.effects[place].0].acts_on_signals();
-        let mut gain = if signals { plain.max(weighed) } else { paid(plain, weighed) };
+        let mut gain = plain.max(weighed);
         let traces = !context.observations.is_empty();
-        if traces && signals {
+        if traces && search.candidates[accepted.effects[place].0].acts_on_signals() {
             // A zero that wanders without the effect is no witness for it.
             let all: Vec<usize> = (0..context.data.len()).collect();
             let readings = [&fewer, &accepted.fitted].map(|f| context.trace_residuals(&f.model, &all));
             let widening = Widening { zero: readings[0].widening().zero, ..Widening::NONE };
             gain = gain.max(share(readings.map(|r| root_mean_square(r.widened(widening).into_iter()))));
         }
-        let mut nothing = neutral(&accepted.fitted, spec);
-        if nothing.is_some()
-            && gain >= PAYS
-            && let Some(found) = ended(context, &accepted.fitted, spec, &search.rows)
-        {
-            (accepted.fitted, nothing) = (found, None);
-        }
         let unfelt = || unfelt(search, &accepted.fitted, spec, &sd_n);
-        let reason = match nothing.or_else(unfelt) {
+        let reason = match neutral(&accepted.fitted, spec).or_else(unfelt) {
             Some(text) => text,
             None if gain < PAYS => format!(
                 "it takes {:.1} % off the error on held-out pulls, a name needs {:.0} %",
@@ -76,14 +65,14 @@ pub(super) fn paying(
         accepted.effects.remove(place);
         accepted.fitted = fewer;
     }
-    while let Some((fewer, hint)) = without_curve(search, before, &accepted, repetitions, rows, &sd_n) {
+    if let Some((accepted, hint)) = without_curve(search, before, &accepted, repetitions, rows, &sd_n) {
         hints.push(hint);
-        accepted = fewer;
+        return (accepted, hints);
     }
     (accepted, hints)
 }
 
-/// The accepted model without its last unnamed curve, if that does not pay.
+/// The accepted model without its unnamed curves, if these do not pay.
 fn without_curve(
     search: &Search<'_>,
     before: &Fitted,
@@ -93,29 +82,27 @@ fn without_curve(
     sd_n: &[f64],
 ) -> Option<(Accepted, Hint)> {
     let context = search.context;
-    let mut curves = accepted.curves.clone();
-    let curve = &search.curves[curves.pop()?];
-    let fewer = if accepted.effects.is_empty() && curves.is_empty() {
+    let curve = &search.curves[*accepted.curves.first()?];
+    let fewer = if accepted.effects.is_empty() {
         before.clone()
     } else {
-        let mut terms = accepted.fitted.terms.clone();
-        terms.curves.pop();
+        let terms = Terms { curves: vec![], ..accepted.fitted.terms.clone() };
         context.fit(&before.model, &terms, &search.rows)?
     };
     let errors = [&fewer, &accepted.fitted].map(|f| search.held_out(f, repetitions, rows));
     let plain = share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(_, e)| *e))));
     let weighed =
         share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(i, e)| e / sd_n[*i]))));
-    if paid(plain, weighed) >= PAYS {
+    if plain.max(weighed) >= PAYS {
         return None;
     }
     let reason = format!(
         "it takes {:.1} % off the error on held-out pulls, a dependence needs {:.0} %",
-        100.0 * paid(plain, weighed),
+        100.0 * plain.max(weighed),
         100.0 * PAYS
     );
     let hint = Hint { name: curve.name.clone(), gain: plain, reason };
-    Some((Accepted { fitted: fewer, curves, ..accepted.clone() }, hint))
+    Some((Accepted { fitted: fewer, curves: vec![], ..accepted.clone() }, hint))
 }
 
 /// What the best rival gained where it gains as much by chance.
@@ -196,12 +183,6 @@ fn unfelt(
     })
 }
 
-/// What counts of the shares that are taken off the error in newtons and in deviations of each label: a weak grip that is predicted well
-/// says as much as a strong one, where newtons fall at all.
-fn paid(plain: f64, weighed: f64) -> f64 {
-    if plain >= FALLS { plain.max(weighed) } else { plain }
-}
-
 pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = values.fold((0.0, 0_usize), |(sum, n), v| (sum + v * v, n + 1));
     (sum / n.max(1) as f64).sqrt()
@@ -209,17 +190,4 @@ pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
 
 pub(super) fn share([before, after]: [f64; 2]) -> f64 {
     if before > 0.0 { 1.0 - after / before } else { 0.0 }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::paid;
-
-    /// Deviations alone do not pay: 40 pulls in which nothing acts had a contamination that took 4 % off them and nothing off newtons.
-    #[test]
-    fn deviations_count_where_newtons_fall() {
-        assert_eq!(paid(0.0003, 0.04), 0.0003);
-        assert_eq!(paid(0.02, 0.04), 0.04);
-        assert_eq!(paid(0.2, -0.1), 0.2);
-    }
 }

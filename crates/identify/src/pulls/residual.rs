@@ -152,10 +152,7 @@ pub(super) fn in_place_of_curves(
         }
         false => pulls,
     };
-    // Two curves were chosen among many with all pulls, what was learnt is shrunk: where both predict alike, it is that.
-    let alike = pulls <= 1.0 + PAYS;
-    (instead || pulls < 1.0 || (alike && (fitted.terms.curves.len() > 1 || together() < 1.0)))
-        .then_some(found)
+    (instead || pulls < 1.0 || (pulls <= 1.0 + PAYS && together() < 1.0)).then_some(found)
 }
 
 /// Whether a curve of sessions gives way to what the other columns say: from the errors on held-out pulls without either, with the other

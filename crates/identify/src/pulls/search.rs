@@ -30,9 +30,8 @@ pub const TIED_WITHIN: f64 = 3.0;
 const MIN_OF_PRODUCT: usize = 40;
 const MAX_WORDS: usize = 12;
 
-/// Effects and unnamed curves at most.
+/// Effects at most.
 const MAX_EFFECTS: usize = 3;
-const MAX_CURVES: usize = 2;
 
 /// Something that may be added to a model.
 #[derive(Debug, Clone)]
@@ -234,8 +233,9 @@ impl<'a> Search<'a> {
             else {
                 break;
             };
+            // One unnamed curve at most.
             let full = match winner.rival {
-                ModelTerm::Curve(_) => accepted.curves.len() >= MAX_CURVES,
+                ModelTerm::Curve(_) => !accepted.curves.is_empty(),
                 ModelTerm::Effect(_) | ModelTerm::ByPart(_) => accepted.effects.len() >= MAX_EFFECTS,
             };
             if full {

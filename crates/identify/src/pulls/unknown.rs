@@ -13,19 +13,20 @@ pub(super) fn unknown(
     accepted: &Accepted,
     data: &PullData<'_>,
 ) -> Vec<UnknownCovariate> {
-    // Residuals of everything but this curve.
-    let without = |place: usize| {
+    // Residuals of everything but the curves.
+    let residuals = if accepted.effects.is_empty() {
+        before.residuals.clone()
+    } else {
         let mut terms = accepted.fitted.terms.clone();
-        terms.curves.remove(place);
-        if terms.effects.is_empty() && terms.curves.is_empty() {
-            return before.residuals.clone();
+        terms.curves.clear();
+        match search.context.fit(&accepted.fitted.model, &terms, &search.rows) {
+            Some(f) => f.residuals,
+            None => before.residuals.clone(),
         }
-        let found = search.context.fit(&accepted.fitted.model, &terms, &search.rows);
-        found.map_or_else(|| before.residuals.clone(), |f| f.residuals)
     };
-    let each = accepted.curves.iter().enumerate().map(|(place, &i)| {
+    let each = accepted.curves.iter().map(|&i| {
         let curve = &search.curves[i];
-        let tested = test(data, &accepted.fitted, &without(place), curve);
+        let tested = test(data, &accepted.fitted, &residuals, curve);
         UnknownCovariate { covariate: curve.name.clone(), strength: tested.strength, p_value: tested.p_value }
     });
     let mut found: Vec<UnknownCovariate> = each.collect();

@@ -13,7 +13,6 @@ struct Key {
     names: Vec<String>,
     hold_signals: bool,
     learnt_share: f64,
-    ends: Vec<Option<f64>>,
 }
 
 impl Key {
@@ -23,7 +22,6 @@ impl Key {
             names: fitted.names.clone(),
             hold_signals: fitted.terms.hold_signals,
             learnt_share: fitted.terms.learnt_share,
-            ends: fitted.terms.effects.iter().map(|(c, _)| c.end).collect(),
         }
     }
 }
