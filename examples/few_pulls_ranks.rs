@@ -30,7 +30,7 @@ const LINES: [(&str, &[f64], bool); 3] = [
     ("three-law", &[20.0, 40.0, 80.0], true),
 ];
 
-/// What is drawn: standard normal variables of mu, offset, kinetic ratio, lag, noise and scatter.
+/// What a rig and its part are, drawn from the beliefs. `offset_n` is 0 where no law is asked for.
 struct Truth {
     mu: f64,
     offset_n: f64,
