@@ -98,3 +98,15 @@ fn cross_talk_of_the_grip_shows_without_a_load() {
     let found = with(&|_, i| walk[i]);
     assert!(found.unknown.iter().all(|u| u.covariate != "grip_force_n"), "{:?}", found.unknown);
 }
+
+/// A wear that has hardly bent yet: depth and pull count say one product, and slopes leave a depth of nothing open. The likelihood does not:
+/// the wear is named, with an interval that ends before nothing.
+#[test]
+#[ignore = "slow: a minute"]
+fn a_wear_that_has_hardly_bent_is_a_name() {
+    let wear = "[[effects]]\nname = \"wear\"\ndepth = 0.8\nn0 = 250.0\n";
+    let found = diagnose(&labels_alone(simulated(wear, 90, &[])), &[]).diagnosis;
+    assert_eq!(names(&found), ["wear"], "{:?} {:?}", found.unknown, found.hints);
+    let depth = &found.effects[0].parameters["depth"];
+    assert!(depth.low90 > 0.05 && depth.high90 > 0.8, "{depth:?}");
+}

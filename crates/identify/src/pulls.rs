@@ -30,6 +30,7 @@ mod paying;
 pub mod posterior;
 pub mod power;
 pub mod priors;
+mod profiled;
 mod recalibrated;
 mod residual;
 mod ridge;

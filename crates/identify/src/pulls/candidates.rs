@@ -19,6 +19,8 @@ pub struct Candidate {
     pub part: Option<(usize, String)>,
     /// Parameters that are tried at the starts only, like the pull at which something happened.
     pub searched: usize,
+    /// End of the interval of its size towards nothing, where the likelihood was followed there (`profiled.rs`).
+    pub end: Option<f64>,
 }
 
 impl Candidate {
@@ -100,7 +102,7 @@ pub(super) fn candidate(
     });
     let starts = starts.iter().map(|s| spec.values(s)).collect();
     let free = free.iter().filter_map(|(name, scale)| Some((spec.position(name)?, *scale))).collect();
-    Some(Candidate { spec, starts, free, part: None, searched })
+    Some(Candidate { spec, starts, free, part: None, searched, end: None })
 }
 
 fn numbers(data: &PullData<'_>, name: &str) -> Vec<f64> {

@@ -6,6 +6,9 @@ use nalgebra::{DMatrix, DVector};
 /// The column whose words do not come back.
 pub(super) const SESSION: &str = "session";
 
+/// Column of the parts, each of which has a friction of its own.
+const PART: &str = "part";
+
 /// Fewest pulls with a word that show a step of it: two pulls that lie far off are two bad pulls.
 const MIN_STEP: usize = 3;
 
@@ -244,12 +247,9 @@ pub fn at_one_word(data: &PullData<'_>, name: &str, other: &str, residuals: &[f6
         if !enough || own.iter().all(|v| *v == own[0]) {
             return None;
         }
-        let mut basis = vec![vec![0.0; 1]; x.len()];
-        for (&i, row) in rows.iter().zip(hinges(&own, 1)) {
-            basis[i] = std::iter::once(1.0).chain(row).collect();
-        }
+        // Friction has a level for each part already.
+        let basis = basis_at(&rows, &own, x.len(), other != PART);
         let width = basis[rows[0]].len();
-        basis.iter_mut().for_each(|row| row.resize(width, 0.0));
         let columns = DMatrix::from_fn(x.len(), width, |i, k| basis[i][k]);
         let solved =
             columns.clone().svd(true, true).solve(&DVector::from_column_slice(residuals), 1e-9).ok()?;
@@ -268,9 +268,36 @@ pub fn at_one_word(data: &PullData<'_>, name: &str, other: &str, residuals: &[f6
     })
 }
 
+/// A line with a bend at the rows of a word whose values are `own`, and nothing elsewhere; with `level` a step to it as well.
+fn basis_at(rows: &[usize], own: &[f64], n: usize, level: bool) -> Vec<Vec<f64>> {
+    let step = level.then_some(1.0);
+    let mut basis = vec![vec![]; n];
+    for (&i, row) in rows.iter().zip(hinges(own, 1)) {
+        basis[i] = step.into_iter().chain(row).collect();
+    }
+    let width = rows.first().map_or(0, |&i| basis[i].len());
+    basis.iter_mut().for_each(|row| row.resize(width, 0.0));
+    basis
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of a part no column is a step: with one, any coefficient of friction would do.
+    #[test]
+    fn a_curve_of_one_part_has_no_level_of_its_own() {
+        let (rows, own) = ([1, 3, 4, 6], [2.0, 5.0, 7.0, 9.0]);
+        let columns = |level: bool| {
+            let basis = basis_at(&rows, &own, 7, level);
+            assert!(basis.iter().all(|row| row.len() == basis[1].len()));
+            assert!(basis[0].iter().all(|x| *x == 0.0));
+            (0..basis[1].len()).map(|k| rows.map(|i| basis[i][k])).collect::<Vec<_>>()
+        };
+        let even = |column: &&[f64; 4]| column.iter().all(|x| *x == column[0]);
+        assert_eq!(columns(true).iter().filter(even).count(), 1);
+        assert_eq!(columns(false).iter().filter(even).count(), 0);
+    }
 
     /// A curve at one word says whether that word is a session, steps say whether they are between sessions.
     #[test]

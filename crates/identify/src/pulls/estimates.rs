@@ -33,6 +33,9 @@ pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<Str
         return BTreeMap::new();
     };
     let spec = candidate.spec;
+    let fitted_as =
+        fitted.terms.effects.iter().map(|(c, _)| c).find(|c| c.spec == spec && c.part == candidate.part);
+    let end = fitted_as.and_then(|c| c.end);
     let each = |(k, p): (usize, &gripgen_twin::effects::ParameterSpec)| {
         let value = effect.values[k];
         let name = candidate.name_of(p.name);
@@ -40,8 +43,15 @@ pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<Str
             let sd = fitted.covariance[(at, at)].max(0.0).sqrt();
             HALF90 * sd.max(MIN_SD * from_nothing(value, p.neutral))
         });
-        let low90 = (value - half).max(p.bounds.0.min(value));
-        let high90 = (value + half).min(p.bounds.1.max(value));
+        let mut low90 = (value - half).max(p.bounds.0.min(value));
+        let mut high90 = (value + half).min(p.bounds.1.max(value));
+        if let Some(end) = end.filter(|_| k == candidate.size()) {
+            if value > p.neutral {
+                low90 = low90.max(end.min(value));
+            } else {
+                high90 = high90.min(end.max(value));
+            }
+        }
         let estimate = ParameterEstimate::new(value, (low90, high90), p.unit);
         (p.name.to_string(), estimate)
     };

@@ -47,8 +47,9 @@ impl NormalFit {
         let n = fitted.values.len();
         let ratio = fitted.names.iter().position(|name| name == "kinetic_ratio");
         let mut known = fitted.information.clone();
-        // A parameter that was held has no say.
-        for i in (0..n).filter(|&i| fitted.information[(i, i)] <= 0.0) {
+        // A parameter that was held has no say, and a curve without a name stays as it is written.
+        let stays = |&i: &usize| fitted.information[(i, i)] <= 0.0 || fitted.names[i].starts_with("curve.");
+        for i in (0..n).filter(stays) {
             known[(i, i)] = 1e30;
         }
         let mut free = fitted.beyond.clone();

@@ -3,6 +3,7 @@
 
 use super::estimates::parameters;
 use super::fitting::Fitted;
+use super::profiled::ended;
 use super::search::{Accepted, ByChance, Search};
 use super::terms::Terms;
 use super::trace_residuals::Widening;
@@ -51,8 +52,15 @@ pub(super) fn paying(
             let widening = Widening { zero: readings[0].widening().zero, ..Widening::NONE };
             gain = gain.max(share(readings.map(|r| root_mean_square(r.widened(widening).into_iter()))));
         }
+        let mut nothing = neutral(&accepted.fitted, spec);
+        if nothing.is_some()
+            && gain >= PAYS
+            && let Some(found) = ended(context, &accepted.fitted, spec, &search.rows)
+        {
+            (accepted.fitted, nothing) = (found, None);
+        }
         let unfelt = || unfelt(search, &accepted.fitted, spec, &sd_n);
-        let reason = match neutral(&accepted.fitted, spec).or_else(unfelt) {
+        let reason = match nothing.or_else(unfelt) {
             Some(text) => text,
             None if gain < PAYS => format!(
                 "it takes {:.1} % off the error on held-out pulls, a name needs {:.0} %",

@@ -58,7 +58,7 @@ fn values_of(model: &PullModel, parts: &[String], law_of: Option<&[f64]>) -> Vec
     ];
     for (part, name) in parts.iter().enumerate() {
         if law_of.is_none() {
-            values.push((format!("parts.{name}.mu"), model.mu[part].max(1e-3)));
+            values.push((format!("parts.{name}.mu"), model.mu[part].clamp(1e-3, 3.0)));
         }
         values.push((format!("parts.{name}.kinetic_ratio"), model.kinetic_ratio.clamp(0.05, 1.0)));
     }

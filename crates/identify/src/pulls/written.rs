@@ -13,6 +13,7 @@ struct Key {
     names: Vec<String>,
     hold_signals: bool,
     learnt_share: f64,
+    ends: Vec<Option<f64>>,
 }
 
 impl Key {
@@ -22,6 +23,7 @@ impl Key {
             names: fitted.names.clone(),
             hold_signals: fitted.terms.hold_signals,
             learnt_share: fitted.terms.learnt_share,
+            ends: fitted.terms.effects.iter().map(|(c, _)| c.end).collect(),
         }
     }
 }
