@@ -24,6 +24,15 @@ const POSES: usize = 64;
 /// Segments of the shaft: 50 000 triangles.
 const SEGMENTS: usize = 1924;
 
+/// Images of a batch on a graphics processor: 3 GB of its memory.
+const GPU_BATCH: usize = 512;
+
+/// How often each stage is made where its time is measured.
+const STAGE_REPEATS: u32 = 50;
+
+/// Stages with their seconds.
+type Stages = Vec<(&'static str, f64)>;
+
 /// What to measure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BenchOptions {
@@ -58,6 +67,8 @@ pub struct BenchReport {
     pub triangles: usize,
     /// The measurements.
     pub rates: Vec<BenchRate>,
+    /// Seconds that each stage takes of a batch on the adapter, by name and in order; empty on the processor.
+    pub stages: Vec<(&'static str, f64)>,
 }
 
 /// One measurement.
@@ -184,6 +195,7 @@ pub fn bench(options: &BenchOptions) -> Result<BenchReport, BenchError> {
         size_px: (work.sensor.grid.width_px, work.sensor.grid.height_px),
         triangles: work.mesh.triangles().len(),
         rates: vec![],
+        stages: vec![],
     };
     match gpu {
         None => {
@@ -193,9 +205,9 @@ pub fn bench(options: &BenchOptions) -> Result<BenchReport, BenchError> {
             }
         }
         Some(gpu) => {
-            let mut sensor = gpu.sensor(&work.sensor, &work.gel)?;
+            let mut sensor = gpu.sensor_for(&work.sensor, &work.gel, GPU_BATCH)?;
             report.batch = Some(sensor.batch());
-            report.rates = on_device(&gpu, &mut sensor, &work, least)?;
+            (report.rates, report.stages) = on_device(&gpu, &mut sensor, &work, least)?;
         }
     }
     Ok(report)
@@ -241,10 +253,10 @@ fn on_device(
     sensor: &mut GpuSensor,
     work: &Work,
     least: Duration,
-) -> Result<Vec<BenchRate>, BenchError> {
+) -> Result<(Vec<BenchRate>, Stages), BenchError> {
     let mesh = gpu.mesh(&work.mesh)?;
     // At least some batches at a time, so that the ring is full.
-    let at_once = 8 * sensor.batch();
+    let at_once = 4 * sensor.batch();
     let requests: Vec<GpuRequest<'_>> = (0..at_once)
         .map(|i| {
             let (gel_from_mesh, force_n) = work.presses[i % work.presses.len()];
@@ -276,5 +288,11 @@ fn on_device(
     };
     let rates = vec![measure("device_resident", false)?, measure("read_back", true)?];
     std::hint::black_box(&taken);
-    fault.map_or(Ok(rates), |e| Err(e.into()))
+    if let Some(fault) = fault {
+        return Err(fault.into());
+    }
+    let repeats = if gpu.adapter().software { 1 } else { STAGE_REPEATS };
+    let start = Instant::now();
+    let stages = gpu.stage_seconds(sensor, &requests, repeats, &|| start.elapsed().as_secs_f64())?;
+    Ok((rates, stages))
 }

@@ -1,15 +1,17 @@
 //! One graphics processor for all worker threads of a sweep.
 //!
-//! A thread puts its images into a queue and asks for the device. Whoever gets it makes everything that waits, so that
-//! images of several threads become one batch; the others find theirs made when it is their turn.
+//! A thread of its own has the device. Workers send it the images of their samples and wait; it makes all that has come in while it
+//! was busy as one batch, so that batches grow with the number of workers.
 
 use gripgen_tactile::gpu::{
-    AdapterChoice, GpuAdapter, GpuError, GpuMesh, GpuPress, GpuRenderer, GpuRequest, GpuSensor,
+    AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuMesh, GpuPress, GpuRenderer, GpuRequest, GpuSensor,
 };
 use gripgen_tactile::{IndentError, Sensor};
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gel, TactileImage, TriMesh};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 
 /// Meshes and sensors kept on the device.
 const MESHES: usize = 32;
@@ -40,21 +42,30 @@ pub(crate) enum ImageFault {
     Indent(IndentError),
 }
 
-type Answer = Arc<Mutex<Option<Result<TactileImage, ImageFault>>>>;
+/// An image with its place among those of its worker.
+type Answer = (usize, Result<TactileImage, ImageFault>);
 
-/// The device and its queue.
-pub struct Gpu {
-    renderer: GpuRenderer,
-    waiting: Mutex<Vec<(ImageJob, Answer)>>,
-    resident: Mutex<Resident>,
-    fault: Mutex<Option<GpuError>>,
+/// A job whose worker waits for it.
+struct Waiting {
+    job: ImageJob,
+    place: usize,
+    answer: Sender<Answer>,
 }
 
-/// What is on the device, most recently used last.
-#[derive(Default)]
-struct Resident {
-    meshes: Vec<(Arc<TriMesh>, GpuMesh)>,
-    sensors: Vec<(Arc<Sensor>, Gel, GpuSensor)>,
+/// What the thread of the device is asked for.
+enum Order {
+    Images(Vec<Waiting>),
+    /// To put a sensor on the device.
+    Prepare(Arc<Sensor>, Gel, Sender<Result<(), GpuError>>),
+}
+
+/// The device and its thread.
+pub struct Gpu {
+    adapter: GpuAdapter,
+    /// `None` once it ends.
+    orders: Option<Sender<Order>>,
+    thread: Option<JoinHandle<()>>,
+    fault: Arc<Mutex<Option<GpuError>>>,
 }
 
 impl Gpu {
@@ -65,27 +76,34 @@ impl Gpu {
     /// No adapter, or one that cannot do what the stages need.
     pub fn open(adapter: Option<&str>) -> Result<Self, GpuError> {
         let choice = adapter.map_or(AdapterChoice::Hardware, |name| AdapterChoice::Named(name.into()));
-        Ok(Self {
-            renderer: GpuRenderer::new(&choice)?,
-            waiting: Mutex::default(),
-            resident: Mutex::default(),
-            fault: Mutex::default(),
-        })
+        let renderer = GpuRenderer::new(&choice)?;
+        let adapter = renderer.adapter().clone();
+        let (orders, taken) = channel();
+        let fault = Arc::new(Mutex::new(None));
+        let slot = fault.clone();
+        let device = Device { renderer, meshes: vec![], sensors: vec![] };
+        let thread = std::thread::Builder::new()
+            .name("gpu".into())
+            .spawn(move || device.serve(&taken, &slot))
+            .map_err(|e| GpuError::Device { adapter: adapter.to_string(), problem: e.to_string() })?;
+        Ok(Self { adapter, orders: Some(orders), thread: Some(thread), fault })
     }
 
     /// Which adapter it is.
     pub fn adapter(&self) -> &GpuAdapter {
-        self.renderer.adapter()
+        &self.adapter
     }
 
     /// What the device reported, if it failed: then no image is worth waiting for.
     pub(crate) fn fault(&self) -> Option<GpuError> {
-        lock(&self.fault).clone()
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Puts a sensor on the device, or says why the device cannot have it.
     pub(crate) fn prepare(&self, sensor: &Arc<Sensor>, gel: &Gel) -> Result<(), GpuError> {
-        lock(&self.resident).sensor(&self.renderer, sensor, gel).map(drop)
+        let (answer, answered) = channel();
+        self.order(Order::Prepare(sensor.clone(), gel.clone(), answer));
+        answered.recv().unwrap_or_else(|_| Err(self.gone()))
     }
 
     /// Makes images, together with those of other threads.
@@ -93,46 +111,87 @@ impl Gpu {
         &self,
         jobs: [ImageJob; N],
     ) -> [Result<TactileImage, ImageFault>; N] {
-        let answers: [Answer; N] = std::array::from_fn(|_| Answer::default());
-        lock(&self.waiting).extend(jobs.into_iter().zip(answers.iter().cloned()));
-        let mut resident = lock(&self.resident);
-        // Answers are complete when the device is free, or ours are still waiting.
-        if answers.iter().any(|a| lock(a).is_none()) {
-            let mut all = std::mem::take(&mut *lock(&self.waiting));
-            while !all.is_empty() {
-                let alike = |other: &ImageJob, one: &ImageJob| {
-                    Arc::ptr_eq(&other.sensor, &one.sensor) && other.gel == one.gel
-                };
-                let first = all[0].0.clone();
-                let (batch, rest) = all.into_iter().partition(|(job, _)| alike(job, &first));
+        let (answer, answered) = channel();
+        let waiting = |(place, job)| Waiting { job, place, answer: answer.clone() };
+        self.order(Order::Images(jobs.into_iter().enumerate().map(waiting).collect()));
+        drop(answer);
+        let mut images = std::array::from_fn(|_| None);
+        for (place, image) in answered {
+            // The first answer counts.
+            images[place].get_or_insert(image);
+        }
+        images.map(|image| image.unwrap_or_else(|| Err(ImageFault::Device(self.gone()))))
+    }
+
+    fn order(&self, order: Order) {
+        // Where the thread has gone, whoever waits for the answer sees it.
+        if let Some(orders) = &self.orders {
+            let _ = orders.send(order);
+        }
+    }
+
+    fn gone(&self) -> GpuError {
+        self.fault().unwrap_or_else(|| GpuError::Device {
+            adapter: self.adapter.to_string(),
+            problem: "its thread has ended".into(),
+        })
+    }
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        self.orders = None;
+        if let Some(thread) = self.thread.take() {
+            // What it reported was told to those who waited.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What the thread has: the device and what is on it, most recently used last.
+struct Device {
+    renderer: GpuRenderer,
+    meshes: Vec<(Arc<TriMesh>, GpuMesh)>,
+    sensors: Vec<(Arc<Sensor>, Gel, GpuSensor)>,
+}
+
+impl Device {
+    /// Answers until nobody can ask any more.
+    fn serve(mut self, orders: &Receiver<Order>, fault: &Mutex<Option<GpuError>>) {
+        while let Ok(first) = orders.recv() {
+            let mut all = vec![];
+            for order in std::iter::once(first).chain(orders.try_iter()) {
+                match order {
+                    Order::Images(jobs) => all.extend(jobs),
+                    Order::Prepare(sensor, gel, answer) => {
+                        let _ = answer.send(self.sensor(&sensor, &gel).map(drop));
+                    }
+                }
+            }
+            while let Some(Waiting { job: first, .. }) = all.first() {
+                let (sensor, gel) = (first.sensor.clone(), first.gel.clone());
+                let alike = |w: &Waiting| Arc::ptr_eq(&w.job.sensor, &sensor) && w.job.gel == gel;
+                let (batch, rest) = all.into_iter().partition(alike);
                 all = rest;
-                if let Err(e) = resident.make(&self.renderer, &batch) {
-                    lock(&self.fault).get_or_insert(e.clone());
-                    for (_, answer) in &batch {
-                        lock(answer).get_or_insert(Err(ImageFault::Device(e.clone())));
+                if let Err(e) = self.make(&batch) {
+                    fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(e.clone());
+                    // Those that were answered listen to the first answer only.
+                    for w in &batch {
+                        let _ = w.answer.send((w.place, Err(ImageFault::Device(e.clone()))));
                     }
                 }
             }
         }
-        drop(resident);
-        answers.map(|a| lock(&a).take().expect("whoever had the device answered all that waited"))
     }
-}
 
-impl Resident {
-    fn sensor(
-        &mut self,
-        renderer: &GpuRenderer,
-        sensor: &Arc<Sensor>,
-        gel: &Gel,
-    ) -> Result<&mut GpuSensor, GpuError> {
+    fn sensor(&mut self, sensor: &Arc<Sensor>, gel: &Gel) -> Result<&mut GpuSensor, GpuError> {
         let entry = match self.sensors.iter().position(|(s, g, _)| Arc::ptr_eq(s, sensor) && g == gel) {
             Some(i) => self.sensors.remove(i),
             None => {
                 if self.sensors.len() == SENSORS {
                     self.sensors.remove(0);
                 }
-                (sensor.clone(), gel.clone(), renderer.sensor(sensor, gel)?)
+                (sensor.clone(), gel.clone(), self.renderer.sensor(sensor, gel)?)
             }
         };
         self.sensors.push(entry);
@@ -140,52 +199,53 @@ impl Resident {
     }
 
     /// Puts the meshes of a batch on the device; those of earlier batches may have to go.
-    fn bring_meshes(&mut self, renderer: &GpuRenderer, batch: &[(ImageJob, Answer)]) -> Result<(), GpuError> {
-        let wanted = |mesh: &Arc<TriMesh>| batch.iter().any(|(job, _)| Arc::ptr_eq(&job.part.mesh, mesh));
+    fn bring_meshes(&mut self, batch: &[Waiting]) -> Result<(), GpuError> {
+        let wanted = |mesh: &Arc<TriMesh>| batch.iter().any(|w| Arc::ptr_eq(&w.job.part.mesh, mesh));
         while self.meshes.len() > MESHES {
             match self.meshes.iter().position(|(mesh, _)| !wanted(mesh)) {
                 Some(i) => drop(self.meshes.remove(i)),
                 None => break,
             }
         }
-        for (job, _) in batch {
-            if !self.meshes.iter().any(|(mesh, _)| Arc::ptr_eq(mesh, &job.part.mesh)) {
-                self.meshes.push((job.part.mesh.clone(), renderer.mesh(&job.part.mesh)?));
+        for part in batch.iter().map(|w| &w.job.part) {
+            if !self.meshes.iter().any(|(mesh, _)| Arc::ptr_eq(mesh, &part.mesh)) {
+                self.meshes.push((part.mesh.clone(), self.renderer.mesh(&part.mesh)?));
             }
         }
         Ok(())
     }
 
-    /// Makes a batch of one sensor.
-    fn make(&mut self, renderer: &GpuRenderer, batch: &[(ImageJob, Answer)]) -> Result<(), GpuError> {
-        let Some((first, _)) = batch.first() else { return Ok(()) };
-        self.bring_meshes(renderer, batch)?;
-        self.sensor(renderer, &first.sensor, &first.gel)?;
-        let Self { meshes, sensors } = self;
+    /// Makes a batch of one sensor. Every image is answered when it is there.
+    fn make(&mut self, batch: &[Waiting]) -> Result<(), GpuError> {
+        let Some(Waiting { job: first, .. }) = batch.first() else { return Ok(()) };
+        self.bring_meshes(batch)?;
+        self.sensor(&first.sensor, &first.gel)?;
+        let Self { renderer, meshes, sensors } = self;
         let (.., sensor) = sensors.last_mut().expect("brought just now");
         let on_device = |mesh: &Arc<TriMesh>| {
             let found = meshes.iter().find(|(m, _)| Arc::ptr_eq(m, mesh));
             &found.expect("brought just now").1
         };
-        let requests: Vec<GpuRequest<'_>> = batch
-            .iter()
-            .map(|(job, _)| GpuRequest {
-                press: Some(GpuPress {
-                    mesh: on_device(&job.part.mesh),
-                    gel_from_mesh: job.part.gel_from_mesh,
-                    imprint_m3_per_n: job.part.imprint_m3_per_n,
-                    force_n: job.part.force_n,
-                }),
-                noise_key: job.noise_key,
-            })
-            .collect();
-        for ((_, answer), image) in batch.iter().zip(renderer.images(sensor, &requests)?) {
-            *lock(answer) = Some(image.map_err(ImageFault::Indent));
-        }
-        Ok(())
+        let request = |job: &ImageJob| GpuRequest {
+            press: Some(GpuPress {
+                mesh: on_device(&job.part.mesh),
+                gel_from_mesh: job.part.gel_from_mesh,
+                imprint_m3_per_n: job.part.imprint_m3_per_n,
+                force_n: job.part.force_n,
+            }),
+            noise_key: job.noise_key,
+        };
+        let requests: Vec<GpuRequest<'_>> = batch.iter().map(|w| request(&w.job)).collect();
+        let size_px = first.sensor.grid;
+        let taken = |image: GpuImage<'_>| TactileImage {
+            width_px: size_px.width_px as u32,
+            height_px: size_px.height_px as u32,
+            rgb: image.rgb.to_vec(),
+        };
+        renderer.render(sensor, &requests, |place, image| {
+            let w = &batch[place];
+            // A worker that does not listen any more has ended.
+            let _ = w.answer.send((w.place, image.map(taken).map_err(ImageFault::Indent)));
+        })
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

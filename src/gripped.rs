@@ -6,6 +6,7 @@ use crate::gpu::{Gpu, ImageFault, ImageJob, PlacedPart};
 use crate::library::Library;
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip};
+use gripgen_tactile::gpu::makes;
 use gripgen_tactile::{ClusteredMesh, Imprint, Plane, Renderer, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
 use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
@@ -62,7 +63,7 @@ impl Gripped {
         let imprint = press.imprints(None)?;
         let look = if !options.images {
             None
-        } else if options.backend == Backend::Gpu && Jaw::BOTH.iter().all(|&jaw| optics[jaw].is_neutral()) {
+        } else if options.backend == Backend::Gpu && on_device(twin, &sensors, &optics) {
             Some(Look::Parts(press.parts))
         } else {
             // Optics effects are seen and not felt: where they change the imprint, the image has its own.
@@ -132,6 +133,11 @@ impl Gripped {
             gripgen_tactile::finish(&self.sensors[jaw], change, key(jaw))
         }))
     }
+}
+
+/// Whether a graphics processor makes the images of both jaws.
+fn on_device(twin: &Twin, sensors: &PerJaw<Arc<Sensor>>, optics: &PerJaw<OpticsState>) -> bool {
+    Jaw::BOTH.iter().all(|&jaw| optics[jaw].is_neutral() && makes(&sensors[jaw], &twin.gel[jaw]))
 }
 
 /// Real normal force of each jaw. An error if an effect leaves a jaw none.

@@ -11,7 +11,7 @@ use crate::sample::SimulateOptions;
 use crate::version::VERSION;
 use gripgen_record::{Background, RunFolder, sha256_hex};
 use gripgen_tactile::finish;
-use gripgen_tactile::gpu::GpuError;
+use gripgen_tactile::gpu::{GpuError, makes};
 use gripgen_twin::config::{Backend, Compression, ConfigError, Document, ImageStorage, SweepFile};
 use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, PerJaw, Posterior, RobotArm, Sweep, Twin, is_twin_key};
 use std::borrow::Cow;
@@ -203,12 +203,13 @@ impl Project {
     }
 
     /// Opens the graphics processor, if images are made there, and puts both sensors on it: what cannot be done shows
-    /// before anything is written.
+    /// before anything is written. Images that are the processor's in any case need neither.
     pub(crate) fn prepare_gpu(&self) -> Result<Option<&Gpu>, GpuError> {
         let Some(gpu) = self.gpu()? else { return Ok(None) };
         for jaw in Jaw::BOTH {
             // A sensor that cannot be read fails its samples, with its own reason.
-            if let Ok(sensor) = self.library.sensor(&self.twin.optics[jaw]) {
+            let sensor = self.library.sensor(&self.twin.optics[jaw]);
+            if let Some(sensor) = sensor.ok().filter(|sensor| makes(sensor, &self.twin.gel[jaw])) {
                 gpu.prepare(&sensor, &self.twin.gel[jaw])?;
             }
         }

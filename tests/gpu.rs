@@ -91,6 +91,31 @@ fn images_that_optics_effects_change_are_those_of_the_processor() {
     }
 }
 
+/// The contact of an elastic gel is solved on the processor, and so are its images: the bytes of a sweep without a graphics processor.
+#[test]
+#[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set: no Vulkan driver was found")]
+fn images_of_an_elastic_gel_are_those_of_the_processor() {
+    let twin = "[parts.gear]\nmesh = \"asset:parts/gear/part.stl\"\nmu = 0.2\nimprint_mm3_per_n = 1.5\n\
+                [[parts.gear.grips]]\norientation_deg = [0.0, 0.0, 90.0]\n\
+                [gel.left]\nmodel = \"elastic\"\nyoung_modulus_mpa = 0.3\n\
+                [gel.right]\nmodel = \"elastic\"\nyoung_modulus_mpa = 0.3\n";
+    let sweep = "twin = \"twin.toml\"\nsamples = 2\nimages = \"png\"\nmechanics = \"reduced\"\n\
+                 [vary]\ngrip_force_n = [10, 20]\n";
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
+    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
+    let at = Location::Disk(folder.path().join("sweep.toml"));
+    let made = |sets: &[&str], out: &str| {
+        let sets = sets.iter().filter_map(|s| s.split_once('=')).map(|(k, v)| (k.into(), v.into()));
+        let out = folder.path().join(out);
+        assert_eq!(run(&Project::load(&at, &sets.collect::<Vec<_>>()).unwrap(), &out, jobs(1)).failed, 0);
+        images(&out, 1)
+    };
+    let ours = made(&[], "cpu");
+    assert!(ours.len() == 2 && ours.iter().all(Option::is_some));
+    assert!(ours == made(&SOFTWARE, "gpu"));
+}
+
 /// A run that another adapter began is continued, with a word about it.
 #[test]
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set: no Vulkan driver was found")]

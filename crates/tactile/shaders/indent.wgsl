@@ -6,7 +6,7 @@
 //
 // It runs twice: by the centres of pixels, then, in images with a step, with the points of the pixels beside it.
 
-const THREADS = 256u;
+const THREADS = /*THREADS*/u;
 const BLOCK = 16u;
 // Newton ends after 2 to 8 steps (median 6); this only bounds what rounding could make of it.
 const MAX_STEPS = 24u;
@@ -55,9 +55,10 @@ fn pressed_in(start: u32, pixel: u32, top: f32, press: f32) -> vec2<f32> {
 fn measure(start: u32, pixels: u32, thread: u32, top: f32, press: f32) {
     var volume = 0.0;
     var count = 0.0;
-    for (var block = thread * BLOCK; block < pixels; block += THREADS * BLOCK) {
+    // Neighbouring threads read neighbouring pixels.
+    for (var block = thread; block < pixels; block += THREADS * BLOCK) {
         var part = vec2<f32>();
-        for (var i = block; i < min(block + BLOCK, pixels); i++) {
+        for (var i = block; i < min(block + THREADS * BLOCK, pixels); i += THREADS) {
             part += pressed_in(start, i, top, press);
         }
         volume += part.x;

@@ -23,6 +23,6 @@ fn standard_normal(words: vec2<u32>, index: u32) -> f32 {
     return levels[(pairs & 0xffffu) + (pairs >> 16u)];
 }
 
-fn rounded(value: f32) -> u32 {
-    return u32(floor(clamp(value, 0.0, 255.0) + 0.5));
+fn rounded(value: vec3<f32>) -> vec3<u32> {
+    return vec3<u32>(floor(clamp(value, vec3<f32>(0.0), vec3<f32>(255.0)) + 0.5));
 }

@@ -10,8 +10,9 @@ const THREADS = 64u;
 const SUB = /*SUB*/;
 const MAX_VERTICES = 128u;
 const MAX_TRIANGLES = 128u;
-// Triangles over more pixels than this are filled by all threads of the group together.
-const LARGE_PX = 128;
+// Triangles that are more work than this are filled by all threads of the group together: a pixel is 1, a row is ROW_PX.
+const LARGE_PX = 1024 * SUB;
+const ROW_PX = 4;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
@@ -113,6 +114,16 @@ fn top(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 
+// Whether a box of pixels, borders included, may have one that is drawn.
+fn wanted(image: u32, left: i32, right: i32, top: i32, bottom: i32) -> bool {
+    /*WANTED*/
+}
+
+// The tiles of a row that may have such pixels, a bit each.
+fn tiles_of(image: u32, row: i32) -> u32 {
+    return /*ROW*/;
+}
+
 var<workgroup> corners: array<Corner, MAX_VERTICES>;
 var<workgroup> large: array<u32, MAX_TRIANGLES>;
 var<workgroup> large_count: atomic<u32>;
@@ -141,36 +152,42 @@ fn visible(image: u32, cluster: u32, reference: i32, floor_px: f32) -> bool {
     let h = f32(c.h - reference);
     return x + reach[0] >= 0.0 && x - reach[0] <= f32(frame.width_px)
         && y + reach[1] >= 0.0 && y - reach[1] <= f32(frame.height_px)
-        && h + reach[2] >= floor_px;
+        && h + reach[2] >= floor_px
+        && wanted(image, i32(x - reach[0]), i32(x + reach[0]), i32(y - reach[1]), i32(y + reach[1]));
+}
+
+// An edge, from its upper end, whichever triangle asks.
+struct Edge {
+    x: i32,
+    y: i32,
+    fx: f32,
+    fy: f32,
+    h: f32,
+    // To its lower end: columns, height, and one over the rows; 0 on a row.
+    run: f32,
+    rise: f32,
+    per_row: f32,
+}
+
+fn edge(upper: Corner, lower: Corner, reference: i32) -> Edge {
+    let span = f32(lower.y - upper.y) + (lower.fy - upper.fy);
+    return Edge(
+        upper.x, upper.y, upper.fx, upper.fy, f32(upper.h - reference) + upper.fh,
+        f32(lower.x - upper.x) + (lower.fx - upper.fx), f32(lower.h - upper.h) + (lower.fh - upper.fh),
+        select(0.0, 1.0 / span, span > 0.0),
+    );
 }
 
 // Where an edge crosses a row of pixels: x + fx, at height h.
 struct Crossing {
-    hit: bool,
     x: i32,
     fx: f32,
     h: f32,
 }
 
-// Computed from the upper end, whichever triangle asks.
-fn crossing(a: Corner, b: Corner, row: i32, reference: i32) -> Crossing {
-    let a_first = a.y < b.y || (a.y == b.y && a.fy <= b.fy);
-    var p = a;
-    var q = b;
-    if !a_first {
-        p = b;
-        q = a;
-    }
-    let span = f32(q.y - p.y) + (q.fy - p.fy);
-    let from_p = f32(row - p.y) - p.fy;
-    let to_q = f32(q.y - row) + q.fy;
-    if span <= 0.0 || from_p < 0.0 || to_q < 0.0 {
-        return Crossing(false, 0, 0.0, 0.0);
-    }
-    let share = min(from_p / span, 1.0);
-    let hp = f32(p.h - reference) + p.fh;
-    let rise = f32(q.h - p.h) + (q.fh - p.fh);
-    return Crossing(true, p.x, p.fx + share * (f32(q.x - p.x) + (q.fx - p.fx)), hp + share * rise);
+fn crossing(e: Edge, row: i32) -> Crossing {
+    let share = min((f32(row - e.y) - e.fy) * e.per_row, 1.0);
+    return Crossing(e.x, e.fx + share * e.run, e.h + share * e.rise);
 }
 
 fn left_of(a: Crossing, b: Crossing) -> bool {
@@ -178,66 +195,92 @@ fn left_of(a: Crossing, b: Crossing) -> bool {
 }
 
 // One row of a triangle: between its two crossings, heights on the line between theirs.
-fn fill_row(image: u32, a: Corner, b: Corner, c: Corner, row: i32, reference: i32) {
-    let ab = crossing(a, b, row, reference);
-    let bc = crossing(b, c, row, reference);
-    let ca = crossing(c, a, row, reference);
-    var left = ab;
-    var right = ab;
-    if bc.hit {
-        if !left.hit || left_of(bc, left) {
-            left = bc;
-        }
-        if !right.hit || left_of(right, bc) {
-            right = bc;
-        }
-    }
-    if ca.hit {
-        if !left.hit || left_of(ca, left) {
-            left = ca;
-        }
-        if !right.hit || left_of(right, ca) {
-            right = ca;
-        }
-    }
-    if !left.hit {
-        return;
-    }
-    let first = max(left.x + i32(ceil(left.fx)), 0);
-    let last = min(right.x + i32(floor(right.fx)), SUB * i32(frame.width_px) - 1);
-    let width = f32(right.x - left.x) + (right.fx - left.fx);
+// `tiles` are those of the row that have pixels to draw.
+fn fill_row(image: u32, a: Crossing, b: Crossing, row: i32, tiles: u32) {
+    let swapped = left_of(b, a);
+    let left_x = select(a.x, b.x, swapped);
+    let left_fx = select(a.fx, b.fx, swapped);
+    let left_h = select(a.h, b.h, swapped);
+    let right_x = select(b.x, a.x, swapped);
+    let right_fx = select(b.fx, a.fx, swapped);
+    let right_h = select(b.h, a.h, swapped);
+    let first = max(left_x + i32(ceil(left_fx)), 0);
+    let last = min(right_x + i32(floor(right_fx)), SUB * i32(frame.width_px) - 1);
+    let width = f32(right_x - left_x) + (right_fx - left_fx);
     let start = (image * frame.height_px + u32(row) / u32(SUB)) * frame.width_px;
     for (var x = first; x <= last; x++) {
-        var h = max(left.h, right.h);
+        /*COLUMN*/
+        var h = max(left_h, right_h);
         if width > 0.0 {
             // Not `mix`: a level row has to stay level to the bit.
-            h = left.h + clamp((f32(x - left.x) - left.fx) / width, 0.0, 1.0) * (right.h - left.h);
+            h = left_h + clamp((f32(x - left_x) - left_fx) / width, 0.0, 1.0) * (right_h - left_h);
         }
         /*STORE*/
     }
 }
 
-// A triangle on the rows `first`, `first + step`, ..., cut to its own. Returns the pixels of its box, 0 if it is out
-// of sight; fills only where `fill` says so.
+// Whether the first corner lies above the second one in the image.
+fn above(a: Corner, b: Corner) -> bool {
+    return a.y < b.y || (a.y == b.y && a.fy <= b.fy);
+}
+
+// A triangle on the rows `first`, `first + step`, ..., cut to its own. Returns whether it is more work than
+// `limit`, and then does nothing.
 fn fill_triangle(image: u32, packed: u32, offset: u32, step: u32, reference: i32, floor_px: f32, limit: i32) -> bool {
     let a = corners[packed & 0xffu];
     let b = corners[(packed >> 8u) & 0xffu];
     let c = corners[(packed >> 16u) & 0xffu];
     let highest = max(a.h, max(b.h, c.h));
-    let left = min(a.x, min(b.x, c.x));
-    let right = max(a.x, max(b.x, c.x));
+    let left = max(min(a.x, min(b.x, c.x)), -1);
+    let right = min(max(a.x, max(b.x, c.x)), SUB * i32(frame.width_px));
     let top_row = max(min(a.y, min(b.y, c.y)), 0);
     let bottom_row = min(max(a.y, max(b.y, c.y)), SUB * i32(frame.height_px) - 1);
     if f32(highest - reference) + 1.0 < floor_px || top_row > bottom_row
-        || right < 0 || left >= SUB * i32(frame.width_px) {
+        || right < 0 || left >= SUB * i32(frame.width_px)
+        || !wanted(image, left / SUB, right / SUB, top_row / SUB, bottom_row / SUB) {
         return false;
     }
-    let columns = min(right, SUB * i32(frame.width_px)) - max(left, -1) + 1;
-    if (bottom_row - top_row + 1) * columns > limit {
+    let ab = vec2<f32>(f32(b.x - a.x), f32(b.y - a.y));
+    let ac = vec2<f32>(f32(c.x - a.x), f32(c.y - a.y));
+    let pixels = i32(min(0.5 * abs(ab.x * ac.y - ab.y * ac.x), 1e6));
+    if ROW_PX * (bottom_row - top_row + 1) + pixels > limit {
         return true;
     }
-    for (var row = top_row + i32(offset); row <= bottom_row; row += i32(step)) {
-        fill_row(image, a, b, c, row, reference);
+    // From the uppermost to the lowest.
+    var p = a;
+    var q = b;
+    var r = c;
+    if !above(p, q) {
+        p = b;
+        q = a;
+    }
+    if !above(q, r) {
+        r = q;
+        q = c;
+        if !above(p, q) {
+            q = p;
+            p = c;
+        }
+    }
+    let whole_side = edge(p, r, reference);
+    let upper_side = edge(p, q, reference);
+    let lower_side = edge(q, r, reference);
+    if whole_side.per_row == 0.0 {
+        return false;
+    }
+    let last = min(r.y, bottom_row);
+    for (var row = max(p.y + i32(ceil(p.fy)), 0) + i32(offset); row <= last; row += i32(step)) {
+        let tiles = tiles_of(image, row);
+        if tiles == 0u {
+            continue;
+        }
+        let below_middle = f32(row - q.y) - q.fy;
+        let upper = below_middle < 0.0 || (below_middle == 0.0 && upper_side.per_row > 0.0);
+        var side = lower_side;
+        if upper {
+            side = upper_side;
+        }
+        fill_row(image, crossing(whole_side, row), crossing(side, row), row, tiles);
     }
     return false;
 }
@@ -250,7 +293,7 @@ fn fill(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) t
     let found = atomicLoad(&tops[image]);
     let reference = select(bitcast<i32>(found ^ 0x80000000u), presses[image].bound_px, found == 0u);
     let floor_px = select(-frame.reach_px, -0x1p120f, found == 0u);
-    let seen = visible(image, cluster, reference, floor_px)/*STEPPED*/;
+    let seen = visible(image, cluster, reference, floor_px);
     let first_vertex = clusters[cluster].first_vertex;
     if seen {
         for (var i = thread; i < clusters[cluster].vertices; i += THREADS) {

@@ -5,7 +5,7 @@
 @group(0) @binding(1) var<storage, read_write> steps: array<f32>;
 // Heights at the nine points of each pixel; 0 where there is nothing.
 @group(0) @binding(2) var<storage, read_write> points: array<u32>;
-// Whether an image has such pixels.
+// Where an image has such pixels: TILES words, each a row of as many tiles.
 @group(0) @binding(3) var<storage, read_write> stepped: array<atomic<u32>>;
 //#PLANES
 
@@ -30,6 +30,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         for (var k = 0u; k < 9u; k++) {
             points[9u * pixel + k] = 0u;
         }
-        atomicOr(&stepped[image], 1u);
+        let bits = tile_bits(frame);
+        atomicOr(&stepped[TILES * image + (y >> bits)], 1u << (x >> bits));
     }
 }

@@ -11,6 +11,7 @@ mod buffers;
 mod cast;
 mod colour;
 mod device;
+mod encode;
 mod layout;
 mod mesh;
 mod pipelines;
@@ -31,6 +32,7 @@ use crate::grid::Plane;
 use crate::indent::IndentError;
 use crate::sensor::Sensor;
 use device::Device;
+use encode::Run;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gel, TactileImage, TriMesh};
 use layout::{HAS_NOISE, HAS_PART, Outcome, PressInput};
@@ -38,6 +40,9 @@ use pipelines::Pipelines;
 
 /// Values that a thread makes on a software adapter. 40 are a tenth faster and take three times as long to build.
 const SOFTWARE_RUN: u32 = 16;
+
+/// Images of a batch on a graphics processor where nobody asks for more.
+pub const BATCH: usize = 64;
 
 /// Why the graphics processor cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -104,6 +109,12 @@ impl GpuError {
     }
 }
 
+/// Whether a device makes the images of a sensor with its gel. Those of an elastic gel and of markers that move are the processor's:
+/// it solves the contact for the labels in any case, and most of such an image is in that solution.
+pub fn makes(sensor: &Sensor, gel: &Gel) -> bool {
+    colour::missing(sensor, gel).is_none()
+}
+
 /// A part pressed into a gel.
 #[derive(Clone, Copy)]
 pub struct GpuPress<'a> {
@@ -166,9 +177,15 @@ impl GpuRenderer {
         GpuMesh::new(&self.device, mesh)
     }
 
-    /// Puts a sensor with its gel on the device, with room for a batch.
+    /// Puts a sensor with its gel on the device, with room for a batch of [`BATCH`] images.
     pub fn sensor(&self, sensor: &Sensor, gel: &Gel) -> Result<GpuSensor, GpuError> {
-        GpuSensor::new(&self.device, &self.pipelines, sensor, gel)
+        self.sensor_for(sensor, gel, BATCH)
+    }
+
+    /// The same for batches of `most` images, or what the device binds; software adapters have their own number. An image of
+    /// 320 x 240 pixels takes 6 MB, 8 with shadows.
+    pub fn sensor_for(&self, sensor: &Sensor, gel: &Gel, most: usize) -> Result<GpuSensor, GpuError> {
+        GpuSensor::new(&self.device, &self.pipelines, sensor, gel, most.max(1))
     }
 
     /// Makes images, any number of them in any order of meshes, and hands them out with their place in `requests`.
@@ -252,23 +269,47 @@ impl GpuRenderer {
         Ok(surfaces.into_iter().map(|s| s.expect("every request is answered")).collect())
     }
 
+    /// Seconds by `clock_s` that each stage takes of the first batch of requests: the mean of `repeats`, by its name and in order.
+    pub fn stage_seconds(
+        &self,
+        sensor: &mut GpuSensor,
+        requests: &[GpuRequest<'_>],
+        repeats: u32,
+        clock_s: &dyn Fn() -> f64,
+    ) -> Result<Vec<(&'static str, f64)>, GpuError> {
+        let order = by_mesh(requests);
+        let batch = &order[..sensor.batch.min(order.len())];
+        let (presses, runs) = inputs(sensor, requests, batch);
+        sensor.stage_seconds(&self.device, &presses, &runs, repeats.max(1), clock_s)
+    }
+
     fn encode(
         &self,
         sensor: &GpuSensor,
         requests: &[GpuRequest<'_>],
         batch: &[usize],
     ) -> wgpu::CommandEncoder {
-        let presses: Vec<PressInput> = batch.iter().map(|&i| press_of(&requests[i], &sensor.grid)).collect();
-        let mut runs: Vec<(usize, usize, &GpuMesh)> = vec![];
-        for (i, &place) in batch.iter().enumerate() {
-            let Some(press) = &requests[place].press else { continue };
-            match runs.last_mut() {
-                Some((_, count, mesh)) if std::ptr::eq(*mesh, press.mesh) => *count += 1,
-                _ => runs.push((i, 1, press.mesh)),
-            }
-        }
+        let (presses, runs) = inputs(sensor, requests, batch);
         sensor.encode(&self.device, &presses, &runs)
     }
+}
+
+/// What a batch uploads, and its runs of images that show the same mesh.
+fn inputs<'a>(
+    sensor: &GpuSensor,
+    requests: &[GpuRequest<'a>],
+    batch: &[usize],
+) -> (Vec<PressInput>, Vec<Run<'a>>) {
+    let presses: Vec<PressInput> = batch.iter().map(|&i| press_of(&requests[i], &sensor.grid)).collect();
+    let mut runs: Vec<Run<'a>> = vec![];
+    for (i, &place) in batch.iter().enumerate() {
+        let Some(press) = &requests[place].press else { continue };
+        match runs.last_mut() {
+            Some((_, count, mesh)) if std::ptr::eq(*mesh, press.mesh) => *count += 1,
+            _ => runs.push((i, 1, press.mesh)),
+        }
+    }
+    (presses, runs)
 }
 
 /// Places of the requests, those with the same mesh one after another.

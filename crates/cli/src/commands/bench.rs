@@ -65,6 +65,8 @@ fn as_json(report: &BenchReport) -> Value {
         "height_px": report.size_px.1,
         "triangles": report.triangles,
         "rates": rates,
+        "stages": report.stages.iter().map(|(stage, s)| json!({"stage": stage, "seconds_per_batch": s}))
+            .collect::<Vec<_>>(),
     })
 }
 
@@ -91,6 +93,16 @@ fn in_words(report: &BenchReport) -> String {
             rate.images,
             rate.seconds
         );
+    }
+    if let Some(batch) = report.batch {
+        let whole: f64 = report.stages.iter().map(|(_, s)| s).sum();
+        for (stage, seconds) in &report.stages {
+            text += &format!(
+                "  {stage:<18}{:>10.2} us an image   ({:.0} % of the stages)\n",
+                seconds / batch as f64 * 1e6,
+                100.0 * seconds / whole
+            );
+        }
     }
     if report.adapter.as_ref().is_some_and(|a| a.software) {
         text += "This adapter computes on the processor: its rate says nothing about a graphics processor.\n";

@@ -106,6 +106,14 @@ struct ShadowBlur {
     down: u32,
 }
 
+// Tiles along each side of an image in which pixels beside steps are looked for.
+const TILES = 32u;
+
+// Such a tile has 2^this pixels along its side.
+fn tile_bits(frame: Frame) -> u32 {
+    return max(firstLeadingBit(max(frame.width_px, frame.height_px)), 4u) - 4u;
+}
+
 const HAS_PART = 1u;
 const HAS_NOISE = 2u;
 

@@ -6,7 +6,7 @@ use super::buffers::{Pass, Planes, bind, bind_at, empty, new_planes, resident, w
 use super::cast::{Cast, Scene, ceiling};
 use super::colour::Colours;
 use super::device::Device;
-use super::layout::{Cluster, Frame, Group, Outcome, PressInput};
+use super::layout::{Cluster, Frame, Outcome, PressInput};
 use super::mesh::{Clusters, Steps};
 use super::pipelines::{Pipelines, Stage};
 use super::readback::Ring;
@@ -22,14 +22,16 @@ use wgpu::BufferUsages;
 
 /// Images of a batch. More planes than a processor's cache holds make a software adapter slower.
 const SOFTWARE_BATCH: u64 = 8;
-const HARDWARE_BATCH: u64 = 64;
+
+/// Where an image has pixels beside steps: `TILES` words of `layout.wgsl`.
+pub(super) const TILE_BYTES: u64 = 4 * 32;
 
 /// A mesh on the device.
 pub struct GpuMesh {
-    clusters: wgpu::Buffer,
-    vertices: wgpu::Buffer,
-    triangles: wgpu::Buffer,
-    count: u32,
+    pub(super) clusters: wgpu::Buffer,
+    pub(super) vertices: wgpu::Buffer,
+    pub(super) triangles: wgpu::Buffer,
+    pub(super) count: u32,
     pub(super) steps: Steps,
 }
 
@@ -52,12 +54,6 @@ impl GpuMesh {
     }
 }
 
-fn draw(pass: &mut wgpu::ComputePass<'_>, stage: &Stage, bound: &wgpu::BindGroup, groups: [u32; 3]) {
-    pass.set_pipeline(&stage.pipeline);
-    pass.set_bind_group(0, bound, &[]);
-    pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
-}
-
 /// A sensor with its gel on the device: rest frame, colours, blurs, and the planes of one batch.
 pub struct GpuSensor {
     pub(super) grid: Grid,
@@ -65,25 +61,25 @@ pub struct GpuSensor {
     pub(super) batch: usize,
     pub(super) image_bytes: usize,
     pub(super) ring: Ring,
-    raster: [Stage; 3],
-    frame: wgpu::Buffer,
-    presses: wgpu::Buffer,
-    tops: wgpu::Buffer,
-    heights: wgpu::Buffer,
-    /// Pixels beside steps, heights at their points, and whether an image has any.
-    steps: wgpu::Buffer,
-    points: wgpu::Buffer,
-    stepped: wgpu::Buffer,
-    outcomes: wgpu::Buffer,
+    pub(super) raster: [Stage; 3],
+    pub(super) frame: wgpu::Buffer,
+    pub(super) presses: wgpu::Buffer,
+    pub(super) tops: wgpu::Buffer,
+    pub(super) heights: wgpu::Buffer,
+    /// Pixels beside steps, heights at their points, and in which tiles an image has any.
+    pub(super) steps: wgpu::Buffer,
+    pub(super) points: wgpu::Buffer,
+    pub(super) stepped: wgpu::Buffer,
+    pub(super) outcomes: wgpu::Buffer,
     /// What the rays of shadows leave; 0 at the start of a batch.
-    lowest: Option<wgpu::Buffer>,
-    packed: wgpu::Buffer,
-    surface: Planes,
+    pub(super) lowest: Option<wgpu::Buffer>,
+    pub(super) packed: wgpu::Buffer,
+    pub(super) surface: Planes,
     /// Press by centres, find steps, press by points.
-    indent: [Pass; 3],
+    pub(super) indent: [Pass; 3],
     /// Between the stages `indent` and `gradient`: the blurs, the surroundings of colours by regression, shadows.
-    between: Vec<Pass>,
-    image: Pass,
+    pub(super) between: Vec<Pass>,
+    pub(super) image: Pass,
 }
 
 impl GpuSensor {
@@ -97,13 +93,14 @@ impl GpuSensor {
         pipelines: &Pipelines,
         sensor: &Sensor,
         gel: &Gel,
+        most: usize,
     ) -> Result<Self, GpuError> {
         let grid = sensor.grid;
         let pixels = grid.len() as u64;
         let image_words = pixels.div_ceil(4) * 3;
         let limits = device.device.limits();
         let allowed = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let most = if device.adapter.software { SOFTWARE_BATCH } else { HARDWARE_BATCH };
+        let most = if device.adapter.software { SOFTWARE_BATCH } else { most as u64 };
         let colours = Colours::new(sensor, gel)?;
         // The heights at nine points of each pixel are the largest of the planes that all sensors have.
         let floats = (9 * pixels).max(colours.regression.map_or(0, |r| u64::from(r.image_floats)));
@@ -141,7 +138,7 @@ impl GpuSensor {
         let heights = buffer("heights", 4 * pixels);
         let steps = buffer("steps", 4 * pixels);
         let points = buffer("points", 36 * pixels);
-        let stepped = buffer("stepped", 4);
+        let stepped = buffer("stepped", TILE_BYTES);
         let outcomes = buffer("outcomes", size_of::<Outcome>() as u64);
         let packed = buffer("packed images", 4 * image_words);
         let planes = || new_planes(device, pipelines.variant(), &grid, batch);
@@ -259,66 +256,6 @@ impl GpuSensor {
             between,
             image,
         })
-    }
-
-    /// The commands of one batch. `runs` are runs of images that show the same mesh: first image, images, mesh.
-    pub(super) fn encode(
-        &self,
-        device: &Device,
-        presses: &[PressInput],
-        runs: &[(usize, usize, &GpuMesh)],
-    ) -> wgpu::CommandEncoder {
-        let images = presses.len() as u32;
-        device.queue.write_buffer(&self.presses, 0, bytemuck::cast_slice(presses));
-        let mut encoder = device.device.create_command_encoder(&Default::default());
-        encoder.clear_buffer(&self.tops, 0, Some(4 * u64::from(images)));
-        encoder.clear_buffer(&self.stepped, 0, Some(4 * u64::from(images)));
-        encoder.clear_buffer(&self.heights, 0, Some(4 * u64::from(images) * self.grid.len() as u64));
-        if let Some(lowest) = &self.lowest {
-            encoder.clear_buffer(lowest, 0, Some(12 * u64::from(images) * self.grid.len() as u64));
-        }
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            let drawn: Vec<_> = runs.iter().map(|run| (run, self.run_of(device, run))).collect();
-            for ((_, count, mesh), [top, fill, _]) in &drawn {
-                draw(&mut pass, &self.raster[0], top, [mesh.count.div_ceil(64), *count as u32, 1]);
-                draw(&mut pass, &self.raster[1], fill, [mesh.count, *count as u32, 1]);
-            }
-            let run = |pass: &mut wgpu::ComputePass<'_>, p: &Pass, groups: [u32; 3]| {
-                draw(pass, &p.stage, &p.bound, groups);
-            };
-            run(&mut pass, &self.indent[0], [images, 1, 1]);
-            run(&mut pass, &self.indent[1], [self.indent[1].groups[0], images, 1]);
-            for ((_, count, mesh), [.., points]) in &drawn {
-                draw(&mut pass, &self.raster[2], points, [mesh.count, *count as u32, 1]);
-            }
-            run(&mut pass, &self.indent[2], [images, 1, 1]);
-            for between in &self.between {
-                run(&mut pass, between, [between.groups[0], between.groups[1], images]);
-            }
-            run(&mut pass, &self.image, [self.image.groups[0], images, 1]);
-        }
-        encoder
-    }
-
-    /// What the three draws of images that show the same mesh read and write: tops, centres, points.
-    fn run_of(&self, device: &Device, &(first, _, mesh): &(usize, usize, &GpuMesh)) -> [wgpu::BindGroup; 3] {
-        let group = Group { first_image: first as u32, clusters: mesh.count };
-        let group = with_content(device, "group", bytemuck::bytes_of(&group), BufferUsages::UNIFORM);
-        let common = [&self.frame, &group, &mesh.clusters, &mesh.vertices];
-        let common = common.into_iter().enumerate().map(|(i, buffer)| (i as u32, buffer));
-        let all = common.chain([(5, &self.presses), (6, &self.tops)]);
-        let drawn = |into| all.clone().chain([(4, &mesh.triangles), (7, into)]);
-        let bound = |stage: usize, all: Vec<(u32, &wgpu::Buffer)>| {
-            let all = all.into_iter().map(|(i, buffer)| (i, buffer.as_entire_binding()));
-            bind_at(device, &self.raster[stage], all)
-        };
-        let points = drawn(&self.points).chain([(8, &self.steps), (9, &self.stepped)]);
-        [
-            bound(0, all.clone().collect()),
-            bound(1, drawn(&self.heights).collect()),
-            bound(2, points.collect()),
-        ]
     }
 
     /// Adds the copy of a batch's images, then outcomes, to the ring's buffer.

@@ -10,6 +10,16 @@ use crate::shadow::FlatShadow;
 use gripgen_twin::Gel;
 use gripgen_twin::config::GelModel;
 
+/// What has no twin on the device.
+pub(super) fn missing(sensor: &Sensor, gel: &Gel) -> Option<&'static str> {
+    match gel.model {
+        GelModel::Elastic => Some("an elastic gel"),
+        // Markers on a gel of unknown modulus stay where they are.
+        _ if sensor.markers.is_some() && gel.elastic.is_some() => Some("markers"),
+        _ => None,
+    }
+}
+
 /// The colours of a sensor for the device.
 pub(super) struct Colours {
     pub(super) shade: Shade,
@@ -27,11 +37,8 @@ pub(super) struct Colours {
 
 impl Colours {
     pub(super) fn new(sensor: &Sensor, gel: &Gel) -> Result<Self, GpuError> {
-        if gel.model == GelModel::Elastic {
-            return Err(GpuError::Unsupported { what: "an elastic gel" });
-        }
-        if sensor.markers.is_some() && gel.elastic.is_some() {
-            return Err(GpuError::Unsupported { what: "markers" });
+        if let Some(what) = missing(sensor, gel) {
+            return Err(GpuError::Unsupported { what });
         }
         let shadows = sensor.shadow.as_ref().map(|shadow| shadow.flat());
         let rest = sensor.rest.concat();
@@ -46,7 +53,9 @@ impl Colours {
         };
         let colours = match &sensor.colour {
             ColourModel::Lambert(lambert) => {
-                Self { coefficients: lambert.coefficients().iter().map(|&c| c as f32).collect(), ..plain }
+                let (c, each) = (lambert.coefficients(), lambert.coefficients().len() / 3);
+                let together = |k: usize| [c[k] as f32, c[each + k] as f32, c[2 * each + k] as f32, 0.0];
+                Self { coefficients: (0..each).flat_map(together).collect(), ..plain }
             }
             ColourModel::Taxim(table) => {
                 let (slopes, directions) = table.borders();

@@ -10,6 +10,8 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Debug, Clone)]
 pub(super) struct Stage {
     pub(super) pipeline: wgpu::ComputePipeline,
+    /// The stage of the pipeline that it is part of.
+    pub(super) name: &'static str,
     /// How a blur shares the image.
     pub(super) shape: Option<BlurShape>,
 }
@@ -26,6 +28,21 @@ enum Key {
     ShadowRays(bool),
     ShadowMerge(Shade, bool, Ceiling),
     ShadowBlur,
+}
+
+impl Key {
+    fn stage(self) -> &'static str {
+        match self {
+            Key::RasterTop | Key::RasterFill(Sampling::Centres) => "raster",
+            Key::RasterFill(Sampling::Points) => "raster of points",
+            Key::Steps => "steps",
+            Key::Indent(_) => "indent",
+            Key::Blur(_) => "deform",
+            Key::Around(_) => "surroundings",
+            Key::Image(..) => "shade and noise",
+            Key::ShadowRays(_) | Key::ShadowMerge(..) | Key::ShadowBlur => "shadow",
+        }
+    }
 }
 
 /// All pipelines of a renderer.
@@ -56,7 +73,9 @@ impl Pipelines {
     }
 
     pub(super) fn indent(&self, device: &Device, sampling: Sampling) -> Result<Stage, GpuError> {
-        let source = || Ok((source::indent(self.variant, sampling), None));
+        let most = device.device.limits().max_compute_invocations_per_workgroup;
+        let threads = if self.variant == Variant::Tile { most.clamp(256, 1024) } else { 256 };
+        let source = || Ok((source::indent(self.variant, sampling, threads), None));
         self.get(device, Key::Indent(sampling), "main", source)
     }
 
@@ -119,10 +138,16 @@ impl Pipelines {
         }
         let label = format!("{key:?}");
         let (source, shape) = source()?;
-        let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(&label),
             source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
+        };
+        // Counters that end loops cost a quarter of all images: no loop is unrolled beside them. Bounds stay checked.
+        let checks =
+            wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };
+        // SAFETY: the sources are ours and have no loop without an end: each counts a whole number towards a bound, halves an
+        // interval, or ends after MAX_STEPS.
+        let module = unsafe { device.device.create_shader_module_trusted(descriptor, checks) };
         let pipeline = device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(&label),
             layout: None,
@@ -132,7 +157,7 @@ impl Pipelines {
             cache: None,
         });
         device.check()?;
-        let stage = Stage { pipeline, shape };
+        let stage = Stage { pipeline, name: key.stage(), shape };
         built.insert(key, stage.clone());
         Ok(stage)
     }

@@ -152,8 +152,10 @@ pub(super) enum Sampling {
 
 /// Stage `raster`: entry points `top` and `fill`.
 pub(super) fn raster(sampling: Sampling) -> String {
-    let (sub, steps, store, stepped) = match sampling {
-        Sampling::Centres => ("1", "", "atomicMax(&heights[start + u32(x)], ordered(h));", ""),
+    let (sub, steps, store, wanted, row, column) = match sampling {
+        Sampling::Centres => {
+            ("1", "", "atomicMax(&heights[start + u32(x)], ordered(h));", "return true;", "0xffffffffu", "")
+        }
         Sampling::Points => (
             "3",
             "@group(0) @binding(8) var<storage, read> steps: array<f32>;\n\
@@ -161,14 +163,29 @@ pub(super) fn raster(sampling: Sampling) -> String {
             "let pixel = start + u32(x) / 3u;\n        \
              if steps[pixel] > 0.0 {\n            \
              atomicMax(&heights[9u * pixel + 3u * (u32(row) % 3u) + u32(x) % 3u], ordered(h));\n        }",
-            " && stepped[image] != 0u",
+            "let tile = tile_bits(frame);\n    \
+             let size = vec2<i32>(i32(frame.width_px), i32(frame.height_px)) - 1;\n    \
+             let low = vec2<u32>(clamp(vec2<i32>(left, top), vec2<i32>(), size)) >> vec2<u32>(tile);\n    \
+             let high = vec2<u32>(clamp(vec2<i32>(right, bottom), vec2<i32>(), size)) >> vec2<u32>(tile);\n    \
+             let columns = (0xffffffffu >> (31u - high.x)) & (0xffffffffu << low.x);\n    \
+             var found = 0u;\n    \
+             for (var y = low.y; y <= high.y; y++) {\n        \
+             found |= stepped[TILES * image + y];\n    }\n    \
+             return (found & columns) != 0u;",
+            "stepped[TILES * image + ((u32(row) / 3u) >> tile_bits(frame))]",
+            "let tile = (u32(x) / 3u) >> tile_bits(frame);\n        \
+             if (tiles & (1u << tile)) == 0u {\n            \
+             x = i32(3u * ((tile + 1u) << tile_bits(frame))) - 1;\n            \
+             continue;\n        }",
         ),
     };
     common(include_str!("../../shaders/raster.wgsl"))
         .replace("/*SUB*/", sub)
         .replace("/*STEPS*/", steps)
         .replace("/*STORE*/", store)
-        .replace("/*STEPPED*/", stepped)
+        .replace("/*WANTED*/", wanted)
+        .replace("/*ROW*/", row)
+        .replace("/*COLUMN*/", column)
 }
 
 /// The pixels beside a step.
@@ -177,7 +194,7 @@ pub(super) fn steps(variant: Variant) -> String {
 }
 
 /// Stage `indent`.
-pub(super) fn indent(variant: Variant, sampling: Sampling) -> String {
+pub(super) fn indent(variant: Variant, sampling: Sampling, threads: u32) -> String {
     let (second, steps, points, again) = match sampling {
         Sampling::Centres => ("false", "", "", ""),
         Sampling::Points => (
@@ -194,11 +211,15 @@ pub(super) fn indent(variant: Variant, sampling: Sampling) -> String {
             "let before = outcomes[image];\n        \
              newton.press = before.press_px;\n        \
              newton.available = before.available_px3;\n        \
-             if before.status != 0u || stepped[image] == 0u {\n            newton.running = 0u;\n        }",
+             var found = 0u;\n        \
+             for (var row = 0u; row < TILES; row++) {\n            \
+             found |= stepped[TILES * image + row];\n        }\n        \
+             if before.status != 0u || found == 0u {\n            newton.running = 0u;\n        }",
         ),
     };
     common(include_str!("../../shaders/indent.wgsl"))
         .replace("//#PLANES", &writable(variant, "contact", 4))
+        .replace("/*THREADS*/", &threads.to_string())
         .replace("/*SECOND*/", second)
         .replace("/*STEPS*/", steps)
         .replace("/*POINTS*/", points)

@@ -44,7 +44,7 @@ fn every_stage_validates() {
     validate("blur of shadows", &source::shadow_blur());
     for variant in VARIANTS {
         for sampling in [Sampling::Centres, Sampling::Points] {
-            let indent = source::indent(variant, sampling);
+            let indent = source::indent(variant, sampling, 256);
             no_markers(&indent);
             assert!(workgroup_bytes(&validate("indent", &indent)) <= 16_384);
         }
