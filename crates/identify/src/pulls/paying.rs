@@ -45,7 +45,8 @@ pub(super) fn paying(
             share([&errors[0], &errors[1]].map(|e| root_mean_square(e.iter().map(|(i, e)| e / sd_n[*i]))));
         let mut gain = plain.max(weighed);
         let traces = !context.observations.is_empty();
-        if traces && search.candidates[accepted.effects[place].0].acts_on_signals() {
+        let signals = search.candidates[accepted.effects[place].0].acts_on_signals();
+        if traces && signals {
             // A zero that wanders without the effect is no witness for it.
             let all: Vec<usize> = (0..context.data.len()).collect();
             let readings = [&fewer, &accepted.fitted].map(|f| context.trace_residuals(&f.model, &all));
@@ -53,7 +54,9 @@ pub(super) fn paying(
             gain = gain.max(share(readings.map(|r| root_mean_square(r.widened(widening).into_iter()))));
         }
         let mut nothing = neutral(&accepted.fitted, spec);
+        // An effect on readings whose size is open may be friction that changes with the rate.
         if nothing.is_some()
+            && !signals
             && gain >= PAYS
             && let Some(found) = ended(context, &accepted.fitted, spec, &search.rows)
         {
