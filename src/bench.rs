@@ -24,7 +24,7 @@ const POSES: usize = 64;
 /// Segments of the shaft: 50 000 triangles.
 const SEGMENTS: usize = 1924;
 
-/// Images of a batch on a graphics processor: 3 GB of its memory.
+/// Images of a batch on a graphics processor: some 3 GB of its memory.
 const GPU_BATCH: usize = 512;
 
 /// How often each stage is made where its time is measured.

@@ -130,11 +130,11 @@ impl Gpu {
         }
     }
 
+    /// Why nobody answers. From then on it is the fault of the device, so that what asks for it stops.
     fn gone(&self) -> GpuError {
-        self.fault().unwrap_or_else(|| GpuError::Device {
-            adapter: self.adapter.to_string(),
-            problem: "its thread has ended".into(),
-        })
+        let ended =
+            || GpuError::Device { adapter: self.adapter.to_string(), problem: "its thread has ended".into() };
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(ended).clone()
     }
 }
 
@@ -236,10 +236,10 @@ impl Device {
             noise_key: job.noise_key,
         };
         let requests: Vec<GpuRequest<'_>> = batch.iter().map(|w| request(&w.job)).collect();
-        let size_px = first.sensor.grid;
+        let grid = first.sensor.grid;
         let taken = |image: GpuImage<'_>| TactileImage {
-            width_px: size_px.width_px as u32,
-            height_px: size_px.height_px as u32,
+            width_px: grid.width_px as u32,
+            height_px: grid.height_px as u32,
             rgb: image.rgb.to_vec(),
         };
         renderer.render(sensor, &requests, |place, image| {

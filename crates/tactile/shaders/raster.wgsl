@@ -224,7 +224,7 @@ fn above(a: Corner, b: Corner) -> bool {
     return a.y < b.y || (a.y == b.y && a.fy <= b.fy);
 }
 
-// A triangle on the rows `first`, `first + step`, ..., cut to its own. Returns whether it is more work than
+// A triangle on every `step`th of its rows from `offset` on. Returns whether it is more work than
 // `limit`, and then does nothing.
 fn fill_triangle(image: u32, packed: u32, offset: u32, step: u32, reference: i32, floor_px: f32, limit: i32) -> bool {
     let a = corners[packed & 0xffu];

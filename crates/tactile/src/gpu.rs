@@ -109,8 +109,8 @@ impl GpuError {
     }
 }
 
-/// Whether a device makes the images of a sensor with its gel. Those of an elastic gel and of markers that move are the processor's:
-/// it solves the contact for the labels in any case, and most of such an image is in that solution.
+/// Whether a device makes the images of a sensor with its gel. Those of an elastic gel are the processor's, which solves the contact
+/// for the labels in any case; so are those of markers that move, which have no twin here yet.
 pub fn makes(sensor: &Sensor, gel: &Gel) -> bool {
     colour::missing(sensor, gel).is_none()
 }
@@ -183,7 +183,7 @@ impl GpuRenderer {
     }
 
     /// The same for batches of `most` images, or what the device binds; software adapters have their own number. An image of
-    /// 320 x 240 pixels takes 6 MB, 8 with shadows.
+    /// 320 x 240 pixels takes some 5 MB, 7 with shadows.
     pub fn sensor_for(&self, sensor: &Sensor, gel: &Gel, most: usize) -> Result<GpuSensor, GpuError> {
         GpuSensor::new(&self.device, &self.pipelines, sensor, gel, most.max(1))
     }

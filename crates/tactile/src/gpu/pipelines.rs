@@ -74,7 +74,8 @@ impl Pipelines {
 
     pub(super) fn indent(&self, device: &Device, sampling: Sampling) -> Result<Stage, GpuError> {
         let most = device.device.limits().max_compute_invocations_per_workgroup;
-        let threads = if self.variant == Variant::Tile { most.clamp(256, 1024) } else { 256 };
+        // A power of two, as its sums want.
+        let threads = if self.variant == Variant::Tile && most >= 1024 { 1024 } else { 256 };
         let source = || Ok((source::indent(self.variant, sampling, threads), None));
         self.get(device, Key::Indent(sampling), "main", source)
     }
@@ -142,7 +143,7 @@ impl Pipelines {
             label: Some(&label),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         };
-        // Counters that end loops cost a quarter of all images: no loop is unrolled beside them. Bounds stay checked.
+        // Counters that end loops cost a fifth of the images. Bounds stay checked.
         let checks =
             wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };
         // SAFETY: the sources are ours and have no loop without an end: each counts a whole number towards a bound, halves an

@@ -1,11 +1,10 @@
-//! WGSL sources: files put together, and the blurs with their weights written out.
+//! WGSL sources: files put together, with what a variant or a stage writes in.
 
-use crate::convolve::Follow;
-use crate::deform::gaussian;
+mod blur;
+
+pub(super) use blur::{Blur, BlurShape, blur};
+
 use std::fmt::Write;
-
-/// Threads of a workgroup of the tiled blur.
-const TILE_THREADS: u32 = 256;
 
 const GRADIENT: &str = include_str!("../../shaders/gradient.wgsl");
 
@@ -81,26 +80,6 @@ impl Step {
             Step::Fine => "fine",
         }
     }
-}
-
-/// How the threads of a blur share the image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct BlurShape {
-    /// Values along the blurred axis that a workgroup makes.
-    pub(super) span: u32,
-    /// Lines that it makes.
-    pub(super) lines: u32,
-}
-
-/// One blur along one axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct Blur {
-    pub(super) kernel_px: u32,
-    pub(super) axis: Axis,
-    /// Whether and how the core of the contact gets its height back afterwards.
-    pub(super) restore: Option<Follow>,
-    /// Whether the gel is not flat at rest, so that a blur moves it: added to the core, or to all after the last blur.
-    pub(super) lifted: bool,
 }
 
 fn common(body: &str) -> String {
@@ -332,129 +311,4 @@ pub(super) fn around(variant: Variant, step: Step) -> String {
         .replace("/*DIFFERENCES*/", &differences)
         .replace("//#PLANES", &readable(variant, "surface", 4))
         + include_str!("../../shaders/shared/field.wgsl")
-}
-
-/// Lanes and values per thread of the tiled blur, as large as the workgroup memory allows; `None` if none does.
-fn tile_of(kernel_px: u32, workgroup_bytes: u32) -> Option<(u32, u32)> {
-    [(32, 8), (32, 4), (16, 4), (16, 2), (8, 2), (8, 1), (4, 1)].into_iter().find(|&(lanes, run)| {
-        let length = TILE_THREADS / lanes * run + kernel_px - 1;
-        length * (lanes + 1) * 4 <= workgroup_bytes
-    })
-}
-
-/// Stage `deform`, one blur; `None` if the workgroup memory holds no tile of it.
-pub(super) fn blur(variant: Variant, blur: Blur, workgroup_bytes: u32) -> Option<(String, BlurShape)> {
-    let weights = gaussian(blur.kernel_px);
-    let planes = [
-        readable(variant, "source", 2),
-        writable(variant, "blurred", 3),
-        if blur.restore.is_some() { readable(variant, "contact", 4) } else { String::new() },
-        match blur.lifted {
-            true => "@group(0) @binding(5) var<storage, read> lift: array<f32>;\n".into(),
-            false => String::new(),
-        },
-    ]
-    .concat();
-    let (size, lines, from_x, from_y) = match blur.axis {
-        Axis::X => ("i32(frame.width_px)", "i32(frame.height_px)", "u32(place)", "u32(line)"),
-        Axis::Y => ("i32(frame.height_px)", "i32(frame.width_px)", "u32(line)", "u32(place)"),
-    };
-    let mut restore = String::new();
-    if blur.lifted {
-        // On a gel that is not flat: how far the blurs so far have lifted or lowered it.
-        let _ = writeln!(restore, "let lift_px = lift[{from_y} * frame.width_px + {from_x}];");
-    }
-    restore += &match (blur.restore, blur.lifted) {
-        (Some(follow), lifted) => {
-            let core = if lifted { "depth + lift_px" } else { "depth" };
-            let core = match follow {
-                Follow::Exactly => core.into(),
-                Follow::AtLeast => format!("max(value, {core})"),
-            };
-            format!(
-                "let depth = load_contact({from_x}, {from_y}, image);\n            \
-                 if depth > outcomes[image].core_px {{ value = {core}; }}"
-            )
-        }
-        // Keeps the binding in use, so that all blurs have the same layout.
-        (None, lifted) => {
-            format!("value += 0.0 * outcomes[image].core_px{};", if lifted { " + lift_px" } else { "" })
-        }
-    };
-    let (source, run, shape) = match variant {
-        Variant::Texture { run } => {
-            // Threads of a group lie side by side along a row of pixels.
-            let (workgroup, lines) = match blur.axis {
-                Axis::X => ("4, 16, 1", 16),
-                Axis::Y => ("64, 1, 1", 64),
-            };
-            let (axis, across, span) = match blur.axis {
-                Axis::X => ("x", "y", 4 * run),
-                Axis::Y => ("y", "x", run),
-            };
-            let source = include_str!("../../shaders/deform_texture.wgsl")
-                .replace("/*WORKGROUP*/", workgroup)
-                .replace("/*AXIS*/", axis)
-                .replace("/*ACROSS*/", across);
-            (source, run, BlurShape { span, lines })
-        }
-        Variant::Tile => {
-            let (lanes, run) = tile_of(blur.kernel_px, workgroup_bytes)?;
-            let (load, store) = match blur.axis {
-                Axis::X => (("k % LENGTH", "k / LENGTH"), ("k % SPAN", "k / SPAN")),
-                Axis::Y => (("k / LANES", "k % LANES"), ("k / LANES", "k % LANES")),
-            };
-            let source = include_str!("../../shaders/deform_tile.wgsl")
-                .replace("/*LANES*/", &lanes.to_string())
-                .replace("/*LOAD_RUN*/", load.0)
-                .replace("/*LOAD_LANE*/", load.1)
-                .replace("/*STORE_RUN*/", store.0)
-                .replace("/*STORE_LANE*/", store.1);
-            (source, run, BlurShape { span: TILE_THREADS / lanes * run, lines: lanes })
-        }
-    };
-    let source = common(&source)
-        .replace("/*RUN*/", &run.to_string())
-        .replace("/*HALF*/", &(weights.len() / 2).to_string())
-        .replace("//#PLANES", &planes)
-        .replace("/*RESTORE*/", &restore)
-        .replace("/*SIZE*/", size)
-        .replace("/*LINES*/", lines)
-        .replace("/*FROM_X*/", from_x)
-        .replace("/*FROM_Y*/", from_y)
-        .replace("/*SUMS*/", &sums(&weights, run, variant))
-        .replace("/*FINISH*/", &finish(run, variant));
-    Some((source, shape))
-}
-
-/// The weighted sums of `run` neighbouring values: each input is read once.
-fn sums(weights: &[f32], run: u32, variant: Variant) -> String {
-    let run = run as usize;
-    let mut text = String::new();
-    for r in 0..run {
-        let _ = writeln!(text, "var s{r} = 0.0;");
-    }
-    for i in 0..weights.len() + run - 1 {
-        let value = match variant {
-            Variant::Texture { .. } => format!("at(first + {i} - HALF, line, image)"),
-            Variant::Tile => format!("tile[base + {i} * PITCH]"),
-        };
-        let _ = writeln!(text, "    let v{i} = {value};");
-        for r in 0..run {
-            if let Some(weight) = i.checked_sub(r).and_then(|k| weights.get(k)) {
-                let _ = writeln!(text, "    s{r} = fma({weight:e}f, v{i}, s{r});");
-            }
-        }
-    }
-    text
-}
-
-fn finish(run: u32, variant: Variant) -> String {
-    (0..run).fold(String::new(), |mut text, r| {
-        let _ = match variant {
-            Variant::Texture { .. } => writeln!(text, "    finish(first + {r}, line, image, s{r});"),
-            Variant::Tile => writeln!(text, "    tile[base + {r} * PITCH] = s{r};"),
-        };
-        text
-    })
 }

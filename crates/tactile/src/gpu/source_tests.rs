@@ -44,9 +44,11 @@ fn every_stage_validates() {
     validate("blur of shadows", &source::shadow_blur());
     for variant in VARIANTS {
         for sampling in [Sampling::Centres, Sampling::Points] {
-            let indent = source::indent(variant, sampling, 256);
-            no_markers(&indent);
-            assert!(workgroup_bytes(&validate("indent", &indent)) <= 16_384);
+            for threads in [256, 1024] {
+                let indent = source::indent(variant, sampling, threads);
+                no_markers(&indent);
+                assert!(workgroup_bytes(&validate("indent", &indent)) <= 16_384);
+            }
         }
         validate("steps", &source::steps(variant));
         for (shade, domed) in [
