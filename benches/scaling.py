@@ -1,4 +1,4 @@
-"""What a sweep costs: against samples, threads, storage, frames of the pull, triangles of the part, and mechanics.
+"""What a sweep costs: against samples, threads, storage, size of the images, frames of the pull, triangles of the part, and mechanics.
 
     python benches/scaling.py --gripgen target/release/gripgen --work /tmp/scaling
 
@@ -13,9 +13,11 @@ import shutil
 import struct
 import subprocess
 import time
+import zipfile
 from pathlib import Path
 
 QUICKSTART = "asset:configs/quickstart.toml"
+SENSOR = Path(__file__).parent.parent / "assets/sensors/gelsight_r15/sensor.npz"
 
 
 def sphere(path, rings):
@@ -81,6 +83,41 @@ def own_part(work, name, rings):
     return triangles
 
 
+def arrays(path):
+    """The members of an npz file, each as its header and its bytes."""
+    with zipfile.ZipFile(path) as file:
+        for name in file.namelist():
+            content = file.read(name)
+            end = 10 + struct.unpack_from("<H", content, 8)[0]
+            yield name, content[10:end].decode(), content[end:]
+
+
+def sensor_of_width(work, width):
+    """The shipped sensor with pixels of another size, the same millimetres in view; returns its file."""
+    path = work / f"sensor-{width}.npz"
+    with zipfile.ZipFile(path, "w") as file:
+        for name, header, data in arrays(SENSOR):
+            if name == "mm_per_px.npy":
+                data = struct.pack("<d", struct.unpack("<d", data)[0] * 320 / width)
+            if name == "rest_rgb.npy":
+                rows = [data[y * 240 // (width * 3 // 4) * 960 :][:960] for y in range(width * 3 // 4)]
+                data = b"".join(row[x * 320 // width * 3 :][:3] for row in rows for x in range(width))
+                header = header.replace("(240, 320, 3", f"({width * 3 // 4}, {width}, 3")
+            file.writestr(name, b"\x93NUMPY\x01\0" + struct.pack("<H", len(header)) + header.encode() + data)
+    return path
+
+
+def of_width(work, width):
+    """Keys of a sweep with images of that width: the sensor, and blurs over the same millimetres."""
+    kernels = [2 * round((k - 1) / 2 * width / 320) + 1 for k in (71, 51, 21, 11, 5)]
+    sensor = sensor_of_width(work, width).resolve()
+    keys = {}
+    for jaw in ("left", "right"):
+        keys[f"optics.{jaw}.sensor"] = f'"{sensor}"'
+        keys[f"gel.{jaw}.kernels_px"] = kernels
+    return keys
+
+
 def main():
     """All tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -102,6 +139,8 @@ def main():
     rows = [(f"{s}, {c}" if s == "clean" else s, 500, *bench.sweep(samples=500, shard_samples=50, images=f'{{storage="{s}", compression="{c}"}}'))
             for s, c in [("png", "fast"), ("clean", "fast"), ("clean", "small"), ("raw", "fast"), ("none", "fast")]]
     table("images stored as", rows)
+    rows = [(w, 200, *bench.sweep(samples=200, shard_samples=25, **of_width(options.work, w))) for w in (160, 320, 640, 1280)]
+    table("pixels across an image (4 : 3)", rows)
     rows = [(f, 100, *bench.sweep(samples=100, shard_samples=25, images=f"{{during_pull={{frames={f}}}}}")) for f in (4, 16, 64)]
     table("frames of the pull", rows)
     rows = []

@@ -9,6 +9,7 @@ mod block;
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
 use block::Block;
+use bytemuck::{Pod, Zeroable};
 
 /// Columns and rows are handled in groups of this, the widest vector.
 const GROUP: usize = 16;
@@ -101,6 +102,11 @@ pub(crate) fn raise(most: &mut [f32], values: &[f32]) {
     }
 }
 
+/// A cache line of values, which is the widest vector. Where vectors lie across two lines the blur takes a third longer.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Line([f32; GROUP]);
+
 /// An image with spare rows before and after, and rows that are whole vectors.
 ///
 /// It is memory to be used again: what it holds outside the area that was last written has no meaning.
@@ -110,7 +116,7 @@ pub(crate) struct Sheet {
     pub(crate) height: usize,
     stride: usize,
     margin: usize,
-    values: Vec<f32>,
+    lines: Vec<Line>,
 }
 
 impl Sheet {
@@ -122,9 +128,18 @@ impl Sheet {
         self.stride = (width.div_ceil(GROUP) | 1) * GROUP;
         self.margin = half + SPARE_ROWS;
         let rows = height.next_multiple_of(GROUP) + 2 * self.margin;
-        if self.values.len() < self.stride * rows {
-            self.values.resize(self.stride * rows, 0.0);
+        let lines = self.stride / GROUP * rows;
+        if self.lines.len() < lines {
+            self.lines.resize(lines, Line::default());
         }
+    }
+
+    fn values(&self) -> &[f32] {
+        bytemuck::cast_slice(&self.lines)
+    }
+
+    fn values_mut(&mut self) -> &mut [f32] {
+        bytemuck::cast_slice_mut(&mut self.lines)
     }
 
     /// Offset of pixel 0 of row `y`, which may lie in the margin.
@@ -134,13 +149,13 @@ impl Sheet {
 
     /// Row `y` with what pads it.
     pub(crate) fn row(&self, y: usize) -> &[f32] {
-        &self.values[self.offset(y as isize)..][..self.stride]
+        &self.values()[self.offset(y as isize)..][..self.stride]
     }
 
     /// Row `y` with what pads it.
     pub(crate) fn row_mut(&mut self, y: usize) -> &mut [f32] {
-        let at = self.offset(y as isize);
-        &mut self.values[at..][..self.stride]
+        let (at, stride) = (self.offset(y as isize), self.stride);
+        &mut self.values_mut()[at..][..stride]
     }
 
     /// The values of an area, 0 around it.
@@ -186,17 +201,13 @@ impl Kernel for Transpose<'_> {
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
         let (from, to, area) = (self.from, self.to, self.area);
+        let (input, output) = (from.values().as_ptr(), to.values_mut().as_mut_ptr());
         for x in (area.x.0..area.x.1).step_by(8) {
             for y in (area.y.0..area.y.1).step_by(8) {
                 let (source, target) = (from.offset(y as isize) + x, to.offset(x as isize) + y);
                 // SAFETY: areas in groups lie within stride and spare rows of both sheets.
                 unsafe {
-                    L::transpose8(
-                        from.values.as_ptr().add(source),
-                        from.stride,
-                        to.values.as_mut_ptr().add(target),
-                        to.stride,
-                    );
+                    L::transpose8(input.add(source), from.stride, output.add(target), to.stride);
                 }
             }
         }
@@ -348,10 +359,10 @@ impl Surface {
             }
             let to = sheet.offset(row);
             if !is_live {
-                sheet.values[to + columns.0..to + columns.1].fill(0.0);
+                sheet.values_mut()[to + columns.0..to + columns.1].fill(0.0);
             } else if source as isize != row {
                 let from = sheet.offset(source as isize);
-                sheet.values.copy_within(from + columns.0..from + columns.1, to + columns.0);
+                sheet.values_mut().copy_within(from + columns.0..from + columns.1, to + columns.0);
             }
         }
     }
@@ -407,13 +418,15 @@ impl Columns<'_> {
         let mut ranges = std::mem::take(self.ranges);
         ranges.clear();
         ranges.extend(blocks.clone().map(|first| self.range(first, ROWS)));
+        let input = self.input.values().as_ptr();
+        let output = self.output.values_mut().as_mut_ptr();
         for x in (self.columns.0..self.columns.1).step_by(L::COUNT) {
             for (first, &range) in blocks.clone().zip(&ranges) {
                 // SAFETY: the rows within reach of the block lie in the sheet, margins included, and columns in
                 // groups lie within its stride.
                 unsafe {
                     let block = Block {
-                        at: self.input.values.as_ptr().add(self.input.offset(first as isize) + x),
+                        at: input.add(self.input.offset(first as isize) + x),
                         stride: self.input.stride,
                         weights: self.weights,
                         range,
@@ -423,10 +436,7 @@ impl Columns<'_> {
                     for (i, &sum) in sums.iter().enumerate().take(rows) {
                         let y = first + i;
                         let value = self.restored::<L>(x, y, sum);
-                        L::store(
-                            self.output.values.as_mut_ptr().add(self.output.offset(y as isize) + x),
-                            value,
-                        );
+                        L::store(output.add(self.output.offset(y as isize) + x), value);
                     }
                 }
             }
@@ -444,9 +454,9 @@ impl Columns<'_> {
         // SAFETY: the sheets of `restore` have the size of this one and are valid in groups.
         unsafe {
             let at = restore.core.offset(y as isize) + x;
-            let mut core = L::load(restore.core.values.as_ptr().add(at));
+            let mut core = L::load(restore.core.values().as_ptr().add(at));
             if let Some(lift) = restore.lift {
-                core = L::add(core, L::load(lift.values.as_ptr().add(lift.offset(y as isize) + x)));
+                core = L::add(core, L::load(lift.values().as_ptr().add(lift.offset(y as isize) + x)));
             }
             match restore.follow {
                 Follow::Exactly => L::first_unless_nan(core, sum),
