@@ -107,6 +107,8 @@ pub fn simulate_campaign(
             sha256: sha256_hex(text.as_bytes()),
         },
         notes,
+        warnings: Vec::new(),
+        implausible: None,
     })
 }
 

@@ -1,6 +1,7 @@
 //! Files to start from: commented configurations, and those for a part of one's own.
 
 mod benchmark;
+mod doubts;
 pub(crate) mod drawing;
 mod places;
 mod pose;
@@ -14,12 +15,14 @@ use crate::library::{Library, LibraryError};
 use crate::location::Location;
 use crate::project::{BASELINE_TWIN, load_twin_document};
 pub use benchmark::{BenchmarkStarter, benchmark_starter};
-use gripgen_physics::PartShape;
+use gripgen_physics::{PartShape, Surface};
+use gripgen_tactile::ClusteredMesh;
 use gripgen_twin::{Jaw, MeshError, Part, TriMesh, Twin};
 pub(crate) use propose::Proposed;
 use propose::Search;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 pub use trial::Varied;
 pub(crate) use trial::{ANGLES_DEG, HIGHEST_N, Trial, TrialCell};
 
@@ -74,6 +77,8 @@ pub struct PartStarter {
     pub varied: Varied,
     /// What is to be said of the mesh, a sentence each.
     pub mesh_words: Vec<String>,
+    /// What is doubtful of each grip, a sentence each.
+    pub doubts: Vec<Vec<String>>,
     /// Size of the part and the grips found, a line each.
     pub summary: String,
 }
@@ -142,6 +147,21 @@ pub enum NoGrip {
     },
 }
 
+impl NoGrip {
+    /// What to do about it, of a part whose size is right.
+    fn hint(&self) -> &'static str {
+        match self {
+            NoGrip::TooWide { .. } | NoGrip::Beyond { .. } => {
+                "grips are looked for with the shipped gripper; for a wider one set gripper.opening_mm in a twin of your own \
+                 (`gripgen init FOLDER`) and write the grips into it"
+            }
+            _ => {
+                "write a grip that you know to hold into a twin of your own: `gripgen init FOLDER`, [[parts.NAME.grips]]"
+            }
+        }
+    }
+}
+
 /// Why there is nothing to start from.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -189,11 +209,17 @@ impl InitError {
             InitError::Open { .. } => {
                 return "close its holes (Meshlab, Blender), or go on with --accept-open-mesh".into();
             }
+            InitError::Read(_) => return "a path is relative to where you are".into(),
             _ => return "export the part as STL, OBJ, PLY or GLB".into(),
         };
-        unit_guess(sizes_mm).unwrap_or_else(|| {
-            "--scale-mm-per-unit 1000 reads a file in metres, 25.4 one in inches".to_string()
-        })
+        if let Some(guess) = unit_guess(sizes_mm) {
+            return guess;
+        }
+        match self {
+            // Its size is that of a part: the unit is right.
+            InitError::NoGrip { source, .. } => source.hint().into(),
+            _ => "--scale-mm-per-unit 1000 reads a file in metres, 25.4 one in inches".into(),
+        }
     }
 }
 
@@ -290,11 +316,19 @@ pub(crate) fn search(path: &Path, options: PartOptions, twin: Twin) -> Result<Se
     for jaw in Jaw::BOTH {
         library.check_sensor(&twin.optics[jaw], &twin.gel[jaw])?;
     }
+    // Where lines meet the part, and its middle of mass, are those of faces that look outwards. Contacts and images are the same.
+    let (surface, clustered) = if look.faces_outwards() {
+        (library.surface(&part)?, library.clustered_mesh(&part)?)
+    } else {
+        let outwards = mesh.faced_outwards();
+        let clustered = Arc::new(ClusteredMesh::new(&outwards));
+        (Arc::new(Surface::new(Arc::new(outwards))), clustered)
+    };
     let search = Search {
         twin: &twin,
         library: &library,
-        surface: library.surface(&part)?,
-        mesh: library.clustered_mesh(&part)?,
+        surface,
+        mesh: clustered,
         part,
         closed: look.is_closed(),
         threads: options.threads,
@@ -348,7 +382,8 @@ pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<
         files.push(StarterFile { name: mesh_name, bytes });
     }
     let summary = text::summary(&name, &size, &mesh_words, &proposed);
-    Ok(PartStarter { files, grips: proposed.grips, varied: proposed.varied, mesh_words, summary })
+    let Proposed { grips, varied, doubts, .. } = proposed;
+    Ok(PartStarter { files, grips, varied, mesh_words, doubts, summary })
 }
 
 /// The rig that grips are proposed for.

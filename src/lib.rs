@@ -90,6 +90,7 @@ mod sweep;
 mod try_part;
 mod twin_edits;
 mod twin_project;
+mod unvaried;
 mod version;
 mod view;
 
@@ -128,7 +129,8 @@ pub use library::{Library, LibraryError};
 pub use live::live_page;
 pub use location::{Location, ReadFileError};
 pub use measured::{
-    LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls, load_pulls_of, load_pulls_with,
+    ImplausibleLabels, LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls, load_pulls_of,
+    load_pulls_with,
 };
 pub use mesh_file::MeshFileError;
 pub use paper::{PaperError, PaperReport, paper_report};
@@ -164,5 +166,6 @@ pub use try_part::{
     FrictionRange, GripTried, Holding, TriedPart, TryOptions, TryPartError, WorksAt, try_part,
 };
 pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, edited_twin_toml, write_twin};
+pub use unvaried::{Unvaried, unvaried};
 pub use version::VERSION;
 pub use view::{ViewOptions, ViewPage, view_page};

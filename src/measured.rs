@@ -1,10 +1,13 @@
 //! Measured pulls from wherever they are: a folder with a table, a run folder, or recordings of ROS 2.
 
 mod bags;
+mod left_out;
 mod suspects;
+mod units;
 mod zero;
 
 pub use suspects::Suspects;
+pub use units::ImplausibleLabels;
 
 use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_record::{
@@ -16,6 +19,7 @@ use gripgen_twin::columns::{Column, covariate, covariates, recorded_covariates};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::{ExtraColumn, MeasuredPull, MeasuredPulls, PullTrace, Values};
+use left_out::LeftOut;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -27,6 +31,10 @@ pub struct LoadedPulls {
     pub pulls: MeasuredPulls,
     /// Remarks, one per sentence.
     pub notes: Vec<String>,
+    /// What people have to be told, asked or not: the numbers or the names of files may not be what was meant.
+    pub warnings: Vec<String>,
+    /// Labels that no gel gives: no twin is to be fitted to them.
+    pub implausible: Option<ImplausibleLabels>,
 }
 
 /// Why there are no measured pulls.
@@ -115,7 +123,7 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
         return load_run(path, suspects);
     }
     let is_bag = !path.join(PULLS_FILE).is_file() && is_rosbag(path);
-    let JudgedPulls { pulls, standing } =
+    let JudgedPulls { pulls, standing, mut warnings } =
         if is_bag { bags::judged_bags(path)? } else { read_judged_pulls(path)? };
     let mut left_out = LeftOut { rig: false, ..LeftOut::default() };
     standing.iter().for_each(|s| left_out.count(s.status));
@@ -128,6 +136,10 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
         return Err(LoadPullsError::Unusable { path: path.into(), notes: notes.join("; ") });
     }
     let mut pulls = pulls.kept(|i| keep[i]);
+    let implausible = units::implausible(path, &pulls.pulls);
+    if implausible.is_none() {
+        warnings.extend(units::warnings(path, &pulls.pulls));
+    }
     if is_bag {
         if pulls.pulls.iter().all(|pull| pull.trace.is_none()) {
             notes.push(
@@ -140,7 +152,7 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
         fewer_traces(&mut pulls.pulls, &mut notes);
     }
     notes.extend(zero::without_shift(&mut pulls));
-    Ok(LoadedPulls { pulls, notes })
+    Ok(LoadedPulls { pulls, notes, warnings, implausible })
 }
 
 /// Loads several folders as one campaign, in their order: what was measured later on the same rig. Pulls whose ids are taken get the
@@ -197,53 +209,13 @@ fn join(path: &Path, all: &mut LoadedPulls, next: LoadedPulls) -> Result<(), Loa
     mine.sha256 = sha256_hex(format!("{}{}", mine.sha256, theirs.sha256).as_bytes());
     mine.pulls.append(&mut theirs.pulls);
     all.notes.extend(next.notes);
+    all.warnings.extend(next.warnings);
+    all.implausible = all.implausible.take().or(next.implausible);
     Ok(())
 }
 
 fn same_kind(a: &ExtraColumn, b: &ExtraColumn) -> bool {
     a.name == b.name && a.values.same_kind(&b.values)
-}
-
-/// Pulls of a run that are left out, by reason.
-#[derive(Default)]
-struct LeftOut {
-    rig: bool,
-    failed: usize,
-    no_contact: usize,
-    censored: usize,
-    other_rule: usize,
-    unfinished_shards: u64,
-}
-
-impl LeftOut {
-    fn count(&mut self, status: Status) {
-        match status {
-            Status::Slipped | Status::Suspect => {}
-            Status::Censored => self.censored += 1,
-            Status::NoContact => self.no_contact += 1,
-            _ => self.failed += 1,
-        }
-    }
-
-    fn notes(&self) -> Vec<String> {
-        let counted = [
-            (self.failed, "failed"),
-            (self.no_contact, "had no contact"),
-            (self.censored, "ended before the jaws slipped"),
-            (self.other_rule, "have another tolerance or stop than the first"),
-        ];
-        let mut notes: Vec<String> = counted
-            .iter()
-            .filter(|(n, _)| *n > 0)
-            .map(|(n, what)| format!("{n} pulls were left out: they {what}"))
-            .collect();
-        match self.unfinished_shards {
-            0 => {}
-            n if self.rig => notes.push(format!("{n} pulls of the campaign are not made yet")),
-            n => notes.push(format!("{n} shards are not finished and were left out")),
-        }
-        notes
-    }
 }
 
 /// Whether a folder holds samples of a sweep.
@@ -308,7 +280,8 @@ fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     }
     notes.extend(zero::without_shift(&mut pulls));
     fewer_traces(&mut pulls.pulls, &mut notes);
-    Ok(LoadedPulls { pulls, notes })
+    // A sweep and a rig write newtons.
+    Ok(LoadedPulls { pulls, notes, warnings: Vec::new(), implausible: None })
 }
 
 /// What is known of pulls that a rig made, and samples of a sweep have not: the order in which they were made, rests

@@ -1,7 +1,6 @@
 //! A report of predicted against real presses, as one HTML file.
 
-use crate::assets;
-use crate::report::png_url;
+use crate::report::{png_url, rendered_with};
 use gripgen_record::encode_png;
 use gripgen_tactile::metrics::Score;
 use gripgen_tactile::presses::{PressComparison, PressSet};
@@ -48,6 +47,9 @@ pub fn press_report(
     let mut order: Vec<usize> = (0..comparison.each.len()).collect();
     let error = |i: usize| comparison.each[i].scores.crop400.mse;
     order.sort_by(|&a, &b| error(b).total_cmp(&error(a)));
+    // A crop ends where the frame does.
+    let (width, height) = set.presses.first().map_or((0, 0), |p| (p.image.width_px, p.image.height_px));
+    let around = |side: u32| format!("{} x {} px around the contact", side.min(width), side.min(height));
     let page = json!({
         "title": text.title,
         "summary": text.summary,
@@ -56,19 +58,14 @@ pub fn press_report(
         "map": text.map.as_ref().map(|map| json!({"image": data_url(&map.image), "text": map.text})),
         "means": [
             mean_row("whole frame", &comparison.mean.full),
-            mean_row("400 x 400 px around the contact", &comparison.mean.crop400),
-            mean_row("200 x 200 px around the contact", &comparison.mean.crop200),
-            mean_row("160 x 160 px around the contact", &comparison.mean.window),
+            mean_row(&around(400), &comparison.mean.crop400),
+            mean_row(&around(200), &comparison.mean.crop200),
+            mean_row(&around(160), &comparison.mean.window),
         ],
         "pictures": pictures(set, comparison, &order, predict),
         "presses": press_rows(set, comparison, &order),
     });
-    let mut environment = minijinja::Environment::new();
-    environment
-        .add_template("presses.html", assets::text("templates/presses.html"))
-        .expect("a template of ours parses");
-    let template = environment.get_template("presses.html").expect("it was just added");
-    template.render(page).expect("the template asks for nothing that the page lacks")
+    rendered_with("presses.html", &page)
 }
 
 fn mean_row(name: &str, score: &Score) -> Value {

@@ -13,7 +13,9 @@ use gripgen_record::{Background, RunFolder, sha256_hex};
 use gripgen_tactile::finish;
 use gripgen_tactile::gpu::{GpuError, makes};
 use gripgen_twin::config::{Backend, Compression, ConfigError, Document, ImageStorage, SweepFile};
-use gripgen_twin::{DEFAULTED_SECTIONS, Jaw, PerJaw, Posterior, RobotArm, Sweep, Twin, is_twin_key};
+use gripgen_twin::{
+    DEFAULTED_SECTIONS, Jaw, PerJaw, Posterior, RobotArm, Sweep, Twin, is_twin_key, scenario_keys,
+};
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
@@ -101,6 +103,17 @@ fn set(document: &mut Document, location: &Location, key: &str, value: &str) -> 
     Ok(())
 }
 
+/// A key of a scenario stands in `[vary]`, also where it has one value.
+fn meant_to_vary(error: ConfigError, document: &Document) -> ConfigError {
+    match scenario_keys().find(|key| *key == error.key) {
+        Some(key) if document.get(key).is_some() => ConfigError {
+            hint: Some(format!("did you mean `vary.{key}`? One value there is the same in every sample")),
+            ..error
+        },
+        _ => error,
+    }
+}
+
 /// A value with its paths as they are called from a configuration at `location`.
 fn from_shell(location: &Location, value: toml::Value) -> toml::Value {
     match value {
@@ -123,7 +136,7 @@ impl Project {
         for (key, value) in sets.iter().filter(|(key, _)| !is_twin_key(key)) {
             set(&mut document, location, key, value)?;
         }
-        let file: SweepFile = document.read()?;
+        let file: SweepFile = document.read().map_err(|e| meant_to_vary(e, &document))?;
         let twin_location = location.beside(&file.twin);
         let twin_document = load_twin_document(&twin_location, sets).map_err(|e| match e {
             LoadError::Read(e) => LoadError::from(

@@ -3,6 +3,7 @@
 mod axis;
 mod bars;
 mod comparison;
+mod doubt;
 mod histogram;
 mod page;
 mod plot;
@@ -12,6 +13,7 @@ mod sentence;
 mod tests;
 
 pub use comparison::{PageTable, comparison_page};
+pub(crate) use doubt::one_for_all;
 pub(crate) use histogram::Histogram;
 pub use page::diagnosis_page;
 pub(crate) use page::{clean, figure, rendered_with};
@@ -83,7 +85,7 @@ pub struct EvidenceRow {
     pub heldout_error: f64,
     /// Fitted values, for people.
     pub values: String,
-    /// What became of it: "named", "tied with wear", "worse", "contradicted by the traces".
+    /// What became of it: "named", "tied with wear", "worse", "as good on held-out pulls", "contradicted by the traces".
     pub fate: String,
 }
 
@@ -139,9 +141,13 @@ pub struct Diagnosed {
 }
 
 impl Diagnosed {
-    /// An answer, with its sentence for a technician.
+    /// An answer, with its sentences for a technician: what was found, and that its name is not sure where it is not.
     pub(crate) fn new(mut diagnosis: Diagnosis, edits: crate::TwinEdits, report: ReportData) -> Self {
-        diagnosis.plain = Some(gripgen_identify::plain(&diagnosis));
+        let mut plain = gripgen_identify::plain(&diagnosis);
+        if let Some(doubt) = doubt::doubt(&diagnosis, &report.evidence) {
+            plain += &format!(" {doubt}");
+        }
+        diagnosis.plain = Some(plain);
         Self { diagnosis, edits, report, next: None, posterior: None }
     }
 }

@@ -15,7 +15,7 @@ use crate::presses::{LoadSensorError, load_sensor};
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
-use gripgen_twin::{Covariates, Jaw, PerJaw, PullSettings, Scenario, TactileImage, Twin};
+use gripgen_twin::{Covariates, Jaw, LARGEST_MU, PerJaw, PullSettings, Scenario, TactileImage, Twin};
 use holding::holding;
 pub use holding::{FrictionRange, Holding};
 use picture::tried_picture;
@@ -76,6 +76,8 @@ pub struct GripTried {
     pub holding: Vec<Holding>,
     /// Where it fails, a sentence each.
     pub fails: Vec<String>,
+    /// What is doubtful of it where it works, a sentence each.
+    pub doubts: Vec<String>,
     /// The same as numbers: angle, offset and the largest force of a jaw that works there, of 10, 20 and 40 N.
     pub works: Vec<WorksAt>,
 }
@@ -119,6 +121,14 @@ pub enum TryPartError {
         /// Why.
         source: SampleError,
     },
+    /// More friction than a part of a twin may have.
+    #[error("mu = {asked} is asked for, a part of a twin has at most {most}")]
+    Friction {
+        /// The friction coefficient asked for.
+        asked: f64,
+        /// The largest of a twin.
+        most: f64,
+    },
     /// More than the gripper has.
     #[error("{asked_n} N are asked for, a jaw of the gripper has at most {most_n} N")]
     Force {
@@ -138,6 +148,9 @@ pub fn try_part(path: &Path, options: &TryOptions) -> Result<TriedPart, TryPartE
     let rig = rig(options.sensor.as_deref())?;
     if let Some(asked_n) = options.force_n.filter(|&n| n > rig.gripper.max_force_n) {
         return Err(TryPartError::Force { asked_n, most_n: rig.gripper.max_force_n });
+    }
+    if let Some(asked) = options.mu.filter(|&mu| mu > LARGEST_MU) {
+        return Err(TryPartError::Friction { asked, most: LARGEST_MU });
     }
     let searched = search(path, options.part, rig)?;
     let found = searched.proposed.grips.len();
@@ -216,6 +229,7 @@ fn try_grip(
         images,
         holding: holding(mu, twin.gripper.max_force_n, options.force_n, &pulls),
         fails: fails(trial),
+        doubts: searched.proposed.doubts[grip_pose].clone(),
         works: trial
             .cells
             .iter()
@@ -269,11 +283,11 @@ fn fails(trial: &Trial) -> Vec<String> {
     limits.dedup();
     let mut sentences = Vec::new();
     for largest_n in limits {
-        let works = if largest_n > 0.0 { format!("{largest_n} N at most") } else { "no force works".into() };
+        let force = if largest_n > 0.0 { format!("above {largest_n} N") } else { "at any force".into() };
         let sentence = |place: &str, angle: Option<f64>| {
             let why = cells(angle, Some(largest_n)).find_map(|c| c.failure.as_ref());
             let why = why.map_or_else(String::new, |why| format!(": {why}"));
-            format!("{place}, {works}{why}")
+            format!("{place} {force}{why}")
         };
         if cells(None, Some(largest_n)).count() == trial.cells.len() {
             sentences.push(sentence("anywhere", None));
@@ -287,7 +301,7 @@ fn fails(trial: &Trial) -> Vec<String> {
             offsets.sort_by(f64::total_cmp);
             let whole = offsets.len() == cells(Some(angle), None).count();
             let named: Vec<String> = offsets.iter().map(f64::to_string).collect();
-            let offsets = if whole { String::new() } else { format!(" and {} mm off", named.join(", ")) };
+            let offsets = if whole { String::new() } else { format!(", {} mm off,", named.join(", ")) };
             sentences.push(sentence(&format!("turned by {angle} degrees{offsets}"), Some(angle)));
         }
     }
@@ -304,4 +318,28 @@ pub(crate) fn friction_words(mu: FrictionRange) -> String {
          band goes from {} (oily) to {} (dry silicone rubber). --mu takes a measured one",
         mu.low, mu.high
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// "would fail: ..." is what a sentence follows: it says where a force is too large, not where it works.
+    #[test]
+    fn a_sentence_says_what_fails() {
+        let cell = |angle_deg: f64, offset_mm: f64, largest_n: f64| {
+            let failure = (largest_n < 40.0).then(|| "too deep".to_string());
+            TrialCell { angle_deg, offset_mm, largest_n, failure }
+        };
+        let of = |cells: Vec<TrialCell>| fails(&Trial { cells });
+        assert_eq!(of(vec![cell(0.0, 0.0, 20.0), cell(30.0, 3.0, 20.0)]), ["anywhere above 20 N: too deep"]);
+        assert_eq!(of(vec![cell(0.0, 0.0, 0.0)]), ["anywhere at any force: too deep"]);
+        let cells =
+            vec![cell(0.0, 0.0, 40.0), cell(30.0, 0.0, 40.0), cell(30.0, 3.0, 10.0), cell(60.0, 0.0, 20.0)];
+        let wanted = [
+            "turned by 30 degrees, 3 mm off, above 10 N: too deep",
+            "turned by 60 degrees above 20 N: too deep",
+        ];
+        assert_eq!(of(cells), wanted);
+    }
 }

@@ -157,16 +157,22 @@ fn proposals_differ_and_local_features_are_found() {
 #[test]
 fn a_part_without_a_grip_says_why() {
     let folder = tempfile::tempdir().unwrap();
-    let refused = |name, solid| match start(&SolidPart { name, solids: vec![solid] }, folder.path()) {
-        Err(InitError::NoGrip { source, .. }) => source,
-        other => panic!("{name}: {other:?}"),
+    let hinted = |name, solid| {
+        let error = start(&SolidPart { name, solids: vec![solid] }, folder.path()).unwrap_err();
+        let hint = error.hint();
+        match error {
+            InitError::NoGrip { source, .. } => (source, hint),
+            other => panic!("{name}: {other}"),
+        }
     };
-    let wide = refused("wide", Solid::Box([0.0; 3], [150.0, 140.0, 130.0]));
+    let (wide, hint) = hinted("wide", Solid::Box([0.0; 3], [150.0, 140.0, 130.0]));
     assert!(
         matches!(wide, NoGrip::TooWide { narrowest_mm, opening_mm, .. } if (narrowest_mm - 130.0).abs() < 0.1 && opening_mm == 110.0),
         "{wide}"
     );
-    let small = refused("small", Solid::Ball([0.0; 3], 1.0));
+    assert!(hint.contains("opening_mm") && !hint.contains("metres"), "the unit is right: {hint}");
+    let (small, hint) = hinted("small", Solid::Ball([0.0; 3], 1.0));
+    assert!(hint.contains("--scale-mm-per-unit 25.4"), "{hint}");
     assert!(
         matches!(small, NoGrip::TooDeep { wanted_mm3, available_mm3, .. } if available_mm3 < wanted_mm3 && (wanted_mm3 - 15.0).abs() < 0.05),
         "{small}"
@@ -240,12 +246,37 @@ fn turned_faces_change_no_grip() {
         let path = folder.path().join("turned.stl");
         std::fs::write(&path, gripgen::twin::write_binary_stl(&turned, "turned", 1e-3)).unwrap();
         let made = part_starter(&path, folder.path(), OPTIONS).unwrap();
-        (made.grips.len(), made.grips[0].width_mm, made.mesh_words)
+        (made.grips, made.mesh_words)
     };
     let (plain, inside_out, mixed) = (grips(0), grips(1), grips(3));
-    assert!((plain.1 - 4.0).abs() < 0.1 && plain.0 > 1, "{plain:?}");
-    assert_eq!((plain.0, plain.1), (inside_out.0, inside_out.1));
-    assert!((mixed.1 - 4.0).abs() < 0.1, "{mixed:?}");
-    assert!(inside_out.2.iter().any(|w| w.contains("inside out")), "{:?}", inside_out.2);
-    assert!(mixed.2.iter().any(|w| w.contains("opposite ways")), "{:?}", mixed.2);
+    assert!((plain.0[0].width_mm - 4.0).abs() < 0.1 && plain.0.len() > 1, "{plain:?}");
+    for turned in [&inside_out, &mixed] {
+        assert_eq!(turned.0.len(), plain.0.len());
+        for (grip, of_plain) in turned.0.iter().zip(&plain.0) {
+            let moved = (0..3).map(|i| (grip.origin_mm[i] - of_plain.origin_mm[i]).abs()).fold(0.0, f64::max);
+            let apart = (grip.lever_mm - of_plain.lever_mm).abs();
+            assert!(moved < 0.02 && apart < 0.02, "{grip:?} instead of {of_plain:?}");
+        }
+    }
+    assert!(inside_out.1.iter().any(|w| w.contains("inside out")), "{:?}", inside_out.1);
+    assert!(mixed.1.iter().any(|w| w.contains("opposite ways")), "{:?}", mixed.1);
+}
+
+/// A grip that works and is doubtful is warned of with both numbers; one of an ordinary part is not.
+#[test]
+fn grips_deep_in_the_gel_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let ball = SolidPart { name: "ball4", solids: vec![Solid::Ball([0.0; 3], 2.0)] };
+    let made = start(&ball, folder.path()).unwrap();
+    assert_eq!(made.doubts.len(), made.grips.len());
+    assert!(
+        made.doubts[0].iter().any(|w| w.contains("into 4.0 mm of gel, deeper than half")),
+        "{:?}",
+        made.doubts
+    );
+    assert!(made.doubts[0].iter().any(|w| w.contains("the gels meet")), "{:?}", made.doubts);
+    assert!(made.summary.contains("warning: grip 0: "), "{}", made.summary);
+    let all = ordinary();
+    let bracket = start(all.iter().find(|p| p.name == "l_bracket").unwrap(), folder.path()).unwrap();
+    assert!(bracket.doubts.iter().all(Vec::is_empty), "{:?}", bracket.doubts);
 }

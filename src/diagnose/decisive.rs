@@ -35,11 +35,18 @@ pub(super) fn decisive(
         (None, None) => return None,
     };
     let part = effect.and_then(|e| e.part.as_deref());
-    let rows: Vec<usize> = (0..measured.pulls.len())
-        .filter(|&i| part.is_none_or(|part| measured.pulls[i].part == part))
-        .collect();
+    let mut curves = fits.after.terms.curves.iter().map(|(curve, _)| curve);
+    let first = d.unknown.first().filter(|_| effect.is_none());
+    let only = first.and_then(|u| curves.find(|c| c.name == u.covariate)?.only.as_ref());
+    let only =
+        only.map(|(column, word)| (column.as_str(), word.as_str())).or(part.map(|part| ("part", part)));
+    let rows = rows_where(measured, only);
     let plot = names.iter().find_map(|name| over(measured, fits, &rows, name, &label))?;
-    let whose = part.map_or(String::new(), |part| format!(" of {part}"));
+    let whose = match only {
+        Some(("part", part)) => format!(" of {part}"),
+        Some((column, word)) => format!(" where {column} is {word}"),
+        None => String::new(),
+    };
     Some(PlotGroup {
         title: "What decides it".into(),
         about: format!(
@@ -47,6 +54,16 @@ pub(super) fn decisive(
         ),
         plots: vec![plot],
     })
+}
+
+/// The pulls in which it was seen: those of one part, or those with one word in a column.
+fn rows_where(measured: &MeasuredPulls, only: Option<(&str, &str)>) -> Vec<usize> {
+    let is = |pull: &MeasuredPull, (column, word): (&str, &str)| match column {
+        "part" => pull.part == word,
+        _ => matches!(cell(column, pull), Some(Drawn::Text(own)) if own == word),
+    };
+    let rows = 0..measured.pulls.len();
+    rows.filter(|&i| only.is_none_or(|only| is(&measured.pulls[i], only))).collect()
 }
 
 fn cell(name: &str, pull: &MeasuredPull) -> Option<Drawn> {
@@ -190,5 +207,35 @@ mod tests {
             (groups.len(), groups[0].at, groups.iter().map(|g| g.rows.len()).sum::<usize>()),
             (10, 4.5, 95)
         );
+    }
+
+    #[test]
+    fn what_was_seen_at_one_word_alone_is_drawn_there_alone() {
+        let pull = |(i, (part, session)): (usize, (&str, &str))| MeasuredPull {
+            id: format!("p{i}"),
+            part: part.into(),
+            grip_pose: 0,
+            grip_force_n: 20.0,
+            increment_n: 1.0,
+            start_n: None,
+            step_s: 0.1,
+            covariates: gripgen_twin::Covariates { session: session.into(), ..Default::default() },
+            max_pull_force_n: 8.0,
+            zero_shift_n: 0.0,
+            trace: None,
+        };
+        let pulls = [("lever", "a"), ("knob", "b"), ("lever", "b")];
+        let measured = MeasuredPulls {
+            pulls: pulls.into_iter().enumerate().map(pull).collect(),
+            recorded: vec!["session".into()],
+            extra: vec![],
+            label_tolerance_n: 3.0,
+            stop_m: 0.005,
+            feedback: None,
+            sha256: String::new(),
+        };
+        assert_eq!(rows_where(&measured, Some(("part", "lever"))), [0, 2]);
+        assert_eq!(rows_where(&measured, Some(("session", "b"))), [1, 2]);
+        assert_eq!(rows_where(&measured, None), [0, 1, 2]);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::decisive::decisive;
 use crate::predict::PullPredictor;
-use crate::report::{EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
+use crate::report::{EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, one_for_all};
 use gripgen_identify::pulls::answer::{PullAnswer, PullFits};
 use gripgen_identify::pulls::search::{Entry, ModelTerm};
 use gripgen_twin::MeasuredPulls;
@@ -241,12 +241,12 @@ fn evidence(fits: &PullFits, answer: &PullAnswer) -> Vec<EvidenceRow> {
         let specs = d.effects.iter().filter_map(|e| find(&e.name));
         column.is_some_and(|c| specs.into_iter().any(|spec| spec.covariates.contains(&c)))
     };
-    let plain = |name: &str| name.strip_suffix(", by part").unwrap_or(name).to_string();
     let fate = |name: &str| {
-        let tied = d.effects.iter().find(|e| e.indistinguishable_from.iter().any(|r| r.name == plain(name)));
+        let tied =
+            d.effects.iter().find(|e| e.indistinguishable_from.iter().any(|r| r.name == one_for_all(name)));
         let unknown = d.unknown.iter().any(|u| name.strip_prefix("curve in ") == Some(u.covariate.as_str()));
         match tied {
-            _ if d.effects.iter().any(|e| e.name == plain(name)) || unknown => "named".to_string(),
+            _ if d.effects.iter().any(|e| e.name == one_for_all(name)) || unknown => "named".to_string(),
             Some(effect) => format!("not told apart from {}", effect.name),
             None if own(name) => "the same covariate without a name".into(),
             None => "worse".into(),
@@ -273,7 +273,18 @@ fn evidence(fits: &PullFits, answer: &PullAnswer) -> Vec<EvidenceRow> {
             rows.push(entry);
         }
     }
+    as_good(&mut rows);
     rows
+}
+
+/// What predicts held-out pulls at least as well as all that was named is not worse: it was not named for what it costs, or for
+/// what the traces say.
+fn as_good(rows: &mut [EvidenceRow]) {
+    let named = rows.iter().filter(|row| row.fate == "named").map(|row| row.heldout_gain);
+    let Some(best) = named.reduce(f64::max) else { return };
+    for row in rows.iter_mut().filter(|row| row.fate == "worse" && row.heldout_gain >= best) {
+        row.fate = "as good on held-out pulls".into();
+    }
 }
 
 fn worst(measured: &MeasuredPulls, fits: &PullFits) -> Vec<WorstRow> {
@@ -294,4 +305,31 @@ fn worst(measured: &MeasuredPulls, fits: &PullFits) -> Vec<WorstRow> {
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_predicts_as_well_as_the_named_effect_is_not_worse() {
+        let row = |name: &str, heldout_gain: f64, fate: &str| EvidenceRow {
+            name: name.into(),
+            heldout_gain,
+            standard_error: 5.0,
+            heldout_error: 0.14,
+            values: String::new(),
+            fate: fate.into(),
+        };
+        let mut rows = [
+            row("area_saturation", 10.4, "named"),
+            row("load_power_law", 13.0, "worse"),
+            row("wear", -1.0, "worse"),
+        ];
+        as_good(&mut rows);
+        assert_eq!(rows.map(|row| row.fate), ["named", "as good on held-out pulls", "worse"]);
+        let mut none = [row("wear", 3.0, "worse")];
+        as_good(&mut none);
+        assert_eq!(none[0].fate, "worse");
+    }
 }

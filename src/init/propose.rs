@@ -1,5 +1,6 @@
 //! Proposing grips: places are looked for, compared on a coarse grid, and those that look good are tried.
 
+use super::doubts::doubts;
 use super::places::{Body, OPPOSITE_RAD, Place, places, spread};
 use super::pose::{GripAt, orientation, spread_of};
 use super::seen::{Seen, Unseen, Viewer};
@@ -48,6 +49,8 @@ pub(crate) struct Proposed {
     /// How many were tried, and what failed first where the sweep had to be narrowed.
     pub(crate) tried: usize,
     pub(crate) failure: Option<String>,
+    /// What is doubtful of each grip, a sentence each.
+    pub(crate) doubts: Vec<Vec<String>>,
 }
 
 /// A grip that looks good.
@@ -71,9 +74,10 @@ impl Search<'_> {
             failure: trials.iter().find_map(Trial::failure).cloned().unwrap_or_default(),
         })?;
         let failure = trials.iter().find_map(Trial::failure).cloned();
-        let proposals = grips.iter().map(|&i| tried[i].proposal()).collect();
+        let proposals: Vec<Proposal> = grips.iter().map(|&i| tried[i].proposal()).collect();
         let trials = grips.iter().map(|&i| trials[i].clone()).collect();
-        Ok(Proposed { grips: proposals, trials, varied, tried: tried.len(), failure })
+        let doubts = doubts(&self.viewer(), &proposals, &varied);
+        Ok(Proposed { grips: proposals, trials, varied, tried: tried.len(), failure, doubts })
     }
 
     /// The first `wanted` grips that stand a given variation, the most promising first; fewer if fewer do.
@@ -138,6 +142,15 @@ impl Search<'_> {
         Ok((body, promising))
     }
 
+    fn viewer(&self) -> Viewer<'_> {
+        Viewer {
+            twin: self.twin,
+            surface: &self.surface,
+            mesh: &self.mesh,
+            imprint_m3_per_n: self.part.imprint_m3_per_n,
+        }
+    }
+
     /// The grip at a place, and the same moved to the middle of what it touches.
     fn look_around(
         &self,
@@ -145,12 +158,7 @@ impl Search<'_> {
         spread: &Matrix3<f64>,
         place: &Place,
     ) -> Vec<Result<Candidate, Unfit>> {
-        let viewer = Viewer {
-            twin: self.twin,
-            surface: &self.surface,
-            mesh: &self.mesh,
-            imprint_m3_per_n: self.part.imprint_m3_per_n,
-        };
+        let viewer = self.viewer();
         let rotation = orientation(spread, place.axis);
         let (mut origin, mut all) = (place.middle, Vec::new());
         for step in 0..4 {

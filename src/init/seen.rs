@@ -13,6 +13,8 @@ const METRES_PER_PX: f64 = 0.5e-3;
 const CELL_PX: usize = 7;
 /// How far beside its pad a finger reaches: the rim of a sensor's housing.
 const RIM_M: f64 = 3e-3;
+/// Pixel on which a chosen grip is looked at again.
+const FINE_METRES_PER_PX: f64 = 0.125e-3;
 /// Forces at which a part is pressed in, the first that fits into the gel.
 const FORCES_N: [f64; 3] = [40.0, 20.0, 10.0];
 
@@ -93,13 +95,29 @@ impl Viewer<'_> {
         })
     }
 
+    /// How a jaw presses at a force, on a finer grid.
+    pub(super) fn pressed(&self, at: &GripAt, jaw: Jaw, force_n: f64) -> Result<Pressed, IndentError> {
+        let grid = self.grid(jaw, FINE_METRES_PER_PX);
+        let thickness_m = self.twin.gel[jaw].thickness_m;
+        let gel_from_mesh = world_from_gel(jaw, 0.0).inverse() * at.part_from_mesh();
+        let heights = self.mesh.raster(&gel_from_mesh, &grid, thickness_m / FINE_METRES_PER_PX);
+        let gel = PressedGel { thickness_m, imprint_m3_per_n: self.imprint_m3_per_n };
+        let imprint = indent(&heights, &grid, &gel, force_n)?;
+        Ok(Pressed { area_m2: imprint.patch.area_m2(), depth_m: imprint.press_depth_m })
+    }
+
+    fn grid(&self, jaw: Jaw, metres_per_px: f64) -> Grid {
+        let gel = &self.twin.gel[jaw];
+        Grid {
+            width_px: (gel.width_m / metres_per_px) as usize,
+            height_px: (gel.height_m / metres_per_px) as usize,
+            metres_per_px,
+        }
+    }
+
     fn side(&self, jaw: Jaw, gel_from_mesh: &Pose) -> Result<Side, Unseen> {
         let gel = &self.twin.gel[jaw];
-        let grid = Grid {
-            width_px: (gel.width_m / METRES_PER_PX) as usize,
-            height_px: (gel.height_m / METRES_PER_PX) as usize,
-            metres_per_px: METRES_PER_PX,
-        };
+        let grid = self.grid(jaw, METRES_PER_PX);
         let heights = self.mesh.raster(gel_from_mesh, &grid, gel.thickness_m / METRES_PER_PX);
         let top = heights.values.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
         if top == f32::NEG_INFINITY {
@@ -133,6 +151,14 @@ impl Viewer<'_> {
             columns: grid.width_px.div_ceil(CELL_PX),
         })
     }
+}
+
+/// A jaw at a force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pressed {
+    pub(super) area_m2: f64,
+    /// The deepest place of the imprint.
+    pub(super) depth_m: f64,
 }
 
 /// What one gel sees.

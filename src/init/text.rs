@@ -72,6 +72,10 @@ pub(super) fn summary(name: &str, size: &str, mesh_words: &[String], proposed: &
         }
         text.push('\n');
     }
+    for (i, words) in proposed.doubts.iter().enumerate().flat_map(|(i, all)| all.iter().map(move |w| (i, w)))
+    {
+        let _ = writeln!(text, "warning: grip {i}: {words}");
+    }
     if let Some(left_out) = narrowed(&proposed.varied) {
         let why = proposed.failure.as_deref().unwrap_or("they fail");
         let _ = writeln!(text, "left out of the sweep, because grips fail there: {left_out} ({why})");

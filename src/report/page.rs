@@ -6,8 +6,9 @@ use super::sentence::{error_unit, sentence};
 use super::{Diagnosed, Plot, PlotGroup};
 use crate::assets;
 use gripgen_identify::{
-    Channel, Diagnosis, ErrorPair, HeldOutError, NamedEffect, ParameterEstimate, Verdict,
+    Channel, Detectable, Diagnosis, ErrorPair, HeldOutError, NamedEffect, ParameterEstimate, Verdict,
 };
+use gripgen_twin::effects::find;
 use serde_json::{Value, json};
 
 /// Points of all plots together; one takes about 12 bytes.
@@ -19,9 +20,13 @@ const PLOTS: usize = 60;
 const SERIES: usize = 12;
 /// Rows of a table.
 pub(super) const ROWS: usize = 40;
+/// A value nearer to the neutral one, as a share of what is fitted, is that.
+const AT_NEUTRAL: f64 = 1e-5;
 /// Letters of a name and of a sentence.
 pub(super) const NAME: usize = 60;
 pub(super) const SENTENCE: usize = 600;
+/// Letters of a command.
+const COMMAND: usize = 8000;
 
 /// The report of a diagnosis: one HTML page with its plots inside, which needs neither a network nor a script.
 ///
@@ -50,7 +55,8 @@ pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
         "decisive": all[..decides],
         "groups": all[decides..],
         "next": report.next.iter().map(|(text, command)| json!({
-            "text": clean(text, SENTENCE), "command": clean(command, SENTENCE),
+            // A command that is cut off cannot be copied.
+            "text": clean(text, SENTENCE), "command": clean(command, COMMAND),
         })).collect::<Vec<_>>(),
         "below_floor": below_floor(d, floor),
         "evidence": report.evidence.iter().take(ROWS).map(|e| json!({
@@ -62,7 +68,7 @@ pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
         "evidence_error": report.evidence.iter().any(|e| e.heldout_error.is_finite()),
         "evidence_spread": report.evidence.iter().any(|e| e.standard_error.is_finite()),
         "unit": clean(unit, NAME),
-        "seen": d.would_have_seen.iter().take(ROWS).map(|(name, s)| json!({
+        "seen": d.would_have_seen.iter().filter(|(name, s)| is_a_size(name, s)).take(ROWS).map(|(name, s)| json!({
             "name": clean(name, NAME), "parameter": clean(&s.parameter, NAME), "value": number(s.value),
             "power": number(100.0 * s.power),
         })).collect::<Vec<_>>(),
@@ -157,6 +163,16 @@ fn error_bars(d: &Diagnosis) -> Option<Vec<Bar>> {
         }
     }
     (!bars.is_empty()).then_some(bars)
+}
+
+/// Whether a size that would have been seen says anything. At its neutral value an effect does nothing: a limit of a sensor of
+/// 999999 N, of up to a million, is none.
+fn is_a_size(effect: &str, seen: &Detectable) -> bool {
+    let spec = find(effect);
+    let parameter = spec.and_then(|spec| spec.parameters.iter().find(|p| p.name == seen.parameter));
+    parameter.is_none_or(|p| {
+        p.neutral == 0.0 || (seen.value - p.neutral).abs() > AT_NEUTRAL * (p.bounds.1 - p.bounds.0)
+    })
 }
 
 /// Whether the error after is below the noise floor, which then wants a word.

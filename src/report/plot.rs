@@ -16,18 +16,28 @@ const COLOURS: usize = 8;
 /// Letters of a word on the x axis.
 const LONGEST_WORD: usize = 18;
 
-/// The class of a series, which gives it its colour: before and after have the same everywhere.
+/// The points whose name begins the name of a line (`gear` of `gear 0, expected`).
+fn points_of(all: &[Series], i: usize) -> Option<usize> {
+    let begins =
+        |whole: &str, name: &str| whole.strip_prefix(name).is_some_and(|rest| rest.starts_with([' ', ',']));
+    let of = |s: &Series| s.mark == Mark::Points && begins(&all[i].name, &s.name);
+    all.iter().position(of).filter(|_| all[i].mark == Mark::Line)
+}
+
+/// The class of a series, which gives it its colour: before and after have the same everywhere, and a line has that of its points.
 pub(super) fn class(all: &[Series], i: usize) -> String {
+    let i = points_of(all, i).unwrap_or(i);
     let of = |name: &str| match name {
         "before" => Some("cb"),
         "after" => Some("ca"),
         _ => None,
     };
+    let number = (0..i).filter(|&j| points_of(all, j).is_none()).count();
     match of(&all[i].name) {
         Some(class) => class.into(),
         // The first colour is that of what is after.
-        None if all.iter().any(|s| of(&s.name).is_some()) => format!("c{}", 1 + i % (COLOURS - 1)),
-        None => format!("c{}", i % COLOURS),
+        None if all.iter().any(|s| of(&s.name).is_some()) => format!("c{}", 1 + number % (COLOURS - 1)),
+        None => format!("c{}", number % COLOURS),
     }
 }
 

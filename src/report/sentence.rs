@@ -1,7 +1,7 @@
 //! The verdict in one sentence.
 
 use super::bars::number;
-use gripgen_identify::{Channel, Diagnosis, HeldOutError, NamedEffect, Verdict};
+use gripgen_identify::{Channel, Diagnosis, HeldOutError, NamedEffect, Verdict, plain};
 
 /// The unit of errors of a channel.
 pub(super) fn error_unit(channel: Channel) -> &'static str {
@@ -15,10 +15,7 @@ pub(super) fn error_unit(channel: Channel) -> &'static str {
 /// What a diagnosis says, for somebody who reads one sentence only.
 pub(super) fn sentence(d: &Diagnosis) -> String {
     match d.verdict {
-        Verdict::Insufficient => match d.notes.first() {
-            Some(note) => format!("The data cannot answer: {note}."),
-            None => "The data cannot answer.".into(),
-        },
+        Verdict::Insufficient => plain(d),
         Verdict::None => {
             let end = after(d).map(|e| format!(": the held-out error is {e}")).unwrap_or_default();
             format!("Nothing beyond the baseline was found{end}{}.", floor(d))

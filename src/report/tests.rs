@@ -1,3 +1,4 @@
+use super::plot::class;
 use super::*;
 use crate::TwinEdits;
 use gripgen_identify::{
@@ -213,6 +214,23 @@ fn parse(page: &str) -> (BTreeSet<String>, String) {
 }
 
 #[test]
+fn a_line_has_the_colour_of_its_points() {
+    let points = |name: &str| series(name, Mark::Points, vec![(0.0, 0.0)]);
+    let line = |name: &str| series(name, Mark::Line, vec![(0.0, 0.0), (1.0, 1.0)]);
+    let colours = |all: &[Series]| (0..all.len()).map(|i| class(all, i)).collect::<Vec<_>>();
+    let lines = [
+        points("gear"),
+        line("gear 0, expected"),
+        line("gear 1, expected"),
+        points("shaft"),
+        line("shaft, expected"),
+    ];
+    assert_eq!(colours(&lines), ["c0", "c0", "c0", "c1", "c1"]);
+    assert_eq!(colours(&[points("gear"), points("shaft")]), ["c0", "c1"], "the same without lines");
+    assert_eq!(colours(&[points("gear"), line("gearbox")]), ["c0", "c1"], "another name");
+}
+
+#[test]
 fn the_page_is_well_formed_and_needs_nothing_from_elsewhere() {
     let page = diagnosis_page(&diagnosed(440));
     let (elements, text) = parse(&page);
@@ -392,4 +410,23 @@ fn the_verdict_is_one_sentence_of_the_answer_itself() {
             &text[text.find("}").unwrap_or(0)..].trim()
         );
     }
+}
+
+/// A limit of nearly a million newtons is no size at which anything would have been seen.
+#[test]
+fn a_size_at_the_neutral_value_is_not_shown() {
+    let mut d = diagnosed(10);
+    for (value, shown) in [(999_999.0, false), (60.0, true)] {
+        let seen = Detectable { parameter: "limit_n".into(), value, power: 0.8 };
+        d.diagnosis.would_have_seen.insert("sensor_saturation".into(), seen);
+        assert_eq!(parse(&diagnosis_page(&d)).1.contains("limit_n"), shown, "{value}");
+    }
+}
+
+#[test]
+fn a_long_command_can_be_copied_from_the_page() {
+    let mut d = diagnosed(10);
+    let command = format!("gripgen diagnose {} -o diagnosed.toml", "folder/".repeat(300));
+    d.report.next = vec![("Write the corrected twin:".into(), command.clone())];
+    assert!(parse(&diagnosis_page(&d)).1.contains(&command));
 }

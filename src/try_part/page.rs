@@ -52,8 +52,9 @@ fn section(grip: &GripTried, searched: &Searched) -> PageSection {
         caption: format!("{jaw} jaw at {} N, without noise", grip.force_n),
         png: encode_png(&grip.images[jaw]).expect("an RGB image can be encoded"),
     }));
+    let doubts: String = grip.doubts.iter().map(|words| format!(" Warning: {words}.")).collect();
     let about = format!(
-        "{:.1} mm between the jaws, {:.0} mm2 in contact, middle of mass {:.1} mm beside the jaw axis. {}",
+        "{:.1} mm between the jaws, {:.0} mm2 in contact, middle of mass {:.1} mm beside the jaw axis. {}{doubts}",
         p.width_mm,
         p.contact_mm2,
         p.lever_mm,

@@ -41,12 +41,14 @@ pub(super) fn tried_picture(part: &TriedPart, mesh: &TriMesh) -> Vec<u8> {
 fn row(canvas: &mut Canvas, top: u32, grip: &GripTried, mu: FrictionRange, mesh: &TriMesh) {
     panel(canvas, (MARGIN, top), grip.grip_pose, mesh, &grip.proposal);
     let mut y = top + DRAWING.1 + 4;
-    let shown = grip.fails.iter().take(SENTENCES);
-    let left_out = grip.fails.len().saturating_sub(SENTENCES);
-    let more = (left_out > 0).then(|| format!("{left_out} more places where it fails: see the page"));
+    let said: Vec<&String> = grip.doubts.iter().chain(&grip.fails).collect();
+    let shown = said.iter().copied().take(SENTENCES);
+    let left_out = said.len().saturating_sub(SENTENCES);
+    let more =
+        (left_out > 0).then(|| format!("{left_out} more doubts and places where it fails: see the page"));
     let works = grip.fails.is_empty().then(|| "works wherever it was tried".to_string());
     for sentence in shown.chain(&more).chain(&works) {
-        let ink = if works.is_some() { SOFT_INK } else { FAILED };
+        let ink = if Some(sentence) == works.as_ref() { SOFT_INK } else { FAILED };
         for line in lines(sentence, LETTERS).iter().take(3) {
             canvas.text(line, f64::from(MARGIN), f64::from(y), Anchor::Left, TextStyle::small(ink));
             y += LINE;

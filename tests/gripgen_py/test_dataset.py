@@ -80,6 +80,59 @@ def test_a_row_has_its_values_and_slices_are_datasets(run):
         ds[16]
 
 
+def test_a_mask_selects_rows_as_in_numpy(run):
+    ds = gg.load(run)
+    mask = ds.column("grip_force_n") > 25
+    wanted = ds.labels[mask].tolist()
+    assert 0 < len(wanted) < len(ds), "a mask that is read as numbers of rows gives as many rows as it is long"
+    images, labels = ds.batch(mask)
+    assert labels.tolist() == wanted and (images == ds.batch(np.flatnonzero(mask))[0]).all()
+    assert ds.batch(mask.tolist())[1].tolist() == wanted, "a list of bool is a mask too"
+    for picked in (ds.subset(mask), ds.where(mask), ds[mask], ds[np.flatnonzero(mask)]):
+        assert picked.labels.tolist() == wanted
+    assert len(ds.batch(~mask & mask)[1]) == len(ds.batch([])[1]) == 0
+    for select in (ds.batch, ds.subset, ds.where):
+        with pytest.raises(gg.ConfigError, match="the mask has 6 values, the dataset 16 rows"):
+            select(mask[:6])
+        with pytest.raises(gg.ConfigError, match=r"the mask has the shape \(4, 4\), the dataset 16 rows"):
+            select(mask.reshape(4, 4))
+    # Numbers of rows are no mask, even where there are as many.
+    with pytest.raises(gg.ConfigError, match="this one of int64") as e:
+        ds.where(np.arange(16))
+    assert "ds.subset" in e.value.hint
+
+
+def test_numbers_of_rows_are_whole(run):
+    ds = gg.load(run)
+    assert ds.batch([1.0, -1.0])[1].tolist() == ds.batch([1, 15])[1].tolist(), "a whole number of any type"
+    for broken, said in (([0, 1.5], "no row 1.5"), ([np.nan], "no row nan"), ([np.inf], "no row inf")):
+        with pytest.raises(gg.ConfigError, match=f"{said}: numbers of rows are whole"):
+            ds.batch(broken)
+    with pytest.raises(gg.ConfigError, match="no row 1.5"):
+        ds[1.5]
+    with pytest.raises(gg.ConfigError, match="not by <U4"):
+        ds.batch(["gear"])
+    with pytest.raises(IndexError, match="no row 16.0, the dataset has 16"):
+        ds.batch([16.0])
+
+
+def test_statuses_shares_and_sizes_that_cannot_be_are_refused(run):
+    with pytest.raises(gg.ConfigError, match="no status 'sliped'; there are slipped, no_contact, censored, suspect, failed") as e:
+        gg.load(run, status=["sliped"])
+    assert e.value.hint == "did you mean `slipped`?" and str(e.value).endswith(e.value.hint)
+    with pytest.raises(gg.ConfigError, match="no status 'good'") as e:
+        gg.load(run, status="good")
+    assert e.value.hint is None
+    ds = gg.load(run, status="slipped")
+    assert len(ds) == len(gg.load(run, status=["slipped"])) > 0, "a word is a status, not letters"
+    for test in (2, 1, 1.0, 0, -0.2, float("nan")):
+        with pytest.raises(gg.ConfigError, match=f"test = {test} is no share"):
+            ds.split(test=test)
+    for size in (0, -1, 2.5):
+        with pytest.raises(gg.ConfigError, match=f"batch_size = {size}, it must be a whole number, 1 at least"):
+            next(ds.iterate(batch_size=size))
+
+
 def test_the_table_is_the_index(run):
     import csv
 

@@ -78,7 +78,7 @@ def test_statuses_are_those_that_were_asked_for(tmp_path):
     # Offsets of up to 70 mm: some jaws miss the part, some samples may fail.
     wide = {**SMALL, "vary.grip_offset_mm": [0, 70]}
     gg.sweep(CONFIG, tmp_path / "run", jobs=2, set=wide)
-    for status in (("slipped",), ("slipped", "no_contact"), ("no_contact",)):
+    for status in ("slipped", ("slipped", "no_contact"), ("no_contact",)):
         ds = gg.load(tmp_path / "run", status=status)
         found = [b for b in stream(set=wide, status=status, columns=["index", "status"])]
         assert [int(i) for b in found for i in b.columns["index"]] == ds.column("index").astype(int).tolist()
@@ -92,6 +92,12 @@ def test_what_cannot_be_is_told_before_anything_is_made(tmp_path):
         stream(set={**SMALL, "shard_samples": -1})
     with pytest.raises(gg.DataError, match="there is no column 'colour'.*grip_force_n"):
         stream(columns=["index", "colour"])
+    for size in (0, -1, 2.5):
+        with pytest.raises(gg.ConfigError, match=f"batch_size = {size}, it must be a whole number, 1 at least"):
+            stream(batch_size=size)
+    with pytest.raises(gg.ConfigError, match="no status 'no_contct'; there are slipped, no_contact") as e:
+        stream(status=["slipped", "no_contct"])
+    assert e.value.hint == "did you mean `no_contact`?"
     images, labels = next(iter(stream(set={**SMALL, "images": "none"})))
     assert images is None and len(labels) == 5
 

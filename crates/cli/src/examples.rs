@@ -8,7 +8,7 @@ pub const TRY: &str = "Examples:
   gripgen try part.stl --force-n 30 --mu 0.2 -o part.html";
 pub const CHECK: &str = "Examples:
   gripgen check mine/sweep.toml
-  gripgen check asset:configs/quickstart.toml --set samples=1000";
+  gripgen check mine/sweep.toml --set samples=1000 --set design=random";
 pub const SWEEP: &str = "Examples:
   gripgen sweep asset:configs/quickstart.toml
   gripgen sweep mine/sweep.toml -o runs/mine --set mechanics=reduced

@@ -22,6 +22,7 @@ mod outputs;
 mod own_files;
 mod posterior;
 mod progress;
+mod shell;
 
 use args::{CalibrateCommand, Cli, Command, RigCommand};
 use clap::Parser;

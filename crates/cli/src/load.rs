@@ -7,8 +7,9 @@ use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::PressSet;
 use gripgen::twin::Twin;
 use gripgen::{
-    FoundCircles, Library, LoadPressesError, LoadPullsError, LoadSensorError, Location, PressGeometry,
-    Suspects, is_pulls, load_presses, load_sensor, load_twin_document, load_twin_sensor,
+    FoundCircles, Library, LoadPressesError, LoadPullsError, LoadSensorError, LoadedPulls, Location,
+    PressGeometry, Suspects, is_pulls, load_presses, load_pulls_with, load_sensor, load_twin_document,
+    load_twin_sensor,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -56,6 +57,34 @@ pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
         return failure;
     }
     failure.hint("measurements are a folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, a bag of ROS 2 with rosbag.toml, or a dataPack.npz")
+}
+
+/// The pulls that a twin is to be fitted to. What people have to know of them is said; labels that no gel gives are refused, but
+/// those of a wrong unit not by who `answers` for them, as a diagnosis does.
+pub fn load_pulls_to_fit(
+    paths: &[&Path],
+    suspects: Suspects,
+    talk: &TalkArgs,
+    answers: bool,
+) -> Result<LoadedPulls, Failure> {
+    let mut loaded = load_pulls_with(paths, suspects).map_err(|e| no_pulls(paths, &e))?;
+    let refused = loaded.implausible.take_if(|e| e.sign || !answers);
+    say_warnings(&loaded, talk);
+    match refused {
+        Some(e) => Err(Failure::usage(&e).hint(&e.hint)),
+        None => Ok(loaded),
+    }
+}
+
+/// Says what people have to know of pulls that were loaded: the one way of it to the terminal.
+pub fn say_warnings(loaded: &LoadedPulls, talk: &TalkArgs) {
+    if talk.quiet {
+        return;
+    }
+    loaded.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    if let Some(implausible) = &loaded.implausible {
+        eprintln!("warning: {implausible} ({})", implausible.hint);
+    }
 }
 
 /// Folders that are read as one campaign.

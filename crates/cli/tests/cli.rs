@@ -5,6 +5,9 @@
 // Planning a campaign, and making it on a twin.
 #[path = "cli/campaign.rs"]
 mod campaign;
+// What is said of a configuration.
+#[path = "cli/check.rs"]
+mod check;
 // The catalogue of effects.
 #[path = "cli/effects.rs"]
 mod effects;
@@ -19,6 +22,9 @@ mod live;
 mod measured;
 #[path = "cli/presses.rs"]
 mod presses;
+// Measured pulls in other units than they seem to be.
+#[path = "cli/pull_units.rs"]
+mod pull_units;
 // A rig whose devices tell half the truth.
 #[path = "cli/rig_doubts.rs"]
 mod rig_doubts;
@@ -136,32 +142,6 @@ fn json_is_one_event_a_line() {
         2,
         "plan and done: nothing was left to do"
     );
-}
-
-#[test]
-fn check_and_dry_run_say_what_it_takes_and_write_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
-    let dry = run(&sweep_args(out.to_str().unwrap(), &["--dry-run", "--json"]));
-    assert_code(&dry, 0);
-    assert!(!out.exists());
-    let plan: serde_json::Value = serde_json::from_slice(&dry.stdout).unwrap();
-    assert_eq!((&plan["samples"], &plan["shards"]), (&24.into(), &4.into()));
-    assert!(plan["estimated_bytes"].as_u64().unwrap() > 24 * 50_000);
-    let check = run(&["check", QUICKSTART]);
-    assert_code(&check, 0);
-    assert!(text(&check.stderr).contains("200 samples") && text(&check.stderr).contains("about"));
-    // A sweep whose samples fail is told before it is run.
-    let failing = run(&[
-        "check",
-        QUICKSTART,
-        "--set",
-        "twin=asset:configs/twin.toml",
-        "--set",
-        "vary.grip_force_n=[10]",
-    ]);
-    assert_code(&failing, 4);
-    assert!(text(&failing.stderr).contains("20 to 80 N"), "{}", text(&failing.stderr));
 }
 
 #[test]

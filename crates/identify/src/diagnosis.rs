@@ -85,8 +85,12 @@ pub struct ParameterEstimate {
 }
 
 impl ParameterEstimate {
-    /// A value with its 90 % interval, inside its bounds.
+    /// A value with its 90 % interval, inside its bounds. An interval of another method than the value may miss it, and is widened up to
+    /// it: nobody is told a value that its own interval rules out.
     pub fn new(value: f64, (low90, high90): (f64, f64), unit: &str) -> Self {
+        // Written so that an end that is not known stays so.
+        let low90 = if low90 > value { value } else { low90 };
+        let high90 = if high90 < value { value } else { high90 };
         Self { value, low90, high90, unit: unit.into(), at_bound: false }
     }
 }
@@ -351,5 +355,23 @@ impl Diagnosis {
                 ));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The value of one method and the interval of another: 0.0120 (0.0063 to 0.0108) was printed.
+    #[test]
+    fn an_interval_holds_its_value() {
+        let ends = |value, interval| {
+            let found = ParameterEstimate::new(value, interval, "s");
+            (found.low90, found.high90)
+        };
+        assert_eq!(ends(0.012, (0.0063, 0.0108)), (0.0063, 0.012));
+        assert_eq!(ends(0.012, (0.013, 0.02)), (0.012, 0.02));
+        assert_eq!(ends(0.012, (0.01, 0.02)), (0.01, 0.02));
+        assert!(ends(0.012, (f64::NAN, f64::NAN)).0.is_nan());
     }
 }

@@ -11,6 +11,8 @@ pub fn plain(d: &Diagnosis) -> String {
     let mut text = match d.verdict {
         Verdict::Insufficient => {
             return match d.notes.first() {
+                // A note may be a question.
+                Some(note) if note.ends_with('?') => format!("The data cannot answer: {note}"),
                 Some(note) => format!("The data cannot answer: {note}."),
                 None => "The data cannot answer.".into(),
             };
@@ -91,6 +93,16 @@ mod tests {
             noise_floor_mse: Some(1.0),
             error: Some(report),
             ..Diagnosis::blank(Channel::Presses, DataSummary::default())
+        }
+    }
+
+    #[test]
+    fn a_note_that_asks_ends_in_one_sign() {
+        for (note, end) in [("all forces in newtons, per jaw?", "jaw?"), ("4 pulls, 8 are needed", "needed.")]
+        {
+            let mut d = Diagnosis::blank(Channel::Pulls, DataSummary::default());
+            d.notes.push(note.into());
+            assert!(plain(&d).ends_with(end), "{}", plain(&d));
         }
     }
 

@@ -50,3 +50,5 @@ mod worth;
 mod written;
 mod zero_screen;
 mod zero_wander;
+
+pub use simulate::recovered;

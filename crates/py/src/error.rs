@@ -1,5 +1,6 @@
 //! Errors as Python exceptions: the Rust message, and what to do about it as `hint`.
 
+use crate::hints;
 use gripgen::record::DatasetError;
 use gripgen::twin::config::ConfigError as KeyError;
 use gripgen::{LoadError, SampleError, SweepError};
@@ -28,9 +29,10 @@ create_exception!(
     "Data that cannot be read; the message names the file."
 );
 
-/// An exception with a hint.
+/// An exception with a hint, in the words of Python.
 fn with_hint<E: PyTypeInfo>(py: Python<'_>, message: &str, hint: Option<&str>) -> PyErr {
-    let text = match hint {
+    let hint = hint.map(hints::in_python);
+    let text = match &hint {
         Some(hint) => format!("{message}\nhint: {hint}"),
         None => message.to_string(),
     };

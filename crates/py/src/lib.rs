@@ -8,6 +8,7 @@
 mod dataset;
 mod error;
 mod film;
+mod hints;
 mod pulls;
 mod render;
 mod simulator;

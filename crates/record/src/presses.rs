@@ -222,7 +222,7 @@ mod tests {
             ("image,depth_mm\na.png,nan\n", "`depth_mm` is `nan`"),
             ("image\nb.png\n", "b.png"),
             ("image\nlossy.png\n", "lossy.png: the image is a JPEG, presses are read from PNG"),
-            ("image,x_px\na.png,1,2\n", "line: 2"),
+            ("image,x_px\na.png,1,2\n", "cells of line 2: "),
         ] {
             let error = read_press_folder(folder(table).path()).unwrap_err().to_string();
             assert!(error.contains(part), "{table:?}: {error}");

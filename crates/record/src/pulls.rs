@@ -3,6 +3,7 @@
 mod cells;
 mod images;
 mod standing;
+mod strays;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -62,11 +63,12 @@ pub fn read_judged_pulls(folder: &Path) -> Result<JudgedPulls, PullFolderError> 
     let bytes = read_bytes(&path)?;
     let mut hash = Sha256::new();
     feed(&mut hash, PULLS_FILE, &bytes);
-    let header = campaign_header(folder, &mut hash)?;
+    let (header, mut warnings) = campaign_header(folder, &mut hash)?;
     let (mut found, mut standing) = read_table(&path, &bytes, &header)?;
     let mut after_n = vec![Vec::new(); found.pulls.len()];
     let traces = folder.join(TRACES_FOLDER);
     let stored = trace_files(&traces)?;
+    warnings.extend(strays::traces_of_nobody(folder, &stored, &found.pulls));
     for (pull, after_n) in found.pulls.iter_mut().zip(&mut after_n).filter(|_| !stored.is_empty()) {
         let name = format!("{}.csv", pull.id);
         if !stored.contains(name.as_str()) {
@@ -82,20 +84,26 @@ pub fn read_judged_pulls(folder: &Path) -> Result<JudgedPulls, PullFolderError> 
     if header.label_evidence == LabelEvidenceKind::Trace {
         judge_labels(&found, &after_n, &mut standing);
     }
-    Ok(JudgedPulls { pulls: found, standing })
+    Ok(JudgedPulls { pulls: found, standing, warnings })
 }
 
-fn campaign_header(folder: &Path, hash: &mut Sha256) -> Result<CampaignHeader, PullFolderError> {
+/// What holds for all pulls, and what in its file means nothing.
+fn campaign_header(
+    folder: &Path,
+    hash: &mut Sha256,
+) -> Result<(CampaignHeader, Vec<String>), PullFolderError> {
     let path = folder.join(CAMPAIGN_FILE);
     let bytes = match std::fs::read(&path) {
         Ok(bytes) => bytes,
-        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(CampaignHeader::default()),
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok((CampaignHeader::default(), Vec::new())),
         Err(e) => return Err(TableError::Io { path, problem: e.to_string() }.into()),
     };
     feed(hash, CAMPAIGN_FILE, &bytes);
-    let text = String::from_utf8(bytes)
-        .map_err(|e| TableError::Io { path: path.clone(), problem: format!("not text: {e}") })?;
-    Ok(parse_header(&path, &text)?)
+    let text = String::from_utf8(bytes).map_err(|e| TableError::Io {
+        path: path.clone(),
+        problem: format!("not text, save it as UTF-8: {e}"),
+    })?;
+    Ok((parse_header(&path, &text)?, strays::unknown_keys(&path, &text)))
 }
 
 /// Names of the files in the folder of the traces; none where there is no such folder.

@@ -106,7 +106,7 @@ fn judged(bags: &Bags, read: Vec<ReadPull>, sha256: String) -> Result<JudgedPull
     if bags.file.campaign.label_evidence == LabelEvidenceKind::Trace {
         judge_labels(&pulls, &after_n, &mut standing);
     }
-    Ok(JudgedPulls { pulls, standing })
+    Ok(JudgedPulls { pulls, standing, warnings: Vec::new() })
 }
 
 /// A fault of the table, where it stands in the mapping.

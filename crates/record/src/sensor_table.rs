@@ -151,7 +151,7 @@ mod tests {
                 "time_s,reference_force_n,measured_force_n,session\n0,1,2,x\n1,1,2,y\n0,1,2,x\n",
                 "line 4, `time_s` is 0 after 0 in session `x`",
             ),
-            ("time_s,reference_force_n,measured_force_n\n0,1\n", "line: 2"),
+            ("time_s,reference_force_n,measured_force_n\n0,1\n", "cells of line 2: "),
             ("time_s,time_s,reference_force_n,measured_force_n\n", "two columns `time_s`"),
         ] {
             let error = read(table).unwrap_err().to_string();

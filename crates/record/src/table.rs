@@ -23,7 +23,7 @@ pub enum TableError {
         path: PathBuf,
     },
     /// The table lacks a column.
-    #[error("{}: there is no column `{column}`; found: {found}{}", .path.display(), semicolons(.found))]
+    #[error("{}: there is no column `{column}`; found: {found}{}", .path.display(), one_cell(.found))]
     Column {
         /// The table.
         path: PathBuf,
@@ -44,7 +44,7 @@ pub enum TableError {
     #[error(
         "{}: line {line}, `{column}` is `{value}`, it must be {wanted}{}",
         .path.display(),
-        decimal_comma(.value)
+        of_cell(.value)
     )]
     Cell {
         /// The table.
@@ -85,16 +85,82 @@ pub enum TableError {
 }
 
 /// What may be the matter with a header.
-fn semicolons(found: &str) -> &'static str {
-    let one_cell = found.contains(';') && !found.contains(", ");
-    if one_cell { " (the header is one cell with `;` in it: save it with commas)" } else { "" }
+fn one_cell(found: &str) -> &'static str {
+    if found.contains(", ") {
+        ""
+    } else if found.contains(';') {
+        " (the header is one cell with `;` in it: save it with commas)"
+    } else if found.contains('\t') {
+        " (the header is one cell with tabs in it: save it with commas)"
+    } else {
+        ""
+    }
 }
 
 /// What may be the matter with a cell.
-fn decimal_comma(cell: &str) -> String {
+fn of_cell(cell: &str) -> String {
     let with_point = cell.replacen(',', ".", 1);
-    let comma = cell.contains(',') && number(&with_point).is_some();
-    if comma { format!(" (`{cell}` has a decimal comma, write {with_point})") } else { String::new() }
+    if cell.contains(',') && number(&with_point).is_some() {
+        return format!(" (`{cell}` has a decimal comma, write {with_point})");
+    }
+    if is_clock(cell) {
+        return format!(" (`{cell}` is a clock time, write seconds from the start as a number: 0, 45.5, 91)");
+    }
+    String::new()
+}
+
+/// Whether a cell is a time of day, a date, or both.
+fn is_clock(cell: &str) -> bool {
+    let count = |of: &[char]| cell.chars().filter(|c| of.contains(c)).count();
+    let written = |c: char| c.is_ascii_digit() || ":-/.+ TZAPMapm".contains(c);
+    let digits = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+    let parts = count(&[':']) >= 1 || count(&['-', '/']) == 2;
+    parts && digits(cell.chars().next()) && cell.chars().all(written)
+}
+
+/// What is the matter with a file whose text cannot be read: with the place, and the way out in brackets.
+fn encoding(bytes: &[u8]) -> Option<(String, &'static str)> {
+    const SAVE: &str = " (save the table as UTF-8; spreadsheets call it \"CSV UTF-8\")";
+    if matches!(bytes, [0xff, 0xfe, ..] | [0xfe, 0xff, ..] | [0, _, ..] | [_, 0, ..]) {
+        return Some(("the file is UTF-16".into(), SAVE));
+    }
+    let at = std::str::from_utf8(bytes).err()?.valid_up_to();
+    let line = Lines { bytes, counted: 0, line: 1 }.at(at);
+    Some((format!("line {line} holds the byte 0x{:02x}, which is no UTF-8", bytes[at]), SAVE))
+}
+
+/// Counts the lines of a file; one ends at `\n`, `\r\n` or a `\r` alone.
+struct Lines<'a> {
+    bytes: &'a [u8],
+    counted: usize,
+    line: u64,
+}
+
+impl Lines<'_> {
+    /// The line of the row that begins at a byte. For the parser a row begins with what is left of the end of the line before it (the
+    /// `\n` of `\r\n`), and with empty lines. Bytes are asked for in order.
+    fn at(&mut self, byte: usize) -> u64 {
+        let mut to = byte.min(self.bytes.len());
+        while matches!(self.bytes.get(to), Some(b'\r' | b'\n')) {
+            to += 1;
+        }
+        while self.counted < to {
+            let next = self.bytes.get(self.counted + 1);
+            let ends = match self.bytes[self.counted] {
+                b'\n' => true,
+                b'\r' => next != Some(&b'\n'),
+                _ => false,
+            };
+            self.line += u64::from(ends);
+            self.counted += 1;
+        }
+        self.line
+    }
+
+    /// The same of a place of the parser.
+    fn of(&mut self, position: Option<&csv::Position>) -> u64 {
+        position.map_or(0, |p| self.at(usize::try_from(p.byte()).unwrap_or(usize::MAX)))
+    }
 }
 
 /// The content of a file.
@@ -111,6 +177,7 @@ pub(crate) struct TableReader<'a> {
     names: Vec<String>,
     reader: csv::Reader<&'a [u8]>,
     record: csv::StringRecord,
+    lines: Lines<'a>,
 }
 
 /// A row of a table.
@@ -128,11 +195,15 @@ impl<'a> TableReader<'a> {
     /// # Errors
     /// [`TableError::Format`].
     pub(crate) fn new(path: &'a Path, bytes: &'a [u8]) -> Result<Self, TableError> {
+        if let Some((problem, hint)) = encoding(bytes) {
+            return Err(TableError::Format { path: path.into(), problem, hint });
+        }
+        let mut lines = Lines { bytes, counted: 0, line: 1 };
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-        let header = reader.headers().map_err(|e| format_error(path, &e))?;
+        let header = reader.headers().map_err(|e| format_error(path, &mut lines, &e))?;
         // The parser takes a byte order mark off the file; a header pasted behind another has one inside.
         let names = header.iter().map(|name| name.trim_start_matches('\u{feff}').trim().into()).collect();
-        Ok(Self { path, names, reader, record: csv::StringRecord::new() })
+        Ok(Self { path, names, reader, record: csv::StringRecord::new(), lines })
     }
 
     /// Names of the columns, empty where a column has none.
@@ -174,20 +245,24 @@ impl<'a> TableReader<'a> {
     /// # Errors
     /// [`TableError::Format`].
     pub(crate) fn row(&mut self) -> Result<Option<Row<'_>>, TableError> {
-        let more = self.reader.read_record(&mut self.record).map_err(|e| format_error(self.path, &e))?;
-        let line = self.record.position().map_or(0, csv::Position::line);
+        let more = self.reader.read_record(&mut self.record);
+        let more = more.map_err(|e| format_error(self.path, &mut self.lines, &e))?;
+        let line = self.lines.of(self.record.position());
         Ok(more.then_some(Row { path: self.path, names: &self.names, record: &self.record, line }))
     }
 }
 
-fn format_error(path: &Path, e: &csv::Error) -> TableError {
-    let hint = match e.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } if len > expected_len => {
-            " (a number with a decimal comma counts as two cells)"
+fn format_error(path: &Path, lines: &mut Lines<'_>, e: &csv::Error) -> TableError {
+    let (problem, hint) = match e.kind() {
+        csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
+            let hint =
+                if len > expected_len { " (a number with a decimal comma counts as two cells)" } else { "" };
+            let line = lines.of(pos.as_ref());
+            (format!("cells of line {line}: {len}, of the header: {expected_len}"), hint)
         }
-        _ => "",
+        _ => (e.to_string(), ""),
     };
-    TableError::Format { path: path.into(), problem: e.to_string(), hint }
+    TableError::Format { path: path.into(), problem, hint }
 }
 
 impl Row<'_> {
@@ -270,7 +345,10 @@ mod tests {
             assert_eq!(fault(text), wanted, "{text:?}");
         }
         let short = fault("force_n,a\n1\n");
-        assert!(short.contains("line: 2") && !short.contains("comma"), "{short}");
+        assert!(
+            short.contains("cells of line 2: 1, of the header: 2") && !short.contains("comma"),
+            "{short}"
+        );
     }
 
     #[test]
@@ -285,10 +363,51 @@ mod tests {
         assert!(quoted.ends_with("it must be a number (`12,5` has a decimal comma, write 12.5)"), "{quoted}");
         let bare = fault("force_n,a\n12,5,2\n");
         assert!(
-            bare.contains("line: 2") && bare.ends_with("(a number with a decimal comma counts as two cells)"),
+            bare.contains("cells of line 2: 3, of")
+                && bare.ends_with("(a number with a decimal comma counts as two cells)"),
             "{bare}"
         );
         assert!(!fault("force_n,a\n\"1,2,3\",2\n").contains("decimal comma"));
+    }
+
+    /// Files of Windows, of old Macs, with empty lines, with a line inside a cell, behind a byte order mark.
+    #[test]
+    fn lines_are_those_of_an_editor() {
+        for (text, line) in [
+            ("force_n,a\r\n1,2\r\n3,4\r\nx,2\r\n", 4),
+            ("\u{feff}force_n,a\r\n1,2\r\nx,2", 3),
+            ("\u{feff}force_n,a\n1,2\nx,2\n", 3),
+            ("force_n,a\r1,2\rx,2\r", 3),
+            ("force_n,a\n\n\n1,2\n\nx,2\n", 6),
+            ("force_n,a\r\n\r\nx,2\r\n", 3),
+            ("force_n,a\r\n1,\"b\r\nc\"\r\nx,2\r\n", 4),
+        ] {
+            let said = fault(text);
+            assert!(said.contains(&format!("line {line}, `force_n` is `x`")), "{text:?}: {said}");
+        }
+        let short = fault("force_n,a\r\n1,2\r\n1\r\n");
+        assert!(short.contains("cells of line 3: 1, of the header: 2"), "{short}");
+    }
+
+    #[test]
+    fn other_encodings_tabs_and_clocks_are_named() {
+        let read = |bytes: &[u8]| TableReader::new(Path::new("a.csv"), bytes).err().unwrap().to_string();
+        let latin = read(b"force_n,op\r\n1,J\xf6rg\r\n");
+        assert!(latin.contains("line 2 holds the byte 0xf6") && latin.contains("as UTF-8"), "{latin}");
+        let wide: Vec<u8> = "\u{feff}force_n\n1\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        for bytes in [&wide[..], &wide[2..]] {
+            let said = read(bytes);
+            assert!(said.contains("the file is UTF-16") && said.contains("as UTF-8"), "{said}");
+        }
+        let tabs = fault("time_s\tforce_n\n0\t1\n");
+        assert!(tabs.ends_with("(the header is one cell with tabs in it: save it with commas)"), "{tabs}");
+        for clock in ["09:15:00", "9:15 AM", "2026-05-01T09:15:00Z", "2026-05-01", "1/5/2026 9:15"] {
+            let said = fault(&format!("force_n,a\n{clock},2\n"));
+            assert!(said.contains("is a clock time, write seconds from the start"), "{said}");
+        }
+        for word in ["x", "-5-", "a:b", "12-3", ":"] {
+            assert!(!fault(&format!("force_n,a\n{word},2\n")).contains("clock"), "{word}");
+        }
     }
 
     #[test]

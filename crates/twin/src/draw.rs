@@ -112,6 +112,14 @@ impl Distribution {
         }
     }
 
+    /// The only value that it has; `None` of one that gives several, or none of its own.
+    pub fn constant(&self) -> Option<&Drawn> {
+        match self {
+            Distribution::Choice(values) => values.first().filter(|first| values.iter().all(|v| v == *first)),
+            _ => None,
+        }
+    }
+
     /// As it stands in `[vary]`.
     pub fn to_toml(&self) -> toml::Value {
         let pair = |name: &str, a: f64, b: f64| {
@@ -176,6 +184,14 @@ mod tests {
             c
         });
         assert_eq!(counts, [1000; 3]);
+    }
+
+    #[test]
+    fn a_list_of_one_value_is_constant() {
+        let of = |values: &[f64]| Distribution::Choice(values.iter().map(|&x| Drawn::Number(x)).collect());
+        assert_eq!(of(&[3.0, 3.0]).constant(), Some(&Drawn::Number(3.0)));
+        assert_eq!(of(&[3.0, 4.0]).constant(), None);
+        assert_eq!(Distribution::Uniform { low: 1.0, high: 2.0 }.constant(), None);
     }
 
     #[test]

@@ -88,6 +88,7 @@ pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep, is_twin_key};
 pub use table::{TABLE_EFFECT, Table, TableTarget, table_factor, table_offset_n};
 pub use trace::{PullTrace, TraceRow};
 pub use twin::{
-    DEFAULTED_SECTIONS, Elastic, Gel, Gripper, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist,
+    DEFAULTED_SECTIONS, Elastic, Gel, Gripper, LARGEST_MU, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin,
+    Wrist,
 };
 pub use values::Values;

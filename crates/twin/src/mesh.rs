@@ -3,6 +3,7 @@
 mod glb;
 mod look;
 mod obj;
+mod orient;
 mod pieces;
 mod ply;
 mod stl;

@@ -9,6 +9,7 @@ use crate::effects::{self, Effect};
 use crate::frames::{Pose, pose};
 use crate::table::{TABLE_EFFECT, Table, check_table};
 use crate::{Jaw, PerJaw};
+pub use check::LARGEST_MU;
 use check::{check_arm, check_effect, check_gel, check_part, check_twist};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;

@@ -2,7 +2,7 @@
 
 use crate::args::CalibratePullsArgs;
 use crate::failure::Failure;
-use crate::load::{folders, jobs, load_library, load_twin, no_pulls, suspects};
+use crate::load::{folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects};
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use crate::posterior;
@@ -10,7 +10,7 @@ use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
 use gripgen::{
     CalibratePullsError, ImprintCalibrations, Location, calibrate_imprints, calibrate_twin, edited_twin_toml,
-    load_pulls_with, load_twin_document, pull_priors,
+    load_twin_document, pull_priors,
 };
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -27,8 +27,7 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &args.set)?;
     let library = load_library(&twin, &args.twin)?;
-    let loaded =
-        load_pulls_with(&measured, suspects(args.include_suspect)).map_err(|e| no_pulls(&measured, &e))?;
+    let loaded = load_pulls_to_fit(&measured, suspects(args.include_suspect), &args.talk, false)?;
     let twin_at = Location::parse(&args.twin);
     let document = load_twin_document(&twin_at, &args.set)?;
     let request = CalibrateRequest {
@@ -62,6 +61,7 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
             let file = name.to_string_lossy();
             document["posterior"] = json!({"file": file, "draws": found.posterior.draws.len()});
         }
+        document["warnings"] = json!(loaded.warnings);
         sink.document(&document)?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
@@ -74,9 +74,23 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
             .chain(&imprints.notes)
             .chain(&found.notes)
             .for_each(|note| eprintln!("note: {note}"));
+        if found.leans_on_beliefs {
+            eprintln!("note: {}", beliefs(loaded.pulls.pulls.len()));
+        }
         eprintln!("the twin: {}", args.out.display());
     }
     Ok(0)
+}
+
+/// What is to be known of a fit to a few pulls.
+fn beliefs(pulls: usize) -> String {
+    let few = match pulls {
+        1 => "one pull is not enough on its own".into(),
+        n => format!("{n} pulls like these are not enough on their own"),
+    };
+    format!(
+        "{few}: the intervals lean on what is believed of parts and rigs (assets/priors/pulls.toml, or a calibrated --twin; docs/few-pulls.md)"
+    )
 }
 
 fn estimate(p: &ParameterEstimate) -> Value {
@@ -108,6 +122,8 @@ fn json_of(found: &PullCalibration, imprints: &ImprintCalibrations, pulls: usize
         "channel": "pulls",
         "data": {"pulls": pulls, "sha256": sha256},
         "notes": found.notes,
+        "outliers": found.outliers,
+        "leans_on_beliefs": found.leans_on_beliefs,
         "fitted_grip_force_n": [found.grip_force_n.0, found.grip_force_n.1],
         "baseline": named(&found.baseline),
         "laws": laws,

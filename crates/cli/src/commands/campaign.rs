@@ -1,13 +1,14 @@
 //! `gripgen campaign`: plan a campaign.
 
 use super::diagnose::diagnose_folders;
-use super::diagnose::output::next_toml;
+use super::diagnose::next::{next_toml, twin_words};
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::load::{load_library, load_twin, within_rig};
 use crate::mark::Format;
 use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
+use crate::shell;
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::record::{campaign_toml, write_pull_folder};
 use gripgen::twin::effects::OutsideFit;
@@ -35,8 +36,8 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     let twin = within_rig(load_twin(&args.twin, &args.set)?, Some(rig))?;
     let (campaign, separating) = match &args.separate {
         Some(measured) => {
-            let next = separating(args, measured, &twin)?;
-            let text = next_toml(&next, measured, &args.twin);
+            let (next, sha256) = separating(args, measured, &twin)?;
+            let text = next_toml(&next, measured, &args.twin, &sha256);
             (next.campaign, Some(text))
         }
         None => (first(args, &twin)?, None),
@@ -76,7 +77,7 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         print(&format!("{hours}\n{}\n", args.out.display()))?;
         if let Some(folder) = simulated {
             print(&format!("{}\n", folder.display()))?;
-            eprintln!("next: {} diagnose {}", program(), folder.display());
+            eprintln!("next: {}", diagnosis_of(args, folder));
         }
     }
     Ok(0)
@@ -93,16 +94,24 @@ fn first(args: &CampaignArgs, twin: &Twin) -> Result<Campaign, Failure> {
     })
 }
 
-/// The pulls that separate what a diagnosis of `measured` leaves tied.
-fn separating(args: &CampaignArgs, measured: &Path, twin: &Twin) -> Result<NextPulls, Failure> {
+/// The command that diagnoses the pulls that were made, with the twin that they were made on.
+fn diagnosis_of(args: &CampaignArgs, folder: &Path) -> String {
+    let mut words = vec![program().to_string(), "diagnose".into(), shell::path(folder)];
+    words.extend(twin_words(&args.twin, &args.set, args.rig.as_deref()));
+    shell::command_line(&words)
+}
+
+/// The pulls that separate what a diagnosis of `measured` leaves tied, and the hash of these measurements.
+fn separating(args: &CampaignArgs, measured: &Path, twin: &Twin) -> Result<(NextPulls, String), Failure> {
     let library = load_library(twin, &args.twin)?;
     let diagnosed = diagnose_folders(&[measured], twin, &library, &[], Suspects::Screen, &args.talk)?;
-    diagnosed.next.ok_or_else(|| {
+    let next = diagnosed.next.ok_or_else(|| {
         let found =
             format!("--separate: {} leaves nothing tied that pulls could separate", measured.display());
         Failure::usage(found)
             .hint("`gripgen diagnose` says what was found; without --separate a first campaign is planned")
-    })
+    })?;
+    Ok((next, diagnosed.diagnosis.data.sha256))
 }
 
 fn options(args: &CampaignArgs, twin: &Twin) -> Result<CampaignOptions, Failure> {

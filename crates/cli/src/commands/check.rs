@@ -4,10 +4,12 @@ use crate::args::{CheckArgs, ConfigArgs, JsonArgs, TalkArgs};
 use crate::failure::{Failure, code};
 use crate::output::{JsonSink, count, duration, size};
 use crate::outputs::Outputs;
+use crate::shell;
 use gripgen::record::{proto::gripgen_v1::Status, status_name};
 use gripgen::tactile::{LINEAR_PRESSURE_SHARE, SimdLevel};
-use gripgen::{Location, Plan, Project, plan};
+use gripgen::{Location, Plan, Project, Unvaried, plan, unvaried};
 use serde_json::json;
+use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &CheckArgs) -> Result<u8, Failure> {
@@ -24,10 +26,11 @@ pub fn check(
 ) -> Result<u8, Failure> {
     let mut outputs = Outputs::of(verb, json.force).reads_config(&config.config, &config.set);
     let mut sink = JsonSink::open(json.json.as_deref(), &mut outputs)?;
-    let project = Project::load(&Location::parse(&config.config), &config.set)?;
+    let project = load(config)?;
     let plan = plan(&project, SimdLevel::best())?;
     let jobs = jobs.unwrap_or_else(cores).max(1);
     let failed: Vec<_> = plan.probes.iter().filter(|p| p.failure.is_some()).collect();
+    let warnings = [standing_still(&project), of_probes(&plan), of_plan(&plan)].concat();
     if sink.wanted() {
         let probes: Vec<_> = plan
             .probes
@@ -57,72 +60,96 @@ pub fn check(
             "jobs": jobs,
             "probes": probes,
             "grips": grips,
+            "warnings": warnings,
         }))?;
     }
     if !talk.quiet {
         eprint!("{}", describe(&project, &plan, jobs));
-        for probe in &plan.probes {
-            let index = probe.index;
-            if probe.lag_exceeds_tolerance {
-                eprintln!(
-                    "warning: sample {index}: the force loop trails the staircase by more than half the label \
-                     tolerance, its label may come before the slip; smaller increments or longer steps help"
-                );
-            }
-            if let Some(share) = probe.pressure_over_modulus.filter(|share| *share > LINEAR_PRESSURE_SHARE) {
-                eprintln!(
-                    "warning: sample {index}: the contact's mean pressure is {share:.2} times the gel's modulus, linear \
-                     elasticity holds to about {LINEAR_PRESSURE_SHARE}: press and image are an extrapolation; a lighter grip or \
-                     a stiffer gel (young_modulus_mpa) stays inside, `model = \"pyramid\"` has no such limit"
-                );
-            }
-            match probe.status {
-                Status::Failed => {
-                    eprintln!(
-                        "warning: sample {index} will fail: {}",
-                        probe.failure.as_deref().unwrap_or("")
-                    );
-                }
-                Status::NoContact => {
-                    eprintln!("warning: sample {index} misses the part (label 0, no_contact)");
-                }
-                Status::Censored => {
-                    eprintln!("warning: sample {index} ends before the jaws slip (censored: a lower bound)");
-                }
-                _ => {}
-            }
+        for warning in &warnings {
+            eprintln!("warning: {warning}");
         }
-    }
-    if !talk.quiet {
-        eprint!("{}", warnings(&plan));
+        if plan.grips.iter().any(|g| !g.failed.is_empty()) {
+            eprintln!(
+                "hint: `gripgen init` tries grips before it proposes them; narrow [vary], or move the grips in the twin"
+            );
+        }
     }
     let grips_fail = plan.grips.iter().any(|g| !g.failed.is_empty());
     Ok(if failed.is_empty() && !grips_fail { 0 } else { code::SAMPLES_FAILED })
 }
 
-/// What a sweep over these grips and meshes will run into.
-fn warnings(plan: &Plan) -> String {
-    let mut text = String::new();
-    for (part, open_edges) in &plan.open_meshes {
-        text += &format!(
-            "warning: the mesh of {part} is open: {open_edges} edges belong to one triangle only, gels sink into its holes\n"
+/// The sweep that was named.
+pub(super) fn load(config: &ConfigArgs) -> Result<Project, Failure> {
+    let path = Path::new(&config.config);
+    if path.is_dir() {
+        let inside = path.join("sweep.toml");
+        let hint = match inside.is_file() {
+            true => format!("its sweep is {}", shell::quoted(&shell::path(&inside))),
+            false => "name the TOML file of a sweep; `gripgen init FOLDER` writes one into a folder".into(),
+        };
+        return Err(
+            Failure::usage(format!("{}: this is a folder, a file is wanted", path.display())).hint(hint)
         );
     }
-    for grip in plan.grips.iter().filter(|g| !g.failed.is_empty()) {
+    Ok(Project::load(&Location::parse(&config.config), &config.set)?)
+}
+
+/// What the twin depends on and the sweep leaves at one value, a sentence each.
+pub(super) fn standing_still(project: &Project) -> Vec<String> {
+    unvaried(project).iter().map(Unvaried::to_string).collect()
+}
+
+/// What the samples that were tried out run into.
+fn of_probes(plan: &Plan) -> Vec<String> {
+    let mut all = Vec::new();
+    for probe in &plan.probes {
+        let index = probe.index;
+        if probe.lag_exceeds_tolerance {
+            all.push(format!(
+                "sample {index}: the force loop trails the staircase by more than half the label tolerance, its label may come \
+                 before the slip; smaller increments or longer steps help"
+            ));
+        }
+        if let Some(share) = probe.pressure_over_modulus.filter(|share| *share > LINEAR_PRESSURE_SHARE) {
+            all.push(format!(
+                "sample {index}: the contact's mean pressure is {share:.2} times the gel's modulus, linear elasticity holds to \
+                 about {LINEAR_PRESSURE_SHARE}: press and image are an extrapolation; a lighter grip or a stiffer gel \
+                 (young_modulus_mpa) stays inside, `model = \"pyramid\"` has no such limit"
+            ));
+        }
+        match probe.status {
+            Status::Failed => {
+                all.push(format!("sample {index} will fail: {}", probe.failure.as_deref().unwrap_or("")));
+            }
+            Status::NoContact => all.push(format!("sample {index} misses the part (label 0, no_contact)")),
+            Status::Censored => {
+                all.push(format!("sample {index} ends before the jaws slip (censored: a lower bound)"));
+            }
+            _ => {}
+        }
+    }
+    all
+}
+
+/// What a sweep over these grips and meshes will run into.
+fn of_plan(plan: &Plan) -> Vec<String> {
+    let open = plan.open_meshes.iter().map(|(part, open_edges)| {
+        format!(
+            "the mesh of {part} is open: {open_edges} edges belong to one triangle only, gels sink into its holes"
+        )
+    });
+    let failing = plan.grips.iter().filter(|g| !g.failed.is_empty()).map(|grip| {
         let (index, reason) = &grip.failed[0];
-        text += &format!(
-            "warning: {} of {} grips tried at the ends of the sweep's forces, offsets and angles fail with grip_pose {} of {}; \
-             sample {index}: {reason}\n",
+        format!(
+            "{} of {} grips tried at the ends of the sweep's forces, offsets and angles fail with grip_pose {} of {}; sample \
+             {index}: {reason}",
             grip.failed.len(),
             grip.tried,
             grip.grip_pose,
             grip.part
-        );
-    }
-    if plan.grips.iter().any(|g| !g.failed.is_empty()) {
-        text += "hint: `gripgen init` tries grips before it proposes them; narrow [vary], or move the grips in the twin\n";
-    }
-    text
+        )
+    });
+    open.chain(failing).collect()
 }
 
 /// Worker threads where the user names none.
@@ -142,7 +169,9 @@ pub fn describe(project: &Project, plan: &Plan, jobs: usize) -> String {
     );
     let cpu = plan.estimated_cpu.as_secs_f64();
     text += &format!("about {} on {}\n", duration(cpu / jobs as f64), count(jobs as u64, "core"));
-    let varied: Vec<&str> = sweep.vary.iter().map(|v| v.key.as_str()).collect();
-    text += &format!("varies: {}\n", varied.join(", "));
+    let varies = sweep.vary.iter().filter(|v| v.distribution.constant().is_none());
+    let varied: Vec<&str> = varies.map(|v| v.key.as_str()).collect();
+    let varied = if varied.is_empty() { "nothing".into() } else { varied.join(", ") };
+    text += &format!("varies: {varied}\n");
     text
 }

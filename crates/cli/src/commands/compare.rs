@@ -6,7 +6,8 @@ use crate::commands::compare_sensor;
 use crate::commands::imprints;
 use crate::failure::Failure;
 use crate::load::{
-    folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls, say_circles, suspects,
+    folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls, say_circles, say_warnings,
+    suspects,
 };
 use crate::mark::Format;
 use crate::output::{JsonSink, print};
@@ -93,6 +94,7 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
     let twin = load_twin(&args.twin, &[])?;
     let suspects = suspects(args.include_suspect);
     let loaded = load_pulls_with(&measured, suspects).map_err(|e| no_pulls(&measured, &e))?;
+    say_warnings(&loaded, &args.talk);
     let library = load_library(&twin, &args.twin)?;
     let twin_at = Location::parse(&args.twin);
     let draws = posterior_twins(&twin_at, &load_twin_document(&twin_at, &[])?).map_err(Failure::from)?;

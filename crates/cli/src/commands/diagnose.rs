@@ -1,12 +1,15 @@
 //! `gripgen diagnose`: where a twin is wrong, and why.
 
-pub mod output;
+pub mod next;
+mod notes;
+mod output;
 mod presses;
+mod units;
 
 use crate::args::{DiagnoseArgs, TalkArgs};
 use crate::commands::imprints;
 use crate::failure::Failure;
-use crate::load::{folders, jobs, load_library, load_twin, no_pulls, suspects, within_rig};
+use crate::load::{folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects, within_rig};
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use crate::posterior;
@@ -15,7 +18,7 @@ use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
 use gripgen::{
     Diagnosed, Library, PullDiagnoseOptions, Suspects, diagnose_pull_table, diagnose_sensor_table,
-    is_imprint_set, is_press_set, is_sensor_table, load_pulls_with, load_sensor_table,
+    is_imprint_set, is_press_set, is_sensor_table, load_sensor_table,
 };
 use std::path::Path;
 
@@ -74,12 +77,12 @@ pub fn diagnose_folders(
     suspects: Suspects,
     talk: &TalkArgs,
 ) -> Result<Diagnosed, Failure> {
-    let loaded = load_pulls_with(measured, suspects).map_err(|e| no_pulls(measured, &e))?;
+    let loaded = load_pulls_to_fit(measured, suspects, talk, true)?;
     let options = PullDiagnoseOptions { jobs: jobs(), without };
     let share = Share::start("diagnosing", talk);
     let diagnosed = diagnose_pull_table(&loaded.pulls, twin, library, &options, &|x| share.at(x));
     share.finish();
     let mut diagnosed = diagnosed.map_err(|e| Failure::usage(&e).hint(e.hint()))?;
-    diagnosed.diagnosis.notes.extend(loaded.notes);
+    diagnosed.diagnosis.notes.extend(loaded.notes.into_iter().chain(loaded.warnings));
     Ok(diagnosed)
 }

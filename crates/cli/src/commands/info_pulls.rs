@@ -2,7 +2,7 @@
 
 use crate::args::InfoArgs;
 use crate::failure::Failure;
-use crate::load::no_pulls;
+use crate::load::{no_pulls, say_warnings};
 use crate::output::{JsonSink, count, print};
 use gripgen::record::{PULLS_FILE, ROSBAG_FILE};
 use gripgen::{Level, levels, load_pulls_of};
@@ -48,6 +48,7 @@ pub fn levels_table(parts: &BTreeMap<String, Vec<Level>>) -> String {
 pub fn run(args: &InfoArgs, mut sink: JsonSink) -> Result<u8, Failure> {
     let folder = [args.run.as_path()];
     let loaded = load_pulls_of(&folder).map_err(|e| no_pulls(&folder, &e))?;
+    say_warnings(&loaded, &args.talk);
     let measured = &loaded.pulls;
     let mut labels: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
     for pull in &measured.pulls {

@@ -6,6 +6,7 @@ use crate::failure::Failure;
 use crate::mark::Format;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
+use crate::shell;
 use gripgen::twin::{MESH_FORMATS, usual_scale_mm_per_unit};
 use gripgen::{PartOptions, benchmark_starter, part_starter, starter};
 use serde_json::json;
@@ -50,8 +51,9 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     paths.iter().zip(&files).try_for_each(|(path, file)| outputs.write(path, Format::Bare, &file.bytes))?;
     if !args.talk.quiet {
         eprint!("{talk}");
-        let sweep = folder.join("sweep.toml");
-        eprintln!("next: {1} check {0}, then {1} sweep {0}", sweep.display(), program());
+        let sweep = shell::path(&folder.join("sweep.toml"));
+        let command = |verb: &str| shell::command_line(&[program(), verb, &sweep]);
+        eprintln!("next: {}, then {}", command("check"), command("sweep"));
     }
     if sink.wanted() {
         let grips: Vec<_> = made
@@ -72,6 +74,9 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
                 "grip_angle_deg": varied.grip_angle_deg,
             });
             document["mesh"] = json!(made.mesh_words);
+            for (grip, words) in made.doubts.iter().enumerate() {
+                document["grips"][grip]["warnings"] = json!(words);
+            }
         }
         sink.document(&document)?;
         if sink.on_stdout() {

@@ -12,9 +12,7 @@ use gripgen::record::{RunFolder, status_name};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::Jaw;
 use gripgen::twin::config::ImageStorage;
-use gripgen::{
-    CONTACT_SHEET, Location, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet, sweep,
-};
+use gripgen::{CONTACT_SHEET, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet, sweep};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -26,7 +24,7 @@ pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
     if args.dry_run {
         return check::check("sweep", &args.config, args.jobs, &args.json, &args.talk);
     }
-    let project = Project::load(&Location::parse(&args.config.config), &args.config.set)?;
+    let project = check::load(&args.config)?;
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&project.name));
     let jobs = args.jobs.unwrap_or_else(check::cores).max(1);
     let options = SweepOptions { jobs, slice: args.slice, simd: simd_level(args)? };
@@ -40,6 +38,9 @@ pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
         let page = LivePage::open(port, State::new(format!("sweep {}", project.name), "samples", 0, 0))?;
         watch.say(&format!("live: {}", page.url()));
         watch.page = Some(page);
+    }
+    for still in check::standing_still(&project) {
+        watch.say(&format!("warning: {still}"));
     }
     let stop = stop_flag("finishing the shards under way");
     let result = sweep(&project, &out, options, stop, |event| watch.on_event(&event));

@@ -7,6 +7,7 @@ use crate::failure::Failure;
 use crate::mark::Format;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
+use crate::shell;
 use gripgen::twin::usual_scale_mm_per_unit;
 use gripgen::{GripTried, PartOptions, TriedPart, TryOptions, TryPartError, try_part};
 use serde_json::{Value, json};
@@ -41,7 +42,7 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
     outputs.write(&picture, Format::Png, &tried.picture)?;
     if !args.talk.quiet {
         eprint!("{}", summary(&tried));
-        eprintln!("next: {} init {} -o {stem}", program(), args.mesh.display());
+        eprintln!("next: {}", next(args, &stem));
     }
     if sink.wanted() {
         sink.document(&document(&tried, &page, &picture))?;
@@ -52,10 +53,24 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
     Ok(0)
 }
 
+/// The command that makes a sweep of the part as it was read here.
+fn next(args: &TryArgs, stem: &str) -> String {
+    let mut words = vec![program().to_string(), "init".into(), shell::path(&args.mesh)];
+    if let Some(scale) = args.scale_mm_per_unit {
+        words.extend(["--scale-mm-per-unit".into(), scale.to_string()]);
+    }
+    if args.accept_open_mesh {
+        words.push("--accept-open-mesh".into());
+    }
+    words.extend(["-o".into(), shell::operand(stem)]);
+    shell::command_line(&words)
+}
+
 fn refused(error: TryPartError) -> Failure {
     let hint = match &error {
         TryPartError::Init(e) => e.hint(),
         TryPartError::NoSuchGrip { .. } => "leave --grip out to see them all".into(),
+        TryPartError::Friction { .. } => "mu is the pull at slip over both grip forces: F / (2 F_G)".into(),
         TryPartError::Fails { .. } | TryPartError::Force { .. } => "try a smaller --force-n".into(),
         _ => "name a sensor file that `gripgen calibrate presses` wrote".into(),
     };
@@ -85,6 +100,9 @@ fn summary(tried: &TriedPart) -> String {
             "grip {}: {:.1} mm between the jaws, {:.0} mm2 in contact{holds}{fails}\n",
             grip.grip_pose, p.width_mm, p.contact_mm2
         );
+        for words in &grip.doubts {
+            text += &format!("warning: grip {}: {words}\n", grip.grip_pose);
+        }
     }
     text
 }
@@ -110,6 +128,7 @@ fn document(tried: &TriedPart, page: &Path, picture: &Path) -> Value {
             "contact_mm2": g.proposal.contact_mm2, "lever_mm": g.proposal.lever_mm,
             "clearance_mm": g.proposal.clearance_mm, "image_force_n": g.force_n,
             "holding": holding.collect::<Vec<_>>(), "works": works.collect::<Vec<_>>(), "fails": g.fails,
+            "warnings": g.doubts,
         })
     };
     json!({

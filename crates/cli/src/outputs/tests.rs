@@ -231,7 +231,12 @@ fn verbs_write_through_one_function() {
     fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            if path.is_dir() { walk(&path, found) } else { found.push(path) }
+            match path.is_dir() {
+                true => walk(&path, found),
+                // Tests write what they read.
+                false if path.ends_with("tests.rs") => {}
+                false => found.push(path),
+            }
         }
     }
     let mut sources = Vec::new();

@@ -21,7 +21,11 @@ fn a_campaign_is_planned_and_made_once() {
         let (file, made) = (at(&format!("{name}.toml")), at(name));
         let output = run(&["campaign", "-o", &file, "--twin", twin, "--pulls", "24", "--simulate", &made]);
         assert_code(&output, 0);
-        assert!(!text(&output.stderr).contains("left out"), "{}", text(&output.stderr));
+        let talk = text(&output.stderr);
+        assert!(!talk.contains("left out"), "{talk}");
+        // The diagnosis that is proposed names the twin, unless it is the default.
+        let named = if twin.ends_with("/twin.toml") { format!(" --twin {twin}") } else { String::new() };
+        assert!(talk.lines().any(|line| line.ends_with(&format!(" diagnose {made}{named}"))), "{talk}");
         let plan = std::fs::read_to_string(&file).unwrap();
         let forces = plan.split("grip_force_n = ").skip(1);
         let forces: Vec<f64> = forces.map(|f| f.split(',').next().unwrap().parse().unwrap()).collect();

@@ -119,19 +119,33 @@ fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
     let said = text(&run(&["diagnose", one.path().to_str().unwrap()]).stdout);
     assert!(said.lines().count() <= 5 && said.starts_with("The data cannot answer"), "{said}");
     assert!(said.lines().last().unwrap().starts_with("next: ") && said.contains(" campaign -o "), "{said}");
-    // Quiet is quiet. The pulls of an earlier diagnosis are planned anew, and go where there are none to make; a file of somebody stays.
+    // Quiet is quiet. The pulls of an earlier diagnosis are planned anew, and go where there are none to make of the same measurements;
+    // those of others stay, and a file of somebody does.
     let equal: String = (0..14).map(|i| format!("p{i},long_shaft,40,16\n")).collect();
     let equal = folder(&format!("pull_id,part,grip_force_n,max_pull_force_n\n{equal}"));
     let own = marked("diagnose", "pulls = []\n");
-    for (at, text, left) in
-        [(&one, &own, Some(false)), (&equal, &own, None), (&one, &"pulls = []\n".into(), Some(true))]
-    {
+    let found = run(&["diagnose", equal.path().to_str().unwrap(), "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&found.stdout).unwrap();
+    let sha256 = json["data"]["sha256"].as_str().unwrap();
+    let same = marked("diagnose", &format!("# Measurements: SHA-256 {sha256}\npulls = []\n"));
+    for (at, text, left) in [
+        (&one, &own, Some(false)),
+        (&equal, &own, Some(true)),
+        (&equal, &same, None),
+        (&one, &"pulls = []\n".into(), Some(true)),
+    ] {
         let (next, out) = (at.path().join("next.toml"), at.path().join("out.toml"));
         std::fs::write(&next, text).unwrap();
         let found = run(&["diagnose", at.path().to_str().unwrap(), "-q", "-o", out.to_str().unwrap()]);
         assert_code(&found, 0);
         assert!(found.stdout.is_empty() && found.stderr.is_empty(), "{found:?}");
         assert_eq!(std::fs::read_to_string(&next).ok().map(|now| now == *text), left);
+    }
+    for (text_of, says) in [(&own, "next.toml of an earlier diagnosis was left there"), (&same, "removed ")] {
+        let (next, out) = (equal.path().join("next.toml"), equal.path().join("out.toml"));
+        std::fs::write(&next, text_of).unwrap();
+        let found = run(&["diagnose", equal.path().to_str().unwrap(), "-o", out.to_str().unwrap()]);
+        assert!(text(&found.stderr).contains(says), "{says}: {}", text(&found.stderr));
     }
     for (table, says) in [
         (pulls(12).replace("max_pull_force_n", "force"), "max_pull_force_n"),
@@ -144,6 +158,29 @@ fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
         assert_code(&refused, 2);
         assert!(text(&refused.stderr).contains(says), "{says}: {}", text(&refused.stderr));
     }
+}
+
+/// The next command names the twin that was named, and pulls that were planned are a list for who has no rig of ours.
+#[test]
+fn the_next_command_is_one_that_helps() {
+    let one = folder(&pulls(1));
+    let twin = one.path().join("a twin.toml");
+    let shipped = std::str::from_utf8(gripgen::assets::get("configs/twin-baseline.toml").unwrap()).unwrap();
+    std::fs::write(&twin, shipped.replace("\"../", "\"asset:")).unwrap();
+    let (at, twin) = (one.path().to_str().unwrap(), twin.to_str().unwrap());
+    let found = run(&["diagnose", at, "--twin", twin, "--set", "wrist.noise_n=0.2"]);
+    assert_code(&found, 0);
+    let said = text(&found.stdout);
+    let wanted = format!("--twin '{twin}' --set wrist.noise_n=0.2");
+    assert!(said.lines().last().unwrap().ends_with(&wanted), "{said}");
+    // Nor is a second campaign offered.
+    let (out, page) = (one.path().join("d.toml"), one.path().join("d.html"));
+    let more = ["-o", out.to_str().unwrap(), "--report", page.to_str().unwrap()];
+    let found = run(&[&["diagnose", at, "--twin", twin][..], &more[..]].concat());
+    let said = text(&found.stdout);
+    assert!(said.contains("next.toml lists (up to ") && !said.contains("rig pull"), "{said}");
+    let page = std::fs::read_to_string(page).unwrap();
+    assert!(!page.contains("campaign -o") && !page.contains("rig pull"));
 }
 
 /// Three pulls are calibrated and their draws lie beside the twin; a second time they are replaced, edited ones are not. `compare` reads

@@ -1,6 +1,8 @@
 //! `gripgen try`.
 
-use super::{assert_code, run, text};
+use super::{assert_code, gripgen, run, text};
+use gripgen::twin::{TriMesh, write_binary_stl};
+use std::path::Path;
 
 #[test]
 fn try_writes_a_page_and_a_picture() {
@@ -39,4 +41,59 @@ fn try_writes_a_page_and_a_picture() {
     let unread = run(&["try", folder.path().join("part.step").to_str().unwrap()]);
     assert_code(&unread, 2);
     assert!(text(&unread.stderr).contains("hint:") && text(&unread.stderr).contains("CAD"));
+}
+
+/// A box of 20 x 12 x 10 mm in inches, without one of its triangles.
+fn write_open_box(path: &Path) {
+    let corner = |i: u32| {
+        let at = |bit: u32, side_mm: f64| f64::from(i >> bit & 1) * side_mm / 25.4;
+        [at(0, 20.0), at(1, 12.0), at(2, 10.0)].into()
+    };
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [1, 3, 7, 5], [0, 4, 6, 2]];
+    let triangles = quads.into_iter().flat_map(|[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]]).take(11);
+    let mesh = TriMesh::new((0..8).map(corner).collect(), triangles.collect()).unwrap();
+    std::fs::write(path, write_binary_stl(&mesh, "open box", 1.0)).unwrap();
+}
+
+/// The command that is proposed reads the part as it was read, whatever its name is, and so do those that it proposes in turn.
+#[cfg(unix)]
+#[test]
+fn proposed_commands_run_as_they_are_copied() {
+    let folder = tempfile::tempdir().unwrap();
+    write_open_box(&folder.path().join("-it's a box.stl"));
+    let arguments = ["try", "./-it's a box.stl", "--accept-open-mesh", "--scale-mm-per-unit", "25.4"];
+    let tried = gripgen().current_dir(folder.path()).args(arguments).output().unwrap();
+    assert_code(&tried, 0);
+    let shell = |line: &str| {
+        let output = std::process::Command::new("sh").current_dir(folder.path()).args(["-c", line]).output();
+        output.unwrap()
+    };
+    let next = |output: &std::process::Output| {
+        let said = text(&output.stderr);
+        said.lines()
+            .find_map(|line| line.strip_prefix("next: "))
+            .unwrap_or_else(|| panic!("{said}"))
+            .to_string()
+    };
+    let line = next(&tried);
+    assert!(line.contains("--accept-open-mesh") && line.contains("--scale-mm-per-unit 25.4"), "{line}");
+    let made = shell(&line);
+    assert_code(&made, 0);
+    assert!(folder.path().join("-it's a box/sweep.toml").exists());
+    let line = next(&made);
+    let check = line.split(", then ").next().unwrap();
+    assert!(check.contains(" check "), "{line}");
+    assert_code(&shell(check), 0);
+}
+
+/// What a twin would refuse is refused here, with both numbers.
+#[test]
+fn friction_beyond_that_of_a_twin_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("gear.stl");
+    std::fs::write(&mesh, gripgen::assets::get("parts/gear/part.stl").unwrap()).unwrap();
+    let refused = run(&["try", mesh.to_str().unwrap(), "--mu", "150"]);
+    assert_code(&refused, 2);
+    let said = text(&refused.stderr);
+    assert!(said.contains("mu = 150") && said.contains("at most 5") && said.contains("hint:"), "{said}");
 }

@@ -385,7 +385,7 @@ pub fn insufficient(data: &PullData<'_>) -> Option<String> {
 }
 
 /// Pulls that lie far off, the farthest first.
-fn outliers(fitted: &Fitted) -> Vec<usize> {
+pub(super) fn outliers(fitted: &Fitted) -> Vec<usize> {
     let s = fitted.likelihood.scale;
     let mut far: Vec<(f64, usize)> = fitted
         .residuals

@@ -1,15 +1,17 @@
 //! Calibration of the baseline, with the effects that were asked for and no search.
 
-use super::answer::insufficient;
+use super::answer::{insufficient, outliers};
 use super::candidates::{Candidate, candidate};
 use super::context::Context;
 use super::data::PullData;
 use super::dynamics::Dynamics;
 use super::estimates::{baseline, parameters};
 use super::few::{FEW_PULLS, calibrate_few, lacks_forces};
+use super::few_diagnosis::FAR;
 use super::fitting::Fitted;
 use super::heldout::{errors, folds, predicted};
 use super::intervals::NormalFit;
+use super::label_noise::{TRIED_FROM_N, TRIED_TO_N};
 use super::law::largest_relative_sigma;
 use super::model::{PredictPulls, PullModel};
 use super::posterior::of_calibration;
@@ -55,6 +57,10 @@ pub struct PullCalibration {
     pub grip_force_n: (f64, f64),
     /// Draws of cause and parameters.
     pub posterior: Posterior,
+    /// Pulls that lie far off, the farthest first; they hardly weigh in the fit.
+    pub outliers: Vec<String>,
+    /// Whether the pulls were so few, or so alike, that they were weighed with what is believed before the first one.
+    pub leans_on_beliefs: bool,
     /// What is to be known beside it.
     pub notes: Vec<String>,
 }
@@ -109,6 +115,8 @@ pub fn calibrate_pulls(
     if let Some(priors) = request.priors.as_ref().filter(|_| few && request.effects.is_empty()) {
         let found = calibrate_few(&data, predictor, given, priors, request.offset_law)
             .ok_or(CalibrateError::NoFit)?;
+        let mut far: Vec<usize> = (0..data.len()).filter(|&i| found.deviations[i].abs() > FAR).collect();
+        far.sort_by(|&a, &b| found.deviations[b].abs().total_cmp(&found.deviations[a].abs()));
         return Ok(PullCalibration {
             model: found.model,
             baseline: found.baseline,
@@ -117,7 +125,9 @@ pub fn calibrate_pulls(
             error: None,
             grip_force_n: range,
             posterior: found.posterior,
-            notes: found.notes,
+            notes: far_off(measured, &far).into_iter().chain(found.notes).collect(),
+            outliers: names(measured, &far),
+            leans_on_beliefs: true,
         });
     }
     if let Some(missing) = missing {
@@ -162,6 +172,8 @@ pub fn calibrate_pulls(
     let (stated, fitted) = context.stated(&found);
     let held = predicted(&stated, &fitted, &folds(data.len()), false);
     let law_of = request.offset_law.then_some(&given.mu[..]);
+    let far = outliers(&fitted);
+    let noise = at_bound(fitted.model.noise_n).filter(|_| context.noise90_n.is_some());
     let drawn = of_calibration(&found, &normal, &fitted, &data.parts, law_of);
     let laws =
         if request.offset_law { laws(&context, &found, &normal, &terms, given, range) } else { vec![] };
@@ -185,9 +197,51 @@ pub fn calibrate_pulls(
         error: errors(&data.label_n, &held, &held, &data.group_of, &rows).map(|pair| pair.after),
         grip_force_n: range,
         posterior: drawn,
-        notes: vec![],
+        notes: far_off(measured, &far).into_iter().chain(noise).collect(),
+        outliers: names(measured, &far),
+        leans_on_beliefs: false,
         model: fitted.model,
     })
+}
+
+fn names(measured: &MeasuredPulls, rows: &[usize]) -> Vec<String> {
+    rows.iter().map(|&i| measured.pulls[i].id.clone()).collect()
+}
+
+/// Pulls named in a sentence.
+const NAMED: usize = 8;
+
+/// What is said of pulls that lie far off, the farthest first.
+fn far_off(measured: &MeasuredPulls, rows: &[usize]) -> Option<String> {
+    let first = &measured.pulls[*rows.first()?];
+    let all = names(measured, &rows[..rows.len().min(NAMED)]).join(", ");
+    let more = if rows.len() > NAMED { ", ..." } else { "" };
+    Some(format!(
+        "{} of {} pulls lie far off ({all}{more}) and hardly weigh in the fit; pull {} has {} N at a grip force of {} N",
+        rows.len(),
+        measured.pulls.len(),
+        first.id,
+        first.max_pull_force_n,
+        first.grip_force_n
+    ))
+}
+
+/// What is said of a noise that labels alone would have beyond what is tried.
+fn at_bound(noise_n: f64) -> Option<String> {
+    let near = |end: f64| (noise_n / end - 1.0).abs() < 1e-6;
+    let (end, beyond) = if near(TRIED_TO_N) {
+        let beyond =
+            "a force sensor with a wrong zero may look like it, or something that was not written down";
+        ("upper", beyond)
+    } else if near(TRIED_FROM_N) {
+        ("lower", "it may be smaller")
+    } else {
+        return None;
+    };
+    Some(format!(
+        "the noise of a reading, {noise_n:.2} N, is the {end} end of what was tried ({TRIED_FROM_N} to {TRIED_TO_N} N): {beyond}; traces with \
+         readings without a load show it"
+    ))
 }
 
 /// The baseline with its intervals.
@@ -204,18 +258,17 @@ fn intervals(
             let (low, high) = normal.of_parameter(k);
             // About the value that is stated.
             let moved = estimate.value - fitted.values[k];
-            (estimate.low90, estimate.high90) = (low + moved, high + moved);
+            *estimate = ParameterEstimate::new(estimate.value, (low + moved, high + moved), &estimate.unit);
         }
     }
     if let (Some(slips), Some(estimate)) = (slips, baseline.get_mut("kinetic_ratio")) {
-        let (low, high) = slips.ratio90();
         // The fit may have moved the value a little.
-        (estimate.low90, estimate.high90) = (low.min(estimate.value), high.max(estimate.value));
+        *estimate = ParameterEstimate::new(estimate.value, slips.ratio90(), &estimate.unit);
     }
     let known = dynamics.into_iter().flatten().zip(["robot.lag_s", "robot.dead_time_s"]);
     for ((value, low, high), name) in known.chain([(scattered, "scatter")]) {
         if let Some(estimate) = baseline.get_mut(name) {
-            (estimate.value, estimate.low90, estimate.high90) = (value, low, high);
+            *estimate = ParameterEstimate::new(value, (low, high), &estimate.unit);
         }
     }
     baseline
@@ -276,4 +329,17 @@ fn laws(
             })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_noise_at_an_end_of_what_was_tried_is_said_with_both_numbers() {
+        let upper = at_bound(libm::exp(libm::log(TRIED_TO_N))).unwrap();
+        assert!(upper.contains("0.90 N, is the upper end of what was tried (0.03 to 0.9 N)"), "{upper}");
+        assert!(at_bound(TRIED_FROM_N).unwrap().contains("0.03 N, is the lower end"));
+        assert_eq!(at_bound(0.15), None);
+    }
 }

@@ -10,7 +10,7 @@ use gripgen_twin::MeasuredPulls;
 use gripgen_twin::effects::OFFSET_LAW;
 
 /// Standard deviations from which on a pull is said to lie off.
-const FAR: f64 = 3.0;
+pub(super) const FAR: f64 = 3.0;
 
 /// Odds from which on an offset is said to look likely.
 const ODDS: f64 = 3.0;

@@ -10,7 +10,11 @@ use super::terms::Terms;
 use std::sync::Mutex;
 
 /// Noises that are tried, in newtons: a factor of 1.5 apart.
-const TRIED_N: [f64; 9] = [0.03, 0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9];
+const TRIED_N: [f64; 9] = [TRIED_FROM_N, 0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6, TRIED_TO_N];
+
+/// The least of them and the largest: what lies beyond is not found.
+pub(super) const TRIED_FROM_N: f64 = 0.03;
+pub(super) const TRIED_TO_N: f64 = 0.9;
 
 /// Standard deviation of the logarithm of a sensor's noise about what a twin says of it: recorded forces of URs have 0.07 to
 /// 0.19 N in quiet stretches, and more while they move.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import _core, remote
+from . import _core, checks, remote
 from .films import Film
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Batch(NamedTuple):
 def load(
     path: str | os.PathLike[str],
     *,
-    status: Sequence[str] = LABELLED,
+    status: str | Sequence[str] = LABELLED,
     suspect: bool = False,
     noise: str = "stored",
     video: bool = False,
@@ -63,9 +63,10 @@ def load(
 ) -> Dataset:
     """Open a run folder or a folder with `pulls.csv`; an fsspec URL (`s3://...`) is copied into `cache_dir` first.
 
-    Rows are kept whose status is in `status`. A censored pull ended before the jaws slipped: its label is a lower
-    bound, so it is left out unless asked for; a failed sample has neither label nor images. A suspect pull has a label
-    that recorded evidence contradicts, and says in `status_reason` how: with `suspect=True` its row is kept too.
+    Rows are kept whose status is in `status` (slipped, no_contact, censored, suspect, failed). A censored pull ended
+    before the jaws slipped: its label is a lower bound, so it is left out unless asked for; a failed sample has neither
+    label nor images. A suspect pull has a label that recorded evidence contradicts, and says in `status_reason` how:
+    with `suspect=True` its row is kept too.
 
     A run with `images = "clean"` has its images without the noise of the sensors, which is added when they are read: as the
     sweep drew it (`noise="stored"`, the bytes of `images = "png"`), anew in every epoch ("resample"), or not at all ("off").
@@ -73,12 +74,13 @@ def load(
     With `video=True` every row has the film of its pull (`ds[i].film`), of a run with `[images] during_pull`; `ds.film(i)` reads one
     in any case.
 
-    Raises DataError, naming the file, for what is no such folder or is damaged.
+    Raises DataError, naming the file, for what is no such folder or is damaged, and ConfigError for an unknown status.
     """
+    asked = checks.known_statuses(status)
     text = os.fspath(path)
     if remote.is_url(text):
         text = remote.fetch(text, cache_dir)
-    kept = (*status, "suspect") if suspect and "suspect" not in status else tuple(status)
+    kept = (*asked, "suspect") if suspect and "suspect" not in asked else asked
     found = Dataset(text, status=kept, _opened=(os.getpid(), _core.Dataset(text)))
     if video:
         if not found._open().has_films:
@@ -94,7 +96,7 @@ class Dataset(Sequence[Sample]):
     """Rows of a run, in the order of its index. Made by `load`.
 
     `ds[i]` is one row, `ds.batch(rows)` several in one call without the interpreter's lock, `ds.table()` everything
-    but images and traces. It is a map-style dataset for torch (`__getitems__` fetches a batch at once), can be
+    but images and traces; `ds[2:6]`, `ds[[3, 1]]` and `ds[mask]` are datasets of those rows. It is a map-style dataset for torch (`__getitems__` fetches a batch at once), can be
     pickled, and works under fork and spawn: a copy opens the files anew when it first reads.
     """
 
@@ -195,16 +197,13 @@ class Dataset(Sequence[Sample]):
         raise _core.ConfigError(f"to = {to!r} is neither 'pandas' nor 'arrow'")
 
     def _rows_of(self, ids: ArrayLike) -> list[int]:
-        ids = np.asarray(ids, dtype=np.int64).reshape(-1)
-        n = len(self)
-        outside = ids[(ids < -n) | (ids >= n)]
-        if outside.size:
-            raise IndexError(f"there is no row {outside[0]}, the dataset has {n}")
-        return self.rows[ids].tolist()
+        return self.rows[checks.row_numbers(ids, len(self))].tolist()
 
-    def __getitem__(self, i: int | slice) -> Sample | Dataset:
+    def __getitem__(self, i: int | slice | ArrayLike) -> Sample | Dataset:
         if isinstance(i, slice):
             return self.subset(range(*i.indices(len(self))))
+        if np.ndim(i) > 0:
+            return self.subset(i)
         return self.__getitems__([i])[0]
 
     def __getitems__(self, ids: Sequence[int]) -> list[Sample]:
@@ -235,6 +234,8 @@ class Dataset(Sequence[Sample]):
     ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32]] | Batch:
         """Rows as arrays: `images, labels = ds.batch(ids)`, uint8[B, 2, H, W, 3] and float32[B].
 
+        `ids` are numbers of rows, or a mask (bool[len]) that selects them.
+
         With `traces`, `heights` or `forces` a `Batch` with those. Heights are simulated again from the run's own
         configuration and cost milliseconds each. `threads` share decoding and simulation.
         """
@@ -263,12 +264,12 @@ class Dataset(Sequence[Sample]):
         return None if arrays is None else Film(**arrays)
 
     def subset(self, ids: ArrayLike) -> Dataset:
-        """The rows with these numbers, in this order."""
+        """The rows with these numbers, in this order, or those that a mask (bool[len]) selects."""
         return self._with(np.asarray(self._rows_of(ids), dtype=np.int64))
 
     def where(self, keep: ArrayLike) -> Dataset:
         """The rows for which `keep` (bool[len]) is true."""
-        return self._with(self.rows[np.asarray(keep, dtype=bool)])
+        return self._with(self.rows[checks.mask_of(keep, len(self))])
 
     def with_noise(self, noise: str, epoch: int = 0) -> Dataset:
         """The same rows with other noise on their images, for runs with `images = "clean"`: "stored" is that of the sweep,
@@ -295,9 +296,10 @@ class Dataset(Sequence[Sample]):
         """Split into train and test so that rows with equal values of `by` stay together.
 
         The default keeps the repetitions of a configuration together, which would leak from train to test otherwise;
-        `by="part"` holds out whole parts, `by=("part", "grip_pose")` whole grips. `test` is the share of groups, at
-        least one.
+        `by="part"` holds out whole parts, `by=("part", "grip_pose")` whole grips. `test` is the share of groups, above 0
+        and below 1; each side has one at least.
         """
+        test = checks.share(test)
         names = [by] if isinstance(by, str) else list(by)
         if by == "group" and "group" not in self._columns():
             # Measured pulls: what was set is the configuration.
@@ -327,6 +329,7 @@ class Dataset(Sequence[Sample]):
     ) -> Iterator[tuple[NDArray[np.uint8] | None, NDArray[np.float32]]]:
         """Batches of this rank in a seeded order, a new one every epoch; every row is seen by one rank. With
         `noise="resample"` the noise of the images is that of the epoch."""
+        batch_size = checks.rows_of_batch(batch_size)
         own = self.with_noise(self.noise, epoch) if self.noise == "resample" else self
         order = np.arange(len(self))
         if shuffle:

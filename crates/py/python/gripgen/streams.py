@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from . import _core
+from . import _core, checks
 from .dataset import LABELLED
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def stream(
     *,
     batch_size: int = 32,
     columns: Sequence[str] = (),
-    status: Sequence[str] = LABELLED,
+    status: str | Sequence[str] = LABELLED,
     set: Mapping[str, Any] | None = None,
     rank: int = 0,
     world_size: int = 1,
@@ -49,14 +49,14 @@ def stream(
 
     `state_dict` and `load_state_dict` continue where a training stopped.
 
-    Raises ConfigError for what the configuration forbids.
+    Raises ConfigError for what the configuration forbids, and for an argument that cannot be.
     """
-    size, workers = max(1, batch_size), jobs or os.cpu_count() or 1
+    size, workers = checks.rows_of_batch(batch_size), jobs or os.cpu_count() or 1
     found = Stream(
         config=os.fspath(config),
         batch_size=size,
         columns=tuple(columns),
-        status=tuple(status),
+        status=checks.known_statuses(status),
         set=dict(set or {}),
         rank=rank,
         world_size=world_size,

@@ -78,7 +78,7 @@ impl Table {
 
     /// The table of measured pulls: what was recorded of the known columns, and every further column.
     pub(super) fn of_pulls(judged: &JudgedPulls) -> Self {
-        let JudgedPulls { pulls: measured, standing } = judged;
+        let JudgedPulls { pulls: measured, standing, .. } = judged;
         let pulls = &measured.pulls;
         let words = |of: &dyn Fn(&MeasuredPull) -> String| Values::Words(pulls.iter().map(of).collect());
         let numbers = |of: &dyn Fn(&MeasuredPull) -> f64| Values::Numbers(pulls.iter().map(of).collect());

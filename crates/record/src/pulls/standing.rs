@@ -15,6 +15,8 @@ pub struct JudgedPulls {
     pub pulls: MeasuredPulls,
     /// How each of them stands.
     pub standing: Vec<Standing>,
+    /// What was not read and may be misspelt, a sentence each.
+    pub warnings: Vec<String>,
 }
 
 /// How a pull stands.

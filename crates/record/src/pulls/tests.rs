@@ -85,7 +85,7 @@ fn faults_name_file_line_column_and_value() {
             "pull_id,part,grip_force_n,max_pull_force_n\na,g,1,1\nb,g,1,1\na,g,2,2\n",
             "lines 2 and 4 are both pull `a`",
         ),
-        ("pull_id,part,grip_force_n,max_pull_force_n\na,g,1\n", "line: 2"),
+        ("pull_id,part,grip_force_n,max_pull_force_n\na,g,1\n", "cells of line 2: "),
         ("pull_id,part,part,grip_force_n,max_pull_force_n\na,g,g,1,1\n", "two columns `part`"),
         ("pull_id,part,grip_force_n,max_pull_force_n,pull_direction\na,g,1,1,0\n", "1 (up) or -1 (down)"),
         ("pull_id,part,grip_force_n,max_pull_force_n,pull_index\na,g,1,1,1.5\n", "`pull_index` is `1.5`"),
@@ -137,6 +137,32 @@ fn faults_of_the_other_files_are_theirs() {
     }
     let error = read_pull_folder(&tempfile::tempdir().unwrap().path().join("none")).unwrap_err().to_string();
     assert!(error.contains("pulls.csv"), "{error}");
+}
+
+/// A trace under a misspelt name and a misspelt key are read as if they were not there, so that people are told.
+#[test]
+fn what_is_not_read_and_may_be_misspelt_is_named() {
+    let table = "pull_id,part,grip_force_n,max_pull_force_n\np0000,g,1,1\np0001,g,1,1\np0010,g,1,1\n";
+    let said = |files: &[(&str, &str)]| read_judged_pulls(folder(table, files).path()).unwrap().warnings;
+    let all = "force_convention = \"per_jaw\"\nlabel_tolerance_n = 3\nstop_mm = 5\nfeedback = \"measured\"\n\
+               label_evidence = \"none\"\npulls = []\n";
+    let fine = [("traces/p0001.csv", TRACE), ("traces/README.md", "x"), ("campaign.toml", all)];
+    assert_eq!(said(&fine), Vec::<String>::new());
+    let near = said(&[("traces/p0001.csv", TRACE), ("traces/p001.csv", TRACE)]);
+    assert_eq!(near.len(), 1);
+    assert!(near[0].contains("p001.csv belongs to no pull and is not read"), "{near:?}");
+    assert!(near[0].ends_with("the nearest pull to `p001.csv` is `p0010`"), "{near:?}");
+    let far = said(&[("traces/ghost.csv", TRACE), ("traces/other.csv", TRACE)]);
+    assert_eq!(far.len(), 1);
+    assert!(far[0].contains("2 files belong to no pull and are not read (ghost.csv, other.csv)"), "{far:?}");
+    assert!(far[0].ends_with("a trace has the name of its pull, as `p0000.csv`"), "{far:?}");
+    let keys = said(&[("campaign.toml", "force_convetion = \"total\"\noperator = \"x\"\n")]);
+    let [close, other] = &keys[..] else { panic!("{keys:?}") };
+    assert!(
+        close.contains("`force_convetion`") && close.ends_with("did you mean `force_convention`?"),
+        "{close}"
+    );
+    assert!(other.contains("`operator`") && other.contains("known are force_convention,"), "{other}");
 }
 
 #[test]

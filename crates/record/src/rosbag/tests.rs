@@ -153,7 +153,7 @@ fn read(mapping: &str) -> Result<JudgedPulls, RosbagError> {
 
 #[test]
 fn a_bag_is_a_pull_with_its_trace_label_and_covariates() {
-    let JudgedPulls { pulls, standing } = read(MAPPING).unwrap();
+    let JudgedPulls { pulls, standing, .. } = read(MAPPING).unwrap();
     let [pull] = &pulls.pulls[..] else { panic!("one pull") };
     assert_eq!((pull.id.as_str(), pull.part.as_str(), pull.grip_force_n), ("one", "gear", 40.0));
     assert_eq!(pulls.extra[0].name, "humidity_pct");

@@ -32,7 +32,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     references: &["sharpness"],
     friction: Some(friction),
     per_part: true,
-    plainly: "Friction stops growing at strong grips, because the contact cannot get any larger.",
+    plainly: "Friction stops growing at strong grips, for example because the contact cannot get any larger.",
     number_means: "Friction never exceeds what 1 / saturation_per_n would hold at the plain coefficient: 0.005 stands for 200 N, where half of that is held (sharpness 1).",
     remedy: "Keep the law in the twin. Gripping harder brings less and less.",
     typical: &[("saturation_per_n", 0.006)],

@@ -34,6 +34,11 @@ impl MeshLook {
         self.open_edges == 0
     }
 
+    /// Whether its faces look outwards, as far as can be told: an open mesh has no outside.
+    pub fn faces_outwards(&self) -> bool {
+        self.turned_edges == 0 && !(self.is_closed() && self.volume_m3 < 0.0)
+    }
+
     /// What there is to say, a sentence each; none of a sound mesh of one body.
     pub fn words(&self) -> Vec<String> {
         let mut words = Vec::new();
@@ -47,12 +52,10 @@ impl MeshLook {
         let n = self.crowded_edges;
         say(n, format!("{n} edges belong to more than two triangles"));
         let n = self.turned_edges;
-        say(n, format!("{n} edges join faces that look opposite ways; grips and images do not depend on it"));
-        let inside_out = self.is_closed() && self.turned_edges == 0 && self.volume_m3 < 0.0;
-        say(
-            usize::from(inside_out),
-            "the mesh is inside out; grips and images do not depend on it".to_string(),
-        );
+        let turned = "its faces are turned outwards where grips are looked for; images do not depend on it";
+        say(n, format!("{n} edges join faces that look opposite ways; {turned}"));
+        let inside_out = self.turned_edges == 0 && !self.faces_outwards();
+        say(usize::from(inside_out), format!("the mesh is inside out; {turned}"));
         let n = self.bodies;
         say(n.saturating_sub(1), format!("the mesh has {n} bodies, which are held as one part"));
         let (n, all) = (self.slivers, self.triangles);
@@ -64,13 +67,19 @@ impl MeshLook {
 impl TriMesh {
     /// Looks for what is wrong with the mesh.
     pub fn look(&self) -> MeshLook {
+        self.look_and_join().0
+    }
+
+    /// The same, and for each vertex the one that stands for it: itself where that leaves no holes.
+    pub(super) fn look_and_join(&self) -> (MeshLook, Vec<u32>) {
         let exact: Vec<u32> = (0..self.vertices_m().len() as u32).collect();
         let look = self.look_with(&exact);
         if look.is_closed() {
-            return look;
+            return (look, exact);
         }
-        let welded = self.look_with(&self.welded());
-        if welded.open_edges < look.open_edges { welded } else { look }
+        let near = self.welded();
+        let welded = self.look_with(&near);
+        if welded.open_edges < look.open_edges { (welded, near) } else { (look, exact) }
     }
 
     /// For each vertex the first one in its cell of a fine grid.

@@ -262,7 +262,8 @@ fn number_of_samples(file: &SweepFile, vary: &[VariedKey]) -> Result<u64, Config
     match file.samples {
         Some(samples) if samples != size => {
             let problem = format!("samples = {samples}, but the grid has {size} (repetitions included)");
-            Err(ConfigError::new("samples", problem).hint("leave `samples` out of a grid"))
+            Err(ConfigError::new("samples", problem)
+                .hint("leave `samples` out of a grid, or draw so many: --set design=random"))
         }
         _ => Ok(size),
     }

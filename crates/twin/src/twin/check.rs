@@ -9,6 +9,9 @@ use crate::effects::{self, Effect, EffectSpec, OutsideFit, Per};
 use crate::frames::{pose, rotation_from_fixed_xyz};
 use nalgebra::Point3;
 
+/// Largest friction coefficient that a part of a twin may have.
+pub const LARGEST_MU: f64 = 5.0;
+
 pub(super) fn check_arm(arm: Option<&ArmFile>) -> Result<RobotArm, ConfigError> {
     let arm = arm.ok_or_else(|| {
         ConfigError::new("robot.model", "an arm with links needs the section [robot.arm]")
@@ -112,7 +115,7 @@ pub(super) fn check_part(part: &PartFile, key: &str) -> Result<Part, ConfigError
         mesh: part.mesh.clone(),
         metres_per_unit: in_range(&at("scale_mm_per_unit"), part.scale_mm_per_unit, 1e-6..=1e6, "mm")? * 1e-3,
         grips,
-        mu: in_range(&at("mu"), part.mu, 0.0..=5.0, "1")?,
+        mu: in_range(&at("mu"), part.mu, 0.0..=LARGEST_MU, "1")?,
         kinetic_ratio: in_range(&at("kinetic_ratio"), part.kinetic_ratio, 0.05..=1.0, "1")?,
         kinetic_fall_s: in_range(&at("kinetic_fall_s"), part.kinetic_fall_s, 0.0..=1.0, "s")?,
         scatter: in_range(&at("scatter"), part.scatter, 0.0..=0.5, "1")?,

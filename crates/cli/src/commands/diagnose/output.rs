@@ -1,17 +1,18 @@
 //! What a diagnosis writes and says.
 
+use super::next::{next_steps, write_next};
+use super::notes::deciding;
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
 use crate::mark::Format;
-use crate::output::{JsonSink, print, program};
+use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use crate::posterior;
 use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, PosteriorFile, Verdict};
-use gripgen::record::campaign_toml;
 use gripgen::twin::rounded;
-use gripgen::{Diagnosed, Location, NextPulls, diagnosis_page, edited_twin_toml};
+use gripgen::{Diagnosed, Location, diagnosis_page, edited_twin_toml};
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Twin, report, JSON, and a summary for people.
 pub fn write(
@@ -30,7 +31,7 @@ pub fn write(
         let file = draws.to_string_lossy().into_owned();
         diagnosed.diagnosis.posterior = Some(PosteriorFile { file, draws: posterior.draws.len() });
     }
-    diagnosed.report.next = next_steps(args, &diagnosed.diagnosis, next.as_deref());
+    diagnosed.report.next = next_steps(args, &diagnosed, next.path.as_deref());
     if let Some(report) = &args.report {
         outputs.write(report, Format::Html, diagnosis_page(&diagnosed).as_bytes())?;
     }
@@ -43,7 +44,9 @@ pub fn write(
         posterior::write(outputs, out, &text.map_err(Failure::new)?, diagnosed.posterior.as_ref())?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
-        let mut text = in_short(&diagnosed.diagnosis, &diagnosed.report.next);
+        // All notes come with `-v`.
+        let notes = if args.talk.verbose { vec![] } else { deciding(&diagnosed.diagnosis) };
+        let mut text = in_short(&diagnosed.diagnosis, &notes, &diagnosed.report.next);
         if args.talk.verbose {
             text += &format!("\n{}", summary(&diagnosed.diagnosis));
         }
@@ -55,93 +58,21 @@ pub fn write(
             (&args.out, "the twin"),
             (&draws, "its posterior"),
             (&args.report, "the report"),
-            (&next, "the next pulls"),
+            (&next.path, "the next pulls"),
         ] {
             if let Some(path) = path {
                 eprintln!("{what}: {}", path.display());
             }
         }
+        if let Some(said) = &next.said {
+            eprintln!("{said}");
+        }
     }
     Ok(0)
 }
 
-/// The campaign that separates what is tied, beside the twin, the JSON or the report. Nobody's own file is written over.
-fn write_next(
-    args: &DiagnoseArgs,
-    outputs: &Outputs,
-    diagnosed: &mut Diagnosed,
-) -> Result<Option<PathBuf>, Failure> {
-    let beside = [
-        args.out.as_deref(),
-        args.json.json.as_deref().filter(|p| *p != "-").map(Path::new),
-        args.report.as_deref(),
-    ];
-    let Some(beside) = beside.into_iter().flatten().next() else { return Ok(None) };
-    let path = beside.with_file_name("next.toml");
-    let Some(next) = &diagnosed.next else {
-        // Those of an earlier diagnosis hold no longer.
-        return outputs.remove_own(&path).map(|()| None);
-    };
-    if outputs.judge(&path).is_err() {
-        let note = format!(
-            "{} is not of a diagnosis, or was edited, and was left alone: the next pulls were not written",
-            path.display()
-        );
-        diagnosed.diagnosis.notes.push(note);
-        return Ok(None);
-    }
-    outputs.write(&path, Format::Toml, next_toml(next, &args.measured, &args.twin).as_bytes())?;
-    let own = diagnosed.diagnosis.effects.iter_mut().filter(|e| next.separates(&e.name));
-    for separate in own.filter_map(|e| e.separate_by.as_mut()) {
-        separate.campaign = Some(path.display().to_string());
-    }
-    Ok(Some(path))
-}
-
-/// The text of the next pulls; `twin` is the name of the one that was diagnosed.
-pub fn next_toml(next: &NextPulls, measured: &Path, twin: &str) -> String {
-    let about = format!(
-        "Planned by `gripgen diagnose` of {} with the twin {twin}.\n{}.\nKeys are described in docs/format.md. Run it with `gripgen rig pull`.",
-        measured.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
-        next.text(),
-    );
-    campaign_toml(&next.campaign, &about)
-}
-
-/// What to do next: a sentence, and a command or nothing. At most two.
-fn next_steps(args: &DiagnoseArgs, diagnosis: &Diagnosis, next: Option<&Path>) -> Vec<(String, String)> {
-    let program = program();
-    let mut steps = Vec::new();
-    if let Some(next) = next {
-        steps.push((
-            "Make the pulls that tell apart what these could not:".into(),
-            format!("{program} rig pull rig.toml --campaign {}", next.display()),
-        ));
-    }
-    let found = matches!(diagnosis.verdict, Verdict::Effect | Verdict::Unknown);
-    match &args.out {
-        Some(out) if found => {
-            let set = std::path::absolute(out).unwrap_or_else(|_| out.clone());
-            steps.push((
-                "Make training data with the corrected twin:".into(),
-                format!("{program} sweep sweep.toml --set twin={} -o runs/corrected", set.display()),
-            ));
-        }
-        None if found => steps.push((
-            "Write the corrected twin:".into(),
-            format!("{program} diagnose {} -o diagnosed.toml", args.measured.display()),
-        )),
-        _ if diagnosis.verdict == Verdict::Insufficient => {
-            steps
-                .push(("Plan pulls that can answer:".into(), format!("{program} campaign -o campaign.toml")));
-        }
-        _ => {}
-    }
-    steps
-}
-
-/// The answer in five lines, for somebody who reads nothing else; `-v` says the rest.
-fn in_short(diagnosis: &Diagnosis, next: &[(String, String)]) -> String {
+/// The answer in five lines and the notes that decide, for somebody who reads nothing else; `-v` says the rest.
+fn in_short(diagnosis: &Diagnosis, notes: &[String], next: &[(String, String)]) -> String {
     let mut text = String::new();
     let word = match diagnosis.verdict {
         Verdict::None => "nothing beyond the baseline was found",
@@ -178,10 +109,21 @@ fn in_short(diagnosis: &Diagnosis, next: &[(String, String)]) -> String {
     if !tied.is_empty() {
         let _ = writeln!(text, "tied: {}", tied.join("; "));
     }
-    if let Some((_, command)) = next.first() {
-        let _ = writeln!(text, "next: {command}");
+    for note in notes {
+        let _ = writeln!(text, "note: {note}");
+    }
+    if let Some((words, command)) = next.first() {
+        let words = if command.is_empty() { in_a_line(words) } else { command.clone() };
+        let _ = writeln!(text, "next: {words}");
     }
     text
+}
+
+/// A sentence behind a colon.
+fn in_a_line(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    let first = letters.next().map(|c| c.to_lowercase().to_string()).unwrap_or_default();
+    first + letters.as_str().trim_end_matches('.')
 }
 
 /// An effect with its largest values; references that nobody fitted are left out.

@@ -1,0 +1,133 @@
+use super::*;
+use crate::args::{Cli, Command};
+use clap::Parser;
+use gripgen::identify::DataSummary;
+use gripgen::twin::{Campaign, PlannedPull, PullKind};
+
+fn typed(words: &[&str]) -> DiagnoseArgs {
+    let all = [&["gripgen", "diagnose"][..], words].concat();
+    match Cli::try_parse_from(&all).unwrap().command {
+        Command::Diagnose(args) => args,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn answered(verdict: Verdict, notes: &[&str]) -> Diagnosed {
+    let diagnosis = Diagnosis {
+        verdict,
+        notes: notes.iter().map(ToString::to_string).collect(),
+        ..Diagnosis::blank(Channel::Pulls, DataSummary { sha256: "ab12".into(), ..Default::default() })
+    };
+    let (edits, report) = Default::default();
+    Diagnosed { diagnosis, edits, report, next: None, posterior: None }
+}
+
+/// Pulls with up to 80 N.
+fn plan() -> NextPulls {
+    let pull =
+        |k: u32| PlannedPull { kind: PullKind::Pull, grip_force_n: f64::from(k), ..PlannedPull::default() };
+    let pulls = [25, 80, 60].map(pull).to_vec();
+    let campaign = Campaign { label_tolerance_n: 3.0, stop_m: 0.005, feedback: None, pulls };
+    NextPulls { campaign, apart: vec![], left: vec![] }
+}
+
+/// The command of the first step, without the program.
+fn first(args: &DiagnoseArgs, diagnosed: &Diagnosed, next: Option<&Path>) -> (String, String) {
+    let (text, command) = next_steps(args, diagnosed, next).remove(0);
+    let words = command.split_once(' ').map_or(String::new(), |(_, words)| words.into());
+    (text, words)
+}
+
+#[test]
+fn the_same_diagnosis_again_keeps_what_the_answer_depends_on() {
+    let words = [
+        "my lab",
+        "--also",
+        "day2",
+        "--twin",
+        "mine/twin.toml",
+        "--set",
+        "parts.a.mu=0.2",
+        "--without",
+        "wear,nap",
+        "--include-suspect",
+        "--rig",
+        "rig.toml",
+        "-v",
+    ];
+    let (_, command) = first(&typed(&words), &answered(Verdict::Effect, &[]), None);
+    assert_eq!(
+        command,
+        "diagnose 'my lab' --also day2 --include-suspect --twin mine/twin.toml --set parts.a.mu=0.2 --rig rig.toml --without wear,nap -o diagnosed.toml"
+    );
+    let (_, command) = first(&typed(&["lab"]), &answered(Verdict::Unknown, &[]), None);
+    assert_eq!(command, "diagnose lab -o diagnosed.toml");
+    let (_, command) =
+        first(&typed(&["lab", "--twin", "t.toml"]), &answered(Verdict::Insufficient, &[]), None);
+    assert_eq!(command, "campaign -o campaign.toml --twin t.toml");
+}
+
+#[test]
+fn the_sweep_lies_beside_the_twin_or_is_said_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let twin = folder.path().join("twin.toml");
+    let args = typed(&["lab", "--twin", twin.to_str().unwrap(), "-o", "d.toml"]);
+    let found = answered(Verdict::Effect, &[]);
+    let (text, command) = first(&args, &found, None);
+    assert!(command.is_empty() && text.contains("--set twin=d.toml"), "{text}: {command}");
+    let sweep = folder.path().join("sweep.toml");
+    std::fs::write(&sweep, "").unwrap();
+    let (_, command) = first(&args, &found, None);
+    let wanted = shell::command_line(&["sweep", sweep.to_str().unwrap(), "--set", "twin=d.toml"]);
+    assert_eq!(command, format!("{wanted} -o runs/corrected"));
+    let (_, command) = first(&typed(&["lab", "-o", "d.toml"]), &found, None);
+    assert_eq!(command, "sweep asset:configs/quickstart.toml --set twin=d.toml -o runs/corrected");
+}
+
+#[test]
+fn pulls_of_no_rig_are_a_list_and_no_other_campaign_is_offered() {
+    let mut few = answered(Verdict::Insufficient, &["3 pulls are too few"]);
+    few.next = Some(plan());
+    let folder = tempfile::tempdir().unwrap();
+    let args = typed(&[folder.path().to_str().unwrap(), "-o", "d.toml"]);
+    let steps = next_steps(&args, &few, Some(Path::new("next.toml")));
+    assert_eq!(steps.len(), 1, "{steps:?}");
+    let (text, command) = &steps[0];
+    assert!(
+        command.is_empty() && text.contains("next.toml lists (up to 80 N a jaw; --rig"),
+        "{text}: {command}"
+    );
+}
+
+#[test]
+fn forces_in_another_unit_are_no_reason_for_a_campaign() {
+    let asked = ["the labels are 201 times twice the grip force: are all forces in newtons, per jaw?"];
+    let (text, command) = first(&typed(&["lab"]), &answered(Verdict::Insufficient, &asked), None);
+    assert!(command.is_empty() && text.contains("in newtons"), "{text}: {command}");
+}
+
+/// Of the plans beside the outputs only that of the same measurements goes, if nobody edited it.
+#[test]
+fn an_earlier_plan_goes_only_with_its_own_measurements() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, next) = (folder.path().join("d.toml"), folder.path().join("next.toml"));
+    let args = typed(&["lab", "-o", out.to_str().unwrap()]);
+    let outputs = Outputs::of("diagnose", false);
+    let own = |sha256: &str| next_toml(&plan(), Path::new("lab"), "t.toml", sha256);
+    let said = || {
+        let file = write_next(&args, &outputs, &mut answered(Verdict::None, &[])).unwrap();
+        assert!(file.path.is_none());
+        file.said.unwrap_or_default()
+    };
+    assert_eq!(said(), "", "there is none");
+    outputs.write(&next, Format::Toml, own("cd34").as_bytes()).unwrap();
+    assert!(said().contains("was left there: it was not planned for these"), "{}", said());
+    outputs.write(&next, Format::Toml, own("ab12").as_bytes()).unwrap();
+    let text = std::fs::read_to_string(&next).unwrap();
+    std::fs::write(&next, format!("{text}\n# mine\n")).unwrap();
+    assert!(said().contains("somebody edited it") && next.is_file());
+    std::fs::write(&next, text).unwrap();
+    assert!(said().starts_with("removed ") && !next.exists());
+    std::fs::write(&next, "pulls = []\n").unwrap();
+    assert!(said().is_empty() && next.is_file(), "somebody's own");
+}

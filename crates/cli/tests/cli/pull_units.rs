@@ -1,0 +1,103 @@
+//! Measured pulls whose numbers or names are not what was meant: what is refused, and what is said without being asked.
+
+use super::{assert_code, run, text};
+
+/// Pulls of a shaft with a coefficient of 0.2; labels and grip forces are in other units by these factors.
+fn folder(rows: usize, label: f64, grip: f64) -> tempfile::TempDir {
+    let mut table = String::from("pull_id,part,grip_force_n,max_pull_force_n\n");
+    for i in 0..rows {
+        let force_n = [20.0, 40.0, 60.0, 30.0][i % 4];
+        let label_n = 0.4 * force_n * (1.0 + 0.01 * ((i * 5 % 11) as f64 - 5.0));
+        table += &format!("p{i},long_shaft,{},{}\n", grip * force_n, label * label_n);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("pulls.csv"), table).unwrap();
+    folder
+}
+
+#[test]
+fn labels_in_another_unit_or_with_a_sign_are_not_fitted() {
+    for (label, grip, says) in [
+        (1e3, 1.0, ["200 times twice the grip force", "0.20 with labels in millinewtons"]),
+        (1.0, 1e3, ["2.00e-4 times twice the grip force", "0.20 with grip forces in millinewtons"]),
+        (-1.0, 1.0, ["12 of 12 labels are below 0: pull p0 has -", "`max_pull_force_n` is a magnitude"]),
+    ] {
+        let wrong = folder(12, label, grip);
+        let (at, out) = (wrong.path().to_str().unwrap(), wrong.path().join("out.toml"));
+        for verb in [&["calibrate", "pulls"][..], &["diagnose"]] {
+            // A diagnosis of a wrong unit is an answer: that it can say nothing, and why.
+            let answers = verb == ["diagnose"] && label > 0.0;
+            let refused = run(&[verb, &[at, "-o", out.to_str().unwrap()]].concat());
+            assert_code(&refused, if answers { 0 } else { 2 });
+            let said = text(&refused.stderr);
+            assert!(says.iter().all(|part| said.contains(part)), "{verb:?}: {said}");
+            assert!(said.contains(if answers { "warning: " } else { "hint: " }), "{said}");
+            assert!(answers || !out.exists());
+        }
+        // What is only looked at is shown.
+        let shown = run(&["info", at]);
+        assert_code(&shown, 0);
+        let said = text(&shown.stderr);
+        assert!(said.contains("warning: ") && said.contains(says[0]), "{said}");
+    }
+}
+
+#[test]
+fn odd_units_and_misspelt_names_are_said_unless_it_is_to_be_quiet() {
+    let odd = folder(12, 0.102, 1.0);
+    std::fs::create_dir(odd.path().join("traces")).unwrap();
+    let trace = "time_s,desired_force_n,measured_force_n,displacement_mm\n0,1,0,0\n";
+    std::fs::write(odd.path().join("traces/p12.csv"), trace).unwrap();
+    std::fs::write(odd.path().join("campaign.toml"), "force_convetion = \"total\"\n").unwrap();
+    let at = odd.path().to_str().unwrap();
+    let said = text(&run(&["info", at]).stderr);
+    for says in [
+        "0.20 with labels in kilograms-force (kgf)",
+        "p12.csv belongs to no pull and is not read: the nearest pull to `p12.csv` is `p1`",
+        "the key `force_convetion` means nothing here and was left alone: did you mean `force_convention`?",
+    ] {
+        assert!(said.contains(says), "{says}: {said}");
+    }
+    assert_eq!(said.matches("warning: ").count(), 3, "{said}");
+    assert!(run(&["info", at, "-q"]).stderr.is_empty());
+    assert!(text(&run(&["info", folder(12, 1.0, 1.0).path().to_str().unwrap()]).stderr).is_empty());
+}
+
+#[test]
+fn one_pull_is_calibrated_with_a_word_on_beliefs() {
+    let one = folder(1, 1.0, 1.0);
+    let out = one.path().join("out.toml");
+    let json = one.path().join("found.json");
+    let [at, out, json] = [one.path(), &out, &json].map(|path| path.to_str().unwrap());
+    let fitted = run(&["calibrate", "pulls", at, "-o", out, "--json", json]);
+    assert_code(&fitted, 0);
+    let said = text(&fitted.stderr);
+    assert!(said.contains("one pull is not enough on its own"), "{said}");
+    assert!(said.contains("assets/priors/pulls.toml") && said.contains("docs/few-pulls.md"), "{said}");
+    let found: serde_json::Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
+    assert_eq!((&found["leans_on_beliefs"], &found["warnings"]), (&true.into(), &serde_json::json!([])));
+    // No value lies outside of its own interval.
+    for (key, value) in found["baseline"].as_object().unwrap() {
+        let [low, at, high] = ["low90", "value", "high90"].map(|k| value[k].as_f64().unwrap());
+        assert!(low <= at && at <= high, "{key}: {value}");
+    }
+}
+
+#[test]
+fn a_pull_that_is_far_off_is_named_by_a_calibration() {
+    let bad = folder(24, 1.0, 1.0);
+    let at = bad.path().join("pulls.csv");
+    let table = std::fs::read_to_string(&at).unwrap();
+    let changed: Vec<String> = table
+        .lines()
+        .map(|row| if row.starts_with("p7,") { "p7,long_shaft,30,12000".into() } else { row.into() })
+        .collect();
+    std::fs::write(&at, changed.join("\n")).unwrap();
+    let out = bad.path().join("out.toml");
+    let fitted = run(&["calibrate", "pulls", bad.path().to_str().unwrap(), "-o", out.to_str().unwrap()]);
+    assert_code(&fitted, 0);
+    let said = text(&fitted.stderr);
+    assert!(said.contains("1 of 24 pulls lie far off (p7)"), "{said}");
+    assert!(said.contains("pull p7 has 12000 N at a grip force of 30 N"), "{said}");
+    assert!(!said.contains("believed"), "{said}");
+}

@@ -1,0 +1,86 @@
+"""Arguments that cannot be are refused: taken for something else they would give other data without a word."""
+
+from __future__ import annotations
+
+import difflib
+import operator
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._core import ConfigError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+#: Names of all statuses of a pull (docs/format.md).
+STATUSES = ("slipped", "no_contact", "censored", "suspect", "failed")
+
+
+def refusal(message: str, hint: str | None = None) -> ConfigError:
+    """The exception of an argument that cannot be, with its hint as the Rust half gives one."""
+    error = ConfigError(f"{message}\nhint: {hint}" if hint else message)
+    error.hint = hint  # type: ignore[attr-defined]
+    return error
+
+
+def known_statuses(status: str | Sequence[str]) -> tuple[str, ...]:
+    """Statuses that there are; one alone may be a word."""
+    asked = (status,) if isinstance(status, str) else tuple(status)
+    for name in asked:
+        if name not in STATUSES:
+            close = difflib.get_close_matches(str(name).lower(), STATUSES, n=1)
+            hint = f"did you mean `{close[0]}`?" if close else None
+            raise refusal(f"there is no status {name!r}; there are {', '.join(STATUSES)}", hint)
+    return asked
+
+
+def mask_of(keep: ArrayLike, rows: int) -> NDArray[np.bool_]:
+    """A mask with a value for each row."""
+    mask = np.asarray(keep)
+    if mask.shape != (rows,):
+        has = f"{mask.size} values" if mask.ndim == 1 else f"the shape {mask.shape}"
+        hint = "compare a column of this dataset, not of the one it was taken from"
+        raise refusal(f"the mask has {has}, the dataset {rows} rows", hint)
+    # An empty list has no type of its own.
+    if mask.dtype != bool and rows:
+        raise refusal(f"a mask is of bool, this one of {mask.dtype}", "ds.subset(ids) takes numbers of rows")
+    return mask.astype(bool)
+
+
+def row_numbers(ids: ArrayLike, rows: int) -> NDArray[np.int64]:
+    """Numbers of rows as numpy would pick them: those below 0 count from the end, a mask selects."""
+    asked = np.asarray(ids)
+    if asked.dtype == bool:
+        return np.flatnonzero(mask_of(asked, rows))
+    asked = asked.reshape(-1)
+    if asked.size and asked.dtype.kind not in "iuf":
+        raise refusal(f"rows are asked for by whole numbers or a mask, not by {asked.dtype}")
+    if asked.dtype.kind == "f":
+        broken = asked[~(np.isfinite(asked) & (asked == np.floor(asked)))]
+        if broken.size:
+            raise refusal(f"there is no row {broken[0]}: numbers of rows are whole")
+    outside = asked[(asked < -rows) | (asked >= rows)]
+    if outside.size:
+        raise IndexError(f"there is no row {outside[0]}, the dataset has {rows}")
+    return asked.astype(np.int64)
+
+
+def share(test: float) -> float:
+    """The share of groups that a split holds out: each side has something."""
+    if not 0 < test < 1:
+        hint = "test=0.2 holds out a fifth of the groups"
+        raise refusal(f"test = {test} is no share of the groups: it must be above 0 and below 1", hint)
+    return test
+
+
+def rows_of_batch(batch_size: Any) -> int:
+    """The size of a batch, which has one row at least."""
+    try:
+        size = operator.index(batch_size)
+    except TypeError:
+        size = 0
+    if size < 1:
+        raise refusal(f"batch_size = {batch_size!r}, it must be a whole number, 1 at least")
+    return size

@@ -1,0 +1,59 @@
+//! What lies in a folder of measured pulls and is not read: its name may be misspelt, so that people are told.
+
+use super::TRACES_FOLDER;
+use gripgen_twin::MeasuredPull;
+use gripgen_twin::config::suggestion;
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+
+/// Keys of a campaign file.
+const KEYS: [&str; 6] =
+    ["force_convention", "label_tolerance_n", "stop_mm", "feedback", "label_evidence", "pulls"];
+
+/// Files named at most.
+const NAMED: usize = 3;
+
+/// Traces that belong to no pull; `stored` are the files in their folder.
+pub(super) fn traces_of_nobody(
+    folder: &Path,
+    stored: &HashSet<String>,
+    pulls: &[MeasuredPull],
+) -> Option<String> {
+    let files: HashMap<String, &str> =
+        pulls.iter().map(|pull| (format!("{}.csv", pull.id), pull.id.as_str())).collect();
+    let table = |name: &&String| name.to_lowercase().ends_with(".csv") && !name.starts_with('.');
+    let mut strays: Vec<&str> =
+        stored.iter().filter(table).map(String::as_str).filter(|name| !files.contains_key(*name)).collect();
+    strays.sort_unstable();
+    let first = strays.first()?;
+    let own = |name: &&str| !stored.contains(&format!("{name}.csv"));
+    let without: Vec<&str> = pulls.iter().map(|pull| pull.id.as_str()).filter(own).collect();
+    let typed = &first[..first.len() - ".csv".len()];
+    let like = match suggestion(typed, without).or_else(|| suggestion(typed, files.values().copied())) {
+        Some(id) => format!("the nearest pull to `{first}` is `{id}`"),
+        None => {
+            format!("a trace has the name of its pull, as `{}.csv`", pulls.first().map_or("", |p| &p.id))
+        }
+    };
+    let more = if strays.len() > NAMED { ", ..." } else { "" };
+    let named = strays[..strays.len().min(NAMED)].join(", ");
+    let said = match strays.len() {
+        1 => format!("{named} belongs to no pull and is not read"),
+        n => format!("{n} files belong to no pull and are not read ({named}{more})"),
+    };
+    Some(format!("{}: {said}: {like}", folder.join(TRACES_FOLDER).display()))
+}
+
+/// Keys of a campaign file that mean nothing.
+pub(super) fn unknown_keys(path: &Path, text: &str) -> Vec<String> {
+    let table: toml::Table = text.trim_start_matches('\u{feff}').parse().unwrap_or_default();
+    let unknown = table.keys().filter(|key| !KEYS.contains(&key.as_str()));
+    let said = |key: &String| {
+        let like = match suggestion(key, KEYS) {
+            Some(name) => format!("did you mean `{name}`?"),
+            None => format!("known are {}", KEYS.join(", ")),
+        };
+        format!("{}: the key `{key}` means nothing here and was left alone: {like}", path.display())
+    };
+    unknown.map(said).collect()
+}

@@ -1,0 +1,312 @@
+//! Whether measured pulls can be in the units that they are read in: numbers a thousand times too large are fitted as well as any.
+
+use gripgen_twin::MeasuredPull;
+use std::path::Path;
+
+/// Labels that no gel and no part give.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{problem}")]
+pub struct ImplausibleLabels {
+    /// What is wrong, with the numbers.
+    pub problem: String,
+    /// What may be behind it, and what is wanted.
+    pub hint: String,
+    /// Whether it is their sign, and not their unit.
+    pub sign: bool,
+}
+
+/// Labels over twice the grip force that gels and parts mostly have; 0.06 is an oily part.
+const USUAL: (f64, f64) = (0.05, 1.0);
+/// Beyond these something may be wrong.
+const ODD: (f64, f64) = (0.04, 3.0);
+/// Beyond these it is.
+const IMPOSSIBLE: (f64, f64) = (0.01, 20.0);
+
+/// Newtons of a kilogram-force and of a pound-force.
+const KGF_N: f64 = 9.80665;
+const LBF_N: f64 = 4.448_222;
+
+/// Units that people write instead of newtons, with the factor on labels over grip forces.
+const UNITS: [(&str, f64); 10] = [
+    ("labels in millinewtons", 1e-3),
+    ("labels in grams", 1e-3 * KGF_N),
+    ("labels in kilograms-force (kgf)", KGF_N),
+    ("labels in pounds-force (lbf)", LBF_N),
+    ("grip forces in millinewtons", 1e3),
+    ("grip forces in grams", 1e3 / KGF_N),
+    ("grip forces in kilograms-force (kgf)", 1.0 / KGF_N),
+    ("grip forces in pounds-force (lbf)", 1.0 / LBF_N),
+    ("labels in kilonewtons", 1e3),
+    ("grip forces in kilonewtons", 1e-3),
+];
+
+/// A sensor that is off reads a little less than nothing of a grip that hardly holds: by less than this, or less than this share of
+/// twice the grip force.
+const OFF_N: f64 = 1.0;
+const OFF_SHARE: f64 = 0.05;
+
+/// How much longer or shorter than its staircase a trace may be.
+const LONGER: f64 = 100.0;
+/// Times between readings.
+const INTERVAL_S: (f64, f64) = (1e-5, 0.2);
+/// Displacement of a tool that still holds what it pulls.
+const FARTHEST_M: f64 = 0.2;
+/// Force over displacement that no gel reaches: fits end at twice of it.
+const STIFFEST_N_PER_M: f64 = 1e6;
+
+/// Labels in other units than newtons, or with the sign of the direction.
+pub(super) fn implausible(path: &Path, pulls: &[MeasuredPull]) -> Option<ImplausibleLabels> {
+    let path = path.display();
+    if let Some((n, first)) = wrong_sign(pulls) {
+        let label_n = first.max_pull_force_n;
+        return Some(ImplausibleLabels {
+            problem: format!(
+                "{path}: {n} of {} labels are below 0: pull {} has {label_n} N at a grip force of {} N",
+                pulls.len(),
+                first.id,
+                first.grip_force_n
+            ),
+            hint: format!(
+                "`max_pull_force_n` is a magnitude along the pull, whatever `pull_direction` says: write {}",
+                -label_n
+            ),
+            sign: true,
+        });
+    }
+    let ratio = median_ratio(pulls)?;
+    if (IMPOSSIBLE.0..=IMPOSSIBLE.1).contains(&ratio) {
+        return None;
+    }
+    let first = pulls.iter().find(|p| p.max_pull_force_n > 0.0)?;
+    Some(ImplausibleLabels {
+        problem: format!(
+            "{path}: the labels are {} times twice the grip force in the median, which no gel gives ({} to {}): pull {} has {} N at a \
+             grip force of {} N",
+            plain(ratio),
+            IMPOSSIBLE.0,
+            IMPOSSIBLE.1,
+            first.id,
+            first.max_pull_force_n,
+            first.grip_force_n
+        ),
+        hint: format!(
+            "millinewtons? grams? forces are newtons, grip forces those of one jaw{}",
+            units(ratio)
+        ),
+        sign: false,
+    })
+}
+
+/// What is to be looked at again.
+pub(super) fn warnings(path: &Path, pulls: &[MeasuredPull]) -> Vec<String> {
+    let odd = median_ratio(pulls).filter(|ratio| !(ODD.0..=ODD.1).contains(ratio));
+    let of_labels = odd.map(|ratio| {
+        format!(
+            "the labels are {} times twice the grip force in the median, usual are {} to {}: are they newtons, and grip forces those of \
+             one jaw?{}",
+            plain(ratio),
+            USUAL.0,
+            USUAL.1,
+            units(ratio)
+        )
+    });
+    let traces: Vec<Seen> = pulls.iter().filter_map(seen).collect();
+    let found = of_labels.into_iter().chain(times(&traces)).chain(displacements(&traces));
+    found.map(|said| format!("{}: {said}", path.display())).collect()
+}
+
+/// How many labels are below 0, and one that no sensor explains.
+fn wrong_sign(pulls: &[MeasuredPull]) -> Option<(usize, &MeasuredPull)> {
+    let below: Vec<&MeasuredPull> = pulls.iter().filter(|p| p.max_pull_force_n < 0.0).collect();
+    let beyond = |p: &&&MeasuredPull| {
+        p.max_pull_force_n < -OFF_N && p.max_pull_force_n < -OFF_SHARE * 2.0 * p.grip_force_n
+    };
+    let most = 2 * below.len() > pulls.len();
+    let first = below.iter().find(beyond).or_else(|| below.first().filter(|_| most))?;
+    Some((below.len(), *first))
+}
+
+/// Labels over twice the grip force; a label of 0 says nothing of its unit.
+fn median_ratio(pulls: &[MeasuredPull]) -> Option<f64> {
+    let held = pulls.iter().filter(|p| p.max_pull_force_n > 0.0);
+    median(held.map(|p| p.max_pull_force_n / (2.0 * p.grip_force_n)).collect())
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// Units with which a ratio would be usual.
+fn units(ratio: f64) -> String {
+    let usual = UNITS.iter().map(|(name, factor)| (name, ratio * factor));
+    let usual = usual.filter(|(_, ratio)| (USUAL.0..=USUAL.1).contains(ratio));
+    let said: Vec<String> = usual.map(|(name, ratio)| format!("{} with {name}", plain(ratio))).collect();
+    if said.is_empty() { String::new() } else { format!("; it would be {}", said.join(", ")) }
+}
+
+/// A number with two or three figures.
+fn plain(x: f64) -> String {
+    match x {
+        x if x >= 100.0 => format!("{x:.0}"),
+        x if x >= 1.0 => format!("{x:.1}"),
+        x if x >= 0.1 => format!("{x:.2}"),
+        x if x >= 0.01 => format!("{x:.3}"),
+        x => format!("{x:.2e}"),
+    }
+}
+
+/// What is looked at in a trace.
+struct Seen {
+    /// Its time over that of its staircase.
+    over_staircase: f64,
+    interval_s: f64,
+    farthest_m: f64,
+    largest_n: f64,
+}
+
+fn seen(pull: &MeasuredPull) -> Option<Seen> {
+    let trace = pull.trace.as_ref()?;
+    let begun = trace.time_s.partition_point(|&t| t < 0.0);
+    let pulled = trace.time_s.get(begun..).filter(|times| times.len() > 1)?;
+    let lasted_s = pulled[pulled.len() - 1] - pulled[0];
+    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let start_n = pull.start_n.unwrap_or(pull.increment_n);
+    let steps = (largest(&trace.desired_force_n) - start_n).max(0.0) / pull.increment_n + 1.0;
+    Some(Seen {
+        over_staircase: lasted_s / (steps * pull.step_s),
+        interval_s: lasted_s / (pulled.len() - 1) as f64,
+        farthest_m: largest(&trace.displacement_m),
+        largest_n: largest(&trace.measured_force_n),
+    })
+}
+
+fn times(traces: &[Seen]) -> Option<String> {
+    let over = median(traces.iter().map(|t| t.over_staircase).collect())?;
+    let interval_s = median(traces.iter().map(|t| t.interval_s).collect())?;
+    let long = over > LONGER || interval_s > INTERVAL_S.1;
+    let short = over < 1.0 / LONGER || interval_s < INTERVAL_S.0;
+    let unit = match (long, short) {
+        (true, _) => "`time_s` in milliseconds",
+        (_, true) => "`time_s` in minutes, or `step_time_s` in milliseconds",
+        _ => return None,
+    };
+    Some(format!(
+        "traces go on for {} times as long as their staircase takes ({} to {LONGER} are plausible), with a reading every {} s ({} to {}; medians \
+         of {}): is {unit}?",
+        plain(over),
+        1.0 / LONGER,
+        plain(interval_s),
+        plain(INTERVAL_S.0),
+        INTERVAL_S.1,
+        traces.len()
+    ))
+}
+
+fn displacements(traces: &[Seen]) -> Option<String> {
+    let farthest_m = median(traces.iter().map(|t| t.farthest_m).collect())?;
+    let stiffness = median(traces.iter().map(|t| t.largest_n / t.farthest_m.max(1e-12)).collect())?;
+    let n = traces.len();
+    if farthest_m > FARTHEST_M {
+        return Some(format!(
+            "displacements of traces reach {} mm ({} mm are plausible; median of {n}): is `displacement_mm` in micrometres?",
+            plain(1e3 * farthest_m),
+            1e3 * FARTHEST_M
+        ));
+    }
+    (stiffness > STIFFEST_N_PER_M).then(|| {
+        format!(
+            "displacements of traces reach {} mm, {} N over each mm ({} are plausible; medians of {n}): is `displacement_mm` in metres?",
+            plain(1e3 * farthest_m),
+            plain(1e-3 * stiffness),
+            1e-3 * STIFFEST_N_PER_M
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measured::tests::pull;
+    use gripgen_twin::{PullTrace, TraceRow};
+
+    /// Pulls with a coefficient of 0.2 at 10, 20 and 40 N and a trace of 5 mm at 100 readings a second, in other units.
+    fn pulls(label: f64, grip: f64, time: f64, displacement: f64) -> Vec<MeasuredPull> {
+        let one = |i: usize| {
+            let grip_force_n = [10.0, 20.0, 40.0][i % 3];
+            let row = |k: usize| TraceRow {
+                time_s: time * 0.01 * k as f64,
+                desired_force_n: (1 + k / 10) as f64,
+                measured_force_n: 0.1 * k as f64,
+                displacement_m: displacement * 5e-5 * k as f64,
+            };
+            MeasuredPull {
+                grip_force_n: grip * grip_force_n,
+                max_pull_force_n: label * 0.4 * grip_force_n,
+                trace: Some((0..=100).map(row).collect::<PullTrace>()),
+                ..pull(i)
+            }
+        };
+        (0..9).map(one).collect()
+    }
+
+    fn refused(pulls: &[MeasuredPull]) -> String {
+        let said = implausible(Path::new("lab"), pulls).unwrap();
+        format!("{said}; {}", said.hint)
+    }
+
+    #[test]
+    fn plausible_pulls_are_taken_without_a_word() {
+        let fine = pulls(1.0, 1.0, 1.0, 1.0);
+        assert_eq!((implausible(Path::new("lab"), &fine), warnings(Path::new("lab"), &fine)), (None, vec![]));
+        // Labels of 0, a sensor that is a little off, and nothing but labels of 0.
+        let mut weak = fine;
+        (weak[0].max_pull_force_n, weak[1].max_pull_force_n) = (0.0, -0.286);
+        assert_eq!((implausible(Path::new("lab"), &weak), warnings(Path::new("lab"), &weak)), (None, vec![]));
+        weak.iter_mut().for_each(|p| p.max_pull_force_n = 0.0);
+        assert_eq!(implausible(Path::new("lab"), &weak), None);
+    }
+
+    #[test]
+    fn labels_that_no_gel_gives_are_refused_with_both_numbers() {
+        let milli = refused(&pulls(1e3, 1.0, 1.0, 1.0));
+        assert!(
+            milli.contains("200 times twice") && milli.contains("4000 N at a grip force of 10 N"),
+            "{milli}"
+        );
+        assert!(milli.contains("millinewtons? grams?"), "{milli}");
+        assert!(milli.contains("0.20 with labels in millinewtons"), "{milli}");
+        let grip = refused(&pulls(1.0, 1e3, 1.0, 1.0));
+        assert!(
+            grip.contains("2.00e-4 times") && grip.contains("0.20 with grip forces in millinewtons"),
+            "{grip}"
+        );
+        let all = refused(&pulls(-1.0, 1.0, 1.0, 1.0));
+        assert!(all.contains("9 of 9 labels are below 0: pull 0 has -4 N"), "{all}");
+        assert!(all.contains("a magnitude along the pull") && all.ends_with("write 4"), "{all}");
+        let mut signed = pulls(1.0, 1.0, 1.0, 1.0);
+        signed[4].max_pull_force_n *= -1.0;
+        let signed = refused(&signed);
+        assert!(signed.contains("1 of 9 labels are below 0: pull 4 has -8 N"), "{signed}");
+    }
+
+    #[test]
+    fn odd_units_are_named() {
+        for (given, says) in [
+            (pulls(1.0 / KGF_N, 1.0, 1.0, 1.0), "0.20 with labels in kilograms-force (kgf)"),
+            (pulls(20.0, 1.0, 1.0, 1.0), "4.0 times twice the grip force"),
+            (pulls(1.0, 1.0, 1e3, 1.0), "a reading every 10.0 s"),
+            (pulls(1.0, 1.0, 1e3, 1.0), "is `time_s` in milliseconds?"),
+            (pulls(1.0, 1.0, 1e-3, 1.0), "`step_time_s` in milliseconds?"),
+            (pulls(1.0, 1.0, 1.0, 1e3), "reach 5000 mm (200 mm are plausible; median of 9)"),
+            (pulls(1.0, 1.0, 1.0, 1e-3), "is `displacement_mm` in metres?"),
+        ] {
+            assert_eq!(implausible(Path::new("lab"), &given), None);
+            let said = warnings(Path::new("lab"), &given);
+            assert!(
+                said.len() == 1 && said[0].starts_with("lab: ") && said[0].contains(says),
+                "{says}: {said:?}"
+            );
+        }
+    }
+}
