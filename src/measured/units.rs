@@ -142,7 +142,7 @@ fn units(ratio: f64) -> String {
     let usual = UNITS.iter().map(|(name, factor)| (name, ratio * factor));
     let usual = usual.filter(|(_, ratio)| (USUAL.0..=USUAL.1).contains(ratio));
     let said: Vec<String> = usual.map(|(name, ratio)| format!("{} with {name}", plain(ratio))).collect();
-    if said.is_empty() { String::new() } else { format!("; it would be {}", said.join(", ")) }
+    if said.is_empty() { String::new() } else { format!(" (it would be {})", said.join(", ")) }
 }
 
 /// A number with two or three figures.
