@@ -66,7 +66,8 @@ fn own_threads() -> Option<usize> {
 #[test]
 fn a_rig_that_is_dropped_leaves_no_thread_and_no_port() {
     let plant = Arc::new(Spring::default());
-    let before = own_threads();
+    // A list of threads that others leave while it is read may lack one: this thread counts itself.
+    let before = (0..100).map(|_| own_threads()).find(|n| *n != Some(0)).flatten();
     let rig = ServedRig::start(plant.clone(), &options(5.0)).unwrap();
     let at = rig.addresses();
     // One device is silent for an hour, one client reads nothing of what it is sent, the others wait.
