@@ -1,6 +1,6 @@
 //! Whether measured pulls can be in the units that they are read in: numbers a thousand times too large are fitted as well as any.
 
-use gripgen_twin::MeasuredPull;
+use gripgen_twin::{MeasuredPull, POSSIBLE_LABEL_RATIO, median_label_ratio, rounded};
 use std::path::Path;
 
 /// Labels that no gel and no part give.
@@ -19,8 +19,6 @@ pub struct ImplausibleLabels {
 const USUAL: (f64, f64) = (0.05, 1.0);
 /// Beyond these something may be wrong.
 const ODD: (f64, f64) = (0.04, 3.0);
-/// Beyond these it is.
-const IMPOSSIBLE: (f64, f64) = (0.01, 20.0);
 
 /// Newtons of a kilogram-force and of a pound-force.
 const KGF_N: f64 = 9.80665;
@@ -73,18 +71,14 @@ pub(super) fn implausible(path: &Path, pulls: &[MeasuredPull]) -> Option<Implaus
             sign: true,
         });
     }
-    let ratio = median_ratio(pulls)?;
-    if (IMPOSSIBLE.0..=IMPOSSIBLE.1).contains(&ratio) {
-        return None;
-    }
+    let (low, high) = POSSIBLE_LABEL_RATIO;
+    let ratio = above_zero(pulls).filter(|ratio| !(low..=high).contains(ratio))?;
     let first = pulls.iter().find(|p| p.max_pull_force_n > 0.0)?;
     Some(ImplausibleLabels {
         problem: format!(
-            "{path}: the labels are {} times twice the grip force in the median, which no gel gives ({} to {}): pull {} has {} N at a \
+            "{path}: the labels are {} times twice the grip force in the median, which no gel gives ({low} to {high}): pull {} has {} N at a \
              grip force of {} N",
-            plain(ratio),
-            IMPOSSIBLE.0,
-            IMPOSSIBLE.1,
+            rounded(ratio, &[]),
             first.id,
             first.max_pull_force_n,
             first.grip_force_n
@@ -99,12 +93,12 @@ pub(super) fn implausible(path: &Path, pulls: &[MeasuredPull]) -> Option<Implaus
 
 /// What is to be looked at again.
 pub(super) fn warnings(path: &Path, pulls: &[MeasuredPull]) -> Vec<String> {
-    let odd = median_ratio(pulls).filter(|ratio| !(ODD.0..=ODD.1).contains(ratio));
+    let odd = above_zero(pulls).filter(|ratio| !(ODD.0..=ODD.1).contains(ratio));
     let of_labels = odd.map(|ratio| {
         format!(
             "the labels are {} times twice the grip force in the median, usual are {} to {}: are they newtons, and grip forces those of \
              one jaw?{}",
-            plain(ratio),
+            rounded(ratio, &[]),
             USUAL.0,
             USUAL.1,
             units(ratio)
@@ -126,10 +120,9 @@ fn wrong_sign(pulls: &[MeasuredPull]) -> Option<(usize, &MeasuredPull)> {
     Some((below.len(), *first))
 }
 
-/// Labels over twice the grip force; a label of 0 says nothing of its unit.
-fn median_ratio(pulls: &[MeasuredPull]) -> Option<f64> {
-    let held = pulls.iter().filter(|p| p.max_pull_force_n > 0.0);
-    median(held.map(|p| p.max_pull_force_n / (2.0 * p.grip_force_n)).collect())
+/// The median label over twice the grip force; labels of 0 say nothing of their unit.
+fn above_zero(pulls: &[MeasuredPull]) -> Option<f64> {
+    median_label_ratio(pulls).filter(|ratio| *ratio > 0.0)
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {
@@ -141,19 +134,9 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 fn units(ratio: f64) -> String {
     let usual = UNITS.iter().map(|(name, factor)| (name, ratio * factor));
     let usual = usual.filter(|(_, ratio)| (USUAL.0..=USUAL.1).contains(ratio));
-    let said: Vec<String> = usual.map(|(name, ratio)| format!("{} with {name}", plain(ratio))).collect();
+    let said: Vec<String> =
+        usual.map(|(name, ratio)| format!("{} with {name}", rounded(ratio, &[]))).collect();
     if said.is_empty() { String::new() } else { format!(" (it would be {})", said.join(", ")) }
-}
-
-/// A number with two or three figures.
-fn plain(x: f64) -> String {
-    match x {
-        x if x >= 100.0 => format!("{x:.0}"),
-        x if x >= 1.0 => format!("{x:.1}"),
-        x if x >= 0.1 => format!("{x:.2}"),
-        x if x >= 0.01 => format!("{x:.3}"),
-        x => format!("{x:.2e}"),
-    }
 }
 
 /// What is looked at in a trace.
@@ -194,10 +177,10 @@ fn times(traces: &[Seen]) -> Option<String> {
     Some(format!(
         "traces go on for {} times as long as their staircase takes ({} to {LONGER} are plausible), with a reading every {} s ({} to {}; medians \
          of {}): is {unit}?",
-        plain(over),
+        rounded(over, &[]),
         1.0 / LONGER,
-        plain(interval_s),
-        plain(INTERVAL_S.0),
+        rounded(interval_s, &[]),
+        rounded(INTERVAL_S.0, &[]),
         INTERVAL_S.1,
         traces.len()
     ))
@@ -210,15 +193,15 @@ fn displacements(traces: &[Seen]) -> Option<String> {
     if farthest_m > FARTHEST_M {
         return Some(format!(
             "displacements of traces reach {} mm ({} mm are plausible; median of {n}): is `displacement_mm` in micrometres?",
-            plain(1e3 * farthest_m),
+            rounded(1e3 * farthest_m, &[]),
             1e3 * FARTHEST_M
         ));
     }
     (stiffness > STIFFEST_N_PER_M).then(|| {
         format!(
             "displacements of traces reach {} mm, {} N over each mm ({} are plausible; medians of {n}): is `displacement_mm` in metres?",
-            plain(1e3 * farthest_m),
-            plain(1e-3 * stiffness),
+            rounded(1e3 * farthest_m, &[]),
+            rounded(1e-3 * stiffness, &[]),
             1e-3 * STIFFEST_N_PER_M
         )
     })
@@ -275,12 +258,12 @@ mod tests {
             "{milli}"
         );
         assert!(milli.contains("millinewtons? grams?"), "{milli}");
-        assert!(milli.contains("0.20 with labels in millinewtons"), "{milli}");
-        let grip = refused(&pulls(1.0, 1e3, 1.0, 1.0));
         assert!(
-            grip.contains("2.00e-4 times") && grip.contains("0.20 with grip forces in millinewtons"),
-            "{grip}"
+            milli.contains("(it would be 0.2") && milli.contains("with labels in millinewtons"),
+            "{milli}"
         );
+        let grip = refused(&pulls(1.0, 1e3, 1.0, 1.0));
+        assert!(grip.contains("0.0002") && grip.contains("with grip forces in millinewtons"), "{grip}");
         let all = refused(&pulls(-1.0, 1.0, 1.0, 1.0));
         assert!(all.contains("9 of 9 labels are below 0: pull 0 has -4 N"), "{all}");
         assert!(all.contains("a magnitude along the pull") && all.ends_with("write 4"), "{all}");
@@ -293,9 +276,9 @@ mod tests {
     #[test]
     fn odd_units_are_named() {
         for (given, says) in [
-            (pulls(1.0 / KGF_N, 1.0, 1.0, 1.0), "0.20 with labels in kilograms-force (kgf)"),
-            (pulls(20.0, 1.0, 1.0, 1.0), "4.0 times twice the grip force"),
-            (pulls(1.0, 1.0, 1e3, 1.0), "a reading every 10.0 s"),
+            (pulls(1.0 / KGF_N, 1.0, 1.0, 1.0), "with labels in kilograms-force (kgf)"),
+            (pulls(18.0, 1.0, 1.0, 1.0), "3.6"),
+            (pulls(1.0, 1.0, 1e3, 1.0), "with a reading every 10"),
             (pulls(1.0, 1.0, 1e3, 1.0), "is `time_s` in milliseconds?"),
             (pulls(1.0, 1.0, 1e-3, 1.0), "`step_time_s` in milliseconds?"),
             (pulls(1.0, 1.0, 1.0, 1e3), "reach 5000 mm (200 mm are plausible; median of 9)"),

@@ -1,7 +1,6 @@
 //! What is said of a name that is not sure.
 
 use super::EvidenceRow;
-use gripgen_identify::pulls::recovered;
 use gripgen_identify::{Diagnosis, NamedEffect};
 use gripgen_twin::effects::{EffectSpec, find};
 
@@ -13,11 +12,10 @@ const AGAIN: f64 = 0.8;
 
 /// A sentence on the first name that is not sure, with the nearest other one in the words of the catalogue.
 pub(super) fn doubt(d: &Diagnosis, evidence: &[EvidenceRow]) -> Option<String> {
-    let mut effects = d.effects.iter().map(|effect| (effect, recovered(d, &effect.name)));
-    let unsure = |weight: f64, again: Option<f64>| weight < SURE || again.is_some_and(|share| share < AGAIN);
-    let (effect, again) = effects.find(|(effect, again)| unsure(effect.weight, *again))?;
-    let again = again.map_or(String::new(), |share| {
-        format!("; of campaigns drawn anew, {:.0} % name it first", 100.0 * share)
+    let again = |effect: &NamedEffect| effect.named_again.is_some_and(|share| share < AGAIN);
+    let effect = d.effects.iter().find(|effect| effect.weight < SURE || again(effect))?;
+    let again = effect.named_again.map_or(String::new(), |share| {
+        format!("; of campaigns drawn anew, {:.0} % name it or what is tied with it", 100.0 * share)
     });
     let name = format!("The name {} is not sure (weight {:.2}{again})", effect.name, effect.weight);
     Some(match nearest(d, effect, evidence) {
@@ -68,11 +66,8 @@ mod tests {
             parameters: BTreeMap::new(),
             indistinguishable_from: vec![Rival { name: "regime_transition".into(), weight: 0.09 }],
             separate_by: None,
+            named_again: Some(share),
         });
-        d.notes.push(format!(
-            "of simulated campaigns with these pulls and this area_saturation, {:.0} % name it, or what is tied with it, first",
-            100.0 * share
-        ));
         d.conclude();
         let report = ReportData { evidence, ..Default::default() };
         Diagnosed::new(d, TwinEdits::default(), report).diagnosis.plain.unwrap_or_default()
@@ -90,7 +85,7 @@ mod tests {
         };
         let light = said(0.12, 0.22, evidence());
         assert!(light.starts_with("Friction stops growing at strong grips, for example"), "{light}");
-        let doubted = "area_saturation is not sure (weight 0.12; of campaigns drawn anew, 22 % name it first). \
+        let doubted = "area_saturation is not sure (weight 0.12; of campaigns drawn anew, 22 % name it or what is tied with it). \
                        Nearest to it is load_power_law: The friction coefficient changes smoothly";
         assert!(light.contains(doubted), "{light}");
         assert!(said(0.7, 0.75, evidence()).contains("not sure"), "a quarter of them names something else");

@@ -38,6 +38,7 @@ fn diagnosis() -> Diagnosis {
         noise_floor_mm3: None,
         verdict: Verdict::Effect,
         effects: vec![NamedEffect {
+            named_again: None,
             name: "wear".into(),
             part: None,
             class: vec!["wear".into(), "sensor_gain_drift".into()],
@@ -77,6 +78,8 @@ fn diagnosis() -> Diagnosis {
         posterior: None,
         plain: None,
         notes: vec!["3 pulls were left out: they failed".into()],
+        deciding: vec![],
+        other_unit: false,
     }
 }
 

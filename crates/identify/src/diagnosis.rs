@@ -157,6 +157,9 @@ pub struct NamedEffect {
     /// What would tell them apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separate_by: Option<SeparateBy>,
+    /// Share of the campaigns that were simulated with it that name it, or what is tied with it, first; where they were.
+    #[serde(skip)]
+    pub named_again: Option<f64>,
 }
 
 /// A covariate on which the residual depends in a way that the library does not explain.
@@ -293,6 +296,12 @@ pub struct Diagnosis {
     pub plain: Option<String>,
     /// Remarks for people: what is missing, what was left out, what to beware of.
     pub notes: Vec<String>,
+    /// Those of the notes that decide how far the answer may be believed, the most important first.
+    #[serde(skip)]
+    pub deciding: Vec<String>,
+    /// Whether the forces look as if they were not in newtons.
+    #[serde(skip)]
+    pub other_unit: bool,
 }
 
 impl Diagnosis {
@@ -318,7 +327,15 @@ impl Diagnosis {
             posterior: None,
             plain: None,
             notes: Vec::new(),
+            deciding: Vec::new(),
+            other_unit: false,
         }
+    }
+
+    /// Adds a note that decides how far the answer may be believed.
+    pub fn decides(&mut self, note: String) {
+        self.deciding.push(note.clone());
+        self.notes.push(note);
     }
 
     /// Puts the verdict that follows from what was found: an effect before a dependence that none explains.
@@ -334,6 +351,7 @@ impl Diagnosis {
 
     /// Marks values that stand at a bound of their parameter, says so, and trusts their effects less.
     fn say_bounds(&mut self) {
+        let mut bounds_met = Vec::new();
         for effect in &mut self.effects {
             let Some(spec) = find(&effect.name) else { continue };
             for p in spec.parameters {
@@ -349,12 +367,13 @@ impl Diagnosis {
                 let Some(bound) = bounds.find(at) else { continue };
                 estimate.at_bound = true;
                 effect.weight = effect.weight.min(MAX_WEIGHT_AT_BOUND);
-                self.notes.push(format!(
+                bounds_met.push(format!(
                     "{}.{} = {} stands at the bound of what is fitted, {bound}: something else may look like {0}",
                     effect.name, p.name, estimate.value
                 ));
             }
         }
+        bounds_met.into_iter().for_each(|note| self.decides(note));
     }
 }
 

@@ -131,6 +131,7 @@ mod tests {
                 )]),
                 indistinguishable_from: Vec::new(),
                 separate_by: None,
+                named_again: None,
             });
             d.conclude();
             d

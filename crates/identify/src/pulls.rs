@@ -44,11 +44,10 @@ mod smooth;
 mod stated;
 pub mod terms;
 mod trace_residuals;
+mod units;
 mod unknown;
 mod words;
 mod worth;
 mod written;
 mod zero_screen;
 mod zero_wander;
-
-pub use simulate::recovered;

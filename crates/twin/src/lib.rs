@@ -71,7 +71,10 @@ pub use grasp::Grasp;
 pub use image::TactileImage;
 pub use jaw::{Jaw, PerJaw};
 pub use label::{LabelError, PullEnd, SlipLabel, slip_label};
-pub use measured::{ExtraColumn, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, RestCount};
+pub use measured::{
+    ExtraColumn, MeasuredPull, MeasuredPulls, POSSIBLE_LABEL_RATIO, PULLS_SINCE_REST, RestCount,
+    median_label_ratio,
+};
 pub use mesh::{
     EXTENT_RANGE_M, MAX_TRIANGLES, MESH_FORMATS, MeshError, MeshLook, TriMesh, usual_scale_mm_per_unit,
     write_binary_stl,

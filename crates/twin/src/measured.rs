@@ -10,6 +10,16 @@ pub const PULLS_SINCE_REST: &str = "pulls_since_rest";
 /// A pause as long as this is a rest: polymers forget most of their first cycles in a quarter of an hour.
 const REST_S: f64 = 900.0;
 
+/// Medians of a label over twice the grip force that gels and parts can give; beyond it the numbers are in another unit.
+pub const POSSIBLE_LABEL_RATIO: (f64, f64) = (0.004, 4.0);
+
+/// Labels over twice the grip force of a jaw, their (upper) median; `None` without pulls.
+pub fn median_label_ratio(pulls: &[MeasuredPull]) -> Option<f64> {
+    let mut ratios: Vec<f64> = pulls.iter().map(|p| p.max_pull_force_n / (2.0 * p.grip_force_n)).collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios.get(ratios.len() / 2).copied()
+}
+
 /// One measured pull.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredPull {

@@ -4,7 +4,6 @@ pub mod next;
 mod notes;
 mod output;
 mod presses;
-mod units;
 
 use crate::args::{DiagnoseArgs, TalkArgs};
 use crate::commands::imprints;

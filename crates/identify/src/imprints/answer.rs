@@ -159,6 +159,7 @@ fn named(prepared: &Prepared, tried: &Tried, set: &Set, effect: usize) -> NamedE
             .map(|((e, _), share)| Rival { name: name(*e), weight: share / all })
             .collect(),
         separate_by: separate_by(&class),
+        named_again: None,
         class,
     }
 }

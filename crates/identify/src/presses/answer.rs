@@ -101,6 +101,7 @@ impl Answer<'_> {
                 let mut class = vec![acting.spec.id.to_string()];
                 class.extend(rivals.iter().map(|r| r.name.clone()));
                 let named = NamedEffect {
+                    named_again: None,
                     name: acting.spec.id.into(),
                     part: None,
                     separate_by: (!rivals.is_empty())
@@ -134,6 +135,7 @@ impl Answer<'_> {
             name: acting.spec.id.into(),
             part: None,
             separate_by: None,
+            named_again: None,
             class: vec![acting.spec.id.into()],
             weight: 0.95,
             parameters: parameters.collect(),

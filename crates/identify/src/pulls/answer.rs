@@ -19,6 +19,7 @@ use super::ridge::ahead;
 use super::search::{Accepted, Search};
 use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
+use super::units::other_unit;
 use super::unknown::unknown;
 use super::worth::{BAD, HeldOut, hints, worse};
 use super::zero_screen::{said, zeros_that_depend};
@@ -26,7 +27,6 @@ use crate::diagnosis::{
     Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, ParameterEstimate, Residual, UnknownCovariate,
 };
 use gripgen_twin::columns::covariates;
-use gripgen_twin::rounded;
 use gripgen_twin::{MeasuredPulls, Posterior};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -180,7 +180,7 @@ pub fn diagnose_pulls(
     for curve in accepted.curves.iter().map(|&i| &search.curves[i]) {
         if let Some((column, word)) = &curve.only {
             let name = &curve.name;
-            diagnosis.notes.push(format!("{name}: it was seen where {column} is {word}, and only there"));
+            diagnosis.decides(format!("{name}: it was seen where {column} is {word}, and only there"));
         }
     }
     if let Some(left) = left {
@@ -210,7 +210,7 @@ pub fn diagnose_pulls(
         }
     }
     if let Some((low_n, _)) = context.noise90_n.filter(|(low_n, _)| *low_n > NOISIER * given.noise_n) {
-        diagnosis.notes.push(format!(
+        diagnosis.decides(format!(
             "the labels are those of a force sensor with {low_n:.2} N of noise or more, the twin says {:.2} N: an offset of sensor, friction or grip force would look \
              alike; a single trace shows the noise",
             given.noise_n
@@ -349,6 +349,7 @@ pub(super) fn blank(data: &PullData<'_>) -> Diagnosis {
         ..DataSummary::default()
     };
     let mut diagnosis = Diagnosis::blank(Channel::Pulls, data_summary);
+    diagnosis.other_unit = other_unit(&data.measured.pulls).is_some();
     for name in known {
         match data.columns.contains_key(name) {
             true if data.varies(name) => {}
@@ -371,17 +372,7 @@ pub fn insufficient(data: &PullData<'_>) -> Option<String> {
     if data.parts.len() * 3 > n {
         return Some(format!("{n} pulls of {} parts are too few", data.parts.len()));
     }
-    let mut ratios: Vec<f64> =
-        data.measured.pulls.iter().map(|p| p.max_pull_force_n / (2.0 * p.grip_force_n)).collect();
-    ratios.sort_by(f64::total_cmp);
-    let ratio = ratios[n / 2];
-    if !(0.004..=4.0).contains(&ratio) {
-        return Some(format!(
-            "the labels are {} times twice the grip force, which no gel does (0.004 to 4): are all forces in newtons, per jaw?",
-            rounded(ratio, &[0.004, 4.0])
-        ));
-    }
-    None
+    other_unit(&data.measured.pulls)
 }
 
 /// Pulls that lie far off, the farthest first.

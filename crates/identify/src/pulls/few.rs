@@ -13,10 +13,11 @@ use super::estimates::plain_baseline;
 use super::law::{OffsetLaw, largest_relative_sigma};
 use super::model::{ModelEffect, PredictPulls, PullModel};
 use super::priors::PullPriors;
+use super::units::other_unit;
 use crate::diagnosis::ParameterEstimate;
 use crate::draws::Draws;
 use gripgen_twin::effects::OFFSET_LAW;
-use gripgen_twin::{Posterior, PosteriorDraw, rounded};
+use gripgen_twin::{Posterior, PosteriorDraw};
 use nodes::{Rig, ratios, rigs};
 use part::{PartAnswer, PartDraw, PartOnRig};
 use std::collections::BTreeMap;
@@ -312,16 +313,7 @@ fn notes(data: &PullData<'_>, law: bool) -> Vec<String> {
             ));
         }
     }
-    let mut ratios: Vec<f64> =
-        data.measured.pulls.iter().map(|p| p.max_pull_force_n / (2.0 * p.grip_force_n)).collect();
-    ratios.sort_by(f64::total_cmp);
-    let ratio = ratios[ratios.len() / 2];
-    if !(0.004..=4.0).contains(&ratio) {
-        notes.push(format!(
-            "the labels are {} times twice the grip force, which no gel does (0.004 to 4): are all forces in newtons, per jaw?",
-            rounded(ratio, &[0.004, 4.0])
-        ));
-    }
+    notes.extend(other_unit(&data.measured.pulls));
     notes
 }
 

@@ -47,6 +47,7 @@ pub fn diagnose_few(
     ));
     let found = calibrate_few(&data, predictor, given, priors, false);
     let Some(plain) = &found else {
+        diagnosis.other_unit = true;
         diagnosis
             .notes
             .push("the labels cannot be predicted at all: is the unit of the forces newton?".into());

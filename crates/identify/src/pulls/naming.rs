@@ -41,6 +41,7 @@ pub(super) fn named(search: &Search<'_>, before: &Fitted, accepted: &Accepted) -
             );
             let names: Vec<&str> = tied.iter().map(|t| search.candidates[t.effect].spec.id).collect();
             let named = NamedEffect {
+                named_again: None,
                 name: candidate.spec.id.into(),
                 part: None,
                 class,

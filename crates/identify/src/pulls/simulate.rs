@@ -48,29 +48,17 @@ pub fn recalibrate(diagnosis: &mut Diagnosis, trusted: &[Trusted]) {
     for t in trusted {
         let entries = diagnosis.effects.iter_mut().filter(|e| e.name == t.effect);
         entries.for_each(|e| {
+            e.named_again = Some(t.recovered);
             e.weight *= t.recovered.max(0.02);
             e.indistinguishable_from.iter_mut().for_each(|r| r.weight *= t.recovered.max(0.02));
         });
         diagnosis.notes.push(format!(
-            "{}{:.0} % name it, or what is tied with it, first; of those without it, {:.0} % name something",
-            said_of(t.effect),
+            "of simulated campaigns with these pulls and this {}, {:.0} % name it, or what is tied with it, first; of those without it, {:.0} % name something",
+            t.effect,
             100.0 * t.recovered,
             100.0 * t.false_alarms
         ));
     }
-}
-
-/// How the note on simulated campaigns with an effect begins.
-fn said_of(effect: &str) -> String {
-    format!("of simulated campaigns with these pulls and this {effect}, ")
-}
-
-/// The share of simulated campaigns that name an effect first, as the notes of an answer say it.
-pub fn recovered(diagnosis: &Diagnosis, effect: &str) -> Option<f64> {
-    let opening = said_of(effect);
-    let said = diagnosis.notes.iter().find_map(|note| note.strip_prefix(opening.as_str()))?;
-    let percent: f64 = said.split_once(" %")?.0.parse().ok()?;
-    Some(percent / 100.0)
 }
 
 /// Of one effect; `set` is it and what is tied with it.
@@ -173,19 +161,4 @@ pub(super) fn orthonormal(columns: Vec<DVector<f64>>) -> Vec<DVector<f64>> {
         }
     }
     found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::diagnosis::{Channel, DataSummary};
-
-    #[test]
-    fn what_the_notes_say_is_read_back() {
-        let mut d = Diagnosis::blank(Channel::Pulls, DataSummary::default());
-        assert_eq!(recovered(&d, "wear"), None);
-        recalibrate(&mut d, &[Trusted { effect: "wear", recovered: 0.22, false_alarms: 0.01 }]);
-        assert_eq!(recovered(&d, "wear"), Some(0.22));
-        assert_eq!(recovered(&d, "nap"), None);
-    }
 }

@@ -171,6 +171,7 @@ fn named_effect(
         name: effect.spec.id.into(),
         part: None,
         separate_by: separate_by(&class),
+        named_again: None,
         class,
         weight,
         parameters,

@@ -1,6 +1,5 @@
 //! What follows from a diagnosis: the next pulls beside its files, and commands that can be copied.
 
-use super::units::asks_for_newtons;
 use crate::args::DiagnoseArgs;
 use crate::commands::rig::load_rig;
 use crate::failure::Failure;
@@ -100,7 +99,7 @@ pub fn next_toml(next: &NextPulls, measured: &Path, twin: &str, sha256: &str) ->
 /// What to do next: a sentence, and a command or nothing. At most two.
 pub fn next_steps(args: &DiagnoseArgs, diagnosed: &Diagnosed, next: Option<&Path>) -> Vec<(String, String)> {
     let diagnosis = &diagnosed.diagnosis;
-    if asks_for_newtons(diagnosis) {
+    if diagnosis.other_unit && diagnosis.verdict == Verdict::Insufficient {
         let text = "Write max_pull_force_n in newtons and grip_force_n in newtons of one jaw (force_convention = \"total\" in campaign.toml, where it is that of both), and diagnose again.";
         return vec![(text.into(), String::new())];
     }

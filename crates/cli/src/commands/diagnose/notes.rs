@@ -8,17 +8,9 @@ const MOST: usize = 2;
 /// Names of what lies far off that are said.
 const NAMES: usize = 5;
 
-/// What marks the notes of a diagnosis that decide, the most important first.
-const DECIDING: [fn(&str) -> bool; 3] = [
-    |note| note.ends_with(", and only there"),
-    |note| note.starts_with("the labels are those of a force sensor with"),
-    |note| note.contains("stands at the bound"),
-];
-
 /// The remarks that decide: what lies far off, where alone something was seen, noise that hides an offset, values at a bound.
 pub fn deciding(diagnosis: &Diagnosis) -> Vec<String> {
-    let of = |is: fn(&str) -> bool| diagnosis.notes.iter().filter(move |note| is(note)).cloned();
-    far_off(diagnosis).into_iter().chain(DECIDING.into_iter().flat_map(of)).take(MOST).collect()
+    far_off(diagnosis).into_iter().chain(diagnosis.deciding.iter().cloned()).take(MOST).collect()
 }
 
 /// What lies far off, by name.
@@ -47,26 +39,23 @@ mod tests {
     use super::*;
     use gripgen::identify::DataSummary;
 
-    fn with(outliers: &[&str], notes: &[&str]) -> Vec<String> {
+    fn with(outliers: &[&str], decide: &[&str]) -> Vec<String> {
         let outliers = outliers.iter().map(ToString::to_string).collect();
         let data = DataSummary { pulls: Some(120), outliers, ..Default::default() };
         let mut d = Diagnosis::blank(Channel::Pulls, data);
-        d.notes = notes.iter().map(ToString::to_string).collect();
+        d.notes.push("3 pulls were left out".into());
+        decide.iter().for_each(|note| d.decides(note.to_string()));
         deciding(&d)
     }
 
     #[test]
     fn pulls_far_off_are_named_and_two_remarks_are_enough() {
-        assert_eq!(with(&["7"], &["x"]), ["pull 7 lies far off: look at it, or leave it out"]);
+        assert_eq!(with(&["7"], &[]), ["pull 7 lies far off: look at it, or leave it out"]);
         assert_eq!(with(&["a", "b"], &[]), ["2 of 120 pulls lie far off: a, b"]);
         let many = with(&["a", "b", "c", "d", "e", "f", "g"], &[]);
         assert_eq!(many, ["7 of 120 pulls lie far off: a, b, c, d, e and 2 more"]);
-        let noise =
-            "the labels are those of a force sensor with 0.87 N of noise or more, the twin says 0.12 N";
-        let only = "humidity_pct*part: it was seen where part is lever, and only there";
-        let bound = "wear.depth = 0.9 stands at the bound of what is fitted, 0.9";
-        assert_eq!(with(&[], &["left out", bound, noise, only]), [only, noise]);
-        assert_eq!(with(&["7"], &[bound]).len(), 2);
-        assert!(with(&[], &["left out"]).is_empty());
+        assert_eq!(with(&[], &["only there", "noise", "bound"]), ["only there", "noise"]);
+        assert_eq!(with(&["7"], &["noise", "bound"]).len(), 2);
+        assert!(with(&[], &[]).is_empty());
     }
 }

@@ -101,8 +101,9 @@ fn pulls_of_no_rig_are_a_list_and_no_other_campaign_is_offered() {
 
 #[test]
 fn forces_in_another_unit_are_no_reason_for_a_campaign() {
-    let asked = ["the labels are 201 times twice the grip force: are all forces in newtons, per jaw?"];
-    let (text, command) = first(&typed(&["lab"]), &answered(Verdict::Insufficient, &asked), None);
+    let mut asked = answered(Verdict::Insufficient, &[]);
+    asked.diagnosis.other_unit = true;
+    let (text, command) = first(&typed(&["lab"]), &asked, None);
     assert!(command.is_empty() && text.contains("in newtons"), "{text}: {command}");
 }
 
