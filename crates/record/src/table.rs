@@ -1,6 +1,11 @@
 //! Tables that people hand in: CSV with a header, read row by row, with one kind of error.
 
+mod faults;
+mod lines;
+
+use faults::{encoding, of_cell, one_cell};
 use gripgen_twin::Values;
+use lines::Lines;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -84,85 +89,6 @@ pub enum TableError {
     },
 }
 
-/// What may be the matter with a header.
-fn one_cell(found: &str) -> &'static str {
-    if found.contains(", ") {
-        ""
-    } else if found.contains(';') {
-        " (the header is one cell with `;` in it: save it with commas)"
-    } else if found.contains('\t') {
-        " (the header is one cell with tabs in it: save it with commas)"
-    } else {
-        ""
-    }
-}
-
-/// What may be the matter with a cell.
-fn of_cell(cell: &str) -> String {
-    let with_point = cell.replacen(',', ".", 1);
-    if cell.contains(',') && number(&with_point).is_some() {
-        return format!(" (`{cell}` has a decimal comma, write {with_point})");
-    }
-    if is_clock(cell) {
-        return format!(" (`{cell}` is a clock time, write seconds from the start as a number: 0, 45.5, 91)");
-    }
-    String::new()
-}
-
-/// Whether a cell is a time of day, a date, or both.
-fn is_clock(cell: &str) -> bool {
-    let count = |of: &[char]| cell.chars().filter(|c| of.contains(c)).count();
-    let written = |c: char| c.is_ascii_digit() || ":-/.+ TZAPMapm".contains(c);
-    let digits = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
-    let parts = count(&[':']) >= 1 || count(&['-', '/']) == 2;
-    parts && digits(cell.chars().next()) && cell.chars().all(written)
-}
-
-/// What is the matter with a file whose text cannot be read: with the place, and the way out in brackets.
-fn encoding(bytes: &[u8]) -> Option<(String, &'static str)> {
-    const SAVE: &str = " (save the table as UTF-8; spreadsheets call it \"CSV UTF-8\")";
-    if matches!(bytes, [0xff, 0xfe, ..] | [0xfe, 0xff, ..] | [0, _, ..] | [_, 0, ..]) {
-        return Some(("the file is UTF-16".into(), SAVE));
-    }
-    let at = std::str::from_utf8(bytes).err()?.valid_up_to();
-    let line = Lines { bytes, counted: 0, line: 1 }.at(at);
-    Some((format!("line {line} holds the byte 0x{:02x}, which is no UTF-8", bytes[at]), SAVE))
-}
-
-/// Counts the lines of a file; one ends at `\n`, `\r\n` or a `\r` alone.
-struct Lines<'a> {
-    bytes: &'a [u8],
-    counted: usize,
-    line: u64,
-}
-
-impl Lines<'_> {
-    /// The line of the row that begins at a byte. For the parser a row begins with what is left of the end of the line before it (the
-    /// `\n` of `\r\n`), and with empty lines. Bytes are asked for in order.
-    fn at(&mut self, byte: usize) -> u64 {
-        let mut to = byte.min(self.bytes.len());
-        while matches!(self.bytes.get(to), Some(b'\r' | b'\n')) {
-            to += 1;
-        }
-        while self.counted < to {
-            let next = self.bytes.get(self.counted + 1);
-            let ends = match self.bytes[self.counted] {
-                b'\n' => true,
-                b'\r' => next != Some(&b'\n'),
-                _ => false,
-            };
-            self.line += u64::from(ends);
-            self.counted += 1;
-        }
-        self.line
-    }
-
-    /// The same of a place of the parser.
-    fn of(&mut self, position: Option<&csv::Position>) -> u64 {
-        position.map_or(0, |p| self.at(usize::try_from(p.byte()).unwrap_or(usize::MAX)))
-    }
-}
-
 /// The content of a file.
 ///
 /// # Errors
@@ -198,7 +124,7 @@ impl<'a> TableReader<'a> {
         if let Some((problem, hint)) = encoding(bytes) {
             return Err(TableError::Format { path: path.into(), problem, hint });
         }
-        let mut lines = Lines { bytes, counted: 0, line: 1 };
+        let mut lines = Lines::new(bytes);
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
         let header = reader.headers().map_err(|e| format_error(path, &mut lines, &e))?;
         // The parser takes a byte order mark off the file; a header pasted behind another has one inside.
