@@ -22,9 +22,12 @@ fn at(run: i32, line: i32, image: u32) -> f32 {
 fn finish(run: i32, line: i32, image: u32, blurred: f32) {
     if run < /*SIZE*/ {
         let place = run;
+        let x = /*FROM_X*/;
+        let y = /*FROM_Y*/;
         var value = blurred;
+        /*DEPTH*/
         /*RESTORE*/
-        store_blurred(/*FROM_X*/, /*FROM_Y*/, image, value);
+        store_blurred(x, y, image, value);
     }
 }
 

@@ -25,6 +25,11 @@ var<workgroup> volumes: array<f32, THREADS>;
 var<workgroup> counts: array<f32, THREADS>;
 var<workgroup> highest: atomic<u32>;
 var<workgroup> newton: Newton;
+// The contact's box.
+var<workgroup> low_x: atomic<u32>;
+var<workgroup> low_y: atomic<u32>;
+var<workgroup> high_x: atomic<u32>;
+var<workgroup> high_y: atomic<u32>;
 
 struct Newton {
     press: f32,
@@ -130,10 +135,29 @@ fn main(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) t
     let deeper = something && (found.available < wanted || found.press > frame.thickness_px);
     let press = found.press;
     let pressed = something && !deeper;
+    var low = vec2<u32>(frame.width_px, frame.height_px);
+    var high = vec2<u32>();
     for (var i = thread; i < pixels; i += THREADS) {
         let depth = select(0.0, pressed_in(start, i, top, press).x, pressed);
-        store_contact(i % frame.width_px, i / frame.width_px, image, depth);
+        let place = vec2<u32>(i % frame.width_px, i / frame.width_px);
+        store_contact(place.x, place.y, image, depth);
+        if depth > 0.0 {
+            low = min(low, place);
+            high = max(high, place);
+        }
     }
+    if thread == 0u {
+        atomicStore(&low_x, frame.width_px);
+        atomicStore(&low_y, frame.height_px);
+        atomicStore(&high_x, 0u);
+        atomicStore(&high_y, 0u);
+    }
+    workgroupBarrier();
+    atomicMin(&low_x, low.x);
+    atomicMin(&low_y, low.y);
+    atomicMax(&high_x, high.x);
+    atomicMax(&high_y, high.y);
+    workgroupBarrier();
     if thread == 0u {
         var status = 0u;
         if has_part && !something {
@@ -142,6 +166,9 @@ fn main(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) t
             status = 2u;
         }
         let depth = select(0.0, press, pressed);
-        outcomes[image] = Outcome(status, depth, found.available, frame.restore_depth_fraction * depth);
+        outcomes[image] = Outcome(
+            status, depth, found.available, frame.restore_depth_fraction * depth,
+            atomicLoad(&low_x), atomicLoad(&low_y), atomicLoad(&high_x), atomicLoad(&high_y),
+        );
     }
 }

@@ -45,6 +45,11 @@ struct Outcome {
     available_px3: f32,
     // Contact deeper than this is restored after each blur.
     core_px: f32,
+    // First and last column and row with contact; the last before the first without.
+    low_x: u32,
+    low_y: u32,
+    high_x: u32,
+    high_y: u32,
 }
 
 // A piece of a mesh.

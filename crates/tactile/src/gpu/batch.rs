@@ -162,6 +162,7 @@ impl GpuSensor {
         let indent = [press(Sampling::Centres)?, find_steps, press(Sampling::Points)?];
         let mut between = Vec::new();
         let follow = Some(on_processor.follow());
+        let mut reach_px = [0; 2];
         for (i, (kernel_px, restore)) in kernels_px
             .iter()
             .map(|&k| (k, follow))
@@ -173,8 +174,9 @@ impl GpuSensor {
             let ways = [(Axis::Y, from, &half_way, None), (Axis::X, &half_way, &surface, restore)];
             for (axis, source, blurred, restore) in ways {
                 let lift = lift.as_ref().filter(|_| axis == Axis::X);
-                let stage =
-                    pipelines.blur(device, Blur { kernel_px, axis, restore, lifted: lift.is_some() })?;
+                reach_px[usize::from(axis == Axis::Y)] += kernel_px / 2;
+                let blur = Blur { kernel_px, axis, restore, lifted: lift.is_some(), reach_px };
+                let stage = pipelines.blur(device, blur)?;
                 let all = [frame.as_entire_binding(), outcomes.as_entire_binding()];
                 let all = all.into_iter().chain([source.binding(), blurred.binding()]);
                 let all = all.enumerate().map(|(i, r)| (i as u32, r));

@@ -46,6 +46,10 @@ pub(super) struct Outcome {
     pub(super) press_px: f32,
     pub(super) available_px3: f32,
     pub(super) core_px: f32,
+    pub(super) low_x: u32,
+    pub(super) low_y: u32,
+    pub(super) high_x: u32,
+    pub(super) high_y: u32,
 }
 
 /// A piece of a mesh.
@@ -148,7 +152,7 @@ mod tests {
             noise_blue
         );
         compare!(PressInput, matrix, shift, fraction_bits, bound_px, wanted_px3, pixels_per_step, flags, key);
-        compare!(Outcome, status, press_px, available_px3, core_px);
+        compare!(Outcome, status, press_px, available_px3, core_px, low_x, low_y, high_x, high_y);
         compare!(Cluster, first_vertex, vertices, first_triangle, triangles, centre, half);
         compare!(Group, first_image, clusters);
         compare!(Shadows, rim_px, heights, directions, held, first_px, per_px);

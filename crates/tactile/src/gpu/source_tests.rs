@@ -98,7 +98,7 @@ fn every_blur_validates_and_fits_the_workgroup_memory() {
                     (None, true),
                 ] {
                     for bytes in [16_384, 32_768, 49_152] {
-                        let blur = Blur { kernel_px, axis, restore, lifted };
+                        let blur = Blur { kernel_px, axis, restore, lifted, reach_px: [35, kernel_px] };
                         let what = format!("{variant:?} {blur:?} {bytes}");
                         let (source, shape) =
                             source::blur(variant, blur, bytes).unwrap_or_else(|| panic!("{what}: no tile"));
@@ -118,6 +118,12 @@ fn every_blur_validates_and_fits_the_workgroup_memory() {
 
 #[test]
 fn a_tile_that_fits_nowhere_is_refused() {
-    let blur = Blur { kernel_px: 71, axis: Axis::X, restore: Some(Follow::AtLeast), lifted: false };
+    let blur = Blur {
+        kernel_px: 71,
+        axis: Axis::X,
+        restore: Some(Follow::AtLeast),
+        lifted: false,
+        reach_px: [35, 35],
+    };
     assert_eq!(source::blur(Variant::Tile, blur, 1024), None);
 }

@@ -1,5 +1,7 @@
 //! Stage `deform`, one blur along one axis, with its weights written out.
 
+mod tile;
+
 use super::{Axis, Variant, common, readable, writable};
 use crate::convolve::Follow;
 use crate::deform::gaussian;
@@ -26,6 +28,8 @@ pub(in crate::gpu) struct Blur {
     pub(in crate::gpu) restore: Option<Follow>,
     /// Whether the gel is not flat at rest, so that a blur moves it: added to the core, or to all after the last blur.
     pub(in crate::gpu) lifted: bool,
+    /// How far the blurs up to this one carry a value, along x and y: beyond it around the contact there is nothing to sum.
+    pub(in crate::gpu) reach_px: [u32; 2],
 }
 
 /// Lanes and values per thread of the tiled blur, as large as the workgroup memory allows; `None` if none does.
@@ -60,7 +64,7 @@ pub(in crate::gpu) fn blur(
     let mut restore = String::new();
     if blur.lifted {
         // On a gel that is not flat: how far the blurs so far have lifted or lowered it.
-        let _ = writeln!(restore, "let lift_px = lift[{from_y} * frame.width_px + {from_x}];");
+        restore += "let lift_px = lift[y * frame.width_px + x];\n";
     }
     restore += &match (blur.restore, blur.lifted) {
         (Some(follow), lifted) => {
@@ -69,10 +73,7 @@ pub(in crate::gpu) fn blur(
                 Follow::Exactly => core.into(),
                 Follow::AtLeast => format!("max(value, {core})"),
             };
-            format!(
-                "let depth = load_contact({from_x}, {from_y}, image);\n            \
-                 if depth > outcomes[image].core_px {{ value = {core}; }}"
-            )
+            format!("if depth > outcomes[image].core_px {{ value = {core}; }}")
         }
         // Keeps the binding in use, so that all blurs have the same layout.
         (None, lifted) => {
@@ -94,20 +95,24 @@ pub(in crate::gpu) fn blur(
                 .replace("/*WORKGROUP*/", workgroup)
                 .replace("/*AXIS*/", axis)
                 .replace("/*ACROSS*/", across);
+            let depth = if blur.restore.is_some() { "let depth = load_contact(x, y, image);" } else { "" };
+            let source = source.replace("/*DEPTH*/", depth);
             (source, run, BlurShape { span, lines })
         }
         Variant::Tile => {
             let (lanes, run) = tile_of(blur.kernel_px, workgroup_bytes)?;
-            let (load, store) = match blur.axis {
-                Axis::X => (("k % LENGTH", "k / LENGTH"), ("k % SPAN", "k / SPAN")),
-                Axis::Y => (("k / LANES", "k % LANES"), ("k / LANES", "k % LANES")),
+            let body = match blur.axis {
+                Axis::X => include_str!("../../../shaders/deform_tile_across.wgsl"),
+                Axis::Y => include_str!("../../../shaders/deform_tile_down.wgsl"),
             };
-            let source = include_str!("../../../shaders/deform_tile.wgsl")
+            let source = [include_str!("../../../shaders/shared/deform_tile.wgsl"), body]
+                .concat()
                 .replace("/*LANES*/", &lanes.to_string())
-                .replace("/*LOAD_RUN*/", load.0)
-                .replace("/*LOAD_LANE*/", load.1)
-                .replace("/*STORE_RUN*/", store.0)
-                .replace("/*STORE_LANE*/", store.1);
+                .replace("/*LOADS*/", &tile::loads(blur, lanes, run))
+                .replace("/*EXCHANGE*/", &tile::exchange(run))
+                .replace("/*FINISH*/", &tile::finish(blur, lanes, run))
+                .replace("/*REACH_X*/", &blur.reach_px[0].to_string())
+                .replace("/*REACH_Y*/", &blur.reach_px[1].to_string());
             (source, run, BlurShape { span: TILE_THREADS / lanes * run, lines: lanes })
         }
     };
@@ -121,21 +126,25 @@ pub(in crate::gpu) fn blur(
         .replace("/*FROM_X*/", from_x)
         .replace("/*FROM_Y*/", from_y)
         .replace("/*SUMS*/", &sums(&weights, run, variant))
-        .replace("/*FINISH*/", &finish(run, variant));
+        .replace("/*FINISH*/", &finish(run));
     Some((source, shape))
 }
 
-/// The weighted sums of `run` neighbouring values: each input is read once.
+/// The weighted sums of `run` neighbouring values: each input is read once. A tile that nothing reaches keeps zeros.
 fn sums(weights: &[f32], run: u32, variant: Variant) -> String {
     let run = run as usize;
     let mut text = String::new();
     for r in 0..run {
         let _ = writeln!(text, "var s{r} = 0.0;");
     }
+    let tiled = variant == Variant::Tile;
+    if tiled {
+        text += "    if touched {\n";
+    }
     for i in 0..weights.len() + run - 1 {
-        let value = match variant {
-            Variant::Texture { .. } => format!("at(first + {i} - HALF, line, image)"),
-            Variant::Tile => format!("tile[base + {i} * PITCH]"),
+        let value = match tiled {
+            true => format!("tile[base + {i}u * PITCH]"),
+            false => format!("at(first + {i} - HALF, line, image)"),
         };
         let _ = writeln!(text, "    let v{i} = {value};");
         for r in 0..run {
@@ -144,15 +153,16 @@ fn sums(weights: &[f32], run: u32, variant: Variant) -> String {
             }
         }
     }
+    if tiled {
+        text += "    }\n";
+    }
     text
 }
 
-fn finish(run: u32, variant: Variant) -> String {
+/// What becomes of the sums of a thread of a software adapter.
+fn finish(run: u32) -> String {
     (0..run).fold(String::new(), |mut text, r| {
-        let _ = match variant {
-            Variant::Texture { .. } => writeln!(text, "    finish(first + {r}, line, image, s{r});"),
-            Variant::Tile => writeln!(text, "    tile[base + {r} * PITCH] = s{r};"),
-        };
+        let _ = writeln!(text, "    finish(first + {r}, line, image, s{r});");
         text
     })
 }
