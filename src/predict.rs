@@ -1,10 +1,12 @@
 //! Predictions of measured pulls for fits: by the reduced mechanics without inertia, which is fast, and through the simulator,
 //! which is what a twin is judged by. Expected values over scatter and noise.
 
+mod clock;
 mod kept;
 mod limit;
 mod signals;
 mod table;
+mod tables;
 
 use crate::cache::Cache;
 use crate::expect::{Expectations, QuietTwin};
@@ -12,7 +14,7 @@ use crate::gripped::answering_mass_kg;
 use crate::library::Library;
 use crate::parallel::in_parallel;
 use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
-use gripgen_physics::{QuasiStatic, StuckPull};
+use gripgen_physics::QuasiStatic;
 use gripgen_twin::config::Feedback;
 use gripgen_twin::effects::{CommandChain, Effect, OutsideFit, Per, SensorChain};
 use gripgen_twin::{Backbone, Jaw, MeasuredPulls, Robot, Staircase, Twin};
@@ -20,27 +22,31 @@ use kept::Kept;
 use signals::Signals;
 use std::convert::Infallible;
 use std::sync::{Arc, OnceLock};
-use table::{ExactLabels, LabelTable, Scattered, enough_for};
+use table::{ExactLabels, LabelTable};
+use tables::Tables;
 
 /// Longest pull that is looked at.
 const MAX_TIME_S: f64 = 120.0;
 
-/// Tables kept: those of a model and of its neighbours for a derivative.
+/// Tables kept at least: those of a model and of its neighbours for a derivative.
 const TABLES: usize = 96;
+
+/// Tables kept of each profile: two kinetic ratios, of a contact that bends and of one that does not, and of two models.
+const TABLES_OF_PROFILE: usize = 8;
 
 /// Pulls and tables kept of models whose effects act on signals: a derivative by a friction parameter asks for those of
 /// the model itself again.
 const SIGNAL_PULLS: usize = 320;
 const SIGNAL_TABLES: usize = 192;
 
+/// Tables kept of a pull with signals of its own: of a model, and of its neighbours for a derivative.
+const OWN_TABLES: usize = 12;
+
+/// Mean contacts kept.
+const BACKBONES: usize = 8;
+
 /// Pulls whose contacts are looked at.
 const CONTACTS: usize = 12;
-
-/// Distance of the kinetic ratios for which there are tables; those between are interpolated.
-const RATIO_STEP: f64 = 0.025;
-
-/// Tables of two kinetic ratios and the weight of the second.
-type Tables = (Arc<LabelTable>, Arc<LabelTable>, f64);
 
 /// Predicts the pulls of a campaign on a rig.
 pub struct PullPredictor<'a> {
@@ -61,12 +67,16 @@ pub struct PullPredictor<'a> {
     max_n: f64,
     /// Cells of contacts from all over the campaign: shares of area and limit.
     contacts: OnceLock<Vec<(f64, f64)>>,
+    /// Mean contacts by the bits of `shear_by_area`.
+    backbones: Cache<u64, Backbone>,
     jobs: usize,
     stuck: Cache<Key, Kept>,
     tables: Cache<Key, LabelTable>,
     exact: Cache<Key, ExactLabels>,
     signal_stuck: Cache<Key, Kept>,
     signal_tables: Cache<Key, LabelTable>,
+    /// Of each pull that has signals of its own.
+    own_tables: Vec<Cache<Key, LabelTable>>,
 }
 
 fn acts_on_signals(model: &PullModel) -> bool {
@@ -99,6 +109,7 @@ impl<'a> PullPredictor<'a> {
         let traces = measured.pulls.iter().filter_map(|p| p.trace.as_ref());
         let readings = traces.flat_map(|t| t.measured_force_n.iter().copied());
         let max_n = 1.4 * labels.chain(readings).fold(1.0, f64::max) + 6.0;
+        let tables = TABLES.max(TABLES_OF_PROFILE * staircases.len());
         let mut robot = twin.robot;
         robot.feedback = measured.feedback.unwrap_or(robot.feedback);
         Self {
@@ -114,12 +125,14 @@ impl<'a> PullPredictor<'a> {
             part_of,
             max_n: max_n.min(2000.0),
             contacts: OnceLock::new(),
+            backbones: Cache::new(BACKBONES),
             jobs: jobs.max(1),
             stuck: Cache::new(TABLES),
-            tables: Cache::new(TABLES),
-            exact: Cache::new(TABLES),
+            tables: Cache::new(tables),
+            exact: Cache::new(tables),
             signal_stuck: Cache::new(SIGNAL_PULLS),
             signal_tables: Cache::new(SIGNAL_TABLES),
+            own_tables: measured.pulls.iter().map(|_| Cache::new(OWN_TABLES)).collect(),
         }
     }
 
@@ -248,96 +261,6 @@ impl<'a> PullPredictor<'a> {
         cache.get(self.key(model, row, &[]), make).unwrap_or_else(|never| match never {})
     }
 
-    fn scattered<'s>(
-        &'s self,
-        model: &'s PullModel,
-        row: usize,
-        stuck: &'s StuckPull,
-        backbone: &'s Backbone,
-    ) -> Scattered<'s> {
-        Scattered {
-            rig: self.rig(model),
-            stuck,
-            staircase: &self.staircases[self.profile_of[row]],
-            kinetic_ratio: model.kinetic_ratio,
-            backbone,
-            scatter: model.scatter,
-            noise_n: model.noise_n,
-            tolerance_n: self.measured.label_tolerance_n,
-            sensor: self.sensor(model, row),
-            command: self.command(model, row),
-        }
-    }
-
-    /// The mean contact of the campaign.
-    fn backbone(&self, model: &PullModel) -> Backbone {
-        let cells = self.contacts.get_or_init(|| {
-            let n = self.measured.pulls.len();
-            let rows = (0..n).step_by(n.div_ceil(CONTACTS).max(1));
-            rows.flat_map(|row| self.expectations.contact(&QuietTwin::new(&self.twin), row)).collect()
-        });
-        Backbone::new(cells, model.shear_by_area)
-    }
-
-    /// The tables of two kinetic ratios around the model's, and the weight of the second.
-    fn table(&self, model: &PullModel, row: usize) -> Tables {
-        let never = |made: Result<Arc<LabelTable>, Infallible>| made.unwrap_or_else(|never| match never {});
-        let build = |model: &PullModel| Ok::<_, Infallible>(self.label_table(model, row));
-        if acts_on_signals(model) {
-            let (bent_lag_s, bent_dead_s) = model.bent_at_s;
-            let own = [
-                model.kinetic_ratio,
-                model.scatter,
-                model.noise_n,
-                model.shear_by_area,
-                bent_lag_s,
-                bent_dead_s,
-            ];
-            let make = || Ok(self.signal_table(model, row));
-            let table = never(self.signal_tables.get(self.key(model, row, &own), make));
-            return (table.clone(), table, 0.0);
-        }
-        let steps = (model.kinetic_ratio / RATIO_STEP).min(1.0 / RATIO_STEP);
-        let at = |ratio: f64| {
-            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n, model.shear_by_area]);
-            let model = PullModel { kinetic_ratio: ratio, ..model.clone() };
-            never(self.tables.get(key, || build(&model)))
-        };
-        let low = steps.floor();
-        let weight = steps - low;
-        let first = at(low * RATIO_STEP);
-        let second = if weight > 0.0 { at((low + 1.0) * RATIO_STEP) } else { first.clone() };
-        (first, second, weight)
-    }
-
-    fn label_table(&self, model: &PullModel, row: usize) -> LabelTable {
-        let stuck = self.stuck(model, row);
-        let backbone = self.backbone(model);
-        let pull = self.scattered(model, row, &stuck, &backbone);
-        if acts_on_signals(model) {
-            return LabelTable::new(&pull, &ExactLabels::new(&pull, self.max_n, model.scatter), self.max_n);
-        }
-        let most = enough_for(model.scatter);
-        let own = [model.kinetic_ratio, most, model.noise_n, model.shear_by_area];
-        let make = || Ok::<_, Infallible>(ExactLabels::new(&pull, self.max_n, most));
-        let exact = self.exact.get(self.key(model, row, &own), make).unwrap_or_else(|never| match never {});
-        LabelTable::new(&pull, &exact, self.max_n)
-    }
-
-    /// Labels of a model whose effects act on signals: those of a contact that lets go at once, and what a bend adds to labels
-    /// without these effects, at the lag and dead time of `bent_at_s`. Fits try thousands of such models, and a contact that
-    /// bends takes five times as long.
-    fn signal_table(&self, model: &PullModel, row: usize) -> LabelTable {
-        if !self.backbone(model).bends() {
-            return self.label_table(model, row);
-        }
-        let straight = self.label_table(&PullModel { shear_by_area: 0.0, ..model.clone() }, row);
-        let (lag_s, dead_time_s) = model.bent_at_s;
-        let plain = PullModel { effects: vec![], factor: vec![], lag_s, dead_time_s, ..model.clone() };
-        let unbent = PullModel { shear_by_area: 0.0, ..plain.clone() };
-        straight.bent(&self.table(&plain, row), &self.table(&unbent, row))
-    }
-
     fn slots(&self) -> usize {
         2 * self.staircases.len()
     }
@@ -350,49 +273,6 @@ impl<'a> PullPredictor<'a> {
     /// Whether pulls of one profile and direction have the same signals.
     fn shares_signals(&self, model: &PullModel) -> bool {
         !model.effects.iter().any(|e| e.spec.reads_clock || (e.acts_on_signals() && e.part.is_some()))
-    }
-
-    /// Labels with signals that depend on the clock: tables at the first, the middle and the last pull of each profile
-    /// and direction, and a parabola in time between them. Signals of one part are taken pull by pull.
-    fn pulls_by_clock(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
-        let time = |row: usize| self.measured.pulls[row].covariates.time_s;
-        let backbone = self.backbone(model);
-        let alone = |row: usize| {
-            let stuck = self.stuck(model, row);
-            self.scattered(model, row, &stuck, &backbone).predict(self.limit_n(model, row))
-        };
-        let of_part = model.effects.iter().any(|e| e.acts_on_signals() && e.part.is_some());
-        let mut places: Vec<Vec<usize>> = vec![vec![]; self.slots()];
-        for (k, &row) in rows.iter().enumerate() {
-            places[self.slot(row)].push(k);
-        }
-        let mut found = vec![PullPrediction::default(); rows.len()];
-        for place in places.iter_mut().filter(|p| !p.is_empty()) {
-            place.sort_by(|&a, &b| time(rows[a]).total_cmp(&time(rows[b])));
-            let nodes = [place[0], place[place.len() / 2], place[place.len() - 1]].map(|k| rows[k]);
-            let t = nodes.map(time);
-            if of_part || place.len() < 12 || t[0] >= t[1] || t[1] >= t[2] {
-                place.iter().for_each(|&k| found[k] = alone(rows[k]));
-                continue;
-            }
-            let tables = nodes.map(|row| self.table(model, row).0);
-            for &k in place.iter() {
-                let (at, limit_n) = (time(rows[k]), self.limit_n(model, rows[k]));
-                let p = [0, 1, 2].map(|i| tables[i].at(limit_n));
-                let weight = |i: usize, j: usize, k: usize| {
-                    (at - t[j]) * (at - t[k]) / ((t[i] - t[j]) * (t[i] - t[k]))
-                };
-                let w = [weight(0, 1, 2), weight(1, 0, 2), weight(2, 0, 1)];
-                let sum = |f: &dyn Fn(&PullPrediction) -> f64| (0..3).map(|i| w[i] * f(&p[i])).sum::<f64>();
-                found[k] = PullPrediction {
-                    limit_n,
-                    limit_reading_n: sum(&|p| p.limit_reading_n),
-                    label_n: sum(&|p| p.label_n),
-                    label_sd_n: sum(&|p| p.label_sd_n).max(0.5 * p[1].label_sd_n),
-                };
-            }
-        }
-        found
     }
 }
 
@@ -412,9 +292,8 @@ impl PredictPulls for PullPredictor<'_> {
         rows.iter()
             .map(|&row| {
                 let slot = self.slot(row);
-                let (first, second, weight) = known[slot].get_or_insert_with(|| self.table(model, row));
-                let limit_n = self.limit_n(model, row);
-                first.at(limit_n).mixed(&second.at(limit_n), *weight)
+                let tables = known[slot].get_or_insert_with(|| self.tables_of(model, row));
+                self.at(tables, self.limit_n(model, row))
             })
             .collect()
     }

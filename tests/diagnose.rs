@@ -2,7 +2,7 @@
 
 use crate::common::root;
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
-use gripgen::identify::pulls::model::PredictPulls as _;
+use gripgen::identify::pulls::model::{ModelEffect, PredictPulls as _, PullModel};
 use gripgen::identify::{CampaignOptions, Diagnosis, Verdict, plan_campaign};
 use gripgen::physics::label_moments;
 use gripgen::twin::random::{Purpose, Stream};
@@ -148,6 +148,47 @@ fn fits_see_what_the_simulator_does() {
             off < 0.01 * all && worst < 0.8,
             "by area {by_area}, ratio {ratio}, {damping} N s/m: {worst} N"
         );
+    }
+}
+
+/// The same for a gain that drifts over four hours: a table of each pull where few share a profile, three of a profile and a parabola
+/// in time where many do. The answers do not depend on what was asked before, or in which order.
+#[test]
+fn fits_see_a_gain_that_drifts() {
+    let effect = "[[effects]]\nname = \"sensor_gain_drift\"\nrate_per_h = 0.04\n";
+    let (_folder, file) = twin_with(effect);
+    let twin = twin_at(&Location::Disk(file));
+    let library = library(&twin);
+    let mut measured = simulated("", 60, &[]);
+    for (i, pull) in measured.pulls.iter_mut().enumerate() {
+        (pull.grip_force_n, pull.trace) = (8.0 + 0.8 * i as f64, None);
+        pull.covariates.time_s = 240.0 * i as f64;
+    }
+    let drift = ModelEffect::new(twin.effects[0].spec, twin.effects[0].values.clone());
+    for (profiles, by_area) in [(1, 0.0), (1, 1.0), (12, 0.0), (12, 1.0)] {
+        for (i, pull) in measured.pulls.iter_mut().enumerate() {
+            pull.increment_n = 0.8 + 0.05 * (i % profiles) as f64;
+        }
+        let rows: Vec<usize> = (0..measured.pulls.len()).collect();
+        let predictor = PullPredictor::new(&measured, &twin, &library, 2);
+        let mut model = given_model(&twin, predictor.part_names()).unwrap();
+        (model.shear_by_area, model.effects) = (by_area, vec![drift.clone()]);
+        let fast = predictor.pulls(&model, &rows);
+        let exact = predictor.labels_n(&model, &rows);
+        let plain = predictor.labels_n(&PullModel { effects: vec![], ..model.clone() }, &rows);
+        let mean = |x: &dyn Fn(usize) -> f64| rows.iter().map(|&i| x(i)).sum::<f64>() / rows.len() as f64;
+        let off = mean(&|i| (fast[i].label_n - exact[i]).abs()) / mean(&|i| exact[i]);
+        let acts = mean(&|i| (plain[i] - exact[i]).abs()) / mean(&|i| exact[i]);
+        println!("{profiles} profiles, by area {by_area}: {:.2} % of {:.1} %", 100.0 * off, 100.0 * acts);
+        assert!(off < 0.01 && acts > 0.05, "{profiles} profiles, by area {by_area}: {off}, {acts}");
+        let other = PullPredictor::new(&measured, &twin, &library, 1);
+        let mut nearby = model.clone();
+        nearby.mu[0] *= 1.07;
+        other.pulls(&nearby, &rows);
+        for &row in rows.iter().rev().filter(|row| profiles > 1 && *row % 7 == 0) {
+            assert_eq!(other.pulls(&model, &[row])[0], fast[row], "pull {row}");
+        }
+        assert_eq!(other.pulls(&model, &rows), fast, "{profiles} profiles, by area {by_area}");
     }
 }
 

@@ -1,10 +1,11 @@
 //! Labels as a function of what the jaws hold, over scatter and noise.
 
 use super::Tables;
-use gripgen_identify::pulls::model::PullPrediction;
+use gripgen_identify::pulls::model::{PullModel, PullPrediction};
 use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
 use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::{Backbone, Staircase};
+use std::sync::{Arc, OnceLock};
 
 /// Distance of two small forces in a table.
 const STEP_N: f64 = 0.2;
@@ -61,18 +62,6 @@ impl Scattered<'_> {
             }
         }
     }
-
-    /// The prediction for jaws that hold `limit_n` on average.
-    pub fn predict(&self, limit_n: f64) -> PullPrediction {
-        let mut slip = SlipPull::default();
-        let moments = NODES[1..8].iter().map(|&(z, w)| {
-            let (mean, square) = self.label((limit_n * (1.0 + self.scatter * z)).max(0.0), &mut slip);
-            (w, mean, square)
-        });
-        let (w, mean, square) = moments
-            .fold((0.0, 0.0, 0.0), |(a, b, c), (w, mean, square)| (a + w, b + w * mean, c + w * square));
-        finished(limit_n, reading_n(self.stuck, limit_n), mean / w, square / w)
-    }
 }
 
 /// The reading when the contact force of a tool that holds reaches `limit_n`.
@@ -89,9 +78,17 @@ fn finished(limit_n: f64, limit_reading_n: f64, mean_n: f64, square: f64) -> Pul
     PullPrediction { limit_n, limit_reading_n, label_n: mean_n, label_sd_n }
 }
 
-/// Predictions for forces whose distances grow with them.
-pub(super) struct LabelTable {
-    rows: Vec<PullPrediction>,
+/// A prediction with what labels of a contact that bends lie above those of one that does not.
+pub(super) fn bent_by(
+    own: &PullPrediction,
+    bent: &PullPrediction,
+    straight: &PullPrediction,
+) -> PullPrediction {
+    PullPrediction {
+        label_n: own.label_n + bent.label_n - straight.label_n,
+        label_sd_n: (own.label_sd_n + bent.label_sd_n - straight.label_sd_n).max(0.5 * own.label_sd_n),
+        ..*own
+    }
 }
 
 /// Force beyond which distances grow.
@@ -109,9 +106,10 @@ fn force_n(place: f64) -> f64 {
 }
 
 /// Means and mean squares of labels of jaws that hold exactly the forces of a table: what is left where nothing scatters. Tables of all
-/// scatters, which differ from fold to fold, share them.
+/// scatters, which differ from fold to fold, share them. Each is worked out when it is first asked for: the pulls of a campaign need
+/// half of them, one pull a tenth.
 pub(super) struct ExactLabels {
-    values: Vec<(f64, f64)>,
+    values: Vec<OnceLock<(f64, f64)>>,
 }
 
 /// Scatters for which the same forces are looked at.
@@ -128,55 +126,64 @@ pub(super) fn enough_for(scatter: f64) -> f64 {
 }
 
 impl ExactLabels {
-    /// Of a pull, at the forces for any scatter up to `scatter`.
-    pub fn new(pull: &Scattered<'_>, max_n: f64, scatter: f64) -> Self {
-        let mut slip = SlipPull::default();
-        let places = 0..count(max_n, scatter);
-        Self { values: places.map(|i| pull.label(force_n(i as f64), &mut slip)).collect() }
+    /// For forces up to `max_n` and any scatter up to `scatter`.
+    pub fn new(max_n: f64, scatter: f64) -> Self {
+        Self { values: (0..count(max_n, scatter)).map(|_| OnceLock::new()).collect() }
+    }
+
+    fn at(&self, i: usize, pull: &Scattered<'_>, slip: &mut SlipPull) -> (f64, f64) {
+        *self.values[i].get_or_init(|| pull.label(force_n(i as f64), slip))
     }
 }
 
+/// Predictions for forces whose distances grow with them, each worked out when it is first asked for.
+pub(super) struct LabelTable {
+    rows: Vec<OnceLock<PullPrediction>>,
+    exact: Arc<ExactLabels>,
+    max_n: f64,
+    /// What it is of: a model, without the factors of its pulls, and one of them.
+    pub model: PullModel,
+    pub row: usize,
+    /// Tables of a contact that bends and of one that does not, whose difference is added.
+    pub bend: Option<[Tables; 2]>,
+}
+
 impl LabelTable {
-    /// Of a pull with the scatter of its jaws; `exact` are its labels without.
-    pub fn new(pull: &Scattered<'_>, exact: &ExactLabels, max_n: f64) -> Self {
-        let (count, exact) = (count(max_n, pull.scatter), &exact.values);
-        let between = |limit_n: f64| {
+    /// Of pull `row` of a model; `exact` are its labels without scatter.
+    pub fn new(model: &PullModel, row: usize, exact: Arc<ExactLabels>, max_n: f64) -> Self {
+        let rows = (0..place(max_n).ceil() as usize + 2).map(|_| OnceLock::new()).collect();
+        let model = PullModel { factor: vec![], ..model.clone() };
+        Self { rows, exact, max_n, model, row, bend: None }
+    }
+
+    /// The prediction for jaws that hold the force of row `i` on average: of `pull`, which is that of the table.
+    pub fn of_row(&self, i: usize, pull: &Scattered<'_>) -> PullPrediction {
+        let (mut slip, count) = (SlipPull::default(), count(self.max_n, pull.scatter));
+        let mut between = |limit_n: f64| {
             let x = place(limit_n).clamp(0.0, (count - 2) as f64);
             let (i, w) = (x as usize, x.fract());
-            (exact[i].0 * (1.0 - w) + exact[i + 1].0 * w, exact[i].1 * (1.0 - w) + exact[i + 1].1 * w)
+            let [a, b] = [i, i + 1].map(|i| self.exact.at(i, pull, &mut slip));
+            (a.0 * (1.0 - w) + b.0 * w, a.1 * (1.0 - w) + b.1 * w)
         };
-        let wanted = place(max_n).ceil() as usize + 2;
-        let rows = (0..wanted)
-            .map(|i| {
-                let limit_n = force_n(i as f64);
-                let (mean, square) = NODES.iter().fold((0.0, 0.0), |(m, s), &(z, w)| {
-                    let (mean, square) = between((limit_n * (1.0 + pull.scatter * z)).max(0.0));
-                    (m + w * mean, s + w * square)
-                });
-                finished(limit_n, reading_n(pull.stuck, limit_n), mean, square)
-            })
-            .collect();
-        Self { rows }
+        let limit_n = force_n(i as f64);
+        let (mean, square) = NODES.iter().fold((0.0, 0.0), |(m, s), &(z, w)| {
+            let (mean, square) = between((limit_n * (1.0 + pull.scatter * z)).max(0.0));
+            (m + w * mean, s + w * square)
+        });
+        finished(limit_n, reading_n(pull.stuck, limit_n), mean, square)
     }
 
-    /// With what labels of a contact that bends lie above those of one that does not. All tables have the same forces.
-    pub fn bent(mut self, bent: &Tables, straight: &Tables) -> Self {
-        let row = |tables: &Tables, i: usize| tables.0.rows[i].mixed(&tables.1.rows[i], tables.2);
-        for (i, own) in self.rows.iter_mut().enumerate() {
-            let (with, without) = (row(bent, i), row(straight, i));
-            own.label_n += with.label_n - without.label_n;
-            own.label_sd_n =
-                (own.label_sd_n + with.label_sd_n - without.label_sd_n).max(0.5 * own.label_sd_n);
-        }
-        self
+    /// Row `i`, which `make` works out if nobody has asked for it.
+    pub fn row(&self, i: usize, make: impl FnOnce() -> PullPrediction) -> PullPrediction {
+        *self.rows[i].get_or_init(make)
     }
 
-    /// The prediction for jaws that hold `limit_n`.
-    pub fn at(&self, limit_n: f64) -> PullPrediction {
+    /// The prediction for jaws that hold `limit_n`, between its rows.
+    pub fn at(&self, limit_n: f64, row: impl Fn(usize) -> PullPrediction) -> PullPrediction {
         let last = self.rows.len() - 1;
         let x = place(limit_n).clamp(0.0, last as f64 - 1e-9);
         let (i, w) = (x as usize, x.fract());
-        let (a, b) = (&self.rows[i], &self.rows[i + 1]);
+        let (a, b) = (row(i), row(i + 1));
         let mix = |a: f64, b: f64| a * (1.0 - w) + b * w;
         // Beyond the table everything grows with the force.
         let beyond = (limit_n / force_n(last as f64)).max(1.0);

@@ -164,6 +164,9 @@ impl QuasiStatic {
             (shear, backbone.at(shear))
         });
         let shear_of_m = self.stiffness_n_per_m / limit_n;
+        // What a force that nobody holds moves in a step, and how much of it a spring of the gels' stiffness takes away.
+        let metres_per_n = step_s / self.robot.damping_n_s_per_m;
+        let held_back = self.stiffness_n_per_m * metres_per_n;
         for tick in held..=self.ticks() {
             let time_s = tick as f64 / self.rate_hz;
             let contact_n = match bent {
@@ -188,13 +191,11 @@ impl QuasiStatic {
             let due_n = due.desired_n((time_s - dead_ticks * step_s).max(0.0));
             let commanded_n = command.apply(due_n, reading_n);
             let applied_n = control.advance_due(step_s, commanded_n, reading_n, contact_n);
-            let step_m = (applied_n - contact_n) / self.robot.damping_n_s_per_m * step_s;
+            let step_m = (applied_n - contact_n) * metres_per_n;
             bent = match bent {
                 Some((shear, (_, slope))) => {
                     // Implicit in x while it holds.
-                    let slope_n_per_m = self.stiffness_n_per_m * slope;
-                    let share = 1.0 / (1.0 + step_s * slope_n_per_m / self.robot.damping_n_s_per_m);
-                    let next = shear + step_m * share * shear_of_m;
+                    let next = shear + step_m * shear_of_m / (1.0 + held_back * slope);
                     (next < backbone.slips_at()).then(|| (next, backbone.at(next)))
                 }
                 None => {

@@ -10,12 +10,14 @@ pub struct Backbone {
     /// Evenly spaced up to [`Self::slips_at`].
     share: Vec<f64>,
     slips_at: f64,
+    /// Points of the curve to a unit of shear.
+    per_shear: f64,
 }
 
 impl Backbone {
     /// A contact that lets go at once: a straight line.
     pub fn straight() -> Self {
-        Self { share: vec![0.0, 1.0], slips_at: 1.0 }
+        Self { share: vec![0.0, 1.0], slips_at: 1.0, per_shear: 1.0 }
     }
 
     /// Of cells with their areas and limits, in any unit; `by_area` is the share of the stiffness that they have by
@@ -43,7 +45,7 @@ impl Backbone {
             }
             if next == each.len() { held } else { held + stiffness * shear }
         });
-        Self { share: share.collect(), slips_at }
+        Self { share: share.collect(), slips_at, per_shear: (POINTS - 1) as f64 / slips_at }
     }
 
     /// The shear at which all of it has slipped.
@@ -60,15 +62,14 @@ impl Backbone {
     #[inline]
     pub fn at(&self, shear: f64) -> (f64, f64) {
         let last = self.share.len() - 1;
-        let per_shear = last as f64 / self.slips_at;
-        let x = shear.max(0.0) * per_shear;
+        let x = shear.max(0.0) * self.per_shear;
         if x >= last as f64 {
             return (self.share[last], 0.0);
         }
         let i = x as usize;
         let w = x - i as f64;
         let rise = self.share[i + 1] - self.share[i];
-        (self.share[i] + w * rise, rise * per_shear)
+        (self.share[i] + w * rise, rise * self.per_shear)
     }
 
     /// The shear at which it holds a share of its limit.

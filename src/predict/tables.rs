@@ -1,0 +1,143 @@
+//! Tables of labels over what the jaws hold, by everything else that they depend on.
+
+use super::table::{ExactLabels, LabelTable, Scattered, bent_by, enough_for};
+use super::{CONTACTS, Key, PullPredictor, acts_on_signals};
+use crate::cache::Cache;
+use crate::expect::QuietTwin;
+use gripgen_identify::pulls::model::{PullModel, PullPrediction};
+use gripgen_physics::StuckPull;
+use gripgen_twin::Backbone;
+use std::convert::Infallible;
+use std::sync::Arc;
+
+/// Distance of the kinetic ratios for which there are tables; those between are interpolated.
+const RATIO_STEP: f64 = 0.025;
+
+/// Tables of two kinetic ratios and the weight of the second.
+pub(super) type Tables = (Arc<LabelTable>, Arc<LabelTable>, f64);
+
+/// A value of a cache whose making cannot fail.
+fn kept<V>(cache: &Cache<Key, V>, key: Key, make: impl FnOnce() -> V) -> Arc<V> {
+    cache.get(key, || Ok::<V, Infallible>(make())).unwrap_or_else(|never| match never {})
+}
+
+/// What labels of a model whose effects act on signals depend on, beside the signals.
+fn shape_of(model: &PullModel) -> [f64; 6] {
+    let (bent_lag_s, bent_dead_s) = model.bent_at_s;
+    [model.kinetic_ratio, model.scatter, model.noise_n, model.shear_by_area, bent_lag_s, bent_dead_s]
+}
+
+/// The model with a contact that lets go at once.
+fn straightened(model: &PullModel) -> PullModel {
+    PullModel { shear_by_area: 0.0, ..model.clone() }
+}
+
+impl PullPredictor<'_> {
+    /// The prediction for jaws that hold `limit_n`.
+    pub(super) fn at(&self, (low, high, weight): &Tables, limit_n: f64) -> PullPrediction {
+        let own = low.at(limit_n, |i| self.row_of(low, i));
+        if *weight > 0.0 { own.mixed(&high.at(limit_n, |i| self.row_of(high, i)), *weight) } else { own }
+    }
+
+    fn row_of(&self, table: &LabelTable, i: usize) -> PullPrediction {
+        let mixed = |(low, high, weight): &Tables| {
+            let own = self.row_of(low, i);
+            if *weight > 0.0 { own.mixed(&self.row_of(high, i), *weight) } else { own }
+        };
+        table.row(i, || {
+            let (stuck, backbone) = (self.stuck(&table.model, table.row), self.backbone(&table.model));
+            let own = table.of_row(i, &self.scattered(&table.model, table.row, &stuck, &backbone));
+            match &table.bend {
+                Some([bent, straight]) => bent_by(&own, &mixed(bent), &mixed(straight)),
+                None => own,
+            }
+        })
+    }
+
+    /// The tables of two kinetic ratios around the model's, and the weight of the second.
+    pub(super) fn tables_of(&self, model: &PullModel, row: usize) -> Tables {
+        if acts_on_signals(model) {
+            let key = self.key(model, row, &shape_of(model));
+            let table = kept(&self.signal_tables, key, || self.signal_table(model, row));
+            return (table.clone(), table, 0.0);
+        }
+        let steps = (model.kinetic_ratio / RATIO_STEP).min(1.0 / RATIO_STEP);
+        let at = |ratio: f64| {
+            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n, model.shear_by_area]);
+            let model = PullModel { kinetic_ratio: ratio, ..model.clone() };
+            kept(&self.tables, key, || self.label_table(&model, row))
+        };
+        let low = steps.floor();
+        let weight = steps - low;
+        let first = at(low * RATIO_STEP);
+        let second = if weight > 0.0 { at((low + 1.0) * RATIO_STEP) } else { first.clone() };
+        (first, second, weight)
+    }
+
+    /// The table of one pull with signals of its own.
+    pub(super) fn own_table(&self, model: &PullModel, row: usize) -> Tables {
+        let key = self.key(model, row, &shape_of(model));
+        let table = kept(&self.own_tables[row], key, || self.signal_table(model, row));
+        (table.clone(), table, 0.0)
+    }
+
+    fn label_table(&self, model: &PullModel, row: usize) -> LabelTable {
+        let exact = if acts_on_signals(model) {
+            Arc::new(ExactLabels::new(self.max_n, model.scatter))
+        } else {
+            let most = enough_for(model.scatter);
+            let own = [model.kinetic_ratio, most, model.noise_n, model.shear_by_area];
+            kept(&self.exact, self.key(model, row, &own), || ExactLabels::new(self.max_n, most))
+        };
+        LabelTable::new(model, row, exact, self.max_n)
+    }
+
+    /// Labels of a model whose effects act on signals: those of a contact that lets go at once, and what a bend adds to labels
+    /// without these effects, at the lag and dead time of `bent_at_s`. Fits try thousands of such models, and a contact that
+    /// bends takes five times as long.
+    fn signal_table(&self, model: &PullModel, row: usize) -> LabelTable {
+        if !self.backbone(model).bends() {
+            return self.label_table(model, row);
+        }
+        let (lag_s, dead_time_s) = model.bent_at_s;
+        let plain = PullModel { effects: vec![], factor: vec![], lag_s, dead_time_s, ..model.clone() };
+        let bend = [&plain, &straightened(&plain)].map(|model| self.tables_of(model, row));
+        let mut table = self.label_table(&straightened(model), row);
+        table.bend = Some(bend);
+        table
+    }
+
+    fn scattered<'s>(
+        &'s self,
+        model: &'s PullModel,
+        row: usize,
+        stuck: &'s StuckPull,
+        backbone: &'s Backbone,
+    ) -> Scattered<'s> {
+        Scattered {
+            rig: self.rig(model),
+            stuck,
+            staircase: &self.staircases[self.profile_of[row]],
+            kinetic_ratio: model.kinetic_ratio,
+            backbone,
+            scatter: model.scatter,
+            noise_n: model.noise_n,
+            tolerance_n: self.measured.label_tolerance_n,
+            sensor: self.sensor(model, row),
+            command: self.command(model, row),
+        }
+    }
+
+    /// The mean contact of the campaign.
+    fn backbone(&self, model: &PullModel) -> Arc<Backbone> {
+        let cells = || {
+            self.contacts.get_or_init(|| {
+                let n = self.measured.pulls.len();
+                let rows = (0..n).step_by(n.div_ceil(CONTACTS).max(1));
+                rows.flat_map(|row| self.expectations.contact(&QuietTwin::new(&self.twin), row)).collect()
+            })
+        };
+        let make = || Ok::<_, Infallible>(Backbone::new(cells(), model.shear_by_area));
+        self.backbones.get(model.shear_by_area.to_bits(), make).unwrap_or_else(|never| match never {})
+    }
+}
