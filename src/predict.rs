@@ -22,8 +22,7 @@ use kept::Kept;
 use signals::Signals;
 use std::convert::Infallible;
 use std::sync::{Arc, OnceLock};
-use table::{ExactLabels, LabelTable};
-use tables::Tables;
+use table::{ExactLabels, LabelTable, Tables};
 
 /// Longest pull that is looked at.
 const MAX_TIME_S: f64 = 120.0;

@@ -1,6 +1,5 @@
 //! Labels as a function of what the jaws hold, over scatter and noise.
 
-use super::Tables;
 use gripgen_identify::pulls::model::{PullModel, PullPrediction};
 use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
 use gripgen_twin::effects::{CommandChain, SensorChain};
@@ -135,6 +134,9 @@ impl ExactLabels {
         *self.values[i].get_or_init(|| pull.label(force_n(i as f64), slip))
     }
 }
+
+/// Tables of two kinetic ratios and the weight of the second.
+pub(super) type Tables = (Arc<LabelTable>, Arc<LabelTable>, f64);
 
 /// Predictions for forces whose distances grow with them, each worked out when it is first asked for.
 pub(super) struct LabelTable {

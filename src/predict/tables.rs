@@ -1,6 +1,6 @@
 //! Tables of labels over what the jaws hold, by everything else that they depend on.
 
-use super::table::{ExactLabels, LabelTable, Scattered, bent_by, enough_for};
+use super::table::{ExactLabels, LabelTable, Scattered, Tables, bent_by, enough_for};
 use super::{CONTACTS, Key, PullPredictor, acts_on_signals};
 use crate::cache::Cache;
 use crate::expect::QuietTwin;
@@ -12,9 +12,6 @@ use std::sync::Arc;
 
 /// Distance of the kinetic ratios for which there are tables; those between are interpolated.
 const RATIO_STEP: f64 = 0.025;
-
-/// Tables of two kinetic ratios and the weight of the second.
-pub(super) type Tables = (Arc<LabelTable>, Arc<LabelTable>, f64);
 
 /// A value of a cache whose making cannot fail.
 fn kept<V>(cache: &Cache<Key, V>, key: Key, make: impl FnOnce() -> V) -> Arc<V> {
