@@ -17,11 +17,10 @@ use gripgen_record::{
 };
 use gripgen_twin::columns::{Column, covariate, covariates, recorded_covariates};
 use gripgen_twin::config::Feedback;
-use gripgen_twin::draw::Drawn;
 use gripgen_twin::{ExtraColumn, MeasuredPull, MeasuredPulls, PullTrace, Values};
 use left_out::LeftOut;
 use serde::Deserialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Measured pulls, and remarks for people: what was left out.
@@ -247,9 +246,8 @@ fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
                 left_out.other_rule += 1;
                 continue;
             }
-            let beside = if rig.is_some() { measured_beside(&sample) } else { BTreeMap::new() };
             let stands = suspects::standing_of(&sample, trace.as_ref());
-            if let Some(pull) = measured(sample, trace.as_ref(), beside) {
+            if let Some(pull) = measured(sample, trace.as_ref()) {
                 pulls.push(pull);
                 standing.push(stands);
             }
@@ -275,8 +273,9 @@ fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
         feedback: feedback_of(&folder.info().config_toml),
         sha256: sha256_hex(hashes.as_bytes()),
     };
-    if let Some(campaign) = rig {
-        as_made(&mut pulls, campaign);
+    match rig {
+        Some(campaign) => as_made(&mut pulls, campaign),
+        None => pulls.extra = own_columns(&pulls.pulls),
     }
     notes.extend(zero::without_shift(&mut pulls));
     fewer_traces(&mut pulls.pulls, &mut notes);
@@ -295,24 +294,18 @@ fn as_made(pulls: &mut MeasuredPulls, campaign: RigCampaign) {
         // A pull that failed at first was made again after the others.
         pulls.pulls.sort_by(|a, b| a.covariates.time_s.total_cmp(&b.covariates.time_s));
     }
-    let names: BTreeSet<String> =
-        pulls.pulls.iter().flat_map(|p| p.covariates.extra.keys().cloned()).collect();
-    let names = names.into_iter().filter(|name| covariate(name).is_none());
-    let extra = |name: String| {
-        let values = Values::of_drawn(pulls.pulls.iter().map(|p| p.covariates.extra.get(&name)));
-        ExtraColumn { name, values }
-    };
-    pulls.extra = names.map(extra).collect();
+    pulls.extra = own_columns(&pulls.pulls);
     pulls.count_rests();
 }
 
-/// What was measured of a pull beside the known covariates.
-fn measured_beside(sample: &Sample) -> BTreeMap<String, Drawn> {
-    let numbers = sample.drawn_number.iter().filter(|(_, x)| x.is_finite());
-    let numbers = numbers.map(|(name, x)| (name.clone(), Drawn::Number(*x)));
-    let words = sample.drawn_text.iter().filter(|(_, word)| !word.is_empty());
-    let words = words.map(|(name, word)| (name.clone(), Drawn::Text(word.clone())));
-    numbers.chain(words).filter(|(name, _)| covariate(name).is_none()).collect()
+/// The columns of pulls that gripgen does not know.
+fn own_columns(pulls: &[MeasuredPull]) -> Vec<ExtraColumn> {
+    let names: BTreeSet<&String> = pulls.iter().flat_map(|p| p.covariates.extra.keys()).collect();
+    let column = |name: &String| ExtraColumn {
+        name: name.clone(),
+        values: Values::of_drawn(pulls.iter().map(|p| p.covariates.extra.get(name))),
+    };
+    names.into_iter().filter(|name| covariate(name).is_none()).map(column).collect()
 }
 
 /// Traces that are always used, and the share of them beyond that. The model of arm and loop is good to about a hundredth: with
@@ -354,13 +347,8 @@ fn thinned(trace: &PullTrace) -> PullTrace {
 }
 
 /// A pull that slipped; `None` if it has no label after all.
-fn measured(
-    sample: Sample,
-    trace: Option<&PullTrace>,
-    extra: BTreeMap<String, Drawn>,
-) -> Option<MeasuredPull> {
-    let mut covariates = sample_covariates(&sample);
-    covariates.extra.extend(extra);
+fn measured(sample: Sample, trace: Option<&PullTrace>) -> Option<MeasuredPull> {
+    let covariates = sample_covariates(&sample);
     Some(MeasuredPull {
         id: sample.index.to_string(),
         max_pull_force_n: sample.max_pull_force_n?,

@@ -19,7 +19,7 @@ pub struct Unvaried {
     pub column: String,
     /// What depends on it.
     pub causes: Vec<String>,
-    /// Its value in every sample; `None` of a column that a sweep cannot draw.
+    /// Its value in every sample; `None` of a column of the user's own that no sample has.
     pub value: Option<Drawn>,
     /// The value lies outside of what a table was made from.
     pub outside: bool,
@@ -31,8 +31,10 @@ impl fmt::Display for Unvaried {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "the twin depends on {} ({}), ", self.column, self.causes.join(", "))?;
         let Some(value) = &self.value else {
-            return f.write_str(
-                "a column that a sweep cannot draw: the table does nothing here; multiply parts.NAME.mu by its factor instead",
+            return write!(
+                f,
+                "which no sample of this sweep has, so that its table does nothing: add vary.{}",
+                self.vary
             );
         };
         let outside = if self.outside { ", outside of it" } else { "" };
@@ -49,11 +51,11 @@ pub fn unvaried(project: &Project) -> Vec<Unvaried> {
     let mut found: Vec<Unvaried> = Vec::new();
     let mut add = |column: &str, cause: String, table: Option<&Table>| {
         let known = columns::covariate(column);
-        let stated = known.map(|known| stated(project, known));
+        let stated = stated(project, column, known);
         let value = columns::value(column, scenario.view());
         let outside = table.is_some_and(|table| value.as_ref().is_some_and(|at| lies_outside(table, at)));
-        let alone = CHANGE_BY_THEMSELVES.contains(&column) && stated == Some(Stated::No);
-        if stated == Some(Stated::Varies) || !(known.is_none() || outside || alone) {
+        let own = known.is_none() || CHANGE_BY_THEMSELVES.contains(&column);
+        if stated == Stated::Varies || !(outside || (own && stated == Stated::No)) {
             return;
         }
         match found.iter_mut().find(|unvaried| unvaried.column == column) {
@@ -64,7 +66,7 @@ pub fn unvaried(project: &Project) -> Vec<Unvaried> {
             None => found.push(Unvaried {
                 column: column.into(),
                 causes: vec![cause],
-                value: value.filter(|_| known.is_some()),
+                value,
                 outside,
                 vary: vary(column, known, table),
             }),
@@ -101,9 +103,12 @@ enum Stated {
 }
 
 /// What `[vary]` says of a column.
-fn stated(project: &Project, column: &Column) -> Stated {
-    let mut keys = project.sweep.vary.iter();
-    match keys.find(|v| columns::find(&v.key).is_some_and(|drawn| drawn.name == column.name)) {
+fn stated(project: &Project, name: &str, known: Option<&Column>) -> Stated {
+    let is_it = |key: &str| match known {
+        Some(column) => columns::find(key).is_some_and(|drawn| drawn.name == column.name),
+        None => key == name,
+    };
+    match project.sweep.vary.iter().find(|v| is_it(&v.key)) {
         None => Stated::No,
         Some(varied) if varied.distribution.constant().is_some() => Stated::OneValue,
         Some(_) => Stated::Varies,
@@ -222,6 +227,17 @@ mod tests {
         let words = of("session", "words=[\"1\", \"2\"]");
         assert!(words.len() == 1 && words[0].ends_with("add vary.session = [\"1\", \"2\"]"), "{words:?}");
         let own = of("humidity_pct", "x=[30, 60]");
-        assert!(own.len() == 1 && own[0].contains("cannot draw"), "{own:?}");
+        assert_eq!(
+            own,
+            [
+                "the twin depends on humidity_pct (a table from 30 to 60), which no sample of this sweep has, so that its table \
+              does nothing: add vary.humidity_pct = { uniform = [30, 60] }"
+            ]
+        );
+        let wet = table("humidity_pct", "x=[30, 60]");
+        for (vary, wanted) in [("{ uniform = [30, 60] }", 0), ("[45]", 0), ("[80]", 1)] {
+            let said = said(&[("effects", &wet), ("vary.humidity_pct", vary)]);
+            assert_eq!(said.len(), wanted, "{vary}: {said:?}");
+        }
     }
 }

@@ -64,6 +64,8 @@ mod presses;
 mod pull;
 // What a twin simulates is what it predicts.
 mod one_physics;
+// Columns that gripgen does not know, in sweeps.
+mod own_columns;
 // What is written is what was simulated.
 mod roundtrip;
 // The wrist sensor against logs of a real arm.

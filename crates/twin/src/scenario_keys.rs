@@ -3,7 +3,7 @@
 use crate::columns::{self, COLUMNS, Column, PullEdit};
 use crate::config::{ConfigError, JitteredStep, PullFile, StepFile};
 use crate::draw::Drawn;
-use crate::{Covariates, Scenario, Twin};
+use crate::{CAUSE_KEY, Covariates, Scenario, Twin};
 
 /// Keys of `[pull]` that can vary and are no columns of a pull.
 const SETTING_KEYS: [&str; 4] =
@@ -63,6 +63,32 @@ pub(crate) fn set(scenario: &mut Scenario, key: &str, value: &Drawn) -> Result<(
         column.check_drawn(key, *x)?;
     }
     Ok(())
+}
+
+/// Whether a key of `[vary]` or `--set` belongs to the twin.
+pub fn is_twin_key(key: &str) -> bool {
+    let section = key.split(['.', '[']).next().unwrap_or_default();
+    ["parts", "effects"].contains(&section) || crate::DEFAULTED_SECTIONS.contains(&section)
+}
+
+/// Whether a drawn key is a column of the user's own: none that is known, and none of the twin or of `[pull]`.
+pub fn is_own_column(key: &str) -> bool {
+    columns::find(key).is_none() && !key.starts_with("pull.") && !is_twin_key(key) && key != CAUSE_KEY
+}
+
+/// Whether a table of the twin depends on a column of the user's own: sweeps draw it for the table.
+pub(crate) fn is_own_of(key: &str, twin: &Twin) -> bool {
+    is_own_column(key) && own_columns(twin).contains(&key)
+}
+
+/// The columns of the user's own that the tables of a twin depend on.
+pub(crate) fn own_columns(twin: &Twin) -> Vec<&str> {
+    twin.tables.iter().flat_map(|table| table.columns()).filter(|name| is_own_column(name)).collect()
+}
+
+/// Sets a column of the user's own.
+pub(crate) fn set_own(scenario: &mut Scenario, key: &str, value: &Drawn) {
+    scenario.covariates.extra.insert(key.into(), value.clone());
 }
 
 /// Sets a key of `[pull]`; its range is checked with the other keys of the pull.

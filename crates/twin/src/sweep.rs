@@ -9,7 +9,7 @@ use crate::config::{
 };
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
 use crate::film::FilmPace;
-use crate::scenario_keys;
+use crate::scenario_keys::{self, is_twin_key};
 use crate::{CAUSE_KEY, Covariates, Posterior, PullSettings, Scenario, Twin, sobol};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -176,6 +176,10 @@ impl Sweep {
             let put = match key {
                 key if key.starts_with("pull.") => scenario_keys::set_pull(&mut pull, key, value),
                 key if is_twin_key(key) || key == CAUSE_KEY => Ok(()),
+                key if self.draws_own(key) || scenario_keys::is_own_of(key, twin) => {
+                    scenario_keys::set_own(&mut scenario, key, value);
+                    Ok(())
+                }
                 key => scenario_keys::set(&mut scenario, key, value),
             };
             problem = problem.and(put.map_err(|e| e.into_config_error(key)));
@@ -188,6 +192,11 @@ impl Sweep {
         scenario.drawn = drawn;
         problem = problem.and_then(|()| scenario_keys::check_against_twin(&scenario, twin));
         (scenario, problem)
+    }
+
+    /// Whether `[vary]` has a column of the user's own, which its twin was asked for. Not each draw of a posterior has the table.
+    fn draws_own(&self, key: &str) -> bool {
+        scenario_keys::is_own_column(key) && self.vary.iter().any(|varied| varied.key == key)
     }
 
     /// The twin of sample `index`: a copy of `base` with the drawn values put in.
@@ -251,13 +260,6 @@ impl Sweep {
         }
     }
 }
-
-/// Whether a key of `[vary]` or `--set` belongs to the twin.
-pub fn is_twin_key(key: &str) -> bool {
-    let section = key.split(['.', '[']).next().unwrap_or_default();
-    ["parts", "effects"].contains(&section) || crate::DEFAULTED_SECTIONS.contains(&section)
-}
-
 fn read_twin(table: &toml::Table) -> Result<Twin, ConfigError> {
     Twin::new(&read_twin_table(table)?)
 }

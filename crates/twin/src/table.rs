@@ -47,6 +47,16 @@ pub struct Table {
 }
 
 impl Table {
+    /// The columns that it depends on: its covariate, or both factors of a product, and those that say where it acts.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        let (first, second) = match self.covariate.split_once('*').filter(|_| self.centre.is_some()) {
+            Some((a, b)) => (a, Some(b)),
+            None => (self.covariate.as_str(), None),
+        };
+        let only = self.only.iter().map(|(name, _)| name.as_str());
+        [Some(first), second].into_iter().flatten().chain(only)
+    }
+
     /// The value where the covariate is `at`; `None` where the table says nothing.
     pub fn value(&self, at: &Drawn) -> Option<f64> {
         match (&self.axis, at) {

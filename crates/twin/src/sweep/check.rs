@@ -1,6 +1,6 @@
 //! Checking a sweep against the twin it names, before any work is done.
 
-use super::{MAX_SAMPLES, Sweep, is_twin_key, put, read_twin};
+use super::{MAX_SAMPLES, Sweep, put, read_twin};
 use crate::columns::{self, Column};
 use crate::config::{
     Backend, Compression, ConfigError, DesignFile, Document, ImageStorage, PullFile, StepFile, SweepFile,
@@ -8,7 +8,7 @@ use crate::config::{
 };
 use crate::draw::{Distribution, Drawn, VariedKey};
 use crate::film::FilmPace;
-use crate::scenario_keys::{self, KeyError, drawn_column, pull_keys, scenario_keys};
+use crate::scenario_keys::{self, KeyError, drawn_column, is_twin_key, pull_keys, scenario_keys};
 use crate::{PullSettings, Twin, sobol};
 
 impl Sweep {
@@ -77,7 +77,7 @@ impl Sweep {
             for (i, value) in varied.distribution.extremes().into_iter().enumerate() {
                 let key = if listed { format!("{place}[{i}]") } else { place.clone() };
                 self.check_value(twin, checked, &varied.key, &value).map_err(|e| match e {
-                    KeyError::Unknown => unknown_key(key, &varied.key),
+                    KeyError::Unknown => unknown_key(key, &varied.key, &scenario_keys::own_columns(checked)),
                     KeyError::Bad(e) => ConfigError { key, place: None, ..e },
                 })?;
             }
@@ -100,6 +100,9 @@ impl Sweep {
         }
         let mut scenario = self.blank();
         scenario.part = checked.parts.keys().next().cloned().unwrap_or_default();
+        if scenario_keys::is_own_of(key, checked) {
+            return Ok(());
+        }
         scenario_keys::set(&mut scenario, key, value)?;
         match key {
             // Which grips exist depends on the part, see `check_grips`.
@@ -171,18 +174,25 @@ fn check_direction(direction: [f64; 3], twin: &Twin) -> Result<(), ConfigError> 
     }
 }
 
-fn unknown_key(place: String, key: &str) -> ConfigError {
+fn unknown_key(place: String, key: &str, own: &[&str]) -> ConfigError {
     let fixed = ["pull.direction", "pull.max_time_s"];
     if fixed.contains(&key) {
         return ConfigError::new(place, format!("`{key}` cannot vary: it is one for the whole sweep"));
     }
     let problem = format!("neither the scenario, `pull` nor the twin has a key `{key}`");
     // The name of a column in tables is close enough.
-    let column = columns::find(key).map(Column::sweep_key);
-    let close = column.or_else(|| suggestion(key, scenario_keys().chain(pull_keys())));
+    let column: Option<&str> = columns::find(key).map(Column::sweep_key);
+    let mut known: Vec<&str> = scenario_keys().collect();
+    known.extend(own);
+    let pull = pull_keys().collect::<Vec<&str>>();
+    let all = known.iter().chain(&pull).copied();
+    let close = column.or_else(|| suggestion(key, all));
     ConfigError::new(place, problem).hint(match close {
         Some(close) => format!("did you mean `{close}`?"),
-        None => format!("keys of a scenario: {}", scenario_keys().collect::<Vec<_>>().join(", ")),
+        None => format!(
+            "keys of a scenario: {}; a column of your own is one where a table of the twin depends on it",
+            known.join(", ")
+        ),
     })
 }
 
@@ -327,10 +337,12 @@ mod tests {
 
     #[test]
     fn the_name_of_a_column_in_tables_leads_to_its_key() {
-        let hint = |key: &str| unknown_key(format!("vary.{key}"), key).hint.unwrap_or_default();
+        let hint =
+            |key: &str| unknown_key(format!("vary.{key}"), key, &["moisture_pct"]).hint.unwrap_or_default();
         assert_eq!(hint("force_increment_n"), "did you mean `pull.increment_n`?");
         assert_eq!(hint("step_time_s"), "did you mean `pull.step_s`?");
         assert_eq!(hint("grip_forc_n"), "did you mean `grip_force_n`?");
+        assert_eq!(hint("moisture"), "did you mean `moisture_pct`?");
         let other = hint("humidity");
         assert!(
             other.starts_with("keys of a scenario: part, grip_pose, gel_id, session, grip_force_n, dwell_s"),
