@@ -1,5 +1,6 @@
 //! The values used last.
 
+use std::convert::Infallible;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A few values by key. A value is built by the first thread that asks for it; others that want the same wait for it,
@@ -27,6 +28,11 @@ impl<K: PartialEq, V> Cache<K, V> {
         let made = Arc::new(make()?);
         *value = Some(made.clone());
         Ok(made)
+    }
+
+    /// The same of a value whose making cannot fail.
+    pub(crate) fn made(&self, key: K, make: impl FnOnce() -> V) -> Arc<V> {
+        self.get(key, || Ok::<V, Infallible>(make())).unwrap_or_else(|never| match never {})
     }
 
     fn slot(&self, key: K) -> Slot<V> {

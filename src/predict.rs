@@ -20,7 +20,6 @@ use gripgen_twin::effects::{CommandChain, Effect, OutsideFit, Per, SensorChain};
 use gripgen_twin::{Backbone, Jaw, MeasuredPulls, Robot, Staircase, Twin};
 use kept::Kept;
 use signals::Signals;
-use std::convert::Infallible;
 use std::sync::{Arc, OnceLock};
 use table::{ExactLabels, LabelTable, Tables};
 
@@ -253,11 +252,11 @@ impl<'a> PullPredictor<'a> {
             let staircase = &self.staircases[self.profile_of[row]];
             let mut kept = Kept::spare();
             self.rig(model).stuck(staircase, &sensor, &command, self.max_n, &mut kept.0);
-            Ok::<_, Infallible>(kept)
+            kept
         };
         // What a fit tries of an effect on signals would push everything else out: it has a place of its own.
         let cache = if acts_on_signals(model) { &self.signal_stuck } else { &self.stuck };
-        cache.get(self.key(model, row, &[]), make).unwrap_or_else(|never| match never {})
+        cache.made(self.key(model, row, &[]), make)
     }
 
     fn slots(&self) -> usize {

@@ -172,7 +172,7 @@ fn fits_see_a_gain_that_drifts() {
         let rows: Vec<usize> = (0..measured.pulls.len()).collect();
         let predictor = PullPredictor::new(&measured, &twin, &library, 2);
         let mut model = given_model(&twin, predictor.part_names()).unwrap();
-        (model.shear_by_area, model.effects) = (by_area, vec![drift.clone()]);
+        (model.shear_by_area, model.kinetic_ratio, model.effects) = (by_area, 0.93, vec![drift.clone()]);
         let fast = predictor.pulls(&model, &rows);
         let exact = predictor.labels_n(&model, &rows);
         let plain = predictor.labels_n(&PullModel { effects: vec![], ..model.clone() }, &rows);

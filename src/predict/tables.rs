@@ -1,22 +1,15 @@
 //! Tables of labels over what the jaws hold, by everything else that they depend on.
 
 use super::table::{ExactLabels, LabelTable, Scattered, Tables, bent_by, enough_for};
-use super::{CONTACTS, Key, PullPredictor, acts_on_signals};
-use crate::cache::Cache;
+use super::{CONTACTS, PullPredictor, acts_on_signals};
 use crate::expect::QuietTwin;
 use gripgen_identify::pulls::model::{PullModel, PullPrediction};
 use gripgen_physics::StuckPull;
 use gripgen_twin::Backbone;
-use std::convert::Infallible;
 use std::sync::Arc;
 
 /// Distance of the kinetic ratios for which there are tables; those between are interpolated.
 const RATIO_STEP: f64 = 0.025;
-
-/// A value of a cache whose making cannot fail.
-fn kept<V>(cache: &Cache<Key, V>, key: Key, make: impl FnOnce() -> V) -> Arc<V> {
-    cache.get(key, || Ok::<V, Infallible>(make())).unwrap_or_else(|never| match never {})
-}
 
 /// What labels of a model whose effects act on signals depend on, beside the signals.
 fn shape_of(model: &PullModel) -> [f64; 6] {
@@ -29,23 +22,24 @@ fn straightened(model: &PullModel) -> PullModel {
     PullModel { shear_by_area: 0.0, ..model.clone() }
 }
 
+/// What both tables say, by their weights; the second is asked only where it counts.
+fn mixed((low, high, weight): &Tables, of: impl Fn(&LabelTable) -> PullPrediction) -> PullPrediction {
+    if *weight > 0.0 { of(low).mixed(&of(high), *weight) } else { of(low) }
+}
+
 impl PullPredictor<'_> {
     /// The prediction for jaws that hold `limit_n`.
-    pub(super) fn at(&self, (low, high, weight): &Tables, limit_n: f64) -> PullPrediction {
-        let own = low.at(limit_n, |i| self.row_of(low, i));
-        if *weight > 0.0 { own.mixed(&high.at(limit_n, |i| self.row_of(high, i)), *weight) } else { own }
+    pub(super) fn at(&self, tables: &Tables, limit_n: f64) -> PullPrediction {
+        mixed(tables, |table| table.at(limit_n, |i| self.row_of(table, i)))
     }
 
     fn row_of(&self, table: &LabelTable, i: usize) -> PullPrediction {
-        let mixed = |(low, high, weight): &Tables| {
-            let own = self.row_of(low, i);
-            if *weight > 0.0 { own.mixed(&self.row_of(high, i), *weight) } else { own }
-        };
+        let row = |tables: &Tables| mixed(tables, |table| self.row_of(table, i));
         table.row(i, || {
             let (stuck, backbone) = (self.stuck(&table.model, table.row), self.backbone(&table.model));
             let own = table.of_row(i, &self.scattered(&table.model, table.row, &stuck, &backbone));
             match &table.bend {
-                Some([bent, straight]) => bent_by(&own, &mixed(bent), &mixed(straight)),
+                Some([bent, straight]) => bent_by(&own, &row(bent), &row(straight)),
                 None => own,
             }
         })
@@ -55,14 +49,14 @@ impl PullPredictor<'_> {
     pub(super) fn tables_of(&self, model: &PullModel, row: usize) -> Tables {
         if acts_on_signals(model) {
             let key = self.key(model, row, &shape_of(model));
-            let table = kept(&self.signal_tables, key, || self.signal_table(model, row));
+            let table = self.signal_tables.made(key, || self.signal_table(model, row));
             return (table.clone(), table, 0.0);
         }
         let steps = (model.kinetic_ratio / RATIO_STEP).min(1.0 / RATIO_STEP);
         let at = |ratio: f64| {
             let key = self.key(model, row, &[ratio, model.scatter, model.noise_n, model.shear_by_area]);
             let model = PullModel { kinetic_ratio: ratio, ..model.clone() };
-            kept(&self.tables, key, || self.label_table(&model, row))
+            self.tables.made(key, || self.label_table(&model, row))
         };
         let low = steps.floor();
         let weight = steps - low;
@@ -74,7 +68,7 @@ impl PullPredictor<'_> {
     /// The table of one pull with signals of its own.
     pub(super) fn own_table(&self, model: &PullModel, row: usize) -> Tables {
         let key = self.key(model, row, &shape_of(model));
-        let table = kept(&self.own_tables[row], key, || self.signal_table(model, row));
+        let table = self.own_tables[row].made(key, || self.signal_table(model, row));
         (table.clone(), table, 0.0)
     }
 
@@ -84,7 +78,7 @@ impl PullPredictor<'_> {
         } else {
             let most = enough_for(model.scatter);
             let own = [model.kinetic_ratio, most, model.noise_n, model.shear_by_area];
-            kept(&self.exact, self.key(model, row, &own), || ExactLabels::new(self.max_n, most))
+            self.exact.made(self.key(model, row, &own), || ExactLabels::new(self.max_n, most))
         };
         LabelTable::new(model, row, exact, self.max_n)
     }
@@ -134,7 +128,7 @@ impl PullPredictor<'_> {
                 rows.flat_map(|row| self.expectations.contact(&QuietTwin::new(&self.twin), row)).collect()
             })
         };
-        let make = || Ok::<_, Infallible>(Backbone::new(cells(), model.shear_by_area));
-        self.backbones.get(model.shear_by_area.to_bits(), make).unwrap_or_else(|never| match never {})
+        let by_area = model.shear_by_area;
+        self.backbones.made(by_area.to_bits(), || Backbone::new(cells(), by_area))
     }
 }

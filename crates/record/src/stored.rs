@@ -1,24 +1,22 @@
 //! A stored sample as the columns of a pull see it.
 
 use crate::proto::gripgen_v1 as proto;
-use gripgen_twin::columns::{COLUMNS, Held, PullView, Scale};
+use gripgen_twin::columns::{Held, PullView, Scale, find};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::{Covariates, is_own_column};
 
 /// The circumstances of a stored sample: the inverse of the message of a scenario. Columns without a field of their own, and those of
 /// the user's own, are those that were drawn or measured beside the others.
 pub fn sample_covariates(s: &proto::Sample) -> Covariates {
-    let drawn = |name: &str| {
-        let number = s.drawn_number.get(name).map(|x| Drawn::Number(*x));
-        number.or_else(|| s.drawn_text.get(name).map(|word| Drawn::Text(word.clone())))
-    };
-    let extra = COLUMNS.iter().filter(|column| matches!(column.held, Held::Extra));
-    let extra = extra.filter_map(|column| Some((column.name.to_string(), drawn(column.name)?)));
     let numbers = s.drawn_number.iter().filter(|(_, x)| x.is_finite());
     let numbers = numbers.map(|(name, x)| (name, Drawn::Number(*x)));
     let words = s.drawn_text.iter().filter(|(_, word)| !word.is_empty());
-    let own = numbers.chain(words.map(|(name, word)| (name, Drawn::Text(word.clone()))));
-    let own = own.filter(|(name, _)| is_own_column(name)).map(|(name, value)| (name.clone(), value));
+    let words = words.map(|(name, word)| (name, Drawn::Text(word.clone())));
+    let has_no_field = |name: &str| match find(name) {
+        Some(column) => column.name == name && matches!(column.held, Held::Extra),
+        None => is_own_column(name),
+    };
+    let extra = numbers.chain(words).filter(|(name, _)| has_no_field(name));
     Covariates {
         gel_id: s.gel_id.clone(),
         session: s.session.clone(),
@@ -29,7 +27,7 @@ pub fn sample_covariates(s: &proto::Sample) -> Covariates {
         grip_offset_m: Scale::Thousandth.to_si(s.grip_offset_mm),
         grip_angle_rad: Scale::Degree.to_si(s.grip_angle_deg),
         pull_direction: f64::from(s.pull_direction),
-        extra: extra.chain(own).collect(),
+        extra: extra.map(|(name, value)| (name.clone(), value)).collect(),
     }
 }
 

@@ -76,12 +76,7 @@ pub fn is_own_column(key: &str) -> bool {
     columns::find(key).is_none() && !key.starts_with("pull.") && !is_twin_key(key) && key != CAUSE_KEY
 }
 
-/// Whether a table of the twin depends on a column of the user's own: sweeps draw it for the table.
-pub(crate) fn is_own_of(key: &str, twin: &Twin) -> bool {
-    is_own_column(key) && own_columns(twin).contains(&key)
-}
-
-/// The columns of the user's own that the tables of a twin depend on.
+/// The columns of the user's own that the tables of a twin depend on: sweeps draw them for these tables.
 pub(crate) fn own_columns(twin: &Twin) -> Vec<&str> {
     twin.tables.iter().flat_map(|table| table.columns()).filter(|name| is_own_column(name)).collect()
 }

@@ -176,7 +176,7 @@ impl Sweep {
             let put = match key {
                 key if key.starts_with("pull.") => scenario_keys::set_pull(&mut pull, key, value),
                 key if is_twin_key(key) || key == CAUSE_KEY => Ok(()),
-                key if self.draws_own(key) || scenario_keys::is_own_of(key, twin) => {
+                key if self.draws_own(key) || scenario_keys::own_columns(twin).contains(&key.as_str()) => {
                     scenario_keys::set_own(&mut scenario, key, value);
                     Ok(())
                 }
@@ -260,6 +260,7 @@ impl Sweep {
         }
     }
 }
+
 fn read_twin(table: &toml::Table) -> Result<Twin, ConfigError> {
     Twin::new(&read_twin_table(table)?)
 }

@@ -43,4 +43,3 @@ fn finish(column: i32, row: i32, image: u32, blurred: f32, depth: f32) {
         store_blurred(x, y, image, value);
     }
 }
-

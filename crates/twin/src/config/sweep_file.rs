@@ -44,8 +44,8 @@ pub struct SweepFile {
     #[serde(default = "shard_samples")]
     pub shard_samples: u64,
     /// Values that vary: any key of the scenario, of `[pull]` (`pull.increment_n`) or of the twin
-    /// (`parts.gear.mu`, `effects.wear.depth`), or a column of one's own that a table of the twin depends on. A value is a list, a plain value, `{ uniform = [low, high] }`,
-    /// `{ log_uniform = [low, high] }`, `{ normal = [mean, deviation] }` or `{ from = "interval" }`.
+    /// (`parts.gear.mu`, `effects.wear.depth`), or a column of one's own that a table of the twin depends on.
+    /// A value is a list, a plain value, `{ uniform = [low, high] }`, `{ log_uniform = [low, high] }`, `{ normal = [mean, deviation] }` or `{ from = "interval" }`.
     /// `twin = { from = "posterior" }` draws cause and parameters together from the posterior beside the twin.
     #[serde(default)]
     #[schemars(with = "std::collections::BTreeMap<String, serde_json::Value>")]

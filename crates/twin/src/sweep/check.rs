@@ -100,7 +100,7 @@ impl Sweep {
         }
         let mut scenario = self.blank();
         scenario.part = checked.parts.keys().next().cloned().unwrap_or_default();
-        if scenario_keys::is_own_of(key, checked) {
+        if scenario_keys::own_columns(checked).contains(&key) {
             return Ok(());
         }
         scenario_keys::set(&mut scenario, key, value)?;
