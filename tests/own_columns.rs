@@ -67,6 +67,9 @@ fn a_diagnosis_finds_the_own_column_of_a_sweep() {
     let found = crate::diagnose::diagnose(&read, &[]).diagnosis;
     assert_eq!(found.verdict, Verdict::Unknown, "{found:?}");
     assert_eq!(found.unknown[0].covariate, "humidity_pct", "{found:?}");
+    let error = found.error.unwrap();
+    let [before, after] = [error.before, error.after].map(|e| e.rmse_n.unwrap());
+    assert!(before > 0.5 && after < 0.5 * before, "{before} to {after} N");
 }
 
 /// A name that no table of the twin depends on is a slip of the pen, and what is close to an own column is said.
