@@ -23,22 +23,24 @@ pub struct Unvaried {
     pub value: Option<Drawn>,
     /// The value lies outside of what a table was made from.
     pub outside: bool,
-    /// What `[vary]` may have, where it is known; else its key.
-    pub vary: String,
+    /// Its key in `[vary]`.
+    pub key: String,
+    /// What `[vary]` may have there, as TOML, where it is known.
+    pub values: Option<String>,
 }
 
 impl fmt::Display for Unvaried {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "the twin depends on {} ({}), ", self.column, self.causes.join(", "))?;
-        let Some(value) = &self.value else {
-            return write!(
-                f,
-                "which no sample of this sweep has, so that its table does nothing: add vary.{}",
-                self.vary
-            );
-        };
-        let outside = if self.outside { ", outside of it" } else { "" };
-        write!(f, "this sweep has {value} in every sample{outside}: add vary.{}", self.vary)
+        match &self.value {
+            None => write!(f, "which no sample of this sweep has, so that its table does nothing")?,
+            Some(value) => {
+                let outside = if self.outside { ", outside of it" } else { "" };
+                write!(f, "this sweep has {value} in every sample{outside}")?;
+            }
+        }
+        write!(f, ": add vary.{}", self.key)?;
+        self.values.iter().try_for_each(|values| write!(f, " = {values}"))
     }
 }
 
@@ -68,7 +70,8 @@ pub fn unvaried(project: &Project) -> Vec<Unvaried> {
                 causes: vec![cause],
                 value,
                 outside,
-                vary: vary(column, known, table),
+                key: known.map_or(column, |known| known.sweep_key()).into(),
+                values: table.and_then(|table| values(known, table)),
             }),
         }
     };
@@ -151,18 +154,16 @@ fn of_table(table: &Table) -> String {
     }
 }
 
-/// What `[vary]` may have of a column: where a table was made, if there is one.
-fn vary(column: &str, known: Option<&Column>, table: Option<&Table>) -> String {
-    let key = known.map_or(column, |known| known.sweep_key());
-    match table.map(|table| &table.axis) {
-        Some(Values::Words(words)) => format!("{key} = {words:?}"),
-        Some(Values::Numbers(x)) => match (x.first(), x.last()) {
+/// What `[vary]` may have of a column: where its table was made.
+fn values(known: Option<&Column>, table: &Table) -> Option<String> {
+    match &table.axis {
+        Values::Words(words) => Some(format!("{words:?}")),
+        Values::Numbers(x) => match (x.first(), x.last()) {
             (Some(low), Some(high)) if low < high && !known.is_some_and(Column::is_listed) => {
-                format!("{key} = {{ uniform = [{low}, {high}] }}")
+                Some(format!("{{ uniform = [{low}, {high}] }}"))
             }
-            _ => key.into(),
+            _ => None,
         },
-        None => key.into(),
     }
 }
 

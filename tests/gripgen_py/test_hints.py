@@ -59,5 +59,17 @@ def test_lengths_and_places_are_those_of_render():
     assert "`scale_mm_per_unit=`" in deep
 
 
+def test_what_python_itself_refuses_has_its_hint_too(run):
+    assert hint_of(lambda: gg.Sim().pull(mu=0.2, grip_force_n=20)) == "part='gear' says which one is pulled"
+    assert "during_pull" in hint_of(gg.load, run, video=True)
+    assert 'images = "clean"' in hint_of(gg.load, run, noise="off")
+    for rank, world_size in ((2, 2), (-1, 2), (0, 0)):
+        assert "world_size=2" in hint_of(lambda: next(gg.load(run).iterate(rank=rank, world_size=world_size)))
+        assert "world_size=2" in hint_of(gg.stream, CONFIG, rank=rank, world_size=world_size)
+    with pytest.raises(gg.DataError, match="no column 'colour'") as e:
+        gg.load(run).column("colour")
+    assert e.value.hint is None, "nothing to say is said by no hint, not by none of the attribute"
+
+
 def test_commands_for_a_shell_stay_as_they_are(tmp_path):
     assert "`gripgen calibrate presses`" in hint_of(gg.render, np.zeros((240, 320)), sensor=tmp_path / "none.npz")

@@ -37,7 +37,10 @@ fn run_verb(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
 #[pymodule(gil_used = false)]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", VERSION)?;
-    module.add("GripgenError", module.py().get_type::<error::GripgenError>())?;
+    let all_errors = module.py().get_type::<error::GripgenError>();
+    // What is raised without a hint has the attribute too.
+    all_errors.setattr("hint", module.py().None())?;
+    module.add("GripgenError", all_errors)?;
     module.add("ConfigError", module.py().get_type::<error::ConfigError>())?;
     module.add("DataError", module.py().get_type::<error::DataError>())?;
     module.add_class::<dataset::Dataset>()?;

@@ -39,7 +39,8 @@ pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
         watch.say(&format!("live: {}", page.url()));
         watch.page = Some(page);
     }
-    for still in check::standing_still(&project) {
+    watch.warnings = check::standing_still(&project);
+    for still in &watch.warnings {
         watch.say(&format!("warning: {still}"));
     }
     let stop = stop_flag("finishing the shards under way");
@@ -73,6 +74,8 @@ struct Watch<'a> {
     made: u64,
     page: Option<LivePage>,
     out: PathBuf,
+    /// What the sweep leaves at one value, for the JSON lines.
+    warnings: Vec<String>,
 }
 
 impl<'a> Watch<'a> {
@@ -88,6 +91,7 @@ impl<'a> Watch<'a> {
             made: 0,
             page: None,
             out: PathBuf::new(),
+            warnings: Vec::new(),
         }
     }
 
@@ -133,6 +137,9 @@ impl<'a> Watch<'a> {
                     "event": "plan", "name": self.project.name, "samples": samples, "done": done, "shards": shards,
                     "config_sha256": self.project.config_sha256,
                 }));
+                for warning in std::mem::take(&mut self.warnings) {
+                    self.line(&json!({"event": "warning", "warning": warning}));
+                }
                 if !self.args.talk.quiet {
                     if *done > 0 {
                         eprintln!(

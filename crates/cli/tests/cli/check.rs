@@ -7,7 +7,7 @@ const STILL: &str =
     "the twin depends on time_s (effect sensor_drift), this sweep has 0 in every sample: add vary.time_s";
 const QUICK: [&str; 6] = ["--set", "mechanics=reduced", "--set", "images=none", "--set", "trace=none"];
 
-/// What a twin depends on and a sweep leaves at one value is said once by both verbs, and stands in JSON.
+/// What a twin depends on and a sweep leaves at one value is said once by both verbs, and stands in the JSON of both.
 #[test]
 fn a_column_that_the_twin_depends_on_and_the_sweep_leaves_is_warned_of() {
     let folder = tempfile::tempdir().unwrap();
@@ -24,9 +24,15 @@ fn a_column_that_the_twin_depends_on_and_the_sweep_leaves_is_warned_of() {
     assert_eq!(json["warnings"], serde_json::json!([]));
 
     let out = folder.path().join("run");
-    let sweep = run(&sweep_args(out.to_str().unwrap(), &[&QUICK[..], &["--set", DRIFT]].concat()));
+    let lines = folder.path().join("lines.json");
+    let more = ["--set", DRIFT, "--json", lines.to_str().unwrap()];
+    let sweep = run(&sweep_args(out.to_str().unwrap(), &[&QUICK[..], &more].concat()));
     assert_code(&sweep, 0);
     assert_eq!(text(&sweep.stderr).matches(STILL).count(), 1, "{}", text(&sweep.stderr));
+    let warning = serde_json::json!({"event": "warning", "warning": STILL});
+    let lines = std::fs::read_to_string(lines).unwrap();
+    let events = lines.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    assert_eq!(events.filter(|event| event["event"] == "warning").collect::<Vec<_>>(), [warning]);
 }
 
 /// A grid of another size: the hint works, and so does the example of `--help`.

@@ -93,9 +93,13 @@ fn a_pull_that_is_far_off_is_named_by_a_calibration() {
         .map(|row| if row.starts_with("p7,") { "p7,long_shaft,30,12000".into() } else { row.into() })
         .collect();
     std::fs::write(&at, changed.join("\n")).unwrap();
-    let out = bad.path().join("out.toml");
-    let fitted = run(&["calibrate", "pulls", bad.path().to_str().unwrap(), "-o", out.to_str().unwrap()]);
+    let [out, json] = ["out.toml", "found.json"].map(|name| bad.path().join(name));
+    let [folder, out, json] = [bad.path(), &out, &json].map(|path| path.to_str().unwrap());
+    let fitted = run(&["calibrate", "pulls", folder, "-o", out, "--json", json]);
     assert_code(&fitted, 0);
+    let found: serde_json::Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
+    let error_n = found["error"]["rmse_n"].as_f64().unwrap();
+    assert!(error_n < 3.0, "{error_n} N are not the error of this twin but of one bad label");
     let said = text(&fitted.stderr);
     assert!(said.contains("1 of 24 pulls lie far off (p7)"), "{said}");
     assert!(said.contains("pull p7 has 12000 N at a grip force of 30 N"), "{said}");

@@ -51,7 +51,7 @@ pub struct PullCalibration {
     pub effects: Vec<(String, BTreeMap<String, ParameterEstimate>)>,
     /// The law of each part.
     pub laws: Vec<OffsetLaw>,
-    /// Error on held-out repetitions.
+    /// Error on held-out repetitions, without pulls that lie far off.
     pub error: Option<HeldOutError>,
     /// Grip forces of the pulls.
     pub grip_force_n: (f64, f64),
@@ -173,6 +173,8 @@ pub fn calibrate_pulls(
     let held = predicted(&stated, &fitted, &folds(data.len()), false);
     let law_of = request.offset_law.then_some(&given.mu[..]);
     let far = outliers(&fitted);
+    // As a diagnosis counts: one bad label would be all of a mean of squares.
+    let counted: Vec<usize> = rows.iter().copied().filter(|i| !far.contains(i)).collect();
     let noise = at_bound(fitted.model.noise_n).filter(|_| context.noise90_n.is_some());
     let drawn = of_calibration(&found, &normal, &fitted, &data.parts, law_of);
     let laws =
@@ -194,7 +196,7 @@ pub fn calibrate_pulls(
         ),
         effects,
         laws,
-        error: errors(&data.label_n, &held, &held, &data.group_of, &rows).map(|pair| pair.after),
+        error: errors(&data.label_n, &held, &held, &data.group_of, &counted).map(|pair| pair.after),
         grip_force_n: range,
         posterior: drawn,
         notes: far_off(measured, &far).into_iter().chain(noise).collect(),
@@ -217,7 +219,7 @@ fn far_off(measured: &MeasuredPulls, rows: &[usize]) -> Option<String> {
     let all = names(measured, &rows[..rows.len().min(NAMED)]).join(", ");
     let more = if rows.len() > NAMED { ", ..." } else { "" };
     Some(format!(
-        "{} of {} pulls lie far off ({all}{more}) and hardly weigh in the fit; pull {} has {} N at a grip force of {} N",
+        "{} of {} pulls lie far off ({all}{more}) and hardly weigh in the fit or in an error; pull {} has {} N at a grip force of {} N",
         rows.len(),
         measured.pulls.len(),
         first.id,

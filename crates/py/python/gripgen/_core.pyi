@@ -29,6 +29,8 @@ __version__: str
 class GripgenError(Exception):
     """What gripgen could not do; `hint` says what to do about it."""
 
+    hint: str | None
+
 class ConfigError(GripgenError):
     """A configuration, a key or an argument that cannot be."""
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import difflib
 import operator
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ._core import ConfigError
+from ._core import ConfigError, DataError, GripgenError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+AnyError = TypeVar("AnyError", bound=GripgenError)
 
 #: Names of all statuses of a pull (docs/format.md).
 STATUSES = ("slipped", "no_contact", "censored", "suspect", "failed")
@@ -20,8 +22,17 @@ STATUSES = ("slipped", "no_contact", "censored", "suspect", "failed")
 
 def refusal(message: str, hint: str | None = None) -> ConfigError:
     """The exception of an argument that cannot be, with its hint as the Rust half gives one."""
-    error = ConfigError(f"{message}\nhint: {hint}" if hint else message)
-    error.hint = hint  # type: ignore[attr-defined]
+    return _with_hint(ConfigError, message, hint)
+
+
+def unreadable(message: str, hint: str | None = None) -> DataError:
+    """The exception of data that cannot be read, or not in this way."""
+    return _with_hint(DataError, message, hint)
+
+
+def _with_hint(kind: type[AnyError], message: str, hint: str | None) -> AnyError:
+    error = kind(f"{message}\nhint: {hint}" if hint else message)
+    error.hint = hint
     return error
 
 
@@ -73,6 +84,14 @@ def share(test: float) -> float:
         hint = "test=0.2 holds out a fifth of the groups"
         raise refusal(f"test = {test} is no share of the groups: it must be above 0 and below 1", hint)
     return test
+
+
+def own_rank(rank: int, world_size: int) -> int:
+    """The rank of this process among those that share the rows."""
+    if not 0 <= rank < world_size:
+        hint = "two processes have the ranks 0 and 1 of world_size=2"
+        raise refusal(f"rank = {rank} of world_size = {world_size}: ranks count from 0", hint)
+    return rank
 
 
 def rows_of_batch(batch_size: Any) -> int:

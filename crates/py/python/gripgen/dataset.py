@@ -84,9 +84,8 @@ def load(
     found = Dataset(text, status=kept, _opened=(os.getpid(), _core.Dataset(text)))
     if video:
         if not found._open().has_films:
-            raise _core.DataError(
-                f"{text}: its pulls are not filmed\nhint: sweep with images = {{ during_pull = {{ frames = 24 }} }}"
-            )
+            hint = "sweep with images = { during_pull = { frames = 24 } }"
+            raise checks.unreadable(f"{text}: its pulls are not filmed", hint)
         found = replace(found, video=True, _opened=(os.getpid(), found._open()))
     return found if noise == "stored" else found.with_noise(noise)
 
@@ -139,9 +138,9 @@ class Dataset(Sequence[Sample]):
             return self._opened[1]
         found = _opened_here(self.path)
         if self._total and len(found) != self._total:
-            raise _core.DataError(
-                f"{self.path}: it has {len(found)} rows now and had {self._total} when it was loaded\n"
-                "hint: load it again"
+            raise checks.unreadable(
+                f"{self.path}: it has {len(found)} rows now and had {self._total} when it was loaded",
+                "load it again",
             )
         object.__setattr__(self, "_opened", (os.getpid(), found))
         return found
@@ -180,7 +179,7 @@ class Dataset(Sequence[Sample]):
         """A column of the table as an array of float64 or str."""
         columns = self._columns()
         if name not in columns:
-            raise _core.DataError(f"{self.path}: there is no column {name!r}; there are {', '.join(columns)}")
+            raise checks.unreadable(f"{self.path}: there is no column {name!r}; there are {', '.join(columns)}")
         return np.asarray(columns[name])[self.rows]
 
     def table(self, *, to: str = "pandas") -> pandas.DataFrame | pyarrow.Table:
@@ -194,7 +193,7 @@ class Dataset(Sequence[Sample]):
             import pyarrow
 
             return pyarrow.table({name: pyarrow.array(values.tolist()) for name, values in columns.items()})
-        raise _core.ConfigError(f"to = {to!r} is neither 'pandas' nor 'arrow'")
+        raise checks.refusal(f"to = {to!r} is neither 'pandas' nor 'arrow'")
 
     def _rows_of(self, ids: ArrayLike) -> list[int]:
         return self.rows[checks.row_numbers(ids, len(self))].tolist()
@@ -275,12 +274,10 @@ class Dataset(Sequence[Sample]):
         """The same rows with other noise on their images, for runs with `images = "clean"`: "stored" is that of the sweep,
         "resample" is drawn for this epoch (the same for the same epoch, of the same size), "off" is none."""
         if noise not in ("stored", "resample", "off"):
-            raise _core.ConfigError(f"noise = {noise!r} is neither 'stored' nor 'resample' nor 'off'")
+            raise checks.refusal(f"noise = {noise!r} is neither 'stored' nor 'resample' nor 'off'")
         if noise != "stored" and not self._open().clean_images:
-            raise _core.DataError(
-                f"{self.path}: the noise of its images is in them\n"
-                'hint: sweep with images = "clean" to choose the noise when reading'
-            )
+            hint = 'sweep with images = "clean" to choose the noise when reading'
+            raise checks.unreadable(f"{self.path}: the noise of its images is in them", hint)
         return replace(self, noise=noise, noise_epoch=epoch, _opened=(os.getpid(), self._open()))
 
     def _images(self, rows: list[int], threads: int) -> NDArray[np.uint8]:
@@ -308,7 +305,7 @@ class Dataset(Sequence[Sample]):
         keys = list(zip(*(self.column(name).tolist() for name in names)))
         groups = sorted(set(keys), key=repr)
         if len(groups) < 2:
-            raise _core.DataError(f"{self.path}: all {len(self)} pulls have the same {', '.join(names)}")
+            raise checks.unreadable(f"{self.path}: all {len(self)} pulls have the same {', '.join(names)}")
         order = np.random.default_rng(seed).permutation(len(groups))
         count = min(max(1, round(test * len(groups))), len(groups) - 1)
         held_out = {groups[i] for i in order[:count]}
@@ -330,6 +327,7 @@ class Dataset(Sequence[Sample]):
         """Batches of this rank in a seeded order, a new one every epoch; every row is seen by one rank. With
         `noise="resample"` the noise of the images is that of the epoch."""
         batch_size = checks.rows_of_batch(batch_size)
+        rank = checks.own_rank(rank, world_size)
         own = self.with_noise(self.noise, epoch) if self.noise == "resample" else self
         order = np.arange(len(self))
         if shuffle:

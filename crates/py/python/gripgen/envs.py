@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from . import _core
+from . import _core, checks
 from .simulation import BASELINE, Sim
 
 #: What an episode draws: a number or word stays, a list is chosen from, a pair `(low, high)` is uniform.
@@ -52,7 +52,7 @@ class _Task:
     ) -> None:
         self.sim = Sim(twin, mechanics=mechanics, images=images, set=set)
         if command not in ("force", "speed"):
-            raise _core.ConfigError(f"command = {command!r} is neither 'force' nor 'speed'")
+            raise checks.refusal(f"command = {command!r} is neither 'force' nor 'speed'")
         self.speeds = command == "speed"
         self.step_s = step_s
         self.images = images

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from ._core import DataError
+from .checks import unreadable
 
 #: Files of a run that are read, beside its shards.
 _FILES = ("run.json", "pulls.csv", "campaign.toml")
@@ -37,7 +38,7 @@ def fetch(url: str, cache_dir: str | os.PathLike[str] | None = None) -> str:
     try:
         import fsspec
     except ImportError as e:
-        raise DataError(f"{url}: reading URLs needs fsspec\nhint: pip install 'gripgen[remote]'") from e
+        raise unreadable(f"{url}: reading URLs needs fsspec", "pip install 'gripgen[remote]'") from e
     files, root = fsspec.core.url_to_fs(url)
     root = root.rstrip("/")
     local = Path(cache_dir or default_cache()) / hashlib.sha256(url.encode()).hexdigest()[:16]

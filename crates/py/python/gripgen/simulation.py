@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _core
+from . import _core, checks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -127,7 +127,8 @@ class Sim:
         if mu is not None:
             part = asked.get("part") or (self.parts[0] if len(self.parts) == 1 else None)
             if part is None:
-                raise _core.ConfigError("mu is the friction of a part\nhint: say which part is pulled")
+                hint = f"part={self.parts[0]!r} says which one is pulled"
+                raise checks.refusal("mu is the friction of a part", hint)
             asked[f"parts.{part}.mu"] = mu
         return self.pulls([asked], seed=seed, first_index=index, images=images, trace=trace)[0]
 
@@ -144,7 +145,7 @@ class Sim:
         """Many pulls in one call, shared by `threads` (all cores if None); pull i has the index `first_index + i`."""
         with_images = self._images if images is None else images
         if with_images and not self._images:
-            raise _core.ConfigError("this Sim was made without images\nhint: Sim(..., images=True)")
+            raise checks.refusal("this Sim was made without images", "Sim(..., images=True)")
         threads = os.cpu_count() or 1 if threads is None else threads
         found = self._core.pulls(
             [dict(values) for values in asked], seed, first_index, with_images, trace, threads

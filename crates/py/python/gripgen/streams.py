@@ -58,19 +58,17 @@ def stream(
         columns=tuple(columns),
         status=checks.known_statuses(status),
         set=dict(set or {}),
-        rank=rank,
+        rank=checks.own_rank(rank, world_size),
         world_size=world_size,
         jobs=workers,
         ahead=max(2 * size, 2 * workers) if ahead is None else ahead,
         drop_last=drop_last,
     )
-    if not 0 <= rank < world_size:
-        raise _core.ConfigError(f"rank = {rank} of world_size = {world_size}: ranks count from 0")
     # A configuration that cannot be is told now.
     known = found.info["columns"]
     for name in columns:
         if name not in known:
-            raise _core.DataError(f"{config}: there is no column {name!r}; there are {', '.join(known)}")
+            raise checks.unreadable(f"{config}: there is no column {name!r}; there are {', '.join(known)}")
     return found
 
 
@@ -117,9 +115,9 @@ class Stream:
         """Continues where `state_dict` was: the next pass begins there, those after it at the beginning."""
         for key, found in (("config_sha256", self.info["config_sha256"]), ("world_size", self.world_size)):
             if state[key] != found:
-                raise _core.ConfigError(
-                    f"the state has {key} = {state[key]}, this stream {found}: its samples would be others\n"
-                    "hint: continue with the configuration and the ranks that it was made with"
+                raise checks.refusal(
+                    f"the state has {key} = {state[key]}, this stream {found}: its samples would be others",
+                    "continue with the configuration and the ranks that it was made with",
                 )
         self._read = int(state["read"])
 

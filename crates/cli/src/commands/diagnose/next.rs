@@ -9,7 +9,7 @@ use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::identify::{Channel, Diagnosis, Verdict};
 use gripgen::record::{RIG_SOURCE, RunFolder, campaign_toml};
-use gripgen::{BASELINE_TWIN, Diagnosed, Location, NextPulls};
+use gripgen::{BASELINE_TWIN, Diagnosed, Location, NextPulls, Project, unvaried};
 use std::path::{Path, PathBuf};
 
 /// The sweep that works with every twin of ours.
@@ -167,8 +167,12 @@ fn sweep_step(args: &DiagnoseArgs, out: &Path) -> (String, String) {
     };
     match sweep {
         Some(sweep) => {
-            let out = unused(Path::new("runs/corrected"));
-            let words = [program(), "sweep", &sweep, "--set", &set, "-o", &shell::path(&out)];
+            let out_folder = unused(Path::new("runs/corrected"));
+            let mut words = vec![program(), "sweep", &sweep, "--set", &set];
+            let ranges = columns_to_vary(&sweep, out);
+            words.extend(ranges.iter().flat_map(|range| ["--set", range]));
+            let out = shell::path(&out_folder);
+            words.extend(["-o", &out]);
             (format!("{text}:"), shell::command_line(&words))
         }
         None => {
@@ -176,6 +180,14 @@ fn sweep_step(args: &DiagnoseArgs, out: &Path) -> (String, String) {
             (format!("{text}: `gripgen sweep` of your sweep file with {set}."), String::new())
         }
     }
+}
+
+/// Columns that the corrected twin depends on and the sweep leaves at one value: where the twin knows them.
+fn columns_to_vary(sweep: &str, twin: &Path) -> Vec<String> {
+    let twin = [("twin".to_string(), twin.display().to_string())];
+    let Ok(project) = Project::load(&Location::parse(sweep), &twin) else { return Vec::new() };
+    let still = unvaried(&project).into_iter();
+    still.filter_map(|column| Some(format!("vary.{}={}", column.key, column.values?))).collect()
 }
 
 /// The same diagnosis again, with the twin written.

@@ -31,6 +31,11 @@ pub fn write(
         let file = draws.to_string_lossy().into_owned();
         diagnosed.diagnosis.posterior = Some(PosteriorFile { file, draws: posterior.draws.len() });
     }
+    if let Some(out) = &args.out {
+        let text = edited_twin_toml(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out);
+        posterior::write(outputs, out, &text.map_err(Failure::new)?, diagnosed.posterior.as_ref())?;
+    }
+    // The twin is there: what its sweep has to vary depends on it.
     diagnosed.report.next = next_steps(args, &diagnosed, next.path.as_deref());
     if let Some(report) = &args.report {
         outputs.write(report, Format::Html, diagnosis_page(&diagnosed).as_bytes())?;
@@ -38,10 +43,6 @@ pub fn write(
     if sink.wanted() {
         let value = serde_json::to_value(&diagnosed.diagnosis).map_err(Failure::new)?;
         sink.document(&value)?;
-    }
-    if let Some(out) = &args.out {
-        let text = edited_twin_toml(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out);
-        posterior::write(outputs, out, &text.map_err(Failure::new)?, diagnosed.posterior.as_ref())?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
         // All notes come with `-v`.

@@ -84,6 +84,22 @@ fn the_sweep_lies_beside_the_twin_or_is_said_in_words() {
     assert_eq!(command, "sweep asset:configs/quickstart.toml --set twin=d.toml -o runs/corrected");
 }
 
+/// The loop of an unknown goes on by a command that can be copied: a table over a column of one's own does nothing in a sweep that
+/// does not draw the column.
+#[test]
+fn a_column_of_ones_own_is_drawn_by_the_next_sweep() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("d.toml");
+    let table = "[{name=\"table\",covariate=\"humidity_pct\",x=[30,60],factor=[1.0,0.7],physical=false}]";
+    let wet = [("effects".to_string(), table.to_string())];
+    let baseline = Location::parse(BASELINE_TWIN);
+    std::fs::write(&out, gripgen::edited_twin_toml(&baseline, &wet, &Default::default(), &out).unwrap()).unwrap();
+    let args = typed(&["lab", "-o", out.to_str().unwrap()]);
+    let (_, command) = first(&args, &answered(Verdict::Unknown, &[]), None);
+    let range = "--set 'vary.humidity_pct={ uniform = [30, 60] }' -o runs/corrected";
+    assert!(command.starts_with("sweep asset:configs/quickstart.toml") && command.ends_with(range), "{command}");
+}
+
 #[test]
 fn pulls_of_no_rig_are_a_list_and_no_other_campaign_is_offered() {
     let mut few = answered(Verdict::Insufficient, &["3 pulls are too few"]);
