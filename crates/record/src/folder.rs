@@ -96,9 +96,12 @@ impl RunFolder {
                 for entry in entries {
                     let example = entry.map_err(&at)?.file_name().to_string_lossy().into_owned();
                     // What a run killed before it wrote its run.json leaves behind.
-                    if !example.ends_with(".partial") && example != "inputs" {
-                        return Err(FolderError::Foreign { path: path.into(), example });
+                    if example.ends_with(".partial") || example == "inputs" {
+                        continue;
                     }
+                    // Another process may have begun the same run since its run.json was looked for.
+                    let begun = Self::open_same(path, &info)?;
+                    return begun.ok_or_else(|| FolderError::Foreign { path: path.into(), example });
                 }
             }
             Err(e) if e.kind() == ErrorKind::NotFound => std::fs::create_dir_all(path).map_err(&at)?,

@@ -225,6 +225,24 @@ mod tests {
         }
     }
 
+    /// Two commands that begin the same run at once both get it: what one of them made since the other looked is not foreign.
+    #[test]
+    fn a_run_that_many_begin_at_once_is_that_of_all() {
+        let temporary = tempfile::tempdir().unwrap();
+        for round in 0..200 {
+            let path = temporary.path().join(round.to_string());
+            let gate = std::sync::Barrier::new(4);
+            std::thread::scope(|scope| {
+                for _ in 0..4 {
+                    scope.spawn(|| {
+                        gate.wait();
+                        folder(&path);
+                    });
+                }
+            });
+        }
+    }
+
     /// Between the rename and the sidecar the shard has no partial name and is not done: it is still its writer's.
     #[test]
     fn a_shard_being_published_is_busy() {
