@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import effects, literature, physics, unknowns
+from . import effects, engines, literature, physics, unknowns
 
 # Hidden in the labels by the free friction coefficient (or nearly so); the size is set by
 # convention from what a handful of traces show.
@@ -59,7 +59,10 @@ def run(world, mu, ledger, acting, factor=1.0):
     if pulls.fade:
         fade = lambda t, ids: np.prod([g(t, ids) for g in pulls.fade], axis=0)
     inc, step = ledger["force_increment_n"].astype(float), ledger["step_time_s"].astype(float)
-    force, travel, ends = physics.simulate(world, limit, inc, step, fade, pulls.loop_gain, pulls.dead_band)
+    if world.engine:
+        force, travel, ends = engines.simulate(world, limit, ledger)
+    else:
+        force, travel, ends = physics.simulate(world, limit, inc, step, fade, pulls.loop_gain, pulls.dead_band)
     desired = physics.desired_of(inc, step, force.shape[1])
     times = np.arange(force.shape[1]) * physics.TICK_S
     idle = np.zeros((n, int(physics.IDLE_S / physics.TICK_S)), np.float32)

@@ -5,7 +5,7 @@ A none, B one library effect, C two, D outside the library, T tied by design, E 
 
 import numpy as np
 
-from . import effects, literature, unknowns
+from . import effects, engines, literature, unknowns
 
 SLOW_FAST = {"increments": [0.25, 1.0, 2.0], "steps": [0.104, 0.208]}
 # What a design needs so that the effect can show at all.
@@ -276,9 +276,17 @@ def plain(i, rng):
     return dict(case, expected=True)
 
 
+def engine(i, rng):
+    """Nothing but the contact of an engine for rigid bodies, which no twin of ours has."""
+    name = list(engines.BOOK)[i % len(engines.BOOK)]
+    fixed = {"count": int(rng.integers(60, 101)), "parts": int(rng.integers(1, 3)), "forces": str(rng.choice(["wide", "low"])),
+             "increments": [0.5, 1.0, 2.0], "traces": "fourth"}
+    return {"group": "P", "kind": name, "engine": name, "acts": [], "design": fixed, "expected": True}
+
+
 MAKERS = {"A": none, "B": one, "C": two, "D": outside, "T": tied, "E": few,
           "n": nothing, "s": small, "3": three, "o": one_session,
-          "i": idle, "l": formula, "w": awkward, "p": plain}
+          "i": idle, "l": formula, "w": awkward, "p": plain, "e": engine}
 
 
 def class_of(name):

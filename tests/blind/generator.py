@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import campaigns, cases, effects, folders, ledger, literature, physics, unknowns
+from . import campaigns, cases, effects, engines, folders, ledger, literature, physics, unknowns
 
 UNSEEN = 120
 REPLICAS = 5
@@ -14,12 +14,16 @@ def build(case, seed, name, open_folder, sealed_folder):
     """Writes `open_folder/name` and `sealed_folder/name`; returns the truth's hash."""
     rng = np.random.default_rng(seed)
     world = physics.draw_world(rng)
+    world.engine = case.get("engine", "")
     design = ledger.draw_design(rng, **case["design"])
     led = ledger.draw_ledger(design, rng)
     mu = campaigns.friction_of_parts(design, rng)
     plain = campaigns.expected(world, mu, led, [], np.ones((1, len(led["part"]))), rng, draws=1)
     design["largest_n"] = float(np.max(plain))
     acting, sizes = _acting(case, world, mu, led, design, rng)
+    if world.engine:
+        sizes.append({"name": world.engine, "library": False, "size": 1.0, "constants": {}, "multiple": float("nan"), "class": [],
+                      "always_tied": [], "accepted": sorted(engines.ADMISSIBLE)})
 
     n = len(led["pull_index"])
     factor = campaigns.scatter_factors(world, n, rng, case["kind"])
@@ -109,17 +113,19 @@ def _unseen(world, mu, design, acting, case, rng, place):
     written; the mean of the others is the oracle's prediction.
     """
     tables = []
-    while sum(len(t["pull_index"]) for t in tables) < UNSEEN:
+    # An engine takes a quarter of a second for a pull.
+    unseen, replicas = (60, 3) if world.engine else (UNSEEN, REPLICAS)
+    while sum(len(t["pull_index"]) for t in tables) < unseen:
         again = dict(design)
         fresh = ledger.draw_ledger(again, rng)
         tables.append(fresh)
     table = {k: np.concatenate([t[k] for t in tables]) for k in tables[0]}
     total = len(table["pull_index"])
-    keep = np.sort(rng.permutation(total)[:UNSEEN])
+    keep = np.sort(rng.permutation(total)[:unseen])
     table = {k: v[keep] for k, v in table.items()}
     draws = []
-    for _ in range(REPLICAS):
-        factor = campaigns.scatter_factors(world, UNSEEN, rng)
+    for _ in range(replicas):
+        factor = campaigns.scatter_factors(world, unseen, rng)
         draws.append(campaigns.labels(world, campaigns.run(world, mu, table, acting, factor), rng)[0])
     oracle = np.mean(draws[1:], axis=0)
     folders.write_campaign(place, folders.measured_ledger(table, rng), draws[0], design["distractors"], prefix="u")
@@ -128,7 +134,7 @@ def _unseen(world, mu, design, acting, case, rng, place):
         seen = folders.measured_ledger(few, rng)
         mean = expected_labels(world, mu, few, acting, case, rng)
         folders.write_campaign(place.parent / "expected", seen, mean, design["distractors"], prefix="e")
-    others = REPLICAS - 1
+    others = replicas - 1
     return float(np.sqrt(np.mean((draws[0] - oracle) ** 2) * others / (others + 1)))
 
 

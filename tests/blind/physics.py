@@ -31,6 +31,7 @@ class World:
     brush_spread: float  # relative sd of the limit from bristle to bristle
     weights: np.ndarray = field(repr=False)  # (2, bristles), share of a jaw's limit
     stiff: np.ndarray = field(repr=False)  # (2, bristles), share of the stiffness
+    engine: str = ""  # in the place of the brush, a name of `engines.BOOK`
 
 
 def draw_world(rng):

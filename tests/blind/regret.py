@@ -57,6 +57,14 @@ def ridge(folder, unseen):
     return float(np.sqrt(np.mean((predicted - test["max_pull_force_n"]) ** 2)))
 
 
+def process(folder, unseen):
+    """The same of a Gaussian process on all columns; None without scikit-learn."""
+    try:
+        return baselines.gp(folder, unseen, None).rmse_after_n
+    except ImportError:
+        return None
+
+
 def score(folder, sealed, work, binary, limit_s, calibrated):
     """All errors of one campaign."""
     truth = json.loads((sealed / "truth.json").read_text(encoding="utf-8"))
@@ -65,6 +73,7 @@ def score(folder, sealed, work, binary, limit_s, calibrated):
     report, twin, plain = work / "report.json", work / "diagnosed.toml", work / "fitted.toml"
     line = {"name": folder.name, "kind": truth["kind"], "group": truth["group"], "pulls": truth["pulls"],
             "acts": [a["name"] for a in truth["acts"]], "floor_n": truth["floor_rmse_n"], "ridge_n": ridge(folder, expected)}
+    line["gp_n"] = process(folder, expected)
     if calibrated:
         _, why, _ = runner._call([binary, "calibrate", "pulls", str(folder), "-o", str(plain), "--force"], limit_s)
         line["before_n"] = None if why else runner._compare(binary, expected, plain, limit_s)[0]
@@ -99,6 +108,19 @@ def table(lines):
     return "\n".join(rows)
 
 
+def explained(lines):
+    """The share of the recalibrated baseline's expected error that is gone, noise off, by world: this tool and the process."""
+    rows = ["| world | n | before, N | explained share, median, least | the process's | none found above 3 x floor |", "|---|---|---|---|---|---|"]
+    done = [r for r in lines if r.get("after_n") is not None and r.get("before_n") and r.get("gp_n")]
+    for kind in sorted({r["kind"] for r in done}):
+        own = [r for r in done if r["kind"] == kind]
+        share, rival = ([1 - r[key] / r["before_n"] for r in own] for key in ("after_n", "gp_n"))
+        missed = sum(r["verdict"] == "none" and np.hypot(r["after_n"], r["floor_n"]) > 3 * r["floor_n"] for r in own)
+        rows.append(f"| {kind} | {len(own)} | {np.median([r['before_n'] for r in own]):.2f} | {np.median(share):.2f}, {min(share):.2f} "
+                    f"| {np.median(rival):.2f}, {min(rival):.2f} | {missed} |")
+    return "\n".join(rows)
+
+
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder")
@@ -126,6 +148,8 @@ def main(arguments=None):
             with open(args.json, "a", encoding="utf-8") as file:
                 file.write(text + "\n")
     print(table(lines))
+    if any(r.get("gp_n") for r in lines):
+        print(explained(lines))
 
 
 if __name__ == "__main__":

@@ -5,11 +5,12 @@ import json
 import os
 import stat
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from . import campaigns, cases, effects, folders, generate, generator, judge, ledger, physics, regret, runner, scorer, unknowns
+from . import campaigns, cases, effects, engines, folders, generate, generator, judge, ledger, physics, regret, runner, scorer, unknowns
 
 
 def quiet_world(ratio=1.0, spread=0.0):
@@ -48,6 +49,59 @@ def test_stiffness_is_the_slope_before_slip():
     force, travel, _ = physics.simulate(world, np.array([[15.0, 15.0]]), np.ones(1), np.full(1, 0.104))
     half = np.nanargmax(force[0] > 15)
     assert force[0, half] / travel[0, half] == pytest.approx(world.stiffness_n_per_mm, rel=0.01)
+
+
+class Coulomb:
+    """An engine that knows nothing but a mass and a friction limit."""
+
+    def __init__(self, shape, mu, grip_force_n, step_s, carriage_kg):
+        self.limit_n, self.step_s, self.mass_kg = 2 * mu * grip_force_n, step_s, carriage_kg + 0.4
+        self.at_m = self.speed_m_per_s = self.applied_n = 0.0
+
+    def push(self, applied_n):
+        self.applied_n = applied_n
+
+    def advance(self):
+        """Implicit in the friction force: what it would take to stop, and no more than the limit."""
+        stops_n = self.applied_n + self.mass_kg * self.speed_m_per_s / self.step_s
+        friction_n = min(max(stops_n, -self.limit_n), self.limit_n)
+        self.speed_m_per_s += (self.applied_n - friction_n) / self.mass_kg * self.step_s
+        self.at_m += self.speed_m_per_s * self.step_s
+
+    def read(self):
+        return self.at_m, self.speed_m_per_s
+
+    def close(self):
+        pass
+
+
+def test_an_engine_in_the_place_of_the_brush(monkeypatch):
+    """The force ends at the sum of both limits, the displacement at the stop, whatever engine is behind."""
+    scene, _ = engines._modules("scene")
+    monkeypatch.setattr(engines, "_modules", lambda name: (scene, SimpleNamespace(Engine=Coulomb)))
+    monkeypatch.setitem(engines.BOOK, "coulomb", ("", {}))
+    world = quiet_world()
+    world.engine = "coulomb"
+    table = {"part": np.array(["gear", "gear"]), "grip_force_n": np.array([10.0, 40.0]), "force_increment_n": np.array([1.0, 2.0]),
+             "step_time_s": np.full(2, 0.104)}
+    limit = np.array([[2.0, 2.0], [8.0, 8.0]])
+    force, travel, ends = engines.simulate(world, limit, table)
+    for i in range(2):
+        assert force[i, ends[i] - 1] == pytest.approx(limit[i].sum(), rel=1e-3)
+        assert travel[i, ends[i] - 1] > physics.STOP_MM > travel[i, ends[i] - 2]
+        assert np.isnan(force[i, ends[i]:]).all()
+    desired = physics.desired_of(table["force_increment_n"], table["step_time_s"], force.shape[1])
+    assert physics.label(force, desired, ends) == pytest.approx(limit.sum(axis=1), rel=1e-3)
+
+
+def test_a_soft_contact_creeps_to_the_stop_below_its_limit():
+    """MuJoCo as it is shipped, which is why its pulls are a world of their own."""
+    pytest.importorskip("mujoco")
+    world = quiet_world()
+    world.engine = "mujoco_as_shipped"
+    table = {"part": np.array(["gear"]), "grip_force_n": np.array([60.0]), "force_increment_n": np.ones(1), "step_time_s": np.full(1, 0.104)}
+    force, travel, ends = engines.simulate(world, np.array([[12.0, 12.0]]), table)
+    assert travel[0, ends[0] - 1] > physics.STOP_MM and np.nanmax(force) < 0.8 * 24.0
 
 
 def test_label_is_the_last_near_sample():
