@@ -17,7 +17,7 @@ mod zero;
 
 pub use beside::{GripForceEvidence, WrenchRow};
 pub use budget::LabelBudget;
-pub use recorded::recorded_may_be_the_rig;
+pub use recorded::recorded_behind;
 pub use zero::ZERO_SHIFT;
 
 use crate::{PullTrace, Scenario, SlipLabel, Twin};
@@ -143,14 +143,39 @@ pub enum FindingKind {
     Torque,
 }
 
-/// Kinds that an effect of sensor or robot may be behind.
-const OF_THE_RIG: [FindingKind; 4] =
-    [FindingKind::Early, FindingKind::Zero, FindingKind::ZeroShift, FindingKind::Displacement];
+/// What may be behind a finding, the narrowest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Behind {
+    /// An accident of this pull.
+    Pull,
+    /// A contact that sticks and slips, in any of its pulls.
+    Contact,
+    /// An effect of sensor or robot that all pulls of a campaign have.
+    Rig,
+}
 
 impl FindingKind {
-    /// Whether an effect of sensor or robot that all pulls of a campaign have may be behind it.
-    pub fn may_be_the_rig(self) -> bool {
-        OF_THE_RIG.contains(&self)
+    /// Every kind.
+    pub const ALL: [Self; 10] = [
+        Self::Rule,
+        Self::Early,
+        Self::LargerBefore,
+        Self::Displacement,
+        Self::Zero,
+        Self::ZeroShift,
+        Self::Jump,
+        Self::GripForce,
+        Self::Lateral,
+        Self::Torque,
+    ];
+
+    /// What may be behind it.
+    pub fn behind(self) -> Behind {
+        match self {
+            Self::Early | Self::Zero | Self::ZeroShift | Self::Displacement => Behind::Rig,
+            Self::Jump | Self::LargerBefore => Behind::Contact,
+            Self::Rule | Self::GripForce | Self::Lateral | Self::Torque => Behind::Pull,
+        }
     }
 }
 
@@ -257,9 +282,9 @@ impl Judgement {
             .then(|| self.reasons().map(Finding::to_string).collect::<Vec<_>>().join("; "))
     }
 
-    /// Whether all that contradicts the label may be an effect of sensor or robot.
-    pub fn may_be_the_rig(&self) -> bool {
-        self.verdict == Verdict::Suspect && self.reasons().all(|finding| finding.kind.may_be_the_rig())
+    /// What may be behind all that contradicts the label.
+    pub fn behind(&self) -> Behind {
+        self.reasons().map(|finding| finding.kind.behind()).min().unwrap_or(Behind::Pull)
     }
 }
 

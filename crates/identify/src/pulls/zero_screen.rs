@@ -2,7 +2,10 @@
 //! of the gripper into the sensor. Labels do not show it, because the friction of the parts takes it in.
 //!
 //! A zero wanders, and so do temperatures: two walks look alike without having to do with each other (Yule 1926). Differences from
-//! one trace to the next are held against each other, which leaves walks nearly white, and are shuffled.
+//! one trace to the next are held against each other, which leaves walks nearly white, and are shuffled. Differences of a zero that does
+//! not wander fall after they rose, as do those of a setting that is drawn anew each time, and look alike more often than shuffled ones: in a
+//! simulation of 17 traces and eight columns 2.4 % of such campaigns got a name in place of 1 %. So a column has to pass a second time
+//! with as much of the last value taken off as the zero itself keeps (prewhitening, Box and Jenkins 1976): 0.4 % then, of walks 1.2 %.
 
 use super::context::Context;
 use super::data::Column;
@@ -34,57 +37,83 @@ pub(super) fn zeros_that_depend(context: &Context<'_>, model: &PullModel) -> Vec
     let asked: Vec<(usize, &[f64])> = seen.iter().map(|(row, _)| (*row, [].as_slice())).collect();
     let predicted = context.predictor.traces(model, &asked);
     let zero_n: Vec<f64> = seen.iter().zip(&predicted).map(|((_, z), p)| z - p.no_load_n).collect();
-    let difference = |x: &[f64]| x.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<f64>>();
-    let steps_n = difference(&zero_n);
     let columns: Vec<(&String, Vec<f64>)> = context
         .data
         .columns
         .iter()
         .filter(|(name, _)| !NOT_LOOKED_AT.contains(&name.as_str()))
         .filter_map(|(name, column)| match column {
-            Column::Number(x) => {
-                Some((name, difference(&seen.iter().map(|(row, _)| x[*row]).collect::<Vec<_>>())))
-            }
+            Column::Number(x) => Some((name, seen.iter().map(|(row, _)| x[*row]).collect::<Vec<_>>())),
             Column::Word(..) => None,
         })
-        .filter(|(_, steps)| steps.iter().any(|s| *s != 0.0))
+        .filter(|(_, x)| x.iter().any(|value| *value != x[0]))
         .collect();
-    depends(&columns, &steps_n)
+    depends(&columns, &zero_n)
 }
 
-/// Columns that the steps of a zero go with, the strongest first. Each has to explain what those before it leave: a column that runs
-/// along with the one that acts says nothing of its own.
-fn depends(columns: &[(&String, Vec<f64>)], steps_n: &[f64]) -> Vec<UnknownCovariate> {
+/// Columns that a zero goes with from trace to trace, the strongest first. Each has to explain what those before it leave: a column that
+/// runs along with the one that acts says nothing of its own.
+fn depends(columns: &[(&String, Vec<f64>)], zero_n: &[f64]) -> Vec<UnknownCovariate> {
     let level = CHANCE / columns.len().max(1) as f64;
     let mut found: Vec<UnknownCovariate> = Vec::new();
-    let (mut columns, mut left_n) = (columns.to_vec(), steps_n.to_vec());
+    let (mut columns, mut zero_n) = (columns.to_vec(), zero_n.to_vec());
     loop {
-        let strength = |k: usize| share(&columns[k].1, &left_n);
+        let steps_n = steps(&zero_n, 1.0);
+        let strength = |k: usize| share(&steps(&columns[k].1, 1.0), &steps_n);
         let best = (0..columns.len()).max_by(|&a, &b| strength(a).total_cmp(&strength(b)));
         let Some(best) = best.filter(|&k| strength(k) >= LEAST_SHARE) else { return found };
-        let (name, steps) = columns.swap_remove(best);
-        let strength = share(&steps, &left_n);
-        let (mut shuffled, mut draws, mut better) = (left_n.clone(), Draws::new(37, 8), 0);
-        for _ in 0..SHUFFLES {
-            draws.shuffle(&mut shuffled);
-            better += usize::from(share(&steps, &shuffled) >= strength);
-        }
-        let p_value = (better + 1) as f64 / (SHUFFLES + 1) as f64;
+        let strength = strength(best);
+        let (name, x) = columns.swap_remove(best);
+        let p_value = [1.0, kept(&zero_n)]
+            .map(|part| chance(&steps(&x, part), &steps(&zero_n, part)))
+            .into_iter()
+            .fold(0.0, f64::max);
         if p_value > level {
             return found;
         }
         found.push(UnknownCovariate { covariate: name.clone(), strength, p_value });
-        left_n = beside(&left_n, &steps);
-        columns.iter_mut().for_each(|(_, own)| *own = beside(own, &steps));
+        zero_n = beside(&zero_n, &x);
+        columns.iter_mut().for_each(|(_, own)| *own = beside(own, &x));
     }
 }
 
-/// What a straight line in `x` leaves of `y`; nothing where it leaves no more than rounding.
+/// How often a straight line in `x` explains as much of a shuffled `y`.
+fn chance(x: &[f64], y: &[f64]) -> f64 {
+    let strength = share(x, y);
+    let (mut shuffled, mut draws, mut better) = (y.to_vec(), Draws::new(37, 8), 0);
+    for _ in 0..SHUFFLES {
+        draws.shuffle(&mut shuffled);
+        better += usize::from(share(x, &shuffled) >= strength);
+    }
+    (better + 1) as f64 / (SHUFFLES + 1) as f64
+}
+
+/// What is new from one value to the next where `part` of the last one is kept: differences where all of it is, otherwise about their mean.
+fn steps(x: &[f64], part: f64) -> Vec<f64> {
+    let new: Vec<f64> = x.windows(2).map(|pair| pair[1] - part * pair[0]).collect();
+    let mean = if part < 1.0 { new.iter().sum::<f64>() / new.len() as f64 } else { 0.0 };
+    new.iter().map(|value| value - mean).collect()
+}
+
+/// The part of a value that the next one keeps, 0 to 1: the correlation of neighbours with its bias in short series taken off (Kendall 1954).
+fn kept(x: &[f64]) -> f64 {
+    let n = x.len() as f64;
+    let mean = x.iter().sum::<f64>() / n;
+    let about = |i: usize| x[i] - mean;
+    let whole: f64 = (0..x.len()).map(|i| about(i) * about(i)).sum();
+    let neighbours: f64 = (1..x.len()).map(|i| about(i) * about(i - 1)).sum();
+    let seen = neighbours / whole.max(1e-300);
+    (seen + (1.0 + 3.0 * seen) / n).clamp(0.0, 1.0)
+}
+
+/// What a straight line in `x` leaves of `y`, its slope that of the differences; nothing where it leaves no more than rounding.
 fn beside(y: &[f64], x: &[f64]) -> Vec<f64> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let slope = dot(x, y) / dot(x, x).max(1e-300);
+    let (dy, dx) = (steps(y, 1.0), steps(x, 1.0));
+    let slope = dot(&dx, &dy) / dot(&dx, &dx).max(1e-300);
     let left: Vec<f64> = y.iter().zip(x).map(|(y, x)| y - slope * x).collect();
-    if dot(&left, &left) > 1e-9 * dot(y, y) { left } else { vec![0.0; y.len()] }
+    let changes = steps(&left, 1.0);
+    if dot(&changes, &changes) > 1e-9 * dot(&dy, &dy) { left } else { vec![0.0; y.len()] }
 }
 
 /// What to say of one.
@@ -123,9 +152,35 @@ mod tests {
         let found = |zero: &[f64]| -> Vec<String> {
             depends(&columns, zero).into_iter().map(|u| u.covariate).collect()
         };
-        assert!(share(&along, &zero) > 0.3, "{}", share(&along, &zero));
+        assert!(share(&steps(&along, 1.0), &steps(&zero, 1.0)) > 0.3);
         assert_eq!(found(&zero), ["grip_force_n"]);
         let both: Vec<f64> = zero.iter().zip(&other).map(|(z, o)| z + 0.15 * o).collect();
         assert_eq!(found(&both), ["grip_force_n", "other"]);
+    }
+
+    /// Of zeros that have nothing to do with any column hardly one gets a name, whether they wander or not.
+    #[test]
+    fn zeros_that_go_with_nothing_get_no_name() {
+        let mut draws = Draws::new(5, 5);
+        let names: Vec<String> = (0..8).map(|k| format!("column {k}")).collect();
+        for wanders in [false, true] {
+            let mut named = 0;
+            for _ in 0..300 {
+                let mut series = |walk: bool| -> Vec<f64> {
+                    let mut at = 0.0;
+                    let next = |_| {
+                        at = if walk { at } else { 0.0 } + draws.normal();
+                        at
+                    };
+                    (0..17).map(next).collect()
+                };
+                let zero = series(wanders);
+                let columns: Vec<_> =
+                    names.iter().enumerate().map(|(k, name)| (name, series(k > 5))).collect();
+                named += usize::from(!depends(&columns, &zero).is_empty());
+            }
+            // Of 300 at 1 % more than 8 in one of 200 cases; by differences alone it is 2 to 3 %.
+            assert!(named <= 6, "{named} of 300, wandering {wanders}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::cells::{Cells, Column};
 use crate::proto::gripgen_v1::Status;
-use gripgen_twin::evidence::{Expected, LabelEvidence, Verdict, judge};
+use gripgen_twin::evidence::{Behind, Expected, LabelEvidence, Verdict, judge};
 use gripgen_twin::{MeasuredPull, MeasuredPulls, slip_label};
 
 /// Labels and readings of files agree to two decimals.
@@ -26,8 +26,8 @@ pub struct Standing {
     pub status: Status,
     /// Why, with numbers; empty where it slipped.
     pub reason: String,
-    /// It is suspect, and an effect of sensor or robot may be why.
-    pub may_be_the_rig: bool,
+    /// What may be behind a suspect label.
+    pub behind: Behind,
     /// Its label was compared with evidence.
     pub judged: bool,
 }
@@ -52,7 +52,7 @@ pub(super) fn stated(columns: &[Column], pulls: &mut [MeasuredPull]) -> Result<V
             _ => {}
         }
         let reason = reasons.and_then(|r| r.get(row)).cloned().unwrap_or_default();
-        standing.push(Standing { status, reason, may_be_the_rig: false, judged: false });
+        standing.push(Standing { status, reason, behind: Behind::Pull, judged: false });
     }
     Ok(standing)
 }
@@ -72,12 +72,8 @@ pub(crate) fn judge_labels(measured: &MeasuredPulls, after_n: &[Vec<f64>], stand
         let judgement = judge(&evidence, &Expected::default());
         standing.judged = judgement.verdict != Verdict::NoEvidence;
         if let Some(reason) = judgement.reason() {
-            *standing = Standing {
-                status: Status::Suspect,
-                reason,
-                may_be_the_rig: judgement.may_be_the_rig(),
-                judged: true,
-            };
+            *standing =
+                Standing { status: Status::Suspect, reason, behind: judgement.behind(), judged: true };
         }
     }
 }

@@ -1,16 +1,19 @@
 //! What a recorded reason says, without the evidence that it came from.
 
-use super::{Finding, OF_THE_RIG};
+use super::{Behind, Finding, FindingKind};
 
-/// Whether a reason that was recorded ([`Judgement::reason`](super::Judgement::reason), perhaps with others behind it, joined by semicolons)
-/// holds nothing but findings that an effect of sensor or robot may be behind. A camera that fell silent is none.
-pub fn recorded_may_be_the_rig(reason: &str) -> bool {
-    let known = OF_THE_RIG.map(|kind| {
+/// What may be behind a reason that was recorded ([`Judgement::reason`](super::Judgement::reason), perhaps with others after it, joined by
+/// semicolons). A camera that fell silent is an accident of its pull.
+pub fn recorded_behind(reason: &str) -> Behind {
+    let known = FindingKind::ALL.map(|kind| {
         let finding = Finding { kind, found: 0.0, wanted: 0.0, allowed: 0.0, time_s: None };
-        plain(&finding.to_string())
+        (plain(&finding.to_string()), kind.behind())
     });
-    let mut reasons = reasons_of(reason).peekable();
-    reasons.peek().is_some() && reasons.all(|reason| known.contains(&plain(reason)))
+    let behind = |reason: &str| {
+        let reason = plain(reason);
+        known.iter().find(|(text, _)| *text == reason).map_or(Behind::Pull, |(_, behind)| *behind)
+    };
+    reasons_of(reason).map(behind).min().unwrap_or(Behind::Pull)
 }
 
 /// The reasons of a record. In the brackets of one there is a semicolon too: "(0.33 N are allowed; at 0.10 s)".

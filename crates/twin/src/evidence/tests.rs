@@ -145,7 +145,7 @@ fn a_trace_with_every_reading_gives_the_label_to_the_last_digit() {
     let off = of(label_n - 0.1);
     let reason = off.reason().unwrap();
     assert!(reason.starts_with("the label rule gives"), "{reason}");
-    assert!(!off.may_be_the_rig());
+    assert_eq!(off.behind(), Behind::Pull);
 }
 
 /// A pull is suspect, or its label is that of the rig by at most what a label may be off.
@@ -232,7 +232,7 @@ fn a_zero_that_moved_shows_in_the_readings_after_the_pull() {
     let moved = after(1.6);
     assert!(moved.reason().unwrap().contains("zero is 1.60 N"), "{:?}", moved.reason());
     assert!((moved.budget.zero_n - 1.6).abs() < 0.1 && moved.budget.total_n() > 1.6);
-    assert!(moved.may_be_the_rig());
+    assert_eq!(moved.behind(), Behind::Rig);
 }
 
 #[test]
@@ -299,22 +299,19 @@ fn other_devices_speak_against_a_label() {
 
 #[test]
 fn a_recorded_reason_says_as_much_as_its_findings() {
-    use FindingKind as K;
-    let kinds = [K::Rule, K::Early, K::LargerBefore, K::Displacement, K::Zero, K::ZeroShift];
-    let kinds = kinds.into_iter().chain([K::Jump, K::GripForce, K::Lateral, K::Torque]);
-    let all: Vec<(FindingKind, String)> = kinds
+    let all: Vec<(FindingKind, String)> = FindingKind::ALL
+        .into_iter()
         .flat_map(|kind| [None, Some(0.104)].map(|time_s| (kind, time_s)))
         .map(|(kind, time_s)| Finding { kind, found: -12.5, wanted: 3.25, allowed: 0.33, time_s })
         .map(|finding| (finding.kind, finding.to_string()))
         .collect();
     for (kind, reason) in &all {
-        assert_eq!(recorded_may_be_the_rig(reason), kind.may_be_the_rig(), "{reason}");
+        assert_eq!(recorded_behind(reason), kind.behind(), "{reason}");
         for (other, second) in &all {
             let both = format!("{reason}; {second}");
-            let rig = kind.may_be_the_rig() && other.may_be_the_rig();
-            assert_eq!(recorded_may_be_the_rig(&both), rig, "{both}");
+            assert_eq!(recorded_behind(&both), kind.behind().min(other.behind()), "{both}");
         }
-        assert!(!recorded_may_be_the_rig(&format!("{reason}; the left camera fell silent")));
+        assert_eq!(recorded_behind(&format!("{reason}; the left camera fell silent")), Behind::Pull);
     }
-    assert!(!recorded_may_be_the_rig(""));
+    assert_eq!(recorded_behind(""), Behind::Pull);
 }

@@ -93,11 +93,15 @@ fn a_column_of_ones_own_is_drawn_by_the_next_sweep() {
     let table = "[{name=\"table\",covariate=\"humidity_pct\",x=[30,60],factor=[1.0,0.7],physical=false}]";
     let wet = [("effects".to_string(), table.to_string())];
     let baseline = Location::parse(BASELINE_TWIN);
-    std::fs::write(&out, gripgen::edited_twin_toml(&baseline, &wet, &Default::default(), &out).unwrap()).unwrap();
+    std::fs::write(&out, gripgen::edited_twin_toml(&baseline, &wet, &Default::default(), &out).unwrap())
+        .unwrap();
     let args = typed(&["lab", "-o", out.to_str().unwrap()]);
     let (_, command) = first(&args, &answered(Verdict::Unknown, &[]), None);
     let range = "--set 'vary.humidity_pct={ uniform = [30, 60] }' -o runs/corrected";
-    assert!(command.starts_with("sweep asset:configs/quickstart.toml") && command.ends_with(range), "{command}");
+    assert!(
+        command.starts_with("sweep asset:configs/quickstart.toml") && command.ends_with(range),
+        "{command}"
+    );
 }
 
 #[test]
