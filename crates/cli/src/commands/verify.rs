@@ -6,6 +6,7 @@ use crate::failure::{Failure, code};
 use crate::output::{JsonSink, count, print, program};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
+use crate::shell;
 use gripgen::record::{RIG_SOURCE, repair, verify};
 use serde_json::json;
 
@@ -61,8 +62,9 @@ pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
                 true => "measured pulls cannot be computed again: a copy of the run may have them whole"
                     .to_string(),
                 false => format!(
-                    "`{} verify --repair` removes what is broken, and the same sweep makes it again",
-                    program()
+                    "`{} verify {} --repair` removes what is broken, and the same sweep makes it again",
+                    program(),
+                    shell::path(&args.run)
                 ),
             }
         );

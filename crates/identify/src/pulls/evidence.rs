@@ -13,7 +13,7 @@ const FIRST: f64 = 2.5;
 const FURTHER: f64 = 3.0;
 
 /// Groups at most.
-const MOST: usize = 6;
+pub(super) const MOST: usize = 6;
 
 /// Orders of the residuals that are tried.
 const SHUFFLES: usize = 399;
@@ -129,10 +129,10 @@ impl Grouped {
     }
 
     /// Groups are taken one at a time, as long as each adds evidence; their deviations are fitted again with each.
-    pub fn learn(&self) -> Learnt {
+    pub fn learn(&self, most: usize) -> Learnt {
         let mut chosen: Vec<(usize, f64)> = Vec::new();
         let mut gain = 0.0;
-        while chosen.len() < MOST {
+        while chosen.len() < most {
             let least = if chosen.is_empty() { FIRST } else { FURTHER };
             let Some((group, sd, with)) = self.next(&chosen) else { break };
             if with < gain + least {
@@ -214,7 +214,7 @@ mod tests {
     fn nothing_is_learnt_from_noise() {
         let false_alarms = (0..60).filter(|&k| {
             let grouped = made(k, 0.0);
-            !grouped.learn().groups.is_empty() && grouped.p_value() <= 0.02
+            !grouped.learn(MOST).groups.is_empty() && grouped.p_value() <= 0.02
         });
         let count = false_alarms.count();
         assert!(count <= 4, "{count} of 60");
@@ -223,7 +223,7 @@ mod tests {
     /// A column and a product of two others are found with their coefficients, and nothing else.
     #[test]
     fn two_groups_come_back() {
-        let found = made(7, 0.04).learn();
+        let found = made(7, 0.04).learn(MOST);
         let mut groups: Vec<usize> = found.groups.iter().map(|g| g.0).collect();
         groups.sort_unstable();
         // The product of the fourth and fifth column: 7 + 6 + 5 pairs stand before it.

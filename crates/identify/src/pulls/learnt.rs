@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::curves::Curve;
-use super::evidence::Grouped;
+use super::evidence::{Grouped, MOST};
 use super::fitting::Fitted;
 use super::model::PullModel;
 use super::smooth::smooths;
@@ -76,15 +76,16 @@ pub(super) fn grouped(
     Grouped::new(&y, &DMatrix::from_columns(&known), &groups)
 }
 
-/// `fitted` with what the pulls at `rows` teach beside it, shrunk once more to `share` of it.
+/// `fitted` with what the pulls at `rows` teach beside it, of at most so many groups, shrunk once more to `share` of it.
 pub(super) fn with_residual(
     context: &Context<'_>,
     fitted: &Fitted,
     rows: &[usize],
     curves: &[Curve],
     share: f64,
+    most: usize,
 ) -> Option<Fitted> {
-    let learnt = grouped(context, fitted, rows, curves)?.learn();
+    let learnt = grouped(context, fitted, rows, curves)?.learn(most);
     if learnt.groups.is_empty() {
         return None;
     }
@@ -97,5 +98,5 @@ pub(super) fn with_residual(
 
 /// The fit of a fold, in which the residual of a model is learnt again.
 pub(super) fn learnt_again(context: &Context<'_>, fitted: Fitted, rows: &[usize], share: f64) -> Fitted {
-    with_residual(context, &fitted, rows, &smooths(context.data), share).unwrap_or(fitted)
+    with_residual(context, &fitted, rows, &smooths(context.data), share, MOST).unwrap_or(fitted)
 }

@@ -3,8 +3,9 @@
 
 use super::context::Context;
 use super::curves::Session;
+use super::evidence::MOST;
 use super::fitting::Fitted;
-use super::heldout::{by_value, predicted};
+use super::heldout::{by_value, predicted, scatter};
 use super::learnt::{grouped, with_residual};
 use super::paying::{root_mean_square, share};
 use super::search::Search;
@@ -28,6 +29,10 @@ const OF_A_SESSION: f64 = 0.55;
 
 /// Part of a residual that held-out pulls have to confirm.
 const CONFIRMED: f64 = 0.4;
+
+/// Error on the pulls that a residual was learnt from, over that on held-out pulls, at most: it is learnt by slopes, and a further group may
+/// be what slopes miss of a first one that does much. Then the last groups go.
+const MOST_SEEN: f64 = 1.1;
 
 /// A residual that is kept.
 pub(super) struct Kept {
@@ -67,7 +72,7 @@ fn learnt_beside(
     let held = Terms { hold_signals: fitted.terms.act_on_signals(), ..fitted.terms.clone() };
     let plain = context.fit_again(&fitted.model, &held, &search.rows)?;
     let left = grouped(context, &plain, &search.rows, &curves)?;
-    let learnt = left.learn();
+    let learnt = left.learn(MOST);
     if learnt.groups.is_empty() {
         return None;
     }
@@ -76,7 +81,7 @@ fn learnt_beside(
     if strict && p_value > CHANCE {
         return None;
     }
-    let full = with_residual(context, &plain, &search.rows, &curves, 1.0)?;
+    let full = with_residual(context, &plain, &search.rows, &curves, 1.0, MOST)?;
     // As much of it as held-out pulls confirm.
     let expected = context.predictor.pulls(&plain.model, &search.rows);
     let [without, with] = [&plain, &full].map(|f| search.held_out(f, repetitions, near));
@@ -96,8 +101,18 @@ fn learnt_beside(
     if confirmed < CONFIRMED {
         return None;
     }
-    let chosen = with_residual(context, &plain, &search.rows, &curves, confirmed)?;
+    let mut chosen = with_residual(context, &plain, &search.rows, &curves, confirmed, MOST)?;
     let with = search.held_out(&chosen, repetitions, near);
+    let unseen_n = root_mean_square(with.iter().map(|(_, e)| *e));
+    for most in (1..learnt.groups.len()).rev() {
+        if own_error_n(context, &chosen, near) <= MOST_SEEN * unseen_n {
+            break;
+        }
+        let fewer = with_residual(context, &plain, &search.rows, &curves, confirmed, most)?;
+        if own_error_n(context, &fewer, near) < own_error_n(context, &chosen, near) {
+            chosen = fewer;
+        }
+    }
     let error = |e: &[(usize, f64)]| root_mean_square(e.iter().map(|(_, e)| *e));
     let weighed =
         |e: &[(usize, f64)]| root_mean_square(e.iter().map(|(i, e)| e / expected[*i].label_sd_n.max(0.03)));
@@ -109,7 +124,7 @@ fn learnt_beside(
         return None;
     }
     let mut strengths: Vec<UnknownCovariate> = Vec::new();
-    for (group, coefficients) in &learnt.groups {
+    for (group, coefficients) in learnt.groups.iter().take(chosen.terms.learnt.len()) {
         let (covariate, strength) = (&curves[*group].name, left.strength(*group, coefficients));
         match strengths.iter_mut().find(|u| u.covariate == *covariate) {
             Some(known) => known.strength += strength,
@@ -164,6 +179,14 @@ fn gives_way(session: Session, without: f64, columns: f64, curve: f64) -> bool {
         Session::Steps => columns <= (1.0 + PAYS) * curve,
         Session::Slope => explained(columns) > OF_A_SESSION * explained(curve).max(0.0),
     }
+}
+
+/// Error on the pulls of `near`, which the fit has seen.
+fn own_error_n(context: &Context<'_>, fitted: &Fitted, near: &[usize]) -> f64 {
+    let mut model = fitted.model.clone();
+    model.scatter = scatter(&model, fitted.likelihood.scale);
+    let labels_n = context.labels_n(&model, near);
+    root_mean_square(near.iter().zip(labels_n).map(|(&i, label_n)| label_n - context.data.label_n[i]))
 }
 
 /// Error on sets that are held out, of the pulls of `near`.
