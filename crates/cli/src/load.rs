@@ -11,6 +11,7 @@ use gripgen::{
     PressGeometry, Suspects, is_pulls, load_presses, load_pulls_with, load_sensor, load_twin_document,
     load_twin_sensor,
 };
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -67,6 +68,7 @@ pub fn load_pulls_to_fit(
     talk: &TalkArgs,
     answers: bool,
 ) -> Result<LoadedPulls, Failure> {
+    each_once(paths)?;
     let mut loaded = load_pulls_with(paths, suspects).map_err(|e| no_pulls(paths, &e))?;
     let refused = loaded.implausible.take_if(|e| e.sign || !answers);
     say_warnings(&loaded, talk);
@@ -74,6 +76,17 @@ pub fn load_pulls_to_fit(
         Some(e) => Err(Failure::usage(&e).hint(&e.hint)),
         None => Ok(loaded),
     }
+}
+
+/// A folder that is named twice would be evidence twice.
+fn each_once(paths: &[&Path]) -> Result<(), Failure> {
+    let mut seen = HashSet::new();
+    // What is not there is said by who reads it.
+    let again = paths.iter().find(|path| path.canonicalize().is_ok_and(|path| !seen.insert(path)));
+    again.map_or(Ok(()), |path| {
+        let said = format!("{} is named twice: the same pulls are no further evidence", path.display());
+        Err(Failure::usage(said).hint("name each folder once; --also adds others"))
+    })
 }
 
 /// Says what people have to know of pulls that were loaded: the one way of it to the terminal.

@@ -63,6 +63,34 @@ fn odd_units_and_misspelt_names_are_said_unless_it_is_to_be_quiet() {
     assert!(text(&run(&["info", folder(12, 1.0, 1.0).path().to_str().unwrap()]).stderr).is_empty());
 }
 
+/// One cell makes a column of numbers one of words, and a folder that is named twice would be evidence twice.
+#[test]
+fn a_word_among_numbers_and_a_folder_named_twice_are_said() {
+    let wet = folder(12, 1.0, 1.0);
+    let at = wet.path().join("pulls.csv");
+    let table = std::fs::read_to_string(&at).unwrap();
+    let with = |p7: &str| {
+        let cell = |i: usize, row: &str| match i {
+            0 => format!("{row},humidity_pct"),
+            8 => format!("{row},{p7}"),
+            _ => format!("{row},{}", 30 + i),
+        };
+        let rows: Vec<String> = table.lines().enumerate().map(|(i, row)| cell(i, row)).collect();
+        std::fs::write(&at, rows.join("\n")).unwrap();
+        text(&run(&["info", wet.path().to_str().unwrap()]).stderr)
+    };
+    assert!(
+        with("n/a")
+            .contains("humidity_pct is one of words, because `n/a` (pull p7) is no number and 11 others are")
+    );
+    assert!(!with("").contains("one of words"), "an empty cell is a value that is missing");
+    let [plain, dotted] =
+        [wet.path().to_path_buf(), wet.path().join(".")].map(|path| path.display().to_string());
+    let twice = run(&["diagnose", &plain, "--also", &dotted]);
+    assert_code(&twice, 2);
+    assert!(text(&twice.stderr).contains("is named twice"), "{}", text(&twice.stderr));
+}
+
 #[test]
 fn one_pull_is_calibrated_with_a_word_on_beliefs() {
     let one = folder(1, 1.0, 1.0);

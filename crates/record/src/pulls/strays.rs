@@ -1,8 +1,9 @@
-//! What lies in a folder of measured pulls and is not read: its name may be misspelt, so that people are told.
+//! What lies in a folder of measured pulls and is not read, or not as it was meant: people are told.
 
 use super::TRACES_FOLDER;
-use gripgen_twin::MeasuredPull;
 use gripgen_twin::config::suggestion;
+use gripgen_twin::draw::Drawn;
+use gripgen_twin::{MeasuredPull, MeasuredPulls};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -42,6 +43,26 @@ pub(super) fn traces_of_nobody(
         n => format!("{n} files belong to no pull and are not read ({named}{more})"),
     };
     Some(format!("{}: {said}: {like}", folder.join(TRACES_FOLDER).display()))
+}
+
+/// Columns of unknown meaning that are words because of a few cells, where most cells are numbers.
+pub(super) fn words_among_numbers(path: &Path, pulls: &MeasuredPulls) -> Vec<String> {
+    let said = |name: &String| {
+        let words = pulls.pulls.iter().filter_map(|pull| match pull.covariates.extra.get(name) {
+            Some(Drawn::Text(word)) => Some((&pull.id, word)),
+            _ => None,
+        });
+        let (numbers, others): (Vec<_>, Vec<_>) =
+            words.partition(|(_, word)| word.trim().parse::<f64>().is_ok());
+        let (id, word) = others.first().filter(|_| numbers.len() > others.len())?;
+        Some(format!(
+            "{}: the column {name} is one of words, because `{word}` (pull {id}) is no number and {} others are: leave a cell empty where a \
+             value is missing",
+            path.display(),
+            numbers.len()
+        ))
+    };
+    pulls.extra.iter().filter_map(|column| said(&column.name)).collect()
 }
 
 /// Keys of a campaign file that mean nothing.
