@@ -96,6 +96,9 @@ mod tests {
         assert_eq!(taken(&many, Suspects::Include).0, 20);
         assert_eq!(taken(&of(2, 0, 18), Suspects::Screen).0, 18, "two pulls are no rig");
         assert_eq!(taken(&of(0, 0, 3), Suspects::Screen), (3, String::new()));
+        // What failed is none of them, whatever its reason.
+        let failed = vec![stands(Status::Failed, Behind::Rig); 4];
+        assert_eq!(taken(&[failed, of(2, 0, 14)].concat(), Suspects::Screen).0, 14);
         // A contact that sticks and slips makes most readings jump; a bump now and then is one of its pull.
         assert_eq!(taken(&of_three(1, 9, 1, 9), Suspects::Screen).0, 19);
         assert_eq!(taken(&of_three(1, 5, 1, 13), Suspects::Screen).0, 13);

@@ -1,8 +1,8 @@
 """python -m tests.blind.regret FOLDER [--json OUT.jsonl] [--only c000,c001]
 
 The expected error on unseen pulls, noise off, of worlds that have expected labels (`expected/` beside the truth): of the
-recalibrated baseline (`calibrate pulls`), of the twin that `diagnose -o` writes (environment GRIPGEN_BIN), and of a quadratic
-ridge on the table. One line of JSON a campaign, appended as it is done; then a table by world.
+recalibrated baseline (`calibrate pulls`), of the twin that `diagnose -o` writes (environment GRIPGEN_BIN), of a quadratic
+ridge on the table, and of a Gaussian process where scikit-learn is installed. One line of JSON a campaign, appended as it is done; then a table by world.
 """
 
 import argparse

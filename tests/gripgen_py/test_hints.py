@@ -62,7 +62,7 @@ def test_lengths_and_places_are_those_of_render():
 def test_what_python_itself_refuses_has_its_hint_too(run):
     sim = gg.Sim(images=False)
     said = hint_of(lambda: sim.pull(mu=0.2, grip_force_n=20)).split(" ")[0]
-    assert sim.pull(mu=0.2, grip_force_n=20, **{"part": said.split("'")[1]}).status == "slipped", said
+    assert sim.pull(mu=0.2, grip_force_n=20, part=said.split("'")[1]).status == "slipped", said
     assert "during_pull" in hint_of(gg.load, run, video=True)
     assert 'images = "clean"' in hint_of(gg.load, run, noise="off")
     for rank, world_size in ((2, 2), (-1, 2), (0, 0)):

@@ -238,6 +238,8 @@ fn a_damaged_run_is_exit_code_5() {
     let report: serde_json::Value = serde_json::from_slice(&bad.stdout).unwrap();
     assert_eq!((&report["ok"], &report["good_shards"]), (&false.into(), &3.into()));
     assert!(report["faults"][0].as_str().unwrap().contains("shard-00002.mcap"));
+    let repair = format!("verify {} --repair`", out.display());
+    assert!(text(&bad.stderr).contains(&repair), "{}", text(&bad.stderr));
 }
 
 /// What is broken is taken away, whatever is broken, and the same sweep gives the same bytes again; what is good is not touched.

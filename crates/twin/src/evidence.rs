@@ -144,7 +144,7 @@ pub enum FindingKind {
 }
 
 /// What may be behind a finding, the narrowest first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Behind {
     /// An accident of this pull.
     Pull,

@@ -124,7 +124,7 @@ fn learnt_beside(
         return None;
     }
     let mut strengths: Vec<UnknownCovariate> = Vec::new();
-    for (group, coefficients) in learnt.groups.iter().take(chosen.terms.learnt.len()) {
+    for (group, coefficients) in &left.learn(chosen.terms.learnt.len()).groups {
         let (covariate, strength) = (&curves[*group].name, left.strength(*group, coefficients));
         match strengths.iter_mut().find(|u| u.covariate == *covariate) {
             Some(known) => known.strength += strength,

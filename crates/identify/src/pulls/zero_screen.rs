@@ -4,8 +4,8 @@
 //! A zero wanders, and so do temperatures: two walks look alike without having to do with each other (Yule 1926). Differences from
 //! one trace to the next are held against each other, which leaves walks nearly white, and are shuffled. Differences of a zero that does
 //! not wander fall after they rose, as do those of a setting that is drawn anew each time, and look alike more often than shuffled ones: in a
-//! simulation of 17 traces and eight columns 2.4 % of such campaigns got a name in place of 1 %. So a column has to pass a second time
-//! with as much of the last value taken off as the zero itself keeps (prewhitening, Box and Jenkins 1976): 0.4 % then, of walks 1.2 %.
+//! simulation of 17 traces and eight columns 7 of 250 such campaigns got a name, where 1 % was meant. So a column has to pass a second time
+//! with as much of the last value taken off as the zero itself keeps (prewhitening, Box and Jenkins 1976): none then, and 3 of 250 walks.
 
 use super::context::Context;
 use super::data::Column;
