@@ -36,6 +36,28 @@ fn labels_say_how_noisy_their_sensor_is() {
     assert_eq!(found.verdict, Verdict::None, "{:?} {:?}", names(&found), found.unknown);
 }
 
+/// A sensor that ends above all levels but the strongest: pulls of the other levels know nothing of its end, so that errors on held-out
+/// levels do not fall, and the answer says on what it rests.
+#[test]
+fn the_end_of_a_range_that_one_level_reaches_is_no_news_to_the_others() {
+    let end = "[[effects]]\nname = \"sensor_saturation\"\nlimit_n = 23.0\n";
+    let measured = labels_alone(simulated(end, 60, &[]));
+    let beyond = measured.pulls.iter().filter(|p| p.max_pull_force_n > 22.5);
+    let forces_n: Vec<f64> = beyond.map(|p| p.grip_force_n).collect();
+    assert!(forces_n.len() > 2 && forces_n.iter().all(|force_n| *force_n > 79.0), "{forces_n:?}");
+    let found = diagnose(&measured, &[]).diagnosis;
+    assert_eq!(names(&found), ["sensor_saturation"], "{:?} {:?}", found.unknown, found.hints);
+    let error = found.error.as_ref().unwrap();
+    assert!(error.after.rmse_n < error.before.rmse_n.map(|e| 0.8 * e), "{error:?}");
+    let levels = error.by.levels.as_ref().unwrap();
+    assert!(levels.after.rmse_n > levels.before.rmse_n.map(|e| 0.9 * e), "{levels:?}");
+    assert!(
+        found.deciding.iter().any(|note| note.contains("one level of the grip force")),
+        "{:?}",
+        found.notes
+    );
+}
+
 /// A first pull that went wrong is an outlier. A conditioning that lasts for half a pull explains it, and nothing else.
 #[test]
 fn one_bad_pull_is_no_effect() {

@@ -1,7 +1,7 @@
 //! The verdict in one sentence.
 
 use super::bars::number;
-use gripgen_identify::{Channel, Diagnosis, HeldOutError, NamedEffect, Verdict, plain};
+use gripgen_identify::{Channel, HARDLY, Diagnosis, HeldOutError, NamedEffect, Verdict, plain};
 
 /// The unit of errors of a channel.
 pub(super) fn error_unit(channel: Channel) -> &'static str {
@@ -50,9 +50,13 @@ pub(super) fn sentence(d: &Diagnosis) -> String {
 fn named(effect: &NamedEffect) -> String {
     let rivals: Vec<&str> = effect.indistinguishable_from.iter().map(|r| r.name.as_str()).collect();
     let part = effect.part.as_ref().map(|p| format!(" on {p}")).unwrap_or_default();
+    let name = match effect.weight < HARDLY {
+        true => format!("perhaps {}{part} (weight {:.2})", effect.name, effect.weight),
+        false => format!("{}{part}", effect.name),
+    };
     match rivals.is_empty() {
-        true => format!("{}{part}", effect.name),
-        false => format!("{}{part} (which these data do not tell from {})", effect.name, list(&rivals)),
+        true => name,
+        false => format!("{name} (which these data do not tell from {})", list(&rivals)),
     }
 }
 

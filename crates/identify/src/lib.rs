@@ -52,7 +52,7 @@ pub use imprints::{
 };
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
-pub use plain::plain;
+pub use plain::{HARDLY, plain};
 pub use presses::{
     ActingEffect, MIN_DIAGNOSED_PRESSES, PRESS_ZONES, PredictPresses, PressCovariate, PressData,
     PressDiagnosis, PressPixels, PressTrial, PressValues, diagnose_presses, too_few_presses,

@@ -6,6 +6,9 @@ use gripgen_twin::effects::find;
 /// From this many times the noise of the camera on what is left of images is said.
 const FAR_ABOVE_NOISE: f64 = 10.0;
 
+/// Weight below which a name is hardly one.
+pub const HARDLY: f64 = 0.1;
+
 /// What a diagnosis says, without names of effects and parameters.
 pub fn plain(d: &Diagnosis) -> String {
     let mut text = match d.verdict {
@@ -41,7 +44,8 @@ fn named(d: &Diagnosis) -> String {
     for effect in &d.effects {
         let plainly = find(&effect.name).map_or(effect.name.as_str(), |spec| spec.plainly);
         let part = effect.part.as_ref().map_or(String::new(), |part| format!(" (Seen on {part} only.)"));
-        sentences.push(format!("{plainly}{part}"));
+        let perhaps = if effect.weight < HARDLY { "Perhaps: " } else { "" };
+        sentences.push(format!("{perhaps}{plainly}{part}"));
         if effect.parameters.values().any(|p| p.at_bound) {
             sentences.push(
                 "Its value stands at the end of what is fitted, so something else may look like it.".into(),
@@ -141,6 +145,10 @@ mod tests {
         assert!(!inside.effects[0].parameters["scale"].at_bound && inside.notes.is_empty());
         assert_eq!(inside.effects[0].weight, 0.95);
         assert!(at.effects[0].parameters["scale"].at_bound && at.notes[0].contains("0.8"), "{:?}", at.notes);
+        assert!(!plain(&inside).starts_with("Perhaps: "), "{}", plain(&inside));
+        let mut light = scaled(0.9);
+        light.effects[0].weight = 0.01;
+        assert!(plain(&light).starts_with("Perhaps: "), "{}", plain(&light));
         assert!(at.effects[0].weight <= 0.5 && plain(&at).contains("something else may look like it"));
         let neutral = scaled(1.0);
         assert!(!neutral.effects[0].parameters["scale"].at_bound, "a neutral value is no end");

@@ -26,6 +26,7 @@ pub mod model;
 mod naming;
 mod null;
 pub mod observe;
+mod one_level;
 mod paying;
 pub mod posterior;
 pub mod power;

@@ -10,6 +10,7 @@ use super::heldout::{
 };
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::naming::named;
+use super::one_level::of_one_level;
 use super::paying::{by_chance, paying};
 use super::posterior::of_diagnosis;
 use super::power::ScoreTest;
@@ -260,6 +261,9 @@ pub fn diagnose_pulls(
             by: ErrorsBy { levels: by(by_value(&force)), sessions: by(by_value(&session)) },
         }
     });
+    if let Some(note) = of_one_level(&diagnosis) {
+        diagnosis.decides(note);
+    }
     recalibrate(&mut diagnosis, &trusted(&search, &accepted));
     progress(0.92);
     let sd_n = label_sd_n(&before, &predictor.pulls(&before.model, &rows));

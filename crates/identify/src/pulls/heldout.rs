@@ -1,9 +1,11 @@
 //! The error on pulls that a fit has not seen.
 
+use super::candidates::Candidate;
 use super::context::Context;
 use super::fitting::Fitted;
 use super::learnt::learnt_again;
 use super::model::PullModel;
+use super::paying::UNFELT;
 use super::terms::Terms;
 use crate::diagnosis::{ErrorPair, HeldOutError};
 use crate::draws::Draws;
@@ -36,7 +38,7 @@ pub fn by_value(of: &[u64]) -> Vec<Vec<usize>> {
 
 /// Labels predicted for pulls by a fit that has not seen them. NaN where no fit was possible. With `hold_signals` what acts on
 /// signals, which traces show rather than labels, stays as all pulls gave it. Of a fit that is stated, in its context, these
-/// are the labels of the simulator to second order in what a fold changes of the model.
+/// are the labels of the simulator to second order in what a fold changes of the model. Without traces nothing is held.
 pub fn predicted(
     context: &Context<'_>,
     fitted: &Fitted,
@@ -45,19 +47,26 @@ pub fn predicted(
 ) -> Vec<f64> {
     let n = context.data.len();
     let result = Mutex::new(vec![f64::NAN; n]);
+    // Labels alone show what acts on signals too: then it is fitted again like everything else.
+    let hold_signals = hold_signals && !context.observations.is_empty();
     // What was learnt without a name is learnt again from the pulls of each fold.
     let learns = !fitted.terms.learnt.is_empty();
     let terms = &Terms { hold_signals, learnt: vec![], ..fitted.terms.clone() };
     context.predictor.for_each(held_out.len(), &|k| {
         let out = &held_out[k];
         let rows: Vec<usize> = (0..n).filter(|i| !out.contains(i)).collect();
-        let Some(found) = context.fit_again(&fitted.model, &unseen_forgotten(terms, &rows), &rows) else {
+        let (start, terms) = unfelt_forgotten(context, &fitted.model, unseen_forgotten(terms, &rows), &rows);
+        let Some(found) = context.fit_again(&start, &terms, &rows) else {
             return;
         };
         let found = if learns { learnt_again(context, found, &rows, terms.learnt_share) } else { found };
         let mut model = found.model;
         model.scatter = scatter(&model, found.likelihood.scale);
-        let labels = context.labels_n(&model, out);
+        // What the simulator says beyond the fast prediction was worked out with the effect that is forgotten.
+        let labels = match terms.stated && terms.effects.len() < fitted.terms.effects.len() {
+            true => context.predictor.labels_n(&model, out),
+            false => context.labels_n(&model, out),
+        };
         if let Ok(mut result) = result.lock() {
             out.iter().zip(&labels).for_each(|(&i, label_n)| result[i] = *label_n);
         }
@@ -78,6 +87,36 @@ fn unseen_forgotten(terms: &Terms, rows: &[usize]) -> Terms {
         }
     }
     terms
+}
+
+/// A model and its terms without the effects that no pull at `rows` feels, though they have a size: the end of a range that only the pulls
+/// which are held out reach.
+fn unfelt_forgotten(
+    context: &Context<'_>,
+    model: &PullModel,
+    mut terms: Terms,
+    rows: &[usize],
+) -> (PullModel, Terms) {
+    let mut start = model.clone();
+    let flat = |(c, _): &&(Candidate, Vec<f64>)| {
+        c.part.is_none() && c.spec.pulls.is_ok_and(|fit| fit.flat_at_neutral)
+    };
+    let own: Vec<Candidate> = terms.effects.iter().filter(flat).map(|(c, _)| c.clone()).collect();
+    for candidate in own {
+        // At its neutral value rather than without it: the same way of predicting.
+        let (spec, size) = (candidate.spec, candidate.size());
+        let mut neutral = start.clone();
+        let effects = neutral.effects.iter_mut().filter(|effect| effect.spec == spec);
+        effects.for_each(|effect| effect.values[size] = spec.parameters[size].neutral);
+        let labels = [&start, &neutral].map(|model| context.labels_n(model, rows));
+        let sd_n = context.deviations(&start, rows);
+        let felt = (0..rows.len()).any(|k| (labels[0][k] - labels[1][k]).abs() > UNFELT * sd_n[k]);
+        if !felt {
+            terms.effects.retain(|(c, _)| c.spec != spec);
+            start.effects.retain(|effect| effect.spec != spec);
+        }
+    }
+    (start, terms)
 }
 
 /// How a rival predicts pulls that no fit has seen, against the model without it.

@@ -155,7 +155,7 @@ fn neutral(fitted: &Fitted, spec: &'static gripgen_twin::effects::EffectSpec) ->
 }
 
 /// Share of a label's standard deviation that is not felt.
-const UNFELT: f64 = 0.1;
+pub(super) const UNFELT: f64 = 0.1;
 
 /// Why an effect that does nothing near its neutral value may be nothing at all: at the end of its interval towards that value no label
 /// is another. (A limit of 49 N is not excluded by pulls that end at 20 N.)
