@@ -42,6 +42,7 @@
 
 pub mod assets;
 mod bench;
+mod beyond;
 mod cache;
 mod calibrate;
 mod campaign;
@@ -90,11 +91,13 @@ mod sweep;
 mod try_part;
 mod twin_edits;
 mod twin_project;
+mod unmeasured;
 mod unvaried;
 mod version;
 mod view;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
+pub use beyond::{Beyond, beyond};
 pub use calibrate::{CalibratePullsError, calibrate_twin};
 pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use catalogue::{EffectCurve, effect_curve};
@@ -166,6 +169,7 @@ pub use try_part::{
     FrictionRange, GripTried, Holding, TriedPart, TryOptions, TryPartError, WorksAt, try_part,
 };
 pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, edited_twin_toml, write_twin};
+pub use unmeasured::unmeasured;
 pub use unvaried::{Unvaried, unvaried};
 pub use version::VERSION;
 pub use view::{ViewOptions, ViewPage, view_page};

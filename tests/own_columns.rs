@@ -53,6 +53,25 @@ fn a_column_of_ones_own_is_drawn_for_a_table_and_comes_back() {
     }
 }
 
+/// A column of one's own that the index would not show is refused rather than lost.
+#[test]
+fn a_column_with_the_name_of_one_of_every_sample_is_refused() {
+    let with = |name: &str| {
+        let sets = [
+            ("effects".to_string(), TABLE[8..].replace("humidity_pct", name)),
+            (format!("vary.{name}"), "[30, 60]".into()),
+        ];
+        Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets)
+            .map(|_| ())
+            .map_err(|e| e.to_string())
+    };
+    assert_eq!(with("humidity_pct"), Ok(()));
+    for name in ["mu", "index", "shard", "group", "slip_time_s", "failure"] {
+        let said = with(name).unwrap_err();
+        assert!(said.contains(&format!("every sample has a `{name}` of its own in index.csv")), "{said}");
+    }
+}
+
 #[test]
 fn a_diagnosis_finds_the_own_column_of_a_sweep() {
     let drawn = wet(&[

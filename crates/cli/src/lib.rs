@@ -25,7 +25,8 @@ mod progress;
 mod shell;
 
 use args::{CalibrateCommand, Cli, Command, RigCommand};
-use clap::Parser;
+use clap::error::{ContextKind, ContextValue};
+use clap::{CommandFactory, FromArgMatches};
 use std::ffi::OsString;
 
 pub use failure::Failure;
@@ -40,6 +41,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(e) => {
             // Clap prints help and versions to standard output, everything else to standard error.
             let _ = e.print();
+            if let Some(hint) = key_of_a_sweep(&e) {
+                eprintln!("\nhint: {hint}");
+            }
             if e.use_stderr() { 2 } else { 0 }
         }
     }
@@ -59,7 +63,41 @@ pub fn try_run(arguments: impl IntoIterator<Item = OsString>) -> Result<u8, Fail
 fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     output::remember_program(arguments.first());
-    Cli::try_parse_from(arguments)
+    let matches = with_negative_numbers(Cli::command()).try_get_matches_from(arguments)?;
+    Cli::from_arg_matches(&matches)
+}
+
+/// Keys of the file of a sweep that people take for options.
+const OF_SWEEPS: [&str; 10] = [
+    "samples",
+    "design",
+    "repetitions",
+    "seed",
+    "mechanics",
+    "backend",
+    "images",
+    "trace",
+    "shard_samples",
+    "twin",
+];
+
+/// What was meant by an option that is a key of the file of a sweep.
+fn key_of_a_sweep(error: &clap::Error) -> Option<String> {
+    let Some(ContextValue::String(typed)) = error.get(ContextKind::InvalidArg) else { return None };
+    let key = typed.trim_start_matches('-').replace('-', "_");
+    let key = key.split('=').next().filter(|key| OF_SWEEPS.contains(key))?;
+    Some(format!(
+        "{key} stands in the file of a sweep; `gripgen sweep`, `check` and `bench` take --set {key}=VALUE"
+    ))
+}
+
+/// `-0.3` is a number to be refused by who reads it, and no option of that name.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let takes = |arg: clap::Arg| match arg.get_action().takes_values() {
+        true => arg.allow_negative_numbers(true),
+        false => arg,
+    };
+    command.mut_args(takes).mut_subcommands(with_negative_numbers)
 }
 
 fn execute(cli: &Cli) -> Result<u8, Failure> {

@@ -3,13 +3,14 @@
 use crate::args::TalkArgs;
 use crate::commands::rig::load_rig;
 use crate::failure::Failure;
+use crate::shell;
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::PressSet;
 use gripgen::twin::Twin;
 use gripgen::{
     FoundCircles, Library, LoadPressesError, LoadPullsError, LoadSensorError, LoadedPulls, Location,
     PressGeometry, Suspects, is_pulls, load_presses, load_pulls_with, load_sensor, load_twin_document,
-    load_twin_sensor,
+    load_twin_sensor, unmeasured,
 };
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -49,6 +50,9 @@ pub fn suspects(include: bool) -> Suspects {
 
 /// What cannot be read as pulls.
 pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
+    if let Some(file) = paths.iter().find(|path| path.is_file()) {
+        return a_file(file);
+    }
     let known = paths.iter().all(|path| is_pulls(path));
     let failure = Failure::usage(e);
     if let Some(hint) = e.hint() {
@@ -60,16 +64,31 @@ pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
     failure.hint("measurements are a folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, a bag of ROS 2 with rosbag.toml, or a dataPack.npz")
 }
 
+/// A file where a folder of pulls is wanted.
+fn a_file(path: &Path) -> Failure {
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let hint = match path.file_name().is_some_and(|name| name == "pulls.csv") {
+        true => format!("name its folder: {}", shell::path(folder)),
+        false => {
+            "put the table into a folder of its own under the name pulls.csv, and name the folder".into()
+        }
+    };
+    Failure::usage(format!("{}: this is a file, the folder of the measurements is wanted", path.display()))
+        .hint(hint)
+}
+
 /// The pulls that a twin is to be fitted to. What people have to know of them is said; labels that no gel gives are refused, but
 /// those of a wrong unit not by who `answers` for them, as a diagnosis does.
 pub fn load_pulls_to_fit(
     paths: &[&Path],
+    twin: &Twin,
     suspects: Suspects,
     talk: &TalkArgs,
     answers: bool,
 ) -> Result<LoadedPulls, Failure> {
     each_once(paths)?;
     let mut loaded = load_pulls_with(paths, suspects).map_err(|e| no_pulls(paths, &e))?;
+    loaded.warnings.extend(unmeasured(twin, &loaded.pulls));
     let refused = loaded.implausible.take_if(|e| e.sign || !answers);
     say_warnings(&loaded, talk);
     match refused {

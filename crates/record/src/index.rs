@@ -2,14 +2,13 @@
 
 use crate::proto::gripgen_v1::{Sample, Status};
 use crate::stored::{sample_covariates, sample_view};
-use gripgen_twin::columns::{COLUMNS, find};
+use gripgen_twin::columns::{COLUMNS, END_OF_SAMPLE, PLACE_OF_SAMPLE, find};
 use std::sync::LazyLock;
 
 /// The fixed columns: the place of a sample, the columns of a pull, how it ended.
 pub static INDEX_COLUMNS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
     let of_pulls = COLUMNS.iter().filter(|c| c.indexed).map(|c| c.name);
-    let ended = ["max_pull_force_n", "slip_time_s", "mu", "group", "repetition", "failure"];
-    ["index", "shard", "in_shard", "status"].into_iter().chain(of_pulls).chain(ended).collect()
+    PLACE_OF_SAMPLE.into_iter().chain(of_pulls).chain(END_OF_SAMPLE).collect()
 });
 
 /// The name of a status in the index and on screens.

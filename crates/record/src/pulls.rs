@@ -65,7 +65,9 @@ pub fn read_judged_pulls(folder: &Path) -> Result<JudgedPulls, PullFolderError> 
     feed(&mut hash, PULLS_FILE, &bytes);
     let (header, mut warnings) = campaign_header(folder, &mut hash)?;
     let (mut found, mut standing) = read_table(&path, &bytes, &header)?;
-    warnings.extend(strays::words_among_numbers(&path, &found));
+    for look in [strays::words_among_numbers, strays::numbers_with_units, strays::nearly_known] {
+        warnings.extend(look(&path, &found));
+    }
     let mut after_n = vec![Vec::new(); found.pulls.len()];
     let traces = folder.join(TRACES_FOLDER);
     let stored = trace_files(&traces)?;

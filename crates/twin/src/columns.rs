@@ -17,6 +17,13 @@ use crate::draw::Drawn;
 use crate::{MeasuredPull, Values};
 use std::borrow::Cow;
 
+/// Columns of `index.csv` that are none of a pull: where a sample stands.
+pub const PLACE_OF_SAMPLE: [&str; 4] = ["index", "shard", "in_shard", "status"];
+
+/// Columns of `index.csv` that are none of a pull: how a sample ended.
+pub const END_OF_SAMPLE: [&str; 6] =
+    ["max_pull_force_n", "slip_time_s", "mu", "group", "repetition", "failure"];
+
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {

@@ -86,7 +86,7 @@ pub use profile::Staircase;
 pub use rounded::rounded;
 pub use sample::{ImprintSummary, Outcome, Pulled, Sample};
 pub use scenario::{Covariates, PullSettings, Scenario};
-pub use scenario_keys::{is_own_column, is_twin_key, pull_keys, scenario_keys};
+pub use scenario_keys::{can_be_drawn, is_own_column, is_twin_key, pull_keys, scenario_keys};
 pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep};
 pub use table::{TABLE_EFFECT, Table, TableTarget, table_factor, table_offset_n};
 pub use trace::{PullTrace, TraceRow};

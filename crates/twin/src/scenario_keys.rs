@@ -76,6 +76,17 @@ pub fn is_own_column(key: &str) -> bool {
     columns::find(key).is_none() && !key.starts_with("pull.") && !is_twin_key(key) && key != CAUSE_KEY
 }
 
+/// Whether `[vary]` takes a column of a table of pulls: all but those of the user's own that have the name of something else.
+pub fn can_be_drawn(key: &str) -> bool {
+    columns::find(key).is_some()
+        || (is_own_column(key) && !is_taken(key) && !key.contains(['.', '[', '"', ' ']))
+}
+
+/// Whether the name of a column of the user's own is that of a column which every sample has in `index.csv`.
+pub(crate) fn is_taken(key: &str) -> bool {
+    columns::PLACE_OF_SAMPLE.contains(&key) || columns::END_OF_SAMPLE.contains(&key)
+}
+
 /// The columns of the user's own that the tables of a twin depend on: sweeps draw them for these tables.
 pub(crate) fn own_columns(twin: &Twin) -> Vec<&str> {
     twin.tables.iter().flat_map(|table| table.columns()).filter(|name| is_own_column(name)).collect()

@@ -7,7 +7,7 @@ use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::record::{proto::gripgen_v1::Status, status_name};
 use gripgen::tactile::{LINEAR_PRESSURE_SHARE, SimdLevel};
-use gripgen::{Location, Plan, Project, Unvaried, plan, unvaried};
+use gripgen::{Beyond, Location, Plan, Project, Unvaried, beyond, plan, unvaried};
 use serde_json::json;
 use std::path::Path;
 
@@ -30,7 +30,7 @@ pub fn check(
     let plan = plan(&project, SimdLevel::best())?;
     let jobs = jobs.unwrap_or_else(cores).max(1);
     let failed: Vec<_> = plan.probes.iter().filter(|p| p.failure.is_some()).collect();
-    let warnings = [standing_still(&project), of_probes(&plan), of_plan(&plan)].concat();
+    let warnings = [of_columns(&project), of_probes(&plan), of_plan(&plan)].concat();
     if sink.wanted() {
         let probes: Vec<_> = plan
             .probes
@@ -94,9 +94,11 @@ pub(super) fn load(config: &ConfigArgs) -> Result<Project, Failure> {
     Ok(Project::load(&Location::parse(&config.config), &config.set)?)
 }
 
-/// What the twin depends on and the sweep leaves at one value, a sentence each.
-pub(super) fn standing_still(project: &Project) -> Vec<String> {
-    unvaried(project).iter().map(Unvaried::to_string).collect()
+/// What the twin depends on and the sweep leaves at one value, or beyond what the twin knows of it, a sentence each.
+pub(super) fn of_columns(project: &Project) -> Vec<String> {
+    let still = unvaried(project);
+    let beyond = beyond(project);
+    still.iter().map(Unvaried::to_string).chain(beyond.iter().map(Beyond::to_string)).collect()
 }
 
 /// What the samples that were tried out run into.

@@ -17,7 +17,7 @@ use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predic
 use gripgen::{
     LabelErrors, Location, PartRatio, PressReportText, compare_images, compare_pulls_with,
     find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, load_pulls_with,
-    load_twin_document, posterior_twins, press_report, pull_comparison_page, pull_ratios,
+    load_twin_document, posterior_twins, press_report, pull_comparison_page, pull_ratios, unmeasured,
 };
 use serde_json::{Value, json};
 
@@ -93,7 +93,8 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &[])?;
     let suspects = suspects(args.include_suspect);
-    let loaded = load_pulls_with(&measured, suspects).map_err(|e| no_pulls(&measured, &e))?;
+    let mut loaded = load_pulls_with(&measured, suspects).map_err(|e| no_pulls(&measured, &e))?;
+    loaded.warnings.extend(unmeasured(&twin, &loaded.pulls));
     say_warnings(&loaded, &args.talk);
     let library = load_library(&twin, &args.twin)?;
     let twin_at = Location::parse(&args.twin);

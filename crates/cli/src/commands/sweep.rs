@@ -39,7 +39,7 @@ pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
         watch.say(&format!("live: {}", page.url()));
         watch.page = Some(page);
     }
-    watch.warnings = check::standing_still(&project);
+    watch.warnings = check::of_columns(&project);
     for still in &watch.warnings {
         watch.say(&format!("warning: {still}"));
     }

@@ -56,7 +56,7 @@ fn only_what_varies_is_said_to_vary() {
     assert!(said.contains("varies: grip_angle_deg, grip_offset_mm, grip_pose\n"), "{said}");
 }
 
-/// Two slips of the hand have a hint that names what was meant.
+/// Slips of the hand have a hint that names what was meant.
 #[test]
 fn a_folder_and_a_key_without_its_section_have_a_hint() {
     let folder = tempfile::tempdir().unwrap();
@@ -71,6 +71,17 @@ fn a_folder_and_a_key_without_its_section_have_a_hint() {
         let (said, wanted) = (text(&refused.stderr), format!("'{}'", at.join("sweep.toml").display()));
         assert!(said.contains(&wanted), "{said}");
     }
+    let twin = at.join("twin.toml");
+    let refused = run(&["sweep", twin.to_str().unwrap()]);
+    assert_code(&refused, 2);
+    assert!(
+        text(&refused.stderr).contains("is a key of a twin; the file of a sweep names its twin"),
+        "{}",
+        text(&refused.stderr)
+    );
+    let refused = run(&["sweep", QUICKSTART, "--samples", "6"]);
+    assert_code(&refused, 2);
+    assert!(text(&refused.stderr).contains("take --set samples=VALUE"), "{}", text(&refused.stderr));
     let refused = run(&["check", QUICKSTART, "--set", "grip_force_n=20"]);
     assert_code(&refused, 2);
     assert!(text(&refused.stderr).contains("vary.grip_force_n"), "{}", text(&refused.stderr));

@@ -1,6 +1,7 @@
 //! What lies in a folder of measured pulls and is not read, or not as it was meant: people are told.
 
 use super::TRACES_FOLDER;
+use gripgen_twin::columns::{COLUMNS, Column, InTable};
 use gripgen_twin::config::suggestion;
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::{MeasuredPull, MeasuredPulls};
@@ -10,6 +11,10 @@ use std::path::Path;
 /// Keys of a campaign file.
 const KEYS: [&str; 6] =
     ["force_convention", "label_tolerance_n", "stop_mm", "feedback", "label_evidence", "pulls"];
+
+/// Units that people write behind numbers.
+const UNITS: [&str; 18] =
+    ["%", "°", "°C", "°F", "C", "K", "N", "mN", "kN", "mm", "cm", "m", "s", "ms", "min", "h", "Hz", "deg"];
 
 /// Files named at most.
 const NAMED: usize = 3;
@@ -60,6 +65,53 @@ pub(super) fn words_among_numbers(path: &Path, pulls: &MeasuredPulls) -> Vec<Str
              value is missing",
             path.display(),
             numbers.len()
+        ))
+    };
+    pulls.extra.iter().filter_map(|column| said(&column.name)).collect()
+}
+
+/// Columns of unknown meaning whose cells are numbers with a unit behind them.
+pub(super) fn numbers_with_units(path: &Path, pulls: &MeasuredPulls) -> Vec<String> {
+    let said = |name: &String| {
+        let mut units = pulls.pulls.iter().filter_map(|pull| match pull.covariates.extra.get(name) {
+            Some(Drawn::Text(word)) => Some(unit_of(word)),
+            _ => None,
+        });
+        let unit = units.next().flatten()?;
+        units.all(|other| other == Some(unit)).then(|| {
+            format!(
+                "{}: all cells of the column {name} end in `{unit}`, so that they are words and have no order: write the number alone",
+                path.display()
+            )
+        })
+    };
+    pulls.extra.iter().filter_map(|column| said(&column.name)).collect()
+}
+
+/// What stands behind the number of a cell, if it begins with one.
+fn unit_of(word: &str) -> Option<&str> {
+    let word = word.trim();
+    let unit = word.trim_start_matches(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+    let number = &word[..word.len() - unit.len()];
+    let unit = unit.trim();
+    // `2b` and `3-left` are names.
+    let is_unit =
+        unit.chars().all(|c| c.is_alphabetic() || "%°/".contains(c)) && number.parse::<f64>().is_ok();
+    (is_unit && UNITS.contains(&unit)).then_some(unit)
+}
+
+/// Columns of unknown meaning whose names are nearly those of columns that effects know.
+pub(super) fn nearly_known(path: &Path, pulls: &MeasuredPulls) -> Vec<String> {
+    let open = |column: &&Column| {
+        column.in_table == InTable::Covariate && pulls.recorded.iter().all(|name| name != column.name)
+    };
+    let said = |typed: &String| {
+        let plain: String =
+            typed.to_lowercase().chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+        let name = suggestion(&plain, COLUMNS.iter().filter(open).map(|column| column.name))?;
+        Some(format!(
+            "{}: no effect knows the column {typed}, it is one of your own: did you mean {name}?",
+            path.display()
         ))
     };
     pulls.extra.iter().filter_map(|column| said(&column.name)).collect()

@@ -165,6 +165,35 @@ fn what_is_not_read_and_may_be_misspelt_is_named() {
     assert!(other.contains("`operator`") && other.contains("known are force_convention,"), "{other}");
 }
 
+/// `45 %` is a word, and `Temperature_C` is nobody's column.
+#[test]
+fn a_unit_in_a_cell_and_a_name_that_is_nearly_known_are_told() {
+    let said = |columns: &str, cells: [&str; 3]| {
+        let rows: String = cells.iter().zip(0..).map(|(cell, i)| format!("p{i},g,1,1,{cell}\n")).collect();
+        let table = format!("pull_id,part,grip_force_n,max_pull_force_n,{columns}\n{rows}");
+        read_judged_pulls(folder(&table, &[]).path()).unwrap().warnings
+    };
+    for fine in ["humidity_pct", "table_mm", "operator", "batch"] {
+        assert_eq!(said(fine, ["45", "46", "47"]), Vec::<String>::new(), "{fine}");
+    }
+    for cells in
+        [["2b", "3a", "4c"], ["3-left", "4-left", "5-left"], ["45 %", "dry", "50 %"], ["a", "b", "c"]]
+    {
+        assert_eq!(said("batch", cells), Vec::<String>::new(), "{cells:?}");
+    }
+    let units = said("humidity_pct", ["45 %", "46%", "-47.5 %"]);
+    assert!(
+        units.len() == 1 && units[0].contains("all cells of the column humidity_pct end in `%`"),
+        "{units:?}"
+    );
+    for (typed, name) in [("Temperature_C", "temperature_c"), ("gel", "gel_id"), ("dwell-s", "dwell_s")] {
+        let near = said(typed, ["1", "2", "3"]);
+        assert!(near.len() == 1 && near[0].ends_with(&format!("did you mean {name}?")), "{typed}: {near:?}");
+    }
+    let taken = said("Temperature_C,temperature_c", ["1,20", "2,21", "3,22"]);
+    assert_eq!(taken, Vec::<String>::new(), "it has one already");
+}
+
 #[test]
 fn the_hash_covers_every_file_that_was_read() {
     let table = "pull_id,part,grip_force_n,max_pull_force_n\na,g,1,1\n";

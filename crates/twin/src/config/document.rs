@@ -2,6 +2,7 @@
 
 use super::keys::{assign, check_part, fill, get};
 use super::{ConfigError, TwinFile, suggestion};
+use crate::scenario_keys::is_twin_key;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -184,7 +185,11 @@ pub(crate) fn read_twin_table(table: &toml::Table) -> Result<TwinFile, ConfigErr
 fn explain(path: &str, message: &str) -> ConfigError {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     let candidates = quoted.get(1..).unwrap_or_default();
+    let of_a_twin = |typed: &str| candidates.contains(&"vary") && is_twin_key(typed);
     let hint = |typed: &str| match suggestion(typed, candidates.iter().copied()) {
+        _ if of_a_twin(typed) => {
+            format!("`{typed}` is a key of a twin; the file of a sweep names its twin: twin = \"twin.toml\"")
+        }
         Some(name) => format!("did you mean `{name}`?"),
         None => format!("known here: {}", candidates.join(", ")),
     };

@@ -101,7 +101,7 @@ impl Sweep {
         let mut scenario = self.blank();
         scenario.part = checked.parts.keys().next().cloned().unwrap_or_default();
         if scenario_keys::own_columns(checked).contains(&key) {
-            return Ok(());
+            return if scenario_keys::is_taken(key) { Err(KeyError::Bad(taken(key))) } else { Ok(()) };
         }
         scenario_keys::set(&mut scenario, key, value)?;
         match key {
@@ -172,6 +172,15 @@ fn check_direction(direction: [f64; 3], twin: &Twin) -> Result<(), ConfigError> 
         }
         _ => Ok(()),
     }
+}
+
+/// A column of the user's own that the index would not show.
+fn taken(key: &str) -> ConfigError {
+    let problem =
+        format!("every sample has a `{key}` of its own in index.csv, so that this one would not be recorded");
+    ConfigError::new(key, problem).hint(format!(
+        "give the column another name, in the pulls and in the table of the twin: `{key}_of_pull`"
+    ))
 }
 
 fn unknown_key(place: String, key: &str, own: &[&str]) -> ConfigError {
