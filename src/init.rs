@@ -253,6 +253,8 @@ pub struct PartOptions {
     pub scale_mm_per_unit: f64,
     /// Whether an open mesh is taken as it is.
     pub accept_open_mesh: bool,
+    /// Friction coefficient of the part, if it was measured: what the twin is written with. Grips are looked for without it.
+    pub mu: Option<f64>,
     /// Threads to try grips with; the result does not depend on them.
     pub threads: usize,
 }
@@ -357,13 +359,18 @@ pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<
     let Searched { name, bytes, mesh, mesh_words, proposed, .. } = searched;
     let (mesh_name, copy) = mesh_reference(path, folder);
     let (proposals, varied) = (&proposed.grips, &proposed.varied);
+    let mu_is = match options.mu {
+        Some(_) => "as it was given to `gripgen init --mu`",
+        None => "an assumption: measure it with a few pulls",
+    };
     let fill = |template: &str| {
         template
             .replace("{{part}}", &name)
             .replace("{{mesh}}", &mesh_name)
             .replace("{{scale_mm_per_unit}}", &format!("{:?}", options.scale_mm_per_unit))
             .replace("{{size}}", &size)
-            .replace("{{mu}}", &format!("{MU:?}"))
+            .replace("{{mu}}", &format!("{:?}", options.mu.unwrap_or(MU)))
+            .replace("{{mu_is}}", mu_is)
             .replace("{{imprint_mm3_per_n}}", &format!("{IMPRINT_MM3_PER_N:?}"))
             .replace("{{grips}}", &text::grips_toml(&name, proposals))
             .replace("{{grip_poses}}", &text::pose_list(proposals.len()))

@@ -34,8 +34,6 @@ pub struct TryOptions {
     pub grip: Option<usize>,
     /// Force of a jaw at which images are made.
     pub force_n: Option<f64>,
-    /// A friction coefficient that was measured.
-    pub mu: Option<f64>,
     /// A sensor file that stands in for the shipped one, in both jaws.
     pub sensor: Option<String>,
 }
@@ -149,7 +147,7 @@ pub fn try_part(path: &Path, options: &TryOptions) -> Result<TriedPart, TryPartE
     if let Some(asked_n) = options.force_n.filter(|&n| n > rig.gripper.max_force_n) {
         return Err(TryPartError::Force { asked_n, most_n: rig.gripper.max_force_n });
     }
-    if let Some(asked) = options.mu.filter(|&mu| mu > LARGEST_MU) {
+    if let Some(asked) = options.part.mu.filter(|&mu| mu > LARGEST_MU) {
         return Err(TryPartError::Friction { asked, most: LARGEST_MU });
     }
     let searched = search(path, options.part, rig)?;
@@ -159,7 +157,7 @@ pub fn try_part(path: &Path, options: &TryOptions) -> Result<TriedPart, TryPartE
         Some(one) => vec![one],
         None => (0..found).collect(),
     };
-    let mu = options.mu.map_or_else(FrictionRange::of_any_part, FrictionRange::measured);
+    let mu = options.part.mu.map_or_else(FrictionRange::of_any_part, FrictionRange::measured);
     let grips: Result<Vec<GripTried>, TryPartError> =
         chosen.into_iter().map(|grip| try_grip(&searched, grip, options, mu)).collect();
     let mut part = TriedPart {

@@ -9,7 +9,8 @@ use gripgen::{InitError, Location, NoGrip, PartOptions, PartStarter, Project, ge
 use nalgebra::{Point3, Vector3};
 use std::path::Path;
 
-const OPTIONS: PartOptions = PartOptions { scale_mm_per_unit: 1.0, accept_open_mesh: false, threads: 2 };
+const OPTIONS: PartOptions =
+    PartOptions { scale_mm_per_unit: 1.0, accept_open_mesh: false, mu: None, threads: 2 };
 
 /// Writes the part and what `init` makes of it.
 fn start(part: &SolidPart, folder: &Path) -> Result<PartStarter, InitError> {

@@ -6,10 +6,11 @@ use gripgen::twin::{Jaw, Outcome};
 use gripgen::{Location, PartOptions, Project, TryOptions, TryPartError, generate, part_starter, try_part};
 use std::path::Path;
 
-const PART: PartOptions = PartOptions { scale_mm_per_unit: 1.0, accept_open_mesh: false, threads: 2 };
+const PART: PartOptions =
+    PartOptions { scale_mm_per_unit: 1.0, accept_open_mesh: false, mu: None, threads: 2 };
 
 fn options() -> TryOptions {
-    TryOptions { part: PART, grip: None, force_n: None, mu: None, sensor: None }
+    TryOptions { part: PART, grip: None, force_n: None, sensor: None }
 }
 
 fn solid(name: &str) -> SolidPart {
@@ -114,14 +115,15 @@ fn what_is_said_to_fail_fails() {
 fn options_do_what_they_say() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = solid("l_bracket").write(folder.path());
-    let asked = TryOptions { grip: Some(0), force_n: Some(12.0), mu: Some(0.4), ..options() };
+    let part = PartOptions { mu: Some(0.4), ..PART };
+    let asked = TryOptions { part, grip: Some(0), force_n: Some(12.0), ..options() };
     let tried = try_part(&mesh, &asked).unwrap();
     assert_eq!((tried.grips.len(), tried.grips[0].force_n), (1, 12.0));
     let at = tried.grips[0].holding.iter().find(|h| h.grip_force_n == 12.0).unwrap();
     let [low, value, high] = *at.max_pull_force_n.as_ref().unwrap();
     assert!((value - 9.6).abs() < 0.05 && low > 0.9 * value && high < 1.1 * value, "{low} {value} {high}");
     assert_eq!(try_part(&mesh, &asked).unwrap().page, tried.page);
-    let one_thread = TryOptions { part: PartOptions { threads: 1, ..PART }, ..asked.clone() };
+    let one_thread = TryOptions { part: PartOptions { threads: 1, ..part }, ..asked.clone() };
     assert_eq!(try_part(&mesh, &one_thread).unwrap().picture, tried.picture);
     let none = try_part(&mesh, &TryOptions { grip: Some(9), ..options() });
     assert!(matches!(none, Err(TryPartError::NoSuchGrip { asked: 9, .. })));

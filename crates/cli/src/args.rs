@@ -4,6 +4,7 @@ mod identify;
 mod render;
 mod rig;
 mod try_part;
+mod values;
 mod view;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -15,6 +16,7 @@ pub use render::RenderArgs;
 pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigRehearseArgs, RigServeArgs, RigTeachArgs};
 use std::path::PathBuf;
 pub use try_part::TryArgs;
+use values::{friction, key_value, scale, seconds, slice};
 pub use view::ViewArgs;
 
 /// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.
@@ -119,8 +121,11 @@ pub struct InitArgs {
     /// Take a mesh with holes as it is.
     #[arg(long)]
     pub accept_open_mesh: bool,
+    /// Friction coefficient of the part, if it was measured: F / (2 F_G) of its pulls.
+    #[arg(long, value_name = "MU", value_parser = friction)]
+    pub mu: Option<f64>,
     /// A sweep over the benchmark: two hundred parts in twelve families, with grips that were tried.
-    #[arg(long, conflicts_with_all = ["scale_mm_per_unit", "accept_open_mesh"])]
+    #[arg(long, conflicts_with_all = ["scale_mm_per_unit", "accept_open_mesh", "mu"])]
     pub benchmark: bool,
     /// The first so many parts of each family only.
     #[arg(long, value_name = "N", requires = "benchmark", value_parser = clap::value_parser!(u64).range(1..))]
@@ -426,39 +431,6 @@ pub struct CompletionsArgs {
     pub shell: clap_complete::Shell,
 }
 
-fn key_value(text: &str) -> Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().into(), value.trim().into())),
-        _ => Err("write it as KEY=VALUE, for example parts.gear.mu=0.2".into()),
-    }
-}
-
-fn scale(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(mm) if mm.is_finite() && mm > 0.0 => Ok(mm),
-        Ok(mm) => Err(format!("{mm} mm is no scale, it must be more than 0")),
-        Err(_) => Err("a number of millimetres is needed, for example 25.4".into()),
-    }
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(s) if (0.01..=3600.0).contains(&s) => Ok(s),
-        _ => Err("a number of seconds from 0.01 to 3600 is needed".into()),
-    }
-}
-
-fn slice(text: &str) -> Result<(u64, u64), String> {
-    let parsed = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    match parsed {
-        Some((i, n)) if n > 0 && i <= n => Ok((i, n)),
-        Some((i, n)) => {
-            Err(format!("piece {i} of {n} does not exist; pieces count from 0 (or from 1) up to {n}"))
-        }
-        None => Err("write it as I/N, for example 3/8".into()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -467,17 +439,5 @@ mod tests {
     fn the_command_line_is_consistent() {
         use clap::CommandFactory;
         Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn values_are_checked_as_they_are_typed() {
-        assert_eq!(key_value("a.b = 3"), Ok(("a.b".into(), "3".into())));
-        assert!(key_value("nothing").is_err() && key_value("=3").is_err());
-        assert_eq!((slice("0/4"), slice("4/4")), (Ok((0, 4)), Ok((4, 4))));
-        assert_eq!(scale("25.4"), Ok(25.4));
-        assert!(["0", "-1", "nan", "inf", "x"].iter().all(|bad| scale(bad).is_err()));
-        for bad in ["5/4", "1/0", "1", "a/b"] {
-            assert!(slice(bad).is_err(), "{bad}");
-        }
     }
 }

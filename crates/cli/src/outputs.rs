@@ -133,6 +133,8 @@ impl Outputs {
                 format!("`gripgen {verb}` wrote it, and it was edited since")
             }
             Some(mark) => format!("`gripgen {}` wrote it, and this is `gripgen {verb}`", mark.verb),
+            // Files to start from carry no mark: they are there to be edited.
+            None if verb == "init" => "`gripgen init` did not write it, or it was edited since".into(),
             None => format!("`gripgen {verb}` did not write it"),
         };
         Err(Failure::usage(format!("{}: there is such a file: {found}", path.display()))

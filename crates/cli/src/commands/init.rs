@@ -25,6 +25,7 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
         let options = PartOptions {
             scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
             accept_open_mesh: args.accept_open_mesh,
+            mu: args.mu,
             threads: cores(),
         };
         let mut made = part_starter(&args.target, &folder, options).map_err(|e| {
@@ -35,6 +36,10 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
         (folder, files, std::mem::take(&mut made.summary), Some(made))
     } else {
         no_mesh(&args.target, &extension)?;
+        if args.mu.is_some() {
+            return Err(Failure::usage("--mu goes with a mesh: it is that of its part")
+                .hint("mu of each part stands in twin.toml"));
+        }
         if let Some(out) = &args.out {
             let problem = format!("--out {} goes with a mesh; a folder is its own target", out.display());
             return Err(Failure::usage(problem));

@@ -30,11 +30,11 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
         part: PartOptions {
             scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
             accept_open_mesh: args.accept_open_mesh,
+            mu: args.mu,
             threads: cores(),
         },
         grip: args.grip,
         force_n: args.force_n(),
-        mu: args.mu,
         sensor: args.sensor.clone(),
     };
     let tried = try_part(&args.mesh, &options).map_err(refused)?;
@@ -61,6 +61,9 @@ fn next(args: &TryArgs, stem: &str) -> String {
     }
     if args.accept_open_mesh {
         words.push("--accept-open-mesh".into());
+    }
+    if let Some(mu) = args.mu {
+        words.extend(["--mu".into(), mu.to_string()]);
     }
     words.extend(["-o".into(), shell::operand(stem)]);
     shell::command_line(&words)

@@ -61,7 +61,8 @@ fn write_open_box(path: &Path) {
 fn proposed_commands_run_as_they_are_copied() {
     let folder = tempfile::tempdir().unwrap();
     write_open_box(&folder.path().join("-it's a box.stl"));
-    let arguments = ["try", "./-it's a box.stl", "--accept-open-mesh", "--scale-mm-per-unit", "25.4"];
+    let arguments =
+        ["try", "./-it's a box.stl", "--accept-open-mesh", "--scale-mm-per-unit", "25.4", "--mu", "0.25"];
     let tried = gripgen().current_dir(folder.path()).args(arguments).output().unwrap();
     assert_code(&tried, 0);
     let shell = |line: &str| {
@@ -76,10 +77,13 @@ fn proposed_commands_run_as_they_are_copied() {
             .to_string()
     };
     let line = next(&tried);
+    assert!(line.contains("--mu 0.25"), "{line}");
     assert!(line.contains("--accept-open-mesh") && line.contains("--scale-mm-per-unit 25.4"), "{line}");
     let made = shell(&line);
     assert_code(&made, 0);
     assert!(folder.path().join("-it's a box/sweep.toml").exists());
+    let twin = std::fs::read_to_string(folder.path().join("-it's a box/twin.toml")).unwrap();
+    assert!(twin.contains("mu = 0.25 "), "{twin}");
     let line = next(&made);
     let check = line.split(", then ").next().unwrap();
     assert!(check.contains(" check "), "{line}");
@@ -94,6 +98,9 @@ fn friction_beyond_that_of_a_twin_is_refused() {
     std::fs::write(&mesh, gripgen::assets::get("parts/gear/part.stl").unwrap()).unwrap();
     let refused = run(&["try", mesh.to_str().unwrap(), "--mu", "150"]);
     assert_code(&refused, 2);
+    let below = run(&["try", mesh.to_str().unwrap(), "--mu", "-0.3"]);
+    assert_code(&below, 2);
+    assert!(text(&below.stderr).contains("a number above 0 is wanted"), "{}", text(&below.stderr));
     let said = text(&refused.stderr);
     assert!(said.contains("mu = 150") && said.contains("at most 5") && said.contains("hint:"), "{said}");
 }

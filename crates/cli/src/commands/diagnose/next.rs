@@ -9,6 +9,7 @@ use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::identify::{Channel, Diagnosis, Verdict};
 use gripgen::record::{RIG_SOURCE, RunFolder, campaign_toml};
+use gripgen::twin::can_be_drawn;
 use gripgen::{BASELINE_TWIN, Diagnosed, Location, NextPulls, Project, unvaried};
 use std::path::{Path, PathBuf};
 
@@ -54,21 +55,27 @@ pub fn write_next(
         return Ok(NextFile { path: None, said: Some(note) });
     }
     let text = next_toml(next, &args.measured, &args.twin, &sha256);
+    let said = (path.exists() && !is_for(&path, &sha256))
+        .then(|| format!("{} was a plan for other measurements and was replaced", path.display()));
     outputs.write(&path, Format::Toml, text.as_bytes())?;
     let own = diagnosed.diagnosis.effects.iter_mut().filter(|e| next.separates(&e.name));
     for separate in own.filter_map(|e| e.separate_by.as_mut()) {
         separate.campaign = Some(path.display().to_string());
     }
-    Ok(NextFile { path: Some(path), said: None })
+    Ok(NextFile { path: Some(path), said })
+}
+
+/// Whether a plan was made for these measurements.
+fn is_for(path: &Path, sha256: &str) -> bool {
+    let line = format!("# {}", made_for(sha256));
+    !sha256.is_empty()
+        && std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(|other| other == line))
 }
 
 /// What becomes of the next pulls of an earlier diagnosis where there are none to make.
 fn earlier(outputs: &Outputs, path: &Path, sha256: &str) -> Result<Option<String>, Failure> {
     let Some(mark) = mark_of(path).filter(|mark| mark.verb == outputs.verb()) else { return Ok(None) };
-    let line = format!("# {}", made_for(sha256));
-    let same = !sha256.is_empty()
-        && std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(|other| other == line));
-    let why = match (mark.whole, same) {
+    let why = match (mark.whole, is_for(path, sha256)) {
         (false, _) => "somebody edited it",
         (_, false) => "it was not planned for these measurements as they are",
         _ => {
@@ -109,7 +116,7 @@ pub fn next_steps(args: &DiagnoseArgs, diagnosed: &Diagnosed, next: Option<&Path
     }
     let found = matches!(diagnosis.verdict, Verdict::Effect | Verdict::Unknown);
     match &args.out {
-        Some(out) if found => steps.push(sweep_step(args, out)),
+        Some(out) if found => steps.push(sweep_step(args, out, diagnosis)),
         None if found => steps.push(("Write the corrected twin:".into(), again(args))),
         // Where pulls are planned already, another campaign is none of the next steps.
         _ if next.is_none() && plans_pulls(diagnosis) => {
@@ -155,7 +162,7 @@ fn rig_of(args: &DiagnoseArgs, last: &Path, most_n: f64) -> Option<String> {
 }
 
 /// A sweep with the corrected twin: that beside the twin, or the shipped one for a shipped twin, otherwise in words.
-fn sweep_step(args: &DiagnoseArgs, out: &Path) -> (String, String) {
+fn sweep_step(args: &DiagnoseArgs, out: &Path, diagnosis: &Diagnosis) -> (String, String) {
     let text = "Make training data with the corrected twin";
     let set = format!("twin={}", out.display());
     let sweep = match Location::parse(&args.twin) {
@@ -169,11 +176,14 @@ fn sweep_step(args: &DiagnoseArgs, out: &Path) -> (String, String) {
         Some(sweep) => {
             let out_folder = unused(Path::new("runs/corrected"));
             let mut words = vec![program(), "sweep", &sweep, "--set", &set];
-            let ranges = columns_to_vary(&sweep, out);
+            let project =
+                Project::load(&Location::parse(&sweep), &[("twin".into(), out.display().to_string())]).ok();
+            let ranges = project.as_ref().map(columns_to_vary).unwrap_or_default();
+            let others = project.as_ref().map(|project| not_pulled(project, diagnosis)).unwrap_or_default();
             words.extend(ranges.iter().flat_map(|range| ["--set", range]));
             let out = shell::path(&out_folder);
             words.extend(["-o", &out]);
-            (format!("{text}:"), shell::command_line(&words))
+            (format!("{text}{others}:"), shell::command_line(&words))
         }
         None => {
             let set = shell::command_line(&["--set", &set]);
@@ -182,12 +192,27 @@ fn sweep_step(args: &DiagnoseArgs, out: &Path) -> (String, String) {
     }
 }
 
-/// Columns that the corrected twin depends on and the sweep leaves at one value: where the twin knows them.
-fn columns_to_vary(sweep: &str, twin: &Path) -> Vec<String> {
-    let twin = [("twin".to_string(), twin.display().to_string())];
-    let Ok(project) = Project::load(&Location::parse(sweep), &twin) else { return Vec::new() };
-    let still = unvaried(&project).into_iter();
-    still.filter_map(|column| Some(format!("vary.{}={}", column.key, column.values?))).collect()
+/// Columns that the corrected twin depends on and the sweep leaves at one value: where the twin knows them, and the sweep takes them.
+fn columns_to_vary(project: &Project) -> Vec<String> {
+    let still = unvaried(project).into_iter();
+    let drawn = still.filter(|column| can_be_drawn(&column.key));
+    drawn.filter_map(|column| Some(format!("vary.{}={}", column.key, column.values?))).collect()
+}
+
+/// What the sweep draws and nobody pulled: the pulls say nothing of its friction.
+fn not_pulled(project: &Project, diagnosis: &Diagnosis) -> String {
+    let pulled = |part: &str| diagnosis.baseline.contains_key(&format!("parts.{part}.mu"));
+    let (own, others): (Vec<&str>, Vec<&str>) =
+        project.sweep.drawn_parts().into_iter().partition(|part| pulled(part));
+    match (own.as_slice(), others.len()) {
+        ([], _) | (_, 0) => String::new(),
+        (own, 1) => {
+            format!(" (the pulls were of {}; {} keeps the mu that it had)", own.join(", "), others[0])
+        }
+        (own, _) => {
+            format!(" (the pulls were of {}; the other parts keep the mu that they had)", own.join(", "))
+        }
+    }
 }
 
 /// The same diagnosis again, with the twin written.

@@ -104,6 +104,33 @@ fn a_column_of_ones_own_is_drawn_by_the_next_sweep() {
     );
 }
 
+/// A proposed command is one that runs: what no sweep takes is not among its ranges. Parts that nobody pulled are told.
+#[test]
+fn the_next_sweep_is_one_that_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("d.toml");
+    let table = |name: &str| {
+        format!("{{name=\"table\",covariate=\"{name}\",x=[30,60],factor=[1.0,0.7],physical=false}}")
+    };
+    let effects = format!("[{}, {}, {}]", table("mu"), table("parts.gear.mu"), table("humidity_pct"));
+    let baseline = Location::parse(BASELINE_TWIN);
+    let text =
+        gripgen::edited_twin_toml(&baseline, &[("effects".into(), effects)], &Default::default(), &out);
+    std::fs::write(&out, text.unwrap()).unwrap();
+    let args = typed(&["lab", "-o", out.to_str().unwrap()]);
+    let mut found = answered(Verdict::Unknown, &[]);
+    let (text, command) = first(&args, &found, None);
+    assert!(command.matches("vary.").count() == 1 && command.contains("vary.humidity_pct="), "{command}");
+    assert_eq!(text, "Make training data with the corrected twin:");
+    let mu = gripgen::identify::ParameterEstimate::new(0.2, (0.18, 0.22), "1");
+    found.diagnosis.baseline.insert("parts.gear.mu".into(), mu);
+    let (text, _) = first(&args, &found, None);
+    assert_eq!(
+        text,
+        "Make training data with the corrected twin (the pulls were of gear; the other parts keep the mu that they had):"
+    );
+}
+
 #[test]
 fn pulls_of_no_rig_are_a_list_and_no_other_campaign_is_offered() {
     let mut few = answered(Verdict::Insufficient, &["3 pulls are too few"]);
@@ -151,4 +178,20 @@ fn an_earlier_plan_goes_only_with_its_own_measurements() {
     assert!(said().starts_with("removed ") && !next.exists());
     std::fs::write(&next, "pulls = []\n").unwrap();
     assert!(said().is_empty() && next.is_file(), "somebody's own");
+}
+
+/// A plan for other measurements that a new one takes the place of is told.
+#[test]
+fn a_plan_that_is_replaced_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("d.toml");
+    let args = typed(&["lab", "-o", out.to_str().unwrap()]);
+    let outputs = Outputs::of("diagnose", false);
+    let said = |sha256: &str| {
+        let mut found = answered(Verdict::Effect, &[]);
+        (found.diagnosis.data.sha256, found.next) = (sha256.into(), Some(plan()));
+        write_next(&args, &outputs, &mut found).unwrap().said.unwrap_or_default()
+    };
+    assert_eq!((said("ab12"), said("ab12")), (String::new(), String::new()));
+    assert!(said("cd34").ends_with("next.toml was a plan for other measurements and was replaced"));
 }
