@@ -7,7 +7,7 @@
 use crate::project::Project;
 use crate::sweep::{encode_options, guarded, noise_rgb};
 use gripgen_record::proto::gripgen_v1::Status;
-use gripgen_record::{EncodeOptions, PictureError, encode};
+use gripgen_record::{EncodeOptions, Film, PictureError, encode};
 use gripgen_tactile::SimdLevel;
 use gripgen_tactile::gpu::GpuError;
 use gripgen_twin::config::{ImageStorage, TraceStorage};
@@ -29,6 +29,8 @@ pub struct StreamOptions {
     pub jobs: usize,
     /// Samples that are kept at most.
     pub ahead: usize,
+    /// Whether samples come with the films of their pulls, where the sweep has films.
+    pub films: bool,
 }
 
 /// A sample of a sweep, as its data set has it.
@@ -42,6 +44,8 @@ pub struct StreamedSample {
     pub row: Vec<String>,
     /// Both images, where the sweep makes some and the sample did not fail.
     pub images: Option<PerJaw<TactileImage>>,
+    /// The film of its pull, where it was asked for and there is one.
+    pub film: Option<Film>,
 }
 
 /// Why a stream ends before its end.
@@ -178,8 +182,8 @@ impl Shared {
     }
 
     fn make(&self, index: u64) -> Made {
-        // A film is what a data set is for: batches have none.
-        let sample = guarded(&self.project, index, SimdLevel::best()).0;
+        // Frames are made when they are asked for.
+        let (sample, film) = guarded(&self.project, index, SimdLevel::best());
         let gpu = self.project.gpu().map_err(Arc::new)?;
         if let Some(fault) = gpu.and_then(|gpu| gpu.fault()) {
             return Err(Arc::new(fault).into());
@@ -208,6 +212,11 @@ impl Shared {
                 PixelNoise { key, sd_rgb: sd_rgb[jaw] }.add(&mut images[jaw].rgb);
             }
         }
-        Ok(StreamedSample { index, status: encoded.status, row, images })
+        let film = film.filter(|_| self.options.films).and_then(|film| {
+            // It ends where a sweep ends it.
+            let frames = (0..film.len()).map_while(|number| film.frame(number).ok());
+            Film::as_read(frames, film.incipient_slip_s, film.whole_slip_s)
+        });
+        Ok(StreamedSample { index, status: encoded.status, row, images, film })
     }
 }

@@ -1,7 +1,7 @@
 //! The verdict in one sentence.
 
 use super::bars::number;
-use gripgen_identify::{Channel, HARDLY, Diagnosis, HeldOutError, NamedEffect, Verdict, plain};
+use gripgen_identify::{Channel, Diagnosis, HARDLY, HeldOutError, NamedEffect, Verdict, plain};
 
 /// The unit of errors of a channel.
 pub(super) fn error_unit(channel: Channel) -> &'static str {

@@ -42,6 +42,23 @@ def test_a_stream_is_the_run_without_its_folder(run):
     assert [len(labels) for _, labels in stream(drop_last=True)] == [5, 5, 5]
 
 
+def test_films_come_without_a_folder(tmp_path):
+    filmed = {**SMALL, "images": {"storage": "clean", "during_pull": {"frames": 4}}, "samples": 5, "design": "random"}
+    gg.sweep(CONFIG, tmp_path / "run", jobs=2, set=filmed)
+    ds = gg.load(tmp_path / "run", video=True)
+    found = [film for batch in stream(set=filmed, video=True, batch_size=2) for film in batch.films]
+    assert len(found) == len(ds) and any(film is not None for film in found)
+    for i, film in enumerate(found):
+        stored = ds.film(i)
+        assert (film is None) == (stored is None)
+        for name, value in vars(film).items() if film else ():
+            other = getattr(stored, name)
+            assert value.tobytes() == other.tobytes() if isinstance(value, np.ndarray) else value == other, name
+    with pytest.raises(gg.ConfigError, match="its pulls are not filmed") as caught:
+        stream(video=True)
+    assert "during_pull" in caught.value.hint
+
+
 def test_ranks_and_workers_share_the_sweep_and_lose_nothing(run):
     labels = gg.load(run).labels
     found = {}

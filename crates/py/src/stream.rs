@@ -1,6 +1,6 @@
 //! `_core.Stream`: batches of a sweep that are made while somebody trains on them.
 
-use crate::{error, values};
+use crate::{error, film, values};
 use gripgen::record::proto::gripgen_v1::Status;
 use gripgen::record::{Table, extra_columns, status_name};
 use gripgen::twin::config::ImageStorage;
@@ -23,15 +23,23 @@ pub struct Stream {
     kept: Vec<String>,
     /// Width and height of the images.
     size_px: Option<(u32, u32)>,
+    /// Whether batches have films.
+    films: bool,
 }
 
-/// Images, labels, columns, and how many samples were read for it.
-type Batch<'py> = (Option<Bound<'py, PyArray5<u8>>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyDict>, u64);
+/// Images, labels, columns, films, and how many samples were read for it.
+type Batch<'py> = (
+    Option<Bound<'py, PyArray5<u8>>>,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyDict>,
+    Option<Bound<'py, PyList>>,
+    u64,
+);
 
 #[pymethods]
 impl Stream {
     #[new]
-    #[pyo3(signature = (config, overrides = None, first = 0, every = 1, jobs = 1, ahead = 64, status = None))]
+    #[pyo3(signature = (config, overrides = None, first = 0, every = 1, jobs = 1, ahead = 64, status = None, films = false))]
     #[expect(clippy::too_many_arguments, reason = "keywords of a constructor")]
     fn new(
         py: Python<'_>,
@@ -42,6 +50,7 @@ impl Stream {
         jobs: usize,
         ahead: usize,
         status: Option<Vec<String>>,
+        films: bool,
     ) -> PyResult<Self> {
         let sets = values::overrides(overrides)?;
         let loaded = py.detach(|| Project::load(&Location::parse(config), &sets));
@@ -54,15 +63,15 @@ impl Stream {
                 Some((grid.width_px as u32, grid.height_px as u32))
             }
         };
-        let options = StreamOptions { first, every, jobs, ahead };
+        let options = StreamOptions { first, every, jobs, ahead, films };
         let samples = SampleStream::new(project.clone(), options);
         let kept = status.unwrap_or_else(|| {
             [Status::Slipped, Status::NoContact].map(status_name).map(Into::into).to_vec()
         });
-        Ok(Self { project, samples, kept, size_px })
+        Ok(Self { project, samples, kept, size_px, films })
     }
 
-    /// Number of samples of the sweep, its seed, the hash of its configuration, and the columns of its rows.
+    /// Number of samples of the sweep, its seed, the hash of its configuration, the columns of its rows, and whether its pulls are filmed.
     #[getter]
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = PyDict::new(py);
@@ -71,6 +80,7 @@ impl Stream {
         found.set_item("config_sha256", &self.project.config_sha256)?;
         let columns: Vec<String> = self.table(&[]).columns().iter().map(|(name, _)| name.clone()).collect();
         found.set_item("columns", columns)?;
+        found.set_item("filmed", self.project.sweep.film.is_some())?;
         Ok(found)
     }
 
@@ -80,8 +90,8 @@ impl Stream {
         self.size_px
     }
 
-    /// The next rows that are kept, fewer at the end of the sweep: uint8[B, 2, H, W, 3], float32[B], the columns of these rows, and how many
-    /// samples were read for them.
+    /// The next rows that are kept, fewer at the end of the sweep: uint8[B, 2, H, W, 3], float32[B], the columns of these rows, their films as dicts of
+    /// arrays (None where the stream has none, or a pull), and how many samples were read for them.
     fn batch<'py>(&self, py: Python<'py>, size: usize, columns: Vec<String>) -> PyResult<Batch<'py>> {
         let (mut found, mut read): (Vec<StreamedSample>, u64) = (Vec::new(), 0);
         let mut looked = Instant::now();
@@ -117,7 +127,11 @@ impl Stream {
             }
         }
         let images = self.size_px.map(|size_px| pixels(py, &found, size_px)).transpose()?;
-        Ok((images, PyArray1::from_vec(py, labels), picked, read))
+        let films = self.films.then(|| -> PyResult<_> {
+            let each = found.iter().map(|s| s.film.as_ref().map(|f| film::arrays(py, f)).transpose());
+            PyList::new(py, each.collect::<PyResult<Vec<_>>>()?)
+        });
+        Ok((images, PyArray1::from_vec(py, labels), picked, films.transpose()?, read))
     }
 }
 

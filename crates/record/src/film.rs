@@ -86,6 +86,38 @@ pub struct Film {
     pub whole_slip_s: Option<f64>,
 }
 
+impl Film {
+    /// A film of these frames as it comes back from a shard; `None` without any.
+    pub fn as_read(
+        frames: impl IntoIterator<Item = PerJaw<FilmFrame>>,
+        incipient_slip_s: Option<f64>,
+        whole_slip_s: Option<f64>,
+    ) -> Option<Self> {
+        let rounded = |f: FilmFrame| FilmFrame {
+            displacement_m: f.displacement_m * 1e3 * 1e-3,
+            cells: f.cells.iter().map(cell_as_read).collect(),
+            markers_px: f.markers_px.iter().map(|m| m.map(|x| f64::from(x as f32))).collect(),
+            ..f
+        };
+        let frames: Vec<_> = frames
+            .into_iter()
+            .map(|both| PerJaw { left: rounded(both.left), right: rounded(both.right) })
+            .collect();
+        (!frames.is_empty()).then_some(Self { frames, incipient_slip_s, whole_slip_s })
+    }
+}
+
+/// Numbers of a cell are stored in millimetres, with 24 bits.
+fn cell_as_read(cell: &CellShear) -> CellShear {
+    let length_m = |x_m: f64| f64::from((x_m * 1e3) as f32) * 1e-3;
+    CellShear {
+        shear_m: length_m(cell.shear_m),
+        slip_m: length_m(cell.slip_m),
+        force_n: f64::from(cell.force_n as f32),
+        slipped: cell.slipped,
+    }
+}
+
 impl ShardReader {
     /// Whether its samples may have films.
     pub fn has_film(&self) -> bool {

@@ -21,7 +21,7 @@ from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, di
 from .policies import Staircase
 from .rendering import Rendered, render
 from .simulation import Pull, Sim
-from .streams import Stream, StreamBatch, stream
+from .streams import FilmBatch, Stream, StreamBatch, stream
 from .sweeps import SweepSummary, sweep
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "DataError",
     "Dataset",
     "Film",
+    "FilmBatch",
     "Diagnosis",
     "GripgenError",
     "Pull",

@@ -73,6 +73,7 @@ class Stream:
         jobs: int = 1,
         ahead: int = 64,
         status: Sequence[str] | None = None,
+        films: bool = False,
     ) -> Stream: ...
     @property
     def info(self) -> dict[str, Any]: ...
@@ -80,7 +81,7 @@ class Stream:
     def image_size_px(self) -> tuple[int, int] | None: ...
     def batch(
         self, size: int, columns: Sequence[str]
-    ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32], dict[str, Any], int]: ...
+    ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32], dict[str, Any], list[dict[str, Any] | None] | None, int]: ...
 
 @final
 class Simulator:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import _core, checks
 from .dataset import LABELLED
+from .films import Film
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,6 +27,17 @@ class StreamBatch(NamedTuple):
     columns: dict[str, NDArray[np.float64] | list[str]]
 
 
+class FilmBatch(NamedTuple):
+    """A batch with the films of its pulls, and columns of its rows."""
+
+    #: As those of `StreamBatch`.
+    images: NDArray[np.uint8] | None
+    max_pull_force_n: NDArray[np.float32]
+    columns: dict[str, NDArray[np.float64] | list[str]]
+    #: The film of each pull; None where there is none (no contact).
+    films: list[Film | None]
+
+
 def stream(
     config: str | os.PathLike[str],
     *,
@@ -38,6 +50,7 @@ def stream(
     jobs: int | None = None,
     ahead: int | None = None,
     drop_last: bool = False,
+    video: bool = False,
 ) -> Stream:
     """The samples of a sweep as batches, made by `jobs` threads while they are read.
 
@@ -46,6 +59,9 @@ def stream(
     threads. Each of `world_size` ranks gets every so manieth sample. At most `ahead` samples (two batches if None) are kept,
     so that memory is bounded and a slow reader slows the threads down. One pass is one sweep: its length is `samples` of the
     configuration, which `set={"samples": 10**9}` overrides.
+
+    With `video=True` a batch is a `FilmBatch`: a film of each pull too, of a sweep with `[images] during_pull`, as `gg.load(..., video=True)`
+    gives it. A film of 24 frames takes 40 MB: choose `batch_size` and `ahead` (one batch if None) by that.
 
     `state_dict` and `load_state_dict` continue where a training stopped.
 
@@ -61,10 +77,14 @@ def stream(
         rank=checks.own_rank(rank, world_size),
         world_size=world_size,
         jobs=workers,
-        ahead=max(2 * size, 2 * workers) if ahead is None else ahead,
+        ahead=(max(size, workers) if video else max(2 * size, 2 * workers)) if ahead is None else ahead,
         drop_last=drop_last,
+        video=video,
     )
     # A configuration that cannot be is told now.
+    if video and not found.info["filmed"]:
+        hint = "films are made by a sweep with [images] during_pull = { frames = 24 }"
+        raise checks.refusal(f"{config}: its pulls are not filmed", hint)
     known = found.info["columns"]
     for name in columns:
         if name not in known:
@@ -86,6 +106,7 @@ class Stream:
     jobs: int
     ahead: int
     drop_last: bool
+    video: bool = False
     #: Samples of this rank that were read in this pass.
     _read: int = 0
     # Asked of the configuration once.
@@ -93,7 +114,7 @@ class Stream:
 
     @property
     def info(self) -> dict[str, Any]:
-        """Of the sweep: samples, seed, config_sha256, columns."""
+        """Of the sweep: samples, seed, config_sha256, columns, filmed."""
         if self._info is None:
             # Beyond the end of any sweep: nothing is made.
             core = _core.Stream(self.config, self.set, 2**63, 1, 1, 1)
@@ -121,16 +142,20 @@ class Stream:
                 )
         self._read = int(state["read"])
 
-    def __iter__(self) -> Iterator[tuple[NDArray[np.uint8] | None, NDArray[np.float32]] | StreamBatch]:
+    def __iter__(self) -> Iterator[tuple[NDArray[np.uint8] | None, NDArray[np.float32]] | StreamBatch | FilmBatch]:
         first = self.rank + self._read * self.world_size
         core = _core.Stream(
-            self.config, self.set, first, self.world_size, self.jobs, self.ahead, list(self.status)
+            self.config, self.set, first, self.world_size, self.jobs, self.ahead, list(self.status), self.video
         )
         while True:
-            images, labels, columns, read = core.batch(self.batch_size, list(self.columns))
+            images, labels, columns, films, read = core.batch(self.batch_size, list(self.columns))
             if len(labels) == 0 or (self.drop_last and len(labels) < self.batch_size):
                 break
             # The batch that is handed out counts as read: a state that is taken after it begins with the next.
             self._read += read
-            yield StreamBatch(images, labels, columns) if self.columns else (images, labels)
+            if films is not None:
+                made = [None if arrays is None else Film(**arrays) for arrays in films]
+                yield FilmBatch(images, labels, columns, made)
+            else:
+                yield StreamBatch(images, labels, columns) if self.columns else (images, labels)
         self._read = 0

@@ -84,7 +84,8 @@ class PullIterableDataset(_TorchIterableDataset):
 
 
 class PullStream(_TorchIterableDataset):
-    """Batches of `gg.stream` as tensors: `(images, labels)`, or with columns a dictionary of columns as the third. Give it
+    """Batches of `gg.stream` as tensors: `(images, labels)`, or with columns a dictionary of columns as the third; with
+    films they are a list of `Film` after it. Give it
     to a loader with `batch_size=None`; the samples are shared out over its worker processes, each with `jobs` threads.
     `num_workers=0` is usually faster: the threads need no interpreter, and nothing is sent between processes."""
 
