@@ -18,11 +18,15 @@ pub(crate) fn arrays<'py>(py: Python<'py>, film: &Film) -> PyResult<Bound<'py, P
     let (width, height) = (first.left.image.width_px as usize, first.left.image.height_px as usize);
     // Left jaw first, as everywhere.
     let all = || film.frames.iter().flat_map(|both| [&both.left, &both.right]);
-    let images: Vec<u8> = all().flat_map(|f| f.image.rgb.iter().copied()).collect();
+    let pixels = 2 * frames * height * width;
+    let mut images: Vec<u8> = Vec::with_capacity(3 * pixels);
+    all().for_each(|f| images.extend_from_slice(&f.image.rgb));
     found.set_item("images", PyArray::from_vec(py, images).reshape([frames, 2, height, width, 3])?)?;
-    let cells: Vec<u8> = all().flat_map(|f| f.cell_of_px.iter().copied()).collect();
+    let mut cells: Vec<u8> = Vec::with_capacity(pixels);
+    all().for_each(|f| cells.extend_from_slice(&f.cell_of_px));
     found.set_item("cells", PyArray::from_vec(py, cells).reshape([frames, 2, height, width])?)?;
-    let depth: Vec<f32> = all().flat_map(|f| f.depth_um.iter().map(|&um| f32::from(um) * 1e-3)).collect();
+    let mut depth: Vec<f32> = Vec::with_capacity(pixels);
+    all().for_each(|f| depth.extend(f.depth_um.iter().map(|&um| f32::from(um) * 1e-3)));
     found.set_item("depth_mm", PyArray::from_vec(py, depth).reshape([frames, 2, height, width])?)?;
     let state = |f: &FilmFrame| match f.state() {
         Some(SlipState::Stick) => 0_u8,
