@@ -16,6 +16,7 @@ pub(crate) use document::read_twin_table;
 pub use document::{Document, Place};
 pub(crate) use draw_file::read as read_vary;
 pub use images_file::{Compression, DuringPullFile, ImageStorage, ImagesFile};
+pub use keys::{DEFAULTED_SECTIONS, is_twin_key};
 pub(crate) use keys::{assign, check_part, get};
 pub use sweep_file::{
     Backend, DesignFile, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,

@@ -65,6 +65,7 @@ pub mod values;
 
 pub use backbone::Backbone;
 pub use campaign::{Campaign, PlannedPull, PullKind};
+pub use config::{DEFAULTED_SECTIONS, is_twin_key};
 pub use film::{CameraStamp, CellShear, FilmFrame, FilmPace, SlipState};
 pub use friction::{FrictionError, GripFriction, cell_friction, grip_friction};
 pub use grasp::Grasp;
@@ -86,12 +87,9 @@ pub use profile::Staircase;
 pub use rounded::rounded;
 pub use sample::{ImprintSummary, Outcome, Pulled, Sample};
 pub use scenario::{Covariates, PullSettings, Scenario};
-pub use scenario_keys::{can_be_drawn, is_own_column, is_twin_key, pull_keys, scenario_keys};
+pub use scenario_keys::{can_be_drawn, is_own_column, pull_keys, scenario_keys};
 pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep};
 pub use table::{TABLE_EFFECT, Table, TableTarget, table_factor, table_offset_n};
 pub use trace::{PullTrace, TraceRow};
-pub use twin::{
-    DEFAULTED_SECTIONS, Elastic, Gel, Gripper, LARGEST_MU, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin,
-    Wrist,
-};
+pub use twin::{Elastic, Gel, Gripper, LARGEST_MU, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist};
 pub use values::Values;

@@ -1,7 +1,7 @@
 //! The keys of a scenario that a sweep can vary.
 
 use crate::columns::{self, COLUMNS, Column, PullEdit};
-use crate::config::{ConfigError, JitteredStep, PullFile, StepFile};
+use crate::config::{ConfigError, JitteredStep, PullFile, StepFile, is_twin_key};
 use crate::draw::Drawn;
 use crate::{CAUSE_KEY, Covariates, Scenario, Twin};
 
@@ -63,12 +63,6 @@ pub(crate) fn set(scenario: &mut Scenario, key: &str, value: &Drawn) -> Result<(
         column.check_drawn(key, *x)?;
     }
     Ok(())
-}
-
-/// Whether a key of `[vary]` or `--set` belongs to the twin.
-pub fn is_twin_key(key: &str) -> bool {
-    let section = key.split(['.', '[']).next().unwrap_or_default();
-    ["parts", "effects"].contains(&section) || crate::DEFAULTED_SECTIONS.contains(&section)
 }
 
 /// Whether a drawn key is a column of the user's own: none that is known, and none of the twin or of `[pull]`.

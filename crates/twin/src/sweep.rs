@@ -3,13 +3,14 @@
 mod check;
 mod posterior;
 
+use crate::config::is_twin_key;
 use crate::config::{
     Backend, Compression, ConfigError, DesignFile, ImageStorage, ImagesFile, Mechanics, PullFile, SweepFile,
     TraceStorage, assign, check_part, get, read_twin_table,
 };
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
 use crate::film::FilmPace;
-use crate::scenario_keys::{self, is_twin_key};
+use crate::scenario_keys;
 use crate::{CAUSE_KEY, Covariates, Posterior, PullSettings, Scenario, Twin, sobol};
 use std::collections::BTreeMap;
 use std::sync::Arc;

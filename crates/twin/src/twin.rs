@@ -17,9 +17,6 @@ use std::collections::BTreeMap;
 /// Format string of a twin file.
 pub const TWIN_SCHEMA: &str = "gripgen.twin/1";
 
-/// The sections that fall back to the shipped baseline twin, key by key.
-pub const DEFAULTED_SECTIONS: &[&str] = &["robot", "gripper", "wrist", "gel", "optics"];
-
 /// Everything the simulation knows of a rig and its parts. Built by [`Twin::new`], which checks it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Twin {

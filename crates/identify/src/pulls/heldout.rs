@@ -5,11 +5,13 @@ use super::context::Context;
 use super::fitting::Fitted;
 use super::learnt::learnt_again;
 use super::model::PullModel;
-use super::paying::UNFELT;
 use super::terms::Terms;
 use crate::diagnosis::{ErrorPair, HeldOutError};
 use crate::draws::Draws;
 use std::sync::Mutex;
+
+/// Share of a label's standard deviation that is not felt.
+pub(super) const UNFELT: f64 = 0.1;
 
 /// Folds of repetitions.
 const FOLDS: usize = 5;

@@ -3,6 +3,7 @@
 
 use super::estimates::parameters;
 use super::fitting::Fitted;
+use super::heldout::UNFELT;
 use super::profiled::ended;
 use super::search::{Accepted, ByChance, Search};
 use super::terms::Terms;
@@ -153,9 +154,6 @@ fn neutral(fitted: &Fitted, spec: &'static gripgen_twin::effects::EffectSpec) ->
     let (low, high) = (p.low90, p.high90);
     Some(format!("the 90 % interval of its {}, {low:.3} to {high:.3}, holds {}", size.name, size.neutral))
 }
-
-/// Share of a label's standard deviation that is not felt.
-pub(super) const UNFELT: f64 = 0.1;
 
 /// Why an effect that does nothing near its neutral value may be nothing at all: at the end of its interval towards that value no label
 /// is another. (A limit of 49 N is not excluded by pulls that end at 20 N.)

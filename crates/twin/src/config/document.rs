@@ -1,8 +1,7 @@
 //! A TOML text that remembers where its values stand.
 
-use super::keys::{assign, check_part, fill, get};
+use super::keys::{assign, check_part, fill, get, is_twin_key};
 use super::{ConfigError, TwinFile, suggestion};
-use crate::scenario_keys::is_twin_key;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -6,6 +6,15 @@
 
 use super::{ConfigError, suggestion};
 
+/// The sections that fall back to the shipped baseline twin, key by key.
+pub const DEFAULTED_SECTIONS: &[&str] = &["robot", "gripper", "wrist", "gel", "optics"];
+
+/// Whether a key of `[vary]` or `--set` belongs to the twin.
+pub fn is_twin_key(key: &str) -> bool {
+    let section = key.split(['.', '[']).next().unwrap_or_default();
+    ["parts", "effects"].contains(&section) || DEFAULTED_SECTIONS.contains(&section)
+}
+
 /// Copies into `mine` what it lacks of `default`, key by key.
 pub(super) fn fill(mine: &mut toml::Value, default: &toml::Value) {
     if let (toml::Value::Table(mine), toml::Value::Table(default)) = (mine, default) {

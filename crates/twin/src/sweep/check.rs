@@ -4,11 +4,11 @@ use super::{MAX_SAMPLES, Sweep, put, read_twin};
 use crate::columns::{self, Column};
 use crate::config::{
     Backend, Compression, ConfigError, DesignFile, Document, ImageStorage, PullFile, StepFile, SweepFile,
-    in_range, read_vary, suggestion,
+    in_range, is_twin_key, read_vary, suggestion,
 };
 use crate::draw::{Distribution, Drawn, VariedKey};
 use crate::film::FilmPace;
-use crate::scenario_keys::{self, KeyError, drawn_column, is_twin_key, pull_keys, scenario_keys};
+use crate::scenario_keys::{self, KeyError, drawn_column, pull_keys, scenario_keys};
 use crate::{PullSettings, Twin, sobol};
 
 impl Sweep {

@@ -1,9 +1,9 @@
 //! Sweeps that draw cause and parameters of the twin together.
 
 use super::Sweep;
+use crate::config::is_twin_key;
 use crate::config::{ConfigError, Document};
 use crate::draw::Distribution;
-use crate::scenario_keys::is_twin_key;
 use crate::{CAUSE_KEY, Posterior, PosteriorDraw};
 use std::collections::BTreeMap;
 use std::sync::Arc;
