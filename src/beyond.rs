@@ -1,5 +1,6 @@
 //! What a sweep draws beyond the tables of its twin.
 
+use crate::generate::drawn_scenario;
 use crate::project::Project;
 use gripgen_twin::columns;
 use gripgen_twin::draw::{Distribution, Drawn};
@@ -35,10 +36,13 @@ impl fmt::Display for Beyond {
     }
 }
 
-/// The columns whose tables a sweep leaves, once each.
+/// The columns whose tables a sweep leaves, once each. Tables over the product of two are not looked at.
 pub fn beyond(project: &Project) -> Vec<Beyond> {
     let parts = project.sweep.drawn_parts();
-    let drawn = |table: &&Table| table.part.as_ref().is_none_or(|name| parts.contains(&name.as_str()));
+    let drawn = |table: &&Table| {
+        let part = table.part.as_ref().is_none_or(|name| parts.contains(&name.as_str()));
+        part && table.only.iter().all(|(column, word)| may_be(project, column, word))
+    };
     let mut found: Vec<Beyond> = Vec::new();
     for table in project.twin.tables.iter().filter(drawn) {
         let (Values::Numbers(x), Some([least, most])) = (&table.axis, range(project, &table.covariate))
@@ -62,7 +66,27 @@ fn range(project: &Project, name: &str) -> Option<[f64; 2]> {
         None => key == name,
     };
     let varied = project.sweep.vary.iter().find(|varied| is_it(&varied.key))?;
-    match &varied.distribution {
+    // A twin may count the force of both jaws; tables are over that of one.
+    let inside = |x: f64| match name {
+        "grip_force_n" => project.twin.force_per_jaw_n(x),
+        _ => x,
+    };
+    ends(&varied.distribution).map(|ends| ends.map(inside))
+}
+
+/// Whether a sweep may draw a word of a column.
+fn may_be(project: &Project, name: &str, word: &str) -> bool {
+    let scenario = drawn_scenario(project, 0);
+    let fixed = || columns::value(name, scenario.view()).is_some_and(|at| at.to_string() == word);
+    match project.sweep.vary.iter().find(|varied| varied.key == name) {
+        Some(varied) => varied.distribution.extremes().iter().any(|value| value.to_string() == word),
+        None => fixed(),
+    }
+}
+
+/// The least and the largest number of a distribution that has more than one.
+fn ends(distribution: &Distribution) -> Option<[f64; 2]> {
+    match distribution {
         distribution if distribution.constant().is_some() => None,
         Distribution::Normal { mean, deviation } => {
             Some([mean - DEVIATIONS * deviation, mean + DEVIATIONS * deviation])
@@ -103,6 +127,24 @@ mod tests {
             let found = said("[20, 30]", "humidity_pct", vary);
             assert_eq!(found.first().map(|b| b.drawn), ends, "{vary}: {found:?}");
         }
+        // 40 to 60 N of both jaws are 20 to 30 N of one.
+        let both = |vary: &str| {
+            let table = "[{name=\"table\", covariate=\"grip_force_n\", x=[20, 30], factor=[1.0, 0.8], physical=false}]";
+            let sets =
+                [("effects", table), ("vary.grip_force_n", vary), ("gripper.force_convention", "total")];
+            let sets = sets.map(|(key, value)| (key.to_string(), value.to_string()));
+            beyond(&Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap())
+        };
+        assert_eq!(both("{ uniform = [40, 60] }"), []);
+        assert_eq!(both("{ uniform = [20, 60] }")[0].drawn, [10.0, 30.0]);
+        // A table of one session that the sweep does not have does nothing.
+        let of_one = |session: &str| {
+            let table = "[{name=\"table\", covariate=\"dwell_s\", where={session=\"3\"}, x=[1, 2], factor=[1.0, 0.8], physical=false}]";
+            let sets = [("effects", table), ("vary.dwell_s", "[1, 60]"), ("vary.session", session)];
+            let sets = sets.map(|(key, value)| (key.to_string(), value.to_string()));
+            beyond(&Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap()).len()
+        };
+        assert_eq!((of_one("[\"1\"]"), of_one("[\"1\", \"3\"]")), (0, 1));
         let forces = said("[20, 30]", "grip_force_n", "{ uniform = [20, 60] }");
         assert_eq!(
             forces.iter().map(Beyond::to_string).collect::<Vec<_>>(),

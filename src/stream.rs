@@ -14,6 +14,7 @@ use gripgen_twin::config::{ImageStorage, TraceStorage};
 use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, Outcome, PerJaw, TactileImage};
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -58,6 +59,12 @@ pub enum StreamError {
     /// A row that cannot be written.
     #[error(transparent)]
     Row(#[from] Arc<PictureError>),
+    /// A bug of ours beside the sample itself, whose own make it a failed one.
+    #[error("internal error in sample {index}, beside its simulation; please report it")]
+    Internal {
+        /// Its global index.
+        index: u64,
+    },
 }
 
 /// What a reader gets.
@@ -175,7 +182,8 @@ impl Shared {
                 state.made - 1
             };
             let Some(index) = self.index(place) else { return };
-            let made = self.make(index);
+            let made = catch_unwind(AssertUnwindSafe(|| self.make(index)))
+                .unwrap_or(Err(StreamError::Internal { index }));
             self.lock().waiting.insert(place, made);
             self.changed.notify_all();
         }

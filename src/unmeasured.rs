@@ -4,8 +4,8 @@ use gripgen_twin::columns::{self, InTable};
 use gripgen_twin::effects::Effect;
 use gripgen_twin::{MeasuredPulls, Twin};
 
-/// The columns that tables and effects of a twin depend on and that nobody recorded, a sentence each: the pulls are taken for such with the
-/// usual value there, or without the table.
+/// The columns that tables and effects of a twin depend on and that were not recorded of all pulls, a sentence each: of those the usual value is
+/// taken, or the table does nothing.
 pub fn unmeasured(twin: &Twin, measured: &MeasuredPulls) -> Vec<String> {
     let pulled = |part: &Option<String>| {
         part.as_ref().is_none_or(|name| measured.pulls.iter().any(|pull| pull.part == *name))
@@ -14,7 +14,7 @@ pub fn unmeasured(twin: &Twin, measured: &MeasuredPulls) -> Vec<String> {
         Some(known) => {
             known.in_table == InTable::Covariate && measured.recorded.iter().all(|name| name != column)
         }
-        None => measured.extra.iter().all(|own| own.name != column),
+        None => measured.pulls.iter().any(|pull| !pull.covariates.extra.contains_key(column)),
     };
     let mut found: Vec<(&str, Vec<String>)> = Vec::new();
     let mut add = |column, cause: String| match found.iter_mut().find(|(name, _)| *name == column) {
@@ -22,7 +22,7 @@ pub fn unmeasured(twin: &Twin, measured: &MeasuredPulls) -> Vec<String> {
         Some((_, causes)) => causes.push(cause),
         None => found.push((column, vec![cause])),
     };
-    for effect in twin.effects.iter().filter(|effect| pulled(&effect.part) && !is_nothing(effect)) {
+    for effect in twin.effects.iter().filter(|effect| pulled(&effect.part) && is_felt(effect)) {
         let own = effect.spec.covariates.iter().filter(|column| missing(column));
         own.for_each(|column| add(*column, format!("effect {}", effect.spec.id)));
     }
@@ -31,19 +31,26 @@ pub fn unmeasured(twin: &Twin, measured: &MeasuredPulls) -> Vec<String> {
         own.for_each(|column| add(column, format!("a table of {}", table.covariate)));
     }
     let said = |(column, causes): (&str, Vec<String>)| {
-        let then = match columns::covariate(column) {
-            Some(_) => "all of them count as pulls with its usual value",
-            None => "the table does nothing to them",
+        let some = measured.pulls.iter().any(|pull| pull.covariates.extra.contains_key(column));
+        let then = match (columns::covariate(column), some) {
+            (Some(_), _) => {
+                "which was not recorded of all these pulls: without it a pull counts with its usual value"
+            }
+            (None, true) => "which some of these pulls do not have: the table does nothing to them",
+            (None, false) => "which these pulls do not have: the table does nothing to them",
         };
-        format!("the twin depends on {column} ({}), which these pulls do not have: {then}", causes.join(", "))
+        format!("the twin depends on {column} ({}), {then}", causes.join(", "))
     };
     found.into_iter().map(said).collect()
 }
 
-/// Whether an effect has no size.
-fn is_nothing(effect: &Effect) -> bool {
-    let sizes = effect.spec.parameters.iter().zip(&effect.values).take(effect.spec.sizes);
-    sizes.into_iter().all(|(parameter, value)| *value == parameter.neutral)
+/// Whether an effect has a size, and labels or traces feel it.
+fn is_felt(effect: &Effect) -> bool {
+    let spec = effect.spec;
+    let sizes = spec.parameters.iter().zip(&effect.values).take(spec.sizes);
+    let has_size = sizes.into_iter().any(|(parameter, value)| *value != parameter.neutral);
+    let felt = spec.friction.is_some() || spec.normal_force.is_some() || spec.tilt_rad.is_some();
+    has_size && (felt || spec.acts_on_signals())
 }
 
 #[cfg(test)]
@@ -51,7 +58,8 @@ mod tests {
     use super::*;
     use crate::location::Location;
     use crate::project::Project;
-    use gripgen_twin::{Covariates, ExtraColumn, MeasuredPull, Values};
+    use gripgen_twin::draw::Drawn;
+    use gripgen_twin::{Covariates, MeasuredPull};
 
     fn pulls(recorded: &[&str], own: &[&str]) -> MeasuredPulls {
         let pull = MeasuredPull {
@@ -67,12 +75,17 @@ mod tests {
             zero_shift_n: 0.0,
             trace: None,
         };
-        let extra =
-            own.iter().map(|name| ExtraColumn { name: (*name).into(), values: Values::Numbers(vec![45.0]) });
+        let (mut pull, mut without) = (pull.clone(), pull);
+        for name in own {
+            let both = [&mut pull, &mut without].into_iter().take(if name.ends_with('?') { 1 } else { 2 });
+            both.for_each(|p| {
+                p.covariates.extra.insert(name.trim_end_matches('?').into(), Drawn::Number(45.0));
+            });
+        }
         MeasuredPulls {
-            pulls: vec![pull],
+            pulls: vec![pull, without],
             recorded: recorded.iter().map(|name| (*name).into()).collect(),
-            extra: extra.collect(),
+            extra: vec![],
             label_tolerance_n: 3.0,
             stop_m: 0.005,
             feedback: None,
@@ -82,7 +95,7 @@ mod tests {
 
     #[test]
     fn a_column_of_the_twin_that_nobody_measured_is_told() {
-        let effects = "[{name=\"temperature\", k_per_k=0.01}, {name=\"dwell_ageing\", beta=0.0}, {name=\"wear\", depth=0.1, part=\"gear\"}, \
+        let effects = "[{name=\"temperature\", k_per_k=0.01}, {name=\"dwell_ageing\", beta=0.0}, {name=\"wear\", depth=0.1, part=\"gear\"}, {name=\"light_drift\", green_per_h=0.1}, \
                        {name=\"table\", covariate=\"humidity_pct\", x=[30, 60], factor=[1.0, 0.8], physical=false}]";
         let sets = [("effects".to_string(), effects.to_string())];
         let project = Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap();
@@ -91,10 +104,12 @@ mod tests {
         assert_eq!(
             said(&[], &["humidity"]),
             [
-                "the twin depends on temperature_c (effect temperature), which these pulls do not have: all of them count as pulls with its \
-              usual value",
+                "the twin depends on temperature_c (effect temperature), which was not recorded of all these pulls: without it a pull counts \
+              with its usual value",
                 "the twin depends on humidity_pct (a table of humidity_pct), which these pulls do not have: the table does nothing to them",
             ]
         );
+        let some = said(&["temperature_c"], &["humidity_pct?"]);
+        assert!(some.len() == 1 && some[0].contains("which some of these pulls do not have"), "{some:?}");
     }
 }

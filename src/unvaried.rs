@@ -6,7 +6,7 @@ use gripgen_twin::columns::{self, Column};
 use gripgen_twin::config::ImageStorage;
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::{Effect, EffectSpec};
-use gripgen_twin::{Table, Values};
+use gripgen_twin::{Table, Values, can_be_drawn};
 use std::fmt;
 
 /// Columns that change over a campaign though nobody sets them. The others are settings, of which one value is a choice.
@@ -38,6 +38,12 @@ impl fmt::Display for Unvaried {
                 let outside = if self.outside { ", outside of it" } else { "" };
                 write!(f, "this sweep has {value} in every sample{outside}")?;
             }
+        }
+        if !can_be_drawn(&self.key) {
+            return write!(
+                f,
+                ": no sweep draws a column of this name, give it another in the pulls and in the table"
+            );
         }
         write!(f, ": add vary.{}", self.key)?;
         self.values.iter().try_for_each(|values| write!(f, " = {values}"))
@@ -234,6 +240,11 @@ mod tests {
                 "the twin depends on humidity_pct (a table from 30 to 60), which no sample of this sweep has, so that its table \
               does nothing: add vary.humidity_pct = { uniform = [30, 60] }"
             ]
+        );
+        let taken = of("mu", "x=[30, 60]");
+        assert!(
+            taken.len() == 1 && taken[0].ends_with("give it another in the pulls and in the table"),
+            "{taken:?}"
         );
         let wet = table("humidity_pct", "x=[30, 60]");
         for (vary, wanted) in [("{ uniform = [30, 60] }", 0), ("[45]", 0), ("[80]", 1)] {

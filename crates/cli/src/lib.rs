@@ -33,7 +33,8 @@ pub use failure::Failure;
 
 /// Runs gripgen with the arguments of a process (the first is its name) and returns its exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    match parsed(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    match parsed(&arguments) {
         Ok(cli) => execute(&cli).unwrap_or_else(|failure| {
             failure.print();
             failure.exit_code()
@@ -41,7 +42,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(e) => {
             // Clap prints help and versions to standard output, everything else to standard error.
             let _ = e.print();
-            if let Some(hint) = key_of_a_sweep(&e) {
+            if let Some(hint) = key_of_a_sweep(&arguments, &e) {
                 eprintln!("\nhint: {hint}");
             }
             if e.use_stderr() { 2 } else { 0 }
@@ -56,12 +57,18 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 ///
 /// Arguments that are wrong, or work that failed.
 pub fn try_run(arguments: impl IntoIterator<Item = OsString>) -> Result<u8, Failure> {
-    let cli = parsed(arguments).map_err(|e| Failure::usage(e.to_string().trim_end()))?;
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = parsed(&arguments).map_err(|e| {
+        let failure = Failure::usage(e.to_string().trim_end());
+        match key_of_a_sweep(&arguments, &e) {
+            Some(hint) => failure.hint(hint),
+            None => failure,
+        }
+    })?;
     output::silently(|| execute(&cli))
 }
 
-fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
-    let arguments: Vec<OsString> = arguments.into_iter().collect();
+fn parsed(arguments: &[OsString]) -> Result<Cli, clap::Error> {
     output::remember_program(arguments.first());
     let matches = with_negative_numbers(Cli::command()).try_get_matches_from(arguments)?;
     Cli::from_arg_matches(&matches)
@@ -81,14 +88,14 @@ const OF_SWEEPS: [&str; 10] = [
     "twin",
 ];
 
-/// What was meant by an option that is a key of the file of a sweep.
-fn key_of_a_sweep(error: &clap::Error) -> Option<String> {
+/// What was meant by an option of `sweep` or `check` that is a key of their file.
+fn key_of_a_sweep(arguments: &[OsString], error: &clap::Error) -> Option<String> {
+    let verb = arguments.get(1).and_then(|word| word.to_str())?;
     let Some(ContextValue::String(typed)) = error.get(ContextKind::InvalidArg) else { return None };
     let key = typed.trim_start_matches('-').replace('-', "_");
-    let key = key.split('=').next().filter(|key| OF_SWEEPS.contains(key))?;
-    Some(format!(
-        "{key} stands in the file of a sweep; `gripgen sweep`, `check` and `bench` take --set {key}=VALUE"
-    ))
+    let key =
+        key.split('=').next().filter(|key| ["sweep", "check"].contains(&verb) && OF_SWEEPS.contains(key))?;
+    Some(format!("{key} stands in the file of the sweep; --set {key}=VALUE changes it"))
 }
 
 /// `-0.3` is a number to be refused by who reads it, and no option of that name.

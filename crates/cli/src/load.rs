@@ -10,7 +10,7 @@ use gripgen::twin::Twin;
 use gripgen::{
     FoundCircles, Library, LoadPressesError, LoadPullsError, LoadSensorError, LoadedPulls, Location,
     PressGeometry, Suspects, is_pulls, load_presses, load_pulls_with, load_sensor, load_twin_document,
-    load_twin_sensor, unmeasured,
+    load_twin_sensor,
 };
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -48,6 +48,9 @@ pub fn suspects(include: bool) -> Suspects {
     if include { Suspects::Include } else { Suspects::Screen }
 }
 
+/// What measurements are.
+const MEASUREMENTS: &str = "measurements are a folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, a bag of ROS 2 with rosbag.toml, or a dataPack.npz";
+
 /// What cannot be read as pulls.
 pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
     if let Some(file) = paths.iter().find(|path| path.is_file()) {
@@ -61,17 +64,24 @@ pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
     if known {
         return failure;
     }
-    failure.hint("measurements are a folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, a bag of ROS 2 with rosbag.toml, or a dataPack.npz")
+    failure.hint(MEASUREMENTS)
 }
 
-/// A file where a folder of pulls is wanted.
+/// Files of a folder of measurements that people name in its place.
+const OF_A_FOLDER: [&str; 7] =
+    ["pulls.csv", "sensor.csv", "presses.csv", "imprints.csv", "campaign.toml", "rosbag.toml", "run.json"];
+
+/// A file where a folder of measurements is wanted.
 fn a_file(path: &Path) -> Failure {
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let hint = match path.file_name().is_some_and(|name| name == "pulls.csv") {
-        true => format!("name its folder: {}", shell::path(folder)),
-        false => {
-            "put the table into a folder of its own under the name pulls.csv, and name the folder".into()
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let hint = match name.to_lowercase().rsplit_once('.') {
+        Some((_, "mcap")) => format!("name its folder: {}", shell::path(folder)),
+        _ if OF_A_FOLDER.contains(&name.as_str()) => format!("name its folder: {}", shell::path(folder)),
+        Some((_, "csv")) => {
+            "a table of pulls has the name pulls.csv in a folder of its own; name the folder".into()
         }
+        _ => MEASUREMENTS.into(),
     };
     Failure::usage(format!("{}: this is a file, the folder of the measurements is wanted", path.display()))
         .hint(hint)
@@ -81,14 +91,12 @@ fn a_file(path: &Path) -> Failure {
 /// those of a wrong unit not by who `answers` for them, as a diagnosis does.
 pub fn load_pulls_to_fit(
     paths: &[&Path],
-    twin: &Twin,
     suspects: Suspects,
     talk: &TalkArgs,
     answers: bool,
 ) -> Result<LoadedPulls, Failure> {
     each_once(paths)?;
     let mut loaded = load_pulls_with(paths, suspects).map_err(|e| no_pulls(paths, &e))?;
-    loaded.warnings.extend(unmeasured(twin, &loaded.pulls));
     let refused = loaded.implausible.take_if(|e| e.sign || !answers);
     say_warnings(&loaded, talk);
     match refused {

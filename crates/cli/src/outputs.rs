@@ -134,7 +134,9 @@ impl Outputs {
             }
             Some(mark) => format!("`gripgen {}` wrote it, and this is `gripgen {verb}`", mark.verb),
             // Files to start from carry no mark: they are there to be edited.
-            None if verb == "init" => "`gripgen init` did not write it, or it was edited since".into(),
+            None if verb == "init" && path.extension().is_none_or(|end| end != "json") => {
+                "what `gripgen init` writes carries no mark, so this may have been edited".into()
+            }
             None => format!("`gripgen {verb}` did not write it"),
         };
         Err(Failure::usage(format!("{}: there is such a file: {found}", path.display()))

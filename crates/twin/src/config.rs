@@ -88,6 +88,11 @@ pub fn suggestion<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> 
         .map(|(_, _, name)| name)
 }
 
+/// Whether two words differ by one letter: left out, put in, exchanged for another or with its neighbour.
+pub fn one_slip_apart(a: &str, b: &str) -> bool {
+    strsim::damerau_levenshtein(a, b) == 1
+}
+
 /// Adds the hint for a part name that the twin does not have.
 pub(crate) fn unknown_part_hint<'a>(
     error: ConfigError,

@@ -27,7 +27,7 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &args.set)?;
     let library = load_library(&twin, &args.twin)?;
-    let loaded = load_pulls_to_fit(&measured, &twin, suspects(args.include_suspect), &args.talk, false)?;
+    let loaded = load_pulls_to_fit(&measured, suspects(args.include_suspect), &args.talk, false)?;
     let twin_at = Location::parse(&args.twin);
     let document = load_twin_document(&twin_at, &args.set)?;
     let request = CalibrateRequest {

@@ -76,7 +76,7 @@ pub fn diagnose_folders(
     suspects: Suspects,
     talk: &TalkArgs,
 ) -> Result<Diagnosed, Failure> {
-    let loaded = load_pulls_to_fit(measured, twin, suspects, talk, true)?;
+    let loaded = load_pulls_to_fit(measured, suspects, talk, true)?;
     let options = PullDiagnoseOptions { jobs: jobs(), without };
     let share = Share::start("diagnosing", talk);
     let diagnosed = diagnose_pull_table(&loaded.pulls, twin, library, &options, &|x| share.at(x));

@@ -81,7 +81,7 @@ fn a_folder_and_a_key_without_its_section_have_a_hint() {
     );
     let refused = run(&["sweep", QUICKSTART, "--samples", "6"]);
     assert_code(&refused, 2);
-    assert!(text(&refused.stderr).contains("take --set samples=VALUE"), "{}", text(&refused.stderr));
+    assert!(text(&refused.stderr).contains("--set samples=VALUE changes it"), "{}", text(&refused.stderr));
     let refused = run(&["check", QUICKSTART, "--set", "grip_force_n=20"]);
     assert_code(&refused, 2);
     assert!(text(&refused.stderr).contains("vary.grip_force_n"), "{}", text(&refused.stderr));

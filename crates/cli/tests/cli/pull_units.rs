@@ -91,7 +91,7 @@ fn a_word_among_numbers_and_a_folder_named_twice_are_said() {
     assert!(text(&twice.stderr).contains("is named twice"), "{}", text(&twice.stderr));
 }
 
-/// What the twin depends on and the table lacks is a warning of every verb that predicts pulls; a file in the place of its folder is told.
+/// What the twin depends on and the table lacks is a warning of a comparison; a file in the place of its folder is told.
 #[test]
 fn a_column_that_the_pulls_lack_and_a_file_for_a_folder_are_said() {
     let dry = folder(12, 1.0, 1.0);
@@ -100,19 +100,20 @@ fn a_column_that_the_pulls_lack_and_a_file_for_a_folder_are_said() {
     let baseline = String::from_utf8(gripgen::assets::get("configs/twin-baseline.toml").unwrap().to_vec());
     let effect = "\n[[effects]]\nname = \"table\"\ncovariate = \"humidity_pct\"\nx = [30, 60]\nfactor = [1.0, 0.7]\nphysical = false\n";
     std::fs::write(&twin, format!("{}{effect}", baseline.unwrap())).unwrap();
-    let out = dry.path().join("out.toml");
-    let [twin, out] = [&twin, &out].map(|path| path.to_str().unwrap());
+    let twin = twin.to_str().unwrap();
     let lacks = "the twin depends on humidity_pct (a table of humidity_pct), which these pulls do not have";
-    for words in
-        [vec!["compare", at, "--twin", twin], vec!["calibrate", "pulls", at, "--twin", twin, "-o", out]]
-    {
-        let said = text(&run(&words).stderr);
-        assert!(said.contains(lacks), "{words:?}: {said}");
-    }
+    let said = text(&run(&["compare", at, "--twin", twin]).stderr);
+    assert!(said.contains(lacks), "{said}");
+    // A diagnosis starts from the twin without its effects and tables.
+    assert!(!text(&run(&["diagnose", at, "--twin", twin]).stderr).contains("depends on"));
     assert!(!text(&run(&["compare", at]).stderr).contains("depends on"));
     let file = run(&["diagnose", table.to_str().unwrap()]);
     assert_code(&file, 2);
     let said = text(&file.stderr);
+    let sensor = dry.path().join("sensor.csv");
+    std::fs::write(&sensor, "x\n").unwrap();
+    let of_sensor = text(&run(&["compare", sensor.to_str().unwrap()]).stderr);
+    assert!(of_sensor.contains(&format!("name its folder: {at}")), "{of_sensor}");
     assert!(said.contains("this is a file") && said.contains(&format!("name its folder: {at}")), "{said}");
 }
 

@@ -261,7 +261,7 @@ pub fn diagnose_pulls(
             by: ErrorsBy { levels: by(by_value(&force)), sessions: by(by_value(&session)) },
         }
     });
-    if let Some(note) = of_one_level(&diagnosis) {
+    if let Some(note) = of_one_level(&diagnosis, &after_context, &after) {
         diagnosis.decides(note);
     }
     recalibrate(&mut diagnosis, &trusted(&search, &accepted));

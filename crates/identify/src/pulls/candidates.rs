@@ -65,6 +65,11 @@ impl Candidate {
         self.spec.acts_on_signals()
     }
 
+    /// Whether it does nothing up to a force and acts beyond, on all parts alike.
+    pub fn is_end_of_a_range(&self) -> bool {
+        self.part.is_none() && self.spec.pulls.is_ok_and(|fit| fit.flat_at_neutral)
+    }
+
     /// Position of the parameter that says how large the effect is.
     pub fn size(&self) -> usize {
         self.free.first().map_or(0, |f| f.0)

@@ -100,25 +100,31 @@ fn unfelt_forgotten(
     rows: &[usize],
 ) -> (PullModel, Terms) {
     let mut start = model.clone();
-    let flat = |(c, _): &&(Candidate, Vec<f64>)| {
-        c.part.is_none() && c.spec.pulls.is_ok_and(|fit| fit.flat_at_neutral)
-    };
-    let own: Vec<Candidate> = terms.effects.iter().filter(flat).map(|(c, _)| c.clone()).collect();
-    for candidate in own {
-        // At its neutral value rather than without it: the same way of predicting.
-        let (spec, size) = (candidate.spec, candidate.size());
-        let mut neutral = start.clone();
-        let effects = neutral.effects.iter_mut().filter(|effect| effect.spec == spec);
-        effects.for_each(|effect| effect.values[size] = spec.parameters[size].neutral);
-        let labels = [&start, &neutral].map(|model| context.labels_n(model, rows));
-        let sd_n = context.deviations(&start, rows);
-        let felt = (0..rows.len()).any(|k| (labels[0][k] - labels[1][k]).abs() > UNFELT * sd_n[k]);
-        if !felt {
-            terms.effects.retain(|(c, _)| c.spec != spec);
-            start.effects.retain(|effect| effect.spec != spec);
+    let ends = terms.effects.iter().map(|(c, _)| c).filter(|c| c.is_end_of_a_range());
+    for candidate in ends.cloned().collect::<Vec<Candidate>>() {
+        if unfelt_without(context, &start, &candidate, rows) {
+            terms.effects.retain(|(c, _)| c.spec != candidate.spec);
+            start.effects.retain(|effect| effect.spec != candidate.spec);
         }
     }
     (start, terms)
+}
+
+/// Whether no label at `rows` is another where an effect has no size.
+pub(super) fn unfelt_without(
+    context: &Context<'_>,
+    model: &PullModel,
+    candidate: &Candidate,
+    rows: &[usize],
+) -> bool {
+    // At its neutral value rather than without it: the same way of predicting.
+    let (spec, size) = (candidate.spec, candidate.size());
+    let mut neutral = model.clone();
+    let effects = neutral.effects.iter_mut().filter(|effect| effect.spec == spec);
+    effects.for_each(|effect| effect.values[size] = spec.parameters[size].neutral);
+    let labels = [model, &neutral].map(|model| context.labels_n(model, rows));
+    let sd_n = context.deviations(model, rows);
+    (0..rows.len()).all(|k| (labels[0][k] - labels[1][k]).abs() <= UNFELT * sd_n[k])
 }
 
 /// How a rival predicts pulls that no fit has seen, against the model without it.

@@ -1,22 +1,30 @@
 //! The end of a range that only one level of the grip force reaches.
 
+use super::context::Context;
+use super::fitting::Fitted;
+use super::heldout::unfelt_without;
 use crate::diagnosis::Diagnosis;
-use gripgen_twin::effects::find;
 
-/// Share of the error on held-out levels that an effect which more than one level feels takes off.
-const FELT_ELSEWHERE: f64 = 0.03;
-
-/// What is said of the end of a range, where only one level of the grip force reaches it.
-pub(super) fn of_one_level(diagnosis: &Diagnosis) -> Option<String> {
-    let ends = |id: &str| find(id).is_some_and(|spec| spec.pulls.is_ok_and(|fit| fit.flat_at_neutral));
+/// What is said of the only effect that was named, where it is the end of a range and pulls of only one grip force feel it.
+pub(super) fn of_one_level(diagnosis: &Diagnosis, context: &Context<'_>, fitted: &Fitted) -> Option<String> {
     let [only] = &diagnosis.effects[..] else { return None };
-    let levels = diagnosis.error.as_ref()?.by.levels.as_ref()?;
-    let (before_n, after_n) = (levels.before.rmse_n?, levels.after.rmse_n?);
-    (ends(&only.name) && after_n > (1.0 - FELT_ELSEWHERE) * before_n).then(|| {
-        format!(
-            "{} rests on one level of the grip force: where a level is held out the error is {before_n:.2} N without and {after_n:.2} N with it; \
-             whatever else takes from that level looks the same, and pulls at levels between tell",
-            only.name
-        )
-    })
+    let (candidate, _) = fitted.terms.effects.iter().find(|(c, _)| c.spec.id == only.name)?;
+    if !candidate.is_end_of_a_range() {
+        return None;
+    }
+    let pulls = &context.data.measured.pulls;
+    let mut feel: Vec<u64> = (0..pulls.len())
+        .filter(|&i| !unfelt_without(context, &fitted.model, candidate, &[i]))
+        .map(|i| pulls[i].grip_force_n.to_bits())
+        .collect();
+    let count = feel.len();
+    feel.sort_unstable();
+    feel.dedup();
+    let [level] = feel[..] else { return None };
+    Some(format!(
+        "{} rests on one level of the grip force, the {count} pulls at {} N: whatever else takes from that level looks the same, and pulls at levels \
+         between tell",
+        only.name,
+        f64::from_bits(level)
+    ))
 }

@@ -2,7 +2,7 @@
 
 use super::TRACES_FOLDER;
 use gripgen_twin::columns::{COLUMNS, Column, InTable};
-use gripgen_twin::config::suggestion;
+use gripgen_twin::config::{one_slip_apart, suggestion};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::{MeasuredPull, MeasuredPulls};
 use std::collections::{HashMap, HashSet};
@@ -108,7 +108,12 @@ pub(super) fn nearly_known(path: &Path, pulls: &MeasuredPulls) -> Vec<String> {
     let said = |typed: &String| {
         let plain: String =
             typed.to_lowercase().chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
-        let name = suggestion(&plain, COLUMNS.iter().filter(open).map(|column| column.name))?;
+        // `gel` begins `gel_id`; `grip` begins several.
+        let begins = |name: &str| plain.len() >= 3 && name.starts_with(&format!("{plain}_"));
+        let slip = |name: &str| plain.len() >= 6 && one_slip_apart(&plain, name);
+        let meant = |name: &&str| *name == plain || begins(name) || slip(name);
+        let mut names = COLUMNS.iter().filter(open).map(|column| column.name).filter(meant);
+        let name = names.next().filter(|_| names.next().is_none())?;
         Some(format!(
             "{}: no effect knows the column {typed}, it is one of your own: did you mean {name}?",
             path.display()

@@ -173,7 +173,19 @@ fn a_unit_in_a_cell_and_a_name_that_is_nearly_known_are_told() {
         let table = format!("pull_id,part,grip_force_n,max_pull_force_n,{columns}\n{rows}");
         read_judged_pulls(folder(&table, &[]).path()).unwrap().warnings
     };
-    for fine in ["humidity_pct", "table_mm", "operator", "batch"] {
+    for fine in [
+        "humidity_pct",
+        "table_mm",
+        "operator",
+        "batch",
+        "lot_id",
+        "run_id",
+        "tool_id",
+        "version",
+        "force",
+        "grip",
+        "t",
+    ] {
         assert_eq!(said(fine, ["45", "46", "47"]), Vec::<String>::new(), "{fine}");
     }
     for cells in
@@ -186,7 +198,9 @@ fn a_unit_in_a_cell_and_a_name_that_is_nearly_known_are_told() {
         units.len() == 1 && units[0].contains("all cells of the column humidity_pct end in `%`"),
         "{units:?}"
     );
-    for (typed, name) in [("Temperature_C", "temperature_c"), ("gel", "gel_id"), ("dwell-s", "dwell_s")] {
+    for (typed, name) in
+        [("Temperature_C", "temperature_c"), ("gel", "gel_id"), ("dwell-s", "dwell_s"), ("sesion", "session")]
+    {
         let near = said(typed, ["1", "2", "3"]);
         assert!(near.len() == 1 && near[0].ends_with(&format!("did you mean {name}?")), "{typed}: {near:?}");
     }

@@ -55,8 +55,13 @@ pub fn write_next(
         return Ok(NextFile { path: None, said: Some(note) });
     }
     let text = next_toml(next, &args.measured, &args.twin, &sha256);
-    let said = (path.exists() && !is_for(&path, &sha256))
-        .then(|| format!("{} was a plan for other measurements and was replaced", path.display()));
+    let planned = mark_of(&path).is_some_and(|mark| mark.verb == outputs.verb() && mark.whole);
+    let said = (path.exists() && !is_for(&path, &sha256)).then(|| match planned {
+        true => format!("{} was a plan for other measurements and was replaced", path.display()),
+        false => {
+            format!("{} was none of a diagnosis, or was edited, and was replaced (--force)", path.display())
+        }
+    });
     outputs.write(&path, Format::Toml, text.as_bytes())?;
     let own = diagnosed.diagnosis.effects.iter_mut().filter(|e| next.separates(&e.name));
     for separate in own.filter_map(|e| e.separate_by.as_mut()) {
@@ -201,17 +206,19 @@ fn columns_to_vary(project: &Project) -> Vec<String> {
 
 /// What the sweep draws and nobody pulled: the pulls say nothing of its friction.
 fn not_pulled(project: &Project, diagnosis: &Diagnosis) -> String {
-    let pulled = |part: &str| diagnosis.baseline.contains_key(&format!("parts.{part}.mu"));
-    let (own, others): (Vec<&str>, Vec<&str>) =
-        project.sweep.drawn_parts().into_iter().partition(|part| pulled(part));
-    match (own.as_slice(), others.len()) {
-        ([], _) | (_, 0) => String::new(),
-        (own, 1) => {
-            format!(" (the pulls were of {}; {} keeps the mu that it had)", own.join(", "), others[0])
-        }
-        (own, _) => {
-            format!(" (the pulls were of {}; the other parts keep the mu that they had)", own.join(", "))
-        }
+    let part = |key: &'_ String| key.strip_prefix("parts.")?.strip_suffix(".mu").map(String::from);
+    let pulled: Vec<String> = diagnosis.baseline.keys().filter_map(part).collect();
+    if diagnosis.channel != Channel::Pulls || pulled.is_empty() {
+        return String::new();
+    }
+    let drawn = project.sweep.drawn_parts();
+    let others: Vec<&str> = drawn.iter().copied().filter(|part| pulled.iter().all(|p| p != part)).collect();
+    let of = pulled.join(", ");
+    match others.len() {
+        0 => String::new(),
+        n if n == drawn.len() => format!(" (the pulls were of {of}, which this sweep does not draw)"),
+        1 => format!(" (the pulls were of {of}; {} keeps the mu that it had)", others[0]),
+        _ => format!(" (the pulls were of {of}; the other parts keep the mu that they had)"),
     }
 }
 

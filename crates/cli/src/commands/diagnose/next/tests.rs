@@ -129,6 +129,11 @@ fn the_next_sweep_is_one_that_runs() {
         text,
         "Make training data with the corrected twin (the pulls were of gear; the other parts keep the mu that they had):"
     );
+    found.diagnosis.baseline.clear();
+    let mu = gripgen::identify::ParameterEstimate::new(0.2, (0.18, 0.22), "1");
+    found.diagnosis.baseline.insert("parts.bracket.mu".into(), mu);
+    let (text, _) = first(&args, &found, None);
+    assert!(text.ends_with("(the pulls were of bracket, which this sweep does not draw):"), "{text}");
 }
 
 #[test]
@@ -194,4 +199,11 @@ fn a_plan_that_is_replaced_is_told() {
     };
     assert_eq!((said("ab12"), said("ab12")), (String::new(), String::new()));
     assert!(said("cd34").ends_with("next.toml was a plan for other measurements and was replaced"));
+    std::fs::write(folder.path().join("next.toml"), "pulls = []\n").unwrap();
+    assert!(said("cd34").contains("were not written"), "somebody's own");
+    let forced = Outputs::of("diagnose", true);
+    let mut found = answered(Verdict::Effect, &[]);
+    found.next = Some(plan());
+    let said = write_next(&args, &forced, &mut found).unwrap().said.unwrap_or_default();
+    assert!(said.ends_with("was none of a diagnosis, or was edited, and was replaced (--force)"), "{said}");
 }
