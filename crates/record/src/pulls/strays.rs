@@ -16,6 +16,9 @@ const KEYS: [&str; 6] =
 const UNITS: [&str; 18] =
     ["%", "°", "°C", "°F", "C", "K", "N", "mN", "kN", "mm", "cm", "m", "s", "ms", "min", "h", "Hz", "deg"];
 
+/// Ends of the names of columns that people leave out.
+const ENDINGS: [&str; 6] = ["_id", "_s", "_c", "_mm", "_deg", "_n"];
+
 /// Files named at most.
 const NAMED: usize = 3;
 
@@ -108,8 +111,8 @@ pub(super) fn nearly_known(path: &Path, pulls: &MeasuredPulls) -> Vec<String> {
     let said = |typed: &String| {
         let plain: String =
             typed.to_lowercase().chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
-        // `gel` begins `gel_id`; `grip` begins several.
-        let begins = |name: &str| plain.len() >= 3 && name.starts_with(&format!("{plain}_"));
+        // `gel` for `gel_id`, `dwell` for `dwell_s`; `force` is no `force_increment_n`.
+        let begins = |name: &str| name.strip_prefix(&plain).is_some_and(|end| ENDINGS.contains(&end));
         let slip = |name: &str| plain.len() >= 6 && one_slip_apart(&plain, name);
         let meant = |name: &&str| *name == plain || begins(name) || slip(name);
         let mut names = COLUMNS.iter().filter(open).map(|column| column.name).filter(meant);
