@@ -66,9 +66,7 @@ fn test(all: bool) -> Result<(), String> {
     run("format of the effects", &mut rustfmt_effects()?)?;
     let clippy = ["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"];
     run("clippy", &mut cargo(&clippy))?;
-    // Examples are looked at by clippy; to build each of them takes minutes.
-    let mut rust = cargo(&["test", "--workspace", "--lib", "--bins", "--tests", "--no-fail-fast"]);
-    let mut docs = cargo(&["test", "--workspace", "--doc", "--quiet"]);
+    let mut rust = cargo(&["test", "--workspace", "--no-fail-fast"]);
     // Tests that need a GPU are ignored, with this reason, where there is no driver.
     if let Err(reason) = &vulkan {
         eprintln!("\nno Vulkan driver ({reason}): GPU tests will read ignored");
@@ -80,7 +78,6 @@ fn test(all: bool) -> Result<(), String> {
         }
     }
     run("Rust tests", &mut rust)?;
-    run("tests in the documentation", &mut docs)?;
     assets(true)?;
     python::stage_package(&root())?;
     let mut checks = python::pytest(&python, &root());
@@ -125,8 +122,8 @@ fn record_benches(words: &[&str]) -> Result<(), String> {
 }
 
 fn assets(check: bool) -> Result<(), String> {
-    // The packages of `cargo test --workspace`, so that nothing is built twice.
-    let selection = ["build", "--quiet", "--workspace", "--lib", "--bins", "--example", "make_assets"];
+    // The same selection as in `cargo test --workspace`, so that nothing is built twice.
+    let selection = ["build", "--quiet", "--workspace", "--lib", "--bins", "--examples"];
     run("build of the asset maker and the Python module", &mut cargo(&selection))?;
     let mut maker = Command::new(python::target(&root()).join("debug/examples/make_assets"));
     run("assets", maker.args(check.then_some("--check")))

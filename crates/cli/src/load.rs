@@ -53,7 +53,11 @@ const MEASUREMENTS: &str = "measurements are a folder with pulls.csv, sensor.csv
 
 /// What cannot be read as pulls.
 pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
-    if let Some(file) = paths.iter().find(|path| path.is_file()) {
+    // A bag of ROS 2 may be one file.
+    let table = |path: &&&Path| {
+        path.is_file() && path.extension().is_some_and(|end| OF_TABLES.iter().any(|e| end == *e))
+    };
+    if let Some(file) = paths.iter().find(table) {
         return a_file(file);
     }
     let known = paths.iter().all(|path| is_pulls(path));
@@ -67,6 +71,9 @@ pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
     failure.hint(MEASUREMENTS)
 }
 
+/// Ends of their names.
+const OF_TABLES: [&str; 3] = ["csv", "toml", "json"];
+
 /// Files of a folder of measurements that people name in its place.
 const OF_A_FOLDER: [&str; 7] =
     ["pulls.csv", "sensor.csv", "presses.csv", "imprints.csv", "campaign.toml", "rosbag.toml", "run.json"];
@@ -75,13 +82,12 @@ const OF_A_FOLDER: [&str; 7] =
 fn a_file(path: &Path) -> Failure {
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let hint = match name.to_lowercase().rsplit_once('.') {
-        Some((_, "mcap")) => format!("name its folder: {}", shell::path(folder)),
-        _ if OF_A_FOLDER.contains(&name.as_str()) => format!("name its folder: {}", shell::path(folder)),
-        Some((_, "csv")) => {
+    let hint = match (OF_A_FOLDER.contains(&name.as_str()), name.ends_with(".csv")) {
+        (true, _) => format!("name its folder: {}", shell::path(folder)),
+        (false, true) => {
             "a table of pulls has the name pulls.csv in a folder of its own; name the folder".into()
         }
-        _ => MEASUREMENTS.into(),
+        (false, false) => MEASUREMENTS.into(),
     };
     Failure::usage(format!("{}: this is a file, the folder of the measurements is wanted", path.display()))
         .hint(hint)
