@@ -5,7 +5,7 @@ use crate::contact::ContactForce;
 use crate::jaw_friction::JawFriction;
 use crate::motion::Motion;
 use crate::scene::SceneBodies;
-use crate::world::{NotFinite, World};
+use crate::world::{Iterations, NotFinite, World};
 #[cfg(test)]
 use gripgen_twin::Jaw;
 use gripgen_twin::PerJaw;
@@ -19,8 +19,8 @@ const SLIDING_M_PER_S: f64 = 1e-4;
 const AT_LIMIT: f64 = 0.99;
 
 /// Share of the jaws' static limits up to which the engine is not asked: jaws that hold a fixed part do not move, so that the contact
-/// takes what the arm applies. Well below the limit, so that all that can happen near a slip happens in the engine.
-const HELD_SHARE: f64 = 0.8;
+/// takes what the arm applies. Below the limit by more than the engine's own error, so that all that can happen near a slip happens there.
+const HELD_SHARE: f64 = 0.95;
 
 /// Steps in which the engine takes over the force that the jaws hold, and steps in which it comes to rest under it: pads drift a
 /// little as their force rises.
@@ -172,6 +172,7 @@ impl RapierPull {
         let jaws_n = self.rig.close_jaws(&mut self.world, &self.grip_force_n, self.jaw_mass_kg);
         let contact_n = self.contact_force_n;
         self.rig.arm.pull(&mut self.world, self.direction, applied_n, contact_n, jaws_n);
+        self.world.solve_in(if self.sliding { Iterations::Sliding } else { Iterations::Holding });
         let refresh = std::mem::take(&mut self.refresh_contacts);
         self.world.step(step_s, refresh)?;
         let momentum = self.rig.momentum(&self.world, self.direction);

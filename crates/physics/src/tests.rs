@@ -348,7 +348,7 @@ fn a_grip_below_its_limit_does_not_creep() {
     }
 }
 
-/// Jaws that hold are not asked until 0.8 of their limit: the slip force is the one of the engine alone, and so is the trace but
+/// Jaws that hold are not asked until 0.95 of their limit: the slip force is the one of the engine alone, and so is the trace but
 /// for the engine's own pre-slip drift.
 #[test]
 fn the_engine_takes_over_before_the_slip() {
