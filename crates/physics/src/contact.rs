@@ -1,6 +1,6 @@
 //! Contact forces. The only place where impulses become newtons.
 
-use crate::world::World;
+use crate::world::{SOLVER_ITERATIONS, World};
 use rapier3d_f64::prelude::*;
 
 /// What the contacts of one collider carry.
@@ -37,7 +37,7 @@ pub(crate) fn contact_force(world: &World, pad: ColliderHandle, part: ColliderHa
         }
         // The engine's vector acts on the first body of the pair.
         let sign = if pair.collider1 == pad { 1.0 } else { -1.0 };
-        sum.friction_n += friction * (sign * world.iterations() as f64 / step_s);
+        sum.friction_n += friction * (sign * SOLVER_ITERATIONS as f64 / step_s);
     }
     sum
 }

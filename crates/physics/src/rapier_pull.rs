@@ -5,7 +5,7 @@ use crate::contact::ContactForce;
 use crate::jaw_friction::JawFriction;
 use crate::motion::Motion;
 use crate::scene::SceneBodies;
-use crate::world::{Iterations, NotFinite, World};
+use crate::world::{NotFinite, World};
 #[cfg(test)]
 use gripgen_twin::Jaw;
 use gripgen_twin::PerJaw;
@@ -172,7 +172,6 @@ impl RapierPull {
         let jaws_n = self.rig.close_jaws(&mut self.world, &self.grip_force_n, self.jaw_mass_kg);
         let contact_n = self.contact_force_n;
         self.rig.arm.pull(&mut self.world, self.direction, applied_n, contact_n, jaws_n);
-        self.world.solve_in(if self.sliding { Iterations::Sliding } else { Iterations::Holding });
         let refresh = std::mem::take(&mut self.refresh_contacts);
         self.world.step(step_s, refresh)?;
         let momentum = self.rig.momentum(&self.world, self.direction);

@@ -6,14 +6,8 @@
 
 use rapier3d_f64::prelude::*;
 
-/// Solver iterations of one step. Each is a substep of the engine, with the arm's mass matrix built anew.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Iterations {
-    /// With fewer, the pads drift before they slip.
-    Holding = 4,
-    /// Jaws that slide cannot drift: against 16 iterations, a slide with 2 has forces and ways as near as one with 4.
-    Sliding = 2,
-}
+/// Solver iterations of one step: with fewer, the pads drift before they slip.
+pub(crate) const SOLVER_ITERATIONS: usize = 4;
 
 /// A world that can be cloned: the sets of `PhysicsWorld`, and a pipeline that is only workspace.
 pub(crate) struct World {
@@ -56,7 +50,7 @@ impl World {
             normalized_max_corrective_velocity: 3.0,
             normalized_prediction_distance: 0.02,
             normalized_max_linear_velocity: 400.0,
-            num_solver_iterations: Iterations::Holding as usize,
+            num_solver_iterations: SOLVER_ITERATIONS,
             num_internal_pgs_iterations: 1,
             num_internal_stabilization_iterations: 1,
             max_ccd_substeps: 0,
@@ -119,16 +113,6 @@ impl World {
     /// Adds a collider to a body.
     pub(crate) fn add_collider(&mut self, collider: ColliderBuilder, to: RigidBodyHandle) -> ColliderHandle {
         self.colliders.insert_with_parent(collider, to, &mut self.bodies)
-    }
-
-    /// How finely the next steps are solved.
-    pub(crate) fn solve_in(&mut self, iterations: Iterations) {
-        self.parameters.num_solver_iterations = iterations as usize;
-    }
-
-    /// Solver iterations of the last step.
-    pub(crate) fn iterations(&self) -> usize {
-        self.parameters.num_solver_iterations
     }
 
     /// Length of the last step.
