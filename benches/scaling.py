@@ -139,7 +139,7 @@ def main():
     rows = [(f"{s}, {c}" if s == "clean" else s, 500, *bench.sweep(samples=500, shard_samples=50, images=f'{{storage="{s}", compression="{c}"}}'))
             for s, c in [("png", "fast"), ("clean", "fast"), ("clean", "small"), ("raw", "fast"), ("none", "fast")]]
     table("images stored as", rows)
-    rows = [(w, 200, *bench.sweep(samples=200, shard_samples=25, **of_width(options.work, w))) for w in (160, 320, 640, 1280)]
+    rows = [(w, 200, *bench.sweep(samples=200, shard_samples=25, **of_width(options.work, w))) for w in (160, 320, 640, 960)]
     table("pixels across an image (4 : 3)", rows)
     rows = [(f, 100, *bench.sweep(samples=100, shard_samples=25, images=f"{{during_pull={{frames={f}}}}}")) for f in (4, 16, 64)]
     table("frames of the pull", rows)
