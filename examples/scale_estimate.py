@@ -17,9 +17,12 @@ import gripgen as gg
 import numpy as np
 
 CONFIG = "asset:configs/quickstart.toml"
+SMALL = {"storage": "clean", "compression": "small"}
 KINDS = {
     "images, traces": {},
     "images": {"trace": "none"},
+    "small clean images, traces": {"images": SMALL},
+    "small clean images": {"images": SMALL, "trace": "none"},
     "labels": {"trace": "none", "images": "none"},
 }
 
