@@ -3,7 +3,7 @@
     python benches/epoch.py            # needs numpy and the installed package
 
 The network has the sizes of `examples/train_grip_metric.py`'s input (40 x 30 pixels of both jaws), one hidden layer and plain gradient descent, in
-numpy with one thread's worth of work. For figures that mean something nothing else may run.
+numpy. For figures that mean something nothing else may run.
 """
 
 import argparse

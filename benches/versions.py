@@ -40,7 +40,6 @@ class Run:
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         self.seconds, self.peak_mb = time.perf_counter() - start, usage.ru_maxrss / 1e3
-        self.cores = (usage.ru_utime + usage.ru_stime) / self.seconds
         self.works = child.returncode == 0
         self.kb = sum(f.stat().st_size for f in Path(work).glob("*.mcap")) / samples / 1e3
 
