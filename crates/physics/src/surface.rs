@@ -106,12 +106,19 @@ impl Surface {
         let tops = self.groups.iter().enumerate().filter_map(|(i, group)| Some((top(group)?, i)));
         let mut highest_first: Vec<(f64, usize)> = tops.filter(|(top, _)| *top >= floor).collect();
         highest_first.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        // Along z, to what rounding leaves; most triangles need no more.
+        let (down, lift) = (-r.matrix().row(2).transpose(), SLACK_M - gel_from_mesh.translation.z);
+        let about = |c: &Point3<f64>| down.dot(&c.coords) + lift;
         for (top, group) in highest_first {
             if top < floor {
                 return;
             }
             for &t in &self.order[self.groups[group].triangles.clone()] {
-                let corners = self.mesh.corners(t as usize).map(|c| gel_from_mesh * c);
+                let corners = self.mesh.corners(t as usize);
+                if corners.iter().all(|c| about(c) < floor) {
+                    continue;
+                }
+                let corners = corners.map(|c| gel_from_mesh * c);
                 let all = |f: &dyn Fn(&Point3<f64>) -> bool| corners.iter().all(f);
                 if all(&|p| p.x > w)
                     || all(&|p| p.x < -w)

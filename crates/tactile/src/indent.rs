@@ -111,8 +111,7 @@ pub fn indent(heights: &Plane, grid: &Grid, gel: &PressedGel, force_n: f64) -> R
     let level = SimdLevel::best();
     let map = HeightMap::of(heights);
     let top = map.top(None, level);
-    let press = Indentation { grid, gel, force_n, rest: None, level };
-    press.finish(&map, top, press.thickness_px())
+    Indentation { grid, gel, force_n, rest: None, level }.finish(&map, top)
 }
 
 /// The first piece drawn of a part.
@@ -120,6 +119,21 @@ const FIRST_DEPTH_PX: f64 = 4.0;
 /// What an estimate of the next piece is enlarged by, and how much deeper than before it is at least.
 const MARGIN: f64 = 1.1;
 const MIN_GROWTH: f64 = 1.5;
+
+/// A depth, and what a part touches that is pressed in so deep: sum of heights above its highest pixel, and number of pixels.
+#[derive(Debug, Clone, Copy)]
+struct Press {
+    depth_px: f64,
+    below: f64,
+    count: f64,
+}
+
+impl Press {
+    /// In cubic pixels.
+    fn volume(&self) -> f64 {
+        self.below + self.count * self.depth_px
+    }
+}
 
 fn cube(a: f64) -> f64 {
     a * a * a
@@ -155,66 +169,75 @@ impl Indentation<'_> {
         let mut depth_px = FIRST_DEPTH_PX.min(thickness_px);
         loop {
             let top = map.draw_down(mesh, depth_px, self.rest, self.level);
-            if top == f32::NEG_INFINITY || depth_px >= thickness_px {
-                return self.smooth(map, mesh, top, thickness_px);
+            if top == f32::NEG_INFINITY {
+                return Err(nothing_in_front(self.grid));
             }
-            let (below, count) = map.touched(self.rest, f64::from(top), depth_px, self.level);
-            let volume = below + count * depth_px;
+            let press = self.touched(map, top, depth_px);
+            let volume = press.volume();
             if volume >= wanted {
-                return self.smooth(map, mesh, top, depth_px);
+                return self.smooth(map, mesh, top, press);
+            }
+            if depth_px >= thickness_px {
+                return Err(self.through_the_gel(volume));
             }
             // Deeper than `enough` it cannot be, since more pixels only make it shallower; and on a round part the
             // volume grows with the square of the depth.
-            let enough = depth_px + (wanted - volume) / count + 1e-6;
+            let enough = depth_px + (wanted - volume) / press.count + 1e-6;
             let round = (MARGIN * (wanted / volume).sqrt()).max(MIN_GROWTH);
             depth_px = enough.min(round * depth_px).min(thickness_px);
         }
     }
 
-    /// The imprint of a map with the highest pixel `top`, complete as deep as `limit_px`, which is deep enough or
-    /// the whole gel.
-    fn finish(&self, map: &HeightMap, top: f32, limit_px: f64) -> Result<Imprint, IndentError> {
-        let press_px = self.press_px(map, top, limit_px)?;
+    /// The imprint of a map that is complete, with the highest pixel `top`.
+    fn finish(&self, map: &HeightMap, top: f32) -> Result<Imprint, IndentError> {
+        if top == f32::NEG_INFINITY {
+            return Err(nothing_in_front(self.grid));
+        }
+        let whole = self.touched(map, top, self.thickness_px());
+        if whole.volume() < self.wanted() {
+            return Err(self.through_the_gel(whole.volume()));
+        }
+        let press_px = self.settle(whole, |depth_px| self.touched(map, top, depth_px)).depth_px;
         let mut depth_px = Plane::filled(map.width, map.height, 0.0);
         self.write_depths(map, press_px - f64::from(top), &mut depth_px);
         let patch = self.patch(&depth_px);
         Ok(self.imprint(depth_px, press_px, patch))
     }
 
-    /// The same with the pixels beside steps at their points.
+    /// The imprint of a map that is complete as deep as `limit`, which is deep enough, with the pixels beside steps at
+    /// their points.
     fn smooth(
         &self,
         map: &mut HeightMap,
         mesh: &ClusteredMesh,
         top: f32,
-        limit_px: f64,
+        limit: Press,
     ) -> Result<Imprint, IndentError> {
-        let mut press_px = self.press_px(map, top, limit_px)?;
+        let by_centres = self.settle(limit, |depth_px| self.touched(map, top, depth_px));
+        let mut press_px = by_centres.depth_px;
         let mut depth_px = Plane::filled(map.width, map.height, 0.0);
         let top_px = f64::from(top);
         self.write_depths(map, press_px - top_px, &mut depth_px);
         // Areas and moments are unbiased by pixels that are in contact or not; one whose mean depth is above 0 may be so in part.
         let patch = self.patch(&depth_px);
-        if map.find_steps(&depth_px, self.level) {
-            let (at_centres_px, mut limit_px) = (press_px, limit_px);
-            let by_centres = map.touched(self.rest, top_px, at_centres_px, self.level);
+        if map.find_steps(&depth_px, patch.1.area, self.level) {
+            let mut limit_px = limit.depth_px;
             // Points change a press little: only what lies so deep is drawn at first.
-            let mut drawn_px = limit_px.min(MARGIN * at_centres_px);
+            let mut drawn_px = limit_px.min(MARGIN * press_px);
             loop {
                 map.draw_steps(mesh, top_px - drawn_px, self.rest, self.level);
-                let touched = |press_px| {
-                    let known = press_px == at_centres_px;
-                    let by_centres =
-                        if known { by_centres } else { map.touched(self.rest, top_px, press_px, self.level) };
-                    map.with_steps(by_centres, top_px, press_px, self.level)
+                let with_steps = |press: Press| {
+                    let sums = (press.below, press.count);
+                    let (below, count) = map.with_steps(sums, top_px, press.depth_px, self.level);
+                    Press { below, count, ..press }
                 };
-                press_px = self.settle(at_centres_px, touched);
+                let touched = |depth_px| with_steps(self.touched(map, top, depth_px));
+                press_px = self.settle(with_steps(by_centres), touched).depth_px;
                 if press_px <= drawn_px {
                     break;
                 }
                 if drawn_px >= self.thickness_px() {
-                    let (below, count) = touched(drawn_px);
-                    return Err(self.through_the_gel(below + count * drawn_px));
+                    return Err(self.through_the_gel(touched(drawn_px).volume()));
                 }
                 if drawn_px >= limit_px {
                     limit_px = (MIN_GROWTH * press_px).min(self.thickness_px());
@@ -228,36 +251,26 @@ impl Indentation<'_> {
         Ok(self.imprint(depth_px, press_px, patch))
     }
 
-    /// How deep a map is pressed in by the centres of its pixels.
-    fn press_px(&self, map: &HeightMap, top: f32, limit_px: f64) -> Result<f64, IndentError> {
-        if top == f32::NEG_INFINITY {
-            return Err(nothing_in_front(self.grid));
-        }
-        let touched = |press_px| map.touched(self.rest, f64::from(top), press_px, self.level);
-        if limit_px == self.thickness_px() {
-            let (below, count) = touched(limit_px);
-            let volume = below + count * limit_px;
-            if volume < self.wanted() {
-                return Err(self.through_the_gel(volume));
-            }
-        }
-        Ok(self.settle(limit_px, touched))
+    /// What a press touches by the centres of pixels.
+    fn touched(&self, map: &HeightMap, top: f32, depth_px: f64) -> Press {
+        let (below, count) = map.touched(self.rest, f64::from(top), depth_px, self.level);
+        Press { depth_px, below, count }
     }
 
-    /// Newton's method from a press, with what that press touches: sum of heights above the highest pixel, and number.
-    fn settle(&self, from_px: f64, touched: impl Fn(f64) -> (f64, f64)) -> f64 {
-        let (mut press_px, mut touching) = (from_px, f64::INFINITY);
+    /// Newton's method from a press that is too deep, with what others touch.
+    fn settle(&self, from: Press, touched: impl Fn(f64) -> Press) -> Press {
+        let mut press = from;
         // Only the first step may go deeper; from there on it is shallower with each.
         let mut deepest_px = f64::INFINITY;
-        loop {
-            let (below, count) = touched(press_px);
-            if count == touching || count < 1e-9 {
-                return press_px;
+        while press.count >= 1e-9 {
+            deepest_px = ((self.wanted() - press.below) / press.count).min(deepest_px);
+            let next = touched(deepest_px);
+            if next.count == press.count {
+                return next;
             }
-            touching = count;
-            press_px = ((self.wanted() - below) / count).min(deepest_px);
-            deepest_px = press_px;
+            press = next;
         }
+        press
     }
 
     fn write_depths(&self, map: &HeightMap, lift: f64, depth_px: &mut Plane) {

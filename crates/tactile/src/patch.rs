@@ -15,7 +15,7 @@ const CELLS_PER_SIDE: usize = 8;
 /// Where the cells of a patch are: the box that was cut, and one bit for each of its places that holds a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CellPlaces {
-    area: Area,
+    pub(crate) area: Area,
     held: u64,
 }
 

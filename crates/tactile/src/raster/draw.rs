@@ -164,9 +164,10 @@ impl HeightMap {
         level.run(Draw { map: self, mesh, floor_px })
     }
 
-    /// Finds the pixels beside a step of a contact that is so deep at the centres of pixels. Returns whether there are any.
-    pub(crate) fn find_steps(&mut self, depth_px: &Plane, level: SimdLevel) -> bool {
-        self.steps.find(depth_px, self.area, level)
+    /// Finds the pixels beside a step of a contact that is so deep at the centres of pixels, 0 beyond `area`. Returns
+    /// whether there are any.
+    pub(crate) fn find_steps(&mut self, depth_px: &Plane, area: Area, level: SimdLevel) -> bool {
+        self.steps.find(depth_px, area, level)
     }
 
     /// Draws these pixels at their points, all that reaches above `floor_px`.
@@ -234,6 +235,28 @@ impl HeightMap {
         sums
     }
 
+    /// The values from a place on, `-inf` after the first `n`, `rest` added.
+    #[inline(always)]
+    fn some_above_gel(&self, rest: Option<&Plane>, at: usize, n: usize) -> [f32; SUMMED] {
+        let some = |values: &[f32]| {
+            let mut some = [f32::NEG_INFINITY; SUMMED];
+            if n >= SUMMED {
+                some.copy_from_slice(&values[at..at + SUMMED]);
+            } else {
+                some[..n].copy_from_slice(&values[at..at + n]);
+            }
+            some
+        };
+        let mut row = some(&self.values);
+        if let Some(rest) = rest {
+            let rest = some(&rest.values);
+            for i in 0..SUMMED {
+                row[i] += rest[i];
+            }
+        }
+        row
+    }
+
     pub(crate) fn into_plane(self) -> Plane {
         Plane { width: self.width, height: self.height, values: self.values }
     }
@@ -269,25 +292,38 @@ struct Touched<'a> {
     press_px: f64,
 }
 
+/// Columns that are summed at once, their sums in registers.
+const SUMMED: usize = 16;
+
 impl Kernel for Touched<'_> {
     type Output = (f64, f64);
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) -> (f64, f64) {
-        let area = self.map.area;
-        let n = area.x.1 - area.x.0;
-        let (mut sum, mut count) = (vec![0.0; n], vec![0.0; n]);
-        let mut sums = Vec::new();
-        for y in area.y.0..area.y.1 {
-            let row = &self.map.above_gel(self.rest, y, &mut sums)[..n];
-            let (sum, count) = (&mut sum[..n], &mut count[..n]);
-            for i in 0..n {
-                let below = f64::from(row[i]) - self.top;
-                let touches = below + self.press_px > 0.0;
-                sum[i] += if touches { below } else { 0.0 };
-                count[i] += if touches { 1.0 } else { 0.0 };
+        let Self { map, rest, top, press_px } = self;
+        // Nothing so low touches, whatever the rounding: rows of a block without anything higher add nothing.
+        let low = ((top - press_px) as f32).next_down();
+        let Area { x: (from, to), y: rows } = map.area;
+        let (mut all, mut number) = (0.0, 0.0);
+        for x in (from..to).step_by(SUMMED) {
+            let (mut sum, mut count) = ([0.0; SUMMED], [0.0; SUMMED]);
+            for y in rows.0..rows.1 {
+                let row = map.some_above_gel(rest, y * map.width + x, to - x);
+                if !row.iter().fold(false, |some, &h| some | (h > low)) {
+                    continue;
+                }
+                for i in 0..SUMMED {
+                    let below = f64::from(row[i]) - top;
+                    let touches = below + press_px > 0.0;
+                    sum[i] += if touches { below } else { 0.0 };
+                    count[i] += if touches { 1.0 } else { 0.0 };
+                }
+            }
+            for i in 0..SUMMED {
+                all += sum[i];
+                number += count[i];
             }
         }
-        (sum.iter().sum(), count.iter().sum())
+        (all, number)
     }
 }
 

@@ -48,25 +48,6 @@ impl Edge {
         (y >= self.rows.0 && y <= self.rows.1).then_some(self.x_px + (y - self.y_px) * self.slope)
     }
 
-    /// Between which columns it lies from one row to another; the first is larger where it does not.
-    #[inline(always)]
-    fn reach(&self, rows: (f64, f64)) -> (f64, f64) {
-        let (from, to) = (higher(rows.0, self.rows.0), lower(rows.1, self.rows.1));
-        let x = |y: f64| self.x_px + (y - self.y_px) * self.slope;
-        let (a, b) = (x(from), x(to));
-        if from <= to { (lower(a, b), higher(a, b)) } else { (f64::INFINITY, f64::NEG_INFINITY) }
-    }
-}
-
-/// Between which columns a triangle lies from one row to another.
-#[inline(always)]
-pub(super) fn reach(edges: &[Edge; 3], rows: (f64, f64)) -> (f64, f64) {
-    let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
-    for edge in edges {
-        let (a, b) = edge.reach(rows);
-        (from, to) = (lower(from, a), higher(to, b));
-    }
-    (from, to)
 }
 
 /// Rows whose columns are found at once.
@@ -86,12 +67,43 @@ pub(super) fn spans(edges: &[Edge; 3], y: f64, last: f64) -> ([i32; ROWS], [i32;
             to[i] = if crossed & (x > to[i]) { x } else { to[i] };
         }
     }
-    let (mut first, mut end) = ([0; ROWS], [0; ROWS]);
-    for i in 0..ROWS {
-        let from = lower(higher(from[i].ceil(), 0.0), last + 1.0);
-        let to = higher(lower(to[i].floor(), last), -1.0);
-        // SAFETY: both lie between -1 and one more than the last column.
-        (first[i], end[i]) = unsafe { (from.to_int_unchecked(), to.to_int_unchecked()) };
+    whole(&from, &to, (0.0, last))
+}
+
+/// First and last column of the pixels that a triangle may reach with points, of those given, in the rows from `y` on; the
+/// first is larger where there is none.
+#[inline(always)]
+pub(super) fn bands(edges: &[Edge; 3], y: f64, columns: (usize, usize)) -> ([i32; ROWS], [i32; ROWS]) {
+    let (mut from, mut to) = ([f64::INFINITY; ROWS], [f64::NEG_INFINITY; ROWS]);
+    for edge in edges {
+        for i in 0..ROWS {
+            let y = y + f64::from(i as u32);
+            // Where the edge enters and leaves the row of pixels.
+            let (upper, under) = (higher(y - 0.5, edge.rows.0), lower(y + 0.5, edge.rows.1));
+            let a = edge.x_px + (upper - edge.y_px) * edge.slope;
+            let b = edge.x_px + (under - edge.y_px) * edge.slope;
+            let (left, right) = (lower(a, b), higher(a, b));
+            let meets = upper <= under;
+            from[i] = if meets & (left < from[i]) { left } else { from[i] };
+            to[i] = if meets & (right > to[i]) { right } else { to[i] };
+        }
     }
-    (first, end)
+    for i in 0..ROWS {
+        // Points lie a third of a pixel from its centre.
+        (from[i], to[i]) = (from[i] - 0.4, to[i] + 0.4);
+    }
+    whole(&from, &to, (columns.0 as f64, columns.1 as f64))
+}
+
+/// The columns between two places in each row, of those from the first to the last; the first is larger where there is none.
+#[inline(always)]
+fn whole(from: &[f64; ROWS], to: &[f64; ROWS], (first, last): (f64, f64)) -> ([i32; ROWS], [i32; ROWS]) {
+    let (mut begin, mut end) = ([0; ROWS], [0; ROWS]);
+    for i in 0..ROWS {
+        let from = lower(higher(from[i].ceil(), first), last + 1.0);
+        let to = higher(lower(to[i].floor(), last), first - 1.0);
+        // SAFETY: both lie between one less than the first and one more than the last column.
+        (begin[i], end[i]) = unsafe { (from.to_int_unchecked(), to.to_int_unchecked()) };
+    }
+    (begin, end)
 }

@@ -74,13 +74,13 @@ fn a_slope_has_no_points() {
         &Pose::identity(),
         &GRID,
     );
-    map.area = Area::whole(GRID.width_px, GRID.height_px);
+    let area = Area::whole(GRID.width_px, GRID.height_px);
     let plane = |per_px: f32| {
         let depth = |i: usize| per_px * (i % GRID.width_px) as f32;
         Plane { values: (0..GRID.len()).map(depth).collect(), ..Plane::filled(150, 90, 0.0) }
     };
-    assert!(!map.find_steps(&plane(0.45), SimdLevel::best()));
-    assert!(map.find_steps(&plane(0.6), SimdLevel::best()));
+    assert!(!map.find_steps(&plane(0.45), area, SimdLevel::best()));
+    assert!(map.find_steps(&plane(0.6), area, SimdLevel::best()));
     let weights = map.steps.weights();
     assert_eq!(weights.len(), GRID.len());
     assert!(weights.iter().all(|w| (w - 0.2).abs() < 1e-4));

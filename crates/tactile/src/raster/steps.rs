@@ -1,6 +1,6 @@
 //! Points within pixels, where a surface has a step: the border of a contact there lies between pixel centres.
 
-use super::edge::{Corner, Edge, higher, lower, reach};
+use super::edge::{Corner, Edge, ROWS as BAND, bands, higher, lower};
 use crate::convolve::Area;
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
@@ -20,7 +20,7 @@ const SIDE: usize = 64;
 const SUMS: usize = 8;
 
 /// Rows whose steps are looked for at once.
-const COARSE: usize = 8;
+const COARSE: usize = BAND;
 
 /// Where the depths of two neighbours differ by more than this, in pixels, points begin to count, and they alone count
 /// from [`STEP_PX`] on. In between both do, so that no last bit of a depth decides what a pixel is.
@@ -187,25 +187,21 @@ impl Steps {
         let tall = rows.1 - rows.0 >= TALL;
         let edges = tall.then(|| [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])]);
         for block in rows.0 / COARSE..=rows.1 / COARSE {
-            let first = rows.0.max(COARSE * block);
-            let last = rows.1.min(COARSE * block + COARSE - 1);
-            // Of a long and thin triangle little lies in a few rows.
-            let columns = match &edges {
-                Some(edges) => narrowed(edges, (first, last), columns),
-                None => columns,
-            };
-            if columns.0 > columns.1 || !any(self.row(&self.coarse, block), columns) {
+            if !any(self.row(&self.coarse, block), columns) {
                 continue;
             }
-            for row in first..=last {
-                if !any(self.row(&self.bits, row), columns) {
+            // Of a long and thin triangle little lies in a row.
+            let bands = edges.as_ref().map(|edges| bands(edges, (COARSE * block) as f64, columns));
+            for row in rows.0.max(COARSE * block)..=rows.1.min(COARSE * block + COARSE - 1) {
+                let columns = match &bands {
+                    Some((from, to)) => (from[row % COARSE] as usize, (to[row % COARSE] + 1) as usize),
+                    None => (columns.0, columns.1 + 1),
+                };
+                if columns.0 >= columns.1 {
                     continue;
                 }
-                let columns = match &edges {
-                    Some(edges) => narrowed(edges, (row, row), columns),
-                    None => columns,
-                };
-                if columns.0 > columns.1 {
+                let columns = (columns.0, columns.1 - 1);
+                if !any(self.row(&self.bits, row), columns) {
                     continue;
                 }
                 let y = row as f64;
@@ -262,18 +258,6 @@ unsafe fn raise<L: Lanes>(heights: &[f32; PLACES], to: &mut [f32; PLACES]) {
             L::store(to.as_mut_ptr().add(at), L::larger_unless_nan(new, old));
         }
     }
-}
-
-/// Columns of pixels, of those given, whose points a triangle may reach in some rows.
-#[inline(always)]
-fn narrowed(edges: &[Edge; 3], rows: (usize, usize), columns: (usize, usize)) -> (usize, usize) {
-    let (from, to) = reach(edges, (rows.0 as f64 - 0.5, rows.1 as f64 + 0.5));
-    // Points lie a third of a pixel from its centre.
-    let from = lower(higher((from - 0.4).ceil(), columns.0 as f64), (columns.1 + 1) as f64);
-    let to = lower(higher((to + 0.4).floor(), -1.0), columns.1 as f64);
-    // SAFETY: both lie between -1 and a column after the last.
-    let (from, to) = unsafe { (from.to_int_unchecked::<i32>(), to.to_int_unchecked::<i32>()) };
-    if to < 0 { (1, 0) } else { (from as usize, to as usize) }
 }
 
 /// An edge as a line, seen from the end with the lower number: on which side of it a point lies.
