@@ -216,6 +216,7 @@ impl TriMesh {
     }
 
     /// The corners of triangle `t`.
+    #[inline]
     pub fn corners(&self, t: usize) -> [Point3<f64>; 3] {
         self.triangles[t].map(|v| self.vertices_m[v as usize])
     }

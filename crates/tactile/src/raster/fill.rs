@@ -5,6 +5,9 @@ use super::edge::{Corner, Edge, ROWS, higher, lower, spans};
 /// A triangle over more rows than this has its columns found for many rows at once.
 const TALL: usize = 4;
 
+/// Pixels of a row that are written at once.
+const COLUMNS: usize = 8;
+
 /// Writes one triangle into a map where it is nearer than what is there.
 #[inline(always)]
 pub(super) fn fill(map: &mut [f32], width: usize, t: [Corner; 3], rows: (usize, usize)) {
@@ -15,28 +18,20 @@ pub(super) fn fill(map: &mut [f32], width: usize, t: [Corner; 3], rows: (usize, 
     if area == 0.0 {
         return;
     }
-    let slope_x = (uh * vy - vh * uy) / area;
-    let slope_y = (vh * ux - uh * vx) / area;
-    let top = higher(higher(t[0].height_px, t[1].height_px), t[2].height_px);
-    let bottom = lower(lower(t[0].height_px, t[1].height_px), t[2].height_px);
+    let surface = Surface {
+        slope: ((uh * vy - vh * uy) / area, (vh * ux - uh * vx) / area),
+        top: higher(higher(t[0].height_px, t[1].height_px), t[2].height_px),
+        bottom: lower(lower(t[0].height_px, t[1].height_px), t[2].height_px),
+        corner: t[0],
+    };
     let edges = [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])];
     let last_column = (width - 1) as f64;
-    let mut draw = |row: usize, from: i32, to: i32| {
-        let along_row = t[0].height_px + slope_y * (f64::from(row as i32) - t[0].y_px);
-        let cells = &mut map[row * width..][from as usize..=to as usize];
-        for (i, cell) in cells.iter_mut().enumerate() {
-            let column = from + i as i32;
-            let height = along_row + slope_x * (f64::from(column) - t[0].x_px);
-            let height = lower(top, higher(bottom, height)) as f32;
-            *cell = if height > *cell { height } else { *cell };
-        }
-    };
     if rows.1 - rows.0 >= TALL {
         for start in (rows.0..=rows.1).step_by(ROWS) {
             let (from, to) = spans(&edges, f64::from(start as i32), last_column);
             for i in 0..ROWS.min(rows.1 + 1 - start) {
                 if from[i] <= to[i] {
-                    draw(start + i, from[i], to[i]);
+                    surface.draw(&mut map[(start + i) * width..][..width], start + i, from[i], to[i]);
                 }
             }
         }
@@ -56,7 +51,50 @@ pub(super) fn fill(map: &mut [f32], width: usize, t: [Corner; 3], rows: (usize, 
         if from <= to {
             // SAFETY: both lie between 0 and the last column.
             let (from, to) = unsafe { (from.to_int_unchecked::<i32>(), to.to_int_unchecked::<i32>()) };
-            draw(row, from, to);
+            surface.draw(&mut map[row * width..][..width], row, from, to);
         }
+    }
+}
+
+/// The plane of a triangle.
+struct Surface {
+    corner: Corner,
+    /// Per column and per row.
+    slope: (f64, f64),
+    top: f64,
+    bottom: f64,
+}
+
+impl Surface {
+    /// One row, from one column up to another. A closure would not be compiled for the vector unit.
+    #[inline(always)]
+    fn draw(&self, cells: &mut [f32], row: usize, from: i32, to: i32) {
+        let along_row = self.corner.height_px + self.slope.1 * (f64::from(row as i32) - self.corner.y_px);
+        if cells.len() < COLUMNS {
+            for column in from..=to {
+                let cell = &mut cells[column as usize];
+                *cell = self.raised(along_row, column, *cell);
+            }
+            return;
+        }
+        let mut start = from;
+        while start <= to {
+            // Whole groups, for most triangles are narrow; the last one of a row lies further to the left.
+            let first = start.min((cells.len() - COLUMNS) as i32);
+            let group = &mut cells[first as usize..first as usize + COLUMNS];
+            for i in 0..COLUMNS {
+                let column = first + i as i32;
+                let height = self.raised(along_row, column, group[i]);
+                group[i] = if (column >= from) & (column <= to) { height } else { group[i] };
+            }
+            start += COLUMNS as i32;
+        }
+    }
+
+    #[inline(always)]
+    fn raised(&self, along_row: f64, column: i32, old: f32) -> f32 {
+        let height = along_row + self.slope.0 * (f64::from(column) - self.corner.x_px);
+        let height = lower(self.top, higher(self.bottom, height)) as f32;
+        if height > old { height } else { old }
     }
 }
