@@ -107,8 +107,9 @@ impl Surface {
         let mut highest_first: Vec<(f64, usize)> = tops.filter(|(top, _)| *top >= floor).collect();
         highest_first.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         // Along z, to what rounding leaves; most triangles need no more.
-        let (down, lift) = (-r.matrix().row(2).transpose(), SLACK_M - gel_from_mesh.translation.z);
-        let about = |c: &Point3<f64>| down.dot(&c.coords) + lift;
+        let (x, y, z) = (-r[(2, 0)], -r[(2, 1)], -r[(2, 2)]);
+        let lift = SLACK_M - gel_from_mesh.translation.z;
+        let about = |c: &Point3<f64>| x * c.x + y * c.y + z * c.z + lift;
         for (top, group) in highest_first {
             if top < floor {
                 return;

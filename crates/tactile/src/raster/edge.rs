@@ -47,7 +47,6 @@ impl Edge {
     pub(super) fn crossing(&self, y: f64) -> Option<f64> {
         (y >= self.rows.0 && y <= self.rows.1).then_some(self.x_px + (y - self.y_px) * self.slope)
     }
-
 }
 
 /// Rows whose columns are found at once.

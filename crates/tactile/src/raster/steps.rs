@@ -181,9 +181,11 @@ impl Steps {
         let turn = if area > 0.0 { 1.0 } else { -1.0 };
         let sides =
             [Side::new(&t[0], &t[1], turn), Side::new(&t[1], &t[2], turn), Side::new(&t[2], &t[0], turn)];
-        // From the centre of a pixel to its points.
-        let plane = Offsets::new(slope_x, slope_y);
-        let across = [sides[0].offsets(), sides[1].offsets(), sides[2].offsets()];
+        // The three sides, and the surface, at the centre of a pixel, and from there to its points.
+        let [first, second, third] = &sides;
+        let from_x = [first.from.0, second.from.0, third.from.0, t[0].x_px];
+        let per_column = [first.y, second.y, third.y, -slope_x];
+        let across = [first.offsets(), second.offsets(), third.offsets(), Offsets::new(slope_x, slope_y)];
         let tall = rows.1 - rows.0 >= TALL;
         let edges = tall.then(|| [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])]);
         for block in rows.0 / COARSE..=rows.1 / COARSE {
@@ -205,7 +207,12 @@ impl Steps {
                     continue;
                 }
                 let y = row as f64;
-                let along_row = t[0].height_px + slope_y * (y - t[0].y_px);
+                let in_row = [
+                    first.x * (y - first.from.1),
+                    second.x * (y - second.from.1),
+                    third.x * (y - third.from.1),
+                    t[0].height_px + slope_y * (y - t[0].y_px),
+                ];
                 for word in columns.0 / 64..=columns.1 / 64 {
                     let bits = self.bits[row * self.words + word];
                     let low = if word == columns.0 / 64 { u64::MAX << (columns.0 % 64) } else { u64::MAX };
@@ -218,16 +225,18 @@ impl Steps {
                         let x = (64 * word + bit as usize) as f64;
                         let before = (bits & !(u64::MAX << bit)).count_ones();
                         let at = (self.starts[row * self.words + word] + before) as usize;
-                        let centre = (along_row + slope_x * (x - t[0].x_px)) as f32;
-                        let side = [sides[0].of(x, y), sides[1].of(x, y), sides[2].of(x, y)];
+                        let mut centre = [0.0; 4];
+                        for i in 0..4 {
+                            centre[i] = (in_row[i] - per_column[i] * (x - from_x[i])) as f32;
+                        }
                         let mut heights = [0.0; PLACES];
                         for i in 0..PLACES {
-                            let height = centre + plane.0[i];
+                            let height = centre[3] + across[3].0[i];
                             let height = if height > bottom { height } else { bottom };
                             let height = if height < top { height } else { top };
-                            let within = (side[0] + across[0].0[i] >= 0.0)
-                                & (side[1] + across[1].0[i] >= 0.0)
-                                & (side[2] + across[2].0[i] >= 0.0);
+                            let within = (centre[0] + across[0].0[i] >= 0.0)
+                                & (centre[1] + across[1].0[i] >= 0.0)
+                                & (centre[2] + across[2].0[i] >= 0.0);
                             heights[i] = if within { height } else { f32::NEG_INFINITY };
                         }
                         // SAFETY: the caller has the instructions of `L`, and a pixel's heights are whole vectors.
@@ -260,7 +269,8 @@ unsafe fn raise<L: Lanes>(heights: &[f32; PLACES], to: &mut [f32; PLACES]) {
     }
 }
 
-/// An edge as a line, seen from the end with the lower number: on which side of it a point lies.
+/// An edge as a line, seen from the end with the lower number. `x (row - from.1) - y (column - from.0)` is at least 0 on the
+/// triangle's side.
 #[derive(Clone, Copy)]
 struct Side {
     from: (f64, f64),
@@ -274,12 +284,6 @@ impl Side {
     fn new(a: &Corner, b: &Corner, turn: f64) -> Self {
         let (a, b, turn) = if a.number <= b.number { (a, b, turn) } else { (b, a, -turn) };
         Self { from: (a.x_px, a.y_px), x: turn * (b.x_px - a.x_px), y: turn * (b.y_px - a.y_px) }
-    }
-
-    /// At least 0 on the triangle's side.
-    #[inline(always)]
-    fn of(&self, x: f64, y: f64) -> f32 {
-        (self.x * (y - self.from.1) - self.y * (x - self.from.0)) as f32
     }
 
     /// What is added on the way to the points of a pixel.
