@@ -2,6 +2,7 @@
 
 use crate::generate::drawn_scenario;
 use crate::project::Project;
+use crate::unvaried::drawn_from;
 use gripgen_twin::columns;
 use gripgen_twin::draw::{Distribution, Drawn};
 use gripgen_twin::{Table, Values};
@@ -61,25 +62,20 @@ pub fn beyond(project: &Project) -> Vec<Beyond> {
 
 /// The least and the largest number that `[vary]` gives a column; nothing of one value, which [`crate::unvaried()`] looks at.
 fn range(project: &Project, name: &str) -> Option<[f64; 2]> {
-    let is_it = |key: &str| match columns::covariate(name) {
-        Some(column) => columns::find(key).is_some_and(|drawn| drawn.name == column.name),
-        None => key == name,
-    };
-    let varied = project.sweep.vary.iter().find(|varied| is_it(&varied.key))?;
     // A twin may count the force of both jaws; tables are over that of one.
     let inside = |x: f64| match name {
         "grip_force_n" => project.twin.force_per_jaw_n(x),
         _ => x,
     };
-    ends(&varied.distribution).map(|ends| ends.map(inside))
+    drawn_from(project, name).and_then(ends).map(|ends| ends.map(inside))
 }
 
 /// Whether a sweep may draw a word of a column.
 fn may_be(project: &Project, name: &str, word: &str) -> bool {
     let scenario = drawn_scenario(project, 0);
     let fixed = || columns::value(name, scenario.view()).is_some_and(|at| at.to_string() == word);
-    match project.sweep.vary.iter().find(|varied| varied.key == name) {
-        Some(varied) => varied.distribution.extremes().iter().any(|value| value.to_string() == word),
+    match drawn_from(project, name) {
+        Some(distribution) => distribution.extremes().iter().any(|value| value.to_string() == word),
         None => fixed(),
     }
 }

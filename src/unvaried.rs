@@ -4,7 +4,7 @@ use crate::generate::drawn_scenario;
 use crate::project::Project;
 use gripgen_twin::columns::{self, Column};
 use gripgen_twin::config::ImageStorage;
-use gripgen_twin::draw::Drawn;
+use gripgen_twin::draw::{Distribution, Drawn};
 use gripgen_twin::effects::{Effect, EffectSpec};
 use gripgen_twin::{Table, Values, can_be_drawn};
 use std::fmt;
@@ -59,7 +59,7 @@ pub fn unvaried(project: &Project) -> Vec<Unvaried> {
     let mut found: Vec<Unvaried> = Vec::new();
     let mut add = |column: &str, cause: String, table: Option<&Table>| {
         let known = columns::covariate(column);
-        let stated = stated(project, column, known);
+        let stated = stated(project, column);
         let value = columns::value(column, scenario.view());
         let outside = table.is_some_and(|table| value.as_ref().is_some_and(|at| lies_outside(table, at)));
         let own = known.is_none() || CHANGE_BY_THEMSELVES.contains(&column);
@@ -112,16 +112,21 @@ enum Stated {
 }
 
 /// What `[vary]` says of a column.
-fn stated(project: &Project, name: &str, known: Option<&Column>) -> Stated {
-    let is_it = |key: &str| match known {
+fn stated(project: &Project, name: &str) -> Stated {
+    match drawn_from(project, name) {
+        None => Stated::No,
+        Some(distribution) if distribution.constant().is_some() => Stated::OneValue,
+        Some(_) => Stated::Varies,
+    }
+}
+
+/// What `[vary]` draws a column of a table of pulls from, whichever of its names the key is.
+pub(crate) fn drawn_from<'a>(project: &'a Project, name: &str) -> Option<&'a Distribution> {
+    let is_it = |key: &str| match columns::covariate(name) {
         Some(column) => columns::find(key).is_some_and(|drawn| drawn.name == column.name),
         None => key == name,
     };
-    match project.sweep.vary.iter().find(|v| is_it(&v.key)) {
-        None => Stated::No,
-        Some(varied) if varied.distribution.constant().is_some() => Stated::OneValue,
-        Some(_) => Stated::Varies,
-    }
+    project.sweep.vary.iter().find(|varied| is_it(&varied.key)).map(|varied| &varied.distribution)
 }
 
 /// Whether an effect does anything to a sample of the sweep.

@@ -1,12 +1,16 @@
 //! Stage `raster`: from a mesh to the height map that the gel meets.
 
 mod clusters;
+mod corners;
 mod draw;
 mod edge;
 mod fill;
+mod find;
+mod points;
 #[cfg(test)]
 mod step_tests;
 mod steps;
+mod sums;
 
 pub use clusters::ClusteredMesh;
 pub(crate) use draw::HeightMap;

@@ -1,18 +1,11 @@
 //! Points within pixels, where a surface has a step: the border of a contact there lies between pixel centres.
 
 use super::edge::{Corner, Edge, ROWS as BAND, bands, higher, lower};
+use super::find::Find;
+use super::points::{Offsets, PLACES, POINTS, Side};
 use crate::convolve::Area;
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
-
-/// Points along a side of a pixel; the middle one is its centre.
-const FINE: usize = 3;
-
-/// Points of a pixel.
-const POINTS: usize = FINE * FINE;
-
-/// Heights of a pixel in memory: its points, and what fills up a vector.
-const PLACES: usize = 16;
 
 /// Pixels that are summed side by side, and the sums of which all are made: the pixels of a block go to them in turn. A block is so long that the
 /// compiler takes it for a loop; it writes out shorter ones and leaves them to single numbers.
@@ -20,12 +13,12 @@ const SIDE: usize = 64;
 const SUMS: usize = 8;
 
 /// Rows whose steps are looked for at once.
-const COARSE: usize = BAND;
+pub(super) const COARSE: usize = BAND;
 
 /// Where the depths of two neighbours differ by more than this, in pixels, points begin to count, and they alone count
 /// from [`STEP_PX`] on. In between both do, so that no last bit of a depth decides what a pixel is.
-const SLOPE_PX: f32 = 0.5;
-const STEP_PX: f32 = 1.0;
+pub(super) const SLOPE_PX: f32 = 0.5;
+pub(super) const STEP_PX: f32 = 1.0;
 
 /// A triangle that is narrower than this, in pixels, has no points.
 const WALL_PX: f64 = 1e-4;
@@ -39,22 +32,22 @@ pub(super) struct Steps {
     width: usize,
     height: usize,
     /// One bit for each pixel, rows in whole words.
-    bits: Vec<u64>,
+    pub(super) bits: Vec<u64>,
     /// The bits of [`COARSE`] rows in one.
-    coarse: Vec<u64>,
-    words: usize,
+    pub(super) coarse: Vec<u64>,
+    pub(super) words: usize,
     /// Where in `pixels` those of a word begin.
     starts: Vec<u32>,
     /// Their places in the image.
-    pixels: Vec<u32>,
+    pub(super) pixels: Vec<u32>,
     /// How much the points of each count; the rest is its centre.
-    weights: Vec<f32>,
+    pub(super) weights: Vec<f32>,
     /// Heights at the points of each, in the order of a map; `-inf` where there is nothing.
     heights: Vec<[f32; PLACES]>,
     /// The same above the gel, as they are summed.
     blocks: Vec<Block>,
     /// Memory for a row.
-    largest: Vec<f32>,
+    pub(super) largest: Vec<f32>,
 }
 
 /// Pixels side by side, heights above the gel at rest.
@@ -269,60 +262,6 @@ unsafe fn raise<L: Lanes>(heights: &[f32; PLACES], to: &mut [f32; PLACES]) {
     }
 }
 
-/// An edge as a line, seen from the end with the lower number. `x (row - from.1) - y (column - from.0)` is at least 0 on the
-/// triangle's side.
-#[derive(Clone, Copy)]
-struct Side {
-    from: (f64, f64),
-    x: f64,
-    y: f64,
-}
-
-impl Side {
-    /// The edge from `a` to `b` of a triangle that lies on its left; if `turn` is -1, on its right.
-    #[inline(always)]
-    fn new(a: &Corner, b: &Corner, turn: f64) -> Self {
-        let (a, b, turn) = if a.number <= b.number { (a, b, turn) } else { (b, a, -turn) };
-        Self { from: (a.x_px, a.y_px), x: turn * (b.x_px - a.x_px), y: turn * (b.y_px - a.y_px) }
-    }
-
-    /// What is added on the way to the points of a pixel.
-    #[inline(always)]
-    fn offsets(&self) -> Offsets {
-        Offsets::new(-self.y, self.x)
-    }
-}
-
-/// What a linear function adds from the centre of a pixel to its points.
-#[derive(Clone, Copy)]
-struct Offsets([f32; PLACES]);
-
-impl Offsets {
-    #[inline(always)]
-    fn new(per_column: f64, per_row: f64) -> Self {
-        let (per_column, per_row) = (per_column as f32, per_row as f32);
-        let mut offsets = [0.0; PLACES];
-        for i in 0..PLACES {
-            offsets[i] = per_column * COLUMNS[i] + per_row * ROWS[i];
-        }
-        Self(offsets)
-    }
-}
-
-/// Where the points of a pixel are, from its centre.
-const COLUMNS: [f32; PLACES] = off_centre(1);
-const ROWS: [f32; PLACES] = off_centre(FINE);
-
-const fn off_centre(step: usize) -> [f32; PLACES] {
-    let mut at = [0.0; PLACES];
-    let mut i = 0;
-    while i < POINTS {
-        at[i] = ((i / step % FINE) as f32 - 1.0) / FINE as f32;
-        i += 1;
-    }
-    at
-}
-
 /// Whether a bit of a row is set, from one column up to another.
 #[inline(always)]
 fn any(words: &[u64], (first, last): (usize, usize)) -> bool {
@@ -405,60 +344,5 @@ impl Kernel for Write<'_> {
                 *at = (centre + weight * (sum[i] / POINTS as f64 - centre)) as f32;
             }
         }
-    }
-}
-
-#[inline(always)]
-fn most(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-struct Find<'a> {
-    steps: &'a mut Steps,
-    depth_px: &'a Plane,
-    /// Around what is not 0.
-    area: Area,
-}
-
-impl Kernel for Find<'_> {
-    type Output = ();
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) {
-        let Self { steps, depth_px, area } = self;
-        let (w, h) = (depth_px.width, depth_px.height);
-        // One more on each side; what lies beyond is 0.
-        let (x0, x1) = (area.x.0.max(1) - 1, (area.x.1 + 1).min(w));
-        let n = x1 - x0;
-        let mut memory = std::mem::take(&mut steps.largest);
-        memory.resize(n, 0.0);
-        let largest = &mut memory[..n];
-        for y in area.y.0.max(1) - 1..(area.y.1 + 1).min(h) {
-            let (above, below) = (depth_px.row(y.max(1) - 1), depth_px.row((y + 1).min(h - 1)));
-            let (here, above, below) = (&depth_px.row(y)[x0..x1], &above[x0..x1], &below[x0..x1]);
-            for x in 0..n {
-                largest[x] = most((here[x] - above[x]).abs(), (here[x] - below[x]).abs());
-            }
-            for x in 1..n {
-                largest[x] = most(largest[x], (here[x] - here[x - 1]).abs());
-            }
-            for x in 0..n - 1 {
-                largest[x] = most(largest[x], (here[x] - here[x + 1]).abs());
-            }
-            for (c, chunk) in largest.chunks(16).enumerate() {
-                if !chunk.iter().fold(false, |some, &e| some | (e > SLOPE_PX)) {
-                    continue;
-                }
-                for (i, &e) in chunk.iter().enumerate() {
-                    if e > SLOPE_PX {
-                        let x = x0 + 16 * c + i;
-                        steps.bits[y * steps.words + x / 64] |= 1 << (x % 64);
-                        steps.coarse[y / COARSE * steps.words + x / 64] |= 1 << (x % 64);
-                        steps.pixels.push((y * w + x) as u32);
-                        steps.weights.push(((e - SLOPE_PX) / (STEP_PX - SLOPE_PX)).min(1.0));
-                    }
-                }
-            }
-        }
-        steps.largest = memory;
     }
 }

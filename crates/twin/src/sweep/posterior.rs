@@ -1,8 +1,7 @@
 //! Sweeps that draw cause and parameters of the twin together.
 
 use super::Sweep;
-use crate::config::is_twin_key;
-use crate::config::{ConfigError, Document};
+use crate::config::{ConfigError, Document, is_twin_key};
 use crate::draw::Distribution;
 use crate::{CAUSE_KEY, Posterior, PosteriorDraw};
 use std::collections::BTreeMap;
