@@ -79,6 +79,8 @@ pub struct Context<'a> {
     pub base: PullModel,
     /// Lag and dead time of the twin that was given, for campaigns without traces.
     pub given: (f64, f64, f64),
+    /// Damping of that twin.
+    pub given_damping_n_s_per_m: f64,
     /// How heavy the tails of its residuals are.
     pub tails: Tails,
     /// 90 % interval of the noise of a reading, where labels alone say it.
@@ -115,6 +117,7 @@ impl<'a> Context<'a> {
             kinetic: None,
             slips: None,
             given: (given.lag_s, given.dead_time_s, given.kinetic_ratio),
+            given_damping_n_s_per_m: given.damping_n_s_per_m,
             tails: Tails::FEW,
             noise90_n: None,
             base,
@@ -133,8 +136,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Without traces the labels are all that knows of force loop and sensor: lag, dead time and noise from them, once. Where they have said
-    /// it already, that stands.
+    /// Without traces the labels are all that knows of force loop and sensor: lag, dead time, damping and noise from them, once. Where they
+    /// have said it already, that stands.
     pub(super) fn learn_lag(&mut self, rows: &[usize]) {
         if !self.observations.is_empty() || self.noise90_n.is_some() {
             return;

@@ -86,6 +86,8 @@ pub(super) fn plain_baseline(m: &PullModel, context: &Context<'_>) -> BTreeMap<S
     if !context.observations.is_empty() {
         let each = m.stiffness_n_per_m * 0.5e-3;
         values.insert("gel.left.shear_stiffness_n_per_mm".into(), plain(each, "N/mm"));
+    }
+    if !context.observations.is_empty() || m.damping_n_s_per_m != context.given_damping_n_s_per_m {
         values.insert("robot.damping_n_s_per_m".into(), plain(m.damping_n_s_per_m, "N s/m"));
     }
     values

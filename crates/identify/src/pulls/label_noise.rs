@@ -1,4 +1,4 @@
-//! How noisy a force sensor is of which there are labels alone.
+//! How noisy a force sensor is of which there are labels alone, and how fast jaws slide then.
 //!
 //! A label is the last reading near the command, so a noisy sensor reads it higher, by one or two deviations, and scatters it where the
 //! friction hardly does: at small forces. Together they are known from an offset of the friction or of the sensor, which moves labels
@@ -20,35 +20,77 @@ pub(super) const TRIED_TO_N: f64 = 0.9;
 /// 0.19 N in quiet stretches, and more while they move.
 const KNOWN: f64 = 0.7;
 
+/// Dampings that are tried beside that of the twin, and which of the noises with them. A tool that slides fast is at the stop before the
+/// command is far enough ahead for a noisy reading to be the label: labels then rise with the rate of the pull, and in the place
+/// of the rig's damping friction would.
+const DAMPINGS_N_S_PER_M: [f64; 3] = [60.0, 130.0, 300.0];
+const TRIED_WITH_THEM: [usize; 4] = [1, 3, 5, 7];
+
+/// Factor from the best of them to the two that are tried beside it.
+const NEARER: f64 = 1.4;
+
+/// Standard deviation of the logarithm of a damping about that of the twin: from the shipped 2000 N s/m the 100 of light arms are
+/// two away.
+const DAMPED: f64 = 1.5;
+
 /// Loss of log-likelihood at the ends of a 90 % interval.
 const HALF_CHI_SQUARED: f64 = 1.353;
 
+/// A fit with a noise and a damping: logarithm of the noise, log-likelihood with what is believed of both, model.
+type Tried = (f64, f64, PullModel);
+
 impl Context<'_> {
-    /// The baseline with lag, dead time and noise that labels say, and the 90 % interval of the noise (profile likelihood).
+    /// The baseline with lag, dead time, damping and noise that labels say, and the 90 % interval of the noise (profile likelihood).
     pub(super) fn noise_of_labels(&self, rows: &[usize]) -> Option<(PullModel, (f64, f64))> {
         let given = libm::log(self.base.noise_n.clamp(TRIED_N[0], TRIED_N[TRIED_N.len() - 1]));
-        let at = |log_noise: f64| {
-            let start = PullModel { noise_n: libm::exp(log_noise), ..self.base.clone() };
+        let given_damping = self.base.damping_n_s_per_m;
+        let at = |log_noise: f64, damping_n_s_per_m: f64| {
+            let start = PullModel { noise_n: libm::exp(log_noise), damping_n_s_per_m, ..self.base.clone() };
             let found = self.fit(&start, &Terms::default(), rows)?;
-            let prior = (log_noise - given) / KNOWN;
-            Some((log_noise, found.likelihood.log - found.trace_cost - 0.5 * prior * prior, found.model))
+            let noisy = (log_noise - given) / KNOWN;
+            let damped = libm::log(damping_n_s_per_m / given_damping) / DAMPED;
+            let score = found.likelihood.log - found.trace_cost - 0.5 * (noisy * noisy + damped * damped);
+            Some((log_noise, score, found.model))
         };
         // The fits with lag and dead time free are most of what a diagnosis of labels takes: threads share them.
-        let slots = TRIED_N.map(|_| Mutex::new(None));
-        self.predictor.for_each(slots.len(), &|k| {
-            let found = at(libm::log(TRIED_N[k]));
-            if let Ok(mut slot) = slots[k].lock() {
-                *slot = found;
-            }
-        });
-        let tried: Vec<_> = slots.into_iter().filter_map(|slot| slot.into_inner().ok().flatten()).collect();
+        let all = |places: &[(usize, f64)]| -> Vec<Tried> {
+            let slots: Vec<Mutex<Option<Tried>>> = places.iter().map(|_| Mutex::new(None)).collect();
+            self.predictor.for_each(slots.len(), &|k| {
+                let found = at(libm::log(TRIED_N[places[k].0]), places[k].1);
+                if let Ok(mut slot) = slots[k].lock() {
+                    *slot = found;
+                }
+            });
+            slots.into_iter().filter_map(|slot| slot.into_inner().ok().flatten()).collect()
+        };
+        let mut places: Vec<(usize, f64)> = (0..TRIED_N.len()).map(|k| (k, given_damping)).collect();
+        if !self.predictor.winds_up() {
+            let lighter = DAMPINGS_N_S_PER_M.into_iter().filter(|d| *d < given_damping);
+            places.extend(lighter.flat_map(|d| TRIED_WITH_THEM.map(|k| (k, d))));
+        }
+        let mut tried = all(&places);
+        let most_likely = |tried: &[Tried]| {
+            let best = tried.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+            Some((best.0, best.2.damping_n_s_per_m))
+        };
+        let (log_noise, near) = most_likely(&tried)?;
+        if near != given_damping {
+            let noise = (0..TRIED_N.len()).find(|k| libm::log(TRIED_N[*k]) == log_noise)?;
+            tried.extend(all(&[near / NEARER, near * NEARER].map(|d| (noise, d))));
+        }
+        let (_, damping) = most_likely(&tried)?;
+        tried.retain(|t| t.2.damping_n_s_per_m == damping);
+        let known: Vec<f64> = tried.iter().map(|t| t.0).collect();
+        let others = (0..TRIED_N.len()).filter(|k| !known.contains(&libm::log(TRIED_N[*k])));
+        tried.extend(all(&others.map(|k| (k, damping)).collect::<Vec<_>>()));
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         let best = (0..tried.len()).max_by(|&a, &b| tried[a].1.total_cmp(&tried[b].1))?;
         let peak = match (best.checked_sub(1).map(|k| &tried[k]), tried.get(best + 1)) {
             (Some(below), Some(above)) => summit([below, &tried[best], above].map(|t| (t.0, t.1))),
             _ => tried[best].0,
         };
         let (log_noise, most, model) =
-            at(peak).filter(|found| found.1 >= tried[best].1).unwrap_or_else(|| tried[best].clone());
+            at(peak, damping).filter(|found| found.1 >= tried[best].1).unwrap_or_else(|| tried[best].clone());
         let profile: Vec<(f64, f64)> = tried.iter().map(|t| (t.0, t.1 - most + HALF_CHI_SQUARED)).collect();
         let low = end(profile.iter().filter(|t| t.0 < log_noise).rev(), log_noise);
         let high = end(profile.iter().filter(|t| t.0 > log_noise), log_noise);
