@@ -36,6 +36,20 @@ fn labels_say_how_noisy_their_sensor_is() {
     assert_eq!(found.verdict, Verdict::None, "{:?} {:?}", names(&found), found.unknown);
 }
 
+/// Jaws that slide fast are at the stop before a noisy reading is the label, so that labels go with the rate of the pull. That is the arm,
+/// and no friction that depends on the rate.
+#[test]
+fn labels_say_how_fast_the_jaws_slide() {
+    let own = [("wrist.noise_n", "0.35"), ("robot.feedback", "independent")];
+    let light = [own[0], own[1], ("robot.damping_n_s_per_m", "100.0")];
+    let found = diagnose(&labels_alone(simulated("", 60, &light)), &[]).diagnosis;
+    assert_eq!(found.verdict, Verdict::None, "{:?} {:?}", names(&found), found.unknown);
+    let damping = &found.baseline["robot.damping_n_s_per_m"];
+    assert!(damping.value > 40.0 && damping.value < 250.0, "{damping:?}");
+    let heavy = diagnose(&labels_alone(simulated("", 60, &own)), &[]).diagnosis;
+    assert!(!heavy.baseline.contains_key("robot.damping_n_s_per_m"), "{:?}", heavy.baseline);
+}
+
 /// A sensor that ends above all levels but the strongest: pulls of the other levels know nothing of its end, so that errors on held-out
 /// levels do not fall, and the answer says on what it rests.
 #[test]
