@@ -1,7 +1,7 @@
 //! Points within pixels, where a surface has a step: the border of a contact there lies between pixel centres.
 
-use super::edge::{Corner, Edge, ROWS as BAND, bands, higher, lower};
-use super::find::Find;
+use super::edge::{Corner, Edge, bands, higher, lower};
+use super::find::{Beside, COARSE};
 use super::points::{Offsets, PLACES, POINTS, Side};
 use crate::convolve::Area;
 use crate::grid::Plane;
@@ -12,14 +12,6 @@ use crate::simd::{Kernel, Lanes, SimdLevel};
 const SIDE: usize = 64;
 const SUMS: usize = 8;
 
-/// Rows whose steps are looked for at once.
-pub(super) const COARSE: usize = BAND;
-
-/// Where the depths of two neighbours differ by more than this, in pixels, points begin to count, and they alone count
-/// from [`STEP_PX`] on. In between both do, so that no last bit of a depth decides what a pixel is.
-pub(super) const SLOPE_PX: f32 = 0.5;
-pub(super) const STEP_PX: f32 = 1.0;
-
 /// A triangle that is narrower than this, in pixels, has no points.
 const WALL_PX: f64 = 1e-4;
 
@@ -29,25 +21,11 @@ const TALL: usize = 4;
 /// The pixels of a map beside a step, and the height of the surface at the points of each. Memory to be used again.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Steps {
-    width: usize,
-    height: usize,
-    /// One bit for each pixel, rows in whole words.
-    pub(super) bits: Vec<u64>,
-    /// The bits of [`COARSE`] rows in one.
-    pub(super) coarse: Vec<u64>,
-    pub(super) words: usize,
-    /// Where in `pixels` those of a word begin.
-    starts: Vec<u32>,
-    /// Their places in the image.
-    pub(super) pixels: Vec<u32>,
-    /// How much the points of each count; the rest is its centre.
-    pub(super) weights: Vec<f32>,
+    beside: Beside,
     /// Heights at the points of each, in the order of a map; `-inf` where there is nothing.
     heights: Vec<[f32; PLACES]>,
     /// The same above the gel, as they are summed.
     blocks: Vec<Block>,
-    /// Memory for a row.
-    pub(super) largest: Vec<f32>,
 }
 
 /// Pixels side by side, heights above the gel at rest.
@@ -68,39 +46,21 @@ impl Steps {
     /// Finds the pixels beside a step of a contact that is so deep at the centres of pixels, 0 beyond `area`. Returns whether
     /// there are any.
     pub(super) fn find(&mut self, depth_px: &Plane, area: Area, level: SimdLevel) -> bool {
-        (self.width, self.height) = (depth_px.width, depth_px.height);
-        self.words = self.width.div_ceil(64);
-        for (bits, rows) in [(&mut self.bits, self.height), (&mut self.coarse, self.height.div_ceil(COARSE))]
-        {
-            bits.clear();
-            bits.resize(self.words * rows, 0);
-        }
-        self.pixels.clear();
-        self.weights.clear();
-        if area.x.0 < area.x.1 && area.y.0 < area.y.1 {
-            level.run(Find { steps: self, depth_px, area });
-        }
-        self.starts.clear();
-        let mut count = 0;
-        self.starts.extend(self.bits.iter().map(|bits| {
-            count += bits.count_ones();
-            count - bits.count_ones()
-        }));
-        !self.pixels.is_empty()
+        self.beside.find(depth_px, area, level)
     }
 
     /// Forgets what was drawn at the points.
     pub(super) fn empty(&mut self) {
         self.heights.clear();
-        self.heights.resize(self.pixels.len(), [f32::NEG_INFINITY; PLACES]);
+        self.heights.resize(self.beside.pixels.len(), [f32::NEG_INFINITY; PLACES]);
     }
 
     /// Puts what was drawn at the points beside the centres, whose heights are `centres`, for [`Steps::touched`] and
     /// [`Steps::write`].
     pub(super) fn collect(&mut self, centres: &[f32], rest: Option<&Plane>) {
         self.blocks.clear();
-        self.blocks.resize(self.pixels.len().div_ceil(SIDE), NOTHING);
-        for (i, (&pixel, heights)) in self.pixels.iter().zip(&self.heights).enumerate() {
+        self.blocks.resize(self.beside.pixels.len().div_ceil(SIDE), NOTHING);
+        for (i, (&pixel, heights)) in self.beside.pixels.iter().zip(&self.heights).enumerate() {
             let (block, i) = (&mut self.blocks[i / SIDE], i % SIDE);
             let rest = rest.map_or(0.0, |rest| rest.values[pixel as usize]);
             block.centres[i] = centres[pixel as usize] + rest;
@@ -108,7 +68,7 @@ impl Steps {
                 points[i] = height + rest;
             }
         }
-        for (block, weights) in self.blocks.iter_mut().zip(self.weights.chunks(SIDE)) {
+        for (block, weights) in self.blocks.iter_mut().zip(self.beside.weights.chunks(SIDE)) {
             block.weights[..weights.len()].copy_from_slice(weights);
         }
     }
@@ -132,19 +92,13 @@ impl Steps {
     /// The weight of each.
     #[cfg(test)]
     pub(super) fn weights(&self) -> &[f32] {
-        &self.weights
+        &self.beside.weights
     }
 
     /// Whether there may be some in a box; both ends count.
     #[inline(always)]
     pub(super) fn may_be_in(&self, rows: (usize, usize), columns: (usize, usize)) -> bool {
-        // A closure would not be compiled for the vector unit.
-        for row in rows.0 / COARSE..=rows.1 / COARSE {
-            if any(self.row(&self.coarse, row), columns) {
-                return true;
-            }
-        }
-        false
+        self.beside.may_be_in(rows, columns)
     }
 
     /// One triangle at the points of the pixels that it reaches, which lie in `rows` and `columns`; both ends count.
@@ -182,7 +136,7 @@ impl Steps {
         let tall = rows.1 - rows.0 >= TALL;
         let edges = tall.then(|| [Edge::new(&t[0], &t[1]), Edge::new(&t[1], &t[2]), Edge::new(&t[2], &t[0])]);
         for block in rows.0 / COARSE..=rows.1 / COARSE {
-            if !any(self.row(&self.coarse, block), columns) {
+            if !self.beside.any_near(block, columns) {
                 continue;
             }
             // Of a long and thin triangle little lies in a row.
@@ -196,7 +150,7 @@ impl Steps {
                     continue;
                 }
                 let columns = (columns.0, columns.1 - 1);
-                if !any(self.row(&self.bits, row), columns) {
+                if !self.beside.any_in(row, columns) {
                     continue;
                 }
                 let y = row as f64;
@@ -207,7 +161,7 @@ impl Steps {
                     t[0].height_px + slope_y * (y - t[0].y_px),
                 ];
                 for word in columns.0 / 64..=columns.1 / 64 {
-                    let bits = self.bits[row * self.words + word];
+                    let (bits, start) = self.beside.word(row, word);
                     let low = if word == columns.0 / 64 { u64::MAX << (columns.0 % 64) } else { u64::MAX };
                     let high =
                         if word == columns.1 / 64 { u64::MAX >> (63 - columns.1 % 64) } else { u64::MAX };
@@ -217,7 +171,7 @@ impl Steps {
                         left &= left - 1;
                         let x = (64 * word + bit as usize) as f64;
                         let before = (bits & !(u64::MAX << bit)).count_ones();
-                        let at = (self.starts[row * self.words + word] + before) as usize;
+                        let at = (start + before) as usize;
                         let mut centre = [0.0; 4];
                         for i in 0..4 {
                             centre[i] = (in_row[i] - per_column[i] * (x - from_x[i])) as f32;
@@ -239,12 +193,6 @@ impl Steps {
             }
         }
     }
-
-    /// The words of a row of bits.
-    #[inline(always)]
-    fn row<'a>(&self, bits: &'a [u64], row: usize) -> &'a [u64] {
-        &bits[row * self.words..][..self.words]
-    }
 }
 
 /// Heights of points where they are larger than before. Stored as a whole: writing some lanes alone is slow on many processors.
@@ -260,21 +208,6 @@ unsafe fn raise<L: Lanes>(heights: &[f32; PLACES], to: &mut [f32; PLACES]) {
             L::store(to.as_mut_ptr().add(at), L::larger_unless_nan(new, old));
         }
     }
-}
-
-/// Whether a bit of a row is set, from one column up to another.
-#[inline(always)]
-fn any(words: &[u64], (first, last): (usize, usize)) -> bool {
-    let (from, to) = (first / 64, last / 64);
-    let (low, high) = (u64::MAX << (first % 64), u64::MAX >> (63 - last % 64));
-    if from == to {
-        return words[from] & low & high != 0;
-    }
-    let mut some = (words[from] & low) | (words[to] & high);
-    for word in &words[from + 1..to] {
-        some |= word;
-    }
-    some != 0
 }
 
 struct Touched<'a> {
@@ -331,7 +264,7 @@ impl Kernel for Write<'_> {
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
         let Self { steps, lift, depth_px } = self;
-        for (block, pixels) in steps.blocks.iter().zip(steps.pixels.chunks(SIDE)) {
+        for (block, pixels) in steps.blocks.iter().zip(steps.beside.pixels.chunks(SIDE)) {
             let mut sum = [0.0; SIDE];
             for points in &block.points {
                 for i in 0..SIDE {
