@@ -20,11 +20,13 @@ pub(super) const TRIED_TO_N: f64 = 0.9;
 /// 0.19 N in quiet stretches, and more while they move.
 const KNOWN: f64 = 0.7;
 
-/// Dampings that are tried beside that of the twin, and which of the noises with them. A tool that slides fast is at the stop before the
-/// command is far enough ahead for a noisy reading to be the label: labels then rise with the rate of the pull, and in the place
-/// of the rig's damping friction would.
+/// Dampings that are tried beside that of the twin. A tool that slides fast is at the stop before the command is far enough ahead for
+/// a noisy reading to be the label: labels then rise with the rate of the pull, and in the place of the rig's damping friction would.
 const DAMPINGS_N_S_PER_M: [f64; 3] = [60.0, 130.0, 300.0];
-const TRIED_WITH_THEM: [usize; 4] = [1, 3, 5, 7];
+
+/// Noises that are tried with them, by places from the best one with the twin's damping: fewer readings are chosen for their
+/// noise, so that there is more of it.
+const NOISIER: [usize; 2] = [0, 2];
 
 /// Factor from the best of them to the two that are tried beside it.
 const NEARER: f64 = 1.4;
@@ -43,12 +45,11 @@ impl Context<'_> {
     /// The baseline with lag, dead time, damping and noise that labels say, and the 90 % interval of the noise (profile likelihood).
     pub(super) fn noise_of_labels(&self, rows: &[usize]) -> Option<(PullModel, (f64, f64))> {
         let given = libm::log(self.base.noise_n.clamp(TRIED_N[0], TRIED_N[TRIED_N.len() - 1]));
-        let given_damping = self.base.damping_n_s_per_m;
         let at = |log_noise: f64, damping_n_s_per_m: f64| {
             let start = PullModel { noise_n: libm::exp(log_noise), damping_n_s_per_m, ..self.base.clone() };
             let found = self.fit(&start, &Terms::default(), rows)?;
             let noisy = (log_noise - given) / KNOWN;
-            let damped = libm::log(damping_n_s_per_m / given_damping) / DAMPED;
+            let damped = libm::log(damping_n_s_per_m / self.given_damping_n_s_per_m) / DAMPED;
             let score = found.likelihood.log - found.trace_cost - 0.5 * (noisy * noisy + damped * damped);
             Some((log_noise, score, found.model))
         };
@@ -63,27 +64,30 @@ impl Context<'_> {
             });
             slots.into_iter().filter_map(|slot| slot.into_inner().ok().flatten()).collect()
         };
-        let mut places: Vec<(usize, f64)> = (0..TRIED_N.len()).map(|k| (k, given_damping)).collect();
+        let given_damping = self.given_damping_n_s_per_m;
+        let noise_of = |t: &Tried| TRIED_N.iter().position(|noise_n| libm::log(*noise_n) == t.0);
+        let most_likely = |tried: &[Tried]| tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)).cloned();
+        let each: Vec<(usize, f64)> = (0..TRIED_N.len()).map(|k| (k, given_damping)).collect();
+        let mut tried = all(&each);
         if !self.predictor.winds_up() {
+            let noise = noise_of(&most_likely(&tried)?)?;
             let lighter = DAMPINGS_N_S_PER_M.into_iter().filter(|d| *d < given_damping);
-            places.extend(lighter.flat_map(|d| TRIED_WITH_THEM.map(|k| (k, d))));
+            let places = lighter.flat_map(|d| NOISIER.map(|k| ((noise + k).min(TRIED_N.len() - 1), d)));
+            tried.extend(all(&places.collect::<Vec<_>>()));
         }
-        let mut tried = all(&places);
-        let most_likely = |tried: &[Tried]| {
-            let best = tried.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-            Some((best.0, best.2.damping_n_s_per_m))
-        };
-        let (log_noise, near) = most_likely(&tried)?;
-        if near != given_damping {
-            let noise = (0..TRIED_N.len()).find(|k| libm::log(TRIED_N[*k]) == log_noise)?;
-            tried.extend(all(&[near / NEARER, near * NEARER].map(|d| (noise, d))));
+        let near = most_likely(&tried)?;
+        if near.2.damping_n_s_per_m != given_damping {
+            let (noise, damping) = (noise_of(&near)?, near.2.damping_n_s_per_m);
+            tried.extend(all(&[damping / NEARER, damping * NEARER].map(|d| (noise, d))));
         }
-        let (_, damping) = most_likely(&tried)?;
+        let damping = most_likely(&tried)?.2.damping_n_s_per_m;
         tried.retain(|t| t.2.damping_n_s_per_m == damping);
-        let known: Vec<f64> = tried.iter().map(|t| t.0).collect();
-        let others = (0..TRIED_N.len()).filter(|k| !known.contains(&libm::log(TRIED_N[*k])));
-        tried.extend(all(&others.map(|k| (k, damping)).collect::<Vec<_>>()));
-        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let known: Vec<usize> = tried.iter().filter_map(noise_of).collect();
+        if damping != given_damping {
+            let others = (0..TRIED_N.len()).filter(|k| !known.contains(k));
+            tried.extend(all(&others.map(|k| (k, damping)).collect::<Vec<_>>()));
+            tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
         let best = (0..tried.len()).max_by(|&a, &b| tried[a].1.total_cmp(&tried[b].1))?;
         let peak = match (best.checked_sub(1).map(|k| &tried[k]), tried.get(best + 1)) {
             (Some(below), Some(above)) => summit([below, &tried[best], above].map(|t| (t.0, t.1))),

@@ -49,6 +49,9 @@ impl Edge {
     }
 }
 
+/// A triangle over more rows than this has its columns found for many rows at once.
+pub(super) const TALL: usize = 4;
+
 /// Rows whose columns are found at once.
 pub(super) const ROWS: usize = 8;
 

@@ -1,9 +1,6 @@
 //! A triangle at the centres of pixels.
 
-use super::edge::{Corner, Edge, ROWS, higher, lower, spans};
-
-/// A triangle over more rows than this has its columns found for many rows at once.
-const TALL: usize = 4;
+use super::edge::{Corner, Edge, ROWS, TALL, higher, lower, spans};
 
 /// Pixels of a row that are written at once.
 const COLUMNS: usize = 8;

@@ -1,6 +1,6 @@
 //! Points within pixels, where a surface has a step: the border of a contact there lies between pixel centres.
 
-use super::edge::{Corner, Edge, bands, higher, lower};
+use super::edge::{Corner, Edge, TALL, bands, higher, lower};
 use super::find::{Beside, COARSE};
 use super::points::{Offsets, PLACES, POINTS, Side};
 use crate::convolve::Area;
@@ -14,9 +14,6 @@ const SUMS: usize = 8;
 
 /// A triangle that is narrower than this, in pixels, has no points.
 const WALL_PX: f64 = 1e-4;
-
-/// A triangle over more rows than this is looked at row by row.
-const TALL: usize = 4;
 
 /// The pixels of a map beside a step, and the height of the surface at the points of each. Memory to be used again.
 #[derive(Debug, Clone, Default)]
