@@ -27,9 +27,12 @@ pub(crate) fn library(twin: &Twin) -> Library {
 }
 
 pub(crate) fn diagnose(measured: &MeasuredPulls, without: &[&str]) -> Diagnosed {
+    diagnose_with(measured, &twin_at(&baseline()), without)
+}
+
+pub(crate) fn diagnose_with(measured: &MeasuredPulls, twin: &Twin, without: &[&str]) -> Diagnosed {
     let options = PullDiagnoseOptions { jobs: 2, without };
-    let twin = twin_at(&baseline());
-    diagnose_pull_table(measured, &twin, &library(&twin), &options, &|_| {}).unwrap()
+    diagnose_pull_table(measured, twin, &library(twin), &options, &|_| {}).unwrap()
 }
 
 pub(crate) fn names(diagnosis: &Diagnosis) -> Vec<&str> {

@@ -16,7 +16,7 @@ use gripgen_identify::pulls::few_diagnosis::is_few;
 use gripgen_identify::pulls::model::PullModel;
 use gripgen_twin::config::{EffectFile, Twist};
 use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Twin};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How a diagnosis of pulls is made.
 pub struct PullDiagnoseOptions<'a> {
@@ -141,7 +141,9 @@ pub fn diagnose_pull_table(
     let predictor = PullPredictor::new(measured, twin, library, options.jobs);
     let given = given_model(twin, predictor.part_names())?;
     if is_few(measured) {
-        return Ok(diagnose_few_pulls(measured, &predictor, &given, twin));
+        let mut found = diagnose_few_pulls(measured, &predictor, &given, twin);
+        found.diagnosis.notes.extend(without_its_effects(twin));
+        return Ok(found);
     }
     let asked = PullOptions { without: options.without };
     let answer = diagnose_pulls(measured, &predictor, &given, &asked, progress);
@@ -153,6 +155,7 @@ pub fn diagnose_pull_table(
         None => None,
     };
     let mut diagnosis = answer.diagnosis;
+    diagnosis.notes.extend(without_its_effects(twin));
     if let Some(next) = &next {
         let own = diagnosis.effects.iter_mut().filter(|e| next.separates(&e.name));
         for separate in own.filter_map(|e| e.separate_by.as_mut()) {
@@ -161,6 +164,19 @@ pub fn diagnose_pull_table(
     }
     let posterior = answer.fits.map(|fits| fits.posterior);
     Ok(Diagnosed { next, posterior, ..Diagnosed::new(diagnosis, edits, report) })
+}
+
+/// That a twin's own effects are looked for again: a fit starts without them, and what is written holds what was found.
+fn without_its_effects(twin: &Twin) -> Option<String> {
+    let effects = twin.effects.iter().map(|e| e.spec.id.to_string());
+    let tables = twin.tables.iter().map(|t| format!("a table over {}", t.covariate));
+    let own: BTreeSet<String> = effects.chain(tables).collect();
+    (!own.is_empty()).then(|| {
+        format!(
+            "the effects of the twin that was given ({}) were looked for anew: \"before\" is without them, and a twin that is written has those that were found",
+            own.into_iter().collect::<Vec<_>>().join(", ")
+        )
+    })
 }
 
 /// The twin that the answer describes.

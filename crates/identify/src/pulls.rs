@@ -5,6 +5,8 @@ mod bend;
 pub mod calibrate;
 pub mod candidates;
 mod choose;
+mod chosen;
+mod compared;
 mod compete;
 pub mod context;
 pub mod curves;

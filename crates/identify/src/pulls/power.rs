@@ -158,6 +158,21 @@ impl<'a> ScoreTest<'a> {
             .collect()
     }
 
+    /// How the parameters of the model move the residuals.
+    pub fn slopes(&self) -> Vec<DVector<f64>> {
+        self.basis.column_iter().map(|c| c.into_owned()).collect()
+    }
+
+    /// How more friction moves the residual of each pull, for a share of it.
+    pub fn by_share(&self) -> DVector<f64> {
+        let (n, step) = (self.context.data.len(), 0.02);
+        let more = |m: &mut PullModel| {
+            let known = if m.factor.is_empty() { vec![1.0; n] } else { m.factor.clone() };
+            m.factor = known.iter().map(|f| f * libm::exp(step)).collect();
+        };
+        self.slope(&more, step)
+    }
+
     /// The detectable size of an effect beside the model; `None` where the campaign cannot show it at any physical size.
     pub fn detectable(&self, candidate: &Candidate) -> Option<Detectable> {
         let size = candidate.size();

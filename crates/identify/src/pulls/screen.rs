@@ -1,6 +1,7 @@
 //! Whether residuals depend on a column, by permutation: what a curve has to pass before it is named.
 
-use super::curves::{Curve, Waves};
+use super::chosen::Waves;
+use super::curves::Curve;
 use super::data::{Column, PullData};
 use super::fitting::Fitted;
 use crate::draws::Draws;

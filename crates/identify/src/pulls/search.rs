@@ -2,8 +2,9 @@
 //! place.
 
 use super::candidates::Candidate;
+use super::chosen::{at_one_word, periodic};
 use super::context::Context;
-use super::curves::{Curve, at_one_word, curves_in, periodic, product};
+use super::curves::{Curve, curves_in, product};
 use super::fitting::Fitted;
 use super::terms::Terms;
 use super::written::Written;

@@ -3,6 +3,13 @@
 use super::likelihood::{huber, scale};
 use super::zero_wander::{ZeroReadings, ZeroWander};
 
+/// Force by which the response of an arm differs from that of a first-order loop, and its part that grows with force: what
+/// all traces of a campaign share says no more than this.
+pub(super) const SHARED_N: (f64, f64) = (0.06, 0.02);
+
+/// The same from trace to trace.
+pub(super) const OWN_N: (f64, f64) = (0.03, 0.005);
+
 /// What the readings of traces differ from a model by, in the deviations that arms and sensors are known to have.
 pub(super) struct TraceResiduals {
     /// Of all traces together, by level of force.
