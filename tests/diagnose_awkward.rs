@@ -46,7 +46,9 @@ fn labels_say_how_fast_the_jaws_slide() {
     assert_eq!(found.verdict, Verdict::None, "{:?} {:?}", names(&found), found.unknown);
     let damping = &found.baseline["robot.damping_n_s_per_m"];
     assert!(damping.value > 40.0 && damping.value < 250.0, "{damping:?}");
-    let heavy = diagnose(&labels_alone(simulated("", 60, &own)), &[]).diagnosis;
+    let twin = twin_at(&baseline());
+    let heavy = labels_alone(simulated("", 60, &own));
+    let heavy = calibrate_twin(&heavy, &twin, &library(&twin), &CalibrateRequest::default(), 2).unwrap().0;
     assert!(!heavy.baseline.contains_key("robot.damping_n_s_per_m"), "{:?}", heavy.baseline);
 }
 
