@@ -6,7 +6,7 @@
 A rig does something that the twin does not know. A network is trained on the twin and meets the rig. Then the rig makes sixty pulls, no image
 among them; `gripgen diagnose` says what the twin lacks, and two new sweeps are made: of the one twin that it writes, and of draws from its
 posterior, cause and parameters together (docs/few-pulls.md). A network is trained on each and meets the same grips of the rig. The rig is
-simulated. `docs/training.md` has the figures of one run with `--samples 1500 --epochs 12 --test 500`; with the defaults it takes half an hour and more.
+simulated. `docs/training.md` has the figures of one run with `--samples 1500 --epochs 12 --test 500`; with the defaults it takes several times as long.
 """
 
 import argparse
