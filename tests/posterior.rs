@@ -1,6 +1,6 @@
 //! Few pulls, and what pulls leave open: draws beside a twin, sweeps from them, predictive intervals.
 
-use crate::diagnose::{baseline, diagnose, diagnose_with, library, names, simulated, twin_at};
+use crate::diagnose::{baseline, diagnose, diagnose_with, library, names, simulated, twin_at, twin_with};
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::{Diagnosis, Verdict};
 use gripgen::twin::draw::Drawn;
@@ -124,11 +124,7 @@ fn a_diagnosis_of_few_pulls_says_what_they_show() {
     let anew = |d: &Diagnosis| d.notes.iter().any(|n| n.contains("(wear) were looked for anew"));
     assert!(!anew(d), "{:?}", d.notes);
     // A twin with effects is fitted without them, and says so.
-    let base =
-        std::fs::read_to_string(crate::common::root().join("assets/configs/twin-baseline.toml")).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("worn.toml");
-    std::fs::write(&file, format!("{base}\n[[effects]]\nname = \"wear\"\ndepth = 0.2\n")).unwrap();
+    let (_folder, file) = twin_with("[[effects]]\nname = \"wear\"\ndepth = 0.2\n");
     let worn = diagnose_with(&measured, &twin_at(&Location::Disk(file)), &[]).diagnosis;
     let apart = |key: &str| (worn.baseline[key].value / d.baseline[key].value - 1.0).abs();
     assert!(anew(&worn) && apart("parts.long_shaft.mu") < 1e-9, "{:?}", worn.notes);

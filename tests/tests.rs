@@ -25,6 +25,7 @@ mod determinism;
 // Diagnoses of pulls.
 mod diagnose;
 mod diagnose_awkward;
+mod diagnose_lacking;
 // Lost grips of a real robot, by rows and by events.
 mod event_log;
 // Files that were changed at random.

@@ -18,7 +18,7 @@ const RATHER_SESSION: f64 = 4.0;
 const SAME_CLOCK: f64 = 0.9;
 
 /// Chance at which the first effect, or the first curve, may be named where nothing acts. Both together would be wrong in one campaign of seventy; in
-/// campaigns of nothing chances below 0.01 come three to five times as often as they say (docs/loop/worlds.md), and what is asked beside them halves that.
+/// campaigns of nothing chances below 0.01 come three to five times as often as they say (docs/loop/worlds.md).
 const CHANCE: f64 = 0.0075;
 
 /// Pulls without which something has to speak for a rival, and the share of its gain that the others have to give.
