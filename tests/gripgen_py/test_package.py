@@ -26,6 +26,7 @@ NOT_RUN = {
     "gripgen sweep mine/sweep.toml": "10 000 samples",
     "python examples/train_grip_metric.py": "needs torch; docs/training.md has its figures",
     "python examples/train_on_families.py": "minutes; docs/training.md has its figures",
+    "python examples/close_the_loop.py": "needs torch, minutes; docs/training.md has its figures",
     "python benches/python.py": "a benchmark",
 }
 
