@@ -8,6 +8,9 @@ use crate::twin_edits::{TwinEdits, effect_entry, put_estimate};
 use gripgen_identify::pulls::calibrate::{
     CalibrateError, CalibrateRequest, PullCalibration, calibrate_pulls,
 };
+use gripgen_identify::pulls::data::PullData;
+use gripgen_identify::pulls::few::FewDensity;
+use gripgen_identify::pulls::priors::PullPriors;
 use gripgen_twin::config::EffectFile;
 use gripgen_twin::effects::{EffectSpec, OFFSET_LAW, find};
 use gripgen_twin::{MeasuredPulls, Twin};
@@ -22,6 +25,27 @@ pub enum CalibratePullsError {
     /// The fit.
     #[error(transparent)]
     Fit(#[from] CalibrateError),
+}
+
+/// Asks the posterior density of which [`calibrate_twin`] has draws, of few labels without traces: see [`FewDensity`]. `None` where nothing can be
+/// predicted.
+///
+/// # Errors
+///
+/// A twin that lacks a part of the campaign.
+pub fn with_few_density<T>(
+    measured: &MeasuredPulls,
+    twin: &Twin,
+    library: &Library,
+    priors: &PullPriors,
+    law: bool,
+    ask: impl FnOnce(&FewDensity<'_>) -> T,
+) -> Result<Option<T>, CalibratePullsError> {
+    check_fit(measured, twin)?;
+    let predictor = PullPredictor::new(measured, twin, library, 1);
+    let given = given_model(twin, predictor.part_names()).map_err(PullTwinError::from)?;
+    let data = PullData::new(measured);
+    Ok(FewDensity::new(&data, &predictor, &given, priors, law).map(|density| ask(&density)))
 }
 
 /// Fits the baseline of `twin` to measured pulls, with the law and the effects asked for, and returns what changes in the

@@ -98,7 +98,7 @@ mod view;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use beyond::{Beyond, beyond};
-pub use calibrate::{CalibratePullsError, calibrate_twin};
+pub use calibrate::{CalibratePullsError, calibrate_twin, with_few_density};
 pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use catalogue::{EffectCurve, effect_curve};
 pub use compare::{LabelErrors, PullComparison, compare_pulls, compare_pulls_with};

@@ -52,5 +52,6 @@ mod unknown;
 mod words;
 mod worth;
 mod written;
+mod zero_chance;
 mod zero_screen;
 mod zero_wander;

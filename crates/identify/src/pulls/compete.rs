@@ -18,6 +18,11 @@ const REFIT_WITHIN: f64 = 6.0;
 
 const MAX_REFITS: usize = 6;
 
+/// Fits from the last end of a range, and the gain from which on there is another.
+const MORE_FITS: usize = 3;
+
+const ENOUGH: f64 = 0.3;
+
 /// Parts at most, and pulls of each at least, of an effect that differs by part.
 const MAX_PARTS: usize = 6;
 
@@ -80,6 +85,14 @@ impl Search<'_> {
                     terms.hold_signals = slow && !candidate.acts_on_signals();
                     terms.effects.push((candidate.clone(), from.clone()));
                     keep(self.context.fit(start, &terms, &self.rows), &mut best);
+                }
+                // Far from its end the pulls beyond it drag the force loop along: once more from the end that was found, and the loop as it was.
+                for _ in 0..if candidate.is_end_of_a_range() { MORE_FITS } else { 0 } {
+                    let Some(last) = best.clone() else { break };
+                    keep(self.context.fit(start, &last.terms, &self.rows), &mut best);
+                    if best.as_ref().is_none_or(|b| self.score(b) < self.score(&last) + ENOUGH) {
+                        break;
+                    }
                 }
             }
         }

@@ -4,6 +4,7 @@
 //! stand for themselves, and coefficient and offset of a part are drawn from their posterior (`few/part.rs`). The evidence of all
 //! parts weighs the points. One pull is enough: what it does not say comes from the belief, and the interval shows it.
 
+mod density;
 mod nodes;
 mod part;
 
@@ -16,6 +17,7 @@ use super::priors::PullPriors;
 use super::units::other_unit;
 use crate::diagnosis::ParameterEstimate;
 use crate::draws::Draws;
+pub use density::FewDensity;
 use gripgen_twin::effects::OFFSET_LAW;
 use gripgen_twin::{Posterior, PosteriorDraw};
 use nodes::{Rig, ratios, rigs};
@@ -81,12 +83,7 @@ pub fn calibrate_few(
     priors: &PullPriors,
     law: bool,
 ) -> Option<FewPulls> {
-    let mut context = Context::new(data, predictor, given);
-    context.see_few_slips();
-    let middle =
-        Rig { lag_s: context.base.lag_s, noise_n: context.base.noise_n, scatter: priors.scatter.at(0.0) };
-    let (first, _) = places(&context, priors, &[middle], law)?;
-    context.correct_at(&means(&context, &first, law));
+    let context = prepared(data, predictor, given, priors, law)?;
     let (all, log_evidence) = places(&context, priors, &rigs(&context, priors), law)?;
     let model = means(&context, &all, law);
     let rows: Vec<usize> = (0..data.len()).collect();
@@ -100,6 +97,23 @@ pub fn calibrate_few(
         notes: notes(data, law),
         model,
     })
+}
+
+/// What is compared with the pulls, corrected by the simulator at what they say on the rig of the twin.
+fn prepared<'a>(
+    data: &'a PullData<'a>,
+    predictor: &'a dyn PredictPulls,
+    given: &PullModel,
+    priors: &PullPriors,
+    law: bool,
+) -> Option<Context<'a>> {
+    let mut context = Context::new(data, predictor, given);
+    context.see_few_slips();
+    let middle =
+        Rig { lag_s: context.base.lag_s, noise_n: context.base.noise_n, scatter: priors.scatter.at(0.0) };
+    let (first, _) = places(&context, priors, &[middle], law)?;
+    context.correct_at(&means(&context, &first, law));
+    Some(context)
 }
 
 /// The points, weighed, and the logarithm of the evidence.

@@ -281,7 +281,7 @@ impl Context<'_> {
             model,
             names: parameters.iter().map(|p| p.name.clone()).collect(),
             values: found.values,
-            covariance: found.covariance * stretch * self.tails.spread(),
+            covariance: found.covariance * stretch,
             residuals,
             likelihood: judged,
             trace_cost,

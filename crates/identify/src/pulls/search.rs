@@ -211,7 +211,10 @@ impl<'a> Search<'a> {
         };
         // Worked out for a campaign that has something to judge.
         let null = OnceCell::new();
-        let chance = |e: &Entry| null.get_or_init(|| self.null_gains(&baseline)).p_value(&e.rival, e.gain);
+        let chance = |e: &Entry| {
+            let shuffled = null.get_or_init(|| self.null_gains(&baseline)).p_value(&e.rival, e.gain);
+            shuffled.max(self.zero_chance(&baseline, e))
+        };
         let Some(mut winner) = self.winner(&baseline, &first, (FIRST_GAIN, CURVE_GAIN), &chance) else {
             let best = self.winner(&baseline, &first, (NAMED_GAIN, CURVE_GAIN), &|_| 0.0);
             accepted.by_chance = best.map(|entry| ByChance { chance: chance(&entry), entry });

@@ -6,6 +6,7 @@
 //! the mean judged afterwards, a walk of 0.15 N was a bias or a drift in one campaign of seven.)
 
 use super::likelihood::{huber, scale};
+use crate::draws::Draws;
 
 /// Deviation of a zero beside the noise of its readings, in newtons: of each, and of all together.
 const ZERO_N: f64 = 0.02;
@@ -102,11 +103,70 @@ impl ZeroReadings {
         best
     }
 
+    /// The readings less an effect, in newtons.
+    pub fn less(&self, effect_n: impl Fn(usize) -> f64) -> Self {
+        let each = self.each.iter().zip(&self.newton).enumerate();
+        Self { each: each.map(|(i, (x, newton))| x - effect_n(i) * newton).collect(), ..self.clone() }
+    }
+
+    /// The zero that is farthest from nothing, in newtons.
+    pub fn farthest_n(&self) -> f64 {
+        self.each.iter().zip(&self.newton).map(|(x, newton)| (x / newton).abs()).fold(0.0, f64::max)
+    }
+
+    /// Ways in which a zero may wander around nothing, and how likely the readings make each: a memory with its scale, and sessions that begin anew, as
+    /// where the sensor is zeroed, or go on where the last one ended.
+    pub fn ways(&self) -> Vec<(Self, ZeroWander, f64)> {
+        let onward = Self { session_of: vec![0; self.each.len()], ..self.clone() };
+        let mut found: Vec<_> = [self.clone(), onward]
+            .into_iter()
+            .flat_map(|zeros| {
+                (0..=MAX_TENTHS).map(move |tenths| {
+                    let memory = f64::from(tenths) * 0.1;
+                    let white = zeros.whitened(memory);
+                    let scale = scale(&white.about_nothing).max(1.0);
+                    let scaled: Vec<f64> = white.about_nothing.iter().map(|x| x / scale).collect();
+                    let log = 0.5 * white.starts as f64 * libm::log(1.0 - memory * memory)
+                        - huber(&scaled)
+                        - scaled.len() as f64 * libm::log(scale);
+                    (zeros.clone(), ZeroWander { scale, memory }, log)
+                })
+            })
+            .collect();
+        let most = found.iter().map(|w| w.2).fold(f64::NEG_INFINITY, f64::max);
+        found.iter_mut().for_each(|w| w.2 = libm::exp(w.2 - most));
+        found
+    }
+
+    /// A zero that wanders around nothing in one of these ways, read as this one is.
+    pub fn drawn(&self, ways: &[(Self, ZeroWander, f64)], draws: &mut Draws) -> Self {
+        let mut left = draws.uniform() * ways.iter().map(|w| w.2).sum::<f64>();
+        let at = ways.iter().position(|w| {
+            left -= w.2;
+            left < 0.0
+        });
+        let (zeros, ZeroWander { scale, memory }, _) = &ways[at.unwrap_or(0)];
+        let mut each: Vec<f64> = Vec::with_capacity(self.each.len());
+        for i in 0..self.each.len() {
+            let new = scale * draws.normal();
+            let start = zeros.starts_at(i);
+            each.push(if start { new / (1.0 - memory * memory).sqrt() } else { memory * each[i - 1] + new });
+        }
+        Self { each, ..self.clone() }
+    }
+
+    fn starts_at(&self, i: usize) -> bool {
+        i == 0 || self.session_of[i] != self.session_of[i - 1]
+    }
+
     fn whitened(&self, memory: f64) -> Whitened {
-        let starts_at = |i: usize| i == 0 || self.session_of[i] != self.session_of[i - 1];
         let new = |x: &[f64]| -> Vec<f64> {
             let one = |i: usize| {
-                if starts_at(i) { x[i] * (1.0 - memory * memory).sqrt() } else { x[i] - memory * x[i - 1] }
+                if self.starts_at(i) {
+                    x[i] * (1.0 - memory * memory).sqrt()
+                } else {
+                    x[i] - memory * x[i - 1]
+                }
             };
             (0..x.len()).map(one).collect()
         };
@@ -118,7 +178,7 @@ impl ZeroReadings {
             information,
             about_mean: about_nothing.iter().zip(&newton).map(|(r, n)| r - mean_n * n).collect(),
             about_nothing,
-            starts: (0..self.each.len()).filter(|&i| starts_at(i)).count(),
+            starts: (0..self.each.len()).filter(|&i| self.starts_at(i)).count(),
         }
     }
 
@@ -137,7 +197,6 @@ impl ZeroReadings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draws::Draws;
 
     /// 80 zeros of 40 readings of 0.1 N in four sessions.
     fn of(zero_n: impl Fn(usize, f64) -> f64) -> ZeroReadings {

@@ -56,11 +56,11 @@ pub(super) struct PartOnRig<'a> {
 
 impl PartOnRig<'_> {
     /// Coefficient and offset at standard normal variables.
-    fn friction(&self, z: &[f64]) -> (f64, f64) {
+    pub(super) fn friction(&self, z: &[f64]) -> (f64, f64) {
         (self.priors.mu.at(z[0]), z.get(1).map_or(0.0, |z| self.priors.offset_n.at(*z)))
     }
 
-    fn model(&self, (mu, offset_n): (f64, f64)) -> PullModel {
+    pub(super) fn model(&self, (mu, offset_n): (f64, f64)) -> PullModel {
         let mut model = self.rig.clone();
         model.mu[self.part] = mu;
         model.effects.clear();
@@ -71,7 +71,7 @@ impl PartOnRig<'_> {
         model
     }
 
-    fn log_likelihood(&self, model: &PullModel) -> f64 {
+    pub(super) fn log_likelihood(&self, model: &PullModel) -> f64 {
         let (share, wide) = BAD;
         let each = |(difference, sd): (f64, f64)| {
             let z = difference / sd;
