@@ -41,17 +41,17 @@ impl Search<'_> {
         let first_s = pulls.iter().map(|p| p.covariates.time_s).fold(f64::INFINITY, f64::min);
         let last_s = pulls.iter().map(|p| p.covariates.time_s).fold(f64::NEG_INFINITY, f64::max);
         let clock: Vec<f64> = time_s.iter().map(|t| (t - first_s) / (last_s - first_s).max(1e-9)).collect();
-        chance_of_zero(&plain, &clock, gain)
+        chance_of_zero(&plain, &clock, gain, CAMPAIGNS)
     }
 }
 
 /// Share of the campaigns in which the zero wanders and nothing acts, and an offset or a line gains as much or more. `clock`: when each reading was made,
 /// from 0 to 1.
-pub(super) fn chance_of_zero(zeros: &ZeroReadings, clock: &[f64], gain: f64) -> f64 {
+fn chance_of_zero(zeros: &ZeroReadings, clock: &[f64], gain: f64, campaigns: usize) -> f64 {
     let mut draws = Draws::new(41, 3);
     let ways = zeros.ways();
-    let better = (0..CAMPAIGNS).filter(|_| best_gain(&zeros.drawn(&ways, &mut draws), clock) >= gain).count();
-    (better + 1) as f64 / (CAMPAIGNS + 1) as f64
+    let better = (0..campaigns).filter(|_| best_gain(&zeros.drawn(&ways, &mut draws), clock) >= gain).count();
+    (better + 1) as f64 / (campaigns + 1) as f64
 }
 
 /// What the better of an offset and a line gains.
@@ -95,11 +95,11 @@ mod tests {
                 })
                 .collect();
             let walk = of(|i| walk[i]);
-            rare += usize::from(chance_of_zero(&walk, &clock(), best_gain(&walk, &clock())) < 0.05);
+            rare += usize::from(chance_of_zero(&walk, &clock(), best_gain(&walk, &clock()), 60) < 0.05);
         }
         assert!(rare <= 6, "{rare} of 40 at 5 %");
         let bias = of(|i| 0.5 + 0.03 * draws_at(i));
-        let found = chance_of_zero(&bias, &clock(), best_gain(&bias, &clock()));
+        let found = chance_of_zero(&bias, &clock(), best_gain(&bias, &clock()), CAMPAIGNS);
         assert!(found < 0.006, "{found}");
     }
 
