@@ -12,10 +12,10 @@
 mod truth;
 
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
-use gripgen::twin::{Posterior, Twin};
-use gripgen::{Library, Location, calibrate_twin, in_parallel, load_twin_document, shipped_priors};
+use gripgen::twin::Posterior;
+use gripgen::{calibrate_twin, in_parallel};
 use std::sync::Mutex;
-use truth::{LINES, PART, TWIN, Truth};
+use truth::{Given, PART, Truth, asked};
 
 const BINS: usize = 10;
 
@@ -51,22 +51,16 @@ fn p_of_nine(x: f64) -> f64 {
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let count: usize = arguments.first().and_then(|a| a.parse().ok()).unwrap_or(1000);
-    let document = load_twin_document(&Location::parse(TWIN), &[]).unwrap();
-    let twin = Twin::new(&document.read_twin().unwrap()).unwrap();
-    let library = Library::of_twin(&twin, &Location::parse(TWIN)).unwrap();
-    let priors = shipped_priors(&twin);
+    let (count, lines) = asked(1000);
+    let Given { twin, library, priors } = Given::shipped();
     let given = twin.parts[PART].mu;
-    for (name, forces_n, law) in
-        LINES.iter().filter(|l| arguments.len() < 2 || arguments[1..].iter().any(|a| a == l.0))
-    {
+    for (name, forces_n, law) in lines {
         let found: Mutex<Vec<Vec<f64>>> = Mutex::default();
         in_parallel(count, 2, |k| {
-            let truth = Truth::draw(&priors, *law, k as u64);
+            let truth = Truth::draw(&priors, law, k as u64);
             let Some(measured) = truth.pulls(forces_n, k as u64) else { return };
             let request = CalibrateRequest {
-                offset_law: *law,
+                offset_law: law,
                 priors: Some(priors.clone()),
                 ..CalibrateRequest::default()
             };
@@ -77,7 +71,7 @@ fn main() {
             };
             let b = |of: &Draw<'_>| given * of(&format!("effects.load_offset.{PART}.b_n"));
             let mut shares = vec![share_below(&fit.posterior, &a, truth.mu)];
-            if *law {
+            if law {
                 shares.push(share_below(&fit.posterior, &b, truth.mu * truth.offset_n));
             }
             let rig = [

@@ -14,13 +14,10 @@ mod truth;
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::pulls::few::FewDensity;
 use gripgen::identify::pulls::priors::PullPriors;
-use gripgen::twin::Twin;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen::{
-    Library, Location, calibrate_twin, in_parallel, load_twin_document, shipped_priors, with_few_density,
-};
+use gripgen::{calibrate_twin, in_parallel, with_few_density};
 use std::sync::Mutex;
-use truth::{LINES, PART, TWIN, Truth};
+use truth::{Given, PART, Truth, asked};
 
 /// Steps of a chain, of which the first third adapts its step and is left out.
 const STEPS: usize = 9000;
@@ -101,23 +98,17 @@ fn log_density(values: &Weighted, width: f64, at: f64) -> f64 {
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let count: usize = arguments.first().and_then(|a| a.parse().ok()).unwrap_or(40);
-    let document = load_twin_document(&Location::parse(TWIN), &[]).unwrap();
-    let twin = Twin::new(&document.read_twin().unwrap()).unwrap();
-    let library = Library::of_twin(&twin, &Location::parse(TWIN)).unwrap();
-    let priors = shipped_priors(&twin);
+    let (count, lines) = asked(40);
+    let Given { twin, library, priors } = Given::shipped();
     let given = twin.parts[PART].mu;
-    for (name, forces_n, law) in
-        LINES.iter().filter(|l| arguments.len() < 2 || arguments[1..].iter().any(|a| a == l.0))
-    {
+    for (name, forces_n, law) in lines {
         let found: Mutex<Vec<[f64; 4]>> = Mutex::default();
         in_parallel(count, 2, |k| {
             let index = 70_000 + k as u64;
-            let truth = Truth::draw(&priors, *law, index);
+            let truth = Truth::draw(&priors, law, index);
             let Some(measured) = truth.pulls(forces_n, index) else { return };
             let request = CalibrateRequest {
-                offset_law: *law,
+                offset_law: law,
                 priors: Some(priors.clone()),
                 ..CalibrateRequest::default()
             };
@@ -129,7 +120,7 @@ fn main() {
             let at = fit.posterior.keys.iter().position(|k| *k == key).unwrap();
             let ours: Weighted =
                 fit.posterior.draws.iter().map(|d| (of * d.values[at].unwrap(), d.weight)).collect();
-            let walked = with_few_density(&measured, &twin, &library, &priors, *law, |density| {
+            let walked = with_few_density(&measured, &twin, &library, &priors, law, |density| {
                 chain(density, &priors, index)
             });
             let walked = walked.unwrap().unwrap();

@@ -2,16 +2,44 @@
 
 use gripgen::identify::pulls::priors::PullPriors;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen::twin::{Campaign, MeasuredPulls, PlannedPull};
-use gripgen::{Location, simulate_campaign};
+use gripgen::twin::{Campaign, MeasuredPulls, PlannedPull, Twin};
+use gripgen::{Library, Location, load_twin_document, shipped_priors, simulate_campaign};
 
-pub const TWIN: &str = "asset:configs/twin-baseline.toml";
+const TWIN: &str = "asset:configs/twin-baseline.toml";
 pub const PART: &str = "gear";
+
+/// The twin that the beliefs are about, its files, and the beliefs.
+pub struct Given {
+    pub twin: Twin,
+    pub library: Library,
+    pub priors: PullPriors,
+}
+
+impl Given {
+    pub fn shipped() -> Self {
+        let place = Location::parse(TWIN);
+        let twin = Twin::new(&load_twin_document(&place, &[]).unwrap().read_twin().unwrap()).unwrap();
+        let library = Library::of_twin(&twin, &place).unwrap();
+        let priors = shipped_priors(&twin);
+        Self { twin, library, priors }
+    }
+}
+
+/// How many campaigns are asked for, and the lines that are named; all where none is.
+pub fn asked(count: usize) -> (usize, Vec<Line>) {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let count = arguments.first().and_then(|a| a.parse().ok()).unwrap_or(count);
+    let named = |line: &Line| arguments.len() < 2 || arguments[1..].iter().any(|a| a == line.0);
+    (count, LINES.into_iter().filter(named).collect())
+}
+
 /// Share of bad pulls, and how many times as far they lie from what is expected, as the posterior takes it.
 const BAD: (f64, f64) = (0.05, 8.0);
 
 /// Name, grip forces, whether the law is asked for.
-pub const LINES: [(&str, &[f64], bool); 3] = [
+type Line = (&'static str, &'static [f64], bool);
+
+const LINES: [Line; 3] = [
     ("one", &[40.0], false),
     ("three", &[20.0, 40.0, 80.0], false),
     ("three-law", &[20.0, 40.0, 80.0], true),

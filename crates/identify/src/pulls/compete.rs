@@ -87,7 +87,8 @@ impl Search<'_> {
                     keep(self.context.fit(start, &terms, &self.rows), &mut best);
                 }
                 // Far from its end the pulls beyond it drag the force loop along: once more from the end that was found, and the loop as it was.
-                for _ in 0..if candidate.is_end_of_a_range() { MORE_FITS } else { 0 } {
+                let more = if candidate.is_end_of_a_range() { MORE_FITS } else { 0 };
+                for _ in 0..more {
                     let Some(last) = best.clone() else { break };
                     keep(self.context.fit(start, &last.terms, &self.rows), &mut best);
                     if best.as_ref().is_none_or(|b| self.score(b) < self.score(&last) + ENOUGH) {

@@ -39,7 +39,7 @@ impl<'a> FewDensity<'a> {
         1 + usize::from(self.law)
     }
 
-    /// Logarithm of the density at a point, up to a constant.
+    /// Logarithm of the density at a point of [`Self::dimensions`] variables, up to a constant.
     pub fn log_at(&self, z: &[f64]) -> f64 {
         let parts = self.context.data.parts.len();
         let rig = &z[parts * self.each()..];
