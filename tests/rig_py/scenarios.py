@@ -102,6 +102,7 @@ def move_and_force(start):
         seen["seconds for 50 mm at 0.1 m/s"] = time.monotonic() - begun
         seen["payload"] = control.setPayload(1.25, [0.0, 0.0, 0.04])
         control.moveL(start, 0.25, 1.2)
+        time.sleep(0.1)
         there = receive.getActualTCPPose()
         seen["another tool"] = control.setTcp([0] * 6)
         time.sleep(0.1)
