@@ -313,9 +313,14 @@ impl PredictPulls for PullPredictor<'_> {
         rows.iter()
             .map(|&row| {
                 let limit_n = self.limit_n(model, row);
+                let scatter_n = model.scatter * limit_n;
+                let mut read = |limit_n: f64| signals.limit_reading_n(row, limit_n);
+                // At the end of the sensor's range all grips read the same.
+                let apart_n = read(limit_n + scatter_n) - read(limit_n - scatter_n);
                 PullPrediction {
                     limit_n,
-                    limit_reading_n: signals.limit_reading_n(row, limit_n),
+                    limit_reading_n: read(limit_n),
+                    label_sd_n: 0.5 * apart_n.abs(),
                     ..PullPrediction::default()
                 }
             })

@@ -108,16 +108,15 @@ fn what_acts_in_one_session_is_found_there() {
 }
 
 /// Readings that rise by 20 mN for each newton of the grip, with and without a load: mu takes it in, the readings without a load
-/// show it. A zero that walks about is nothing of the kind.
+/// show it. A zero that walks about is nothing of the kind, and labels that walk with it are no second witness of anything.
 #[test]
 fn cross_talk_of_the_grip_shows_without_a_load() {
     let with = |zero_n: &dyn Fn(f64, usize) -> f64| {
         let mut measured = simulated("", 60, &[]);
         for (i, pull) in measured.pulls.iter_mut().enumerate() {
             let more_n = zero_n(pull.grip_force_n, i);
-            let Some(trace) = &pull.trace else { continue };
             let row = |r: TraceRow| TraceRow { measured_force_n: r.measured_force_n + more_n, ..r };
-            pull.trace = Some(trace.rows().map(row).collect::<PullTrace>());
+            pull.trace = pull.trace.as_ref().map(|trace| trace.rows().map(row).collect::<PullTrace>());
             pull.max_pull_force_n += more_n;
         }
         diagnose(&measured, &[]).diagnosis
@@ -129,12 +128,12 @@ fn cross_talk_of_the_grip_shows_without_a_load() {
     let mut noise = Stream::new(5, 0, Purpose::ForceNoise);
     let walk: Vec<f64> = (0..60)
         .scan(0.0, |zero, _| {
-            *zero = 0.95 * *zero + 0.05 * noise.normal();
+            *zero = 0.9 * *zero + 0.13 * noise.normal();
             Some(*zero)
         })
         .collect();
     let found = with(&|_, i| walk[i]);
-    assert!(found.unknown.iter().all(|u| u.covariate != "grip_force_n"), "{:?}", found.unknown);
+    assert_eq!(found.verdict, Verdict::None, "{:?} {:?}", names(&found), found.unknown);
 }
 
 /// A wear that has hardly bent yet: depth and pull count say one product, and slopes leave a depth of nothing open. The likelihood does not:

@@ -54,4 +54,5 @@ mod worth;
 mod written;
 mod zero_chance;
 mod zero_screen;
+mod zero_walk;
 mod zero_wander;

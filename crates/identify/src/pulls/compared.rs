@@ -5,7 +5,10 @@ use super::model::{PullModel, PullPrediction};
 use super::observe::LEVELS;
 use super::slip::SlipLimit;
 use super::trace_residuals::{OWN_N, SHARED_N, TraceResiduals};
+use super::zero_screen::zeros_that_depend;
+use super::zero_walk::{Pulls, SlowZero, Zero, ZeroWalk};
 use super::zero_wander::ZeroReadings;
+use std::borrow::Cow;
 
 /// Force by which slips and labels of a rig differ from those of a pull without inertia: an offset as small as this says
 /// nothing about friction.
@@ -16,28 +19,71 @@ const MISREAD_N: f64 = 0.05;
 const CLOSED_LOOP: f64 = 5.0;
 
 impl Context<'_> {
-    /// Predictions of the pulls at `rows`; those with a slip in their trace have no label.
+    /// Pulls as their zero goes through them.
+    fn in_order(&self) -> Pulls<'_> {
+        let pulls = &self.data.measured.pulls;
+        let turned = pulls.iter().map(|p| p.covariates.pull_direction < 0.0).collect();
+        Pulls { session_of: &self.data.session_of, turned }
+    }
+
+    /// Readings without a load less what a model says of them, by pull.
+    fn zeros(&self, model: &PullModel) -> Vec<Zero> {
+        let mut zeros = vec![None; self.data.len()];
+        let seen: Vec<_> = self.observations.iter().filter_map(|o| Some((o.row, o.no_load_n?))).collect();
+        let asked: Vec<(usize, &[f64])> = seen.iter().map(|(row, _)| (*row, [].as_slice())).collect();
+        for ((row, (mean_n, n)), p) in seen.iter().zip(self.predictor.traces(model, &asked)) {
+            zeros[*row] = Some((mean_n - p.no_load_n, model.noise_n / (*n as f64).sqrt()));
+        }
+        zeros
+    }
+
+    /// Looks for a walk of the zero under the baseline.
+    pub(super) fn find_walk(&mut self) {
+        let zeros = self.zeros(&self.base);
+        let pulls = self.in_order();
+        // A zero that goes with a column is no walk, be it that the column was set in order.
+        let walk =
+            ZeroWalk::likely(&zeros, &pulls).filter(|_| zeros_that_depend(self, &self.base).is_empty());
+        self.walk = walk.map(|walk| (walk, walk.smoothed(&zeros, &pulls)));
+    }
+
+    /// The slow part of the zero in each pull, beyond what a model says of it; nothing where none was seen.
+    pub(super) fn slow_zeros(&self, model: &PullModel) -> Option<Cow<'_, [SlowZero]>> {
+        let (walk, still) = self.walk.as_ref()?;
+        if model.effects.iter().any(|e| e.acts_on_signals()) {
+            return Some(walk.smoothed(&self.zeros(model), &self.in_order()).into());
+        }
+        Some(still.into())
+    }
+
+    /// Predictions of the pulls at `rows`, with the zero that their readings have as far as the traces show it; those with a slip in their trace have no label.
     pub(super) fn predicted(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction> {
         let seen: Vec<usize> = rows.iter().copied().filter(|&i| self.limit_of(i).is_some()).collect();
         let unseen: Vec<usize> = rows.iter().copied().filter(|&i| self.limit_of(i).is_none()).collect();
         let mut slips = self.predictor.slips(model, &seen).into_iter();
         let mut labels = self.predictor.pulls(model, &unseen).into_iter();
         let next = |&i: &usize| if self.limit_of(i).is_some() { slips.next() } else { labels.next() };
-        rows.iter().map(next).map(Option::unwrap_or_default).collect()
+        let mut all: Vec<PullPrediction> = rows.iter().map(next).map(Option::unwrap_or_default).collect();
+        if let Some(zeros) = self.slow_zeros(model) {
+            for (p, &i) in all.iter_mut().zip(rows) {
+                p.limit_reading_n += zeros[i].mean_n;
+                p.label_n += zeros[i].mean_n;
+            }
+        }
+        all
     }
 
     /// Standard deviation of what is compared of each pull: its slip where there is a trace, its label otherwise.
     pub(super) fn deviations(&self, model: &PullModel, rows: &[usize]) -> Vec<f64> {
-        rows.iter().zip(&self.predicted(model, rows)).map(|(&i, p)| self.deviation_n(model, i, p)).collect()
+        rows.iter().zip(&self.predicted(model, rows)).map(|(&i, p)| self.deviation_n(i, p)).collect()
     }
 
-    pub(super) fn deviation_n(&self, model: &PullModel, row: usize, p: &PullPrediction) -> f64 {
+    pub(super) fn deviation_n(&self, row: usize, p: &PullPrediction) -> f64 {
+        // The zero is as sure as the traces around make it, whatever the model.
+        let zero = self.walk.as_ref().map_or(0.0, |(_, zeros)| zeros[row].variance_n2) + 0.03 * 0.03;
         match self.limit_of(row) {
-            Some(limit) => {
-                let scatter = model.scatter * p.limit_n;
-                (scatter * scatter + limit.sd_n * limit.sd_n + 0.03 * 0.03).sqrt()
-            }
-            None => (p.label_sd_n * p.label_sd_n + 0.03 * 0.03).sqrt(),
+            Some(limit) => (p.label_sd_n * p.label_sd_n + limit.sd_n * limit.sd_n + zero).sqrt(),
+            None => (p.label_sd_n * p.label_sd_n + zero).sqrt(),
         }
     }
 

@@ -7,6 +7,7 @@ use super::observe::{LEVELS, TraceObservation, fall_s, noise_n, observe};
 use super::slip::{SlipLimit, SlipRig, SlipTrace, Slips, read_slips};
 use super::terms::Terms;
 use super::trace_residuals::{SHARED_N, Widening};
+use super::zero_walk::{SlowZero, ZeroWalk};
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 
 /// Scatter of friction from grip to grip with which residuals are weighed; their true scale is fitted.
@@ -75,6 +76,8 @@ pub struct Context<'a> {
     pub baseline_trace_cost: f64,
     /// What the labels of the simulator lie above those of the fast prediction, near the model that is fitted.
     pub above_fast_n: Vec<f64>,
+    /// How the zero of the sensor wanders, where the traces show that it does, and what that makes it in each pull where nothing acts on readings.
+    pub(super) walk: Option<(ZeroWalk, Vec<SlowZero>)>,
 }
 
 impl<'a> Context<'a> {
@@ -108,6 +111,7 @@ impl<'a> Context<'a> {
             free_lag: false,
             baseline_trace_cost: 0.0,
             above_fast_n: vec![0.0; data.len()],
+            walk: None,
         };
         context.look_at(&raw);
         context
@@ -192,6 +196,7 @@ impl<'a> Context<'a> {
         (self.base.lag_s, self.base.dead_time_s) = (best.1, best.2);
         self.read_slips();
         self.read_bend();
+        self.find_walk();
         self.baseline_trace_cost = self.trace_residuals(&self.base, &rows).cost();
     }
 

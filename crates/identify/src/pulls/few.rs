@@ -344,7 +344,7 @@ impl Context<'_> {
     /// labels otherwise.
     fn compared(&self, model: &PullModel, rows: &[usize]) -> Vec<(f64, f64)> {
         let predicted = self.predicted(model, rows);
-        let each = |(&row, p)| (self.difference_n(model, row, p), self.deviation_n(model, row, p));
+        let each = |(&row, p)| (self.difference_n(model, row, p), self.deviation_n(row, p));
         rows.iter().zip(&predicted).map(each).collect()
     }
 }

@@ -73,7 +73,7 @@ pub struct PullPrediction {
     pub limit_reading_n: f64,
     /// Expected label over scatter and noise.
     pub label_n: f64,
-    /// Its standard deviation over scatter and noise.
+    /// Its standard deviation over scatter and noise; of a slip, that of its reading over scatter alone.
     pub label_sd_n: f64,
 }
 
@@ -111,7 +111,7 @@ pub trait PredictPulls: Sync {
         self.pulls(model, rows).iter().map(|p| p.label_n).collect()
     }
 
-    /// What the jaws hold and the reading of it, of the pulls at `rows`; labels may be left at 0.
+    /// What the jaws hold and the reading of it with what scatter makes of that, of the pulls at `rows`; labels may be left at 0.
     fn slips(&self, model: &PullModel, rows: &[usize]) -> Vec<PullPrediction>;
 
     /// Limits alone, of all pulls: friction and normal force, no sensor.
