@@ -12,6 +12,7 @@ pub mod context;
 pub mod curves;
 pub mod data;
 mod dynamics;
+mod error_interval;
 mod estimates;
 mod evidence;
 pub mod few;

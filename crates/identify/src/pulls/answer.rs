@@ -3,11 +3,10 @@
 use super::candidates::{Candidate, candidates};
 use super::context::Context;
 use super::data::PullData;
+use super::error_interval::{Judged, errors};
 use super::estimates::baseline;
 use super::fitting::Fitted;
-use super::heldout::{
-    HeldOutScore, by_value, errors, folds, held_out_score, noise_floor_n, predicted, scatter,
-};
+use super::heldout::{HeldOutScore, by_value, folds, held_out_score, noise_floor_n, predicted, scatter};
 use super::model::{PredictPulls, PullModel, PullPrediction};
 use super::naming::named;
 use super::one_level::of_one_level;
@@ -243,14 +242,16 @@ pub fn diagnose_pulls(
     let own: Vec<f64> = counted.iter().map(|&i| data.label_n[i] - labels[1][i]).collect();
     let groups: Vec<usize> = counted.iter().map(|&i| data.group_of[i]).collect();
     diagnosis.noise_floor_n = Some(noise_floor_n(&own, &groups, after.names.len()));
-    diagnosis.error = errors(&data.label_n, &heldout[0], &heldout[1], &data.group_of, &counted).map(|pair| {
+    let sd_n = label_sd_n(&before, &predictor.pulls(&before.model, &rows));
+    let pulls = Judged { label_n: &data.label_n, sd_n: &sd_n, groups: &data.group_of, rows: &counted };
+    diagnosis.error = errors(&pulls, &heldout[0], &heldout[1]).map(|pair| {
         let by = |sets: Vec<Vec<usize>>| {
             if sets.len() < 3 || sets.len() > 20 {
                 return None;
             }
             let b = predicted(&before_context, &stated_before, &sets, true);
             let a = if found { predicted(&after_context, &after, &sets, true) } else { b.clone() };
-            errors(&data.label_n, &b, &a, &data.group_of, &counted)
+            errors(&pulls, &b, &a)
         };
         let force: Vec<u64> = measured.pulls.iter().map(|p| p.grip_force_n.to_bits()).collect();
         let session: Vec<u64> = data.session_of.iter().map(|&s| s as u64).collect();
@@ -266,7 +267,6 @@ pub fn diagnose_pulls(
     }
     recalibrate(&mut diagnosis, &trusted(&search, &accepted));
     progress(0.92);
-    let sd_n = label_sd_n(&before, &predictor.pulls(&before.model, &rows));
     let scores = accepted.entries.iter().take(SCORED).map(|entry| {
         let held = predicted(&context, &entry.fitted, &repetitions, true);
         held_out_score(&data.label_n, &sd_n, &fast_before, &held, &counted)

@@ -5,11 +5,12 @@ use super::candidates::{Candidate, candidate};
 use super::context::Context;
 use super::data::PullData;
 use super::dynamics::Dynamics;
+use super::error_interval::{Judged, errors};
 use super::estimates::{baseline, parameters};
 use super::few::{FEW_PULLS, calibrate_few, lacks_forces};
 use super::few_diagnosis::FAR;
 use super::fitting::Fitted;
-use super::heldout::{errors, folds, predicted};
+use super::heldout::{folds, predicted};
 use super::intervals::NormalFit;
 use super::label_noise::{TRIED_FROM_N, TRIED_TO_N};
 use super::law::largest_relative_sigma;
@@ -176,6 +177,9 @@ pub fn calibrate_pulls(
     // As a diagnosis counts: one bad label would be all of a mean of squares.
     let counted: Vec<usize> = rows.iter().copied().filter(|i| !far.contains(i)).collect();
     let noise = at_bound(fitted.model.noise_n).filter(|_| context.noise90_n.is_some());
+    let sd_n: Vec<f64> =
+        predictor.pulls(&fitted.model, &rows).iter().map(|p| p.label_sd_n.max(0.03)).collect();
+    let pulls = Judged { label_n: &data.label_n, sd_n: &sd_n, groups: &data.group_of, rows: &counted };
     let drawn = of_calibration(&found, &normal, &fitted, &data.parts, law_of);
     let laws =
         if request.offset_law { laws(&context, &found, &normal, &terms, given, range) } else { vec![] };
@@ -196,7 +200,7 @@ pub fn calibrate_pulls(
         ),
         effects,
         laws,
-        error: errors(&data.label_n, &held, &held, &data.group_of, &counted).map(|pair| pair.after),
+        error: errors(&pulls, &held, &held).map(|pair| pair.after),
         grip_force_n: range,
         posterior: drawn,
         notes: far_off(measured, &far).into_iter().chain(noise).collect(),

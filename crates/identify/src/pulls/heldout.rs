@@ -6,7 +6,6 @@ use super::fitting::Fitted;
 use super::learnt::learnt_again;
 use super::model::PullModel;
 use super::terms::Terms;
-use crate::diagnosis::{ErrorPair, HeldOutError};
 use crate::draws::Draws;
 use std::sync::Mutex;
 
@@ -15,9 +14,6 @@ pub(super) const UNFELT: f64 = 0.1;
 
 /// Folds of repetitions.
 const FOLDS: usize = 5;
-
-/// Resamples of an interval.
-const RESAMPLES: usize = 400;
 
 /// Sets of pulls that are held out one after the other.
 pub fn folds(n: usize) -> Vec<Vec<usize>> {
@@ -174,72 +170,6 @@ pub fn scatter(model: &PullModel, scale: f64) -> f64 {
     (model.scatter * scale).clamp(0.001, 0.3)
 }
 
-/// Errors of two predictions at the pulls of `rows`, with intervals that hold for both alike: pulls are drawn anew, whole
-/// configurations of `groups` at a time.
-///
-/// The interval is that of the error on as many new pulls: these scatter as much as the ones at hand, so its ends are
-/// sqrt(2) further away, in the logarithm, than those of the bootstrap (Efron and Tibshirani 1993, chapter 13).
-pub fn errors(
-    label_n: &[f64],
-    before: &[f64],
-    after: &[f64],
-    groups: &[usize],
-    rows: &[usize],
-) -> Option<ErrorPair> {
-    let known: Vec<usize> =
-        rows.iter().copied().filter(|&i| before[i].is_finite() && after[i].is_finite()).collect();
-    if known.len() < 3 {
-        return None;
-    }
-    let count = groups.iter().max().map_or(0, |g| g + 1);
-    let mut members = vec![vec![]; count];
-    for &i in &known {
-        members[groups[i]].push(i);
-    }
-    members.retain(|m| !m.is_empty());
-    // Few configurations are no population; then pulls are drawn.
-    if members.len() < 15 {
-        members = known.iter().map(|&i| vec![i]).collect();
-    }
-    let error = |predicted: &[f64]| {
-        let square = |i: usize| (predicted[i] - label_n[i]) * (predicted[i] - label_n[i]);
-        let rmse = |square: f64, n: usize| (square / n.max(1) as f64).sqrt();
-        let all: f64 = known.iter().map(|&i| square(i)).sum();
-        let relative: f64 =
-            known.iter().map(|&i| (predicted[i] - label_n[i]).abs() / label_n[i].abs().max(0.1)).sum();
-        let mut draws = Draws::new(11, 2);
-        let mut found: Vec<f64> = (0..RESAMPLES)
-            .map(|_| {
-                let (mut sum, mut n) = (0.0, 0);
-                for _ in 0..members.len() {
-                    let group = &members[draws.below(members.len())];
-                    sum += group.iter().map(|&i| square(i)).sum::<f64>();
-                    n += group.len();
-                }
-                rmse(sum, n)
-            })
-            .collect();
-        found.sort_by(f64::total_cmp);
-        let own = rmse(all, known.len());
-        let new = |end: f64| {
-            if own > 0.0 && end > 0.0 {
-                own * libm::exp(std::f64::consts::SQRT_2 * libm::log(end / own))
-            } else {
-                end
-            }
-        };
-        HeldOutError {
-            rmse_n: Some(own),
-            mse: None,
-            rmse_mm3: None,
-            low90: new(found[RESAMPLES / 20]),
-            high90: new(found[RESAMPLES - 1 - RESAMPLES / 20]),
-            mape_pct: Some(100.0 * relative / known.len() as f64),
-        }
-    };
-    Some(ErrorPair { before: error(before), after: error(after) })
-}
-
 /// Scatter of repetitions about the mean of their configuration, after what a model predicts of their differences is
 /// taken out: pooled standard deviation. Without repetitions the errors themselves, with the fitted parameters counted.
 pub fn noise_floor_n(errors: &[f64], groups: &[usize], parameters: usize) -> f64 {
@@ -285,20 +215,6 @@ mod tests {
         all.sort_unstable();
         assert_eq!(all, (0..23).collect::<Vec<_>>());
         assert_eq!(by_value(&[3, 1, 3]), vec![vec![1], vec![0, 2]]);
-    }
-
-    /// The interval of the root mean square of as many new normal errors: +-1.645 sigma / sqrt(n).
-    #[test]
-    fn intervals_are_those_of_normal_errors() {
-        let mut draws = Draws::new(3, 0);
-        let n = 400;
-        let truth = vec![10.0; n];
-        let off: Vec<f64> = (0..n).map(|_| 10.0 + 0.5 * draws.normal()).collect();
-        let groups: Vec<usize> = (0..n).collect();
-        let pair = errors(&truth, &off, &off, &groups, &groups).unwrap();
-        let half = 0.5 * (pair.after.high90 - pair.after.low90);
-        let exact = 1.645 * 0.5 / (n as f64).sqrt();
-        assert!((half / exact - 1.0).abs() < 0.15, "{half} {exact}");
     }
 
     /// Errors of 2 N that become 1 N gain 1.5 each, all alike.

@@ -20,7 +20,7 @@ const LOG_PEAK: f64 = -0.960_418_255_751_598_7;
 const LOCATION: f64 = 1.394;
 
 /// Width of bad pulls over that of the others.
-const BAD: f64 = 6.0;
+pub(super) const BAD: f64 = 6.0;
 
 /// Shares of bad pulls that are tried.
 const SHARES: [f64; 3] = [0.03, 0.08, 0.15];
