@@ -6,8 +6,8 @@
 //! (Rao 1948), from each of its starts and, where its fit moves other parameters than its size too, from beside them; a curve that was chosen
 //! for what it explains is chosen again. Baseline and rival are both fitted to the shuffled residuals, by weighted least squares with the weights
 //! of Student's t, and judged by the likelihood by which fits are judged. Shuffled are the innovations of the fitted memory, so that neighbours
-//! remember each other as they do in the data (Freedman and Lane 1983 for the residuals of a smaller model). What only traces
-//! show is left out.
+//! remember each other as they do in the data (Freedman and Lane 1983 for the residuals of a smaller model). Effects on readings compete with what they
+//! do to labels and slips; what only traces show is left out.
 
 use super::candidates::Candidate;
 use super::chosen::chosen_from;
@@ -120,7 +120,6 @@ impl Search<'_> {
 fn directions(search: &Search<'_>, test: &ScoreTest<'_>) -> Vec<Direction> {
     let context = search.context;
     let each = 0.5 * libm::log(search.rows.len().max(2) as f64);
-    let traces = !context.observations.is_empty();
     let mut found = Vec::new();
     let mut add = |named: bool, cost: usize, columns: Vec<DVector<f64>>| {
         let vectors = orthonormal(columns);
@@ -133,9 +132,6 @@ fn directions(search: &Search<'_>, test: &ScoreTest<'_>) -> Vec<Direction> {
         }
     };
     for (i, candidate) in search.candidates.iter().enumerate() {
-        if traces && candidate.acts_on_signals() {
-            continue;
-        }
         for from in starts_and_beside(candidate) {
             add(true, candidate.cost(), vec![test.direction(candidate, &from)]);
             if search.may_differ(i) {
