@@ -72,6 +72,16 @@ fn the_end_of_a_range_that_one_level_reaches_is_no_news_to_the_others() {
         "{:?}",
         found.notes
     );
+    // Three pulls lie close together by chance.
+    let mut three = measured;
+    let mut left = 3;
+    three.pulls.retain(|p| {
+        let beyond = p.max_pull_force_n > 22.5;
+        left -= i32::from(beyond);
+        !beyond || left >= 0
+    });
+    let found = diagnose(&three, &[]).diagnosis;
+    assert!(!names(&found).contains(&"sensor_saturation"), "{:?}", found.effects);
 }
 
 /// A first pull that went wrong is an outlier. A conditioning that lasts for half a pull explains it, and nothing else.

@@ -8,6 +8,7 @@ mod choose;
 mod chosen;
 mod compared;
 mod compete;
+mod confirmed;
 pub mod context;
 pub mod curves;
 pub mod data;

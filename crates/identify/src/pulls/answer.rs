@@ -1,13 +1,14 @@
 //! From a campaign to an answer.
 
 use super::candidates::{Candidate, candidates};
+use super::confirmed::{confirmed, label_sd_n};
 use super::context::Context;
 use super::data::PullData;
 use super::error_interval::{Judged, errors};
 use super::estimates::baseline;
 use super::fitting::Fitted;
 use super::heldout::{HeldOutScore, by_value, folds, held_out_score, noise_floor_n, predicted, scatter};
-use super::model::{PredictPulls, PullModel, PullPrediction};
+use super::model::{PredictPulls, PullModel};
 use super::naming::named;
 use super::one_level::of_one_level;
 use super::paying::{by_chance, paying};
@@ -21,7 +22,7 @@ use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
 use super::units::other_unit;
 use super::unknown::unknown;
-use super::worth::{BAD, HeldOut, hints, worse};
+use super::worth::{HeldOut, hints, worse};
 use super::zero_screen::{said, zeros_that_depend};
 use crate::diagnosis::{
     Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, ParameterEstimate, Residual, UnknownCovariate,
@@ -39,10 +40,6 @@ const OUTLIER: f64 = 4.5;
 
 /// Rivals of the first place that are scored on held-out repetitions.
 const SCORED: usize = 8;
-
-/// Part of the squared error by which labels that no fit has seen may be predicted worse, by chance, with an effect that
-/// shows in the traces only.
-const WORSE: f64 = 1.03;
 
 /// How many times the noise that a twin states labels have to show before it is said.
 const NOISIER: f64 = 1.6;
@@ -299,49 +296,6 @@ fn learnt_text(residual: &Residual) -> String {
         100.0 * residual.gain,
         residual.covariates.join(", ")
     )
-}
-
-/// Standard deviations of labels, as a fit sees them.
-fn label_sd_n(fitted: &Fitted, predicted: &[PullPrediction]) -> Vec<f64> {
-    let scale = fitted.likelihood.scale.max(0.1);
-    predicted.iter().map(|p| (scale * scale * p.label_sd_n * p.label_sd_n + 0.03 * 0.03).sqrt()).collect()
-}
-
-/// What was accepted, as far as it does not predict labels worse that no fit has seen: the last term goes first.
-fn confirmed(
-    search: &Search<'_>,
-    before: &Fitted,
-    mut accepted: Accepted,
-    heldout_before: &[f64],
-    repetitions: &[Vec<usize>],
-) -> Accepted {
-    let data = search.context.data;
-    let sd_n = label_sd_n(before, &search.context.predictor.pulls(&before.model, &search.rows));
-    // A few bad pulls decide nothing.
-    let squares = |predicted: &[f64]| -> f64 {
-        let each = data.label_n.iter().zip(predicted).zip(&sd_n).filter(|((_, p), _)| p.is_finite());
-        each.map(|((l, p), sd)| ((l - p) / sd).powi(2).min(BAD * BAD)).sum()
-    };
-    loop {
-        if accepted.effects.is_empty() && accepted.curves.is_empty() {
-            return accepted;
-        }
-        let after = predicted(search.context, &accepted.fitted, repetitions, false);
-        if squares(&after) <= WORSE * squares(heldout_before) {
-            return accepted;
-        }
-        let mut fewer = accepted.fitted.terms.clone();
-        if accepted.effects.len() > 1 || accepted.curves.is_empty() {
-            if let Some((last, _)) = accepted.effects.pop() {
-                fewer.effects.retain(|(c, _)| c.spec != search.candidates[last].spec);
-            }
-        } else {
-            accepted.curves.pop();
-            fewer.curves.pop();
-        }
-        let refitted = search.context.fit(&before.model, &fewer, &search.rows);
-        accepted.fitted = refitted.unwrap_or_else(|| before.clone());
-    }
 }
 
 pub(super) fn blank(data: &PullData<'_>) -> Diagnosis {

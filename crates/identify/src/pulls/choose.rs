@@ -1,7 +1,7 @@
 //! Which of the rivals is accepted.
 
 use super::fitting::Fitted;
-use super::heldout::unfelt_without;
+use super::heldout::feeling;
 use super::screen::test;
 use super::search::{CURVE_GAIN, Entry, ModelTerm, Search};
 
@@ -19,8 +19,8 @@ const RATHER_SESSION: f64 = 4.0;
 const SAME_CLOCK: f64 = 0.9;
 
 /// Chance at which the first effect, or the first curve, may be named where nothing acts, of labels alone and beside traces. Of 130 campaigns of labels in
-/// which nothing acts one had a name at 0.0075, and of 81 others three at 0.015, which is more than is wanted; beside traces chances below 0.01 come two to three times as
-/// often as they say (docs/loop/worlds.md).
+/// which nothing acts one had a name at 0.0075, and of 81 others three at 0.015, which is more than is wanted; beside traces four of 200 had one at 0.0075
+/// (docs/loop/worlds.md).
 const CHANCE_OF_LABELS: f64 = 0.01;
 const CHANCE: f64 = 0.0075;
 
@@ -119,12 +119,14 @@ impl Search<'_> {
     /// Whether more than a pull or two speak for a rival, and more than a few where it is the end of a range: what explains one bad pull and nothing else is
     /// no effect.
     fn broad(&self, before: &Fitted, entry: &Entry) -> bool {
-        let ends = |i: usize| self.candidates[i].is_end_of_a_range();
-        if entry.rival.effect().is_some_and(ends) && self.felt_by(entry) < FEEL {
+        let effect = entry.rival.effect().map(|i| &self.candidates[i]);
+        if let Some(end) = effect.filter(|c| c.is_end_of_a_range())
+            && feeling(self.context, &entry.fitted.model, end, &self.rows).len() < FEEL
+        {
             return false;
         }
         let traces = !self.context.observations.is_empty();
-        if traces && entry.rival.effect().is_some_and(|i| self.candidates[i].acts_on_signals()) {
+        if traces && effect.is_some_and(|c| c.acts_on_signals()) {
             return true;
         }
         let log = |f: &Fitted, i: usize| self.context.tails.log_of(f.residuals[i], f.likelihood.scale);
@@ -133,14 +135,6 @@ impl Search<'_> {
         gains.sort_by(|a, b| b.total_cmp(a));
         let all: f64 = gains.iter().sum();
         gains.iter().skip(FEW).sum::<f64>() >= OTHERS * all
-    }
-
-    /// How many pulls feel the effect of a rival.
-    fn felt_by(&self, entry: &Entry) -> usize {
-        let Some(i) = entry.rival.effect() else { return 0 };
-        let feels =
-            |&&row: &&usize| !unfelt_without(self.context, &entry.fitted.model, &self.candidates[i], &[row]);
-        self.rows.iter().filter(feels).count()
     }
 
     /// The entry that is accepted, if one is. `chance` is how often the best of all rivals gains as much where nothing acts.

@@ -27,7 +27,7 @@ impl Context<'_> {
     }
 
     /// Readings without a load less what a model says of them, by pull.
-    fn zeros(&self, model: &PullModel) -> Vec<Zero> {
+    pub(super) fn zeros(&self, model: &PullModel) -> Vec<Zero> {
         let mut zeros = vec![None; self.data.len()];
         let seen: Vec<_> = self.observations.iter().filter_map(|o| Some((o.row, o.no_load_n?))).collect();
         let asked: Vec<(usize, &[f64])> = seen.iter().map(|(row, _)| (*row, [].as_slice())).collect();
@@ -47,7 +47,7 @@ impl Context<'_> {
         self.walk = walk.map(|walk| (walk, walk.smoothed(&zeros, &pulls)));
     }
 
-    /// The slow part of the zero in each pull, beyond what a model says of it; nothing where none was seen.
+    /// Mean and slow part of the zero in each pull, beyond what a model says of it; nothing where none was seen.
     pub(super) fn slow_zeros(&self, model: &PullModel) -> Option<Cow<'_, [SlowZero]>> {
         let (walk, still) = self.walk.as_ref()?;
         if model.effects.iter().any(|e| e.acts_on_signals()) {

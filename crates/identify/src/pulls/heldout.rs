@@ -107,12 +107,7 @@ fn unfelt_forgotten(
 }
 
 /// Whether no label at `rows` is another where an effect has no size.
-pub(super) fn unfelt_without(
-    context: &Context<'_>,
-    model: &PullModel,
-    candidate: &Candidate,
-    rows: &[usize],
-) -> bool {
+fn unfelt_without(context: &Context<'_>, model: &PullModel, candidate: &Candidate, rows: &[usize]) -> bool {
     // At its neutral value rather than without it: the same way of predicting.
     let (spec, size) = (candidate.spec, candidate.size());
     let mut neutral = model.clone();
@@ -121,6 +116,16 @@ pub(super) fn unfelt_without(
     let labels = [model, &neutral].map(|model| context.labels_n(model, rows));
     let sd_n = context.deviations(model, rows);
     (0..rows.len()).all(|k| (labels[0][k] - labels[1][k]).abs() <= UNFELT * sd_n[k])
+}
+
+/// The pulls of `rows` whose labels are others where an effect has no size.
+pub(super) fn feeling(
+    context: &Context<'_>,
+    model: &PullModel,
+    candidate: &Candidate,
+    rows: &[usize],
+) -> Vec<usize> {
+    rows.iter().copied().filter(|&i| !unfelt_without(context, model, candidate, &[i])).collect()
 }
 
 /// How a rival predicts pulls that no fit has seen, against the model without it.

@@ -19,6 +19,9 @@ const LOG_PEAK: f64 = -0.960_418_255_751_598_7;
 /// squared integral of its slope.
 const LOCATION: f64 = 1.394;
 
+/// Standard deviation of normal residuals over the median of their sizes.
+pub(super) const SD_OF_MEDIAN: f64 = 1.4826;
+
 /// Width of bad pulls over that of the others.
 pub(super) const BAD: f64 = 6.0;
 
@@ -55,7 +58,7 @@ impl Tails {
         let n = residuals.len() as f64;
         let mut sorted: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
         sorted.sort_by(f64::total_cmp);
-        let mut square = sorted.get(sorted.len() / 2).map_or(1.0, |m| (m * 1.4826).powi(2)).max(1e-12);
+        let mut square = sorted.get(sorted.len() / 2).map_or(1.0, |m| (m * SD_OF_MEDIAN).powi(2)).max(1e-12);
         for _ in 0..30 {
             let new = residuals.iter().map(|r| self.weight(r * r / square) * r * r).sum::<f64>() / n;
             let new = new.max(1e-12);

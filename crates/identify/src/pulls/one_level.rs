@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::fitting::Fitted;
-use super::heldout::unfelt_without;
+use super::heldout::feeling;
 use crate::diagnosis::Diagnosis;
 
 /// What is said of the only effect that was named, where it is the end of a range and pulls of only one grip force feel it.
@@ -13,10 +13,9 @@ pub(super) fn of_one_level(diagnosis: &Diagnosis, context: &Context<'_>, fitted:
         return None;
     }
     let pulls = &context.data.measured.pulls;
-    let mut feel: Vec<u64> = (0..pulls.len())
-        .filter(|&i| !unfelt_without(context, &fitted.model, candidate, &[i]))
-        .map(|i| pulls[i].grip_force_n.to_bits())
-        .collect();
+    let all: Vec<usize> = (0..pulls.len()).collect();
+    let felt = feeling(context, &fitted.model, candidate, &all);
+    let mut feel: Vec<u64> = felt.iter().map(|&i| pulls[i].grip_force_n.to_bits()).collect();
     let count = feel.len();
     feel.sort_unstable();
     feel.dedup();

@@ -31,13 +31,13 @@ const NOT_LOOKED_AT: [&str; 3] = ["time_s", "pull_index", "pull_direction"];
 
 /// Columns that the readings without a load go with, beyond what a model says of them.
 pub(super) fn zeros_that_depend(context: &Context<'_>, model: &PullModel) -> Vec<UnknownCovariate> {
-    let seen: Vec<_> = context.observations.iter().filter_map(|o| Some((o.row, o.no_load_n?.0))).collect();
+    let zeros = context.zeros(model);
+    let seen: Vec<(usize, f64)> =
+        (zeros.iter().enumerate()).filter_map(|(i, z)| Some((i, (*z)?.0))).collect();
     if seen.len() < MIN_TRACES {
         return Vec::new();
     }
-    let asked: Vec<(usize, &[f64])> = seen.iter().map(|(row, _)| (*row, [].as_slice())).collect();
-    let predicted = context.predictor.traces(model, &asked);
-    let zero_n: Vec<f64> = seen.iter().zip(&predicted).map(|((_, z), p)| z - p.no_load_n).collect();
+    let zero_n: Vec<f64> = seen.iter().map(|(_, zero_n)| *zero_n).collect();
     let columns: Vec<(&String, Vec<f64>)> = context
         .data
         .columns
