@@ -1,7 +1,7 @@
 //! Labels as a function of what the jaws hold, over scatter and noise.
 
 use gripgen_identify::pulls::model::{PullModel, PullPrediction};
-use gripgen_physics::{QuasiStatic, SlipPull, StuckPull};
+use gripgen_physics::{QuasiStatic, SlipPull, SlipRun, StuckPull};
 use gripgen_twin::effects::{CommandChain, SensorChain};
 use gripgen_twin::{Backbone, Staircase};
 use std::sync::{Arc, OnceLock};
@@ -38,28 +38,26 @@ pub(super) struct Scattered<'a> {
 }
 
 impl Scattered<'_> {
-    /// Mean and mean square of the label of jaws that hold exactly `limit_n`.
-    fn label(&self, limit_n: f64, slip: &mut SlipPull) -> (f64, f64) {
-        let decided_n = self.tolerance_n + 7.0 * self.noise_n;
-        self.rig.slip(
-            self.stuck,
-            self.staircase,
-            limit_n,
-            self.kinetic_ratio,
-            self.backbone,
-            decided_n,
-            &self.sensor,
-            &self.command,
-            slip,
-        );
-        match slip.label(self.stuck, self.tolerance_n, self.noise_n) {
+    /// Means and mean squares of the labels of jaws that hold exactly `limits_n`.
+    fn labels(&self, limits_n: [f64; TOGETHER], slips: &mut [SlipPull; TOGETHER]) -> [(f64, f64); TOGETHER] {
+        let run = SlipRun {
+            stuck: self.stuck,
+            staircase: self.staircase,
+            kinetic_ratio: self.kinetic_ratio,
+            backbone: self.backbone,
+            decided_n: self.tolerance_n + 7.0 * self.noise_n,
+            sensor: &self.sensor,
+            command: &self.command,
+        };
+        self.rig.slips(&run, limits_n, slips);
+        std::array::from_fn(|k| match slips[k].label(self.stuck, self.tolerance_n, self.noise_n) {
             Some((mean, var)) => (mean, mean * mean + var),
             // A reading that was never near the command: the rule would fail, the reading at the slip stands in.
             None => {
-                let reading = reading_n(self.stuck, limit_n);
+                let reading = reading_n(self.stuck, limits_n[k]);
                 (reading, reading * reading)
             }
-        }
+        })
     }
 }
 
@@ -105,11 +103,14 @@ fn force_n(place: f64) -> f64 {
 }
 
 /// Means and mean squares of labels of jaws that hold exactly the forces of a table: what is left where nothing scatters. Tables of all
-/// scatters, which differ from fold to fold, share them. Each is worked out when it is first asked for: the pulls of a campaign need
-/// half of them, one pull a tenth.
+/// scatters, which differ from fold to fold, share them. Each is worked out when it is first asked for, with its neighbours: the pulls of a
+/// campaign need half of them, one pull a tenth.
 pub(super) struct ExactLabels {
-    values: Vec<OnceLock<(f64, f64)>>,
+    values: Vec<OnceLock<[(f64, f64); TOGETHER]>>,
 }
+
+/// Neighbours that are worked out together.
+const TOGETHER: usize = 4;
 
 /// Scatters for which the same forces are looked at.
 const SCATTER_STEP: f64 = 0.1;
@@ -127,11 +128,13 @@ pub(super) fn enough_for(scatter: f64) -> f64 {
 impl ExactLabels {
     /// For forces up to `max_n` and any scatter up to `scatter`.
     pub fn new(max_n: f64, scatter: f64) -> Self {
-        Self { values: (0..count(max_n, scatter)).map(|_| OnceLock::new()).collect() }
+        Self { values: (0..count(max_n, scatter).div_ceil(TOGETHER)).map(|_| OnceLock::new()).collect() }
     }
 
-    fn at(&self, i: usize, pull: &Scattered<'_>, slip: &mut SlipPull) -> (f64, f64) {
-        *self.values[i].get_or_init(|| pull.label(force_n(i as f64), slip))
+    fn at(&self, i: usize, pull: &Scattered<'_>, slips: &mut [SlipPull; TOGETHER]) -> (f64, f64) {
+        let (block, place) = (i / TOGETHER, i % TOGETHER);
+        let limit_n = |k: usize| force_n((block * TOGETHER + k) as f64);
+        self.values[block].get_or_init(|| pull.labels(std::array::from_fn(limit_n), slips))[place]
     }
 }
 
@@ -160,11 +163,11 @@ impl LabelTable {
 
     /// The prediction for jaws that hold the force of row `i` on average: of `pull`, which is that of the table.
     pub fn of_row(&self, i: usize, pull: &Scattered<'_>) -> PullPrediction {
-        let (mut slip, count) = (SlipPull::default(), count(self.max_n, pull.scatter));
+        let (mut slips, count) = (Default::default(), count(self.max_n, pull.scatter));
         let mut between = |limit_n: f64| {
             let x = place(limit_n).clamp(0.0, (count - 2) as f64);
             let (i, w) = (x as usize, x.fract());
-            let [a, b] = [i, i + 1].map(|i| self.exact.at(i, pull, &mut slip));
+            let [a, b] = [i, i + 1].map(|i| self.exact.at(i, pull, &mut slips));
             (a.0 * (1.0 - w) + b.0 * w, a.1 * (1.0 - w) + b.1 * w)
         };
         let limit_n = force_n(i as f64);

@@ -55,6 +55,7 @@ impl ForceLoop {
     }
 
     /// The same for a command that has waited its dead time already.
+    #[inline]
     pub(crate) fn advance_due(
         &mut self,
         step_s: f64,
@@ -66,6 +67,7 @@ impl ForceLoop {
         self.close(step_s, measured_n, contact_n)
     }
 
+    #[inline]
     fn close(&mut self, step_s: f64, measured_n: f64, contact_n: f64) -> f64 {
         let closed = match self.robot.feedback {
             Feedback::Measured => measured_n,

@@ -83,7 +83,7 @@ pub use mesh::{
 pub use optics::{BACKGROUND_TERMS, FINER_TERMS, OpticsState};
 pub use patch::{ContactPatch, PressureCell};
 pub use posterior::{CAUSE_KEY, Posterior, PosteriorDraw, PosteriorError};
-pub use profile::Staircase;
+pub use profile::{Staircase, StaircaseCursor};
 pub use rounded::rounded;
 pub use sample::{ImprintSummary, Outcome, Pulled, Sample};
 pub use scenario::{Covariates, PullSettings, Scenario};

@@ -125,6 +125,11 @@ impl CommandChain {
         Self { stages: effects.filter_map(|(spec, values)| Some((spec.command?, values.to_vec()))).collect() }
     }
 
+    /// Whether no effect acts on commands.
+    pub fn is_identity(&self) -> bool {
+        self.stages.is_empty()
+    }
+
     /// What the force loop is told when it measures `measured_n`.
     pub fn apply(&self, desired_n: f64, measured_n: f64) -> f64 {
         self.stages.iter().fold(desired_n, |force_n, (hook, values)| hook(values, force_n, measured_n))

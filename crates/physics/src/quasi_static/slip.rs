@@ -1,0 +1,238 @@
+//! What follows a slip.
+
+use super::label::label_moments;
+use super::{QuasiStatic, SNAPSHOT_TICKS, StuckPull};
+use crate::force_loop::ForceLoop;
+use gripgen_twin::effects::{CommandChain, SensorChain};
+use gripgen_twin::{Backbone, Staircase, StaircaseCursor};
+
+/// Share of the limit up to which contacts that bend are taken for springs: what they trail more below is forgotten, within
+/// the time in which gels and damping relax, before they slip.
+const BENDS_FROM: f64 = 0.3;
+
+/// What follows after a slip.
+#[derive(Debug, Clone, Default)]
+pub struct SlipPull {
+    /// The first tick at which the jaws slide, or bend, or one past the last tick of a pull that ends before.
+    pub slip_tick: usize,
+    /// Command at each tick from there on.
+    pub desired_n: Vec<f64>,
+    /// Noise-free reading at each of them.
+    pub reading_n: Vec<f64>,
+    /// Displacement at the last tick.
+    pub displacement_m: f64,
+}
+
+/// What pulls of one profile share that differ in what the jaws hold.
+#[derive(Debug, Clone, Copy)]
+pub struct SlipRun<'a> {
+    /// The pull of a tool that holds.
+    pub stuck: &'a StuckPull,
+    /// Its commands.
+    pub staircase: &'a Staircase,
+    /// Kinetic over static friction.
+    pub kinetic_ratio: f64,
+    /// The contact.
+    pub backbone: &'a Backbone,
+    /// A command that is so much above the reading decides: the label cannot change any more.
+    pub decided_n: f64,
+    /// The sensor of `stuck`.
+    pub sensor: &'a SensorChain,
+    /// The commands of `stuck`.
+    pub command: &'a CommandChain,
+}
+
+/// A pull from where it leaves the one of a tool that holds.
+struct Slipping<'a> {
+    limit_n: f64,
+    kinetic_n: f64,
+    /// Force above the kinetic one.
+    above_n: f64,
+    /// Shear of a contact that bends, with its share of the limit and its slope, until all of it has slipped.
+    bent: Option<(f64, (f64, f64))>,
+    /// Shear per displacement.
+    shear_of_m: f64,
+    sensor: SensorChain,
+    control: ForceLoop,
+    stairs: StaircaseCursor<'a>,
+    /// Commands that have waited their dead time.
+    due: StaircaseCursor<'a>,
+    tick: usize,
+}
+
+/// What all steps of a pull share.
+struct Steps {
+    step_s: f64,
+    dead_s: f64,
+    /// Share of the force above the kinetic one that is left after a step.
+    kept: f64,
+    /// What a force that nobody holds moves in a step.
+    metres_per_n: f64,
+    /// How much of that a spring of the gels' stiffness takes away.
+    held_back: f64,
+    last: usize,
+}
+
+impl QuasiStatic {
+    /// What follows when the jaws hold `limits_n` only, each for itself. A pull ends at the displacement stop, or when the label is
+    /// decided. Pulls advance in turns: each waits for its own last step alone, and together they take little longer than one.
+    pub fn slips<const N: usize>(&self, run: &SlipRun<'_>, limits_n: [f64; N], pulls: &mut [SlipPull; N]) {
+        let step_s = 1.0 / self.rate_hz;
+        let metres_per_n = step_s / self.robot.damping_n_s_per_m;
+        let steps = Steps {
+            step_s,
+            dead_s: (self.robot.dead_time_s * self.rate_hz - 1e-9).ceil().max(0.0) * step_s,
+            kept: if self.fall_s > 0.0 { libm::exp(-step_s / self.fall_s) } else { 0.0 },
+            metres_per_n,
+            held_back: self.stiffness_n_per_m * metres_per_n,
+            last: self.ticks(),
+        };
+        let mut slipping: [Option<Slipping<'_>>; N] =
+            std::array::from_fn(|i| self.leaves(run, &steps, limits_n[i], &mut pulls[i]));
+        // Without effects on readings and commands, as most are, there is nothing to ask them.
+        if run.sensor.is_identity() && run.command.is_identity() {
+            self.advance_all(
+                run,
+                &steps,
+                &mut slipping,
+                pulls,
+                |_, contact_n, _| contact_n,
+                |due_n, _| due_n,
+            );
+        } else {
+            let read = |sensor: &mut SensorChain, contact_n: f64, time_s: f64| {
+                sensor.read(contact_n, time_s, step_s)
+            };
+            let command = |due_n: f64, reading_n: f64| run.command.apply(due_n, reading_n);
+            self.advance_all(run, &steps, &mut slipping, pulls, read, command);
+        }
+    }
+
+    #[inline(always)]
+    fn advance_all<const N: usize>(
+        &self,
+        run: &SlipRun<'_>,
+        steps: &Steps,
+        slipping: &mut [Option<Slipping<'_>>; N],
+        pulls: &mut [SlipPull; N],
+        read: impl Fn(&mut SensorChain, f64, f64) -> f64,
+        command: impl Fn(f64, f64) -> f64,
+    ) {
+        while slipping.iter().any(Option::is_some) {
+            for (slot, pull) in slipping.iter_mut().zip(pulls.iter_mut()) {
+                let Some(slipping) = slot else { continue };
+                if !self.advance(run, steps, slipping, pull, &read, &command) {
+                    *slot = None;
+                }
+            }
+        }
+    }
+
+    /// The pull at the tick at which it is no longer that of a tool that holds; `None` if it ends before.
+    fn leaves<'a>(
+        &self,
+        run: &SlipRun<'a>,
+        steps: &Steps,
+        limit_n: f64,
+        pull: &mut SlipPull,
+    ) -> Option<Slipping<'a>> {
+        let SlipRun { stuck, backbone, .. } = run;
+        pull.desired_n.clear();
+        pull.reading_n.clear();
+        let from_n = if backbone.bends() { BENDS_FROM * limit_n } else { limit_n };
+        let held = stuck.largest_n.partition_point(|&f| f < from_n);
+        pull.displacement_m = limit_n / self.stiffness_n_per_m;
+        pull.slip_tick = held;
+        if held >= stuck.desired_n.len() {
+            return None;
+        }
+        let mut sensor = match stuck.sensors.get(held / SNAPSHOT_TICKS) {
+            Some(remembered) => remembered.clone(),
+            None => run.sensor.clone(),
+        };
+        if !sensor.is_identity() {
+            for tick in held / SNAPSHOT_TICKS * SNAPSHOT_TICKS..held {
+                let before_s = if tick == 0 { 0.0 } else { steps.step_s };
+                sensor.read(stuck.contact_n[tick], tick as f64 / self.rate_hz, before_s);
+            }
+        }
+        let mut control = ForceLoop::new(self.robot);
+        control.take_over(stuck.applied_n[held]);
+        let kinetic_n = limit_n * run.kinetic_ratio;
+        let held_s = held as f64 / self.rate_hz;
+        Some(Slipping {
+            limit_n,
+            kinetic_n,
+            above_n: (limit_n - kinetic_n) * steps.kept,
+            bent: backbone.bends().then(|| {
+                let shear = backbone.shear_of(stuck.contact_n[held] / limit_n);
+                (shear, backbone.at(shear))
+            }),
+            shear_of_m: self.stiffness_n_per_m / limit_n,
+            sensor,
+            control,
+            stairs: run.staircase.from(held_s),
+            due: run.staircase.from((held_s - steps.dead_s).max(0.0)),
+            tick: held,
+        })
+    }
+
+    /// One tick, and whether there is another.
+    #[inline(always)]
+    fn advance(
+        &self,
+        run: &SlipRun<'_>,
+        steps: &Steps,
+        slipping: &mut Slipping<'_>,
+        pull: &mut SlipPull,
+        read: &impl Fn(&mut SensorChain, f64, f64) -> f64,
+        command: &impl Fn(f64, f64) -> f64,
+    ) -> bool {
+        let time_s = slipping.tick as f64 / self.rate_hz;
+        let contact_n = match slipping.bent {
+            Some((_, (share, _))) => slipping.limit_n * share,
+            None => slipping.kinetic_n + slipping.above_n,
+        };
+        if slipping.bent.is_none() {
+            slipping.above_n *= steps.kept;
+        }
+        let reading_n = read(&mut slipping.sensor, contact_n, time_s);
+        let desired_n = slipping.stairs.desired_n(time_s);
+        pull.desired_n.push(desired_n);
+        pull.reading_n.push(reading_n);
+        if let Some((shear, _)) = slipping.bent {
+            pull.displacement_m = shear / slipping.shear_of_m;
+        }
+        let decided = slipping.bent.is_none() && desired_n - reading_n > run.decided_n;
+        if pull.displacement_m > self.stop_m || decided {
+            return false;
+        }
+        // Commands under way at the slip go on arriving: the loop is given the one that is due.
+        let due_n = slipping.due.desired_n((time_s - steps.dead_s).max(0.0));
+        let commanded_n = command(due_n, reading_n);
+        let applied_n = slipping.control.advance_due(steps.step_s, commanded_n, reading_n, contact_n);
+        let step_m = (applied_n - contact_n) * steps.metres_per_n;
+        slipping.bent = match slipping.bent {
+            Some((shear, (_, slope))) => {
+                // Implicit in x while it holds.
+                let next = shear + step_m * slipping.shear_of_m / (1.0 + steps.held_back * slope);
+                (next < run.backbone.slips_at()).then(|| (next, run.backbone.at(next)))
+            }
+            None => {
+                pull.displacement_m += step_m.max(0.0);
+                None
+            }
+        };
+        slipping.tick += 1;
+        slipping.tick <= steps.last
+    }
+}
+
+impl SlipPull {
+    /// Mean and variance of the label of this pull whose readings carry white noise: [`label_moments`].
+    pub fn label(&self, stuck: &StuckPull, tolerance_n: f64, noise_n: f64) -> Option<(f64, f64)> {
+        let held = self.slip_tick.min(stuck.desired_n.len());
+        let before = stuck.desired_n[..held].iter().zip(&stuck.reading_n[..held]);
+        label_moments(before.chain(self.desired_n.iter().zip(&self.reading_n)), tolerance_n, noise_n)
+    }
+}
