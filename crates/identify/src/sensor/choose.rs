@@ -11,8 +11,10 @@ use crate::draws::Draws;
 const MAX_PICKED: usize = 3;
 /// Chance of a further effect where there is none.
 const FURTHER_FALSE_ALARM: f64 = 0.01;
-/// A further effect explains at least this part of what the first one does; less is the first one's formula.
+/// A further effect explains at least this part of what the first one does; less is the first one's formula. One that acts through
+/// other covariates than all that were picked may be smaller.
 const MIN_SHARE: f64 = 0.06;
+const MIN_SHARE_OF_OTHERS: f64 = 0.02;
 /// Chance of a first effect where there is none, where only blocks decide: they are few, and what they cannot decide is
 /// said beside the name.
 const BLOCKS_FALSE_ALARM: f64 = 0.1;
@@ -47,19 +49,20 @@ pub(crate) fn model_of(ws: &Workspace<'_>, picked: &[(usize, usize)]) -> Model {
     picked.iter().fold(Model::baseline(), |model, &(k, point)| ws.candidates[k].points[point].1.on(&model))
 }
 
-/// Chooses greedily, then looks once whether another one fits better in the place of each.
+/// Chooses greedily by the noise that all smooth effects together leave, takes out again what slow noise explains as well beside the
+/// others, then looks once whether another one fits better in the place of each.
+///
+/// Slow noise that is fitted beside one effect of two takes the other one in, and explains the first as well: each is asked for
+/// with the other one in its place.
 pub(crate) fn choose(ws: &mut Workspace<'_>, options: &SensorOptions) -> Choice {
     let mut choice = Choice::default();
     let mut first_gain = 0.0;
+    let mut rounds = Vec::new();
     for turn in 0..MAX_PICKED {
         let base = model_of(ws, &choice.picked);
         let skip: Vec<usize> = choice.picked.iter().map(|p| p.0).collect();
         let round = ws.round(&base, &skip, options.simulations, options.seed);
-        let alarm = match (turn, ws.weighing) {
-            (0, Weighing::Likelihood) => options.false_alarm,
-            (0, Weighing::Blocks) => BLOCKS_FALSE_ALARM,
-            _ => FURTHER_FALSE_ALARM,
-        };
+        let alarm = alarm(ws, turn, options);
         let picked = pick(ws, &base, &round);
         let found = picked.and_then(|k| {
             let score = round.scores[k].as_ref()?;
@@ -67,31 +70,70 @@ pub(crate) fn choose(ws: &mut Workspace<'_>, options: &SensorOptions) -> Choice 
             let better: f64 = ws.held_out_gain(&base, &after).iter().sum();
             let family_p = match ws.weighing {
                 Weighing::Blocks => round.family_p(score.p_value, ws.candidates[k].is_effect()),
-                Weighing::Likelihood => {
-                    let gain = score.gain.min(ws.profile_gain(&base, &after));
-                    round.family_p(round.p_of(k, gain), false)
-                }
+                Weighing::Likelihood => round.family_p(score.p_value, false),
             };
             (better > 0.0 && family_p <= alarm).then_some((k, score.point, score.gain, score.p_value))
         });
-        if turn == 0 {
-            choice.first = Some(round);
-        }
+        rounds.push(round);
         let Some((k, point, gain, p_value)) = found else { break };
         if turn == 0 {
             first_gain = gain;
-        } else if gain < MIN_SHARE * first_gain || is_misfit(ws, &choice.picked, k) {
+        } else if gain < least_share(ws, &choice.picked, k) * first_gain || is_misfit(ws, &choice.picked, k) {
             break;
         }
         choice.picked.push((k, point));
         choice.p_values.push(p_value);
     }
+    if ws.weighing == Weighing::Likelihood {
+        beyond_slow_noise(ws, &mut choice, &rounds, options);
+    }
+    choice.first = rounds.into_iter().next();
     exchange(ws, &mut choice);
     if ws.weighing == Weighing::Likelihood {
         let noise = ws.noise_of(&model_of(ws, &choice.picked));
         ws.weigh(noise);
     }
     choice
+}
+
+/// Part of the first gain that a further effect or curve has to explain.
+fn least_share(ws: &Workspace<'_>, picked: &[(usize, usize)], k: usize) -> f64 {
+    let through = |k: usize| ws.candidates[k].acts_through();
+    let apart = picked.iter().all(|&(p, _)| through(p).iter().all(|c| !through(k).contains(c)));
+    if ws.candidates[k].is_effect() && apart { MIN_SHARE_OF_OTHERS } else { MIN_SHARE }
+}
+
+/// Chance of one more where there is none.
+fn alarm(ws: &Workspace<'_>, turn: usize, options: &SensorOptions) -> f64 {
+    match (turn, ws.weighing) {
+        (0, Weighing::Likelihood) => options.false_alarm,
+        (0, Weighing::Blocks) => BLOCKS_FALSE_ALARM,
+        _ => FURTHER_FALSE_ALARM,
+    }
+}
+
+/// Takes out, one after the other, what is picked and gains too little over noise that is fitted without it, the least likely first.
+/// `rounds` are those in which they were picked.
+fn beyond_slow_noise(ws: &Workspace<'_>, choice: &mut Choice, rounds: &[Round], options: &SensorOptions) {
+    let mut turns: Vec<usize> = (0..choice.picked.len()).collect();
+    while !choice.picked.is_empty() {
+        let with = model_of(ws, &choice.picked);
+        let chance = |at: usize| {
+            let (k, turn) = (choice.picked[at].0, turns[at]);
+            let others: Vec<(usize, usize)> =
+                (0..choice.picked.len()).filter(|&i| i != at).map(|i| choice.picked[i]).collect();
+            let gain = ws.profile_gain(&model_of(ws, &others), &with);
+            let p_value = rounds[turn].p_of(k, gain).max(choice.p_values[at]);
+            let place = if others.is_empty() { 0 } else { turn };
+            rounds[turn].family_p(p_value, false) / alarm(ws, place, options)
+        };
+        let chances: Vec<f64> = (0..choice.picked.len()).map(chance).collect();
+        let worst = (0..chances.len()).max_by(|&a, &b| chances[a].total_cmp(&chances[b]));
+        let Some(worst) = worst.filter(|&at| chances[at] > 1.0) else { return };
+        choice.picked.remove(worst);
+        choice.p_values.remove(worst);
+        turns.remove(worst);
+    }
 }
 
 /// A curve in the own covariate of an effect that was picked is what the effect's formula leaves.

@@ -114,18 +114,20 @@ fn what_cannot_be_told_apart_is_said() {
     assert_eq!(d.not_excited, [gripgen_twin::effects::FORCE_RATE]);
 }
 
-/// Two effects are both named.
+/// Two effects are both named, in white noise and in noise that slow noise beside one of them alone would explain as well.
 #[test]
 fn two_effects_are_both_named() {
-    let mut both = case(Effect::Drift, 6.0, NoiseKind::White, 12);
-    both.effects.push(Effect::Quadratic);
-    let d = answer(&make(&both)).diagnosis;
-    let mut names: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
-    names.sort_unstable();
-    assert_eq!(names, ["sensor_drift", "sensor_quadratic"]);
-    // Which way a line bends below zero is not asked of forces above it.
-    let odd = d.effects.iter().find_map(|e| e.parameters.get("odd"));
-    assert!(odd.is_some_and(|p| (p.value, p.low90, p.high90) == (0.0, 0.0, 0.0)), "{odd:?}");
+    for (noise, seed) in [(NoiseKind::White, 12), (NoiseKind::Mixed, 301)] {
+        let mut both = case(Effect::Drift, 6.0, noise, seed);
+        both.effects.push(Effect::Quadratic);
+        let d = answer(&make(&both)).diagnosis;
+        let mut names: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
+        names.sort_unstable();
+        assert_eq!(names, ["sensor_drift", "sensor_quadratic"], "{noise:?}");
+        // Which way a line bends below zero is not asked of forces above it.
+        let odd = d.effects.iter().find_map(|e| e.parameters.get("odd"));
+        assert!(odd.is_some_and(|p| (p.value, p.low90, p.high90) == (0.0, 0.0, 0.0)), "{odd:?}");
+    }
 }
 
 /// Every fault is an answer, never a panic and never a name.

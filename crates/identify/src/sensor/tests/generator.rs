@@ -48,6 +48,8 @@ pub(super) struct Made {
     pub data: SensorData,
     /// The same sensor and session with new noise.
     pub again: SensorData,
+    /// Size of each effect beside the others, each by its true formula, in the unit of [`Case::size`].
+    pub visible: Vec<f64>,
 }
 
 impl Made {
@@ -159,6 +161,7 @@ pub(super) fn make(case: &Case) -> Made {
     let mut data = SensorData::default();
     let mut clean: Vec<f64> = Vec::new();
     let mut effect = Vec::new();
+    let mut each = vec![Vec::new(); case.effects.len()];
     let mut start = 0.0;
     let whole_s = case.sessions as f64 * (n as f64 * step_s + 5.0);
     let mut temperature = Vec::new();
@@ -173,10 +176,12 @@ pub(super) fn make(case: &Case) -> Made {
         let gain = (0.9 + 0.2 * draws.uniform()) * if case.seed % 4 == 3 { -0.03 } else { 1.0 };
         let offset = gain * 2.0 * draws.normal();
         let mut sum = vec![0.0; n];
-        for e in &case.effects {
-            for (total, v) in sum.iter_mut().zip(added(*e, &x, &clock, whole_s, step_s, &warm)) {
+        for (e, own) in case.effects.iter().zip(&mut each) {
+            let added = added(*e, &x, &clock, whole_s, step_s, &warm);
+            for (total, v) in sum.iter_mut().zip(&added) {
                 *total += v;
             }
+            own.extend(added.iter().map(|v| gain * v));
         }
         effect.extend(sum.iter().map(|v| gain * v));
         clean.extend(x.iter().zip(&sum).map(|(v, e)| offset + gain * (v + e)));
@@ -199,9 +204,23 @@ pub(super) fn make(case: &Case) -> Made {
     let whitener = Whitener::new(shape, &prepared.group_steps);
     columns.iter_mut().for_each(|c| whitener.apply(c));
     let visible = Moments::new(&prepared.units, &columns).solve(&Model::baseline(), |_| true).left;
+    let mut beside = vec![vec![1.0; clean.len()], data.reference_force_n.clone()];
+    beside.extend(each);
+    beside.iter_mut().for_each(|c| whitener.apply(c));
     let scale = data.reference_force_n.iter().zip(&clean).map(|(_, c)| c.abs()).fold(0.0, f64::max);
     let size =
         if case.effects == [Effect::None] { 0.01 * scale } else { libm::sqrt(visible) / (case.size * 3.42) };
+    let visible = (2..beside.len())
+        .map(|i| {
+            let mut columns = beside.clone();
+            let own = columns.remove(i);
+            let others: Vec<usize> = (2..columns.len()).collect();
+            columns.push(own);
+            let left = Moments::new(&prepared.units, &columns);
+            let model = others.iter().fold(Model::baseline(), |m, &c| m.with(&[c]));
+            libm::sqrt(left.solve(&model, |_| true).left) / (size * 3.42)
+        })
+        .collect();
     let noisy = |lane: u64| {
         let mut draws = Draws::new(case.seed, lane);
         let mut noise = draw(shape, &prepared.group_steps, &mut draws);
@@ -216,5 +235,5 @@ pub(super) fn make(case: &Case) -> Made {
         new.measured_force_n = clean.iter().zip(&noise).map(|(c, e)| c + size * e).collect();
         new
     };
-    Made { data: noisy(1), again: noisy(2) }
+    Made { data: noisy(1), again: noisy(2), visible }
 }
