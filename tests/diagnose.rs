@@ -195,6 +195,40 @@ fn fits_see_a_gain_that_drifts() {
     }
 }
 
+/// A slip is read with the scatter of the friction, and at the end of the sensor's range with hardly any: all grips read the same there.
+#[test]
+fn slips_at_the_end_of_the_range_hardly_scatter() {
+    let limit_n = 30.0;
+    let (_folder, file) =
+        twin_with(&format!("[[effects]]\nname = \"sensor_saturation\"\nlimit_n = {limit_n}\n"));
+    let twin = twin_at(&Location::Disk(file));
+    let library = library(&twin);
+    let mut measured = simulated("", 40, &[]);
+    for (i, pull) in measured.pulls.iter_mut().enumerate() {
+        (pull.grip_force_n, pull.trace) = (8.0 + 6.0 * i as f64, None);
+    }
+    let rows: Vec<usize> = (0..measured.pulls.len()).collect();
+    let predictor = PullPredictor::new(&measured, &twin, &library, 1);
+    let mut model = given_model(&twin, predictor.part_names()).unwrap();
+    model.scatter = 0.05;
+    let plain = predictor.slips(&model, &rows);
+    model.effects = vec![ModelEffect::new(twin.effects[0].spec, twin.effects[0].values.clone())];
+    let ended = predictor.slips(&model, &rows);
+    let (mut below, mut beyond) = (0, 0);
+    for (plain, ended) in plain.iter().zip(&ended) {
+        assert!((plain.label_sd_n / (0.05 * plain.limit_n) - 1.0).abs() < 1e-9, "{plain:?}");
+        if plain.limit_n < 0.8 * limit_n {
+            below += 1;
+            assert!((ended.label_sd_n / plain.label_sd_n - 1.0).abs() < 0.05, "{ended:?}");
+        } else if plain.limit_n > 1.2 * limit_n {
+            beyond += 1;
+            assert!(ended.label_sd_n < 0.01 * plain.label_sd_n, "{ended:?}");
+            assert!((ended.limit_reading_n - limit_n).abs() < 0.1, "{ended:?}");
+        }
+    }
+    assert!(below >= 5 && beyond >= 5, "{below} below, {beyond} beyond");
+}
+
 /// Effects on readings are fitted with lag and dead time free. Where the baseline has not had both first, they win by them
 /// alone: `sensor_saturation` in these two campaigns, in which nothing acts.
 #[test]

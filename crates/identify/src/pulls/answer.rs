@@ -44,8 +44,8 @@ const SCORED: usize = 8;
 /// How many times the noise that a twin states labels have to show before it is said.
 const NOISIER: f64 = 1.6;
 
-/// How often chance lets the ridge be ahead by two standard errors.
-const RIVAL_P: f64 = 0.023;
+/// How often chance lets the ridge be ahead by two and a half standard errors.
+const RIVAL_P: f64 = 0.006;
 
 /// An answer, with what a report and a twin need beside it.
 #[derive(Debug, Clone)]
@@ -160,7 +160,12 @@ pub fn diagnose_pulls(
         let after_n = predicted(&after_context, &after, &repetitions, false);
         let sd_n = label_sd_n(&before, &predictor.pulls(&before.model, &rows));
         let held = HeldOut { before_n: &heldout_before, after_n: &after_n, sd_n: &sd_n };
-        if let Some(reason) = worse(&search, &accepted, &held, &near) {
+        // The pulls that the report counts, too: they are those of the twin that is written.
+        let far = outliers(&after);
+        let counted: Vec<usize> = rows.iter().copied().filter(|i| !far.contains(i)).collect();
+        if let Some(reason) =
+            [&near, &counted].into_iter().find_map(|rows| worse(&search, &accepted, &held, rows))
+        {
             diagnosis.hints.extend(hints(&search, &accepted, &reason));
             accepted.effects.clear();
             accepted.curves.clear();

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Share of the error on held-out pulls by which the ridge has to be ahead, in how many standard errors of the difference.
 const AHEAD: f64 = 0.10;
-const SURE: f64 = 2.0;
+const SURE: f64 = 2.5;
 
 /// Fewest pulls that are held against it.
 const MIN_PULLS: usize = 24;

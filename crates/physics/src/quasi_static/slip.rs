@@ -11,7 +11,7 @@ use gripgen_twin::{Backbone, Staircase, StaircaseCursor};
 const BENDS_FROM: f64 = 0.3;
 
 /// What follows after a slip.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SlipPull {
     /// The first tick at which the jaws slide, or bend, or one past the last tick of a pull that ends before.
     pub slip_tick: usize,
@@ -234,5 +234,71 @@ impl SlipPull {
         let held = self.slip_tick.min(stuck.desired_n.len());
         let before = stuck.desired_n[..held].iter().zip(&stuck.reading_n[..held]);
         label_moments(before.chain(self.desired_n.iter().zip(&self.reading_n)), tolerance_n, noise_n)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gripgen_twin::Robot;
+    use gripgen_twin::config::{Feedback, Twist};
+    use gripgen_twin::effects::find;
+
+    /// Four pulls in turns are each what they are alone: contacts that let go at once and that bend, with and without an effect on readings, one
+    /// that never slips among them.
+    #[test]
+    fn pulls_in_turns_are_what_they_are_alone() {
+        let robot = Robot {
+            moving_mass_kg: 8.0,
+            apparent_mass_kg: None,
+            lag_s: 0.05,
+            dead_time_s: 0.01,
+            damping_n_s_per_m: 400.0,
+            speed_limit_m_per_s: 0.1,
+            feedback: Feedback::Independent,
+            twist: Twist::Stiff,
+            twist_stiffness_n_m_per_rad: None,
+        };
+        let rig = QuasiStatic {
+            robot,
+            stiffness_n_per_m: 2e4,
+            rate_hz: 500.0,
+            fall_s: 0.01,
+            stop_m: 5e-3,
+            max_time_s: 6.0,
+        };
+        let staircase = Staircase::constant(1.0, 0.104, 6.0);
+        let ring = |i: i32| (1.0, 40.0 - f64::from(i));
+        let rings: Vec<(f64, f64)> = (0..40).map(ring).collect();
+        let lowpass = [(find("sensor_lowpass").unwrap(), [0.03].as_slice())];
+        for backbone in [Backbone::straight(), Backbone::new(&rings, 1.0)] {
+            for sensor in [SensorChain::default(), SensorChain::of(lowpass.into_iter(), 0.0)] {
+                let (command, mut stuck) = (CommandChain::default(), StuckPull::default());
+                rig.stuck(&staircase, &sensor, &command, 50.0, &mut stuck);
+                let run = SlipRun {
+                    stuck: &stuck,
+                    staircase: &staircase,
+                    kinetic_ratio: 0.9,
+                    backbone: &backbone,
+                    decided_n: 4.0,
+                    sensor: &sensor,
+                    command: &command,
+                };
+                let limits_n = [5.0, 17.0, 33.0, 500.0];
+                let mut together: [SlipPull; 4] = Default::default();
+                rig.slips(&run, limits_n, &mut together);
+                for (limit_n, pull) in limits_n.into_iter().zip(&together) {
+                    let mut alone: [SlipPull; 1] = Default::default();
+                    rig.slips(&run, [limit_n], &mut alone);
+                    assert_eq!(alone[0], *pull, "{limit_n} N, {}", backbone.bends());
+                    assert_eq!(pull.reading_n.is_empty(), limit_n > 100.0, "{limit_n} N");
+                }
+                // What holds more is pulled further.
+                assert!(
+                    together[0].slip_tick < together[1].slip_tick
+                        && together[1].slip_tick < together[2].slip_tick
+                );
+            }
+        }
     }
 }
