@@ -55,6 +55,8 @@ mod measured;
 mod mechanics;
 // Numbers that Wucherer et al. 2023 print.
 mod paper;
+// Predictions that fits are made with.
+mod predict;
 // Few pulls, and what pulls leave open.
 mod posterior;
 // Presses whose optics were changed, diagnosed.

@@ -16,7 +16,7 @@ use super::posterior::of_diagnosis;
 use super::power::ScoreTest;
 use super::recalibrated::recalibrated;
 use super::residual::{in_place_of_curves, kept};
-use super::ridge::ahead;
+use super::ridge::{AHEAD_BY_CHANCE, ahead};
 use super::search::{Accepted, Search};
 use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
@@ -43,9 +43,6 @@ const SCORED: usize = 8;
 
 /// How many times the noise that a twin states labels have to show before it is said.
 const NOISIER: f64 = 1.6;
-
-/// How often chance lets the ridge be ahead by two and a half standard errors.
-const RIVAL_P: f64 = 0.006;
 
 /// An answer, with what a report and a twin need beside it.
 #[derive(Debug, Clone)]
@@ -127,8 +124,7 @@ pub fn diagnose_pulls(
     let repetitions = folds(data.len());
     let fast_before = predicted(&context, &before, &repetitions, false);
     let accepted = confirmed(&search, &before, accepted, &fast_before, &repetitions);
-    let far = outliers(&accepted.fitted);
-    let near: Vec<usize> = rows.iter().copied().filter(|i| !far.contains(i)).collect();
+    let near = without(&rows, &outliers(&accepted.fitted));
     let (mut accepted, unpaid) = paying(&search, &before, accepted, &repetitions, &near);
     diagnosis.hints = unpaid;
     if let Some(found) = &accepted.by_chance {
@@ -161,8 +157,7 @@ pub fn diagnose_pulls(
         let sd_n = label_sd_n(&before, &predictor.pulls(&before.model, &rows));
         let held = HeldOut { before_n: &heldout_before, after_n: &after_n, sd_n: &sd_n };
         // The pulls that the report counts, too: they are those of the twin that is written.
-        let far = outliers(&after);
-        let counted: Vec<usize> = rows.iter().copied().filter(|i| !far.contains(i)).collect();
+        let counted = without(&rows, &outliers(&after));
         if let Some(reason) =
             [&near, &counted].into_iter().find_map(|rows| worse(&search, &accepted, &held, rows))
         {
@@ -201,7 +196,7 @@ pub fn diagnose_pulls(
         ));
         for (covariate, strength) in rival.columns {
             if diagnosis.unknown.iter().all(|u| u.covariate != covariate) {
-                diagnosis.unknown.push(UnknownCovariate { covariate, strength, p_value: RIVAL_P });
+                diagnosis.unknown.push(UnknownCovariate { covariate, strength, p_value: AHEAD_BY_CHANCE });
             }
         }
     }
@@ -225,7 +220,7 @@ pub fn diagnose_pulls(
     }
     let named_rows = outliers(&after);
     diagnosis.data.outliers = named_rows.iter().map(|&i| measured.pulls[i].id.clone()).collect();
-    let counted: Vec<usize> = rows.iter().copied().filter(|i| !named_rows.contains(i)).collect();
+    let counted = without(&rows, &named_rows);
     if !named_rows.is_empty() {
         diagnosis.notes.push(format!(
             "{} of {} pulls lie far off ({}): they are named, hardly weigh in the fit, and are not in the errors before and after",
@@ -350,6 +345,11 @@ pub(super) fn outliers(fitted: &Fitted) -> Vec<usize> {
         .collect();
     far.sort_by(|a, b| b.0.total_cmp(&a.0));
     far.into_iter().map(|(_, i)| i).collect()
+}
+
+/// The rows that are not among those far off.
+pub(super) fn without(rows: &[usize], far: &[usize]) -> Vec<usize> {
+    rows.iter().copied().filter(|i| !far.contains(i)).collect()
 }
 
 fn would_have_seen(

@@ -1,6 +1,6 @@
 //! Calibration of the baseline, with the effects that were asked for and no search.
 
-use super::answer::{insufficient, outliers};
+use super::answer::{insufficient, outliers, without};
 use super::candidates::{Candidate, candidate};
 use super::context::Context;
 use super::data::PullData;
@@ -175,7 +175,7 @@ pub fn calibrate_pulls(
     let law_of = request.offset_law.then_some(&given.mu[..]);
     let far = outliers(&fitted);
     // As a diagnosis counts: one bad label would be all of a mean of squares.
-    let counted: Vec<usize> = rows.iter().copied().filter(|i| !far.contains(i)).collect();
+    let counted = without(&rows, &far);
     let noise = at_bound(fitted.model.noise_n).filter(|_| context.noise90_n.is_some());
     let sd_n: Vec<f64> =
         predictor.pulls(&fitted.model, &rows).iter().map(|p| p.label_sd_n.max(0.03)).collect();

@@ -8,6 +8,9 @@ use nalgebra::{DMatrix, DVector};
 const AHEAD: f64 = 0.10;
 const SURE: f64 = 2.5;
 
+/// How often chance lets it be ahead by as many standard errors.
+pub(super) const AHEAD_BY_CHANCE: f64 = 0.006;
+
 /// Fewest pulls that are held against it.
 const MIN_PULLS: usize = 24;
 

@@ -2,7 +2,7 @@
 
 use super::calibrate::estimate;
 use super::candidates::{Candidate, candidates, force_rate};
-use super::choose::{Choice, choose, model_of, ties};
+use super::choose::{Choice, choose, model_of, ties, without};
 use super::errors::{Errors, errors};
 use super::moments::{Model, Moments};
 use super::prepare::{Prepared, prepare, range};
@@ -124,12 +124,11 @@ fn finish(
     }
     let all_left = ws.fit.solve(&Model::baseline(), |_| true).left;
     for &at in &curves {
-        let others: Vec<(usize, usize)> =
-            (0..choice.picked.len()).filter(|&i| i != at).map(|i| choice.picked[i]).collect();
-        let without = ws.fit.solve(&model_of(ws, &others), |_| true).left;
+        let fewer = model_of(ws, &without(&choice.picked, at));
+        let left_without = ws.fit.solve(&fewer, |_| true).left;
         diagnosis.unknown.push(UnknownCovariate {
             covariate: ws.candidates[choice.picked[at].0].name().to_string(),
-            strength: ((without - solution.left) / all_left.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0),
+            strength: ((left_without - solution.left) / all_left.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0),
             p_value: choice.p_values.get(at).map_or(1.0, |p| p.max(1e-6)),
         });
     }

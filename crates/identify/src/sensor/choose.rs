@@ -49,6 +49,11 @@ pub(crate) fn model_of(ws: &Workspace<'_>, picked: &[(usize, usize)]) -> Model {
     picked.iter().fold(Model::baseline(), |model, &(k, point)| ws.candidates[k].points[point].1.on(&model))
 }
 
+/// Everything that was picked but for one.
+pub(crate) fn without(picked: &[(usize, usize)], at: usize) -> Vec<(usize, usize)> {
+    (0..picked.len()).filter(|&i| i != at).map(|i| picked[i]).collect()
+}
+
 /// Chooses greedily by the noise that all smooth effects together leave, takes out again what slow noise explains as well beside the
 /// others, then looks once whether another one fits better in the place of each.
 ///
@@ -120,8 +125,7 @@ fn beyond_slow_noise(ws: &Workspace<'_>, choice: &mut Choice, rounds: &[Round], 
         let with = model_of(ws, &choice.picked);
         let chance = |at: usize| {
             let (k, turn) = (choice.picked[at].0, turns[at]);
-            let others: Vec<(usize, usize)> =
-                (0..choice.picked.len()).filter(|&i| i != at).map(|i| choice.picked[i]).collect();
+            let others = without(&choice.picked, at);
             let gain = ws.profile_gain(&model_of(ws, &others), &with);
             let p_value = rounds[turn].p_of(k, gain).max(choice.p_values[at]);
             let place = if others.is_empty() { 0 } else { turn };
@@ -190,8 +194,7 @@ fn exchange(ws: &Workspace<'_>, choice: &mut Choice) {
         if !ws.candidates[choice.picked[at].0].is_effect() {
             continue;
         }
-        let others: Vec<(usize, usize)> =
-            (0..choice.picked.len()).filter(|&i| i != at).map(|i| choice.picked[i]).collect();
+        let others = without(&choice.picked, at);
         let base = model_of(ws, &others);
         let skip: Vec<usize> = others.iter().map(|p| p.0).collect();
         let round = ws.round(&base, &skip, 0, 0);
@@ -219,7 +222,7 @@ fn strength(ws: &Workspace<'_>, score: &Score) -> f64 {
 /// Effects that predict held-out blocks as well as the one picked at `at`, within one paired standard error, and the
 /// weight of that one: shares of the resampled data in which each is the best.
 pub(crate) fn ties(ws: &Workspace<'_>, picked: &[(usize, usize)], at: usize, seed: u64) -> (f64, Vec<Tie>) {
-    let others: Vec<(usize, usize)> = (0..picked.len()).filter(|&i| i != at).map(|i| picked[i]).collect();
+    let others = without(picked, at);
     let base = model_of(ws, &others);
     let best = ws.candidates[picked[at].0].points[picked[at].1].1.on(&base);
     let skip: Vec<usize> = picked.iter().map(|p| p.0).collect();

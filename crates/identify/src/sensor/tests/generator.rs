@@ -203,13 +203,13 @@ pub(super) fn make(case: &Case) -> Made {
     let mut columns = vec![vec![1.0; clean.len()], data.reference_force_n.clone(), effect];
     let whitener = Whitener::new(shape, &prepared.group_steps);
     columns.iter_mut().for_each(|c| whitener.apply(c));
-    let visible = Moments::new(&prepared.units, &columns).solve(&Model::baseline(), |_| true).left;
+    let together = Moments::new(&prepared.units, &columns).solve(&Model::baseline(), |_| true).left;
     let mut beside = vec![vec![1.0; clean.len()], data.reference_force_n.clone()];
     beside.extend(each);
     beside.iter_mut().for_each(|c| whitener.apply(c));
     let scale = data.reference_force_n.iter().zip(&clean).map(|(_, c)| c.abs()).fold(0.0, f64::max);
     let size =
-        if case.effects == [Effect::None] { 0.01 * scale } else { libm::sqrt(visible) / (case.size * 3.42) };
+        if case.effects == [Effect::None] { 0.01 * scale } else { libm::sqrt(together) / (case.size * 3.42) };
     let visible = (2..beside.len())
         .map(|i| {
             let mut columns = beside.clone();
