@@ -5,7 +5,7 @@
 //! the scatter of friction by quadrature, the noise of the readings by [`label_moments`].
 
 use crate::cache::Cache;
-use crate::generate::{PatchFriction, sensor_chain};
+use crate::generate::{PatchFriction, creep_of, sensor_chain};
 use crate::gripped::{Indenter, grip_point, held, jaw_forces_n};
 use crate::library::Library;
 use crate::predictive::LabelCurve;
@@ -124,6 +124,8 @@ pub(crate) fn scenario_of(pull: &MeasuredPull, stop_m: f64, label_tolerance_n: f
 struct Prepared {
     scenario: Scenario,
     held: Box<Held>,
+    /// Real normal force of each jaw.
+    force_n: PerJaw<f64>,
     patches: Arc<PerJaw<ContactPatch>>,
     law: PatchFriction,
 }
@@ -239,7 +241,7 @@ impl<'a> Expectations<'a> {
             })
         })?;
         let law = PatchFriction::new(twin, &scenario, &PerJaw::from_fn(|jaw| &patches[jaw]))?;
-        Ok(Prepared { scenario, held, patches, law })
+        Ok(Prepared { scenario, held, force_n, patches, law })
     }
 
     /// Of each cell of both patches of a pull its share of the area and of what the jaws hold; nothing where there is none.
@@ -265,6 +267,7 @@ impl<'a> Expectations<'a> {
             noise: Stream::new(0, 0, Purpose::ForceNoise),
             sensor: sensor_chain(twin, scenario),
             command: CommandChain::new(twin, &scenario.part),
+            creep: creep_of(twin, scenario, &prepared.force_n),
         };
         // A sensor that remembers goes on rising after the slip; one that does not reads what the jaws hold at most.
         let decides = signals.sensor.is_identity();

@@ -12,11 +12,11 @@ use gripgen_physics::{
 };
 use gripgen_tactile::{Imprint, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
-use gripgen_twin::effects::{CommandChain, SensorChain};
+use gripgen_twin::effects::{CommandChain, Creep, GripPoint, SensorChain, creep};
 use gripgen_twin::evidence::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    ContactPatch, FilmPace, FrictionError, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled,
+    ContactPatch, FilmPace, FrictionError, GripFriction, ImprintSummary, Jaw, Outcome, Part, PerJaw, Pulled,
     Sample, Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
 };
 use std::sync::Arc;
@@ -141,6 +141,7 @@ pub(crate) fn pull_session(
         noise: Stream::new(scenario.seed, scenario.index, Purpose::ForceNoise),
         sensor: sensor_chain(twin, scenario),
         command: CommandChain::new(twin, &scenario.part),
+        creep: creep_of(twin, scenario, &contact.force_n),
     };
     Ok(((*contact.held).clone().pull(&friction, signals), law, scatter))
 }
@@ -155,6 +156,12 @@ fn held_friction(
     let law = PatchFriction::new(twin, scenario, &patches)?;
     let scatter = scatter(&twin.parts[&scenario.part], scenario) * table_factor(twin, scenario);
     Ok((law.held(twin, scenario, &patches, scatter), law.law, scatter))
+}
+
+/// How the tool of a pull creeps whose jaws press with these normal forces.
+pub(crate) fn creep_of(twin: &Twin, scenario: &Scenario, force_n: &PerJaw<f64>) -> Creep {
+    let mean_n = 0.5 * (force_n.left + force_n.right);
+    creep(twin, &scenario.part, &GripPoint { grip_force_n: mean_n, ..grip_point(scenario, Jaw::Left, 0.0) })
 }
 
 /// The wrist sensor of a pull, with what tables of the twin add to its readings.

@@ -2,6 +2,7 @@
 //! which is what a twin is judged by. Expected values over scatter and noise.
 
 mod clock;
+mod creep;
 mod kept;
 mod limit;
 mod signals;
@@ -13,6 +14,7 @@ use crate::expect::{Expectations, QuietTwin};
 use crate::gripped::answering_mass_kg;
 use crate::library::Library;
 use crate::parallel::in_parallel;
+use creep::creeps;
 use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
 use gripgen_physics::QuasiStatic;
 use gripgen_twin::config::Feedback;
@@ -286,6 +288,9 @@ impl PredictPulls for PullPredictor<'_> {
         if clock {
             return self.pulls_by_clock(model, rows);
         }
+        if creeps(model) {
+            return rows.iter().map(|&row| self.crept(model, row, row)).collect();
+        }
         let mut known: Vec<Option<Tables>> = vec![None; self.slots()];
         rows.iter()
             .map(|&row| {
@@ -325,6 +330,13 @@ impl PredictPulls for PullPredictor<'_> {
                 }
             })
             .collect()
+    }
+
+    fn creeps_m_per_n_s(&self, model: &PullModel, rows: &[(usize, f64)]) -> Vec<f64> {
+        let of = |&(row, to_n): &(usize, f64)| {
+            self.creep(model, row).mean_rate_m_per_n_s(to_n / self.limit_n(model, row))
+        };
+        rows.iter().map(of).collect()
     }
 
     fn limits_n(&self, model: &PullModel) -> Vec<f64> {

@@ -49,8 +49,7 @@ fn is_felt(effect: &Effect) -> bool {
     let spec = effect.spec;
     let sizes = spec.parameters.iter().zip(&effect.values).take(spec.sizes);
     let has_size = sizes.into_iter().any(|(parameter, value)| *value != parameter.neutral);
-    let felt = spec.friction.is_some() || spec.normal_force.is_some() || spec.tilt_rad.is_some();
-    has_size && (felt || spec.acts_on_signals())
+    has_size && spec.is_felt()
 }
 
 #[cfg(test)]

@@ -137,11 +137,7 @@ fn acts(project: &Project, effect: &Effect) -> bool {
     if !drawn && sizes.into_iter().all(|(parameter, value)| *value == parameter.neutral) {
         return false;
     }
-    let felt = spec.friction.is_some()
-        || spec.normal_force.is_some()
-        || spec.imprint_volume.is_some()
-        || spec.tilt_rad.is_some()
-        || spec.acts_on_signals();
+    let felt = spec.imprint_volume.is_some() || spec.is_felt();
     felt || (spec.optics.is_some() && project.sweep.images != ImageStorage::None)
 }
 

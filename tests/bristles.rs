@@ -121,6 +121,15 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
         let each = acting.iter().filter_map(|e| Some((e.spec.command?, &e.values)));
         each.fold(desired_n, |d, (hook, values)| hook(values, d, measured_n))
     };
+    // Creep, which moves the tool and no force: the rate is the effect's, what the rim does to it is written here.
+    let pressed = [Jaw::Left, Jaw::Right].map(|jaw| normal_force_n(twin, pull, jaw, pull.grip_force_n));
+    let creeps = acting.iter().filter_map(|e| Some((e.spec.creep?, &e.values))).last();
+    let (rate, rim) = creeps.map_or((0.0, 0.0), |(hook, values)| {
+        let creep = hook(values, &point(pull, Jaw::Left, 0.5 * (pressed[0] + pressed[1])));
+        (creep.rate_m_per_n_s, creep.rim_exponent)
+    });
+    let whole_n: f64 = bristles.iter().map(|b| b.limit_n).sum();
+    let mut crept = 0.0;
     let (mut x, mut v, mut contact, mut loop_n, mut effective) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64, 0.0);
     let (mut slid_s, mut commands) = (None::<f64>, Vec::new());
     let mut label_n = f64::NAN;
@@ -132,7 +141,7 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
         if (measured - desired).abs() < tolerance_n {
             label_n = measured;
         }
-        if x > stop_m {
+        if x + crept > stop_m {
             break;
         }
         // The loop: tau dF/dt = F_des(t - T) - F_closed, exactly over a step; the speed limit bounds it.
@@ -162,6 +171,7 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
         v = root(v - 1.0, v + 1.0, off);
         x += v * dt;
         contact = force(x);
+        crept += rate * contact * (1.0 - contact / whole_n).max(0.01).min(1.0).powf(-rim) * dt;
         let mut holds = false;
         for b in &mut bristles {
             let most = b.limit_n * keep;

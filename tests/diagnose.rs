@@ -121,6 +121,25 @@ fn an_effect_of_the_simulator_is_found_and_put_into_the_twin() {
     assert!(compare_pulls(&measured, &plain, &library(&plain), 2).unwrap().pulls.rmse_n > after);
 }
 
+/// A tool that creeps to its stop while the jaws hold: the label of strong grips is then no friction. Displacements show it, and of labels
+/// alone it is no rival.
+#[test]
+fn creep_that_reaches_the_stop_is_found_by_its_displacement() {
+    let effect = "[[effects]]\nname = \"shear_creep\"\nrate_mm_per_n_s = 0.3\nload_exponent = 0.2\nrim_exponent = 0.5\n";
+    let mut measured = simulated(effect, 90, &[]);
+    let found = diagnose(&measured, &[]);
+    let diagnosis = &found.diagnosis;
+    assert_eq!(names(diagnosis), ["shear_creep"], "{diagnosis:?}");
+    let rate = &diagnosis.effects[0].parameters["rate_mm_per_n_s"];
+    assert!((rate.value / 0.3 - 1.0).abs() < 0.15 && rate.low90 < 0.3 && 0.3 < rate.high90, "{rate:?}");
+    let error = diagnosis.error.as_ref().unwrap();
+    assert!(error.after.rmse_n.unwrap() < 1.3 * diagnosis.noise_floor_n.unwrap(), "{error:?}");
+    assert!(error.before.rmse_n > Some(3.0 * error.after.rmse_n.unwrap()), "{error:?}");
+    measured.pulls.iter_mut().for_each(|pull| pull.trace = None);
+    let blind = diagnose(&measured, &[]).diagnosis;
+    assert!(!names(&blind).contains(&"shear_creep"), "{blind:?}");
+}
+
 /// The twin that is written is the fitted model: with a force that falls after the slip, and with an effect, the error that is
 /// stated is the one that a comparison with that twin gets on those pulls.
 #[test]

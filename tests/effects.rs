@@ -137,6 +137,18 @@ fn effects_that_show_elsewhere_do() {
         let behind = at(&seen(""), 1.3) - at(&band, 1.3);
         assert!((0.5..2.0).contains(&behind), "the loop stays behind by up to its dead band: {behind} N");
 
+        // A tool that creeps moves further at the same force; one that creeps as far as the stop ends its pull there, at the force whose
+        // impulse is that of the way: x = rate int F dt with F = r t.
+        let crept = run(&effect("shear_creep", "rate_mm_per_n_s = 0.02"), "");
+        let tick = 600;
+        let impulse: f64 = crept.trace.measured_force_n[..=tick].iter().sum::<f64>() / 500.0;
+        let further = crept.trace.displacement_m[tick] - plain.trace.displacement_m[tick];
+        assert!((further / (2e-5 * impulse) - 1.0).abs() < 0.01, "{further} m");
+        assert_eq!(at(&crept, 1.2), at(&plain, 1.2));
+        let fast = run(&effect("shear_creep", "rate_mm_per_n_s = 2.0"), "");
+        let stopped_n = (2.0 * (1.0 / 0.104) * 5e-3 / 2e-3_f64).sqrt();
+        assert!((peak_n(&fast) / stopped_n - 1.0).abs() < 0.06, "{} N, {stopped_n} N", peak_n(&fast));
+
         let unequal = run(&effect("asymmetric_jaws", "asymmetry = 0.2"), "");
         assert!((peak_n(&unequal) / peak_n(&plain) - 1.0).abs() < 2e-3, "what one jaw gains the other loses");
         let deep = run(&effect("imprint_nonlinearity", "exponent = 1.3\nf_ref_n = 20.0"), "");

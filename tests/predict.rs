@@ -95,6 +95,42 @@ fn fits_see_what_the_simulator_does() {
     }
 }
 
+/// The same for tools that creep, each grip at its own rate: some as far as the stop while the jaws hold, some until they slip.
+#[test]
+fn fits_see_tools_that_creep() {
+    let mut measured = simulated("", 60, &[]);
+    for (i, pull) in measured.pulls.iter_mut().enumerate() {
+        (pull.grip_force_n, pull.trace) = (8.0 + 1.2 * i as f64, None);
+    }
+    let twin = twin_at(&baseline());
+    let library = library(&twin);
+    let rows: Vec<usize> = (0..measured.pulls.len()).collect();
+    let creep = gripgen::twin::effects::find("shear_creep").unwrap();
+    for (by_area, rim) in [(0.0, 0.0), (0.0, 2.0 / 3.0), (1.0, 1.0 / 3.0)] {
+        let predictor = PullPredictor::new(&measured, &twin, &library, 2);
+        let mut model = given_model(&twin, predictor.part_names()).unwrap();
+        (model.shear_by_area, model.kinetic_ratio) = (by_area, 0.95);
+        let plain = predictor.pulls(&model, &rows);
+        let values = creep.values(&[("rate_mm_per_n_s", 0.5), ("load_exponent", 0.3), ("rim_exponent", rim)]);
+        model.effects = vec![ModelEffect::new(creep, values)];
+        let fast = predictor.pulls(&model, &rows);
+        let exact = predictor.labels_n(&model, &rows);
+        let off = |k: usize| (fast[k].label_n - exact[k]).abs();
+        let (sum, all) = (rows.iter().map(|&k| off(k)).sum::<f64>(), exact.iter().sum::<f64>());
+        let worst = rows.iter().map(|&k| off(k)).fold(0.0, f64::max);
+        let stopped = rows.iter().filter(|&&k| fast[k].label_n < 0.9 * plain[k].label_n).count();
+        println!(
+            "by area {by_area}, rim {rim}: {:.2} %, worst {worst:.2} N, {stopped} stopped",
+            100.0 * sum / all
+        );
+        assert!((10..=50).contains(&stopped), "{stopped} of 60 end at the stop");
+        assert!(
+            sum < 0.012 * all && worst < 0.8,
+            "by area {by_area}, rim {rim}: {sum} N of {all} N, worst {worst} N"
+        );
+    }
+}
+
 /// The same for a gain that drifts over four hours: a table of each pull where few share a profile, three of a profile and a parabola
 /// in time where many do. The answers do not depend on what was asked before, or in which order.
 #[test]

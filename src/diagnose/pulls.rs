@@ -106,6 +106,7 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
         noise_n: twin.wrist.noise_n,
         scatter: mean(&|p| p.scatter),
         effects: vec![],
+        creep: None,
         factor: vec![],
     })
 }

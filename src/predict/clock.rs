@@ -1,6 +1,7 @@
 //! Pulls whose signals depend on the clock of the campaign, or on the part.
 
 use super::PullPredictor;
+use super::creep::creeps;
 use gripgen_identify::pulls::model::{PullModel, PullPrediction};
 
 /// Pulls of one profile and direction from which on a parabola in time stands for them.
@@ -24,14 +25,21 @@ impl PullPredictor<'_> {
             if of_part || place.len() < MANY || t[0] >= t[1] || t[1] >= t[2] {
                 for &k in place.iter() {
                     let limit_n = self.limit_n(model, rows[k]);
-                    found[k] = self.at(&self.own_table(model, rows[k]), limit_n);
+                    found[k] = if creeps(model) {
+                        self.crept(model, rows[k], rows[k])
+                    } else {
+                        self.at(&self.own_table(model, rows[k]), limit_n)
+                    };
                 }
                 continue;
             }
-            let tables = nodes.map(|row| self.tables_of(model, row));
+            let tables = if creeps(model) { None } else { Some(nodes.map(|row| self.tables_of(model, row))) };
             for &k in place.iter() {
                 let (at, limit_n) = (time(rows[k]), self.limit_n(model, rows[k]));
-                let p = [0, 1, 2].map(|i| self.at(&tables[i], limit_n));
+                let p = [0, 1, 2].map(|i| match &tables {
+                    Some(tables) => self.at(&tables[i], limit_n),
+                    None => self.crept(model, nodes[i], rows[k]),
+                });
                 let weight = |i: usize, j: usize, k: usize| {
                     (at - t[j]) * (at - t[k]) / ((t[i] - t[j]) * (t[i] - t[k]))
                 };

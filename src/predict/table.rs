@@ -1,8 +1,8 @@
 //! Labels as a function of what the jaws hold, over scatter and noise.
 
 use gripgen_identify::pulls::model::{PullModel, PullPrediction};
-use gripgen_physics::{QuasiStatic, SlipPull, SlipRun, StuckPull};
-use gripgen_twin::effects::{CommandChain, SensorChain};
+use gripgen_physics::{QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
+use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
 use gripgen_twin::{Backbone, Staircase};
 use std::sync::{Arc, OnceLock};
 
@@ -35,6 +35,9 @@ pub(super) struct Scattered<'a> {
     pub tolerance_n: f64,
     pub sensor: SensorChain,
     pub command: CommandChain,
+    /// How the tool creeps.
+    pub creep: Creep,
+    pub rim: RimTable,
 }
 
 impl Scattered<'_> {
@@ -45,6 +48,8 @@ impl Scattered<'_> {
             staircase: self.staircase,
             kinetic_ratio: self.kinetic_ratio,
             backbone: self.backbone,
+            creep: self.creep,
+            rim: &self.rim,
             decided_n: self.tolerance_n + 7.0 * self.noise_n,
             sensor: &self.sensor,
             command: &self.command,
@@ -190,12 +195,13 @@ impl LabelTable {
         let (i, w) = (x as usize, x.fract());
         let (a, b) = (row(i), row(i + 1));
         let mix = |a: f64, b: f64| a * (1.0 - w) + b * w;
-        // Beyond the table everything grows with the force.
+        // Beyond the table everything grows with the force, but for labels that a stop ends.
         let beyond = (limit_n / force_n(last as f64)).max(1.0);
+        let stopped = self.model.creep.is_some_and(|creep| creep.rate_m_per_n_s > 0.0);
         PullPrediction {
             limit_n,
             limit_reading_n: beyond * mix(a.limit_reading_n, b.limit_reading_n),
-            label_n: beyond * mix(a.label_n, b.label_n),
+            label_n: if stopped { 1.0 } else { beyond } * mix(a.label_n, b.label_n),
             label_sd_n: mix(a.label_sd_n, b.label_sd_n),
         }
     }

@@ -4,7 +4,7 @@ use super::table::{ExactLabels, LabelTable, Scattered, Tables, bent_by, enough_f
 use super::{CONTACTS, PullPredictor, acts_on_signals};
 use crate::expect::QuietTwin;
 use gripgen_identify::pulls::model::{PullModel, PullPrediction};
-use gripgen_physics::StuckPull;
+use gripgen_physics::{RimTable, StuckPull};
 use gripgen_twin::Backbone;
 use std::sync::Arc;
 
@@ -12,9 +12,24 @@ use std::sync::Arc;
 const RATIO_STEP: f64 = 0.025;
 
 /// What labels of a model whose effects act on signals depend on, beside the signals.
-fn shape_of(model: &PullModel) -> [f64; 6] {
-    let (bent_lag_s, bent_dead_s) = model.bent_at_s;
-    [model.kinetic_ratio, model.scatter, model.noise_n, model.shear_by_area, bent_lag_s, bent_dead_s]
+fn shape_of(model: &PullModel) -> [f64; 8] {
+    let ((bent_lag_s, bent_dead_s), [rate, rim]) = (model.bent_at_s, creep_of(model));
+    [
+        model.kinetic_ratio,
+        model.scatter,
+        model.noise_n,
+        model.shear_by_area,
+        bent_lag_s,
+        bent_dead_s,
+        rate,
+        rim,
+    ]
+}
+
+/// Rate and rim exponent of a model whose tools all creep alike.
+fn creep_of(model: &PullModel) -> [f64; 2] {
+    let creep = model.creep.unwrap_or_default();
+    [creep.rate_m_per_n_s, creep.rim_exponent]
 }
 
 /// The model with a contact that lets go at once.
@@ -52,9 +67,11 @@ impl PullPredictor<'_> {
             let table = self.signal_tables.made(key, || self.signal_table(model, row));
             return (table.clone(), table, 0.0);
         }
+        let [rate, rim] = creep_of(model);
         let steps = (model.kinetic_ratio / RATIO_STEP).min(1.0 / RATIO_STEP);
         let at = |ratio: f64| {
-            let key = self.key(model, row, &[ratio, model.scatter, model.noise_n, model.shear_by_area]);
+            let own = [ratio, model.scatter, model.noise_n, model.shear_by_area, rate, rim];
+            let key = self.key(model, row, &own);
             let model = PullModel { kinetic_ratio: ratio, ..model.clone() };
             self.tables.made(key, || self.label_table(&model, row))
         };
@@ -77,7 +94,8 @@ impl PullPredictor<'_> {
             Arc::new(ExactLabels::new(self.max_n, model.scatter))
         } else {
             let most = enough_for(model.scatter);
-            let own = [model.kinetic_ratio, most, model.noise_n, model.shear_by_area];
+            let [rate, rim] = creep_of(model);
+            let own = [model.kinetic_ratio, most, model.noise_n, model.shear_by_area, rate, rim];
             self.exact.made(self.key(model, row, &own), || ExactLabels::new(self.max_n, most))
         };
         LabelTable::new(model, row, exact, self.max_n)
@@ -116,6 +134,8 @@ impl PullPredictor<'_> {
             tolerance_n: self.measured.label_tolerance_n,
             sensor: self.sensor(model, row),
             command: self.command(model, row),
+            creep: model.creep.unwrap_or_default(),
+            rim: RimTable::new(model.creep.unwrap_or_default()),
         }
     }
 

@@ -10,6 +10,7 @@ mod compared;
 mod compete;
 mod confirmed;
 pub mod context;
+mod creep;
 pub mod curves;
 pub mod data;
 mod dynamics;

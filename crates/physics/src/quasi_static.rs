@@ -7,6 +7,8 @@
 //! ```
 //!
 //! Contacts that bend have F_c = L b(k x / L) with the backbone b of the contact ([`gripgen_twin::Backbone`]) from three tenths of L on.
+//! A tool that creeps under the force that the jaws hold moves besides ([`gripgen_twin::effects::Creep`]), and meets the displacement stop earlier.
+//!
 //! All with the force loop of [`crate::PullSession`], its sensor and command effects, and the same order of readings and
 //! commands. What is missing against the reduced mechanics is the ringing of the arm's mass on the gel and the
 //! differences between contacts; `a_pull_without_inertia_is_the_reduced_one` says how much that is.
@@ -15,7 +17,7 @@ mod label;
 mod slip;
 
 pub use label::label_moments;
-pub use slip::{SlipPull, SlipRun};
+pub use slip::{RimTable, SlipPull, SlipRun};
 
 use crate::force_loop::ForceLoop;
 use gripgen_twin::effects::{CommandChain, SensorChain};

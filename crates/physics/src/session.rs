@@ -8,7 +8,7 @@ use crate::motion::Motion;
 use crate::rapier_pull::RapierPull;
 use crate::reduced::ReducedPull;
 use crate::world::NotFinite;
-use gripgen_twin::effects::{CommandChain, SensorChain};
+use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
 use gripgen_twin::random::Stream;
 use gripgen_twin::{PerJaw, Robot, Wrist};
 
@@ -33,12 +33,19 @@ pub struct Signals {
     pub sensor: SensorChain,
     /// Effects on the command of the force loop.
     pub command: CommandChain,
+    /// How the tool creeps under the contact force, in series with the mechanics.
+    pub creep: Creep,
 }
 
 impl From<Stream> for Signals {
     /// Noise alone.
     fn from(noise: Stream) -> Self {
-        Self { noise, sensor: SensorChain::default(), command: CommandChain::default() }
+        Self {
+            noise,
+            sensor: SensorChain::default(),
+            command: CommandChain::default(),
+            creep: Creep::default(),
+        }
     }
 }
 
@@ -119,6 +126,8 @@ pub struct PullSession {
     target_m: Option<f64>,
     limit_n: f64,
     has_slid: bool,
+    /// Way that the tool has crept.
+    crept_m: f64,
     state: PullState,
 }
 
@@ -139,6 +148,7 @@ impl PullSession {
             target_m: None,
             limit_n: friction.left.limit_n() + friction.right.limit_n(),
             has_slid: false,
+            crept_m: 0.0,
             state: PullState {
                 time_s: 0.0,
                 contact_force_n: 0.0,
@@ -160,6 +170,11 @@ impl PullSession {
     /// Whether the jaws have slid on the part since the start of the pull.
     pub fn has_slid(&self) -> bool {
         self.has_slid
+    }
+
+    /// How far the tool has crept.
+    pub(crate) fn crept_m(&self) -> f64 {
+        self.crept_m
     }
 
     /// What the wrist sensor can report at most, as long as the jaws obey their static limits; nothing is known of a
@@ -252,11 +267,12 @@ impl PullSession {
         let motion =
             self.plant.advance(applied_n, step_s).map_err(|e| PullError { bodies: e.bodies, time_s })?;
         self.has_slid |= motion.sliding;
+        self.crept_m += self.signals.creep.speed_m_per_s(motion.contact_force_n, self.limit_n) * step_s;
         self.state = PullState {
             time_s: time_s + step_s,
             contact_force_n: motion.contact_force_n,
             measured_force_n: self.reading(motion.contact_force_n, time_s + step_s, step_s),
-            displacement_m: motion.displacement_m,
+            displacement_m: motion.displacement_m + self.crept_m,
             speed_m_per_s: motion.speed_m_per_s,
             sliding: motion.sliding,
         };

@@ -11,7 +11,7 @@ pub struct StaircaseResult {
     pub trace: PullTrace,
     /// What ended the pull.
     pub end: PullEnd,
-    /// Whether the jaws slid on the part; if not, the label is a lower bound.
+    /// Whether the jaws slid on the part, or crept along it to the stop; if not, the label is a lower bound.
     pub slid: bool,
 }
 
@@ -95,5 +95,7 @@ pub fn pull_staircase_seen(
         session.step(Command::ForceN(desired_force_n), 1.0 / rate_hz)?;
         tick += 1;
     };
-    Ok(StaircaseResult { trace, end, slid: session.has_slid() })
+    // Creep as far as the stop is the part lost, as slip is; gels whose shear alone reaches it still hold.
+    let crept = end == PullEnd::Displacement && session.crept_m() > 0.5 * pull.stop_m;
+    Ok(StaircaseResult { trace, end, slid: session.has_slid() || crept })
 }

@@ -19,16 +19,18 @@ pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 
-pub use chain::{CommandChain, SensorChain, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
+pub use chain::{
+    CommandChain, SensorChain, creep, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state,
+};
 pub use experiment::{Experiment, Measured, separating};
 pub use fit::{
     Bounds, FORCE_RATE, Fit, GraspSpan, Grid, ImprintFit, Named, PressFit, PressNeeds, PullFit, PullSpan,
-    REFERENCE_FORCE, TableFit, TableSpan,
+    REFERENCE_FORCE, Seen, TableFit, TableSpan,
 };
 use fit::{log_spaced, wider};
 pub use hooks::{
-    CommandHook, FrictionHook, GraspForceHook, GripPoint, ImprintHook, NormalForceHook, OpticsHook,
-    SensorHook, SensorMemory, SensorPoint, TiltHook,
+    CommandHook, Creep, CreepHook, FrictionHook, GraspForceHook, GripPoint, ImprintHook, NormalForceHook,
+    OpticsHook, SensorHook, SensorMemory, SensorPoint, TiltHook,
 };
 pub use spec::{EffectSpec, Group, ParameterSpec, Visible};
 
@@ -62,6 +64,7 @@ library! {
     mod off_centre;
     mod asymmetric_jaws;
     mod grip_force_loss;
+    mod shear_creep;
     mod sensor_gain;
     mod sensor_bias;
     mod sensor_drift;

@@ -51,7 +51,7 @@ pub struct LabelError {
 /// displacement stop ([`PullTrace::until_displacement`]). The paper uses a tolerance of 3 N.
 ///
 /// A pull in which the jaws never slid on the part is `censored`: one that ended at its force or time limit, or whose
-/// gels were so soft that their shear alone reached the displacement stop.
+/// gels were so soft that their shear alone reached the displacement stop. A tool that crept there is lost as one that slid.
 ///
 /// ```
 /// use gripgen_twin::{slip_label, PullTrace, TraceRow};

@@ -7,7 +7,7 @@ use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::twin::config::suggestion;
-use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, ParameterSpec, PressNeeds, find};
+use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, ParameterSpec, PressNeeds, Seen, find};
 use gripgen::{BASELINE_TWIN, EffectCurve, effect_curve};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -78,10 +78,16 @@ fn found_text(spec: &EffectSpec) -> String {
             names if names.is_empty() => channels,
             names => format!("{channels}, where {names} varies"),
         },
-        Ok(fit) => match varies(fit.spans) {
-            names if names.is_empty() => channels,
-            names => format!("{channels}, of pulls where {names} varies"),
-        },
+        Ok(fit) => {
+            let shown = match fit.seen {
+                Seen::InLabels => "",
+                Seen::InDisplacements => ", and displacements of traces show it",
+            };
+            match varies(fit.spans) {
+                names if names.is_empty() => format!("{channels}{shown}"),
+                names => format!("{channels}, of pulls where {names} varies{shown}"),
+            }
+        }
     }
 }
 

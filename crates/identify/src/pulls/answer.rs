@@ -108,7 +108,7 @@ pub fn diagnose_pulls(
         context.correct_at(&plain.model);
     }
     let max_n = data.label_n.iter().copied().fold(0.0, f64::max);
-    let search = Search::new(&context, candidates(&data, max_n, options.without));
+    let search = Search::new(&context, candidates(&data, max_n, context.creep_m_per_n_s(), options.without));
     if search.candidates.is_empty() && search.curves.is_empty() {
         diagnosis
             .notes

@@ -3,6 +3,7 @@
 use super::answer::{insufficient, outliers, without};
 use super::candidates::{Candidate, candidate};
 use super::context::Context;
+use super::creep::Creep;
 use super::data::PullData;
 use super::dynamics::Dynamics;
 use super::error_interval::{Judged, errors};
@@ -135,6 +136,7 @@ pub fn calibrate_pulls(
         return Err(CalibrateError::Insufficient(missing));
     }
     let max_n = data.label_n.iter().copied().fold(0.0, f64::max);
+    let creep_m_per_n_s = Creep::of(&measured.pulls).map(|creep| creep.median_m_per_n_s());
     let mut terms = Terms::default();
     let asked = |spec: &'static EffectSpec| -> Result<Candidate, CalibrateError> {
         if let Err(reason) = spec.pulls {
@@ -142,7 +144,7 @@ pub fn calibrate_pulls(
         }
         let spans = spec.pulls.map_or(&[][..], |fit| fit.spans);
         let needs = || [spec.covariates, spans].concat().join(", ");
-        candidate(spec, &data, max_n)
+        candidate(spec, &data, max_n, creep_m_per_n_s)
             .ok_or_else(|| CalibrateError::NotExcited { effect: spec.id.into(), needs: needs() })
     };
     if request.offset_law {

@@ -4,7 +4,7 @@ use super::data::{Column, PullData};
 use super::model::ModelEffect;
 use crate::least_squares::FreeParameter;
 use gripgen_twin::PULLS_SINCE_REST;
-use gripgen_twin::effects::{EffectSpec, Fit, LIBRARY, PullSpan};
+use gripgen_twin::effects::{EffectSpec, Fit, LIBRARY, PullSpan, Seen};
 
 /// An effect that competes.
 #[derive(Debug, Clone)]
@@ -76,13 +76,22 @@ impl Candidate {
     }
 }
 
-/// The effects of the library that can show in these pulls: those whose covariates vary. `without` are ids that must not
-/// compete.
-pub fn candidates(data: &PullData<'_>, largest_reading_n: f64, without: &[&str]) -> Vec<Candidate> {
+/// The effects of the library that can show in these pulls: those whose covariates vary. `creep_m_per_n_s` is the speed per newton at which
+/// displacements show tools to creep, `without` are ids that must not compete.
+pub fn candidates(
+    data: &PullData<'_>,
+    largest_reading_n: f64,
+    creep_m_per_n_s: Option<f64>,
+    without: &[&str],
+) -> Vec<Candidate> {
+    let seen = |spec: &EffectSpec| match spec.pulls {
+        Ok(fit) if fit.seen == Seen::InDisplacements => creep_m_per_n_s.is_some(),
+        _ => true,
+    };
     LIBRARY
         .iter()
-        .filter(|s| !without.contains(&s.id))
-        .filter_map(|spec| candidate(spec, data, largest_reading_n))
+        .filter(|s| !without.contains(&s.id) && seen(s))
+        .filter_map(|spec| candidate(spec, data, largest_reading_n, creep_m_per_n_s))
         .collect()
 }
 
@@ -91,8 +100,10 @@ pub(super) fn candidate(
     spec: &'static EffectSpec,
     data: &PullData<'_>,
     largest_reading_n: f64,
+    creep_m_per_n_s: Option<f64>,
 ) -> Option<Candidate> {
     let fit = spec.pulls.ok()?;
+
     let varies = |name: &str| data.varies(name);
     let has_range = spec.covariates.is_empty() || spec.covariates.iter().any(|c| varies(c));
     if !has_range || !fit.spans.iter().all(|c| varies(c)) {
@@ -103,6 +114,7 @@ pub(super) fn candidate(
         largest_reading_n,
         last_pull_index: numbers(data, "pull_index").into_iter().fold(0.0, f64::max).max(4.0),
         splits: splits(data),
+        creep_mm_per_n_s: creep_m_per_n_s.map(|rate| 1e3 * rate),
         rests: data.measured.pulls.iter().any(|p| p.covariates.extra.contains_key(PULLS_SINCE_REST)),
     });
     let starts = starts.iter().map(|s| spec.values(s)).collect();

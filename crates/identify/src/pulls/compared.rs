@@ -165,6 +165,11 @@ impl Context<'_> {
     /// What is known beside the pulls, as residuals.
     pub(super) fn priors(&self, model: &PullModel, signals: bool) -> Vec<f64> {
         let mut r = vec![model.misread_n / MISREAD_N];
+        if let Some(creep) = &self.creep {
+            let rows: Vec<(usize, f64)> = creep.seen().map(|(row, c)| (row, c.to_n)).collect();
+            let predicted = self.predictor.creeps_m_per_n_s(model, &rows);
+            r.extend(creep.seen().zip(predicted).map(|((_, c), predicted)| (c.rate - predicted) / c.sd));
+        }
         match self.kinetic {
             Some((ratio, error)) => r.push((model.kinetic_ratio - ratio) / error),
             None => r.extend(self.assumed_ratio().map(|(mean, sd)| (model.kinetic_ratio - mean) / sd)),

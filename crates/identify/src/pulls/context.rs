@@ -1,5 +1,6 @@
 //! A campaign with what its traces say.
 
+use super::creep::{Creep, without_slips_that_rise};
 use super::data::PullData;
 use super::likelihood::Tails;
 use super::model::{PredictPulls, PullModel};
@@ -76,6 +77,8 @@ pub struct Context<'a> {
     pub baseline_trace_cost: f64,
     /// What the labels of the simulator lie above those of the fast prediction, near the model that is fitted.
     pub above_fast_n: Vec<f64>,
+    /// How tools creep while the jaws hold, where the displacements of traces show that they do.
+    pub(super) creep: Option<Creep>,
     /// How the zero of the sensor wanders, where the traces show that it does, and what that makes it in each pull where nothing acts on readings.
     pub(super) walk: Option<(ZeroWalk, Vec<SlowZero>)>,
 }
@@ -91,10 +94,19 @@ impl<'a> Context<'a> {
         if let Some(noise) = noise_n(pulls) {
             base.noise_n = noise.max(0.01);
         }
+        let creep = Creep::of(pulls);
         let raw: Vec<TraceObservation> = pulls
             .iter()
             .enumerate()
-            .filter_map(|(i, p)| Some(observe(i, p.trace.as_ref()?, base.noise_n)))
+            .filter_map(|(i, p)| {
+                let trace = p.trace.as_ref()?;
+                Some(match &creep {
+                    Some(creep) => {
+                        without_slips_that_rise(observe(i, &creep.taken_off(i, p, trace), base.noise_n))
+                    }
+                    None => observe(i, trace, base.noise_n),
+                })
+            })
             .collect();
         let mut context = Self {
             data,
@@ -111,10 +123,16 @@ impl<'a> Context<'a> {
             free_lag: false,
             baseline_trace_cost: 0.0,
             above_fast_n: vec![0.0; data.len()],
+            creep,
             walk: None,
         };
         context.look_at(&raw);
         context
+    }
+
+    /// Speed per newton at which tools creep, in the middle of the campaign, where displacements show that they do.
+    pub(super) fn creep_m_per_n_s(&self) -> Option<f64> {
+        self.creep.as_ref().map(Creep::median_m_per_n_s)
     }
 
     /// Looks how many pulls are bad: what of them the baseline leaves.
@@ -195,7 +213,9 @@ impl<'a> Context<'a> {
         }
         (self.base.lag_s, self.base.dead_time_s) = (best.1, best.2);
         self.read_slips();
-        self.read_bend();
+        if self.creep.is_none() {
+            self.read_bend();
+        }
         self.find_walk();
         self.baseline_trace_cost = self.trace_residuals(&self.base, &rows).cost();
     }

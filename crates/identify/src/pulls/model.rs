@@ -1,6 +1,6 @@
 //! What predicts pulls, and what it predicts them from.
 
-use gripgen_twin::effects::EffectSpec;
+use gripgen_twin::effects::{Creep, EffectSpec};
 
 /// An effect of a model.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,6 +60,8 @@ pub struct PullModel {
     pub scatter: f64,
     /// The effects, in order.
     pub effects: Vec<ModelEffect>,
+    /// How the tools of all pulls creep, in place of what the effects say: labels are worked out at a few rates. Fits leave it alone.
+    pub creep: Option<Creep>,
     /// Factor on the friction of each pull, 1 where this is empty.
     pub factor: Vec<f64>,
 }
@@ -119,6 +121,11 @@ pub trait PredictPulls: Sync {
 
     /// Readings of pulls if they never slipped: for each a row and times.
     fn traces(&self, model: &PullModel, asked: &[(usize, &[f64])]) -> Vec<TracePrediction>;
+
+    /// Way over impulse in m/(N s) that tools creep by up to a force: for each a row and that force.
+    fn creeps_m_per_n_s(&self, _model: &PullModel, rows: &[(usize, f64)]) -> Vec<f64> {
+        vec![0.0; rows.len()]
+    }
 
     /// The contact of one pull: of each point its share of the area and its share of what the jaws hold.
     fn contact(&self, _model: &PullModel, _row: usize) -> Vec<(f64, f64)> {

@@ -3,7 +3,7 @@
 use super::label::label_moments;
 use super::{QuasiStatic, SNAPSHOT_TICKS, StuckPull};
 use crate::force_loop::ForceLoop;
-use gripgen_twin::effects::{CommandChain, SensorChain};
+use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
 use gripgen_twin::{Backbone, Staircase, StaircaseCursor};
 
 /// Share of the limit up to which contacts that bend are taken for springs: what they trail more below is forgotten, within
@@ -34,12 +34,33 @@ pub struct SlipRun<'a> {
     pub kinetic_ratio: f64,
     /// The contact.
     pub backbone: &'a Backbone,
+    /// How the tool creeps.
+    pub creep: Creep,
+    /// The same over the share of the limit.
+    pub rim: &'a RimTable,
     /// A command that is so much above the reading decides: the label cannot change any more.
     pub decided_n: f64,
     /// The sensor of `stuck`.
     pub sensor: &'a SensorChain,
     /// The commands of `stuck`.
     pub command: &'a CommandChain,
+}
+
+/// By how much a tool creeps faster while the rim of its contact slips, over the share of the limit: evenly spaced from 0 to 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RimTable(Vec<f64>);
+
+impl RimTable {
+    /// Of a tool that creeps so.
+    pub fn new(creep: Creep) -> Self {
+        const STEPS: usize = 256;
+        if creep.rate_m_per_n_s == 0.0 {
+            return Self(Vec::new());
+        }
+        let unit = Creep { rate_m_per_n_s: 1.0, ..creep };
+        let at = |i: usize| i.max(1) as f64 / STEPS as f64;
+        Self((0..=STEPS).map(|i| unit.speed_m_per_s(at(i), 1.0) / at(i)).collect())
+    }
 }
 
 /// A pull from where it leaves the one of a tool that holds.
@@ -52,6 +73,8 @@ struct Slipping<'a> {
     bent: Option<(f64, (f64, f64))>,
     /// Shear per displacement.
     shear_of_m: f64,
+    /// Way that the tool has crept.
+    crept_m: f64,
     sensor: SensorChain,
     control: ForceLoop,
     stairs: StaircaseCursor<'a>,
@@ -141,7 +164,15 @@ impl QuasiStatic {
         pull.reading_n.clear();
         let from_n = if backbone.bends() { BENDS_FROM * limit_n } else { limit_n };
         let held = stuck.largest_n.partition_point(|&f| f < from_n);
-        pull.displacement_m = limit_n / self.stiffness_n_per_m;
+        let crept_m = match self.crept(run, limit_n, held, steps.step_s) {
+            Ok(crept_m) => crept_m,
+            // A tool that creeps as far as the stop ends its pull while the jaws hold.
+            Err(stop_tick) => {
+                (pull.slip_tick, pull.displacement_m) = (stop_tick + 1, self.stop_m);
+                return None;
+            }
+        };
+        pull.displacement_m = limit_n / self.stiffness_n_per_m + crept_m;
         pull.slip_tick = held;
         if held >= stuck.desired_n.len() {
             return None;
@@ -169,12 +200,33 @@ impl QuasiStatic {
                 (shear, backbone.at(shear))
             }),
             shear_of_m: self.stiffness_n_per_m / limit_n,
+            crept_m,
             sensor,
             control,
             stairs: run.staircase.from(held_s),
             due: run.staircase.from((held_s - steps.dead_s).max(0.0)),
             tick: held,
         })
+    }
+
+    /// How far the tool has crept while the jaws hold, or the tick at which that is as far as the stop.
+    fn crept(&self, run: &SlipRun<'_>, limit_n: f64, held: usize, step_s: f64) -> Result<f64, usize> {
+        let mut crept_m = 0.0;
+        if run.creep.rate_m_per_n_s == 0.0 {
+            return Ok(crept_m);
+        }
+        let faster = &run.rim.0;
+        let last = faster.len().saturating_sub(2);
+        for (tick, &contact_n) in run.stuck.contact_n.iter().take(held).enumerate() {
+            let at = (contact_n / limit_n).clamp(0.0, 1.0) * (last + 1) as f64;
+            let (i, w) = ((at as usize).min(last), at - (at as usize).min(last) as f64);
+            let speed = run.creep.rate_m_per_n_s * contact_n * (faster[i] * (1.0 - w) + faster[i + 1] * w);
+            crept_m += speed * step_s;
+            if contact_n / self.stiffness_n_per_m + crept_m > self.stop_m {
+                return Err(tick);
+            }
+        }
+        Ok(crept_m)
     }
 
     /// One tick, and whether there is another.
@@ -201,8 +253,10 @@ impl QuasiStatic {
         pull.desired_n.push(desired_n);
         pull.reading_n.push(reading_n);
         if let Some((shear, _)) = slipping.bent {
-            pull.displacement_m = shear / slipping.shear_of_m;
+            pull.displacement_m = shear / slipping.shear_of_m + slipping.crept_m;
         }
+        let creep_m = run.creep.speed_m_per_s(contact_n, slipping.limit_n) * steps.step_s;
+        slipping.crept_m += creep_m;
         let decided = slipping.bent.is_none() && desired_n - reading_n > run.decided_n;
         if pull.displacement_m > self.stop_m || decided {
             return false;
@@ -219,7 +273,7 @@ impl QuasiStatic {
                 (next < run.backbone.slips_at()).then(|| (next, run.backbone.at(next)))
             }
             None => {
-                pull.displacement_m += step_m.max(0.0);
+                pull.displacement_m += step_m.max(0.0) + creep_m;
                 None
             }
         };
@@ -280,6 +334,8 @@ mod tests {
                     staircase: &staircase,
                     kinetic_ratio: 0.9,
                     backbone: &backbone,
+                    creep: Creep::default(),
+                    rim: &RimTable::new(Creep::default()),
                     decided_n: 4.0,
                     sensor: &sensor,
                     command: &command,

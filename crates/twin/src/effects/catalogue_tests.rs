@@ -35,12 +35,12 @@ fn declared_traits_are_those_of_the_hooks() {
     }
 }
 
-/// Laws that parts may have each in their own way are laws of friction, and nothing else of the rig.
+/// Laws that parts may have each in their own way are those of their contact, and nothing else of the rig.
 #[test]
-fn only_friction_differs_by_part() {
+fn only_contacts_differ_by_part() {
     for spec in LIBRARY.iter().filter(|s| s.per_part) {
         let of_rig = spec.normal_force.is_some() || spec.sensor.is_some() || spec.command.is_some();
-        assert!(spec.friction.is_some() && !of_rig, "{}", spec.id);
+        assert!((spec.friction.is_some() || spec.creep.is_some()) && !of_rig, "{}", spec.id);
     }
 }
 
@@ -103,6 +103,7 @@ fn fits_to_pulls_name_their_own_parameters_and_start_inside_their_bounds() {
             last_pull_index: 300.0,
             splits: vec![100.0, 200.0],
             rests,
+            creep_mm_per_n_s: None,
         };
         let mut fitted = 0;
         for spec in LIBRARY {

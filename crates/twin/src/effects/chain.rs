@@ -1,6 +1,6 @@
 //! The effects of a twin on one part, hook by hook, in the order of the twin.
 
-use super::{CommandHook, Effect, EffectSpec, GripPoint, SensorHook, SensorMemory, SensorPoint};
+use super::{CommandHook, Creep, Effect, EffectSpec, GripPoint, SensorHook, SensorMemory, SensorPoint};
 use crate::{OpticsState, Part, Twin};
 
 fn acting<'a>(twin: &'a Twin, part_name: &'a str) -> impl Iterator<Item = &'a Effect> {
@@ -20,6 +20,13 @@ pub fn imprint_volume_m3(twin: &Twin, part_name: &str, part: &Part, force_n: f64
     acting(twin, part_name).fold(part.imprint_m3_per_n * force_n, |volume_m3, effect| {
         effect.spec.imprint_volume.map_or(volume_m3, |hook| hook(&effect.values, volume_m3, force_n))
     })
+}
+
+/// How the tool creeps under a pull that the jaws hold, by the last effect that says it. The force of `at` is the mean normal force of both
+/// jaws.
+pub fn creep(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> Creep {
+    let own = acting(twin, part_name).filter_map(|effect| Some(effect.spec.creep?(&effect.values, at)));
+    own.last().unwrap_or_default()
 }
 
 /// Angle of a gel about its +x axis, 0 without effects. Positive angles bring its lower edge nearer to the part.

@@ -23,6 +23,8 @@ pub struct PullSpan<'a> {
     pub splits: Vec<f64>,
     /// Whether pulls since the last rest were counted.
     pub rests: bool,
+    /// Speed per newton at which tools creep below their limits, where displacements show that they do.
+    pub creep_mm_per_n_s: Option<f64>,
 }
 
 /// Where a fit starts, and what is free in it.
@@ -60,11 +62,22 @@ pub type Bounds = (f64, f64);
 /// Values of one parameter on a grid, by its name.
 pub type Grid = (&'static str, Vec<f64>);
 
+/// What has to show an effect before it competes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seen {
+    /// Labels may.
+    InLabels,
+    /// Displacements have to: labels alone say nothing that a law of friction would not say too.
+    InDisplacements,
+}
+
 /// How an effect is fitted to pulls.
 #[derive(Clone, Copy)]
 pub struct PullFit {
     /// Columns that have to vary besides the covariates of the effect.
     pub spans: &'static [&'static str],
+    /// What has to show it.
+    pub seen: Seen,
     /// The fit in a campaign.
     pub fit: fn(&PullSpan<'_>) -> Fit,
     /// Bounds of a parameter in a fit, from its name, the values of a start and the bounds of the library.
@@ -77,6 +90,7 @@ impl PullFit {
     /// No fit: what the specs fill in.
     pub(super) const PLAIN: PullFit = PullFit {
         spans: &[],
+        seen: Seen::InLabels,
         fit: |_| Fit { starts: Vec::new(), free: Vec::new(), searched: 0 },
         bounds: |_, _, library| library,
         flat_at_neutral: false,

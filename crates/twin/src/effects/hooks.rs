@@ -75,6 +75,53 @@ pub type ImprintHook = fn(&[f64], f64, f64) -> f64;
 /// forces so far in N) -> new ones in N. Only measured grasps have such readings: a simulated grip holds its force.
 pub type GraspForceHook = fn(&[f64], &[f64], &[f64]) -> Vec<f64>;
 
+/// How a tool creeps under a pull F that jaws hold which let go at L, beside all other motion:
+///
+/// ```text
+/// dx/dt = rate F (1 - F / L)^-q
+/// ```
+///
+/// Forces know nothing of it: a force loop makes up for motion that is so slow.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Creep {
+    /// Speed per newton in m/(N s) of a contact of which all sticks; 0 does not creep.
+    pub rate_m_per_n_s: f64,
+    /// q: how much faster the rest creeps while the rim of the contact slips.
+    pub rim_exponent: f64,
+}
+
+/// Share of the limit that is left at least: what happens nearer to it is slip.
+const LEFT: f64 = 0.01;
+
+impl Creep {
+    /// The speed in m/s under a force, of jaws that let go at `limit_n`.
+    pub fn speed_m_per_s(&self, force_n: f64, limit_n: f64) -> f64 {
+        if self.rate_m_per_n_s == 0.0 || self.rim_exponent == 0.0 || limit_n <= 0.0 {
+            return self.rate_m_per_n_s * force_n;
+        }
+        let left = (1.0 - force_n / limit_n).clamp(LEFT, 1.0);
+        self.rate_m_per_n_s * force_n * libm::pow(left, -self.rim_exponent)
+    }
+
+    /// The rate with which a tool would creep as far whose contact sticks as a whole, of a pull that rises evenly from nothing to `share` of
+    /// the limit:
+    ///
+    /// ```text
+    /// 2 / u^2 int_0^u s (1 - s)^-q ds,   q < 1
+    /// ```
+    pub fn mean_rate_m_per_n_s(&self, share: f64) -> f64 {
+        let (q, u) = (self.rim_exponent.clamp(0.0, 0.99), share.clamp(0.0, 1.0 - LEFT));
+        if q == 0.0 || u < 1e-3 {
+            return self.rate_m_per_n_s;
+        }
+        let to = |power: f64| (1.0 - libm::pow(1.0 - u, power)) / power;
+        self.rate_m_per_n_s * 2.0 / (u * u) * (to(1.0 - q) - to(2.0 - q))
+    }
+}
+
+/// Creep of a tool: (parameters, one jaw, its force the mean normal force of both) -> how it creeps.
+pub type CreepHook = fn(&[f64], &GripPoint<'_>) -> Creep;
+
 /// Turns a gel about its +x axis: (parameters, where) -> angle in rad. Positive angles bring its lower edge
 /// nearer to the part.
 pub type TiltHook = fn(&[f64], &GripPoint<'_>) -> f64;

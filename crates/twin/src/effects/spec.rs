@@ -1,8 +1,8 @@
 //! What stands in the file of an effect: all that anybody knows of it.
 
 use super::{
-    CommandHook, Experiment, FrictionHook, GraspForceHook, ImprintFit, ImprintHook, Named, NormalForceHook,
-    OpticsHook, PressFit, PullFit, SensorHook, TableFit, TiltHook,
+    CommandHook, CreepHook, Experiment, FrictionHook, GraspForceHook, ImprintFit, ImprintHook, Named,
+    NormalForceHook, OpticsHook, PressFit, PullFit, SensorHook, TableFit, TiltHook,
 };
 use std::fmt;
 
@@ -112,7 +112,7 @@ pub struct EffectSpec {
     pub remembers: bool,
     /// Its formula knows pulls up and down, and no other direction.
     pub upright_only: bool,
-    /// An effect of the surface, which parts may have each in their own way. Those of gel, gripper, sensor and robot are common.
+    /// An effect of the contact, which parts may have each in their own way. Those of gel, gripper, sensor and robot are common.
     pub per_part: bool,
     /// The size from which on it is an effect.
     pub visible: Visible,
@@ -140,6 +140,8 @@ pub struct EffectSpec {
     pub imprint_volume: Option<ImprintHook>,
     /// Acts on the force that imprints show beside readings of a load cell.
     pub grasp_force: Option<GraspForceHook>,
+    /// Acts on the displacement under a pull that the jaws hold.
+    pub creep: Option<CreepHook>,
     /// Acts on the angle of a gel.
     pub tilt_rad: Option<TiltHook>,
     /// Acts on the readings of the wrist sensor.
@@ -184,6 +186,7 @@ impl EffectSpec {
         normal_force: None,
         imprint_volume: None,
         grasp_force: None,
+        creep: None,
         tilt_rad: None,
         sensor: None,
         command: None,
@@ -222,6 +225,7 @@ impl EffectSpec {
             (self.normal_force.is_some(), "normal force of a jaw"),
             (self.imprint_volume.is_some(), "imprint volume"),
             (self.grasp_force.is_some(), "force that imprints show beside a load cell"),
+            (self.creep.is_some(), "displacement under a pull that the jaws hold"),
             (self.tilt_rad.is_some(), "angle of the gels"),
             (self.sensor.is_some(), "readings of the wrist sensor"),
             (self.command.is_some(), "command of the force loop"),
@@ -233,6 +237,12 @@ impl EffectSpec {
     /// Whether it changes readings or commands.
     pub fn acts_on_signals(&self) -> bool {
         self.sensor.is_some() || self.command.is_some()
+    }
+
+    /// Whether pulls feel it: a label, or the trace of one.
+    pub fn is_felt(&self) -> bool {
+        let grip = self.friction.is_some() || self.normal_force.is_some() || self.tilt_rad.is_some();
+        grip || self.creep.is_some() || self.acts_on_signals()
     }
 
     /// Whether the effect is a friction law of the grip force, which can be taken per pressure cell.

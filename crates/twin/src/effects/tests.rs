@@ -54,6 +54,13 @@ fn each_call(spec: &EffectSpec, parameters: &[f64], mut check: impl FnMut(&str, 
             let volume_m3 = 1.5e-9 * at.grip_force_n;
             check("imprint_volume", volume_m3, hook(parameters, volume_m3, at.grip_force_n));
         }
+        if let Some(hook) = spec.creep {
+            FORCES_N.iter().for_each(|&force_n| {
+                // A reading below nothing makes a speed of -0, which adds nothing.
+                let way = 1.0 + hook(parameters, at).speed_m_per_s(force_n, 0.4 * at.grip_force_n);
+                check("creep", 1.0, way);
+            });
+        }
         if let Some(hook) = spec.tilt_rad {
             check("tilt_rad", 0.0, hook(parameters, at));
         }

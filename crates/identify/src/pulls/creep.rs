@@ -1,0 +1,357 @@
+//! Tools that creep under a force that the jaws hold, as displacements show it.
+//!
+//! ```text
+//! x = x_0 + F / k + rate int F dt
+//! ```
+//!
+//! up to four fifths of the largest force. Of one staircase the integral is a parabola in the force, as what a contact bends by before it
+//! slips is; creep is what is far more than gels shear by, and is not more where the staircase is steeper.
+
+use super::observe::TraceObservation;
+use gripgen_twin::{MeasuredPull, PullTrace};
+use nalgebra::{DMatrix, DVector};
+
+/// Share of the largest force up to which a trace is looked at.
+const HELD: f64 = 0.8;
+
+/// Way that a trace has to creep, and how much more that has to be than what its gels shear by.
+const LEAST_M: f64 = 1e-4;
+const BEYOND_SHEAR: f64 = 3.0;
+
+/// What may be left of a trace: a part of its way, or of the noise of its displacement.
+const LEFT: f64 = 0.1;
+const LEFT_OF_NOISE: f64 = 3.0;
+
+/// Fewest rows of a trace, fewest traces that creep, and their share.
+const MIN_ROWS: usize = 10;
+const MIN_TRACES: usize = 3;
+const MIN_SHARE: f64 = 0.5;
+
+/// Ratio of the steepest to the flattest staircase that tells creep from bends, whose rate would grow with it to the power of 1, and what it
+/// may at most.
+const RATES_APART: f64 = 1.5;
+const MOST_BY_RATE: f64 = 0.4;
+
+/// How far rates of traces may lie about what part and grip force make of them, in the logarithm.
+const SCATTER: f64 = 0.3;
+
+/// Share by which a model of creep differs from what a trace does.
+const MODEL_SD: f64 = 0.07;
+
+/// Slope of the readings after a slip over that before it, above which nothing has slipped.
+const RISES_ON: f64 = 0.5;
+
+/// How tools creep.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Creep {
+    /// Of each pull whose trace shows it.
+    of_pull: Vec<Option<Crept>>,
+    /// Logarithm of the rate at 1 N of each part that was seen to creep, and the power of the grip force with which all go.
+    of_part: Vec<(String, f64)>,
+    by_grip: f64,
+}
+
+/// What a trace crept by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Crept {
+    /// Way over impulse, in m/(N s), and its standard deviation.
+    pub rate: f64,
+    pub sd: f64,
+    /// The force up to which that is.
+    pub to_n: f64,
+}
+
+impl Creep {
+    /// What the traces of a campaign show, if they do.
+    pub fn of(pulls: &[MeasuredPull]) -> Option<Self> {
+        let traces = pulls.iter().filter_map(|p| p.trace.as_ref());
+        let whole = traces.filter(|t| t.rows().filter(|r| r.time_s >= 0.0).count() >= MIN_ROWS).count();
+        let of_pull: Vec<Option<Crept>> = pulls.iter().map(|p| rate_of(p.trace.as_ref()?)).collect();
+        let seen: Vec<(&MeasuredPull, f64)> =
+            pulls.iter().zip(&of_pull).filter_map(|(p, rate)| Some((p, rate.as_ref()?.rate))).collect();
+        if seen.len() < MIN_TRACES || (seen.len() as f64) < MIN_SHARE * whole as f64 {
+            return None;
+        }
+        let mut parts: Vec<&str> = seen.iter().map(|(p, _)| p.part.as_str()).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        let steep = |p: &MeasuredPull| libm::log(p.increment_n / p.step_s);
+        let span = |x: &dyn Fn(&MeasuredPull) -> f64| {
+            let all = seen.iter().map(|(p, _)| x(p));
+            all.clone().fold(f64::NEG_INFINITY, f64::max) - all.fold(f64::INFINITY, f64::min)
+        };
+        let grip = |p: &MeasuredPull| libm::log(p.grip_force_n);
+        let (grips_vary, rates_vary) = (span(&grip) > 0.1, span(&steep) > libm::log(RATES_APART));
+        // A level for each part, whose contacts differ.
+        let row = |p: &MeasuredPull, rate: bool| -> Vec<f64> {
+            let own = |name: &&str| if p.part == **name { 1.0 } else { 0.0 };
+            let slopes =
+                [(grips_vary, grip(p)), (rate, steep(p))].map(|(varies, x)| if varies { x } else { 0.0 });
+            parts.iter().map(own).chain(slopes).collect()
+        };
+        let fit = |rate: bool| {
+            let rows: Vec<(Vec<f64>, f64)> =
+                seen.iter().map(|(p, found)| (row(p, rate), libm::log(*found))).collect();
+            let found = least_squares(&rows)?;
+            let off = |(x, y): &(Vec<f64>, f64)| y - x.iter().zip(&found).map(|(a, b)| a * b).sum::<f64>();
+            let apart = (rows.iter().map(|r| off(r).powi(2)).sum::<f64>() / rows.len() as f64).sqrt();
+            Some((found, apart))
+        };
+        if let Some((found, _)) = rates_vary.then(|| fit(true)).flatten()
+            && found.last().is_some_and(|power| power.abs() > MOST_BY_RATE)
+        {
+            return None;
+        }
+        let (found, apart) = fit(false)?;
+        if apart > SCATTER {
+            return None;
+        }
+        // Contacts differ, by part and load: no rate says more than they do.
+        let widened = |c: Crept| Crept { sd: libm::hypot(c.sd, apart * c.rate), ..c };
+        Some(Self {
+            of_pull: of_pull.into_iter().map(|p| p.map(widened)).collect(),
+            of_part: parts.iter().zip(&found).map(|(name, level)| (name.to_string(), *level)).collect(),
+            by_grip: found[parts.len()],
+        })
+    }
+
+    /// Each pull whose trace shows its rate.
+    pub fn seen(&self) -> impl Iterator<Item = (usize, Crept)> {
+        self.of_pull.iter().enumerate().filter_map(|(row, rate)| Some((row, (*rate)?)))
+    }
+
+    /// The rate in the middle of the campaign.
+    pub fn median_m_per_n_s(&self) -> f64 {
+        let mut all: Vec<f64> = self.of_pull.iter().flatten().map(|c| c.rate).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// The trace of pull `row` with the way that its tool has crept taken off.
+    pub fn taken_off(&self, row: usize, pull: &MeasuredPull, trace: &PullTrace) -> PullTrace {
+        let levels = self.of_part.iter().map(|(_, level)| level).sum::<f64>() / self.of_part.len() as f64;
+        let own =
+            self.of_part.iter().find(|(name, _)| *name == pull.part).map_or(levels, |(_, level)| *level);
+        let by_grip = || libm::exp(own + self.by_grip * libm::log(pull.grip_force_n));
+        let rate = self.of_pull[row].map_or_else(by_grip, |c| c.rate);
+        let mut trace = trace.clone();
+        let zero_n = no_load_n(&trace);
+        let (mut impulse_n_s, mut last) = (0.0, None);
+        let rows: Vec<_> = trace.rows().collect();
+        for (row, x) in rows.iter().zip(&mut trace.displacement_m) {
+            let force_n = row.measured_force_n - zero_n;
+            if let Some((time_s, before_n)) = last
+                && row.time_s > 0.0
+            {
+                impulse_n_s += 0.5 * (force_n + before_n) * (row.time_s - time_s);
+            }
+            *x -= rate * impulse_n_s;
+            last = Some((row.time_s, force_n));
+        }
+        trace
+    }
+}
+
+/// What follows a slip is level: readings that rise on are those of a tool that creeps to its stop.
+pub(super) fn without_slips_that_rise(mut seen: TraceObservation) -> TraceObservation {
+    let slope = |rows: &[(f64, f64)]| {
+        let n = rows.len() as f64;
+        let (mt, my) = (rows.iter().map(|r| r.0).sum::<f64>() / n, rows.iter().map(|r| r.1).sum::<f64>() / n);
+        let (ty, tt) = rows
+            .iter()
+            .fold((0.0, 0.0), |(ty, tt), (t, y)| (ty + (t - mt) * (y - my), tt + (t - mt) * (t - mt)));
+        if tt > 0.0 { ty / tt } else { 0.0 }
+    };
+    let after: Vec<(f64, f64)> = seen.slid_rows.iter().map(|r| (r.0, r.1)).collect();
+    let before: Vec<(f64, f64)> = seen.held_s.iter().copied().zip(seen.held_n.iter().copied()).collect();
+    if seen.slip_s.is_some()
+        && (after.len() < 3 || before.len() < 3 || slope(&after) > RISES_ON * slope(&before))
+    {
+        (seen.slip_s, seen.slid_n) = (None, None);
+        seen.before_slip_n.clear();
+        seen.slid_rows.clear();
+    }
+    seen
+}
+
+fn no_load_n(trace: &PullTrace) -> f64 {
+    let (sum, count) = trace
+        .rows()
+        .filter(|r| r.time_s < 0.0)
+        .fold((0.0, 0.0), |(sum, count), r| (sum + r.measured_force_n, count + 1.0));
+    if count >= 5.0 { sum / count } else { 0.0 }
+}
+
+/// What a trace crept by, if that is far.
+fn rate_of(trace: &PullTrace) -> Option<Crept> {
+    let zero_n = no_load_n(trace);
+    let rows: Vec<(f64, f64, f64)> = trace
+        .rows()
+        .filter(|r| r.time_s >= 0.0)
+        .map(|r| (r.time_s, r.measured_force_n - zero_n, r.displacement_m))
+        .collect();
+    let smooth: Vec<f64> = rows.windows(3).map(|w| w.iter().map(|r| r.1).sum::<f64>() / 3.0).collect();
+    let most_n = smooth.iter().copied().fold(0.0, f64::max);
+    let held = smooth.iter().position(|f| *f >= HELD * most_n)?;
+    if held < MIN_ROWS {
+        return None;
+    }
+    let mut impulse_n_s = 0.0;
+    let mut points = vec![(vec![1.0, rows[0].1, 0.0], rows[0].2)];
+    for pair in rows[..=held].windows(2) {
+        impulse_n_s += 0.5 * (pair[0].1 + pair[1].1) * (pair[1].0 - pair[0].0);
+        points.push((vec![1.0, pair[1].1, impulse_n_s], pair[1].2));
+    }
+    let mut found = least_squares(&points)?;
+    if found[1] < 0.0 {
+        points.iter_mut().for_each(|(x, _)| x[1] = 0.0);
+        found = least_squares(&points)?;
+    }
+    let left =
+        points.iter().map(|(x, y)| (y - x.iter().zip(&found).map(|(a, b)| a * b).sum::<f64>()).powi(2));
+    let left_m = (left.sum::<f64>() / points.len() as f64).sqrt();
+    let (shear_m, crept_m) = (found[1] * rows[held].1, found[2] * impulse_n_s);
+    let mut bends: Vec<f64> =
+        rows[..=held].windows(3).map(|w| (w[2].2 - 2.0 * w[1].2 + w[0].2).abs()).collect();
+    bends.sort_by(f64::total_cmp);
+    let noise_m = 0.605 * bends[bends.len() / 2];
+    let creeps = crept_m >= LEAST_M && crept_m >= BEYOND_SHEAR * shear_m;
+    let follows = left_m <= (LEFT_OF_NOISE * noise_m).max(LEFT * crept_m);
+    let sd = found[2] * libm::hypot(MODEL_SD, left_m / crept_m);
+    (creeps && follows).then_some(Crept { rate: found[2], sd, to_n: smooth[held] })
+}
+
+/// Least squares; columns without a size stay out.
+fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<Vec<f64>> {
+    let columns = rows.first()?.0.len();
+    let size = |k: usize| rows.iter().map(|(x, _)| x[k] * x[k]).sum::<f64>();
+    let used: Vec<usize> = (0..columns).filter(|&k| size(k) > 0.0).collect();
+    let slopes = DMatrix::from_fn(rows.len(), used.len(), |i, k| rows[i].0[used[k]]);
+    let measured = DVector::from_iterator(rows.len(), rows.iter().map(|(_, y)| *y));
+    let solved = slopes.tr_mul(&slopes).cholesky()?.solve(&slopes.tr_mul(&measured));
+    let mut found = vec![0.0; columns];
+    used.iter().zip(solved.iter()).for_each(|(&k, value)| found[k] = *value);
+    Some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draws::Draws;
+    use gripgen_twin::{PlannedPull, TraceRow};
+
+    /// A pull that rises by `increment_n / 0.1 s` to `limit_n`, with noise of 0.1 N and 5 um, its way by `way_m(force, impulse)`.
+    fn pull(
+        grip_force_n: f64,
+        increment_n: f64,
+        limit_n: f64,
+        way_m: &dyn Fn(f64, f64) -> f64,
+        draws: &mut Draws,
+    ) -> MeasuredPull {
+        let mut impulse_n_s = 0.0;
+        let rows = (-50..(100.0 * limit_n / (10.0 * increment_n)) as i32).map(|i| {
+            let time_s = 0.01 * f64::from(i);
+            let force_n = 10.0 * increment_n * time_s.max(0.0);
+            impulse_n_s += 0.01 * force_n;
+            TraceRow {
+                time_s,
+                desired_force_n: force_n,
+                measured_force_n: force_n + 0.1 * draws.normal(),
+                displacement_m: way_m(force_n, impulse_n_s) + 5e-6 * draws.normal(),
+            }
+        });
+        MeasuredPull {
+            id: String::new(),
+            part: "rod".into(),
+            grip_pose: 0,
+            grip_force_n,
+            increment_n,
+            start_n: None,
+            step_s: 0.1,
+            covariates: PlannedPull::default().covariates(),
+            max_pull_force_n: limit_n,
+            zero_shift_n: 0.0,
+            trace: Some(rows.collect()),
+        }
+    }
+
+    const GRIPS: [(f64, f64); 6] =
+        [(10.0, 0.5), (20.0, 1.0), (40.0, 2.0), (15.0, 2.0), (30.0, 0.5), (60.0, 1.0)];
+
+    #[test]
+    fn the_rate_of_a_tool_that_creeps_comes_back() {
+        let mut draws = Draws::new(3, 0);
+        let rate = |grip: f64| 3e-4 * libm::pow(grip / 20.0, -0.3);
+        let pulls: Vec<MeasuredPull> = GRIPS
+            .iter()
+            .map(|&(grip, step)| {
+                let way = |force: f64, impulse: f64| force / 4e4 + rate(grip) * impulse;
+                pull(grip, step, 0.8 * grip, &way, &mut draws)
+            })
+            .collect();
+        // Another part, whose contact creeps four times as fast.
+        let more: Vec<MeasuredPull> = GRIPS
+            .iter()
+            .map(|&(grip, step)| {
+                let way = |force: f64, impulse: f64| force / 4e4 + 4.0 * rate(grip) * impulse;
+                MeasuredPull { part: "plate".into(), ..pull(grip, step, 0.5 * grip, &way, &mut draws) }
+            })
+            .collect();
+        assert!(Creep::of(&[&pulls[..], &more[..]].concat()).is_some());
+        let creep = Creep::of(&pulls).unwrap();
+        for (row, crept) in creep.seen() {
+            let truth = rate(pulls[row].grip_force_n);
+            assert!((crept.rate / truth - 1.0).abs() < 0.1, "{row}: {crept:?}, {truth}");
+            // What is left is the shear of the gels.
+            let trace = pulls[row].trace.as_ref().unwrap();
+            let left = creep.taken_off(row, &pulls[row], trace);
+            let last = left.row(left.len() - 1);
+            let sheared_m = last.measured_force_n / 4e4;
+            assert!((last.displacement_m - sheared_m).abs() < 0.1 * trace.row(left.len() - 1).displacement_m);
+        }
+        assert!(creep.seen().count() >= 4);
+    }
+
+    /// Contacts that bend go further and further too, but no further where the pull is slower: the sphere of Mindlin 1949, on gels as soft as to
+    /// move by millimetres.
+    #[test]
+    fn contacts_that_bend_do_not_creep() {
+        let mut draws = Draws::new(4, 0);
+        let pulls: Vec<MeasuredPull> = GRIPS
+            .iter()
+            .map(|&(grip, step)| {
+                let limit = 0.8 * grip;
+                let way = move |force: f64, _: f64| {
+                    1.5 * limit / 5e3 * (1.0 - libm::pow(1.0 - (force / limit).min(1.0), 2.0 / 3.0))
+                };
+                pull(grip, step, limit, &way, &mut draws)
+            })
+            .collect();
+        assert!(Creep::of(&pulls).is_none());
+        // Nor what goes with the square of the force, which one staircase cannot tell from creep.
+        let pulls: Vec<MeasuredPull> = GRIPS
+            .iter()
+            .map(|&(grip, step)| pull(grip, step, 0.8 * grip, &|force, _| 4e-6 * force * force, &mut draws))
+            .collect();
+        assert!(Creep::of(&pulls).is_none());
+    }
+
+    #[test]
+    fn readings_that_rise_to_the_end_are_no_slip() {
+        let seen = |slope: f64| TraceObservation {
+            row: 0,
+            no_load_n: None,
+            held_s: (0..40).map(|i| 0.05 * f64::from(i)).collect(),
+            held_n: (0..40).map(|i| 0.25 * f64::from(i)).collect(),
+            held_m: vec![0.0; 40],
+            slip_s: Some(2.0),
+            before_slip_n: vec![9.5; 6],
+            slid_n: Some((10.0, 20)),
+            slid_rows: (0..20)
+                .map(|i| (2.0 + 0.05 * f64::from(i), 10.0 + slope * 0.05 * f64::from(i), 0.0))
+                .collect(),
+        };
+        assert_eq!(without_slips_that_rise(seen(4.5)).slip_s, None);
+        assert_eq!(without_slips_that_rise(seen(0.0)).slip_s, Some(2.0));
+    }
+}
