@@ -22,12 +22,13 @@ BOOK = {
     "mujoco_firm": ("mujoco_pull", {"cone": "pyramidal", "impratio": 10.0, "contact_time_s": 0.02}),
     "pybullet_as_shipped": ("pybullet_pull", {"iterations": 50}),
 }
-#: What may be named, fixed before any tool was scored: of a contact that creeps below its limit, the rate at which it is loaded and
-#: what a reading that lags or falls behind under load looks like; of a limit that is not in proportion to the normal force, a law of
+#: What may be named, fixed before any tool was scored: of a contact that creeps below its limit, that it does (an effect of the library
+#: since 2026-11-28, added here before salts 22005 and later were made), the rate at which it is loaded and what a reading that lags or
+#: falls behind under load looks like; of a limit that is not in proportion to the normal force, a law of
 #: the load; the columns of both.
 ADMISSIBLE = {
     "rate_dependence", "force_increment_n", "step_time_s", "grip_force_n", "load_offset", "load_power_law", "area_saturation",
-    "regime_transition", "shear_strength", "grip_force_loss", "sensor_creep",
+    "regime_transition", "shear_strength", "grip_force_loss", "sensor_creep", "shear_creep",
 }
 
 
@@ -38,6 +39,11 @@ def _modules(name):
     import importlib
 
     return importlib.import_module("scene"), importlib.import_module(name)
+
+
+def feedback(world):
+    """What the force loop of a world closes on: that of the scenes on the force of the contact, that of the brush on its own."""
+    return "measured" if world.engine else "independent"
 
 
 def simulate(world, limit, ledger):

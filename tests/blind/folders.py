@@ -30,8 +30,8 @@ def measured_ledger(ledger, rng):
     return seen
 
 
-def write_campaign(folder, seen, labels, free, prefix="p"):
-    """`pulls.csv` and `campaign.toml`."""
+def write_campaign(folder, seen, labels, free, prefix="p", feedback="independent"):
+    """`pulls.csv` and `campaign.toml`; `feedback` is what the force loop closes on."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     columns = COLUMNS + [(name, FREE[name]) for name in free]
@@ -43,7 +43,7 @@ def write_campaign(folder, seen, labels, free, prefix="p"):
             row += [form.format(seen[name][i]) for name, form in columns[1:]]
             out.writerow(row + [f"{value:.3f}"])
     (folder / "campaign.toml").write_text(
-        'force_convention = "per_jaw"\nlabel_tolerance_n = 3.0\nstop_mm = 5.0\nfeedback = "independent"\n',
+        f'force_convention = "per_jaw"\nlabel_tolerance_n = 3.0\nstop_mm = 5.0\nfeedback = "{feedback}"\n',
         encoding="utf-8",
     )
 

@@ -41,7 +41,7 @@ def build(case, seed, name, open_folder, sealed_folder):
         label = np.round(label / case["rounded_n"]) * case["rounded_n"]
     seen = folders.measured_ledger(led, rng)
     place = Path(open_folder) / name
-    folders.write_campaign(place, seen, label, design["distractors"])
+    folders.write_campaign(place, seen, label, design["distractors"], feedback=engines.feedback(world))
     which = {"fourth": range(0, n, 4), "all": range(n), "few": range(0, n, 8), "none": []}[design["traces"]]
     if len(which):
         folders.write_traces(place, which, out, noisy, world, rng)
@@ -128,12 +128,12 @@ def _unseen(world, mu, design, acting, case, rng, place):
         factor = campaigns.scatter_factors(world, unseen, rng)
         draws.append(campaigns.labels(world, campaigns.run(world, mu, table, acting, factor), rng)[0])
     oracle = np.mean(draws[1:], axis=0)
-    folders.write_campaign(place, folders.measured_ledger(table, rng), draws[0], design["distractors"], prefix="u")
+    folders.write_campaign(place, folders.measured_ledger(table, rng), draws[0], design["distractors"], "u", engines.feedback(world))
     if case.get("expected"):
         few = {k: v[::2] for k, v in table.items()}
         seen = folders.measured_ledger(few, rng)
         mean = expected_labels(world, mu, few, acting, case, rng)
-        folders.write_campaign(place.parent / "expected", seen, mean, design["distractors"], prefix="e")
+        folders.write_campaign(place.parent / "expected", seen, mean, design["distractors"], "e", engines.feedback(world))
     others = replicas - 1
     return float(np.sqrt(np.mean((draws[0] - oracle) ** 2) * others / (others + 1)))
 
