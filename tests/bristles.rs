@@ -123,7 +123,7 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
     };
     // Creep, which moves the tool and no force: the rate is the effect's, what the rim does to it is written here.
     let pressed = [Jaw::Left, Jaw::Right].map(|jaw| normal_force_n(twin, pull, jaw, pull.grip_force_n));
-    let creeps = acting.iter().filter_map(|e| Some((e.spec.creep?, &e.values))).last();
+    let creeps = acting.iter().filter_map(|e| Some((e.spec.creep?, &e.values))).next_back();
     let (rate, rim) = creeps.map_or((0.0, 0.0), |(hook, values)| {
         let creep = hook(values, &point(pull, Jaw::Left, 0.5 * (pressed[0] + pressed[1])));
         (creep.rate_m_per_n_s, creep.rim_exponent)
@@ -171,7 +171,7 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
         v = root(v - 1.0, v + 1.0, off);
         x += v * dt;
         contact = force(x);
-        crept += rate * contact * (1.0 - contact / whole_n).max(0.01).min(1.0).powf(-rim) * dt;
+        crept += rate * contact * (1.0 - contact / whole_n).clamp(0.01, 1.0).powf(-rim) * dt;
         let mut holds = false;
         for b in &mut bristles {
             let most = b.limit_n * keep;
