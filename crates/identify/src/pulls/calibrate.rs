@@ -3,7 +3,6 @@
 use super::answer::{insufficient, outliers, without};
 use super::candidates::{Candidate, candidate};
 use super::context::Context;
-use super::creep::Creep;
 use super::data::PullData;
 use super::dynamics::Dynamics;
 use super::error_interval::{Judged, errors};
@@ -136,7 +135,8 @@ pub fn calibrate_pulls(
         return Err(CalibrateError::Insufficient(missing));
     }
     let max_n = data.label_n.iter().copied().fold(0.0, f64::max);
-    let creep_m_per_n_s = Creep::of(&measured.pulls).map(|creep| creep.median_m_per_n_s());
+    let mut context = Context::new(&data, predictor, given);
+    let creep_m_per_n_s = context.creep_m_per_n_s();
     let mut terms = Terms::default();
     let asked = |spec: &'static EffectSpec| -> Result<Candidate, CalibrateError> {
         if let Err(reason) = spec.pulls {
@@ -161,7 +161,6 @@ pub fn calibrate_pulls(
         let start = candidate.starts[candidate.starts.len() / 2].clone();
         terms.effects.push((candidate, start));
     }
-    let mut context = Context::new(&data, predictor, given);
     let rows: Vec<usize> = (0..data.len()).collect();
     context.see_tails(&rows);
     context.learn_lag(&rows);

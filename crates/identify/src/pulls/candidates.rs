@@ -103,7 +103,6 @@ pub(super) fn candidate(
     creep_m_per_n_s: Option<f64>,
 ) -> Option<Candidate> {
     let fit = spec.pulls.ok()?;
-
     let varies = |name: &str| data.varies(name);
     let has_range = spec.covariates.is_empty() || spec.covariates.iter().any(|c| varies(c));
     if !has_range || !fit.spans.iter().all(|c| varies(c)) {

@@ -7,7 +7,7 @@
 //! up to four fifths of the largest force. Of one staircase the integral is a parabola in the force, as what a contact bends by before it
 //! slips is; creep is what is far more than gels shear by, and is not more where the staircase is steeper.
 
-use super::observe::TraceObservation;
+use super::observe::{TraceObservation, displacement_noise, mean};
 use gripgen_twin::{MeasuredPull, PullTrace};
 use nalgebra::{DMatrix, DVector};
 
@@ -134,22 +134,32 @@ impl Creep {
             self.of_part.iter().find(|(name, _)| *name == pull.part).map_or(levels, |(_, level)| *level);
         let by_grip = || libm::exp(own + self.by_grip * libm::log(pull.grip_force_n));
         let rate = self.of_pull[row].map_or_else(by_grip, |c| c.rate);
+        let pulled = pulled(trace);
         let mut trace = trace.clone();
-        let zero_n = no_load_n(&trace);
-        let (mut impulse_n_s, mut last) = (0.0, None);
-        let rows: Vec<_> = trace.rows().collect();
-        for (row, x) in rows.iter().zip(&mut trace.displacement_m) {
-            let force_n = row.measured_force_n - zero_n;
-            if let Some((time_s, before_n)) = last
-                && row.time_s > 0.0
-            {
-                impulse_n_s += 0.5 * (force_n + before_n) * (row.time_s - time_s);
-            }
-            *x -= rate * impulse_n_s;
-            last = Some((row.time_s, force_n));
+        let before = trace.len() - pulled.len();
+        for (x, crept) in trace.displacement_m[before..].iter_mut().zip(impulses_n_s(&pulled)) {
+            *x -= rate * crept;
         }
         trace
     }
+}
+
+/// Time, force and displacement of the rows of the pull, forces less the reading without load.
+fn pulled(trace: &PullTrace) -> Vec<(f64, f64, f64)> {
+    let no_load: Vec<f64> = trace.rows().filter(|r| r.time_s < 0.0).map(|r| r.measured_force_n).collect();
+    let zero_n = mean(&no_load).filter(|(_, n)| *n >= 5).map_or(0.0, |(zero_n, _)| zero_n);
+    let rows = trace.rows().filter(|r| r.time_s >= 0.0);
+    rows.map(|r| (r.time_s, r.measured_force_n - zero_n, r.displacement_m)).collect()
+}
+
+/// Force times time up to each row of a pull.
+fn impulses_n_s(pulled: &[(f64, f64, f64)]) -> Vec<f64> {
+    let mut impulse_n_s = 0.0;
+    let steps = pulled.windows(2).map(|w| {
+        impulse_n_s += 0.5 * (w[0].1 + w[1].1) * (w[1].0 - w[0].0);
+        impulse_n_s
+    });
+    std::iter::once(0.0).chain(steps).take(pulled.len()).collect()
 }
 
 /// What follows a slip is level: readings that rise on are those of a tool that creeps to its stop.
@@ -174,34 +184,19 @@ pub(super) fn without_slips_that_rise(mut seen: TraceObservation) -> TraceObserv
     seen
 }
 
-fn no_load_n(trace: &PullTrace) -> f64 {
-    let (sum, count) = trace
-        .rows()
-        .filter(|r| r.time_s < 0.0)
-        .fold((0.0, 0.0), |(sum, count), r| (sum + r.measured_force_n, count + 1.0));
-    if count >= 5.0 { sum / count } else { 0.0 }
-}
-
 /// What a trace crept by, if that is far.
 fn rate_of(trace: &PullTrace) -> Option<Crept> {
-    let zero_n = no_load_n(trace);
-    let rows: Vec<(f64, f64, f64)> = trace
-        .rows()
-        .filter(|r| r.time_s >= 0.0)
-        .map(|r| (r.time_s, r.measured_force_n - zero_n, r.displacement_m))
-        .collect();
+    let rows = pulled(trace);
     let smooth: Vec<f64> = rows.windows(3).map(|w| w.iter().map(|r| r.1).sum::<f64>() / 3.0).collect();
     let most_n = smooth.iter().copied().fold(0.0, f64::max);
     let held = smooth.iter().position(|f| *f >= HELD * most_n)?;
     if held < MIN_ROWS {
         return None;
     }
-    let mut impulse_n_s = 0.0;
-    let mut points = vec![(vec![1.0, rows[0].1, 0.0], rows[0].2)];
-    for pair in rows[..=held].windows(2) {
-        impulse_n_s += 0.5 * (pair[0].1 + pair[1].1) * (pair[1].0 - pair[0].0);
-        points.push((vec![1.0, pair[1].1, impulse_n_s], pair[1].2));
-    }
+    let held_rows = &rows[..=held];
+    let impulse_n_s = impulses_n_s(held_rows);
+    let mut points: Vec<(Vec<f64>, f64)> =
+        held_rows.iter().zip(&impulse_n_s).map(|(r, i)| (vec![1.0, r.1, *i], r.2)).collect();
     let mut found = least_squares(&points)?;
     if found[1] < 0.0 {
         points.iter_mut().for_each(|(x, _)| x[1] = 0.0);
@@ -210,11 +205,9 @@ fn rate_of(trace: &PullTrace) -> Option<Crept> {
     let left =
         points.iter().map(|(x, y)| (y - x.iter().zip(&found).map(|(a, b)| a * b).sum::<f64>()).powi(2));
     let left_m = (left.sum::<f64>() / points.len() as f64).sqrt();
-    let (shear_m, crept_m) = (found[1] * rows[held].1, found[2] * impulse_n_s);
-    let mut bends: Vec<f64> =
-        rows[..=held].windows(3).map(|w| (w[2].2 - 2.0 * w[1].2 + w[0].2).abs()).collect();
-    bends.sort_by(f64::total_cmp);
-    let noise_m = 0.605 * bends[bends.len() / 2];
+    let (shear_m, crept_m) = (found[1] * rows[held].1, found[2] * impulse_n_s[held]);
+    let way_m: Vec<f64> = held_rows.iter().map(|r| r.2).collect();
+    let noise_m = displacement_noise(&way_m);
     let creeps = crept_m >= LEAST_M && crept_m >= BEYOND_SHEAR * shear_m;
     let follows = left_m <= (LEFT_OF_NOISE * noise_m).max(LEFT * crept_m);
     let sd = found[2] * libm::hypot(MODEL_SD, left_m / crept_m);

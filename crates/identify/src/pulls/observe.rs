@@ -96,7 +96,8 @@ pub fn observe(row: usize, trace: &PullTrace, noise_n: f64) -> TraceObservation 
     observation
 }
 
-fn mean(x: &[f64]) -> Option<(f64, usize)> {
+/// Mean and number, of one at least.
+pub(super) fn mean(x: &[f64]) -> Option<(f64, usize)> {
     (!x.is_empty()).then(|| (x.iter().sum::<f64>() / x.len() as f64, x.len()))
 }
 
@@ -119,6 +120,13 @@ fn force_levels(rows: &[(f64, f64)]) -> Option<usize> {
         vy - cty * cty / vt + after[5] - after[3] * after[3] / after[0]
     };
     (8..n.saturating_sub(3)).min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
+}
+
+/// Noise of displacements from their second differences, which a steady motion does not have; of three at least.
+pub(super) fn displacement_noise(way_m: &[f64]) -> f64 {
+    let mut bends: Vec<f64> = way_m.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs()).collect();
+    bends.sort_by(f64::total_cmp);
+    0.605 * bends[bends.len() / 2]
 }
 
 /// The first row after the slip of (reading, displacement) rows: from there on the displacement is beyond that of the
@@ -146,11 +154,8 @@ fn slip_row(rows: &[(f64, f64)], noise_n: f64) -> Option<usize> {
     }
     let compliance = if ff > 0.0 { (fx / ff).max(0.0) } else { 0.0 };
     let beyond = |i: usize| rows[i].1 - x0 - compliance * rows[i].0;
-    // Noise of the displacement from its second differences, which a steady motion does not have.
-    let mut bends: Vec<f64> =
-        rows[..n / 2 + 2].windows(3).map(|w| (w[2].1 - 2.0 * w[1].1 + w[0].1).abs()).collect();
-    bends.sort_by(f64::total_cmp);
-    let threshold = SLID_M.max(5.0 * 0.605 * bends[bends.len() / 2]);
+    let displacements: Vec<f64> = rows[..n / 2 + 2].iter().map(|r| r.1).collect();
+    let threshold = SLID_M.max(5.0 * displacement_noise(&displacements));
     // Slip that begins at the rim softens the gels before the jaws let go.
     let slid = |i: usize| beyond(i) > threshold.max(SOFTER * compliance * rows[i].0);
     if !slid(n - 1) {
