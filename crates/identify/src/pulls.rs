@@ -21,6 +21,7 @@ pub mod few;
 pub mod few_diagnosis;
 pub mod fitting;
 pub mod heldout;
+mod instead;
 pub mod intervals;
 mod label_noise;
 mod law;

@@ -8,6 +8,7 @@ use super::error_interval::{Judged, errors};
 use super::estimates::baseline;
 use super::fitting::Fitted;
 use super::heldout::{HeldOutScore, by_value, folds, held_out_score, noise_floor_n, predicted, scatter};
+use super::instead::tied_instead;
 use super::model::{PredictPulls, PullModel};
 use super::naming::named;
 use super::one_level::of_one_level;
@@ -133,6 +134,10 @@ pub fn diagnose_pulls(
     let mut left = None;
     if !accepted.curves.is_empty() {
         left = in_place_of_curves(&search, &accepted.fitted, &repetitions, &near);
+        let now = left.as_ref().map_or(&accepted.fitted, |l| &l.fitted);
+        if let Some(instead) = tied_instead(&search, &before, &accepted, now, &repetitions, &near) {
+            (accepted, left) = (instead.accepted, instead.left);
+        }
         if left.is_some() {
             accepted.curves.clear();
         }
