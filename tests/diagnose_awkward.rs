@@ -4,8 +4,9 @@
 use crate::diagnose::{baseline, diagnose, library, names, simulated, twin_at};
 use gripgen::identify::Verdict;
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
+use gripgen::twin::draw::Drawn;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen::twin::{MeasuredPulls, PullTrace, TraceRow};
+use gripgen::twin::{ExtraColumn, MeasuredPulls, PullTrace, TraceRow, Values};
 use gripgen::{calibrate_twin, edited_twin};
 
 /// Labels alone, as they are copied from a screen.
@@ -156,4 +157,29 @@ fn a_wear_that_has_hardly_bent_is_a_name() {
     assert_eq!(names(&found), ["wear"], "{:?} {:?}", found.unknown, found.hints);
     let depth = &found.effects[0].parameters["depth"];
     assert!(depth.low90 > 0.05 && depth.high90 > 0.8, "{depth:?}");
+}
+
+/// Friction in humid heat, in a room that is cold and moist towards the end: a step of friction from there on beside a curve of the humidity is
+/// as likely as the temperature beside that curve, and less so once the product of both stands there too.
+#[test]
+fn what_is_tied_may_explain_more_beside_a_curve() {
+    let mut measured = labels_alone(simulated("", 75, &[]));
+    let mut humidity_pct = Vec::new();
+    for (i, pull) in measured.pulls.iter_mut().enumerate() {
+        let phase = i as f64;
+        let (middle, swing) = if i < 60 { (40.0, 17.0) } else { (60.0, 12.0) };
+        let humidity = middle + swing * ((2.4 * phase).sin() + 0.5 * (1.1 * phase).cos());
+        let degrees = if i < 60 { 22.8 + 0.9 * (0.4 * phase).sin() } else { 19.8 + 0.3 * phase.cos() };
+        let (h, t) = ((humidity - 47.0) / 18.0, (degrees - 22.0) / 2.0);
+        pull.covariates.temperature_c = degrees;
+        pull.covariates.extra.insert("humidity_pct".into(), Drawn::Number(humidity));
+        humidity_pct.push(humidity);
+        pull.max_pull_force_n *= (0.16 * (0.6 * h + 0.4 * t + 0.5 * h * t - 0.3 * h * h)).exp();
+    }
+    measured.extra.push(ExtraColumn { name: "humidity_pct".into(), values: Values::Numbers(humidity_pct) });
+    let d = diagnose(&measured, &[]).diagnosis;
+    assert_eq!(names(&d), ["temperature"], "{d:?}");
+    assert!(d.unknown.iter().any(|u| u.covariate == "humidity_pct*temperature_c"), "{:?}", d.unknown);
+    let error = d.error.as_ref().unwrap();
+    assert!(error.after.rmse_n < error.before.rmse_n.map(|e| 0.4 * e), "{error:?}");
 }
