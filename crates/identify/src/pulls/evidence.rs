@@ -28,6 +28,8 @@ pub(super) struct Grouped {
     along: DVector<f64>,
     square: f64,
     free: f64,
+    /// Logarithm of the determinant by which rows were whitened, less that of what the model explains of them.
+    beside: f64,
     /// Orthonormal directions that the model explains.
     known: DMatrix<f64>,
 }
@@ -42,15 +44,21 @@ pub(super) struct Learnt {
 }
 
 impl Grouped {
-    /// From residuals, derivatives by the parameters of a model, and groups of columns, all in units of the noise. `None` if
-    /// there are too few rows.
-    pub fn new(y: &DVector<f64>, slopes: &DMatrix<f64>, groups: &[DMatrix<f64>]) -> Option<Self> {
+    /// From residuals, derivatives by the parameters of a model, and groups of columns, all in units of the noise; whitened by a
+    /// matrix with a determinant whose logarithm is `whitened_by`. `None` if there are too few rows.
+    pub fn new(
+        y: &DVector<f64>,
+        slopes: &DMatrix<f64>,
+        groups: &[DMatrix<f64>],
+        whitened_by: f64,
+    ) -> Option<Self> {
         let n = y.len();
         let svd = slopes.clone().svd(true, false);
         let u = svd.u?;
         let most = svd.singular_values.iter().copied().fold(0.0, f64::max);
         let kept: Vec<usize> =
             (0..svd.singular_values.len()).filter(|&k| svd.singular_values[k] > 1e-9 * most).collect();
+        let widths: f64 = kept.iter().map(|&k| libm::log(svd.singular_values[k])).sum();
         let known = DMatrix::from_fn(n, kept.len(), |i, k| u[(i, kept[k])]);
         let free = n.checked_sub(kept.len()).filter(|f| *f >= 8)? as f64;
         let width: usize = groups.iter().map(DMatrix::ncols).sum();
@@ -70,6 +78,7 @@ impl Grouped {
             along: columns.tr_mul(&y),
             square: y.norm_squared(),
             free,
+            beside: whitened_by - widths,
             y,
             columns,
             groups: places,
@@ -111,6 +120,11 @@ impl Grouped {
             own
         });
         Some((gain, coefficients.collect()))
+    }
+
+    /// Logarithm of the likelihood with no group, but for what is the same however rows are whitened.
+    pub fn evidence_of_nothing(&self) -> f64 {
+        self.beside - 0.5 * self.free * libm::log(self.square.max(1e-300))
     }
 
     fn gain(&self, chosen: &[(usize, f64)]) -> f64 {
@@ -206,7 +220,7 @@ mod tests {
                 groups.push(DMatrix::from_columns(&[x[i].component_mul(&x[j]) / 0.04]));
             }
         }
-        Grouped::new(&y, &DMatrix::from_element(ROWS, 1, 25.0), &groups).unwrap()
+        Grouped::new(&y, &DMatrix::from_element(ROWS, 1, 25.0), &groups, 0.0).unwrap()
     }
 
     /// Of noise alone nothing is learnt, but for as many campaigns as the test allows.

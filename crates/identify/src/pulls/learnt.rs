@@ -1,8 +1,8 @@
 //! Learning a residual beside a model from some of the pulls.
 
 use super::context::Context;
-use super::curves::Curve;
-use super::evidence::{Grouped, MOST};
+use super::curves::{Curve, SESSION};
+use super::evidence::{Grouped, Learnt, MOST};
 use super::fitting::Fitted;
 use super::model::PullModel;
 use super::smooth::smooths;
@@ -11,6 +11,9 @@ use nalgebra::{DMatrix, DVector};
 /// Step of the logarithm of the friction by which the labels are differentiated.
 const STEP: f64 = 0.02;
 
+/// Shares of the memory of a fit with which a residual may be learnt: what goes with a slow column is memory to a model without it.
+const OF_MEMORY: [f64; 3] = [1.0, 0.5, 0.0];
+
 /// What is left of the pulls at `rows` beside a model, as groups of columns in units of the noise.
 pub(super) fn grouped(
     context: &Context<'_>,
@@ -18,6 +21,17 @@ pub(super) fn grouped(
     rows: &[usize],
     curves: &[Curve],
 ) -> Option<Grouped> {
+    grouped_with(context, fitted, rows, curves, &[1.0])?.pop()
+}
+
+/// The same for some shares of the memory that pulls of a session have.
+fn grouped_with(
+    context: &Context<'_>,
+    fitted: &Fitted,
+    rows: &[usize],
+    curves: &[Curve],
+    shares: &[f64],
+) -> Option<Vec<Grouped>> {
     let model = &fitted.model;
     let n = context.data.len();
     let sd = context.deviations(model, rows);
@@ -51,29 +65,53 @@ pub(super) fn grouped(
         .iter()
         .map(|r| (context.tails.weight_of(r / scale) / context.tails.weight_of(0.0)).sqrt() / scale)
         .collect();
-    let memory = fitted.likelihood.memory;
     let sessions: Vec<usize> = rows.iter().map(|&i| context.data.session_of[i]).collect();
-    // Neighbours that remember each other: what is new in each pull.
-    let whitened = |raw: &dyn Fn(usize) -> f64| {
-        let own = |k: usize| weights[k] * raw(k);
-        DVector::from_iterator(
-            rows.len(),
-            (0..rows.len()).map(|k| match k.checked_sub(1).filter(|&last| sessions[last] == sessions[k]) {
-                Some(last) => (own(k) - memory * own(last)) / (1.0 - memory * memory).sqrt(),
+    let last_of = |k: usize| k.checked_sub(1).filter(|&last| sessions[last] == sessions[k]);
+    let followers = (0..rows.len()).filter(|&k| last_of(k).is_some()).count() as f64;
+    let each = shares.iter().map(|share| {
+        let memory = share * fitted.likelihood.memory;
+        // Neighbours that remember each other: what is new in each pull.
+        let new = 1.0 - memory * memory;
+        let whitened = |raw: &dyn Fn(usize) -> f64| {
+            let own = |k: usize| weights[k] * raw(k);
+            let one = |k: usize| match last_of(k) {
+                Some(last) => (own(k) - memory * own(last)) / new.sqrt(),
                 None => own(k),
-            }),
-        )
-    };
-    let y = whitened(&|k| residuals[k]);
-    let known: Vec<DVector<f64>> = known.iter().map(|c| whitened(&|k| c[k])).collect();
-    let groups: Vec<DMatrix<f64>> = curves
-        .iter()
-        .map(|curve| {
+            };
+            DVector::from_iterator(rows.len(), (0..rows.len()).map(one))
+        };
+        let y = whitened(&|k| residuals[k]);
+        let known: Vec<DVector<f64>> = known.iter().map(|c| whitened(&|k| c[k])).collect();
+        let group = |curve: &Curve| {
+            // Steps of sessions are no explanation of what pulls of a session remember.
+            if *share < 1.0 && curve.name == SESSION {
+                return DMatrix::zeros(rows.len(), curve.len());
+            }
             let of = |j: usize| whitened(&|k| by_factor[k] * curve.basis[rows[k]][j]);
             DMatrix::from_columns(&(0..curve.len()).map(of).collect::<Vec<_>>())
-        })
-        .collect();
-    Grouped::new(&y, &DMatrix::from_columns(&known), &groups)
+        };
+        let groups: Vec<DMatrix<f64>> = curves.iter().map(group).collect();
+        Grouped::new(&y, &DMatrix::from_columns(&known), &groups, -0.5 * followers * libm::log(new))
+    });
+    each.collect()
+}
+
+/// What is left beside a model with the memory that has the most evidence together with what the pulls at `rows` teach, and that.
+pub(super) fn learnt_beside_memory(
+    context: &Context<'_>,
+    fitted: &Fitted,
+    rows: &[usize],
+    curves: &[Curve],
+    most: usize,
+) -> Option<(Grouped, Learnt)> {
+    let shares = if fitted.likelihood.memory == 0.0 { &OF_MEMORY[..1] } else { &OF_MEMORY };
+    let each = grouped_with(context, fitted, rows, curves, shares)?;
+    let all = each.into_iter().map(|left| {
+        let learnt = left.learn(most);
+        (left.evidence_of_nothing() + learnt.gain, left, learnt)
+    });
+    let best = all.reduce(|a, b| if b.0 > a.0 { b } else { a });
+    best.map(|(_, left, learnt)| (left, learnt))
 }
 
 /// `fitted` with what the pulls at `rows` teach beside it, of at most so many groups, shrunk once more to `share` of it.
@@ -85,7 +123,7 @@ pub(super) fn with_residual(
     share: f64,
     most: usize,
 ) -> Option<Fitted> {
-    let learnt = grouped(context, fitted, rows, curves)?.learn(most);
+    let (_, learnt) = learnt_beside_memory(context, fitted, rows, curves, most)?;
     if learnt.groups.is_empty() {
         return None;
     }

@@ -6,7 +6,7 @@ use super::curves::Session;
 use super::evidence::MOST;
 use super::fitting::Fitted;
 use super::heldout::{by_value, predicted, scatter};
-use super::learnt::{grouped, with_residual};
+use super::learnt::{grouped, learnt_beside_memory, with_residual};
 use super::paying::{root_mean_square, share};
 use super::search::Search;
 use super::smooth::smooths;
@@ -71,14 +71,17 @@ fn learnt_beside(
     // What traces show of signals stays as it is, which is fast.
     let held = Terms { hold_signals: fitted.terms.act_on_signals(), ..fitted.terms.clone() };
     let plain = context.fit_again(&fitted.model, &held, &search.rows)?;
-    let left = grouped(context, &plain, &search.rows, &curves)?;
-    let learnt = left.learn(MOST);
-    if learnt.groups.is_empty() {
+    // Memory stays that of the model without where chance decides; in the place of a curve the evidence is there already.
+    let own = grouped(context, &plain, &search.rows, &curves)?;
+    if strict && own.learn(1).groups.is_empty() {
         return None;
     }
-    let p_value = left.p_value();
-    // In the place of a curve the evidence is there already.
+    let p_value = own.p_value();
     if strict && p_value > CHANCE {
+        return None;
+    }
+    let (left, learnt) = learnt_beside_memory(context, &plain, &search.rows, &curves, MOST)?;
+    if learnt.groups.is_empty() {
         return None;
     }
     let full = with_residual(context, &plain, &search.rows, &curves, 1.0, MOST)?;
@@ -124,8 +127,10 @@ fn learnt_beside(
         return None;
     }
     let mut strengths: Vec<UnknownCovariate> = Vec::new();
-    for (group, coefficients) in &left.learn(chosen.terms.learnt.len()).groups {
-        let (covariate, strength) = (&curves[*group].name, left.strength(*group, coefficients));
+    for (curve, shrunk) in &chosen.terms.learnt {
+        let Some(group) = curves.iter().position(|c| c == curve) else { continue };
+        let coefficients: Vec<f64> = shrunk.iter().map(|c| c / confirmed).collect();
+        let (covariate, strength) = (&curve.name, left.strength(group, &coefficients));
         match strengths.iter_mut().find(|u| u.covariate == *covariate) {
             Some(known) => known.strength += strength,
             None => strengths.push(UnknownCovariate { covariate: covariate.clone(), strength, p_value }),
