@@ -256,4 +256,43 @@ mod tests {
         let plain = grouped.along[1] / grouped.gram[(1, 1)];
         assert!(coefficients[0][0].abs() < 0.9 * plain.abs(), "{coefficients:?} {plain}");
     }
+
+    /// Noise, and what a slow column does, seen with neighbours that remember `memory` of each other: the evidence that both have together.
+    fn evidence_with(memory: f64, column: &[f64], y: &[f64]) -> f64 {
+        let new = 1.0 - memory * memory;
+        let whitened = |x: &[f64]| {
+            let one = |k: usize| if k == 0 { x[0] } else { (x[k] - memory * x[k - 1]) / new.sqrt() };
+            DVector::from_iterator(ROWS, (0..ROWS).map(one))
+        };
+        let scaled: Vec<f64> = column.iter().map(|x| x / 0.04).collect();
+        let (level, group) = (whitened(&[25.0; ROWS]), whitened(&scaled));
+        let by = -0.5 * (ROWS - 1) as f64 * libm::log(new);
+        let columns = [DMatrix::from_columns(&[group])];
+        let seen = Grouped::new(&whitened(y), &DMatrix::from_columns(&[level]), &columns, by).unwrap();
+        seen.evidence_of_nothing() + seen.learn(MOST).gain
+    }
+
+    /// What goes with a slow column is memory to a model without it; with the column more speaks for none. Noise that does remember is told
+    /// from that by the same column.
+    #[test]
+    fn a_slow_column_is_no_memory() {
+        let ahead = |seed: u64, moved: bool| {
+            let mut draws = Draws::new(seed, 2);
+            let mut walk = |keeps: f64| -> Vec<f64> {
+                let mut at = draws.normal();
+                let next = |_| {
+                    let was = at;
+                    at = keeps * at + (1.0 - keeps * keeps).sqrt() * draws.normal();
+                    was
+                };
+                (0..ROWS).map(next).collect()
+            };
+            let (slow, white, remembers) = (walk(0.9), walk(0.0), walk(0.7));
+            let by_column = slow.iter().zip(&white).map(|(x, e)| 1.2 * x + e).collect();
+            let y: Vec<f64> = if moved { by_column } else { remembers };
+            evidence_with(0.0, &slow, &y) - evidence_with(0.7, &slow, &y)
+        };
+        let mean = |moved: bool| (0..20).map(|seed| ahead(seed, moved)).sum::<f64>() / 20.0;
+        assert!(mean(true) > 3.0 && mean(false) < -3.0, "{} and {}", mean(true), mean(false));
+    }
 }
