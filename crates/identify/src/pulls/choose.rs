@@ -1,5 +1,6 @@
 //! Which of the rivals is accepted.
 
+use super::curves::CLOCKS;
 use super::fitting::Fitted;
 use super::heldout::feeling;
 use super::screen::test;
@@ -59,7 +60,7 @@ impl Search<'_> {
         if rate.contains(&name) && own.iter().any(|c| rate.contains(c)) {
             return true;
         }
-        own.iter().any(|c| ["pull_index", "time_s"].contains(c) && self.same_clock(c, name))
+        own.iter().any(|c| CLOCKS.contains(c) && self.same_clock(c, name))
     }
 
     pub(super) fn same_clock(&self, a: &str, b: &str) -> bool {
@@ -95,7 +96,7 @@ impl Search<'_> {
             ModelTerm::Curve(k) => self.curves[k].name.as_str(),
             _ => "",
         };
-        let clock = name(best).split('*').all(|c| ["time_s", "pull_index"].contains(&c));
+        let clock = name(best).split('*').all(|c| CLOCKS.contains(&c));
         let session = entries.iter().find(|e| name(e) == "session");
         session.filter(|s| clock && s.gain > best.gain - RATHER_SESSION).unwrap_or(best).clone()
     }

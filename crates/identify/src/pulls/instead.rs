@@ -1,13 +1,10 @@
 //! Beside a dependence without a name, what is tied with a name may explain more together with it: humid heat looks like a step of friction
-//! in the warmest hours beside a slope of the humidity, until the temperature stands beside both.
+//! in the coldest hours beside a slope of the humidity, until the temperature stands beside both.
 
 use super::fitting::Fitted;
-use super::paying::{paying, root_mean_square, share};
+use super::paying::{PAYS, held_out_n, paying, share};
 use super::residual::{Kept, in_place_of_curves};
 use super::search::{Accepted, Search, TIED_WITHIN, Tied};
-
-/// Share of the error on held-out pulls that a rival has to take off.
-const PAYS: f64 = 0.03;
 
 /// An answer with a tied rival in the place of a name.
 pub(super) struct Instead {
@@ -27,8 +24,7 @@ pub(super) fn tied_instead(
     repetitions: &[Vec<usize>],
     near: &[usize],
 ) -> Option<Instead> {
-    let error_n =
-        |f: &Fitted| root_mean_square(search.held_out(f, repetitions, near).into_iter().map(|(_, e)| e));
+    let error_n = |f: &Fitted| held_out_n(search, f, repetitions, near);
     let now_n = error_n(fitted);
     let places = accepted.effects.iter().enumerate();
     let rivals = places.flat_map(|(place, (_, tied))| tied.iter().map(move |rival| (place, rival)));

@@ -1,7 +1,7 @@
 //! Learning a residual beside a model from some of the pulls.
 
 use super::context::Context;
-use super::curves::{Curve, SESSION};
+use super::curves::{CLOCKS, Curve, SESSION};
 use super::evidence::{Grouped, Learnt, MOST};
 use super::fitting::Fitted;
 use super::model::PullModel;
@@ -13,9 +13,6 @@ const STEP: f64 = 0.02;
 
 /// Shares of the memory of a fit with which a residual may be learnt: what goes with a slow column is memory to a model without it.
 const OF_MEMORY: [f64; 3] = [1.0, 0.5, 0.0];
-
-/// Columns that go slowly whatever acts.
-const REMEMBERED: [&str; 3] = [SESSION, "time_s", "pull_index"];
 
 /// What is left of the pulls at `rows` beside a model, as groups of columns in units of the noise.
 pub(super) fn grouped(
@@ -87,7 +84,9 @@ fn grouped_with(
         let known: Vec<DVector<f64>> = known.iter().map(|c| whitened(&|k| c[k])).collect();
         let group = |curve: &Curve| {
             // What sessions and clocks explain is what pulls of a session remember, and no explanation of it.
-            if *share < 1.0 && curve.name.split('*').any(|column| REMEMBERED.contains(&column)) {
+            if *share < 1.0
+                && curve.name.split('*').any(|column| column == SESSION || CLOCKS.contains(&column))
+            {
                 return DMatrix::zeros(rows.len(), curve.len());
             }
             let of = |j: usize| whitened(&|k| by_factor[k] * curve.basis[rows[k]][j]);

@@ -10,8 +10,8 @@ use super::terms::Terms;
 use super::trace_residuals::Widening;
 use crate::diagnosis::Hint;
 
-/// Share of the error on held-out data that a name has to take off.
-const PAYS: f64 = 0.03;
+/// Share of the error on held-out data that a name, or what is learnt without one, has to take off.
+pub(super) const PAYS: f64 = 0.03;
 
 /// Least standard deviation of a label.
 const LEAST_SD_N: f64 = 0.03;
@@ -127,10 +127,7 @@ pub(super) fn by_chance(
 ) -> Hint {
     Hint {
         name: search.name_of(&found.entry.rival),
-        gain: share([before, &found.entry.fitted].map(|f| {
-            let errors = search.held_out(f, repetitions, rows);
-            root_mean_square(errors.into_iter().map(|(_, e)| e))
-        })),
+        gain: share([before, &found.entry.fitted].map(|f| held_out_n(search, f, repetitions, rows))),
         reason: format!(
             "where nothing acts, the best of everything that competes looks as good in {:.0} % of campaigns like this one",
             100.0 * found.chance
@@ -190,6 +187,16 @@ fn unfelt(
             size.name
         )
     })
+}
+
+/// Error of a fit on held-out pulls of `rows`.
+pub(super) fn held_out_n(
+    search: &Search<'_>,
+    fitted: &Fitted,
+    repetitions: &[Vec<usize>],
+    rows: &[usize],
+) -> f64 {
+    root_mean_square(search.held_out(fitted, repetitions, rows).into_iter().map(|(_, e)| e))
 }
 
 pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {

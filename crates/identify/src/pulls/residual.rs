@@ -7,7 +7,7 @@ use super::evidence::MOST;
 use super::fitting::Fitted;
 use super::heldout::{by_value, predicted, scatter};
 use super::learnt::{grouped, learnt_beside_memory, with_residual};
-use super::paying::{root_mean_square, share};
+use super::paying::{PAYS, held_out_n, root_mean_square, share};
 use super::search::Search;
 use super::smooth::smooths;
 use super::terms::Terms;
@@ -16,8 +16,7 @@ use crate::diagnosis::{Residual, UnknownCovariate};
 /// How often chance may look as good.
 const CHANCE: f64 = 0.015;
 
-/// Share of the error on held-out pulls that a residual has to take off, and may add on held-out levels and sessions.
-const PAYS: f64 = 0.03;
+/// Share of the error that a residual may add on held-out levels and sessions.
 const WORSE: f64 = 0.01;
 
 /// Fewest pulls.
@@ -158,9 +157,8 @@ pub(super) fn in_place_of_curves(
     let terms = Terms { curves: vec![], hold_signals: fitted.terms.act_on_signals(), ..fitted.terms.clone() };
     let bare = context.fit(&fitted.model, &terms, &search.rows)?;
     let found = learnt_beside(search, &bare, repetitions, near, false)?;
-    let error =
-        |f: &Fitted| root_mean_square(search.held_out(f, repetitions, near).into_iter().map(|(_, e)| e));
-    let [without, with, own] = [&bare, &found.fitted, fitted].map(error);
+    let [without, with, own] =
+        [&bare, &found.fitted, fitted].map(|f| held_out_n(search, f, repetitions, near));
     let pulls = with / own.max(1e-300);
     let session = fitted.terms.curves.first().map_or(Session::Elsewhere, |(curve, _)| curve.session());
     let instead = gives_way(session, without, with, own);

@@ -4,7 +4,7 @@
 use super::candidates::Candidate;
 use super::chosen::{at_one_word, periodic};
 use super::context::Context;
-use super::curves::{Curve, curves_in, product};
+use super::curves::{CLOCKS, Curve, curves_in, product};
 use super::fitting::Fitted;
 use super::terms::Terms;
 use super::written::Written;
@@ -143,7 +143,7 @@ impl<'a> Search<'a> {
             }
         }
         let residuals = baseline_residuals(context);
-        curves.extend(residuals.as_ref().and_then(|r| wave(context, &["time_s", "pull_index"], r)));
+        curves.extend(residuals.as_ref().and_then(|r| wave(context, &CLOCKS, r)));
         for (i, a) in numbers.iter().enumerate() {
             for b in &numbers[i + 1..] {
                 curves.extend(product(data, a, b).filter(|_| n >= MIN_OF_PRODUCT));
