@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from . import campaigns, cases, effects, engines, folders, generate, generator, judge, ledger, physics, regret, runner, scorer, unknowns
+from . import campaigns, cases, effects, engines, folders, generate, generator, judge, known, ledger, physics, regret, runner, scorer, unknowns
 
 
 def quiet_world(ratio=1.0, spread=0.0):
@@ -250,6 +250,28 @@ def test_scorer_survives_a_broken_tool(tmp_path, monkeypatch, action, why):
     answer = runner.diagnose(tmp_path, tmp_path, tmp_path / "work", limit_s=5)
     assert answer.verdict == "failed" and why in answer.reason
     assert not judge.judge(truth("A"), answer.plain())["null"]
+
+
+def write_labels(folder, table, size):
+    """The table with labels of an Archard wear of that size, of a friction of 0.4 per newton of grip."""
+    acts = known.log_factor("archard", size, {"last": 60}, table)
+    table = dict(table, max_pull_force_n=0.4 * table["grip_force_n"] * np.exp(acts))
+    folder.mkdir()
+    rows = [",".join(table), *(",".join(str(v) for v in row) for row in zip(*table.values()))]
+    (folder / "pulls.csv").write_text("\n".join(rows) + "\n")
+
+
+def test_a_fit_that_knows_the_formula_finds_its_size(tmp_path):
+    table = {"part": np.full(60, "gear"), "grip_force_n": np.tile([10.0, 20.0, 40.0], 20), "pull_index": np.arange(60.0)}
+    # A size between two that are tried.
+    write_labels(tmp_path / "seen", table, 0.2537)
+    write_labels(tmp_path / "unseen", dict(table, pull_index=table["pull_index"] + 0.5), 0.2537)
+    act = {"name": "archard", "constants": {"last": 60}}
+    assert known.error_n(tmp_path / "seen", tmp_path / "unseen", act) < 0.02
+    write_labels(tmp_path / "other", table, 0.1)
+    assert known.error_n(tmp_path / "other", tmp_path / "unseen", act) > 0.3
+    assert known.log_factor("hidden_humidity", 0.1, {}, table) is None
+    assert known.log_factor("cross_talk", 0.01, {}, table) is None
 
 
 def test_scorer_reads_campaign_and_seal(tmp_path, monkeypatch):
