@@ -49,6 +49,7 @@ impl Backbone {
     }
 
     /// The shear at which all of it has slipped.
+    #[inline]
     pub fn slips_at(&self) -> f64 {
         self.slips_at
     }

@@ -108,10 +108,13 @@ impl Staircase {
 
     /// For commands at times that never fall, the first of them at `time_s`.
     pub fn from(&self, time_s: f64) -> StaircaseCursor<'_> {
-        StaircaseCursor {
-            staircase: self,
-            begun: self.starts_s.partition_point(|&start| start <= time_s + 1e-9),
-        }
+        let begun = self.starts_s.partition_point(|&start| start <= time_s + 1e-9);
+        StaircaseCursor { staircase: self, begun, now_n: self.command_n(begun), next_s: self.start_s(begun) }
+    }
+
+    /// When a step begins, counted from 0; never, of one that there is not.
+    fn start_s(&self, step: usize) -> f64 {
+        self.starts_s.get(step).copied().unwrap_or(f64::INFINITY)
     }
 }
 
@@ -120,16 +123,29 @@ impl Staircase {
 pub struct StaircaseCursor<'a> {
     staircase: &'a Staircase,
     begun: usize,
+    /// The command of the step that lasts.
+    now_n: f64,
+    /// When the next one begins.
+    next_s: f64,
 }
 
 impl StaircaseCursor<'_> {
     /// The commanded force at `time_s`, which is not before the time asked for last.
+    #[inline]
     pub fn desired_n(&mut self, time_s: f64) -> f64 {
-        let starts_s = &self.staircase.starts_s;
-        while self.begun < starts_s.len() && starts_s[self.begun] <= time_s + 1e-9 {
-            self.begun += 1;
+        if self.next_s <= time_s + 1e-9 {
+            self.climb(time_s);
         }
-        self.staircase.command_n(self.begun)
+        self.now_n
+    }
+
+    #[cold]
+    fn climb(&mut self, time_s: f64) {
+        while self.next_s <= time_s + 1e-9 {
+            self.begun += 1;
+            self.next_s = self.staircase.start_s(self.begun);
+        }
+        self.now_n = self.staircase.command_n(self.begun);
     }
 }
 

@@ -22,7 +22,7 @@ const BEYOND_SHEAR: f64 = 3.0;
 const LEFT: f64 = 0.1;
 const LEFT_OF_NOISE: f64 = 3.0;
 
-/// Fewest rows of a trace, fewest traces that creep, and their share.
+/// Fewest rows of a trace, fewest traces that creep, and their share of those that would show it.
 const MIN_ROWS: usize = 10;
 const MIN_TRACES: usize = 3;
 const MIN_SHARE: f64 = 0.5;
@@ -64,12 +64,13 @@ pub(super) struct Crept {
 impl Creep {
     /// What the traces of a campaign show, if they do.
     pub fn of(pulls: &[MeasuredPull]) -> Option<Self> {
-        let traces = pulls.iter().filter_map(|p| p.trace.as_ref());
-        let whole = traces.filter(|t| t.rows().filter(|r| r.time_s >= 0.0).count() >= MIN_ROWS).count();
-        let of_pull: Vec<Option<Crept>> = pulls.iter().map(|p| rate_of(p.trace.as_ref()?)).collect();
+        let looked_at: Vec<Option<LookedAt>> =
+            pulls.iter().map(|p| LookedAt::of(p.trace.as_ref()?)).collect();
+        let of_pull: Vec<Option<Crept>> = looked_at.iter().map(|l| l.as_ref()?.crept).collect();
         let seen: Vec<(&MeasuredPull, f64)> =
             pulls.iter().zip(&of_pull).filter_map(|(p, rate)| Some((p, rate.as_ref()?.rate))).collect();
-        if seen.len() < MIN_TRACES || (seen.len() as f64) < MIN_SHARE * whole as f64 {
+        let show = would_show(&looked_at, median(seen.iter().map(|(_, rate)| *rate).collect()));
+        if seen.len() < MIN_TRACES || (seen.len() as f64) < MIN_SHARE * show as f64 {
             return None;
         }
         let mut parts: Vec<&str> = seen.iter().map(|(p, _)| p.part.as_str()).collect();
@@ -122,9 +123,7 @@ impl Creep {
 
     /// The rate in the middle of the campaign.
     pub fn median_m_per_n_s(&self) -> f64 {
-        let mut all: Vec<f64> = self.of_pull.iter().flatten().map(|c| c.rate).collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied().unwrap_or(0.0)
+        median(self.of_pull.iter().flatten().map(|c| c.rate).collect())
     }
 
     /// The trace of pull `row` with the way that its tool has crept taken off.
@@ -142,6 +141,17 @@ impl Creep {
         }
         trace
     }
+}
+
+fn median(mut all: Vec<f64>) -> f64 {
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// How many traces creep, or would be seen to at this rate: a weak grip slips before it has crept far, which is no evidence.
+fn would_show(looked_at: &[Option<LookedAt>], rate_m_per_n_s: f64) -> usize {
+    let shows = |l: &&LookedAt| l.crept.is_some() || rate_m_per_n_s * l.impulse_n_s >= LEAST_M;
+    looked_at.iter().flatten().filter(shows).count()
 }
 
 /// Time, force and displacement of the rows of the pull, forces less the reading without load.
@@ -184,34 +194,45 @@ pub(super) fn without_slips_that_rise(mut seen: TraceObservation) -> TraceObserv
     seen
 }
 
-/// What a trace crept by, if that is far.
-fn rate_of(trace: &PullTrace) -> Option<Crept> {
-    let rows = pulled(trace);
-    let smooth: Vec<f64> = rows.windows(3).map(|w| w.iter().map(|r| r.1).sum::<f64>() / 3.0).collect();
-    let most_n = smooth.iter().copied().fold(0.0, f64::max);
-    let held = smooth.iter().position(|f| *f >= HELD * most_n)?;
-    if held < MIN_ROWS {
-        return None;
+/// A trace with enough rows.
+#[derive(Debug, Clone, Copy)]
+struct LookedAt {
+    /// Force times time up to where it is looked at.
+    impulse_n_s: f64,
+    /// What it crept by, if that is far.
+    crept: Option<Crept>,
+}
+
+impl LookedAt {
+    fn of(trace: &PullTrace) -> Option<Self> {
+        let rows = pulled(trace);
+        let smooth: Vec<f64> = rows.windows(3).map(|w| w.iter().map(|r| r.1).sum::<f64>() / 3.0).collect();
+        let most_n = smooth.iter().copied().fold(0.0, f64::max);
+        let held = smooth.iter().position(|f| *f >= HELD * most_n)?;
+        if held < MIN_ROWS {
+            return None;
+        }
+        let held_rows = &rows[..=held];
+        let impulse_n_s = impulses_n_s(held_rows);
+        let mut points: Vec<(Vec<f64>, f64)> =
+            held_rows.iter().zip(&impulse_n_s).map(|(r, i)| (vec![1.0, r.1, *i], r.2)).collect();
+        let mut found = least_squares(&points)?;
+        if found[1] < 0.0 {
+            points.iter_mut().for_each(|(x, _)| x[1] = 0.0);
+            found = least_squares(&points)?;
+        }
+        let left =
+            points.iter().map(|(x, y)| (y - x.iter().zip(&found).map(|(a, b)| a * b).sum::<f64>()).powi(2));
+        let left_m = (left.sum::<f64>() / points.len() as f64).sqrt();
+        let (shear_m, crept_m) = (found[1] * rows[held].1, found[2] * impulse_n_s[held]);
+        let way_m: Vec<f64> = held_rows.iter().map(|r| r.2).collect();
+        let noise_m = displacement_noise(&way_m);
+        let creeps = crept_m >= LEAST_M && crept_m >= BEYOND_SHEAR * shear_m;
+        let follows = left_m <= (LEFT_OF_NOISE * noise_m).max(LEFT * crept_m);
+        let sd = found[2] * libm::hypot(MODEL_SD, left_m / crept_m);
+        let crept = (creeps && follows).then_some(Crept { rate: found[2], sd, to_n: smooth[held] });
+        Some(Self { impulse_n_s: impulse_n_s[held], crept })
     }
-    let held_rows = &rows[..=held];
-    let impulse_n_s = impulses_n_s(held_rows);
-    let mut points: Vec<(Vec<f64>, f64)> =
-        held_rows.iter().zip(&impulse_n_s).map(|(r, i)| (vec![1.0, r.1, *i], r.2)).collect();
-    let mut found = least_squares(&points)?;
-    if found[1] < 0.0 {
-        points.iter_mut().for_each(|(x, _)| x[1] = 0.0);
-        found = least_squares(&points)?;
-    }
-    let left =
-        points.iter().map(|(x, y)| (y - x.iter().zip(&found).map(|(a, b)| a * b).sum::<f64>()).powi(2));
-    let left_m = (left.sum::<f64>() / points.len() as f64).sqrt();
-    let (shear_m, crept_m) = (found[1] * rows[held].1, found[2] * impulse_n_s[held]);
-    let way_m: Vec<f64> = held_rows.iter().map(|r| r.2).collect();
-    let noise_m = displacement_noise(&way_m);
-    let creeps = crept_m >= LEAST_M && crept_m >= BEYOND_SHEAR * shear_m;
-    let follows = left_m <= (LEFT_OF_NOISE * noise_m).max(LEFT * crept_m);
-    let sd = found[2] * libm::hypot(MODEL_SD, left_m / crept_m);
-    (creeps && follows).then_some(Crept { rate: found[2], sd, to_n: smooth[held] })
 }
 
 /// Least squares; columns without a size stay out.
@@ -327,6 +348,28 @@ mod tests {
             .map(|&(grip, step)| pull(grip, step, 0.8 * grip, &|force, _| 4e-6 * force * force, &mut draws))
             .collect();
         assert!(Creep::of(&pulls).is_none());
+    }
+
+    /// Of nine grips three are strong enough to creep far before they slip. The weak ones say nothing; strong ones that stay do.
+    #[test]
+    fn weak_grips_are_no_evidence_against_creep() {
+        let mut draws = Draws::new(5, 0);
+        let mut nine = |others_n: f64, creep: f64| {
+            let strong = [(40.0, 0.5), (60.0, 1.0), (80.0, 2.0)].map(|(grip, step)| (grip, step, 5.6e-5));
+            let others = [0.5, 1.0, 0.5, 1.0, 0.5, 1.0].map(|step| (others_n, step, creep));
+            let pulls: Vec<MeasuredPull> = strong
+                .into_iter()
+                .chain(others)
+                .map(|(grip, step, rate)| {
+                    let way = move |force: f64, impulse: f64| force / 1e6 + rate * impulse;
+                    pull(grip, step, 0.4 * grip, &way, &mut draws)
+                })
+                .collect();
+            Creep::of(&pulls)
+        };
+        let found = nine(6.0, 5.6e-5).expect("six weak grips").median_m_per_n_s();
+        assert!((found / 5.6e-5 - 1.0).abs() < 0.1, "{found}");
+        assert!(nine(50.0, 0.0).is_none());
     }
 
     #[test]

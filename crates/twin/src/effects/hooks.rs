@@ -95,6 +95,7 @@ const LEFT: f64 = 0.01;
 
 impl Creep {
     /// The speed in m/s under a force, of jaws that let go at `limit_n`.
+    #[inline]
     pub fn speed_m_per_s(&self, force_n: f64, limit_n: f64) -> f64 {
         if self.rate_m_per_n_s == 0.0 || self.rim_exponent == 0.0 || limit_n <= 0.0 {
             return self.rate_m_per_n_s * force_n;
