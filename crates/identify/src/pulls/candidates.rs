@@ -65,6 +65,11 @@ impl Candidate {
         self.spec.acts_on_signals()
     }
 
+    /// Whether traces show it beside what labels say: in readings, commands or displacements.
+    pub fn shows_in_traces(&self) -> bool {
+        self.acts_on_signals() || self.spec.pulls.is_ok_and(|fit| fit.seen == Seen::InDisplacements)
+    }
+
     /// Whether it does nothing up to a force and acts beyond, on all parts alike.
     pub fn is_end_of_a_range(&self) -> bool {
         self.part.is_none() && self.spec.pulls.is_ok_and(|fit| fit.flat_at_neutral)
