@@ -3,7 +3,7 @@
 use crate::common::root;
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::{CampaignOptions, Diagnosis, Verdict, plan_campaign};
-use gripgen::twin::{MeasuredPulls, Twin};
+use gripgen::twin::{MeasuredPull, MeasuredPulls, Twin};
 use gripgen::{
     Diagnosed, Library, Location, PullDiagnoseOptions, Suspects, calibrate_twin, compare_pulls,
     diagnose_pull_table, edited_twin, load_pulls, load_pulls_with, load_twin_document, simulate_campaign,
@@ -138,6 +138,19 @@ fn creep_that_reaches_the_stop_is_found_by_its_displacement() {
     measured.pulls.iter_mut().for_each(|pull| pull.trace = None);
     let blind = diagnose(&measured, &[]).diagnosis;
     assert!(!names(&blind).contains(&"shear_creep"), "{blind:?}");
+}
+
+/// Two labels that end at the stop would be two bad labels, if displacements of all traces did not say that the tool creeps.
+#[test]
+fn two_labels_are_enough_where_displacements_show_creep() {
+    let effect = "[[effects]]\nname = \"shear_creep\"\nrate_mm_per_n_s = 0.12\n";
+    let measured = simulated(effect, 120, &[]);
+    let share = |pull: &MeasuredPull| pull.max_pull_force_n / pull.grip_force_n;
+    let friction = measured.pulls.iter().map(share).fold(0.0, f64::max);
+    let feel = measured.pulls.iter().filter(|pull| share(pull) < 0.75 * friction).count();
+    assert!((1..=2).contains(&feel), "{feel} labels end at the stop");
+    let diagnosis = diagnose(&measured, &[]).diagnosis;
+    assert_eq!(names(&diagnosis), ["shear_creep"], "{diagnosis:?}");
 }
 
 /// The twin that is written is the fitted model: with a force that falls after the slip, and with an effect, the error that is
