@@ -7,7 +7,7 @@
 //! up to four fifths of the largest force. Of one staircase the integral is a parabola in the force, as what a contact bends by before it
 //! slips is; creep is what is far more than gels shear by, and is not more where the staircase is steeper.
 
-use super::observe::{TraceObservation, displacement_noise, mean};
+use super::observe::{TraceObservation, displacement_noise, mean, median};
 use gripgen_twin::{MeasuredPull, PullTrace};
 use nalgebra::{DMatrix, DVector};
 
@@ -69,7 +69,8 @@ impl Creep {
         let of_pull: Vec<Option<Crept>> = looked_at.iter().map(|l| l.as_ref()?.crept).collect();
         let seen: Vec<(&MeasuredPull, f64)> =
             pulls.iter().zip(&of_pull).filter_map(|(p, rate)| Some((p, rate.as_ref()?.rate))).collect();
-        let show = would_show(&looked_at, median(seen.iter().map(|(_, rate)| *rate).collect()));
+        let show =
+            would_show(&looked_at, median(&mut seen.iter().map(|(_, rate)| *rate).collect::<Vec<f64>>()));
         if seen.len() < MIN_TRACES || (seen.len() as f64) < MIN_SHARE * show as f64 {
             return None;
         }
@@ -123,7 +124,7 @@ impl Creep {
 
     /// The rate in the middle of the campaign.
     pub fn median_m_per_n_s(&self) -> f64 {
-        median(self.of_pull.iter().flatten().map(|c| c.rate).collect())
+        median(&mut self.of_pull.iter().flatten().map(|c| c.rate).collect::<Vec<f64>>())
     }
 
     /// The trace of pull `row` with the way that its tool has crept taken off.
@@ -141,11 +142,6 @@ impl Creep {
         }
         trace
     }
-}
-
-fn median(mut all: Vec<f64>) -> f64 {
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// How many traces creep, or would be seen to at this rate: a weak grip slips before it has crept far, which is no evidence.

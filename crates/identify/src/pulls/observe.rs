@@ -96,6 +96,12 @@ pub fn observe(row: usize, trace: &PullTrace, noise_n: f64) -> TraceObservation 
     observation
 }
 
+/// The value in the middle, the upper one of two; 0 of none.
+pub(super) fn median(x: &mut [f64]) -> f64 {
+    x.sort_by(f64::total_cmp);
+    x.get(x.len() / 2).copied().unwrap_or(0.0)
+}
+
 /// Mean and number, of one at least.
 pub(super) fn mean(x: &[f64]) -> Option<(f64, usize)> {
     (!x.is_empty()).then(|| (x.iter().sum::<f64>() / x.len() as f64, x.len()))

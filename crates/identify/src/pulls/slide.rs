@@ -11,7 +11,7 @@
 
 use super::context::Context;
 use super::model::PullModel;
-use super::observe::TraceObservation;
+use super::observe::{TraceObservation, median};
 
 /// Fewest rows of a slide, and fewest slides.
 const MIN_ROWS: usize = 5;
@@ -81,11 +81,6 @@ impl Context<'_> {
 fn damping(slides: &[Slide], tau_s: f64) -> (f64, f64) {
     let (mut dampings, mut squares): (Vec<f64>, Vec<f64>) = slides.iter().map(|s| s.fitted(tau_s)).unzip();
     (median(&mut dampings).clamp(10.0, 2e4), median(&mut squares))
-}
-
-fn median(x: &mut [f64]) -> f64 {
-    x.sort_by(f64::total_cmp);
-    x[x.len() / 2]
 }
 
 impl Slide {
