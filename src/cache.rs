@@ -37,7 +37,8 @@ impl<K: PartialEq, V> Cache<K, V> {
 
     fn slot(&self, key: K) -> Slot<V> {
         let mut slots = lock(&self.slots);
-        let entry = match slots.iter().position(|(k, _)| *k == key) {
+        // What was used last is asked for most.
+        let entry = match slots.iter().rposition(|(k, _)| *k == key) {
             Some(i) => slots.remove(i),
             None => {
                 if slots.len() == self.capacity {

@@ -16,7 +16,7 @@ use crate::library::Library;
 use crate::parallel::in_parallel;
 use creep::creeps;
 use gripgen_identify::pulls::model::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
-use gripgen_physics::QuasiStatic;
+use gripgen_physics::{LabelRule, QuasiStatic, RimTable};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::effects::{CommandChain, Effect, OutsideFit, Per, SensorChain};
 use gripgen_twin::{Backbone, Jaw, MeasuredPulls, Robot, Staircase, Twin};
@@ -45,6 +45,9 @@ const OWN_TABLES: usize = 12;
 /// Mean contacts kept.
 const BACKBONES: usize = 8;
 
+/// Noises and rim exponents of which tables are kept.
+const RULES: usize = 16;
+
 /// Pulls whose contacts are looked at.
 const CONTACTS: usize = 12;
 
@@ -69,6 +72,10 @@ pub struct PullPredictor<'a> {
     contacts: OnceLock<Vec<(f64, f64)>>,
     /// Mean contacts by the bits of `shear_by_area`.
     backbones: Cache<u64, Backbone>,
+    /// How labels are read, by the bits of the noise.
+    rules: Cache<u64, LabelRule>,
+    /// How tools creep while the rim of their contact slips, by the bits of the exponent.
+    rims: Cache<Option<u64>, RimTable>,
     jobs: usize,
     stuck: Cache<Key, Kept>,
     tables: Cache<Key, LabelTable>,
@@ -126,6 +133,8 @@ impl<'a> PullPredictor<'a> {
             max_n: max_n.min(2000.0),
             contacts: OnceLock::new(),
             backbones: Cache::new(BACKBONES),
+            rules: Cache::new(RULES),
+            rims: Cache::new(RULES),
             jobs: jobs.max(1),
             stuck: Cache::new(TABLES),
             tables: Cache::new(tables),

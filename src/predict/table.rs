@@ -1,7 +1,7 @@
 //! Labels as a function of what the jaws hold, over scatter and noise.
 
 use gripgen_identify::pulls::model::{PullModel, PullPrediction};
-use gripgen_physics::{QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
+use gripgen_physics::{LabelRule, QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
 use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
 use gripgen_twin::{Backbone, Staircase};
 use std::sync::{Arc, OnceLock};
@@ -31,13 +31,12 @@ pub(super) struct Scattered<'a> {
     pub kinetic_ratio: f64,
     pub backbone: &'a Backbone,
     pub scatter: f64,
-    pub noise_n: f64,
-    pub tolerance_n: f64,
+    pub rule: Arc<LabelRule>,
     pub sensor: SensorChain,
     pub command: CommandChain,
     /// How the tool creeps.
     pub creep: Creep,
-    pub rim: RimTable,
+    pub rim: Arc<RimTable>,
 }
 
 impl Scattered<'_> {
@@ -50,12 +49,12 @@ impl Scattered<'_> {
             backbone: self.backbone,
             creep: self.creep,
             rim: &self.rim,
-            decided_n: self.tolerance_n + 7.0 * self.noise_n,
+            rule: &self.rule,
             sensor: &self.sensor,
             command: &self.command,
         };
         self.rig.slips(&run, limits_n, slips);
-        std::array::from_fn(|k| match slips[k].label(self.stuck, self.tolerance_n, self.noise_n) {
+        std::array::from_fn(|k| match slips[k].label(self.stuck, &self.rule) {
             Some((mean, var)) => (mean, mean * mean + var),
             // A reading that was never near the command: the rule would fail, the reading at the slip stands in.
             None => {

@@ -4,7 +4,7 @@ use super::table::{ExactLabels, LabelTable, Scattered, Tables, bent_by, enough_f
 use super::{CONTACTS, PullPredictor, acts_on_signals};
 use crate::expect::QuietTwin;
 use gripgen_identify::pulls::model::{PullModel, PullPrediction};
-use gripgen_physics::{RimTable, StuckPull};
+use gripgen_physics::{LabelRule, RimTable, StuckPull};
 use gripgen_twin::Backbone;
 use std::sync::Arc;
 
@@ -123,6 +123,8 @@ impl PullPredictor<'_> {
         stuck: &'s StuckPull,
         backbone: &'s Backbone,
     ) -> Scattered<'s> {
+        let creep = model.creep.unwrap_or_default();
+        let rim = (creep.rate_m_per_n_s > 0.0).then_some(creep.rim_exponent);
         Scattered {
             rig: self.rig(model),
             stuck,
@@ -130,12 +132,13 @@ impl PullPredictor<'_> {
             kinetic_ratio: model.kinetic_ratio,
             backbone,
             scatter: model.scatter,
-            noise_n: model.noise_n,
-            tolerance_n: self.measured.label_tolerance_n,
+            rule: self.rules.made(model.noise_n.to_bits(), || {
+                LabelRule::new(self.measured.label_tolerance_n, model.noise_n)
+            }),
             sensor: self.sensor(model, row),
             command: self.command(model, row),
-            creep: model.creep.unwrap_or_default(),
-            rim: RimTable::new(model.creep.unwrap_or_default()),
+            creep,
+            rim: self.rims.made(rim.map(f64::to_bits), || RimTable::new(creep)),
         }
     }
 

@@ -16,7 +16,7 @@
 mod label;
 mod slip;
 
-pub use label::label_moments;
+pub use label::{LabelRule, label_moments};
 pub use slip::{RimTable, SlipPull, SlipRun};
 
 use crate::force_loop::ForceLoop;

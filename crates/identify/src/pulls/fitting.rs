@@ -177,6 +177,11 @@ impl Context<'_> {
         self.fit_in(0..ROUNDS, start, terms, rows)
     }
 
+    /// The same from a start that is near: bad pulls are known.
+    pub fn fit_near(&self, start: &PullModel, terms: &Terms, rows: &[usize]) -> Option<Fitted> {
+        self.fit_in(1..ROUNDS, start, terms, rows)
+    }
+
     /// The same from a start that is nearly right: one round, and bad pulls are known.
     pub fn fit_again(&self, start: &PullModel, terms: &Terms, rows: &[usize]) -> Option<Fitted> {
         self.fit_in(ROUNDS - 1..ROUNDS, start, terms, rows)

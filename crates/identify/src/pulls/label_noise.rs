@@ -45,19 +45,27 @@ impl Context<'_> {
     /// The baseline with lag, dead time, damping and noise that labels say, and the 90 % interval of the noise (profile likelihood).
     pub(super) fn noise_of_labels(&self, rows: &[usize]) -> Option<(PullModel, (f64, f64))> {
         let given = libm::log(self.base.noise_n.clamp(TRIED_N[0], TRIED_N[TRIED_N.len() - 1]));
-        let at = |log_noise: f64, damping_n_s_per_m: f64| {
-            let start = PullModel { noise_n: libm::exp(log_noise), damping_n_s_per_m, ..self.base.clone() };
-            let found = self.fit(&start, &Terms::default(), rows)?;
+        // Fits with lag and dead time free are most of what a diagnosis of labels takes: but for the first, each begins at one that is
+        // near, and threads share them.
+        let at = |log_noise: f64, damping_n_s_per_m: f64, near: Option<&PullModel>| {
+            let start = near.unwrap_or(&self.base).clone();
+            let start = PullModel { noise_n: libm::exp(log_noise), damping_n_s_per_m, ..start };
+            let found = match near {
+                Some(_) => self.fit_near(&start, &Terms::default(), rows)?,
+                None => self.fit(&start, &Terms::default(), rows)?,
+            };
             let noisy = (log_noise - given) / KNOWN;
             let damped = libm::log(damping_n_s_per_m / self.given_damping_n_s_per_m) / DAMPED;
             let score = found.likelihood.log - found.trace_cost - 0.5 * (noisy * noisy + damped * damped);
             Some((log_noise, score, found.model))
         };
-        // The fits with lag and dead time free are most of what a diagnosis of labels takes: threads share them.
-        let all = |places: &[(usize, f64)]| -> Vec<Tried> {
+        let all = |places: &[(usize, f64)], near: &[Tried]| -> Vec<Tried> {
             let slots: Vec<Mutex<Option<Tried>>> = places.iter().map(|_| Mutex::new(None)).collect();
             self.predictor.for_each(slots.len(), &|k| {
-                let found = at(libm::log(TRIED_N[places[k].0]), places[k].1);
+                let log_noise = libm::log(TRIED_N[places[k].0]);
+                let from = |t: &&Tried| (t.0 - log_noise).abs();
+                let near = near.iter().min_by(|a, b| from(a).total_cmp(&from(b)));
+                let found = at(log_noise, places[k].1, near.map(|t| &t.2));
                 if let Ok(mut slot) = slots[k].lock() {
                     *slot = found;
                 }
@@ -67,25 +75,29 @@ impl Context<'_> {
         let given_damping = self.given_damping_n_s_per_m;
         let noise_of = |t: &Tried| TRIED_N.iter().position(|noise_n| libm::log(*noise_n) == t.0);
         let most_likely = |tried: &[Tried]| tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)).cloned();
-        let each: Vec<(usize, f64)> = (0..TRIED_N.len()).map(|k| (k, given_damping)).collect();
-        let mut tried = all(&each);
+        let away = |k: &usize| (libm::log(TRIED_N[*k]) - given).abs();
+        let first = (0..TRIED_N.len()).min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let mut tried = all(&[(first, given_damping)], &[]);
+        let others = (0..TRIED_N.len()).filter(|k| *k != first).map(|k| (k, given_damping));
+        tried.extend(all(&others.collect::<Vec<_>>(), &tried));
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         if !self.predictor.winds_up() {
             let noise = noise_of(&most_likely(&tried)?)?;
             let lighter = DAMPINGS_N_S_PER_M.into_iter().filter(|d| *d < given_damping);
             let places = lighter.flat_map(|d| NOISIER.map(|k| ((noise + k).min(TRIED_N.len() - 1), d)));
-            tried.extend(all(&places.collect::<Vec<_>>()));
+            tried.extend(all(&places.collect::<Vec<_>>(), &tried));
         }
         let near = most_likely(&tried)?;
         if near.2.damping_n_s_per_m != given_damping {
             let (noise, damping) = (noise_of(&near)?, near.2.damping_n_s_per_m);
-            tried.extend(all(&[damping / NEARER, damping * NEARER].map(|d| (noise, d))));
+            tried.extend(all(&[damping / NEARER, damping * NEARER].map(|d| (noise, d)), &[near]));
         }
         let damping = most_likely(&tried)?.2.damping_n_s_per_m;
         tried.retain(|t| t.2.damping_n_s_per_m == damping);
         let known: Vec<usize> = tried.iter().filter_map(noise_of).collect();
         if damping != given_damping {
             let others = (0..TRIED_N.len()).filter(|k| !known.contains(k));
-            tried.extend(all(&others.map(|k| (k, damping)).collect::<Vec<_>>()));
+            tried.extend(all(&others.map(|k| (k, damping)).collect::<Vec<_>>(), &tried));
             tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         let best = (0..tried.len()).max_by(|&a, &b| tried[a].1.total_cmp(&tried[b].1))?;
@@ -93,8 +105,9 @@ impl Context<'_> {
             (Some(below), Some(above)) => summit([below, &tried[best], above].map(|t| (t.0, t.1))),
             _ => tried[best].0,
         };
-        let (log_noise, most, model) =
-            at(peak, damping).filter(|found| found.1 >= tried[best].1).unwrap_or_else(|| tried[best].clone());
+        let (log_noise, most, model) = at(peak, damping, Some(&tried[best].2))
+            .filter(|found| found.1 >= tried[best].1)
+            .unwrap_or_else(|| tried[best].clone());
         let profile: Vec<(f64, f64)> = tried.iter().map(|t| (t.0, t.1 - most + HALF_CHI_SQUARED)).collect();
         let low = end(profile.iter().filter(|t| t.0 < log_noise).rev(), log_noise);
         let high = end(profile.iter().filter(|t| t.0 > log_noise), log_noise);

@@ -32,9 +32,9 @@ struct Direction {
 }
 
 /// Simulates the campaign of `search` with and without each accepted effect on friction, beside the other accepted ones. What
-/// acts on signals shows in traces, which are not simulated.
+/// shows in traces, in readings or displacements, is not simulated.
 pub fn trusted(search: &Search<'_>, accepted: &Accepted) -> Vec<Trusted> {
-    let acting = accepted.effects.iter().filter(|(i, _)| !search.candidates[*i].acts_on_signals());
+    let acting = accepted.effects.iter().filter(|(i, _)| !search.candidates[*i].shows_in_traces());
     let of = |(i, tied): &(usize, Vec<Tied>)| {
         let set: Vec<usize> = tied.iter().map(|t| t.effect).chain([*i]).collect();
         of_effect(search, accepted, *i, &set)

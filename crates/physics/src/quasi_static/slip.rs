@@ -1,6 +1,6 @@
 //! What follows a slip.
 
-use super::label::label_moments;
+use super::label::LabelRule;
 use super::{QuasiStatic, SNAPSHOT_TICKS, StuckPull};
 use crate::force_loop::ForceLoop;
 use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
@@ -38,8 +38,8 @@ pub struct SlipRun<'a> {
     pub creep: Creep,
     /// The same over the share of the limit.
     pub rim: &'a RimTable,
-    /// A command that is so much above the reading decides: the label cannot change any more.
-    pub decided_n: f64,
+    /// How labels are read, and from where on they cannot change any more.
+    pub rule: &'a LabelRule,
     /// The sensor of `stuck`.
     pub sensor: &'a SensorChain,
     /// The commands of `stuck`.
@@ -47,11 +47,11 @@ pub struct SlipRun<'a> {
 }
 
 /// By how much a tool creeps faster while the rim of its contact slips, over the share of the limit: evenly spaced from 0 to 1.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RimTable(Vec<f64>);
 
 impl RimTable {
-    /// Of a tool that creeps so.
+    /// Of a tool that creeps so: the same at all rates but none.
     pub fn new(creep: Creep) -> Self {
         const STEPS: usize = 256;
         if creep.rate_m_per_n_s == 0.0 {
@@ -75,6 +75,8 @@ struct Slipping<'a> {
     shear_of_m: f64,
     /// Way that the tool has crept.
     crept_m: f64,
+    /// A force on the contact and what the tool creeps under it in a step: jaws that slide hold the same force for long.
+    creep: (f64, f64),
     sensor: SensorChain,
     control: ForceLoop,
     stairs: StaircaseCursor<'a>,
@@ -201,6 +203,7 @@ impl QuasiStatic {
             }),
             shear_of_m: self.stiffness_n_per_m / limit_n,
             crept_m,
+            creep: (f64::NAN, 0.0),
             sensor,
             control,
             stairs: run.staircase.from(held_s),
@@ -255,9 +258,13 @@ impl QuasiStatic {
         if let Some((shear, _)) = slipping.bent {
             pull.displacement_m = shear / slipping.shear_of_m + slipping.crept_m;
         }
-        let creep_m = run.creep.speed_m_per_s(contact_n, slipping.limit_n) * steps.step_s;
+        if slipping.creep.0 != contact_n {
+            let speed_m_per_s = run.creep.speed_m_per_s(contact_n, slipping.limit_n);
+            slipping.creep = (contact_n, speed_m_per_s * steps.step_s);
+        }
+        let creep_m = slipping.creep.1;
         slipping.crept_m += creep_m;
-        let decided = slipping.bent.is_none() && desired_n - reading_n > run.decided_n;
+        let decided = slipping.bent.is_none() && desired_n - reading_n > run.rule.decided_n();
         if pull.displacement_m > self.stop_m || decided {
             return false;
         }
@@ -283,11 +290,11 @@ impl QuasiStatic {
 }
 
 impl SlipPull {
-    /// Mean and variance of the label of this pull whose readings carry white noise: [`label_moments`].
-    pub fn label(&self, stuck: &StuckPull, tolerance_n: f64, noise_n: f64) -> Option<(f64, f64)> {
+    /// Mean and variance of the label of this pull whose readings carry white noise.
+    pub fn label(&self, stuck: &StuckPull, rule: &LabelRule) -> Option<(f64, f64)> {
         let held = self.slip_tick.min(stuck.desired_n.len());
         let before = stuck.desired_n[..held].iter().zip(&stuck.reading_n[..held]);
-        label_moments(before.chain(self.desired_n.iter().zip(&self.reading_n)), tolerance_n, noise_n)
+        rule.moments(before.chain(self.desired_n.iter().zip(&self.reading_n)))
     }
 }
 
@@ -336,7 +343,7 @@ mod tests {
                     backbone: &backbone,
                     creep: Creep::default(),
                     rim: &RimTable::new(Creep::default()),
-                    decided_n: 4.0,
+                    rule: &LabelRule::new(3.0, 0.2),
                     sensor: &sensor,
                     command: &command,
                 };
