@@ -160,7 +160,7 @@ fn two_labels_are_enough_where_displacements_show_creep() {
     let diagnosis = diagnose(&measured, &[]).diagnosis;
     assert_eq!(names(&diagnosis), ["shear_creep"], "{diagnosis:?}");
     // Campaigns of labels are no measure of what displacements show.
-    assert!(diagnosis.effects[0].weight > 0.9, "{diagnosis:?}");
+    assert_eq!(diagnosis.effects[0].named_again, None, "{diagnosis:?}");
 }
 
 /// The twin that is written is the fitted model: with a force that falls after the slip, and with an effect, the error that is

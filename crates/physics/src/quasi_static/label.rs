@@ -3,6 +3,9 @@
 /// Deviations of the noise beyond which a reading is on one side of the tolerance for sure.
 const WIDE: f64 = 7.0;
 
+/// Deviations of the noise above the tolerance at which a pull is decided: of readings further off, one in three million is within it.
+const DECIDED: f64 = 5.0;
+
 /// Nodes of a table for each deviation of the noise: linear between them, with an error below 1e-5.
 const NODES: f64 = 64.0;
 
@@ -64,9 +67,6 @@ impl LabelRule {
         })
     }
 }
-
-/// Deviations of the noise above the tolerance at which a pull is decided: of readings further off, one in three million is within it.
-const DECIDED: f64 = 5.0;
 
 #[inline]
 fn moments<'a>(

@@ -47,7 +47,7 @@ pub struct SlipRun<'a> {
 }
 
 /// By how much a tool creeps faster while the rim of its contact slips, over the share of the limit: evenly spaced from 0 to 1.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RimTable(Vec<f64>);
 
 impl RimTable {
