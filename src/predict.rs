@@ -240,7 +240,8 @@ impl<'a> PullPredictor<'a> {
     fn key(&self, model: &PullModel, row: usize, more: &[f64]) -> Key {
         let rig =
             [model.lag_s, model.dead_time_s, model.stiffness_n_per_m, model.damping_n_s_per_m, model.fall_s];
-        let mut bits: Vec<u64> = rig.iter().chain(more).map(|x| x.to_bits()).collect();
+        let creep = model.creep.map(|c| c.rate_m_per_n_s).filter(|rate| *rate > 0.0);
+        let mut bits: Vec<u64> = rig.iter().chain(more).chain(&creep).map(|x| x.to_bits()).collect();
         let mut signed = false;
         for effect in model.effects.iter().filter(|e| e.acts_on_signals()) {
             if effect.spec.reads_clock {
@@ -262,7 +263,8 @@ impl<'a> PullPredictor<'a> {
             let (sensor, command) = (self.sensor(model, row), self.command(model, row));
             let staircase = &self.staircases[self.profile_of[row]];
             let mut kept = Kept::spare();
-            self.rig(model).stuck(staircase, &sensor, &command, self.max_n, &mut kept.0);
+            let rate = model.creep.unwrap_or_default().rate_m_per_n_s;
+            self.rig(model).stuck(staircase, &sensor, &command, rate, self.max_n, &mut kept.0);
             kept
         };
         // What a fit tries of an effect on signals would push everything else out: it has a place of its own.

@@ -121,7 +121,7 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
         let each = acting.iter().filter_map(|e| Some((e.spec.command?, &e.values)));
         each.fold(desired_n, |d, (hook, values)| hook(values, d, measured_n))
     };
-    // Creep, which moves the tool and no force: the rate is the effect's, what the rim does to it is written here.
+    // Creep, which moves the tool and shears nothing: the rate is the effect's, what the rim does to it is written here.
     let pressed = [Jaw::Left, Jaw::Right].map(|jaw| normal_force_n(twin, pull, jaw, pull.grip_force_n));
     let creeps = acting.iter().filter_map(|e| Some((e.spec.creep?, &e.values))).next_back();
     let (rate, rim) = creeps.map_or((0.0, 0.0), |(hook, values)| {
@@ -129,7 +129,7 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
         (creep.rate_m_per_n_s, creep.rim_exponent)
     });
     let whole_n: f64 = bristles.iter().map(|b| b.limit_n).sum();
-    let mut crept = 0.0;
+    let (mut crept, mut creeping) = (0.0, 0.0);
     let (mut x, mut v, mut contact, mut loop_n, mut effective) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64, 0.0);
     let (mut slid_s, mut commands) = (None::<f64>, Vec::new());
     let mut label_n = f64::NAN;
@@ -154,7 +154,7 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
         loop_n += share * (effective - closed);
         let most = robot.damping_n_s_per_m * robot.speed_limit_m_per_s;
         loop_n = loop_n.max(contact - most).min(contact + most);
-        let applied = loop_n - robot.damping_n_s_per_m * v;
+        let applied = loop_n - robot.damping_n_s_per_m * (v + creeping);
         // m (v' - v) / dt = F - F_c(x + v' dt): the difference of both sides rises with v'.
         let keep = slid_s.map_or(1.0, |s| match part.kinetic_fall_s {
             0.0 => part.kinetic_ratio,
@@ -171,7 +171,6 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
         v = root(v - 1.0, v + 1.0, off);
         x += v * dt;
         contact = force(x);
-        crept += rate * contact * (1.0 - contact / whole_n).clamp(0.01, 1.0).powf(-rim) * dt;
         let mut holds = false;
         for b in &mut bristles {
             let most = b.limit_n * keep;
@@ -183,6 +182,10 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
             }
         }
         slid_s = (!holds).then(|| slid_s.unwrap_or(0.0) + dt);
+        // The damping acts on the creep of what sticks.
+        let left = (1.0 - contact / whole_n).clamp(0.01, 1.0);
+        creeping = if holds { rate * contact } else { 0.0 };
+        crept += creeping * left.powf(-rim) * dt;
         measured = read(contact, t + dt, dt);
     }
     label_n

@@ -1,5 +1,6 @@
 //! Readings of tools that hold, shared by the pulls that have the same.
 
+use super::creep::creeps;
 use super::{Kept, PullPredictor, acts_on_signals, table};
 use gripgen_identify::pulls::model::PullModel;
 use gripgen_twin::config::Feedback;
@@ -34,6 +35,11 @@ impl<'a> Signals<'a> {
 
     fn stuck(&mut self, row: usize) -> Arc<Kept> {
         let (predictor, model) = (self.predictor, if self.pointwise { &self.plain } else { self.model });
+        if creeps(self.model) {
+            // Each grip at a rate of its own.
+            let creep = Some(predictor.creep(self.model, row));
+            return predictor.stuck(&PullModel { creep, ..model.clone() }, row);
+        }
         if !(self.pointwise || self.shared) {
             return predictor.stuck(model, row);
         }

@@ -7,7 +7,9 @@
 //! ```
 //!
 //! Contacts that bend have F_c = L b(k x / L) with the backbone b of the contact ([`gripgen_twin::Backbone`]) from three tenths of L on.
-//! A tool that creeps under the force that the jaws hold moves besides ([`gripgen_twin::effects::Creep`]), and meets the displacement stop earlier.
+//! A tool that creeps under the force that the jaws hold moves besides ([`gripgen_twin::effects::Creep`]): it meets the displacement stop
+//! earlier, and the damping takes its share of the force, `d (dF_c/dt / k + rate F_c) = F - F_c`. A loop that closes on its sensor then
+//! follows with `lag (1 + d rate)`.
 //!
 //! All with the force loop of [`crate::PullSession`], its sensor and command effects, and the same order of readings and
 //! commands. What is missing against the reduced mechanics is the ringing of the arm's mass on the gel and the
@@ -65,18 +67,21 @@ impl QuasiStatic {
         (self.max_time_s * self.rate_hz) as usize
     }
 
-    /// The pull of a tool that holds, until its contact force exceeds `force_n`, into `pull`.
+    /// The pull of a tool that holds, until its contact force exceeds `force_n`, into `pull`. It creeps with `creep_m_per_n_s` as long as all of
+    /// its contact sticks.
     pub fn stuck(
         &self,
         staircase: &Staircase,
         sensor: &SensorChain,
         command: &CommandChain,
+        creep_m_per_n_s: f64,
         force_n: f64,
         pull: &mut StuckPull,
     ) {
         let step_s = 1.0 / self.rate_hz;
         let (mut sensor, mut control) = (sensor.clone(), ForceLoop::new(self.robot));
-        let share = 1.0 / (1.0 + step_s * self.stiffness_n_per_m / self.robot.damping_n_s_per_m);
+        let yields = 1.0 + self.robot.damping_n_s_per_m * creep_m_per_n_s;
+        let share = 1.0 / (1.0 + step_s * self.stiffness_n_per_m / self.robot.damping_n_s_per_m * yields);
         pull.clear();
         let mut stairs = staircase.from(0.0);
         let (mut contact_n, mut applied_n, mut largest_n) = (0.0_f64, 0.0, 0.0_f64);
@@ -99,7 +104,8 @@ impl QuasiStatic {
             let commanded_n = command.apply(desired_n, reading_n);
             applied_n = control.advance(time_s, step_s, commanded_n, reading_n, contact_n);
             // k x, implicit in x.
-            contact_n = applied_n + (contact_n - applied_n) * share;
+            let held_n = applied_n / yields;
+            contact_n = held_n + (contact_n - held_n) * share;
         }
     }
 }

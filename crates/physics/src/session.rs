@@ -60,7 +60,7 @@ pub struct PullState {
     pub measured_force_n: f64,
     /// Displacement of the tool along the pull.
     pub displacement_m: f64,
-    /// Speed of the jaws along the pull.
+    /// Speed of the tool along the pull: of the jaws, and of what creeps.
     pub speed_m_per_s: f64,
     /// Whether the jaws slide on the part.
     pub sliding: bool,
@@ -128,6 +128,8 @@ pub struct PullSession {
     has_slid: bool,
     /// Way that the tool has crept.
     crept_m: f64,
+    /// The speed of that without what the rim adds, as the damping of the arm feels it.
+    felt_m_per_s: f64,
     state: PullState,
 }
 
@@ -149,6 +151,7 @@ impl PullSession {
             limit_n: friction.left.limit_n() + friction.right.limit_n(),
             has_slid: false,
             crept_m: 0.0,
+            felt_m_per_s: 0.0,
             state: PullState {
                 time_s: 0.0,
                 contact_force_n: 0.0,
@@ -250,7 +253,7 @@ impl PullSession {
             }
             Command::SpeedMPerS(speed) => {
                 let speed = speed.clamp(-self.robot.speed_limit_m_per_s, self.robot.speed_limit_m_per_s);
-                let position = self.plant.position_m();
+                let position = self.plant.position_m() + self.crept_m;
                 let target = self.target_m.unwrap_or(position) + speed * step_s;
                 self.target_m = Some(target);
                 // A critically damped position loop, with the contact force fed forward.
@@ -267,16 +270,28 @@ impl PullSession {
         let motion =
             self.plant.advance(applied_n, step_s).map_err(|e| PullError { bodies: e.bodies, time_s })?;
         self.has_slid |= motion.sliding;
-        self.crept_m += self.signals.creep.speed_m_per_s(motion.contact_force_n, self.limit_n) * step_s;
+        self.creep(if motion.sliding { 0.0 } else { motion.contact_force_n }, step_s);
         self.state = PullState {
             time_s: time_s + step_s,
             contact_force_n: motion.contact_force_n,
             measured_force_n: self.reading(motion.contact_force_n, time_s + step_s, step_s),
             displacement_m: motion.displacement_m + self.crept_m,
-            speed_m_per_s: motion.speed_m_per_s,
+            speed_m_per_s: motion.speed_m_per_s + self.felt_m_per_s,
             sliding: motion.sliding,
         };
         Ok(())
+    }
+
+    /// Creeps under a force that the jaws hold. A contact without mass answers at once, and a damper that felt the speed of the step before
+    /// would drive it to and fro: what it feels is implicit in the force.
+    fn creep(&mut self, held_n: f64, step_s: f64) {
+        let creep = self.signals.creep;
+        if creep.rate_m_per_n_s == 0.0 {
+            return;
+        }
+        let slope = self.robot.damping_n_s_per_m * creep.rate_m_per_n_s;
+        self.felt_m_per_s += (creep.rate_m_per_n_s * held_n - self.felt_m_per_s) / (1.0 + slope);
+        self.crept_m += creep.speed_m_per_s(held_n, self.limit_n) * step_s;
     }
 
     /// What the wrist sensor reports for a force: a balance of momentum behind it, weight and inertia of the gripper

@@ -79,6 +79,8 @@ pub struct Context<'a> {
     pub above_fast_n: Vec<f64>,
     /// How tools creep while the jaws hold, where the displacements of traces show that they do.
     pub(super) creep: Option<Creep>,
+    /// Lag and dead time of models that creep, in which the damping takes its share of what the others have for lag.
+    pub(super) creeping: Option<(f64, f64)>,
     /// How the zero of the sensor wanders, where the traces show that it does, and what that makes it in each pull where nothing acts on readings.
     pub(super) walk: Option<(ZeroWalk, Vec<SlowZero>)>,
 }
@@ -124,6 +126,7 @@ impl<'a> Context<'a> {
             baseline_trace_cost: 0.0,
             above_fast_n: vec![0.0; data.len()],
             creep,
+            creeping: None,
             walk: None,
         };
         context.look_at(&raw);
@@ -189,16 +192,30 @@ impl<'a> Context<'a> {
             self.observed[trace.row] = Some(self.observations.len());
             self.observations.push(observation);
         }
-        // Lag and dead time once more, now against what effects on the readings will be judged by.
         let rows: Vec<usize> = (0..self.data.len()).collect();
-        let mut best = (f64::INFINITY, self.base.lag_s, self.base.dead_time_s);
+        (self.base.lag_s, self.base.dead_time_s) = self.lag_by_readings(&self.base, &rows);
+        if let Some(creep) = &self.creep {
+            let effects = creep.effects(&self.data.parts);
+            self.creeping = Some(self.lag_by_readings(&PullModel { effects, ..self.base.clone() }, &rows));
+        }
+        self.read_slips();
+        if self.creep.is_none() {
+            self.read_bend();
+        }
+        self.find_walk();
+        self.baseline_trace_cost = self.trace_residuals(&self.base, &rows).cost();
+    }
+
+    /// Lag and dead time of `base` against what effects on the readings will be judged by.
+    fn lag_by_readings(&self, base: &PullModel, rows: &[usize]) -> (f64, f64) {
+        let mut best = (f64::INFINITY, base.lag_s, base.dead_time_s);
         for step in 0..16 {
             // Every dead time has its lag; the best of both is where effects start from.
             let dead_time_s = 0.004 * f64::from(step);
-            let lag = [dynamics(&self.base)[0].clone()];
+            let lag = [dynamics(base)[0].clone()];
             let found = fit(&lag, FitOptions { max_steps: 10, min_gain: 1e-5 }, |v| {
-                let model = PullModel { lag_s: v[0], dead_time_s, ..self.base.clone() };
-                let mut r = self.trace_residuals(&model, &rows).widened(Widening::NONE);
+                let model = PullModel { lag_s: v[0], dead_time_s, ..base.clone() };
+                let mut r = self.trace_residuals(&model, rows).widened(Widening::NONE);
                 // Huber's cost as a sum of squares.
                 r.iter_mut()
                     .filter(|x| x.abs() > 2.5)
@@ -211,13 +228,7 @@ impl<'a> Context<'a> {
                 best = (found.cost, found.values[0], dead_time_s);
             }
         }
-        (self.base.lag_s, self.base.dead_time_s) = (best.1, best.2);
-        self.read_slips();
-        if self.creep.is_none() {
-            self.read_bend();
-        }
-        self.find_walk();
-        self.baseline_trace_cost = self.trace_residuals(&self.base, &rows).cost();
+        (best.1, best.2)
     }
 
     /// Lag and dead time from the readings while the jaws held.

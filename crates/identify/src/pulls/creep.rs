@@ -7,7 +7,9 @@
 //! up to four fifths of the largest force. Of one staircase the integral is a parabola in the force, as what a contact bends by before it
 //! slips is; creep is what is far more than gels shear by, and is not more where the staircase is steeper.
 
+use super::model::ModelEffect;
 use super::observe::{TraceObservation, displacement_noise, mean, median};
+use gripgen_twin::effects::find;
 use gripgen_twin::{MeasuredPull, PullTrace};
 use nalgebra::{DMatrix, DVector};
 
@@ -37,6 +39,9 @@ const SCATTER: f64 = 0.3;
 
 /// Share by which a model of creep differs from what a trace does.
 const MODEL_SD: f64 = 0.07;
+
+/// Normal force at which effects say their rates.
+const REFERENCE_N: f64 = 20.0;
 
 /// Slope of the readings after a slip over that before it, above which nothing has slipped.
 const RISES_ON: f64 = 0.5;
@@ -122,6 +127,30 @@ impl Creep {
         self.of_pull.iter().enumerate().filter_map(|(row, rate)| Some((row, (*rate)?)))
     }
 
+    /// The same as effects, one of each of `parts`; those that were not seen to creep have the rate in their middle.
+    pub fn effects(&self, parts: &[String]) -> Vec<ModelEffect> {
+        let Some(spec) = find("shear_creep") else { return vec![] };
+        let values = |level: f64| {
+            let at_20_n = 1e3 * libm::exp(level + self.by_grip * libm::log(REFERENCE_N));
+            let named = [
+                ("rate_mm_per_n_s", at_20_n),
+                ("load_exponent", -self.by_grip),
+                ("reference_force_n", REFERENCE_N),
+            ];
+            spec.values(&named)
+        };
+        let of = |(part, name): (usize, &String)| {
+            let values = values(self.level_of(name));
+            ModelEffect { part: Some(part), ..ModelEffect::new(spec, values) }
+        };
+        parts.iter().enumerate().map(of).collect()
+    }
+
+    fn level_of(&self, part: &str) -> f64 {
+        let mean = || self.of_part.iter().map(|(_, level)| level).sum::<f64>() / self.of_part.len() as f64;
+        self.of_part.iter().find(|(name, _)| *name == part).map_or_else(mean, |(_, level)| *level)
+    }
+
     /// The rate in the middle of the campaign.
     pub fn median_m_per_n_s(&self) -> f64 {
         median(&mut self.of_pull.iter().flatten().map(|c| c.rate).collect::<Vec<f64>>())
@@ -129,9 +158,7 @@ impl Creep {
 
     /// The trace of pull `row` with the way that its tool has crept taken off.
     pub fn taken_off(&self, row: usize, pull: &MeasuredPull, trace: &PullTrace) -> PullTrace {
-        let levels = self.of_part.iter().map(|(_, level)| level).sum::<f64>() / self.of_part.len() as f64;
-        let own =
-            self.of_part.iter().find(|(name, _)| *name == pull.part).map_or(levels, |(_, level)| *level);
+        let own = self.level_of(&pull.part);
         let by_grip = || libm::exp(own + self.by_grip * libm::log(pull.grip_force_n));
         let rate = self.of_pull[row].map_or_else(by_grip, |c| c.rate);
         let pulled = pulled(trace);

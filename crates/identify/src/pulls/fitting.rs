@@ -107,8 +107,9 @@ impl Context<'_> {
         });
         let dynamics = (terms.act_on_signals() || self.free_lag) && !terms.hold_signals;
         if dynamics {
+            let (lag_s, dead_time_s) = self.lag_from(start, terms);
             for (name, value, most, scale) in
-                [("robot.lag_s", start.lag_s, 1.0, 0.02), ("robot.dead_time_s", start.dead_time_s, 0.5, 0.4)]
+                [("robot.lag_s", lag_s, 1.0, 0.02), ("robot.dead_time_s", dead_time_s, 0.5, 0.4)]
             {
                 parameters.push(FreeParameter {
                     name: name.into(),
@@ -134,6 +135,16 @@ impl Context<'_> {
         Layout { parts: self.data.parts.len(), dynamics, parameters }
     }
 
+    /// Lag and dead time that a fit from `start` begins with: its own, or those of the traces if one of both creeps and the other does not.
+    fn lag_from(&self, start: &PullModel, terms: &Terms) -> (f64, f64) {
+        let creeps = start.effects.iter().any(|e| e.spec.creep.is_some());
+        match self.creeping {
+            Some(creeping) if terms.creep() && !creeps => creeping,
+            Some(_) if !terms.creep() && creeps => (self.base.lag_s, self.base.dead_time_s),
+            _ => (start.lag_s, start.dead_time_s),
+        }
+    }
+
     fn model_at(&self, start: &PullModel, terms: &Terms, layout: &Layout, values: &[f64]) -> PullModel {
         let mut model = start.clone();
         model.mu.copy_from_slice(&values[..layout.parts]);
@@ -143,6 +154,8 @@ impl Context<'_> {
         if layout.dynamics {
             (model.lag_s, model.dead_time_s) = (values[at], values[at + 1]);
             at += 2;
+        } else {
+            (model.lag_s, model.dead_time_s) = self.lag_from(start, terms);
         }
         model.effects.clear();
         for (candidate, from) in &terms.effects {

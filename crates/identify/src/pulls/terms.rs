@@ -27,6 +27,11 @@ impl Terms {
         self.effects.iter().any(|(c, _)| c.acts_on_signals())
     }
 
+    /// Whether tools creep.
+    pub fn creep(&self) -> bool {
+        self.effects.iter().any(|(c, _)| c.spec.creep.is_some())
+    }
+
     pub(super) fn holds(&self, candidate: &Candidate) -> bool {
         self.hold_signals && candidate.acts_on_signals()
     }

@@ -61,6 +61,15 @@ impl RimTable {
         let at = |i: usize| i.max(1) as f64 / STEPS as f64;
         Self((0..=STEPS).map(|i| unit.speed_m_per_s(at(i), 1.0) / at(i)).collect())
     }
+
+    /// The factor at a share of the limit.
+    #[inline]
+    fn at(&self, share: f64) -> f64 {
+        let last = self.0.len() - 2;
+        let x = share.clamp(0.0, 1.0) * (last + 1) as f64;
+        let i = (x as usize).min(last);
+        self.0[i] + (x - i as f64) * (self.0[i + 1] - self.0[i])
+    }
 }
 
 /// A pull from where it leaves the one of a tool that holds.
@@ -75,8 +84,6 @@ struct Slipping<'a> {
     shear_of_m: f64,
     /// Way that the tool has crept.
     crept_m: f64,
-    /// A force on the contact and what the tool creeps under it in a step: jaws that slide hold the same force for long.
-    creep: (f64, f64),
     sensor: SensorChain,
     control: ForceLoop,
     stairs: StaircaseCursor<'a>,
@@ -203,7 +210,6 @@ impl QuasiStatic {
             }),
             shear_of_m: self.stiffness_n_per_m / limit_n,
             crept_m,
-            creep: (f64::NAN, 0.0),
             sensor,
             control,
             stairs: run.staircase.from(held_s),
@@ -218,12 +224,8 @@ impl QuasiStatic {
         if run.creep.rate_m_per_n_s == 0.0 {
             return Ok(crept_m);
         }
-        let faster = &run.rim.0;
-        let last = faster.len().saturating_sub(2);
         for (tick, &contact_n) in run.stuck.contact_n.iter().take(held).enumerate() {
-            let at = (contact_n / limit_n).clamp(0.0, 1.0) * (last + 1) as f64;
-            let (i, w) = ((at as usize).min(last), at - (at as usize).min(last) as f64);
-            let speed = run.creep.rate_m_per_n_s * contact_n * (faster[i] * (1.0 - w) + faster[i + 1] * w);
+            let speed = run.creep.rate_m_per_n_s * contact_n * run.rim.at(contact_n / limit_n);
             crept_m += speed * step_s;
             if contact_n / self.stiffness_n_per_m + crept_m > self.stop_m {
                 return Err(tick);
@@ -258,12 +260,10 @@ impl QuasiStatic {
         if let Some((shear, _)) = slipping.bent {
             pull.displacement_m = shear / slipping.shear_of_m + slipping.crept_m;
         }
-        if slipping.creep.0 != contact_n {
-            let speed_m_per_s = run.creep.speed_m_per_s(contact_n, slipping.limit_n);
-            slipping.creep = (contact_n, speed_m_per_s * steps.step_s);
+        let creep_m = run.creep.rate_m_per_n_s * contact_n * steps.step_s;
+        if creep_m > 0.0 && slipping.bent.is_some() {
+            slipping.crept_m += creep_m * run.rim.at(contact_n / slipping.limit_n);
         }
-        let creep_m = slipping.creep.1;
-        slipping.crept_m += creep_m;
         let decided = slipping.bent.is_none() && desired_n - reading_n > run.rule.decided_n();
         if pull.displacement_m > self.stop_m || decided {
             return false;
@@ -275,12 +275,13 @@ impl QuasiStatic {
         let step_m = (applied_n - contact_n) * steps.metres_per_n;
         slipping.bent = match slipping.bent {
             Some((shear, (_, slope))) => {
-                // Implicit in x while it holds.
-                let next = shear + step_m * slipping.shear_of_m / (1.0 + steps.held_back * slope);
+                // Implicit in x while it holds. What creeps shears nothing.
+                let sheared_m = step_m - creep_m;
+                let next = shear + sheared_m * slipping.shear_of_m / (1.0 + steps.held_back * slope);
                 (next < run.backbone.slips_at()).then(|| (next, run.backbone.at(next)))
             }
             None => {
-                pull.displacement_m += step_m.max(0.0) + creep_m;
+                pull.displacement_m += step_m.max(0.0);
                 None
             }
         };
@@ -335,7 +336,7 @@ mod tests {
         for backbone in [Backbone::straight(), Backbone::new(&rings, 1.0)] {
             for sensor in [SensorChain::default(), SensorChain::of(lowpass.into_iter(), 0.0)] {
                 let (command, mut stuck) = (CommandChain::default(), StuckPull::default());
-                rig.stuck(&staircase, &sensor, &command, 50.0, &mut stuck);
+                rig.stuck(&staircase, &sensor, &command, 0.0, 50.0, &mut stuck);
                 let run = SlipRun {
                     stuck: &stuck,
                     staircase: &staircase,

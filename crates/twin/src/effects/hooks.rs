@@ -81,7 +81,8 @@ pub type GraspForceHook = fn(&[f64], &[f64], &[f64]) -> Vec<f64>;
 /// dx/dt = rate F (1 - F / L)^-q
 /// ```
 ///
-/// Forces know nothing of it: a force loop makes up for motion that is so slow.
+/// It shears nothing. The damping of the arm acts on the creep of what sticks, `rate F`: a force loop has to make up for it. That of the rim
+/// is left out of the forces, as contacts that slow down the nearer they are to their limit would never get there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Creep {
     /// Speed per newton in m/(N s) of a contact of which all sticks; 0 does not creep.
