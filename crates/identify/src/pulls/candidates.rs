@@ -67,7 +67,12 @@ impl Candidate {
 
     /// Whether traces show it beside what labels say: in readings, commands or displacements.
     pub fn shows_in_traces(&self) -> bool {
-        self.acts_on_signals() || self.spec.pulls.is_ok_and(|fit| fit.seen == Seen::InDisplacements)
+        self.acts_on_signals() || self.shows_in_displacements()
+    }
+
+    /// Whether displacements show it, whatever labels say.
+    pub fn shows_in_displacements(&self) -> bool {
+        self.spec.pulls.is_ok_and(|fit| fit.seen == Seen::InDisplacements)
     }
 
     /// Whether it does nothing up to a force and acts beyond, on all parts alike.

@@ -121,6 +121,10 @@ impl Search<'_> {
     /// no effect.
     fn broad(&self, before: &Fitted, entry: &Entry) -> bool {
         let effect = entry.rival.effect().map(|i| &self.candidates[i]);
+        // What labels do not feel is a hint in the end (`paying.rs`); turned down here, the next best would take its place.
+        if effect.is_some_and(|c| c.shows_in_displacements()) {
+            return true;
+        }
         if let Some(end) = effect.filter(|c| c.is_end_of_a_range())
             && feeling(self.context, &entry.fitted.model, end, &self.rows).len() < FEEL
         {
