@@ -182,10 +182,11 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
             }
         }
         slid_s = (!holds).then(|| slid_s.unwrap_or(0.0) + dt);
-        // The damping acts on the creep of what sticks.
+        // The damping acts on the creep of what sticks, implicitly in the force.
         let left = (1.0 - contact / whole_n).clamp(0.01, 1.0);
-        creeping = if holds { rate * contact } else { 0.0 };
-        crept += creeping * left.powf(-rim) * dt;
+        let creeps = if holds { rate * contact } else { 0.0 };
+        creeping += (creeps - creeping) / (1.0 + robot.damping_n_s_per_m * rate);
+        crept += creeps * left.powf(-rim) * dt;
         measured = read(contact, t + dt, dt);
     }
     label_n

@@ -91,7 +91,7 @@ pub struct Expected {
     pub noise_n: Option<f64>,
     /// Time constant and dead time of the force loop together.
     pub lag_s: Option<f64>,
-    /// The twin has effects on its sensor or its command, or a loop so slow that the label rule may fire before the slip: what
+    /// The twin has effects on its sensor or its command, or a tool that creeps and so stays behind its command, or a loop so slow that the label rule may fire before the slip: what
     /// they do to a trace is predicted, and no reason. Only label and trace have to agree then.
     pub own_effects: bool,
 }
@@ -100,7 +100,9 @@ impl Expected {
     /// What a twin says of a pull that it simulates.
     pub fn of(twin: &Twin, scenario: &Scenario) -> Self {
         let acts = |e: &&crate::effects::Effect| e.acts_on(&scenario.part);
-        let on_signals = |e: &crate::effects::Effect| e.spec.sensor.is_some() || e.spec.command.is_some();
+        let on_signals = |e: &crate::effects::Effect| {
+            e.spec.sensor.is_some() || e.spec.command.is_some() || e.spec.creep.is_some()
+        };
         let pull = &scenario.pull;
         let lag_s = twin.robot.lag_s + twin.robot.dead_time_s;
         // Gels that give way let the arm move, which takes its damping over their stiffness.

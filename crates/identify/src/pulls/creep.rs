@@ -9,7 +9,7 @@
 
 use super::model::ModelEffect;
 use super::observe::{TraceObservation, displacement_noise, mean, median};
-use gripgen_twin::effects::find;
+use gripgen_twin::effects::LIBRARY;
 use gripgen_twin::{MeasuredPull, PullTrace};
 use nalgebra::{DMatrix, DVector};
 
@@ -129,7 +129,7 @@ impl Creep {
 
     /// The same as effects, one of each of `parts`; those that were not seen to creep have the rate in their middle.
     pub fn effects(&self, parts: &[String]) -> Vec<ModelEffect> {
-        let Some(spec) = find("shear_creep") else { return vec![] };
+        let Some(spec) = LIBRARY.iter().find(|spec| spec.creep.is_some()) else { return vec![] };
         let values = |level: f64| {
             let at_20_n = 1e3 * libm::exp(level + self.by_grip * libm::log(REFERENCE_N));
             let named = [
