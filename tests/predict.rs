@@ -111,7 +111,7 @@ fn fits_see_tools_that_creep() {
         let mut model = given_model(&twin, predictor.part_names()).unwrap();
         (model.shear_by_area, model.kinetic_ratio) = (by_area, 0.95);
         let plain = predictor.pulls(&model, &rows);
-        let values = creep.values(&[("rate_mm_per_n_s", 0.4), ("load_exponent", 0.3), ("rim_exponent", rim)]);
+        let values = creep.values(&[("rate_mm_per_n_s", 0.5), ("load_exponent", 0.3), ("rim_exponent", rim)]);
         model.effects = vec![ModelEffect::new(creep, values)];
         let fast = predictor.pulls(&model, &rows);
         let exact = predictor.labels_n(&model, &rows);

@@ -91,8 +91,9 @@ pub struct Expected {
     pub noise_n: Option<f64>,
     /// Time constant and dead time of the force loop together.
     pub lag_s: Option<f64>,
-    /// The twin has effects on its sensor or its command, or a tool that creeps and so stays behind its command, or a loop so slow that the label rule may fire before the slip: what
-    /// they do to a trace is predicted, and no reason. Only label and trace have to agree then.
+    /// The twin has effects on its sensor or its command, a tool that creeps and so stays behind its command, or a loop so slow
+    /// that the label rule may fire before the slip: what they do to a trace is predicted, and no reason. Only label and trace
+    /// have to agree then.
     pub own_effects: bool,
 }
 
@@ -100,7 +101,7 @@ impl Expected {
     /// What a twin says of a pull that it simulates.
     pub fn of(twin: &Twin, scenario: &Scenario) -> Self {
         let acts = |e: &&crate::effects::Effect| e.acts_on(&scenario.part);
-        let on_signals = |e: &crate::effects::Effect| {
+        let shapes_trace = |e: &crate::effects::Effect| {
             e.spec.sensor.is_some() || e.spec.command.is_some() || e.spec.creep.is_some()
         };
         let pull = &scenario.pull;
@@ -113,7 +114,7 @@ impl Expected {
         Self {
             noise_n: Some(twin.wrist.noise_n),
             lag_s: Some(lag_s),
-            own_effects: twin.effects.iter().filter(acts).any(on_signals)
+            own_effects: twin.effects.iter().filter(acts).any(shapes_trace)
                 || crate::table_offset_n(twin, scenario) != 0.0
                 || trails_n > 0.5 * pull.label_tolerance_n,
         }

@@ -131,7 +131,7 @@ impl Search<'_> {
             return false;
         }
         let traces = !self.context.observations.is_empty();
-        if traces && effect.is_some_and(|c| c.shows_in_traces()) {
+        if traces && effect.is_some_and(|c| c.acts_on_signals()) {
             return true;
         }
         let log = |f: &Fitted, i: usize| self.context.tails.log_of(f.residuals[i], f.likelihood.scale);

@@ -7,25 +7,17 @@
 //! up to four fifths of the largest force. Of one staircase the integral is a parabola in the force, as what a contact bends by before it
 //! slips is; creep is what is far more than gels shear by, and is not more where the staircase is steeper.
 
+mod trace;
+
 use super::model::ModelEffect;
-use super::observe::{TraceObservation, displacement_noise, mean, median};
+use super::observe::median;
 use gripgen_twin::effects::LIBRARY;
 use gripgen_twin::{MeasuredPull, PullTrace};
-use nalgebra::{DMatrix, DVector};
+use trace::{Crept, LEAST_M, LookedAt, impulses_n_s, least_squares, pulled};
 
-/// Share of the largest force up to which a trace is looked at.
-const HELD: f64 = 0.8;
+pub(super) use trace::without_slips_that_rise;
 
-/// Way that a trace has to creep, and how much more that has to be than what its gels shear by.
-const LEAST_M: f64 = 1e-4;
-const BEYOND_SHEAR: f64 = 3.0;
-
-/// What may be left of a trace: a part of its way, or of the noise of its displacement.
-const LEFT: f64 = 0.1;
-const LEFT_OF_NOISE: f64 = 3.0;
-
-/// Fewest rows of a trace, fewest traces that creep, and their share of those that would show it.
-const MIN_ROWS: usize = 10;
+/// Fewest traces that creep, and their share of those that would show it.
 const MIN_TRACES: usize = 3;
 const MIN_SHARE: f64 = 0.5;
 
@@ -37,15 +29,6 @@ const MOST_BY_RATE: f64 = 0.4;
 /// How far rates of traces may lie about what part and grip force make of them, in the logarithm.
 const SCATTER: f64 = 0.3;
 
-/// Share by which a model of creep differs from what a trace does.
-const MODEL_SD: f64 = 0.07;
-
-/// Normal force at which effects say their rates.
-const REFERENCE_N: f64 = 20.0;
-
-/// Slope of the readings after a slip over that before it, above which nothing has slipped.
-const RISES_ON: f64 = 0.5;
-
 /// How tools creep.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Creep {
@@ -54,16 +37,6 @@ pub(super) struct Creep {
     /// Logarithm of the rate at 1 N of each part that was seen to creep, and the power of the grip force with which all go.
     of_part: Vec<(String, f64)>,
     by_grip: f64,
-}
-
-/// What a trace crept by.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Crept {
-    /// Way over impulse, in m/(N s), and its standard deviation.
-    pub rate: f64,
-    pub sd: f64,
-    /// The force up to which that is.
-    pub to_n: f64,
 }
 
 impl Creep {
@@ -130,22 +103,18 @@ impl Creep {
     /// The same as effects, one of each of `parts`; those that were not seen to creep have the rate in their middle.
     pub fn effects(&self, parts: &[String]) -> Vec<ModelEffect> {
         let Some(spec) = LIBRARY.iter().find(|spec| spec.creep.is_some()) else { return vec![] };
-        let values = |level: f64| {
-            let at_20_n = 1e3 * libm::exp(level + self.by_grip * libm::log(REFERENCE_N));
-            let named = [
-                ("rate_mm_per_n_s", at_20_n),
-                ("load_exponent", -self.by_grip),
-                ("reference_force_n", REFERENCE_N),
-            ];
-            spec.values(&named)
-        };
         let of = |(part, name): (usize, &String)| {
-            let values = values(self.level_of(name));
+            let values = spec.values(&[
+                ("rate_mm_per_n_s", 1e3 * libm::exp(self.level_of(name))),
+                ("load_exponent", -self.by_grip),
+                ("reference_force_n", 1.0),
+            ]);
             ModelEffect { part: Some(part), ..ModelEffect::new(spec, values) }
         };
         parts.iter().enumerate().map(of).collect()
     }
 
+    /// Logarithm of the rate of a part at 1 N.
     fn level_of(&self, part: &str) -> f64 {
         let mean = || self.of_part.iter().map(|(_, level)| level).sum::<f64>() / self.of_part.len() as f64;
         self.of_part.iter().find(|(name, _)| *name == part).map_or_else(mean, |(_, level)| *level)
@@ -177,104 +146,11 @@ fn would_show(looked_at: &[Option<LookedAt>], rate_m_per_n_s: f64) -> usize {
     looked_at.iter().flatten().filter(shows).count()
 }
 
-/// Time, force and displacement of the rows of the pull, forces less the reading without load.
-fn pulled(trace: &PullTrace) -> Vec<(f64, f64, f64)> {
-    let no_load: Vec<f64> = trace.rows().filter(|r| r.time_s < 0.0).map(|r| r.measured_force_n).collect();
-    let zero_n = mean(&no_load).filter(|(_, n)| *n >= 5).map_or(0.0, |(zero_n, _)| zero_n);
-    let rows = trace.rows().filter(|r| r.time_s >= 0.0);
-    rows.map(|r| (r.time_s, r.measured_force_n - zero_n, r.displacement_m)).collect()
-}
-
-/// Force times time up to each row of a pull.
-fn impulses_n_s(pulled: &[(f64, f64, f64)]) -> Vec<f64> {
-    let mut impulse_n_s = 0.0;
-    let steps = pulled.windows(2).map(|w| {
-        impulse_n_s += 0.5 * (w[0].1 + w[1].1) * (w[1].0 - w[0].0);
-        impulse_n_s
-    });
-    std::iter::once(0.0).chain(steps).take(pulled.len()).collect()
-}
-
-/// What follows a slip is level: readings that rise on are those of a tool that creeps to its stop.
-pub(super) fn without_slips_that_rise(mut seen: TraceObservation) -> TraceObservation {
-    let slope = |rows: &[(f64, f64)]| {
-        let n = rows.len() as f64;
-        let (mt, my) = (rows.iter().map(|r| r.0).sum::<f64>() / n, rows.iter().map(|r| r.1).sum::<f64>() / n);
-        let (ty, tt) = rows
-            .iter()
-            .fold((0.0, 0.0), |(ty, tt), (t, y)| (ty + (t - mt) * (y - my), tt + (t - mt) * (t - mt)));
-        if tt > 0.0 { ty / tt } else { 0.0 }
-    };
-    let after: Vec<(f64, f64)> = seen.slid_rows.iter().map(|r| (r.0, r.1)).collect();
-    let before: Vec<(f64, f64)> = seen.held_s.iter().copied().zip(seen.held_n.iter().copied()).collect();
-    if seen.slip_s.is_some()
-        && (after.len() < 3 || before.len() < 3 || slope(&after) > RISES_ON * slope(&before))
-    {
-        (seen.slip_s, seen.slid_n) = (None, None);
-        seen.before_slip_n.clear();
-        seen.slid_rows.clear();
-    }
-    seen
-}
-
-/// A trace with enough rows.
-#[derive(Debug, Clone, Copy)]
-struct LookedAt {
-    /// Force times time up to where it is looked at.
-    impulse_n_s: f64,
-    /// What it crept by, if that is far.
-    crept: Option<Crept>,
-}
-
-impl LookedAt {
-    fn of(trace: &PullTrace) -> Option<Self> {
-        let rows = pulled(trace);
-        let smooth: Vec<f64> = rows.windows(3).map(|w| w.iter().map(|r| r.1).sum::<f64>() / 3.0).collect();
-        let most_n = smooth.iter().copied().fold(0.0, f64::max);
-        let held = smooth.iter().position(|f| *f >= HELD * most_n)?;
-        if held < MIN_ROWS {
-            return None;
-        }
-        let held_rows = &rows[..=held];
-        let impulse_n_s = impulses_n_s(held_rows);
-        let mut points: Vec<(Vec<f64>, f64)> =
-            held_rows.iter().zip(&impulse_n_s).map(|(r, i)| (vec![1.0, r.1, *i], r.2)).collect();
-        let mut found = least_squares(&points)?;
-        if found[1] < 0.0 {
-            points.iter_mut().for_each(|(x, _)| x[1] = 0.0);
-            found = least_squares(&points)?;
-        }
-        let left =
-            points.iter().map(|(x, y)| (y - x.iter().zip(&found).map(|(a, b)| a * b).sum::<f64>()).powi(2));
-        let left_m = (left.sum::<f64>() / points.len() as f64).sqrt();
-        let (shear_m, crept_m) = (found[1] * rows[held].1, found[2] * impulse_n_s[held]);
-        let way_m: Vec<f64> = held_rows.iter().map(|r| r.2).collect();
-        let noise_m = displacement_noise(&way_m);
-        let creeps = crept_m >= LEAST_M && crept_m >= BEYOND_SHEAR * shear_m;
-        let follows = left_m <= (LEFT_OF_NOISE * noise_m).max(LEFT * crept_m);
-        let sd = found[2] * libm::hypot(MODEL_SD, left_m / crept_m);
-        let crept = (creeps && follows).then_some(Crept { rate: found[2], sd, to_n: smooth[held] });
-        Some(Self { impulse_n_s: impulse_n_s[held], crept })
-    }
-}
-
-/// Least squares; columns without a size stay out.
-fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<Vec<f64>> {
-    let columns = rows.first()?.0.len();
-    let size = |k: usize| rows.iter().map(|(x, _)| x[k] * x[k]).sum::<f64>();
-    let used: Vec<usize> = (0..columns).filter(|&k| size(k) > 0.0).collect();
-    let slopes = DMatrix::from_fn(rows.len(), used.len(), |i, k| rows[i].0[used[k]]);
-    let measured = DVector::from_iterator(rows.len(), rows.iter().map(|(_, y)| *y));
-    let solved = slopes.tr_mul(&slopes).cholesky()?.solve(&slopes.tr_mul(&measured));
-    let mut found = vec![0.0; columns];
-    used.iter().zip(solved.iter()).for_each(|(&k, value)| found[k] = *value);
-    Some(found)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::draws::Draws;
+    use crate::pulls::observe::TraceObservation;
     use gripgen_twin::{PlannedPull, TraceRow};
 
     /// A pull that rises by `increment_n / 0.1 s` to `limit_n`, with noise of 0.1 N and 5 um, its way by `way_m(force, impulse)`.
