@@ -54,6 +54,11 @@ impl ForceLoop {
         self.close(step_s, measured_n, contact_n)
     }
 
+    /// The force that acts.
+    pub(crate) fn force_n(&self) -> f64 {
+        self.force_n
+    }
+
     /// The same for a command that has waited its dead time already.
     #[inline]
     pub(crate) fn advance_due(
@@ -73,16 +78,25 @@ impl ForceLoop {
             Feedback::Measured => measured_n,
             Feedback::Independent => self.force_n,
         };
-        // Exact for a command that is constant over the step.
         if self.share.0 != step_s {
-            let share = if self.robot.lag_s > 0.0 { -libm::expm1(-step_s / self.robot.lag_s) } else { 1.0 };
-            self.share = (step_s, share);
+            self.share = (step_s, share_of_error(&self.robot, step_s));
         }
         self.force_n += self.share.1 * (self.effective_n - closed);
-        let excess = self.robot.damping_n_s_per_m * self.robot.speed_limit_m_per_s;
+        let excess = most_excess_n(&self.robot);
         self.force_n = self.force_n.clamp(contact_n - excess, contact_n + excess);
         self.force_n
     }
+}
+
+/// The share of its error that the loop makes up in a step: exact for a command that is constant over it.
+pub(crate) fn share_of_error(robot: &Robot, step_s: f64) -> f64 {
+    if robot.lag_s > 0.0 { -libm::expm1(-step_s / robot.lag_s) } else { 1.0 }
+}
+
+/// By how much the force may exceed that of the contact.
+#[inline]
+pub(crate) fn most_excess_n(robot: &Robot) -> f64 {
+    robot.damping_n_s_per_m * robot.speed_limit_m_per_s
 }
 
 #[cfg(test)]

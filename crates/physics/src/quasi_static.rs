@@ -55,6 +55,8 @@ pub struct StuckPull {
     largest_n: Vec<f64>,
     /// Force of the loop at each tick.
     applied_n: Vec<f64>,
+    /// What the loop is told at each tick.
+    commanded_n: Vec<f64>,
     /// The sensor before every [`SNAPSHOT_TICKS`]th reading, if it has effects.
     sensors: Vec<SensorChain>,
 }
@@ -78,33 +80,60 @@ impl QuasiStatic {
         force_n: f64,
         pull: &mut StuckPull,
     ) {
+        pull.clear();
+        // Without effects on readings and commands, as most are, there is nothing to ask them.
+        if sensor.is_identity() && command.is_identity() {
+            let read = |_: &mut StuckPull, contact_n: f64, _: usize| contact_n;
+            self.hold(staircase, read, |desired_n, _| desired_n, creep_m_per_n_s, force_n, pull);
+        } else {
+            let (mut sensor, step_s) = (sensor.clone(), 1.0 / self.rate_hz);
+            let read = |pull: &mut StuckPull, contact_n: f64, tick: usize| {
+                if tick.is_multiple_of(SNAPSHOT_TICKS) && !sensor.is_identity() {
+                    pull.sensors.push(sensor.clone());
+                }
+                sensor.read(contact_n, tick as f64 / self.rate_hz, if tick == 0 { 0.0 } else { step_s })
+            };
+            let command = |desired_n: f64, reading_n: f64| command.apply(desired_n, reading_n);
+            self.hold(staircase, read, command, creep_m_per_n_s, force_n, pull);
+        }
+    }
+
+    #[inline(always)]
+    fn hold(
+        &self,
+        staircase: &Staircase,
+        mut read: impl FnMut(&mut StuckPull, f64, usize) -> f64,
+        command: impl Fn(f64, f64) -> f64,
+        creep_m_per_n_s: f64,
+        force_n: f64,
+        pull: &mut StuckPull,
+    ) {
         let step_s = 1.0 / self.rate_hz;
-        let (mut sensor, mut control) = (sensor.clone(), ForceLoop::new(self.robot));
+        let mut control = ForceLoop::new(self.robot);
         let yields = 1.0 + self.robot.damping_n_s_per_m * creep_m_per_n_s;
         let share = 1.0 / (1.0 + step_s * self.stiffness_n_per_m / self.robot.damping_n_s_per_m * yields);
-        pull.clear();
+        // A command acts at the first tick at which it has waited its dead time.
+        let dead_ticks = ((self.robot.dead_time_s - 1e-9) * self.rate_hz).ceil().max(0.0) as usize;
+        let most_n = force_n.min(self.stop_m * self.stiffness_n_per_m);
         let mut stairs = staircase.from(0.0);
         let (mut contact_n, mut applied_n, mut largest_n) = (0.0_f64, 0.0, 0.0_f64);
         for tick in 0..=self.ticks() {
-            let time_s = tick as f64 / self.rate_hz;
-            if tick % SNAPSHOT_TICKS == 0 && !sensor.is_identity() {
-                pull.sensors.push(sensor.clone());
-            }
-            let reading_n = sensor.read(contact_n, time_s, if tick == 0 { 0.0 } else { step_s });
-            let desired_n = stairs.desired_n(time_s);
-            largest_n = largest_n.max(contact_n);
+            let reading_n = read(pull, contact_n, tick);
+            let desired_n = stairs.desired_n(tick as f64 / self.rate_hz);
+            largest_n = if largest_n > contact_n { largest_n } else { contact_n };
             pull.desired_n.push(desired_n);
             pull.reading_n.push(reading_n);
             pull.contact_n.push(contact_n);
             pull.largest_n.push(largest_n);
             pull.applied_n.push(applied_n);
-            if contact_n > force_n || contact_n > self.stop_m * self.stiffness_n_per_m {
+            if contact_n > most_n {
                 break;
             }
-            let commanded_n = command.apply(desired_n, reading_n);
-            applied_n = control.advance(time_s, step_s, commanded_n, reading_n, contact_n);
+            pull.commanded_n.push(command(desired_n, reading_n));
+            let due_n = tick.checked_sub(dead_ticks).map_or(0.0, |sent| pull.commanded_n[sent]);
+            applied_n = control.advance_due(step_s, due_n, reading_n, contact_n);
             // k x, implicit in x.
-            let held_n = applied_n / yields;
+            let held_n = if yields > 1.0 { applied_n / yields } else { applied_n };
             contact_n = held_n + (contact_n - held_n) * share;
         }
     }
@@ -113,8 +142,8 @@ impl QuasiStatic {
 impl StuckPull {
     /// Forgets everything and keeps its memory.
     fn clear(&mut self) {
-        let Self { desired_n, reading_n, contact_n, largest_n, applied_n, sensors } = self;
-        [desired_n, reading_n, contact_n, largest_n, applied_n].into_iter().for_each(Vec::clear);
+        let Self { desired_n, reading_n, contact_n, largest_n, applied_n, commanded_n, sensors } = self;
+        [desired_n, reading_n, contact_n, largest_n, applied_n, commanded_n].into_iter().for_each(Vec::clear);
         sensors.clear();
     }
 }

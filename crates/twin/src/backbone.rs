@@ -7,8 +7,8 @@ const POINTS: usize = 129;
 /// other where they are stiffer than what they hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Backbone {
-    /// Evenly spaced up to [`Self::slips_at`].
-    share: Vec<f64>,
+    /// Share, its rise up to the next point and the slope there: evenly spaced up to [`Self::slips_at`].
+    points: Vec<[f64; 3]>,
     slips_at: f64,
     /// Points of the curve to a unit of shear.
     per_shear: f64,
@@ -17,7 +17,7 @@ pub struct Backbone {
 impl Backbone {
     /// A contact that lets go at once: a straight line.
     pub fn straight() -> Self {
-        Self { share: vec![0.0, 1.0], slips_at: 1.0, per_shear: 1.0 }
+        Self::through(&[0.0, 1.0], 1.0)
     }
 
     /// Of cells with their areas and limits, in any unit; `by_area` is the share of the stiffness that they have by
@@ -45,7 +45,16 @@ impl Backbone {
             }
             if next == each.len() { held } else { held + stiffness * shear }
         });
-        Self { share: share.collect(), slips_at, per_shear: (POINTS - 1) as f64 / slips_at }
+        Self::through(&share.collect::<Vec<f64>>(), slips_at)
+    }
+
+    fn through(share: &[f64], slips_at: f64) -> Self {
+        let per_shear = (share.len() - 1) as f64 / slips_at;
+        let point = |i: usize| {
+            let rise = share.get(i + 1).map_or(0.0, |next| next - share[i]);
+            [share[i], rise, rise * per_shear]
+        };
+        Self { points: (0..share.len()).map(point).collect(), slips_at, per_shear }
     }
 
     /// The shear at which all of it has slipped.
@@ -62,23 +71,22 @@ impl Backbone {
     /// Share of its limit that it holds at a shear, and the slope there.
     #[inline]
     pub fn at(&self, shear: f64) -> (f64, f64) {
-        let last = self.share.len() - 1;
-        let x = shear.max(0.0) * self.per_shear;
-        if x >= last as f64 {
-            return (self.share[last], 0.0);
-        }
-        let i = x as usize;
-        let w = x - i as f64;
-        let rise = self.share[i + 1] - self.share[i];
-        (self.share[i] + w * rise, rise * self.per_shear)
+        let last = self.points.len() - 1;
+        let x = if shear > 0.0 { shear * self.per_shear } else { 0.0 };
+        let x = if x < last as f64 { x } else { last as f64 };
+        // There are a few hundred points: a conversion of 32 bits is the quicker one.
+        let i = x as i32;
+        let [share, rise, slope] = self.points[i as usize];
+        (share + (x - f64::from(i)) * rise, slope)
     }
 
     /// The shear at which it holds a share of its limit.
     pub fn shear_of(&self, share: f64) -> f64 {
-        let after = self.share.partition_point(|s| *s < share).clamp(1, self.share.len() - 1);
-        let (low, high) = (self.share[after - 1], self.share[after]);
+        let last = self.points.len() - 1;
+        let after = self.points.partition_point(|p| p[0] < share).clamp(1, last);
+        let (low, high) = (self.points[after - 1][0], self.points[after][0]);
         let w = if high > low { ((share - low) / (high - low)).clamp(0.0, 1.0) } else { 1.0 };
-        self.slips_at * (after as f64 - 1.0 + w) / (self.share.len() - 1) as f64
+        self.slips_at * (after as f64 - 1.0 + w) / last as f64
     }
 }
 

@@ -139,6 +139,23 @@ impl StaircaseCursor<'_> {
         self.now_n
     }
 
+    /// The commanded force at ticks from `tick` on, at `time_s` of each of them, into `forces_n`; `rate_hz` are its ticks per second.
+    pub fn fill(&mut self, forces_n: &mut [f64], tick: usize, rate_hz: f64, time_s: impl Fn(usize) -> f64) {
+        let mut done = 0;
+        while done < forces_n.len() {
+            let now_s = time_s(tick + done);
+            let force_n = self.desired_n(now_s);
+            // The last tick of the step but for rounding, and what is left of it.
+            let sure = (((self.next_s - now_s) * rate_hz) as usize).saturating_sub(2);
+            let mut end = sure.saturating_add(done + 1).min(forces_n.len());
+            while end < forces_n.len() && self.next_s > time_s(tick + end) + 1e-9 {
+                end += 1;
+            }
+            forces_n[done..end].fill(force_n);
+            done = end;
+        }
+    }
+
     #[cold]
     fn climb(&mut self, time_s: f64) {
         while self.next_s <= time_s + 1e-9 {
@@ -158,6 +175,23 @@ mod tests {
         let s = Staircase::constant(0.5, 0.104, 1.0);
         for (time, force) in [(-0.1, 0.0), (0.0, 0.5), (0.103, 0.5), (0.104, 1.0), (0.52, 3.0)] {
             assert_eq!(s.desired_n(time), force, "at {time} s");
+        }
+    }
+
+    /// Filled at once as asked for tick by tick: steps that begin on a tick, between two and within less than one, and a second part that goes
+    /// on where the first ended.
+    #[test]
+    fn filled_forces_are_those_of_each_tick() {
+        let mut lengths = [0.13, 0.0007, 0.1, 0.0751].into_iter().cycle();
+        let uneven = Staircase::from_steps(1.0, 3.0, || lengths.next().unwrap());
+        for stairs in [Staircase::constant(1.0, 0.104, 3.0), uneven] {
+            let time_s = |tick: usize| (tick as f64 / 500.0 - 0.014).max(0.0);
+            let each: Vec<f64> = (0..2000).map(|tick| stairs.desired_n(time_s(tick))).collect();
+            let (mut cursor, mut filled) = (stairs.from(0.0), vec![0.0; 2000]);
+            let (first, second) = filled.split_at_mut(777);
+            cursor.fill(first, 0, 500.0, time_s);
+            cursor.fill(second, 777, 500.0, time_s);
+            assert!(filled == each);
         }
     }
 

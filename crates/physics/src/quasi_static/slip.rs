@@ -1,5 +1,8 @@
 //! What follows a slip.
 
+mod bend;
+mod slide;
+
 use super::label::LabelRule;
 use super::{QuasiStatic, SNAPSHOT_TICKS, StuckPull};
 use crate::force_loop::ForceLoop;
@@ -109,34 +112,33 @@ impl QuasiStatic {
     /// What follows when the jaws hold `limits_n` only, each for itself. A pull ends at the displacement stop, or when the label is
     /// decided. Pulls advance in turns: each waits for its own last step alone, and together they take little longer than one.
     pub fn slips<const N: usize>(&self, run: &SlipRun<'_>, limits_n: [f64; N], pulls: &mut [SlipPull; N]) {
+        let steps = self.steps();
+        let mut slipping: [Option<Slipping<'_>>; N] =
+            std::array::from_fn(|i| self.leaves(run, &steps, limits_n[i], &mut pulls[i]));
+        // Without effects on readings and commands, as most are, there is nothing to ask them.
+        if run.sensor.is_identity() && run.command.is_identity() {
+            self.bend(run, &steps, &mut slipping, pulls);
+            self.slide(run, &steps, &mut slipping, pulls);
+        } else {
+            let read = |sensor: &mut SensorChain, contact_n: f64, time_s: f64| {
+                sensor.read(contact_n, time_s, steps.step_s)
+            };
+            let command = |due_n: f64, reading_n: f64| run.command.apply(due_n, reading_n);
+            self.advance_all(run, &steps, &mut slipping, pulls, read, command);
+        }
+    }
+
+    /// What all steps of these pulls share.
+    fn steps(&self) -> Steps {
         let step_s = 1.0 / self.rate_hz;
         let metres_per_n = step_s / self.robot.damping_n_s_per_m;
-        let steps = Steps {
+        Steps {
             step_s,
             dead_s: (self.robot.dead_time_s * self.rate_hz - 1e-9).ceil().max(0.0) * step_s,
             kept: if self.fall_s > 0.0 { libm::exp(-step_s / self.fall_s) } else { 0.0 },
             metres_per_n,
             held_back: self.stiffness_n_per_m * metres_per_n,
             last: self.ticks(),
-        };
-        let mut slipping: [Option<Slipping<'_>>; N] =
-            std::array::from_fn(|i| self.leaves(run, &steps, limits_n[i], &mut pulls[i]));
-        // Without effects on readings and commands, as most are, there is nothing to ask them.
-        if run.sensor.is_identity() && run.command.is_identity() {
-            self.advance_all(
-                run,
-                &steps,
-                &mut slipping,
-                pulls,
-                |_, contact_n, _| contact_n,
-                |due_n, _| due_n,
-            );
-        } else {
-            let read = |sensor: &mut SensorChain, contact_n: f64, time_s: f64| {
-                sensor.read(contact_n, time_s, step_s)
-            };
-            let command = |due_n: f64, reading_n: f64| run.command.apply(due_n, reading_n);
-            self.advance_all(run, &steps, &mut slipping, pulls, read, command);
         }
     }
 
@@ -227,7 +229,9 @@ impl QuasiStatic {
         for (tick, &contact_n) in run.stuck.contact_n.iter().take(held).enumerate() {
             let speed = run.creep.rate_m_per_n_s * contact_n * run.rim.at(contact_n / limit_n);
             crept_m += speed * step_s;
-            if contact_n / self.stiffness_n_per_m + crept_m > self.stop_m {
+            // Only near the stop is it worth a division.
+            let near = contact_n > (0.999 * self.stop_m - crept_m) * self.stiffness_n_per_m;
+            if near && contact_n / self.stiffness_n_per_m + crept_m > self.stop_m {
                 return Err(tick);
             }
         }
