@@ -21,6 +21,10 @@ pub(super) use trace::without_slips_that_rise;
 const MIN_TRACES: usize = 3;
 const MIN_SHARE: f64 = 0.5;
 
+/// Ratio of the largest to the smallest grip force of a part that says how its rate goes with the grip: of one force, or one for each part,
+/// nothing does, and rates of grips that were not seen to creep would be anything.
+const GRIPS_APART: f64 = 1.5;
+
 /// Ratio of the steepest to the flattest staircase that tells creep from bends, whose rate would grow with it to the power of 1, and what it
 /// may at most.
 const RATES_APART: f64 = 1.5;
@@ -56,12 +60,14 @@ impl Creep {
         parts.sort_unstable();
         parts.dedup();
         let steep = |p: &MeasuredPull| libm::log(p.increment_n / p.step_s);
-        let span = |x: &dyn Fn(&MeasuredPull) -> f64| {
-            let all = seen.iter().map(|(p, _)| x(p));
+        // How far apart it is in the part in which that is most, and in all of them.
+        let span = |of: &str, x: &dyn Fn(&MeasuredPull) -> f64| {
+            let all = seen.iter().filter(|(p, _)| of.is_empty() || p.part == of).map(|(p, _)| x(p));
             all.clone().fold(f64::NEG_INFINITY, f64::max) - all.fold(f64::INFINITY, f64::min)
         };
         let grip = |p: &MeasuredPull| libm::log(p.grip_force_n);
-        let (grips_vary, rates_vary) = (span(&grip) > 0.1, span(&steep) > libm::log(RATES_APART));
+        let grips_vary = parts.iter().any(|part| span(part, &grip) > libm::log(GRIPS_APART));
+        let rates_vary = span("", &steep) > libm::log(RATES_APART);
         // A level for each part, whose contacts differ.
         let row = |p: &MeasuredPull, rate: bool| -> Vec<f64> {
             let own = |name: &&str| if p.part == **name { 1.0 } else { 0.0 };
@@ -269,6 +275,30 @@ mod tests {
         let found = nine(6.0, 5.6e-5).expect("six weak grips").median_m_per_n_s();
         assert!((found / 5.6e-5 - 1.0).abs() < 0.1, "{found}");
         assert!(nine(50.0, 0.0).is_none());
+    }
+
+    /// Of one grip force for each part nothing says how the rate goes with the grip. A weak grip that slid by millimetres has not crept them.
+    #[test]
+    fn grips_that_nobody_saw_creep_have_no_rate_of_their_own() {
+        let mut draws = Draws::new(6, 0);
+        let way = |force: f64, impulse: f64| force / 1e6 + 5e-5 * impulse;
+        let mut seen = |grip: f64, step: f64| pull(grip, step, 0.4 * grip, &way, &mut draws);
+        let ball = |p: MeasuredPull| MeasuredPull { part: "ball".into(), ..p };
+        let mut pulls = vec![seen(80.0, 0.5), seen(80.0, 2.0), ball(seen(30.0, 1.0))];
+        // 2.5 N, held for a second while it slides by 4 mm.
+        let mut weak = seen(5.0, 0.5);
+        let slides = (0..100).map(|i| TraceRow {
+            time_s: 0.5 + 0.01 * f64::from(i),
+            desired_force_n: 3.0,
+            measured_force_n: 2.5,
+            displacement_m: 4e-7 * f64::from(i * i),
+        });
+        weak.trace = Some(weak.trace.unwrap().rows().filter(|r| r.time_s < 0.5).chain(slides).collect());
+        pulls.push(weak);
+        let creep = Creep::of(&pulls).unwrap();
+        let left = creep.taken_off(3, &pulls[3], pulls[3].trace.as_ref().unwrap());
+        let last_m = left.row(left.len() - 1).displacement_m;
+        assert!(last_m > 3.5e-3, "{last_m}");
     }
 
     #[test]
