@@ -110,7 +110,7 @@ struct Steps {
 
 impl QuasiStatic {
     /// What follows when the jaws hold `limits_n` only, each for itself. A pull ends at the displacement stop, or when the label is
-    /// decided. Pulls advance in turns: each waits for its own last step alone, and together they take little longer than one.
+    /// decided. Pulls advance in lanes: each waits for its own last step alone, and together they take little longer than one.
     pub fn slips<const N: usize>(&self, run: &SlipRun<'_>, limits_n: [f64; N], pulls: &mut [SlipPull; N]) {
         let steps = self.steps();
         let mut slipping: [Option<Slipping<'_>>; N] =
@@ -118,13 +118,20 @@ impl QuasiStatic {
         // Without effects on readings and commands, as most are, there is nothing to ask them.
         if run.sensor.is_identity() && run.command.is_identity() {
             self.bend(run, &steps, &mut slipping, pulls);
-            self.slide(run, &steps, &mut slipping, pulls);
+            self.slide(run, &steps, &mut slipping, pulls, &|_, contact_n, _| contact_n, &|due_n, _| due_n);
         } else {
             let read = |sensor: &mut SensorChain, contact_n: f64, time_s: f64| {
                 sensor.read(contact_n, time_s, steps.step_s)
             };
             let command = |due_n: f64, reading_n: f64| run.command.apply(due_n, reading_n);
-            self.advance_all(run, &steps, &mut slipping, pulls, read, command);
+            for (slot, pull) in slipping.iter_mut().zip(pulls.iter_mut()) {
+                while let Some(slipping) = slot.as_mut().filter(|s| s.bent.is_some()) {
+                    if !self.advance(run, &steps, slipping, pull, &read, &command) {
+                        *slot = None;
+                    }
+                }
+            }
+            self.slide(run, &steps, &mut slipping, pulls, &read, &command);
         }
     }
 
@@ -139,26 +146,6 @@ impl QuasiStatic {
             metres_per_n,
             held_back: self.stiffness_n_per_m * metres_per_n,
             last: self.ticks(),
-        }
-    }
-
-    #[inline(always)]
-    fn advance_all<const N: usize>(
-        &self,
-        run: &SlipRun<'_>,
-        steps: &Steps,
-        slipping: &mut [Option<Slipping<'_>>; N],
-        pulls: &mut [SlipPull; N],
-        read: impl Fn(&mut SensorChain, f64, f64) -> f64,
-        command: impl Fn(f64, f64) -> f64,
-    ) {
-        while slipping.iter().any(Option::is_some) {
-            for (slot, pull) in slipping.iter_mut().zip(pulls.iter_mut()) {
-                let Some(slipping) = slot else { continue };
-                if !self.advance(run, steps, slipping, pull, &read, &command) {
-                    *slot = None;
-                }
-            }
         }
     }
 

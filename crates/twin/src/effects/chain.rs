@@ -2,6 +2,7 @@
 
 use super::{CommandHook, Creep, Effect, EffectSpec, GripPoint, SensorHook, SensorMemory, SensorPoint};
 use crate::{OpticsState, Part, Twin};
+use std::sync::Arc;
 
 fn acting<'a>(twin: &'a Twin, part_name: &'a str) -> impl Iterator<Item = &'a Effect> {
     twin.effects.iter().filter(move |effect| effect.acts_on(part_name))
@@ -50,7 +51,8 @@ pub fn optics_state(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> OpticsS
 /// The wrist sensor as its effects change it, for one pull. The default reads the true force bit for bit.
 #[derive(Debug, Clone)]
 pub struct SensorChain {
-    stages: Vec<(SensorHook, Vec<f64>, SensorMemory)>,
+    /// Values are shared: fits copy chains to remember what they remember.
+    stages: Vec<(SensorHook, Arc<[f64]>, SensorMemory)>,
     clock_start_s: f64,
     direction: f64,
     offset_n: f64,
@@ -66,7 +68,7 @@ impl SensorChain {
     /// The sensor effects on `part_name`, for a pull that starts at `clock_start_s` of the campaign.
     pub fn new(twin: &Twin, part_name: &str, clock_start_s: f64) -> Self {
         let stages = acting(twin, part_name)
-            .filter_map(|e| Some((e.spec.sensor?, e.values.clone(), SensorMemory::default())))
+            .filter_map(|e| Some((e.spec.sensor?, e.values.as_slice().into(), SensorMemory::default())))
             .collect();
         Self { stages, clock_start_s, direction: 1.0, offset_n: 0.0 }
     }
@@ -77,7 +79,7 @@ impl SensorChain {
         clock_start_s: f64,
     ) -> Self {
         let stages = effects
-            .filter_map(|(spec, values)| Some((spec.sensor?, values.to_vec(), SensorMemory::default())))
+            .filter_map(|(spec, values)| Some((spec.sensor?, values.into(), SensorMemory::default())))
             .collect();
         Self { stages, clock_start_s, direction: 1.0, offset_n: 0.0 }
     }

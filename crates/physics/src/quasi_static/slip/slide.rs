@@ -1,19 +1,17 @@
-//! Pulls that slide, where no effect acts on readings and commands: in lanes as those that bend ([`super::bend`]), and to the last bit the
-//! steps of [`super`].
+//! Pulls that slide, in lanes as those that bend ([`super::bend`]), and to the last bit the steps of [`super`].
 
 use super::bend::between;
 use super::{QuasiStatic, SlipPull, SlipRun, Slipping, Steps};
 use crate::force_loop::{most_excess_n, share_of_error};
 use gripgen_twin::config::Feedback;
+use gripgen_twin::effects::SensorChain;
 use std::array::from_fn;
 
 /// Most ticks that lanes go on together before somebody looks after them: most slides are shorter.
 const CHUNK: usize = 64;
 
-/// Pulls side by side. A lane without one stays at zero.
+/// Pulls side by side. Nobody looks at a lane without one.
 struct Lanes<const N: usize> {
-    kinetic_n: [f64; N],
-    above_n: [f64; N],
     force_n: [f64; N],
     displacement_m: [f64; N],
     /// Displacement, and command above the reading, beyond which a pull ends.
@@ -22,11 +20,13 @@ struct Lanes<const N: usize> {
     ended: [Option<usize>; N],
 }
 
-/// Commands, those that arrive, and readings.
+/// What a pull that slides says of the ticks to come: nothing of it depends on the loop.
 struct Signals<const N: usize> {
     desired_n: [[f64; CHUNK]; N],
-    due_n: [[f64; CHUNK]; N],
+    contact_n: [[f64; CHUNK]; N],
     readings_n: [[f64; CHUNK]; N],
+    /// What the loop is told.
+    commanded_n: [[f64; CHUNK]; N],
 }
 
 impl<const N: usize> Lanes<N> {
@@ -37,8 +37,6 @@ impl<const N: usize> Lanes<N> {
         pulls: &[SlipPull; N],
     ) -> Self {
         let mut lanes = Self {
-            kinetic_n: [0.0; N],
-            above_n: [0.0; N],
             force_n: [0.0; N],
             displacement_m: [0.0; N],
             most: [(f64::INFINITY, f64::INFINITY); N],
@@ -46,7 +44,6 @@ impl<const N: usize> Lanes<N> {
         };
         for (k, (slot, pull)) in slipping.iter().zip(pulls).enumerate() {
             let Some(slipping) = slot else { continue };
-            (lanes.kinetic_n[k], lanes.above_n[k]) = (slipping.kinetic_n, slipping.above_n);
             (lanes.force_n[k], lanes.displacement_m[k]) = (slipping.control.force_n(), pull.displacement_m);
             lanes.most[k] = (rig.stop_m, run.rule.decided_n());
         }
@@ -58,25 +55,20 @@ impl<const N: usize> Lanes<N> {
         &mut self,
         rig: &QuasiStatic,
         steps: &Steps,
-        signals: &mut Signals<N>,
+        signals: &Signals<N>,
         count: usize,
     ) -> usize {
         let gain = share_of_error(&rig.robot, steps.step_s);
         let excess_n = most_excess_n(&rig.robot);
         // In registers, not in memory.
-        let (kinetic_n, mut above_n, mut most) = (self.kinetic_n, self.above_n, self.most);
-        let (mut force_n, mut displacement_m) = (self.force_n, self.displacement_m);
+        let (mut force_n, mut displacement_m, mut most) = (self.force_n, self.displacement_m, self.most);
         let mut ticks = 0;
         while ticks < count.min(CHUNK) {
-            let contact_n: [f64; N] = from_fn(|k| kinetic_n[k] + above_n[k]);
-            let desired_n: [f64; N] = from_fn(|k| signals.desired_n[k][ticks]);
-            let due_n: [f64; N] = from_fn(|k| signals.due_n[k][ticks]);
-            for k in 0..N {
-                above_n[k] *= steps.kept;
-                signals.readings_n[k][ticks] = contact_n[k];
-            }
+            let at = |signal: &[[f64; CHUNK]; N]| -> [f64; N] { from_fn(|k| signal[k][ticks]) };
+            let (desired_n, contact_n) = (at(&signals.desired_n), at(&signals.contact_n));
+            let (reading_n, commanded_n) = (at(&signals.readings_n), at(&signals.commanded_n));
             ticks += 1;
-            let ends = |k: usize| (displacement_m[k] > most[k].0) | (desired_n[k] - contact_n[k] > most[k].1);
+            let ends = |k: usize| (displacement_m[k] > most[k].0) | (desired_n[k] - reading_n[k] > most[k].1);
             let ending: [bool; N] = from_fn(ends);
             if ending != [false; N] {
                 for k in (0..N).filter(|&k| ending[k]) {
@@ -88,8 +80,8 @@ impl<const N: usize> Lanes<N> {
                 }
             }
             for k in 0..N {
-                let closed_n = if MEASURED { contact_n[k] } else { force_n[k] };
-                let asked_n = force_n[k] + gain * (due_n[k] - closed_n);
+                let closed_n = if MEASURED { reading_n[k] } else { force_n[k] };
+                let asked_n = force_n[k] + gain * (commanded_n[k] - closed_n);
                 force_n[k] = between(asked_n, contact_n[k] - excess_n, contact_n[k] + excess_n);
                 let step_m = (force_n[k] - contact_n[k]) * steps.metres_per_n;
                 displacement_m[k] += if step_m > 0.0 { step_m } else { 0.0 };
@@ -98,42 +90,51 @@ impl<const N: usize> Lanes<N> {
         for k in (0..N).filter(|&k| self.ended[k].is_none()) {
             self.displacement_m[k] = displacement_m[k];
         }
-        (self.above_n, self.force_n) = (above_n, force_n);
+        self.force_n = force_n;
         ticks
     }
 }
 
 impl QuasiStatic {
-    /// Advances pulls that slide until each has ended.
+    /// Advances pulls that slide until each has ended: with what the sensor reads at a time, and what the loop is told of a command that arrives
+    /// with a reading.
+    #[inline(always)]
     pub(super) fn slide<const N: usize>(
         &self,
         run: &SlipRun<'_>,
         steps: &Steps,
         slipping: &mut [Option<Slipping<'_>>; N],
         pulls: &mut [SlipPull; N],
+        read: &impl Fn(&mut SensorChain, f64, f64) -> f64,
+        command: &impl Fn(f64, f64) -> f64,
     ) {
         let nothing = [[0.0; CHUNK]; N];
-        let mut signals = Signals { desired_n: nothing, due_n: nothing, readings_n: nothing };
+        let mut signals =
+            Signals { desired_n: nothing, contact_n: nothing, readings_n: nothing, commanded_n: nothing };
         let time_s = |tick: usize| tick as f64 / self.rate_hz;
         let waited_s = |tick: usize| (time_s(tick) - steps.dead_s).max(0.0);
         loop {
             let left = slipping.iter().flatten().map(|s| steps.last + 1 - s.tick);
             let Some(count) = left.min().map(|left| left.min(CHUNK)) else { return };
-            for (k, slot) in slipping.iter().enumerate() {
-                let (desired_n, due_n) = (&mut signals.desired_n[k][..count], &mut signals.due_n[k][..count]);
-                let Some(slipping) = slot else {
-                    desired_n.fill(0.0);
-                    due_n.fill(0.0);
-                    continue;
-                };
+            for (k, slot) in slipping.iter_mut().enumerate() {
+                let Some(slipping) = slot else { continue };
+                let from = slipping.tick;
                 // The pull may end before: its own go on later.
-                slipping.stairs.clone().fill(desired_n, slipping.tick, self.rate_hz, time_s);
-                slipping.due.clone().fill(due_n, slipping.tick, self.rate_hz, waited_s);
+                slipping.stairs.clone().fill(&mut signals.desired_n[k][..count], from, self.rate_hz, time_s);
+                slipping.due.clone().fill(&mut signals.commanded_n[k][..count], from, self.rate_hz, waited_s);
+                for i in 0..count {
+                    let contact_n = slipping.kinetic_n + slipping.above_n;
+                    slipping.above_n *= steps.kept;
+                    signals.contact_n[k][i] = contact_n;
+                    let reading_n = read(&mut slipping.sensor, contact_n, time_s(from + i));
+                    signals.readings_n[k][i] = reading_n;
+                    signals.commanded_n[k][i] = command(signals.commanded_n[k][i], reading_n);
+                }
             }
             let mut lanes = Lanes::of(self, run, slipping, pulls);
             let ticks = match self.robot.feedback {
-                Feedback::Measured => lanes.go_on::<true>(self, steps, &mut signals, count),
-                Feedback::Independent => lanes.go_on::<false>(self, steps, &mut signals, count),
+                Feedback::Measured => lanes.go_on::<true>(self, steps, &signals, count),
+                Feedback::Independent => lanes.go_on::<false>(self, steps, &signals, count),
             };
             for (k, (slot, pull)) in slipping.iter_mut().zip(pulls.iter_mut()).enumerate() {
                 let Some(slipping) = slot else { continue };
@@ -142,7 +143,6 @@ impl QuasiStatic {
                 pull.desired_n.extend_from_slice(&signals.desired_n[k][..ticks]);
                 pull.displacement_m = lanes.displacement_m[k];
                 slipping.tick += ticks;
-                slipping.above_n = lanes.above_n[k];
                 slipping.control.take_over(lanes.force_n[k]);
                 slipping.stairs.desired_n(time_s(slipping.tick));
                 slipping.due.desired_n(waited_s(slipping.tick));
@@ -159,20 +159,31 @@ mod tests {
     use super::super::{LabelRule, RimTable, StuckPull};
     use super::*;
     use gripgen_twin::config::Twist;
-    use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
+    use gripgen_twin::effects::{CommandChain, Creep, find};
     use gripgen_twin::{Backbone, Robot, Staircase};
 
-    /// Pulls in lanes are to the last bit what they are tick by tick: with both kinds of feedback, tools that creep and that do not, a stop
-    /// that some reach while they bend, others while they slide, and pulls that end at the last tick.
+    /// Pulls in lanes are to the last bit what they are tick by tick: with both kinds of feedback, with and without effects on readings and
+    /// commands, tools that creep and that do not, a stop that some reach while they bend, others while they slide, and pulls that end at the
+    /// last tick.
     #[test]
     fn lanes_are_the_steps_of_one_pull() {
         let rings: Vec<(f64, f64)> = (0..40).map(|i| (1.0, 40.0 - f64::from(i))).collect();
         let backbone = Backbone::new(&rings, 1.0);
         let staircase = Staircase::constant(1.0, 0.104, 9.0);
-        let (sensor, command, rule) =
-            (SensorChain::default(), CommandChain::default(), LabelRule::new(3.0, 0.2));
+        let rule = LabelRule::new(3.0, 0.2);
+        let lowpass = [(find("sensor_lowpass").unwrap(), [0.03].as_slice())];
+        let deadband = [(find("deadband").unwrap(), [0.3].as_slice())];
+        let chains = [
+            (SensorChain::default(), CommandChain::default()),
+            (SensorChain::of(lowpass.into_iter(), 0.0), CommandChain::of(deadband.into_iter())),
+        ];
         let mut ends = [0; 3];
-        for feedback in [Feedback::Measured, Feedback::Independent] {
+        for (feedback, (sensor, command)) in [
+            (Feedback::Measured, &chains[0]),
+            (Feedback::Independent, &chains[0]),
+            (Feedback::Measured, &chains[1]),
+            (Feedback::Independent, &chains[1]),
+        ] {
             for rate_m_per_n_s in [0.0, 6e-5] {
                 for (stop_m, max_time_s) in [(2.5e-3, 9.0), (50e-3, 9.0), (50e-3, 2.5)] {
                     let robot = Robot {
@@ -196,7 +207,7 @@ mod tests {
                     };
                     let creep = Creep { rate_m_per_n_s, rim_exponent: 2.0 };
                     let mut stuck = StuckPull::default();
-                    rig.stuck(&staircase, &sensor, &command, rate_m_per_n_s, 60.0, &mut stuck);
+                    rig.stuck(&staircase, sensor, command, rate_m_per_n_s, 60.0, &mut stuck);
                     let run = SlipRun {
                         stuck: &stuck,
                         staircase: &staircase,
@@ -205,8 +216,8 @@ mod tests {
                         creep,
                         rim: &RimTable::new(creep),
                         rule: &rule,
-                        sensor: &sensor,
-                        command: &command,
+                        sensor,
+                        command,
                     };
                     let steps = rig.steps();
                     for limits_n in [[5.0, 17.0, 33.0, 21.0], [0.3, 48.0, 70.0, 41.0]] {
@@ -215,7 +226,8 @@ mod tests {
                         for (limit_n, pull) in limits_n.into_iter().zip(&mut alone) {
                             let mut slot = rig.leaves(&run, &steps, limit_n, pull);
                             while let Some(slipping) = &mut slot {
-                                let (read, command) = (|_: &mut _, n: f64, _| n, |n: f64, _| n);
+                                let read = |s: &mut SensorChain, n: f64, t: f64| s.read(n, t, steps.step_s);
+                                let command = |due: f64, reading: f64| command.apply(due, reading);
                                 let bent = slipping.bent.is_some();
                                 if !rig.advance(&run, &steps, slipping, pull, &read, &command) {
                                     let last = slipping.tick > steps.last;
