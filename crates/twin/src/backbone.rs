@@ -74,7 +74,7 @@ impl Backbone {
         let last = self.points.len() - 1;
         let x = if shear > 0.0 { shear * self.per_shear } else { 0.0 };
         let x = if x < last as f64 { x } else { last as f64 };
-        // There are a few hundred points: a conversion of 32 bits is the quicker one.
+        // Points are few: a conversion of 32 bits is the quicker one.
         let i = x as i32;
         let [share, rise, slope] = self.points[i as usize];
         (share + (x - f64::from(i)) * rise, slope)

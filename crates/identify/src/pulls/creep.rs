@@ -60,14 +60,14 @@ impl Creep {
         parts.sort_unstable();
         parts.dedup();
         let steep = |p: &MeasuredPull| libm::log(p.increment_n / p.step_s);
-        // How far apart it is in the part in which that is most, and in all of them.
-        let span = |of: &str, x: &dyn Fn(&MeasuredPull) -> f64| {
-            let all = seen.iter().filter(|(p, _)| of.is_empty() || p.part == of).map(|(p, _)| x(p));
+        // How far apart it is in one part, or in all.
+        let span = |of: Option<&str>, x: &dyn Fn(&MeasuredPull) -> f64| {
+            let all = seen.iter().filter(|(p, _)| of.is_none_or(|part| p.part == part)).map(|(p, _)| x(p));
             all.clone().fold(f64::NEG_INFINITY, f64::max) - all.fold(f64::INFINITY, f64::min)
         };
         let grip = |p: &MeasuredPull| libm::log(p.grip_force_n);
-        let grips_vary = parts.iter().any(|part| span(part, &grip) > libm::log(GRIPS_APART));
-        let rates_vary = span("", &steep) > libm::log(RATES_APART);
+        let grips_vary = parts.iter().any(|part| span(Some(part), &grip) > libm::log(GRIPS_APART));
+        let rates_vary = span(None, &steep) > libm::log(RATES_APART);
         // A level for each part, whose contacts differ.
         let row = |p: &MeasuredPull, rate: bool| -> Vec<f64> {
             let own = |name: &&str| if p.part == **name { 1.0 } else { 0.0 };

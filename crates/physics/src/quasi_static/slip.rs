@@ -297,29 +297,34 @@ mod tests {
     use gripgen_twin::config::{Feedback, Twist};
     use gripgen_twin::effects::find;
 
-    /// Four pulls in turns are each what they are alone: contacts that let go at once and that bend, with and without an effect on readings, one
-    /// that never slips among them.
-    #[test]
-    fn pulls_in_turns_are_what_they_are_alone() {
+    /// A light arm on soft gels.
+    pub(super) fn rig(feedback: Feedback) -> QuasiStatic {
         let robot = Robot {
             moving_mass_kg: 8.0,
             apparent_mass_kg: None,
             lag_s: 0.05,
-            dead_time_s: 0.01,
+            dead_time_s: 0.0131,
             damping_n_s_per_m: 400.0,
             speed_limit_m_per_s: 0.1,
-            feedback: Feedback::Independent,
+            feedback,
             twist: Twist::Stiff,
             twist_stiffness_n_m_per_rad: None,
         };
-        let rig = QuasiStatic {
+        QuasiStatic {
             robot,
             stiffness_n_per_m: 2e4,
             rate_hz: 500.0,
             fall_s: 0.01,
             stop_m: 5e-3,
             max_time_s: 6.0,
-        };
+        }
+    }
+
+    /// Four pulls in turns are each what they are alone: contacts that let go at once and that bend, with and without an effect on readings, one
+    /// that never slips among them.
+    #[test]
+    fn pulls_in_turns_are_what_they_are_alone() {
+        let rig = rig(Feedback::Independent);
         let staircase = Staircase::constant(1.0, 0.104, 6.0);
         let ring = |i: i32| (1.0, 40.0 - f64::from(i));
         let rings: Vec<(f64, f64)> = (0..40).map(ring).collect();

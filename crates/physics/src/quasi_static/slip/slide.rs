@@ -156,11 +156,11 @@ impl QuasiStatic {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::rig;
     use super::super::{LabelRule, RimTable, StuckPull};
     use super::*;
-    use gripgen_twin::config::Twist;
     use gripgen_twin::effects::{CommandChain, Creep, find};
-    use gripgen_twin::{Backbone, Robot, Staircase};
+    use gripgen_twin::{Backbone, Staircase};
 
     /// Pulls in lanes are to the last bit what they are tick by tick: with both kinds of feedback, with and without effects on readings and
     /// commands, tools that creep and that do not, a stop that some reach while they bend, others while they slide, and pulls that end at the
@@ -172,10 +172,10 @@ mod tests {
         let staircase = Staircase::constant(1.0, 0.104, 9.0);
         let rule = LabelRule::new(3.0, 0.2);
         let lowpass = [(find("sensor_lowpass").unwrap(), [0.03].as_slice())];
-        let deadband = [(find("deadband").unwrap(), [0.3].as_slice())];
+        let gain = [(find("controller_gain").unwrap(), [1.1].as_slice())];
         let chains = [
             (SensorChain::default(), CommandChain::default()),
-            (SensorChain::of(lowpass.into_iter(), 0.0), CommandChain::of(deadband.into_iter())),
+            (SensorChain::of(lowpass.into_iter(), 0.0), CommandChain::of(gain.into_iter())),
         ];
         let mut ends = [0; 3];
         for (feedback, (sensor, command)) in [
@@ -186,25 +186,7 @@ mod tests {
         ] {
             for rate_m_per_n_s in [0.0, 6e-5] {
                 for (stop_m, max_time_s) in [(2.5e-3, 9.0), (50e-3, 9.0), (50e-3, 2.5)] {
-                    let robot = Robot {
-                        moving_mass_kg: 8.0,
-                        apparent_mass_kg: None,
-                        lag_s: 0.05,
-                        dead_time_s: 0.0131,
-                        damping_n_s_per_m: 900.0,
-                        speed_limit_m_per_s: 0.02,
-                        feedback,
-                        twist: Twist::Stiff,
-                        twist_stiffness_n_m_per_rad: None,
-                    };
-                    let rig = QuasiStatic {
-                        robot,
-                        stiffness_n_per_m: 2e4,
-                        rate_hz: 500.0,
-                        fall_s: 0.01,
-                        stop_m,
-                        max_time_s,
-                    };
+                    let rig = QuasiStatic { stop_m, max_time_s, ..rig(feedback) };
                     let creep = Creep { rate_m_per_n_s, rim_exponent: 2.0 };
                     let mut stuck = StuckPull::default();
                     rig.stuck(&staircase, sensor, command, rate_m_per_n_s, 60.0, &mut stuck);
