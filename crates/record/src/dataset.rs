@@ -16,12 +16,9 @@ use crate::folder::{FolderError, RunFolder};
 use crate::index::{extra_columns, index_row};
 use crate::picture::encode_png;
 use crate::proto::gripgen_v1::Sample;
-use crate::pulls::{
-    PullFolderError, PullImagesError, pulls_with_images, read_judged_pulls, read_pull_images,
-};
 use crate::reader::{ReadError, Record, ShardReader};
 use crate::shard::RIG_SOURCE;
-use gripgen_twin::{Jaw, MeasuredPulls, PerJaw, PullTrace, TactileImage};
+use gripgen_twin::{Jaw, PerJaw, PullTrace, TactileImage};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -45,10 +42,32 @@ enum Source {
         open: Mutex<Vec<(u64, Arc<ShardReader>)>>,
     },
     Shard(Arc<ShardReader>),
-    Pulls {
-        measured: Box<MeasuredPulls>,
-        with_images: BTreeSet<String>,
-    },
+    Measured(MeasuredRows),
+}
+
+/// Rows of measured pulls from a table.
+pub struct MeasuredRows {
+    /// Name of each pull.
+    pub ids: Vec<String>,
+    /// Force over time of each, where it was recorded.
+    pub traces: Vec<Option<PullTrace>>,
+    /// Reads the images of a pull, by its name.
+    pub images: Box<ReadImages>,
+    /// Width and height of all images.
+    pub image_size_px: Option<(u32, u32)>,
+}
+
+/// Reads both images of a pull; `None` where it has none.
+pub type ReadImages = dyn Fn(&str) -> Result<Option<PerJaw<TactileImage>>, PictureFileError> + Send + Sync;
+
+/// Why an image file could not be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}: {problem}", .path.display())]
+pub struct PictureFileError {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// What the system or the decoder says.
+    pub problem: String,
 }
 
 #[derive(Clone, Copy)]
@@ -92,12 +111,9 @@ pub enum DatasetError {
         /// Value of the run.
         wanted: String,
     },
-    /// Measured pulls.
+    /// Images of measured pulls.
     #[error(transparent)]
-    Pulls(#[from] PullFolderError),
-    /// Their images.
-    #[error(transparent)]
-    Images(#[from] PullImagesError),
+    Images(#[from] PictureFileError),
     /// There is no such row.
     #[error("{}: there is no row {row}, it has {rows}", .path.display())]
     NoRow {
@@ -139,14 +155,11 @@ pub enum DatasetError {
 }
 
 impl Dataset {
-    /// Opens a run folder or a folder with `pulls.csv`, of which it reads the index and no shard; or a single shard, of which it
-    /// reads all samples without their images.
+    /// Opens a run folder, of which it reads the index and no shard; or a single shard, of which it reads all samples without
+    /// their images.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
         if path.join("run.json").is_file() {
             return Self::open_run(path);
-        }
-        if path.join(crate::PULLS_FILE).is_file() {
-            return Self::open_pulls(path);
         }
         if path.is_file() {
             return Self::open_shard(path);
@@ -178,20 +191,10 @@ impl Dataset {
         Ok(found)
     }
 
-    fn open_pulls(path: &Path) -> Result<Self, DatasetError> {
-        let judged = read_judged_pulls(path)?;
-        let with_images = pulls_with_images(path)?;
-        let first = judged.pulls.pulls.iter().find(|p| with_images.contains(&p.id));
-        let image_size_px = match first {
-            Some(pull) => {
-                let image = read_pull_images(path, &pull.id)?.grip.left;
-                Some((image.width_px, image.height_px))
-            }
-            None => None,
-        };
-        let table = Table::of_pulls(&judged);
-        let source = Source::Pulls { measured: Box::new(judged.pulls), with_images };
-        Ok(Self { path: path.into(), table, source, image_size_px })
+    /// Rows of measured pulls, with one row of `table` each.
+    pub fn of_measured(path: &Path, table: Table, rows: MeasuredRows) -> Self {
+        let image_size_px = rows.image_size_px;
+        Self { path: path.into(), table, source: Source::Measured(rows), image_size_px }
     }
 
     fn open_shard(path: &Path) -> Result<Self, DatasetError> {
@@ -221,7 +224,7 @@ impl Dataset {
     pub fn run(&self) -> Option<&RunFolder> {
         match &self.source {
             Source::Run { folder, .. } => Some(folder),
-            Source::Shard(_) | Source::Pulls { .. } => None,
+            Source::Shard(_) | Source::Measured(_) => None,
         }
     }
 
@@ -244,7 +247,7 @@ impl Dataset {
                 Ok(at.first_sample + (row - at.first_row) as u64)
             }
             Source::Shard(reader) => Ok(reader.indices().start + row as u64),
-            Source::Pulls { .. } => Ok(row as u64),
+            Source::Measured(_) => Ok(row as u64),
         }
     }
 
@@ -262,7 +265,7 @@ impl Dataset {
                 let row = id.parse::<u64>().ok()?.checked_sub(reader.indices().start)? as usize;
                 (row < self.table.rows()).then_some(row)
             }
-            Source::Pulls { measured, .. } => measured.pulls.iter().position(|p| p.id == id),
+            Source::Measured(rows) => rows.ids.iter().position(|name| name == id),
         }
     }
 
@@ -279,7 +282,7 @@ impl Dataset {
     pub fn has_clean_images(&self) -> Result<bool, DatasetError> {
         match &self.source {
             Source::Run { .. } | Source::Shard(_) => Ok(self.shard_of(0)?.0.has_clean_images()),
-            Source::Pulls { .. } => Ok(false),
+            Source::Measured(_) => Ok(false),
         }
     }
 
@@ -311,12 +314,8 @@ impl Dataset {
                     }
                 }
             }
-            Source::Pulls { measured, with_images } => {
-                let id = &measured.pulls[row].id;
-                if !with_images.contains(id) {
-                    return Err(missing());
-                }
-                let images = read_pull_images(&self.path, id)?.grip;
+            Source::Measured(rows) => {
+                let images = (rows.images)(&rows.ids[row])?.ok_or_else(missing)?;
                 for (image, out) in [(images.left, left), (images.right, right)] {
                     if (image.width_px, image.height_px) != wanted {
                         return Err(size((image.width_px, image.height_px)));
@@ -332,7 +331,7 @@ impl Dataset {
     pub fn images_png(&self, row: usize) -> Result<Option<[Vec<u8>; 2]>, DatasetError> {
         self.check_row(row)?;
         let coded = |image: &TactileImage| {
-            let problem = |e: crate::PictureError| PullImagesError {
+            let problem = |e: crate::PictureError| PictureFileError {
                 path: self.path.clone(),
                 problem: format!("row {row}: {e}"),
             };
@@ -347,14 +346,10 @@ impl Dataset {
                 }
                 Ok(reader.images_png(index)?)
             }
-            Source::Pulls { measured, with_images } => {
-                let id = &measured.pulls[row].id;
-                if !with_images.contains(id) {
-                    return Ok(None);
-                }
-                let images = read_pull_images(&self.path, id)?.grip;
-                Ok(Some([coded(&images.left)?, coded(&images.right)?]))
-            }
+            Source::Measured(rows) => match (rows.images)(&rows.ids[row])? {
+                Some(images) => Ok(Some([coded(&images.left)?, coded(&images.right)?])),
+                None => Ok(None),
+            },
         }
     }
 
@@ -363,7 +358,7 @@ impl Dataset {
         match &self.source {
             Source::Run { folder, .. } => folder.info().source == RIG_SOURCE,
             Source::Shard(reader) => reader.is_rig(),
-            Source::Pulls { .. } => false,
+            Source::Measured(_) => false,
         }
     }
 
@@ -396,7 +391,7 @@ impl Dataset {
                 let (reader, index) = self.shard_of(row)?;
                 Ok(reader.pull(index)?.1)
             }
-            Source::Pulls { measured, .. } => Ok(measured.pulls[row].trace.clone()),
+            Source::Measured(rows) => Ok(rows.traces[row].clone()),
         }
     }
 
@@ -412,12 +407,7 @@ impl Dataset {
                 let (reader, index) = self.shard_of(row)?;
                 Ok(reader.record(index)?.images)
             }
-            Source::Pulls { measured, with_images } => {
-                let id = &measured.pulls[row].id;
-                let images =
-                    with_images.contains(id).then(|| read_pull_images(&self.path, id)).transpose()?;
-                Ok(images.map(|images| images.grip))
-            }
+            Source::Measured(rows) => Ok((rows.images)(&rows.ids[row])?),
         }
     }
 
@@ -429,7 +419,7 @@ impl Dataset {
                 let (reader, index) = self.shard_of(row)?;
                 Ok(Some(reader.record(index)?))
             }
-            Source::Pulls { .. } => Ok(None),
+            Source::Measured(_) => Ok(None),
         }
     }
 
@@ -443,7 +433,7 @@ impl Dataset {
         let (folder, shards, open) = match &self.source {
             Source::Run { folder, shards, open } => (folder, shards, open),
             Source::Shard(reader) => return Ok((reader.clone(), reader.indices().start + row as u64)),
-            Source::Pulls { .. } => return Err(DatasetError::Unknown { path: self.path.clone() }),
+            Source::Measured(_) => return Err(DatasetError::Unknown { path: self.path.clone() }),
         };
         let at = shards[shards.partition_point(|s| s.first_row <= row) - 1];
         let index = at.first_sample + (row - at.first_row) as u64;

@@ -17,7 +17,6 @@
 //! This crate does not know how samples are made. Reading holds one sample in memory, writing one as well.
 
 mod background;
-mod campaign;
 mod card;
 mod dataset;
 mod encode;
@@ -26,33 +25,24 @@ mod film;
 mod film_frame;
 mod folder;
 mod frame;
-mod imprint_table;
 mod index;
 mod lerobot;
 mod mark;
 mod parquet;
 mod picture;
-mod presses;
 pub mod proto;
-mod pulls;
 mod reader;
 mod rig_log;
 mod rig_run;
-mod rosbag;
-mod sensor_table;
 mod shard;
 mod stored;
-mod table;
 #[cfg(test)]
 mod tests;
 mod verify;
 mod webdataset;
 
 pub use background::Background;
-pub use campaign::{
-    CAMPAIGN_FILE, CampaignFile, CampaignFileError, CampaignHeader, campaign_toml, read_campaign,
-};
-pub use dataset::{Dataset, DatasetError, NoiseMode, Table};
+pub use dataset::{Dataset, DatasetError, MeasuredRows, NoiseMode, PictureFileError, ReadImages, Table};
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportError, export_sample};
 pub use film::{Film, FilmOptions, encode_frame};
@@ -61,22 +51,11 @@ pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
     sha256_hex,
 };
-pub use imprint_table::{
-    IMPRINTS_FILE, ImprintTable, MeasuredImprint, read_imprint_picture, read_imprint_table,
-};
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
 pub use lerobot::{ExportLeRobotError, LEROBOT_CARD, LeRobotOptions, export_lerobot};
 pub use mark::{MARK_NAME, parquet_mark, png_mark, png_with_mark};
 pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};
-pub use picture::{PictureError, decode as decode_picture, encode_jpeg, encode_png};
-pub use presses::{
-    PRESSES_FILE, PressColumnTable, PressFolder, PressRecord, PressedBody, press_table, read_press_columns,
-    read_press_folder,
-};
-pub use pulls::{
-    JudgedPulls, PULLS_FILE, PullFolderError, PullImages, PullImagesError, Standing, TRACES_FOLDER,
-    pulls_with_images, read_judged_pulls, read_pull_folder, read_pull_images, write_pull_folder,
-};
+pub use picture::{PictureError, decode as decode_picture, encode_jpeg, encode_png, is_jpeg};
 pub use reader::{ReadError, Record, ShardReader, mcap_mark};
 pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};
 pub use rig_run::{
@@ -84,14 +63,8 @@ pub use rig_run::{
     RigRunInfo, create_rig_run, discard_failed, failed_pulls, missing_pulls, rig_campaign, suspect_pulls,
     write_rig_pull,
 };
-pub use rosbag::{
-    BagCell, BagClock, BagForce, BagImages, BagMotion, BagPull, BagTopics, ROSBAG_FILE, RosbagError,
-    RosbagFile, TipOfJoints, is_rosbag, read_judged_bags,
-};
-pub use sensor_table::{SENSOR_FILE, SensorTable, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
 pub use stored::{sample_covariates, sample_view};
-pub use table::TableError;
 pub use verify::{Verification, repair, verify};
 pub use webdataset::{
     ExportWebDatasetError, WebDatasetOptions, export_webdataset, tar_mark, webdataset_rows,

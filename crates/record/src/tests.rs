@@ -2,4 +2,3 @@
 
 mod bytes;
 mod shards;
-mod tables;

@@ -1,9 +1,8 @@
 //! The table of a dataset: columns of numbers or of words.
 
-use crate::index::{INDEX_COLUMNS, index_header, status_name};
-use crate::pulls::JudgedPulls;
-use gripgen_twin::columns::{Kind, find, recorded_covariates};
-use gripgen_twin::{MeasuredPull, PULLS_SINCE_REST, Values};
+use crate::index::{INDEX_COLUMNS, index_header};
+use gripgen_twin::Values;
+use gripgen_twin::columns::{Kind, find};
 
 /// Whether a column of an index holds words whatever stands in it.
 fn holds_words(name: &str) -> bool {
@@ -76,32 +75,10 @@ impl Table {
         self
     }
 
-    /// The table of measured pulls: what was recorded of the known columns, and every further column.
-    pub(super) fn of_pulls(judged: &JudgedPulls) -> Self {
-        let JudgedPulls { pulls: measured, standing, .. } = judged;
-        let pulls = &measured.pulls;
-        let words = |of: &dyn Fn(&MeasuredPull) -> String| Values::Words(pulls.iter().map(of).collect());
-        let numbers = |of: &dyn Fn(&MeasuredPull) -> f64| Values::Numbers(pulls.iter().map(of).collect());
-        let mut columns = vec![
-            ("pull_id".to_string(), words(&|p| p.id.clone())),
-            (
-                "status".to_string(),
-                Values::Words(standing.iter().map(|s| status_name(s.status).into()).collect()),
-            ),
-        ];
-        for column in recorded_covariates(&measured.recorded) {
-            columns.push((column.name.into(), column.values(pulls)));
-        }
-        if pulls.iter().any(|p| p.start_n.is_some()) {
-            columns.push(("force_start_n".into(), numbers(&|p| p.start_n.unwrap_or(p.increment_n))));
-        }
-        for extra in measured.extra.iter().filter(|e| e.name != PULLS_SINCE_REST) {
-            let values = Values::of_drawn(pulls.iter().map(|p| p.covariates.extra.get(&extra.name)));
-            columns.push((extra.name.clone(), values));
-        }
-        columns.push(("max_pull_force_n".into(), numbers(&|p| p.max_pull_force_n)));
-        columns.push((REASON.into(), Values::Words(standing.iter().map(|s| s.reason.clone()).collect())));
-        Self { columns, rows: pulls.len() }
+    /// A table of columns of equal length.
+    pub fn of_columns(columns: Vec<(String, Values)>) -> Self {
+        let rows = columns.first().map_or(0, |(_, values)| values.len());
+        Self { columns, rows }
     }
 
     /// Number of rows.

@@ -1,7 +1,7 @@
 //! How measured pulls stand: what their table says, and what their traces say of their labels.
 
 use super::cells::{Cells, Column};
-use crate::proto::gripgen_v1::Status;
+use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_twin::evidence::{Behind, Expected, LabelEvidence, Verdict, judge};
 use gripgen_twin::{MeasuredPull, MeasuredPulls, slip_label};
 

@@ -1,6 +1,6 @@
 //! A folder of presses, of a ball or of other bodies: `presses.csv`, the images that it names, and `rest.png`.
 
-use crate::picture::{decode, is_jpeg};
+use gripgen_record::{decode_picture as decode, is_jpeg};
 use crate::table::{TableError, TableReader, TextCells, number, read_bytes};
 use gripgen_twin::{TactileImage, Values};
 use std::path::{Path, PathBuf};
@@ -176,7 +176,7 @@ pub(crate) fn picture(path: &Path) -> Result<TactileImage, TableError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::encode_png;
+    use gripgen_record::encode_png;
 
     fn folder(table: &str) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();

@@ -41,11 +41,11 @@ pub(super) fn thinned(trace: &PullTrace) -> PullTrace {
 }
 
 #[cfg(test)]
-pub(in crate::measured) mod tests {
+pub(in crate::load) mod tests {
     use super::*;
     use gripgen_twin::{Covariates, TraceRow};
 
-    pub(in crate::measured) fn pull(i: usize) -> MeasuredPull {
+    pub(in crate::load) fn pull(i: usize) -> MeasuredPull {
         MeasuredPull {
             id: i.to_string(),
             part: "p".into(),

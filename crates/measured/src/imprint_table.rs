@@ -1,7 +1,7 @@
 //! A folder with `imprints.csv`: imprints of grasps beside the normal force of the jaw, without a pull.
 
-use crate::folder::sha256_hex;
-use crate::presses::picture;
+use gripgen_record::sha256_hex;
+use crate::press_table::picture;
 use crate::table::{Row, TableError, TableReader, TextCells, read_bytes};
 use gripgen_twin::{TactileImage, Values};
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! A folder with `sensor.csv`: a force sensor read beside a reference.
 
-use crate::folder::sha256_hex;
+use gripgen_record::sha256_hex;
 use crate::table::{TableError, TableReader, TextCells, read_bytes};
 use gripgen_twin::Values;
 use std::path::Path;

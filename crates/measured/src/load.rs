@@ -1,6 +1,5 @@
-//! Measured pulls from wherever they are: a folder with a table, a run folder, or recordings of ROS 2.
+//! Measured pulls of a campaign: from a folder with a table, or from a run folder.
 
-mod bags;
 mod left_out;
 mod runs;
 mod suspects;
@@ -11,10 +10,8 @@ mod zero;
 pub use suspects::Suspects;
 pub use units::ImplausibleLabels;
 
-use gripgen_record::{
-    FolderError, JudgedPulls, PULLS_FILE, PullFolderError, RIG_SOURCE, ReadError, RosbagError, RunFolder,
-    Standing, is_rosbag, read_judged_pulls, sha256_hex,
-};
+use crate::pulls::{JudgedPulls, PULLS_FILE, PullFolderError, Standing, read_judged_pulls};
+use gripgen_record::{FolderError, RIG_SOURCE, ReadError, RunFolder, sha256_hex};
 use gripgen_twin::{ExtraColumn, MeasuredPulls};
 use left_out::LeftOut;
 use runs::load_run;
@@ -48,9 +45,6 @@ pub enum LoadPullsError {
     /// A shard of it.
     #[error(transparent)]
     Shard(#[from] ReadError),
-    /// Recordings of ROS 2.
-    #[error(transparent)]
-    Bags(#[from] RosbagError),
     /// Folders whose labels mean different things.
     #[error(
         "{}: its labels are taken with {other_n} N and {:.1} mm, those of the first folder with {tolerance_n} N and {:.1} mm",
@@ -86,23 +80,12 @@ pub enum LoadPullsError {
     },
 }
 
-impl LoadPullsError {
-    /// What to do about it, where that is known.
-    pub fn hint(&self) -> Option<&str> {
-        match self {
-            Self::Bags(e) if !e.hint.is_empty() => Some(&e.hint),
-            _ => None,
-        }
-    }
-}
-
 /// Whether a path holds pulls that [`load_pulls`] reads.
 pub fn is_pulls(path: &Path) -> bool {
-    path.join(PULLS_FILE).is_file() || path.join("run.json").is_file() || is_rosbag(path)
+    path.join(PULLS_FILE).is_file() || path.join("run.json").is_file()
 }
 
-/// Loads measured pulls: a run folder of a sweep or of a rig if there is a `run.json`, else a folder with `pulls.csv`, else
-/// bags of ROS 2.
+/// Loads measured pulls: a run folder of a sweep or of a rig if there is a `run.json`, else a folder with `pulls.csv`.
 ///
 /// Of a run folder, pulls without a slip (failed, without contact, censored) are left out and counted in the notes, and so
 /// are those whose label rule is not that of the first. Its covariates are those stored with each sample; what a sweep
@@ -120,9 +103,7 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     if path.join("run.json").is_file() {
         return load_run(path, suspects);
     }
-    let is_bag = !path.join(PULLS_FILE).is_file() && is_rosbag(path);
-    let JudgedPulls { pulls, standing, mut warnings } =
-        if is_bag { bags::judged_bags(path)? } else { read_judged_pulls(path)? };
+    let JudgedPulls { pulls, standing, mut warnings } = read_judged_pulls(path)?;
     let mut left_out = LeftOut { rig: false, ..LeftOut::default() };
     standing.iter().for_each(|s| left_out.count(s.status));
     let ids: Vec<&str> = pulls.pulls.iter().map(|p| p.id.as_str()).collect();
@@ -137,17 +118,6 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     let implausible = units::implausible(path, &pulls.pulls);
     if implausible.is_none() {
         warnings.extend(units::warnings(path, &pulls.pulls));
-    }
-    if is_bag {
-        if pulls.pulls.iter().all(|pull| pull.trace.is_none()) {
-            notes.push(
-                "nobody recorded how the tool moved (topics.pose, topics.joint_states): traces are not used"
-                    .into(),
-            );
-        }
-        // As those of a run: every reading is there.
-        pulls.pulls.iter_mut().for_each(|pull| pull.trace = pull.trace.as_ref().map(thinned));
-        fewer_traces(&mut pulls.pulls, &mut notes);
     }
     notes.extend(zero::without_shift(&mut pulls));
     Ok(LoadedPulls { pulls, notes, warnings, implausible })

@@ -1,6 +1,6 @@
 //! What each column of a pull table means.
 
-use crate::proto::gripgen_v1::Status;
+use gripgen_record::proto::gripgen_v1::Status;
 use crate::table::{TableError, TableReader, TextCells, number};
 use gripgen_twin::MeasuredPull;
 use gripgen_twin::columns::{COLUMNS, Column as PullColumn, InTable};

@@ -1,6 +1,6 @@
 //! Tactile images beside a table of pulls: `images/<pull_id>_left.png`, `_right.png`, and without contact `_rest.png`.
 
-use crate::picture::decode;
+use gripgen_record::{PictureFileError, decode_picture as decode};
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -17,24 +17,14 @@ pub struct PullImages {
     pub rest: PerJaw<Option<TactileImage>>,
 }
 
-/// Why the images of a pull could not be read.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}: {problem}", .path.display())]
-pub struct PullImagesError {
-    /// The file or folder.
-    pub path: PathBuf,
-    /// What the system or the decoder says.
-    pub problem: String,
-}
-
 /// Ids of the pulls that have the images of both jaws, sorted; none where there is no such folder.
 ///
 /// # Errors
 ///
 /// A folder that cannot be read.
-pub fn pulls_with_images(folder: &Path) -> Result<BTreeSet<String>, PullImagesError> {
+pub fn pulls_with_images(folder: &Path) -> Result<BTreeSet<String>, PictureFileError> {
     let path = folder.join(IMAGES_FOLDER);
-    let at = |e: std::io::Error| PullImagesError { path: path.clone(), problem: e.to_string() };
+    let at = |e: std::io::Error| PictureFileError { path: path.clone(), problem: e.to_string() };
     if !path.is_dir() {
         return Ok(BTreeSet::new());
     }
@@ -51,13 +41,13 @@ pub fn pulls_with_images(folder: &Path) -> Result<BTreeSet<String>, PullImagesEr
 /// # Errors
 ///
 /// Images that are missing for one jaw, or cannot be read.
-pub fn read_pull_images(folder: &Path, id: &str) -> Result<PullImages, PullImagesError> {
+pub fn read_pull_images(folder: &Path, id: &str) -> Result<PullImages, PictureFileError> {
     let path = |kind: &str| folder.join(IMAGES_FOLDER).join(format!("{id}_{kind}.png"));
     let read = |path: PathBuf| {
         let bytes = std::fs::read(&path).map_err(|e| e.to_string());
         bytes
             .and_then(|b| decode(&b).map_err(|e| e.to_string()))
-            .map_err(|problem| PullImagesError { path, problem })
+            .map_err(|problem| PictureFileError { path, problem })
     };
     let grip = PerJaw::try_from_fn(|jaw| read(path(&jaw.to_string())))?;
     let rest = PerJaw::try_from_fn(|jaw: Jaw| {
@@ -70,7 +60,7 @@ pub fn read_pull_images(folder: &Path, id: &str) -> Result<PullImages, PullImage
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::encode_png;
+    use gripgen_record::encode_png;
 
     #[test]
     fn pulls_with_both_images_are_found_and_read() {

@@ -1,8 +1,7 @@
 //! The columns of a press table that say in which circumstances each press was made.
 
-use crate::diagnose::PressCovariate;
-use gripgen_record::{TableError, press_table, read_press_columns, sha256_hex};
-use gripgen_tactile::presses::PressSet;
+use crate::press_table::{press_table, read_press_columns};
+use crate::table::TableError;
 use gripgen_twin::Values;
 use std::path::Path;
 
@@ -10,7 +9,16 @@ use std::path::Path;
 const MARKS: [&str; 9] =
     ["image", "x_px", "y_px", "radius_px", "depth_mm", "pull_index", "mesh", "shape", "rotation_deg"];
 
-/// What a table says beside images and marks.
+/// A circumstance of the presses, by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressColumn {
+    /// Name of the column.
+    pub name: String,
+    /// Its values.
+    pub values: Values,
+}
+
+/// The columns of a table in addition to images and marks.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PressColumns {
     /// Name of the image of each row.
@@ -18,7 +26,7 @@ pub struct PressColumns {
     /// Seconds since the first press.
     pub time_s: Option<Vec<f64>>,
     /// All other columns.
-    pub covariates: Vec<PressCovariate>,
+    pub covariates: Vec<PressColumn>,
 }
 
 impl PressColumns {
@@ -59,41 +67,8 @@ pub fn load_press_columns(path: &Path) -> Result<PressColumns, TableError> {
                 let first = times.iter().fold(f64::INFINITY, |m, t| m.min(*t));
                 columns.time_s = Some(times.iter().map(|t| t - first).collect());
             }
-            values => columns.covariates.push(PressCovariate { name, values }),
+            values => columns.covariates.push(PressColumn { name, values }),
         }
     }
     Ok(columns)
-}
-
-/// Hash of the images and marks of a set.
-pub fn presses_sha256(set: &PressSet) -> String {
-    let mut text = String::new();
-    for press in &set.presses {
-        let mark = press.circle.map_or(String::new(), |c| format!("{} {} {}", c.x_px, c.y_px, c.radius_px));
-        text += &format!("{} {} {mark}\n", press.name, sha256_hex(&press.image.rgb));
-    }
-    sha256_hex(text.as_bytes())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use gripgen_record::PRESSES_FILE;
-
-    #[test]
-    fn a_gap_leaves_a_column_of_numbers_and_takes_the_clock() {
-        let folder = tempfile::tempdir().unwrap();
-        let load = |text: &str| {
-            std::fs::write(folder.path().join(PRESSES_FILE), text).unwrap();
-            load_press_columns(folder.path()).unwrap()
-        };
-        let whole = load("image,time_s,lamp_v,x_px\na.png,100,1.5,3\nb.png,103,,4\n");
-        assert_eq!((whole.time_s, whole.covariates.len()), (Some(vec![0.0, 3.0]), 1));
-        let Values::Numbers(lamp_v) = &whole.covariates[0].values else { panic!("{:?}", whole.covariates) };
-        assert!(lamp_v[0] == 1.5 && lamp_v[1].is_nan(), "{lamp_v:?}");
-        let mut gap = load("image,time_s,lamp\na.png,100,on\nb.png,,off\n");
-        assert_eq!((gap.time_s.clone(), gap.covariates.len()), (None, 2));
-        gap.leave_out(&["a.png".into()]);
-        assert_eq!(gap.covariates[1].values, Values::Words(vec!["off".into()]));
-    }
 }

@@ -32,7 +32,7 @@ const WORTH_A_WORD_N: f64 = 0.1;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measured::traces::tests::pull;
+    use crate::load::traces::tests::pull;
 
     fn measured(extra: Vec<ExtraColumn>) -> MeasuredPulls {
         MeasuredPulls {

@@ -210,7 +210,7 @@ fn displacements(traces: &[Seen]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measured::traces::tests::pull;
+    use crate::load::traces::tests::pull;
     use gripgen_twin::{PullTrace, TraceRow};
 
     /// Pulls with a coefficient of 0.2 at 10, 20 and 40 N and a trace of 5 mm at 100 readings a second, in other units.

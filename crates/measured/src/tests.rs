@@ -1,7 +1,7 @@
 //! Tables that people hand in: what is written is read back, and what is wrong is named.
 
 use crate::{
-    TableError, read_press_columns, read_press_folder, read_pull_folder, read_sensor_table, write_pull_folder,
+    TableError, open_dataset, read_press_columns, read_press_folder, read_pull_folder, read_sensor_table, write_pull_folder,
 };
 use gripgen_twin::columns::{COLUMNS, Column, InTable, Kind, covariates};
 use gripgen_twin::draw::Drawn;
@@ -144,4 +144,51 @@ fn an_empty_cell_means_the_same_in_every_table() {
 fn a_file_that_is_not_there_is_named() {
     let error = read_sensor_table(Path::new("/nowhere/at/all")).unwrap_err();
     assert!(matches!(&error, TableError::Io { path, .. } if path.ends_with("sensor.csv")), "{error}");
+}
+
+const PULLS: &str = "\
+pull_id,part,grip_force_n,gel_id,session,force_increment_n,step_time_s,dwell_s,pull_index,time_s,temperature_c,\
+grip_offset_mm,grip_angle_deg,pull_direction,force_start_n,humidity_pct,grip_pose,operator,max_pull_force_n
+a,gear,30.1,g1,1,0.5,0.1,1.5,3,0.25,21.5,-0.3,30,-1,4.5,40,1,\"ann, b\",11.25
+b,shaft,0.1,g2,2,1,0.104,0,4,-7,-40.5,0.7,-7.7,1,,,0,bo,-0.286
+";
+
+#[test]
+fn every_column_of_a_table_is_written_as_it_was_read() {
+    // The same table, its columns turned round.
+    let turned: Vec<String> = {
+        let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(PULLS.as_bytes());
+        let rows = reader.records().map(|row| row.unwrap().iter().rev().map(String::from).collect());
+        let rows: Vec<Vec<String>> = rows.collect();
+        vec![String::from_utf8(gripgen_record::csv_lines(&rows)).unwrap()]
+    };
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("pulls.csv"), turned.concat()).unwrap();
+    let read = read_pull_folder(folder.path()).unwrap();
+    let (out, again) = (folder.path().join("out"), folder.path().join("again"));
+    write_pull_folder(&out, &read).unwrap();
+    let written = std::fs::read_to_string(out.join("pulls.csv")).unwrap();
+    // Columns of unknown meaning keep the order of their table.
+    let known = |text: &str| -> Vec<String> {
+        let (header, rest) = text.split_once('\n').unwrap();
+        let before = header.split(',').position(|name| name == "force_start_n").unwrap();
+        let mut lines = vec![header.split(',').take(before + 1).collect::<Vec<_>>().join(",")];
+        lines.extend(rest.lines().map(|l| l.split(',').take(before + 1).collect::<Vec<_>>().join(",")));
+        lines
+    };
+    assert_eq!(known(&written), known(PULLS));
+    assert!(written.starts_with(&PULLS[..PULLS.find("humidity").unwrap()]), "{written}");
+    assert!(written.lines().next().unwrap().ends_with(",operator,grip_pose,humidity_pct,max_pull_force_n"));
+    let back = read_pull_folder(&out).unwrap();
+    write_pull_folder(&again, &back).unwrap();
+    assert_eq!(written, std::fs::read_to_string(again.join("pulls.csv")).unwrap());
+    assert_eq!(format!("{:?}", read.pulls), format!("{:?}", back.pulls));
+    let dataset = open_dataset(&out).unwrap();
+    let names: Vec<&str> = dataset.table().columns().iter().map(|(name, _)| name.as_str()).collect();
+    let wanted = "pull_id,status,part,grip_force_n,gel_id,session,force_increment_n,step_time_s,dwell_s,pull_index,time_s,\
+                  temperature_c,grip_offset_mm,grip_angle_deg,pull_direction,force_start_n,operator,grip_pose,humidity_pct,\
+                  max_pull_force_n,status_reason";
+    assert_eq!(names.join(","), wanted);
+    assert_eq!(dataset.table().numbers("force_start_n"), Some(&[4.5, 1.0][..]));
+    assert_eq!(dataset.table().numbers("temperature_c"), Some(&[21.5, -40.5][..]));
 }
