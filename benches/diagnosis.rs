@@ -10,10 +10,8 @@ mod guard;
 
 use gripgen::identify::{CampaignOptions, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
-use gripgen::{
-    Library, Location, PullDiagnoseOptions, compare_pulls, diagnose_pull_table, load_twin_document,
-    simulate_campaign,
-};
+use gripgen::{Library, Location, load_twin_document};
+use gripgen_cli::{PullDiagnoseOptions, compare_pulls, diagnose_pull_table, simulate_campaign};
 use guard::baseline::Unit;
 use std::process::ExitCode;
 use std::time::Instant;

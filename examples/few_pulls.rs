@@ -17,10 +17,9 @@ use gripgen::identify::pulls::priors::{Prior, PullPriors};
 use gripgen::twin::config::Feedback;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{MeasuredPulls, Twin};
-use gripgen::{
-    Library, Location, calibrate_twin, compare_pulls_with, edited_twin, in_parallel, load_twin_document,
-    shipped_priors,
-};
+use gripgen::{Library, Location, load_twin_document};
+use gripgen::physics::in_parallel;
+use gripgen_cli::{calibrate_twin, compare_pulls_with, edited_twin, shipped_priors};
 use lab::{Contact, Plan, World, campaign};
 use std::sync::Mutex;
 

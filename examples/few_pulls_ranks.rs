@@ -13,7 +13,8 @@ mod truth;
 
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::twin::Posterior;
-use gripgen::{calibrate_twin, in_parallel};
+use gripgen::physics::in_parallel;
+use gripgen_cli::calibrate_twin;
 use std::sync::Mutex;
 use truth::{Given, PART, Truth, asked};
 

@@ -15,7 +15,8 @@ use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::pulls::few::FewDensity;
 use gripgen::identify::pulls::priors::PullPriors;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen::{calibrate_twin, in_parallel, with_few_density};
+use gripgen::physics::in_parallel;
+use gripgen_cli::{calibrate_twin, with_few_density};
 use std::sync::Mutex;
 use truth::{Given, PART, Truth, asked};
 

@@ -5,7 +5,8 @@
 //! them lie in a temporary folder; none of the data is kept.
 
 use gripgen::identify::{Diagnosis, HeldOutError, Verdict};
-use gripgen::{Plot, calibrate_sensor_table, diagnose_sensor_table, load_sensor_table};
+use gripgen::Plot;
+use gripgen_cli::{calibrate_sensor_table, diagnose_sensor_table, load_sensor_table};
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -5,7 +5,7 @@
 //! `soft`. `gripgen diagnose OUT/rigid` then says the same as the table. Nothing is written where the data are absent.
 
 use gripgen::identify::{Diagnosis, ImprintDiagnosis, diagnose_imprints};
-use gripgen::load_imprint_set;
+use gripgen_cli::load_imprint_set;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -9,10 +9,9 @@
 use gripgen::identify::{FitOptions, FreeParameter, fit};
 use gripgen::twin::effects::{GripPoint, find};
 use gripgen::twin::{Covariates, Jaw, Twin};
-use gripgen::{
-    BASELINE_TWIN, Library, Location, PullDiagnoseOptions, diagnose_pull_table, load_pulls,
-    load_twin_document,
-};
+use gripgen::{BASELINE_TWIN, Library, Location, load_twin_document};
+use gripgen_cli::{PullDiagnoseOptions, diagnose_pull_table};
+use gripgen_measured::load_pulls;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 //! Mean squared errors in grey levels squared: whole frame, 400 x 400 and 200 x 200 px around the contact.
 
 use gripgen::tactile::presses::{CalibrateOptions, PressSet, Scores, calibrate_presses, compare_presses};
-use gripgen::{PressGeometry, load_presses};
+use gripgen_cli::{PressGeometry, load_presses};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 

@@ -8,7 +8,8 @@ use gripgen::tactile::presses::{CalibrateOptions, PressScene, PressSet, calibrat
 use gripgen::tactile::{Sensor, SensorFiles};
 use gripgen::twin::effects::{GripPoint, find};
 use gripgen::twin::{Covariates, Jaw, OpticsState};
-use gripgen::{Diagnosed, Plot, PressDiagnosisInput, PressGeometry, diagnose_presses, load_presses};
+use gripgen::{Diagnosed, Plot};
+use gripgen_cli::{PressDiagnosisInput, PressGeometry, diagnose_presses, load_presses};
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -11,7 +11,7 @@ use gripgen::tactile::presses::{
     render_body,
 };
 use gripgen::twin::{TactileImage, TriMesh};
-use gripgen::{PressGeometry, load_presses};
+use gripgen_cli::{PressGeometry, load_presses};
 use nalgebra::Point3;
 use std::path::Path;
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 //! What the report of `compare` shows of pulls: the panels of Wucherer et al. 2023, for any measurements and any twin.
 
 use crate::compare::PullComparison;
-use crate::levels::Level;
-use crate::ratio::{PartRatio, part_ratio};
+use gripgen_identify::Level;
+use gripgen_identify::{PartRatio, part_ratio};
 use crate::report::{Mark, PageTable, Plot, PlotGroup, Series, comparison_page};
 use gripgen_twin::MeasuredPulls;
 use std::collections::BTreeMap;

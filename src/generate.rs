@@ -2,22 +2,21 @@
 
 use crate::film::{Film, Seen};
 use crate::gpu::Gpu;
-use crate::gripped::{Contact, Gripped, grip_point};
-use crate::hold::hold;
+use crate::gripped::{Contact, Gripped};
 use crate::library::Library;
 use crate::project::Project;
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_physics::{
-    JawFriction, PullSession, PullState, Signals, Until, pull_staircase_seen, staircase_of,
+    JawFriction, PatchFriction, PullSession, PullState, Signals, Until, creep_of, pull_staircase_seen, sensor_chain, staircase_of,
 };
 use gripgen_tactile::{Imprint, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
-use gripgen_twin::effects::{CommandChain, Creep, GripPoint, SensorChain, creep};
+use gripgen_twin::effects::CommandChain;
 use gripgen_twin::evidence::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    ContactPatch, FilmPace, FrictionError, GripFriction, ImprintSummary, Jaw, Outcome, Part, PerJaw, Pulled,
-    Sample, Scenario, TactileImage, Twin, cell_friction, slip_label, table_factor, table_offset_n,
+    FilmPace, GripFriction, ImprintSummary, Jaw, Outcome, Part, PerJaw, Pulled,
+    Sample, Scenario, TactileImage, Twin, slip_label, table_factor,
 };
 use std::sync::Arc;
 
@@ -156,52 +155,6 @@ fn held_friction(
     let law = PatchFriction::new(twin, scenario, &patches)?;
     let scatter = scatter(&twin.parts[&scenario.part], scenario) * table_factor(twin, scenario);
     Ok((law.held(twin, scenario, &patches, scatter), law.law, scatter))
-}
-
-/// How the tool of a pull creeps whose jaws press with these normal forces.
-pub(crate) fn creep_of(twin: &Twin, scenario: &Scenario, force_n: &PerJaw<f64>) -> Creep {
-    let mean_n = 0.5 * (force_n.left + force_n.right);
-    creep(twin, &scenario.part, &GripPoint { grip_force_n: mean_n, ..grip_point(scenario, Jaw::Left, 0.0) })
-}
-
-/// The wrist sensor of a pull, with what tables of the twin add to its readings.
-pub(crate) fn sensor_chain(twin: &Twin, scenario: &Scenario) -> SensorChain {
-    SensorChain::new(twin, &scenario.part, scenario.covariates.time_s)
-        .along(scenario.covariates.pull_direction)
-        .plus(table_offset_n(twin, scenario))
-}
-
-/// The friction laws of a twin on the patches of a grip.
-pub(crate) struct PatchFriction {
-    cell_mu: PerJaw<Vec<f64>>,
-    law: PerJaw<GripFriction>,
-}
-
-impl PatchFriction {
-    pub(crate) fn new(
-        twin: &Twin,
-        scenario: &Scenario,
-        patches: &PerJaw<&ContactPatch>,
-    ) -> Result<Self, FrictionError> {
-        let part = &twin.parts[&scenario.part];
-        let laws = PerJaw::try_from_fn(|jaw| {
-            let at = grip_point(scenario, jaw, patches[jaw].area_m2());
-            cell_friction(twin, &scenario.part, part, &at, patches[jaw])
-        })?;
-        Ok(Self { law: laws.map(|_, (_, law)| *law), cell_mu: laws.map(|_, (cells, _)| cells.clone()) })
-    }
-
-    /// What the jaws hold when every coefficient is multiplied by `factor`.
-    pub(crate) fn held(
-        &self,
-        twin: &Twin,
-        scenario: &Scenario,
-        patches: &PerJaw<&ContactPatch>,
-        factor: f64,
-    ) -> PerJaw<JawFriction> {
-        let mu = self.cell_mu.map(|_, cells| cells.iter().map(|mu| mu * factor).collect());
-        hold(twin, scenario, patches, &mu, self.law.left.kinetic_ratio)
-    }
 }
 
 /// A pull and its film.

@@ -5,11 +5,11 @@
 use crate::gpu::{Gpu, ImageFault, ImageJob, PlacedPart};
 use crate::library::Library;
 use crate::sample::{SampleError, SimulateOptions};
-use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip};
+use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip, grip_point, pull_direction};
 use gripgen_tactile::gpu::makes;
 use gripgen_tactile::{ClusteredMesh, Imprint, Plane, Renderer, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
-use gripgen_twin::effects::{GripPoint, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
+use gripgen_twin::effects::{imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Grasp, Jaw, OpticsState, Part, PerJaw, Scenario, TactileImage, Twin};
@@ -255,11 +255,6 @@ pub(crate) fn world_from_part(scenario: &Scenario) -> gripgen_twin::frames::Pose
     Part::world_from_part(c.grip_angle_rad, c.grip_offset_m)
 }
 
-/// Unit vector of the pull in `world`.
-pub(crate) fn pull_direction(scenario: &Scenario) -> [f64; 3] {
-    scenario.pull.direction.map(|x| x * scenario.covariates.pull_direction)
-}
-
 /// Mass with which the tool of a rig answers along +z. Of an arm whose description cannot be read, that of its carriage.
 pub(crate) fn answering_mass_kg(twin: &Twin, library: &Library) -> f64 {
     let carried_kg = twin.robot.carriage_mass_kg(&twin.gripper);
@@ -276,18 +271,6 @@ pub(crate) fn check_damping(twin: &Twin, arm: &PlacedArm, direction: [f64; 3]) -
         return Ok(());
     }
     Err(SampleError::Damping { damping_n_s_per_m: damping, mass_kg, step_s })
-}
-
-/// What the effects look at.
-pub(crate) fn grip_point(scenario: &Scenario, jaw: Jaw, contact_area_m2: f64) -> GripPoint<'_> {
-    GripPoint {
-        jaw,
-        grip_force_n: scenario.grip_force_n,
-        contact_area_m2,
-        pull_rate_n_per_s: scenario.pull.increment_n / scenario.pull.step_s,
-        covariates: &scenario.covariates,
-        grip: (scenario.seed, scenario.group),
-    }
 }
 
 /// The part in front of each gel, and how hard it is pressed.

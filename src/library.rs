@@ -1,6 +1,6 @@
 //! Meshes, contact shapes and sensors: read once, shared by the samples that need them.
 
-use crate::cache::Cache;
+use gripgen_physics::Cache;
 use crate::location::{Location, ReadFileError};
 use crate::resolve::Files;
 use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, Surface, UrdfError};

@@ -3,7 +3,8 @@
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::parts::benchmark;
 use gripgen::twin::{Outcome, TriMesh};
-use gripgen::{Location, Project, assets, benchmark_starter, generate};
+use gripgen::{Location, Project, assets, generate};
+use gripgen_cli::benchmark_starter;
 
 /// A part of each family: grips of all, no sample fails, and families and their split stand in what every run carries.
 #[test]

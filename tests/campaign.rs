@@ -1,10 +1,12 @@
 //! Campaigns: planned, made on a twin, written, and read as measurements.
 
 use gripgen::identify::{CampaignOptions, plan_campaign};
-use gripgen::record::{CAMPAIGN_FILE, campaign_toml, read_campaign, write_pull_folder};
+use gripgen_measured::{CAMPAIGN_FILE, campaign_toml, read_campaign, write_pull_folder};
 use gripgen::twin::config::Feedback;
 use gripgen::twin::{Campaign, PlannedPull};
-use gripgen::{Location, Suspects, load_pulls_with, simulate_campaign};
+use gripgen::Location;
+use gripgen_cli::simulate_campaign;
+use gripgen_measured::{Suspects, load_pulls_with};
 
 fn baseline() -> Location {
     Location::parse("asset:configs/twin-baseline.toml")

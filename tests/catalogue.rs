@@ -3,7 +3,8 @@
 use crate::common::root;
 use gripgen::twin::Twin;
 use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, find};
-use gripgen::{BASELINE_TWIN, EffectCurve, Library, Location, effect_curve, load_twin_document};
+use gripgen::{BASELINE_TWIN, Library, Location, load_twin_document};
+use gripgen_cli::{EffectCurve, effect_curve};
 use std::fmt::Write;
 
 /// The table of a group, as docs/model.md has it.

@@ -1,11 +1,12 @@
 //! Images of measured pulls beside those that a twin expects.
 
 use crate::common::{jobs, run, small_project};
-use gripgen::record::{Dataset, encode_png, write_pull_folder};
+use gripgen::record::{Dataset, encode_png};
+use gripgen_measured::write_pull_folder;
 use gripgen::twin::{Jaw, TactileImage, Twin};
-use gripgen::{
-    ImageComparison, Library, Location, Suspects, compare_images, load_pulls_with, load_twin_document,
-};
+use gripgen::{Library, Location, load_twin_document};
+use gripgen_cli::{ImageComparison, compare_images};
+use gripgen_measured::{Suspects, load_pulls_with};
 use std::path::Path;
 
 /// The twin that makes the sweeps here.

@@ -3,7 +3,9 @@
 use crate::common::{jobs, project, run};
 use gripgen::twin::Twin;
 use gripgen::{BASELINE_TWIN, Library, Location};
-use gripgen::{compare_pulls, load_pulls, load_twin_document, pull_comparison_page, pull_ratios};
+use gripgen::{load_twin_document, pull_comparison_page, pull_ratios};
+use gripgen_cli::compare_pulls;
+use gripgen_measured::load_pulls;
 
 /// Pulls of the paper's twin, taken as measured, against the twin without its correction: the fit gives back a and b of the
 /// paper's table, which the twin carries.

@@ -4,10 +4,9 @@ use crate::common::root;
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::{CampaignOptions, Diagnosis, Verdict, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
-use gripgen::{
-    Diagnosed, Library, Location, PullDiagnoseOptions, Suspects, calibrate_twin, compare_pulls,
-    diagnose_pull_table, edited_twin, load_pulls, load_pulls_with, load_twin_document, simulate_campaign,
-};
+use gripgen::{Diagnosed, Library, Location, load_twin_document};
+use gripgen_cli::{PullDiagnoseOptions, calibrate_twin, compare_pulls, diagnose_pull_table, edited_twin, simulate_campaign};
+use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
 
 pub(crate) fn baseline() -> Location {
     Location::parse("asset:configs/twin-baseline.toml")

@@ -7,7 +7,7 @@ use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{ExtraColumn, MeasuredPulls, PullTrace, TraceRow, Values};
-use gripgen::{calibrate_twin, edited_twin};
+use gripgen_cli::{calibrate_twin, edited_twin};
 
 /// Labels alone, as they are copied from a screen.
 fn labels_alone(mut measured: MeasuredPulls) -> MeasuredPulls {

@@ -116,7 +116,7 @@ fn a_plan_says_the_pressure_over_the_modulus() {
         ];
         let cheap = ["vary.grip_angle_deg=[0]", "images=none", "trace=none", "mechanics=reduced"];
         let p = project("asset:configs/quickstart.toml", &[&at[..], &cheap, sets].concat());
-        gripgen::plan(&p, SimdLevel::best()).unwrap().probes[0].pressure_over_modulus
+        gripgen_cli::plan(&p, SimdLevel::best()).unwrap().probes[0].pressure_over_modulus
     };
     assert_eq!(share(&[]), None, "the pyramid has no modulus");
     let of =

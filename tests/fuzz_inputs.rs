@@ -3,10 +3,12 @@
 //! Few of each here; `GRIPGEN_FUZZ=100000` sets how many, and `docs/reliability.md` has the counts of such a run.
 
 use crate::common::{jobs, run, small_project};
-use gripgen::record::{ShardReader, read_campaign};
+use gripgen::record::ShardReader;
+use gripgen_measured::read_campaign;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Posterior, TriMesh, write_binary_stl};
-use gripgen::{Location, Project, load_pulls, load_twin_document};
+use gripgen::{Location, Project, load_twin_document};
+use gripgen_measured::load_pulls;
 use nalgebra::Point3;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

@@ -6,7 +6,8 @@ mod lab;
 use gripgen::identify::pulls::calibrate::{CalibrateRequest, PullCalibration};
 use gripgen::twin::Twin;
 use gripgen::twin::config::Feedback;
-use gripgen::{Library, Location, calibrate_twin, load_twin_document};
+use gripgen::{Library, Location, load_twin_document};
+use gripgen_cli::calibrate_twin;
 use lab::{Contact, Plan, World, campaign};
 
 fn world(index: u64, contact: Contact, kinetic_ratio: f64) -> World {

@@ -3,7 +3,7 @@
 use crate::common::{jobs, run, small_project};
 use gripgen::record::ShardReader;
 use gripgen::twin::config::Feedback;
-use gripgen::{Suspects, load_pulls, load_pulls_with};
+use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
 
 #[test]
 fn a_run_folder_is_a_campaign() {

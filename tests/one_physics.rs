@@ -7,10 +7,9 @@ use gripgen::twin::config::ConfigError;
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Campaign, PlannedPull, Twin};
-use gripgen::{
-    Library, Location, Project, SweepOptions, compare_pulls, load_pulls, load_twin_document,
-    simulate_campaign, sweep,
-};
+use gripgen::{Library, Location, Project, SweepOptions, load_twin_document, sweep};
+use gripgen_cli::{compare_pulls, simulate_campaign};
+use gripgen_measured::load_pulls;
 use std::sync::atomic::AtomicBool;
 
 /// A twin by what is added to the shipped baseline.

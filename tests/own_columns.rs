@@ -3,7 +3,8 @@
 use crate::common::{jobs, project, run};
 use gripgen::identify::Verdict;
 use gripgen::twin::draw::Drawn;
-use gripgen::{LoadError, Location, Project, Suspects, load_pulls_with};
+use gripgen::{LoadError, Location, Project};
+use gripgen_measured::{Suspects, load_pulls_with};
 
 const TABLE: &str =
     "effects=[{name=\"table\",covariate=\"humidity_pct\",x=[30,60],factor=[1.0,0.7],physical=false}]";

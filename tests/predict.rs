@@ -1,11 +1,13 @@
 //! Predictions that fits are made with, against the simulator and closed forms.
 
 use crate::diagnose::{baseline, library, simulated, twin_at, twin_with};
-use gripgen::identify::pulls::model::{ModelEffect, PredictPulls as _, PullModel};
+use gripgen::twin::predict::{ModelEffect, PredictPulls as _, PullModel};
 use gripgen::physics::label_moments;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{PullTrace, TraceRow, Twin, slip_label};
-use gripgen::{Location, PullPredictor, compare_pulls, given_model, load_twin_document};
+use gripgen::{Location, load_twin_document};
+use gripgen::physics::PullPredictor;
+use gripgen_cli::{compare_pulls, given_model};
 
 /// The closed form of the label over white noise against the rule applied to 4000 noisy traces: before and at a slip
 /// whose kinetic force stays within the tolerance for a while.
@@ -73,7 +75,7 @@ fn fits_see_what_the_simulator_does() {
     for (by_area, ratio, damping) in
         [(0.0, 0.93, 2000.0), (1.0, 0.93, 2000.0), (1.0, 0.9, 100.0), (0.4, 1.0, 500.0)]
     {
-        let predictor = PullPredictor::new(&measured, &twin, &library, 2);
+        let predictor = pull_predictor(&measured, &twin, &library, 2);
         let mut model = given_model(&twin, predictor.part_names()).unwrap();
         (model.shear_by_area, model.kinetic_ratio, model.damping_n_s_per_m) = (by_area, ratio, damping);
         let fast = predictor.pulls(&model, &rows);
@@ -107,7 +109,7 @@ fn fits_see_tools_that_creep() {
     let rows: Vec<usize> = (0..measured.pulls.len()).collect();
     let creep = gripgen::twin::effects::find("shear_creep").unwrap();
     for (by_area, rim) in [(0.0, 0.0), (0.0, 2.0 / 3.0), (1.0, 1.0 / 3.0)] {
-        let predictor = PullPredictor::new(&measured, &twin, &library, 2);
+        let predictor = pull_predictor(&measured, &twin, &library, 2);
         let mut model = given_model(&twin, predictor.part_names()).unwrap();
         (model.shear_by_area, model.kinetic_ratio) = (by_area, 0.95);
         let plain = predictor.pulls(&model, &rows);
@@ -150,7 +152,7 @@ fn fits_see_a_gain_that_drifts() {
             pull.increment_n = 0.8 + 0.05 * (i % profiles) as f64;
         }
         let rows: Vec<usize> = (0..measured.pulls.len()).collect();
-        let predictor = PullPredictor::new(&measured, &twin, &library, 2);
+        let predictor = pull_predictor(&measured, &twin, &library, 2);
         let mut model = given_model(&twin, predictor.part_names()).unwrap();
         (model.shear_by_area, model.kinetic_ratio, model.effects) = (by_area, 0.93, vec![drift.clone()]);
         let fast = predictor.pulls(&model, &rows);
@@ -161,7 +163,7 @@ fn fits_see_a_gain_that_drifts() {
         let acts = mean(&|i| (plain[i] - exact[i]).abs()) / mean(&|i| exact[i]);
         println!("{profiles} profiles, by area {by_area}: {:.2} % of {:.1} %", 100.0 * off, 100.0 * acts);
         assert!(off < 0.003 && acts > 0.05, "{profiles} profiles, by area {by_area}: {off}, {acts}");
-        let other = PullPredictor::new(&measured, &twin, &library, 1);
+        let other = pull_predictor(&measured, &twin, &library, 1);
         let mut nearby = model.clone();
         nearby.mu[0] *= 1.07;
         other.pulls(&nearby, &rows);
@@ -185,7 +187,7 @@ fn slips_at_the_end_of_the_range_hardly_scatter() {
         (pull.grip_force_n, pull.trace) = (8.0 + 6.0 * i as f64, None);
     }
     let rows: Vec<usize> = (0..measured.pulls.len()).collect();
-    let predictor = PullPredictor::new(&measured, &twin, &library, 1);
+    let predictor = pull_predictor(&measured, &twin, &library, 1);
     let mut model = given_model(&twin, predictor.part_names()).unwrap();
     model.scatter = 0.05;
     let plain = predictor.slips(&model, &rows);

@@ -6,9 +6,8 @@ use gripgen::identify::{Diagnosis, Verdict};
 use gripgen::tactile::presses::{Circle, Indenter, IndenterPose, Press, PressContact, PressScene, PressSet};
 use gripgen::tactile::{Sensor, finish};
 use gripgen::twin::{OpticsState, TactileImage};
-use gripgen::{
-    PressColumns, PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses, measured_presses,
-};
+use gripgen_cli::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses, measured_presses};
+use gripgen_measured::PressColumns;
 use std::sync::Arc;
 
 const PRESSES: usize = 12;

@@ -9,7 +9,9 @@ use gripgen::tactile::presses::{
 };
 use gripgen::tactile::{GelShape, finish};
 use gripgen::twin::{TriMesh, write_binary_stl};
-use gripgen::{Location, PressGeometry, RenderOptions, in_parallel, load_presses, load_sensor, render_file};
+use gripgen::Location;
+use gripgen::physics::in_parallel;
+use gripgen_cli::{PressGeometry, RenderOptions, load_presses, load_sensor, render_file};
 use nalgebra::Point3;
 use std::time::Instant;
 

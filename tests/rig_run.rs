@@ -11,10 +11,9 @@ use gripgen::twin::{
     Campaign, MeasuredPull, Outcome, PerJaw, PlannedPull, Scenario, SlipLabel, TactileImage, Values,
     slip_label,
 };
-use gripgen::{
-    Draw, Location, PullDiagnoseOptions, Simulator, calibrate_imprints, compare_pulls, contact_sheet,
-    contact_sheet_samples, diagnose_pull_table, load_pulls, sample_picture, simulate_campaign,
-};
+use gripgen::{Draw, Location, Simulator, contact_sheet, contact_sheet_samples, sample_picture};
+use gripgen_cli::{PullDiagnoseOptions, calibrate_imprints, compare_pulls, diagnose_pull_table, simulate_campaign};
+use gripgen_measured::load_pulls;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -1,12 +1,14 @@
 //! Labels against their own traces, through the whole pipeline.
 
 use crate::common::{jobs, run};
-use gripgen::record::{Dataset, read_judged_pulls, write_pull_folder};
+use gripgen::record::Dataset;
+use gripgen_measured::{read_judged_pulls, write_pull_folder};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
 use gripgen::twin::evidence::{Expected, LabelEvidence, Verdict, judge};
 use gripgen::twin::{MeasuredPulls, Outcome, Pulled};
-use gripgen::{Location, Project, Suspects, generate, load_pulls, load_pulls_with};
+use gripgen::{Location, Project, generate};
+use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
 use std::path::Path;
 
 /// Pulls of the gear by the reduced mechanics, with these effects; no images.

@@ -3,7 +3,8 @@
 use crate::solids::{Solid, SolidPart, ordinary};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::{Jaw, Outcome};
-use gripgen::{Location, PartOptions, Project, TryOptions, TryPartError, generate, part_starter, try_part};
+use gripgen::{Location, Project, generate};
+use gripgen_cli::{PartOptions, TryOptions, TryPartError, part_starter, try_part};
 use std::path::Path;
 
 const PART: PartOptions =

@@ -3,9 +3,8 @@
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::config::{CalibrationFile, EffectFile};
 use gripgen::twin::{Outcome, Pulled, Twin};
-use gripgen::{
-    EditedValue, Location, Project, TwinEdits, edited_twin, generate, load_twin_document, write_twin,
-};
+use gripgen::{Location, Project, generate, load_twin_document};
+use gripgen_cli::{EditedValue, TwinEdits, edited_twin, write_twin};
 use std::path::Path;
 
 fn twin(at: &Location) -> Twin {

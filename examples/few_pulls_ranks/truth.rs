@@ -3,7 +3,8 @@
 use gripgen::identify::pulls::priors::PullPriors;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Campaign, MeasuredPulls, PlannedPull, Twin};
-use gripgen::{Library, Location, load_twin_document, shipped_priors, simulate_campaign};
+use gripgen::{Library, Location, load_twin_document};
+use gripgen_cli::{shipped_priors, simulate_campaign};
 
 const TWIN: &str = "asset:configs/twin-baseline.toml";
 pub const PART: &str = "gear";

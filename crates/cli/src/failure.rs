@@ -4,7 +4,8 @@ use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use gripgen::record::{ExportError, FolderError, ReadError};
 use gripgen::tactile::presses::HeightsError;
 use gripgen::twin::config::{ConfigError, Place};
-use gripgen::{BenchError, LoadError, LoadSensorError, OpenPlantError, RenderError, SweepError};
+use gripgen::{LoadError, OpenPlantError, SweepError};
+use crate::{BenchError, LoadSensorError, RenderError};
 use std::fmt::Display;
 use std::io;
 

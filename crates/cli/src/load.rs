@@ -7,11 +7,9 @@ use crate::shell;
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::PressSet;
 use gripgen::twin::Twin;
-use gripgen::{
-    FoundCircles, Library, LoadPressesError, LoadPullsError, LoadSensorError, LoadedPulls, Location,
-    PressGeometry, Suspects, is_pulls, load_presses, load_pulls_with, load_sensor, load_twin_document,
-    load_twin_sensor,
-};
+use gripgen::{Library, Location, load_twin_document};
+use crate::{FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, load_presses, load_sensor, load_twin_sensor};
+use gripgen_measured::{LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls_with};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

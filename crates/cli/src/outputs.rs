@@ -12,7 +12,7 @@ pub use pending::{Pending, PendingFolder};
 use crate::failure::{Failure, no_room};
 use crate::mark::{Format, Mark, mark_of, marked, short_hash};
 use crate::own_files::{IMAGES_FOLDER, owner};
-use gripgen::record::{CAMPAIGN_FILE, PULLS_FILE, TRACES_FOLDER};
+use gripgen_measured::{CAMPAIGN_FILE, PULLS_FILE, TRACES_FOLDER};
 use std::collections::hash_map::RandomState;
 use std::fs::File;
 use std::hash::BuildHasher;

@@ -2,9 +2,8 @@
 
 use crate::mark::mark_of;
 use gripgen::CONTACT_SHEET;
-use gripgen::record::{
-    CAMPAIGN_FILE, IMPRINTS_FILE, PRESSES_FILE, PULLS_FILE, ROSBAG_FILE, SENSOR_FILE, TRACES_FOLDER,
-};
+use gripgen::record::ROSBAG_FILE;
+use gripgen_measured::{CAMPAIGN_FILE, IMPRINTS_FILE, PRESSES_FILE, PULLS_FILE, SENSOR_FILE, TRACES_FOLDER};
 use std::ffi::OsStr;
 use std::path::Path;
 

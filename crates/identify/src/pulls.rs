@@ -28,7 +28,6 @@ mod law;
 mod learnt;
 mod levels;
 pub mod likelihood;
-pub mod model;
 mod naming;
 mod null;
 pub mod observe;

@@ -3,7 +3,8 @@
 use crate::error;
 use gripgen::tactile::npz::Array;
 use gripgen::tactile::presses::RenderedBody;
-use gripgen::{Location, RenderOptions, load_sensor, render_file, render_surface};
+use gripgen::Location;
+use gripgen_cli::{RenderOptions, load_sensor, render_file, render_surface};
 use gripgen_cli::Failure;
 use numpy::{PyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;

@@ -87,7 +87,7 @@ pub(crate) fn decode_grey(bytes: &[u8], wanted: (u32, u32)) -> Result<Vec<u16>, 
 }
 
 /// Whether bytes begin like a JPEG, whatever their file is called.
-pub(crate) fn is_jpeg(bytes: &[u8]) -> bool {
+pub fn is_jpeg(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0xff, 0xd8, 0xff])
 }
 

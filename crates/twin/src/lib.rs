@@ -50,6 +50,7 @@ mod patch;
 pub mod pixel_noise;
 pub mod plant;
 mod posterior;
+pub mod predict;
 mod profile;
 pub mod random;
 mod rounded;

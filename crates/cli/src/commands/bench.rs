@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::twin::config::Backend;
-use gripgen::{BenchOptions, BenchReport, bench};
+use crate::{BenchOptions, BenchReport, bench};
 use serde_json::{Value, json};
 
 /// Runs the verb.

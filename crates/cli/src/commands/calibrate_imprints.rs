@@ -8,7 +8,8 @@ use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::identify::{ImprintConstants, ParameterEstimate, SharedConstant};
-use gripgen::{Location, calibrate_imprint_table, edited_twin_toml, imprint_calibration_edits};
+use gripgen::Location;
+use crate::{calibrate_imprint_table, edited_twin_toml, imprint_calibration_edits};
 use serde_json::{Map, Value, json};
 
 /// Runs the verb.

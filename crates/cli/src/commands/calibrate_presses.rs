@@ -13,7 +13,8 @@ use gripgen::tactile::presses::{
 };
 use gripgen::tactile::{GelShape, Sensor};
 use gripgen::twin::TactileImage;
-use gripgen::{PressGeometry, PressMap, PressReportText, find_missing_circles, load_presses, press_report};
+use gripgen::{PressMap, PressReportText, press_report};
+use crate::{PressGeometry, find_missing_circles, load_presses};
 use serde_json::{Value, json};
 use std::path::Path;
 

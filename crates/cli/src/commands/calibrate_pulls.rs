@@ -8,10 +8,8 @@ use crate::outputs::Outputs;
 use crate::posterior;
 use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
-use gripgen::{
-    CalibratePullsError, ImprintCalibrations, Location, calibrate_imprints, calibrate_twin, edited_twin_toml,
-    load_twin_document, pull_priors,
-};
+use gripgen::{Location, load_twin_document};
+use crate::{CalibratePullsError, ImprintCalibrations, calibrate_imprints, calibrate_twin, edited_twin_toml, pull_priors};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::Path;

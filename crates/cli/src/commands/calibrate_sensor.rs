@@ -6,9 +6,8 @@ use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::identify::{ParameterEstimate, SensorCalibration};
-use gripgen::{
-    Location, calibrate_sensor_table, edited_twin_toml, load_sensor_table, sensor_calibration_edits,
-};
+use gripgen::Location;
+use crate::{calibrate_sensor_table, edited_twin_toml, load_sensor_table, sensor_calibration_edits};
 use serde_json::json;
 use std::fmt::Write;
 

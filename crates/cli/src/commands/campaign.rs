@@ -10,10 +10,12 @@ use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
-use gripgen::record::{campaign_toml, write_pull_folder};
+use gripgen_measured::{campaign_toml, write_pull_folder};
 use gripgen::twin::effects::OutsideFit;
 use gripgen::twin::{Campaign, PullKind, Twin};
-use gripgen::{Location, NextPulls, Suspects, simulate_campaign};
+use gripgen::Location;
+use crate::{NextPulls, simulate_campaign};
+use gripgen_measured::Suspects;
 use serde_json::json;
 use std::path::Path;
 

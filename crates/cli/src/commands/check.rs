@@ -7,7 +7,9 @@ use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::record::{proto::gripgen_v1::Status, status_name};
 use gripgen::tactile::{LINEAR_PRESSURE_SHARE, SimdLevel};
-use gripgen::{Beyond, Location, Plan, Project, Unvaried, beyond, plan, unvaried};
+use gripgen::{Location, Project};
+use crate::{Plan, plan};
+use crate::{Beyond, Unvaried, beyond, unvaried};
 use serde_json::json;
 use std::path::Path;
 

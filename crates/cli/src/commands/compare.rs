@@ -14,11 +14,10 @@ use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
-use gripgen::{
-    LabelErrors, Location, PartRatio, PressReportText, compare_images, compare_pulls_with,
-    find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, load_pulls_with,
-    load_twin_document, posterior_twins, press_report, pull_comparison_page, pull_ratios, unmeasured,
-};
+use gripgen::{Location, PressReportText, load_twin_document, press_report, pull_comparison_page, pull_ratios};
+use crate::{LabelErrors, compare_images, compare_pulls_with, find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, posterior_twins, unmeasured};
+use gripgen_identify::PartRatio;
+use gripgen_measured::load_pulls_with;
 use serde_json::{Value, json};
 
 /// Runs the verb.

@@ -1,6 +1,6 @@
 //! What `gripgen compare` says of the images of pulls.
 
-use gripgen::ImageComparison;
+use crate::ImageComparison;
 use gripgen::tactile::metrics::Score;
 use serde_json::{Map, Value, json};
 

@@ -4,7 +4,7 @@ use crate::args::CompareArgs;
 use crate::failure::Failure;
 use crate::load::load_twin;
 use crate::output::{JsonSink, print};
-use gripgen::{compare_sensor_table, load_sensor_table};
+use crate::{compare_sensor_table, load_sensor_table};
 use serde_json::{Map, json};
 
 /// Runs the verb.

@@ -15,10 +15,9 @@ use crate::posterior;
 use crate::progress::Share;
 use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
-use gripgen::{
-    Diagnosed, Library, PullDiagnoseOptions, Suspects, diagnose_pull_table, diagnose_sensor_table,
-    is_imprint_set, is_press_set, is_sensor_table, load_sensor_table,
-};
+use gripgen::{Diagnosed, Library};
+use crate::{PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_imprint_set, is_press_set, is_sensor_table, load_sensor_table};
+use gripgen_measured::Suspects;
 use std::path::Path;
 
 /// Runs the verb.

@@ -8,7 +8,8 @@ use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::twin::config::suggestion;
 use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, ParameterSpec, PressNeeds, Seen, find};
-use gripgen::{BASELINE_TWIN, EffectCurve, effect_curve};
+use gripgen::BASELINE_TWIN;
+use crate::{EffectCurve, effect_curve};
 use serde_json::{Value, json};
 use std::fmt::Write;
 

@@ -5,10 +5,8 @@ use crate::failure::Failure;
 use crate::load::load_twin;
 use crate::output::{JsonSink, print};
 use gripgen::twin::{Jaw, Twin};
-use gripgen::{
-    Diagnosed, ImprintSet, Location, compare_imprint_table, diagnose_imprint_table, load_imprint_set,
-    load_sensor,
-};
+use gripgen::{Diagnosed, Location};
+use crate::{ImprintSet, compare_imprint_table, diagnose_imprint_table, load_imprint_set, load_sensor};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 

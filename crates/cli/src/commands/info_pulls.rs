@@ -4,8 +4,10 @@ use crate::args::InfoArgs;
 use crate::failure::Failure;
 use crate::load::{no_pulls, say_warnings};
 use crate::output::{JsonSink, count, print};
-use gripgen::record::{PULLS_FILE, ROSBAG_FILE};
-use gripgen::{Level, levels, load_pulls_of};
+use gripgen::record::ROSBAG_FILE;
+use gripgen_measured::PULLS_FILE;
+use gripgen_identify::{Level, levels};
+use gripgen_measured::load_pulls_of;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 

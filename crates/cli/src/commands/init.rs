@@ -8,7 +8,7 @@ use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::twin::{MESH_FORMATS, usual_scale_mm_per_unit};
-use gripgen::{PartOptions, benchmark_starter, part_starter, starter};
+use crate::{PartOptions, benchmark_starter, part_starter, starter};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

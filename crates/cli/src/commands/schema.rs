@@ -3,7 +3,7 @@
 use crate::args::{SchemaArgs, SchemaKind};
 use crate::failure::Failure;
 use crate::output::print;
-use gripgen::{campaign_schema, rosbag_schema, sweep_schema, twin_schema};
+use crate::{campaign_schema, rosbag_schema, sweep_schema, twin_schema};
 use gripgen_rig::experiment::rig_schema;
 
 /// Runs the verb.

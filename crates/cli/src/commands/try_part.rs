@@ -9,7 +9,7 @@ use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::twin::usual_scale_mm_per_unit;
-use gripgen::{GripTried, PartOptions, TriedPart, TryOptions, TryPartError, try_part};
+use crate::{GripTried, PartOptions, TriedPart, TryOptions, TryPartError, try_part};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

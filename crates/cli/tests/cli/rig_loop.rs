@@ -2,7 +2,9 @@
 
 use super::{assert_code, gripgen, run, text};
 use gripgen::twin::Twin;
-use gripgen::{BASELINE_TWIN, Library, Location, PullDiagnoseOptions, diagnose_pull_table, load_pulls_of};
+use gripgen::{BASELINE_TWIN, Library, Location};
+use gripgen_cli::{PullDiagnoseOptions, diagnose_pull_table};
+use gripgen_measured::load_pulls_of;
 use std::cell::Cell;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};

@@ -9,7 +9,7 @@ use super::estimates::baseline;
 use super::fitting::Fitted;
 use super::heldout::{HeldOutScore, by_value, folds, held_out_score, noise_floor_n, predicted, scatter};
 use super::instead::tied_instead;
-use super::model::{PredictPulls, PullModel};
+use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::naming::named;
 use super::one_level::of_one_level;
 use super::paying::{by_chance, paying};

@@ -14,7 +14,7 @@ use super::heldout::{folds, predicted};
 use super::intervals::NormalFit;
 use super::label_noise::{TRIED_FROM_N, TRIED_TO_N};
 use super::law::largest_relative_sigma;
-use super::model::{PredictPulls, PullModel};
+use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::posterior::of_calibration;
 use super::priors::PullPriors;
 use super::recalibrated::corrected;

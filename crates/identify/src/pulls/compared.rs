@@ -1,7 +1,7 @@
 //! A model against a campaign: how far labels, slips and readings lie from what it predicts, and in which deviations.
 
 use super::context::{Context, Observation};
-use super::model::{PullModel, PullPrediction};
+use gripgen_twin::predict::{PullModel, PullPrediction};
 use super::observe::LEVELS;
 use super::slip::SlipLimit;
 use super::trace_residuals::{OWN_N, SHARED_N, TraceResiduals};

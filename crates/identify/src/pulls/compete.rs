@@ -1,7 +1,7 @@
 //! Fits of all rivals beside a model.
 
 use super::fitting::Fitted;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::power::ScoreTest;
 use super::search::{Entry, ModelTerm, Search};
 use super::terms::Terms;

@@ -2,7 +2,7 @@
 
 use super::fitting::Fitted;
 use super::heldout::predicted;
-use super::model::PullPrediction;
+use gripgen_twin::predict::PullPrediction;
 use super::search::{Accepted, Search};
 use super::worth::BAD;
 

@@ -3,7 +3,7 @@
 use super::creep::{Creep, without_slips_that_rise};
 use super::data::PullData;
 use super::likelihood::Tails;
-use super::model::{PredictPulls, PullModel};
+use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::observe::{LEVELS, TraceObservation, fall_s, noise_n, observe};
 use super::slip::{SlipLimit, SlipRig, SlipTrace, Slips, read_slips};
 use super::terms::Terms;

@@ -9,7 +9,7 @@
 
 mod trace;
 
-use super::model::ModelEffect;
+use gripgen_twin::predict::ModelEffect;
 use super::observe::median;
 use gripgen_twin::effects::LIBRARY;
 use gripgen_twin::{MeasuredPull, PullTrace};

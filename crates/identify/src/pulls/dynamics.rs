@@ -1,7 +1,7 @@
 //! Lag and dead time of the force loop from traces, with what they are known to.
 
 use super::context::Context;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::observe::START_S;
 use crate::bounded::interval90;
 use crate::least_squares::{FitOptions, FreeParameter, fit};

@@ -4,7 +4,7 @@ use super::candidates::Candidate;
 use super::context::Context;
 use super::fitting::Fitted;
 use super::heldout::scatter;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use crate::diagnosis::ParameterEstimate;
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ const FAR: f64 = 1e3;
 /// Values of an effect in a fit, by name.
 pub(super) fn parameters(fitted: &Fitted, candidate: &Candidate) -> BTreeMap<String, ParameterEstimate> {
     let part = candidate.part.as_ref().map(|p| p.0);
-    let own = |e: &&super::model::ModelEffect| e.spec == candidate.spec && e.part == part;
+    let own = |e: &&gripgen_twin::predict::ModelEffect| e.spec == candidate.spec && e.part == part;
     let Some(effect) = fitted.model.effects.iter().find(own) else {
         return BTreeMap::new();
     };

@@ -12,7 +12,7 @@ use super::context::Context;
 use super::data::PullData;
 use super::estimates::plain_baseline;
 use super::law::{OffsetLaw, largest_relative_sigma};
-use super::model::{ModelEffect, PredictPulls, PullModel};
+use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel};
 use super::priors::PullPriors;
 use super::units::other_unit;
 use crate::diagnosis::ParameterEstimate;

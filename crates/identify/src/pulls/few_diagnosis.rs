@@ -3,7 +3,7 @@
 use super::answer::blank;
 use super::data::PullData;
 use super::few::{FEW_PULLS, FewPulls, calibrate_few};
-use super::model::{PredictPulls, PullModel};
+use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::priors::PullPriors;
 use crate::diagnosis::{Diagnosis, Hint};
 use gripgen_twin::MeasuredPulls;

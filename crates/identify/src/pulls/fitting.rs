@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::likelihood::{Likelihood, likelihood};
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::terms::Terms;
 use super::trace_residuals::Widening;
 use crate::least_squares::{FitOptions, FreeParameter, fit};

@@ -4,7 +4,7 @@ use super::candidates::Candidate;
 use super::context::Context;
 use super::fitting::Fitted;
 use super::learnt::learnt_again;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::terms::Terms;
 use crate::draws::Draws;
 use std::sync::Mutex;

@@ -5,7 +5,7 @@
 //! without scattering them. What was taken for granted instead came back as such an offset.
 
 use super::context::Context;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::terms::Terms;
 use std::sync::Mutex;
 

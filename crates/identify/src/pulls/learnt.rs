@@ -4,7 +4,7 @@ use super::context::Context;
 use super::curves::{CLOCKS, Curve, SESSION};
 use super::evidence::{Grouped, Learnt, MOST};
 use super::fitting::Fitted;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::smooth::smooths;
 use nalgebra::{DMatrix, DVector};
 

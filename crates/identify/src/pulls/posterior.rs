@@ -5,7 +5,7 @@
 
 use super::fitting::Fitted;
 use super::intervals::NormalFit;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::search::Accepted;
 use crate::diagnosis::Diagnosis;
 use gripgen_twin::effects::OFFSET_LAW;

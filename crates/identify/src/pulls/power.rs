@@ -3,7 +3,7 @@
 use super::candidates::Candidate;
 use super::context::Context;
 use super::curves::Curve;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::terms::Terms;
 use super::trace_residuals::Widening;
 use crate::diagnosis::Detectable;

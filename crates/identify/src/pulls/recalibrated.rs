@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::fitting::Fitted;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::scatter::scatter;
 use super::terms::Terms;
 

@@ -10,7 +10,7 @@
 //! ends its pulls later than the rig does.
 
 use super::context::Context;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use super::observe::{TraceObservation, median};
 
 /// Fewest rows of a slide, and fewest slides.

@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::fitting::Fitted;
 use super::heldout::scatter;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 
 impl Context<'_> {
     /// Learns what the simulator's labels lie above the fast prediction at a model: fits near it are fits through the simulator.

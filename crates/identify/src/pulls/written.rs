@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::fitting::Fitted;
 use super::heldout::predicted;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use std::sync::Mutex;
 
 /// What a fit and all that follows from it depend on.

@@ -9,7 +9,7 @@
 
 use super::context::Context;
 use super::data::Column;
-use super::model::PullModel;
+use gripgen_twin::predict::PullModel;
 use crate::diagnosis::UnknownCovariate;
 use crate::draws::Draws;
 

@@ -12,7 +12,7 @@ impl Dataset {
     pub fn has_films(&self) -> Result<bool, DatasetError> {
         match &self.source {
             Source::Run { .. } | Source::Shard(_) => Ok(self.shard_of(0)?.0.has_film()),
-            Source::Pulls { .. } => Ok(false),
+            Source::Measured(_) => Ok(false),
         }
     }
 
@@ -23,7 +23,7 @@ impl Dataset {
     /// A row that is not there, or a shard that cannot be read.
     pub fn film(&self, row: usize) -> Result<Option<Film>, DatasetError> {
         self.check_row(row)?;
-        if matches!(self.source, Source::Pulls { .. }) {
+        if matches!(self.source, Source::Measured(_)) {
             return Ok(None);
         }
         let (reader, index) = self.shard_of(row)?;

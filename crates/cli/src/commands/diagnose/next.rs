@@ -8,9 +8,11 @@ use crate::output::program;
 use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::identify::{Channel, Diagnosis, Verdict};
-use gripgen::record::{RIG_SOURCE, RunFolder, campaign_toml};
+use gripgen::record::{RIG_SOURCE, RunFolder};
+use gripgen_measured::campaign_toml;
 use gripgen::twin::can_be_drawn;
-use gripgen::{BASELINE_TWIN, Diagnosed, Location, NextPulls, Project, unvaried};
+use gripgen::{BASELINE_TWIN, Diagnosed, Location, Project};
+use crate::{NextPulls, unvaried};
 use std::path::{Path, PathBuf};
 
 /// The sweep that works with every twin of ours.

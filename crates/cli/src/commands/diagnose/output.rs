@@ -10,7 +10,8 @@ use crate::outputs::Outputs;
 use crate::posterior;
 use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, PosteriorFile, Verdict};
 use gripgen::twin::rounded;
-use gripgen::{Diagnosed, Location, diagnosis_page, edited_twin_toml};
+use gripgen::{Diagnosed, Location, diagnosis_page};
+use crate::edited_twin_toml;
 use std::fmt::Write;
 use std::path::Path;
 

@@ -4,9 +4,9 @@ use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
 use crate::load::{load_sensor_and_presses, say_circles};
 use crate::progress::Share;
-use gripgen::{
-    Diagnosed, Location, diagnose_measured_presses, load_press_columns, load_twin_document, measured_presses,
-};
+use gripgen::{Diagnosed, Location, load_twin_document};
+use crate::{diagnose_measured_presses, measured_presses};
+use gripgen_measured::load_press_columns;
 
 /// Diagnoses the presses of the arguments.
 pub fn presses(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {

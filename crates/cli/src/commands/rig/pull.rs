@@ -11,10 +11,8 @@ use crate::failure::{Failure, another_run, code};
 use crate::interrupt::stop_flag;
 use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
-use gripgen::record::{
-    FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls,
-    read_campaign, suspect_pulls, write_rig_pull,
-};
+use gripgen::record::{FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls, suspect_pulls, write_rig_pull};
+use gripgen_measured::read_campaign;
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
 use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_differences, rig_run_toml};
 use gripgen_rig::experiment::check::check;

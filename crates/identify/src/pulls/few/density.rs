@@ -2,7 +2,7 @@
 
 use super::super::context::Context;
 use super::super::data::PullData;
-use super::super::model::{PredictPulls, PullModel};
+use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::super::priors::PullPriors;
 use super::part::PartOnRig;
 use super::prepared;

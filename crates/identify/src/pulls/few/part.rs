@@ -4,7 +4,7 @@
 //! weighed by likelihood and prior over the density that they were drawn from. The mean weight is the evidence of the rig.
 
 use super::super::context::Context;
-use super::super::model::{ModelEffect, PullModel};
+use gripgen_twin::predict::{ModelEffect, PullModel};
 use super::super::priors::PullPriors;
 use crate::draws::Draws;
 use crate::least_squares::{FitOptions, FreeParameter, fit};

@@ -93,7 +93,7 @@ fn a_column_of_ones_own_is_drawn_by_the_next_sweep() {
     let table = "[{name=\"table\",covariate=\"humidity_pct\",x=[30,60],factor=[1.0,0.7],physical=false}]";
     let wet = [("effects".to_string(), table.to_string())];
     let baseline = Location::parse(BASELINE_TWIN);
-    std::fs::write(&out, gripgen::edited_twin_toml(&baseline, &wet, &Default::default(), &out).unwrap())
+    std::fs::write(&out, crate::edited_twin_toml(&baseline, &wet, &Default::default(), &out).unwrap())
         .unwrap();
     let args = typed(&["lab", "-o", out.to_str().unwrap()]);
     let (_, command) = first(&args, &answered(Verdict::Unknown, &[]), None);
@@ -115,7 +115,7 @@ fn the_next_sweep_is_one_that_runs() {
     let effects = format!("[{}, {}, {}]", table("mu"), table("parts.gear.mu"), table("humidity_pct"));
     let baseline = Location::parse(BASELINE_TWIN);
     let text =
-        gripgen::edited_twin_toml(&baseline, &[("effects".into(), effects)], &Default::default(), &out);
+        crate::edited_twin_toml(&baseline, &[("effects".into(), effects)], &Default::default(), &out);
     std::fs::write(&out, text.unwrap()).unwrap();
     let args = typed(&["lab", "-o", out.to_str().unwrap()]);
     let mut found = answered(Verdict::Unknown, &[]);

@@ -1,0 +1,49 @@
+//! Bodies that are pressed into a sensor, from their meshes.
+
+use super::LoadPressesError;
+use gripgen::read_mesh;
+use gripgen_measured::PressedBody;
+use gripgen_tactile::Grid;
+use gripgen_tactile::presses::{Indenter, IndenterPose};
+use gripgen_twin::{TactileImage, TriMesh};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Meshes of indenters are in millimetres.
+const METRES_PER_UNIT: f64 = 1e-3;
+
+/// The bodies of a folder; each mesh is read once.
+pub(super) struct PressBodies {
+    folder: PathBuf,
+    metres_per_px: f64,
+    meshes: BTreeMap<String, TriMesh>,
+}
+
+impl PressBodies {
+    pub(super) fn new(folder: &Path, metres_per_px: f64) -> Self {
+        Self { folder: folder.into(), metres_per_px, meshes: BTreeMap::new() }
+    }
+
+    /// A body at its place in an image, `travel_m` after first contact.
+    pub(super) fn indenter(
+        &mut self,
+        body: &PressedBody,
+        at: IndenterPose,
+        travel_m: f64,
+        image: &TactileImage,
+    ) -> Result<Arc<Indenter>, LoadPressesError> {
+        let grid = Grid {
+            width_px: image.width_px as usize,
+            height_px: image.height_px as usize,
+            metres_per_px: self.metres_per_px,
+        };
+        if !self.meshes.contains_key(&body.mesh) {
+            self.meshes.insert(body.mesh.clone(), read_mesh(&self.folder.join(&body.mesh), METRES_PER_UNIT)?);
+        }
+        let indenter = Indenter::of_mesh(&body.shape, &self.meshes[&body.mesh], at, travel_m, &grid);
+        let indenter =
+            indenter.map_err(|source| LoadPressesError::Body { path: self.folder.clone(), source })?;
+        Ok(Arc::new(indenter))
+    }
+}

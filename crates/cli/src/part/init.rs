@@ -1,0 +1,421 @@
+//! Files to start from: commented configurations, and those for a part of one's own.
+
+mod benchmark;
+mod doubts;
+pub(crate) mod drawing;
+mod places;
+mod pose;
+mod propose;
+mod seen;
+mod text;
+mod trial;
+
+use gripgen::assets;
+use gripgen::{Library, LibraryError};
+use gripgen::Location;
+use gripgen::{BASELINE_TWIN, load_twin_document};
+pub use benchmark::{BenchmarkStarter, benchmark_starter};
+use gripgen_physics::{PartShape, Surface};
+use gripgen_tactile::ClusteredMesh;
+use gripgen_twin::{Jaw, MeshError, Part, TriMesh, Twin};
+pub(crate) use propose::Proposed;
+use propose::Search;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+pub use trial::Varied;
+pub(crate) use trial::{ANGLES_DEG, HIGHEST_N, Trial, TrialCell};
+
+/// Friction and imprint constant of a part of which nothing is known; `twin.toml` says so.
+pub(crate) const MU: f64 = 0.15;
+const IMPRINT_MM3_PER_N: f64 = 1.5;
+
+/// Name of the part while grips are looked for.
+pub(crate) const PART: &str = "part";
+
+/// The smallest of the largest forces that a grip is tried with.
+const LEAST_FORCE_N: f64 = 10.0;
+
+/// A part smaller or larger than this is asked about its unit.
+const SMALL_MM: f64 = 8.0;
+const LARGE_MM: f64 = 2000.0;
+
+/// A grip proposed for a part, which worked wherever the sweep goes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposal {
+    /// As in `[[parts.NAME.grips]]`.
+    pub origin_mm: [f64; 3],
+    /// As in `[[parts.NAME.grips]]`.
+    pub orientation_deg: [f64; 3],
+    /// Distance between the gels where they first touch.
+    pub width_mm: f64,
+    /// Contact area of the jaw that has less of it, at 40 N or the largest force that fits.
+    pub contact_mm2: f64,
+    /// Distance of the middle of mass from the jaw axis.
+    pub lever_mm: f64,
+    /// How much lower than the contact the part lies beside the pads; negative where it rises towards a finger.
+    pub clearance_mm: f64,
+}
+
+/// A file that `init` writes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StarterFile {
+    /// Its name in the folder.
+    pub name: String,
+    /// Its content.
+    pub bytes: Vec<u8>,
+}
+
+/// Files for a part, and what to tell about them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartStarter {
+    /// The files.
+    pub files: Vec<StarterFile>,
+    /// The grips proposed, the best first.
+    pub grips: Vec<Proposal>,
+    /// What the sweep varies beside the grip.
+    pub varied: Varied,
+    /// What is to be said of the mesh, a sentence each.
+    pub mesh_words: Vec<String>,
+    /// What is doubtful of each grip, a sentence each.
+    pub doubts: Vec<Vec<String>>,
+    /// Size of the part and the grips found, a line each.
+    pub summary: String,
+}
+
+/// Why a part has no grip.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoGrip {
+    /// The jaws do not open far enough.
+    #[error(
+        "the part is too wide: its narrowest place measures {narrowest_mm:.1} mm, the jaws open to {opening_mm:.0} mm and \
+         take {largest_mm:.1} mm"
+    )]
+    TooWide {
+        /// Narrowest place.
+        narrowest_mm: f64,
+        /// Opening of the gripper.
+        opening_mm: f64,
+        /// Widest grip.
+        largest_mm: f64,
+    },
+    /// No surfaces face each other.
+    #[error(
+        "the part is too round or too steep: where a gel rests its surface is inclined by {least_deg:.1} degrees or more, \
+         friction holds up to {allowed_deg:.1} degrees"
+    )]
+    TooSteep {
+        /// Smallest inclination found.
+        least_deg: f64,
+        /// Largest inclination that is proposed.
+        allowed_deg: f64,
+    },
+    /// The part presses through the gel.
+    #[error(
+        "the part is too small or too pointed, it presses through the gel: {force_n:.0} N need an imprint of {wanted_mm3:.1} \
+         mm3, the best place has {available_mm3:.1} mm3 before the gel is pressed through"
+    )]
+    TooDeep {
+        /// Smallest force tried.
+        force_n: f64,
+        /// Volume that it needs.
+        wanted_mm3: f64,
+        /// Largest volume found.
+        available_mm3: f64,
+    },
+    /// Something of the part is always in a jaw's way.
+    #[error(
+        "the part reaches beyond the open jaws at each of {places} places: they open to {opening_mm:.0} mm, half of it on \
+         either side"
+    )]
+    Beyond {
+        /// Places looked at.
+        places: usize,
+        /// Opening of the gripper.
+        opening_mm: f64,
+    },
+    /// Grips that look good fail when they are tried.
+    #[error(
+        "none of {tried} grips works when it is tried as a sweep does, from {LEAST_FORCE_N:.0} N on: {failure}"
+    )]
+    AllFail {
+        /// Grips tried.
+        tried: usize,
+        /// Why the first failed.
+        failure: String,
+    },
+}
+
+impl NoGrip {
+    /// What to do about it, of a part whose size is right.
+    fn hint(&self) -> &'static str {
+        match self {
+            NoGrip::TooWide { .. } | NoGrip::Beyond { .. } => {
+                "grips are looked for with the shipped gripper; for a wider one set gripper.opening_mm in a twin of your own \
+                 (`gripgen init FOLDER`) and write the grips into it"
+            }
+            _ => {
+                "write a grip that you know to hold into a twin of your own: `gripgen init FOLDER`, [[parts.NAME.grips]]"
+            }
+        }
+    }
+}
+
+/// Why there is nothing to start from.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InitError {
+    /// The mesh.
+    #[error(transparent)]
+    Mesh(#[from] LibraryError),
+    /// The mesh file.
+    #[error(transparent)]
+    Read(#[from] gripgen::ReadFileError),
+    /// The mesh encloses no volume.
+    #[error(
+        "{path}: the mesh is open: {open_edges} edges belong to one triangle only, gels would sink into its holes"
+    )]
+    Open {
+        /// The mesh file.
+        path: String,
+        /// Edges of one triangle only.
+        open_edges: usize,
+    },
+    /// No grip works.
+    #[error("{path}: no grip found on {x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm: {source}")]
+    NoGrip {
+        /// The mesh file.
+        path: String,
+        /// Size along x.
+        x_mm: f64,
+        /// Size along y.
+        y_mm: f64,
+        /// Size along z.
+        z_mm: f64,
+        /// Why.
+        source: NoGrip,
+    },
+}
+
+impl InitError {
+    /// What to do about it.
+    pub fn hint(&self) -> String {
+        let sizes_mm = match self {
+            InitError::Mesh(LibraryError::Mesh {
+                source: MeshError::Extent { x_mm, y_mm, z_mm }, ..
+            })
+            | InitError::NoGrip { x_mm, y_mm, z_mm, .. } => [*x_mm, *y_mm, *z_mm],
+            InitError::Open { .. } => {
+                return "close its holes (Meshlab, Blender), or go on with --accept-open-mesh".into();
+            }
+            InitError::Read(_) => return "a path is relative to where you are".into(),
+            _ => return "export the part as STL, OBJ, PLY or GLB".into(),
+        };
+        if let Some(guess) = unit_guess(sizes_mm) {
+            return guess;
+        }
+        match self {
+            // Its size is that of a part: the unit is right.
+            InitError::NoGrip { source, .. } => source.hint().into(),
+            _ => "--scale-mm-per-unit 1000 reads a file in metres, 25.4 one in inches".into(),
+        }
+    }
+}
+
+/// What the file's unit may be, of a part whose size is not that of a part.
+fn unit_guess(sizes_mm: [f64; 3]) -> Option<String> {
+    let largest = sizes_mm.iter().fold(0.0_f64, |a, &b| a.max(b));
+    let (unit, scale) = match largest {
+        x if x < 0.5 => ("metres", 1000.0),
+        x if x < SMALL_MM => ("inches", 25.4),
+        x if x > LARGE_MM => ("micrometres", 1e-3),
+        _ => return None,
+    };
+    let as_mm = largest * scale;
+    Some(format!("in {unit} the largest side would be {as_mm:.1} mm: --scale-mm-per-unit {scale}"))
+}
+
+/// A commented sweep and twin.
+pub fn starter() -> Vec<StarterFile> {
+    ["sweep.toml", "twin.toml"]
+        .map(|name| StarterFile {
+            name: name.into(),
+            bytes: assets::text(&format!("templates/{name}")).as_bytes().to_vec(),
+        })
+        .to_vec()
+}
+
+/// What `part_starter` is told beside the mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartOptions {
+    /// Millimetres per unit of the mesh file.
+    pub scale_mm_per_unit: f64,
+    /// Whether an open mesh is taken as it is.
+    pub accept_open_mesh: bool,
+    /// Friction coefficient of the part, if it was measured: what the twin is written with. Grips are looked for without it.
+    pub mu: Option<f64>,
+    /// Threads to try grips with; the result does not depend on them.
+    pub threads: usize,
+}
+
+/// A mesh that was read, looked at and searched for grips.
+pub(crate) struct Searched {
+    /// The file name as a TOML bare key.
+    pub(crate) name: String,
+    /// Content of the file.
+    pub(crate) bytes: Vec<u8>,
+    /// The mesh, in metres.
+    pub(crate) mesh: TriMesh,
+    /// Its extent along its axes.
+    pub(crate) size_mm: [f64; 3],
+    /// What is to be said of the mesh, a sentence each.
+    pub(crate) mesh_words: Vec<String>,
+    /// The rig, with a part named `part` that has the grips found.
+    pub(crate) twin: Twin,
+    /// The files of the twin.
+    pub(crate) library: Library,
+    /// The grips.
+    pub(crate) proposed: Proposed,
+}
+
+impl Searched {
+    /// Size of the part, for people.
+    pub(crate) fn size(&self) -> String {
+        let [x_mm, y_mm, z_mm] = self.size_mm;
+        format!("{x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm")
+    }
+}
+
+/// Reads a mesh, looks at it and tries grips on a rig.
+pub(crate) fn search(path: &Path, options: PartOptions, twin: Twin) -> Result<Searched, InitError> {
+    let location = Location::Disk(path.into());
+    let bytes = location.read()?.into_owned();
+    let metres_per_unit = options.scale_mm_per_unit * 1e-3;
+    let mesh = TriMesh::from_file_bytes(&bytes, location.extension(), metres_per_unit)
+        .map_err(|source| LibraryError::Mesh { location: location.clone(), source })?;
+    let look = mesh.look();
+    if !look.is_closed() && !options.accept_open_mesh {
+        return Err(InitError::Open { path: path.display().to_string(), open_edges: look.open_edges });
+    }
+    // The contact shape is built now, so that a mesh without volume is refused here.
+    PartShape::hull(&mesh, &gripgen_twin::frames::Pose::identity())
+        .map_err(|source| LibraryError::Shape { location: location.clone(), source })?;
+    let size_mm = mesh.extent_m().map(|s| s * 1e3);
+    let part = Part {
+        mesh: path.display().to_string(),
+        metres_per_unit,
+        grips: vec![],
+        mu: MU,
+        kinetic_ratio: 1.0,
+        kinetic_fall_s: 0.0,
+        scatter: 0.0,
+        imprint_m3_per_n: IMPRINT_MM3_PER_N * 1e-9,
+    };
+    let mut twin = Twin { parts: BTreeMap::from([(PART.to_string(), part.clone())]), ..twin };
+    // Paths are relative to where the program was started.
+    let library = Library::of_twin(&twin, &Location::Disk("twin.toml".into()))?;
+    for jaw in Jaw::BOTH {
+        library.check_sensor(&twin.optics[jaw], &twin.gel[jaw])?;
+    }
+    // Where lines meet the part, and its middle of mass, are those of faces that look outwards. Contacts and images are the same.
+    let (surface, clustered) = if look.faces_outwards() {
+        (library.surface(&part)?, library.clustered_mesh(&part)?)
+    } else {
+        let outwards = mesh.faced_outwards();
+        let clustered = Arc::new(ClusteredMesh::new(&outwards));
+        (Arc::new(Surface::new(Arc::new(outwards))), clustered)
+    };
+    let search = Search {
+        twin: &twin,
+        library: &library,
+        surface,
+        mesh: clustered,
+        part,
+        closed: look.is_closed(),
+        threads: options.threads,
+    };
+    let [x_mm, y_mm, z_mm] = size_mm;
+    let path_shown = || path.display().to_string();
+    let proposed =
+        search.run().map_err(|source| InitError::NoGrip { path: path_shown(), x_mm, y_mm, z_mm, source })?;
+    let grips = proposed.grips.iter().map(Proposal::part_from_mesh).collect();
+    twin.parts.get_mut(PART).expect("it was put there").grips = grips;
+    let mut mesh_words = look.words();
+    mesh_words.extend(unit_guess(size_mm).map(|guess| {
+        format!("the part measures {x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm; {guess}, if the file is not in mm")
+    }));
+    Ok(Searched { name: part_name(path), bytes, mesh, size_mm, mesh_words, twin, library, proposed })
+}
+
+/// A sweep, a twin with grips that were tried, a picture and a copy of the mesh, for the mesh file at `path`.
+///
+/// # Errors
+///
+/// A file that is no mesh, a mesh that is open, or a part on which no grip works.
+pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<PartStarter, InitError> {
+    let searched = search(path, options, baseline())?;
+    let size = searched.size();
+    let Searched { name, bytes, mesh, mesh_words, proposed, .. } = searched;
+    let (mesh_name, copy) = mesh_reference(path, folder);
+    let (proposals, varied) = (&proposed.grips, &proposed.varied);
+    let mu_is = match options.mu {
+        Some(_) => "as it was given to `gripgen init --mu`",
+        None => "an assumption: measure it with a few pulls",
+    };
+    let fill = |template: &str| {
+        template
+            .replace("{{part}}", &name)
+            .replace("{{mesh}}", &mesh_name)
+            .replace("{{scale_mm_per_unit}}", &format!("{:?}", options.scale_mm_per_unit))
+            .replace("{{size}}", &size)
+            .replace("{{mu}}", &format!("{:?}", options.mu.unwrap_or(MU)))
+            .replace("{{mu_is}}", mu_is)
+            .replace("{{imprint_mm3_per_n}}", &format!("{IMPRINT_MM3_PER_N:?}"))
+            .replace("{{grips}}", &text::grips_toml(&name, proposals))
+            .replace("{{grip_poses}}", &text::pose_list(proposals.len()))
+            .replace("{{grip_force_n}}", &text::numbers(&[varied.grip_force_n.0, varied.grip_force_n.1]))
+            .replace("{{grip_offset_sd_mm}}", &format!("{:?}", varied.grip_offset_sd_mm))
+            .replace("{{grip_angle_deg}}", &text::numbers(&varied.grip_angle_deg))
+            .replace("{{narrowed}}", &text::narrowed_comment(&proposed))
+            .into_bytes()
+    };
+    let mut files = vec![
+        StarterFile { name: "sweep.toml".into(), bytes: fill(assets::text("templates/part-sweep.toml")) },
+        StarterFile { name: "twin.toml".into(), bytes: fill(assets::text("templates/part-twin.toml")) },
+        StarterFile { name: "grips.png".into(), bytes: drawing::grips_picture(&name, &mesh, proposals) },
+    ];
+    if copy {
+        files.push(StarterFile { name: mesh_name, bytes });
+    }
+    let summary = text::summary(&name, &size, &mesh_words, &proposed);
+    let Proposed { grips, varied, doubts, .. } = proposed;
+    Ok(PartStarter { files, grips, varied, mesh_words, doubts, summary })
+}
+
+/// The rig that grips are proposed for.
+pub(crate) fn baseline() -> Twin {
+    let document = load_twin_document(&Location::parse(BASELINE_TWIN), &[]);
+    let file = document.ok().and_then(|d| d.read_twin().ok());
+    file.and_then(|f| Twin::new(&f).ok()).expect("a test loads the baseline twin")
+}
+
+/// The file name as a TOML bare key.
+fn part_name(path: &Path) -> String {
+    let stem = path.file_stem().map_or_else(|| "part".into(), |s| s.to_string_lossy().to_lowercase());
+    let name: String = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    let name = name.trim_matches('_').to_string();
+    if name.is_empty() { "part".into() } else { name }
+}
+
+/// How the twin in `folder` names the mesh, and whether the file has to be copied there.
+fn mesh_reference(path: &Path, folder: &Path) -> (String, bool) {
+    let whole = |p: &Path| {
+        std::fs::canonicalize(p).or_else(|_| std::path::absolute(p)).unwrap_or_else(|_| p.to_path_buf())
+    };
+    if let Ok(inside) = whole(path).strip_prefix(whole(folder)) {
+        return (inside.to_string_lossy().replace('\\', "/"), false);
+    }
+    let extension = path.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
+    (format!("{}.{extension}", part_name(path)), true)
+}
