@@ -33,15 +33,10 @@ static FILES: &[(&str, &[u8])] = embedded![
     "sensors/gelsight_r15/sensor.npz",
     "templates/benchmark-sweep.toml",
     "templates/benchmark-twin.toml",
-    "templates/diagnosis.html",
-    "templates/live.html",
-    "templates/page.css",
     "templates/part-sweep.toml",
     "templates/part-twin.toml",
-    "templates/presses.html",
     "templates/sweep.toml",
     "templates/twin.toml",
-    "templates/view.html",
 ];
 
 /// The content of an embedded file.
@@ -50,7 +45,7 @@ pub fn get(path: &str) -> Option<&'static [u8]> {
 }
 
 /// Folder of the parts that are made on demand: `parts/benchmark/shaft_007.stl`.
-pub(crate) const BENCHMARK: &str = "parts/benchmark/";
+pub const BENCHMARK: &str = "parts/benchmark/";
 
 /// The content of an embedded file, or of a mesh of the benchmark: binary STL in millimetres, the same bytes everywhere.
 pub fn read(path: &str) -> Option<Cow<'static, [u8]>> {
@@ -78,7 +73,7 @@ pub(crate) fn near(path: &str) -> String {
 ///
 /// # Panics
 /// If there is no such file: its name is a constant of this crate.
-pub(crate) fn text(path: &str) -> &'static str {
+pub fn text(path: &str) -> &'static str {
     std::str::from_utf8(get(path).expect("the name is one of the list")).expect("templates are text")
 }
 

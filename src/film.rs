@@ -4,10 +4,10 @@
 //! grip. What holds the part is that of the grip: its cells keep their limits and go along with the part in the image.
 
 use crate::gpu::PlacedPart;
-use crate::gripped::{Contact, Gripped, Indenter, grip_point, pull_direction};
+use crate::gripped::{Contact, Gripped, Indenter};
 use crate::library::Library;
 use crate::sample::{SampleError, SimulateOptions};
-use gripgen_physics::{JawFriction, PullCells, PullState};
+use gripgen_physics::{JawFriction, PullCells, PullState, grip_point, pull_direction};
 use gripgen_tactile::{CellMap, ClusteredMesh, Imprint, Renderer, Sensor, SimdLevel, finish};
 use gripgen_twin::effects::optics_state;
 use gripgen_twin::frames::world_from_gel;

@@ -15,7 +15,7 @@ use gripgen_twin::effects::CommandChain;
 use gripgen_twin::evidence::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    FilmPace, GripFriction, ImprintSummary, Jaw, Outcome, Part, PerJaw, Pulled,
+    FilmPace, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled,
     Sample, Scenario, TactileImage, Twin, slip_label, table_factor,
 };
 use std::sync::Arc;
@@ -48,7 +48,7 @@ fn made(project: &Project, index: u64, level: SimdLevel, film: Option<FilmPace>)
 }
 
 /// What is known of a sample before its own twin is: enough to record one that fails.
-pub(crate) fn drawn_scenario(project: &Project, index: u64) -> Scenario {
+pub fn drawn_scenario(project: &Project, index: u64) -> Scenario {
     project.sweep.scenario(index, &project.twin).0
 }
 
@@ -91,7 +91,7 @@ pub fn simulate(
 }
 
 /// The same of a grip that is there, without images.
-pub(crate) fn pull_gripped(
+pub fn pull_gripped(
     twin: &Twin,
     scenario: &Scenario,
     gripped: &Gripped,
@@ -130,7 +130,7 @@ pub fn start_pull(
 }
 
 /// The session of this repetition, the friction laws of both jaws, and the factor of its scatter.
-pub(crate) fn pull_session(
+pub fn pull_session(
     twin: &Twin,
     scenario: &Scenario,
     contact: &Contact,

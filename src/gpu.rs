@@ -19,11 +19,15 @@ const SENSORS: usize = 4;
 
 /// A part pressed into a gel.
 #[derive(Debug, Clone)]
-pub(crate) struct PlacedPart {
-    pub(crate) mesh: Arc<TriMesh>,
-    pub(crate) gel_from_mesh: Pose,
-    pub(crate) imprint_m3_per_n: f64,
-    pub(crate) force_n: f64,
+pub struct PlacedPart {
+    /// Its mesh.
+    pub mesh: Arc<TriMesh>,
+    /// Where the mesh is in front of the gel.
+    pub gel_from_mesh: Pose,
+    /// Volume that a newton displaces.
+    pub imprint_m3_per_n: f64,
+    /// Normal force.
+    pub force_n: f64,
 }
 
 /// An image to make.

@@ -20,10 +20,11 @@ use std::sync::Arc;
 const MIN_FORCE_N: f64 = 1e-3;
 
 /// A grip with its imprints.
-pub(crate) struct Gripped {
-    pub(crate) sensors: PerJaw<Arc<Sensor>>,
+pub struct Gripped {
+    /// The sensor of each jaw.
+    pub sensors: PerJaw<Arc<Sensor>>,
     /// `None` if the jaws miss the part.
-    pub(crate) contact: Option<Contact>,
+    pub contact: Option<Contact>,
     /// What the images are made of, if anything differs from the rest frame and there are images.
     look: Option<Look>,
 }
@@ -37,16 +38,18 @@ enum Look {
 }
 
 /// Jaws that hold a part.
-pub(crate) struct Contact {
-    pub(crate) held: Box<Held>,
-    pub(crate) imprint: PerJaw<Imprint>,
+pub struct Contact {
+    /// The grip in the mechanics.
+    pub held: Box<Held>,
+    /// What is pressed into each gel.
+    pub imprint: PerJaw<Imprint>,
     /// Real normal force of each jaw.
-    pub(crate) force_n: PerJaw<f64>,
+    pub force_n: PerJaw<f64>,
 }
 
 impl Gripped {
     /// Grips and presses. Depends on what repetitions share only: not on index, scatter or noise.
-    pub(crate) fn new(
+    pub fn new(
         twin: &Twin,
         library: &Library,
         scenario: &Scenario,
@@ -77,7 +80,7 @@ impl Gripped {
     }
 
     /// Open jaws, or jaws that miss the part.
-    pub(crate) fn at_rest(
+    pub fn at_rest(
         twin: &Twin,
         library: &Library,
         scenario: &Scenario,
@@ -97,7 +100,7 @@ impl Gripped {
     }
 
     /// The images of one repetition, with the noise of the sensors or without.
-    pub(crate) fn images(
+    pub fn images(
         &self,
         twin: &Twin,
         scenario: &Scenario,
@@ -141,7 +144,7 @@ fn on_device(twin: &Twin, sensors: &PerJaw<Arc<Sensor>>, optics: &PerJaw<OpticsS
 }
 
 /// Real normal force of each jaw. An error if an effect leaves a jaw none.
-pub(crate) fn jaw_forces_n(twin: &Twin, scenario: &Scenario) -> Result<PerJaw<f64>, SampleError> {
+pub fn jaw_forces_n(twin: &Twin, scenario: &Scenario) -> Result<PerJaw<f64>, SampleError> {
     PerJaw::try_from_fn(|jaw| {
         let force_n = normal_force_n(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
         let commanded_n = scenario.grip_force_n;
@@ -154,7 +157,7 @@ pub(crate) fn jaw_forces_n(twin: &Twin, scenario: &Scenario) -> Result<PerJaw<f6
 }
 
 /// The part between closed jaws; `None` if they miss it.
-pub(crate) fn held(
+pub fn held(
     twin: &Twin,
     library: &Library,
     scenario: &Scenario,
@@ -174,7 +177,7 @@ pub(crate) fn held(
 }
 
 /// A part in front of both gels, ready to be pressed in.
-pub(crate) struct Indenter<'a> {
+pub struct Indenter<'a> {
     twin: &'a Twin,
     sensors: PerJaw<Arc<Sensor>>,
     parts: PerJaw<PlacedPart>,
@@ -183,7 +186,12 @@ pub(crate) struct Indenter<'a> {
 }
 
 impl<'a> Indenter<'a> {
-    pub(crate) fn new(
+    /// The part in front of both gels.
+    ///
+    /// # Errors
+    ///
+    /// A mesh or a sensor that cannot be used.
+    pub fn new(
         twin: &'a Twin,
         library: &Library,
         scenario: &Scenario,
@@ -201,7 +209,7 @@ impl<'a> Indenter<'a> {
     }
 
     /// The part in front of a gel.
-    pub(crate) fn part(&self, jaw: Jaw) -> &PlacedPart {
+    pub fn part(&self, jaw: Jaw) -> &PlacedPart {
         &self.parts[jaw]
     }
 
@@ -210,7 +218,7 @@ impl<'a> Indenter<'a> {
     }
 
     /// What the jaws feel, or with `optics` what their cameras see.
-    pub(crate) fn imprints(
+    pub fn imprints(
         &self,
         optics: Option<&PerJaw<OpticsState>>,
     ) -> Result<PerJaw<Imprint>, SampleError> {
@@ -250,13 +258,13 @@ fn grip_setup<'a>(
 }
 
 /// Where the part lies between the jaws.
-pub(crate) fn world_from_part(scenario: &Scenario) -> gripgen_twin::frames::Pose {
+pub fn world_from_part(scenario: &Scenario) -> gripgen_twin::frames::Pose {
     let c = &scenario.covariates;
     Part::world_from_part(c.grip_angle_rad, c.grip_offset_m)
 }
 
 /// Mass with which the tool of a rig answers along +z. Of an arm whose description cannot be read, that of its carriage.
-pub(crate) fn answering_mass_kg(twin: &Twin, library: &Library) -> f64 {
+pub fn answering_mass_kg(twin: &Twin, library: &Library) -> f64 {
     let carried_kg = twin.robot.carriage_mass_kg(&twin.gripper);
     let arm = twin.arm.as_ref().and_then(|arm| library.arm(arm).ok());
     let of_rig_kg = arm.map_or(carried_kg, |arm| arm.held_mass_kg(&twin.gripper, [0.0, 0.0, 1.0]));
@@ -264,7 +272,7 @@ pub(crate) fn answering_mass_kg(twin: &Twin, library: &Library) -> f64 {
 }
 
 /// Damping that stops more than the arm's mass within one step of the force loop makes it unstable.
-pub(crate) fn check_damping(twin: &Twin, arm: &PlacedArm, direction: [f64; 3]) -> Result<(), SampleError> {
+pub fn check_damping(twin: &Twin, arm: &PlacedArm, direction: [f64; 3]) -> Result<(), SampleError> {
     let (damping, step_s) = (twin.robot.damping_n_s_per_m, twin.wrist.step_s());
     let mass_kg = twin.robot.apparent_mass_kg.unwrap_or_else(|| arm.held_mass_kg(&twin.gripper, direction));
     if damping * step_s < mass_kg {
@@ -274,7 +282,7 @@ pub(crate) fn check_damping(twin: &Twin, arm: &PlacedArm, direction: [f64; 3]) -
 }
 
 /// The part in front of each gel, and how hard it is pressed.
-pub(crate) fn placed_parts(
+pub fn placed_parts(
     twin: &Twin,
     library: &Library,
     scenario: &Scenario,
@@ -299,7 +307,7 @@ pub(crate) fn placed_parts(
 
 /// Grips and presses as a sample does, without images and pull: whether the jaws hold the part. Jaws stop at the surface in both
 /// mechanics, so the reduced one answers for both.
-pub(crate) fn try_grip(twin: &Twin, library: &Library, scenario: &Scenario) -> Result<bool, SampleError> {
+pub fn try_grip(twin: &Twin, library: &Library, scenario: &Scenario) -> Result<bool, SampleError> {
     let force_n = jaw_forces_n(twin, scenario)?;
     let Some(held) = held(twin, library, scenario, force_n, Mechanics::Reduced)? else { return Ok(false) };
     let press = Indenter::new(twin, library, scenario, &force_n, &held.grasp, SimdLevel::best())?;

@@ -41,56 +41,45 @@
 //! A sample depends on (version, resolved configuration, seed, index) and on nothing else.
 
 pub mod assets;
-mod compare_report;
 mod film;
 mod generate;
 mod gpu;
 mod gripped;
 mod library;
-mod live;
 mod location;
 mod mesh_file;
-mod paper;
-pub mod picture;
 mod plant;
-mod press_report;
 mod project;
-pub mod report;
 mod resolve;
 mod sample;
 mod simulator;
 mod stream;
 mod sweep;
 mod version;
-pub mod view;
 
-pub use compare_report::{pull_comparison_page, pull_ratios};
 pub use film::Film;
-pub use generate::{GripImprints, StartedPull, generate, generate_filmed, press_only, simulate, start_pull};
-pub use gpu::Gpu;
+pub use generate::{
+    GripImprints, StartedPull, drawn_scenario, generate, generate_filmed, press_only, pull_gripped, pull_session, simulate,
+    start_pull,
+};
+pub use gpu::{Gpu, PlacedPart};
+pub use gripped::{Contact, Gripped, Indenter, answering_mass_kg, held, jaw_forces_n, placed_parts, try_grip};
 pub use gripgen_identify as identify;
 pub use gripgen_physics as physics;
 pub use gripgen_record as record;
 pub use gripgen_tactile as tactile;
 pub use gripgen_twin as twin;
 pub use library::{Library, LibraryError};
-pub use live::live_page;
-pub use location::{Location, ReadFileError};
-pub use mesh_file::MeshFileError;
-pub use paper::{PaperError, PaperReport, paper_report};
-pub use picture::{
-    CONTACT_SHEET, PictureSampleError, contact_sheet, contact_sheet_samples, publish_contact_sheet,
-    sample_picture,
-};
+pub use location::{Location, ReadFileError, path_from};
+pub use mesh_file::{MeshFileError, read_mesh};
 pub use plant::{Fixture, OpenPlantError, TwinPlant};
-pub use press_report::{PressMap, PressReportText, press_report};
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
-pub use report::{
-    Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
-};
+pub use resolve::Files;
 pub use sample::{SampleError, SimulateOptions};
 pub use simulator::{Draw, Simulator};
 pub use stream::{SampleStream, StreamError, StreamOptions, Streamed, StreamedSample};
-pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, prepare_run, run_info, sweep};
+pub use sweep::differences;
+pub use sweep::{
+    SweepError, SweepEvent, SweepOptions, SweepSummary, encode_filmed, guarded, prepare_run, run_info, sweep,
+};
 pub use version::VERSION;
-pub use view::{ViewOptions, ViewPage, view_page};

@@ -149,7 +149,8 @@ impl Library {
         Ok(Self::new(files))
     }
 
-    pub(crate) fn new(files: Files) -> Self {
+    /// The files of a twin, by the path that names them: where they are, and their content.
+    pub fn new(files: Files) -> Self {
         Self {
             files,
             meshes: Cache::new(MESHES),
@@ -201,7 +202,7 @@ impl Library {
     }
 
     /// The surface of a part, prepared for what its jaws meet.
-    pub(crate) fn surface(&self, part: &Part) -> Result<Arc<Surface>, LibraryError> {
+    pub fn surface(&self, part: &Part) -> Result<Arc<Surface>, LibraryError> {
         let key = (part.mesh.clone(), part.metres_per_unit.to_bits());
         let make = || Ok::<_, LibraryError>(Arc::new(Surface::new(self.mesh(part)?)));
         Ok((*self.surfaces.get(key, make)?).clone())
@@ -300,7 +301,7 @@ impl Library {
     }
 
     /// Reads a sensor and checks that a gel fits it.
-    pub(crate) fn check_sensor(&self, optics: &Optics, gel: &Gel) -> Result<(), LibraryError> {
+    pub fn check_sensor(&self, optics: &Optics, gel: &Gel) -> Result<(), LibraryError> {
         let sensor = self.sensor(optics)?;
         let image_px = sensor.grid.width_px.min(sensor.grid.height_px);
         let kernels_px = sensor.pyramid.as_ref().map_or(&gel.kernels_px, |pyramid| &pyramid.kernels_px);

@@ -135,7 +135,7 @@ impl Location {
 }
 
 /// How a file is called in a configuration that lies in `folder` (canonical): relative to it where there is a way.
-pub(crate) fn path_from(folder: &Path, file: &Location) -> String {
+pub fn path_from(folder: &Path, file: &Location) -> String {
     let Location::Disk(path) = file else { return file.to_string() };
     if path.is_absolute() {
         return path.display().to_string();

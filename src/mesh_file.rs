@@ -18,7 +18,7 @@ pub enum MeshFileError {
 }
 
 /// Reads an STL, OBJ, PLY or GLB file.
-pub(crate) fn read_mesh(path: &Path, metres_per_unit: f64) -> Result<TriMesh, MeshFileError> {
+pub fn read_mesh(path: &Path, metres_per_unit: f64) -> Result<TriMesh, MeshFileError> {
     let location = Location::Disk(path.into());
     let bytes = location.read()?;
     let mesh = TriMesh::from_file_bytes(&bytes, location.extension(), metres_per_unit);

@@ -249,7 +249,7 @@ impl Project {
 
     /// Opens the graphics processor, if images are made there, and puts both sensors on it: what cannot be done shows
     /// before anything is written. Images that are the processor's in any case need neither.
-    pub(crate) fn prepare_gpu(&self) -> Result<Option<&Gpu>, GpuError> {
+    pub fn prepare_gpu(&self) -> Result<Option<&Gpu>, GpuError> {
         let Some(gpu) = self.gpu()? else { return Ok(None) };
         for jaw in Jaw::BOTH {
             // A sensor that cannot be read fails its samples, with its own reason.

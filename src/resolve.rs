@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Files by the path that names them: where they are, and their content.
-pub(crate) type Files = BTreeMap<String, (Location, Vec<u8>)>;
+pub type Files = BTreeMap<String, (Location, Vec<u8>)>;
 
 /// Stands for the path of a file that no sample needs.
 const NOT_USED: &str = "not used";

@@ -26,7 +26,7 @@ pub struct SimulateOptions {
 
 impl SimulateOptions {
     /// What the samples of a sweep are made with.
-    pub(crate) fn of(sweep: &Sweep, level: SimdLevel) -> Self {
+    pub fn of(sweep: &Sweep, level: SimdLevel) -> Self {
         Self {
             mechanics: sweep.mechanics,
             images: sweep.images != ImageStorage::None,

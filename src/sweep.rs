@@ -1,6 +1,6 @@
 //! Running a sweep: shards over threads, in order, resumable.
 
-pub(crate) mod differences;
+mod differences;
 mod pipeline;
 mod shards;
 
@@ -8,7 +8,6 @@ use crate::film::Film;
 use crate::generate::{drawn_scenario, generate_filmed};
 use crate::project::Project;
 use crate::version::VERSION;
-use differences::differences;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_record::{
     FolderError, PictureError, RUN_SCHEMA, RunFolder, RunInfo, ShardError, Sidecar, extra_columns,
@@ -17,7 +16,9 @@ use gripgen_tactile::SimdLevel;
 use gripgen_tactile::gpu::{GpuAdapter, GpuError};
 use gripgen_twin::{Outcome, Sample};
 use pipeline::Run;
-pub(crate) use shards::{encode_filmed, encode_options, noise_rgb};
+pub use differences::differences;
+pub use shards::encode_filmed;
+pub(crate) use shards::{encode_options, noise_rgb};
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -257,7 +258,7 @@ fn samples_of_shard(project: &Project, shard: u64) -> u64 {
 }
 
 /// Generates a sample; a panic (a bug, or the engine's) fails that sample instead of losing the run.
-pub(crate) fn guarded(project: &Project, index: u64, simd: SimdLevel) -> (Sample, Option<Film>) {
+pub fn guarded(project: &Project, index: u64, simd: SimdLevel) -> (Sample, Option<Film>) {
     catch_unwind(AssertUnwindSafe(|| generate_filmed(project, index, simd))).unwrap_or_else(|panic| {
         let what = panic
             .downcast_ref::<String>()

@@ -4,7 +4,7 @@
 const SHOWN: usize = 4;
 
 /// The keys in which two configurations differ, with both values; `None` if they are the same or cannot be read.
-pub(crate) fn differences(there: &str, here: &str) -> Option<String> {
+pub fn differences(there: &str, here: &str) -> Option<String> {
     let (there, here) = (there.parse::<toml::Table>().ok()?, here.parse::<toml::Table>().ok()?);
     let mut found = Vec::new();
     compare("", &there.into(), &here.into(), &mut found);

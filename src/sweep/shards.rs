@@ -102,7 +102,7 @@ fn cell<'a>(row: &'a [String], column: &str) -> &'a str {
 
 /// Encodes a sample, and its film where there is one. A film ends where the part has left the window, or is pressed through the gel
 /// there.
-pub(crate) fn encode_filmed(
+pub fn encode_filmed(
     project: &Project,
     sample: &Sample,
     film: Option<&Film>,

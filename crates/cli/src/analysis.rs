@@ -38,7 +38,7 @@ pub use imprint_set::{ImprintSet, LoadImprintsError, imprint_data, is_imprint_se
 pub use posterior::posterior_twins;
 pub use presses::{
     FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_circles_with_sensor,
-    find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor,
+    find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor, presses_sha256,
 };
 pub use priors::{pull_priors, shipped_priors};
 pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, edited_twin_toml, write_twin};

@@ -1,6 +1,6 @@
 //! What a run of a rig is made with, as one text.
 
-use crate::sweep::differences::differences;
+use gripgen::differences;
 use gripgen_measured::campaign_toml;
 use gripgen_record::RunFolder;
 use gripgen_twin::columns::covariates;

@@ -17,7 +17,6 @@ use left_out::LeftOut;
 use runs::load_run;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use traces::{fewer_traces, thinned};
 
 /// Measured pulls, and remarks for people: what was left out.
 #[derive(Debug, Clone, PartialEq)]

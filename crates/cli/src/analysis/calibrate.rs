@@ -2,7 +2,7 @@
 
 use crate::analysis::diagnose::{PullTwinError, check_fit, given_model, pull_values};
 use gripgen::Library;
-use gripgen_physics::PullPredictor;
+use crate::analysis::expect::pull_predictor;
 use crate::analysis::priors::shipped_priors;
 use crate::analysis::twin_edits::{TwinEdits, effect_entry, put_estimate};
 use gripgen_identify::pulls::calibrate::{

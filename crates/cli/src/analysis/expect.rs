@@ -4,8 +4,9 @@
 //! friction law on each cell, limit surface, reduced mechanics, force loop, wrist sensor. What a sample draws is averaged:
 //! the scatter of friction by quadrature, the noise of the readings by [`label_moments`].
 
-use gripgen::{PatchFriction, creep_of, sensor_chain};
-use gripgen::{Indenter, answering_mass_kg, grip_point, held, jaw_forces_n};
+use gripgen_physics::{PatchFriction, creep_of, sensor_chain};
+use gripgen::{Indenter, answering_mass_kg, held, jaw_forces_n};
+use gripgen_physics::{grip_point};
 use gripgen::Library;
 use gripgen::SampleError;
 use gripgen_physics::{Cache, Command, Held, JawFriction, PullPredictor, PullSession, Signals, SimulatePulls, campaign_staircases, label_moments};

@@ -9,6 +9,7 @@ use gripgen::{LoadError, load_twin_document};
 use gripgen::Files;
 use bodies::PressBodies;
 use gripgen_measured::{PRESSES_FILE, PressFolder, PressRecord, TableError, press_table, read_press_folder};
+use gripgen_record::sha256_hex;
 use gripgen_tactile::presses::{
     Circle, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError, IndenterError, IndenterPose, Press,
     PressSet, USUAL_SINK_IN, find_circle, reference_frame,
@@ -300,6 +301,16 @@ pub struct FoundCircles {
     pub found: Vec<String>,
     /// Presses without a visible contact, which were taken out.
     pub without_contact: Vec<String>,
+}
+
+/// Hash of the images and marks of a set.
+pub fn presses_sha256(set: &PressSet) -> String {
+    let mut text = String::new();
+    for press in &set.presses {
+        let mark = press.circle.map_or(String::new(), |c| format!("{} {} {}", c.x_px, c.y_px, c.radius_px));
+        text += &format!("{} {} {mark}\n", press.name, sha256_hex(&press.image.rgb));
+    }
+    sha256_hex(text.as_bytes())
 }
 
 /// Why the sensor of a comparison could not be loaded.

@@ -11,7 +11,7 @@ use crate::part::init::{
     search,
 };
 use gripgen::Location;
-use crate::analysis::presses::{LoadSensorError, load_sensor};
+use crate::analysis::{LoadSensorError, load_sensor};
 use gripgen::{SampleError, SimulateOptions};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};

@@ -2,8 +2,9 @@
 
 use super::presses::{PressDiagnosisInput, diagnose_presses};
 use gripgen_measured::PressColumns;
-use crate::analysis::presses::{FoundCircles, find_circles_with_sensor};
-use gripgen::report::Diagnosed;
+use crate::analysis::presses::{FoundCircles, find_circles_with_sensor, presses_sha256};
+use super::Diagnosed;
+use gripgen_identify::PressCovariate;
 use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::PressSet;
 use gripgen_twin::config::EffectFile;
@@ -42,11 +43,12 @@ pub fn diagnose_measured_presses(
     progress: &mut dyn FnMut(f64, &str),
 ) -> Diagnosed {
     let is_optics = |name: &str| find(name).is_some_and(|spec| spec.optics.is_some());
+    let columns = presses.columns.covariates.iter();
     let input = PressDiagnosisInput {
         set: &presses.set,
         sensor,
         time_s: presses.columns.time_s.clone(),
-        covariates: presses.columns.covariates.clone(),
+        covariates: columns.map(|c| PressCovariate { name: c.name.clone(), values: c.values.clone() }).collect(),
         marked: presses.marked,
         sha256: presses.sha256.clone(),
         kept_effects: twin_effects.into_iter().filter(|e| !is_optics(&e.name)).collect(),

@@ -1,7 +1,7 @@
 //! The next pulls: those that best tell apart what a diagnosis could not.
 
 use gripgen::Library;
-use gripgen_physics::PullPredictor;
+use crate::analysis::expect::pull_predictor;
 use gripgen_identify::pulls::answer::PullFits;
 use gripgen_identify::pulls::fitting::Fitted;
 use gripgen_identify::pulls::heldout::scatter;

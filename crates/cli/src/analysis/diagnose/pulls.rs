@@ -5,6 +5,7 @@ use super::next::next_pulls;
 use super::pull_report::pull_report;
 use super::pull_values::pull_values;
 use gripgen::Library;
+use crate::analysis::expect::pull_predictor;
 use gripgen_physics::PullPredictor;
 use gripgen::report::Diagnosed;
 use crate::analysis::twin_edits::{TwinEdits, calibration_entry, effect_entry};
