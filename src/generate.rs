@@ -13,7 +13,7 @@ use gripgen_physics::{
 use gripgen_tactile::{Imprint, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::effects::{CommandChain, Creep, GripPoint, SensorChain, creep};
-use gripgen_twin::evidence::suspect_simulated;
+use gripgen_twin::label_check::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
     ContactPatch, FilmPace, FrictionError, GripFriction, ImprintSummary, Jaw, Outcome, Part, PerJaw, Pulled,

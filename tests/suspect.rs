@@ -4,7 +4,7 @@ use crate::common::{jobs, run};
 use gripgen::record::{Dataset, read_judged_pulls, write_pull_folder};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
-use gripgen::twin::evidence::{Expected, LabelEvidence, Verdict, judge};
+use gripgen::twin::label_check::{Expected, LabelEvidence, Verdict, check_label};
 use gripgen::twin::{MeasuredPulls, Outcome, Pulled};
 use gripgen::{Location, Project, Suspects, generate, load_pulls, load_pulls_with};
 use std::path::Path;
@@ -57,7 +57,7 @@ fn clean_simulated_pulls_are_not_suspect() {
 /// What a pull is suspect for where nothing is known of its rig.
 fn as_measured(p: &Pulled) -> Option<String> {
     let of_trace = LabelEvidence::of_trace(p.label.max_pull_force_n, 3.0, 5e-3, Some(&p.trace));
-    let judgement = judge(&LabelEvidence { every_reading: true, ..of_trace }, &Expected::default());
+    let judgement = check_label(&LabelEvidence { every_reading: true, ..of_trace }, &Expected::default());
     assert_ne!(judgement.verdict, Verdict::NoEvidence);
     judgement.reason()
 }

@@ -1,11 +1,11 @@
-//! A label proves itself: whether what was recorded of a pull agrees with its label.
+//! The label check: whether what was recorded of a pull agrees with its label.
 //!
-//! One pure function, [`judge`], for pulls that were simulated, imported or made on a rig. It looks only at evidence that
+//! One pure function, [`check_label`], for pulls that were simulated, imported or made on a rig. It looks only at evidence that
 //! is there; what is missing is no reason. A difference counts where it is larger than both the noise explains and a
 //! label may be off ([`cap_n`]).
 
-mod beside;
 mod budget;
+mod cross_axis;
 mod follow;
 mod recorded;
 mod rule;
@@ -15,8 +15,8 @@ mod slip;
 mod tests;
 mod zero;
 
-pub use beside::{GripForceEvidence, WrenchRow};
 pub use budget::LabelBudget;
+pub use cross_axis::{GripForceEvidence, WrenchRow};
 pub use recorded::recorded_behind;
 pub use zero::ZERO_SHIFT;
 
@@ -292,7 +292,7 @@ impl Judgement {
 }
 
 /// Judges a label by the evidence that is there.
-pub fn judge(evidence: &LabelEvidence<'_>, expected: &Expected) -> Judgement {
+pub fn check_label(evidence: &LabelEvidence<'_>, expected: &Expected) -> Judgement {
     let mut findings = Vec::new();
     let mut budget = LabelBudget::default();
     let signal = evidence.trace.and_then(|trace| Signal::of(trace, evidence, expected));
@@ -304,8 +304,8 @@ pub fn judge(evidence: &LabelEvidence<'_>, expected: &Expected) -> Judgement {
             slip::slip(signal, evidence, expected, &mut findings, &mut budget);
         }
     }
-    beside::grip_force(evidence, &mut findings);
-    beside::across(evidence, &mut findings);
+    cross_axis::grip_force(evidence, &mut findings);
+    cross_axis::across(evidence, &mut findings);
     let verdict = match () {
         () if findings.iter().any(Finding::is_reason) => Verdict::Suspect,
         () if findings.is_empty() => Verdict::NoEvidence,
@@ -325,5 +325,5 @@ pub fn suspect_simulated(
     let of_trace =
         LabelEvidence::of_trace(label.max_pull_force_n, pull.label_tolerance_n, pull.stop_m, Some(trace));
     let evidence = LabelEvidence { censored: label.censored, every_reading: true, ..of_trace };
-    judge(&evidence, &Expected::of(twin, scenario)).reason()
+    check_label(&evidence, &Expected::of(twin, scenario)).reason()
 }
