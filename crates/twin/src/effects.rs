@@ -32,6 +32,7 @@ pub use hooks::{
     CommandHook, Creep, CreepHook, FrictionHook, GraspForceHook, GripPoint, ImprintHook, NormalForceHook,
     OpticsHook, SensorHook, SensorMemory, SensorPoint, TiltHook,
 };
+use spec::parameter;
 pub use spec::{EffectSpec, Group, ParameterSpec, Visible};
 
 /// Declares the modules of the effects and lists their specs: one line per effect.

@@ -4,10 +4,8 @@
 //! is there; what is missing is no reason. A difference counts where it is larger than both the noise explains and a
 //! label may be off ([`cap_n`]).
 
-mod budget;
 mod cross_axis;
 mod follow;
-mod recorded;
 mod rule;
 mod signal;
 mod slip;
@@ -15,9 +13,7 @@ mod slip;
 mod tests;
 mod zero;
 
-pub use budget::LabelBudget;
 pub use cross_axis::{GripForceEvidence, WrenchRow};
-pub use recorded::recorded_behind;
 pub use zero::ZERO_SHIFT;
 
 use crate::{PullTrace, Scenario, SlipLabel, Twin};
@@ -251,6 +247,31 @@ impl fmt::Display for Finding {
     }
 }
 
+/// Standard errors of a label by their cause, N; 0 where the evidence for it is missing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LabelBudget {
+    /// Noise of the one reading that the label is.
+    pub noise_n: f64,
+    /// The rule: what the jaws held before the label and more than it, and steps that jump over its tolerance.
+    pub rule_n: f64,
+    /// The loop's time constant times the slope of the force after the label.
+    pub lag_n: f64,
+    /// The reading without a load.
+    pub zero_n: f64,
+    /// What the reading is more or less than a share of the command.
+    pub gain_n: f64,
+    /// Half the time between two rows times the slope at the label, where the label may lie between them.
+    pub timing_n: f64,
+}
+
+impl LabelBudget {
+    /// All causes together, as if they were independent.
+    pub fn total_n(&self) -> f64 {
+        let Self { noise_n, rule_n, lag_n, zero_n, gain_n, timing_n } = *self;
+        [noise_n, rule_n, lag_n, zero_n, gain_n, timing_n].iter().map(|x| x * x).sum::<f64>().sqrt()
+    }
+}
+
 /// What the evidence says of a label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -326,4 +347,29 @@ pub fn suspect_simulated(
         LabelEvidence::of_trace(label.max_pull_force_n, pull.label_tolerance_n, pull.stop_m, Some(trace));
     let evidence = LabelEvidence { censored: label.censored, every_reading: true, ..of_trace };
     check_label(&evidence, &Expected::of(twin, scenario)).reason()
+}
+
+/// What may be behind a reason that was recorded ([`Judgement::reason`], perhaps with others after it, joined by
+/// semicolons). A camera that fell silent is an accident of its pull.
+pub fn recorded_behind(reason: &str) -> Behind {
+    let known = FindingKind::ALL.map(|kind| {
+        let finding = Finding { kind, found: 0.0, wanted: 0.0, allowed: 0.0, time_s: None };
+        (plain(&finding.to_string()), kind.behind())
+    });
+    let behind = |reason: &str| {
+        let reason = plain(reason);
+        known.iter().find(|(text, _)| *text == reason).map_or(Behind::Pull, |(_, behind)| *behind)
+    };
+    reasons_of(reason).map(behind).min().unwrap_or(Behind::Pull)
+}
+
+/// The reasons of a record. In the brackets of one there is a semicolon too: "(0.33 N are allowed; at 0.10 s)".
+fn reasons_of(reason: &str) -> impl Iterator<Item = &str> {
+    reason.split("; ").filter(|part| !part.is_empty() && !part.starts_with("at "))
+}
+
+/// A reason without its numbers and what stands in brackets.
+fn plain(reason: &str) -> String {
+    let before = reason.split(" (").next().unwrap_or_default();
+    before.chars().filter(|c| !c.is_ascii_digit() && !matches!(c, '-' | '.')).collect()
 }

@@ -1,7 +1,7 @@
 //! Friction that depends on the direction of the pull on the part.
 
 use super::hooks::values;
-use super::{EffectSpec, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Fit, GripPoint, Group, PullFit, parameter};
 
 /// `anisotropy`: a ground, turned or toothed surface has a lay; friction across it differs from friction along
 /// it, and is the same after half a turn.
@@ -12,20 +12,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 + amplitude cos(2 (grip_angle - axis_deg)))",
     source: "two-fold term of the angle; amplitude 0.05 to 0.3. Ma and Rodriguez 2018 on anisotropy in data",
     parameters: &[
-        ParameterSpec {
-            name: "amplitude",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 0.6),
-            about: "half of the relative difference between the two main directions",
-        },
-        ParameterSpec {
-            name: "axis_deg",
-            unit: "deg",
-            neutral: 0.0,
-            bounds: (-90.0, 90.0),
-            about: "grip angle of the highest friction",
-        },
+        parameter("amplitude", "1", 0.0, (0.0, 0.6))
+            .about("half of the relative difference between the two main directions"),
+        parameter("axis_deg", "deg", 0.0, (-90.0, 90.0)).about("grip angle of the highest friction"),
     ],
     covariates: &["grip_angle_deg"],
     friction: Some(friction),

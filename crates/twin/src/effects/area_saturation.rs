@@ -1,7 +1,7 @@
 //! A soft pad whose friction force stops growing with the load.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
 
 /// `area_saturation`: once the pad is in full contact, more load brings no more area. The parameter is the
 /// inverse of the saturation force `F_s`, so that 0 means none; the friction force tends to `mu F_s`. How suddenly it
@@ -13,20 +13,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu / (1 + (saturation_per_n F_G)^sharpness)^(1 / sharpness)",
     source: "soft fingertips: Fujihira et al.; saturation force 50 to 200 N",
     parameters: &[
-        ParameterSpec {
-            name: "saturation_per_n",
-            unit: "1/N",
-            neutral: 0.0,
-            bounds: (0.0, 0.1),
-            about: "inverse of the grip force that friction behaves as if it had at most",
-        },
-        ParameterSpec {
-            name: "sharpness",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (1.0, 6.0),
-            about: "how suddenly it levels off",
-        },
+        parameter("saturation_per_n", "1/N", 0.0, (0.0, 0.1))
+            .about("inverse of the grip force that friction behaves as if it had at most"),
+        parameter("sharpness", "1", 1.0, (1.0, 6.0)).about("how suddenly it levels off"),
     ],
     covariates: &["grip_force_n"],
     references: &["sharpness"],

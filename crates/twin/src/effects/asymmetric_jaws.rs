@@ -1,7 +1,7 @@
 //! Two gels that do not rub alike.
 
 use super::hooks::values;
-use super::{EffectSpec, GripPoint, Group, ParameterSpec};
+use super::{EffectSpec, GripPoint, Group, parameter};
 use crate::Jaw;
 
 /// `asymmetric_jaws`: the coefficient of one jaw is higher and that of the other lower by the same share; the
@@ -12,13 +12,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "friction coefficients that differ between the jaws",
     formula: "mu_left' = mu (1 + asymmetry), mu_right' = mu (1 - asymmetry)",
     source: "definition; 5 to 30 % between two gels",
-    parameters: &[ParameterSpec {
-        name: "asymmetry",
-        unit: "1",
-        neutral: 0.0,
-        bounds: (-0.6, 0.6),
-        about: "half of the relative difference, left minus right",
-    }],
+    parameters: &[parameter("asymmetry", "1", 0.0, (-0.6, 0.6))
+        .about("half of the relative difference, left minus right")],
     covariates: &[],
     friction: Some(friction),
     plainly: "The two gels do not hold the same.",

@@ -1,7 +1,7 @@
 //! Shadows that the gel around a contact throws.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
 use crate::OpticsState;
 
 /// `cast_shadow`: a channel's light, which comes from the side towards which its colour model is brightest, does not
@@ -14,20 +14,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "I_c' = I_c - strength I_c,rest s(max over d of (z(x + d l_c) - z(x)) / (d tan(elevation_deg)))",
     source: "horizon mapping, Max 1988; lights of GelSight sensors stand low: shadows of -10 to -75 grey levels in Taxim",
     parameters: &[
-        ParameterSpec {
-            name: "strength",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (-0.5, 1.0),
-            about: "share of a channel's brightness that is missing in a full shadow",
-        },
-        ParameterSpec {
-            name: "elevation_deg",
-            unit: "deg",
-            neutral: 30.0,
-            bounds: (5.0, 60.0),
-            about: "height of the lights above the gel; lower ones throw longer shadows",
-        },
+        parameter("strength", "1", 0.0, (-0.5, 1.0))
+            .about("share of a channel's brightness that is missing in a full shadow"),
+        parameter("elevation_deg", "deg", 30.0, (5.0, 60.0))
+            .about("height of the lights above the gel; lower ones throw longer shadows"),
     ],
     covariates: &[],
     optics: Some(optics),

@@ -1,7 +1,7 @@
 //! Oil, dust or wear particles between part and gel, from one pull on.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
 
 /// `contamination`: the coefficient steps at a pull. A negative drop is a cleaning.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -11,20 +11,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 - drop) from pull at_pull_index on",
     source: "third bodies take 10 to 60 % of the friction, until they are cleaned off",
     parameters: &[
-        ParameterSpec {
-            name: "drop",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (-1.5, 0.9),
-            about: "share of the coefficient that is lost",
-        },
-        ParameterSpec {
-            name: "at_pull_index",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 1e7),
-            about: "first pull with it",
-        },
+        parameter("drop", "1", 0.0, (-1.5, 0.9)).about("share of the coefficient that is lost"),
+        parameter("at_pull_index", "1", 0.0, (0.0, 1e7)).about("first pull with it"),
     ],
     covariates: &["pull_index"],
     friction: Some(friction),

@@ -1,7 +1,7 @@
 //! A camera that is out of focus.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
 use crate::OpticsState;
 
 /// `defocus`: a Gaussian blur of what the contact changes in the image. The rest frame is smooth and was taken with the
@@ -12,13 +12,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "blur of the contact in the image",
     formula: "dI' = dI * N(0, sigma_mm)",
     source: "Gaussian point spread function; sigma up to 3 px",
-    parameters: &[ParameterSpec {
-        name: "sigma_mm",
-        unit: "mm",
-        neutral: 0.0,
-        bounds: (0.0, 0.6),
-        about: "standard deviation of the point spread function, on the gel",
-    }],
+    parameters: &[parameter("sigma_mm", "mm", 0.0, (0.0, 0.6))
+        .about("standard deviation of the point spread function, on the gel")],
     covariates: &[],
     optics: Some(optics),
     plainly: "Contacts look blurred: the camera is out of focus.",

@@ -1,7 +1,7 @@
 //! A part whose edges are round where its mesh has sharp ones.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, PressNeeds};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, PressNeeds, parameter};
 use crate::OpticsState;
 
 /// `edge_rounding`: the convex edges of the real part have a radius. The image shows the rounded part; forces and friction
@@ -12,13 +12,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "radius of the part's convex edges",
     formula: "z' = opening of z by a ball of radius_mm; z = surface of the part before it is pressed in",
     source: "rims of printed parts lie 0.15 to 0.25 mm inside their mesh in GelSight images (Chen et al. 2022, its published presses); opening: Serra 1982",
-    parameters: &[ParameterSpec {
-        name: "radius_mm",
-        unit: "mm",
-        neutral: 0.0,
-        bounds: (0.0, 1.0),
-        about: "radius of the ball that just fits into each edge from inside",
-    }],
+    parameters: &[parameter("radius_mm", "mm", 0.0, (0.0, 1.0))
+        .about("radius of the ball that just fits into each edge from inside")],
     covariates: &[],
     optics: Some(optics),
     plainly: "The part's edges are rounder than in its drawing.",

@@ -1,7 +1,7 @@
 //! A camera with another exposure or response.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
 use crate::OpticsState;
 
 /// `exposure`: gain and gamma of the camera, the same for all channels, with and without contact. Two of them one after
@@ -13,20 +13,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "I' = 255 (gain I / 255)^gamma",
     source: "power law of camera responses; gamma 0.8 to 1.2",
     parameters: &[
-        ParameterSpec {
-            name: "gain",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (0.3, 3.0),
-            about: "exposure over that of the sensor file",
-        },
-        ParameterSpec {
-            name: "gamma",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (0.4, 2.5),
-            about: "exponent of the response",
-        },
+        parameter("gain", "1", 1.0, (0.3, 3.0)).about("exposure over that of the sensor file"),
+        parameter("gamma", "1", 1.0, (0.4, 2.5)).about("exponent of the response"),
     ],
     covariates: &[],
     optics: Some(optics),

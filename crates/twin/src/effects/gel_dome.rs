@@ -1,7 +1,7 @@
 //! A gel that is more or less domed than its sensor file says.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
 use crate::OpticsState;
 
 /// `gel_dome`: a paraboloid is added to the gel's shape at rest. The imprint has the same volume on another surface: a
@@ -12,13 +12,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "sag of the gel at the corners of the image",
     formula: "z_rest' = z_rest - sag_mm r^2 / r_corner^2, towards the part",
     source: "GelSight gels are domed: 1.4 mm in Taxim's gel map (Si and Yuan 2022); paraboloid for the cap is ours",
-    parameters: &[ParameterSpec {
-        name: "sag_mm",
-        unit: "mm",
-        neutral: 0.0,
-        bounds: (-2.0, 3.0),
-        about: "how much deeper the corners lie below the apex",
-    }],
+    parameters: &[
+        parameter("sag_mm", "mm", 0.0, (-2.0, 3.0)).about("how much deeper the corners lie below the apex")
+    ],
     covariates: &[],
     optics: Some(optics),
     plainly: "The gel is domed: it lies deeper at the corners than in the middle.",

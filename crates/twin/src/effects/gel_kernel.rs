@@ -1,7 +1,7 @@
 //! A gel that follows the part more or less closely than its kernels say.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
 use crate::OpticsState;
 
 /// `gel_kernel`: the sizes of the kernels that deform the gel around a contact, all by one factor. Between two odd
@@ -12,13 +12,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "smoothing length of the gel",
     formula: "k' = factor k for every kernel",
     source: "kernels that were not fitted to the gel are wrong by some 30 %; Si and Yuan 2022 on the kernels",
-    parameters: &[ParameterSpec {
-        name: "factor",
-        unit: "1",
-        neutral: 1.0,
-        bounds: (0.5, 2.0),
-        about: "true size of the kernels over that of the twin",
-    }],
+    parameters: &[
+        parameter("factor", "1", 1.0, (0.5, 2.0)).about("true size of the kernels over that of the twin")
+    ],
     covariates: &[],
     optics: Some(optics),
     plainly: "The gel smooths a contact over a wider or narrower neighbourhood than the twin thinks.",

@@ -1,7 +1,7 @@
 //! A constant part of the friction force: adhesion, or a force offset that looks like it.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
 
 /// `load_offset`: Wucherer et al. 2023 correct the simulated friction with `mu_corr = mu (a + b / F_G)`, that
 /// is, with a friction force `mu a F_G + mu b`. Negative where `b < -a F_G`.
@@ -12,20 +12,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (a + b_n / F_G)",
     source: "Wucherer et al. 2023, correction of the friction coefficient and its table of fits",
     parameters: &[
-        ParameterSpec {
-            name: "a",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (0.2, 5.0),
-            about: "factor on the friction coefficient at high grip force",
-        },
-        ParameterSpec {
-            name: "b_n",
-            unit: "N",
-            neutral: 0.0,
-            bounds: (-50.0, 50.0),
-            about: "constant friction force per jaw, in units of the coefficient",
-        },
+        parameter("a", "1", 1.0, (0.2, 5.0)).about("factor on the friction coefficient at high grip force"),
+        parameter("b_n", "N", 0.0, (-50.0, 50.0))
+            .about("constant friction force per jaw, in units of the coefficient"),
     ],
     covariates: &["grip_force_n"],
     friction: Some(friction),

@@ -1,7 +1,7 @@
 //! A press that is deeper, or less deep, than it is thought to be.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, PressNeeds};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, PressNeeds, parameter};
 use crate::OpticsState;
 
 /// `press_depth`: zero and scale of the depth of the press are not those that the twin, or the stage of a calibration, believes.
@@ -14,20 +14,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "d' = factor d + offset_mm, at least 0; d = depth of the press",
     source: "depths seen in presses into a GelSight are 0.65 of those of the stage (Chen et al. 2022, its published presses), zeros of a stage 0.02 to 0.1 mm off",
     parameters: &[
-        ParameterSpec {
-            name: "factor",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (0.4, 2.0),
-            about: "depth that is seen over the one that is believed",
-        },
-        ParameterSpec {
-            name: "offset_mm",
-            unit: "mm",
-            neutral: 0.0,
-            bounds: (-0.5, 0.5),
-            about: "how much deeper the press is beyond that",
-        },
+        parameter("factor", "1", 1.0, (0.4, 2.0)).about("depth that is seen over the one that is believed"),
+        parameter("offset_mm", "mm", 0.0, (-0.5, 0.5)).about("how much deeper the press is beyond that"),
     ],
     covariates: &[],
     optics: Some(optics),

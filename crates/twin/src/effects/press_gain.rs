@@ -1,7 +1,7 @@
 //! A camera whose white balance is another one, or differs from grip to grip.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter};
 use crate::random::{Purpose, Stream};
 use crate::{Jaw, OpticsState};
 
@@ -41,12 +41,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
 };
 
 const fn gain(name: &'static str, about: &'static str) -> ParameterSpec {
-    ParameterSpec { name, unit: "1", neutral: 1.0, bounds: (0.5, 2.0), about }
+    parameter(name, "1", 1.0, (0.5, 2.0)).about(about)
 }
 
 const fn scatter(name: &'static str) -> ParameterSpec {
     let about = "standard deviation of the logarithm of the channel's gain";
-    ParameterSpec { name, unit: "1", neutral: 0.0, bounds: (0.0, 0.5), about }
+    parameter(name, "1", 0.0, (0.0, 0.5)).about(about)
 }
 
 fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {

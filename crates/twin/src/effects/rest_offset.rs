@@ -1,7 +1,7 @@
 //! A colour model that is not 0 at zero slope.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter};
 use crate::OpticsState;
 
 /// `rest_offset`: one constant per channel, the value that the real sensor's colours have where the gel is flat but
@@ -27,7 +27,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
 
 const fn level(name: &'static str) -> ParameterSpec {
     let about = "value of the channel at zero slope";
-    ParameterSpec { name, unit: "grey levels", neutral: 0.0, bounds: (-60.0, 60.0), about }
+    parameter(name, "grey levels", 0.0, (-60.0, 60.0)).about(about)
 }
 
 fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {

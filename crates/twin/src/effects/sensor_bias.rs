@@ -1,7 +1,7 @@
 //! A force sensor with a wrong zero.
 
 use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, Visible};
+use super::{EffectSpec, Experiment, Fit, Group, PullFit, Visible, parameter};
 
 /// `sensor_bias`: a constant in every reading, without load too: a wrong zero, or a payload that the robot does
 /// not know. It keeps its sign when the pull is reversed, so it raises the reading one way and lowers it the other.
@@ -11,13 +11,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "constant added to the measured force",
     formula: "F_m = F + bias_n",
     source: "UR5e data sheet: accuracy 4 N; a payload of 0.1 kg that is not set is 1 N",
-    parameters: &[ParameterSpec {
-        name: "bias_n",
-        unit: "N",
-        neutral: 0.0,
-        bounds: (-30.0, 30.0),
-        about: "reading without load, along the sensor's axis (up)",
-    }],
+    parameters: &[parameter("bias_n", "N", 0.0, (-30.0, 30.0))
+        .about("reading without load, along the sensor's axis (up)")],
     sensor: Some(sensor),
     upright_only: true,
     visible: Visible::From(0.05),

@@ -2,7 +2,7 @@
 
 use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, FORCE_RATE, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, log_spaced,
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, TableFit, Visible, log_spaced, parameter,
 };
 
 /// `sensor_hysteresis`: a Bouc-Wen loop (exponent 1, beta = gamma), integrated exactly over each step. Its state
@@ -15,20 +15,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "F_m = F - amplitude_n z, dz = (sign(dF) - z) abs(dF) / force_scale_n",
     source: "Bouc-Wen model; 0.5 to 3 % of the range",
     parameters: &[
-        ParameterSpec {
-            name: "amplitude_n",
-            unit: "N",
-            neutral: 0.0,
-            bounds: (0.0, 10.0),
-            about: "half of the difference between the branches",
-        },
-        ParameterSpec {
-            name: "force_scale_n",
-            unit: "N",
-            neutral: 10.0,
-            bounds: (0.1, 100.0),
-            about: "change of force after which 63 % of a branch are reached",
-        },
+        parameter("amplitude_n", "N", 0.0, (0.0, 10.0)).about("half of the difference between the branches"),
+        parameter("force_scale_n", "N", 10.0, (0.1, 100.0))
+            .about("change of force after which 63 % of a branch are reached"),
     ],
     sensor: Some(sensor),
     remembers: true,

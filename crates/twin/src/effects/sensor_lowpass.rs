@@ -2,7 +2,7 @@
 
 use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, FORCE_RATE, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, log_spaced,
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, TableFit, Visible, log_spaced, parameter,
 };
 
 /// `sensor_lowpass`: first order, exact for a force that is constant over the step. Starts settled; the memory's
@@ -13,13 +13,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "measured force behind a low-pass filter",
     formula: "tau_s dF_m/dt = F - F_m",
     source: "first-order filter; tau 5 to 50 ms",
-    parameters: &[ParameterSpec {
-        name: "tau_s",
-        unit: "s",
-        neutral: 0.0,
-        bounds: (0.0, 2.0),
-        about: "time constant",
-    }],
+    parameters: &[parameter("tau_s", "s", 0.0, (0.0, 2.0)).about("time constant")],
     sensor: Some(sensor),
     remembers: true,
     visible: Visible::From(0.02),

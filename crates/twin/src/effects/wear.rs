@@ -1,7 +1,7 @@
 //! A gel that wears from pull to pull.
 
 use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
 
 /// `wear`: the coating loses friction at a rate that falls off, until `depth` of it is gone.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -11,20 +11,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 - depth (1 - exp(-pull_index / n0)))",
     source: "saturating wear of the coating, n0 500 to 5000; GelSlim was tested for more than 3000 grasps",
     parameters: &[
-        ParameterSpec {
-            name: "depth",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 0.9),
-            about: "share of the coefficient that is lost in the end",
-        },
-        ParameterSpec {
-            name: "n0",
-            unit: "1",
-            neutral: 1000.0,
-            bounds: (5.0, 1e5),
-            about: "pulls after which 63 % of it are lost",
-        },
+        parameter("depth", "1", 0.0, (0.0, 0.9)).about("share of the coefficient that is lost in the end"),
+        parameter("n0", "1", 1000.0, (5.0, 1e5)).about("pulls after which 63 % of it are lost"),
     ],
     covariates: &["pull_index"],
     friction: Some(friction),
