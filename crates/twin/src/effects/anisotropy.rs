@@ -1,7 +1,6 @@
 //! Friction that depends on the direction of the pull on the part.
 
-use super::hooks::values;
-use super::{EffectSpec, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `anisotropy`: a ground, turned or toothed surface has a lay; friction across it differs from friction along
 /// it, and is the same after half a turn.
@@ -24,13 +23,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "amplitude = 0.1: 10 % more than the mean along axis_deg, 10 % less at a right angle to it.",
     remedy: "Look for a lay of machining on the part or a weave of the gel's coating; keep the law in the twin.",
     typical: &[("amplitude", 0.15)],
-    pulls: Ok(PullFit {
-        fit: |_| {
-            let free = [("amplitude", 0.05), ("axis_deg", 10.0)];
-            Fit::over("axis_deg", &[-67.5, -22.5, 22.5, 67.5], ("amplitude", 0.08), &free)
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| {
+        let free = [("amplitude", 0.05), ("axis_deg", 10.0)];
+        Fit::over("axis_deg", &[-67.5, -22.5, 22.5, 67.5], ("amplitude", 0.08), &free)
+    })),
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,6 @@
 //! A background that is another one from one pull on.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter, values};
 use crate::OpticsState;
 use crate::optics::{BACKGROUND_TERMS, FINER_TERMS};
 

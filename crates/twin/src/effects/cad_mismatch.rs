@@ -1,7 +1,6 @@
 //! A part that is not the one of the mesh.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `cad_mismatch`: the real part's outlines (of teeth, rings, ends) lie outside those of its mesh, and its convex edges
@@ -19,7 +18,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         parameter("blunting_mm", "mm", 0.0, (0.0, 1.0))
             .about("standard deviation of the smoothing of convex edges"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 2,
     plainly: "The part is not its drawing: outlines stand elsewhere, edges are blunter.",

@@ -1,7 +1,6 @@
 //! Shadows that the gel around a contact throws.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `cast_shadow`: a channel's light, which comes from the side towards which its colour model is brightest, does not
@@ -19,7 +18,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         parameter("elevation_deg", "deg", 30.0, (5.0, 60.0))
             .about("height of the lights above the gel; lower ones throw longer shadows"),
     ],
-    covariates: &[],
     optics: Some(optics),
     plainly: "Contacts throw shadows away from the lights that the twin does not draw.",
     number_means: "strength = 0.1: in a full shadow 10 % of the light's brightness are missing.",

@@ -1,7 +1,6 @@
 //! A new gel that takes a few cycles to settle.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 use crate::PULLS_SINCE_REST;
 use crate::draw::Drawn;
 

@@ -1,7 +1,6 @@
 //! Oil, dust or wear particles between part and gel, from one pull on.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `contamination`: the coefficient steps at a pull. A negative drop is a cleaning.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -20,10 +19,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "drop = 0.2: 20 % of the coefficient are lost from pull at_pull_index on.",
     remedy: "Look up what happened before that pull (oil, dust, a touched part); clean gel and part, and repeat a few of the pulls before it.",
     typical: &[("drop", 0.2), ("at_pull_index", 150.0)],
-    pulls: Ok(PullFit {
-        fit: |span| Fit::over("at_pull_index", &span.splits, ("drop", 0.0), &[("drop", 0.05)]).searching(1),
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|span| {
+        Fit::over("at_pull_index", &span.splits, ("drop", 0.0), &[("drop", 0.05)]).searching(1)
+    })),
     experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,6 @@
 //! A force loop that settles at a multiple of its command.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, Group, PullFit, Visible, parameter};
+use super::{EffectSpec, Experiment, Fit, Group, PullFit, Visible, parameter, values};
 
 /// `controller_gain`: the loop follows a share of the desired force.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -17,7 +16,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "gain = 0.95: where 100 N were asked for the robot pulls with 95 N.",
     remedy: "Compare the commanded with the measured force of a part that holds; check the payload and the force mode's damping.",
     typical: &[("gain", 0.95)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]))),
     experiments: &[Experiment::KnownMasses],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,6 @@
 //! A force loop that lets small errors be.
 
-use super::hooks::values;
-use super::{EffectSpec, Fit, Group, PullFit, parameter};
+use super::{EffectSpec, Fit, Group, PullFit, parameter, values};
 
 /// `deadband`: closer than the band to what it measures, the loop takes the measured force as its command and
 /// so sees no error.

@@ -1,7 +1,6 @@
 //! A camera that is out of focus.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `defocus`: a Gaussian blur of what the contact changes in the image. The rest frame is smooth and was taken with the
@@ -14,7 +13,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     source: "Gaussian point spread function; sigma up to 3 px",
     parameters: &[parameter("sigma_mm", "mm", 0.0, (0.0, 0.6))
         .about("standard deviation of the point spread function, on the gel")],
-    covariates: &[],
     optics: Some(optics),
     plainly: "Contacts look blurred: the camera is out of focus.",
     number_means: "sigma_mm = 0.1: a point on the gel is smeared over about 0.2 mm.",

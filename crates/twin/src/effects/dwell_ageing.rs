@@ -1,7 +1,6 @@
 //! Static friction that grows while the contact rests.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `dwell_ageing`: the real contact area creeps up with the logarithm of the time under load.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -23,7 +22,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "beta = 0.02: ten times the dwell has a coefficient about 4.6 % higher.",
     remedy: "Wait equally long before every pull, or keep the law in the twin.",
     typical: &[("beta", 0.03)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("beta", 0.01)]], &[("beta", 0.01)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("beta", 0.01)]], &[("beta", 0.01)]))),
     experiments: &[Experiment::DwellTimes],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,6 @@
 //! A part whose edges are round where its mesh has sharp ones.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, PressNeeds, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, PressNeeds, parameter, values};
 use crate::OpticsState;
 
 /// `edge_rounding`: the convex edges of the real part have a radius. The image shows the rounded part; forces and friction
@@ -14,7 +13,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     source: "rims of printed parts lie 0.15 to 0.25 mm inside their mesh in GelSight images (Chen et al. 2022, its published presses); opening: Serra 1982",
     parameters: &[parameter("radius_mm", "mm", 0.0, (0.0, 1.0))
         .about("radius of the ball that just fits into each edge from inside")],
-    covariates: &[],
     optics: Some(optics),
     plainly: "The part's edges are rounder than in its drawing.",
     number_means: "radius_mm = 0.2: edges have a radius of 0.2 mm.",

@@ -1,7 +1,6 @@
 //! A camera with another exposure or response.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `exposure`: gain and gamma of the camera, the same for all channels, with and without contact. Two of them one after
@@ -16,7 +15,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         parameter("gain", "1", 1.0, (0.3, 3.0)).about("exposure over that of the sensor file"),
         parameter("gamma", "1", 1.0, (0.4, 2.5)).about("exponent of the response"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 2,
     plainly: "The camera's exposure or its curve is another one.",

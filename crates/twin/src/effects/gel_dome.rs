@@ -1,7 +1,6 @@
 //! A gel that is more or less domed than its sensor file says.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `gel_dome`: a paraboloid is added to the gel's shape at rest. The imprint has the same volume on another surface: a
@@ -15,7 +14,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     parameters: &[
         parameter("sag_mm", "mm", 0.0, (-2.0, 3.0)).about("how much deeper the corners lie below the apex")
     ],
-    covariates: &[],
     optics: Some(optics),
     plainly: "The gel is domed: it lies deeper at the corners than in the middle.",
     number_means: "sag_mm = 0.5: the corners lie 0.5 mm deeper than the sensor file says.",

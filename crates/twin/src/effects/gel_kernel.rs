@@ -1,7 +1,6 @@
 //! A gel that follows the part more or less closely than its kernels say.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `gel_kernel`: the sizes of the kernels that deform the gel around a contact, all by one factor. Between two odd
@@ -15,7 +14,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     parameters: &[
         parameter("factor", "1", 1.0, (0.5, 2.0)).about("true size of the kernels over that of the twin")
     ],
-    covariates: &[],
     optics: Some(optics),
     plainly: "The gel smooths a contact over a wider or narrower neighbourhood than the twin thinks.",
     number_means: "factor = 1.3: edges are smeared over a length 30 % larger.",

@@ -1,7 +1,6 @@
 //! A gripper that does not bring its command to the jaws.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `grip_force_loss`: drive friction takes a constant force. A gain of the drive is no parameter: friction
 /// coefficient and imprint constant absorb it.
@@ -18,7 +17,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "loss_n = 2: of 20 N per jaw that were commanded 18 N arrive.",
     remedy: "Measure the grip force with a load cell between the jaws; grease or tare the drive.",
     typical: &[("loss_n", 2.0)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("loss_n", 0.0)]], &[("loss_n", 0.5)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("loss_n", 0.0)]], &[("loss_n", 0.5)]))),
     experiments: &[Experiment::GripForceWithALoadCell],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,6 @@
 //! A picture that was taken earlier or later than the force that stands beside it.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, Group, ImprintFit, parameter};
+use super::{EffectSpec, Experiment, Fit, Group, ImprintFit, parameter, values};
 
 /// `imprint_delay`: camera and load cell have clocks, or buffers, of their own. It acts on grasps beside a load cell and on nothing
 /// else: a grip that is simulated holds its force while the pictures are taken.

@@ -1,7 +1,6 @@
 //! An imprint that grows with another power of the grip force than the first.
 
-use super::hooks::{positive, values};
-use super::{EffectSpec, Experiment, Fit, Group, ImprintFit, parameter};
+use super::{EffectSpec, Experiment, Fit, Group, ImprintFit, parameter, positive, values};
 
 /// `imprint_nonlinearity`: `V = c F` becomes a power law through the same volume at `f_ref_n`. A Hertzian
 /// half-space under a sphere has 4/3; a thin layer on a hard backing has less than 1.

@@ -1,7 +1,6 @@
 //! Jaws that are not parallel: the grip is a wedge.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// Largest coefficient of a wedge that locks.
 const LOCKED_MU: f64 = 100.0;
@@ -26,7 +25,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "tilt_deg = 1: a coefficient of 0.3 is about 0.02 higher pulling up and as much lower pulling down.",
     remedy: "Measure the jaws with feeler gauges on a flat part, and shim them.",
     typical: &[("tilt_deg", 1.5)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("tilt_deg", 0.0)]], &[("tilt_deg", 0.3)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("tilt_deg", 0.0)]], &[("tilt_deg", 0.3)]))),
     experiments: &[Experiment::KnownMasses],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,8 @@
 //! Lights whose brightness drifts with the clock.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ImprintFit, ParameterSpec, PressFit, parameter};
+use super::{
+    EffectSpec, Experiment, Fit, GripPoint, Group, ImprintFit, ParameterSpec, PressFit, parameter, values,
+};
 use crate::OpticsState;
 
 /// `light_drift`: every channel is multiplied, with and without contact, by a factor that starts at 1 and changes

@@ -1,7 +1,6 @@
 //! A coefficient that falls, or rises, as a power of the load.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `load_power_law`: adhesive friction of constant shear stress is proportional to the contact area, which
 /// grows with less than the load; `n = -1/3` for a Hertzian sphere.
@@ -23,7 +22,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "n = -0.1: twice the grip force has a coefficient 7 % lower.",
     remedy: "Keep the law in the twin, and stay within the grip forces it was fitted on.",
     typical: &[("n", -0.15)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("n", 0.0)]], &[("n", 0.05)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("n", 0.0)]], &[("n", 0.05)]))),
     experiments: &[Experiment::OtherPullRates, Experiment::WiderGripForces],
     ..EffectSpec::BARE
 };

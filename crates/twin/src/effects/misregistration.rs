@@ -1,7 +1,8 @@
 //! A contact that is seen elsewhere than it is thought to be.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, PressNeeds, parameter};
+use super::{
+    EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, PressNeeds, parameter, values,
+};
 use crate::Jaw;
 use crate::OpticsState;
 
@@ -24,7 +25,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         parameter("k1", "1", 0.0, (-0.1, 0.1)).about("radial distortion half an image width from the middle, positive for a barrel"),
         parameter("frame_moves", "1", 0.0, (0.0, 1.0)).about("how much of the way the frame at rest moves along: 0 if the part lies elsewhere, 1 if the camera does"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 5,
     plainly: "The contact stands elsewhere in the picture than it should: moved, turned, or at another scale.",

@@ -1,7 +1,6 @@
 //! A grip beside the pull line: part of the friction holds the moment.
 
-use super::hooks::values;
-use super::{EffectSpec, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `off_centre`: a law of the offset alone, whatever the grip angle, for what the mechanics of the twin leave out. What a
 /// grip that turns loses follows from the contact itself, with `robot.twist`. The two differ (an offset along the pull has
@@ -23,15 +22,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "1 / inverse_lever_per_mm is the offset in mm at which 71 % of the friction are left.",
     remedy: "Grip in the middle, or compute the contact: a compliant twist needs no such law.",
     typical: &[("inverse_lever_per_mm", 0.08)],
-    pulls: Ok(PullFit {
-        fit: |_| {
-            Fit::new(
-                &[&[("inverse_lever_per_mm", 0.04)], &[("inverse_lever_per_mm", 0.12)]],
-                &[("inverse_lever_per_mm", 0.02)],
-            )
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| {
+        Fit::new(
+            &[&[("inverse_lever_per_mm", 0.04)], &[("inverse_lever_per_mm", 0.12)]],
+            &[("inverse_lever_per_mm", 0.02)],
+        )
+    })),
     ..EffectSpec::BARE
 };
 

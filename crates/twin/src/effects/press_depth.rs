@@ -1,7 +1,6 @@
 //! A press that is deeper, or less deep, than it is thought to be.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, PressNeeds, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, PressNeeds, parameter, values};
 use crate::OpticsState;
 
 /// `press_depth`: zero and scale of the depth of the press are not those that the twin, or the stage of a calibration, believes.
@@ -17,7 +16,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         parameter("factor", "1", 1.0, (0.4, 2.0)).about("depth that is seen over the one that is believed"),
         parameter("offset_mm", "mm", 0.0, (-0.5, 0.5)).about("how much deeper the press is beyond that"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 2,
     plainly: "Things are pressed in deeper, or less deep, than was written down.",

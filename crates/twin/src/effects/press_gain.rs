@@ -1,7 +1,6 @@
 //! A camera whose white balance is another one, or differs from grip to grip.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter, values};
 use crate::random::{Purpose, Stream};
 use crate::{Jaw, OpticsState};
 
@@ -21,7 +20,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         scatter("green_sd"),
         scatter("blue_sd"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 5,
     plainly: "Pictures have a colour cast, all the same or each its own: the camera balances white, or exposes, by itself.",

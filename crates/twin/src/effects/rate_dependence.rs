@@ -1,7 +1,6 @@
 //! A coefficient that depends on how fast the force rises.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// Slowest pull the logarithm is taken at.
 const SLOWEST_N_PER_S: f64 = 1e-3;
@@ -28,7 +27,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "k = 0.02: ten times the rate has a coefficient 4.6 % higher.",
     remedy: "Pull at the rate of the application, or keep the law in the twin.",
     typical: &[("k", 0.04)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("k", 0.0)]], &[("k", 0.02)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("k", 0.0)]], &[("k", 0.02)]))),
     experiments: &[Experiment::OtherPullRates],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,6 @@
 //! Two regimes of friction with a transition at a grip force.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `regime_transition`: one coefficient below a grip force, another above. The lower one is `mu`; a factor on
 /// both would be `mu` again. Wucherer et al. 2023 see a "phase transition" near 20 N and do not explain it.

@@ -1,7 +1,6 @@
 //! A colour model that is not 0 at zero slope.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `rest_offset`: one constant per channel, the value that the real sensor's colours have where the gel is flat but
@@ -13,7 +12,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "I_c' = I_c + c with contact, c = red, green, blue",
     source: "colour tables have -5 to 6 grey levels at zero slope where there should be none (Taxim, Si and Yuan 2022)",
     parameters: &[level("red"), level("green"), level("blue")],
-    covariates: &[],
     optics: Some(optics),
     sizes: 3,
     plainly: "Pictures with contact are brighter or darker everywhere, the frame without contact is right.",

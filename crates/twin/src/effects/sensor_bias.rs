@@ -1,7 +1,8 @@
 //! A force sensor with a wrong zero.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, PullFit, Visible, parameter};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, SensorMemory, SensorPoint, Visible, parameter, values,
+};
 
 /// `sensor_bias`: a constant in every reading, without load too: a wrong zero, or a payload that the robot does
 /// not know. It keeps its sign when the pull is reversed, so it raises the reading one way and lowers it the other.
@@ -20,7 +21,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "bias_n = 1: with nothing on it the sensor reads 1 N.",
     remedy: "Zero the sensor without load before every pull, and set the payload of the gripper.",
     typical: &[("bias_n", 1.0)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("bias_n", 0.0)]], &[("bias_n", 0.2)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("bias_n", 0.0)]], &[("bias_n", 0.2)]))),
     experiments: &[Experiment::NoLoadReading, Experiment::PullsUpAndDown],
     ..EffectSpec::BARE
 };

@@ -1,8 +1,8 @@
 //! A force sensor that creeps under load.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, TableFit, Visible, log_spaced, parameter,
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible,
+    log_spaced, parameter, values,
 };
 
 /// `sensor_creep`: part of the reading follows the force slowly. Starts settled; the memory's state is the slow

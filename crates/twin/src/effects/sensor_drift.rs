@@ -1,7 +1,9 @@
 //! A force sensor whose zero wanders with the clock.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, PullFit, TableFit, Visible, parameter, wider};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible, parameter,
+    values, wider,
+};
 
 /// `sensor_drift`: a bias that grows linearly from 0 at the start of the campaign.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -21,10 +23,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "rate_n_per_h = 1: after an hour the sensor reads 1 N more than at the start.",
     remedy: "Zero the sensor before every pull; let it warm up.",
     typical: &[("rate_n_per_h", 0.5)],
-    pulls: Ok(PullFit {
-        fit: |_| Fit::new(&[&[("rate_n_per_h", 0.0)]], &[("rate_n_per_h", 0.2)]),
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("rate_n_per_h", 0.0)]], &[("rate_n_per_h", 0.2)]))),
     table: Some(TableFit {
         acts_through: &["time_s"],
         bounds: |span, own| wider(own, (span.highest_n - span.lowest_n) / span.hours()),

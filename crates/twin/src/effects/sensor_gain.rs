@@ -1,7 +1,8 @@
 //! A force sensor with a wrong gain.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, PullFit, Visible, parameter};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, SensorMemory, SensorPoint, Visible, parameter, values,
+};
 
 /// `sensor_gain`: every reading times a factor.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -17,7 +18,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "gain = 0.95: a true force of 100 N reads 95 N.",
     remedy: "Hang a known mass on the flange and set the sensor's scale.",
     typical: &[("gain", 0.95)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]))),
     experiments: &[Experiment::KnownMasses],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,9 @@
 //! A force sensor whose gain wanders with the clock.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, PullFit, TableFit, Visible, parameter, wider};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible, parameter,
+    values, wider,
+};
 
 /// `sensor_gain_drift`: a gain that leaves 1 linearly from the start of the campaign on.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -19,10 +21,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "rate_per_h = 0.01: after an hour every force reads 1 % more than at the start.",
     remedy: "Let sensor and electronics warm up; check a known mass at the start and at the end of the day.",
     typical: &[("rate_per_h", 0.02)],
-    pulls: Ok(PullFit {
-        fit: |_| Fit::new(&[&[("rate_per_h", 0.0)]], &[("rate_per_h", 0.02)]),
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("rate_per_h", 0.0)]], &[("rate_per_h", 0.02)]))),
     table: Some(TableFit {
         acts_through: &["time_s"],
         bounds: |span, own| wider(own, 0.9 / span.hours()),

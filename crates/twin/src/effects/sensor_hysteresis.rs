@@ -1,8 +1,8 @@
 //! A force sensor that reads less on the way up than on the way down.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, TableFit, Visible, log_spaced, parameter,
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible,
+    log_spaced, parameter, values,
 };
 
 /// `sensor_hysteresis`: a Bouc-Wen loop (exponent 1, beta = gamma), integrated exactly over each step. Its state
@@ -26,13 +26,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "amplitude_n = 0.5: rising and falling readings of one force differ by 1 N.",
     remedy: "Approach every force from the same side, or load the sensor fully once before it is used.",
     typical: &[("amplitude_n", 0.5)],
-    pulls: Ok(PullFit {
-        fit: |_| {
-            let free = [("amplitude_n", 0.3), ("force_scale_n", 3.0)];
-            Fit::over("force_scale_n", &[3.0, 15.0], ("amplitude_n", 0.3), &free)
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| {
+        let free = [("amplitude_n", 0.3), ("force_scale_n", 3.0)];
+        Fit::over("force_scale_n", &[3.0, 15.0], ("amplitude_n", 0.3), &free)
+    })),
     table: Some(TableFit {
         acts_through: &[FORCE_RATE],
         grid: Some(|span| {

@@ -1,8 +1,8 @@
 //! A force sensor that is filtered.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, TableFit, Visible, log_spaced, parameter,
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible,
+    log_spaced, parameter, values,
 };
 
 /// `sensor_lowpass`: first order, exact for a force that is constant over the step. Starts settled; the memory's
@@ -21,10 +21,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "tau_s = 0.05: two thirds of a sudden change are seen after 50 ms.",
     remedy: "Give the sensor's filter a higher cut-off frequency, or pull more slowly.",
     typical: &[("tau_s", 0.1)],
-    pulls: Ok(PullFit {
-        fit: |_| Fit::new(&[&[("tau_s", 0.03)], &[("tau_s", 0.15)]], &[("tau_s", 0.02)]),
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("tau_s", 0.03)], &[("tau_s", 0.15)]], &[("tau_s", 0.02)]))),
     table: Some(TableFit {
         acts_through: &[FORCE_RATE],
         grid: Some(|span| {

@@ -1,8 +1,8 @@
 //! A force sensor whose line is bent.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, Fit, Group, PullFit, REFERENCE_FORCE, TableFit, Visible, parameter, wider,
+    EffectSpec, Experiment, Fit, Group, PullFit, REFERENCE_FORCE, SensorMemory, SensorPoint, TableFit,
+    Visible, parameter, values, wider,
 };
 
 /// `sensor_quadratic`: the second term of the sensor's curve. A load cell bends the same way whatever the sign of the

@@ -1,7 +1,9 @@
 //! A force sensor at the end of its range.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, PullFit, REFERENCE_FORCE, TableFit, parameter};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, REFERENCE_FORCE, SensorMemory, SensorPoint, TableFit,
+    parameter, values,
+};
 
 /// No force here comes near it.
 const NO_LIMIT_N: f64 = 1e6;

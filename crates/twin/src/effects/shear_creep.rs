@@ -1,7 +1,6 @@
 //! Gels that flow under shear.
 
-use super::hooks::values;
-use super::{Creep, EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, Seen, parameter};
+use super::{Creep, EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, Seen, parameter, values};
 
 /// `shear_creep`: the tool goes on moving under a force that the jaws hold. What creeps far enough ends the pull at its
 /// displacement stop before the jaws let go: the label is then the force of that moment, `sqrt(2 r x_stop / rate)` of a pull that

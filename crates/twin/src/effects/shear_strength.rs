@@ -1,7 +1,6 @@
 //! A contact that holds no more per area than its shear strength, however hard it is pressed.
 
-use super::hooks::values;
-use super::{EffectSpec, GripPoint, Group, parameter};
+use super::{EffectSpec, GripPoint, Group, parameter, values};
 
 /// No interface here comes near it.
 const NO_LIMIT_MPA: f64 = 1e6;

@@ -1,7 +1,6 @@
 //! A gel whose friction changes as it warms.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `temperature`: friction of elastomers falls with temperature, here by the same share for each kelvin.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -22,7 +21,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "k_per_k = 0.01: a gel that is 1 K warmer has a coefficient 1 % lower.",
     remedy: "Record the temperature with every pull, let lights and robot warm up first, and keep the law in the twin.",
     typical: &[("k_per_k", 0.01)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("k_per_k", 0.0)]], &[("k_per_k", 0.005)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("k_per_k", 0.0)]], &[("k_per_k", 0.005)]))),
     experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,6 @@
 //! A gel that wears from pull to pull.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `wear`: the coating loses friction at a rate that falls off, until `depth` of it is gone.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -20,14 +19,11 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "depth = 0.1: 10 % of the coefficient are lost in the end, two thirds of it after n0 pulls.",
     remedy: "Compare with a new gel; plan pulls in random order so that wear is not taken for something else.",
     typical: &[("depth", 0.2), ("n0", 150.0)],
-    pulls: Ok(PullFit {
-        fit: |span| {
-            let last = span.last_pull_index;
-            let free = [("depth", 0.05), ("n0", 0.3 * last)];
-            Fit::over("n0", &[0.1 * last, 0.5 * last, 3.0 * last], ("depth", 0.1), &free)
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|span| {
+        let last = span.last_pull_index;
+        let free = [("depth", 0.05), ("n0", 0.3 * last)];
+        Fit::over("n0", &[0.1 * last, 0.5 * last, 3.0 * last], ("depth", 0.1), &free)
+    })),
     experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };
