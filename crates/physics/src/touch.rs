@@ -6,7 +6,7 @@
 //! add to the friction force. Else the engine gets a plate in front of each pad.
 
 use crate::convert::rapier_pose;
-use crate::grip_error::GripError;
+use crate::grip::GripError;
 use crate::scene::pad_shape;
 use crate::setup::GripSetup;
 use crate::surface::Window;
