@@ -78,11 +78,10 @@ pub use pulls::{
     pulls_with_images, read_judged_pulls, read_pull_folder, read_pull_images, write_pull_folder,
 };
 pub use reader::{ReadError, Record, ShardReader, mcap_mark};
-pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};
+pub use rig_log::{RigLog, RigLogEvent, RigStream};
 pub use rig_run::{
-    FAILED_FOLDER, FrameView, RigCampaign, RigFilm, RigFrame, RigPull, RigPullError, RigResult, RigRunError,
-    RigRunInfo, create_rig_run, discard_failed, failed_pulls, missing_pulls, rig_campaign, suspect_pulls,
-    write_rig_pull,
+    FAILED_FOLDER, FrameView, RigCampaign, RigFilm, RigFrame, RigPull, RigResult, RigRunError, RigRunInfo,
+    create_rig_run, discard_failed, failed_pulls, missing_pulls, rig_campaign, suspect_pulls, write_rig_pull,
 };
 pub use rosbag::{
     BagCell, BagClock, BagForce, BagImages, BagMotion, BagPull, BagTopics, ROSBAG_FILE, RosbagError,

@@ -246,14 +246,14 @@ fn a_campaign_goes_on_and_failed_pulls_are_made_again() {
         write_rig_pull(&folder, &measured).unwrap();
     }
     assert!(missing_pulls(&folder).unwrap().is_empty() && folder.write_index().unwrap());
-    let again = write_rig_pull(&folder, &slipped(1)).unwrap_err();
-    assert!(matches!(again, RigRunError::Done { pull: 1, .. }), "{again}");
+    let again = write_rig_pull(&folder, &slipped(1)).unwrap_err().to_string();
+    assert!(again.starts_with("pull 1 is done: "), "{again}");
 
     let folder = create_rig_run(at.path(), &RigRunInfo { name: "other name".into(), ..info(3) }).unwrap();
     assert_eq!(failed_pulls(&folder).unwrap(), [0]);
     for kept in [1, 2] {
-        let e = discard_failed(&folder, kept).unwrap_err();
-        assert!(matches!(e, RigRunError::Labelled { .. }), "{e}");
+        let e = discard_failed(&folder, kept).unwrap_err().to_string();
+        assert!(e.contains("did not fail, it stays: "), "{e}");
     }
     assert!(discard_failed(&folder, 0).unwrap());
     assert_eq!(missing_pulls(&folder).unwrap(), [0]);
