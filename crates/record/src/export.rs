@@ -1,5 +1,6 @@
-//! One sample as a file of its own, with every reading as a message for viewers.
+//! Exports: what all of them share, and one sample as a file of its own, with every reading as a message for viewers.
 
+use crate::dataset::DatasetError;
 use crate::encode::{EncodedSample, state_messages, timestamp};
 use crate::film_frame::EncodedFrame;
 use crate::mark::EXPORT;
@@ -10,8 +11,45 @@ use crate::reader::{ReadError, ShardReader, trace_of};
 use crate::shard::{ShardError, ShardInfo, ShardWriter};
 use gripgen_twin::config::ImageStorage;
 use gripgen_twin::{Jaw, PerJaw};
+use parquet::errors::ParquetError;
 use prost::Message;
 use std::io::Cursor;
+use std::path::PathBuf;
+
+/// What of each row of a dataset is exported beside its cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExportOptions {
+    /// Both images. LeRobot and WebDataset leave out rows without them.
+    pub images: bool,
+    /// The force over time. LeRobot leaves out rows without it.
+    pub traces: bool,
+}
+
+/// Why a dataset could not be exported.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportDatasetError {
+    /// The dataset.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// A Parquet file.
+    #[error("Parquet: {0}")]
+    Parquet(#[from] ParquetError),
+    /// A tar file.
+    #[error("tar: {0}")]
+    Tar(#[from] std::io::Error),
+    /// A file of a folder.
+    #[error("{}: {source}", .path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Nothing is left.
+    #[error("no row has what is wanted of it: images {}, traces {}", .0.images, .0.traces)]
+    Empty(ExportOptions),
+}
 
 /// Why a sample could not be exported.
 #[derive(Debug, thiserror::Error)]

@@ -54,7 +54,7 @@ pub use campaign::{
 };
 pub use dataset::{Dataset, DatasetError, NoiseMode, Table};
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
-pub use export::{ExportError, export_sample};
+pub use export::{ExportDatasetError, ExportError, ExportOptions, export_sample};
 pub use film::{Film, FilmOptions, encode_frame};
 pub use film_frame::EncodedFrame;
 pub use folder::{
@@ -65,9 +65,9 @@ pub use imprint_table::{
     IMPRINTS_FILE, ImprintTable, MeasuredImprint, read_imprint_picture, read_imprint_table,
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
-pub use lerobot::{ExportLeRobotError, LEROBOT_CARD, LeRobotOptions, export_lerobot};
+pub use lerobot::{LEROBOT_CARD, export_lerobot};
 pub use mark::{MARK_NAME, parquet_mark, png_mark, png_with_mark};
-pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};
+pub use parquet::export_parquet;
 pub use picture::{PictureError, decode as decode_picture, encode_jpeg, encode_png};
 pub use presses::{
     PRESSES_FILE, PressColumnTable, PressFolder, PressRecord, PressedBody, press_table, read_press_columns,
@@ -92,6 +92,4 @@ pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo
 pub use stored::{sample_covariates, sample_view};
 pub use table::TableError;
 pub use verify::{Verification, repair, verify};
-pub use webdataset::{
-    ExportWebDatasetError, WebDatasetOptions, export_webdataset, tar_mark, webdataset_rows,
-};
+pub use webdataset::{export_webdataset, tar_mark, webdataset_rows};

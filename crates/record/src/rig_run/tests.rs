@@ -366,7 +366,7 @@ fn a_parquet_file_has_the_images_at_rest_and_nulls() {
     write_rig_pull(&folder, &RigPull { rest: None, trace: None, ..failed(2) }).unwrap();
     let rows = Dataset::open(at.path()).unwrap();
     let path = at.path().join("all.parquet");
-    let options = crate::ParquetOptions { images: true, traces: true };
+    let options = crate::ExportOptions { images: true, traces: true };
     crate::export_parquet(&rows, options, std::fs::File::create(&path).unwrap(), |_| {}).unwrap();
     let reader = SerializedFileReader::new(std::fs::File::open(&path).unwrap()).unwrap();
     let found: Vec<BTreeMap<String, Field>> = reader
