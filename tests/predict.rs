@@ -1,8 +1,8 @@
 //! Predictions that fits are made with, against the simulator and closed forms.
 
 use crate::diagnose::{baseline, library, simulated, twin_at, twin_with};
+use gripgen::identify::label_moments;
 use gripgen::identify::pulls::model::{ModelEffect, PredictPulls as _, PullModel};
-use gripgen::physics::label_moments;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{PullTrace, TraceRow, Twin, slip_label};
 use gripgen::{Location, PullPredictor, compare_pulls, given_model, load_twin_document};

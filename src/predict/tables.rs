@@ -3,8 +3,9 @@
 use super::table::{ExactLabels, LabelTable, Scattered, Tables, bent_by, enough_for};
 use super::{CONTACTS, PullPredictor, acts_on_signals};
 use crate::expect::QuietTwin;
+use gripgen_identify::LabelRule;
 use gripgen_identify::pulls::model::{PullModel, PullPrediction};
-use gripgen_physics::{LabelRule, RimTable, StuckPull};
+use gripgen_physics::{RimTable, StuckPull};
 use gripgen_twin::Backbone;
 use std::sync::Arc;
 

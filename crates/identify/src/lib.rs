@@ -25,6 +25,7 @@ mod draws;
 mod grouped;
 mod imprint;
 mod imprints;
+mod label_moments;
 mod least_squares;
 mod permutation;
 mod plain;
@@ -50,6 +51,7 @@ pub use imprints::{
     ImprintRow, MeasuredGrasp, PartConstant, SharedConstant, calibrate_imprint_set, compare_imprints,
     diagnose_imprints,
 };
+pub use label_moments::{LabelRule, label_moments};
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
 pub use plain::{HARDLY, plain};

@@ -54,7 +54,7 @@ pub use cells::PullCells;
 pub use grip::{Grip, GripError, Held, grip};
 pub use jaw_friction::{FrictionCell, JawFriction};
 pub use limit_surface::{LimitCell, free_twist_capacity_n};
-pub use quasi_static::{LabelRule, QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull, label_moments};
+pub use quasi_static::{QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
 pub use session::{Command, PullError, PullSession, PullState, Signals};
 pub use setup::{Arm, GripSetup, Mount};
 pub use shape::{PartShape, ShapeError};
