@@ -247,18 +247,7 @@ impl Sweep {
 
     /// A scenario in which nothing is drawn yet.
     fn blank(&self) -> Scenario {
-        Scenario {
-            seed: self.seed,
-            index: 0,
-            group: 0,
-            repetition: 0,
-            part: String::new(),
-            grip_pose: 0,
-            grip_force_n: 1.0,
-            covariates: Covariates::default(),
-            pull: self.pull(),
-            drawn: BTreeMap::new(),
-        }
+        Scenario { seed: self.seed, grip_force_n: 1.0, pull: self.pull(), ..Scenario::default() }
     }
 }
 

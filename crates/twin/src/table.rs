@@ -293,18 +293,8 @@ mod tests {
     fn scenario(part: &str, extra: &[(&str, Drawn)]) -> Scenario {
         let pull = PullSettings { increment_n: 0.5, step_s: 0.1, ..Default::default() };
         let extra = extra.iter().map(|(k, v)| (k.to_string(), v.clone())).collect();
-        Scenario {
-            seed: 1,
-            index: 0,
-            group: 0,
-            repetition: 0,
-            part: part.into(),
-            grip_pose: 0,
-            grip_force_n: 40.0,
-            covariates: Covariates { session: "2".into(), grip_offset_m: 3e-3, extra, ..Default::default() },
-            pull,
-            drawn: Default::default(),
-        }
+        let covariates = Covariates { session: "2".into(), grip_offset_m: 3e-3, extra, ..Default::default() };
+        Scenario { part: part.into(), grip_force_n: 40.0, covariates, pull, ..Scenario::default() }
     }
 
     const HUMIDITY: &str = "[[effects]]\nname = \"table\"\ncovariate = \"humidity_pct\"\nx = [30, 40.0, 60]\n\

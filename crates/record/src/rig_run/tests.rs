@@ -60,16 +60,14 @@ fn pull(index: u64, result: RigResult) -> RigPull {
     let covariates = Covariates { pull_index: index, time_s: 60.0 * index as f64, ..Covariates::default() };
     let settings = PullSettings { max_time_s: 120.0, ..Default::default() };
     let scenario = Scenario {
-        seed: 0,
         index,
         group: index,
-        repetition: 0,
         part: "gear".into(),
-        grip_pose: 0,
         grip_force_n: 20.0,
         covariates,
         pull: settings,
         drawn: BTreeMap::from([("humidity_pct".to_string(), Drawn::Number(41.5))]),
+        ..Scenario::default()
     };
     let (images, rest) = (Some(image(90)), Some(image(60)));
     RigPull { scenario, result, images, rest, trace: Some(trace()), film: None, log: log() }
