@@ -23,7 +23,6 @@ mod dataset;
 mod encode;
 mod export;
 mod film;
-mod film_frame;
 mod folder;
 mod frame;
 mod imprint_table;
@@ -55,8 +54,7 @@ pub use campaign::{
 pub use dataset::{Dataset, DatasetError, NoiseMode, Table};
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportDatasetError, ExportError, ExportOptions, export_sample};
-pub use film::{Film, FilmOptions, encode_frame};
-pub use film_frame::EncodedFrame;
+pub use film::{EncodedFrame, Film, FilmOptions, encode_frame};
 pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
     sha256_hex,
