@@ -22,7 +22,7 @@ mod tests;
 pub use chain::{
     CommandChain, SensorChain, creep, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state,
 };
-pub use experiment::{Experiment, Measured, separating};
+pub use experiment::{Experiment, Measured};
 pub use fit::{
     Bounds, FORCE_RATE, Fit, GraspSpan, Grid, ImprintFit, Named, PressFit, PressNeeds, PullFit, PullSpan,
     REFERENCE_FORCE, Seen, TableFit, TableSpan,

@@ -52,18 +52,6 @@ pub enum Visible {
     AtTheLargestForce(f64),
 }
 
-impl Visible {
-    /// Whether a size is enough, in a campaign of so many hours with such a largest label.
-    pub fn holds(self, size: f64, hours: f64, largest_n: f64) -> bool {
-        match self {
-            Visible::Always => true,
-            Visible::From(least) => size >= least,
-            Visible::OverTheCampaign(least) => size * hours >= least,
-            Visible::AtTheLargestForce(least) => size * largest_n >= least,
-        }
-    }
-}
-
 /// What of the rig an effect belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Group {
