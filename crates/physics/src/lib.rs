@@ -64,10 +64,4 @@ pub use twist::{TwistCell, compliant_twist_capacity_n};
 pub use urdf::UrdfError;
 
 #[cfg(test)]
-mod arm_tests;
-#[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod touch_tests;
-#[cfg(test)]
-mod urdf_tests;

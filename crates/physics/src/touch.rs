@@ -200,3 +200,6 @@ fn first_touch(setup: &GripSetup<'_>, jaw: Jaw) -> Result<Option<f64>, GripError
         Some(hit) => Ok(Some(open - hit.time_of_impact)),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -217,3 +217,6 @@ fn meshes_of(robot: &Robot, find_mesh: &dyn Fn(&str) -> Option<String>) -> Resul
     }
     Ok(meshes)
 }
+
+#[cfg(test)]
+mod tests;

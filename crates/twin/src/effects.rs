@@ -7,8 +7,6 @@
 //! the baseline (the rate at which the coefficient was measured, say), that scale is a parameter too, a
 //! *reference*: it has a documented default and is not fitted.
 
-#[cfg(test)]
-mod catalogue_tests;
 mod chain;
 mod experiment;
 mod fit;

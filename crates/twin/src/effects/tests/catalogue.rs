@@ -1,7 +1,7 @@
 //! What the specs say of their effects: checked by calling the hooks, and against each other.
 
-use super::testing::grip;
-use super::*;
+use super::super::testing::grip;
+use super::super::*;
 use crate::{Covariates, OpticsState};
 
 /// What a spec says of its sensor hook is what the hook does: at another time, and after other readings.
