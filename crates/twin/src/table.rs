@@ -4,15 +4,11 @@
 //! over one covariate. It repeats what was seen and says nothing about why: it is marked `physical = false`, and outside
 //! its range it is held.
 
-mod acting;
-
-pub use acting::{table_factor, table_offset_n};
-
-use crate::Values;
 use crate::columns::{self, Column, PullView};
 use crate::config::{ConfigError, EffectFile, TwinFile, in_range, suggestion};
 use crate::draw::Drawn;
 use crate::effects::{OutsideFit, Per};
+use crate::{Scenario, Twin, Values};
 
 /// The `name` of a table among the effects of a twin file. It is not in the library.
 pub const TABLE_EFFECT: &str = "table";
@@ -87,6 +83,18 @@ impl Table {
         };
         self.value(&at)
     }
+}
+
+/// By what the tables of a twin multiply the friction of a pull; 1 without any.
+pub fn table_factor(twin: &Twin, scenario: &Scenario) -> f64 {
+    let factors = twin.tables.iter().filter(|t| t.target == TableTarget::Factor);
+    factors.filter_map(|t| t.at(scenario.view())).product()
+}
+
+/// What the tables of a twin add to the readings of the wrist sensor, in newtons; 0 without any.
+pub fn table_offset_n(twin: &Twin, scenario: &Scenario) -> f64 {
+    let offsets = twin.tables.iter().filter(|t| t.target == TableTarget::Offset);
+    offsets.filter_map(|t| t.at(scenario.view())).fold(0.0, |sum, x| sum + x)
 }
 
 /// Linear between the points, held outside.
@@ -288,7 +296,7 @@ fn distinct(value: &toml::Value, key: &str) -> Result<Vec<String>, ConfigError> 
 mod tests {
     use super::*;
     use crate::effects::testing::twin;
-    use crate::{Covariates, PullSettings, Scenario, TWIN_SCHEMA};
+    use crate::{Covariates, PullSettings, TWIN_SCHEMA};
 
     fn scenario(part: &str, extra: &[(&str, Drawn)]) -> Scenario {
         let pull = PullSettings { increment_n: 0.5, step_s: 0.1, ..Default::default() };
