@@ -5,7 +5,7 @@
 //! its range it is held.
 
 use crate::columns::{self, Column, PullView};
-use crate::config::{ConfigError, EffectFile, TwinFile, in_range, suggestion};
+use crate::config::{ConfigError, EffectFile, TwinFile, in_range};
 use crate::draw::Drawn;
 use crate::effects::{OutsideFit, Per};
 use crate::{Scenario, Twin, Values};
@@ -118,8 +118,7 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
     let key = |name: &str| format!("effects[{index}].{name}");
     refuse_foreign(effect, &key)?;
     if let Some(part) = effect.part.as_ref().filter(|part| !file.parts.contains_key(*part)) {
-        let error = ConfigError::new(key("part"), format!("the twin has no part `{part}`"));
-        return Err(crate::config::unknown_part_hint(error, part, file.parts.keys()));
+        return Err(ConfigError::unknown_part(key("part"), part, file.parts.keys()));
     }
     let get = |name: &str| effect.parameters.get(name);
     if get("physical") != Some(&toml::Value::Boolean(false)) {
@@ -227,10 +226,7 @@ fn only(
 fn refuse_foreign(effect: &EffectFile, key: &dyn Fn(&str) -> String) -> Result<(), ConfigError> {
     if let Some(name) = effect.parameters.keys().find(|name| !KEYS.contains(&name.as_str())) {
         let error = ConfigError::new(key(name), format!("a table has no key `{name}`"));
-        return Err(match suggestion(name, KEYS) {
-            Some(close) => error.hint(format!("did you mean `{close}`?")),
-            None => error.hint(format!("its keys: {}", KEYS.join(", "))),
-        });
+        return Err(error.suggest(name, KEYS, || format!("its keys: {}", KEYS.join(", "))));
     }
     let foreign = [
         ("fitted_grip_force_n", effect.fitted_grip_force_n.is_some()),
