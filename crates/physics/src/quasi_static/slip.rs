@@ -293,21 +293,16 @@ impl SlipPull {
 mod tests {
     use super::*;
     use gripgen_twin::Robot;
-    use gripgen_twin::config::{Feedback, Twist};
+    use gripgen_twin::config::Feedback;
     use gripgen_twin::effects::find;
 
     /// A light arm on soft gels.
     pub(super) fn rig(feedback: Feedback) -> QuasiStatic {
         let robot = Robot {
-            moving_mass_kg: 8.0,
-            apparent_mass_kg: None,
-            lag_s: 0.05,
             dead_time_s: 0.0131,
             damping_n_s_per_m: 400.0,
             speed_limit_m_per_s: 0.1,
-            feedback,
-            twist: Twist::Stiff,
-            twist_stiffness_n_m_per_rad: None,
+            ..crate::tests::robot(feedback)
         };
         QuasiStatic {
             robot,

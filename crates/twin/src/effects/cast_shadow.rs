@@ -43,15 +43,12 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn without_strength_the_elevation_says_nothing() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[0.0, 10.0], &mut state, &grip(&c, 40.0));
-        assert_eq!(state, OpticsState::default());
-        optics(&[0.3, 10.0], &mut state, &grip(&c, 40.0));
+        assert_eq!(optics_after(optics, &[&[0.0, 10.0]]), OpticsState::default());
+        let state = optics_after(optics, &[&[0.0, 10.0], &[0.3, 10.0]]);
         assert_eq!((state.shadow_strength, state.light_elevation_rad), (0.3, 10f64.to_radians()));
     }
 }

@@ -33,14 +33,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn variances_of_two_blurs_add() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[0.3], &mut state, &grip(&c, 40.0));
-        optics(&[0.4], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[0.3], &[0.4]]);
         assert!((state.defocus_m - 5e-4).abs() < 1e-18);
     }
 }

@@ -37,15 +37,10 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn the_larger_radius_counts() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        for radius_mm in [0.1, 0.3, 0.2] {
-            optics(&[radius_mm], &mut state, &grip(&c, 40.0));
-        }
-        assert_eq!(state.edge_rounding_m, 0.3e-3);
+        assert_eq!(optics_after(optics, &[&[0.1], &[0.3], &[0.2]]).edge_rounding_m, 0.3e-3);
     }
 }

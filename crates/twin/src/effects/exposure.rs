@@ -37,19 +37,13 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn two_cameras_in_a_row_are_one() {
-        let c = Covariates::default();
-        let of = |list: &[[f64; 2]]| {
-            let mut state = OpticsState::default();
-            list.iter().for_each(|p| optics(p, &mut state, &grip(&c, 40.0)));
-            state
-        };
+        let of = |list: &[&[f64]]| optics_after(optics, list);
         let seen = |s: &OpticsState, i: f64| 255.0 * (s.exposure_gain * i / 255.0).powf(s.gamma);
-        let (first, second, both) = (of(&[[0.9, 1.2]]), of(&[[1.3, 0.8]]), of(&[[0.9, 1.2], [1.3, 0.8]]));
+        let (first, second, both) = (of(&[&[0.9, 1.2]]), of(&[&[1.3, 0.8]]), of(&[&[0.9, 1.2], &[1.3, 0.8]]));
         for level in [3.0, 90.0, 200.0] {
             assert!((seen(&both, level) - seen(&second, seen(&first, level))).abs() < 1e-9);
         }

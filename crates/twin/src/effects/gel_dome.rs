@@ -32,14 +32,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn sags_add() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[1.0], &mut state, &grip(&c, 40.0));
-        optics(&[-0.5], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[1.0], &[-0.5]]);
         assert!((state.dome_sag_m - 0.5e-3).abs() < 1e-18 && state.changes_press());
     }
 }

@@ -33,14 +33,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn factors_multiply() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[1.5], &mut state, &grip(&c, 40.0));
-        optics(&[0.5], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[1.5], &[0.5]]);
         assert_eq!(state.kernel_scale, 0.75);
     }
 }

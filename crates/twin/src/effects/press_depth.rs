@@ -42,14 +42,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn two_of_them_one_after_the_other_are_one() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[0.8, 0.1], &mut state, &grip(&c, 40.0));
-        optics(&[1.5, -0.05], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[0.8, 0.1], &[1.5, -0.05]]);
         let depth_m = state.press_depth_m(0.5e-3);
         assert!((depth_m - (1.5 * (0.8 * 0.5e-3 + 0.1e-3) - 0.05e-3)).abs() < 1e-15);
         assert_eq!(OpticsState { press_offset_m: -1.0, ..state }.press_depth_m(0.5e-3), 0.0);

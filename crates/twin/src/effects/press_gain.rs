@@ -65,7 +65,7 @@ fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {
 mod tests {
     use super::*;
     use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::{grip, optics_after};
 
     fn gain(jaw: Jaw, grip_key: (u64, u64), sd: [f64; 3]) -> [f64; 3] {
         let c = Covariates::default();
@@ -113,8 +113,7 @@ mod tests {
 
     #[test]
     fn a_white_balance_that_stays_is_its_two_gains() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[1.06, 0.94, 0.0, 0.0, 0.0], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[1.06, 0.94, 0.0, 0.0, 0.0]]);
         assert_eq!(state.light_gain, [1.06, 1.0, 0.94]);
     }
 }

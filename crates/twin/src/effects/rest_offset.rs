@@ -38,14 +38,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn offsets_add_channel_by_channel() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[3.0, 0.0, -2.0], &mut state, &grip(&c, 40.0));
-        optics(&[1.0, 5.0, 0.0], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[3.0, 0.0, -2.0], &[1.0, 5.0, 0.0]]);
         assert_eq!(state.rest_offset, [4.0, 5.0, -2.0]);
     }
 }
