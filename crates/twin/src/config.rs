@@ -72,11 +72,11 @@ impl ConfigError {
     pub(crate) fn unknown_part<'a>(
         key: impl Into<String>,
         part: &str,
-        parts: impl Iterator<Item = &'a String> + Clone,
+        parts: impl Iterator<Item = &'a String>,
     ) -> Self {
-        let all = || format!("its parts: {}", parts.clone().cloned().collect::<Vec<_>>().join(", "));
+        let parts: Vec<&str> = parts.map(String::as_str).collect();
         let error = Self::new(key, format!("the twin has no part `{part}`"));
-        error.suggest(part, parts.clone().map(String::as_str), all)
+        error.suggest(part, parts.iter().copied(), || format!("its parts: {}", parts.join(", ")))
     }
 }
 

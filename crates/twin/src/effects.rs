@@ -26,11 +26,11 @@ pub use fit::{
     REFERENCE_FORCE, Seen, TableFit, TableSpan,
 };
 use fit::{log_spaced, wider};
-use hooks::values;
 pub use hooks::{
     CommandHook, Creep, CreepHook, FrictionHook, GraspForceHook, GripPoint, ImprintHook, NormalForceHook,
     OpticsHook, SensorHook, SensorMemory, SensorPoint, TiltHook,
 };
+use hooks::{positive, values};
 use spec::parameter;
 pub use spec::{EffectSpec, Group, ParameterSpec, Visible};
 

@@ -11,7 +11,7 @@ use crate::config::{
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
 use crate::film::FilmPace;
 use crate::scenario_keys;
-use crate::{CAUSE_KEY, Covariates, Posterior, PullSettings, Scenario, Twin, sobol};
+use crate::{CAUSE_KEY, Posterior, PullSettings, Scenario, Twin, sobol};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
