@@ -12,7 +12,7 @@ use gripgen_physics::{
 use gripgen_tactile::{Imprint, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::effects::CommandChain;
-use gripgen_twin::evidence::suspect_simulated;
+use gripgen_twin::label_check::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
     FilmPace, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled,

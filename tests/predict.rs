@@ -1,8 +1,8 @@
 //! Predictions that fits are made with, against the simulator and closed forms.
 
 use crate::diagnose::{baseline, library, simulated, twin_at, twin_with};
+use gripgen::twin::label_moments::label_moments;
 use gripgen::twin::predict::{ModelEffect, PredictPulls as _, PullModel};
-use gripgen::physics::label_moments;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{PullTrace, TraceRow, Twin, slip_label};
 use gripgen::{Location, load_twin_document};

@@ -1,9 +1,9 @@
 //! Runs of a rig, from a campaign that a twin made: what reads sweeps reads them too.
 
 use gripgen::record::{
-    Dataset, ExportParquetError, ParquetOptions, RigLog, RigPull, RigResult, RigRunInfo, RigStream,
-    RunFolder, Verification, create_rig_run, decode_picture, discard_failed, export_parquet, missing_pulls,
-    verify, write_rig_pull,
+    Dataset, ExportDatasetError, ExportOptions, RigLog, RigPull, RigResult, RigRunInfo, RigStream, RunFolder,
+    Verification, create_rig_run, decode_picture, discard_failed, export_parquet, missing_pulls, verify,
+    write_rig_pull,
 };
 use gripgen::twin::config::{Feedback, Mechanics};
 use gripgen::twin::draw::Drawn;
@@ -253,9 +253,9 @@ fn check(path: &Path, folder: &RunFolder, pulls: &[RigPull], made: usize) {
         assert_eq!(rows.record(row).unwrap().unwrap().images, pull.images, "pull {row}");
         assert_eq!(rows.rest(row).unwrap(), pull.rest, "pull {row}");
     }
-    let exported = |images| -> Result<usize, ExportParquetError> {
+    let exported = |images| -> Result<usize, ExportDatasetError> {
         let (mut out, mut last) = (Vec::new(), 0);
-        export_parquet(&rows, ParquetOptions { images, traces: true }, &mut out, |n| last = n)?;
+        export_parquet(&rows, ExportOptions { images, traces: true }, &mut out, |n| last = n)?;
         assert_eq!((last, &out[..4]), (made, &b"PAR1"[..]));
         Ok(out.len())
     };

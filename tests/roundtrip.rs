@@ -2,7 +2,7 @@
 
 use crate::common::{jobs, run, small_project};
 use gripgen::record::proto::gripgen_v1::Status;
-use gripgen::record::{INDEX_COLUMNS, RunFolder, ShardReader, export_sample, verify};
+use gripgen::record::{INDEX_COLUMNS, NoiseMode, RunFolder, ShardReader, export_sample, verify};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::Outcome;
 use gripgen::{Project, generate};
@@ -285,8 +285,8 @@ fn small_frames_are_read_as_they_were_made() {
         assert!(plain == found, "sample {index}");
         let size = 2 * 3 * 320 * 240;
         let [mut plain, mut found] = [vec![0; size], vec![0; size]];
-        sets[0].images_into(index as usize, &mut plain).unwrap();
-        sets[1].images_into(index as usize, &mut found).unwrap();
+        sets[0].images_with(index as usize, NoiseMode::Stored, &mut plain).unwrap();
+        sets[1].images_with(index as usize, NoiseMode::Stored, &mut found).unwrap();
         assert!(plain == found, "row {index}");
         let pngs = sets.each_ref().map(|set| set.images_png(index as usize).unwrap());
         assert!(pngs[0] == pngs[1]);

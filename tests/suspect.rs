@@ -5,7 +5,7 @@ use gripgen::record::Dataset;
 use gripgen_measured::{read_judged_pulls, write_pull_folder};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
-use gripgen::twin::evidence::{Expected, LabelEvidence, Verdict, judge};
+use gripgen::twin::label_check::{Expected, LabelEvidence, Verdict, check_label};
 use gripgen::twin::{MeasuredPulls, Outcome, Pulled};
 use gripgen::{Location, Project, generate};
 use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
@@ -59,7 +59,7 @@ fn clean_simulated_pulls_are_not_suspect() {
 /// What a pull is suspect for where nothing is known of its rig.
 fn as_measured(p: &Pulled) -> Option<String> {
     let of_trace = LabelEvidence::of_trace(p.label.max_pull_force_n, 3.0, 5e-3, Some(&p.trace));
-    let judgement = judge(&LabelEvidence { every_reading: true, ..of_trace }, &Expected::default());
+    let judgement = check_label(&LabelEvidence { every_reading: true, ..of_trace }, &Expected::default());
     assert_ne!(judgement.verdict, Verdict::NoEvidence);
     judgement.reason()
 }

@@ -11,11 +11,7 @@
 //! and the belt is q <= c(mu). Its interval of a measured x never is empty and goes over by itself from a limit to two ends.
 
 use crate::grouped::t_quantile_95;
-
-/// Normal distribution function.
-fn normal_cdf(x: f64) -> f64 {
-    0.5 * libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
-}
+use gripgen_twin::random::normal_cdf;
 
 /// Smallest and largest x that are accepted for a mean.
 fn belt(mean: f64, level: f64) -> (f64, f64) {

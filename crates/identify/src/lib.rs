@@ -22,6 +22,7 @@ mod bounded;
 mod campaign;
 mod diagnosis;
 mod draws;
+mod effect_search;
 mod grouped;
 mod imprint;
 mod imprints;

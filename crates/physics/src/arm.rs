@@ -7,6 +7,8 @@ mod carriage;
 mod model;
 mod multibody;
 mod placed;
+#[cfg(test)]
+pub(crate) mod tests;
 
 pub use model::{ArmJoint, ArmMesh, ArmModel, LinkInertia};
 pub use placed::{ArmError, PlacedArm};

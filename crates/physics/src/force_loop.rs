@@ -104,17 +104,7 @@ mod tests {
     use super::*;
 
     fn robot(feedback: Feedback) -> Robot {
-        Robot {
-            moving_mass_kg: 8.0,
-            apparent_mass_kg: None,
-            lag_s: 0.05,
-            dead_time_s: 0.02,
-            damping_n_s_per_m: 2000.0,
-            speed_limit_m_per_s: 0.02,
-            feedback,
-            twist: gripgen_twin::config::Twist::Stiff,
-            twist_stiffness_n_m_per_rad: None,
-        }
+        Robot { dead_time_s: 0.02, ..crate::tests::robot(feedback) }
     }
 
     /// A stuck tool: the measured force is the applied one, and both kinds of feedback give the step response

@@ -35,10 +35,8 @@ mod convert;
 mod force_loop;
 mod grip;
 mod grip_capacity;
-mod grip_error;
 mod jaw_friction;
 mod limit_surface;
-mod motion;
 mod parallel;
 mod predict;
 mod quasi_static;
@@ -59,14 +57,13 @@ mod world;
 pub use arm::{ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm};
 pub use cache::Cache;
 pub use cells::PullCells;
-pub use grip::{Grip, Held, grip};
+pub use grip::{Grip, GripError, Held, grip};
 pub use grip_capacity::PatchFriction;
-pub use grip_error::GripError;
 pub use jaw_friction::{FrictionCell, JawFriction};
 pub use limit_surface::{LimitCell, free_twist_capacity_n};
 pub use parallel::in_parallel;
 pub use predict::{PullPredictor, SimulatePulls, campaign_staircases, speed_limit_m_per_s};
-pub use quasi_static::{LabelRule, QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull, label_moments};
+pub use quasi_static::{QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
 pub use scenario::{creep_of, grip_point, pull_direction, sensor_chain};
 pub use session::{Command, PullError, PullSession, PullState, Signals};
 pub use setup::{Arm, GripSetup, Mount};
@@ -77,10 +74,4 @@ pub use twist::{TwistCell, compliant_twist_capacity_n};
 pub use urdf::UrdfError;
 
 #[cfg(test)]
-mod arm_tests;
-#[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod touch_tests;
-#[cfg(test)]
-mod urdf_tests;

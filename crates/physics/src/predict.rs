@@ -11,8 +11,9 @@ mod tables;
 
 use crate::cache::Cache;
 use crate::parallel::in_parallel;
-use crate::{LabelRule, QuasiStatic, RimTable};
+use crate::{QuasiStatic, RimTable};
 use creep::creeps;
+use gripgen_twin::label_moments::LabelRule;
 use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::effects::{CommandChain, Effect, OutsideFit, Per, SensorChain};

@@ -15,10 +15,8 @@
 //! commands. What is missing against the reduced mechanics is the ringing of the arm's mass on the gel and the
 //! differences between contacts; `a_pull_without_inertia_is_the_reduced_one` says how much that is.
 
-mod label;
 mod slip;
 
-pub use label::{LabelRule, label_moments};
 pub use slip::{RimTable, SlipPull, SlipRun};
 
 use crate::force_loop::ForceLoop;

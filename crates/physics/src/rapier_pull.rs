@@ -3,8 +3,8 @@
 #[cfg(test)]
 use crate::contact::ContactForce;
 use crate::jaw_friction::JawFriction;
-use crate::motion::Motion;
 use crate::scene::SceneBodies;
+use crate::session::Motion;
 use crate::world::{NotFinite, World};
 #[cfg(test)]
 use gripgen_twin::Jaw;

@@ -18,7 +18,7 @@
 
 use crate::bristles::Bristles;
 use crate::jaw_friction::JawFriction;
-use crate::motion::Motion;
+use crate::session::Motion;
 use crate::world::NotFinite;
 use gripgen_twin::{Gel, PerJaw};
 

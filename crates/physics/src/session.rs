@@ -4,7 +4,6 @@
 use crate::contact::ContactForce;
 use crate::force_loop::ForceLoop;
 use crate::jaw_friction::JawFriction;
-use crate::motion::Motion;
 use crate::rapier_pull::RapierPull;
 use crate::reduced::ReducedPull;
 use crate::world::NotFinite;
@@ -64,6 +63,14 @@ pub struct PullState {
     pub speed_m_per_s: f64,
     /// Whether the jaws slide on the part.
     pub sliding: bool,
+}
+
+/// The plant of either mechanics after a time step.
+pub(crate) struct Motion {
+    pub(crate) contact_force_n: f64,
+    pub(crate) displacement_m: f64,
+    pub(crate) speed_m_per_s: f64,
+    pub(crate) sliding: bool,
 }
 
 /// A pull that cannot go on.

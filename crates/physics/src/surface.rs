@@ -231,5 +231,4 @@ fn meets_triangle([a, b, c]: &[Point3<f64>; 3], from: Point3<f64>, along: Vector
 }
 
 #[cfg(test)]
-#[path = "surface_tests.rs"]
 mod tests;

@@ -15,6 +15,21 @@ mod reduced;
 
 pub(crate) const STEP_S: f64 = 0.002;
 
+/// An arm whose loop answers at once after its lag.
+pub(crate) fn robot(feedback: Feedback) -> Robot {
+    Robot {
+        moving_mass_kg: 8.0,
+        apparent_mass_kg: None,
+        lag_s: 0.05,
+        dead_time_s: 0.0,
+        damping_n_s_per_m: 2000.0,
+        speed_limit_m_per_s: 0.02,
+        feedback,
+        twist: Twist::Stiff,
+        twist_stiffness_n_m_per_rad: None,
+    }
+}
+
 /// A rig for tests: no noise, so that results can be compared with closed forms.
 pub(crate) struct Bench {
     pub(crate) mechanics: Mechanics,
@@ -46,17 +61,7 @@ impl Bench {
         Self {
             mechanics: Mechanics::Rapier,
             arm: None,
-            robot: Robot {
-                moving_mass_kg: 8.0,
-                apparent_mass_kg: None,
-                lag_s: 0.05,
-                dead_time_s: 0.0,
-                damping_n_s_per_m: 2000.0,
-                speed_limit_m_per_s: 0.02,
-                feedback: Feedback::Measured,
-                twist: Twist::Stiff,
-                twist_stiffness_n_m_per_rad: None,
-            },
+            robot: robot(Feedback::Measured),
             gel: PerJaw { left: gel.clone(), right: gel },
             shape,
             world_from_part: Pose::identity(),

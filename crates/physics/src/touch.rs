@@ -6,7 +6,7 @@
 //! add to the friction force. Else the engine gets a plate in front of each pad.
 
 use crate::convert::rapier_pose;
-use crate::grip_error::GripError;
+use crate::grip::GripError;
 use crate::scene::pad_shape;
 use crate::setup::GripSetup;
 use crate::surface::Window;
@@ -200,3 +200,6 @@ fn first_touch(setup: &GripSetup<'_>, jaw: Jaw) -> Result<Option<f64>, GripError
         Some(hit) => Ok(Some(open - hit.time_of_impact)),
     }
 }
+
+#[cfg(test)]
+mod tests;

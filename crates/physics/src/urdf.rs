@@ -1,14 +1,15 @@
 //! An arm from URDF text: one chain of revolute joints with the inertia of what each joint moves.
 
-mod error;
-
-pub use error::UrdfError;
-
 use crate::arm::{ArmJoint, ArmMesh, ArmModel, LinkInertia};
 use gripgen_twin::frames::{Pose, pose, rotation_from_fixed_xyz};
 use nalgebra::{Matrix3, Unit, Vector3};
 use std::collections::BTreeMap;
 use urdf_rs::{Geometry, Joint, JointType, Link, Robot};
+
+/// Why a URDF is no arm.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct UrdfError(pub(crate) String);
 
 impl ArmModel {
     /// Reads the chain that ends at link `tip`.
@@ -25,7 +26,8 @@ impl ArmModel {
         tip: &str,
         find_mesh: &dyn Fn(&str) -> Option<String>,
     ) -> Result<Self, UrdfError> {
-        let robot = urdf_rs::read_from_string(text).map_err(|e| UrdfError::Syntax(e.to_string()))?;
+        let robot = urdf_rs::read_from_string(text)
+            .map_err(|e| UrdfError(format!("the URDF cannot be read: {e}")))?;
         let meshes = meshes_of(&robot, find_mesh)?;
         let tree = Tree::new(&robot)?;
         let chain = tree.chain(tip)?;
@@ -49,8 +51,11 @@ impl ArmModel {
                     last_from_here = Pose::identity();
                 }
                 ref other => {
-                    let (joint, kind) = (joint.name.clone(), kind_name(other));
-                    return Err(UrdfError::JointKind { joint, kind, tip: tip.to_owned() });
+                    return Err(UrdfError(format!(
+                        "joint `{}` between base and `{tip}` is {}; only revolute, continuous and fixed joints are supported",
+                        joint.name,
+                        kind_name(other)
+                    )));
                 }
             }
             if let Some(parts) = inertias.last_mut() {
@@ -59,7 +64,7 @@ impl ArmModel {
             }
         }
         if joints.is_empty() {
-            return Err(UrdfError::NoJoints { tip: tip.to_owned() });
+            return Err(UrdfError(format!("no revolute joint between base and `{tip}`")));
         }
         for (joint, parts) in joints.iter_mut().zip(&inertias) {
             joint.inertia = LinkInertia::sum(parts);
@@ -81,11 +86,10 @@ impl<'a> Tree<'a> {
         let mut parent_joint: BTreeMap<&str, &Joint> = BTreeMap::new();
         for joint in &robot.joints {
             if let Some(first) = parent_joint.insert(&joint.child.link, joint) {
-                return Err(UrdfError::TwoParents {
-                    link: joint.child.link.clone(),
-                    first: first.name.clone(),
-                    second: joint.name.clone(),
-                });
+                let (link, first, second) = (&joint.child.link, &first.name, &joint.name);
+                return Err(UrdfError(format!(
+                    "link `{link}` is the child of both `{first}` and `{second}`"
+                )));
             }
         }
         let links = robot.links.iter().map(|l| (l.name.as_str(), l)).collect();
@@ -96,13 +100,13 @@ impl<'a> Tree<'a> {
     fn chain(&self, tip: &str) -> Result<Vec<&'a Joint>, UrdfError> {
         if !self.links.contains_key(tip) {
             let links = self.links.keys().map(|l| format!("`{l}`")).collect::<Vec<_>>().join(", ");
-            return Err(UrdfError::NoTip { tip: tip.to_owned(), links });
+            return Err(UrdfError(format!("no link `{tip}`; the links are {links}")));
         }
         let mut chain = Vec::new();
         let mut link = tip;
         while let Some(&joint) = self.parent_joint.get(link) {
             if chain.len() == self.joints.len() {
-                return Err(UrdfError::Cycle { link: link.to_owned() });
+                return Err(UrdfError(format!("link `{link}` is its own ancestor")));
             }
             chain.push(joint);
             link = &joint.parent.link;
@@ -128,8 +132,10 @@ impl<'a> Tree<'a> {
         }
         for joint in self.joints.iter().filter(|j| j.parent.link == link && Some(j.name.as_str()) != next) {
             if joint.joint_type != JointType::Fixed {
-                let (joint, kind) = (joint.name.clone(), kind_name(&joint.joint_type));
-                return Err(UrdfError::MovingBranch { joint, kind, link: link.to_owned() });
+                let (joint, kind) = (&joint.name, kind_name(&joint.joint_type));
+                return Err(UrdfError(format!(
+                    "joint `{joint}` ({kind}) branches off the arm at link `{link}`; only fixed branches are supported"
+                )));
             }
             let origin = origin_of(&joint.name, &joint.origin)?;
             self.collect(&joint.child.link, &(last_from_link * origin), tip, None, parts)?;
@@ -153,7 +159,7 @@ fn kind_name(kind: &JointType) -> &'static str {
 fn finite(what: &'static str, of: &str, values: &[f64]) -> Result<(), UrdfError> {
     match values.iter().find(|v| !v.is_finite()) {
         None => Ok(()),
-        Some(&value) => Err(UrdfError::NotFinite { what, of: of.to_owned(), value }),
+        Some(value) => Err(UrdfError(format!("{what} of `{of}` is {value}"))),
     }
 }
 
@@ -167,9 +173,10 @@ fn origin_of(of: &str, origin: &urdf_rs::Pose) -> Result<Pose, UrdfError> {
 fn axis_of(joint: &Joint) -> Result<[f64; 3], UrdfError> {
     let axis = joint.axis.xyz.0;
     finite("axis", &joint.name, &axis)?;
-    Unit::try_new(Vector3::from(axis), 1e-9)
-        .map(|a| a.into_inner().into())
-        .ok_or_else(|| UrdfError::Axis { joint: joint.name.clone(), length: Vector3::from(axis).norm() })
+    Unit::try_new(Vector3::from(axis), 1e-9).map(|a| a.into_inner().into()).ok_or_else(|| {
+        let length = Vector3::from(axis).norm();
+        UrdfError(format!("the axis of joint `{}` has length {length}", joint.name))
+    })
 }
 
 fn limits_of(joint: &Joint) -> Result<Option<[f64; 2]>, UrdfError> {
@@ -179,7 +186,10 @@ fn limits_of(joint: &Joint) -> Result<Option<[f64; 2]>, UrdfError> {
     let (lower_rad, upper_rad) = (joint.limit.lower, joint.limit.upper);
     finite("limit", &joint.name, &[lower_rad, upper_rad])?;
     if lower_rad > upper_rad {
-        return Err(UrdfError::Limits { joint: joint.name.clone(), lower_rad, upper_rad });
+        return Err(UrdfError(format!(
+            "joint `{}` has its lower limit {lower_rad} above its upper limit {upper_rad}",
+            joint.name
+        )));
     }
     Ok(Some([lower_rad, upper_rad]))
 }
@@ -199,10 +209,14 @@ fn meshes_of(robot: &Robot, find_mesh: &dyn Fn(&str) -> Option<String>) -> Resul
         let seen = link.visual.iter().map(|v| &v.geometry);
         for geometry in seen.chain(link.collision.iter().map(|c| &c.geometry)) {
             let Geometry::Mesh { filename, .. } = geometry else { continue };
-            let place = find_mesh(filename)
-                .ok_or_else(|| UrdfError::Mesh { mesh: filename.clone(), link: link.name.clone() })?;
+            let place = find_mesh(filename).ok_or_else(|| {
+                UrdfError(format!("mesh `{filename}` of link `{}` was not found", link.name))
+            })?;
             meshes.push(ArmMesh { link: link.name.clone(), reference: filename.clone(), place });
         }
     }
     Ok(meshes)
 }
+
+#[cfg(test)]
+mod tests;

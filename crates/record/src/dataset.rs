@@ -4,7 +4,6 @@
 //! row can be read at any time from any thread. Memory does not grow with what was read: the shards used last stay open.
 
 mod columns;
-mod films;
 mod images;
 #[cfg(test)]
 mod tests;
@@ -12,6 +11,7 @@ mod tests;
 pub use columns::Table;
 pub use images::NoiseMode;
 
+use crate::film::Film;
 use crate::folder::{FolderError, RunFolder};
 use crate::index::{extra_columns, index_row};
 use crate::picture::encode_png;
@@ -70,6 +70,14 @@ pub struct PictureFileError {
     pub problem: String,
 }
 
+/// Where a row is.
+enum Place<'a> {
+    /// A sample of a shard, by its global index.
+    Sample(Arc<ShardReader>, u64),
+    /// A measured pull, by its row.
+    Pull(&'a MeasuredRows, usize),
+}
+
 #[derive(Clone, Copy)]
 struct FinishedShard {
     shard: u64,
@@ -114,16 +122,6 @@ pub enum DatasetError {
     /// Images of measured pulls.
     #[error(transparent)]
     Images(#[from] PictureFileError),
-    /// There is no such row.
-    #[error("{}: there is no row {row}, it has {rows}", .path.display())]
-    NoRow {
-        /// The dataset.
-        path: PathBuf,
-        /// Row asked for.
-        row: usize,
-        /// Rows there are.
-        rows: usize,
-    },
     /// A row without what was asked for.
     #[error("{}: row {row} has no {what}", .path.display())]
     Missing {
@@ -140,17 +138,13 @@ pub enum DatasetError {
         /// The dataset.
         path: PathBuf,
     },
-    /// Images of another size than the first.
-    #[error("{}: an image of row {row} is {}x{} pixels, the first one {}x{}", .path.display(), .found.0, .found.1, .wanted.0, .wanted.1)]
-    Size {
+    /// A row that is not there, or an image of another size than the first.
+    #[error("{}: {problem}", .path.display())]
+    Row {
         /// The dataset.
         path: PathBuf,
-        /// The row.
-        row: usize,
-        /// Width and height found.
-        found: (u32, u32),
-        /// Those of the first image.
-        wanted: (u32, u32),
+        /// What is wrong.
+        problem: String,
     },
 }
 
@@ -269,24 +263,17 @@ impl Dataset {
         }
     }
 
-    /// Both images of a row into `out`: `[2, height, width, 3]` bytes, left jaw first.
-    pub fn images_into(&self, row: usize, out: &mut [u8]) -> Result<(), DatasetError> {
-        self.images_with(row, NoiseMode::Stored, out)
-    }
-
     /// Whether the images of its rows are stored without their noise.
     ///
     /// # Errors
     ///
     /// A shard that cannot be read.
     pub fn has_clean_images(&self) -> Result<bool, DatasetError> {
-        match &self.source {
-            Source::Run { .. } | Source::Shard(_) => Ok(self.shard_of(0)?.0.has_clean_images()),
-            Source::Measured(_) => Ok(false),
-        }
+        Ok(self.first_shard()?.is_some_and(|reader| reader.has_clean_images()))
     }
 
-    /// The same with other noise, where the noise is not in the stored images already.
+    /// Both images of a row into `out`: `[2, height, width, 3]` bytes, left jaw first; with other noise, where the noise is not in
+    /// the stored images already.
     ///
     /// # Errors
     ///
@@ -298,59 +285,44 @@ impl Dataset {
         }
         let missing = || DatasetError::Missing { path: self.path.clone(), row, what: "images" };
         let wanted = self.image_size_px.ok_or_else(missing)?;
-        let size = |found| DatasetError::Size { path: self.path.clone(), row, found, wanted };
+        let size = |found: (u32, u32)| {
+            let ((width, height), (w, h)) = (found, wanted);
+            self.wrong(format!("an image of row {row} is {width}x{height} pixels, the first one {w}x{h}"))
+        };
         let (left, right) = out.split_at_mut(out.len() / 2);
-        match &self.source {
-            Source::Run { .. } | Source::Shard(_) => {
-                let (reader, index) = self.shard_of(row)?;
-                let raw = reader.raw(index)?;
-                let both = raw.images.as_ref().ok_or_else(missing)?;
-                let noise = reader.noise_of(index, &raw.sample)?;
-                for (jaw, out) in [(Jaw::Left, left), (Jaw::Right, right)] {
-                    reader.image_into(index, jaw, &both[jaw], raw.raw_images, wanted, out)?.map_err(size)?;
-                    reader.put_back(jaw, out);
-                    if let Some(noise) = noise[jaw].and_then(|noise| mode.of(noise)) {
-                        noise.add(out);
-                    }
+        if let Place::Sample(reader, index) = self.place(row)? {
+            let raw = reader.raw(index)?;
+            let both = raw.images.as_ref().ok_or_else(missing)?;
+            let noise = reader.noise_of(index, &raw.sample)?;
+            for (jaw, out) in [(Jaw::Left, left), (Jaw::Right, right)] {
+                reader.image_into(index, jaw, &both[jaw], raw.raw_images, wanted, out)?.map_err(size)?;
+                reader.put_back(jaw, out);
+                if let Some(noise) = noise[jaw].and_then(|noise| mode.of(noise)) {
+                    noise.add(out);
                 }
             }
-            Source::Measured(rows) => {
-                let images = (rows.images)(&rows.ids[row])?.ok_or_else(missing)?;
-                for (image, out) in [(images.left, left), (images.right, right)] {
-                    if (image.width_px, image.height_px) != wanted {
-                        return Err(size((image.width_px, image.height_px)));
-                    }
-                    out.copy_from_slice(&image.rgb);
-                }
+            return Ok(());
+        }
+        let images = self.images(row)?.ok_or_else(missing)?;
+        for (image, out) in [(images.left, left), (images.right, right)] {
+            if (image.width_px, image.height_px) != wanted {
+                return Err(size((image.width_px, image.height_px)));
             }
+            out.copy_from_slice(&image.rgb);
         }
         Ok(())
     }
 
     /// Both images of a row as PNG, left jaw first; `None` where it has none.
     pub fn images_png(&self, row: usize) -> Result<Option<[Vec<u8>; 2]>, DatasetError> {
-        self.check_row(row)?;
-        let coded = |image: &TactileImage| {
-            let problem = |e: crate::PictureError| PictureFileError {
-                path: self.path.clone(),
-                problem: format!("row {row}: {e}"),
-            };
-            encode_png(image).map_err(|e| DatasetError::Images(problem(e)))
-        };
-        match &self.source {
-            Source::Run { .. } | Source::Shard(_) => {
-                let (reader, index) = self.shard_of(row)?;
-                if reader.has_raw_images() || reader.has_clean_images() {
-                    let images = reader.record(index)?.images;
-                    return images.map(|i| Ok([coded(&i.left)?, coded(&i.right)?])).transpose();
-                }
-                Ok(reader.images_png(index)?)
-            }
-            Source::Measured(rows) => match (rows.images)(&rows.ids[row])? {
-                Some(images) => Ok(Some([coded(&images.left)?, coded(&images.right)?])),
-                None => Ok(None),
-            },
+        if let Place::Sample(reader, index) = self.place(row)?
+            && !(reader.has_raw_images() || reader.has_clean_images())
+        {
+            return Ok(reader.images_png(index)?);
         }
+        let coded =
+            |image: &TactileImage| encode_png(image).map_err(|e| self.wrong(format!("row {row}: {e}")));
+        self.images(row)?.map(|both| Ok([coded(&both.left)?, coded(&both.right)?])).transpose()
     }
 
     /// Whether its rows may have images without contact that [`Dataset::rest_png`] knows: those of a rig.
@@ -364,34 +336,24 @@ impl Dataset {
 
     /// Both images of a row of a rig's run before the grip, where there are any.
     pub fn rest(&self, row: usize) -> Result<Option<PerJaw<TactileImage>>, DatasetError> {
-        self.check_row(row)?;
-        if !self.has_rest() {
-            return Ok(None);
+        match self.rig_place(row)? {
+            Some((reader, index)) => Ok(reader.rest(index)?),
+            None => Ok(None),
         }
-        let (reader, index) = self.shard_of(row)?;
-        Ok(reader.rest(index)?)
     }
 
     /// The same as PNG, left jaw first.
     pub fn rest_png(&self, row: usize) -> Result<Option<[Vec<u8>; 2]>, DatasetError> {
-        self.check_row(row)?;
-        if !self.has_rest() {
-            return Ok(None);
-        }
-        let (reader, index) = self.shard_of(row)?;
+        let Some((reader, index)) = self.rig_place(row)? else { return Ok(None) };
         let both = reader.raw_rest(index)?;
         Ok(both.map(|both| reader.png_of(index, "_rest", &both)).transpose()?)
     }
 
     /// The force over time of a row, where it is stored.
     pub fn trace(&self, row: usize) -> Result<Option<PullTrace>, DatasetError> {
-        self.check_row(row)?;
-        match &self.source {
-            Source::Run { .. } | Source::Shard(_) => {
-                let (reader, index) = self.shard_of(row)?;
-                Ok(reader.pull(index)?.1)
-            }
-            Source::Measured(rows) => Ok(rows.traces[row].clone()),
+        match self.place(row)? {
+            Place::Sample(reader, index) => Ok(reader.pull(index)?.1),
+            Place::Pull(rows, row) => Ok(rows.traces[row].clone()),
         }
     }
 
@@ -401,39 +363,82 @@ impl Dataset {
     ///
     /// A row that cannot be read.
     pub fn images(&self, row: usize) -> Result<Option<PerJaw<TactileImage>>, DatasetError> {
-        self.check_row(row)?;
-        match &self.source {
-            Source::Run { .. } | Source::Shard(_) => {
-                let (reader, index) = self.shard_of(row)?;
-                Ok(reader.record(index)?.images)
-            }
-            Source::Measured(rows) => Ok((rows.images)(&rows.ids[row])?),
+        match self.place(row)? {
+            Place::Sample(reader, index) => Ok(reader.record(index)?.images),
+            Place::Pull(rows, row) => Ok((rows.images)(&rows.ids[row])?),
+        }
+    }
+
+    /// Whether pulls of its rows are filmed.
+    ///
+    /// # Errors
+    ///
+    /// A shard that cannot be read.
+    pub fn has_films(&self) -> Result<bool, DatasetError> {
+        Ok(self.first_shard()?.is_some_and(|reader| reader.has_film()))
+    }
+
+    /// The film of a row's pull, where there is one.
+    ///
+    /// # Errors
+    ///
+    /// A row that is not there, or a shard that cannot be read.
+    pub fn film(&self, row: usize) -> Result<Option<Film>, DatasetError> {
+        match self.place(row)? {
+            Place::Sample(reader, index) => Ok(reader.film(index)?),
+            Place::Pull(..) => Ok(None),
         }
     }
 
     /// Everything of a row of a run; `None` for measured pulls from a table.
     pub fn record(&self, row: usize) -> Result<Option<Record>, DatasetError> {
-        self.check_row(row)?;
-        match &self.source {
-            Source::Run { .. } | Source::Shard(_) => {
-                let (reader, index) = self.shard_of(row)?;
-                Ok(Some(reader.record(index)?))
-            }
-            Source::Measured(_) => Ok(None),
+        match self.place(row)? {
+            Place::Sample(reader, index) => Ok(Some(reader.record(index)?)),
+            Place::Pull(..) => Ok(None),
         }
     }
 
     fn check_row(&self, row: usize) -> Result<(), DatasetError> {
         let rows = self.table.rows();
-        if row < rows { Ok(()) } else { Err(DatasetError::NoRow { path: self.path.clone(), row, rows }) }
+        let missing = || self.wrong(format!("there is no row {row}, it has {rows}"));
+        if row < rows { Ok(()) } else { Err(missing()) }
     }
 
-    /// The shard of a row and the global index of its sample.
-    fn shard_of(&self, row: usize) -> Result<(Arc<ShardReader>, u64), DatasetError> {
+    fn wrong(&self, problem: String) -> DatasetError {
+        DatasetError::Row { path: self.path.clone(), problem }
+    }
+
+    /// The first shard; `None` of measured pulls.
+    fn first_shard(&self) -> Result<Option<Arc<ShardReader>>, DatasetError> {
+        match &self.source {
+            Source::Measured(_) => Ok(None),
+            _ => match self.place(0)? {
+                Place::Sample(reader, _) => Ok(Some(reader)),
+                Place::Pull(..) => Ok(None),
+            },
+        }
+    }
+
+    /// Where a row of a rig's run is; `None` of all else.
+    fn rig_place(&self, row: usize) -> Result<Option<(Arc<ShardReader>, u64)>, DatasetError> {
+        if !self.has_rest() {
+            return self.check_row(row).map(|()| None);
+        }
+        match self.place(row)? {
+            Place::Sample(reader, index) => Ok(Some((reader, index))),
+            Place::Pull(..) => Ok(None),
+        }
+    }
+
+    /// Where a row is, its shard opened.
+    fn place(&self, row: usize) -> Result<Place<'_>, DatasetError> {
+        self.check_row(row)?;
         let (folder, shards, open) = match &self.source {
             Source::Run { folder, shards, open } => (folder, shards, open),
-            Source::Shard(reader) => return Ok((reader.clone(), reader.indices().start + row as u64)),
-            Source::Measured(_) => return Err(DatasetError::Unknown { path: self.path.clone() }),
+            Source::Shard(reader) => {
+                return Ok(Place::Sample(reader.clone(), reader.indices().start + row as u64));
+            }
+            Source::Measured(rows) => return Ok(Place::Pull(rows, row)),
         };
         let at = shards[shards.partition_point(|s| s.first_row <= row) - 1];
         let index = at.first_sample + (row - at.first_row) as u64;
@@ -444,7 +449,7 @@ impl Dataset {
                 let entry = open.remove(i);
                 let reader = entry.1.clone();
                 open.push(entry);
-                return Ok((reader, index));
+                return Ok(Place::Sample(reader, index));
             }
         }
         let path = folder.shard_path(at.shard);
@@ -459,18 +464,16 @@ impl Dataset {
             open.remove(0);
         }
         open.push((at.shard, reader.clone()));
-        Ok((reader, index))
+        Ok(Place::Sample(reader, index))
     }
 
     /// Size of the first image of a run; a sample that failed has none.
     fn first_image_size(&self) -> Result<Option<(u32, u32)>, DatasetError> {
-        let (reader, _) = self.shard_of(0)?;
-        if !reader.has_images() {
+        if self.first_shard()?.is_some_and(|reader| !reader.has_images()) {
             return Ok(None);
         }
         for row in 0..self.table.rows() {
-            let (reader, index) = self.shard_of(row)?;
-            if let Some(images) = reader.record(index)?.images {
+            if let Some(images) = self.images(row)? {
                 return Ok(Some((images.left.width_px, images.left.height_px)));
             }
         }

@@ -1,7 +1,8 @@
-//! One sample as a file of its own, with every reading as a message for viewers.
+//! Exports: what all of them share, and one sample as a file of its own, with every reading as a message for viewers.
 
+use crate::dataset::DatasetError;
 use crate::encode::{EncodedSample, state_messages, timestamp};
-use crate::film_frame::EncodedFrame;
+use crate::film::EncodedFrame;
 use crate::mark::EXPORT;
 use crate::picture::encode_png;
 use crate::proto::foxglove::{CompressedImage, RawImage};
@@ -10,8 +11,46 @@ use crate::reader::{ReadError, ShardReader, trace_of};
 use crate::shard::{ShardError, ShardInfo, ShardWriter};
 use gripgen_twin::config::ImageStorage;
 use gripgen_twin::{Jaw, PerJaw};
+use parquet::errors::ParquetError;
 use prost::Message;
+use prost_types::Timestamp;
 use std::io::Cursor;
+use std::path::PathBuf;
+
+/// What of each row of a dataset is exported beside its cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExportOptions {
+    /// Both images. LeRobot and WebDataset leave out rows without them.
+    pub images: bool,
+    /// The force over time. LeRobot leaves out rows without it.
+    pub traces: bool,
+}
+
+/// Why a dataset could not be exported.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportDatasetError {
+    /// The dataset.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// A Parquet file.
+    #[error("Parquet: {0}")]
+    Parquet(#[from] ParquetError),
+    /// A tar file.
+    #[error("tar: {0}")]
+    Tar(#[from] std::io::Error),
+    /// A file of a folder.
+    #[error("{}: {source}", .path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Nothing is left.
+    #[error("no row has what is wanted of it: images {}, traces {}", .0.images, .0.traces)]
+    Empty(ExportOptions),
+}
 
 /// Why a sample could not be exported.
 #[derive(Debug, thiserror::Error)]
@@ -50,20 +89,9 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
         .map(|both| {
             PerJaw::try_from_fn(|jaw| -> Result<Vec<u8>, ReadError> {
                 let topic = format!("/tactile/{jaw}");
-                Ok(if storage == ImageStorage::Raw {
-                    let mut image = RawImage::decode(&both[jaw][..]).map_err(|e| damaged(&topic, e))?;
-                    image.timestamp = zero;
-                    image.encode_to_vec()
-                } else {
-                    let mut image =
-                        CompressedImage::decode(&both[jaw][..]).map_err(|e| damaged(&topic, e))?;
-                    image.timestamp = zero;
-                    if let Some(whole) = &whole {
-                        image.data = encode_png(&whole[jaw])
-                            .map_err(|e| reader.damaged(index, &topic, &e.to_string()))?;
-                    }
-                    image.encode_to_vec()
-                })
+                let whole = whole.as_ref().map(|whole| encode_png(&whole[jaw])).transpose();
+                let whole = whole.map_err(|e| reader.damaged(index, &topic, &e.to_string()))?;
+                image_at(zero, &both[jaw], raw.raw_images, whole).map_err(|e| damaged(&topic, e))
             })
         })
         .transpose()?;
@@ -98,6 +126,23 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
     Ok(writer.finish()?.into_inner())
 }
 
+/// The message of an image at another time, with another PNG where there is one.
+fn image_at(
+    time: Option<Timestamp>,
+    message: &[u8],
+    raw: bool,
+    png: Option<Vec<u8>>,
+) -> Result<Vec<u8>, prost::DecodeError> {
+    if raw {
+        let image = RawImage::decode(message)?;
+        return Ok(RawImage { timestamp: time, ..image }.encode_to_vec());
+    }
+    let mut image = CompressedImage::decode(message)?;
+    image.timestamp = time;
+    image.data = png.unwrap_or(image.data);
+    Ok(image.encode_to_vec())
+}
+
 /// The film of a sample, starting at time 0.
 fn film_from_zero(reader: &ShardReader, index: u64) -> Result<Vec<EncodedFrame>, ReadError> {
     let mut film = reader.raw_film(index)?;
@@ -112,15 +157,8 @@ fn film_from_zero(reader: &ShardReader, index: u64) -> Result<Vec<EncodedFrame>,
             let mut labels = FilmFrame::decode(&frame.labels[jaw][..]).map_err(damaged)?;
             labels.timestamp = now;
             frame.labels[jaw] = labels.encode_to_vec();
-            frame.image[jaw] = if reader.has_raw_images() {
-                let mut image = RawImage::decode(&frame.image[jaw][..]).map_err(damaged)?;
-                image.timestamp = now;
-                image.encode_to_vec()
-            } else {
-                let mut image = CompressedImage::decode(&frame.image[jaw][..]).map_err(damaged)?;
-                image.timestamp = now;
-                image.encode_to_vec()
-            };
+            frame.image[jaw] =
+                image_at(now, &frame.image[jaw], reader.has_raw_images(), None).map_err(damaged)?;
         }
     }
     Ok(film)

@@ -30,15 +30,7 @@ pub enum FolderError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// A JSON file is damaged.
-    #[error("{path}: {source}")]
-    Json {
-        /// The file.
-        path: PathBuf,
-        /// What the parser says.
-        source: serde_json::Error,
-    },
-    /// The numbers of a `run.json` do not fit together.
+    /// A JSON file is damaged, or its numbers do not fit together.
     #[error("{path}: {problem}")]
     Invalid {
         /// The file.

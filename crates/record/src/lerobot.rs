@@ -8,7 +8,8 @@
 mod statistics;
 
 use crate::card;
-use crate::dataset::{Dataset, DatasetError};
+use crate::dataset::Dataset;
+use crate::export::{ExportDatasetError, ExportOptions};
 use crate::mark::EXPORT;
 use crate::parquet::{
     Field, Group, Kind, TRACE, file, file_with, write_all_numbers, write_bytes, write_images, write_lists,
@@ -23,7 +24,7 @@ use statistics::Statistics;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The card of the folder.
 pub const LEROBOT_CARD: &str = "README.md";
@@ -43,48 +44,6 @@ const TAKEN: [&str; 7] =
 const STATE: &str = "observation.state";
 const IMAGES: [&str; 2] = ["observation.images.left", "observation.images.right"];
 
-/// What goes into the folder beside the table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LeRobotOptions {
-    /// Both images; rows without them are left out.
-    pub images: bool,
-    /// The force over time; rows without it are left out.
-    pub traces: bool,
-}
-
-/// Why a dataset could not be written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ExportLeRobotError {
-    /// The dataset.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// A Parquet file.
-    #[error("Parquet: {0}")]
-    Parquet(#[from] ParquetError),
-    /// A file.
-    #[error("{}: {source}", .path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// Nothing is left.
-    #[error("no row has what is wanted of it: images {images}, traces {traces}")]
-    Empty {
-        /// Whether images were wanted.
-        images: bool,
-        /// Whether traces were wanted.
-        traces: bool,
-    },
-}
-
-/// What a data file holds.
-struct DataFile {
-    rows: Vec<usize>,
-}
-
 /// Writes `dataset` into a folder that is there and empty; `on_row` is called after each row. Returns the number of episodes: rows without
 /// what is wanted are left out.
 ///
@@ -93,15 +52,15 @@ struct DataFile {
 /// A row that cannot be read, a file that cannot be written, or nothing to write.
 pub fn export_lerobot(
     dataset: &Dataset,
-    options: LeRobotOptions,
+    options: ExportOptions,
     out: &Path,
     mut on_row: impl FnMut(),
-) -> Result<usize, ExportLeRobotError> {
+) -> Result<usize, ExportDatasetError> {
     let table = dataset.table();
     let layout = Layout::of(dataset, options);
     let tasks = tasks(dataset);
     let mut statistics = Statistics::default();
-    let mut files: Vec<DataFile> = Vec::new();
+    let mut rows_of_files: Vec<Vec<usize>> = Vec::new();
     let mut episodes = 0;
     let mut pending = Vec::new();
     let mut rows = 0..table.rows();
@@ -119,16 +78,16 @@ pub fn export_lerobot(
         if pending.is_empty() {
             break;
         }
-        let path = out.join(data_path(files.len()));
+        let path = out.join(data_path(rows_of_files.len()));
         write_data(&path, dataset, &layout, &tasks, &pending, episodes)?;
         episodes += pending.len();
-        files.push(DataFile { rows: pending.drain(..).map(|frame| frame.row).collect() });
+        rows_of_files.push(pending.drain(..).map(|frame| frame.row).collect());
     }
     if episodes == 0 {
-        return Err(ExportLeRobotError::Empty { images: options.images, traces: options.traces });
+        return Err(ExportDatasetError::Empty(options));
     }
     write_tasks(&out.join("meta/tasks.parquet"), &tasks)?;
-    write_episodes(&out.join("meta/episodes/chunk-000/file-000.parquet"), dataset, &files, &tasks)?;
+    write_episodes(&out.join("meta/episodes/chunk-000/file-000.parquet"), dataset, &rows_of_files, &tasks)?;
     let info = info(dataset, &layout, episodes, tasks.len());
     write_text(&out.join("meta/info.json"), &format!("{info:#}\n"))?;
     let stats = statistics.json(&layout.state, options.images);
@@ -144,11 +103,7 @@ struct Frame {
     trace: Option<PullTrace>,
 }
 
-fn frame(
-    dataset: &Dataset,
-    options: LeRobotOptions,
-    row: usize,
-) -> Result<Option<Frame>, ExportLeRobotError> {
+fn frame(dataset: &Dataset, options: ExportOptions, row: usize) -> Result<Option<Frame>, ExportDatasetError> {
     let images = if options.images { dataset.images_png(row)? } else { Some([vec![], vec![]]) };
     let Some(images) = images else { return Ok(None) };
     let trace = if options.traces { dataset.trace(row)? } else { None };
@@ -169,7 +124,7 @@ fn even(trace: &PullTrace) -> Option<PullTrace> {
 
 /// Which columns there are, and what they are called.
 struct Layout {
-    options: LeRobotOptions,
+    options: ExportOptions,
     /// Numbers of the table that a robot knows before the pull: the state.
     state: Vec<String>,
     /// Columns of the table by their names there and in the files, with what they hold.
@@ -177,7 +132,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(dataset: &Dataset, options: LeRobotOptions) -> Self {
+    fn of(dataset: &Dataset, options: ExportOptions) -> Self {
         let table = dataset.table();
         let numbers = |name: &str| table.numbers(name).is_some_and(|x| x.iter().all(|x| x.is_finite()));
         let known = |name: &str| find(name).is_some_and(|c| c.known_to_rig) && numbers(name);
@@ -228,19 +183,19 @@ fn data_path(file: usize) -> String {
     format!("data/chunk-{:03}/file-{:03}.parquet", file / CHUNK, file % CHUNK)
 }
 
-fn created(path: &Path) -> Result<BufWriter<File>, ExportLeRobotError> {
-    let at = |source| ExportLeRobotError::Write { path: path.into(), source };
+fn created(path: &Path) -> Result<BufWriter<File>, ExportDatasetError> {
+    let at = |source| ExportDatasetError::Write { path: path.into(), source };
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(at)?;
     }
     File::create_new(path).map(BufWriter::new).map_err(at)
 }
 
-fn write_text(path: &Path, text: &str) -> Result<(), ExportLeRobotError> {
+fn write_text(path: &Path, text: &str) -> Result<(), ExportDatasetError> {
     use std::io::Write;
     let mut file = created(path)?;
     let written = file.write_all(text.as_bytes()).and_then(|()| file.flush());
-    written.map_err(|source| ExportLeRobotError::Write { path: path.into(), source })
+    written.map_err(|source| ExportDatasetError::Write { path: path.into(), source })
 }
 
 fn write_data(
@@ -250,7 +205,7 @@ fn write_data(
     tasks: &BTreeMap<String, usize>,
     frames: &[Frame],
     first: usize,
-) -> Result<(), ExportLeRobotError> {
+) -> Result<(), ExportDatasetError> {
     let table = dataset.table();
     let mut writer = file(created(path)?, "frames", &layout.fields())?;
     for (group, frames) in frames.chunks(GROUP_ROWS).enumerate() {
@@ -321,7 +276,7 @@ fn tasks(dataset: &Dataset) -> BTreeMap<String, usize> {
 }
 
 /// A table of pandas with the task as its index.
-fn write_tasks(path: &Path, tasks: &BTreeMap<String, usize>) -> Result<(), ExportLeRobotError> {
+fn write_tasks(path: &Path, tasks: &BTreeMap<String, usize>) -> Result<(), ExportDatasetError> {
     let fields = [Field::new("task_index", Kind::Whole), Field::new("task", Kind::Word)];
     let column = |name: &str, pandas: &str, numpy: &str| json!({"name": name, "field_name": name, "pandas_type": pandas, "numpy_type": numpy, "metadata": null});
     let pandas = json!({
@@ -346,9 +301,9 @@ fn write_tasks(path: &Path, tasks: &BTreeMap<String, usize>) -> Result<(), Expor
 fn write_episodes(
     path: &Path,
     dataset: &Dataset,
-    files: &[DataFile],
+    rows_of_files: &[Vec<usize>],
     tasks: &BTreeMap<String, usize>,
-) -> Result<(), ExportLeRobotError> {
+) -> Result<(), ExportDatasetError> {
     let names = [
         "episode_index",
         "length",
@@ -363,8 +318,8 @@ fn write_episodes(
     fields.push(Field::new("tasks", Kind::Words));
     let mut writer = file(created(path)?, "episodes", &fields)?;
     let mut first = 0;
-    for (number, data) in files.iter().enumerate() {
-        let n = data.rows.len();
+    for (number, rows) in rows_of_files.iter().enumerate() {
+        let n = rows.len();
         let mut out = writer.next_row_group()?;
         let counted = |from: usize| (0..n).map(move |i| (first + from + i) as f64);
         let all = |x: usize| std::iter::repeat_n(x as f64, n);
@@ -376,7 +331,7 @@ fn write_episodes(
         write_whole(&mut out, counted(1))?;
         write_whole(&mut out, all(0))?;
         write_whole(&mut out, all(0))?;
-        let words: Vec<String> = data.rows.iter().map(|&row| task(dataset, row)).collect();
+        let words: Vec<String> = rows.iter().map(|&row| task(dataset, row)).collect();
         debug_assert!(words.iter().all(|word| tasks.contains_key(word)));
         write_word_lists(&mut out, &words.iter().map(String::as_str).collect::<Vec<_>>())?;
         out.close()?;

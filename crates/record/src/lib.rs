@@ -22,7 +22,6 @@ mod dataset;
 mod encode;
 mod export;
 mod film;
-mod film_frame;
 mod folder;
 mod frame;
 mod index;
@@ -44,28 +43,24 @@ mod webdataset;
 pub use background::Background;
 pub use dataset::{Dataset, DatasetError, MeasuredRows, NoiseMode, PictureFileError, ReadImages, Table};
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
-pub use export::{ExportError, export_sample};
-pub use film::{Film, FilmOptions, encode_frame};
-pub use film_frame::EncodedFrame;
+pub use export::{ExportDatasetError, ExportError, ExportOptions, export_sample};
+pub use film::{EncodedFrame, Film, FilmOptions, encode_frame};
 pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
     sha256_hex,
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
-pub use lerobot::{ExportLeRobotError, LEROBOT_CARD, LeRobotOptions, export_lerobot};
+pub use lerobot::{LEROBOT_CARD, export_lerobot};
 pub use mark::{MARK_NAME, parquet_mark, png_mark, png_with_mark};
-pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};
+pub use parquet::export_parquet;
 pub use picture::{PictureError, decode as decode_picture, encode_jpeg, encode_png, is_jpeg};
 pub use reader::{ReadError, Record, ShardReader, mcap_mark};
-pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};
+pub use rig_log::{RigLog, RigLogEvent, RigStream};
 pub use rig_run::{
-    FAILED_FOLDER, FrameView, RigCampaign, RigFilm, RigFrame, RigPull, RigPullError, RigResult, RigRunError,
-    RigRunInfo, create_rig_run, discard_failed, failed_pulls, missing_pulls, rig_campaign, suspect_pulls,
-    write_rig_pull,
+    FAILED_FOLDER, FrameView, RigCampaign, RigFilm, RigFrame, RigPull, RigResult, RigRunError, RigRunInfo,
+    create_rig_run, discard_failed, failed_pulls, missing_pulls, rig_campaign, suspect_pulls, write_rig_pull,
 };
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
 pub use stored::{sample_covariates, sample_view};
 pub use verify::{Verification, repair, verify};
-pub use webdataset::{
-    ExportWebDatasetError, WebDatasetOptions, export_webdataset, tar_mark, webdataset_rows,
-};
+pub use webdataset::{export_webdataset, tar_mark, webdataset_rows};

@@ -13,6 +13,7 @@ pub(crate) use columns::{
 };
 
 use crate::dataset::{Dataset, DatasetError};
+use crate::export::{ExportDatasetError, ExportOptions};
 use crate::mark::{EXPORT, MARK_NAME};
 use columns::{huggingface, schema};
 use parquet::errors::ParquetError;
@@ -25,27 +26,6 @@ use std::sync::Arc;
 /// Rows of a row group: about 50 MB with images.
 const GROUP_ROWS: usize = 256;
 
-/// What goes into the file beside the table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ParquetOptions {
-    /// Both images of each row.
-    pub images: bool,
-    /// Its force over time.
-    pub traces: bool,
-}
-
-/// Why a dataset could not be written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ExportParquetError {
-    /// The dataset.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// The file.
-    #[error("Parquet: {0}")]
-    Parquet(#[from] ParquetError),
-}
-
 /// Writes all rows of `dataset` into `out`; `on_rows` is told how many are written so far.
 ///
 /// # Errors
@@ -53,10 +33,10 @@ pub enum ExportParquetError {
 /// A row that cannot be read, or an `out` that cannot be written.
 pub fn export_parquet<W: Write + Send>(
     dataset: &Dataset,
-    options: ParquetOptions,
+    options: ExportOptions,
     out: W,
     mut on_rows: impl FnMut(usize),
-) -> Result<(), ExportParquetError> {
+) -> Result<(), ExportDatasetError> {
     let fields = fields(dataset, options);
     let mut writer = file(out, "pulls", &fields)?;
     let rows = dataset.table().rows();
@@ -113,7 +93,7 @@ fn write_both<W: Write + Send>(
     out: &mut Group<'_, W>,
     rows: &[usize],
     of: impl Fn(usize) -> Result<Option<[Vec<u8>; 2]>, DatasetError>,
-) -> Result<(), ExportParquetError> {
+) -> Result<(), ExportDatasetError> {
     let (mut left, mut right) = (Vec::new(), Vec::new());
     for &row in rows {
         let (l, r) = of(row)?.map_or((None, None), |[l, r]| (Some(l), Some(r)));
@@ -125,7 +105,7 @@ fn write_both<W: Write + Send>(
     Ok(())
 }
 
-fn fields(dataset: &Dataset, options: ParquetOptions) -> Vec<Field> {
+fn fields(dataset: &Dataset, options: ExportOptions) -> Vec<Field> {
     let table = dataset.table();
     let mut fields: Vec<Field> =
         table.columns().iter().map(|(name, values)| Field::of(name, values, table.is_whole(name))).collect();

@@ -74,38 +74,20 @@ pub enum ReadError {
         /// What the format reader says.
         source: McapError,
     },
-    /// An MCAP file of somebody else.
-    #[error("{path}: not a gripgen shard: {problem}")]
-    Foreign {
+    /// An MCAP file that is no shard, a sample that is not in it, or a damaged message.
+    #[error("{path}: {problem}")]
+    Content {
         /// The file.
         path: PathBuf,
-        /// What is missing.
-        problem: String,
-    },
-    /// There is no such sample.
-    #[error("{path}: sample {sample} is not in this shard, it holds {first}..{end}")]
-    NoSample {
-        /// The file.
-        path: PathBuf,
-        /// Global index asked for.
-        sample: u64,
-        /// First index.
-        first: u64,
-        /// One past the last index.
-        end: u64,
-    },
-    /// A message is damaged.
-    #[error("{path}: sample {sample}, {topic}: {problem}")]
-    Message {
-        /// The file.
-        path: PathBuf,
-        /// Global index.
-        sample: u64,
-        /// Topic of the message.
-        topic: String,
         /// What is wrong.
         problem: String,
     },
+}
+
+impl ReadError {
+    fn foreign(path: &Path, problem: &str) -> Self {
+        Self::Content { path: path.into(), problem: format!("not a gripgen shard: {problem}") }
+    }
 }
 
 /// The verb that wrote an MCAP file which is no shard of a run; `None` where nobody marked it.
@@ -122,7 +104,7 @@ impl ShardReader {
     ///
     /// A file that cannot be opened, is no MCAP file or no shard of gripgen.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let foreign = |problem: String| ReadError::Foreign { path: path.into(), problem };
+        let foreign = |problem: String| ReadError::foreign(path, &problem);
         let bad = |source| ReadError::Mcap { path: path.into(), source };
         let (file, bytes) = open_mcap(path)?;
         let summary =
@@ -207,7 +189,7 @@ impl ShardReader {
     ///
     /// A file that cannot be read.
     pub fn config_toml(&self) -> Result<String, ReadError> {
-        let foreign = |problem: &str| ReadError::Foreign { path: self.path.clone(), problem: problem.into() };
+        let foreign = |problem: &str| ReadError::foreign(&self.path, problem);
         let text = attachment(&self.file, self.bytes, &self.summary, "config.toml")
             .map_err(|source| ReadError::Mcap { path: self.path.clone(), source })?
             .ok_or_else(|| foreign("it has no attachment `config.toml`"))?;
@@ -318,7 +300,8 @@ impl ShardReader {
     }
 
     pub(crate) fn damaged(&self, sample: u64, topic: &str, problem: &str) -> ReadError {
-        ReadError::Message { path: self.path.clone(), sample, topic: topic.into(), problem: problem.into() }
+        let problem = format!("sample {sample}, {topic}: {problem}");
+        ReadError::Content { path: self.path.clone(), problem }
     }
 }
 

@@ -41,44 +41,18 @@ pub struct RigLogEvent {
     pub text: String,
 }
 
-/// A log that cannot be stored.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RigLogError {
-    /// A column of another length than its stream.
-    #[error("stream `{stream}`: its column `{column}` has {rows} rows, {wanted} were received")]
-    Rows {
-        /// The stream.
-        stream: String,
-        /// The column.
-        column: String,
-        /// Its rows.
-        rows: usize,
-        /// Rows of the stream.
-        wanted: usize,
-    },
-    /// Two of the same name: what belongs to which could not be told.
-    #[error("{what} `{name}` is there twice")]
-    Twice {
-        /// A stream, or a column of which stream.
-        what: String,
-        /// The name.
-        name: String,
-    },
-}
-
 impl RigLog {
     /// The stream of a source.
     pub fn stream(&self, name: &str) -> Option<&RigStream> {
         self.streams.iter().find(|s| s.name == name)
     }
 
-    /// Refuses columns of unequal length and names that occur twice.
-    pub(crate) fn check(&self) -> Result<(), RigLogError> {
+    /// Refuses columns of unequal length and names that occur twice: what belongs to which could not be told.
+    pub(crate) fn check(&self) -> Result<(), String> {
         let mut names = BTreeSet::new();
         for stream in &self.streams {
             if !names.insert(&stream.name) {
-                return Err(RigLogError::Twice { what: "stream".into(), name: stream.name.clone() });
+                return Err(format!("stream `{}` is there twice", stream.name));
             }
             stream.check()?;
         }
@@ -121,23 +95,22 @@ impl RigStream {
         self.columns.iter().find(|(n, _)| n == name).map(|(_, values)| values.as_slice())
     }
 
-    fn check(&self) -> Result<(), RigLogError> {
+    fn check(&self) -> Result<(), String> {
         let wanted = self.host_time_s.len();
         let device =
             Some(("device_time_s", self.device_time_s.len())).filter(|_| !self.device_time_s.is_empty());
         let columns = self.columns.iter().map(|(name, values)| (name.as_str(), values.len()));
         for (column, rows) in device.into_iter().chain(columns) {
             if rows != wanted {
-                let (stream, column) = (self.name.clone(), column.into());
-                return Err(RigLogError::Rows { stream, column, rows, wanted });
+                return Err(format!(
+                    "stream `{}`: its column `{column}` has {rows} rows, {wanted} were received",
+                    self.name
+                ));
             }
         }
         let mut names = BTreeSet::new();
         match self.columns.iter().find(|(name, _)| !names.insert(name)) {
-            Some((name, _)) => {
-                let what = format!("column of stream `{}`", self.name);
-                Err(RigLogError::Twice { what, name: name.clone() })
-            }
+            Some((name, _)) => Err(format!("column of stream `{}` `{name}` is there twice", self.name)),
             None => Ok(()),
         }
     }
@@ -151,7 +124,7 @@ impl RigStream {
             device_time_s: message.device_time_s,
             columns: message.columns.into_iter().map(|c| (c.name, c.value)).collect(),
         };
-        stream.check().map_err(|e| e.to_string())?;
+        stream.check()?;
         Ok(stream)
     }
 }
@@ -216,7 +189,7 @@ mod tests {
         let fault = |change: &dyn Fn(&mut RigLog)| {
             let mut log = good.clone();
             change(&mut log);
-            log.check().unwrap_err().to_string()
+            log.check().unwrap_err()
         };
         let short = fault(&|l| l.streams[0].columns[0].1.truncate(1));
         assert_eq!(short, "stream `robot`: its column `force_n` has 1 rows, 2 were received");

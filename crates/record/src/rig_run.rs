@@ -10,7 +10,7 @@ mod tests;
 
 pub use film::{FrameView, RigFilm, RigFrame};
 pub(crate) use film::{camera_image, stamp_of};
-pub use pull::{RigPull, RigPullError, RigResult};
+pub use pull::{RigPull, RigResult};
 
 use crate::folder::{FolderError, RUN_SCHEMA, RunFolder, RunInfo, ShardStart, Sidecar, sha256_hex};
 use crate::index::extra_columns;
@@ -55,52 +55,9 @@ pub enum RigRunError {
     /// The shard.
     #[error(transparent)]
     Shard(#[from] ShardError),
-    /// What was measured.
-    #[error("pull {pull}: {source}")]
-    Pull {
-        /// Its place in the campaign.
-        pull: u64,
-        /// What is wrong with it.
-        source: RigPullError,
-    },
-    /// The run of something else.
-    #[error("{}: its source is `{found}`, pulls of a rig go into runs of a `{RIG_SOURCE}`", .path.display())]
-    NoRig {
-        /// The folder.
-        path: PathBuf,
-        /// Its source.
-        found: String,
-    },
-    /// The campaign has no such pull.
-    #[error("there is no pull {pull}, the campaign has {pulls} (counted from 0)")]
-    NoPull {
-        /// The pull.
-        pull: u64,
-        /// Pulls there are.
-        pulls: u64,
-    },
-    /// It is done: what was measured is not replaced.
-    #[error("pull {pull} is done: {}", .shard.display())]
-    Done {
-        /// The pull.
-        pull: u64,
-        /// Its shard.
-        shard: PathBuf,
-    },
-    /// Another process writes it at this moment.
-    #[error("pull {pull} is being written by another process")]
-    Busy {
-        /// The pull.
-        pull: u64,
-    },
-    /// A pull with a label is not thrown away.
-    #[error("pull {pull} did not fail, it stays: {}", .shard.display())]
-    Labelled {
-        /// The pull.
-        pull: u64,
-        /// Its shard.
-        shard: PathBuf,
-    },
+    /// A pull, or a run, that is not what it has to be; nothing was changed.
+    #[error("{0}")]
+    Refused(String),
 }
 
 /// Opens the folder of a rig's run, or makes it. The run of another campaign, rig or version is refused.
@@ -154,12 +111,17 @@ pub fn write_rig_pull(folder: &RunFolder, pull: &RigPull) -> Result<Sidecar, Rig
     check_place(folder, index)?;
     let encoded = pull
         .encode(&folder.info().extra_columns)
-        .map_err(|source| RigRunError::Pull { pull: index, source })?;
+        .map_err(|problem| RigRunError::Refused(format!("pull {index}: {problem}")))?;
     let partial = match folder.start_shard(index)? {
         ShardStart::Begun(partial) => partial,
-        ShardStart::Busy => return Err(RigRunError::Busy { pull: index }),
+        ShardStart::Busy => {
+            let problem = format!("pull {index} is being written by another process");
+            return Err(RigRunError::Refused(problem));
+        }
+        // What was measured is not replaced.
         ShardStart::Done(_) => {
-            return Err(RigRunError::Done { pull: index, shard: folder.shard_path(index) });
+            let shard = folder.shard_path(index);
+            return Err(RigRunError::Refused(format!("pull {index} is done: {}", shard.display())));
         }
     };
     let file = BufWriter::new(partial.duplicate()?);
@@ -194,10 +156,15 @@ fn shard_info(folder: &RunFolder, pull: &RigPull) -> ShardInfo {
 fn check_place(folder: &RunFolder, pull: u64) -> Result<(), RigRunError> {
     let run = folder.info();
     if run.source != RIG_SOURCE {
-        return Err(RigRunError::NoRig { path: folder.path().into(), found: run.source.clone() });
+        return Err(RigRunError::Refused(format!(
+            "{}: its source is `{}`, pulls of a rig go into runs of a `{RIG_SOURCE}`",
+            folder.path().display(),
+            run.source
+        )));
     }
     if pull >= run.samples {
-        return Err(RigRunError::NoPull { pull, pulls: run.samples });
+        let problem = format!("there is no pull {pull}, the campaign has {} (counted from 0)", run.samples);
+        return Err(RigRunError::Refused(problem));
     }
     Ok(())
 }
@@ -237,7 +204,9 @@ pub fn discard_failed(folder: &RunFolder, pull: u64) -> Result<bool, RigRunError
     match folder.finished(pull)? {
         None => return Ok(false),
         Some(sidecar) if sidecar.failed == 0 => {
-            return Err(RigRunError::Labelled { pull, shard: folder.shard_path(pull) });
+            let shard = folder.shard_path(pull);
+            let problem = format!("pull {pull} did not fail, it stays: {}", shard.display());
+            return Err(RigRunError::Refused(problem));
         }
         Some(_) => {}
     }

@@ -2,7 +2,7 @@
 
 use crate::background::Background;
 use crate::encode::EncodedSample;
-use crate::film_frame::{film_topic, label_topic};
+use crate::film::{film_topic, label_topic};
 use crate::mark::MARK_NAME;
 use crate::picture::{PictureError, encode_small_png};
 use crate::proto::{
@@ -111,6 +111,38 @@ struct RigChannels {
     events: u16,
 }
 
+/// A message: its channel, its time and its bytes.
+type ChannelMessage<'a> = (u16, u64, &'a [u8]);
+
+impl Channels {
+    /// The messages of a sample, chunk by chunk; what is not there leaves its chunk empty.
+    fn chunks<'a>(&self, sample: &'a EncodedSample) -> [Vec<ChannelMessage<'a>>; 5] {
+        let start_ns = sample.start_ns;
+        let mut chunks: [Vec<ChannelMessage<'a>>; 5] = Default::default();
+        let [core, film, rest, log, states] = &mut chunks;
+        core.push((self.sample, start_ns, &sample.sample));
+        for (jaw, &channel) in self.images.iter().flat_map(PerJaw::iter) {
+            core.extend(sample.images.iter().map(|both| (channel, start_ns, &both[jaw][..])));
+        }
+        core.extend(sample.trace.iter().map(|trace| (self.trace, start_ns, &trace[..])));
+        for (frame, channels) in sample.film.iter().flat_map(|frame| Some((frame, self.film.as_ref()?))) {
+            for jaw in Jaw::BOTH {
+                film.push((channels.image[jaw], frame.time_ns, &frame.image[jaw]));
+                film.push((channels.labels[jaw], frame.time_ns, &frame.labels[jaw]));
+            }
+        }
+        if let (Some(channels), Some(rig)) = (&self.rig, &sample.rig) {
+            for (jaw, &channel) in channels.rest.iter() {
+                rest.extend(rig.rest.iter().map(|both| (channel, start_ns, &both[jaw][..])));
+            }
+            log.extend(rig.streams.iter().map(|stream| (channels.log, start_ns, &stream[..])));
+            log.extend(rig.events.iter().map(|event| (channels.events, start_ns, &event[..])));
+        }
+        states.extend(sample.states.iter().map(|state| (self.state, state.time_ns, &state.data[..])));
+        chunks
+    }
+}
+
 /// Why a shard could not be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -200,28 +232,19 @@ impl<W: Write + Seek> ShardWriter<W> {
         };
         let images = match image_schema {
             None => None,
-            Some((name, descriptor)) => Some(PerJaw {
-                left: channel(name, descriptor, "/tactile/left")?,
-                right: channel(name, descriptor, "/tactile/right")?,
-            }),
+            Some((name, descriptor)) => {
+                Some(PerJaw::try_from_fn(|jaw| channel(name, descriptor, &format!("/tactile/{jaw}")))?)
+            }
         };
         let trace = channel("gripgen.v1.PullTrace", PULL_DESCRIPTOR, "/pull/trace")?;
         let state = channel("gripgen.v1.PullState", PULL_DESCRIPTOR, "/pull/state")?;
         let rig = match info.source == RIG_SOURCE {
             false => None,
             true => Some(RigChannels {
-                rest: PerJaw {
-                    left: channel(
-                        "foxglove.CompressedImage",
-                        COMPRESSED_IMAGE_DESCRIPTOR,
-                        "/tactile/left_rest",
-                    )?,
-                    right: channel(
-                        "foxglove.CompressedImage",
-                        COMPRESSED_IMAGE_DESCRIPTOR,
-                        "/tactile/right_rest",
-                    )?,
-                },
+                rest: PerJaw::try_from_fn(|jaw| {
+                    let topic = format!("/tactile/{jaw}_rest");
+                    channel("foxglove.CompressedImage", COMPRESSED_IMAGE_DESCRIPTOR, &topic)
+                })?,
                 log: channel("gripgen.v1.RigStream", RIG_DESCRIPTOR, "/rig/log")?,
                 events: channel("gripgen.v1.RigEvent", RIG_DESCRIPTOR, "/rig/events")?,
             }),
@@ -261,84 +284,22 @@ impl<W: Write + Seek> ShardWriter<W> {
         Ok(self.writer.write_metadata(&Metadata { name: MARK_NAME.into(), metadata })?)
     }
 
-    /// Appends a sample: one chunk with what training reads, one with what viewers draw; of a rig one with the images
-    /// without contact and one with the log between them.
+    /// Appends a sample: one chunk with what training reads, one with the film, one with what viewers draw; of a rig one with the
+    /// images without contact and one with the log between them.
     ///
     /// # Errors
     ///
     /// What the writer says.
     pub fn push(&mut self, sample: &EncodedSample) -> Result<(), ShardError> {
         let sequence = self.written as u32;
-        let mut write = |channel_id, time_ns, data: &[u8]| {
-            let header = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
-            self.writer.write_to_known_channel(&header, data)
-        };
-        write(self.channels.sample, sample.start_ns, &sample.sample)?;
-        if let (Some(channels), Some(images)) = (&self.channels.images, &sample.images) {
-            for (jaw, &channel) in channels.iter() {
-                write(channel, sample.start_ns, &images[jaw])?;
-            }
-        }
-        if let Some(trace) = &sample.trace {
-            write(self.channels.trace, sample.start_ns, trace)?;
-        }
-        self.writer.flush()?;
-        self.push_film(sample, sequence)?;
-        self.push_rig(sample, sequence)?;
-        if !sample.states.is_empty() {
-            for state in &sample.states {
-                let (channel_id, time_ns) = (self.channels.state, state.time_ns);
+        for chunk in self.channels.chunks(sample).iter().filter(|chunk| !chunk.is_empty()) {
+            for &(channel_id, time_ns, data) in chunk {
                 let header = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
-                self.writer.write_to_known_channel(&header, &state.data)?;
+                self.writer.write_to_known_channel(&header, data)?;
             }
             self.writer.flush()?;
         }
         self.written += 1;
-        Ok(())
-    }
-
-    /// The film, in a chunk of its own.
-    fn push_film(&mut self, sample: &EncodedSample, sequence: u32) -> Result<(), ShardError> {
-        let Some(channels) = self.channels.film.as_ref().filter(|_| !sample.film.is_empty()) else {
-            return Ok(());
-        };
-        for frame in &sample.film {
-            for jaw in Jaw::BOTH {
-                let of_jaw =
-                    [(channels.image[jaw], &frame.image[jaw]), (channels.labels[jaw], &frame.labels[jaw])];
-                for (channel_id, data) in of_jaw {
-                    let (log_time, publish_time) = (frame.time_ns, frame.time_ns);
-                    let header = MessageHeader { channel_id, sequence, log_time, publish_time };
-                    self.writer.write_to_known_channel(&header, data)?;
-                }
-            }
-        }
-        Ok(self.writer.flush()?)
-    }
-
-    /// What only a rig has, in chunks of its own.
-    fn push_rig(&mut self, sample: &EncodedSample, sequence: u32) -> Result<(), ShardError> {
-        let (Some(channels), Some(rig)) = (&self.channels.rig, &sample.rig) else { return Ok(()) };
-        let time_ns = sample.start_ns;
-        let write = |writer: &mut Writer<W>, channel_id, data: &[u8]| {
-            let header = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
-            writer.write_to_known_channel(&header, data)
-        };
-        if let Some(rest) = &rig.rest {
-            for (jaw, &channel) in channels.rest.iter() {
-                write(&mut self.writer, channel, &rest[jaw])?;
-            }
-            self.writer.flush()?;
-        }
-        for stream in &rig.streams {
-            write(&mut self.writer, channels.log, stream)?;
-        }
-        for event in &rig.events {
-            write(&mut self.writer, channels.events, event)?;
-        }
-        if !(rig.streams.is_empty() && rig.events.is_empty()) {
-            self.writer.flush()?;
-        }
         Ok(())
     }
 

@@ -4,7 +4,8 @@
 //! sample to WebDataset: the mark and the card are there. Nothing in a file depends on time, host or path.
 
 use crate::card;
-use crate::dataset::{Dataset, DatasetError};
+use crate::dataset::Dataset;
+use crate::export::{ExportDatasetError, ExportOptions};
 use crate::mark::{EXPORT, MARK_NAME};
 use gripgen_twin::{PullTrace, Values};
 use serde_json::{Map, Value, json};
@@ -16,33 +17,12 @@ use tar::{Archive, Builder, EntryType, Header};
 /// Where the mark and the card are.
 const ABOUT: &str = "__gripgen__";
 
-/// What of each row is written beside its cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WebDatasetOptions {
-    /// Both images; rows without them are left out.
-    pub images: bool,
-    /// The force over time.
-    pub traces: bool,
-}
-
-/// Why a dataset could not be written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ExportWebDatasetError {
-    /// The dataset.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// The file.
-    #[error("tar: {0}")]
-    Tar(#[from] std::io::Error),
-}
-
 /// Rows of a dataset that an export takes: with images all that have some. The others are failed samples.
 ///
 /// # Errors
 ///
 /// A row that cannot be read.
-pub fn webdataset_rows(dataset: &Dataset, options: WebDatasetOptions) -> Vec<usize> {
+pub fn webdataset_rows(dataset: &Dataset, options: ExportOptions) -> Vec<usize> {
     let statuses = dataset.table().words("status");
     let failed = |row: usize| statuses.is_some_and(|words| words[row] == "failed");
     (0..dataset.table().rows()).filter(|&row| !options.images || !failed(row)).collect()
@@ -57,10 +37,10 @@ pub fn webdataset_rows(dataset: &Dataset, options: WebDatasetOptions) -> Vec<usi
 pub fn export_webdataset<W: Write>(
     dataset: &Dataset,
     rows: &[usize],
-    options: WebDatasetOptions,
+    options: ExportOptions,
     out: W,
     mut on_row: impl FnMut(),
-) -> Result<usize, ExportWebDatasetError> {
+) -> Result<usize, ExportDatasetError> {
     let mut tar = Builder::new(out);
     add(&mut tar, &format!("{ABOUT}/{MARK_NAME}"), EXPORT.as_bytes())?;
     add(&mut tar, &format!("{ABOUT}/README.md"), about(dataset).as_bytes())?;

@@ -54,6 +54,30 @@ impl ConfigError {
         self.hint = Some(hint.into());
         self
     }
+
+    /// Adds the one of some known names that `typed` was probably meant to be as a hint; another hint where there is none.
+    pub(crate) fn suggest<'a>(
+        self,
+        typed: &str,
+        known: impl IntoIterator<Item = &'a str>,
+        otherwise: impl FnOnce() -> String,
+    ) -> Self {
+        self.hint(match suggestion(typed, known) {
+            Some(name) => format!("did you mean `{name}`?"),
+            None => otherwise(),
+        })
+    }
+
+    /// A part that the twin does not have.
+    pub(crate) fn unknown_part<'a>(
+        key: impl Into<String>,
+        part: &str,
+        parts: impl Iterator<Item = &'a String>,
+    ) -> Self {
+        let parts: Vec<&str> = parts.map(String::as_str).collect();
+        let error = Self::new(key, format!("the twin has no part `{part}`"));
+        error.suggest(part, parts.iter().copied(), || format!("its parts: {}", parts.join(", ")))
+    }
 }
 
 impl std::fmt::Display for ConfigError {
@@ -91,18 +115,6 @@ pub fn suggestion<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> 
 /// Whether two words differ by one letter: left out, put in, exchanged for another or with its neighbour.
 pub fn one_slip_apart(a: &str, b: &str) -> bool {
     strsim::damerau_levenshtein(a, b) == 1
-}
-
-/// Adds the hint for a part name that the twin does not have.
-pub(crate) fn unknown_part_hint<'a>(
-    error: ConfigError,
-    typed: &str,
-    parts: impl Iterator<Item = &'a String> + Clone,
-) -> ConfigError {
-    match suggestion(typed, parts.clone().map(String::as_str)) {
-        Some(name) => error.hint(format!("did you mean `{name}`?")),
-        None => error.hint(format!("its parts: {}", parts.cloned().collect::<Vec<_>>().join(", "))),
-    }
 }
 
 /// Checks that a number is finite and inside `range`.

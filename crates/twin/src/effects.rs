@@ -7,8 +7,6 @@
 //! the baseline (the rate at which the coefficient was measured, say), that scale is a parameter too, a
 //! *reference*: it has a documented default and is not fitted.
 
-#[cfg(test)]
-mod catalogue_tests;
 mod chain;
 mod experiment;
 mod fit;
@@ -22,7 +20,7 @@ mod tests;
 pub use chain::{
     CommandChain, SensorChain, creep, imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state,
 };
-pub use experiment::{Experiment, Measured, separating};
+pub use experiment::{Experiment, Measured};
 pub use fit::{
     Bounds, FORCE_RATE, Fit, GraspSpan, Grid, ImprintFit, Named, PressFit, PressNeeds, PullFit, PullSpan,
     REFERENCE_FORCE, Seen, TableFit, TableSpan,
@@ -32,6 +30,8 @@ pub use hooks::{
     CommandHook, Creep, CreepHook, FrictionHook, GraspForceHook, GripPoint, ImprintHook, NormalForceHook,
     OpticsHook, SensorHook, SensorMemory, SensorPoint, TiltHook,
 };
+use hooks::{positive, values};
+use spec::parameter;
 pub use spec::{EffectSpec, Group, ParameterSpec, Visible};
 
 /// Declares the modules of the effects and lists their specs: one line per effect.

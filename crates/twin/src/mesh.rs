@@ -20,6 +20,9 @@ pub const MAX_TRIANGLES: usize = 2_000_000;
 /// Smallest and largest extent of a part, in metres. Beyond them the unit of the file is wrong.
 pub const EXTENT_RANGE_M: (f64, f64) = (0.5e-3, 2.0);
 
+/// A triangle of a file: its corners, in the unit of the file.
+type Triangle = [[f32; 3]; 3];
+
 /// An indexed triangle mesh. Coordinates are finite and in metres, indices are in range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TriMesh {
@@ -29,77 +32,10 @@ pub struct TriMesh {
 
 /// Why the bytes of a mesh file could not be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum MeshError {
-    /// Nothing in the file.
-    #[error("the file is empty (0 bytes)")]
-    EmptyFile,
-    /// No triangle in an otherwise readable file.
-    #[error("the mesh has no triangles")]
-    NoTriangles,
-    /// Neither the binary size rule nor the ASCII keyword holds.
-    #[error(
-        "not an STL file: {size} bytes are not 84 + 50 x the {count} triangles its header promises, \
-         and it does not begin with `solid`"
-    )]
-    NotStl {
-        /// Bytes in the file.
-        size: usize,
-        /// Triangle count at byte 80.
-        count: u32,
-    },
-    /// Fewer than the 84 bytes of a header.
-    #[error("not an STL file: {size} bytes, a binary header alone has 84")]
-    ShortHeader {
-        /// Bytes in the file.
-        size: usize,
-    },
-    /// The binary file ends early.
-    #[error(
-        "the file is cut off: its header promises {count} triangles ({expected} bytes), it has {size} bytes"
-    )]
-    Truncated {
-        /// Triangle count at byte 80.
-        count: u32,
-        /// Bytes that count needs.
-        expected: u64,
-        /// Bytes in the file.
-        size: usize,
-    },
-    /// A text file breaks the grammar.
-    #[error("line {line}: {problem}")]
-    Syntax {
-        /// 1-based line number.
-        line: usize,
-        /// What is wrong on it.
-        problem: String,
-    },
-    /// What a library says of a file.
-    #[error("not a {format} file that can be read: {problem}")]
-    Unreadable {
-        /// The format.
-        format: &'static str,
-        /// What is wrong.
-        problem: String,
-    },
-    /// A coordinate is NaN or infinite.
-    #[error("triangle {triangle}, corner {corner}: coordinate {axis} is {value}, not a finite number")]
-    NotFinite {
-        /// 0-based triangle.
-        triangle: usize,
-        /// 0-based corner.
-        corner: usize,
-        /// `x`, `y` or `z`.
-        axis: char,
-        /// The value.
-        value: f64,
-    },
-    /// More triangles than [`MAX_TRIANGLES`].
-    #[error("the mesh has {triangles} triangles, at most {MAX_TRIANGLES} are allowed")]
-    TooManyTriangles {
-        /// Triangles found or promised.
-        triangles: u64,
-    },
+    /// What is wrong with the file, and where.
+    #[error("{0}")]
+    File(String),
     /// The part would be microscopic or huge: a unit mistake.
     #[error(
         "the part measures {x_mm:.4} x {y_mm:.4} x {z_mm:.4} mm; its largest side must lie between {min} and {max} mm",
@@ -113,12 +49,18 @@ pub enum MeshError {
         /// Size along z.
         z_mm: f64,
     },
-    /// The file name tells no known format.
-    #[error("`{extension}` is not a known mesh format; known are stl, obj, ply and glb")]
-    UnknownFormat {
-        /// Lower-case extension, empty where there is none.
-        extension: String,
-    },
+}
+
+impl MeshError {
+    /// A text file that breaks the grammar in a line, counted from 1.
+    fn syntax(line: usize, problem: &str) -> Self {
+        Self::File(format!("line {line}: {problem}"))
+    }
+
+    /// More triangles than [`MAX_TRIANGLES`], found or promised.
+    fn too_many(triangles: impl std::fmt::Display) -> Self {
+        Self::File(format!("the mesh has {triangles} triangles, at most {MAX_TRIANGLES} are allowed"))
+    }
 }
 
 /// Endings of the mesh files that are read.
@@ -142,17 +84,19 @@ impl TriMesh {
     /// If a triangle names a vertex that does not exist: meshes are built by this crate only.
     pub fn new(vertices_m: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         if triangles.is_empty() {
-            return Err(MeshError::NoTriangles);
+            return Err(MeshError::File("the mesh has no triangles".into()));
         }
         if triangles.len() > MAX_TRIANGLES {
-            return Err(MeshError::TooManyTriangles { triangles: triangles.len() as u64 });
+            return Err(MeshError::too_many(triangles.len()));
         }
         for (t, triangle) in triangles.iter().enumerate() {
             for (corner, &v) in triangle.iter().enumerate() {
                 let p = &vertices_m[v as usize];
                 for (axis, value) in ['x', 'y', 'z'].into_iter().zip(p.iter()) {
                     if !value.is_finite() {
-                        return Err(MeshError::NotFinite { triangle: t, corner, axis, value: *value });
+                        return Err(MeshError::File(format!(
+                            "triangle {t}, corner {corner}: coordinate {axis} is {value}, not a finite number"
+                        )));
                     }
                 }
             }
@@ -170,14 +114,20 @@ impl TriMesh {
     /// [`Self::new`] refuses.
     pub fn from_file_bytes(bytes: &[u8], extension: &str, metres_per_unit: f64) -> Result<Self, MeshError> {
         let extension = extension.to_ascii_lowercase();
-        let soup = match extension.as_str() {
-            "stl" => stl::read(bytes)?,
-            "obj" => obj::read(bytes)?,
-            "ply" => ply::read(bytes)?,
-            "glb" => glb::read(bytes)?,
-            _ => return Err(MeshError::UnknownFormat { extension }),
+        let read = match extension.as_str() {
+            "stl" => stl::read,
+            "obj" => obj::read,
+            "ply" => ply::read,
+            "glb" => glb::read,
+            _ => {
+                let known = "known are stl, obj, ply and glb";
+                return Err(MeshError::File(format!("`{extension}` is not a known mesh format; {known}")));
+            }
         };
-        let mesh = Self::from_soup(&soup, metres_per_unit)?;
+        if bytes.is_empty() {
+            return Err(MeshError::File("the file is empty (0 bytes)".into()));
+        }
+        let mesh = Self::from_soup(&read(bytes)?, metres_per_unit)?;
         let size = mesh.extent_m();
         let largest = size.iter().fold(0.0_f64, |a, &b| a.max(b));
         if !(EXTENT_RANGE_M.0..=EXTENT_RANGE_M.1).contains(&largest) {
@@ -188,7 +138,7 @@ impl TriMesh {
     }
 
     /// Merges bitwise equal corners of a list of triangles, keeping the order of first appearance.
-    fn from_soup(soup: &[[[f32; 3]; 3]], metres_per_unit: f64) -> Result<Self, MeshError> {
+    fn from_soup(soup: &[Triangle], metres_per_unit: f64) -> Result<Self, MeshError> {
         let mut seen: HashMap<[u32; 3], u32> = HashMap::with_capacity(soup.len());
         let mut vertices_m = Vec::new();
         let mut triangles = Vec::with_capacity(soup.len());

@@ -74,6 +74,11 @@ pub fn splitmix64(state: &mut u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// The normal distribution function.
+pub fn normal_cdf(x: f64) -> f64 {
+    0.5 * libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
+}
+
 /// The quantile function of the standard normal distribution.
 ///
 /// Wichura (1988), algorithm AS 241 (PPND16), relative accuracy about 1e-16.

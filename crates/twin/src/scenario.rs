@@ -86,8 +86,8 @@ impl Default for PullSettings {
     }
 }
 
-/// One pull: everything a sample is a function of, beside the twin and the sweep seed.
-#[derive(Debug, Clone, PartialEq)]
+/// One pull: everything a sample is a function of, beside the twin and the sweep seed. The default grips no part with no force.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scenario {
     /// Seed of the sweep.
     pub seed: u64,

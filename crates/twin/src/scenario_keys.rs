@@ -127,8 +127,7 @@ pub(crate) fn set_pull(pull: &mut PullFile, key: &str, value: &Drawn) -> Result<
 /// What only the twin can tell: whether the part and its grip exist and the gripper can press that hard.
 pub(crate) fn check_against_twin(scenario: &Scenario, twin: &Twin) -> Result<(), ConfigError> {
     let Some(part) = twin.parts.get(&scenario.part) else {
-        let error = ConfigError::new("part", format!("the twin has no part `{}`", scenario.part));
-        return Err(crate::config::unknown_part_hint(error, &scenario.part, twin.parts.keys()));
+        return Err(ConfigError::unknown_part("part", &scenario.part, twin.parts.keys()));
     };
     if scenario.grip_pose >= part.grips.len() {
         let problem = format!(

@@ -11,7 +11,7 @@ use crate::config::{
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
 use crate::film::FilmPace;
 use crate::scenario_keys;
-use crate::{CAUSE_KEY, Covariates, Posterior, PullSettings, Scenario, Twin, sobol};
+use crate::{CAUSE_KEY, Posterior, PullSettings, Scenario, Twin, sobol};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -247,18 +247,7 @@ impl Sweep {
 
     /// A scenario in which nothing is drawn yet.
     fn blank(&self) -> Scenario {
-        Scenario {
-            seed: self.seed,
-            index: 0,
-            group: 0,
-            repetition: 0,
-            part: String::new(),
-            grip_pose: 0,
-            grip_force_n: 1.0,
-            covariates: Covariates::default(),
-            pull: self.pull(),
-            drawn: BTreeMap::new(),
-        }
+        Scenario { seed: self.seed, grip_force_n: 1.0, pull: self.pull(), ..Scenario::default() }
     }
 }
 

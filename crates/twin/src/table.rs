@@ -4,15 +4,11 @@
 //! over one covariate. It repeats what was seen and says nothing about why: it is marked `physical = false`, and outside
 //! its range it is held.
 
-mod acting;
-
-pub use acting::{table_factor, table_offset_n};
-
-use crate::Values;
 use crate::columns::{self, Column, PullView};
-use crate::config::{ConfigError, EffectFile, TwinFile, in_range, suggestion};
+use crate::config::{ConfigError, EffectFile, TwinFile, in_range};
 use crate::draw::Drawn;
 use crate::effects::{OutsideFit, Per};
+use crate::{Scenario, Twin, Values};
 
 /// The `name` of a table among the effects of a twin file. It is not in the library.
 pub const TABLE_EFFECT: &str = "table";
@@ -89,6 +85,18 @@ impl Table {
     }
 }
 
+/// By what the tables of a twin multiply the friction of a pull; 1 without any.
+pub fn table_factor(twin: &Twin, scenario: &Scenario) -> f64 {
+    let factors = twin.tables.iter().filter(|t| t.target == TableTarget::Factor);
+    factors.filter_map(|t| t.at(scenario.view())).product()
+}
+
+/// What the tables of a twin add to the readings of the wrist sensor, in newtons; 0 without any.
+pub fn table_offset_n(twin: &Twin, scenario: &Scenario) -> f64 {
+    let offsets = twin.tables.iter().filter(|t| t.target == TableTarget::Offset);
+    offsets.filter_map(|t| t.at(scenario.view())).fold(0.0, |sum, x| sum + x)
+}
+
 /// Linear between the points, held outside.
 fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
     let after = x.partition_point(|&x| x <= at);
@@ -110,8 +118,7 @@ pub(crate) fn check_table(file: &TwinFile, index: usize) -> Result<Table, Config
     let key = |name: &str| format!("effects[{index}].{name}");
     refuse_foreign(effect, &key)?;
     if let Some(part) = effect.part.as_ref().filter(|part| !file.parts.contains_key(*part)) {
-        let error = ConfigError::new(key("part"), format!("the twin has no part `{part}`"));
-        return Err(crate::config::unknown_part_hint(error, part, file.parts.keys()));
+        return Err(ConfigError::unknown_part(key("part"), part, file.parts.keys()));
     }
     let get = |name: &str| effect.parameters.get(name);
     if get("physical") != Some(&toml::Value::Boolean(false)) {
@@ -219,10 +226,7 @@ fn only(
 fn refuse_foreign(effect: &EffectFile, key: &dyn Fn(&str) -> String) -> Result<(), ConfigError> {
     if let Some(name) = effect.parameters.keys().find(|name| !KEYS.contains(&name.as_str())) {
         let error = ConfigError::new(key(name), format!("a table has no key `{name}`"));
-        return Err(match suggestion(name, KEYS) {
-            Some(close) => error.hint(format!("did you mean `{close}`?")),
-            None => error.hint(format!("its keys: {}", KEYS.join(", "))),
-        });
+        return Err(error.suggest(name, KEYS, || format!("its keys: {}", KEYS.join(", "))));
     }
     let foreign = [
         ("fitted_grip_force_n", effect.fitted_grip_force_n.is_some()),
@@ -288,23 +292,13 @@ fn distinct(value: &toml::Value, key: &str) -> Result<Vec<String>, ConfigError> 
 mod tests {
     use super::*;
     use crate::effects::testing::twin;
-    use crate::{Covariates, PullSettings, Scenario, TWIN_SCHEMA};
+    use crate::{Covariates, PullSettings, TWIN_SCHEMA};
 
     fn scenario(part: &str, extra: &[(&str, Drawn)]) -> Scenario {
         let pull = PullSettings { increment_n: 0.5, step_s: 0.1, ..Default::default() };
         let extra = extra.iter().map(|(k, v)| (k.to_string(), v.clone())).collect();
-        Scenario {
-            seed: 1,
-            index: 0,
-            group: 0,
-            repetition: 0,
-            part: part.into(),
-            grip_pose: 0,
-            grip_force_n: 40.0,
-            covariates: Covariates { session: "2".into(), grip_offset_m: 3e-3, extra, ..Default::default() },
-            pull,
-            drawn: Default::default(),
-        }
+        let covariates = Covariates { session: "2".into(), grip_offset_m: 3e-3, extra, ..Default::default() };
+        Scenario { part: part.into(), grip_force_n: 40.0, covariates, pull, ..Scenario::default() }
     }
 
     const HUMIDITY: &str = "[[effects]]\nname = \"table\"\ncovariate = \"humidity_pct\"\nx = [30, 40.0, 60]\n\

@@ -8,8 +8,8 @@ use crate::output::{JsonSink, count, print};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{
-    Dataset, LEROBOT_CARD, LeRobotOptions, ParquetOptions, ShardReader, WebDatasetOptions, export_lerobot,
-    export_parquet, export_sample, export_webdataset, webdataset_rows,
+    Dataset, ExportOptions, LEROBOT_CARD, ShardReader, export_lerobot, export_parquet, export_sample,
+    export_webdataset, webdataset_rows,
 };
 use serde_json::json;
 use std::path::PathBuf;
@@ -34,7 +34,7 @@ pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
 
 fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Failure> {
     let dataset = Dataset::open(&args.run).map_err(Failure::usage)?;
-    let options = ParquetOptions {
+    let options = ExportOptions {
         images: !args.no_images && dataset.image_size_px().is_some(),
         traces: !args.no_traces,
     };
@@ -61,7 +61,7 @@ fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let rows = dataset.table().rows();
     let has_traces = (0..rows).find_map(|row| dataset.trace(row).ok().flatten()).is_some();
-    let options = LeRobotOptions {
+    let options = ExportOptions {
         images: !args.no_images && dataset.image_size_px().is_some(),
         traces: !args.no_traces && has_traces,
     };
@@ -92,7 +92,7 @@ const ROWS: usize = 1000;
 
 fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
     let dataset = Dataset::open(&args.run).map_err(Failure::usage)?;
-    let options = WebDatasetOptions {
+    let options = ExportOptions {
         images: !args.no_images && dataset.image_size_px().is_some(),
         traces: !args.no_traces,
     };

@@ -12,8 +12,9 @@ use crate::diagnosis::{
     Channel, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, NamedEffect,
     ParameterEstimate, Rival, SeparateBy,
 };
+use crate::effect_search::separating;
 use crate::grouped::t_quantile_95;
-use gripgen_twin::effects::{EffectSpec, Experiment, Measured, separating};
+use gripgen_twin::effects::{EffectSpec, Experiment, Measured};
 use std::collections::BTreeMap;
 
 /// A row with what was predicted of it from other rows.

@@ -9,12 +9,13 @@ use super::search::Found;
 use super::unnamed::{PressCovariate, PressValues};
 use super::whole::FrameErrors;
 use super::{PressData, PressDiagnosis};
+use crate::effect_search::separating;
 use crate::plain::left;
 use crate::{
     Channel, DataSummary, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, HeldOutError, NamedEffect,
     ParameterEstimate, Rival, SeparateBy, UnknownCovariate, grouped_intervals,
 };
-use gripgen_twin::effects::{Measured, separating};
+use gripgen_twin::effects::Measured;
 use std::collections::BTreeMap;
 
 /// Everything that the answer is made of.

@@ -114,7 +114,7 @@ impl Search<'_> {
         let first_s = pulls.iter().map(|p| p.covariates.time_s).fold(last_s, f64::min);
         let hours = (last_s - first_s) / 3600.0;
         let max_n = self.context.data.label_n.iter().copied().fold(0.0, f64::max);
-        spec.visible.holds(size, hours, max_n)
+        crate::effect_search::is_visible(spec.visible, size, hours, max_n)
     }
 
     /// Whether more than a pull or two speak for a rival, and more than a few where it is the end of a range: what explains one bad pull and nothing else is

@@ -1,6 +1,7 @@
 //! What a diagnosis says to people.
 
-use gripgen_twin::effects::{Measured, separating};
+use crate::effect_search::separating;
+use gripgen_twin::effects::Measured;
 
 /// What tells effects apart, for people.
 pub(super) fn separation(name: &str, rivals: &[&str]) -> String {

@@ -6,7 +6,8 @@ use super::refine::values_at;
 use super::search::Workspace;
 use super::statistics::mean_and_error;
 use crate::diagnosis::SeparateBy;
-use gripgen_twin::effects::{Experiment, Measured, separating};
+use crate::effect_search::separating;
+use gripgen_twin::effects::{Experiment, Measured};
 
 /// A candidate in the table of evidence.
 #[derive(Debug, Clone, PartialEq)]

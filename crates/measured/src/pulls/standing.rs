@@ -2,7 +2,7 @@
 
 use super::cells::{Cells, Column};
 use gripgen_record::proto::gripgen_v1::Status;
-use gripgen_twin::evidence::{Behind, Expected, LabelEvidence, Verdict, judge};
+use gripgen_twin::label_check::{Behind, Expected, LabelEvidence, Verdict, check_label};
 use gripgen_twin::{MeasuredPull, MeasuredPulls, slip_label};
 
 /// Labels and readings of files agree to two decimals.
@@ -69,7 +69,7 @@ pub(crate) fn judge_labels(measured: &MeasuredPulls, after_n: &[Vec<f64>], stand
         let of_trace =
             LabelEvidence::of_trace(pull.max_pull_force_n, tolerance_n, stop_m, pull.trace.as_ref());
         let evidence = LabelEvidence { censored, every_reading, no_load_after_n: after_n, ..of_trace };
-        let judgement = judge(&evidence, &Expected::default());
+        let judgement = check_label(&evidence, &Expected::default());
         standing.judged = judgement.verdict != Verdict::NoEvidence;
         if let Some(reason) = judgement.reason() {
             *standing =

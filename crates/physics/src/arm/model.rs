@@ -117,13 +117,17 @@ impl LinkInertia {
     }
 
     pub(crate) fn check(&self, joint: &ArmJoint) -> Result<(), UrdfError> {
-        let (link, joint) = (joint.link.clone(), joint.name.clone());
-        if self.mass_kg <= 0.0 {
-            return Err(UrdfError::NoInertial { link, joint, mass_kg: self.mass_kg });
+        let (link, joint, mass_kg) = (&joint.link, &joint.name, self.mass_kg);
+        if mass_kg <= 0.0 {
+            return Err(UrdfError(format!(
+                "link `{link}`, moved by joint `{joint}`, has no <inertial> with a positive mass: {mass_kg} kg"
+            )));
         }
         let moments: [f64; 3] = self.about_centre_kg_m2.symmetric_eigenvalues().into();
         if moments.iter().any(|&m| m <= 0.0) {
-            return Err(UrdfError::Inertia { link, moments });
+            return Err(UrdfError(format!(
+                "the inertia of link `{link}` has principal moments {moments:?} kg m2; all have to be positive"
+            )));
         }
         Ok(())
     }

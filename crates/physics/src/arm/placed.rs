@@ -12,48 +12,10 @@ const JOINTS: usize = 6;
 /// Smallest singular value of the Jacobian (metres or 1 per radian) of a pose from which the arm can pull.
 const SMALLEST_SINGULAR_VALUE: f64 = 0.02;
 
-/// A stance that an arm cannot take.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ArmError {
-    /// Too few or too many joints.
-    #[error("the arm `{arm}` has {joints} joints, {JOINTS} are needed")]
-    Joints {
-        /// Name of the arm.
-        arm: String,
-        /// How many joints it has.
-        joints: usize,
-    },
-    /// A joint beyond its limits.
-    #[error("joint `{joint}` stands at {angle_rad} rad, its limits are {lower_rad} to {upper_rad} rad")]
-    Limit {
-        /// The joint.
-        joint: String,
-        /// Its angle.
-        angle_rad: f64,
-        /// Lower limit.
-        lower_rad: f64,
-        /// Upper limit.
-        upper_rad: f64,
-    },
-    /// A number that is none, or negative where it must not be.
-    #[error("{what} is {value}")]
-    Number {
-        /// Which number.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// The arm cannot move in every direction.
-    #[error(
-        "the arm is singular in this stance: the smallest singular value of its Jacobian is {smallest:.4}, \
-         at least {SMALLEST_SINGULAR_VALUE} is needed"
-    )]
-    Singular {
-        /// Smallest singular value of the Jacobian at the grip centre.
-        smallest: f64,
-    },
-}
+/// Why an arm cannot take a stance.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ArmError(String);
 
 /// An arm in its stance, placed so that the grip centre is the origin of `world`, the tip's z axis (the approach)
 /// along +x and its y axis along +y, the jaw axis.
@@ -75,19 +37,23 @@ impl PlacedArm {
     pub fn new(model: ArmModel, stance: &RobotArm) -> Result<Self, ArmError> {
         let joints = model.joints.len();
         if joints != JOINTS {
-            return Err(ArmError::Joints { arm: model.name, joints });
+            let arm = model.name;
+            return Err(ArmError(format!("the arm `{arm}` has {joints} joints, {JOINTS} are needed")));
         }
         for (joint, &angle_rad) in model.joints.iter().zip(&stance.joints_rad) {
             let [lower_rad, upper_rad] = joint.limits_rad.unwrap_or([f64::MIN, f64::MAX]);
             if !(lower_rad..=upper_rad).contains(&angle_rad) {
-                return Err(ArmError::Limit { joint: joint.name.clone(), angle_rad, lower_rad, upper_rad });
+                return Err(ArmError(format!(
+                    "joint `{}` stands at {angle_rad} rad, its limits are {lower_rad} to {upper_rad} rad",
+                    joint.name
+                )));
             }
         }
         let numbers = std::iter::once(("tip_to_grip_m", stance.tip_to_grip_m))
             .chain(stance.rotor_inertia_kg_m2.iter().map(|&i| ("rotor_inertia_kg_m2", i)));
         for (what, value) in numbers {
             if !value.is_finite() || value < 0.0 {
-                return Err(ArmError::Number { what, value });
+                return Err(ArmError(format!("{what} is {value}")));
             }
         }
         let tip_from_grip =
@@ -99,7 +65,10 @@ impl PlacedArm {
         let placed = Self { model, stance: stance.clone(), world_from_base, world_from_links };
         let smallest = placed.jacobian().singular_values().min();
         if smallest < SMALLEST_SINGULAR_VALUE {
-            return Err(ArmError::Singular { smallest });
+            return Err(ArmError(format!(
+                "the arm is singular in this stance: the smallest singular value of its Jacobian is {smallest:.4}, \
+                 at least {SMALLEST_SINGULAR_VALUE} is needed"
+            )));
         }
         Ok(placed)
     }

@@ -1,7 +1,8 @@
 //! Labels as a function of what the jaws hold, over scatter and noise.
 
+use crate::{QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
+use gripgen_twin::label_moments::LabelRule;
 use gripgen_twin::predict::{PullModel, PullPrediction};
-use crate::{LabelRule, QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
 use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
 use gripgen_twin::{Backbone, Staircase};
 use std::sync::{Arc, OnceLock};
@@ -49,12 +50,12 @@ impl Scattered<'_> {
             backbone: self.backbone,
             creep: self.creep,
             rim: &self.rim,
-            rule: &self.rule,
+            decided_n: self.rule.decided_n(),
             sensor: &self.sensor,
             command: &self.command,
         };
         self.rig.slips(&run, limits_n, slips);
-        std::array::from_fn(|k| match slips[k].label(self.stuck, &self.rule) {
+        std::array::from_fn(|k| match self.rule.moments(slips[k].ticks(self.stuck)) {
             Some((mean, var)) => (mean, mean * mean + var),
             // A reading that was never near the command: the rule would fail, the reading at the slip stands in.
             None => {

@@ -3,7 +3,6 @@
 mod bend;
 mod slide;
 
-use super::label::LabelRule;
 use super::{QuasiStatic, SNAPSHOT_TICKS, StuckPull};
 use crate::force_loop::ForceLoop;
 use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
@@ -41,8 +40,8 @@ pub struct SlipRun<'a> {
     pub creep: Creep,
     /// The same over the share of the limit.
     pub rim: &'a RimTable,
-    /// How labels are read, and from where on they cannot change any more.
-    pub rule: &'a LabelRule,
+    /// How far a command is above the reading of a pull whose label cannot change any more: there it ends.
+    pub decided_n: f64,
     /// The sensor of `stuck`.
     pub sensor: &'a SensorChain,
     /// The commands of `stuck`.
@@ -255,7 +254,7 @@ impl QuasiStatic {
         if creep_m > 0.0 && slipping.bent.is_some() {
             slipping.crept_m += creep_m * run.rim.at(contact_n / slipping.limit_n);
         }
-        let decided = slipping.bent.is_none() && desired_n - reading_n > run.rule.decided_n();
+        let decided = slipping.bent.is_none() && desired_n - reading_n > run.decided_n;
         if pull.displacement_m > self.stop_m || decided {
             return false;
         }
@@ -282,11 +281,11 @@ impl QuasiStatic {
 }
 
 impl SlipPull {
-    /// Mean and variance of the label of this pull whose readings carry white noise.
-    pub fn label(&self, stuck: &StuckPull, rule: &LabelRule) -> Option<(f64, f64)> {
+    /// Command and noise-free reading at all ticks of this pull, in order; `stuck` is that of a tool that holds.
+    pub fn ticks<'a>(&'a self, stuck: &'a StuckPull) -> impl DoubleEndedIterator<Item = (&'a f64, &'a f64)> {
         let held = self.slip_tick.min(stuck.desired_n.len());
         let before = stuck.desired_n[..held].iter().zip(&stuck.reading_n[..held]);
-        rule.moments(before.chain(self.desired_n.iter().zip(&self.reading_n)))
+        before.chain(self.desired_n.iter().zip(&self.reading_n))
     }
 }
 
@@ -294,21 +293,16 @@ impl SlipPull {
 mod tests {
     use super::*;
     use gripgen_twin::Robot;
-    use gripgen_twin::config::{Feedback, Twist};
+    use gripgen_twin::config::Feedback;
     use gripgen_twin::effects::find;
 
     /// A light arm on soft gels.
     pub(super) fn rig(feedback: Feedback) -> QuasiStatic {
         let robot = Robot {
-            moving_mass_kg: 8.0,
-            apparent_mass_kg: None,
-            lag_s: 0.05,
             dead_time_s: 0.0131,
             damping_n_s_per_m: 400.0,
             speed_limit_m_per_s: 0.1,
-            feedback,
-            twist: Twist::Stiff,
-            twist_stiffness_n_m_per_rad: None,
+            ..crate::tests::robot(feedback)
         };
         QuasiStatic {
             robot,
@@ -340,7 +334,7 @@ mod tests {
                     backbone: &backbone,
                     creep: Creep::default(),
                     rim: &RimTable::new(Creep::default()),
-                    rule: &LabelRule::new(3.0, 0.2),
+                    decided_n: 4.0,
                     sensor: &sensor,
                     command: &command,
                 };

@@ -1,9 +1,12 @@
 //! Images of a row: decoding them, and the noise that they may be stored without.
 
 use crate::picture::decode_png_into;
+use crate::proto::foxglove::{CompressedImage, RawImage};
+use crate::proto::gripgen_v1::Sample;
 use crate::reader::{ReadError, ShardReader, noise_apart};
 use gripgen_twin::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, PerJaw};
+use prost::Message;
 
 /// Which noise images are read with that are stored without it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,12 +40,10 @@ impl ShardReader {
         index: u64,
         sample: &[u8],
     ) -> Result<PerJaw<Option<PixelNoise>>, ReadError> {
-        use prost::Message;
         if !self.has_clean_images() {
             return Ok(PerJaw { left: None, right: None });
         }
-        let sample = crate::proto::gripgen_v1::Sample::decode(sample)
-            .map_err(|e| self.damaged(index, "/sample", &e.to_string()))?;
+        let sample = Sample::decode(sample).map_err(|e| self.damaged(index, "/sample", &e.to_string()))?;
         Ok(PerJaw::from_fn(|jaw| noise_apart(&sample, jaw)))
     }
 
@@ -59,8 +60,6 @@ impl ShardReader {
         kind: &str,
         both: &PerJaw<Vec<u8>>,
     ) -> Result<[Vec<u8>; 2], ReadError> {
-        use crate::proto::foxglove::CompressedImage;
-        use prost::Message;
         let png = |jaw: Jaw| {
             let image = CompressedImage::decode(&both[jaw][..]);
             image
@@ -80,8 +79,6 @@ impl ShardReader {
         wanted: (u32, u32),
         out: &mut [u8],
     ) -> Result<Result<(), (u32, u32)>, ReadError> {
-        use crate::proto::foxglove::{CompressedImage, RawImage};
-        use prost::Message;
         let damaged = |problem: String| self.damaged(index, &format!("/tactile/{jaw}"), &problem);
         if raw {
             let image = RawImage::decode(message).map_err(|e| damaged(e.to_string()))?;

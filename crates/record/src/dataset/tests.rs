@@ -24,10 +24,11 @@ fn measured_pulls_are_rows_like_samples() {
     assert_eq!(found.table().numbers("max_pull_force_n").unwrap(), [6.5, 9.25]);
     assert_eq!(found.table().words("operator").unwrap(), ["ann", ""]);
     let mut out = vec![0; 48];
-    found.images_into(0, &mut out).unwrap();
+    found.images_with(0, NoiseMode::Stored, &mut out).unwrap();
     assert!(out[..24].iter().all(|&v| v == 7) && out[24..].iter().all(|&v| v == 9));
-    assert!(found.images_into(1, &mut out).unwrap_err().to_string().contains("row 1 has no images"));
-    assert!(found.images_into(2, &mut out).unwrap_err().to_string().contains("no row 2, it has 2"));
+    let mut images = |row| found.images_with(row, NoiseMode::Stored, &mut out).unwrap_err();
+    assert!(images(1).to_string().contains("row 1 has no images"));
+    assert!(images(2).to_string().contains("no row 2, it has 2"));
 }
 
 #[test]

@@ -83,9 +83,11 @@ pub(super) fn json<T: Serialize>(value: &T) -> Vec<u8> {
 }
 
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<RunInfo, FolderError> {
-    let info: RunInfo =
-        serde_json::from_slice(bytes).map_err(|source| FolderError::Json { path: path.into(), source })?;
     let invalid = |problem: String| Err(FolderError::Invalid { path: path.into(), problem });
+    let info: RunInfo = match serde_json::from_slice(bytes) {
+        Ok(info) => info,
+        Err(e) => return invalid(e.to_string()),
+    };
     if info.schema != RUN_SCHEMA {
         return invalid(format!("its schema is `{}`, this gripgen reads `{RUN_SCHEMA}`", info.schema));
     }

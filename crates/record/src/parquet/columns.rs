@@ -2,7 +2,7 @@
 
 use gripgen_twin::{PullTrace, Values};
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
-use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int64Type};
+use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::writer::SerializedRowGroupWriter;
 use parquet::schema::types::{Type, TypePtr};
@@ -127,8 +127,30 @@ pub(crate) fn huggingface(fields: &[Field]) -> String {
 /// Where columns of a row group go.
 pub(crate) type Group<'a, W> = SerializedRowGroupWriter<'a, W>;
 
-fn lacks_a_column() -> ParquetError {
-    ParquetError::General("the schema has fewer columns than the table".into())
+/// Writes the next column: what is there, and the levels that say of which rows it is.
+fn write<W: Write + Send, T: DataType>(
+    group: &mut Group<'_, W>,
+    there: &[T::T],
+    defined: &[i16],
+    repeated: Option<&[i16]>,
+) -> Result<(), ParquetError> {
+    let lacking = || ParquetError::General("the schema has fewer columns than the table".into());
+    let mut column = group.next_column()?.ok_or_else(lacking)?;
+    column.typed::<T>().write_batch(there, Some(defined), repeated)?;
+    column.close()
+}
+
+/// Values of which some are not there.
+fn write_some<W: Write + Send, T: DataType>(
+    group: &mut Group<'_, W>,
+    values: impl Iterator<Item = Option<T::T>>,
+) -> Result<(), ParquetError> {
+    let (mut levels, mut there) = (Vec::new(), Vec::new());
+    for value in values {
+        levels.push(i16::from(value.is_some()));
+        there.extend(value);
+    }
+    write::<W, T>(group, &there, &levels, None)
 }
 
 /// Numbers; what is none is null.
@@ -136,12 +158,7 @@ pub(crate) fn write_numbers<W: Write + Send>(
     group: &mut Group<'_, W>,
     values: impl Iterator<Item = f64>,
 ) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    let values: Vec<f64> = values.collect();
-    let levels: Vec<i16> = values.iter().map(|x| i16::from(!x.is_nan())).collect();
-    let there: Vec<f64> = values.into_iter().filter(|x| !x.is_nan()).collect();
-    column.typed::<DoubleType>().write_batch(&there, Some(&levels), None)?;
-    column.close()
+    write_some::<W, DoubleType>(group, values.map(|x| Some(x).filter(|x| !x.is_nan())))
 }
 
 /// Numbers, all of them there, whatever they are.
@@ -149,10 +166,7 @@ pub(crate) fn write_all_numbers<W: Write + Send>(
     group: &mut Group<'_, W>,
     values: impl Iterator<Item = f64>,
 ) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    let values: Vec<f64> = values.collect();
-    column.typed::<DoubleType>().write_batch(&values, Some(&vec![1; values.len()]), None)?;
-    column.close()
+    write_some::<W, DoubleType>(group, values.map(Some))
 }
 
 /// The same of 32 bits.
@@ -160,10 +174,7 @@ pub(crate) fn write_small<W: Write + Send>(
     group: &mut Group<'_, W>,
     values: impl Iterator<Item = f32>,
 ) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    let values: Vec<f32> = values.collect();
-    column.typed::<FloatType>().write_batch(&values, Some(&vec![1; values.len()]), None)?;
-    column.close()
+    write_some::<W, FloatType>(group, values.map(Some))
 }
 
 /// Whole numbers; what is no number is null.
@@ -171,12 +182,7 @@ pub(crate) fn write_whole<W: Write + Send>(
     group: &mut Group<'_, W>,
     values: impl Iterator<Item = f64>,
 ) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    let values: Vec<f64> = values.collect();
-    let levels: Vec<i16> = values.iter().map(|x| i16::from(!x.is_nan())).collect();
-    let there: Vec<i64> = values.into_iter().filter(|x| !x.is_nan()).map(|x| x as i64).collect();
-    column.typed::<Int64Type>().write_batch(&there, Some(&levels), None)?;
-    column.close()
+    write_some::<W, Int64Type>(group, values.map(|x| Some(x).filter(|x| !x.is_nan()).map(|x| x as i64)))
 }
 
 /// Rows of a column of a table.
@@ -205,12 +211,8 @@ pub(crate) fn write_images<W: Write + Send>(
     let there: Vec<bool> = images.iter().map(Option::is_some).collect();
     let bytes: Vec<ByteArray> = images.into_iter().flatten().map(ByteArray::from).collect();
     let levels = |full: i16| there.iter().map(|there| if *there { full } else { 0 }).collect::<Vec<i16>>();
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    column.typed::<ByteArrayType>().write_batch(&bytes, Some(&levels(2)), None)?;
-    column.close()?;
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    column.typed::<ByteArrayType>().write_batch(&[], Some(&levels(1)), None)?;
-    column.close()
+    write::<W, ByteArrayType>(group, &bytes, &levels(2), None)?;
+    write::<W, ByteArrayType>(group, &[], &levels(1), None)
 }
 
 /// The four columns of traces.
@@ -238,11 +240,9 @@ pub(crate) fn write_word_lists<W: Write + Send>(
     group: &mut Group<'_, W>,
     words: &[&str],
 ) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
     let there: Vec<ByteArray> = words.iter().map(|word| ByteArray::from(word.as_bytes().to_vec())).collect();
     let (defined, repeated) = (vec![2; there.len()], vec![0; there.len()]);
-    column.typed::<ByteArrayType>().write_batch(&there, Some(&defined), Some(&repeated))?;
-    column.close()
+    write::<W, ByteArrayType>(group, &there, &defined, Some(&repeated))
 }
 
 /// Bytes or words; `None` is null.
@@ -250,14 +250,7 @@ pub(crate) fn write_bytes<W: Write + Send>(
     group: &mut Group<'_, W>,
     values: impl Iterator<Item = Option<Vec<u8>>>,
 ) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
-    let (mut levels, mut there) = (Vec::new(), Vec::new());
-    for value in values {
-        levels.push(i16::from(value.is_some()));
-        there.extend(value.map(ByteArray::from));
-    }
-    column.typed::<ByteArrayType>().write_batch(&there, Some(&levels), None)?;
-    column.close()
+    write_some::<W, ByteArrayType>(group, values.map(|bytes| bytes.map(ByteArray::from)))
 }
 
 /// Lists: level 0 is no list, 1 an empty one, 2 an element; elements after the first repeat at level 1.
@@ -265,7 +258,6 @@ pub(crate) fn write_lists<W: Write + Send>(
     group: &mut Group<'_, W>,
     lists: &[Option<Vec<f32>>],
 ) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(lacks_a_column)?;
     let (mut defined, mut repeated, mut there) = (Vec::new(), Vec::new(), Vec::new());
     for list in lists {
         match list {
@@ -281,6 +273,5 @@ pub(crate) fn write_lists<W: Write + Send>(
         }
         repeated.push(0);
     }
-    column.typed::<FloatType>().write_batch(&there, Some(&defined), Some(&repeated))?;
-    column.close()
+    write::<W, FloatType>(group, &there, &defined, Some(&repeated))
 }

@@ -62,8 +62,9 @@ impl ShardReader {
     /// All chunks of a sample.
     fn slot_of(&self, index: u64) -> Result<impl Iterator<Item = &ChunkIndex>, ReadError> {
         if !self.indices().contains(&index) {
-            let (first, end) = (self.first_sample, self.first_sample + self.samples);
-            return Err(ReadError::NoSample { path: self.path.clone(), sample: index, first, end });
+            let held = self.indices();
+            let problem = format!("sample {index} is not in this shard, it holds {held:?}");
+            return Err(ReadError::Content { path: self.path.clone(), problem });
         }
         let start = (index - self.first_sample) * self.slot_ns;
         // Chunks are written in the order of their samples.

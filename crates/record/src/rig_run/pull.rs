@@ -6,11 +6,10 @@ use crate::encode::{
     state_messages, timestamp, trace_message,
 };
 use crate::index::index_row;
-use crate::picture::PictureError;
 use crate::proto::gripgen_v1::{PullTrace as PullTraceMessage, Status};
-use crate::rig_log::{RigLog, RigLogError};
+use crate::rig_log::RigLog;
 use gripgen_twin::config::ImageStorage;
-use gripgen_twin::{Jaw, PerJaw, PullTrace, Scenario, SlipLabel, TactileImage};
+use gripgen_twin::{PerJaw, PullTrace, Scenario, SlipLabel, TactileImage};
 use prost::Message;
 
 /// How a measured pull ended.
@@ -62,67 +61,9 @@ pub struct RigPull {
     pub log: RigLog,
 }
 
-/// A pull that cannot be stored as it is.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RigPullError {
-    /// A label that is no number.
-    #[error("its label is {max_pull_force_n} N at {slip_time_s} s, both must be numbers")]
-    Label {
-        /// The force.
-        max_pull_force_n: f64,
-        /// The time.
-        slip_time_s: f64,
-    },
-    /// Columns of a trace that do not fit together.
-    #[error("its trace has columns of {rows:?} rows (time, desired force, measured force, displacement)")]
-    TraceRows {
-        /// Rows of each column.
-        rows: [usize; 4],
-    },
-    /// Times of a trace that do not rise.
-    #[error("row {row} of its trace is at {time_s} s, the row before at {before_s} s")]
-    TraceTime {
-        /// The row, counted from 0.
-        row: usize,
-        /// Its time.
-        time_s: f64,
-        /// The time of the row before; minus infinity for the first.
-        before_s: f64,
-    },
-    /// A frame of its film without a time.
-    #[error("frame {frame} of its film came at {received_s} s")]
-    FrameTime {
-        /// The frame, counted from 0.
-        frame: usize,
-        /// Its time.
-        received_s: f64,
-    },
-    /// An image whose bytes are not those of its size.
-    #[error("the image {what} of the {jaw} jaw is {width_px}x{height_px} pixels and has {bytes} bytes")]
-    Image {
-        /// `while gripped` or `at rest`.
-        what: &'static str,
-        /// The jaw.
-        jaw: Jaw,
-        /// Columns.
-        width_px: u32,
-        /// Rows.
-        height_px: u32,
-        /// Its bytes; three per pixel are needed.
-        bytes: usize,
-    },
-    /// The image cannot be coded.
-    #[error(transparent)]
-    Picture(#[from] PictureError),
-    /// The log.
-    #[error(transparent)]
-    Log(#[from] RigLogError),
-}
-
 impl RigPull {
-    /// The messages of its shard.
-    pub(super) fn encode(&self, extra_columns: &[String]) -> Result<EncodedSample, RigPullError> {
+    /// The messages of its shard, or what is wrong with it.
+    pub(super) fn encode(&self, extra_columns: &[String]) -> Result<EncodedSample, String> {
         self.check()?;
         let start = Some(timestamp(0));
         let mut message = scenario_message(&self.scenario, start);
@@ -146,7 +87,7 @@ impl RigPull {
             let png = |both: &PerJaw<TactileImage>| {
                 PerJaw::try_from_fn(|jaw| image_message(&both[jaw], jaw, ImageStorage::Png, start))
             };
-            both.as_ref().map(png).transpose()
+            both.as_ref().map(png).transpose().map_err(|e| e.to_string())
         };
         let trace = self.trace.as_ref();
         let (streams, events) = self.log.encode(start);
@@ -174,14 +115,16 @@ impl RigPull {
         (length_s.max(0.0).ceil() as u64 + 1).saturating_mul(1_000_000_000)
     }
 
-    fn check(&self) -> Result<(), RigPullError> {
+    fn check(&self) -> Result<(), String> {
         if let RigResult::Slipped { label }
         | RigResult::Censored { label }
         | RigResult::Suspect { label, .. } = &self.result
         {
             let SlipLabel { max_pull_force_n, slip_time_s, .. } = *label;
             if !(max_pull_force_n.is_finite() && slip_time_s.is_finite()) {
-                return Err(RigPullError::Label { max_pull_force_n, slip_time_s });
+                return Err(format!(
+                    "its label is {max_pull_force_n} N at {slip_time_s} s, both must be numbers"
+                ));
             }
         }
         for (what, images) in [("while gripped", &self.images), ("at rest", &self.rest)] {
@@ -189,31 +132,35 @@ impl RigPull {
                 let TactileImage { width_px, height_px, ref rgb } = *image;
                 let wanted = u64::from(width_px) * u64::from(height_px) * 3;
                 if rgb.len() as u64 != wanted {
-                    let bytes = rgb.len();
-                    return Err(RigPullError::Image { what, jaw, width_px, height_px, bytes });
+                    return Err(format!(
+                        "the image {what} of the {jaw} jaw is {width_px}x{height_px} pixels and has {} bytes",
+                        rgb.len()
+                    ));
                 }
             }
         }
         for (frame, both) in self.film.iter().flat_map(|film| film.frames.iter().enumerate()) {
             if let Some((_, bad)) = both.iter().find(|(_, one)| !one.received_s.is_finite()) {
-                return Err(RigPullError::FrameTime { frame, received_s: bad.received_s });
+                return Err(format!("frame {frame} of its film came at {} s", bad.received_s));
             }
         }
         self.trace.as_ref().map_or(Ok(()), check_trace)?;
-        Ok(self.log.check()?)
+        self.log.check()
     }
 }
 
-fn check_trace(t: &PullTrace) -> Result<(), RigPullError> {
+fn check_trace(t: &PullTrace) -> Result<(), String> {
     let columns = [&t.time_s, &t.desired_force_n, &t.measured_force_n, &t.displacement_m];
     let rows = columns.map(Vec::len);
     if rows.iter().any(|&n| n != rows[0]) {
-        return Err(RigPullError::TraceRows { rows });
+        return Err(format!(
+            "its trace has columns of {rows:?} rows (time, desired force, measured force, displacement)"
+        ));
     }
     let mut before_s = f64::NEG_INFINITY;
     for (row, &time_s) in t.time_s.iter().enumerate() {
         if !(time_s.is_finite() && time_s > before_s) {
-            return Err(RigPullError::TraceTime { row, time_s, before_s });
+            return Err(format!("row {row} of its trace is at {time_s} s, the row before at {before_s} s"));
         }
         before_s = time_s;
     }

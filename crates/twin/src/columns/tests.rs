@@ -1,19 +1,9 @@
 use super::*;
-use crate::{Covariates, PullSettings, Scenario, pull_keys, scenario_keys};
+use crate::{PullSettings, Scenario, pull_keys, scenario_keys};
 
 fn scenario() -> Scenario {
-    Scenario {
-        seed: 1,
-        index: 0,
-        group: 0,
-        repetition: 0,
-        part: String::new(),
-        grip_pose: 0,
-        grip_force_n: 0.0,
-        covariates: Covariates::default(),
-        pull: PullSettings { increment_n: 0.0, step_s: 0.0, ..Default::default() },
-        drawn: Default::default(),
-    }
+    let pull = PullSettings { increment_n: 0.0, step_s: 0.0, ..Default::default() };
+    Scenario { pull, ..Scenario::default() }
 }
 
 /// A cell that a column may hold, and no other column has by default.

@@ -111,12 +111,8 @@ fn named(place: &str, name: &str, argument: &toml::Value) -> Result<Distribution
             .hint("the calibrated uncertainty of the key is from = \"interval\"; twin = { from = \"posterior\" } draws all keys together")),
         other => {
             let error = ConfigError::new(place, format!("there is no distribution `{other}`"));
-            Err(match suggestion(other, NAMES) {
-                Some(close) => error.hint(format!("did you mean `{close}`?")),
-                None => {
-                    error.hint("write a list of values, uniform, normal, log_uniform or from = \"interval\"")
-                }
-            })
+            let known = "write a list of values, uniform, normal, log_uniform or from = \"interval\"";
+            Err(error.suggest(other, NAMES, || known.into()))
         }
     }
 }

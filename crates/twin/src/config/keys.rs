@@ -4,7 +4,7 @@
 //! (`effects.load_offset.a`), followed by its `part` where the name alone is not unique
 //! (`effects.load_offset.gear.a`). Names with dots or brackets in them cannot be reached.
 
-use super::{ConfigError, suggestion};
+use super::ConfigError;
 
 /// The sections that fall back to the shipped baseline twin, key by key.
 pub const DEFAULTED_SECTIONS: &[&str] = &["robot", "gripper", "wrist", "gel", "optics"];
@@ -60,11 +60,7 @@ pub(crate) fn check_part(table: &toml::Table, key: &str) -> Result<(), ConfigErr
     if parts.contains_key(*part) {
         return Ok(());
     }
-    let error = ConfigError::new(key, format!("the twin has no part `{part}`"));
-    Err(match suggestion(part, parts.keys().map(String::as_str)) {
-        Some(name) => error.hint(format!("did you mean `{name}`?")),
-        None => error.hint(format!("its parts: {}", parts.keys().cloned().collect::<Vec<_>>().join(", "))),
-    })
+    Err(ConfigError::unknown_part(key, part, parts.keys()))
 }
 
 /// Puts `value` at a dotted key, making tables on the way; returns the key as the document records places.
@@ -133,11 +129,10 @@ fn element(items: &[toml::Value], segments: &[&str], key: &str) -> Result<(usize
         [] => {
             let known: Vec<String> = items.iter().map(|item| text(item, "name")).collect();
             let error = ConfigError::new(key, format!("there is no `{}` in the list", segments[0]));
-            Err(match suggestion(segments[0], known.iter().map(String::as_str)) {
-                Some(name) => error.hint(format!("did you mean `{name}`?")),
-                None if known.is_empty() => error.hint("the list is empty"),
-                None => error.hint(format!("the list has: {}", known.join(", "))),
-            })
+            Err(error.suggest(segments[0], known.iter().map(String::as_str), || match known.is_empty() {
+                true => "the list is empty".into(),
+                false => format!("the list has: {}", known.join(", ")),
+            }))
         }
         [only] if segments.get(1).is_none_or(|part| text(&items[only], "part") != *part) => Ok((only, 1)),
         _ => {

@@ -1,7 +1,6 @@
 //! Friction that depends on the direction of the pull on the part.
 
-use super::hooks::values;
-use super::{EffectSpec, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `anisotropy`: a ground, turned or toothed surface has a lay; friction across it differs from friction along
 /// it, and is the same after half a turn.
@@ -12,20 +11,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 + amplitude cos(2 (grip_angle - axis_deg)))",
     source: "two-fold term of the angle; amplitude 0.05 to 0.3. Ma and Rodriguez 2018 on anisotropy in data",
     parameters: &[
-        ParameterSpec {
-            name: "amplitude",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 0.6),
-            about: "half of the relative difference between the two main directions",
-        },
-        ParameterSpec {
-            name: "axis_deg",
-            unit: "deg",
-            neutral: 0.0,
-            bounds: (-90.0, 90.0),
-            about: "grip angle of the highest friction",
-        },
+        parameter("amplitude", "1", 0.0, (0.0, 0.6))
+            .about("half of the relative difference between the two main directions"),
+        parameter("axis_deg", "deg", 0.0, (-90.0, 90.0)).about("grip angle of the highest friction"),
     ],
     covariates: &["grip_angle_deg"],
     friction: Some(friction),
@@ -35,13 +23,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "amplitude = 0.1: 10 % more than the mean along axis_deg, 10 % less at a right angle to it.",
     remedy: "Look for a lay of machining on the part or a weave of the gel's coating; keep the law in the twin.",
     typical: &[("amplitude", 0.15)],
-    pulls: Ok(PullFit {
-        fit: |_| {
-            let free = [("amplitude", 0.05), ("axis_deg", 10.0)];
-            Fit::over("axis_deg", &[-67.5, -22.5, 22.5, 67.5], ("amplitude", 0.08), &free)
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| {
+        let free = [("amplitude", 0.05), ("axis_deg", 10.0)];
+        Fit::over("axis_deg", &[-67.5, -22.5, 22.5, 67.5], ("amplitude", 0.08), &free)
+    })),
     ..EffectSpec::BARE
 };
 

@@ -1,7 +1,6 @@
 //! A soft pad whose friction force stops growing with the load.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `area_saturation`: once the pad is in full contact, more load brings no more area. The parameter is the
 /// inverse of the saturation force `F_s`, so that 0 means none; the friction force tends to `mu F_s`. How suddenly it
@@ -13,20 +12,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu / (1 + (saturation_per_n F_G)^sharpness)^(1 / sharpness)",
     source: "soft fingertips: Fujihira et al.; saturation force 50 to 200 N",
     parameters: &[
-        ParameterSpec {
-            name: "saturation_per_n",
-            unit: "1/N",
-            neutral: 0.0,
-            bounds: (0.0, 0.1),
-            about: "inverse of the grip force that friction behaves as if it had at most",
-        },
-        ParameterSpec {
-            name: "sharpness",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (1.0, 6.0),
-            about: "how suddenly it levels off",
-        },
+        parameter("saturation_per_n", "1/N", 0.0, (0.0, 0.1))
+            .about("inverse of the grip force that friction behaves as if it had at most"),
+        parameter("sharpness", "1", 1.0, (1.0, 6.0)).about("how suddenly it levels off"),
     ],
     covariates: &["grip_force_n"],
     references: &["sharpness"],
@@ -36,13 +24,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "Friction never exceeds what 1 / saturation_per_n would hold at the plain coefficient: 0.005 stands for 200 N, where half of that is held (sharpness 1).",
     remedy: "Keep the law in the twin. Gripping harder brings less and less.",
     typical: &[("saturation_per_n", 0.006)],
-    pulls: Ok(PullFit {
-        fit: |_| {
-            let free = [("saturation_per_n", 0.002)];
-            Fit::over("sharpness", &[1.0, 2.5], ("saturation_per_n", 0.004), &free).searching(1)
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| {
+        let free = [("saturation_per_n", 0.002)];
+        Fit::over("sharpness", &[1.0, 2.5], ("saturation_per_n", 0.004), &free).searching(1)
+    })),
     experiments: &[Experiment::WiderGripForces],
     ..EffectSpec::BARE
 };

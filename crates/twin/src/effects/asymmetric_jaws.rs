@@ -1,7 +1,6 @@
 //! Two gels that do not rub alike.
 
-use super::hooks::values;
-use super::{EffectSpec, GripPoint, Group, ParameterSpec};
+use super::{EffectSpec, GripPoint, Group, parameter, values};
 use crate::Jaw;
 
 /// `asymmetric_jaws`: the coefficient of one jaw is higher and that of the other lower by the same share; the
@@ -12,14 +11,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "friction coefficients that differ between the jaws",
     formula: "mu_left' = mu (1 + asymmetry), mu_right' = mu (1 - asymmetry)",
     source: "definition; 5 to 30 % between two gels",
-    parameters: &[ParameterSpec {
-        name: "asymmetry",
-        unit: "1",
-        neutral: 0.0,
-        bounds: (-0.6, 0.6),
-        about: "half of the relative difference, left minus right",
-    }],
-    covariates: &[],
+    parameters: &[parameter("asymmetry", "1", 0.0, (-0.6, 0.6))
+        .about("half of the relative difference, left minus right")],
     friction: Some(friction),
     plainly: "The two gels do not hold the same.",
     number_means: "asymmetry = 0.1: the left jaw has a coefficient 10 % above the mean, the right one 10 % below it.",

@@ -1,7 +1,6 @@
 //! A background that is another one from one pull on.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter, values};
 use crate::OpticsState;
 use crate::optics::{BACKGROUND_TERMS, FINER_TERMS};
 
@@ -67,17 +66,12 @@ const PARAMETERS: [ParameterSpec; SIZES + 1] = {
     all
 };
 
-const AT_PULL_INDEX: ParameterSpec = ParameterSpec {
-    name: "at_pull_index",
-    unit: "1",
-    neutral: 0.0,
-    bounds: (0.0, 1e7),
-    about: "first pull with it",
-};
+const AT_PULL_INDEX: ParameterSpec =
+    parameter("at_pull_index", "1", 0.0, (0.0, 1e7)).about("first pull with it");
 
 const fn term(name: &'static str) -> ParameterSpec {
     let about = "coefficient of one term of one channel";
-    ParameterSpec { name, unit: "grey levels", neutral: 0.0, bounds: (-60.0, 60.0), about }
+    parameter(name, "grey levels", 0.0, (-60.0, 60.0)).about(about)
 }
 
 fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {

@@ -1,7 +1,6 @@
 //! A part that is not the one of the mesh.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `cad_mismatch`: the real part's outlines (of teeth, rings, ends) lie outside those of its mesh, and its convex edges
@@ -14,22 +13,11 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "z' = max of min(z, z * N(0, blunting_mm)) within offset_mm, at one volume; z = gel surface",
     source: "reworked edges, other teeth and rings, 0.05 to 0.5 mm (Wucherer et al. 2023); dilation: Serra 1982",
     parameters: &[
-        ParameterSpec {
-            name: "offset_mm",
-            unit: "mm",
-            neutral: 0.0,
-            bounds: (-0.6, 0.6),
-            about: "how far outlines lie outside those of the mesh",
-        },
-        ParameterSpec {
-            name: "blunting_mm",
-            unit: "mm",
-            neutral: 0.0,
-            bounds: (0.0, 1.0),
-            about: "standard deviation of the smoothing of convex edges",
-        },
+        parameter("offset_mm", "mm", 0.0, (-0.6, 0.6))
+            .about("how far outlines lie outside those of the mesh"),
+        parameter("blunting_mm", "mm", 0.0, (0.0, 1.0))
+            .about("standard deviation of the smoothing of convex edges"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 2,
     plainly: "The part is not its drawing: outlines stand elsewhere, edges are blunter.",

@@ -1,7 +1,6 @@
 //! Shadows that the gel around a contact throws.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `cast_shadow`: a channel's light, which comes from the side towards which its colour model is brightest, does not
@@ -14,22 +13,11 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "I_c' = I_c - strength I_c,rest s(max over d of (z(x + d l_c) - z(x)) / (d tan(elevation_deg)))",
     source: "horizon mapping, Max 1988; lights of GelSight sensors stand low: shadows of -10 to -75 grey levels in Taxim",
     parameters: &[
-        ParameterSpec {
-            name: "strength",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (-0.5, 1.0),
-            about: "share of a channel's brightness that is missing in a full shadow",
-        },
-        ParameterSpec {
-            name: "elevation_deg",
-            unit: "deg",
-            neutral: 30.0,
-            bounds: (5.0, 60.0),
-            about: "height of the lights above the gel; lower ones throw longer shadows",
-        },
+        parameter("strength", "1", 0.0, (-0.5, 1.0))
+            .about("share of a channel's brightness that is missing in a full shadow"),
+        parameter("elevation_deg", "deg", 30.0, (5.0, 60.0))
+            .about("height of the lights above the gel; lower ones throw longer shadows"),
     ],
-    covariates: &[],
     optics: Some(optics),
     plainly: "Contacts throw shadows away from the lights that the twin does not draw.",
     number_means: "strength = 0.1: in a full shadow 10 % of the light's brightness are missing.",
@@ -55,15 +43,12 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn without_strength_the_elevation_says_nothing() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[0.0, 10.0], &mut state, &grip(&c, 40.0));
-        assert_eq!(state, OpticsState::default());
-        optics(&[0.3, 10.0], &mut state, &grip(&c, 40.0));
+        assert_eq!(optics_after(optics, &[&[0.0, 10.0]]), OpticsState::default());
+        let state = optics_after(optics, &[&[0.0, 10.0], &[0.3, 10.0]]);
         assert_eq!((state.shadow_strength, state.light_elevation_rad), (0.3, 10f64.to_radians()));
     }
 }

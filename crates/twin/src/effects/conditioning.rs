@@ -1,7 +1,6 @@
 //! A new gel that takes a few cycles to settle.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 use crate::PULLS_SINCE_REST;
 use crate::draw::Drawn;
 
@@ -15,27 +14,11 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 - depth exp(-n / n0)), n = (1 - rests) pull_index + rests pulls_since_rest",
     source: "Mullins softening, 5 to 30 % in the first cycle, over in 3 to 10",
     parameters: &[
-        ParameterSpec {
-            name: "depth",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (-0.6, 0.6),
-            about: "share of the settled coefficient that the first pull lacks",
-        },
-        ParameterSpec {
-            name: "n0",
-            unit: "1",
-            neutral: 5.0,
-            bounds: (0.5, 100.0),
-            about: "pulls after which 63 % of that are there",
-        },
-        ParameterSpec {
-            name: "rests",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 1.0),
-            about: "1 where every rest starts it anew, 0 where it happens once in the life of a gel",
-        },
+        parameter("depth", "1", 0.0, (-0.6, 0.6))
+            .about("share of the settled coefficient that the first pull lacks"),
+        parameter("n0", "1", 5.0, (0.5, 100.0)).about("pulls after which 63 % of that are there"),
+        parameter("rests", "1", 0.0, (0.0, 1.0))
+            .about("1 where every rest starts it anew, 0 where it happens once in the life of a gel"),
     ],
     covariates: &["pull_index"],
     references: &["rests"],

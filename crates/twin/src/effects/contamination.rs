@@ -1,7 +1,6 @@
 //! Oil, dust or wear particles between part and gel, from one pull on.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `contamination`: the coefficient steps at a pull. A negative drop is a cleaning.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -11,20 +10,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 - drop) from pull at_pull_index on",
     source: "third bodies take 10 to 60 % of the friction, until they are cleaned off",
     parameters: &[
-        ParameterSpec {
-            name: "drop",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (-1.5, 0.9),
-            about: "share of the coefficient that is lost",
-        },
-        ParameterSpec {
-            name: "at_pull_index",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 1e7),
-            about: "first pull with it",
-        },
+        parameter("drop", "1", 0.0, (-1.5, 0.9)).about("share of the coefficient that is lost"),
+        parameter("at_pull_index", "1", 0.0, (0.0, 1e7)).about("first pull with it"),
     ],
     covariates: &["pull_index"],
     friction: Some(friction),
@@ -32,10 +19,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "drop = 0.2: 20 % of the coefficient are lost from pull at_pull_index on.",
     remedy: "Look up what happened before that pull (oil, dust, a touched part); clean gel and part, and repeat a few of the pulls before it.",
     typical: &[("drop", 0.2), ("at_pull_index", 150.0)],
-    pulls: Ok(PullFit {
-        fit: |span| Fit::over("at_pull_index", &span.splits, ("drop", 0.0), &[("drop", 0.05)]).searching(1),
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|span| {
+        Fit::over("at_pull_index", &span.splits, ("drop", 0.0), &[("drop", 0.05)]).searching(1)
+    })),
     experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,6 @@
 //! A force loop that settles at a multiple of its command.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, Visible};
+use super::{EffectSpec, Experiment, Fit, Group, PullFit, Visible, parameter, values};
 
 /// `controller_gain`: the loop follows a share of the desired force.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -10,20 +9,14 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "factor on the force that the force loop goes for",
     formula: "F_cmd = gain F_des",
     source: "UR5e set to 10 N gave 8.95 to 13.26 N over its workspace (Trochimczuk et al. 2026)",
-    parameters: &[ParameterSpec {
-        name: "gain",
-        unit: "1",
-        neutral: 1.0,
-        bounds: (0.5, 1.5),
-        about: "settled over desired force",
-    }],
+    parameters: &[parameter("gain", "1", 1.0, (0.5, 1.5)).about("settled over desired force")],
     command: Some(command),
     visible: Visible::From(0.02),
     plainly: "The robot goes for a force that is the same share above or below the one it was told.",
     number_means: "gain = 0.95: where 100 N were asked for the robot pulls with 95 N.",
     remedy: "Compare the commanded with the measured force of a part that holds; check the payload and the force mode's damping.",
     typical: &[("gain", 0.95)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]))),
     experiments: &[Experiment::KnownMasses],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,6 @@
 //! A force loop that lets small errors be.
 
-use super::hooks::values;
-use super::{EffectSpec, Fit, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Fit, Group, PullFit, parameter, values};
 
 /// `deadband`: closer than the band to what it measures, the loop takes the measured force as its command and
 /// so sees no error.
@@ -11,13 +10,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "force loop that ignores errors inside a band",
     formula: "F_cmd = F_measured where abs(F_des - F_measured) < width_n, else F_des",
     source: "dead band of force controllers, 0.5 to 3 N",
-    parameters: &[ParameterSpec {
-        name: "width_n",
-        unit: "N",
-        neutral: 0.0,
-        bounds: (0.0, 5.0),
-        about: "largest error that is ignored, on each side",
-    }],
+    parameters: &[
+        parameter("width_n", "N", 0.0, (0.0, 5.0)).about("largest error that is ignored, on each side")
+    ],
     command: Some(command),
     plainly: "The robot's force loop does nothing about small errors of the force.",
     number_means: "width_n = 1: an error of up to 1 N stays as it is.",

@@ -1,7 +1,6 @@
 //! A camera that is out of focus.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `defocus`: a Gaussian blur of what the contact changes in the image. The rest frame is smooth and was taken with the
@@ -12,14 +11,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "blur of the contact in the image",
     formula: "dI' = dI * N(0, sigma_mm)",
     source: "Gaussian point spread function; sigma up to 3 px",
-    parameters: &[ParameterSpec {
-        name: "sigma_mm",
-        unit: "mm",
-        neutral: 0.0,
-        bounds: (0.0, 0.6),
-        about: "standard deviation of the point spread function, on the gel",
-    }],
-    covariates: &[],
+    parameters: &[parameter("sigma_mm", "mm", 0.0, (0.0, 0.6))
+        .about("standard deviation of the point spread function, on the gel")],
     optics: Some(optics),
     plainly: "Contacts look blurred: the camera is out of focus.",
     number_means: "sigma_mm = 0.1: a point on the gel is smeared over about 0.2 mm.",
@@ -40,14 +33,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn variances_of_two_blurs_add() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[0.3], &mut state, &grip(&c, 40.0));
-        optics(&[0.4], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[0.3], &[0.4]]);
         assert!((state.defocus_m - 5e-4).abs() < 1e-18);
     }
 }

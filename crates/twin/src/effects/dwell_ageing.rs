@@ -1,7 +1,6 @@
 //! Static friction that grows while the contact rests.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `dwell_ageing`: the real contact area creeps up with the logarithm of the time under load.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -11,20 +10,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 + beta ln(1 + t_dwell / t0_s))",
     source: "static ageing: 0.01 to 0.05 per e-fold of solids, up to 0.1 of polymers; Farain and Bonn",
     parameters: &[
-        ParameterSpec {
-            name: "beta",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 0.2),
-            about: "relative growth of the coefficient for e times the dwell",
-        },
-        ParameterSpec {
-            name: "t0_s",
-            unit: "s",
-            neutral: 1.0,
-            bounds: (0.001, 1000.0),
-            about: "dwell from which on it grows with the logarithm",
-        },
+        parameter("beta", "1", 0.0, (0.0, 0.2))
+            .about("relative growth of the coefficient for e times the dwell"),
+        parameter("t0_s", "s", 1.0, (0.001, 1000.0)).about("dwell from which on it grows with the logarithm"),
     ],
     references: &["t0_s"],
     covariates: &["dwell_s"],
@@ -34,7 +22,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "beta = 0.02: ten times the dwell has a coefficient about 4.6 % higher.",
     remedy: "Wait equally long before every pull, or keep the law in the twin.",
     typical: &[("beta", 0.03)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("beta", 0.01)]], &[("beta", 0.01)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("beta", 0.01)]], &[("beta", 0.01)]))),
     experiments: &[Experiment::DwellTimes],
     ..EffectSpec::BARE
 };

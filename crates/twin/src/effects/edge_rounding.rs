@@ -1,7 +1,6 @@
 //! A part whose edges are round where its mesh has sharp ones.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, PressNeeds};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, PressNeeds, parameter, values};
 use crate::OpticsState;
 
 /// `edge_rounding`: the convex edges of the real part have a radius. The image shows the rounded part; forces and friction
@@ -12,14 +11,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "radius of the part's convex edges",
     formula: "z' = opening of z by a ball of radius_mm; z = surface of the part before it is pressed in",
     source: "rims of printed parts lie 0.15 to 0.25 mm inside their mesh in GelSight images (Chen et al. 2022, its published presses); opening: Serra 1982",
-    parameters: &[ParameterSpec {
-        name: "radius_mm",
-        unit: "mm",
-        neutral: 0.0,
-        bounds: (0.0, 1.0),
-        about: "radius of the ball that just fits into each edge from inside",
-    }],
-    covariates: &[],
+    parameters: &[parameter("radius_mm", "mm", 0.0, (0.0, 1.0))
+        .about("radius of the ball that just fits into each edge from inside")],
     optics: Some(optics),
     plainly: "The part's edges are rounder than in its drawing.",
     number_means: "radius_mm = 0.2: edges have a radius of 0.2 mm.",
@@ -44,15 +37,10 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn the_larger_radius_counts() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        for radius_mm in [0.1, 0.3, 0.2] {
-            optics(&[radius_mm], &mut state, &grip(&c, 40.0));
-        }
-        assert_eq!(state.edge_rounding_m, 0.3e-3);
+        assert_eq!(optics_after(optics, &[&[0.1], &[0.3], &[0.2]]).edge_rounding_m, 0.3e-3);
     }
 }

@@ -1,7 +1,5 @@
 //! Experiments that tell effects apart.
 
-use super::find;
-
 /// What a campaign consists of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measured {
@@ -122,22 +120,4 @@ impl Experiment {
             }
         }
     }
-
-    /// Whether it is of use for some suspects: it shows one of them, and leaves another one alone where it has such a side.
-    fn separates(self, suspects: &[&str]) -> bool {
-        let specs = || suspects.iter().filter_map(|id| find(id));
-        let two_sided = super::LIBRARY.iter().any(|s| s.not_shown_by.contains(&self));
-        specs().any(|s| s.experiments.contains(&self))
-            && (!two_sided || specs().any(|s| s.not_shown_by.contains(&self)))
-    }
-}
-
-/// Experiments with `measured` that tell some suspects apart, by their ids; names that are no effects say nothing.
-pub fn separating(measured: Measured, suspects: &[&str]) -> Vec<Experiment> {
-    let mut all: Vec<Experiment> =
-        super::LIBRARY.iter().flat_map(|s| s.experiments).copied().filter(|e| e.of() == measured).collect();
-    all.sort_unstable();
-    all.dedup();
-    all.retain(|e| e.separates(suspects));
-    all
 }

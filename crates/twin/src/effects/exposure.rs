@@ -1,7 +1,6 @@
 //! A camera with another exposure or response.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `exposure`: gain and gamma of the camera, the same for all channels, with and without contact. Two of them one after
@@ -13,22 +12,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "I' = 255 (gain I / 255)^gamma",
     source: "power law of camera responses; gamma 0.8 to 1.2",
     parameters: &[
-        ParameterSpec {
-            name: "gain",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (0.3, 3.0),
-            about: "exposure over that of the sensor file",
-        },
-        ParameterSpec {
-            name: "gamma",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (0.4, 2.5),
-            about: "exponent of the response",
-        },
+        parameter("gain", "1", 1.0, (0.3, 3.0)).about("exposure over that of the sensor file"),
+        parameter("gamma", "1", 1.0, (0.4, 2.5)).about("exponent of the response"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 2,
     plainly: "The camera's exposure or its curve is another one.",
@@ -51,19 +37,13 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn two_cameras_in_a_row_are_one() {
-        let c = Covariates::default();
-        let of = |list: &[[f64; 2]]| {
-            let mut state = OpticsState::default();
-            list.iter().for_each(|p| optics(p, &mut state, &grip(&c, 40.0)));
-            state
-        };
+        let of = |list: &[&[f64]]| optics_after(optics, list);
         let seen = |s: &OpticsState, i: f64| 255.0 * (s.exposure_gain * i / 255.0).powf(s.gamma);
-        let (first, second, both) = (of(&[[0.9, 1.2]]), of(&[[1.3, 0.8]]), of(&[[0.9, 1.2], [1.3, 0.8]]));
+        let (first, second, both) = (of(&[&[0.9, 1.2]]), of(&[&[1.3, 0.8]]), of(&[&[0.9, 1.2], &[1.3, 0.8]]));
         for level in [3.0, 90.0, 200.0] {
             assert!((seen(&both, level) - seen(&second, seen(&first, level))).abs() < 1e-9);
         }

@@ -95,6 +95,11 @@ impl PullFit {
         bounds: |_, _, library| library,
         flat_at_neutral: false,
     };
+
+    /// This fit, of an effect of which all else is plain.
+    pub(super) const fn of(fit: fn(&PullSpan<'_>) -> Fit) -> Self {
+        Self { fit, ..Self::PLAIN }
+    }
 }
 
 /// What the fits need to know of a table of a force sensor beside a reference.

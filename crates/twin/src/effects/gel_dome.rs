@@ -1,7 +1,6 @@
 //! A gel that is more or less domed than its sensor file says.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `gel_dome`: a paraboloid is added to the gel's shape at rest. The imprint has the same volume on another surface: a
@@ -12,14 +11,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "sag of the gel at the corners of the image",
     formula: "z_rest' = z_rest - sag_mm r^2 / r_corner^2, towards the part",
     source: "GelSight gels are domed: 1.4 mm in Taxim's gel map (Si and Yuan 2022); paraboloid for the cap is ours",
-    parameters: &[ParameterSpec {
-        name: "sag_mm",
-        unit: "mm",
-        neutral: 0.0,
-        bounds: (-2.0, 3.0),
-        about: "how much deeper the corners lie below the apex",
-    }],
-    covariates: &[],
+    parameters: &[
+        parameter("sag_mm", "mm", 0.0, (-2.0, 3.0)).about("how much deeper the corners lie below the apex")
+    ],
     optics: Some(optics),
     plainly: "The gel is domed: it lies deeper at the corners than in the middle.",
     number_means: "sag_mm = 0.5: the corners lie 0.5 mm deeper than the sensor file says.",
@@ -38,14 +32,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn sags_add() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[1.0], &mut state, &grip(&c, 40.0));
-        optics(&[-0.5], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[1.0], &[-0.5]]);
         assert!((state.dome_sag_m - 0.5e-3).abs() < 1e-18 && state.changes_press());
     }
 }

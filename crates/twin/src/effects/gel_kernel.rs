@@ -1,7 +1,6 @@
 //! A gel that follows the part more or less closely than its kernels say.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `gel_kernel`: the sizes of the kernels that deform the gel around a contact, all by one factor. Between two odd
@@ -12,14 +11,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "smoothing length of the gel",
     formula: "k' = factor k for every kernel",
     source: "kernels that were not fitted to the gel are wrong by some 30 %; Si and Yuan 2022 on the kernels",
-    parameters: &[ParameterSpec {
-        name: "factor",
-        unit: "1",
-        neutral: 1.0,
-        bounds: (0.5, 2.0),
-        about: "true size of the kernels over that of the twin",
-    }],
-    covariates: &[],
+    parameters: &[
+        parameter("factor", "1", 1.0, (0.5, 2.0)).about("true size of the kernels over that of the twin")
+    ],
     optics: Some(optics),
     plainly: "The gel smooths a contact over a wider or narrower neighbourhood than the twin thinks.",
     number_means: "factor = 1.3: edges are smeared over a length 30 % larger.",
@@ -39,14 +33,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn factors_multiply() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[1.5], &mut state, &grip(&c, 40.0));
-        optics(&[0.5], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[1.5], &[0.5]]);
         assert_eq!(state.kernel_scale, 0.75);
     }
 }

@@ -1,7 +1,6 @@
 //! A gripper that does not bring its command to the jaws.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `grip_force_loss`: drive friction takes a constant force. A gain of the drive is no parameter: friction
 /// coefficient and imprint constant absorb it.
@@ -11,20 +10,14 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "normal force below the commanded grip force",
     formula: "F_N = max(0, F_G - loss_n)",
     source: "friction and resolution of parallel grippers, 1 to 5 N",
-    parameters: &[ParameterSpec {
-        name: "loss_n",
-        unit: "N",
-        neutral: 0.0,
-        bounds: (-10.0, 20.0),
-        about: "force per jaw that the drive takes",
-    }],
+    parameters: &[parameter("loss_n", "N", 0.0, (-10.0, 20.0)).about("force per jaw that the drive takes")],
     covariates: &["grip_force_n"],
     normal_force: Some(normal_force),
     plainly: "The jaws press less than the gripper was told to.",
     number_means: "loss_n = 2: of 20 N per jaw that were commanded 18 N arrive.",
     remedy: "Measure the grip force with a load cell between the jaws; grease or tare the drive.",
     typical: &[("loss_n", 2.0)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("loss_n", 0.0)]], &[("loss_n", 0.5)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("loss_n", 0.0)]], &[("loss_n", 0.5)]))),
     experiments: &[Experiment::GripForceWithALoadCell],
     ..EffectSpec::BARE
 };

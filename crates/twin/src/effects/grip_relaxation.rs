@@ -1,7 +1,6 @@
 //! A grip that loosens while it is held at constant width.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ImprintFit, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ImprintFit, PullFit, parameter, values};
 
 /// `grip_relaxation`: the gel's stress relaxes with one time constant while the jaws keep their width. It acts
 /// on the normal force, so the imprint shows it too; that tells it from ageing of the friction. Beside a load cell that reads the
@@ -14,20 +13,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "F_N = F_G (1 - depth (1 - exp(-t_dwell / tau_s)))",
     source: "one term of a Prony series; 5 to 25 % in 100 s, tau 0.3 to 100 s. Tiezzi and Kao 2007",
     parameters: &[
-        ParameterSpec {
-            name: "depth",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 0.6),
-            about: "share of the normal force that is lost in the end",
-        },
-        ParameterSpec {
-            name: "tau_s",
-            unit: "s",
-            neutral: 10.0,
-            bounds: (0.05, 1000.0),
-            about: "dwell after which 63 % of it are lost",
-        },
+        parameter("depth", "1", 0.0, (0.0, 0.6)).about("share of the normal force that is lost in the end"),
+        parameter("tau_s", "s", 10.0, (0.05, 1000.0)).about("dwell after which 63 % of it are lost"),
     ],
     covariates: &["dwell_s"],
     normal_force: Some(normal_force),
@@ -35,13 +22,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "depth = 0.1: 10 % of the normal force are lost in the end, two thirds of it after tau_s.",
     remedy: "Let the gripper hold its force rather than its width, or wait equally long before every pull.",
     typical: &[("depth", 0.15)],
-    pulls: Ok(PullFit {
-        fit: |_| {
-            let free = [("depth", 0.05), ("tau_s", 5.0)];
-            Fit::over("tau_s", &[1.0, 8.0, 60.0], ("depth", 0.08), &free)
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| {
+        let free = [("depth", 0.05), ("tau_s", 5.0)];
+        Fit::over("tau_s", &[1.0, 8.0, 60.0], ("depth", 0.08), &free)
+    })),
     grasp_force: Some(grasp_force),
     imprints: Some(ImprintFit {
         timed: true,

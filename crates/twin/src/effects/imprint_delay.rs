@@ -1,7 +1,6 @@
 //! A picture that was taken earlier or later than the force that stands beside it.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, Group, ImprintFit, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, Group, ImprintFit, parameter, values};
 
 /// `imprint_delay`: camera and load cell have clocks, or buffers, of their own. It acts on grasps beside a load cell and on nothing
 /// else: a grip that is simulated holds its force while the pictures are taken.
@@ -11,13 +10,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "time by which the reading of a force comes after the picture of it",
     formula: "V(t) = c F(t + delay_s)",
     source: "50 to 120 ms between a camera stream of 30 Hz and a load cell of 5 to 8 readings per second (Burgess 2024, example data of EstimateModulus)",
-    parameters: &[ParameterSpec {
-        name: "delay_s",
-        unit: "s",
-        neutral: 0.0,
-        bounds: (-0.5, 0.5),
-        about: "how much later than its picture a force is read; below 0 the picture is the later one",
-    }],
+    parameters: &[parameter("delay_s", "s", 0.0, (-0.5, 0.5))
+        .about("how much later than its picture a force is read; below 0 the picture is the later one")],
     covariates: &["time_s"],
     grasp_force: Some(grasp_force),
     plainly: "Pictures and force readings that stand side by side were not taken at the same time.",

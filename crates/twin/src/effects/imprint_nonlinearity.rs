@@ -1,7 +1,6 @@
 //! An imprint that grows with another power of the grip force than the first.
 
-use super::hooks::{positive, values};
-use super::{EffectSpec, Experiment, Fit, Group, ImprintFit, ParameterSpec};
+use super::{EffectSpec, Experiment, Fit, Group, ImprintFit, parameter, positive, values};
 
 /// `imprint_nonlinearity`: `V = c F` becomes a power law through the same volume at `f_ref_n`. A Hertzian
 /// half-space under a sphere has 4/3; a thin layer on a hard backing has less than 1.
@@ -12,14 +11,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "V = c f_ref_n (F_N / f_ref_n)^exponent",
     source: "Hertz: 4/3 for a sphere; Wucherer et al. 2023 take 1, their images differ more at 55 N than at 25 N; 0.5 to 1.2 on rigid objects in a GelSight Wedge",
     parameters: &[
-        ParameterSpec { name: "exponent", unit: "1", neutral: 1.0, bounds: (0.4, 1.5), about: "exponent" },
-        ParameterSpec {
-            name: "f_ref_n",
-            unit: "N",
-            neutral: 40.0,
-            bounds: (1.0, 500.0),
-            about: "normal force at which the volume is c F",
-        },
+        parameter("exponent", "1", 1.0, (0.4, 1.5)).about("exponent"),
+        parameter("f_ref_n", "N", 40.0, (1.0, 500.0)).about("normal force at which the volume is c F"),
     ],
     references: &["f_ref_n"],
     covariates: &["grip_force_n"],

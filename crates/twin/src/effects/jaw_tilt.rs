@@ -1,7 +1,6 @@
 //! Jaws that are not parallel: the grip is a wedge.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// Largest coefficient of a wedge that locks.
 const LOCKED_MU: f64 = 100.0;
@@ -16,13 +15,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "wedge angle of the jaws",
     formula: "mu' = (mu + s tan(tilt_deg)) / (1 - s mu tan(tilt_deg)), s = pull_direction",
     source: "statics of a wedge; 3 deg change a coefficient of 0.15 by 35 %",
-    parameters: &[ParameterSpec {
-        name: "tilt_deg",
-        unit: "deg",
-        neutral: 0.0,
-        bounds: (-10.0, 10.0),
-        about: "angle of each jaw against the jaw axis' normal plane",
-    }],
+    parameters: &[parameter("tilt_deg", "deg", 0.0, (-10.0, 10.0))
+        .about("angle of each jaw against the jaw axis' normal plane")],
     covariates: &["pull_direction"],
     friction: Some(friction),
     tilt_rad: Some(tilt_rad),
@@ -31,7 +25,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "tilt_deg = 1: a coefficient of 0.3 is about 0.02 higher pulling up and as much lower pulling down.",
     remedy: "Measure the jaws with feeler gauges on a flat part, and shim them.",
     typical: &[("tilt_deg", 1.5)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("tilt_deg", 0.0)]], &[("tilt_deg", 0.3)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("tilt_deg", 0.0)]], &[("tilt_deg", 0.3)]))),
     experiments: &[Experiment::KnownMasses],
     ..EffectSpec::BARE
 };

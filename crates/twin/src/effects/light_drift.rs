@@ -1,7 +1,8 @@
 //! Lights whose brightness drifts with the clock.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ImprintFit, ParameterSpec, PressFit};
+use super::{
+    EffectSpec, Experiment, Fit, GripPoint, Group, ImprintFit, ParameterSpec, PressFit, parameter, values,
+};
 use crate::OpticsState;
 
 /// `light_drift`: every channel is multiplied, with and without contact, by a factor that starts at 1 and changes
@@ -44,7 +45,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
 };
 
 const fn rate(name: &'static str, about: &'static str) -> ParameterSpec {
-    ParameterSpec { name, unit: "1/h", neutral: 0.0, bounds: (-1.0, 1.0), about }
+    parameter(name, "1/h", 0.0, (-1.0, 1.0)).about(about)
 }
 
 fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {

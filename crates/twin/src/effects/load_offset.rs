@@ -1,7 +1,6 @@
 //! A constant part of the friction force: adhesion, or a force offset that looks like it.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `load_offset`: Wucherer et al. 2023 correct the simulated friction with `mu_corr = mu (a + b / F_G)`, that
 /// is, with a friction force `mu a F_G + mu b`. Negative where `b < -a F_G`.
@@ -12,20 +11,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (a + b_n / F_G)",
     source: "Wucherer et al. 2023, correction of the friction coefficient and its table of fits",
     parameters: &[
-        ParameterSpec {
-            name: "a",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (0.2, 5.0),
-            about: "factor on the friction coefficient at high grip force",
-        },
-        ParameterSpec {
-            name: "b_n",
-            unit: "N",
-            neutral: 0.0,
-            bounds: (-50.0, 50.0),
-            about: "constant friction force per jaw, in units of the coefficient",
-        },
+        parameter("a", "1", 1.0, (0.2, 5.0)).about("factor on the friction coefficient at high grip force"),
+        parameter("b_n", "N", 0.0, (-50.0, 50.0))
+            .about("constant friction force per jaw, in units of the coefficient"),
     ],
     covariates: &["grip_force_n"],
     friction: Some(friction),
@@ -35,7 +23,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "a is the factor on the coefficient at strong grips; b_n is the constant force per jaw over mu, so with a = 1 friction is doubled at F_G = b_n.",
     remedy: "Keep the law in the twin. A gripper that presses less than it says looks the same: check the grip force with a load cell first.",
     typical: &[("b_n", 3.0)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("b_n", 0.0)]], &[("b_n", 1.0)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("b_n", 0.0)]], &[("b_n", 1.0)]))),
     experiments: &[Experiment::GripForceWithALoadCell],
     ..EffectSpec::BARE
 };

@@ -1,7 +1,6 @@
 //! A coefficient that falls, or rises, as a power of the load.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `load_power_law`: adhesive friction of constant shear stress is proportional to the contact area, which
 /// grows with less than the load; `n = -1/3` for a Hertzian sphere.
@@ -12,14 +11,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (F_G / f_ref_n)^n",
     source: "Hertz contact with constant shear stress; Xydas and Kao 1999; Lyashenko and Popov 2024",
     parameters: &[
-        ParameterSpec { name: "n", unit: "1", neutral: 0.0, bounds: (-0.9, 0.5), about: "exponent" },
-        ParameterSpec {
-            name: "f_ref_n",
-            unit: "N",
-            neutral: 40.0,
-            bounds: (1.0, 500.0),
-            about: "grip force at which the coefficient is mu",
-        },
+        parameter("n", "1", 0.0, (-0.9, 0.5)).about("exponent"),
+        parameter("f_ref_n", "N", 40.0, (1.0, 500.0)).about("grip force at which the coefficient is mu"),
     ],
     references: &["f_ref_n"],
     covariates: &["grip_force_n"],
@@ -29,7 +22,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "n = -0.1: twice the grip force has a coefficient 7 % lower.",
     remedy: "Keep the law in the twin, and stay within the grip forces it was fitted on.",
     typical: &[("n", -0.15)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("n", 0.0)]], &[("n", 0.05)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("n", 0.0)]], &[("n", 0.05)]))),
     experiments: &[Experiment::OtherPullRates, Experiment::WiderGripForces],
     ..EffectSpec::BARE
 };

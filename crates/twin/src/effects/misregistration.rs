@@ -1,7 +1,8 @@
 //! A contact that is seen elsewhere than it is thought to be.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, PressNeeds};
+use super::{
+    EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, PressNeeds, parameter, values,
+};
 use crate::Jaw;
 use crate::OpticsState;
 
@@ -19,36 +20,11 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     parameters: &[
         length("shift_x_mm", "to the right in the left image, to the left in the right one"),
         length("shift_y_mm", "down in both images"),
-        ParameterSpec {
-            name: "rotation_deg",
-            unit: "deg",
-            neutral: 0.0,
-            bounds: (-10.0, 10.0),
-            about: "from right to down in the left image, against that in the right one",
-        },
-        ParameterSpec {
-            name: "scale",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (0.8, 1.25),
-            about: "pixel size of the sensor file over the true one",
-        },
-        ParameterSpec {
-            name: "k1",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (-0.1, 0.1),
-            about: "radial distortion half an image width from the middle, positive for a barrel",
-        },
-        ParameterSpec {
-            name: "frame_moves",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 1.0),
-            about: "how much of the way the frame at rest moves along: 0 if the part lies elsewhere, 1 if the camera does",
-        },
+        parameter("rotation_deg", "deg", 0.0, (-10.0, 10.0)).about("from right to down in the left image, against that in the right one"),
+        parameter("scale", "1", 1.0, (0.8, 1.25)).about("pixel size of the sensor file over the true one"),
+        parameter("k1", "1", 0.0, (-0.1, 0.1)).about("radial distortion half an image width from the middle, positive for a barrel"),
+        parameter("frame_moves", "1", 0.0, (0.0, 1.0)).about("how much of the way the frame at rest moves along: 0 if the part lies elsewhere, 1 if the camera does"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 5,
     plainly: "The contact stands elsewhere in the picture than it should: moved, turned, or at another scale.",
@@ -73,7 +49,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
 };
 
 const fn length(name: &'static str, about: &'static str) -> ParameterSpec {
-    ParameterSpec { name, unit: "mm", neutral: 0.0, bounds: (-3.0, 3.0), about }
+    parameter(name, "mm", 0.0, (-3.0, 3.0)).about(about)
 }
 
 fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {

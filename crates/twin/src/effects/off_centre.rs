@@ -1,7 +1,6 @@
 //! A grip beside the pull line: part of the friction holds the moment.
 
-use super::hooks::values;
-use super::{EffectSpec, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `off_centre`: a law of the offset alone, whatever the grip angle, for what the mechanics of the twin leave out. What a
 /// grip that turns loses follows from the contact itself, with `robot.twist`. The two differ (an offset along the pull has
@@ -15,28 +14,20 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "friction that falls with the lever between grip and pull line",
     formula: "mu' = mu / sqrt(1 + (inverse_lever_per_mm grip_offset)^2)",
     source: "elliptic limit surface; m = 0.6 to 0.67 times the contact radius. Xydas and Kao 1999",
-    parameters: &[ParameterSpec {
-        name: "inverse_lever_per_mm",
-        unit: "1/mm",
-        neutral: 0.0,
-        bounds: (0.0, 2.0),
-        about: "inverse of the lever at which the friction has fallen to 71 %",
-    }],
+    parameters: &[parameter("inverse_lever_per_mm", "1/mm", 0.0, (0.0, 2.0))
+        .about("inverse of the lever at which the friction has fallen to 71 %")],
     covariates: &["grip_offset_mm"],
     friction: Some(friction),
     plainly: "Grips beside the middle of the part hold less, because the pull also turns the part in the jaws.",
     number_means: "1 / inverse_lever_per_mm is the offset in mm at which 71 % of the friction are left.",
     remedy: "Grip in the middle, or compute the contact: a compliant twist needs no such law.",
     typical: &[("inverse_lever_per_mm", 0.08)],
-    pulls: Ok(PullFit {
-        fit: |_| {
-            Fit::new(
-                &[&[("inverse_lever_per_mm", 0.04)], &[("inverse_lever_per_mm", 0.12)]],
-                &[("inverse_lever_per_mm", 0.02)],
-            )
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| {
+        Fit::new(
+            &[&[("inverse_lever_per_mm", 0.04)], &[("inverse_lever_per_mm", 0.12)]],
+            &[("inverse_lever_per_mm", 0.02)],
+        )
+    })),
     ..EffectSpec::BARE
 };
 

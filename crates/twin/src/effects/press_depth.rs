@@ -1,7 +1,6 @@
 //! A press that is deeper, or less deep, than it is thought to be.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, PressNeeds};
+use super::{EffectSpec, Experiment, GripPoint, Group, PressFit, PressNeeds, parameter, values};
 use crate::OpticsState;
 
 /// `press_depth`: zero and scale of the depth of the press are not those that the twin, or the stage of a calibration, believes.
@@ -14,22 +13,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "d' = factor d + offset_mm, at least 0; d = depth of the press",
     source: "depths seen in presses into a GelSight are 0.65 of those of the stage (Chen et al. 2022, its published presses), zeros of a stage 0.02 to 0.1 mm off",
     parameters: &[
-        ParameterSpec {
-            name: "factor",
-            unit: "1",
-            neutral: 1.0,
-            bounds: (0.4, 2.0),
-            about: "depth that is seen over the one that is believed",
-        },
-        ParameterSpec {
-            name: "offset_mm",
-            unit: "mm",
-            neutral: 0.0,
-            bounds: (-0.5, 0.5),
-            about: "how much deeper the press is beyond that",
-        },
+        parameter("factor", "1", 1.0, (0.4, 2.0)).about("depth that is seen over the one that is believed"),
+        parameter("offset_mm", "mm", 0.0, (-0.5, 0.5)).about("how much deeper the press is beyond that"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 2,
     plainly: "Things are pressed in deeper, or less deep, than was written down.",
@@ -56,14 +42,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn two_of_them_one_after_the_other_are_one() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[0.8, 0.1], &mut state, &grip(&c, 40.0));
-        optics(&[1.5, -0.05], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[0.8, 0.1], &[1.5, -0.05]]);
         let depth_m = state.press_depth_m(0.5e-3);
         assert!((depth_m - (1.5 * (0.8 * 0.5e-3 + 0.1e-3) - 0.05e-3)).abs() < 1e-15);
         assert_eq!(OpticsState { press_offset_m: -1.0, ..state }.press_depth_m(0.5e-3), 0.0);

@@ -1,7 +1,6 @@
 //! A camera whose white balance is another one, or differs from grip to grip.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter, values};
 use crate::random::{Purpose, Stream};
 use crate::{Jaw, OpticsState};
 
@@ -21,7 +20,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         scatter("green_sd"),
         scatter("blue_sd"),
     ],
-    covariates: &[],
     optics: Some(optics),
     sizes: 5,
     plainly: "Pictures have a colour cast, all the same or each its own: the camera balances white, or exposes, by itself.",
@@ -41,12 +39,12 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
 };
 
 const fn gain(name: &'static str, about: &'static str) -> ParameterSpec {
-    ParameterSpec { name, unit: "1", neutral: 1.0, bounds: (0.5, 2.0), about }
+    parameter(name, "1", 1.0, (0.5, 2.0)).about(about)
 }
 
 const fn scatter(name: &'static str) -> ParameterSpec {
     let about = "standard deviation of the logarithm of the channel's gain";
-    ParameterSpec { name, unit: "1", neutral: 0.0, bounds: (0.0, 0.5), about }
+    parameter(name, "1", 0.0, (0.0, 0.5)).about(about)
 }
 
 fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {
@@ -67,7 +65,7 @@ fn optics(parameters: &[f64], state: &mut OpticsState, at: &GripPoint<'_>) {
 mod tests {
     use super::*;
     use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::{grip, optics_after};
 
     fn gain(jaw: Jaw, grip_key: (u64, u64), sd: [f64; 3]) -> [f64; 3] {
         let c = Covariates::default();
@@ -115,8 +113,7 @@ mod tests {
 
     #[test]
     fn a_white_balance_that_stays_is_its_two_gains() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[1.06, 0.94, 0.0, 0.0, 0.0], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[1.06, 0.94, 0.0, 0.0, 0.0]]);
         assert_eq!(state.light_gain, [1.06, 1.0, 0.94]);
     }
 }

@@ -1,7 +1,6 @@
 //! A coefficient that depends on how fast the force rises.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// Slowest pull the logarithm is taken at.
 const SLOWEST_N_PER_S: f64 = 1e-3;
@@ -15,20 +14,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 + k ln(r / r0_n_per_s)), r = force increment / step time",
     source: "Juvekar and Singh, gel on glass; break-away ratio with force rate: Song et al. 2013",
     parameters: &[
-        ParameterSpec {
-            name: "k",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (-0.1, 0.3),
-            about: "relative change of the coefficient for e times the rate",
-        },
-        ParameterSpec {
-            name: "r0_n_per_s",
-            unit: "N/s",
-            neutral: 10.0,
-            bounds: (0.01, 1000.0),
-            about: "pull rate at which the coefficient is mu; a step of 1 N every 0.104 s is 9.6 N/s",
-        },
+        parameter("k", "1", 0.0, (-0.1, 0.3))
+            .about("relative change of the coefficient for e times the rate"),
+        parameter("r0_n_per_s", "N/s", 10.0, (0.01, 1000.0))
+            .about("pull rate at which the coefficient is mu; a step of 1 N every 0.104 s is 9.6 N/s"),
     ],
     references: &["r0_n_per_s"],
     covariates: &["force_increment_n", "step_time_s"],
@@ -38,7 +27,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "k = 0.02: ten times the rate has a coefficient 4.6 % higher.",
     remedy: "Pull at the rate of the application, or keep the law in the twin.",
     typical: &[("k", 0.04)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("k", 0.0)]], &[("k", 0.02)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("k", 0.0)]], &[("k", 0.02)]))),
     experiments: &[Experiment::OtherPullRates],
     ..EffectSpec::BARE
 };

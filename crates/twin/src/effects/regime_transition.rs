@@ -1,7 +1,6 @@
 //! Two regimes of friction with a transition at a grip force.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `regime_transition`: one coefficient below a grip force, another above. The lower one is `mu`; a factor on
 /// both would be `mu` again. Wucherer et al. 2023 see a "phase transition" near 20 N and do not explain it.
@@ -12,27 +11,11 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 + step / (1 + exp(-(F_G - f_c_n) / width_n)))",
     source: "Wucherer et al. 2023, transition near 20 N; logistic step is ours",
     parameters: &[
-        ParameterSpec {
-            name: "step",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (-0.8, 2.0),
-            about: "relative change of the coefficient from far below to far above",
-        },
-        ParameterSpec {
-            name: "f_c_n",
-            unit: "N",
-            neutral: 20.0,
-            bounds: (1.0, 100.0),
-            about: "grip force of half the step",
-        },
-        ParameterSpec {
-            name: "width_n",
-            unit: "N",
-            neutral: 2.0,
-            bounds: (0.1, 20.0),
-            about: "width; from f_c_n - 2.2 width_n to f_c_n + 2.2 width_n it goes from 10 to 90 %",
-        },
+        parameter("step", "1", 0.0, (-0.8, 2.0))
+            .about("relative change of the coefficient from far below to far above"),
+        parameter("f_c_n", "N", 20.0, (1.0, 100.0)).about("grip force of half the step"),
+        parameter("width_n", "N", 2.0, (0.1, 20.0))
+            .about("width; from f_c_n - 2.2 width_n to f_c_n + 2.2 width_n it goes from 10 to 90 %"),
     ],
     covariates: &["grip_force_n"],
     friction: Some(friction),

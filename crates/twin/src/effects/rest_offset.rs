@@ -1,7 +1,6 @@
 //! A colour model that is not 0 at zero slope.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit};
+use super::{EffectSpec, Experiment, GripPoint, Group, ParameterSpec, PressFit, parameter, values};
 use crate::OpticsState;
 
 /// `rest_offset`: one constant per channel, the value that the real sensor's colours have where the gel is flat but
@@ -13,7 +12,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "I_c' = I_c + c with contact, c = red, green, blue",
     source: "colour tables have -5 to 6 grey levels at zero slope where there should be none (Taxim, Si and Yuan 2022)",
     parameters: &[level("red"), level("green"), level("blue")],
-    covariates: &[],
     optics: Some(optics),
     sizes: 3,
     plainly: "Pictures with contact are brighter or darker everywhere, the frame without contact is right.",
@@ -27,7 +25,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
 
 const fn level(name: &'static str) -> ParameterSpec {
     let about = "value of the channel at zero slope";
-    ParameterSpec { name, unit: "grey levels", neutral: 0.0, bounds: (-60.0, 60.0), about }
+    parameter(name, "grey levels", 0.0, (-60.0, 60.0)).about(about)
 }
 
 fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
@@ -40,14 +38,11 @@ fn optics(parameters: &[f64], state: &mut OpticsState, _: &GripPoint<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Covariates;
-    use crate::effects::testing::grip;
+    use crate::effects::testing::optics_after;
 
     #[test]
     fn offsets_add_channel_by_channel() {
-        let (c, mut state) = (Covariates::default(), OpticsState::default());
-        optics(&[3.0, 0.0, -2.0], &mut state, &grip(&c, 40.0));
-        optics(&[1.0, 5.0, 0.0], &mut state, &grip(&c, 40.0));
+        let state = optics_after(optics, &[&[3.0, 0.0, -2.0], &[1.0, 5.0, 0.0]]);
         assert_eq!(state.rest_offset, [4.0, 5.0, -2.0]);
     }
 }

@@ -1,7 +1,8 @@
 //! A force sensor with a wrong zero.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, Visible};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, SensorMemory, SensorPoint, Visible, parameter, values,
+};
 
 /// `sensor_bias`: a constant in every reading, without load too: a wrong zero, or a payload that the robot does
 /// not know. It keeps its sign when the pull is reversed, so it raises the reading one way and lowers it the other.
@@ -11,13 +12,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "constant added to the measured force",
     formula: "F_m = F + bias_n",
     source: "UR5e data sheet: accuracy 4 N; a payload of 0.1 kg that is not set is 1 N",
-    parameters: &[ParameterSpec {
-        name: "bias_n",
-        unit: "N",
-        neutral: 0.0,
-        bounds: (-30.0, 30.0),
-        about: "reading without load, along the sensor's axis (up)",
-    }],
+    parameters: &[parameter("bias_n", "N", 0.0, (-30.0, 30.0))
+        .about("reading without load, along the sensor's axis (up)")],
     sensor: Some(sensor),
     upright_only: true,
     visible: Visible::From(0.05),
@@ -25,7 +21,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "bias_n = 1: with nothing on it the sensor reads 1 N.",
     remedy: "Zero the sensor without load before every pull, and set the payload of the gripper.",
     typical: &[("bias_n", 1.0)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("bias_n", 0.0)]], &[("bias_n", 0.2)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("bias_n", 0.0)]], &[("bias_n", 0.2)]))),
     experiments: &[Experiment::NoLoadReading, Experiment::PullsUpAndDown],
     ..EffectSpec::BARE
 };

@@ -1,8 +1,8 @@
 //! A force sensor that creeps under load.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, FORCE_RATE, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, log_spaced,
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible,
+    log_spaced, parameter, values,
 };
 
 /// `sensor_creep`: part of the reading follows the force slowly. Starts settled; the memory's state is the slow
@@ -14,20 +14,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "F_m = F + fraction F_slow, tau_s dF_slow/dt = F - F_slow",
     source: "one term of viscoelastic creep of the sensor's body",
     parameters: &[
-        ParameterSpec {
-            name: "fraction",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (-0.6, 1.5),
-            about: "creep in the end over the first reading of a load",
-        },
-        ParameterSpec {
-            name: "tau_s",
-            unit: "s",
-            neutral: 10.0,
-            bounds: (0.1, 3600.0),
-            about: "time after which 63 % of it are there",
-        },
+        parameter("fraction", "1", 0.0, (-0.6, 1.5))
+            .about("creep in the end over the first reading of a load"),
+        parameter("tau_s", "s", 10.0, (0.1, 3600.0)).about("time after which 63 % of it are there"),
     ],
     sensor: Some(sensor),
     remembers: true,

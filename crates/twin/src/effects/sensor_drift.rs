@@ -1,7 +1,9 @@
 //! A force sensor whose zero wanders with the clock.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, wider};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible, parameter,
+    values, wider,
+};
 
 /// `sensor_drift`: a bias that grows linearly from 0 at the start of the campaign.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -10,13 +12,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "constant added to the measured force that grows with time",
     formula: "F_m = F + rate_n_per_h t",
     source: "0.1 to 3 N/h; 26 N from temperature alone in small sensors without compensation (arXiv 2502.17528)",
-    parameters: &[ParameterSpec {
-        name: "rate_n_per_h",
-        unit: "N/h",
-        neutral: 0.0,
-        bounds: (-30.0, 30.0),
-        about: "change of the reading without load in an hour, along the sensor's axis (up)",
-    }],
+    parameters: &[parameter("rate_n_per_h", "N/h", 0.0, (-30.0, 30.0))
+        .about("change of the reading without load in an hour, along the sensor's axis (up)")],
     covariates: &["time_s"],
     sensor: Some(sensor),
     reads_clock: true,
@@ -26,10 +23,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "rate_n_per_h = 1: after an hour the sensor reads 1 N more than at the start.",
     remedy: "Zero the sensor before every pull; let it warm up.",
     typical: &[("rate_n_per_h", 0.5)],
-    pulls: Ok(PullFit {
-        fit: |_| Fit::new(&[&[("rate_n_per_h", 0.0)]], &[("rate_n_per_h", 0.2)]),
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("rate_n_per_h", 0.0)]], &[("rate_n_per_h", 0.2)]))),
     table: Some(TableFit {
         acts_through: &["time_s"],
         bounds: |span, own| wider(own, (span.highest_n - span.lowest_n) / span.hours()),

@@ -1,7 +1,8 @@
 //! A force sensor with a wrong gain.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, Visible};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, SensorMemory, SensorPoint, Visible, parameter, values,
+};
 
 /// `sensor_gain`: every reading times a factor.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -10,20 +11,14 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "factor on the measured force",
     formula: "F_m = gain F",
     source: "0.95 to 1.05 is normal; Wucherer et al. 2023 found 0.709 in their simulation",
-    parameters: &[ParameterSpec {
-        name: "gain",
-        unit: "1",
-        neutral: 1.0,
-        bounds: (0.3, 3.0),
-        about: "measured over true force",
-    }],
+    parameters: &[parameter("gain", "1", 1.0, (0.3, 3.0)).about("measured over true force")],
     sensor: Some(sensor),
     visible: Visible::From(0.02),
     plainly: "The force sensor reads the same share too much or too little at every force.",
     number_means: "gain = 0.95: a true force of 100 N reads 95 N.",
     remedy: "Hang a known mass on the flange and set the sensor's scale.",
     typical: &[("gain", 0.95)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("gain", 1.0)]], &[("gain", 0.05)]))),
     experiments: &[Experiment::KnownMasses],
     ..EffectSpec::BARE
 };

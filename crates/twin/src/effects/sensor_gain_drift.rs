@@ -1,7 +1,9 @@
 //! A force sensor whose gain wanders with the clock.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, wider};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible, parameter,
+    values, wider,
+};
 
 /// `sensor_gain_drift`: a gain that leaves 1 linearly from the start of the campaign on.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -10,13 +12,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "factor on the measured force that changes with time",
     formula: "F_m = F (1 + rate_per_h t)",
     source: "first order of a drifting gain; warm-up of the sensor's electronics",
-    parameters: &[ParameterSpec {
-        name: "rate_per_h",
-        unit: "1/h",
-        neutral: 0.0,
-        bounds: (-1.0, 1.0),
-        about: "change of the gain in an hour",
-    }],
+    parameters: &[parameter("rate_per_h", "1/h", 0.0, (-1.0, 1.0)).about("change of the gain in an hour")],
     covariates: &["time_s"],
     sensor: Some(sensor),
     reads_clock: true,
@@ -25,10 +21,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "rate_per_h = 0.01: after an hour every force reads 1 % more than at the start.",
     remedy: "Let sensor and electronics warm up; check a known mass at the start and at the end of the day.",
     typical: &[("rate_per_h", 0.02)],
-    pulls: Ok(PullFit {
-        fit: |_| Fit::new(&[&[("rate_per_h", 0.0)]], &[("rate_per_h", 0.02)]),
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("rate_per_h", 0.0)]], &[("rate_per_h", 0.02)]))),
     table: Some(TableFit {
         acts_through: &["time_s"],
         bounds: |span, own| wider(own, 0.9 / span.hours()),

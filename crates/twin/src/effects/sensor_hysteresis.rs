@@ -1,8 +1,8 @@
 //! A force sensor that reads less on the way up than on the way down.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, FORCE_RATE, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, log_spaced,
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible,
+    log_spaced, parameter, values,
 };
 
 /// `sensor_hysteresis`: a Bouc-Wen loop (exponent 1, beta = gamma), integrated exactly over each step. Its state
@@ -15,20 +15,9 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "F_m = F - amplitude_n z, dz = (sign(dF) - z) abs(dF) / force_scale_n",
     source: "Bouc-Wen model; 0.5 to 3 % of the range",
     parameters: &[
-        ParameterSpec {
-            name: "amplitude_n",
-            unit: "N",
-            neutral: 0.0,
-            bounds: (0.0, 10.0),
-            about: "half of the difference between the branches",
-        },
-        ParameterSpec {
-            name: "force_scale_n",
-            unit: "N",
-            neutral: 10.0,
-            bounds: (0.1, 100.0),
-            about: "change of force after which 63 % of a branch are reached",
-        },
+        parameter("amplitude_n", "N", 0.0, (0.0, 10.0)).about("half of the difference between the branches"),
+        parameter("force_scale_n", "N", 10.0, (0.1, 100.0))
+            .about("change of force after which 63 % of a branch are reached"),
     ],
     sensor: Some(sensor),
     remembers: true,
@@ -37,13 +26,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "amplitude_n = 0.5: rising and falling readings of one force differ by 1 N.",
     remedy: "Approach every force from the same side, or load the sensor fully once before it is used.",
     typical: &[("amplitude_n", 0.5)],
-    pulls: Ok(PullFit {
-        fit: |_| {
-            let free = [("amplitude_n", 0.3), ("force_scale_n", 3.0)];
-            Fit::over("force_scale_n", &[3.0, 15.0], ("amplitude_n", 0.3), &free)
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| {
+        let free = [("amplitude_n", 0.3), ("force_scale_n", 3.0)];
+        Fit::over("force_scale_n", &[3.0, 15.0], ("amplitude_n", 0.3), &free)
+    })),
     table: Some(TableFit {
         acts_through: &[FORCE_RATE],
         grid: Some(|span| {

@@ -1,8 +1,8 @@
 //! A force sensor that is filtered.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, FORCE_RATE, Fit, Group, ParameterSpec, PullFit, TableFit, Visible, log_spaced,
+    EffectSpec, Experiment, FORCE_RATE, Fit, Group, PullFit, SensorMemory, SensorPoint, TableFit, Visible,
+    log_spaced, parameter, values,
 };
 
 /// `sensor_lowpass`: first order, exact for a force that is constant over the step. Starts settled; the memory's
@@ -13,13 +13,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "measured force behind a low-pass filter",
     formula: "tau_s dF_m/dt = F - F_m",
     source: "first-order filter; tau 5 to 50 ms",
-    parameters: &[ParameterSpec {
-        name: "tau_s",
-        unit: "s",
-        neutral: 0.0,
-        bounds: (0.0, 2.0),
-        about: "time constant",
-    }],
+    parameters: &[parameter("tau_s", "s", 0.0, (0.0, 2.0)).about("time constant")],
     sensor: Some(sensor),
     remembers: true,
     visible: Visible::From(0.02),
@@ -27,10 +21,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "tau_s = 0.05: two thirds of a sudden change are seen after 50 ms.",
     remedy: "Give the sensor's filter a higher cut-off frequency, or pull more slowly.",
     typical: &[("tau_s", 0.1)],
-    pulls: Ok(PullFit {
-        fit: |_| Fit::new(&[&[("tau_s", 0.03)], &[("tau_s", 0.15)]], &[("tau_s", 0.02)]),
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("tau_s", 0.03)], &[("tau_s", 0.15)]], &[("tau_s", 0.02)]))),
     table: Some(TableFit {
         acts_through: &[FORCE_RATE],
         grid: Some(|span| {

@@ -1,8 +1,8 @@
 //! A force sensor whose line is bent.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
 use super::{
-    EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, REFERENCE_FORCE, TableFit, Visible, wider,
+    EffectSpec, Experiment, Fit, Group, PullFit, REFERENCE_FORCE, SensorMemory, SensorPoint, TableFit,
+    Visible, parameter, values, wider,
 };
 
 /// `sensor_quadratic`: the second term of the sensor's curve. A load cell bends the same way whatever the sign of the
@@ -15,20 +15,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "F_m = F + quadratic_per_n F^2, with F abs(F) for F^2 where odd = 1",
     source: "non-linearity of load cells, 0.5 to 3 % of the range",
     parameters: &[
-        ParameterSpec {
-            name: "quadratic_per_n",
-            unit: "1/N",
-            neutral: 0.0,
-            bounds: (-0.01, 0.01),
-            about: "relative change of the gain for a newton",
-        },
-        ParameterSpec {
-            name: "odd",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 1.0),
-            about: "1 where the line bends alike in both directions, 0 where it bends one way",
-        },
+        parameter("quadratic_per_n", "1/N", 0.0, (-0.01, 0.01))
+            .about("relative change of the gain for a newton"),
+        parameter("odd", "1", 0.0, (0.0, 1.0))
+            .about("1 where the line bends alike in both directions, 0 where it bends one way"),
     ],
     references: &["odd"],
     sensor: Some(sensor),

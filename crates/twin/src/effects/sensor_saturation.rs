@@ -1,7 +1,9 @@
 //! A force sensor at the end of its range.
 
-use super::hooks::{SensorMemory, SensorPoint, values};
-use super::{EffectSpec, Experiment, Fit, Group, ParameterSpec, PullFit, REFERENCE_FORCE, TableFit};
+use super::{
+    EffectSpec, Experiment, Fit, Group, PullFit, REFERENCE_FORCE, SensorMemory, SensorPoint, TableFit,
+    parameter, values,
+};
 
 /// No force here comes near it.
 const NO_LIMIT_N: f64 = 1e6;
@@ -13,13 +15,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     about: "measured force that stops at the end of the sensor's range",
     formula: "F_m = clamp(F, -limit_n, limit_n)",
     source: "UR5e data sheet: range 50 N",
-    parameters: &[ParameterSpec {
-        name: "limit_n",
-        unit: "N",
-        neutral: NO_LIMIT_N,
-        bounds: (1.0, NO_LIMIT_N),
-        about: "largest reading",
-    }],
+    parameters: &[parameter("limit_n", "N", NO_LIMIT_N, (1.0, NO_LIMIT_N)).about("largest reading")],
     sensor: Some(sensor),
     plainly: "The force sensor stops at the end of its range: whatever is larger reads the same.",
     number_means: "limit_n = 50: no force reads more than 50 N.",

@@ -1,7 +1,6 @@
 //! Gels that flow under shear.
 
-use super::hooks::values;
-use super::{Creep, EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit, Seen};
+use super::{Creep, EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, Seen, parameter, values};
 
 /// `shear_creep`: the tool goes on moving under a force that the jaws hold. What creeps far enough ends the pull at its
 /// displacement stop before the jaws let go: the label is then the force of that moment, `sqrt(2 r x_stop / rate)` of a pull that
@@ -13,34 +12,10 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "dx/dt = rate_mm_per_n_s (F_N / reference_force_n)^-load_exponent F (1 - F / L)^-rim_exponent, in series with the gels' shear",
     source: "dashpot of a Maxwell element (Johnson 1985, section 6.5) on what sticks of a contact: (1 - F / L)^(2/3) of the area of Cattaneo's and Mindlin's sphere; contact solvers that soften friction creep so by 0.04 to 4 mm/s (docs/peers.md)",
     parameters: &[
-        ParameterSpec {
-            name: "rate_mm_per_n_s",
-            unit: "mm/(N s)",
-            neutral: 0.0,
-            bounds: (0.0, 5.0),
-            about: "speed per newton of pull, at the reference force",
-        },
-        ParameterSpec {
-            name: "load_exponent",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 1.0),
-            about: "how much slower a stronger grip creeps: 2/3 where the rate goes with the area of a sphere's contact, turned round",
-        },
-        ParameterSpec {
-            name: "rim_exponent",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 0.9),
-            about: "how much faster it creeps while the rim slips: 2/3 of a sphere, 0 of a contact that lets go all at once",
-        },
-        ParameterSpec {
-            name: "reference_force_n",
-            unit: "N",
-            neutral: 20.0,
-            bounds: (0.1, 100.0),
-            about: "normal force of a jaw at which the rate is the one above",
-        },
+        parameter("rate_mm_per_n_s", "mm/(N s)", 0.0, (0.0, 5.0)).about("speed per newton of pull, at the reference force"),
+        parameter("load_exponent", "1", 0.0, (0.0, 1.0)).about("how much slower a stronger grip creeps: 2/3 where the rate goes with the area of a sphere's contact, turned round"),
+        parameter("rim_exponent", "1", 0.0, (0.0, 0.9)).about("how much faster it creeps while the rim slips: 2/3 of a sphere, 0 of a contact that lets go all at once"),
+        parameter("reference_force_n", "N", 20.0, (0.1, 100.0)).about("normal force of a jaw at which the rate is the one above"),
     ],
     references: &["reference_force_n"],
     covariates: &["grip_force_n"],

@@ -1,7 +1,6 @@
 //! A contact that holds no more per area than its shear strength, however hard it is pressed.
 
-use super::hooks::values;
-use super::{EffectSpec, GripPoint, Group, ParameterSpec};
+use super::{EffectSpec, GripPoint, Group, parameter, values};
 
 /// No interface here comes near it.
 const NO_LIMIT_MPA: f64 = 1e6;
@@ -21,13 +20,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = strength_mpa erf(sqrt(pi) mu p / (2 strength_mpa)) / p, p = pressure of the cell",
     source: "F = strength x real area: Bowden and Tabor 1950; share of real area: Persson 2001; rough silicone: \
              Nguyen et al. 2013, Trejo et al. 2017",
-    parameters: &[ParameterSpec {
-        name: "strength_mpa",
-        unit: "MPa",
-        neutral: NO_LIMIT_MPA,
-        bounds: (1e-4, NO_LIMIT_MPA),
-        about: "largest shear stress of the interface",
-    }],
+    parameters: &[parameter("strength_mpa", "MPa", NO_LIMIT_MPA, (1e-4, NO_LIMIT_MPA))
+        .about("largest shear stress of the interface")],
     covariates: &["grip_force_n"],
     of_pressure: true,
     friction: Some(friction),

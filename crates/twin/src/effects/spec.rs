@@ -21,6 +21,23 @@ pub struct ParameterSpec {
     pub about: &'static str,
 }
 
+/// A parameter of this name, unit, neutral value and bounds; [`ParameterSpec::about`] says what it means.
+pub(super) const fn parameter(
+    name: &'static str,
+    unit: &'static str,
+    neutral: f64,
+    bounds: (f64, f64),
+) -> ParameterSpec {
+    ParameterSpec { name, unit, neutral, bounds, about: "" }
+}
+
+impl ParameterSpec {
+    /// The same with what it means.
+    pub(super) const fn about(self, about: &'static str) -> Self {
+        Self { about, ..self }
+    }
+}
+
 /// How large an effect has to be for more than what a first-order loop gets wrong of an arm: less is none, however often it was
 /// measured. Sizes are those of the first parameter that is fitted, less its neutral value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,18 +50,6 @@ pub enum Visible {
     OverTheCampaign(f64),
     /// What has grown to this at the largest label of a campaign; the size is one per newton.
     AtTheLargestForce(f64),
-}
-
-impl Visible {
-    /// Whether a size is enough, in a campaign of so many hours with such a largest label.
-    pub fn holds(self, size: f64, hours: f64, largest_n: f64) -> bool {
-        match self {
-            Visible::Always => true,
-            Visible::From(least) => size >= least,
-            Visible::OverTheCampaign(least) => size * hours >= least,
-            Visible::AtTheLargestForce(least) => size * largest_n >= least,
-        }
-    }
 }
 
 /// What of the rig an effect belongs to.

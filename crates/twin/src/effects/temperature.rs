@@ -1,7 +1,6 @@
 //! A gel whose friction changes as it warms.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `temperature`: friction of elastomers falls with temperature, here by the same share for each kelvin.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -11,20 +10,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu exp(-k_per_k (T - t0_c))",
     source: "Arrhenius law over a small range; 0.5 to 3 % per kelvin",
     parameters: &[
-        ParameterSpec {
-            name: "k_per_k",
-            unit: "1/K",
-            neutral: 0.0,
-            bounds: (-0.05, 0.1),
-            about: "relative fall of the coefficient for a kelvin",
-        },
-        ParameterSpec {
-            name: "t0_c",
-            unit: "degC",
-            neutral: 23.0,
-            bounds: (-20.0, 80.0),
-            about: "temperature at which the coefficient is mu",
-        },
+        parameter("k_per_k", "1/K", 0.0, (-0.05, 0.1)).about("relative fall of the coefficient for a kelvin"),
+        parameter("t0_c", "degC", 23.0, (-20.0, 80.0)).about("temperature at which the coefficient is mu"),
     ],
     references: &["t0_c"],
     covariates: &["temperature_c"],
@@ -34,7 +21,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "k_per_k = 0.01: a gel that is 1 K warmer has a coefficient 1 % lower.",
     remedy: "Record the temperature with every pull, let lights and robot warm up first, and keep the law in the twin.",
     typical: &[("k_per_k", 0.01)],
-    pulls: Ok(PullFit { fit: |_| Fit::new(&[&[("k_per_k", 0.0)]], &[("k_per_k", 0.005)]), ..PullFit::PLAIN }),
+    pulls: Ok(PullFit::of(|_| Fit::new(&[&[("k_per_k", 0.0)]], &[("k_per_k", 0.005)]))),
     experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };

@@ -1,8 +1,8 @@
 //! What the tests of the effects share.
 
-use super::{GripPoint, SensorHook, SensorMemory, SensorPoint};
+use super::{GripPoint, OpticsHook, SensorHook, SensorMemory, SensorPoint};
 use crate::config::{ConfigError, read_twin_table};
-use crate::{Covariates, Jaw, Twin};
+use crate::{Covariates, Jaw, OpticsState, Twin};
 
 /// The left jaw with a patch of 1 cm2, pulled at 10 N/s.
 pub(crate) fn grip(covariates: &Covariates, grip_force_n: f64) -> GripPoint<'_> {
@@ -17,6 +17,13 @@ pub(crate) fn readings(hook: SensorHook, parameters: &[f64], forces_n: &[f64], s
         hook(parameters, force_n, &mut memory, &SensorPoint { clock_s: i as f64 * step_s, step_s })
     };
     forces_n.iter().enumerate().map(read).collect()
+}
+
+/// The optics of the left jaw, gripped with 40 N, after a hook with each of these parameters.
+pub(crate) fn optics_after(hook: OpticsHook, parameters: &[&[f64]]) -> OpticsState {
+    let (covariates, mut state) = (Covariates::default(), OpticsState::default());
+    parameters.iter().for_each(|p| hook(p, &mut state, &grip(&covariates, 40.0)));
+    state
 }
 
 /// A twin of two parts (`plate` with mu 0.2, `rod` with mu 0.3) and these effects.

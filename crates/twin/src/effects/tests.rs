@@ -1,5 +1,7 @@
 //! What every effect must keep, and what a twin makes of its effects.
 
+mod catalogue;
+
 use super::testing::{grip, twin};
 use super::*;
 use crate::{

@@ -1,7 +1,6 @@
 //! A gel that wears from pull to pull.
 
-use super::hooks::values;
-use super::{EffectSpec, Experiment, Fit, GripPoint, Group, ParameterSpec, PullFit};
+use super::{EffectSpec, Experiment, Fit, GripPoint, Group, PullFit, parameter, values};
 
 /// `wear`: the coating loses friction at a rate that falls off, until `depth` of it is gone.
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -11,20 +10,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     formula: "mu' = mu (1 - depth (1 - exp(-pull_index / n0)))",
     source: "saturating wear of the coating, n0 500 to 5000; GelSlim was tested for more than 3000 grasps",
     parameters: &[
-        ParameterSpec {
-            name: "depth",
-            unit: "1",
-            neutral: 0.0,
-            bounds: (0.0, 0.9),
-            about: "share of the coefficient that is lost in the end",
-        },
-        ParameterSpec {
-            name: "n0",
-            unit: "1",
-            neutral: 1000.0,
-            bounds: (5.0, 1e5),
-            about: "pulls after which 63 % of it are lost",
-        },
+        parameter("depth", "1", 0.0, (0.0, 0.9)).about("share of the coefficient that is lost in the end"),
+        parameter("n0", "1", 1000.0, (5.0, 1e5)).about("pulls after which 63 % of it are lost"),
     ],
     covariates: &["pull_index"],
     friction: Some(friction),
@@ -32,14 +19,11 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     number_means: "depth = 0.1: 10 % of the coefficient are lost in the end, two thirds of it after n0 pulls.",
     remedy: "Compare with a new gel; plan pulls in random order so that wear is not taken for something else.",
     typical: &[("depth", 0.2), ("n0", 150.0)],
-    pulls: Ok(PullFit {
-        fit: |span| {
-            let last = span.last_pull_index;
-            let free = [("depth", 0.05), ("n0", 0.3 * last)];
-            Fit::over("n0", &[0.1 * last, 0.5 * last, 3.0 * last], ("depth", 0.1), &free)
-        },
-        ..PullFit::PLAIN
-    }),
+    pulls: Ok(PullFit::of(|span| {
+        let last = span.last_pull_index;
+        let free = [("depth", 0.05), ("n0", 0.3 * last)];
+        Fit::over("n0", &[0.1 * last, 0.5 * last, 3.0 * last], ("depth", 0.1), &free)
+    })),
     experiments: &[Experiment::LongPause],
     ..EffectSpec::BARE
 };

@@ -2,14 +2,12 @@
 //! nodes; materials, skins and animations are ignored. The structure is read by `serde_json`; what it names is looked up and bounded
 //! here, because the library for it indexes unchecked and panics on damaged files.
 
-use super::{MAX_TRIANGLES, MeshError};
+use super::{MAX_TRIANGLES, MeshError, Triangle};
 use nalgebra::{Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
 /// A tree of nodes that is deeper than this is none.
 const DEEPEST: usize = 64;
-
-type Triangle = [[f32; 3]; 3];
 
 /// Types of components: unsigned 8, 16 and 32 bits, and 32-bit floats.
 const WHOLE: [(u32, usize); 3] = [(5121, 1), (5123, 2), (5125, 4)];
@@ -100,9 +98,6 @@ struct Buffer {
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
-    if bytes.is_empty() {
-        return Err(MeshError::EmptyFile);
-    }
     let (json, blob) = chunks(bytes)?;
     let document: Document = serde_json::from_slice(json).map_err(|e| bad(e.to_string()))?;
     if let Some(extension) = document.extensions_required.first() {
@@ -117,7 +112,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
 }
 
 fn bad(problem: String) -> MeshError {
-    MeshError::Unreadable { format: "GLB", problem }
+    MeshError::File(format!("not a GLB file that can be read: {problem}"))
 }
 
 fn look_up<'a, T>(all: &'a [T], at: usize, what: &str) -> Result<&'a T, MeshError> {
@@ -206,9 +201,9 @@ impl<'a> Reading<'a> {
             // Points and lines have no surface.
             _ => Vec::new(),
         };
-        if self.triangles.len() + corners.len() > MAX_TRIANGLES {
-            let triangles = (self.triangles.len() + corners.len()) as u64;
-            return Err(MeshError::TooManyTriangles { triangles });
+        let found = self.triangles.len() + corners.len();
+        if found > MAX_TRIANGLES {
+            return Err(MeshError::too_many(found));
         }
         for [a, b, c] in corners {
             let at = |i: usize| look_up(&places, i, "vertex").copied();

@@ -1,22 +1,19 @@
 //! Wavefront OBJ, through `tobj`. Materials and texture coordinates are ignored.
 
-use super::{MAX_TRIANGLES, MeshError};
+use super::{MAX_TRIANGLES, MeshError, Triangle};
 use std::io::{BufRead, Cursor};
 
-pub(super) fn read(bytes: &[u8]) -> Result<Vec<[[f32; 3]; 3]>, MeshError> {
-    if bytes.is_empty() {
-        return Err(MeshError::EmptyFile);
-    }
+pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
     check_faces(bytes)?;
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, |_| Ok(Default::default()))
-        .map_err(|e| MeshError::Syntax { line: 0, problem: e.to_string() })?;
+        .map_err(|e| MeshError::syntax(0, &e.to_string()))?;
     let mut triangles = Vec::new();
     for model in &models {
         let mesh = &model.mesh;
-        if triangles.len() + mesh.indices.len() / 3 > MAX_TRIANGLES {
-            let found = (triangles.len() + mesh.indices.len() / 3) as u64;
-            return Err(MeshError::TooManyTriangles { triangles: found });
+        let found = triangles.len() + mesh.indices.len() / 3;
+        if found > MAX_TRIANGLES {
+            return Err(MeshError::too_many(found));
         }
         for corners in mesh.indices.chunks_exact(3) {
             let corner = |i: usize| {
@@ -34,7 +31,7 @@ fn check_faces(bytes: &[u8]) -> Result<(), MeshError> {
     let mut vertices: i64 = 0;
     for (number, text) in Cursor::new(bytes).lines().enumerate() {
         let line = number + 1;
-        let syntax = |problem: String| MeshError::Syntax { line, problem };
+        let syntax = |problem: String| MeshError::syntax(line, &problem);
         let text = text.map_err(|_| syntax("not text (invalid UTF-8)".into()))?;
         let mut words = text.split_ascii_whitespace();
         match words.next() {

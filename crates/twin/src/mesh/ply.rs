@@ -1,52 +1,33 @@
 //! PLY (Stanford), text and binary, through `ply-rs-bw`. Only places and faces are read; a face of more corners becomes a fan.
 
-use super::{MAX_TRIANGLES, MeshError};
+use super::{MAX_TRIANGLES, MeshError, Triangle};
 use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{DefaultElement, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{DefaultElement, Property, PropertyAccess, PropertyAccessResult};
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Vertex([f32; 3]);
-
-impl Vertex {
-    fn set(&mut self, name: &str, value: f64) -> PropertyAccessResult {
-        let axis = match name {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
-            _ => return PropertyAccessResult::Ignored,
-        };
-        self.0[axis] = value as f32;
-        PropertyAccessResult::Set
-    }
-}
 
 impl PropertyAccess for Vertex {
     fn new() -> Self {
         Self::default()
     }
-    fn set_char(&mut self, name: &str, value: i8) -> PropertyAccessResult {
-        self.set(name, value.into())
-    }
-    fn set_uchar(&mut self, name: &str, value: u8) -> PropertyAccessResult {
-        self.set(name, value.into())
-    }
-    fn set_short(&mut self, name: &str, value: i16) -> PropertyAccessResult {
-        self.set(name, value.into())
-    }
-    fn set_ushort(&mut self, name: &str, value: u16) -> PropertyAccessResult {
-        self.set(name, value.into())
-    }
-    fn set_int(&mut self, name: &str, value: i32) -> PropertyAccessResult {
-        self.set(name, value.into())
-    }
-    fn set_uint(&mut self, name: &str, value: u32) -> PropertyAccessResult {
-        self.set(name, value.into())
-    }
-    fn set_float(&mut self, name: &str, value: f32) -> PropertyAccessResult {
-        self.set(name, value.into())
-    }
-    fn set_double(&mut self, name: &str, value: f64) -> PropertyAccessResult {
-        self.set(name, value)
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let axis = ["x", "y", "z"].iter().position(|axis| *axis == name);
+        let value = match property {
+            Property::Char(x) => f64::from(x),
+            Property::UChar(x) => f64::from(x),
+            Property::Short(x) => f64::from(x),
+            Property::UShort(x) => f64::from(x),
+            Property::Int(x) => f64::from(x),
+            Property::UInt(x) => f64::from(x),
+            Property::Float(x) => f64::from(x),
+            Property::Double(x) => x,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        let Some(axis) = axis else { return PropertyAccessResult::Ignored };
+        self.0[axis] = value as f32;
+        PropertyAccessResult::Set
     }
 }
 
@@ -54,46 +35,31 @@ impl PropertyAccess for Vertex {
 #[derive(Debug, Clone, Default)]
 struct Face(Vec<i64>);
 
-impl Face {
-    fn set<T: Into<i64>>(&mut self, name: &str, values: Vec<T>) -> PropertyAccessResult {
-        // Both names are in use.
-        if name != "vertex_indices" && name != "vertex_index" {
-            return PropertyAccessResult::Ignored;
-        }
-        self.0 = values.into_iter().map(Into::into).collect();
-        PropertyAccessResult::Set
-    }
-}
-
 impl PropertyAccess for Face {
     fn new() -> Self {
         Self::default()
     }
-    fn set_list_char(&mut self, name: &str, value: Vec<i8>) -> PropertyAccessResult {
-        self.set(name, value)
-    }
-    fn set_list_uchar(&mut self, name: &str, value: Vec<u8>) -> PropertyAccessResult {
-        self.set(name, value)
-    }
-    fn set_list_short(&mut self, name: &str, value: Vec<i16>) -> PropertyAccessResult {
-        self.set(name, value)
-    }
-    fn set_list_ushort(&mut self, name: &str, value: Vec<u16>) -> PropertyAccessResult {
-        self.set(name, value)
-    }
-    fn set_list_int(&mut self, name: &str, value: Vec<i32>) -> PropertyAccessResult {
-        self.set(name, value)
-    }
-    fn set_list_uint(&mut self, name: &str, value: Vec<u32>) -> PropertyAccessResult {
-        self.set(name, value)
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        // Both names are in use.
+        if name != "vertex_indices" && name != "vertex_index" {
+            return PropertyAccessResult::Ignored;
+        }
+        self.0 = match property {
+            Property::ListChar(i) => i.into_iter().map(i64::from).collect(),
+            Property::ListUChar(i) => i.into_iter().map(i64::from).collect(),
+            Property::ListShort(i) => i.into_iter().map(i64::from).collect(),
+            Property::ListUShort(i) => i.into_iter().map(i64::from).collect(),
+            Property::ListInt(i) => i.into_iter().map(i64::from).collect(),
+            Property::ListUInt(i) => i.into_iter().map(i64::from).collect(),
+            _ => return PropertyAccessResult::Ignored,
+        };
+        PropertyAccessResult::Set
     }
 }
 
-pub(super) fn read(bytes: &[u8]) -> Result<Vec<[[f32; 3]; 3]>, MeshError> {
-    if bytes.is_empty() {
-        return Err(MeshError::EmptyFile);
-    }
-    let bad = |problem: String| MeshError::Unreadable { format: "PLY", problem };
+pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
+    let bad = |problem: String| MeshError::File(format!("not a PLY file that can be read: {problem}"));
     let mut reader = Reader::new(bytes);
     let (vertices_of, faces_of) = (Parser::<Vertex>::new(), Parser::<Face>::new());
     let header = vertices_of.read_header(&mut reader).map_err(|e| bad(e.to_string()))?;
@@ -136,7 +102,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<[[f32; 3]; 3]>, MeshError> {
             triangles.push([at(corners[0])?, at(pair[0])?, at(pair[1])?]);
         }
         if triangles.len() > MAX_TRIANGLES {
-            return Err(MeshError::TooManyTriangles { triangles: triangles.len() as u64 });
+            return Err(MeshError::too_many(triangles.len()));
         }
     }
     Ok(triangles)

@@ -3,17 +3,13 @@
 //! A file is binary when its size is 84 + 50 n for the count n at byte 80 (many binary files begin with the
 //! word `solid`), ASCII when it begins with `solid`, and otherwise neither.
 
-use super::{MAX_TRIANGLES, MeshError, TriMesh};
-
-type Triangle = [[f32; 3]; 3];
+use super::{MAX_TRIANGLES, MeshError, TriMesh, Triangle};
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;
 
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
-    if bytes.is_empty() {
-        return Err(MeshError::EmptyFile);
-    }
+    let size = bytes.len();
     let count =
         (bytes.len() >= HEADER).then(|| u32::from_le_bytes([bytes[80], bytes[81], bytes[82], bytes[83]]));
     if let Some(count) = count {
@@ -25,24 +21,29 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
     if bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) {
         return read_ascii(bytes);
     }
-    match count {
-        None => Err(MeshError::ShortHeader { size: bytes.len() }),
-        Some(count) => {
-            let expected = HEADER as u64 + RECORD as u64 * u64::from(count);
-            if count as usize > MAX_TRIANGLES {
-                Err(MeshError::TooManyTriangles { triangles: u64::from(count) })
-            } else if expected > bytes.len() as u64 {
-                Err(MeshError::Truncated { count, expected, size: bytes.len() })
-            } else {
-                Err(MeshError::NotStl { size: bytes.len(), count })
-            }
-        }
+    let Some(count) = count else {
+        let problem = format!("not an STL file: {size} bytes, a binary header alone has 84");
+        return Err(MeshError::File(problem));
+    };
+    let expected = HEADER as u64 + RECORD as u64 * u64::from(count);
+    if count as usize > MAX_TRIANGLES {
+        return Err(MeshError::too_many(count));
     }
+    Err(MeshError::File(if expected > size as u64 {
+        format!(
+            "the file is cut off: its header promises {count} triangles ({expected} bytes), it has {size} bytes"
+        )
+    } else {
+        format!(
+            "not an STL file: {size} bytes are not 84 + 50 x the {count} triangles its header promises, \
+             and it does not begin with `solid`"
+        )
+    }))
 }
 
 fn read_binary(records: &[u8], count: u32) -> Result<Vec<Triangle>, MeshError> {
     if count as usize > MAX_TRIANGLES {
-        return Err(MeshError::TooManyTriangles { triangles: u64::from(count) });
+        return Err(MeshError::too_many(count));
     }
     let float = |record: &[u8], i: usize| {
         f32::from_le_bytes([record[4 * i], record[4 * i + 1], record[4 * i + 2], record[4 * i + 3]])
@@ -67,28 +68,28 @@ fn read_ascii(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
         match keyword.to_ascii_lowercase().as_str() {
             "vertex" => {
                 if corners.len() == 3 {
-                    return Err(MeshError::Syntax { line, problem: "a fourth vertex in one facet".into() });
+                    return Err(MeshError::syntax(line, "a fourth vertex in one facet"));
                 }
                 corners.push(vertex(words, line)?);
             }
             "endfacet" => {
                 let [a, b, c] = corners[..] else {
                     let problem = format!("the facet ends after {} of 3 vertices", corners.len());
-                    return Err(MeshError::Syntax { line, problem });
+                    return Err(MeshError::syntax(line, &problem));
                 };
                 if triangles.len() == MAX_TRIANGLES {
-                    return Err(MeshError::TooManyTriangles { triangles: MAX_TRIANGLES as u64 + 1 });
+                    return Err(MeshError::too_many(MAX_TRIANGLES + 1));
                 }
                 triangles.push([a, b, c]);
                 corners.clear();
             }
             "endsolid" => ended = true,
             "solid" | "facet" | "outer" | "endloop" => {}
-            other => return Err(MeshError::Syntax { line, problem: format!("unknown keyword `{other}`") }),
+            other => return Err(MeshError::syntax(line, &format!("unknown keyword `{other}`"))),
         }
     }
     if !ended || !corners.is_empty() {
-        return Err(MeshError::Syntax { line, problem: "the file ends before `endsolid`".into() });
+        return Err(MeshError::syntax(line, "the file ends before `endsolid`"));
     }
     Ok(triangles)
 }
@@ -96,13 +97,9 @@ fn read_ascii(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
 fn vertex<'a>(mut words: impl Iterator<Item = &'a str>, line: usize) -> Result<[f32; 3], MeshError> {
     let mut coordinates = [0.0; 3];
     for (i, c) in coordinates.iter_mut().enumerate() {
-        let word = words.next().ok_or_else(|| MeshError::Syntax {
-            line,
-            problem: format!("a vertex has 3 coordinates, found {i}"),
-        })?;
-        *c = word
-            .parse()
-            .map_err(|_| MeshError::Syntax { line, problem: format!("`{word}` is not a number") })?;
+        let missing = || MeshError::syntax(line, &format!("a vertex has 3 coordinates, found {i}"));
+        let word = words.next().ok_or_else(missing)?;
+        *c = word.parse().map_err(|_| MeshError::syntax(line, &format!("`{word}` is not a number")))?;
     }
     Ok(coordinates)
 }

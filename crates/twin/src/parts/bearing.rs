@@ -12,7 +12,6 @@ struct Rings {
     inner_shoulder_mm: f64,
     outer_shoulder_mm: f64,
     chamfer_mm: f64,
-    segments: usize,
 }
 
 impl Rings {
@@ -41,7 +40,7 @@ impl Rings {
                     (-h, inside + c),
                 ]
             };
-            b.revolve(&outline.map(|(x, radius)| (x * 1e-3, radius * 1e-3)), self.segments);
+            b.revolve(&outline.map(|(x, radius)| (x * 1e-3, radius * 1e-3)), 240);
         }
     }
 }
@@ -87,17 +86,15 @@ impl BallBearing {
     /// The mesh, in metres.
     pub fn mesh(&self) -> TriMesh {
         let mut b = Builder::default();
-        Rings {
-            bore_mm: self.bore_mm,
-            outer_mm: self.outer_mm,
-            width_mm: self.width_mm,
-            inner_shoulder_mm: self.inner_shoulder_mm,
-            outer_shoulder_mm: self.outer_shoulder_mm,
-            chamfer_mm: self.chamfer_mm,
-            segments: 240,
-        }
-        .add(&mut b);
-        let pitch = (self.inner_shoulder_mm + self.outer_shoulder_mm) / 4.0 * 1e-3;
+        self.add(&mut b);
+        b.finish()
+    }
+
+    pub(super) fn add(&self, b: &mut Builder) {
+        let Self { bore_mm, outer_mm, width_mm, inner_shoulder_mm, outer_shoulder_mm, chamfer_mm, .. } =
+            *self;
+        Rings { bore_mm, outer_mm, width_mm, inner_shoulder_mm, outer_shoulder_mm, chamfer_mm }.add(b);
+        let pitch = (inner_shoulder_mm + outer_shoulder_mm) / 4.0 * 1e-3;
         let radius = self.ball_mm / 2.0 * 1e-3;
         // Half circle from pole to pole, revolved about the ball's own axis parallel to x.
         let arc: Vec<(f64, f64)> = (0..=16)
@@ -106,8 +103,7 @@ impl BallBearing {
                 (radius * c, if i == 0 || i == 16 { 0.0 } else { radius * s })
             })
             .collect();
-        add_rolling(&mut b, &arc, 32, pitch, self.balls);
-        b.finish()
+        add_rolling(b, &arc, 32, pitch, self.balls);
     }
 }
 
@@ -156,21 +152,18 @@ impl RollerBearing {
     /// The mesh, in metres.
     pub fn mesh(&self) -> TriMesh {
         let mut b = Builder::default();
-        Rings {
-            bore_mm: self.bore_mm,
-            outer_mm: self.outer_mm,
-            width_mm: self.width_mm,
-            inner_shoulder_mm: self.inner_shoulder_mm,
-            outer_shoulder_mm: self.outer_shoulder_mm,
-            chamfer_mm: self.chamfer_mm,
-            segments: 240,
-        }
-        .add(&mut b);
-        let pitch = (self.inner_shoulder_mm + self.outer_shoulder_mm) / 4.0 * 1e-3;
+        self.add(&mut b);
+        b.finish()
+    }
+
+    pub(super) fn add(&self, b: &mut Builder) {
+        let Self { bore_mm, outer_mm, width_mm, inner_shoulder_mm, outer_shoulder_mm, chamfer_mm, .. } =
+            *self;
+        Rings { bore_mm, outer_mm, width_mm, inner_shoulder_mm, outer_shoulder_mm, chamfer_mm }.add(b);
+        let pitch = (inner_shoulder_mm + outer_shoulder_mm) / 4.0 * 1e-3;
         let (h, r, c) = (self.roller_length_mm / 2.0 * 1e-3, self.roller_mm / 2.0 * 1e-3, 0.2e-3);
         let roller = [(h, 0.0), (h, r - c), (h - c, r), (c - h, r), (-h, r - c), (-h, 0.0)];
-        add_rolling(&mut b, &roller, 48, pitch, self.rollers);
-        b.finish()
+        add_rolling(b, &roller, 48, pitch, self.rollers);
     }
 }
 

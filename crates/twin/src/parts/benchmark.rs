@@ -1,6 +1,6 @@
 //! Two hundred parts in twelve families, made on demand: the same name gives the same mesh everywhere.
 //!
-//! Each family is a file with one function from random sizes to a mesh. Sizes are those of parts that a WSG 50 (opening 110 mm) with
+//! Each family is a file with one function from random sizes to a body. Sizes are those of parts that a WSG 50 (opening 110 mm) with
 //! pads of 28 x 21 mm can hold. Nothing is taken from a catalogue or a data set; proportions are ordinary ones.
 //!
 //! Parts that are the same shape but for rounding (see [`Fingerprint`]) are left out before families are split, so no part for training
@@ -22,7 +22,12 @@ mod tube;
 
 pub use fingerprint::Fingerprint;
 
+use super::grid::Grid;
 use super::numbers::Numbers;
+use super::outline::{Edge, Point, circle, cornered, polygon, rectangle, slot};
+use super::prism::Prism;
+use super::turned::{Section, Turned};
+use super::{BallBearing, Builder, InvoluteGear, RollerBearing, sin_cos_turn};
 use crate::TriMesh;
 use std::sync::OnceLock;
 
@@ -58,7 +63,7 @@ pub struct Family {
     pub name: &'static str,
     /// What it is for.
     pub split: Split,
-    make: fn(&mut Numbers) -> TriMesh,
+    make: fn(&mut Numbers, &mut Builder),
 }
 
 /// All families. The three for tests were chosen by hand, before anything was trained.
@@ -137,7 +142,9 @@ pub fn part(name: &str) -> Option<&'static BenchmarkPart> {
 
 /// Variant `index` of a family under any seed, in metres: more parts than those of the benchmark.
 pub fn variant(seed: u64, family: usize, index: u64) -> TriMesh {
-    (FAMILIES[family % FAMILIES.len()].make)(&mut Numbers::new(seed, family as u64, index))
+    let mut b = Builder::default();
+    (FAMILIES[family % FAMILIES.len()].make)(&mut Numbers::new(seed, family as u64, index), &mut b);
+    b.finish()
 }
 
 #[cfg(test)]

@@ -2,8 +2,7 @@
 
 use super::{Elastic, Gel, Part, RobotArm};
 use crate::config::{
-    ArmFile, ConfigError, GelFile, GelModel, PartFile, RobotFile, TwinFile, Twist, in_range, suggestion,
-    unknown_part_hint,
+    ArmFile, ConfigError, GelFile, GelModel, PartFile, RobotFile, TwinFile, Twist, in_range,
 };
 use crate::effects::{self, Effect, EffectSpec, OutsideFit, Per};
 use crate::frames::{pose, rotation_from_fixed_xyz};
@@ -55,24 +54,19 @@ pub(super) fn check_gel(gel: &GelFile, key: &str) -> Result<Gel, ConfigError> {
             return Err(ConfigError::new(format!("{key}.kernels_px[{i}]"), problem));
         }
     }
-    let mm = |name: &str, value: f64, range: std::ops::RangeInclusive<f64>| {
-        in_range(&format!("{key}.{name}"), value, range, "mm").map(|x| x * 1e-3)
+    let checked = |name: &str, value: f64, range: std::ops::RangeInclusive<f64>, unit: &str| {
+        in_range(&format!("{key}.{name}"), value, range, unit)
     };
     Ok(Gel {
-        thickness_m: mm("thickness_mm", gel.thickness_mm, 0.1..=50.0)?,
-        width_m: mm("width_mm", gel.width_mm, 1.0..=200.0)?,
-        height_m: mm("height_mm", gel.height_mm, 1.0..=200.0)?,
+        thickness_m: checked("thickness_mm", gel.thickness_mm, 0.1..=50.0, "mm")? * 1e-3,
+        width_m: checked("width_mm", gel.width_mm, 1.0..=200.0, "mm")? * 1e-3,
+        height_m: checked("height_mm", gel.height_mm, 1.0..=200.0, "mm")? * 1e-3,
         shear_stiffness_n_per_m: 1e3
-            * in_range(
-                &format!("{key}.shear_stiffness_n_per_mm"),
-                gel.shear_stiffness_n_per_mm,
-                0.1..=1e4,
-                "N/mm",
-            )?,
-        shear_by_area: in_range(&format!("{key}.shear_by_area"), gel.shear_by_area, 0.0..=1.0, "1")?,
+            * checked("shear_stiffness_n_per_mm", gel.shear_stiffness_n_per_mm, 0.1..=1e4, "N/mm")?,
+        shear_by_area: checked("shear_by_area", gel.shear_by_area, 0.0..=1.0, "1")?,
         kernels_px: gel.kernels_px.clone(),
-        restore_depth_fraction: in_range(
-            &format!("{key}.restore_depth_fraction"),
+        restore_depth_fraction: checked(
+            "restore_depth_fraction",
             gel.restore_depth_fraction,
             0.0..=1.0,
             "1",
@@ -130,18 +124,14 @@ pub(super) fn check_effect(file: &TwinFile, index: usize) -> Result<Effect, Conf
     let known = || effects::LIBRARY.iter().map(|spec| spec.id);
     let spec = effects::find(&effect.name).ok_or_else(|| {
         let error = ConfigError::new(key("name"), format!("there is no effect `{}`", effect.name));
-        match suggestion(&effect.name, known()) {
-            Some(name) => error.hint(format!("did you mean `{name}`?")),
-            None => {
-                error.hint(format!("effects of this version: {}", known().collect::<Vec<_>>().join(", ")))
-            }
-        }
+        error.suggest(&effect.name, known(), || {
+            format!("effects of this version: {}", known().collect::<Vec<_>>().join(", "))
+        })
     })?;
     if let Some(part) = &effect.part
         && !file.parts.contains_key(part)
     {
-        let error = ConfigError::new(key("part"), format!("the twin has no part `{part}`"));
-        return Err(unknown_part_hint(error, part, file.parts.keys()));
+        return Err(ConfigError::unknown_part(key("part"), part, file.parts.keys()));
     }
     let fixed =
         ["part", "fitted_grip_force_n", "outside_fit", "per", "reference_area_mm2", "source", "calibration"];
@@ -149,10 +139,8 @@ pub(super) fn check_effect(file: &TwinFile, index: usize) -> Result<Effect, Conf
         if spec.parameters.iter().all(|p| p.name != name) {
             let names: Vec<&str> = spec.parameters.iter().map(|p| p.name).chain(fixed).collect();
             let error = ConfigError::new(key(name), format!("`{}` has no parameter `{name}`", spec.id));
-            return Err(match suggestion(name, names.iter().copied()) {
-                Some(close) => error.hint(format!("did you mean `{close}`?")),
-                None => error.hint(format!("its keys: {}", names.join(", "))),
-            });
+            let keys = || format!("its keys: {}", names.join(", "));
+            return Err(error.suggest(name, names.iter().copied(), keys));
         }
     }
     if spec.friction.is_none() {

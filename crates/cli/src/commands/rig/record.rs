@@ -2,7 +2,9 @@
 
 use gripgen::record::{FrameView, RigFilm, RigFrame, RigLog, RigLogEvent, RigPull, RigResult, RigStream};
 use gripgen::twin::draw::Drawn;
-use gripgen::twin::evidence::{Expected, GripForceEvidence, LabelEvidence, WrenchRow, ZERO_SHIFT, judge};
+use gripgen::twin::label_check::{
+    Expected, GripForceEvidence, LabelEvidence, WrenchRow, ZERO_SHIFT, check_label,
+};
 use gripgen::twin::{Campaign, Covariates, Jaw, PerJaw, PlannedPull, PullKind, PullSettings, Scenario};
 use gripgen_rig::experiment::film::FilmedFrame;
 use gripgen_rig::experiment::pull::{ExecutedPull, FrameStamp};
@@ -143,7 +145,7 @@ pub fn suspect(config: &RigConfig, campaign: &Campaign, m: &ExecutedPull) -> Opt
         wrench: &wrench,
         ..of_trace
     };
-    let by_force = judge(&evidence, &Expected::default()).reason();
+    let by_force = check_label(&evidence, &Expected::default()).reason();
     let reasons: Vec<String> = by_force.into_iter().chain(m.doubts.iter().cloned()).collect();
     (!reasons.is_empty()).then(|| reasons.join("; "))
 }

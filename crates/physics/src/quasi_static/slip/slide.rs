@@ -45,7 +45,7 @@ impl<const N: usize> Lanes<N> {
         for (k, (slot, pull)) in slipping.iter().zip(pulls).enumerate() {
             let Some(slipping) = slot else { continue };
             (lanes.force_n[k], lanes.displacement_m[k]) = (slipping.control.force_n(), pull.displacement_m);
-            lanes.most[k] = (rig.stop_m, run.rule.decided_n());
+            lanes.most[k] = (rig.stop_m, run.decided_n);
         }
         lanes
     }
@@ -157,7 +157,7 @@ impl QuasiStatic {
 #[cfg(test)]
 mod tests {
     use super::super::tests::rig;
-    use super::super::{LabelRule, RimTable, StuckPull};
+    use super::super::{RimTable, StuckPull};
     use super::*;
     use gripgen_twin::effects::{CommandChain, Creep, find};
     use gripgen_twin::{Backbone, Staircase};
@@ -170,7 +170,6 @@ mod tests {
         let rings: Vec<(f64, f64)> = (0..40).map(|i| (1.0, 40.0 - f64::from(i))).collect();
         let backbone = Backbone::new(&rings, 1.0);
         let staircase = Staircase::constant(1.0, 0.104, 9.0);
-        let rule = LabelRule::new(3.0, 0.2);
         let lowpass = [(find("sensor_lowpass").unwrap(), [0.03].as_slice())];
         let gain = [(find("controller_gain").unwrap(), [1.1].as_slice())];
         let chains = [
@@ -197,7 +196,7 @@ mod tests {
                         backbone: &backbone,
                         creep,
                         rim: &RimTable::new(creep),
-                        rule: &rule,
+                        decided_n: 4.0,
                         sensor,
                         command,
                     };

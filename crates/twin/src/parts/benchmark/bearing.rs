@@ -1,9 +1,6 @@
 //! Bearings: rolling ones of ordinary sizes, and plain bushes with and without a flange.
 
-use super::super::numbers::Numbers;
-use super::super::turned::{Section, Turned};
-use super::super::{BallBearing, Builder, RollerBearing};
-use crate::TriMesh;
+use super::{BallBearing, Builder, Numbers, RollerBearing, Section, Turned};
 use std::f64::consts::PI;
 
 /// Bore, outer diameter and width of ordinary bearings (ISO 15).
@@ -24,7 +21,7 @@ const SIZES_MM: [[f64; 3]; 14] = [
     [20.0, 47.0, 14.0],
 ];
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
     let [bore_mm, outer_mm, width_mm] = n.one_of(&SIZES_MM);
     let wall = (outer_mm - bore_mm) / 2.0;
     let pitch = (outer_mm + bore_mm) / 2.0;
@@ -42,7 +39,7 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
                 outer_shoulder_mm: pitch + 0.8 * ball_mm,
                 chamfer_mm,
             }
-            .mesh()
+            .add(b);
         }
         1 => {
             let roller_mm = (0.45 + 0.1 * n.share()) * wall;
@@ -58,7 +55,7 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
                 outer_shoulder_mm: pitch + roller_mm + 0.1,
                 chamfer_mm,
             }
-            .mesh()
+            .add(b);
         }
         kind => {
             let length = n.between(0.8 * bore_mm, 2.2 * bore_mm).max(6.0);
@@ -68,12 +65,10 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
                 steps.push((n.between(1.5, 4.0), Section::Round(outer + n.between(2.0, 6.0))));
             }
             let (edge, rim) = (n.edge(0.3, 1.0), n.edge(0.3, 0.8));
-            let mut b = Builder::default();
             Turned::new(96)
                 .steps(-length / 2.0, &steps, edge)
                 .bore(Section::Round(bore_mm / 2.0), rim)
-                .add(&mut b);
-            b.finish()
+                .add(b);
         }
     }
 }

@@ -1,12 +1,8 @@
 //! Brackets: L, U, Z, T, hat and gusset profiles of sheet or cast, drawn out; bends and edges are rounded.
 
-use super::super::Builder;
-use super::super::numbers::Numbers;
-use super::super::outline::{Edge, Point, circle, cornered};
-use super::super::prism::Prism;
-use crate::TriMesh;
+use super::{Builder, Edge, Numbers, Point, Prism, circle, cornered};
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
     let t = n.between(2.5, 8.0);
     let (a, c) = (n.between(25.0, 60.0).max(5.0 * t), n.between(20.0, 50.0).max(4.0 * t));
     let width = n.between(14.0, 50.0);
@@ -54,7 +50,6 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
     };
     let round = n.between(0.15, 0.45) * t;
     let width = if holes.is_empty() { width } else { n.between(6.0, 20.0) };
-    let mut b = Builder::default();
     Prism {
         outline: cornered(&profile, Edge::Round(round)),
         holes,
@@ -62,6 +57,5 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
         edge: n.edge(0.2, 0.8).at_most(0.1 * t.max(4.0)),
         twist: 0.0,
     }
-    .add(&mut b);
-    b.finish()
+    .add(b);
 }

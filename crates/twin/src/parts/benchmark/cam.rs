@@ -1,15 +1,12 @@
 //! Cams: discs beside their axis, eggs, lobes, hearts and snails, with a bore and some with a hub.
 
-use super::super::numbers::Numbers;
-use super::super::outline::{Edge, Point, circle, cornered, rectangle};
-use super::super::prism::Prism;
-use super::super::turned::{Section, Turned};
-use super::super::{Builder, sin_cos_turn};
-use crate::TriMesh;
+use super::{
+    Builder, Edge, Numbers, Point, Prism, Section, Turned, circle, cornered, rectangle, sin_cos_turn,
+};
 
 const AROUND: usize = 144;
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
     let base = n.between(9.0, 18.0);
     let lift = n.between(0.15, 0.5) * base;
     let kind = n.whole(0, 4);
@@ -39,16 +36,14 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
         _ => circle([0.0; 2], bore, 48),
     };
     let width = n.between(6.0, 18.0);
-    let mut b = Builder::default();
     let edge = n.edge(0.2, 0.8);
-    Prism { outline, holes: vec![hole], ends: [-width / 2.0, width / 2.0], edge, twist: 0.0 }.add(&mut b);
+    Prism { outline, holes: vec![hole], ends: [-width / 2.0, width / 2.0], edge, twist: 0.0 }.add(b);
     if n.chance(0.4) {
         // A body of its own, a hundredth of a millimetre from the face.
         let hub = [(n.between(3.0, 9.0), Section::Round(0.75 * base))];
         Turned::new(48)
             .steps(width / 2.0 + 0.01, &hub, Edge::Chamfer(0.5))
             .bore(Section::Round(0.5 * base), Edge::Sharp)
-            .add(&mut b);
+            .add(b);
     }
-    b.finish()
 }

@@ -1,17 +1,12 @@
 //! Connectors: housings with rows of cavities, with pins in them or without, round ones with a collar, and trapezoids.
 
-use super::super::Builder;
-use super::super::numbers::Numbers;
-use super::super::outline::{Edge, circle, cornered, rectangle};
-use super::super::prism::Prism;
-use super::super::turned::{Section, Turned};
-use crate::TriMesh;
+use super::{Builder, Edge, Numbers, Prism, Section, Turned, circle, cornered, rectangle};
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
-    if n.chance(0.3) { round(n) } else { block(n) }
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
+    if n.chance(0.3) { round(n, b) } else { block(n, b) }
 }
 
-fn block(n: &mut Numbers) -> TriMesh {
+fn block(n: &mut Numbers, b: &mut Builder) {
     let pitch = n.one_of(&[3.96, 5.0, 5.08, 7.5, 10.0]);
     let (columns, rows) = (n.whole(2, if pitch > 6.0 { 5 } else { 8 }), n.whole(1, 3));
     let wall = n.between(1.5, 4.0);
@@ -22,7 +17,6 @@ fn block(n: &mut Numbers) -> TriMesh {
     let round_cavities = n.chance(0.4);
     let pins = n.chance(0.6);
     let sticks_out = n.between(0.0, 5.0);
-    let mut b = Builder::default();
     let (mut holes, mut pin_prisms) = (Vec::new(), Vec::new());
     for i in 0..columns {
         for j in 0..rows {
@@ -71,12 +65,11 @@ fn block(n: &mut Numbers) -> TriMesh {
             cornered(&outline, Edge::Round(0.5))
         }
     };
-    Prism { outline, holes, ends: [-height / 2.0, height / 2.0], edge, twist: 0.0 }.add(&mut b);
-    pin_prisms.iter().for_each(|pin| pin.add(&mut b));
-    b.finish()
+    Prism { outline, holes, ends: [-height / 2.0, height / 2.0], edge, twist: 0.0 }.add(b);
+    pin_prisms.iter().for_each(|pin| pin.add(b));
 }
 
-fn round(n: &mut Numbers) -> TriMesh {
+fn round(n: &mut Numbers, b: &mut Builder) {
     let radius = n.between(7.0, 16.0);
     let edge = n.edge(0.3, 1.0);
     let grip = match n.chance(0.5) {
@@ -90,17 +83,15 @@ fn round(n: &mut Numbers) -> TriMesh {
     ];
     let depth: f64 = steps.iter().map(|s| s.0).sum();
     let floor = depth - 0.7 * steps[2].0;
-    let mut b = Builder::default();
     Turned::new(96)
         .steps(0.0, &steps, edge)
         .recess(floor, Section::Round(0.7 * radius), Edge::Chamfer(0.3))
-        .add(&mut b);
+        .add(b);
     for k in 0..n.whole(2, 6) {
         // Pins on the floor, a hundredth of a millimetre above it.
         let at = circle([0.0; 2], 0.4 * radius, 7)[k];
         let pin = circle(at, 0.1 * radius, 16);
         let ends = [floor + 0.01, depth - 1.0];
-        Prism { outline: pin, holes: vec![], ends, edge: Edge::Chamfer(0.2), twist: 0.0 }.add(&mut b);
+        Prism { outline: pin, holes: vec![], ends, edge: Edge::Chamfer(0.2), twist: 0.0 }.add(b);
     }
-    b.finish()
 }

@@ -1,14 +1,9 @@
 //! Gears: spur and helical, with chamfered faces, a bore with or without a keyway, and some with a hub.
 
-use super::super::numbers::Numbers;
-use super::super::outline::{Edge, Point, circle};
-use super::super::prism::Prism;
-use super::super::turned::{Section, Turned};
-use super::super::{Builder, InvoluteGear, sin_cos_turn};
-use crate::TriMesh;
+use super::{Builder, Edge, InvoluteGear, Numbers, Point, Prism, Section, Turned, circle, sin_cos_turn};
 use std::f64::consts::PI;
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
     let module = n.one_of(&[0.8, 1.0, 1.25, 1.5, 2.0, 2.5]);
     let most = (52.0 / module) as usize;
     let teeth = n.whole(13, most.clamp(14, 44));
@@ -21,7 +16,6 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
     } else {
         circle([0.0; 2], bore, 48)
     };
-    let mut b = Builder::default();
     Prism {
         outline: outline(module, teeth),
         holes: vec![hole],
@@ -29,7 +23,7 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
         edge: Edge::Chamfer(0.12 * module),
         twist: if n.chance(0.35) { n.share() * width / (12.0 * PI * pitch) * 2.0 } else { 0.0 },
     }
-    .add(&mut b);
+    .add(b);
     if n.chance(0.4) {
         // A body of its own, a hundredth of a millimetre from the face.
         let hub = (1.6 * bore).min(0.8 * (pitch - 1.25 * module)).max(bore + 1.0);
@@ -37,9 +31,8 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
         Turned::new(48)
             .steps(half + 0.01, &[(length, Section::Round(hub))], n.edge(0.3, 0.8))
             .bore(Section::Round(bore + 0.005), Edge::Sharp)
-            .add(&mut b);
+            .add(b);
     }
-    b.finish()
 }
 
 /// Teeth, counter-clockwise; involute flanks on which the tooth gets thinner towards its tip.

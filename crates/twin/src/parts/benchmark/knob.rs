@@ -1,12 +1,8 @@
 //! Knobs and handles: fluted, star, polygonal and smooth heads on a shank, with a blind bore or a foot.
 
-use super::super::Builder;
-use super::super::numbers::Numbers;
-use super::super::outline::Edge;
-use super::super::turned::{Section, Turned};
-use crate::TriMesh;
+use super::{Builder, Edge, Numbers, Section, Turned};
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
     let radius = n.between(8.0, 22.0);
     let height = n.between(9.0, 26.0);
     let head = match n.whole(0, 5) {
@@ -47,7 +43,5 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
         let section = if n.chance(0.5) { Section::Flat(shaft, 0.6 * shaft) } else { Section::Round(shaft) };
         turned = turned.recess(-0.4 * height, section, Edge::Chamfer(0.2));
     }
-    let mut b = Builder::default();
-    turned.add(&mut b);
-    b.finish()
+    turned.add(b);
 }

@@ -1,17 +1,12 @@
 //! Lattices: plates of square, round, hexagonal or diamond cells, and cubes of struts.
 
-use super::super::Builder;
-use super::super::grid::Grid;
-use super::super::numbers::Numbers;
-use super::super::outline::{Edge, circle, cornered, polygon, rectangle};
-use super::super::prism::Prism;
-use crate::TriMesh;
+use super::{Builder, Edge, Grid, Numbers, Prism, circle, cornered, polygon, rectangle};
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
-    if n.chance(0.45) { struts(n) } else { plate(n) }
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
+    if n.chance(0.45) { struts(n, b) } else { plate(n, b) }
 }
 
-fn plate(n: &mut Numbers) -> TriMesh {
+fn plate(n: &mut Numbers, b: &mut Builder) {
     let cell = n.between(4.0, 11.0);
     let wall = n.between(1.2, 2.6);
     let pitch = cell + wall;
@@ -42,7 +37,6 @@ fn plate(n: &mut Numbers) -> TriMesh {
         }
     }
     let height = n.between(6.0, 24.0);
-    let mut b = Builder::default();
     Prism {
         outline: cornered(&rectangle([0.0; 2], size), Edge::Round(2.0)),
         holes,
@@ -50,12 +44,11 @@ fn plate(n: &mut Numbers) -> TriMesh {
         edge: n.edge(0.1, 0.3),
         twist: 0.0,
     }
-    .add(&mut b);
-    b.finish()
+    .add(b);
 }
 
 /// Square struts along the edges of cubes.
-fn struts(n: &mut Numbers) -> TriMesh {
+fn struts(n: &mut Numbers, b: &mut Builder) {
     let strut = n.between(1.6, 4.0);
     let gap = n.between(3.0, 9.0);
     let cells = [0, 1, 2].map(|_| n.whole(1, 5).min((60.0 / (strut + gap)) as usize).max(1));
@@ -70,7 +63,5 @@ fn struts(n: &mut Numbers) -> TriMesh {
         // A closed one has a floor and a lid across x.
         solid >= 2 || (closed && (at[0] == 0 || at[0] == 2 * cells[0]))
     };
-    let mut b = Builder::default();
-    Grid { planes, full: &full }.add(&mut b);
-    b.finish()
+    Grid { planes, full: &full }.add(b);
 }

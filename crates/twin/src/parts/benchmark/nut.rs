@@ -1,12 +1,8 @@
 //! Nuts: hexagonal, square, flanged, castle, cap and round with slots.
 
-use super::super::Builder;
-use super::super::numbers::Numbers;
-use super::super::outline::Edge;
-use super::super::turned::{Section, Turned};
-use crate::TriMesh;
+use super::{Builder, Edge, Numbers, Section, Turned};
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
     let thread = n.between(5.0, 24.0);
     let flats = thread * (1.55 + 0.2 * n.share()) / 2.0;
     let height = (thread * (0.6 + 0.6 * n.share())).max(5.0);
@@ -40,7 +36,5 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
             .step([0.0, height], Section::Slotted(1.1 * flats, 0.95 * flats, 4), [edge; 2])
             .bore(bore, rim),
     };
-    let mut b = Builder::default();
-    turned.add(&mut b);
-    b.finish()
+    turned.add(b);
 }

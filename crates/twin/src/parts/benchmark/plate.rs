@@ -1,12 +1,8 @@
 //! Plates with holes: rectangles, triangles, hexagons, discs, links; round holes, slots and windows.
 
-use super::super::numbers::Numbers;
-use super::super::outline::{Edge, Point, circle, cornered, polygon, rectangle, slot};
-use super::super::prism::Prism;
-use super::super::{Builder, sin_cos_turn};
-use crate::TriMesh;
+use super::{Builder, Edge, Numbers, Point, Prism, circle, cornered, polygon, rectangle, sin_cos_turn, slot};
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
     let (a, c) = (n.between(28.0, 75.0), n.between(24.0, 55.0));
     let corner = Edge::Round(n.between(2.0, 6.0));
     let mut holes = Vec::new();
@@ -52,11 +48,9 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
         }
         _ => link(n, a, &mut holes),
     };
-    let mut b = Builder::default();
     let thickness = n.between(3.0, 16.0);
     let edge = n.edge(0.2, 1.0);
-    Prism { outline, holes, ends: [-thickness / 2.0, thickness / 2.0], edge, twist: 0.0 }.add(&mut b);
-    b.finish()
+    Prism { outline, holes, ends: [-thickness / 2.0, thickness / 2.0], edge, twist: 0.0 }.add(b);
 }
 
 /// Two eyes of different size and what joins them.

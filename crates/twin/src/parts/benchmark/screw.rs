@@ -1,10 +1,6 @@
 //! Screws: hexagonal, socket, pan, countersunk and flanged heads; the thread is a row of rings.
 
-use super::super::Builder;
-use super::super::numbers::Numbers;
-use super::super::outline::Edge;
-use super::super::turned::{Section, Turned};
-use crate::TriMesh;
+use super::{Builder, Edge, Numbers, Section, Turned};
 
 /// Thread diameter, pitch, width across the flats of a hexagonal head (ISO 261, ISO 4017), of a socket (ISO 4762).
 const SIZES_MM: [[f64; 4]; 7] = [
@@ -17,7 +13,7 @@ const SIZES_MM: [[f64; 4]; 7] = [
     [20.0, 2.5, 30.0, 17.0],
 ];
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
     let [thread, pitch, flats, socket] = n.one_of(&SIZES_MM);
     let length = n.between((2.0 * thread).max(16.0), (6.0 * thread).min(90.0));
     let threaded = length * (0.3 + 0.7 * n.share());
@@ -70,7 +66,5 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
             )
             .step([0.15 * thread, 0.8 * thread], Section::Polygon(flats / 2.0, 6), [Edge::Sharp, edge]),
     };
-    let mut b = Builder::default();
-    turned.add(&mut b);
-    b.finish()
+    turned.add(b);
 }

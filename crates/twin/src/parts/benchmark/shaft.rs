@@ -1,12 +1,8 @@
 //! Shafts: one to five steps, some flat or beside the axis, with grooves, a bore.
 
-use super::super::Builder;
-use super::super::numbers::Numbers;
-use super::super::outline::Edge;
-use super::super::turned::{Section, Turned};
-use crate::TriMesh;
+use super::{Builder, Edge, Numbers, Section, Turned};
 
-pub(super) fn make(n: &mut Numbers) -> TriMesh {
+pub(super) fn make(n: &mut Numbers, b: &mut Builder) {
     let count = n.whole(1, 5);
     let edge = n.edge(0.3, 1.2);
     let mut steps: Vec<(f64, Section)> = Vec::new();
@@ -39,7 +35,5 @@ pub(super) fn make(n: &mut Numbers) -> TriMesh {
     if n.chance(0.25) {
         turned = turned.bore(Section::Round(thickest * n.one_of(&[0.1, 0.15, 0.2])), Edge::Chamfer(0.3));
     }
-    let mut b = Builder::default();
-    turned.add(&mut b);
-    b.finish()
+    turned.add(b);
 }

@@ -79,7 +79,7 @@ fn label_of(trace: &PullTrace) -> Option<f64> {
 }
 
 fn judged(trace: &PullTrace, label_n: f64) -> Judgement {
-    judge(&LabelEvidence::of_trace(label_n, TOLERANCE_N, STOP_M, Some(trace)), &Expected::default())
+    check_label(&LabelEvidence::of_trace(label_n, TOLERANCE_N, STOP_M, Some(trace)), &Expected::default())
 }
 
 /// Every fifth row, as such traces are stored.
@@ -139,7 +139,7 @@ fn a_trace_with_every_reading_gives_the_label_to_the_last_digit() {
     let label_n = label_of(&trace).unwrap();
     let of = |label_n: f64| {
         let of_trace = LabelEvidence::of_trace(label_n, TOLERANCE_N, STOP_M, Some(&trace));
-        judge(&LabelEvidence { every_reading: true, ..of_trace }, &Expected::default())
+        check_label(&LabelEvidence { every_reading: true, ..of_trace }, &Expected::default())
     };
     assert_eq!(of(label_n).verdict, Verdict::Holds);
     let off = of(label_n - 0.1);
@@ -226,7 +226,7 @@ fn a_zero_that_moved_shows_in_the_readings_after_the_pull() {
     let of_trace = LabelEvidence::of_trace(label_n, TOLERANCE_N, STOP_M, Some(&trace));
     let after = |zero_n: f64| {
         let no_load_after_n = [zero_n; 20];
-        judge(&LabelEvidence { no_load_after_n: &no_load_after_n, ..of_trace }, &Expected::default())
+        check_label(&LabelEvidence { no_load_after_n: &no_load_after_n, ..of_trace }, &Expected::default())
     };
     assert_eq!(after(0.1).verdict, Verdict::Holds);
     let moved = after(1.6);
@@ -238,7 +238,7 @@ fn a_zero_that_moved_shows_in_the_readings_after_the_pull() {
 #[test]
 fn missing_evidence_is_no_reason() {
     let nothing = LabelEvidence::of_trace(1e9, TOLERANCE_N, STOP_M, None);
-    assert_eq!(judge(&nothing, &Expected::default()).verdict, Verdict::NoEvidence);
+    assert_eq!(check_label(&nothing, &Expected::default()).verdict, Verdict::NoEvidence);
     let few = pull(SYNTHETIC, 1).rows().take(SYNTHETIC.no_load + 3).collect();
     assert_eq!(judged(&few, 1e9).verdict, Verdict::NoEvidence, "three rows of a pull");
     let trace = pull(SyntheticPull { no_load: 0, ..SYNTHETIC }, 2);
@@ -269,7 +269,7 @@ fn other_devices_speak_against_a_label() {
     let base = LabelEvidence::of_trace(20.0, TOLERANCE_N, STOP_M, None);
     let says = |reported_n| {
         let grip_force = Some(GripForceEvidence { asked_n: 20.0, reported_n, allowed_n: 1.0 });
-        judge(&LabelEvidence { grip_force, ..base }, &Expected::default())
+        check_label(&LabelEvidence { grip_force, ..base }, &Expected::default())
     };
     assert_eq!(says(20.4).verdict, Verdict::Holds);
     assert_eq!(
@@ -288,7 +288,7 @@ fn other_devices_speak_against_a_label() {
             }
         };
         let rows: Vec<WrenchRow> = (-20..=100).map(row).collect();
-        judge(&LabelEvidence { wrench: &rows, ..base }, &Expected::default())
+        check_label(&LabelEvidence { wrench: &rows, ..base }, &Expected::default())
     };
     assert_eq!(wrench(2.0, 0.03, 0.0).verdict, Verdict::Holds, "0.1 N of friction, and a lever of 3 cm");
     // sqrt(20^2 + 8^2) = 21.54.

@@ -1,5 +1,7 @@
 //! Labels of pulls whose readings carry noise.
 
+use crate::random::normal_cdf;
+
 /// Deviations of the noise beyond which a reading is on one side of the tolerance for sure.
 const WIDE: f64 = 7.0;
 
@@ -115,10 +117,6 @@ fn within(difference_n: f64, tolerance_n: f64, noise_n: f64) -> (f64, f64, f64) 
     let shift = (fa - fb) / p;
     let var = (1.0 + (a * fa - b * fb) / p - shift * shift).max(0.0);
     (p, shift, var)
-}
-
-fn normal_cdf(x: f64) -> f64 {
-    0.5 * libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 fn normal_pdf(x: f64) -> f64 {

@@ -1,6 +1,6 @@
 //! The loader against the closed-form kinematics of the UR5e, and what it refuses.
 
-use crate::arm_tests::URDF;
+use crate::arm::tests::URDF;
 use crate::{ArmModel, UrdfError};
 use gripgen_twin::frames::Pose;
 use nalgebra::{Matrix3, Matrix4};

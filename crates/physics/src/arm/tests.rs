@@ -1,19 +1,19 @@
 //! The whole arm: slip against the closed form, the wrist sensor against the engine, and what the arm adds.
 
-use super::*;
 use crate::setup::Mount;
 use crate::tests::{Bench, STEP_S, assert_clones_agree, check_take_over, hull_of_64, shapes};
+use crate::*;
 use gripgen_twin::config::{Document, Feedback, Mechanics};
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{PullEnd, RobotArm, Twin};
 use nalgebra::Vector3;
 
-pub(crate) const URDF: &str = include_str!("../../../assets/robots/ur5e/ur5e.urdf");
+pub(crate) const URDF: &str = include_str!("../../../../assets/robots/ur5e/ur5e.urdf");
 
 /// The stance of the shipped twins.
 fn stance() -> RobotArm {
-    let text = include_str!("../../../assets/configs/twin-baseline.toml");
+    let text = include_str!("../../../../assets/configs/twin-baseline.toml");
     let twin = Document::parse("twin-baseline.toml", text).and_then(|d| Twin::new(&d.read_twin()?)).unwrap();
     twin.arm.unwrap()
 }

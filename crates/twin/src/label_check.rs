@@ -1,13 +1,11 @@
-//! A label proves itself: whether what was recorded of a pull agrees with its label.
+//! The label check: whether what was recorded of a pull agrees with its label.
 //!
-//! One pure function, [`judge`], for pulls that were simulated, imported or made on a rig. It looks only at evidence that
+//! One pure function, [`check_label`], for pulls that were simulated, imported or made on a rig. It looks only at evidence that
 //! is there; what is missing is no reason. A difference counts where it is larger than both the noise explains and a
 //! label may be off ([`cap_n`]).
 
-mod beside;
-mod budget;
+mod cross_axis;
 mod follow;
-mod recorded;
 mod rule;
 mod signal;
 mod slip;
@@ -15,9 +13,7 @@ mod slip;
 mod tests;
 mod zero;
 
-pub use beside::{GripForceEvidence, WrenchRow};
-pub use budget::LabelBudget;
-pub use recorded::recorded_behind;
+pub use cross_axis::{GripForceEvidence, WrenchRow};
 pub use zero::ZERO_SHIFT;
 
 use crate::{PullTrace, Scenario, SlipLabel, Twin};
@@ -251,6 +247,31 @@ impl fmt::Display for Finding {
     }
 }
 
+/// Standard errors of a label by their cause, N; 0 where the evidence for it is missing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LabelBudget {
+    /// Noise of the one reading that the label is.
+    pub noise_n: f64,
+    /// The rule: what the jaws held before the label and more than it, and steps that jump over its tolerance.
+    pub rule_n: f64,
+    /// The loop's time constant times the slope of the force after the label.
+    pub lag_n: f64,
+    /// The reading without a load.
+    pub zero_n: f64,
+    /// What the reading is more or less than a share of the command.
+    pub gain_n: f64,
+    /// Half the time between two rows times the slope at the label, where the label may lie between them.
+    pub timing_n: f64,
+}
+
+impl LabelBudget {
+    /// All causes together, as if they were independent.
+    pub fn total_n(&self) -> f64 {
+        let Self { noise_n, rule_n, lag_n, zero_n, gain_n, timing_n } = *self;
+        [noise_n, rule_n, lag_n, zero_n, gain_n, timing_n].iter().map(|x| x * x).sum::<f64>().sqrt()
+    }
+}
+
 /// What the evidence says of a label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -292,7 +313,7 @@ impl Judgement {
 }
 
 /// Judges a label by the evidence that is there.
-pub fn judge(evidence: &LabelEvidence<'_>, expected: &Expected) -> Judgement {
+pub fn check_label(evidence: &LabelEvidence<'_>, expected: &Expected) -> Judgement {
     let mut findings = Vec::new();
     let mut budget = LabelBudget::default();
     let signal = evidence.trace.and_then(|trace| Signal::of(trace, evidence, expected));
@@ -304,8 +325,8 @@ pub fn judge(evidence: &LabelEvidence<'_>, expected: &Expected) -> Judgement {
             slip::slip(signal, evidence, expected, &mut findings, &mut budget);
         }
     }
-    beside::grip_force(evidence, &mut findings);
-    beside::across(evidence, &mut findings);
+    cross_axis::grip_force(evidence, &mut findings);
+    cross_axis::across(evidence, &mut findings);
     let verdict = match () {
         () if findings.iter().any(Finding::is_reason) => Verdict::Suspect,
         () if findings.is_empty() => Verdict::NoEvidence,
@@ -325,5 +346,30 @@ pub fn suspect_simulated(
     let of_trace =
         LabelEvidence::of_trace(label.max_pull_force_n, pull.label_tolerance_n, pull.stop_m, Some(trace));
     let evidence = LabelEvidence { censored: label.censored, every_reading: true, ..of_trace };
-    judge(&evidence, &Expected::of(twin, scenario)).reason()
+    check_label(&evidence, &Expected::of(twin, scenario)).reason()
+}
+
+/// What may be behind a reason that was recorded ([`Judgement::reason`], perhaps with others after it, joined by
+/// semicolons). A camera that fell silent is an accident of its pull.
+pub fn recorded_behind(reason: &str) -> Behind {
+    let known = FindingKind::ALL.map(|kind| {
+        let finding = Finding { kind, found: 0.0, wanted: 0.0, allowed: 0.0, time_s: None };
+        (plain(&finding.to_string()), kind.behind())
+    });
+    let behind = |reason: &str| {
+        let reason = plain(reason);
+        known.iter().find(|(text, _)| *text == reason).map_or(Behind::Pull, |(_, behind)| *behind)
+    };
+    reasons_of(reason).map(behind).min().unwrap_or(Behind::Pull)
+}
+
+/// The reasons of a record. In the brackets of one there is a semicolon too: "(0.33 N are allowed; at 0.10 s)".
+fn reasons_of(reason: &str) -> impl Iterator<Item = &str> {
+    reason.split("; ").filter(|part| !part.is_empty() && !part.starts_with("at "))
+}
+
+/// A reason without its numbers and what stands in brackets.
+fn plain(reason: &str) -> String {
+    let before = reason.split(" (").next().unwrap_or_default();
+    before.chars().filter(|c| !c.is_ascii_digit() && !matches!(c, '-' | '.')).collect()
 }
