@@ -66,9 +66,9 @@ mod live;
 mod location;
 mod measured;
 mod mesh_file;
-mod paper;
 mod parallel;
-mod picture;
+#[doc(hidden)]
+pub mod picture;
 mod plan;
 mod plant;
 mod predict;
@@ -136,7 +136,6 @@ pub use measured::{
     load_pulls_with,
 };
 pub use mesh_file::MeshFileError;
-pub use paper::{PaperError, PaperReport, paper_report};
 pub use parallel::in_parallel;
 pub use picture::{
     CONTACT_SHEET, PictureSampleError, contact_sheet, contact_sheet_samples, publish_contact_sheet,
