@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a measurement that cannot go on panics")]
 
+use crate::arguments;
 use gripgen::identify::pulls::priors::PullPriors;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Campaign, MeasuredPulls, PlannedPull, Twin};
@@ -29,7 +30,7 @@ impl Given {
 
 /// How many campaigns are asked for, and the lines that are named; all where none is.
 pub fn asked(count: usize) -> (usize, Vec<Line>) {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<String> = arguments().collect();
     let count = arguments.first().and_then(|a| a.parse().ok()).unwrap_or(count);
     let named = |line: &Line| arguments.len() < 2 || arguments[1..].iter().any(|a| a == line.0);
     (count, LINES.into_iter().filter(named).collect())
@@ -39,7 +40,7 @@ pub fn asked(count: usize) -> (usize, Vec<Line>) {
 const BAD: (f64, f64) = (0.05, 8.0);
 
 /// Name, grip forces, whether the law is asked for.
-pub type Line = (&'static str, &'static [f64], bool);
+type Line = (&'static str, &'static [f64], bool);
 
 const LINES: [Line; 3] = [
     ("one", &[40.0], false),

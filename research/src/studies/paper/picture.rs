@@ -1,8 +1,8 @@
 //! The picture of the paper's report: ratios over grip force, and a pull profile.
 
+use super::cells::PartCells;
 use gripgen::picture::{Anchor, Area, Canvas, Curve, TextStyle, pull_curve};
 use gripgen::picture::{COMMAND, GRID, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
-use crate::cells::PartCells;
 use gripgen::twin::PullTrace;
 
 const MARGIN: f64 = 16.0;

@@ -3,6 +3,7 @@
 //! `cargo xtask research loop-presses [FOLDER]`: FOLDER is `gelsight` of the shared Taxim data
 //! (`../shared/real/taxim/gelsight` where it is left out). Writes `research/loop/presses.md` and its plots.
 
+use crate::{StudyResult, arguments};
 use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect};
 use gripgen::tactile::presses::{CalibrateOptions, PressScene, PressSet, calibrate_presses, frame_mse};
 use gripgen::tactile::{Sensor, SensorFiles};
@@ -15,9 +16,8 @@ use std::path::{Path, PathBuf};
 
 mod svg;
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let folder =
-        PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "../shared/real/taxim/gelsight".into()));
+pub fn run() -> StudyResult {
+    let folder = PathBuf::from(arguments().next().unwrap_or_else(|| "../shared/real/taxim/gelsight".into()));
     let set = load_presses(&folder.join("dataPack.npz"), PressGeometry::default())?;
     let table = std::fs::read(folder.join("polycalib.npz"))?;
     let gel_map = std::fs::read(folder.join("gelmap.npy"))?;

@@ -4,6 +4,7 @@
 //! `cargo xtask research press-pictures PRESSES FOLDER [--ball-mm D --mm-per-px P]`; it writes
 //! `FOLDER/sensor-real.png` and `FOLDER/sensor-shapes.png`, and says the errors.
 
+use crate::{StudyResult, arguments};
 use gripgen::record::encode_png;
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::{
@@ -28,8 +29,8 @@ const ENLARGED: f64 = 4.0;
 
 const DEPTHS_MM: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
-fn main() {
-    let mut words: Vec<String> = std::env::args().skip(1).collect();
+pub fn run() -> StudyResult {
+    let mut words: Vec<String> = arguments().collect();
     let mut number = |option: &str| {
         let at = words.iter().position(|w| w == option).filter(|at| at + 1 < words.len())?;
         words.drain(at..at + 2).nth(1)?.parse::<f64>().ok()
@@ -56,6 +57,7 @@ fn main() {
     };
     write("sensor-real.png", &real_beside_drawn(&half(1), &sensor));
     write("sensor-shapes.png", &shapes(&sensor));
+    Ok(())
 }
 
 /// Red, green and blue of a tile, row by row.

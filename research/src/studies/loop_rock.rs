@@ -6,6 +6,7 @@
 //! the step is fitted with the library's own laws: a constant, `rate_dependence`, and that with `dwell_ageing`, whose dwell is the age of
 //! the contacts. Nothing is written where the data are absent.
 
+use crate::{StudyResult, arguments};
 use gripgen::identify::{FitOptions, FreeParameter, fit};
 use gripgen::twin::effects::{GripPoint, find};
 use gripgen::twin::{Covariates, Jaw, Twin};
@@ -39,8 +40,8 @@ struct Trace {
     step: usize,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut words = std::env::args().skip(1);
+pub fn run() -> StudyResult {
+    let mut words = arguments();
     let data = PathBuf::from(words.next().unwrap_or_else(|| "../shared/real/rock_velocity_steps".into()));
     let out = PathBuf::from(words.next().unwrap_or_else(|| "target/rock".into()));
     for (name, file) in

@@ -2,6 +2,7 @@
 //! `cargo xtask research press-errors FOLDER`, the folder of shared measured data (`../shared/real` where it is left out).
 //! Mean squared errors in grey levels squared: whole frame, 400 x 400 and 200 x 200 px around the contact.
 
+use crate::{StudyResult, arguments};
 use gripgen::tactile::presses::{CalibrateOptions, PressSet, Scores, calibrate_presses, compare_presses};
 use gripgen::{PressGeometry, load_presses};
 use std::error::Error;
@@ -17,8 +18,8 @@ const SETS: [(&str, &str, SizesMm); 3] = [
     ("FOTS' GelSight", "gelsight_fots", Some((4.70, 0.051_072_5))),
 ];
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "../shared/real".into()));
+pub fn run() -> StudyResult {
+    let folder = PathBuf::from(arguments().next().unwrap_or_else(|| "../shared/real".into()));
     for (name, path, sizes_mm) in SETS {
         let set = load(&folder.join(path), sizes_mm)?;
         let found = calibrate_presses(&set, &CalibrateOptions::default())?;

@@ -7,6 +7,7 @@ mod cells;
 mod picture;
 mod report;
 
+use crate::{StudyResult, arguments};
 use gripgen::record::RunFolder;
 use gripgen::tactile::SimdLevel;
 use gripgen::{Location, Project, SweepOptions, sweep};
@@ -15,7 +16,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-fn run(out: &Path, sets: &[(&str, &str)]) -> Result<RunFolder, Box<dyn Error>> {
+fn sweep_into(out: &Path, sets: &[(&str, &str)]) -> Result<RunFolder, Box<dyn Error>> {
     let sets: Vec<(String, String)> =
         sets.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
     let project = Project::load(&Location::parse("asset:configs/paper.toml"), &sets)?;
@@ -26,10 +27,11 @@ fn run(out: &Path, sets: &[(&str, &str)]) -> Result<RunFolder, Box<dyn Error>> {
     Ok(RunFolder::open(out)?)
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let out = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "runs/paper-report".into()));
-    let corrected = run(&out.join("corrected"), &[])?;
-    let plain = run(&out.join("plain"), &[("twin", "asset:configs/twin-baseline.toml"), ("images", "none")])?;
+pub fn run() -> StudyResult {
+    let out = PathBuf::from(arguments().next().unwrap_or_else(|| "runs/paper-report".into()));
+    let corrected = sweep_into(&out.join("corrected"), &[])?;
+    let plain =
+        sweep_into(&out.join("plain"), &[("twin", "asset:configs/twin-baseline.toml"), ("images", "none")])?;
     let report = paper_report(&corrected, &plain)?;
     std::fs::create_dir_all(out.join("images"))?;
     std::fs::write(out.join("paper.md"), &report.markdown)?;

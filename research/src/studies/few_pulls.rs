@@ -8,6 +8,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a measurement that cannot go on panics")]
 
+use crate::lab::{Contact, Plan, World, campaign};
+use crate::{StudyResult, arguments};
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::pulls::priors::{Prior, PullPriors};
 use gripgen::twin::config::Feedback;
@@ -17,7 +19,6 @@ use gripgen::{
     Library, Location, calibrate_twin, compare_pulls_with, edited_twin, in_parallel, load_twin_document,
     shipped_priors,
 };
-use gripgen_research::lab::{Contact, Plan, World, campaign};
 use std::sync::Mutex;
 
 const TWIN: &str = "asset:configs/twin-baseline.toml";
@@ -111,8 +112,8 @@ fn widened(mut priors: PullPriors) -> PullPriors {
     priors
 }
 
-fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+pub fn run() -> StudyResult {
+    let arguments: Vec<String> = arguments().collect();
     let count: usize = arguments.first().and_then(|a| a.parse().ok()).unwrap_or(40);
     let from: usize = std::env::var("FROM").ok().and_then(|f| f.parse().ok()).unwrap_or(0);
     let document = load_twin_document(&Location::parse(TWIN), &[]).unwrap();
@@ -180,4 +181,5 @@ fn main() {
             share(2)
         );
     }
+    Ok(())
 }

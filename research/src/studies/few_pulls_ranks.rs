@@ -8,11 +8,12 @@
 
 #![expect(clippy::unwrap_used, reason = "a measurement that cannot go on panics")]
 
+use crate::StudyResult;
+use crate::truth::{Given, PART, Truth, asked};
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::twin::Posterior;
 use gripgen::{calibrate_twin, in_parallel};
 use std::sync::Mutex;
-use gripgen_research::truth::{Given, PART, Truth, asked};
 
 const BINS: usize = 10;
 
@@ -47,7 +48,7 @@ fn p_of_nine(x: f64) -> f64 {
         + 2.0 * (-0.5 * x).exp() / std::f64::consts::TAU.sqrt() * series
 }
 
-fn main() {
+pub fn run() -> StudyResult {
     let (count, lines) = asked(1000);
     let Given { twin, library, priors } = Given::shipped();
     let given = twin.parts[PART].mu;
@@ -98,4 +99,5 @@ fn main() {
             );
         }
     }
+    Ok(())
 }

@@ -4,6 +4,7 @@
 //! 2020, MIT; `../shared/real/gripforce_two_sensors` where it is left out), OUT is `research/loop`. The tables made from
 //! them lie in a temporary folder; none of the data is kept.
 
+use crate::{StudyResult, arguments};
 use gripgen::identify::{Diagnosis, HeldOutError, Verdict};
 use gripgen::{Plot, calibrate_sensor_table, diagnose_sensor_table, load_sensor_table};
 use std::error::Error;
@@ -20,10 +21,10 @@ const SESSIONS: [(&str, usize, usize, f64, &str); 5] = [
     ("S5", 165, 650, 1.56, "quadratic, 1.37"),
 ];
 
-const TEXT: &str = include_str!("../loop-force-sensor.md");
+const TEXT: &str = include_str!("loop_force_sensor.md");
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
+pub fn run() -> StudyResult {
+    let mut arguments = arguments();
     let folder = PathBuf::from(arguments.next().unwrap_or("../shared/real/gripforce_two_sensors".into()));
     let out = PathBuf::from(arguments.next().unwrap_or("research/loop".into()));
     std::fs::create_dir_all(out.join("images"))?;

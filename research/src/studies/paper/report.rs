@@ -1,7 +1,7 @@
 //! The experiment of Wucherer et al. 2023, evaluated.
 
-use crate::cells::{Cell, PartCells};
-use crate::picture::paper_picture;
+use super::cells::{Cell, PartCells};
+use super::picture::paper_picture;
 use gripgen::record::{FolderError, INDEX_COLUMNS, ReadError, RunFolder, ShardReader};
 use gripgen::twin::effects::OFFSET_LAW;
 use gripgen::twin::{PullTrace, Twin};

@@ -8,13 +8,14 @@
 
 #![expect(clippy::unwrap_used, reason = "a measurement that cannot go on panics")]
 
+use crate::StudyResult;
+use crate::truth::{Given, PART, Truth, asked};
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::pulls::few::FewDensity;
 use gripgen::identify::pulls::priors::PullPriors;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::{calibrate_twin, in_parallel, with_few_density};
 use std::sync::Mutex;
-use gripgen_research::truth::{Given, PART, Truth, asked};
 
 /// Steps of a chain, of which the first third adapts its step and is left out.
 const STEPS: usize = 9000;
@@ -94,7 +95,7 @@ fn log_density(values: &Weighted, width: f64, at: f64) -> f64 {
     (sum / weight / (width * std::f64::consts::TAU.sqrt())).max(1e-30).ln()
 }
 
-fn main() {
+pub fn run() -> StudyResult {
     let (count, lines) = asked(40);
     let Given { twin, library, priors } = Given::shipped();
     let given = twin.parts[PART].mu;
@@ -146,4 +147,5 @@ fn main() {
             of(3)
         );
     }
+    Ok(())
 }

@@ -4,6 +4,7 @@
 //! (`../shared/real/grasp_force_wedge` where it is left out), OUT where sets are written, a folder each: `rigid`, `gel-a`, `gel-b` and
 //! `soft`. `gripgen diagnose OUT/rigid` then says the same as the table. Nothing is written where the data are absent.
 
+use crate::{StudyResult, arguments};
 use gripgen::identify::{Diagnosis, ImprintDiagnosis, diagnose_imprints};
 use gripgen::load_imprint_set;
 use std::error::Error;
@@ -31,8 +32,8 @@ impl Cells {
     }
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut words = std::env::args().skip(1);
+pub fn run() -> StudyResult {
+    let mut words = arguments();
     let data = PathBuf::from(words.next().unwrap_or_else(|| "../shared/real/grasp_force_wedge".into()));
     let out = PathBuf::from(words.next().unwrap_or_else(|| "target/imprints".into()));
     if !data.join("grasps.csv").is_file() {

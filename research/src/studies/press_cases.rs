@@ -5,6 +5,7 @@
 //! `cargo xtask research press-cases PRESSES [--ball-mm D --mm-per-px P] [words of cases]`. `--untouched N` diagnoses
 //! N halves that are drawn, without any change; `--from K` begins with half K, so that a run can be continued.
 
+use crate::{StudyResult, arguments};
 use gripgen::identify::{Diagnosis, Verdict};
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::{CalibrateOptions, Press, PressSet, calibrate_presses};
@@ -83,8 +84,8 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-fn main() {
-    let mut words: Vec<String> = std::env::args().skip(1).collect();
+pub fn run() -> StudyResult {
+    let mut words: Vec<String> = arguments().collect();
     let mut number = |option: &str| {
         let at = words.iter().position(|w| w == option).filter(|at| at + 1 < words.len())?;
         words.drain(at..at + 2).nth(1)?.parse::<f64>().ok()
@@ -153,6 +154,7 @@ fn main() {
         }
     }
     println!("{right} of {all}");
+    Ok(())
 }
 
 /// What is named in halves of a set that nobody changed, against a sensor of the other half; halves `first` to `first + splits - 1`.

@@ -7,13 +7,14 @@
 
 #![expect(clippy::unwrap_used, reason = "a measurement that cannot go on panics")]
 
+use crate::lab::{Contact, Plan, World, campaign};
+use crate::{StudyResult, arguments};
 use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::twin::Twin;
 use gripgen::twin::config::Feedback;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::{Library, Location, calibrate_twin, in_parallel, load_twin_document};
-use gripgen_research::lab::{Contact, Plan, World, campaign};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
@@ -99,8 +100,8 @@ struct Tally {
     below: usize,
 }
 
-fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+pub fn run() -> StudyResult {
+    let arguments: Vec<String> = arguments().collect();
     let count: usize = arguments.first().and_then(|a| a.parse().ok()).unwrap_or(50);
     let verbose = std::env::var_os("VERBOSE").is_some();
     let file = load_twin_document(&Location::parse("asset:configs/twin-baseline.toml"), &[]).unwrap();
@@ -190,4 +191,5 @@ fn main() {
             );
         }
     }
+    Ok(())
 }
