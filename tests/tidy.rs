@@ -46,8 +46,7 @@ fn paths_named_in_the_documentation_exist() {
     ] {
         let text = read(document);
         for word in text.split('`').skip(1).step_by(2) {
-            let ours =
-                ["crates/", "src/", "assets/", "docs/", "tests/", "benches/", "research/", "xtask/"];
+            let ours = ["crates/", "src/", "assets/", "docs/", "tests/", "benches/", "research/", "xtask/"];
             if ours.iter().any(|p| word.starts_with(p)) && !word.contains(['<', '*', ' ']) {
                 checked += 1;
                 assert!(root().join(word.trim_end_matches('/')).exists(), "{document} names `{word}`");
@@ -247,10 +246,11 @@ fn effects_are_named_in_their_own_files() {
     let mut naming = BTreeSet::new();
     for path in with_extension(&["rs", "py", "wgsl", "html"]) {
         let relative = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
-        let elsewhere =
-            ["crates/twin/src/effects/", "tests/", "benches/", "research/"].iter().any(|f| relative.starts_with(f))
-                || relative.contains("/tests/")
-                || relative.ends_with("tests.rs");
+        let elsewhere = ["crates/twin/src/effects/", "tests/", "benches/", "research/"]
+            .iter()
+            .any(|f| relative.starts_with(f))
+            || relative.contains("/tests/")
+            || relative.ends_with("tests.rs");
         if elsewhere {
             continue;
         }

@@ -1,5 +1,6 @@
 //! A virtual environment with pinned packages for the checks by independent programs.
 
+use crate::times::Times;
 use crate::{apt_install, can_install};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -102,21 +103,21 @@ pub fn stage_package(root: &Path) -> Result<PathBuf, String> {
     Ok(stage)
 }
 
-/// The command that runs the Python checks against the binary that the Rust tests have built.
-pub fn pytest(python: &Path, root: &Path) -> Command {
-    let mut command = Command::new(python);
-    command.args([
+/// The command that runs the Python checks against the binary that was built for the tests.
+pub fn pytest(python: &Path, root: &Path, all: bool) -> Result<Command, String> {
+    let mut command = Times::command()?;
+    command.arg(python).args([
         "-m",
         "pytest",
         "-q",
         "-p",
         "no:cacheprovider",
-        "tests/python",
-        "tests/gripgen_py",
-        "tests/rig_py",
-        "tests/blind",
+        "--durations=0",
+        "--durations-min=1",
     ]);
+    command.args(["tests/python", "tests/gripgen_py", "tests/rig_py"]);
+    command.args(all.then_some("research/blind"));
     command.env("PYTHONPATH", target(root).join("python"));
     command.env("GRIPGEN_BIN", target(root).join("debug/gripgen")).env("PYTHONDONTWRITEBYTECODE", "1");
-    command
+    Ok(command)
 }

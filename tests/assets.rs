@@ -1,13 +1,13 @@
-//! Makes the shipped meshes and the shipped sensor file from the numbers beside them.
+//! The shipped meshes and the shipped sensor file are made from the numbers beside them.
 //!
-//! `cargo xtask assets` writes them; `cargo xtask assets --check` only compares.
+//! `cargo xtask assets` runs this test with `GRIPGEN_UPDATE` set, which writes them; `cargo xtask assets --check` only compares.
 
-use gripgen_tactile::{ColourModel, GelShape, Grid, Lambert, Light, Sensor};
-use gripgen_twin::parts::{BallBearing, InvoluteGear, RollerBearing, SteppedShaft};
-use gripgen_twin::write_binary_stl;
+use crate::common::root;
+use gripgen::tactile::{ColourModel, GelShape, Grid, Lambert, Light, Sensor};
+use gripgen::twin::parts::{BallBearing, InvoluteGear, RollerBearing, SteppedShaft};
+use gripgen::twin::write_binary_stl;
 use serde::Deserialize;
-use std::path::Path;
-use std::process::ExitCode;
+use std::path::PathBuf;
 
 #[derive(Deserialize)]
 struct Illumination {
@@ -28,35 +28,29 @@ struct LightFile {
     falloff: [f64; 2],
 }
 
-fn main() -> ExitCode {
-    let check = std::env::args().any(|a| a == "--check");
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
+#[test]
+fn shipped_assets_are_those_of_their_numbers() {
+    let assets = root().join("assets");
     let mut stale = Vec::new();
+    let mut publish = |path: PathBuf, bytes: Vec<u8>| {
+        if std::fs::read(&path).is_ok_and(|old| old == bytes) {
+            return;
+        }
+        if std::env::var_os("GRIPGEN_UPDATE").is_some() {
+            std::fs::write(&path, bytes).unwrap();
+        } else {
+            stale.push(path);
+        }
+    };
     for part in ["ball_bearing", "gear", "long_shaft", "roller_bearing"] {
         let folder = assets.join("parts").join(part);
         let text = std::fs::read_to_string(folder.join("part.toml")).expect("every part has its numbers");
-        publish(&folder.join("part.stl"), &part_stl(part, &text), check, &mut stale);
+        publish(folder.join("part.stl"), part_stl(part, &text));
     }
     let folder = assets.join("sensors/gelsight_r15");
     let text = std::fs::read_to_string(folder.join("illumination.toml")).expect("the sensor has its numbers");
-    publish(&folder.join("sensor.npz"), &sensor_npz(&text), check, &mut stale);
-    if stale.is_empty() {
-        return ExitCode::SUCCESS;
-    }
-    eprintln!("stale: {}; run `cargo xtask assets`", stale.join(", "));
-    ExitCode::FAILURE
-}
-
-fn publish(path: &Path, bytes: &[u8], check: bool, stale: &mut Vec<String>) {
-    if std::fs::read(path).is_ok_and(|old| old == bytes) {
-        return;
-    }
-    if check {
-        stale.push(path.display().to_string());
-    } else {
-        std::fs::write(path, bytes).expect("the assets folder is writable");
-        println!("{} ({} bytes)", path.display(), bytes.len());
-    }
+    publish(folder.join("sensor.npz"), sensor_npz(&text));
+    assert!(stale.is_empty(), "stale: {stale:?}; run `cargo xtask assets`");
 }
 
 fn part_stl(name: &str, text: &str) -> Vec<u8> {
