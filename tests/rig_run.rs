@@ -1,5 +1,6 @@
 //! Runs of a rig, from a campaign that a twin made: what reads sweeps reads them too.
 
+use crate::common::baseline;
 use gripgen::record::{
     Dataset, ExportParquetError, ParquetOptions, RigLog, RigPull, RigResult, RigRunInfo, RigStream,
     RunFolder, Verification, create_rig_run, decode_picture, discard_failed, export_parquet, missing_pulls,
@@ -12,7 +13,7 @@ use gripgen::twin::{
     slip_label,
 };
 use gripgen::{
-    Draw, Location, PullDiagnoseOptions, Simulator, calibrate_imprints, compare_pulls, contact_sheet,
+    Draw, PullDiagnoseOptions, Simulator, calibrate_imprints, compare_pulls, contact_sheet,
     contact_sheet_samples, diagnose_pull_table, load_pulls, sample_picture, simulate_campaign,
 };
 use std::collections::BTreeMap;
@@ -22,10 +23,6 @@ use std::path::Path;
 const DIRT: i32 = 40;
 /// The imprint constant that the images are made with; the shipped twin has another.
 const IMPRINT_MM3_PER_N: f64 = 2.3;
-
-fn baseline() -> Location {
-    Location::parse("asset:configs/twin-baseline.toml")
-}
 
 fn campaign() -> Campaign {
     let pull = |i: u32| PlannedPull {

@@ -4,6 +4,7 @@ mod coverage;
 mod few_pulls;
 mod few_pulls_ranks;
 mod few_pulls_reference;
+mod images_and_labels;
 mod loop_force_sensor;
 mod loop_imprints;
 mod loop_presses;
@@ -16,11 +17,12 @@ mod press_pictures;
 use crate::StudyResult;
 
 /// Every study by the name of its file.
-pub const ALL: [(&str, fn() -> StudyResult); 12] = [
+pub const ALL: [(&str, fn() -> StudyResult); 13] = [
     ("coverage", coverage::run),
     ("few-pulls", few_pulls::run),
     ("few-pulls-ranks", few_pulls_ranks::run),
     ("few-pulls-reference", few_pulls_reference::run),
+    ("images-and-labels", images_and_labels::run),
     ("loop-force-sensor", loop_force_sensor::run),
     ("loop-imprints", loop_imprints::run),
     ("loop-presses", loop_presses::run),

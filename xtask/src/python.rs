@@ -77,8 +77,8 @@ fn make_venv(python: &str, venv: &Path) -> bool {
     command.status().is_ok_and(|s| s.success())
 }
 
-/// Puts the Python package together in `target/python` from its sources and the module that cargo has built.
-pub fn stage_package(root: &Path) -> Result<PathBuf, String> {
+/// Puts the Python package together in `target/python` from its sources and the module that cargo has built in a profile.
+pub fn stage_package(root: &Path, profile: &str) -> Result<PathBuf, String> {
     let stage = target(root).join("python");
     let package = stage.join("gripgen");
     let at = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
@@ -96,7 +96,7 @@ pub fn stage_package(root: &Path) -> Result<PathBuf, String> {
         }
     }
     let names =
-        ["lib_core.so", "lib_core.dylib", "_core.dll"].map(|name| target(root).join("debug").join(name));
+        ["lib_core.so", "lib_core.dylib", "_core.dll"].map(|name| target(root).join(profile).join(name));
     let built = names.iter().find(|path| path.exists()).ok_or("cargo has not built the Python module")?;
     let name = if cfg!(windows) { "_core.pyd" } else { "_core.abi3.so" };
     std::fs::copy(built, package.join(name)).map_err(|e| at(built, e))?;

@@ -49,7 +49,7 @@ pub fn test(all: bool) -> Result<(), String> {
     gpu(&mut build);
     run("build", &mut build)?;
     let python = python.join().map_err(|_| "the set-up of Python panicked")??;
-    python::stage_package(&root())?;
+    python::stage_package(&root(), "debug")?;
     let times = Times::new(python::target(&root()).join("test-times.tsv"))?;
     let mut failed = Vec::new();
     let mut step = |what: &str, command: &mut Command| {

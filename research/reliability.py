@@ -1,6 +1,6 @@
 """Counts what is lost: sweeps that are killed, disks that are full or read-only, two sweeps in one folder, files that vanish, shards that are damaged.
 
-    GRIPGEN_BIN=target/release/gripgen python tests/reliability.py --table docs/reliability.md
+    cargo xtask research reliability --table docs/reliability.md
 
 prints a table, and puts it into a page between its marks. It needs the Python package, and root for small disks (tmpfs); without, those rows say so.
 """
