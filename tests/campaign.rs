@@ -1,20 +1,12 @@
 //! Campaigns: planned, made on a twin, written, and read as measurements.
 
+use crate::common::{baseline, overrides};
 use gripgen::identify::{CampaignOptions, plan_campaign};
 use gripgen_measured::{CAMPAIGN_FILE, campaign_toml, read_campaign, write_pull_folder};
 use gripgen::twin::config::Feedback;
 use gripgen::twin::{Campaign, PlannedPull};
-use gripgen::Location;
 use gripgen_cli::simulate_campaign;
 use gripgen_measured::{Suspects, load_pulls_with};
-
-fn baseline() -> Location {
-    Location::parse("asset:configs/twin-baseline.toml")
-}
-
-fn sets(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
-    pairs.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect()
-}
 
 /// Without noise and scatter the measurements are those of Coulomb's law.
 #[test]
@@ -27,7 +19,7 @@ fn a_planned_campaign_is_made_on_the_twin() {
     std::fs::write(&file, campaign_toml(&plan, "a test")).unwrap();
     let campaign = read_campaign(&file).unwrap();
     assert_eq!(campaign, plan);
-    let quiet = sets(&[
+    let quiet = overrides(&[
         ("wrist.noise_n", "0"),
         ("parts.gear.scatter", "0"),
         ("parts.long_shaft.scatter", "0"),
@@ -78,7 +70,7 @@ fn a_simulated_campaign_depends_on_its_seed_and_has_its_effects() {
         pulls: (0..6).map(|i| pull(20.0 + 5.0 * f64::from(i))).collect(),
     };
     let made = |pairs: &[(&str, &str)], seed| {
-        simulate_campaign(&baseline(), &sets(pairs), &campaign, seed).unwrap().pulls
+        simulate_campaign(&baseline(), &overrides(pairs), &campaign, seed).unwrap().pulls
     };
     let plain = made(&[], 1);
     assert!(plain == made(&[], 1));

@@ -1,9 +1,7 @@
 //! The catalogue of effects: what documents say of it, and what it says of labels.
 
-use crate::common::root;
-use gripgen::twin::Twin;
+use crate::common::{baseline, library, root, twin_at};
 use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, find};
-use gripgen::{BASELINE_TWIN, Library, Location, load_twin_document};
 use gripgen_cli::{EffectCurve, effect_curve};
 use std::fmt::Write;
 
@@ -49,9 +47,8 @@ fn the_catalogue_in_the_model_is_current() {
 }
 
 fn curve(spec: &'static EffectSpec) -> EffectCurve {
-    let at = Location::parse(BASELINE_TWIN);
-    let twin = Twin::new(&load_twin_document(&at, &[]).unwrap().read_twin().unwrap()).unwrap();
-    effect_curve(spec, &twin, &Library::of_twin(&twin, &at).unwrap(), 2).unwrap()
+    let twin = twin_at(&baseline());
+    effect_curve(spec, &twin, &library(&twin), 2).unwrap()
 }
 
 /// What the catalogue draws is the formula, for laws of the coefficient: the label follows it.

@@ -1,10 +1,10 @@
 //! Images of measured pulls beside those that a twin expects.
 
-use crate::common::{jobs, run, small_project};
+use crate::common::{jobs, overrides, run, small_project, twin_at, twin_with_sets};
 use gripgen::record::{Dataset, encode_png};
 use gripgen_measured::write_pull_folder;
-use gripgen::twin::{Jaw, TactileImage, Twin};
-use gripgen::{Library, Location, load_twin_document};
+use gripgen::twin::{Jaw, TactileImage};
+use gripgen::{Library, Location};
 use gripgen_cli::{ImageComparison, compare_images};
 use gripgen_measured::{Suspects, load_pulls_with};
 use std::path::Path;
@@ -13,9 +13,7 @@ use std::path::Path;
 const TWIN: &str = "asset:configs/twin.toml";
 
 fn compare(folders: &[&Path], sets: &[(&str, &str)]) -> ImageComparison {
-    let sets: Vec<(String, String)> = sets.iter().map(|&(k, v)| (k.into(), v.into())).collect();
-    let document = load_twin_document(&Location::parse(TWIN), &sets).unwrap();
-    let twin = Twin::new(&document.read_twin().unwrap()).unwrap();
+    let twin = twin_with_sets(&Location::parse(TWIN), &overrides(sets));
     let library = Library::of_twin(&twin, &Location::parse(TWIN)).unwrap();
     let loaded = load_pulls_with(folders, Suspects::Include).unwrap();
     compare_images(folders, &loaded, Suspects::Include, &twin, &library, 2).unwrap()
@@ -23,8 +21,7 @@ fn compare(folders: &[&Path], sets: &[(&str, &str)]) -> ImageComparison {
 
 /// Mean square of the noise of the sensors in [`TWIN`].
 fn noise_square() -> f64 {
-    let document = load_twin_document(&Location::parse(TWIN), &[]).unwrap();
-    let twin = Twin::new(&document.read_twin().unwrap()).unwrap();
+    let twin = twin_at(&Location::parse(TWIN));
     let library = Library::of_twin(&twin, &Location::parse(TWIN)).unwrap();
     let noise_rgb = library.sensor(&twin.optics[Jaw::Left]).unwrap().noise_rgb;
     noise_rgb.iter().map(|&sd| f64::from(sd).powi(2)).sum::<f64>() / 3.0

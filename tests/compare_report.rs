@@ -1,9 +1,8 @@
 //! Measured pulls of any folder beside a twin: the paper's panels.
 
-use crate::common::{jobs, project, run};
+use crate::common::{baseline, jobs, library, project, run, twin_at};
 use gripgen::twin::Twin;
-use gripgen::{BASELINE_TWIN, Library, Location};
-use gripgen::{load_twin_document, pull_comparison_page, pull_ratios};
+use gripgen::{pull_comparison_page, pull_ratios};
 use gripgen_cli::compare_pulls;
 use gripgen_measured::load_pulls;
 
@@ -24,10 +23,8 @@ fn the_ratio_to_a_plain_twin_is_the_papers_correction() {
     let folder = tempfile::tempdir().unwrap();
     run(&sweep, folder.path(), jobs(2));
     let measured = load_pulls(folder.path()).unwrap().pulls;
-    let document = load_twin_document(&Location::parse(BASELINE_TWIN), &[]).unwrap();
-    let plain = Twin::new(&document.read_twin().unwrap()).unwrap();
-    let library = Library::of_twin(&plain, &Location::parse(BASELINE_TWIN)).unwrap();
-    let found = compare_pulls(&measured, &plain, &library, 2).unwrap();
+    let plain = twin_at(&baseline());
+    let found = compare_pulls(&measured, &plain, &library(&plain), 2).unwrap();
     let ratios = pull_ratios(&measured, &found);
     for (name, a, b_n) in laws(&sweep.twin) {
         let ratio = &ratios[&name];

@@ -1,10 +1,9 @@
 //! Data-driven: every file in `configs/invalid` has one fault and says in its head what the answer must contain.
 
-use crate::common::{project, root};
-use gripgen::twin::Twin;
+use crate::common::{baseline, overrides, project, root, twin_with_sets, write_project};
 use gripgen::twin::config::ConfigError;
 use gripgen::twin::draw::Drawn;
-use gripgen::{LoadError, Location, Project, load_twin_document};
+use gripgen::{LoadError, Location, Project};
 use std::path::Path;
 
 struct Expected {
@@ -260,10 +259,8 @@ fn calibrated_intervals_become_draws() {
     let folder = tempfile::tempdir().unwrap();
     let twin = "[parts.gear]\nmesh = \"asset:parts/gear/part.stl\"\nmu = 0.15\nimprint_mm3_per_n = 1.5\n\
                 [parts.gear.calibration.mu]\nlow90 = 0.14\nhigh90 = 0.16\nevidence = \"12 pulls\"\n";
-    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
     let sweep = "twin = \"twin.toml\"\nsamples = 4000\n[vary]\n\"parts.gear.mu\" = { from = \"interval\" }\n";
-    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
-    let p = project(folder.path().join("sweep.toml").to_str().unwrap(), &[]);
+    let p = write_project(folder.path(), twin, sweep);
     let values: Vec<f64> = (0..4000)
         .map(|i| match p.sweep.drawn(i)["parts.gear.mu"] {
             Drawn::Number(x) => x,
@@ -310,9 +307,8 @@ type Sets<'a> = &'a [(&'a str, &'a str)];
 /// Overrides that load, or the key and words of the error they give.
 fn refused(sets: Sets<'_>) -> Option<ConfigError> {
     let paper = [("twin", "asset:configs/twin.toml")];
-    let sets = paper.iter().chain(sets).map(|(k, v)| (k.to_string(), v.to_string()));
-    let sets: Vec<(String, String)> = sets.collect();
-    match Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets) {
+    let sets = [&paper[..], sets].concat();
+    match Project::load(&Location::parse("asset:configs/quickstart.toml"), &overrides(&sets)) {
         Ok(_) => None,
         Err(LoadError::Config(e)) => Some(e),
         Err(e) => panic!("{e}"),
@@ -322,11 +318,7 @@ fn refused(sets: Sets<'_>) -> Option<ConfigError> {
 /// An arm with links has one model under two names, and the name of a gripper changes nothing.
 #[test]
 fn names_of_models_change_no_number() {
-    let at = Location::parse("asset:configs/twin-baseline.toml");
-    let twin = |key: &str, value: &str| {
-        Twin::new(&load_twin_document(&at, &[(key.into(), value.into())]).unwrap().read_twin().unwrap())
-            .unwrap()
-    };
+    let twin = |key: &str, value: &str| twin_with_sets(&baseline(), &overrides(&[(key, value)]));
     let shipped = twin("robot.model", "\"ur5e\"");
     assert!(shipped.arm.is_some());
     assert_eq!(twin("robot.model", "\"arm\""), shipped);
@@ -393,10 +385,8 @@ fn settings_that_do_not_go_together_are_refused() {
 #[test]
 fn paths_of_unused_files_stay_at_home() {
     let hash = |path: &str| {
-        let sets =
-            [("vary.part", "[\"long_shaft\"]"), ("parts.gear.mesh", path), ("robot.model", "carriage")]
-                .map(|(k, v)| (k.to_string(), v.to_string()));
-        let p = Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap();
+        let sets = ["vary.part=[\"long_shaft\"]", &format!("parts.gear.mesh={path}"), "robot.model=carriage"];
+        let p = project("asset:configs/quickstart.toml", &sets);
         assert!(!p.config_toml.contains(path), "{path}");
         p.config_sha256
     };

@@ -1,25 +1,12 @@
 //! Diagnoses of pulls, from the campaign to the better twin.
 
-use crate::common::root;
+use crate::common::{baseline, library, overrides, root, twin_at, twin_with};
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::{CampaignOptions, Diagnosis, Verdict, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
-use gripgen::{Diagnosed, Library, Location, load_twin_document};
+use gripgen::{Diagnosed, Location};
 use gripgen_cli::{PullDiagnoseOptions, calibrate_twin, compare_pulls, diagnose_pull_table, edited_twin, simulate_campaign};
 use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
-
-pub(crate) fn baseline() -> Location {
-    Location::parse("asset:configs/twin-baseline.toml")
-}
-
-pub(crate) fn twin_at(location: &Location) -> Twin {
-    Twin::new(&load_twin_document(location, &[]).unwrap().read_twin().unwrap()).unwrap()
-}
-
-/// The files of a twin that names embedded ones only.
-pub(crate) fn library(twin: &Twin) -> Library {
-    Library::of_twin(twin, &baseline()).unwrap()
-}
 
 pub(crate) fn diagnose(measured: &MeasuredPulls, without: &[&str]) -> Diagnosed {
     diagnose_with(measured, &twin_at(&baseline()), without)
@@ -32,15 +19,6 @@ pub(crate) fn diagnose_with(measured: &MeasuredPulls, twin: &Twin, without: &[&s
 
 pub(crate) fn names(diagnosis: &Diagnosis) -> Vec<&str> {
     diagnosis.effects.iter().map(|e| e.name.as_str()).collect()
-}
-
-/// A file with the baseline twin and `effects`.
-pub(crate) fn twin_with(effects: &str) -> (tempfile::TempDir, std::path::PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("twin.toml");
-    let base = std::fs::read_to_string(root().join("assets/configs/twin-baseline.toml")).unwrap();
-    std::fs::write(&file, format!("{base}\n{effects}")).unwrap();
-    (folder, file)
 }
 
 /// A campaign of the simulator itself: `effects` are added to the baseline twin.
@@ -57,8 +35,7 @@ pub(crate) fn simulated_at(
     let (_folder, file) = twin_with(effects);
     let options = CampaignOptions { parts: vec!["long_shaft".into()], pulls, ..options };
     let campaign = plan_campaign(&options).unwrap();
-    let sets: Vec<(String, String)> = sets.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
-    simulate_campaign(&Location::Disk(file), &sets, &campaign, 7).unwrap().pulls
+    simulate_campaign(&Location::Disk(file), &overrides(sets), &campaign, 7).unwrap().pulls
 }
 
 /// Effects on readings are fitted with lag and dead time free. Where the baseline has not had both first, they win by them

@@ -1,7 +1,8 @@
 //! Campaigns that are harder than a simulator's own: noisy sensors without traces, bad pulls, effects of one session alone, a gripper
 //! that speaks into the sensor.
 
-use crate::diagnose::{baseline, diagnose, library, names, simulated, twin_at};
+use crate::common::{baseline, library, twin_at};
+use crate::diagnose::{diagnose, names, simulated};
 use gripgen::identify::Verdict;
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::twin::draw::Drawn;

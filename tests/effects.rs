@@ -1,10 +1,10 @@
 //! Effects of the library, through the whole pipeline and in both mechanics.
 
-use crate::common::{content, jobs, run};
+use crate::common::{self, content, jobs, run, write_project};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::effects::LIBRARY;
 use gripgen::twin::{Outcome, Pulled};
-use gripgen::{Location, Project, generate};
+use gripgen::{Project, generate};
 
 /// A quiet twin of the gear with these effects, gripped with 40 N on its faces.
 fn project(effects: &str, mechanics: &str, vary: &str, images: &str) -> Project {
@@ -17,17 +17,11 @@ fn project(effects: &str, mechanics: &str, vary: &str, images: &str) -> Project 
         "twin = \"twin.toml\"\nsamples = 1\nimages = \"{images}\"\nmechanics = \"{mechanics}\"\n\
          [vary]\ngrip_force_n = [40]\n{vary}"
     );
-    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
-    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
-    let at = Location::Disk(folder.path().join("sweep.toml"));
-    Project::load(&at, &[]).unwrap_or_else(|e| panic!("{effects}: {e}"))
+    write_project(folder.path(), &twin, &sweep)
 }
 
 fn pulled(project: &Project) -> Box<Pulled> {
-    match generate(project, 0, SimdLevel::best()).outcome {
-        Outcome::Pulled(pulled) => pulled,
-        other => panic!("{other:?}"),
-    }
+    common::pulled(project, 0).unwrap()
 }
 
 fn peak_n(p: &Pulled) -> f64 {
@@ -188,12 +182,10 @@ fn stamp(effects: &str, mechanics: &str) -> Box<Pulled> {
         "[parts.cube]\nmesh = \"cube.obj\"\nmu = 0.2\nimprint_mm3_per_n = 1.5\n[wrist]\nnoise_n = 0.0\n\
          [optics.left]\nimage_noise = \"off\"\n{effects}"
     );
-    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
     let sweep = format!(
         "twin = \"twin.toml\"\nsamples = 1\nmechanics = \"{mechanics}\"\n[vary]\ngrip_force_n = [40]\n"
     );
-    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
-    pulled(&Project::load(&Location::Disk(folder.path().join("sweep.toml")), &[]).unwrap())
+    pulled(&write_project(folder.path(), &twin, &sweep))
 }
 
 /// A rigid flat punch, tilted by t on a Winkler bed of foundation constant 1 / c: p = (d + y tan t) / c as long as the whole

@@ -1,6 +1,6 @@
 //! Films of pulls: what they show is what the mechanics say, and they leave everything else as it is.
 
-use crate::common::{assert_same, jobs, project, run, small_project};
+use crate::common::{assert_same, jobs, load, project, run, small_project};
 use gripgen::record::{ShardReader, export_sample, verify};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::{FilmFrame, Outcome, PerJaw, Pulled, SlipState};
@@ -192,12 +192,7 @@ fn a_film_needs_images_of_the_processor() {
         (vec!["images=pgn"], "images"),
         (vec!["images={storage=\"pgn\"}"], "images"),
     ] {
-        let sets: Vec<(String, String)> = sets
-            .iter()
-            .map(|s| s.split_once('=').map(|(k, v)| (k.to_string(), v.to_string())).unwrap())
-            .collect();
-        let at = gripgen::Location::parse("asset:configs/quickstart.toml");
-        let error = match Project::load(&at, &sets) {
+        let error = match load("asset:configs/quickstart.toml", &sets) {
             Err(e) => e.to_string(),
             Ok(_) => panic!("{sets:?}"),
         };

@@ -3,6 +3,7 @@
 //! What is there is found by other code: triangles are drawn into a map of heights in front of each pad, and the depth at which the map
 //! has the imprint's volume gives area and middle of the contact.
 
+use crate::common::{overrides, project_in};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::parts::benchmark::{FAMILIES, variant};
 use gripgen::twin::random::{Purpose, Stream};
@@ -98,8 +99,7 @@ fn project(
         stream.bits() >> 40
     );
     std::fs::write(folder.join("sweep.toml"), sweep).unwrap();
-    let sets: Vec<(String, String)> = sets.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
-    Project::load(&Location::Disk(folder.join("sweep.toml")), &sets).map_err(|e| e.to_string())
+    Project::load(&Location::Disk(folder.join("sweep.toml")), &overrides(sets)).map_err(|e| e.to_string())
 }
 
 /// Heights of the part in front of a pad, in metres from the gel: infinite where there is nothing.
@@ -330,9 +330,7 @@ fn ratios(seed: u64, parts: u64, wanted: usize) -> Vec<(f64, String)> {
         let mesh = variant(seed + 1000, family, number);
         let folder = tempfile::tempdir().unwrap();
         let reduced = project(folder.path(), &mesh, &mut stream, &[("images", "none")]).unwrap();
-        let sets =
-            [("mechanics".to_string(), "rapier".to_string()), ("images".to_string(), "none".to_string())];
-        let rapier = Project::load(&Location::Disk(folder.path().join("sweep.toml")), &sets).unwrap();
+        let rapier = project_in(folder.path(), &[("mechanics", "rapier"), ("images", "none")]);
         let mut of_part = 0;
         for index in 0..GRIPS {
             if of_part == wanted {

@@ -2,10 +2,10 @@
 //!
 //! On Mesa's lavapipe, by name. Stages alone are compared in `crates/tactile/src/gpu/tests.rs`.
 
-use crate::common::{jobs, run, small_project};
+use crate::common::{jobs, project, run, small_project, write_project};
 use gripgen::record::{Record, RunFolder, ShardReader};
 use gripgen::tactile::gpu::GpuError;
-use gripgen::{Location, Project, SweepError, SweepEvent, sweep};
+use gripgen::{SweepError, SweepEvent, sweep};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -61,20 +61,13 @@ fn a_gpu_sweep_has_the_same_labels_and_images_within_the_tolerance() {
     assert_eq!(RunFolder::open(cpu.path()).unwrap().info().gpu_adapter, None);
 }
 
-/// Files of a gear with `twin` behind it, and where its sweep is.
-fn gear_sweep(twin: &str, sweep: &str) -> (tempfile::TempDir, Location) {
+/// Files of a gear with `twin` behind it.
+fn gear_sweep(twin: &str, sweep: &str) -> tempfile::TempDir {
     let gear = "[parts.gear]\nmesh = \"asset:parts/gear/part.stl\"\nmu = 0.2\nimprint_mm3_per_n = 1.5\n\
                 [[parts.gear.grips]]\norientation_deg = [0.0, 0.0, 90.0]\n";
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("twin.toml"), [gear, twin].concat()).unwrap();
-    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
-    let at = Location::Disk(folder.path().join("sweep.toml"));
-    (folder, at)
-}
-
-fn project(at: &Location, sets: &[&str]) -> Project {
-    let sets = sets.iter().filter_map(|s| s.split_once('=')).map(|(k, v)| (k.into(), v.into()));
-    Project::load(at, &sets.collect::<Vec<_>>()).unwrap()
+    write_project(folder.path(), &[gear, twin].concat(), sweep);
+    folder
 }
 
 /// Optics effects are the processor's: what they change has the bytes of a sweep without a graphics processor. Samples
@@ -85,9 +78,10 @@ fn images_that_optics_effects_change_are_those_of_the_processor() {
     let twin = "[[effects]]\nname = \"light_drift\"\nred_per_h = 0.2\nblue_per_h = -0.1\n";
     let sweep = "twin = \"twin.toml\"\nsamples = 6\nimages = \"png\"\nmechanics = \"reduced\"\n\
                  [vary]\ngrip_force_n = [30, 35, 40]\ntime_s = [0, 3600]\n";
-    let (folder, at) = gear_sweep(twin, sweep);
+    let folder = gear_sweep(twin, sweep);
+    let config = folder.path().join("sweep.toml").display().to_string();
     let made = |sets: &[&str], out: &Path| {
-        run(&project(&at, sets), out, jobs(2));
+        run(&project(&config, sets), out, jobs(2));
         let reader = ShardReader::open(&RunFolder::open(out).unwrap().shard_path(0)).unwrap();
         let records: Vec<_> = reader.indices().map(|i| reader.record(i).unwrap()).collect();
         records
@@ -109,10 +103,11 @@ fn images_of_an_elastic_gel_are_those_of_the_processor() {
                 [gel.right]\nmodel = \"elastic\"\nyoung_modulus_mpa = 0.3\n";
     let sweep = "twin = \"twin.toml\"\nsamples = 2\nimages = \"png\"\nmechanics = \"reduced\"\n\
                  [vary]\ngrip_force_n = [10, 20]\n";
-    let (folder, at) = gear_sweep(twin, sweep);
+    let folder = gear_sweep(twin, sweep);
+    let config = folder.path().join("sweep.toml").display().to_string();
     let made = |sets: &[&str], out: &str| {
         let out = folder.path().join(out);
-        assert_eq!(run(&project(&at, sets), &out, jobs(1)).failed, 0);
+        assert_eq!(run(&project(&config, sets), &out, jobs(1)).failed, 0);
         images(&out, 1)
     };
     let ours = made(&[], "cpu");

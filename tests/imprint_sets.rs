@@ -1,6 +1,6 @@
 //! Sets of imprints, from disk to answer: volumes of images, constants in a twin, real grasps.
 
-use crate::common::{jobs, root, run, small_project};
+use crate::common::{baseline, jobs, root, run, small_project, twin_at};
 use gripgen::identify::{SharedConstant, Verdict};
 use gripgen::record::{RunFolder, ShardReader, encode_png};
 use gripgen::twin::{Jaw, Twin};
@@ -10,10 +10,6 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 const TWIN: &str = "asset:configs/twin-baseline.toml";
-
-fn twin() -> Twin {
-    Twin::new(&load_twin_document(&Location::parse(TWIN), &[]).unwrap().read_twin().unwrap()).unwrap()
-}
 
 /// The images of a sweep of the gear, with their true forces, as a set of imprints: left jaws only, one constant for all.
 fn set_of_images(folder: &Path, sets: &[&str]) {
@@ -48,7 +44,7 @@ fn the_growth_of_imprints_is_read_off_noisy_images() {
     let error = load_imprint_set(folder.path(), None).unwrap_err();
     assert!(matches!(error, LoadImprintsError::NoSensor { images: 20, rows: 20, .. }), "{error}");
     assert!(error.hint().is_some_and(|hint| hint.contains("--sensor")));
-    let (sensor, twin) = (load_twin_sensor(&Location::parse(TWIN)).unwrap(), twin());
+    let (sensor, twin) = (load_twin_sensor(&Location::parse(TWIN)).unwrap(), twin_at(&baseline()));
     let loaded = |folder: &Path| load_imprint_set(folder, Some((&sensor, &twin.gel[Jaw::Left]))).unwrap();
     let set = loaded(folder.path());
     let found = calibrate_imprint_table(&set, SharedConstant::Part).unwrap();
@@ -82,7 +78,7 @@ fn constants_stand_in_the_twin_with_their_evidence() {
         }
     }
     std::fs::write(folder.path().join("imprints.csv"), &table).unwrap();
-    let (set, twin) = (load_imprint_set(folder.path(), None).unwrap(), twin());
+    let (set, twin) = (load_imprint_set(folder.path(), None).unwrap(), twin_at(&baseline()));
     let found = calibrate_imprint_table(&set, SharedConstant::Grasp).unwrap();
     let edits = imprint_calibration_edits(&found, &twin, None, &set.sha256).unwrap();
     let out = folder.path().join("twin.toml");
@@ -92,7 +88,7 @@ fn constants_stand_in_the_twin_with_their_evidence() {
         "{text}"
     );
     std::fs::write(&out, text).unwrap();
-    let new = load_twin_document(&Location::Disk(out), &[]).unwrap().read_twin().unwrap();
+    let new = load_twin_document(&Location::Disk(out), &[]).unwrap().read_twin_at(&baseline()).unwrap();
     let c = Twin::new(&new).unwrap().parts["gear"].imprint_m3_per_n * 1e9;
     assert!((c - (1.8f64 * 2.2).sqrt()).abs() < 1e-9, "{c}");
     std::fs::write(folder.path().join("imprints.csv"), table.replace(",gear", ",bolt")).unwrap();
@@ -126,7 +122,7 @@ fn real_grasps_show_a_delay_and_a_power() {
     }
     std::fs::write(folder.path().join("imprints.csv"), table).unwrap();
     let set = load_imprint_set(folder.path(), None).unwrap();
-    let d = diagnose_imprint_table(&set, &twin()).diagnosis;
+    let d = diagnose_imprint_table(&set, &twin_at(&baseline())).diagnosis;
     assert_eq!(d.verdict, Verdict::Effect, "{:?}", d.hints);
     assert!(d.effects.iter().any(|e| e.name == "imprint_delay"), "{:?}", d.effects);
     let error = d.error.unwrap();

@@ -1,6 +1,6 @@
 //! Intervals of a calibration against campaigns of a lab that shares no mechanics with the twin.
 
-#[path = "../examples/interval_coverage/lab.rs"]
+#[path = "../research/src/lab.rs"]
 mod lab;
 
 use gripgen::identify::pulls::calibrate::{CalibrateRequest, PullCalibration};
@@ -41,7 +41,7 @@ fn calibrated(world: &World, seed: u64) -> PullCalibration {
 }
 
 /// Spheres whose rim slips first and flat contacts, kinetic ratio 1 and 0.9: mu comes back, nine of ten intervals hold it (binomial: 10 or
-/// fewer of 16 once in 1000), and the kinetic ratio that ends at 1 is inside its own. `examples/interval_coverage.rs` counts
+/// fewer of 16 once in 1000), and the kinetic ratio that ends at 1 is inside its own. `cargo xtask research coverage` counts
 /// hundreds.
 #[test]
 fn calibrated_intervals_hold_the_truth_of_a_foreign_lab() {

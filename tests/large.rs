@@ -36,8 +36,6 @@ struct Row {
     label_n: f64,
     /// Mean pressure of the left jaw.
     pressure_pa: f64,
-    /// Means of 20 x 20 pixels of each channel of both images.
-    seen: Vec<f64>,
 }
 
 fn rows(config: &str, samples: u64, sets: &[&str]) -> Vec<Row> {
@@ -53,23 +51,12 @@ fn rows(config: &str, samples: u64, sets: &[&str]) -> Vec<Row> {
             Outcome::NoContact { .. } => continue,
             Outcome::Failed { reason } => panic!("{reason}"),
         };
-        let mut seen = Vec::new();
-        for (_, image) in pulled.images.iter().flat_map(|images| images.iter()) {
-            for (x0, y0) in (0..16).flat_map(|x| (0..12).map(move |y| (20 * x, 20 * y))) {
-                let mut sum = [0.0; 3];
-                for (x, y) in (x0..x0 + 20).flat_map(|x| (y0..y0 + 20).map(move |y| (x, y))) {
-                    sum.iter_mut().zip(image.pixel(x, y)).for_each(|(s, v)| *s += f64::from(v) / 400.0);
-                }
-                seen.extend(sum);
-            }
-        }
         rows.push(Row {
             part: sample.scenario.part,
             pose: sample.scenario.grip_pose,
             force_n: sample.scenario.grip_force_n,
             label_n: pulled.label.max_pull_force_n,
             pressure_pa: pulled.imprint.left.patch.normal_force_n() / pulled.imprint.left.patch.area_m2(),
-            seen,
         });
     }
     rows
@@ -128,63 +115,5 @@ fn part_and_grip_force_do_not_tell_the_label() {
             100.0 * quiet_posed
         );
         assert!(left > least && quiet > 0.7 * left, "{config}: {left} {quiet}");
-    }
-}
-
-/// Share of the labels' variance of the last quarter of `rows` that a ridge regression on the others leaves open. It is
-/// given part, pose if `posed`, a cubic in the grip force for each, and the images if `sighted`.
-fn left_after_ridge(rows: &[Row], posed: bool, sighted: bool) -> f64 {
-    let mut groups: Vec<(&str, usize)> =
-        rows.iter().map(|r| (r.part.as_str(), r.pose * usize::from(posed))).collect();
-    let own = groups.clone();
-    groups.sort_unstable();
-    groups.dedup();
-    let features = |i: usize| {
-        let row = &rows[i];
-        let here = groups.iter().map(|g| f64::from(u8::from(*g == own[i])));
-        let cubic = here.flat_map(|on| (0..4).map(move |k| on * (row.force_n / 40.0).powi(k)));
-        let mut all: Vec<f64> = cubic.collect();
-        if sighted {
-            all.extend(row.seen.iter().map(|v| v / 30.0));
-            all.extend(row.seen.iter().map(|v| v / 30.0 * row.force_n / 40.0));
-        }
-        all
-    };
-    let train = rows.len() * 3 / 4;
-    let width = features(0).len();
-    let made: Vec<Vec<f64>> = (0..rows.len()).map(features).collect();
-    let x = nalgebra::DMatrix::from_fn(train, width, |i, j| made[i][j]);
-    let y = nalgebra::DVector::from_fn(train, |i, _| rows[i].label_n);
-    let (gram, moment) = (x.tr_mul(&x), x.tr_mul(&y));
-    let held = &rows[train..];
-    let mut best = f64::INFINITY;
-    for ridge in [1e-3, 0.1, 1.0, 10.0] {
-        let mut own = gram.clone();
-        (0..width).for_each(|j| own[(j, j)] += if j < 4 * groups.len() { 1e-6 } else { ridge });
-        let weights = own.cholesky().unwrap().solve(&moment);
-        let error = |i: usize| {
-            made[train + i].iter().zip(weights.iter()).map(|(a, b)| a * b).sum::<f64>() - held[i].label_n
-        };
-        let left =
-            (0..held.len()).map(|i| error(i).powi(2)).sum::<f64>() / held.len() as f64 / variance(held);
-        best = best.min(left);
-    }
-    best
-}
-
-/// The table of docs/training.md.
-#[test]
-#[ignore = "takes some minutes; prints the table of docs/training.md"]
-fn what_images_tell_of_the_labels() {
-    for config in ["asset:configs/quickstart.toml", "asset:configs/large.toml"] {
-        let rows = rows(config, 4000, &[]);
-        for (name, posed, sighted) in [
-            ("part, F_G", false, false),
-            ("part, pose, F_G", true, false),
-            ("part, F_G, images", false, true),
-            ("part, pose, F_G, images", true, true),
-        ] {
-            println!("{config}: {name}: {:.1} % left", 100.0 * left_after_ridge(&rows, posed, sighted));
-        }
     }
 }

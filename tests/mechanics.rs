@@ -1,17 +1,6 @@
 //! Two mechanics, one result: where they agree, how far, and what both share.
 
-use crate::common::project;
-use gripgen::tactile::SimdLevel;
-use gripgen::twin::{Outcome, Pulled};
-use gripgen::{Project, generate};
-
-fn pulled(project: &Project, index: u64) -> Option<Box<Pulled>> {
-    match generate(project, index, SimdLevel::best()).outcome {
-        Outcome::Pulled(pulled) => Some(pulled),
-        Outcome::NoContact { .. } => None,
-        Outcome::Failed { reason } => panic!("{reason}"),
-    }
-}
+use crate::common::{project, pulled};
 
 /// Labels of both mechanics on random scenarios without noise: how many were compared, the largest relative difference,
 /// and where.

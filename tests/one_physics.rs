@@ -1,16 +1,14 @@
 //! What a twin simulates is what it predicts: labels of campaigns made on a twin against the labels expected of it.
 
 use crate::bristles;
-use crate::common::root;
-use gripgen::tactile::SimdLevel;
+use crate::common::{jobs, overrides, root, run, slow, twin_with, twin_with_sets};
 use gripgen::twin::config::ConfigError;
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Campaign, PlannedPull, Twin};
-use gripgen::{Library, Location, Project, SweepOptions, load_twin_document, sweep};
+use gripgen::{Library, Location, Project, load_twin_document};
 use gripgen_cli::{compare_pulls, simulate_campaign};
 use gripgen_measured::load_pulls;
-use std::sync::atomic::AtomicBool;
 
 /// A twin by what is added to the shipped baseline.
 struct Case {
@@ -49,10 +47,7 @@ fn campaign(pulls: usize) -> Campaign {
 /// How far simulated labels and expected labels lie from those of the integration in `bristles.rs`, on average, as shares of the
 /// mean label; an error where the twin refuses.
 fn differences(case: &Case, pulls: usize) -> Result<[f64; 2], ConfigError> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("twin.toml");
-    let base = include_str!("../assets/configs/twin-baseline.toml");
-    std::fs::write(&file, format!("{base}\n{}", case.effects)).unwrap();
+    let (_folder, file) = twin_with(&case.effects);
     let at = Location::Disk(file);
     let sets = [quiet(), case.sets.clone()].concat();
     let twin = Twin::new(&load_twin_document(&at, &sets).unwrap().read_twin()?)?;
@@ -241,12 +236,9 @@ fn the_expected_label_is_the_mean_of_many_noisy_pulls() {
         ("saturation", vec![kinetic("0.9")], "[[effects]]\nname = \"sensor_saturation\"\nlimit_n = 11.0\n"),
     ];
     for (name, sets, effects) in cases {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("twin.toml");
-        let base = include_str!("../assets/configs/twin-baseline.toml");
-        std::fs::write(&file, format!("{base}\n{effects}")).unwrap();
+        let (_folder, file) = twin_with(effects);
         let at = Location::Disk(file);
-        let twin = Twin::new(&load_twin_document(&at, &sets).unwrap().read_twin().unwrap()).unwrap();
+        let twin = twin_with_sets(&at, &sets);
         let library = Library::of_twin(&twin, &at).unwrap();
         for grip_force_n in [22.0, 41.3] {
             let pull = PlannedPull { part: "long_shaft".into(), grip_force_n, ..PlannedPull::default() };
@@ -285,11 +277,6 @@ fn a_twin_simulates_and_predicts_what_an_own_integration_says_of_pairs() {
     agree(&pairs(if slow() { 200 } else { 24 }), if slow() { 24 } else { 8 });
 }
 
-/// Whether the long versions are asked for.
-fn slow() -> bool {
-    std::env::var_os("GRIPGEN_SLOW_TESTS").is_some()
-}
-
 /// The shipped twin of the large set, through the folder of a run: its labels have friction by pressure cell.
 #[test]
 fn the_large_twin_predicts_its_own_sweep() {
@@ -302,7 +289,7 @@ fn the_large_twin_predicts_its_own_sweep() {
         ("parts.gear.scatter", "0"),
         ("parts.roller_bearing.scatter", "0"),
     ];
-    let sets: Vec<_> = sets.iter().map(|(k, v)| set(k, v)).collect();
+    let sets = overrides(&sets);
     let file = std::fs::read_to_string(root().join("assets/configs/large.toml")).unwrap();
     // What varies of the twin is not known to a comparison.
     let plain: Vec<&str> =
@@ -315,10 +302,9 @@ fn the_large_twin_predicts_its_own_sweep() {
     std::fs::write(&at, text).unwrap();
     let project = Project::load(&Location::Disk(at), &sets).unwrap();
     let out = folder.path().join("run");
-    let options = SweepOptions { jobs: 2, slice: None, simd: SimdLevel::best() };
-    sweep(&project, &out, options, &AtomicBool::new(false), |_| {}).unwrap();
+    run(&project, &out, jobs(2));
     let measured = load_pulls(&out).unwrap().pulls;
-    let twin = Twin::new(&load_twin_document(&twin_at, &sets).unwrap().read_twin().unwrap()).unwrap();
+    let twin = twin_with_sets(&twin_at, &sets);
     let library = Library::of_twin(&twin, &twin_at).unwrap();
     let found = compare_pulls(&measured, &twin, &library, 2).unwrap();
     let mean = measured.pulls.iter().map(|p| p.max_pull_force_n).sum::<f64>() / measured.pulls.len() as f64;

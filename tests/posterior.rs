@@ -1,6 +1,7 @@
 //! Few pulls, and what pulls leave open: draws beside a twin, sweeps from them, predictive intervals.
 
-use crate::diagnose::{baseline, diagnose, diagnose_with, library, names, simulated, twin_at, twin_with};
+use crate::common::{baseline, library, project_in, twin_at, twin_with};
+use crate::diagnose::{diagnose, diagnose_with, names, simulated};
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::{Diagnosis, Verdict};
 use gripgen::twin::draw::Drawn;
@@ -139,7 +140,7 @@ fn sweep_of(folder: &Path, posterior: &Posterior, more: &str) -> Project {
         "twin = \"found.toml\"\nsamples = 2000\nimages = \"none\"\nmechanics = \"reduced\"\n[vary]\npart = [\"gear\"]\ntwin = {{ from = \"posterior\" }}\n{more}"
     );
     std::fs::write(folder.join("sweep.toml"), sweep).unwrap();
-    Project::load(&Location::Disk(folder.join("sweep.toml")), &[]).unwrap()
+    project_in(folder, &[])
 }
 
 fn two_causes() -> Posterior {

@@ -1,11 +1,12 @@
 //! Predictions that fits are made with, against the simulator and closed forms.
 
-use crate::diagnose::{baseline, library, simulated, twin_at, twin_with};
-use gripgen::twin::label_moments::label_moments;
-use gripgen::twin::predict::{ModelEffect, PredictPulls as _, PullModel};
+use crate::common::{baseline, library, overrides, twin_at, twin_with, twin_with_sets};
+use crate::diagnose::simulated;
+use gripgen::identify::pulls::model::{ModelEffect, PredictPulls as _, PullModel};
+use gripgen::physics::label_moments;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen::twin::{PullTrace, TraceRow, Twin, slip_label};
-use gripgen::{Location, load_twin_document};
+use gripgen::twin::{PullTrace, TraceRow, slip_label};
+use gripgen::Location;
 use gripgen::physics::PullPredictor;
 use gripgen_cli::{compare_pulls, given_model};
 
@@ -52,8 +53,7 @@ fn a_pull_without_inertia_is_the_reduced_one() {
             ("robot.lag_s", "0.06"),
         ];
         let measured = simulated("", 40, &sets);
-        let sets: Vec<(String, String)> = sets.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
-        let twin = Twin::new(&load_twin_document(&baseline(), &sets).unwrap().read_twin().unwrap()).unwrap();
+        let twin = twin_with_sets(&baseline(), &overrides(&sets));
         let found = compare_pulls(&measured, &twin, &library(&twin), 2).unwrap();
         println!("kinetic ratio {ratio}: {:.3} N, {:.2} %", found.pulls.rmse_n, found.pulls.mape_pct);
         assert!(found.pulls.mape_pct < 2.0, "kinetic ratio {ratio}: {found:?}");

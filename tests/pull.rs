@@ -1,6 +1,6 @@
 //! Labels against closed forms, through the whole pipeline.
 
-use crate::common::project;
+use crate::common::{project, write_project};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::{Outcome, Pulled, Sample};
 use gripgen::{Project, generate};
@@ -112,11 +112,9 @@ fn a_box_from_a_file_slips_at_twice_mu_times_grip_force() {
     std::fs::write(folder.path().join("box.obj"), obj).unwrap();
     let twin = "[parts.box]\nmesh = \"box.obj\"\nscale_mm_per_unit = 25.4\nmu = 0.3\nimprint_mm3_per_n = 1.5\n\
                 [wrist]\nnoise_n = 0.0\n";
-    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
     let sweep =
         "twin = \"twin.toml\"\nsamples = 4\n[vary]\ngrip_force_n = [20, 80]\ngrip_angle_deg = [0, 20, 90]\n";
-    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
-    let p = project(folder.path().join("sweep.toml").to_str().unwrap(), &[]);
+    let p = write_project(folder.path(), twin, sweep);
     for index in 0..4 {
         let sample = generate(&p, index, SimdLevel::best());
         let force = sample.scenario.grip_force_n;

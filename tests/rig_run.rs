@@ -1,5 +1,6 @@
 //! Runs of a rig, from a campaign that a twin made: what reads sweeps reads them too.
 
+use crate::common::baseline;
 use gripgen::record::{
     Dataset, ExportDatasetError, ExportOptions, RigLog, RigPull, RigResult, RigRunInfo, RigStream, RunFolder,
     Verification, create_rig_run, decode_picture, discard_failed, export_parquet, missing_pulls, verify,
@@ -11,7 +12,7 @@ use gripgen::twin::{
     Campaign, MeasuredPull, Outcome, PerJaw, PlannedPull, Scenario, SlipLabel, TactileImage, Values,
     slip_label,
 };
-use gripgen::{Draw, Location, Simulator, contact_sheet, contact_sheet_samples, sample_picture};
+use gripgen::{Draw, Simulator, contact_sheet, contact_sheet_samples, sample_picture};
 use gripgen_cli::{PullDiagnoseOptions, calibrate_imprints, compare_pulls, diagnose_pull_table, simulate_campaign};
 use gripgen_measured::load_pulls;
 use std::collections::BTreeMap;
@@ -21,10 +22,6 @@ use std::path::Path;
 const DIRT: i32 = 40;
 /// The imprint constant that the images are made with; the shipped twin has another.
 const IMPRINT_MM3_PER_N: f64 = 2.3;
-
-fn baseline() -> Location {
-    Location::parse("asset:configs/twin-baseline.toml")
-}
 
 fn campaign() -> Campaign {
     let pull = |i: u32| PlannedPull {

@@ -1,13 +1,12 @@
 //! Labels against their own traces, through the whole pipeline.
 
-use crate::common::{jobs, run};
+use crate::common::{self, jobs, run, slow, write_project};
 use gripgen::record::Dataset;
 use gripgen_measured::{read_judged_pulls, write_pull_folder};
-use gripgen::tactile::SimdLevel;
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
-use gripgen::twin::label_check::{Expected, LabelEvidence, Verdict, check_label};
-use gripgen::twin::{MeasuredPulls, Outcome, Pulled};
-use gripgen::{Location, Project, generate};
+use gripgen::twin::evidence::{Expected, LabelEvidence, Verdict, judge};
+use gripgen::twin::{MeasuredPulls, Pulled};
+use gripgen::Project;
 use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
 use std::path::Path;
 
@@ -23,26 +22,14 @@ fn project(effects: &str, samples: usize, vary: &str) -> Project {
          [vary]\ngrip_force_n = {{ uniform = [15, 60] }}\ndwell_s = [1, 30]\ntime_s = {{ uniform = [0, 7200] }}\n\
          pull_index = [0, 50, 300]\n{vary}"
     );
-    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
-    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
-    let at = Location::Disk(folder.path().join("sweep.toml"));
-    Project::load(&at, &[]).unwrap_or_else(|e| panic!("{effects}: {e}"))
+    write_project(folder.path(), &twin, &sweep)
 }
 
 const MANY: &str =
     "pull.increment_n = [0.5, 1, 2]\nparts.gear.kinetic_ratio = [1.0, 0.8]\nrobot.lag_s = [0.02, 0.05]\n";
 
 fn pulled(project: &Project, samples: usize) -> Vec<Pulled> {
-    let sample = |i| match generate(project, i as u64, SimdLevel::best()).outcome {
-        Outcome::Pulled(pulled) => Some(*pulled),
-        Outcome::NoContact { .. } => None,
-        Outcome::Failed { reason } => panic!("{reason}"),
-    };
-    (0..samples).filter_map(sample).collect()
-}
-
-fn many() -> bool {
-    std::env::var_os("GRIPGEN_SLOW_TESTS").is_some()
+    (0..samples).filter_map(|i| common::pulled(project, i as u64)).map(|pulled| *pulled).collect()
 }
 
 /// 400 clean pulls, judged with what the twin knows and again as if somebody had measured them.
@@ -83,7 +70,7 @@ fn typical(spec: &EffectSpec) -> String {
 /// What the library's effects do to a trace is predicted, and no reason.
 #[test]
 fn no_effect_makes_its_own_pulls_suspect() {
-    let each = if many() { 100 } else { 10 };
+    let each = if slow() { 100 } else { 10 };
     let mut wrong = Vec::new();
     for spec in LIBRARY.iter().filter(|spec| spec.optics.is_none()) {
         for feedback in ["measured", "independent"] {

@@ -1,6 +1,6 @@
 //! Files of Taxim load, and look like what they are.
 
-use crate::common::{content, jobs, project, root, run};
+use crate::common::{content, jobs, root, run, write_project};
 use gripgen::record::{RunFolder, decode_picture};
 use gripgen::tactile::npz::Npz;
 use gripgen::tactile::{ColourModel, Plane, Sensor, SimdLevel, shade};
@@ -85,10 +85,8 @@ fn a_run_keeps_the_files_of_a_taxim_sensor() {
                 [optics.left]\nsensor = \"polycalib.npz\"\nbackground = \"bg.jpg\"\nmm_per_px = 0.0295\n\
                 gel_map = \"gelmap.npy\"\nshadow_table = \"shadow.npz\"\n";
     let sweep = "twin = \"twin.toml\"\nsamples = 1\nmechanics = \"reduced\"\n[vary]\ngrip_force_n = [20]\n";
-    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
-    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
     let out = folder.path().join("run");
-    let whole = project(folder.path().join("sweep.toml").to_str().unwrap(), &[]);
+    let whole = write_project(folder.path(), twin, sweep);
     let summary = run(&whole, &out, jobs(1));
     assert_eq!((summary.samples, summary.failed), (1, 0));
     let mut inputs: Vec<String> = content(&out.join("inputs")).into_keys().collect();
@@ -106,8 +104,7 @@ fn a_run_keeps_the_files_of_a_taxim_sensor() {
     assert!(one == two, "other bytes from the copies");
     // The shadow is drawn: without its table the same grip is brighter beside the contact.
     let plain = twin.replace("shadow_table = \"shadow.npz\"\n", "");
-    std::fs::write(folder.path().join("twin.toml"), plain).unwrap();
-    let plain = project(folder.path().join("sweep.toml").to_str().unwrap(), &[]);
+    let plain = write_project(folder.path(), &plain, sweep);
     let plain = images(generate(&plain, 0, SimdLevel::best()).outcome);
     let sum = |image: &gripgen::twin::TactileImage| image.rgb.iter().map(|&v| u64::from(v)).sum::<u64>();
     assert!(sum(&plain.left) > sum(&one.left));

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
+// The shipped files and the numbers that they are made from.
+mod assets;
 // The guard of the benchmarks.
 mod bench_guard;
 // The benchmark of two hundred parts.

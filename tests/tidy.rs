@@ -46,7 +46,7 @@ fn paths_named_in_the_documentation_exist() {
     ] {
         let text = read(document);
         for word in text.split('`').skip(1).step_by(2) {
-            let ours = ["crates/", "src/", "assets/", "docs/", "tests/", "benches/", "xtask/"];
+            let ours = ["crates/", "src/", "assets/", "docs/", "tests/", "benches/", "research/", "xtask/"];
             if ours.iter().any(|p| word.starts_with(p)) && !word.contains(['<', '*', ' ']) {
                 checked += 1;
                 assert!(root().join(word.trim_end_matches('/')).exists(), "{document} names `{word}`");
@@ -102,6 +102,7 @@ fn packages_depend_on_each_other_as_drawn() {
         ("crates/cli", &["gripgen", "gripgen-rig"][..]),
         ("crates/py", &["gripgen", "gripgen-cli"][..]),
         ("crates/rig", &["gripgen-twin"][..]),
+        ("research", &["gripgen"][..]),
         ("xtask", &[][..]),
     ];
     for (package, arrows) in allowed {
@@ -234,7 +235,7 @@ fn only_tests_are_left_out() {
     assert_eq!(without_tests(text), "a;\n\nb.sin();\n // }\nc;");
 }
 
-/// Who else names an effect than its own file, tests and benchmarks is listed in ARCHITECTURE.md with its reason.
+/// Who else names an effect than its own file, tests, benchmarks and studies is listed in ARCHITECTURE.md with its reason.
 #[test]
 fn effects_are_named_in_their_own_files() {
     let architecture = read("ARCHITECTURE.md");
@@ -245,10 +246,11 @@ fn effects_are_named_in_their_own_files() {
     let mut naming = BTreeSet::new();
     for path in with_extension(&["rs", "py", "wgsl", "html"]) {
         let relative = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
-        let elsewhere =
-            ["crates/twin/src/effects/", "tests/", "benches/"].iter().any(|f| relative.starts_with(f))
-                || relative.contains("/tests/")
-                || relative.ends_with("tests.rs");
+        let elsewhere = ["crates/twin/src/effects/", "tests/", "benches/", "research/"]
+            .iter()
+            .any(|f| relative.starts_with(f))
+            || relative.contains("/tests/")
+            || relative.ends_with("tests.rs");
         if elsewhere {
             continue;
         }

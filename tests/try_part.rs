@@ -1,9 +1,10 @@
 //! `try`: what the page shows is what a sweep makes, and what is said to fail fails.
 
+use crate::common::project_in;
 use crate::solids::{Solid, SolidPart, ordinary};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::{Jaw, Outcome};
-use gripgen::{Location, Project, generate};
+use gripgen::generate;
 use gripgen_cli::{PartOptions, TryOptions, TryPartError, part_starter, try_part};
 use std::path::Path;
 
@@ -28,10 +29,7 @@ fn sample(folder: &Path, name: &str, grip: usize, sets: &[(&str, &str)]) -> Outc
     ];
     let (grip, scatter) = (format!("[{grip}]"), format!("parts.{name}.scatter"));
     let fixed = [("vary.grip_pose", grip.as_str()), (scatter.as_str(), "0")];
-    let sets = own.iter().chain(&fixed).chain(sets).map(|(k, v)| (k.to_string(), v.to_string()));
-    let project =
-        Project::load(&Location::Disk(folder.join("sweep.toml")), &sets.collect::<Vec<_>>()).unwrap();
-    generate(&project, 0, SimdLevel::best()).outcome
+    generate(&project_in(folder, &[&own[..], &fixed, sets].concat()), 0, SimdLevel::best()).outcome
 }
 
 /// Images and pull of each grip are those of a sweep over the files that `init` writes, and the pull is that of Coulomb's law for two jaws.

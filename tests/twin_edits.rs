@@ -1,15 +1,11 @@
 //! Twins that were changed: what is written is read back, and what is taken out leaves nothing behind.
 
-use gripgen::tactile::SimdLevel;
+use crate::common::{self, twin_at};
+use gripgen::twin::Pulled;
 use gripgen::twin::config::{CalibrationFile, EffectFile};
-use gripgen::twin::{Outcome, Pulled, Twin};
-use gripgen::{Location, Project, generate, load_twin_document};
+use gripgen::{Location, load_twin_document};
 use gripgen_cli::{EditedValue, TwinEdits, edited_twin, write_twin};
 use std::path::Path;
-
-fn twin(at: &Location) -> Twin {
-    Twin::new(&load_twin_document(at, &[]).unwrap().read_twin().unwrap()).unwrap()
-}
 
 fn effect(text: &str) -> EffectFile {
     toml::from_str(text).unwrap()
@@ -31,7 +27,7 @@ fn a_twin_without_edits_is_the_same_twin() {
         let base = Location::parse(&format!("asset:configs/{name}.toml"));
         let out = folder.path().join(format!("{name}.toml"));
         write_twin(&base, &[], &TwinEdits::default(), &out).unwrap();
-        assert_eq!(twin(&Location::Disk(out)), twin(&base), "{name}");
+        assert_eq!(twin_at(&Location::Disk(out)), twin_at(&base), "{name}");
     }
 }
 
@@ -103,12 +99,12 @@ fn paths_name_the_same_files_from_the_new_place() {
     for out in ["rig/new.toml", "out/deep/new.toml", "new.toml"] {
         write_twin(&base, &[], &TwinEdits::default(), &root.join(out)).unwrap();
         let at = Location::Disk(root.join(out));
-        let read = twin(&at);
+        let read = twin_at(&at);
         for part in ["a", "b", "c"] {
             let found = at.beside(&read.parts[part].mesh);
             assert_eq!(*found.read().unwrap(), *mesh, "{out}: {found}");
         }
-        assert_eq!(read.optics.left.sensor, twin(&base).optics.left.sensor, "inside gripgen");
+        assert_eq!(read.optics.left.sensor, twin_at(&base).optics.left.sensor, "inside gripgen");
     }
     let error = write_twin(&base, &[], &TwinEdits::default(), Path::new("/no/such/folder/t.toml"));
     assert!(error.unwrap_err().to_string().contains("/no/such/folder/t.toml"));
@@ -125,11 +121,11 @@ fn a_relative_base_is_followed() {
     std::fs::create_dir(folder.path().join("new")).unwrap();
     let out = folder.path().join("new/twin.toml");
     write_twin(&Location::Disk(base.clone()), &[], &TwinEdits::default(), &out).unwrap();
-    assert_eq!(twin(&Location::Disk(out)).parts["a"].mesh, "../a.stl");
+    assert_eq!(twin_at(&Location::Disk(out)).parts["a"].mesh, "../a.stl");
     let elsewhere = tempfile::tempdir().unwrap();
     let out = elsewhere.path().join("twin.toml");
     write_twin(&Location::Disk(base), &[], &TwinEdits::default(), &out).unwrap();
-    assert!(twin(&Location::Disk(out)).parts["a"].mesh.ends_with(&format!("{name}/a.stl")));
+    assert!(twin_at(&Location::Disk(out)).parts["a"].mesh.ends_with(&format!("{name}/a.stl")));
 }
 
 fn pulled(twin: &Path) -> Box<Pulled> {
@@ -138,11 +134,7 @@ fn pulled(twin: &Path) -> Box<Pulled> {
                  grip_force_n = [40]\ndwell_s = [5]\npull_index = [40]\n";
     let name = twin.file_name().unwrap().to_str().unwrap();
     std::fs::write(folder.join("sweep.toml"), format!("twin = \"{name}\"\n{sweep}")).unwrap();
-    let project = Project::load(&Location::Disk(folder.join("sweep.toml")), &[]).unwrap();
-    match generate(&project, 0, SimdLevel::best()).outcome {
-        Outcome::Pulled(pulled) => pulled,
-        other => panic!("{other:?}"),
-    }
+    common::pulled(&common::project_in(folder, &[]), 0).unwrap()
 }
 
 /// An effect and a table that are put into a twin change its pulls; taking them out restores every bit.

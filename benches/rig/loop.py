@@ -5,7 +5,7 @@
 Each run serves a virtual rig of its own with a lag of force mode of up to 0.2 s and a zero that drifts, which are a nuisance and no effect of the
 grip, rehearses, pulls the campaign of 48 pulls that `gripgen campaign` plans, and diagnoses it. Every other rig has an undeclared effect. Names that no
 design tells apart count as right (`HIDDEN`). Where something is hidden, `compare` gives the error on 24 pulls that no twin has seen, before and after.
-One line of JSON a run, appended, so that a run can be continued. Needs no package. `docs/loop/rig.md` has the figures of one run.
+One line of JSON a run, appended, so that a run can be continued. Needs no package. `research/loop/rig.md` has the figures of one run.
 """
 
 import argparse

@@ -1,12 +1,18 @@
 //! Tasks of gripgen's developers. No dependencies, so that it is built in a second.
 //!
-//! `cargo xtask test` sets up what the tests need and runs all of them; `cargo xtask test --all` adds the slow ones;
-//! `cargo xtask blind` runs the whole blind benchmark of the diagnosis (hours) and writes docs/loop/blind.md;
+//! `cargo xtask test` sets up what the tests need and runs what a change can break; `cargo xtask test --all` adds campaigns, fuzzing
+//! at length, lints and the slow checks of Python, once for each change that is handed in;
+//! `cargo xtask research NAME` runs a study of `research/`; without a name it lists them;
+//! `cargo xtask count` prints Rust lines by place, crowded folders and the numeric constants of `identify`;
 //! `cargo xtask bench record [--profile NAME] [FILTER]` runs the benchmarks and writes their numbers down as those of this machine,
 //! which `cargo bench` compares with;
 //! `cargo xtask assets [--check]` makes the shipped meshes and the shipped sensor from the numbers beside them.
 
+mod count;
 mod python;
+mod research;
+mod test;
+mod times;
 mod vulkan;
 
 use std::path::{Path, PathBuf};
@@ -22,13 +28,19 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match words[..] {
-        ["test"] => test(false),
-        ["test", "--all"] => test(true),
-        ["blind"] => blind(),
+        ["test"] => test::test(false),
+        ["test", "--all"] => test::test(true),
+        // What cargo starts test programs with.
+        ["timed", ref words @ ..] => return times::timed(words),
+        ["research"] => research::research(None, &[]),
+        ["research", name, ref rest @ ..] => research::research(Some(name), rest),
+        ["count"] => count::count(),
         ["bench", "record", ref rest @ ..] => record_benches(rest),
         ["assets"] => assets(false),
         ["assets", "--check"] => assets(true),
-        _ => Err("usage: cargo xtask test [--all] | blind | bench record [--profile NAME] [FILTER] | assets [--check]".into()),
+        _ => Err("usage: cargo xtask test [--all] | research [NAME [ARGUMENTS]] | count | \
+                  bench record [--profile NAME] [FILTER] | assets [--check]"
+            .into()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -58,57 +70,6 @@ fn cargo(arguments: &[&str]) -> Command {
     command
 }
 
-fn test(all: bool) -> Result<(), String> {
-    let start = Instant::now();
-    let vulkan = vulkan::set_up();
-    let python = python::set_up(&root(), all)?;
-    run("format", &mut cargo(&["fmt", "--all", "--check"]))?;
-    run("format of the effects", &mut rustfmt_effects()?)?;
-    let clippy = ["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"];
-    run("clippy", &mut cargo(&clippy))?;
-    let mut rust = cargo(&["test", "--workspace", "--no-fail-fast"]);
-    // Tests that need a GPU are ignored, with this reason, where there is no driver.
-    if let Err(reason) = &vulkan {
-        eprintln!("\nno Vulkan driver ({reason}): GPU tests will read ignored");
-    } else {
-        rust.env("GRIPGEN_VULKAN", "1");
-        // The driver complains about every device it opens without one.
-        if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-            rust.env("XDG_RUNTIME_DIR", std::env::temp_dir());
-        }
-    }
-    run("Rust tests", &mut rust)?;
-    assets(true)?;
-    python::stage_package(&root())?;
-    let mut checks = python::pytest(&python, &root());
-    if all {
-        checks.env("GRIPGEN_SLOW_TESTS", "1");
-    }
-    run("Python checks", &mut checks)?;
-    eprintln!("\nall tests passed in {:.0} s", start.elapsed().as_secs_f64());
-    Ok(())
-}
-
-/// The effects are modules of a macro, which `cargo fmt` does not look into.
-fn rustfmt_effects() -> Result<Command, String> {
-    let folder = root().join("crates/twin/src/effects");
-    let entries = std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let mut rustfmt = Command::new("rustfmt");
-    rustfmt.args(["--check", "--edition", "2024"]);
-    rustfmt.args(entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|x| x == "rs")));
-    Ok(rustfmt)
-}
-
-fn blind() -> Result<(), String> {
-    let python = python::set_up(&root(), false)?;
-    run("release build", &mut cargo(&["build", "--release", "--quiet"]))?;
-    let mut all = Command::new(&python);
-    all.args(["-m", "tests.blind.all", "--out"]).arg(python::target(&root()).join("blind"));
-    all.args(["--doc", "docs/loop/blind.md"]);
-    all.env("GRIPGEN_BIN", python::target(&root()).join("release/gripgen"));
-    run("blind benchmark", &mut all)
-}
-
 /// The benchmarks write the file themselves (`benches/guard/`): only they know what they measured.
 fn record_benches(words: &[&str]) -> Result<(), String> {
     let (profile, rest) = match words {
@@ -121,12 +82,14 @@ fn record_benches(words: &[&str]) -> Result<(), String> {
     run("benchmarks", &mut benches)
 }
 
+/// The test that compares the assets writes them on request.
 fn assets(check: bool) -> Result<(), String> {
-    // The same selection as in `cargo test --workspace`, so that nothing is built twice.
-    let selection = ["build", "--quiet", "--workspace", "--lib", "--bins", "--examples"];
-    run("build of the asset maker and the Python module", &mut cargo(&selection))?;
-    let mut maker = Command::new(python::target(&root()).join("debug/examples/make_assets"));
-    run("assets", maker.args(check.then_some("--check")))
+    let mut test = test::cargo_selected("test", &["--test", "tests"]);
+    test.args(["--quiet", "--", "shipped_assets"]);
+    if !check {
+        test.env("GRIPGEN_UPDATE", "1");
+    }
+    run("assets", &mut test)
 }
 
 /// Whether this process may install packages with apt-get.

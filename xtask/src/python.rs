@@ -1,5 +1,6 @@
 //! A virtual environment with pinned packages for the checks by independent programs.
 
+use crate::times::Times;
 use crate::{apt_install, can_install};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -76,8 +77,8 @@ fn make_venv(python: &str, venv: &Path) -> bool {
     command.status().is_ok_and(|s| s.success())
 }
 
-/// Puts the Python package together in `target/python` from its sources and the module that cargo has built.
-pub fn stage_package(root: &Path) -> Result<PathBuf, String> {
+/// Puts the Python package together in `target/python` from its sources and the module that cargo has built in a profile.
+pub fn stage_package(root: &Path, profile: &str) -> Result<PathBuf, String> {
     let stage = target(root).join("python");
     let package = stage.join("gripgen");
     let at = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
@@ -95,28 +96,28 @@ pub fn stage_package(root: &Path) -> Result<PathBuf, String> {
         }
     }
     let names =
-        ["lib_core.so", "lib_core.dylib", "_core.dll"].map(|name| target(root).join("debug").join(name));
+        ["lib_core.so", "lib_core.dylib", "_core.dll"].map(|name| target(root).join(profile).join(name));
     let built = names.iter().find(|path| path.exists()).ok_or("cargo has not built the Python module")?;
     let name = if cfg!(windows) { "_core.pyd" } else { "_core.abi3.so" };
     std::fs::copy(built, package.join(name)).map_err(|e| at(built, e))?;
     Ok(stage)
 }
 
-/// The command that runs the Python checks against the binary that the Rust tests have built.
-pub fn pytest(python: &Path, root: &Path) -> Command {
-    let mut command = Command::new(python);
-    command.args([
+/// The command that runs the Python checks against the binary that was built for the tests.
+pub fn pytest(python: &Path, root: &Path, all: bool) -> Result<Command, String> {
+    let mut command = Times::command()?;
+    command.arg(python).args([
         "-m",
         "pytest",
         "-q",
         "-p",
         "no:cacheprovider",
-        "tests/python",
-        "tests/gripgen_py",
-        "tests/rig_py",
-        "tests/blind",
+        "--durations=0",
+        "--durations-min=1",
     ]);
+    command.args(["tests/python", "tests/gripgen_py", "tests/rig_py"]);
+    command.args(all.then_some("research/blind"));
     command.env("PYTHONPATH", target(root).join("python"));
     command.env("GRIPGEN_BIN", target(root).join("debug/gripgen")).env("PYTHONDONTWRITEBYTECODE", "1");
-    command
+    Ok(command)
 }

@@ -102,7 +102,7 @@ fn pulls_needed(first: &Path, second: &Path) -> Option<usize> {
     needed
 }
 
-/// The commands of `docs/loop/rig.md`, one by one.
+/// The commands of `research/loop/rig.md`, one by one.
 #[test]
 fn an_undeclared_effect_of_a_rig_is_found_over_the_wire_and_the_next_campaign_tells_it_from_its_rivals() {
     let folder = tempfile::tempdir().unwrap();

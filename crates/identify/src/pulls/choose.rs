@@ -21,7 +21,7 @@ const SAME_CLOCK: f64 = 0.9;
 
 /// Chance at which the first effect, or the first curve, may be named where nothing acts, of labels alone and beside traces. Of 130 campaigns of labels in
 /// which nothing acts one had a name at 0.0075, and of 81 others three at 0.015, which is more than is wanted; beside traces four of 200 had one at 0.0075
-/// (docs/loop/worlds.md).
+/// (research/loop/worlds.md).
 const CHANCE_OF_LABELS: f64 = 0.01;
 const CHANCE: f64 = 0.0075;
 

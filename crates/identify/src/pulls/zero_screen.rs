@@ -20,7 +20,7 @@ const MIN_TRACES: usize = 10;
 const SHUFFLES: usize = 4999;
 
 /// Chance at which a column may be named where none acts, over all columns. With 0.01 it was 4 of 153 campaigns of nothing with a dozen traces each
-/// (docs/loop/worlds.md).
+/// (research/loop/worlds.md).
 const CHANCE: f64 = 0.005;
 
 /// Least share of the variance of the differences that a column explains.

@@ -2,16 +2,16 @@
 
 use super::canvas::Rgb;
 
-pub(crate) const PAPER: Rgb = Rgb(255, 255, 255);
-pub(crate) const PANEL: Rgb = Rgb(246, 247, 249);
-pub(crate) const INK: Rgb = Rgb(33, 37, 43);
-pub(crate) const SOFT_INK: Rgb = Rgb(110, 117, 128);
-pub(crate) const GRID: Rgb = Rgb(222, 226, 231);
-pub(crate) const COMMAND: Rgb = Rgb(150, 156, 166);
-pub(crate) const MEASURED: Rgb = Rgb(24, 94, 178);
-pub(crate) const SLIP: Rgb = Rgb(205, 58, 36);
+pub const PAPER: Rgb = Rgb(255, 255, 255);
+pub const PANEL: Rgb = Rgb(246, 247, 249);
+pub const INK: Rgb = Rgb(33, 37, 43);
+pub const SOFT_INK: Rgb = Rgb(110, 117, 128);
+pub const GRID: Rgb = Rgb(222, 226, 231);
+pub const COMMAND: Rgb = Rgb(150, 156, 166);
+pub const MEASURED: Rgb = Rgb(24, 94, 178);
+pub const SLIP: Rgb = Rgb(205, 58, 36);
 pub(crate) const DISPLACEMENT: Rgb = Rgb(40, 140, 92);
-pub(crate) const FAILED: Rgb = Rgb(176, 42, 42);
+pub const FAILED: Rgb = Rgb(176, 42, 42);
 
 /// A perceptually even scale from dark to bright for `t` in 0..=1: nine stops of viridis (van der Walt & Smith,
 /// CC0), linear between them.

@@ -6,20 +6,20 @@ use gripgen_twin::PullTrace;
 
 /// A rectangle of the canvas.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Area {
-    pub(crate) x: f64,
-    pub(crate) y: f64,
-    pub(crate) width: f64,
-    pub(crate) height: f64,
+pub struct Area {
+    pub x: f64,
+    pub y: f64,
+    pub width: f64,
+    pub height: f64,
 }
 
 /// What a curve shows.
-pub(crate) struct Curve<'a> {
-    pub(crate) trace: &'a PullTrace,
+pub struct Curve<'a> {
+    pub trace: &'a PullTrace,
     /// Time and force of the label.
-    pub(crate) slip: Option<(f64, f64)>,
+    pub slip: Option<(f64, f64)>,
     /// Names of the axes, and displacement; without them the plot is a thumbnail.
-    pub(crate) full: bool,
+    pub full: bool,
 }
 
 /// Distance of two grid lines that divides `range` into about `wanted` pieces: 1, 2 or 5 times a power of ten.
@@ -37,7 +37,7 @@ fn label(value: f64, step: f64) -> String {
 }
 
 /// Draws a pull curve into `area`; axes and their numbers are inside it.
-pub(crate) fn pull_curve(canvas: &mut Canvas, area: Area, curve: &Curve<'_>) {
+pub fn pull_curve(canvas: &mut Canvas, area: Area, curve: &Curve<'_>) {
     let t = curve.trace;
     let end_s = t.time_s.last().copied().unwrap_or(1.0).max(1e-3);
     let top_n = t

@@ -48,7 +48,7 @@ fn count(cases: impl Iterator<Item = bool>) -> (u32, u32) {
 /// How often an effect is first, or among those not told apart, how well the error is stated, and how often a column of
 /// unknown meaning is named.
 #[test]
-#[ignore = "takes minutes; asserts the table of docs/diagnosis-sensor.md"]
+#[ignore = "slow: minutes; asserts the table of docs/diagnosis-sensor.md"]
 fn sensor_benchmark() {
     for (noise, row) in NOISES {
         for (column, size) in [(2, 1.0), (3, 2.0), (4, 4.0)] {
@@ -87,7 +87,7 @@ fn sensor_benchmark() {
 
 /// How often nothing is found where nothing is.
 #[test]
-#[ignore = "takes minutes; asserts the table of docs/diagnosis-sensor.md"]
+#[ignore = "slow: minutes; asserts the table of docs/diagnosis-sensor.md"]
 fn sensor_nulls() {
     for (noise, row) in NOISES {
         let nothing = |seed| {
@@ -102,7 +102,7 @@ fn sensor_nulls() {
 /// Both of two effects, with noise of three kinds: of all, and of those in which each is as large beside the other one, both by their true
 /// formulas, as a test at the 1 % level sees with 80 % power.
 #[test]
-#[ignore = "takes minutes; asserts figures of docs/diagnosis-sensor.md"]
+#[ignore = "slow: minutes; asserts figures of docs/diagnosis-sensor.md"]
 fn sensor_pairs() {
     let mut extra = 0;
     let mut visible = Vec::new();
