@@ -89,7 +89,7 @@ pub struct JsonArgs {
     /// Print JSON to standard output, or to FILE.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub json: Option<String>,
-    /// Replace files that something else wrote, or that were edited. What is read, runs and measurements are never replaced.
+    /// Replace output files that exist. Inputs and a run's own files are never replaced.
     #[arg(long)]
     pub force: bool,
 }

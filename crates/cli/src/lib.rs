@@ -16,11 +16,8 @@ mod failure;
 mod interrupt;
 mod live;
 mod load;
-mod mark;
 mod output;
 mod outputs;
-mod own_files;
-mod posterior;
 mod progress;
 mod shell;
 

@@ -400,7 +400,7 @@ fn info_show_and_export_read_a_run() {
     assert_code(&shown, 0);
     assert_eq!(&std::fs::read(&picture).unwrap()[..4], b"\x89PNG");
     assert_code(&run(&["show", out, "24"]), 2);
-    let shown = run(&["show", out, "5", "-o", picture.to_str().unwrap(), "--json"]);
+    let shown = run(&["show", out, "5", "-o", picture.to_str().unwrap(), "--json", "--force"]);
     let json: serde_json::Value = serde_json::from_slice(&shown.stdout).unwrap();
     assert_eq!((&json["sample"], json["file"].as_str()), (&5.into(), picture.to_str()));
     assert!(run(&["info", out, "-q"]).stdout.is_empty());
@@ -408,7 +408,7 @@ fn info_show_and_export_read_a_run() {
     let one = folder.path().join("one.mcap");
     assert_code(&run(&["export", out, "--sample", "7", "-o", one.to_str().unwrap()]), 0);
     assert_eq!(&std::fs::read(&one).unwrap()[1..5], b"MCAP");
-    let quiet = run(&["export", out, "--sample", "7", "-o", one.to_str().unwrap(), "-q"]);
+    let quiet = run(&["export", out, "--sample", "7", "-o", one.to_str().unwrap(), "-q", "--force"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty());
     let foreign = run(&["info", folder.path().to_str().unwrap()]);
     assert_code(&foreign, 1);

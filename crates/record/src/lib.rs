@@ -29,7 +29,6 @@ mod frame;
 mod imprint_table;
 mod index;
 mod lerobot;
-mod mark;
 mod parquet;
 mod picture;
 mod presses;
@@ -65,8 +64,7 @@ pub use imprint_table::{
     IMPRINTS_FILE, ImprintTable, MeasuredImprint, read_imprint_picture, read_imprint_table,
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
-pub use lerobot::{ExportLeRobotError, LEROBOT_CARD, LeRobotOptions, export_lerobot};
-pub use mark::{MARK_NAME, parquet_mark, png_mark, png_with_mark};
+pub use lerobot::{ExportLeRobotError, LeRobotOptions, export_lerobot};
 pub use parquet::{ExportParquetError, ParquetOptions, export_parquet};
 pub use picture::{PictureError, decode as decode_picture, encode_jpeg, encode_png};
 pub use presses::{
@@ -77,7 +75,7 @@ pub use pulls::{
     JudgedPulls, PULLS_FILE, PullFolderError, PullImages, PullImagesError, Standing, TRACES_FOLDER,
     pulls_with_images, read_judged_pulls, read_pull_folder, read_pull_images, write_pull_folder,
 };
-pub use reader::{ReadError, Record, ShardReader, mcap_mark};
+pub use reader::{ReadError, Record, ShardReader};
 pub use rig_log::{RigLog, RigLogError, RigLogEvent, RigStream};
 pub use rig_run::{
     FAILED_FOLDER, FrameView, RigCampaign, RigFilm, RigFrame, RigPull, RigPullError, RigResult, RigRunError,
@@ -93,6 +91,4 @@ pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo
 pub use stored::{sample_covariates, sample_view};
 pub use table::TableError;
 pub use verify::{Verification, repair, verify};
-pub use webdataset::{
-    ExportWebDatasetError, WebDatasetOptions, export_webdataset, tar_mark, webdataset_rows,
-};
+pub use webdataset::{ExportWebDatasetError, WebDatasetOptions, export_webdataset, webdataset_rows};

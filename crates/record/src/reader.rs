@@ -5,7 +5,6 @@ mod messages;
 mod rig;
 
 use crate::background::Background;
-use crate::mark::MARK_NAME;
 use crate::picture::{PictureError, decode};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
@@ -106,13 +105,6 @@ pub enum ReadError {
         /// What is wrong.
         problem: String,
     },
-}
-
-/// The verb that wrote an MCAP file which is no shard of a run; `None` where nobody marked it.
-pub fn mcap_mark(path: &Path) -> Option<String> {
-    let (file, bytes) = open_mcap(path).ok()?;
-    let summary = read_summary(&file, bytes).ok()??;
-    metadata_record(&file, bytes, &summary, MARK_NAME).ok()??.remove("verb")
 }
 
 impl ShardReader {

@@ -34,7 +34,7 @@ pub struct TryArgs {
     /// Print JSON to standard output, or to FILE: the grips, what they are expected to hold and where they fail.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub json: Option<String>,
-    /// Replace files that something else wrote, or that were edited. With a number it is --force-n.
+    /// Replace output files that exist. With a number it is --force-n.
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "files", value_parser = forced)]
     pub force: Option<Forced>,
     /// How much is said.

@@ -1,6 +1,6 @@
 //! Arguments of `gripgen view`.
 
-use super::TalkArgs;
+use super::{JsonArgs, TalkArgs};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -16,12 +16,9 @@ pub struct ViewArgs {
     /// The page to write; view.html in the folder, or beside the shard, where it is left out.
     #[arg(short, long, value_name = "PAGE.html")]
     pub out: Option<PathBuf>,
-    /// Print JSON to standard output, or to FILE: the page and how much of the data it shows.
-    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
-    pub json: Option<String>,
-    /// Replace files that something else wrote, or that were edited. What is read, runs and measurements are never replaced.
-    #[arg(long)]
-    pub force: bool,
+    /// JSON: the page and how much of the data it shows.
+    #[command(flatten)]
+    pub json: JsonArgs,
     /// How much is said.
     #[command(flatten)]
     pub talk: TalkArgs,

@@ -15,7 +15,7 @@ pub fn run(args: &BenchArgs) -> Result<u8, Failure> {
     if args.adapter.is_some() && backend == Backend::Cpu {
         return Err(Failure::usage("--adapter goes with --backend gpu"));
     }
-    let mut outputs = Outputs::of("bench", args.json.force).reads_all(&args.sensor);
+    let mut outputs = Outputs::new(args.json.force).reads_all(&args.sensor);
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let options = BenchOptions {
         backend,

@@ -4,7 +4,6 @@ use crate::args::{CalibrateImprintsArgs, ConstantOf};
 use crate::commands::imprints;
 use crate::failure::Failure;
 use crate::load::load_twin;
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::identify::{ImprintConstants, ParameterEstimate, SharedConstant};
@@ -16,7 +15,7 @@ pub fn run(args: &CalibrateImprintsArgs) -> Result<u8, Failure> {
     if !args.measured.exists() {
         return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
     }
-    let mut outputs = Outputs::of("calibrate imprints", args.json.force)
+    let mut outputs = Outputs::new(args.json.force)
         .reads(&args.measured)
         .reads_all(&args.sensor)
         .reads_config(&args.twin, &[]);
@@ -40,7 +39,7 @@ pub fn run(args: &CalibrateImprintsArgs) -> Result<u8, Failure> {
                     .hint("name the twin that has the part with --twin, or the part of all rows with --part")
             })?;
         let text = edited_twin_toml(&Location::parse(&args.twin), &[], &edits, out).map_err(Failure::new)?;
-        outputs.write(out, Format::Toml, text.as_bytes())?;
+        outputs.write(out, text.as_bytes())?;
     }
     if sink.wanted() {
         let parts: Map<String, Value> = found

@@ -13,18 +13,17 @@ use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &CheckArgs) -> Result<u8, Failure> {
-    check("check", &args.config, None, &args.json, &args.talk)
+    check(&args.config, None, &args.json, &args.talk)
 }
 
 /// Loads, tries out and reports; `sweep --dry-run` is the same.
 pub fn check(
-    verb: &'static str,
     config: &ConfigArgs,
     jobs: Option<usize>,
     json: &JsonArgs,
     talk: &TalkArgs,
 ) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of(verb, json.force).reads_config(&config.config, &config.set);
+    let mut outputs = Outputs::new(json.force).reads_config(&config.config, &config.set);
     let mut sink = JsonSink::open(json.json.as_deref(), &mut outputs)?;
     let project = load(config)?;
     let plan = plan(&project, SimdLevel::best())?;

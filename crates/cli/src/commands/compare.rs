@@ -9,7 +9,6 @@ use crate::load::{
     folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls, say_circles, say_warnings,
     suspects,
 };
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::tactile::metrics::Score;
@@ -31,7 +30,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
         return Err(Failure::usage("--report: a comparison with a table has no page")
             .hint("`gripgen diagnose FOLDER --report FILE.html` draws one of such a table"));
     }
-    let mut outputs = Outputs::of("compare", args.json.force)
+    let mut outputs = Outputs::new(args.json.force)
         .reads(&args.measured)
         .reads_all(&args.also)
         .reads_all(&args.sensor)
@@ -77,7 +76,7 @@ fn presses(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<
         let page = press_report(&text, &set, &comparison, |i| {
             predict_press(&set.presses[i], set.ball_m, &sensor).ok()
         });
-        outputs.write(path, Format::Html, page.as_bytes())?;
+        outputs.write(path, page.as_bytes())?;
     }
     if sink.wanted() {
         sink.document(&json!({"schema": "gripgen.comparison/1", "presses": comparison_json(&comparison)}))?;
@@ -106,7 +105,7 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
     if let Some(path) = &args.report {
         let title = format!("{} against {}", args.measured.display(), args.twin);
         let page = pull_comparison_page(&title, &loaded.pulls, &found);
-        outputs.write(path, Format::Html, page.as_bytes())?;
+        outputs.write(path, page.as_bytes())?;
     }
     let errors =
         |e: &LabelErrors| json!({"n": e.n, "rmse_n": e.rmse_n, "mape_pct": e.mape_pct, "bias_n": e.bias_n});

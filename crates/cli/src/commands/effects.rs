@@ -3,7 +3,6 @@
 use crate::args::EffectsArgs;
 use crate::failure::Failure;
 use crate::load::{load_library, load_twin};
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::twin::config::suggestion;
@@ -21,7 +20,7 @@ const LINE: usize = 96;
 
 /// Runs the verb.
 pub fn run(args: &EffectsArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("effects", args.json.force);
+    let mut outputs = Outputs::new(args.json.force);
     outputs.allow_all(args.plot.as_deref())?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let Some(id) = &args.id else {
@@ -39,7 +38,7 @@ pub fn run(args: &EffectsArgs) -> Result<u8, Failure> {
     let curve = effect_curve(spec, &twin, &library, 1).map_err(Failure::new)?;
     if let Some(path) = &args.plot {
         let title = format!("{} ({})", spec.id, typical(spec));
-        outputs.write(path, Format::Svg, curve.plot(&title).to_svg().as_bytes())?;
+        outputs.write(path, curve.plot(&title).to_svg().as_bytes())?;
     }
     if sink.wanted() {
         let mut whole = document(spec);

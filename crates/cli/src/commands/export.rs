@@ -3,20 +3,19 @@
 use crate::args::{ExportArgs, ExportFormat};
 use crate::commands::{maker, open_run};
 use crate::failure::Failure;
-use crate::mark::Format;
 use crate::output::{JsonSink, count, print};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{
-    Dataset, LEROBOT_CARD, LeRobotOptions, ParquetOptions, ShardReader, WebDatasetOptions, export_lerobot,
-    export_parquet, export_sample, export_webdataset, webdataset_rows,
+    Dataset, LeRobotOptions, ParquetOptions, ShardReader, WebDatasetOptions, export_lerobot, export_parquet,
+    export_sample, export_webdataset, webdataset_rows,
 };
 use serde_json::json;
 use std::path::PathBuf;
 
 /// Runs the verb.
 pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("export", args.json.force).reads(&args.run);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.run);
     if args.sample.is_none() && args.to == Some(ExportFormat::Webdataset) {
         return webdataset(args, outputs);
     }
@@ -49,7 +48,7 @@ fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Fai
     });
     progress.finish();
     exported.map_err(Failure::new)?;
-    let file = pending.publish(outputs)?;
+    let file = pending.publish()?;
     let bytes = file.metadata().map_err(Failure::new)?.len();
     let document = json!({"schema": "gripgen.export/1", "rows": rows, "file": args.out, "bytes": bytes});
     tell(args, sink, &document)
@@ -70,7 +69,6 @@ fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
     let made = export_lerobot(&dataset, options, folder.path(), || progress.step());
     progress.finish();
     let episodes = made.map_err(Failure::new)?;
-    folder.mark(LEROBOT_CARD, Format::Html, outputs.verb())?;
     folder.publish()?;
     let left_out = rows - episodes;
     if left_out > 0 && !args.talk.quiet {
@@ -113,7 +111,7 @@ fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
         let out = std::io::BufWriter::new(&pending.file);
         let made = export_webdataset(&dataset, rows, options, out, || progress.step());
         written += made.map_err(Failure::new)?;
-        bytes += pending.publish(&outputs)?.metadata().map_err(Failure::new)?.len();
+        bytes += pending.publish()?.metadata().map_err(Failure::new)?.len();
     }
     progress.finish();
     let left_out = dataset.table().rows() - written;
@@ -165,7 +163,7 @@ fn one(args: &ExportArgs, sample: u64, outputs: &Outputs, sink: JsonSink) -> Res
             .hint(format!("run the {} again to finish it", maker(&folder))));
     }
     let bytes = export_sample(&ShardReader::open(&folder.shard_path(shard))?, sample)?;
-    outputs.write(&args.out, Format::Marked, &bytes)?;
+    outputs.write(&args.out, &bytes)?;
     tell(
         args,
         sink,

@@ -40,7 +40,7 @@ impl PartSummary {
 
 /// Runs the verb.
 pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("info", args.json.force).reads(&args.run);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.run);
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     if !args.run.join("run.json").is_file() && is_pulls(&args.run) {
         return info_pulls::run(args, sink);

@@ -3,7 +3,6 @@
 use crate::args::InitArgs;
 use crate::commands::check::cores;
 use crate::failure::Failure;
-use crate::mark::Format;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
@@ -46,14 +45,12 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
         }
         (args.target.clone(), starter(), String::new(), None)
     };
-    let mut outputs = Outputs::of("init", args.json.force).reads_all(made.is_some().then_some(&args.target));
+    let mut outputs = Outputs::new(args.json.force).reads_all(made.is_some().then_some(&args.target));
     let paths: Vec<PathBuf> = files.iter().map(|f| folder.join(&f.name)).collect();
-    paths.iter().try_for_each(|path| outputs.judge(path))?;
     std::fs::create_dir_all(&folder).map_err(|e| Failure::new(format!("{}: {e}", folder.display())))?;
     outputs.allow_all(paths.iter().map(PathBuf::as_path))?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
-    // They are there to be edited, and carry no mark: who runs it again means --force.
-    paths.iter().zip(&files).try_for_each(|(path, file)| outputs.write(path, Format::Bare, &file.bytes))?;
+    paths.iter().zip(&files).try_for_each(|(path, file)| outputs.write(path, &file.bytes))?;
     if !args.talk.quiet {
         eprint!("{talk}");
         let sweep = shell::path(&folder.join("sweep.toml"));

@@ -2,7 +2,6 @@
 
 use crate::args::RenderArgs;
 use crate::failure::Failure;
-use crate::mark::{Format, short_hash};
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::record::encode_png;
@@ -15,12 +14,9 @@ use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
-    let mut outputs =
-        Outputs::of("render", args.json.force).reads(&args.mesh).reads_config(&args.sensor, &[]);
-    outputs.allow_all([Some(args.out.as_path()), args.mask.as_deref()].into_iter().flatten())?;
-    for path in [&args.heights, &args.normals].into_iter().flatten() {
-        outputs.allow_beside(path, &args.out)?;
-    }
+    let mut outputs = Outputs::new(args.json.force).reads(&args.mesh).reads_config(&args.sensor, &[]);
+    let written = [Some(&args.out), args.heights.as_ref(), args.normals.as_ref(), args.mask.as_ref()];
+    outputs.allow_all(written.iter().flatten().map(|path| path.as_path()))?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let sensor = load_sensor(&Location::parse(&args.sensor))?;
     let extension = args.mesh.extension().map_or_else(String::new, |e| e.to_string_lossy().into_owned());
@@ -33,28 +29,24 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
     };
     let rendered = render_file(&args.mesh, &options, &sensor)?;
     let size = (rendered.heights_mm.height, rendered.heights_mm.width);
-    let mut beside = Vec::new();
-    let mut bare = |path: &Path, array: &Array| {
-        let bytes = write_npy(array, ElementType::F32);
-        beside.push(short_hash(&bytes));
-        outputs.write(path, Format::Bare, &bytes)
+    let array = |path: &Path, shape: Vec<usize>, values: Vec<f64>| {
+        outputs.write(path, &write_npy(&Array { shape, values }, ElementType::F32))
     };
     if let Some(path) = &args.heights {
         let values = rendered.heights_mm.values.iter().map(|&h| f64::from(h)).collect();
-        bare(path, &Array { shape: vec![size.0, size.1], values })?;
+        array(path, vec![size.0, size.1], values)?;
     }
     if let Some(path) = &args.normals {
         let [x, y, z] = &rendered.normals;
         let values = (0..size.0 * size.1)
             .flat_map(|p| [x.values[p], y.values[p], z.values[p]].map(f64::from))
             .collect();
-        bare(path, &Array { shape: vec![size.0, size.1, 3], values })?;
+        array(path, vec![size.0, size.1, 3], values)?;
     }
-    // Last, and after what it names.
     let image = encode_png(&rendered.image).map_err(Failure::new)?;
-    outputs.write_with(&args.out, Format::Png, &image, &beside)?;
+    outputs.write(&args.out, &image)?;
     if let Some(path) = &args.mask {
-        outputs.write(path, Format::Png, &encode_png(&mask(&rendered)).map_err(Failure::new)?)?;
+        outputs.write(path, &encode_png(&mask(&rendered)).map_err(Failure::new)?)?;
     }
     if sink.wanted() {
         let pixels = rendered.contact.iter().filter(|&&c| c).count();
@@ -68,7 +60,6 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
         }))?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
-        let written = [Some(&args.out), args.heights.as_ref(), args.normals.as_ref(), args.mask.as_ref()];
         let lines: Vec<String> =
             written.iter().flatten().map(|path| format!("{}\n", path.display())).collect();
         print(&lines.concat())?;

@@ -3,7 +3,6 @@
 use crate::args::ShowArgs;
 use crate::commands::open_run;
 use crate::failure::Failure;
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::{CONTACT_SHEET, contact_sheet, sample_picture};
@@ -15,7 +14,7 @@ pub fn run(args: &ShowArgs) -> Result<u8, Failure> {
     let folder = open_run(&args.run)?;
     let name = args.sample.map_or(CONTACT_SHEET.into(), |index| format!("sample-{index:06}.png"));
     let out = args.out.clone().unwrap_or_else(|| args.run.join(name));
-    let mut outputs = Outputs::of("show", args.json.force).reads(&args.run);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.run);
     // The run's own sheet is made as the sweep makes it, and by nothing else.
     let own_sheet = args.sample.is_none() && is_sheet_of(&args.run, &out);
     if !own_sheet {
@@ -35,7 +34,7 @@ pub fn run(args: &ShowArgs) -> Result<u8, Failure> {
     if own_sheet {
         folder.publish(CONTACT_SHEET, &bytes)?;
     } else {
-        outputs.write(&out, Format::Png, &bytes)?;
+        outputs.write(&out, &bytes)?;
     }
     if sink.wanted() {
         sink.document(&json!({

@@ -4,7 +4,6 @@ use crate::args::TryArgs;
 use crate::commands::check::cores;
 use crate::commands::init::mesh_wanted;
 use crate::failure::Failure;
-use crate::mark::Format;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
@@ -20,7 +19,7 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
         args.mesh.file_stem().map_or_else(|| "part".into(), |stem| stem.to_string_lossy().into_owned());
     let page = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}-try.html")));
     let picture = page.with_extension("png");
-    let mut outputs = Outputs::of("try", args.replaces()).reads(&args.mesh);
+    let mut outputs = Outputs::new(args.replaces()).reads(&args.mesh);
     if let Some(sensor) = &args.sensor {
         outputs = outputs.reads_config(sensor, &[]);
     }
@@ -38,8 +37,8 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
         sensor: args.sensor.clone(),
     };
     let tried = try_part(&args.mesh, &options).map_err(refused)?;
-    outputs.write(&page, Format::Html, tried.page.as_bytes())?;
-    outputs.write(&picture, Format::Png, &tried.picture)?;
+    outputs.write(&page, tried.page.as_bytes())?;
+    outputs.write(&picture, &tried.picture)?;
     if !args.talk.quiet {
         eprint!("{}", summary(&tried));
         eprintln!("next: {}", next(args, &stem));

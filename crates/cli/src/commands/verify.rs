@@ -12,7 +12,7 @@ use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("verify", args.json.force).reads(&args.run);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.run);
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let folder = open_run(&args.run)?;
     let mut progress = Progress::start("shards", 0, folder.info().shards, &args.talk);

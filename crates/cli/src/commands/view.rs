@@ -2,7 +2,6 @@
 
 use crate::args::ViewArgs;
 use crate::failure::Failure;
-use crate::mark::Format;
 use crate::output::{JsonSink, print, size};
 use crate::outputs::Outputs;
 use gripgen::record::Dataset;
@@ -20,16 +19,16 @@ pub fn run(args: &ViewArgs) -> Result<u8, Failure> {
         return Err(Failure::usage(none).hint("name a run folder, a folder with pulls.csv, or a shard"));
     }
     let out = args.out.clone().unwrap_or_else(|| beside(&args.data));
-    let mut outputs = Outputs::of("view", args.force).reads(&args.data);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.data);
     outputs.allow(&out)?;
-    let mut sink = JsonSink::open(args.json.as_deref(), &mut outputs)?;
+    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let dataset = Dataset::open(&args.data).map_err(Failure::usage)?;
     let absolute = std::path::absolute(&args.data).unwrap_or_else(|_| args.data.clone());
     let title =
         absolute.file_name().map_or_else(|| "pulls".into(), |name| name.to_string_lossy().into_owned());
     let options = ViewOptions { title, pulls: args.pulls as usize };
     let page = view_page(&dataset, &options).map_err(Failure::new)?;
-    outputs.write(&out, Format::Html, page.html.as_bytes())?;
+    outputs.write(&out, page.html.as_bytes())?;
     if !args.talk.quiet {
         let bytes = size(page.html.len() as u64);
         eprintln!("{} of {} pulls with images and curves, {bytes}", page.shown, page.pulls);

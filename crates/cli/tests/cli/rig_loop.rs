@@ -133,6 +133,7 @@ fn an_undeclared_effect_of_a_rig_is_found_over_the_wire_and_the_next_campaign_te
         "--json",
         &path("both.json"),
         "-q",
+        "--force",
     ];
     assert_code(&run(&both), 0);
     let second: serde_json::Value = serde_json::from_slice(&std::fs::read(at("both.json")).unwrap()).unwrap();

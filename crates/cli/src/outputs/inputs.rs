@@ -1,13 +1,46 @@
-//! Files that a configuration names, and those that they name.
+//! What a command reads: files, the data of folders, and what configurations name.
 
+use gripgen::record::{CAMPAIGN_FILE, ROSBAG_FILE};
 use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Value};
 
+/// Endings of tables and of what they name. No verb that reads a folder of measurements writes a file of these kinds.
+const DATA: [&str; 12] =
+    [".csv", ".png", ".jpg", ".jpeg", ".npy", ".stl", ".obj", ".ply", ".glb", ".mcap", ".db3", ".bag"];
 /// How far names are followed: a sweep names a twin, which names meshes.
 const DEPTH: usize = 3;
 
+/// Whether a file is an input, by links too, or in an input folder one of its data.
+pub fn holds(input: &Path, path: &Path) -> bool {
+    let (Ok(input), Ok(path)) = (input.canonicalize(), path.canonicalize()) else { return false };
+    input == path || same_inode(&input, &path) || is_data_of(&input, &path)
+}
+
+/// Whether a file in a folder of measurements is one of those that are read. Twins, reports and sensor files may lie there too, and a
+/// run has files of its own.
+fn is_data_of(folder: &Path, path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let is_data = DATA.iter().any(|ending| name.ends_with(ending)) && !name.ends_with(".posterior.csv");
+    path.starts_with(folder)
+        && !folder.join("run.json").is_file()
+        && (is_data || [CAMPAIGN_FILE, ROSBAG_FILE].contains(&&*name))
+}
+
+#[cfg(unix)]
+fn same_inode(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let (Ok(one), Ok(other)) = (std::fs::metadata(a), std::fs::metadata(b)) else { return false };
+    (one.dev(), one.ino()) == (other.dev(), other.ino())
+}
+
+/// A hard link is not seen; what is renamed onto one leaves the other name's content alone.
+#[cfg(not(unix))]
+fn same_inode(_: &Path, _: &Path) -> bool {
+    false
+}
+
 /// A configuration file, the files that its strings name, and those that `--set` names. What is not there is left out.
-pub fn files(path: &str, sets: &[(String, String)]) -> Vec<PathBuf> {
+pub fn of_config(path: &str, sets: &[(String, String)]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let base = if path.starts_with(gripgen::assets::ASSET_PREFIX) { None } else { Some(Path::new(path)) };
     for (_, value) in sets {
