@@ -2,20 +2,14 @@
 
 use super::rig_served::Served;
 use super::{assert_code, run, text};
-use gripgen::record::{RunFolder, ShardReader, status_name};
+use gripgen::record::{RunFolder, ShardReader};
 use std::path::Path;
 
 const SPEED: [&str; 2] = ["--speed", "20"];
 
-/// Status and reason of each pull of a folder.
+/// Status and reason of each pull that a folder has.
 fn pulls(out: &Path) -> Vec<(String, String)> {
-    let folder = RunFolder::open(out).unwrap();
-    let pull = |index: u64| {
-        let (sample, _) = ShardReader::open(&folder.shard_path(index)).unwrap().pull(index).unwrap();
-        let reason = if sample.failure.is_empty() { &sample.status_reason } else { &sample.failure }.clone();
-        (status_name(sample.status()).to_string(), reason)
-    };
-    (0..folder.info().shards).filter(|&shard| folder.sidecar_path(shard).exists()).map(pull).collect()
+    super::rig_served::pulls(out).into_iter().flatten().collect()
 }
 
 /// A pull during which something is said to the rig when it reaches a step; its exit code and what is stored.

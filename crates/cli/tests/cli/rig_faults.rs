@@ -1,28 +1,13 @@
 //! `gripgen rig pull` when something goes wrong in the middle: what it says, what it leaves, and that it goes on.
 
-use super::rig_served::Served;
+use super::rig_served::{Served, pulls};
 use super::{assert_code, run, text};
-use gripgen::record::{RunFolder, ShardReader, status_name};
 use std::path::Path;
 use std::time::Duration;
 
 /// No fault holds the robot's client up for longer, on a machine that has five times as much to do as it can.
 const LONGEST: Duration = Duration::from_secs(20);
 const SPEED: [&str; 2] = ["--speed", "20"];
-
-/// Status and failure of each pull of a folder; `None` where there is none.
-fn pulls(out: &Path) -> Vec<Option<(String, String)>> {
-    let folder = RunFolder::open(out).unwrap();
-    let pull = |index: u64| {
-        // A shard without its sidecar is half written: it is taken for none.
-        let done = folder.sidecar_path(index).exists();
-        done.then(|| {
-            let (sample, _) = ShardReader::open(&folder.shard_path(index)).unwrap().pull(index).unwrap();
-            (status_name(sample.status()).to_string(), sample.failure)
-        })
-    };
-    (0..folder.info().shards).map(pull).collect()
-}
 
 fn statuses(out: &Path) -> Vec<String> {
     pulls(out).into_iter().map(|pull| pull.map_or("missing".into(), |(status, _)| status)).collect()
