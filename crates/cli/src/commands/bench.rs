@@ -1,8 +1,8 @@
 //! `gripgen bench`: images per second on this machine.
 
 use crate::args::BenchArgs;
-use crate::commands::check::cores;
 use crate::failure::Failure;
+use crate::load::jobs;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::twin::config::Backend;
@@ -22,7 +22,7 @@ pub fn run(args: &BenchArgs) -> Result<u8, Failure> {
         sensor: args.sensor.clone(),
         adapter: args.adapter.clone(),
         seconds: args.seconds,
-        threads: cores(),
+        threads: jobs(),
     };
     let report = bench(&options)?;
     if sink.wanted() {

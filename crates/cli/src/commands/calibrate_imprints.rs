@@ -3,7 +3,7 @@
 use crate::args::{CalibrateImprintsArgs, ConstantOf};
 use crate::commands::imprints;
 use crate::failure::Failure;
-use crate::load::load_twin;
+use crate::load::{load_twin, there_is};
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::identify::{ImprintConstants, ParameterEstimate, SharedConstant};
@@ -12,9 +12,7 @@ use serde_json::{Map, Value, json};
 
 /// Runs the verb.
 pub fn run(args: &CalibrateImprintsArgs) -> Result<u8, Failure> {
-    if !args.measured.exists() {
-        return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
-    }
+    there_is(&args.measured)?;
     let mut outputs = Outputs::new(args.json.force)
         .reads(&args.measured)
         .reads_all(&args.sensor)

@@ -2,6 +2,7 @@
 
 use crate::args::CalibrateSensorArgs;
 use crate::failure::Failure;
+use crate::load::there_is;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::identify::{ParameterEstimate, SensorCalibration};
@@ -13,9 +14,7 @@ use std::fmt::Write;
 
 /// Runs the verb.
 pub fn run(args: &CalibrateSensorArgs) -> Result<u8, Failure> {
-    if !args.measured.exists() {
-        return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
-    }
+    there_is(&args.measured)?;
     let mut outputs = Outputs::new(args.json.force).reads(&args.measured).reads_config(&args.twin, &[]);
     outputs.allow_all(args.out.as_deref())?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;

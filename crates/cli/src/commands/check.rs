@@ -2,6 +2,7 @@
 
 use crate::args::{CheckArgs, ConfigArgs, JsonArgs, TalkArgs};
 use crate::failure::{Failure, code};
+use crate::load;
 use crate::output::{JsonSink, count, duration, size};
 use crate::outputs::Outputs;
 use crate::shell;
@@ -27,7 +28,7 @@ pub fn check(
     let mut sink = JsonSink::open(json.json.as_deref(), &mut outputs)?;
     let project = load(config)?;
     let plan = plan(&project, SimdLevel::best())?;
-    let jobs = jobs.unwrap_or_else(cores).max(1);
+    let jobs = jobs.unwrap_or_else(load::jobs).max(1);
     let failed: Vec<_> = plan.probes.iter().filter(|p| p.failure.is_some()).collect();
     let warnings = [of_columns(&project), of_probes(&plan), of_plan(&plan)].concat();
     if sink.wanted() {
@@ -151,11 +152,6 @@ fn of_plan(plan: &Plan) -> Vec<String> {
         )
     });
     open.chain(failing).collect()
-}
-
-/// Worker threads where the user names none.
-pub fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// The plan in words.

@@ -8,7 +8,9 @@ mod presses;
 use crate::args::{DiagnoseArgs, TalkArgs};
 use crate::commands::imprints;
 use crate::failure::Failure;
-use crate::load::{folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects, within_rig};
+use crate::load::{
+    folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects, there_is, within_rig,
+};
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use crate::progress::Share;
@@ -22,9 +24,7 @@ use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
-    if !args.measured.exists() {
-        return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
-    }
+    there_is(&args.measured)?;
     let mut outputs = Outputs::new(args.json.force)
         .reads(&args.measured)
         .reads_all(&args.also)

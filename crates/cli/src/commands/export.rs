@@ -57,7 +57,7 @@ fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Fai
 fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
     let dataset = Dataset::open(&args.run).map_err(Failure::usage)?;
     outputs.allow_new_folder(&args.out)?;
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let rows = dataset.table().rows();
     let has_traces = (0..rows).find_map(|row| dataset.trace(row).ok().flatten()).is_some();
     let options = LeRobotOptions {
@@ -74,15 +74,9 @@ fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
     if left_out > 0 && !args.talk.quiet {
         eprintln!("{} without images or trace left out", count(left_out as u64, "row"));
     }
-    if sink.wanted() {
-        sink.document(&json!({
-            "schema": "gripgen.export/1", "rows": episodes, "left_out": left_out, "file": args.out,
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!("{}\n", args.out.display()))?;
-    }
-    Ok(0)
+    let document =
+        json!({"schema": "gripgen.export/1", "rows": episodes, "left_out": left_out, "file": args.out});
+    tell(args, sink, &document)
 }
 
 /// Rows of a tar file whose name has a number.

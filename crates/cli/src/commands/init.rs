@@ -1,8 +1,8 @@
 //! `gripgen init`: something to start from.
 
 use crate::args::InitArgs;
-use crate::commands::check::cores;
 use crate::failure::Failure;
+use crate::load::jobs;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
@@ -17,7 +17,7 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     let (folder, files, talk, made) = if args.benchmark {
         let folder = args.out.clone().unwrap_or_else(|| args.target.clone());
         no_mesh(&folder, "")?;
-        let made = benchmark_starter(args.per_family.map(|n| n as usize), cores()).map_err(Failure::new)?;
+        let made = benchmark_starter(args.per_family.map(|n| n as usize), jobs()).map_err(Failure::new)?;
         (folder, made.files, made.summary, None)
     } else if MESH_FORMATS.contains(&extension.as_str()) {
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
@@ -25,7 +25,7 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
             scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
             accept_open_mesh: args.accept_open_mesh,
             mu: args.mu,
-            threads: cores(),
+            threads: jobs(),
         };
         let mut made = part_starter(&args.target, &folder, options).map_err(|e| {
             let hint = e.hint();

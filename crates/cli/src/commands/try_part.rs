@@ -1,9 +1,9 @@
 //! `gripgen try`: what becomes of a part, on one page and in one picture.
 
 use crate::args::TryArgs;
-use crate::commands::check::cores;
 use crate::commands::init::mesh_wanted;
 use crate::failure::Failure;
+use crate::load::jobs;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
@@ -30,7 +30,7 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
             scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
             accept_open_mesh: args.accept_open_mesh,
             mu: args.mu,
-            threads: cores(),
+            threads: jobs(),
         },
         grip: args.grip,
         force_n: args.force_n(),

@@ -2,6 +2,7 @@
 
 use crate::args::ViewArgs;
 use crate::failure::Failure;
+use crate::load::there_is;
 use crate::output::{JsonSink, print, size};
 use crate::outputs::Outputs;
 use gripgen::record::Dataset;
@@ -14,10 +15,7 @@ const PAGE: &str = "view.html";
 
 /// Runs the verb.
 pub fn run(args: &ViewArgs) -> Result<u8, Failure> {
-    if !args.data.exists() {
-        let none = format!("{}: there is no such file or folder", args.data.display());
-        return Err(Failure::usage(none).hint("name a run folder, a folder with pulls.csv, or a shard"));
-    }
+    there_is(&args.data).map_err(|e| e.hint("name a run folder, a folder with pulls.csv, or a shard"))?;
     let out = args.out.clone().unwrap_or_else(|| beside(&args.data));
     let mut outputs = Outputs::new(args.json.force).reads(&args.data);
     outputs.allow(&out)?;

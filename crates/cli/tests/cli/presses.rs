@@ -237,9 +237,15 @@ fn a_mesh_is_rendered_with_its_surface() {
     // Placed, turned by half a turn, and smaller: the middle of its section lies 0.5 mm times 0.6 beside its tip, 3.4 px.
     let middle = |more: &[&str]| {
         let placed = ["--x-px", "140", "--y-px", "90.5"];
-        let drawn = run(
-            &[&arguments[..2], &["--depth-mm", "2", "--sensor", sensor], &placed, &wanted, &["--force"], more].concat()
-        );
+        let drawn = run(&[
+            &arguments[..2],
+            &["--depth-mm", "2", "--sensor", sensor],
+            &placed,
+            &wanted,
+            &["--force"],
+            more,
+        ]
+        .concat());
         assert!(drawn.status.success(), "{}", text(&drawn.stderr));
         let all = inside("m.png");
         let n = all.len() as f64;
@@ -304,7 +310,8 @@ fn a_surface_is_rendered_from_its_heights() {
         ("ridges.npy", vec!["--scale-mm-per-unit", "100"], "pressed in by 19.99"),
     ] {
         let path = file(name);
-        let refused = run(&[vec!["render", &path, "--sensor", sensor, "-o", &image, "--force"], more].concat());
+        let refused =
+            run(&[vec!["render", &path, "--sensor", sensor, "-o", &image, "--force"], more].concat());
         assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
         assert!(text(&refused.stderr).contains(part), "{}", text(&refused.stderr));
     }
