@@ -23,14 +23,7 @@ pub mod try_part;
 pub mod verify;
 pub mod view;
 
-use crate::failure::Failure;
 use gripgen::record::{RIG_SOURCE, RunFolder};
-use std::path::Path;
-
-/// Opens a run folder for reading.
-fn open_run(path: &Path) -> Result<RunFolder, Failure> {
-    RunFolder::open(path).map_err(Failure::from)
-}
 
 /// What makes the shards of a run.
 fn maker(folder: &RunFolder) -> &'static str {

@@ -52,6 +52,22 @@ impl JsonSink {
         matches!(self, JsonSink::Stdout)
     }
 
+    /// Ends a verb: its document where JSON was asked for, its text for people unless standard output is taken or `quiet`.
+    pub fn finish(
+        mut self,
+        quiet: bool,
+        document: impl FnOnce() -> Value,
+        text: impl FnOnce() -> String,
+    ) -> Result<u8, Failure> {
+        if self.wanted() {
+            self.document(&document())?;
+        }
+        if !self.on_stdout() && !quiet {
+            print(&text())?;
+        }
+        Ok(0)
+    }
+
     /// Writes a value on one line, one of many.
     pub fn line(&mut self, value: &Value) -> Result<(), Failure> {
         match self {

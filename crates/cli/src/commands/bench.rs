@@ -3,7 +3,7 @@
 use crate::args::BenchArgs;
 use crate::failure::Failure;
 use crate::load::jobs;
-use crate::output::{JsonSink, print};
+use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use gripgen::twin::config::Backend;
 use gripgen::{BenchOptions, BenchReport, bench};
@@ -16,7 +16,7 @@ pub fn run(args: &BenchArgs) -> Result<u8, Failure> {
         return Err(Failure::usage("--adapter goes with --backend gpu"));
     }
     let mut outputs = Outputs::new(args.json.force).reads_all(&args.sensor);
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let options = BenchOptions {
         backend,
         sensor: args.sensor.clone(),
@@ -25,13 +25,7 @@ pub fn run(args: &BenchArgs) -> Result<u8, Failure> {
         threads: jobs(),
     };
     let report = bench(&options)?;
-    if sink.wanted() {
-        sink.document(&as_json(&report))?;
-    }
-    if !sink.on_stdout() {
-        print(&in_words(&report))?;
-    }
-    Ok(0)
+    sink.finish(false, || as_json(&report), || in_words(&report))
 }
 
 fn name(backend: Backend) -> &'static str {

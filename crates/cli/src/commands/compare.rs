@@ -46,7 +46,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
 }
 
 /// A sensor file against presses.
-fn presses(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8, Failure> {
+fn presses(args: &CompareArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Failure> {
     let (sensor, mut set) = load_sensor_and_presses(&args.measured, args.sensor.as_deref(), &args.twin)?;
     say_circles(&find_circles_with_sensor(&mut set, &sensor), &args.talk);
     let comparison = compare_presses(&set, &sensor)
@@ -75,40 +75,35 @@ fn presses(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<
         });
         outputs.write(path, page.as_bytes())?;
     }
-    if sink.wanted() {
-        sink.document(&json!({"schema": "gripgen.comparison/1", "presses": comparison_json(&comparison)}))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&table(&comparison))?;
-    }
-    Ok(0)
+    let document = || json!({"schema": "gripgen.comparison/1", "presses": comparison_json(&comparison)});
+    sink.finish(args.talk.quiet, document, || table(&comparison))
 }
 
 /// A twin against a force-sensor table.
-fn sensor_table(args: &CompareArgs, mut sink: JsonSink) -> Result<u8, Failure> {
+fn sensor_table(args: &CompareArgs, sink: JsonSink) -> Result<u8, Failure> {
     let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
     let twin = load_twin(&args.twin, &[])?;
     let found = compare_sensor_table(&table, &twin)
         .map_err(|reason| Failure::usage(format!("{}: {reason}", args.measured.display())))?;
-    if sink.wanted() {
+    let document = || {
         let by_session: Map<String, Value> = found
             .by_session
             .iter()
             .map(|(name, n, rmse_n)| (name.clone(), json!({"n": n, "rmse_n": rmse_n})))
             .collect();
-        sink.document(&json!({
+        json!({
             "schema": "gripgen.comparison/1",
             "sensor": {"n": found.n, "rmse_n": found.rmse_n, "mape_pct": found.mape_pct, "bias_n": found.bias_n,
                 "by_session": by_session},
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!(
+        })
+    };
+    let text = || {
+        format!(
             "{} rows, error {:.4} N ({:.1} %), gain and offset of each session refitted\n",
             found.n, found.rmse_n, found.mape_pct
-        ))?;
-    }
-    Ok(0)
+        )
+    };
+    sink.finish(args.talk.quiet, document, text)
 }
 
 /// A twin against measured pulls.

@@ -1,14 +1,14 @@
 //! `gripgen export`: a sample as a file of its own, or all of them as a table or for WebDataset.
 
 use crate::args::{ExportArgs, ExportFormat};
-use crate::commands::{maker, open_run};
+use crate::commands::maker;
 use crate::failure::Failure;
-use crate::output::{JsonSink, count, print};
+use crate::output::{JsonSink, count};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{
-    Dataset, LeRobotOptions, ParquetOptions, ShardReader, WebDatasetOptions, export_lerobot, export_parquet,
-    export_sample, export_webdataset, webdataset_rows,
+    Dataset, LeRobotOptions, ParquetOptions, RunFolder, ShardReader, WebDatasetOptions, export_lerobot,
+    export_parquet, export_sample, export_webdataset, webdataset_rows,
 };
 use serde_json::json;
 use std::path::PathBuf;
@@ -51,7 +51,7 @@ fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Fai
     let file = pending.publish()?;
     let bytes = file.metadata().map_err(Failure::new)?.len();
     let document = json!({"schema": "gripgen.export/1", "rows": rows, "file": args.out, "bytes": bytes});
-    tell(args, sink, &document)
+    sink.finish(args.talk.quiet, || document, || format!("{}\n", args.out.display()))
 }
 
 fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
@@ -76,7 +76,7 @@ fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
     }
     let document =
         json!({"schema": "gripgen.export/1", "rows": episodes, "left_out": left_out, "file": args.out});
-    tell(args, sink, &document)
+    sink.finish(args.talk.quiet, || document, || format!("{}\n", args.out.display()))
 }
 
 /// Rows of a tar file whose name has a number.
@@ -97,7 +97,7 @@ fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
         None => vec![(args.out.clone(), &rows)],
     };
     outputs.allow_all(files.iter().map(|(path, _)| path.as_path()))?;
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let mut progress = Progress::start("rows", 0, rows.len() as u64, &args.talk);
     let (mut written, mut bytes) = (0, 0);
     for (path, rows) in &files {
@@ -113,16 +113,12 @@ fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
         eprintln!("{} without images left out", count(left_out as u64, "row"));
     }
     let paths: Vec<&PathBuf> = files.iter().map(|(path, _)| path).collect();
-    if sink.wanted() {
-        sink.document(&json!({
-            "schema": "gripgen.export/1", "rows": written, "left_out": left_out, "file": args.out, "files": paths,
-            "bytes": bytes,
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>())?;
-    }
-    Ok(0)
+    let document = json!({
+        "schema": "gripgen.export/1", "rows": written, "left_out": left_out, "file": args.out, "files": paths,
+        "bytes": bytes,
+    });
+    let lines = || paths.iter().map(|path| format!("{}\n", path.display())).collect();
+    sink.finish(args.talk.quiet, || document, lines)
 }
 
 /// The names that a name with `%d` or `%05d` in it stands for; `None` without one.
@@ -134,18 +130,8 @@ fn numbered(name: &str) -> Option<impl Fn(usize) -> String> {
     (width < 20).then_some(move |i: usize| format!("{before}{i:0width$}{after}"))
 }
 
-fn tell(args: &ExportArgs, mut sink: JsonSink, document: &serde_json::Value) -> Result<u8, Failure> {
-    if sink.wanted() {
-        sink.document(document)?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!("{}\n", args.out.display()))?;
-    }
-    Ok(0)
-}
-
 fn one(args: &ExportArgs, sample: u64, outputs: &Outputs, sink: JsonSink) -> Result<u8, Failure> {
-    let folder = open_run(&args.run)?;
+    let folder = RunFolder::open(&args.run)?;
     let info = folder.info();
     if sample >= info.samples {
         let (k, n) = (sample, info.samples);
@@ -158,9 +144,7 @@ fn one(args: &ExportArgs, sample: u64, outputs: &Outputs, sink: JsonSink) -> Res
     }
     let bytes = export_sample(&ShardReader::open(&folder.shard_path(shard))?, sample)?;
     outputs.write(&args.out, &bytes)?;
-    tell(
-        args,
-        sink,
-        &json!({"schema": "gripgen.export/1", "sample": sample, "file": args.out, "bytes": bytes.len()}),
-    )
+    let document =
+        json!({"schema": "gripgen.export/1", "sample": sample, "file": args.out, "bytes": bytes.len()});
+    sink.finish(args.talk.quiet, || document, || format!("{}\n", args.out.display()))
 }

@@ -1,12 +1,11 @@
 //! `gripgen info`: what a run folder holds, or a folder of measured pulls.
 
 use crate::args::InfoArgs;
-use crate::commands::open_run;
 use crate::failure::Failure;
 use crate::load::{no_pulls, say_warnings};
 use crate::output::{JsonSink, count, print, size};
 use crate::outputs::Outputs;
-use gripgen::record::{INDEX_COLUMNS, PULLS_FILE, RIG_SOURCE, ROSBAG_FILE};
+use gripgen::record::{INDEX_COLUMNS, PULLS_FILE, RIG_SOURCE, ROSBAG_FILE, RunFolder};
 use gripgen::{Level, is_pulls, levels, load_pulls_of};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -46,7 +45,7 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     if !args.run.join("run.json").is_file() && is_pulls(&args.run) {
         return pulls(args, sink);
     }
-    let folder = open_run(&args.run)?;
+    let folder = RunFolder::open(&args.run)?;
     let info = folder.info();
     let at = |name: &str| INDEX_COLUMNS.iter().position(|c| *c == name).unwrap_or(0);
     let (status, part, label) = (at("status"), at("part"), at("max_pull_force_n"));

@@ -14,13 +14,20 @@ use std::path::{Path, PathBuf};
 /// Runs the verb.
 pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     let extension = args.target.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
+    // Every kind of start has a sweep; grips are tried for minutes.
+    let free = |folder: &Path| match folder.is_dir() {
+        true => Outputs::new(args.json.force).allow(&folder.join("sweep.toml")),
+        false => Ok(()),
+    };
     let (folder, files, talk, made) = if args.benchmark {
         let folder = args.out.clone().unwrap_or_else(|| args.target.clone());
         no_mesh(&folder, "")?;
+        free(&folder)?;
         let made = benchmark_starter(args.per_family.map(|n| n as usize), jobs()).map_err(Failure::new)?;
         (folder, made.files, made.summary, None)
     } else if MESH_FORMATS.contains(&extension.as_str()) {
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
+        free(&folder)?;
         let options = PartOptions {
             scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
             accept_open_mesh: args.accept_open_mesh,

@@ -2,7 +2,7 @@
 
 use crate::args::RenderArgs;
 use crate::failure::Failure;
-use crate::output::{JsonSink, print};
+use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use gripgen::record::encode_png;
 use gripgen::tactile::npz::{Array, ElementType, write_npy};
@@ -17,7 +17,7 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
     let mut outputs = Outputs::new(args.json.force).reads(&args.mesh).reads_config(&args.sensor, &[]);
     let written = [Some(&args.out), args.heights.as_ref(), args.normals.as_ref(), args.mask.as_ref()];
     outputs.allow_all(written.iter().flatten().map(|path| path.as_path()))?;
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let sensor = load_sensor(&Location::parse(&args.sensor))?;
     let extension = args.mesh.extension().map_or_else(String::new, |e| e.to_string_lossy().into_owned());
     let options = RenderOptions {
@@ -48,23 +48,19 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
     if let Some(path) = &args.mask {
         outputs.write(path, &encode_png(&mask(&rendered)).map_err(Failure::new)?)?;
     }
-    if sink.wanted() {
+    let document = || {
         let pixels = rendered.contact.iter().filter(|&&c| c).count();
         let at = (!is_height_map(&args.mesh)).then(|| options.pose(&sensor.grid));
         let side_mm = sensor.grid.metres_per_px * 1e3;
-        sink.document(&json!({
+        json!({
             "schema": "gripgen.render/1", "image": args.out, "heights": args.heights, "normals": args.normals,
             "mask": args.mask, "width_px": size.1, "height_px": size.0,
             "x_px": at.map(|at| at.x_px), "y_px": at.map(|at| at.y_px),
             "contact_area_mm2": pixels as f64 * side_mm * side_mm,
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        let lines: Vec<String> =
-            written.iter().flatten().map(|path| format!("{}\n", path.display())).collect();
-        print(&lines.concat())?;
-    }
-    Ok(0)
+        })
+    };
+    let lines = || written.iter().flatten().map(|path| format!("{}\n", path.display())).collect();
+    sink.finish(args.talk.quiet, document, lines)
 }
 
 fn mask(rendered: &RenderedBody) -> TactileImage {

@@ -4,7 +4,7 @@ use crate::args::TryArgs;
 use crate::commands::init::mesh_wanted;
 use crate::failure::Failure;
 use crate::load::jobs;
-use crate::output::{JsonSink, print, program};
+use crate::output::{JsonSink, program};
 use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::twin::usual_scale_mm_per_unit;
@@ -24,7 +24,7 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
         outputs = outputs.reads_config(sensor, &[]);
     }
     outputs.allow_all([page.as_path(), picture.as_path()])?;
-    let mut sink = JsonSink::open(args.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.as_deref(), &mut outputs)?;
     let options = TryOptions {
         part: PartOptions {
             scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
@@ -43,13 +43,8 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
         eprint!("{}", summary(&tried));
         eprintln!("next: {}", next(args, &stem));
     }
-    if sink.wanted() {
-        sink.document(&document(&tried, &page, &picture))?;
-    }
-    if !sink.on_stdout() {
-        print(&format!("{}\n{}\n", page.display(), picture.display()))?;
-    }
-    Ok(0)
+    let files = || format!("{}\n{}\n", page.display(), picture.display());
+    sink.finish(false, || document(&tried, &page, &picture), files)
 }
 
 /// The command that makes a sweep of the part as it was read here.

@@ -3,7 +3,7 @@
 use crate::args::ViewArgs;
 use crate::failure::Failure;
 use crate::load::there_is;
-use crate::output::{JsonSink, print, size};
+use crate::output::{JsonSink, size};
 use crate::outputs::Outputs;
 use gripgen::record::Dataset;
 use gripgen::{ViewOptions, view_page};
@@ -19,7 +19,7 @@ pub fn run(args: &ViewArgs) -> Result<u8, Failure> {
     let out = args.out.clone().unwrap_or_else(|| beside(&args.data));
     let mut outputs = Outputs::new(args.json.force).reads(&args.data);
     outputs.allow(&out)?;
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let dataset = Dataset::open(&args.data).map_err(Failure::usage)?;
     let absolute = std::path::absolute(&args.data).unwrap_or_else(|_| args.data.clone());
     let title =
@@ -31,16 +31,13 @@ pub fn run(args: &ViewArgs) -> Result<u8, Failure> {
         let bytes = size(page.html.len() as u64);
         eprintln!("{} of {} pulls with images and curves, {bytes}", page.shown, page.pulls);
     }
-    if sink.wanted() {
-        sink.document(&json!({
+    let document = || {
+        json!({
             "schema": "gripgen.view/1", "file": out, "pulls": page.pulls, "shown": page.shown,
             "bytes": page.html.len(),
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!("{}\n", out.display()))?;
-    }
-    Ok(0)
+        })
+    };
+    sink.finish(args.talk.quiet, document, || format!("{}\n", out.display()))
 }
 
 /// In a folder, or beside a shard.

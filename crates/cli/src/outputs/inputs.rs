@@ -2,7 +2,6 @@
 
 use gripgen::record::{CAMPAIGN_FILE, ROSBAG_FILE};
 use std::path::{Path, PathBuf};
-use toml_edit::{DocumentMut, Item, Value};
 
 /// Endings of tables and of what they name. No verb that reads a folder of measurements writes a file of these kinds.
 const DATA: [&str; 12] =
@@ -64,32 +63,8 @@ fn follow(path: &Path, depth: usize, found: &mut Vec<PathBuf>) {
     }
     // The draws that a sweep may take from beside its twin.
     follow(&path.with_extension("posterior.csv"), depth, found);
-    let Some(document) = std::fs::read_to_string(path).ok().and_then(|text| text.parse::<DocumentMut>().ok())
-    else {
-        return;
-    };
+    let text = std::fs::read_to_string(path).unwrap_or_default();
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut names = Vec::new();
-    strings_of(document.as_item(), &mut names);
-    names.iter().for_each(|name| follow(&folder.join(name), depth - 1, found));
-}
-
-fn strings_of(item: &Item, names: &mut Vec<String>) {
-    match item {
-        Item::None => {}
-        Item::Value(value) => of_value(value, names),
-        Item::Table(table) => table.iter().for_each(|(_, item)| strings_of(item, names)),
-        Item::ArrayOfTables(all) => {
-            all.iter().flat_map(|table| table.iter()).for_each(|(_, item)| strings_of(item, names));
-        }
-    }
-}
-
-fn of_value(value: &Value, names: &mut Vec<String>) {
-    match value {
-        Value::String(name) => names.push(name.value().clone()),
-        Value::Array(all) => all.iter().for_each(|value| of_value(value, names)),
-        Value::InlineTable(table) => table.iter().for_each(|(_, value)| of_value(value, names)),
-        _ => {}
-    }
+    // Of all that stands between two quotes only names of files are followed.
+    text.split(['"', '\'']).for_each(|name| follow(&folder.join(name), depth - 1, found));
 }

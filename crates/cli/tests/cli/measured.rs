@@ -13,7 +13,8 @@ fn pulls(rows: usize) -> String {
     table
 }
 
-fn folder(table: &str) -> tempfile::TempDir {
+/// A folder with this table of pulls.
+pub fn folder(table: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("pulls.csv"), table).unwrap();
     folder

@@ -1,7 +1,7 @@
 //! `gripgen rig pull` on a rig whose devices tell half the truth: nothing breaks, and no such label is taken for a good one.
 
 use super::rig_served::Served;
-use super::{assert_code, run, text};
+use super::{assert_code, run, text, unmade};
 use gripgen::record::{RunFolder, ShardReader};
 use std::path::Path;
 
@@ -105,8 +105,7 @@ fn a_rig_that_is_not_as_its_file_says_is_refused() {
 /// The same picture with new stamps is a camera that stands still.
 #[test]
 fn a_camera_that_repeats_itself_is_frozen() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let mut rig = Served::start(&SPEED);
     let (code, found, said) = pulled(&mut rig, &out, ": rest images", "repeat right", &[]);
     assert_eq!(code, 1, "{said}");

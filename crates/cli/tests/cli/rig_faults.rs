@@ -1,7 +1,7 @@
 //! `gripgen rig pull` when something goes wrong in the middle: what it says, what it leaves, and that it goes on.
 
 use super::rig_served::{Served, pulls};
-use super::{assert_code, run, text};
+use super::{assert_code, run, text, unmade};
 use std::path::Path;
 use std::time::Duration;
 
@@ -25,8 +25,7 @@ fn assert_counts(out: &Path, counts: [u64; 3]) {
 
 #[test]
 fn an_emergency_stop_fails_one_pull_and_the_same_command_finishes_the_campaign() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let mut rig = Served::start(&SPEED);
     let mut pulling = rig.pull(&out, 3, &[]);
     pulling.until(&["2/3", ": pulling"]);
@@ -62,8 +61,7 @@ fn an_emergency_stop_fails_one_pull_and_the_same_command_finishes_the_campaign()
 
 #[test]
 fn a_protective_stop_is_left_only_when_somebody_says_so() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let mut rig = Served::start(&SPEED);
     let mut pulling = rig.pull(&out, 1, &[]);
     pulling.until(&["1/1", ": the way down"]);
@@ -83,8 +81,7 @@ fn a_protective_stop_is_left_only_when_somebody_says_so() {
 
 #[test]
 fn ctrl_c_stops_the_robot_and_the_same_command_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let rig = Served::start(&SPEED);
     let mut pulling = rig.pull(&out, 2, &[]);
     pulling.until(&["2/2", ": pulling"]);
@@ -100,8 +97,7 @@ fn ctrl_c_stops_the_robot_and_the_same_command_goes_on() {
 /// SIGKILL: nobody says stop, nobody says goodbye.
 #[test]
 fn a_host_that_dies_stops_the_robot_and_leaves_no_half_pull() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let rig = Served::start(&SPEED);
     for moment in [": pulling", ": gripping", ": the way down"] {
         let mut pulling = rig.pull(&out, 2, &[]);
