@@ -35,7 +35,7 @@ def campaign(work: Path, effects: list[dict[str, object]], pulls: int, seed: int
     if not folder.exists():
         inline = ", ".join("{ " + ", ".join(f"{key} = {json.dumps(value)}" for key, value in e.items()) + " }" for e in effects)
         command = [sys.executable, "-m", "gripgen", "campaign", "--pulls", str(pulls), "--seed", str(seed), "--offsets-mm=-6,-3,0,3,6"]
-        command += ["--quiet", "--set", f"effects=[{inline}]", "--out", str(work / "campaign.toml"), "--simulate", str(folder)]
+        command += ["--quiet", "--set", f"effects=[{inline}]", "--out", str(work / "campaign.toml"), "--force", "--simulate", str(folder)]
         subprocess.run(command, check=True)
     return folder
 
@@ -64,7 +64,7 @@ def main() -> None:
         work = options.work / f"rig-{number}"
         work.mkdir(exist_ok=True)
         test = Arrays(data(work, "rig", BASELINE, options.test, 100 + number, effects=effects))
-        found = gg.diagnose(campaign(work, effects, options.pulls, options.seed + number), out=work / "diagnosed.toml")
+        found = gg.diagnose(campaign(work, effects, options.pulls, options.seed + number), out=work / "diagnosed.toml", force=True)
         print(f"\n{name}: {options.pulls} pulls without images say {found.verdict}, {', '.join(found.names) or 'no name'}")
         twin = str((work / "diagnosed.toml").resolve())
         rows = {"before": errors(before, test)}

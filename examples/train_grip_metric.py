@@ -206,7 +206,7 @@ def make_campaign(work: Path) -> None:
     [effect] = HIDDEN
     inline = ", ".join(f"{key} = {json.dumps(value)}" for key, value in effect.items())
     command = [sys.executable, "-m", "gripgen", "campaign", "--pulls", "240", "--offsets-mm=-6,-3,0,3,6", "--quiet"]
-    command += ["--set", f"effects=[{{ {inline} }}]", "--out", str(work / "campaign.toml")]
+    command += ["--set", f"effects=[{{ {inline} }}]", "--out", str(work / "campaign.toml"), "--force"]
     subprocess.run([*command, "--simulate", str(work / "campaign")], check=True)
 
 
@@ -262,7 +262,7 @@ def main() -> None:
     network_plain = train(plain.where(~kept), epochs, seed)
     if not (work / "campaign").exists():
         make_campaign(work)
-    found = gg.diagnose(work / "campaign", out=work / "diagnosed.toml", report=work / "diagnosis.html")
+    found = gg.diagnose(work / "campaign", out=work / "diagnosed.toml", report=work / "diagnosis.html", force=True)
     print(f"\ndiagnosis of 240 pulls without images: {found.verdict}, {', '.join(found.names)}")
     diagnosed = Arrays(data(work, "diagnosed", str((work / "diagnosed.toml").resolve()), options.samples, 3))
     network_diagnosed = train(diagnosed, epochs, seed)

@@ -70,7 +70,7 @@ def diagnose(campaign, unseen, work, limit_s=240, before=True, errors=True):
     for old in (report, twin):
         old.unlink(missing_ok=True)
     answer = Answer()
-    command = [binary, "diagnose", str(campaign), "--json", str(report)] + (["-o", str(twin)] if errors else [])
+    command = [binary, "diagnose", str(campaign), "--json", str(report), "--force"] + (["-o", str(twin)] if errors else [])
     _, why, spent = _call(command, limit_s)
     if why:
         answer.reason, answer.seconds = why, spent
@@ -85,7 +85,7 @@ def diagnose(campaign, unseen, work, limit_s=240, before=True, errors=True):
     answer.rmse_after_n, answer.reason = _compare(binary, unseen, twin, limit_s)
     if before:
         fitted = work / "fitted.toml"
-        _, why, _ = _call([binary, "calibrate", "pulls", str(campaign), "-o", str(fitted)], limit_s)
+        _, why, _ = _call([binary, "calibrate", "pulls", str(campaign), "-o", str(fitted), "--force"], limit_s)
         if not why:
             answer.rmse_before_n, _ = _compare(binary, unseen, fitted, limit_s)
     return answer

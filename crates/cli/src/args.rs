@@ -1,23 +1,19 @@
 //! What was typed.
 
 mod identify;
-mod render;
+mod part;
 mod rig;
-mod try_part;
 mod values;
-mod view;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gripgen::twin::config::Backend;
 pub use identify::{
     CalibrateImprintsArgs, CalibratePullsArgs, CalibrateSensorArgs, CampaignArgs, ConstantOf, DiagnoseArgs,
 };
-pub use render::RenderArgs;
+pub use part::{InitArgs, RenderArgs, TryArgs};
 pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigRehearseArgs, RigServeArgs, RigTeachArgs};
 use std::path::PathBuf;
-pub use try_part::TryArgs;
-use values::{friction, key_value, scale, seconds, slice};
-pub use view::ViewArgs;
+use values::{key_value, seconds, slice};
 
 /// A digital twin of grip, pull and slip: tactile images, force traces and slip labels, as many as you like.
 #[derive(Debug, Parser)]
@@ -89,7 +85,7 @@ pub struct JsonArgs {
     /// Print JSON to standard output, or to FILE.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub json: Option<String>,
-    /// Replace files that something else wrote, or that were edited. What is read, runs and measurements are never replaced.
+    /// Replace output files that exist. Inputs and a run's own files are never replaced.
     #[arg(long)]
     pub force: bool,
 }
@@ -103,39 +99,6 @@ pub struct TalkArgs {
     /// Say more.
     #[arg(short, long, conflicts_with = "quiet")]
     pub verbose: bool,
-}
-
-/// `gripgen init`
-#[derive(Debug, Args)]
-#[command(after_help = crate::examples::INIT)]
-pub struct InitArgs {
-    /// A folder to write into, or a mesh (STL, OBJ, PLY, GLB) of your part.
-    #[arg(default_value = ".")]
-    pub target: PathBuf,
-    /// Folder to write into, where TARGET is a mesh.
-    #[arg(short, long, value_name = "FOLDER")]
-    pub out: Option<PathBuf>,
-    /// Millimetres per unit of the mesh file; 1 where it is left out, 1000 of GLB, which is in metres.
-    #[arg(long, value_name = "MM", value_parser = scale)]
-    pub scale_mm_per_unit: Option<f64>,
-    /// Take a mesh with holes as it is.
-    #[arg(long)]
-    pub accept_open_mesh: bool,
-    /// Friction coefficient of the part, if it was measured: F / (2 F_G) of its pulls.
-    #[arg(long, value_name = "MU", value_parser = friction)]
-    pub mu: Option<f64>,
-    /// A sweep over the benchmark: two hundred parts in twelve families, with grips that were tried.
-    #[arg(long, conflicts_with_all = ["scale_mm_per_unit", "accept_open_mesh", "mu"])]
-    pub benchmark: bool,
-    /// The first so many parts of each family only.
-    #[arg(long, value_name = "N", requires = "benchmark", value_parser = clap::value_parser!(u64).range(1..))]
-    pub per_family: Option<u64>,
-    /// JSON: the files, the grips proposed, what the sweep varies and what is to be said of the mesh.
-    #[command(flatten)]
-    pub json: JsonArgs,
-    /// How much is said.
-    #[command(flatten)]
-    pub talk: TalkArgs,
 }
 
 /// `gripgen check`
@@ -229,6 +192,26 @@ pub struct ShowArgs {
     #[arg(short, long, value_name = "FILE.png")]
     pub out: Option<PathBuf>,
     /// JSON: the picture's path, and what the sample is.
+    #[command(flatten)]
+    pub json: JsonArgs,
+    /// How much is said.
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// `gripgen view`
+#[derive(Debug, Args)]
+#[command(after_help = crate::examples::VIEW)]
+pub struct ViewArgs {
+    /// A run folder, a folder with pulls.csv, or a shard (.mcap).
+    pub data: PathBuf,
+    /// Pulls that are shown with images and curves; of more, the strangest, those that failed, and the others evenly.
+    #[arg(long, value_name = "N", default_value_t = 96, value_parser = clap::value_parser!(u32).range(1..=2000))]
+    pub pulls: u32,
+    /// The page to write; view.html in the folder, or beside the shard, where it is left out.
+    #[arg(short, long, value_name = "PAGE.html")]
+    pub out: Option<PathBuf>,
+    /// JSON: the page and how much of the data it shows.
     #[command(flatten)]
     pub json: JsonArgs,
     /// How much is said.

@@ -8,15 +8,11 @@ pub mod calibrate_sensor;
 pub mod campaign;
 pub mod check;
 pub mod compare;
-mod compare_images;
-pub mod compare_sensor;
-pub mod completions;
 pub mod diagnose;
 pub mod effects;
 pub mod export;
 pub mod imprints;
 pub mod info;
-mod info_pulls;
 pub mod init;
 pub mod render;
 pub mod rig;
@@ -27,14 +23,7 @@ pub mod try_part;
 pub mod verify;
 pub mod view;
 
-use crate::failure::Failure;
 use gripgen::record::{RIG_SOURCE, RunFolder};
-use std::path::Path;
-
-/// Opens a run folder for reading.
-fn open_run(path: &Path) -> Result<RunFolder, Failure> {
-    RunFolder::open(path).map_err(Failure::from)
-}
 
 /// What makes the shards of a run.
 fn maker(folder: &RunFolder) -> &'static str {

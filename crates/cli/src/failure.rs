@@ -59,6 +59,13 @@ impl Failure {
         self
     }
 
+    /// Adds what to do about it, if that is known.
+    #[must_use]
+    pub fn hint_if(mut self, hint: Option<impl Into<String>>) -> Self {
+        self.hint = hint.map(Into::into).or(self.hint);
+        self
+    }
+
     /// The process's exit code.
     pub fn exit_code(&self) -> u8 {
         self.exit_code
@@ -153,11 +160,7 @@ impl From<RenderError> for Failure {
             }
             _ => None,
         };
-        let failure = Failure::usage(&e);
-        match hint {
-            Some(hint) => failure.hint(hint),
-            None => failure,
-        }
+        Failure::usage(&e).hint_if(hint)
     }
 }
 
@@ -229,7 +232,7 @@ impl From<ReadError> for Failure {
             }
             _ => None,
         };
-        Self { hint: hint.map(String::from), ..Self::new(e) }
+        Self::new(&e).hint_if(hint)
     }
 }
 

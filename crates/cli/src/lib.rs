@@ -18,13 +18,10 @@ mod failure;
 mod interrupt;
 mod live;
 mod load;
-mod mark;
 mod output;
 mod outputs;
-mod own_files;
 mod part;
 mod plan;
-mod posterior;
 mod progress;
 mod render;
 mod rig_run;
@@ -72,13 +69,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 /// Arguments that are wrong, or work that failed.
 pub fn try_run(arguments: impl IntoIterator<Item = OsString>) -> Result<u8, Failure> {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let cli = parsed(&arguments).map_err(|e| {
-        let failure = Failure::usage(e.to_string().trim_end());
-        match key_of_a_sweep(&arguments, &e) {
-            Some(hint) => failure.hint(hint),
-            None => failure,
-        }
-    })?;
+    let cli = parsed(&arguments)
+        .map_err(|e| Failure::usage(e.to_string().trim_end()).hint_if(key_of_a_sweep(&arguments, &e)))?;
     output::silently(|| execute(&cli))
 }
 
@@ -148,6 +140,6 @@ fn execute(cli: &Cli) -> Result<u8, Failure> {
         Command::Campaign(args) => commands::campaign::run(args),
         Command::Bench(args) => commands::bench::run(args),
         Command::Schema(args) => commands::schema::run(args),
-        Command::Completions(args) => commands::completions::run(args),
+        Command::Completions(args) => commands::schema::completions(args),
     }
 }

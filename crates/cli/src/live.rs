@@ -3,11 +3,9 @@
 //! The work never waits for the page: it leaves what is new under a lock that is held for as long as a few numbers take to copy, and pictures
 //! are decoded by the page's own thread, when somebody asks for them.
 
-mod picture;
 mod state;
 
-pub use picture::Picture;
-pub use state::{CurvePoint, Made, State};
+pub use state::{CurvePoint, Made, Picture, State};
 
 use crate::failure::Failure;
 use gripgen::twin::Jaw;

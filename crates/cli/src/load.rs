@@ -36,6 +36,14 @@ pub fn within_rig(mut twin: Twin, rig: Option<&str>) -> Result<Twin, Failure> {
     Ok(twin)
 }
 
+/// Refuses measurements that are not there.
+pub fn there_is(measured: &Path) -> Result<(), Failure> {
+    if measured.exists() {
+        return Ok(());
+    }
+    Err(Failure::usage(format!("{}: there is no such file or folder", measured.display())))
+}
+
 /// Worker threads.
 pub fn jobs() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
@@ -59,14 +67,7 @@ pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
         return a_file(file);
     }
     let known = paths.iter().all(|path| is_pulls(path));
-    let failure = Failure::usage(e);
-    if let Some(hint) = e.hint() {
-        return failure.hint(hint);
-    }
-    if known {
-        return failure;
-    }
-    failure.hint(MEASUREMENTS)
+    Failure::usage(e).hint_if(e.hint().or((!known).then_some(MEASUREMENTS)))
 }
 
 /// Ends of their names.
@@ -155,11 +156,7 @@ pub fn no_presses(e: &LoadPressesError, geometry: &str) -> Failure {
         LoadPressesError::Geometry { .. } => Some(geometry),
         other => other.hint(),
     };
-    let failure = Failure::usage(e);
-    match hint {
-        Some(hint) => failure.hint(hint),
-        None => failure,
-    }
+    Failure::usage(e).hint_if(hint)
 }
 
 /// The sensor file of `--sensor`, or the twin's, and presses that have its size.

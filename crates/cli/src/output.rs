@@ -1,7 +1,6 @@
 //! Data to standard output or a file.
 
 use crate::failure::Failure;
-use crate::mark::{Format, marked_json};
 use crate::outputs::Outputs;
 use serde_json::Value;
 use std::cell::Cell;
@@ -53,7 +52,23 @@ impl JsonSink {
         matches!(self, JsonSink::Stdout)
     }
 
-    /// Writes a value on one line, one of many. The first one in a file carries the mark.
+    /// Ends a verb: its document where JSON was asked for, its text for people unless standard output is taken or `quiet`.
+    pub fn finish(
+        mut self,
+        quiet: bool,
+        document: impl FnOnce() -> Value,
+        text: impl FnOnce() -> String,
+    ) -> Result<u8, Failure> {
+        if self.wanted() {
+            self.document(&document())?;
+        }
+        if !self.on_stdout() && !quiet {
+            print(&text())?;
+        }
+        Ok(0)
+    }
+
+    /// Writes a value on one line, one of many.
     pub fn line(&mut self, value: &Value) -> Result<(), Failure> {
         match self {
             JsonSink::None => Ok(()),
@@ -68,8 +83,7 @@ impl JsonSink {
             JsonSink::None => Ok(()),
             JsonSink::Stdout => print(&format!("{value:#}\n")),
             JsonSink::File(JsonFile { outputs, path, .. }) => {
-                let text = format!("{:#}\n", marked_json(outputs.verb(), value));
-                outputs.write(path, Format::Json, text.as_bytes())
+                outputs.write(path, format!("{value:#}\n").as_bytes())
             }
         }
     }
@@ -77,14 +91,14 @@ impl JsonSink {
 
 impl JsonFile {
     fn line(&mut self, value: &Value) -> Result<(), Failure> {
+        let line = format!("{value}\n");
         let failed = |e: io::Error| Failure::new(format!("writing JSON: {e}"));
         if let Some(file) = &mut self.lines {
-            return file.write_all(format!("{value}\n").as_bytes()).map_err(failed);
+            return file.write_all(line.as_bytes()).map_err(failed);
         }
         let mut pending = self.outputs.begin(&self.path)?;
-        let first = format!("{}\n", marked_json(self.outputs.verb(), value));
-        pending.file.write_all(first.as_bytes()).map_err(failed)?;
-        self.lines = Some(pending.publish(&self.outputs)?);
+        pending.file.write_all(line.as_bytes()).map_err(failed)?;
+        self.lines = Some(pending.publish()?);
         Ok(())
     }
 }

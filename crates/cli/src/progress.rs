@@ -10,6 +10,16 @@ use std::time::{Duration, Instant};
 /// Time between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
+/// A bar on a terminal; none elsewhere.
+fn bar(total: u64, template: &str, prefix: &'static str, talk: &TalkArgs) -> Option<ProgressBar> {
+    (std::io::stderr().is_terminal() && !talk.quiet).then(|| {
+        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
+        bar.set_style(ProgressStyle::with_template(template).expect("the template is a constant"));
+        bar.set_prefix(prefix);
+        bar
+    })
+}
+
 /// Progress of a known amount of work.
 pub struct Progress {
     unit: &'static str,
@@ -25,16 +35,12 @@ pub struct Progress {
 impl Progress {
     /// Starts at `done` of `total` units.
     pub fn start(unit: &'static str, done: u64, total: u64, talk: &TalkArgs) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let bar = (terminal && !talk.quiet).then(|| {
-            let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
-            let template = "{bar:32} {human_pos}/{human_len} {prefix}  {per_sec}  {eta} left {msg}";
-            bar.set_style(ProgressStyle::with_template(template).expect("the template is a constant"));
-            bar.set_prefix(unit);
+        let template = "{bar:32} {human_pos}/{human_len} {prefix}  {per_sec}  {eta} left {msg}";
+        let bar = bar(total, template, unit, talk);
+        if let Some(bar) = &bar {
             bar.set_position(done);
             bar.reset_eta();
-            bar
-        });
+        }
         let now = Instant::now();
         Self { unit, total, done_before: done, done, start: now, last_line: now, bar, silent: talk.quiet }
     }
@@ -89,13 +95,7 @@ pub struct Share {
 impl Share {
     /// Starts at nothing.
     pub fn start(what: &'static str, talk: &TalkArgs) -> Self {
-        let bar = (std::io::stderr().is_terminal() && !talk.quiet).then(|| {
-            let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr_with_hz(10));
-            let style = ProgressStyle::with_template("{bar:32} {percent} % {prefix}  {eta} left");
-            bar.set_style(style.expect("the template is a constant"));
-            bar.set_prefix(what);
-            bar
-        });
+        let bar = bar(1000, "{bar:32} {percent} % {prefix}  {eta} left", what, talk);
         let now = Instant::now();
         Self { what, silent: talk.quiet, start: now, state: Mutex::new((0.0, now)), bar }
     }

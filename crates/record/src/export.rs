@@ -3,7 +3,6 @@
 use crate::dataset::DatasetError;
 use crate::encode::{EncodedSample, state_messages, timestamp};
 use crate::film::EncodedFrame;
-use crate::mark::EXPORT;
 use crate::picture::encode_png;
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{FilmFrame, PullTrace, Sample};
@@ -121,8 +120,6 @@ pub fn export_sample(reader: &ShardReader, index: u64) -> Result<Vec<u8>, Export
         writer = writer.with_films(storage)?;
     }
     writer.push(&encoded)?;
-    // After the sample: a record between ends the chunk that holds the channels, which would then be one without messages.
-    writer.mark(EXPORT)?;
     Ok(writer.finish()?.into_inner())
 }
 

@@ -10,7 +10,6 @@ mod statistics;
 use crate::card;
 use crate::dataset::Dataset;
 use crate::export::{ExportDatasetError, ExportOptions};
-use crate::mark::EXPORT;
 use crate::parquet::{
     Field, Group, Kind, TRACE, file, file_with, write_all_numbers, write_bytes, write_images, write_lists,
     write_small, write_traces, write_values, write_whole, write_word_lists,
@@ -27,7 +26,7 @@ use std::io::BufWriter;
 use std::path::Path;
 
 /// The card of the folder.
-pub const LEROBOT_CARD: &str = "README.md";
+const LEROBOT_CARD: &str = "README.md";
 
 /// Bytes of images of a data file, and rows of a row group.
 const FILE_BYTES: usize = 100 << 20;
@@ -379,7 +378,7 @@ fn readme(dataset: &Dataset, layout: &Layout, episodes: usize) -> String {
     format!(
         "---\nlicense: other\nlicense_name: not-chosen-yet\ntask_categories:\n- robotics\ntags:\n- LeRobot\n- tactile\nconfigs:\n- config_name: default\n\
          \x20 data_files: data/*/*.parquet\n---\n\n# Grips, pulls and slip\n\n\
-         {episodes} episodes in the LeRobot format 3.0 (written by `gripgen {EXPORT}`): each is a grip by two jaws with a tactile sensor each and a pull until they \
+         {episodes} episodes in the LeRobot format 3.0 (written by `gripgen export`): each is a grip by two jaws with a tactile sensor each and a pull until they \
          slip. An episode has one frame, the grip before the pull; `fps` says nothing.\n\n\
          - `observation.images.left`, `.right`: tactile images, PNG, without loss; there is no video\n\
          - `observation.state`: what is known before the pull: {}\n{traces}\

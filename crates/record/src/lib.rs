@@ -26,7 +26,6 @@ mod folder;
 mod frame;
 mod index;
 mod lerobot;
-mod mark;
 mod parquet;
 mod picture;
 pub mod proto;
@@ -50,11 +49,10 @@ pub use folder::{
     sha256_hex,
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
-pub use lerobot::{LEROBOT_CARD, export_lerobot};
-pub use mark::{MARK_NAME, parquet_mark, png_mark, png_with_mark};
+pub use lerobot::export_lerobot;
 pub use parquet::export_parquet;
 pub use picture::{PictureError, decode as decode_picture, encode_jpeg, encode_png, is_jpeg};
-pub use reader::{ReadError, Record, ShardReader, mcap_mark};
+pub use reader::{ReadError, Record, ShardReader};
 pub use rig_log::{RigLog, RigLogEvent, RigStream};
 pub use rig_run::{
     FAILED_FOLDER, FrameView, RigCampaign, RigFilm, RigFrame, RigPull, RigResult, RigRunError, RigRunInfo,
@@ -63,4 +61,4 @@ pub use rig_run::{
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
 pub use stored::{sample_covariates, sample_view};
 pub use verify::{Verification, repair, verify};
-pub use webdataset::{export_webdataset, tar_mark, webdataset_rows};
+pub use webdataset::{export_webdataset, webdataset_rows};

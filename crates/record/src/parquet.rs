@@ -14,7 +14,6 @@ pub(crate) use columns::{
 
 use crate::dataset::{Dataset, DatasetError};
 use crate::export::{ExportDatasetError, ExportOptions};
-use crate::mark::{EXPORT, MARK_NAME};
 use columns::{huggingface, schema};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
@@ -64,7 +63,7 @@ pub fn export_parquet<W: Write + Send>(
     Ok(())
 }
 
-/// A writer of a marked file of these columns.
+/// A writer of a file of these columns.
 pub(crate) fn file<W: Write + Send>(
     out: W,
     name: &str,
@@ -78,9 +77,8 @@ pub(crate) fn file_with<W: Write + Send>(
     out: W,
     name: &str,
     fields: &[Field],
-    mut keys: Vec<KeyValue>,
+    keys: Vec<KeyValue>,
 ) -> Result<SerializedFileWriter<W>, ParquetError> {
-    keys.push(KeyValue::new(MARK_NAME.into(), EXPORT.to_string()));
     let properties = WriterProperties::builder()
         .set_created_by("gripgen".into())
         .set_key_value_metadata(Some(keys))

@@ -5,7 +5,6 @@ mod messages;
 mod rig;
 
 use crate::background::Background;
-use crate::mark::MARK_NAME;
 use crate::picture::{PictureError, decode};
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{PullTrace, Sample};
@@ -88,13 +87,6 @@ impl ReadError {
     fn foreign(path: &Path, problem: &str) -> Self {
         Self::Content { path: path.into(), problem: format!("not a gripgen shard: {problem}") }
     }
-}
-
-/// The verb that wrote an MCAP file which is no shard of a run; `None` where nobody marked it.
-pub fn mcap_mark(path: &Path) -> Option<String> {
-    let (file, bytes) = open_mcap(path).ok()?;
-    let summary = read_summary(&file, bytes).ok()??;
-    metadata_record(&file, bytes, &summary, MARK_NAME).ok()??.remove("verb")
 }
 
 impl ShardReader {

@@ -3,7 +3,6 @@
 use crate::background::Background;
 use crate::encode::EncodedSample;
 use crate::film::{film_topic, label_topic};
-use crate::mark::MARK_NAME;
 use crate::picture::{PictureError, encode_small_png};
 use crate::proto::{
     COMPRESSED_IMAGE_DESCRIPTOR, FILM_DESCRIPTOR, PULL_DESCRIPTOR, RAW_IMAGE_DESCRIPTOR, RIG_DESCRIPTOR,
@@ -272,16 +271,6 @@ impl<W: Write + Seek> ShardWriter<W> {
             PerJaw::try_from_fn(|jaw| self.writer.add_channel(schema, label_topic(jaw), "protobuf", &none))?;
         self.channels.film = Some(FilmChannels { image, labels });
         Ok(self)
-    }
-
-    /// Writes down which verb made a file that is no shard of a run (`mcap_mark` reads it). Shards have no mark.
-    ///
-    /// # Errors
-    ///
-    /// What the writer says.
-    pub(crate) fn mark(&mut self, verb: &str) -> Result<(), ShardError> {
-        let metadata = [("verb".to_string(), verb.to_string())].into();
-        Ok(self.writer.write_metadata(&Metadata { name: MARK_NAME.into(), metadata })?)
     }
 
     /// Appends a sample: one chunk with what training reads, one with the film, one with what viewers draw; of a rig one with the

@@ -1,20 +1,17 @@
 //! A dataset as tar files for WebDataset: a sample is the files of one name, `000000012.left.png`, `.right.png`, `.json`, `.trace.npy`.
 //!
 //! Rows without images are left out where images are wanted, so that all samples have the same keys. What is in a `__name__` folder is no
-//! sample to WebDataset: the mark and the card are there. Nothing in a file depends on time, host or path.
+//! sample to WebDataset: the card is there. Nothing in a file depends on time, host or path.
 
 use crate::card;
 use crate::dataset::Dataset;
 use crate::export::{ExportDatasetError, ExportOptions};
-use crate::mark::{EXPORT, MARK_NAME};
 use gripgen_twin::{PullTrace, Values};
 use serde_json::{Map, Value, json};
-use std::fs::File;
-use std::io::{Read, Write};
-use std::path::Path;
-use tar::{Archive, Builder, EntryType, Header};
+use std::io::Write;
+use tar::{Builder, EntryType, Header};
 
-/// Where the mark and the card are.
+/// Where the card is.
 const ABOUT: &str = "__gripgen__";
 
 /// Rows of a dataset that an export takes: with images all that have some. The others are failed samples.
@@ -42,7 +39,6 @@ pub fn export_webdataset<W: Write>(
     mut on_row: impl FnMut(),
 ) -> Result<usize, ExportDatasetError> {
     let mut tar = Builder::new(out);
-    add(&mut tar, &format!("{ABOUT}/{MARK_NAME}"), EXPORT.as_bytes())?;
     add(&mut tar, &format!("{ABOUT}/README.md"), about(dataset).as_bytes())?;
     let mut written = 0;
     for &row in rows {
@@ -121,21 +117,4 @@ fn about(dataset: &Dataset) -> String {
         card::columns(dataset, str::to_string),
         card::configuration(dataset)
     )
-}
-
-/// The verb that wrote a tar file; `None` where there is no mark or no such file.
-pub fn tar_mark(path: &Path) -> Option<String> {
-    let mut magic = [0; 262];
-    let mut file = File::open(path).ok()?;
-    file.read_exact(&mut magic).ok()?;
-    if &magic[257..] != b"ustar" {
-        return None;
-    }
-    let mut archive = Archive::new(File::open(path).ok()?);
-    let mut first = archive.entries().ok()?.next()?.ok()?;
-    let named = first.path().ok()?.to_str().is_some_and(|name| name == format!("{ABOUT}/{MARK_NAME}"));
-    let mut verb = String::new();
-    // A mark is a word.
-    first.by_ref().take(64).read_to_string(&mut verb).ok()?;
-    named.then_some(verb)
 }

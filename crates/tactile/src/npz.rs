@@ -110,14 +110,6 @@ impl<'a> Npz<'a> {
         Ok((header.shape, file))
     }
 
-    /// Reads a text that [`npz_with_text`] wrote; `None` where there is none.
-    pub fn text(&mut self, key: &str) -> Option<String> {
-        let file = self.file(key).ok()?;
-        let header = parse_header(&file).ok()?;
-        let text = file.get(header.data_start..).filter(|_| header.descr.starts_with("|S"))?;
-        String::from_utf8(text.to_vec()).ok()
-    }
-
     /// The unpacked bytes of an array's file.
     fn file(&mut self, key: &str) -> Result<Vec<u8>, NpzError> {
         if !self.has(key) {
@@ -308,24 +300,6 @@ pub fn write_npz(arrays: &[(&str, Array, ElementType)]) -> Result<Vec<u8>, NpzEr
     Ok(writer.finish().map_err(|e| failed(e.to_string()))?.into_inner())
 }
 
-/// The archive with one more entry: a scalar of bytes (`|S`), which numpy shows as `b'...'`.
-///
-/// # Errors
-///
-/// Bytes that are no zip archive, or one that has such an entry.
-pub fn npz_with_text(npz: &[u8], key: &str, text: &str) -> Result<Vec<u8>, NpzError> {
-    let failed = |e: zip::result::ZipError| NpzError::Archive(e.to_string());
-    let mut writer = zip::ZipWriter::new_append(Cursor::new(npz.to_vec())).map_err(failed)?;
-    let options = SimpleFileOptions::default()
-        .compression_method(zip::CompressionMethod::Deflated)
-        .last_modified_time(zip::DateTime::default());
-    writer.start_file(format!("{key}.npy"), options).map_err(failed)?;
-    let mut bytes = npy_header(&format!("|S{}", text.len()), &[]);
-    bytes.extend(text.bytes());
-    writer.write_all(&bytes).map_err(|e| NpzError::Archive(e.to_string()))?;
-    Ok(writer.finish().map_err(failed)?.into_inner())
-}
-
 /// What stands before the values of a `.npy` file, format 1.0.
 fn npy_header(descr: &str, shape: &[usize]) -> Vec<u8> {
     let axes: String = shape.iter().map(|n| format!("{n}, ")).collect();
@@ -395,11 +369,6 @@ mod tests {
         assert_eq!(error, "the archive has no array `e`; it has: a, b, c, d");
         let shape = npz.array_of_shape("a", &[None, Some(4)]).unwrap_err().to_string();
         assert_eq!(shape, "array `a`: its shape is [2, 3], it must be (any, 4)");
-        let noted = npz_with_text(&bytes, "by", "who").unwrap();
-        let mut npz = Npz::open(&noted).unwrap();
-        assert_eq!((npz.text("by").as_deref(), npz.text("a"), npz.text("c")), (Some("who"), None, None));
-        assert_eq!(npz.array("d").unwrap(), arrays[3].1, "nothing else changed");
-        assert!(npz_with_text(&noted, "by", "me").is_err());
     }
 
     #[test]

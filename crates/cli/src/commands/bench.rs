@@ -1,9 +1,9 @@
 //! `gripgen bench`: images per second on this machine.
 
 use crate::args::BenchArgs;
-use crate::commands::check::cores;
 use crate::failure::Failure;
-use crate::output::{JsonSink, print};
+use crate::load::jobs;
+use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use gripgen::twin::config::Backend;
 use crate::{BenchOptions, BenchReport, bench};
@@ -15,23 +15,17 @@ pub fn run(args: &BenchArgs) -> Result<u8, Failure> {
     if args.adapter.is_some() && backend == Backend::Cpu {
         return Err(Failure::usage("--adapter goes with --backend gpu"));
     }
-    let mut outputs = Outputs::of("bench", args.json.force).reads_all(&args.sensor);
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let mut outputs = Outputs::new(args.json.force).reads_all(&args.sensor);
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let options = BenchOptions {
         backend,
         sensor: args.sensor.clone(),
         adapter: args.adapter.clone(),
         seconds: args.seconds,
-        threads: cores(),
+        threads: jobs(),
     };
     let report = bench(&options)?;
-    if sink.wanted() {
-        sink.document(&as_json(&report))?;
-    }
-    if !sink.on_stdout() {
-        print(&in_words(&report))?;
-    }
-    Ok(0)
+    sink.finish(false, || as_json(&report), || in_words(&report))
 }
 
 fn name(backend: Backend) -> &'static str {

@@ -3,8 +3,7 @@
 use crate::args::{CalibrateImprintsArgs, ConstantOf};
 use crate::commands::imprints;
 use crate::failure::Failure;
-use crate::load::load_twin;
-use crate::mark::Format;
+use crate::load::{load_twin, there_is};
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::identify::{ImprintConstants, ParameterEstimate, SharedConstant};
@@ -14,10 +13,8 @@ use serde_json::{Map, Value, json};
 
 /// Runs the verb.
 pub fn run(args: &CalibrateImprintsArgs) -> Result<u8, Failure> {
-    if !args.measured.exists() {
-        return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
-    }
-    let mut outputs = Outputs::of("calibrate imprints", args.json.force)
+    there_is(&args.measured)?;
+    let mut outputs = Outputs::new(args.json.force)
         .reads(&args.measured)
         .reads_all(&args.sensor)
         .reads_config(&args.twin, &[]);
@@ -41,7 +38,7 @@ pub fn run(args: &CalibrateImprintsArgs) -> Result<u8, Failure> {
                     .hint("name the twin that has the part with --twin, or the part of all rows with --part")
             })?;
         let text = edited_twin_toml(&Location::parse(&args.twin), &[], &edits, out).map_err(Failure::new)?;
-        outputs.write(out, Format::Toml, text.as_bytes())?;
+        outputs.write(out, text.as_bytes())?;
     }
     if sink.wanted() {
         let parts: Map<String, Value> = found

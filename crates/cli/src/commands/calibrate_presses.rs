@@ -4,7 +4,6 @@ use crate::args::{CalibratePressesArgs, TalkArgs};
 use crate::commands::compare::{comparison_json, table};
 use crate::failure::Failure;
 use crate::load::{no_presses, say_circles};
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::tactile::presses::{
@@ -21,13 +20,7 @@ use std::path::Path;
 /// Runs the verb.
 pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
     let report = args.report.clone().unwrap_or_else(|| args.out.with_extension("html"));
-    if report == args.out {
-        let same = format!("{}: sensor file and report would be one file", report.display());
-        return Err(
-            Failure::usage(same).hint("end the sensor file in .npz, or name the report with --report")
-        );
-    }
-    let mut outputs = Outputs::of("calibrate presses", args.json.force).reads(&args.presses);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.presses);
     outputs.allow_all([args.out.as_path(), &report])?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let metres = |mm: Option<f64>| mm.map(|mm| mm * 1e-3);
@@ -59,14 +52,14 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
         Failure::usage(format!("{}: the fitted sensor cannot be: {e}", args.presses.display()))
             .hint("are these presses of one ball into one sensor, with the camera's settings fixed?")
     })?;
-    outputs.write(&args.out, Format::Npz, &bytes)?;
+    outputs.write(&args.out, &bytes)?;
     let report_text = PressReportText {
         map: coverage.as_ref().map(|coverage| map(coverage, &calibration.sensor)),
         ..text(args, &set, &calibration, ball_size.as_ref())
     };
     let page =
         press_report(&report_text, &set, &calibration.held_out, |i| calibration.predicted.get(i).cloned());
-    outputs.write(&report, Format::Html, page.as_bytes())?;
+    outputs.write(&report, page.as_bytes())?;
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.press_calibration/1",

@@ -4,8 +4,7 @@ use crate::args::CalibratePullsArgs;
 use crate::failure::Failure;
 use crate::load::{folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects};
 use crate::output::{JsonSink, print};
-use crate::outputs::Outputs;
-use crate::posterior;
+use crate::outputs::{Outputs, draws_of};
 use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
 use gripgen::{Location, load_twin_document};
@@ -16,11 +15,11 @@ use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("calibrate pulls", args.json.force)
+    let mut outputs = Outputs::new(args.json.force)
         .reads(&args.measured)
         .reads_all(&args.also)
         .reads_config(&args.twin, &args.set);
-    posterior::allow(&mut outputs, &args.out)?;
+    outputs.allow_twin(&args.out)?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let measured = folders(&args.measured, &args.also);
     let twin = load_twin(&args.twin, &args.set)?;
@@ -52,10 +51,10 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     })?;
     edits.values.extend(imprints.values(&loaded.pulls));
     let text = edited_twin_toml(&twin_at, &args.set, &edits, &args.out).map_err(Failure::new)?;
-    posterior::write(&outputs, &args.out, &text, Some(&found.posterior))?;
+    outputs.write_twin(&args.out, &text, Some(&found.posterior))?;
     if sink.wanted() {
         let mut document = json_of(&found, &imprints, loaded.pulls.pulls.len(), &loaded.pulls.sha256);
-        if let Some(name) = posterior::beside(&args.out).as_deref().and_then(Path::file_name) {
+        if let Some(name) = draws_of(&args.out).as_deref().and_then(Path::file_name) {
             let file = name.to_string_lossy();
             document["posterior"] = json!({"file": file, "draws": found.posterior.draws.len()});
         }

@@ -2,7 +2,7 @@
 
 use crate::args::CalibrateSensorArgs;
 use crate::failure::Failure;
-use crate::mark::Format;
+use crate::load::there_is;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::identify::{ParameterEstimate, SensorCalibration};
@@ -13,11 +13,8 @@ use std::fmt::Write;
 
 /// Runs the verb.
 pub fn run(args: &CalibrateSensorArgs) -> Result<u8, Failure> {
-    if !args.measured.exists() {
-        return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
-    }
-    let mut outputs =
-        Outputs::of("calibrate sensor", args.json.force).reads(&args.measured).reads_config(&args.twin, &[]);
+    there_is(&args.measured)?;
+    let mut outputs = Outputs::new(args.json.force).reads(&args.measured).reads_config(&args.twin, &[]);
     outputs.allow_all(args.out.as_deref())?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
@@ -29,7 +26,7 @@ pub fn run(args: &CalibrateSensorArgs) -> Result<u8, Failure> {
         let edits = sensor_calibration_edits(&calibration, &table.sha256)
             .map_err(|e| Failure::usage(format!("{}: {e}", args.measured.display())))?;
         let text = edited_twin_toml(&Location::parse(&args.twin), &[], &edits, out).map_err(Failure::new)?;
-        outputs.write(out, Format::Toml, text.as_bytes())?;
+        outputs.write(out, text.as_bytes())?;
     }
     if sink.wanted() {
         let sessions: Vec<_> = calibration

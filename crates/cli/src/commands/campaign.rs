@@ -5,7 +5,6 @@ use super::diagnose::next::{next_toml, twin_words};
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
 use crate::load::{load_library, load_twin, within_rig};
-use crate::mark::Format;
 use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
@@ -26,13 +25,13 @@ const SHIPPED_RIG: &str = "asset:configs/rig.toml";
 pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     let at = Location::parse(&args.twin);
     let rig = args.rig.as_deref().unwrap_or(SHIPPED_RIG);
-    let mut outputs = Outputs::of("campaign", args.json.force)
+    let mut outputs = Outputs::new(args.json.force)
         .reads_config(&args.twin, &args.set)
         .reads_config(rig, &[])
         .reads_all(&args.separate);
     outputs.allow(&args.out)?;
     if let Some(folder) = &args.simulate {
-        outputs.allow_measurements(folder)?;
+        outputs.allow_new_folder(folder)?;
     }
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let twin = within_rig(load_twin(&args.twin, &args.set)?, Some(rig))?;
@@ -53,11 +52,13 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         args.seed
     );
     let text = separating.unwrap_or_else(|| campaign_toml(&campaign, &about));
-    outputs.write(&args.out, Format::Toml, text.as_bytes())?;
+    outputs.write(&args.out, text.as_bytes())?;
     let simulated = match &args.simulate {
         Some(folder) => {
             let made = simulate_campaign(&at, &args.set, &campaign, args.seed).map_err(Failure::usage)?;
-            write_pull_folder(folder, &made.pulls).map_err(Failure::new)?;
+            let pending = outputs.begin_folder(folder)?;
+            write_pull_folder(pending.path(), &made.pulls).map_err(Failure::new)?;
+            pending.publish()?;
             if !args.talk.quiet {
                 made.notes.iter().for_each(|note| eprintln!("{note}"));
             }

@@ -2,6 +2,7 @@
 
 use crate::args::{CheckArgs, ConfigArgs, JsonArgs, TalkArgs};
 use crate::failure::{Failure, code};
+use crate::load;
 use crate::output::{JsonSink, count, duration, size};
 use crate::outputs::Outputs;
 use crate::shell;
@@ -15,22 +16,21 @@ use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &CheckArgs) -> Result<u8, Failure> {
-    check("check", &args.config, None, &args.json, &args.talk)
+    check(&args.config, None, &args.json, &args.talk)
 }
 
 /// Loads, tries out and reports; `sweep --dry-run` is the same.
 pub fn check(
-    verb: &'static str,
     config: &ConfigArgs,
     jobs: Option<usize>,
     json: &JsonArgs,
     talk: &TalkArgs,
 ) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of(verb, json.force).reads_config(&config.config, &config.set);
+    let mut outputs = Outputs::new(json.force).reads_config(&config.config, &config.set);
     let mut sink = JsonSink::open(json.json.as_deref(), &mut outputs)?;
     let project = load(config)?;
     let plan = plan(&project, SimdLevel::best())?;
-    let jobs = jobs.unwrap_or_else(cores).max(1);
+    let jobs = jobs.unwrap_or_else(load::jobs).max(1);
     let failed: Vec<_> = plan.probes.iter().filter(|p| p.failure.is_some()).collect();
     let warnings = [of_columns(&project), of_probes(&plan), of_plan(&plan)].concat();
     if sink.wanted() {
@@ -154,11 +154,6 @@ fn of_plan(plan: &Plan) -> Vec<String> {
         )
     });
     open.chain(failing).collect()
-}
-
-/// Worker threads where the user names none.
-pub fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// The plan in words.

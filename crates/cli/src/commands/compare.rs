@@ -1,36 +1,31 @@
 //! `gripgen compare`: how far a twin or a sensor file is from measurements.
 
 use crate::args::CompareArgs;
-use crate::commands::compare_images::{images_json, images_table};
-use crate::commands::compare_sensor;
 use crate::commands::imprints;
 use crate::failure::Failure;
 use crate::load::{
     folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls, say_circles, say_warnings,
-    suspects,
+    suspects, there_is,
 };
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
 use gripgen::{Location, PressReportText, load_twin_document, press_report, pull_comparison_page, pull_ratios};
-use crate::{LabelErrors, compare_images, compare_pulls_with, find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, posterior_twins, unmeasured};
+use crate::{ImageComparison, LabelErrors, compare_images, compare_pulls_with, compare_sensor_table, find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, load_sensor_table, posterior_twins, unmeasured};
 use gripgen_identify::PartRatio;
 use gripgen_measured::load_pulls_with;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// Runs the verb.
 pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
-    if !args.measured.exists() {
-        return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
-    }
+    there_is(&args.measured)?;
     let is_table = is_sensor_table(&args.measured) || is_imprint_set(&args.measured);
     if args.report.is_some() && is_table {
         return Err(Failure::usage("--report: a comparison with a table has no page")
             .hint("`gripgen diagnose FOLDER --report FILE.html` draws one of such a table"));
     }
-    let mut outputs = Outputs::of("compare", args.json.force)
+    let mut outputs = Outputs::new(args.json.force)
         .reads(&args.measured)
         .reads_all(&args.also)
         .reads_all(&args.sensor)
@@ -40,7 +35,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
     if is_imprint_set(&args.measured) {
         imprints::compare(args, sink)
     } else if is_sensor_table(&args.measured) {
-        compare_sensor::run(args, sink)
+        sensor_table(args, sink)
     } else if is_press_set(&args.measured) {
         presses(args, &outputs, sink)
     } else {
@@ -49,7 +44,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
 }
 
 /// A sensor file against presses.
-fn presses(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8, Failure> {
+fn presses(args: &CompareArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Failure> {
     let (sensor, mut set) = load_sensor_and_presses(&args.measured, args.sensor.as_deref(), &args.twin)?;
     say_circles(&find_circles_with_sensor(&mut set, &sensor), &args.talk);
     let comparison = compare_presses(&set, &sensor)
@@ -76,15 +71,37 @@ fn presses(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<
         let page = press_report(&text, &set, &comparison, |i| {
             predict_press(&set.presses[i], set.ball_m, &sensor).ok()
         });
-        outputs.write(path, Format::Html, page.as_bytes())?;
+        outputs.write(path, page.as_bytes())?;
     }
-    if sink.wanted() {
-        sink.document(&json!({"schema": "gripgen.comparison/1", "presses": comparison_json(&comparison)}))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&table(&comparison))?;
-    }
-    Ok(0)
+    let document = || json!({"schema": "gripgen.comparison/1", "presses": comparison_json(&comparison)});
+    sink.finish(args.talk.quiet, document, || table(&comparison))
+}
+
+/// A twin against a force-sensor table.
+fn sensor_table(args: &CompareArgs, sink: JsonSink) -> Result<u8, Failure> {
+    let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
+    let twin = load_twin(&args.twin, &[])?;
+    let found = compare_sensor_table(&table, &twin)
+        .map_err(|reason| Failure::usage(format!("{}: {reason}", args.measured.display())))?;
+    let document = || {
+        let by_session: Map<String, Value> = found
+            .by_session
+            .iter()
+            .map(|(name, n, rmse_n)| (name.clone(), json!({"n": n, "rmse_n": rmse_n})))
+            .collect();
+        json!({
+            "schema": "gripgen.comparison/1",
+            "sensor": {"n": found.n, "rmse_n": found.rmse_n, "mape_pct": found.mape_pct, "bias_n": found.bias_n,
+                "by_session": by_session},
+        })
+    };
+    let text = || {
+        format!(
+            "{} rows, error {:.4} N ({:.1} %), gain and offset of each session refitted\n",
+            found.n, found.rmse_n, found.mape_pct
+        )
+    };
+    sink.finish(args.talk.quiet, document, text)
 }
 
 /// A twin against measured pulls.
@@ -105,22 +122,18 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
     if let Some(path) = &args.report {
         let title = format!("{} against {}", args.measured.display(), args.twin);
         let page = pull_comparison_page(&title, &loaded.pulls, &found);
-        outputs.write(path, Format::Html, page.as_bytes())?;
+        outputs.write(path, page.as_bytes())?;
     }
     let errors =
         |e: &LabelErrors| json!({"n": e.n, "rmse_n": e.rmse_n, "mape_pct": e.mape_pct, "bias_n": e.bias_n});
     if sink.wanted() {
         let mut pulls = errors(&found.pulls);
-        pulls["by_part"] = found
-            .by_part
-            .iter()
-            .map(|(name, e)| (name.clone(), errors(e)))
-            .collect::<serde_json::Map<_, _>>()
-            .into();
+        pulls["by_part"] =
+            found.by_part.iter().map(|(name, e)| (name.clone(), errors(e))).collect::<Map<_, _>>().into();
         pulls["ratio"] = pull_ratios(&loaded.pulls, &found)
             .iter()
             .map(|(name, r)| (name.clone(), ratio_json(r)))
-            .collect::<serde_json::Map<_, _>>()
+            .collect::<Map<_, _>>()
             .into();
         pulls["n_outside_fit"] = json!(found.outside_fit);
         pulls["coverage90"] = json!(found.coverage90);
@@ -173,6 +186,43 @@ fn ratio_json(ratio: &PartRatio) -> Value {
         "n": ratio.points.len(), "fit": fit, "before_pct": ratio.before_pct, "after_pct": ratio.after_pct,
         "left_out_pct": ratio.left_out_pct,
     })
+}
+
+/// The scores of the images of pulls as they stand in `--json`; `None` where no pull has images.
+fn images_json(found: &ImageComparison) -> Option<Value> {
+    let mut images = score_json(&found.mean()?);
+    images["n"] = json!(found.each.len());
+    let part = |(name, (n, score)): (String, (usize, Score))| {
+        let mut own = score_json(&score);
+        own["n"] = json!(n);
+        (name, own)
+    };
+    images["by_part"] = found.by_part().into_iter().map(part).collect::<Map<_, _>>().into();
+    let each = found.each.iter().map(|image| {
+        let mut own = score_json(&image.score);
+        own["pull"] = json!(image.pull);
+        own["jaw"] = json!(image.jaw.to_string());
+        own
+    });
+    images["each"] = each.collect::<Vec<_>>().into();
+    Some(images)
+}
+
+/// The mean scores for people, and the image that is least like the twin's; nothing where no pull has images.
+fn images_table(found: &ImageComparison) -> String {
+    let Some(mean) = found.mean() else { return String::new() };
+    let mut text =
+        format!("{:<16} {:>6} {:>9} {:>7} {:>8} {:>7}\n", "part", "images", "MSE", "PSNR dB", "SSIM", "L1");
+    let mut row = |name: &str, n: usize, s: &Score| {
+        text +=
+            &format!("{name:<16} {n:>6} {:>9.2} {:>7.2} {:>8.4} {:>7.2}\n", s.mse, s.psnr_db, s.ssim, s.l1);
+    };
+    found.by_part().iter().for_each(|(name, (n, score))| row(name, *n, score));
+    row("all", found.each.len(), &mean);
+    if let Some(worst) = found.each.iter().max_by(|a, b| a.score.mse.total_cmp(&b.score.mse)) {
+        text += &format!("least alike: pull {}, {} jaw, MSE {:.2}\n", worst.pull, worst.jaw, worst.score.mse);
+    }
+    text
 }
 
 /// The scores of presses as they stand in `--json`.

@@ -8,10 +8,11 @@ mod presses;
 use crate::args::{DiagnoseArgs, TalkArgs};
 use crate::commands::imprints;
 use crate::failure::Failure;
-use crate::load::{folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects, within_rig};
+use crate::load::{
+    folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects, there_is, within_rig,
+};
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
-use crate::posterior;
 use crate::progress::Share;
 use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
@@ -22,16 +23,14 @@ use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
-    if !args.measured.exists() {
-        return Err(Failure::usage(format!("{}: there is no such file or folder", args.measured.display())));
-    }
-    let mut outputs = Outputs::of("diagnose", args.json.force)
+    there_is(&args.measured)?;
+    let mut outputs = Outputs::new(args.json.force)
         .reads(&args.measured)
         .reads_all(&args.also)
         .reads_all(&args.rig)
         .reads_all(&args.sensor)
         .reads_config(&args.twin, &args.set);
-    args.out.as_deref().map_or(Ok(()), |out| posterior::allow(&mut outputs, out))?;
+    args.out.as_deref().map_or(Ok(()), |out| outputs.allow_twin(out))?;
     outputs.allow_all(args.report.as_deref())?;
     let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let diagnosed = if is_press_set(&args.measured) {
@@ -41,6 +40,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
     } else if is_sensor_table(&args.measured) {
         sensor(args)?
     } else {
+        outputs.allow_all(next::next_file(args).as_deref())?;
         pulls(args)?
     };
     output::write(args, &outputs, sink, diagnosed)

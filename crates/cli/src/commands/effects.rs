@@ -3,8 +3,7 @@
 use crate::args::EffectsArgs;
 use crate::failure::Failure;
 use crate::load::{load_library, load_twin};
-use crate::mark::Format;
-use crate::output::{JsonSink, print};
+use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use gripgen::twin::config::suggestion;
 use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, ParameterSpec, PressNeeds, Seen, find};
@@ -22,17 +21,11 @@ const LINE: usize = 96;
 
 /// Runs the verb.
 pub fn run(args: &EffectsArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("effects", args.json.force);
+    let mut outputs = Outputs::new(args.json.force);
     outputs.allow_all(args.plot.as_deref())?;
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let Some(id) = &args.id else {
-        if sink.wanted() {
-            sink.document(&LIBRARY.iter().map(|spec| document(spec)).collect())?;
-        }
-        if !sink.on_stdout() {
-            print(&list())?;
-        }
-        return Ok(0);
+        return sink.finish(false, || LIBRARY.iter().map(|spec| document(spec)).collect(), list);
     };
     let spec = find(id).ok_or_else(|| unknown(id))?;
     let twin = load_twin(BASELINE_TWIN, &[])?;
@@ -40,17 +33,11 @@ pub fn run(args: &EffectsArgs) -> Result<u8, Failure> {
     let curve = effect_curve(spec, &twin, &library, 1).map_err(Failure::new)?;
     if let Some(path) = &args.plot {
         let title = format!("{} ({})", spec.id, typical(spec));
-        outputs.write(path, Format::Svg, curve.plot(&title).to_svg().as_bytes())?;
+        outputs.write(path, curve.plot(&title).to_svg().as_bytes())?;
     }
-    if sink.wanted() {
-        let mut whole = document(spec);
-        whole["f_max"] = json!({ "covariate": curve.covariate, "x": curve.x, "ratio": curve.ratio });
-        sink.document(&whole)?;
-    }
-    if !sink.on_stdout() {
-        print(&(page(spec) + &curve_text(spec, &curve)))?;
-    }
-    Ok(0)
+    let mut whole = document(spec);
+    whole["f_max"] = json!({ "covariate": curve.covariate, "x": curve.x, "ratio": curve.ratio });
+    sink.finish(false, || whole, || page(spec) + &curve_text(spec, &curve))
 }
 
 fn unknown(id: &str) -> Failure {

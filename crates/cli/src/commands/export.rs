@@ -1,22 +1,24 @@
 //! `gripgen export`: a sample as a file of its own, or all of them as a table or for WebDataset.
 
 use crate::args::{ExportArgs, ExportFormat};
-use crate::commands::{maker, open_run};
+use crate::commands::maker;
 use crate::failure::Failure;
-use crate::mark::Format;
-use crate::output::{JsonSink, count, print};
+use crate::output::{JsonSink, count};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{
-    Dataset, ExportOptions, LEROBOT_CARD, ShardReader, export_lerobot, export_parquet, export_sample,
-    export_webdataset, webdataset_rows,
+use gripgen_measured::open_dataset;
+use gripgen::record::{
+    ExportOptions, RunFolder, ShardReader, export_lerobot, export_parquet, export_sample, export_webdataset,
+    webdataset_rows,
+};
 };
 use serde_json::json;
 use std::path::PathBuf;
 
 /// Runs the verb.
 pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("export", args.json.force).reads(&args.run);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.run);
     if args.sample.is_none() && args.to == Some(ExportFormat::Webdataset) {
         return webdataset(args, outputs);
     }
@@ -33,7 +35,7 @@ pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
 }
 
 fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Failure> {
-    let dataset = Dataset::open(&args.run).map_err(Failure::usage)?;
+    let dataset = open_dataset(&args.run).map_err(Failure::usage)?;
     let options = ExportOptions {
         images: !args.no_images && dataset.image_size_px().is_some(),
         traces: !args.no_traces,
@@ -49,16 +51,16 @@ fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Fai
     });
     progress.finish();
     exported.map_err(Failure::new)?;
-    let file = pending.publish(outputs)?;
+    let file = pending.publish()?;
     let bytes = file.metadata().map_err(Failure::new)?.len();
     let document = json!({"schema": "gripgen.export/1", "rows": rows, "file": args.out, "bytes": bytes});
-    tell(args, sink, &document)
+    sink.finish(args.talk.quiet, || document, || format!("{}\n", args.out.display()))
 }
 
 fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
-    let dataset = Dataset::open(&args.run).map_err(Failure::usage)?;
+    let dataset = open_dataset(&args.run).map_err(Failure::usage)?;
     outputs.allow_new_folder(&args.out)?;
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let rows = dataset.table().rows();
     let has_traces = (0..rows).find_map(|row| dataset.trace(row).ok().flatten()).is_some();
     let options = ExportOptions {
@@ -70,28 +72,21 @@ fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
     let made = export_lerobot(&dataset, options, folder.path(), || progress.step());
     progress.finish();
     let episodes = made.map_err(Failure::new)?;
-    folder.mark(LEROBOT_CARD, Format::Html, outputs.verb())?;
     folder.publish()?;
     let left_out = rows - episodes;
     if left_out > 0 && !args.talk.quiet {
         eprintln!("{} without images or trace left out", count(left_out as u64, "row"));
     }
-    if sink.wanted() {
-        sink.document(&json!({
-            "schema": "gripgen.export/1", "rows": episodes, "left_out": left_out, "file": args.out,
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!("{}\n", args.out.display()))?;
-    }
-    Ok(0)
+    let document =
+        json!({"schema": "gripgen.export/1", "rows": episodes, "left_out": left_out, "file": args.out});
+    sink.finish(args.talk.quiet, || document, || format!("{}\n", args.out.display()))
 }
 
 /// Rows of a tar file whose name has a number.
 const ROWS: usize = 1000;
 
 fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
-    let dataset = Dataset::open(&args.run).map_err(Failure::usage)?;
+    let dataset = open_dataset(&args.run).map_err(Failure::usage)?;
     let options = ExportOptions {
         images: !args.no_images && dataset.image_size_px().is_some(),
         traces: !args.no_traces,
@@ -105,7 +100,7 @@ fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
         None => vec![(args.out.clone(), &rows)],
     };
     outputs.allow_all(files.iter().map(|(path, _)| path.as_path()))?;
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let mut progress = Progress::start("rows", 0, rows.len() as u64, &args.talk);
     let (mut written, mut bytes) = (0, 0);
     for (path, rows) in &files {
@@ -113,7 +108,7 @@ fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
         let out = std::io::BufWriter::new(&pending.file);
         let made = export_webdataset(&dataset, rows, options, out, || progress.step());
         written += made.map_err(Failure::new)?;
-        bytes += pending.publish(&outputs)?.metadata().map_err(Failure::new)?.len();
+        bytes += pending.publish()?.metadata().map_err(Failure::new)?.len();
     }
     progress.finish();
     let left_out = dataset.table().rows() - written;
@@ -121,16 +116,12 @@ fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
         eprintln!("{} without images left out", count(left_out as u64, "row"));
     }
     let paths: Vec<&PathBuf> = files.iter().map(|(path, _)| path).collect();
-    if sink.wanted() {
-        sink.document(&json!({
-            "schema": "gripgen.export/1", "rows": written, "left_out": left_out, "file": args.out, "files": paths,
-            "bytes": bytes,
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>())?;
-    }
-    Ok(0)
+    let document = json!({
+        "schema": "gripgen.export/1", "rows": written, "left_out": left_out, "file": args.out, "files": paths,
+        "bytes": bytes,
+    });
+    let lines = || paths.iter().map(|path| format!("{}\n", path.display())).collect();
+    sink.finish(args.talk.quiet, || document, lines)
 }
 
 /// The names that a name with `%d` or `%05d` in it stands for; `None` without one.
@@ -142,18 +133,8 @@ fn numbered(name: &str) -> Option<impl Fn(usize) -> String> {
     (width < 20).then_some(move |i: usize| format!("{before}{i:0width$}{after}"))
 }
 
-fn tell(args: &ExportArgs, mut sink: JsonSink, document: &serde_json::Value) -> Result<u8, Failure> {
-    if sink.wanted() {
-        sink.document(document)?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!("{}\n", args.out.display()))?;
-    }
-    Ok(0)
-}
-
 fn one(args: &ExportArgs, sample: u64, outputs: &Outputs, sink: JsonSink) -> Result<u8, Failure> {
-    let folder = open_run(&args.run)?;
+    let folder = RunFolder::open(&args.run)?;
     let info = folder.info();
     if sample >= info.samples {
         let (k, n) = (sample, info.samples);
@@ -165,10 +146,8 @@ fn one(args: &ExportArgs, sample: u64, outputs: &Outputs, sink: JsonSink) -> Res
             .hint(format!("run the {} again to finish it", maker(&folder))));
     }
     let bytes = export_sample(&ShardReader::open(&folder.shard_path(shard))?, sample)?;
-    outputs.write(&args.out, Format::Marked, &bytes)?;
-    tell(
-        args,
-        sink,
-        &json!({"schema": "gripgen.export/1", "sample": sample, "file": args.out, "bytes": bytes.len()}),
-    )
+    outputs.write(&args.out, &bytes)?;
+    let document =
+        json!({"schema": "gripgen.export/1", "sample": sample, "file": args.out, "bytes": bytes.len()});
+    sink.finish(args.talk.quiet, || document, || format!("{}\n", args.out.display()))
 }

@@ -18,11 +18,7 @@ pub fn load(measured: &Path, sensor: Option<&str>, twin: &Twin) -> Result<Imprin
     let gel = &twin.gel[Jaw::Left];
     load_imprint_set(measured, sensor.as_deref().map(|s| (s, gel))).map_err(|e| {
         let hint = e.hint();
-        let failure = Failure::usage(e);
-        match hint {
-            Some(hint) => failure.hint(hint),
-            None => failure,
-        }
+        Failure::usage(e).hint_if(hint)
     })
 }
 

@@ -1,9 +1,8 @@
 //! `gripgen init`: something to start from.
 
 use crate::args::InitArgs;
-use crate::commands::check::cores;
 use crate::failure::Failure;
-use crate::mark::Format;
+use crate::load::jobs;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
@@ -15,18 +14,25 @@ use std::path::{Path, PathBuf};
 /// Runs the verb.
 pub fn run(args: &InitArgs) -> Result<u8, Failure> {
     let extension = args.target.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
+    // Every kind of start has a sweep; grips are tried for minutes.
+    let free = |folder: &Path| match folder.is_dir() {
+        true => Outputs::new(args.json.force).allow(&folder.join("sweep.toml")),
+        false => Ok(()),
+    };
     let (folder, files, talk, made) = if args.benchmark {
         let folder = args.out.clone().unwrap_or_else(|| args.target.clone());
         no_mesh(&folder, "")?;
-        let made = benchmark_starter(args.per_family.map(|n| n as usize), cores()).map_err(Failure::new)?;
+        free(&folder)?;
+        let made = benchmark_starter(args.per_family.map(|n| n as usize), jobs()).map_err(Failure::new)?;
         (folder, made.files, made.summary, None)
     } else if MESH_FORMATS.contains(&extension.as_str()) {
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
+        free(&folder)?;
         let options = PartOptions {
             scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
             accept_open_mesh: args.accept_open_mesh,
             mu: args.mu,
-            threads: cores(),
+            threads: jobs(),
         };
         let mut made = part_starter(&args.target, &folder, options).map_err(|e| {
             let hint = e.hint();
@@ -46,14 +52,12 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
         }
         (args.target.clone(), starter(), String::new(), None)
     };
-    let mut outputs = Outputs::of("init", args.json.force).reads_all(made.is_some().then_some(&args.target));
+    let mut outputs = Outputs::new(args.json.force).reads_all(made.is_some().then_some(&args.target));
     let paths: Vec<PathBuf> = files.iter().map(|f| folder.join(&f.name)).collect();
-    paths.iter().try_for_each(|path| outputs.judge(path))?;
     std::fs::create_dir_all(&folder).map_err(|e| Failure::new(format!("{}: {e}", folder.display())))?;
     outputs.allow_all(paths.iter().map(PathBuf::as_path))?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
-    // They are there to be edited, and carry no mark: who runs it again means --force.
-    paths.iter().zip(&files).try_for_each(|(path, file)| outputs.write(path, Format::Bare, &file.bytes))?;
+    paths.iter().zip(&files).try_for_each(|(path, file)| outputs.write(path, &file.bytes))?;
     if !args.talk.quiet {
         eprint!("{talk}");
         let sweep = shell::path(&folder.join("sweep.toml"));

@@ -2,8 +2,7 @@
 
 use crate::args::RenderArgs;
 use crate::failure::Failure;
-use crate::mark::{Format, short_hash};
-use crate::output::{JsonSink, print};
+use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use gripgen::record::encode_png;
 use gripgen::tactile::npz::{Array, ElementType, write_npy};
@@ -16,13 +15,10 @@ use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
-    let mut outputs =
-        Outputs::of("render", args.json.force).reads(&args.mesh).reads_config(&args.sensor, &[]);
-    outputs.allow_all([Some(args.out.as_path()), args.mask.as_deref()].into_iter().flatten())?;
-    for path in [&args.heights, &args.normals].into_iter().flatten() {
-        outputs.allow_beside(path, &args.out)?;
-    }
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let mut outputs = Outputs::new(args.json.force).reads(&args.mesh).reads_config(&args.sensor, &[]);
+    let written = [Some(&args.out), args.heights.as_ref(), args.normals.as_ref(), args.mask.as_ref()];
+    outputs.allow_all(written.iter().flatten().map(|path| path.as_path()))?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let sensor = load_sensor(&Location::parse(&args.sensor))?;
     let extension = args.mesh.extension().map_or_else(String::new, |e| e.to_string_lossy().into_owned());
     let options = RenderOptions {
@@ -34,47 +30,38 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
     };
     let rendered = render_file(&args.mesh, &options, &sensor)?;
     let size = (rendered.heights_mm.height, rendered.heights_mm.width);
-    let mut beside = Vec::new();
-    let mut bare = |path: &Path, array: &Array| {
-        let bytes = write_npy(array, ElementType::F32);
-        beside.push(short_hash(&bytes));
-        outputs.write(path, Format::Bare, &bytes)
+    let array = |path: &Path, shape: Vec<usize>, values: Vec<f64>| {
+        outputs.write(path, &write_npy(&Array { shape, values }, ElementType::F32))
     };
     if let Some(path) = &args.heights {
         let values = rendered.heights_mm.values.iter().map(|&h| f64::from(h)).collect();
-        bare(path, &Array { shape: vec![size.0, size.1], values })?;
+        array(path, vec![size.0, size.1], values)?;
     }
     if let Some(path) = &args.normals {
         let [x, y, z] = &rendered.normals;
         let values = (0..size.0 * size.1)
             .flat_map(|p| [x.values[p], y.values[p], z.values[p]].map(f64::from))
             .collect();
-        bare(path, &Array { shape: vec![size.0, size.1, 3], values })?;
+        array(path, vec![size.0, size.1, 3], values)?;
     }
-    // Last, and after what it names.
     let image = encode_png(&rendered.image).map_err(Failure::new)?;
-    outputs.write_with(&args.out, Format::Png, &image, &beside)?;
+    outputs.write(&args.out, &image)?;
     if let Some(path) = &args.mask {
-        outputs.write(path, Format::Png, &encode_png(&mask(&rendered)).map_err(Failure::new)?)?;
+        outputs.write(path, &encode_png(&mask(&rendered)).map_err(Failure::new)?)?;
     }
-    if sink.wanted() {
+    let document = || {
         let pixels = rendered.contact.iter().filter(|&&c| c).count();
         let at = (!is_height_map(&args.mesh)).then(|| options.pose(&sensor.grid));
         let side_mm = sensor.grid.metres_per_px * 1e3;
-        sink.document(&json!({
+        json!({
             "schema": "gripgen.render/1", "image": args.out, "heights": args.heights, "normals": args.normals,
             "mask": args.mask, "width_px": size.1, "height_px": size.0,
             "x_px": at.map(|at| at.x_px), "y_px": at.map(|at| at.y_px),
             "contact_area_mm2": pixels as f64 * side_mm * side_mm,
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        let written = [Some(&args.out), args.heights.as_ref(), args.normals.as_ref(), args.mask.as_ref()];
-        let lines: Vec<String> =
-            written.iter().flatten().map(|path| format!("{}\n", path.display())).collect();
-        print(&lines.concat())?;
-    }
-    Ok(0)
+        })
+    };
+    let lines = || written.iter().flatten().map(|path| format!("{}\n", path.display())).collect();
+    sink.finish(args.talk.quiet, document, lines)
 }
 
 fn mask(rendered: &RenderedBody) -> TactileImage {

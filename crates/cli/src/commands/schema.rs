@@ -1,8 +1,9 @@
-//! `gripgen schema`: for editors that complete and check TOML.
+//! `gripgen schema` and `gripgen completions`: for editors and shells that complete what is typed.
 
-use crate::args::{SchemaArgs, SchemaKind};
+use crate::args::{Cli, CompletionsArgs, SchemaArgs, SchemaKind};
 use crate::failure::Failure;
 use crate::output::print;
+use clap::CommandFactory;
 use crate::{campaign_schema, rosbag_schema, sweep_schema, twin_schema};
 use gripgen_rig::experiment::rig_schema;
 
@@ -16,6 +17,14 @@ pub fn run(args: &SchemaArgs) -> Result<u8, Failure> {
         SchemaKind::Rosbag => rosbag_schema(),
     };
     print(&format!("{schema:#}\n"))?;
+    Ok(0)
+}
+
+/// Runs `gripgen completions`.
+pub fn completions(args: &CompletionsArgs) -> Result<u8, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "gripgen", &mut script);
+    print(&String::from_utf8_lossy(&script))?;
     Ok(0)
 }
 

@@ -1,27 +1,26 @@
 //! `gripgen show`: pictures of a run.
 
 use crate::args::ShowArgs;
-use crate::commands::open_run;
 use crate::failure::Failure;
-use crate::mark::Format;
-use crate::output::{JsonSink, print};
+use crate::output::JsonSink;
 use crate::outputs::Outputs;
+use gripgen::record::RunFolder;
 use gripgen::{CONTACT_SHEET, contact_sheet, sample_picture};
 use serde_json::json;
 use std::path::Path;
 
 /// Runs the verb.
 pub fn run(args: &ShowArgs) -> Result<u8, Failure> {
-    let folder = open_run(&args.run)?;
+    let folder = RunFolder::open(&args.run)?;
     let name = args.sample.map_or(CONTACT_SHEET.into(), |index| format!("sample-{index:06}.png"));
     let out = args.out.clone().unwrap_or_else(|| args.run.join(name));
-    let mut outputs = Outputs::of("show", args.json.force).reads(&args.run);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.run);
     // The run's own sheet is made as the sweep makes it, and by nothing else.
     let own_sheet = args.sample.is_none() && is_sheet_of(&args.run, &out);
     if !own_sheet {
         outputs.allow(&out)?;
     }
-    let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let bytes = match args.sample {
         None => contact_sheet(&folder).map_err(Failure::new)?,
         Some(index) if index >= folder.info().samples => {
@@ -35,17 +34,11 @@ pub fn run(args: &ShowArgs) -> Result<u8, Failure> {
     if own_sheet {
         folder.publish(CONTACT_SHEET, &bytes)?;
     } else {
-        outputs.write(&out, Format::Png, &bytes)?;
+        outputs.write(&out, &bytes)?;
     }
-    if sink.wanted() {
-        sink.document(&json!({
-            "schema": "gripgen.picture/1", "sample": args.sample, "file": out, "bytes": bytes.len(),
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!("{}\n", out.display()))?;
-    }
-    Ok(0)
+    let document =
+        || json!({"schema": "gripgen.picture/1", "sample": args.sample, "file": out, "bytes": bytes.len()});
+    sink.finish(args.talk.quiet, document, || format!("{}\n", out.display()))
 }
 
 fn is_sheet_of(run: &Path, out: &Path) -> bool {

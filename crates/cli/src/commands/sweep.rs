@@ -5,6 +5,7 @@ use crate::commands::check;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
 use crate::live::{LivePage, Made, Picture, State};
+use crate::load;
 use crate::output::{JsonSink, count, duration, print, program, size};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
@@ -22,15 +23,14 @@ const FAILURES_SHOWN: u64 = 10;
 /// Runs the verb.
 pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
     if args.dry_run {
-        return check::check("sweep", &args.config, args.jobs, &args.json, &args.talk);
+        return check::check(&args.config, args.jobs, &args.json, &args.talk);
     }
     let project = check::load(&args.config)?;
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&project.name));
-    let jobs = args.jobs.unwrap_or_else(check::cores).max(1);
+    let jobs = args.jobs.unwrap_or_else(load::jobs).max(1);
     let options = SweepOptions { jobs, slice: args.slice, simd: simd_level(args)? };
-    let mut outputs = Outputs::of("sweep", args.json.force)
-        .reads_config(&args.config.config, &args.config.set)
-        .makes_run(&out);
+    let mut outputs =
+        Outputs::new(args.json.force).reads_config(&args.config.config, &args.config.set).makes_run(&out);
     let json = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let mut watch = Watch::new(args, &project, json);
     watch.out = out.clone();

@@ -1,11 +1,10 @@
 //! `gripgen try`: what becomes of a part, on one page and in one picture.
 
 use crate::args::TryArgs;
-use crate::commands::check::cores;
 use crate::commands::init::mesh_wanted;
 use crate::failure::Failure;
-use crate::mark::Format;
-use crate::output::{JsonSink, print, program};
+use crate::load::jobs;
+use crate::output::{JsonSink, program};
 use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::twin::usual_scale_mm_per_unit;
@@ -20,37 +19,32 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
         args.mesh.file_stem().map_or_else(|| "part".into(), |stem| stem.to_string_lossy().into_owned());
     let page = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}-try.html")));
     let picture = page.with_extension("png");
-    let mut outputs = Outputs::of("try", args.replaces()).reads(&args.mesh);
+    let mut outputs = Outputs::new(args.replaces()).reads(&args.mesh);
     if let Some(sensor) = &args.sensor {
         outputs = outputs.reads_config(sensor, &[]);
     }
     outputs.allow_all([page.as_path(), picture.as_path()])?;
-    let mut sink = JsonSink::open(args.json.as_deref(), &mut outputs)?;
+    let sink = JsonSink::open(args.json.as_deref(), &mut outputs)?;
     let options = TryOptions {
         part: PartOptions {
             scale_mm_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)),
             accept_open_mesh: args.accept_open_mesh,
             mu: args.mu,
-            threads: cores(),
+            threads: jobs(),
         },
         grip: args.grip,
         force_n: args.force_n(),
         sensor: args.sensor.clone(),
     };
     let tried = try_part(&args.mesh, &options).map_err(refused)?;
-    outputs.write(&page, Format::Html, tried.page.as_bytes())?;
-    outputs.write(&picture, Format::Png, &tried.picture)?;
+    outputs.write(&page, tried.page.as_bytes())?;
+    outputs.write(&picture, &tried.picture)?;
     if !args.talk.quiet {
         eprint!("{}", summary(&tried));
         eprintln!("next: {}", next(args, &stem));
     }
-    if sink.wanted() {
-        sink.document(&document(&tried, &page, &picture))?;
-    }
-    if !sink.on_stdout() {
-        print(&format!("{}\n{}\n", page.display(), picture.display()))?;
-    }
-    Ok(0)
+    let files = || format!("{}\n{}\n", page.display(), picture.display());
+    sink.finish(false, || document(&tried, &page, &picture), files)
 }
 
 /// The command that makes a sweep of the part as it was read here.

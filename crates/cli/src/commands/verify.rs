@@ -1,20 +1,20 @@
 //! `gripgen verify`: is the folder what it says it is?
 
 use crate::args::VerifyArgs;
-use crate::commands::{maker, open_run};
+use crate::commands::maker;
 use crate::failure::{Failure, code};
 use crate::output::{JsonSink, count, print, program};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use crate::shell;
-use gripgen::record::{RIG_SOURCE, repair, verify};
+use gripgen::record::{RIG_SOURCE, RunFolder, repair, verify};
 use serde_json::json;
 
 /// Runs the verb.
 pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("verify", args.json.force).reads(&args.run);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.run);
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
-    let folder = open_run(&args.run)?;
+    let folder = RunFolder::open(&args.run)?;
     let mut progress = Progress::start("shards", 0, folder.info().shards, &args.talk);
     let result = verify(&args.run, |_| progress.step())?;
     progress.finish();

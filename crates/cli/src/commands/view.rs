@@ -2,8 +2,8 @@
 
 use crate::args::ViewArgs;
 use crate::failure::Failure;
-use crate::mark::Format;
-use crate::output::{JsonSink, print, size};
+use crate::load::there_is;
+use crate::output::{JsonSink, size};
 use crate::outputs::Outputs;
 use gripgen::record::Dataset;
 use gripgen::{ViewOptions, view_page};
@@ -15,35 +15,29 @@ const PAGE: &str = "view.html";
 
 /// Runs the verb.
 pub fn run(args: &ViewArgs) -> Result<u8, Failure> {
-    if !args.data.exists() {
-        let none = format!("{}: there is no such file or folder", args.data.display());
-        return Err(Failure::usage(none).hint("name a run folder, a folder with pulls.csv, or a shard"));
-    }
+    there_is(&args.data).map_err(|e| e.hint("name a run folder, a folder with pulls.csv, or a shard"))?;
     let out = args.out.clone().unwrap_or_else(|| beside(&args.data));
-    let mut outputs = Outputs::of("view", args.force).reads(&args.data);
+    let mut outputs = Outputs::new(args.json.force).reads(&args.data);
     outputs.allow(&out)?;
-    let mut sink = JsonSink::open(args.json.as_deref(), &mut outputs)?;
-    let dataset = Dataset::open(&args.data).map_err(Failure::usage)?;
+    let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
+    let dataset = open_dataset(&args.data).map_err(Failure::usage)?;
     let absolute = std::path::absolute(&args.data).unwrap_or_else(|_| args.data.clone());
     let title =
         absolute.file_name().map_or_else(|| "pulls".into(), |name| name.to_string_lossy().into_owned());
     let options = ViewOptions { title, pulls: args.pulls as usize };
     let page = view_page(&dataset, &options).map_err(Failure::new)?;
-    outputs.write(&out, Format::Html, page.html.as_bytes())?;
+    outputs.write(&out, page.html.as_bytes())?;
     if !args.talk.quiet {
         let bytes = size(page.html.len() as u64);
         eprintln!("{} of {} pulls with images and curves, {bytes}", page.shown, page.pulls);
     }
-    if sink.wanted() {
-        sink.document(&json!({
+    let document = || {
+        json!({
             "schema": "gripgen.view/1", "file": out, "pulls": page.pulls, "shown": page.shown,
             "bytes": page.html.len(),
-        }))?;
-    }
-    if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!("{}\n", out.display()))?;
-    }
-    Ok(0)
+        })
+    };
+    sink.finish(args.talk.quiet, document, || format!("{}\n", out.display()))
 }
 
 /// In a folder, or beside a shard.

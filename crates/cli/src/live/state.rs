@@ -1,9 +1,12 @@
 //! What the page shows.
 
-use super::Picture;
-use gripgen::twin::PerJaw;
+use gripgen::record::{Dataset, encode_png};
+use gripgen::twin::{Jaw, PerJaw};
+use gripgen_rig::camera::{CameraFrame, CameraView, SHIPPED_FRAME_LIMITS, decode_jpeg};
 use serde_json::{Value, json};
 use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Points of the curve of the pull under way: with more, every second is dropped.
@@ -47,6 +50,33 @@ pub struct Made {
     pub label_n: Option<f64>,
     /// Why it failed or is suspect.
     pub reason: String,
+}
+
+/// Where a picture comes from.
+#[derive(Debug, Clone)]
+pub enum Picture {
+    /// A frame of a camera, and how it is looked at.
+    Frame(Arc<CameraFrame>, PerJaw<CameraView>),
+    /// The last sample of a shard.
+    Shard(PathBuf),
+}
+
+impl Picture {
+    /// As a PNG, decoded when the page asks for it; `None` where there is none, or it cannot be read.
+    pub fn png(&self, jaw: Jaw) -> Option<Vec<u8>> {
+        match self {
+            Self::Frame(frame, views) => {
+                let frame = decode_jpeg(&frame.jpeg, &SHIPPED_FRAME_LIMITS).ok()?;
+                encode_png(&views[jaw].apply(&frame).ok()?).ok()
+            }
+            Self::Shard(path) => {
+                let shard = Dataset::open(path).ok()?;
+                let last = shard.table().rows().checked_sub(1)?;
+                let [left, right] = shard.images_png(last).ok()??;
+                Some(if jaw == Jaw::Left { left } else { right })
+            }
+        }
+    }
 }
 
 /// The numbers behind the page.
@@ -142,7 +172,7 @@ impl State {
     }
 
     /// A picture of a jaw, if the last one is old enough.
-    pub fn picture(&mut self, jaw: gripgen::twin::Jaw, picture: Picture) {
+    pub fn picture(&mut self, jaw: Jaw, picture: Picture) {
         let old = self.pictured[jaw].is_none_or(|at| at.elapsed() >= PICTURE_EVERY);
         if old {
             let number = self.pictures[jaw].as_ref().map_or(0, |(number, _)| *number) + 1;

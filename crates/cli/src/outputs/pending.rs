@@ -1,39 +1,36 @@
 //! Files and folders under temporary names, until they are finished.
 
-use super::{Outputs, unwritable};
+use super::{exists, is_special, unwritable};
 use crate::failure::Failure;
-use crate::mark::{Format, marked};
+use std::collections::hash_map::RandomState;
 use std::fs::File;
+use std::hash::BuildHasher;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 /// A folder under its temporary name; it is removed unless it is published.
 #[derive(Debug)]
 pub struct PendingFolder {
-    pub(super) temporary: Option<PathBuf>,
-    pub(super) folder: PathBuf,
+    temporary: Option<PathBuf>,
+    folder: PathBuf,
 }
 
 impl PendingFolder {
+    pub(super) fn create(folder: &Path) -> io::Result<Self> {
+        let temporary = unused_name(folder);
+        std::fs::create_dir(&temporary)?;
+        Ok(Self { temporary: Some(temporary), folder: folder.into() })
+    }
+
     /// Where the files go.
     pub fn path(&self) -> &Path {
         self.temporary.as_deref().unwrap_or(&self.folder)
     }
 
-    /// Gives one of its files the mark of a verb.
-    pub fn mark(&self, name: &str, format: Format, verb: &str) -> Result<(), Failure> {
-        let path = self.path().join(name);
-        let failed = |e: io::Error| unwritable(&path, &e);
-        let bytes = std::fs::read(&path).map_err(failed)?;
-        std::fs::write(&path, marked(format, verb, &bytes, &[])).map_err(failed)
-    }
-
     /// Gives the folder its name, if that is still free or an empty folder: renaming onto any other fails.
     pub fn publish(mut self) -> Result<(), Failure> {
         let Some(temporary) = self.temporary.take() else { return Ok(()) };
-        std::fs::rename(&temporary, &self.folder).map_err(|e| {
-            unwritable(&self.folder, &e).hint(format!("what was made is in {}", temporary.display()))
-        })
+        std::fs::rename(&temporary, &self.folder).map_err(|e| kept(&self.folder, &temporary, &e))
     }
 }
 
@@ -50,45 +47,48 @@ impl Drop for PendingFolder {
 pub struct Pending {
     /// Where the bytes go.
     pub file: File,
-    pub(super) path: PathBuf,
-    pub(super) temporary: Option<PathBuf>,
+    path: PathBuf,
+    temporary: Option<PathBuf>,
+    replaces: bool,
 }
 
 impl Pending {
+    pub(super) fn create(path: &Path, replaces: bool) -> io::Result<Self> {
+        if is_special(path) {
+            let file = File::options().write(true).open(path)?;
+            return Ok(Self { file, path: path.into(), temporary: None, replaces });
+        }
+        // Through a link, the file that it leads to.
+        let path = path.canonicalize().unwrap_or_else(|_| path.into());
+        let temporary = unused_name(&path);
+        let file = File::create_new(&temporary)?;
+        Ok(Self { file, path, temporary: Some(temporary), replaces })
+    }
+
     /// Gives the file its name, if that is still free or may be replaced. Returns the open file.
-    pub fn publish(mut self, outputs: &Outputs) -> Result<File, Failure> {
-        if self.temporary.is_some() {
-            outputs.judge(&self.path).map_err(|refused| self.kept(refused))?;
+    pub fn publish(mut self) -> Result<File, Failure> {
+        let failed = |e: io::Error| unwritable(&self.path, &e);
+        let file = self.file.try_clone().map_err(failed)?;
+        if let Some(temporary) = &self.temporary {
+            file.sync_all().map_err(failed)?;
+            let renamed = match self.replaces && exists(&self.path) {
+                true => std::fs::rename(temporary, &self.path),
+                false => publish_new(temporary, &self.path),
+            };
+            let failure = renamed.map_err(|e| kept(&self.path, temporary, &e));
+            self.temporary = None;
+            failure?;
         }
-        self.rename()
-    }
-
-    /// What was made stays under its temporary name, and the failure says so.
-    fn kept(&mut self, failure: Failure) -> Failure {
-        match self.temporary.take() {
-            Some(temporary) => failure.hint(format!("what was made is in {}", temporary.display())),
-            None => failure,
-        }
-    }
-
-    pub(super) fn rename(mut self) -> Result<File, Failure> {
-        let file = self.file.try_clone().map_err(|e| unwritable(&self.path, &e))?;
-        let Some(temporary) = &self.temporary else { return Ok(file) };
-        file.sync_all().map_err(|e| unwritable(&self.path, &e))?;
-        let renamed = match std::fs::symlink_metadata(&self.path) {
-            Err(_) => publish_new(temporary, &self.path),
-            Ok(_) => std::fs::rename(temporary, &self.path),
-        };
-        if let Err(e) = renamed {
-            let failure = unwritable(&self.path, &e);
-            return Err(self.kept(failure));
-        }
-        self.temporary = None;
         Ok(file)
     }
 }
 
-/// Gives a file a name that nobody may have taken in between.
+/// What was made stays under its temporary name, and the failure says so.
+fn kept(path: &Path, temporary: &Path, e: &io::Error) -> Failure {
+    unwritable(path, e).hint(format!("what was made is in {}", temporary.display()))
+}
+
+/// Gives a file a name that must not have been taken in between.
 fn publish_new(temporary: &Path, path: &Path) -> io::Result<()> {
     match std::fs::hard_link(temporary, path) {
         Ok(()) => std::fs::remove_file(temporary),
@@ -96,6 +96,14 @@ fn publish_new(temporary: &Path, path: &Path) -> io::Result<()> {
         // A file system without hard links.
         Err(_) => std::fs::rename(temporary, path),
     }
+}
+
+/// An unused name next to `path`.
+fn unused_name(path: &Path) -> PathBuf {
+    // Without a slash at its end, which a folder may have.
+    let mut name = path.components().as_path().as_os_str().to_os_string();
+    name.push(format!(".{:016x}.partial", RandomState::new().hash_one(std::process::id())));
+    PathBuf::from(name)
 }
 
 impl Drop for Pending {

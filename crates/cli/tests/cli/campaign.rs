@@ -37,15 +37,16 @@ fn a_campaign_is_planned_and_made_once() {
     assert!(within(forces("asset:configs/twin-baseline.toml", "plain"), 0.1));
     assert!(within(forces("asset:configs/twin.toml", "papers"), 20.0));
 
-    let again = run(&plan);
+    assert_code(&run(&plan), 2);
+    let again = run(&[&plan[..], &["--force"]].concat());
     assert_code(&again, 2);
-    assert!(text(&again.stderr).contains("holds measurements"), "{}", text(&again.stderr));
+    assert!(text(&again.stderr).contains("this exists and is no empty folder"), "{}", text(&again.stderr));
     for (arguments, part) in [
         (["--parts", "gaer"], "has no part `gaer`"),
         (["--pulls", "3"], "3 pulls are too few for 4 parts: at least 24"),
         (["--sessions", "0"], "0 sessions"),
     ] {
-        let refused = run(&[&["campaign", "-o", &file][..], &arguments].concat());
+        let refused = run(&[&["campaign", "-o", &file, "--force"][..], &arguments].concat());
         assert_code(&refused, 2);
         assert!(text(&refused.stderr).contains(part), "{}", text(&refused.stderr));
     }

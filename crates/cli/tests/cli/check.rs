@@ -1,6 +1,6 @@
 //! `gripgen check`, and what `gripgen sweep` says of a configuration.
 
-use super::{QUICKSTART, assert_code, run, sweep_args, text};
+use super::{QUICKSTART, assert_code, run, sweep_args, text, unmade};
 
 const DRIFT: &str = "effects=[{name=\"sensor_drift\", rate_n_per_h=0.5}]";
 const STILL: &str =
@@ -89,8 +89,7 @@ fn a_folder_and_a_key_without_its_section_have_a_hint() {
 
 #[test]
 fn check_and_dry_run_say_what_it_takes_and_write_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (_folder, out) = unmade("run");
     let dry = run(&sweep_args(out.to_str().unwrap(), &["--dry-run", "--json"]));
     assert_code(&dry, 0);
     assert!(!out.exists());

@@ -10,9 +10,7 @@ fn folder(rows: usize, label: f64, grip: f64) -> tempfile::TempDir {
         let label_n = 0.4 * force_n * (1.0 + 0.01 * ((i * 5 % 11) as f64 - 5.0));
         table += &format!("p{i},long_shaft,{},{}\n", grip * force_n, label * label_n);
     }
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("pulls.csv"), table).unwrap();
-    folder
+    super::measured::folder(&table)
 }
 
 #[test]

@@ -1,21 +1,15 @@
 //! `gripgen rig pull` on a rig whose devices tell half the truth: nothing breaks, and no such label is taken for a good one.
 
 use super::rig_served::Served;
-use super::{assert_code, run, text};
-use gripgen::record::{RunFolder, ShardReader, status_name};
+use super::{assert_code, run, text, unmade};
+use gripgen::record::{RunFolder, ShardReader};
 use std::path::Path;
 
 const SPEED: [&str; 2] = ["--speed", "20"];
 
-/// Status and reason of each pull of a folder.
+/// Status and reason of each pull that a folder has.
 fn pulls(out: &Path) -> Vec<(String, String)> {
-    let folder = RunFolder::open(out).unwrap();
-    let pull = |index: u64| {
-        let (sample, _) = ShardReader::open(&folder.shard_path(index)).unwrap().pull(index).unwrap();
-        let reason = if sample.failure.is_empty() { &sample.status_reason } else { &sample.failure }.clone();
-        (status_name(sample.status()).to_string(), reason)
-    };
-    (0..folder.info().shards).filter(|&shard| folder.sidecar_path(shard).exists()).map(pull).collect()
+    super::rig_served::pulls(out).into_iter().flatten().collect()
 }
 
 /// A pull during which something is said to the rig when it reaches a step; its exit code and what is stored.
@@ -111,8 +105,7 @@ fn a_rig_that_is_not_as_its_file_says_is_refused() {
 /// The same picture with new stamps is a camera that stands still.
 #[test]
 fn a_camera_that_repeats_itself_is_frozen() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let mut rig = Served::start(&SPEED);
     let (code, found, said) = pulled(&mut rig, &out, ": rest images", "repeat right", &[]);
     assert_eq!(code, 1, "{said}");

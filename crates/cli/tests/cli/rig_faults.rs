@@ -1,28 +1,13 @@
 //! `gripgen rig pull` when something goes wrong in the middle: what it says, what it leaves, and that it goes on.
 
-use super::rig_served::Served;
-use super::{assert_code, run, text};
-use gripgen::record::{RunFolder, ShardReader, status_name};
+use super::rig_served::{Served, pulls};
+use super::{assert_code, run, text, unmade};
 use std::path::Path;
 use std::time::Duration;
 
 /// No fault holds the robot's client up for longer, on a machine that has five times as much to do as it can.
 const LONGEST: Duration = Duration::from_secs(20);
 const SPEED: [&str; 2] = ["--speed", "20"];
-
-/// Status and failure of each pull of a folder; `None` where there is none.
-fn pulls(out: &Path) -> Vec<Option<(String, String)>> {
-    let folder = RunFolder::open(out).unwrap();
-    let pull = |index: u64| {
-        // A shard without its sidecar is half written: it is taken for none.
-        let done = folder.sidecar_path(index).exists();
-        done.then(|| {
-            let (sample, _) = ShardReader::open(&folder.shard_path(index)).unwrap().pull(index).unwrap();
-            (status_name(sample.status()).to_string(), sample.failure)
-        })
-    };
-    (0..folder.info().shards).map(pull).collect()
-}
 
 fn statuses(out: &Path) -> Vec<String> {
     pulls(out).into_iter().map(|pull| pull.map_or("missing".into(), |(status, _)| status)).collect()
@@ -40,8 +25,7 @@ fn assert_counts(out: &Path, counts: [u64; 3]) {
 
 #[test]
 fn an_emergency_stop_fails_one_pull_and_the_same_command_finishes_the_campaign() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let mut rig = Served::start(&SPEED);
     let mut pulling = rig.pull(&out, 3, &[]);
     pulling.until(&["2/3", ": pulling"]);
@@ -77,8 +61,7 @@ fn an_emergency_stop_fails_one_pull_and_the_same_command_finishes_the_campaign()
 
 #[test]
 fn a_protective_stop_is_left_only_when_somebody_says_so() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let mut rig = Served::start(&SPEED);
     let mut pulling = rig.pull(&out, 1, &[]);
     pulling.until(&["1/1", ": the way down"]);
@@ -98,8 +81,7 @@ fn a_protective_stop_is_left_only_when_somebody_says_so() {
 
 #[test]
 fn ctrl_c_stops_the_robot_and_the_same_command_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let rig = Served::start(&SPEED);
     let mut pulling = rig.pull(&out, 2, &[]);
     pulling.until(&["2/2", ": pulling"]);
@@ -115,8 +97,7 @@ fn ctrl_c_stops_the_robot_and_the_same_command_goes_on() {
 /// SIGKILL: nobody says stop, nobody says goodbye.
 #[test]
 fn a_host_that_dies_stops_the_robot_and_leaves_no_half_pull() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let rig = Served::start(&SPEED);
     for moment in [": pulling", ": gripping", ": the way down"] {
         let mut pulling = rig.pull(&out, 2, &[]);

@@ -1,14 +1,13 @@
 //! The loop over the wire: a rig that has something which nobody declared, measured, diagnosed, measured again.
 
+use super::rig_served::Served;
 use super::{assert_code, gripgen, run, text};
 use gripgen::twin::Twin;
 use gripgen::{BASELINE_TWIN, Library, Location};
 use gripgen_cli::{PullDiagnoseOptions, diagnose_pull_table};
 use gripgen_measured::load_pulls_of;
 use std::cell::Cell;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
 
 /// How many times faster than real time the virtual rig runs here: at 50 a slow machine with other tests beside it made a gain of the controller of it once.
 const SPEED: &str = "25";
@@ -16,9 +15,9 @@ const SPEED: &str = "25";
 /// What the rig has and nobody declares: an offset in its friction law.
 const HIDDEN: &str = "effects=[{name=\"load_offset\", a=1.2, b_n=-4.0, fitted_grip_force_n=[2, 80], outside_fit=\"extrapolate\"}]";
 
-/// A virtual rig that is served, and the file that finds it.
-struct Served {
-    process: Child,
+/// A virtual rig, the file that finds it, and how many of its pulls were suspect.
+struct Loop {
+    _served: Served,
     rig: PathBuf,
     suspect: Cell<usize>,
 }
@@ -27,16 +26,11 @@ struct Served {
 /// and three campaigns have 114. They are kept, listed, and left out of fits.
 const MOST_SUSPECT: usize = 1;
 
-impl Served {
+impl Loop {
     fn start(folder: &Path) -> Self {
         let rig = folder.join("rig.toml");
-        let serve = ["rig", "serve", "--set", HIDDEN, "--any-ports", "--speed", SPEED, "--seed", "5", "-q"];
-        let mut process =
-            gripgen().args(serve).arg("--write-rig").arg(&rig).stdout(Stdio::piped()).spawn().unwrap();
-        let mut line = String::new();
-        BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        assert!(line.starts_with("ready rtde=127.0.0.1:"), "{line}");
-        Self { process, rig, suspect: Cell::new(0) }
+        let serve = ["--set", HIDDEN, "--speed", SPEED, "--seed", "5", "--write-rig", rig.to_str().unwrap()];
+        Self { _served: Served::start(&serve), rig, suspect: Cell::new(0) }
     }
 
     fn pull(&self, out: &Path, more: &[&str]) {
@@ -53,13 +47,6 @@ impl Served {
         self.suspect.set(self.suspect.get() + suspect.len());
         assert!(self.suspect.get() <= MOST_SUSPECT, "{suspect:#?}");
         assert_code(&done, if suspect.is_empty() { 0 } else { 4 });
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }
 
@@ -108,7 +95,7 @@ fn an_undeclared_effect_of_a_rig_is_found_over_the_wire_and_the_next_campaign_te
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| -> PathBuf { folder.path().join(name) };
     let path = |name: &str| at(name).to_str().unwrap().to_string();
-    let rig = Served::start(folder.path());
+    let rig = Loop::start(folder.path());
 
     rig.pull(&at("first"), &["--grip-force-n", "20,30,40", "--repetitions", "5"]);
     let limit = ["--rig", rig.rig.to_str().unwrap()];
@@ -135,6 +122,7 @@ fn an_undeclared_effect_of_a_rig_is_found_over_the_wire_and_the_next_campaign_te
         "--json",
         &path("both.json"),
         "-q",
+        "--force",
     ];
     assert_code(&run(&both), 0);
     let second: serde_json::Value = serde_json::from_slice(&std::fs::read(at("both.json")).unwrap()).unwrap();

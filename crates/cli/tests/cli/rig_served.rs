@@ -1,6 +1,7 @@
 //! A virtual rig and a client of it, each a process of its own.
 
 use super::{assert_code, gripgen, run, text};
+use gripgen::record::{RunFolder, ShardReader, status_name};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Output, Stdio};
@@ -114,6 +115,21 @@ impl Drop for Served {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
+}
+
+/// Status of each pull of a folder, and why it failed or is suspect; `None` where there is none.
+pub fn pulls(out: &Path) -> Vec<Option<(String, String)>> {
+    let folder = RunFolder::open(out).unwrap();
+    let pull = |index: u64| {
+        // A shard without its sidecar is half written: it is taken for none.
+        let done = folder.sidecar_path(index).exists();
+        done.then(|| {
+            let (sample, _) = ShardReader::open(&folder.shard_path(index)).unwrap().pull(index).unwrap();
+            let reason = if sample.failure.is_empty() { &sample.status_reason } else { &sample.failure };
+            (status_name(sample.status()).to_string(), reason.clone())
+        })
+    };
+    (0..folder.info().shards).map(pull).collect()
 }
 
 /// A campaign under way.

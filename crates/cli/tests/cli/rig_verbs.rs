@@ -1,7 +1,7 @@
 //! `gripgen rig check`, `teach`, and what `pull` does before it connects.
 
 use super::rig_served::Served;
-use super::{assert_code, gripgen, run, text};
+use super::{assert_code, gripgen, run, text, unmade};
 use std::path::Path;
 
 /// Ports that nobody listens on.
@@ -68,8 +68,7 @@ fn teach_writes_where_the_tool_is_and_keeps_the_rest_of_the_file() {
 /// Pulls that nobody may make. Nothing listens on the ports: whoever connected would end with 1.
 #[test]
 fn a_campaign_beyond_the_limits_is_refused_before_anything_is_connected() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("lab");
+    let (_folder, out) = unmade("lab");
     let refused = |more: &[&str], numbers: [&str; 2]| {
         let mut arguments = vec!["rig", "pull", "-o", out.to_str().unwrap()];
         arguments.extend(more);
@@ -127,8 +126,7 @@ fn is_empty(folder: &Path) -> bool {
 /// A folder of another rig is refused by the keys that differ, not by two hashes.
 #[test]
 fn a_changed_rig_names_the_keys() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("day");
+    let (_folder, out) = unmade("day");
     let pull =
         |more: &[&str]| run(&[&["rig", "pull", "-o", out.to_str().unwrap()], &nothing()[..], more].concat());
     // Nobody answers, but the folder is made.

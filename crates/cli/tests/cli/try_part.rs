@@ -29,10 +29,12 @@ fn try_writes_a_page_and_a_picture() {
     );
     assert_eq!(&std::fs::read(folder.path().join("gear.png")).unwrap()[..4], b"\x89PNG");
 
-    // The same verb replaces its own; an edited page needs the word.
-    assert_code(&run(&["try", mesh, "-o", at, "--force", "12", "--grip", "0"]), 0);
-    assert!(std::fs::read_to_string(&page).unwrap().contains("at 12 N"));
-    std::fs::write(&page, "mine").unwrap();
+    // With a number the word is the force of a jaw.
+    let other = folder.path().join("other.html");
+    let at_12_n = ["try", mesh, "-o", other.to_str().unwrap(), "--force", "12", "--grip", "0"];
+    assert_code(&run(&at_12_n), 0);
+    assert!(std::fs::read_to_string(&other).unwrap().contains("at 12 N"));
+    assert_code(&run(&at_12_n), 2);
     assert_code(&run(&["try", mesh, "-o", at]), 2);
     assert_code(&run(&["try", mesh, "-o", at, "--force-n", "12"]), 2);
     assert_code(&run(&["try", mesh, "-o", at, "--force", "-q"]), 0);

@@ -73,8 +73,8 @@ def diagnose(
 ) -> Diagnosis:
     """Find what the twin cannot explain of measured pulls, force-sensor tables or presses.
 
-    `out` is the twin to write, `report` the HTML page. Files of an earlier diagnosis are replaced, others with `force`
-    only (docs/outputs.md). See docs/diagnosis.md.
+    `out` is the twin to write, `report` the HTML page; files that exist are replaced with `force` only
+    (docs/outputs.md). See docs/diagnosis.md.
     """
     more = (["--report", os.fspath(report)] if report else []) + (["--force"] if force else [])
     found = _verb(["diagnose"], measured, twin, out, set, more)
@@ -101,8 +101,8 @@ def calibrate(
 ) -> Calibration:
     """Fit the baseline of a twin to measured pulls and write the new twin to `out`.
 
-    `law="offset"` fits the paper's mu (a + b / F_G) for each part, `fit` names effects to fit beside the baseline. A twin of
-    an earlier calibration is replaced, any other file with `force` only (docs/outputs.md).
+    `law="offset"` fits the paper's mu (a + b / F_G) for each part, `fit` names effects to fit beside the baseline. A
+    file that exists is replaced with `force` only (docs/outputs.md).
     """
     more = (["--law", law] if law else []) + (["--fit", ",".join(fit)] if fit else [])
     more += ["--force"] if force else []

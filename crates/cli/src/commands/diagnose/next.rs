@@ -3,9 +3,8 @@
 use crate::args::DiagnoseArgs;
 use crate::commands::rig::load_rig;
 use crate::failure::Failure;
-use crate::mark::{Format, mark_of};
 use crate::output::program;
-use crate::outputs::Outputs;
+use crate::outputs::{Outputs, is_special};
 use crate::shell;
 use gripgen::identify::{Channel, Diagnosis, Verdict};
 use gripgen::record::{RIG_SOURCE, RunFolder};
@@ -21,90 +20,42 @@ const SHIPPED_SWEEP: &str = "asset:configs/quickstart.toml";
 /// A number behind a name that is taken, at most.
 const MOST: u32 = 99;
 
-/// What became of the file with the next pulls.
-#[derive(Debug, Default)]
-pub struct NextFile {
-    /// Where they were written.
-    pub path: Option<PathBuf>,
-    /// What became of a file that was there.
-    pub said: Option<String>,
+/// The file of the next pulls, where files are written at all: next to the twin, the JSON or the report.
+pub fn next_file(args: &DiagnoseArgs) -> Option<PathBuf> {
+    let json = args.json.json.as_deref().filter(|p| *p != "-").map(Path::new);
+    let written = [args.out.as_deref(), json, args.report.as_deref()];
+    let beside = written.into_iter().flatten().find(|path| !is_special(path))?;
+    Some(beside.with_file_name("next.toml"))
 }
 
-/// Writes the campaign that separates what is tied, beside the twin, the JSON or the report. Nobody's own file is written over, and
-/// an earlier plan goes only where it was made for the same measurements.
+/// Writes the campaign that separates what is tied. Where no pulls are left to make, the plan of an earlier diagnosis goes.
 pub fn write_next(
     args: &DiagnoseArgs,
     outputs: &Outputs,
     diagnosed: &mut Diagnosed,
-) -> Result<NextFile, Failure> {
-    let beside = [
-        args.out.as_deref(),
-        args.json.json.as_deref().filter(|p| *p != "-").map(Path::new),
-        args.report.as_deref(),
-    ];
-    let Some(beside) = beside.into_iter().flatten().next() else { return Ok(NextFile::default()) };
-    let path = beside.with_file_name("next.toml");
-    let sha256 = diagnosed.diagnosis.data.sha256.clone();
+) -> Result<Option<PathBuf>, Failure> {
+    let Some(path) = next_file(args) else { return Ok(None) };
     let Some(next) = &diagnosed.next else {
-        return Ok(NextFile { path: None, said: earlier(outputs, &path, &sha256)? });
-    };
-    if outputs.judge(&path).is_err() {
-        let note = format!(
-            "{} is not of a diagnosis, or was edited, and was left alone: the next pulls were not written",
-            path.display()
-        );
-        diagnosed.diagnosis.notes.push(note.clone());
-        return Ok(NextFile { path: None, said: Some(note) });
-    }
-    let text = next_toml(next, &args.measured, &args.twin, &sha256);
-    let planned = mark_of(&path).is_some_and(|mark| mark.verb == outputs.verb() && mark.whole);
-    let said = (path.exists() && !is_for(&path, &sha256)).then(|| match planned {
-        true => format!("{} was a plan for other measurements and was replaced", path.display()),
-        false => {
-            format!("{} was none of a diagnosis, or was edited, and was replaced (--force)", path.display())
+        let of_pulls = diagnosed.diagnosis.channel == Channel::Pulls;
+        if of_pulls && outputs.remove(&path)? && !args.talk.quiet {
+            eprintln!("removed {}: no pulls are left to make", path.display());
         }
-    });
-    outputs.write(&path, Format::Toml, text.as_bytes())?;
+        return Ok(None);
+    };
+    let text = next_toml(next, &args.measured, &args.twin, &diagnosed.diagnosis.data.sha256);
+    outputs.write(&path, text.as_bytes())?;
     let own = diagnosed.diagnosis.effects.iter_mut().filter(|e| next.separates(&e.name));
     for separate in own.filter_map(|e| e.separate_by.as_mut()) {
         separate.campaign = Some(path.display().to_string());
     }
-    Ok(NextFile { path: Some(path), said })
-}
-
-/// Whether a plan was made for these measurements.
-fn is_for(path: &Path, sha256: &str) -> bool {
-    let line = format!("# {}", made_for(sha256));
-    !sha256.is_empty()
-        && std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(|other| other == line))
-}
-
-/// What becomes of the next pulls of an earlier diagnosis where there are none to make.
-fn earlier(outputs: &Outputs, path: &Path, sha256: &str) -> Result<Option<String>, Failure> {
-    let Some(mark) = mark_of(path).filter(|mark| mark.verb == outputs.verb()) else { return Ok(None) };
-    let why = match (mark.whole, is_for(path, sha256)) {
-        (false, _) => "somebody edited it",
-        (_, false) => "it was not planned for these measurements as they are",
-        _ => {
-            outputs.remove_own(path)?;
-            let said = format!("removed {}: of these measurements no pulls are left to make", path.display());
-            return Ok((!path.exists()).then_some(said));
-        }
-    };
-    Ok(Some(format!("{} of an earlier diagnosis was left there: {why}", path.display())))
-}
-
-/// The line of a plan that tells which measurements it was made for.
-fn made_for(sha256: &str) -> String {
-    format!("Measurements: SHA-256 {sha256}")
+    Ok(Some(path))
 }
 
 /// The text of the next pulls; `twin` is the name of the one that was diagnosed.
 pub fn next_toml(next: &NextPulls, measured: &Path, twin: &str, sha256: &str) -> String {
     let about = format!(
-        "Planned by `gripgen diagnose` of {} with the twin {twin}.\n{}\n{}.\nKeys are described in docs/format.md. `gripgen rig pull` makes these pulls where there is a rig.toml; for any other rig they are a list.",
+        "Planned by `gripgen diagnose` of {} with the twin {twin}.\nMeasurements: SHA-256 {sha256}\n{}.\nKeys are described in docs/format.md. `gripgen rig pull` makes these pulls where there is a rig.toml; for any other rig they are a list.",
         measured.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
-        made_for(sha256),
         next.text(),
     );
     campaign_toml(&next.campaign, &about)
@@ -124,7 +75,7 @@ pub fn next_steps(args: &DiagnoseArgs, diagnosed: &Diagnosed, next: Option<&Path
     let found = matches!(diagnosis.verdict, Verdict::Effect | Verdict::Unknown);
     match &args.out {
         Some(out) if found => steps.push(sweep_step(args, out, diagnosis)),
-        None if found => steps.push(("Write the corrected twin:".into(), again(args))),
+        None if found => steps.push(("Write the corrected twin:".into(), again(args, next))),
         // Where pulls are planned already, another campaign is none of the next steps.
         _ if next.is_none() && plans_pulls(diagnosis) => {
             steps.push(("Plan pulls that can answer:".into(), plan_campaign(args)));
@@ -144,7 +95,7 @@ fn pulls_step(args: &DiagnoseArgs, next: &Path, plan: &NextPulls) -> (String, St
     let most_n = plan.campaign.pulls.iter().map(|pull| pull.grip_force_n).fold(0.0, f64::max);
     if let Some(rig) = rig_of(args, last, most_n) {
         let words = [program(), "rig", "pull", &shell::operand(&rig), "--campaign", &shell::path(next)];
-        let out = unused(Path::new("runs/next"));
+        let out = unused("runs/next", "");
         let rest = ["--after", &shell::path(last), "-o", &shell::path(&out)];
         let text = "Make the pulls that tell apart what these could not:";
         return (text.into(), shell::command_line(&[&words[..], &rest[..]].concat()));
@@ -181,7 +132,7 @@ fn sweep_step(args: &DiagnoseArgs, out: &Path, diagnosis: &Diagnosis) -> (String
     };
     match sweep {
         Some(sweep) => {
-            let out_folder = unused(Path::new("runs/corrected"));
+            let out_folder = unused("runs/corrected", "");
             let mut words = vec![program(), "sweep", &sweep, "--set", &set];
             let project =
                 Project::load(&Location::parse(&sweep), &[("twin".into(), out.display().to_string())]).ok();
@@ -224,8 +175,8 @@ fn not_pulled(project: &Project, diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// The same diagnosis again, with the twin written.
-fn again(args: &DiagnoseArgs) -> String {
+/// The same diagnosis again, with the twin written. The plan that was just written is the same again.
+fn again(args: &DiagnoseArgs, next: Option<&Path>) -> String {
     let mut words = vec![program().to_string(), "diagnose".into(), shell::path(&args.measured)];
     for also in &args.also {
         words.extend(["--also".into(), shell::path(also)]);
@@ -240,15 +191,16 @@ fn again(args: &DiagnoseArgs) -> String {
     if !args.without.is_empty() {
         words.extend(["--without".into(), args.without.join(",")]);
     }
-    let outputs = Outputs::of("diagnose", false).reads(&args.measured).reads_config(&args.twin, &args.set);
-    words.extend(["-o".into(), shell::path(&writable(&outputs, "diagnosed"))]);
+    words.extend(["-o".into(), shell::path(&unused("diagnosed", ".toml"))]);
+    if next == Some(Path::new("next.toml")) {
+        words.push("--force".into());
+    }
     shell::command_line(&words)
 }
 
 /// A first campaign of the parts of the twin.
 fn plan_campaign(args: &DiagnoseArgs) -> String {
-    let outputs = Outputs::of("campaign", false).reads_config(&args.twin, &args.set);
-    let out = shell::path(&writable(&outputs, "campaign"));
+    let out = shell::path(&unused("campaign", ".toml"));
     let mut words = vec![program().to_string(), "campaign".into(), "-o".into(), out];
     words.extend(twin_words(&args.twin, &args.set, args.rig.as_deref()));
     shell::command_line(&words)
@@ -269,20 +221,11 @@ pub fn twin_words(twin: &str, set: &[(String, String)], rig: Option<&str>) -> Ve
     words
 }
 
-/// `STEM.toml`, or the first of `STEM-2.toml` and so on that a verb may write.
-fn writable(outputs: &Outputs, stem: &str) -> PathBuf {
-    let plain = PathBuf::from(format!("{stem}.toml"));
-    let numbered = (2..=MOST).map(|k| PathBuf::from(format!("{stem}-{k}.toml")));
-    std::iter::once(plain.clone()).chain(numbered).find(|at| outputs.judge(at).is_ok()).unwrap_or(plain)
-}
-
-/// A folder, or the first with a number behind its name that is not there.
-fn unused(folder: &Path) -> PathBuf {
-    let numbered = (2..=MOST).map(|k| PathBuf::from(format!("{}-{k}", folder.display())));
-    std::iter::once(folder.to_path_buf())
-        .chain(numbered)
-        .find(|at| !at.exists())
-        .unwrap_or_else(|| folder.into())
+/// `STEM.END`, or the first with a number behind its stem that does not exist.
+fn unused(stem: &str, end: &str) -> PathBuf {
+    let plain = PathBuf::from(format!("{stem}{end}"));
+    let numbered = (2..=MOST).map(|k| PathBuf::from(format!("{stem}-{k}{end}")));
+    std::iter::once(plain.clone()).chain(numbered).find(|at| !at.exists()).unwrap_or(plain)
 }
 
 #[cfg(test)]

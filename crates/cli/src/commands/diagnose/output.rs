@@ -4,10 +4,8 @@ use super::next::{next_steps, write_next};
 use super::notes::deciding;
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
-use crate::outputs::Outputs;
-use crate::posterior;
+use crate::outputs::{Outputs, draws_of};
 use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, PosteriorFile, Verdict};
 use gripgen::twin::rounded;
 use gripgen::{Diagnosed, Location, diagnosis_page};
@@ -26,7 +24,7 @@ pub fn write(
         diagnosed.report.title = args.measured.display().to_string();
     }
     let next = write_next(args, outputs, &mut diagnosed)?;
-    let draws = args.out.as_deref().and_then(posterior::beside);
+    let draws = args.out.as_deref().and_then(draws_of);
     if let (Some(draws), Some(posterior)) = (draws.as_deref().and_then(Path::file_name), &diagnosed.posterior)
     {
         let file = draws.to_string_lossy().into_owned();
@@ -34,12 +32,12 @@ pub fn write(
     }
     if let Some(out) = &args.out {
         let text = edited_twin_toml(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out);
-        posterior::write(outputs, out, &text.map_err(Failure::new)?, diagnosed.posterior.as_ref())?;
+        outputs.write_twin(out, &text.map_err(Failure::new)?, diagnosed.posterior.as_ref())?;
     }
     // The twin is there: what its sweep has to vary depends on it.
-    diagnosed.report.next = next_steps(args, &diagnosed, next.path.as_deref());
+    diagnosed.report.next = next_steps(args, &diagnosed, next.as_deref());
     if let Some(report) = &args.report {
-        outputs.write(report, Format::Html, diagnosis_page(&diagnosed).as_bytes())?;
+        outputs.write(report, diagnosis_page(&diagnosed).as_bytes())?;
     }
     if sink.wanted() {
         let value = serde_json::to_value(&diagnosed.diagnosis).map_err(Failure::new)?;
@@ -60,14 +58,11 @@ pub fn write(
             (&args.out, "the twin"),
             (&draws, "its posterior"),
             (&args.report, "the report"),
-            (&next.path, "the next pulls"),
+            (&next, "the next pulls"),
         ] {
             if let Some(path) = path {
                 eprintln!("{what}: {}", path.display());
             }
-        }
-        if let Some(said) = &next.said {
-            eprintln!("{said}");
         }
     }
     Ok(0)

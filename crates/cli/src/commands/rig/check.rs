@@ -18,7 +18,7 @@ const MIN_FREE: u64 = 2_000_000_000;
 
 /// Runs the verb.
 pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("rig check", args.json.force).reads_config(&args.rig, &args.set);
+    let mut outputs = Outputs::new(args.json.force).reads_config(&args.rig, &args.set);
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&args.rig, &args.set)?;
     let rehearsal = args.rehearsal.as_deref().map(load).transpose()?;

@@ -43,7 +43,7 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
     })?;
     let pulls: Vec<&PlannedPull> = campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).collect();
     let out = folder_of(args);
-    let mut outputs = Outputs::of("rig pull", args.json.force)
+    let mut outputs = Outputs::new(args.json.force)
         .reads_config(&args.rig, &args.set)
         .reads_all(&args.campaign)
         .reads_all(&args.after)

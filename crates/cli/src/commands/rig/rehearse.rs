@@ -5,7 +5,6 @@ use super::programs::judged;
 use crate::args::RigRehearseArgs;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::{VERSION, plain_campaign};
@@ -19,7 +18,7 @@ use std::time::SystemTime;
 
 /// Runs the verb.
 pub fn run(args: &RigRehearseArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("rig rehearse", args.json.force).reads_config(&args.rig, &args.set);
+    let mut outputs = Outputs::new(args.json.force).reads_config(&args.rig, &args.set);
     outputs.allow(&args.out)?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&args.rig, &args.set)?;
@@ -77,7 +76,7 @@ pub fn run(args: &RigRehearseArgs) -> Result<u8, Failure> {
     };
     let mut text = serde_json::to_string_pretty(&stored).map_err(Failure::new)?;
     text.push('\n');
-    outputs.write(&args.out, Format::Json, text.as_bytes())?;
+    outputs.write(&args.out, text.as_bytes())?;
     sink.document(&serde_json::to_value(&stored).map_err(Failure::new)?)?;
     if !sink.on_stdout() {
         print(&page(&stored))?;

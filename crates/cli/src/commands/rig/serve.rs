@@ -5,7 +5,6 @@ use super::teach::taught;
 use crate::args::RigServeArgs;
 use crate::failure::Failure;
 use crate::interrupt::stop_flag;
-use crate::mark::Format;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::{Location, TwinPlant};
@@ -29,7 +28,7 @@ const LOOK: Duration = Duration::from_millis(100);
 
 /// Runs the verb.
 pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
-    let mut outputs = Outputs::of("rig serve", args.json.force).reads_config(&args.twin, &args.set);
+    let mut outputs = Outputs::new(args.json.force).reads_config(&args.twin, &args.set);
     outputs.allow_all(args.write_rig.as_deref())?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let plant = TwinPlant::open(&Location::parse(&args.twin), &args.set, args.seed)?;
@@ -51,7 +50,7 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     let addresses = rig.addresses();
     // Before the line that says ready: who waits for that line finds the file.
     if let Some(path) = &args.write_rig {
-        outputs.write(path, Format::Toml, rig_toml(&addresses, &fixtures)?.as_bytes())?;
+        outputs.write(path, rig_toml(&addresses, &fixtures)?.as_bytes())?;
     }
     if sink.wanted() {
         let of = |(what, address): (&str, SocketAddr)| (what.to_string(), json!(address.to_string()));

@@ -16,7 +16,7 @@ use toml_edit::{Array, DocumentMut, Item, Table, value};
 pub fn run(args: &RigTeachArgs) -> Result<u8, Failure> {
     let path = args.rig.display().to_string();
     // The rig's file is read and changed in its place: that is what it is for. All else is left alone.
-    let mut outputs = Outputs::of("rig teach", args.json.force).reads_config(&path, &args.set);
+    let mut outputs = Outputs::new(args.json.force).reads_config(&path, &args.set);
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&path, &args.set)?;
     let pose = read_pose(&config)

@@ -159,51 +159,22 @@ fn forces_in_another_unit_are_no_reason_for_a_campaign() {
     assert!(command.is_empty() && text.contains("in newtons"), "{text}: {command}");
 }
 
-/// Of the plans beside the outputs only that of the same measurements goes, if nobody edited it.
+/// A plan of an earlier diagnosis is replaced only with `--force`, and goes where there are no pulls to make.
 #[test]
-fn an_earlier_plan_goes_only_with_its_own_measurements() {
+fn an_earlier_plan_is_replaced_or_goes_with_force() {
     let folder = tempfile::tempdir().unwrap();
     let (out, next) = (folder.path().join("d.toml"), folder.path().join("next.toml"));
-    let args = typed(&["lab", "-o", out.to_str().unwrap()]);
-    let outputs = Outputs::of("diagnose", false);
-    let own = |sha256: &str| next_toml(&plan(), Path::new("lab"), "t.toml", sha256);
-    let said = || {
-        let file = write_next(&args, &outputs, &mut answered(Verdict::None, &[])).unwrap();
-        assert!(file.path.is_none());
-        file.said.unwrap_or_default()
-    };
-    assert_eq!(said(), "", "there is none");
-    outputs.write(&next, Format::Toml, own("cd34").as_bytes()).unwrap();
-    assert!(said().contains("was left there: it was not planned for these"), "{}", said());
-    outputs.write(&next, Format::Toml, own("ab12").as_bytes()).unwrap();
-    let text = std::fs::read_to_string(&next).unwrap();
-    std::fs::write(&next, format!("{text}\n# mine\n")).unwrap();
-    assert!(said().contains("somebody edited it") && next.is_file());
-    std::fs::write(&next, text).unwrap();
-    assert!(said().starts_with("removed ") && !next.exists());
-    std::fs::write(&next, "pulls = []\n").unwrap();
-    assert!(said().is_empty() && next.is_file(), "somebody's own");
-}
-
-/// A plan for other measurements that a new one takes the place of is told.
-#[test]
-fn a_plan_that_is_replaced_is_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("d.toml");
-    let args = typed(&["lab", "-o", out.to_str().unwrap()]);
-    let outputs = Outputs::of("diagnose", false);
-    let said = |sha256: &str| {
+    let args = typed(&["lab", "-o", out.to_str().unwrap(), "-q"]);
+    let write = |force: bool, plan: Option<NextPulls>| {
         let mut found = answered(Verdict::Effect, &[]);
-        (found.diagnosis.data.sha256, found.next) = (sha256.into(), Some(plan()));
-        write_next(&args, &outputs, &mut found).unwrap().said.unwrap_or_default()
+        found.next = plan;
+        write_next(&args, &Outputs::new(force), &mut found).map_err(|e| e.message())
     };
-    assert_eq!((said("ab12"), said("ab12")), (String::new(), String::new()));
-    assert!(said("cd34").ends_with("next.toml was a plan for other measurements and was replaced"));
-    std::fs::write(folder.path().join("next.toml"), "pulls = []\n").unwrap();
-    assert!(said("cd34").contains("were not written"), "somebody's own");
-    let forced = Outputs::of("diagnose", true);
-    let mut found = answered(Verdict::Effect, &[]);
-    found.next = Some(plan());
-    let said = write_next(&args, &forced, &mut found).unwrap().said.unwrap_or_default();
-    assert!(said.ends_with("was none of a diagnosis, or was edited, and was replaced (--force)"), "{said}");
+    assert_eq!(write(false, Some(plan())), Ok(Some(next.clone())));
+    let text = std::fs::read_to_string(&next).unwrap();
+    assert!(text.contains("# Measurements: SHA-256 ab12\n"), "{text}");
+    assert!(write(false, Some(plan())).is_err());
+    assert_eq!((write(false, None), next.is_file()), (Ok(None), true));
+    assert_eq!((write(true, Some(plan())), next.is_file()), (Ok(Some(next.clone())), true));
+    assert_eq!((write(true, None), next.is_file()), (Ok(None), false));
 }

@@ -3,46 +3,31 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
 // Planning a campaign, and making it on a twin.
-#[path = "cli/campaign.rs"]
 mod campaign;
 // What is said of a configuration.
-#[path = "cli/check.rs"]
 mod check;
 // The catalogue of effects.
-#[path = "cli/effects.rs"]
 mod effects;
 // Files to start from.
-#[path = "cli/init.rs"]
 mod init;
 // A page of what is under way.
-#[path = "cli/live.rs"]
 mod live;
 // Calibrating a sensor and comparing with it.
-#[path = "cli/measured.rs"]
 mod measured;
-#[path = "cli/presses.rs"]
 mod presses;
 // Measured pulls in other units than they seem to be.
-#[path = "cli/pull_units.rs"]
 mod pull_units;
 // A rig whose devices tell half the truth.
-#[path = "cli/rig_doubts.rs"]
 mod rig_doubts;
 // Faults in the middle of a campaign of a rig.
-#[path = "cli/rig_faults.rs"]
 mod rig_faults;
 // The loop over the wire.
-#[path = "cli/rig_loop.rs"]
 mod rig_loop;
 // Runs of a rig.
-#[path = "cli/rig_run.rs"]
 mod rig_run;
-#[path = "cli/rig_served.rs"]
 mod rig_served;
-#[path = "cli/rig_verbs.rs"]
 mod rig_verbs;
 // Parts at a glance.
-#[path = "cli/try_part.rs"]
 mod try_part;
 
 use std::collections::BTreeMap;
@@ -95,10 +80,16 @@ fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
+/// A folder of this name that is not there yet, in one that goes with the test.
+fn unmade(name: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join(name);
+    (folder, out)
+}
+
 /// A finished run of the small sweep.
 fn reference() -> (tempfile::TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (folder, out) = unmade("run");
     let output = run(&sweep_args(out.to_str().unwrap(), &["--jobs", "2"]));
     assert_code(&output, 0);
     (folder, out)
@@ -106,8 +97,7 @@ fn reference() -> (tempfile::TempDir, PathBuf) {
 
 #[test]
 fn standard_output_is_data_and_standard_error_is_talk() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (_folder, out) = unmade("run");
     let output = run(&sweep_args(out.to_str().unwrap(), &[]));
     assert_code(&output, 0);
     assert_eq!(text(&output.stdout), format!("{}\n", out.display()));
@@ -122,8 +112,7 @@ fn standard_output_is_data_and_standard_error_is_talk() {
 
 #[test]
 fn json_is_one_event_a_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (folder, out) = unmade("run");
     let output = run(&sweep_args(out.to_str().unwrap(), &["--json"]));
     assert_code(&output, 0);
     let events: Vec<serde_json::Value> =
@@ -188,8 +177,7 @@ fn another_run_in_the_folder_is_exit_code_3() {
 
 #[test]
 fn failed_samples_are_exit_code_4_and_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (_folder, out) = unmade("run");
     // The laws of the paper's twin refuse below 20 N.
     let paper = ["--set", "twin=\"asset:configs/twin.toml\"", "--set", "vary.grip_force_n=[10, 20, 30]"];
     let output = run(&sweep_args(out.to_str().unwrap(), &paper));
@@ -203,8 +191,7 @@ fn failed_samples_are_exit_code_4_and_are_named() {
 #[cfg(unix)]
 #[test]
 fn a_shard_that_does_not_fit_says_where_and_leaves_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (_folder, out) = unmade("run");
     let arguments = sweep_args(out.to_str().unwrap(), &["-q", "--jobs", "1"]);
     // With the signal ignored, writing past the limit is an error like any other.
     let limited = Command::new("sh")
@@ -320,8 +307,7 @@ fn a_killed_run_continues_to_the_same_bytes() {
         ("after the third shard", Box::new(shard(2))),
     ];
     for (what, moment) in moments {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("run");
+        let (_folder, out) = unmade("run");
         let mut child = spawn(&out);
         wait_until(&mut child, || moment(&out));
         child.kill().unwrap();
@@ -329,8 +315,7 @@ fn a_killed_run_continues_to_the_same_bytes() {
         assert_continues_to(&out, &expected, what);
     }
     // Killed several times in a row.
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (_folder, out) = unmade("run");
     for round in 0..4 {
         let mut child = spawn(&out);
         wait_until(&mut child, || out.join(format!("shard-0000{round}.mcap.partial")).exists());
@@ -346,8 +331,7 @@ fn a_killed_run_continues_to_the_same_bytes() {
 fn ctrl_c_finishes_what_is_under_way() {
     let (_folder, out) = reference();
     let expected = content(&out);
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (_folder, out) = unmade("run");
     let mut child = spawn(&out);
     wait_until(&mut child, || out.join("shard-00000.mcap.partial").exists());
     let signal = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
@@ -365,8 +349,7 @@ fn ctrl_c_finishes_what_is_under_way() {
 fn two_processes_in_one_folder_make_one_run() {
     let (_folder, out) = reference();
     let expected = content(&out);
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (folder, out) = unmade("run");
     let events = [folder.path().join("a.json"), folder.path().join("b.json")];
     let mut children = events.clone().map(|file| {
         let mut command = gripgen();
@@ -400,7 +383,7 @@ fn info_show_and_export_read_a_run() {
     assert_code(&shown, 0);
     assert_eq!(&std::fs::read(&picture).unwrap()[..4], b"\x89PNG");
     assert_code(&run(&["show", out, "24"]), 2);
-    let shown = run(&["show", out, "5", "-o", picture.to_str().unwrap(), "--json"]);
+    let shown = run(&["show", out, "5", "-o", picture.to_str().unwrap(), "--json", "--force"]);
     let json: serde_json::Value = serde_json::from_slice(&shown.stdout).unwrap();
     assert_eq!((&json["sample"], json["file"].as_str()), (&5.into(), picture.to_str()));
     assert!(run(&["info", out, "-q"]).stdout.is_empty());
@@ -408,7 +391,7 @@ fn info_show_and_export_read_a_run() {
     let one = folder.path().join("one.mcap");
     assert_code(&run(&["export", out, "--sample", "7", "-o", one.to_str().unwrap()]), 0);
     assert_eq!(&std::fs::read(&one).unwrap()[1..5], b"MCAP");
-    let quiet = run(&["export", out, "--sample", "7", "-o", one.to_str().unwrap(), "-q"]);
+    let quiet = run(&["export", out, "--sample", "7", "-o", one.to_str().unwrap(), "-q", "--force"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty());
     let foreign = run(&["info", folder.path().to_str().unwrap()]);
     assert_code(&foreign, 1);
@@ -445,8 +428,7 @@ fn a_reader_that_hangs_up_is_no_failure() {
 /// Without the adapter that is named there is one line, a hint, and no output.
 #[test]
 fn a_missing_graphics_adapter_is_one_clear_error() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
+    let (_folder, out) = unmade("run");
     let missing = ["--set", "backend=gpu", "--set", "gpu_adapter=no such adapter"];
     let sweep = run(&sweep_args(out.to_str().unwrap(), &missing));
     let bench = run(&["bench", "--backend", "gpu", "--adapter", "no such adapter"]);
