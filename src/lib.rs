@@ -132,7 +132,7 @@ pub use library::{Library, LibraryError};
 pub use live::live_page;
 pub use location::{Location, ReadFileError};
 pub use measured::{
-    ImplausibleLabels, LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls, load_pulls_of,
+    BAG_HINT, ImplausibleLabels, LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls, load_pulls_of,
     load_pulls_with,
 };
 pub use mesh_file::MeshFileError;

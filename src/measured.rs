@@ -1,6 +1,5 @@
-//! Measured pulls from wherever they are: a folder with a table, a run folder, or recordings of ROS 2.
+//! Measured pulls from wherever they are: a folder with a table, or a run folder.
 
-mod bags;
 mod left_out;
 mod runs;
 mod suspects;
@@ -12,8 +11,8 @@ pub use suspects::Suspects;
 pub use units::ImplausibleLabels;
 
 use gripgen_record::{
-    FolderError, JudgedPulls, PULLS_FILE, PullFolderError, RIG_SOURCE, ReadError, RosbagError, RunFolder,
-    Standing, is_rosbag, read_judged_pulls, sha256_hex,
+    FolderError, JudgedPulls, PULLS_FILE, PullFolderError, RIG_SOURCE, ReadError, RunFolder, Standing,
+    read_judged_pulls, sha256_hex,
 };
 use gripgen_twin::{ExtraColumn, MeasuredPulls};
 use left_out::LeftOut;
@@ -48,9 +47,12 @@ pub enum LoadPullsError {
     /// A shard of it.
     #[error(transparent)]
     Shard(#[from] ReadError),
-    /// Recordings of ROS 2.
-    #[error(transparent)]
-    Bags(#[from] RosbagError),
+    /// Recordings of ROS, which the Python package reads.
+    #[error("{}: bags of ROS are read by the Python package", .path.display())]
+    Bag {
+        /// The bag, or its mapping.
+        path: PathBuf,
+    },
     /// Folders whose labels mean different things.
     #[error(
         "{}: its labels are taken with {other_n} N and {:.1} mm, those of the first folder with {tolerance_n} N and {:.1} mm",
@@ -89,20 +91,30 @@ pub enum LoadPullsError {
 impl LoadPullsError {
     /// What to do about it, where that is known.
     pub fn hint(&self) -> Option<&str> {
-        match self {
-            Self::Bags(e) if !e.hint.is_empty() => Some(&e.hint),
-            _ => None,
-        }
+        matches!(self, Self::Bag { .. }).then_some(BAG_HINT)
     }
 }
 
-/// Whether a path holds pulls that [`load_pulls`] reads.
-pub fn is_pulls(path: &Path) -> bool {
-    path.join(PULLS_FILE).is_file() || path.join("run.json").is_file() || is_rosbag(path)
+/// How bags of ROS become measured pulls.
+pub const BAG_HINT: &str =
+    "`pip install 'gripgen[bags]'`, then `gripgen import BAG -o FOLDER` makes a folder of measured pulls";
+
+/// Whether a path is a recording of ROS, a folder of them, or their mapping.
+fn is_bag(path: &Path) -> bool {
+    if path.is_dir() {
+        return path.join("rosbag.toml").is_file() || path.join("metadata.yaml").is_file();
+    }
+    let of_run = path.with_file_name("run.json").is_file();
+    let recording = path.extension().is_some_and(|end| ["mcap", "db3", "bag"].iter().any(|e| end == *e));
+    path.is_file() && (path.ends_with("rosbag.toml") || recording && !of_run)
 }
 
-/// Loads measured pulls: a run folder of a sweep or of a rig if there is a `run.json`, else a folder with `pulls.csv`, else
-/// bags of ROS 2.
+/// Whether a path holds pulls that [`load_pulls`] reads, or bags, of which it says how they are read.
+pub fn is_pulls(path: &Path) -> bool {
+    path.join(PULLS_FILE).is_file() || path.join("run.json").is_file() || is_bag(path)
+}
+
+/// Loads measured pulls: a run folder of a sweep or of a rig if there is a `run.json`, else a folder with `pulls.csv`.
 ///
 /// Of a run folder, pulls without a slip (failed, without contact, censored) are left out and counted in the notes, and so
 /// are those whose label rule is not that of the first. Its covariates are those stored with each sample; what a sweep
@@ -120,9 +132,10 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     if path.join("run.json").is_file() {
         return load_run(path, suspects);
     }
-    let is_bag = !path.join(PULLS_FILE).is_file() && is_rosbag(path);
-    let JudgedPulls { pulls, standing, mut warnings } =
-        if is_bag { bags::judged_bags(path)? } else { read_judged_pulls(path)? };
+    if !path.join(PULLS_FILE).is_file() && is_bag(path) {
+        return Err(LoadPullsError::Bag { path: path.into() });
+    }
+    let JudgedPulls { pulls, standing, every_reading, mut warnings } = read_judged_pulls(path)?;
     let mut left_out = LeftOut { rig: false, ..LeftOut::default() };
     standing.iter().for_each(|s| left_out.count(s.status));
     let ids: Vec<&str> = pulls.pulls.iter().map(|p| p.id.as_str()).collect();
@@ -138,14 +151,8 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     if implausible.is_none() {
         warnings.extend(units::warnings(path, &pulls.pulls));
     }
-    if is_bag {
-        if pulls.pulls.iter().all(|pull| pull.trace.is_none()) {
-            notes.push(
-                "nobody recorded how the tool moved (topics.pose, topics.joint_states): traces are not used"
-                    .into(),
-            );
-        }
-        // As those of a run: every reading is there.
+    if every_reading {
+        // As those of a run.
         pulls.pulls.iter_mut().for_each(|pull| pull.trace = pull.trace.as_ref().map(thinned));
         fewer_traces(&mut pulls.pulls, &mut notes);
     }

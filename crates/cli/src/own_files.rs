@@ -2,18 +2,17 @@
 
 use crate::mark::mark_of;
 use gripgen::CONTACT_SHEET;
-use gripgen::record::{
-    CAMPAIGN_FILE, IMPRINTS_FILE, PRESSES_FILE, PULLS_FILE, ROSBAG_FILE, SENSOR_FILE, TRACES_FOLDER,
-};
+use gripgen::record::{CAMPAIGN_FILE, IMPRINTS_FILE, PRESSES_FILE, PULLS_FILE, SENSOR_FILE, TRACES_FOLDER};
 use std::ffi::OsStr;
 use std::path::Path;
 
 /// Folder of the images of pulls.
 pub const IMAGES_FOLDER: &str = "images";
 /// Other names of the table of presses, that of imprints, and the mapping of bags.
-const OTHER_TABLES: [&str; 3] = ["shapes.csv", "imprints.csv", ROSBAG_FILE];
+const OTHER_TABLES: [&str; 3] = ["shapes.csv", "imprints.csv", "rosbag.toml"];
 /// Endings of what tables of measurements refer to.
-const DATA: [&str; 11] = ["png", "jpg", "jpeg", "csv", "npy", "npz", "stl", "obj", "ply", "glb", "mcap"];
+const DATA: [&str; 13] =
+    ["png", "jpg", "jpeg", "csv", "npy", "npz", "stl", "obj", "ply", "glb", "mcap", "db3", "bag"];
 
 /// What a file belongs to, or would belong to if it were written; `None` where it is nobody's.
 ///

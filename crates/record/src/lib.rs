@@ -38,7 +38,6 @@ mod pulls;
 mod reader;
 mod rig_log;
 mod rig_run;
-mod rosbag;
 mod sensor_table;
 mod shard;
 mod stored;
@@ -83,10 +82,6 @@ pub use rig_run::{
     FAILED_FOLDER, FrameView, RigCampaign, RigFilm, RigFrame, RigPull, RigPullError, RigResult, RigRunError,
     RigRunInfo, create_rig_run, discard_failed, failed_pulls, missing_pulls, rig_campaign, suspect_pulls,
     write_rig_pull,
-};
-pub use rosbag::{
-    BagCell, BagClock, BagForce, BagImages, BagMotion, BagPull, BagTopics, ROSBAG_FILE, RosbagError,
-    RosbagFile, TipOfJoints, is_rosbag, read_judged_bags,
 };
 pub use sensor_table::{SENSOR_FILE, SensorTable, read_sensor_table};
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};

@@ -9,19 +9,18 @@ mod tests;
 mod trace;
 mod write;
 
-pub(crate) use cells::DEFAULT_STEP_S;
 pub use images::{PullImages, PullImagesError, pulls_with_images, read_pull_images};
-pub(crate) use standing::judge_labels;
 pub use standing::{JudgedPulls, Standing};
 pub use write::write_pull_folder;
 
 use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, LabelEvidenceKind, parse_header};
 use crate::proto::gripgen_v1::Status;
 use crate::table::{TableError, TableReader, read_bytes};
-use cells::{Cells, Column};
+use cells::{Cells, Column, DEFAULT_STEP_S};
 use gripgen_twin::config::PullFile;
 use gripgen_twin::{Covariates, ExtraColumn, MeasuredPull, MeasuredPulls};
 use sha2::{Digest, Sha256};
+use standing::judge_labels;
 use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::Path;
@@ -87,7 +86,7 @@ pub fn read_judged_pulls(folder: &Path) -> Result<JudgedPulls, PullFolderError> 
     if header.label_evidence == LabelEvidenceKind::Trace {
         judge_labels(&found, &after_n, &mut standing);
     }
-    Ok(JudgedPulls { pulls: found, standing, warnings })
+    Ok(JudgedPulls { pulls: found, standing, every_reading: header.every_reading, warnings })
 }
 
 /// What holds for all pulls, and what in its file means nothing.
@@ -122,7 +121,7 @@ fn trace_files(folder: &Path) -> Result<HashSet<String>, TableError> {
 }
 
 /// Reads a table of pulls from its content; `path` is for errors.
-pub(crate) fn read_table(
+fn read_table(
     path: &Path,
     bytes: &[u8],
     header: &CampaignHeader,
@@ -196,13 +195,13 @@ fn extra_column(column: Column) -> Option<ExtraColumn> {
 }
 
 /// Adds a file to the hash: its name, its length, its content.
-pub(crate) fn feed(hash: &mut Sha256, name: &str, bytes: &[u8]) {
+fn feed(hash: &mut Sha256, name: &str, bytes: &[u8]) {
     hash.update(name.as_bytes());
     hash.update([0]);
     hash.update((bytes.len() as u64).to_le_bytes());
     hash.update(bytes);
 }
 
-pub(crate) fn hex(digest: &[u8]) -> String {
+fn hex(digest: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -4,7 +4,7 @@ use crate::args::InfoArgs;
 use crate::failure::Failure;
 use crate::load::{no_pulls, say_warnings};
 use crate::output::{JsonSink, count, print};
-use gripgen::record::{PULLS_FILE, ROSBAG_FILE};
+use gripgen::record::PULLS_FILE;
 use gripgen::{Level, levels, load_pulls_of};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ pub fn levels_table(parts: &BTreeMap<String, Vec<Level>>) -> String {
     text
 }
 
-/// A folder with pulls.csv, or bags of ROS 2.
+/// A folder with pulls.csv.
 pub fn run(args: &InfoArgs, mut sink: JsonSink) -> Result<u8, Failure> {
     let folder = [args.run.as_path()];
     let loaded = load_pulls_of(&folder).map_err(|e| no_pulls(&folder, &e))?;
@@ -58,8 +58,6 @@ pub fn run(args: &InfoArgs, mut sink: JsonSink) -> Result<u8, Failure> {
         labels.iter().map(|(name, labels)| (name.clone(), levels(labels))).collect();
     let traces = measured.pulls.iter().filter(|p| p.trace.is_some()).count();
     let extra: Vec<&str> = measured.extra.iter().map(|e| e.name.as_str()).collect();
-    let table = args.run.join(PULLS_FILE).is_file();
-    let source = if table { PULLS_FILE } else { ROSBAG_FILE };
     if sink.wanted() {
         let part = |(name, labels): (&String, &Vec<(f64, f64)>)| {
             let each = || labels.iter().map(|l| l.1);
@@ -71,7 +69,7 @@ pub fn run(args: &InfoArgs, mut sink: JsonSink) -> Result<u8, Failure> {
             (name.clone(), value)
         };
         sink.document(&json!({
-            "schema": "gripgen.info/1", "source": source, "samples": measured.pulls.len(), "traces": traces,
+            "schema": "gripgen.info/1", "source": PULLS_FILE, "samples": measured.pulls.len(), "traces": traces,
             "recorded": measured.recorded, "further_columns": extra, "sha256": measured.sha256,
             "label_tolerance_n": measured.label_tolerance_n, "stop_mm": 1e3 * measured.stop_m,
             "parts": labels.iter().map(part).collect::<serde_json::Map<_, _>>(),
