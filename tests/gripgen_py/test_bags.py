@@ -270,7 +270,7 @@ def test_joints_move_the_tool_where_there_is_no_pose(known_lab, tmp_path):
 
 def test_without_a_pose_labels_are_used_and_traces_are_not(known_lab, tmp_path):
     found = read(known_lab, tmp_path, MAPPING.replace('pose = "/pose"\n', ""))
-    assert (found.traces, found.status) == (0, {"slipped": 1}) and "how the tool moved" in found.notes[0]
+    assert (found.traces, found.status) == (0, {"slipped": 1}) and "motion of the tool" in found.notes[0]
     assert float(table(found.out)[0]["max_pull_force_n"]) == pytest.approx(8.0, abs=1e-12)
     assert not (found.out / "traces").exists()
 
@@ -567,6 +567,7 @@ def test_the_command_line_of_the_wheel(known_lab, tmp_path):
         ((tmp_path / "none", "-o", tmp_path / "x"), "there is no such file or folder"),
         ((known_lab, "-o", known_lab, "--force"), "the bags are in this folder"),
         ((known_lab, "-o", answer, "--force"), "this is a file"),
+        ((known_lab, "-o", tmp_path / "x", "--force", "--json", known_lab / "one/one.mcap"), "it belongs to the bags"),
         ((known_lab, "-o", ROOT / "assets/campaigns/example", "--force"), "was not made of bags"),
     ):
         done = imported(*arguments)
@@ -606,7 +607,7 @@ def test_the_binary_says_who_reads_bags(known_lab, tmp_path):
     assert protected.returncode == 2 and "belongs to the measurements" in protected.stderr
 
 
-reported = pytest.mark.skipif(not REPORTS.is_dir(), reason="the folder of shared reports is not beside the checkout")
+reported = pytest.mark.skipif(not REPORTS.is_dir(), reason="the folder of shared reports is not next to the checkout")
 
 
 @reported

@@ -129,12 +129,12 @@ def mapping_of(path: Path) -> Path | None:
     """Where the mapping of a bag or of a folder of bags is, or ought to be; None for what is no bag."""
     of_run = (path / "run.json" if path.is_dir() else path.parent / "run.json").is_file()
     if path.is_dir():
-        inside, beside = path / ROSBAG_FILE, path.parent / ROSBAG_FILE
+        inside, above = path / ROSBAG_FILE, path.parent / ROSBAG_FILE
         is_bag = (path / "metadata.yaml").is_file()
         if inside.is_file() or not is_bag:
             loose = not of_run and any(p.suffix in SUFFIXES for p in path.iterdir())
             return inside if inside.is_file() or loose else None
-        return beside if beside.is_file() else inside
+        return above if above.is_file() else inside
     if path.name == ROSBAG_FILE:
         return path
     return path.parent / ROSBAG_FILE if path.suffix in SUFFIXES and not of_run else None

@@ -125,7 +125,7 @@ def _reader(path: Path) -> Iterator[tuple[Any, Any]]:
     except ImportError as e:
         raise unreadable(f"{path}: reading bags needs rosbags", "pip install 'gripgen[bags]'") from e
     is1 = path.suffix == ".bag"
-    # The types that are read are the same in all versions of ROS 2, so that no definition of a bag is looked at.
+    # The types that are read are the same in all versions of ROS 2, so the definitions in a bag are not needed.
     store = get_typestore(Stores.ROS1_NOETIC if is1 else Stores.ROS2_HUMBLE)
     try:
         with (rosbag1.Reader if is1 else rosbag2.Reader)(path) as reader:
@@ -225,7 +225,7 @@ class _Topic:
         return ()
 
     def series(self, path: Path) -> Series:
-        """All of it in the order of time. Of readings of one time the first counts, of commands the last: it was sent after the others."""
+        """All of it in the order of time. Of equal times the first reading counts, and the last command."""
         if not self.ns:
             wanted, there = ", ".join(self.mapping.motion.joints), ", ".join(sorted(self.joints))
             raise self.bad(path, f"no message has the joints {wanted}; there are {there}")

@@ -33,7 +33,7 @@ MADE = "# gripgen import"
 #: What a folder of pulls of bags holds.
 _PARTS = ("pulls.csv", "campaign.toml", "traces", "images")
 _TRACE = ("time_s", "desired_force_n", "measured_force_n", "displacement_mm")
-#: Increment and length of a step where nobody wrote them down (docs/format.md).
+#: Default increment and length of a step (docs/format.md).
 _INCREMENT_N, _STEP_S = 1.0, 0.104
 _MOST_STEPS = 1e6
 #: How much of a pull the readings may miss at its ends.
@@ -68,7 +68,7 @@ class _Pull:
     trace: NDArray[np.float64]
     #: The same without a load after the pull.
     after: NDArray[np.float64]
-    #: Somebody recorded how the tool moved.
+    #: The motion of the tool was recorded.
     moved: bool
     label_n: float | None
     status: str
@@ -88,8 +88,8 @@ def read_bag(
     """Make a folder of measured pulls (pulls.csv, campaign.toml, traces, images) of ROS bags. Needs `gripgen[bags]`.
 
     `path` is a bag (ROS 1, or ROS 2 as MCAP or sqlite3), a folder with `rosbag.toml`, or that file, which says what the topics
-    are and when the pulls were made; `mapping` is that file where it is neither inside the bag nor beside it. Without `out` the
-    folder is a temporary one that goes when Python ends. `force` makes a folder again that was made of bags.
+    are and when the pulls were made; `mapping` is that file where it is neither in the bag nor in its folder. Without `out`
+    the folder is a temporary one that goes when Python ends. `force` makes a folder again that was made of bags.
     `progress` is called with bags read and bags in all; True prints them, None prints on a terminal only.
 
     Raises ConfigError for a mapping or an argument that cannot be, DataError for a bag that cannot be read or is not clear.
@@ -101,10 +101,10 @@ def read_bag(
     if of_bag is None:
         hint = f"name a folder with {ROSBAG_FILE}, or a bag: a folder with metadata.yaml, an .mcap, .db3 or .bag"
         raise refusal(f"{path}: neither a bag nor a mapping of bags", hint)
-    beside = path.parent if path == of_bag else path
+    bag = path.parent if path == of_bag else path
     if not of_bag.is_file():
-        raise _no_mapping(of_bag, beside)
-    read = read_mapping(of_bag, beside)
+        raise _no_mapping(of_bag, bag)
+    read = read_mapping(of_bag, bag)
     if out is None:
         out = tempfile.mkdtemp(prefix="gripgen-bag-")
         atexit.register(shutil.rmtree, out, ignore_errors=True)
@@ -123,7 +123,7 @@ def read_bag(
 
 
 def _no_mapping(mapping: Path, bag: Path) -> Exception:
-    """A bag that nobody described: what is in it, and how a description begins."""
+    """The error of a bag without a mapping: its topics, and how a mapping begins."""
     try:
         topics = topics_of(bag)
     except DataError as e:
@@ -182,6 +182,8 @@ def _fill(folder: Path, mapping: BagMapping, tell: Callable[[int, int], None] | 
             except _Fault as e:
                 raise unreadable(f"{mapping.path}: pulls[{i}] (`{marked.id}`, {marked.bag}): {e}", e.hint) from e
             _write_trace(folder, marked, rows[i])
+            # The traces of all bags together may be large.
+            rows[i].trace = rows[i].after = np.zeros((0, 4))
             wanted |= {folder / "images" / f"{marked.id}_{name}.png": place for name, place in rows[i].images.items()}
         if wanted:
             (folder / "images").mkdir(exist_ok=True)
@@ -190,7 +192,7 @@ def _fill(folder: Path, mapping: BagMapping, tell: Callable[[int, int], None] | 
             tell(done, len(bags))
     _write_table(folder, mapping, [rows[i] for i in range(len(mapping.pulls))])
     still = sum(not pull.moved for pull in rows.values())
-    unmoved = f"nobody recorded how the tool moved (topics.pose, topics.joint_states): {still} pulls have no trace"
+    unmoved = f"the motion of the tool was not recorded (topics.pose, topics.joint_states): {still} pulls have no trace"
     return [unmoved] if still else []
 
 
@@ -288,7 +290,7 @@ def _read(signals: Signals, marks: Marks, begin: int, end: int) -> _Pull:
 
 
 def _places(signals: Signals, begin: int, end: int) -> Callable[[NDArray[np.int64]], NDArray[np.float64]] | None:
-    """Where the tool is along the pull at given times, m; None where nobody recorded it."""
+    """Where the tool is along the pull at given times, m; None where it was not recorded."""
     key = next((key for key in ("pose", "joint_states") if key in signals.series), None)
     if key is None:
         return None
@@ -382,7 +384,7 @@ def _write_table(folder: Path, mapping: BagMapping, pulls: list[_Pull]) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["pull_id", *names, *stated, "max_pull_force_n"])
         for marked, pull in zip(mapping.pulls, pulls, strict=True):
-            # What somebody wrote down of the pull is known better than what its readings say of it.
+            # A status in the mapping takes precedence over the one from the readings.
             own = [marked.marks.text(name) for name in stated]
             status = own if own[0] else [pull.status, pull.reason]
             label = "" if pull.label_n is None else plain(pull.label_n)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ._core import GripgenError
+from .bag_mapping import ROSBAG_FILE
 from .bags import BagSummary, read_bag
 from .checks import refusal
 
@@ -20,7 +21,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gripgen import",
         description="Make a folder of measured pulls of ROS bags: ROS 1, or ROS 2 as MCAP or sqlite3.",
-        epilog="Examples:\n  gripgen import lab-bags -o lab\n  gripgen import lab-bags/monday.bag --mapping rosbag.toml -o monday --force",
+        epilog="Examples:\n  gripgen import lab-bags -o lab\n  gripgen import monday.bag --mapping rosbag.toml -o monday --force",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
@@ -40,6 +41,9 @@ def run(arguments: Sequence[str]) -> int:
         answer = None if args.json in (None, "-") else Path(args.json)
         if answer is not None and answer.exists() and not args.force:
             raise refusal(f"{answer}: it is there already", "--force replaces it")
+        of_bag = [p.resolve() for p in (args.bag, args.mapping) if p is not None]
+        if answer is not None and (answer.name == ROSBAG_FILE or {*of_bag} & {answer.resolve(), *answer.resolve().parents}):
+            raise refusal(f"{answer}: it belongs to the bags", "name another file")
         found = read_bag(args.bag, args.mapping, out=args.out, force=args.force, progress=not args.quiet)
         if args.json:
             text = json.dumps(_document(found), indent=2) + "\n"
