@@ -30,6 +30,7 @@ static FILES: &[(&str, &[u8])] = embedded![
     "parts/gear/part.stl",
     "parts/long_shaft/part.stl",
     "parts/roller_bearing/part.stl",
+    "schemas/rosbag.json",
     "sensors/gelsight_r15/sensor.npz",
     "templates/benchmark-sweep.toml",
     "templates/benchmark-twin.toml",

@@ -224,9 +224,6 @@ fn configs(folder: &Path) -> Vec<(&'static str, String)> {
     let campaign = "label_tolerance_n = 3.0\nstop_mm = 5.0\ngrip_force_means = \"per_jaw\"\n[[pulls]]\npart = \"gear\"\ngrip_force_n = 20\n\
                     force_increment_n = 1.0\nstep_time_s = 0.104\ndwell_s = 1.0\n[[pulls]]\nkind = \"no_load\"\ndwell_s = 5\n"
         .to_string();
-    let mapping = "[topics]\nwrench = \"/wrench\"\npose = \"/pose\"\n[force]\nalong = [0, 0, -1]\ntare = true\n[defaults]\npart = \"gear\"\n\
-                   no_load_s = [0.5, 1.5]\nstep_time_s = 0.104\n[[pulls]]\nbag = \"no/bag\"\ngrip_force_n = 40.0\nhumidity_pct = 41\n"
-        .to_string();
     let posterior = "weight,cause,parts.gear.mu\n0.4,none,0.2\n0.6,wear,0.21\n".to_string();
     vec![
         ("sweep", sweep),
@@ -234,7 +231,6 @@ fn configs(folder: &Path) -> Vec<(&'static str, String)> {
         ("shipped twin", own),
         ("campaign", campaign),
         ("posterior", posterior),
-        ("mapping of bags", mapping),
     ]
 }
 
@@ -250,7 +246,6 @@ fn changed_configurations_never_panic() {
         let file = at(match kind {
             "sweep" => "sweep.toml",
             "twin" => "twin.toml",
-            "mapping of bags" => "rosbag.toml",
             _ => "other.toml",
         });
         std::fs::write(&file, bytes).unwrap();
@@ -263,11 +258,6 @@ fn changed_configurations_never_panic() {
             "shipped twin" => load_twin_document(&Location::Disk(file), &[])
                 .map_err(|e| said(&e))
                 .and_then(|document| document.read_twin().map(drop).map_err(|e| said(&e))),
-            // Its bag is not there, which is said once the mapping itself is right.
-            "mapping of bags" => match load_pulls(&file).map(|_| ()).map_err(|e| said(&e)) {
-                Err(problem) if problem.contains("no/bag") => Ok(()),
-                other => other,
-            },
             "campaign" => read_campaign(&file).map(drop).map_err(|e| said(&e)),
             _ => Posterior::parse(&String::from_utf8_lossy(bytes)).map(drop).map_err(|e| said(&e)),
         }

@@ -45,6 +45,8 @@ pub enum Command {
     View(ViewArgs),
     /// Write a run in another format (Parquet, WebDataset, LeRobot), or one sample as a file of its own with every reading.
     Export(ExportArgs),
+    /// Make a folder of measured pulls of ROS bags; with the Python package.
+    Import(ImportArgs),
     /// Fit a sensor file to measurements.
     #[command(subcommand)]
     Calibrate(CalibrateCommand),
@@ -153,7 +155,7 @@ pub struct SweepArgs {
 #[derive(Debug, Args)]
 #[command(after_help = crate::examples::INFO)]
 pub struct InfoArgs {
-    /// A run folder, a folder with pulls.csv, or a bag of ROS 2 with rosbag.toml.
+    /// A run folder, or a folder with pulls.csv.
     pub run: PathBuf,
     /// JSON.
     #[command(flatten)]
@@ -259,6 +261,15 @@ pub enum ExportFormat {
     Webdataset,
 }
 
+/// `gripgen import`: the Python package has its arguments.
+#[derive(Debug, Args)]
+#[command(after_help = crate::examples::IMPORT)]
+pub struct ImportArgs {
+    /// A bag, a folder with rosbag.toml, or that file; the folder to write behind -o.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    pub arguments: Vec<std::ffi::OsString>,
+}
+
 /// `gripgen calibrate`
 #[derive(Debug, Subcommand)]
 pub enum CalibrateCommand {
@@ -302,7 +313,7 @@ pub struct CalibratePressesArgs {
 #[derive(Debug, Args)]
 #[command(after_help = crate::examples::COMPARE)]
 pub struct CompareArgs {
-    /// Pulls: a run folder, a folder with pulls.csv, or a bag of ROS 2; images that they have are compared too. Presses: Taxim's dataPack.npz, or
+    /// Pulls: a run folder, or a folder with pulls.csv; images that they have are compared too. Presses: Taxim's dataPack.npz, or
     /// a folder with presses.csv and images. A force-sensor table: a folder with sensor.csv. Imprints: a folder with imprints.csv.
     pub measured: PathBuf,
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.

@@ -31,12 +31,14 @@ pub const EXPORT: &str = "Examples:
   gripgen export runs/quickstart --to lerobot -o quickstart-lerobot
   gripgen export runs/quickstart --to webdataset -o train-%05d.tar
   gripgen export runs/quickstart --sample 3 -o three.mcap";
+pub const IMPORT: &str = "Examples:
+  gripgen import lab-bags -o lab";
 pub const CALIBRATE_PRESSES: &str = "Examples:
   gripgen calibrate presses presses --ball-mm 4 --mm-per-px 0.0877 -o my.npz
   gripgen calibrate presses dataPack.npz -o sensor.npz";
 pub const CALIBRATE_PULLS: &str = "Examples:
   gripgen calibrate pulls measured -o fitted.toml
-  gripgen calibrate pulls rosbag.toml -o fitted.toml
+  gripgen calibrate pulls monday --also tuesday -o fitted.toml
   gripgen calibrate pulls measured --law offset -o fitted.toml";
 pub const CALIBRATE_SENSOR: &str = "Examples:
   gripgen calibrate sensor two_sensors -o fitted.toml";
@@ -48,7 +50,7 @@ pub const COMPARE: &str = "Examples:
 pub const DIAGNOSE: &str = "Examples:
   gripgen diagnose measured
   gripgen diagnose measured -o diagnosed.toml --report report.html
-  gripgen diagnose lab-bags --twin fitted.toml";
+  gripgen diagnose lab --twin fitted.toml";
 pub const RENDER: &str = "Examples:
   gripgen render part.stl --depth-mm 0.5 --sensor sensor.npz -o part.png
   gripgen render heights.npy --sensor sensor.npz -o ridges.png";
@@ -114,6 +116,6 @@ mod tests {
             }
             verbs += 1;
         }
-        assert_eq!(verbs, 26, "a new verb gets an example");
+        assert_eq!(verbs, 27, "a new verb gets an example");
     }
 }

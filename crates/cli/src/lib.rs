@@ -124,6 +124,10 @@ fn execute(cli: &Cli) -> Result<u8, Failure> {
         Command::Show(args) => commands::show::run(args),
         Command::View(args) => commands::view::run(args),
         Command::Export(args) => commands::export::run(args),
+        Command::Import(_) => {
+            let said = "`gripgen import` is in the Python package, which reads bags of ROS";
+            Err(Failure::usage(said).hint(gripgen::BAG_HINT))
+        }
         Command::Calibrate(CalibrateCommand::Presses(args)) => commands::calibrate_presses::run(args),
         Command::Calibrate(CalibrateCommand::Pulls(args)) => commands::calibrate_pulls::run(args),
         Command::Calibrate(CalibrateCommand::Imprints(args)) => commands::calibrate_imprints::run(args),

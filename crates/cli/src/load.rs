@@ -55,11 +55,13 @@ pub fn suspects(include: bool) -> Suspects {
 }
 
 /// What measurements are.
-const MEASUREMENTS: &str = "measurements are a folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, a bag of ROS 2 with rosbag.toml, or a dataPack.npz";
+const MEASUREMENTS: &str = "measurements are a folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, or a dataPack.npz";
 
 /// What cannot be read as pulls.
 pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
-    // A bag of ROS 2 may be one file.
+    if let Some(hint) = e.hint() {
+        return Failure::usage(e).hint(hint);
+    }
     let table = |path: &&&Path| {
         path.is_file() && path.extension().is_some_and(|end| OF_TABLES.iter().any(|e| end == *e))
     };
@@ -74,8 +76,8 @@ pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
 const OF_TABLES: [&str; 3] = ["csv", "toml", "json"];
 
 /// Files of a folder of measurements that people name in its place.
-const OF_A_FOLDER: [&str; 7] =
-    ["pulls.csv", "sensor.csv", "presses.csv", "imprints.csv", "campaign.toml", "rosbag.toml", "run.json"];
+const OF_A_FOLDER: [&str; 6] =
+    ["pulls.csv", "sensor.csv", "presses.csv", "imprints.csv", "campaign.toml", "run.json"];
 
 /// A file where a folder of measurements is wanted.
 fn a_file(path: &Path) -> Failure {

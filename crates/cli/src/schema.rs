@@ -1,7 +1,7 @@
 //! JSON Schemas of the configuration files.
 
+use gripgen::assets;
 use gripgen_measured::CampaignFile;
-use gripgen_record::RosbagFile;
 use gripgen_twin::DEFAULTED_SECTIONS;
 use gripgen_twin::config::{SweepFile, TwinFile};
 use serde_json::Value;
@@ -16,9 +16,9 @@ pub fn campaign_schema() -> Value {
     schemars::schema_for!(CampaignFile).to_value()
 }
 
-/// Schema of `rosbag.toml`.
+/// Schema of `rosbag.toml`, which the Python package reads.
 pub fn rosbag_schema() -> Value {
-    schemars::schema_for!(RosbagFile).to_value()
+    serde_json::from_str(assets::text("schemas/rosbag.json")).unwrap_or_default()
 }
 
 /// Schema of `twin.toml`. Sections that fall back to the baseline twin, and their keys, may be left out.

@@ -26,6 +26,9 @@ pub struct CampaignHeader {
     /// Whether the traces say anything of the labels.
     #[serde(skip_serializing_if = "LabelEvidenceKind::is_trace")]
     pub label_evidence: LabelEvidenceKind,
+    /// The traces hold every reading of the sensor, as those of a run: a diagnosis takes one each 10 ms, and not of all pulls.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub every_reading: bool,
 }
 
 /// What the labels of a campaign may be judged by.
@@ -54,6 +57,7 @@ impl Default for CampaignHeader {
             stop_mm: 5.0,
             feedback: None,
             label_evidence: LabelEvidenceKind::Trace,
+            every_reading: false,
         }
     }
 }

@@ -35,7 +35,7 @@ pub use imprint_table::{
     IMPRINTS_FILE, ImprintTable, MeasuredImprint, read_imprint_picture, read_imprint_table,
 };
 pub use load::{
-    ImplausibleLabels, LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls, load_pulls_of,
+    BAG_HINT, ImplausibleLabels, LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls, load_pulls_of,
     load_pulls_with,
 };
 pub use press_columns::{PressColumn, PressColumns, load_press_columns};

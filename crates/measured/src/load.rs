@@ -17,6 +17,7 @@ use left_out::LeftOut;
 use runs::load_run;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use traces::{fewer_traces, thinned};
 
 /// Measured pulls, and remarks for people: what was left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,6 +45,12 @@ pub enum LoadPullsError {
     /// A shard of it.
     #[error(transparent)]
     Shard(#[from] ReadError),
+    /// Recordings of ROS, which the Python package reads.
+    #[error("{}: bags of ROS are read by the Python package", .path.display())]
+    Bag {
+        /// The bag, or its mapping.
+        path: PathBuf,
+    },
     /// Folders whose labels mean different things.
     #[error(
         "{}: its labels are taken with {other_n} N and {:.1} mm, those of the first folder with {tolerance_n} N and {:.1} mm",
@@ -79,9 +86,30 @@ pub enum LoadPullsError {
     },
 }
 
-/// Whether a path holds pulls that [`load_pulls`] reads.
+impl LoadPullsError {
+    /// What to do about it, where that is known.
+    pub fn hint(&self) -> Option<&str> {
+        matches!(self, Self::Bag { .. }).then_some(BAG_HINT)
+    }
+}
+
+/// How bags of ROS become measured pulls.
+pub const BAG_HINT: &str =
+    "`pip install 'gripgen[bags]'`, then `gripgen import BAG -o FOLDER` makes a folder of measured pulls";
+
+/// Whether a path is a recording of ROS, a folder of them, or their mapping.
+fn is_bag(path: &Path) -> bool {
+    if path.is_dir() {
+        return path.join("rosbag.toml").is_file() || path.join("metadata.yaml").is_file();
+    }
+    let of_run = path.with_file_name("run.json").is_file();
+    let recording = path.extension().is_some_and(|end| ["mcap", "db3", "bag"].iter().any(|e| end == *e));
+    path.is_file() && (path.ends_with("rosbag.toml") || recording && !of_run)
+}
+
+/// Whether a path holds pulls that [`load_pulls`] reads, or bags, of which it says how they are read.
 pub fn is_pulls(path: &Path) -> bool {
-    path.join(PULLS_FILE).is_file() || path.join("run.json").is_file()
+    path.join(PULLS_FILE).is_file() || path.join("run.json").is_file() || is_bag(path)
 }
 
 /// Loads measured pulls: a run folder of a sweep or of a rig if there is a `run.json`, else a folder with `pulls.csv`.
@@ -102,7 +130,10 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     if path.join("run.json").is_file() {
         return load_run(path, suspects);
     }
-    let JudgedPulls { pulls, standing, mut warnings } = read_judged_pulls(path)?;
+    if !path.join(PULLS_FILE).is_file() && is_bag(path) {
+        return Err(LoadPullsError::Bag { path: path.into() });
+    }
+    let JudgedPulls { pulls, standing, every_reading, mut warnings } = read_judged_pulls(path)?;
     let mut left_out = LeftOut { rig: false, ..LeftOut::default() };
     standing.iter().for_each(|s| left_out.count(s.status));
     let ids: Vec<&str> = pulls.pulls.iter().map(|p| p.id.as_str()).collect();
@@ -117,6 +148,11 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     let implausible = units::implausible(path, &pulls.pulls);
     if implausible.is_none() {
         warnings.extend(units::warnings(path, &pulls.pulls));
+    }
+    if every_reading {
+        // As those of a run.
+        pulls.pulls.iter_mut().for_each(|pull| pull.trace = pull.trace.as_ref().map(thinned));
+        fewer_traces(&mut pulls.pulls, &mut notes);
     }
     notes.extend(zero::without_shift(&mut pulls));
     Ok(LoadedPulls { pulls, notes, warnings, implausible })

@@ -9,7 +9,6 @@ mod tests;
 mod trace;
 mod write;
 
-use cells::DEFAULT_STEP_S;
 pub use images::{PullImages, pulls_with_images, read_pull_images};
 use standing::judge_labels;
 pub use standing::{JudgedPulls, Standing};
@@ -18,10 +17,11 @@ pub use write::write_pull_folder;
 use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, LabelEvidenceKind, parse_header};
 use gripgen_record::proto::gripgen_v1::Status;
 use crate::table::{TableError, TableReader, read_bytes};
-use cells::{Cells, Column};
+use cells::{Cells, Column, DEFAULT_STEP_S};
 use gripgen_twin::config::PullFile;
 use gripgen_twin::{Covariates, ExtraColumn, MeasuredPull, MeasuredPulls};
 use sha2::{Digest, Sha256};
+use standing::judge_labels;
 use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::Path;
@@ -87,7 +87,7 @@ pub fn read_judged_pulls(folder: &Path) -> Result<JudgedPulls, PullFolderError> 
     if header.label_evidence == LabelEvidenceKind::Trace {
         judge_labels(&found, &after_n, &mut standing);
     }
-    Ok(JudgedPulls { pulls: found, standing, warnings })
+    Ok(JudgedPulls { pulls: found, standing, every_reading: header.every_reading, warnings })
 }
 
 /// What holds for all pulls, and what in its file means nothing.

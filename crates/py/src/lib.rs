@@ -17,6 +17,8 @@ mod sweep;
 mod values;
 
 use gripgen::VERSION;
+use gripgen::physics::ArmModel;
+use numpy::{PyArray, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use std::ffi::OsString;
 
@@ -34,6 +36,24 @@ fn run_verb(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
     py.detach(|| gripgen_cli::try_run(all)).map_err(|e| error::failure(py, &e))
 }
 
+/// Where the tool of a UR5e is in its base, float64[N, 3] in m, for joint angles float64[N, 6] in rad from base to tool.
+#[pyfunction]
+fn ur5e_tool_m<'py>(
+    py: Python<'py>,
+    joints_rad: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let urdf = gripgen::assets::read("robots/ur5e/ur5e.urdf").unwrap_or_default();
+    let arm = ArmModel::from_urdf(&String::from_utf8_lossy(&urdf), "tool0", &|_| None)
+        .map_err(|e| error::argument(py, &e.to_string(), None))?;
+    let mut tool_m = Vec::new();
+    for joints_rad in joints_rad.as_array().rows() {
+        let at = arm.base_from_tip(&joints_rad.to_vec()).translation;
+        tool_m.extend([at.x, at.y, at.z]);
+    }
+    let rows = tool_m.len() / 3;
+    PyArray::from_vec(py, tool_m).reshape([rows, 3])
+}
+
 #[pymodule(gil_used = false)]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", VERSION)?;
@@ -49,6 +69,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<pulls::Pulls>()?;
     module.add_function(wrap_pyfunction!(run_cli, module)?)?;
     module.add_function(wrap_pyfunction!(run_verb, module)?)?;
+    module.add_function(wrap_pyfunction!(ur5e_tool_m, module)?)?;
     module.add_function(wrap_pyfunction!(render::render, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::sweep, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::contact_sheet_shards, module)?)?;

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = crate::examples::CALIBRATE_PULLS)]
 pub struct CalibratePullsArgs {
-    /// A folder with pulls.csv, a run folder, or a bag of ROS 2 with rosbag.toml.
+    /// A folder with pulls.csv, or a run folder.
     pub measured: PathBuf,
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]
@@ -108,7 +108,7 @@ pub enum ConstantOf {
 #[derive(Debug, Args)]
 #[command(after_help = crate::examples::DIAGNOSE)]
 pub struct DiagnoseArgs {
-    /// A folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, a bag of ROS 2 with rosbag.toml, or a dataPack.npz.
+    /// A folder with pulls.csv, sensor.csv, presses.csv or imprints.csv, a run folder, or a dataPack.npz.
     pub measured: PathBuf,
     /// Of pulls: a folder that was measured later on the same rig; may be given many times.
     #[arg(long, value_name = "FOLDER")]

@@ -7,7 +7,7 @@ use gripgen_twin::columns::{COLUMNS, Column as PullColumn, InTable};
 use std::borrow::Cow;
 
 /// Length of a step where nobody wrote it down: the mean of Wucherer et al. 2023.
-pub(crate) const DEFAULT_STEP_S: f64 = 0.104;
+pub(super) const DEFAULT_STEP_S: f64 = 0.104;
 
 const ID: &str = "pull_id";
 pub(super) const LABEL: &str = "max_pull_force_n";

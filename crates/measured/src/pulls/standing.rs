@@ -15,6 +15,8 @@ pub struct JudgedPulls {
     pub pulls: MeasuredPulls,
     /// How each of them stands.
     pub standing: Vec<Standing>,
+    /// Their traces hold every reading of the sensor.
+    pub every_reading: bool,
     /// What was not read and may be misspelt, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -58,7 +60,7 @@ pub(super) fn stated(columns: &[Column], pulls: &mut [MeasuredPull]) -> Result<V
 }
 
 /// Judges the labels of pulls with a trace; `after_n` are their readings without a load after the pull.
-pub(crate) fn judge_labels(measured: &MeasuredPulls, after_n: &[Vec<f64>], standing: &mut [Standing]) {
+pub(super) fn judge_labels(measured: &MeasuredPulls, after_n: &[Vec<f64>], standing: &mut [Standing]) {
     let every_reading = labels_are_rows(measured, standing);
     for ((pull, after_n), standing) in measured.pulls.iter().zip(after_n).zip(standing) {
         let censored = standing.status == Status::Censored;

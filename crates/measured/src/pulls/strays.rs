@@ -9,8 +9,15 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// Keys of a campaign file.
-const KEYS: [&str; 6] =
-    ["force_convention", "label_tolerance_n", "stop_mm", "feedback", "label_evidence", "pulls"];
+const KEYS: [&str; 7] = [
+    "force_convention",
+    "label_tolerance_n",
+    "stop_mm",
+    "feedback",
+    "label_evidence",
+    "every_reading",
+    "pulls",
+];
 
 /// Units that people write behind numbers.
 const UNITS: [&str; 18] =

@@ -15,6 +15,7 @@ Units stand in the names: `_n` newton, `_mm` millimetre, `_s` second, `_deg` deg
 from importlib.util import find_spec as _find_spec
 
 from ._core import ConfigError, DataError, GripgenError, __version__
+from .bags import BagSummary, read_bag
 from .dataset import Batch, Dataset, Sample, load
 from .films import Film
 from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, diagnose
@@ -25,6 +26,7 @@ from .streams import FilmBatch, Stream, StreamBatch, stream
 from .sweeps import SweepSummary, sweep
 
 __all__ = [
+    "BagSummary",
     "Batch",
     "Calibration",
     "Comparison",
@@ -48,6 +50,7 @@ __all__ = [
     "compare",
     "diagnose",
     "load",
+    "read_bag",
     "render",
     "stream",
     "sweep",

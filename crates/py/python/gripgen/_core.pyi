@@ -22,6 +22,7 @@ __all__ = [
     "run_cli",
     "run_verb",
     "sweep",
+    "ur5e_tool_m",
 ]
 
 __version__: str
@@ -149,3 +150,4 @@ def prepare_run(
     config: str, out: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None
 ) -> tuple[int, int]: ...
 def contact_sheet_shards(out: str | os.PathLike[str]) -> list[int]: ...
+def ur5e_tool_m(joints_rad: NDArray[np.float64]) -> NDArray[np.float64]: ...

@@ -1,8 +1,8 @@
 //! Images of measured pulls, from a folder of files or from the shards of a run.
 
 use super::press::Seen;
-use gripgen_measured::{PULLS_FILE, pulls_with_images, read_pull_images};
-use gripgen_record::{BagImages, Dataset, DatasetError, PullImagesError, RosbagError, is_rosbag};
+use gripgen_measured::{pulls_with_images, read_pull_images};
+use gripgen_record::{Dataset, DatasetError, PictureFileError};
 use gripgen_twin::PerJaw;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -13,10 +13,7 @@ use std::path::{Path, PathBuf};
 pub enum ImprintImagesError {
     /// Files beside a table.
     #[error(transparent)]
-    Files(#[from] PullImagesError),
-    /// Recordings of ROS 2.
-    #[error(transparent)]
-    Bags(#[from] RosbagError),
+    Files(#[from] PictureFileError),
     /// A run.
     #[error(transparent)]
     Run(#[from] DatasetError),
@@ -34,8 +31,6 @@ pub(crate) enum ImageSource {
     Files(PathBuf, BTreeSet<String>),
     /// The samples of a run; ids are their indices.
     Run(Box<Dataset>),
-    /// Images of bags.
-    Bags(BagImages),
 }
 
 impl ImageSource {
@@ -43,16 +38,12 @@ impl ImageSource {
         if folder.join("run.json").is_file() {
             return Ok(Self::Run(Box::new(Dataset::open(folder)?)));
         }
-        if !folder.join(PULLS_FILE).is_file() && is_rosbag(folder) {
-            return Ok(Self::Bags(BagImages::open(folder)?));
-        }
         Ok(Self::Files(folder.into(), pulls_with_images(folder)?))
     }
 
     pub(crate) fn has(&self, id: &str) -> bool {
         match self {
             Self::Files(_, ids) => ids.contains(id),
-            Self::Bags(images) => images.has(id),
             Self::Run(samples) => samples.image_size_px().is_some() && samples.row_of(id).is_some(),
         }
     }
@@ -62,10 +53,6 @@ impl ImageSource {
         match self {
             Self::Files(folder, _) => {
                 let images = read_pull_images(folder, id)?;
-                Ok(Seen { grip: images.grip, rest: images.rest, grip_pose: None })
-            }
-            Self::Bags(images) => {
-                let images = images.read(id)?;
                 Ok(Seen { grip: images.grip, rest: images.rest, grip_pose: None })
             }
             Self::Run(samples) => {
