@@ -126,7 +126,7 @@ fn execute(cli: &Cli) -> Result<u8, Failure> {
         Command::Export(args) => commands::export::run(args),
         Command::Import(_) => {
             let said = "`gripgen import` is in the Python package, which reads bags of ROS";
-            Err(Failure::usage(said).hint(gripgen::BAG_HINT))
+            Err(Failure::usage(said).hint(gripgen_measured::BAG_HINT))
         }
         Command::Calibrate(CalibrateCommand::Presses(args)) => commands::calibrate_presses::run(args),
         Command::Calibrate(CalibrateCommand::Pulls(args)) => commands::calibrate_pulls::run(args),

@@ -10,7 +10,6 @@ mod trace;
 mod write;
 
 pub use images::{PullImages, pulls_with_images, read_pull_images};
-use standing::judge_labels;
 pub use standing::{JudgedPulls, Standing};
 pub use write::write_pull_folder;
 

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::load::{no_pulls, say_warnings};
 use crate::output::{JsonSink, count, print, size};
 use crate::outputs::Outputs;
-use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE, ROSBAG_FILE, RunFolder};
+use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE, RunFolder};
 use gripgen_measured::PULLS_FILE;
 use gripgen_identify::{Level, levels};
 use gripgen_measured::{is_pulls, load_pulls_of};
@@ -142,11 +142,9 @@ fn pulls(args: &InfoArgs, mut sink: JsonSink) -> Result<u8, Failure> {
     let by_level = levels_of(&parts);
     let traces = measured.pulls.iter().filter(|p| p.trace.is_some()).count();
     let extra: Vec<&str> = measured.extra.iter().map(|e| e.name.as_str()).collect();
-    let table = args.run.join(PULLS_FILE).is_file();
-    let source = if table { PULLS_FILE } else { ROSBAG_FILE };
     if sink.wanted() {
         sink.document(&json!({
-            "schema": "gripgen.info/1", "source": source, "samples": measured.pulls.len(), "traces": traces,
+            "schema": "gripgen.info/1", "source": PULLS_FILE, "samples": measured.pulls.len(), "traces": traces,
             "recorded": measured.recorded, "further_columns": extra, "sha256": measured.sha256,
             "label_tolerance_n": measured.label_tolerance_n, "stop_mm": 1e3 * measured.stop_m,
             "parts": parts_json(&parts, &by_level),

@@ -1,6 +1,5 @@
 //! What a command reads: files, the data of folders, and what configurations name.
 
-use gripgen::record::ROSBAG_FILE;
 use gripgen_measured::CAMPAIGN_FILE;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +22,7 @@ fn is_data_of(folder: &Path, path: &Path) -> bool {
     let is_data = DATA.iter().any(|ending| name.ends_with(ending)) && !name.ends_with(".posterior.csv");
     path.starts_with(folder)
         && !folder.join("run.json").is_file()
-        && (is_data || [CAMPAIGN_FILE, ROSBAG_FILE].contains(&&*name))
+        && (is_data || [CAMPAIGN_FILE, "rosbag.toml"].contains(&&*name))
 }
 
 #[cfg(unix)]
