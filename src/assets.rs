@@ -33,15 +33,10 @@ static FILES: &[(&str, &[u8])] = embedded![
     "sensors/gelsight_r15/sensor.npz",
     "templates/benchmark-sweep.toml",
     "templates/benchmark-twin.toml",
-    "templates/diagnosis.html",
-    "templates/live.html",
-    "templates/page.css",
     "templates/part-sweep.toml",
     "templates/part-twin.toml",
-    "templates/presses.html",
     "templates/sweep.toml",
     "templates/twin.toml",
-    "templates/view.html",
 ];
 
 /// The content of an embedded file.

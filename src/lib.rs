@@ -49,7 +49,6 @@ mod campaign;
 mod catalogue;
 mod compare;
 mod compare_images;
-mod compare_report;
 mod diagnose;
 mod expect;
 mod film;
@@ -60,9 +59,7 @@ mod hold;
 mod imprint;
 mod imprint_set;
 mod init;
-mod levels;
 mod library;
-mod live;
 mod location;
 mod measured;
 mod mesh_file;
@@ -74,13 +71,10 @@ mod plant;
 mod predict;
 mod predictive;
 mod press_columns;
-mod press_report;
 mod presses;
 mod priors;
 mod project;
-mod ratio;
 mod render;
-mod report;
 mod resolve;
 mod rig_run;
 mod sample;
@@ -94,7 +88,6 @@ mod twin_project;
 mod unmeasured;
 mod unvaried;
 mod version;
-mod view;
 
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use beyond::{Beyond, beyond};
@@ -103,9 +96,8 @@ pub use campaign::{SimulateCampaignError, simulate_campaign};
 pub use catalogue::{EffectCurve, effect_curve};
 pub use compare::{LabelErrors, PullComparison, compare_pulls, compare_pulls_with};
 pub use compare_images::{CompareImagesError, ImageComparison, ImageScore, compare_images};
-pub use compare_report::{pull_comparison_page, pull_ratios};
 pub use diagnose::{
-    MeasuredPresses, NextPulls, PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions,
+    Diagnosed, MeasuredPresses, NextPulls, PressCovariate, PressDiagnosisInput, PressValues, PullDiagnoseOptions,
     calibrate_imprint_table, calibrate_sensor_table, compare_imprint_table, compare_sensor_table,
     diagnose_imprint_table, diagnose_measured_presses, diagnose_presses, diagnose_pull_table,
     diagnose_sensor_table, given_model, imprint_calibration_edits, is_sensor_table, load_sensor_table,
@@ -125,11 +117,9 @@ pub use imprint::{
 pub use imprint_set::{ImprintSet, LoadImprintsError, imprint_data, is_imprint_set, load_imprint_set};
 pub use init::{
     BenchmarkStarter, InitError, NoGrip, PartOptions, PartStarter, Proposal, StarterFile, Varied,
-    benchmark_starter, part_starter, starter,
+    benchmark_starter, part_starter, rasterise, starter,
 };
-pub use levels::{Level, levels};
 pub use library::{Library, LibraryError};
-pub use live::live_page;
 pub use location::{Location, ReadFileError};
 pub use measured::{
     ImplausibleLabels, LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls, load_pulls_of,
@@ -138,38 +128,26 @@ pub use measured::{
 pub use mesh_file::MeshFileError;
 pub use paper::{PaperError, PaperReport, paper_report};
 pub use parallel::in_parallel;
-pub use picture::{
-    CONTACT_SHEET, PictureSampleError, contact_sheet, contact_sheet_samples, publish_contact_sheet,
-    sample_picture,
-};
 pub use plan::{Plan, Probe, TriedGrip, plan};
 pub use plant::{Fixture, OpenPlantError, TwinPlant};
 pub use predict::PullPredictor;
 pub use predictive::posterior_twins;
 pub use press_columns::{PressColumns, load_press_columns, presses_sha256};
-pub use press_report::{PressMap, PressReportText, press_report};
 pub use presses::{
     FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_circles_with_sensor,
     find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor,
 };
 pub use priors::{pull_priors, shipped_priors};
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
-pub use ratio::{PartRatio, RatioFit};
 pub use render::{RenderError, RenderOptions, is_height_map, render_file, render_surface};
-pub use report::{
-    Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, diagnosis_page,
-};
 pub use rig_run::{plain_campaign, rig_run_differences, rig_run_toml};
 pub use sample::{SampleError, SimulateOptions};
 pub use schema::{campaign_schema, rosbag_schema, sweep_schema, twin_schema};
 pub use simulator::{Draw, Simulator};
 pub use stream::{SampleStream, StreamError, StreamOptions, Streamed, StreamedSample};
 pub use sweep::{SweepError, SweepEvent, SweepOptions, SweepSummary, prepare_run, run_info, sweep};
-pub use try_part::{
-    FrictionRange, GripTried, Holding, TriedPart, TryOptions, TryPartError, WorksAt, try_part,
-};
+pub use try_part::{TryOptions, TryPartError, try_part};
 pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, edited_twin_toml, write_twin};
 pub use unmeasured::unmeasured;
 pub use unvaried::{Unvaried, unvaried};
 pub use version::VERSION;
-pub use view::{ViewOptions, ViewPage, view_page};

@@ -3,7 +3,9 @@
 use crate::common::{jobs, project, run};
 use gripgen::twin::Twin;
 use gripgen::{BASELINE_TWIN, Library, Location};
-use gripgen::{compare_pulls, load_pulls, load_twin_document, pull_comparison_page, pull_ratios};
+use gripgen::identify::pull_ratios;
+use gripgen::{compare_pulls, load_pulls, load_twin_document};
+use gripgen_report::{ComparedPulls, pull_comparison_page};
 
 /// Pulls of the paper's twin, taken as measured, against the twin without its correction: the fit gives back a and b of the
 /// paper's table, which the twin carries.
@@ -26,7 +28,7 @@ fn the_ratio_to_a_plain_twin_is_the_papers_correction() {
     let plain = Twin::new(&document.read_twin().unwrap()).unwrap();
     let library = Library::of_twin(&plain, &Location::parse(BASELINE_TWIN)).unwrap();
     let found = compare_pulls(&measured, &plain, &library, 2).unwrap();
-    let ratios = pull_ratios(&measured, &found);
+    let ratios = pull_ratios(&measured, &found.label_n);
     for (name, a, b_n) in laws(&sweep.twin) {
         let ratio = &ratios[&name];
         let fit = ratio.fit.unwrap();
@@ -38,7 +40,18 @@ fn the_ratio_to_a_plain_twin_is_the_papers_correction() {
         let counts: Vec<usize> = ratio.measured.iter().map(|level| level.rows.len()).collect();
         assert_eq!(counts, [6; 5], "{name}");
     }
-    let page = pull_comparison_page("campaign", &measured, &found);
+    let shown = ComparedPulls {
+        measured: &measured,
+        label_n: &found.label_n,
+        trace_n: &found.trace_n,
+        rmse_n: found.pulls.rmse_n,
+        mape_pct: found.pulls.mape_pct,
+        bias_n: found.pulls.bias_n,
+        coverage90: found.coverage90,
+        outside_fit: found.outside_fit,
+        traces: found.traces,
+    };
+    let page = pull_comparison_page("campaign", &shown);
     for part in [
         "Maximum pull force over grip force",
         "The pull nearest to 40 N",

@@ -1,9 +1,9 @@
 //! Presses as somebody measured them, from what was read to the answer.
 
+use super::diagnosed::Diagnosed;
 use super::presses::{PressDiagnosisInput, diagnose_presses};
 use crate::press_columns::{PressColumns, presses_sha256};
 use crate::presses::{FoundCircles, find_circles_with_sensor};
-use crate::report::Diagnosed;
 use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::PressSet;
 use gripgen_twin::config::EffectFile;

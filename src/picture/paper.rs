@@ -1,9 +1,8 @@
 //! The picture of the paper's report: ratios over grip force, and a pull profile.
 
-use super::canvas::{Anchor, Canvas, TextStyle};
-use super::colours::{COMMAND, GRID, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
-use super::plot::{Area, Curve, pull_curve};
 use crate::paper::PartCells;
+use gripgen_report::picture::{Anchor, Area, Canvas, Curve, TextStyle, pull_curve};
+use gripgen_report::picture::{COMMAND, GRID, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
 use gripgen_twin::PullTrace;
 
 const MARGIN: f64 = 16.0;

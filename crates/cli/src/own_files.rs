@@ -1,7 +1,7 @@
 //! Files that belong to a run folder or to measurements: no output is ever written onto one of them.
 
 use crate::mark::mark_of;
-use gripgen::CONTACT_SHEET;
+use gripgen_report::CONTACT_SHEET;
 use gripgen::record::{
     CAMPAIGN_FILE, IMPRINTS_FILE, PRESSES_FILE, PULLS_FILE, ROSBAG_FILE, SENSOR_FILE, TRACES_FOLDER,
 };

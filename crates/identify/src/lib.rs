@@ -26,10 +26,13 @@ mod grouped;
 mod imprint;
 mod imprints;
 mod least_squares;
+mod levels;
 mod permutation;
 mod plain;
 mod presses;
 pub mod pulls;
+mod ratio;
+mod robust_line;
 mod sensor;
 mod separate;
 
@@ -51,12 +54,15 @@ pub use imprints::{
     diagnose_imprints,
 };
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
+pub use levels::{Level, levels};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
 pub use plain::{HARDLY, plain};
 pub use presses::{
     ActingEffect, MIN_DIAGNOSED_PRESSES, PRESS_ZONES, PredictPresses, PressCovariate, PressData,
     PressDiagnosis, PressPixels, PressTrial, PressValues, diagnose_presses, too_few_presses,
 };
+pub use ratio::{PartRatio, RatioFit, part_ratio, pull_ratios};
+pub use robust_line::RobustLine;
 pub use sensor::{
     SensorBlock, SensorCalibration, SensorComparison, SensorData, SensorDiagnosis, SensorEvidence,
     SensorOptions, SensorRow, SessionCalibration, calibrate_sensor, compare_sensor, diagnose_sensor,

@@ -68,7 +68,7 @@ pub use campaign::{Campaign, PlannedPull, PullKind};
 pub use config::{DEFAULTED_SECTIONS, is_twin_key};
 pub use film::{CameraStamp, CellShear, FilmFrame, FilmPace, SlipState};
 pub use friction::{FrictionError, GripFriction, cell_friction, grip_friction};
-pub use grasp::Grasp;
+pub use grasp::{Grasp, Proposal};
 pub use image::TactileImage;
 pub use jaw::{Jaw, PerJaw};
 pub use label::{LabelError, PullEnd, SlipLabel, slip_label};

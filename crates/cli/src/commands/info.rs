@@ -6,7 +6,8 @@ use crate::failure::Failure;
 use crate::output::{JsonSink, count, print, size};
 use crate::outputs::Outputs;
 use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE};
-use gripgen::{is_pulls, levels};
+use gripgen::identify::levels;
+use gripgen::is_pulls;
 use serde_json::json;
 use std::collections::BTreeMap;
 

@@ -9,7 +9,8 @@ use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::twin::usual_scale_mm_per_unit;
-use gripgen::{GripTried, PartOptions, TriedPart, TryOptions, TryPartError, try_part};
+use gripgen::{PartOptions, TryOptions, TryPartError, rasterise, try_part};
+use gripgen_report::{GripTried, TriedPart, tried_page, tried_picture};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -38,8 +39,8 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
         sensor: args.sensor.clone(),
     };
     let tried = try_part(&args.mesh, &options).map_err(refused)?;
-    outputs.write(&page, Format::Html, tried.page.as_bytes())?;
-    outputs.write(&picture, Format::Png, &tried.picture)?;
+    outputs.write(&page, Format::Html, tried_page(&tried, &rasterise).as_bytes())?;
+    outputs.write(&picture, Format::Png, &tried_picture(&tried, &rasterise))?;
     if !args.talk.quiet {
         eprint!("{}", summary(&tried));
         eprintln!("next: {}", next(args, &stem));

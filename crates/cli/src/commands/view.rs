@@ -6,7 +6,7 @@ use crate::mark::Format;
 use crate::output::{JsonSink, print, size};
 use crate::outputs::Outputs;
 use gripgen::record::Dataset;
-use gripgen::{ViewOptions, view_page};
+use gripgen_report::{ViewOptions, view_page};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -5,51 +5,54 @@ use gripgen_twin::TactileImage;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
-/// A colour.
+/// A colour: red, green, blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Rgb(pub(crate) u8, pub(crate) u8, pub(crate) u8);
+pub struct Rgb(pub u8, pub u8, pub u8);
 
 /// Which end of a text its x coordinate names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Anchor {
+pub enum Anchor {
+    /// Its beginning.
     Left,
+    /// Its middle.
     Middle,
+    /// Its end.
     Right,
 }
 
 /// A drawing surface of whole pixels, origin at the top left.
-pub(crate) struct Canvas {
+pub struct Canvas {
     pixmap: Pixmap,
 }
 
 impl Canvas {
     /// A canvas of one colour.
-    pub(crate) fn new(width: u32, height: u32, background: Rgb) -> Self {
+    pub fn new(width: u32, height: u32, background: Rgb) -> Self {
         let mut pixmap = Pixmap::new(width.max(1), height.max(1)).expect("a picture has a sensible size");
         pixmap.fill(colour(background));
         Self { pixmap }
     }
 
     /// The picture as PNG.
-    pub(crate) fn into_png(self) -> Vec<u8> {
+    pub fn into_png(self) -> Vec<u8> {
         let (width_px, height_px) = (self.pixmap.width(), self.pixmap.height());
         let rgb = self.pixmap.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
         encode_png(&TactileImage { width_px, height_px, rgb }).expect("an RGB picture can be encoded")
     }
 
     /// A filled rectangle.
-    pub(crate) fn rect(&mut self, x: f64, y: f64, width: f64, height: f64, fill: Rgb) {
+    pub fn rect(&mut self, x: f64, y: f64, width: f64, height: f64, fill: Rgb) {
         let Some(rect) = Rect::from_xywh(x as f32, y as f32, width as f32, height as f32) else { return };
         self.pixmap.fill_rect(rect, &paint(fill), Transform::identity(), None);
     }
 
     /// A connected line. Points that are not finite interrupt it.
-    pub(crate) fn line(&mut self, points: &[(f64, f64)], width: f64, ink: Rgb) {
+    pub fn line(&mut self, points: &[(f64, f64)], width: f64, ink: Rgb) {
         self.stroke(points, width, ink, None);
     }
 
     /// A dashed line.
-    pub(crate) fn dashed(&mut self, points: &[(f64, f64)], width: f64, ink: Rgb) {
+    pub fn dashed(&mut self, points: &[(f64, f64)], width: f64, ink: Rgb) {
         self.stroke(points, width, ink, StrokeDash::new(vec![5.0, 4.0], 0.0));
     }
 
@@ -72,7 +75,7 @@ impl Canvas {
     }
 
     /// A filled disc with a white rim.
-    pub(crate) fn disc(&mut self, x: f64, y: f64, radius: f64, fill: Rgb) {
+    pub fn disc(&mut self, x: f64, y: f64, radius: f64, fill: Rgb) {
         for (r, ink) in [(radius + 1.5, Rgb(255, 255, 255)), (radius, fill)] {
             let Some(path) = PathBuilder::from_circle(x as f32, y as f32, r as f32) else { continue };
             self.pixmap.fill_path(&path, &paint(ink), FillRule::Winding, Transform::identity(), None);
@@ -80,7 +83,7 @@ impl Canvas {
     }
 
     /// One pixel; outside the canvas nothing happens.
-    pub(crate) fn put(&mut self, x: u32, y: u32, ink: Rgb) {
+    pub fn put(&mut self, x: u32, y: u32, ink: Rgb) {
         if x < self.pixmap.width() && y < self.pixmap.height() {
             let at = (y * self.pixmap.width() + x) as usize;
             self.pixmap.pixels_mut()[at] = colour(ink).premultiply().to_color_u8();
@@ -88,7 +91,7 @@ impl Canvas {
     }
 
     /// Text whose top is at `y`. Characters that the font lacks become `?`.
-    pub(crate) fn text(&mut self, text: &str, x: f64, y: f64, anchor: Anchor, style: TextStyle) {
+    pub fn text(&mut self, text: &str, x: f64, y: f64, anchor: Anchor, style: TextStyle) {
         let (weight, height) = style.font();
         let advance = get_raster_width(weight, height) as f64;
         let width = advance * text.chars().count() as f64;
@@ -127,20 +130,23 @@ impl Canvas {
 
 /// How a text looks.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TextStyle {
-    pub(crate) ink: Rgb,
-    pub(crate) large: bool,
-    pub(crate) bold: bool,
+pub struct TextStyle {
+    /// Its colour.
+    pub ink: Rgb,
+    /// 20 pixels high, not 16.
+    pub large: bool,
+    /// In bold letters.
+    pub bold: bool,
 }
 
 impl TextStyle {
     /// 16 pixels high.
-    pub(crate) fn small(ink: Rgb) -> Self {
+    pub fn small(ink: Rgb) -> Self {
         Self { ink, large: false, bold: false }
     }
 
     /// 20 pixels high and bold.
-    pub(crate) fn title(ink: Rgb) -> Self {
+    pub fn title(ink: Rgb) -> Self {
         Self { ink, large: true, bold: true }
     }
 

@@ -10,7 +10,8 @@ use crate::outputs::Outputs;
 use crate::posterior;
 use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, PosteriorFile, Verdict};
 use gripgen::twin::rounded;
-use gripgen::{Diagnosed, Location, diagnosis_page, edited_twin_toml};
+use gripgen::{Diagnosed, Location, edited_twin_toml};
+use gripgen_report::diagnosis_page;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -38,7 +39,7 @@ pub fn write(
     // The twin is there: what its sweep has to vary depends on it.
     diagnosed.report.next = next_steps(args, &diagnosed, next.path.as_deref());
     if let Some(report) = &args.report {
-        outputs.write(report, Format::Html, diagnosis_page(&diagnosed).as_bytes())?;
+        outputs.write(report, Format::Html, diagnosis_page(&diagnosed.diagnosis, &diagnosed.report).as_bytes())?;
     }
     if sink.wanted() {
         let value = serde_json::to_value(&diagnosed.diagnosis).map_err(Failure::new)?;
