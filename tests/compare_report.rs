@@ -2,9 +2,10 @@
 
 use crate::common::{baseline, jobs, library, project, run, twin_at};
 use gripgen::twin::Twin;
-use gripgen::{pull_comparison_page, pull_ratios};
+use gripgen::identify::pull_ratios;
 use gripgen_cli::compare_pulls;
 use gripgen_measured::load_pulls;
+use gripgen_report::{ComparedPulls, pull_comparison_page};
 
 /// Pulls of the paper's twin, taken as measured, against the twin without its correction: the fit gives back a and b of the
 /// paper's table, which the twin carries.
@@ -25,7 +26,7 @@ fn the_ratio_to_a_plain_twin_is_the_papers_correction() {
     let measured = load_pulls(folder.path()).unwrap().pulls;
     let plain = twin_at(&baseline());
     let found = compare_pulls(&measured, &plain, &library(&plain), 2).unwrap();
-    let ratios = pull_ratios(&measured, &found);
+    let ratios = pull_ratios(&measured, &found.label_n);
     for (name, a, b_n) in laws(&sweep.twin) {
         let ratio = &ratios[&name];
         let fit = ratio.fit.unwrap();
@@ -37,7 +38,18 @@ fn the_ratio_to_a_plain_twin_is_the_papers_correction() {
         let counts: Vec<usize> = ratio.measured.iter().map(|level| level.rows.len()).collect();
         assert_eq!(counts, [6; 5], "{name}");
     }
-    let page = pull_comparison_page("campaign", &measured, &found);
+    let shown = ComparedPulls {
+        measured: &measured,
+        label_n: &found.label_n,
+        trace_n: &found.trace_n,
+        rmse_n: found.pulls.rmse_n,
+        mape_pct: found.pulls.mape_pct,
+        bias_n: found.pulls.bias_n,
+        coverage90: found.coverage90,
+        outside_fit: found.outside_fit,
+        traces: found.traces,
+    };
+    let page = pull_comparison_page("campaign", &shown);
     for part in [
         "Maximum pull force over grip force",
         "The pull nearest to 40 N",

@@ -4,8 +4,9 @@ use crate::common::project_in;
 use crate::solids::{Solid, SolidPart, ordinary};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::{Jaw, Outcome};
-use gripgen::generate;
-use gripgen_cli::{PartOptions, TryOptions, TryPartError, part_starter, try_part};
+use gripgen::{Location, Project, generate};
+use gripgen_cli::{PartOptions, TryOptions, TryPartError, part_starter, rasterise, try_part};
+use gripgen_report::{TriedPart, tried_page, tried_picture};
 use std::path::Path;
 
 const PART: PartOptions =
@@ -121,9 +122,11 @@ fn options_do_what_they_say() {
     let at = tried.grips[0].holding.iter().find(|h| h.grip_force_n == 12.0).unwrap();
     let [low, value, high] = *at.max_pull_force_n.as_ref().unwrap();
     assert!((value - 9.6).abs() < 0.05 && low > 0.9 * value && high < 1.1 * value, "{low} {value} {high}");
-    assert_eq!(try_part(&mesh, &asked).unwrap().page, tried.page);
+    let page = |part: &TriedPart| tried_page(part, &rasterise);
+    let picture = |part: &TriedPart| tried_picture(part, &rasterise);
+    assert_eq!(page(&try_part(&mesh, &asked).unwrap()), page(&tried));
     let one_thread = TryOptions { part: PartOptions { threads: 1, ..part }, ..asked.clone() };
-    assert_eq!(try_part(&mesh, &one_thread).unwrap().picture, tried.picture);
+    assert_eq!(picture(&try_part(&mesh, &one_thread).unwrap()), picture(&tried));
     let none = try_part(&mesh, &TryOptions { grip: Some(9), ..options() });
     assert!(matches!(none, Err(TryPartError::NoSuchGrip { asked: 9, .. })));
     let strong = try_part(&mesh, &TryOptions { force_n: Some(500.0), ..options() });

@@ -9,7 +9,7 @@ mod pending;
 pub use pending::{Pending, PendingFolder};
 
 use crate::failure::{Failure, no_room};
-use gripgen::CONTACT_SHEET;
+use gripgen_report::CONTACT_SHEET;
 use gripgen::twin::Posterior;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};

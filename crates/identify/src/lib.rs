@@ -34,6 +34,7 @@ mod predictive;
 mod presses;
 pub mod pulls;
 mod ratio;
+mod robust_line;
 mod sensor;
 mod separate;
 
@@ -63,7 +64,8 @@ pub use presses::{
     ActingEffect, MIN_DIAGNOSED_PRESSES, PRESS_ZONES, PredictPresses, PressCovariate, PressData,
     PressDiagnosis, PressPixels, PressTrial, PressValues, diagnose_presses, too_few_presses,
 };
-pub use ratio::{PartRatio, RatioFit, part_ratio};
+pub use ratio::{PartRatio, RatioFit, part_ratio, pull_ratios};
+pub use robust_line::RobustLine;
 pub use sensor::{
     SensorBlock, SensorCalibration, SensorComparison, SensorData, SensorDiagnosis, SensorEvidence,
     SensorOptions, SensorRow, SessionCalibration, calibrate_sensor, compare_sensor, diagnose_sensor,

@@ -1,6 +1,8 @@
 //! Measured over simulated labels against grip force: the paper's correction `a + b / F_G` with its covariance.
 
 use crate::levels::{Level, levels};
+use gripgen_twin::MeasuredPulls;
+use std::collections::BTreeMap;
 
 /// Predictions smaller than this have no ratio.
 const MIN_N: f64 = 0.1;
@@ -79,6 +81,15 @@ impl RatioFit {
         let x = 1.0 / grip_force_n;
         libm::sqrt((aa + 2.0 * ab * x + bb * x * x).max(0.0))
     }
+}
+
+/// Measured over predicted labels of each part; `predicted_n`: the label predicted for each pull.
+pub fn pull_ratios(measured: &MeasuredPulls, predicted_n: &[f64]) -> BTreeMap<String, PartRatio> {
+    let mut parts: BTreeMap<&str, Vec<(f64, f64, f64)>> = BTreeMap::new();
+    for (pull, &predicted_n) in measured.pulls.iter().zip(predicted_n) {
+        parts.entry(&pull.part).or_default().push((pull.grip_force_n, pull.max_pull_force_n, predicted_n));
+    }
+    parts.into_iter().map(|(name, pulls)| (name.into(), part_ratio(&pulls))).collect()
 }
 
 /// The ratios of a part's pulls, given as grip force, measured and predicted label.

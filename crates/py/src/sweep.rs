@@ -3,10 +3,8 @@
 use crate::{error, values};
 use gripgen::record::{FolderError, RunFolder};
 use gripgen::tactile::SimdLevel;
-use gripgen::{
-    CONTACT_SHEET, Location, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet_samples,
-    publish_contact_sheet,
-};
+use gripgen::{Location, Project, SweepEvent, SweepOptions, SweepSummary};
+use gripgen_report::{CONTACT_SHEET, contact_sheet_samples, publish_contact_sheet};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};

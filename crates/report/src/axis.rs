@@ -2,16 +2,16 @@
 
 /// A range of values and the round numbers in it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Axis {
-    pub(super) low: f64,
-    pub(super) high: f64,
+pub(crate) struct Axis {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
     /// Places of the ticks and their labels.
-    pub(super) ticks: Vec<(f64, String)>,
+    pub(crate) ticks: Vec<(f64, String)>,
 }
 
 impl Axis {
     /// An axis for finite values, with a margin, and about `wanted` ticks at 1, 2 or 5 times a power of ten.
-    pub(super) fn of(values: impl Iterator<Item = f64>, wanted: usize) -> Self {
+    pub(crate) fn of(values: impl Iterator<Item = f64>, wanted: usize) -> Self {
         let (mut low, mut high) =
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
         if low > high {
@@ -31,20 +31,20 @@ impl Axis {
     }
 
     /// An axis of words at 0, 1, 2...
-    pub(super) fn of_words(words: &[String], most: usize) -> Self {
+    pub(crate) fn of_words(words: &[String], most: usize) -> Self {
         let every = words.len().div_ceil(most.max(1)).max(1);
         let ticks = words.iter().enumerate().step_by(every).map(|(i, word)| (i as f64, word.clone()));
         Self { low: -0.5, high: words.len() as f64 - 0.5, ticks: ticks.collect() }
     }
 
     /// Where a value lies between the ends, 0 to 1.
-    pub(super) fn share(&self, value: f64) -> f64 {
+    pub(crate) fn share(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
 }
 
 fn ticks(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
-    let step = nice_step((high - low) / wanted.max(1) as f64);
+    let step = nice_step((high - low) / wanted.max(1) as f64, 0.75);
     let (first, last) = ((low / step).ceil(), (high / step).floor());
     (0..=(last - first).clamp(0.0, 40.0) as usize)
         .map(|i| (first + i as f64) * step)
@@ -52,10 +52,10 @@ fn ticks(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
         .collect()
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is not much below `rough`.
-fn nice_step(rough: f64) -> f64 {
+/// The smallest of 1, 2, 5 times a power of ten that is not below a share of `rough`.
+pub(crate) fn nice_step(rough: f64, share: f64) -> f64 {
     let power = libm::pow(10.0, libm::floor(libm::log10(rough)));
-    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= 0.75 * rough).unwrap_or(10.0);
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= share * rough).unwrap_or(10.0);
     factor * power
 }
 

@@ -1,19 +1,20 @@
 //! The error before and after, as bars with intervals and the noise floor.
 
-use super::axis::Axis;
-use super::plot::escape;
+use crate::axis::Axis;
+use crate::svg::label;
+use crate::text::number;
 use std::fmt::Write;
 
 /// One bar.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Bar {
+pub(crate) struct Bar {
     /// What it is an error of.
-    pub(super) name: String,
+    pub(crate) name: String,
     /// After the effects were added.
-    pub(super) after: bool,
-    pub(super) value: f64,
+    pub(crate) after: bool,
+    pub(crate) value: f64,
     /// Its 90 % interval.
-    pub(super) interval: (f64, f64),
+    pub(crate) interval: (f64, f64),
 }
 
 const WIDTH: f64 = 420.0;
@@ -21,7 +22,7 @@ const ROW: f64 = 40.0;
 const SIDE: f64 = 10.0;
 
 /// Draws the bars below each other, and the floor as a line through all of them.
-pub(super) fn draw(bars: &[Bar], floor: Option<f64>, unit: &str) -> String {
+pub(crate) fn draw(bars: &[Bar], floor: Option<f64>, unit: &str) -> String {
     let floor = floor.filter(|f| f.is_finite());
     let values = bars.iter().flat_map(|b| [b.value, b.interval.0, b.interval.1]).chain(floor).chain([0.0]);
     let x = Axis::of(values.filter(|v| v.is_finite()), 5);
@@ -36,80 +37,33 @@ pub(super) fn draw(bars: &[Bar], floor: Option<f64>, unit: &str) -> String {
     for (value, text) in &x.ticks {
         let px = at(*value);
         let _ = write!(grid, "M{px:.1} {top:.0}V{bottom:.0}");
-        let _ =
-            write!(svg, "<text x=\"{px:.1}\" y=\"{:.0}\" class=\"x\">{}</text>", bottom + 16.0, escape(text));
+        svg += &label(px, bottom + 16.0, "x", text);
     }
     let _ = write!(svg, "<path class=\"grid\" d=\"{grid}\"/>");
     if let Some(floor) = floor {
-        let (px, text) = (at(floor), escape(&format!("noise floor {}", number(floor))));
+        let px = at(floor);
         // Near the right end the words stand to the left of the line.
         let (tx, class) = if px > WIDTH / 2.0 { (px + 4.0, "y") } else { (px - 4.0, "start") };
-        let _ = write!(svg, "<text x=\"{tx:.1}\" y=\"14\" class=\"{class}\">{text}</text>");
+        svg += &label(tx, 14.0, class, &format!("noise floor {}", number(floor)));
     }
     for (i, bar) in bars.iter().enumerate() {
         let y = top + ROW * i as f64;
-        let numbers = format!(
-            "{}: {} ({} to {})",
-            bar.name,
-            number(bar.value),
-            number(bar.interval.0),
-            number(bar.interval.1)
-        );
+        let [value, low, high] = [bar.value, bar.interval.0, bar.interval.1];
+        let numbers = format!("{}: {} ({} to {})", bar.name, number(value), number(low), number(high));
+        svg += &label(SIDE, y + 14.0, "start", &numbers);
         let class = if bar.after { "after" } else { "before" };
-        let _ = write!(svg, "<text x=\"{SIDE}\" y=\"{:.0}\">{}</text>", y + 14.0, escape(&numbers));
-        let (zero, end) = (at(0.0), at(bar.value));
+        let (zero, end, low, high, cap) = (at(0.0), at(value), at(low), at(high), y + 23.0);
         let _ = write!(
             svg,
-            "<rect class=\"{class}\" x=\"{zero:.1}\" y=\"{:.0}\" width=\"{:.1}\" height=\"14\"/>",
+            "<rect class=\"{class}\" x=\"{zero:.1}\" y=\"{:.0}\" width=\"{:.1}\" height=\"14\"/>\
+             <path class=\"interval\" d=\"M{low:.1} {:.0}H{high:.1}M{low:.1} {cap:.0}v8M{high:.1} {cap:.0}v8\"/>",
             y + 20.0,
-            (end - zero).max(0.0)
-        );
-        let (low, high) = (at(bar.interval.0), at(bar.interval.1));
-        let middle = y + 27.0;
-        let _ = write!(
-            svg,
-            "<path class=\"interval\" d=\"M{low:.1} {middle:.0}H{high:.1}M{low:.1} {:.0}v8M{high:.1} {:.0}v8\"/>",
-            middle - 4.0,
-            middle - 4.0
+            (end - zero).max(0.0),
+            y + 27.0,
         );
         if let Some(floor) = floor {
             let _ = write!(svg, "<path class=\"floor\" d=\"M{:.1} {:.0}v20\"/>", at(floor), y + 17.0);
         }
     }
-    let _ = write!(
-        svg,
-        "<text x=\"{:.0}\" y=\"{:.0}\" class=\"x\">held-out error, {}</text></svg>",
-        WIDTH / 2.0,
-        bottom + 36.0,
-        escape(unit)
-    );
-    svg
-}
-
-/// A number with three digits that count.
-pub(super) fn number(x: f64) -> String {
-    if !x.is_finite() {
-        return "\u{2013}".into();
-    }
-    let text = match x.abs() {
-        0.0 => "0".into(),
-        size if !(1e-4..1e6).contains(&size) => format!("{x:.2e}"),
-        size => {
-            let decimals = (2.0 - libm::floor(libm::log10(size))).clamp(0.0, 6.0) as usize;
-            format!("{x:.decimals$}")
-        }
-    };
-    text.replace('-', "\u{2212}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_have_three_digits() {
-        let shown = [0.0, 0.331, 12.34, 412.7, 0.012_345, -2.0, 1.5e-9, 2e7, f64::NAN].map(number);
-        assert_eq!(shown[..6], ["0", "0.331", "12.3", "413", "0.0123", "\u{2212}2.00"]);
-        assert_eq!(shown[6..], ["1.50e\u{2212}9", "2.00e7", "\u{2013}"]);
-    }
+    svg + &label(WIDTH / 2.0, bottom + 36.0, "x", &format!("held-out error, {unit}")) + "</svg>"
 }

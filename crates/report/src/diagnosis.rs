@@ -1,126 +1,192 @@
-//! The page: what its template is given.
+//! The report of a diagnosis.
 
-use super::bars::{self, Bar, number};
-use super::plot::{self, shorten};
-use super::sentence::{error_unit, sentence};
-use super::{Diagnosed, Plot, PlotGroup};
-use crate::assets;
+pub(crate) mod decisive;
+pub(crate) mod doubt;
+pub(crate) mod imprints;
+pub(crate) mod presses;
+pub(crate) mod pulls;
+pub(crate) mod sensor;
+#[cfg(test)]
+mod tests;
+
+use crate::PlotGroup;
+use crate::bars::{self, Bar};
+use crate::page::{PLOTS, Page, PlotBudget, Table};
+use crate::text::{NAME, SENTENCE, clean, number};
 use gripgen_identify::{
-    Channel, Detectable, Diagnosis, ErrorPair, HeldOutError, NamedEffect, ParameterEstimate, Verdict,
+    Channel, Detectable, Diagnosis, ErrorPair, HARDLY, HeldOutError, NamedEffect, ParameterEstimate, UnknownCovariate,
+    Verdict,
 };
 use gripgen_twin::effects::find;
 use serde_json::{Value, json};
 
-/// Points of all plots together; one takes about 12 bytes.
-const ALL_POINTS: usize = 16_000;
-/// Points of a series.
-const SERIES_POINTS: usize = 800;
-/// Plots of the page, and series of a plot.
-const PLOTS: usize = 60;
-const SERIES: usize = 12;
 /// Rows of a table.
-pub(super) const ROWS: usize = 40;
+const ROWS: usize = 40;
 /// A value nearer to the neutral one, as a share of what is fitted, is that.
 const AT_NEUTRAL: f64 = 1e-5;
-/// Letters of a name and of a sentence.
-pub(super) const NAME: usize = 60;
-pub(super) const SENTENCE: usize = 600;
-/// Letters of a command.
-const COMMAND: usize = 8000;
+
+/// A candidate in the table of evidence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EvidenceRow {
+    /// Its name: an effect, "none", or "curve in humidity_pct".
+    pub name: String,
+    /// Gain in held-out log-likelihood over the model without it.
+    pub heldout_gain: f64,
+    /// Standard error of that.
+    pub standard_error: f64,
+    /// Error on held-out data with it.
+    pub heldout_error: f64,
+    /// Fitted values, for people.
+    pub values: String,
+    /// What became of it: "named", "tied with wear", "worse", "as good on held-out pulls", "contradicted by the traces".
+    pub fate: String,
+}
+
+/// An observation that fits badly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorstRow {
+    /// Its id.
+    pub id: String,
+    /// What it is, for people: part, force.
+    pub about: String,
+    /// Measured.
+    pub measured: f64,
+    /// Predicted after the effects were added.
+    pub predicted: f64,
+    /// Difference in standard deviations.
+    pub deviations: f64,
+}
+
+/// What the page shows beside the diagnosis itself.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ReportData {
+    /// Title of the page.
+    pub title: String,
+    /// Plots in the order of the page.
+    pub groups: Vec<PlotGroup>,
+    /// How many of these decide the answer: they stand before everything else.
+    pub decides: usize,
+    /// What to do next: a sentence, and a command or nothing.
+    pub next: Vec<(String, String)>,
+    /// The candidates.
+    pub evidence: Vec<EvidenceRow>,
+    /// The worst observations.
+    pub worst: Vec<WorstRow>,
+    /// The unit of errors: `N`, or `grey levels^2`.
+    pub error_unit: String,
+}
 
 /// The report of a diagnosis: one HTML page with its plots inside, which needs neither a network nor a script.
 ///
 /// It stays below 500 kB whatever the size of the data: plots show at most so many points, tables so many rows, and what
 /// was left out is said.
-pub fn diagnosis_page(diagnosed: &Diagnosed) -> String {
-    let (d, report) = (&diagnosed.diagnosis, &diagnosed.report);
+pub fn diagnosis_page(d: &Diagnosis, report: &ReportData) -> String {
     let floor = d.noise_floor_n.or(d.noise_floor_mse).or(d.noise_floor_mm3);
     let unit = if report.error_unit.is_empty() { error_unit(d.channel) } else { &report.error_unit };
-    let said = if report.sentence.is_empty() { sentence(d) } else { report.sentence.clone() };
-    let all = groups(&report.groups);
-    // A group without plots is no section.
-    let decides = report.decides.min(all.len());
-    let page = json!({
-        "title": clean(&report.title, NAME),
-        "plain": d.plain.as_ref().map(|plain| clean(plain, SENTENCE)),
-        "sentence": clean(&said, SENTENCE),
-        "verdict": verdict(d.verdict),
-        "facts": facts(d, floor, unit),
-        "bars": error_bars(d).map(|b| bars::draw(&b, floor, unit)),
-        "percent": percent(d),
-        "effects": d.effects.iter().take(ROWS).map(effect).collect::<Vec<_>>(),
-        "unknown": d.unknown.iter().take(ROWS).map(|u| json!({
-            "name": clean(&u.covariate, NAME), "strength": number(100.0 * u.strength), "p": number(u.p_value),
-        })).collect::<Vec<_>>(),
-        "decisive": all[..decides],
-        "groups": all[decides..],
-        "next": report.next.iter().map(|(text, command)| json!({
-            // A command that is cut off cannot be copied.
-            "text": clean(text, SENTENCE), "command": clean(command, COMMAND),
-        })).collect::<Vec<_>>(),
-        "below_floor": below_floor(d, floor),
-        "evidence": report.evidence.iter().take(ROWS).map(|e| json!({
-            "name": clean(&e.name, NAME), "gain": number(e.heldout_gain), "error": number(e.standard_error),
-            "heldout": number(e.heldout_error), "values": clean(&e.values, 2 * NAME), "fate": clean(&e.fate, 2 * NAME),
-            "named": e.fate.starts_with("named"),
-        })).collect::<Vec<_>>(),
-        // Columns that a channel does not fill are left out.
-        "evidence_error": report.evidence.iter().any(|e| e.heldout_error.is_finite()),
-        "evidence_spread": report.evidence.iter().any(|e| e.standard_error.is_finite()),
-        "unit": clean(unit, NAME),
-        "seen": d.would_have_seen.iter().filter(|(name, s)| is_a_size(name, s)).take(ROWS).map(|(name, s)| json!({
-            "name": clean(name, NAME), "parameter": clean(&s.parameter, NAME), "value": number(s.value),
-            "power": number(100.0 * s.power),
-        })).collect::<Vec<_>>(),
-        "not_excited": names(&d.not_excited),
-        "not_recorded": names(&d.not_recorded),
-        "outliers": names(&d.data.outliers),
-        "worst": report.worst.iter().take(ROWS).map(|w| json!({
-            "id": clean(&w.id, NAME), "about": clean(&w.about, NAME), "measured": number(w.measured),
-            "predicted": number(w.predicted), "deviations": number(w.deviations),
-        })).collect::<Vec<_>>(),
-        "baseline": d.baseline.iter().take(ROWS).map(|(key, e)| parameter(key, e)).collect::<Vec<_>>(),
-        "notes": d.notes.iter().take(ROWS).map(|n| clean(n, SENTENCE)).collect::<Vec<_>>(),
-        "left_out": left_out(diagnosed),
-    });
-    rendered(&page)
-}
-
-/// The page as HTML; sections that it lacks are left out.
-pub(super) fn rendered(page: &Value) -> String {
-    rendered_with("diagnosis.html", page)
-}
-
-/// The same with a template of `assets/templates/`; all pages share one style sheet.
-pub(crate) fn rendered_with(name: &str, page: &Value) -> String {
-    let mut environment = minijinja::Environment::new();
-    for file in ["page.css", name] {
-        environment
-            .add_template_owned(file.to_string(), assets::text(&format!("templates/{file}")).to_string())
-            .expect("a template of ours parses");
-    }
-    let template = environment.get_template(name).expect("it was just added");
-    template.render(page).expect("the template asks for nothing that the page lacks")
-}
-
-/// A text of the data without control characters, not longer than `most`. The template escapes it.
-pub(crate) fn clean(text: &str, most: usize) -> String {
-    let plain: String =
-        text.chars().filter(|c| !c.is_control() && !('\u{fffe}'..='\u{ffff}').contains(c)).collect();
-    shorten(&plain, most)
-}
-
-fn verdict(verdict: Verdict) -> Value {
-    let (class, word) = match verdict {
+    let unit = &clean(unit, NAME);
+    let (class, word) = match d.verdict {
         Verdict::None => ("good", "nothing beyond the baseline"),
         Verdict::Effect => ("found", "effect"),
         Verdict::Unknown => ("open", "unknown dependence"),
         Verdict::Insufficient => ("open", "the data cannot answer"),
     };
-    json!({"class": class, "word": word})
+    let mut budget = PlotBudget::of(&report.groups);
+    // A group without plots is no section.
+    let groups: Vec<PlotGroup> = report.groups.iter().filter(|g| !g.plots.is_empty()).cloned().collect();
+    let (decisive, others) = groups.split_at(report.decides.min(groups.len()));
+
+    let mut page = Page::new(&report.title);
+    page.verdict(class, &format!("{word}{}", names(d)), d.plain.as_deref().unwrap_or_default());
+    page.groups(decisive, &mut budget);
+    if !report.next.is_empty() {
+        page.section("Next", "");
+        for (text, command) in &report.next {
+            page.text(text);
+            if !command.is_empty() {
+                page.command(command);
+            }
+        }
+    }
+    page.facts(&facts(d, floor, unit));
+    if let Some(bars) = error_bars(d) {
+        page.section("Error before and after", &about_errors(d, floor));
+        page.drawing(&bars::draw(&bars, floor, unit));
+    }
+    if !d.effects.is_empty() {
+        page.section("What acts", "");
+        page.cards(&d.effects.iter().take(ROWS).map(effect).collect::<Vec<_>>());
+    }
+    if !d.unknown.is_empty() {
+        page.section(
+            "Unknown dependence",
+            "The residual depends on these in a way that no known effect explains.",
+        );
+        let row = |u: &UnknownCovariate| {
+            vec![clean(&u.covariate, NAME), number(100.0 * u.strength), number(u.p_value)]
+        };
+        let rows = d.unknown.iter().take(ROWS).map(row);
+        page.table(&Table::new(&["covariate", "variance explained, %", "p"], rows));
+    }
+    page.groups(others, &mut budget);
+    evidence(&mut page, report, unit);
+    limits(&mut page, d);
+    if !d.baseline.is_empty() {
+        page.section("Baseline", "");
+        let row = |(name, e): (&String, &ParameterEstimate)| {
+            let (low, high) = interval(e).map_or(("fixed".into(), String::new()), |ends| ends);
+            vec![clean(name, NAME), number(e.value), low, high, unit_of(e)]
+        };
+        let rows = d.baseline.iter().take(ROWS).map(row);
+        let head = ["value", "fitted", "90 % from", "to", "unit"];
+        page.table(&Table { words: vec![4], ..Table::new(&head, rows) });
+    }
+    if !report.worst.is_empty() {
+        page.section("What fits worst", "");
+        let row = |w: &WorstRow| {
+            let numbers = [w.measured, w.predicted, w.deviations].map(number);
+            [vec![clean(&w.id, NAME), clean(&w.about, NAME)], numbers.to_vec()].concat()
+        };
+        let head = ["id", "what", "measured", "predicted", "standard deviations"];
+        page.table(&Table { words: vec![1], ..Table::new(&head, report.worst.iter().take(ROWS).map(row)) });
+    }
+    if !d.data.outliers.is_empty() {
+        page.text(&format!("Given little weight because they fit nothing: {}.", list(&d.data.outliers)));
+    }
+    let notes: Vec<String> = d.notes.iter().take(ROWS).cloned().chain(left_out(d, report)).collect();
+    if !notes.is_empty() {
+        page.section("Notes", "");
+        page.list(&notes);
+    }
+    page.html()
 }
 
-fn facts(d: &Diagnosis, floor: Option<f64>, unit: &str) -> Vec<Value> {
+/// What was found, by name, with what it is tied with.
+fn names(d: &Diagnosis) -> String {
+    let effect = |effect: &NamedEffect| {
+        let perhaps = if effect.weight < HARDLY { "perhaps " } else { "" };
+        let part = effect.part.as_ref().map(|part| format!(" on {part}")).unwrap_or_default();
+        let alternatives: Vec<&str> = effect.indistinguishable_from.iter().map(|r| r.name.as_str()).collect();
+        let tied = match alternatives.is_empty() {
+            true => String::new(),
+            false => format!(" (not told apart from {})", alternatives.join(", ")),
+        };
+        format!("{perhaps}{}{part}{tied}", effect.name)
+    };
+    let unknown = d.unknown.iter().map(|u| format!("something that goes with {}", u.covariate));
+    let names: Vec<String> = d.effects.iter().map(effect).chain(unknown).collect();
+    if names.is_empty() { String::new() } else { format!(": {}", names.join("; ")) }
+}
+
+/// The unit of errors of a channel.
+fn error_unit(channel: Channel) -> &'static str {
+    match channel {
+        Channel::Pulls | Channel::Sensor => "N",
+        Channel::Presses => "grey levels\u{b2}",
+        Channel::Imprints => "mm\u{b3}",
+    }
+}
+
+fn facts(d: &Diagnosis, floor: Option<f64>, unit: &str) -> Vec<(&'static str, String)> {
     let channel = match d.channel {
         Channel::Pulls => "pulls",
         Channel::Sensor => "force-sensor table",
@@ -136,14 +202,99 @@ fn facts(d: &Diagnosis, floor: Option<f64>, unit: &str) -> Vec<Value> {
         (d.data.grasps, "grasps"),
     ];
     let size: Vec<String> = counts.iter().filter_map(|(n, what)| n.map(|n| format!("{n} {what}"))).collect();
-    let mut facts =
-        vec![json!({"name": "channel", "value": channel}), json!({"name": "data", "value": size.join(", ")})];
+    let mut facts = vec![("channel", channel.into()), ("data", size.join(", "))];
     if let Some(floor) = floor {
-        let value = format!("{} {}", number(floor), clean(unit, NAME));
-        facts.push(json!({"name": "noise floor (repetitions)", "value": value}));
+        facts.push(("noise floor (repetitions)", format!("{} {unit}", number(floor))));
     }
-    facts.push(json!({"name": "SHA-256 of the data", "value": clean(&d.data.sha256, 13)}));
+    facts.push(("SHA-256 of the data", clean(&d.data.sha256, 13)));
     facts
+}
+
+/// What the bars of errors are, with the headline as a share of the measured value.
+fn about_errors(d: &Diagnosis, floor: Option<f64>) -> String {
+    let mut text =
+        "On data that the fit has not seen, through the simulator; the lines are 90 % intervals.".to_string();
+    let percent = |e: &HeldOutError| e.mape_pct.filter(|p| p.is_finite());
+    let error = d.error.as_ref();
+    if let Some((before, after)) = error.and_then(|e| percent(&e.before).zip(percent(&e.after))) {
+        let (before, after) = (number(before), number(after));
+        text += &format!(" Relative to the measured value: {before} % before, {after} % after.");
+    }
+    text += " The dashed line is the noise floor: how far repetitions of one pull are from each other.";
+    let after = error.and_then(|error| error.after.rmse_n.or(error.after.mse));
+    if after.zip(floor).is_some_and(|(after, floor)| after < floor) {
+        text += " The error after is below it: nothing is left that repetitions do not scatter by themselves, and both are \
+                 estimates from few pulls.";
+    }
+    text
+}
+
+/// The candidates; columns that a channel does not fill are left out.
+fn evidence(page: &mut Page, report: &ReportData, unit: &str) {
+    if report.evidence.is_empty() {
+        return;
+    }
+    let any = |of: fn(&EvidenceRow) -> f64| report.evidence.iter().any(|e| of(e).is_finite());
+    let (has_error, has_spread) = (any(|e| e.heldout_error), any(|e| e.standard_error));
+    let cost = match has_error {
+        true => "on data that the fit had not seen",
+        false => "less what its parameters cost",
+    };
+    let about = format!(
+        "Each candidate was fitted together with the whole baseline. The gain is in log-likelihood over the model without it, \
+         {cost}."
+    );
+    page.section("Evidence", &about);
+    let error = format!("error, {unit}");
+    let columns = |first: &str, gain: &str, spread: &str, error: &str, last: [&str; 2]| -> Vec<String> {
+        let numbers = [(true, gain), (has_spread, spread), (has_error, error)];
+        let numbers = numbers.into_iter().filter(|(has, _)| *has).map(|(_, text)| text);
+        std::iter::once(first).chain(numbers).chain(last).map(String::from).collect()
+    };
+    let head = columns("candidate", "gain", "\u{b1}", &error, ["values", "verdict"]);
+    let row = |e: &EvidenceRow| {
+        let [gain, spread, error] = [e.heldout_gain, e.standard_error, e.heldout_error].map(number);
+        let [values, fate] = [&e.values, &e.fate].map(|text| clean(text, 2 * NAME));
+        columns(&clean(&e.name, NAME), &gain, &spread, &error, [&values, &fate])
+    };
+    let shown = &report.evidence[..report.evidence.len().min(ROWS)];
+    page.table(&Table {
+        words: vec![head.len() - 2, head.len() - 1],
+        rows: shown.iter().map(row).collect(),
+        strong: (0..shown.len()).filter(|&i| shown[i].fate.starts_with("named")).collect(),
+        head,
+        bars: vec![],
+    });
+}
+
+/// What the data can and cannot show.
+fn limits(page: &mut Page, d: &Diagnosis) {
+    let seen: Vec<Vec<String>> = d
+        .would_have_seen
+        .iter()
+        .filter(|(name, seen)| is_a_size(name, seen))
+        .take(ROWS)
+        .map(|(name, seen)| {
+            let names = [name, &seen.parameter].map(|name| clean(name, NAME));
+            [names, [number(seen.value), number(100.0 * seen.power)]].concat()
+        })
+        .collect();
+    if seen.is_empty() && d.not_excited.is_empty() && d.not_recorded.is_empty() {
+        return;
+    }
+    page.section("What these data can and cannot show", "");
+    if !d.not_excited.is_empty() {
+        let names = list(&d.not_excited);
+        page.text(&format!("Never varied, so nothing can be said about it: {names}."));
+    }
+    if !d.not_recorded.is_empty() {
+        page.text(&format!("Not written down: {}.", list(&d.not_recorded)));
+    }
+    if !seen.is_empty() {
+        page.note("Effects that were not found would have been, had they had this size:");
+        let head = ["effect", "parameter", "size", "probability, %"];
+        page.table(&Table { words: vec![1], ..Table::new(&head, seen) });
+    }
 }
 
 fn error_bars(d: &Diagnosis) -> Option<Vec<Bar>> {
@@ -175,93 +326,60 @@ fn is_a_size(effect: &str, seen: &Detectable) -> bool {
     })
 }
 
-/// Whether the error after is below the noise floor, which then wants a word.
-fn below_floor(d: &Diagnosis, floor: Option<f64>) -> bool {
-    let after = d.error.as_ref().and_then(|error| error.after.rmse_n.or(error.after.mse));
-    after.zip(floor).is_some_and(|(after, floor)| after < floor)
+/// Ends of the 90 % interval; nothing of a value that was not fitted.
+fn interval(e: &ParameterEstimate) -> Option<(String, String)> {
+    let is_fixed = e.low90 == e.value && e.high90 == e.value;
+    (!is_fixed).then(|| (number(e.low90), number(e.high90)))
 }
 
-/// The headline as a share of the measured value.
-fn percent(d: &Diagnosis) -> Option<String> {
-    let error = d.error.as_ref()?;
-    let of = |e: &HeldOutError| e.mape_pct.filter(|p| p.is_finite());
-    let (before, after) = (of(&error.before)?, of(&error.after)?);
-    Some(format!("{} % before, {} % after", number(before), number(after)))
+fn unit_of(e: &ParameterEstimate) -> String {
+    if e.unit == "1" { String::new() } else { clean(&e.unit, NAME) }
 }
 
-fn parameter(name: &str, e: &ParameterEstimate) -> Value {
-    let unit = if e.unit == "1" { String::new() } else { clean(&e.unit, NAME) };
-    json!({
-        "name": clean(name, NAME), "value": number(e.value), "low": number(e.low90), "high": number(e.high90),
-        "unit": unit, "fixed": e.low90 == e.value && e.high90 == e.value,
-    })
-}
-
+/// The card of an effect.
 fn effect(effect: &NamedEffect) -> Value {
     let weight = |name: &str, weight: f64| {
         let width = 100.0 * if weight.is_finite() { weight.clamp(0.0, 1.0) } else { 0.0 };
         json!({"name": clean(name, NAME), "weight": number(weight), "width": format!("{width:.0}")})
     };
-    let rivals = effect.indistinguishable_from.iter().take(ROWS).map(|r| weight(&r.name, r.weight));
-    let parameters = effect.parameters.iter().take(ROWS).map(|(name, e)| parameter(name, e));
+    let alternatives = effect.indistinguishable_from.iter().take(ROWS).map(|r| weight(&r.name, r.weight));
+    let fact = |(name, e): (&String, &ParameterEstimate)| {
+        let range = interval(e).map_or("fixed".into(), |(low, high)| format!("{low} to {high}"));
+        [format!("{} = {} {}", clean(name, NAME), number(e.value), unit_of(e)), range]
+    };
+    let part = effect.part.as_ref().map_or(String::new(), |part| format!(" on {}", clean(part, NAME)));
+    let tied = match effect.indistinguishable_from.is_empty() {
+        true => "",
+        false => "These data do not tell it apart from the others below. ",
+    };
+    let separate = effect.separate_by.as_ref();
     json!({
-        "name": clean(&effect.name, NAME),
-        "part": effect.part.as_ref().map(|p| clean(p, NAME)),
-        "class": names(&effect.class),
-        "tied": !effect.indistinguishable_from.is_empty(),
-        "weights": std::iter::once(weight(&effect.name, effect.weight)).chain(rivals).collect::<Vec<_>>(),
-        "parameters": parameters.collect::<Vec<_>>(),
-        "separate": effect.separate_by.as_ref().map(|s| clean(&s.text, SENTENCE)),
-        "campaign": effect.separate_by.as_ref().and_then(|s| s.campaign.as_ref()).map(|c| clean(c, 4 * NAME)),
+        "title": clean(&effect.name, NAME) + &part,
+        "facts": effect.parameters.iter().take(ROWS).map(fact).collect::<Vec<_>>(),
+        "about": format!("{tied}Share of the evidence:"),
+        "weights": std::iter::once(weight(&effect.name, effect.weight)).chain(alternatives).collect::<Vec<_>>(),
+        "end": (effect.class.len() > 1).then(|| format!("Class: {}", list(&effect.class))),
+        "next": separate.map(|s| clean(&s.text, SENTENCE)),
+        "file": separate.and_then(|s| s.campaign.as_ref()).map(|file| clean(file, 4 * NAME)),
     })
 }
 
-fn names(names: &[String]) -> Vec<String> {
+fn list(names: &[String]) -> String {
     let mut shown: Vec<String> = names.iter().take(ROWS).map(|n| clean(n, NAME)).collect();
     if names.len() > ROWS {
         shown.push(format!("and {} more", names.len() - ROWS));
     }
-    shown
-}
-
-pub(super) fn groups(groups: &[PlotGroup]) -> Vec<Value> {
-    let drawn = |g: &PlotGroup| g.plots.iter().map(|p| p.series.len().min(SERIES)).sum::<usize>();
-    let series: usize = groups.iter().map(drawn).sum();
-    let most = (ALL_POINTS / series.max(1)).clamp(8, SERIES_POINTS);
-    let mut room = PLOTS;
-    groups
-        .iter()
-        .filter(|g| !g.plots.is_empty())
-        .map(|group| {
-            let plots: Vec<Value> = group.plots.iter().take(room).map(|p| figure(p, most)).collect();
-            room -= plots.len();
-            json!({"title": clean(&group.title, NAME), "about": clean(&group.about, SENTENCE), "plots": plots})
-        })
-        .filter(|group| group["plots"].as_array().is_some_and(|p| !p.is_empty()))
-        .collect()
-}
-
-pub(crate) fn figure(plot: &Plot, most: usize) -> Value {
-    let mut plot = plot.clone();
-    plot.series.truncate(SERIES);
-    let legend = plot
-        .series
-        .iter()
-        .enumerate()
-        .map(|(i, s)| json!({"name": clean(&s.name, 30), "class": plot::class(&plot.series, i)}));
-    let legend: Vec<Value> = if plot.series.len() > 1 { legend.collect() } else { Vec::new() };
-    json!({"title": clean(&plot.title, NAME), "svg": plot::draw(&plot, most), "legend": legend})
+    shown.join(", ")
 }
 
 /// What the page does not show, for people.
-fn left_out(diagnosed: &Diagnosed) -> Vec<String> {
-    let report = &diagnosed.report;
+fn left_out(d: &Diagnosis, report: &ReportData) -> Vec<String> {
     let plots: usize = report.groups.iter().map(|g| g.plots.len()).sum();
     let counts = [
         (plots, PLOTS, "plots"),
         (report.evidence.len(), ROWS, "candidates"),
         (report.worst.len(), ROWS, "observations that fit badly"),
-        (diagnosed.diagnosis.notes.len(), ROWS, "notes"),
+        (d.notes.len(), ROWS, "notes"),
     ];
     let more = counts.iter().filter(|(n, most, _)| n > most);
     more.map(|(n, most, what)| format!("{} more {what} are not shown", n - most)).collect()

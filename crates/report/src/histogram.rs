@@ -1,7 +1,8 @@
 //! Distributions as bars; those of a selection are drawn over those of all by the script of the page.
 
-use super::axis::Axis;
-use super::plot::{escape, shorten};
+use crate::axis::Axis;
+use crate::svg::label;
+use crate::text::{escape, shorten};
 use gripgen_twin::Values;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -96,12 +97,7 @@ impl Histogram {
                 // Words at the ends do not stand out of the drawing.
                 let half = 3.3 * text.chars().count() as f64;
                 let x = (SIDE + room * share).clamp(half, WIDTH - half);
-                let _ = write!(
-                    svg,
-                    "<text x=\"{x:.1}\" y=\"{:.0}\" class=\"x\">{}</text>",
-                    bottom + 15.0,
-                    escape(text)
-                );
+                svg += &label(x, bottom + 15.0, "x", text);
             }
         }
         svg + "</svg>"

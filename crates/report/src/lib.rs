@@ -1,153 +1,47 @@
-//! The report of a diagnosis: one HTML page with its plots inside.
+//! What people look at: pages with plots and pictures inside, and pictures of runs, pulls and parts.
+//!
+//! ```
+//! use gripgen_report::{Plot, Series};
+//!
+//! let mut measured = Series::points("gear", [(20.0, 6.1), (40.0, 12.3)]);
+//! measured.errors = vec![0.3, 0.5];
+//! let expected = Series::line("gear, expected", [(20.0, 6.0), (40.0, 12.0)]);
+//! let plot = Plot::new("labels", "grip force of a jaw, N", "label, N", vec![measured, expected]);
+//! assert!(plot.to_svg().starts_with("<svg"));
+//! ```
+//!
+//! A page is one HTML file that needs neither a network nor, but for `view` and `--live`, a script. This crate fits
+//! nothing, opens no engine and knows no sensor: it is given what it shows.
 
 mod axis;
 mod bars;
 mod comparison;
-mod doubt;
+mod diagnosis;
 mod histogram;
 mod page;
+pub mod picture;
 mod plot;
-mod sections;
-mod sentence;
-#[cfg(test)]
-mod tests;
+mod presses;
+mod svg;
+mod text;
+mod tried;
+mod view;
 
-pub use comparison::{PageTable, comparison_page};
-pub(crate) use doubt::one_for_all;
-pub(crate) use histogram::Histogram;
-pub use page::diagnosis_page;
-pub(crate) use page::{clean, figure, rendered_with};
-pub(crate) use sections::{PageFigure, PageSection, jpeg_url, png_url, sections_page};
-
-use gripgen_identify::Diagnosis;
-use gripgen_twin::Posterior;
-
-/// How the points of a series are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mark {
-    /// A dot each, with a bar where an error is given.
-    Points,
-    /// Joined by a line.
-    Line,
-    /// The outline of an area, which is filled.
-    Band,
-}
-
-/// Points of a plot.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Series {
-    /// Its name in the legend.
-    pub name: String,
-    /// How it is drawn.
-    pub mark: Mark,
-    /// (x, y) of each point.
-    pub points: Vec<(f64, f64)>,
-    /// Half lengths of error bars, or empty.
-    pub errors: Vec<f64>,
-}
-
-/// A plot.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plot {
-    /// What it shows.
-    pub title: String,
-    /// Label of the x axis, with its unit.
-    pub x_label: String,
-    /// Label of the y axis, with its unit.
-    pub y_label: String,
-    /// Words in place of the numbers 0, 1, 2... of the x axis, for covariates that are words.
-    pub x_words: Vec<String>,
-    /// What is drawn.
-    pub series: Vec<Series>,
-}
-
-/// Plots that belong together.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlotGroup {
-    /// Heading.
-    pub title: String,
-    /// A sentence below it.
-    pub about: String,
-    /// The plots.
-    pub plots: Vec<Plot>,
-}
-
-/// A candidate in the table of evidence.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EvidenceRow {
-    /// Its name: an effect, "none", or "curve in humidity_pct".
-    pub name: String,
-    /// Gain in held-out log-likelihood over the model without it.
-    pub heldout_gain: f64,
-    /// Standard error of that.
-    pub standard_error: f64,
-    /// Error on held-out data with it.
-    pub heldout_error: f64,
-    /// Fitted values, for people.
-    pub values: String,
-    /// What became of it: "named", "tied with wear", "worse", "as good on held-out pulls", "contradicted by the traces".
-    pub fate: String,
-}
-
-/// An observation that fits badly.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WorstRow {
-    /// Its id.
-    pub id: String,
-    /// What it is, for people: part, force.
-    pub about: String,
-    /// Measured.
-    pub measured: f64,
-    /// Predicted after the effects were added.
-    pub predicted: f64,
-    /// Difference in standard deviations.
-    pub deviations: f64,
-}
-
-/// What the page shows beside the diagnosis itself.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct ReportData {
-    /// Title of the page.
-    pub title: String,
-    /// The verdict in one sentence.
-    pub sentence: String,
-    /// Plots in the order of the page.
-    pub groups: Vec<PlotGroup>,
-    /// How many of these decide the answer: they stand before everything else.
-    pub decides: usize,
-    /// What to do next: a sentence, and a command or nothing.
-    pub next: Vec<(String, String)>,
-    /// The candidates.
-    pub evidence: Vec<EvidenceRow>,
-    /// The worst observations.
-    pub worst: Vec<WorstRow>,
-    /// The unit of errors: `N`, or `grey levels^2`.
-    pub error_unit: String,
-}
-
-/// What a diagnosis of any channel hands back.
-#[derive(Debug, Clone)]
-pub struct Diagnosed {
-    /// The answer.
-    pub diagnosis: Diagnosis,
-    /// What it changes in the twin.
-    pub edits: crate::TwinEdits,
-    /// What the report shows.
-    pub report: ReportData,
-    /// The pulls that would tell apart what these could not.
-    pub next: Option<crate::NextPulls>,
-    /// Draws of cause and parameters, of pulls.
-    pub posterior: Option<Posterior>,
-}
-
-impl Diagnosed {
-    /// An answer, with its sentences for a technician: what was found, and that its name is not sure where it is not.
-    pub(crate) fn new(mut diagnosis: Diagnosis, edits: crate::TwinEdits, report: ReportData) -> Self {
-        let mut plain = gripgen_identify::plain(&diagnosis);
-        if let Some(doubt) = doubt::doubt(&diagnosis, &report.evidence) {
-            plain += &format!(" {doubt}");
-        }
-        diagnosis.plain = Some(plain);
-        Self { diagnosis, edits, report, next: None, posterior: None }
-    }
-}
+pub use comparison::{ComparedPulls, pull_comparison_page};
+pub use diagnosis::doubt::doubt;
+pub use diagnosis::imprints::imprint_report;
+pub use diagnosis::presses::{PressPlace, press_report};
+pub use diagnosis::pulls::{SimulatePull, pull_report};
+pub use diagnosis::sensor::sensor_report;
+pub use diagnosis::{EvidenceRow, ReportData, WorstRow, diagnosis_page};
+pub use page::live_page;
+pub use picture::grips::grips_picture;
+pub use picture::sample::{JawPress, PictureSampleError, sample_picture};
+pub use picture::scene::{Rasterise, View};
+pub use picture::sheet::{
+    CONTACT_SHEET, SheetError, contact_sheet, contact_sheet_samples, publish_contact_sheet,
+};
+pub use plot::{Mark, Plot, PlotGroup, Series};
+pub use presses::{PressMap, PressPage, PressScores, PressShown, Score, press_page};
+pub use tried::{FrictionRange, GripTried, Holding, TriedPart, WorksAt, tried_page, tried_picture};
+pub use view::{ViewOptions, ViewPage, view_page};

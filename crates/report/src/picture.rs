@@ -1,20 +1,17 @@
-//! Pictures for people: what a run, a sample or a part looks like.
+//! Pictures for people: what a run, a sample or a part looks like; and what they are drawn with.
 
 mod canvas;
 mod colours;
 mod film;
-mod layout;
+pub(crate) mod grips;
+pub(crate) mod layout;
 mod plot;
 mod rig;
-mod sample;
-mod scene;
-mod sheet;
+pub(crate) mod sample;
+pub(crate) mod scene;
+pub(crate) mod sheet;
 
 pub use canvas::{Anchor, Canvas, Rgb, TextStyle};
 pub use colours::{COMMAND, FAILED, GRID, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
-pub(crate) use layout::{CAPTION, HEADER, IMAGE, MARGIN, fit, frame, pixel};
 pub(crate) use plot::axes;
 pub use plot::{Area, Curve, pull_curve};
-pub use sample::{PictureSampleError, sample_picture};
-pub(crate) use scene::{Scene, SceneMesh, View};
-pub use sheet::{CONTACT_SHEET, contact_sheet, contact_sheet_samples, publish_contact_sheet};

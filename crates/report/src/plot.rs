@@ -1,238 +1,81 @@
-//! Plots as SVG, drawn by ourselves: a page needs no script and no other file.
+//! What a plot shows; `svg.rs` draws it.
 
-use super::axis::Axis;
-use super::{Mark, Plot, Series};
-use std::fmt::Write;
-
-/// Width of a plot in its own units, and height of what is drawn in it; the page scales it.
-const WIDTH: f64 = 420.0;
-const INNER_HEIGHT: f64 = 232.0;
-const TOP: f64 = 8.0;
-const RIGHT: f64 = 12.0;
-/// Width of a letter of the labels, in the mean.
-const LETTER: f64 = 6.6;
-/// Colours of series; the style sheet has as many.
-const COLOURS: usize = 8;
-/// Letters of a word on the x axis.
-const LONGEST_WORD: usize = 18;
-
-/// The points whose name begins the name of a line (`gear` of `gear 0, expected`).
-fn points_of(all: &[Series], i: usize) -> Option<usize> {
-    let begins =
-        |whole: &str, name: &str| whole.strip_prefix(name).is_some_and(|rest| rest.starts_with([' ', ',']));
-    let of = |s: &Series| s.mark == Mark::Points && begins(&all[i].name, &s.name);
-    all.iter().position(of).filter(|_| all[i].mark == Mark::Line)
+/// How the points of a series are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// A dot each, with a bar where an error is given.
+    Points,
+    /// Joined by a line.
+    Line,
+    /// The outline of an area, which is filled.
+    Band,
 }
 
-/// The class of a series, which gives it its colour: before and after have the same everywhere, and a line has that of its points.
-pub(super) fn class(all: &[Series], i: usize) -> String {
-    let i = points_of(all, i).unwrap_or(i);
-    let of = |name: &str| match name {
-        "before" => Some("cb"),
-        "after" => Some("ca"),
-        _ => None,
-    };
-    let number = (0..i).filter(|&j| points_of(all, j).is_none()).count();
-    match of(&all[i].name) {
-        Some(class) => class.into(),
-        // The first colour is that of what is after.
-        None if all.iter().any(|s| of(&s.name).is_some()) => format!("c{}", 1 + number % (COLOURS - 1)),
-        None => format!("c{}", number % COLOURS),
+/// Points of a plot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Its name in the legend.
+    pub name: String,
+    /// How it is drawn.
+    pub mark: Mark,
+    /// (x, y) of each point.
+    pub points: Vec<(f64, f64)>,
+    /// Half lengths of error bars, or empty.
+    pub errors: Vec<f64>,
+}
+
+impl Series {
+    /// A series without error bars.
+    pub fn new(name: impl Into<String>, mark: Mark, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { name: name.into(), mark, points: points.into_iter().collect(), errors: Vec::new() }
+    }
+
+    /// Dots.
+    pub fn points(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self::new(name, Mark::Points, points)
+    }
+
+    /// A line.
+    pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self::new(name, Mark::Line, points)
     }
 }
 
-/// A text that a page may hold: markup characters escaped, characters that XML forbids left out.
-pub(super) fn escape(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            '\'' => safe.push_str("&#39;"),
-            '\n' | '\t' => safe.push(' '),
-            c if c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c) => {}
-            c => safe.push(c),
-        }
-    }
-    safe
+/// A plot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plot {
+    /// What it shows.
+    pub title: String,
+    /// Label of the x axis, with its unit.
+    pub x_label: String,
+    /// Label of the y axis, with its unit.
+    pub y_label: String,
+    /// Words in place of the numbers 0, 1, 2... of the x axis, for covariates that are words.
+    pub x_words: Vec<String>,
+    /// What is drawn.
+    pub series: Vec<Series>,
 }
-
-/// At most `most` letters of a text, the end replaced by a dot-dot-dot.
-pub(super) fn shorten(text: &str, most: usize) -> String {
-    if text.chars().count() <= most {
-        return text.into();
-    }
-    text.chars().take(most - 1).chain(['\u{2026}']).collect()
-}
-
-/// Draws a plot; of each series at most `most` points, so that a page has a size.
-pub(super) fn draw(plot: &Plot, most: usize) -> String {
-    let mut series: Vec<Thinned> = plot.series.iter().map(|s| thin(s, most)).collect();
-    let all = || series.iter().flat_map(|s| &s.points);
-    let heights = all().flat_map(|p| [p.1 - p.2, p.1 + p.2]);
-    let y = Axis::of(heights, 5);
-    let words: Vec<String> = plot.x_words.iter().map(|w| shorten(w, LONGEST_WORD)).collect();
-    let x = if words.is_empty() { Axis::of(all().map(|p| p.0), 6) } else { Axis::of_words(&words, 24) };
-
-    let letters =
-        |ticks: &[(f64, String)]| ticks.iter().map(|t| t.1.chars().count()).max().unwrap_or(1) as f64;
-    let left = 34.0 + LETTER * letters(&y.ticks);
-    let room = (WIDTH - left - RIGHT) / x.ticks.len().max(1) as f64;
-    // Words that do not fit beside each other stand upright.
-    let upright = !words.is_empty() && LETTER * letters(&x.ticks) + 6.0 > room;
-    let below = if upright { 14.0 + LETTER * letters(&x.ticks) } else { 20.0 };
-    let bottom = TOP + INNER_HEIGHT;
-    let whole = bottom + below + 20.0;
-    let at = |px: f64, py: f64| {
-        (left + x.share(px) * (WIDTH - left - RIGHT), bottom - y.share(py) * (bottom - TOP))
-    };
-
-    let name = escape(&format!("{}: {} over {}", plot.title, plot.y_label, plot.x_label));
-    let mut svg =
-        format!("<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {whole:.0}\" role=\"img\" aria-label=\"{name}\">");
-    let mut grid = String::new();
-    for (value, text) in &y.ticks {
-        let (_, py) = at(x.low, *value);
-        let _ = write!(grid, "M{left:.0} {py:.1}H{:.0}", WIDTH - RIGHT);
-        let _ = write!(
-            svg,
-            "<text x=\"{:.0}\" y=\"{:.1}\" class=\"y\">{}</text>",
-            left - 6.0,
-            py + 4.0,
-            escape(text)
-        );
-    }
-    for (value, text) in &x.ticks {
-        let (px, _) = at(*value, y.low);
-        let _ = write!(grid, "M{px:.1} {bottom:.0}v-{:.0}", bottom - TOP);
-        let text = escape(text);
-        let _ = if upright {
-            let (tx, ty) = (px + 4.0, bottom + 6.0);
-            write!(
-                svg,
-                "<text x=\"{tx:.1}\" y=\"{ty:.1}\" class=\"y\" transform=\"rotate(-90 {tx:.1} {ty:.1})\">{text}</text>"
-            )
-        } else {
-            write!(svg, "<text x=\"{px:.1}\" y=\"{:.1}\" class=\"x\">{text}</text>", bottom + 15.0)
-        };
-    }
-    let _ = write!(svg, "<path class=\"grid\" d=\"{grid}\"/>");
-    if y.low < 0.0 && y.high > 0.0 {
-        let _ = write!(
-            svg,
-            "<path class=\"zero\" d=\"M{left:.0} {:.1}H{:.0}\"/>",
-            at(x.low, 0.0).1,
-            WIDTH - RIGHT
-        );
-    }
-    let shown = plot.series.len().max(1) as f64;
-    for (i, (own, thinned)) in plot.series.iter().zip(&mut series).enumerate() {
-        // One point a word is a mean, which stands where it is.
-        let many = thinned.points.len() > words.len();
-        if !words.is_empty() && own.mark == Mark::Points && many {
-            spread(&mut thinned.points, 0.7 * ((i as f64 + 0.5) / shown - 0.5), 0.5 / shown);
-        }
-        svg.push_str(&marks(own.mark, thinned, &class(&plot.series, i), &at));
-    }
-    let (middle, x_label) = ((left + WIDTH - RIGHT) / 2.0, escape(&shorten(&plot.x_label, 60)));
-    let _ = write!(svg, "<text x=\"{middle:.0}\" y=\"{:.0}\" class=\"x\">{x_label}</text>", whole - 6.0);
-    let (height, y_label) = ((TOP + bottom) / 2.0, escape(&shorten(&plot.y_label, 40)));
-    let _ = write!(
-        svg,
-        "<text x=\"13\" y=\"{height:.0}\" class=\"x\" transform=\"rotate(-90 13 {height:.0})\">{y_label}</text></svg>"
-    );
-    svg
-}
-
-/// What the style sheet of a page says of plots, for a picture of its own.
-const STYLE: &str = "text { font: 12px system-ui, sans-serif; fill: #1d2328 } .x { text-anchor: middle } \
-    .y { text-anchor: end } path { fill: none; stroke: #0072b2 } .grid { stroke: #e6e9ed } .zero { stroke: #5b6670 } \
-    .line { stroke-width: 2 } .dots { stroke-width: 5.5; stroke-linecap: round } .c1 { stroke: #d55e00 } .cb { stroke: #87919b }";
 
 impl Plot {
-    /// The plot as an SVG file of its own, with its title above it.
-    pub fn to_svg(&self) -> String {
-        let inner = draw(self, 800).replace("<svg class=\"plot\"", "<svg y=\"24\"");
-        let title = escape(&shorten(&self.title, 60));
-        let (width, height) = (WIDTH, INNER_HEIGHT + 100.0);
-        format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
-             height=\"{height}\"><style>{STYLE}</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\
-             <text x=\"{}\" y=\"18\" class=\"x\">{title}</text>{inner}</svg>\n",
-            WIDTH / 2.0
-        )
+    /// A plot over numbers.
+    pub fn new(
+        title: impl Into<String>,
+        x_label: impl Into<String>,
+        y_label: impl Into<String>,
+        series: Vec<Series>,
+    ) -> Self {
+        let (title, x_label, y_label) = (title.into(), x_label.into(), y_label.into());
+        Self { title, x_label, y_label, x_words: Vec::new(), series }
     }
 }
 
-/// Points with the half lengths of their error bars, few enough to draw.
-struct Thinned {
-    points: Vec<(f64, f64, f64)>,
-    errors: bool,
-}
-
-/// At most about `most` of the finite points: of a line the lowest and the highest of each stretch, of dots every n-th.
-fn thin(series: &Series, most: usize) -> Thinned {
-    let errors = series.errors.len() == series.points.len() && !series.errors.is_empty();
-    let error = |i: usize| if errors && series.errors[i].is_finite() { series.errors[i].abs() } else { 0.0 };
-    let all = series.points.iter().enumerate().map(|(i, &(x, y))| (x, y, error(i)));
-    // Beyond this the distance of two values has no number.
-    let points: Vec<_> = all.filter(|p| p.0.abs() < 1e300 && p.1.abs() + p.2 < 1e300).collect();
-    let most = most.max(4);
-    if points.len() <= most {
-        return Thinned { points, errors };
-    }
-    let points = match series.mark {
-        Mark::Points | Mark::Band => (0..most).map(|i| points[i * points.len() / most]).collect(),
-        Mark::Line => {
-            let stretch = points.len().div_ceil(most / 2);
-            points.chunks(stretch).flat_map(ends).collect()
-        }
-    };
-    Thinned { points, errors }
-}
-
-/// The lowest and the highest point of a stretch, in their order.
-fn ends(stretch: &[(f64, f64, f64)]) -> Vec<(f64, f64, f64)> {
-    let by = |a: &&(f64, f64, f64), b: &&(f64, f64, f64)| a.1.total_cmp(&b.1);
-    let place = |p: &(f64, f64, f64)| stretch.iter().position(|q| q == p);
-    let (Some(low), Some(high)) = (stretch.iter().min_by(by), stretch.iter().max_by(by)) else {
-        return vec![];
-    };
-    if place(low) <= place(high) { vec![*low, *high] } else { vec![*high, *low] }
-}
-
-/// Points of one word beside each other, those of each series in a strip of their own: they hide each other less.
-fn spread(points: &mut [(f64, f64, f64)], middle: f64, width: f64) {
-    if points.len() < 2 {
-        return;
-    }
-    for (i, point) in points.iter_mut().enumerate() {
-        let share = (i as f64 * 0.618_034).fract();
-        point.0 += middle + width * (share - 0.5);
-    }
-}
-
-fn marks(mark: Mark, series: &Thinned, colour: &str, at: &dyn Fn(f64, f64) -> (f64, f64)) -> String {
-    let (mut path, mut bars) = (String::new(), String::new());
-    for (i, &(px, py, error)) in series.points.iter().enumerate() {
-        let (x, y) = at(px, py);
-        let _ = match mark {
-            // A line of no length with round ends is a dot.
-            Mark::Points => write!(path, "M{x:.1} {y:.1}h0"),
-            Mark::Line | Mark::Band => write!(path, "{}{x:.1} {y:.1}", if i == 0 { 'M' } else { 'L' }),
-        };
-        if series.errors && error > 0.0 {
-            let _ = write!(bars, "M{x:.1} {:.1}V{:.1}", at(px, py - error).1, at(px, py + error).1);
-        }
-    }
-    let class = match mark {
-        Mark::Points if series.points.len() > 120 => "dots many",
-        Mark::Points => "dots",
-        Mark::Line => "line",
-        Mark::Band => "band",
-    };
-    let bars = if bars.is_empty() { bars } else { format!("<path class=\"bars {colour}\" d=\"{bars}\"/>") };
-    format!("{bars}<path class=\"{class} {colour}\" d=\"{path}\"/>")
+/// Plots that belong together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlotGroup {
+    /// Heading.
+    pub title: String,
+    /// A sentence below it.
+    pub about: String,
+    /// The plots.
+    pub plots: Vec<Plot>,
 }

@@ -1,31 +1,49 @@
 //! A report of predicted against real presses, as one HTML file.
 
-use crate::report::{png_url, rendered_with};
+use crate::page::{Page, Table};
 use gripgen_record::encode_png;
-use gripgen_tactile::metrics::Score;
-use gripgen_tactile::presses::{PressComparison, PressSet};
 use gripgen_twin::TactileImage;
-use serde_json::{Value, json};
 
 /// How much larger than life differences are drawn.
 const ENLARGED: i32 = 8;
 
-/// Longest bar of the table, in rem.
-const LONGEST_BAR: f64 = 12.0;
+/// How like two images are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// Mean squared error.
+    pub mse: f64,
+    /// Peak signal-to-noise ratio.
+    pub psnr_db: f64,
+    /// Structural similarity.
+    pub ssim: f64,
+    /// Mean absolute error.
+    pub l1: f64,
+}
 
-/// What a report says besides scores and pictures.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PressReportText {
-    /// Title of the page.
-    pub title: String,
-    /// What was done, in a sentence or two.
-    pub summary: String,
-    /// What the error is an error of: held-out presses, say.
-    pub meaning: String,
-    /// Names and values of what was found.
-    pub facts: Vec<(String, String)>,
-    /// Where in the frame something was pressed.
-    pub map: Option<PressMap>,
+/// Scores of a press, or their means.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PressScores {
+    /// Of the whole frame.
+    pub full: Score,
+    /// Of 400 x 400 px around the contact.
+    pub crop400: Score,
+    /// Of 200 x 200 px.
+    pub crop200: Score,
+    /// Of 160 x 160 px.
+    pub window: Score,
+}
+
+/// A press of the page.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PressShown<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// The real image.
+    pub image: &'a TactileImage,
+    /// Centre and radius of the contact in pixels, where it is known.
+    pub circle_px: Option<[f64; 3]>,
+    /// How like the predicted image is.
+    pub scores: PressScores,
 }
 
 /// A picture of the frame that shows where something was pressed.
@@ -37,110 +55,130 @@ pub struct PressMap {
     pub text: String,
 }
 
-/// The page: scores of all presses, pictures of three of them. `predict` draws the prediction that was scored.
-pub fn press_report(
-    text: &PressReportText,
-    set: &PressSet,
-    comparison: &PressComparison,
-    predict: impl Fn(usize) -> Option<TactileImage>,
-) -> String {
-    let mut order: Vec<usize> = (0..comparison.each.len()).collect();
-    let error = |i: usize| comparison.each[i].scores.crop400.mse;
+/// What a report of presses shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressPage<'a> {
+    /// Title of the page.
+    pub title: String,
+    /// What was done, in a sentence or two.
+    pub summary: String,
+    /// What the error is an error of: held-out presses, say.
+    pub meaning: String,
+    /// Names and values of what was found.
+    pub facts: Vec<(String, String)>,
+    /// Where in the frame something was pressed.
+    pub map: Option<PressMap>,
+    /// Means over all presses.
+    pub mean: PressScores,
+    /// The presses.
+    pub presses: Vec<PressShown<'a>>,
+}
+
+/// The page: scores of all presses, pictures of five of them at most. `predict` draws the prediction that was scored.
+pub fn press_page(shown: &PressPage<'_>, predict: impl Fn(usize) -> Option<TactileImage>) -> String {
+    let presses = &shown.presses;
+    let error = |i: usize| presses[i].scores.crop400.mse;
+    let mut order: Vec<usize> = (0..presses.len()).collect();
     order.sort_by(|&a, &b| error(b).total_cmp(&error(a)));
+    let mut page = Page::new(&shown.title);
+    page.text(&shown.summary);
+    page.facts(&shown.facts);
+    page.section(
+        "Error of the predicted images",
+        &format!(
+            "{} Means over {} presses; MSE and L1 in grey levels of 0 to 255. The whole frame is mostly gel at rest: look at the \
+             crops around the contact first.",
+            shown.meaning,
+            presses.len()
+        ),
+    );
+    page.table(&means(shown));
+    if let Some(map) = &shown.map {
+        let about = format!("{}. Colours elsewhere are continued from there.", map.text);
+        page.section("Where something was pressed", &about);
+        page.figures(&[picture("frame at rest, dark where nothing was pressed", &map.image)], &[], 0);
+    }
+    page.section("The worst, the middle and the best press", "");
+    for (rank, i) in ranks(&order) {
+        let Some(predicted) = predict(i) else { continue };
+        let (press, mse) = (&presses[i], error(i));
+        page.part(&format!("{}: MSE {mse:.1} in the 400 px crop ({rank})", press.name), "");
+        let left = difference(press.image, &predicted);
+        let figures = [
+            picture("real", press.image),
+            picture("predicted", &predicted),
+            picture(&format!("real minus predicted, {ENLARGED} times enlarged, grey is none"), &left),
+        ];
+        page.figures(&figures, &[], 0);
+    }
+    page.section("Each press", "");
+    page.table(&each(presses, order.first().copied()));
+    page.html()
+}
+
+fn means(shown: &PressPage<'_>) -> Table {
     // A crop ends where the frame does.
-    let (width, height) = set.presses.first().map_or((0, 0), |p| (p.image.width_px, p.image.height_px));
+    let (width, height) = shown.presses.first().map_or((0, 0), |p| (p.image.width_px, p.image.height_px));
     let around = |side: u32| format!("{} x {} px around the contact", side.min(width), side.min(height));
-    let page = json!({
-        "title": text.title,
-        "summary": text.summary,
-        "meaning": text.meaning,
-        "facts": text.facts.iter().map(|(name, value)| json!({"name": name, "value": value})).collect::<Vec<_>>(),
-        "map": text.map.as_ref().map(|map| json!({"image": data_url(&map.image), "text": map.text})),
-        "means": [
-            mean_row("whole frame", &comparison.mean.full),
-            mean_row(&around(400), &comparison.mean.crop400),
-            mean_row(&around(200), &comparison.mean.crop200),
-            mean_row(&around(160), &comparison.mean.window),
-        ],
-        "pictures": pictures(set, comparison, &order, predict),
-        "presses": press_rows(set, comparison, &order),
-    });
-    rendered_with("presses.html", &page)
+    let PressScores { full, crop400, crop200, window } = shown.mean;
+    let rows = [
+        ("whole frame".into(), full),
+        (around(400), crop400),
+        (around(200), crop200),
+        (around(160), window),
+    ];
+    let row = |(name, s): (String, Score)| {
+        let Score { mse, psnr_db, ssim, l1 } = s;
+        vec![name, format!("{mse:.2}"), format!("{psnr_db:.2}"), format!("{ssim:.4}"), format!("{l1:.2}")]
+    };
+    Table::new(&["", "MSE", "PSNR, dB", "SSIM", "L1"], rows.map(row))
 }
 
-fn mean_row(name: &str, score: &Score) -> Value {
-    json!({
-        "name": name,
-        "mse": format!("{:.2}", score.mse),
-        "psnr": format!("{:.2}", score.psnr_db),
-        "ssim": format!("{:.4}", score.ssim),
-        "l1": format!("{:.2}", score.l1),
-    })
+/// The scores of all presses; the worst one stands out.
+fn each(presses: &[PressShown<'_>], worst: Option<usize>) -> Table {
+    let most = worst.map_or(1.0, |i| presses[i].scores.crop400.mse).max(1e-9);
+    let row = |press: &PressShown<'_>| {
+        let PressScores { full, crop400, crop200, .. } = press.scores;
+        vec![
+            press.name.into(),
+            press.circle_px.map_or("-".into(), |[x, y, r]| format!("({x:.0}, {y:.0}) r {r:.0}")),
+            format!("{:.1}", full.mse),
+            format!("{:.1}", crop400.mse),
+            format!("{:.2}", crop400.psnr_db),
+            format!("{:.4}", crop400.ssim),
+            format!("{:.1}", crop200.mse),
+        ]
+    };
+    let head = ["press", "contact, px", "MSE full", "MSE 400", "PSNR 400", "SSIM 400", "MSE 200"];
+    Table {
+        strong: worst.into_iter().collect(),
+        bars: presses.iter().map(|press| press.scores.crop400.mse / most).collect(),
+        ..Table::new(&head, presses.iter().map(row))
+    }
 }
 
-fn press_rows(set: &PressSet, comparison: &PressComparison, order: &[usize]) -> Vec<Value> {
-    let worst = order.first().map_or(1.0, |&i| comparison.each[i].scores.crop400.mse).max(1e-9);
-    comparison
-        .each
-        .iter()
-        .enumerate()
-        .map(|(i, press)| {
-            let circle = set.presses[i]
-                .circle
-                .map_or("-".into(), |c| format!("({:.0}, {:.0}) r {:.0}", c.x_px, c.y_px, c.radius_px));
-            let s = &press.scores;
-            json!({
-                "name": press.name,
-                "circle": circle,
-                "worst": order.first() == Some(&i),
-                "full": format!("{:.1}", s.full.mse),
-                "crop400": format!("{:.1}", s.crop400.mse),
-                "psnr": format!("{:.2}", s.crop400.psnr_db),
-                "ssim": format!("{:.4}", s.crop400.ssim),
-                "crop200": format!("{:.1}", s.crop200.mse),
-                "bar": format!("{:.2}", LONGEST_BAR * s.crop400.mse / worst),
-            })
-        })
-        .collect()
-}
-
-/// The worst three, the middle one and the best.
-fn pictures(
-    set: &PressSet,
-    comparison: &PressComparison,
-    order: &[usize],
-    predict: impl Fn(usize) -> Option<TactileImage>,
-) -> Vec<Value> {
+/// The worst three, the middle one and the best, of presses from the worst to the best.
+fn ranks(order: &[usize]) -> Vec<(&'static str, usize)> {
     let n = order.len();
-    let last = n.saturating_sub(1);
     let wanted = [
         (0, "the worst"),
         (1, "second worst"),
         (2, "third worst"),
         (n / 2, "the median"),
-        (last, "the best"),
+        (n.saturating_sub(1), "the best"),
     ];
-    let mut ranks: Vec<(usize, &str)> = Vec::new();
-    for (rank, name) in wanted {
-        if rank < n && ranks.iter().all(|&(r, _)| r != rank) {
-            ranks.push((rank, name));
+    let mut found: Vec<(&str, usize)> = Vec::new();
+    for (place, rank) in wanted {
+        let press = order.get(place).copied();
+        if let Some(press) = press.filter(|press| found.iter().all(|(_, other)| other != press)) {
+            found.push((rank, press));
         }
     }
-    ranks
-        .into_iter()
-        .filter_map(|(rank, name)| {
-            let i = order[rank];
-            let (real, predicted) = (&set.presses[i].image, predict(i)?);
-            Some(json!({
-                "name": set.presses[i].name,
-                "rank": name,
-                "mse": format!("{:.1}", comparison.each[i].scores.crop400.mse),
-                "real": data_url(real),
-                "predicted": data_url(&predicted),
-                "difference": data_url(&difference(real, &predicted)),
-            }))
-        })
-        .collect()
+    found
+}
+
+fn picture(caption: &str, image: &TactileImage) -> (String, Vec<u8>) {
+    (caption.into(), encode_png(image).expect("an RGB image can be encoded"))
 }
 
 /// `128 + 8 (a - b)` per channel.
@@ -149,55 +187,34 @@ fn difference(a: &TactileImage, b: &TactileImage) -> TactileImage {
     TactileImage { rgb: a.rgb.iter().zip(&b.rgb).map(grey).collect(), ..*a }
 }
 
-fn data_url(image: &TactileImage) -> String {
-    png_url(&encode_png(image).expect("an RGB image can be encoded"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gripgen_tactile::presses::{Press, PressScore, Scores};
 
     #[test]
     fn a_page_names_every_press_and_draws_the_worst() {
         let image = TactileImage { width_px: 16, height_px: 16, rgb: vec![100; 16 * 16 * 3] };
-        let press = |name: &str| Press::of_ball(name, image.clone(), None);
-        let names = ["one", "two <b>", "three", "four", "five"];
-        let presses = names.map(press).to_vec();
-        let set = PressSet { metres_per_px: 1e-4, ball_m: 4e-3, rest: None, presses };
-        let score = |mse: f64| Score { mse, psnr_db: 40.0, ssim: 0.9, l1: 1.0 };
-        let each = names
-            .iter()
-            .zip([3.0, 9.0, 1.0, 2.0, 5.0])
-            .map(|(name, mse)| PressScore {
-                name: (*name).into(),
-                shape: "ball".into(),
-                scores: Scores {
-                    full: score(mse),
-                    crop400: score(mse),
-                    crop200: score(mse),
-                    window: score(mse),
-                },
-                zones: vec![],
-            })
-            .collect();
-        let comparison = PressComparison::from_each(each).unwrap();
-        let text = PressReportText {
+        let scores = |mse: f64| {
+            let s = Score { mse, psnr_db: 40.0, ssim: 0.9, l1: 1.0 };
+            PressScores { full: s, crop400: s, crop200: s, window: s }
+        };
+        let names = ["one", "two <b>", "three", "four", "five"].into_iter();
+        let press = |(name, mse)| PressShown { name, image: &image, circle_px: None, scores: scores(mse) };
+        let mut shown = PressPage {
             title: "Calibration".into(),
             summary: "36 presses".into(),
             meaning: "Held-out presses.".into(),
             facts: vec![("ball".into(), "4 mm".into())],
             map: None,
+            mean: scores(4.0),
+            presses: names.zip([3.0, 9.0, 1.0, 2.0, 5.0]).map(press).collect(),
         };
-        let mapped = PressReportText {
-            map: Some(PressMap { image: image.clone(), text: "60 % of the frame".into() }),
-            ..text.clone()
-        };
-        let page = press_report(&mapped, &set, &comparison, |_| None);
-        assert!(page.contains("60 % of the frame") && page.matches("<img ").count() == 1, "the map");
-        let page = press_report(&text, &set, &comparison, |_| Some(image.clone()));
+        let page = press_page(&shown, |_| Some(image.clone()));
         assert!(page.contains("two &lt;b&gt;: MSE 9.0 in the 400 px crop (the worst)"), "names are escaped");
         assert_eq!(page.matches("<img ").count(), 12, "worst three and best; the median is among them");
-        assert!(page.contains("<td>whole frame</td><td>4.00</td>"));
+        assert!(page.contains("whole frame</td><td class=\"\">4.00</td>"));
+        shown.map = Some(PressMap { image: image.clone(), text: "60 % of the frame".into() });
+        let page = press_page(&shown, |_| None);
+        assert!(page.contains("60 % of the frame") && page.matches("<img ").count() == 1, "the map");
     }
 }

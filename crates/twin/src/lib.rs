@@ -37,6 +37,7 @@ pub mod effects;
 mod film;
 pub mod frames;
 mod friction;
+mod grasp;
 mod image;
 mod jaw;
 mod label;
@@ -69,6 +70,7 @@ pub use campaign::{Campaign, PlannedPull, PullKind};
 pub use config::{DEFAULTED_SECTIONS, is_twin_key};
 pub use film::{CameraStamp, CellShear, FilmFrame, FilmPace, SlipState};
 pub use friction::{FrictionError, GripFriction, cell_friction, grip_friction};
+pub use grasp::{Grasp, Proposal};
 pub use image::TactileImage;
 pub use jaw::{Jaw, PerJaw};
 pub use label::{LabelError, PullEnd, SlipLabel, slip_label};
@@ -81,7 +83,7 @@ pub use mesh::{
     write_binary_stl,
 };
 pub use optics::{BACKGROUND_TERMS, FINER_TERMS, OpticsState};
-pub use patch::{ContactPatch, Grasp, PressureCell};
+pub use patch::{ContactPatch, PressureCell};
 pub use posterior::{CAUSE_KEY, Posterior, PosteriorDraw, PosteriorError};
 pub use rounded::rounded;
 pub use sample::{ImprintSummary, Outcome, Pulled, Sample};

@@ -1,7 +1,5 @@
 //! What a grip looks like once the jaws have settled, and its contacts as a few pressure cells.
 
-use crate::PerJaw;
-use crate::frames::Pose;
 
 /// One cell of a contact patch, in the `gel` frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,13 +71,4 @@ impl ContactPatch {
             .fold((0.0, 0.0), |(sx, sy), c| (sx + c.force_n * c.x_m, sy + c.force_n * c.y_m));
         (sx / f, sy / f)
     }
-}
-
-/// The settled grip: all that the tactile pipeline and the pull need to know of it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Grasp {
-    /// Where the part is, seen from each gel. The gel's origin lies on its unloaded surface.
-    pub gel_from_part: PerJaw<Pose>,
-    /// Normal force of each jaw.
-    pub normal_force_n: PerJaw<f64>,
 }

@@ -15,7 +15,8 @@ use gripgen::identify::pulls::priors::{Prior, PullPriors};
 use gripgen::twin::config::Feedback;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{MeasuredPulls, Twin};
-use gripgen::{Library, Location, in_parallel, load_twin_document};
+use gripgen::{Library, Location, load_twin_document};
+use gripgen::physics::in_parallel;
 use gripgen_cli::{calibrate_twin, compare_pulls_with, edited_twin, shipped_priors};
 use std::sync::Mutex;
 

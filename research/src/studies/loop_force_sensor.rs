@@ -6,7 +6,7 @@
 
 use crate::{StudyResult, arguments};
 use gripgen::identify::{Diagnosis, HeldOutError, Verdict};
-use gripgen::Plot;
+use gripgen_report::Plot;
 use gripgen_cli::{calibrate_sensor_table, diagnose_sensor_table, load_sensor_table};
 use std::error::Error;
 use std::fmt::Write as _;
@@ -47,7 +47,7 @@ fn write_page(folder: &Path, out: &Path, work: &Path) -> Result<(), Box<dyn Erro
         let diagnosed = diagnose_sensor_table(&table);
         rows += &row(name, before_n, best, &diagnosed.diagnosis, scale);
         writeln!(details, "\n### {name}\n")?;
-        for line in [&diagnosed.report.sentence].into_iter().chain(&diagnosed.diagnosis.notes) {
+        for line in diagnosed.diagnosis.plain.iter().chain(&diagnosed.diagnosis.notes) {
             writeln!(details, "* {}", line.trim_end_matches('.'))?;
         }
         writeln!(details, "\n| candidate | held-out gain | standard error | held-out error, N | fate |")?;

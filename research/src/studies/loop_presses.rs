@@ -9,8 +9,8 @@ use gripgen::tactile::presses::{CalibrateOptions, PressScene, PressSet, calibrat
 use gripgen::tactile::{Sensor, SensorFiles};
 use gripgen::twin::effects::{GripPoint, find};
 use gripgen::twin::{Covariates, Jaw, OpticsState};
-use gripgen::{Diagnosed, Plot};
-use gripgen_cli::{PressDiagnosisInput, PressGeometry, diagnose_presses, load_presses};
+use gripgen_cli::{Diagnosed, PressDiagnosisInput, PressGeometry, diagnose_presses, load_presses};
+use gripgen_report::Plot;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -96,7 +96,7 @@ fn chapter(
     out: &Path,
 ) -> Result<(), Box<dyn Error>> {
     let d = &found.diagnosis;
-    writeln!(text, "\n## {title}\n\n{}\n", found.report.sentence)?;
+    writeln!(text, "\n## {title}\n\n{}\n", found.diagnosis.plain.as_deref().unwrap_or_default())?;
     writeln!(text, "| | whole frame, held-out presses |\n|---|---|")?;
     writeln!(text, "| before | {} |", error(d, |e| &e.before))?;
     writeln!(text, "| after | {} |", error(d, |e| &e.after))?;

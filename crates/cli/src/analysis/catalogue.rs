@@ -3,7 +3,7 @@
 use crate::analysis::compare::compare_pulls;
 use crate::analysis::diagnose::UnknownPartError;
 use gripgen::Library;
-use gripgen::report::{Mark, Plot, Series};
+use gripgen_report::{Plot, Series};
 use gripgen_twin::columns::{self, Column, Kind};
 use gripgen_twin::effects::{Effect, EffectSpec, OutsideFit, Per};
 use gripgen_twin::{Covariates, MeasuredPull, MeasuredPulls, Twin};
@@ -126,13 +126,7 @@ pub fn effect_curve(
 impl EffectCurve {
     /// The curve as a plot.
     pub fn plot(&self, title: &str) -> Plot {
-        let points = self.x.iter().copied().zip(self.ratio.iter().copied()).collect();
-        Plot {
-            title: title.into(),
-            x_label: self.covariate.into(),
-            y_label: "label with over without".into(),
-            x_words: Vec::new(),
-            series: vec![Series { name: title.into(), mark: Mark::Line, points, errors: Vec::new() }],
-        }
+        let points = self.x.iter().copied().zip(self.ratio.iter().copied());
+        Plot::new(title, self.covariate, "label with over without", vec![Series::line(title, points)])
     }
 }

@@ -1,16 +1,16 @@
 //! Diagnoses: measurements and a twin in, an answer and a better twin out. One file per channel.
 
-mod decisive;
+mod diagnosed;
 mod few;
 mod imprints;
 mod measured_presses;
 mod next;
 mod presses;
-mod pull_report;
 mod pull_values;
 mod pulls;
 mod sensor;
 
+pub use diagnosed::Diagnosed;
 pub use imprints::{
     calibrate_imprint_table, compare_imprint_table, diagnose_imprint_table, imprint_calibration_edits,
 };

@@ -1,7 +1,7 @@
 //! `gripgen calibrate presses`: a sensor file from presses of a ball.
 
 use crate::args::{CalibratePressesArgs, TalkArgs};
-use crate::commands::compare::{comparison_json, table};
+use crate::commands::compare::{comparison_json, page_scores, shown, table};
 use crate::failure::Failure;
 use crate::load::{no_presses, say_circles};
 use crate::output::{JsonSink, print};
@@ -12,8 +12,8 @@ use gripgen::tactile::presses::{
 };
 use gripgen::tactile::{GelShape, Sensor};
 use gripgen::twin::TactileImage;
-use gripgen::{PressMap, PressReportText, press_report};
 use crate::{PressGeometry, find_missing_circles, load_presses};
+use gripgen_report::{PressMap, PressPage, press_page};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -53,12 +53,11 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
             .hint("are these presses of one ball into one sensor, with the camera's settings fixed?")
     })?;
     outputs.write(&args.out, &bytes)?;
-    let report_text = PressReportText {
+    let page = PressPage {
         map: coverage.as_ref().map(|coverage| map(coverage, &calibration.sensor)),
-        ..text(args, &set, &calibration, ball_size.as_ref())
+        ..page(args, &set, &calibration, ball_size.as_ref())
     };
-    let page =
-        press_report(&report_text, &set, &calibration.held_out, |i| calibration.predicted.get(i).cloned());
+    let page = press_page(&page, |i| calibration.predicted.get(i).cloned());
     outputs.write(&report, page.as_bytes())?;
     if sink.wanted() {
         sink.document(&json!({
@@ -264,19 +263,19 @@ fn gives_way(sensor: &Sensor) -> String {
     format!("{percent:.0} % of the press at the rim, widest kernel {widest_mm:.1} mm")
 }
 
-fn text(
+fn page<'a>(
     args: &CalibratePressesArgs,
-    set: &PressSet,
+    set: &'a PressSet,
     calibration: &Calibration,
     ball_size: Option<&BallSize>,
-) -> PressReportText {
+) -> PressPage<'a> {
     let sensor = &calibration.sensor;
     let gel = match sensor.gel_shape {
         GelShape::Dome { sag_m } => format!("dome, {:.2} mm lower at the corners", sag_m * 1e3),
         _ => "flat".into(),
     };
     let [red, green, blue] = sensor.noise_rgb;
-    PressReportText {
+    PressPage {
         title: format!("Calibration from {}", args.presses.display()),
         summary: format!(
             "Colours, frame at rest, noise and gel shape of a tactile sensor, fitted to {} presses of a ball.",
@@ -304,5 +303,7 @@ fn text(
             ("noise of red, green, blue".into(), format!("{red:.2}, {green:.2}, {blue:.2} grey levels")),
         ],
         map: None,
+        mean: page_scores(&calibration.held_out.mean),
+        presses: shown(set, &calibration.held_out),
     }
 }

@@ -10,11 +10,14 @@ use crate::load::{
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use gripgen::tactile::metrics::Score;
-use gripgen::tactile::presses::{PressComparison, Scores, compare_presses, predict_press};
-use gripgen::{Location, PressReportText, load_twin_document, press_report, pull_comparison_page, pull_ratios};
+use gripgen::identify::{PartRatio, pull_ratios};
+use gripgen::tactile::presses::{
+    Press, PressComparison, PressScore, PressSet, Scores, compare_presses, predict_press,
+};
+use gripgen::{Location, load_twin_document};
 use crate::{ImageComparison, LabelErrors, compare_images, compare_pulls_with, compare_sensor_table, find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, load_sensor_table, posterior_twins, unmeasured};
-use gripgen_identify::PartRatio;
 use gripgen_measured::load_pulls_with;
+use gripgen_report::{ComparedPulls, PressPage, PressScores, PressShown, press_page, pull_comparison_page};
 use serde_json::{Map, Value, json};
 
 /// Runs the verb.
@@ -50,7 +53,7 @@ fn presses(args: &CompareArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, 
     let comparison = compare_presses(&set, &sensor)
         .map_err(|e| Failure::usage(format!("{}: {e}", args.measured.display())))?;
     if let Some(path) = &args.report {
-        let text = PressReportText {
+        let page = PressPage {
             title: format!(
                 "{} against {}",
                 args.measured.display(),
@@ -67,10 +70,10 @@ fn presses(args: &CompareArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, 
                 ("pixel".into(), format!("{:.4} mm", set.metres_per_px * 1e3)),
             ],
             map: None,
+            mean: page_scores(&comparison.mean),
+            presses: shown(&set, &comparison),
         };
-        let page = press_report(&text, &set, &comparison, |i| {
-            predict_press(&set.presses[i], set.ball_m, &sensor).ok()
-        });
+        let page = press_page(&page, |i| predict_press(&set.presses[i], set.ball_m, &sensor).ok());
         outputs.write(path, page.as_bytes())?;
     }
     let document = || json!({"schema": "gripgen.comparison/1", "presses": comparison_json(&comparison)});
@@ -121,7 +124,20 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
         compare_images(&measured, &loaded, suspects, &twin, &library, jobs()).map_err(Failure::usage)?;
     if let Some(path) = &args.report {
         let title = format!("{} against {}", args.measured.display(), args.twin);
-        let page = pull_comparison_page(&title, &loaded.pulls, &found);
+        let page = pull_comparison_page(
+            &title,
+            &ComparedPulls {
+                measured: &loaded.pulls,
+                label_n: &found.label_n,
+                trace_n: &found.trace_n,
+                rmse_n: found.pulls.rmse_n,
+                mape_pct: found.pulls.mape_pct,
+                bias_n: found.pulls.bias_n,
+                coverage90: found.coverage90,
+                outside_fit: found.outside_fit,
+                traces: found.traces,
+            },
+        );
         outputs.write(path, page.as_bytes())?;
     }
     let errors =
@@ -130,7 +146,7 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
         let mut pulls = errors(&found.pulls);
         pulls["by_part"] =
             found.by_part.iter().map(|(name, e)| (name.clone(), errors(e))).collect::<Map<_, _>>().into();
-        pulls["ratio"] = pull_ratios(&loaded.pulls, &found)
+        pulls["ratio"] = pull_ratios(&loaded.pulls, &found.label_n)
             .iter()
             .map(|(name, r)| (name.clone(), ratio_json(r)))
             .collect::<Map<_, _>>()
@@ -223,6 +239,24 @@ fn images_table(found: &ImageComparison) -> String {
         text += &format!("least alike: pull {}, {} jaw, MSE {:.2}\n", worst.pull, worst.jaw, worst.score.mse);
     }
     text
+}
+
+/// Presses as their page shows them.
+pub fn shown<'a>(set: &'a PressSet, comparison: &PressComparison) -> Vec<PressShown<'a>> {
+    let press = |(press, scored): (&'a Press, &PressScore)| PressShown {
+        name: &press.name,
+        image: &press.image,
+        circle_px: press.circle.map(|c| [c.x_px, c.y_px, c.radius_px]),
+        scores: page_scores(&scored.scores),
+    };
+    set.presses.iter().zip(&comparison.each).map(press).collect()
+}
+
+/// Scores as the page shows them.
+pub fn page_scores(scores: &Scores) -> PressScores {
+    let of = |s: &Score| gripgen_report::Score { mse: s.mse, psnr_db: s.psnr_db, ssim: s.ssim, l1: s.l1 };
+    let Scores { full, crop400, crop200, window } = scores;
+    PressScores { full: of(full), crop400: of(crop400), crop200: of(crop200), window: of(window) }
 }
 
 /// The scores of presses as they stand in `--json`.

@@ -5,7 +5,9 @@ use crate::failure::Failure;
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use gripgen::record::RunFolder;
-use gripgen::{CONTACT_SHEET, contact_sheet, sample_picture};
+use gripgen::twin::{Jaw, PerJaw};
+use gripgen::{Project, press_only};
+use gripgen_report::{CONTACT_SHEET, JawPress, contact_sheet, sample_picture};
 use serde_json::json;
 use std::path::Path;
 
@@ -29,7 +31,9 @@ pub fn run(args: &ShowArgs) -> Result<u8, Failure> {
                 "there is no sample {index}, the run has {n} (counted from 0)"
             )));
         }
-        Some(index) => sample_picture(&folder, index).map_err(Failure::new)?,
+        Some(index) => {
+            sample_picture(&folder, index, || press_again(&folder, index)).map_err(Failure::new)?
+        }
     };
     if own_sheet {
         folder.publish(CONTACT_SHEET, &bytes)?;
@@ -39,6 +43,27 @@ pub fn run(args: &ShowArgs) -> Result<u8, Failure> {
     let document =
         || json!({"schema": "gripgen.picture/1", "sample": args.sample, "file": out, "bytes": bytes.len()});
     sink.finish(args.talk.quiet, document, || format!("{}\n", out.display()))
+}
+
+/// The imprints of a simulated sample, made again from the configuration of its run.
+fn press_again(folder: &RunFolder, index: u64) -> Option<PerJaw<JawPress>> {
+    let project = Project::from_run(folder).ok()?;
+    let twin = project.twin_of(index).ok()?;
+    let (scenario, usable) = project.sweep.scenario(index, &twin);
+    usable.ok()?;
+    let pressed = press_only(&twin, &project.library, &scenario, project.sweep.mechanics).ok()??;
+    let of = |jaw: Jaw| {
+        let imprint = &pressed.imprint[jaw];
+        let plane = &imprint.depth_px;
+        JawPress {
+            size_px: (plane.width as u32, plane.height as u32),
+            depth_px: plane.values.clone(),
+            mm_per_px: pressed.sensors[jaw].grid.metres_per_px * 1e3,
+            press_depth_mm: imprint.press_depth_m * 1e3,
+            peak_pressure_pa: imprint.patch.cells.iter().map(|c| c.pressure_pa()).fold(0.0, f64::max),
+        }
+    };
+    Some(PerJaw { left: of(Jaw::Left), right: of(Jaw::Right) })
 }
 
 fn is_sheet_of(run: &Path, out: &Path) -> bool {

@@ -13,7 +13,8 @@ use gripgen::record::{RunFolder, status_name};
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::Jaw;
 use gripgen::twin::config::ImageStorage;
-use gripgen::{CONTACT_SHEET, Project, SweepEvent, SweepOptions, SweepSummary, contact_sheet, sweep};
+use gripgen::{Project, SweepEvent, SweepOptions, SweepSummary, sweep};
+use gripgen_report::{CONTACT_SHEET, contact_sheet};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

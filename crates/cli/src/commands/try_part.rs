@@ -8,7 +8,8 @@ use crate::output::{JsonSink, program};
 use crate::outputs::Outputs;
 use crate::shell;
 use gripgen::twin::usual_scale_mm_per_unit;
-use crate::{GripTried, PartOptions, TriedPart, TryOptions, TryPartError, try_part};
+use crate::{PartOptions, TryOptions, TryPartError, rasterise, try_part};
+use gripgen_report::{GripTried, TriedPart, tried_page, tried_picture};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -37,8 +38,8 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
         sensor: args.sensor.clone(),
     };
     let tried = try_part(&args.mesh, &options).map_err(refused)?;
-    outputs.write(&page, tried.page.as_bytes())?;
-    outputs.write(&picture, &tried.picture)?;
+    outputs.write(&page, tried_page(&tried, &rasterise).as_bytes())?;
+    outputs.write(&picture, &tried_picture(&tried, &rasterise))?;
     if !args.talk.quiet {
         eprint!("{}", summary(&tried));
         eprintln!("next: {}", next(args, &stem));

@@ -5,8 +5,8 @@ use crate::failure::Failure;
 use crate::load::there_is;
 use crate::output::{JsonSink, size};
 use crate::outputs::Outputs;
-use gripgen_measured::open_dataset;
-use gripgen::{ViewOptions, view_page};
+use gripgen::record::Dataset;
+use gripgen_report::{ViewOptions, view_page};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,6 @@
 
 mod benchmark;
 mod doubts;
-pub(crate) mod drawing;
 mod places;
 mod pose;
 mod propose;
@@ -16,7 +15,10 @@ use gripgen::Location;
 use gripgen::{BASELINE_TWIN, load_twin_document};
 pub use benchmark::{BenchmarkStarter, benchmark_starter};
 use gripgen_physics::{PartShape, Surface};
-use gripgen_tactile::ClusteredMesh;
+use gripgen_report::{View, grips_picture};
+use gripgen_tactile::{ClusteredMesh, Grid, raster};
+use gripgen_twin::frames::Pose;
+pub use gripgen_twin::Proposal;
 use gripgen_twin::{Jaw, MeshError, Part, TriMesh, Twin};
 pub(crate) use propose::Proposed;
 use propose::Search;
@@ -39,23 +41,6 @@ const LEAST_FORCE_N: f64 = 10.0;
 /// A part smaller or larger than this is asked about its unit.
 const SMALL_MM: f64 = 8.0;
 const LARGE_MM: f64 = 2000.0;
-
-/// A grip proposed for a part, which worked wherever the sweep goes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Proposal {
-    /// As in `[[parts.NAME.grips]]`.
-    pub origin_mm: [f64; 3],
-    /// As in `[[parts.NAME.grips]]`.
-    pub orientation_deg: [f64; 3],
-    /// Distance between the gels where they first touch.
-    pub width_mm: f64,
-    /// Contact area of the jaw that has less of it, at 40 N or the largest force that fits.
-    pub contact_mm2: f64,
-    /// Distance of the middle of mass from the jaw axis.
-    pub lever_mm: f64,
-    /// How much lower than the contact the part lies beside the pads; negative where it rises towards a finger.
-    pub clearance_mm: f64,
-}
 
 /// A file that `init` writes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -279,14 +264,6 @@ pub(crate) struct Searched {
     pub(crate) proposed: Proposed,
 }
 
-impl Searched {
-    /// Size of the part, for people.
-    pub(crate) fn size(&self) -> String {
-        let [x_mm, y_mm, z_mm] = self.size_mm;
-        format!("{x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm")
-    }
-}
-
 /// Reads a mesh, looks at it and tries grips on a rig.
 pub(crate) fn search(path: &Path, options: PartOptions, twin: Twin) -> Result<Searched, InitError> {
     let location = Location::Disk(path.into());
@@ -355,8 +332,8 @@ pub(crate) fn search(path: &Path, options: PartOptions, twin: Twin) -> Result<Se
 /// A file that is no mesh, a mesh that is open, or a part on which no grip works.
 pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<PartStarter, InitError> {
     let searched = search(path, options, baseline())?;
-    let size = searched.size();
-    let Searched { name, bytes, mesh, mesh_words, proposed, .. } = searched;
+    let Searched { name, bytes, mesh, mesh_words, proposed, size_mm: [x_mm, y_mm, z_mm], .. } = searched;
+    let size = format!("{x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm");
     let (mesh_name, copy) = mesh_reference(path, folder);
     let (proposals, varied) = (&proposed.grips, &proposed.varied);
     let mu_is = match options.mu {
@@ -383,7 +360,7 @@ pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<
     let mut files = vec![
         StarterFile { name: "sweep.toml".into(), bytes: fill(assets::text("templates/part-sweep.toml")) },
         StarterFile { name: "twin.toml".into(), bytes: fill(assets::text("templates/part-twin.toml")) },
-        StarterFile { name: "grips.png".into(), bytes: drawing::grips_picture(&name, &mesh, proposals) },
+        StarterFile { name: "grips.png".into(), bytes: grips_picture(&name, &mesh, proposals, &rasterise) },
     ];
     if copy {
         files.push(StarterFile { name: mesh_name, bytes });
@@ -391,6 +368,13 @@ pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<
     let summary = text::summary(&name, &size, &mesh_words, &proposed);
     let Proposed { grips, varied, doubts, .. } = proposed;
     Ok(PartStarter { files, grips, varied, mesh_words, doubts, summary })
+}
+
+/// Heights of a mesh for a drawing, as those of a part in front of a gel.
+pub fn rasterise(mesh: &TriMesh, eye_from_mesh: &Pose, view: &View) -> Vec<f32> {
+    let (width_px, height_px) = (view.size_px.0 as usize, view.size_px.1 as usize);
+    let grid = Grid { width_px, height_px, metres_per_px: view.metres_per_px };
+    raster(mesh, eye_from_mesh, &grid, f64::INFINITY).values
 }
 
 /// The rig that grips are proposed for.

@@ -1,24 +1,21 @@
 //! A part at a glance: grips that were tried, what the gels see of each, how much it is expected to hold, and what would fail.
 
 mod holding;
-mod page;
-mod picture;
 
 use gripgen::{pull_gripped, start_pull};
 use gripgen::Gripped;
 use crate::part::init::{
-    ANGLES_DEG, HIGHEST_N, InitError, MU, PART, PartOptions, Proposal, Searched, Trial, TrialCell, baseline,
+    ANGLES_DEG, HIGHEST_N, InitError, MU, PART, PartOptions, Searched, Trial, TrialCell, baseline,
     search,
 };
 use gripgen::Location;
-use crate::analysis::{LoadSensorError, load_sensor};
+use crate::analysis::presses::{LoadSensorError, load_sensor};
 use gripgen::{SampleError, SimulateOptions};
+use gripgen_report::{FrictionRange, GripTried, TriedPart, WorksAt};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
-use gripgen_twin::{Covariates, Jaw, LARGEST_MU, PerJaw, PullSettings, Scenario, TactileImage, Twin};
-use holding::holding;
-pub use holding::{FrictionRange, Holding};
-use picture::tried_picture;
+use gripgen_twin::{Covariates, Jaw, LARGEST_MU, PullSettings, Scenario, Twin};
+use holding::{friction_measured, friction_of_any_part, holding};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -36,59 +33,6 @@ pub struct TryOptions {
     pub force_n: Option<f64>,
     /// A sensor file that stands in for the shipped one, in both jaws.
     pub sensor: Option<String>,
-}
-
-/// A part that was tried.
-#[derive(Debug, Clone)]
-pub struct TriedPart {
-    /// Its name: that of the file.
-    pub name: String,
-    /// Extent along the axes of the mesh.
-    pub size_mm: [f64; 3],
-    /// What is to be said of the mesh, a sentence each.
-    pub mesh_words: Vec<String>,
-    /// The friction that was assumed.
-    pub mu: FrictionRange,
-    /// The grips, the best first.
-    pub grips: Vec<GripTried>,
-    /// Grips that were tried.
-    pub tried: usize,
-    /// A page that needs neither a network nor a script.
-    pub page: String,
-    /// The same as one picture, PNG.
-    pub picture: Vec<u8>,
-}
-
-/// A grip that was tried.
-#[derive(Debug, Clone)]
-pub struct GripTried {
-    /// Its place among the grips found.
-    pub grip_pose: usize,
-    /// Where it is.
-    pub proposal: Proposal,
-    /// Force of a jaw at which the images were made.
-    pub force_n: f64,
-    /// What the cameras see.
-    pub images: PerJaw<TactileImage>,
-    /// What it is expected to hold, by grip force.
-    pub holding: Vec<Holding>,
-    /// Where it fails, a sentence each.
-    pub fails: Vec<String>,
-    /// What is doubtful of it where it works, a sentence each.
-    pub doubts: Vec<String>,
-    /// The same as numbers: angle, offset and the largest force of a jaw that works there, of 10, 20 and 40 N.
-    pub works: Vec<WorksAt>,
-}
-
-/// The largest force that works at a place.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WorksAt {
-    /// Grip angle.
-    pub grip_angle_deg: f64,
-    /// Offset of the grip.
-    pub grip_offset_mm: f64,
-    /// The largest force of a jaw that was tried and works; 0 if none does.
-    pub largest_n: f64,
 }
 
 /// Why a part could not be tried.
@@ -157,22 +101,29 @@ pub fn try_part(path: &Path, options: &TryOptions) -> Result<TriedPart, TryPartE
         Some(one) => vec![one],
         None => (0..found).collect(),
     };
-    let mu = options.part.mu.map_or_else(FrictionRange::of_any_part, FrictionRange::measured);
+    let mu = options.part.mu.map_or_else(friction_of_any_part, friction_measured);
     let grips: Result<Vec<GripTried>, TryPartError> =
         chosen.into_iter().map(|grip| try_grip(&searched, grip, options, mu)).collect();
-    let mut part = TriedPart {
-        name: searched.name.clone(),
-        size_mm: searched.size_mm,
-        mesh_words: searched.mesh_words.clone(),
+    let varied = &searched.proposed.varied;
+    let angles: Vec<String> = varied.grip_angle_deg.iter().map(f64::to_string).collect();
+    Ok(TriedPart {
         mu,
+        friction: friction_words(mu),
+        varies: format!(
+            "{} to {} N of a jaw, offsets with a deviation of {} mm, angles of {} degrees",
+            varied.grip_force_n.0,
+            varied.grip_force_n.1,
+            varied.grip_offset_sd_mm,
+            angles.join(", ")
+        ),
         grips: grips?,
         tried: searched.proposed.tried,
-        page: String::new(),
-        picture: vec![],
-    };
-    part.page = page::page(&part, &searched);
-    part.picture = tried_picture(&part, &searched.mesh);
-    Ok(part)
+        found,
+        name: searched.name,
+        size_mm: searched.size_mm,
+        mesh_words: searched.mesh_words,
+        mesh: searched.mesh,
+    })
 }
 
 /// The baseline rig without noise, with the sensor that was named.
@@ -307,7 +258,7 @@ fn fails(trial: &Trial) -> Vec<String> {
 }
 
 /// What friction is taken to be, in words.
-pub(crate) fn friction_words(mu: FrictionRange) -> String {
+fn friction_words(mu: FrictionRange) -> String {
     if mu.is_measured {
         return format!("mu = {}, as given; repetitions of such pulls scatter by about 5 %", mu.value);
     }

@@ -1,6 +1,6 @@
 //! The one plot that decides: how far measured labels are from what the twin predicted, level by level, and the law that was found.
 
-use gripgen::report::{Mark, Plot, PlotGroup, Series};
+use crate::{Plot, PlotGroup, Series};
 use gripgen_identify::pulls::answer::{PullAnswer, PullFits};
 use gripgen_twin::columns::{find, value};
 use gripgen_twin::draw::Drawn;
@@ -131,19 +131,16 @@ fn over(
         errors.push(if n > 1.0 { NINETY * (squares / (n - 1.0) / n).sqrt() } else { 0.0 });
         law.push((at(k), mean(|s| s.1)));
     }
-    let series = |name: &str, mark, points, errors| Series { name: name.into(), mark, points, errors };
-    let zero = vec![(means[0].0, 0.0), (means[means.len() - 1].0, 0.0)];
-    Some(Plot {
-        title: format!("over {}", label(name)),
-        x_label: label(name),
-        y_label: "above the prediction before, %".into(),
-        x_words: if named { levels.iter().map(|level| level.name.clone()).collect() } else { vec![] },
-        series: vec![
-            series("before", Mark::Line, zero, vec![]),
-            series("after", Mark::Line, law, vec![]),
-            series("measured", Mark::Points, means, errors),
-        ],
-    })
+    let zero = [(means[0].0, 0.0), (means[means.len() - 1].0, 0.0)];
+    let series = vec![
+        Series::line("before", zero),
+        Series::line("after", law),
+        Series { errors, ..Series::points("measured", means) },
+    ];
+    let x_words = if named { levels.into_iter().map(|level| level.name).collect() } else { vec![] };
+    let plot =
+        Plot::new(format!("over {}", label(name)), label(name), "above the prediction before, %", series);
+    Some(Plot { x_words, ..plot })
 }
 
 fn of_numbers(mut numbers: Vec<(f64, usize)>) -> Vec<Level> {

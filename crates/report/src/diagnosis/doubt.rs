@@ -11,7 +11,7 @@ const SURE: f64 = 0.5;
 const AGAIN: f64 = 0.8;
 
 /// A sentence on the first name that is not sure, with the nearest other one in the words of the catalogue.
-pub(super) fn doubt(d: &Diagnosis, evidence: &[EvidenceRow]) -> Option<String> {
+pub fn doubt(d: &Diagnosis, evidence: &[EvidenceRow]) -> Option<String> {
     let again = |effect: &NamedEffect| effect.named_again.is_some_and(|share| share < AGAIN);
     let effect = d.effects.iter().find(|effect| effect.weight < SURE || again(effect))?;
     let again = effect.named_again.map_or(String::new(), |share| {
@@ -45,8 +45,6 @@ pub(crate) fn one_for_all(name: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::TwinEdits;
-    use crate::report::{Diagnosed, ReportData};
     use gripgen_identify::{Channel, DataSummary, Rival};
     use std::collections::BTreeMap;
 
@@ -56,7 +54,7 @@ mod tests {
         EvidenceRow { name: name.into(), heldout_gain, standard_error, heldout_error, values, fate }
     }
 
-    fn said(weight: f64, share: f64, evidence: Vec<EvidenceRow>) -> String {
+    fn said(weight: f64, share: f64, evidence: &[EvidenceRow]) -> String {
         let mut d = Diagnosis::blank(Channel::Pulls, DataSummary::default());
         d.effects.push(NamedEffect {
             name: "area_saturation".into(),
@@ -68,28 +66,20 @@ mod tests {
             separate_by: None,
             named_again: Some(share),
         });
-        d.conclude();
-        let report = ReportData { evidence, ..Default::default() };
-        Diagnosed::new(d, TwinEdits::default(), report).diagnosis.plain.unwrap_or_default()
+        doubt(&d, evidence).unwrap_or_default()
     }
 
     /// The true law is in the table of evidence, ahead of what was named.
     #[test]
     fn a_name_that_is_not_sure_says_so_and_names_its_nearest_rival() {
-        let evidence = || {
-            vec![
-                row("curve in grip_force_n", 14.0),
-                row("area_saturation", 10.4),
-                row("load_power_law", 13.0),
-            ]
-        };
-        let light = said(0.12, 0.22, evidence());
-        assert!(light.starts_with("Friction stops growing at strong grips, for example"), "{light}");
+        let evidence =
+            [row("curve in grip_force_n", 14.0), row("area_saturation", 10.4), row("load_power_law", 13.0)];
+        let light = said(0.12, 0.22, &evidence);
         let doubted = "area_saturation is not sure (weight 0.12; of campaigns drawn anew, 22 % name it or what is tied with it). \
                        Nearest to it is load_power_law: The friction coefficient changes smoothly";
         assert!(light.contains(doubted), "{light}");
-        assert!(said(0.7, 0.75, evidence()).contains("not sure"), "a quarter of them names something else");
-        assert!(said(0.45, 0.99, vec![]).contains("Nearest to it is regime_transition"));
-        assert!(!said(0.7, 0.95, evidence()).contains("not sure"));
+        assert!(said(0.7, 0.75, &evidence).contains("not sure"), "a quarter of them names something else");
+        assert!(said(0.45, 0.99, &[]).contains("Nearest to it is regime_transition"));
+        assert_eq!(said(0.7, 0.95, &evidence), "");
     }
 }

@@ -1,10 +1,14 @@
 //! What the report of a diagnosis of pulls shows beside the answer itself.
 
 use super::decisive::decisive;
-use gripgen_physics::PullPredictor;
-use gripgen::report::{EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow, one_for_all};
+use super::doubt::one_for_all;
+use super::{EvidenceRow, ReportData, WorstRow};
+use crate::text::spread;
+use crate::{Plot, PlotGroup, Series};
 use gripgen_identify::pulls::answer::{PullAnswer, PullFits};
+use gripgen_twin::predict::PullModel;
 use gripgen_identify::pulls::search::{Entry, ModelTerm};
+use gripgen_identify::{Level, levels};
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::columns::{covariates, value};
 use gripgen_twin::draw::Drawn;
@@ -16,12 +20,11 @@ const CURVES: usize = 6;
 const CANDIDATES: usize = 14;
 const WORST: usize = 10;
 
+/// Readings that a model predicts for the times of a pull, without its scatter.
+pub type SimulatePull<'a> = dyn Fn(&PullModel, usize, &[f64]) -> Vec<f64> + 'a;
+
 /// Plots and tables of an answer. Empty where nothing was fitted.
-pub(super) fn pull_report(
-    measured: &MeasuredPulls,
-    predictor: &PullPredictor<'_>,
-    answer: &PullAnswer,
-) -> ReportData {
+pub fn pull_report(measured: &MeasuredPulls, simulate: &SimulatePull<'_>, answer: &PullAnswer) -> ReportData {
     let Some(fits) = &answer.fits else { return ReportData::default() };
     let mut groups: Vec<PlotGroup> = decisive(measured, fits, answer, axis_label).into_iter().collect();
     groups.extend([
@@ -44,7 +47,7 @@ pub(super) fn pull_report(
             about: "The twin over the measurement; its curve ends the rise at the expected limit, without the scatter of this \
                     pull."
                 .into(),
-            plots: curves(measured, predictor, fits),
+            plots: curves(measured, simulate, fits),
         },
     ]);
     let decides = usize::from(groups.len() > 3);
@@ -96,24 +99,12 @@ fn residual(measured: &MeasuredPulls, fits: &PullFits, name: &str) -> Option<Plo
     if known.iter().all(|v| *v == known[0]) {
         return None;
     }
-    let series = |name: &str, predicted: &[f64]| Series {
-        name: name.into(),
-        mark: Mark::Points,
-        points: x
-            .iter()
-            .zip(&measured.pulls)
-            .zip(predicted)
-            .map(|((x, pull), predicted)| (*x, pull.max_pull_force_n - predicted))
-            .collect(),
-        errors: Vec::new(),
+    let series = |name: &str, predicted: &[f64]| {
+        let pulls = x.iter().zip(&measured.pulls).zip(predicted);
+        Series::points(name, pulls.map(|((x, pull), predicted)| (*x, pull.max_pull_force_n - predicted)))
     };
-    Some(Plot {
-        title: name.into(),
-        x_label: axis_label(name),
-        y_label: "measured \u{2212} predicted, N".into(),
-        x_words: words,
-        series: vec![series("before", &fits.heldout_label_n[0]), series("after", &fits.heldout_label_n[1])],
-    })
+    let both = vec![series("before", &fits.heldout_label_n[0]), series("after", &fits.heldout_label_n[1])];
+    Some(Plot { x_words: words, ..Plot::new(name, axis_label(name), "measured \u{2212} predicted, N", both) })
 }
 
 /// The name of a column in words, with the unit that its name ends in.
@@ -138,83 +129,50 @@ fn axis_label(name: &str) -> String {
 
 /// One plot a part.
 fn limits(measured: &MeasuredPulls, fits: &PullFits) -> Vec<Plot> {
-    let mut parts: BTreeMap<&str, BTreeMap<u64, Vec<usize>>> = BTreeMap::new();
+    let mut parts: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (i, pull) in measured.pulls.iter().enumerate() {
-        // Positive forces are ordered as their bits are.
-        parts.entry(&pull.part).or_default().entry(pull.grip_force_n.to_bits()).or_default().push(i);
+        parts.entry(&pull.part).or_default().push(i);
     }
-    let plot = |(part, levels): (&str, BTreeMap<u64, Vec<usize>>)| {
-        let mean = |rows: &[usize], of: &dyn Fn(usize) -> f64| {
-            rows.iter().map(|&i| of(i)).sum::<f64>() / rows.len() as f64
+    let plot = |(part, pulls): (&str, Vec<usize>)| {
+        let of = |value: &dyn Fn(usize) -> f64| {
+            levels(&pulls.iter().map(|&i| (measured.pulls[i].grip_force_n, value(i))).collect::<Vec<_>>())
         };
-        let points = |of: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
-            levels.iter().map(|(bits, rows)| (f64::from_bits(*bits), mean(rows, of))).collect()
+        let means = |all: &[Level]| all.iter().map(|l| (l.grip_force_n, l.mean_n)).collect::<Vec<_>>();
+        let line = |name: &str, predicted: &[f64]| Series::line(name, means(&of(&|i| predicted[i])));
+        let labels = of(&|i| measured.pulls[i].max_pull_force_n);
+        let deviation = |level: &Level| {
+            let n = level.rows.len().max(2) as f64;
+            level.rms_n * libm::sqrt(level.rows.len() as f64 / (n - 1.0))
         };
-        let label = |i: usize| measured.pulls[i].max_pull_force_n;
-        let spread = |rows: &Vec<usize>| {
-            let middle = mean(rows, &label);
-            let squares = rows.iter().map(|&i| (label(i) - middle) * (label(i) - middle)).sum::<f64>();
-            libm::sqrt(squares / (rows.len().max(2) - 1) as f64)
-        };
-        let line = |name: &str, predicted: &[f64]| Series {
-            name: name.into(),
-            mark: Mark::Line,
-            points: points(&|i| predicted[i]),
-            errors: Vec::new(),
-        };
-        let measured = Series {
-            name: "measured".into(),
-            mark: Mark::Points,
-            points: points(&label),
-            errors: levels.values().map(spread).collect(),
-        };
-        Plot {
-            title: part.into(),
-            x_label: "grip force per jaw, N".into(),
-            y_label: "maximum pull force, N".into(),
-            x_words: Vec::new(),
-            series: vec![line("before", &fits.label_n[0]), line("after", &fits.label_n[1]), measured],
-        }
+        let errors = labels.iter().map(deviation).collect();
+        let measured = Series { errors, ..Series::points("measured", means(&labels)) };
+        let series = vec![line("before", &fits.label_n[0]), line("after", &fits.label_n[1]), measured];
+        Plot::new(part, "grip force per jaw, N", "maximum pull force, N", series)
     };
     parts.into_iter().map(plot).collect()
 }
 
 /// A few pulls with a trace, from the weakest to the strongest grip.
-fn curves(measured: &MeasuredPulls, predictor: &PullPredictor<'_>, fits: &PullFits) -> Vec<Plot> {
+fn curves(measured: &MeasuredPulls, simulate: &SimulatePull<'_>, fits: &PullFits) -> Vec<Plot> {
     let mut traced: Vec<usize> =
         (0..measured.pulls.len()).filter(|&i| measured.pulls[i].trace.is_some()).collect();
     traced.sort_by(|&a, &b| measured.pulls[a].grip_force_n.total_cmp(&measured.pulls[b].grip_force_n));
-    let shown = CURVES.min(traced.len());
-    let rows: Vec<usize> = (0..shown).map(|k| traced[k * (traced.len() - 1) / (shown.max(2) - 1)]).collect();
-    let model = &fits.after.model;
-    rows.iter()
-        .filter_map(|&row| {
-            let pull = &measured.pulls[row];
-            let trace = pull.trace.as_ref()?;
-            // What follows the slip is a tool that runs to its stop.
-            let kept = trace.until_displacement(measured.stop_m);
-            let pulled: Vec<f64> = kept.time_s.iter().copied().filter(|t| *t >= 0.0).collect();
-            let simulated = predictor.simulated_trace_n(model, row, &pulled);
-            let line = |name: &str, points: Vec<(f64, f64)>| Series {
-                name: name.into(),
-                mark: Mark::Line,
-                points,
-                errors: Vec::new(),
-            };
-            let column = |of: &[f64]| kept.time_s.iter().copied().zip(of.iter().copied()).collect();
-            Some(Plot {
-                title: format!("{}: {}, {} N", pull.id, pull.part, pull.grip_force_n),
-                x_label: "time, s".into(),
-                y_label: "force, N".into(),
-                x_words: Vec::new(),
-                series: vec![
-                    line("measured", column(&kept.measured_force_n)),
-                    line("twin", pulled.iter().copied().zip(simulated).collect()),
-                    line("command", column(&kept.desired_force_n)),
-                ],
-            })
-        })
-        .collect()
+    let curve = |&row: &usize| {
+        let pull = &measured.pulls[row];
+        // What follows the slip is a tool that runs to its stop.
+        let kept = pull.trace.as_ref()?.until_displacement(measured.stop_m);
+        let pulled: Vec<f64> = kept.time_s.iter().copied().filter(|t| *t >= 0.0).collect();
+        let simulated = simulate(&fits.after.model, row, &pulled);
+        let column = |of: &[f64]| kept.time_s.iter().copied().zip(of.iter().copied()).collect::<Vec<_>>();
+        let series = vec![
+            Series::line("measured", column(&kept.measured_force_n)),
+            Series::line("twin", pulled.iter().copied().zip(simulated)),
+            Series::line("command", column(&kept.desired_force_n)),
+        ];
+        let title = format!("{}: {}, {} N", pull.id, pull.part, pull.grip_force_n);
+        Some(Plot::new(title, "time, s", "force, N", series))
+    };
+    spread(&traced, CURVES).filter_map(curve).collect()
 }
 
 fn evidence(fits: &PullFits, answer: &PullAnswer) -> Vec<EvidenceRow> {

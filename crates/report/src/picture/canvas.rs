@@ -5,15 +5,18 @@ use gripgen_twin::TactileImage;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
-/// A colour.
+/// A colour: red, green, blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rgb(pub u8, pub u8, pub u8);
 
 /// Which end of a text its x coordinate names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
+    /// Its beginning.
     Left,
+    /// Its middle.
     Middle,
+    /// Its end.
     Right,
 }
 
@@ -128,8 +131,11 @@ impl Canvas {
 /// How a text looks.
 #[derive(Debug, Clone, Copy)]
 pub struct TextStyle {
+    /// Its colour.
     pub ink: Rgb,
+    /// 20 pixels high, not 16.
     pub large: bool,
+    /// In bold letters.
     pub bold: bool,
 }
 

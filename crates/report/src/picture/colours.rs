@@ -2,15 +2,24 @@
 
 use super::canvas::Rgb;
 
+/// The background.
 pub const PAPER: Rgb = Rgb(255, 255, 255);
+/// The background of a plot or of an image that is missing.
 pub const PANEL: Rgb = Rgb(246, 247, 249);
+/// Text.
 pub const INK: Rgb = Rgb(33, 37, 43);
+/// Text that explains.
 pub const SOFT_INK: Rgb = Rgb(110, 117, 128);
+/// Grid lines.
 pub const GRID: Rgb = Rgb(222, 226, 231);
+/// The commanded force.
 pub const COMMAND: Rgb = Rgb(150, 156, 166);
+/// The measured force.
 pub const MEASURED: Rgb = Rgb(24, 94, 178);
+/// Slip.
 pub const SLIP: Rgb = Rgb(205, 58, 36);
 pub(crate) const DISPLACEMENT: Rgb = Rgb(40, 140, 92);
+/// What failed.
 pub const FAILED: Rgb = Rgb(176, 42, 42);
 
 /// A perceptually even scale from dark to bright for `t` in 0..=1: nine stops of viridis (van der Walt & Smith,

@@ -3,6 +3,7 @@
 use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
 use super::colours::{INK, SLIP};
 use super::layout::{CAPTION, MARGIN};
+use crate::text::spread;
 use gripgen_record::Film;
 use gripgen_twin::{FilmFrame, Jaw, PerJaw};
 
@@ -18,10 +19,8 @@ pub(super) const STRIP_HEIGHT: u32 = CAPTION + 2 * (TILE.1 + 4) + MARGIN;
 /// Draws a few frames of a film, from its first to its last: left jaw above right jaw. What has slipped is tinted.
 pub(super) fn draw_strip(canvas: &mut Canvas, (top, width): (u32, u32), film: &Film) {
     let there_is_room_for = ((width - MARGIN) / (TILE.0 + 4)) as usize;
-    let shown = FRAMES.min(there_is_room_for).min(film.frames.len());
-    for i in 0..shown {
-        let number = if shown == 1 { 0 } else { i * (film.frames.len() - 1) / (shown - 1) };
-        let both: &PerJaw<FilmFrame> = &film.frames[number];
+    let frames: Vec<(usize, &PerJaw<FilmFrame>)> = film.frames.iter().enumerate().collect();
+    for (i, &(number, both)) in spread(&frames, FRAMES.min(there_is_room_for)).enumerate() {
         let x = MARGIN + i as u32 * (TILE.0 + 4);
         let f = &both.left;
         let caption = format!(

@@ -1,9 +1,9 @@
 //! The picture of proposed grips: part, jaws and axes with a scale.
 
-use super::Proposal;
-use gripgen::picture::{Anchor, Canvas, Rgb, Scene, SceneMesh, TextStyle, View};
-use gripgen_twin::frames::{Pose, pose};
-use gripgen_twin::{Jaw, TriMesh};
+use super::scene::{Rasterise, SceneMesh, View};
+use super::{Anchor, Canvas, INK, PAPER, Rgb, SOFT_INK, TextStyle};
+use gripgen_twin::frames::pose;
+use gripgen_twin::{Jaw, Proposal, TriMesh};
 use nalgebra::{Point3, Rotation3, Vector3};
 
 pub(crate) const PANEL: (u32, u32) = (620, 460);
@@ -16,28 +16,26 @@ const AXES: [(Rgb, &str); 3] =
 const PAD_M: [f64; 3] = [28e-3, 6e-3, 21e-3];
 
 /// A PNG with one panel for each grip.
-pub(super) fn grips_picture(name: &str, mesh: &TriMesh, proposals: &[Proposal]) -> Vec<u8> {
-    let columns = if proposals.len() > 1 { 2 } else { 1 };
-    let rows = proposals.len().div_ceil(columns as usize) as u32;
-    let mut canvas = Canvas::new(columns * PANEL.0, HEADER + rows * PANEL.1, Rgb(255, 255, 255));
-    let ink = Rgb(33, 37, 43);
-    let size = mesh.extent_m().map(|s| s * 1e3);
-    let title = format!("{name}: {:.1} x {:.1} x {:.1} mm in its mesh frame", size[0], size[1], size[2]);
-    canvas.text(&title, 14.0, 8.0, Anchor::Left, TextStyle::title(ink));
+pub fn grips_picture(name: &str, mesh: &TriMesh, grips: &[Proposal], rasterise: &Rasterise<'_>) -> Vec<u8> {
+    let columns = if grips.len() > 1 { 2 } else { 1 };
+    let rows = grips.len().div_ceil(columns as usize) as u32;
+    let mut canvas = Canvas::new(columns * PANEL.0, HEADER + rows * PANEL.1, PAPER);
+    let [x, y, z] = mesh.extent_m().map(|s| s * 1e3);
+    let title = format!("{name}: {x:.1} x {y:.1} x {z:.1} mm in its mesh frame");
+    canvas.text(&title, 14.0, 8.0, Anchor::Left, TextStyle::title(INK));
     let legend = "blue: left jaw, orange: right jaw, at a grip angle of 0; the pull is along z";
-    canvas.text(legend, 14.0, 32.0, Anchor::Left, TextStyle::small(Rgb(110, 117, 128)));
-    for (i, proposal) in proposals.iter().enumerate() {
-        let x = (i as u32 % columns) * PANEL.0;
-        let y = HEADER + (i as u32 / columns) * PANEL.1;
-        panel(&mut canvas, (x, y), i, mesh, proposal);
+    canvas.text(legend, 14.0, 32.0, Anchor::Left, TextStyle::small(SOFT_INK));
+    for (i, grip) in grips.iter().enumerate() {
+        let at = (i as u32 % columns * PANEL.0, HEADER + i as u32 / columns * PANEL.1);
+        panel(&mut canvas, at, mesh, (i, grip), rasterise);
     }
     canvas.into_png()
 }
 
 /// A PNG of one grip.
-pub(crate) fn grip_picture(index: usize, mesh: &TriMesh, proposal: &Proposal) -> Vec<u8> {
-    let mut canvas = Canvas::new(PANEL.0, PANEL.1, Rgb(255, 255, 255));
-    panel(&mut canvas, (0, 0), index, mesh, proposal);
+pub(crate) fn grip_picture(mesh: &TriMesh, grip: (usize, &Proposal), rasterise: &Rasterise<'_>) -> Vec<u8> {
+    let mut canvas = Canvas::new(PANEL.0, PANEL.1, PAPER);
+    panel(&mut canvas, (0, 0), mesh, grip, rasterise);
     canvas.into_png()
 }
 
@@ -45,11 +43,11 @@ pub(crate) fn grip_picture(index: usize, mesh: &TriMesh, proposal: &Proposal) ->
 pub(crate) fn panel(
     canvas: &mut Canvas,
     (x, y): (u32, u32),
-    index: usize,
     mesh: &TriMesh,
-    proposal: &Proposal,
+    (grip_pose, grip): (usize, &Proposal),
+    rasterise: &Rasterise<'_>,
 ) {
-    let part = proposal.part_from_mesh();
+    let part = grip.part_from_mesh();
     let reach = mesh.vertices_m().iter().map(|v| (part * v).coords.norm()).fold(0.02, f64::max);
     let view = View {
         azimuth_rad: 0.6,
@@ -58,23 +56,22 @@ pub(crate) fn panel(
         size_px: PANEL,
     };
     let pads = Jaw::BOTH.map(|jaw| {
-        let distance = proposal.width_mm * 0.5e-3 + PAD_M[1] / 2.0;
+        let distance = grip.width_mm * 0.5e-3 + PAD_M[1] / 2.0;
         pose(&Rotation3::identity(), Vector3::new(0.0, jaw.side() * distance, 0.0))
     });
     let pad = cuboid(PAD_M);
-    let identity = Pose::identity();
     let meshes = [
-        SceneMesh { mesh, world_from_mesh: identity * part, colour: STEEL },
+        SceneMesh { mesh, world_from_mesh: part, colour: STEEL },
         SceneMesh { mesh: &pad, world_from_mesh: pads[0], colour: GEL[0] },
         SceneMesh { mesh: &pad, world_from_mesh: pads[1], colour: GEL[1] },
     ];
-    Scene::new(view).draw(canvas, x, y, &meshes);
+    view.draw(canvas, (x, y), &meshes, rasterise);
     draw_axes(canvas, (x, y), &view, reach);
     let text = format!(
-        "grip_pose = {index}: {:.1} mm between the jaws, {:.0} mm\u{b2} in contact",
-        proposal.width_mm, proposal.contact_mm2
+        "grip_pose = {grip_pose}: {:.1} mm between the jaws, {:.0} mm\u{b2} in contact",
+        grip.width_mm, grip.contact_mm2
     );
-    canvas.text(&text, f64::from(x + 14), f64::from(y + 6), Anchor::Left, TextStyle::small(Rgb(33, 37, 43)));
+    canvas.text(&text, f64::from(x + 14), f64::from(y + 6), Anchor::Left, TextStyle::small(INK));
 }
 
 /// The axes of the part frame, and a bar of a round length.
@@ -100,9 +97,9 @@ fn draw_axes(canvas: &mut Canvas, (x, y): (u32, u32), view: &View, reach: f64) {
         .unwrap_or(1.0);
     let width = bar_mm * 1e-3 / view.metres_per_px;
     let (left, bottom) = (f64::from(x) + 16.0, f64::from(y + PANEL.1) - 18.0);
-    canvas.line(&[(left, bottom), (left + width, bottom)], 3.0, Rgb(33, 37, 43));
+    canvas.line(&[(left, bottom), (left + width, bottom)], 3.0, INK);
     let text = format!("{bar_mm} mm");
-    canvas.text(&text, left, bottom - 20.0, Anchor::Left, TextStyle::small(Rgb(33, 37, 43)));
+    canvas.text(&text, left, bottom - 20.0, Anchor::Left, TextStyle::small(INK));
 }
 
 /// A box centred on the origin.

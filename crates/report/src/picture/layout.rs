@@ -1,24 +1,23 @@
 //! What the pictures of a sample and of a measured pull share.
 
 use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
-use super::colours::{COMMAND, DISPLACEMENT, INK, MEASURED, PANEL, SLIP, SOFT_INK};
+use super::colours::{COMMAND, DISPLACEMENT, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
 use super::plot::{Area, Curve, pull_curve};
-use super::sheet::details;
-use gripgen_record::Record;
+use super::film::{STRIP_HEIGHT, draw_strip};
+use super::sheet::{details, heading};
+use gripgen_record::{Film, Record};
 use gripgen_record::proto::gripgen_v1::Sample;
 use gripgen_twin::TactileImage;
 
 pub(crate) const MARGIN: u32 = 16;
-
 pub(crate) const IMAGE: (u32, u32) = (400, 300);
-
 pub(crate) const HEADER: u32 = 64;
-
 pub(crate) const CAPTION: u32 = 24;
+/// Height of a row of images with their captions.
+pub(crate) const ROW: u32 = CAPTION + IMAGE.1 + MARGIN;
+const CURVE_HEIGHT: u32 = 380;
 
-pub(crate) const CURVE_HEIGHT: u32 = 380;
-
-pub(crate) fn second_line(s: &Sample) -> String {
+fn second_line(s: &Sample) -> String {
     let mut text = details(s);
     if let Some(mu) = s.mu {
         text += &format!(", mu {mu:.4}");
@@ -32,17 +31,52 @@ pub(crate) fn second_line(s: &Sample) -> String {
     text
 }
 
-pub(crate) fn frame(canvas: &mut Canvas, x: u32, y: u32) {
-    canvas.rect(f64::from(x), f64::from(y), f64::from(IMAGE.0), f64::from(IMAGE.1), PANEL);
+/// A picture of one sample: its heading, `rows` rows of images that `draw` draws, its pull curve and its film.
+pub(super) fn sample_sheet(
+    record: &Record,
+    film: Option<&Film>,
+    (columns, rows): (u32, u32),
+    draw: impl FnOnce(&mut Canvas),
+) -> Vec<u8> {
+    let width = columns * (IMAGE.0 + MARGIN) + MARGIN;
+    let curve = HEADER + rows * ROW;
+    let plain = curve + CAPTION + CURVE_HEIGHT + MARGIN;
+    let height = plain + if film.is_some() { STRIP_HEIGHT } else { 0 };
+    let mut canvas = Canvas::new(width, height, PAPER);
+    let s = &record.sample;
+    canvas.text(&heading(s), f64::from(MARGIN), 10.0, Anchor::Left, TextStyle::title(INK));
+    canvas.text(&second_line(s), f64::from(MARGIN), 36.0, Anchor::Left, TextStyle::small(SOFT_INK));
+    draw(&mut canvas);
+    draw_curve(&mut canvas, curve, width, record);
+    if let Some(film) = film {
+        draw_strip(&mut canvas, (plain, width), film);
+    }
+    canvas.into_png()
 }
 
-pub(crate) fn pixel(image: &TactileImage, u: u32, v: u32) -> Rgb {
-    let [r, g, b] = image.pixel(u, v);
-    Rgb(r, g, b)
+/// An empty frame with a caption above it.
+pub(crate) fn frame(canvas: &mut Canvas, (x, top): (u32, u32), caption: &str) {
+    canvas.text(caption, f64::from(x), f64::from(top), Anchor::Left, TextStyle::small(INK));
+    canvas.rect(f64::from(x), f64::from(top + CAPTION), f64::from(IMAGE.0), f64::from(IMAGE.1), PANEL);
 }
 
-/// Draws an image into the frame, as large as it fits, centred.
-pub(crate) fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour: impl Fn(u32, u32) -> Rgb) {
+/// A frame with an image in it.
+pub(crate) fn framed(canvas: &mut Canvas, at: (u32, u32), caption: &str, image: &TactileImage) {
+    frame(canvas, at, caption);
+    fit(canvas, at, (image.width_px, image.height_px), |u, v| {
+        let [r, g, b] = image.pixel(u, v);
+        Rgb(r, g, b)
+    });
+}
+
+/// Draws an image into the frame below the caption at a place, as large as it fits, centred.
+pub(super) fn fit(
+    canvas: &mut Canvas,
+    (x, caption): (u32, u32),
+    size: (u32, u32),
+    colour: impl Fn(u32, u32) -> Rgb,
+) {
+    let y = caption + CAPTION;
     let (zoom, left, top) = placement(size);
     let (width, height) = ((f64::from(size.0) * zoom) as u32, (f64::from(size.1) * zoom) as u32);
     for row in 0..height {
@@ -55,7 +89,7 @@ pub(crate) fn fit(canvas: &mut Canvas, x: u32, y: u32, size: (u32, u32), colour:
     }
 }
 
-pub(crate) fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Record) {
+fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Record) {
     let mut x = f64::from(MARGIN);
     for (text, ink) in [
         ("force / N:", INK),
@@ -88,8 +122,32 @@ pub(crate) fn draw_curve(canvas: &mut Canvas, top: u32, width: u32, record: &Rec
 }
 
 /// Zoom and margins of an image of this size in the frame.
-pub(crate) fn placement(size: (u32, u32)) -> (f64, u32, u32) {
+pub(super) fn placement(size: (u32, u32)) -> (f64, u32, u32) {
     let zoom = (f64::from(IMAGE.0) / f64::from(size.0)).min(f64::from(IMAGE.1) / f64::from(size.1));
     let rest = |frame: u32, n: u32| ((f64::from(frame) - f64::from(n) * zoom) / 2.0).max(0.0) as u32;
     (zoom, rest(IMAGE.0, size.0), rest(IMAGE.1, size.1))
+}
+
+/// An image of another size: each pixel is the mean of those that it covers.
+pub(crate) fn averaged(image: &TactileImage, (width_px, height_px): (u32, u32)) -> TactileImage {
+    let span = |i: u32, n: u32, of: u32| {
+        let step = f64::from(of) / f64::from(n);
+        let from = (f64::from(i) * step) as u32;
+        from.min(of - 1)..((f64::from(i + 1) * step).ceil() as u32).clamp(from + 1, of)
+    };
+    let mut rgb = Vec::with_capacity((3 * width_px * height_px) as usize);
+    for row in 0..height_px {
+        for column in 0..width_px {
+            let (mut sum, mut count) = ([0_u32; 3], 0);
+            for v in span(row, height_px, image.height_px) {
+                for u in span(column, width_px, image.width_px) {
+                    let pixel = image.pixel(u, v);
+                    (0..3).for_each(|c| sum[c] += u32::from(pixel[c]));
+                    count += 1;
+                }
+            }
+            rgb.extend(sum.map(|s| (s / count) as u8));
+        }
+    }
+    TactileImage { width_px, height_px, rgb }
 }

@@ -2,19 +2,25 @@
 
 use super::canvas::{Anchor, Canvas, TextStyle};
 use super::colours::{COMMAND, DISPLACEMENT, GRID, MEASURED, SLIP, SOFT_INK};
+use crate::axis::nice_step;
 use gripgen_twin::PullTrace;
 
 /// A rectangle of the canvas.
 #[derive(Debug, Clone, Copy)]
 pub struct Area {
+    /// Its left side.
     pub x: f64,
+    /// Its top.
     pub y: f64,
+    /// Its width.
     pub width: f64,
+    /// Its height.
     pub height: f64,
 }
 
 /// What a curve shows.
 pub struct Curve<'a> {
+    /// The pull.
     pub trace: &'a PullTrace,
     /// Time and force of the label.
     pub slip: Option<(f64, f64)>,
@@ -22,23 +28,18 @@ pub struct Curve<'a> {
     pub full: bool,
 }
 
-/// Distance of two grid lines that divides `range` into about `wanted` pieces: 1, 2 or 5 times a power of ten.
-fn tick(range: f64, wanted: f64) -> f64 {
-    let raw = range / wanted;
-    let power = libm::pow(10.0, libm::log10(raw).floor());
-    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= raw).unwrap_or(10.0);
-    factor * power
-}
-
-/// A number with as many decimals as its grid needs.
-fn label(value: f64, step: f64) -> String {
+/// Places of the grid lines from 0 to `end`, about as many as are wanted, with their numbers.
+fn ticks(end: f64, wanted: f64) -> impl Iterator<Item = (f64, String)> {
+    let step = nice_step(end / wanted, 1.0);
     let decimals = if step >= 1.0 { 0 } else { (-libm::log10(step)).ceil() as usize };
-    format!("{value:.decimals$}")
+    let places = std::iter::successors(Some(0.0), move |at| Some(at + step));
+    places.take_while(move |at| *at <= end).map(move |at| (at, format!("{at:.decimals$}")))
 }
 
 /// Draws a pull curve into `area`; axes and their numbers are inside it.
 pub fn pull_curve(canvas: &mut Canvas, area: Area, curve: &Curve<'_>) {
     let t = curve.trace;
+    let pulled = || t.rows().filter(|r| r.time_s >= 0.0);
     let end_s = t.time_s.last().copied().unwrap_or(1.0).max(1e-3);
     let top_n = t
         .measured_force_n
@@ -56,11 +57,9 @@ pub fn pull_curve(canvas: &mut Canvas, area: Area, curve: &Curve<'_>) {
     let x = |time_s: f64| plot.x + plot.width * time_s / end_s;
     let y = |force_n: f64| plot.y + plot.height * (1.0 - force_n.max(0.0) / top_n);
     axes(canvas, plot, end_s, top_n, curve.full.then_some("time / s"));
-    let command: Vec<(f64, f64)> =
-        t.rows().filter(|r| r.time_s >= 0.0).map(|r| (x(r.time_s), y(r.desired_force_n))).collect();
+    let command: Vec<(f64, f64)> = pulled().map(|r| (x(r.time_s), y(r.desired_force_n))).collect();
     canvas.line(&command, 1.2, COMMAND);
-    let measured: Vec<(f64, f64)> =
-        t.rows().filter(|r| r.time_s >= 0.0).map(|r| (x(r.time_s), y(r.measured_force_n))).collect();
+    let measured: Vec<(f64, f64)> = pulled().map(|r| (x(r.time_s), y(r.measured_force_n))).collect();
     canvas.line(&measured, if curve.full { 1.6 } else { 1.2 }, MEASURED);
     if curve.full {
         displacement(canvas, plot, t, end_s);
@@ -75,21 +74,15 @@ pub fn pull_curve(canvas: &mut Canvas, area: Area, curve: &Curve<'_>) {
 pub(crate) fn axes(canvas: &mut Canvas, plot: Area, end: f64, top_n: f64, name: Option<&str>) {
     let small = TextStyle::small(SOFT_INK);
     let (columns, rows) = if name.is_some() { (8.0, 6.0) } else { (3.0, 3.0) };
-    let step = tick(end, columns);
-    let mut at = 0.0;
-    while at <= end {
+    for (at, number) in ticks(end, columns) {
         let x = plot.x + plot.width * at / end;
         canvas.line(&[(x, plot.y), (x, plot.y + plot.height)], 1.0, GRID);
-        canvas.text(&label(at, step), x, plot.y + plot.height + 3.0, Anchor::Middle, small);
-        at += step;
+        canvas.text(&number, x, plot.y + plot.height + 3.0, Anchor::Middle, small);
     }
-    let step = tick(top_n, rows);
-    let mut force = 0.0;
-    while force <= top_n {
+    for (force, number) in ticks(top_n, rows) {
         let y = plot.y + plot.height * (1.0 - force / top_n);
         canvas.line(&[(plot.x, y), (plot.x + plot.width, y)], 1.0, GRID);
-        canvas.text(&label(force, step), plot.x - 4.0, y - 8.0, Anchor::Right, small);
-        force += step;
+        canvas.text(&number, plot.x - 4.0, y - 8.0, Anchor::Right, small);
     }
     if let Some(name) = name {
         let (middle, below) = (plot.x + plot.width / 2.0, plot.y + plot.height + 21.0);
@@ -109,12 +102,9 @@ fn displacement(canvas: &mut Canvas, plot: Area, trace: &PullTrace, end_s: f64) 
         })
         .collect();
     canvas.line(&points, 1.2, DISPLACEMENT);
-    let step = tick(top_mm, 6.0);
-    let mut mm = 0.0;
-    while mm <= top_mm {
+    for (mm, number) in ticks(top_mm, 6.0) {
         let y = plot.y + plot.height * (1.0 - mm / top_mm);
         let style = TextStyle::small(DISPLACEMENT);
-        canvas.text(&label(mm, step), plot.x + plot.width + 5.0, y - 8.0, Anchor::Left, style);
-        mm += step;
+        canvas.text(&number, plot.x + plot.width + 5.0, y - 8.0, Anchor::Left, style);
     }
 }

@@ -1,12 +1,7 @@
 //! A measured pull in full: images before and in the grip, their difference, pull curve.
 
-use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
-use super::colours::{INK, PAPER, SOFT_INK};
-use super::film::{STRIP_HEIGHT, draw_strip};
-use super::layout::{
-    CAPTION, CURVE_HEIGHT, HEADER, IMAGE, MARGIN, draw_curve, fit, frame, pixel, second_line,
-};
-use super::sheet::heading;
+use super::canvas::{Canvas, Rgb};
+use super::layout::{HEADER, IMAGE, MARGIN, ROW, fit, frame, framed, sample_sheet};
 use gripgen_record::{Film, Record};
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 
@@ -21,24 +16,12 @@ pub(super) fn rig_picture(
     rest: Option<&PerJaw<TactileImage>>,
     film: Option<&Film>,
 ) -> Vec<u8> {
-    let row = CAPTION + IMAGE.1 + MARGIN;
-    let width = 3 * (IMAGE.0 + MARGIN) + MARGIN;
-    let plain = HEADER + 2 * row + CAPTION + CURVE_HEIGHT + MARGIN;
-    let height = plain + if film.is_some() { STRIP_HEIGHT } else { 0 };
-    let mut canvas = Canvas::new(width, height, PAPER);
-    let s = &record.sample;
-    canvas.text(&heading(s), f64::from(MARGIN), 10.0, Anchor::Left, TextStyle::title(INK));
-    canvas.text(&second_line(s), f64::from(MARGIN), 36.0, Anchor::Left, TextStyle::small(SOFT_INK));
-    let mut top = HEADER;
-    for jaw in Jaw::BOTH {
-        draw_jaw(&mut canvas, top, jaw, record.images.as_ref().map(|i| &i[jaw]), rest.map(|i| &i[jaw]));
-        top += row;
-    }
-    draw_curve(&mut canvas, top, width, record);
-    if let Some(film) = film {
-        draw_strip(&mut canvas, (plain, width), film);
-    }
-    canvas.into_png()
+    sample_sheet(record, film, (3, 2), |canvas| {
+        for (row, jaw) in (0..).zip(Jaw::BOTH) {
+            let (grip, rest) = (record.images.as_ref().map(|i| &i[jaw]), rest.map(|i| &i[jaw]));
+            draw_jaw(canvas, HEADER + row * ROW, jaw, grip, rest);
+        }
+    })
 }
 
 fn draw_jaw(
@@ -48,30 +31,20 @@ fn draw_jaw(
     grip: Option<&TactileImage>,
     rest: Option<&TactileImage>,
 ) {
-    let place = |i: u32| (MARGIN + i * (IMAGE.0 + MARGIN), top + CAPTION);
-    let caption = |canvas: &mut Canvas, i: u32, text: &str| {
-        let (x, y) = place(i);
-        canvas.text(text, f64::from(x), f64::from(top), Anchor::Left, TextStyle::small(INK));
-        frame(canvas, x, y);
-    };
+    let place = |i: u32| (MARGIN + i * (IMAGE.0 + MARGIN), top);
     for (i, what, image) in [(0, "before the grip", rest), (1, "gripped", grip)] {
         match image {
-            Some(image) => {
-                caption(canvas, i, &format!("{jaw} jaw, {what}"));
-                let (x, y) = place(i);
-                fit(canvas, x, y, (image.width_px, image.height_px), |u, v| pixel(image, u, v));
-            }
-            None => caption(canvas, i, &format!("{jaw} jaw, {what}: no image")),
+            Some(image) => framed(canvas, place(i), &format!("{jaw} jaw, {what}"), image),
+            None => frame(canvas, place(i), &format!("{jaw} jaw, {what}: no image")),
         }
     }
     let size = |image: &TactileImage| (image.width_px, image.height_px);
     match grip.zip(rest).filter(|(grip, rest)| size(grip) == size(rest)) {
         Some((grip, rest)) => {
-            caption(canvas, 2, &format!("{jaw} jaw, difference x {GAIN} (grey: none)"));
-            let (x, y) = place(2);
-            fit(canvas, x, y, size(grip), |u, v| difference(grip.pixel(u, v), rest.pixel(u, v)));
+            frame(canvas, place(2), &format!("{jaw} jaw, difference x {GAIN} (grey: none)"));
+            fit(canvas, place(2), size(grip), |u, v| difference(grip.pixel(u, v), rest.pixel(u, v)));
         }
-        None => caption(canvas, 2, &format!("{jaw} jaw: no difference without two images of one size")),
+        None => frame(canvas, place(2), &format!("{jaw} jaw: no difference without two images of one size")),
     }
 }
 
@@ -83,6 +56,7 @@ fn difference(grip: [u8; 3], rest: [u8; 3]) -> Rgb {
 
 #[cfg(test)]
 mod tests {
+    use super::super::layout::CAPTION;
     use super::*;
     use gripgen_record::decode_picture;
     use gripgen_record::proto::gripgen_v1::{Sample, Status};
@@ -102,7 +76,7 @@ mod tests {
         let found = decode_picture(&rig_picture(&record, Some(&rest), None)).unwrap();
         let middle = |column: u32, row: u32| {
             let x = MARGIN + column * (IMAGE.0 + MARGIN) + IMAGE.0 / 2;
-            found.pixel(x, HEADER + row * (CAPTION + IMAGE.1 + MARGIN) + CAPTION + IMAGE.1 / 2)
+            found.pixel(x, HEADER + row * ROW + CAPTION + IMAGE.1 / 2)
         };
         let grey = |level: u8| [level; 3];
         assert_eq!([0, 1, 2].map(|i| middle(i, 0)), [grey(60), grey(90), grey(128 + 60)]);

@@ -1,10 +1,13 @@
 //! A shaded view of parts and jaws, through the height map rasteriser.
 
 use super::canvas::{Canvas, Rgb};
-use gripgen_tactile::{Grid, Plane, raster};
 use gripgen_twin::TriMesh;
 use gripgen_twin::frames::{Pose, pose, rotation_about_axis};
 use nalgebra::{Point3, Vector3};
+
+/// Heights of a mesh, turned as the pose says, towards the eye of a view: in pixels, row by row, not finite where there is
+/// nothing. z grows away from the eye.
+pub type Rasterise<'a> = dyn Fn(&TriMesh, &Pose, &View) -> Vec<f32> + 'a;
 
 /// Something to draw.
 pub(crate) struct SceneMesh<'a> {
@@ -15,15 +18,15 @@ pub(crate) struct SceneMesh<'a> {
 
 /// Where a scene is seen from.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct View {
+pub struct View {
     /// Turn about the vertical.
-    pub(crate) azimuth_rad: f64,
+    pub azimuth_rad: f64,
     /// Height of the eye above the horizon.
-    pub(crate) elevation_rad: f64,
+    pub elevation_rad: f64,
     /// Side of a pixel.
-    pub(crate) metres_per_px: f64,
+    pub metres_per_px: f64,
     /// Size in pixels.
-    pub(crate) size_px: (u32, u32),
+    pub size_px: (u32, u32),
 }
 
 impl View {
@@ -41,30 +44,24 @@ impl View {
     }
 }
 
-/// A scene seen from one side.
-pub(crate) struct Scene {
-    view: View,
-}
-
-impl Scene {
-    pub(crate) fn new(view: View) -> Self {
-        Self { view }
-    }
-
+impl View {
     /// Draws meshes into the canvas at (`x`, `y`); the nearest surface wins.
-    pub(crate) fn draw(&self, canvas: &mut Canvas, x: u32, y: u32, meshes: &[SceneMesh<'_>]) {
-        let (width, height) = self.view.size_px;
-        let grid = Grid {
-            width_px: width as usize,
-            height_px: height as usize,
-            metres_per_px: self.view.metres_per_px,
+    pub(crate) fn draw(
+        &self,
+        canvas: &mut Canvas,
+        (x, y): (u32, u32),
+        meshes: &[SceneMesh<'_>],
+        rasterise: &Rasterise<'_>,
+    ) {
+        let (width, height) = self.size_px;
+        let size = (width as usize, height as usize);
+        let map = |m: &SceneMesh<'_>| Heights {
+            size,
+            values: rasterise(m.mesh, &(self.eye_from_world() * m.world_from_mesh), self),
         };
-        let maps: Vec<Plane> = meshes
-            .iter()
-            .map(|m| raster(m.mesh, &(self.view.eye_from_world() * m.world_from_mesh), &grid, f64::INFINITY))
-            .collect();
-        for row in 0..grid.height_px {
-            for column in 0..grid.width_px {
+        let maps: Vec<Heights> = meshes.iter().map(map).collect();
+        for row in 0..size.1 {
+            for column in 0..size.0 {
                 let nearest = (0..maps.len())
                     .filter(|&i| maps[i].at(column, row).is_finite())
                     .reduce(|a, b| if maps[b].at(column, row) > maps[a].at(column, row) { b } else { a });
@@ -77,8 +74,20 @@ impl Scene {
     }
 }
 
+/// What [`Rasterise`] gives.
+struct Heights {
+    size: (usize, usize),
+    values: Vec<f32>,
+}
+
+impl Heights {
+    fn at(&self, column: usize, row: usize) -> f32 {
+        self.values[row * self.size.0 + column]
+    }
+}
+
 /// Slope of the surface in pixels of height per pixel, to the side where there is a surface.
-fn slope(map: &Plane, x: usize, y: usize) -> (f64, f64) {
+fn slope(map: &Heights, x: usize, y: usize) -> (f64, f64) {
     let here = map.at(x, y);
     let difference = |ax: usize, ay: usize, bx: usize, by: usize| {
         let (a, b) = (map.at(ax, ay), map.at(bx, by));
@@ -89,8 +98,8 @@ fn slope(map: &Plane, x: usize, y: usize) -> (f64, f64) {
             _ => 0.0,
         }
     };
-    let (l, r) = (x.saturating_sub(1), (x + 1).min(map.width - 1));
-    let (u, d) = (y.saturating_sub(1), (y + 1).min(map.height - 1));
+    let (l, r) = (x.saturating_sub(1), (x + 1).min(map.size.0 - 1));
+    let (u, d) = (y.saturating_sub(1), (y + 1).min(map.size.1 - 1));
     (difference(l, y, r, y), difference(x, u, x, d))
 }
 

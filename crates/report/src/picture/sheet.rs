@@ -1,8 +1,10 @@
 //! The contact sheet: a few samples of a run at a glance.
 
-use super::canvas::{Anchor, Canvas, TextStyle};
+use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
 use super::colours::{FAILED, INK, PANEL, PAPER, SOFT_INK};
+use super::layout::averaged;
 use super::plot::{Area, Curve, pull_curve};
+use crate::text::{spread, wrapped};
 use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_record::{FolderError, INDEX_COLUMNS, ReadError, Record, RunFolder, ShardReader, status_name};
 use std::collections::BTreeMap;
@@ -116,12 +118,6 @@ fn chosen(mut by_part: BTreeMap<String, Vec<(f64, u64)>>, failed: &[u64]) -> Vec
     chosen
 }
 
-/// So many of a list, from its first to its last; the middle one where it is one.
-fn spread<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
-    let n = most.min(all.len());
-    (0..n).map(move |k| &all[if n == 1 { all.len() / 2 } else { k * (all.len() - 1) / (n - 1) }])
-}
-
 fn tile(canvas: &mut Canvas, x: u32, y: u32, record: &Record) {
     let s = &record.sample;
     canvas.rect(f64::from(x), f64::from(y), f64::from(TILE_WIDTH), f64::from(TILE_HEIGHT), PANEL);
@@ -131,14 +127,18 @@ fn tile(canvas: &mut Canvas, x: u32, y: u32, record: &Record) {
     top += 18.0;
     // A failed sample has nothing but its reason, and the whole tile for it.
     let most = if s.status() == Status::Failed { usize::MAX } else { 1 };
-    for (i, line) in lines(&details(s), LINE).iter().take(most).enumerate() {
+    for (i, line) in wrapped(&details(s), LINE).iter().take(most).enumerate() {
         canvas.text(line, left, top + 18.0 * i as f64, Anchor::Left, TextStyle::small(SOFT_INK));
     }
     top += 22.0;
     if let Some(images) = &record.images {
         for (k, (_, image)) in images.iter().enumerate() {
             let at = x + GAP + k as u32 * (IMAGE_WIDTH + GAP);
-            thumbnail(canvas, image, at, top as u32);
+            let small = averaged(image, (IMAGE_WIDTH, IMAGE_HEIGHT));
+            for (y, x) in (0..IMAGE_HEIGHT).flat_map(|y| (0..IMAGE_WIDTH).map(move |x| (y, x))) {
+                let [r, g, b] = small.pixel(x, y);
+                canvas.put(at + x, top as u32 + y, Rgb(r, g, b));
+            }
         }
     }
     top += f64::from(IMAGE_HEIGHT + GAP);
@@ -175,51 +175,6 @@ pub(super) fn details(s: &Sample) -> String {
     )
 }
 
-/// A text broken between words into lines of at most so many characters; a longer word has a line of its own, cut.
-fn lines(text: &str, most: usize) -> Vec<String> {
-    let mut lines: Vec<String> = vec![String::new()];
-    for word in text.split_whitespace() {
-        let word: String = word.chars().take(most).collect();
-        let last = lines.len() - 1;
-        if lines[last].is_empty() {
-            lines[last] = word;
-        } else if lines[last].chars().count() + 1 + word.chars().count() <= most {
-            lines[last] += &format!(" {word}");
-        } else {
-            lines.push(word);
-        }
-    }
-    lines
-}
-
-/// An image shrunk (or stretched) to the size of a tile's half, by averaging.
-fn thumbnail(canvas: &mut Canvas, image: &gripgen_twin::TactileImage, x: u32, y: u32) {
-    let (sx, sy) = (
-        f64::from(image.width_px) / f64::from(IMAGE_WIDTH),
-        f64::from(image.height_px) / f64::from(IMAGE_HEIGHT),
-    );
-    for row in 0..IMAGE_HEIGHT {
-        for column in 0..IMAGE_WIDTH {
-            let span = |i: u32, s: f64, n: u32| {
-                let from = (f64::from(i) * s) as u32;
-                let to = ((f64::from(i + 1) * s).ceil() as u32).clamp(from + 1, n);
-                from.min(n - 1)..to
-            };
-            let mut sum = [0u32; 3];
-            let mut count = 0;
-            for v in span(row, sy, image.height_px) {
-                for u in span(column, sx, image.width_px) {
-                    let pixel = image.pixel(u, v);
-                    (0..3).for_each(|c| sum[c] += u32::from(pixel[c]));
-                    count += 1;
-                }
-            }
-            let [r, g, b] = sum.map(|s| (s / count) as u8);
-            canvas.put(x + column, y + row, super::Rgb(r, g, b));
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -238,12 +193,5 @@ mod tests {
         // What has room is all there, the failures behind.
         assert_eq!(chosen([part("a", 0, 2)].into(), &failed[..5]), [1, 0, 40, 41, 42, 43, 44]);
         assert_eq!(chosen(BTreeMap::new(), &failed[..1]), [40]);
-    }
-
-    #[test]
-    fn reasons_are_broken_between_words() {
-        assert_eq!(lines("the part is deeper than the gel", 12), ["the part is", "deeper than", "the gel"]);
-        assert_eq!(lines("", 12), [""]);
-        assert_eq!(lines("abcdefghijklmnop x", 5), ["abcde", "x"]);
     }
 }

@@ -2,9 +2,10 @@
 
 use super::expected::Expected;
 use super::rows::Rows;
-use crate::report::{clean, jpeg_url};
+use crate::picture::layout::averaged;
+use crate::text::{clean, data_url};
 use gripgen_record::{Dataset, DatasetError, encode_jpeg};
-use gripgen_twin::{Jaw, PullTrace, TactileImage, Values, rounded};
+use gripgen_twin::{Jaw, PullTrace, TraceRow, Values, rounded};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -33,10 +34,11 @@ pub(super) fn card(
         .iter()
         .flat_map(|both| Jaw::BOTH.map(|jaw| (jaw, &both[jaw])))
         .filter_map(|(jaw, image)| {
-            let small = shrunk(image);
+            let by = image.width_px.div_ceil(WIDEST_PX).max(1);
+            let small = averaged(image, (image.width_px / by, (image.height_px / by).max(1)));
             let jpeg = encode_jpeg(&small, QUALITY).ok()?;
             Some(json!({
-                "jaw": jaw.to_string(), "url": jpeg_url(&jpeg), "width": small.width_px, "height": small.height_px,
+                "jaw": jaw.to_string(), "url": data_url("jpeg", &jpeg), "width": small.width_px, "height": small.height_px,
             }))
         })
         .collect();
@@ -81,27 +83,6 @@ fn finite(x: f64) -> String {
     if x.is_finite() { x.to_string() } else { String::new() }
 }
 
-/// An image as wide as the page shows it, by averaging whole blocks.
-fn shrunk(image: &TactileImage) -> TactileImage {
-    let by = image.width_px.div_ceil(WIDEST_PX).max(1);
-    let (width_px, height_px) = (image.width_px / by, image.height_px / by);
-    if by == 1 || width_px == 0 || height_px == 0 {
-        return image.clone();
-    }
-    let mut rgb = Vec::with_capacity((3 * width_px * height_px) as usize);
-    for v in 0..height_px {
-        for u in 0..width_px {
-            let mut sum = [0_u32; 3];
-            for (y, x) in (0..by).flat_map(|y| (0..by).map(move |x| (y, x))) {
-                let pixel = image.pixel(u * by + x, v * by + y);
-                (0..3).for_each(|c| sum[c] += u32::from(pixel[c]));
-            }
-            rgb.extend(sum.map(|s| ((s + by * by / 2) / (by * by)) as u8));
-        }
-    }
-    TactileImage { width_px, height_px, rgb }
-}
-
 /// The pull as a small drawing: command, measured force, slip. Nothing of a trace without two rows.
 fn curve(trace: &PullTrace, slip_s: Option<f64>, label_n: f64) -> Option<Value> {
     let step = trace.len().div_ceil(POINTS).max(1);
@@ -114,7 +95,7 @@ fn curve(trace: &PullTrace, slip_s: Option<f64>, label_n: f64) -> Option<Value> 
     }
     let x = |t: f64| WIDTH * (t - first) / (last - first);
     let y = |f: f64| 2.0 + (HEIGHT - 4.0) * (high - f) / (high - low);
-    let path = |of: &dyn Fn(&gripgen_twin::TraceRow) -> f64| {
+    let path = |of: fn(&TraceRow) -> f64| {
         let mut path = String::new();
         for row in kept.iter().filter(|row| of(row).is_finite()) {
             let command = if path.is_empty() { 'M' } else { 'L' };
@@ -124,7 +105,7 @@ fn curve(trace: &PullTrace, slip_s: Option<f64>, label_n: f64) -> Option<Value> 
     };
     let slip = slip_s.filter(|t| (first..=last).contains(t) && label_n.is_finite());
     Some(json!({
-        "desired": path(&|r| r.desired_force_n), "measured": path(&|r| r.measured_force_n),
+        "desired": path(|r| r.desired_force_n), "measured": path(|r| r.measured_force_n),
         "slip": slip.map(|t| format!("M{:.1} {:.1}h0", x(t), y(label_n))),
         "says": format!("{} s, up to {} N", rounded(last - first.min(0.0), &[]), rounded(high, &[])),
     }))

@@ -2,6 +2,7 @@
 
 use super::expected::ExpectedLabels;
 use super::rows::Rows;
+use crate::text::spread;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// At most `most` rows, in their order: a quarter for those farthest from what is expected, as many for those that did not slip,
@@ -27,7 +28,7 @@ pub(super) fn chosen(rows: &Rows<'_>, expected: &ExpectedLabels, most: usize) ->
     let per_part = most.saturating_sub(taken.len()).div_ceil(slipped.len().max(1));
     for of_part in slipped.values_mut() {
         of_part.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for (_, row) in spread(of_part, per_part) {
+        for &(_, row) in spread(of_part, per_part) {
             if taken.len() < most {
                 taken.insert(row);
             }
@@ -37,10 +38,4 @@ pub(super) fn chosen(rows: &Rows<'_>, expected: &ExpectedLabels, most: usize) ->
     let left: Vec<usize> = (0..rows.len()).filter(|row| !taken.contains(row)).collect();
     taken.extend(spread(&left, most.saturating_sub(taken.len())));
     taken.into_iter().take(most).collect()
-}
-
-/// So many of a list, from its first to its last.
-fn spread<T: Copy>(all: &[T], most: usize) -> impl Iterator<Item = T> + '_ {
-    let n = most.min(all.len());
-    (0..n).map(move |k| all[if n == 1 { all.len() / 2 } else { k * (all.len() - 1) / (n - 1) }])
 }

@@ -3,7 +3,10 @@
 use super::ViewOptions;
 use super::expected::ExpectedLabels;
 use super::rows::Rows;
-use crate::report::{Histogram, Mark, Plot, Series, clean, figure, rendered_with};
+use crate::histogram::Histogram;
+use crate::page::{Page, Table};
+use crate::text::{NAME, clean};
+use crate::{Plot, Series};
 use gripgen_record::Dataset;
 use gripgen_twin::rounded;
 use serde_json::{Value, json};
@@ -15,9 +18,6 @@ const HISTOGRAMS: usize = 16;
 const COUNTED: usize = 10_000;
 /// Points of a series.
 const POINTS: usize = 600;
-/// Letters of a name, of a sentence.
-const NAME: usize = 60;
-const SENTENCE: usize = 400;
 /// Reasons in the table.
 const REASONS: usize = 12;
 /// Series of a plot; with more, what is expected is not drawn.
@@ -63,17 +63,27 @@ pub(super) fn page(
         "parts": short(&part), "grips": short(&grip), "statuses": short(&status),
     });
     let left_out = rows.varied().len() + 1 - histograms.len().min(rows.varied().len() + 1);
-    rendered_with(
+    let mut page = Page::new(&options.title);
+    page.text(&sentence(rows, cards.len()));
+    page.facts(&facts(dataset));
+    let reasons = reasons(rows);
+    if !reasons.is_empty() {
+        page.section("What failed or is suspect", "");
+        let head = ["pulls", "status", "first", "reason of the first"];
+        page.table(&Table { words: vec![1, 2, 3], ..Table::new(&head, reasons) });
+    }
+    let plots = plots(rows, expected);
+    if !plots.is_empty() {
+        let about = "Expected is a straight line through the labels of each grip of a part over grip force, which single pulls \
+                     move little.";
+        page.section("Labels", about);
+        page.figures(&[], &plots, POINTS);
+    }
+    page.html_with(
         "view.html",
-        &json!({
-            "title": clean(&options.title, 2 * NAME),
-            "sentence": sentence(rows, cards.len()),
-            "facts": facts(dataset),
-            "reasons": reasons(rows),
-            "histograms": histograms,
-            "left_out": left_out,
+        json!({
+            "histograms": histograms, "left_out": left_out,
             "counted": (counted.len() < n).then_some(counted.len()),
-            "plots": plots(rows, expected).iter().map(|plot| figure(plot, POINTS)).collect::<Vec<_>>(),
             "parts": short(&part), "grips": short(&grip), "statuses": short(&status),
             "cards": cards, "pulls": n,
             // Nothing in it ends the script that it stands in.
@@ -112,11 +122,11 @@ fn sentence(rows: &Rows<'_>, shown: usize) -> String {
     } else {
         " All are shown.".into()
     };
-    clean(&text, SENTENCE)
+    text
 }
 
-fn facts(dataset: &Dataset) -> Vec<Value> {
-    let mut facts: Vec<(&str, String)> = vec![("data", dataset.path().display().to_string())];
+fn facts(dataset: &Dataset) -> Vec<(&'static str, String)> {
+    let mut facts = vec![("data", dataset.path().display().to_string())];
     if let Some(run) = dataset.run() {
         let info = run.info();
         facts.push(("run", format!("{}, {} samples planned", info.name, info.samples)));
@@ -129,11 +139,11 @@ fn facts(dataset: &Dataset) -> Vec<Value> {
             format!("{width} x {height} px; shown here as JPEG of quality 90, at most 320 px wide"),
         ));
     }
-    facts.iter().map(|(name, value)| json!({"name": name, "value": clean(value, SENTENCE)})).collect()
+    facts
 }
 
 /// Why pulls failed or are suspect, most frequent first; numbers of a reason do not tell reasons apart.
-fn reasons(rows: &Rows<'_>) -> Vec<Value> {
+fn reasons(rows: &Rows<'_>) -> Vec<Vec<String>> {
     let mut found: BTreeMap<(String, String), (usize, String, String)> = BTreeMap::new();
     for row in (0..rows.len()).filter(|&row| !rows.reason(row).is_empty()) {
         let kind: String = rows.reason(row).chars().filter(|c| !c.is_ascii_digit()).collect();
@@ -144,8 +154,10 @@ fn reasons(rows: &Rows<'_>) -> Vec<Value> {
     }
     let mut all: Vec<_> = found.into_iter().collect();
     all.sort_by(|a, b| b.1.0.cmp(&a.1.0).then(a.0.cmp(&b.0)));
-    let row = |((status, _), (n, reason, id)): &((String, String), (usize, String, String))| json!({"n": n, "status": clean(status, NAME), "reason": clean(reason, SENTENCE), "id": clean(id, NAME)});
-    all.iter().take(REASONS).map(row).collect()
+    let row = |((status, _), (n, reason, id)): ((String, String), (usize, String, String))| {
+        vec![n.to_string(), clean(&status, NAME), clean(&id, NAME), reason]
+    };
+    all.into_iter().take(REASONS).map(row).collect()
 }
 
 /// Labels over grip force with what is expected of each part, and how far pulls are from it in their order.
@@ -154,7 +166,6 @@ fn plots(rows: &Rows<'_>, expected: &ExpectedLabels) -> Vec<Plot> {
     for row in (0..rows.len()).filter(|&row| rows.label_n(row).is_finite()) {
         parts.entry(rows.part(row)).or_default().push(row);
     }
-    let series = |name: &str, mark, points| Series { name: name.into(), mark, points, errors: vec![] };
     let (mut over_force, mut in_order) = (Vec::new(), Vec::new());
     let lines = parts.len() + expected.lines.len() <= LINES;
     for (part, of_part) in &parts {
@@ -164,30 +175,21 @@ fn plots(rows: &Rows<'_>, expected: &ExpectedLabels) -> Vec<Plot> {
             .filter(|(force, _)| force.is_finite())
             .collect();
         let ends = points.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), p| (l.min(p.0), h.max(p.0)));
-        over_force.push(series(part, Mark::Points, points));
+        over_force.push(Series::points(*part, points));
         let of_grips = expected.lines.iter().filter(|((of, _), _)| lines && of == part && ends.0 < ends.1);
         for ((_, grip), line) in of_grips {
-            let at = |force: f64| (force, line.at_zero_n + line.slope * force);
             let grip = if grip.is_empty() { String::new() } else { format!(" {grip}") };
-            over_force.push(series(
-                &format!("{part}{grip}, expected"),
-                Mark::Line,
-                vec![at(ends.0), at(ends.1)],
-            ));
+            let points = [ends.0, ends.1].map(|force| (force, line.at(force)));
+            over_force.push(Series::line(format!("{part}{grip}, expected"), points));
         }
         let far = of_part.iter().filter_map(|&row| Some((row as f64, expected.of_row(row)?.deviations)));
-        in_order.push(series(part, Mark::Points, far.collect()));
+        in_order.push(Series::points(*part, far));
     }
-    let plot = |title: &str, x: &str, y: &str, series: Vec<Series>| Plot {
-        title: title.into(),
-        x_label: x.into(),
-        y_label: y.into(),
-        x_words: vec![],
-        series,
-    };
-    let mut plots = vec![plot("labels over grip force", "grip force of a jaw, N", "label, N", over_force)];
+    let mut plots =
+        vec![Plot::new("labels over grip force", "grip force of a jaw, N", "label, N", over_force)];
     if in_order.iter().any(|s| !s.points.is_empty()) {
-        plots.push(plot("how far from what is expected", "pull", "standard deviations", in_order));
+        let title = "how far from what is expected";
+        plots.push(Plot::new(title, "pull", "standard deviations", in_order));
     }
     plots.retain(|plot| plot.series.iter().any(|s| s.points.len() > 1));
     plots

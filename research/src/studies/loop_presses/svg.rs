@@ -1,6 +1,6 @@
 //! A small plot as SVG.
 
-use gripgen::Plot;
+use gripgen_report::Plot;
 use std::fmt::Write;
 
 const COLOURS: [&str; 2] = ["#c0504d", "#4f81bd"];

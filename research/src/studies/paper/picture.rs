@@ -1,9 +1,9 @@
 //! The picture of the paper's report: ratios over grip force, and a pull profile.
 
 use super::cells::PartCells;
-use gripgen::picture::{Anchor, Area, Canvas, Curve, TextStyle, pull_curve};
-use gripgen::picture::{COMMAND, GRID, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
 use gripgen::twin::PullTrace;
+use gripgen_report::picture::{Anchor, Area, Canvas, Curve, TextStyle, pull_curve};
+use gripgen_report::picture::{COMMAND, GRID, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
 
 const MARGIN: f64 = 16.0;
 const PLOT: (f64, f64) = (360.0, 260.0);

@@ -1,14 +1,15 @@
 //! Diagnosis of so few pulls that nothing gets a name: the calibrated twin, and what to pull next.
 
+use super::diagnosed::Diagnosed;
 use super::next::NextPulls;
 use super::pull_values::pull_values;
-use gripgen_physics::PullPredictor;
+use gripgen::PullPredictor;
 use crate::analysis::priors::shipped_priors;
-use gripgen::report::{Diagnosed, ReportData};
 use crate::analysis::twin_edits::TwinEdits;
 use gripgen_identify::pulls::few_diagnosis::diagnose_few;
 use gripgen_twin::predict::PullModel;
 use gripgen_identify::{CampaignOptions, plan_campaign};
+use gripgen_report::ReportData;
 use gripgen_twin::{MeasuredPulls, Twin};
 
 /// Pulls that are planned for a part, and at least.

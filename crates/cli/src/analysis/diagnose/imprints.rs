@@ -1,23 +1,17 @@
 //! Sets of imprints: diagnosis, calibration, comparison.
 
+use super::diagnosed::Diagnosed;
 use crate::analysis::imprint_set::ImprintSet;
-use gripgen::report::{Diagnosed, EvidenceRow, Mark, Plot, PlotGroup, ReportData, Series, WorstRow};
 use crate::analysis::twin_edits::{EditedValue, TwinEdits, calibration_entry, effect_entry};
 use gripgen_identify::{
     ImprintComparison, ImprintConstants, ImprintDiagnosis, ImprintRow, NamedEffect, ParameterEstimate,
     SharedConstant, Verdict, calibrate_imprint_set, compare_imprints, diagnose_imprints,
 };
+use gripgen_report::imprint_report;
 use gripgen_twin::Twin;
 use gripgen_twin::config::EffectFile;
 use gripgen_twin::effects::EffectSpec;
 use std::collections::BTreeMap;
-
-/// Grasps with a plot of their own.
-const PLOTS: usize = 6;
-/// Rows in the list of the worst.
-const WORST: usize = 6;
-/// Sets of effects in the table of evidence.
-const EVIDENCE: usize = 8;
 
 /// Diagnoses a set: what imprints do beside `V = c F`.
 pub fn diagnose_imprint_table(set: &ImprintSet, twin: &Twin) -> Diagnosed {
@@ -25,7 +19,7 @@ pub fn diagnose_imprint_table(set: &ImprintSet, twin: &Twin) -> Diagnosed {
     answer.diagnosis.data.sha256.clone_from(&set.sha256);
     answer.diagnosis.notes.extend(set.notes.iter().cloned());
     let edits = edits(&mut answer, twin, &set.sha256);
-    let report = report(&answer);
+    let report = imprint_report(&answer);
     Diagnosed::new(answer.diagnosis, edits, report)
 }
 
@@ -158,83 +152,4 @@ fn effect_file(spec: &EffectSpec, values: &[f64], named: Option<&NamedEffect>, s
         }
     }
     file
-}
-
-fn report(answer: &ImprintDiagnosis) -> ReportData {
-    let floor = answer.diagnosis.noise_floor_mm3.unwrap_or(1.0).max(f64::MIN_POSITIVE);
-    let mut rows: Vec<&ImprintRow> = answer.rows.iter().collect();
-    let left = |r: &ImprintRow| r.measured_mm3 - r.after_mm3;
-    rows.sort_by(|a, b| left(b).abs().total_cmp(&left(a).abs()));
-    let worst = rows.iter().take(WORST).map(|r| WorstRow {
-        id: answer.grasps[r.grasp].constant.name.clone(),
-        about: format!("{:.2} N at {:.2} s", r.force_n, r.time_s),
-        measured: r.measured_mm3,
-        predicted: r.after_mm3,
-        deviations: left(r).abs() / floor,
-    });
-    let evidence = answer.evidence.iter().take(EVIDENCE).map(|e| EvidenceRow {
-        name: e.name.clone(),
-        heldout_gain: e.gain.0,
-        standard_error: e.gain.1,
-        heldout_error: e.rmse_mm3,
-        values: e.values.clone(),
-        fate: e.fate.clone(),
-    });
-    ReportData {
-        groups: if answer.rows.is_empty() { Vec::new() } else { groups(answer) },
-        evidence: evidence.collect(),
-        worst: worst.collect(),
-        ..ReportData::default()
-    }
-}
-
-fn series(name: &str, mark: Mark, points: Vec<(f64, f64)>) -> Series {
-    Series { name: name.into(), mark, points, errors: Vec::new() }
-}
-
-fn groups(answer: &ImprintDiagnosis) -> Vec<PlotGroup> {
-    let plot = |title: &str, x_label: &str, y_label: &str, series: Vec<Series>| Plot {
-        title: title.into(),
-        x_label: x_label.into(),
-        y_label: y_label.into(),
-        x_words: Vec::new(),
-        series,
-    };
-    let residuals = |x: &dyn Fn(&ImprintRow) -> f64| {
-        let of = |name: &str, predicted: &dyn Fn(&ImprintRow) -> f64| {
-            let points = answer.rows.iter().map(|r| (x(r), r.measured_mm3 - predicted(r)));
-            series(name, Mark::Points, points.filter(|p| p.0.is_finite()).collect())
-        };
-        vec![of("V = c F", &|r| r.before_mm3), of("with the effects", &|r| r.after_mm3)]
-    };
-    let mut left =
-        vec![plot("Against the force", "force of the jaw [N]", "residual [mm^3]", residuals(&|r| r.force_n))];
-    if answer.rows.iter().any(|r| r.time_s.is_finite()) {
-        let label = "time since the start of the grasp [s]";
-        left.push(plot("Against time", label, "residual [mm^3]", residuals(&|r| r.time_s)));
-    }
-    let grasp = |(g, name): (usize, &str)| {
-        let points = |y: &dyn Fn(&ImprintRow) -> f64| -> Vec<(f64, f64)> {
-            answer.rows.iter().filter(|r| r.grasp == g).map(|r| (r.force_n, y(r))).collect()
-        };
-        let all = vec![
-            series("measured", Mark::Points, points(&|r| r.measured_mm3)),
-            series("V = c F", Mark::Points, points(&|r| r.before_mm3)),
-            series("with the effects", Mark::Points, points(&|r| r.after_mm3)),
-        ];
-        plot(name, "force of the jaw [N]", "volume of the imprint [mm^3]", all)
-    };
-    let names = answer.grasps.iter().map(|g| g.constant.name.as_str()).enumerate();
-    vec![
-        PlotGroup {
-            title: "What is left".into(),
-            about: "Volume less prediction; c comes from other stretches of the same grasp, effects from other grasps.".into(),
-            plots: left,
-        },
-        PlotGroup {
-            title: "Grasps".into(),
-            about: "Volume over the force that was read, measured and predicted.".into(),
-            plots: names.take(PLOTS).map(grasp).collect(),
-        },
-    ]
 }

@@ -1,9 +1,9 @@
 //! Presses as somebody measured them, from what was read to the answer.
 
+use super::diagnosed::Diagnosed;
 use super::presses::{PressDiagnosisInput, diagnose_presses};
 use gripgen_measured::PressColumns;
 use crate::analysis::presses::{FoundCircles, find_circles_with_sensor, presses_sha256};
-use super::Diagnosed;
 use gripgen_identify::PressCovariate;
 use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::PressSet;

@@ -5,17 +5,17 @@
 
 mod answer;
 mod marks;
-mod page;
 mod work;
 
 pub use gripgen_identify::{PressCovariate, PressValues};
 
-use crate::analysis::TwinEdits;
-use gripgen::report::Diagnosed;
+use super::diagnosed::Diagnosed;
+use crate::TwinEdits;
 use answer::{edits, remark};
 use gripgen_identify::{MIN_DIAGNOSED_PRESSES, PressData, too_few_presses};
+use gripgen_report::{PressPlace, ReportData, press_report};
 use gripgen_tactile::Sensor;
-use gripgen_tactile::presses::PressSet;
+use gripgen_tactile::presses::{Press, PressSet, ZONES};
 use gripgen_twin::Covariates;
 use gripgen_twin::config::EffectFile;
 use gripgen_twin::effects::PressNeeds;
@@ -56,7 +56,7 @@ pub fn diagnose_presses(input: &PressDiagnosisInput<'_>, progress: &mut dyn FnMu
     let n = input.set.presses.iter().filter(|p| p.circle.is_some()).count();
     if n < MIN_DIAGNOSED_PRESSES || n < input.set.presses.len() {
         let diagnosis = too_few_presses(&data, n);
-        let report = page::without_answer(&diagnosis);
+        let report = ReportData { title: "Diagnosis of presses".into(), ..ReportData::default() };
         return Diagnosed::new(diagnosis, TwinEdits::default(), report);
     }
     let circumstances: Vec<Covariates> = (0..n)
@@ -71,7 +71,14 @@ pub fn diagnose_presses(input: &PressDiagnosisInput<'_>, progress: &mut dyn FnMu
     let scatter_px = marks::straighten(&mut work);
     let mut found = gripgen_identify::diagnose_presses(&work, &data, progress);
     remark(&mut found.diagnosis, input, &work, &found.acting, scatter_px);
-    let report = page::report(input, &data.covariates, &found);
+    let place = |press: &Press| PressPlace {
+        name: press.name.clone(),
+        place: press.circle.map_or(String::new(), |c| {
+            format!("at ({:.0}, {:.0}), radius {:.0} px", c.x_px, c.y_px, c.radius_px)
+        }),
+    };
+    let places: Vec<PressPlace> = input.set.presses.iter().map(place).collect();
+    let report = press_report(&places, ZONES.map(|zone| zone.name()), &data.covariates, &found);
     let edits = edits(input, &found.diagnosis);
     Diagnosed::new(found.diagnosis, edits, report)
 }

@@ -2,12 +2,9 @@
 
 use super::few::diagnose_few_pulls;
 use super::next::next_pulls;
-use super::pull_report::pull_report;
 use super::pull_values::pull_values;
 use gripgen::Library;
-use crate::analysis::expect::pull_predictor;
-use gripgen_physics::PullPredictor;
-use gripgen::report::Diagnosed;
+use gripgen::PullPredictor;
 use crate::analysis::twin_edits::{TwinEdits, calibration_entry, effect_entry};
 use gripgen_identify::Diagnosis;
 use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
@@ -151,7 +148,11 @@ pub fn diagnose_pull_table(
     let answer = diagnose_pulls(measured, &predictor, &given, &asked, progress);
     let edits =
         answer.fits.as_ref().map(|f| edits(f, &answer.diagnosis, measured, &predictor)).unwrap_or_default();
-    let report = pull_report(measured, &predictor, &answer);
+    let report = pull_report(
+        measured,
+        &|model, row, times_s| predictor.simulated_trace_n(model, row, times_s),
+        &answer,
+    );
     let next = match &answer.fits {
         Some(fits) => next_pulls(fits, measured, twin, library, options.jobs),
         None => None,

@@ -10,7 +10,8 @@ use gripgen::identify::{Channel, Diagnosis, Verdict};
 use gripgen::record::{RIG_SOURCE, RunFolder};
 use gripgen_measured::campaign_toml;
 use gripgen::twin::can_be_drawn;
-use gripgen::{BASELINE_TWIN, Diagnosed, Location, Project};
+use gripgen::{BASELINE_TWIN, Location, Project};
+use crate::Diagnosed;
 use crate::{NextPulls, unvaried};
 use std::path::{Path, PathBuf};
 

@@ -8,8 +8,9 @@ use crate::output::{JsonSink, print};
 use crate::outputs::{Outputs, draws_of};
 use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, PosteriorFile, Verdict};
 use gripgen::twin::rounded;
-use gripgen::{Diagnosed, Location, diagnosis_page};
-use crate::edited_twin_toml;
+use gripgen::Location;
+use crate::{Diagnosed, edited_twin_toml};
+use gripgen_report::diagnosis_page;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -37,7 +38,7 @@ pub fn write(
     // The twin is there: what its sweep has to vary depends on it.
     diagnosed.report.next = next_steps(args, &diagnosed, next.as_deref());
     if let Some(report) = &args.report {
-        outputs.write(report, diagnosis_page(&diagnosed).as_bytes())?;
+        outputs.write(report, diagnosis_page(&diagnosed.diagnosis, &diagnosed.report).as_bytes())?;
     }
     if sink.wanted() {
         let value = serde_json::to_value(&diagnosed.diagnosis).map_err(Failure::new)?;

@@ -1,6 +1,5 @@
 //! The pose of a grip: as rotations and points, and as the angles that a twin has.
 
-use super::Proposal;
 use gripgen_twin::TriMesh;
 use gripgen_twin::frames::{Pose, pose, rotation_from_fixed_xyz};
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
@@ -27,12 +26,6 @@ impl GripAt {
         let rotation = rotation_from_fixed_xyz(self.orientation_deg.map(f64::to_radians));
         let origin = Vector3::from(self.origin_mm.map(|x| x * 1e-3));
         pose(&rotation, -(rotation * origin))
-    }
-}
-
-impl Proposal {
-    pub(super) fn part_from_mesh(&self) -> Pose {
-        GripAt { origin_mm: self.origin_mm, orientation_deg: self.orientation_deg }.part_from_mesh()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::part::init::MU;
 use gripgen::SampleError;
+use gripgen_report::{FrictionRange, Holding};
 use gripgen_twin::Outcome;
 
 /// Forces of a jaw that are tried.
@@ -10,40 +11,16 @@ const FORCES_N: [f64; 8] = [5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0];
 /// Relative half width of a 90 % interval over repetitions: they scatter by 3 to 7 %, 1.645 deviations of 5 %.
 const REPEATS: f64 = 0.082;
 
-/// Friction between a gel and a part.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrictionRange {
-    /// Lower end.
-    pub low: f64,
-    /// What is expected.
-    pub value: f64,
-    /// Upper end.
-    pub high: f64,
-    /// Whether somebody measured it.
-    pub is_measured: bool,
+/// Friction of a part of which nothing is known: no shape tells it. The value is that of a new twin; four steel parts had 0.14 to
+/// 0.17 (Wucherer et al. 2023, table of fits). Oil and dust take 10 to 60 % of it, and vendors quote dry silicone rubber from
+/// 0.25 to 0.75. A range and no interval: what a part has depends on whose part it is.
+pub(super) fn friction_of_any_part() -> FrictionRange {
+    FrictionRange { low: 0.06, value: MU, high: 0.75, is_measured: false }
 }
 
-impl FrictionRange {
-    /// Of a part of which nothing is known: no shape tells friction. The value is that of a new twin; four steel parts had 0.14 to
-    /// 0.17 (Wucherer et al. 2023, table of fits). Oil and dust take 10 to 60 % of it, and vendors quote dry silicone rubber from
-    /// 0.25 to 0.75. A range and no interval: what a part has depends on whose part it is.
-    pub fn of_any_part() -> Self {
-        Self { low: 0.06, value: MU, high: 0.75, is_measured: false }
-    }
-
-    /// Of a part whose friction was measured: its repetitions scatter.
-    pub fn measured(mu: f64) -> Self {
-        Self { low: mu * (1.0 - REPEATS), value: mu, high: mu * (1.0 + REPEATS), is_measured: true }
-    }
-}
-
-/// What a grip is expected to hold.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Holding {
-    /// Force of a jaw.
-    pub grip_force_n: f64,
-    /// Lower end, expected value and upper end of the pull at slip; why there is none.
-    pub max_pull_force_n: Result<[f64; 3], String>,
+/// Friction of a part that was measured: its repetitions scatter.
+pub(super) fn friction_measured(mu: f64) -> FrictionRange {
+    FrictionRange { low: mu * (1.0 - REPEATS), value: mu, high: mu * (1.0 + REPEATS), is_measured: true }
 }
 
 /// The pull at slip for each grip force; `pulls` makes one for each of three friction coefficients.
@@ -83,7 +60,7 @@ mod tests {
         let refused = |force_n: f64, _| {
             Err(SampleError::NoForce { jaw: gripgen_twin::Jaw::Left, force_n, commanded_n: 1.0 })
         };
-        let found = holding(FrictionRange::of_any_part(), 40.0, Some(17.0), &refused);
+        let found = holding(friction_of_any_part(), 40.0, Some(17.0), &refused);
         let forces: Vec<f64> = found.iter().map(|h| h.grip_force_n).collect();
         assert_eq!(forces, [5.0, 10.0, 15.0, 17.0, 20.0, 30.0, 40.0]);
         assert!(
@@ -91,6 +68,6 @@ mod tests {
                 .iter()
                 .all(|h| h.max_pull_force_n.as_ref().is_err_and(|why| why.contains("nothing is gripped")))
         );
-        assert_eq!(holding(FrictionRange::of_any_part(), 40.0, Some(20.0), &refused).len(), 6);
+        assert_eq!(holding(friction_of_any_part(), 40.0, Some(20.0), &refused).len(), 6);
     }
 }

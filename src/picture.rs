@@ -1,0 +1,5 @@
+//! Goes to the studies with `paper.rs`.
+
+mod paper;
+
+pub(crate) use paper::paper_picture;
