@@ -5,8 +5,8 @@
 //! them lie in a temporary folder; none of the data is kept.
 
 use gripgen::identify::{Diagnosis, HeldOutError, Verdict};
-use gripgen_report::Plot;
 use gripgen::{calibrate_sensor_table, diagnose_sensor_table, load_sensor_table};
+use gripgen_report::Plot;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

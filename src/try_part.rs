@@ -5,8 +5,7 @@ mod holding;
 use crate::generate::{pull_gripped, start_pull};
 use crate::gripped::Gripped;
 use crate::init::{
-    ANGLES_DEG, HIGHEST_N, InitError, MU, PART, PartOptions, Searched, Trial, TrialCell, baseline,
-    search,
+    ANGLES_DEG, HIGHEST_N, InitError, MU, PART, PartOptions, Searched, Trial, TrialCell, baseline, search,
 };
 use crate::location::Location;
 use crate::presses::{LoadSensorError, load_sensor};

@@ -1,9 +1,9 @@
 //! Measured pulls of any folder beside a twin: the paper's panels.
 
 use crate::common::{jobs, project, run};
+use gripgen::identify::pull_ratios;
 use gripgen::twin::Twin;
 use gripgen::{BASELINE_TWIN, Library, Location};
-use gripgen::identify::pull_ratios;
 use gripgen::{compare_pulls, load_pulls, load_twin_document};
 use gripgen_report::{ComparedPulls, pull_comparison_page};
 

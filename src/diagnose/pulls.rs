@@ -1,5 +1,6 @@
 //! Diagnosis of pulls through the reduced mechanics.
 
+use super::diagnosed::Diagnosed;
 use super::few::diagnose_few_pulls;
 use super::next::next_pulls;
 use super::pull_values::pull_values;
@@ -12,6 +13,7 @@ use gripgen_identify::pulls::curves::Curve;
 use gripgen_identify::pulls::data::{Column, PullData};
 use gripgen_identify::pulls::few_diagnosis::is_few;
 use gripgen_identify::pulls::model::PullModel;
+use gripgen_report::pull_report;
 use gripgen_twin::config::{EffectFile, Twist};
 use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Twin};
 use std::collections::{BTreeMap, BTreeSet};

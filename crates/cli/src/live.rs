@@ -126,7 +126,10 @@ fn answer(request: &Request, state: &Mutex<State>, port: u16) -> Answer {
     }
     let path = request.url().split('?').next().unwrap_or_default();
     match path {
-        "/" => with_type(Response::from_data(gripgen_report::live_page().into_bytes()), "text/html; charset=utf-8"),
+        "/" => with_type(
+            Response::from_data(gripgen_report::live_page().into_bytes()),
+            "text/html; charset=utf-8",
+        ),
         "/state" => {
             let state = locked(state).to_json();
             with_type(Response::from_data(state.to_string().into_bytes()), "application/json")

@@ -1,10 +1,10 @@
 //! Files that belong to a run folder or to measurements: no output is ever written onto one of them.
 
 use crate::mark::mark_of;
-use gripgen_report::CONTACT_SHEET;
 use gripgen::record::{
     CAMPAIGN_FILE, IMPRINTS_FILE, PRESSES_FILE, PULLS_FILE, ROSBAG_FILE, SENSOR_FILE, TRACES_FOLDER,
 };
+use gripgen_report::CONTACT_SHEET;
 use std::ffi::OsStr;
 use std::path::Path;
 

@@ -5,9 +5,9 @@ use crate::commands::{info_pulls, open_run};
 use crate::failure::Failure;
 use crate::output::{JsonSink, count, print, size};
 use crate::outputs::Outputs;
-use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE};
 use gripgen::identify::levels;
 use gripgen::is_pulls;
+use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE};
 use serde_json::json;
 use std::collections::BTreeMap;
 

@@ -4,9 +4,9 @@ use crate::args::InfoArgs;
 use crate::failure::Failure;
 use crate::load::{no_pulls, say_warnings};
 use crate::output::{JsonSink, count, print};
-use gripgen::record::{PULLS_FILE, ROSBAG_FILE};
 use gripgen::identify::{Level, levels};
 use gripgen::load_pulls_of;
+use gripgen::record::{PULLS_FILE, ROSBAG_FILE};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 

@@ -39,7 +39,11 @@ pub fn write(
     // The twin is there: what its sweep has to vary depends on it.
     diagnosed.report.next = next_steps(args, &diagnosed, next.path.as_deref());
     if let Some(report) = &args.report {
-        outputs.write(report, Format::Html, diagnosis_page(&diagnosed.diagnosis, &diagnosed.report).as_bytes())?;
+        outputs.write(
+            report,
+            Format::Html,
+            diagnosis_page(&diagnosed.diagnosis, &diagnosed.report).as_bytes(),
+        )?;
     }
     if sink.wanted() {
         let value = serde_json::to_value(&diagnosed.diagnosis).map_err(Failure::new)?;
