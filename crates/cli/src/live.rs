@@ -5,46 +5,16 @@
 
 mod state;
 
-pub use state::{CurvePoint, Made, State};
+pub use state::{CurvePoint, Made, Picture, State};
 
 use crate::failure::Failure;
-use gripgen::record::{Dataset, encode_png};
-use gripgen::twin::{Jaw, PerJaw};
-use gripgen_rig::camera::{CameraFrame, CameraView, SHIPPED_FRAME_LIMITS, decode_jpeg};
+use gripgen::twin::Jaw;
 use std::io::Cursor;
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use tiny_http::{Header, Method, Request, Response, Server};
 
 type Answer = Response<Cursor<Vec<u8>>>;
-
-/// Where a picture comes from.
-#[derive(Debug, Clone)]
-pub enum Picture {
-    /// A frame of a camera, and how it is looked at.
-    Frame(Arc<CameraFrame>, PerJaw<CameraView>),
-    /// The last sample of a shard.
-    Shard(PathBuf),
-}
-
-impl Picture {
-    /// As a PNG; `None` where there is none, or it cannot be read.
-    pub fn png(&self, jaw: Jaw) -> Option<Vec<u8>> {
-        match self {
-            Self::Frame(frame, views) => {
-                let frame = decode_jpeg(&frame.jpeg, &SHIPPED_FRAME_LIMITS).ok()?;
-                encode_png(&views[jaw].apply(&frame).ok()?).ok()
-            }
-            Self::Shard(path) => {
-                let shard = Dataset::open(path).ok()?;
-                let last = shard.table().rows().checked_sub(1)?;
-                let [left, right] = shard.images_png(last).ok()??;
-                Some(if jaw == Jaw::Left { left } else { right })
-            }
-        }
-    }
-}
 
 /// The page, which ends with the command.
 pub struct LivePage {
@@ -126,7 +96,10 @@ fn answer(request: &Request, state: &Mutex<State>, port: u16) -> Answer {
     }
     let path = request.url().split('?').next().unwrap_or_default();
     match path {
-        "/" => with_type(Response::from_data(gripgen_report::live_page().into_bytes()), "text/html; charset=utf-8"),
+        "/" => with_type(
+            Response::from_data(gripgen_report::live_page().into_bytes()),
+            "text/html; charset=utf-8",
+        ),
         "/state" => {
             let state = locked(state).to_json();
             with_type(Response::from_data(state.to_string().into_bytes()), "application/json")

@@ -159,7 +159,8 @@ fn profile(name: &str, found: &ComparedPulls<'_>) -> Option<Plot> {
 fn fits(ratios: &BTreeMap<String, PartRatio>) -> Table {
     let row = |(name, ratio): (&String, &PartRatio)| {
         let pct = |x: Option<f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.2}"));
-        let mut cells = vec![clean(name, NAME), ratio.points.len().to_string(), ratio.measured.len().to_string()];
+        let mut cells =
+            vec![clean(name, NAME), ratio.points.len().to_string(), ratio.measured.len().to_string()];
         cells.extend(match ratio.fit {
             Some(fit) => {
                 let [[aa, ab], [_, bb]] = fit.covariance;

@@ -14,8 +14,8 @@ use crate::bars::{self, Bar};
 use crate::page::{PLOTS, Page, PlotBudget, Table};
 use crate::text::{NAME, SENTENCE, clean, number};
 use gripgen_identify::{
-    Channel, Detectable, Diagnosis, ErrorPair, HARDLY, HeldOutError, NamedEffect, ParameterEstimate, UnknownCovariate,
-    Verdict,
+    Channel, Detectable, Diagnosis, ErrorPair, HARDLY, HeldOutError, NamedEffect, ParameterEstimate,
+    UnknownCovariate, Verdict,
 };
 use gripgen_twin::effects::find;
 use serde_json::{Value, json};

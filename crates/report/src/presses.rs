@@ -121,12 +121,8 @@ fn means(shown: &PressPage<'_>) -> Table {
     let (width, height) = shown.presses.first().map_or((0, 0), |p| (p.image.width_px, p.image.height_px));
     let around = |side: u32| format!("{} x {} px around the contact", side.min(width), side.min(height));
     let PressScores { full, crop400, crop200, window } = shown.mean;
-    let rows = [
-        ("whole frame".into(), full),
-        (around(400), crop400),
-        (around(200), crop200),
-        (around(160), window),
-    ];
+    let rows =
+        [("whole frame".into(), full), (around(400), crop400), (around(200), crop200), (around(160), window)];
     let row = |(name, s): (String, Score)| {
         let Score { mse, psnr_db, ssim, l1 } = s;
         vec![name, format!("{mse:.2}"), format!("{psnr_db:.2}"), format!("{ssim:.4}"), format!("{l1:.2}")]

@@ -9,8 +9,8 @@ use crate::load::{
 };
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
-use gripgen::tactile::metrics::Score;
 use gripgen::identify::{PartRatio, pull_ratios};
+use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{
     Press, PressComparison, PressScore, PressSet, Scores, compare_presses, predict_press,
 };

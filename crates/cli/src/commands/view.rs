@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::load::there_is;
 use crate::output::{JsonSink, size};
 use crate::outputs::Outputs;
-use gripgen::record::Dataset;
+use gripgen_measured::open_dataset;
 use gripgen_report::{ViewOptions, view_page};
 use serde_json::json;
 use std::path::{Path, PathBuf};

@@ -17,8 +17,8 @@ pub use benchmark::{BenchmarkStarter, benchmark_starter};
 use gripgen_physics::{PartShape, Surface};
 use gripgen_report::{View, grips_picture};
 use gripgen_tactile::{ClusteredMesh, Grid, raster};
-use gripgen_twin::frames::Pose;
 pub use gripgen_twin::Proposal;
+use gripgen_twin::frames::Pose;
 use gripgen_twin::{Jaw, MeshError, Part, TriMesh, Twin};
 pub(crate) use propose::Proposed;
 use propose::Search;
@@ -276,7 +276,7 @@ pub(crate) fn search(path: &Path, options: PartOptions, twin: Twin) -> Result<Se
         return Err(InitError::Open { path: path.display().to_string(), open_edges: look.open_edges });
     }
     // The contact shape is built now, so that a mesh without volume is refused here.
-    PartShape::hull(&mesh, &gripgen_twin::frames::Pose::identity())
+    PartShape::hull(&mesh, &Pose::identity())
         .map_err(|source| LibraryError::Shape { location: location.clone(), source })?;
     let size_mm = mesh.extent_m().map(|s| s * 1e3);
     let part = Part {

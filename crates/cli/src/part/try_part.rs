@@ -9,7 +9,7 @@ use crate::part::init::{
     search,
 };
 use gripgen::Location;
-use crate::analysis::presses::{LoadSensorError, load_sensor};
+use crate::analysis::{LoadSensorError, load_sensor};
 use gripgen::{SampleError, SimulateOptions};
 use gripgen_report::{FrictionRange, GripTried, TriedPart, WorksAt};
 use gripgen_tactile::SimdLevel;

@@ -2,9 +2,7 @@
 
 use super::{EvidenceRow, ReportData, WorstRow};
 use crate::{Plot, PlotGroup, Series};
-use gripgen_identify::{
-    Diagnosis, PRESS_ZONES, PressCovariate, PressDiagnosis, PressTrial, PressValues,
-};
+use gripgen_identify::{Diagnosis, PRESS_ZONES, PressCovariate, PressDiagnosis, PressTrial, PressValues};
 
 /// Presses in the list of the worst.
 const WORST: usize = 8;

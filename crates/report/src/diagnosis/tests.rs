@@ -342,7 +342,13 @@ fn the_verdict_names_what_was_found() {
     let second = |d: &mut Diagnosis| {
         d.unknown.clear();
         let (name, part) = ("jaw_tilt".into(), Some("gear".into()));
-        d.effects.push(NamedEffect { name, part, weight: 0.05, indistinguishable_from: vec![], ..d.effects[0].clone() });
+        d.effects.push(NamedEffect {
+            name,
+            part,
+            weight: 0.05,
+            indistinguishable_from: vec![],
+            ..d.effects[0].clone()
+        });
     };
     assert_eq!(named(&second), format!(": {one}; perhaps jaw_tilt on gear"));
     assert_eq!(named(&|d| *d = Diagnosis::blank(Channel::Pulls, DataSummary::default())), "");

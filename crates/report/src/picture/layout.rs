@@ -2,11 +2,11 @@
 
 use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
 use super::colours::{COMMAND, DISPLACEMENT, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
-use super::plot::{Area, Curve, pull_curve};
 use super::film::{STRIP_HEIGHT, draw_strip};
+use super::plot::{Area, Curve, pull_curve};
 use super::sheet::{details, heading};
-use gripgen_record::{Film, Record};
 use gripgen_record::proto::gripgen_v1::Sample;
+use gripgen_record::{Film, Record};
 use gripgen_twin::TactileImage;
 
 pub(crate) const MARGIN: u32 = 16;

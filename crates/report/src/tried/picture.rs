@@ -4,9 +4,7 @@ use super::{FrictionRange, GripTried, TriedPart};
 use crate::Rasterise;
 use crate::picture::grips::{PANEL as DRAWING, panel};
 use crate::picture::layout::{CAPTION, HEADER, IMAGE, MARGIN, ROW as IMAGES, framed};
-use crate::picture::{
-    Anchor, Area, Canvas, FAILED, INK, MEASURED, PANEL, PAPER, SOFT_INK, TextStyle, axes,
-};
+use crate::picture::{Anchor, Area, Canvas, FAILED, INK, MEASURED, PANEL, PAPER, SOFT_INK, TextStyle, axes};
 use crate::text::wrapped;
 use gripgen_twin::Jaw;
 
@@ -42,13 +40,7 @@ pub fn tried_picture(part: &TriedPart, rasterise: &Rasterise<'_>) -> Vec<u8> {
     canvas.into_png()
 }
 
-fn row(
-    canvas: &mut Canvas,
-    top: u32,
-    part: &TriedPart,
-    grip: &GripTried,
-    rasterise: &Rasterise<'_>,
-) {
+fn row(canvas: &mut Canvas, top: u32, part: &TriedPart, grip: &GripTried, rasterise: &Rasterise<'_>) {
     panel(canvas, (MARGIN, top), &part.mesh, (grip.grip_pose, &grip.proposal), rasterise);
     let mut y = top + DRAWING.1 + 4;
     let said: Vec<&String> = grip.doubts.iter().chain(&grip.fails).collect();

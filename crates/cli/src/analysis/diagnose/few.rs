@@ -3,7 +3,7 @@
 use super::diagnosed::Diagnosed;
 use super::next::NextPulls;
 use super::pull_values::pull_values;
-use gripgen::PullPredictor;
+use gripgen_physics::PullPredictor;
 use crate::analysis::priors::shipped_priors;
 use crate::analysis::twin_edits::TwinEdits;
 use gripgen_identify::pulls::few_diagnosis::diagnose_few;

@@ -1,16 +1,19 @@
 //! Diagnosis of pulls through the reduced mechanics.
 
+use super::diagnosed::Diagnosed;
 use super::few::diagnose_few_pulls;
 use super::next::next_pulls;
 use super::pull_values::pull_values;
 use gripgen::Library;
-use gripgen::PullPredictor;
+use crate::analysis::expect::pull_predictor;
+use gripgen_physics::PullPredictor;
 use crate::analysis::twin_edits::{TwinEdits, calibration_entry, effect_entry};
 use gripgen_identify::Diagnosis;
 use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
 use gripgen_identify::pulls::curves::Curve;
 use gripgen_identify::pulls::data::{Column, PullData};
 use gripgen_identify::pulls::few_diagnosis::is_few;
+use gripgen_report::pull_report;
 use gripgen_twin::predict::PullModel;
 use gripgen_twin::config::{EffectFile, Twist};
 use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Twin};

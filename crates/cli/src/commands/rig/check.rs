@@ -7,7 +7,7 @@ use crate::args::RigCheckArgs;
 use crate::failure::{Failure, code};
 use crate::output::{JsonSink, print, size};
 use crate::outputs::Outputs;
-use gripgen::plain_campaign;
+use crate::plain_campaign;
 use gripgen_rig::experiment::RigConfig;
 use gripgen_rig::experiment::check::{CheckLine, check, check_force};
 use serde_json::{Value, json};
