@@ -6,7 +6,7 @@ use gripgen::physics::Window;
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::frames::{Pose, world_from_gel};
 use gripgen::twin::{Jaw, Outcome, Part, Pulled};
-use gripgen::{InitError, Location, NoGrip, PartOptions, PartStarter, Project, generate, part_starter, plan};
+use gripgen::{InitError, NoGrip, PartOptions, PartStarter, Project, generate, part_starter, plan};
 use nalgebra::{Point3, Vector3};
 use std::path::Path;
 
