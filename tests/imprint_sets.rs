@@ -88,7 +88,7 @@ fn constants_stand_in_the_twin_with_their_evidence() {
         "{text}"
     );
     std::fs::write(&out, text).unwrap();
-    let new = load_twin_document(&Location::Disk(out), &[]).unwrap().read_twin_at(&baseline()).unwrap();
+    let new = load_twin_document(&Location::Disk(out), &[]).unwrap().read_twin().unwrap();
     let c = Twin::new(&new).unwrap().parts["gear"].imprint_m3_per_n * 1e9;
     assert!((c - (1.8f64 * 2.2).sqrt()).abs() < 1e-9, "{c}");
     std::fs::write(folder.path().join("imprints.csv"), table.replace(",gear", ",bolt")).unwrap();

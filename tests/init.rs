@@ -6,9 +6,8 @@ use gripgen::physics::Window;
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::frames::{Pose, world_from_gel};
 use gripgen::twin::{Jaw, Outcome, Part, Pulled};
-use gripgen::{Location, Project, generate};
-use gripgen_cli::plan;
-use gripgen_cli::{InitError, NoGrip, PartOptions, PartStarter, part_starter};
+use gripgen::{Project, generate};
+use gripgen_cli::{InitError, NoGrip, PartOptions, PartStarter, part_starter, plan};
 use nalgebra::{Point3, Vector3};
 use std::path::Path;
 

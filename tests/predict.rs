@@ -2,13 +2,12 @@
 
 use crate::common::{baseline, library, overrides, twin_at, twin_with, twin_with_sets};
 use crate::diagnose::simulated;
-use gripgen::identify::pulls::model::{ModelEffect, PredictPulls as _, PullModel};
-use gripgen::physics::label_moments;
+use gripgen::twin::predict::{ModelEffect, PredictPulls as _, PullModel};
+use gripgen::twin::label_moments::label_moments;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{PullTrace, TraceRow, slip_label};
 use gripgen::Location;
-use gripgen::physics::PullPredictor;
-use gripgen_cli::{compare_pulls, given_model};
+use gripgen_cli::{compare_pulls, given_model, pull_predictor};
 
 /// The closed form of the label over white noise against the rule applied to 4000 noisy traces: before and at a slip
 /// whose kinetic force stays within the tolerance for a while.

@@ -4,7 +4,7 @@ use crate::common::{self, jobs, run, slow, write_project};
 use gripgen::record::Dataset;
 use gripgen_measured::{read_judged_pulls, write_pull_folder};
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
-use gripgen::twin::evidence::{Expected, LabelEvidence, Verdict, judge};
+use gripgen::twin::label_check::{Expected, LabelEvidence, Verdict, check_label};
 use gripgen::twin::{MeasuredPulls, Pulled};
 use gripgen::Project;
 use gripgen_measured::{Suspects, load_pulls, load_pulls_with};

@@ -36,8 +36,8 @@ impl Lines {
             let test = all_tests || item.is_some();
             lines.constants[usize::from(test)] += usize::from(is_numeric_constant(trimmed));
             match trimmed {
-                "" => {}
                 _ if test => lines.tests += 1,
+                "" => {}
                 _ if trimmed.starts_with("//") => lines.comments += 1,
                 _ => lines.code += 1,
             }

@@ -4,7 +4,7 @@
 //! that are marked so, the lints and the tests of `research/`.
 
 use crate::times::Times;
-use crate::{cargo, python, root, run, times, vulkan};
+use crate::{cargo, python, root, run, vulkan};
 use std::process::Command;
 use std::time::Instant;
 
@@ -18,10 +18,11 @@ const TARGETS: [&str; 3] = ["--lib", "--bins", "--tests"];
 /// Set for the long versions of tests.
 pub const SLOW: &str = "GRIPGEN_SLOW_TESTS";
 
-/// Cargo with a command, all packages that are tested, these targets of them, and the features.
+/// Cargo with a command, all packages that are tested, these targets of them, and the features. Nothing is compiled incrementally: from
+/// nothing that is faster, and so is what comes out.
 pub fn cargo_selected(command: &str, targets: &[&str]) -> Command {
     let mut cargo = cargo(&[command]);
-    cargo.args(PACKAGES).args(targets).args(FEATURES);
+    cargo.args(PACKAGES).args(targets).args(FEATURES).env("CARGO_INCREMENTAL", "0");
     cargo
 }
 

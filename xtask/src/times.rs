@@ -119,6 +119,7 @@ fn watched(words: &[&str], more: &[String]) -> std::io::Result<(Vec<String>, boo
 /// `test NAME ... ignored, REASON: more`.
 fn rust_ignored(line: &str) -> Option<(&str, &str)> {
     let (name, reason) = line.strip_prefix("test ")?.split_once(" ... ignored, ")?;
+    let name = name.strip_suffix(" - should panic").unwrap_or(name);
     Some((name, reason.split(':').next().unwrap_or(reason)))
 }
 

@@ -97,13 +97,13 @@ pub fn run() -> StudyResult {
         eprintln!(
             "usage: press_cases PRESSES [--ball-mm D --mm-per-px P] [--untouched N [--from K]] [CASE...]"
         );
-        return;
+        return Ok(());
     };
     let verbose = std::env::var("VERBOSE").is_ok();
     let set = load_presses(Path::new(pack), geometry).expect("a press set");
     if let Some(splits) = untouched {
         halves(&set, first as u64, splits as u64, verbose);
-        return;
+        return Ok(());
     }
     let set_name = presses_sha256(&set);
     let splits: [(&str, usize, usize); 5] =

@@ -41,7 +41,7 @@ pub fn run() -> StudyResult {
     };
     let [presses, folder] = words.as_slice() else {
         eprintln!("usage: press_pictures PRESSES FOLDER [--ball-mm D --mm-per-px P]");
-        return;
+        return Ok(());
     };
     let set = load_presses(Path::new(presses), geometry).expect("a press set");
     let half = |odd: usize| PressSet {
