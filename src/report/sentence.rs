@@ -1,7 +1,9 @@
 //! The verdict in one sentence.
 
 use super::bars::number;
-use gripgen_identify::{Channel, Diagnosis, HARDLY, HeldOutError, NamedEffect, Verdict, plain};
+use gripgen_identify::{
+    Channel, Diagnosis, HeldOutError, MIN_REPORTABLE_WEIGHT, NamedEffect, Verdict, summary_sentence,
+};
 
 /// The unit of errors of a channel.
 pub(super) fn error_unit(channel: Channel) -> &'static str {
@@ -15,7 +17,7 @@ pub(super) fn error_unit(channel: Channel) -> &'static str {
 /// What a diagnosis says, for somebody who reads one sentence only.
 pub(super) fn sentence(d: &Diagnosis) -> String {
     match d.verdict {
-        Verdict::Insufficient => plain(d),
+        Verdict::Insufficient => summary_sentence(d),
         Verdict::None => {
             let end = after(d).map(|e| format!(": the held-out error is {e}")).unwrap_or_default();
             format!("Nothing beyond the baseline was found{end}{}.", floor(d))
@@ -50,7 +52,7 @@ pub(super) fn sentence(d: &Diagnosis) -> String {
 fn named(effect: &NamedEffect) -> String {
     let rivals: Vec<&str> = effect.indistinguishable_from.iter().map(|r| r.name.as_str()).collect();
     let part = effect.part.as_ref().map(|p| format!(" on {p}")).unwrap_or_default();
-    let name = match effect.weight < HARDLY {
+    let name = match effect.weight < MIN_REPORTABLE_WEIGHT {
         true => format!("perhaps {}{part} (weight {:.2})", effect.name, effect.weight),
         false => format!("{}{part}", effect.name),
     };

@@ -10,9 +10,9 @@ mod beyond;
 mod calibrate;
 mod compare;
 mod errors;
-mod left;
 mod model;
 mod prepare;
+mod residual;
 mod search;
 #[cfg(test)]
 mod tests;

@@ -19,7 +19,7 @@
 //! apart, and what to measure next. `docs/diagnosis.md` describes the method.
 
 mod bounded;
-mod campaign;
+mod design;
 mod diagnosis;
 mod draws;
 mod grouped;
@@ -27,13 +27,15 @@ mod imprint;
 mod imprints;
 mod least_squares;
 mod permutation;
-mod plain;
 mod presses;
 pub mod pulls;
 mod sensor;
-mod separate;
+mod summary;
 
-pub use campaign::{CampaignError, CampaignOptions, DWELLS_S, FORCES_N, NO_LOAD_S, plan_campaign};
+pub use design::{
+    CampaignError, CampaignOptions, CandidatePull, DWELLS_S, FORCES_N, NO_LOAD_S, SeparableRival,
+    SeparateError, SeparatingPlan, plan_campaign, plan_separating,
+};
 pub use diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy,
     HeldOutError, Hint, NamedEffect, ParameterEstimate, PosteriorFile, Residual, Rival, SeparateBy,
@@ -52,7 +54,6 @@ pub use imprints::{
 };
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
-pub use plain::{HARDLY, plain};
 pub use presses::{
     ActingEffect, MIN_DIAGNOSED_PRESSES, PRESS_ZONES, PredictPresses, PressCovariate, PressData,
     PressDiagnosis, PressPixels, PressTrial, PressValues, diagnose_presses, too_few_presses,
@@ -61,4 +62,4 @@ pub use sensor::{
     SensorBlock, SensorCalibration, SensorComparison, SensorData, SensorDiagnosis, SensorEvidence,
     SensorOptions, SensorRow, SessionCalibration, calibrate_sensor, compare_sensor, diagnose_sensor,
 };
-pub use separate::{CandidatePull, SeparableRival, SeparateError, SeparatingPlan, plan_separating};
+pub use summary::{MIN_REPORTABLE_WEIGHT, summary_sentence};

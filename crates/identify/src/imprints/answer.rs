@@ -4,9 +4,9 @@ use super::ImprintData;
 use super::beyond::beyond;
 use super::calibrate::{GraspConstant, grasp_constants};
 use super::errors::{HeldOut, error, predict};
-use super::left::{covariates, residuals, unknown};
 use super::model::{Acting, refit, size_of};
 use super::prepare::{Prepared, lack, prepare};
+use super::residual::{covariates, residuals, unknown};
 use super::search::{Set, Tried, less};
 use crate::diagnosis::{
     Channel, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, NamedEffect,

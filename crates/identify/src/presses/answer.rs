@@ -1,15 +1,15 @@
 //! From what was found to the answer.
 
 use super::candidates::tried;
-use super::left::Left;
+use super::frame_error::FrameErrors;
 use super::observed::Observed;
 use super::power::would_have_seen;
+use super::residual::Left;
 use super::score::hash;
 use super::search::Found;
 use super::unnamed::{PressCovariate, PressValues};
-use super::whole::FrameErrors;
 use super::{PressData, PressDiagnosis};
-use crate::plain::left;
+use crate::summary::left;
 use crate::{
     Channel, DataSummary, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, HeldOutError, NamedEffect,
     ParameterEstimate, Rival, SeparateBy, UnknownCovariate, grouped_intervals,
