@@ -6,9 +6,8 @@
 //! grasps, c to other stretches of the same one. `docs/diagnosis-imprints.md` describes the method.
 
 mod answer;
-mod beyond;
 mod calibrate;
-mod compare;
+mod constant;
 mod errors;
 mod model;
 mod prepare;
@@ -19,7 +18,8 @@ mod tests;
 
 pub use answer::{ImprintDiagnosis, ImprintEvidence, ImprintRow, MeasuredGrasp, diagnose_imprints};
 pub use calibrate::{GraspConstant, ImprintConstants, PartConstant, SharedConstant, calibrate_imprint_set};
-pub use compare::{ImprintComparison, compare_imprints};
+pub use constant::{FittedPress, ImprintEstimate, imprint_constant};
+pub use errors::{ImprintComparison, compare_imprints};
 
 use crate::permutation::Covariate;
 

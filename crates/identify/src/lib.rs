@@ -23,13 +23,13 @@ mod design;
 mod diagnosis;
 mod draws;
 mod grouped;
-mod imprint;
 mod imprints;
 mod least_squares;
 mod permutation;
 mod presses;
 pub mod pulls;
 mod sensor;
+mod statistics;
 mod summary;
 
 pub use design::{
@@ -46,11 +46,10 @@ pub use grouped::{
     GroupMoments, GroupedFit, GroupedModel, fit_grouped, fold_steps, grouped_intervals, grouped_step,
     held_out_costs, t_quantile_95,
 };
-pub use imprint::{FittedPress, ImprintEstimate, imprint_constant};
 pub use imprints::{
-    GraspConstant, ImprintComparison, ImprintConstants, ImprintData, ImprintDiagnosis, ImprintEvidence,
-    ImprintRow, MeasuredGrasp, PartConstant, SharedConstant, calibrate_imprint_set, compare_imprints,
-    diagnose_imprints,
+    FittedPress, GraspConstant, ImprintComparison, ImprintConstants, ImprintData, ImprintDiagnosis,
+    ImprintEstimate, ImprintEvidence, ImprintRow, MeasuredGrasp, PartConstant, SharedConstant,
+    calibrate_imprint_set, compare_imprints, diagnose_imprints, imprint_constant,
 };
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
