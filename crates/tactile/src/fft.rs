@@ -264,10 +264,7 @@ mod tests {
                 Fft::new(n).forward(&mut data, &mut scratch, level);
                 data.re.iter().chain(&data.im).flatten().map(|v| v.to_bits()).collect::<Vec<_>>()
             };
-            let portable = run(SimdLevel::Portable);
-            for level in SimdLevel::available() {
-                assert!(run(level) == portable, "{level:?}, {n}");
-            }
+            crate::testing::assert_same_on_every_unit(&n.to_string(), run);
         }
     }
 

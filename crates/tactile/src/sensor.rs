@@ -57,6 +57,22 @@ pub struct Pyramid {
 }
 
 impl Sensor {
+    /// A sensor with a flat gel, without markers, shadows and calibration.
+    pub fn new(grid: Grid, rest: [Vec<f32>; 3], noise_rgb: [f32; 3], colour: ColourModel) -> Self {
+        Self {
+            grid,
+            rest,
+            noise_rgb,
+            colour,
+            gel_shape: GelShape::Flat,
+            markers: None,
+            shadow: None,
+            pyramid: None,
+            ball_m: None,
+            press_gain_sd: None,
+        }
+    }
+
     fn checked(self, background: Option<&TactileImage>) -> Result<Self, SensorError> {
         let mm = self.grid.metres_per_px * 1e3;
         if !(mm.is_finite() && (1e-4..=1.0).contains(&mm)) {

@@ -26,7 +26,7 @@ use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
 use crate::colour::{ColourModel, Lambert, Regressor, TaximTable};
 use crate::convolve::Follow;
 use crate::deform::gaussian;
-use crate::grid::Grid;
+use crate::grid::{Grid, levels_of};
 use crate::markers::Markers;
 use crate::npz::{Array, ElementType, Npz, NpzError, parse_npy, write_npz};
 use crate::shadow::{Shadow, ShadowKind, ShadowTable};
@@ -114,18 +114,11 @@ impl Sensor {
         let ball_m = scalar(npz, "ball_mm")?.map(|mm| mm * 1e-3);
         let press_gain_sd = triple(npz, "press_gain_sd_rgb")?;
         let grid = Grid { width_px, height_px, metres_per_px: metres_per_px.unwrap_or(mm_per_px * 1e-3) };
-        Ok(Self {
-            grid,
-            rest: background.map_or_else(|| planes(&rest.values), planes_of_image),
-            noise_rgb: [noise[0] as f32, noise[1] as f32, noise[2] as f32],
-            colour,
-            gel_shape,
-            markers: Markers::read(npz)?,
-            shadow: None,
-            pyramid,
-            ball_m,
-            press_gain_sd,
-        })
+        let rest = background.map_or_else(|| planes(&rest.values), levels_of);
+        let noise_rgb = [noise[0] as f32, noise[1] as f32, noise[2] as f32];
+        let markers = Markers::read(npz)?;
+        let plain = Self::new(grid, rest, noise_rgb, colour);
+        Ok(Self { gel_shape, markers, pyramid, ball_m, press_gain_sd, ..plain })
     }
 
     fn taxim(
@@ -136,22 +129,10 @@ impl Sensor {
         let background = background.ok_or(SensorError::Incomplete { missing: "background" })?;
         let metres_per_px = metres_per_px.ok_or(SensorError::Incomplete { missing: "mm_per_px" })?;
         let table = TaximTable::read(npz, background)?;
-        Ok(Self {
-            grid: Grid {
-                width_px: background.width_px as usize,
-                height_px: background.height_px as usize,
-                metres_per_px,
-            },
-            rest: planes_of_image(background),
-            noise_rgb: [0.0; 3],
-            colour: ColourModel::Taxim(Box::new(table)),
-            gel_shape: GelShape::Flat,
-            markers: None,
-            shadow: None,
-            pyramid: None,
-            ball_m: None,
-            press_gain_sd: None,
-        })
+        let (width_px, height_px) = (background.width_px as usize, background.height_px as usize);
+        let grid = Grid { width_px, height_px, metres_per_px };
+        let colour = ColourModel::Taxim(Box::new(table));
+        Ok(Self::new(grid, levels_of(background), [0.0; 3], colour))
     }
 
     /// The bytes of a sensor file; `None` for a colour model that is only read, Taxim's table.
@@ -325,8 +306,4 @@ fn pyramid(npz: &mut Npz<'_>) -> Result<Option<Pyramid>, NpzError> {
 
 fn planes(interleaved: &[f64]) -> [Vec<f32>; 3] {
     [0, 1, 2].map(|c| interleaved.iter().skip(c).step_by(3).map(|&x| x as f32).collect())
-}
-
-fn planes_of_image(image: &TactileImage) -> [Vec<f32>; 3] {
-    [0, 1, 2].map(|c| image.rgb.iter().skip(c).step_by(3).map(|&x| f32::from(x)).collect())
 }

@@ -31,16 +31,9 @@ impl GelShape {
             GelShape::Flat => None,
             GelShape::Dome { sag_m } if *sag_m == 0.0 => None,
             GelShape::Dome { sag_m } => {
-                let (w, h) = (grid.width_px, grid.height_px);
-                let corner = grid.centre_m(w - 1, h - 1);
+                let corner = grid.centre_m(grid.width_px - 1, grid.height_px - 1);
                 let scale = -sag_m / grid.metres_per_px / (corner.0 * corner.0 + corner.1 * corner.1);
-                let values = (0..w * h)
-                    .map(|i| {
-                        let (x, y) = grid.centre_m(i % w, i / w);
-                        (scale * (x * x + y * y)) as f32
-                    })
-                    .collect();
-                Some(Plane { width: w, height: h, values })
+                Some(grid.plane(|x, y| scale * (x * x + y * y)))
             }
             GelShape::Map(heights) => {
                 Some(Plane { width: grid.width_px, height: grid.height_px, values: heights.clone() })
