@@ -5,7 +5,6 @@
 //! Results are within a tolerance of those of [`crate::Renderer`], not equal to the bit: the surface within 1e-4 pixels,
 //! and at most 0.05 % of the image's values more than one grey level apart.
 
-mod around;
 mod batch;
 mod buffers;
 mod cast;
@@ -17,7 +16,6 @@ mod mesh;
 mod pipelines;
 mod readback;
 mod regression;
-mod rest;
 mod source;
 #[cfg(test)]
 mod source_tests;
