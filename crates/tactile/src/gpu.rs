@@ -27,7 +27,7 @@ pub use device::{AdapterChoice, GpuAdapter};
 pub use source::Variant;
 
 use crate::grid::Plane;
-use crate::indent::IndentError;
+use crate::indent::{IndentError, nothing_in_front};
 use crate::sensor::Sensor;
 use device::Device;
 use encode::Run;
@@ -341,10 +341,7 @@ fn judge(
 ) -> Result<f64, IndentError> {
     let a = grid.metres_per_px;
     match (outcome.status, press) {
-        (1, _) => Err(IndentError::NothingInFront {
-            width_mm: grid.width_px as f64 * a * 1e3,
-            height_mm: grid.height_px as f64 * a * 1e3,
-        }),
+        (1, _) => Err(nothing_in_front(grid)),
         (2, Some(press)) => Err(IndentError::ThroughTheGel {
             force_n: press.force_n,
             wanted_mm3: press.imprint_m3_per_n * press.force_n * 1e9,

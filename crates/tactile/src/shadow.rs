@@ -4,12 +4,11 @@
 //! fans of rays go out, downhill; along them a table says how dark the gel can be. Everything that Taxim counts in pixels
 //! is a length on the gel here, so that a table serves any resolution; at Taxim's own it is the same pixels.
 
-mod blur;
+pub(crate) mod blur;
 mod presses;
 mod rays;
 mod table;
 
-pub(crate) use blur::Border;
 pub use presses::{BallPress, shadow_from_presses};
 pub use table::{ShadowKind, ShadowTable};
 
@@ -17,7 +16,7 @@ use crate::colour::ColourModel;
 use crate::deform::{gaussian, half_gaussian};
 use crate::grid::Plane;
 use crate::simd::SimdLevel;
-use blur::{Blur, blur};
+use blur::{Blur, Border, blur};
 use rays::Rays;
 
 /// Lengths in steps of a ray (1.25 px at Taxim's resolution): width of the rim around the core of a contact from which

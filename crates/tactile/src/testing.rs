@@ -1,6 +1,6 @@
 //! What tests of several stages share.
 
-use crate::colour::{ColourModel, Lambert, Light, TaximTable};
+use crate::colour::{Lambert, Light, TaximTable};
 use crate::npz::{Array, ElementType, Npz, write_npz};
 use crate::shadow::{ShadowKind, ShadowTable};
 use crate::simd::SimdLevel;
@@ -31,12 +31,6 @@ pub(crate) fn lights(elevation_rad: f64, falloff: [f64; 2], lights: &[(f64, [f64
         falloff,
     };
     Lambert::from_lights(&lights.iter().map(light).collect::<Vec<_>>())
-}
-
-/// Three lights, each mainly in its channel.
-pub(crate) fn lit() -> ColourModel {
-    let colours = [(0.0, [150.0, 20.0, 10.0]), (120.0, [10.0, 160.0, 20.0]), (240.0, [20.0, 10.0, 155.0])];
-    ColourModel::Lambert(Box::new(lights(0.6, [0.3, 0.1], &colours)))
 }
 
 /// Taxim's table of given coefficients of (channel of the file, bin).

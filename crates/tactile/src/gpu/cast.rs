@@ -7,7 +7,8 @@ use super::layout::{ShadowBlur, Shadows};
 use super::pipelines::{Key, Pipelines};
 use super::source::{Ceiling, Shade};
 use crate::grid::Grid;
-use crate::shadow::{Border, Shadow, ShadowKind};
+use crate::shadow::blur::Border;
+use crate::shadow::{Shadow, ShadowKind};
 use wgpu::{BindingResource, BufferUsages};
 
 /// What the values of a table are to the device.

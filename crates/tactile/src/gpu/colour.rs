@@ -83,9 +83,9 @@ impl Colours {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::tests::sensor;
+    use crate::gpu::tests::{lit, sensor};
     use crate::markers::Markers;
-    use crate::testing::{gel, lit};
+    use crate::testing::gel;
 
     #[test]
     fn what_has_no_twin_is_refused() {

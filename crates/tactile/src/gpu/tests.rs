@@ -8,7 +8,7 @@ use crate::colour::{ColourModel, Regressor, TaximTable};
 use crate::convolve::Follow;
 use crate::sensor::{GelShape, Pyramid};
 use crate::shadow::{Shadow, ShadowKind, ShadowTable};
-use crate::testing::{self, gel, lit};
+use crate::testing::{self, gel};
 use crate::{ClusteredMesh, Grid, Renderer, SimdLevel, finish};
 use gripgen_twin::frames::{pose, rotation_from_fixed_xyz};
 use gripgen_twin::parts::{BallBearing, InvoluteGear, SteppedShaft};
@@ -53,6 +53,12 @@ fn regression(width_px: usize) -> ColourModel {
         height_limit_mm: 1.0,
         around_limit,
     }))
+}
+
+/// Three lights, each mainly in its channel.
+pub(super) fn lit() -> ColourModel {
+    let colours = [(0.0, [150.0, 20.0, 10.0]), (120.0, [10.0, 160.0, 20.0]), (240.0, [20.0, 10.0, 155.0])];
+    ColourModel::Lambert(Box::new(testing::lights(0.6, [0.3, 0.1], &colours)))
 }
 
 pub(super) fn sensor(width_px: usize, height_px: usize, colour: ColourModel) -> Sensor {

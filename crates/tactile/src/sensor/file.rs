@@ -247,23 +247,16 @@ fn own_colour(npz: &mut Npz<'_>) -> Result<ColourModel, NpzError> {
 }
 
 fn scalar(npz: &mut Npz<'_>, key: &str) -> Result<Option<f64>, NpzError> {
-    if !npz.has(key) {
-        return Ok(None);
-    }
-    Ok(Some(npz.array_of_shape(key, &[])?.values[0]))
+    Ok(npz.optional(key, &[])?.map(|array| array.values[0]))
 }
 
 fn triple(npz: &mut Npz<'_>, key: &str) -> Result<Option<[f32; 3]>, NpzError> {
-    if !npz.has(key) {
-        return Ok(None);
-    }
-    let values = npz.array_of_shape(key, &[Some(3)])?.values;
-    Ok(Some([values[0] as f32, values[1] as f32, values[2] as f32]))
+    let of = |Array { values, .. }| [0, 1, 2].map(|c: usize| values[c] as f32);
+    Ok(npz.optional(key, &[Some(3)])?.map(of))
 }
 
 fn gel_shape(npz: &mut Npz<'_>, rows: usize, columns: usize) -> Result<GelShape, NpzError> {
-    if npz.has("gel_height_px") {
-        let heights = npz.array_of_shape("gel_height_px", &[Some(rows), Some(columns)])?;
+    if let Some(heights) = npz.optional("gel_height_px", &[Some(rows), Some(columns)])? {
         return Ok(GelShape::Map(heights.values.iter().map(|&h| h as f32).collect()));
     }
     Ok(match scalar(npz, "dome_sag_mm")? {
@@ -293,10 +286,8 @@ fn taxim_gel_map(bytes: &[u8], grid: &Grid) -> Result<GelShape, SensorError> {
 }
 
 fn pyramid(npz: &mut Npz<'_>) -> Result<Option<Pyramid>, NpzError> {
-    if !npz.has("kernels_px") {
-        return Ok(None);
-    }
-    let kernels_px = npz.array_of_shape("kernels_px", &[None])?.values.iter().map(|&k| k as u32).collect();
+    let Some(kernels) = npz.optional("kernels_px", &[None])? else { return Ok(None) };
+    let kernels_px = kernels.values.iter().map(|&k| k as u32).collect();
     let restore_depth_fraction = npz.array_of_shape("restore_depth_fraction", &[])?.values[0];
     let sink_in_fraction = scalar(npz, "sink_in_fraction")?.unwrap_or(0.0);
     let at_least = scalar(npz, "core_at_least")?.is_some_and(|one| one != 0.0);
