@@ -1,6 +1,6 @@
 //! What a diagnosis says, as it stands in `diagnose --json` (DESIGN 5.4).
 
-use gripgen_twin::effects::find;
+use gripgen_twin::effects::{Experiment, Measured, find, separating};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -160,6 +160,32 @@ pub struct NamedEffect {
     /// Share of the campaigns that were simulated with it that name it, or what is tied with it, first; where they were.
     #[serde(skip)]
     pub named_again: Option<f64>,
+}
+
+impl NamedEffect {
+    /// An effect of a channel that is no pulls' with what is confused with it. `otherwise`: what tells them apart where the library
+    /// knows no experiment.
+    pub(crate) fn new(
+        id: &str,
+        weight: f64,
+        parameters: BTreeMap<String, ParameterEstimate>,
+        rivals: Vec<Rival>,
+        (measured, otherwise): (Measured, Option<&str>),
+    ) -> Self {
+        let class: Vec<&str> = std::iter::once(id).chain(rivals.iter().map(|r| r.name.as_str())).collect();
+        let steps: Vec<&str> = separating(measured, &class).into_iter().map(Experiment::text).collect();
+        let text = if steps.is_empty() { otherwise.map(Into::into) } else { Some(steps.join("; ")) };
+        Self {
+            name: id.into(),
+            part: None,
+            class: class.iter().map(|name| (*name).into()).collect(),
+            weight,
+            parameters,
+            separate_by: text.filter(|_| !rivals.is_empty()).map(|text| SeparateBy { text, campaign: None }),
+            indistinguishable_from: rivals,
+            named_again: None,
+        }
+    }
 }
 
 /// A covariate on which the residual depends in a way that the library does not explain.
@@ -330,6 +356,14 @@ impl Diagnosis {
             deciding: Vec::new(),
             other_unit: false,
         }
+    }
+
+    /// Ids of the effects, in the order of the alphabet.
+    #[cfg(test)]
+    pub(crate) fn names(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = self.effects.iter().map(|e| e.name.as_str()).collect();
+        names.sort_unstable();
+        names
     }
 
     /// Adds a note that decides how far the answer may be believed.

@@ -6,20 +6,20 @@
 //! grasps, c to other stretches of the same one. `docs/diagnosis-imprints.md` describes the method.
 
 mod answer;
-mod beyond;
 mod calibrate;
-mod compare;
+mod constant;
 mod errors;
-mod left;
 mod model;
 mod prepare;
+mod residual;
 mod search;
 #[cfg(test)]
 mod tests;
 
 pub use answer::{ImprintDiagnosis, ImprintEvidence, ImprintRow, MeasuredGrasp, diagnose_imprints};
 pub use calibrate::{GraspConstant, ImprintConstants, PartConstant, SharedConstant, calibrate_imprint_set};
-pub use compare::{ImprintComparison, compare_imprints};
+pub use constant::{FittedPress, ImprintEstimate, imprint_constant};
+pub use errors::{ImprintComparison, compare_imprints};
 
 use crate::permutation::Covariate;
 

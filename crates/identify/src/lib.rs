@@ -19,26 +19,28 @@
 //! apart, and what to measure next. `docs/diagnosis.md` describes the method.
 
 mod bounded;
-mod campaign;
+mod design;
 mod diagnosis;
 mod draws;
 mod effect_search;
 mod grouped;
-mod imprint;
 mod imprints;
 mod least_squares;
 mod levels;
 mod permutation;
-mod plain;
 mod predictive;
 mod presses;
 pub mod pulls;
 mod ratio;
 mod robust_line;
 mod sensor;
-mod separate;
+mod statistics;
+mod summary;
 
-pub use campaign::{CampaignError, CampaignOptions, DWELLS_S, FORCES_N, NO_LOAD_S, plan_campaign};
+pub use design::{
+    CampaignError, CampaignOptions, CandidatePull, DWELLS_S, FORCES_N, NO_LOAD_S, SeparableRival,
+    SeparateError, SeparatingPlan, plan_campaign, plan_separating,
+};
 pub use diagnosis::{
     Channel, DIAGNOSIS_SCHEMA, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy,
     HeldOutError, Hint, NamedEffect, ParameterEstimate, PosteriorFile, Residual, Rival, SeparateBy,
@@ -49,16 +51,14 @@ pub use grouped::{
     GroupMoments, GroupedFit, GroupedModel, fit_grouped, fold_steps, grouped_intervals, grouped_step,
     held_out_costs, t_quantile_95,
 };
-pub use imprint::{FittedPress, ImprintEstimate, imprint_constant};
 pub use imprints::{
-    GraspConstant, ImprintComparison, ImprintConstants, ImprintData, ImprintDiagnosis, ImprintEvidence,
-    ImprintRow, MeasuredGrasp, PartConstant, SharedConstant, calibrate_imprint_set, compare_imprints,
-    diagnose_imprints,
+    FittedPress, GraspConstant, ImprintComparison, ImprintConstants, ImprintData, ImprintDiagnosis,
+    ImprintEstimate, ImprintEvidence, ImprintRow, MeasuredGrasp, PartConstant, SharedConstant,
+    calibrate_imprint_set, compare_imprints, diagnose_imprints, imprint_constant,
 };
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use levels::{Level, levels};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
-pub use plain::{HARDLY, plain};
 pub use predictive::share_below;
 pub use presses::{
     ActingEffect, MIN_DIAGNOSED_PRESSES, PRESS_ZONES, PredictPresses, PressCovariate, PressData,
@@ -70,4 +70,4 @@ pub use sensor::{
     SensorBlock, SensorCalibration, SensorComparison, SensorData, SensorDiagnosis, SensorEvidence,
     SensorOptions, SensorRow, SessionCalibration, calibrate_sensor, compare_sensor, diagnose_sensor,
 };
-pub use separate::{CandidatePull, SeparableRival, SeparateError, SeparatingPlan, plan_separating};
+pub use summary::{MIN_REPORTABLE_WEIGHT, summary_sentence};

@@ -401,5 +401,4 @@ fn orthonormal(columns: &[Vec<f64>], before: &[Vec<f64>]) -> DMatrix<f64> {
 }
 
 #[cfg(test)]
-#[path = "permutation_tests.rs"]
 mod tests;

@@ -7,18 +7,18 @@
 
 mod answer;
 mod candidates;
+mod frame_error;
 mod gains;
-mod left;
 mod model;
 mod observed;
 mod power;
 mod predict;
+mod residual;
 mod score;
 mod search;
 #[cfg(test)]
 mod tests;
 mod unnamed;
-mod whole;
 
 pub use predict::{ActingEffect, PRESS_ZONES, PredictPresses, PressPixels};
 pub use score::PressTrial;
@@ -89,7 +89,7 @@ pub fn diagnose_presses(
     let candidates = candidates(&data.known);
     let mut found = search(&mut observed, &data.covariates, &candidates, data.press_gain_sd, progress);
     progress(0.97, "whole frames");
-    let errors = whole::borne_out(&observed, &mut found);
+    let errors = frame_error::borne_out(&observed, &mut found);
     Answer { data, observed: &observed, found, errors }.diagnosed()
 }
 

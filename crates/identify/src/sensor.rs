@@ -13,18 +13,17 @@ mod detect;
 mod errors;
 mod moments;
 mod noise;
-mod predict;
 mod prepare;
 mod refine;
 mod search;
-mod statistics;
 #[cfg(test)]
 mod tests;
 mod words;
 
 pub use answer::{SensorBlock, SensorDiagnosis, SensorRow, diagnose_sensor};
-pub use calibrate::{SensorCalibration, SessionCalibration, calibrate_sensor};
-pub use predict::{SensorComparison, compare_sensor};
+pub use calibrate::{
+    SensorCalibration, SensorComparison, SessionCalibration, calibrate_sensor, compare_sensor,
+};
 pub use words::SensorEvidence;
 
 use crate::permutation::Covariate;

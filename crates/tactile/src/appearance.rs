@@ -29,14 +29,9 @@ pub(crate) fn appearance_on(
     core: impl Fn(usize) -> bool,
     level: SimdLevel,
 ) -> [Plane; 3] {
-    let rest = rest_px.map(|gel| {
-        // Towards the camera a gel that bulges towards the part is a hollow.
-        Plane { values: gel.values.iter().map(|h| -h).collect(), ..*gel }
-    });
-    let whole = rest.as_ref().map(|rest| {
-        let values = raised_px.values.iter().zip(&rest.values).map(|(a, b)| a + b).collect();
-        Plane { values, ..*raised_px }
-    });
+    // Towards the camera a gel that bulges towards the part is a hollow.
+    let rest = rest_px.map(|gel| gel.map(|h| -h));
+    let whole = rest.as_ref().map(|rest| raised_px.zip(rest, |a, b| a + b));
     let surface_px = whole.as_ref().unwrap_or(raised_px);
     let (along_x, along_y) = gradient(surface_px);
     let rest_slope = rest.as_ref().filter(|_| !sensor.colour.takes_whole_slope()).map(gradient);
@@ -52,34 +47,25 @@ pub(crate) fn appearance_on(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::colour::{ColourModel, Lambert, Light};
+    use crate::colour::ColourModel;
     use crate::grid::Grid;
     use crate::sensor::GelShape;
     use crate::shadow::{Shadow, ShadowKind, ShadowTable};
+    use crate::testing::lights;
 
     fn sensor(gel_shape: GelShape) -> Sensor {
-        let light =
-            Light { azimuth_rad: 0.4, elevation_rad: 0.6, colour: [90.0, 50.0, 20.0], falloff: [0.2, 0.1] };
-        Sensor {
-            grid: Grid { width_px: 64, height_px: 48, metres_per_px: 1e-4 },
-            rest: [0, 1, 2].map(|_| vec![100.0; 64 * 48]),
-            noise_rgb: [0.0; 3],
-            colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&[light]))),
-            gel_shape,
-            markers: None,
-            shadow: None,
-            pyramid: None,
-            ball_m: None,
-            press_gain_sd: None,
-        }
+        let lights = lights(0.6, [0.2, 0.1], &[(23.0, [90.0, 50.0, 20.0])]);
+        let grid = Grid { width_px: 64, height_px: 48, metres_per_px: 1e-4 };
+        let rest = [0, 1, 2].map(|_| vec![100.0; 64 * 48]);
+        let colour = ColourModel::Lambert(Box::new(lights));
+        Sensor { gel_shape, ..Sensor::new(grid, rest, [0.0; 3], colour) }
     }
 
     fn bump() -> Plane {
-        let height = |i: usize| {
-            let (x, y) = ((i % 64) as f32 - 30.0, (i / 64) as f32 - 25.0);
+        Plane::from_fn(64, 48, |x, y| {
+            let (x, y) = (x as f32 - 30.0, y as f32 - 25.0);
             6.0 * (-(x * x + y * y) / 60.0).exp()
-        };
-        Plane { width: 64, height: 48, values: (0..64 * 48).map(height).collect() }
+        })
     }
 
     fn change(sensor: &Sensor, raised: &Plane) -> [Plane; 3] {
@@ -94,12 +80,8 @@ mod tests {
         assert!(at_rest.iter().all(|plane| plane.values.iter().all(|&v| v == 0.0)), "no imprint, no change");
         // By hand: a flat gel of that surface against a flat gel of the surface at rest.
         let dome = domed.gel_shape.rest_px(&domed.grid).unwrap();
-        let values = dome.values.iter().map(|g| -g).collect();
-        let hollow = Plane { values, ..dome };
-        let both = Plane {
-            values: bump().values.iter().zip(&hollow.values).map(|(a, b)| a + b).collect(),
-            ..bump()
-        };
+        let hollow = dome.map(|g| -g);
+        let both = bump().zip(&hollow, |a, b| a + b);
         let (whole, rest) = (change(&flat, &both), change(&flat, &hollow));
         let domed = change(&domed, &bump());
         for c in 0..3 {

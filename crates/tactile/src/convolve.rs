@@ -207,7 +207,7 @@ impl Columns<'_> {
     }
 
     #[inline(always)]
-    unsafe fn blocks<L: Lanes, const ROWS: usize, const BOTH: bool>(self) {
+    unsafe fn blocks<L: Lanes, const ROWS: usize>(self) {
         let blocks = (self.rows.0..self.rows.1).step_by(ROWS);
         let mut ranges = std::mem::take(self.ranges);
         ranges.clear();
@@ -225,7 +225,7 @@ impl Columns<'_> {
                         weights: self.weights,
                         range,
                     };
-                    let sums = block.sums::<L, ROWS, BOTH>();
+                    let sums = block.sums::<L, ROWS>();
                     let rows = ROWS.min(self.rows.1 - first);
                     for (i, &sum) in sums.iter().enumerate().take(rows) {
                         let y = first + i;
@@ -267,9 +267,9 @@ impl Kernel for Columns<'_> {
         // SAFETY: forwarded.
         unsafe {
             if L::MANY_REGISTERS {
-                self.blocks::<L, 8, true>();
+                self.blocks::<L, 8>();
             } else {
-                self.blocks::<L, 4, true>();
+                self.blocks::<L, 4>();
             }
         }
     }

@@ -93,7 +93,7 @@ impl BlurredRest {
         let half = largest_half(weights);
         let whole = Area::whole(rest_px.width, rest_px.height);
         // Heights in the image are towards the camera.
-        let towards_camera = Plane { values: rest_px.values.iter().map(|&h| -h).collect(), ..*rest_px };
+        let towards_camera = rest_px.map(|h| -h);
         let mut surface = Surface::default();
         surface.start(&towards_camera, whole, half);
         let mut upright = Sheet::default();
@@ -190,6 +190,14 @@ impl DeformScratch {
     }
 }
 
+/// Centre and one side of a Gaussian up to 4 standard deviations (scipy's).
+pub(crate) fn half_gaussian(sigma_px: f64) -> Vec<f64> {
+    let radius = (4.0 * sigma_px + 0.5) as i32;
+    let weight = |k: i32| libm::exp(-0.5 / (sigma_px * sigma_px) * f64::from(k * k));
+    let sum: f64 = (-radius..=radius).map(weight).sum();
+    (0..=radius).map(|k| weight(k) / sum).collect()
+}
+
 /// OpenCV's automatic Gaussian of an odd size.
 pub(crate) fn gaussian(size: u32) -> Vec<f32> {
     match size {
@@ -216,44 +224,14 @@ mod tests {
     use crate::convolve::mirrored;
     use crate::grid::Grid;
     use crate::indent::{PressedGel, indent};
-
-    /// The same blur as plain sums in f64, with borders by definition.
-    fn blur_reference(plane: &Plane, size: u32) -> Plane {
-        let weights: Vec<f64> = gaussian(size).iter().map(|&w| f64::from(w)).collect();
-        let half = size as isize / 2;
-        let pass = |input: &[f64], width: usize, height: usize, dx: isize, dy: isize| -> Vec<f64> {
-            let mut out = vec![0.0; width * height];
-            for y in 0..height {
-                for x in 0..width {
-                    for (k, w) in weights.iter().enumerate() {
-                        let o = k as isize - half;
-                        let sx = mirrored(x as isize + o * dx, width);
-                        let sy = mirrored(y as isize + o * dy, height);
-                        out[y * width + x] += w * input[sy * width + sx];
-                    }
-                }
-            }
-            out
-        };
-        let values: Vec<f64> = plane.values.iter().map(|&v| f64::from(v)).collect();
-        let vertical = pass(&values, plane.width, plane.height, 0, 1);
-        let both = pass(&vertical, plane.width, plane.height, 1, 0);
-        Plane { values: both.iter().map(|&v| v as f32).collect(), ..*plane }
-    }
+    use crate::reference::blur;
+    use crate::testing::{assert_same_on_every_unit, bits};
 
     fn bumps(width: usize, height: usize) -> Plane {
-        let mut plane = Plane::filled(width, height, 0.0);
-        for y in 0..height {
-            for x in 0..width {
-                let (fx, fy) = (x as f32 * 0.21, y as f32 * 0.37);
-                plane.values[y * width + x] = (12.0 * fx.sin() * fy.cos() - 4.0).max(0.0);
-            }
-        }
-        plane
-    }
-
-    fn largest_difference(a: &Plane, b: &Plane) -> f32 {
-        a.values.iter().zip(&b.values).fold(0.0, |m, (x, y)| m.max((x - y).abs()))
+        Plane::from_fn(width, height, |x, y| {
+            let (fx, fy) = (x as f32 * 0.21, y as f32 * 0.37);
+            (12.0 * fx.sin() * fy.cos() - 4.0).max(0.0)
+        })
     }
 
     fn press(width: usize, height: usize) -> (Imprint, f64) {
@@ -274,7 +252,10 @@ mod tests {
                     surface.blur(&gaussian(size)[size as usize / 2..], None, 0, level);
                     surface.upright(level);
                     let ours = scratch.surface_plane();
-                    let difference = largest_difference(&ours, &blur_reference(&plane, size));
+                    let values: Vec<f64> = plane.values.iter().map(|&v| f64::from(v)).collect();
+                    let exact = blur(&values, width, height, size);
+                    let off = ours.values.iter().zip(&exact).map(|(&a, b)| (f64::from(a) - b).abs());
+                    let difference = off.fold(0.0, f64::max);
                     assert!(difference < 2e-5, "{level:?}, {width}x{height}, kernel {size}: {difference}");
                 }
             }
@@ -293,12 +274,9 @@ mod tests {
     fn every_vector_path_gives_the_same_bits() {
         for (width, height) in [(80, 61), (50, 34)] {
             let (imprint, metres_per_px) = press(width, height);
-            let run = |level| deform(&imprint, &[31, 21, 11, 5], 0.4, metres_per_px, None, level).values;
-            let portable: Vec<u32> = run(SimdLevel::Portable).iter().map(|v| v.to_bits()).collect();
-            for level in SimdLevel::available() {
-                let bits: Vec<u32> = run(level).iter().map(|v| v.to_bits()).collect();
-                assert!(bits == portable, "{level:?} differs at {width}x{height}");
-            }
+            assert_same_on_every_unit(&format!("{width}x{height}"), |level| {
+                bits(&deform(&imprint, &[31, 21, 11, 5], 0.4, metres_per_px, None, level).values)
+            });
         }
     }
 
@@ -307,12 +285,8 @@ mod tests {
     fn the_contact_is_restored_and_the_far_field_rests() {
         let grid = Grid { width_px: 160, height_px: 120, metres_per_px: 1e-4 };
         let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
-        let mut stamp = Plane::filled(160, 120, f32::NEG_INFINITY);
-        for y in 50..70 {
-            for x in 60..100 {
-                stamp.values[y * 160 + x] = 0.0;
-            }
-        }
+        let inside = |x, y| (60..100).contains(&x) && (50..70).contains(&y);
+        let stamp = Plane::from_fn(160, 120, |x, y| if inside(x, y) { 0.0 } else { f32::NEG_INFINITY });
         let imprint = indent(&stamp, &grid, &gel, 5.0).unwrap();
         let depth = (imprint.press_depth_m / 1e-4) as f32;
         let surface = deform(&imprint, &[21, 11, 5], 0.4, 1e-4, None, SimdLevel::best());
@@ -330,12 +304,10 @@ mod tests {
     #[test]
     fn beside_a_slanted_wall_there_is_no_moat() {
         for (press_px, steepness) in [(6.0, 1.0f32), (12.0, 1.0), (12.0, 2.0), (24.0, 2.0), (24.0, 4.0)] {
-            let mut depth = Plane::filled(240, 160, 0.0);
-            for (i, depth) in depth.values.iter_mut().enumerate() {
-                let (x, y) = ((i % 240) as f32, (i / 240) as f32);
-                let beyond = ((x - 100.0).abs() - 28.0).max(0.0);
-                *depth = if (y - 80.0).abs() < 40.0 { (press_px - beyond * steepness).max(0.0) } else { 0.0 };
-            }
+            let depth = Plane::from_fn(240, 160, |x, y| {
+                let beyond = ((x as f32 - 100.0).abs() - 28.0).max(0.0);
+                if (y as f32 - 80.0).abs() < 40.0 { (press_px - beyond * steepness).max(0.0) } else { 0.0 }
+            });
             let kernels = [71, 51, 21, 11, 5].map(gaussian);
             let rise = |follow| {
                 let core = (0.4 * f64::from(press_px), follow);

@@ -104,7 +104,7 @@ pub fn press_elastic(
     level: SimdLevel,
 ) -> Result<Imprint, IndentError> {
     let a = grid.metres_per_px;
-    let top = heights.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h));
+    let top = heights.highest();
     if top == f32::NEG_INFINITY {
         return Err(nothing_in_front(grid));
     }

@@ -5,7 +5,6 @@
 //! Results are within a tolerance of those of [`crate::Renderer`], not equal to the bit: the surface within 1e-4 pixels,
 //! and at most 0.05 % of the image's values more than one grey level apart.
 
-mod around;
 mod batch;
 mod buffers;
 mod cast;
@@ -17,7 +16,6 @@ mod mesh;
 mod pipelines;
 mod readback;
 mod regression;
-mod rest;
 mod source;
 #[cfg(test)]
 mod source_tests;
@@ -29,7 +27,7 @@ pub use device::{AdapterChoice, GpuAdapter};
 pub use source::Variant;
 
 use crate::grid::Plane;
-use crate::indent::IndentError;
+use crate::indent::{IndentError, nothing_in_front};
 use crate::sensor::Sensor;
 use device::Device;
 use encode::Run;
@@ -343,10 +341,7 @@ fn judge(
 ) -> Result<f64, IndentError> {
     let a = grid.metres_per_px;
     match (outcome.status, press) {
-        (1, _) => Err(IndentError::NothingInFront {
-            width_mm: grid.width_px as f64 * a * 1e3,
-            height_mm: grid.height_px as f64 * a * 1e3,
-        }),
+        (1, _) => Err(nothing_in_front(grid)),
         (2, Some(press)) => Err(IndentError::ThroughTheGel {
             force_n: press.force_n,
             wanted_mm3: press.imprint_m3_per_n * press.force_n * 1e9,

@@ -35,12 +35,7 @@ mod tests {
 
     #[test]
     fn a_plane_has_its_slope_everywhere() {
-        let mut plane = Plane::filled(7, 5, 0.0);
-        for y in 0..5 {
-            for x in 0..7 {
-                plane.values[y * 7 + x] = 0.25 * x as f32 - 0.5 * y as f32 + 3.0;
-            }
-        }
+        let plane = Plane::from_fn(7, 5, |x, y| 0.25 * x as f32 - 0.5 * y as f32 + 3.0);
         let (gx, gy) = gradient(&plane);
         assert!(gx.values.iter().all(|&g| g == 0.25) && gy.values.iter().all(|&g| g == -0.5));
     }

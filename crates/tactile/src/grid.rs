@@ -1,5 +1,7 @@
 //! Images of numbers: height maps and the planes of the pipeline.
 
+use gripgen_twin::TactileImage;
+
 /// The pixel grid of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
@@ -27,6 +29,27 @@ impl Grid {
         let at = |i: usize, n: usize| (i as f64 + 0.5 - n as f64 / 2.0) * self.metres_per_px;
         (at(column, self.width_px), at(row, self.height_px))
     }
+
+    /// A plane from a function of the position of each pixel's centre.
+    pub fn plane(&self, value: impl Fn(f64, f64) -> f64) -> Plane {
+        Plane::from_fn(self.width_px, self.height_px, |column, row| {
+            let (x_m, y_m) = self.centre_m(column, row);
+            value(x_m, y_m) as f32
+        })
+    }
+}
+
+/// Grey levels of red, green and blue of an image.
+pub(crate) fn levels_of(image: &TactileImage) -> [Vec<f32>; 3] {
+    [0, 1, 2].map(|c| image.rgb.iter().skip(c).step_by(3).map(|&v| f32::from(v)).collect())
+}
+
+/// Heights with those of a gel at rest, where it is not flat.
+pub(crate) fn added(heights: Plane, rest: Option<&Plane>) -> Plane {
+    match rest {
+        Some(rest) => heights.zip(rest, |height, rest| height + rest),
+        None => heights,
+    }
 }
 
 /// One number per pixel, row by row.
@@ -44,6 +67,27 @@ impl Plane {
     /// A plane of one value.
     pub fn filled(width: usize, height: usize, value: f32) -> Self {
         Self { width, height, values: vec![value; width * height] }
+    }
+
+    /// A plane from a function of column and row.
+    pub fn from_fn(width: usize, height: usize, mut value: impl FnMut(usize, usize) -> f32) -> Self {
+        let values = (0..width * height).map(|i| value(i % width, i / width)).collect();
+        Self { width, height, values }
+    }
+
+    /// A function of each value.
+    pub(crate) fn map(&self, of: impl Fn(f32) -> f32) -> Self {
+        Self { values: self.values.iter().map(|&v| of(v)).collect(), ..*self }
+    }
+
+    /// A function of the values of this plane and of another one of its size.
+    pub(crate) fn zip(&self, other: &Self, of: impl Fn(f32, f32) -> f32) -> Self {
+        Self { values: self.values.iter().zip(&other.values).map(|(&a, &b)| of(a, b)).collect(), ..*self }
+    }
+
+    /// The largest value; `-inf` without any.
+    pub(crate) fn highest(&self) -> f32 {
+        self.values.iter().fold(f32::NEG_INFINITY, |m, &v| m.max(v))
     }
 
     /// Row `y`.

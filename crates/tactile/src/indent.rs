@@ -328,14 +328,7 @@ mod tests {
     const GEL: PressedGel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
 
     fn heights(f: impl Fn(f64, f64) -> f64) -> Plane {
-        let mut plane = Plane::filled(GRID.width_px, GRID.height_px, 0.0);
-        for row in 0..GRID.height_px {
-            for column in 0..GRID.width_px {
-                let (x, y) = GRID.centre_m(column, row);
-                plane.values[row * GRID.width_px + column] = (f(x, y) / GRID.metres_per_px) as f32;
-            }
-        }
-        plane
+        GRID.plane(|x, y| f(x, y) / GRID.metres_per_px)
     }
 
     /// The volume of a spherical cap is `pi d^2 (R - d / 3)`.

@@ -1,18 +1,12 @@
 //! Tactile images: from a part in front of a gel to what the camera behind it sees.
 //!
 //! ```
-//! use gripgen_tactile::{Grid, Plane, PressedGel, indent};
+//! use gripgen_tactile::{Grid, PressedGel, indent};
 //!
 //! // A ball of 4 mm radius in front of a gel: heights in pixels, one per pixel of 160 x 200.
 //! let grid = Grid { width_px: 200, height_px: 160, metres_per_px: 5e-5 };
-//! let mut heights = Plane::filled(grid.width_px, grid.height_px, 0.0);
-//! for row in 0..grid.height_px {
-//!     for column in 0..grid.width_px {
-//!         let (x_m, y_m) = grid.centre_m(column, row);
-//!         let z_m = (4e-3_f64.powi(2) - x_m * x_m - y_m * y_m).max(0.0).sqrt() - 7e-3;
-//!         heights.values[row * grid.width_px + column] = (z_m / grid.metres_per_px) as f32;
-//!     }
-//! }
+//! let ball_m = |x_m: f64, y_m: f64| (4e-3_f64.powi(2) - x_m * x_m - y_m * y_m).max(0.0).sqrt() - 7e-3;
+//! let heights = grid.plane(|x_m, y_m| ball_m(x_m, y_m) / grid.metres_per_px);
 //! // 5 N displace 5 mm3 of gel: the cap of a ball, pi d^2 (R - d / 3).
 //! let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
 //! let imprint = indent(&heights, &grid, &gel, 5.0)?;
@@ -61,6 +55,8 @@ mod sensor;
 mod shading;
 mod shadow;
 mod simd;
+#[cfg(test)]
+mod testing;
 mod volume;
 
 pub use appearance::appearance;

@@ -10,7 +10,7 @@ pub use green::MarkerGel;
 
 use crate::grid::{Grid, Plane};
 use crate::npz::{Array, ElementType, Npz};
-use crate::sensor::SensorError;
+use crate::sensor::{SensorError, check_range};
 use gripgen_twin::ContactPatch;
 
 /// Dots on the gel.
@@ -56,29 +56,17 @@ impl Markers {
 
     /// The markers of a sensor file, if it has any: `marker_px` (N, 2), `marker_radius_px`, `marker_darkness_rgb` (3).
     pub(crate) fn read(npz: &mut Npz<'_>) -> Result<Option<Self>, SensorError> {
-        if !npz.has("marker_px") {
-            return Ok(None);
-        }
-        let centres = npz.array_of_shape("marker_px", &[None, Some(2)])?.values;
+        let Some(centres) = npz.optional("marker_px", &[None, Some(2)])? else { return Ok(None) };
+        let centres = centres.values;
         if centres.iter().any(|v| !v.is_finite()) {
             return Err(SensorError::NotFinite { key: "marker_px" });
         }
-        if let Some(&value) = centres.iter().find(|v| v.abs() > FURTHEST_PX) {
-            return Err(SensorError::Value {
-                key: "marker_px",
-                value,
-                range: "within 8192 pixels of the image",
-            });
-        }
+        let near = -FURTHEST_PX..=FURTHEST_PX;
+        check_range("marker_px", centres.iter().copied(), near, "within 8192 pixels of the image")?;
         let radius_px = npz.array_of_shape("marker_radius_px", &[])?.values[0];
-        if !(0.5..=64.0).contains(&radius_px) {
-            let range = "from 0.5 to 64 pixels";
-            return Err(SensorError::Value { key: "marker_radius_px", value: radius_px, range });
-        }
+        check_range("marker_radius_px", [radius_px], 0.5..=64.0, "from 0.5 to 64 pixels")?;
         let dark = npz.array_of_shape("marker_darkness_rgb", &[Some(3)])?.values;
-        if let Some(&value) = dark.iter().find(|d| !(0.0..=1.0).contains(*d)) {
-            return Err(SensorError::Value { key: "marker_darkness_rgb", value, range: "from 0 to 1" });
-        }
+        check_range("marker_darkness_rgb", dark.iter().copied(), 0.0..=1.0, "from 0 to 1")?;
         let rest_px = centres.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
         Ok(Some(Self { rest_px, radius_px, darkness_rgb: [dark[0] as f32, dark[1] as f32, dark[2] as f32] }))
     }

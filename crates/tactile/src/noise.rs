@@ -95,38 +95,28 @@ fn rounded(value: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::assert_same_on_every_unit;
     use gripgen_twin::pixel_noise::PixelNoise;
 
     #[test]
     fn vector_units_give_the_same_image() {
         let grid = crate::grid::Grid { width_px: 53, height_px: 7, metres_per_px: 1e-4 };
         let light = crate::colour::Lambert::from_lights(&[]);
-        let sensor = Sensor {
-            grid,
-            rest: [90.3, 120.5, 250.0].map(|level| vec![level; grid.len()]),
-            noise_rgb: [1.5, 0.0, 4.0],
-            colour: crate::colour::ColourModel::Lambert(Box::new(light)),
-            gel_shape: crate::sensor::GelShape::Flat,
-            markers: None,
-            shadow: None,
-            pyramid: None,
-            ball_m: None,
-            press_gain_sd: None,
-        };
+        let rest = [90.3, 120.5, 250.0].map(|level| vec![level; grid.len()]);
+        let colour = crate::colour::ColourModel::Lambert(Box::new(light));
+        let sensor = Sensor::new(grid, rest, [1.5, 0.0, 4.0], colour);
         let change = [0, 1, 2].map(|c| Plane::filled(53, 7, 0.3 + c as f32));
         let clean = finish(&sensor, Some(&change), None);
         for key in [None, Some(5), Some(99 << 40)] {
-            let portable = finish_on(&sensor, Some(&change), key, SimdLevel::Portable);
-            for level in SimdLevel::available() {
-                assert_eq!(finish_on(&sensor, Some(&change), key, level), portable, "{level:?}");
-            }
+            let run = |level| finish_on(&sensor, Some(&change), key, level);
+            assert_same_on_every_unit("finish", run);
             // What is added to a stored frame is what would have been added before.
             let mut added = clean.clone();
             if let Some(key) = key {
                 PixelNoise { key, sd_rgb: sensor.noise_rgb }.add(&mut added.rgb);
                 assert_ne!(added, clean);
             }
-            assert_eq!(added, portable);
+            assert_eq!(added, run(SimdLevel::Portable));
         }
     }
 

@@ -146,6 +146,15 @@ impl<'a> Npz<'a> {
         let problem = format!("its shape is {:?}, it must be ({})", array.shape, wanted.join(", "));
         Err(NpzError::Array { key: key.into(), problem })
     }
+
+    /// The same of an array that may be missing.
+    ///
+    /// # Errors
+    ///
+    /// An array of another shape, or one that cannot be read as numbers.
+    pub fn optional(&mut self, key: &str, shape: &[Option<usize>]) -> Result<Option<Array>, NpzError> {
+        if self.has(key) { self.array_of_shape(key, shape).map(Some) } else { Ok(None) }
+    }
 }
 
 /// What stands before the values of a `.npy` file.

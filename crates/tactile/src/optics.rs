@@ -26,7 +26,7 @@ pub(crate) use warp::frame_at;
 
 use crate::appearance::appearance_on;
 use crate::deform::{blurred, deform_with};
-use crate::grid::{Grid, Plane};
+use crate::grid::{Grid, Plane, added};
 use crate::indent::{Imprint, IndentError};
 use crate::markers::Shear;
 use crate::raster::ClusteredMesh;
@@ -34,13 +34,6 @@ use crate::render::Renderer;
 use crate::sensor::GelShape;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{ContactPatch, OpticsState};
-
-fn added(mut heights: Plane, rest: Option<&Plane>) -> Plane {
-    if let Some(rest) = rest {
-        heights.values.iter_mut().zip(&rest.values).for_each(|(height, rest)| *height += rest);
-    }
-    heights
-}
 
 /// What the effects add to the gel's shape at rest, in pixels towards the part.
 fn dome(grid: &Grid, optics: &OpticsState) -> Option<Plane> {
@@ -80,9 +73,8 @@ impl Renderer<'_> {
     fn at_depth(&self, imprint: Imprint, heights: &Plane, optics: &OpticsState) -> Imprint {
         let press_depth_m = optics.press_depth_m(imprint.press_depth_m).min(self.gel.thickness_m);
         let press_px = (press_depth_m / self.sensor.grid.metres_per_px) as f32;
-        let highest = heights.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h));
-        let depth = |&h: &f32| (h - highest + press_px).max(0.0);
-        let depth_px = Plane { values: heights.values.iter().map(depth).collect(), ..*heights };
+        let highest = heights.highest();
+        let depth_px = heights.map(|h| (h - highest + press_px).max(0.0));
         Imprint { depth_px, press_depth_m, ..imprint }
     }
 

@@ -231,17 +231,9 @@ mod tests {
             ),
         ];
         for (name, shape) in shapes {
-            let mut depth = Plane::filled(120, 90, 0.0);
+            let depth = grid.plane(|x, y| shape(x, y).max(0.0));
+            let total: f64 = depth.values.iter().map(|&d| f64::from(d)).sum();
             let mut exact = Moments::default();
-            let mut total = 0.0;
-            for y in 0..90 {
-                for x in 0..120 {
-                    let (px, py) = grid.centre_m(x, y);
-                    let d = shape(px, py).max(0.0) as f32;
-                    depth.values[y * 120 + x] = d;
-                    total += f64::from(d);
-                }
-            }
             for y in 0..90 {
                 for x in 0..120 {
                     let (px, py) = grid.centre_m(x, y);

@@ -1,7 +1,6 @@
 //! Presses of a ball or of other bodies into a sensor, and how well a sensor file predicts their images.
 
 mod ball_size;
-mod body;
 mod calibrate;
 mod circle;
 mod compare;
@@ -9,14 +8,11 @@ mod contact;
 mod coverage;
 mod data_pack;
 mod gain;
-mod heights;
 mod indenter;
-mod mark;
+mod render;
 mod seen;
-mod zone;
 
 pub use ball_size::{BallSize, BallSizeBy, check_ball_size};
-pub use body::{RenderedBody, render_body};
 pub use calibrate::{
     CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MIN_PRESSES, Smoothness, calibrate_presses,
 };
@@ -29,14 +25,14 @@ pub use coverage::{PARTS, PressCoverage, RIM_M, SEEN_SHARE, press_coverage};
 pub use data_pack::{DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError};
 
 use gripgen_twin::TactileImage;
+use gripgen_twin::random::splitmix64;
 use std::sync::Arc;
 
 pub(crate) use contact::Contact;
-pub use heights::{HeightsError, render_heights};
+pub use contact::{MarkError, ZONES, Zone};
 pub use indenter::{Indenter, IndenterError, IndenterPose, USUAL_SINK_IN};
-pub use mark::MarkError;
+pub use render::{HeightsError, RenderedBody, render_body, render_heights};
 pub use seen::{PressContact, PressScene, PressView, frame_mse, surface_part};
-pub use zone::{ZONES, Zone};
 
 /// Images of one sensor into which a ball or other bodies were pressed, in the order in which they were taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,6 +78,18 @@ impl Press {
     pub fn shape(&self) -> &str {
         self.indenter.as_ref().map_or("ball", |indenter| &indenter.shape)
     }
+}
+
+/// Some of the pixels of a list, at most `most`, in rising order; a function of the list and the state.
+pub(crate) fn drawn(mut pixels: Vec<usize>, most: usize, state: &mut u64) -> Vec<usize> {
+    let n = most.min(pixels.len());
+    for i in 0..n {
+        let j = i + (splitmix64(state) % (pixels.len() - i) as u64) as usize;
+        pixels.swap(i, j);
+    }
+    pixels.truncate(n);
+    pixels.sort_unstable();
+    pixels
 }
 
 /// The rim of the contact of a ball, in pixels from the centre of the image's first pixel.

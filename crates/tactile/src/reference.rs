@@ -51,7 +51,7 @@ fn raster(mesh: &TriMesh, gel_from_mesh: &Pose, grid: &Grid) -> Plane {
 
 /// The press in pixels, by halving.
 fn press_px(heights: &Plane, wanted_px3: f64, thickness_px: f64) -> f64 {
-    let top = heights.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h));
+    let top = heights.highest();
     let volume = |press: f64| -> f64 {
         heights.values.iter().map(|&h| (f64::from(h) - f64::from(top) + press).max(0.0)).sum()
     };
@@ -78,8 +78,7 @@ impl Sampled {
         let (w, h) = (grid.width_px, grid.height_px);
         let fine = Grid { width_px: 3 * w, height_px: 3 * h, metres_per_px: grid.metres_per_px / 3.0 };
         let fine = raster(mesh, gel_from_mesh, &fine);
-        let mut centres = raster(mesh, gel_from_mesh, grid);
-        centres.values.iter_mut().zip(&rest.values).for_each(|(h, r)| *h += r);
+        let centres = raster(mesh, gel_from_mesh, grid).zip(rest, |h, r| h + r);
         let at = |i: usize, k: usize| f64::from(fine.at(3 * (i % w) + k % 3, 3 * (i / w) + k / 3)) / 3.0;
         let of = |i: usize| std::array::from_fn(|k| at(i, k) + f64::from(rest.values[i]));
         Self { centres, points: (0..w * h).map(of).collect() }
@@ -89,7 +88,7 @@ impl Sampled {
     /// a step of more than half a pixel, which alone count from a whole one on.
     fn pressed(&self, wanted_px3: f64) -> (Vec<f64>, f64) {
         let (w, h) = (self.centres.width, self.centres.height);
-        let top = f64::from(self.centres.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h)));
+        let top = f64::from(self.centres.highest());
         let first_px = press_px(&self.centres, wanted_px3, 16.0);
         let depth = |h: f64, press: f64| (h - top + press).max(0.0);
         let at = |x: usize, y: usize| depth(f64::from(self.centres.at(x, y)), first_px);
@@ -118,7 +117,7 @@ impl Sampled {
 }
 
 /// A blur along both axes as plain sums.
-fn blur(values: &[f64], width: usize, height: usize, size: u32) -> Vec<f64> {
+pub(crate) fn blur(values: &[f64], width: usize, height: usize, size: u32) -> Vec<f64> {
     let weights: Vec<f64> = gaussian(size).iter().map(|&w| f64::from(w)).collect();
     let half = size as isize / 2;
     let pass = |input: &[f64], dx: isize, dy: isize| -> Vec<f64> {
@@ -152,10 +151,10 @@ fn deform(depth: &Plane, gel: &[f64], kernels_px: &[u32], core_px: f64) -> Vec<f
 
 mod tests {
     use super::*;
-    use crate::colour::{ColourModel, Lambert, Light, shade};
+    use crate::colour::{ColourModel, shade};
     use crate::sensor::{GelShape, Sensor};
+    use crate::testing::{assert_same_on_every_unit, gel, lights};
     use crate::{BlurredRest, ClusteredMesh, Imprint, PressedGel, Renderer, SimdLevel, gradient, indent};
-    use gripgen_twin::Gel;
     use gripgen_twin::frames::{pose, rotation_from_fixed_xyz};
     use gripgen_twin::parts::{InvoluteGear, SteppedShaft};
     use nalgebra::Vector3;
@@ -175,35 +174,10 @@ mod tests {
     }
 
     fn sensor(gel_shape: GelShape) -> Sensor {
-        let light =
-            |azimuth_rad, colour| Light { azimuth_rad, elevation_rad: 0.4, colour, falloff: [0.3, 0.1] };
-        let lights = [light(0.2, [90.0, 0.0, 5.0]), light(2.3, [0.0, 80.0, 4.0])];
-        Sensor {
-            grid: GRID,
-            rest: [0, 1, 2].map(|_| vec![110.0; GRID.len()]),
-            noise_rgb: [1.5; 3],
-            colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&lights))),
-            gel_shape,
-            markers: None,
-            shadow: None,
-            pyramid: None,
-            ball_m: None,
-            press_gain_sd: None,
-        }
-    }
-
-    fn gel() -> Gel {
-        Gel {
-            model: gripgen_twin::config::GelModel::Pyramid,
-            elastic: None,
-            thickness_m: 4e-3,
-            width_m: 26e-3,
-            height_m: 19.5e-3,
-            shear_stiffness_n_per_m: 4e4,
-            shear_by_area: 1.0,
-            kernels_px: KERNELS_PX.to_vec(),
-            restore_depth_fraction: 0.4,
-        }
+        let lights = lights(0.4, [0.3, 0.1], &[(11.5, [90.0, 0.0, 5.0]), (132.0, [0.0, 80.0, 4.0])]);
+        let rest = [0, 1, 2].map(|_| vec![110.0; GRID.len()]);
+        let colour = ColourModel::Lambert(Box::new(lights));
+        Sensor { gel_shape, ..Sensor::new(GRID, rest, [1.5; 3], colour) }
     }
 
     /// Clusters, culling and the order of drawing change no bit of what is near enough to touch.
@@ -212,7 +186,7 @@ mod tests {
         for (name, mesh, at) in scenes() {
             let clustered = ClusteredMesh::new(&mesh);
             let plain = raster(&mesh, &at, &GRID);
-            let top = plain.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h));
+            let top = plain.highest();
             assert!(top.is_finite(), "{name}");
             for depth_px in [1.0, 16.0, f64::INFINITY] {
                 let ours = clustered.raster(&at, &GRID, depth_px);
@@ -231,7 +205,7 @@ mod tests {
         for (name, mesh, at) in scenes() {
             let clustered = ClusteredMesh::new(&mesh);
             for shape in [GelShape::Flat, GelShape::Dome { sag_m: 0.6e-3 }] {
-                let (sensor, gel) = (sensor(shape), gel());
+                let (sensor, gel) = (sensor(shape), gel(&KERNELS_PX));
                 let rest = sensor.gel_shape.rest_px(&GRID).unwrap_or(Plane::filled(104, 78, 0.0));
                 let sampled = Sampled::new(&mesh, &at, &GRID, &rest);
                 let above = &sampled.centres;
@@ -251,18 +225,17 @@ mod tests {
                         sunk.depth_px.values.iter().zip(&depths).map(|(&a, b)| (f64::from(a) - b).abs());
                     let worst = off.fold(0.0, f64::max);
                     assert!(worst < 1e-3, "{name}, {force_n} N: depths differ by {worst} px");
-                    for level in SimdLevel::available() {
+                    assert_same_on_every_unit(&format!("{name}, {force_n} N"), |level| {
                         let renderer = Renderer { sensor: &sensor, gel: &gel, level };
-                        let again = renderer.press(&clustered, &at, 1e-9, force_n).unwrap();
-                        assert!(again == sunk, "{name}, {force_n} N, {level:?}");
-                    }
+                        renderer.press(&clustered, &at, 1e-9, force_n).unwrap()
+                    });
                 }
             }
         }
     }
 
     fn imprints(sensor: &Sensor) -> Vec<(&'static str, Imprint)> {
-        let (gel, level) = (gel(), SimdLevel::best());
+        let (gel, level) = (gel(&KERNELS_PX), SimdLevel::best());
         let renderer = Renderer { sensor, gel: &gel, level };
         let press = |(name, mesh, at): (&'static str, TriMesh, Pose)| {
             (name, renderer.press(&ClusteredMesh::new(&mesh), &at, 1e-9, 20.0).unwrap())
@@ -294,7 +267,8 @@ mod tests {
     /// With lights or a regression the displacement is blurred, whatever the gel's shape: far away nothing moves.
     #[test]
     fn a_dome_is_displaced_like_a_flat_gel() {
-        let (domed, flat, gel) = (sensor(GelShape::Dome { sag_m: 0.6e-3 }), sensor(GelShape::Flat), gel());
+        let (domed, flat, gel) =
+            (sensor(GelShape::Dome { sag_m: 0.6e-3 }), sensor(GelShape::Flat), gel(&KERNELS_PX));
         for (name, imprint) in imprints(&domed) {
             let surface = |sensor| Renderer { sensor, gel: &gel, level: SimdLevel::best() }.surface(&imprint);
             let moved = surface(&domed);
@@ -321,7 +295,7 @@ mod tests {
     /// law in f64.
     #[test]
     fn colours_are_those_of_the_stages_and_of_the_law() {
-        let (sensor, gel) = (sensor(GelShape::Flat), gel());
+        let (sensor, gel) = (sensor(GelShape::Flat), gel(&KERNELS_PX));
         let ColourModel::Lambert(lambert) = &sensor.colour else { unreachable!() };
         let fields = lambert.coefficients();
         for (name, imprint) in imprints(&sensor) {

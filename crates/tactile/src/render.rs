@@ -6,7 +6,7 @@ use crate::appearance::appearance;
 use crate::colour::LocalColours;
 use crate::convolve::Follow;
 use crate::elastic::{Base, ElasticGel, press_elastic};
-use crate::grid::Plane;
+use crate::grid::{Plane, added};
 use crate::indent::{Imprint, IndentError, Indentation, PressedGel, indent};
 use crate::markers::{
     MarkerGel, Shear, draw_markers, marker_displacements, marker_displacements_by_cell, without_markers,
@@ -51,11 +51,8 @@ impl Renderer<'_> {
         let grid = &self.sensor.grid;
         if self.elastic_gel().is_some() {
             let rest = self.sensor.gel_shape.rest_px(grid);
-            let mut heights = mesh.raster(gel_from_mesh, grid, self.reach_px(rest.as_ref()));
-            if let Some(rest) = rest {
-                heights.values.iter_mut().zip(&rest.values).for_each(|(h, r)| *h += r);
-            }
-            return self.press_heights(&heights, imprint_m3_per_n, force_n);
+            let heights = mesh.raster(gel_from_mesh, grid, self.reach_px(rest.as_ref()));
+            return self.press_heights(&added(heights, rest.as_ref()), imprint_m3_per_n, force_n);
         }
         let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n };
         with_scratch(self, |scratch, prepared| {

@@ -4,6 +4,7 @@ mod error;
 mod file;
 mod gel_shape;
 
+pub(crate) use error::check_range;
 pub use error::{SENSOR_VERSION, SensorError};
 pub use file::SensorFiles;
 pub use gel_shape::GelShape;
@@ -57,19 +58,31 @@ pub struct Pyramid {
 }
 
 impl Sensor {
-    fn checked(self, background: Option<&TactileImage>) -> Result<Self, SensorError> {
-        let mm = self.grid.metres_per_px * 1e3;
-        if !(mm.is_finite() && (1e-4..=1.0).contains(&mm)) {
-            return Err(SensorError::Value { key: "mm_per_px", value: mm, range: "from 0.0001 to 1" });
+    /// A sensor with a flat gel, without markers, shadows and calibration.
+    pub fn new(grid: Grid, rest: [Vec<f32>; 3], noise_rgb: [f32; 3], colour: ColourModel) -> Self {
+        Self {
+            grid,
+            rest,
+            noise_rgb,
+            colour,
+            gel_shape: GelShape::Flat,
+            markers: None,
+            shadow: None,
+            pyramid: None,
+            ball_m: None,
+            press_gain_sd: None,
         }
-        for (key, n) in [("width", self.grid.width_px), ("height", self.grid.height_px)] {
-            if !(16..=4096).contains(&n) {
-                return Err(SensorError::Value { key, value: n as f64, range: "from 16 to 4096 pixels" });
-            }
+    }
+
+    fn checked(self, background: Option<&TactileImage>) -> Result<Self, SensorError> {
+        let Grid { width_px, height_px, metres_per_px } = self.grid;
+        check_range("mm_per_px", [metres_per_px * 1e3], 1e-4..=1.0, "from 0.0001 to 1")?;
+        for (key, n) in [("width", width_px), ("height", height_px)] {
+            check_range(key, [n as f64], 16.0..=4096.0, "from 16 to 4096 pixels")?;
         }
         if let Some(image) = background {
             let (w, h) = (image.width_px as usize, image.height_px as usize);
-            let wanted = (self.grid.width_px, self.grid.height_px);
+            let wanted = (width_px, height_px);
             if (w, h) != wanted {
                 return Err(SensorError::BackgroundSize { found: (w, h), wanted });
             }
@@ -77,39 +90,22 @@ impl Sensor {
         if let Some(key) = self.colour.unusable_arrays() {
             return Err(SensorError::NotFinite { key });
         }
-        if let Some(&sigma) = self.noise_rgb.iter().find(|s| !(0.0..=64.0).contains(*s)) {
-            let value = f64::from(sigma);
-            return Err(SensorError::Value { key: "noise_rgb", value, range: "from 0 to 64 grey levels" });
-        }
-        let bad = self.rest.iter().flatten().find(|v| !(0.0..=255.0).contains(*v));
-        if let Some(&value) = bad {
-            let range = "from 0 to 255 grey levels";
-            return Err(SensorError::Value { key: "rest_rgb", value: f64::from(value), range });
-        }
-        if let Some(&sd) = self.press_gain_sd.iter().flatten().find(|s| !(0.0..=1.0).contains(*s)) {
-            let range = "from 0 to 1";
-            return Err(SensorError::Value { key: "press_gain_sd_rgb", value: f64::from(sd), range });
-        }
+        let noise = self.noise_rgb.map(f64::from);
+        check_range("noise_rgb", noise, 0.0..=64.0, "from 0 to 64 grey levels")?;
+        let rest = self.rest.iter().flatten().map(|&level| f64::from(level));
+        check_range("rest_rgb", rest, 0.0..=255.0, "from 0 to 255 grey levels")?;
+        let gains = self.press_gain_sd.into_iter().flatten().map(f64::from);
+        check_range("press_gain_sd_rgb", gains, 0.0..=1.0, "from 0 to 1")?;
         self.gel_shape.check(&self.grid)?;
-        if let Some(ball_m) = self.ball_m.filter(|d| !(1e-4..=0.1).contains(d)) {
-            let range = "from 0.1 to 100 mm";
-            return Err(SensorError::Value { key: "ball_mm", value: ball_m * 1e3, range });
-        }
+        check_range("ball_mm", self.ball_m.map(|d| d * 1e3), 0.1..=100.0, "from 0.1 to 100 mm")?;
         if let Some(pyramid) = &self.pyramid {
             if let Some(&k) = pyramid.kernels_px.iter().find(|&&k| k % 2 == 0 || !(3..=255).contains(&k)) {
                 let range = "odd and from 3 to 255 pixels";
                 return Err(SensorError::Value { key: "kernels_px", value: f64::from(k), range });
             }
-            let share = pyramid.restore_depth_fraction;
-            if !(0.0..=1.0).contains(&share) {
-                let range = "from 0 to 1";
-                return Err(SensorError::Value { key: "restore_depth_fraction", value: share, range });
-            }
-            let share = pyramid.sink_in_fraction;
-            if !(0.0..=0.9).contains(&share) {
-                let range = "from 0 to 0.9";
-                return Err(SensorError::Value { key: "sink_in_fraction", value: share, range });
-            }
+            let (restored, sunk) = (pyramid.restore_depth_fraction, pyramid.sink_in_fraction);
+            check_range("restore_depth_fraction", [restored], 0.0..=1.0, "from 0 to 1")?;
+            check_range("sink_in_fraction", [sunk], 0.0..=0.9, "from 0 to 0.9")?;
         }
         Ok(self)
     }

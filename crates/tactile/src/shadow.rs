@@ -4,18 +4,16 @@
 //! fans of rays go out, downhill; along them a table says how dark the gel can be. Everything that Taxim counts in pixels
 //! is a length on the gel here, so that a table serves any resolution; at Taxim's own it is the same pixels.
 
-mod blur;
-mod flat;
+pub(crate) mod blur;
 mod presses;
 mod rays;
 mod table;
 
-pub(crate) use flat::FlatShadow;
 pub use presses::{BallPress, shadow_from_presses};
 pub use table::{ShadowKind, ShadowTable};
 
 use crate::colour::ColourModel;
-use crate::deform::gaussian;
+use crate::deform::{gaussian, half_gaussian};
 use crate::grid::Plane;
 use crate::simd::SimdLevel;
 use blur::{Blur, Border, blur};
@@ -31,12 +29,13 @@ const LAST_KERNEL_STEPS: f64 = 4.0;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shadow {
     table: ShadowTable,
-    rays: Rays,
-    rim_px: usize,
+    pub(crate) rays: Rays,
+    /// Pixels around the core from which rays go out.
+    pub(crate) rim_px: usize,
     /// The blur of the shadows, and with Taxim's colours the blur of the whole image.
-    blurs: Vec<Blur>,
+    pub(crate) blurs: Vec<Blur>,
     /// With Taxim's colours and table: the background after the last blur, minus the frame at rest.
-    base: Option<[Vec<f32>; 3]>,
+    pub(crate) base: Option<[Vec<f32>; 3]>,
 }
 
 /// The gel surface under a contact, all planes of one size.
@@ -58,7 +57,8 @@ impl Shadow {
     /// Lays a table out for pixels of a sensor `width_px` wide with the given colours.
     pub fn new(table: ShadowTable, metres_per_px: f64, width_px: usize, colour: &ColourModel) -> Self {
         let step_px = table.step_m / metres_per_px;
-        let mut blurs = vec![Blur { weights: one_side(SIGMA_STEPS * step_px), border: Border::EdgeTwice }];
+        let weights = half_gaussian(SIGMA_STEPS * step_px).into_iter().map(|w| w as f32).collect();
+        let mut blurs = vec![Blur { weights, border: Border::EdgeTwice }];
         let mut base = None;
         if let (ShadowKind::Ceiling, Some(colour)) = (table.kind, colour.taxim()) {
             let half = ((LAST_KERNEL_STEPS * step_px - 1.0) / 2.0).round().clamp(0.0, 127.0) as usize;
@@ -178,14 +178,6 @@ fn rim(core: &[u8], width: usize, reach: usize) -> Vec<u8> {
 pub(crate) fn blur_once(plane: &mut [f32], width: usize, weights: &[f32]) {
     let weights = weights[weights.len() / 2..].to_vec();
     blur(plane, width, &[Blur { weights, border: Border::EdgeOnce }], SimdLevel::Portable);
-}
-
-/// Centre and one side of a Gaussian up to 4 standard deviations (scipy's).
-fn one_side(sigma_px: f64) -> Vec<f32> {
-    let radius = (4.0 * sigma_px + 0.5) as i32;
-    let weight = |k: i32| libm::exp(-0.5 / (sigma_px * sigma_px) * f64::from(k * k));
-    let sum: f64 = (-radius..=radius).map(weight).sum();
-    (0..=radius).map(|k| (weight(k) / sum) as f32).collect()
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! away is in one factor between the volume of the surface and that of the imprint, `V` of `V = c F`.
 
 use crate::gradient::gradient;
-use crate::grid::Plane;
+use crate::grid::{Plane, added};
 use crate::render::Renderer;
 use crate::sensor::Sensor;
 use crate::simd::SimdLevel;
@@ -202,16 +202,12 @@ fn training(sensor: &Sensor, gel: &Gel, level: SimdLevel, reader: &VolumeReader)
                 let u = PLACES[(i + j + k) % PLACES.len()];
                 let (radius, rim) = (ball * side, contact * side);
                 let (x0, y0) = ((0.5 + u) * w, (0.5 + v) * h);
-                let mut heights = Plane::filled(grid.width_px, grid.height_px, 0.0);
-                for (at, height) in heights.values.iter_mut().enumerate() {
-                    let (x, y) =
-                        ((at % grid.width_px) as f64 + 0.5 - x0, (at / grid.width_px) as f64 + 0.5 - y0);
+                let heights = Plane::from_fn(grid.width_px, grid.height_px, |x, y| {
+                    let (x, y) = (x as f64 + 0.5 - x0, y as f64 + 0.5 - y0);
                     let up = radius * radius - x * x - y * y;
-                    *height = if up > 0.0 { (up.sqrt() - radius) as f32 } else { -radius as f32 };
-                }
-                if let Some(rest) = sensor.gel_shape.rest_px(grid) {
-                    heights.values.iter_mut().zip(&rest.values).for_each(|(h, r)| *h += r);
-                }
+                    if up > 0.0 { (up.sqrt() - radius) as f32 } else { -radius as f32 }
+                });
+                let heights = added(heights, sensor.gel_shape.rest_px(grid).as_ref());
                 let depth = radius - (radius * radius - rim * rim).sqrt();
                 let cap_px3 = std::f64::consts::PI * depth * depth * (radius - depth / 3.0);
                 let volume_m3 = cap_px3 * grid.metres_per_px.powi(3);

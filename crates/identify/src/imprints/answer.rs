@@ -1,20 +1,20 @@
 //! From what was found to the answer.
 
 use super::ImprintData;
-use super::beyond::beyond;
 use super::calibrate::{GraspConstant, grasp_constants};
-use super::errors::{HeldOut, error, predict};
-use super::left::{covariates, residuals, unknown};
+use super::errors::{HeldOut, error, extrapolated, predict};
 use super::model::{Acting, refit, size_of};
 use super::prepare::{Prepared, lack, prepare};
+use super::residual::{covariates, residuals, unknown};
 use super::search::{Set, Tried, less};
 use crate::diagnosis::{
     Channel, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, NamedEffect,
-    ParameterEstimate, Rival, SeparateBy,
+    ParameterEstimate, Rival,
 };
 use crate::effect_search::separating;
 use crate::grouped::t_quantile_95;
-use gripgen_twin::effects::{EffectSpec, Experiment, Measured};
+use crate::statistics::mean_and_error;
+use gripgen_twin::effects::{EffectSpec, Measured};
 use std::collections::BTreeMap;
 
 /// A row with what was predicted of it from other rows.
@@ -146,32 +146,12 @@ fn named(prepared: &Prepared, tried: &Tried, set: &Set, effect: usize) -> NamedE
     let shares: Vec<f64> = rivals.iter().map(|(_, squares)| evidence(*squares).min(1.0)).collect();
     let none = evidence(tried.of(&less(set, effect)).all()).min(1.0);
     let all = 1.0 + none + shares.iter().sum::<f64>();
-    let name = |e: usize| tried.specs[e].id.to_string();
-    let class: Vec<String> =
-        std::iter::once(effect).chain(rivals.iter().map(|(e, _)| *e)).map(name).collect();
-    NamedEffect {
-        name: spec.id.into(),
-        part: None,
-        weight: 1.0 / all,
-        parameters,
-        indistinguishable_from: rivals
-            .iter()
-            .zip(&shares)
-            .map(|((e, _), share)| Rival { name: name(*e), weight: share / all })
-            .collect(),
-        separate_by: separate_by(&class),
-        named_again: None,
-        class,
-    }
-}
-
-fn separate_by(class: &[String]) -> Option<SeparateBy> {
-    let suspects: Vec<&str> = class.iter().map(String::as_str).collect();
-    let steps = separating(Measured::Imprints, &suspects);
-    (class.len() > 1 && !steps.is_empty()).then(|| SeparateBy {
-        text: steps.into_iter().map(Experiment::text).collect::<Vec<_>>().join("; "),
-        campaign: None,
-    })
+    let rivals = rivals
+        .iter()
+        .zip(&shares)
+        .map(|((e, _), share)| Rival { name: tried.specs[*e].id.into(), weight: share / all })
+        .collect();
+    NamedEffect::new(spec.id, 1.0 / all, parameters, rivals, (Measured::Imprints, None))
 }
 
 /// Correlation of neighbouring residuals of the grasps.
@@ -234,7 +214,7 @@ fn errors(data: &ImprintData, prepared: &Prepared, tried: &Tried, set: &Set, ans
         before: error(prepared, a, rows),
         after: error(prepared, b, rows),
     };
-    let far = beyond(prepared, after);
+    let far = extrapolated(prepared, after);
     let levels = (!far.rows.is_empty()).then(|| pair(&far.before_mm3, &far.after_mm3, &far.rows));
     let sessions = by_sessions(data, prepared, &after.effects)
         .map(|predicted| pair(&before.predicted_mm3, &predicted, &rows));
@@ -298,7 +278,7 @@ fn evidence(prepared: &Prepared, tried: &Tried, chosen: &Set) -> Vec<ImprintEvid
     let of = |(set, found): (&Set, &HeldOut)| {
         let names: Vec<&str> = set.iter().map(|&e| tried.specs[e].id).collect();
         let saved: Vec<f64> = base.squares.iter().zip(&found.squares).map(|(b, a)| b - a).collect();
-        let (mean, deviation) = super::errors::mean_and_error(&saved);
+        let (mean, deviation) = mean_and_error(&saved);
         let share = saved.len() as f64 / base.all().max(f64::MIN_POSITIVE);
         let values = found.effects.iter().map(|(spec, values)| {
             let size = size_of(prepared, spec);

@@ -1,11 +1,11 @@
 //! Imprint constants of grasps and of parts.
 
 use super::ImprintData;
-use super::errors::mean_and_error;
 use super::model::{Acting, constants, shown};
 use super::prepare::{FOLDS, Prepared, prepare};
 use crate::diagnosis::ParameterEstimate;
 use crate::grouped::t_quantile_95;
+use crate::statistics::mean_and_error;
 use std::collections::BTreeMap;
 
 /// What shares a constant in a calibration.

@@ -1,9 +1,12 @@
-//! Predictions of rows that gave neither a constant nor a value of an effect, and their errors.
+//! Predictions of rows that gave neither a constant nor a value of an effect, and their errors; how far the law of a twin is from
+//! a table.
 
+use super::ImprintData;
 use super::model::{Acting, constants, refit, shown};
-use super::prepare::{FOLDS, Prepared};
+use super::prepare::{FOLDS, Prepared, prepare};
 use crate::diagnosis::HeldOutError;
-use crate::grouped::t_quantile_95;
+use crate::statistics::{log_error_half90, mean_and_error};
+use gripgen_twin::effects::EffectSpec;
 
 /// A model that was fitted with each unit held out.
 #[derive(Debug, Clone)]
@@ -66,9 +69,6 @@ pub(super) fn predict(prepared: &Prepared, sets: &[Vec<Acting>], of: &dyn Fn(usi
     predicted
 }
 
-/// The interval is for the error of new data of the same size, whose own scatter is as large: root of 2.
-const NEW_DATA: f64 = std::f64::consts::SQRT_2;
-
 /// Error of some rows in mm^3; the interval from the scatter of its square over the groups, or over stretches where there
 /// are fewer than four.
 pub(super) fn error(prepared: &Prepared, predicted_mm3: &[f64], rows: &[usize]) -> HeldOutError {
@@ -84,12 +84,7 @@ pub(super) fn error(prepared: &Prepared, predicted_mm3: &[f64], rows: &[usize]) 
         part.1 += 1.0;
     }
     let squares: Vec<f64> = parts.values().map(|(sum, n)| sum / n).collect();
-    let (middle, deviation) = mean_and_error(&squares);
-    let half = if middle > 0.0 && deviation.is_finite() {
-        0.5 * NEW_DATA * t_quantile_95(squares.len() as f64 - 1.0) * (deviation / middle).min(3.0)
-    } else {
-        0.0
-    };
+    let half = log_error_half90(mean_and_error(&squares).0, &squares);
     let rmse = libm::sqrt(mean);
     HeldOutError {
         rmse_mm3: Some(rmse),
@@ -100,13 +95,100 @@ pub(super) fn error(prepared: &Prepared, predicted_mm3: &[f64], rows: &[usize]) 
     }
 }
 
-/// Mean and its standard error; infinite for one value.
-pub(super) fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n.max(1.0);
-    if values.len() < 2 {
-        return (mean, f64::INFINITY);
+/// Force below which the constant is fitted.
+const BELOW_N: f64 = 10.0;
+/// Rows in contact that are needed below and beyond it.
+const MIN_ROWS_PER_SIDE: usize = 3;
+/// Smallest force that says something of a constant, as a share of the limit.
+const MIN_FORCE_SHARE: f64 = 0.1;
+
+/// Rows beyond the limit with predictions from a constant that rows of their group below it gave.
+pub(super) struct Extrapolated {
+    /// Rows that are predicted.
+    pub(super) rows: Vec<usize>,
+    /// Predictions of the baseline and with the effects, in mm^3; 0 elsewhere.
+    pub(super) before_mm3: Vec<f64>,
+    pub(super) after_mm3: Vec<f64>,
+}
+
+/// Predicts rows beyond [`BELOW_N`]. Effects are those of other grasps; where there are too few of them, those of the rows below.
+pub(super) fn extrapolated(prepared: &Prepared, found: &HeldOut) -> Extrapolated {
+    let below = |i: usize| prepared.force_n[i] <= BELOW_N;
+    let enough = |rows: &[usize]| {
+        let pressing = rows.iter().filter(|&&i| prepared.force_n[i] > MIN_FORCE_SHARE * BELOW_N);
+        let (low, high): (Vec<usize>, Vec<usize>) = pressing.partition(|&&i| below(i));
+        low.len() >= MIN_ROWS_PER_SIDE && high.len() >= MIN_ROWS_PER_SIDE
+    };
+    let used: Vec<bool> = prepared.groups.iter().map(|g| enough(&g.rows)).collect();
+    let is_used = |i: usize| prepared.group[i].is_some_and(|g| used[g]);
+    let rows: Vec<usize> = prepared.rows().filter(|&i| is_used(i) && !below(i)).collect();
+    let n = prepared.group.len();
+    let predict = |sets: &[Vec<Acting>]| {
+        let mut predicted = vec![0.0; n];
+        for (u, effects) in sets.iter().enumerate() {
+            let shown_n = shown(prepared, effects);
+            let c = constants(prepared, &shown_n, below);
+            for &i in rows.iter().filter(|&&i| sets.len() == 1 || prepared.unit[i] == u) {
+                predicted[i] = prepared.group[i].map_or(0.0, |g| c[g]) * shown_n[i];
+            }
+        }
+        predicted
+    };
+    let sets = match (found.effects.is_empty(), prepared.whole_grasps) {
+        (true, _) => vec![Vec::new()],
+        (false, true) => found.without.clone(),
+        (false, false) => vec![refit(prepared, &found.effects, &below).0],
+    };
+    let (before_mm3, after_mm3) = (predict(&[Vec::new()]), predict(&sets));
+    Extrapolated { rows, before_mm3, after_mm3 }
+}
+
+/// The error of a law, the constant of each grasp refitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImprintComparison {
+    /// Rows.
+    pub n: usize,
+    /// Root of the mean squared error, in mm^3.
+    pub rmse_mm3: f64,
+    /// Root of the mean squared error as a share of the largest measured volume of its grasp, in percent.
+    pub rmse_pct_of_peak: f64,
+    /// Name, rows and both errors of each grasp.
+    pub by_grasp: Vec<(String, usize, f64, f64)>,
+    /// Remarks for people.
+    pub notes: Vec<String>,
+}
+
+/// Compares `V = c F` and some effects, in their order, with a table; c of each grasp is the best one. The error says what is missing.
+///
+/// # Errors
+///
+/// No grasp with two forces above 0; the text says so.
+pub fn compare_imprints(
+    data: &ImprintData,
+    effects: &[(&'static EffectSpec, Vec<f64>)],
+) -> Result<ImprintComparison, String> {
+    let prepared = prepare(data);
+    if prepared.groups.is_empty() {
+        return Err("no grasp has two rows with a force above 0 and a volume".into());
     }
-    let square: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-    (mean, libm::sqrt(square / (n - 1.0) / n))
+    let shown_n = shown(&prepared, effects);
+    let c = constants(&prepared, &shown_n, |_| true);
+    let mut by_grasp = Vec::new();
+    let (mut squares, mut shares, mut n) = (0.0, 0.0, 0);
+    for (g, group) in prepared.groups.iter().enumerate() {
+        let left = |i: usize| prepared.volume_mm3[i] - c[g] * shown_n[i];
+        let square: f64 = group.rows.iter().map(|&i| left(i) * left(i)).sum();
+        let rmse = libm::sqrt(square / group.rows.len() as f64);
+        by_grasp.push((group.name.clone(), group.rows.len(), rmse, 100.0 * rmse / group.peak_mm3));
+        squares += square;
+        shares += square / (group.peak_mm3 * group.peak_mm3);
+        n += group.rows.len();
+    }
+    Ok(ImprintComparison {
+        n,
+        rmse_mm3: libm::sqrt(squares / n as f64),
+        rmse_pct_of_peak: 100.0 * libm::sqrt(shares / n as f64),
+        by_grasp,
+        notes: prepared.notes,
+    })
 }

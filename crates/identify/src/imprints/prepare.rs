@@ -1,6 +1,7 @@
 //! Rows in the groups that share a constant, and what is held out of them.
 
 use super::ImprintData;
+use crate::statistics::median;
 use gripgen_twin::effects::GraspSpan;
 use std::collections::BTreeMap;
 
@@ -166,11 +167,6 @@ fn span(prepared: &Prepared) -> GraspSpan {
         step_s: median(steps).unwrap_or(f64::INFINITY),
         longest_s,
     }
-}
-
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// What the table lacks for a diagnosis.

@@ -4,11 +4,12 @@
 //! held-out error with it is lower by [`MIN_GAIN`] and by more than chance over the units makes it, and its value differs from
 //! the neutral one by more than the fits without one unit scatter. The largest such set is the answer.
 
-use super::errors::{HeldOut, hold_out, mean_and_error};
+use super::errors::{HeldOut, hold_out};
 use super::model::{Acting, candidates, refit, size_of, starts};
 use super::prepare::Prepared;
 use crate::diagnosis::Hint;
 use crate::grouped::t_quantile_95;
+use crate::statistics::mean_and_error;
 use gripgen_twin::effects::EffectSpec;
 use std::collections::BTreeMap;
 

@@ -28,6 +28,23 @@ fn force_n(grasp: usize, t: f64) -> f64 {
     peak * (up - down)
 }
 
+/// Adds a row to the grasp whose name comes next.
+fn add_row(
+    data: &mut ImprintData,
+    force_n: f64,
+    volume_mm3: f64,
+    time_s: f64,
+    (part, session): (&str, &str),
+) {
+    data.ids.push(data.ids.len().to_string());
+    data.grip_force_n.push(force_n);
+    data.volume_mm3.push(volume_mm3);
+    data.time_s.push(time_s);
+    data.grasp.push(data.grasps.len());
+    data.part.push(part.into());
+    data.session.push(session.into());
+}
+
 fn made(world: World) -> ImprintData {
     let mut data = ImprintData::default();
     let mut draws = Draws::new(world.seed, 5);
@@ -44,23 +61,14 @@ fn made(world: World) -> ImprintData {
                 continue;
             }
             let volume = c * 20.0 * (pressing.max(0.0) / 20.0).powf(world.exponent);
-            data.ids.push(format!("{g}-{k}"));
-            data.grip_force_n.push(force_n(g, t - world.delay_s));
-            data.volume_mm3.push(volume + world.noise_mm3 * draws.normal());
-            data.time_s.push(t);
-            data.grasp.push(g);
-            data.part.push(if g % 2 == 0 { "ball" } else { "cone" }.into());
-            data.session.push(if g < world.grasps / 2 { "1" } else { "2" }.into());
+            let part = if g % 2 == 0 { "ball" } else { "cone" };
+            let session = if g < world.grasps / 2 { "1" } else { "2" };
+            let measured = volume + world.noise_mm3 * draws.normal();
+            add_row(&mut data, force_n(g, t - world.delay_s), measured, t, (part, session));
         }
         data.grasps.push(format!("grasp {g}"));
     }
     data
-}
-
-fn names(d: &Diagnosis) -> Vec<&str> {
-    let mut names: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
-    names.sort_unstable();
-    names
 }
 
 fn rmse(d: &Diagnosis) -> [f64; 2] {
@@ -92,7 +100,7 @@ fn each_effect_is_named_with_its_value() {
     ] {
         let d = diagnose_imprints(&made(world)).diagnosis;
         assert_eq!(d.verdict, Verdict::Effect, "{name} {value}: {:?} {:?}", d.hints, d.unknown);
-        assert_eq!(names(&d), [name], "{value}: {:?}", d.effects);
+        assert_eq!(d.names(), [name], "{value}: {:?}", d.effects);
         let found = &d.effects[0].parameters[parameter];
         assert!((found.value - value).abs() < near, "{name}: {found:?}");
         assert!(found.low90 <= found.value && found.value <= found.high90);
@@ -106,7 +114,7 @@ fn each_effect_is_named_with_its_value() {
 fn a_delay_and_a_power_are_found_together() {
     let world = World { exponent: 1.2, delay_s: 0.1, ..PLAIN };
     let d = diagnose_imprints(&made(world)).diagnosis;
-    assert_eq!(names(&d), ["imprint_delay", "imprint_nonlinearity"], "{:?} {:?}", d.effects, d.hints);
+    assert_eq!(d.names(), ["imprint_delay", "imprint_nonlinearity"], "{:?} {:?}", d.effects, d.hints);
     let of = |name: &str, parameter: &str| {
         d.effects.iter().find(|e| e.name == name).unwrap().parameters[parameter].value
     };
@@ -123,7 +131,7 @@ fn a_delay_and_a_power_are_found_together() {
 #[test]
 fn two_grasps_still_show_a_delay() {
     let d = diagnose_imprints(&made(World { grasps: 2, delay_s: 0.1, ..PLAIN })).diagnosis;
-    assert_eq!(names(&d), ["imprint_delay"], "{:?}", d.hints);
+    assert_eq!(d.names(), ["imprint_delay"], "{:?}", d.hints);
     assert_eq!(d.error.unwrap().heldout, "stretches");
 }
 
@@ -174,17 +182,12 @@ fn single_rows_show_a_power_and_no_time() {
     let mut draws = Draws::new(7, 2);
     for i in 0..40 {
         let force = 5.0 + 1.8 * f64::from(i);
-        data.ids.push(i.to_string());
+        let volume = 3.0 * force.powf(0.8) * (1.0 + 0.02 * draws.normal());
+        add_row(&mut data, force, volume, f64::NAN, ("ball", ""));
         data.grasps.push(i.to_string());
-        data.grasp.push(i as usize);
-        data.grip_force_n.push(force);
-        data.volume_mm3.push(3.0 * force.powf(0.8) * (1.0 + 0.02 * draws.normal()));
-        data.time_s.push(f64::NAN);
-        data.part.push("ball".into());
-        data.session.push(String::new());
     }
     let d = diagnose_imprints(&data).diagnosis;
-    assert_eq!(names(&d), ["imprint_nonlinearity"], "{:?}", d.hints);
+    assert_eq!(d.names(), ["imprint_nonlinearity"], "{:?}", d.hints);
     assert!((d.effects[0].parameters["exponent"].value - 0.8).abs() < 0.02);
     assert!(d.notes.iter().any(|n| n.contains("share one constant")), "{:?}", d.notes);
 }
@@ -196,13 +199,7 @@ fn constants_of_parts_are_means_of_grasps() {
     for (g, c) in [1.0, 2.0, 4.0].into_iter().enumerate() {
         for k in 1..=6 {
             let force = 5.0 * f64::from(k);
-            data.ids.push(format!("{g}{k}"));
-            data.grip_force_n.push(force);
-            data.volume_mm3.push(c * force);
-            data.time_s.push(f64::from(k));
-            data.grasp.push(g);
-            data.part.push("ball".into());
-            data.session.push(String::new());
+            add_row(&mut data, force, c * force, f64::from(k), ("ball", ""));
         }
         data.grasps.push(g.to_string());
     }

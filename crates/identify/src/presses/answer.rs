@@ -1,22 +1,26 @@
 //! From what was found to the answer.
 
 use super::candidates::tried;
-use super::left::Left;
+use super::frame_error::FrameErrors;
 use super::observed::Observed;
 use super::power::would_have_seen;
+use super::residual::Left;
 use super::score::hash;
 use super::search::Found;
 use super::unnamed::{PressCovariate, PressValues};
-use super::whole::FrameErrors;
 use super::{PressData, PressDiagnosis};
-use crate::effect_search::separating;
-use crate::plain::left;
+use crate::statistics::median;
+use crate::summary::left;
 use crate::{
     Channel, DataSummary, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, HeldOutError, NamedEffect,
-    ParameterEstimate, Rival, SeparateBy, UnknownCovariate, grouped_intervals,
+    ParameterEstimate, Rival, UnknownCovariate, grouped_intervals,
 };
 use gripgen_twin::effects::Measured;
 use std::collections::BTreeMap;
+
+/// What tells an effect from its rivals: an experiment of the library, or this.
+const SEPARATED_BY: (Measured, Option<&str>) =
+    (Measured::Presses, Some("more presses, at other places and depths"));
 
 /// Everything that the answer is made of.
 pub(super) struct Answer<'a> {
@@ -99,19 +103,7 @@ impl Answer<'_> {
                     parameters.insert(acting.spec.parameters[j].name.into(), estimate);
                 }
                 let (own, rivals) = self.weights(e);
-                let mut class = vec![acting.spec.id.to_string()];
-                class.extend(rivals.iter().map(|r| r.name.clone()));
-                let named = NamedEffect {
-                    named_again: None,
-                    name: acting.spec.id.into(),
-                    part: None,
-                    separate_by: (!rivals.is_empty())
-                        .then(|| SeparateBy { text: separate_by(acting.spec.id, &rivals), campaign: None }),
-                    class,
-                    weight: own,
-                    parameters,
-                    indistinguishable_from: rivals,
-                };
+                let named = NamedEffect::new(acting.spec.id, own, parameters, rivals, SEPARATED_BY);
                 (self.found.gains.get(e).copied().unwrap_or(0.0), named)
             })
             .collect();
@@ -132,16 +124,7 @@ impl Answer<'_> {
             like.parameters.extend(parameters);
             return;
         }
-        let named = NamedEffect {
-            name: acting.spec.id.into(),
-            part: None,
-            separate_by: None,
-            named_again: None,
-            class: vec![acting.spec.id.into()],
-            weight: 0.95,
-            parameters: parameters.collect(),
-            indistinguishable_from: Vec::new(),
-        };
+        let named = NamedEffect::new(acting.spec.id, 0.95, parameters.collect(), Vec::new(), SEPARATED_BY);
         list.push((self.found.scatter.trial.as_ref().map_or(0.0, |trial| trial.gain), named));
     }
 
@@ -170,9 +153,7 @@ impl Answer<'_> {
     /// Presses that the model explains far worse than the others.
     fn outliers(&self) -> Vec<String> {
         let costs: Vec<f64> = self.found.model.fit.moments.iter().map(|m| m.cost).collect();
-        let mut sorted = costs.clone();
-        sorted.sort_by(f64::total_cmp);
-        let median = sorted[sorted.len() / 2];
+        let median = median(costs.clone()).unwrap_or_default();
         let mut list: Vec<usize> = (0..costs.len()).filter(|&i| costs[i] > 6.0 * median).collect();
         list.sort_by(|&a, &b| costs[b].total_cmp(&costs[a]));
         list.into_iter().map(|i| self.data.names[i].clone()).collect()
@@ -210,14 +191,4 @@ fn interval(errors: &[f64]) -> HeldOutError {
         high90: means[1899],
         ..Default::default()
     }
-}
-
-/// What tells an effect from its rivals.
-fn separate_by(name: &str, rivals: &[Rival]) -> String {
-    let suspects: Vec<&str> = std::iter::once(name).chain(rivals.iter().map(|r| r.name.as_str())).collect();
-    let steps = separating(Measured::Presses, &suspects);
-    if steps.is_empty() {
-        return "more presses, at other places and depths".into();
-    }
-    steps.iter().map(|step| step.text()).collect::<Vec<_>>().join("; ")
 }

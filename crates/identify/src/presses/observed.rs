@@ -2,6 +2,7 @@
 
 use super::candidates::tried;
 use super::predict::{ActingEffect, PRESS_ZONES, PredictPresses, PressPixels};
+use crate::statistics::median;
 use std::sync::Mutex;
 
 /// Presses with what was measured of them and what predicts them.
@@ -147,9 +148,7 @@ impl<'a> Observed<'a> {
     pub(super) fn rescale(&mut self, model: &[ActingEffect]) {
         let squares = self.zone_squares(model);
         let median = |of: &dyn Fn(&PressSquares) -> f64| {
-            let mut list: Vec<f64> = squares.iter().map(of).filter(|s| s.is_finite()).collect();
-            list.sort_by(f64::total_cmp);
-            list.get(list.len() / 2).copied().unwrap_or(1.0)
+            median(squares.iter().map(of).filter(|s| s.is_finite()).collect()).unwrap_or(1.0)
         };
         let noise = self.predictor.noise_mse();
         self.zone_scale = std::array::from_fn(|z| median(&|(zones, _)| zones[z]).max(noise.max(0.02)));

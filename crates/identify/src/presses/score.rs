@@ -4,6 +4,7 @@ use super::candidates::{is_drawn, tried};
 use super::model::{Head, NamedModel};
 use super::observed::Observed;
 use super::predict::ActingEffect;
+use crate::statistics::median;
 use crate::{
     FreeParameter, GroupMoments, GroupedFit, GroupedModel, fit_grouped, fold_steps, grouped_step,
     held_out_costs,
@@ -50,9 +51,7 @@ impl Design {
 
     /// Weights that keep single presses from deciding.
     pub(super) fn reweigh(&mut self, costs: &[f64]) {
-        let mut sorted = costs.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let median = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(1e-12);
+        let median = median(costs.to_vec()).unwrap_or(1.0).max(1e-12);
         self.weights = costs.iter().map(|c| (6.0 * median / c.max(1e-12)).min(1.0)).collect();
     }
 
@@ -146,6 +145,18 @@ pub(super) fn scored(observed: &Observed<'_>, design: &Design, acting: Vec<Actin
     let fit = fit_grouped(&model.parameters, MAX_STEPS, &design.weights, &model);
     let held_out = held_out_costs(&model.parameters, &fit, &design.weights, &design.folds);
     Scored { acting: model.at(&fit.values), free: model.free, parameters: model.parameters, fit, held_out }
+}
+
+/// A set of effects without one of them.
+pub(super) fn left_out(
+    observed: &Observed<'_>,
+    design: &Design,
+    acting: &[ActingEffect],
+    e: usize,
+) -> Scored {
+    let mut rest = acting.to_vec();
+    rest.remove(e);
+    scored(observed, design, rest)
 }
 
 /// Differences press by press.

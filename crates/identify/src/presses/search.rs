@@ -4,7 +4,9 @@ use super::candidates::is_drawn;
 use super::gains::{Scatter, scatter};
 use super::observed::Observed;
 use super::predict::{ActingEffect, PRESS_ZONES};
-use super::score::{Base, Design, MATERIAL, PressTrial, SURE, Scored, differences, scored, shares, with};
+use super::score::{
+    Base, Design, MATERIAL, PressTrial, SURE, Scored, differences, left_out, scored, shares, with,
+};
 use super::unnamed::{Fields, PressCovariate, Unnamed};
 use crate::Hint;
 use gripgen_twin::effects::EffectSpec;
@@ -207,9 +209,7 @@ fn spares_zones(observed: &Observed<'_>, before: &[ActingEffect], after: &[Actin
 fn dropped(observed: &Observed<'_>, design: &Design, mut model: Scored, least: f64) -> Scored {
     let mut e = 0;
     while model.acting.len() > 1 && e < model.acting.len() {
-        let mut rest = model.acting.clone();
-        rest.remove(e);
-        let without = scored(observed, design, rest);
+        let without = left_out(observed, design, &model.acting, e);
         if design.mean(&differences(&without.held_out, &model.held_out)).0 < least {
             model = without;
         } else {
@@ -235,9 +235,7 @@ fn finish(
     let mut exchanges = 0;
     while e < model.acting.len() {
         let spec = model.acting[e].spec;
-        let mut rest = model.acting.clone();
-        rest.remove(e);
-        let without = scored(observed, &design, rest);
+        let without = left_out(observed, &design, &model.acting, e);
         let ground = Base::new(observed, &without);
         let gain = design.mean(&differences(&without.held_out, &model.held_out)).0;
         let mut tied = Vec::new();
@@ -295,10 +293,8 @@ fn finish(
         // Effects that the rival makes needless were standing in for it.
         let mut e = 0;
         while e < model.acting.len() {
-            let mut rest = model.acting.clone();
-            rest.remove(e);
             let with_it = Fields::new(observed, &model).beside(rival, &design);
-            let without = scored(observed, &design, rest);
+            let without = left_out(observed, &design, &model.acting, e);
             let without_it = Fields::new(observed, &without).beside(rival, &design);
             let loss = design.mean(&differences(&without_it, &with_it)).0;
             if loss < MATERIAL * base || loss < 0.1 * gains[e] {

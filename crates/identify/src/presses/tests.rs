@@ -140,10 +140,6 @@ fn diagnosis(camera: &Camera) -> PressDiagnosis {
     diagnose_presses(camera, &data(Vec::new()), &mut |_, _| {})
 }
 
-fn names(found: &PressDiagnosis) -> Vec<&str> {
-    found.diagnosis.effects.iter().map(|e| e.name.as_str()).collect()
-}
-
 /// The light's rates come back, and the 90 % intervals hold them about as often as they say.
 #[test]
 fn light_that_drifts_is_named_and_the_intervals_hold_its_rates() {
@@ -154,7 +150,7 @@ fn light_that_drifts_is_named_and_the_intervals_hold_its_rates() {
             [0, 1, 2].map(|c| level[c] * (1.0 + truth[c].1 * PRESS_H * press as f64))
         });
         let found = diagnosis(&camera);
-        assert_eq!(names(&found), ["light_drift"], "seed {seed}: {:?}", found.diagnosis);
+        assert_eq!(found.diagnosis.names(), ["light_drift"], "seed {seed}: {:?}", found.diagnosis);
         assert_eq!(found.acting[0].spec.id, "light_drift");
         for (name, rate) in truth {
             let p = &found.diagnosis.effects[0].parameters[name];
@@ -176,7 +172,12 @@ fn what_makes_whole_frames_worse_is_no_name() {
     for (unseen_mse, named) in [(3.0, true), (60.0, false)] {
         let drift = |press: usize, _, level: [f64; 3]| level.map(|l| l * (1.0 + 0.004 * press as f64));
         let found = diagnosis(&Camera { unseen_mse, ..Camera::new(3, drift) });
-        assert_eq!(names(&found), if named { vec!["light_drift"] } else { vec![] }, "{:?}", found.diagnosis);
+        assert_eq!(
+            found.diagnosis.names(),
+            if named { vec!["light_drift"] } else { vec![] },
+            "{:?}",
+            found.diagnosis
+        );
         let error = found.diagnosis.error.as_ref().unwrap();
         assert!(error.after.mse <= error.before.mse, "{error:?}");
         let hints = &found.diagnosis.hints;
@@ -194,7 +195,11 @@ fn nothing_is_named_where_nothing_acts() {
     for seed in 0..20 {
         let found = diagnosis(&Camera::new(100 + seed, |_, _, level| level));
         let d = &found.diagnosis;
-        assert_eq!((d.verdict, names(&found), d.unknown.len()), (Verdict::None, vec![], 0), "{seed}: {d:?}");
+        assert_eq!(
+            (d.verdict, found.diagnosis.names(), d.unknown.len()),
+            (Verdict::None, vec![], 0),
+            "{seed}: {d:?}"
+        );
         assert!(found.frame_mse.iter().all(|(before, after)| before == after), "nothing was added");
         assert_eq!(found.zone_mse[0], found.zone_mse[1]);
         assert!(found.zone_mse[0].iter().all(|mse| (mse - 1.0).abs() < 0.2), "{:?}", found.zone_mse);
@@ -213,7 +218,7 @@ fn sizes_that_would_have_been_seen_are_those_that_are() {
     for (factor, expected) in [(2.0, vec!["rest_offset"]), (0.33, vec![])] {
         let offset = [0.0, factor * size, 0.0];
         let camera = Camera::new(6, |_, _, level| [0, 1, 2].map(|c| level[c] + offset[c]));
-        assert_eq!(names(&diagnosis(&camera)), expected, "{factor} of {size}");
+        assert_eq!(diagnosis(&camera).diagnosis.names(), expected, "{factor} of {size}");
     }
 }
 
@@ -232,11 +237,11 @@ fn beside_gains_that_wander_light_is_told_by_the_one_that_does_not() {
         diagnose_presses(&camera, &known, &mut |_, _| {})
     };
     for seed in 30..36 {
-        assert_eq!(names(&wandering(seed, &|_| 1.0)), [""; 0], "{seed}: nothing but the balance");
+        assert_eq!(wandering(seed, &|_| 1.0).diagnosis.names(), [""; 0], "{seed}: nothing but the balance");
         let (dimmer, drifting) =
             (wandering(seed, &|_| 0.96), wandering(seed, &|press| 1.0 - 0.009 * press as f64));
         for (found, name) in [(dimmer, "exposure"), (drifting, "light_drift")] {
-            assert_eq!(names(&found), [name], "{seed}");
+            assert_eq!(found.diagnosis.names(), [name], "{seed}");
             assert!(found.diagnosis.effects[0].weight > 0.7, "{seed}: {:?}", found.diagnosis.effects);
         }
     }
@@ -249,7 +254,7 @@ fn a_background_that_changes_is_found_where_it_does() {
         if press < 5 { level } else { [level[0] + 4.0 * u, level[1] - 3.0 * v, level[2] + 3.0 * u * v] }
     });
     let found = diagnosis(&camera);
-    assert_eq!(names(&found), ["background_change"]);
+    assert_eq!(found.diagnosis.names(), ["background_change"]);
     let p = &found.diagnosis.effects[0].parameters;
     assert_eq!(p["at_pull_index"].value, 5.0);
     assert!((p["red_u"].value - 4.0).abs() < 0.3 && (p["green_v"].value + 3.0).abs() < 0.3, "{p:?}");
@@ -268,9 +273,9 @@ fn a_background_that_changes_late_is_found() {
         })
     };
     let found = diagnosis(&late(10));
-    assert_eq!(names(&found), ["background_change"]);
+    assert_eq!(found.diagnosis.names(), ["background_change"]);
     assert_eq!(found.diagnosis.effects[0].parameters["at_pull_index"].value, 10.0);
-    assert_eq!(names(&diagnosis(&late(11))), [""; 0]);
+    assert_eq!(diagnosis(&late(11)).diagnosis.names(), [""; 0]);
 }
 
 /// What follows a column of the table alone is unknown by the name of the column.
@@ -291,7 +296,7 @@ fn light_that_follows_a_column_is_unknown_by_its_name() {
 fn one_press_that_went_wrong_is_an_outlier() {
     let camera = Camera::new(9, |press, _, level| if press == 4 { level.map(|l| l + 25.0) } else { level });
     let found = diagnosis(&camera);
-    assert_eq!(names(&found), [""; 0], "{:?}", found.diagnosis);
+    assert_eq!(found.diagnosis.names(), [""; 0], "{:?}", found.diagnosis);
     assert_eq!(found.diagnosis.data.outliers, ["press-4"]);
 }
 

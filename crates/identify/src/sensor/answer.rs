@@ -8,12 +8,13 @@ use super::moments::{Model, Moments};
 use super::prepare::{Prepared, prepare, range};
 use super::refine::{JointFit, Refined, joint_fit, values_at};
 use super::search::{Weighing, Workspace};
-use super::words::{SensorEvidence, evidence, separate_by};
+use super::words::{SensorEvidence, evidence};
 use super::{SensorData, SensorOptions, detect};
 use crate::diagnosis::{
     Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, Rival, UnknownCovariate,
 };
-use gripgen_twin::effects::{EffectSpec, FORCE_RATE};
+use crate::statistics::median;
+use gripgen_twin::effects::{EffectSpec, FORCE_RATE, Measured};
 use gripgen_twin::rounded;
 
 /// A group of rows with what was predicted from the other blocks.
@@ -156,9 +157,6 @@ fn named_effect(
     tied: &[super::choose::Tie],
     candidates: &[Candidate],
 ) -> NamedEffect {
-    let name = |k: usize| candidates[k].name().to_string();
-    let mut class = vec![effect.spec.id.to_string()];
-    class.extend(tied.iter().map(|t| name(t.candidate)));
     let parameters = effect
         .spec
         .parameters
@@ -166,19 +164,10 @@ fn named_effect(
         .zip(effect.values.iter().zip(&effect.half90))
         .map(|(p, (value, half90))| (p.name.to_string(), estimate(*value, *half90, p.unit)))
         .collect();
-    NamedEffect {
-        name: effect.spec.id.into(),
-        part: None,
-        separate_by: separate_by(&class),
-        named_again: None,
-        class,
-        weight,
-        parameters,
-        indistinguishable_from: tied
-            .iter()
-            .map(|t| Rival { name: name(t.candidate), weight: t.weight })
-            .collect(),
-    }
+    let rival =
+        |t: &super::choose::Tie| Rival { name: candidates[t.candidate].name().into(), weight: t.weight };
+    let rivals = tied.iter().map(rival).collect();
+    NamedEffect::new(effect.spec.id, weight, parameters, rivals, (Measured::SensorTable, Some("")))
 }
 
 fn baseline_values(diagnosis: &mut Diagnosis, prepared: &Prepared, fit: &JointFit) {
@@ -302,9 +291,7 @@ fn plausible(prepared: &Prepared, gains: &[f64]) -> Result<(), String> {
             "reference forces reach {most} N: this table is for forces of a gripper; is the column in another unit?"
         ));
     }
-    let mut sizes: Vec<f64> = gains.iter().map(|g| g.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let gain = sizes[sizes.len() / 2];
+    let gain = median(gains.iter().map(|g| g.abs()).collect()).unwrap_or_default();
     if !(4e-3..=250.0).contains(&gain) {
         return Err(format!(
             "the measured column is {} times the reference: one of them is in another unit (a factor of \

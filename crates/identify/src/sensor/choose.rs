@@ -4,8 +4,8 @@ use super::SensorOptions;
 use super::candidates::Kind;
 use super::moments::Model;
 use super::search::{Round, Score, Weighing, Workspace};
-use super::statistics::mean_and_error;
 use crate::draws::Draws;
+use crate::statistics::mean_and_error;
 
 /// Most effects and curves in an answer.
 const MAX_PICKED: usize = 3;

@@ -6,6 +6,7 @@ use super::noise::draw;
 use super::search::{Weighing, Workspace};
 use crate::diagnosis::Detectable;
 use crate::draws::Draws;
+use crate::statistics::median;
 use std::collections::BTreeMap;
 
 /// Standard errors at which a first effect is accepted among all candidates, about.
@@ -81,8 +82,7 @@ fn smallest(candidate: &Candidate, gain: f64, error: impl Fn(usize, f64) -> f64)
             shapes.into_iter().max_by(f64::total_cmp)
         };
     }
-    sizes.sort_by(f64::total_cmp);
-    Some(sizes[sizes.len() / 2]).filter(|v| v.is_finite())
+    median(sizes).filter(|v| v.is_finite())
 }
 
 fn responses(ws: &Workspace<'_>, variance: f64, seed: u64) -> Vec<super::moments::Moments> {

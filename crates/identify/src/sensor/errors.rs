@@ -4,9 +4,8 @@ use super::candidates::{chain, is_shape_only, size_parameter};
 use super::moments::{Model, Moments};
 use super::noise::{Noise, Whitener};
 use super::search::{Weighing, Workspace, combined};
-use super::statistics::mean_and_error;
 use crate::diagnosis::{ErrorPair, HeldOutError};
-use crate::grouped::t_quantile_95;
+use crate::statistics::log_error_half90;
 use gripgen_twin::effects::EffectSpec;
 
 /// Held-out errors before and after.
@@ -104,9 +103,6 @@ fn error(ws: &Workspace<'_>, y: &[f64], predicted: &[f64]) -> HeldOutError {
     }
 }
 
-/// The interval is for the error of new data of the same length, whose own scatter is as large: root of 2.
-const NEW_DATA: f64 = std::f64::consts::SQRT_2;
-
 /// Root mean square over all rows; the interval from the scatter of the mean square over folds of sessions, on a
 /// logarithmic scale.
 fn summary(ws: &Workspace<'_>, by_unit: &[f64], y: &[f64]) -> HeldOutError {
@@ -124,19 +120,12 @@ fn summary(ws: &Workspace<'_>, by_unit: &[f64], y: &[f64]) -> HeldOutError {
     }
     let mean = by_unit.iter().sum::<f64>() / y.len() as f64;
     let squares: Vec<f64> = blocks.iter().map(|b| b.1 / b.2.max(1.0)).collect();
-    let (_, deviation) = mean_and_error(&squares);
-    let half = if mean > 0.0 && deviation.is_finite() {
-        0.5 * NEW_DATA * t_quantile_95(squares.len() as f64 - 1.0) * (deviation / mean).min(3.0)
-    } else {
-        0.0
-    };
+    let half = log_error_half90(mean, &squares);
     let rmse = libm::sqrt(mean);
     HeldOutError {
         rmse_n: Some(rmse),
-        mse: None,
-        rmse_mm3: None,
         low90: rmse * libm::exp(-half),
         high90: rmse * libm::exp(half),
-        mape_pct: None,
+        ..HeldOutError::default()
     }
 }

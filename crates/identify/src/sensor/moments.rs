@@ -117,20 +117,7 @@ impl Moments {
             }
             sums[(last, last)] = y.iter().map(|v| v * v).sum();
         }
-        for total in &mut self.totals {
-            let last = total.nrows() - 1;
-            total.row_mut(last).fill(0.0);
-            total.column_mut(last).fill(0.0);
-        }
-        for (unit, sums) in self.units.iter().zip(&self.sums) {
-            let last = sums.nrows() - 1;
-            let total = &mut self.totals[unit.session];
-            for j in 0..last {
-                total[(j, last)] += sums[(j, last)];
-                total[(last, j)] += sums[(last, j)];
-            }
-            total[(last, last)] += sums[(last, last)];
-        }
+        self.sum_up(columns.len());
     }
 
     fn response(&self) -> usize {

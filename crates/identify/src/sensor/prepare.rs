@@ -2,6 +2,7 @@
 
 use super::SensorData;
 use super::moments::Unit;
+use crate::statistics::median;
 use gripgen_twin::effects::TableSpan;
 
 /// Folds of every session.
@@ -71,9 +72,7 @@ impl Prepared {
     /// What the fits of effects need to know of it.
     pub fn span(&self) -> TableSpan {
         let (lowest_n, highest_n) = range(self.reference_n.iter().copied());
-        let mut steps = self.step_s.clone();
-        steps.sort_by(f64::total_cmp);
-        let step_s = steps[steps.len() / 2];
+        let step_s = median(self.step_s.clone()).unwrap_or_default();
         TableSpan { lowest_n, highest_n, step_s, longest_s: self.longest_s(), whole_s: self.whole_s() }
     }
 }
@@ -121,13 +120,11 @@ pub(crate) fn prepare(data: &SensorData, max_rows: usize) -> Result<Prepared, St
     let starts: Vec<usize> =
         (0..rows.len()).filter(|&i| i == 0 || session[i] != session[i - 1]).chain([rows.len()]).collect();
     let is_start = |i: usize| starts.binary_search(&i).is_ok();
-    let mut steps: Vec<f64> =
-        (1..rows.len()).filter(|&i| !is_start(i)).map(|i| time[i] - time[i - 1]).collect();
+    let steps: Vec<f64> = (1..rows.len()).filter(|&i| !is_start(i)).map(|i| time[i] - time[i - 1]).collect();
     if let Some(bad) = steps.iter().find(|s| s.is_nan() || **s <= 0.0) {
         return Err(format!("the time moves by {bad} s from one row of a session to the next"));
     }
-    steps.sort_by(f64::total_cmp);
-    let median_s = steps[steps.len() / 2];
+    let median_s = median(steps).unwrap_or_default();
     let step_s =
         (0..rows.len()).map(|i| if is_start(i) { median_s } else { time[i] - time[i - 1] }).collect();
     let spikes = remove_spikes(&reference_n, &mut measured, &starts);
@@ -213,12 +210,10 @@ fn remove_spikes(reference_n: &[f64], measured: &mut [f64], starts: &[usize]) ->
             bends.push((i, measured[i] - middle, slope));
         }
     }
-    let mut sizes: Vec<f64> = bends.iter().map(|b| b.1.abs()).collect();
-    if sizes.is_empty() {
+    let Some(middle) = median(bends.iter().map(|b: &(usize, f64, f64)| b.1.abs()).collect()) else {
         return Vec::new();
-    }
-    sizes.sort_by(f64::total_cmp);
-    let robust = 1.4826 * sizes[sizes.len() / 2];
+    };
+    let robust = 1.4826 * middle;
     let (low, high) = range(reference_n.iter().copied());
     let (bottom, top) = range(measured.iter().copied());
     let scale = if high > low { (top - bottom) / (high - low) } else { 0.0 };

@@ -10,8 +10,8 @@ use super::candidates::{Candidate, Change};
 use super::moments::{Model, Moments, Solution};
 use super::noise::{Noise, Whitener, draw, fit_noise, left_correlation};
 use super::prepare::Prepared;
-use super::statistics::{gamma_tail, mean_and_error};
 use crate::draws::Draws;
+use crate::statistics::{gamma_tail, mean_and_error};
 
 /// How rows are weighed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -121,9 +121,7 @@ fn two_effects_are_both_named() {
         let mut both = case(Effect::Drift, 6.0, noise, seed);
         both.effects.push(Effect::Quadratic);
         let d = answer(&make(&both)).diagnosis;
-        let mut names: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
-        names.sort_unstable();
-        assert_eq!(names, ["sensor_drift", "sensor_quadratic"], "{noise:?}");
+        assert_eq!(d.names(), ["sensor_drift", "sensor_quadratic"], "{noise:?}");
         // Which way a line bends below zero is not asked of forces above it.
         let odd = d.effects.iter().find_map(|e| e.parameters.get("odd"));
         assert!(odd.is_some_and(|p| (p.value, p.low90, p.high90) == (0.0, 0.0, 0.0)), "{odd:?}");

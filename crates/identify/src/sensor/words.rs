@@ -1,13 +1,10 @@
-//! The table of evidence, and experiments in words.
+//! The table of evidence.
 
 use super::choose::{Choice, model_of, ties};
 use super::moments::Model;
 use super::refine::values_at;
 use super::search::Workspace;
-use super::statistics::mean_and_error;
-use crate::diagnosis::SeparateBy;
-use crate::effect_search::separating;
-use gripgen_twin::effects::{Experiment, Measured};
+use crate::statistics::mean_and_error;
 
 /// A candidate in the table of evidence.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,15 +101,4 @@ pub(crate) fn evidence(ws: &Workspace<'_>, choice: &Choice) -> Vec<SensorEvidenc
         );
     }
     table
-}
-
-/// What tells the members of a class apart, none for a class of one.
-pub(crate) fn separate_by(class: &[String]) -> Option<SeparateBy> {
-    if class.len() < 2 {
-        return None;
-    }
-    let suspects: Vec<&str> = class.iter().map(String::as_str).collect();
-    let steps: Vec<&str> =
-        separating(Measured::SensorTable, &suspects).into_iter().map(Experiment::text).collect();
-    Some(SeparateBy { text: steps.join("; "), campaign: None })
 }

@@ -17,7 +17,6 @@
 //!
 //! Every term is 0 for a gel at rest: no contact, no change.
 
-mod block;
 mod draw;
 mod near;
 mod pyramid;
@@ -47,6 +46,29 @@ pub(crate) const NEAR: usize = NORMAL_TERMS + (HEIGHT_DEGREE + 1) * (HEIGHT_DEGR
 /// Monomials `u^i v^j` of degree at most 3, and of degree at most 2. Order: `1, u, v, u^2, u v, v^2, u^3, ...`.
 pub(crate) const NEAR_FIELD: usize = 10;
 pub(crate) const AROUND_FIELD: usize = 6;
+
+/// Pixels or cells that are computed together: the widest vector.
+const BLOCK: usize = 16;
+
+const CHANNELS: usize = 3;
+
+/// Coefficients by monomial, then feature and channel, out of channel, feature, monomial.
+#[inline(always)]
+fn by_monomial<const FIELD: usize>(coefficients: &[f32], features: usize) -> Vec<f32> {
+    let mut out = vec![0.0; coefficients.len()];
+    for (i, of_feature) in coefficients.as_chunks::<FIELD>().0.iter().enumerate() {
+        let to = CHANNELS * (i % features) + i / features;
+        for (monomial, c) in of_feature.iter().enumerate() {
+            out[monomial * CHANNELS * features + to] = *c;
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn block_of(row: &[f32], start: usize) -> &[f32; BLOCK] {
+    row[start..].first_chunk().expect("rows are padded to whole blocks")
+}
 
 /// Coefficients of the model; see the module.
 #[derive(Debug, Clone, PartialEq)]

@@ -181,35 +181,11 @@ fn about_the_middle(rgb: &[Vec<[f64; 6]>; 3], bin: usize) -> [[f32; 4]; 6] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::npz::{Array, ElementType, write_npz};
+    use crate::testing::taxim_table;
 
     fn frame() -> TactileImage {
         let rgb = (0..64 * 48).flat_map(|i| [100, 90, 80 + (i % 64) as u8]).collect();
         TactileImage { width_px: 64, height_px: 48, rgb }
-    }
-
-    /// A table of given coefficients of (channel of the file, bin).
-    fn table(bins: usize, coefficients: impl Fn(usize, usize) -> [f64; 6]) -> TaximTable {
-        table_on(&frame(), bins, coefficients)
-    }
-
-    fn table_on(
-        frame: &TactileImage,
-        bins: usize,
-        coefficients: impl Fn(usize, usize) -> [f64; 6],
-    ) -> TaximTable {
-        let channel = |c: usize| {
-            let values = (0..bins * bins).flat_map(|k| coefficients(c, k)).collect();
-            Array { shape: vec![bins, bins, 6], values }
-        };
-        let bytes = write_npz(&[
-            ("bins", Array { shape: vec![], values: vec![bins as f64] }, ElementType::F64),
-            ("grad_r", channel(0), ElementType::F64),
-            ("grad_g", channel(1), ElementType::F64),
-            ("grad_b", channel(2), ElementType::F64),
-        ])
-        .unwrap();
-        TaximTable::read(&mut Npz::open(&bytes).unwrap(), frame).unwrap()
     }
 
     fn shade(table: &TaximTable, gx: f32, gy: f32) -> [Plane; 3] {
@@ -220,7 +196,7 @@ mod tests {
 
     #[test]
     fn channel_0_of_the_file_is_blue() {
-        let t = table(5, |c, _| [0.0, 0.0, 0.0, 0.0, 0.0, 10.0 * (c + 1) as f64]);
+        let t = taxim_table(&frame(), 5, |c, _| [0.0, 0.0, 0.0, 0.0, 0.0, 10.0 * (c + 1) as f64]);
         let change = shade(&t, 0.3, 0.1);
         let of_table = [0, 1, 2].map(|c| change[c].values[70] - t.offset[c][70]);
         assert_eq!(of_table, [30.0, 20.0, 10.0]);
@@ -242,7 +218,7 @@ mod tests {
             let size = 1.0 + 0.2 * c as f64 + 0.5 * (bin / 125) as f64 + 0.001 * (bin % 125) as f64;
             [1e-4, -2e-4, 3e-4, 0.05, -0.07, 40.0].map(|term| term * size)
         };
-        let change = shade(&table_on(&frame, 125, coefficients), 0.0, 0.0);
+        let change = shade(&taxim_table(&frame, 125, coefficients), 0.0, 0.0);
         // Slope bin floor(0 / ((pi / 2) / 124)), direction bin floor((0 + pi) / (2 pi / 124)).
         let (slope, direction) = (0, 62);
         for (x, y) in places {
@@ -264,7 +240,7 @@ mod tests {
 
     #[test]
     fn slopes_fall_into_taxims_bins() {
-        let t = table(125, |_, k| [0.0, 0.0, 0.0, 0.0, 0.0, k as f64]);
+        let t = taxim_table(&frame(), 125, |_, k| [0.0, 0.0, 0.0, 0.0, 0.0, k as f64]);
         let steps = 124.0;
         for (gx, gy) in [(0.5, 0.02), (0.1, 0.5), (-0.2, -0.1), (0.3, -0.7), (30.0, -40.0)] {
             let magnitude = f32::hypot(gx, gy).atan();

@@ -15,13 +15,13 @@ pub(super) struct Block<'a> {
 }
 
 impl Block<'_> {
-    /// `ROWS` sums. With `BOTH` the rows above and below are kept in registers while k grows, so that each k loads
-    /// two new ones (three sets of `ROWS` registers); else only those above, and those below are loaded.
+    /// `ROWS` sums. The rows above and below are kept in registers while k grows, so that each k loads two new ones (three
+    /// sets of `ROWS` registers).
     ///
     /// # Safety
     /// The processor must have the instructions of `L`; rows as far away as the range reaches must be valid.
     #[inline(always)]
-    pub(super) unsafe fn sums<L: Lanes, const ROWS: usize, const BOTH: bool>(&self) -> [L::Vector; ROWS] {
+    pub(super) unsafe fn sums<L: Lanes, const ROWS: usize>(&self) -> [L::Vector; ROWS] {
         // SAFETY: see above.
         unsafe {
             let zero = L::splat(0.0);
@@ -51,21 +51,19 @@ impl Block<'_> {
             }
             for r in 0..ROWS {
                 walk.up[r] = L::load(walk.above.add(r * self.stride));
-                if BOTH {
-                    walk.down[r] = L::load(walk.below.add(r * self.stride));
-                }
+                walk.down[r] = L::load(walk.below.add(r * self.stride));
             }
             let mut left = end - k;
             loop {
                 // Registers keep their places for `ROWS` steps; a step that is not there is skipped for good.
-                walk.phase::<L, BOTH, 0>(&mut sums, &mut left);
-                walk.phase::<L, BOTH, 1>(&mut sums, &mut left);
-                walk.phase::<L, BOTH, 2>(&mut sums, &mut left);
-                walk.phase::<L, BOTH, 3>(&mut sums, &mut left);
-                walk.phase::<L, BOTH, 4>(&mut sums, &mut left);
-                walk.phase::<L, BOTH, 5>(&mut sums, &mut left);
-                walk.phase::<L, BOTH, 6>(&mut sums, &mut left);
-                walk.phase::<L, BOTH, 7>(&mut sums, &mut left);
+                walk.phase::<L, 0>(&mut sums, &mut left);
+                walk.phase::<L, 1>(&mut sums, &mut left);
+                walk.phase::<L, 2>(&mut sums, &mut left);
+                walk.phase::<L, 3>(&mut sums, &mut left);
+                walk.phase::<L, 4>(&mut sums, &mut left);
+                walk.phase::<L, 5>(&mut sums, &mut left);
+                walk.phase::<L, 6>(&mut sums, &mut left);
+                walk.phase::<L, 7>(&mut sums, &mut left);
                 if left == 0 {
                     return sums;
                 }
@@ -91,7 +89,7 @@ impl<V: Copy, const ROWS: usize> Walk<V, ROWS> {
     /// # Safety
     /// As for [`Block::sums`].
     #[inline(always)]
-    unsafe fn phase<L: Lanes<Vector = V>, const BOTH: bool, const PHASE: usize>(
+    unsafe fn phase<L: Lanes<Vector = V>, const PHASE: usize>(
         &mut self,
         sums: &mut [V; ROWS],
         left: &mut usize,
@@ -104,19 +102,13 @@ impl<V: Copy, const ROWS: usize> Walk<V, ROWS> {
         unsafe {
             let weight = L::splat(*self.weight);
             for r in 0..ROWS {
-                let below = if BOTH {
-                    self.down[(r + PHASE) % ROWS]
-                } else {
-                    L::load(self.below.add(r * self.stride))
-                };
-                sums[r] = L::fused(weight, L::add(self.up[(r + ROWS - PHASE) % ROWS], below), sums[r]);
+                let pair = L::add(self.up[(r + ROWS - PHASE) % ROWS], self.down[(r + PHASE) % ROWS]);
+                sums[r] = L::fused(weight, pair, sums[r]);
             }
             self.weight = self.weight.wrapping_add(1);
             self.above = self.above.wrapping_sub(self.stride);
             self.up[ROWS - 1 - PHASE] = L::load(self.above);
-            if BOTH {
-                self.down[PHASE] = L::load(self.below.add(ROWS * self.stride));
-            }
+            self.down[PHASE] = L::load(self.below.add(ROWS * self.stride));
             self.below = self.below.wrapping_add(self.stride);
         }
     }

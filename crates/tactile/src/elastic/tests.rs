@@ -1,6 +1,7 @@
 //! Against closed forms of contact mechanics.
 
 use super::*;
+use crate::testing::assert_same_on_every_unit;
 
 const SOFT: ElasticGel =
     ElasticGel { thickness_m: 4e-3, young_modulus_pa: 2e5, poisson_ratio: 0.5, base: Base::HalfSpace };
@@ -10,14 +11,7 @@ fn square(n: usize, metres_per_px: f64) -> Grid {
 }
 
 fn heights(grid: &Grid, f: impl Fn(f64, f64) -> f64) -> Plane {
-    let mut plane = Plane::filled(grid.width_px, grid.height_px, 0.0);
-    for row in 0..grid.height_px {
-        for column in 0..grid.width_px {
-            let (x, y) = grid.centre_m(column, row);
-            plane.values[row * grid.width_px + column] = (f(x, y) / grid.metres_per_px) as f32;
-        }
-    }
-    plane
+    grid.plane(|x, y| f(x, y) / grid.metres_per_px)
 }
 
 /// Hertz's ball: a paraboloid.
@@ -189,7 +183,7 @@ fn pressure_and_gap_complement_each_other() {
             let gel = ElasticGel { base, poisson_ratio: nu, ..SOFT };
             let imprint = press(&part, &grid, &gel, 2.0);
             let d = imprint.press_depth_m / grid.metres_per_px;
-            let top = part.values.iter().fold(f32::NEG_INFINITY, |m, &h| m.max(h));
+            let top = part.highest();
             let ElasticField { surface_px, pressure_pa } = field(&imprint);
             let mut touching = 0;
             for i in 0..part.values.len() {
@@ -224,10 +218,7 @@ fn every_vector_path_presses_to_the_same_bits() {
     let grid = Grid { width_px: 100, height_px: 70, metres_per_px: 8e-5 };
     let part = heights(&grid, |x, y| 1e-4 * (x * 3e3).sin() - y * y / 0.02);
     let gel = ElasticGel { base: Base::Bonded, ..SOFT };
-    let run = |level| press_elastic(&part, &grid, &gel, 3.0, level).unwrap();
-    for level in SimdLevel::available() {
-        assert!(run(level) == run(SimdLevel::Portable), "{level:?}");
-    }
+    assert_same_on_every_unit("press", |level| press_elastic(&part, &grid, &gel, 3.0, level).unwrap());
 }
 
 #[test]

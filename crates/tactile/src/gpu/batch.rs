@@ -1,17 +1,18 @@
 //! One sensor on the device: what stays there, and the passes of a batch.
 
 use super::GpuError;
-use super::around::Around;
 use super::buffers::{Pass, Planes, bind, bind_at, empty, new_planes, resident, with_content};
 use super::cast::{Cast, Scene, ceiling};
 use super::colour::Colours;
 use super::device::Device;
 use super::layout::{Cluster, Frame, Outcome, PressInput};
 use super::mesh::{Clusters, Steps};
-use super::pipelines::{Pipelines, Stage};
+use super::pipelines::{Key, Pipelines, Stage};
 use super::readback::Ring;
-use super::rest::RestShape;
+use super::regression::Around;
 use super::source::{Axis, Blur, Sampling, Variant};
+use crate::convolve::mirrored;
+use crate::deform::{FINAL_KERNEL_PX, gaussian};
 use crate::grid::{Grid, Plane};
 use crate::render::Renderer;
 use crate::sensor::Sensor;
@@ -145,7 +146,7 @@ impl GpuSensor {
         let (contact, half_way, surface) = (planes(), planes(), planes());
 
         let press = |sampling| -> Result<Pass, GpuError> {
-            let stage = pipelines.indent(device, sampling)?;
+            let stage = pipelines.get(device, Key::Indent(sampling))?;
             let all = [&frame, &presses, &heights, &outcomes].map(wgpu::Buffer::as_entire_binding);
             let all = all.into_iter().chain([contact.binding(), gel_at_rest.as_entire_binding()]);
             let of_points = [&steps, &points, &stepped].map(wgpu::Buffer::as_entire_binding);
@@ -154,7 +155,7 @@ impl GpuSensor {
             Ok(Pass { stage, bound, groups: [1, 1] })
         };
         let find_steps = {
-            let stage = pipelines.steps(device)?;
+            let stage = pipelines.get(device, Key::Steps)?;
             let all = [&frame, &steps, &points, &stepped].map(wgpu::Buffer::as_entire_binding);
             let bound = bind(device, &stage, all.into_iter().chain([contact.binding()]));
             Pass { stage, bound, groups: [pixels.div_ceil(64) as u32, 0] }
@@ -163,11 +164,8 @@ impl GpuSensor {
         let mut between = Vec::new();
         let follow = Some(on_processor.follow());
         let mut reach_px = [0; 2];
-        for (i, (kernel_px, restore)) in kernels_px
-            .iter()
-            .map(|&k| (k, follow))
-            .chain([(crate::deform::FINAL_KERNEL_PX, None)])
-            .enumerate()
+        for (i, (kernel_px, restore)) in
+            kernels_px.iter().map(|&k| (k, follow)).chain([(FINAL_KERNEL_PX, None)]).enumerate()
         {
             let from = if i == 0 { &contact } else { &surface };
             let lift = shape.lift_px.get(i).map(|lift| resident(device, "lift", lift));
@@ -176,7 +174,7 @@ impl GpuSensor {
                 let lift = lift.as_ref().filter(|_| axis == Axis::X);
                 reach_px[usize::from(axis == Axis::Y)] += kernel_px / 2;
                 let blur = Blur { kernel_px, axis, restore, lifted: lift.is_some(), reach_px };
-                let stage = pipelines.blur(device, blur)?;
+                let stage = pipelines.get(device, Key::Blur(blur))?;
                 let all = [frame.as_entire_binding(), outcomes.as_entire_binding()];
                 let all = all.into_iter().chain([source.binding(), blurred.binding()]);
                 let all = all.enumerate().map(|(i, r)| (i as u32, r));
@@ -201,7 +199,7 @@ impl GpuSensor {
         let shading: Vec<_> = shading.map(|(i, buffer)| (i, buffer.as_entire_binding())).collect();
         let cast = match &colours.shadows {
             None => None,
-            Some(flat) => {
+            Some(shadow) => {
                 let scene = Scene {
                     grid: &grid,
                     frame: &frame,
@@ -212,14 +210,14 @@ impl GpuSensor {
                     shade: colours.shade,
                     shading: shading.clone(),
                 };
-                Some(Cast::new(device, pipelines, flat, scene, batch)?)
+                Some(Cast::new(device, pipelines, shadow, scene, batch)?)
             }
         };
         let image = {
             // Colours by regression look at the displacement alone.
             let domed = shape.domed && around.is_none();
-            let shadows = colours.shadows.as_ref().map(ceiling);
-            let stage = pipelines.image(device, colours.shade, domed, shadows)?;
+            let shadows = colours.shadows.as_deref().map(ceiling);
+            let stage = pipelines.get(device, Key::Image(colours.shade, domed, shadows))?;
             let own = [(0, &frame), (1, &presses), (4, &noise), (5, &packed)];
             let own = own.into_iter().chain(domed.then_some((7, &gel_at_rest)));
             let own = own.chain(cast.as_ref().map(|c| (10, &c.dark)));
@@ -239,9 +237,9 @@ impl GpuSensor {
             image_bytes: 4 * image_words as usize,
             ring: Ring::new(device, batch * (4 * image_words + size_of::<Outcome>() as u64)),
             raster: [
-                pipelines.raster_top(device)?,
-                pipelines.raster_fill(device, Sampling::Centres)?,
-                pipelines.raster_fill(device, Sampling::Points)?,
+                pipelines.get(device, Key::RasterTop)?,
+                pipelines.get(device, Key::RasterFill(Sampling::Centres))?,
+                pipelines.get(device, Key::RasterFill(Sampling::Points))?,
             ],
             frame,
             presses,
@@ -312,4 +310,58 @@ impl GpuSensor {
         });
         Ok(planes.collect())
     }
+}
+
+/// A gel that is not flat at rest: its surface, and how far each blur moves it. CPU twin: `BlurredRest` in src/deform.rs, where the
+/// formulas are.
+struct RestShape {
+    /// Heights towards the part in pixels, at most 0.
+    rest_px: Vec<f32>,
+    /// Deepest of them below 0.
+    sag_px: f64,
+    /// Whether it is not flat.
+    domed: bool,
+    /// After each blur what is added: `G_0 - G_i` to the core, after the last blur `G_n - G_0` to all. None if it is
+    /// flat, or the blurs work on the displacement alone.
+    lift_px: Vec<Vec<f32>>,
+}
+
+impl RestShape {
+    /// `whole_gel`: whether the blurs work on the whole gel (`Renderer::blurs_whole_gel`).
+    fn new(rest: Option<Plane>, grid: &Grid, kernels_px: &[u32], whole_gel: bool) -> Self {
+        let Some(rest) = rest else {
+            return Self { rest_px: vec![0.0; grid.len()], sag_px: 0.0, domed: false, lift_px: vec![] };
+        };
+        let first: Vec<f64> = rest.values.iter().map(|&h| -f64::from(h)).collect();
+        let mut blurred = first.clone();
+        let mut lift_px = vec![];
+        for &kernel_px in kernels_px.iter().chain([&FINAL_KERNEL_PX]).take_while(|_| whole_gel) {
+            blurred = blur(&blurred, grid, &gaussian(kernel_px));
+            lift_px.push(first.iter().zip(&blurred).map(|(g0, g)| (g0 - g) as f32).collect::<Vec<f32>>());
+        }
+        if let Some(last) = lift_px.last_mut() {
+            last.iter_mut().for_each(|l| *l = -*l);
+        }
+        let sag_px = first.iter().fold(0.0, |m: f64, &s| m.max(s));
+        Self { rest_px: rest.values, sag_px, domed: true, lift_px }
+    }
+}
+
+/// A blur along both axes with mirrored borders.
+fn blur(values: &[f64], grid: &Grid, weights: &[f32]) -> Vec<f64> {
+    let (w, h) = (grid.width_px, grid.height_px);
+    let half = weights.len() as isize / 2;
+    let along = |from: &[f64], dx: isize, dy: isize| -> Vec<f64> {
+        (0..w * h)
+            .map(|i| {
+                let (x, y) = ((i % w) as isize, (i / w) as isize);
+                weights.iter().enumerate().fold(0.0, |sum, (k, &weight)| {
+                    let o = k as isize - half;
+                    let at = mirrored(y + o * dy, h) * w + mirrored(x + o * dx, w);
+                    sum + f64::from(weight) * from[at]
+                })
+            })
+            .collect()
+    };
+    along(&along(values, 0, 1), 1, 0)
 }

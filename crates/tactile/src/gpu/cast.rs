@@ -4,15 +4,16 @@ use super::GpuError;
 use super::buffers::{Pass, Planes, bind_at, empty, resident, with_content};
 use super::device::Device;
 use super::layout::{ShadowBlur, Shadows};
-use super::pipelines::Pipelines;
+use super::pipelines::{Key, Pipelines};
 use super::source::{Ceiling, Shade};
 use crate::grid::Grid;
-use crate::shadow::{FlatShadow, ShadowKind};
+use crate::shadow::blur::Border;
+use crate::shadow::{Shadow, ShadowKind};
 use wgpu::{BindingResource, BufferUsages};
 
 /// What the values of a table are to the device.
-pub(super) fn ceiling(flat: &FlatShadow) -> Ceiling {
-    match (flat.kind, &flat.base) {
+pub(super) fn ceiling(shadow: &Shadow) -> Ceiling {
+    match (shadow.table().kind, &shadow.base) {
         (ShadowKind::Darkening, _) => Ceiling::Added,
         (ShadowKind::Ceiling, None) => Ceiling::Relative,
         (ShadowKind::Ceiling, Some(_)) => Ceiling::Taxim,
@@ -62,7 +63,7 @@ impl Cast {
     pub(super) fn new(
         device: &Device,
         pipelines: &Pipelines,
-        flat: &FlatShadow,
+        shadow: &Shadow,
         scene: Scene<'_>,
         batch: u64,
     ) -> Result<Self, GpuError> {
@@ -73,22 +74,23 @@ impl Cast {
         let groups = [scene.grid.width_px.div_ceil(16) as u32, scene.grid.height_px.div_ceil(4) as u32];
         let mut passes = vec![];
 
+        let rays = &shadow.rays;
+        let borders: Vec<[f32; 2]> = rays.sectors.borders().iter().map(|b| b.map(|x| x as f32)).collect();
         let uniform = Shadows {
-            rim_px: flat.rim_px as u32,
-            heights: flat.heights as u32,
-            directions: flat.borders.len() as u32,
-            held: u32::from(flat.held),
-            first_px: flat.first_px as f32,
-            per_px: flat.per_px as f32,
+            rim_px: shadow.rim_px as u32,
+            heights: rays.heights as u32,
+            directions: borders.len() as u32,
+            held: u32::from(rays.clamped),
+            first_px: rays.first_px as f32,
+            per_px: rays.per_px as f32,
         };
         let uniform =
             with_content(device, "shadow table", bytemuck::bytes_of(&uniform), BufferUsages::UNIFORM);
-        let borders: Vec<[f32; 2]> = flat.borders.iter().map(|b| b.map(|x| x as f32)).collect();
-        let fans: Vec<[u32; 2]> = flat.fans.iter().map(|f| f.map(|x| x as u32)).collect();
-        let mut targets: Vec<[u32; 4]> = flat
+        let fans: Vec<[u32; 2]> = rays.fans.iter().map(|&(from, to, _)| [from as u32, to as u32]).collect();
+        let mut targets: Vec<[u32; 4]> = rays
             .targets
             .iter()
-            .map(|(at, value)| [packed(*at), code(value[0]), code(value[1]), code(value[2])])
+            .map(|t| [packed([t.dx, t.dy]), code(t.value[0]), code(t.value[1]), code(t.value[2])])
             .collect();
         // A binding is never empty.
         targets.push([0; 4]);
@@ -100,7 +102,7 @@ impl Cast {
         let borders = resident(device, "sectors", &borders);
         let fans = resident(device, "fans", &fans);
         let targets = resident(device, "targets", &targets);
-        let stage = pipelines.shadow_rays(device, scene.gel.is_some())?;
+        let stage = pipelines.get(device, Key::ShadowRays(scene.gel.is_some()))?;
         let bound = [scene.frame, &uniform, scene.outcomes, &borders, &fans, &targets];
         let bound = bound.into_iter().enumerate().map(|(i, b)| (i as u32, b.as_entire_binding()));
         let planes = [(6, scene.surface.binding()), (8, scene.contact.binding())];
@@ -108,10 +110,10 @@ impl Cast {
         let bound = bind_at(device, &stage, bound.chain([(9, lowest.as_entire_binding())]));
         passes.push(Pass { stage, bound, groups });
 
-        let kind = ceiling(flat);
+        let kind = ceiling(shadow);
         // Colours by regression look at the displacement alone.
         let domed = scene.gel.is_some() && scene.shade != Shade::Regressor;
-        let stage = pipelines.shadow_merge(device, scene.shade, domed, kind)?;
+        let stage = pipelines.get(device, Key::ShadowMerge(scene.shade, domed, kind))?;
         let mut bound = vec![(0, scene.frame.as_entire_binding())];
         bound.extend([(10, lowest.as_entire_binding()), (11, dark.as_entire_binding())]);
         // The source has `rest` in every kind, and nothing of the stage `shade` where values are added.
@@ -123,13 +125,14 @@ impl Cast {
         }
         passes.push(Pass { bound: bind_at(device, &stage, bound), stage, groups });
 
-        for (weights, edge_once) in &flat.blurs {
-            let weights_px = resident(device, "weights", weights);
+        for one in &shadow.blurs {
+            let weights_px = resident(device, "weights", &one.weights);
             for (down, from, to) in [(0, &dark, &half_way), (1, &half_way, &dark)] {
-                let radius = weights.len() as i32 - 1;
-                let blur = ShadowBlur { radius, edge_once: u32::from(*edge_once), down };
+                let radius = one.weights.len() as i32 - 1;
+                let edge_once = u32::from(one.border == Border::EdgeOnce);
+                let blur = ShadowBlur { radius, edge_once, down };
                 let blur = with_content(device, "blur", bytemuck::bytes_of(&blur), BufferUsages::UNIFORM);
-                let stage = pipelines.shadow_blur(device)?;
+                let stage = pipelines.get(device, Key::ShadowBlur)?;
                 let bound = [scene.frame, &blur, &weights_px, from, to].into_iter().enumerate();
                 let bound = bind_at(device, &stage, bound.map(|(i, b)| (i as u32, b.as_entire_binding())));
                 passes.push(Pass { stage, bound, groups });

@@ -6,7 +6,7 @@ use super::regression::{around_coefficients, near_coefficients, regression};
 use super::source::Shade;
 use crate::colour::ColourModel;
 use crate::sensor::Sensor;
-use crate::shadow::FlatShadow;
+use crate::shadow::Shadow;
 use gripgen_twin::Gel;
 use gripgen_twin::config::GelModel;
 
@@ -30,7 +30,7 @@ pub(super) struct Colours {
     /// Limits and planes of colours by regression, and the coefficients of the surroundings.
     pub(super) regression: Option<Regression>,
     pub(super) around: Vec<f32>,
-    pub(super) shadows: Option<FlatShadow>,
+    pub(super) shadows: Option<Box<Shadow>>,
     /// Rest frame, what a table adds to it where the gel is pressed, and what takes its place under Taxim's shadows.
     pub(super) rest: Vec<f32>,
 }
@@ -40,7 +40,7 @@ impl Colours {
         if let Some(what) = missing(sensor, gel) {
             return Err(GpuError::Unsupported { what });
         }
-        let shadows = sensor.shadow.as_ref().map(|shadow| shadow.flat());
+        let shadows = sensor.shadow.clone();
         let rest = sensor.rest.concat();
         let plain = Self {
             shade: Shade::Lambert,
@@ -83,12 +83,13 @@ impl Colours {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::tests::{gel, lights, sensor};
+    use crate::gpu::tests::{lit, sensor};
     use crate::markers::Markers;
+    use crate::testing::gel;
 
     #[test]
     fn what_has_no_twin_is_refused() {
-        let mut marked = sensor(16, 16, lights());
+        let mut marked = sensor(16, 16, lit());
         let plain = gel(&[5]);
         let refused = |sensor: &Sensor, gel: &Gel| Colours::new(sensor, gel).err().map(|e| e.to_string());
         assert_eq!(refused(&marked, &plain), None);

@@ -16,8 +16,9 @@ pub(super) struct Stage {
     pub(super) shape: Option<BlurShape>,
 }
 
+/// Which pipeline; all that its source depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Key {
+pub(super) enum Key {
     RasterTop,
     RasterFill(Sampling),
     Steps,
@@ -43,6 +44,46 @@ impl Key {
             Key::ShadowRays(_) | Key::ShadowMerge(..) | Key::ShadowBlur => "shadow",
         }
     }
+
+    fn entry_point(self) -> &'static str {
+        match self {
+            Key::RasterTop => "top",
+            Key::RasterFill(_) => "fill",
+            Key::Around(step) => step.entry_point(),
+            _ => "main",
+        }
+    }
+
+    /// The WGSL source, and how a blur shares the image.
+    fn source(
+        self,
+        variant: Variant,
+        limits: &wgpu::Limits,
+    ) -> Result<(String, Option<BlurShape>), GpuError> {
+        let source = match self {
+            Key::RasterTop => source::raster(Sampling::Centres),
+            Key::RasterFill(sampling) => source::raster(sampling),
+            Key::Steps => source::steps(variant),
+            Key::Indent(sampling) => {
+                let most = limits.max_compute_invocations_per_workgroup;
+                // A power of two, as its sums want.
+                let threads = if variant == Variant::Tile && most >= 1024 { 1024 } else { 256 };
+                source::indent(variant, sampling, threads)
+            }
+            Key::Blur(blur) => {
+                let workgroup_bytes = limits.max_compute_workgroup_storage_size;
+                let (source, shape) = source::blur(variant, blur, workgroup_bytes)
+                    .ok_or(GpuError::Kernel { kernel_px: blur.kernel_px, workgroup_bytes })?;
+                return Ok((source, Some(shape)));
+            }
+            Key::Around(step) => source::around(variant, step),
+            Key::Image(shade, domed, shadows) => source::image(variant, shade, domed, shadows),
+            Key::ShadowRays(domed) => source::shadow_rays(variant, domed),
+            Key::ShadowMerge(shade, domed, kind) => source::shadow_merge(variant, shade, domed, kind),
+            Key::ShadowBlur => source::shadow_blur(),
+        };
+        Ok((source, None))
+    }
 }
 
 /// All pipelines of a renderer.
@@ -60,85 +101,14 @@ impl Pipelines {
         self.variant
     }
 
-    pub(super) fn raster_top(&self, device: &Device) -> Result<Stage, GpuError> {
-        self.get(device, Key::RasterTop, "top", || Ok((source::raster(Sampling::Centres), None)))
-    }
-
-    pub(super) fn raster_fill(&self, device: &Device, sampling: Sampling) -> Result<Stage, GpuError> {
-        self.get(device, Key::RasterFill(sampling), "fill", || Ok((source::raster(sampling), None)))
-    }
-
-    pub(super) fn steps(&self, device: &Device) -> Result<Stage, GpuError> {
-        self.get(device, Key::Steps, "main", || Ok((source::steps(self.variant), None)))
-    }
-
-    pub(super) fn indent(&self, device: &Device, sampling: Sampling) -> Result<Stage, GpuError> {
-        let most = device.device.limits().max_compute_invocations_per_workgroup;
-        // A power of two, as its sums want.
-        let threads = if self.variant == Variant::Tile && most >= 1024 { 1024 } else { 256 };
-        let source = || Ok((source::indent(self.variant, sampling, threads), None));
-        self.get(device, Key::Indent(sampling), "main", source)
-    }
-
-    pub(super) fn image(
-        &self,
-        device: &Device,
-        shade: Shade,
-        domed: bool,
-        shadows: Option<Ceiling>,
-    ) -> Result<Stage, GpuError> {
-        let source = || Ok((source::image(self.variant, shade, domed, shadows), None));
-        self.get(device, Key::Image(shade, domed, shadows), "main", source)
-    }
-
-    pub(super) fn shadow_rays(&self, device: &Device, domed: bool) -> Result<Stage, GpuError> {
-        let source = || Ok((source::shadow_rays(self.variant, domed), None));
-        self.get(device, Key::ShadowRays(domed), "main", source)
-    }
-
-    pub(super) fn shadow_merge(
-        &self,
-        device: &Device,
-        shade: Shade,
-        domed: bool,
-        kind: Ceiling,
-    ) -> Result<Stage, GpuError> {
-        let source = || Ok((source::shadow_merge(self.variant, shade, domed, kind), None));
-        self.get(device, Key::ShadowMerge(shade, domed, kind), "main", source)
-    }
-
-    pub(super) fn shadow_blur(&self, device: &Device) -> Result<Stage, GpuError> {
-        self.get(device, Key::ShadowBlur, "main", || Ok((source::shadow_blur(), None)))
-    }
-
-    /// A step of the surroundings of colours by regression.
-    pub(super) fn around(&self, device: &Device, step: Step) -> Result<Stage, GpuError> {
-        let source = || Ok((source::around(self.variant, step), None));
-        self.get(device, Key::Around(step), step.entry_point(), source)
-    }
-
-    pub(super) fn blur(&self, device: &Device, blur: Blur) -> Result<Stage, GpuError> {
-        self.get(device, Key::Blur(blur), "main", || {
-            let workgroup_bytes = device.device.limits().max_compute_workgroup_storage_size;
-            let (source, shape) = source::blur(self.variant, blur, workgroup_bytes)
-                .ok_or(GpuError::Kernel { kernel_px: blur.kernel_px, workgroup_bytes })?;
-            Ok((source, Some(shape)))
-        })
-    }
-
-    fn get(
-        &self,
-        device: &Device,
-        key: Key,
-        entry: &str,
-        source: impl FnOnce() -> Result<(String, Option<BlurShape>), GpuError>,
-    ) -> Result<Stage, GpuError> {
+    /// The pipeline of a stage.
+    pub(super) fn get(&self, device: &Device, key: Key) -> Result<Stage, GpuError> {
         let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(stage) = built.get(&key) {
             return Ok(stage.clone());
         }
         let label = format!("{key:?}");
-        let (source, shape) = source()?;
+        let (source, shape) = key.source(self.variant, &device.device.limits())?;
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(&label),
             source: wgpu::ShaderSource::Wgsl(source.into()),
@@ -153,7 +123,7 @@ impl Pipelines {
             label: Some(&label),
             layout: None,
             module: &module,
-            entry_point: Some(entry),
+            entry_point: Some(key.entry_point()),
             compilation_options: Default::default(),
             cache: None,
         });

@@ -129,42 +129,21 @@ pub(super) enum Sampling {
     Points,
 }
 
+/// A source with pieces in it: what follows a line `//# NAME` in the file of pieces takes the place of `/*NAME*/`.
+fn filled(source: &str, pieces: &str) -> String {
+    pieces.split("//# ").skip(1).fold(source.to_string(), |source, piece| {
+        let (name, text) = piece.split_once('\n').unwrap_or((piece, ""));
+        source.replace(&format!("/*{name}*/"), text.trim_end())
+    })
+}
+
 /// Stage `raster`: entry points `top` and `fill`.
 pub(super) fn raster(sampling: Sampling) -> String {
-    let (sub, steps, store, wanted, row, column) = match sampling {
-        Sampling::Centres => {
-            ("1", "", "atomicMax(&heights[start + u32(x)], ordered(h));", "return true;", "0xffffffffu", "")
-        }
-        Sampling::Points => (
-            "3",
-            "@group(0) @binding(8) var<storage, read> steps: array<f32>;\n\
-             @group(0) @binding(9) var<storage, read> stepped: array<u32>;\n",
-            "let pixel = start + u32(x) / 3u;\n        \
-             if steps[pixel] > 0.0 {\n            \
-             atomicMax(&heights[9u * pixel + 3u * (u32(row) % 3u) + u32(x) % 3u], ordered(h));\n        }",
-            "let tile = tile_bits(frame);\n    \
-             let size = vec2<i32>(i32(frame.width_px), i32(frame.height_px)) - 1;\n    \
-             let low = vec2<u32>(clamp(vec2<i32>(left, top), vec2<i32>(), size)) >> vec2<u32>(tile);\n    \
-             let high = vec2<u32>(clamp(vec2<i32>(right, bottom), vec2<i32>(), size)) >> vec2<u32>(tile);\n    \
-             let columns = (0xffffffffu >> (31u - high.x)) & (0xffffffffu << low.x);\n    \
-             var found = 0u;\n    \
-             for (var y = low.y; y <= high.y; y++) {\n        \
-             found |= stepped[TILES * image + y];\n    }\n    \
-             return (found & columns) != 0u;",
-            "stepped[TILES * image + ((u32(row) / 3u) >> tile_bits(frame))]",
-            "let tile = (u32(x) / 3u) >> tile_bits(frame);\n        \
-             if (tiles & (1u << tile)) == 0u {\n            \
-             x = i32(3u * ((tile + 1u) << tile_bits(frame))) - 1;\n            \
-             continue;\n        }",
-        ),
+    let pieces = match sampling {
+        Sampling::Centres => include_str!("../../shaders/shared/raster_centres.wgsl"),
+        Sampling::Points => include_str!("../../shaders/shared/raster_points.wgsl"),
     };
-    common(include_str!("../../shaders/raster.wgsl"))
-        .replace("/*SUB*/", sub)
-        .replace("/*STEPS*/", steps)
-        .replace("/*STORE*/", store)
-        .replace("/*WANTED*/", wanted)
-        .replace("/*ROW*/", row)
-        .replace("/*COLUMN*/", column)
+    common(&filled(include_str!("../../shaders/raster.wgsl"), pieces))
 }
 
 /// The pixels beside a step.
@@ -174,35 +153,13 @@ pub(super) fn steps(variant: Variant) -> String {
 
 /// Stage `indent`.
 pub(super) fn indent(variant: Variant, sampling: Sampling, threads: u32) -> String {
-    let (second, steps, points, again) = match sampling {
-        Sampling::Centres => ("false", "", "", ""),
-        Sampling::Points => (
-            "true",
-            "@group(0) @binding(6) var<storage, read> steps: array<f32>;\n\
-             @group(0) @binding(7) var<storage, read> points: array<u32>;\n\
-             @group(0) @binding(8) var<storage, read> stepped: array<u32>;\n",
-            "let weight = steps[start + pixel];\n    \
-             if weight > 0.0 {\n        \
-             var sum = vec2<f32>();\n        \
-             for (var k = 0u; k < 9u; k++) {\n            \
-             sum += touch(points[9u * (start + pixel) + k], pixel, top, press);\n        }\n        \
-             here += weight * (sum / 9.0 - here);\n    }",
-            "let before = outcomes[image];\n        \
-             newton.press = before.press_px;\n        \
-             newton.available = before.available_px3;\n        \
-             var found = 0u;\n        \
-             for (var row = 0u; row < TILES; row++) {\n            \
-             found |= stepped[TILES * image + row];\n        }\n        \
-             if before.status != 0u || found == 0u {\n            newton.running = 0u;\n        }",
-        ),
+    let pieces = match sampling {
+        Sampling::Centres => include_str!("../../shaders/shared/indent_centres.wgsl"),
+        Sampling::Points => include_str!("../../shaders/shared/indent_points.wgsl"),
     };
-    common(include_str!("../../shaders/indent.wgsl"))
+    common(&filled(include_str!("../../shaders/indent.wgsl"), pieces))
         .replace("//#PLANES", &writable(variant, "contact", 4))
         .replace("/*THREADS*/", &threads.to_string())
-        .replace("/*SECOND*/", second)
-        .replace("/*STEPS*/", steps)
-        .replace("/*POINTS*/", points)
-        .replace("/*AGAIN*/", again)
 }
 
 /// The gel at rest: `whole_surface` and `slope_at_rest`.

@@ -4,11 +4,11 @@
 
 use super::*;
 use crate::colour::regressor::{AROUND_FIELD, AROUND_HEIGHTS, NEAR, NEAR_FIELD, SURROUNDINGS};
-use crate::colour::{ColourModel, Lambert, Light, Regressor, TaximTable};
+use crate::colour::{ColourModel, Regressor, TaximTable};
 use crate::convolve::Follow;
-use crate::npz::{Array, ElementType, Npz, write_npz};
 use crate::sensor::{GelShape, Pyramid};
 use crate::shadow::{Shadow, ShadowKind, ShadowTable};
+use crate::testing::{self, gel};
 use crate::{ClusteredMesh, Grid, Renderer, SimdLevel, finish};
 use gripgen_twin::frames::{pose, rotation_from_fixed_xyz};
 use gripgen_twin::parts::{BallBearing, InvoluteGear, SteppedShaft};
@@ -31,25 +31,13 @@ fn both_variants() -> [GpuRenderer; 2] {
 
 /// A table whose colours change with slope and direction, as a calibrated one's do.
 fn taxim_table(width_px: usize, height_px: usize) -> TaximTable {
-    let bins = 125;
-    let channel = |phase: f64| {
-        let values = (0..bins * bins).flat_map(|k| {
-            let (i, j) = ((k / bins) as f64, (k % bins) as f64);
-            let value = 1.5 * i * (j * std::f64::consts::TAU / 124.0 + phase).cos();
-            [1e-6 * i, -2e-6 * i, 1e-6 * i, 1e-3 * i, -1e-3 * i, value + 100.0]
-        });
-        Array { shape: vec![bins, bins, 6], values: values.collect() }
-    };
-    let bytes = write_npz(&[
-        ("bins", Array { shape: vec![], values: vec![bins as f64] }, ElementType::F64),
-        ("grad_r", channel(0.0), ElementType::F64),
-        ("grad_g", channel(2.1), ElementType::F64),
-        ("grad_b", channel(4.2), ElementType::F64),
-    ])
-    .unwrap();
     let rgb = (0..width_px * height_px).flat_map(|i| [(90 + i % 30) as u8, 110, 120]).collect();
     let frame = TactileImage { width_px: width_px as u32, height_px: height_px as u32, rgb };
-    TaximTable::read(&mut Npz::open(&bytes).unwrap(), &frame).unwrap()
+    testing::taxim_table(&frame, 125, |c, k| {
+        let (i, j) = ((k / 125) as f64, (k % 125) as f64);
+        let value = 1.5 * i * (j * std::f64::consts::TAU / 124.0 + [0.0, 2.1, 4.2][c]).cos();
+        [1e-6 * i, -2e-6 * i, 1e-6 * i, 1e-3 * i, -1e-3 * i, value + 100.0]
+    })
 }
 
 /// Regression with every coefficient in use, and limits that some presses reach.
@@ -67,50 +55,18 @@ fn regression(width_px: usize) -> ColourModel {
     }))
 }
 
-pub(super) fn lights() -> ColourModel {
-    let light = |azimuth_deg: f64, colour| Light {
-        azimuth_rad: azimuth_deg.to_radians(),
-        elevation_rad: 0.6,
-        colour,
-        falloff: [0.3, 0.1],
-    };
-    ColourModel::Lambert(Box::new(Lambert::from_lights(&[
-        light(0.0, [150.0, 20.0, 10.0]),
-        light(120.0, [10.0, 160.0, 20.0]),
-        light(240.0, [20.0, 10.0, 155.0]),
-    ])))
+/// Three lights, each mainly in its channel.
+pub(super) fn lit() -> ColourModel {
+    let colours = [(0.0, [150.0, 20.0, 10.0]), (120.0, [10.0, 160.0, 20.0]), (240.0, [20.0, 10.0, 155.0])];
+    ColourModel::Lambert(Box::new(testing::lights(0.6, [0.3, 0.1], &colours)))
 }
 
 pub(super) fn sensor(width_px: usize, height_px: usize, colour: ColourModel) -> Sensor {
     let rest = [90.0, 110.0, 120.0].map(|base| {
         (0..width_px * height_px).map(|i| base + (i % width_px) as f32 * 0.05).collect::<Vec<f32>>()
     });
-    Sensor {
-        grid: Grid { width_px, height_px, metres_per_px: 28e-3 / width_px as f64 },
-        rest,
-        noise_rgb: [1.5, 1.2, 1.8],
-        colour,
-        gel_shape: GelShape::Flat,
-        shadow: None,
-        markers: None,
-        pyramid: None,
-        ball_m: None,
-        press_gain_sd: None,
-    }
-}
-
-pub(super) fn gel(kernels_px: &[u32]) -> Gel {
-    Gel {
-        thickness_m: 4e-3,
-        width_m: 28e-3,
-        height_m: 21e-3,
-        shear_stiffness_n_per_m: 1e4,
-        shear_by_area: 1.0,
-        kernels_px: kernels_px.to_vec(),
-        restore_depth_fraction: 0.4,
-        model: gripgen_twin::config::GelModel::Pyramid,
-        elastic: None,
-    }
+    let grid = Grid { width_px, height_px, metres_per_px: 28e-3 / width_px as f64 };
+    Sensor::new(grid, rest, [1.5, 1.2, 1.8], colour)
 }
 
 const PYRAMID: [u32; 5] = [71, 51, 21, 11, 5];
@@ -216,7 +172,7 @@ fn compare(gpu: &GpuRenderer, sensor: &Sensor, gel: &Gel, turned_rad: f64) {
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn images_agree_with_the_processor() {
     for gpu in both_variants() {
-        compare(&gpu, &sensor(320, 240, lights()), &gel(&PYRAMID), 0.0);
+        compare(&gpu, &sensor(320, 240, lit()), &gel(&PYRAMID), 0.0);
     }
 }
 
@@ -224,7 +180,7 @@ fn images_agree_with_the_processor() {
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn odd_sizes_and_other_pyramids_agree_with_the_processor() {
     for gpu in both_variants() {
-        compare(&gpu, &sensor(131, 97, lights()), &gel(&[101, 31, 7, 3]), 0.0);
+        compare(&gpu, &sensor(131, 97, lit()), &gel(&[101, 31, 7, 3]), 0.0);
     }
 }
 
@@ -273,20 +229,11 @@ fn the_deformation_of_the_calibration_is_used() {
 /// Rays as long as a sensor's, longer in some directions, of some rows and of some channels. Some contacts lie below and
 /// above its rows.
 fn shadow_table(kind: ShadowKind) -> ShadowTable {
-    let heights = 4;
     let ray = |i: usize, c: usize| -> Vec<f32> {
         let steps = 8 + (i * 7 + c * 5) % 40;
         (0..steps).map(|s| -40.0 * (1.0 - s as f32 / steps as f32) - ((i + c) % 5) as f32).collect()
     };
-    ShadowTable {
-        kind,
-        directions_rad: (0..63).map(|n| f64::from(n) * 0.1).collect(),
-        first_height_m: 0.2e-3,
-        height_step_m: 0.1e-3,
-        heights,
-        step_m: 0.08e-3,
-        rays: (0..63 * heights).map(|i| [0, 1, 2].map(|c| ray(i, c))).collect(),
-    }
+    ShadowTable { first_height_m: 0.2e-3, ..testing::shadow_table(kind, 4, 0.08e-3, ray) }
 }
 
 fn with_shadows(mut sensor: Sensor, kind: ShadowKind) -> Sensor {
@@ -305,10 +252,10 @@ fn shadows_agree_with_the_processor() {
     let (flat, dome) = (GelShape::Flat, GelShape::Dome { sag_m: 1e-3 });
     let (added, ceiling) = (ShadowKind::Darkening, ShadowKind::Ceiling);
     for (kind, colour, gel_shape) in [
-        (added, lights(), &flat),
+        (added, lit(), &flat),
         (added, regression(200), &dome),
         (added, taxim(), &flat),
-        (ceiling, lights(), &dome),
+        (ceiling, lit(), &dome),
         (ceiling, regression(200), &dome),
         (ceiling, taxim(), &flat),
         (ceiling, taxim(), &dome),
@@ -327,7 +274,7 @@ fn shadows_agree_with_the_processor() {
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn a_gel_at_rest_gives_the_same_bytes() {
     for gpu in both_variants() {
-        for colour in [lights(), regression(67), ColourModel::Taxim(Box::new(taxim_table(67, 45)))] {
+        for colour in [lit(), regression(67), ColourModel::Taxim(Box::new(taxim_table(67, 45)))] {
             let sensor = with_shadows(sensor(67, 45, colour), ShadowKind::Ceiling);
             let mut there = gpu.sensor(&sensor, &gel(&[11, 5])).unwrap();
             let keys = [None, Some(0), Some(7), Some(u64::MAX), Some(99 << 32 | 17)];
@@ -344,7 +291,7 @@ fn a_gel_at_rest_gives_the_same_bytes() {
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn images_come_back_in_the_order_of_the_requests() {
     let gpu = renderer();
-    let sensor = sensor(64, 48, lights());
+    let sensor = sensor(64, 48, lit());
     let mut there = gpu.sensor(&sensor, &gel(&[11, 5])).unwrap();
     let (meshes, cases) = cases(0.0);
     let on_device: Vec<GpuMesh> = meshes.iter().map(|m| gpu.mesh(m).unwrap()).collect();
@@ -363,7 +310,7 @@ fn images_come_back_in_the_order_of_the_requests() {
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn presses_that_cannot_be_are_the_same_errors() {
     let gpu = renderer();
-    let (sensor, gel) = (sensor(160, 120, lights()), gel(&[21, 5]));
+    let (sensor, gel) = (sensor(160, 120, lit()), gel(&[21, 5]));
     let cpu = Renderer { sensor: &sensor, gel: &gel, level: SimdLevel::best() };
     let mesh = SteppedShaft::default().mesh();
     let there = gpu.mesh(&mesh).unwrap();
@@ -393,7 +340,7 @@ fn a_missing_adapter_is_one_clear_line() {
 #[test]
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
 fn domed_gels_agree_with_the_processor() {
-    for colour in [lights(), regression(200), ColourModel::Taxim(Box::new(taxim_table(200, 150)))] {
+    for colour in [lit(), regression(200), ColourModel::Taxim(Box::new(taxim_table(200, 150)))] {
         let mut domed = sensor(200, 150, colour);
         domed.gel_shape = GelShape::Dome { sag_m: 1e-3 };
         for gpu in both_variants() {

@@ -175,18 +175,7 @@ fn markers_of_a_sensor_file_are_read_and_moved() {
     print_markers(&mut rest, &grid, &markers);
     let rest = rest.map(|plane| plane.iter().map(|v| v.round()).collect());
     let colour = ColourModel::Lambert(Box::new(Lambert::new(&[0.0; 54])));
-    let sensor = Sensor {
-        grid,
-        rest,
-        noise_rgb: [0.0; 3],
-        colour,
-        markers: Some(markers.clone()),
-        gel_shape: crate::GelShape::Flat,
-        shadow: None,
-        pyramid: None,
-        ball_m: None,
-        press_gain_sd: None,
-    };
+    let sensor = Sensor { markers: Some(markers.clone()), ..Sensor::new(grid, rest, [0.0; 3], colour) };
     let bytes = sensor.to_npz().unwrap().unwrap();
     let again = Sensor::from_npz(&bytes, None, None).unwrap();
     assert_eq!(again.markers, sensor.markers);
@@ -201,25 +190,9 @@ fn markers_of_a_sensor_file_are_read_and_moved() {
     }
     let elastic = Some(gripgen_twin::Elastic { young_modulus_pa: 2e5, poisson_ratio: 0.5 });
     let model = gripgen_twin::config::GelModel::Elastic;
-    let gel = gripgen_twin::Gel {
-        thickness_m: 4e-3,
-        width_m: 6e-3,
-        height_m: 5e-3,
-        shear_stiffness_n_per_m: 2e4,
-        shear_by_area: 1.0,
-        kernels_px: vec![5],
-        restore_depth_fraction: 0.4,
-        model,
-        elastic,
-    };
+    let gel = gripgen_twin::Gel { model, elastic, ..crate::testing::gel(&[5]) };
     let renderer = Renderer { sensor: &again, gel: &gel, level: SimdLevel::best() };
-    let ball = Plane {
-        width: 64,
-        height: 48,
-        values: (0..grid.len())
-            .map(|i| -(((i % 64) as f32 - 31.5).powi(2) + ((i / 64) as f32 - 23.5).powi(2)) / 40.0)
-            .collect(),
-    };
+    let ball = Plane::from_fn(64, 48, |x, y| -((x as f32 - 31.5).powi(2) + (y as f32 - 23.5).powi(2)) / 40.0);
     let gel = crate::ElasticGel {
         thickness_m: 4e-3,
         young_modulus_pa: 2e5,

@@ -83,9 +83,7 @@ mod tests {
     use super::*;
 
     fn plane(of: impl Fn(f64, f64) -> f64) -> Plane {
-        let at = |i: usize| ((i % 80) as f64 - 39.5, (i / 80) as f64 - 29.5);
-        let values = (0..80 * 60).map(|i| of(at(i).0, at(i).1) as f32).collect();
-        Plane { width: 80, height: 60, values }
+        Plane::from_fn(80, 60, |x, y| of(x as f64 - 39.5, y as f64 - 29.5) as f32)
     }
 
     /// A block whose walls fall for ever: the top next to an edge lies on the circle, the middle stays.

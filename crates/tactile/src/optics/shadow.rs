@@ -165,12 +165,8 @@ mod tests {
     /// A ridge of height h across the ray is seen under h / d, to within a step.
     #[test]
     fn a_ridge_is_seen_under_its_slope() {
-        let mut surface = Plane::filled(200, 40, 0.0);
-        for y in 0..40 {
-            for x in 0..200 {
-                surface.values[y * 200 + x] = 8.0 * libm::expf(-((x as f32 - 150.0) / 6.0).powi(2));
-            }
-        }
+        let ridge = |x: usize| 8.0 * libm::expf(-((x as f32 - 150.0) / 6.0).powi(2));
+        let surface = Plane::from_fn(200, 40, |x, _| ridge(x));
         for x in [70usize, 100, 120, 130] {
             let exact = (1..180 - x).map(|d| surface.at((x + d).min(199), 20) / d as f32).fold(0.0, f32::max);
             let found = horizon(&surface, (x, 20), [1.0, 0.0], 8.0, 0.01);
@@ -182,12 +178,8 @@ mod tests {
     /// Rays that miss the box see nothing, so leaving them out changes nothing.
     #[test]
     fn pixels_behind_the_box_see_no_horizon() {
-        let mut surface = Plane::filled(90, 70, 0.0);
-        for y in 30..40 {
-            for x in 40..60 {
-                surface.values[y * 90 + x] = 5.0;
-            }
-        }
+        let inside = |x, y| (40..60).contains(&x) && (30..40).contains(&y);
+        let surface = Plane::from_fn(90, 70, |x, y| if inside(x, y) { 5.0 } else { 0.0 });
         let least = 0.2;
         let found = raised(&surface, 5.0, least).unwrap();
         let mut seen = 0;

@@ -103,9 +103,7 @@ mod tests {
     const GRID: Grid = Grid { width_px: 120, height_px: 90, metres_per_px: 1e-4 };
 
     fn plane(f: impl Fn(f64, f64) -> f64) -> Plane {
-        let at = |i: usize| ((i % 120) as f64 - 59.5, (i / 120) as f64 - 44.5);
-        let values = (0..GRID.len()).map(|i| f(at(i).0, at(i).1) as f32).collect();
-        Plane { width: 120, height: 90, values }
+        Plane::from_fn(120, 90, |x, y| f(x as f64 - 59.5, y as f64 - 44.5) as f32)
     }
 
     /// A plate that is long in y: from -20 to 20 px, its walls a normal integral wide.

@@ -1,12 +1,13 @@
 //! What the tests of the optics share: a small sensor, things that are pressed into it, and the effects by name.
 
-use super::{added, dome};
-use crate::colour::{ColourModel, Lambert, Light};
-use crate::grid::{Grid, Plane};
+use super::dome;
+use crate::colour::ColourModel;
+use crate::grid::{Grid, Plane, added};
 use crate::indent::{Imprint, PressedGel, indent};
 use crate::render::Renderer;
-use crate::sensor::{GelShape, Sensor};
+use crate::sensor::Sensor;
 use crate::simd::SimdLevel;
+use crate::testing::{gel, lights};
 use gripgen_twin::effects::{EffectSpec, GripPoint, find};
 use gripgen_twin::{Covariates, Gel, Jaw, OpticsState};
 
@@ -48,18 +49,8 @@ pub(super) struct TestSensor {
 
 /// Red, green and blue lights at 30, 150 and 270 degrees, each mainly in its channel.
 pub(super) fn rig() -> TestSensor {
-    let light = |azimuth_deg: f64, colour| Light {
-        azimuth_rad: azimuth_deg.to_radians(),
-        elevation_rad: 0.66,
-        colour,
-        falloff: [0.2, 0.05],
-    };
-    let lights = [
-        light(30.0, [150.0, 18.0, 14.0]),
-        light(150.0, [16.0, 158.0, 24.0]),
-        light(270.0, [14.0, 26.0, 140.0]),
-    ];
-    let lambert = Lambert::from_lights(&lights);
+    let colours = [(30.0, [150.0, 18.0, 14.0]), (150.0, [16.0, 158.0, 24.0]), (270.0, [14.0, 26.0, 140.0])];
+    let lambert = lights(0.66, [0.2, 0.05], &colours);
     let unit = 2.0 / GRID.width_px as f64;
     let rest = [0, 1, 2].map(|c| {
         let level = |i: usize| {
@@ -69,30 +60,8 @@ pub(super) fn rig() -> TestSensor {
         };
         (0..GRID.len()).map(level).collect()
     });
-    let sensor = Sensor {
-        grid: GRID,
-        rest,
-        noise_rgb: [1.0; 3],
-        colour: ColourModel::Lambert(Box::new(lambert)),
-        gel_shape: GelShape::Flat,
-        markers: None,
-        shadow: None,
-        pyramid: None,
-        ball_m: None,
-        press_gain_sd: None,
-    };
-    let gel = Gel {
-        model: gripgen_twin::config::GelModel::Pyramid,
-        elastic: None,
-        thickness_m: 4e-3,
-        width_m: 28e-3,
-        height_m: 21e-3,
-        shear_stiffness_n_per_m: 2e4,
-        shear_by_area: 1.0,
-        kernels_px: vec![41, 31, 13, 7, 5],
-        restore_depth_fraction: 0.4,
-    };
-    TestSensor { sensor, gel }
+    let sensor = Sensor::new(GRID, rest, [1.0; 3], ColourModel::Lambert(Box::new(lambert)));
+    TestSensor { sensor, gel: gel(&[41, 31, 13, 7, 5]) }
 }
 
 impl TestSensor {
@@ -104,8 +73,7 @@ impl TestSensor {
         if scene.shape == Shape::Nothing {
             return None;
         }
-        let values = (0..GRID.len()).map(|i| {
-            let (x, y) = GRID.centre_m(i % GRID.width_px, i / GRID.width_px);
+        let heights = GRID.plane(|x, y| {
             let [x, y] = [x * 1e3 - scene.centre_mm[0], y * 1e3 - scene.centre_mm[1]];
             let [along, across] = [0.956 * x + 0.292 * y, 0.956 * y - 0.292 * x];
             let height_mm = match scene.shape {
@@ -117,9 +85,8 @@ impl TestSensor {
                 }
                 _ => f64::NEG_INFINITY,
             };
-            (height_mm * 1e-3 / GRID.metres_per_px) as f32
+            height_mm * 1e-3 / GRID.metres_per_px
         });
-        let heights = Plane { width: GRID.width_px, height: GRID.height_px, values: values.collect() };
         let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n: IMPRINT_M3_PER_N };
         let renderer = self.renderer();
         let heights = added(renderer.rounded_as_seen(heights, optics), dome(&GRID, optics).as_ref());
@@ -166,7 +133,7 @@ pub(super) fn state(id: &str, parameters: &[f64], scene: &Scene, jaw: Jaw) -> Op
 }
 
 pub(super) fn difference(a: &Plane, b: &Plane) -> Plane {
-    Plane { values: a.values.iter().zip(&b.values).map(|(x, y)| x - y).collect(), ..*a }
+    a.zip(b, |x, y| x - y)
 }
 
 pub(super) fn rms(planes: &[Plane]) -> f64 {

@@ -5,7 +5,7 @@ use crate::finish;
 use crate::grid::Plane;
 use crate::presses::{Circle, PressContact, PressScene, PressView};
 use crate::render::Renderer;
-use crate::simd::SimdLevel;
+use crate::testing::{assert_same_on_every_unit, bits};
 use gripgen_twin::effects::LIBRARY;
 use gripgen_twin::{Jaw, OpticsState};
 
@@ -24,9 +24,7 @@ fn neutral_optics_are_the_plain_pipeline_bit_for_bit() {
             let neutral: Vec<f64> = spec.parameters.iter().map(|p| p.neutral).collect();
             let state = state(spec.id, &neutral, &scene, Jaw::Right);
             assert!(state.is_neutral() && !state.changes_press(), "{}", spec.id);
-            let bits = |planes: &[Plane; 3]| {
-                planes.iter().flat_map(|p| &p.values).map(|v| v.to_bits()).collect::<Vec<_>>()
-            };
+            let bits = |planes: &[Plane; 3]| bits(planes.iter().flat_map(|p| &p.values));
             assert!(rig.imprint(&scene, &state).unwrap() == imprint, "{}", spec.id);
             assert!(bits(&rig.change(&scene, &state)) == bits(&plain), "{}", spec.id);
         }
@@ -74,14 +72,10 @@ fn every_vector_path_gives_the_same_bits() {
         ..Default::default()
     };
     let imprint = rig.imprint(&RACK, &optics).unwrap();
-    let bits = |level| -> Vec<u32> {
+    assert_same_on_every_unit("change", |level| {
         let change = Renderer { level, ..rig.renderer() }.change_seen(Some(&imprint), &optics);
-        change.iter().flat_map(|p| &p.values).map(|v| v.to_bits()).collect()
-    };
-    let portable = bits(SimdLevel::Portable);
-    for level in SimdLevel::available() {
-        assert!(bits(level) == portable, "{level:?}");
-    }
+        bits(change.iter().flat_map(|p| &p.values))
+    });
 }
 
 /// `light_drift`: image over first image is one number per channel, everywhere, and it grows in proportion to the time.

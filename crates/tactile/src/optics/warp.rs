@@ -59,14 +59,9 @@ impl Sight {
 pub(super) fn surface(surface: &Plane, grid: &Grid, optics: &OpticsState) -> Plane {
     let (w, h) = (surface.width, surface.height);
     let sight = Sight::of_contact(grid, optics);
-    let mut seen = Plane::filled(w, h, 0.0);
-    for y in 0..h {
-        for x in 0..w {
-            let height = interpolated(&surface.values, (w, h), sight.from(x, y));
-            seen.values[y * w + x] = (optics.scale * height) as f32;
-        }
-    }
-    seen
+    Plane::from_fn(w, h, |x, y| {
+        (optics.scale * interpolated(&surface.values, (w, h), sight.from(x, y))) as f32
+    })
 }
 
 /// The frame at rest where it is seen if it moves along, one plane of levels.
@@ -132,8 +127,7 @@ mod tests {
     }
 
     fn plane(f: impl Fn(f64, f64) -> f64) -> Plane {
-        let values = (0..GRID.len()).map(|i| f((i % 80) as f64, (i / 80) as f64) as f32).collect();
-        Plane { width: 80, height: 60, values }
+        Plane::from_fn(80, 60, |x, y| f(x as f64, y as f64) as f32)
     }
 
     fn largest_difference(a: &Plane, b: &Plane) -> f32 {

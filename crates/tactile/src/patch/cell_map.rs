@@ -75,14 +75,11 @@ mod tests {
     #[test]
     fn pixels_belong_to_the_cells_of_the_patch() {
         let grid = Grid { width_px: 96, height_px: 80, metres_per_px: 1e-4 };
-        let mut heights = Plane::filled(96, 80, -50.0);
-        for y in 0..80 {
-            for x in 0..96 {
-                let (u, v) = (x as f32 - 40.0, y as f32 - 37.0);
-                // A ring: its middle holds no cell.
-                heights.values[96 * y + x] = -((u * u + v * v).sqrt() - 20.0).abs();
-            }
-        }
+        // A ring: its middle holds no cell.
+        let heights = Plane::from_fn(96, 80, |x, y| {
+            let (u, v) = (x as f32 - 40.0, y as f32 - 37.0);
+            -((u * u + v * v).sqrt() - 20.0).abs()
+        });
         let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
         let imprint = indent(&heights, &grid, &gel, 10.0).unwrap();
         let map = CellMap::new(&imprint.places);

@@ -14,8 +14,8 @@ pub use ridge::Smoothness;
 
 use super::circle::{Seen, look, reference_frame};
 use super::compare::{CompareError, PressComparison, predict_taken, score_press};
+use super::contact::{MarkError, Marked, checked};
 use super::gain::{gains, without_gains};
-use super::mark::{self, MarkError, Marked};
 use super::{Circle, PressSet};
 use crate::colour::regressor::{AROUND_FITTED, AROUND_HEIGHTS, SURROUNDINGS};
 use crate::colour::{ColourModel, Regressor, shade};
@@ -152,7 +152,7 @@ fn calibrate_marked(
     let marked = set
         .presses
         .iter()
-        .map(|p| Ok((p, mark::checked(p, set.ball_m, grid.metres_per_px)?)))
+        .map(|p| Ok((p, checked(p, set.ball_m, grid.metres_per_px)?)))
         .collect::<Result<Vec<Marked<'_>>, MarkError>>()?;
     let gains = gains(&marked, set.rest.as_ref(), &grid);
     let balanced = gains.as_ref().map(|gains| without_gains(set, gains));
@@ -246,17 +246,13 @@ impl Fit<'_> {
         colour = self.colours(candidate, &smoothness, seen, &rest)?;
         // A 64th of a grey level is far below the noise, and packs well.
         rest.iter_mut().flatten().for_each(|v| *v = (*v * 64.0).round() / 64.0);
+        let noise_rgb = noise_rgb(&presses, &rest, &self.grid);
         Ok(Sensor {
-            markers: None,
-            shadow: None,
-            grid: self.grid,
-            noise_rgb: noise_rgb(&presses, &rest, &self.grid),
-            rest,
-            colour,
             gel_shape: candidate.gel.shape.clone(),
             pyramid: Some(candidate.gel.pyramid.clone()),
             ball_m: Some(self.set.ball_m),
             press_gain_sd: self.press_gain_sd,
+            ..Sensor::new(self.grid, rest, noise_rgb, colour)
         })
     }
 

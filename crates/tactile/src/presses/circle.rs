@@ -1,7 +1,7 @@
 //! Where a ball touches, when nobody marked it.
 
 use super::{Circle, PressSet};
-use crate::grid::Plane;
+use crate::grid::{Plane, levels_of};
 use gripgen_twin::TactileImage;
 
 /// Angles at which a circle is looked at.
@@ -93,7 +93,7 @@ impl PressSet {
 /// A frame to compare presses with: the one without contact, or the median over the presses.
 pub fn reference_frame(set: &PressSet) -> Option<[Vec<f32>; 3]> {
     if let Some(rest) = &set.rest {
-        return Some([0, 1, 2].map(|c| rest.rgb.iter().skip(c).step_by(3).map(|&v| f32::from(v)).collect()));
+        return Some(levels_of(rest));
     }
     let step = set.presses.len().div_ceil(MEDIAN_OF).max(1);
     let some: Vec<&[u8]> = set.presses.iter().step_by(step).map(|p| &p.image.rgb[..]).collect();

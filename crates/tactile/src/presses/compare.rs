@@ -1,8 +1,7 @@
 //! A sensor file against presses: predicted and real image of each.
 
+use super::contact::{MarkError, ZONES, Zone, checked};
 use super::gain::within_gain;
-use super::mark::{self, MarkError};
-use super::zone::{ZONES, Zone};
 use super::{Contact, Press, PressSet};
 use crate::convolve::Follow;
 use crate::metrics::{MetricError, Score, mean_score, score, score_where};
@@ -151,7 +150,7 @@ pub fn predict_press(press: &Press, ball_m: f64, sensor: &Sensor) -> Result<Tact
     if found != wanted {
         return Err(CompareError::Size { press: press.name.clone(), found, wanted });
     }
-    let contact = mark::checked(press, ball_m, sensor.grid.metres_per_px)?;
+    let contact = checked(press, ball_m, sensor.grid.metres_per_px)?;
     Ok(predict_taken(press, &contact, ball_m, sensor))
 }
 

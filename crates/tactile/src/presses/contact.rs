@@ -1,4 +1,5 @@
-//! Where something touches in a press: the circle of a ball, or a body at its place. From it follows the imprint.
+//! Where something touches in a press: the circle of a ball, checked against image and ball, or a body at its place. From it
+//! follow the imprint, and the zones around it.
 
 use super::indenter::Indenter;
 use super::{Circle, Press};
@@ -21,7 +22,6 @@ pub(crate) struct Contact {
 
 impl Contact {
     /// A ball that is known by its circle alone.
-    #[cfg(test)]
     pub(crate) fn of_circle(circle: Circle) -> Self {
         Self { circle, travel_m: None, indenter: None }
     }
@@ -107,6 +107,108 @@ pub(super) fn imprint(depth_px: Plane, press_depth_m: f64) -> Imprint {
     Imprint { depth_px, press_depth_m, patch, places, elastic: None }
 }
 
+/// Hand-drawn circles are unsure by a few per cent: one up to so much wider than the ball is taken for its equator.
+const WIDEST: f64 = 1.05;
+
+/// Why a mark cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MarkError {
+    /// Nobody marked the contact, and none is to be seen.
+    #[error("press `{press}` has no centre and radius, and no contact is to be seen in it")]
+    Missing {
+        /// The press.
+        press: String,
+    },
+    /// A contact whose centre lies beside the image.
+    #[error("press `{press}`: the centre ({x_px}, {y_px}) lies outside the {width_px}x{height_px} image")]
+    Outside {
+        /// The press.
+        press: String,
+        /// Centre, along the columns.
+        x_px: f64,
+        /// Centre, down the rows.
+        y_px: f64,
+        /// Width of the image.
+        width_px: u32,
+        /// Height of the image.
+        height_px: u32,
+    },
+    /// A contact wider than the ball, or without width.
+    #[error("press `{press}`: the radius is {radius_mm:.3} mm, the ball's {ball_mm:.3} mm")]
+    Radius {
+        /// The press.
+        press: String,
+        /// Radius of the contact.
+        radius_mm: f64,
+        /// Radius of the ball.
+        ball_mm: f64,
+    },
+}
+
+/// A press with its checked contact.
+pub(super) type Marked<'a> = (&'a Press, Contact);
+
+/// The contact of a press; the circle of a ball is at most as wide as the ball.
+pub(super) fn checked(press: &Press, ball_m: f64, metres_per_px: f64) -> Result<Contact, MarkError> {
+    if let (Some(_), Some(circle)) = (&press.indenter, press.circle) {
+        return Ok(Contact::of_press(press, circle));
+    }
+    let name = || press.name.clone();
+    let circle = press.circle.ok_or_else(|| MarkError::Missing { press: name() })?;
+    let (width_px, height_px) = (press.image.width_px, press.image.height_px);
+    let inside = |v: f64, n: u32| (-0.5..=f64::from(n) - 0.5).contains(&v);
+    if !inside(circle.x_px, width_px) || !inside(circle.y_px, height_px) {
+        let (x_px, y_px) = (circle.x_px, circle.y_px);
+        return Err(MarkError::Outside { press: name(), x_px, y_px, width_px, height_px });
+    }
+    let ball_px = ball_m / 2.0 / metres_per_px;
+    if !(circle.radius_px > 0.0 && circle.radius_px <= WIDEST * ball_px) {
+        let radius_mm = circle.radius_px * metres_per_px * 1e3;
+        return Err(MarkError::Radius { press: name(), radius_mm, ball_mm: ball_m / 2.0 * 1e3 });
+    }
+    let circle = Circle { radius_px: circle.radius_px.min(0.999 * ball_px), ..circle };
+    Ok(Contact::of_press(press, circle))
+}
+
+/// Where a pixel lies beside the contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Zone {
+    /// Inside the rim of the contact.
+    Contact,
+    /// Up to 0.4 radii outside.
+    Rim,
+    /// From there to 2.2 radii outside: where shadows fall.
+    Shadow,
+    /// Further away.
+    Far,
+}
+
+/// All zones, from the contact outwards.
+pub const ZONES: [Zone; 4] = [Zone::Contact, Zone::Rim, Zone::Shadow, Zone::Far];
+
+impl Zone {
+    /// Name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Zone::Contact => "contact",
+            Zone::Rim => "rim",
+            Zone::Shadow => "shadow zone",
+            Zone::Far => "far field",
+        }
+    }
+
+    /// The zone at a distance from the rim of the contact, in its radii; 0 and less is inside.
+    pub(super) fn at(radii_from_rim: f64) -> Zone {
+        match radii_from_rim {
+            d if d <= 0.0 => Zone::Contact,
+            d if d < 0.4 => Zone::Rim,
+            d if d < 2.2 => Zone::Shadow,
+            _ => Zone::Far,
+        }
+    }
+}
+
 /// How deep a ball is pressed in.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Deeper {
@@ -167,13 +269,10 @@ pub(crate) fn ball_imprint(
     };
     // A ball sinks in up to its equator; the rest of a deeper press is the gel closing around it.
     let more = press_px.min(radius_px).max(deepest_px) - deepest_px;
-    let mut depth_px = Plane::filled(w, h, 0.0);
-    for (i, depth) in depth_px.values.iter_mut().enumerate() {
-        let (x, y) = ((i % w) as f64, (i / w) as f64);
-        if over_ball(x, y) {
-            *depth = (above_rest(x, y) - level + more).max(0.0) as f32;
-        }
-    }
+    let depth_px = Plane::from_fn(w, h, |x, y| {
+        let (x, y) = (x as f64, y as f64);
+        if over_ball(x, y) { (above_rest(x, y) - level + more).max(0.0) as f32 } else { 0.0 }
+    });
     imprint(depth_px, press_px * grid.metres_per_px)
 }
 

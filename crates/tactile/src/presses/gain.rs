@@ -3,7 +3,7 @@
 //! The contact covers little of the frame; away from it an image is the frame at rest times the gain of that press. So each
 //! press says its own gain, and no fit to the contact has a part in it.
 
-use super::mark::Marked;
+use super::contact::Marked;
 use super::{Contact, Press, PressSet};
 use crate::grid::Grid;
 use gripgen_twin::TactileImage;

@@ -149,7 +149,7 @@ impl Indenter {
     /// touched. `rest_px`: the gel at rest, `None` if it is flat.
     pub(crate) fn depth_px(&self, press_px: f64, rest_px: Option<&Plane>) -> Plane {
         let (w, h) = (self.heights_px.width / FINE, self.heights_px.height / FINE);
-        let row_of = |y: usize| &self.heights_px.values[y * self.heights_px.width..][..self.heights_px.width];
+        let row_of = |y: usize| self.heights_px.row(y);
         let rest = |x: usize, y: usize| rest_px.map_or(0.0, |rest| rest.at(x, y));
         let first = match rest_px {
             None => 0.0,
@@ -158,17 +158,14 @@ impl Indenter {
                 .fold(f32::NEG_INFINITY, |m, (x, y, z)| m.max(z + rest(x / FINE, y / FINE))),
         };
         let lift = press_px as f32 - first;
-        let mut depth = Plane::filled(w, h, 0.0);
-        for (i, depth) in depth.values.iter_mut().enumerate() {
-            let (x, y) = (i % w, i / w);
+        Plane::from_fn(w, h, |x, y| {
             let at = rest(x, y) + lift;
             let sum: f32 = (y * FINE..(y + 1) * FINE)
                 .flat_map(|y| &row_of(y)[x * FINE..(x + 1) * FINE])
                 .map(|z| (z + at).max(0.0))
                 .sum();
-            *depth = sum / (FINE * FINE) as f32;
-        }
-        depth
+            sum / (FINE * FINE) as f32
+        })
     }
 
     /// A circle around its origin with the area of its contact.
@@ -188,11 +185,7 @@ impl Indenter {
 
     /// `of` the heights in units of `1 / units` pixels.
     fn scaled(&self, units: f32, of: impl Fn(&Plane) -> Plane) -> Plane {
-        let times = |plane: &Plane, factor: f32| Plane {
-            values: plane.values.iter().map(|h| h * factor).collect(),
-            ..*plane
-        };
-        times(&of(&times(&self.heights_px, units)), 1.0 / units)
+        of(&self.heights_px.map(|h| h * units)).map(|h| h * (1.0 / units))
     }
 
     /// The body in an image whose pixels are `factor` times as wide: the middle one of each square of points.

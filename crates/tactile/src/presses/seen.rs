@@ -30,7 +30,7 @@ impl PressContact {
 
     /// A ball that is known by its circle alone.
     pub fn of_circle(circle: Circle) -> Self {
-        Self(Contact { circle, travel_m: None, indenter: None })
+        Self(Contact::of_circle(circle))
     }
 
     /// The same with another circle; of a body that is no ball, which has its own place, the same.

@@ -75,10 +75,7 @@ fn a_slope_has_no_points() {
         &GRID,
     );
     let area = Area::whole(GRID.width_px, GRID.height_px);
-    let plane = |per_px: f32| {
-        let depth = |i: usize| per_px * (i % GRID.width_px) as f32;
-        Plane { values: (0..GRID.len()).map(depth).collect(), ..Plane::filled(150, 90, 0.0) }
-    };
+    let plane = |per_px: f32| Plane::from_fn(GRID.width_px, GRID.height_px, |x, _| per_px * x as f32);
     assert!(!map.find_steps(&plane(0.45), area, SimdLevel::best()));
     assert!(map.find_steps(&plane(0.6), area, SimdLevel::best()));
     let weights = map.steps.weights();

@@ -1,6 +1,7 @@
 //! What can be wrong with a sensor file.
 
 use crate::npz::NpzError;
+use std::ops::RangeInclusive;
 
 /// Version of the sensor file format, stored under the key `gripgen_sensor`.
 pub const SENSOR_VERSION: f64 = 1.0;
@@ -73,4 +74,15 @@ pub enum SensorError {
         /// What is allowed.
         range: &'static str,
     },
+}
+
+/// Refuses the first of some values that does not lie in a range, which `text` tells.
+pub(crate) fn check_range(
+    key: &'static str,
+    values: impl IntoIterator<Item = f64>,
+    range: RangeInclusive<f64>,
+    text: &'static str,
+) -> Result<(), SensorError> {
+    let outside = values.into_iter().find(|value| !range.contains(value));
+    outside.map_or(Ok(()), |value| Err(SensorError::Value { key, value, range: text }))
 }

@@ -26,7 +26,7 @@ use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
 use crate::colour::{ColourModel, Lambert, Regressor, TaximTable};
 use crate::convolve::Follow;
 use crate::deform::gaussian;
-use crate::grid::Grid;
+use crate::grid::{Grid, levels_of};
 use crate::markers::Markers;
 use crate::npz::{Array, ElementType, Npz, NpzError, parse_npy, write_npz};
 use crate::shadow::{Shadow, ShadowKind, ShadowTable};
@@ -114,18 +114,11 @@ impl Sensor {
         let ball_m = scalar(npz, "ball_mm")?.map(|mm| mm * 1e-3);
         let press_gain_sd = triple(npz, "press_gain_sd_rgb")?;
         let grid = Grid { width_px, height_px, metres_per_px: metres_per_px.unwrap_or(mm_per_px * 1e-3) };
-        Ok(Self {
-            grid,
-            rest: background.map_or_else(|| planes(&rest.values), planes_of_image),
-            noise_rgb: [noise[0] as f32, noise[1] as f32, noise[2] as f32],
-            colour,
-            gel_shape,
-            markers: Markers::read(npz)?,
-            shadow: None,
-            pyramid,
-            ball_m,
-            press_gain_sd,
-        })
+        let rest = background.map_or_else(|| planes(&rest.values), levels_of);
+        let noise_rgb = [noise[0] as f32, noise[1] as f32, noise[2] as f32];
+        let markers = Markers::read(npz)?;
+        let plain = Self::new(grid, rest, noise_rgb, colour);
+        Ok(Self { gel_shape, markers, pyramid, ball_m, press_gain_sd, ..plain })
     }
 
     fn taxim(
@@ -136,22 +129,10 @@ impl Sensor {
         let background = background.ok_or(SensorError::Incomplete { missing: "background" })?;
         let metres_per_px = metres_per_px.ok_or(SensorError::Incomplete { missing: "mm_per_px" })?;
         let table = TaximTable::read(npz, background)?;
-        Ok(Self {
-            grid: Grid {
-                width_px: background.width_px as usize,
-                height_px: background.height_px as usize,
-                metres_per_px,
-            },
-            rest: planes_of_image(background),
-            noise_rgb: [0.0; 3],
-            colour: ColourModel::Taxim(Box::new(table)),
-            gel_shape: GelShape::Flat,
-            markers: None,
-            shadow: None,
-            pyramid: None,
-            ball_m: None,
-            press_gain_sd: None,
-        })
+        let (width_px, height_px) = (background.width_px as usize, background.height_px as usize);
+        let grid = Grid { width_px, height_px, metres_per_px };
+        let colour = ColourModel::Taxim(Box::new(table));
+        Ok(Self::new(grid, levels_of(background), [0.0; 3], colour))
     }
 
     /// The bytes of a sensor file; `None` for a colour model that is only read, Taxim's table.
@@ -266,23 +247,16 @@ fn own_colour(npz: &mut Npz<'_>) -> Result<ColourModel, NpzError> {
 }
 
 fn scalar(npz: &mut Npz<'_>, key: &str) -> Result<Option<f64>, NpzError> {
-    if !npz.has(key) {
-        return Ok(None);
-    }
-    Ok(Some(npz.array_of_shape(key, &[])?.values[0]))
+    Ok(npz.optional(key, &[])?.map(|array| array.values[0]))
 }
 
 fn triple(npz: &mut Npz<'_>, key: &str) -> Result<Option<[f32; 3]>, NpzError> {
-    if !npz.has(key) {
-        return Ok(None);
-    }
-    let values = npz.array_of_shape(key, &[Some(3)])?.values;
-    Ok(Some([values[0] as f32, values[1] as f32, values[2] as f32]))
+    let of = |Array { values, .. }| [0, 1, 2].map(|c: usize| values[c] as f32);
+    Ok(npz.optional(key, &[Some(3)])?.map(of))
 }
 
 fn gel_shape(npz: &mut Npz<'_>, rows: usize, columns: usize) -> Result<GelShape, NpzError> {
-    if npz.has("gel_height_px") {
-        let heights = npz.array_of_shape("gel_height_px", &[Some(rows), Some(columns)])?;
+    if let Some(heights) = npz.optional("gel_height_px", &[Some(rows), Some(columns)])? {
         return Ok(GelShape::Map(heights.values.iter().map(|&h| h as f32).collect()));
     }
     Ok(match scalar(npz, "dome_sag_mm")? {
@@ -312,10 +286,8 @@ fn taxim_gel_map(bytes: &[u8], grid: &Grid) -> Result<GelShape, SensorError> {
 }
 
 fn pyramid(npz: &mut Npz<'_>) -> Result<Option<Pyramid>, NpzError> {
-    if !npz.has("kernels_px") {
-        return Ok(None);
-    }
-    let kernels_px = npz.array_of_shape("kernels_px", &[None])?.values.iter().map(|&k| k as u32).collect();
+    let Some(kernels) = npz.optional("kernels_px", &[None])? else { return Ok(None) };
+    let kernels_px = kernels.values.iter().map(|&k| k as u32).collect();
     let restore_depth_fraction = npz.array_of_shape("restore_depth_fraction", &[])?.values[0];
     let sink_in_fraction = scalar(npz, "sink_in_fraction")?.unwrap_or(0.0);
     let at_least = scalar(npz, "core_at_least")?.is_some_and(|one| one != 0.0);
@@ -325,8 +297,4 @@ fn pyramid(npz: &mut Npz<'_>) -> Result<Option<Pyramid>, NpzError> {
 
 fn planes(interleaved: &[f64]) -> [Vec<f32>; 3] {
     [0, 1, 2].map(|c| interleaved.iter().skip(c).step_by(3).map(|&x| x as f32).collect())
-}
-
-fn planes_of_image(image: &TactileImage) -> [Vec<f32>; 3] {
-    [0, 1, 2].map(|c| image.rgb.iter().skip(c).step_by(3).map(|&x| f32::from(x)).collect())
 }

@@ -1,6 +1,6 @@
 //! The gel surface at rest: flat, domed, or measured.
 
-use super::SensorError;
+use super::{SensorError, check_range};
 use crate::grid::{Grid, Plane};
 
 /// Deepest rest surface below its highest point.
@@ -31,16 +31,9 @@ impl GelShape {
             GelShape::Flat => None,
             GelShape::Dome { sag_m } if *sag_m == 0.0 => None,
             GelShape::Dome { sag_m } => {
-                let (w, h) = (grid.width_px, grid.height_px);
-                let corner = grid.centre_m(w - 1, h - 1);
+                let corner = grid.centre_m(grid.width_px - 1, grid.height_px - 1);
                 let scale = -sag_m / grid.metres_per_px / (corner.0 * corner.0 + corner.1 * corner.1);
-                let values = (0..w * h)
-                    .map(|i| {
-                        let (x, y) = grid.centre_m(i % w, i / w);
-                        (scale * (x * x + y * y)) as f32
-                    })
-                    .collect();
-                Some(Plane { width: w, height: h, values })
+                Some(grid.plane(|x, y| scale * (x * x + y * y)))
             }
             GelShape::Map(heights) => {
                 Some(Plane { width: grid.width_px, height: grid.height_px, values: heights.clone() })
@@ -52,19 +45,14 @@ impl GelShape {
         let largest_px = LARGEST_SAG_M / grid.metres_per_px;
         match self {
             GelShape::Flat => Ok(()),
-            GelShape::Dome { sag_m } if (0.0..=LARGEST_SAG_M).contains(sag_m) => Ok(()),
             GelShape::Dome { sag_m } => {
-                Err(SensorError::Value { key: "dome_sag_mm", value: sag_m * 1e3, range: "from 0 to 20 mm" })
+                let deepest_mm = LARGEST_SAG_M * 1e3;
+                check_range("dome_sag_mm", [sag_m * 1e3], 0.0..=deepest_mm, "from 0 to 20 mm")
             }
             GelShape::Map(heights) => {
-                match heights.iter().find(|&&h| !(-largest_px..=0.0).contains(&f64::from(h))) {
-                    None => Ok(()),
-                    Some(&h) => Err(SensorError::Value {
-                        key: "gel_height_px",
-                        value: f64::from(h),
-                        range: "from -20 mm in pixels to 0, relative to the highest point",
-                    }),
-                }
+                let heights = heights.iter().map(|&h| f64::from(h));
+                let text = "from -20 mm in pixels to 0, relative to the highest point";
+                check_range("gel_height_px", heights, -largest_px..=0.0, text)
             }
         }
     }

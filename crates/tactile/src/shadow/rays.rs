@@ -13,24 +13,24 @@ const FAR_PX: f64 = 512.0;
 
 /// One target of a ray: where it lies from the origin, and its value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Target {
-    pub(super) dx: i32,
-    pub(super) dy: i32,
-    pub(super) value: [f32; 4],
+pub(crate) struct Target {
+    pub(crate) dx: i32,
+    pub(crate) dy: i32,
+    pub(crate) value: [f32; 4],
 }
 
 /// A table laid out for one pixel size: the pixels of each fan of rays, every pixel once.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Rays {
-    pub(super) sectors: Sectors,
-    pub(super) heights: usize,
+pub(crate) struct Rays {
+    pub(crate) sectors: Sectors,
+    pub(crate) heights: usize,
     /// Begin and number of rows, in pixels of height; and whether other heights use the first and the last one.
-    pub(super) first_px: f64,
-    pub(super) per_px: f64,
-    pub(super) clamped: bool,
-    pub(super) targets: Vec<Target>,
+    pub(crate) first_px: f64,
+    pub(crate) per_px: f64,
+    pub(crate) clamped: bool,
+    pub(crate) targets: Vec<Target>,
     /// For direction `n` and row `h`, at `n * heights + h`: its targets, and their largest distance along an axis.
-    pub(super) fans: Vec<(usize, usize, i32)>,
+    pub(crate) fans: Vec<(usize, usize, i32)>,
 }
 
 impl Rays {

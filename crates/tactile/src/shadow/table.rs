@@ -75,10 +75,8 @@ impl ShadowTable {
 
     /// Reads the keys `shadow_*` of a sensor file; `None` if it has no shadows.
     pub(crate) fn of_sensor(npz: &mut Npz<'_>) -> Result<Option<Self>, NpzError> {
-        if !npz.has("shadow_values") {
-            return Ok(None);
-        }
-        let values = npz.array_of_shape("shadow_values", &[None, None, None, Some(3)])?;
+        let shape = [None, None, None, Some(3)];
+        let Some(values) = npz.optional("shadow_values", &shape)? else { return Ok(None) };
         let [n, heights, steps] = [0, 1, 2].map(|axis| values.shape[axis]);
         let heights_mm = npz.array_of_shape("shadow_heights_mm", &[Some(2)])?.values;
         let step_mm = npz.array_of_shape("shadow_step_mm", &[])?.values[0];

@@ -2,13 +2,10 @@ use super::*;
 use crate::colour::{Lambert, shade};
 use crate::gradient::gradient;
 use crate::grid::Grid;
+use crate::testing::shadow_table;
 
 fn plane(w: usize, h: usize, value: impl Fn(f64, f64) -> f64) -> Plane {
-    Plane {
-        width: w,
-        height: h,
-        values: (0..w * h).map(|i| value((i % w) as f64, (i / w) as f64) as f32).collect(),
-    }
+    Plane::from_fn(w, h, |x, y| value(x as f64, y as f64) as f32)
 }
 
 fn dull() -> ColourModel {
@@ -17,20 +14,10 @@ fn dull() -> ColourModel {
 
 /// A table of 63 directions and two rows whose rays have different lengths in each channel.
 fn table(kind: ShadowKind, step_m: f64) -> ShadowTable {
-    let rays = (0..63 * 2).map(|i| {
-        [0, 1, 2].map(|c| {
-            (0..3 + (i * 7 + c * 5) % 20).map(|s| -30.0 + ((i + c) % 11) as f32 + s as f32).collect()
-        })
-    });
-    ShadowTable {
-        kind,
-        directions_rad: (0..63).map(|n| f64::from(n) * 0.1).collect(),
-        first_height_m: 0.0,
-        height_step_m: 1e-3,
-        heights: 2,
-        step_m,
-        rays: rays.collect(),
-    }
+    let ray = |i: usize, c: usize| {
+        (0..3 + (i * 7 + c * 5) % 20).map(|s| -30.0 + ((i + c) % 11) as f32 + s as f32).collect()
+    };
+    ShadowTable { height_step_m: 1e-3, ..shadow_table(kind, 2, step_m, ray) }
 }
 
 /// A bump near the corner of an image, so that rays leave it on two sides.

@@ -1,11 +1,12 @@
 //! Drawing of the regression: the surroundings on cells, which are spread bilinearly over the pixels, then row by row
 //! the part of displaced pixels. Only fused multiply-adds and sums in a fixed order, so that all vector units agree.
 
-use super::block::{BLOCK, CHANNELS, block_of, by_monomial};
 use super::near::Near;
 use super::pyramid::{Features, SURROUNDINGS, Surroundings, cell_px, double, surroundings};
 use super::terrain::Terrain;
-use super::{AROUND_FIELD, Place, Regressor, between_cells, cell_centre_px};
+use super::{
+    AROUND_FIELD, BLOCK, CHANNELS, Place, Regressor, between_cells, block_of, by_monomial, cell_centre_px,
+};
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
 

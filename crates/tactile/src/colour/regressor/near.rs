@@ -1,8 +1,9 @@
 //! The part of displaced pixels, block by block along a row.
 
-use super::block::{BLOCK, CHANNELS, block_of, by_monomial};
 use super::terrain::Terrain;
-use super::{NEAR, NEAR_FIELD, Place, Regressor, limited_normal, near_terms};
+use super::{
+    BLOCK, CHANNELS, NEAR, NEAR_FIELD, Place, Regressor, block_of, by_monomial, limited_normal, near_terms,
+};
 use crate::simd::Lanes;
 
 /// Slopes, and heights in pixels, below this are none: no colour changes by a hundredth of a level. The blurs of a gel end in wide

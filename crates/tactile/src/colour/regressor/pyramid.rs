@@ -5,7 +5,7 @@
 //! so that the levels see 0.5, 1, 2 and 4 mm around them. All values are linear in the height and exactly 0 where
 //! there is no contact anywhere.
 
-use super::Terrain;
+use super::{BLOCK, Terrain};
 use crate::convolve::mirrored;
 use crate::grid::Plane;
 
@@ -38,9 +38,6 @@ pub(crate) const AROUND_FITTED: [usize; 11] = [
     3 * DERIVATIVES + 4,
     3 * DERIVATIVES + 5,
 ];
-
-/// Cells that are computed together.
-const BLOCK: usize = 16;
 
 /// Side of a cell that is aimed at, in millimetres.
 const CELL_MM: f64 = 0.24;
@@ -294,12 +291,9 @@ mod tests {
     #[test]
     fn the_levels_see_gaussians_of_half_a_millimetre_and_doubles() {
         // A pin at a cell's centre: the variance of the smoothed height is that of the kernels.
-        let mut surface = Plane::filled(512, 512, 0.0);
-        for y in 252..260 {
-            for x in 252..260 {
-                surface.values[y * 512 + x] = 1.0;
-            }
-        }
+        let pin = 252..260;
+        let surface =
+            Plane::from_fn(512, 512, |x, y| f32::from(u8::from(pin.contains(&x) && pin.contains(&y))));
         let found = surroundings(&Planes::of_heights(&surface), 8, 0.03, &[true; SURROUNDINGS]);
         let variance = |plane: &Plane| {
             let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
@@ -323,10 +317,7 @@ mod tests {
 
     #[test]
     fn a_slanted_plane_has_its_slope_on_every_level() {
-        let mut surface = Plane::filled(330, 250, 0.0);
-        for (i, z) in surface.values.iter_mut().enumerate() {
-            *z = 0.1 * (i % 330) as f32 - 0.2 * (i / 330) as f32;
-        }
+        let surface = Plane::from_fn(330, 250, |x, y| 0.1 * x as f32 - 0.2 * y as f32);
         let found = surroundings(&Planes::of_heights(&surface), 4, 0.06, &[true; SURROUNDINGS]);
         let middle = |plane: &Plane| plane.at(plane.width / 2, plane.height / 2);
         // Millimetres per cell: slope times the cell's side, doubled from level to level.
@@ -340,11 +331,10 @@ mod tests {
     /// Each feature is the same whatever else is looked at.
     #[test]
     fn a_feature_alone_is_that_of_all() {
-        let mut surface = Plane::filled(83, 61, 0.0);
-        for (i, z) in surface.values.iter_mut().enumerate() {
-            let (x, y) = ((i % 83) as f32 - 50.0, (i / 83) as f32 - 27.0);
-            *z = (6.0 - 0.03 * (x * x + 0.6 * y * y + 0.3 * x * y)).max(0.0);
-        }
+        let surface = Plane::from_fn(83, 61, |x, y| {
+            let (x, y) = (x as f32 - 50.0, y as f32 - 27.0);
+            (6.0 - 0.03 * (x * x + 0.6 * y * y + 0.3 * x * y)).max(0.0)
+        });
         let of = |wanted: &Wanted| {
             let found = surroundings(&Planes::of_heights(&surface), 2, 0.1, wanted);
             [found.fine.planes, found.coarse.planes].concat()

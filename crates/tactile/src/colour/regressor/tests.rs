@@ -3,7 +3,7 @@ use super::*;
 use crate::colour::{ColourModel, shade};
 use crate::gradient::gradient;
 use crate::grid::Plane;
-use crate::simd::SimdLevel;
+use crate::testing::{assert_same_on_every_unit, bits};
 
 /// Reproducible numbers between -1 and 1.
 fn number(i: usize) -> f32 {
@@ -23,12 +23,10 @@ fn model(near: f32, around: f32) -> Regressor {
 
 /// A dent beside the middle of the image.
 fn dent() -> Plane {
-    let mut surface = Plane::filled(83, 61, 0.0);
-    for (i, z) in surface.values.iter_mut().enumerate() {
-        let (x, y) = ((i % 83) as f32 - 50.0, (i / 83) as f32 - 27.0);
-        *z = (6.0 - 0.03 * (x * x + y * y)).max(0.0);
-    }
-    surface
+    Plane::from_fn(83, 61, |x, y| {
+        let (x, y) = (x as f32 - 50.0, y as f32 - 27.0);
+        (6.0 - 0.03 * (x * x + y * y)).max(0.0)
+    })
 }
 
 /// The features of the surroundings of a surface on its finest cells, one plane a feature.
@@ -162,16 +160,12 @@ fn models_that_cannot_be_drawn_are_told_apart() {
 fn vector_units_give_the_same_bits() {
     let surface = dent();
     let (along_x, along_y) = gradient(&surface);
-    let at = |level: SimdLevel| {
+    assert_same_on_every_unit("shade", |level| {
         let mut change = [0, 1, 2].map(|_| Plane::filled(83, 61, 0.0));
         let planes = Planes::new(&surface, &along_x, &along_y);
         model(30.0, 30.0).shade(&planes, &mut change, &mut DrawScratch::default(), level);
-        change.map(|plane| plane.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>())
-    };
-    let portable = at(SimdLevel::Portable);
-    for level in SimdLevel::available() {
-        assert_eq!(at(level), portable, "{level:?}");
-    }
+        change.map(|plane| bits(&plane.values))
+    });
 }
 
 /// A model that uses some of the features draws what it draws with all of them.

@@ -1,5 +1,6 @@
 //! Taxim's treatment of the frame without contact.
 
+use crate::deform::half_gaussian;
 use gripgen_twin::TactileImage;
 
 /// Standard deviation of the blur in pixels of an image as wide as those of the calibration.
@@ -17,7 +18,7 @@ const BLURRED_SHARE: f64 = 0.15;
 /// order of summation. The blur scales with the image width from the 640 px of the calibration.
 pub(super) fn background(frame: &TactileImage, calibration_width_px: f64) -> [Vec<f32>; 3] {
     let (w, h) = (frame.width_px as usize, frame.height_px as usize);
-    let weights = gaussian(SIGMA_PX * w as f64 / calibration_width_px);
+    let weights = half_gaussian(SIGMA_PX * w as f64 / calibration_width_px);
     let frame_of: [Vec<f64>; 3] =
         [0, 1, 2].map(|c| frame.rgb.iter().skip(c).step_by(3).map(|&v| f64::from(v)).collect());
     // Grey levels of u8 are never negative, so that cutting is rounding down.
@@ -40,14 +41,6 @@ pub(super) fn background(frame: &TactileImage, calibration_width_px: f64) -> [Ve
         }
     }
     out
-}
-
-/// Weights of the centre and one side, up to 4 standard deviations.
-fn gaussian(sigma_px: f64) -> Vec<f64> {
-    let radius = (4.0 * sigma_px + 0.5) as i32;
-    let side = |k: i32| libm::exp(-0.5 / (sigma_px * sigma_px) * f64::from(k * k));
-    let sum: f64 = (-radius..=radius).map(side).sum();
-    (0..=radius).map(|k| side(k) / sum).collect()
 }
 
 fn blur_columns(plane: &[f64], w: usize, h: usize, weights: &[f64]) -> Vec<f64> {

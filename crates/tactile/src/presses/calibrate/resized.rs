@@ -4,7 +4,7 @@ use super::gel::{Candidate, Gels};
 use super::rest::rest_frame;
 use super::samples::GelModel;
 use super::{
-    Calibration, Circle, Fit, MIN_PRESSES, Marked, Smoothness, check, gains, mark, reference_frame,
+    Calibration, Circle, Fit, MIN_PRESSES, Marked, Smoothness, check, checked, gains, reference_frame,
     without_gains,
 };
 use crate::grid::Grid;
@@ -79,6 +79,6 @@ impl Resized {
 }
 
 fn marked(set: &PressSet) -> Option<Vec<Marked<'_>>> {
-    let contact = |press| Some((press, mark::checked(press, set.ball_m, set.metres_per_px).ok()?));
+    let contact = |press| Some((press, checked(press, set.ball_m, set.metres_per_px).ok()?));
     set.presses.iter().map(contact).collect()
 }

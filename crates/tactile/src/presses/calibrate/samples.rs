@@ -1,6 +1,6 @@
 //! Pixels of a press and what the regressor sees there.
 
-use super::super::{Contact, Press};
+use super::super::{Contact, Press, drawn};
 use crate::colour::regressor::{
     AROUND_FITTED, NEAR, Place, between_cells, cell_px, fitted_surroundings, limited_normal, near_terms,
 };
@@ -9,7 +9,6 @@ use crate::gradient::gradient;
 use crate::grid::{Grid, Plane};
 use crate::sensor::{GelShape, Pyramid};
 use crate::simd::SimdLevel;
-use gripgen_twin::random::splitmix64;
 
 /// Inputs of a pixel: the terms of the displaced gel, then the features of its surroundings.
 pub(super) const INPUTS: usize = NEAR + AROUND_FITTED.len();
@@ -109,15 +108,10 @@ fn choose(index: u64, contact: &Contact, grid: &Grid) -> (Vec<usize>, Vec<f32>) 
     }
     let mut state = index.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(1);
     let (mut pixels, mut weights) = (Vec::new(), Vec::new());
-    for (mut zone, (_, wanted, weight)) in zones.into_iter().zip(ZONES_MM) {
+    for (zone, (_, wanted, weight)) in zones.into_iter().zip(ZONES_MM) {
         let area_mm2 = zone.len() as f64 * mm_per_px * mm_per_px;
-        let n = wanted.min(zone.len());
-        for i in 0..n {
-            let j = i + (splitmix64(&mut state) % (zone.len() - i) as u64) as usize;
-            zone.swap(i, j);
-        }
-        zone.truncate(n);
-        zone.sort_unstable();
+        let zone = drawn(zone, wanted, &mut state);
+        let n = zone.len();
         weights.extend(std::iter::repeat_n((weight * area_mm2) as f32 / n.max(1) as f32, n));
         pixels.extend(zone);
     }

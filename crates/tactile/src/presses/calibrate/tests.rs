@@ -1,12 +1,12 @@
 use super::gel::FOLLOW;
 use super::*;
-use crate::colour::{Lambert, Light};
 use crate::convolve::Follow;
 use crate::presses::compare::predict_contact;
 use crate::presses::{
     BallSizeBy, Contact, Indenter, IndenterPose, Press, check_ball_size, compare_presses, find_circle,
 };
 use crate::sensor::Pyramid;
+use crate::testing::lights;
 use gripgen_twin::TriMesh;
 use nalgebra::Point3;
 use samples::GelModel;
@@ -17,14 +17,8 @@ const NOISE: f32 = 1.5;
 
 /// A sensor that is not a regressor: three coloured lights, a gel of its own, a shaded frame with scratches.
 fn truth() -> Sensor {
-    let light = |degrees: f64, colour: [f64; 3]| Light {
-        azimuth_rad: degrees.to_radians(),
-        elevation_rad: 0.5,
-        colour,
-        falloff: [0.15, 0.0],
-    };
-    let lights =
-        [light(0.0, [70.0, 5.0, 0.0]), light(120.0, [0.0, 60.0, 8.0]), light(240.0, [6.0, 0.0, 65.0])];
+    let colours = [(0.0, [70.0, 5.0, 0.0]), (120.0, [0.0, 60.0, 8.0]), (240.0, [6.0, 0.0, 65.0])];
+    let colour = ColourModel::Lambert(Box::new(lights(0.5, [0.15, 0.0], &colours)));
     let rest = [0, 1, 2].map(|c| {
         let pixel = |i: usize| {
             let (x, y) = (i % GRID.width_px, i / GRID.width_px);
@@ -33,23 +27,13 @@ fn truth() -> Sensor {
         };
         (0..GRID.len()).map(pixel).collect()
     });
-    Sensor {
-        grid: GRID,
-        rest,
-        noise_rgb: [NOISE; 3],
-        colour: ColourModel::Lambert(Box::new(Lambert::from_lights(&lights))),
-        gel_shape: GelShape::Flat,
-        pyramid: Some(Pyramid {
-            kernels_px: vec![13, 9, 5],
-            restore_depth_fraction: 0.3,
-            sink_in_fraction: 0.0,
-            follow: Follow::Exactly,
-        }),
-        markers: None,
-        shadow: None,
-        ball_m: None,
-        press_gain_sd: None,
-    }
+    let pyramid = Pyramid {
+        kernels_px: vec![13, 9, 5],
+        restore_depth_fraction: 0.3,
+        sink_in_fraction: 0.0,
+        follow: Follow::Exactly,
+    };
+    Sensor { pyramid: Some(pyramid), ..Sensor::new(GRID, rest, [NOISE; 3], colour) }
 }
 
 /// Presses of a 4 mm ball all over the frame.

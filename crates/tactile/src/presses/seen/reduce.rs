@@ -33,18 +33,10 @@ pub(super) fn reduced_sensor(sensor: &Sensor, factor: usize) -> Option<Sensor> {
     let shadow = sensor.shadow.as_ref().map(|shadow| {
         Box::new(Shadow::new(shadow.table().clone(), grid.metres_per_px, grid.width_px, &colour))
     });
-    Some(Sensor {
-        grid,
-        rest: [0, 1, 2].map(|c| means(&sensor.rest[c])),
-        noise_rgb: sensor.noise_rgb.map(|s| s / factor as f32),
-        colour,
-        gel_shape,
-        markers: None,
-        shadow,
-        pyramid,
-        ball_m: sensor.ball_m,
-        press_gain_sd: sensor.press_gain_sd,
-    })
+    let rest = [0, 1, 2].map(|c| means(&sensor.rest[c]));
+    let plain = Sensor::new(grid, rest, sensor.noise_rgb.map(|s| s / factor as f32), colour);
+    let (ball_m, press_gain_sd) = (sensor.ball_m, sensor.press_gain_sd);
+    Some(Sensor { gel_shape, shadow, pyramid, ball_m, press_gain_sd, ..plain })
 }
 
 /// The odd size next to a `factor`-th of a kernel.

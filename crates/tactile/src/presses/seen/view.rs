@@ -2,10 +2,9 @@
 
 use super::reduce::means;
 use super::{PressContact, PressScene};
+use crate::grid::levels_of;
 use crate::optics::{frame_at, level_at};
-use crate::presses::Circle;
-use crate::presses::zone::{ZONES, Zone};
-use gripgen_twin::random::splitmix64;
+use crate::presses::{Circle, ZONES, Zone, drawn};
 use gripgen_twin::{OpticsState, TactileImage};
 
 /// Pixels of a zone that are looked at in a press.
@@ -45,22 +44,13 @@ impl PressView {
         }
         let mut state = (index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(11);
         let (mut pixels, mut zones) = (Vec::new(), Vec::new());
-        for (zone, mut list) in ZONES.into_iter().zip(by_zone) {
-            let n = PIXELS_PER_ZONE.min(list.len());
-            for i in 0..n {
-                let j = i + (splitmix64(&mut state) % (list.len() - i) as u64) as usize;
-                list.swap(i, j);
-            }
-            list.truncate(n);
-            list.sort_unstable();
+        for (zone, list) in ZONES.into_iter().zip(by_zone) {
+            let list = drawn(list, PIXELS_PER_ZONE, &mut state);
             zones.extend(std::iter::repeat_n(zone, list.len()));
             pixels.extend(list);
         }
         let (full_w, full_h) = (image.width_px as usize, image.height_px as usize);
-        let planes = [0, 1, 2].map(|c| {
-            let plane: Vec<f32> = image.rgb.iter().skip(c).step_by(3).map(|&v| f32::from(v)).collect();
-            means(&plane, full_w, full_h, f)
-        });
+        let planes = levels_of(image).map(|plane| means(&plane, full_w, full_h, f));
         let plain = OpticsState::default();
         let finer = match &press {
             Some(_) if f > 1 => {

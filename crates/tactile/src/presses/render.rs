@@ -1,11 +1,60 @@
-//! The picture of a surface that is known by its height at each pixel.
+//! The picture of a body that is pressed in, or of a surface that is known by its height at each pixel, with the gel that it is a
+//! picture of.
 
-use super::body::{RenderedBody, render_imprint};
+use super::Contact;
+use super::compare::{gel_of, sink_in_fraction};
 use super::contact::imprint;
-use super::indenter::MAX_TRAVEL_M;
+use super::indenter::{Indenter, MAX_TRAVEL_M};
+use crate::gradient::gradient;
 use crate::grid::Plane;
+use crate::indent::Imprint;
 use crate::npz::Array;
+use crate::render::Renderer;
 use crate::sensor::Sensor;
+use crate::simd::SimdLevel;
+use gripgen_twin::TactileImage;
+use std::sync::Arc;
+
+/// What a sensor sees of a body, without noise, and the gel that it sees. All of the size of the sensor's image, row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderedBody {
+    /// The image.
+    pub image: TactileImage,
+    /// How far the gel's surface stands above its rest towards the camera, in millimetres; 0 where nothing moves it.
+    pub heights_mm: Plane,
+    /// Unit normal of that displaced surface: components to the image's right, to its top, and towards the camera.
+    pub normals: [Plane; 3],
+    /// Where the gel follows the body.
+    pub contact: Vec<bool>,
+}
+
+/// Presses a body in and looks at it.
+pub fn render_body(indenter: &Arc<Indenter>, sensor: &Sensor) -> RenderedBody {
+    let contact = Contact { circle: indenter.circle(), travel_m: None, indenter: Some(Arc::clone(indenter)) };
+    // No ball is looked at.
+    render_imprint(&contact.imprint(0.0, &sensor.grid, &sensor.gel_shape, sink_in_fraction(sensor)), sensor)
+}
+
+/// Looks at an imprint. One without any depth is the gel at rest.
+fn render_imprint(imprint: &Imprint, sensor: &Sensor) -> RenderedBody {
+    let gel = gel_of(sensor);
+    let renderer = Renderer { sensor, gel: &gel, level: SimdLevel::best() };
+    let touched = imprint.depth_px.values.iter().any(|&d| d > 0.0);
+    let surface_px = renderer.surface(imprint);
+    let (along_x, along_y) = gradient(&surface_px);
+    let inverse = along_x.zip(&along_y, |gx, gy| 1.0 / (1.0 + gx * gx + gy * gy).sqrt());
+    // Rows count downwards, the normal's second component upwards.
+    let across = along_x.zip(&inverse, |gx, inverse| -gx * inverse);
+    let up = along_y.zip(&inverse, |gy, inverse| gy * inverse);
+    let core_px = renderer.core_px(imprint) as f32;
+    let mm_per_px = (sensor.grid.metres_per_px * 1e3) as f32;
+    RenderedBody {
+        image: renderer.image(touched.then_some(imprint), None),
+        heights_mm: surface_px.map(|h| h * mm_per_px),
+        normals: [across, up, inverse],
+        contact: imprint.depth_px.values.iter().map(|&d| d > core_px).collect(),
+    }
+}
 
 /// Why heights cannot be pressed in.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -82,10 +131,9 @@ pub fn render_heights(
         _ if highest_m > MAX_TRAVEL_M => return refused(highest_m, "finite"),
         _ => 0.0,
     };
-    let mut depth_px = Plane::filled(grid.width_px, grid.height_px, 0.0);
-    for (depth, height_m) in depth_px.values.iter_mut().zip(&heights_m.values) {
-        *depth = ((height_m + lift_m).max(0.0) / grid.metres_per_px) as f32;
-    }
+    let depth_px = |height_m: &f64| ((height_m + lift_m).max(0.0) / grid.metres_per_px) as f32;
+    let values = heights_m.values.iter().map(depth_px).collect();
+    let depth_px = Plane { width: grid.width_px, height: grid.height_px, values };
     let press_m = travel_m.unwrap_or(highest_m.max(0.0));
     Ok(render_imprint(&imprint(depth_px, press_m), sensor))
 }
@@ -93,10 +141,9 @@ pub fn render_heights(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::presses::{Indenter, IndenterPose, render_body};
+    use crate::presses::IndenterPose;
     use gripgen_twin::TriMesh;
     use nalgebra::Point3;
-    use std::sync::Arc;
 
     fn sensor() -> Sensor {
         let bytes = include_bytes!("../../../../assets/sensors/gelsight_r15/sensor.npz");

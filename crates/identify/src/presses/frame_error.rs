@@ -2,7 +2,7 @@
 //! zones that count alike; one that makes the frames of presses that were held out worse is no name.
 
 use super::observed::Observed;
-use super::score::{differences, scored};
+use super::score::{differences, left_out};
 use super::search::Found;
 use crate::Hint;
 
@@ -39,15 +39,12 @@ pub(super) fn borne_out(observed: &Observed<'_>, found: &mut Found) -> FrameErro
 
 /// Leaves an effect out and fits the others again; its id.
 fn drop_effect(observed: &Observed<'_>, found: &mut Found, e: usize) -> &'static str {
-    let mut acting = found.model.acting.clone();
-    let dropped = acting.remove(e).spec.id;
+    let dropped = found.model.acting[e].spec.id;
     found.rivals.remove(e);
     found.gains.remove(e);
-    found.model = scored(observed, &found.design, acting);
+    found.model = left_out(observed, &found.design, &found.model.acting, e);
     for (e, gain) in found.gains.iter_mut().enumerate() {
-        let mut rest = found.model.acting.clone();
-        rest.remove(e);
-        let without = scored(observed, &found.design, rest);
+        let without = left_out(observed, &found.design, &found.model.acting, e);
         *gain = found.design.mean(&differences(&without.held_out, &found.model.held_out)).0;
     }
     found.cost = found.design.mean(&found.model.held_out).0;

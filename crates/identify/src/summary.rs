@@ -6,11 +6,11 @@ use gripgen_twin::effects::find;
 /// From this many times the noise of the camera on what is left of images is said.
 const FAR_ABOVE_NOISE: f64 = 10.0;
 
-/// Weight below which a name is hardly one.
-pub const HARDLY: f64 = 0.1;
+/// Share of the evidence below which an effect is reported as `Perhaps`.
+pub const MIN_REPORTABLE_WEIGHT: f64 = 0.1;
 
 /// What a diagnosis says, without names of effects and parameters.
-pub fn plain(d: &Diagnosis) -> String {
+pub fn summary_sentence(d: &Diagnosis) -> String {
     let mut text = match d.verdict {
         Verdict::Insufficient => {
             return match d.notes.first() {
@@ -44,7 +44,7 @@ fn named(d: &Diagnosis) -> String {
     for effect in &d.effects {
         let plainly = find(&effect.name).map_or(effect.name.as_str(), |spec| spec.plainly);
         let part = effect.part.as_ref().map_or(String::new(), |part| format!(" (Seen on {part} only.)"));
-        let perhaps = if effect.weight < HARDLY { "Perhaps: " } else { "" };
+        let perhaps = if effect.weight < MIN_REPORTABLE_WEIGHT { "Perhaps: " } else { "" };
         sentences.push(format!("{perhaps}{plainly}{part}"));
         if effect.parameters.values().any(|p| p.at_bound) {
             sentences.push(
@@ -106,7 +106,7 @@ mod tests {
         {
             let mut d = Diagnosis::blank(Channel::Pulls, DataSummary::default());
             d.notes.push(note.into());
-            assert!(plain(&d).ends_with(end), "{}", plain(&d));
+            assert!(summary_sentence(&d).ends_with(end), "{}", summary_sentence(&d));
         }
     }
 
@@ -115,8 +115,8 @@ mod tests {
         let (mut near, mut far) = (of([3.0, 3.0]), of([40.0, 40.0]));
         near.conclude();
         far.conclude();
-        assert!(!plain(&near).contains("times the noise"), "{}", plain(&near));
-        assert!(plain(&far).contains("still 40 times the noise"), "{}", plain(&far));
+        assert!(!summary_sentence(&near).contains("times the noise"), "{}", summary_sentence(&near));
+        assert!(summary_sentence(&far).contains("still 40 times the noise"), "{}", summary_sentence(&far));
     }
 
     /// A scale of 0.8 is the lowest that is fitted: it is marked, said, and trusted by half at most.
@@ -145,11 +145,13 @@ mod tests {
         assert!(!inside.effects[0].parameters["scale"].at_bound && inside.notes.is_empty());
         assert_eq!(inside.effects[0].weight, 0.95);
         assert!(at.effects[0].parameters["scale"].at_bound && at.notes[0].contains("0.8"), "{:?}", at.notes);
-        assert!(!plain(&inside).starts_with("Perhaps: "), "{}", plain(&inside));
+        assert!(!summary_sentence(&inside).starts_with("Perhaps: "), "{}", summary_sentence(&inside));
         let mut light = scaled(0.9);
         light.effects[0].weight = 0.01;
-        assert!(plain(&light).starts_with("Perhaps: "), "{}", plain(&light));
-        assert!(at.effects[0].weight <= 0.5 && plain(&at).contains("something else may look like it"));
+        assert!(summary_sentence(&light).starts_with("Perhaps: "), "{}", summary_sentence(&light));
+        assert!(
+            at.effects[0].weight <= 0.5 && summary_sentence(&at).contains("something else may look like it")
+        );
         let neutral = scaled(1.0);
         assert!(!neutral.effects[0].parameters["scale"].at_bound, "a neutral value is no end");
         // Between 1 N and a million newtons, which stand for no limit.

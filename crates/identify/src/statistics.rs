@@ -1,5 +1,7 @@
 //! A few functions of statistics.
 
+use crate::grouped::t_quantile_95;
+
 /// Upper tail of the gamma distribution with this shape and scale 1 (series and continued fraction, Numerical Recipes
 /// section 6.2).
 pub(crate) fn gamma_tail(shape: f64, x: f64) -> f64 {
@@ -36,18 +38,33 @@ pub(crate) fn gamma_tail(shape: f64, x: f64) -> f64 {
     (front * h).clamp(0.0, 1.0)
 }
 
-/// Mean and its standard error.
+/// Mean and its standard error; infinite for one value.
 pub(crate) fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
-    if values.is_empty() {
-        return (0.0, 0.0);
-    }
-    let mean = values.iter().sum::<f64>() / n;
+    let mean = values.iter().sum::<f64>() / n.max(1.0);
     if values.len() < 2 {
         return (mean, f64::INFINITY);
     }
     let square: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
     (mean, libm::sqrt(square / (n - 1.0) / n))
+}
+
+/// The value in the middle; the upper one of two. `None` without any.
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// Half the length of the 90 % interval of the logarithm of a root mean squared error whose `mean` square comes from the squares of
+/// several parts, by the scatter of these. It is for the error of new data of the same size, whose own scatter is as large: root of 2.
+pub(crate) fn log_error_half90(mean: f64, squares: &[f64]) -> f64 {
+    let (_, deviation) = mean_and_error(squares);
+    if mean > 0.0 && deviation.is_finite() {
+        let t = t_quantile_95(squares.len() as f64 - 1.0);
+        0.5 * std::f64::consts::SQRT_2 * t * (deviation / mean).min(3.0)
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]
