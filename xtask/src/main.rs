@@ -2,10 +2,12 @@
 //!
 //! `cargo xtask test` sets up what the tests need and runs all of them; `cargo xtask test --all` adds the slow ones;
 //! `cargo xtask blind` runs the whole blind benchmark of the diagnosis (hours) and writes docs/loop/blind.md;
+//! `cargo xtask dist` builds the wheel and a static binary and tries both where there is no Rust;
 //! `cargo xtask bench record [--profile NAME] [FILTER]` runs the benchmarks and writes their numbers down as those of this machine,
 //! which `cargo bench` compares with;
 //! `cargo xtask assets [--check]` makes the shipped meshes and the shipped sensor from the numbers beside them.
 
+mod dist;
 mod python;
 mod vulkan;
 
@@ -25,10 +27,11 @@ fn main() -> ExitCode {
         ["test"] => test(false),
         ["test", "--all"] => test(true),
         ["blind"] => blind(),
+        ["dist"] => dist::dist(),
         ["bench", "record", ref rest @ ..] => record_benches(rest),
         ["assets"] => assets(false),
         ["assets", "--check"] => assets(true),
-        _ => Err("usage: cargo xtask test [--all] | blind | bench record [--profile NAME] [FILTER] | assets [--check]".into()),
+        _ => Err("usage: cargo xtask test [--all] | blind | dist | bench record [--profile NAME] [FILTER] | assets [--check]".into()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -131,9 +134,12 @@ fn assets(check: bool) -> Result<(), String> {
 
 /// Whether this process may install packages with apt-get.
 fn can_install() -> bool {
-    let root_user = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.starts_with(b"0\n"));
     let apt = Command::new("apt-get").arg("--version").output().is_ok_and(|o| o.status.success());
-    root_user && apt
+    is_root() && apt
+}
+
+fn is_root() -> bool {
+    Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.starts_with(b"0\n"))
 }
 
 /// Installs a Debian package, saying so.
