@@ -41,6 +41,7 @@ mod elastic;
 // Films of pulls.
 mod film;
 // Images by a graphics processor are those of the processor, within the tolerance.
+#[cfg(feature = "gpu")]
 mod gpu;
 mod imprint;
 // Imprints of grasps without a pull.

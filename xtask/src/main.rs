@@ -4,11 +4,13 @@
 //! at length, lints and the slow checks of Python, once for each change that is handed in;
 //! `cargo xtask research NAME` runs a study of `research/`; without a name it lists them;
 //! `cargo xtask count` prints Rust lines by place, crowded folders and the numeric constants of `identify`;
+//! `cargo xtask dist` builds the wheel and a static binary and tries both where there is no Rust;
 //! `cargo xtask bench record [--profile NAME] [FILTER]` runs the benchmarks and writes their numbers down as those of this machine,
 //! which `cargo bench` compares with;
 //! `cargo xtask assets [--check]` makes the shipped meshes and the shipped sensor from the numbers beside them.
 
 mod count;
+mod dist;
 mod python;
 mod research;
 mod test;
@@ -35,10 +37,11 @@ fn main() -> ExitCode {
         ["research"] => research::research(None, &[]),
         ["research", name, ref rest @ ..] => research::research(Some(name), rest),
         ["count"] => count::count(),
+        ["dist"] => dist::dist(),
         ["bench", "record", ref rest @ ..] => record_benches(rest),
         ["assets"] => assets(false),
         ["assets", "--check"] => assets(true),
-        _ => Err("usage: cargo xtask test [--all] | research [NAME [ARGUMENTS]] | count | \
+        _ => Err("usage: cargo xtask test [--all] | research [NAME [ARGUMENTS]] | count | dist | \
                   bench record [--profile NAME] [FILTER] | assets [--check]"
             .into()),
     };
@@ -94,9 +97,12 @@ fn assets(check: bool) -> Result<(), String> {
 
 /// Whether this process may install packages with apt-get.
 fn can_install() -> bool {
-    let root_user = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.starts_with(b"0\n"));
     let apt = Command::new("apt-get").arg("--version").output().is_ok_and(|o| o.status.success());
-    root_user && apt
+    is_root() && apt
+}
+
+fn is_root() -> bool {
+    Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.starts_with(b"0\n"))
 }
 
 /// Installs a Debian package, saying so.

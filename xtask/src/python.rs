@@ -27,18 +27,7 @@ pub fn set_up(root: &Path, all: bool) -> Result<PathBuf, String> {
     let wanted = if all { many } else { few };
     let stamp = venv.join(STAMP);
     eprintln!("making a Python environment in {}", venv.display());
-    let system = system_python()?;
-    if !make_venv(&system, &venv) {
-        if !can_install() {
-            return Err(
-                "python3 cannot make virtual environments; install its venv module (python3-venv)".into()
-            );
-        }
-        apt_install("python3-venv", "python3 cannot make virtual environments")?;
-        if !make_venv(&system, &venv) {
-            return Err("python3 cannot make virtual environments, even with python3-venv".into());
-        }
-    }
+    make(&venv)?;
     let mut pip = Command::new(&python);
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
     pip.args(["-r", "tests/python/requirements.txt"]).current_dir(root);
@@ -51,6 +40,22 @@ pub fn set_up(root: &Path, all: bool) -> Result<PathBuf, String> {
     }
     std::fs::write(&stamp, wanted).map_err(|e| format!("{}: {e}", stamp.display()))?;
     Ok(python)
+}
+
+/// Makes an empty virtual environment in a folder.
+pub fn make(venv: &Path) -> Result<(), String> {
+    let system = system_python()?;
+    if make_venv(&system, venv) {
+        return Ok(());
+    }
+    if !can_install() {
+        return Err("python3 cannot make virtual environments; install its venv module (python3-venv)".into());
+    }
+    apt_install("python3-venv", "python3 cannot make virtual environments")?;
+    if make_venv(&system, venv) {
+        return Ok(());
+    }
+    Err("python3 cannot make virtual environments, even with python3-venv".into())
 }
 
 /// Where cargo builds.

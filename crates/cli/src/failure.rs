@@ -2,6 +2,7 @@
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use gripgen::record::{ExportError, FolderError, ReadError};
+use gripgen::tactile::gpu::GpuError;
 use gripgen::tactile::presses::HeightsError;
 use gripgen::twin::config::{ConfigError, Place};
 use gripgen::{LoadError, OpenPlantError, SweepError};
@@ -202,13 +203,20 @@ pub fn another_run(error: &dyn Display) -> Failure {
     failure.hint("choose another folder with --out; nothing was touched")
 }
 
+impl From<GpuError> for Failure {
+    fn from(e: GpuError) -> Self {
+        let failure = if e == GpuError::NotBuilt { Self::usage(&e) } else { Self::new(&e) };
+        failure.hint(e.hint())
+    }
+}
+
 impl From<SweepError> for Failure {
     fn from(e: SweepError) -> Self {
         match e {
             SweepError::Folder(e) => e.into(),
             SweepError::AnotherConfig { .. } => another_run(&e),
             SweepError::Slice { .. } => Failure::usage(e),
-            SweepError::Gpu(e) => Failure::new(&e).hint(e.hint()),
+            SweepError::Gpu(e) => e.into(),
             other => Failure::new(other),
         }
     }
@@ -217,7 +225,7 @@ impl From<SweepError> for Failure {
 impl From<BenchError> for Failure {
     fn from(e: BenchError) -> Self {
         match e {
-            BenchError::Gpu(e) => Failure::new(&e).hint(e.hint()),
+            BenchError::Gpu(e) => e.into(),
             BenchError::Load(e) => e.into(),
             other => Failure::new(other),
         }

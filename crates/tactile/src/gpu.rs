@@ -23,7 +23,9 @@ mod source_tests;
 mod tests;
 
 pub use batch::{GpuMesh, GpuSensor};
-pub use device::{AdapterChoice, GpuAdapter};
+pub use crate::gpu_types::{
+    AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRequest, makes,
+};
 pub use source::Variant;
 
 use crate::grid::Plane;
@@ -41,108 +43,6 @@ const SOFTWARE_RUN: u32 = 16;
 
 /// Images of a batch on a graphics processor where nobody asks for more.
 pub const BATCH: usize = 64;
-
-/// Why the graphics processor cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum GpuError {
-    /// No adapter of the kind wanted.
-    #[error("{}; found {}", no_adapter(wanted), if found.is_empty() { "none".into() } else { found.join(", ") })]
-    NoAdapter {
-        /// What was wanted.
-        wanted: AdapterChoice,
-        /// What is there.
-        found: Vec<String>,
-    },
-    /// The device or its driver.
-    #[error("{adapter}: {problem}")]
-    Device {
-        /// Which.
-        adapter: String,
-        /// What it says.
-        problem: String,
-    },
-    /// Something that this backend cannot do.
-    #[error("the gpu backend cannot do {what}")]
-    Unsupported {
-        /// What.
-        what: &'static str,
-    },
-    /// Larger than the device allows.
-    #[error("one {what} takes {bytes} bytes, the device binds at most {allowed}")]
-    TooLarge {
-        /// What.
-        what: &'static str,
-        /// Its size.
-        bytes: u64,
-        /// The limit.
-        allowed: u64,
-    },
-    /// A blur kernel for which the memory of a workgroup is too small.
-    #[error("a blur kernel of {kernel_px} pixels does not fit the {workgroup_bytes} bytes of a workgroup")]
-    Kernel {
-        /// Width of the kernel.
-        kernel_px: u32,
-        /// Memory of a workgroup.
-        workgroup_bytes: u32,
-    },
-}
-
-fn no_adapter(wanted: &AdapterChoice) -> String {
-    match wanted {
-        AdapterChoice::Hardware => "no graphics processor with Vulkan, Metal or DX12".into(),
-        AdapterChoice::Named(name) => format!("no adapter is called `{name}`"),
-    }
-}
-
-impl GpuError {
-    /// What to do about it.
-    pub fn hint(&self) -> &'static str {
-        match self {
-            GpuError::NoAdapter { wanted: AdapterChoice::Hardware, .. } => {
-                "use backend = \"cpu\"; a software adapter is taken when gpu_adapter names it"
-            }
-            _ => "use backend = \"cpu\"",
-        }
-    }
-}
-
-/// Whether a device makes the images of a sensor with its gel. Those of an elastic gel are the processor's, which solves the contact
-/// for the labels in any case; so are those of markers that move, which have no twin here yet.
-pub fn makes(sensor: &Sensor, gel: &Gel) -> bool {
-    colour::missing(sensor, gel).is_none()
-}
-
-/// A part pressed into a gel.
-#[derive(Clone, Copy)]
-pub struct GpuPress<'a> {
-    /// The part.
-    pub mesh: &'a GpuMesh,
-    /// Where it is.
-    pub gel_from_mesh: Pose,
-    /// Imprint constant c of `V = c F`.
-    pub imprint_m3_per_n: f64,
-    /// Normal force.
-    pub force_n: f64,
-}
-
-/// One image to make.
-#[derive(Clone, Copy, Default)]
-pub struct GpuRequest<'a> {
-    /// The press; the gel at rest without one.
-    pub press: Option<GpuPress<'a>>,
-    /// Which noise; none without a key.
-    pub noise_key: Option<u64>,
-}
-
-/// One image as it comes back.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GpuImage<'a> {
-    /// Red, green, blue of each pixel, row by row.
-    pub rgb: &'a [u8],
-    /// Largest depth of the contact; 0 without one.
-    pub press_depth_m: f64,
-}
 
 /// An open graphics processor.
 pub struct GpuRenderer {

@@ -35,7 +35,12 @@ mod convolve;
 mod deform;
 mod elastic;
 mod fft;
+#[cfg(feature = "gpu")]
 pub mod gpu;
+#[cfg(not(feature = "gpu"))]
+#[path = "gpu_absent.rs"]
+pub mod gpu;
+mod gpu_types;
 mod gradient;
 mod grid;
 mod indent;

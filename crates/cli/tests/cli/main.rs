@@ -425,7 +425,7 @@ fn a_reader_that_hangs_up_is_no_failure() {
     assert!(output.stderr.is_empty(), "{}", text(&output.stderr));
 }
 
-/// Without the adapter that is named there is one line, a hint, and no output.
+/// Without the adapter that is named there is one line, a hint, and no output; in a build without the backend too.
 #[test]
 fn a_missing_graphics_adapter_is_one_clear_error() {
     let (_folder, out) = unmade("run");
@@ -433,10 +433,14 @@ fn a_missing_graphics_adapter_is_one_clear_error() {
     let sweep = run(&sweep_args(out.to_str().unwrap(), &missing));
     let bench = run(&["bench", "--backend", "gpu", "--adapter", "no such adapter"]);
     for output in [sweep, bench] {
-        assert_code(&output, 1);
+        let (code, problem, hint) = match cfg!(feature = "gpu") {
+            true => (1, "no adapter is called `no such adapter`; found ", "hint: use backend = \"cpu\""),
+            false => (2, "this gripgen was built without the gpu backend", "--features gpu"),
+        };
+        assert_code(&output, code);
         let said = text(&output.stderr);
-        assert!(said.contains("no adapter is called `no such adapter`; found "), "{said}");
-        assert!(said.contains("hint: use backend = \"cpu\""), "{said}");
+        assert!(said.contains(problem), "{said}");
+        assert!(said.contains(hint), "{said}");
         assert!(output.stdout.is_empty());
     }
     assert!(!out.exists());

@@ -5,20 +5,10 @@ use super::layout::Regression;
 use super::regression::{around_coefficients, near_coefficients, regression};
 use super::source::Shade;
 use crate::colour::ColourModel;
+use crate::gpu_types::missing;
 use crate::sensor::Sensor;
 use crate::shadow::Shadow;
 use gripgen_twin::Gel;
-use gripgen_twin::config::GelModel;
-
-/// What has no twin on the device.
-pub(super) fn missing(sensor: &Sensor, gel: &Gel) -> Option<&'static str> {
-    match gel.model {
-        GelModel::Elastic => Some("an elastic gel"),
-        // Markers on a gel of unknown modulus stay where they are.
-        _ if sensor.markers.is_some() && gel.elastic.is_some() => Some("markers"),
-        _ => None,
-    }
-}
 
 /// The colours of a sensor for the device.
 pub(super) struct Colours {
@@ -86,6 +76,7 @@ mod tests {
     use crate::gpu::tests::{lit, sensor};
     use crate::markers::Markers;
     use crate::testing::gel;
+    use gripgen_twin::config::GelModel;
 
     #[test]
     fn what_has_no_twin_is_refused() {

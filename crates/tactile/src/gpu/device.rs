@@ -1,6 +1,6 @@
 //! Choosing an adapter and opening it.
 
-use super::GpuError;
+use super::{AdapterChoice, GpuAdapter, GpuError};
 use std::future::Future;
 use std::pin::pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,35 +9,6 @@ use wgpu::{Backends, DeviceType};
 
 /// Never GL: it is silently wrong for texture arrays of one layer (gfx-rs/wgpu#2161, #10015).
 const BACKENDS: Backends = Backends::VULKAN.union(Backends::METAL).union(Backends::DX12);
-
-/// Which adapter to take.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum AdapterChoice {
-    /// A graphics processor: discrete before integrated before virtual. Never a software adapter.
-    Hardware,
-    /// The first adapter whose name contains this, in any case; the only way to a software adapter.
-    Named(String),
-}
-
-/// What an adapter says of itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct GpuAdapter {
-    /// Its name.
-    pub name: String,
-    /// `vulkan`, `metal` or `dx12`.
-    pub api: String,
-    /// Driver and its version.
-    pub driver: String,
-    /// Whether it computes on the processor.
-    pub software: bool,
-}
-
-impl std::fmt::Display for GpuAdapter {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let software = if self.software { ", software" } else { "" };
-        write!(f, "{} ({}{software})", self.name, self.api)
-    }
-}
 
 /// An open adapter.
 pub(super) struct Device {

@@ -1,0 +1,82 @@
+//! A build without the feature `gpu`: no adapter can be opened, so that there is no value of any type of a device.
+
+pub use crate::gpu_types::{
+    AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRequest, makes,
+};
+
+use crate::indent::IndentError;
+use crate::sensor::Sensor;
+use gripgen_twin::{Gel, TriMesh};
+
+/// A mesh on the device.
+pub enum GpuMesh {}
+
+/// A sensor with its gel on the device.
+pub enum GpuSensor {}
+
+impl GpuSensor {
+    /// Images that are computed at once.
+    pub fn batch(&self) -> usize {
+        match *self {}
+    }
+}
+
+/// An open graphics processor.
+pub enum GpuRenderer {}
+
+impl GpuRenderer {
+    /// Opens no adapter.
+    ///
+    /// # Errors
+    ///
+    /// Always [`GpuError::NotBuilt`].
+    pub fn new(_: &AdapterChoice) -> Result<Self, GpuError> {
+        Err(GpuError::NotBuilt)
+    }
+
+    /// Which adapter it is.
+    pub fn adapter(&self) -> &GpuAdapter {
+        match *self {}
+    }
+
+    /// Puts a mesh on the device.
+    pub fn mesh(&self, _: &TriMesh) -> Result<GpuMesh, GpuError> {
+        match *self {}
+    }
+
+    /// Puts a sensor with its gel on the device.
+    pub fn sensor(&self, _: &Sensor, _: &Gel) -> Result<GpuSensor, GpuError> {
+        match *self {}
+    }
+
+    /// The same for batches of a size.
+    pub fn sensor_for(&self, _: &Sensor, _: &Gel, _: usize) -> Result<GpuSensor, GpuError> {
+        match *self {}
+    }
+
+    /// Makes images and hands them out.
+    pub fn render(
+        &self,
+        _: &mut GpuSensor,
+        _: &[GpuRequest<'_>],
+        _: impl FnMut(usize, Result<GpuImage<'_>, IndentError>),
+    ) -> Result<(), GpuError> {
+        match *self {}
+    }
+
+    /// Makes images and leaves them on the device.
+    pub fn render_resident(&self, _: &mut GpuSensor, _: &[GpuRequest<'_>]) -> Result<(), GpuError> {
+        match *self {}
+    }
+
+    /// Seconds of each stage.
+    pub fn stage_seconds(
+        &self,
+        _: &mut GpuSensor,
+        _: &[GpuRequest<'_>],
+        _: u32,
+        _: &dyn Fn() -> f64,
+    ) -> Result<Vec<(&'static str, f64)>, GpuError> {
+        match *self {}
+    }
+}
