@@ -7,7 +7,8 @@ use crate::library::Library;
 use crate::project::Project;
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_physics::{
-    JawFriction, PatchFriction, PullSession, PullState, Signals, Until, creep_of, pull_staircase_seen, sensor_chain, staircase_of,
+    JawFriction, PatchFriction, PullSession, PullState, Signals, Until, creep_of, pull_staircase_seen,
+    sensor_chain, staircase_of,
 };
 use gripgen_tactile::{Imprint, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
@@ -15,8 +16,8 @@ use gripgen_twin::effects::CommandChain;
 use gripgen_twin::label_check::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    FilmPace, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled,
-    Sample, Scenario, TactileImage, Twin, slip_label, table_factor,
+    FilmPace, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled, Sample, Scenario, TactileImage,
+    Twin, slip_label, table_factor,
 };
 use std::sync::Arc;
 

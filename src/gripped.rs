@@ -5,7 +5,9 @@
 use crate::gpu::{Gpu, ImageFault, ImageJob, PlacedPart};
 use crate::library::Library;
 use crate::sample::{SampleError, SimulateOptions};
-use gripgen_physics::{Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip, grip_point, pull_direction};
+use gripgen_physics::{
+    Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip, grip_point, pull_direction,
+};
 use gripgen_tactile::gpu::makes;
 use gripgen_tactile::{ClusteredMesh, Imprint, Plane, Renderer, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
@@ -218,10 +220,7 @@ impl<'a> Indenter<'a> {
     }
 
     /// What the jaws feel, or with `optics` what their cameras see.
-    pub fn imprints(
-        &self,
-        optics: Option<&PerJaw<OpticsState>>,
-    ) -> Result<PerJaw<Imprint>, SampleError> {
+    pub fn imprints(&self, optics: Option<&PerJaw<OpticsState>>) -> Result<PerJaw<Imprint>, SampleError> {
         PerJaw::try_from_fn(|jaw| {
             let PlacedPart { gel_from_mesh, imprint_m3_per_n, force_n, .. } = &self.parts[jaw];
             let (renderer, c) = (self.renderer(jaw), *imprint_m3_per_n);

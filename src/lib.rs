@@ -59,16 +59,18 @@ mod version;
 
 pub use film::Film;
 pub use generate::{
-    GripImprints, StartedPull, drawn_scenario, generate, generate_filmed, press_only, pull_gripped, pull_session, simulate,
-    start_pull,
+    GripImprints, StartedPull, drawn_scenario, generate, generate_filmed, press_only, pull_gripped,
+    pull_session, simulate, start_pull,
 };
 pub use gpu::{Gpu, PlacedPart};
-pub use gripped::{Contact, Gripped, Indenter, answering_mass_kg, held, jaw_forces_n, placed_parts, try_grip};
 pub use gripgen_identify as identify;
 pub use gripgen_physics as physics;
 pub use gripgen_record as record;
 pub use gripgen_tactile as tactile;
 pub use gripgen_twin as twin;
+pub use gripped::{
+    Contact, Gripped, Indenter, answering_mass_kg, held, jaw_forces_n, placed_parts, try_grip,
+};
 pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError, path_from};
 pub use mesh_file::{MeshFileError, read_mesh};

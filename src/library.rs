@@ -1,8 +1,8 @@
 //! Meshes, contact shapes and sensors: read once, shared by the samples that need them.
 
-use gripgen_physics::Cache;
 use crate::location::{Location, ReadFileError};
 use crate::resolve::Files;
+use gripgen_physics::Cache;
 use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, Surface, UrdfError};
 use gripgen_record::{decode_picture, sha256_hex};
 use gripgen_tactile::{ClusteredMesh, Sensor, SensorError, SensorFiles};

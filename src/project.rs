@@ -1,7 +1,6 @@
 //! A sweep with everything it needs: twin, meshes, sensors, and the hash over all of it.
 
 use crate::assets;
-use gripgen_physics::Cache;
 use crate::gpu::Gpu;
 use crate::gripped::{Gripped, check_damping};
 use crate::library::{Library, LibraryError};
@@ -9,6 +8,7 @@ use crate::location::{Location, ReadFileError};
 use crate::resolve::{Files, Named, Resolved, config_hash, is_file_key, resolve};
 use crate::sample::SimulateOptions;
 use crate::version::VERSION;
+use gripgen_physics::Cache;
 use gripgen_record::{Background, RunFolder, sha256_hex};
 use gripgen_tactile::finish;
 use gripgen_tactile::gpu::{GpuError, makes};

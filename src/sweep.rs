@@ -8,6 +8,7 @@ use crate::film::Film;
 use crate::generate::{drawn_scenario, generate_filmed};
 use crate::project::Project;
 use crate::version::VERSION;
+pub use differences::differences;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_record::{
     FolderError, PictureError, RUN_SCHEMA, RunFolder, RunInfo, ShardError, Sidecar, extra_columns,
@@ -16,7 +17,6 @@ use gripgen_tactile::SimdLevel;
 use gripgen_tactile::gpu::{GpuAdapter, GpuError};
 use gripgen_twin::{Outcome, Sample};
 use pipeline::Run;
-pub use differences::differences;
 pub use shards::encode_filmed;
 pub(crate) use shards::{encode_options, noise_rgb};
 use std::collections::VecDeque;

@@ -1,9 +1,9 @@
 //! The benchmark of two hundred parts: made on demand, with grips that hold wherever its sweep goes.
 
 use crate::common::{project_in, pulled};
+use gripgen::assets;
 use gripgen::twin::TriMesh;
 use gripgen::twin::parts::benchmark;
-use gripgen::assets;
 use gripgen_cli::benchmark_starter;
 
 /// A part of each family: grips of all, no sample fails, and families and their split stand in what every run carries.

@@ -2,10 +2,10 @@
 
 use crate::common::{baseline, overrides};
 use gripgen::identify::{CampaignOptions, plan_campaign};
-use gripgen_measured::{CAMPAIGN_FILE, campaign_toml, read_campaign, write_pull_folder};
 use gripgen::twin::config::Feedback;
 use gripgen::twin::{Campaign, PlannedPull};
 use gripgen_cli::simulate_campaign;
+use gripgen_measured::{CAMPAIGN_FILE, campaign_toml, read_campaign, write_pull_folder};
 use gripgen_measured::{Suspects, load_pulls_with};
 
 /// Without noise and scatter the measurements are those of Coulomb's law.

@@ -2,10 +2,10 @@
 
 use crate::common::{jobs, overrides, run, small_project, twin_at, twin_with_sets};
 use gripgen::record::{Dataset, encode_png};
-use gripgen_measured::write_pull_folder;
 use gripgen::twin::{Jaw, TactileImage};
 use gripgen::{Library, Location};
 use gripgen_cli::{ImageComparison, compare_images};
+use gripgen_measured::write_pull_folder;
 use gripgen_measured::{Suspects, load_pulls_with};
 use std::path::Path;
 

@@ -4,11 +4,10 @@
 
 use crate::common::{jobs, run, small_project};
 use gripgen::record::ShardReader;
-use gripgen_measured::read_campaign;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Posterior, TriMesh, write_binary_stl};
 use gripgen::{Location, Project, load_twin_document};
-use gripgen_measured::load_pulls;
+use gripgen_measured::read_campaign;
 use nalgebra::Point3;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

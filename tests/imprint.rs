@@ -1,12 +1,12 @@
 //! Imprint constants from tactile images: those that the images were made with come back.
 
 use crate::common::{jobs, run, small_project};
-use gripgen::record::{Dataset, RunFolder, ShardReader, encode_png};
-use gripgen_measured::write_pull_folder;
-use gripgen::twin::TactileImage;
 use gripgen::Location;
+use gripgen::record::{Dataset, RunFolder, ShardReader, encode_png};
+use gripgen::twin::TactileImage;
 use gripgen_cli::{ImprintCalibrations, calibrate_imprints};
 use gripgen_measured::load_pulls;
+use gripgen_measured::write_pull_folder;
 use std::path::Path;
 
 /// Sixteen grips of the gear and the shaft with noisy images; the twin that is calibrated has 1.5 mm^3/N for both.

@@ -5,7 +5,10 @@ use gripgen::identify::{SharedConstant, Verdict};
 use gripgen::record::{RunFolder, ShardReader, encode_png};
 use gripgen::twin::{Jaw, Twin};
 use gripgen::{Location, load_twin_document};
-use gripgen_cli::{LoadImprintsError, calibrate_imprint_table, compare_imprint_table, diagnose_imprint_table, edited_twin_toml, imprint_calibration_edits, load_imprint_set, load_twin_sensor};
+use gripgen_cli::{
+    LoadImprintsError, calibrate_imprint_table, compare_imprint_table, diagnose_imprint_table,
+    edited_twin_toml, imprint_calibration_edits, load_imprint_set, load_twin_sensor,
+};
 use std::fmt::Write as _;
 use std::path::Path;
 

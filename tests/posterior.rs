@@ -7,7 +7,10 @@ use gripgen::identify::{Diagnosis, Verdict};
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::{CAUSE_KEY, MeasuredPulls, Posterior, PosteriorDraw};
 use gripgen::{Location, Project, load_twin_document};
-use gripgen_cli::{calibrate_twin, compare_pulls, compare_pulls_with, edited_twin, posterior_twins, pull_priors, shipped_priors};
+use gripgen_cli::{
+    calibrate_twin, compare_pulls, compare_pulls_with, edited_twin, posterior_twins, pull_priors,
+    shipped_priors,
+};
 use std::path::Path;
 
 /// A campaign of the simulator with what is kept of it.

@@ -2,11 +2,11 @@
 
 use crate::common::{baseline, library, overrides, twin_at, twin_with, twin_with_sets};
 use crate::diagnose::simulated;
-use gripgen::twin::predict::{ModelEffect, PredictPulls as _, PullModel};
+use gripgen::Location;
 use gripgen::twin::label_moments::label_moments;
+use gripgen::twin::predict::{ModelEffect, PredictPulls as _, PullModel};
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{PullTrace, TraceRow, slip_label};
-use gripgen::Location;
 use gripgen_cli::{compare_pulls, given_model, pull_predictor};
 
 /// The closed form of the label over white noise against the rule applied to 4000 noisy traces: before and at a slip

@@ -1,6 +1,8 @@
 //! Real presses of a ball, calibrated with and predicted.
 
 use crate::common::root;
+use gripgen::Location;
+use gripgen::physics::in_parallel;
 use gripgen::record::encode_png;
 use gripgen::tactile::presses::{
     BallSizeBy, CalibrateOptions, Calibration, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, Press, PressSet,
@@ -9,8 +11,6 @@ use gripgen::tactile::presses::{
 };
 use gripgen::tactile::{GelShape, finish};
 use gripgen::twin::{TriMesh, write_binary_stl};
-use gripgen::Location;
-use gripgen::physics::in_parallel;
 use gripgen_cli::{PressGeometry, RenderOptions, load_presses, load_sensor, render_file};
 use nalgebra::Point3;
 use std::time::Instant;

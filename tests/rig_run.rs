@@ -12,8 +12,10 @@ use gripgen::twin::{
     Campaign, MeasuredPull, Outcome, PerJaw, PlannedPull, Scenario, SlipLabel, TactileImage, Values,
     slip_label,
 };
-use gripgen::{Draw, Location, Simulator};
-use gripgen_cli::{PullDiagnoseOptions, calibrate_imprints, compare_pulls, diagnose_pull_table, simulate_campaign};
+use gripgen::{Draw, Simulator};
+use gripgen_cli::{
+    PullDiagnoseOptions, calibrate_imprints, compare_pulls, diagnose_pull_table, simulate_campaign,
+};
 use gripgen_measured::load_pulls;
 use gripgen_report::{contact_sheet, contact_sheet_samples, sample_picture};
 use std::collections::BTreeMap;

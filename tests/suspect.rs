@@ -1,13 +1,13 @@
 //! Labels against their own traces, through the whole pipeline.
 
 use crate::common::{self, jobs, run, slow, write_project};
+use gripgen::Project;
 use gripgen::record::Dataset;
-use gripgen_measured::{read_judged_pulls, write_pull_folder};
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
 use gripgen::twin::label_check::{Expected, LabelEvidence, Verdict, check_label};
 use gripgen::twin::{MeasuredPulls, Pulled};
-use gripgen::Project;
 use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
+use gripgen_measured::{read_judged_pulls, write_pull_folder};
 use std::path::Path;
 
 /// Pulls of the gear by the reduced mechanics, with these effects; no images.

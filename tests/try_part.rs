@@ -2,9 +2,9 @@
 
 use crate::common::project_in;
 use crate::solids::{Solid, SolidPart, ordinary};
+use gripgen::generate;
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::{Jaw, Outcome};
-use gripgen::{Location, Project, generate};
 use gripgen_cli::{PartOptions, TryOptions, TryPartError, part_starter, rasterise, try_part};
 use gripgen_report::{TriedPart, tried_page, tried_picture};
 use std::path::Path;

@@ -42,7 +42,8 @@ fn build_wheel(target: &Path, folder: &Path) -> Result<PathBuf, String> {
 }
 
 fn build_binary(target: &Path, folder: &Path) -> Result<PathBuf, String> {
-    let selection = ["--release", "--locked", "--package", "gripgen-cli", "--features", "gpu", "--target", TARGET];
+    let selection =
+        ["--release", "--locked", "--package", "gripgen-cli", "--features", "gpu", "--target", TARGET];
     let mut build = cargo(&["build"]);
     build.args(selection).env("RUSTFLAGS", "-C target-feature=+crt-static");
     run("static binary", &mut build)?;

@@ -15,8 +15,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use gripgen::LibraryError;
-use gripgen::{Location, ReadFileError};
 use gripgen::{LoadError, Project};
+use gripgen::{Location, ReadFileError};
 
 /// Poses that are rendered in turn.
 const POSES: usize = 64;

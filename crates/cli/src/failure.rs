@@ -1,12 +1,12 @@
 //! What went wrong, for a person: place, both numbers, a hint, and an exit code.
 
+use crate::{BenchError, LoadSensorError, RenderError};
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use gripgen::record::{ExportError, FolderError, ReadError};
 use gripgen::tactile::gpu::GpuError;
 use gripgen::tactile::presses::HeightsError;
 use gripgen::twin::config::{ConfigError, Place};
 use gripgen::{LoadError, OpenPlantError, SweepError};
-use crate::{BenchError, LoadSensorError, RenderError};
 use std::fmt::Display;
 use std::io;
 

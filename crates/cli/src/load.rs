@@ -4,11 +4,14 @@ use crate::args::TalkArgs;
 use crate::commands::rig::load_rig;
 use crate::failure::Failure;
 use crate::shell;
+use crate::{
+    FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, load_presses, load_sensor,
+    load_twin_sensor,
+};
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::PressSet;
 use gripgen::twin::Twin;
 use gripgen::{Library, Location, load_twin_document};
-use crate::{FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, load_presses, load_sensor, load_twin_sensor};
 use gripgen_measured::{LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls_with};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};

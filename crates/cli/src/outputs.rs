@@ -9,8 +9,8 @@ mod pending;
 pub use pending::{Pending, PendingFolder};
 
 use crate::failure::{Failure, no_room};
-use gripgen_report::CONTACT_SHEET;
 use gripgen::twin::Posterior;
+use gripgen_report::CONTACT_SHEET;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 

@@ -1,9 +1,9 @@
 //! What a sweep will be: size, time, and whether its first samples and its outermost grips work.
 
-use gripgen::drawn_scenario;
-use gripgen::try_grip;
 use gripgen::Project;
 use gripgen::SampleError;
+use gripgen::drawn_scenario;
+use gripgen::try_grip;
 use gripgen::{SweepError, encode_filmed, guarded};
 use gripgen_record::EncodedFrame;
 use gripgen_record::proto::gripgen_v1::Status;

@@ -1,6 +1,7 @@
 //! What a diagnosis says, as it stands in `diagnose --json` (DESIGN 5.4).
 
-use gripgen_twin::effects::{Experiment, Measured, find, separating};
+use crate::effect_search::separating;
+use gripgen_twin::effects::{Experiment, Measured, find};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

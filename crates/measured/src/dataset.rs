@@ -49,7 +49,11 @@ pub fn open_dataset(path: &Path) -> Result<Dataset, OpenDatasetError> {
         false => Ok(None),
     };
     let (ids, traces) = pulls.into_iter().map(|pull| (pull.id, pull.trace)).unzip();
-    Ok(Dataset::of_measured(path, table, MeasuredRows { ids, traces, images: Box::new(images), image_size_px }))
+    Ok(Dataset::of_measured(
+        path,
+        table,
+        MeasuredRows { ids, traces, images: Box::new(images), image_size_px },
+    ))
 }
 
 /// What was recorded of the known columns, and every further column.

@@ -1,8 +1,8 @@
 //! A folder with `imprints.csv`: imprints of grasps beside the normal force of the jaw, without a pull.
 
-use gripgen_record::sha256_hex;
 use crate::press_table::picture;
 use crate::table::{Row, TableError, TableReader, TextCells, read_bytes};
+use gripgen_record::sha256_hex;
 use gripgen_twin::{TactileImage, Values};
 use std::path::Path;
 

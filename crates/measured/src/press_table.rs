@@ -1,7 +1,7 @@
 //! A folder of presses, of a ball or of other bodies: `presses.csv`, the images that it names, and `rest.png`.
 
-use gripgen_record::{decode_picture as decode, is_jpeg};
 use crate::table::{TableError, TableReader, TextCells, number, read_bytes};
+use gripgen_record::{decode_picture as decode, is_jpeg};
 use gripgen_twin::{TactileImage, Values};
 use std::path::{Path, PathBuf};
 

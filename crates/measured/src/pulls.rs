@@ -14,9 +14,9 @@ pub use standing::{JudgedPulls, Standing};
 pub use write::write_pull_folder;
 
 use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, LabelEvidenceKind, parse_header};
-use gripgen_record::proto::gripgen_v1::Status;
 use crate::table::{TableError, TableReader, read_bytes};
 use cells::{Cells, Column, DEFAULT_STEP_S};
+use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_twin::config::PullFile;
 use gripgen_twin::{Covariates, ExtraColumn, MeasuredPull, MeasuredPulls};
 use sha2::{Digest, Sha256};

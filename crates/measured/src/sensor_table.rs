@@ -1,7 +1,7 @@
 //! A folder with `sensor.csv`: a force sensor read beside a reference.
 
-use gripgen_record::sha256_hex;
 use crate::table::{TableError, TableReader, TextCells, read_bytes};
+use gripgen_record::sha256_hex;
 use gripgen_twin::Values;
 use std::path::Path;
 

@@ -1,7 +1,8 @@
 //! Tables that people hand in: what is written is read back, and what is wrong is named.
 
 use crate::{
-    TableError, open_dataset, read_press_columns, read_press_folder, read_pull_folder, read_sensor_table, write_pull_folder,
+    TableError, open_dataset, read_press_columns, read_press_folder, read_pull_folder, read_sensor_table,
+    write_pull_folder,
 };
 use gripgen_twin::columns::{COLUMNS, Column, InTable, Kind, covariates};
 use gripgen_twin::draw::Drawn;

@@ -2,12 +2,12 @@
 
 use crate::error;
 use crate::film;
+use gripgen::physics::in_parallel;
 use gripgen::record::proto::gripgen_v1::{JawContact, Status};
 use gripgen::record::{Dataset as Rows, DatasetError, NoiseMode};
 use gripgen::twin::Values;
 use gripgen::twin::{ContactPatch, Jaw};
 use gripgen::{Project, press_only};
-use gripgen::physics::in_parallel;
 use numpy::{IntoPyArray, PyArray, PyArray1, PyArray3, PyArray4, PyArray5, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

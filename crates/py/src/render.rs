@@ -1,11 +1,11 @@
 //! `_core.render`: what a sensor sees of a mesh, or of a surface that is given by its heights.
 
 use crate::error;
+use gripgen::Location;
 use gripgen::tactile::npz::Array;
 use gripgen::tactile::presses::RenderedBody;
-use gripgen::Location;
-use gripgen_cli::{RenderOptions, load_sensor, render_file, render_surface};
 use gripgen_cli::Failure;
+use gripgen_cli::{RenderOptions, load_sensor, render_file, render_surface};
 use numpy::{PyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

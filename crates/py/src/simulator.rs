@@ -1,13 +1,13 @@
 //! `_core.Simulator`: pulls on a twin, one by one or many at once.
 
 use crate::{error, values};
+use gripgen::physics::in_parallel;
 use gripgen::record::proto::gripgen_v1::Status;
 use gripgen::record::status_name;
 use gripgen::twin::config::Mechanics;
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::{Outcome, PerJaw, PullTrace, Sample, TactileImage};
 use gripgen::{Draw, Location, Simulator as Twin};
-use gripgen::physics::in_parallel;
 use numpy::{PyArray, PyArray1, PyArray4, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -14,8 +14,8 @@ use crate::bars::{self, Bar};
 use crate::page::{PLOTS, Page, PlotBudget, Table};
 use crate::text::{NAME, SENTENCE, clean, number};
 use gripgen_identify::{
-    Channel, Detectable, Diagnosis, ErrorPair, HARDLY, HeldOutError, NamedEffect, ParameterEstimate,
-    UnknownCovariate, Verdict,
+    Channel, Detectable, Diagnosis, ErrorPair, HeldOutError, MIN_REPORTABLE_WEIGHT, NamedEffect,
+    ParameterEstimate, UnknownCovariate, Verdict,
 };
 use gripgen_twin::effects::find;
 use serde_json::{Value, json};
@@ -163,7 +163,7 @@ pub fn diagnosis_page(d: &Diagnosis, report: &ReportData) -> String {
 /// What was found, by name, with what it is tied with.
 fn names(d: &Diagnosis) -> String {
     let effect = |effect: &NamedEffect| {
-        let perhaps = if effect.weight < HARDLY { "perhaps " } else { "" };
+        let perhaps = if effect.weight < MIN_REPORTABLE_WEIGHT { "perhaps " } else { "" };
         let part = effect.part.as_ref().map(|part| format!(" on {part}")).unwrap_or_default();
         let alternatives: Vec<&str> = effect.indistinguishable_from.iter().map(|r| r.name.as_str()).collect();
         let tied = match alternatives.is_empty() {

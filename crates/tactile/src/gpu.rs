@@ -22,10 +22,8 @@ mod source_tests;
 #[cfg(test)]
 mod tests;
 
+pub use crate::gpu_types::{AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRequest, makes};
 pub use batch::{GpuMesh, GpuSensor};
-pub use crate::gpu_types::{
-    AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRequest, makes,
-};
 pub use source::Variant;
 
 use crate::grid::Plane;
@@ -33,7 +31,6 @@ use crate::indent::{IndentError, nothing_in_front};
 use crate::sensor::Sensor;
 use device::Device;
 use encode::Run;
-use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gel, TactileImage, TriMesh};
 use layout::{HAS_NOISE, HAS_PART, Outcome, PressInput};
 use pipelines::Pipelines;

@@ -1,8 +1,6 @@
 //! A build without the feature `gpu`: no adapter can be opened, so that there is no value of any type of a device.
 
-pub use crate::gpu_types::{
-    AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRequest, makes,
-};
+pub use crate::gpu_types::{AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRequest, makes};
 
 use crate::indent::IndentError;
 use crate::sensor::Sensor;

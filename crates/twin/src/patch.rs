@@ -1,6 +1,5 @@
 //! What a grip looks like once the jaws have settled, and its contacts as a few pressure cells.
 
-
 /// One cell of a contact patch, in the `gel` frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PressureCell {

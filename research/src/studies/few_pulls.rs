@@ -12,11 +12,11 @@ use crate::lab::{Contact, Plan, World, campaign};
 use crate::{StudyResult, arguments};
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
 use gripgen::identify::pulls::priors::{Prior, PullPriors};
+use gripgen::physics::in_parallel;
 use gripgen::twin::config::Feedback;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{MeasuredPulls, Twin};
 use gripgen::{Library, Location, load_twin_document};
-use gripgen::physics::in_parallel;
 use gripgen_cli::{calibrate_twin, compare_pulls_with, edited_twin, shipped_priors};
 use std::sync::Mutex;
 

@@ -11,8 +11,8 @@
 use crate::StudyResult;
 use crate::truth::{Given, PART, Truth, asked};
 use gripgen::identify::pulls::calibrate::CalibrateRequest;
-use gripgen::twin::Posterior;
 use gripgen::physics::in_parallel;
+use gripgen::twin::Posterior;
 use gripgen_cli::calibrate_twin;
 use std::sync::Mutex;
 

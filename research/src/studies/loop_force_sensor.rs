@@ -6,8 +6,8 @@
 
 use crate::{StudyResult, arguments};
 use gripgen::identify::{Diagnosis, HeldOutError, Verdict};
-use gripgen_report::Plot;
 use gripgen_cli::{calibrate_sensor_table, diagnose_sensor_table, load_sensor_table};
+use gripgen_report::Plot;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -11,7 +11,10 @@ use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::{CalibrateOptions, Press, PressSet, calibrate_presses};
 use gripgen::twin::TactileImage;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen_cli::{PressCovariate, PressDiagnosisInput, PressGeometry, PressValues, diagnose_presses, load_presses, presses_sha256};
+use gripgen_cli::{
+    PressCovariate, PressDiagnosisInput, PressGeometry, PressValues, diagnose_presses, load_presses,
+    presses_sha256,
+};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;

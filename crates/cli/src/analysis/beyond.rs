@@ -1,8 +1,8 @@
 //! What a sweep draws beyond the tables of its twin.
 
-use gripgen::drawn_scenario;
-use gripgen::Project;
 use crate::analysis::unvaried::drawn_from;
+use gripgen::Project;
+use gripgen::drawn_scenario;
 use gripgen_twin::columns;
 use gripgen_twin::draw::{Distribution, Drawn};
 use gripgen_twin::{Table, Values};

@@ -1,10 +1,10 @@
 //! Calibration of a twin from measured pulls.
 
 use crate::analysis::diagnose::{PullTwinError, check_fit, given_model, pull_values};
-use gripgen::Library;
 use crate::analysis::expect::pull_predictor;
 use crate::analysis::priors::shipped_priors;
 use crate::analysis::twin_edits::{TwinEdits, effect_entry, put_estimate};
+use gripgen::Library;
 use gripgen_identify::pulls::calibrate::{
     CalibrateError, CalibrateRequest, PullCalibration, calibrate_pulls,
 };

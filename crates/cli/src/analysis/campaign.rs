@@ -1,10 +1,10 @@
 //! A campaign made on a twin instead of on a rig, and the options of a first one from a twin.
 
-use gripgen::simulate;
 use gripgen::Location;
-use gripgen_measured::LoadedPulls;
-use gripgen::{LoadError, Project, load_twin_document};
 use gripgen::SimulateOptions;
+use gripgen::simulate;
+use gripgen::{LoadError, Project, load_twin_document};
+use gripgen_measured::LoadedPulls;
 use gripgen_record::sha256_hex;
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::columns::{Column, covariates};

@@ -1,12 +1,12 @@
 //! How far the images that a twin expects are from those of measured pulls.
 
 use crate::analysis::expect::scenario_of;
-use gripgen::Gripped;
 use crate::analysis::imprint::{ImageSource, ImprintImagesError, Seen, grips_tried};
+use gripgen::Gripped;
 use gripgen::Library;
+use gripgen::{SampleError, SimulateOptions};
 use gripgen_measured::{LoadPullsError, LoadedPulls, Suspects, load_pulls_with};
 use gripgen_physics::in_parallel;
-use gripgen::{SampleError, SimulateOptions};
 use gripgen_tactile::SimdLevel;
 use gripgen_tactile::metrics::{MetricError, Score, mean_score, score};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};

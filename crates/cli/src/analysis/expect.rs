@@ -4,16 +4,19 @@
 //! friction law on each cell, limit surface, reduced mechanics, force loop, wrist sensor. What a sample draws is averaged:
 //! the scatter of friction by quadrature, the noise of the readings by [`label_moments`].
 
-use gripgen_physics::{PatchFriction, creep_of, sensor_chain};
-use gripgen::{Indenter, answering_mass_kg, held, jaw_forces_n};
-use gripgen_physics::{grip_point};
 use gripgen::Library;
 use gripgen::SampleError;
-use gripgen_physics::{Cache, Command, Held, JawFriction, PullPredictor, PullSession, Signals, SimulatePulls, campaign_staircases};
+use gripgen::{Indenter, answering_mass_kg, held, jaw_forces_n};
+use gripgen_physics::grip_point;
+use gripgen_physics::{
+    Cache, Command, Held, JawFriction, PullPredictor, PullSession, Signals, SimulatePulls,
+    campaign_staircases,
+};
+use gripgen_physics::{PatchFriction, creep_of, sensor_chain};
 use gripgen_tactile::SimdLevel;
-use gripgen_twin::label_moments::label_moments;
 use gripgen_twin::config::Mechanics;
 use gripgen_twin::effects::{CommandChain, OutsideFit, imprint_volume_m3, jaw_tilt_rad};
+use gripgen_twin::label_moments::label_moments;
 use gripgen_twin::random::{Purpose, Stream, normal_quantile};
 use gripgen_twin::{
     ContactPatch, Jaw, MeasuredPull, MeasuredPulls, PerJaw, PullSettings, Scenario, Staircase, Twin,

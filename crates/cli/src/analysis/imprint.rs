@@ -4,10 +4,10 @@
 mod images;
 mod press;
 
-use gripgen::Location;
-use gripgen::{LoadError, Project};
-use gripgen::SampleError;
 use crate::analysis::twin_edits::{EditedValue, calibration_entry};
+use gripgen::Location;
+use gripgen::SampleError;
+use gripgen::{LoadError, Project};
 use gripgen_identify::{FittedPress, ImprintEstimate, imprint_constant};
 use gripgen_twin::config::GelModel;
 use gripgen_twin::{Jaw, MeasuredPull, MeasuredPulls};

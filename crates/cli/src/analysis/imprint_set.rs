@@ -1,7 +1,9 @@
 //! Sets of imprints from disk: a folder with `imprints.csv`, whose volumes stand there or are read off pictures.
 
 use gripgen_identify::{Covariate, ImprintData};
-use gripgen_measured::{IMPRINTS_FILE, ImprintTable, MeasuredImprint, TableError, read_imprint_picture, read_imprint_table};
+use gripgen_measured::{
+    IMPRINTS_FILE, ImprintTable, MeasuredImprint, TableError, read_imprint_picture, read_imprint_table,
+};
 use gripgen_record::sha256_hex;
 use gripgen_tactile::{Sensor, SimdLevel, VolumeError, VolumeReader};
 use gripgen_twin::{Gel, TactileImage};

@@ -2,12 +2,12 @@
 
 mod bodies;
 
-use gripgen::{Library, LibraryError};
-use gripgen::{Location, ReadFileError};
-use gripgen::MeshFileError;
-use gripgen::{LoadError, load_twin_document};
-use gripgen::Files;
 use bodies::PressBodies;
+use gripgen::Files;
+use gripgen::MeshFileError;
+use gripgen::{Library, LibraryError};
+use gripgen::{LoadError, load_twin_document};
+use gripgen::{Location, ReadFileError};
 use gripgen_measured::{PRESSES_FILE, PressFolder, PressRecord, TableError, press_table, read_press_folder};
 use gripgen_record::sha256_hex;
 use gripgen_tactile::presses::{

@@ -4,9 +4,9 @@ mod entry;
 
 pub(crate) use entry::{calibration_entry, effect_entry, put_estimate};
 
-use gripgen::{Location, path_from};
-use gripgen::{LoadError, load_twin_document};
 use gripgen::VERSION;
+use gripgen::{LoadError, load_twin_document};
+use gripgen::{Location, path_from};
 use gripgen_twin::config::{CalibrationFile, ConfigError, EffectFile, TwinFile};
 use gripgen_twin::{TWIN_SCHEMA, Twin};
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! What a twin depends on and a sweep leaves at one value.
 
-use gripgen::drawn_scenario;
 use gripgen::Project;
+use gripgen::drawn_scenario;
 use gripgen_twin::columns::{self, Column};
 use gripgen_twin::config::ImageStorage;
 use gripgen_twin::draw::{Distribution, Drawn};

@@ -5,8 +5,8 @@ use crate::failure::Failure;
 use crate::load::jobs;
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
-use gripgen::twin::config::Backend;
 use crate::{BenchOptions, BenchReport, bench};
+use gripgen::twin::config::Backend;
 use serde_json::{Value, json};
 
 /// Runs the verb.

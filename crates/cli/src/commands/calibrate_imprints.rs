@@ -6,9 +6,9 @@ use crate::failure::Failure;
 use crate::load::{load_twin, there_is};
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
-use gripgen::identify::{ImprintConstants, ParameterEstimate, SharedConstant};
-use gripgen::Location;
 use crate::{calibrate_imprint_table, edited_twin_toml, imprint_calibration_edits};
+use gripgen::Location;
+use gripgen::identify::{ImprintConstants, ParameterEstimate, SharedConstant};
 use serde_json::{Map, Value, json};
 
 /// Runs the verb.

@@ -6,13 +6,13 @@ use crate::failure::Failure;
 use crate::load::{no_presses, say_circles};
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
+use crate::{PressGeometry, find_missing_circles, load_presses};
 use gripgen::tactile::presses::{
     BallSize, CalibrateError, CalibrateOptions, Calibration, FEW_PRESSES, MarkError, PARTS, PressCoverage,
     PressSet, RIM_M, calibrate_presses, check_ball_size, press_coverage,
 };
 use gripgen::tactile::{GelShape, Sensor};
 use gripgen::twin::TactileImage;
-use crate::{PressGeometry, find_missing_circles, load_presses};
 use gripgen_report::{PressMap, PressPage, press_page};
 use serde_json::{Value, json};
 use std::path::Path;

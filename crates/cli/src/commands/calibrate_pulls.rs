@@ -5,10 +5,13 @@ use crate::failure::Failure;
 use crate::load::{folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects};
 use crate::output::{JsonSink, print};
 use crate::outputs::{Outputs, draws_of};
+use crate::{
+    CalibratePullsError, ImprintCalibrations, calibrate_imprints, calibrate_twin, edited_twin_toml,
+    pull_priors,
+};
 use gripgen::identify::ParameterEstimate;
 use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
 use gripgen::{Location, load_twin_document};
-use crate::{CalibratePullsError, ImprintCalibrations, calibrate_imprints, calibrate_twin, edited_twin_toml, pull_priors};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::Path;

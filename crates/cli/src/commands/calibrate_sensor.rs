@@ -5,9 +5,9 @@ use crate::failure::Failure;
 use crate::load::there_is;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
-use gripgen::identify::{ParameterEstimate, SensorCalibration};
-use gripgen::Location;
 use crate::{calibrate_sensor_table, edited_twin_toml, load_sensor_table, sensor_calibration_edits};
+use gripgen::Location;
+use gripgen::identify::{ParameterEstimate, SensorCalibration};
 use serde_json::json;
 use std::fmt::Write;
 

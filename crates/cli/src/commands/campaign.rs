@@ -8,13 +8,13 @@ use crate::load::{load_library, load_twin, within_rig};
 use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
+use crate::{NextPulls, simulate_campaign};
+use gripgen::Location;
 use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
-use gripgen_measured::{campaign_toml, write_pull_folder};
 use gripgen::twin::effects::OutsideFit;
 use gripgen::twin::{Campaign, PullKind, Twin};
-use gripgen::Location;
-use crate::{NextPulls, simulate_campaign};
 use gripgen_measured::Suspects;
+use gripgen_measured::{campaign_toml, write_pull_folder};
 use serde_json::json;
 use std::path::Path;
 

@@ -6,11 +6,11 @@ use crate::load;
 use crate::output::{JsonSink, count, duration, size};
 use crate::outputs::Outputs;
 use crate::shell;
+use crate::{Beyond, Unvaried, beyond, unvaried};
+use crate::{Plan, plan};
 use gripgen::record::{proto::gripgen_v1::Status, status_name};
 use gripgen::tactile::{LINEAR_PRESSURE_SHARE, SimdLevel};
 use gripgen::{Location, Project};
-use crate::{Plan, plan};
-use crate::{Beyond, Unvaried, beyond, unvaried};
 use serde_json::json;
 use std::path::Path;
 

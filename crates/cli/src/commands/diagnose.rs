@@ -5,6 +5,7 @@ mod notes;
 mod output;
 mod presses;
 
+use crate::Diagnosed;
 use crate::args::{DiagnoseArgs, TalkArgs};
 use crate::commands::imprints;
 use crate::failure::Failure;
@@ -14,11 +15,13 @@ use crate::load::{
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use crate::progress::Share;
+use crate::{
+    PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_imprint_set, is_press_set,
+    is_sensor_table, load_sensor_table,
+};
+use gripgen::Library;
 use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
-use gripgen::Library;
-use crate::Diagnosed;
-use crate::{PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_imprint_set, is_press_set, is_sensor_table, load_sensor_table};
 use gripgen_measured::Suspects;
 use std::path::Path;
 

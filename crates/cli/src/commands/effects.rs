@@ -5,10 +5,10 @@ use crate::failure::Failure;
 use crate::load::{load_library, load_twin};
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
+use crate::{EffectCurve, effect_curve};
+use gripgen::BASELINE_TWIN;
 use gripgen::twin::config::suggestion;
 use gripgen::twin::effects::{EffectSpec, Group, LIBRARY, ParameterSpec, PressNeeds, Seen, find};
-use gripgen::BASELINE_TWIN;
-use crate::{EffectCurve, effect_curve};
 use serde_json::{Value, json};
 use std::fmt::Write;
 

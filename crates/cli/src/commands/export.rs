@@ -6,11 +6,11 @@ use crate::failure::Failure;
 use crate::output::{JsonSink, count};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
-use gripgen_measured::open_dataset;
 use gripgen::record::{
     ExportOptions, RunFolder, ShardReader, export_lerobot, export_parquet, export_sample, export_webdataset,
     webdataset_rows,
 };
+use gripgen_measured::open_dataset;
 use serde_json::json;
 use std::path::PathBuf;
 

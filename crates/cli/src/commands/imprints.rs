@@ -1,13 +1,13 @@
 //! Sets of imprints: loading, `gripgen compare` and `gripgen diagnose` of them.
 
+use crate::Diagnosed;
 use crate::args::{CompareArgs, DiagnoseArgs};
 use crate::failure::Failure;
 use crate::load::load_twin;
 use crate::output::{JsonSink, print};
-use gripgen::twin::{Jaw, Twin};
-use gripgen::Location;
-use crate::Diagnosed;
 use crate::{ImprintSet, compare_imprint_table, diagnose_imprint_table, load_imprint_set, load_sensor};
+use gripgen::Location;
+use gripgen::twin::{Jaw, Twin};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 

@@ -6,8 +6,8 @@ use crate::load::jobs;
 use crate::output::{JsonSink, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
-use gripgen::twin::{MESH_FORMATS, usual_scale_mm_per_unit};
 use crate::{PartOptions, benchmark_starter, part_starter, starter};
+use gripgen::twin::{MESH_FORMATS, usual_scale_mm_per_unit};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -4,12 +4,12 @@ use crate::args::RenderArgs;
 use crate::failure::Failure;
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
+use crate::{RenderOptions, is_height_map, load_sensor, render_file};
+use gripgen::Location;
 use gripgen::record::encode_png;
 use gripgen::tactile::npz::{Array, ElementType, write_npy};
 use gripgen::tactile::presses::RenderedBody;
 use gripgen::twin::{TactileImage, usual_scale_mm_per_unit};
-use gripgen::Location;
-use crate::{RenderOptions, is_height_map, load_sensor, render_file};
 use serde_json::json;
 use std::path::Path;
 

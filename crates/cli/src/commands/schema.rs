@@ -3,8 +3,8 @@
 use crate::args::{Cli, CompletionsArgs, SchemaArgs, SchemaKind};
 use crate::failure::Failure;
 use crate::output::print;
-use clap::CommandFactory;
 use crate::{campaign_schema, rosbag_schema, sweep_schema, twin_schema};
+use clap::CommandFactory;
 use gripgen_rig::experiment::rig_schema;
 
 /// Runs the verb.

@@ -9,11 +9,11 @@ mod seen;
 mod text;
 mod trial;
 
-use gripgen::assets;
-use gripgen::{Library, LibraryError};
-use gripgen::Location;
-use gripgen::{BASELINE_TWIN, load_twin_document};
 pub use benchmark::{BenchmarkStarter, benchmark_starter};
+use gripgen::Location;
+use gripgen::assets;
+use gripgen::{BASELINE_TWIN, load_twin_document};
+use gripgen::{Library, LibraryError};
 use gripgen_physics::{PartShape, Surface};
 use gripgen_report::{View, grips_picture};
 use gripgen_tactile::{ClusteredMesh, Grid, raster};

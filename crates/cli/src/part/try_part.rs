@@ -2,15 +2,14 @@
 
 mod holding;
 
-use gripgen::{pull_gripped, start_pull};
-use gripgen::Gripped;
-use crate::part::init::{
-    ANGLES_DEG, HIGHEST_N, InitError, MU, PART, PartOptions, Searched, Trial, TrialCell, baseline,
-    search,
-};
-use gripgen::Location;
 use crate::analysis::{LoadSensorError, load_sensor};
+use crate::part::init::{
+    ANGLES_DEG, HIGHEST_N, InitError, MU, PART, PartOptions, Searched, Trial, TrialCell, baseline, search,
+};
+use gripgen::Gripped;
+use gripgen::Location;
 use gripgen::{SampleError, SimulateOptions};
+use gripgen::{pull_gripped, start_pull};
 use gripgen_report::{FrictionRange, GripTried, TriedPart, WorksAt};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};

@@ -11,7 +11,6 @@ use crate::diagnosis::{
     Channel, DataSummary, Detectable, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, NamedEffect,
     ParameterEstimate, Rival,
 };
-use crate::effect_search::separating;
 use crate::grouped::t_quantile_95;
 use crate::statistics::mean_and_error;
 use gripgen_twin::effects::{EffectSpec, Measured};

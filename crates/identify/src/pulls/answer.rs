@@ -9,7 +9,6 @@ use super::estimates::baseline;
 use super::fitting::Fitted;
 use super::heldout::{HeldOutScore, by_value, folds, held_out_score, noise_floor_n, predicted, scatter};
 use super::instead::tied_instead;
-use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::naming::named;
 use super::one_level::of_one_level;
 use super::paying::{by_chance, paying};
@@ -29,6 +28,7 @@ use crate::diagnosis::{
     Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, ParameterEstimate, Residual, UnknownCovariate,
 };
 use gripgen_twin::columns::covariates;
+use gripgen_twin::predict::{PredictPulls, PullModel};
 use gripgen_twin::{MeasuredPulls, Posterior};
 use std::collections::BTreeMap;
 use std::sync::Mutex;

@@ -14,7 +14,6 @@ use super::heldout::{folds, predicted};
 use super::intervals::NormalFit;
 use super::label_noise::{TRIED_FROM_N, TRIED_TO_N};
 use super::law::largest_relative_sigma;
-use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::posterior::of_calibration;
 use super::priors::PullPriors;
 use super::recalibrated::corrected;
@@ -22,6 +21,7 @@ use super::slip::Slips;
 use super::terms::Terms;
 use crate::diagnosis::{HeldOutError, ParameterEstimate};
 use gripgen_twin::effects::{EffectSpec, OFFSET_LAW, find};
+use gripgen_twin::predict::{PredictPulls, PullModel};
 use gripgen_twin::{MeasuredPulls, Posterior};
 use std::collections::BTreeMap;
 

@@ -1,10 +1,10 @@
 //! Which effects of the library compete for a campaign, and where their fits start.
 
 use super::data::{Column, PullData};
-use gripgen_twin::predict::ModelEffect;
 use crate::least_squares::FreeParameter;
 use gripgen_twin::PULLS_SINCE_REST;
 use gripgen_twin::effects::{EffectSpec, Fit, LIBRARY, PullSpan, Seen};
+use gripgen_twin::predict::ModelEffect;
 
 /// An effect that competes.
 #[derive(Debug, Clone)]

@@ -1,13 +1,13 @@
 //! A model against a campaign: how far labels, slips and readings lie from what it predicts, and in which deviations.
 
 use super::context::{Context, Observation};
-use gripgen_twin::predict::{PullModel, PullPrediction};
 use super::observe::LEVELS;
 use super::slip::SlipLimit;
 use super::trace_residuals::{OWN_N, SHARED_N, TraceResiduals};
 use super::zero_screen::zeros_that_depend;
 use super::zero_walk::{Pulls, SlowZero, Zero, ZeroWalk};
 use super::zero_wander::ZeroReadings;
+use gripgen_twin::predict::{PullModel, PullPrediction};
 use std::borrow::Cow;
 
 /// Force by which slips and labels of a rig differ from those of a pull without inertia: an offset as small as this says

@@ -1,10 +1,10 @@
 //! Fits of all rivals beside a model.
 
 use super::fitting::Fitted;
-use gripgen_twin::predict::PullModel;
 use super::power::ScoreTest;
 use super::search::{Entry, ModelTerm, Search};
 use super::terms::Terms;
+use gripgen_twin::predict::PullModel;
 use std::sync::Mutex;
 
 /// Gain of log-likelihood that the slope at nothing has to promise for an effect on signals to be fitted, and for anything

@@ -2,9 +2,9 @@
 
 use super::fitting::Fitted;
 use super::heldout::predicted;
-use gripgen_twin::predict::PullPrediction;
 use super::search::{Accepted, Search};
 use super::worth::BAD;
+use gripgen_twin::predict::PullPrediction;
 
 /// Part of the squared error by which labels that no fit has seen may be predicted worse, by chance, with an effect that
 /// shows in the traces only.

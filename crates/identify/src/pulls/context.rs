@@ -3,13 +3,13 @@
 use super::creep::{Creep, without_slips_that_rise};
 use super::data::PullData;
 use super::likelihood::Tails;
-use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::observe::{LEVELS, TraceObservation, fall_s, noise_n, observe};
 use super::slip::{SlipLimit, SlipRig, SlipTrace, Slips, read_slips};
 use super::terms::Terms;
 use super::trace_residuals::{SHARED_N, Widening};
 use super::zero_walk::{SlowZero, ZeroWalk};
 use crate::least_squares::{FitOptions, FreeParameter, fit};
+use gripgen_twin::predict::{PredictPulls, PullModel};
 
 /// Scatter of friction from grip to grip with which residuals are weighed; their true scale is fitted.
 const SCATTER: f64 = 0.04;

@@ -9,9 +9,9 @@
 
 mod trace;
 
-use gripgen_twin::predict::ModelEffect;
 use super::observe::median;
 use gripgen_twin::effects::LIBRARY;
+use gripgen_twin::predict::ModelEffect;
 use gripgen_twin::{MeasuredPull, PullTrace};
 use trace::{Crept, LEAST_M, LookedAt, impulses_n_s, least_squares, pulled};
 

@@ -1,10 +1,10 @@
 //! Lag and dead time of the force loop from traces, with what they are known to.
 
 use super::context::Context;
-use gripgen_twin::predict::PullModel;
 use super::observe::START_S;
 use crate::bounded::interval90;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
+use gripgen_twin::predict::PullModel;
 use nalgebra::{DMatrix, DVector};
 
 /// Share of the limit up to which the gels are taken for springs.

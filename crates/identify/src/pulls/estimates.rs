@@ -4,8 +4,8 @@ use super::candidates::Candidate;
 use super::context::Context;
 use super::fitting::Fitted;
 use super::heldout::scatter;
-use gripgen_twin::predict::PullModel;
 use crate::diagnosis::ParameterEstimate;
+use gripgen_twin::predict::PullModel;
 use std::collections::BTreeMap;
 
 /// Half width of a 90 % interval of a normal variable, and by how much more the formulas here differ from what acts: set on

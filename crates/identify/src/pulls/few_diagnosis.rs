@@ -3,11 +3,11 @@
 use super::answer::blank;
 use super::data::PullData;
 use super::few::{FEW_PULLS, FewPulls, calibrate_few};
-use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::priors::PullPriors;
 use crate::diagnosis::{Diagnosis, Hint};
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::effects::OFFSET_LAW;
+use gripgen_twin::predict::{PredictPulls, PullModel};
 
 /// Standard deviations from which on a pull is said to lie off.
 pub(super) const FAR: f64 = 3.0;

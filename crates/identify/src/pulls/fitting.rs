@@ -2,10 +2,10 @@
 
 use super::context::Context;
 use super::likelihood::{Likelihood, likelihood};
-use gripgen_twin::predict::PullModel;
 use super::terms::Terms;
 use super::trace_residuals::Widening;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
+use gripgen_twin::predict::PullModel;
 use nalgebra::{DMatrix, DVector};
 
 /// Rounds of weights.

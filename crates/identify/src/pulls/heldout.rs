@@ -4,9 +4,9 @@ use super::candidates::Candidate;
 use super::context::Context;
 use super::fitting::Fitted;
 use super::learnt::learnt_again;
-use gripgen_twin::predict::PullModel;
 use super::terms::Terms;
 use crate::draws::Draws;
+use gripgen_twin::predict::PullModel;
 use std::sync::Mutex;
 
 /// Share of a label's standard deviation that is not felt.

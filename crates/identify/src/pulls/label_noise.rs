@@ -5,8 +5,8 @@
 //! without scattering them. What was taken for granted instead came back as such an offset.
 
 use super::context::Context;
-use gripgen_twin::predict::PullModel;
 use super::terms::Terms;
+use gripgen_twin::predict::PullModel;
 use std::sync::Mutex;
 
 /// Noises that are tried, in newtons: a factor of 1.5 apart.

@@ -4,8 +4,8 @@ use super::context::Context;
 use super::curves::{CLOCKS, Curve, SESSION};
 use super::evidence::{Grouped, Learnt, MOST};
 use super::fitting::Fitted;
-use gripgen_twin::predict::PullModel;
 use super::smooth::smooths;
+use gripgen_twin::predict::PullModel;
 use nalgebra::{DMatrix, DVector};
 
 /// Step of the logarithm of the friction by which the labels are differentiated.

@@ -5,10 +5,10 @@
 
 use super::fitting::Fitted;
 use super::intervals::NormalFit;
-use gripgen_twin::predict::PullModel;
 use super::search::Accepted;
 use crate::diagnosis::Diagnosis;
 use gripgen_twin::effects::OFFSET_LAW;
+use gripgen_twin::predict::PullModel;
 use gripgen_twin::{Posterior, PosteriorDraw};
 use std::collections::BTreeMap;
 

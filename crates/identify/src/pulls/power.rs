@@ -3,10 +3,10 @@
 use super::candidates::Candidate;
 use super::context::Context;
 use super::curves::Curve;
-use gripgen_twin::predict::PullModel;
 use super::terms::Terms;
 use super::trace_residuals::Widening;
 use crate::diagnosis::Detectable;
+use gripgen_twin::predict::PullModel;
 use nalgebra::{DMatrix, DVector, Dyn, SVD};
 
 /// Standard errors that an effect has to be away from nothing to be seen with a probability of 0.8 at a level of 1 %.

@@ -2,9 +2,9 @@
 
 use super::context::Context;
 use super::fitting::Fitted;
-use gripgen_twin::predict::PullModel;
 use super::scatter::scatter;
 use super::terms::Terms;
+use gripgen_twin::predict::PullModel;
 
 /// Least scatter with which a fit weighs residuals.
 const MIN_SCATTER: f64 = 0.002;

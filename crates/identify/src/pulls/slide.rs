@@ -10,8 +10,8 @@
 //! ends its pulls later than the rig does.
 
 use super::context::Context;
-use gripgen_twin::predict::PullModel;
 use super::observe::{TraceObservation, median};
+use gripgen_twin::predict::PullModel;
 
 /// Fewest rows of a slide, and fewest slides.
 const MIN_ROWS: usize = 5;

@@ -9,9 +9,9 @@
 
 use super::context::Context;
 use super::data::Column;
-use gripgen_twin::predict::PullModel;
 use crate::diagnosis::UnknownCovariate;
 use crate::draws::Draws;
+use gripgen_twin::predict::PullModel;
 
 /// Fewest traces with a reading without a load.
 const MIN_TRACES: usize = 10;

@@ -1,7 +1,7 @@
 //! What each column of a pull table means.
 
-use gripgen_record::proto::gripgen_v1::Status;
 use crate::table::{TableError, TableReader, TextCells, number};
+use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_twin::MeasuredPull;
 use gripgen_twin::columns::{COLUMNS, Column as PullColumn, InTable};
 use std::borrow::Cow;

@@ -2,8 +2,8 @@
 
 use super::PullPredictor;
 use super::limit::NormalForce;
-use gripgen_twin::predict::{PullModel, PullPrediction};
 use gripgen_twin::effects::Creep;
+use gripgen_twin::predict::{PullModel, PullPrediction};
 
 /// Ratio of the rates for which there are tables. Labels that end at the stop go with one over the root of the rate, so that is what is linear
 /// between two of them.

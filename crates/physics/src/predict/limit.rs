@@ -1,8 +1,8 @@
 //! What the jaws of a pull hold.
 
 use super::PullPredictor;
-use gripgen_twin::predict::PullModel;
 use gripgen_twin::effects::GripPoint;
+use gripgen_twin::predict::PullModel;
 use gripgen_twin::{Jaw, PerJaw};
 
 /// How hard the jaws of a pull press.

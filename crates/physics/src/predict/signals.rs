@@ -2,8 +2,8 @@
 
 use super::creep::creeps;
 use super::{Kept, PullPredictor, acts_on_signals, table};
-use gripgen_twin::predict::PullModel;
 use gripgen_twin::config::Feedback;
+use gripgen_twin::predict::PullModel;
 use std::sync::Arc;
 
 /// The signals of a model.

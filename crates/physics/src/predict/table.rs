@@ -1,9 +1,9 @@
 //! Labels as a function of what the jaws hold, over scatter and noise.
 
 use crate::{QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
+use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
 use gripgen_twin::label_moments::LabelRule;
 use gripgen_twin::predict::{PullModel, PullPrediction};
-use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
 use gripgen_twin::{Backbone, Staircase};
 use std::sync::{Arc, OnceLock};
 

@@ -3,9 +3,9 @@
 use super::table::{ExactLabels, LabelTable, Scattered, Tables, bent_by, enough_for};
 use super::{CONTACTS, PullPredictor, acts_on_signals};
 use crate::{RimTable, StuckPull};
+use gripgen_twin::Backbone;
 use gripgen_twin::label_moments::LabelRule;
 use gripgen_twin::predict::{PullModel, PullPrediction};
-use gripgen_twin::Backbone;
 use std::sync::Arc;
 
 /// Distance of the kinetic ratios for which there are tables; those between are interpolated.

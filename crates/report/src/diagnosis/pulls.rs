@@ -6,13 +6,13 @@ use super::{EvidenceRow, ReportData, WorstRow};
 use crate::text::spread;
 use crate::{Plot, PlotGroup, Series};
 use gripgen_identify::pulls::answer::{PullAnswer, PullFits};
-use gripgen_twin::predict::PullModel;
 use gripgen_identify::pulls::search::{Entry, ModelTerm};
 use gripgen_identify::{Level, levels};
 use gripgen_twin::MeasuredPulls;
 use gripgen_twin::columns::{covariates, value};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::find;
+use gripgen_twin::predict::PullModel;
 use std::collections::BTreeMap;
 
 /// Pull curves shown, rows of the tables.

@@ -10,6 +10,7 @@ use crate::sensor::{GelShape, Pyramid};
 use crate::shadow::{Shadow, ShadowKind, ShadowTable};
 use crate::testing::{self, gel};
 use crate::{ClusteredMesh, Grid, Renderer, SimdLevel, finish};
+use gripgen_twin::frames::Pose;
 use gripgen_twin::frames::{pose, rotation_from_fixed_xyz};
 use gripgen_twin::parts::{BallBearing, InvoluteGear, SteppedShaft};
 use nalgebra::Vector3;

@@ -24,7 +24,7 @@ pub struct Diagnosed {
 impl Diagnosed {
     /// An answer, with its sentences for a technician: what was found, and that its name is not sure where it is not.
     pub(crate) fn new(mut diagnosis: Diagnosis, edits: TwinEdits, report: ReportData) -> Self {
-        let mut plain = gripgen_identify::plain(&diagnosis);
+        let mut plain = gripgen_identify::summary_sentence(&diagnosis);
         if let Some(doubt) = doubt(&diagnosis, &report.evidence) {
             plain += &format!(" {doubt}");
         }

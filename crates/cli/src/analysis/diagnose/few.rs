@@ -3,13 +3,13 @@
 use super::diagnosed::Diagnosed;
 use super::next::NextPulls;
 use super::pull_values::pull_values;
-use gripgen_physics::PullPredictor;
 use crate::analysis::priors::shipped_priors;
 use crate::analysis::twin_edits::TwinEdits;
 use gripgen_identify::pulls::few_diagnosis::diagnose_few;
-use gripgen_twin::predict::PullModel;
 use gripgen_identify::{CampaignOptions, plan_campaign};
+use gripgen_physics::PullPredictor;
 use gripgen_report::ReportData;
+use gripgen_twin::predict::PullModel;
 use gripgen_twin::{MeasuredPulls, Twin};
 
 /// Pulls that are planned for a part, and at least.

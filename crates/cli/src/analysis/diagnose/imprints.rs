@@ -4,8 +4,8 @@ use super::diagnosed::Diagnosed;
 use crate::analysis::imprint_set::ImprintSet;
 use crate::analysis::twin_edits::{EditedValue, TwinEdits, calibration_entry, effect_entry};
 use gripgen_identify::{
-    ImprintComparison, ImprintConstants, ImprintDiagnosis, NamedEffect, ParameterEstimate,
-    SharedConstant, Verdict, calibrate_imprint_set, compare_imprints, diagnose_imprints,
+    ImprintComparison, ImprintConstants, ImprintDiagnosis, NamedEffect, ParameterEstimate, SharedConstant,
+    Verdict, calibrate_imprint_set, compare_imprints, diagnose_imprints,
 };
 use gripgen_report::imprint_report;
 use gripgen_twin::Twin;

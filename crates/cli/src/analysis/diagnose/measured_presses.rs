@@ -2,9 +2,9 @@
 
 use super::diagnosed::Diagnosed;
 use super::presses::{PressDiagnosisInput, diagnose_presses};
-use gripgen_measured::PressColumns;
 use crate::analysis::presses::{FoundCircles, find_circles_with_sensor, presses_sha256};
 use gripgen_identify::PressCovariate;
+use gripgen_measured::PressColumns;
 use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::PressSet;
 use gripgen_twin::config::EffectFile;
@@ -48,7 +48,9 @@ pub fn diagnose_measured_presses(
         set: &presses.set,
         sensor,
         time_s: presses.columns.time_s.clone(),
-        covariates: columns.map(|c| PressCovariate { name: c.name.clone(), values: c.values.clone() }).collect(),
+        covariates: columns
+            .map(|c| PressCovariate { name: c.name.clone(), values: c.values.clone() })
+            .collect(),
         marked: presses.marked,
         sha256: presses.sha256.clone(),
         kept_effects: twin_effects.into_iter().filter(|e| !is_optics(&e.name)).collect(),

@@ -1,13 +1,13 @@
 //! The next pulls: those that best tell apart what a diagnosis could not.
 
-use gripgen::Library;
 use crate::analysis::expect::pull_predictor;
+use gripgen::Library;
 use gripgen_identify::pulls::answer::PullFits;
 use gripgen_identify::pulls::fitting::Fitted;
 use gripgen_identify::pulls::heldout::scatter;
-use gripgen_twin::predict::{PredictPulls, PullModel};
 use gripgen_identify::{CandidatePull, DWELLS_S, FORCES_N, NO_LOAD_S, SeparableRival, plan_separating};
 use gripgen_twin::draw::Drawn;
+use gripgen_twin::predict::{PredictPulls, PullModel};
 use gripgen_twin::{Campaign, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, PlannedPull, PullKind, Twin};
 use nalgebra::{DMatrix, DVector};
 

@@ -1,8 +1,8 @@
 //! Fitted values of pulls as they stand in a twin.
 
-use gripgen_physics::speed_limit_m_per_s;
 use crate::analysis::twin_edits::{EditedValue, calibration_entry};
 use gripgen_identify::ParameterEstimate;
+use gripgen_physics::speed_limit_m_per_s;
 use gripgen_twin::predict::PullModel;
 use std::collections::BTreeMap;
 

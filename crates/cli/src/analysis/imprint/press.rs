@@ -2,8 +2,8 @@
 
 use super::CalibrateImprintsError;
 use crate::analysis::expect::scenario_of;
-use gripgen::{Gripped, placed_parts};
 use gripgen::Library;
+use gripgen::{Gripped, placed_parts};
 use gripgen::{SampleError, SimulateOptions};
 use gripgen_tactile::{Plane, Renderer, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};

@@ -1,18 +1,18 @@
 //! What follows from a diagnosis: the next pulls beside its files, and commands that can be copied.
 
+use crate::Diagnosed;
 use crate::args::DiagnoseArgs;
 use crate::commands::rig::load_rig;
 use crate::failure::Failure;
 use crate::output::program;
 use crate::outputs::{Outputs, is_special};
 use crate::shell;
+use crate::{NextPulls, unvaried};
 use gripgen::identify::{Channel, Diagnosis, Verdict};
 use gripgen::record::{RIG_SOURCE, RunFolder};
-use gripgen_measured::campaign_toml;
 use gripgen::twin::can_be_drawn;
 use gripgen::{BASELINE_TWIN, Location, Project};
-use crate::Diagnosed;
-use crate::{NextPulls, unvaried};
+use gripgen_measured::campaign_toml;
 use std::path::{Path, PathBuf};
 
 /// The sweep that works with every twin of ours.

@@ -1,12 +1,12 @@
 //! Presses: what a sensor file lacks.
 
+use crate::Diagnosed;
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
 use crate::load::{load_sensor_and_presses, say_circles};
 use crate::progress::Share;
-use gripgen::{Location, load_twin_document};
-use crate::Diagnosed;
 use crate::{diagnose_measured_presses, measured_presses};
+use gripgen::{Location, load_twin_document};
 use gripgen_measured::load_press_columns;
 
 /// Diagnoses the presses of the arguments.

@@ -11,11 +11,14 @@ use crate::failure::{Failure, another_run, code};
 use crate::interrupt::stop_flag;
 use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
-use gripgen::record::{FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls, suspect_pulls, write_rig_pull};
-use gripgen_measured::read_campaign;
-use gripgen::twin::{Campaign, PlannedPull, PullKind};
-use gripgen::VERSION;
 use crate::{plain_campaign, rig_run_differences, rig_run_toml};
+use gripgen::VERSION;
+use gripgen::record::{
+    FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls,
+    suspect_pulls, write_rig_pull,
+};
+use gripgen::twin::{Campaign, PlannedPull, PullKind};
+use gripgen_measured::read_campaign;
 use gripgen_report::publish_contact_sheet;
 use gripgen_rig::experiment::check::check;
 use gripgen_rig::experiment::plan::pull_program;

@@ -3,9 +3,9 @@
 use super::propose::Search;
 use super::trial::{ANGLES_DEG, LOWEST_N};
 use super::{IMPRINT_MM3_PER_N, InitError, MU, Proposal, StarterFile, Varied, baseline, text};
-use gripgen::assets::{self, ASSET_PREFIX, BENCHMARK};
 use gripgen::Library;
 use gripgen::Location;
+use gripgen::assets::{self, ASSET_PREFIX, BENCHMARK};
 use gripgen_physics::in_parallel;
 use gripgen_twin::parts::benchmark::{BenchmarkPart, FAMILIES, all};
 use gripgen_twin::random::{Purpose, Stream};

@@ -1,10 +1,10 @@
 //! Trying grips as the sweep will: the sweep's own code, forces, offsets and angles.
 
 use super::pose::GripAt;
-use gripgen::try_grip;
 use gripgen::Library;
-use gripgen_physics::in_parallel;
 use gripgen::SampleError;
+use gripgen::try_grip;
+use gripgen_physics::in_parallel;
 use gripgen_tactile::IndentError;
 use gripgen_twin::{Covariates, Part, PullSettings, Scenario, Twin};
 use std::collections::BTreeMap;

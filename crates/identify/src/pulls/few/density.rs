@@ -2,10 +2,10 @@
 
 use super::super::context::Context;
 use super::super::data::PullData;
-use gripgen_twin::predict::{PredictPulls, PullModel};
 use super::super::priors::PullPriors;
 use super::part::PartOnRig;
 use super::prepared;
+use gripgen_twin::predict::{PredictPulls, PullModel};
 
 /// What the draws of [`super::calibrate_few`] are draws of: likelihood times belief, of labels alone.
 ///

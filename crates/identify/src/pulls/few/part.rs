@@ -4,11 +4,11 @@
 //! weighed by likelihood and prior over the density that they were drawn from. The mean weight is the evidence of the rig.
 
 use super::super::context::Context;
-use gripgen_twin::predict::{ModelEffect, PullModel};
 use super::super::priors::PullPriors;
 use crate::draws::Draws;
 use crate::least_squares::{FitOptions, FreeParameter, fit};
 use gripgen_twin::effects::OFFSET_LAW;
+use gripgen_twin::predict::{ModelEffect, PullModel};
 use nalgebra::DVector;
 
 /// Draws of a part on each rig.

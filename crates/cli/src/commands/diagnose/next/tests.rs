@@ -114,8 +114,7 @@ fn the_next_sweep_is_one_that_runs() {
     };
     let effects = format!("[{}, {}, {}]", table("mu"), table("parts.gear.mu"), table("humidity_pct"));
     let baseline = Location::parse(BASELINE_TWIN);
-    let text =
-        crate::edited_twin_toml(&baseline, &[("effects".into(), effects)], &Default::default(), &out);
+    let text = crate::edited_twin_toml(&baseline, &[("effects".into(), effects)], &Default::default(), &out);
     std::fs::write(&out, text.unwrap()).unwrap();
     let args = typed(&["lab", "-o", out.to_str().unwrap()]);
     let mut found = answered(Verdict::Unknown, &[]);
