@@ -8,7 +8,7 @@
 
 mod guard;
 
-use gripgen::identify::{CampaignOptions, plan_campaign};
+use gripgen_identify::{CampaignOptions, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
 use gripgen::{Library, Location, load_twin_document};
 use gripgen_cli::{PullDiagnoseOptions, compare_pulls, diagnose_pull_table, simulate_campaign};

@@ -48,6 +48,7 @@ mod gripped;
 mod library;
 mod location;
 mod mesh_file;
+mod parallel;
 mod plant;
 mod project;
 mod resolve;
@@ -63,7 +64,6 @@ pub use generate::{
     pull_session, simulate, start_pull,
 };
 pub use gpu::{Gpu, PlacedPart};
-pub use gripgen_identify as identify;
 pub use gripgen_physics as physics;
 pub use gripgen_record as record;
 pub use gripgen_tactile as tactile;
@@ -74,6 +74,7 @@ pub use gripped::{
 pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError, path_from};
 pub use mesh_file::{MeshFileError, read_mesh};
+pub use parallel::in_parallel;
 pub use plant::{Fixture, OpenPlantError, TwinPlant};
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
 pub use resolve::Files;

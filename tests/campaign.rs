@@ -1,7 +1,7 @@
 //! Campaigns: planned, made on a twin, written, and read as measurements.
 
 use crate::common::{baseline, overrides};
-use gripgen::identify::{CampaignOptions, plan_campaign};
+use gripgen_identify::{CampaignOptions, plan_campaign};
 use gripgen::twin::config::Feedback;
 use gripgen::twin::{Campaign, PlannedPull};
 use gripgen_cli::simulate_campaign;

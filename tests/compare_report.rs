@@ -1,7 +1,7 @@
 //! Measured pulls of any folder beside a twin: the paper's panels.
 
 use crate::common::{baseline, jobs, library, project, run, twin_at};
-use gripgen::identify::pull_ratios;
+use gripgen_identify::pull_ratios;
 use gripgen::twin::Twin;
 use gripgen_cli::compare_pulls;
 use gripgen_measured::load_pulls;

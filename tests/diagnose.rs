@@ -2,8 +2,8 @@
 
 use crate::common::{baseline, library, overrides, root, twin_at, twin_with};
 use gripgen::Location;
-use gripgen::identify::pulls::calibrate::CalibrateRequest;
-use gripgen::identify::{CampaignOptions, Diagnosis, Verdict, plan_campaign};
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::{CampaignOptions, Diagnosis, Verdict, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
 use gripgen_cli::Diagnosed;
 use gripgen_cli::{

@@ -3,8 +3,8 @@
 
 use crate::common::{baseline, library, twin_at};
 use crate::diagnose::{diagnose, names, simulated};
-use gripgen::identify::Verdict;
-use gripgen::identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::Verdict;
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{ExtraColumn, MeasuredPulls, PullTrace, TraceRow, Values};

@@ -1,7 +1,7 @@
 //! Diagnoses with a library that lacks the effect that acts.
 
 use crate::diagnose::{diagnose, names, simulated, simulated_at};
-use gripgen::identify::{CampaignOptions, Verdict};
+use gripgen_identify::{CampaignOptions, Verdict};
 use gripgen::twin::MeasuredPulls;
 
 /// Effects taken out of the library one at a time: what they did comes back as a dependence on the right column, and not

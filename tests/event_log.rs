@@ -1,7 +1,7 @@
 //! The log of a real robot (UR3 CobotOps) as a control: its lost grips look like a warm-up effect, row by row.
 
 use crate::common::root;
-use gripgen::identify::{Covariate, Dependence, dependence};
+use gripgen_identify::{Covariate, Dependence, dependence};
 
 /// Row of the log: session, cycle, temperature of joint 4, whether the grip was lost.
 struct Row {

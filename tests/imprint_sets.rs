@@ -1,7 +1,7 @@
 //! Sets of imprints, from disk to answer: volumes of images, constants in a twin, real grasps.
 
 use crate::common::{baseline, jobs, root, run, small_project, twin_at};
-use gripgen::identify::{SharedConstant, Verdict};
+use gripgen_identify::{SharedConstant, Verdict};
 use gripgen::record::{RunFolder, ShardReader, encode_png};
 use gripgen::twin::{Jaw, Twin};
 use gripgen::{Location, load_twin_document};
@@ -61,7 +61,7 @@ fn the_growth_of_imprints_is_read_off_noisy_images() {
     set_of_images(bent.path(), &["effects=[{ name = \"imprint_nonlinearity\", exponent = 0.6 }]"]);
     let d = diagnose_imprint_table(&loaded(bent.path()), &twin).diagnosis;
     println!("{:?}\n{:?}", plain.effects, d.effects);
-    let exponent = |d: &gripgen::identify::Diagnosis| {
+    let exponent = |d: &gripgen_identify::Diagnosis| {
         d.effects
             .iter()
             .find(|e| e.name == "imprint_nonlinearity")

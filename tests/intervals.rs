@@ -4,7 +4,7 @@
 mod lab;
 
 use crate::common::{baseline, library, slow, twin_at};
-use gripgen::identify::pulls::calibrate::{CalibrateRequest, PullCalibration};
+use gripgen_identify::pulls::calibrate::{CalibrateRequest, PullCalibration};
 use gripgen::twin::config::Feedback;
 use gripgen_cli::calibrate_twin;
 use lab::{Contact, Plan, World, campaign};

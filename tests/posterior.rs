@@ -2,8 +2,8 @@
 
 use crate::common::{baseline, library, project_in, twin_at, twin_with};
 use crate::diagnose::{diagnose, diagnose_with, names, simulated};
-use gripgen::identify::pulls::calibrate::CalibrateRequest;
-use gripgen::identify::{Diagnosis, Verdict};
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::{Diagnosis, Verdict};
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::{CAUSE_KEY, MeasuredPulls, Posterior, PosteriorDraw};
 use gripgen::{Location, Project, load_twin_document};
@@ -75,7 +75,7 @@ fn three_forces_give_the_law() {
     assert!(own.covariance[1] < 0.0 && found.notes.is_empty(), "{own:?} {:?}", found.notes);
     assert!(found.posterior.keys.contains(&"effects.load_offset.long_shaft.b_n".to_string()));
     let single = calibrated(&at_forces(law, &[30.0]));
-    let width = |law: &gripgen::identify::pulls::calibrate::OffsetLaw| law.b_n.high90 - law.b_n.low90;
+    let width = |law: &gripgen_identify::pulls::calibrate::OffsetLaw| law.b_n.high90 - law.b_n.low90;
     assert!(width(&single.laws[0]) > 4.0 * width(own), "{:?} {own:?}", single.laws);
     assert!(single.notes[0].contains("believed"), "{:?}", single.notes);
 }

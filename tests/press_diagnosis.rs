@@ -2,7 +2,7 @@
 
 use crate::common::root;
 use crate::presses::block;
-use gripgen::identify::{Diagnosis, Verdict};
+use gripgen_identify::{Diagnosis, Verdict};
 use gripgen::tactile::presses::{Circle, Indenter, IndenterPose, Press, PressContact, PressScene, PressSet};
 use gripgen::tactile::{Sensor, finish};
 use gripgen::twin::{OpticsState, TactileImage};

@@ -2,7 +2,7 @@
 
 use crate::common::root;
 use gripgen::Location;
-use gripgen::physics::in_parallel;
+use gripgen::in_parallel;
 use gripgen::record::encode_png;
 use gripgen::tactile::presses::{
     BallSizeBy, CalibrateOptions, Calibration, DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, Press, PressSet,

@@ -95,22 +95,11 @@ fn packages_depend_on_each_other_as_drawn() {
         ("crates/physics", &["gripgen-twin"][..]),
         ("crates/tactile", &["gripgen-twin"][..]),
         ("crates/record", &["gripgen-twin"][..]),
+        ("crates/measured", &["gripgen-record", "gripgen-twin"][..]),
         ("crates/report", &["gripgen-identify", "gripgen-record", "gripgen-twin"][..]),
-        (
-            ".",
-            &[
-                "gripgen-identify",
-                "gripgen-physics",
-                "gripgen-record",
-                "gripgen-report",
-                "gripgen-tactile",
-                "gripgen-twin",
-            ][..],
-        ),
-        ("crates/cli", &["gripgen", "gripgen-report", "gripgen-rig"][..]),
-        ("crates/py", &["gripgen", "gripgen-cli", "gripgen-report"][..]),
         ("crates/rig", &["gripgen-twin"][..]),
-        ("research", &["gripgen"][..]),
+        ("crates/rig_sim", &["gripgen-rig", "gripgen-twin"][..]),
+        (".", &["gripgen-physics", "gripgen-record", "gripgen-tactile", "gripgen-twin"][..]),
         ("xtask", &[][..]),
     ];
     for (package, arrows) in allowed {

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a measurement that cannot go on panics")]
 
 use crate::arguments;
-use gripgen::identify::pulls::priors::PullPriors;
+use gripgen_identify::pulls::priors::PullPriors;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Campaign, MeasuredPulls, PlannedPull, Twin};
 use gripgen::{Library, Location, load_twin_document};

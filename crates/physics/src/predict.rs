@@ -10,7 +10,6 @@ mod table;
 mod tables;
 
 use crate::cache::Cache;
-use crate::parallel::in_parallel;
 use crate::{QuasiStatic, RimTable};
 use creep::creeps;
 use gripgen_twin::config::Feedback;
@@ -53,14 +52,17 @@ const CONTACTS: usize = 12;
 /// The simulator as a predictor needs it: pulls of a campaign on any twin, without scatter and noise. Implemented where grips and
 /// their contacts are known.
 pub trait SimulatePulls: Sync {
-    /// Expected label of pull `row`, its friction multiplied by `factor`.
-    fn label_n(&self, twin: &Twin, row: usize, factor: f64) -> f64;
+    /// Expected labels of pulls: for each a row and the factor on its friction.
+    fn labels_n(&self, twin: &Twin, pulls: &[(usize, f64)]) -> Vec<f64>;
 
     /// Readings of pull `row` at the rate of the sensor, to its end.
     fn readings_n(&self, twin: &Twin, row: usize, factor: f64) -> Vec<f64>;
 
     /// Of each cell of both contacts its share of the area and of what the jaws hold.
     fn contact(&self, twin: &Twin, row: usize) -> Vec<(f64, f64)>;
+
+    /// Calls `task` for 0..n, in parallel where that is possible. Each call stands for itself.
+    fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync));
 }
 
 /// The commands of each pull of a campaign: those of its own trace, or the planned ones. Pulls with the same commands share them.
@@ -103,7 +105,6 @@ pub struct PullPredictor<'a> {
     rules: Cache<u64, LabelRule>,
     /// How tools creep while the rim of their contact slips, by the bits of the exponent.
     rims: Cache<Option<u64>, RimTable>,
-    jobs: usize,
     stuck: Cache<Key, Kept>,
     tables: Cache<Key, LabelTable>,
     exact: Cache<Key, ExactLabels>,
@@ -121,13 +122,12 @@ fn acts_on_signals(model: &PullModel) -> bool {
 type Key = (usize, bool, Vec<u64>);
 
 impl<'a> PullPredictor<'a> {
-    /// For the pulls of a campaign on the rig of `twin`, whose tool answers with `mass_kg`. `jobs` threads share the work.
+    /// For the pulls of a campaign on the rig of `twin`, whose tool answers with `mass_kg`.
     pub fn new(
         measured: &'a MeasuredPulls,
         twin: &Twin,
         mass_kg: f64,
         simulator: Box<dyn SimulatePulls + 'a>,
-        jobs: usize,
     ) -> Self {
         // Pulls with the same commands share a staircase, and then a profile.
         let mut staircases: Vec<Arc<Staircase>> = Vec::new();
@@ -167,7 +167,6 @@ impl<'a> PullPredictor<'a> {
             backbones: Cache::new(BACKBONES),
             rules: Cache::new(RULES),
             rims: Cache::new(RULES),
-            jobs: jobs.max(1),
             stuck: Cache::new(TABLES),
             tables: Cache::new(tables),
             exact: Cache::new(tables),
@@ -344,11 +343,9 @@ impl PredictPulls for PullPredictor<'_> {
     }
 
     fn labels_n(&self, model: &PullModel, rows: &[usize]) -> Vec<f64> {
-        let twin = self.twin_of(model);
-        in_parallel(rows.len(), self.jobs, |k| {
-            let factor = model.factor.get(rows[k]).copied().unwrap_or(1.0);
-            self.simulator.label_n(&twin, rows[k], factor)
-        })
+        let factor = |row: &usize| model.factor.get(*row).copied().unwrap_or(1.0);
+        let pulls: Vec<(usize, f64)> = rows.iter().map(|row| (*row, factor(row))).collect();
+        self.simulator.labels_n(&self.twin_of(model), &pulls)
     }
 
     fn contact(&self, model: &PullModel, row: usize) -> Vec<(f64, f64)> {
@@ -405,6 +402,6 @@ impl PredictPulls for PullPredictor<'_> {
     }
 
     fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync)) {
-        in_parallel(n, self.jobs, task);
+        self.simulator.for_each(n, task);
     }
 }

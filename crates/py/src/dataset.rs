@@ -2,7 +2,7 @@
 
 use crate::error;
 use crate::film;
-use gripgen::physics::in_parallel;
+use gripgen::in_parallel;
 use gripgen::record::proto::gripgen_v1::{JawContact, Status};
 use gripgen::record::{Dataset as Rows, DatasetError, NoiseMode};
 use gripgen::twin::Values;

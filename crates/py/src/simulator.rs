@@ -1,7 +1,7 @@
 //! `_core.Simulator`: pulls on a twin, one by one or many at once.
 
 use crate::{error, values};
-use gripgen::physics::in_parallel;
+use gripgen::in_parallel;
 use gripgen::record::proto::gripgen_v1::Status;
 use gripgen::record::status_name;
 use gripgen::twin::config::Mechanics;

@@ -9,9 +9,9 @@
 
 use crate::lab::{Contact, Plan, World, campaign};
 use crate::{StudyResult, arguments};
-use gripgen::identify::ParameterEstimate;
-use gripgen::identify::pulls::calibrate::CalibrateRequest;
-use gripgen::physics::in_parallel;
+use gripgen_identify::ParameterEstimate;
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen::in_parallel;
 use gripgen::twin::Twin;
 use gripgen::twin::config::Feedback;
 use gripgen::twin::random::{Purpose, Stream};

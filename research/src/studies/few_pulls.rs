@@ -10,9 +10,9 @@
 
 use crate::lab::{Contact, Plan, World, campaign};
 use crate::{StudyResult, arguments};
-use gripgen::identify::pulls::calibrate::CalibrateRequest;
-use gripgen::identify::pulls::priors::{Prior, PullPriors};
-use gripgen::physics::in_parallel;
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::pulls::priors::{Prior, PullPriors};
+use gripgen::in_parallel;
 use gripgen::twin::config::Feedback;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{MeasuredPulls, Twin};

@@ -10,8 +10,8 @@
 
 use crate::StudyResult;
 use crate::truth::{Given, PART, Truth, asked};
-use gripgen::identify::pulls::calibrate::CalibrateRequest;
-use gripgen::physics::in_parallel;
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen::in_parallel;
 use gripgen::twin::Posterior;
 use gripgen_cli::calibrate_twin;
 use std::sync::Mutex;

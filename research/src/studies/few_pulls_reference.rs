@@ -10,10 +10,10 @@
 
 use crate::StudyResult;
 use crate::truth::{Given, PART, Truth, asked};
-use gripgen::identify::pulls::calibrate::CalibrateRequest;
-use gripgen::identify::pulls::few::FewDensity;
-use gripgen::identify::pulls::priors::PullPriors;
-use gripgen::physics::in_parallel;
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::pulls::few::FewDensity;
+use gripgen_identify::pulls::priors::PullPriors;
+use gripgen::in_parallel;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen_cli::{calibrate_twin, with_few_density};
 use std::sync::Mutex;

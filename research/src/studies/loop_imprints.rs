@@ -5,7 +5,7 @@
 //! `soft`. `gripgen diagnose OUT/rigid` then says the same as the table. Nothing is written where the data are absent.
 
 use crate::{StudyResult, arguments};
-use gripgen::identify::{Diagnosis, ImprintDiagnosis, diagnose_imprints};
+use gripgen_identify::{Diagnosis, ImprintDiagnosis, diagnose_imprints};
 use gripgen_cli::load_imprint_set;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -136,7 +136,7 @@ fn answer(d: &Diagnosis) -> String {
 
 fn errors(d: &Diagnosis) -> String {
     let Some(error) = &d.error else { return d.notes.join("; ") };
-    let one = |e: &gripgen::identify::HeldOutError| {
+    let one = |e: &gripgen_identify::HeldOutError| {
         format!("{:.2} ({:.2} to {:.2})", e.rmse_mm3.unwrap_or(f64::NAN), e.low90, e.high90)
     };
     let mut text = format!("held-out {}: {} -> {} mm³", error.heldout, one(&error.before), one(&error.after));

@@ -4,7 +4,7 @@
 //! (`../shared/real/taxim/gelsight` where it is left out). Writes `research/loop/presses.md` and its plots.
 
 use crate::{StudyResult, arguments};
-use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect};
+use gripgen_identify::{Diagnosis, HeldOutError, NamedEffect};
 use gripgen::tactile::presses::{CalibrateOptions, PressScene, PressSet, calibrate_presses, frame_mse};
 use gripgen::tactile::{Sensor, SensorFiles};
 use gripgen::twin::effects::{GripPoint, find};
@@ -81,7 +81,7 @@ fn diagnosed(set: &PressSet, sensor: &Sensor) -> Diagnosed {
     diagnose_presses(&input, &mut |share, what| eprintln!("{:3.0} % {what}", 100.0 * share))
 }
 
-fn error(d: &Diagnosis, of: fn(&gripgen::identify::ErrorReport) -> &HeldOutError) -> String {
+fn error(d: &Diagnosis, of: fn(&gripgen_identify::ErrorReport) -> &HeldOutError) -> String {
     d.error.as_ref().map_or("-".into(), |e| {
         let e = of(e);
         format!("{:.2} ({:.2} to {:.2})", e.mse.unwrap_or(f64::NAN), e.low90, e.high90)
@@ -127,7 +127,7 @@ fn chapter(
 }
 
 fn values(effect: &NamedEffect) -> String {
-    let one = |(name, p): (&String, &gripgen::identify::ParameterEstimate)| {
+    let one = |(name, p): (&String, &gripgen_identify::ParameterEstimate)| {
         format!("{name} {:.3} ({:.3} to {:.3})", p.value, p.low90, p.high90)
     };
     effect.parameters.iter().map(one).collect::<Vec<_>>().join(", ")

@@ -7,7 +7,7 @@
 //! the contacts. Nothing is written where the data are absent.
 
 use crate::{StudyResult, arguments};
-use gripgen::identify::{FitOptions, FreeParameter, fit};
+use gripgen_identify::{FitOptions, FreeParameter, fit};
 use gripgen::twin::effects::{GripPoint, find};
 use gripgen::twin::{Covariates, Jaw, Twin};
 use gripgen::{BASELINE_TWIN, Library, Location, load_twin_document};
@@ -128,7 +128,7 @@ fn as_pulls(trace: &Trace, speeds: (f64, f64), folder: &Path) -> Result<(), Box<
         println!("  hint: {}: {}", hint.name, hint.reason);
     }
     if let Some(error) = &found.error {
-        let rmse = |e: &gripgen::identify::HeldOutError| e.rmse_n.unwrap_or(f64::NAN) / (2.0 * GRIP_N);
+        let rmse = |e: &gripgen_identify::HeldOutError| e.rmse_n.unwrap_or(f64::NAN) / (2.0 * GRIP_N);
         println!(
             "  held-out error of the coefficient: {:.5} -> {:.5}",
             rmse(&error.before),

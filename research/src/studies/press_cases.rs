@@ -6,7 +6,7 @@
 //! N halves that are drawn, without any change; `--from K` begins with half K, so that a run can be continued.
 
 use crate::{StudyResult, arguments};
-use gripgen::identify::{Diagnosis, Verdict};
+use gripgen_identify::{Diagnosis, Verdict};
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::{CalibrateOptions, Press, PressSet, calibrate_presses};
 use gripgen::twin::TactileImage;

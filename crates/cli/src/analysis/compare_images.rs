@@ -6,7 +6,7 @@ use gripgen::Gripped;
 use gripgen::Library;
 use gripgen::{SampleError, SimulateOptions};
 use gripgen_measured::{LoadPullsError, LoadedPulls, Suspects, load_pulls_with};
-use gripgen_physics::in_parallel;
+use gripgen::in_parallel;
 use gripgen_tactile::SimdLevel;
 use gripgen_tactile::metrics::{MetricError, Score, mean_score, score};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};

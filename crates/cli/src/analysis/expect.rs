@@ -4,7 +4,7 @@
 //! friction law on each cell, limit surface, reduced mechanics, force loop, wrist sensor. What a sample draws is averaged:
 //! the scatter of friction by quadrature, the noise of the readings by [`label_moments`].
 
-use gripgen::Library;
+use gripgen::{Library, in_parallel};
 use gripgen::SampleError;
 use gripgen::{Indenter, answering_mass_kg, held, jaw_forces_n};
 use gripgen_physics::grip_point;
@@ -65,21 +65,33 @@ pub fn pull_predictor<'a>(
     library: &'a Library,
     jobs: usize,
 ) -> PullPredictor<'a> {
-    let simulator = Box::new(Expectations::new(measured, library));
-    PullPredictor::new(measured, twin, answering_mass_kg(twin, library), simulator, jobs)
+    let simulator = Box::new(Simulated { expectations: Expectations::new(measured, library), jobs: jobs.max(1) });
+    PullPredictor::new(measured, twin, answering_mass_kg(twin, library), simulator)
 }
 
-impl SimulatePulls for Expectations<'_> {
-    fn label_n(&self, twin: &Twin, row: usize, factor: f64) -> f64 {
-        self.expected(&QuietTwin::new(twin), row, factor).label_n
+/// The pulls of a campaign on a few threads.
+struct Simulated<'a> {
+    expectations: Expectations<'a>,
+    jobs: usize,
+}
+
+impl SimulatePulls for Simulated<'_> {
+    fn labels_n(&self, twin: &Twin, pulls: &[(usize, f64)]) -> Vec<f64> {
+        let quiet = QuietTwin::new(twin);
+        let label = |k: usize| self.expectations.expected(&quiet, pulls[k].0, pulls[k].1).label_n;
+        in_parallel(pulls.len(), self.jobs, label)
     }
 
     fn readings_n(&self, twin: &Twin, row: usize, factor: f64) -> Vec<f64> {
-        self.readings(&QuietTwin::new(twin), row, factor).measured_n
+        self.expectations.readings(&QuietTwin::new(twin), row, factor).measured_n
     }
 
     fn contact(&self, twin: &Twin, row: usize) -> Vec<(f64, f64)> {
-        self.contact(&QuietTwin::new(twin), row)
+        self.expectations.contact(&QuietTwin::new(twin), row)
+    }
+
+    fn for_each(&self, n: usize, task: &(dyn Fn(usize) + Sync)) {
+        in_parallel(n, self.jobs, task);
     }
 }
 

@@ -8,7 +8,7 @@ use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use crate::{calibrate_imprint_table, edited_twin_toml, imprint_calibration_edits};
 use gripgen::Location;
-use gripgen::identify::{ImprintConstants, ParameterEstimate, SharedConstant};
+use gripgen_identify::{ImprintConstants, ParameterEstimate, SharedConstant};
 use serde_json::{Map, Value, json};
 
 /// Runs the verb.

@@ -9,8 +9,8 @@ use crate::{
     CalibratePullsError, ImprintCalibrations, calibrate_imprints, calibrate_twin, edited_twin_toml,
     pull_priors,
 };
-use gripgen::identify::ParameterEstimate;
-use gripgen::identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
+use gripgen_identify::ParameterEstimate;
+use gripgen_identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
 use gripgen::{Location, load_twin_document};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;

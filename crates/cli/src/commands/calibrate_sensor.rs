@@ -7,7 +7,7 @@ use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use crate::{calibrate_sensor_table, edited_twin_toml, load_sensor_table, sensor_calibration_edits};
 use gripgen::Location;
-use gripgen::identify::{ParameterEstimate, SensorCalibration};
+use gripgen_identify::{ParameterEstimate, SensorCalibration};
 use serde_json::json;
 use std::fmt::Write;
 

@@ -10,7 +10,7 @@ use crate::outputs::Outputs;
 use crate::shell;
 use crate::{NextPulls, simulate_campaign};
 use gripgen::Location;
-use gripgen::identify::{CampaignError, CampaignOptions, plan_campaign};
+use gripgen_identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen::twin::effects::OutsideFit;
 use gripgen::twin::{Campaign, PullKind, Twin};
 use gripgen_measured::Suspects;

@@ -14,7 +14,7 @@ use crate::{
     find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, load_sensor_table,
     posterior_twins, unmeasured,
 };
-use gripgen::identify::{PartRatio, pull_ratios};
+use gripgen_identify::{PartRatio, pull_ratios};
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{
     Press, PressComparison, PressScore, PressSet, Scores, compare_presses, predict_press,

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::load::{no_pulls, say_warnings};
 use crate::output::{JsonSink, count, print, size};
 use crate::outputs::Outputs;
-use gripgen::identify::{Level, levels};
+use gripgen_identify::{Level, levels};
 use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE, RunFolder};
 use gripgen_measured::{PULLS_FILE, is_pulls, load_pulls_of};
 use serde_json::{Value, json};

@@ -8,7 +8,7 @@ use crate::output::program;
 use crate::outputs::{Outputs, is_special};
 use crate::shell;
 use crate::{NextPulls, unvaried};
-use gripgen::identify::{Channel, Diagnosis, Verdict};
+use gripgen_identify::{Channel, Diagnosis, Verdict};
 use gripgen::record::{RIG_SOURCE, RunFolder};
 use gripgen::twin::can_be_drawn;
 use gripgen::{BASELINE_TWIN, Location, Project};

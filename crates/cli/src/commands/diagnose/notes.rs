@@ -1,6 +1,6 @@
 //! The remarks that decide how far an answer may be believed: they are said without `-v`.
 
-use gripgen::identify::{Channel, Diagnosis};
+use gripgen_identify::{Channel, Diagnosis};
 
 /// Remarks that are said at most.
 const MOST: usize = 2;
@@ -37,7 +37,7 @@ fn far_off(diagnosis: &Diagnosis) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gripgen::identify::DataSummary;
+    use gripgen_identify::DataSummary;
 
     fn with(outliers: &[&str], decide: &[&str]) -> Vec<String> {
         let outliers = outliers.iter().map(ToString::to_string).collect();

@@ -8,7 +8,7 @@ use crate::output::{JsonSink, print};
 use crate::outputs::{Outputs, draws_of};
 use crate::{Diagnosed, edited_twin_toml};
 use gripgen::Location;
-use gripgen::identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, PosteriorFile, Verdict};
+use gripgen_identify::{Diagnosis, HeldOutError, NamedEffect, ParameterEstimate, PosteriorFile, Verdict};
 use gripgen::twin::rounded;
 use gripgen_report::diagnosis_page;
 use std::fmt::Write;

@@ -6,7 +6,7 @@ use super::{IMPRINT_MM3_PER_N, InitError, MU, Proposal, StarterFile, Varied, bas
 use gripgen::Library;
 use gripgen::Location;
 use gripgen::assets::{self, ASSET_PREFIX, BENCHMARK};
-use gripgen_physics::in_parallel;
+use gripgen::in_parallel;
 use gripgen_twin::parts::benchmark::{BenchmarkPart, FAMILIES, all};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Part, Twin};

@@ -8,7 +8,7 @@ use super::trial::{Trial, Trials, Varied, widest_first};
 use super::{NoGrip, Proposal};
 use gripgen::Library;
 use gripgen_physics::Surface;
-use gripgen_physics::in_parallel;
+use gripgen::in_parallel;
 use gripgen_tactile::ClusteredMesh;
 use gripgen_twin::{Part, Twin};
 use nalgebra::{Matrix3, Point3};

@@ -1,7 +1,7 @@
 use super::*;
 use crate::args::{Cli, Command};
 use clap::Parser;
-use gripgen::identify::DataSummary;
+use gripgen_identify::DataSummary;
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
 
 fn typed(words: &[&str]) -> DiagnoseArgs {
@@ -121,7 +121,7 @@ fn the_next_sweep_is_one_that_runs() {
     let (text, command) = first(&args, &found, None);
     assert!(command.matches("vary.").count() == 1 && command.contains("vary.humidity_pct="), "{command}");
     assert_eq!(text, "Make training data with the corrected twin:");
-    let mu = gripgen::identify::ParameterEstimate::new(0.2, (0.18, 0.22), "1");
+    let mu = gripgen_identify::ParameterEstimate::new(0.2, (0.18, 0.22), "1");
     found.diagnosis.baseline.insert("parts.gear.mu".into(), mu);
     let (text, _) = first(&args, &found, None);
     assert_eq!(
@@ -129,7 +129,7 @@ fn the_next_sweep_is_one_that_runs() {
         "Make training data with the corrected twin (the pulls were of gear; the other parts keep the mu that they had):"
     );
     found.diagnosis.baseline.clear();
-    let mu = gripgen::identify::ParameterEstimate::new(0.2, (0.18, 0.22), "1");
+    let mu = gripgen_identify::ParameterEstimate::new(0.2, (0.18, 0.22), "1");
     found.diagnosis.baseline.insert("parts.bracket.mu".into(), mu);
     let (text, _) = first(&args, &found, None);
     assert!(text.ends_with("(the pulls were of bracket, which this sweep does not draw):"), "{text}");
