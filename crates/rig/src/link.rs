@@ -5,8 +5,8 @@ mod socket;
 #[cfg(test)]
 mod socket_tests;
 
-pub use socket::Stamped;
-pub(crate) use socket::{Connection, LOOK, Reading, Shared, Socket, lock, time_left};
+pub use socket::{Stamped, lock};
+pub(crate) use socket::{Connection, LOOK, Reading, Shared, Socket, time_left};
 
 use std::net::SocketAddr;
 use std::sync::Arc;

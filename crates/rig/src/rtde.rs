@@ -4,7 +4,7 @@
 //! Source of the wire format: Universal Robots, "Real-Time Data Exchange (RTDE) Guide"; checked against the byte sequences
 //! in the unit tests of the Universal Robots Client Library.
 
-pub(crate) mod fields;
+pub mod fields;
 mod frame;
 #[cfg(test)]
 mod lenient_tests;

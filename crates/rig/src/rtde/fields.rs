@@ -113,7 +113,7 @@ pub fn input_type(name: &str) -> Option<FieldType> {
 
 /// Where a register is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Register {
+pub enum Register {
     /// An integer, 0 to 47.
     Int(usize),
     /// A number, 0 to 47.
@@ -126,7 +126,7 @@ pub(crate) enum Register {
 
 /// Who writes a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Writer {
+pub enum Writer {
     /// Clients.
     Client,
     /// Programs on the robot.
@@ -134,7 +134,7 @@ pub(crate) enum Writer {
 }
 
 /// A register among the outputs: those of both directions are.
-pub(crate) fn output_register(name: &str) -> Option<(Writer, Register)> {
+pub fn output_register(name: &str) -> Option<(Writer, Register)> {
     match name.strip_prefix("output_") {
         Some(rest) => Some((Writer::Program, Register::of(rest)?)),
         None => Some((Writer::Client, input_register(name)?)),
@@ -142,7 +142,7 @@ pub(crate) fn output_register(name: &str) -> Option<(Writer, Register)> {
 }
 
 /// A register among the inputs.
-pub(crate) fn input_register(name: &str) -> Option<Register> {
+pub fn input_register(name: &str) -> Option<Register> {
     name.strip_prefix("input_").and_then(Register::of)
 }
 
@@ -175,7 +175,7 @@ impl Register {
 impl FieldType {
     /// These numbers as a value of this type. Places without a number are 0; a number that an integer cannot be is the nearest
     /// that it can.
-    pub(crate) fn value(self, numbers: &[f64]) -> Value {
+    pub fn value(self, numbers: &[f64]) -> Value {
         let at = |i: usize| numbers.get(i).copied().unwrap_or(0.0);
         match self {
             FieldType::Bool => Value::Bool(at(0) != 0.0),

@@ -132,7 +132,7 @@ impl Value {
     }
 
     /// Appends its bytes.
-    pub(crate) fn write(&self, out: &mut Vec<u8>) {
+    pub fn write(&self, out: &mut Vec<u8>) {
         match self {
             Value::Bool(x) => out.push(u8::from(*x)),
             Value::Uint8(x) => out.push(*x),

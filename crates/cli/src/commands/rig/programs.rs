@@ -3,8 +3,8 @@
 use gripgen::twin::{Campaign, PullKind};
 use gripgen_rig::experiment::RigConfig;
 use gripgen_rig::experiment::plan::{motion_program, pull_program};
-use gripgen_rig::judge::{Finding, judge_motion, judge_pull};
 use gripgen_rig::program::TcpPose;
+use gripgen_rig_sim::program_check::{Finding, check_motion, check_pull};
 
 /// Different pulls of a campaign that are judged; their text is the same but for its numbers.
 const MOST: usize = 8;
@@ -20,13 +20,13 @@ pub fn judged(config: &RigConfig, campaign: &Campaign) -> Result<usize, String> 
         if seen.len() >= MOST || seen.contains(&text) {
             continue;
         }
-        first("pull", judge_pull(&program, &text).next())?;
+        first("pull", check_pull(&program, &text).next())?;
         seen.push(text);
     }
     for speed_mm_s in [config.motion.speed_mm_s, config.motion.approach_speed_mm_s] {
         let program = motion_program(config, TARGET, speed_mm_s, 0.1, 1);
         let text = program.script().map_err(|e| e.to_string())?;
-        first("motion", judge_motion(&program, &text).next())?;
+        first("motion", check_motion(&program, &text).next())?;
     }
     Ok(seen.len() + 2)
 }
