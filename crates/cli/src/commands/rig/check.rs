@@ -1,8 +1,8 @@
 //! `gripgen rig check`: does every device answer.
 
-use super::load::load_rig;
-use super::programs::judged;
-use super::rehearsal::{compared, load};
+use crate::rig::load_rig;
+use crate::rig::programs::judged;
+use crate::rig::rehearsal::{compared, load};
 use crate::args::RigCheckArgs;
 use crate::failure::{Failure, code};
 use crate::output::{JsonSink, print, size};

@@ -1,6 +1,6 @@
 //! What somebody sees who looks on.
 
-use super::record::Standing;
+use crate::rig::record::Standing;
 use crate::args::TalkArgs;
 use crate::failure::Failure;
 use crate::live::{CurvePoint, LivePage, Made, Picture, State};

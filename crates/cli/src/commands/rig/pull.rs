@@ -1,11 +1,11 @@
 //! `gripgen rig pull`: the experiment, recorded.
 
 use super::live::Live;
-use super::load::load_rig;
-use super::programs::judged;
-use super::record::{Standing, rig_pull, suspect};
-use super::rehearsal;
-use super::standing::CampaignClock;
+use crate::rig::load_rig;
+use crate::rig::programs::judged;
+use crate::rig::record::{Standing, rig_pull, suspect};
+use crate::rig::rehearsal;
+use crate::rig::standing::CampaignClock;
 use crate::args::RigPullArgs;
 use crate::failure::{Failure, another_run, code};
 use crate::interrupt::stop_flag;

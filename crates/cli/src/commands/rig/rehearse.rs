@@ -1,7 +1,7 @@
 //! `gripgen rig rehearse`: what the rig is like today, on one page.
 
-use super::load::load_rig;
-use super::programs::judged;
+use crate::rig::load_rig;
+use crate::rig::programs::judged;
 use crate::args::RigRehearseArgs;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;

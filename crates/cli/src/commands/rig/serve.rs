@@ -1,6 +1,6 @@
 //! `gripgen rig serve`: a virtual rig.
 
-use super::load::SHIPPED_RIG;
+use crate::rig::SHIPPED_RIG;
 use super::teach::taught;
 use crate::args::RigServeArgs;
 use crate::failure::Failure;

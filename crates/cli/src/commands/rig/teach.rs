@@ -1,6 +1,6 @@
 //! `gripgen rig teach`: the pose of the tool becomes that of a part.
 
-use super::load::load_rig;
+use crate::rig::load_rig;
 use crate::args::RigTeachArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print};
