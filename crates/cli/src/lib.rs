@@ -22,7 +22,7 @@ mod outputs;
 mod own_files;
 mod posterior;
 mod progress;
-mod rig;
+pub mod rig;
 mod shell;
 
 use args::{CalibrateCommand, Cli, Command, RigCommand};

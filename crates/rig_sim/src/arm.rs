@@ -5,8 +5,8 @@ mod joints;
 
 use super::kinematics::{Joints, MAX_SPEED_RAD_S, OutOfReachError};
 use super::urscript::ForceMode;
-use gripgen_rig::program::TcpPose;
 use force::Pulling;
+use gripgen_rig::program::TcpPose;
 use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError};
 use nalgebra::UnitQuaternion;
 use std::collections::VecDeque;

@@ -57,6 +57,8 @@ pub struct Controller {
     broken_off: Option<Drive>,
     /// When each integer register was last written.
     written_s: [f64; 48],
+    /// When any input was last written.
+    input_s: f64,
     clock_rate: f64,
     stopped_s: f64,
     announcements: Vec<Announcement>,
@@ -99,6 +101,7 @@ impl Controller {
             watchdog: None,
             broken_off: None,
             written_s: [BOOTED_S; 48],
+            input_s: BOOTED_S,
             clock_rate,
             stopped_s: f64::NEG_INFINITY,
             announcements: Vec::new(),
@@ -135,9 +138,15 @@ impl Controller {
         self.announcements.push(Announcement::CannotRun { problem: problem.into() });
     }
 
+    /// Time since a client wrote an input.
+    pub fn unheard_s(&self) -> f64 {
+        self.robot.timestamp_s - self.input_s
+    }
+
     /// A client wrote an input.
     pub fn write_input(&mut self, name: &str, value: Value) {
         self.robot.write_input(name, value);
+        self.input_s = self.robot.timestamp_s;
         let register =
             name.strip_prefix("input_int_register_").and_then(|digits| digits.parse::<usize>().ok());
         if let Some(at) = register.and_then(|i| self.written_s.get_mut(i)) {

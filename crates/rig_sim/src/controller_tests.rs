@@ -3,18 +3,13 @@
 use super::arm::STEP_S;
 use super::controller::{Announcement, Controller};
 use super::dashboard;
-use super::panel::Panel;
 use super::robot::RuntimeState;
+use super::spring::Spring;
 use gripgen_rig::program::{MotionProgram, Phase, PullProgram, StopReason, TcpPose, registers};
 use gripgen_rig::robot_state::{RobotMode, SafetyStatus};
 use gripgen_rig::rtde::Value;
-use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
-use gripgen_twin::{PerJaw, TactileImage};
-use plant::Spring;
+use gripgen_twin::plant::Plant;
 use std::sync::Arc;
-
-#[path = "../tests/common/plant.rs"]
-pub(super) mod plant;
 
 mod joints;
 mod pulls;
@@ -82,7 +77,7 @@ impl HostedRobot {
     }
 
     fn say(&mut self, line: &str) -> String {
-        dashboard::reply(line, &mut Panel(&mut self.controller)).text
+        dashboard::reply(line, &mut self.controller).text
     }
 
     fn close_jaws(&mut self) {

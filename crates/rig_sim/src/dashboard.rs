@@ -3,72 +3,12 @@
 //! Source: Universal Robots, "Dashboard Server e-Series, port 29999": commands and answers word for word. Commands that only
 //! change what the teach pendant shows or loads are not there; they are answered like unknown ones.
 
+use super::controller::Controller;
+use super::robot::RuntimeState;
 use gripgen_rig::robot_state::{RobotMode, SafetyStatus};
 
 /// Longest piece of an unknown line that is repeated.
 const MAX_REPEATED: usize = 200;
-
-/// What the program on the robot does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ProgramState {
-    /// Nothing.
-    Stopped,
-    /// It runs.
-    Playing,
-    /// It waits.
-    Paused,
-}
-
-impl ProgramState {
-    /// Its word on the dashboard.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Stopped => "STOPPED",
-            Self::Playing => "PLAYING",
-            Self::Paused => "PAUSED",
-        }
-    }
-}
-
-/// What the dashboard can read of a robot and do to it. Where something is refused, the error is the line that is answered.
-pub trait DashboardRobot {
-    /// What the robot as a whole does.
-    fn robot_mode(&self) -> RobotMode;
-    /// What its safety system says.
-    fn safety_status(&self) -> SafetyStatus;
-    /// What its program does.
-    fn program_state(&self) -> ProgramState;
-    /// The name of the program, with its ending; nothing where none is loaded.
-    fn program_name(&self) -> &str;
-    /// `UR5` and the like: the e-Series has no name of its own here.
-    fn model(&self) -> &str;
-    /// Digits.
-    fn serial_number(&self) -> &str;
-    /// In the style of `URSoftware 5.12.0.1101319 (Mar 22 2022)`.
-    fn polyscope_version(&self) -> &str;
-    /// Whether clients may command it.
-    fn remote_control(&self) -> bool;
-    /// Gives the arm power, with its brakes on.
-    fn power_on(&mut self) -> Result<(), String>;
-    /// Takes it away.
-    fn power_off(&mut self) -> Result<(), String>;
-    /// Gives it power, if it has none, and releases its brakes.
-    fn brake_release(&mut self) -> Result<(), String>;
-    /// Leaves a protective stop; a robot refuses until five seconds after it.
-    fn unlock_protective_stop(&mut self) -> Result<(), String>;
-    /// Closes a popup.
-    fn close_popup(&mut self);
-    /// Closes a popup of the safety system.
-    fn close_safety_popup(&mut self);
-    /// Starts the safety system anew after a fault; the arm is without power then.
-    fn restart_safety(&mut self) -> Result<(), String>;
-    /// Starts the program.
-    fn play(&mut self) -> Result<(), String>;
-    /// Ends it.
-    fn stop_program(&mut self) -> Result<(), String>;
-    /// Lets it wait.
-    fn pause_program(&mut self) -> Result<(), String>;
-}
 
 /// An answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -85,37 +25,77 @@ pub fn greeting() -> &'static str {
 }
 
 /// The answer to a line, with or without its end. Capitals and blanks do not matter.
-pub fn reply(line: &str, robot: &mut dyn DashboardRobot) -> Reply {
+pub fn reply(line: &str, controller: &mut Controller) -> Reply {
     let command = line.split_whitespace().collect::<Vec<_>>().join(" ").to_ascii_lowercase();
+    let (mode, safety) = (controller.robot().mode, controller.robot().safety);
+    let runtime = controller.robot().runtime;
     let text = match command.as_str() {
-        "robotmode" => format!("Robotmode: {}", robot.robot_mode().name()),
-        "safetystatus" => format!("Safetystatus: {}", robot.safety_status().name()),
+        "robotmode" => format!("Robotmode: {}", mode.name()),
+        "safetystatus" => format!("Safetystatus: {}", safety.name()),
         "programstate" => {
-            format!("{} {}", robot.program_state().name(), robot.program_name()).trim_end().into()
+            let state = match runtime {
+                RuntimeState::Playing | RuntimeState::Stopping => "PLAYING",
+                RuntimeState::Paused => "PAUSED",
+                RuntimeState::Stopped => "STOPPED",
+            };
+            format!("{state} {}", controller.program_title().unwrap_or_default()).trim_end().into()
         }
-        "running" => format!("Program running: {}", robot.program_state() == ProgramState::Playing),
-        "get loaded program" if robot.program_name().is_empty() => "No program loaded".into(),
-        "get loaded program" => format!("Loaded program: {}", robot.program_name()),
-        "get robot model" => robot.model().into(),
-        "get serial number" => robot.serial_number().into(),
-        "polyscopeversion" => robot.polyscope_version().into(),
-        "is in remote control" => robot.remote_control().to_string(),
-        "power on" => done(robot.power_on(), "Powering on"),
-        "power off" => done(robot.power_off(), "Powering off"),
-        "brake release" => done(robot.brake_release(), "Brake releasing"),
-        "unlock protective stop" => done(robot.unlock_protective_stop(), "Protective stop releasing"),
-        "restart safety" => done(robot.restart_safety(), "Restarting safety"),
-        "play" => done(robot.play(), "Starting program"),
-        "stop" => done(robot.stop_program(), "Stopped"),
-        "pause" => done(robot.pause_program(), "Pausing program"),
-        "close popup" => {
-            robot.close_popup();
-            "closing popup".into()
+        "running" => {
+            let runs = matches!(runtime, RuntimeState::Playing | RuntimeState::Stopping);
+            format!("Program running: {runs}")
         }
-        "close safety popup" => {
-            robot.close_safety_popup();
-            "closing safety popup".into()
+        "get loaded program" => match controller.program_title() {
+            None => "No program loaded".into(),
+            Some(title) => format!("Loaded program: {title}"),
+        },
+        // The e-Series has no name of its own here.
+        "get robot model" => "UR5".into(),
+        "get serial number" => "20265000001".into(),
+        "polyscopeversion" => "URSoftware 5.12.0.1101319 (Mar 22 2022)".into(),
+        "is in remote control" => "true".into(),
+        "power on" | "brake release" if !matches!(safety, SafetyStatus::Normal | SafetyStatus::Reduced) => {
+            format!("Failed: the robot is in {}", safety.name())
         }
+        "power on" => {
+            if mode != RobotMode::Running {
+                controller.set_mode(RobotMode::Idle);
+            }
+            "Powering on".into()
+        }
+        "brake release" => {
+            controller.set_mode(RobotMode::Running);
+            "Brake releasing".into()
+        }
+        "power off" => {
+            controller.set_mode(RobotMode::PowerOff);
+            "Powering off".into()
+        }
+        "unlock protective stop" => match controller.unlock() {
+            Ok(()) => "Protective stop releasing".into(),
+            Err(e) => format!("Cannot unlock protective stop: {e}"),
+        },
+        "restart safety" => {
+            controller.restart_safety();
+            controller.set_mode(RobotMode::PowerOff);
+            "Restarting safety".into()
+        }
+        "play" if controller.program_title().is_none() || safety != SafetyStatus::Normal => {
+            "Failed to execute: play".into()
+        }
+        "play" => {
+            controller.play();
+            "Starting program".into()
+        }
+        "stop" => {
+            controller.stop_program("the dashboard said stop");
+            "Stopped".into()
+        }
+        "pause" => {
+            controller.pause();
+            "Pausing program".into()
+        }
+        "close popup" => "closing popup".into(),
+        "close safety popup" => "closing safety popup".into(),
         "quit" => return Reply { text: "Disconnected".into(), close: true },
         _ => {
             let repeated: String =
@@ -126,10 +106,95 @@ pub fn reply(line: &str, robot: &mut dyn DashboardRobot) -> Reply {
     Reply { text, close: false }
 }
 
-/// What is answered to a command: these words, or why not, as one line.
-fn done(result: Result<(), String>, words: &str) -> String {
-    match result {
-        Ok(()) => words.into(),
-        Err(reason) => reason.split_whitespace().collect::<Vec<_>>().join(" "),
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spring::Spring;
+    use gripgen_rig::program::TcpPose;
+    use std::sync::Arc;
+
+    fn robot() -> Controller {
+        let tcp = TcpPose { position_m: [0.3, 0.0, 0.2], rotation_rad: [0.0; 3] };
+        Controller::new(Arc::new(Spring::default()), tcp, 1.0)
+    }
+
+    #[test]
+    fn answers_are_those_of_the_table() {
+        assert_eq!(greeting(), "Connected: Universal Robots Dashboard Server");
+        let mut robot = robot();
+        robot.set_mode(RobotMode::PowerOff);
+        let talk = |robot: &mut Controller, lines: &[(&str, &str)]| {
+            for (line, wanted) in lines {
+                assert_eq!(reply(line, robot), Reply { text: (*wanted).into(), close: false }, "{line}");
+            }
+        };
+        talk(
+            &mut robot,
+            &[
+                ("robotmode\n", "Robotmode: POWER_OFF"),
+                ("power on", "Powering on"),
+                ("robotmode", "Robotmode: IDLE"),
+                ("brake release", "Brake releasing"),
+                ("robotmode\r\n", "Robotmode: RUNNING"),
+                ("safetystatus", "Safetystatus: NORMAL"),
+                ("programState", "STOPPED"),
+                ("running", "Program running: false"),
+                ("play", "Failed to execute: play"),
+                ("get loaded program", "No program loaded"),
+            ],
+        );
+        robot.run_script("def pull():\n  while True:\n    sync()\n  end\nend\n");
+        talk(
+            &mut robot,
+            &[
+                ("programState", "PLAYING pull"),
+                ("running", "Program running: true"),
+                ("pause", "Pausing program"),
+                ("programState", "PAUSED pull"),
+                ("running", "Program running: false"),
+                ("get loaded program", "Loaded program: pull"),
+                ("play", "Starting program"),
+                ("running", "Program running: true"),
+                ("stop", "Stopped"),
+                ("unlock protective stop", "Protective stop releasing"),
+                ("close safety popup", "closing safety popup"),
+                ("close popup", "closing popup"),
+                ("restart safety", "Restarting safety"),
+                ("power off", "Powering off"),
+                ("is in remote control", "true"),
+                ("PolyscopeVersion", "URSoftware 5.12.0.1101319 (Mar 22 2022)"),
+                ("get serial number", "20265000001"),
+                ("get robot model", "UR5"),
+                ("  Get  Robot MODEL ", "UR5"),
+            ],
+        );
+        assert_eq!(reply("quit", &mut robot), Reply { text: "Disconnected".into(), close: true });
+    }
+
+    #[test]
+    fn a_robot_that_is_stopped_refuses_in_one_line() {
+        let mut robot = robot();
+        robot.protective_stop();
+        for (line, wanted) in [
+            ("safetystatus", "Safetystatus: PROTECTIVE_STOP"),
+            ("power on", "Failed: the robot is in PROTECTIVE_STOP"),
+            ("brake release", "Failed: the robot is in PROTECTIVE_STOP"),
+            (
+                "unlock protective stop",
+                "Cannot unlock protective stop: 0.0 s have passed since the stop, 5 s are needed",
+            ),
+        ] {
+            assert_eq!(reply(line, &mut robot).text, wanted, "{line}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_understood_is_repeated() {
+        let mut robot = robot();
+        assert_eq!(reply("dance\r\n", &mut robot).text, "could not understand: \"dance\"");
+        assert_eq!(reply("", &mut robot).text, "could not understand: \"\"");
+        assert_eq!(reply("power\u{0}on", &mut robot).text, "could not understand: \"poweron\"");
+        assert!(reply(&"\u{e4}".repeat(100_000), &mut robot).text.chars().count() < 300);
+        assert_eq!(robot.robot().mode, RobotMode::Running);
     }
 }

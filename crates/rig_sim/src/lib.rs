@@ -14,9 +14,8 @@ pub mod controller;
 #[cfg(test)]
 mod controller_tests;
 pub mod dashboard;
-#[cfg(test)]
-mod dashboard_tests;
 pub mod faults;
+mod fields;
 pub mod gripper;
 #[cfg(test)]
 mod gripper_tests;
@@ -24,7 +23,6 @@ pub mod kinematics;
 pub mod mjpeg;
 #[cfg(test)]
 mod mjpeg_tests;
-pub mod panel;
 pub mod program_check;
 pub mod robot;
 pub mod rtde;
@@ -32,6 +30,7 @@ pub mod rtde;
 mod rtde_tests;
 pub mod script;
 pub mod server;
+pub mod spring;
 pub mod urscript;
 mod wire;
 pub mod world;

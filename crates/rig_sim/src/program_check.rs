@@ -11,7 +11,6 @@
 mod bench;
 mod motion;
 mod pull;
-mod spring;
 #[cfg(test)]
 mod tests;
 

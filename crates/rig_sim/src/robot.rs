@@ -1,10 +1,10 @@
 //! What the virtual robot is at a moment, and what of it can be read and written by name.
 
 use super::kinematics::Joints;
+use crate::fields::{Register, Writer, input_register, output_register, output_type, value_of};
 use gripgen_rig::program::TcpPose;
 use gripgen_rig::robot_state::{RobotMode, SafetyStatus};
 use gripgen_rig::rtde::Value;
-use gripgen_rig::rtde::fields::{Register, Writer, input_register, output_register, output_type};
 
 /// Registers of one direction.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,45 +112,46 @@ impl Robot {
     /// UR's client library asks for them all in one recipe, and one that is missing spoils it.
     pub fn output(&self, name: &str) -> Option<Value> {
         let kind = output_type(name)?;
+        let value = |numbers: &[f64]| value_of(kind, numbers);
         let [vx, vy, vz] = self.velocity_m_s;
         if let Some((writer, register)) = output_register(name) {
             let registers = match writer {
                 Writer::Client => &self.inputs,
                 Writer::Program => &self.outputs,
             };
-            return Some(kind.value(&[registers.number(register)]));
+            return Some(value(&[registers.number(register)]));
         }
         Some(match name {
-            "timestamp" => kind.value(&[self.timestamp_s]),
-            "actual_q" | "target_q" => kind.value(&self.joints_rad),
-            "actual_qd" | "target_qd" => kind.value(&self.joint_speeds_rad_s),
-            "joint_temperatures" => kind.value(&[PART_TEMPERATURE_C; 6]),
-            "tool_temperature" => kind.value(&[PART_TEMPERATURE_C]),
-            "actual_joint_voltage" => kind.value(&[MAIN_VOLTAGE_V; 6]),
-            "actual_main_voltage" | "actual_robot_voltage" => kind.value(&[MAIN_VOLTAGE_V]),
-            "joint_mode" => kind.value(&[PART_RUNNING; 6]),
-            "tool_mode" => kind.value(&[PART_RUNNING]),
-            "actual_TCP_pose" | "target_TCP_pose" => kind.value(&self.tcp.numbers()),
-            "tcp_offset" => kind.value(&self.tool_m),
-            "actual_TCP_speed" | "target_TCP_speed" => kind.value(&[vx, vy, vz]),
-            "actual_TCP_force" => kind.value(&self.wrench),
-            "ft_raw_wrench" => kind.value(&self.raw_wrench),
-            "tcp_force_scalar" => kind.value(&[self.wrench[..3].iter().map(|f| f * f).sum::<f64>().sqrt()]),
-            "actual_tool_accelerometer" => kind.value(&[0.0, 0.0, -9.81]),
-            "robot_mode" => kind.value(&[self.mode.number().into()]),
-            "safety_mode" | "safety_status" => kind.value(&[self.safety.number().into()]),
-            "robot_status_bits" => kind.value(&[self.status_bits().into()]),
-            "safety_status_bits" => kind.value(&[self.safety_bits().into()]),
-            "runtime_state" => kind.value(&[f64::from(self.runtime as u8)]),
-            "speed_scaling" => kind.value(&[1.0]),
-            "target_speed_fraction" => kind.value(&[self.speed_slider]),
-            "payload" => kind.value(&[self.payload_kg]),
-            "payload_cog" => kind.value(&self.centre_of_gravity_m),
-            _ => kind.value(&[]),
+            "timestamp" => value(&[self.timestamp_s]),
+            "actual_q" | "target_q" => value(&self.joints_rad),
+            "actual_qd" | "target_qd" => value(&self.joint_speeds_rad_s),
+            "joint_temperatures" => value(&[PART_TEMPERATURE_C; 6]),
+            "tool_temperature" => value(&[PART_TEMPERATURE_C]),
+            "actual_joint_voltage" => value(&[MAIN_VOLTAGE_V; 6]),
+            "actual_main_voltage" | "actual_robot_voltage" => value(&[MAIN_VOLTAGE_V]),
+            "joint_mode" => value(&[PART_RUNNING; 6]),
+            "tool_mode" => value(&[PART_RUNNING]),
+            "actual_TCP_pose" | "target_TCP_pose" => value(&self.tcp.numbers()),
+            "tcp_offset" => value(&self.tool_m),
+            "actual_TCP_speed" | "target_TCP_speed" => value(&[vx, vy, vz]),
+            "actual_TCP_force" => value(&self.wrench),
+            "ft_raw_wrench" => value(&self.raw_wrench),
+            "tcp_force_scalar" => value(&[self.wrench[..3].iter().map(|f| f * f).sum::<f64>().sqrt()]),
+            "actual_tool_accelerometer" => value(&[0.0, 0.0, -9.81]),
+            "robot_mode" => value(&[self.mode.number().into()]),
+            "safety_mode" | "safety_status" => value(&[self.safety.number().into()]),
+            "robot_status_bits" => value(&[self.status_bits().into()]),
+            "safety_status_bits" => value(&[self.safety_bits().into()]),
+            "runtime_state" => value(&[f64::from(self.runtime as u8)]),
+            "speed_scaling" => value(&[1.0]),
+            "target_speed_fraction" => value(&[self.speed_slider]),
+            "payload" => value(&[self.payload_kg]),
+            "payload_cog" => value(&self.centre_of_gravity_m),
+            _ => value(&[]),
         })
     }
 
-    /// Writes an input field that [`input_type`](gripgen_rig::rtde::input_type) knows. Inputs that do nothing here are taken and forgotten, as a controller
+    /// Writes an input field that [`input_type`](crate::fields::input_type) knows. Inputs that do nothing here are taken and forgotten, as a controller
     /// takes them.
     pub fn write_input(&mut self, name: &str, value: Value) {
         let registers = &mut self.inputs;
@@ -171,8 +172,8 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fields::input_type;
     use gripgen_rig::program::TcpPose;
-    use gripgen_rig::rtde::input_type;
 
     /// UR's client library lists the input registers among the outputs of a controller.
     #[test]

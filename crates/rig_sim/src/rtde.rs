@@ -1,7 +1,8 @@
 //! RTDE as a controller speaks it, without a socket: bytes in, bytes out, data frames when they are due.
 
 use super::controller::Controller;
-use gripgen_rig::rtde::{FieldType, Frame, FrameError, Framer, Kind, Value, encode_frame, input_type, output_type};
+use crate::fields::{input_type, output_type};
+use gripgen_rig::rtde::{FieldType, Frame, FrameError, Framer, Kind, Value, encode_frame};
 use std::collections::BTreeMap;
 
 /// Version of the controller that the virtual rig says it is: major, minor, bugfix, build.
@@ -18,6 +19,11 @@ const MAX_INPUT_RECIPES: usize = 255;
 pub struct InputOwners(BTreeMap<String, u64>);
 
 impl InputOwners {
+    /// Whether no client writes inputs.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// Frees what a connection had.
     pub fn release(&mut self, connection: u64) {
         self.0.retain(|_, owner| *owner != connection);

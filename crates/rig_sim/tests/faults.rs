@@ -12,19 +12,15 @@ mod bench_tests;
 mod injection;
 #[path = "faults/verdict.rs"]
 mod verdict;
-#[path = "common/plant.rs"]
-mod plant;
 #[path = "faults/watch.rs"]
 mod watch;
 
-use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
-use gripgen_twin::{PerJaw, TactileImage};
 use injection::{ALL, Injection, injections};
-use verdict::{Ended, NEVER_CAME, Report, verdict};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use verdict::{Ended, Report, verdict};
 
 /// Rigs at once.
 const RIGS: usize = 4;
@@ -40,24 +36,12 @@ fn chosen() -> Vec<Injection> {
     }
 }
 
-/// Makes an injection and judges it; what is wrong is a line of text. A machine on which the heartbeat's thread gets no
-/// processor for a tenth of a second is stopped, as it must be; that says nothing about the fault, which is tried again.
+/// Makes an injection and checks how it ended; what is wrong is a line of text.
 fn tried(injection: &Injection) -> Result<Report, String> {
-    let once = || {
-        catch_unwind(AssertUnwindSafe(|| verdict(injection, bench_tests::make(injection)))).map_err(|panic| {
-            let words = panic.downcast_ref::<String>().map(String::as_str);
-            words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic").to_string()
-        })
-    };
-    let first = once();
-    let busy = |problem: &&String| problem.contains("heartbeat") || problem.contains("said nothing for");
-    match first.as_ref().err().filter(busy) {
-        Some(problem) => {
-            println!("{injection}: again, after: {problem}");
-            once()
-        }
-        None => first,
-    }
+    catch_unwind(AssertUnwindSafe(|| verdict(injection, bench_tests::make(injection)))).map_err(|panic| {
+        let words = panic.downcast_ref::<String>().map(String::as_str);
+        words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic").to_string()
+    })
 }
 
 #[test]
@@ -70,11 +54,7 @@ fn whatever_goes_wrong_the_arm_stops_and_no_pull_is_labelled_from_it() {
         for _ in 0..RIGS {
             scope.spawn(|| {
                 while let Some(injection) = list.get(next.fetch_add(1, Ordering::SeqCst)) {
-                    let mut result = tried(injection);
-                    if result.as_ref().is_err_and(|problem| problem.contains(NEVER_CAME)) {
-                        // A machine that is busy may let the moment pass before the fault is there: nothing was tried then.
-                        result = tried(injection);
-                    }
+                    let result = tried(injection);
                     let words = match &result {
                         Ok(report) => report.to_string(),
                         Err(problem) => format!("WRONG: {problem}"),

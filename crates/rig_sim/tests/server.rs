@@ -10,25 +10,22 @@ mod device_tests;
 mod end_tests;
 #[path = "server/fault_tests.rs"]
 mod fault_tests;
-#[path = "common/plant.rs"]
-mod plant;
 
 use gripgen_rig::camera::CameraView;
 use gripgen_rig::program::TcpPose;
 use gripgen_rig_sim::server::{RigAddresses, ServeOptions, ServedRig};
-use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
-use gripgen_twin::{PerJaw, TactileImage};
-use plant::Spring;
+use gripgen_rig_sim::spring::Spring;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// More than enough for anything on loopback.
-const TIMEOUT: Duration = Duration::from_secs(10);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 fn options(clock_rate: f64) -> ServeOptions {
     ServeOptions {
         addresses: RigAddresses::any_ports(),
         clock_rate,
+        in_step: false,
         tcp: TcpPose { position_m: [0.3, 0.0, 0.2], rotation_rad: [0.0; 3] },
         view: CameraView { rotate_deg: 90, mirror: false, crop_px: None, size_px: [16, 8] },
     }

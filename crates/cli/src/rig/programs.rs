@@ -1,4 +1,4 @@
-//! What a robot will be sent, judged by running it on the virtual robot first.
+//! What a robot will be sent, checked by running it on the virtual robot first.
 
 use gripgen::twin::{Campaign, PullKind};
 use gripgen_rig::experiment::RigConfig;
@@ -6,13 +6,13 @@ use gripgen_rig::experiment::plan::{motion_program, pull_program};
 use gripgen_rig::program::TcpPose;
 use gripgen_rig_sim::program_check::{Finding, check_motion, check_pull};
 
-/// Different pulls of a campaign that are judged; their text is the same but for its numbers.
+/// Different pulls of a campaign that are checked; their text is the same but for its numbers.
 const MOST: usize = 8;
-/// Where the judged motion goes: it is judged without a robot.
+/// Where the checked motion goes: it is checked without a robot.
 const TARGET: TcpPose = TcpPose { position_m: [0.4, 0.1, 0.3], rotation_rad: [0.0, 3.1, 0.0] };
 
-/// How many programs were judged; the first that does not do what its numbers say.
-pub fn judged(config: &RigConfig, campaign: &Campaign) -> Result<usize, String> {
+/// How many programs were checked; the first that does not do what its numbers say.
+pub fn checked_programs(config: &RigConfig, campaign: &Campaign) -> Result<usize, String> {
     let mut seen: Vec<String> = Vec::new();
     for planned in campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull) {
         let program = pull_program(config, campaign, planned, 1);

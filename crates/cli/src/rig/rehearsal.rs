@@ -1,16 +1,80 @@
-//! What `gripgen rig rehearse` stored.
+//! Rehearsals of a rig, and their files.
 
+use super::no_pose;
+use super::programs::checked_programs;
 use crate::failure::Failure;
 use gripgen::record::{RunFolder, sha256_hex};
-use gripgen_rig::experiment::check::CheckLine;
+use gripgen::{VERSION, plain_campaign};
+use gripgen_rig::experiment::check::{CheckLine, check};
 use gripgen_rig::experiment::rehearse::{SCHEMA, StoredRehearsal};
+use gripgen_rig::experiment::{Devices, RehearsalPlan, RigConfig, RigEvent, check_campaign, rehearse};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
-/// Lines of `rig check` that stay the same while a rig stays the same.
-const CONSTANT: [&str; 5] = ["dashboard", "controller", "primary interface", "tool offset", "payload"];
+/// A rehearsal on a part, the first that is taught where none is named.
+///
+/// # Errors
+///
+/// A rig on which nothing is taught (`rig` is its name for the message), or a dwell out of range.
+pub fn plan_rehearsal(
+    config: &RigConfig,
+    rig: &str,
+    part: Option<String>,
+    grip_force_n: f64,
+    dwell_s: f64,
+) -> Result<RehearsalPlan, Failure> {
+    let Some(part) = part.or_else(|| config.poses.keys().next().cloned()) else {
+        return Err(no_pose(rig));
+    };
+    if !(0.5..=3600.0).contains(&dwell_s) {
+        return Err(Failure::usage(format!("--dwell-s: {dwell_s} s, it must be from 0.5 to 3600 s")));
+    }
+    Ok(RehearsalPlan { part, grip_force_n, dwell_s })
+}
 
-/// Reads a file.
-pub fn load(path: &Path) -> Result<StoredRehearsal, Failure> {
+/// Finds out what the rig is like today: checks everything, then moves it.
+///
+/// # Errors
+///
+/// A part that is not taught or too much force; a device that does not answer; what ends a pull. After the last of them everything
+/// was stopped.
+pub fn rehearse_rig(
+    config: &RigConfig,
+    plan: &RehearsalPlan,
+    stop: &AtomicBool,
+    emit: &mut dyn FnMut(RigEvent),
+) -> Result<StoredRehearsal, Failure> {
+    let unmoved = |failure: Failure| failure.hint("nothing was sent and nothing moved");
+    let campaign = plain_campaign(std::slice::from_ref(&plan.part), &[plan.grip_force_n], 1, 0);
+    check_campaign(config, &campaign).map_err(|e| unmoved(Failure::usage(e)))?;
+    checked_programs(config, &campaign).map_err(|e| unmoved(Failure::new(e)))?;
+    let mut lines: Vec<CheckLine> = Vec::new();
+    check(config, |line| lines.push(line));
+    if let Some(bad) = lines.iter().find(|line| !line.ok) {
+        return Err(Failure::new(format!("{}: {}", bad.what, bad.found))
+            .hint("`gripgen rig check` says all; nothing was moved"));
+    }
+    let devices = Devices::connect(config).map_err(Failure::new)?;
+    let rehearsal = rehearse(config, devices, plan, stop, emit).map_err(Failure::new)?;
+    Ok(StoredRehearsal::new(VERSION, config, lines, rehearsal))
+}
+
+/// The text of its file.
+///
+/// # Errors
+///
+/// A number that JSON cannot hold.
+pub fn rehearsal_text(stored: &StoredRehearsal) -> Result<String, Failure> {
+    let text = serde_json::to_string_pretty(stored).map_err(Failure::new)?;
+    Ok(text + "\n")
+}
+
+/// Reads the file of a rehearsal.
+///
+/// # Errors
+///
+/// A file that cannot be read or is none.
+pub fn load_rehearsal(path: &Path) -> Result<StoredRehearsal, Failure> {
     let wrong = |problem: String| {
         Failure::usage(format!("{}: {problem}", path.display())).hint("`gripgen rig rehearse` writes it")
     };
@@ -26,20 +90,4 @@ pub fn load(path: &Path) -> Result<StoredRehearsal, Failure> {
 pub fn keep(path: &Path, run: &RunFolder) -> Result<(), Failure> {
     let bytes = std::fs::read(path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
     Ok(run.publish(&format!("rehearsal-{}.json", &sha256_hex(&bytes)[..8]), &bytes)?)
-}
-
-/// Whether the rig is the one that rehearsed.
-pub fn compared(stored: &StoredRehearsal, lines: &[CheckLine]) -> CheckLine {
-    let mut changed = Vec::new();
-    for (what, then) in stored.checks.iter().filter(|(what, _)| CONSTANT.contains(&what.as_str())) {
-        let now = lines.iter().find(|line| line.what == what).map_or("nothing", |line| &line.found);
-        if now != then {
-            changed.push(format!("{what}: {now}, it was {then}"));
-        }
-    }
-    let found = match changed.is_empty() {
-        true => "the rig is the one that rehearsed".to_string(),
-        false => format!("rehearse again, the rig has changed: {}", changed.join("; ")),
-    };
-    CheckLine { what: "rehearsal", ok: changed.is_empty(), found }
 }

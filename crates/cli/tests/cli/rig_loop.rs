@@ -28,7 +28,19 @@ const MOST_SUSPECT: usize = 1;
 impl Served {
     fn start(folder: &Path) -> Self {
         let rig = folder.join("rig.toml");
-        let serve = ["rig", "serve", "--set", HIDDEN, "--any-ports", "--speed", SPEED, "--seed", "5", "-q"];
+        let serve = [
+            "rig",
+            "serve",
+            "--set",
+            HIDDEN,
+            "--any-ports",
+            "--in-step",
+            "--speed",
+            SPEED,
+            "--seed",
+            "5",
+            "-q",
+        ];
         let mut process =
             gripgen().args(serve).arg("--write-rig").arg(&rig).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
@@ -38,12 +50,8 @@ impl Served {
     }
 
     fn pull(&self, out: &Path, more: &[&str]) {
-        // A machine that builds something else at the same time is slow, not broken.
-        let patient =
-            ["--set", "limits.robot_silence_s=1.0", "--set", "images.frame_s=5.0", "--reconnect", "20"];
         let mut arguments =
             vec!["rig", "pull", self.rig.to_str().unwrap(), "-q", "-o", out.to_str().unwrap()];
-        arguments.extend(patient);
         arguments.extend(more);
         let done = run(&arguments);
         let index = std::fs::read_to_string(out.join("index.csv")).unwrap_or_default();

@@ -111,5 +111,3 @@ fn nothing_beyond_the_limits_becomes_a_program() {
     assert!(refused(|p| p.centre_of_gravity_mm = [0.0, f64::NAN, 0.0]).contains("centre of gravity is NaN"));
     assert!(refused(|p| p.run = 0).contains("the run is 0"));
 }
-
-/// The interpreter's reading of the language has no say in how the programs are written; that it takes them is tested here.

@@ -1,10 +1,10 @@
 //! The joints under the tool: they follow it, they lead it, and they end what they cannot do.
 
 use super::{HostedRobot, START, rig};
-use gripgen_rig::robot_state::SafetyStatus;
 use crate::arm::STEP_S;
 use crate::controller::Announcement;
 use crate::kinematics::{MAX_SPEED_RAD_S, base_from_flange};
+use gripgen_rig::robot_state::SafetyStatus;
 use nalgebra::Translation3;
 
 fn with(lines: &str) -> HostedRobot {

@@ -1,11 +1,11 @@
 //! A virtual robot with a host that does what a trial wants.
 
-use super::spring::Spring;
-use gripgen_rig::program::{ACKNOWLEDGE_S, Phase, StopReason, TcpPose, registers};
-use gripgen_rig::rtde::Value;
 use crate::arm::{Arm, STEP_S};
 use crate::controller::{Announcement, Controller, TOOL_M};
 use crate::robot::Robot;
+use crate::spring::Spring;
+use gripgen_rig::program::{ACKNOWLEDGE_S, Phase, StopReason, TcpPose, registers};
+use gripgen_rig::rtde::Value;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::plant::{GripRequest, Plant};
 use nalgebra::Translation3;

@@ -2,9 +2,9 @@
 
 use super::bench::{Bench, Verdict, near};
 use super::pull::never_begins;
-use super::spring::Spring;
-use gripgen_rig::program::{GO_WAIT_S, MotionProgram, Phase, StopReason, TcpPose, registers};
 use crate::arm::STEP_S;
+use crate::spring::Spring;
+use gripgen_rig::program::{GO_WAIT_S, MotionProgram, Phase, StopReason, TcpPose, registers};
 
 type Trial = fn(&MotionProgram, &str) -> Verdict;
 
@@ -21,7 +21,7 @@ pub(super) const TRIALS: [(&str, Trial); 9] = [
     ("nobody says go before the way", nobody_says_go),
 ];
 
-const NOTHING: Spring = Spring { limit_n: 1.0, gain: 1.0 };
+const NOTHING: Spring = Spring { limit_n: 1.0, ..Spring::PLAIN };
 /// How long the way is, and how much the tool turns on it.
 const WAY_M: f64 = 0.1;
 const TURN_RAD: f64 = 0.2;

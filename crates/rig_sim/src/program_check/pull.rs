@@ -1,11 +1,11 @@
 //! Trials of a pull.
 
 use super::bench::{Bench, Verdict, near};
-use super::spring::Spring;
+use crate::arm::STEP_S;
+use crate::spring::Spring;
 use gripgen_rig::program::{
     HEARTBEAT_WAIT_S, PRELOAD_S, Phase, PullProgram, SETTLE_S, StopReason, TcpPose, registers,
 };
-use crate::arm::STEP_S;
 
 type Trial = fn(&PullProgram, &str) -> Verdict;
 
@@ -31,7 +31,7 @@ const START: TcpPose = TcpPose { position_m: [0.4, 0.1, 0.25], rotation_rad: [0.
 const LONGEST_WAIT_S: f64 = 300.0;
 const GRAVITY_M_S2: f64 = 9.806_65;
 /// More than any program applies.
-const STRONG: Spring = Spring { limit_n: 1e6, gain: 1.0 };
+const STRONG: Spring = Spring { limit_n: 1e6, ..Spring::PLAIN };
 /// What hangs on the tool when the sensor is zeroed, and what is added when the jaws close.
 const TARE_KG: f64 = 0.1;
 const PRELOAD_KG: f64 = 0.05;
@@ -110,7 +110,7 @@ fn stair(p: &PullProgram, bench: &Bench, tick: u64) -> Verdict {
 
 fn slips(p: &PullProgram, text: &str) -> Verdict {
     let limit_n = p.start_n.max(0.25 * p.max_force_n) + 0.25 * p.increment_n;
-    let mut bench = start(p, text, Spring { limit_n, gain: 1.0 })?;
+    let mut bench = start(p, text, Spring { limit_n, ..Spring::PLAIN })?;
     bench.until_phase(Phase::Started, 0.02)?;
     // The zero at the start of a program is the controller's; what hangs there since has to be zeroed by the program.
     bench.arm_mut().hang(TARE_KG);
@@ -172,7 +172,7 @@ fn slips(p: &PullProgram, text: &str) -> Verdict {
             return Err("the pull goes on after the part has slipped".into());
         }
     }
-    let expected_s = time_to_s(p, limit_n) + 1e-3 * p.stop_mm / super::spring::SLIDING_M_S;
+    let expected_s = time_to_s(p, limit_n) + 1e-3 * p.stop_mm / Spring::PLAIN.sliding_m_s;
     near("the time of the pull", tick as f64 * STEP_S, expected_s, 0.03)?;
     bench.stops_for(StopReason::Displacement, 0.3)?;
     let over_mm = 1e3 * moved_m(p, &bench) - p.stop_mm;

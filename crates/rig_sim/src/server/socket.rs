@@ -1,15 +1,16 @@
 //! Starting, the clock, and what stops it.
 
+use super::messages::{announcement_message, robot_mode_packet};
 use super::ports::socket::Shared;
-use super::{RigAddresses, ServeError, announcement_message, robot_mode_packet};
+use super::{RigAddresses, ServeError};
+use crate::arm::{ArmFaults, STEP_S};
+use crate::faults::{Device, Fault};
+use crate::world::World;
 use gripgen_rig::camera::CameraView;
 use gripgen_rig::gcl::GripState;
 use gripgen_rig::link::lock;
 use gripgen_rig::program::TcpPose;
 use gripgen_rig::robot_state::{RobotMode, SafetyStatus};
-use crate::arm::{ArmFaults, STEP_S};
-use crate::faults::{Device, Fault};
-use crate::world::World;
 use gripgen_twin::plant::{GripRequest, Plant};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -23,6 +24,12 @@ const NAP: Duration = Duration::from_millis(1);
 const MAX_BEHIND_S: f64 = 0.25;
 /// Control steps between two packets with the robot's mode: ten per second.
 const STEPS_PER_MODE: u64 = 50;
+/// How far, in real time, a rig that waits for its client may go beyond a beat: two of them.
+const AHEAD_S: f64 = 0.02;
+/// Time between two control steps while it waits.
+const SLOWLY: Duration = Duration::from_millis(40);
+/// A client that is waited for longer is dead.
+const DEAD: Duration = Duration::from_secs(1);
 /// Control steps without a look at the clients.
 const STEPS_AT_ONCE: u64 = 64;
 
@@ -33,6 +40,9 @@ pub struct ServeOptions {
     pub addresses: RigAddresses,
     /// How many times faster than real time.
     pub clock_rate: f64,
+    /// Whether the clock waits for a client that writes inputs: a machine that is busy then slows the rig down, and no deadline
+    /// that is counted by the rig's clock depends on it.
+    pub in_step: bool,
     /// Where the tool is at first.
     pub tcp: TcpPose,
     /// How a client turns the cameras' frames; the cameras send what this makes upright.
@@ -89,10 +99,11 @@ impl ServedRig {
         }
         let world = World::new(plant.clone(), options.tcp, rate);
         let shared = Arc::new(Shared::new(world, rate, options.view));
+        let pace = options.in_step.then(|| Pace::new(rate));
         let addresses = shared.open_ports(options.addresses).inspect_err(|_| shared.close())?;
         let (ask, asked) = channel();
         let (ticking, working) = (shared.clone(), shared.clone());
-        let clock = std::thread::spawn(move || run_clock(&ticking, &ask));
+        let clock = std::thread::spawn(move || run_clock(&ticking, &ask, pace));
         let worker = std::thread::spawn(move || work(&working, plant.as_ref(), &asked));
         Ok(Self { addresses, shared, clock: Some(clock), worker: Some(worker) })
     }
@@ -169,8 +180,41 @@ impl Drop for ServedRig {
     }
 }
 
+/// Steps of a rig that waits for its client.
+struct Pace {
+    /// How far the rig may go beyond the last beat.
+    ahead_s: f64,
+    /// Since when it waits, and when it went on last.
+    waits: Option<(Instant, Instant)>,
+}
+
+impl Pace {
+    fn new(rate: f64) -> Self {
+        Self { ahead_s: AHEAD_S * rate, waits: None }
+    }
+
+    /// Control steps that may be made now. A client that is late gets one now and then, so that it hears something; one that is too
+    /// late is taken for dead, and not waited for until it beats again.
+    fn steps(&mut self, world: &World, now: Instant) -> u64 {
+        let left_s = self.ahead_s - world.controller.unheard_s();
+        if world.owners.is_empty() || left_s >= STEP_S {
+            self.waits = None;
+            return if world.owners.is_empty() { u64::MAX } else { (left_s / STEP_S) as u64 };
+        }
+        let (since, last) = self.waits.get_or_insert((now, now));
+        if now.duration_since(*since) > DEAD {
+            return u64::MAX;
+        }
+        let due = now.duration_since(*last) >= SLOWLY;
+        if due {
+            *last = now;
+        }
+        u64::from(due)
+    }
+}
+
 /// The clock: control steps when they are due.
-fn run_clock(shared: &Shared, ask: &Sender<GripRequest>) {
+fn run_clock(shared: &Shared, ask: &Sender<GripRequest>, mut pace: Option<Pace>) {
     let mut origin = Instant::now();
     let mut steps_at_origin = 0;
     while !shared.stop.load(Ordering::SeqCst) {
@@ -181,7 +225,8 @@ fn run_clock(shared: &Shared, ask: &Sender<GripRequest>) {
             (origin, steps_at_origin) = (Instant::now(), world.step_number());
         }
         let mut batches = shared.batches();
-        for _ in 0..behind.min(STEPS_AT_ONCE) {
+        let allowed = pace.as_mut().map_or(u64::MAX, |pace| pace.steps(&world, Instant::now()));
+        for _ in 0..behind.min(STEPS_AT_ONCE).min(allowed) {
             world.begin_step();
             for batch in &mut batches {
                 batch.add(&world);
@@ -204,7 +249,9 @@ fn run_clock(shared: &Shared, ask: &Sender<GripRequest>) {
             // The worker is there as long as this thread is.
             let _ = ask.send(request);
         }
-        if behind <= STEPS_AT_ONCE {
+        if allowed < behind.min(STEPS_AT_ONCE) {
+            std::thread::sleep(NAP);
+        } else if behind <= STEPS_AT_ONCE {
             let next_s = (due + 1 - steps_at_origin) as f64 * STEP_S / shared.rate;
             let left_s = next_s - origin.elapsed().as_secs_f64();
             if left_s > 0.0 {

@@ -395,6 +395,7 @@ fn a_value_may_stand_in_the_next_line_before_another_statement() {
     }
 }
 
+/// The interpreter's reading of the language has no say in how the programs are written; that it takes them is tested here.
 #[test]
 fn both_programs_are_texts_that_an_interpreter_reads() {
     let motion = MotionProgram {
@@ -407,7 +408,10 @@ fn both_programs_are_texts_that_an_interpreter_reads() {
         centre_of_gravity_mm: [0.0; 3],
         tool_mm: [0.0; 3],
     };
-    for (text, title) in [(PullProgram::default().script().unwrap(), "gripgen_pull"), (motion.script().unwrap(), "gripgen_move")] {
+    for (text, title) in [
+        (PullProgram::default().script().unwrap(), "gripgen_pull"),
+        (motion.script().unwrap(), "gripgen_move"),
+    ] {
         assert_eq!(Program::parse(&text).unwrap().title(), title);
     }
 }

@@ -1,7 +1,6 @@
 //! A rig of its own for each injection, and a pull on it.
 
 use super::injection::{HEAVY_KG, Injection, Kind, Moment};
-use super::plant::Spring;
 use super::watch::{Progress, Watch};
 use gripgen_rig::camera::CameraView;
 use gripgen_rig::experiment::pull::ExecutedPull;
@@ -10,6 +9,7 @@ use gripgen_rig::program::TcpPose;
 use gripgen_rig::rtde::{Kind as Frame, encode_frame};
 use gripgen_rig_sim::faults::Fault;
 use gripgen_rig_sim::server::{RigAddresses, ServeOptions, ServedRig};
+use gripgen_rig_sim::spring::Spring;
 use gripgen_twin::config::Document;
 use gripgen_twin::{Campaign, PlannedPull};
 use std::io::Write;
@@ -22,17 +22,17 @@ use std::time::{Duration, Instant};
 /// How many times faster than real time.
 const RATE: f64 = 20.0;
 /// Longest wait for a moment to come.
-const COMES: Duration = Duration::from_secs(20);
+const COMES: Duration = Duration::from_secs(120);
 /// The pull has to be over by then, whatever happens.
-const OVER: Duration = Duration::from_secs(60);
-/// After this the arm has to stand.
-pub const LONGEST: Duration = Duration::from_secs(5);
+const OVER: Duration = Duration::from_secs(180);
+/// After this the arm has to stand: five seconds, and patience.
+pub const LONGEST: Duration = Duration::from_secs(20);
 /// So long it is looked at whether it stays so.
 const STAYS: Duration = Duration::from_millis(300);
-/// How long somebody leans on the tool: 0.3 s of the rig's time.
-const TOUCH: Duration = Duration::from_millis(15);
-/// How long a stuck experiment hangs.
-const HANGS: Duration = Duration::from_millis(1500);
+/// How long a person leans on the tool, by the rig's clock.
+const TOUCH_S: f64 = 0.3;
+/// How long a stuck experiment hangs: the rig waits a second for it.
+const HANGS: Duration = Duration::from_millis(2500);
 
 /// What came of an injection.
 pub struct Made {
@@ -63,7 +63,7 @@ pub fn config(at: RigAddresses) -> RigConfig {
          [gripper]\naddress = \"127.0.0.1\"\nport = {}\n\
          [cameras.left]\naddress = \"127.0.0.1\"\nport = {}\nsize_px = [16, 8]\n\
          [cameras.right]\naddress = \"127.0.0.1\"\nport = {}\nsize_px = [16, 8]\n\
-         [limits]\nrobot_silence_s = 0.5\n[images]\nframe_s = 1.0\n\
+         [limits]\nrobot_silence_s = 0.5\npatience = 3.0\n[images]\nframe_s = 1.0\n\
          [poses.part]\nbase_from_tool = [0.45, 0.0, 0.25, 0, 0, 0]\n",
         at.rtde.port(),
         at.dashboard.port(),
@@ -86,17 +86,19 @@ fn campaign() -> Campaign {
     Campaign { label_tolerance_n: 3.0, stop_m: 5e-3, feedback: None, pulls: vec![pull] }
 }
 
-/// Connects and pulls. `emit` sees what happens.
+/// Connects and pulls. `emit` sees what happens, `over` is called when the pull is over.
 fn pull(
     config: &RigConfig,
     stop: &AtomicBool,
     emit: &mut dyn FnMut(gripgen_rig::experiment::RigEvent),
+    over: impl FnOnce(),
 ) -> Result<ExecutedPull, String> {
     let devices = Devices::connect(config).map_err(|e| e.to_string())?;
     let mut experiment = Experiment::new(config, devices, stop, emit);
     experiment.begin().map_err(|e| e.to_string())?;
     let campaign = campaign();
     let pull = experiment.pull(&campaign, &campaign.pulls[0]);
+    over();
     if pull.stopped.is_none() {
         experiment.close();
     }
@@ -108,12 +110,13 @@ pub fn make(injection: &Injection) -> Made {
     let options = ServeOptions {
         addresses: RigAddresses::any_ports(),
         clock_rate: RATE,
+        in_step: true,
         tcp: TcpPose { position_m: [0.4, 0.1, 0.4], rotation_rad: [0.0; 3] },
         view: CameraView { rotate_deg: 90, mirror: false, crop_px: None, size_px: [16, 8] },
     };
     let rig = ServedRig::start(Arc::new(Spring::default()), &options).unwrap();
     let config = config(rig.addresses());
-    let progress = Progress::default();
+    let progress = Progress::until(injection.moment);
     let (stop, dies, hangs) = (AtomicBool::new(false), AtomicBool::new(false), AtomicBool::new(false));
     std::thread::scope(|scope| {
         let experiment = scope.spawn(|| {
@@ -127,14 +130,16 @@ pub fn make(injection: &Injection) -> Made {
                     std::thread::sleep(HANGS);
                 }
             };
-            pull(&config, &stop, &mut emit).unwrap()
+            pull(&config, &stop, &mut emit, || progress.wait_for_fault()).unwrap()
         });
         let mut watch = Watch::new(&rig, &progress);
         let mut came = watch.until_moment(injection.moment, COMES, || experiment.is_finished());
-        let began = Instant::now();
-        let wait = Duration::from_millis(injection.delay_ms);
-        came &= !watch.until(wait, |_| experiment.is_finished());
-        let injected = began + wait;
+        // By the rig's clock: the experiment goes no further than this moment before the fault is there.
+        let due_s = rig.status().timestamp_s + RATE * 1e-3 * injection.delay_ms as f64;
+        let is_due = |rig: &ServedRig| rig.status().timestamp_s >= due_s || progress.waits();
+        came &=
+            watch.until(COMES, |w| is_due(w.rig) || experiment.is_finished()) && !experiment.is_finished();
+        let (injected, moment) = (Instant::now(), watch.moment());
         // Jaws that are about to open may do so.
         let held = watch.holds() && !progress.releases();
         let mut slow = None;
@@ -146,11 +151,13 @@ pub fn make(injection: &Injection) -> Made {
             Kind::Stuck => hangs.store(true, Ordering::SeqCst),
             Kind::Touch => {
                 rig.inject(Fault::Hang(HEAVY_KG));
-                watch.until(TOUCH, |_| false);
+                progress.fault_is_there();
+                let over_s = rig.status().timestamp_s + TOUCH_S;
+                watch.until(COMES, |w| w.rig.status().timestamp_s >= over_s || experiment.is_finished());
                 rig.inject(Fault::Hang(0.0));
             }
         }
-        let moment = watch.moment();
+        progress.fault_is_there();
         let mut stands_since = None;
         let mut follow = |w: &mut Watch| {
             if w.stands() {
@@ -199,7 +206,7 @@ fn again(injection: &Injection, rig: &ServedRig, config: &RigConfig) -> Option<R
         | Kind::Touch => {}
         _ => return None,
     }
-    Some(pull(config, &AtomicBool::new(false), &mut |_| ()))
+    Some(pull(config, &AtomicBool::new(false), &mut |_| (), || ()))
 }
 
 /// Asks for much and reads nothing.

@@ -4,15 +4,28 @@ use super::injection::{MOMENTS, Moment};
 use gripgen_rig::experiment::RigEvent;
 use gripgen_rig::gcl::GripState;
 use gripgen_rig_sim::server::ServedRig;
-use std::sync::Mutex;
+use std::sync::{Condvar, Mutex};
 use std::time::{Duration, Instant};
 
 /// Time between two looks.
 const LOOK: Duration = Duration::from_micros(500);
+/// Longest time that an experiment is held.
+const LONGEST_WAIT: Duration = Duration::from_secs(120);
 
-/// What the experiment has told so far.
+/// What the experiment has told so far. It is held where it would go beyond the moment of a fault that is not there yet, and with
+/// it the rig's clock, however late the test looks.
+pub struct Progress {
+    told: Mutex<Told>,
+    moment: Moment,
+    fault: Mutex<Fault>,
+    changed: Condvar,
+}
+
 #[derive(Default)]
-pub struct Progress(Mutex<Told>);
+struct Fault {
+    is_there: bool,
+    is_waited_for: bool,
+}
 
 #[derive(Default, Clone, Copy)]
 struct Told {
@@ -21,10 +34,56 @@ struct Told {
     displacement_mm: f64,
 }
 
+impl Told {
+    /// Whether this moment has begun, of those that an experiment tells.
+    fn reached(&self, moment: Moment) -> bool {
+        match moment {
+            Moment::Settling => false,
+            // The images take no time to speak of.
+            Moment::Dwell => self.moment >= Some(Moment::GripImages),
+            Moment::MidPull => self.desired_n >= 5.0,
+            Moment::NearSlip => self.desired_n >= 10.0,
+            Moment::Sliding => self.displacement_mm > 0.5,
+            moment => self.moment >= Some(moment),
+        }
+    }
+}
+
 impl Progress {
+    /// Of a pull that has a fault at this moment.
+    pub fn until(moment: Moment) -> Self {
+        Self { told: Mutex::default(), moment, fault: Mutex::default(), changed: Condvar::new() }
+    }
+
+    /// Waits, where the fault is not there yet.
+    pub fn wait_for_fault(&self) {
+        let mut fault = self.fault.lock().unwrap();
+        fault.is_waited_for = true;
+        drop(self.changed.wait_timeout_while(fault, LONGEST_WAIT, |fault| !fault.is_there).unwrap());
+    }
+
+    /// The fault was injected, or never will be.
+    pub fn fault_is_there(&self) {
+        self.fault.lock().unwrap().is_there = true;
+        self.changed.notify_all();
+    }
+
+    /// Whether the experiment is held.
+    pub fn waits(&self) -> bool {
+        self.fault.lock().unwrap().is_waited_for
+    }
+
     /// Takes in what the experiment tells.
     pub fn take(&self, event: &RigEvent) {
-        let mut told = self.0.lock().unwrap();
+        self.keep(event);
+        let told = *self.told.lock().unwrap();
+        if MOMENTS.into_iter().any(|moment| moment > self.moment && told.reached(moment)) {
+            self.wait_for_fault();
+        }
+    }
+
+    fn keep(&self, event: &RigEvent) {
+        let mut told = self.told.lock().unwrap();
         match event {
             RigEvent::Step(step) => {
                 let moment = match *step {
@@ -50,23 +109,18 @@ impl Progress {
 
     /// Whether this moment has begun.
     fn reached(&self, moment: Moment, rig: &ServedRig) -> bool {
-        let told = *self.0.lock().unwrap();
+        let told = *self.told.lock().unwrap();
         match moment {
             Moment::Settling => {
                 told.moment >= Some(Moment::Gripping) && rig.status().grip == GripState::Holding
             }
-            // The images take no time to speak of.
-            Moment::Dwell => told.moment >= Some(Moment::GripImages),
-            Moment::MidPull => told.desired_n >= 5.0,
-            Moment::NearSlip => told.desired_n >= 10.0,
-            Moment::Sliding => told.displacement_mm > 0.5,
-            moment => told.moment >= Some(moment),
+            moment => told.reached(moment),
         }
     }
 
     /// Whether the jaws may open from now on.
     pub fn releases(&self) -> bool {
-        self.0.lock().unwrap().moment >= Some(Moment::Release)
+        self.told.lock().unwrap().moment >= Some(Moment::Release)
     }
 }
 

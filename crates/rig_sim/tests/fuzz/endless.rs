@@ -40,12 +40,7 @@ fn feed(mut take: Take, first: &[u8], again: &[u8], allowed: usize) -> usize {
 }
 
 fn link() -> Take {
-    let plan = SessionPlan {
-        outputs: vec!["timestamp".into()],
-        frequency_hz: 500.0,
-        inputs: vec![],
-        lenient: false,
-    };
+    let plan = SessionPlan { outputs: vec!["timestamp".into()], frequency_hz: 500.0, inputs: vec![] };
     let mut link = Link::new(plan).unwrap();
     Box::new(move |bytes| link.receive(bytes).is_ok())
 }
@@ -60,7 +55,7 @@ fn primary() -> Take {
     Box::new(move |bytes| {
         stream.push(bytes);
         loop {
-            match stream.next_event() {
+            match stream.next_message() {
                 Ok(Some(_)) => {}
                 Ok(None) => return true,
                 Err(_) => return false,

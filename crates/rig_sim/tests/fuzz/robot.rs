@@ -1,15 +1,14 @@
 //! The devices of the virtual rig that hear the inputs.
 
 use super::Heard;
-use super::plant::Spring;
 use gripgen_rig::gcl::SHIPPED_LIMITS;
 use gripgen_rig::program::TcpPose;
 use gripgen_rig::rtde::Value;
 use gripgen_rig_sim::controller::Controller;
 use gripgen_rig_sim::dashboard;
 use gripgen_rig_sim::gripper::{Closed, Jaws, VirtualGripper};
-use gripgen_rig_sim::panel::Panel;
 use gripgen_rig_sim::rtde::{InputOwners, RtdeServer, ServerError};
+use gripgen_rig_sim::spring::Spring;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
@@ -21,7 +20,7 @@ pub fn controller() -> Controller {
 
 /// The answer of its dashboard.
 pub fn reply(line: &str, controller: &mut Controller) -> String {
-    dashboard::reply(line, &mut Panel(controller)).text
+    dashboard::reply(line, controller).text
 }
 
 /// A program that does what its inputs say: command 3 goes to a pose, 6 pulls with a force, 7 ends that.

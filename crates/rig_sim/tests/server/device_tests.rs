@@ -3,7 +3,7 @@
 use super::{TIMEOUT, serve};
 use gripgen_rig::camera::{CameraClient, SHIPPED_FRAME_LIMITS, decode_jpeg};
 use gripgen_rig::gcl::{GclClient, GclCommand, GripState, Query, SHIPPED_LIMITS};
-use gripgen_rig::primary::{PrimaryClient, PrimaryEvent, PrimaryStream, RobotMessage};
+use gripgen_rig::primary::{PrimaryMessage, PrimaryStream};
 use gripgen_rig::robot_state::RobotMode;
 use gripgen_rig_sim::faults::Fault;
 use gripgen_rig_sim::server::ServedRig;
@@ -101,21 +101,20 @@ fn cameras_stream_and_freeze() {
         camera.frame_after(Instant::now(), TIMEOUT).unwrap().event.device_time_s.unwrap()
     };
     assert!(cameras.iter().all(|camera| stamp(camera) >= 0.0));
-    let before = cameras.each_ref().map(CameraClient::frames_seen);
-    std::thread::sleep(Duration::from_secs(2));
-    let seen = [0, 1].map(|i| cameras[i].frames_seen() - before[i]);
-    println!("{seen:?} frames in 2 s");
-    assert!(seen.iter().all(|seen| (60..=125).contains(seen)), "{seen:?}");
+    let (began, before) = (Instant::now(), cameras.each_ref().map(CameraClient::frames_seen));
+    let seen = || [0, 1].map(|i| cameras[i].frames_seen() - before[i]);
+    wait_for("a second of frames", || seen().iter().all(|seen| *seen >= 60));
+    // No machine makes them come faster than 60 times a second.
+    let most = 62.5 * began.elapsed().as_secs_f64() + 2.0;
+    assert!(seen().iter().all(|seen| *seen as f64 <= most), "{:?} of {most}", seen());
 
     rig.inject(Fault::Freeze(Jaw::Left));
     stamp(&cameras[0]);
     let (frozen_s, right_s) = (stamp(&cameras[0]), stamp(&cameras[1]));
-    std::thread::sleep(Duration::from_millis(200));
+    wait_for("the other camera", || stamp(&cameras[1]) > right_s + 0.15);
     assert_eq!(stamp(&cameras[0]), frozen_s, "frames still come, their stamp is the same");
-    assert!(stamp(&cameras[1]) > right_s + 0.15, "the other camera goes on");
     rig.inject(Fault::Thaw(Jaw::Left));
-    stamp(&cameras[0]);
-    assert!(stamp(&cameras[0]) > frozen_s + 0.15);
+    wait_for("a camera that sees again", || stamp(&cameras[0]) > frozen_s + 0.15);
 }
 
 /// A program with a word that nobody knows, sent to each port that takes programs, is answered on the primary one.
@@ -127,19 +126,36 @@ fn every_script_port_takes_programs_and_the_primary_one_tells() {
     primary.set_read_timeout(Some(TIMEOUT)).unwrap();
     let (mut stream, mut buffer) = (PrimaryStream::default(), [0; 4096]);
     let mut next = || loop {
-        if let Some(PrimaryEvent::Message { message, .. }) = stream.next_event().unwrap() {
+        if let Some(message) = stream.next_message().unwrap() {
             break message;
         }
         let n = primary.read(&mut buffer).unwrap();
         assert!(n > 0, "closed");
         stream.push(&buffer[..n]);
     };
-    assert!(matches!(next(), RobotMessage::Version(_)));
+    assert!(matches!(next(), PrimaryMessage::Version { .. }));
     for (name, port) in [("one", at.primary), ("two", at.secondary), ("three", at.real_time)] {
         let script = format!("def program():\n  word_{name}(1)\nend\n");
         TcpStream::connect(port).unwrap().write_all(script.as_bytes()).unwrap();
-        let RobotMessage::ErrorCode(error) = next() else { panic!("{name}") };
-        assert_eq!(error.text, format!("line 2: `word_{name}` is no function that is known"));
+        let PrimaryMessage::ErrorCode { text, .. } = next() else { panic!("{name}") };
+        assert_eq!(text, format!("line 2: `word_{name}` is no function that is known"));
+    }
+}
+
+/// The next state of the robot: the controller's clock in microseconds, seven flags, and the mode.
+fn next_mode(stream: &mut TcpStream) -> (u64, [bool; 7], RobotMode) {
+    loop {
+        let mut size = [0; 4];
+        stream.read_exact(&mut size).unwrap();
+        let mut packet = vec![0; u32::from_be_bytes(size) as usize - 4];
+        stream.read_exact(&mut packet).unwrap();
+        // A robot state is its type and one sub-packet: size, type, content.
+        if packet[0] == 16 {
+            assert_eq!((packet.len(), packet[5]), (48, 0));
+            let flags = std::array::from_fn(|i| packet[14 + i] == 1);
+            let ticks = u64::from_be_bytes(packet[6..14].try_into().unwrap());
+            return (ticks, flags, RobotMode::from_number(i32::from(packet[21] as i8)).unwrap());
+        }
     }
 }
 
@@ -147,31 +163,29 @@ fn every_script_port_takes_programs_and_the_primary_one_tells() {
 fn the_mode_of_the_robot_comes_ten_times_a_second() {
     let rig = serve(1.0);
     let at = rig.addresses();
-    let connect = |address| PrimaryClient::connect(address, TIMEOUT).unwrap();
-    let clients = [connect(at.primary), connect(at.secondary)];
-    let newest = |client: &PrimaryClient| client.newest_mode().map(|mode| mode.event);
-    wait_for("the first mode", || clients.iter().all(|client| newest(client).is_some()));
-    for client in &clients {
-        let mode = newest(client).unwrap();
-        assert_eq!(mode.mode(), Some(RobotMode::Running));
-        assert!(mode.power_on && !mode.emergency_stopped && !mode.program_running, "{mode:?}");
+    let mut clients = [at.primary, at.secondary].map(|address| TcpStream::connect(address).unwrap());
+    for client in &mut clients {
+        client.set_read_timeout(Some(TIMEOUT)).unwrap();
+        let (before, flags, mode) = next_mode(client);
+        assert_eq!(mode, RobotMode::Running);
+        // Real, enabled and powered; neither stopped nor running a program.
+        assert_eq!(flags, [true, true, true, false, false, false, false]);
         // Packets are a tenth of a second of the controller's clock apart.
-        let before = mode.device_ticks;
-        wait_for("the next mode", || newest(client).unwrap().device_ticks > before);
-        let next = newest(client).unwrap().device_ticks - before;
-        assert!((next + 5) % 100_000 < 10, "{next} us");
+        let passed = next_mode(client).0 - before;
+        assert!((passed + 5) % 100_000 < 10, "{passed} us");
     }
     let real_time = TcpStream::connect(at.real_time).unwrap();
     real_time.set_read_timeout(Some(Duration::from_millis(300))).unwrap();
     assert!((&real_time).read(&mut [0; 16]).is_err(), "the real-time port is silent");
 
     rig.inject(Fault::EmergencyStop);
-    for client in &clients {
-        wait_for("the stop", || newest(client).unwrap().emergency_stopped);
-        let mode = newest(client).unwrap();
-        assert!(mode.mode() == Some(RobotMode::PowerOff) && !mode.power_on, "{mode:?}");
-        // The mode is an event where it changes, beside the version and the safety message.
-        let modes = client.events().try_iter().filter(|e| matches!(e.event, PrimaryEvent::RobotMode(_)));
-        assert_eq!((modes.count(), client.skipped(), client.events_lost()), (2, 0, 0));
+    for client in &mut clients {
+        let (_, flags, mode) = loop {
+            let next = next_mode(client);
+            if next.1[3] {
+                break next;
+            }
+        };
+        assert!(mode == RobotMode::PowerOff && !flags[2], "{mode:?}");
     }
 }

@@ -27,9 +27,9 @@ fn talk(rig: &ServedRig, device: Device) -> Talk {
     let mut talk = Talk { address, ask, says: Vec::new() };
     // What it says undisturbed, until it is silent.
     let mut stream = talk.connect();
-    stream.set_read_timeout(Some(Duration::from_millis(300))).unwrap();
     let mut buffer = [0; 4096];
     while let Ok(n) = stream.read(&mut buffer) {
+        stream.set_read_timeout(Some(Duration::from_millis(300))).unwrap();
         talk.says.extend(&buffer[..n]);
         if n == 0 || device == Device::Script {
             break;

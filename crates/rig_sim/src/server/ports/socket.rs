@@ -1,9 +1,8 @@
 //! Connections of each kind, and what they share.
 
+use super::super::RigAddresses;
 use super::super::ServeError;
-use super::super::{RigAddresses, version_message};
-use gripgen_rig::camera::CameraView;
-use gripgen_rig::link::lock;
+use super::super::messages::version_message;
 use crate::arm::STEP_S;
 use crate::dashboard;
 use crate::faults::Device;
@@ -11,11 +10,12 @@ use crate::mjpeg::{
     CameraRequest, HttpRequest, bad_request, encode_jpeg, not_found, snapshot, stream_header, stream_part,
     with_comment,
 };
-use crate::panel::Panel;
 use crate::rtde::RtdeServer;
 use crate::script::ScriptReader;
 use crate::wire::{DeviceFaults, Outbox, listen, read_on, spawn_writer};
 use crate::world::World;
+use gripgen_rig::camera::CameraView;
+use gripgen_rig::link::lock;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -224,7 +224,7 @@ impl Shared {
         read_on(stream, &outbox, self.faults(Device::Dashboard), &self.stop, |bytes| {
             lines.each(bytes, |line| {
                 let mut world = lock(&self.world);
-                let reply = dashboard::reply(line, &mut Panel(&mut world.controller));
+                let reply = dashboard::reply(line, &mut world.controller);
                 drop(world);
                 outbox.push((reply.text + "\n").into_bytes());
                 !reply.close

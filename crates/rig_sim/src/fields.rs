@@ -1,9 +1,9 @@
 //! Fields that are known by name, and their types. A controller says the types itself; these are for those who have to say
-//! them, and for a client of a server that does not.
+//! them.
 //!
 //! Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", and the type table of the Universal Robots Client Library.
 
-use super::value::{FieldType, Value};
+use gripgen_rig::rtde::{FieldType, Value};
 
 /// Type of an output field; `None` if it is not known. A controller lets clients read the input registers, too.
 pub fn output_type(name: &str) -> Option<FieldType> {
@@ -172,22 +172,61 @@ impl Register {
     }
 }
 
-impl FieldType {
-    /// These numbers as a value of this type. Places without a number are 0; a number that an integer cannot be is the nearest
-    /// that it can.
-    pub fn value(self, numbers: &[f64]) -> Value {
-        let at = |i: usize| numbers.get(i).copied().unwrap_or(0.0);
-        match self {
-            FieldType::Bool => Value::Bool(at(0) != 0.0),
-            FieldType::Uint8 => Value::Uint8(at(0) as u8),
-            FieldType::Uint32 => Value::Uint32(at(0) as u32),
-            FieldType::Uint64 => Value::Uint64(at(0) as u64),
-            FieldType::Int32 => Value::Int32(at(0) as i32),
-            FieldType::Double => Value::Double(at(0)),
-            FieldType::Vector3d => Value::Vector3d(std::array::from_fn(at)),
-            FieldType::Vector6d => Value::Vector6d(std::array::from_fn(at)),
-            FieldType::Vector6int32 => Value::Vector6int32(std::array::from_fn(|i| at(i) as i32)),
-            FieldType::Vector6uint32 => Value::Vector6uint32(std::array::from_fn(|i| at(i) as u32)),
+/// These numbers as a value of this type. Places without a number are 0; a number that an integer cannot be is the nearest
+/// that it can.
+pub fn value_of(kind: FieldType, numbers: &[f64]) -> Value {
+    let at = |i: usize| numbers.get(i).copied().unwrap_or(0.0);
+    match kind {
+        FieldType::Bool => Value::Bool(at(0) != 0.0),
+        FieldType::Uint8 => Value::Uint8(at(0) as u8),
+        FieldType::Uint32 => Value::Uint32(at(0) as u32),
+        FieldType::Uint64 => Value::Uint64(at(0) as u64),
+        FieldType::Int32 => Value::Int32(at(0) as i32),
+        FieldType::Double => Value::Double(at(0)),
+        FieldType::Vector3d => Value::Vector3d(std::array::from_fn(at)),
+        FieldType::Vector6d => Value::Vector6d(std::array::from_fn(at)),
+        FieldType::Vector6int32 => Value::Vector6int32(std::array::from_fn(|i| at(i) as i32)),
+        FieldType::Vector6uint32 => Value::Vector6uint32(std::array::from_fn(|i| at(i) as u32)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_fields_have_their_types() {
+        for (name, kind) in [
+            ("timestamp", FieldType::Double),
+            ("actual_TCP_force", FieldType::Vector6d),
+            ("tcp_offset", FieldType::Vector6d),
+            ("elbow_position", FieldType::Vector3d),
+            ("joint_mode", FieldType::Vector6int32),
+            ("safety_status", FieldType::Int32),
+            ("tool_mode", FieldType::Uint32),
+            ("tool_output_voltage", FieldType::Int32),
+            ("tool_output_mode", FieldType::Uint8),
+            ("tool_temperature", FieldType::Double),
+            ("analog_io_types", FieldType::Uint32),
+            ("actual_configurable_digital_input_bits", FieldType::Uint64),
+            ("output_int_register_47", FieldType::Int32),
+            ("output_bit_register_64", FieldType::Bool),
+            ("output_bit_registers0_to_31", FieldType::Uint32),
+            ("input_double_register_0", FieldType::Double),
+        ] {
+            assert_eq!(output_type(name), Some(kind), "{name}");
         }
+        for (name, kind) in [
+            ("speed_slider_mask", FieldType::Uint32),
+            ("standard_digital_output", FieldType::Uint8),
+            ("external_force_torque", FieldType::Vector6d),
+            ("input_int_register_24", FieldType::Int32),
+        ] {
+            assert_eq!(input_type(name), Some(kind), "{name}");
+        }
+        for unknown in ["", "output_", "output_int_register_48", "output_bit_register_63", "Timestamp"] {
+            assert_eq!((output_type(unknown), input_type(unknown)), (None, None), "{unknown}");
+        }
+        assert_eq!(input_type("output_int_register_24"), None);
     }
 }

@@ -1,7 +1,8 @@
-//! A plant in closed form: a spring up to the friction limit, then sliding at a constant speed. The file is read by tests inside
-//! and outside of the crate: whoever includes it imports the seam's names.
+//! A plant in closed form: a spring up to the friction limit, then sliding at a constant speed. Programs are checked on it, and the
+//! virtual devices are tested with it.
 
-use super::{Grip, GripRequest, PerJaw, Plant, PlantError, PullReading, PullRequest, TactileImage};
+use gripgen_twin::plant::{Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
+use gripgen_twin::{PerJaw, TactileImage};
 
 /// The part and the sensors.
 #[derive(Debug, Clone, Copy)]
@@ -18,9 +19,15 @@ pub struct Spring {
     pub sliding_m_s: f64,
 }
 
+impl Spring {
+    /// A sensor that reads true but for an offset, and a part that slips at 10.25 N.
+    pub const PLAIN: Self =
+        Self { limit_n: 10.25, gain: 1.0, offset_n: 0.75, stiffness_n_m: 50_000.0, sliding_m_s: 0.02 };
+}
+
 impl Default for Spring {
     fn default() -> Self {
-        Self { limit_n: 10.25, gain: 1.0, offset_n: 0.75, stiffness_n_m: 50_000.0, sliding_m_s: 0.02 }
+        Self::PLAIN
     }
 }
 
@@ -53,7 +60,7 @@ impl Plant for Spring {
 }
 
 /// The part between the jaws.
-pub struct Held {
+struct Held {
     spring: Spring,
     images: PerJaw<TactileImage>,
     direction: f64,
