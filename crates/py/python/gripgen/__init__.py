@@ -14,6 +14,7 @@ Units stand in the names: `_n` newton, `_mm` millimetre, `_s` second, `_deg` deg
 
 from importlib.util import find_spec as _find_spec
 
+from . import rig
 from ._core import ConfigError, DataError, GripgenError, __version__
 from .dataset import Batch, Dataset, Sample, load
 from .films import Film
@@ -49,6 +50,7 @@ __all__ = [
     "diagnose",
     "load",
     "render",
+    "rig",
     "stream",
     "sweep",
 ]
