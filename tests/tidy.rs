@@ -168,12 +168,12 @@ fn absent_from(relative: &str) -> (&'static [&'static str], bool) {
         (no_world, true)
     } else if starts("crates/identify/src") || starts("src/") {
         (&["std::net"], true)
-    } else if starts("crates/rig/src") && relative.ends_with("/socket.rs") {
+    } else if (starts("crates/rig/src") || starts("crates/rig_sim/src")) && relative.ends_with("/socket.rs") {
         (&["std::fs"], false)
     } else if starts("crates/rig/src/experiment") {
         // The experiment waits and hurries, on connections that others made.
         (&["std::fs", "TcpStream", "TcpListener"], false)
-    } else if starts("crates/rig/src") {
+    } else if starts("crates/rig/src") || starts("crates/rig_sim/src") {
         // Protocols are sessions without sockets.
         (&["std::fs", "std::time", "std::thread", "TcpStream", "TcpListener", "Instant::now"], false)
     } else if starts("crates/cli/src/commands/rig") {

@@ -24,6 +24,7 @@ mod part;
 mod plan;
 mod progress;
 mod render;
+pub mod rig;
 mod rig_run;
 mod schema;
 mod shell;

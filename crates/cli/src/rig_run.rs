@@ -15,7 +15,7 @@ const OF_THE_NETWORK: [(&[&str], &[&str]); 6] = [
     (&["gripper"], &["address", "port"]),
     (&["cameras", "left"], &["address", "port"]),
     (&["cameras", "right"], &["address", "port"]),
-    (&["limits"], &["robot_silence_s"]),
+    (&["limits"], &["robot_silence_s", "patience"]),
     (&["images"], &["frame_s"]),
 ];
 

@@ -11,6 +11,7 @@ mod film;
 mod hints;
 mod pulls;
 mod render;
+mod rig;
 mod simulator;
 mod stream;
 mod sweep;
@@ -71,6 +72,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(run_verb, module)?)?;
     module.add_function(wrap_pyfunction!(ur5e_tool_m, module)?)?;
     module.add_function(wrap_pyfunction!(render::render, module)?)?;
+    module.add_function(wrap_pyfunction!(rig::rig_check, module)?)?;
+    module.add_function(wrap_pyfunction!(rig::rig_rehearse, module)?)?;
+    module.add_function(wrap_pyfunction!(rig::rig_pull, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::sweep, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::contact_sheet_shards, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::prepare_run, module)?)

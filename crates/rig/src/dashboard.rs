@@ -12,6 +12,6 @@ mod socket_tests;
 #[cfg(test)]
 mod tests;
 
-pub use command::{DashboardCommand, DashboardReply, DashboardReplyError, PolyscopeVersion, ProgramState};
+pub use command::{DashboardCommand, DashboardReply, DashboardReplyError, PolyscopeVersion};
 pub use session::{DashboardEvent, DashboardLink, DashboardSendError, DashboardSessionError, GREETING};
 pub use socket::{DashboardClient, DashboardError, DashboardLinkError};

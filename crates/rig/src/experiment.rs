@@ -10,10 +10,12 @@
 //! watched by a heartbeat that only an experiment which is alive keeps up; and whatever goes wrong ends in [`stop`], the one
 //! way to stop.
 
+mod campaign;
 pub mod check;
 mod clock;
 pub mod config;
 pub mod devices;
+mod event;
 mod executed;
 pub mod fault;
 pub mod film;
@@ -31,11 +33,12 @@ pub mod slowing;
 pub mod stop;
 mod zero;
 
+pub use campaign::{CampaignError, CampaignPlan, run_campaign};
 pub use config::{RigConfig, rig_schema};
 pub use devices::Devices;
+pub use event::{ExecutedPull, PullOutcome, RigEvent, Stopped};
 pub use fault::Fault;
 pub use plan::{PlanError, check_campaign};
-pub use pull::{ExecutedPull, PullOutcome};
+pub use rehearse::{RehearsalPlan, RehearseError, rehearse};
 pub use robot::RobotRow;
-pub use run::{Experiment, RigEvent};
-pub use stop::Stopped;
+pub use run::Experiment;

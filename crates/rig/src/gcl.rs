@@ -14,4 +14,4 @@ mod tests;
 
 pub use command::{GclCommand, GclLimits, GripState, LimitError, Query, SHIPPED_LIMITS};
 pub use session::{GclEvent, GclLink, GclSessionError, SendError, status_meaning};
-pub use socket::{GclClient, GclLinkError, GclLogLine, GclRunError, GclSendError, GclStopper};
+pub use socket::{GclClient, GclLinkError, GclLogLine, GclRunError, GclSendError};

@@ -11,17 +11,15 @@
 //! ```
 //!
 //! Sessions are without sockets: bytes in, events and bytes out, so that every moment of a connection can be tested. Clients
-//! on sockets have a reader thread each. [`experiment`] is the pull itself, [`program`] what the robot runs of it,
-//! [`judge`] whether that does what it should, [`virtual_rig`] the devices' side of the same protocols for a machine without any.
+//! on sockets have a reader thread each. [`experiment`] is the pull itself, [`program`] what the robot runs of it.
+//! The devices' side of the same protocols, and a checker of programs, are in `gripgen-rig-sim`.
 
 pub mod camera;
 pub mod dashboard;
 pub mod experiment;
 pub mod gcl;
-pub mod judge;
 pub mod link;
 pub mod primary;
 pub mod program;
 pub mod robot_state;
 pub mod rtde;
-pub mod virtual_rig;

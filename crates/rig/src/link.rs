@@ -4,9 +4,11 @@
 mod socket;
 #[cfg(test)]
 mod socket_tests;
+#[cfg(test)]
+pub(crate) mod testing;
 
-pub use socket::Stamped;
-pub(crate) use socket::{Connection, LOOK, Reading, Shared, Socket, lock, time_left};
+pub(crate) use socket::{Connection, LOOK, Reading, Shared, Socket, time_left};
+pub use socket::{Stamped, lock};
 
 use std::net::SocketAddr;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! What the robot runs: the pull and the motions between grips, as programs of their own.
 //!
 //! A program carries its numbers as named assignments at its head; what follows them is always the same text. So a person can
-//! read what will happen. What a text does is judged by [`crate::judge`], which runs it and knows only its numbers.
+//! read what will happen. What a text does is judged by `gripgen_rig_sim::program_check`, which runs it and knows only its numbers.
 //!
 //! The staircase runs on the controller, at its own rate: the commanded force arrives in the same packet as the measured one, and
 //! nothing depends on the host being in time. The host only says go and keeps a heartbeat; when it stops, the controller
@@ -9,7 +9,7 @@
 //! for e-Series (5.x).
 //!
 //! **Not run on a robot yet.** What is tested is the text, on the virtual rig, whose controller interprets it
-//! ([`crate::virtual_rig::urscript`]): every limit, every way out, and that nothing goes on after the end.
+//! (`gripgen_rig_sim::urscript`): every limit, every way out, and that nothing goes on after the end.
 
 mod head;
 mod motion;

@@ -4,10 +4,7 @@
 //! Source of the wire format: Universal Robots, "Real-Time Data Exchange (RTDE) Guide"; checked against the byte sequences
 //! in the unit tests of the Universal Robots Client Library.
 
-pub(crate) mod fields;
 mod frame;
-#[cfg(test)]
-mod lenient_tests;
 mod recipe;
 mod session;
 mod socket;
@@ -17,7 +14,6 @@ mod socket_tests;
 mod tests;
 mod value;
 
-pub use fields::{input_type, output_type};
 pub use frame::{Frame, FrameError, FrameTooLongError, Framer, Kind, encode_frame};
 pub use recipe::{Recipe, RecipeError};
 pub use session::{Event, Link, SessionError, SessionPlan, WriteInputError};

@@ -173,6 +173,9 @@ pub struct RigServeArgs {
     /// How many times faster than real time the rig's clock runs.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = clock_rate)]
     pub speed: f64,
+    /// Let the rig's clock wait for its client: a busy machine slows the rig down, and spoils no pull.
+    #[arg(long)]
+    pub in_step: bool,
     /// Begin with the tool at the fixture of this part, instead of above the first.
     #[arg(long, value_name = "PART")]
     pub at: Option<String>,

@@ -5,7 +5,10 @@ use super::{assert_code, run, text, unmade};
 use gripgen::record::{RunFolder, ShardReader};
 use std::path::Path;
 
-const SPEED: [&str; 2] = ["--speed", "20"];
+/// Slow enough that a fault is injected within the step that the test waited for.
+const SPEED: [&str; 2] = ["--speed", "5"];
+/// Where nothing is injected while a pull is under way.
+const FAST: [&str; 2] = ["--speed", "20"];
 
 /// Status and reason of each pull that a folder has.
 fn pulls(out: &Path) -> Vec<(String, String)> {
@@ -136,7 +139,7 @@ fn label_n(out: &Path) -> f64 {
 #[test]
 fn a_lag_is_suspect() {
     let folder = tempfile::tempdir().unwrap();
-    let mut rig = Served::start(&SPEED);
+    let mut rig = Served::start(&FAST);
     for lag in ["force-lag", "sensor-lag"] {
         rig.inject(&format!("{lag} 0.35"));
         let out = folder.path().join(lag);
@@ -161,15 +164,14 @@ fn trails_s(stored: &Path) -> [f64; 2] {
 fn a_lag_is_rehearsed() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    let mut rig = Served::start(&SPEED);
+    let mut rig = Served::start(&FAST);
     let true_n = {
         assert_eq!(rig.pull(&path("true"), 1, &[]).ends(), 0);
         label_n(&path("true"))
     };
     let rehearse = |rig: &mut Served, name: &str| {
         let stored = path(name);
-        let slack = ["--set", "limits.robot_gap_s=1.0", "--dwell-s", "1", "-o", stored.to_str().unwrap()];
-        let page = rig.rig("rehearse", &slack);
+        let page = rig.rig("rehearse", &["--dwell-s", "1", "-o", stored.to_str().unwrap()]);
         assert_code(&page, 0);
         (trails_s(&stored), text(&page.stdout))
     };

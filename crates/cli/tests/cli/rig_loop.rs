@@ -29,17 +29,14 @@ const MOST_SUSPECT: usize = 1;
 impl Loop {
     fn start(folder: &Path) -> Self {
         let rig = folder.join("rig.toml");
-        let serve = ["--set", HIDDEN, "--speed", SPEED, "--seed", "5", "--write-rig", rig.to_str().unwrap()];
+        let serve =
+            ["--set", HIDDEN, "--speed", SPEED, "--seed", "5", "--write-rig", rig.to_str().unwrap()];
         Self { _served: Served::start(&serve), rig, suspect: Cell::new(0) }
     }
 
     fn pull(&self, out: &Path, more: &[&str]) {
-        // A machine that builds something else at the same time is slow, not broken.
-        let patient =
-            ["--set", "limits.robot_silence_s=1.0", "--set", "images.frame_s=5.0", "--reconnect", "20"];
         let mut arguments =
             vec!["rig", "pull", self.rig.to_str().unwrap(), "-q", "-o", out.to_str().unwrap()];
-        arguments.extend(patient);
         arguments.extend(more);
         let done = run(&arguments);
         let index = std::fs::read_to_string(out.join("index.csv")).unwrap_or_default();

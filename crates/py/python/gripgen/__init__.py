@@ -14,6 +14,7 @@ Units stand in the names: `_n` newton, `_mm` millimetre, `_s` second, `_deg` deg
 
 from importlib.util import find_spec as _find_spec
 
+from . import rig
 from ._core import ConfigError, DataError, GripgenError, __version__
 from .bags import BagSummary, read_bag
 from .dataset import Batch, Dataset, Sample, load
@@ -52,6 +53,7 @@ __all__ = [
     "load",
     "read_bag",
     "render",
+    "rig",
     "stream",
     "sweep",
 ]

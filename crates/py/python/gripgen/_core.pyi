@@ -19,6 +19,9 @@ __all__ = [
     "contact_sheet_shards",
     "prepare_run",
     "render",
+    "rig_check",
+    "rig_pull",
+    "rig_rehearse",
     "run_cli",
     "run_verb",
     "sweep",
@@ -137,6 +140,35 @@ def render(
     y_px: float | None = None,
     rotation_deg: float = 0.0,
     scale_mm_per_unit: float = 1.0,
+) -> dict[str, Any]: ...
+def rig_check(
+    config: str,
+    overrides: Mapping[str, Any] | None = None,
+    rehearsal: str | os.PathLike[str] | None = None,
+) -> list[tuple[str, bool, str]]: ...
+def rig_rehearse(
+    config: str,
+    overrides: Mapping[str, Any] | None = None,
+    part: str | None = None,
+    grip_force_n: float = 30.0,
+    dwell_s: float = 5.0,
+    on_event: Callable[[dict[str, Any]], object] | None = None,
+) -> str: ...
+def rig_pull(
+    config: str,
+    out: str | os.PathLike[str],
+    overrides: Mapping[str, Any] | None,
+    campaign: str | os.PathLike[str] | None,
+    parts: Sequence[str],
+    grip_force_n: Sequence[float],
+    repetitions: int,
+    seed: int,
+    rehearsal: str | os.PathLike[str] | None,
+    after: str | os.PathLike[str] | None,
+    power_on: bool,
+    unlock: bool,
+    reconnect: int,
+    on_event: Callable[[dict[str, Any]], object] | None,
 ) -> dict[str, Any]: ...
 def sweep(
     config: str | None,

@@ -46,7 +46,6 @@ pub struct CameraClient {
 struct State {
     newest: Option<Stamped<Arc<CameraFrame>>>,
     frames: u64,
-    largest_gap: Duration,
 }
 
 impl CameraClient {
@@ -111,12 +110,6 @@ impl CameraClient {
         self.connection.shared.known().state.frames
     }
 
-    /// The longest time between the arrivals of two frames, s; 0 before the second. The silence that lasts now is no gap yet:
-    /// it is the age of the newest frame.
-    pub fn largest_gap_s(&self) -> f64 {
-        self.connection.shared.known().state.largest_gap.as_secs_f64()
-    }
-
     /// Why the connection ended, once it has.
     pub fn ended(&self) -> Option<CameraLinkError> {
         self.connection.shared.known().ended.clone()
@@ -125,9 +118,6 @@ impl CameraClient {
 
 impl State {
     fn take(&mut self, frame: CameraFrame, at: Instant) {
-        if let Some(before) = &self.newest {
-            self.largest_gap = self.largest_gap.max(at.duration_since(before.at));
-        }
         self.frames += 1;
         self.newest = Some(Stamped { at, event: Arc::new(frame) });
     }

@@ -11,45 +11,20 @@ pub enum DashboardCommand {
     SafetyStatus,
     /// Power for the arm; it ends in [`RobotMode::Idle`], which is asked for.
     PowerOn,
-    /// No power for the arm.
-    PowerOff,
     /// Brakes off; it ends in [`RobotMode::Running`], which is asked for.
     BrakeRelease,
     /// Leave a protective stop; refused in its first 5 s.
     UnlockProtectiveStop,
     /// Close the message of the safety system.
     CloseSafetyPopup,
-    /// Start the safety system anew after a fault or a violation; the arm loses its power.
-    RestartSafety,
-    /// What the loaded program does: [`ProgramState`].
-    ProgramState,
-    /// Whether a program runs.
-    Running,
     /// Stop the program.
     Stop,
-    /// Start the loaded program.
-    Play,
     /// Whether the controller takes commands from outside.
     IsInRemoteControl,
     /// Version of the software.
     PolyscopeVersion,
     /// Serial number of the robot.
     SerialNumber,
-    /// Model of the robot.
-    RobotModel,
-    /// Say goodbye.
-    Quit,
-}
-
-/// What a program does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ProgramState {
-    /// Nothing.
-    Stopped,
-    /// It runs.
-    Playing,
-    /// It stands and can go on.
-    Paused,
 }
 
 /// Version of the robot's software, as in `URSoftware 5.12.0.1101319 (Mar 22 2022)`.
@@ -75,23 +50,12 @@ pub enum DashboardReply {
     RobotMode(RobotMode),
     /// What the safety system does.
     SafetyStatus(SafetyStatus),
-    /// What the loaded program does.
-    Program {
-        /// Its state.
-        state: ProgramState,
-        /// Its file; empty where none is loaded.
-        name: String,
-    },
-    /// Whether a program runs.
-    Running(bool),
     /// Whether the controller takes commands from outside.
     RemoteControl(bool),
     /// Version of the software.
     Version(PolyscopeVersion),
     /// Serial number of the robot.
     SerialNumber(String),
-    /// Model of the robot, such as `UR5`: the e is not said.
-    RobotModel(String),
 }
 
 /// An answer that is not the one that the command has: most often the controller's refusal, in its own words.
@@ -108,24 +72,17 @@ pub struct DashboardReplyError {
 
 impl DashboardCommand {
     /// All commands.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 10] = [
         Self::RobotMode,
         Self::SafetyStatus,
         Self::PowerOn,
-        Self::PowerOff,
         Self::BrakeRelease,
         Self::UnlockProtectiveStop,
         Self::CloseSafetyPopup,
-        Self::RestartSafety,
-        Self::ProgramState,
-        Self::Running,
         Self::Stop,
-        Self::Play,
         Self::IsInRemoteControl,
         Self::PolyscopeVersion,
         Self::SerialNumber,
-        Self::RobotModel,
-        Self::Quit,
     ];
 
     /// The line on the wire, without its end.
@@ -139,20 +96,13 @@ impl DashboardCommand {
             Self::RobotMode => ("robotmode", "Robotmode: "),
             Self::SafetyStatus => ("safetystatus", "Safetystatus: "),
             Self::PowerOn => ("power on", "Powering on"),
-            Self::PowerOff => ("power off", "Powering off"),
             Self::BrakeRelease => ("brake release", "Brake releasing"),
             Self::UnlockProtectiveStop => ("unlock protective stop", "Protective stop releasing"),
             Self::CloseSafetyPopup => ("close safety popup", "closing safety popup"),
-            Self::RestartSafety => ("restart safety", "Restarting safety"),
-            Self::ProgramState => ("programState", "STOPPED, PLAYING or PAUSED"),
-            Self::Running => ("running", "Program running: "),
             Self::Stop => ("stop", "Stopped"),
-            Self::Play => ("play", "Starting program"),
             Self::IsInRemoteControl => ("is in remote control", "true or false"),
             Self::PolyscopeVersion => ("PolyscopeVersion", "URSoftware "),
             Self::SerialNumber => ("get serial number", "digits"),
-            Self::RobotModel => ("get robot model", "UR and a number"),
-            Self::Quit => ("quit", "Disconnected"),
         }
     }
 
@@ -165,48 +115,20 @@ impl DashboardCommand {
         let (command, wanted) = self.words();
         let line = line.trim();
         let read = match self {
-            Self::ProgramState => program_of(line),
-            Self::IsInRemoteControl => truth_of(line).map(DashboardReply::RemoteControl),
+            Self::IsInRemoteControl => line.parse().ok().map(DashboardReply::RemoteControl),
             Self::SerialNumber => {
                 let digits = !line.is_empty() && line.bytes().all(|b| b.is_ascii_digit());
                 digits.then(|| DashboardReply::SerialNumber(line.into()))
             }
-            Self::RobotModel => {
-                let numbered =
-                    line.strip_prefix("UR").is_some_and(|n| n.starts_with(|c: char| c.is_ascii_digit()));
-                numbered.then(|| DashboardReply::RobotModel(line.into()))
-            }
             _ => line.strip_prefix(wanted).and_then(|rest| match self {
                 Self::RobotMode => RobotMode::from_word(rest).map(DashboardReply::RobotMode),
                 Self::SafetyStatus => SafetyStatus::from_word(rest).map(DashboardReply::SafetyStatus),
-                Self::Running => truth_of(rest).map(DashboardReply::Running),
                 Self::PolyscopeVersion => version_of(rest).map(DashboardReply::Version),
                 _ => Some(DashboardReply::Done),
             }),
         };
         read.ok_or_else(|| DashboardReplyError { command, wanted, line: line.into() })
     }
-}
-
-fn truth_of(word: &str) -> Option<bool> {
-    match word {
-        "true" => Some(true),
-        "false" => Some(false),
-        _ => None,
-    }
-}
-
-fn program_of(line: &str) -> Option<DashboardReply> {
-    let (word, name) = line.split_once(' ').unwrap_or((line, ""));
-    let state = match word {
-        "STOPPED" => ProgramState::Stopped,
-        "PLAYING" => ProgramState::Playing,
-        "PAUSED" => ProgramState::Paused,
-        _ => return None,
-    };
-    // A controller without a loaded program says `null`.
-    let name = if name == "null" { "" } else { name.trim() };
-    Some(DashboardReply::Program { state, name: name.into() })
 }
 
 fn version_of(rest: &str) -> Option<PolyscopeVersion> {

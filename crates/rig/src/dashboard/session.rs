@@ -61,12 +61,6 @@ pub enum DashboardSendError {
         /// How many wait.
         outstanding: usize,
     },
-    /// Nothing is sent after the goodbye.
-    #[error("`{asked}` after `quit`")]
-    Closed {
-        /// What was asked.
-        asked: &'static str,
-    },
 }
 
 /// A session under way.
@@ -75,7 +69,6 @@ pub struct DashboardLink {
     incoming: Vec<u8>,
     outgoing: Vec<u8>,
     greeted: bool,
-    closed: bool,
     /// Commands without an answer, the oldest first.
     outstanding: VecDeque<(u64, DashboardCommand)>,
     sent: u64,
@@ -86,12 +79,9 @@ impl DashboardLink {
     ///
     /// # Errors
     ///
-    /// Too many commands without an answer, or one after `quit`.
+    /// Too many commands without an answer.
     pub fn send(&mut self, command: DashboardCommand) -> Result<u64, DashboardSendError> {
         let asked = command.line();
-        if self.closed {
-            return Err(DashboardSendError::Closed { asked });
-        }
         let outstanding = self.outstanding.len();
         if outstanding == MAX_OUTSTANDING {
             return Err(DashboardSendError::Outstanding { asked, outstanding });
@@ -101,7 +91,6 @@ impl DashboardLink {
         let number = self.sent;
         self.outstanding.push_back((number, command));
         self.sent += 1;
-        self.closed = command == DashboardCommand::Quit;
         Ok(number)
     }
 

@@ -9,7 +9,7 @@ use super::robot::RobotRow;
 use crate::camera::{SHIPPED_FRAME_LIMITS, decode_jpeg};
 use crate::dashboard::{DashboardCommand, DashboardReply};
 use crate::gcl::{GclCommand, GripState, Query};
-use crate::primary::{PrimaryEvent, RobotMessage};
+use crate::primary::PrimaryMessage;
 use crate::robot_state::{RobotMode, SafetyStatus};
 use crate::rtde::{Event, RtdeClient, Value};
 use std::time::{Duration, Instant};
@@ -77,7 +77,7 @@ fn readings(robot: &RtdeClient, rows: usize, limit: Duration) -> (Vec<RobotRow>,
 
 fn robot_data(config: &RigConfig) -> Vec<CheckLine> {
     let began = Instant::now();
-    let robot = match connect_listener(config, REPLY) {
+    let robot = match connect_listener(config, config.patient(REPLY)) {
         Ok(robot) => robot,
         Err(e) => return vec![line::<String>("RTDE", Ok((false, e.to_string())))],
     };
@@ -161,9 +161,9 @@ fn payload(config: &RigConfig) -> Result<(bool, String), ReadPoseError> {
 
 /// The value of one output field.
 fn read_one(config: &RigConfig, field: &str) -> Result<Value, ReadPoseError> {
-    let robot = connect_for(config, &["timestamp", field], REPLY)?;
+    let robot = connect_for(config, &["timestamp", field], config.patient(REPLY))?;
     let began = Instant::now();
-    while let Some(left) = REPLY.checked_sub(began.elapsed()) {
+    while let Some(left) = config.patient(REPLY).checked_sub(began.elapsed()) {
         let Ok(event) = robot.events().recv_timeout(left) else { break };
         if let Event::Data(values) = event.event
             && let Some(value) = values.get(1)
@@ -208,7 +208,7 @@ fn dashboard(config: &RigConfig) -> Vec<CheckLine> {
         Err(e) => return vec![line::<String>("dashboard", Ok((false, e.to_string())))],
     };
     let mut ask = |what: &'static str, command: DashboardCommand| {
-        let answer = client.command(command, REPLY);
+        let answer = client.command(command, config.patient(REPLY));
         line(
             what,
             answer.map(|reply| match reply {
@@ -235,22 +235,23 @@ fn dashboard(config: &RigConfig) -> Vec<CheckLine> {
 fn primary(config: &RigConfig) -> Result<(bool, String), String> {
     let client = connect_primary(config).map_err(|e| e.to_string())?;
     let began = Instant::now();
-    while let Some(left) = REPLY.checked_sub(began.elapsed()) {
-        let Ok(event) = client.events().recv_timeout(left) else { break };
-        if let PrimaryEvent::Message { message: RobotMessage::Version(v), .. } = event.event {
-            return Ok((true, format!("{} {}.{}.{}", v.project, v.major, v.minor, v.bugfix)));
+    while let Some(left) = config.patient(REPLY).checked_sub(began.elapsed()) {
+        let Ok(event) = client.messages().recv_timeout(left) else { break };
+        if let PrimaryMessage::Version { .. } = event.event {
+            return Ok((true, event.event.to_string()));
         }
     }
     Ok((false, format!("no version came within {:.0} s", REPLY.as_secs_f64())))
 }
 
 fn gripper(config: &RigConfig) -> Result<(bool, String), String> {
+    let reply = config.patient(REPLY);
     let mut client = connect_gripper(config).map_err(|e| e.to_string())?;
     let began = Instant::now();
-    let state = client.ask(Query::GripState, REPLY).map_err(|e| e.to_string())?;
+    let state = client.ask(Query::GripState, reply).map_err(|e| e.to_string())?;
     let reply_ms = 1e3 * began.elapsed().as_secs_f64();
-    let width_mm = client.ask(Query::Position, REPLY).map_err(|e| e.to_string())?;
-    client.run(&GclCommand::Verbose(true), REPLY).map_err(|e| e.to_string())?;
+    let width_mm = client.ask(Query::Position, reply).map_err(|e| e.to_string())?;
+    client.run(&GclCommand::Verbose(true), reply).map_err(|e| e.to_string())?;
     let state = GripState::from_number(state);
     let ready = matches!(state, Some(GripState::Idle));
     let words = format!(
@@ -264,11 +265,11 @@ fn gripper(config: &RigConfig) -> Result<(bool, String), String> {
 fn camera(config: &RigConfig, left: bool) -> Result<(bool, String), String> {
     let client = connect_camera(config, left).map_err(|e| e.to_string())?;
     let began = Instant::now();
-    let first = client.frame_after(began, REPLY).map_err(|e| e.to_string())?;
+    let first = client.frame_after(began, config.patient(REPLY)).map_err(|e| e.to_string())?;
     let seen = client.frames_seen();
     std::thread::sleep(COUNT);
     let rate_hz = (client.frames_seen() - seen) as f64 / COUNT.as_secs_f64();
-    let last = client.frame_after(Instant::now(), REPLY).map_err(|e| e.to_string())?;
+    let last = client.frame_after(Instant::now(), config.patient(REPLY)).map_err(|e| e.to_string())?;
     let frame = decode_jpeg(&last.event.jpeg, &SHIPPED_FRAME_LIMITS).map_err(|e| e.to_string())?;
     let views = config.views();
     let view = if left { views.left } else { views.right };
@@ -333,9 +334,9 @@ pub fn check_force(
     mass_kg: f64,
     hang: impl FnOnce(),
 ) -> Result<ForceCheck, ForceCheckError> {
-    let robot = connect_listener(config, REPLY)?;
+    let robot = connect_listener(config, config.patient(REPLY))?;
     let average = || {
-        let (rows, _) = readings(&robot, AVERAGED, REPLY);
+        let (rows, _) = readings(&robot, AVERAGED, config.patient(REPLY));
         if rows.len() < AVERAGED {
             return Err(ForceCheckError::Readings { found: rows.len() });
         }
@@ -412,8 +413,8 @@ pub fn read_pose(config: &RigConfig) -> Result<crate::program::TcpPose, ReadPose
     if !same_tool(found_mm, config) {
         return Err(ReadPoseError::Tool { found_mm, wanted_mm: config.robot.tool_mm });
     }
-    let robot = connect_listener(config, REPLY)?;
-    let (rows, _) = readings(&robot, AVERAGED, REPLY);
+    let robot = connect_listener(config, config.patient(REPLY))?;
+    let (rows, _) = readings(&robot, AVERAGED, config.patient(REPLY));
     let Some(last) = rows.last() else { return Err(ReadPoseError::Silent) };
     let speed_m_s = rows.iter().map(RobotRow::speed_m_s).fold(0.0, f64::max);
     if speed_m_s > STILL_M_S {

@@ -8,6 +8,8 @@ use gripgen_twin::config::{ConfigError, Document};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::net::IpAddr;
+use std::time::Duration;
 
 /// The whole file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -146,6 +148,8 @@ pub struct LimitsSection {
     pub robot_silence_s: f64,
     /// Gap in the robot's own clock that spoils a pull.
     pub robot_gap_s: f64,
+    /// How many times longer everything may take that this machine times. More than 1 only with a virtual rig on this machine.
+    pub patience: f64,
 }
 
 /// `[motion]`
@@ -203,6 +207,7 @@ impl Default for LimitsSection {
             pull_time_s: 60.0,
             robot_silence_s: 0.25,
             robot_gap_s: 0.02,
+            patience: 1.0,
         }
     }
 }
@@ -294,6 +299,7 @@ impl RigConfig {
             ("limits.pull_time_s", limits.pull_time_s, 1.0, 300.0, "s"),
             ("limits.robot_silence_s", limits.robot_silence_s, 0.02, 1.0, "s"),
             ("limits.robot_gap_s", limits.robot_gap_s, 0.002, 1.0, "s"),
+            ("limits.patience", limits.patience, 1.0, 100.0, "times"),
             ("motion.approach_mm", motion.approach_mm, 10.0, 300.0, "mm"),
             ("motion.speed_mm_s", motion.speed_mm_s, 1.0, 500.0, "mm/s"),
             ("motion.approach_speed_mm_s", motion.approach_speed_mm_s, 1.0, 250.0, "mm/s"),
@@ -308,6 +314,17 @@ impl RigConfig {
                     format!("{value} {unit} is out of range, it must be from {least} to {most} {unit}");
                 return Err(ConfigError::new(key, problem));
             }
+        }
+        let is_here =
+            |host: &str| host == "localhost" || host.parse().is_ok_and(|ip: IpAddr| ip.is_loopback());
+        if limits.patience > 1.0 && !is_here(&self.robot.address) {
+            let problem = format!(
+                "{} is for a virtual rig, `{}` is not this machine",
+                limits.patience, self.robot.address
+            );
+            return Err(
+                ConfigError::new("limits.patience", problem).hint("a real robot is never waited for longer")
+            );
         }
         if self.robot.force_sign.abs() != 1.0 {
             let problem = format!("{} is neither 1 nor -1", self.robot.force_sign);
@@ -330,6 +347,11 @@ impl RigConfig {
         GclLimits { force_sum_n: (2.0 * least, 2.0 * most), ..crate::gcl::SHIPPED_LIMITS }
     }
 
+    /// A limit that this machine times, as patience stretches it.
+    pub(super) fn patient(&self, limit: Duration) -> Duration {
+        limit.mul_f64(self.limits.patience)
+    }
+
     /// How the frames of both cameras are looked at.
     pub fn views(&self) -> PerJaw<CameraView> {
         let view = |c: &CameraSection| CameraView {
@@ -346,5 +368,26 @@ impl TaughtPose {
     /// Where the tool is.
     pub fn tcp(&self) -> TcpPose {
         TcpPose::from_numbers(self.base_from_tool)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_virtual_rig_is_waited_for_longer() {
+        let shipped = include_str!("../../../../assets/configs/rig.toml");
+        let read = |sets: &[(&str, &str)]| {
+            let mut document = Document::parse("rig.toml", shipped)?;
+            sets.iter().try_for_each(|(key, value)| document.set(key, value))?;
+            RigConfig::read(&document)
+        };
+        let patient = read(&[("limits.patience", "20.0")]).unwrap();
+        assert_eq!(patient.patient(Duration::from_secs(3)), Duration::from_secs(60));
+        assert!(read(&[("robot.address", "192.168.1.2")]).is_ok());
+        let e = read(&[("limits.patience", "20.0"), ("robot.address", "192.168.1.2")]).unwrap_err();
+        assert!(e.problem.contains("`192.168.1.2` is not this machine"), "{}", e.problem);
+        assert!(read(&[("limits.patience", "0.5")]).is_err());
     }
 }

@@ -13,6 +13,8 @@ use std::time::Duration;
 
 /// How long a device may take to answer at first.
 const TIMEOUT: Duration = Duration::from_secs(3);
+/// How long the dashboard may take for an answer.
+const REPLY: Duration = Duration::from_secs(2);
 
 /// Why a rig is not there.
 #[derive(Debug, thiserror::Error)]
@@ -63,6 +65,8 @@ pub struct Devices {
     /// `None` once it was said goodbye.
     pub(super) gripper: Option<GclClient>,
     pub(super) cameras: PerJaw<CameraClient>,
+    /// How long the dashboard may take for an answer.
+    pub(super) reply: Duration,
 }
 
 /// Where a device is.
@@ -83,25 +87,25 @@ pub(super) fn connect_camera(config: &RigConfig, left: bool) -> Result<CameraCli
     if resolve("camera", &other.address, other.port).is_ok_and(|other| other == at) {
         return Err(ConnectError::OneCamera { at });
     }
-    Ok(CameraClient::connect(at, &camera.address, TIMEOUT)?)
+    Ok(CameraClient::connect(at, &camera.address, config.patient(TIMEOUT))?)
 }
 
 /// Connects the gripper.
 pub(super) fn connect_gripper(config: &RigConfig) -> Result<GclClient, ConnectError> {
     let at = resolve("gripper", &config.gripper.address, config.gripper.port)?;
-    Ok(GclClient::connect(at, config.gripper_limits(), TIMEOUT)?)
+    Ok(GclClient::connect(at, config.gripper_limits(), config.patient(TIMEOUT))?)
 }
 
 /// Connects the dashboard.
 pub(super) fn connect_dashboard(config: &RigConfig) -> Result<DashboardClient, ConnectError> {
     let at = resolve("dashboard", &config.robot.address, config.robot.dashboard_port)?;
-    Ok(DashboardClient::connect(at, TIMEOUT)?)
+    Ok(DashboardClient::connect(at, config.patient(TIMEOUT))?)
 }
 
 /// Connects RTDE.
 pub(super) fn connect_robot(config: &RigConfig) -> Result<RtdeClient, ConnectError> {
     let at = resolve("RTDE", &config.robot.address, config.robot.rtde_port)?;
-    let robot = RtdeClient::connect(at, &session_plan(), TIMEOUT)?;
+    let robot = RtdeClient::connect(at, &session_plan(), config.patient(TIMEOUT))?;
     match unfit(robot.recipe()) {
         Some(types) => Err(ConnectError::Types(types)),
         None => Ok(robot),
@@ -130,7 +134,7 @@ pub(super) fn connect_for(
 /// Connects the primary interface.
 pub(super) fn connect_primary(config: &RigConfig) -> Result<PrimaryClient, ConnectError> {
     let at = resolve("primary interface", &config.robot.address, config.robot.primary_port)?;
-    Ok(PrimaryClient::connect(at, TIMEOUT)?)
+    Ok(PrimaryClient::connect(at, config.patient(TIMEOUT))?)
 }
 
 impl Devices {
@@ -141,7 +145,7 @@ impl Devices {
     /// The first device that does not answer as it should.
     pub fn connect(config: &RigConfig) -> Result<Self, ConnectError> {
         let robot = connect_robot(config)?;
-        let heart = Heart::start(&robot);
+        let heart = Heart::start(&robot, config.limits.patience > 1.0);
         Ok(Self {
             heart,
             robot,
@@ -149,6 +153,7 @@ impl Devices {
             primary: connect_primary(config)?,
             gripper: Some(connect_gripper(config)?),
             cameras: PerJaw { left: connect_camera(config, true)?, right: connect_camera(config, false)? },
+            reply: config.patient(REPLY),
         })
     }
 

@@ -1,71 +1,13 @@
 //! What came of a pull: its trace, its label and all that was heard during it.
 
+use super::event::{ExecutedPull, FrameStamp, LogLine, PullOutcome, Stopped};
 use super::film::FilmedFrame;
-use super::images::FrameStamp;
-use super::robot::{RobotRow, thinned};
-use super::run::{Experiment, LogLine};
-use super::stop::Stopped;
+use super::robot::thinned;
+use super::run::Experiment;
 use super::zero::{self, Unloaded};
 use crate::program::{Phase, StopReason};
-use gripgen_twin::{Campaign, PerJaw, PlannedPull, PullTrace, SlipLabel, TactileImage, TraceRow, slip_label};
+use gripgen_twin::{Campaign, PerJaw, PlannedPull, PullTrace, TactileImage, TraceRow, slip_label};
 use std::time::Instant;
-
-/// What came of a pull.
-#[derive(Debug, Clone, PartialEq)]
-pub enum PullOutcome {
-    /// The jaws slipped, or the pull ended before they did (`censored`).
-    Labelled(SlipLabel),
-    /// There was nothing between the jaws.
-    NoContact,
-    /// It has no label.
-    Failed {
-        /// Why.
-        reason: String,
-    },
-}
-
-/// A pull with all that came during it.
-#[derive(Debug, Clone)]
-pub struct ExecutedPull {
-    /// What was asked.
-    pub planned: PlannedPull,
-    /// What came of it.
-    pub outcome: PullOutcome,
-    /// How everything was stopped, where something went wrong.
-    pub stopped: Option<Stopped>,
-    /// The force over time; rows before 0 are those without a load.
-    pub trace: Option<PullTrace>,
-    /// Grip images.
-    pub images: Option<PerJaw<TactileImage>>,
-    /// Images with open jaws.
-    pub rest: Option<PerJaw<TactileImage>>,
-    /// When the images came.
-    pub frames: Vec<FrameStamp>,
-    /// The film of both cameras from the closing of the jaws to the stop; empty where the rig does not film.
-    pub film: Vec<PerJaw<FilmedFrame>>,
-    /// Time from closing the jaws to the start of the pull, by the robot's clock.
-    pub dwell_s: f64,
-    /// The controller's clock at the start of the pull; that of the last reading where there was none.
-    pub robot_time_s: f64,
-    /// The same moment, in seconds since 1970 by this machine's clock.
-    pub unix_s: f64,
-    /// Force along the pull before it, N.
-    pub preload_n: f64,
-    /// Readings along the pull after it, jaws open and before anything moves or is zeroed again.
-    pub no_load_after_n: Vec<f64>,
-    /// How far the sensor's zero had moved along the pull when the jaws slipped; `None` without a label or without readings.
-    pub zero_shift_n: Option<f64>,
-    /// What the gripper said of the force of a jaw while it held, N.
-    pub reported_force_n: Option<f64>,
-    /// What is wrong with it beside its forces, a sentence each: its label is suspect.
-    pub doubts: Vec<String>,
-    /// Everything that the robot said.
-    pub rows: Vec<RobotRow>,
-    /// Seconds since 1970 of each row's arrival.
-    pub rows_unix_s: Vec<f64>,
-    /// Words of all devices, with seconds since 1970.
-    pub log: Vec<(f64, LogLine)>,
-}
 
 /// What is known of a pull under way.
 #[derive(Default)]

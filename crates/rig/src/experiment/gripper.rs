@@ -76,8 +76,9 @@ impl Experiment<'_> {
             if answered && waited > ASK {
                 (asked, answered) = (Instant::now(), false);
                 x.send_gripper(&GclCommand::Ask(Query::GripState))?;
-            } else if !answered && waited > SLACK {
-                let (waited_s, limit_s) = (waited.as_secs_f64(), SLACK.as_secs_f64());
+            } else if !answered && waited > x.config.patient(SLACK) {
+                let limit_s = x.config.patient(SLACK).as_secs_f64();
+                let waited_s = waited.as_secs_f64();
                 return Err(Fault::Late { what: "an answer of the gripper", waited_s, limit_s });
             }
             Ok(false)

@@ -1,5 +1,6 @@
 //! Images of both jaws, new ones.
 
+use super::event::{FrameStamp, RigEvent};
 use super::fault::Fault;
 use super::film::{FilmedFrame, Recorder};
 use super::run::Experiment;
@@ -8,23 +9,6 @@ use crate::link::Stamped;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-
-/// When a frame was taken and came.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FrameStamp {
-    /// Which camera.
-    pub jaw: Jaw,
-    /// What it was taken for.
-    pub what: &'static str,
-    /// When it came.
-    pub at: Instant,
-    /// The camera's clock, where it has one.
-    pub device_time_s: Option<f64>,
-    /// The robot's clock when it came.
-    pub robot_time_s: f64,
-    /// The frame as it came.
-    pub jpeg: Arc<CameraFrame>,
-}
 
 /// Images with their stamps.
 pub(super) struct Seen {
@@ -54,12 +38,13 @@ impl Experiment<'_> {
             jpeg: frame.event.clone(),
         };
         let stamps = vec![stamp(Jaw::Left, &left), stamp(Jaw::Right, &right)];
+        self.tell(RigEvent::Images { what, images: images.clone() });
         Ok(Seen { images, stamps })
     }
 
     /// What is wrong with the cameras now, in words: those that ended, and those from which nothing comes any more.
     pub(super) fn silent_cameras(&self) -> Vec<String> {
-        let limit_s = self.config.images.frame_s;
+        let limit_s = self.frame_limit_s();
         let silent = |jaw: Jaw| {
             let camera = &self.devices.cameras[jaw];
             if let Some(end) = camera.ended() {
@@ -71,6 +56,11 @@ impl Experiment<'_> {
             })
         };
         Jaw::BOTH.into_iter().filter_map(silent).collect()
+    }
+
+    /// How long a new frame may take.
+    pub(super) fn frame_limit_s(&self) -> f64 {
+        self.config.images.frame_s * self.config.limits.patience
     }
 
     /// Films from now on, if the rig films at all.
@@ -105,7 +95,7 @@ impl Experiment<'_> {
         asked: &Asked,
         before: &[FrameStamp],
     ) -> Result<Stamped<Arc<CameraFrame>>, Fault> {
-        let limit = Duration::from_secs_f64(self.config.images.frame_s);
+        let limit = Duration::from_secs_f64(self.frame_limit_s());
         let old = before.iter().rfind(|old| old.jaw == jaw);
         // What came, but was taken before: a frame that waited on its way, or one of a camera that stands still.
         let mut first_late: Option<f64> = None;

@@ -5,8 +5,6 @@ use crate::dashboard::{DashboardCommand, DashboardError, DashboardReply, Polysco
 use crate::robot_state::{RobotMode, SafetyStatus};
 use std::time::{Duration, Instant};
 
-/// How long the dashboard may take.
-const REPLY: Duration = Duration::from_secs(2);
 /// How long power and brakes may take.
 const POWER: Duration = Duration::from_secs(60);
 /// Time between two questions.
@@ -133,7 +131,7 @@ impl Devices {
     }
 
     fn ask(&mut self, command: DashboardCommand) -> Result<DashboardReply, PrepareError> {
-        Ok(self.dashboard.command(command, REPLY)?)
+        Ok(self.dashboard.command(command, self.reply)?)
     }
 
     fn safety(&mut self) -> Result<SafetyStatus, PrepareError> {

@@ -1,13 +1,12 @@
 //! One pull, from the way to the part to the way back.
 
+use super::event::RigEvent;
+pub use super::event::{ExecutedPull, FrameStamp, LogLine, PullOutcome};
 use super::executed::Parts;
-pub use super::executed::{ExecutedPull, PullOutcome};
 use super::fault::Fault;
 use super::film;
-pub use super::images::FrameStamp;
 use super::plan::{GripPoses, grip_command, grip_poses, pull_program};
-pub use super::run::LogLine;
-use super::run::{Experiment, PROGRAM, RigEvent};
+use super::run::{Experiment, PROGRAM};
 use crate::gcl::{GclCommand, GripState, Query};
 use crate::program::{PRELOAD_S, Phase, SETTLE_S, StopReason};
 use gripgen_twin::{Campaign, PlannedPull};
@@ -169,7 +168,7 @@ impl Experiment<'_> {
         parts.film = self.end_film();
         parts.doubts = self.silent_cameras();
         film::exposure(&parts.film).into_iter().for_each(|words| self.note("camera", words));
-        parts.doubts.extend(film::doubts(&parts.film, self.config.images.frame_s));
+        parts.doubts.extend(film::doubts(&parts.film, self.frame_limit_s()));
         let state = self.ask_gripper(Query::GripState)?;
         if GripState::from_number(state) != Some(GripState::Holding) {
             return Err(Fault::NotHolding { state });

@@ -4,16 +4,22 @@
 //! a few newtons in slow steps that hold. What comes out is compared by `check` and used by `pull`: a staircase is slowed down until
 //! force mode and sensor can follow.
 
+use super::check::CheckLine;
 use super::config::RigConfig;
+use super::devices::Devices;
+use super::event::{RigEvent, Stopped};
 use super::fault::Fault;
 use super::plan::{grip_command, grip_poses, pull_program};
+use super::prepare::{Permit, PrepareError};
 use super::response::{Response, StepRow, response};
 use super::robot::RobotRow;
-use super::run::{Experiment, RigEvent, SLACK};
+use super::run::{Experiment, SLACK};
 use crate::gcl::{GripState, Query};
 use crate::program::{Phase, StopReason};
 use gripgen_twin::{Campaign, Jaw, PerJaw, PlannedPull};
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::AtomicBool;
+use std::time::SystemTime;
 
 /// Largest command of the rehearsed pull, and its steps.
 pub const REHEARSED_N: f64 = 5.0;
@@ -97,6 +103,92 @@ pub struct StoredRehearsal {
     pub doubts: Vec<String>,
 }
 
+/// Lines of a check that stay the same while a rig stays the same.
+const CONSTANT: [&str; 5] = ["dashboard", "controller", "primary interface", "tool offset", "payload"];
+
+impl StoredRehearsal {
+    /// The file of what was just found. `checks` is what [`check`](super::check::check) found before it.
+    pub fn new(
+        gripgen_version: &str,
+        config: &RigConfig,
+        checks: Vec<CheckLine>,
+        rehearsal: Rehearsal,
+    ) -> Self {
+        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        Self {
+            schema: SCHEMA.into(),
+            gripgen_version: gripgen_version.into(),
+            unix_s: since.map_or(0.0, |since| since.as_secs_f64()),
+            checks: checks.into_iter().map(|line| (line.what.to_string(), line.found)).collect(),
+            doubts: rehearsal.doubts(config),
+            rehearsal,
+        }
+    }
+
+    /// Whether the rig of these lines is the one that rehearsed.
+    pub fn compare(&self, lines: &[CheckLine]) -> CheckLine {
+        let mut changed = Vec::new();
+        for (what, then) in self.checks.iter().filter(|(what, _)| CONSTANT.contains(&what.as_str())) {
+            let now = lines.iter().find(|line| line.what == what).map_or("nothing", |line| &line.found);
+            if now != then {
+                changed.push(format!("{what}: {now}, it was {then}"));
+            }
+        }
+        let found = match changed.is_empty() {
+            true => "the rig is the one that rehearsed".to_string(),
+            false => format!("rehearse again, the rig has changed: {}", changed.join("; ")),
+        };
+        CheckLine { what: "rehearsal", ok: changed.is_empty(), found }
+    }
+}
+
+/// What is rehearsed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RehearsalPlan {
+    /// The part that is pulled.
+    pub part: String,
+    /// Grip force of a jaw. It has to hold [`REHEARSED_N`].
+    pub grip_force_n: f64,
+    /// How long the zeroed sensor is read.
+    pub dwell_s: f64,
+}
+
+/// Why nothing is known after a rehearsal.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RehearseError {
+    /// The robot is not ready.
+    #[error("{0}")]
+    Prepare(#[from] PrepareError),
+    /// Everything was stopped.
+    #[error("{0}")]
+    Stopped(Stopped),
+}
+
+/// Rehearses on devices that are connected, and lets them go. Whatever goes wrong ends in a safe stop.
+///
+/// # Errors
+///
+/// A robot that is not ready, or what ends a pull.
+pub fn rehearse(
+    config: &RigConfig,
+    mut devices: Devices,
+    plan: &RehearsalPlan,
+    stop: &AtomicBool,
+    emit: &mut dyn FnMut(RigEvent),
+) -> Result<Rehearsal, RehearseError> {
+    devices.prepare(Permit::default())?;
+    let mut experiment = Experiment::new(config, devices, stop, emit);
+    let found = experiment.begin().and_then(|()| experiment.rehearse(plan));
+    match found {
+        Ok(rehearsal) => {
+            experiment.close();
+            Ok(rehearsal)
+        }
+        Err(fault) => Err(RehearseError::Stopped(experiment.safe_stop(&fault))),
+    }
+}
+
 impl Rehearsal {
     /// How far a reading trails an evenly rising command, s; `None` if it was not found.
     pub fn trails_s(&self) -> Option<f64> {
@@ -160,13 +252,10 @@ impl Rehearsal {
 
 impl Experiment<'_> {
     /// Rehearses on a part. Whatever goes wrong has to be followed by a safe stop.
-    ///
-    /// # Errors
-    ///
-    /// A part that nobody taught, a part that does not hold, or what ends a pull: see [`Fault`].
-    pub fn rehearse(&mut self, part: &str, grip_force_n: f64, dwell_s: f64) -> Result<Rehearsal, Fault> {
+    fn rehearse(&mut self, plan: &RehearsalPlan) -> Result<Rehearsal, Fault> {
+        let RehearsalPlan { part, grip_force_n, dwell_s } = plan.clone();
         let planned = PlannedPull {
-            part: part.into(),
+            part: part.clone(),
             grip_force_n,
             force_increment_n: STEP_N,
             force_start_n: None,
@@ -250,7 +339,7 @@ impl Experiment<'_> {
             self.rows.iter().step_by(10).map(pair).collect::<Vec<_>>()
         });
         Ok(Rehearsal {
-            part: part.into(),
+            part,
             grip_force_n,
             reported_force_n,
             rest,

@@ -5,7 +5,7 @@ use crate::link::lock;
 use crate::program::{Phase, TcpPose, registers};
 use crate::robot_state::{RobotMode, SafetyStatus};
 use crate::rtde::{Recipe, RtdeClient, SessionPlan, Value};
-use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -92,7 +92,6 @@ pub(super) fn session_plan() -> SessionPlan {
         outputs: OUTPUTS.map(String::from).to_vec(),
         frequency_hz: RATE_HZ,
         inputs: vec![vec![input(registers::HEARTBEAT), input(registers::GO)]],
-        lenient: false,
     }
 }
 
@@ -188,23 +187,31 @@ pub(super) struct Heart {
 struct Hand {
     go: AtomicI32,
     alive: Mutex<Instant>,
+    /// Signs of life so far.
+    signs: AtomicU64,
     wanted: AtomicBool,
 }
 
 impl Heart {
-    /// Begins to beat.
-    pub(super) fn start(client: &RtdeClient) -> Self {
+    /// Begins to beat. `in_step` is for a virtual rig whose clock waits for beats: then there is none without a new sign of life,
+    /// so that the rig goes no faster than the experiment looks at it.
+    pub(super) fn start(client: &RtdeClient, in_step: bool) -> Self {
         let writer = client.writer();
         let hand = Arc::new(Hand {
             go: AtomicI32::new(0),
             alive: Mutex::new(Instant::now()),
+            signs: AtomicU64::new(0),
             wanted: AtomicBool::new(true),
         });
         let own = hand.clone();
         let thread = std::thread::spawn(move || {
-            let mut beat = 0_i32;
+            let (mut beat, mut seen) = (0_i32, 0);
             while own.wanted.load(Ordering::SeqCst) {
-                if lock(&own.alive).elapsed() < ALIVE {
+                let signs = own.signs.load(Ordering::SeqCst);
+                // Before the first sign everything is being connected.
+                let is_new = !in_step || signs == 0 || signs != seen;
+                if is_new && lock(&own.alive).elapsed() < ALIVE {
+                    seen = signs;
                     beat = beat.wrapping_add(1);
                     let go = own.go.load(Ordering::SeqCst);
                     if writer.write_input(0, &[Value::Int32(beat), Value::Int32(go)]).is_err() {
@@ -220,6 +227,7 @@ impl Heart {
     /// The experiment is alive.
     pub(super) fn alive(&self) {
         *lock(&self.hand.alive) = Instant::now();
+        self.hand.signs.fetch_add(1, Ordering::SeqCst);
     }
 
     /// What the program is told from the next beat on.

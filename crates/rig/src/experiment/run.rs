@@ -3,17 +3,17 @@
 use super::clock::HostClock;
 use super::config::RigConfig;
 use super::devices::Devices;
+use super::event::{LogLine, RigEvent};
 use super::fault::Fault;
 use super::film::Recorder;
 use super::plan::{motion_program, outside_workspace};
 use super::robot::RobotRow;
-use crate::camera::CameraFrame;
 use crate::gcl::GclEvent;
-use crate::primary::{PrimaryEvent, RobotMessage};
+use crate::link::Stamped;
+use crate::primary::PrimaryMessage;
 use crate::program::{Phase, StopReason, TcpPose};
 use crate::rtde::Event;
 use gripgen_twin::Jaw;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
@@ -30,50 +30,6 @@ const MAX_RUN: i32 = 1_000_000_000;
 const FRAMES_EVERY: Duration = Duration::from_millis(200);
 /// A tool that is closer to a pose than this is there.
 const THERE_M: f64 = 1e-4;
-
-/// What happens, for somebody who looks on.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum RigEvent {
-    /// What is done now.
-    Step(&'static str),
-    /// A reading during the pull.
-    Reading {
-        /// Time since the pull began.
-        time_s: f64,
-        /// Commanded force.
-        desired_n: f64,
-        /// Measured force along the pull.
-        measured_n: f64,
-        /// Displacement.
-        displacement_mm: f64,
-    },
-    /// A new frame of a camera as it came, where [`Experiment::show_frames`] asked for them.
-    Frame {
-        /// Which camera.
-        jaw: Jaw,
-        /// The frame.
-        frame: Arc<CameraFrame>,
-    },
-    /// Words of a device.
-    Said {
-        /// Which.
-        source: &'static str,
-        /// What.
-        text: String,
-    },
-}
-
-/// Words that came, or were sent.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LogLine {
-    /// When.
-    pub at: Instant,
-    /// Who.
-    pub source: &'static str,
-    /// What.
-    pub text: String,
-}
 
 /// An experiment: the devices, and what came from them since the last pull began.
 pub struct Experiment<'a> {
@@ -187,7 +143,7 @@ impl<'a> Experiment<'a> {
         if let Some(row) = &self.newest {
             row.check()?;
         }
-        let (silent_s, limit_s) = (self.heard.elapsed().as_secs_f64(), self.config.limits.robot_silence_s);
+        let (silent_s, limit_s) = (self.heard.elapsed().as_secs_f64(), self.silence_limit_s());
         if silent_s > limit_s {
             return Err(Fault::Silent { silent_s, limit_s });
         }
@@ -197,10 +153,14 @@ impl<'a> Experiment<'a> {
         Ok(rows)
     }
 
+    fn silence_limit_s(&self) -> f64 {
+        self.config.limits.robot_silence_s * self.config.limits.patience
+    }
+
     /// The first reading that allows to move. What the dashboard has just switched on is a moment late in the readings.
     pub(super) fn ready(&mut self) -> Result<(), Fault> {
         let began = Instant::now();
-        while began.elapsed() < PROGRAM {
+        while began.elapsed() < self.config.patient(PROGRAM) {
             self.devices.heart.alive();
             self.take_robot(LOOK)?;
             let interrupted = self.stop.load(Ordering::SeqCst);
@@ -221,7 +181,7 @@ impl<'a> Experiment<'a> {
                 Err(RecvTimeoutError::Timeout) => return Ok(rows),
                 Err(RecvTimeoutError::Disconnected) => {
                     let silent_s = self.heard.elapsed().as_secs_f64();
-                    let silent = Fault::Silent { silent_s, limit_s: self.config.limits.robot_silence_s };
+                    let silent = Fault::Silent { silent_s, limit_s: self.silence_limit_s() };
                     return Err(self.devices.robot.ended().map_or(silent, Fault::Robot));
                 }
             };
@@ -248,18 +208,10 @@ impl<'a> Experiment<'a> {
 
     /// Takes in what the controller announces and what the gripper says.
     fn take_others(&mut self) -> Result<(), Fault> {
-        while let Ok(event) = self.devices.primary.events().try_recv() {
-            let PrimaryEvent::Message { message, .. } = &event.event else { continue };
-            let said = match message {
-                RobotMessage::ErrorCode(e) => Some(format!("C{}A{} {}", e.code, e.argument, e.text)),
-                RobotMessage::RuntimeException(e) => {
-                    Some(format!("line {}, column {}: {}", e.line, e.column, e.text))
-                }
-                RobotMessage::Key(key) => Some(format!("{} {}", key.title, key.text)),
-                _ => None,
-            };
-            if let Some(text) = said {
-                self.log.push(LogLine { at: event.at, source: "controller", text: text.clone() });
+        while let Ok(Stamped { at, event }) = self.devices.primary.messages().try_recv() {
+            if !matches!(event, PrimaryMessage::Version { .. }) {
+                let text = event.to_string();
+                self.log.push(LogLine { at, source: "controller", text: text.clone() });
                 self.last_said = Some(text);
             }
         }
@@ -297,7 +249,7 @@ impl<'a> Experiment<'a> {
         limit: Duration,
         mut is: impl FnMut(&mut Self) -> Result<bool, Fault>,
     ) -> Result<(), Fault> {
-        let began = Instant::now();
+        let (began, limit) = (Instant::now(), self.config.patient(limit));
         loop {
             self.look()?;
             if is(self)? {

@@ -5,6 +5,7 @@
 
 use super::config::RigConfig;
 use super::devices::connect_listener;
+use super::event::{RigEvent, Stopped};
 use super::fault::Fault;
 use super::rest::Rest;
 use super::robot::RobotRow;
@@ -21,17 +22,6 @@ const AGAIN: Duration = Duration::from_millis(100);
 /// How long the dashboard may take.
 const DASHBOARD: Duration = Duration::from_millis(1000);
 
-/// How a stop went.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Stopped {
-    /// Why.
-    pub reason: String,
-    /// Whether the robot said itself that it stands still.
-    pub still: bool,
-    /// What was done, for the record.
-    pub steps: Vec<String>,
-}
-
 impl Experiment<'_> {
     /// Stops everything because of a fault.
     pub fn safe_stop(&mut self, fault: &Fault) -> Stopped {
@@ -43,7 +33,7 @@ impl Experiment<'_> {
         std::thread::sleep(Duration::from_millis(25));
         self.devices.heart.stop();
         steps.push("the program was told to stop, the heartbeat ended".to_string());
-        match self.devices.dashboard.command(DashboardCommand::Stop, DASHBOARD) {
+        match self.devices.dashboard.command(DashboardCommand::Stop, self.config.patient(DASHBOARD)) {
             Ok(_) => steps.push("the dashboard stopped the program".into()),
             Err(e) => steps.push(format!("the dashboard could not be told: {e}")),
         }
@@ -55,13 +45,15 @@ impl Experiment<'_> {
         steps.push("the gripper keeps what it holds".into());
         let reason = fault.to_string();
         self.note("stop", format!("{reason}; {}", steps.join("; ")));
-        Stopped { reason, still, steps }
+        let stopped = Stopped { reason, still, steps };
+        self.tell(RigEvent::Stopped(stopped.clone()));
+        stopped
     }
 
     /// Whether the robot says that it stands, within the time that a stop has.
     fn wait_for_rest(&mut self, began: Instant) -> bool {
         let (mut rest, mut seen) = (Rest::default(), self.rows.len());
-        while began.elapsed() < LONGEST {
+        while began.elapsed() < self.config.patient(LONGEST) {
             // What the robot says counts, however bad it is. A link that is gone is made anew, to listen only.
             if self.take_robot(Duration::from_millis(20)).is_err() {
                 return listen_for_rest(self.config, began);
@@ -82,13 +74,14 @@ impl Experiment<'_> {
 /// Whether the robot says on a new connection that it stands, within the time that the stop which began then has. Nothing is
 /// written there.
 fn listen_for_rest(config: &RigConfig, began: Instant) -> bool {
-    while let Some(left) = LONGEST.checked_sub(began.elapsed()) {
+    let longest = config.patient(LONGEST);
+    while let Some(left) = longest.checked_sub(began.elapsed()) {
         let Ok(robot) = connect_listener(config, left) else {
             std::thread::sleep(AGAIN.min(left));
             continue;
         };
         let mut rest = Rest::default();
-        while let Some(left) = LONGEST.checked_sub(began.elapsed()) {
+        while let Some(left) = longest.checked_sub(began.elapsed()) {
             let Ok(event) = robot.events().recv_timeout(left) else { break };
             let Event::Data(values) = event.event else { continue };
             let Some(row) = RobotRow::from_values(event.at, &values) else { return false };

@@ -1,12 +1,10 @@
-//! The session on a socket: a thread of its own reads, so that no answer waits for anybody, and a fast stop can be sent from any
-//! thread at any moment.
+//! The session on a socket: a thread of its own reads, so that no answer waits for anybody.
 
 use super::command::{GclCommand, GclLimits, Query};
 use super::session::{GclEvent, GclLink, GclSessionError, SendError, status_meaning};
 use crate::link::{Connection, LinkError, Reading, Shared, Socket, Stamped};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -70,12 +68,6 @@ pub enum GclRunError {
         /// What the gripper made of it.
         taken: f64,
     },
-    /// A fast stop was sent: the motion never finishes.
-    #[error("{command} was ended by a fast stop")]
-    Stopped {
-        /// What moved.
-        command: &'static str,
-    },
     /// The answer did not come in time. When it comes later, it is not lost: [`GclClient::wait_for`] finds it.
     #[error("no `{awaited}` came for {waited_s:.3} s, {limit_s:.3} s are allowed")]
     Timeout {
@@ -106,20 +98,12 @@ pub struct GclClient {
     events: Receiver<Stamped<GclEvent>>,
 }
 
-/// Sends a fast stop from any thread, also while the client waits.
-#[derive(Clone)]
-pub struct GclStopper {
-    shared: Arc<Shared<State, GclSessionError>>,
-}
-
 struct State {
     session: GclLink,
     /// What came of a line that has no end yet.
     line: Vec<u8>,
     log: VecDeque<GclLogLine>,
     answers: VecDeque<GclEvent>,
-    /// A fast stop was sent after the last motion.
-    stopped: bool,
 }
 
 impl GclClient {
@@ -135,7 +119,6 @@ impl GclClient {
             line: Vec::new(),
             log: VecDeque::new(),
             answers: VecDeque::new(),
-            stopped: false,
         };
         let (tell, events) = sync_channel(MAX_EVENTS);
         let connection = Connection::start(socket, READING, state, move |shared, bytes, at| {
@@ -163,11 +146,6 @@ impl GclClient {
     /// All lines since the last call, both ways, in their order.
     pub fn take_log(&self) -> Vec<GclLogLine> {
         std::mem::take(&mut self.connection.shared.known().state.log).into()
-    }
-
-    /// A handle that can stop the gripper from another thread.
-    pub fn stopper(&self) -> GclStopper {
-        GclStopper { shared: self.connection.shared.clone() }
     }
 
     /// Sends a command and waits for nothing.
@@ -227,17 +205,6 @@ impl GclClient {
     }
 }
 
-impl GclStopper {
-    /// Stops the jaws at once. Whoever waits for a motion is told; before the next one the stop is acknowledged.
-    ///
-    /// # Errors
-    ///
-    /// A connection that ended.
-    pub fn fast_stop(&self) -> Result<(), GclSendError> {
-        self.shared.send(&GclCommand::FastStop)
-    }
-}
-
 impl Shared<State, GclSessionError> {
     fn send(&self, command: &GclCommand) -> Result<(), GclSendError> {
         let mut known = self.known();
@@ -248,12 +215,7 @@ impl Shared<State, GclSessionError> {
         state.session.send(command)?;
         // What is left of an earlier command of this name is no answer to this one.
         state.answers.retain(|event| !is_answer(event, command));
-        match command {
-            GclCommand::FastStop => state.stopped = true,
-            command if command.moves() => state.stopped = false,
-            _ => {}
-        }
-        // One line, one write: the lock keeps lines of two threads apart and the log in the order of the wire.
+        // One line, one write: the lock keeps the log in the order of the wire.
         let bytes = state.session.take_outgoing();
         state.log(Instant::now(), true, &bytes);
         let written = self.socket.write(&bytes);
@@ -276,16 +238,13 @@ impl Shared<State, GclSessionError> {
         let name = command.name();
         let look = |state: &mut State| {
             let answer = state.answers.iter().position(|event| is_answer(event, command));
-            if let Some(answer) = answer.and_then(|at| state.answers.remove(at)) {
-                if let GclEvent::Failed { status, line, .. } = answer {
+            match answer.and_then(|at| state.answers.remove(at))? {
+                GclEvent::Failed { status, line, .. } => {
                     let meaning = status.map_or("it gives no status", status_meaning);
-                    return Some(Err(GclRunError::Failed { command: name, status, meaning, line }));
+                    Some(Err(GclRunError::Failed { command: name, status, meaning, line }))
                 }
-                if let Some(found) = read(&answer) {
-                    return Some(Ok(found));
-                }
+                answer => read(&answer).map(Ok),
             }
-            (state.stopped && command.moves()).then_some(Err(GclRunError::Stopped { command: name }))
         };
         self.wait(timeout, look, |_, waited| {
             let (waited_s, limit_s) = (waited.as_secs_f64(), timeout.as_secs_f64());

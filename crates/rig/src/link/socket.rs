@@ -251,6 +251,6 @@ pub(crate) fn time_left(started: Instant, timeout: Duration) -> Option<Duration>
 }
 
 /// A thread that died with the lock leaves whole values behind: all of them are written at once.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,14 +1,13 @@
 //! The primary interface on a socket: a thread of its own reads.
 
-use super::message::{PrimaryEvent, RobotModeData};
-use super::packet::{PrimaryStream, PrimaryStreamError};
+use super::packet::{PrimaryMessage, PrimaryStream, PrimaryStreamError};
 use crate::link::{Connection, LinkError, Reading, Socket, Stamped};
 use std::net::SocketAddr;
-use std::sync::mpsc::{Receiver, TrySendError, sync_channel};
-use std::time::{Duration, Instant};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Duration;
 
-/// Events that wait to be read; later ones are lost, and counted.
-const MAX_EVENTS: usize = 4096;
+/// Messages that wait to be read; later ones are lost.
+const MAX_MESSAGES: usize = 4096;
 
 const READING: Reading = Reading { thread: "primary", silence: None, cut_at_end: true };
 
@@ -37,63 +36,33 @@ pub enum ScriptError {
 
 /// A connected client. Dropping it closes the connection; a program that runs goes on.
 pub struct PrimaryClient {
-    connection: Connection<State, PrimaryStreamError>,
-    events: Receiver<Stamped<PrimaryEvent>>,
-}
-
-#[derive(Default)]
-struct State {
-    mode: Option<Stamped<RobotModeData>>,
-    skipped: u64,
-    lost: u64,
+    connection: Connection<(), PrimaryStreamError>,
+    messages: Receiver<Stamped<PrimaryMessage>>,
 }
 
 impl PrimaryClient {
-    /// Connects. The first event is the version of the controller.
+    /// Connects. The first message is the version of the controller.
     ///
     /// # Errors
     ///
     /// No connection, or nothing within the timeout.
     pub fn connect(address: SocketAddr, timeout: Duration) -> Result<Self, PrimaryLinkError> {
         let socket = Socket::connect(address, timeout, "the connection to the primary interface is closed")?;
-        let (tell, events) = sync_channel(MAX_EVENTS);
+        let (tell, messages) = sync_channel(MAX_MESSAGES);
         let mut primary = PrimaryStream::default();
-        let connection = Connection::start(socket, READING, State::default(), move |shared, bytes, at| {
+        let connection = Connection::start(socket, READING, (), move |_, bytes, at| {
             primary.push(bytes);
-            loop {
-                let next = primary.next_event();
-                let state = &mut shared.known().state;
-                state.skipped = primary.skipped();
-                let Some(event) = next? else { return Ok(()) };
-                if state.is_news(&event, at)
-                    && let Err(TrySendError::Full(_)) = tell.try_send(Stamped { at, event })
-                {
-                    state.lost += 1;
-                }
+            while let Some(event) = primary.next_message()? {
+                let _ = tell.try_send(Stamped { at, event });
             }
+            Ok(())
         })?;
-        Ok(Self { connection, events })
+        Ok(Self { connection, messages })
     }
 
-    /// What the controller said, in its order; the mode of the robot only where it has changed. The end of the channel is the
-    /// end of the connection.
-    pub fn events(&self) -> &Receiver<Stamped<PrimaryEvent>> {
-        &self.events
-    }
-
-    /// The newest state of the robot as a whole.
-    pub fn newest_mode(&self) -> Option<Stamped<RobotModeData>> {
-        self.connection.shared.known().state.mode
-    }
-
-    /// Packets that nothing was read from.
-    pub fn skipped(&self) -> u64 {
-        self.connection.shared.known().state.skipped
-    }
-
-    /// Events that nobody read in time.
-    pub fn events_lost(&self) -> u64 {
-        self.connection.shared.known().state.lost
+    /// What the controller said, in its order. The end of the channel is the end of the connection.
+    pub fn messages(&self) -> &Receiver<Stamped<PrimaryMessage>> {
+        &self.messages
     }
 
     /// Why the connection ended, once it has.
@@ -102,7 +71,7 @@ impl PrimaryClient {
     }
 
     /// Sends a program; a last line without an end gets one. It replaces the program that runs, unless it is a `sec`. Whether
-    /// the controller takes it, the events tell: see the [module](super).
+    /// the controller takes it, the messages tell: see the [module](super).
     ///
     /// # Errors
     ///
@@ -125,14 +94,5 @@ impl PrimaryClient {
         // Half a program may be on its way: nothing may follow it.
         socket.write(&bytes).inspect_err(|_| socket.cut())?;
         Ok(())
-    }
-}
-
-impl State {
-    /// Keeps the mode of the robot; its clock alone is no news.
-    fn is_news(&mut self, event: &PrimaryEvent, at: Instant) -> bool {
-        let PrimaryEvent::RobotMode(mode) = *event else { return true };
-        let before = self.mode.replace(Stamped { at, event: mode });
-        !before.is_some_and(|b| RobotModeData { device_ticks: mode.device_ticks, ..b.event } == mode)
     }
 }

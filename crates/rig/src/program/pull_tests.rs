@@ -1,6 +1,4 @@
 use super::*;
-use crate::program::{MotionProgram, TcpPose};
-use crate::virtual_rig::urscript::Program;
 
 fn script(of: impl FnOnce(&mut PullProgram)) -> String {
     let mut program = PullProgram::default();
@@ -112,22 +110,4 @@ fn nothing_beyond_the_limits_becomes_a_program() {
     assert!(refused(|p| p.step_s = f64::NAN).contains("NaN"));
     assert!(refused(|p| p.centre_of_gravity_mm = [0.0, f64::NAN, 0.0]).contains("centre of gravity is NaN"));
     assert!(refused(|p| p.run = 0).contains("the run is 0"));
-}
-
-/// The interpreter's reading of the language has no say in how the programs are written; that it takes them is tested here.
-#[test]
-fn both_programs_are_texts_that_an_interpreter_reads() {
-    let motion = MotionProgram {
-        run: 1,
-        target: TcpPose { position_m: [0.3, 0.0, 0.2], rotation_rad: [0.0; 3] },
-        speed_mm_s: 50.0,
-        abort_force_n: 20.0,
-        max_time_s: 10.0,
-        payload_kg: 1.0,
-        centre_of_gravity_mm: [0.0; 3],
-        tool_mm: [0.0; 3],
-    };
-    for (text, title) in [(script(|_| ()), "gripgen_pull"), (motion.script().unwrap(), "gripgen_move")] {
-        assert_eq!(Program::parse(&text).unwrap().title(), title);
-    }
 }

@@ -2,14 +2,11 @@
 
 use super::value::{FieldType, Value, ValueError};
 
-/// The type of a field by its name, for those that are known.
-pub(super) type KnownTypes = fn(&str) -> Option<FieldType>;
-
 /// Fields of a data frame that the controller has accepted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Recipe {
-    /// Its number on the wire; protocol 1 has none for outputs.
-    pub id: Option<u8>,
+    /// Its number on the wire.
+    pub id: u8,
     /// Name and type of each field.
     pub fields: Vec<(String, FieldType)>,
 }
@@ -55,20 +52,10 @@ pub enum RecipeError {
 }
 
 impl Recipe {
-    /// Reads the controller's answer to `names`. With a table of `known` fields, an answer that repeats the names has the
-    /// table's types.
-    pub(super) fn from_answer(
-        names: &[String],
-        answer: &[u8],
-        with_id: bool,
-        known: Option<KnownTypes>,
-    ) -> Result<Self, RecipeError> {
+    /// Reads the controller's answer to `names`.
+    pub(super) fn from_answer(names: &[String], answer: &[u8]) -> Result<Self, RecipeError> {
         let unreadable = || RecipeError::Answer { bytes: answer.len() };
-        let (id, types) = match answer {
-            types if !with_id => (None, types),
-            [id, types @ ..] => (Some(*id), types),
-            [] => return Err(unreadable()),
-        };
+        let (&id, types) = answer.split_first().ok_or_else(unreadable)?;
         let types = std::str::from_utf8(types).map_err(|_| unreadable())?;
         let types: Vec<&str> = types.split(',').collect();
         if types.len() != names.len() {
@@ -84,11 +71,9 @@ impl Recipe {
         if !taken.is_empty() {
             return Err(RecipeError::InUse { names: taken });
         }
-        let table = known.filter(|_| names.iter().zip(&types).all(|(name, found)| name == found));
         let fields = names.iter().zip(&types).map(|(name, found)| {
-            let kind = table.map_or_else(|| FieldType::from_name(found), |type_of| type_of(name));
             let unknown = || RecipeError::Type { name: name.clone(), found: found.to_string() };
-            Ok((name.clone(), kind.ok_or_else(unknown)?))
+            Ok((name.clone(), FieldType::from_name(found).ok_or_else(unknown)?))
         });
         Ok(Self { id, fields: fields.collect::<Result<_, _>>()? })
     }
@@ -105,16 +90,8 @@ impl Recipe {
 
     /// Reads the values of a data frame; `None` if it has another number or length.
     pub(super) fn read(&self, payload: &[u8]) -> Option<Vec<Value>> {
-        match (self.id, payload) {
-            (None, values) => self.read_values(values),
-            (Some(id), [found, values @ ..]) if *found == id => self.read_values(values),
-            _ => None,
-        }
-    }
-
-    /// Reads the values of a data frame behind its number; `None` if it has another length.
-    pub(super) fn read_values(&self, mut rest: &[u8]) -> Option<Vec<Value>> {
-        if rest.len() != self.size() {
+        let (found, mut rest) = payload.split_first()?;
+        if *found != self.id || rest.len() != self.size() {
             return None;
         }
         let mut values = Vec::with_capacity(self.fields.len());
@@ -129,7 +106,7 @@ impl Recipe {
     /// The payload of a data frame with these values.
     pub(super) fn write(&self, values: &[Value]) -> Result<Vec<u8>, ValueError> {
         let mut payload = Vec::with_capacity(1 + self.size());
-        payload.extend(self.id);
+        payload.push(self.id);
         for (index, ((_, wanted), value)) in self.fields.iter().zip(values).enumerate() {
             let (found, wanted) = (value.field_type(), *wanted);
             if found != wanted {

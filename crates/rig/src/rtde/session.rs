@@ -1,15 +1,14 @@
 //! The session of a client, without a socket: bytes in, events and bytes out.
 //!
 //! ```text
-//! protocol 2? --refused--> protocol 1? --> controller's version --> outputs --> inputs, one by one --> start --> data
+//! protocol 2? --> controller's version --> outputs --> inputs, one by one --> start --> data
 //! ```
 //!
-//! A text message may come at any moment, also between a request and its answer; a data frame may still come after a
-//! pause was asked for.
+//! A text message may come at any moment, also between a request and its answer. Every controller that an experiment is made with
+//! speaks protocol 2.
 
-use super::fields::{input_type, output_type};
 use super::frame::{Frame, FrameError, FrameTooLongError, Framer, Kind, encode_frame};
-use super::recipe::{KnownTypes, Recipe, RecipeError};
+use super::recipe::{Recipe, RecipeError};
 use super::value::{Value, ValueError};
 
 /// Longest list of names that a controller takes.
@@ -20,35 +19,27 @@ const MAX_NAMES: usize = 2048;
 pub struct SessionPlan {
     /// Fields that the controller sends; at least one.
     pub outputs: Vec<String>,
-    /// How often it sends them. Protocol 1 sends at its own rate.
+    /// How often it sends them.
     pub frequency_hz: f64,
     /// Fields that the client writes, one list for each input recipe.
     pub inputs: Vec<Vec<String>>,
-    /// For test servers that are known to be lax; never for a robot, whose answers are the only proof of what its bytes mean.
-    /// An answer that repeats the names is taken for one with the types of [`output_type`] and [`input_type`], and the number in
-    /// a data frame is not looked at: a connection has one output recipe.
-    pub lenient: bool,
 }
 
 /// What the session learns.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Event {
-    /// Both sides speak this protocol.
-    Protocol(u16),
     /// Version of the controller: major, minor, bugfix, build.
     ControllerVersion([u32; 4]),
     /// All recipes are set up and the controller sends.
     Started,
-    /// The controller stopped sending.
-    Paused,
     /// Values of the output recipe, in its order.
     Data(Vec<Value>),
     /// A message for people; level 0 is an exception, 1 an error, 2 a warning, 3 information.
     Text {
         /// What it says.
         text: String,
-        /// Who says it; empty in protocol 1.
+        /// Who says it.
         source: String,
         /// How grave it is.
         level: u8,
@@ -77,8 +68,8 @@ pub enum SessionError {
         /// Their length.
         bytes: usize,
     },
-    /// Neither protocol 2 nor 1.
-    #[error("the controller speaks neither protocol 2 nor 1")]
+    /// A controller of another protocol.
+    #[error("the controller does not speak protocol 2")]
     Protocol,
     /// The controller refuses to start.
     #[error("the controller refuses to start sending")]
@@ -123,7 +114,7 @@ pub enum SessionError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteInputError {
-    /// The session has not started, or was paused.
+    /// The session has not started.
     #[error("inputs are written after the start of the session")]
     NotStarted,
     /// There is no such recipe.
@@ -150,14 +141,12 @@ pub enum WriteInputError {
 /// Where the session is: which answer it waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    Version(u16),
+    Version,
     Controller,
     Outputs,
     Inputs(usize),
     Start,
     Running,
-    Pause,
-    Paused,
 }
 
 /// A session under way.
@@ -165,7 +154,6 @@ enum State {
 pub struct Link {
     plan: SessionPlan,
     state: State,
-    protocol: u16,
     framer: Framer,
     outgoing: Vec<u8>,
     output: Option<Recipe>,
@@ -191,8 +179,7 @@ impl Link {
         }
         let mut link = Self {
             plan,
-            state: State::Version(2),
-            protocol: 2,
+            state: State::Version,
             framer: Framer::default(),
             outgoing: Vec::new(),
             output: None,
@@ -252,19 +239,6 @@ impl Link {
         Ok(())
     }
 
-    /// Asks the controller to stop sending.
-    ///
-    /// # Errors
-    ///
-    /// A request that does not fit a frame.
-    pub fn pause(&mut self) -> Result<(), SessionError> {
-        if self.state == State::Running {
-            self.state = State::Pause;
-            self.ask(Kind::Pause, &[])?;
-        }
-        Ok(())
-    }
-
     fn ask(&mut self, kind: Kind, payload: &[u8]) -> Result<(), SessionError> {
         let frame = encode_frame(kind, payload)?;
         self.outgoing.extend(frame);
@@ -274,13 +248,12 @@ impl Link {
     /// The kind of answer that is awaited.
     fn awaited(&self) -> Kind {
         match self.state {
-            State::Version(_) => Kind::ProtocolVersion,
+            State::Version => Kind::ProtocolVersion,
             State::Controller => Kind::ControllerVersion,
             State::Outputs => Kind::SetUpOutputs,
             State::Inputs(_) => Kind::SetUpInputs,
             State::Start => Kind::Start,
-            State::Pause => Kind::Pause,
-            State::Running | State::Paused => Kind::Data,
+            State::Running => Kind::Data,
         }
     }
 
@@ -288,7 +261,7 @@ impl Link {
         let payload = &frame.payload[..];
         match frame.kind {
             Kind::Text => {
-                events.push(self.text(payload));
+                events.push(Self::text(payload));
                 return Ok(());
             }
             Kind::Data => return self.data(payload, events),
@@ -298,18 +271,12 @@ impl Link {
             _ => {}
         }
         match self.state {
-            State::Version(version) => {
-                if accepted(frame)? {
-                    self.protocol = version;
-                    events.push(Event::Protocol(version));
-                    self.state = State::Controller;
-                    self.ask(Kind::ControllerVersion, &[])
-                } else if version == 2 {
-                    self.state = State::Version(1);
-                    self.ask(Kind::ProtocolVersion, &1_u16.to_be_bytes())
-                } else {
-                    Err(SessionError::Protocol)
+            State::Version => {
+                if !accepted(frame)? {
+                    return Err(SessionError::Protocol);
                 }
+                self.state = State::Controller;
+                self.ask(Kind::ControllerVersion, &[])
             }
             State::Controller => {
                 let number =
@@ -321,21 +288,17 @@ impl Link {
                 };
                 events.push(Event::ControllerVersion([major, minor, bugfix, build]));
                 self.state = State::Outputs;
-                let mut asked = match self.protocol {
-                    1 => vec![],
-                    _ => self.plan.frequency_hz.to_be_bytes().to_vec(),
-                };
+                let mut asked = self.plan.frequency_hz.to_be_bytes().to_vec();
                 asked.extend(self.plan.outputs.join(",").bytes());
                 self.ask(Kind::SetUpOutputs, &asked)
             }
             State::Outputs => {
-                let (names, with_id) = (&self.plan.outputs, self.protocol > 1);
-                self.output = Some(Recipe::from_answer(names, payload, with_id, self.known(output_type))?);
+                self.output = Some(Recipe::from_answer(&self.plan.outputs, payload)?);
                 self.next_input(0)
             }
             State::Inputs(k) => {
                 let names = &self.plan.inputs[k];
-                self.inputs.push(Recipe::from_answer(names, payload, true, self.known(input_type))?);
+                self.inputs.push(Recipe::from_answer(names, payload)?);
                 self.next_input(k + 1)
             }
             State::Start => {
@@ -346,20 +309,8 @@ impl Link {
                 events.push(Event::Started);
                 Ok(())
             }
-            State::Pause => {
-                // A refusal leaves it sending.
-                let paused = accepted(frame)?;
-                self.state = if paused { State::Paused } else { State::Running };
-                events.extend(paused.then_some(Event::Paused));
-                Ok(())
-            }
-            State::Running | State::Paused => Ok(()),
+            State::Running => Ok(()),
         }
-    }
-
-    /// The table of types, where it may stand in for an answer.
-    fn known(&self, table: KnownTypes) -> Option<KnownTypes> {
-        self.plan.lenient.then_some(table)
     }
 
     fn next_input(&mut self, k: usize) -> Result<(), SessionError> {
@@ -377,12 +328,8 @@ impl Link {
         let Some(recipe) = &self.output else {
             return Err(SessionError::Unexpected { found: Kind::Data, wanted: self.awaited() });
         };
-        let read = match payload {
-            [_, values @ ..] if self.plan.lenient && recipe.id.is_some() => recipe.read_values(values),
-            _ => recipe.read(payload),
-        };
-        let Some(values) = read else {
-            let wanted = recipe.size() + usize::from(recipe.id.is_some());
+        let Some(values) = recipe.read(payload) else {
+            let wanted = recipe.size() + 1;
             return Err(SessionError::Data { found: payload.len(), wanted });
         };
         let time_s = recipe.place("timestamp").and_then(|place| values.get(place));
@@ -398,21 +345,16 @@ impl Link {
     }
 
     /// A message for people. What cannot be read is shown as it is: no message ends a session.
-    fn text(&self, payload: &[u8]) -> Event {
+    fn text(payload: &[u8]) -> Event {
         let words = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        let v2 = || {
+        let read = || {
             let (&length, rest) = payload.split_first()?;
             let (text, rest) = rest.split_at_checked(usize::from(length))?;
             let (&length, rest) = rest.split_first()?;
             let (source, rest) = rest.split_at_checked(usize::from(length))?;
             Some(Event::Text { text: words(text), source: words(source), level: *rest.first()? })
         };
-        let v1 = || {
-            let (&level, text) = payload.split_first()?;
-            Some(Event::Text { text: words(text), source: String::new(), level })
-        };
-        let read = if self.protocol == 1 { v1() } else { v2() };
-        read.unwrap_or_else(|| Event::Text { text: words(payload), source: String::new(), level: 3 })
+        read().unwrap_or_else(|| Event::Text { text: words(payload), source: String::new(), level: 3 })
     }
 }
 

@@ -92,7 +92,7 @@ impl FieldType {
     }
 
     /// Reads a value from exactly [`size`](Self::size) bytes.
-    pub(crate) fn read(self, bytes: &[u8]) -> Option<Value> {
+    pub fn read(self, bytes: &[u8]) -> Option<Value> {
         Some(match self {
             FieldType::Bool => Value::Bool(*bytes.first()? != 0),
             FieldType::Uint8 => Value::Uint8(*bytes.first()?),
@@ -132,7 +132,7 @@ impl Value {
     }
 
     /// Appends its bytes.
-    pub(crate) fn write(&self, out: &mut Vec<u8>) {
+    pub fn write(&self, out: &mut Vec<u8>) {
         match self {
             Value::Bool(x) => out.push(u8::from(*x)),
             Value::Uint8(x) => out.push(*x),

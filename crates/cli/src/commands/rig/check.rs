@@ -1,45 +1,27 @@
 //! `gripgen rig check`: does every device answer.
 
-use super::load::load_rig;
-use super::programs::judged;
-use super::rehearsal::{compared, load};
 use crate::args::RigCheckArgs;
 use crate::failure::{Failure, code};
-use crate::output::{JsonSink, print, size};
+use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
-use crate::plain_campaign;
-use gripgen_rig::experiment::RigConfig;
-use gripgen_rig::experiment::check::{CheckLine, check, check_force};
+use crate::rig::{check_rig, load_rehearsal, load_rig};
+use gripgen_rig::experiment::check::check_force;
 use serde_json::{Value, json};
-use std::cell::RefCell;
-
-/// Free space that a day of pulls needs.
-const MIN_FREE: u64 = 2_000_000_000;
 
 /// Runs the verb.
 pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
     let mut outputs = Outputs::new(args.json.force).reads_config(&args.rig, &args.set);
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&args.rig, &args.set)?;
-    let rehearsal = args.rehearsal.as_deref().map(load).transpose()?;
-    let (on_stdout, lines) = (sink.on_stdout(), RefCell::new(Vec::new()));
-    let mut failed = Ok(());
-    let mut tell = |line: CheckLine| {
+    let rehearsal = args.rehearsal.as_deref().map(load_rehearsal).transpose()?;
+    let (on_stdout, mut failed) = (sink.on_stdout(), Ok(()));
+    let lines = check_rig(&config, rehearsal.as_ref(), |line| {
         let mark = if line.ok { "ok  " } else { "BAD " };
         if !on_stdout && failed.is_ok() {
             failed = print(&format!("{mark} {:<18} {}\n", line.what, line.found));
         }
-        lines.borrow_mut().push(line);
-    };
-    check(&config, &mut tell);
-    tell(programs(&config));
-    if let Some(stored) = &rehearsal {
-        let found = compared(stored, &lines.borrow());
-        tell(found);
-    }
-    tell(free_space());
+    });
     failed?;
-    let lines = lines.into_inner();
     let (mut force, mut force_ok) = (Value::Null, true);
     if let Some(mass_kg) = args.mass_kg {
         let hang = || eprintln!("hang {mass_kg} kg on the tool now, and let it come to rest");
@@ -68,22 +50,4 @@ pub fn run(args: &RigCheckArgs) -> Result<u8, Failure> {
         eprintln!("an experiment needs all of them; nothing was moved");
     }
     Ok(if ok { 0 } else { code::FAILED })
-}
-
-/// What the robot would be sent, run on the virtual robot through every way out.
-fn programs(config: &RigConfig) -> CheckLine {
-    let campaign = plain_campaign(&["part".into()], &[20.0], 1, 0);
-    let (ok, found) = match judged(config, &campaign) {
-        Ok(count) => (true, format!("{count} do what their numbers say, on the virtual robot")),
-        Err(problem) => (false, problem),
-    };
-    CheckLine { what: "programs", ok, found }
-}
-
-fn free_space() -> CheckLine {
-    let (ok, found) = match fs4::available_space(".") {
-        Ok(bytes) => (bytes >= MIN_FREE, format!("{} free here", size(bytes))),
-        Err(e) => (false, e.to_string()),
-    };
-    CheckLine { what: "disk", ok, found }
 }

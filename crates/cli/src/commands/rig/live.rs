@@ -1,11 +1,11 @@
 //! What somebody sees who looks on.
 
-use super::record::Standing;
 use crate::args::TalkArgs;
 use crate::failure::Failure;
 use crate::live::{CurvePoint, LivePage, Made, Picture, State};
 use crate::output::{JsonSink, count, print, program};
 use crate::progress::Progress;
+use crate::rig::Standing;
 use gripgen::twin::{PerJaw, PlannedPull};
 use gripgen_rig::camera::CameraView;
 use gripgen_rig::experiment::pull::ExecutedPull;
@@ -75,7 +75,7 @@ impl Live {
     }
 
     /// A pull begins.
-    pub fn begin(&mut self, place: u64, planned: &PlannedPull) {
+    fn begin(&mut self, place: u64, planned: &PlannedPull) {
         self.label = format!("{}/{} {} {} N", place + 1, self.total, planned.part, planned.grip_force_n);
         self.curve.clear();
         self.progress.message(&self.label);
@@ -85,6 +85,10 @@ impl Live {
     /// Something happens.
     pub fn event(&mut self, event: &RigEvent) {
         match event {
+            RigEvent::PullStarted { place, planned } => self.begin(*place, planned),
+            RigEvent::Reconnecting { reason } => {
+                self.say(&format!("{reason}; the robot stands still, connecting again"));
+            }
             RigEvent::Step(step) => {
                 self.progress.message(&format!("{}: {step}", self.label));
                 self.on_page(|state| state.now = format!("{}: {step}", self.label));

@@ -1,21 +1,14 @@
 //! `gripgen rig rehearse`: what the rig is like today, on one page.
 
-use super::load::load_rig;
-use super::programs::judged;
 use crate::args::RigRehearseArgs;
 use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
-use crate::plain_campaign;
-use gripgen::VERSION;
-use gripgen_rig::experiment::check::{CheckLine, check};
-use gripgen_rig::experiment::prepare::Permit;
-use gripgen_rig::experiment::rehearse::{REHEARSED_N, Rehearsal, SCHEMA, StoredRehearsal};
+use crate::rig::{RigEvent, StoredRehearsal, load_rig, plan_rehearsal, rehearsal_text, rehearse_rig};
+use gripgen_rig::experiment::rehearse::{REHEARSED_N, Rehearsal};
 use gripgen_rig::experiment::slowing::TRAILS_N;
-use gripgen_rig::experiment::{Devices, Experiment, RigEvent, check_campaign};
 use std::fmt::Write;
-use std::time::SystemTime;
 
 /// Runs the verb.
 pub fn run(args: &RigRehearseArgs) -> Result<u8, Failure> {
@@ -23,26 +16,7 @@ pub fn run(args: &RigRehearseArgs) -> Result<u8, Failure> {
     outputs.allow(&args.out)?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let config = load_rig(&args.rig, &args.set)?;
-    let Some(part) = args.part.clone().or_else(|| config.poses.keys().next().cloned()) else {
-        return Err(Failure::usage(format!("{}: no pose is taught", args.rig))
-            .hint("move the tool to a part by hand, then `gripgen rig teach NAME`"));
-    };
-    if !(0.5..=3600.0).contains(&args.dwell_s) {
-        return Err(Failure::usage(format!("--dwell-s: {} s, it must be from 0.5 to 3600 s", args.dwell_s)));
-    }
-    let campaign = plain_campaign(std::slice::from_ref(&part), &[args.grip_force_n], 1, 0);
-    check_campaign(&config, &campaign)
-        .map_err(|e| Failure::usage(e).hint("nothing was sent and nothing moved"))?;
-    judged(&config, &campaign).map_err(|e| Failure::new(e).hint("nothing was sent and nothing moved"))?;
-    let mut lines: Vec<CheckLine> = Vec::new();
-    check(&config, |line| lines.push(line));
-    if let Some(bad) = lines.iter().find(|line| !line.ok) {
-        return Err(Failure::new(format!("{}: {}", bad.what, bad.found))
-            .hint("`gripgen rig check` says all; nothing was moved"));
-    }
-    let stop = stop_flag("stopping the robot safely");
-    let mut devices = Devices::connect(&config).map_err(Failure::new)?;
-    devices.prepare(Permit::default()).map_err(Failure::new)?;
+    let plan = plan_rehearsal(&config, &args.rig, args.part.clone(), args.grip_force_n, args.dwell_s)?;
     let quiet = args.talk.quiet || sink.on_stdout();
     let mut emit = |event| {
         if let RigEvent::Step(step) = event
@@ -51,33 +25,8 @@ pub fn run(args: &RigRehearseArgs) -> Result<u8, Failure> {
             eprintln!("{step}");
         }
     };
-    let mut experiment = Experiment::new(&config, devices, stop, &mut emit);
-    let made = experiment.begin().and_then(|()| experiment.rehearse(&part, args.grip_force_n, args.dwell_s));
-    let rehearsal = match made {
-        Ok(rehearsal) => rehearsal,
-        Err(fault) => {
-            let stopped = experiment.safe_stop(&fault);
-            let rest = if stopped.still {
-                "the robot stands still"
-            } else {
-                "NOBODY KNOWS WHETHER THE ROBOT STANDS STILL"
-            };
-            return Err(Failure::new(format!("{}; {rest}, the gripper keeps what it holds", stopped.reason)));
-        }
-    };
-    experiment.close();
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    let stored = StoredRehearsal {
-        schema: SCHEMA.into(),
-        gripgen_version: VERSION.into(),
-        unix_s: since.map_or(0.0, |since| since.as_secs_f64()),
-        checks: lines.into_iter().map(|line| (line.what.to_string(), line.found)).collect(),
-        doubts: rehearsal.doubts(&config),
-        rehearsal,
-    };
-    let mut text = serde_json::to_string_pretty(&stored).map_err(Failure::new)?;
-    text.push('\n');
-    outputs.write(&args.out, text.as_bytes())?;
+    let stored = rehearse_rig(&config, &plan, stop_flag("stopping the robot safely"), &mut emit)?;
+    outputs.write(&args.out, rehearsal_text(&stored)?.as_bytes())?;
     sink.document(&serde_json::to_value(&stored).map_err(Failure::new)?)?;
     if !sink.on_stdout() {
         print(&page(&stored))?;

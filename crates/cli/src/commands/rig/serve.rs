@@ -1,17 +1,17 @@
 //! `gripgen rig serve`: a virtual rig.
 
-use super::load::SHIPPED_RIG;
 use super::teach::taught;
 use crate::args::RigServeArgs;
 use crate::failure::Failure;
 use crate::interrupt::stop_flag;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
+use crate::rig::SHIPPED_RIG;
 use gripgen::{Location, TwinPlant};
 use gripgen_rig::camera::CameraView;
 use gripgen_rig::program::TcpPose;
-use gripgen_rig::virtual_rig::faults::Fault;
-use gripgen_rig::virtual_rig::server::{RigAddresses, ServeError, ServeOptions, ServedRig};
+use gripgen_rig_sim::faults::Fault;
+use gripgen_rig_sim::server::{RigAddresses, ServeError, ServeOptions, ServedRig};
 use serde_json::json;
 use std::io::BufRead;
 use std::net::SocketAddr;
@@ -23,6 +23,8 @@ use toml_edit::{DocumentMut, value};
 
 /// How far above its fixture the tool begins.
 const ABOVE_M: f64 = 0.1;
+/// Patience of the clients of a rig that waits for them.
+const PATIENCE: f64 = 20.0;
 /// Time between two looks at Ctrl-C.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -41,6 +43,7 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     let options = ServeOptions {
         addresses: addresses(args),
         clock_rate: args.speed,
+        in_step: args.in_step,
         tcp,
         // The R1.5 sends portrait frames.
         view: CameraView { rotate_deg: 90, mirror: false, crop_px: None, size_px: [320, 240] },
@@ -50,7 +53,7 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     let addresses = rig.addresses();
     // Before the line that says ready: who waits for that line finds the file.
     if let Some(path) = &args.write_rig {
-        outputs.write(path, rig_toml(&addresses, &fixtures)?.as_bytes())?;
+        outputs.write(path, rig_toml(&addresses, &fixtures, args.in_step)?.as_bytes())?;
     }
     if sink.wanted() {
         let of = |(what, address): (&str, SocketAddr)| (what.to_string(), json!(address.to_string()));
@@ -92,8 +95,12 @@ pub fn run(args: &RigServeArgs) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// The shipped rig.toml with these ports and poses.
-fn rig_toml(addresses: &RigAddresses, fixtures: &[(String, TcpPose)]) -> Result<String, Failure> {
+/// The shipped rig.toml with these ports and poses; clients of a rig that waits for them are patient, too.
+fn rig_toml(
+    addresses: &RigAddresses,
+    fixtures: &[(String, TcpPose)],
+    in_step: bool,
+) -> Result<String, Failure> {
     let text = Location::parse(SHIPPED_RIG).read_text().map_err(Failure::new)?;
     let mut document: DocumentMut = text.parse().map_err(Failure::new)?;
     let port = |at: SocketAddr| value(i64::from(at.port()));
@@ -103,6 +110,9 @@ fn rig_toml(addresses: &RigAddresses, fixtures: &[(String, TcpPose)]) -> Result<
     document["gripper"]["port"] = port(addresses.gripper);
     document["cameras"]["left"]["port"] = port(addresses.camera_left);
     document["cameras"]["right"]["port"] = port(addresses.camera_right);
+    if in_step {
+        document["limits"]["patience"] = value(PATIENCE);
+    }
     document.remove("poses");
     for (part, pose) in fixtures {
         taught(&mut document, part, pose.numbers());

@@ -1,10 +1,10 @@
 //! `gripgen rig teach`: the pose of the tool becomes that of a part.
 
-use super::load::load_rig;
 use crate::args::RigTeachArgs;
 use crate::failure::Failure;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
+use crate::rig::load_rig;
 use gripgen::twin::config::Document;
 use gripgen_rig::experiment::RigConfig;
 use gripgen_rig::experiment::check::read_pose;
