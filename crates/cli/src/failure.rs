@@ -6,7 +6,8 @@ use gripgen::record::{ExportError, FolderError, ReadError};
 use gripgen::tactile::gpu::GpuError;
 use gripgen::tactile::presses::HeightsError;
 use gripgen::twin::config::{ConfigError, Place};
-use gripgen::{LoadError, OpenPlantError, SweepError};
+use gripgen::{LoadError, SweepError};
+use crate::rig::OpenPlantError;
 use std::fmt::Display;
 use std::io;
 

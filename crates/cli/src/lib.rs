@@ -25,7 +25,6 @@ mod plan;
 mod progress;
 mod render;
 pub mod rig;
-mod rig_run;
 mod schema;
 mod shell;
 
@@ -57,7 +56,6 @@ pub use part::{
 };
 pub use plan::{Plan, Probe, TriedGrip, plan};
 pub use render::{RenderError, RenderOptions, is_height_map, render_file, render_surface};
-pub use rig_run::{plain_campaign, rig_run_differences, rig_run_toml};
 pub use schema::{campaign_schema, rosbag_schema, sweep_schema, twin_schema};
 
 /// Runs gripgen with the arguments of a process (the first is its name) and returns its exit code.

@@ -3,6 +3,8 @@
 //! `gripgen-rig` makes the experiment and tells what happens; here that is written into a run folder.
 
 mod check;
+mod config_text;
+mod plant;
 mod programs;
 mod pull;
 mod record;
@@ -10,11 +12,13 @@ mod rehearsal;
 mod standing;
 
 pub use check::check_rig;
+pub use config_text::{plain_campaign, rig_run_differences, rig_run_toml};
 pub use gripgen_rig::experiment::check::CheckLine;
 pub use gripgen_rig::experiment::prepare::Permit;
 pub use gripgen_rig::experiment::pull::ExecutedPull;
 pub use gripgen_rig::experiment::rehearse::StoredRehearsal;
 pub use gripgen_rig::experiment::{PullOutcome, RehearsalPlan, RigConfig, RigEvent};
+pub use plant::{Fixture, OpenPlantError, TwinPlant};
 pub use pull::{HowToPull, PullJob, PullProgress, PullRun, PullSummary, plan_pulls};
 pub use record::Standing;
 pub use rehearsal::{load_rehearsal, plan_rehearsal, rehearsal_text, rehearse_rig};

@@ -1,7 +1,7 @@
 //! A rig from Python: the functions that the command line calls, in the caller's thread with its signals.
 
 use crate::{error, values};
-use gripgen::record::read_campaign;
+use gripgen_measured::read_campaign;
 use gripgen_cli::Failure;
 use gripgen_cli::rig::{
     HowToPull, Permit, PullJob, PullOutcome, PullProgress, RigEvent, check_rig, load_rehearsal, load_rig,

@@ -2,7 +2,7 @@
 
 use super::programs::checked_programs;
 use crate::output::size;
-use gripgen::plain_campaign;
+use crate::rig::plain_campaign;
 use gripgen_rig::experiment::RigConfig;
 use gripgen_rig::experiment::check::{CheckLine, check};
 use gripgen_rig::experiment::rehearse::StoredRehearsal;

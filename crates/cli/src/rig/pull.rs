@@ -12,7 +12,9 @@ use gripgen::record::{
     suspect_pulls, write_rig_pull,
 };
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
-use gripgen::{VERSION, plain_campaign, publish_contact_sheet, rig_run_differences, rig_run_toml};
+use gripgen::VERSION;
+use crate::rig::{plain_campaign, rig_run_differences, rig_run_toml};
+use gripgen_report::publish_contact_sheet;
 use gripgen_rig::experiment::check::check;
 use gripgen_rig::experiment::prepare::Permit;
 use gripgen_rig::experiment::pull::ExecutedPull;

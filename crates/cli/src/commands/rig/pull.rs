@@ -7,7 +7,7 @@ use crate::interrupt::stop_flag;
 use crate::output::{JsonSink, count, duration, print};
 use crate::outputs::Outputs;
 use crate::rig::{HowToPull, Permit, PullJob, PullProgress, load_rig, plan_pulls};
-use gripgen::record::read_campaign;
+use gripgen_measured::read_campaign;
 use gripgen_rig::experiment::plan::pull_program;
 use serde_json::json;
 use std::path::PathBuf;

@@ -1,10 +1,8 @@
 //! The twin as what a virtual rig moves: grips where the tool is, pulls that somebody else commands.
 
-use crate::generate::pull_session;
-use crate::gripped::Gripped;
-use crate::location::Location;
-use crate::project::{LoadError, Project, load_twin_document};
-use crate::sample::{SampleError, SimulateOptions};
+use gripgen::{
+    Gripped, LoadError, Location, Project, SampleError, SimulateOptions, load_twin_document, pull_session,
+};
 use gripgen_physics::{Command, PullSession};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, Mechanics};
@@ -325,7 +323,7 @@ mod tests {
         let scenario = grip.scenario.clone();
         let twin = plant.twin();
         let outcome =
-            crate::generate::simulate(twin, &plant.project.library, &scenario, options(false), None);
+            gripgen::simulate(twin, &plant.project.library, &scenario, options(false), None);
         let gripgen_twin::Outcome::Pulled(pulled) = outcome.unwrap() else { panic!("it slips") };
         let peak = pulled.trace.measured_force_n.iter().copied().fold(0.0, f64::max);
         assert_eq!(largest_n, peak);
