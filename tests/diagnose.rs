@@ -193,6 +193,7 @@ fn a_plain_twin_has_nothing_to_find() {
 
 /// The shipped example comes from another generator. Without the effect that explains it, the answer is the covariate.
 #[test]
+#[ignore = "slow: a campaign"]
 fn the_example_is_diagnosed_and_an_effect_that_is_taken_away_becomes_unknown() {
     let measured = load_pulls(&root().join("assets/campaigns/example")).unwrap().pulls;
     let found = diagnose(&measured, &[]);
@@ -212,7 +213,6 @@ fn the_example_is_diagnosed_and_an_effect_that_is_taken_away_becomes_unknown() {
 /// The laws of Wucherer et al. 2023 in the shipped twin have another offset for each part, and not all the same sign: they come
 /// back with the part's own b / a.
 #[test]
-#[ignore = "slow: a campaign"]
 fn laws_that_differ_by_part_come_back_with_theirs() {
     let location = Location::parse("asset:configs/twin.toml");
     let parts: Vec<String> = ["ball_bearing", "roller_bearing"].map(String::from).to_vec();

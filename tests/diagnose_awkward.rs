@@ -126,7 +126,6 @@ fn what_acts_in_one_session_is_found_there() {
 /// Readings that rise by 20 mN for each newton of the grip, with and without a load: mu takes it in, the readings without a load
 /// show it. A zero that walks about is nothing of the kind, and labels that walk with it are no second witness of anything.
 #[test]
-#[ignore = "slow: a campaign"]
 fn cross_talk_of_the_grip_shows_without_a_load() {
     let with = |zero_n: &dyn Fn(f64, usize) -> f64| {
         let mut measured = simulated("", 60, &[]);
