@@ -44,6 +44,7 @@ pub(crate) fn simulated_at(
 /// Effects on readings are fitted with lag and dead time free. Where the baseline has not had both first, they win by them
 /// alone: `sensor_saturation` in these two campaigns, in which nothing acts.
 #[test]
+#[ignore = "slow: a campaign"]
 fn nothing_is_found_in_campaigns_of_the_shipped_twin() {
     for seed in [5, 6] {
         let options = CampaignOptions {
@@ -103,6 +104,7 @@ fn an_effect_of_the_simulator_is_found_and_put_into_the_twin() {
 /// A tool that creeps to its stop while the jaws hold: the label of strong grips is then no friction. Displacements show it, and of labels
 /// alone it is no rival.
 #[test]
+#[ignore = "slow: a campaign"]
 fn creep_that_reaches_the_stop_is_found_by_its_displacement() {
     let effect = "[[effects]]\nname = \"shear_creep\"\nrate_mm_per_n_s = 0.3\nload_exponent = 0.2\nrim_exponent = 0.5\n";
     let mut measured = simulated(effect, 90, &[]);
@@ -125,6 +127,7 @@ fn creep_that_reaches_the_stop_is_found_by_its_displacement() {
 
 /// Two labels that end at the stop would be two bad labels, if displacements of all traces did not say that the tool creeps.
 #[test]
+#[ignore = "slow: a campaign"]
 fn two_labels_are_enough_where_displacements_show_creep() {
     let effect = "[[effects]]\nname = \"shear_creep\"\nrate_mm_per_n_s = 0.12\n";
     let mut measured = simulated(effect, 120, &[]);
@@ -160,6 +163,7 @@ fn creep_that_no_label_feels_is_said() {
 /// The twin that is written is the fitted model: with a force that falls after the slip, and with an effect, the error that is
 /// stated is the one that a comparison with that twin gets on those pulls.
 #[test]
+#[ignore = "slow: a campaign"]
 fn the_stated_error_is_that_of_the_written_twin() {
     let falls = ("parts.long_shaft.kinetic_fall_s", "0.012");
     let kinetic = ("parts.long_shaft.kinetic_ratio", "0.88");
@@ -191,6 +195,7 @@ fn a_plain_twin_has_nothing_to_find() {
 
 /// The shipped example comes from another generator. Without the effect that explains it, the answer is the covariate.
 #[test]
+#[ignore = "slow: a campaign"]
 fn the_example_is_diagnosed_and_an_effect_that_is_taken_away_becomes_unknown() {
     let measured = load_pulls(&root().join("assets/campaigns/example")).unwrap().pulls;
     let found = diagnose(&measured, &[]);
@@ -229,6 +234,7 @@ fn laws_that_differ_by_part_come_back_with_theirs() {
 /// What is tied is told apart by the pulls that are planned for it: a bias of the sensor, pulled upwards only without
 /// traces, looks like an offset of the friction until the planned pulls are made on the same rig.
 #[test]
+#[ignore = "slow: a campaign"]
 fn the_planned_pulls_tell_apart_what_was_tied() {
     let effect = "[[effects]]\nname = \"sensor_bias\"\nbias_n = -1.0\n";
     let mut measured = simulated(effect, 90, &[]);
@@ -307,6 +313,7 @@ fn the_offset_law_is_fitted_with_its_uncertainty() {
 /// The measured campaigns whose causes are not declared: the answers of this version, so that a change shows.
 #[test]
 #[cfg_attr(not(shared_data), ignore = "the folder of shared measured data is not beside this checkout")]
+#[cfg_attr(shared_data, ignore = "slow: five campaigns")]
 fn measured_campaigns_have_their_answers() {
     let shared = root().join("../shared/measured");
     for (lab, effects, unknown) in [

@@ -22,6 +22,7 @@ fn labels_alone(mut measured: MeasuredPulls) -> MeasuredPulls {
 /// A sensor with three times the noise that the twin says reads labels higher. That is its noise and no offset of the friction: the
 /// calibration says so, and the diagnosis names nothing.
 #[test]
+#[ignore = "slow: a campaign"]
 fn labels_say_how_noisy_their_sensor_is() {
     let twin = twin_at(&baseline());
     let noise = |measured: &MeasuredPulls| {
@@ -41,6 +42,7 @@ fn labels_say_how_noisy_their_sensor_is() {
 /// Jaws that slide fast are at the stop before a noisy reading is the label, so that labels go with the rate of the pull. That is the arm,
 /// and no friction that depends on the rate.
 #[test]
+#[ignore = "slow: a campaign"]
 fn labels_say_how_fast_the_jaws_slide() {
     let own = [("wrist.noise_n", "0.35"), ("robot.feedback", "independent")];
     let light = [own[0], own[1], ("robot.damping_n_s_per_m", "100.0")];
@@ -57,6 +59,7 @@ fn labels_say_how_fast_the_jaws_slide() {
 /// A sensor that ends above all levels but the strongest: pulls of the other levels know nothing of its end, so that errors on held-out
 /// levels do not fall, and the answer says on what it rests.
 #[test]
+#[ignore = "slow: a campaign"]
 fn the_end_of_a_range_that_one_level_reaches_is_no_news_to_the_others() {
     let end = "[[effects]]\nname = \"sensor_saturation\"\nlimit_n = 23.0\n";
     let measured = labels_alone(simulated(end, 60, &[]));
@@ -99,6 +102,7 @@ fn one_bad_pull_is_no_effect() {
 /// Friction that grows with the dwell in the second session alone comes back as that pair of columns, and the twin that is written
 /// has it in that session alone.
 #[test]
+#[ignore = "slow: a campaign"]
 fn what_acts_in_one_session_is_found_there() {
     let table = "[[effects]]\nname = \"table\"\ncovariate = \"dwell_s\"\nwhere = { session = \"2\" }\nx = [0.5, 90.0]\n\
                  factor = [1.0, 1.5]\nphysical = false\n";
@@ -163,6 +167,7 @@ fn a_wear_that_has_hardly_bent_is_a_name() {
 /// Friction in humid heat, in a room that is cold and moist towards the end: a step of friction from there on beside a curve of the humidity is
 /// as likely as the temperature beside that curve, and less so once the product of both stands there too.
 #[test]
+#[ignore = "slow: a campaign"]
 fn what_is_tied_may_explain_more_beside_a_curve() {
     let mut measured = labels_alone(simulated("", 75, &[]));
     let mut humidity_pct = Vec::new();

@@ -22,6 +22,7 @@ fn an_effect_that_the_library_lacks_comes_back_as_its_covariate() {
 
 /// The same of more effects.
 #[test]
+#[ignore = "slow: a campaign"]
 fn more_effects_that_the_library_lacks_come_back_as_their_covariates() {
     lacking("off_centre", "inverse_lever_per_mm = 0.1", &["grip_offset_mm"]);
     let rate = ["force_increment_n", "step_time_s", "force_increment_n*step_time_s"];

@@ -1,6 +1,6 @@
 //! Files that were changed at random: whatever they say, readers answer with a result and never panic.
 //!
-//! Few of each here; `GRIPGEN_FUZZ=100000` sets how many, and `docs/reliability.md` has the counts of such a run.
+//! Few of each here, ten times as many in the slow tests; `GRIPGEN_FUZZ=100000` sets how many, and `docs/reliability.md` has the counts of such a run.
 
 use crate::common::{jobs, run, small_project};
 use gripgen::record::ShardReader;
@@ -14,7 +14,8 @@ use std::path::Path;
 
 /// How many files of each kind.
 fn tries(few: u64) -> u64 {
-    std::env::var("GRIPGEN_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(few)
+    let asked = std::env::var("GRIPGEN_FUZZ").ok().and_then(|n| n.parse().ok());
+    asked.unwrap_or(if slow() { 10 * few } else { few })
 }
 
 /// What is written in the place of a number or between two lines.

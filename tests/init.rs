@@ -1,6 +1,6 @@
 //! Parts of one's own: what `init` proposes holds wherever its sweep goes, and the jaws stop at the surface.
 
-use crate::common::project_in;
+use crate::common::{project_in, slow};
 use crate::solids::{Solid, SolidPart, ordinary};
 use gripgen::physics::Window;
 use gripgen::tactile::SimdLevel;
@@ -73,7 +73,7 @@ fn proposed_grips_hold_and_the_jaws_stop_at_the_surface() {
                 assert!(imprint.patch.area_m2() > 1e-6, "{}, sample {index}, {jaw} jaw", part.name);
                 // The gels stand where their surfaces first touch: the part's origin lies that far in front of them.
                 let stands_mm = pulled.grasp.gel_from_part[jaw].translation.z * 1e3;
-                if index % 10 == 0 {
+                if index % (if slow() { 10 } else { 50 }) == 0 {
                     let c = &scenario.covariates;
                     let world_from_mesh = Part::world_from_part(c.grip_angle_rad, c.grip_offset_m)
                         * of_part.grips[scenario.grip_pose];

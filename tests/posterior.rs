@@ -243,6 +243,7 @@ fn a_twins_own_labels_lie_in_its_intervals() {
 
 /// A diagnosis hands its posterior on: the tied cause is in it with its weight, and every draw makes a twin.
 #[test]
+#[ignore = "slow: a campaign"]
 fn a_diagnosis_hands_on_its_causes() {
     // Upwards only and without traces, a bias of the sensor looks like an offset of the friction.
     let mut measured = simulated("[[effects]]\nname = \"sensor_bias\"\nbias_n = -1.0\n", 90, &[]);
