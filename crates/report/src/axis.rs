@@ -17,7 +17,7 @@ impl Axis {
         if low > high {
             (low, high) = (0.0, 1.0);
         }
-        // A range that is nothing beside its place: a constant, up to rounding.
+        // A range that is negligible next to its place: a constant, up to rounding.
         let size = low.abs().max(high.abs());
         if high - low <= 1e-9 * size || high - low < 1e-300 {
             let half = if size > 0.0 { 0.5 * size } else { 0.5 };

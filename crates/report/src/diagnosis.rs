@@ -57,7 +57,7 @@ pub struct WorstRow {
     pub deviations: f64,
 }
 
-/// What the page shows beside the diagnosis itself.
+/// What the page shows in addition to the diagnosis itself.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReportData {
     /// Title of the page.
@@ -78,7 +78,7 @@ pub struct ReportData {
 
 /// The report of a diagnosis: one HTML page with its plots inside, which needs neither a network nor a script.
 ///
-/// It stays below 500 kB whatever the size of the data: plots show at most so many points, tables so many rows, and what
+/// It stays below 500 kB whatever the size of the data: plots and tables have a largest number of points and rows, and what
 /// was left out is said.
 pub fn diagnosis_page(d: &Diagnosis, report: &ReportData) -> String {
     let floor = d.noise_floor_n.or(d.noise_floor_mse).or(d.noise_floor_mm3);

@@ -32,7 +32,7 @@ const TEMPLATES: [(&str, &str); 4] = [
 pub(crate) struct Table {
     /// Names of the columns.
     pub(crate) head: Vec<String>,
-    /// Columns of words beside the first.
+    /// Columns of words besides the first, which is always one.
     pub(crate) words: Vec<usize>,
     /// Cells.
     pub(crate) rows: Vec<Vec<String>>,
@@ -189,7 +189,7 @@ impl Page {
     }
 }
 
-/// What is left of the room for plots, so that a page has a size.
+/// The room for plots that a page still has: its size is bounded.
 pub(crate) struct PlotBudget {
     plots: usize,
     points: usize,

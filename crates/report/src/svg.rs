@@ -68,7 +68,7 @@ pub(crate) fn draw(plot: &Plot, most: usize) -> String {
         |ticks: &[(f64, String)]| ticks.iter().map(|t| t.1.chars().count()).max().unwrap_or(1) as f64;
     let left = 34.0 + LETTER * letters(&y.ticks);
     let right = WIDTH - RIGHT;
-    // Words that do not fit beside each other stand upright.
+    // Words that do not fit next to each other stand upright.
     let room = (right - left) / x.ticks.len().max(1) as f64;
     let is_upright = !words.is_empty() && LETTER * letters(&x.ticks) + 6.0 > room;
     let below = if is_upright { 14.0 + LETTER * letters(&x.ticks) } else { 20.0 };
@@ -111,13 +111,13 @@ pub(crate) fn draw(plot: &Plot, most: usize) -> String {
     svg + "</svg>"
 }
 
-/// What the style sheet of a page says of plots, for a picture of its own.
+/// What the style sheet of a page says of plots, for a separate picture.
 const STYLE: &str = "text { font: 12px system-ui, sans-serif; fill: #1d2328 } .x { text-anchor: middle } \
     .y { text-anchor: end } path { fill: none; stroke: #0072b2 } .grid { stroke: #e6e9ed } .zero { stroke: #5b6670 } \
     .line { stroke-width: 2 } .dots { stroke-width: 5.5; stroke-linecap: round } .c1 { stroke: #d55e00 } .cb { stroke: #87919b }";
 
 impl Plot {
-    /// The plot as an SVG file of its own, with its title above it.
+    /// The plot as a separate SVG file, with its title above it.
     pub fn to_svg(&self) -> String {
         let inner = draw(self, 800).replace("<svg class=\"plot\"", "<svg y=\"24\"");
         let title = escape(&shorten(&self.title, 60));
@@ -168,7 +168,7 @@ fn ends(stretch: &[(f64, f64, f64)]) -> Vec<(f64, f64, f64)> {
     if place(low) <= place(high) { vec![*low, *high] } else { vec![*high, *low] }
 }
 
-/// Points of one word beside each other, those of each series in a strip of their own: they hide each other less.
+/// Points of one word next to each other, those of each series in a separate strip: they hide each other less.
 fn spread(points: &mut [(f64, f64, f64)], middle: f64, width: f64) {
     if points.len() < 2 {
         return;

@@ -46,7 +46,7 @@ pub struct FrictionRange {
     pub value: f64,
     /// Upper end.
     pub high: f64,
-    /// Whether somebody measured it.
+    /// Whether it was measured.
     pub is_measured: bool,
 }
 

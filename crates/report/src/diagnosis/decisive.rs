@@ -8,7 +8,7 @@ use gripgen_twin::effects;
 use gripgen_twin::{MeasuredPull, MeasuredPulls, rounded};
 use std::collections::BTreeMap;
 
-/// Different values that are levels; of more, pulls are put together in so many groups.
+/// Different values that are levels; with more, pulls are put together into this many groups.
 const LEVELS: usize = 12;
 const GROUPS: usize = 10;
 /// Half width of a 90 % interval in standard errors.

@@ -7,7 +7,7 @@ use gripgen_twin::effects::{EffectSpec, find};
 /// Weight from which on a name is sure.
 const SURE: f64 = 0.5;
 
-/// Share of campaigns drawn anew that name it again, from which on it is.
+/// Share of redrawn campaigns that name it again, from which on it is.
 const AGAIN: f64 = 0.8;
 
 /// A sentence on the first name that is not sure, with the nearest other one in the words of the catalogue.
@@ -19,12 +19,12 @@ pub fn doubt(d: &Diagnosis, evidence: &[EvidenceRow]) -> Option<String> {
     });
     let name = format!("The name {} is not sure (weight {:.2}{again})", effect.name, effect.weight);
     Some(match nearest(d, effect, evidence) {
-        Some(rival) => format!("{name}. Nearest to it is {}: {}", rival.id, rival.plainly),
+        Some(other) => format!("{name}. Nearest to it is {}: {}", other.id, other.plainly),
         None => format!("{name}."),
     })
 }
 
-/// The effect that predicts held-out data best beside those that were named, or the heaviest of what is tied with it.
+/// The effect that predicts held-out data best among those that were not named, or the heaviest of what is tied with it.
 fn nearest(d: &Diagnosis, effect: &NamedEffect, evidence: &[EvidenceRow]) -> Option<&'static EffectSpec> {
     let other =
         |name: &str| find(one_for_all(name)).filter(|spec| d.effects.iter().all(|e| e.name != spec.id));
@@ -71,7 +71,7 @@ mod tests {
 
     /// The true law is in the table of evidence, ahead of what was named.
     #[test]
-    fn a_name_that_is_not_sure_says_so_and_names_its_nearest_rival() {
+    fn an_uncertain_name_comes_with_its_nearest_alternative() {
         let evidence =
             [row("curve in grip_force_n", 14.0), row("area_saturation", 10.4), row("load_power_law", 13.0)];
         let light = said(0.12, 0.22, &evidence);

@@ -1,4 +1,4 @@
-//! What the report of a diagnosis of pulls shows beside the answer itself.
+//! What the report of a diagnosis of pulls shows in addition to the answer itself.
 
 use super::decisive::decisive;
 use super::doubt::one_for_all;

@@ -90,7 +90,7 @@ pub(crate) fn axes(canvas: &mut Canvas, plot: Area, end: f64, top_n: f64, name: 
     }
 }
 
-/// Displacement on an axis of its own, at the right.
+/// Displacement on a separate axis, at the right.
 fn displacement(canvas: &mut Canvas, plot: Area, trace: &PullTrace, end_s: f64) {
     let top_mm = trace.displacement_m.iter().fold(1e-3_f64, |a, &b| a.max(b * 1e3)) * 1.08;
     let points: Vec<(f64, f64)> = trace
