@@ -8,10 +8,10 @@
 
 mod guard;
 
-use gripgen_identify::{CampaignOptions, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
 use gripgen::{Library, Location, load_twin_document};
 use gripgen_cli::{PullDiagnoseOptions, compare_pulls, diagnose_pull_table, simulate_campaign};
+use gripgen_identify::{CampaignOptions, plan_campaign};
 use guard::baseline::Unit;
 use std::process::ExitCode;
 use std::time::Instant;

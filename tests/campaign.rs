@@ -1,10 +1,10 @@
 //! Campaigns: planned, made on a twin, written, and read as measurements.
 
 use crate::common::{baseline, overrides};
-use gripgen_identify::{CampaignOptions, plan_campaign};
 use gripgen::twin::config::Feedback;
 use gripgen::twin::{Campaign, PlannedPull};
 use gripgen_cli::simulate_campaign;
+use gripgen_identify::{CampaignOptions, plan_campaign};
 use gripgen_measured::{CAMPAIGN_FILE, campaign_toml, read_campaign, write_pull_folder};
 use gripgen_measured::{Suspects, load_pulls_with};
 

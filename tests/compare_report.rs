@@ -1,9 +1,9 @@
 //! Measured pulls of any folder beside a twin: the paper's panels.
 
 use crate::common::{baseline, jobs, library, project, run, twin_at};
-use gripgen_identify::pull_ratios;
 use gripgen::twin::Twin;
 use gripgen_cli::compare_pulls;
+use gripgen_identify::pull_ratios;
 use gripgen_measured::load_pulls;
 use gripgen_report::{ComparedPulls, pull_comparison_page};
 

@@ -2,13 +2,13 @@
 
 use crate::common::{baseline, library, overrides, root, twin_at, twin_with};
 use gripgen::Location;
-use gripgen_identify::pulls::calibrate::CalibrateRequest;
-use gripgen_identify::{CampaignOptions, Diagnosis, Verdict, plan_campaign};
 use gripgen::twin::{MeasuredPulls, Twin};
 use gripgen_cli::Diagnosed;
 use gripgen_cli::{
     PullDiagnoseOptions, calibrate_twin, compare_pulls, diagnose_pull_table, edited_twin, simulate_campaign,
 };
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::{CampaignOptions, Diagnosis, Verdict, plan_campaign};
 use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
 
 pub(crate) fn diagnose(measured: &MeasuredPulls, without: &[&str]) -> Diagnosed {

@@ -3,12 +3,12 @@
 
 use crate::common::{baseline, library, twin_at};
 use crate::diagnose::{diagnose, names, simulated};
-use gripgen_identify::Verdict;
-use gripgen_identify::pulls::calibrate::CalibrateRequest;
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{ExtraColumn, MeasuredPulls, PullTrace, TraceRow, Values};
 use gripgen_cli::{calibrate_twin, edited_twin};
+use gripgen_identify::Verdict;
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
 
 /// Labels alone, as they are copied from a screen.
 fn labels_alone(mut measured: MeasuredPulls) -> MeasuredPulls {

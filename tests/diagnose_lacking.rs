@@ -1,8 +1,8 @@
 //! Diagnoses with a library that lacks the effect that acts.
 
 use crate::diagnose::{diagnose, names, simulated, simulated_at};
-use gripgen_identify::{CampaignOptions, Verdict};
 use gripgen::twin::MeasuredPulls;
+use gripgen_identify::{CampaignOptions, Verdict};
 
 /// Effects taken out of the library one at a time: what they did comes back as a dependence on the right column, and not
 /// under another name.

@@ -2,7 +2,7 @@
 //!
 //! Few of each here, ten times as many in the slow tests; `GRIPGEN_FUZZ=100000` sets how many, and `docs/reliability.md` has the counts of such a run.
 
-use crate::common::{jobs, run, small_project};
+use crate::common::{jobs, run, slow, small_project};
 use gripgen::record::ShardReader;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Posterior, TriMesh, write_binary_stl};

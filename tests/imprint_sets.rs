@@ -1,7 +1,6 @@
 //! Sets of imprints, from disk to answer: volumes of images, constants in a twin, real grasps.
 
 use crate::common::{baseline, jobs, root, run, small_project, twin_at};
-use gripgen_identify::{SharedConstant, Verdict};
 use gripgen::record::{RunFolder, ShardReader, encode_png};
 use gripgen::twin::{Jaw, Twin};
 use gripgen::{Location, load_twin_document};
@@ -9,6 +8,7 @@ use gripgen_cli::{
     LoadImprintsError, calibrate_imprint_table, compare_imprint_table, diagnose_imprint_table,
     edited_twin_toml, imprint_calibration_edits, load_imprint_set, load_twin_sensor,
 };
+use gripgen_identify::{SharedConstant, Verdict};
 use std::fmt::Write as _;
 use std::path::Path;
 

@@ -4,9 +4,9 @@
 mod lab;
 
 use crate::common::{baseline, library, slow, twin_at};
-use gripgen_identify::pulls::calibrate::{CalibrateRequest, PullCalibration};
 use gripgen::twin::config::Feedback;
 use gripgen_cli::calibrate_twin;
+use gripgen_identify::pulls::calibrate::{CalibrateRequest, PullCalibration};
 use lab::{Contact, Plan, World, campaign};
 
 fn world(index: u64, contact: Contact, kinetic_ratio: f64) -> World {

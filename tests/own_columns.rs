@@ -1,9 +1,9 @@
 //! Columns that gripgen does not know: a diagnosis writes a table over them, and a sweep draws them for it.
 
 use crate::common::{jobs, project, run};
-use gripgen_identify::Verdict;
 use gripgen::twin::draw::Drawn;
 use gripgen::{LoadError, Location, Project};
+use gripgen_identify::Verdict;
 use gripgen_measured::{Suspects, load_pulls_with};
 
 const TABLE: &str =

@@ -2,8 +2,6 @@
 
 use crate::common::{baseline, library, project_in, twin_at, twin_with};
 use crate::diagnose::{diagnose, diagnose_with, names, simulated};
-use gripgen_identify::pulls::calibrate::CalibrateRequest;
-use gripgen_identify::{Diagnosis, Verdict};
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::{CAUSE_KEY, MeasuredPulls, Posterior, PosteriorDraw};
 use gripgen::{Location, Project, load_twin_document};
@@ -11,6 +9,8 @@ use gripgen_cli::{
     calibrate_twin, compare_pulls, compare_pulls_with, edited_twin, posterior_twins, pull_priors,
     shipped_priors,
 };
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::{Diagnosis, Verdict};
 use std::path::Path;
 
 /// A campaign of the simulator with what is kept of it.

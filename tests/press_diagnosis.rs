@@ -2,11 +2,11 @@
 
 use crate::common::root;
 use crate::presses::block;
-use gripgen_identify::{Diagnosis, Verdict};
 use gripgen::tactile::presses::{Circle, Indenter, IndenterPose, Press, PressContact, PressScene, PressSet};
 use gripgen::tactile::{Sensor, finish};
 use gripgen::twin::{OpticsState, TactileImage};
 use gripgen_cli::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses, measured_presses};
+use gripgen_identify::{Diagnosis, Verdict};
 use gripgen_measured::PressColumns;
 use std::sync::Arc;
 

@@ -3,11 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a measurement that cannot go on panics")]
 
 use crate::arguments;
-use gripgen_identify::pulls::priors::PullPriors;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{Campaign, MeasuredPulls, PlannedPull, Twin};
 use gripgen::{Library, Location, load_twin_document};
 use gripgen_cli::{shipped_priors, simulate_campaign};
+use gripgen_identify::pulls::priors::PullPriors;
 
 const TWIN: &str = "asset:configs/twin-baseline.toml";
 pub const PART: &str = "gear";

@@ -1,5 +1,6 @@
 //! What went wrong, for a person: place, both numbers, a hint, and an exit code.
 
+use crate::rig::OpenPlantError;
 use crate::{BenchError, LoadSensorError, RenderError};
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use gripgen::record::{ExportError, FolderError, ReadError};
@@ -7,7 +8,6 @@ use gripgen::tactile::gpu::GpuError;
 use gripgen::tactile::presses::HeightsError;
 use gripgen::twin::config::{ConfigError, Place};
 use gripgen::{LoadError, SweepError};
-use crate::rig::OpenPlantError;
 use std::fmt::Display;
 use std::io;
 

@@ -1,12 +1,12 @@
 //! A rig from Python: the functions that the command line calls, in the caller's thread with its signals.
 
 use crate::{error, values};
-use gripgen_measured::read_campaign;
 use gripgen_cli::Failure;
 use gripgen_cli::rig::{
     HowToPull, Permit, PullJob, PullOutcome, PullProgress, RigEvent, check_rig, load_rehearsal, load_rig,
     plan_pulls, plan_rehearsal, rehearsal_text, rehearse_rig,
 };
+use gripgen_measured::read_campaign;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;

@@ -9,14 +9,14 @@
 
 use crate::lab::{Contact, Plan, World, campaign};
 use crate::{StudyResult, arguments};
-use gripgen_identify::ParameterEstimate;
-use gripgen_identify::pulls::calibrate::CalibrateRequest;
 use gripgen::in_parallel;
 use gripgen::twin::Twin;
 use gripgen::twin::config::Feedback;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::{Library, Location, load_twin_document};
 use gripgen_cli::calibrate_twin;
+use gripgen_identify::ParameterEstimate;
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 

@@ -10,14 +10,14 @@
 
 use crate::lab::{Contact, Plan, World, campaign};
 use crate::{StudyResult, arguments};
-use gripgen_identify::pulls::calibrate::CalibrateRequest;
-use gripgen_identify::pulls::priors::{Prior, PullPriors};
 use gripgen::in_parallel;
 use gripgen::twin::config::Feedback;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{MeasuredPulls, Twin};
 use gripgen::{Library, Location, load_twin_document};
 use gripgen_cli::{calibrate_twin, compare_pulls_with, edited_twin, shipped_priors};
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::pulls::priors::{Prior, PullPriors};
 use std::sync::Mutex;
 
 const TWIN: &str = "asset:configs/twin-baseline.toml";

@@ -10,10 +10,10 @@
 
 use crate::StudyResult;
 use crate::truth::{Given, PART, Truth, asked};
-use gripgen_identify::pulls::calibrate::CalibrateRequest;
 use gripgen::in_parallel;
 use gripgen::twin::Posterior;
 use gripgen_cli::calibrate_twin;
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
 use std::sync::Mutex;
 
 const BINS: usize = 10;

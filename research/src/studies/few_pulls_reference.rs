@@ -10,12 +10,12 @@
 
 use crate::StudyResult;
 use crate::truth::{Given, PART, Truth, asked};
-use gripgen_identify::pulls::calibrate::CalibrateRequest;
-use gripgen_identify::pulls::few::FewDensity;
-use gripgen_identify::pulls::priors::PullPriors;
 use gripgen::in_parallel;
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen_cli::{calibrate_twin, with_few_density};
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::pulls::few::FewDensity;
+use gripgen_identify::pulls::priors::PullPriors;
 use std::sync::Mutex;
 
 /// Steps of a chain, of which the first third adapts its step and is left out.

@@ -5,8 +5,8 @@
 //! them lie in a temporary folder; none of the data is kept.
 
 use crate::{StudyResult, arguments};
-use gripgen_identify::{Diagnosis, HeldOutError, Verdict};
 use gripgen_cli::{calibrate_sensor_table, diagnose_sensor_table, load_sensor_table};
+use gripgen_identify::{Diagnosis, HeldOutError, Verdict};
 use gripgen_report::Plot;
 use std::error::Error;
 use std::fmt::Write as _;

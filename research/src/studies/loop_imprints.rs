@@ -5,8 +5,8 @@
 //! `soft`. `gripgen diagnose OUT/rigid` then says the same as the table. Nothing is written where the data are absent.
 
 use crate::{StudyResult, arguments};
-use gripgen_identify::{Diagnosis, ImprintDiagnosis, diagnose_imprints};
 use gripgen_cli::load_imprint_set;
+use gripgen_identify::{Diagnosis, ImprintDiagnosis, diagnose_imprints};
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -4,12 +4,12 @@
 //! (`../shared/real/taxim/gelsight` where it is left out). Writes `research/loop/presses.md` and its plots.
 
 use crate::{StudyResult, arguments};
-use gripgen_identify::{Diagnosis, HeldOutError, NamedEffect};
 use gripgen::tactile::presses::{CalibrateOptions, PressScene, PressSet, calibrate_presses, frame_mse};
 use gripgen::tactile::{Sensor, SensorFiles};
 use gripgen::twin::effects::{GripPoint, find};
 use gripgen::twin::{Covariates, Jaw, OpticsState};
 use gripgen_cli::{Diagnosed, PressDiagnosisInput, PressGeometry, diagnose_presses, load_presses};
+use gripgen_identify::{Diagnosis, HeldOutError, NamedEffect};
 use gripgen_report::Plot;
 use std::error::Error;
 use std::fmt::Write as _;

@@ -7,11 +7,11 @@
 //! the contacts. Nothing is written where the data are absent.
 
 use crate::{StudyResult, arguments};
-use gripgen_identify::{FitOptions, FreeParameter, fit};
 use gripgen::twin::effects::{GripPoint, find};
 use gripgen::twin::{Covariates, Jaw, Twin};
 use gripgen::{BASELINE_TWIN, Library, Location, load_twin_document};
 use gripgen_cli::{PullDiagnoseOptions, diagnose_pull_table};
+use gripgen_identify::{FitOptions, FreeParameter, fit};
 use gripgen_measured::load_pulls;
 use std::error::Error;
 use std::fmt::Write as _;

@@ -6,7 +6,6 @@
 //! N halves that are drawn, without any change; `--from K` begins with half K, so that a run can be continued.
 
 use crate::{StudyResult, arguments};
-use gripgen_identify::{Diagnosis, Verdict};
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::{CalibrateOptions, Press, PressSet, calibrate_presses};
 use gripgen::twin::TactileImage;
@@ -15,6 +14,7 @@ use gripgen_cli::{
     PressCovariate, PressDiagnosisInput, PressGeometry, PressValues, diagnose_presses, load_presses,
     presses_sha256,
 };
+use gripgen_identify::{Diagnosis, Verdict};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;

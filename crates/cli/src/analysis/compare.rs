@@ -3,8 +3,8 @@
 use crate::analysis::diagnose::{UnknownPartError, check_parts};
 use crate::analysis::expect::{Expectations, QuietTwin};
 use gripgen::Library;
-use gripgen_identify::share_below;
 use gripgen::in_parallel;
+use gripgen_identify::share_below;
 use gripgen_twin::{MeasuredPull, MeasuredPulls, PullTrace, Twin};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -4,9 +4,9 @@
 //! friction law on each cell, limit surface, reduced mechanics, force loop, wrist sensor. What a sample draws is averaged:
 //! the scatter of friction by quadrature, the noise of the readings by [`label_moments`].
 
-use gripgen::{Library, in_parallel};
 use gripgen::SampleError;
 use gripgen::{Indenter, answering_mass_kg, held, jaw_forces_n};
+use gripgen::{Library, in_parallel};
 use gripgen_physics::grip_point;
 use gripgen_physics::{
     Cache, Command, Held, JawFriction, PullPredictor, PullSession, Signals, SimulatePulls,
@@ -65,7 +65,8 @@ pub fn pull_predictor<'a>(
     library: &'a Library,
     jobs: usize,
 ) -> PullPredictor<'a> {
-    let simulator = Box::new(Simulated { expectations: Expectations::new(measured, library), jobs: jobs.max(1) });
+    let simulator =
+        Box::new(Simulated { expectations: Expectations::new(measured, library), jobs: jobs.max(1) });
     PullPredictor::new(measured, twin, answering_mass_kg(twin, library), simulator)
 }
 

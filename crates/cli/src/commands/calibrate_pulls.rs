@@ -9,9 +9,9 @@ use crate::{
     CalibratePullsError, ImprintCalibrations, calibrate_imprints, calibrate_twin, edited_twin_toml,
     pull_priors,
 };
+use gripgen::{Location, load_twin_document};
 use gripgen_identify::ParameterEstimate;
 use gripgen_identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
-use gripgen::{Location, load_twin_document};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::Path;

@@ -14,12 +14,12 @@ use crate::{
     find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, load_sensor_table,
     posterior_twins, unmeasured,
 };
-use gripgen_identify::{PartRatio, pull_ratios};
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{
     Press, PressComparison, PressScore, PressSet, Scores, compare_presses, predict_press,
 };
 use gripgen::{Location, load_twin_document};
+use gripgen_identify::{PartRatio, pull_ratios};
 use gripgen_measured::load_pulls_with;
 use gripgen_report::{ComparedPulls, PressPage, PressScores, PressShown, press_page, pull_comparison_page};
 use serde_json::{Map, Value, json};

@@ -322,8 +322,7 @@ mod tests {
         }
         let scenario = grip.scenario.clone();
         let twin = plant.twin();
-        let outcome =
-            gripgen::simulate(twin, &plant.project.library, &scenario, options(false), None);
+        let outcome = gripgen::simulate(twin, &plant.project.library, &scenario, options(false), None);
         let gripgen_twin::Outcome::Pulled(pulled) = outcome.unwrap() else { panic!("it slips") };
         let peak = pulled.trace.measured_force_n.iter().copied().fold(0.0, f64::max);
         assert_eq!(largest_n, peak);

@@ -7,13 +7,13 @@ use super::standing::CampaignClock;
 use super::{load_rehearsal, no_pose};
 use crate::failure::{Failure, another_run, code};
 use crate::output::program;
+use crate::rig::{plain_campaign, rig_run_differences, rig_run_toml};
+use gripgen::VERSION;
 use gripgen::record::{
     FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls,
     suspect_pulls, write_rig_pull,
 };
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
-use gripgen::VERSION;
-use crate::rig::{plain_campaign, rig_run_differences, rig_run_toml};
 use gripgen_report::publish_contact_sheet;
 use gripgen_rig::experiment::check::check;
 use gripgen_rig::experiment::prepare::Permit;

@@ -3,9 +3,9 @@
 use super::no_pose;
 use super::programs::checked_programs;
 use crate::failure::Failure;
-use gripgen::record::{RunFolder, sha256_hex};
-use gripgen::VERSION;
 use crate::rig::plain_campaign;
+use gripgen::VERSION;
+use gripgen::record::{RunFolder, sha256_hex};
 use gripgen_rig::experiment::check::{CheckLine, check};
 use gripgen_rig::experiment::rehearse::{SCHEMA, StoredRehearsal};
 use gripgen_rig::experiment::{Devices, RehearsalPlan, RigConfig, RigEvent, check_campaign, rehearse};

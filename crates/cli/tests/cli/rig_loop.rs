@@ -29,8 +29,7 @@ const MOST_SUSPECT: usize = 1;
 impl Loop {
     fn start(folder: &Path) -> Self {
         let rig = folder.join("rig.toml");
-        let serve =
-            ["--set", HIDDEN, "--speed", SPEED, "--seed", "5", "--write-rig", rig.to_str().unwrap()];
+        let serve = ["--set", HIDDEN, "--speed", SPEED, "--seed", "5", "--write-rig", rig.to_str().unwrap()];
         Self { _served: Served::start(&serve), rig, suspect: Cell::new(0) }
     }
 

@@ -8,10 +8,10 @@ use crate::output::program;
 use crate::outputs::{Outputs, is_special};
 use crate::shell;
 use crate::{NextPulls, unvaried};
-use gripgen_identify::{Channel, Diagnosis, Verdict};
 use gripgen::record::{RIG_SOURCE, RunFolder};
 use gripgen::twin::can_be_drawn;
 use gripgen::{BASELINE_TWIN, Location, Project};
+use gripgen_identify::{Channel, Diagnosis, Verdict};
 use gripgen_measured::campaign_toml;
 use std::path::{Path, PathBuf};
 

@@ -3,8 +3,8 @@
 use super::pose::GripAt;
 use gripgen::Library;
 use gripgen::SampleError;
-use gripgen::try_grip;
 use gripgen::in_parallel;
+use gripgen::try_grip;
 use gripgen_tactile::IndentError;
 use gripgen_twin::{Covariates, Part, PullSettings, Scenario, Twin};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! Presses, and what any set of effects makes of them, at the pixels that are looked at.
 
-use gripgen_identify::{ActingEffect, PRESS_ZONES, PredictPresses, PressPixels};
 use gripgen::in_parallel;
+use gripgen_identify::{ActingEffect, PRESS_ZONES, PredictPresses, PressPixels};
 use gripgen_tactile::Sensor;
 use gripgen_tactile::presses::{
     Circle, PressContact, PressScene, PressSet, PressView, ZONES, frame_mse, surface_part,

@@ -1,8 +1,8 @@
 use super::*;
 use crate::args::{Cli, Command};
 use clap::Parser;
-use gripgen_identify::DataSummary;
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
+use gripgen_identify::DataSummary;
 
 fn typed(words: &[&str]) -> DiagnoseArgs {
     let all = [&["gripgen", "diagnose"][..], words].concat();
