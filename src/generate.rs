@@ -17,7 +17,7 @@ use gripgen_twin::label_check::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
     FilmPace, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled, Sample, Scenario, TactileImage,
-    Twin, slip_label, table_factor,
+    Twin, slip_label,
 };
 use std::sync::Arc;
 
@@ -154,7 +154,7 @@ fn held_friction(
 ) -> Result<(PerJaw<JawFriction>, PerJaw<GripFriction>, f64), SampleError> {
     let patches = PerJaw::from_fn(|jaw| &contact.imprint[jaw].patch);
     let law = PatchFriction::new(twin, scenario, &patches)?;
-    let scatter = scatter(&twin.parts[&scenario.part], scenario) * table_factor(twin, scenario);
+    let scatter = scatter(&twin.parts[&scenario.part], scenario) * twin.table_factor(scenario);
     Ok((law.held(twin, scenario, &patches, scatter), law.law, scatter))
 }
 

@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[2]
 
 PACKAGES = [
     "crates/twin/src", "crates/physics/src", "crates/tactile/src", "crates/identify/src", "crates/record/src",
-    "crates/rig/src", "crates/rig_sim/src", "crates/cli/src", "crates/py/src", "src",
+    "crates/measured/src", "crates/report/src", "crates/rig/src", "crates/rig_sim/src", "crates/cli/src", "crates/py/src", "src",
 ]
 
 DEFINITION = re.compile(r"\b(?:fn|struct|enum|trait|const|type|static|macro_rules!)\s+([A-Za-z_]\w*)")

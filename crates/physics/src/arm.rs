@@ -10,7 +10,7 @@ mod placed;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use model::{ArmJoint, ArmMesh, ArmModel, LinkInertia};
+pub use model::{ArmJoint, ArmMesh, ArmModel, LinkInertia, UrdfError};
 pub use placed::{ArmError, PlacedArm};
 
 use crate::setup::{Arm, GripSetup};

@@ -4,6 +4,14 @@ use gripgen_twin::Robot;
 use gripgen_twin::config::Feedback;
 use std::collections::VecDeque;
 
+/// The plant of either mechanics after a time step.
+pub(crate) struct Motion {
+    pub(crate) contact_force_n: f64,
+    pub(crate) displacement_m: f64,
+    pub(crate) speed_m_per_s: f64,
+    pub(crate) sliding: bool,
+}
+
 /// State of the force loop, along the pull.
 ///
 /// ```text

@@ -53,10 +53,10 @@ mod twist;
 mod urdf;
 mod world;
 
-pub use arm::{ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm};
+pub use arm::{ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm, UrdfError};
 pub use cache::Cache;
 pub use cells::PullCells;
-pub use grip::{Grip, GripError, Held, grip};
+pub use grip::{Grip, Held, grip};
 pub use grip_capacity::PatchFriction;
 pub use jaw_friction::{FrictionCell, JawFriction};
 pub use limit_surface::{LimitCell, free_twist_capacity_n};
@@ -64,12 +64,11 @@ pub use predict::{PullPredictor, SimulatePulls, campaign_staircases, speed_limit
 pub use quasi_static::{QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
 pub use scenario::{creep_of, grip_point, pull_direction, sensor_chain};
 pub use session::{Command, PullError, PullSession, PullState, Signals};
-pub use setup::{Arm, GripSetup, Mount};
+pub use setup::{Arm, GripError, GripSetup, Mount};
 pub use shape::{PartShape, ShapeError};
 pub use staircase::{StaircaseResult, Until, pull_staircase, pull_staircase_seen, staircase_of};
 pub use surface::{LineHit, Surface, Window};
 pub use twist::{TwistCell, compliant_twist_capacity_n};
-pub use urdf::UrdfError;
 
 #[cfg(test)]
 mod tests;

@@ -2,9 +2,9 @@
 
 #[cfg(test)]
 use crate::contact::ContactForce;
+use crate::force_loop::Motion;
 use crate::jaw_friction::JawFriction;
 use crate::scene::SceneBodies;
-use crate::session::Motion;
 use crate::world::{NotFinite, World};
 #[cfg(test)]
 use gripgen_twin::Jaw;

@@ -17,8 +17,8 @@
 //! method inside a bracket finds the one solution, for any stiffness, and momentum balances to rounding.
 
 use crate::bristles::Bristles;
+use crate::force_loop::Motion;
 use crate::jaw_friction::JawFriction;
-use crate::session::Motion;
 use crate::world::NotFinite;
 use gripgen_twin::{Gel, PerJaw};
 

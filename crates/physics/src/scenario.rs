@@ -1,7 +1,7 @@
 //! What a scenario makes of a twin: direction, wrist sensor, creep, and the arguments of its effects.
 
 use gripgen_twin::effects::{Creep, GripPoint, SensorChain, creep};
-use gripgen_twin::{Jaw, PerJaw, Scenario, Twin, table_offset_n};
+use gripgen_twin::{Jaw, PerJaw, Scenario, Twin};
 
 /// Unit vector of the pull in `world`.
 pub fn pull_direction(scenario: &Scenario) -> [f64; 3] {
@@ -30,5 +30,5 @@ pub fn creep_of(twin: &Twin, scenario: &Scenario, force_n: &PerJaw<f64>) -> Cree
 pub fn sensor_chain(twin: &Twin, scenario: &Scenario) -> SensorChain {
     SensorChain::new(twin, &scenario.part, scenario.covariates.time_s)
         .along(scenario.covariates.pull_direction)
-        .plus(table_offset_n(twin, scenario))
+        .plus(twin.table_offset_n(scenario))
 }

@@ -2,7 +2,7 @@
 
 #[cfg(test)]
 use crate::contact::ContactForce;
-use crate::force_loop::ForceLoop;
+use crate::force_loop::{ForceLoop, Motion};
 use crate::jaw_friction::JawFriction;
 use crate::rapier_pull::RapierPull;
 use crate::reduced::ReducedPull;
@@ -63,14 +63,6 @@ pub struct PullState {
     pub speed_m_per_s: f64,
     /// Whether the jaws slide on the part.
     pub sliding: bool,
-}
-
-/// The plant of either mechanics after a time step.
-pub(crate) struct Motion {
-    pub(crate) contact_force_n: f64,
-    pub(crate) displacement_m: f64,
-    pub(crate) speed_m_per_s: f64,
-    pub(crate) sliding: bool,
 }
 
 /// A pull that cannot go on.

@@ -4,7 +4,7 @@ use crate::arm::PlacedArm;
 use crate::shape::PartShape;
 use gripgen_twin::config::Mechanics;
 use gripgen_twin::frames::Pose;
-use gripgen_twin::{Gel, Gripper, PerJaw, Robot, Wrist};
+use gripgen_twin::{Gel, Gripper, Jaw, PerJaw, Robot, Wrist};
 
 /// The arm of a grip.
 #[derive(Debug, Clone, Copy)]
@@ -54,4 +54,43 @@ pub struct GripSetup<'a> {
     pub direction: [f64; 3],
     /// What else holds the part. The arm carries the gripper's own weight.
     pub mount: Mount,
+}
+
+/// Why a grip failed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GripError {
+    /// The part does not fit between the open jaws.
+    #[error("the part reaches beyond the open {jaw} jaw: the gripper opens to {opening_mm:.1} mm")]
+    TooWide {
+        /// Jaw that the part overlaps.
+        jaw: Jaw,
+        /// Opening between the gels.
+        opening_mm: f64,
+    },
+    /// The jaws did not come to rest.
+    #[error(
+        "the grip did not settle in {time_s} s: the {jaw} jaw presses with {normal_n:.4} N instead of {wanted_n} N"
+    )]
+    NotSettled {
+        /// Jaw farthest from its force.
+        jaw: Jaw,
+        /// Its normal force.
+        normal_n: f64,
+        /// Commanded force.
+        wanted_n: f64,
+        /// Time given.
+        time_s: f64,
+    },
+    /// The contact geometry is not supported by the engine.
+    #[error("the contact shape cannot be gripped: {0}")]
+    Shape(String),
+    /// The engine lost a body to a non-finite number.
+    #[error("{bodies} bodies became non-finite {time_s:.3} s into the grip")]
+    NotFinite {
+        /// Bodies concerned.
+        bodies: usize,
+        /// Time since the jaws began to close.
+        time_s: f64,
+    },
 }

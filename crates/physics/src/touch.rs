@@ -6,8 +6,8 @@
 //! add to the friction force. Else the engine gets a plate in front of each pad.
 
 use crate::convert::rapier_pose;
-use crate::grip::GripError;
 use crate::scene::pad_shape;
+use crate::setup::GripError;
 use crate::setup::GripSetup;
 use crate::surface::Window;
 use gripgen_twin::frames::{Pose, world_from_gel};

@@ -1,15 +1,10 @@
 //! An arm from URDF text: one chain of revolute joints with the inertia of what each joint moves.
 
-use crate::arm::{ArmJoint, ArmMesh, ArmModel, LinkInertia};
+use crate::arm::{ArmJoint, ArmMesh, ArmModel, LinkInertia, UrdfError};
 use gripgen_twin::frames::{Pose, pose, rotation_from_fixed_xyz};
 use nalgebra::{Matrix3, Unit, Vector3};
 use std::collections::BTreeMap;
 use urdf_rs::{Geometry, Joint, JointType, Link, Robot};
-
-/// Why a URDF is no arm.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct UrdfError(pub(crate) String);
 
 impl ArmModel {
     /// Reads the chain that ends at link `tip`.

@@ -1,7 +1,7 @@
 //! From a sample to the messages of a shard.
 
 use crate::background::Background;
-use crate::film::EncodedFrame;
+use crate::film_frame::EncodedFrame;
 use crate::index::index_row;
 use crate::picture::{PictureError, encode_png, encode_small_png, encode_smallest_png};
 use crate::proto::foxglove::{CompressedImage, RawImage};

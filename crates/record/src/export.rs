@@ -2,7 +2,7 @@
 
 use crate::dataset::DatasetError;
 use crate::encode::{EncodedSample, state_messages, timestamp};
-use crate::film::EncodedFrame;
+use crate::film_frame::EncodedFrame;
 use crate::picture::encode_png;
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::{FilmFrame, PullTrace, Sample};

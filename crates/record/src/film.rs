@@ -1,6 +1,7 @@
 //! Films of pulls: to the messages of a shard and back.
 
 use crate::encode::{image_message, timestamp};
+use crate::film_frame::{EncodedFrame, film_topic, label_topic};
 use crate::picture::{PictureError, decode_grey, encode_grey};
 use crate::proto::gripgen_v1 as proto;
 use crate::reader::{ReadError, ShardReader, png_image, raw_image};
@@ -9,40 +10,6 @@ use gripgen_twin::config::ImageStorage;
 use gripgen_twin::{CellShear, FilmFrame, Jaw, PerJaw, SlipState, TactileImage};
 use image::ExtendedColorType;
 use prost::Message;
-
-/// Topic of the images of a jaw's film.
-pub(crate) fn film_topic(jaw: Jaw) -> &'static str {
-    match jaw {
-        Jaw::Left => "/tactile/left/film",
-        Jaw::Right => "/tactile/right/film",
-    }
-}
-
-/// Topic of what is known beside them.
-pub(crate) fn label_topic(jaw: Jaw) -> &'static str {
-    match jaw {
-        Jaw::Left => "/tactile/left/film_labels",
-        Jaw::Right => "/tactile/right/film_labels",
-    }
-}
-
-/// A frame of both jaws as the messages of a shard.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EncodedFrame {
-    /// Time in the file.
-    pub time_ns: u64,
-    /// Images.
-    pub image: PerJaw<Vec<u8>>,
-    /// What is known beside them.
-    pub labels: PerJaw<Vec<u8>>,
-}
-
-impl EncodedFrame {
-    /// Size of its messages.
-    pub fn bytes(&self) -> usize {
-        self.image.iter().chain(self.labels.iter()).map(|(_, message)| message.len()).sum()
-    }
-}
 
 /// What all frames of a film share.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -22,6 +22,7 @@ mod dataset;
 mod encode;
 mod export;
 mod film;
+mod film_frame;
 mod folder;
 mod frame;
 mod index;
@@ -43,7 +44,8 @@ pub use background::Background;
 pub use dataset::{Dataset, DatasetError, MeasuredRows, NoiseMode, PictureFileError, ReadImages, Table};
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportDatasetError, ExportError, ExportOptions, export_sample};
-pub use film::{EncodedFrame, Film, FilmOptions, encode_frame};
+pub use film::{Film, FilmOptions, encode_frame};
+pub use film_frame::EncodedFrame;
 pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
     sha256_hex,

@@ -2,7 +2,7 @@
 
 use crate::background::Background;
 use crate::encode::EncodedSample;
-use crate::film::{film_topic, label_topic};
+use crate::film_frame::{film_topic, label_topic};
 use crate::picture::{PictureError, encode_small_png};
 use crate::proto::{
     COMPRESSED_IMAGE_DESCRIPTOR, FILM_DESCRIPTOR, PULL_DESCRIPTOR, RAW_IMAGE_DESCRIPTOR, RIG_DESCRIPTOR,

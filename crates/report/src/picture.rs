@@ -1,6 +1,6 @@
 //! Pictures for people: what a run, a sample or a part looks like; and what they are drawn with.
 
-mod canvas;
+pub(crate) mod canvas;
 mod colours;
 mod film;
 pub(crate) mod grips;

@@ -22,7 +22,13 @@ mod source_tests;
 #[cfg(test)]
 mod tests;
 
-pub use crate::gpu_types::{AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRequest, makes};
+pub use crate::gpu_types::{AdapterChoice, GpuAdapter, GpuError, GpuImage, makes};
+
+/// A part pressed into a gel on the device.
+pub type GpuPress<'a> = crate::gpu_types::Press<&'a GpuMesh>;
+
+/// One image to make on the device.
+pub type GpuRequest<'a> = crate::gpu_types::Request<&'a GpuMesh>;
 pub use batch::{GpuMesh, GpuSensor};
 pub use source::Variant;
 

@@ -1,6 +1,12 @@
 //! A build without the feature `gpu`: no adapter can be opened, so that there is no value of any type of a device.
 
-pub use crate::gpu_types::{AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuPress, GpuRequest, makes};
+pub use crate::gpu_types::{AdapterChoice, GpuAdapter, GpuError, GpuImage, makes};
+
+/// A part pressed into a gel on the device.
+pub type GpuPress<'a> = crate::gpu_types::Press<&'a GpuMesh>;
+
+/// One image to make on the device.
+pub type GpuRequest<'a> = crate::gpu_types::Request<&'a GpuMesh>;
 
 use crate::indent::IndentError;
 use crate::sensor::Sensor;

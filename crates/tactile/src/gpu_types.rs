@@ -1,6 +1,5 @@
 //! What a graphics processor is asked for and why there is none: the types that are there with and without the feature `gpu`.
 
-use crate::gpu::GpuMesh;
 use crate::sensor::Sensor;
 use gripgen_twin::Gel;
 use gripgen_twin::config::GelModel;
@@ -124,9 +123,9 @@ pub fn makes(sensor: &Sensor, gel: &Gel) -> bool {
 
 /// A part pressed into a gel.
 #[derive(Clone, Copy)]
-pub struct GpuPress<'a> {
+pub struct Press<Mesh> {
     /// The part.
-    pub mesh: &'a GpuMesh,
+    pub mesh: Mesh,
     /// Where it is.
     pub gel_from_mesh: Pose,
     /// Imprint constant c of `V = c F`.
@@ -136,12 +135,18 @@ pub struct GpuPress<'a> {
 }
 
 /// One image to make.
-#[derive(Clone, Copy, Default)]
-pub struct GpuRequest<'a> {
+#[derive(Clone, Copy)]
+pub struct Request<Mesh> {
     /// The press; the gel at rest without one.
-    pub press: Option<GpuPress<'a>>,
+    pub press: Option<Press<Mesh>>,
     /// Which noise; none without a key.
     pub noise_key: Option<u64>,
+}
+
+impl<Mesh> Default for Request<Mesh> {
+    fn default() -> Self {
+        Self { press: None, noise_key: None }
+    }
 }
 
 /// One image as it comes back.

@@ -111,7 +111,7 @@ impl Expected {
             noise_n: Some(twin.wrist.noise_n),
             lag_s: Some(lag_s),
             own_effects: twin.effects.iter().filter(acts).any(shapes_trace)
-                || crate::table_offset_n(twin, scenario) != 0.0
+                || twin.table_offset_n(scenario) != 0.0
                 || trails_n > 0.5 * pull.label_tolerance_n,
         }
     }

@@ -91,7 +91,7 @@ pub use scenario::{Covariates, PullSettings, Scenario};
 pub use scenario_keys::{can_be_drawn, is_own_column, pull_keys, scenario_keys};
 pub use staircase::{Staircase, StaircaseCursor};
 pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep};
-pub use table::{TABLE_EFFECT, Table, TableTarget, table_factor, table_offset_n};
+pub use table::{TABLE_EFFECT, Table, TableTarget};
 pub use trace::{PullTrace, TraceRow};
 pub use twin::{Elastic, Gel, Gripper, LARGEST_MU, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist};
 pub use values::Values;

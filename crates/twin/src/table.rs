@@ -4,11 +4,11 @@
 //! over one covariate. It repeats what was seen and says nothing about why: it is marked `physical = false`, and outside
 //! its range it is held.
 
+use crate::Values;
 use crate::columns::{self, Column, PullView};
 use crate::config::{ConfigError, EffectFile, TwinFile, in_range};
 use crate::draw::Drawn;
 use crate::effects::{OutsideFit, Per};
-use crate::{Scenario, Twin, Values};
 
 /// The `name` of a table among the effects of a twin file. It is not in the library.
 pub const TABLE_EFFECT: &str = "table";
@@ -83,18 +83,6 @@ impl Table {
         };
         self.value(&at)
     }
-}
-
-/// By what the tables of a twin multiply the friction of a pull; 1 without any.
-pub fn table_factor(twin: &Twin, scenario: &Scenario) -> f64 {
-    let factors = twin.tables.iter().filter(|t| t.target == TableTarget::Factor);
-    factors.filter_map(|t| t.at(scenario.view())).product()
-}
-
-/// What the tables of a twin add to the readings of the wrist sensor, in newtons; 0 without any.
-pub fn table_offset_n(twin: &Twin, scenario: &Scenario) -> f64 {
-    let offsets = twin.tables.iter().filter(|t| t.target == TableTarget::Offset);
-    offsets.filter_map(|t| t.at(scenario.view())).fold(0.0, |sum, x| sum + x)
 }
 
 /// Linear between the points, held outside.
@@ -291,6 +279,7 @@ fn distinct(value: &toml::Value, key: &str) -> Result<Vec<String>, ConfigError> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Scenario;
     use crate::effects::testing::twin;
     use crate::{Covariates, PullSettings, TWIN_SCHEMA};
 
@@ -308,7 +297,7 @@ mod tests {
     fn a_table_is_linear_between_its_points_and_held_outside() {
         let twin = twin(HUMIDITY).unwrap();
         assert!(twin.effects.is_empty() && twin.tables.len() == 1);
-        let at = |x: f64| table_factor(&twin, &scenario("rod", &[("humidity_pct", Drawn::Number(x))]));
+        let at = |x: f64| twin.table_factor(&scenario("rod", &[("humidity_pct", Drawn::Number(x))]));
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
         close(at(30.0), 1.0);
         close(at(35.0), 1.1);
@@ -316,8 +305,8 @@ mod tests {
         close(at(50.0), 1.0);
         close(at(-5.0), 1.0);
         close(at(90.0), 0.8);
-        close(table_factor(&twin, &scenario("rod", &[])), 1.0);
-        close(table_factor(&twin, &scenario("rod", &[("humidity_pct", Drawn::Text("wet".into()))])), 1.0);
+        close(twin.table_factor(&scenario("rod", &[])), 1.0);
+        close(twin.table_factor(&scenario("rod", &[("humidity_pct", Drawn::Text("wet".into()))])), 1.0);
     }
 
     #[test]
@@ -329,7 +318,7 @@ mod tests {
             twin(&text).unwrap()
         };
         let rod = scenario("rod", &[]);
-        let factor = |covariate, axis| table_factor(&table(covariate, axis, "factor = [0.5, 1.5]"), &rod);
+        let factor = |covariate, axis| table(covariate, axis, "factor = [0.5, 1.5]").table_factor(&rod);
         assert_eq!(factor("session", "words = [\"1\", \"2\"]"), 1.5);
         assert_eq!(factor("session", "words = [\"1\", \"3\"]"), 1.0, "another word");
         assert_eq!(factor("force_increment_n", "x = [0.5, 1]"), 0.5);
@@ -337,9 +326,9 @@ mod tests {
         assert_eq!(factor("grip_force_n", "x = [20, 60]"), 1.0);
         assert!((factor("grip_offset_mm", "x = [0, 6]") - 1.0).abs() < 1e-12);
         let offset = table("part", "words = [\"rod\", \"plate\"]", "offset_n = [0.7, -0.2]");
-        assert_eq!((table_factor(&offset, &rod), table_offset_n(&offset, &rod)), (1.0, 0.7));
+        assert_eq!((offset.table_factor(&rod), offset.table_offset_n(&rod)), (1.0, 0.7));
         let own = table("dwell_s", "x = [1]", "factor = [2.0]\npart = \"plate\"");
-        assert_eq!((table_factor(&own, &rod), table_factor(&own, &scenario("plate", &[]))), (1.0, 2.0));
+        assert_eq!((own.table_factor(&rod), own.table_factor(&scenario("plate", &[]))), (1.0, 2.0));
     }
 
     /// A product is that of both columns about their centres.
@@ -349,7 +338,7 @@ mod tests {
                     x = [-100, 100]\nfactor = [0.9, 1.1]\nphysical = false\n";
         let twin_of = |text: &str| twin(text);
         let made = twin_of(text).unwrap();
-        let at = |x: f64| table_factor(&made, &scenario("rod", &[("humidity_pct", Drawn::Number(x))]));
+        let at = |x: f64| made.table_factor(&scenario("rod", &[("humidity_pct", Drawn::Number(x))]));
         // The grip is 40 N: (40 - 30) (55 - 50) = 50.
         assert!(
             (at(55.0) - 1.05).abs() < 1e-12 && (at(45.0) - 0.95).abs() < 1e-12,
@@ -357,7 +346,7 @@ mod tests {
             at(55.0),
             at(45.0)
         );
-        assert_eq!(table_factor(&made, &scenario("rod", &[])), 1.0, "nobody wrote it down");
+        assert_eq!(made.table_factor(&scenario("rod", &[])), 1.0, "nobody wrote it down");
         for (from, to, key) in [
             ("centre = [30, 50]\n", "", "effects[0].centre"),
             ("[30, 50]", "[30]", "effects[0].centre"),
@@ -375,7 +364,7 @@ mod tests {
         let made = |only: &str| twin(&HUMIDITY.replace("physical", &format!("where = {only}\nphysical")));
         let wet = [("humidity_pct", Drawn::Number(40.0)), ("operator", Drawn::Text("ann".into()))];
         let rod = scenario("rod", &wet);
-        let factor = |only: &str| table_factor(&made(only).unwrap(), &rod);
+        let factor = |only: &str| made(only).unwrap().table_factor(&rod);
         assert_eq!(factor("{ session = \"2\" }"), 1.2);
         assert_eq!(factor("{ session = \"3\" }"), 1.0);
         assert_eq!(factor("{ session = \"2\", operator = \"ann\" }"), 1.2);

@@ -7,8 +7,8 @@ use crate::config::{
 };
 use crate::effects::{self, Effect};
 use crate::frames::{Pose, pose};
-use crate::table::{TABLE_EFFECT, Table, check_table};
-use crate::{Jaw, PerJaw};
+use crate::table::{TABLE_EFFECT, Table, TableTarget, check_table};
+use crate::{Jaw, PerJaw, Scenario};
 pub use check::LARGEST_MU;
 use check::{check_arm, check_effect, check_gel, check_part, check_twist};
 use nalgebra::Vector3;
@@ -187,6 +187,18 @@ pub struct Part {
 }
 
 impl Twin {
+    /// By what the tables multiply the friction of a pull; 1 without any.
+    pub fn table_factor(&self, scenario: &Scenario) -> f64 {
+        let factors = self.tables.iter().filter(|t| t.target == TableTarget::Factor);
+        factors.filter_map(|t| t.at(scenario.view())).product()
+    }
+
+    /// What the tables add to the readings of the wrist sensor, in newtons; 0 without any.
+    pub fn table_offset_n(&self, scenario: &Scenario) -> f64 {
+        let offsets = self.tables.iter().filter(|t| t.target == TableTarget::Offset);
+        offsets.filter_map(|t| t.at(scenario.view())).fold(0.0, |sum, x| sum + x)
+    }
+
     /// Checks a file's values and converts them. Errors name the key.
     ///
     /// # Errors

@@ -15,7 +15,7 @@ use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::rounded;
 use gripgen_twin::{
     Campaign, Covariates, MeasuredPull, MeasuredPulls, Outcome, PULLS_SINCE_REST, PlannedPull, PullKind,
-    PullTrace, RestCount, Scenario, TraceRow, Twin, table_offset_n,
+    PullTrace, RestCount, Scenario, TraceRow, Twin,
 };
 
 /// Time between readings of a stored trace; the label is taken at the full rate.
@@ -204,7 +204,7 @@ fn stored(twin: &Twin, scenario: &Scenario, trace: &PullTrace) -> PullTrace {
     let c = &scenario.covariates;
     let mut sensor = SensorChain::new(twin, &scenario.part, c.time_s)
         .along(c.pull_direction)
-        .plus(table_offset_n(twin, scenario));
+        .plus(twin.table_offset_n(scenario));
     // The noise of the pull itself is lane 0.
     let mut noise = Stream::with_lane(scenario.seed, scenario.index, Purpose::ForceNoise, 1);
     let before = (NO_LOAD_S / step_s).round() as usize;

@@ -20,7 +20,6 @@ use gripgen_twin::label_moments::label_moments;
 use gripgen_twin::random::{Purpose, Stream, normal_quantile};
 use gripgen_twin::{
     ContactPatch, Jaw, MeasuredPull, MeasuredPulls, PerJaw, PullSettings, Scenario, Staircase, Twin,
-    table_factor,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -203,7 +202,7 @@ impl<'a> Expectations<'a> {
     ) -> (Expected, LabelCurve) {
         let mut curve = LabelCurve::new();
         let Ok(prepared) = self.prepared(quiet, row) else { return (Expected::default(), curve) };
-        let factor = factor * table_factor(&quiet.twin, &prepared.scenario);
+        let factor = factor * quiet.twin.table_factor(&prepared.scenario);
         let part = &quiet.twin.parts[&prepared.scenario.part];
         let mean = prepared.friction(&quiet.twin, factor);
         let limit_n = mean.left.limit_n() + mean.right.limit_n();
@@ -238,7 +237,7 @@ impl<'a> Expectations<'a> {
     /// Readings of the pull at `row` without scatter and noise, to its end, its friction multiplied by `factor`.
     pub(crate) fn readings(&self, quiet: &QuietTwin, row: usize, factor: f64) -> Readings {
         let Ok(prepared) = self.prepared(quiet, row) else { return Readings::default() };
-        let factor = factor * table_factor(&quiet.twin, &prepared.scenario);
+        let factor = factor * quiet.twin.table_factor(&prepared.scenario);
         let friction = prepared.friction(&quiet.twin, factor);
         self.pull(quiet, row, &prepared, &friction, f64::INFINITY).unwrap_or_default()
     }

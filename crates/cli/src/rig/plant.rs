@@ -11,9 +11,7 @@ use gripgen_twin::effects::SensorChain;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::plant::{EmptyGrip, Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
 use gripgen_twin::random::{Purpose, Stream};
-use gripgen_twin::{
-    Covariates, PULLS_SINCE_REST, PerJaw, RestCount, Scenario, TactileImage, Twin, table_offset_n,
-};
+use gripgen_twin::{Covariates, PULLS_SINCE_REST, PerJaw, RestCount, Scenario, TactileImage, Twin};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::fmt::Display;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -157,7 +155,7 @@ impl Plant for TwinPlant {
     fn offset_n(&self, time_s: f64) -> f64 {
         let (twin, scenario) = (&self.project.twin, self.at_rest(time_s));
         let chain = SensorChain::new(twin, &scenario.part, time_s);
-        chain.along(1.0).plus(table_offset_n(twin, &scenario)).read(0.0, 0.0, 0.0)
+        chain.along(1.0).plus(twin.table_offset_n(&scenario)).read(0.0, 0.0, 0.0)
     }
 
     fn noise_n(&self, tick: u64) -> f64 {

@@ -1,8 +1,12 @@
 //! A serial arm: joints, inertias, forward kinematics.
 
-use crate::urdf::UrdfError;
 use gripgen_twin::frames::Pose;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+/// Why a URDF is no arm.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct UrdfError(pub(crate) String);
 
 /// A serial arm: all that its motion depends on, checked.
 #[derive(Debug, Clone, PartialEq)]

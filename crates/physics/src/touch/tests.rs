@@ -1,7 +1,7 @@
 //! Jaws on parts whose convex hull is not what the pads meet.
 
 use crate::grip::Grip;
-use crate::grip::GripError;
+use crate::setup::GripError;
 use crate::shape::PartShape;
 use crate::surface::Surface;
 use crate::tests::Bench;

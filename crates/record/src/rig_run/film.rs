@@ -1,7 +1,7 @@
 //! Films of measured pulls: frames as the cameras sent them, with stamps.
 
 use crate::encode::timestamp;
-use crate::film::EncodedFrame;
+use crate::film_frame::EncodedFrame;
 use crate::picture::decode;
 use crate::proto::foxglove::CompressedImage;
 use crate::proto::gripgen_v1 as proto;

@@ -5,6 +5,10 @@ use gripgen_twin::TactileImage;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
+/// Space around and between what a picture shows, and height of a caption, in pixels.
+pub(crate) const MARGIN: u32 = 16;
+pub(crate) const CAPTION: u32 = 24;
+
 /// A colour: red, green, blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rgb(pub u8, pub u8, pub u8);
@@ -165,4 +169,28 @@ fn paint(c: Rgb) -> Paint<'static> {
     paint.set_color(colour(c));
     paint.anti_alias = true;
     paint
+}
+
+/// An image of another size: each pixel is the mean of those that it covers.
+pub(crate) fn averaged(image: &TactileImage, (width_px, height_px): (u32, u32)) -> TactileImage {
+    let span = |i: u32, n: u32, of: u32| {
+        let step = f64::from(of) / f64::from(n);
+        let from = (f64::from(i) * step) as u32;
+        from.min(of - 1)..((f64::from(i + 1) * step).ceil() as u32).clamp(from + 1, of)
+    };
+    let mut rgb = Vec::with_capacity((3 * width_px * height_px) as usize);
+    for row in 0..height_px {
+        for column in 0..width_px {
+            let (mut sum, mut count) = ([0_u32; 3], 0);
+            for v in span(row, height_px, image.height_px) {
+                for u in span(column, width_px, image.width_px) {
+                    let pixel = image.pixel(u, v);
+                    (0..3).for_each(|c| sum[c] += u32::from(pixel[c]));
+                    count += 1;
+                }
+            }
+            rgb.extend(sum.map(|s| (s / count) as u8));
+        }
+    }
+    TactileImage { width_px, height_px, rgb }
 }

@@ -1,8 +1,7 @@
 //! A strip of frames of a filmed pull: what the cameras see, and which part of the contact has slipped.
 
-use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
+use super::canvas::{Anchor, CAPTION, Canvas, MARGIN, Rgb, TextStyle};
 use super::colours::{INK, SLIP};
-use super::layout::{CAPTION, MARGIN};
 use crate::text::spread;
 use gripgen_record::Film;
 use gripgen_twin::{FilmFrame, Jaw, PerJaw};

@@ -1,6 +1,6 @@
 //! What the pictures of a sample and of a measured pull share.
 
-use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
+use super::canvas::{Anchor, CAPTION, Canvas, MARGIN, Rgb, TextStyle};
 use super::colours::{COMMAND, DISPLACEMENT, INK, MEASURED, PANEL, PAPER, SLIP, SOFT_INK};
 use super::film::{STRIP_HEIGHT, draw_strip};
 use super::plot::{Area, Curve, pull_curve};
@@ -9,10 +9,8 @@ use gripgen_record::proto::gripgen_v1::Sample;
 use gripgen_record::{Film, Record};
 use gripgen_twin::TactileImage;
 
-pub(crate) const MARGIN: u32 = 16;
 pub(crate) const IMAGE: (u32, u32) = (400, 300);
 pub(crate) const HEADER: u32 = 64;
-pub(crate) const CAPTION: u32 = 24;
 /// Height of a row of images with their captions.
 pub(crate) const ROW: u32 = CAPTION + IMAGE.1 + MARGIN;
 const CURVE_HEIGHT: u32 = 380;
@@ -126,28 +124,4 @@ pub(super) fn placement(size: (u32, u32)) -> (f64, u32, u32) {
     let zoom = (f64::from(IMAGE.0) / f64::from(size.0)).min(f64::from(IMAGE.1) / f64::from(size.1));
     let rest = |frame: u32, n: u32| ((f64::from(frame) - f64::from(n) * zoom) / 2.0).max(0.0) as u32;
     (zoom, rest(IMAGE.0, size.0), rest(IMAGE.1, size.1))
-}
-
-/// An image of another size: each pixel is the mean of those that it covers.
-pub(crate) fn averaged(image: &TactileImage, (width_px, height_px): (u32, u32)) -> TactileImage {
-    let span = |i: u32, n: u32, of: u32| {
-        let step = f64::from(of) / f64::from(n);
-        let from = (f64::from(i) * step) as u32;
-        from.min(of - 1)..((f64::from(i + 1) * step).ceil() as u32).clamp(from + 1, of)
-    };
-    let mut rgb = Vec::with_capacity((3 * width_px * height_px) as usize);
-    for row in 0..height_px {
-        for column in 0..width_px {
-            let (mut sum, mut count) = ([0_u32; 3], 0);
-            for v in span(row, height_px, image.height_px) {
-                for u in span(column, width_px, image.width_px) {
-                    let pixel = image.pixel(u, v);
-                    (0..3).for_each(|c| sum[c] += u32::from(pixel[c]));
-                    count += 1;
-                }
-            }
-            rgb.extend(sum.map(|s| (s / count) as u8));
-        }
-    }
-    TactileImage { width_px, height_px, rgb }
 }

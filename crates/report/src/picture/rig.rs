@@ -1,7 +1,8 @@
 //! A measured pull in full: images before and in the grip, their difference, pull curve.
 
+use super::canvas::MARGIN;
 use super::canvas::{Canvas, Rgb};
-use super::layout::{HEADER, IMAGE, MARGIN, ROW, fit, frame, framed, sample_sheet};
+use super::layout::{HEADER, IMAGE, ROW, fit, frame, framed, sample_sheet};
 use gripgen_record::{Film, Record};
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 
@@ -56,7 +57,7 @@ fn difference(grip: [u8; 3], rest: [u8; 3]) -> Rgb {
 
 #[cfg(test)]
 mod tests {
-    use super::super::layout::CAPTION;
+    use super::super::canvas::CAPTION;
     use super::*;
     use gripgen_record::decode_picture;
     use gripgen_record::proto::gripgen_v1::{Sample, Status};

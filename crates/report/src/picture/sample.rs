@@ -1,8 +1,9 @@
 //! One sample in full: images, height, pressure, pull curve.
 
 use super::canvas::Canvas;
+use super::canvas::{CAPTION, MARGIN};
 use super::colours::{SLIP, scale};
-use super::layout::{CAPTION, HEADER, IMAGE, MARGIN, fit, frame, framed, placement, sample_sheet};
+use super::layout::{HEADER, IMAGE, fit, frame, framed, placement, sample_sheet};
 use super::rig::rig_picture;
 use gripgen_record::proto::gripgen_v1::JawContact;
 use gripgen_record::{FolderError, RIG_SOURCE, ReadError, Record, RunFolder, ShardReader};

@@ -1,8 +1,7 @@
 //! The contact sheet: a few samples of a run at a glance.
 
-use super::canvas::{Anchor, Canvas, Rgb, TextStyle};
+use super::canvas::{Anchor, Canvas, Rgb, TextStyle, averaged};
 use super::colours::{FAILED, INK, PANEL, PAPER, SOFT_INK};
-use super::layout::averaged;
 use super::plot::{Area, Curve, pull_curve};
 use crate::text::{spread, wrapped};
 use gripgen_record::proto::gripgen_v1::{Sample, Status};

@@ -2,8 +2,9 @@
 
 use super::{FrictionRange, GripTried, TriedPart};
 use crate::Rasterise;
+use crate::picture::canvas::{CAPTION, MARGIN};
 use crate::picture::grips::{PANEL as DRAWING, panel};
-use crate::picture::layout::{CAPTION, HEADER, IMAGE, MARGIN, ROW as IMAGES, framed};
+use crate::picture::layout::{HEADER, IMAGE, ROW as IMAGES, framed};
 use crate::picture::{Anchor, Area, Canvas, FAILED, INK, MEASURED, PANEL, PAPER, SOFT_INK, TextStyle, axes};
 use crate::text::wrapped;
 use gripgen_twin::Jaw;

@@ -2,7 +2,7 @@
 
 use super::expected::Expected;
 use super::rows::Rows;
-use crate::picture::layout::averaged;
+use crate::picture::canvas::averaged;
 use crate::text::{clean, data_url};
 use gripgen_record::{Dataset, DatasetError, encode_jpeg};
 use gripgen_twin::{Jaw, PullTrace, TraceRow, Values, rounded};
