@@ -1,4 +1,4 @@
-//! What is handed out: a wheel and a static binary, both with everything in them, and both tried where there is no Rust.
+//! What is handed out: a wheel with everything in it and a static binary with all but the gpu backend, both tried where there is no Rust.
 
 use crate::{cargo, is_root, python, root, run};
 use std::path::{Path, PathBuf};
@@ -42,8 +42,8 @@ fn build_wheel(target: &Path, folder: &Path) -> Result<PathBuf, String> {
 }
 
 fn build_binary(target: &Path, folder: &Path) -> Result<PathBuf, String> {
-    let selection =
-        ["--release", "--locked", "--package", "gripgen-cli", "--features", "gpu", "--target", TARGET];
+    // Without the feature `gpu`: a static program cannot load the system's Vulkan driver.
+    let selection = ["--release", "--locked", "--package", "gripgen-cli", "--target", TARGET];
     let mut build = cargo(&["build"]);
     build.args(selection).env("RUSTFLAGS", "-C target-feature=+crt-static");
     run("static binary", &mut build)?;

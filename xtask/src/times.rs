@@ -59,8 +59,11 @@ impl Times {
     }
 }
 
+/// Where this program is. The build of the tests may have put a new one in its place: Linux then calls the old one deleted.
 fn own_program() -> Result<PathBuf, String> {
-    std::env::current_exe().map_err(|e| format!("this program: {e}"))
+    let own = std::env::current_exe().map_err(|e| format!("this program: {e}"))?;
+    let text = own.to_string_lossy();
+    Ok(text.strip_suffix(" (deleted)").map_or_else(|| own.clone(), PathBuf::from))
 }
 
 /// Runs a test program or pytest, shows what it prints, and appends the time of each test to the list. Where slow tests are
