@@ -2,12 +2,11 @@
 
 use crate::common::{self, jobs, run, slow, write_project};
 use gripgen::Project;
-use gripgen::record::Dataset;
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
 use gripgen::twin::label_check::{Expected, LabelEvidence, Verdict, check_label};
 use gripgen::twin::{MeasuredPulls, Pulled};
 use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
-use gripgen_measured::{read_judged_pulls, write_pull_folder};
+use gripgen_measured::{open_dataset, read_judged_pulls, write_pull_folder};
 use std::path::Path;
 
 /// Pulls of the gear by the reduced mechanics, with these effects; no images.
@@ -129,7 +128,7 @@ fn labels_that_contradict_their_traces_are_left_out_of_a_table() {
         assert!(loaded.notes[0].contains("the label rule gives"), "{:?}", loaded.notes);
         let all = load_pulls_with(&[folder.path()], Suspects::Include).unwrap();
         assert_eq!(all.pulls.pulls.len(), 12);
-        let dataset = Dataset::open(folder.path()).unwrap();
+        let dataset = open_dataset(folder.path()).unwrap();
         let statuses = dataset.table().words("status").unwrap();
         assert!(statuses.iter().filter(|s| *s == "suspect").count() >= 10, "{statuses:?}");
         assert!(dataset.table().words("status_reason").unwrap()[11].contains(" N "));

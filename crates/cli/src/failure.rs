@@ -253,3 +253,16 @@ impl From<ExportError> for Failure {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a build without the feature `gpu` answers; the tests are built with it.
+    #[test]
+    fn gpu_backend_not_built_is_a_usage_error_with_the_build_command() {
+        let failure = Failure::from(SweepError::Gpu(GpuError::NotBuilt));
+        assert_eq!(failure.exit_code(), code::USAGE);
+        assert!(failure.what_to_do().unwrap().contains("cargo build --release --features gpu"));
+    }
+}

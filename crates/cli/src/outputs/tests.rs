@@ -76,6 +76,8 @@ impl World {
             b"twin = \"twin.toml\"\nsamples = 2\nmechanics = \"reduced\"\ntrace = \"none\"\n[vary]\npart = [\"gear\"]\n",
         );
         world.line("sweep sweep.toml -o run -q").unwrap();
+        // A run of assets alone has no copies of its inputs.
+        std::fs::create_dir_all(world.root.join("run/inputs")).unwrap();
         world
     }
 

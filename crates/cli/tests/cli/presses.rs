@@ -260,7 +260,8 @@ fn a_mesh_is_rendered_with_its_surface() {
     // A quarter of the size lies in the gel as a whole, a sixteenth of 9 mm2.
     let (_, _, n) = middle(&["--scale-mm-per-unit", "0.25"]);
     assert!((n * 0.0877 * 0.0877 - 9.0 / 16.0).abs() < 0.15, "{n} px");
-    let twice = run(&["render", &tip, "--depth-mm", "1", "--sensor", sensor, "-o", &image, "--mask", &image]);
+    let both = ["-o", &image, "--mask", &image, "--force"];
+    let twice = run(&[&["render", &tip, "--depth-mm", "1", "--sensor", sensor][..], &both].concat());
     assert_code(&twice, 2);
     assert!(text(&twice.stderr).contains("two files would be one"));
     // The same depth 100 times as large is not to be had, and a place beside the image neither.

@@ -92,17 +92,20 @@ impl TaximTable {
     }
 
     /// Number of bins of slope, and of direction.
+    #[cfg(feature = "gpu")]
     pub(crate) fn bins(&self) -> usize {
         self.bins
     }
 
     /// Smallest slope of each bin, and cosine and sine of the lower border of each bin of direction.
+    #[cfg(feature = "gpu")]
     pub(crate) fn borders(&self) -> (&[f32], Vec<[f64; 2]>) {
         (self.steepness.first(), self.sectors.borders())
     }
 
     /// Coefficients of each bin for positions relative to [`MIDDLE_PX`]: terms `x^2, y^2, x y, x, y, 1`, each for red,
     /// green, blue and nothing.
+    #[cfg(feature = "gpu")]
     pub(crate) fn packed(&self) -> &[[[f32; 4]; 6]] {
         &self.packed
     }

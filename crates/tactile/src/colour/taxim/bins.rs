@@ -58,6 +58,7 @@ impl Sectors {
     }
 
     /// Cosine and sine of the lower border of each sector.
+    #[cfg(feature = "gpu")]
     pub(crate) fn borders(&self) -> Vec<[f64; 2]> {
         if !self.borders.is_empty() {
             return self.borders.clone();
@@ -137,6 +138,7 @@ impl Steepness {
     }
 
     /// Smallest slope of each bin.
+    #[cfg(feature = "gpu")]
     pub(crate) fn first(&self) -> &[f32] {
         &self.first[..self.first.len() - 1]
     }
