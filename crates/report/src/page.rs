@@ -1,7 +1,7 @@
 //! A page is a list of blocks: headings, facts, plots, pictures, tables. The template draws them in their order.
 
 use crate::svg::{SERIES, class, draw};
-use crate::text::{NAME, SENTENCE, clean, data_url};
+use crate::text::{NAME, SENTENCE, clean, data_url, is_forbidden};
 use crate::{Plot, PlotGroup};
 use serde_json::{Value, json};
 
@@ -185,7 +185,10 @@ impl Page {
             environment.add_template(name, text).expect("a template of ours parses");
         }
         let template = environment.get_template(template).expect("it was just added");
-        template.render(&more).expect("the template asks for nothing that the page lacks")
+        let mut page = template.render(&more).expect("the template asks for nothing that the page lacks");
+        // Names and words of the data may hold characters that no page may.
+        page.retain(|c| matches!(c, '\n' | '\t') || !is_forbidden(c));
+        page
     }
 }
 

@@ -30,7 +30,8 @@ pub(crate) fn clean(text: &str, most: usize) -> String {
     shorten(&plain, most)
 }
 
-fn is_forbidden(c: char) -> bool {
+/// Whether a character may not be in a page.
+pub(crate) fn is_forbidden(c: char) -> bool {
     c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c)
 }
 

@@ -120,7 +120,7 @@ fn pieces_of_any_size_give_the_same_events() {
         stream.chunks(size).flat_map(|piece| link.receive(piece).unwrap()).collect::<Vec<_>>()
     };
     let whole = events(stream.len());
-    assert_eq!(whole.len(), 24);
+    assert_eq!(whole.len(), 23);
     assert!(whole.contains(&Event::Text { text: "hello".into(), source: "UR".into(), level: 3 }));
     for size in [1, 2, 3, 7, 58, 61, 200] {
         assert_eq!(events(size), whole, "pieces of {size}");
