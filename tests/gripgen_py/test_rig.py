@@ -46,7 +46,7 @@ def test_pulls_are_recorded_and_told(served, tmp_path):
     assert [event["index"] for event in made] == [0, 1]
     ds = gg.load(run.out)
     assert len(ds) == 2
-    assert ds.table()["max_pull_force_n"] == pytest.approx([event["max_pull_force_n"] for event in made])
+    assert list(ds.table()["max_pull_force_n"]) == pytest.approx([event["max_pull_force_n"] for event in made])
     # Nothing is left to make.
     again = gg.rig.pull(served, tmp_path / "run", parts=["gear"], grip_force_n=[25], repetitions=2)
     assert again == run

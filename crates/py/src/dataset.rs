@@ -8,6 +8,7 @@ use gripgen::record::{Dataset as Rows, DatasetError, NoiseMode};
 use gripgen::twin::Values;
 use gripgen::twin::{ContactPatch, Jaw};
 use gripgen::{Project, press_only};
+use gripgen_measured::open_dataset;
 use numpy::{IntoPyArray, PyArray, PyArray1, PyArray3, PyArray4, PyArray5, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -25,7 +26,7 @@ pub struct Dataset {
 impl Dataset {
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let rows = py.detach(|| Rows::open(&path)).map_err(|e| error::data(py, &e))?;
+        let rows = py.detach(|| open_dataset(&path)).map_err(|e| error::open(py, &e))?;
         Ok(Self { rows, project: OnceLock::new() })
     }
 

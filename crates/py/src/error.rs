@@ -5,6 +5,7 @@ use gripgen::record::DatasetError;
 use gripgen::twin::config::ConfigError as KeyError;
 use gripgen::{LoadError, SampleError, SweepError};
 use gripgen_cli::Failure;
+use gripgen_measured::OpenDatasetError;
 use pyo3::PyTypeInfo;
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
@@ -66,6 +67,14 @@ pub fn sample(py: Python<'_>, e: SampleError) -> PyErr {
     match e {
         SampleError::Config(e) => config(py, e),
         other => with_hint::<GripgenError>(py, &other.to_string(), None),
+    }
+}
+
+/// A dataset that cannot be opened.
+pub fn open(py: Python<'_>, e: &OpenDatasetError) -> PyErr {
+    match e {
+        OpenDatasetError::Dataset(e) => data(py, e),
+        _ => with_hint::<DataError>(py, &e.to_string(), None),
     }
 }
 
