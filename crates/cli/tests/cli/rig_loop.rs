@@ -87,6 +87,7 @@ fn pulls_needed(first: &Path, second: &Path) -> Option<usize> {
 
 /// The commands of `research/loop/rig.md`, one by one.
 #[test]
+#[ignore = "slow: campaigns over the wire"]
 fn an_undeclared_effect_of_a_rig_is_found_over_the_wire_and_the_next_campaign_tells_it_from_its_rivals() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| -> PathBuf { folder.path().join(name) };

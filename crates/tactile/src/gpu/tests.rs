@@ -200,6 +200,7 @@ fn colours_of_a_taxim_table_agree_with_the_processor() {
 /// them. Much smaller images differ by what the straight lines of the processor's blocks of 16 pixels leave out.
 #[test]
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+#[cfg_attr(vulkan, ignore = "slow: kernels on a software driver")]
 fn colours_by_regression_agree_with_the_processor() {
     for gpu in both_variants() {
         compare(&gpu, &sensor(320, 240, regression(320)), &gel(&PYRAMID), 0.0);
@@ -248,6 +249,7 @@ fn with_shadows(mut sensor: Sensor, kind: ShadowKind) -> Sensor {
 /// have borders along the axes of the image too.
 #[test]
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+#[cfg_attr(vulkan, ignore = "slow: kernels on a software driver")]
 fn shadows_agree_with_the_processor() {
     let taxim = || ColourModel::Taxim(Box::new(taxim_table(200, 150)));
     let (flat, dome) = (GelShape::Flat, GelShape::Dome { sag_m: 1e-3 });
@@ -273,6 +275,7 @@ fn shadows_agree_with_the_processor() {
 /// Without contact the image is the rest frame, with the same noise to the bit.
 #[test]
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+#[cfg_attr(vulkan, ignore = "slow: kernels on a software driver")]
 fn a_gel_at_rest_gives_the_same_bytes() {
     for gpu in both_variants() {
         for colour in [lit(), regression(67), ColourModel::Taxim(Box::new(taxim_table(67, 45)))] {
@@ -340,6 +343,7 @@ fn a_missing_adapter_is_one_clear_line() {
 
 #[test]
 #[cfg_attr(not(vulkan), ignore = "GRIPGEN_VULKAN is not set")]
+#[cfg_attr(vulkan, ignore = "slow: kernels on a software driver")]
 fn domed_gels_agree_with_the_processor() {
     for colour in [lit(), regression(200), ColourModel::Taxim(Box::new(taxim_table(200, 150)))] {
         let mut domed = sensor(200, 150, colour);
