@@ -11,22 +11,23 @@ pub type GpuRequest<'a> = crate::gpu_types::Request<&'a GpuMesh>;
 use crate::indent::IndentError;
 use crate::sensor::Sensor;
 use gripgen_twin::{Gel, TriMesh};
+use std::convert::Infallible;
 
 /// A mesh on the device.
-pub enum GpuMesh {}
+pub struct GpuMesh(#[expect(dead_code, reason = "there is no value")] Infallible);
 
 /// A sensor with its gel on the device.
-pub enum GpuSensor {}
+pub struct GpuSensor(Infallible);
 
 impl GpuSensor {
     /// Images that are computed at once.
     pub fn batch(&self) -> usize {
-        match *self {}
+        match self.0 {}
     }
 }
 
 /// An open graphics processor.
-pub enum GpuRenderer {}
+pub struct GpuRenderer(Infallible);
 
 impl GpuRenderer {
     /// Opens no adapter.
@@ -40,22 +41,22 @@ impl GpuRenderer {
 
     /// Which adapter it is.
     pub fn adapter(&self) -> &GpuAdapter {
-        match *self {}
+        match self.0 {}
     }
 
     /// Puts a mesh on the device.
     pub fn mesh(&self, _: &TriMesh) -> Result<GpuMesh, GpuError> {
-        match *self {}
+        match self.0 {}
     }
 
     /// Puts a sensor with its gel on the device.
     pub fn sensor(&self, _: &Sensor, _: &Gel) -> Result<GpuSensor, GpuError> {
-        match *self {}
+        match self.0 {}
     }
 
     /// The same for batches of a size.
     pub fn sensor_for(&self, _: &Sensor, _: &Gel, _: usize) -> Result<GpuSensor, GpuError> {
-        match *self {}
+        match self.0 {}
     }
 
     /// Makes images and hands them out.
@@ -65,12 +66,12 @@ impl GpuRenderer {
         _: &[GpuRequest<'_>],
         _: impl FnMut(usize, Result<GpuImage<'_>, IndentError>),
     ) -> Result<(), GpuError> {
-        match *self {}
+        match self.0 {}
     }
 
     /// Makes images and leaves them on the device.
     pub fn render_resident(&self, _: &mut GpuSensor, _: &[GpuRequest<'_>]) -> Result<(), GpuError> {
-        match *self {}
+        match self.0 {}
     }
 
     /// Seconds of each stage.
@@ -81,6 +82,6 @@ impl GpuRenderer {
         _: u32,
         _: &dyn Fn() -> f64,
     ) -> Result<Vec<(&'static str, f64)>, GpuError> {
-        match *self {}
+        match self.0 {}
     }
 }
