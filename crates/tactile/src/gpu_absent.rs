@@ -14,7 +14,7 @@ use gripgen_twin::{Gel, TriMesh};
 use std::convert::Infallible;
 
 /// A mesh on the device.
-pub struct GpuMesh(#[expect(dead_code, reason = "there is no value")] Infallible);
+pub struct GpuMesh(Infallible);
 
 /// A sensor with its gel on the device.
 pub struct GpuSensor(Infallible);
