@@ -16,8 +16,11 @@ mod press_pictures;
 
 use crate::StudyResult;
 
+/// A study, as it is run.
+type Study = fn() -> StudyResult;
+
 /// Every study by the name of its file.
-pub const ALL: [(&str, fn() -> StudyResult); 13] = [
+pub const ALL: [(&str, Study); 13] = [
     ("coverage", coverage::run),
     ("few-pulls", few_pulls::run),
     ("few-pulls-ranks", few_pulls_ranks::run),

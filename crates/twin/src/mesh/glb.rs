@@ -111,8 +111,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
     Ok(reading.triangles)
 }
 
-fn bad(problem: String) -> MeshError {
-    MeshError::File(format!("not a GLB file that can be read: {problem}"))
+fn bad(problem: impl Into<String>) -> MeshError {
+    MeshError::File(format!("not a GLB file that can be read: {}", problem.into()))
 }
 
 fn look_up<'a, T>(all: &'a [T], at: usize, what: &str) -> Result<&'a T, MeshError> {
@@ -127,7 +127,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), MeshError> {
     };
     let short = |wanted: usize| bad(format!("it is cut off: {} bytes, {wanted} are needed", bytes.len()));
     if !bytes.starts_with(b"glTF") {
-        return Err(bad("it does not begin with `glTF`".into()));
+        return Err(bad("it does not begin with `glTF`"));
     }
     match word(4) {
         Some(2) => {}
@@ -144,7 +144,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), MeshError> {
         let found = bytes.get(at + 8..end)?;
         (bytes.get(at + 4..at + 8)? == kind).then_some((found, end))
     };
-    let (json, next) = chunk(12, b"JSON").ok_or_else(|| bad("it has no JSON chunk".into()))?;
+    let (json, next) = chunk(12, b"JSON").ok_or_else(|| bad("it has no JSON chunk"))?;
     Ok((json, chunk(next, b"BIN\0").map_or(&[][..], |(blob, _)| blob)))
 }
 
@@ -171,8 +171,7 @@ impl<'a> Reading<'a> {
     }
 
     fn primitive(&mut self, primitive: &Primitive, here: &Matrix4<f32>) -> Result<(), MeshError> {
-        let places =
-            primitive.attributes.position.ok_or_else(|| bad("a primitive has no POSITION".into()))?;
+        let places = primitive.attributes.position.ok_or_else(|| bad("a primitive has no POSITION"))?;
         let places: Vec<[f32; 3]> = self
             .values(places, "VEC3", 3, &FLOAT)?
             .map(|bytes| {
@@ -233,7 +232,7 @@ impl<'a> Reading<'a> {
         let view = accessor.buffer_view.ok_or_else(|| bad(format!("accessor {at} has no data")))?;
         let view = look_up(&self.document.buffer_views, view, "view")?;
         if look_up(&self.document.buffers, view.buffer, "buffer")?.uri.is_some() || view.buffer != 0 {
-            return Err(bad("its data lie in another file: export it as one binary file".into()));
+            return Err(bad("its data lie in another file: export it as one binary file"));
         }
         let (count, stride) = (accessor.count, view.byte_stride.unwrap_or(size).max(size));
         let last = count.checked_sub(1).and_then(|n| n.checked_mul(stride));
