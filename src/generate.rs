@@ -1,7 +1,6 @@
 //! One sample: from a scenario to images, trace and label.
 
 use crate::film::{Film, Seen};
-use crate::gpu::Gpu;
 use crate::gripped::{Contact, Gripped};
 use crate::library::Library;
 use crate::project::Project;
@@ -10,10 +9,10 @@ use gripgen_physics::{
     JawFriction, PatchFriction, PullSession, PullState, Signals, Until, creep_of, pull_staircase_seen,
     sensor_chain, staircase_of,
 };
-use gripgen_tactile::{Imprint, Sensor, SimdLevel};
+use gripgen_tactile::{Gpu, Imprint, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::effects::CommandChain;
-use gripgen_twin::label_check::suspect_simulated;
+use gripgen_twin::label::check::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
     FilmPace, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled, Sample, Scenario, TactileImage,

@@ -43,17 +43,14 @@
 pub mod assets;
 mod film;
 mod generate;
-mod gpu;
 mod gripped;
 mod library;
 mod location;
-mod mesh_file;
 mod parallel;
 mod project;
 mod resolve;
 mod sample;
 mod simulator;
-mod stream;
 mod sweep;
 mod version;
 
@@ -62,7 +59,6 @@ pub use generate::{
     GripImprints, StartedPull, drawn_scenario, generate, generate_filmed, press_only, pull_gripped,
     pull_session, simulate, start_pull,
 };
-pub use gpu::{Gpu, PlacedPart};
 pub use gripgen_physics as physics;
 pub use gripgen_record as record;
 pub use gripgen_tactile as tactile;
@@ -72,15 +68,13 @@ pub use gripped::{
 };
 pub use library::{Library, LibraryError};
 pub use location::{Location, ReadFileError, path_from};
-pub use mesh_file::{MeshFileError, read_mesh};
 pub use parallel::in_parallel;
 pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
 pub use resolve::Files;
 pub use sample::{SampleError, SimulateOptions};
 pub use simulator::{Draw, Simulator};
-pub use stream::{SampleStream, StreamError, StreamOptions, Streamed, StreamedSample};
 pub use sweep::differences;
 pub use sweep::{
-    SweepError, SweepEvent, SweepOptions, SweepSummary, encode_filmed, guarded, prepare_run, run_info, sweep,
+    SweepError, SweepEvent, SweepOptions, SweepSummary, encode_filmed, encode_options, guarded, noise_rgb, prepare_run, run_info, sweep,
 };
 pub use version::VERSION;

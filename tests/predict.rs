@@ -3,7 +3,7 @@
 use crate::common::{baseline, library, overrides, twin_at, twin_with, twin_with_sets};
 use crate::diagnose::simulated;
 use gripgen::Location;
-use gripgen::twin::label_moments::label_moments;
+use gripgen::twin::label::moments::label_moments;
 use gripgen::twin::predict::{ModelEffect, PredictPulls as _, PullModel};
 use gripgen::twin::random::{Purpose, Stream};
 use gripgen::twin::{PullTrace, TraceRow, slip_label};

@@ -3,7 +3,7 @@
 use crate::common::{self, jobs, run, slow, write_project};
 use gripgen::Project;
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
-use gripgen::twin::label_check::{Expected, LabelEvidence, Verdict, check_label};
+use gripgen::twin::label::check::{Expected, LabelEvidence, Verdict, check_label};
 use gripgen::twin::{MeasuredPulls, Pulled};
 use gripgen_measured::{Suspects, load_pulls, load_pulls_with};
 use gripgen_measured::{open_dataset, read_judged_pulls, write_pull_folder};

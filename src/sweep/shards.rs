@@ -123,7 +123,7 @@ pub fn encode_filmed(
 }
 
 /// How sample `index` of a project is encoded into its shard.
-pub(crate) fn encode_options(project: &Project, index: u64) -> EncodeOptions {
+pub fn encode_options(project: &Project, index: u64) -> EncodeOptions {
     let sweep = &project.sweep;
     EncodeOptions {
         images: sweep.images,
@@ -138,7 +138,7 @@ pub(crate) fn encode_options(project: &Project, index: u64) -> EncodeOptions {
 }
 
 /// Noise of both sensors of a sample, in levels; `None` where the sample's twin cannot be, and has no images either.
-pub(crate) fn noise_rgb(project: &Project, index: u64) -> Option<PerJaw<[f32; 3]>> {
+pub fn noise_rgb(project: &Project, index: u64) -> Option<PerJaw<[f32; 3]>> {
     let twin = project.twin_of(index).ok()?;
     PerJaw::try_from_fn(|jaw| match twin.optics[jaw].image_noise {
         ImageNoise::Off => Ok([0.0; 3]),

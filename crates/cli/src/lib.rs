@@ -18,6 +18,7 @@ mod failure;
 mod interrupt;
 mod live;
 mod load;
+mod mesh_file;
 mod output;
 mod outputs;
 mod part;

@@ -14,7 +14,7 @@ use crate::{QuasiStatic, RimTable};
 use creep::creeps;
 use gripgen_twin::config::Feedback;
 use gripgen_twin::effects::{CommandChain, Effect, OutsideFit, Per, SensorChain};
-use gripgen_twin::label_moments::LabelRule;
+use gripgen_twin::label::moments::LabelRule;
 use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
 use gripgen_twin::{Backbone, Jaw, MeasuredPulls, Robot, Staircase, Twin};
 use kept::Kept;

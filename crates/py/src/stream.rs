@@ -1,14 +1,17 @@
 //! `_core.Stream`: batches of a sweep that are made while somebody trains on them.
 
+mod samples;
+
 use crate::{error, film, values};
 use gripgen::record::proto::gripgen_v1::Status;
 use gripgen::record::{Table, extra_columns, status_name};
 use gripgen::twin::config::ImageStorage;
 use gripgen::twin::{Jaw, Values};
-use gripgen::{Location, Project, SampleStream, StreamError, StreamOptions, Streamed, StreamedSample};
+use gripgen::{Location, Project};
 use numpy::{PyArray, PyArray1, PyArray5, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use samples::{SampleStream, StreamError, StreamOptions, Streamed, StreamedSample};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

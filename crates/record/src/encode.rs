@@ -10,7 +10,7 @@ use gripgen_twin::columns::Scale;
 use gripgen_twin::config::{ImageStorage, TraceStorage};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::frames::Pose;
-use gripgen_twin::pixel_noise::PixelNoise;
+use gripgen_twin::image::pixel_noise::PixelNoise;
 use gripgen_twin::{
     ImprintSummary, Jaw, Outcome, PerJaw, PullTrace, Sample, Scenario, SlipLabel, TactileImage,
 };

@@ -11,7 +11,7 @@ use crate::proto::gripgen_v1::{PullTrace, Sample};
 use crate::shard::RIG_SOURCE;
 use crate::shard::{CLEAN, EVEN, LAYOUT_VERSION, METADATA_NAME, rest_name};
 use file::{attachment, metadata_record, open_mcap, read_summary};
-use gripgen_twin::pixel_noise::PixelNoise;
+use gripgen_twin::image::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, PerJaw, TactileImage};
 use mcap::{McapError, Summary};
 use prost::Message;

@@ -4,10 +4,10 @@ use crate::grid::Plane;
 use crate::sensor::Sensor;
 use crate::simd::{Kernel, Lanes, SimdLevel};
 use gripgen_twin::TactileImage;
-use gripgen_twin::pixel_noise::{normal_of_sum, sum_of, words};
+use gripgen_twin::image::pixel_noise::{normal_of_sum, sum_of, words};
 
 /// Adds the change of colour to the rest frame and rounds to 8 bits; where there is a key, adds noise to that and rounds again
-/// (`gripgen_twin::pixel_noise`).
+/// (`gripgen_twin::image::pixel_noise`).
 pub fn finish(sensor: &Sensor, change: Option<&[Plane; 3]>, noise_key: Option<u64>) -> TactileImage {
     finish_on(sensor, change, noise_key, SimdLevel::best())
 }
@@ -83,7 +83,7 @@ fn write_row(bytes: &mut [u8], rest: &[f32], change: Option<&[f32]>, sigma: f32,
     }
 }
 
-/// To the nearest of 0 to 255; 0 for what is not a number. `pixel_noise::rounded` in the form that vector units are fast with.
+/// To the nearest of 0 to 255; 0 for what is not a number. `image::pixel_noise::rounded` in the form that vector units are fast with.
 #[inline(always)]
 fn rounded(value: f32) -> u8 {
     let value = if value > 0.0 { value } else { 0.0 };
@@ -96,7 +96,7 @@ fn rounded(value: f32) -> u8 {
 mod tests {
     use super::*;
     use crate::testing::assert_same_on_every_unit;
-    use gripgen_twin::pixel_noise::PixelNoise;
+    use gripgen_twin::image::pixel_noise::PixelNoise;
 
     #[test]
     fn vector_units_give_the_same_image() {
@@ -124,8 +124,8 @@ mod tests {
     fn rounding_is_that_of_the_noise() {
         for level in -40..1400 {
             let value = level as f32 / 5.0;
-            assert_eq!(rounded(value), gripgen_twin::pixel_noise::rounded(value), "{value}");
+            assert_eq!(rounded(value), gripgen_twin::image::pixel_noise::rounded(value), "{value}");
         }
-        assert_eq!(rounded(f32::NAN), gripgen_twin::pixel_noise::rounded(f32::NAN));
+        assert_eq!(rounded(f32::NAN), gripgen_twin::image::pixel_noise::rounded(f32::NAN));
     }
 }

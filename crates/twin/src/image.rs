@@ -1,5 +1,8 @@
 //! Tactile images.
 
+pub mod film;
+pub mod pixel_noise;
+
 /// An 8-bit RGB image, row by row from the top, three bytes per pixel. Up in the image is +z of `world`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TactileImage {

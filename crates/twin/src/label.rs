@@ -1,5 +1,8 @@
 //! The training label: the pull force at which the jaws slip.
 
+pub mod check;
+pub mod moments;
+
 use crate::PullTrace;
 
 /// The label of one pull.

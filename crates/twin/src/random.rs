@@ -4,6 +4,8 @@
 //! A stream is a ChaCha8 generator whose 256-bit key is made of the three numbers, so neither thread count,
 //! order, shard size nor resume can change a draw. Transcendentals come from `libm`.
 
+pub mod sobol;
+
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 

@@ -1,5 +1,8 @@
 //! One pull, fully specified.
 
+pub(crate) mod keys;
+pub(crate) mod staircase;
+
 use crate::draw::Drawn;
 use std::collections::BTreeMap;
 

@@ -10,8 +10,9 @@ use crate::config::{
 };
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
 use crate::film::FilmPace;
-use crate::scenario_keys;
-use crate::{CAUSE_KEY, Posterior, PullSettings, Scenario, Twin, sobol};
+use crate::scenario::keys;
+use crate::{CAUSE_KEY, Posterior, PullSettings, Scenario, Twin};
+use crate::random::sobol;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -175,13 +176,13 @@ impl Sweep {
         let mut problem = Ok(());
         for (key, value) in &drawn {
             let put = match key {
-                key if key.starts_with("pull.") => scenario_keys::set_pull(&mut pull, key, value),
+                key if key.starts_with("pull.") => keys::set_pull(&mut pull, key, value),
                 key if is_twin_key(key) || key == CAUSE_KEY => Ok(()),
-                key if self.draws_own(key) || scenario_keys::own_columns(twin).contains(&key.as_str()) => {
-                    scenario_keys::set_own(&mut scenario, key, value);
+                key if self.draws_own(key) || keys::own_columns(twin).contains(&key.as_str()) => {
+                    keys::set_own(&mut scenario, key, value);
                     Ok(())
                 }
-                key => scenario_keys::set(&mut scenario, key, value),
+                key => keys::set(&mut scenario, key, value),
             };
             problem = problem.and(put.map_err(|e| e.into_config_error(key)));
         }
@@ -191,13 +192,13 @@ impl Sweep {
         }
         scenario.grip_force_n = twin.force_per_jaw_n(scenario.grip_force_n);
         scenario.drawn = drawn;
-        problem = problem.and_then(|()| scenario_keys::check_against_twin(&scenario, twin));
+        problem = problem.and_then(|()| keys::check_against_twin(&scenario, twin));
         (scenario, problem)
     }
 
     /// Whether `[vary]` has a column of the user's own, which its twin was asked for. Not each draw of a posterior has the table.
     fn draws_own(&self, key: &str) -> bool {
-        scenario_keys::is_own_column(key) && self.vary.iter().any(|varied| varied.key == key)
+        keys::is_own_column(key) && self.vary.iter().any(|varied| varied.key == key)
     }
 
     /// The twin of sample `index`: a copy of `base` with the drawn values put in.

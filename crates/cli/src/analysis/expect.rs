@@ -16,7 +16,7 @@ use gripgen_physics::{PatchFriction, creep_of, sensor_chain};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::Mechanics;
 use gripgen_twin::effects::{CommandChain, OutsideFit, imprint_volume_m3, jaw_tilt_rad};
-use gripgen_twin::label_moments::label_moments;
+use gripgen_twin::label::moments::label_moments;
 use gripgen_twin::random::{Purpose, Stream, normal_quantile};
 use gripgen_twin::{
     ContactPatch, Jaw, MeasuredPull, MeasuredPulls, PerJaw, PullSettings, Scenario, Staircase, Twin,

@@ -4,7 +4,7 @@ mod bodies;
 
 use bodies::PressBodies;
 use gripgen::Files;
-use gripgen::MeshFileError;
+use crate::mesh_file::MeshFileError;
 use gripgen::{Library, LibraryError};
 use gripgen::{LoadError, load_twin_document};
 use gripgen::{Location, ReadFileError};

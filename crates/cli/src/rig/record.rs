@@ -2,7 +2,7 @@
 
 use gripgen::record::{FrameView, RigFilm, RigFrame, RigLog, RigLogEvent, RigPull, RigResult, RigStream};
 use gripgen::twin::draw::Drawn;
-use gripgen::twin::label_check::{
+use gripgen::twin::label::check::{
     Expected, GripForceEvidence, LabelEvidence, WrenchRow, ZERO_SHIFT, check_label,
 };
 use gripgen::twin::{Campaign, Covariates, Jaw, PerJaw, PlannedPull, PullKind, PullSettings, Scenario};

@@ -3,7 +3,7 @@
 use super::Standing;
 use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_twin::PullTrace;
-use gripgen_twin::label_check::{Behind, recorded_behind};
+use gripgen_twin::label::check::{Behind, recorded_behind};
 
 /// What becomes of measured pulls whose label is suspect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

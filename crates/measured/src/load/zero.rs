@@ -1,6 +1,6 @@
 //! A zero of the force sensor that moves during a pull is measured with it, and taken off its label.
 
-use gripgen_twin::label_check::ZERO_SHIFT;
+use gripgen_twin::label::check::ZERO_SHIFT;
 use gripgen_twin::{ExtraColumn, MeasuredPulls, Values};
 
 /// Takes the shift of the sensor's zero off the labels. A column of that name is then no covariate any more: what is known of a

@@ -2,7 +2,7 @@
 
 use super::cells::{Cells, Column};
 use gripgen_record::proto::gripgen_v1::Status;
-use gripgen_twin::label_check::{Behind, Expected, LabelEvidence, Verdict, check_label};
+use gripgen_twin::label::check::{Behind, Expected, LabelEvidence, Verdict, check_label};
 use gripgen_twin::{MeasuredPull, MeasuredPulls, slip_label};
 
 /// Labels and readings of files agree to two decimals.

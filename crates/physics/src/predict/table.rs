@@ -2,7 +2,7 @@
 
 use crate::{QuasiStatic, RimTable, SlipPull, SlipRun, StuckPull};
 use gripgen_twin::effects::{CommandChain, Creep, SensorChain};
-use gripgen_twin::label_moments::LabelRule;
+use gripgen_twin::label::moments::LabelRule;
 use gripgen_twin::predict::{PullModel, PullPrediction};
 use gripgen_twin::{Backbone, Staircase};
 use std::sync::{Arc, OnceLock};

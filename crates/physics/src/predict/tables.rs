@@ -4,7 +4,7 @@ use super::table::{ExactLabels, LabelTable, Scattered, Tables, bent_by, enough_f
 use super::{CONTACTS, PullPredictor, acts_on_signals};
 use crate::{RimTable, StuckPull};
 use gripgen_twin::Backbone;
-use gripgen_twin::label_moments::LabelRule;
+use gripgen_twin::label::moments::LabelRule;
 use gripgen_twin::predict::{PullModel, PullPrediction};
 use std::sync::Arc;
 

@@ -4,7 +4,7 @@ use crate::picture::decode_png_into;
 use crate::proto::foxglove::{CompressedImage, RawImage};
 use crate::proto::gripgen_v1::Sample;
 use crate::reader::{ReadError, ShardReader, noise_apart};
-use gripgen_twin::pixel_noise::PixelNoise;
+use gripgen_twin::image::pixel_noise::PixelNoise;
 use gripgen_twin::{Jaw, PerJaw};
 use prost::Message;
 

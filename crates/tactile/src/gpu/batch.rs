@@ -17,7 +17,7 @@ use crate::grid::{Grid, Plane};
 use crate::render::Renderer;
 use crate::sensor::Sensor;
 use crate::simd::SimdLevel;
-use gripgen_twin::pixel_noise::levels;
+use gripgen_twin::image::pixel_noise::levels;
 use gripgen_twin::{Gel, TriMesh};
 use wgpu::BufferUsages;
 

@@ -2,7 +2,7 @@
 
 use super::{ConfigError, suggestion};
 use crate::draw::{Distribution, Drawn, VariedKey};
-use crate::scenario_keys::{pull_keys, scenario_keys};
+use crate::scenario::keys::{pull_keys, scenario_keys};
 
 /// Names of the distributions.
 const NAMES: [&str; 4] = ["uniform", "normal", "log_uniform", "from"];

@@ -8,8 +8,9 @@ use crate::config::{
 };
 use crate::draw::{Distribution, Drawn, VariedKey};
 use crate::film::FilmPace;
-use crate::scenario_keys::{self, KeyError, drawn_column, pull_keys, scenario_keys};
-use crate::{PullSettings, Twin, sobol};
+use crate::scenario::keys::{self, KeyError, drawn_column, pull_keys, scenario_keys};
+use crate::random::sobol;
+use crate::{PullSettings, Twin};
 
 impl Sweep {
     /// Checks a sweep against the twin it names. `twin` is the twin's document with all defaults filled in.
@@ -77,7 +78,7 @@ impl Sweep {
             for (i, value) in varied.distribution.extremes().into_iter().enumerate() {
                 let key = if listed { format!("{place}[{i}]") } else { place.clone() };
                 self.check_value(twin, checked, &varied.key, &value).map_err(|e| match e {
-                    KeyError::Unknown => unknown_key(key, &varied.key, &scenario_keys::own_columns(checked)),
+                    KeyError::Unknown => unknown_key(key, &varied.key, &keys::own_columns(checked)),
                     KeyError::Bad(e) => ConfigError { key, place: None, ..e },
                 })?;
             }
@@ -88,7 +89,7 @@ impl Sweep {
     fn check_value(&self, twin: &Document, checked: &Twin, key: &str, value: &Drawn) -> Result<(), KeyError> {
         if key.starts_with("pull.") {
             let mut pull = self.pull.clone();
-            scenario_keys::set_pull(&mut pull, key, value)?;
+            keys::set_pull(&mut pull, key, value)?;
             pull_settings(&pull)?;
             return Ok(());
         }
@@ -100,17 +101,17 @@ impl Sweep {
         }
         let mut scenario = self.blank();
         scenario.part = checked.parts.keys().next().cloned().unwrap_or_default();
-        if scenario_keys::own_columns(checked).contains(&key) {
-            return if scenario_keys::is_taken(key) { Err(KeyError::Bad(taken(key))) } else { Ok(()) };
+        if keys::own_columns(checked).contains(&key) {
+            return if keys::is_taken(key) { Err(KeyError::Bad(taken(key))) } else { Ok(()) };
         }
-        scenario_keys::set(&mut scenario, key, value)?;
+        keys::set(&mut scenario, key, value)?;
         match key {
             // Which grips exist depends on the part, see `check_grips`.
             "grip_pose" => return Ok(()),
             "grip_force_n" => scenario.grip_force_n = checked.force_per_jaw_n(scenario.grip_force_n),
             _ => {}
         }
-        Ok(scenario_keys::check_against_twin(&scenario, checked)?)
+        Ok(keys::check_against_twin(&scenario, checked)?)
     }
 
     /// Every drawn grip has to exist for every drawn part.
@@ -118,10 +119,10 @@ impl Sweep {
         for (i, pose) in self.representatives("grip_pose").into_iter().enumerate() {
             for part in self.representatives("part") {
                 let mut scenario = self.blank();
-                let put = scenario_keys::set(&mut scenario, "part", part)
-                    .and_then(|()| scenario_keys::set(&mut scenario, "grip_pose", pose));
+                let put = keys::set(&mut scenario, "part", part)
+                    .and_then(|()| keys::set(&mut scenario, "grip_pose", pose));
                 put.map_err(|e| e.into_config_error("grip_pose"))
-                    .and_then(|()| scenario_keys::check_against_twin(&scenario, twin))
+                    .and_then(|()| keys::check_against_twin(&scenario, twin))
                     .map_err(|e| ConfigError { key: format!("vary.grip_pose[{i}]"), ..e })?;
             }
         }

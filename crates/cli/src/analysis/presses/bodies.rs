@@ -1,7 +1,7 @@
 //! Bodies that are pressed into a sensor, from their meshes.
 
 use super::LoadPressesError;
-use gripgen::read_mesh;
+use crate::mesh_file::read_mesh;
 use gripgen_measured::PressedBody;
 use gripgen_tactile::Grid;
 use gripgen_tactile::presses::{Indenter, IndenterPose};

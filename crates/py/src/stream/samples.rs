@@ -4,15 +4,14 @@
 //! write, whatever the number of threads. No more than so many are kept, so that memory is bounded and a slow reader slows the
 //! workers down.
 
-use crate::project::Project;
-use crate::sweep::{encode_options, guarded, noise_rgb};
-use gripgen_record::proto::gripgen_v1::Status;
-use gripgen_record::{EncodeOptions, Film, PictureError, encode};
-use gripgen_tactile::SimdLevel;
-use gripgen_tactile::gpu::GpuError;
-use gripgen_twin::config::{ImageStorage, TraceStorage};
-use gripgen_twin::pixel_noise::PixelNoise;
-use gripgen_twin::{Jaw, Outcome, PerJaw, TactileImage};
+use gripgen::record::proto::gripgen_v1::Status;
+use gripgen::record::{EncodeOptions, Film, PictureError, encode};
+use gripgen::tactile::SimdLevel;
+use gripgen::tactile::gpu::GpuError;
+use gripgen::twin::config::{ImageStorage, TraceStorage};
+use gripgen::twin::image::pixel_noise::PixelNoise;
+use gripgen::twin::{Jaw, Outcome, PerJaw, TactileImage};
+use gripgen::{Project, encode_options, guarded, noise_rgb};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

@@ -3,10 +3,10 @@
 //! A thread of its own has the device. Workers send it the images of their samples and wait; it makes all that has come in while it
 //! was busy as one batch, so that batches grow with the number of workers.
 
-use gripgen_tactile::gpu::{
+use crate::gpu::{
     AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuMesh, GpuPress, GpuRenderer, GpuRequest, GpuSensor,
 };
-use gripgen_tactile::{IndentError, Sensor};
+use crate::{IndentError, Sensor};
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gel, TactileImage, TriMesh};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -32,17 +32,23 @@ pub struct PlacedPart {
 
 /// An image to make.
 #[derive(Debug, Clone)]
-pub(crate) struct ImageJob {
-    pub(crate) sensor: Arc<Sensor>,
-    pub(crate) gel: Gel,
-    pub(crate) part: PlacedPart,
-    pub(crate) noise_key: Option<u64>,
+pub struct ImageJob {
+    /// The sensor behind the gel.
+    pub sensor: Arc<Sensor>,
+    /// The gel.
+    pub gel: Gel,
+    /// What is pressed into it.
+    pub part: PlacedPart,
+    /// Which noise; none without a key.
+    pub noise_key: Option<u64>,
 }
 
 /// Why there is no image.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum ImageFault {
+pub enum ImageFault {
+    /// The device failed.
     Device(GpuError),
+    /// The part cannot be pressed into the gel.
     Indent(IndentError),
 }
 
@@ -99,22 +105,23 @@ impl Gpu {
     }
 
     /// What the device reported, if it failed: then no image is worth waiting for.
-    pub(crate) fn fault(&self) -> Option<GpuError> {
+    pub fn fault(&self) -> Option<GpuError> {
         self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Puts a sensor on the device, or says why the device cannot have it.
-    pub(crate) fn prepare(&self, sensor: &Arc<Sensor>, gel: &Gel) -> Result<(), GpuError> {
+    /// Puts a sensor on the device.
+    ///
+    /// # Errors
+    ///
+    /// A sensor that the device cannot have.
+    pub fn prepare(&self, sensor: &Arc<Sensor>, gel: &Gel) -> Result<(), GpuError> {
         let (answer, answered) = channel();
         self.order(Order::Prepare(sensor.clone(), gel.clone(), answer));
         answered.recv().unwrap_or_else(|_| Err(self.gone()))
     }
 
     /// Makes images, together with those of other threads.
-    pub(crate) fn images<const N: usize>(
-        &self,
-        jobs: [ImageJob; N],
-    ) -> [Result<TactileImage, ImageFault>; N] {
+    pub fn images<const N: usize>(&self, jobs: [ImageJob; N]) -> [Result<TactileImage, ImageFault>; N] {
         let (answer, answered) = channel();
         let waiting = |(place, job)| Waiting { job, place, answer: answer.clone() };
         self.order(Order::Images(jobs.into_iter().enumerate().map(waiting).collect()));

@@ -1,7 +1,6 @@
 //! A mesh from a file.
 
-use crate::library::LibraryError;
-use crate::location::{Location, ReadFileError};
+use gripgen::{LibraryError, Location, ReadFileError};
 use gripgen_twin::TriMesh;
 use std::path::Path;
 
