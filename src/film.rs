@@ -3,11 +3,12 @@
 //! The part moves in front of a gel as the gripper moves along the pull, and is pressed in anew at each frame, with the force of the
 //! grip. What holds the part is that of the grip: its cells keep their limits and go along with the part in the image.
 
+use crate::gpu::PlacedPart;
 use crate::gripped::{Contact, Gripped, Indenter};
 use crate::library::Library;
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_physics::{JawFriction, PullCells, PullState, grip_point, pull_direction};
-use gripgen_tactile::{CellMap, ClusteredMesh, Imprint, PlacedPart, Renderer, Sensor, SimdLevel, finish};
+use gripgen_tactile::{CellMap, ClusteredMesh, Imprint, Renderer, Sensor, SimdLevel, finish};
 use gripgen_twin::effects::optics_state;
 use gripgen_twin::frames::world_from_gel;
 use gripgen_twin::{

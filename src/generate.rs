@@ -1,6 +1,7 @@
 //! One sample: from a scenario to images, trace and label.
 
 use crate::film::{Film, Seen};
+use crate::gpu::Gpu;
 use crate::gripped::{Contact, Gripped};
 use crate::library::Library;
 use crate::project::Project;
@@ -9,7 +10,7 @@ use gripgen_physics::{
     JawFriction, PatchFriction, PullSession, PullState, Signals, Until, creep_of, pull_staircase_seen,
     sensor_chain, staircase_of,
 };
-use gripgen_tactile::{Gpu, Imprint, Sensor, SimdLevel};
+use gripgen_tactile::{Imprint, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
 use gripgen_twin::effects::CommandChain;
 use gripgen_twin::label::check::suspect_simulated;

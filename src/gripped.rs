@@ -2,15 +2,14 @@
 //!
 //! Repetitions of a configuration share it; scatter, noise and the pull itself are drawn anew for each.
 
+use crate::gpu::{Gpu, ImageFault, ImageJob, PlacedPart};
 use crate::library::Library;
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_physics::{
     Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip, grip_point, pull_direction,
 };
 use gripgen_tactile::gpu::makes;
-use gripgen_tactile::{
-    ClusteredMesh, Gpu, ImageFault, ImageJob, Imprint, PlacedPart, Plane, Renderer, Sensor, SimdLevel,
-};
+use gripgen_tactile::{ClusteredMesh, Imprint, Plane, Renderer, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
 use gripgen_twin::effects::{imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 use gripgen_twin::frames::{pose, rotation_about_axis};

@@ -43,6 +43,7 @@
 pub mod assets;
 mod film;
 mod generate;
+mod gpu;
 mod gripped;
 mod library;
 mod location;
@@ -59,6 +60,7 @@ pub use generate::{
     GripImprints, StartedPull, drawn_scenario, generate, generate_filmed, press_only, pull_gripped,
     pull_session, simulate, start_pull,
 };
+pub use gpu::{Gpu, PlacedPart};
 pub use gripgen_physics as physics;
 pub use gripgen_record as record;
 pub use gripgen_tactile as tactile;
@@ -73,7 +75,6 @@ pub use project::{BASELINE_TWIN, LoadError, Project, load_twin_document};
 pub use resolve::Files;
 pub use sample::{SampleError, SimulateOptions};
 pub use simulator::{Draw, Simulator};
-pub use sweep::differences;
 pub use sweep::{
     SweepError, SweepEvent, SweepOptions, SweepSummary, encode_filmed, encode_options, guarded, noise_rgb,
     prepare_run, run_info, sweep,

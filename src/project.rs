@@ -1,6 +1,7 @@
 //! A sweep with everything it needs: twin, meshes, sensors, and the hash over all of it.
 
 use crate::assets;
+use crate::gpu::Gpu;
 use crate::gripped::{Gripped, check_damping};
 use crate::library::{Library, LibraryError};
 use crate::location::{Location, ReadFileError};
@@ -9,8 +10,8 @@ use crate::sample::SimulateOptions;
 use crate::version::VERSION;
 use gripgen_physics::Cache;
 use gripgen_record::{Background, RunFolder, sha256_hex};
+use gripgen_tactile::finish;
 use gripgen_tactile::gpu::{GpuError, makes};
-use gripgen_tactile::{Gpu, finish};
 use gripgen_twin::config::{Backend, Compression, ConfigError, Document, ImageStorage, SweepFile};
 use gripgen_twin::{
     DEFAULTED_SECTIONS, Jaw, PerJaw, Posterior, RobotArm, Sweep, Twin, is_twin_key, scenario_keys,

@@ -1,6 +1,5 @@
 //! Running a sweep: shards over threads, in order, resumable.
 
-mod differences;
 mod pipeline;
 mod shards;
 
@@ -8,10 +7,10 @@ use crate::film::Film;
 use crate::generate::{drawn_scenario, generate_filmed};
 use crate::project::Project;
 use crate::version::VERSION;
-pub use differences::differences;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_record::{
-    FolderError, PictureError, RUN_SCHEMA, RunFolder, RunInfo, ShardError, Sidecar, extra_columns,
+    FolderError, PictureError, RUN_SCHEMA, RunFolder, RunInfo, ShardError, Sidecar, differences,
+    extra_columns,
 };
 use gripgen_tactile::SimdLevel;
 use gripgen_tactile::gpu::{GpuAdapter, GpuError};

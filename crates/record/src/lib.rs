@@ -19,6 +19,7 @@
 mod background;
 mod card;
 mod dataset;
+mod differences;
 mod encode;
 mod export;
 mod film;
@@ -42,6 +43,7 @@ mod webdataset;
 
 pub use background::Background;
 pub use dataset::{Dataset, DatasetError, MeasuredRows, NoiseMode, PictureFileError, ReadImages, Table};
+pub use differences::differences;
 pub use encode::{EncodeOptions, EncodedRig, EncodedSample, Timed, VIEW_RATE_HZ, encode};
 pub use export::{ExportDatasetError, ExportError, ExportOptions, export_sample};
 pub use film::{Film, FilmOptions, encode_frame};

@@ -40,7 +40,6 @@ pub mod gpu;
 #[cfg(not(feature = "gpu"))]
 #[path = "gpu_absent.rs"]
 pub mod gpu;
-mod gpu_thread;
 mod gpu_types;
 mod gradient;
 mod grid;
@@ -70,7 +69,6 @@ pub use colour::{ColourModel, Lambert, Light, Regressor, TaximTable, shade};
 pub use convolve::Follow;
 pub use deform::{BlurredRest, deform};
 pub use elastic::{Base, ElasticGel, LINEAR_PRESSURE_SHARE, press_elastic};
-pub use gpu_thread::{Gpu, ImageFault, ImageJob, PlacedPart};
 pub use gradient::gradient;
 pub use grid::{Grid, Plane};
 pub use indent::{ElasticField, Imprint, IndentError, PressedGel, indent};

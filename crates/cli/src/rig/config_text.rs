@@ -1,8 +1,8 @@
 //! What a run of a rig is made with, as one text.
 
-use gripgen::differences;
 use gripgen_measured::campaign_toml;
 use gripgen_record::RunFolder;
+use gripgen_record::differences;
 use gripgen_twin::columns::covariates;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Campaign, PlannedPull};

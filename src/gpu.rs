@@ -3,10 +3,10 @@
 //! A thread of its own has the device. Workers send it the images of their samples and wait; it makes all that has come in while it
 //! was busy as one batch, so that batches grow with the number of workers.
 
-use crate::gpu::{
+use gripgen_tactile::gpu::{
     AdapterChoice, GpuAdapter, GpuError, GpuImage, GpuMesh, GpuPress, GpuRenderer, GpuRequest, GpuSensor,
 };
-use crate::{IndentError, Sensor};
+use gripgen_tactile::{IndentError, Sensor};
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gel, TactileImage, TriMesh};
 use std::sync::mpsc::{Receiver, Sender, channel};
