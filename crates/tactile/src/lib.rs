@@ -51,7 +51,9 @@ pub mod metrics;
 mod noise;
 pub mod npz;
 mod optics;
+mod pad;
 mod patch;
+mod press;
 pub mod presses;
 mod raster;
 #[cfg(test)]
@@ -79,6 +81,7 @@ pub use markers::{
     print_markers, without_markers,
 };
 pub use noise::finish;
+pub use pad::Pad;
 pub use patch::{CellMap, CellPlaces};
 pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;
