@@ -8,7 +8,7 @@ use crate::gripped::{Contact, Gripped, Indenter};
 use crate::library::Library;
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_physics::{JawFriction, PullCells, PullState, grip_point, pull_direction};
-use gripgen_tactile::{CellMap, ClusteredMesh, Imprint, Renderer, Sensor, SimdLevel, finish};
+use gripgen_tactile::{CellMap, ClusteredMesh, Pad, Renderer, Sensor, SimdLevel, finish};
 use gripgen_twin::effects::optics_state;
 use gripgen_twin::frames::world_from_gel;
 use gripgen_twin::{
@@ -131,16 +131,17 @@ impl Film {
 
     fn jaw_frame(&self, jaw: Jaw, state: &PullState, cells: &[CellShear]) -> Result<FilmFrame, SampleError> {
         let FilmJaw { sensor, part, optics, pull, patch, cells: map } = &self.jaws[jaw];
-        let renderer = Renderer { sensor, gel: &self.twin.gel[jaw], level: self.level };
-        let a = sensor.grid.metres_per_px;
+        let gel = &self.twin.gel[jaw];
+        let (renderer, pad) = (Renderer { sensor, gel, level: self.level }, Pad { gel, level: self.level });
         // The gel goes along with the gripper, so that in it the part moves against the pull.
         let moved_m = -state.displacement_m * pull;
         let mut gel_from_mesh = part.gel_from_mesh;
         gel_from_mesh.translation.vector += moved_m;
         let failed = |source| SampleError::Indent { jaw, source };
         let (c, force_n) = (part.imprint_m3_per_n, part.force_n);
-        let imprint: Imprint =
-            renderer.press_seen(&self.mesh, &gel_from_mesh, c, force_n, optics).map_err(failed)?;
+        let own =
+            pad.press_seen(&renderer, &self.mesh, &gel_from_mesh, c, force_n, optics).map_err(failed)?;
+        let imprint = renderer.seen(&self.mesh, &gel_from_mesh, &own, optics);
         let mut moved = patch.clone();
         for cell in &mut moved.cells {
             cell.x_m += moved_m.x;
@@ -151,7 +152,7 @@ impl Film {
             cells.iter().map(|cell| [-cell.force_n * pull.x, -cell.force_n * pull.y]).collect();
         let (change, markers_px) = renderer.change_pulled(&imprint, optics, &moved, &tangential_n);
         let depth = &imprint.depth_px;
-        let um_per_px = (a * 1e6) as f32;
+        let um_per_px = (sensor.grid.metres_per_px * 1e6) as f32;
         Ok(FilmFrame {
             time_s: state.time_s,
             contact_force_n: state.contact_force_n,
@@ -159,7 +160,7 @@ impl Film {
             pull_px: [pull.x, pull.y],
             camera: None,
             image: finish(sensor, Some(&change), None),
-            cell_of_px: map.of_contact(depth, [moved_m.x / a, moved_m.y / a]),
+            cell_of_px: map.of_contact(depth, &sensor.grid, [moved_m.x, moved_m.y]),
             depth_um: depth.values.iter().map(|&d| (d * um_per_px + 0.5) as u16).collect(),
             cells: cells.to_vec(),
             markers_px,

@@ -2,13 +2,13 @@
 
 use crate::film::{Film, Seen};
 use crate::gpu::Gpu;
-use crate::gripped::{Contact, Gripped};
+use crate::gripped::{Contact, Gripped, Indenter};
 use crate::library::Library;
 use crate::project::Project;
 use crate::sample::{SampleError, SimulateOptions};
 use gripgen_physics::{
     JawFriction, PatchFriction, PullSession, PullState, Signals, Until, creep_of, pull_staircase_seen,
-    sensor_chain, staircase_of,
+    sensor_chain, slip_onset_force_n, staircase_of,
 };
 use gripgen_tactile::{Imprint, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, Mechanics};
@@ -16,14 +16,15 @@ use gripgen_twin::effects::CommandChain;
 use gripgen_twin::label::check::suspect_simulated;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{
-    FilmPace, GripFriction, ImprintSummary, Outcome, Part, PerJaw, Pulled, Sample, Scenario, TactileImage,
-    Twin, slip_label,
+    FilmPace, GripFriction, ImprintSummary, OpticsState, Outcome, Part, PerJaw, Pulled, Sample, Scenario,
+    TactileImage, Twin, slip_label,
 };
+use std::borrow::Cow;
 use std::sync::Arc;
 
-/// What a sample shows of a grip beside the data that is stored: for pictures.
+/// What a sample shows of a grip in addition to the data that is stored: for pictures.
 pub struct GripImprints {
-    /// Imprints of both jaws.
+    /// Imprints of both jaws on the pixels of their images, without optics effects; patches are those of the pads.
     pub imprint: PerJaw<Imprint>,
     /// Sensors of both jaws.
     pub sensors: PerJaw<Arc<Sensor>>,
@@ -137,13 +138,22 @@ pub fn pull_session(
     contact: &Contact,
 ) -> Result<(PullSession, PerJaw<GripFriction>, f64), SampleError> {
     let (friction, law, scatter) = held_friction(twin, scenario, contact)?;
+    Ok((started(twin, scenario, contact, &friction), law, scatter))
+}
+
+fn started(
+    twin: &Twin,
+    scenario: &Scenario,
+    contact: &Contact,
+    friction: &PerJaw<JawFriction>,
+) -> PullSession {
     let signals = Signals {
         noise: Stream::new(scenario.seed, scenario.index, Purpose::ForceNoise),
         sensor: sensor_chain(twin, scenario),
         command: CommandChain::new(twin, &scenario.part),
         creep: creep_of(twin, scenario, &contact.force_n),
     };
-    Ok(((*contact.held).clone().pull(&friction, signals), law, scatter))
+    (*contact.held).clone().pull(friction, signals)
 }
 
 /// What the jaws hold in this repetition, the friction laws of both, and the factor of its scatter.
@@ -192,18 +202,30 @@ fn pull(
     gripped: &Gripped,
     options: SimulateOptions,
     gpu: Option<&Gpu>,
-    see: impl FnMut(&PullState),
+    mut see: impl FnMut(&PullState),
 ) -> Result<Outcome, SampleError> {
     let images =
         if options.images { Some(gripped.images(twin, scenario, options.noise, gpu)?) } else { None };
     let Some(contact) = &gripped.contact else {
         return Ok(Outcome::NoContact { images });
     };
-    let (mut session, law, scatter) = pull_session(twin, scenario, contact)?;
+    let (friction, law, factor) = held_friction(twin, scenario, contact)?;
+    let onset_n = slip_onset_force_n(&twin.gel, &friction);
+    let (mut slip_onset_s, mut slip_s) = (None, None);
+    let watched = |state: &PullState| {
+        if state.sliding && slip_s.is_none() {
+            slip_s = Some(state.time_s);
+        }
+        if slip_onset_s.is_none() && (state.sliding || state.contact_force_n > onset_n) {
+            slip_onset_s = Some(state.time_s);
+        }
+        see(state);
+    };
+    let mut session = started(twin, scenario, contact, &friction);
     let mut jitter = Stream::new(scenario.seed, scenario.index, Purpose::StepJitter);
     let staircase = staircase_of(&scenario.pull, &mut jitter);
     let until = if options.trace { Until::Stopped } else { Until::Decided };
-    let result = pull_staircase_seen(&mut session, &staircase, &scenario.pull, until, see)?;
+    let result = pull_staircase_seen(&mut session, &staircase, &scenario.pull, until, watched)?;
     let label = slip_label(&result.trace, scenario.pull.label_tolerance_n, result.slid)?;
     // A pull that ends as soon as its label is decided has no whole trace.
     let suspect = if options.trace { suspect_simulated(twin, scenario, &result.trace, &label) } else { None };
@@ -214,11 +236,16 @@ fn pull(
         grasp: held.grasp.clone(),
         imprint: summary,
         images,
-        mu: mean_mu(&law, force_n) * scatter,
+        mu_drawn: twin.parts[&scenario.part].mu * scatter(&twin.parts[&scenario.part], scenario),
+        mu_effective: mean_mu(&law, force_n) * factor,
         outside_fit: law.left.outside_fit || law.right.outside_fit,
         lag_exceeds_tolerance: lag_exceeds_tolerance(twin, scenario),
         trace: result.trace,
         label,
+        forces: result.forces,
+        limit_force_n: friction.left.limit_n() + friction.right.limit_n(),
+        slip_onset_s,
+        slip_s,
         suspect,
     })))
 }
@@ -243,7 +270,11 @@ pub fn press_only(
         level: SimdLevel::best(),
     };
     let Gripped { sensors, contact, .. } = Gripped::new(twin, library, scenario, options)?;
-    Ok(contact.map(|c| GripImprints { imprint: c.imprint, sensors }))
+    let Some(Contact { held, imprint, force_n }) = contact else { return Ok(None) };
+    let press = Indenter::new(twin, library, scenario, &force_n, &held.grasp, options.level)?;
+    let plain = OpticsState::default();
+    let imprint = PerJaw::try_from_fn(|jaw| press.seen(jaw, &imprint[jaw], &plain).map(Cow::into_owned))?;
+    Ok(Some(GripImprints { imprint, sensors }))
 }
 
 /// Whether the steady lag error of the force loop, `dF / dt (tau + T)`, is more than half the label tolerance.

@@ -9,13 +9,14 @@ use gripgen_physics::{
     Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip, grip_point, pull_direction,
 };
 use gripgen_tactile::gpu::makes;
-use gripgen_tactile::{ClusteredMesh, Imprint, Plane, Renderer, Sensor, SimdLevel};
+use gripgen_tactile::{ClusteredMesh, Imprint, Pad, Plane, Renderer, Sensor, SimdLevel};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
 use gripgen_twin::effects::{imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
 use gripgen_twin::frames::{pose, rotation_about_axis};
 use gripgen_twin::image::pixel_noise::PixelNoise;
 use gripgen_twin::{Grasp, Jaw, OpticsState, Part, PerJaw, Scenario, TactileImage, Twin};
 use nalgebra::Vector3;
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Smallest normal force of a jaw that still grips.
@@ -65,18 +66,16 @@ impl Gripped {
             return Self::at_rest(twin, library, scenario, options);
         };
         let press = Indenter::new(twin, library, scenario, &force_n, &held.grasp, options.level)?;
-        let imprint = press.imprints(None)?;
+        let imprint = press.felt()?;
         let look = if !options.images {
             None
-        } else if options.backend == Backend::Gpu && on_device(twin, &sensors, &optics) {
+        } else if options.backend == Backend::Gpu && press.on_device(&optics) {
             Some(Look::Parts(press.parts))
         } else {
-            // Optics effects are seen and not felt: where they change the imprint, the image has its own.
-            let apart = Jaw::BOTH.iter().any(|&jaw| optics[jaw].changes_press());
-            let seen = apart.then(|| press.imprints(Some(&optics))).transpose()?;
-            let seen = seen.as_ref().unwrap_or(&imprint);
-            let change = |jaw: Jaw| press.renderer(jaw).change_seen(Some(&seen[jaw]), &optics[jaw]);
-            Some(Look::Change(PerJaw::from_fn(change)))
+            Some(Look::Change(PerJaw::try_from_fn(|jaw| {
+                let seen = press.seen(jaw, &imprint[jaw], &optics[jaw])?;
+                Ok::<_, SampleError>(press.renderer(jaw).change_seen(Some(&*seen), &optics[jaw]))
+            })?))
         };
         Ok(Self { sensors, contact: Some(Contact { held, imprint, force_n }), look })
     }
@@ -138,11 +137,6 @@ impl Gripped {
             gripgen_tactile::finish(&self.sensors[jaw], change, key(jaw))
         }))
     }
-}
-
-/// Whether a graphics processor makes the images of both jaws.
-fn on_device(twin: &Twin, sensors: &PerJaw<Arc<Sensor>>, optics: &PerJaw<OpticsState>) -> bool {
-    Jaw::BOTH.iter().all(|&jaw| optics[jaw].is_neutral() && makes(&sensors[jaw], &twin.gel[jaw]))
 }
 
 /// Real normal force of each jaw. An error if an effect leaves a jaw none.
@@ -219,17 +213,50 @@ impl<'a> Indenter<'a> {
         Renderer { sensor: &self.sensors[jaw], gel: &self.twin.gel[jaw], level: self.level }
     }
 
-    /// What the jaws feel, or with `optics` what their cameras see.
-    pub fn imprints(&self, optics: Option<&PerJaw<OpticsState>>) -> Result<PerJaw<Imprint>, SampleError> {
+    /// Whether a graphics processor makes the images of both jaws: it solves the contact on the pixels of the image, so that these have
+    /// to be those of the pad.
+    fn on_device(&self, optics: &PerJaw<OpticsState>) -> bool {
+        Jaw::BOTH.iter().all(|&jaw| {
+            let renderer = self.renderer(jaw);
+            optics[jaw].is_neutral() && renderer.sees_pad() && makes(renderer.sensor, renderer.gel)
+        })
+    }
+
+    /// What the jaws feel: the contact with both pads.
+    ///
+    /// # Errors
+    ///
+    /// A part beside a pad, or a press deeper than a gel.
+    pub fn felt(&self) -> Result<PerJaw<Imprint>, SampleError> {
         PerJaw::try_from_fn(|jaw| {
             let PlacedPart { gel_from_mesh, imprint_m3_per_n, force_n, .. } = &self.parts[jaw];
-            let (renderer, c) = (self.renderer(jaw), *imprint_m3_per_n);
-            let pressed = match optics {
-                None => renderer.press(&self.mesh, gel_from_mesh, c, *force_n),
-                Some(o) => renderer.press_seen(&self.mesh, gel_from_mesh, c, *force_n, &o[jaw]),
-            };
-            pressed.map_err(|source| SampleError::Indent { jaw, source })
+            let pad = Pad { gel: &self.twin.gel[jaw], level: self.level };
+            let felt = pad.press(&self.mesh, gel_from_mesh, *imprint_m3_per_n, *force_n);
+            felt.map_err(|source| SampleError::Indent { jaw, source })
         })
+    }
+
+    /// What the camera of a jaw sees of `felt`. Optics effects are seen and not felt: where they change the imprint, the camera has
+    /// its own.
+    ///
+    /// # Errors
+    ///
+    /// As [`Indenter::felt`].
+    pub fn seen<'i>(
+        &self,
+        jaw: Jaw,
+        felt: &'i Imprint,
+        optics: &OpticsState,
+    ) -> Result<Cow<'i, Imprint>, SampleError> {
+        let PlacedPart { gel_from_mesh, imprint_m3_per_n, force_n, .. } = &self.parts[jaw];
+        let renderer = self.renderer(jaw);
+        if !optics.changes_press() {
+            return Ok(renderer.seen(&self.mesh, gel_from_mesh, felt, optics));
+        }
+        let pad = Pad { gel: renderer.gel, level: self.level };
+        let own = pad.press_seen(&renderer, &self.mesh, gel_from_mesh, *imprint_m3_per_n, *force_n, optics);
+        let own = own.map_err(|source| SampleError::Indent { jaw, source })?;
+        Ok(Cow::Owned(renderer.seen(&self.mesh, gel_from_mesh, &own, optics).into_owned()))
     }
 }
 
@@ -310,5 +337,5 @@ pub fn try_grip(twin: &Twin, library: &Library, scenario: &Scenario) -> Result<b
     let force_n = jaw_forces_n(twin, scenario)?;
     let Some(held) = held(twin, library, scenario, force_n, Mechanics::Reduced)? else { return Ok(false) };
     let press = Indenter::new(twin, library, scenario, &force_n, &held.grasp, SimdLevel::best())?;
-    press.imprints(None).map(|_| true)
+    press.felt().map(|_| true)
 }

@@ -54,6 +54,8 @@ fn slip_runs_from_the_rim_inwards() {
     assert_eq!(all.len(), 12);
     let stiffness = p.twin.gel.left.shear_stiffness_n_per_m + p.twin.gel.right.shear_stiffness_n_per_m;
     let (first, whole) = (film.incipient_slip_s.unwrap(), film.whole_slip_s.unwrap());
+    // Those of the label come from the forces alone, these from every cell.
+    assert_eq!((pulled.slip_onset_s, pulled.slip_s), (Some(first), Some(whole)));
     assert!(0.0 < first && first < whole && whole <= pulled.label.slip_time_s, "{first} {whole}");
     let (mut held, mut slipping, mut slid) = (0, 0, 0);
     for both in &all {

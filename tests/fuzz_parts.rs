@@ -199,7 +199,7 @@ fn check(seen: &mut Seen, project: &Project, mesh: &TriMesh, index: u64, pulled:
     let scenario = project.sweep.scenario(index, &project.twin).0;
     let part = &project.twin.parts["part"];
     assert!(pulled.label.max_pull_force_n.is_finite() && pulled.label.max_pull_force_n >= 0.0);
-    assert!(pulled.label.slip_time_s.is_finite() && pulled.mu.is_finite());
+    assert!(pulled.label.slip_time_s.is_finite() && pulled.mu_effective.is_finite());
     for (jaw, imprint) in pulled.imprint.iter() {
         let ImprintSummary { press_depth_m, patch } = imprint;
         let cells_are_numbers = patch.cells.iter().all(|c| {

@@ -145,7 +145,7 @@ fn grips_that_miss_and_pulls_that_end_early_keep_their_meaning() {
             let images = record.images.expect("every grip has images");
             if record.sample.grip_offset_mm == 60.0 {
                 assert_eq!(record.sample.status(), Status::NoContact);
-                assert_eq!((record.sample.max_pull_force_n, record.sample.mu), (Some(0.0), None));
+                assert_eq!((record.sample.max_pull_force_n, record.sample.mu_effective), (Some(0.0), None));
                 assert!(record.trace.is_none() && record.sample.left.is_none());
                 assert!(row.contains(",no_contact,"), "{row}");
             } else {

@@ -47,6 +47,7 @@ fn heights_on_a_dome_are_taxims() {
         let imprint = Imprint {
             depth_px: Plane { values: depth, ..z0.clone() },
             press_depth_m: press_mm * 1e-3,
+            lift_m: 0.0,
             patch: ContactPatch::default(),
             places: Default::default(),
             elastic: None,

@@ -36,6 +36,8 @@ mod fuzz_inputs;
 mod fuzz_parts;
 // Effects of the library, through the whole pipeline.
 mod effects;
+// Labels of a sample, and what they depend on.
+mod labels;
 // The elastic gel, also beside the pyramid on real presses.
 mod elastic;
 // Films of pulls.

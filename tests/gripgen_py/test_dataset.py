@@ -75,7 +75,7 @@ def test_a_row_has_its_values_and_slices_are_datasets(run):
     assert sample.images.shape == (2, 240, 320, 3)
     assert sample.values["part"] == ds.column("part")[4]
     assert len(ds[2:6]) == 4 and ds[2:6][0].values["index"] == 2.0
-    assert [s.max_pull_force_n for s in ds] == ds.column("max_pull_force_n").tolist()
+    assert [s.label_n for s in ds] == ds.column("max_pull_force_n").tolist()
     with pytest.raises(IndexError, match="no row 16, the dataset has 16"):
         ds[16]
 

@@ -24,7 +24,7 @@ def stream(**more):
 def test_a_stream_is_the_run_without_its_folder(run):
     ds = gg.load(run)
     wanted, labels = ds.batch(range(len(ds)))
-    columns = ["index", "part", "grip_force_n", "grip_pose", "mu", "shard", "in_shard", "status"]
+    columns = ["index", "part", "grip_force_n", "grip_pose", "mu_effective", "shard", "in_shard", "status"]
     for jobs, ahead in ((1, 1), (3, None), (2, 40)):
         found = list(stream(jobs=jobs, ahead=ahead, columns=columns))
         assert [len(batch.max_pull_force_n) for batch in found] == [5, 5, 5, 1]

@@ -41,7 +41,7 @@ def test_a_tar_file_holds_the_run(run, tmp_path):
         for jaw, name in enumerate(("left.png", "right.png")):
             assert (np.asarray(Image.open(io.BytesIO(files[name]))) == batch.images[i, jaw]).all()
         cells = json.loads(files["json"])
-        assert cells["max_pull_force_n"] == pytest.approx(batch.max_pull_force_n[i], rel=1e-6)
+        assert cells["max_pull_force_n"] == pytest.approx(batch.label_n[i], rel=1e-6)
         assert cells["index"] == i and isinstance(cells["index"], int) and cells["part"] == ds.column("part")[i]
         assert cells["failure"] is None and cells["status"] == "slipped"
         assert isinstance(cells["group"], int) and isinstance(cells["grip_force_n"], float)
@@ -72,7 +72,7 @@ def test_webdataset_reads_it(run, tmp_path):
     ds = gg.load(run)
     seen = 0
     for i, (left, right, cells, trace) in enumerate(rows):
-        images, label = ds[i].images, ds[i].max_pull_force_n
+        images, label = ds[i].images, ds[i].label_n
         assert (left == images[0]).all() and (right == images[1]).all()
         assert cells["max_pull_force_n"] == pytest.approx(label) and trace.shape[1] == 4
         seen += 1

@@ -63,7 +63,7 @@ def test_every_sample_is_what_the_index_says(run):
             assert int(row["in_shard"]) == place
             assert sample.index == int(row["index"])
             assert sample.part == row["part"]
-            for column in ["grip_force_n", "grip_angle_deg", "max_pull_force_n", "slip_time_s", "mu"]:
+            for column in ["grip_force_n", "grip_angle_deg", "max_pull_force_n", "slip_time_s", "mu_effective"]:
                 assert getattr(sample, column) == float(row[column]), column
 
 
@@ -97,7 +97,7 @@ def test_the_label_follows_from_the_trace(run):
 def test_labels_are_the_friction_law(run):
     """2 mu F_G, with what the sensor's noise adds to one reading."""
     for row in index(run):
-        ideal = 2 * float(row["mu"]) * float(row["grip_force_n"])
+        ideal = 2 * float(row["mu_effective"]) * float(row["grip_force_n"])
         assert float(row["max_pull_force_n"]) == pytest.approx(ideal, abs=0.6)
 
 
@@ -132,7 +132,7 @@ def test_the_resolved_configuration_travels_with_the_data(run):
         attachments = {a.name: a.data for a in make_reader(file, validate_crcs=True).iter_attachments()}
     config = tomllib.loads(attachments["config.toml"].decode())
     assert config["sweep"]["vary"]["grip_force_n"] == [20, 30]
-    assert config["twin"]["parts"]["gear"]["mu"] == 0.15
+    assert config["twin"]["parts"]["gear"]["mu_effective"] == 0.15
     about = json.loads((run / "run.json").read_text())
     assert about["config_sha256"] == metadata(run / "shard-00000.mcap")["gripgen.shard"]["config_sha256"]
 

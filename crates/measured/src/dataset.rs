@@ -5,6 +5,7 @@ use crate::pulls::{
 };
 use gripgen_record::{Dataset, DatasetError, MeasuredRows, PictureFileError, Table, status_name};
 use gripgen_twin::columns::recorded_covariates;
+use gripgen_twin::label::forces::PullForces;
 use gripgen_twin::{MeasuredPull, PULLS_SINCE_REST, Values};
 use std::path::Path;
 
@@ -78,6 +79,15 @@ fn columns(judged: &JudgedPulls) -> Vec<(String, Values)> {
         columns.push((extra.name.clone(), values));
     }
     columns.push(("max_pull_force_n".into(), numbers(&|p| p.max_pull_force_n)));
+    if pulls.iter().any(|p| p.trace.is_some()) {
+        let forces: Vec<PullForces> =
+            pulls.iter().map(|p| p.trace.as_ref().map_or(PullForces::default(), PullForces::of)).collect();
+        let of = |f: fn(&PullForces) -> Option<f64>| {
+            Values::Numbers(forces.iter().map(|all| f(all).unwrap_or(f64::NAN)).collect())
+        };
+        columns.push(("peak_force_n".into(), of(|f| f.peak_force_n)));
+        columns.push(("kinetic_force_n".into(), of(|f| f.kinetic_force_n)));
+    }
     let reasons = standing.iter().map(|s| s.reason.clone()).collect();
     columns.push(("status_reason".into(), Values::Words(reasons)));
     columns

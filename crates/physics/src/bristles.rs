@@ -6,6 +6,15 @@ use gripgen_twin::{Gel, PerJaw};
 /// Cells are padded to a multiple of this, so that sums have one fixed order whatever the vector unit.
 const LANES: usize = 8;
 
+/// Force along the pull above which the first cell of the contact slides, N: all cells are sheared alike until then.
+pub fn slip_onset_force_n(gel: &PerJaw<Gel>, friction: &PerJaw<JawFriction>) -> f64 {
+    let (bristles, _) = Bristles::new(gel, friction);
+    let columns = bristles.reach_m.iter().zip(&bristles.stiffness_n_per_m);
+    let reach_m =
+        columns.filter(|(_, k)| **k > 0.0).fold(f64::INFINITY, |least, (reach, _)| least.min(*reach));
+    bristles.total_n_per_m * reach_m
+}
+
 /// The bristles of both jaws, one column each.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bristles {

@@ -54,6 +54,7 @@ mod urdf;
 mod world;
 
 pub use arm::{ArmError, ArmJoint, ArmMesh, ArmModel, LinkInertia, PlacedArm, UrdfError};
+pub use bristles::slip_onset_force_n;
 pub use cache::Cache;
 pub use cells::PullCells;
 pub use grip::{Grip, Held, grip};

@@ -1,6 +1,7 @@
 //! The pull of the experiment: a force staircase until the jaws slip.
 
 use crate::session::{Command, PullError, PullSession, PullState};
+use gripgen_twin::label::forces::{PeakSearch, PullForces};
 use gripgen_twin::random::Stream;
 use gripgen_twin::{PullEnd, PullSettings, PullTrace, Staircase, TraceRow};
 
@@ -13,6 +14,8 @@ pub struct StaircaseResult {
     pub end: PullEnd,
     /// Whether the jaws slid on the part, or crept along it to the stop; if not, the label is a lower bound.
     pub slid: bool,
+    /// Peak and sliding friction.
+    pub forces: PullForces,
 }
 
 /// How far a pull goes.
@@ -20,7 +23,7 @@ pub struct StaircaseResult {
 pub enum Until {
     /// To the displacement stop, for its trace.
     Stopped,
-    /// Until its label cannot change any more: the same label, about a third of the steps less.
+    /// Until its label and its forces cannot change any more: the same numbers, about a third of the steps less.
     Decided,
 }
 
@@ -65,6 +68,7 @@ pub fn pull_staircase_seen(
     mut see: impl FnMut(&PullState),
 ) -> Result<StaircaseResult, PullError> {
     let mut trace = PullTrace::default();
+    let (mut search, mut is_found) = (PeakSearch::default(), false);
     let rate_hz = session.rate_hz();
     let mut tick = 0_u64;
     let end = loop {
@@ -78,12 +82,13 @@ pub fn pull_staircase_seen(
             measured_force_n: state.measured_force_n,
             displacement_m: state.displacement_m,
         });
+        is_found = is_found || search.take(&trace, tick as usize);
         if state.displacement_m > pull.stop_m {
             break PullEnd::Displacement;
         }
         // The measured force stays below what the jaws hold, the command only rises.
         let undecided = desired_force_n - pull.label_tolerance_n <= session.largest_reading_n();
-        if until == Until::Decided && session.has_slid() && !undecided {
+        if until == Until::Decided && session.has_slid() && !undecided && is_found {
             break PullEnd::Decided;
         }
         if pull.max_force_n.is_some_and(|limit| desired_force_n > limit) {
@@ -97,5 +102,6 @@ pub fn pull_staircase_seen(
     };
     // Creep as far as the stop is the part lost, as slip is; gels whose shear alone reaches it still hold.
     let crept = end == PullEnd::Displacement && session.crept_m() > 0.5 * pull.stop_m;
-    Ok(StaircaseResult { trace, end, slid: session.has_slid() || crept })
+    let forces = search.forces(&trace);
+    Ok(StaircaseResult { trace, end, slid: session.has_slid() || crept, forces })
 }

@@ -79,6 +79,15 @@ impl Dataset {
         Ok(found)
     }
 
+    /// What each column is to somebody who trains on it: "place", "input", "label" or "answer".
+    fn roles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = PyDict::new(py);
+        for (name, _) in self.rows.table().columns() {
+            found.set_item(name, self.rows.role(name).name())?;
+        }
+        Ok(found)
+    }
+
     /// Images of these rows: uint8[B, 2, H, W, 3], left jaw first. `threads` share the decoding.
     /// `noise`: "stored" (that of the sample), "off", or "again" (other noise, that of a `pass_`), where images are stored without it.
     #[pyo3(signature = (rows, threads = 1, noise = "stored", pass_ = 0))]

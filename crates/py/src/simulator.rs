@@ -6,6 +6,7 @@ use gripgen::record::proto::gripgen_v1::Status;
 use gripgen::record::status_name;
 use gripgen::twin::config::Mechanics;
 use gripgen::twin::draw::Drawn;
+use gripgen::twin::label::forces::LabelBranch;
 use gripgen::twin::{Outcome, PerJaw, PullTrace, Sample, TactileImage};
 use gripgen::{Draw, Location, Simulator as Twin};
 use numpy::{PyArray, PyArray1, PyArray4, PyArrayMethods};
@@ -142,7 +143,21 @@ fn dict_of(py: Python<'_>, sample: Sample, trace: bool) -> PyResult<Bound<'_, Py
             }
             found.set_item("max_pull_force_n", pulled.label.max_pull_force_n)?;
             found.set_item("slip_time_s", pulled.label.slip_time_s)?;
-            found.set_item("mu", pulled.mu)?;
+            found.set_item("mu_drawn", pulled.mu_drawn)?;
+            found.set_item("mu_effective", pulled.mu_effective)?;
+            found.set_item("limit_force_n", pulled.limit_force_n)?;
+            let forces = &pulled.forces;
+            let optional = [
+                ("peak_force_n", forces.peak_force_n),
+                ("kinetic_force_n", forces.kinetic_force_n),
+                ("slip_onset_s", pulled.slip_onset_s),
+                ("slip_s", pulled.slip_s),
+            ];
+            for (name, value) in optional {
+                found.set_item(name, value.unwrap_or(f64::NAN))?;
+            }
+            let branch = forces.branch(pulled.label.slip_time_s);
+            found.set_item("label_branch", branch.map_or("", LabelBranch::name))?;
             found.set_item("outside_fit", pulled.outside_fit)?;
             found.set_item("images", pulled.images.as_ref().map(|i| image_array(py, i)).transpose()?)?;
             if trace {

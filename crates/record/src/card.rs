@@ -6,7 +6,7 @@ use gripgen_twin::columns::find;
 use std::fmt::Write;
 
 /// What columns are that no pull has beside them.
-const ABOUT: [(&str, &str, &str); 10] = [
+const ABOUT: [(&str, &str, &str); 17] = [
     ("index", "", "index of the sample in its run"),
     ("sample_index", "", "index of the sample in its run"),
     (
@@ -16,7 +16,14 @@ const ABOUT: [(&str, &str, &str); 10] = [
     ),
     ("max_pull_force_n", "N", "the label: the measured pull force at slip"),
     ("slip_time_s", "s", "when it slips, since the start of the pull"),
-    ("mu", "1", "friction coefficient that was drawn or set"),
+    ("peak_force_n", "N", "largest mean over 20 ms while the jaws held"),
+    ("kinetic_force_n", "N", "median from 0.2 to 1 mm past the peak: friction of jaws that slide"),
+    ("label_branch", "", "static or kinetic: where the label was read"),
+    ("limit_force_n", "N", "what both jaws held, without noise and label rule"),
+    ("slip_onset_s", "s", "when the first part of the contact slid"),
+    ("slip_s", "s", "when all of it did"),
+    ("mu_drawn", "1", "friction coefficient of the part as it was drawn for this grip"),
+    ("mu_effective", "1", "friction coefficient that acted, after friction laws and contact"),
     ("group", "", "repetitions of one configuration share it"),
     ("repetition", "", "which repetition"),
     ("pull_id", "", "what the pull is called in its table"),
@@ -30,6 +37,8 @@ pub(crate) fn facts(dataset: &Dataset) -> String {
          were read or made, with the noise of the sensor, without loss.\n\n\
          **Split** by `group` (repetitions of one configuration share it), or by `part`, never by row: repetitions are nearly the same sample. \
          Leave `failed` and `suspect` rows out of training.\n\n\
+         **Inputs, labels, answers**: an input is known before the pull, a label came out of it. An answer (`answer.` in its name) is what \
+         only the simulation knows: a network that is given one predicts nothing that a robot could.\n\n\
          **Licence**: gripgen is MIT OR Apache-2.0 and claims nothing of what it makes; whoever publishes these data chooses theirs. The meshes and \
          sensor files that they were made with may have terms of their own.\n",
     );
@@ -48,13 +57,14 @@ pub(crate) fn facts(dataset: &Dataset) -> String {
 
 /// The columns of the table with their units, in Markdown; `renamed` says what they are called in the files.
 pub(crate) fn columns(dataset: &Dataset, renamed: impl Fn(&str) -> String) -> String {
-    let mut text = String::from("| column | unit | what it is |\n|---|---|---|\n");
+    let mut text = String::from("| column | role | unit | what it is |\n|---|---|---|---|\n");
     for (name, values) in dataset.table().columns() {
         let known = find(name).map(|c| (c.unit, c.about));
         let beside = || ABOUT.iter().find(|(n, ..)| n == name).map(|(_, unit, about)| (*unit, *about));
         let kind = if matches!(values, Values::Words(_)) { "a word" } else { "a number" };
         let (unit, about) = known.or_else(beside).unwrap_or(("", kind));
-        let _ = writeln!(text, "| `{}` | {unit} | {about} |", renamed(name));
+        let role = dataset.role(name).name();
+        let _ = writeln!(text, "| `{}` | {role} | {unit} | {about} |", renamed(name));
     }
     text
 }

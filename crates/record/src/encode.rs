@@ -11,6 +11,7 @@ use gripgen_twin::config::{ImageStorage, TraceStorage};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::image::pixel_noise::PixelNoise;
+use gripgen_twin::label::forces::PullForces;
 use gripgen_twin::{
     ImprintSummary, Jaw, Outcome, PerJaw, PullTrace, Sample, Scenario, SlipLabel, TactileImage,
 };
@@ -185,7 +186,10 @@ fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sampl
         Outcome::Pulled(p) => {
             set_label(&mut message, &p.label);
             set_suspect(&mut message, p.suspect.as_deref());
-            message.mu = Some(p.mu);
+            set_forces(&mut message, &p.forces);
+            message.limit_force_n = Some(p.limit_force_n);
+            (message.slip_onset_s, message.slip_s) = (p.slip_onset_s, p.slip_s);
+            (message.mu_drawn, message.mu_effective) = (Some(p.mu_drawn), Some(p.mu_effective));
             message.outside_fit = p.outside_fit;
             message.lag_exceeds_tolerance = p.lag_exceeds_tolerance;
             let contact = |jaw| {
@@ -196,7 +200,10 @@ fn sample_message(sample: &Sample, timestamp: Option<Timestamp>) -> proto::Sampl
         }
         Outcome::NoContact { .. } => {
             message.set_status(proto::Status::NoContact);
+            // Jaws that hold nothing: every force is 0.
             message.max_pull_force_n = Some(0.0);
+            (message.peak_force_n, message.kinetic_force_n) = (Some(0.0), Some(0.0));
+            message.limit_force_n = Some(0.0);
         }
         Outcome::Failed { reason } => {
             message.set_status(proto::Status::Failed);
@@ -212,6 +219,13 @@ pub(crate) fn set_label(message: &mut proto::Sample, label: &SlipLabel) {
     message.max_pull_force_n = Some(label.max_pull_force_n);
     message.slip_time_s = Some(label.slip_time_s);
     message.censored = label.censored;
+}
+
+/// Forces of a trace in addition to its label, which has been set.
+pub(crate) fn set_forces(message: &mut proto::Sample, forces: &PullForces) {
+    (message.peak_force_n, message.kinetic_force_n) = (forces.peak_force_n, forces.kinetic_force_n);
+    let branch = message.slip_time_s.and_then(|slip_time_s| forces.branch(slip_time_s));
+    message.label_branch = branch.map_or(String::new(), |branch| branch.name().into());
 }
 
 /// The status of a label that evidence contradicts; the label stays.

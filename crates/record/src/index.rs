@@ -2,13 +2,16 @@
 
 use crate::proto::gripgen_v1::{Sample, Status};
 use crate::stored::{sample_covariates, sample_view};
-use gripgen_twin::columns::{COLUMNS, END_OF_SAMPLE, PLACE_OF_SAMPLE, find};
+use gripgen_twin::columns::{
+    ANSWERS_OF_SAMPLE, COLUMNS, END_OF_SAMPLE, LABELS_OF_SAMPLE, PLACE_OF_SAMPLE, find,
+};
 use std::sync::LazyLock;
 
 /// The fixed columns: the place of a sample, the columns of a pull, how it ended.
 pub static INDEX_COLUMNS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
     let of_pulls = COLUMNS.iter().filter(|c| c.indexed).map(|c| c.name);
-    PLACE_OF_SAMPLE.into_iter().chain(of_pulls).chain(END_OF_SAMPLE).collect()
+    let ends = LABELS_OF_SAMPLE.into_iter().chain(ANSWERS_OF_SAMPLE).chain(END_OF_SAMPLE);
+    PLACE_OF_SAMPLE.into_iter().chain(of_pulls).chain(ends).collect()
 });
 
 /// The name of a status in the index and on screens.
@@ -39,7 +42,14 @@ pub fn index_row(sample: &Sample, extra_columns: &[String]) -> Vec<String> {
             "status" => status_name(sample.status()).into(),
             "max_pull_force_n" => optional(sample.max_pull_force_n),
             "slip_time_s" => optional(sample.slip_time_s),
-            "mu" => optional(sample.mu),
+            "peak_force_n" => optional(sample.peak_force_n),
+            "kinetic_force_n" => optional(sample.kinetic_force_n),
+            "label_branch" => sample.label_branch.clone(),
+            "limit_force_n" => optional(sample.limit_force_n),
+            "slip_onset_s" => optional(sample.slip_onset_s),
+            "slip_s" => optional(sample.slip_s),
+            "mu_drawn" => optional(sample.mu_drawn),
+            "mu_effective" => optional(sample.mu_effective),
             "group" => sample.group.to_string(),
             "repetition" => sample.repetition.to_string(),
             // One column for both: why there is no label, or none to be relied on.

@@ -140,7 +140,7 @@ impl Layout {
         let cells = table.columns().iter().map(|(name, values)| {
             // A whole number that is not there has no integer.
             let whole = table.is_whole(name) && numbers(name);
-            (name.clone(), Field::of(&renamed(name), values, whole))
+            (name.clone(), Field::of(&renamed(dataset, name), values, whole))
         });
         Self { options, state, cells: cells.collect() }
     }
@@ -170,11 +170,11 @@ impl Layout {
 }
 
 /// What a column of the table is called: LeRobot has an `index` of its own, and no slashes.
-fn renamed(name: &str) -> String {
+fn renamed(dataset: &Dataset, name: &str) -> String {
     match name {
         "index" => "sample_index".into(),
         name if TAKEN.contains(&name) => format!("pull.{name}"),
-        name => name.replace('/', "_"),
+        name => dataset.exported_name(name).replace('/', "_"),
     }
 }
 
@@ -387,7 +387,7 @@ fn readme(dataset: &Dataset, layout: &Layout, episodes: usize) -> String {
          have no statistics of their own. The split in `meta/info.json` names all of them.\n\n{}\n{}{}",
         layout.state.join(", "),
         card::facts(dataset),
-        card::columns(dataset, renamed),
+        card::columns(dataset, |name| renamed(dataset, name)),
         card::configuration(dataset)
     )
 }

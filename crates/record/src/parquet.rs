@@ -105,8 +105,11 @@ fn write_both<W: Write + Send>(
 
 fn fields(dataset: &Dataset, options: ExportOptions) -> Vec<Field> {
     let table = dataset.table();
-    let mut fields: Vec<Field> =
-        table.columns().iter().map(|(name, values)| Field::of(name, values, table.is_whole(name))).collect();
+    let mut fields: Vec<Field> = table
+        .columns()
+        .iter()
+        .map(|(name, values)| Field::of(&dataset.exported_name(name), values, table.is_whole(name)))
+        .collect();
     if options.images {
         let rest = ["left_rest_png", "right_rest_png"].into_iter().filter(|_| dataset.has_rest());
         fields.extend(

@@ -83,7 +83,11 @@ fn cells(dataset: &Dataset, row: usize) -> Value {
         // What is not a number is null in JSON.
         Values::Numbers(x) => json!(x[row]),
     };
-    let all = dataset.table().columns().iter().map(|(name, column)| (name.clone(), cell(name, column)));
+    let all = dataset
+        .table()
+        .columns()
+        .iter()
+        .map(|(name, column)| (dataset.exported_name(name), cell(name, column)));
     Value::Object(all.collect::<Map<_, _>>())
 }
 
@@ -114,7 +118,7 @@ fn about(dataset: &Dataset) -> String {
          - `KEY.json`: the columns below; `max_pull_force_n` is the label\n\
          - `KEY.trace.npy`: float32 (rows, 4): time_s, desired_force_n, measured_force_n, displacement_mm\n\n{}\n{}{}",
         card::facts(dataset),
-        card::columns(dataset, str::to_string),
+        card::columns(dataset, |name| dataset.exported_name(name)),
         card::configuration(dataset)
     )
 }

@@ -137,6 +137,7 @@ pub fn press_elastic(
     Ok(Imprint {
         depth_px: plane(depth),
         press_depth_m: press_px * a,
+        lift_m: (press_px - f64::from(top)) * a,
         patch,
         places,
         elastic: Some(ElasticField { surface_px: plane(surface), pressure_pa }),

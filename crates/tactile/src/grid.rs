@@ -3,7 +3,7 @@
 use gripgen_twin::TactileImage;
 
 /// The pixel grid of a sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Grid {
     /// Columns.
     pub width_px: usize,

@@ -1,5 +1,6 @@
 //! Stage `indent`: how deep the part sinks into the gel, and the pressure that follows.
 
+use crate::convolve::Area;
 use crate::grid::{Grid, Plane};
 use crate::patch::{CellPlaces, aggregate};
 use crate::raster::{ClusteredMesh, HeightMap};
@@ -13,6 +14,8 @@ pub struct Imprint {
     pub depth_px: Plane,
     /// Largest depth.
     pub press_depth_m: f64,
+    /// How far the part went into the gel from the pose it was pressed at: depth is height plus this.
+    pub lift_m: f64,
     /// The pressure field as a few cells, from the centres of pixels.
     pub patch: ContactPatch,
     /// Where these cells are in the image.
@@ -44,9 +47,7 @@ pub struct PressedGel {
 #[non_exhaustive]
 pub enum IndentError {
     /// No surface lies in front of the camera.
-    #[error(
-        "no surface of the part lies in front of the {width_mm:.1} x {height_mm:.1} mm of gel that the camera sees"
-    )]
+    #[error("no surface of the part lies in front of the {width_mm:.1} x {height_mm:.1} mm of gel")]
     NothingInFront {
         /// Width of the window.
         width_mm: f64,
@@ -201,7 +202,29 @@ impl Indentation<'_> {
         let mut depth_px = Plane::filled(map.width, map.height, 0.0);
         self.write_depths(map, press_px - f64::from(top), &mut depth_px);
         let patch = self.patch(&depth_px);
-        Ok(self.imprint(depth_px, press_px, patch))
+        Ok(self.imprint(depth_px, press_px, f64::from(top), patch))
+    }
+
+    /// The part `lift_px` deeper than it was drawn, whatever force that takes: depths as those of an imprint, 0 where the part does
+    /// not reach. `map` has been started.
+    pub(crate) fn lifted(&self, map: &mut HeightMap, mesh: &ClusteredMesh, lift_px: f64) -> Plane {
+        let mut depth_px = Plane::filled(map.width, map.height, 0.0);
+        let top = map.draw_down(mesh, FIRST_DEPTH_PX, self.rest, self.level);
+        let deepest_px = f64::from(top) + lift_px;
+        // No part in front of the gel, or one that stays above it.
+        if deepest_px.is_nan() || deepest_px <= 0.0 {
+            return depth_px;
+        }
+        if deepest_px > FIRST_DEPTH_PX {
+            map.draw_down(mesh, deepest_px, self.rest, self.level);
+        }
+        self.write_depths(map, lift_px, &mut depth_px);
+        let area = Area::of_positive(&depth_px, self.level);
+        if map.find_steps(&depth_px, area, self.level) {
+            map.draw_steps(mesh, f64::from(top) - MARGIN * deepest_px, self.rest, self.level);
+            map.write_steps(lift_px, &mut depth_px, self.level);
+        }
+        depth_px
     }
 
     /// The imprint of a map that is complete as deep as `limit`, which is deep enough, with the pixels beside steps at
@@ -248,7 +271,7 @@ impl Indentation<'_> {
             self.write_depths(map, press_px - top_px, &mut depth_px);
             map.write_steps(press_px - top_px, &mut depth_px, self.level);
         }
-        Ok(self.imprint(depth_px, press_px, patch))
+        Ok(self.imprint(depth_px, press_px, top_px, patch))
     }
 
     /// What a press touches by the centres of pixels.
@@ -281,9 +304,16 @@ impl Indentation<'_> {
         aggregate(depth_px, self.grid, self.force_n, self.level)
     }
 
-    fn imprint(&self, depth_px: Plane, press_px: f64, patch: (ContactPatch, CellPlaces)) -> Imprint {
-        let (patch, places) = patch;
-        Imprint { depth_px, press_depth_m: press_px * self.grid.metres_per_px, patch, places, elastic: None }
+    fn imprint(
+        &self,
+        depth_px: Plane,
+        press_px: f64,
+        top_px: f64,
+        (patch, places): (ContactPatch, CellPlaces),
+    ) -> Imprint {
+        let a = self.grid.metres_per_px;
+        let (press_depth_m, lift_m) = (press_px * a, (press_px - top_px) * a);
+        Imprint { depth_px, press_depth_m, lift_m, patch, places, elastic: None }
     }
 
     fn through_the_gel(&self, available: f64) -> IndentError {

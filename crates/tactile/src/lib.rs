@@ -50,7 +50,9 @@ pub mod metrics;
 mod noise;
 pub mod npz;
 mod optics;
+mod pad;
 mod patch;
+mod press;
 pub mod presses;
 mod raster;
 #[cfg(test)]
@@ -77,6 +79,7 @@ pub use markers::{
     print_markers, without_markers,
 };
 pub use noise::finish;
+pub use pad::Pad;
 pub use patch::{CellMap, CellPlaces};
 pub use raster::{ClusteredMesh, raster};
 pub use render::Renderer;

@@ -27,68 +27,53 @@ pub(crate) use warp::frame_at;
 use crate::appearance::appearance_on;
 use crate::deform::{blurred, deform_with};
 use crate::grid::{Grid, Plane, added};
-use crate::indent::{Imprint, IndentError};
+use crate::indent::Imprint;
 use crate::markers::Shear;
-use crate::raster::ClusteredMesh;
 use crate::render::Renderer;
 use crate::sensor::GelShape;
-use gripgen_twin::frames::Pose;
 use gripgen_twin::{ContactPatch, OpticsState};
 
-/// What the effects add to the gel's shape at rest, in pixels towards the part.
-fn dome(grid: &Grid, optics: &OpticsState) -> Option<Plane> {
-    GelShape::Dome { sag_m: optics.dome_sag_m }.rest_px(grid)
+/// What the effects add to the gel's shape at rest, in pixels towards the part: a dome over what the camera sees, `view`, on any grid.
+pub(crate) fn dome(grid: &Grid, view: &Grid, optics: &OpticsState) -> Option<Plane> {
+    GelShape::Dome { sag_m: optics.dome_sag_m }.rest_over(grid, view)
+}
+
+/// The part's surface with its edges as they are.
+pub(crate) fn rounded_as_seen(heights: Plane, grid: &Grid, optics: &OpticsState) -> Plane {
+    if optics.edge_rounding_m == 0.0 {
+        return heights;
+    }
+    rounded(&heights, optics.edge_rounding_m / grid.metres_per_px)
+}
+
+/// The imprint at the depth that is seen instead of its own, at most the thickness of the gel.
+pub(crate) fn at_depth(
+    imprint: Imprint,
+    heights: &Plane,
+    grid: &Grid,
+    thickness_m: f64,
+    optics: &OpticsState,
+) -> Imprint {
+    let press_depth_m = optics.press_depth_m(imprint.press_depth_m).min(thickness_m);
+    let press_px = (press_depth_m / grid.metres_per_px) as f32;
+    let highest = heights.highest();
+    let depth_px = heights.map(|h| (h - highest + press_px).max(0.0));
+    let lift_m = f64::from(press_px - highest) * grid.metres_per_px;
+    Imprint { depth_px, press_depth_m, lift_m, ..imprint }
 }
 
 impl Renderer<'_> {
-    /// [`Renderer::press`] on the gel as it really is. The image is made of it; forces are those of the plain press.
-    pub fn press_seen(
-        &self,
-        mesh: &ClusteredMesh,
-        gel_from_mesh: &Pose,
-        imprint_m3_per_n: f64,
-        force_n: f64,
-        optics: &OpticsState,
-    ) -> Result<Imprint, IndentError> {
-        if !optics.changes_press() {
-            return self.press(mesh, gel_from_mesh, imprint_m3_per_n, force_n);
-        }
-        let grid = &self.sensor.grid;
-        let rest = self.rest_seen(optics);
-        let heights = mesh.raster(gel_from_mesh, grid, self.reach_px(rest.as_ref()));
-        let heights = added(self.rounded_as_seen(heights, optics), rest.as_ref());
-        let imprint = self.press_heights(&heights, imprint_m3_per_n, force_n)?;
-        Ok(if optics.changes_depth() { self.at_depth(imprint, &heights, optics) } else { imprint })
-    }
-
-    /// The part's surface with its edges as they are.
-    fn rounded_as_seen(&self, heights: Plane, optics: &OpticsState) -> Plane {
-        if optics.edge_rounding_m == 0.0 {
-            return heights;
-        }
-        rounded(&heights, optics.edge_rounding_m / self.sensor.grid.metres_per_px)
-    }
-
-    /// The imprint at the depth that is seen instead of its own, at most the thickness of the gel.
-    fn at_depth(&self, imprint: Imprint, heights: &Plane, optics: &OpticsState) -> Imprint {
-        let press_depth_m = optics.press_depth_m(imprint.press_depth_m).min(self.gel.thickness_m);
-        let press_px = (press_depth_m / self.sensor.grid.metres_per_px) as f32;
-        let highest = heights.highest();
-        let depth_px = heights.map(|h| (h - highest + press_px).max(0.0));
-        Imprint { depth_px, press_depth_m, ..imprint }
-    }
-
     /// The gel's shape at rest with what the effects add to it, in pixels towards the part.
-    fn rest_seen(&self, optics: &OpticsState) -> Option<Plane> {
+    pub(crate) fn rest_seen(&self, optics: &OpticsState) -> Option<Plane> {
         let grid = &self.sensor.grid;
-        match (self.sensor.gel_shape.rest_px(grid), dome(grid, optics)) {
+        match (self.sensor.gel_shape.rest_px(grid), dome(grid, grid, optics)) {
             (Some(rest), dome) => Some(added(rest, dome.as_ref())),
             (None, dome) => dome,
         }
     }
 
     /// What the camera sees, minus the rest frame of the sensor file, in grey levels of red, green and blue; for an
-    /// imprint of [`Renderer::press_seen`] or without contact. [`crate::finish`] makes an image of it.
+    /// imprint of [`Renderer::seen`] or without contact. [`crate::finish`] makes an image of it.
     pub fn change_seen(&self, imprint: Option<&Imprint>, optics: &OpticsState) -> [Plane; 3] {
         let grid = &self.sensor.grid;
         let still =

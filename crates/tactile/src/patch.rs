@@ -12,9 +12,10 @@ use gripgen_twin::{ContactPatch, PressureCell};
 /// Cells along each side of the contact's bounding box.
 const CELLS_PER_SIDE: usize = 8;
 
-/// Where the cells of a patch are: the box that was cut, and one bit for each of its places that holds a cell.
+/// Where the cells of a patch are: the box that was cut, on which grid, and one bit for each of its places that holds a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CellPlaces {
+    grid: Grid,
     pub(crate) area: Area,
     held: u64,
 }
@@ -163,7 +164,7 @@ pub(crate) fn aggregate(
     }
     restore_second_moments(&mut patch, &all, &merged);
     let held = sums.iter().rev().fold(0, |bits, s| (bits << 1) | u64::from(s.pixels > 0.0));
-    (patch, CellPlaces { area, held })
+    (patch, CellPlaces { grid: *grid, area, held })
 }
 
 fn restore_second_moments(patch: &mut ContactPatch, all: &Moments, merged: &Moments) {

@@ -5,20 +5,20 @@ mod scratch;
 use crate::appearance::appearance;
 use crate::colour::LocalColours;
 use crate::convolve::Follow;
-use crate::elastic::{Base, ElasticGel, press_elastic};
-use crate::grid::{Plane, added};
-use crate::indent::{Imprint, IndentError, Indentation, PressedGel, indent};
+use crate::grid::Plane;
+use crate::indent::{Imprint, IndentError};
 use crate::markers::{
     MarkerGel, Shear, draw_markers, marker_displacements, marker_displacements_by_cell, without_markers,
 };
 use crate::noise::finish_on;
+use crate::press::Press;
 use crate::raster::ClusteredMesh;
 use crate::sensor::Sensor;
 use crate::shading::change;
 use crate::simd::SimdLevel;
-use gripgen_twin::config::GelModel;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{ContactPatch, Gel, TactileImage};
+pub(crate) use scratch::with_map;
 use scratch::{Prepared, Scratch, with_scratch};
 
 /// One sensor with its gel.
@@ -36,7 +36,8 @@ pub struct Renderer<'a> {
 }
 
 impl Renderer<'_> {
-    /// Presses a part into the gel: stages `raster` and `indent`. An elastic gel needs no imprint constant.
+    /// Presses a part into the gel as the sensor's pixels resolve it: stages `raster` and `indent`. The contact of a grip is that of
+    /// its pad ([`crate::Pad::press`]).
     ///
     /// # Errors
     ///
@@ -48,18 +49,10 @@ impl Renderer<'_> {
         imprint_m3_per_n: f64,
         force_n: f64,
     ) -> Result<Imprint, IndentError> {
-        let grid = &self.sensor.grid;
-        if self.elastic_gel().is_some() {
-            let rest = self.sensor.gel_shape.rest_px(grid);
-            let heights = mesh.raster(gel_from_mesh, grid, self.reach_px(rest.as_ref()));
-            return self.press_heights(&added(heights, rest.as_ref()), imprint_m3_per_n, force_n);
-        }
-        let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n };
+        let press = Press { gel: self.gel, imprint_m3_per_n, force_n, level: self.level };
         with_scratch(self, |scratch, prepared| {
-            let map = &mut scratch.map;
-            map.start(mesh, gel_from_mesh, grid);
             let rest = prepared.rest_px.as_ref();
-            Indentation { grid, gel: &gel, force_n, rest, level: self.level }.sink(map, mesh)
+            press.mesh(&mut scratch.map, mesh, gel_from_mesh, &self.sensor.grid, rest)
         })
     }
 
@@ -70,14 +63,8 @@ impl Renderer<'_> {
         imprint_m3_per_n: f64,
         force_n: f64,
     ) -> Result<Imprint, IndentError> {
-        let grid = &self.sensor.grid;
-        match self.elastic_gel() {
-            Some(gel) => press_elastic(heights, grid, &gel, force_n, self.level),
-            None => {
-                let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n };
-                indent(heights, grid, &gel, force_n)
-            }
-        }
+        let press = Press { gel: self.gel, imprint_m3_per_n, force_n, level: self.level };
+        press.heights(heights, &self.sensor.grid)
     }
 
     /// The gel surface around an imprint, in pixels towards the camera above its rest: stage `deform`. For an elastic
@@ -162,25 +149,6 @@ impl Renderer<'_> {
                 return change(colours, sheet, area, self.level);
             }
             appearance(self.sensor, &sheet.plane(area), core, self.level)
-        })
-    }
-
-    /// How deep below the highest part of a surface another one may lie and still touch the gel: its thickness, and how
-    /// much the gel's own surface differs at rest.
-    pub(crate) fn reach_px(&self, rest_px: Option<&Plane>) -> f64 {
-        let lowest = rest_px.map_or(0.0, |rest| rest.values.iter().fold(0.0f32, |m, &h| m.min(h)));
-        let highest = rest_px.map_or(0.0, |rest| rest.values.iter().fold(0.0f32, |m, &h| m.max(h)));
-        self.gel.thickness_m / self.sensor.grid.metres_per_px + f64::from(highest - lowest)
-    }
-
-    /// The gel of a twin that says `elastic`.
-    fn elastic_gel(&self) -> Option<ElasticGel> {
-        let elastic = self.gel.elastic.filter(|_| self.gel.model == GelModel::Elastic)?;
-        Some(ElasticGel {
-            thickness_m: self.gel.thickness_m,
-            young_modulus_pa: elastic.young_modulus_pa,
-            poisson_ratio: elastic.poisson_ratio,
-            base: Base::Bonded,
         })
     }
 

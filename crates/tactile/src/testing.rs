@@ -15,6 +15,7 @@ pub(crate) fn gel(kernels_px: &[u32]) -> Gel {
         thickness_m: 4e-3,
         width_m: 28e-3,
         height_m: 21e-3,
+        contact_m_per_px: 8.77e-5,
         shear_stiffness_n_per_m: 2e4,
         shear_by_area: 1.0,
         kernels_px: kernels_px.to_vec(),

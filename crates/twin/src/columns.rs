@@ -20,9 +20,73 @@ use std::borrow::Cow;
 /// Columns of `index.csv` that are none of a pull: where a sample stands.
 pub const PLACE_OF_SAMPLE: [&str; 4] = ["index", "shard", "in_shard", "status"];
 
-/// Columns of `index.csv` that are none of a pull: how a sample ended.
-pub const END_OF_SAMPLE: [&str; 6] =
-    ["max_pull_force_n", "slip_time_s", "mu", "group", "repetition", "failure"];
+/// Columns of `index.csv` that are none of a pull: what came out of it.
+pub const LABELS_OF_SAMPLE: [&str; 5] =
+    ["max_pull_force_n", "slip_time_s", "peak_force_n", "kinetic_force_n", "label_branch"];
+
+/// Columns of `index.csv` that are none of a pull: what only a simulation knows.
+pub const ANSWERS_OF_SAMPLE: [&str; 5] =
+    ["limit_force_n", "slip_onset_s", "slip_s", "mu_drawn", "mu_effective"];
+
+/// Columns of `index.csv` that are none of a pull: the rest of how a sample ended.
+pub const END_OF_SAMPLE: [&str; 3] = ["group", "repetition", "failure"];
+
+/// What a column of a sample is to somebody who trains on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Which sample it is, and how it ended.
+    Place,
+    /// Known before the pull.
+    Input,
+    /// What came out of the pull.
+    Label,
+    /// What no robot knows before the pull: limits, coefficients, drawn keys of the twin.
+    Answer,
+}
+
+impl Role {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Place => "place",
+            Role::Input => "input",
+            Role::Label => "label",
+            Role::Answer => "answer",
+        }
+    }
+}
+
+/// The role of a column of a sample. A key that is none of a pull is an answer in a sweep, where it was drawn, and an input in measured
+/// pulls, where it was noted.
+pub fn role_of(name: &str, is_simulated: bool) -> Role {
+    let known = PLACE_OF_SAMPLE.contains(&name)
+        || END_OF_SAMPLE.contains(&name)
+        || ["pull_id", "status_reason"].contains(&name);
+    if known {
+        Role::Place
+    } else if LABELS_OF_SAMPLE.contains(&name) {
+        Role::Label
+    } else if ANSWERS_OF_SAMPLE.contains(&name) {
+        Role::Answer
+    } else if find(name).is_some() || !is_simulated || is_pull_key(name) {
+        Role::Input
+    } else {
+        Role::Answer
+    }
+}
+
+/// Whether a column of `index.csv` is none of a pull.
+pub fn is_of_sample(name: &str) -> bool {
+    PLACE_OF_SAMPLE.contains(&name)
+        || LABELS_OF_SAMPLE.contains(&name)
+        || ANSWERS_OF_SAMPLE.contains(&name)
+        || END_OF_SAMPLE.contains(&name)
+}
+
+/// Whether a key of `[vary]` sets the pull: what a robot is told.
+fn is_pull_key(name: &str) -> bool {
+    name.starts_with("pull.")
+}
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

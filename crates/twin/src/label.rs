@@ -1,6 +1,7 @@
 //! The training label: the pull force at which the jaws slip.
 
 pub mod check;
+pub mod forces;
 pub mod moments;
 
 use crate::PullTrace;

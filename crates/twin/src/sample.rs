@@ -1,5 +1,6 @@
 //! The result of simulating one scenario.
 
+use crate::label::forces::PullForces;
 use crate::{ContactPatch, Grasp, PerJaw, PullTrace, Scenario, SlipLabel, TactileImage};
 
 /// One sample: what was asked and what came out.
@@ -37,8 +38,10 @@ pub struct Pulled {
     pub imprint: PerJaw<ImprintSummary>,
     /// What each camera sees of it, unless the sweep makes no images.
     pub images: Option<PerJaw<TactileImage>>,
-    /// Static friction coefficient of this grip, scatter included.
-    pub mu: f64,
+    /// The part's friction coefficient as it was drawn for this grip, scatter included.
+    pub mu_drawn: f64,
+    /// The coefficient that acted: what friction laws, tables and the contact make of it.
+    pub mu_effective: f64,
     /// A friction law was used outside its fitted range.
     pub outside_fit: bool,
     /// The force loop trails the staircase by more than half the label tolerance, so that the label rule may take a
@@ -48,6 +51,14 @@ pub struct Pulled {
     pub trace: PullTrace,
     /// The label.
     pub label: SlipLabel,
+    /// Forces that the trace has in addition to the label.
+    pub forces: PullForces,
+    /// What both jaws held along the pull, without noise and label rule.
+    pub limit_force_n: f64,
+    /// When the first cell of the contact slid, since the start of the pull; `None` if none did.
+    pub slip_onset_s: Option<f64>,
+    /// When all cells did.
+    pub slip_s: Option<f64>,
     /// Why the trace contradicts the label, with numbers; `None` if it does not, and without a trace.
     pub suspect: Option<String>,
 }

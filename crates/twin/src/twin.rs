@@ -125,6 +125,8 @@ pub struct Gel {
     pub width_m: f64,
     /// Height, along image y.
     pub height_m: f64,
+    /// Side of a pixel of the grid that its contact is solved on.
+    pub contact_m_per_px: f64,
     /// Tangential force per shear displacement.
     pub shear_stiffness_n_per_m: f64,
     /// Share of it that cells have by their area; the rest they have by their load.

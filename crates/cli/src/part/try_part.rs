@@ -133,12 +133,9 @@ fn rig(sensor: Option<&str>) -> Result<Twin, TryPartError> {
     }
     twin.wrist.noise_n = 0.0;
     if let Some(path) = sensor {
-        let grid = load_sensor(&Location::parse(path))?.grid;
+        load_sensor(&Location::parse(path))?;
         for jaw in Jaw::BOTH {
             twin.optics[jaw].sensor = path.into();
-            // The gel is what its camera sees.
-            twin.gel[jaw].width_m = grid.width_px as f64 * grid.metres_per_px;
-            twin.gel[jaw].height_m = grid.height_px as f64 * grid.metres_per_px;
         }
     }
     Ok(twin)

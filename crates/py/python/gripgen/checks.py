@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -45,6 +45,15 @@ def known_statuses(status: str | Sequence[str]) -> tuple[str, ...]:
             hint = f"did you mean `{close[0]}`?" if close else None
             raise refusal(f"there is no status {name!r}; there are {', '.join(STATUSES)}", hint)
     return asked
+
+
+def one_of(name: str, value: str, known: Iterable[str]) -> str:
+    """A word of a list."""
+    if value not in known:
+        close = difflib.get_close_matches(str(value).lower(), known, n=1)
+        hint = f"did you mean `{close[0]}`?" if close else None
+        raise refusal(f"{name} = {value!r} is none of {', '.join(known)}", hint)
+    return value
 
 
 def mask_of(keep: ArrayLike, rows: int) -> NDArray[np.bool_]:

@@ -21,14 +21,23 @@ if TYPE_CHECKING:
 #: Statuses whose label is exact.
 LABELLED = ("slipped", "no_contact")
 
+#: Labels of a pull, and their columns: what the label rule of the experiment reads, the largest mean force while the jaws held, the
+#: friction of jaws that slide, and (of simulated pulls) what the contact held without noise and rule.
+LABELS = {
+    "rule": "max_pull_force_n",
+    "peak": "peak_force_n",
+    "kinetic": "kinetic_force_n",
+    "limit": "limit_force_n",
+}
+
 
 class Sample(NamedTuple):
     """One row: both images, the label, and what is known of the pull."""
 
     #: uint8[2, H, W, 3], left jaw first; None where the dataset has no images.
     images: NDArray[np.uint8] | None
-    #: The pull force at slip, N.
-    max_pull_force_n: float
+    #: The label that the dataset was loaded with, N.
+    label_n: float
     #: The row of the table.
     values: dict[str, Any]
     #: The film of the pull, where the dataset was loaded with `video=True`.
@@ -41,7 +50,7 @@ class Batch(NamedTuple):
     #: uint8[B, 2, H, W, 3].
     images: NDArray[np.uint8] | None
     #: float32[B], N.
-    max_pull_force_n: NDArray[np.float32]
+    label_n: NDArray[np.float32]
     #: float32[B, T, 4]: time_s, desired_force_n, measured_force_n, displacement_mm; NaN beyond the end of a pull.
     traces: NDArray[np.float32] | None = None
     #: int64[B], rows of each trace; 0 where none is stored.
@@ -55,6 +64,7 @@ class Batch(NamedTuple):
 def load(
     path: str | os.PathLike[str],
     *,
+    label: str = "rule",
     status: str | Sequence[str] = LABELLED,
     suspect: bool = False,
     noise: str = "stored",
@@ -67,6 +77,9 @@ def load(
     before the jaws slipped: its label is a lower bound, so it is left out unless asked for; a failed sample has neither
     label nor images. A suspect pull has a label that recorded evidence contradicts, and says in `status_reason` how:
     with `suspect=True` its row is kept too.
+
+    `label` is "rule" (the label rule of the experiment), "peak" (the largest mean of 20 ms while the jaws held), "kinetic" (the friction
+    of jaws that slide) or "limit" (what the contact held, of simulated pulls). Rows without that label are left out.
 
     A run with `images = "clean"` has its images without the noise of the sensors, which is added when they are read: as the
     sweep drew it (`noise="stored"`, the bytes of `images = "png"`), anew in every epoch ("resample"), or not at all ("off").
@@ -81,7 +94,8 @@ def load(
     if remote.is_url(text):
         text = remote.fetch(text, cache_dir)
     kept = (*asked, "suspect") if suspect and "suspect" not in asked else asked
-    found = Dataset(text, status=kept, _opened=(os.getpid(), _core.Dataset(text)))
+    checks.one_of("label", label, LABELS)
+    found = Dataset(text, status=kept, label=label, _opened=(os.getpid(), _core.Dataset(text)))
     if video:
         if not found._open().has_films:
             hint = "sweep with images = { during_pull = { frames = 24 } }"
@@ -101,6 +115,8 @@ class Dataset(Sequence[Sample]):
 
     path: str
     status: tuple[str, ...] = LABELLED
+    #: Which label it has: a key of `LABELS`.
+    label: str = "rule"
     #: Rows of the run that belong to this dataset.
     rows: NDArray[np.int64] | None = None
     #: The noise that images are read with: "stored", "resample" or "off"; and the epoch that it is drawn for.
@@ -118,14 +134,17 @@ class Dataset(Sequence[Sample]):
             object.__setattr__(self, "_total", len(self._open()))
         if self.rows is None:
             found = np.asarray(self._columns()["status"])
-            rows = np.flatnonzero(np.isin(found, self.status))
+            keep = np.isin(found, self.status)
+            if self.label != "rule":
+                keep &= np.isfinite(self._label_column())
+            rows = np.flatnonzero(keep)
         else:
             rows = np.array(self.rows, dtype=np.int64)
         rows.flags.writeable = False
         object.__setattr__(self, "rows", rows)
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = ("path", "status", "rows", "noise", "noise_epoch", "video", "_total")
+        kept = ("path", "status", "label", "rows", "noise", "noise_epoch", "video", "_total")
         return {**{name: getattr(self, name) for name in kept}, "_opened": None}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
@@ -172,8 +191,29 @@ class Dataset(Sequence[Sample]):
 
     @property
     def labels(self) -> NDArray[np.float32]:
-        """float32[len]: the pull force at slip of every row, N."""
-        return self.column("max_pull_force_n").astype(np.float32)
+        """float32[len]: the label of every row, N."""
+        return self._label_column()[self.rows].astype(np.float32)
+
+    def _label_column(self) -> NDArray[np.float64]:
+        name = LABELS[self.label]
+        columns = self._columns()
+        if name not in columns:
+            hint = "traces with displacements have it, and runs of this version" if self.label != "rule" else ""
+            raise checks.unreadable(f"{self.path}: there is no column {name!r} for label = {self.label!r}", hint)
+        return np.asarray(columns[name])
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Columns that are known before a pull: what a network may be given."""
+        return self._of_role("input")
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """Columns that only a simulation knows (limits, friction coefficients, drawn keys of the twin): no network may be given one."""
+        return self._of_role("answer")
+
+    def _of_role(self, role: str) -> tuple[str, ...]:
+        return tuple(name for name, found in self._open().roles().items() if found == role)
 
     def column(self, name: str) -> NDArray[Any]:
         """A column of the table as an array of float64 or str."""
@@ -209,12 +249,12 @@ class Dataset(Sequence[Sample]):
         """Several rows at once; torch's loaders call it with the ids of a batch."""
         rows = self._rows_of(ids)
         images = self._images(rows, 1) if self.image_size_px else [None] * len(rows)
-        columns = self._columns()
+        columns, labels = self._columns(), self._label_column()
         found = []
         for row, both in zip(rows, images):
             values = {name: column[row] for name, column in columns.items()}
             film = self._film(row) if self.video else None
-            found.append(Sample(both, float(values["max_pull_force_n"]), values, film))
+            found.append(Sample(both, float(labels[row]), values, film))
         return found
 
     def __iter__(self) -> Iterator[Sample]:
@@ -240,14 +280,14 @@ class Dataset(Sequence[Sample]):
         """
         rows = self._rows_of(ids)
         opened = self._open()
-        labels = np.asarray(self._columns()["max_pull_force_n"])[rows].astype(np.float32)
+        labels = self._label_column()[rows].astype(np.float32)
         pixels = self._images(rows, threads) if images else None
         if not (traces or heights or forces):
             return pixels, labels
         lines, lengths = opened.traces(rows) if traces else (None, None)
         return Batch(
             images=pixels,
-            max_pull_force_n=labels,
+            label_n=labels,
             traces=lines,
             trace_rows=lengths,
             heights_mm=opened.heights(rows, threads) if heights else None,

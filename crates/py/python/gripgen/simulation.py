@@ -33,8 +33,18 @@ class Pull:
     #: The pull force at slip, N; NaN if the sample failed.
     max_pull_force_n: float = float("nan")
     slip_time_s: float = float("nan")
-    #: Friction coefficient of this grip, scatter included.
-    mu: float = float("nan")
+    #: Largest mean reading over 20 ms while the jaws held, and the median from 0.2 to 1 mm past its place, N; NaN where there is none.
+    peak_force_n: float = float("nan")
+    kinetic_force_n: float = float("nan")
+    #: "static" or "kinetic": where the label was read; "" where it is not known.
+    label_branch: str = ""
+    #: What both jaws held, without noise and label rule, N; when the first part of the contact slid, and all of it, s.
+    limit_force_n: float = float("nan")
+    slip_onset_s: float = float("nan")
+    slip_s: float = float("nan")
+    #: Friction coefficient of the part as drawn for this grip, and the one that acted after friction laws and contact.
+    mu_drawn: float = float("nan")
+    mu_effective: float = float("nan")
     #: A friction law was used outside the forces on which it was fitted.
     outside_fit: bool = False
     #: Why a sample failed.

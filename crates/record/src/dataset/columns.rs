@@ -6,7 +6,8 @@ use gripgen_twin::columns::{Kind, find};
 
 /// Whether a column of an index holds words whatever stands in it.
 fn holds_words(name: &str) -> bool {
-    ["status", "failure"].contains(&name) || find(name).is_some_and(|c| c.indexed && c.holds_words())
+    ["status", "failure", "label_branch"].contains(&name)
+        || find(name).is_some_and(|c| c.indexed && c.holds_words())
 }
 
 /// The column that says why a row failed or is suspect; in an index it is `failure`, whatever the status.

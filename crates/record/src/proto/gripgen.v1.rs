@@ -109,9 +109,20 @@ pub struct Sample {
     /// Why the label is suspect.
     #[prost(string, tag = "35")]
     pub status_reason: ::prost::alloc::string::String,
-    /// Static friction coefficient of this grip, scatter included.
+    /// Largest mean reading over 20 ms while the jaws held; a lower bound where the pull ended before they slipped. Absent without
+    /// displacements.
+    #[prost(double, optional, tag = "36")]
+    pub peak_force_n: ::core::option::Option<f64>,
+    /// Median reading from 0.2 to 1 mm past the place of the peak: friction of jaws that slide. Absent where the pull ended before.
+    #[prost(double, optional, tag = "37")]
+    pub kinetic_force_n: ::core::option::Option<f64>,
+    /// The branch on which max_pull_force_n was read: "static" while the jaws held, "kinetic" after that; empty where it is not known.
+    #[prost(string, tag = "38")]
+    pub label_branch: ::prost::alloc::string::String,
+    /// Answers, which no robot knows before the pull; of simulated pulls only.
+    /// The coefficient that acted: what friction laws, tables and the contact make of the drawn one.
     #[prost(double, optional, tag = "40")]
-    pub mu: ::core::option::Option<f64>,
+    pub mu_effective: ::core::option::Option<f64>,
     /// A friction law was used outside the forces it was fitted on.
     #[prost(bool, tag = "41")]
     pub outside_fit: bool,
@@ -123,6 +134,17 @@ pub struct Sample {
     /// time)): the label rule may take a force from before the slip.
     #[prost(bool, tag = "44")]
     pub lag_exceeds_tolerance: bool,
+    /// The part's friction coefficient as it was drawn for this grip, scatter included.
+    #[prost(double, optional, tag = "45")]
+    pub mu_drawn: ::core::option::Option<f64>,
+    /// What both jaws held along the pull, without noise and label rule.
+    #[prost(double, optional, tag = "46")]
+    pub limit_force_n: ::core::option::Option<f64>,
+    /// When the first cell of the contact slid, and when all cells did, since the start of the pull.
+    #[prost(double, optional, tag = "47")]
+    pub slip_onset_s: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "48")]
+    pub slip_s: ::core::option::Option<f64>,
     /// Sensor noise that the stored images do not have (`images = "clean"`); absent where they have it or where there is none.
     #[prost(message, optional, tag = "50")]
     pub left_image_noise: ::core::option::Option<ImageNoise>,

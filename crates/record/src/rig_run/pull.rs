@@ -2,13 +2,14 @@
 
 use super::film::RigFilm;
 use crate::encode::{
-    EncodedRig, EncodedSample, VIEW_RATE_HZ, image_message, scenario_message, set_label, set_suspect,
-    state_messages, timestamp, trace_message,
+    EncodedRig, EncodedSample, VIEW_RATE_HZ, image_message, scenario_message, set_forces, set_label,
+    set_suspect, state_messages, timestamp, trace_message,
 };
 use crate::index::index_row;
 use crate::proto::gripgen_v1::{PullTrace as PullTraceMessage, Status};
 use crate::rig_log::RigLog;
 use gripgen_twin::config::ImageStorage;
+use gripgen_twin::label::forces::PullForces;
 use gripgen_twin::{PerJaw, PullTrace, Scenario, SlipLabel, TactileImage};
 use prost::Message;
 
@@ -82,6 +83,9 @@ impl RigPull {
                 message.set_status(Status::Failed);
                 message.failure.clone_from(reason);
             }
+        }
+        if let (Some(trace), Some(_)) = (&self.trace, message.slip_time_s) {
+            set_forces(&mut message, &PullForces::of(trace));
         }
         let coded = |both: &Option<PerJaw<TactileImage>>| {
             let png = |both: &PerJaw<TactileImage>| {

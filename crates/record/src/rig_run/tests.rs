@@ -146,7 +146,11 @@ fn what_was_measured_is_read_back() {
     let record = reader.record(1).unwrap();
     let s = &record.sample;
     assert_eq!((s.index, s.status(), s.max_pull_force_n), (1, Status::Slipped, Some(1.75)));
-    assert_eq!((s.mu, &s.left, &s.right), (None, &None, &None), "a rig knows neither friction nor cells");
+    assert_eq!(
+        (s.mu_effective, &s.left, &s.right),
+        (None, &None, &None),
+        "a rig knows neither friction nor cells"
+    );
     assert_eq!(s.drawn_number["humidity_pct"], 41.5);
     assert_eq!((record.images, reader.rest(1).unwrap()), (Some(image(90)), Some(image(60))));
     let (found, wanted) = (record.trace.unwrap(), trace());
@@ -159,7 +163,7 @@ fn what_was_measured_is_read_back() {
     let rows = Dataset::open(at.path()).unwrap();
     assert_eq!((rows.table().rows(), rows.sample_index(0).unwrap()), (1, 1));
     assert_eq!(rows.table().numbers("humidity_pct").unwrap(), [41.5]);
-    assert!(rows.table().numbers("mu").unwrap()[0].is_nan());
+    assert!(rows.table().numbers("mu_effective").unwrap()[0].is_nan());
     assert_eq!(rows.rest(0).unwrap(), Some(image(60)));
     let png = rows.rest_png(0).unwrap().unwrap();
     assert_eq!(crate::decode_picture(&png[1]).unwrap(), image(60).right);
@@ -375,7 +379,7 @@ fn a_parquet_file_has_the_images_at_rest_and_nulls() {
         .collect();
     assert_eq!(found.len(), 2);
     let (slipped, failed) = (&found[0], &found[1]);
-    assert_eq!((&slipped["mu"], &failed["max_pull_force_n"]), (&Field::Null, &Field::Null));
+    assert_eq!((&slipped["answer.mu_effective"], &failed["max_pull_force_n"]), (&Field::Null, &Field::Null));
     assert_eq!(slipped["humidity_pct"], Field::Double(41.5));
     let Field::Group(image) = &slipped["left_rest_png"] else { panic!("{:?}", slipped["left_rest_png"]) };
     let parts: BTreeMap<&String, &Field> = image.get_column_iter().collect();

@@ -6,9 +6,10 @@ use std::collections::HashMap;
 
 const INDEX: &str = "\
 index,shard,in_shard,status,part,grip_pose,gel_id,session,grip_force_n,force_increment_n,step_time_s,dwell_s,\
-pull_index,time_s,temperature_c,grip_offset_mm,grip_angle_deg,pull_direction,max_pull_force_n,slip_time_s,mu,group,\
-repetition,failure,parts.gear.mu,pull.start_n,pull.step_s.jitter
-7,,,suspect,\"gear, left\",2,g2,3,30.1,0.5,0.104,20,12,3600.25,21.5,-0.3,30,-1,11.25,1.5,0.31,3,1,why not,0.3,4.5,
+pull_index,time_s,temperature_c,grip_offset_mm,grip_angle_deg,pull_direction,max_pull_force_n,slip_time_s,\
+peak_force_n,kinetic_force_n,label_branch,limit_force_n,slip_onset_s,slip_s,mu_drawn,mu_effective,group,repetition,failure,\
+parts.gear.mu,pull.start_n,pull.step_s.jitter
+7,,,suspect,\"gear, left\",2,g2,3,30.1,0.5,0.104,20,12,3600.25,21.5,-0.3,30,-1,11.25,1.5,12.5,,static,12.75,0.5,1.25,0.33,0.31,3,1,why not,0.3,4.5,
 ";
 
 #[test]
@@ -43,7 +44,13 @@ fn the_index_has_the_columns_and_numbers_that_it_always_had() {
         pull_direction: -1,
         max_pull_force_n: Some(11.25),
         slip_time_s: Some(1.5),
-        mu: Some(0.31),
+        peak_force_n: Some(12.5),
+        label_branch: "static".into(),
+        limit_force_n: Some(12.75),
+        slip_onset_s: Some(0.5),
+        slip_s: Some(1.25),
+        mu_drawn: Some(0.33),
+        mu_effective: Some(0.31),
         status_reason: "why not".into(),
         drawn_number: HashMap::from([("parts.gear.mu".to_string(), 0.3), ("pull.start_n".into(), 4.5)])
             .into_iter()

@@ -17,7 +17,7 @@ const CURVE_HEIGHT: u32 = 380;
 
 fn second_line(s: &Sample) -> String {
     let mut text = details(s);
-    if let Some(mu) = s.mu {
+    if let Some(mu) = s.mu_effective {
         text += &format!(", mu {mu:.4}");
     }
     if s.lag_exceeds_tolerance {

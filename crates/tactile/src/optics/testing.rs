@@ -1,6 +1,6 @@
 //! What the tests of the optics share: a small sensor, things that are pressed into it, and the effects by name.
 
-use super::dome;
+use super::{at_depth, dome, rounded_as_seen};
 use crate::colour::ColourModel;
 use crate::grid::{Grid, Plane, added};
 use crate::indent::{Imprint, PressedGel, indent};
@@ -88,10 +88,11 @@ impl TestSensor {
             height_mm * 1e-3 / GRID.metres_per_px
         });
         let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n: IMPRINT_M3_PER_N };
-        let renderer = self.renderer();
-        let heights = added(renderer.rounded_as_seen(heights, optics), dome(&GRID, optics).as_ref());
+        let heights = added(rounded_as_seen(heights, &GRID, optics), dome(&GRID, &GRID, optics).as_ref());
         let imprint = indent(&heights, &GRID, &gel, scene.force_n).unwrap();
-        Some(if optics.changes_depth() { renderer.at_depth(imprint, &heights, optics) } else { imprint })
+        let thickness_m = self.gel.thickness_m;
+        let changed = optics.changes_depth();
+        Some(if changed { at_depth(imprint, &heights, &GRID, thickness_m, optics) } else { imprint })
     }
 
     /// What the camera sees of a scene, minus the rest frame.

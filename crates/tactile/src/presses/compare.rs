@@ -191,6 +191,7 @@ pub(super) fn gel_of(sensor: &Sensor) -> Gel {
         thickness_m: f64::INFINITY,
         width_m: sensor.grid.width_px as f64 * sensor.grid.metres_per_px,
         height_m: sensor.grid.height_px as f64 * sensor.grid.metres_per_px,
+        contact_m_per_px: sensor.grid.metres_per_px,
         shear_stiffness_n_per_m: 0.0,
         shear_by_area: 1.0,
         kernels_px: pyramid.kernels_px,

@@ -104,7 +104,7 @@ impl Contact {
 
 pub(super) fn imprint(depth_px: Plane, press_depth_m: f64) -> Imprint {
     let (patch, places) = Default::default();
-    Imprint { depth_px, press_depth_m, patch, places, elastic: None }
+    Imprint { depth_px, press_depth_m, lift_m: 0.0, patch, places, elastic: None }
 }
 
 /// Hand-drawn circles are unsure by a few per cent: one up to so much wider than the ball is taken for its equator.

@@ -64,6 +64,11 @@ thread_local! {
     static MEMORY: RefCell<(Scratch, Vec<Prepared>)> = RefCell::default();
 }
 
+/// Runs `f` with this thread's height map.
+pub(crate) fn with_map<T>(f: impl FnOnce(&mut HeightMap) -> T) -> T {
+    MEMORY.with_borrow_mut(|(scratch, _)| f(&mut scratch.map))
+}
+
 /// Runs `f` with this thread's memory.
 pub(super) fn with_scratch<T>(renderer: &Renderer<'_>, f: impl FnOnce(&mut Scratch, &Prepared) -> T) -> T {
     MEMORY.with_borrow_mut(|(scratch, prepared)| {

@@ -22,16 +22,30 @@ pub enum GelShape {
 }
 
 impl GelShape {
+    /// Whether it is a plane.
+    pub fn is_flat(&self) -> bool {
+        match self {
+            GelShape::Flat => true,
+            GelShape::Dome { sag_m } => *sag_m == 0.0,
+            GelShape::Map(_) => false,
+        }
+    }
+
     /// Heights at rest in pixels, at most 0; `None` for a flat gel.
     ///
     /// A dome is `-sag r^2 / r_corner^2`: the paraboloid that a spherical cap is to within `sag / (4 R)` of its sag
     /// (2 % for Taxim's 1.4 mm on a half diagonal of 11.8 mm).
     pub fn rest_px(&self, grid: &Grid) -> Option<Plane> {
+        self.rest_over(grid, grid)
+    }
+
+    /// The same on another grid than that of the image, `view`; a map has that of the image alone.
+    pub(crate) fn rest_over(&self, grid: &Grid, view: &Grid) -> Option<Plane> {
         match self {
             GelShape::Flat => None,
             GelShape::Dome { sag_m } if *sag_m == 0.0 => None,
             GelShape::Dome { sag_m } => {
-                let corner = grid.centre_m(grid.width_px - 1, grid.height_px - 1);
+                let corner = view.centre_m(view.width_px - 1, view.height_px - 1);
                 let scale = -sag_m / grid.metres_per_px / (corner.0 * corner.0 + corner.1 * corner.1);
                 Some(grid.plane(|x, y| scale * (x * x + y * y)))
             }

@@ -203,6 +203,9 @@ pub struct GelFile {
     pub width_mm: f64,
     /// Height of the pad, along image y.
     pub height_mm: f64,
+    /// Side of a pixel of the grid that the contact is solved on. It has nothing to do with the pixels of the sensor.
+    #[serde(default = "contact_mm_per_px", skip_serializing_if = "is_contact_mm_per_px")]
+    pub contact_mm_per_px: f64,
     /// Tangential force per shear displacement of the pad.
     pub shear_stiffness_n_per_mm: f64,
     /// Share of that stiffness which the points of a contact have by their area, from 0 to 1; the rest they have by their
@@ -300,6 +303,15 @@ pub struct PartFile {
 
 fn one() -> f64 {
     1.0
+}
+
+/// The pixels of a GelSight R1.5: 320 over the 28.064 mm of its pad.
+fn contact_mm_per_px() -> f64 {
+    0.0877
+}
+
+fn is_contact_mm_per_px(x: &f64) -> bool {
+    *x == contact_mm_per_px()
 }
 
 fn is_one(x: &f64) -> bool {

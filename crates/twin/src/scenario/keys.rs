@@ -78,7 +78,7 @@ pub fn can_be_drawn(key: &str) -> bool {
 
 /// Whether the name of a column of the user's own is that of a column which every sample has in `index.csv`.
 pub(crate) fn is_taken(key: &str) -> bool {
-    columns::PLACE_OF_SAMPLE.contains(&key) || columns::END_OF_SAMPLE.contains(&key)
+    columns::is_of_sample(key)
 }
 
 /// The columns of the user's own that the tables of a twin depend on: sweeps draw them for these tables.

@@ -47,6 +47,9 @@ pub(super) fn check_twist(robot: &RobotFile) -> Result<Option<f64>, ConfigError>
     stiffness.map(|k| in_range(key, k, 1e-3..=1e6, "N m/rad").map_err(|e| e.hint(hint))).transpose()
 }
 
+/// Most pixels of a contact: those of a camera image of 2048 x 2048, whose planes of single precision take 16 MB each.
+const MAX_CONTACT_PIXELS: f64 = 4_194_304.0;
+
 pub(super) fn check_gel(gel: &GelFile, key: &str) -> Result<Gel, ConfigError> {
     for (i, &k) in gel.kernels_px.iter().enumerate() {
         if k % 2 == 0 || !(3..=255).contains(&k) {
@@ -57,10 +60,21 @@ pub(super) fn check_gel(gel: &GelFile, key: &str) -> Result<Gel, ConfigError> {
     let checked = |name: &str, value: f64, range: std::ops::RangeInclusive<f64>, unit: &str| {
         in_range(&format!("{key}.{name}"), value, range, unit)
     };
+    let contact_mm_per_px = checked("contact_mm_per_px", gel.contact_mm_per_px, 0.005..=1.0, "mm")?;
+    let pixels = gel.width_mm * gel.height_mm / (contact_mm_per_px * contact_mm_per_px);
+    if pixels > MAX_CONTACT_PIXELS {
+        let problem = format!(
+            "{} x {} mm of pad in pixels of {contact_mm_per_px} mm are {pixels:.0}, at most {MAX_CONTACT_PIXELS:.0} are solved",
+            gel.width_mm, gel.height_mm
+        );
+        return Err(ConfigError::new(format!("{key}.contact_mm_per_px"), problem)
+            .hint("use larger contact pixels or a smaller pad"));
+    }
     Ok(Gel {
         thickness_m: checked("thickness_mm", gel.thickness_mm, 0.1..=50.0, "mm")? * 1e-3,
         width_m: checked("width_mm", gel.width_mm, 1.0..=200.0, "mm")? * 1e-3,
         height_m: checked("height_mm", gel.height_mm, 1.0..=200.0, "mm")? * 1e-3,
+        contact_m_per_px: contact_mm_per_px * 1e-3,
         shear_stiffness_n_per_m: 1e3
             * checked("shear_stiffness_n_per_mm", gel.shear_stiffness_n_per_mm, 0.1..=1e4, "N/mm")?,
         shear_by_area: checked("shear_by_area", gel.shear_by_area, 0.0..=1.0, "1")?,
