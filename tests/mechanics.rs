@@ -91,7 +91,7 @@ fn repetitions_differ_in_scatter_and_noise_only() {
         for pair in ascending[..5].windows(2) {
             assert_eq!(pair[0].grasp, pair[1].grasp);
             assert_eq!(pair[0].imprint, pair[1].imprint);
-            assert_ne!(pair[0].mu, pair[1].mu);
+            assert_ne!(pair[0].mu_effective, pair[1].mu_effective);
             assert_ne!(pair[0].images, pair[1].images);
         }
     }

@@ -157,9 +157,19 @@ fn taking_an_entry_out_restores_the_old_pulls() {
     let wear = effect("name = \"wear\"\ndepth = 0.3\nn0 = 20.0\n");
     let plain = write(vec![], "plain.toml");
     let with = write(vec![table.clone(), wear], "with.toml");
-    assert!((with.mu - plain.mu).abs() > 0.01, "{} {}", with.mu, plain.mu);
+    assert!(
+        (with.mu_effective - plain.mu_effective).abs() > 0.01,
+        "{} {}",
+        with.mu_effective,
+        plain.mu_effective
+    );
     let tabled = write(vec![table], "tabled.toml");
-    assert!((tabled.mu / plain.mu - 1.25).abs() < 1e-12, "{} {}", tabled.mu, plain.mu);
+    assert!(
+        (tabled.mu_effective / plain.mu_effective - 1.25).abs() < 1e-12,
+        "{} {}",
+        tabled.mu_effective,
+        plain.mu_effective
+    );
     let moved = write(vec![offset], "offset.toml");
     let first = |p: &Pulled| p.trace.measured_force_n[0];
     assert!((first(&moved) - first(&plain) - 1.0).abs() < 1e-9);
