@@ -25,8 +25,9 @@ const RATE: f64 = 20.0;
 const COMES: Duration = Duration::from_secs(120);
 /// The pull has to be over by then, whatever happens.
 const OVER: Duration = Duration::from_secs(180);
-/// After this the arm has to stand, in seconds of a rig in real time: counted by the rig's clock, which is slow where the machine is.
-pub const LONGEST_S: f64 = 5.0;
+/// After this the arm has to stand: five seconds, and the patience of 3 of what the host times. In seconds of a rig in real time, but
+/// counted by the rig's clock, which is slow where the machine is.
+pub const LONGEST_S: f64 = 20.0;
 /// So long it is looked at whether it stays so.
 const STAYS: Duration = Duration::from_millis(300);
 /// How long a person leans on the tool, by the rig's clock.

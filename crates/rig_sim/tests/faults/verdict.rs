@@ -59,7 +59,8 @@ pub fn verdict(injection: &Injection, made: Made) -> Report {
         None => Ended::Dead,
         Some(pull) => outcome(pull, kind, both(must_stop), both(must_fail)),
     };
-    let limit_s = if matches!(ended, Ended::Labelled(_)) { UNDISTURBED_S } else { LONGEST_S };
+    let stopped = made.pull.as_ref().is_none_or(|pull| pull.stopped.is_some());
+    let limit_s = if stopped { LONGEST_S } else { UNDISTURBED_S };
     assert!(seconds < limit_s, "it took {seconds:.2} s");
     // What spoils only what is said next, or weighs only on the way back, is noticed when the part is let go already.
     let late = match kind {
