@@ -118,4 +118,48 @@ mod tests {
         }
         assert_eq!(verbs, 27, "a new verb gets an example");
     }
+
+    /// Texts of the program that stand between back quotes and begin with its name.
+    fn named_commands(folder: &std::path::Path, found: &mut Vec<String>) {
+        for entry in std::fs::read_dir(folder).unwrap().map_while(Result::ok) {
+            let path = entry.path();
+            if path.is_dir() {
+                named_commands(&path, found);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                let quoted = text.split('`').skip(1).step_by(2);
+                found.extend(quoted.filter(|words| words.starts_with("gripgen ")).map(String::from));
+            }
+        }
+    }
+
+    /// A hint works when it is followed: what messages tell people to type, verbs and flags, is there.
+    #[test]
+    fn commands_that_messages_name_are_there() {
+        let crates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+        let mut named = Vec::new();
+        for name in ["cli", "identify", "measured", "record", "report", "rig", "rig_sim", "tactile", "twin"] {
+            named_commands(&crates.join(name).join("src"), &mut named);
+        }
+        assert!(named.len() > 50, "{named:?}");
+        // `import` is the Python package's; what stands in braces is put in later.
+        for command in named.iter().filter(|words| !words.contains(['{', '\n']) && *words != "gripgen import")
+        {
+            let (mut verb, mut is_group) = (Cli::command(), true);
+            for word in command.split_whitespace().skip(1) {
+                if word == "import" {
+                    break;
+                }
+                if let Some(flag) = word.strip_prefix("--") {
+                    let flag = flag.split('=').next();
+                    let known = verb.get_arguments().any(|argument| argument.get_long() == flag);
+                    assert!(known, "`{command}`: {} has no --{flag:?}", verb.get_name());
+                } else if is_group {
+                    let found = verb.find_subcommand(word).cloned();
+                    verb = found.unwrap_or_else(|| panic!("`{command}`: there is no verb {word}"));
+                    is_group = verb.has_subcommands();
+                }
+            }
+        }
+    }
 }

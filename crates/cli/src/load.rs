@@ -9,7 +9,7 @@ use crate::{
     load_twin_sensor,
 };
 use gripgen::tactile::Sensor;
-use gripgen::tactile::presses::PressSet;
+use gripgen::tactile::presses::{PressSet, RestDoubt, rest_doubt};
 use gripgen::twin::Twin;
 use gripgen::{Library, Location, load_twin_document};
 use gripgen_measured::{LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls_with};
@@ -140,6 +140,22 @@ pub fn say_warnings(loaded: &LoadedPulls, talk: &TalkArgs) {
 /// Folders that are read as one campaign.
 pub fn folders<'a>(measured: &'a Path, also: &'a [PathBuf]) -> Vec<&'a Path> {
     std::iter::once(measured).chain(also.iter().map(PathBuf::as_path)).collect()
+}
+
+/// Takes a frame without contact that contradicts the presses away, and says so.
+pub fn drop_doubtful_rest(path: &Path, set: &mut PressSet, talk: &TalkArgs) -> Option<RestDoubt> {
+    let doubt = rest_doubt(set)?;
+    set.rest = None;
+    if !talk.quiet {
+        eprintln!(
+            "warning: {}: the frame without contact is {:.0} grey levels from the presses where nothing touches, they are {:.0} from each \
+             other: it is not used; take a new one with the same sensor, light and camera settings, or leave it out",
+            path.display(),
+            doubt.differs,
+            doubt.presses_differ
+        );
+    }
+    Some(doubt)
 }
 
 /// Says which contacts were not marked.

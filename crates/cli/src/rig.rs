@@ -2,6 +2,7 @@
 //!
 //! `gripgen-rig` makes the experiment and tells what happens; here that is written into a run folder.
 
+mod ask;
 mod check;
 mod config_text;
 mod plant;
@@ -11,6 +12,7 @@ mod record;
 mod rehearsal;
 mod standing;
 
+pub use ask::ask_at_keyboard;
 pub use check::check_rig;
 pub use config_text::{plain_campaign, rig_run_differences, rig_run_toml};
 pub use gripgen_rig::experiment::check::CheckLine;
@@ -26,9 +28,31 @@ pub use rehearsal::{load_rehearsal, plan_rehearsal, rehearsal_text, rehearse_rig
 use crate::failure::Failure;
 use gripgen::Location;
 use gripgen::twin::config::Document;
+use gripgen_rig::experiment::Stopped;
+use gripgen_rig::experiment::prepare::PrepareError;
 
 /// The shipped rig: the virtual one on this machine.
 pub const SHIPPED_RIG: &str = "asset:configs/rig.toml";
+
+/// What to do after a safe stop, the red button first where it may be needed; `again` says how the work goes on.
+fn after_stop(stopped: &Stopped, again: &str) -> String {
+    let moves = "press the red button (emergency stop): the robot may still move; then look at the rig";
+    let look = if stopped.still { "look at the rig" } else { moves };
+    let hint = stopped.hint.map(|hint| format!("; {hint}")).unwrap_or_default();
+    format!("{look}{hint}; {again}")
+}
+
+/// A robot that is not ready, with what a person at the rig does about it.
+fn unprepared(e: &PrepareError) -> Failure {
+    Failure::new(e).hint(match e {
+        PrepareError::Local => "nothing was moved; the switch is in the upper right corner of the teach pendant",
+        PrepareError::Protective => "nothing was moved; the same command with --unlock leaves the stop, 5 s after it at the earliest",
+        PrepareError::Power { .. } => "nothing was moved; the same command with --power-on switches the arm on and releases its brakes",
+        PrepareError::Safety { .. } => "nothing was moved; find out why, release what was pressed, and restart the robot on its teach pendant",
+        PrepareError::Version { .. } => "nothing was moved; `gripgen rig check` says what the controller is",
+        _ => "`gripgen rig check` says what the robot answers",
+    })
+}
 
 /// A rig on which no part is taught.
 fn no_pose(rig: &str) -> Failure {

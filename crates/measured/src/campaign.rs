@@ -2,6 +2,8 @@
 
 use gripgen_twin::columns::{COLUMNS, InTable};
 use gripgen_twin::config::{Feedback, ForceConvention};
+use gripgen_twin::draw::Drawn;
+use gripgen_twin::notes::check_note;
 use gripgen_twin::{Campaign, PlannedPull, PullKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -131,8 +133,8 @@ pub struct CampaignFile {
     pulls: Vec<PlannedPull>,
 }
 
-/// Reads a campaign with its list of pulls, grip forces per jaw. Unknown keys of the file are left alone, those of a pull
-/// are errors: a misspelt dwell would be made as if it were not there.
+/// Reads a campaign with its list of pulls, grip forces per jaw. Unknown keys of the file are left alone, those of a pull are columns
+/// that a lab notes; one that is nearly a known key is an error: a misspelt dwell would be made as if it were not there.
 ///
 /// # Errors
 ///
@@ -163,6 +165,9 @@ fn check_pull(pull: &PlannedPull) -> Result<(), String> {
     if loaded && pull.part.is_empty() {
         return Err("a pull needs a `part`".into());
     }
+    for (name, value) in &pull.notes {
+        check_note(name, value)?;
+    }
     let covariates = pull.covariates();
     for column in COLUMNS.iter().filter(|column| column.in_table != InTable::Absent) {
         let Some(x) = column.number(pull.view(&covariates)) else { continue };
@@ -191,6 +196,11 @@ pub fn campaign_toml(campaign: &Campaign, about: &str) -> String {
     text += "pulls = [\n";
     let number = |x: f64| toml::Value::Float(x).to_string();
     let word = |x: &str| toml::Value::String(x.into()).to_string();
+    // `größe` is no bare key.
+    let key = |x: &str| match x.is_ascii() {
+        true => x.to_string(),
+        false => word(x),
+    };
     for pull in &campaign.pulls {
         let entry = match pull.kind {
             PullKind::NoLoad => format!("kind = \"no_load\", dwell_s = {}", number(pull.dwell_s)),
@@ -209,7 +219,15 @@ pub fn campaign_toml(campaign: &Campaign, about: &str) -> String {
             ),
         };
         let (pause, session, gel) = (number(pull.pause_s), word(&pull.session), word(&pull.gel_id));
-        text += &format!("  {{ {entry}, pause_s = {pause}, session = {session}, gel_id = {gel} }},\n");
+        let notes: String = pull
+            .notes
+            .iter()
+            .map(|(name, value)| match value {
+                Drawn::Number(x) => format!(", {} = {}", key(name), number(*x)),
+                Drawn::Text(text) => format!(", {} = {}", key(name), word(text)),
+            })
+            .collect();
+        text += &format!("  {{ {entry}, pause_s = {pause}, session = {session}, gel_id = {gel}{notes} }},\n");
     }
     text + "]\n"
 }
@@ -237,7 +255,13 @@ mod tests {
     fn a_campaign_that_was_written_is_read_back() {
         let pull = PlannedPull { part: "gear \"a\"".into(), grip_force_n: 0.1 + 0.2, ..Default::default() };
         let pull = PlannedPull { force_start_n: Some(4.5), ..pull };
+        let notes = [
+            ("operator".to_string(), Drawn::Text("anna".into())),
+            ("humidity_pct".to_string(), Drawn::Number(43.0)),
+            ("größe".to_string(), Drawn::Number(2.5)),
+        ];
         let second = PlannedPull {
+            notes: notes.into(),
             force_start_n: None,
             pull_direction: -1.0,
             pause_s: 1500.0,
@@ -282,7 +306,10 @@ mod tests {
         let pull = "[[pulls]]\npart = \"gear\"\ngrip_force_n = 40\n";
         for (text, part) in [
             (String::new(), "no `pulls`"),
-            (format!("{pull}dwel_s = 3\n"), "unknown field `dwel_s`"),
+            (format!("{pull}dwel_s = 3\n"), "pulls[0]: unknown field `dwel_s`: did you mean `dwell_s`?"),
+            (format!("{pull}humidity_pct = true\n"), "a number or a word is needed"),
+            (format!("{pull}temperature_c = \"warm\"\n"), "`temperature_c` is `warm`, it must be a number"),
+            (format!("{pull}pull_index = 3\n"), "the campaign or the rig says it"),
             (format!("{pull}{}", pull.replace("40", "-4")), "pulls[1]: `grip_force_n` is -4"),
             (pull.replace("part = \"gear\"", ""), "pulls[0]: a pull needs a `part`"),
             (format!("{pull}pull_direction = 0\n"), "1 (up) or -1 (down)"),

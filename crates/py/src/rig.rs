@@ -108,7 +108,7 @@ pub fn rig_pull<'py>(
             }));
             Ok(())
         };
-        job.open(&name, &out, after.as_deref())?.make(how, stop, &mut emit)
+        job.open(&name, &out, after.as_deref())?.make(how, stop, &mut |_, _, _| channel().1, &mut emit)
     })?;
     let found = PyDict::new(py);
     found.set_item("failed", made.failed)?;

@@ -33,6 +33,22 @@ fn compare(key: &str, there: &toml::Value, here: &toml::Value, found: &mut Vec<S
             }
         }
         _ if there == here => {}
+        (toml::Value::Array(a), toml::Value::Array(b)) if a.iter().chain(b).all(toml::Value::is_str) => {
+            let only = |of: &[toml::Value], other: &[toml::Value]| {
+                let words: Vec<String> =
+                    of.iter().filter(|word| !other.contains(word)).map(ToString::to_string).collect();
+                if words.is_empty() { "nothing more".into() } else { words.join(", ") }
+            };
+            found.push(format!("{key} has {} there alone, {} here alone", only(a, b), only(b, a)));
+        }
+        (toml::Value::Array(a), toml::Value::Array(b)) if a.iter().chain(b).any(toml::Value::is_table) => {
+            if a.len() != b.len() {
+                found.push(format!("{key} has {} entries there, {} here", a.len(), b.len()));
+            }
+            for (i, (a, b)) in a.iter().zip(b).enumerate() {
+                compare(&format!("{key}[{i}]"), a, b, found);
+            }
+        }
         _ => found.push(format!("{key} is {} there, {} here", brief(there), brief(here))),
     }
 }
@@ -60,5 +76,19 @@ mod tests {
             "a.w is not set there, \"p\" here; a.x is 1 there, 2 here; a.z is 3 there, not set here"
         );
         assert_eq!(differences("a = 1", "a = 1"), None);
+        // Lists of entries by their entries, lists of words by the words.
+        assert_eq!(
+            differences("p = [{f = 20.0, x = 1}, {f = 25.0}]", "p = [{f = 20.0, x = 1}, {f = 30.0}]")
+                .unwrap(),
+            "p[1].f is 25.0 there, 30.0 here"
+        );
+        assert_eq!(
+            differences("p = [{f = 20.0}, {f = 25.0}]", "p = [{f = 21.0}]").unwrap(),
+            "p has 2 entries there, 1 here; p[0].f is 20.0 there, 21.0 here"
+        );
+        assert_eq!(
+            differences("r = [\"a\", \"b\"]", "r = [\"b\", \"operator\"]").unwrap(),
+            "r has \"a\" there alone, \"operator\" here alone"
+        );
     }
 }

@@ -55,6 +55,8 @@ pub fn index_row(sample: &Sample, extra_columns: &[String]) -> Vec<String> {
             // One column for both: why there is no label, or none to be relied on.
             "failure" if sample.status() == Status::Suspect => sample.status_reason.clone(),
             "failure" => sample.failure.clone(),
+            // It was not measured.
+            "temperature_c" if sample.temperature_c.is_nan() => String::new(),
             name => of_pull(name),
         })
         .collect();

@@ -16,13 +16,15 @@ pub fn sample_covariates(s: &proto::Sample) -> Covariates {
         Some(column) => column.name == name && matches!(column.held, Held::Extra),
         None => is_own_column(name),
     };
+    // A temperature that was not measured is stored as none; a pull then has that of a table without the column.
+    let unmeasured = Covariates::default();
     let extra = numbers.chain(words).filter(|(name, _)| has_no_field(name));
     Covariates {
         gel_id: s.gel_id.clone(),
         session: s.session.clone(),
         pull_index: s.pull_index,
         time_s: s.time_s,
-        temperature_c: s.temperature_c,
+        temperature_c: if s.temperature_c.is_nan() { unmeasured.temperature_c } else { s.temperature_c },
         dwell_s: s.dwell_s,
         grip_offset_m: Scale::Thousandth.to_si(s.grip_offset_mm),
         grip_angle_rad: Scale::Degree.to_si(s.grip_angle_deg),

@@ -33,7 +33,7 @@ pub mod slowing;
 pub mod stop;
 mod zero;
 
-pub use campaign::{CampaignError, CampaignPlan, run_campaign};
+pub use campaign::{Ask, CampaignError, CampaignPlan, run_campaign};
 pub use config::{RigConfig, rig_schema};
 pub use devices::Devices;
 pub use event::{ExecutedPull, PullOutcome, RigEvent, Stopped};

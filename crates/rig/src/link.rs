@@ -7,7 +7,7 @@ mod socket_tests;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub(crate) use socket::{Connection, LOOK, Reading, Shared, Socket, time_left};
+pub(crate) use socket::{Connection, Reading, Shared, Socket, time_left};
 pub use socket::{Stamped, lock};
 
 use std::net::SocketAddr;

@@ -15,6 +15,8 @@ mod verdict;
 #[path = "faults/watch.rs"]
 mod watch;
 
+use gripgen_rig::experiment::PullOutcome;
+use gripgen_rig_sim::faults::Device;
 use injection::{ALL, Injection, injections};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -33,6 +35,22 @@ fn chosen() -> Vec<Injection> {
         (Some(one), _) => injections(one + 1).split_off(one),
         (None, Some(all)) => injections(all),
         (None, None) => injections(DEFAULT).into_iter().step_by(5).collect(),
+    }
+}
+
+/// The robot is lost when the label is complete: everything is stopped, and the label stays.
+#[test]
+fn a_label_that_was_complete_survives_a_lost_connection() {
+    for device in [Device::Rtde, Device::Gripper, Device::Script] {
+        let pull = bench_tests::pull_and_lose(device, "releasing");
+        let stopped = pull.stopped.as_ref().unwrap_or_else(|| panic!("{device:?}: nothing was stopped"));
+        assert!(stopped.steps.len() >= 4, "{device:?}: {stopped:?}");
+        let PullOutcome::Labelled(label) = &pull.outcome else { panic!("{device:?}: {:?}", pull.outcome) };
+        assert!((label.max_pull_force_n - 10.25).abs() < 0.01 && !label.censored, "{device:?}: {label:?}");
+        assert!(pull.trace.is_some() && pull.images.is_some(), "{device:?}");
+        // Lost in the middle of the pull there is none.
+        let pull = bench_tests::pull_and_lose(device, "pulling");
+        assert!(matches!(pull.outcome, PullOutcome::Failed { .. }), "{device:?}: {:?}", pull.outcome);
     }
 }
 

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
+#[path = "server/check_tests.rs"]
+mod check_tests;
 #[path = "server/clock_tests.rs"]
 mod clock_tests;
 #[path = "server/device_tests.rs"]

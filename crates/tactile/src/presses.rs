@@ -10,6 +10,7 @@ mod data_pack;
 mod gain;
 mod indenter;
 mod render;
+mod rest_doubt;
 mod seen;
 
 pub use ball_size::{BallSize, BallSizeBy, check_ball_size};
@@ -32,6 +33,7 @@ pub(crate) use contact::Contact;
 pub use contact::{MarkError, ZONES, Zone};
 pub use indenter::{Indenter, IndenterError, IndenterPose, USUAL_SINK_IN};
 pub use render::{HeightsError, RenderedBody, render_body, render_heights};
+pub use rest_doubt::{RestDoubt, rest_doubt};
 pub use seen::{PressContact, PressScene, PressView, frame_mse, surface_part};
 
 /// Images of one sensor into which a ball or other bodies were pressed, in the order in which they were taken.

@@ -1,8 +1,10 @@
 //! A campaign: pulls to make, in order.
 
 use crate::config::Feedback;
+use crate::draw::Drawn;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// What is done at one place of a campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -17,7 +19,7 @@ pub enum PullKind {
 
 /// One entry of `pulls` of a campaign file, in its units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct PlannedPull {
     /// What is done.
     pub kind: PullKind,
@@ -46,6 +48,9 @@ pub struct PlannedPull {
     pub session: String,
     /// Which gel is mounted.
     pub gel_id: String,
+    /// What a lab notes of it: `temperature_c`, `operator`, any column that is none of the others.
+    #[serde(flatten)]
+    pub notes: BTreeMap<String, Drawn>,
 }
 
 impl Default for PlannedPull {
@@ -65,6 +70,7 @@ impl Default for PlannedPull {
             pause_s: 0.0,
             session: "1".into(),
             gel_id: "g1".into(),
+            notes: BTreeMap::new(),
         }
     }
 }

@@ -1,10 +1,13 @@
 //! What varies from sample to sample, and by how much.
 
 use crate::random::{Purpose, Stream, normal_quantile};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A drawn value.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "a number or a word is needed")]
 pub enum Drawn {
     /// A number.
     Number(f64),

@@ -121,6 +121,12 @@ pub struct RigPullArgs {
     /// A run on the same rig and gels before this one: its pulls and its clock are counted on.
     #[arg(long, value_name = "FOLDER")]
     pub after: Option<PathBuf>,
+    /// Note this of every pull, for example operator=anna; may be given many times.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = key_value)]
+    pub column: Vec<(String, String)>,
+    /// Ask for these columns before each pull, for example temperature_c; an empty answer notes nothing.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub ask: Vec<String>,
     /// Run folder; runs/<name of the campaign> where it is left out.
     #[arg(short, long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,

@@ -3,7 +3,7 @@
 use crate::args::{CalibratePressesArgs, TalkArgs};
 use crate::commands::compare::{comparison_json, page_scores, shown, table};
 use crate::failure::Failure;
-use crate::load::{no_presses, say_circles};
+use crate::load::{drop_doubtful_rest, no_presses, say_circles};
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use crate::{PressGeometry, find_missing_circles, load_presses};
@@ -31,6 +31,8 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
             "--ball-mm: measure the ball with calipers; --mm-per-px: measure a pixel by a known length on the gel",
         )
     })?;
+    let had_rest = set.rest.is_some();
+    let doubt = drop_doubtful_rest(&args.presses, &mut set, &args.talk);
     say_circles(&find_missing_circles(&mut set), &args.talk);
     if !args.talk.quiet {
         eprintln!("{} presses; fitting, and again without each fold of them", set.presses.len());
@@ -69,6 +71,11 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
             "ball_size": ball_size_json(ball_size.as_ref()),
             "coverage": coverage.as_ref().map(coverage_json),
             "doubtful": calibration.doubtful,
+            "rest": had_rest.then(|| json!({
+                "used": doubt.is_none(),
+                "differs": doubt.map(|doubt| doubt.differs),
+                "presses_differ": doubt.map(|doubt| doubt.presses_differ),
+            })),
             "held_out": comparison_json(&calibration.held_out),
         }))?;
     }

@@ -4,8 +4,8 @@ use crate::args::CompareArgs;
 use crate::commands::imprints;
 use crate::failure::Failure;
 use crate::load::{
-    folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls, say_circles, say_warnings,
-    suspects, there_is,
+    drop_doubtful_rest, folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls,
+    say_circles, say_warnings, suspects, there_is,
 };
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
@@ -53,6 +53,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
 /// A sensor file against presses.
 fn presses(args: &CompareArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Failure> {
     let (sensor, mut set) = load_sensor_and_presses(&args.measured, args.sensor.as_deref(), &args.twin)?;
+    drop_doubtful_rest(&args.measured, &mut set, &args.talk);
     say_circles(&find_circles_with_sensor(&mut set, &sensor), &args.talk);
     let comparison = compare_presses(&set, &sensor)
         .map_err(|e| Failure::usage(format!("{}: {e}", args.measured.display())))?;

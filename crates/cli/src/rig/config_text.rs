@@ -7,6 +7,7 @@ use gripgen_twin::columns::covariates;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Campaign, PlannedPull};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Keys of a rig's file that no measurement depends on: where the devices are, and how patient the host is.
@@ -20,16 +21,24 @@ const OF_THE_NETWORK: [(&[&str], &[&str]); 6] = [
 ];
 
 /// Sections `[rig]` and `[campaign]`: limits and poses, and every pull that is to be made. Two campaigns of the same text are the
-/// same run, wherever the devices are.
+/// same run, wherever the devices are, and whatever a person notes of each pull: `noted` are the names of those columns.
 ///
 /// # Errors
 ///
 /// A configuration that TOML cannot hold.
-pub fn rig_run_toml(rig: &impl Serialize, campaign: &Campaign) -> Result<String, toml::ser::Error> {
+pub fn rig_run_toml<'a>(
+    rig: &impl Serialize,
+    campaign: &'a Campaign,
+    noted: impl Iterator<Item = &'a String>,
+) -> Result<String, toml::ser::Error> {
+    let noted: BTreeSet<&String> =
+        noted.chain(campaign.pulls.iter().flat_map(|pull| pull.notes.keys())).collect();
     let campaign = campaign_toml(campaign, "");
     let mut campaign: toml::Table =
         campaign.parse().unwrap_or_else(|e| unreachable!("what campaign_toml writes can be read: {e}"));
-    let recorded: Vec<toml::Value> = covariates().filter(|c| c.known_to_rig).map(|c| c.name.into()).collect();
+    let known = covariates().filter(|c| c.known_to_rig).map(|c| c.name.into());
+    let recorded: Vec<toml::Value> =
+        known.chain(noted.into_iter().map(|name| name.as_str().into())).collect();
     campaign.insert("recorded".into(), recorded.into());
     let mut run = toml::Table::new();
     let mut rig = toml::Table::try_from(rig)?;
@@ -76,7 +85,7 @@ mod tests {
     fn a_run_is_the_same_on_other_ports_and_another_with_other_limits() {
         let rig = |text: &str| -> toml::Table { text.parse().unwrap() };
         let campaign = plain_campaign(&["gear".into()], &[20.0], 2, 1);
-        let of = |text: &str| rig_run_toml(&rig(text), &campaign).unwrap();
+        let of = |text: &str| rig_run_toml(&rig(text), &campaign, [].iter()).unwrap();
         let here = "[robot]\naddress = \"a\"\nrtde_port = 1\npayload_kg = 1.0\n[cameras.left]\nport = 3\nrotate_deg = 90\n";
         assert_eq!(
             of(here),

@@ -4,7 +4,7 @@ use super::programs::checked_programs;
 use super::record::{Standing, rig_pull, suspect};
 use super::rehearsal::keep;
 use super::standing::CampaignClock;
-use super::{load_rehearsal, no_pose};
+use super::{after_stop, load_rehearsal, no_pose, unprepared};
 use crate::failure::{Failure, another_run, code};
 use crate::output::program;
 use crate::rig::{plain_campaign, rig_run_differences, rig_run_toml};
@@ -13,6 +13,8 @@ use gripgen::record::{
     FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls,
     suspect_pulls, write_rig_pull,
 };
+use gripgen::twin::draw::Drawn;
+use gripgen::twin::notes::{check_note, note_of};
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
 use gripgen_report::publish_contact_sheet;
 use gripgen_rig::experiment::check::check;
@@ -21,9 +23,9 @@ use gripgen_rig::experiment::pull::ExecutedPull;
 use gripgen_rig::experiment::rehearse::StoredRehearsal;
 use gripgen_rig::experiment::slowing::slowed;
 use gripgen_rig::experiment::{
-    CampaignError, CampaignPlan, Devices, RigConfig, RigEvent, check_campaign, run_campaign,
+    Ask, CampaignError, CampaignPlan, Devices, RigConfig, RigEvent, check_campaign, run_campaign,
 };
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -57,6 +59,8 @@ pub struct PullJob {
     /// What the rehearsal did to the campaign, in words.
     pub slowed: Option<String>,
     rehearsal: Option<(PathBuf, StoredRehearsal)>,
+    notes: BTreeMap<String, Drawn>,
+    asked: Vec<String>,
 }
 
 impl PullJob {
@@ -75,7 +79,36 @@ impl PullJob {
         check_campaign(&config, &campaign).map_err(|e| {
             Failure::usage(e).hint("nothing was sent and nothing moved; the limits stand in the rig's file and in the device's data sheet")
         })?;
-        Ok(Self { config, campaign, slowed, rehearsal })
+        Ok(Self { config, campaign, slowed, rehearsal, notes: BTreeMap::new(), asked: Vec::new() })
+    }
+
+    /// Notes these columns of every pull, and asks for the others before each.
+    ///
+    /// # Errors
+    ///
+    /// A column that is given twice, has the name of something else, or a value that cannot have been measured.
+    pub fn with_notes(mut self, notes: &[(String, String)], asked: &[String]) -> Result<Self, Failure> {
+        let none = |name: &str| {
+            Failure::usage(format!("--column {name}: there is no value"))
+                .hint("leave the flag out where nothing was measured")
+        };
+        for (name, text) in notes {
+            let value = note_of(text).ok_or_else(|| none(name))?;
+            check_note(name, &value).map_err(|e| Failure::usage(format!("--column: {e}")))?;
+            self.notes.insert(name.clone(), value);
+        }
+        for name in asked {
+            check_note(name, &Drawn::Number(0.0)).map_err(|e| Failure::usage(format!("--ask: {e}")))?;
+            self.asked.push(name.clone());
+        }
+        let mut names: Vec<&String> = notes.iter().map(|(name, _)| name).chain(asked).collect();
+        names.sort();
+        match names.windows(2).find(|pair| pair[0] == pair[1]) {
+            Some(pair) => Err(Failure::usage(format!("the column {} is given twice", pair[0])).hint(
+                "a column is either the same for all pulls (--column) or asked for before each (--ask)",
+            )),
+            None => Ok(self),
+        }
     }
 
     /// The pulls, without what is between them.
@@ -117,7 +150,8 @@ impl PullJob {
     }
 
     fn open_folder(&self, name: &str, out: &Path) -> Result<RunFolder, Failure> {
-        let config_toml = rig_run_toml(&self.config, &self.campaign).map_err(Failure::new)?;
+        let config_toml = rig_run_toml(&self.config, &self.campaign, self.notes.keys().chain(&self.asked))
+            .map_err(Failure::new)?;
         let pulls = self.pulls().len() as u64;
         let info = RigRunInfo { name: name.into(), gripgen_version: VERSION.into(), config_toml, pulls };
         create_rig_run(out, &info).map_err(|e| match &e {
@@ -214,7 +248,8 @@ impl PullRun<'_> {
         self.todo.len()
     }
 
-    /// Makes what is missing, records it, and finishes the run. An error of `tell` ends it after the pull under way.
+    /// Makes what is missing, records it, and finishes the run. `ask` asks a person for the columns of [`PullJob::with_notes`]. An error
+    /// of `tell` ends it after the pull under way.
     ///
     /// # Errors
     ///
@@ -223,9 +258,10 @@ impl PullRun<'_> {
         &self,
         how: HowToPull,
         stop: &AtomicBool,
+        ask: &mut Ask<'_>,
         tell: &mut dyn FnMut(PullProgress<'_>) -> Result<(), Failure>,
     ) -> Result<PullSummary, Failure> {
-        let PullJob { config, campaign, rehearsal, .. } = self.job;
+        let PullJob { config, campaign, rehearsal, notes, asked, .. } = self.job;
         let trails_s = rehearsal.as_ref().and_then(|(_, stored)| stored.rehearsal.trails_s());
         let plan = CampaignPlan {
             config,
@@ -235,6 +271,8 @@ impl PullRun<'_> {
             reconnects: how.reconnects,
             trails_s: trails_s.unwrap_or_default(),
             frames: how.frames,
+            notes: notes.clone(),
+            asked: asked.clone(),
         };
         let mut clock = CampaignClock::of(&self.folder)?;
         if clock.is_new() {
@@ -255,7 +293,7 @@ impl PullRun<'_> {
         };
         let failed = match self.todo.is_empty() {
             true => 0,
-            false => run_campaign(&plan, Devices::connect, stop, &mut on_event).map_err(ended)?,
+            false => run_campaign(&plan, Devices::connect, stop, ask, &mut on_event).map_err(ended)?,
         };
         let complete = self.folder.write_index()?;
         if complete {
@@ -273,17 +311,19 @@ fn ended(e: CampaignError<Failure>) -> Failure {
         ),
         // It is not ours to stop.
         CampaignError::Busy(fault) => {
-            Failure::new(fault).hint("wait for its end, or stop it on the teach pendant; nothing was moved")
+            let hint = fault.hint();
+            Failure::new(fault).hint_if(hint)
         }
         CampaignError::Stopped { stopped, interrupted } => {
-            let again = format!("look at the rig; `{} rig pull` with the same arguments goes on", program());
-            let failure = Failure::new(stopped).hint(again);
+            let again = format!("`{} rig pull` with the same arguments goes on", program());
+            let hint = after_stop(&stopped, &again);
+            let failure = Failure::new(stopped).hint(hint);
             if interrupted { failure.with_code(code::INTERRUPTED) } else { failure }
         }
         CampaignError::InARow { problem } => {
             Failure::new(problem).hint("look at the rig; the same command goes on")
         }
         CampaignError::Told(failure) => failure,
-        CampaignError::Prepare(e) => Failure::new(e),
+        CampaignError::Prepare(e) => unprepared(&e),
     }
 }

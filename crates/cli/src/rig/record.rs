@@ -5,6 +5,7 @@ use gripgen::twin::draw::Drawn;
 use gripgen::twin::label::check::{
     Expected, GripForceEvidence, LabelEvidence, WrenchRow, ZERO_SHIFT, check_label,
 };
+use gripgen::twin::notes::TEMPERATURE;
 use gripgen::twin::{Campaign, Covariates, Jaw, PerJaw, PlannedPull, PullKind, PullSettings, Scenario};
 use gripgen_rig::experiment::film::FilmedFrame;
 use gripgen_rig::experiment::pull::{ExecutedPull, FrameStamp};
@@ -219,6 +220,11 @@ fn scenario(config: &RigConfig, campaign: &Campaign, standing: Standing, m: &Exe
             pull_index: standing.made,
             time_s: thousandth(standing.time_s),
             dwell_s: thousandth(m.dwell_s),
+            // A rig has no thermometer: it is that of a person, or none.
+            temperature_c: match planned.notes.get(TEMPERATURE) {
+                Some(Drawn::Number(celsius)) => *celsius,
+                _ => f64::NAN,
+            },
             ..planned.covariates()
         },
         pull: PullSettings {
@@ -235,6 +241,7 @@ fn scenario(config: &RigConfig, campaign: &Campaign, standing: Standing, m: &Exe
         drawn: covariates_beside(config, m)
             .into_iter()
             .map(|(name, x)| (name.into(), Drawn::Number(thousandth(x))))
+            .chain(planned.notes.clone().into_iter().filter(|(name, _)| name != TEMPERATURE))
             .collect(),
     }
 }
@@ -249,6 +256,7 @@ fn group_of(campaign: &Campaign, index: usize) -> (u64, u64) {
             pause_s: mine.pause_s,
             session: mine.session.clone(),
             gel_id: mine.gel_id.clone(),
+            notes: mine.notes.clone(),
             ..p.clone()
         };
         alike == **mine

@@ -1,14 +1,16 @@
 //! Rehearsals of a rig, and their files.
 
-use super::no_pose;
 use super::programs::checked_programs;
+use super::{after_stop, no_pose, unprepared};
 use crate::failure::Failure;
 use crate::rig::plain_campaign;
 use gripgen::VERSION;
 use gripgen::record::{RunFolder, sha256_hex};
 use gripgen_rig::experiment::check::{CheckLine, check};
 use gripgen_rig::experiment::rehearse::{SCHEMA, StoredRehearsal};
-use gripgen_rig::experiment::{Devices, RehearsalPlan, RigConfig, RigEvent, check_campaign, rehearse};
+use gripgen_rig::experiment::{
+    Devices, RehearsalPlan, RehearseError, RigConfig, RigEvent, check_campaign, rehearse,
+};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -55,8 +57,16 @@ pub fn rehearse_rig(
         return Err(Failure::new(format!("{}: {}", bad.what, bad.found))
             .hint("`gripgen rig check` says all; nothing was moved"));
     }
-    let devices = Devices::connect(config).map_err(Failure::new)?;
-    let rehearsal = rehearse(config, devices, plan, stop, emit).map_err(Failure::new)?;
+    let devices = Devices::connect(config)
+        .map_err(|e| Failure::new(e).hint("`gripgen rig check` says which devices answer"))?;
+    let rehearsal = rehearse(config, devices, plan, stop, emit).map_err(|e| match e {
+        RehearseError::Prepare(e) => unprepared(&e),
+        RehearseError::Stopped(stopped) => {
+            let hint = after_stop(&stopped, "then rehearse again");
+            Failure::new(stopped).hint(hint)
+        }
+        other => Failure::new(other),
+    })?;
     Ok(StoredRehearsal::new(VERSION, config, lines, rehearsal))
 }
 

@@ -23,6 +23,8 @@ mod rig_doubts;
 mod rig_faults;
 // The loop over the wire.
 mod rig_loop;
+// What a lab notes of the pulls of a rig.
+mod rig_notes;
 // Runs of a rig.
 mod rig_run;
 mod rig_served;

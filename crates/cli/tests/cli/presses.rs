@@ -49,6 +49,7 @@ fn a_sensor_is_calibrated_from_a_folder_of_presses_and_compared_with_it() {
     assert!(text(&done.stderr).contains("4 presses, it was looked for"), "{}", text(&done.stderr));
     let json: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!(json["held_out"]["n"], 16);
+    assert_eq!(json["rest"]["used"], true, "{json}");
     assert_eq!(json["fitted"]["ball_mm"], 5.0);
     // One ball, and nothing that would show how large it is.
     assert_eq!(json["ball_size"]["checked"], false);
@@ -316,4 +317,41 @@ fn a_surface_is_rendered_from_its_heights() {
         assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
         assert!(text(&refused.stderr).contains(part), "{}", text(&refused.stderr));
     }
+}
+
+/// A frame without contact of another light is not used, and is named; the contacts are found as well without it.
+#[test]
+fn a_rest_frame_that_contradicts_the_presses_is_named() {
+    let presses = press_folder(8);
+    let rest = presses.path().join("rest.png");
+    let bytes = gripgen::assets::get("sensors/gelsight_r15/sensor.npz").unwrap();
+    let shipped = gripgen::tactile::Sensor::from_npz(bytes, None, None).unwrap();
+    let image = gripgen::tactile::finish(&shipped, None, Some(1));
+    let darker =
+        gripgen::twin::TactileImage { rgb: image.rgb.iter().map(|level| level / 2).collect(), ..image };
+    std::fs::write(&rest, gripgen::record::encode_png(&darker).unwrap()).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let sensor = out.path().join("sensor.npz");
+    let done = run(&[
+        "calibrate",
+        "presses",
+        presses.path().to_str().unwrap(),
+        "--ball-mm",
+        "5",
+        "--mm-per-px",
+        "0.0877",
+        "-o",
+        sensor.to_str().unwrap(),
+        "--json",
+    ]);
+    assert_code(&done, 0);
+    let said = text(&done.stderr);
+    assert!(
+        said.contains("grey levels from the presses where nothing touches")
+            && said.contains("it is not used"),
+        "{said}"
+    );
+    let json: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(json["rest"]["used"], false, "{json}");
+    assert!(json["rest"]["differs"].as_f64().unwrap() > 10.0, "{json}");
 }

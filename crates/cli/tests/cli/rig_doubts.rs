@@ -105,6 +105,29 @@ fn a_rig_that_is_not_as_its_file_says_is_refused() {
     assert!(refused.said.contains("enlarged to 640 x 480 px"), "{}", refused.said);
 }
 
+/// A sign that is not the sensor's is told by its name, and the hint finds it.
+#[test]
+fn a_wrong_sign_of_the_force_is_recognised() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = Served::start(&FAST);
+    // 25 N slip above the force that a hand is told from, 6 N below it.
+    for (name, grip_force_n) in [("strong", "25"), ("weak", "6")] {
+        let out = folder.path().join(name);
+        let wrong = ["--set", "robot.force_sign=1.0", "--grip-force-n", grip_force_n];
+        let mut flags = vec!["--parts", "gear", "-o", out.to_str().unwrap()];
+        flags.extend(wrong);
+        let refused = rig.rig("pull", &flags);
+        assert_code(&refused, 1);
+        let said = text(&refused.stderr);
+        assert!(
+            said.contains("the force reads the wrong way") && said.contains("-1.0 fits this pull"),
+            "{said}"
+        );
+        assert!(said.contains("`gripgen rig check --mass-kg 1.0` finds the sign"), "{said}");
+        assert_eq!(pulls(&out)[0].0, "failed");
+    }
+}
+
 /// The same picture with new stamps is a camera that stands still.
 #[test]
 fn a_camera_that_repeats_itself_is_frozen() {

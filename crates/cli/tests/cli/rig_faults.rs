@@ -2,6 +2,7 @@
 
 use super::rig_served::{PATIENCE, Served, pulls};
 use super::{assert_code, run, text, unmade};
+use gripgen::record::{RunFolder, ShardReader};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -22,6 +23,19 @@ fn assert_counts(out: &Path, counts: [u64; 3]) {
     assert_code(&run(&["verify", out.to_str().unwrap()]), 0);
 }
 
+/// A pull that is stopped is over by then, in seconds of the rig's own clock: no busy machine makes that go faster.
+const LONGEST_S: f64 = 20.0;
+
+/// How long the rig went on after its safety mode was no more `NORMAL`, by its own clock.
+fn stopped_after_s(out: &Path, pull: u64) -> f64 {
+    let folder = RunFolder::open(out).unwrap();
+    let log = ShardReader::open(&folder.shard_path(pull)).unwrap().rig_log(pull).unwrap();
+    let robot = log.streams.iter().find(|stream| stream.name == "robot").unwrap();
+    let (_, safety) = robot.columns.iter().find(|(name, _)| name == "safety_mode").unwrap();
+    let stopped = safety.iter().position(|mode| *mode != 1.0).expect("the stop was seen");
+    robot.device_time_s.last().unwrap() - robot.device_time_s[stopped]
+}
+
 #[test]
 fn an_emergency_stop_fails_one_pull_and_the_same_command_finishes_the_campaign() {
     let (_folder, out) = unmade("lab");
@@ -36,6 +50,8 @@ fn an_emergency_stop_fails_one_pull_and_the_same_command_finishes_the_campaign()
         "{said}"
     );
     assert_eq!(statuses(&out), ["slipped", "failed", "missing"], "{said}");
+    let after_s = stopped_after_s(&out, 1);
+    assert!(after_s < LONGEST_S, "{after_s} s");
     let failure = pulls(&out).remove(1).unwrap().1;
     assert_eq!(failure, "the robot is in ROBOT_EMERGENCY_STOP");
     assert_counts(&out, [2, 1, 1]);
@@ -67,6 +83,8 @@ fn a_protective_stop_is_left_only_when_somebody_says_so() {
     rig.inject("protective-stop");
     pulling.ends_with(1);
     assert!(pulling.said.contains("PROTECTIVE_STOP; the robot stands still"), "{}", pulling.said);
+    let after_s = stopped_after_s(&out, 0);
+    assert!(after_s < LONGEST_S, "{after_s} s");
     let place = rig.place();
     let mut refused = rig.pull(&out, 1, &["--power-on"]);
     refused.ends_with(1);

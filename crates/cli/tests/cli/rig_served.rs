@@ -94,10 +94,16 @@ impl Served {
 
     /// Begins a campaign.
     pub fn pull(&self, out: &Path, pulls: usize, more: &[&str]) -> Pulling {
+        self.pull_answering(out, pulls, more, "")
+    }
+
+    /// Begins a campaign with somebody at the keyboard, who has typed these lines.
+    pub fn pull_answering(&self, out: &Path, pulls: usize, more: &[&str], typed: &str) -> Pulling {
         let mut command = gripgen();
         command.args(self.pull_flags(out, pulls)).args(more);
         let mut process =
-            command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+            command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        process.stdin.take().unwrap().write_all(typed.as_bytes()).unwrap();
         let stderr = process.stderr.take().unwrap();
         let (tell, lines) = channel();
         std::thread::spawn(move || {

@@ -57,6 +57,13 @@ fn teach_writes_where_the_tool_is_and_keeps_the_rest_of_the_file() {
     let pose = value["poses"]["bolt"]["base_from_tool"].as_array().unwrap();
     let numbers: Vec<f64> = pose.iter().map(|x| x.as_float().unwrap()).collect();
     assert_eq!(&numbers[..3], [0.45, 0.06, 0.25], "the fixture of the shaft");
+    // Again: the pose that is replaced is named, in case it was another part's.
+    let again = rig.rig("teach", &["bolt", "--rig", file.to_str().unwrap()]);
+    let said = text(&again.stdout);
+    assert!(said.contains(", instead of 450.0, 60.0, 250.0 mm: 0.0 mm and 0.0 degrees away"), "{said}");
+    let other = rig.rig("teach", &["gear", "--rig", file.to_str().unwrap(), "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&other.stdout).unwrap();
+    assert_eq!((&json["replaced"], &json["was"][1]), (&true.into(), &(-0.06).into()));
     let unknown = rig.rig(
         "teach",
         &["bolt", "--rig", file.to_str().unwrap(), "--set", "limits.workspace_high_mm=[700.0, 0.0, 600.0]"],

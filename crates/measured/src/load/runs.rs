@@ -10,6 +10,7 @@ use gripgen_record::{
 };
 use gripgen_twin::columns::{Column, covariate, covariates, recorded_covariates};
 use gripgen_twin::config::Feedback;
+use gripgen_twin::notes::TEMPERATURE;
 use gripgen_twin::{ExtraColumn, MeasuredPull, MeasuredPulls, PullTrace, Values};
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -21,7 +22,7 @@ pub(super) fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, L
     let rig = (folder.info().source == RIG_SOURCE).then(|| rig_campaign(&folder)).transpose()?;
     let mut left_out = LeftOut { rig: rig.is_some(), ..LeftOut::default() };
     let (mut pulls, mut standing, mut hashes) = (Vec::new(), Vec::new(), String::new());
-    let mut rule: Option<(f64, f64)> = None;
+    let (mut rule, mut no_temperature): (Option<(f64, f64)>, _) = (None, Vec::new());
     for shard in 0..folder.info().shards {
         let Some(sidecar) = folder.finished(shard)? else {
             left_out.unfinished_shards += 1;
@@ -41,6 +42,9 @@ pub(super) fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, L
                 continue;
             }
             let stands = suspects::standing_of(&sample, trace.as_ref());
+            if sample.temperature_c.is_nan() {
+                no_temperature.push(sample.index.to_string());
+            }
             if let Some(pull) = measured(sample, trace.as_ref()) {
                 pulls.push(pull);
                 standing.push(stands);
@@ -71,10 +75,22 @@ pub(super) fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, L
         Some(campaign) => as_made(&mut pulls, campaign),
         None => pulls.extra = own_columns(&pulls.pulls),
     }
+    notes.extend(without_temperature(&mut pulls, &no_temperature));
     notes.extend(zero::without_shift(&mut pulls));
     fewer_traces(&mut pulls.pulls, &mut notes);
     // A sweep and a rig write newtons.
     Ok(LoadedPulls { pulls, notes, warnings: Vec::new(), implausible: None })
+}
+
+/// A temperature that was not measured in all pulls is used in none: those without it would have that of a table without the column.
+fn without_temperature(pulls: &mut MeasuredPulls, missing: &[String]) -> Option<String> {
+    let missing = pulls.pulls.iter().filter(|pull| missing.contains(&pull.id)).count();
+    let at = pulls.recorded.iter().position(|name| name == TEMPERATURE).filter(|_| missing > 0)?;
+    pulls.recorded.remove(at);
+    Some(format!(
+        "{TEMPERATURE} was not measured in {missing} of {} pulls: it is left out",
+        pulls.pulls.len()
+    ))
 }
 
 /// What is known of pulls that a rig made, and samples of a sweep have not: the order in which they were made, rests

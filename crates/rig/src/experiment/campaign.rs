@@ -6,10 +6,12 @@ use super::event::{ExecutedPull, PullOutcome, RigEvent, Stopped};
 use super::fault::Fault;
 use super::prepare::{Permit, PrepareError};
 use super::run::Experiment;
+use gripgen_twin::draw::Drawn;
 use gripgen_twin::{Campaign, PlannedPull, PullKind};
 use std::cell::RefCell;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError};
 
 /// Pulls in a row without a label after which a person has to look at the rig.
 const MAX_FAILED_IN_A_ROW: usize = 3;
@@ -31,7 +33,15 @@ pub struct CampaignPlan<'a> {
     pub trails_s: f64,
     /// Whether frames of the cameras are told of.
     pub frames: bool,
+    /// What is noted of every pull, in addition to the notes of the campaign; it counts where both have a column.
+    pub notes: BTreeMap<String, Drawn>,
+    /// Columns that a person is asked for before each pull.
+    pub asked: Vec<String>,
 }
+
+/// Asks a person for a column of a pull, and gives where the answer will come: nothing where it was not measured. An end without an
+/// answer means that there is no person.
+pub type Ask<'a> = dyn FnMut(u64, &PlannedPull, &str) -> Receiver<Option<Drawn>> + 'a;
 
 /// Why a campaign ended before its last pull.
 #[derive(Debug, thiserror::Error)]
@@ -83,12 +93,13 @@ pub fn run_campaign<E>(
     plan: &CampaignPlan<'_>,
     mut connect: impl FnMut(&RigConfig) -> Result<Devices, ConnectError>,
     stop: &AtomicBool,
+    ask: &mut Ask<'_>,
     tell: &mut dyn FnMut(RigEvent) -> Result<(), E>,
 ) -> Result<usize, CampaignError<E>> {
     let (mut left, mut reconnects) = (plan.todo.clone(), plan.reconnects);
     loop {
         let devices = connect(plan.config).map_err(CampaignError::Connect)?;
-        let stopped = match on_devices(plan, devices, &mut left, stop, tell)? {
+        let stopped = match on_devices(plan, devices, &mut left, stop, ask, tell)? {
             End::Done(failed) => return Ok(failed),
             End::Stopped(stopped) => stopped,
         };
@@ -107,9 +118,14 @@ fn on_devices<E>(
     mut devices: Devices,
     left: &mut BTreeSet<u64>,
     stop: &AtomicBool,
+    ask: &mut Ask<'_>,
     tell: &mut dyn FnMut(RigEvent) -> Result<(), E>,
 ) -> Result<End, CampaignError<E>> {
-    devices.prepare(plan.permit).map_err(CampaignError::Prepare)?;
+    if let Err(e) = devices.prepare(plan.permit) {
+        // Nothing has moved: the gripper is left as it was found.
+        devices.close();
+        return Err(CampaignError::Prepare(e));
+    }
     let refused = RefCell::new(None);
     let mut emit = |event| {
         if let Err(e) = tell(event) {
@@ -123,6 +139,7 @@ fn on_devices<E>(
     }
     if let Err(fault) = experiment.begin() {
         if let Fault::Busy { .. } = fault {
+            experiment.close();
             return Err(CampaignError::Busy(fault));
         }
         return Ok(End::Stopped(experiment.safe_stop(&fault)));
@@ -135,12 +152,27 @@ fn on_devices<E>(
         else {
             continue;
         };
+        let mut planned = planned.clone();
+        planned.notes.extend(plan.notes.clone());
+        let answered = plan.asked.iter().try_for_each(|name| {
+            let answer = ask(place, &planned, name);
+            let noted = experiment.answer(name, &answer)?;
+            planned.notes.remove(name);
+            planned.notes.extend(noted.map(|value| (name.clone(), value)));
+            Ok(())
+        });
         experiment.tell(RigEvent::PullStarted { place, planned: planned.clone() });
-        let pull = experiment.entries(plan.campaign, entries, planned);
+        let pull = match answered {
+            Ok(()) => experiment.entries(plan.campaign, entries, &planned),
+            Err(fault) => experiment.give_up(&planned, &fault),
+        };
         let (outcome, stopped) = (pull.outcome.clone(), pull.stopped.clone());
         experiment.tell(RigEvent::PullFinished { place, pull: Box::new(pull) });
         if let Some(e) = refused.take() {
             return Err(CampaignError::Told(e));
+        }
+        if !matches!(outcome, PullOutcome::Failed { .. }) {
+            left.remove(&place);
         }
         if let Some(stopped) = stopped {
             return Ok(End::Stopped(stopped));
@@ -153,10 +185,7 @@ fn on_devices<E>(
                 return Err(CampaignError::InARow { problem });
             }
             PullOutcome::Failed { .. } => in_a_row += 1,
-            _ => {
-                in_a_row = 0;
-                left.remove(&place);
-            }
+            _ => in_a_row = 0,
         }
     }
     experiment.close();
@@ -164,6 +193,20 @@ fn on_devices<E>(
 }
 
 impl Experiment<'_> {
+    /// Waits for the answer of a person, however long that takes; the robot is looked at meanwhile.
+    fn answer(&mut self, name: &str, answer: &Receiver<Option<Drawn>>) -> Result<Option<Drawn>, Fault> {
+        loop {
+            self.look()?;
+            // Readings that are not recorded would fill the memory.
+            self.rows.clear();
+            match answer.try_recv() {
+                Ok(value) => return Ok(value),
+                Err(TryRecvError::Empty) => {}
+                Err(TryRecvError::Disconnected) => return Err(Fault::Unanswered { name: name.into() }),
+            }
+        }
+    }
+
     /// What comes before a pull, and the pull.
     fn entries(
         &mut self,

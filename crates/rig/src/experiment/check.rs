@@ -1,25 +1,31 @@
-//! Does every device answer, and how fast. Nothing moves.
+//! Does every device answer, and how fast. Nothing moves, and every device is left as it was found.
+
+mod force;
+mod readings;
+
+pub use force::{ForceCheck, ForceCheckError, check_force};
 
 use super::config::RigConfig;
 use super::devices::{
-    connect_camera, connect_dashboard, connect_for, connect_gripper, connect_listener, connect_primary,
+    ConnectError, connect_camera, connect_dashboard, connect_for, connect_gripper, connect_listener,
+    connect_primary, connect_robot,
 };
 use super::prepare::unsupported;
 use super::robot::RobotRow;
 use crate::camera::{SHIPPED_FRAME_LIMITS, decode_jpeg};
 use crate::dashboard::{DashboardCommand, DashboardReply};
-use crate::gcl::{GclCommand, GripState, Query};
+use crate::gcl::{GclClient, GclRunError, GripState, Query};
 use crate::primary::PrimaryMessage;
+use crate::program::registers;
 use crate::robot_state::{RobotMode, SafetyStatus};
-use crate::rtde::{Event, RtdeClient, Value};
+use crate::rtde::{Event, Value};
+use readings::watch;
 use std::time::{Duration, Instant};
 
 /// How long a device may take.
 const REPLY: Duration = Duration::from_secs(2);
 /// How long readings and frames are counted.
 const COUNT: Duration = Duration::from_millis(1500);
-/// Standard gravity.
-const GRAVITY_M_S2: f64 = 9.806_65;
 /// Readings that an average is made of.
 const AVERAGED: usize = 250;
 /// Largest force at rest: the accuracy of an e-Series' sensor is 4 N (data sheet), and a payload that is half a kilogram wrong
@@ -27,8 +33,6 @@ const AVERAGED: usize = 250;
 const REST_N: f64 = 5.0;
 /// A payload is that of the rig's file if it differs by less: 1 N.
 const SAME_PAYLOAD_KG: f64 = 0.1;
-/// How long somebody has to hang a mass.
-const HANG: Duration = Duration::from_secs(60);
 
 /// One line of the answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,23 +62,6 @@ pub fn check(config: &RigConfig, mut tell: impl FnMut(CheckLine)) {
     tell(line("right camera", camera(config, false)));
 }
 
-/// Readings of about so long, and the controller's version.
-fn readings(robot: &RtdeClient, rows: usize, limit: Duration) -> (Vec<RobotRow>, Option<[u32; 4]>) {
-    let (began, mut found, mut version) = (Instant::now(), Vec::new(), None);
-    while let Some(left) = limit.checked_sub(began.elapsed()) {
-        let Ok(event) = robot.events().recv_timeout(left) else { break };
-        match event.event {
-            Event::ControllerVersion(v) => version = Some(v),
-            Event::Data(values) => found.extend(RobotRow::from_values(event.at, &values)),
-            _ => {}
-        }
-        if found.len() >= rows {
-            break;
-        }
-    }
-    (found, version)
-}
-
 fn robot_data(config: &RigConfig) -> Vec<CheckLine> {
     let began = Instant::now();
     let robot = match connect_listener(config, config.patient(REPLY)) {
@@ -82,25 +69,17 @@ fn robot_data(config: &RigConfig) -> Vec<CheckLine> {
         Err(e) => return vec![line::<String>("RTDE", Ok((false, e.to_string())))],
     };
     let connected_ms = 1e3 * began.elapsed().as_secs_f64();
-    let (rows, version) = readings(&robot, usize::MAX, COUNT);
-    let Some(last) = rows.last() else {
-        return vec![line::<String>("RTDE", Ok((false, "connected, but no reading came".into())))];
-    };
-    let version = version.map_or("unknown".into(), |[a, b, c, d]| format!("{a}.{b}.{c}.{d}"));
-    let (gap_s, late_s) = gaps(&rows);
-    let words = format!(
-        "controller {version}, connected in {connected_ms:.0} ms, {} readings, largest gap {:.1} ms by its own clock, 99 % arrive \
-         within {:.1} ms of the earliest",
-        rows.len(),
-        1e3 * gap_s,
-        1e3 * late_s
-    );
-    let mode = RobotMode::from_number(last.mode).map_or("unknown", RobotMode::name);
-    let safety = SafetyStatus::from_number(last.safety);
-    let ready = mode == RobotMode::Running.name() && safety.is_some_and(SafetyStatus::allows_motion);
+    let watch = watch(&robot, usize::MAX, COUNT);
+    drop(robot);
+    let stream = line::<String>("RTDE", Ok(watch.judged(config, connected_ms)));
+    let rows = &watch.rows;
+    let Some(last) = rows.last() else { return vec![stream] };
+    let (mode, safety) = (RobotMode::from_number(last.mode), SafetyStatus::from_number(last.safety));
+    let ready = mode == Some(RobotMode::Running) && safety.is_some_and(SafetyStatus::allows_motion);
     let state = format!(
-        "{mode}, {}, speed slider {:.0} %, limiter {:.0} %, program {}",
-        safety.map_or("unknown", SafetyStatus::name),
+        "{}, {}, speed slider {:.0} %, limiter {:.0} %, program {}",
+        mode.map_or_else(|| format!("unknown mode {}", last.mode), |mode| mode.name().into()),
+        safety.map_or_else(|| format!("unknown safety mode {}", last.safety), |safety| safety.name().into()),
         100.0 * last.speed_slider,
         100.0 * last.speed_scaling,
         if last.program_runs() { "running" } else { "stopped" }
@@ -117,13 +96,21 @@ fn robot_data(config: &RigConfig) -> Vec<CheckLine> {
     let force = format!("{fx:.2}, {fy:.2}, {fz:.2} N at rest, {zero}");
     let [x, y, z] = last.tcp.position_m.map(|m| 1e3 * m);
     vec![
-        line::<String>("RTDE", Ok((gap_s <= config.limits.robot_gap_s, words))),
+        stream,
+        line("registers", registers_free(config)),
         line::<String>("robot", Ok((ready && last.is_at_full_speed(), state))),
         line::<String>("tool", Ok((true, format!("at {x:.1}, {y:.1}, {z:.1} mm")))),
         line("tool offset", tool_offset(config)),
         line("payload", payload(config)),
         line::<String>("force", Ok((rest_n < REST_N, force))),
     ]
+}
+
+/// Whether the inputs can be had that an experiment writes. Nothing is written, and they are free again at once.
+fn registers_free(config: &RigConfig) -> Result<(bool, String), ConnectError> {
+    connect_robot(config)?;
+    let (heartbeat, go) = (registers::HEARTBEAT, registers::GO);
+    Ok((true, format!("input_int_register_{heartbeat} and input_int_register_{go} are free")))
 }
 
 /// Grip centre at the flange that the robot counts with, beside that of the rig's file.
@@ -147,7 +134,7 @@ fn payload(config: &RigConfig) -> Result<(bool, String), ReadPoseError> {
     let wanted_kg = config.robot.payload_kg;
     let found_kg = match read_one(config, "payload")? {
         Value::Double(found_kg) => found_kg,
-        other => return Ok((false, format!("the robot answers {other:?} to payload"))),
+        other => return Err(ReadPoseError::Type { field: "payload", found: format!("{other:?}") }),
     };
     let ok = (found_kg - wanted_kg).abs() < SAME_PAYLOAD_KG;
     let words = match ok {
@@ -171,7 +158,7 @@ fn read_one(config: &RigConfig, field: &str) -> Result<Value, ReadPoseError> {
             return Ok(*value);
         }
     }
-    Err(ReadPoseError::Silent)
+    Err(robot.ended().map_or(ReadPoseError::Silent, |end| ReadPoseError::Ended(end.to_string())))
 }
 
 fn same_tool(found_mm: [f64; 3], config: &RigConfig) -> bool {
@@ -181,25 +168,8 @@ fn same_tool(found_mm: [f64; 3], config: &RigConfig) -> bool {
 fn read_tool_mm(config: &RigConfig) -> Result<[f64; 3], ReadPoseError> {
     match read_one(config, "tcp_offset")? {
         Value::Vector6d([x, y, z, ..]) => Ok([x, y, z].map(|m| 1e3 * m)),
-        _ => Err(ReadPoseError::Silent),
+        found => Err(ReadPoseError::Type { field: "tcp_offset", found: format!("{found:?}") }),
     }
-}
-
-/// Largest gap in the robot's clock, and how late 99 % of the readings are at most, beside the earliest, when a constant
-/// rate between both clocks is taken out.
-fn gaps(rows: &[RobotRow]) -> (f64, f64) {
-    let gap_s = rows.windows(2).map(|w| w[1].timestamp_s - w[0].timestamp_s).fold(0.0, f64::max);
-    let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return (gap_s, 0.0) };
-    let device_s = (last.timestamp_s - first.timestamp_s).max(1e-9);
-    let rate = (last.at - first.at).as_secs_f64() / device_s;
-    let late: Vec<f64> = rows
-        .iter()
-        .map(|row| (row.at - first.at).as_secs_f64() - rate * (row.timestamp_s - first.timestamp_s))
-        .collect();
-    let earliest = late.iter().copied().fold(f64::INFINITY, f64::min);
-    let mut late: Vec<f64> = late.iter().map(|x| x - earliest).collect();
-    late.sort_by(f64::total_cmp);
-    (gap_s, late.get(late.len() * 99 / 100).copied().unwrap_or(0.0))
 }
 
 fn dashboard(config: &RigConfig) -> Vec<CheckLine> {
@@ -221,7 +191,7 @@ fn dashboard(config: &RigConfig) -> Vec<CheckLine> {
                     Some(why) => (false, why),
                 },
                 DashboardReply::SerialNumber(number) => (true, format!("serial number {number}")),
-                other => (true, format!("{other:?}")),
+                other => (false, format!("the controller answers {other:?} to `{}`", command.line())),
             }),
         )
     };
@@ -241,25 +211,34 @@ fn primary(config: &RigConfig) -> Result<(bool, String), String> {
             return Ok((true, event.event.to_string()));
         }
     }
-    Ok((false, format!("no version came within {:.0} s", REPLY.as_secs_f64())))
+    match client.ended() {
+        Some(end) => Err(format!("the connection ended before its version came: {end}")),
+        None => Err(format!("no version came within {:.0} s", config.patient(REPLY).as_secs_f64())),
+    }
 }
 
 fn gripper(config: &RigConfig) -> Result<(bool, String), String> {
-    let reply = config.patient(REPLY);
     let mut client = connect_gripper(config).map_err(|e| e.to_string())?;
+    let found = gripper_state(&mut client, config.patient(REPLY));
+    // Whatever it said: a connection that is cut without a goodbye is an emergency to it.
+    let closed = client.close();
+    let found = found.map_err(|e| e.to_string())?;
+    closed.map_err(|e| e.to_string())?;
+    Ok(found)
+}
+
+/// Only questions: nothing is set.
+fn gripper_state(client: &mut GclClient, reply: Duration) -> Result<(bool, String), GclRunError> {
     let began = Instant::now();
-    let state = client.ask(Query::GripState, reply).map_err(|e| e.to_string())?;
+    let number = client.ask(Query::GripState, reply)?;
     let reply_ms = 1e3 * began.elapsed().as_secs_f64();
-    let width_mm = client.ask(Query::Position, reply).map_err(|e| e.to_string())?;
-    client.run(&GclCommand::Verbose(true), reply).map_err(|e| e.to_string())?;
-    let state = GripState::from_number(state);
-    let ready = matches!(state, Some(GripState::Idle));
+    let width_mm = client.ask(Query::Position, reply)?;
+    let state = GripState::from_number(number);
     let words = format!(
         "{}, jaws at {width_mm:.1} mm, answers in {reply_ms:.1} ms",
-        state.map_or("unknown".into(), |s| format!("{s:?}").to_lowercase())
+        state.map_or(format!("unknown state {number}"), |s| format!("{s:?}").to_lowercase())
     );
-    client.close().map_err(|e| e.to_string())?;
-    Ok((ready, words))
+    Ok((matches!(state, Some(GripState::Idle)), words))
 }
 
 fn camera(config: &RigConfig, left: bool) -> Result<(bool, String), String> {
@@ -276,7 +255,12 @@ fn camera(config: &RigConfig, left: bool) -> Result<(bool, String), String> {
     let image = view.apply(&frame).map_err(|e| e.to_string())?;
     let stamped = match (first.event.device_time_s, last.event.device_time_s) {
         (Some(a), Some(b)) if b > a => "stamped",
-        (Some(_), Some(_)) => return Ok((false, "its stamps stand still: the picture is frozen".into())),
+        (Some(a), Some(b)) if b < a => {
+            return Ok((false, format!("its clock went back from {a:.3} s to {b:.3} s")));
+        }
+        (Some(a), Some(_)) => {
+            return Ok((false, format!("its stamps stand still at {a:.3} s: the picture is frozen")));
+        }
         _ => "without stamps",
     };
     let words = format!(
@@ -284,87 +268,6 @@ fn camera(config: &RigConfig, left: bool) -> Result<(bool, String), String> {
         frame.width_px, frame.height_px, image.width_px, image.height_px
     );
     Ok((rate_hz > 5.0, words))
-}
-
-/// What hanging a known mass on the tool says of sign and gain.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ForceCheck {
-    /// Change of the reading along z.
-    pub change_n: f64,
-    /// Weight of the mass.
-    pub weight_n: f64,
-    /// `force_sign` that follows.
-    pub sign: f64,
-    /// `force_gain` that follows.
-    pub gain: f64,
-}
-
-/// Why sign and gain are not known.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ForceCheckError {
-    /// The robot.
-    #[error("{0}")]
-    Connect(#[from] super::devices::ConnectError),
-    /// No readings.
-    #[error("{found} readings came, {AVERAGED} are needed")]
-    Readings {
-        /// How many.
-        found: usize,
-    },
-    /// Nobody hung a mass, or one of another weight.
-    #[error("the reading changed by {change_n:.2} N within {waited_s:.0} s, the mass weighs {weight_n:.2} N")]
-    Nothing {
-        /// By how much it changed.
-        change_n: f64,
-        /// How long it was waited.
-        waited_s: f64,
-        /// What the mass weighs.
-        weight_n: f64,
-    },
-}
-
-/// Finds sign and gain of the force sensor: reads it, says that the mass is to be hung, and reads it again. Nothing moves.
-///
-/// # Errors
-///
-/// No connection, too few readings, or a change of the reading that is no weight.
-pub fn check_force(
-    config: &RigConfig,
-    mass_kg: f64,
-    hang: impl FnOnce(),
-) -> Result<ForceCheck, ForceCheckError> {
-    let robot = connect_listener(config, config.patient(REPLY))?;
-    let average = || {
-        let (rows, _) = readings(&robot, AVERAGED, config.patient(REPLY));
-        if rows.len() < AVERAGED {
-            return Err(ForceCheckError::Readings { found: rows.len() });
-        }
-        Ok(rows.iter().map(|r| r.force[2]).sum::<f64>() / rows.len() as f64)
-    };
-    let before_n = average()?;
-    hang();
-    let weight_n = mass_kg * GRAVITY_M_S2;
-    let began = Instant::now();
-    loop {
-        let change_n = average()? - before_n;
-        if change_n.abs() > 0.5 * weight_n {
-            // It swings at first.
-            std::thread::sleep(Duration::from_secs(1));
-            while robot.events().try_recv().is_ok() {}
-            let change_n = average()? - before_n;
-            // The mass pulls down, as a part does that is pulled up.
-            let gain = weight_n / change_n.abs();
-            return Ok(ForceCheck { change_n, weight_n, sign: change_n.signum(), gain });
-        }
-        if began.elapsed() > HANG {
-            return Err(ForceCheckError::Nothing {
-                change_n,
-                waited_s: began.elapsed().as_secs_f64(),
-                weight_n,
-            });
-        }
-    }
 }
 
 /// Grip centres that are closer than this are the same.
@@ -378,10 +281,27 @@ const STILL_M_S: f64 = 1e-3;
 pub enum ReadPoseError {
     /// The robot.
     #[error("{0}")]
-    Connect(#[from] super::devices::ConnectError),
+    Connect(#[from] ConnectError),
     /// No reading.
     #[error("the robot is connected, but no reading came within {:.0} s", REPLY.as_secs_f64())]
     Silent,
+    /// The connection ended before.
+    #[error("the connection to the robot ended: {0}")]
+    Ended(String),
+    /// A value of another type than that of the guide.
+    #[error("the robot answers {found} to {field}, which cannot be read")]
+    Type {
+        /// What was asked.
+        field: &'static str,
+        /// What came.
+        found: String,
+    },
+    /// Its clock stands: where the tool is now is unknown.
+    #[error("the robot's clock stands at {time_s:.3} s: its readings say nothing new")]
+    ClockStands {
+        /// Where it stands.
+        time_s: f64,
+    },
     /// Its grip centre is another one.
     #[error(
         "the robot counts with a grip centre {found_mm:?} mm from its flange, the rig's file says {wanted_mm:?} mm: the pose would be off by \
@@ -414,8 +334,15 @@ pub fn read_pose(config: &RigConfig) -> Result<crate::program::TcpPose, ReadPose
         return Err(ReadPoseError::Tool { found_mm, wanted_mm: config.robot.tool_mm });
     }
     let robot = connect_listener(config, config.patient(REPLY))?;
-    let (rows, _) = readings(&robot, AVERAGED, config.patient(REPLY));
-    let Some(last) = rows.last() else { return Err(ReadPoseError::Silent) };
+    let watch = watch(&robot, AVERAGED, config.patient(REPLY));
+    if let Some(end) = watch.ended {
+        return Err(ReadPoseError::Ended(end));
+    }
+    let rows = watch.rows;
+    let [first, .., last] = &rows[..] else { return Err(ReadPoseError::Silent) };
+    if last.timestamp_s <= first.timestamp_s {
+        return Err(ReadPoseError::ClockStands { time_s: last.timestamp_s });
+    }
     let speed_m_s = rows.iter().map(RobotRow::speed_m_s).fold(0.0, f64::max);
     if speed_m_s > STILL_M_S {
         return Err(ReadPoseError::Moving { speed_mm_s: 1e3 * speed_m_s, max_mm_s: 1e3 * STILL_M_S });

@@ -315,9 +315,7 @@ impl RigConfig {
                 return Err(ConfigError::new(key, problem));
             }
         }
-        let is_here =
-            |host: &str| host == "localhost" || host.parse().is_ok_and(|ip: IpAddr| ip.is_loopback());
-        if limits.patience > 1.0 && !is_here(&self.robot.address) {
+        if limits.patience > 1.0 && !self.is_on_this_machine() {
             let problem = format!(
                 "{} is for a virtual rig, `{}` is not this machine",
                 limits.patience, self.robot.address
@@ -339,6 +337,12 @@ impl RigConfig {
             }
         }
         Ok(())
+    }
+
+    /// Whether the robot is a virtual one: nothing else speaks on this machine.
+    pub(super) fn is_on_this_machine(&self) -> bool {
+        let host = self.robot.address.as_str();
+        host == "localhost" || host.parse().is_ok_and(|ip: IpAddr| ip.is_loopback())
     }
 
     /// What the gripper is allowed, in its own convention: sums over both jaws.

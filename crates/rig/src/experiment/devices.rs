@@ -104,19 +104,26 @@ pub(super) fn connect_dashboard(config: &RigConfig) -> Result<DashboardClient, C
 
 /// Connects RTDE.
 pub(super) fn connect_robot(config: &RigConfig) -> Result<RtdeClient, ConnectError> {
-    let at = resolve("RTDE", &config.robot.address, config.robot.rtde_port)?;
-    let robot = RtdeClient::connect(at, &session_plan(), config.patient(TIMEOUT))?;
-    match unfit(robot.recipe()) {
-        Some(types) => Err(ConnectError::Types(types)),
-        None => Ok(robot),
-    }
+    connect_rtde(config, &session_plan(), config.patient(TIMEOUT))
 }
 
 /// Connects RTDE to listen: no input is asked for, nothing can be written.
 pub(super) fn connect_listener(config: &RigConfig, timeout: Duration) -> Result<RtdeClient, ConnectError> {
-    let at = resolve("RTDE", &config.robot.address, config.robot.rtde_port)?;
     let plan = SessionPlan { inputs: vec![], ..session_plan() };
-    Ok(RtdeClient::connect(at, &plan, timeout)?)
+    connect_rtde(config, &plan, timeout)
+}
+
+fn connect_rtde(
+    config: &RigConfig,
+    plan: &SessionPlan,
+    timeout: Duration,
+) -> Result<RtdeClient, ConnectError> {
+    let at = resolve("RTDE", &config.robot.address, config.robot.rtde_port)?;
+    let robot = RtdeClient::connect(at, plan, timeout)?;
+    match unfit(robot.recipe()) {
+        Some(types) => Err(ConnectError::Types(types)),
+        None => Ok(robot),
+    }
 }
 
 /// Connects RTDE to listen to these fields.
@@ -151,8 +158,9 @@ impl Devices {
             robot,
             dashboard: connect_dashboard(config)?,
             primary: connect_primary(config)?,
-            gripper: Some(connect_gripper(config)?),
             cameras: PerJaw { left: connect_camera(config, true)?, right: connect_camera(config, false)? },
+            // The last one: it takes a connection that is cut for an emergency.
+            gripper: Some(connect_gripper(config)?),
             reply: config.patient(REPLY),
         })
     }

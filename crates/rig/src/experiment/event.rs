@@ -106,6 +106,8 @@ pub struct Stopped {
     pub still: bool,
     /// What was done, for the record.
     pub steps: Vec<String>,
+    /// What to do about the reason, where that is known.
+    pub hint: Option<&'static str>,
 }
 
 impl Display for Stopped {

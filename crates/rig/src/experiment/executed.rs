@@ -88,6 +88,8 @@ impl Experiment<'_> {
         let robot_time_s = anchor.map_or(0.0, |row| row.timestamp_s);
         let unix_s = self.clock.unix_s(anchor.map_or_else(Instant::now, |row| row.at));
         let outcome = match (&stopped, parts.outcome) {
+            // What went wrong after the pull takes nothing from a label that was complete.
+            (Some(_), Some(labelled @ PullOutcome::Labelled(_))) => labelled,
             (Some(stopped), _) => PullOutcome::Failed { reason: stopped.reason.clone() },
             (None, Some(outcome)) => outcome,
             (None, None) => PullOutcome::Failed { reason: "the robot said nothing during the pull".into() },

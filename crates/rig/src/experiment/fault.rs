@@ -16,6 +16,12 @@ pub enum Fault {
     /// Somebody pressed Ctrl-C.
     #[error("interrupted")]
     Interrupted,
+    /// A question for a column was not answered.
+    #[error("`{name}` was asked for, and the input ended without an answer")]
+    Unanswered {
+        /// The column.
+        name: String,
+    },
     /// The safety system.
     #[error("the robot is in {}", .status.name())]
     Safety {
@@ -61,6 +67,18 @@ pub enum Fault {
         /// The longest that is allowed.
         limit_s: f64,
     },
+    /// It speaks, and its clock stands.
+    #[error(
+        "the robot's clock stands at {time_s:.3} s for {stood_s:.3} s now, {limit_s:.3} s are allowed: its readings say nothing new"
+    )]
+    ClockStands {
+        /// Where it stands.
+        time_s: f64,
+        /// For how long.
+        stood_s: f64,
+        /// The longest that is allowed.
+        limit_s: f64,
+    },
     /// Data of it are missing.
     #[error("{gap_s:.3} s are missing between two readings of the robot, {limit_s:.3} s are allowed")]
     Gap {
@@ -92,6 +110,18 @@ pub enum Fault {
         low_n: f64,
         /// Most that is believed.
         high_n: f64,
+    },
+    /// The reading is the mirror image of the command.
+    #[error(
+        "the force reads the wrong way: a newton of command reads {gain:.2} N with `robot.force_sign` = {sign:?}; {fits:?} fits this pull"
+    )]
+    ForceSign {
+        /// `robot.force_sign` of the rig's file.
+        sign: f64,
+        /// The one that fits.
+        fits: f64,
+        /// What a newton of command reads as.
+        gain: f64,
     },
     /// Something pulls at the tool already.
     #[error(
@@ -154,6 +184,14 @@ pub enum Fault {
         line: String,
         /// What its status means.
         meaning: &'static str,
+    },
+    /// It answers something that is no answer.
+    #[error("the gripper answers `{line}` to {asked}?, which cannot be read")]
+    GripperUnread {
+        /// What was asked.
+        asked: &'static str,
+        /// What came.
+        line: String,
     },
     /// It moves no more, and did not say that it has finished.
     #[error("the gripper is in state {state} ({}), and never said that {command} is done", grip_state_name(*.state))]
@@ -241,6 +279,26 @@ pub enum Fault {
         /// Where it ends.
         high_mm: f64,
     },
+}
+
+impl Fault {
+    /// What to do about it, where that is known.
+    pub fn hint(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::ForceSign { .. } => {
+                "`gripgen rig check --mass-kg 1.0` finds the sign with a known mass; put it into the rig's file"
+            }
+            Self::Unanswered { .. } => {
+                "`--ask` needs somebody at the keyboard; `--column NAME=VALUE` notes one value for all pulls"
+            }
+            Self::Speed { .. } => "move the speed slider of the teach pendant to 100 %",
+            Self::Busy { .. } => "wait for its end, or stop it on the teach pendant; nothing was moved",
+            Self::GripperUnread { .. } => {
+                "is this the text interface (GCL) of a WSG 50? `gripgen rig check` asks it again"
+            }
+            _ => return None,
+        })
+    }
 }
 
 fn grip_state_name(state: f64) -> String {

@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 /// How long a motion of the gripper may take, and how often it is asked meanwhile whether it still moves.
 const GRIPPER: Duration = Duration::from_secs(30);
 const ASK: Duration = Duration::from_millis(250);
+/// What is waited for after a question.
+const ANSWER: &str = "an answer of the gripper";
 /// So many answers that it stands, and no word that it has finished: the word is lost.
 const STANDS: u32 = 3;
 
@@ -79,7 +81,8 @@ impl Experiment<'_> {
             } else if !answered && waited > x.config.patient(SLACK) {
                 let limit_s = x.config.patient(SLACK).as_secs_f64();
                 let waited_s = waited.as_secs_f64();
-                return Err(Fault::Late { what: "an answer of the gripper", waited_s, limit_s });
+                let late = Fault::Late { what: ANSWER, waited_s, limit_s };
+                return Err(x.unread(Query::GripState).unwrap_or(late));
             }
             Ok(false)
         })?;
@@ -90,7 +93,7 @@ impl Experiment<'_> {
     pub(super) fn ask_gripper(&mut self, query: Query) -> Result<f64, Fault> {
         self.tell_gripper(&GclCommand::Ask(query))?;
         let mut value = None;
-        self.wait("an answer of the gripper", SLACK, |x| {
+        let waited = self.wait(ANSWER, SLACK, |x| {
             for event in std::mem::take(&mut x.gripper_events) {
                 match event {
                     GclEvent::Value { name, number } if name == query.name() => value = Some(number),
@@ -102,7 +105,17 @@ impl Experiment<'_> {
                 }
             }
             Ok(value.is_some())
-        })?;
-        Ok(value.unwrap_or(f64::NAN))
+        });
+        match waited {
+            Ok(()) => Ok(value.unwrap_or(f64::NAN)),
+            Err(late @ Fault::Late { .. }) => Err(self.unread(query).unwrap_or(late)),
+            Err(other) => Err(other),
+        }
+    }
+
+    /// What came instead of an answer, as a fault.
+    fn unread(&self, query: Query) -> Option<Fault> {
+        let line = self.devices.gripper.as_ref()?.unread(&GclCommand::Ask(query))?;
+        Some(Fault::GripperUnread { asked: query.name(), line })
     }
 }

@@ -6,6 +6,7 @@ use super::executed::Parts;
 use super::fault::Fault;
 use super::film;
 use super::plan::{GripPoses, grip_command, grip_poses, pull_program};
+use super::robot::RobotRow;
 use super::run::{Experiment, PROGRAM};
 use crate::gcl::{GclCommand, GripState, Query};
 use crate::program::{PRELOAD_S, Phase, SETTLE_S, StopReason};
@@ -163,19 +164,31 @@ impl Experiment<'_> {
         // The program needs its own time between the go and the first step.
         self.wait_until("the dwell", held_s + planned.dwell_s - PRELOAD_S - SETTLE_S)?;
         parts.run = Some(run);
-        let reason = self.staircase(run, planned, program.max_time_s)?;
+        let (reason, fault) = match self.staircase(run, planned, program.max_time_s) {
+            Ok(reason) => (reason, None),
+            // The program had ended by itself: what failed after it takes nothing from the label.
+            Err(fault) => match self.own_end(run) {
+                Some(reason) => (reason, Some(fault)),
+                None => return Err(fault),
+            },
+        };
         parts.preload_n = self.preload_n(planned);
         parts.film = self.end_film();
         parts.doubts = self.silent_cameras();
         film::exposure(&parts.film).into_iter().for_each(|words| self.note("camera", words));
         parts.doubts.extend(film::doubts(&parts.film, self.frame_limit_s()));
+        let checked =
+            self.check_gaps(run).and_then(|()| self.check_force(campaign, planned, run, parts.preload_n));
+        if checked.is_ok() {
+            parts.outcome = self.label(campaign, planned, parts, reason);
+        }
+        fault.map_or(checked, Err)?;
+        // A part that was lost in the pull has no label. A gripper that does not answer takes none away.
         let state = self.ask_gripper(Query::GripState)?;
         if GripState::from_number(state) != Some(GripState::Holding) {
+            parts.outcome = None;
             return Err(Fault::NotHolding { state });
         }
-        self.check_gaps(run)?;
-        self.check_force(campaign, planned, run, parts.preload_n)?;
-        parts.outcome = self.label(campaign, planned, parts, reason);
         self.tell(RigEvent::Step("releasing"));
         self.release()?;
         // The next program zeroes the sensor.
@@ -240,6 +253,12 @@ impl Experiment<'_> {
         self.end_of_program("the pull", run, limit.saturating_sub(began.elapsed()) + SLACK)
     }
 
+    /// Why a pull's program stopped by itself, where the newest reading says that it did.
+    fn own_end(&self, run: i32) -> Option<StopReason> {
+        let row = self.newest().filter(|row| row.phase_of(run) == Some(Phase::Stopped))?;
+        StopReason::from_number(row.reason)
+    }
+
     /// What the program measured before the first step, along the pull.
     pub(super) fn preload_n(&self, planned: &PlannedPull) -> f64 {
         self.signed(planned, self.newest().map_or(0.0, |row| row.preload_n * planned.pull_direction))
@@ -273,10 +292,16 @@ impl Experiment<'_> {
         run: i32,
         preload_n: f64,
     ) -> Result<(), Fault> {
+        let pulling = || self.rows.iter().filter(|row| row.phase_of(run) == Some(Phase::Pulling));
+        let forces = |row: &RobotRow| (row.desired_n, self.signed(planned, row.force[2]));
+        let held = pulling().take_while(|row| row.displacement_m.abs() < HELD * campaign.stop_m);
+        if let Some(gain) = mirrored(&held.map(forces).collect::<Vec<_>>(), preload_n) {
+            let sign = self.config.robot.force_sign;
+            return Err(Fault::ForceSign { sign, fits: -sign, gain });
+        }
         let slack_n = 2.0 * campaign.label_tolerance_n;
         let low_n = preload_n.min(0.0) - slack_n;
-        for row in self.rows.iter().filter(|row| row.phase_of(run) == Some(Phase::Pulling)) {
-            let (measured_n, desired_n) = (self.signed(planned, row.force[2]), row.desired_n);
+        for (desired_n, measured_n) in pulling().map(forces) {
             let high_n = 2.0 * desired_n + preload_n.max(0.0) + slack_n;
             if !(low_n..=high_n).contains(&measured_n) {
                 return Err(Fault::Disturbed { measured_n, desired_n, low_n, high_n });
@@ -302,5 +327,48 @@ impl Experiment<'_> {
         let here = self.reading()?.tcp;
         self.move_to("the way up", here.raised(CLEAR_M), self.config.motion.approach_speed_mm_s)?;
         self.move_to("the way back", poses.approach, self.config.motion.speed_mm_s)
+    }
+}
+
+/// A newton of command that reads as less than this is a reading of the other sign: with the right one it reads as 1, and as less
+/// once the jaws slip.
+pub(super) const MIRRORED_GAIN: f64 = -0.5;
+/// Share of the way to the stop before which the jaws have not slipped for good: the reading follows the command there.
+const HELD: f64 = 0.1;
+/// Share of the readings' squares that has to follow the command: a hand that pushes does not.
+const FOLLOWS: f64 = 0.5;
+
+/// What a newton of command reads as, if the readings are the mirror image of the commands; both are (command, reading).
+fn mirrored(pulled: &[(f64, f64)], preload_n: f64) -> Option<f64> {
+    let (mut together, mut of_command, mut of_reading) = (0.0, 0.0, 0.0);
+    for (desired_n, measured_n) in pulled {
+        let more_n = measured_n - preload_n;
+        together += desired_n * more_n;
+        of_command += desired_n * desired_n;
+        of_reading += more_n * more_n;
+    }
+    let gain = together / of_command;
+    (gain < MIRRORED_GAIN && together * together > FOLLOWS * of_command * of_reading).then_some(gain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mirrored;
+
+    #[test]
+    fn readings_of_the_other_sign_are_told_from_a_hand() {
+        // 1 N every 50 readings, a slip at 6 N.
+        let pull = |sign: f64, zero_n: f64| -> Vec<(f64, f64)> {
+            let step = |i: u32| f64::from(i / 50 + 1);
+            (0..400).map(|i| (step(i), zero_n + sign * if i < 300 { step(i) } else { 4.0 })).collect()
+        };
+        assert_eq!(mirrored(&pull(1.0, 0.0), 0.0), None);
+        assert_eq!(mirrored(&pull(1.0, -2.0), -2.0), None);
+        let gain = mirrored(&pull(-1.0, 0.3), 0.3).unwrap();
+        assert!((-1.0..-0.6).contains(&gain), "{gain}");
+        let mut pushed = pull(1.0, 0.0);
+        pushed[250..300].iter_mut().for_each(|(_, measured_n)| *measured_n = -60.0);
+        assert_eq!(mirrored(&pushed, 0.0), None);
+        assert_eq!(mirrored(&[], 0.0), None);
     }
 }

@@ -11,6 +11,7 @@ use super::event::{RigEvent, Stopped};
 use super::fault::Fault;
 use super::plan::{grip_command, grip_poses, pull_program};
 use super::prepare::{Permit, PrepareError};
+use super::pull::MIRRORED_GAIN;
 use super::response::{Response, StepRow, response};
 use super::robot::RobotRow;
 use super::run::{Experiment, SLACK};
@@ -177,7 +178,10 @@ pub fn rehearse(
     stop: &AtomicBool,
     emit: &mut dyn FnMut(RigEvent),
 ) -> Result<Rehearsal, RehearseError> {
-    devices.prepare(Permit::default())?;
+    if let Err(e) = devices.prepare(Permit::default()) {
+        devices.close();
+        return Err(e.into());
+    }
     let mut experiment = Experiment::new(config, devices, stop, emit);
     let found = experiment.begin().and_then(|()| experiment.rehearse(plan));
     match found {
@@ -235,7 +239,13 @@ impl Rehearsal {
         match self.response {
             None => doubts.push("the pull that should hold has too few readings".into()),
             Some(r) => {
-                if (r.force.gain - 1.0).abs() > 0.1 {
+                if r.force.gain < MIRRORED_GAIN {
+                    let sign = config.robot.force_sign;
+                    doubts.push(format!(
+                        "the force reads the wrong way: a newton of command reads {:.2} N with `robot.force_sign` = {sign:?}, {:?} fits",
+                        r.force.gain, -sign
+                    ));
+                } else if (r.force.gain - 1.0).abs() > 0.1 {
                     doubts.push(format!(
                         "a newton of command reads {:.2} N, 0.9 to 1.1 N are allowed",
                         r.force.gain

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Rate that readings are asked for.
-const RATE_HZ: f64 = 500.0;
+pub(super) const RATE_HZ: f64 = 500.0;
 /// Time between two beats: the program wants ten per second at least.
 const BEAT: Duration = Duration::from_millis(10);
 /// An experiment that has not looked at its robot for so long is taken for dead.

@@ -44,6 +44,8 @@ pub struct Experiment<'a> {
     emit: &'a mut dyn FnMut(RigEvent),
     newest: Option<RobotRow>,
     heard: Instant,
+    /// When the robot's clock last went on.
+    went_on: Instant,
     run: i32,
     /// What must go on while it is waited: a program of this number.
     watched: Option<(i32, &'static str)>,
@@ -79,6 +81,7 @@ impl<'a> Experiment<'a> {
             emit,
             newest: None,
             heard: Instant::now(),
+            went_on: Instant::now(),
             run,
             watched: None,
             last_said: None,
@@ -147,6 +150,10 @@ impl<'a> Experiment<'a> {
         if silent_s > limit_s {
             return Err(Fault::Silent { silent_s, limit_s });
         }
+        let stood_s = self.heard.saturating_duration_since(self.went_on).as_secs_f64();
+        if let Some(row) = self.newest.filter(|_| stood_s > limit_s) {
+            return Err(Fault::ClockStands { time_s: row.timestamp_s, stood_s, limit_s });
+        }
         self.check_program()?;
         self.tell_frames();
         self.film_on();
@@ -191,6 +198,9 @@ impl<'a> Experiment<'a> {
                     // The types were looked at when the connection was made.
                     if let Some(row) = RobotRow::from_values(event.at, &values) {
                         self.heard = event.at.max(self.heard);
+                        if self.newest.is_none_or(|before| row.timestamp_s > before.timestamp_s) {
+                            self.went_on = self.heard;
+                        }
                         self.newest = Some(row);
                         self.rows.push(row);
                         rows += 1;

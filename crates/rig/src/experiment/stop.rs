@@ -45,7 +45,7 @@ impl Experiment<'_> {
         steps.push("the gripper keeps what it holds".into());
         let reason = fault.to_string();
         self.note("stop", format!("{reason}; {}", steps.join("; ")));
-        let stopped = Stopped { reason, still, steps };
+        let stopped = Stopped { reason, still, steps, hint: fault.hint() };
         self.tell(RigEvent::Stopped(stopped.clone()));
         stopped
     }

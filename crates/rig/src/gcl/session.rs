@@ -147,7 +147,7 @@ impl GclLink {
             let line = String::from_utf8_lossy(&self.incoming[start..start + end]).trim().to_string();
             start += end + 1;
             if !line.is_empty() {
-                let event = event_of(line);
+                let event = event_of(line.clone()).unwrap_or(GclEvent::Other(line));
                 self.follow(&event);
                 events.push(event);
             }
@@ -178,18 +178,19 @@ impl GclLink {
     }
 }
 
-fn event_of(line: String) -> GclEvent {
+/// What a line says; `None` where it is nothing that a gripper says.
+pub(super) fn event_of(line: String) -> Option<GclEvent> {
     let mut words = line.split_whitespace();
     match words.next() {
-        Some("ACK") => GclEvent::Acknowledged(words.next().unwrap_or_default().into()),
-        Some("FIN") => GclEvent::Finished(words.next().unwrap_or_default().into()),
+        Some("ACK") => Some(GclEvent::Acknowledged(words.next().unwrap_or_default().into())),
+        Some("FIN") => Some(GclEvent::Finished(words.next().unwrap_or_default().into())),
         Some("ERR") => {
             let rest: Vec<&str> = words.collect();
             let status = rest.iter().find_map(|w| w.parse().ok());
             let command = rest.first().filter(|w| w.parse::<u32>().is_err()).map_or("", |w| *w);
-            GclEvent::Failed { command: command.into(), status, line }
+            Some(GclEvent::Failed { command: command.into(), status, line })
         }
-        _ => value_of(&line).unwrap_or(GclEvent::Other(line)),
+        _ => value_of(&line),
     }
 }
 

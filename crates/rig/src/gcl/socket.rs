@@ -1,7 +1,7 @@
 //! The session on a socket: a thread of its own reads, so that no answer waits for anybody.
 
 use super::command::{GclCommand, GclLimits, Query};
-use super::session::{GclEvent, GclLink, GclSessionError, SendError, status_meaning};
+use super::session::{GclEvent, GclLink, GclSessionError, SendError, event_of, status_meaning};
 use crate::link::{Connection, LinkError, Reading, Shared, Socket, Stamped};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
@@ -67,6 +67,14 @@ pub enum GclRunError {
         asked: f64,
         /// What the gripper made of it.
         taken: f64,
+    },
+    /// An answer that is none.
+    #[error("the gripper answers `{line}` to {asked}, which cannot be read")]
+    Unread {
+        /// What was asked.
+        asked: String,
+        /// The whole answer.
+        line: String,
     },
     /// The answer did not come in time. When it comes later, it is not lost: [`GclClient::wait_for`] finds it.
     #[error("no `{awaited}` came for {waited_s:.3} s, {limit_s:.3} s are allowed")]
@@ -146,6 +154,11 @@ impl GclClient {
     /// All lines since the last call, both ways, in their order.
     pub fn take_log(&self) -> Vec<GclLogLine> {
         std::mem::take(&mut self.connection.shared.known().state.log).into()
+    }
+
+    /// The line that came instead of an answer since `command` was sent, if one did: `POS=110,0`.
+    pub fn unread(&self, command: &GclCommand) -> Option<String> {
+        self.connection.shared.known().state.unread(command)
     }
 
     /// Sends a command and waits for nothing.
@@ -238,7 +251,11 @@ impl Shared<State, GclSessionError> {
         let name = command.name();
         let look = |state: &mut State| {
             let answer = state.answers.iter().position(|event| is_answer(event, command));
-            match answer.and_then(|at| state.answers.remove(at))? {
+            let Some(answer) = answer.and_then(|at| state.answers.remove(at)) else {
+                let line = state.misspelt(command)?;
+                return Some(Err(GclRunError::Unread { asked: asked(command), line }));
+            };
+            match answer {
                 GclEvent::Failed { status, line, .. } => {
                     let meaning = status.map_or("it gives no status", status_meaning);
                     Some(Err(GclRunError::Failed { command: name, status, meaning, line }))
@@ -246,9 +263,12 @@ impl Shared<State, GclSessionError> {
                 answer => read(&answer).map(Ok),
             }
         };
-        self.wait(timeout, look, |_, waited| {
+        self.wait(timeout, look, |state, waited| {
             let (waited_s, limit_s) = (waited.as_secs_f64(), timeout.as_secs_f64());
-            GclRunError::Timeout { awaited: awaited(command), waited_s, limit_s }
+            match state.unread(command) {
+                Some(line) => GclRunError::Unread { asked: asked(command), line },
+                None => GclRunError::Timeout { awaited: awaited(command), waited_s, limit_s },
+            }
         })
     }
 }
@@ -260,6 +280,31 @@ impl State {
         }
         let line = String::from_utf8_lossy(bytes).trim().to_string();
         self.log.push_back(GclLogLine { at, sent, line });
+    }
+
+    /// Lines that came since `command` was sent, the newest first.
+    fn came_since(&self, command: &GclCommand) -> impl Iterator<Item = &String> {
+        let name = command.name();
+        let sent = self.log.iter().rposition(|line| line.sent && line.line.starts_with(name));
+        let from = sent.map_or(self.log.len(), |sent| sent + 1);
+        self.log.range(from..).rev().filter(|line| !line.sent).map(|line| &line.line)
+    }
+
+    /// A line that says the name of `command` and is no answer to it: `POS=110,0`, `pos=110`.
+    fn misspelt(&self, command: &GclCommand) -> Option<String> {
+        let name = command.name();
+        let is_named = |line: &&String| {
+            let own = line.get(..name.len()).is_some_and(|start| start.eq_ignore_ascii_case(name));
+            own && line[name.len()..].trim_start().starts_with('=')
+        };
+        let is_read = |line: &String| event_of(line.clone()).is_some_and(|event| is_answer(&event, command));
+        self.came_since(command).find(is_named).filter(|line| !is_read(line)).cloned()
+    }
+
+    /// The line that came instead of an answer since `command` was sent, if one did.
+    fn unread(&self, command: &GclCommand) -> Option<String> {
+        let says_nothing = |line: &&String| event_of(line.to_string()).is_none();
+        self.misspelt(command).or_else(|| self.came_since(command).find(says_nothing).cloned())
     }
 
     /// Takes in a piece of a line, or its end.
@@ -311,6 +356,12 @@ fn setting_of(command: &GclCommand) -> Option<f64> {
     }
 }
 
+/// A command as people know it.
+pub(super) fn asked(command: &GclCommand) -> String {
+    let question = if matches!(command, GclCommand::Ask(_)) { "?" } else { "" };
+    format!("{}{question}", command.name())
+}
+
 /// How the line begins that ends `command`.
 fn awaited(command: &GclCommand) -> String {
     let name = command.name();
@@ -319,5 +370,30 @@ fn awaited(command: &GclCommand) -> String {
         GclCommand::Ask(_) => format!("{name}="),
         command if setting_of(command).is_some() => format!("{name}="),
         _ => format!("ACK {name}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::command::SHIPPED_LIMITS;
+    use super::*;
+
+    #[test]
+    fn a_line_that_says_nothing_is_shown_when_the_time_is_over() {
+        let unread = |lines: &[&str]| {
+            let (session, line) = (GclLink::new(SHIPPED_LIMITS), Vec::new());
+            let mut state = State { session, line, log: VecDeque::new(), answers: VecDeque::new() };
+            state.log(Instant::now(), false, b"Hello");
+            state.log(Instant::now(), true, b"SPEED?");
+            for line in lines {
+                state.receive(format!("{line}\n").as_bytes(), Instant::now()).unwrap();
+            }
+            state.unread(&GclCommand::Ask(Query::Speed))
+        };
+        assert_eq!(unread(&["Welcome", "?"]).unwrap(), "?");
+        assert_eq!(unread(&["SPEED=fast", "?"]).unwrap(), "SPEED=fast");
+        // Answers to something else, and nothing at all.
+        assert_eq!(unread(&["POS=110", "@SPEED=3", "FIN MOVE"]), None);
+        assert_eq!(unread(&[]), None);
     }
 }

@@ -189,3 +189,22 @@ fn close_says_goodbye_and_drop_does_not() {
     assert!(matches!(e, GclRunError::Timeout { .. }) && started.elapsed() < TIMEOUT, "{e}");
     assert_eq!(device.join().unwrap(), "BYE()\n");
 }
+
+/// What cannot be read is shown as it came.
+#[test]
+fn an_answer_that_cannot_be_read_is_shown() {
+    let (mut client, device) = gripper(|gripper| {
+        gripper.expect("POS?", &["@FORCE=1\n", "POS=110,0\n"]);
+        gripper.expect("GRIPSTATE?", &["gripstate=0\n"]);
+        gripper.expect("BYE()", &["ACK BYE\n"]);
+        gripper.rest()
+    });
+    for (query, words) in [
+        (Query::Position, "the gripper answers `POS=110,0` to POS?, which cannot be read"),
+        (Query::GripState, "the gripper answers `gripstate=0` to GRIPSTATE?, which cannot be read"),
+    ] {
+        assert_eq!(client.ask(query, TIMEOUT).unwrap_err().to_string(), words);
+    }
+    client.close().unwrap();
+    assert_eq!(device.join().unwrap(), "");
+}

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// A device that takes no bytes for so long is gone.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time between two looks at a device whose silence is watched.
-pub(crate) const LOOK: Duration = Duration::from_millis(50);
+const LOOK: Duration = Duration::from_millis(50);
 
 /// Something that came, and when it did by the clock of this host. The network's delay is in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -93,15 +93,21 @@ pub enum SessionError {
         wanted: Kind,
     },
     /// A data frame that does not fit its recipe.
-    #[error("a data frame of {found} bytes does not fit the output recipe of {wanted}")]
+    #[error(
+        "a data frame of recipe {id} with {found} bytes does not fit the output recipe {wanted_id} of {wanted}"
+    )]
     Data {
-        /// Its length.
+        /// Number of its recipe; 0 where it has none.
+        id: u8,
+        /// Its length, without that number.
         found: usize,
-        /// Length by the recipe, its number included.
+        /// Number of the output recipe.
+        wanted_id: u8,
+        /// Length by the recipe.
         wanted: usize,
     },
     /// The controller's clock went backwards: it has restarted.
-    #[error("the controller's clock went from {before_s} s back to {now_s} s: it has restarted")]
+    #[error("the controller's clock went from {before_s:.3} s back to {now_s:.3} s: it has restarted")]
     Restarted {
         /// Time of the data frame before.
         before_s: f64,
@@ -257,6 +263,17 @@ impl Link {
         }
     }
 
+    /// What was asked last, in words.
+    pub(super) fn asked(&self) -> &'static str {
+        match self.state {
+            State::Version => "protocol version 2",
+            State::Controller => "version of the controller",
+            State::Outputs => "set up outputs",
+            State::Inputs(_) => "set up inputs",
+            State::Start | State::Running => "start",
+        }
+    }
+
     fn take(&mut self, frame: &Frame, events: &mut Vec<Event>) -> Result<(), SessionError> {
         let payload = &frame.payload[..];
         match frame.kind {
@@ -329,8 +346,8 @@ impl Link {
             return Err(SessionError::Unexpected { found: Kind::Data, wanted: self.awaited() });
         };
         let Some(values) = recipe.read(payload) else {
-            let wanted = recipe.size() + 1;
-            return Err(SessionError::Data { found: payload.len(), wanted });
+            let (id, found) = (payload.first().copied().unwrap_or(0), payload.len().saturating_sub(1));
+            return Err(SessionError::Data { id, found, wanted_id: recipe.id, wanted: recipe.size() });
         };
         let time_s = recipe.place("timestamp").and_then(|place| values.get(place));
         if let Some(&Value::Double(now_s)) = time_s {

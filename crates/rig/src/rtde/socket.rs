@@ -3,7 +3,7 @@
 use super::session::{Event, Link, SessionError, SessionPlan, WriteInputError};
 use super::value::Value;
 use super::{Recipe, RecipeError};
-use crate::link::{Connection, LOOK, Reading, Shared, Socket, Stamped, lock};
+use crate::link::{Connection, Reading, Shared, Socket, Stamped, lock, time_left};
 use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
@@ -56,19 +56,23 @@ impl RtdeClient {
     fn connect_once(address: SocketAddr, plan: &SessionPlan, timeout: Duration) -> Result<Self, LinkError> {
         let began = Instant::now();
         let socket = Socket::connect(address, timeout, "the controller closed the connection")?;
-        socket.limit_read(LOOK)?;
         let mut session = Link::new(plan.clone()).map_err(|e| socket.refused(e))?;
         let (tell, events) = channel();
         let mut newest = None;
         let mut buffer = [0; 8192];
+        let mut is_silent = true;
         while !session.is_running() {
             socket.write(&session.take_outgoing())?;
-            let Some(n) = socket.read(&mut buffer)? else {
-                if began.elapsed() > timeout {
-                    return Err(socket.silent(began, timeout));
-                }
-                continue;
+            // By the clock: data may flow while an answer is missing.
+            let Some(left) = time_left(began, timeout) else {
+                return Err(match is_silent {
+                    true => socket.silent(began, timeout),
+                    false => socket.no_answer(session.asked(), began, timeout),
+                });
             };
+            socket.limit_read(left)?;
+            let Some(n) = socket.read(&mut buffer)? else { continue };
+            is_silent = false;
             for event in session.receive(&buffer[..n]).map_err(|e| socket.refused(e))? {
                 keep_newest(&event, &mut newest);
                 let _ = tell.send(Stamped { at: Instant::now(), event });

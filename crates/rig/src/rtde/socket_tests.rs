@@ -178,3 +178,29 @@ fn dropping_the_client_closes_the_connection_at_once() {
     drop(client);
     closed.recv_timeout(TIMEOUT).unwrap();
 }
+
+/// Data that flow are no answer: the set-up ends by the clock, and says what it waited for.
+#[test]
+fn a_start_without_an_answer_ends_by_the_clock() {
+    let address = controller(|_, mut stream| {
+        let set_up = |stream: &mut TcpStream| {
+            while let Some((kind, _)) = next(stream) {
+                match kind {
+                    b'V' => answer(stream, Kind::ProtocolVersion, &[1]),
+                    b'v' => answer(stream, Kind::ControllerVersion, &[0; 16]),
+                    b'O' => answer(stream, Kind::SetUpOutputs, b"\x01DOUBLE,VECTOR6D"),
+                    b'I' => answer(stream, Kind::SetUpInputs, b"\x01DOUBLE"),
+                    _ => return,
+                }
+            }
+        };
+        set_up(&mut stream);
+        (0..).take_while(|tick| stream.write_all(&data(*tick)).is_ok()).for_each(|_| {
+            std::thread::sleep(Duration::from_millis(2));
+        });
+    });
+    let limit = Duration::from_millis(300);
+    let e = RtdeClient::connect(address, &plan(), limit).err().unwrap();
+    let LinkError::Timeout { awaited, limit_s, .. } = e else { panic!("{e}") };
+    assert_eq!((awaited, limit_s), ("start", 0.3));
+}

@@ -4,10 +4,10 @@ use super::injection::{HEAVY_KG, Injection, Kind, Moment};
 use super::watch::{Progress, Watch};
 use gripgen_rig::camera::CameraView;
 use gripgen_rig::experiment::pull::ExecutedPull;
-use gripgen_rig::experiment::{Devices, Experiment, RigConfig};
+use gripgen_rig::experiment::{Devices, Experiment, RigConfig, RigEvent};
 use gripgen_rig::program::TcpPose;
 use gripgen_rig::rtde::{Kind as Frame, encode_frame};
-use gripgen_rig_sim::faults::Fault;
+use gripgen_rig_sim::faults::{Device, Fault};
 use gripgen_rig_sim::server::{RigAddresses, ServeOptions, ServedRig};
 use gripgen_rig_sim::spring::Spring;
 use gripgen_twin::config::Document;
@@ -17,7 +17,7 @@ use std::net::TcpStream;
 use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How many times faster than real time.
 const RATE: f64 = 20.0;
@@ -25,8 +25,9 @@ const RATE: f64 = 20.0;
 const COMES: Duration = Duration::from_secs(120);
 /// The pull has to be over by then, whatever happens.
 const OVER: Duration = Duration::from_secs(180);
-/// After this the arm has to stand: five seconds, and patience.
-pub const LONGEST: Duration = Duration::from_secs(20);
+/// After this the arm has to stand: five seconds, and the patience of 3 of what the host times. In seconds of a rig in real time, but
+/// counted by the rig's clock, which is slow where the machine is.
+pub const LONGEST_S: f64 = 20.0;
 /// So long it is looked at whether it stays so.
 const STAYS: Duration = Duration::from_millis(300);
 /// How long a person leans on the tool, by the rig's clock.
@@ -42,10 +43,10 @@ pub struct Made {
     pub came: bool,
     /// Where the pull was when the fault was there: later than asked for on a machine that is busy.
     pub moment: Option<Moment>,
-    /// Time from the injection to the return of the call.
-    pub returned: Duration,
+    /// Time from the injection to the return of the call, as that of [`LONGEST_S`].
+    pub returned_s: f64,
     /// Time from the injection until the arm stood for good.
-    pub stood: Option<Duration>,
+    pub stood_s: Option<f64>,
     /// Whether it stayed so.
     pub stayed: bool,
     /// Whether the jaws held at the injection, and at the end.
@@ -90,7 +91,7 @@ fn campaign() -> Campaign {
 fn pull(
     config: &RigConfig,
     stop: &AtomicBool,
-    emit: &mut dyn FnMut(gripgen_rig::experiment::RigEvent),
+    emit: &mut dyn FnMut(RigEvent),
     over: impl FnOnce(),
 ) -> Result<ExecutedPull, String> {
     let devices = Devices::connect(config).map_err(|e| e.to_string())?;
@@ -105,8 +106,7 @@ fn pull(
     Ok(pull)
 }
 
-/// Makes an injection.
-pub fn make(injection: &Injection) -> Made {
+fn serve() -> ServedRig {
     let options = ServeOptions {
         addresses: RigAddresses::any_ports(),
         clock_rate: RATE,
@@ -114,7 +114,24 @@ pub fn make(injection: &Injection) -> Made {
         tcp: TcpPose { position_m: [0.4, 0.1, 0.4], rotation_rad: [0.0; 3] },
         view: CameraView { rotate_deg: 90, mirror: false, crop_px: None, size_px: [16, 8] },
     };
-    let rig = ServedRig::start(Arc::new(Spring::default()), &options).unwrap();
+    ServedRig::start(Arc::new(Spring::default()), &options).unwrap()
+}
+
+/// A pull that loses a device for good when this step begins.
+pub fn pull_and_lose(device: Device, step: &str) -> ExecutedPull {
+    let rig = serve();
+    let mut emit = |event| {
+        if matches!(event, RigEvent::Step(now) if now == step) {
+            rig.inject(Fault::Refuse(device));
+            rig.inject(Fault::Drop(device));
+        }
+    };
+    pull(&config(rig.addresses()), &AtomicBool::new(false), &mut emit, || ()).unwrap()
+}
+
+/// Makes an injection.
+pub fn make(injection: &Injection) -> Made {
+    let rig = serve();
     let config = config(rig.addresses());
     let progress = Progress::until(injection.moment);
     let (stop, dies, hangs) = (AtomicBool::new(false), AtomicBool::new(false), AtomicBool::new(false));
@@ -139,7 +156,9 @@ pub fn make(injection: &Injection) -> Made {
         let is_due = |rig: &ServedRig| rig.status().timestamp_s >= due_s || progress.waits();
         came &=
             watch.until(COMES, |w| is_due(w.rig) || experiment.is_finished()) && !experiment.is_finished();
-        let (injected, moment) = (Instant::now(), watch.moment());
+        let injected_s = rig.status().timestamp_s;
+        let since_s = || (rig.status().timestamp_s - injected_s) / RATE;
+        let moment = watch.moment();
         // Jaws that are about to open may do so.
         let held = watch.holds() && !progress.releases();
         let mut slow = None;
@@ -161,26 +180,24 @@ pub fn make(injection: &Injection) -> Made {
         let mut stands_since = None;
         let mut follow = |w: &mut Watch| {
             if w.stands() {
-                stands_since.get_or_insert_with(Instant::now);
+                stands_since.get_or_insert_with(since_s);
             } else {
                 stands_since = None;
             }
             experiment.is_finished()
         };
         assert!(watch.until(OVER, &mut follow), "the call does not come back");
-        let returned = injected.elapsed();
-        watch.until(LONGEST.saturating_sub(returned), |w| w.stands());
-        let stood = watch
-            .stands()
-            .then(|| stands_since.unwrap_or_else(Instant::now).saturating_duration_since(injected));
+        let returned_s = since_s();
+        watch.until(OVER, |w| w.stands() || since_s() > LONGEST_S);
+        let stood_s = watch.stands().then(|| stands_since.unwrap_or_else(since_s));
         let stayed = !watch.until(STAYS, |w| !w.stands());
         let pull = experiment.join().ok();
         let made = Made {
             pull,
             came,
             moment,
-            returned,
-            stood,
+            returned_s,
+            stood_s,
             stayed,
             held: (held, watch.holds()),
             let_go: watch.let_go.take(),

@@ -170,6 +170,7 @@ impl Live {
             "max_pull_force_n": force_n,
             "time_s": standing.time_s,
             "dwell_s": measured.dwell_s,
+            "columns": measured.planned.notes,
             "failure": reason,
             "status_reason": suspect.unwrap_or(reason),
             "still": measured.stopped.as_ref().map(|s| s.still),

@@ -6,7 +6,7 @@ use crate::failure::{Failure, code};
 use crate::interrupt::stop_flag;
 use crate::output::{JsonSink, count, duration, print};
 use crate::outputs::Outputs;
-use crate::rig::{HowToPull, Permit, PullJob, PullProgress, load_rig, plan_pulls};
+use crate::rig::{HowToPull, Permit, PullJob, PullProgress, ask_at_keyboard, load_rig, plan_pulls};
 use gripgen_measured::read_campaign;
 use gripgen_rig::experiment::plan::pull_program;
 use serde_json::json;
@@ -15,11 +15,20 @@ use std::path::PathBuf;
 /// Runs the verb.
 pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
     let config = load_rig(&args.rig, &args.set)?;
-    let campaign = match &args.campaign {
+    let mut campaign = match &args.campaign {
         Some(path) => read_campaign(path).map_err(Failure::usage)?,
         None => plan_pulls(&config, &args.rig, &args.parts, &args.grip_force_n, args.repetitions, args.seed)?,
     };
-    let job = PullJob::new(config, campaign, args.rehearsal.as_deref())?;
+    // These two are known columns of a campaign: they stand in its entries.
+    let (of_entries, notes): (Vec<_>, Vec<_>) =
+        args.column.iter().cloned().partition(|(name, _)| ["gel_id", "session"].contains(&name.as_str()));
+    for (name, word) in of_entries {
+        let entries = campaign.pulls.iter_mut();
+        entries.for_each(|pull| {
+            *if name == "gel_id" { &mut pull.gel_id } else { &mut pull.session } = word.clone()
+        });
+    }
+    let job = PullJob::new(config, campaign, args.rehearsal.as_deref())?.with_notes(&notes, &args.ask)?;
     let (name, out) = (name_of(args), folder_of(args));
     let mut outputs = Outputs::new(args.json.force)
         .reads_config(&args.rig, &args.set)
@@ -66,7 +75,7 @@ pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
         }
         PullProgress::Pulled { standing, pull, suspect } => live.pulled(&standing, pull, suspect),
     };
-    let made = run.make(how, stop_flag("stopping the robot safely"), &mut tell)?;
+    let made = run.make(how, stop_flag("stopping the robot safely"), &mut ask_at_keyboard, &mut tell)?;
     live.done(run.folder(), made.failed, made.suspect, made.complete)?;
     Ok(if made.failed > 0 || made.suspect > 0 { code::SAMPLES_FAILED } else { 0 })
 }

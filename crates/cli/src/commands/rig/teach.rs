@@ -8,7 +8,9 @@ use crate::rig::load_rig;
 use gripgen::twin::config::Document;
 use gripgen_rig::experiment::RigConfig;
 use gripgen_rig::experiment::check::read_pose;
+use gripgen_rig::experiment::config::TaughtPose;
 use gripgen_rig::experiment::plan::outside_workspace;
+use gripgen_rig::program::TcpPose;
 use serde_json::json;
 use toml_edit::{Array, DocumentMut, Item, Table, value};
 
@@ -29,36 +31,46 @@ pub fn run(args: &RigTeachArgs) -> Result<u8, Failure> {
     }
     let text = std::fs::read_to_string(&args.rig).map_err(|e| Failure::usage(format!("{path}: {e}")))?;
     let mut document: DocumentMut = text.parse().map_err(|e| Failure::usage(format!("{path}: {e}")))?;
-    let replaced = taught(&mut document, &args.name, pose.numbers());
+    let replaced = config.poses.get(&args.name).map(TaughtPose::tcp);
+    taught(&mut document, &args.name, pose.numbers());
     let text = document.to_string();
     // What was written is read once more before it replaces the file.
     RigConfig::read(&Document::parse(&path, &text)?)?;
     outputs.edit(&args.rig, text.as_bytes())?;
     let [x, y, z] = pose.position_m.map(|m| 1e3 * m);
     if sink.wanted() {
-        sink.document(&json!({"name": args.name, "base_from_tool": pose.numbers(), "replaced": replaced}))?;
+        let was = replaced.map(|was| was.numbers());
+        sink.document(&json!({
+            "name": args.name, "base_from_tool": pose.numbers(), "replaced": was.is_some(), "was": was
+        }))?;
     }
     if !sink.on_stdout() {
-        let done = if replaced { "taught again" } else { "taught" };
-        print(&format!("{}: {done} at {x:.1}, {y:.1}, {z:.1} mm\n", args.name))?;
+        let instead = replaced.map(|was| instead_of(&was, &pose)).unwrap_or_default();
+        print(&format!("{}: taught at {x:.1}, {y:.1}, {z:.1} mm{instead}\n", args.name))?;
     }
     Ok(0)
 }
 
-/// Puts a pose in; comments and everything else stay. Returns whether there was one.
-pub fn taught(document: &mut DocumentMut, name: &str, numbers: [f64; 6]) -> bool {
+/// The pose that is replaced, and how far the new one is from it.
+fn instead_of(was: &TcpPose, now: &TcpPose) -> String {
+    let [x, y, z] = was.position_m.map(|m| 1e3 * m);
+    let turned = was.base_from_tool().rotation.angle_to(&now.base_from_tool().rotation).to_degrees();
+    let away_mm = 1e3 * was.distance_m(now);
+    format!(", instead of {x:.1}, {y:.1}, {z:.1} mm: {away_mm:.1} mm and {turned:.1} degrees away")
+}
+
+/// Puts a pose in; comments and everything else stay.
+pub fn taught(document: &mut DocumentMut, name: &str, numbers: [f64; 6]) {
     let poses = document.entry("poses").or_insert_with(|| {
         let mut table = Table::new();
         table.set_implicit(true);
         Item::Table(table)
     });
-    let Some(poses) = poses.as_table_like_mut() else { return false };
-    let replaced = poses.contains_key(name);
+    let Some(poses) = poses.as_table_like_mut() else { return };
     let pose = poses.entry(name).or_insert_with(|| Item::Table(Table::new()));
     if let Some(pose) = pose.as_table_like_mut() {
         pose.insert("base_from_tool", value(numbers.iter().copied().collect::<Array>()));
     }
-    replaced
 }
 
 #[cfg(test)]
@@ -69,11 +81,22 @@ mod tests {
     fn a_pose_is_added_or_replaced_and_the_rest_stays() {
         let text = "# mine\n[robot]\naddress = \"a\" # there\n\n[poses.gear]\nbase_from_tool = [0, 0, 0, 0, 0, 0] # old\n";
         let mut document: DocumentMut = text.parse().unwrap();
-        assert!(taught(&mut document, "gear", [0.1, 0.2, 0.3, 0.0, 1.5, 0.0]));
-        assert!(!taught(&mut document, "nut", [0.4, 0.0, 0.3, 0.0, 0.0, 0.0]));
+        taught(&mut document, "gear", [0.1, 0.2, 0.3, 0.0, 1.5, 0.0]);
+        taught(&mut document, "nut", [0.4, 0.0, 0.3, 0.0, 0.0, 0.0]);
         let text = document.to_string();
         assert!(text.starts_with("# mine\n[robot]\naddress = \"a\" # there\n"), "{text}");
         assert!(text.contains("[poses.gear]\nbase_from_tool = [0.1, 0.2, 0.3, 0.0, 1.5, 0.0]"), "{text}");
         assert!(text.contains("[poses.nut]\nbase_from_tool = [0.4"), "{text}");
+    }
+
+    #[test]
+    fn a_pose_that_is_replaced_is_named() {
+        let was = TcpPose { position_m: [0.45, 0.0, 0.25], rotation_rad: [std::f64::consts::PI, 0.0, 0.0] };
+        let now = TcpPose {
+            position_m: [0.45, 0.003, 0.254],
+            rotation_rad: [std::f64::consts::PI - 0.1, 0.0, 0.0],
+        };
+        let words = instead_of(&was, &now);
+        assert_eq!(words, ", instead of 450.0, 0.0, 250.0 mm: 5.0 mm and 5.7 degrees away");
     }
 }
