@@ -2,9 +2,9 @@
 
 mod bodies;
 
+use crate::mesh_file::MeshFileError;
 use bodies::PressBodies;
 use gripgen::Files;
-use crate::mesh_file::MeshFileError;
 use gripgen::{Library, LibraryError};
 use gripgen::{LoadError, load_twin_document};
 use gripgen::{Location, ReadFileError};
