@@ -61,10 +61,10 @@ pub mod values;
 pub use backbone::Backbone;
 pub use campaign::{Campaign, PlannedPull, PullKind};
 pub use config::{DEFAULTED_SECTIONS, is_twin_key};
-pub use image::film::{CameraStamp, CellShear, FilmFrame, FilmPace, SlipState};
 pub use friction::{FrictionError, GripFriction, cell_friction, grip_friction};
 pub use grasp::{Grasp, Proposal};
 pub use image::TactileImage;
+pub use image::film::{CameraStamp, CellShear, FilmFrame, FilmPace, SlipState};
 pub use jaw::{Jaw, PerJaw};
 pub use label::{LabelError, PullEnd, SlipLabel, slip_label};
 pub use measured::{
@@ -80,11 +80,13 @@ pub use patch::{ContactPatch, PressureCell};
 pub use posterior::{CAUSE_KEY, Posterior, PosteriorDraw, PosteriorError};
 pub use rounded::rounded;
 pub use sample::{ImprintSummary, Outcome, Pulled, Sample};
-pub use scenario::{Covariates, PullSettings, Scenario};
 pub use scenario::keys::{can_be_drawn, is_own_column, pull_keys, scenario_keys};
 pub use scenario::staircase::{Staircase, StaircaseCursor};
+pub use scenario::{Covariates, PullSettings, Scenario};
 pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep};
 pub use table::{TABLE_EFFECT, Table, TableTarget};
 pub use trace::{PullTrace, TraceRow};
-pub use twin::{Elastic, Gel, Gripper, LARGEST_MU, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist};
+pub use twin::{
+    Elastic, Gel, Gripper, LARGEST_MU, NO_MESH, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist,
+};
 pub use values::Values;
