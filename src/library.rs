@@ -6,7 +6,7 @@ use gripgen_physics::Cache;
 use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, Surface, UrdfError};
 use gripgen_record::{decode_picture, sha256_hex};
 use gripgen_tactile::{ClusteredMesh, Sensor, SensorError, SensorFiles};
-use gripgen_twin::{Gel, MeshError, Optics, Part, RobotArm, TriMesh, Twin};
+use gripgen_twin::{Gel, MeshError, NO_MESH, Optics, Part, RobotArm, TriMesh, Twin};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -16,6 +16,9 @@ const MESHES: usize = 256;
 const SHAPES: usize = 512;
 const SENSORS: usize = 8;
 const ARMS: usize = 8;
+
+/// What holds the place of a geometry that is not known.
+const STAND_IN: &str = "asset:parts/long_shaft/part.stl";
 
 /// The files of a sweep and what was made of them. What it returns depends on its arguments only.
 pub struct Library {
@@ -127,7 +130,8 @@ impl LibraryError {
 }
 
 impl Library {
-    /// The files that the grips of a twin need: meshes, robot and sensors. `beside` is where the twin lies.
+    /// The files that the grips of a twin need: meshes, robot and sensors. `beside` is where the twin lies. For labels, which do
+    /// not depend on it, a part without a geometry has the shape of a shaft.
     ///
     /// # Errors
     ///
@@ -141,7 +145,7 @@ impl Library {
         let mut files = Files::new();
         for path in meshes.chain(sensors.flatten()).chain(arm) {
             if !files.contains_key(path) {
-                let at = beside.beside(path);
+                let at = if path == NO_MESH { Location::parse(STAND_IN) } else { beside.beside(path) };
                 let bytes = at.read()?.into_owned();
                 files.insert(path.clone(), (at, bytes));
             }

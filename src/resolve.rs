@@ -8,7 +8,7 @@ use crate::location::Location;
 use gripgen_record::sha256_hex;
 use gripgen_twin::config::{ConfigError, Document, SweepFile, TwinFile};
 use gripgen_twin::draw::{Distribution, Drawn};
-use gripgen_twin::{Sweep, TWIN_SCHEMA, is_twin_key};
+use gripgen_twin::{NO_MESH, Sweep, TWIN_SCHEMA, is_twin_key};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -106,6 +106,12 @@ impl<L: Fn(&str) -> Location> Resolver<L> {
         for (name, part) in &mut twin.parts {
             let key = format!("parts.{name}.mesh");
             // A mesh that no sample draws need not be there, and its path is nobody's business.
+            if drawn.contains(&name.as_str()) && part.mesh == NO_MESH {
+                let problem =
+                    format!("the part `{name}` has no geometry, its twin was made from labels alone");
+                let hint = format!("name its mesh: --set parts.{name}.mesh=FILE.stl, or draw another part");
+                return Err(ConfigError::new(&key, problem).hint(hint));
+            }
             if drawn.contains(&name.as_str()) {
                 self.name(key.clone(), key, &mut part.mesh)?;
             } else {

@@ -10,6 +10,7 @@ mod diagnose;
 mod expect;
 mod imprint;
 mod imprint_set;
+mod own_parts;
 mod posterior;
 mod presses;
 mod priors;
@@ -35,6 +36,7 @@ pub use imprint::{
     CalibrateImprintsError, ImprintCalibration, ImprintCalibrations, ImprintImagesError, calibrate_imprints,
 };
 pub use imprint_set::{ImprintSet, LoadImprintsError, imprint_data, is_imprint_set, load_imprint_set};
+pub use own_parts::{OwnParts, effects_of_geometry, jaws_of_grip_force, own_parts};
 pub use posterior::posterior_twins;
 pub use presses::{
     FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, find_circles_with_sensor,

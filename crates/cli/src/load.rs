@@ -5,8 +5,8 @@ use crate::commands::rig::load_rig;
 use crate::failure::Failure;
 use crate::shell;
 use crate::{
-    FoundCircles, LoadPressesError, LoadSensorError, PressGeometry, load_presses, load_sensor,
-    load_twin_sensor,
+    FoundCircles, LoadPressesError, LoadSensorError, OwnParts, PressGeometry, jaws_of_grip_force,
+    load_presses, load_sensor, load_twin_sensor, own_parts,
 };
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::{PressSet, RestDoubt, rest_doubt};
@@ -28,6 +28,38 @@ pub fn load_twin(path: &str, sets: &[(String, String)]) -> Result<Twin, Failure>
 pub fn load_library(twin: &Twin, path: &str) -> Result<Library, Failure> {
     let unread = |e| Failure::usage(e).hint("paths in a twin are relative to its file");
     Library::of_twin(twin, &Location::parse(path)).map_err(unread)
+}
+
+/// The twin that pulls are held against.
+pub struct TwinOfPulls<'a> {
+    /// Its file.
+    pub path: &'a str,
+    /// Overrides.
+    pub sets: &'a [(String, String)],
+    /// The rig whose gripper limits it.
+    pub rig: Option<&'a str>,
+}
+
+impl TwinOfPulls<'_> {
+    /// The twin with the parts of the pulls, those that it lacks made from their labels, and its files. What people have to know of the
+    /// parts and of the grip forces is returned with them.
+    pub fn for_pulls(&self, loaded: &mut LoadedPulls) -> Result<(Twin, Library, OwnParts), Failure> {
+        let twin = load_twin(self.path, self.sets)?;
+        let mut own = own_parts(&mut loaded.pulls, &twin);
+        let twin = match own.sets.is_empty() {
+            true => twin,
+            false => load_twin(self.path, &[self.sets, &own.sets].concat())?,
+        };
+        own.notes.extend(jaws_of_grip_force(&loaded.pulls, &twin, &own));
+        let mut twin = within_rig(twin, self.rig)?;
+        if self.rig.is_none() {
+            // No plan asks for more than what the gripper of the lab has shown.
+            let strongest_n = loaded.pulls.pulls.iter().map(|pull| pull.grip_force_n).fold(0.0, f64::max);
+            twin.gripper.max_force_n = twin.gripper.max_force_n.min(strongest_n);
+        }
+        let library = load_library(&twin, self.path)?;
+        Ok((twin, library, own))
+    }
 }
 
 /// The twin with no more grip force than the gripper of a rig has.
@@ -107,7 +139,7 @@ pub fn load_pulls_to_fit(
 ) -> Result<LoadedPulls, Failure> {
     each_once(paths)?;
     let mut loaded = load_pulls_with(paths, suspects).map_err(|e| no_pulls(paths, &e))?;
-    let refused = loaded.implausible.take_if(|e| e.sign || !answers);
+    let refused = loaded.implausible.take_if(|e| e.unanswerable || !answers);
     say_warnings(&loaded, talk);
     match refused {
         Some(e) => Err(Failure::usage(&e).hint(&e.hint)),

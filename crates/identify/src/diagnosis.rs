@@ -57,6 +57,9 @@ pub struct DataSummary {
     /// Their grasps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grasps: Option<usize>,
+    /// Missing cells of each column that other rows fill.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub missing_cells: BTreeMap<String, usize>,
     /// Hash of the data.
     pub sha256: String,
     /// Names of observations that fit nothing and were given little weight: worst first.
@@ -329,6 +332,9 @@ pub struct Diagnosis {
     /// Whether the forces look as if they were not in newtons.
     #[serde(skip)]
     pub other_unit: bool,
+    /// Whether the error is far beyond the scatter of repetitions; a note has the numbers.
+    #[serde(skip)]
+    pub not_described: bool,
 }
 
 impl Diagnosis {
@@ -356,6 +362,7 @@ impl Diagnosis {
             notes: Vec::new(),
             deciding: Vec::new(),
             other_unit: false,
+            not_described: false,
         }
     }
 
@@ -371,6 +378,15 @@ impl Diagnosis {
     pub fn decides(&mut self, note: String) {
         self.deciding.push(note.clone());
         self.notes.push(note);
+    }
+
+    /// Takes back that nothing was found: the model does not describe the data, as the note says.
+    pub(crate) fn is_not_described(&mut self, note: String) {
+        if self.verdict == Verdict::None {
+            self.verdict = Verdict::Unknown;
+        }
+        self.not_described = true;
+        self.decides(note);
     }
 
     /// Puts the verdict that follows from what was found: an effect before a dependence that none explains.

@@ -29,6 +29,7 @@ mod learnt;
 mod levels;
 pub mod likelihood;
 mod naming;
+mod not_described;
 mod null;
 pub mod observe;
 mod one_level;

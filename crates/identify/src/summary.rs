@@ -21,6 +21,9 @@ pub fn summary_sentence(d: &Diagnosis) -> String {
             };
         }
         Verdict::None => "Nothing was found that the model lacks.".into(),
+        Verdict::Unknown if d.unknown.is_empty() && d.not_described => {
+            "The model does not describe these data, and nothing that was written down says why.".into()
+        }
         Verdict::Unknown => format!("Something that the library has no name for goes with {}.", unknown(d)),
         Verdict::Effect => named(d),
     };

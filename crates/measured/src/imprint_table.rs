@@ -191,7 +191,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<ImprintTable, TableError> {
         table.part.push(word(places.part).into());
         table.session.push(word(places.session).into());
         for (place, _, cells) in &mut extra {
-            cells.push(row.cell(*place));
+            cells.push(&row.plain(*place)?);
         }
     }
     if table.ids.is_empty() {

@@ -44,8 +44,8 @@ pub use press_table::{
     read_press_folder,
 };
 pub use pulls::{
-    JudgedPulls, PULLS_FILE, PullFolderError, PullImages, Standing, TRACES_FOLDER, pulls_with_images,
-    read_judged_pulls, read_pull_folder, read_pull_images, write_pull_folder,
+    JudgedPulls, MissingCells, PULLS_FILE, PullFolderError, PullImages, Standing, TRACES_FOLDER,
+    pulls_with_images, read_judged_pulls, read_pull_folder, read_pull_images, write_pull_folder,
 };
 pub use sensor_table::{SENSOR_FILE, SensorTable, read_sensor_table};
 pub use table::TableError;

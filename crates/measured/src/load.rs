@@ -10,7 +10,7 @@ mod zero;
 pub use suspects::Suspects;
 pub use units::ImplausibleLabels;
 
-use crate::pulls::{JudgedPulls, PULLS_FILE, PullFolderError, Standing, read_judged_pulls};
+use crate::pulls::{JudgedPulls, MissingCells, PULLS_FILE, PullFolderError, Standing, read_judged_pulls};
 use gripgen_record::{FolderError, RIG_SOURCE, ReadError, RunFolder, sha256_hex};
 use gripgen_twin::{ExtraColumn, MeasuredPulls};
 use left_out::LeftOut;
@@ -30,6 +30,8 @@ pub struct LoadedPulls {
     pub warnings: Vec<String>,
     /// Labels that no gel gives: no twin is to be fitted to them.
     pub implausible: Option<ImplausibleLabels>,
+    /// Cells that are missing in columns that other pulls fill; the notes say so too.
+    pub missing: MissingCells,
 }
 
 /// Why there are no measured pulls.
@@ -89,7 +91,11 @@ pub enum LoadPullsError {
 impl LoadPullsError {
     /// What to do about it, where that is known.
     pub fn hint(&self) -> Option<&str> {
-        matches!(self, Self::Bag { .. }).then_some(BAG_HINT)
+        match self {
+            Self::Bag { .. } => Some(BAG_HINT),
+            Self::Table(PullFolderError::Table(e)) => Some(e.hint()),
+            _ => None,
+        }
     }
 }
 
@@ -133,12 +139,12 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
     if !path.join(PULLS_FILE).is_file() && is_bag(path) {
         return Err(LoadPullsError::Bag { path: path.into() });
     }
-    let JudgedPulls { pulls, standing, every_reading, mut warnings } = read_judged_pulls(path)?;
+    let JudgedPulls { pulls, standing, every_reading, missing, mut warnings } = read_judged_pulls(path)?;
     let mut left_out = LeftOut { rig: false, ..LeftOut::default() };
-    standing.iter().for_each(|s| left_out.count(s.status));
+    standing.iter().filter(|s| !s.lacks_value).for_each(|s| left_out.count(s.status));
     let ids: Vec<&str> = pulls.pulls.iter().map(|p| p.id.as_str()).collect();
     let (keep, note) = suspects::kept(&standing, &ids, suspects);
-    let mut notes: Vec<String> = left_out.notes().into_iter().chain(note).collect();
+    let mut notes: Vec<String> = left_out.notes().into_iter().chain(note).chain(missing.notes()).collect();
     if !keep.contains(&true) {
         let first = standing.iter().zip(&ids).find(|(s, _)| !s.reason.is_empty() && notes.len() == 1);
         notes.extend(first.map(|(s, id)| format!("pull {id}: {}", s.reason)));
@@ -155,7 +161,7 @@ fn load_one(path: &Path, suspects: Suspects) -> Result<LoadedPulls, LoadPullsErr
         fewer_traces(&mut pulls.pulls, &mut notes);
     }
     notes.extend(zero::without_shift(&mut pulls));
-    Ok(LoadedPulls { pulls, notes, warnings, implausible })
+    Ok(LoadedPulls { pulls, notes, warnings, implausible, missing })
 }
 
 /// Loads several folders as one campaign, in their order: what was measured later on the same rig. Pulls whose ids are taken get the
@@ -201,6 +207,7 @@ fn join(path: &Path, all: &mut LoadedPulls, next: LoadedPulls) -> Result<(), Loa
     for pull in theirs.pulls.iter_mut().filter(|pull| ids.contains(&pull.id)) {
         pull.id = format!("{folder}-{}", pull.id);
     }
+    sessions_apart(&folder, mine, &mut theirs);
     mine.recorded.retain(|name| theirs.recorded.contains(name));
     mine.extra.retain(|column| theirs.extra.iter().any(|c| same_kind(column, c)));
     for column in &mut mine.extra {
@@ -214,7 +221,21 @@ fn join(path: &Path, all: &mut LoadedPulls, next: LoadedPulls) -> Result<(), Loa
     all.notes.extend(next.notes);
     all.warnings.extend(next.warnings);
     all.implausible = all.implausible.take().or(next.implausible);
+    all.missing.append(&next.missing);
     Ok(())
+}
+
+/// Names the sessions of the second folder after it where the first one has them too: two folders are two sessions at least.
+fn sessions_apart(folder: &str, mine: &mut MeasuredPulls, theirs: &mut MeasuredPulls) {
+    let sessions: BTreeSet<String> = mine.pulls.iter().map(|p| p.covariates.session.clone()).collect();
+    for pull in theirs.pulls.iter_mut().filter(|p| sessions.contains(&p.covariates.session)) {
+        pull.covariates.session = format!("{folder}-{}", pull.covariates.session);
+    }
+    for all in [mine, theirs] {
+        if !all.recorded.iter().any(|name| name == "session") {
+            all.recorded.push("session".into());
+        }
+    }
 }
 
 fn same_kind(a: &ExtraColumn, b: &ExtraColumn) -> bool {

@@ -146,7 +146,9 @@ pub fn read_press_columns(folder: &Path) -> Result<PressColumnTable, TableError>
     let image_column = table.place(IMAGE);
     let mut names = Vec::new();
     while let Some(row) = table.row()? {
-        columns.iter_mut().enumerate().for_each(|(place, (_, cells))| cells.push(row.cell(place)));
+        for (place, (_, cells)) in columns.iter_mut().enumerate() {
+            cells.push(&row.plain(place)?);
+        }
         names.extend(image_column.map(|place| row.cell(place).to_string()));
     }
     let columns = columns.into_iter().filter(|(name, _)| !name.is_empty());
@@ -219,7 +221,7 @@ mod tests {
                 "image,radius_px\na.png,5\na.png,-3\n",
                 "line 3, `radius_px` is `-3`, it must be a number above 0",
             ),
-            ("image,depth_mm\na.png,nan\n", "`depth_mm` is `nan`"),
+            ("image,depth_mm\na.png,deep\n", "`depth_mm` is `deep`"),
             ("image\nb.png\n", "b.png"),
             ("image\nlossy.png\n", "lossy.png: the image is a JPEG, presses are read from PNG"),
             ("image,x_px\na.png,1,2\n", "cells of line 2: "),

@@ -47,6 +47,7 @@ pub fn read_sensor_table(folder: &Path) -> Result<SensorTable, TableError> {
 
 fn parse(path: &Path, bytes: &[u8]) -> Result<SensorTable, TableError> {
     let mut reader = TableReader::new(path, bytes)?;
+    reader.spell(&[&REQUIRED[..], &[SESSION]].concat());
     reader.check_single()?;
     let mut places = [0; 3];
     for (place, column) in places.iter_mut().zip(REQUIRED) {
@@ -97,7 +98,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<SensorTable, TableError> {
         table.measured_force_n.push(measured);
         table.session.push(session);
         for (place, _, cells) in &mut extra {
-            cells.push(row.cell(*place));
+            cells.push(&row.plain(*place)?);
         }
     }
     table.extra = extra.into_iter().filter_map(|(_, name, cells)| Some((name, cells.values()?))).collect();

@@ -30,6 +30,7 @@ pub fn sample_covariates(s: &proto::Sample) -> Covariates {
         grip_angle_rad: Scale::Degree.to_si(s.grip_angle_deg),
         pull_direction: f64::from(s.pull_direction),
         extra: extra.map(|(name, value)| (name.clone(), value)).collect(),
+        ..Covariates::default()
     }
 }
 

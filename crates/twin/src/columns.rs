@@ -283,8 +283,14 @@ impl Column {
         self.number_by(pull, Scale::as_written)
     }
 
+    /// Whether the cell of this pull was empty where other pulls have a value.
+    pub fn is_missing(&self, pull: PullView<'_>) -> bool {
+        pull.covariates.missing.contains(self.name)
+    }
+
     fn number_by(&self, pull: PullView<'_>, from_si: fn(Scale, f64) -> f64) -> Option<f64> {
         match self.held {
+            _ if self.is_missing(pull) => None,
             Held::Number { get, .. } => get(pull).map(|x| from_si(self.scale, x)),
             Held::Word { .. } => None,
             Held::Extra => match pull.covariates.extra.get(self.name)? {
@@ -297,6 +303,7 @@ impl Column {
     /// Its word in a pull; `None` where there is none.
     pub fn word<'a>(&self, pull: PullView<'a>) -> Option<&'a str> {
         match self.held {
+            _ if self.is_missing(pull) => None,
             Held::Word { get, .. } => Some(get(pull)),
             Held::Number { .. } => None,
             Held::Extra => match pull.covariates.extra.get(self.name)? {

@@ -87,5 +87,7 @@ pub use scenario::{Covariates, PullSettings, Scenario};
 pub use sweep::{DEFAULT_GRIP_FORCE_N, MAX_SAMPLES, Sweep};
 pub use table::{TABLE_EFFECT, Table, TableTarget};
 pub use trace::{PullTrace, TraceRow};
-pub use twin::{Elastic, Gel, Gripper, LARGEST_MU, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist};
+pub use twin::{
+    Elastic, Gel, Gripper, LARGEST_MU, NO_MESH, Optics, Part, Robot, RobotArm, TWIN_SCHEMA, Twin, Wrist,
+};
 pub use values::Values;

@@ -4,7 +4,7 @@ pub(crate) mod keys;
 pub(crate) mod staircase;
 
 use crate::draw::Drawn;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The circumstances of a pull: the columns that a table of measured pulls may have.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,9 @@ pub struct Covariates {
     /// Columns without a field of their own, in the units of the columns: mostly of unknown meaning. A table of the twin may
     /// depend on them.
     pub extra: BTreeMap<String, Drawn>,
+    /// Columns that other pulls of the campaign have and this one lacks: a field then holds a stand-in from its neighbours, for
+    /// a simulation, and [`crate::columns::Column::value`] is `None`.
+    pub missing: BTreeSet<&'static str>,
 }
 
 impl Default for Covariates {
@@ -45,6 +48,7 @@ impl Default for Covariates {
             grip_angle_rad: 0.0,
             pull_direction: 1.0,
             extra: BTreeMap::new(),
+            missing: BTreeSet::new(),
         }
     }
 }

@@ -188,6 +188,16 @@ pub struct Part {
     pub imprint_m3_per_n: f64,
 }
 
+/// What stands in place of the path of a mesh for a part of which only labels are known.
+pub const NO_MESH: &str = "none";
+
+impl Part {
+    /// Whether its shape is known: without it a part has labels, and no images.
+    pub fn has_geometry(&self) -> bool {
+        self.mesh != NO_MESH
+    }
+}
+
 impl Twin {
     /// By what the tables multiply the friction of a pull; 1 without any.
     pub fn table_factor(&self, scenario: &Scenario) -> f64 {

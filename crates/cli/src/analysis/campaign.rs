@@ -4,7 +4,7 @@ use gripgen::Location;
 use gripgen::SimulateOptions;
 use gripgen::simulate;
 use gripgen::{LoadError, Project, load_twin_document};
-use gripgen_measured::LoadedPulls;
+use gripgen_measured::{LoadedPulls, MissingCells};
 use gripgen_record::sha256_hex;
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::columns::{Column, covariates};
@@ -97,6 +97,7 @@ pub fn simulate_campaign(
     let recorded = covariates().filter(there).map(|c| c.name.into()).collect();
     let text = format!("{}{seed}{:?}", project.config_sha256, campaign);
     Ok(LoadedPulls {
+        missing: MissingCells::default(),
         pulls: MeasuredPulls {
             pulls,
             recorded,

@@ -10,7 +10,7 @@ use gripgen_measured::{LoadPullsError, LoadedPulls, Suspects, load_pulls_with};
 use gripgen_tactile::SimdLevel;
 use gripgen_tactile::metrics::{MetricError, Score, mean_score, score};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
-use gripgen_twin::{Jaw, MeasuredPull, PerJaw, Scenario, TactileImage, Twin};
+use gripgen_twin::{Jaw, MeasuredPull, Part, PerJaw, Scenario, TactileImage, Twin};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -127,7 +127,12 @@ fn compare_folder(
     jobs: usize,
     found: &mut ImageComparison,
 ) -> Result<(), ImprintImagesError> {
-    let pulls: Vec<&MeasuredPull> = loaded.pulls.pulls.iter().filter(|p| source.has(&p.id)).collect();
+    let pulls: Vec<&MeasuredPull> = loaded
+        .pulls
+        .pulls
+        .iter()
+        .filter(|p| source.has(&p.id) && twin.parts.get(&p.part).is_some_and(Part::has_geometry))
+        .collect();
     let compared = in_parallel(pulls.len(), jobs, |i| match source.read(&pulls[i].id) {
         Ok(seen) => Ok(compare_pull(pulls[i], &seen, twin, library)),
         Err(ImprintImagesError::None { .. }) => Ok(Compared::Nothing),

@@ -8,7 +8,7 @@ use gripgen::VERSION;
 use gripgen::{LoadError, load_twin_document};
 use gripgen::{Location, path_from};
 use gripgen_twin::config::{CalibrationFile, ConfigError, EffectFile, TwinFile};
-use gripgen_twin::{TWIN_SCHEMA, Twin};
+use gripgen_twin::{NO_MESH, TWIN_SCHEMA, Twin};
 use std::path::{Path, PathBuf};
 
 /// A value of a twin that was fitted.
@@ -144,7 +144,8 @@ fn to_value<T: serde::Serialize>(value: &T) -> Result<toml::Value, WriteTwinErro
 
 /// The paths of files in a twin.
 fn paths_of(file: &mut TwinFile) -> Vec<&mut String> {
-    let mut paths: Vec<&mut String> = file.parts.values_mut().map(|part| &mut part.mesh).collect();
+    let mut paths: Vec<&mut String> =
+        file.parts.values_mut().map(|part| &mut part.mesh).filter(|mesh| *mesh != NO_MESH).collect();
     paths.extend(file.robot.arm.as_mut().map(|arm| &mut arm.urdf));
     for optics in [Some(&mut file.optics.left), file.optics.right.as_mut()].into_iter().flatten() {
         paths.push(&mut optics.sensor);

@@ -197,6 +197,9 @@ pub struct CampaignArgs {
     /// Also make the campaign on the twin, into this folder of measurements.
     #[arg(long, value_name = "FOLDER")]
     pub simulate: Option<PathBuf>,
+    /// Also write the pulls as a table to print and fill in by hand; once its empty cells are filled it is a pulls.csv.
+    #[arg(long, value_name = "FILE.csv")]
+    pub csv: Option<PathBuf>,
     /// Seed of the order.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

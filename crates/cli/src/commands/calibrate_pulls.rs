@@ -2,13 +2,14 @@
 
 use crate::args::CalibratePullsArgs;
 use crate::failure::Failure;
-use crate::load::{folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects};
+use crate::load::{TwinOfPulls, folders, jobs, load_pulls_to_fit, suspects};
 use crate::output::{JsonSink, print};
 use crate::outputs::{Outputs, draws_of};
 use crate::{
     CalibratePullsError, ImprintCalibrations, calibrate_imprints, calibrate_twin, edited_twin_toml,
     pull_priors,
 };
+use gripgen::twin::Part;
 use gripgen::{Location, load_twin_document};
 use gripgen_identify::ParameterEstimate;
 use gripgen_identify::pulls::calibrate::{CalibrateError, CalibrateRequest, PullCalibration};
@@ -25,11 +26,12 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     outputs.allow_twin(&args.out)?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let measured = folders(&args.measured, &args.also);
-    let twin = load_twin(&args.twin, &args.set)?;
-    let library = load_library(&twin, &args.twin)?;
-    let loaded = load_pulls_to_fit(&measured, suspects(args.include_suspect), &args.talk, false)?;
+    let mut loaded = load_pulls_to_fit(&measured, suspects(args.include_suspect), &args.talk, false)?;
+    let (twin, library, own) =
+        TwinOfPulls { path: &args.twin, sets: &args.set, rig: None }.for_pulls(&mut loaded)?;
+    let sets = [&args.set[..], &own.sets].concat();
     let twin_at = Location::parse(&args.twin);
-    let document = load_twin_document(&twin_at, &args.set)?;
+    let document = load_twin_document(&twin_at, &sets)?;
     let request = CalibrateRequest {
         offset_law: args.law.is_some(),
         effects: args.fit.clone(),
@@ -49,11 +51,13 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
             };
             Failure::usage(e).hint(hint)
         })?;
-    let imprints = calibrate_imprints(&args.measured, &loaded.pulls, &twin_at, &args.set).map_err(|e| {
+    let pulls = &loaded.pulls.pulls;
+    let seen = loaded.pulls.kept(|i| twin.parts.get(&pulls[i].part).is_some_and(Part::has_geometry));
+    let imprints = calibrate_imprints(&args.measured, &seen, &twin_at, &sets).map_err(|e| {
         Failure::usage(e).hint("images/<pull_id>_left.png and _right.png have the size of the twin's sensor")
     })?;
     edits.values.extend(imprints.values(&loaded.pulls));
-    let text = edited_twin_toml(&twin_at, &args.set, &edits, &args.out).map_err(Failure::new)?;
+    let text = edited_twin_toml(&twin_at, &sets, &edits, &args.out).map_err(Failure::new)?;
     outputs.write_twin(&args.out, &text, Some(&found.posterior))?;
     if sink.wanted() {
         let mut document = json_of(&found, &imprints, loaded.pulls.pulls.len(), &loaded.pulls.sha256);
@@ -61,16 +65,19 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
             let file = name.to_string_lossy();
             document["posterior"] = json!({"file": file, "draws": found.posterior.draws.len()});
         }
-        document["warnings"] = json!(loaded.warnings);
+        document["warnings"] = json!([&loaded.warnings[..], &own.notes].concat());
+        if !loaded.missing.counts().is_empty() {
+            document["data"]["missing_cells"] = json!(loaded.missing.counts());
+        }
         sink.document(&document)?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
         print(&summary(&found, &imprints))?;
     }
     if !args.talk.quiet {
-        loaded
-            .notes
+        own.notes
             .iter()
+            .chain(&loaded.notes)
             .chain(&imprints.notes)
             .chain(&found.notes)
             .for_each(|note| eprintln!("note: {note}"));

@@ -4,17 +4,19 @@ use super::diagnose::diagnose_folders;
 use super::diagnose::next::{next_toml, twin_words};
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
-use crate::load::{load_library, load_twin, within_rig};
+use crate::load::{TwinOfPulls, load_twin, within_rig};
 use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
 use crate::{NextPulls, simulate_campaign};
 use gripgen::Location;
+use gripgen::twin::columns::{COLUMNS, Column};
 use gripgen::twin::effects::OutsideFit;
 use gripgen::twin::{Campaign, PullKind, Twin};
 use gripgen_identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen_measured::Suspects;
 use gripgen_measured::{campaign_toml, write_pull_folder};
+use gripgen_record::csv_lines;
 use serde_json::json;
 use std::path::Path;
 
@@ -30,6 +32,7 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         .reads_config(rig, &[])
         .reads_all(&args.separate);
     outputs.allow(&args.out)?;
+    outputs.allow_all(args.csv.as_deref())?;
     if let Some(folder) = &args.simulate {
         outputs.allow_new_folder(folder)?;
     }
@@ -37,7 +40,7 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     let twin = within_rig(load_twin(&args.twin, &args.set)?, Some(rig))?;
     let (campaign, separating) = match &args.separate {
         Some(measured) => {
-            let (next, sha256) = separating(args, measured, &twin)?;
+            let (next, sha256) = separating(args, measured, rig)?;
             let text = next_toml(&next, measured, &args.twin, &sha256);
             (next.campaign, Some(text))
         }
@@ -45,14 +48,29 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
     };
     let minutes = campaign.estimated_minutes();
     let hours = format!("{}, about {}", count(pulls_of(&campaign), "pull"), duration(60.0 * minutes));
+    let blocks = blocks(&campaign);
+    let by_block: String = blocks
+        .iter()
+        .map(|b| {
+            format!(
+                "session {}: {}, about {}\n",
+                b.session,
+                count(b.pulls, "pull"),
+                duration(60.0 * b.minutes)
+            )
+        })
+        .collect();
     let about = format!(
-        "{hours} of the robot's time, pauses included.\n\
+        "{hours} of the robot's time, pauses included.\n{by_block}\
          Made by `gripgen campaign`, seed {}: settings in random order, each twice; one reference grip throughout.\n\
          Keys are described in docs/format.md. Run it with `gripgen rig pull`.",
         args.seed
     );
     let text = separating.unwrap_or_else(|| campaign_toml(&campaign, &about));
     outputs.write(&args.out, text.as_bytes())?;
+    if let Some(csv) = &args.csv {
+        outputs.write(csv, &table_csv(&campaign))?;
+    }
     let simulated = match &args.simulate {
         Some(folder) => {
             let made = simulate_campaign(&at, &args.set, &campaign, args.seed).map_err(Failure::usage)?;
@@ -73,11 +91,18 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
             "pulls": pulls_of(&campaign),
             "no_load": campaign.pulls.len() as u64 - pulls_of(&campaign),
             "minutes": (minutes * 10.0).round() / 10.0,
+            "blocks": blocks.iter().map(|b| json!({
+                "session": b.session, "pulls": b.pulls, "minutes": (b.minutes * 10.0).round() / 10.0,
+            })).collect::<Vec<_>>(),
+            "csv": args.csv,
             "simulated": simulated,
         }))?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!("{hours}\n{}\n", args.out.display()))?;
+        print(&format!("{hours}\n{by_block}{}\n", args.out.display()))?;
+        if let Some(csv) = &args.csv {
+            print(&format!("{}\n", csv.display()))?;
+        }
         if let Some(folder) = simulated {
             print(&format!("{}\n", folder.display()))?;
             eprintln!("next: {}", diagnosis_of(args, folder));
@@ -105,9 +130,9 @@ fn diagnosis_of(args: &CampaignArgs, folder: &Path) -> String {
 }
 
 /// The pulls that separate what a diagnosis of `measured` leaves tied, and the hash of these measurements.
-fn separating(args: &CampaignArgs, measured: &Path, twin: &Twin) -> Result<(NextPulls, String), Failure> {
-    let library = load_library(twin, &args.twin)?;
-    let diagnosed = diagnose_folders(&[measured], twin, &library, &[], Suspects::Screen, &args.talk)?;
+fn separating(args: &CampaignArgs, measured: &Path, rig: &str) -> Result<(NextPulls, String), Failure> {
+    let twin = TwinOfPulls { path: &args.twin, sets: &args.set, rig: Some(rig) };
+    let diagnosed = diagnose_folders(&[measured], &twin, &[], Suspects::Screen, &args.talk)?;
     let next = diagnosed.next.ok_or_else(|| {
         let found =
             format!("--separate: {} leaves nothing tied that pulls could separate", measured.display());
@@ -153,4 +178,76 @@ fn fitted_range_n(twin: &Twin, parts: &[String]) -> (f64, f64) {
 
 fn pulls_of(campaign: &Campaign) -> u64 {
     campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).count() as u64
+}
+
+/// A session of a campaign.
+struct Block {
+    session: String,
+    pulls: u64,
+    minutes: f64,
+}
+
+/// The sessions of a campaign in their order, and how long each keeps the robot busy, the pause before it included.
+fn blocks(campaign: &Campaign) -> Vec<Block> {
+    let mut blocks: Vec<Block> = Vec::new();
+    for pull in &campaign.pulls {
+        if blocks.last().is_none_or(|block| block.session != pull.session) {
+            blocks.push(Block { session: pull.session.clone(), pulls: 0, minutes: 0.0 });
+        }
+        if let Some(block) = blocks.last_mut() {
+            block.pulls += u64::from(pull.kind == PullKind::Pull);
+            block.minutes += pull.estimated_s(campaign.label_tolerance_n) / 60.0;
+        }
+    }
+    blocks
+}
+
+/// Columns that somebody fills in at the rig.
+const BY_HAND: [&str; 4] = ["time_s", "temperature_c", "max_pull_force_n", "status"];
+
+/// The pulls as a table to print and fill in: once the empty cells are filled it is a `pulls.csv`.
+fn table_csv(campaign: &Campaign) -> Vec<u8> {
+    let planned = |column: &&Column| {
+        let absent = BY_HAND.contains(&column.name) || column.name == "pull_index";
+        column.is_covariate() && !absent
+    };
+    let columns: Vec<&Column> = COLUMNS.iter().filter(planned).collect();
+    let names = columns.iter().map(|column| column.name);
+    let mut rows: Vec<Vec<String>> =
+        vec![["pull_id"].into_iter().chain(names).chain(BY_HAND).map(String::from).collect()];
+    let pulls = campaign.pulls.iter().filter(|pull| pull.kind == PullKind::Pull);
+    for (pull, number) in pulls.zip(1..) {
+        let covariates = pull.covariates();
+        let mut cells = vec![format!("p{number:04}")];
+        cells.extend(columns.iter().map(|column| column.cell(pull.view(&covariates)).into_owned()));
+        cells.extend(BY_HAND.map(|_| String::new()));
+        rows.push(cells);
+    }
+    csv_lines(&rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is printed, filled in and saved is a table of measured pulls.
+    #[test]
+    fn a_table_that_was_filled_in_is_read_as_measured_pulls() {
+        let options = CampaignOptions { parts: vec!["gear".into()], pulls: 24, ..CampaignOptions::default() };
+        let campaign = plan_campaign(&options).unwrap();
+        let text = String::from_utf8(table_csv(&campaign)).unwrap();
+        assert!(text.starts_with("pull_id,part,gel_id,session,grip_force_n,"), "{text}");
+        assert_eq!(text.lines().count(), 25);
+        // Somebody writes temperature and label into each row.
+        let filled = text.replace(",,,,", ",,21.5,6.25,");
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("pulls.csv"), filled).unwrap();
+        let read = gripgen_measured::read_pull_folder(folder.path()).unwrap();
+        assert_eq!(read.pulls.len(), 24);
+        assert!(read.pulls.iter().all(|p| p.max_pull_force_n == 6.25 && p.covariates.temperature_c == 21.5));
+        let blocks = blocks(&campaign);
+        assert_eq!(blocks.iter().map(|b| b.pulls).sum::<u64>(), 24);
+        let minutes: f64 = blocks.iter().map(|b| b.minutes).sum();
+        assert!((minutes - campaign.estimated_minutes()).abs() < 1e-9);
+    }
 }

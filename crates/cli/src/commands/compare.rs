@@ -4,8 +4,8 @@ use crate::args::CompareArgs;
 use crate::commands::imprints;
 use crate::failure::Failure;
 use crate::load::{
-    drop_doubtful_rest, folders, jobs, load_library, load_sensor_and_presses, load_twin, no_pulls,
-    say_circles, say_warnings, suspects, there_is,
+    TwinOfPulls, drop_doubtful_rest, folders, jobs, load_library, load_sensor_and_presses, load_twin,
+    no_pulls, say_circles, say_warnings, suspects, there_is,
 };
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
@@ -115,14 +115,15 @@ fn sensor_table(args: &CompareArgs, sink: JsonSink) -> Result<u8, Failure> {
 /// A twin against measured pulls.
 fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8, Failure> {
     let measured = folders(&args.measured, &args.also);
-    let twin = load_twin(&args.twin, &[])?;
     let suspects = suspects(args.include_suspect);
     let mut loaded = load_pulls_with(&measured, suspects).map_err(|e| no_pulls(&measured, &e))?;
+    let (twin, library, own) =
+        TwinOfPulls { path: &args.twin, sets: &[], rig: None }.for_pulls(&mut loaded)?;
     loaded.warnings.extend(unmeasured(&twin, &loaded.pulls));
     say_warnings(&loaded, &args.talk);
-    let library = load_library(&twin, &args.twin)?;
     let twin_at = Location::parse(&args.twin);
-    let draws = posterior_twins(&twin_at, &load_twin_document(&twin_at, &[])?).map_err(Failure::from)?;
+    let draws =
+        posterior_twins(&twin_at, &load_twin_document(&twin_at, &own.sets)?).map_err(Failure::from)?;
     let found = compare_pulls_with(&loaded.pulls, &twin, &draws, &library, jobs())
         .map_err(|e| Failure::usage(e).hint("name a twin that has this part with --twin"))?;
     let images =
@@ -158,8 +159,14 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
             .into();
         pulls["n_outside_fit"] = json!(found.outside_fit);
         pulls["coverage90"] = json!(found.coverage90);
+        if !loaded.missing.counts().is_empty() {
+            pulls["missing_cells"] = json!(loaded.missing.counts());
+        }
         let traces = json!({"n": found.traces.0, "rmse_n": found.traces.1});
         let mut document = json!({"schema": "gripgen.comparison/1", "pulls": pulls, "traces": traces});
+        if !own.notes.is_empty() {
+            document["notes"] = json!(own.notes);
+        }
         document["coverage90"] = json!(found.coverage90);
         if let Some(images) = images_json(&images) {
             document["images"] = images;
@@ -189,7 +196,7 @@ fn pulls(args: &CompareArgs, outputs: &Outputs, mut sink: JsonSink) -> Result<u8
         print(&text)?;
     }
     if !args.talk.quiet {
-        loaded.notes.iter().chain(&images.notes).for_each(|note| eprintln!("note: {note}"));
+        own.notes.iter().chain(&loaded.notes).chain(&images.notes).for_each(|note| eprintln!("note: {note}"));
         if found.outside_fit > 0 {
             eprintln!(
                 "note: {} pulls lie outside the grip forces on which an effect was fitted",

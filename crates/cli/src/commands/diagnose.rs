@@ -9,18 +9,14 @@ use crate::Diagnosed;
 use crate::args::{DiagnoseArgs, TalkArgs};
 use crate::commands::imprints;
 use crate::failure::Failure;
-use crate::load::{
-    folders, jobs, load_library, load_pulls_to_fit, load_twin, suspects, there_is, within_rig,
-};
+use crate::load::{TwinOfPulls, folders, jobs, load_pulls_to_fit, suspects, there_is};
 use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use crate::progress::Share;
 use crate::{
-    PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, is_imprint_set, is_press_set,
-    is_sensor_table, load_sensor_table,
+    PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, effects_of_geometry, is_imprint_set,
+    is_press_set, is_sensor_table, load_sensor_table,
 };
-use gripgen::Library;
-use gripgen::twin::Twin;
 use gripgen::twin::effects::LIBRARY;
 use gripgen_measured::Suspects;
 use std::path::Path;
@@ -56,7 +52,6 @@ fn sensor(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
 }
 
 fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
-    let twin = within_rig(load_twin(&args.twin, &args.set)?, args.rig.as_deref())?;
     let known = |id: &String| LIBRARY.iter().any(|spec| spec.id == id);
     if let Some(id) = args.without.iter().find(|id| !known(id)) {
         let ids: Vec<&str> = LIBRARY.iter().map(|spec| spec.id).collect();
@@ -64,27 +59,33 @@ fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
             .hint(format!("the effects: {}", ids.join(", "))));
     }
     let without: Vec<&str> = args.without.iter().map(String::as_str).collect();
-    let library = load_library(&twin, &args.twin)?;
-    let suspects = suspects(args.include_suspect);
+    let twin = TwinOfPulls { path: &args.twin, sets: &args.set, rig: args.rig.as_deref() };
     let measured = folders(&args.measured, &args.also);
-    diagnose_folders(&measured, &twin, &library, &without, suspects, &args.talk)
+    diagnose_folders(&measured, &twin, &without, suspects(args.include_suspect), &args.talk)
 }
 
 /// Diagnoses the pulls of folders, with progress.
 pub fn diagnose_folders(
     measured: &[&Path],
-    twin: &Twin,
-    library: &Library,
+    twin: &TwinOfPulls<'_>,
     without: &[&str],
     suspects: Suspects,
     talk: &TalkArgs,
 ) -> Result<Diagnosed, Failure> {
-    let loaded = load_pulls_to_fit(measured, suspects, talk, true)?;
-    let options = PullDiagnoseOptions { jobs: jobs(), without };
+    let mut loaded = load_pulls_to_fit(measured, suspects, talk, true)?;
+    let (twin, library, own) = twin.for_pulls(&mut loaded)?;
+    if !talk.quiet {
+        loaded.missing.notes().for_each(|note| eprintln!("note: {note}"));
+    }
+    let without = [without, &effects_of_geometry(&loaded.pulls, &twin)].concat();
+    let options = PullDiagnoseOptions { jobs: jobs(), without: &without };
     let share = Share::start("diagnosing", talk);
-    let diagnosed = diagnose_pull_table(&loaded.pulls, twin, library, &options, &|x| share.at(x));
+    let diagnosed = diagnose_pull_table(&loaded.pulls, &twin, &library, &options, &|x| share.at(x));
     share.finish();
     let mut diagnosed = diagnosed.map_err(|e| Failure::usage(&e).hint(e.hint()))?;
+    diagnosed.sets = own.sets;
+    diagnosed.diagnosis.data.missing_cells = loaded.missing.counts();
+    own.notes.into_iter().for_each(|note| diagnosed.diagnosis.decides(note));
     diagnosed.diagnosis.notes.extend(loaded.notes.into_iter().chain(loaded.warnings));
     Ok(diagnosed)
 }

@@ -10,6 +10,7 @@ use super::fitting::Fitted;
 use super::heldout::{HeldOutScore, by_value, folds, held_out_score, noise_floor_n, predicted, scatter};
 use super::instead::tied_instead;
 use super::naming::named;
+use super::not_described::not_described;
 use super::one_level::of_one_level;
 use super::paying::{by_chance, paying};
 use super::posterior::of_diagnosis;
@@ -264,6 +265,10 @@ pub fn diagnose_pulls(
             by: ErrorsBy { levels: by(by_value(&force)), sessions: by(by_value(&session)) },
         }
     });
+    let rmse_n = diagnosis.error.as_ref().and_then(|error| error.after.rmse_n);
+    if let Some(beyond) = rmse_n.and_then(|rmse_n| not_described(&data, &counted, rmse_n)) {
+        diagnosis.is_not_described(beyond.to_string());
+    }
     if let Some(note) = of_one_level(&diagnosis, &after_context, &after) {
         diagnosis.decides(note);
     }

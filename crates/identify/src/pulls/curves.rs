@@ -51,6 +51,11 @@ impl Curve {
         }
     }
 
+    /// The columns that it is in.
+    pub(super) fn columns(&self) -> impl Iterator<Item = &str> {
+        self.name.split('*')
+    }
+
     /// Number of coefficients.
     pub fn len(&self) -> usize {
         self.basis.first().map_or(0, Vec::len)

@@ -1,5 +1,6 @@
 //! A campaign as numbers.
 
+use super::curves::Curve;
 use super::levels::levels;
 use gripgen_twin::columns::covariates;
 use gripgen_twin::values::distinct;
@@ -11,7 +12,7 @@ use std::collections::BTreeMap;
 pub enum Column {
     /// Numbers, all finite.
     Number(Vec<f64>),
-    /// Words, as positions in a sorted list of them.
+    /// Words, as positions in a sorted list of them; behind its end where nobody wrote one down.
     Word(Vec<usize>, Vec<String>),
 }
 
@@ -22,10 +23,22 @@ impl From<Values> for Column {
             Values::Numbers(x) => Column::Number(x),
             Values::Words(words) => {
                 let (at, names) = Values::coded(&words);
-                Column::Word(at, names)
+                // The empty word is the first of all, and no word.
+                match names.split_first() {
+                    Some((first, names)) if first.is_empty() => {
+                        let at = at.into_iter().map(|i| i.checked_sub(1).unwrap_or(names.len()));
+                        Column::Word(at.collect(), names.to_vec())
+                    }
+                    _ => Column::Word(at, names),
+                }
             }
         }
     }
+}
+
+/// Rows that have no value.
+fn missing(values: &Values) -> Vec<usize> {
+    (0..values.len()).filter(|&row| values.at(row).is_none()).collect()
 }
 
 impl Column {
@@ -51,6 +64,8 @@ pub struct PullData<'a> {
     pub label_n: Vec<f64>,
     /// Columns that were written down, by name, in a fixed order; dwells as the levels that were meant (`levels.rs`).
     pub columns: BTreeMap<String, Column>,
+    /// Rows of a column in which nobody wrote a value down, of those columns that have such rows.
+    pub missing: BTreeMap<String, Vec<usize>>,
     /// Session of each pull, as a position.
     pub session_of: Vec<usize>,
     /// Pulls of one configuration share a number.
@@ -72,16 +87,22 @@ impl<'a> PullData<'a> {
     pub fn new(measured: &'a MeasuredPulls) -> Self {
         let pulls = &measured.pulls;
         let mut columns = BTreeMap::new();
+        let mut gaps = BTreeMap::new();
+        let mut add = |name: &str, values: Values| {
+            gaps.insert(name.to_string(), missing(&values));
+            columns.insert(name.to_string(), values.into());
+        };
         for column in covariates().filter(|c| measured.recorded.iter().any(|name| name == c.name)) {
-            columns.insert(column.name.into(), column.values(pulls).into());
+            add(column.name, column.values(pulls));
         }
+        for extra in &measured.extra {
+            add(&extra.name, extra.values.clone());
+        }
+        gaps.retain(|_, rows| !rows.is_empty());
         let mut dwell_s: Vec<f64> = pulls.iter().map(|p| p.covariates.dwell_s).collect();
         if let Some(Column::Number(carried_out)) = columns.get_mut("dwell_s") {
             *carried_out = levels(carried_out);
             dwell_s.clone_from(carried_out);
-        }
-        for extra in &measured.extra {
-            columns.insert(extra.name.clone(), extra.values.clone().into());
         }
         let (part_of, parts) = Values::coded(&pulls.iter().map(|p| p.part.clone()).collect::<Vec<_>>());
         let session_of = numbered(pulls.iter().map(|p| p.covariates.session.clone()));
@@ -105,6 +126,7 @@ impl<'a> PullData<'a> {
             part_of,
             label_n: pulls.iter().map(|p| p.max_pull_force_n).collect(),
             columns,
+            missing: gaps,
             session_of,
             group_of,
         }
@@ -123,6 +145,14 @@ impl<'a> PullData<'a> {
     /// Whether a column was written down and varies.
     pub fn varies(&self, name: &str) -> bool {
         self.columns.get(name).is_some_and(|c| c.distinct() > 1)
+    }
+
+    /// Takes out of a curve in a column, or in two of them, what it says of pulls without a value there.
+    pub(super) fn silence(&self, curve: &mut Curve) {
+        let missing: Vec<&Vec<usize>> = curve.columns().filter_map(|name| self.missing.get(name)).collect();
+        for row in missing.into_iter().flatten() {
+            curve.basis[*row].fill(0.0);
+        }
     }
 
     /// Numbers of a column, words as their positions.

@@ -157,6 +157,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
+        curves.iter_mut().for_each(|curve| data.silence(curve));
         Self { context, candidates, curves, rows: (0..n).collect(), written: Written::default() }
     }
 

@@ -4,6 +4,7 @@ use super::left_out::LeftOut;
 use super::suspects::{self, Suspects};
 use super::traces::{fewer_traces, thinned};
 use super::{LoadPullsError, LoadedPulls, zero};
+use crate::pulls::{MissingCells, SAY_NOTHING};
 use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_record::{
     RIG_SOURCE, RigCampaign, RunFolder, ShardReader, rig_campaign, sample_covariates, sha256_hex,
@@ -79,7 +80,13 @@ pub(super) fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, L
     notes.extend(zero::without_shift(&mut pulls));
     fewer_traces(&mut pulls.pulls, &mut notes);
     // A sweep and a rig write newtons.
-    Ok(LoadedPulls { pulls, notes, warnings: Vec::new(), implausible: None })
+    let mut missing = MissingCells::default();
+    for column in &pulls.extra {
+        let empty = (0..pulls.pulls.len()).filter(|&i| column.values.at(i).is_none()).count();
+        missing.add(&column.name, empty, SAY_NOTHING);
+    }
+    notes.extend(missing.notes());
+    Ok(LoadedPulls { pulls, notes, warnings: Vec::new(), implausible: None, missing })
 }
 
 /// A temperature that was not measured in all pulls is used in none: those without it would have that of a table without the column.

@@ -32,6 +32,7 @@ pub(super) fn standing_of(sample: &Sample, trace: Option<&PullTrace>) -> Standin
         reason: sample.status_reason.clone(),
         behind: recorded_behind(&sample.status_reason),
         judged: trace.is_some(),
+        lacks_value: false,
     }
 }
 
@@ -77,7 +78,13 @@ mod tests {
 
     #[test]
     fn suspects_are_taken_where_they_are_asked_for_or_are_the_rig() {
-        let stands = |status, behind| Standing { status, reason: "because".into(), behind, judged: true };
+        let stands = |status, behind| Standing {
+            status,
+            reason: "because".into(),
+            behind,
+            judged: true,
+            lacks_value: false,
+        };
         let of_three = |rig: usize, contact: usize, pull: usize, fine: usize| -> Vec<Standing> {
             let many = [(rig, Behind::Rig), (contact, Behind::Contact), (pull, Behind::Pull)];
             let suspect = many.into_iter().flat_map(|(n, behind)| vec![stands(Status::Suspect, behind); n]);

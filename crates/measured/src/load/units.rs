@@ -11,8 +11,8 @@ pub struct ImplausibleLabels {
     pub problem: String,
     /// What may be behind it, and what is wanted.
     pub hint: String,
-    /// Whether it is their sign, and not their unit.
-    pub sign: bool,
+    /// Whether a diagnosis cannot answer either: it is their sign, or a staircase of many minutes.
+    pub unanswerable: bool,
 }
 
 /// Labels over twice the grip force that gels and parts mostly have; 0.06 is an oily part.
@@ -43,6 +43,11 @@ const UNITS: [(&str, f64); 10] = [
 const OFF_N: f64 = 1.0;
 const OFF_SHARE: f64 = 0.05;
 
+/// Longest pull that the mechanics predict (`gripgen_physics`): a label beyond it is never reached.
+const LONGEST_S: f64 = 120.0;
+/// Steps over labels that no staircase has: a label is read on a step that the jaws held, within the tolerance of a few newtons.
+const HIGHEST_STEP: f64 = 10.0;
+
 /// How much longer or shorter than its staircase a trace may be.
 const LONGER: f64 = 100.0;
 /// Times between readings.
@@ -68,11 +73,18 @@ pub(super) fn implausible(path: &Path, pulls: &[MeasuredPull]) -> Option<Implaus
                 "`max_pull_force_n` is a magnitude along the pull, whatever `pull_direction` says: write {}",
                 -label_n
             ),
-            sign: true,
+            unanswerable: true,
         });
     }
     let (low, high) = POSSIBLE_LABEL_RATIO;
-    let ratio = above_zero(pulls).filter(|ratio| !(low..=high).contains(ratio))?;
+    let Some(ratio) = above_zero(pulls).filter(|ratio| !(low..=high).contains(ratio)) else {
+        return endless(pulls).map(|problem| ImplausibleLabels {
+            problem: format!("{path}: {problem}"),
+            hint: "`step_time_s` is in seconds, `force_increment_n` in newtons: write 0.104 for 104 ms"
+                .into(),
+            unanswerable: true,
+        });
+    };
     let first = pulls.iter().find(|p| p.max_pull_force_n > 0.0)?;
     Some(ImplausibleLabels {
         problem: format!(
@@ -87,8 +99,39 @@ pub(super) fn implausible(path: &Path, pulls: &[MeasuredPull]) -> Option<Implaus
             "millinewtons? grams? forces are newtons, grip forces those of one jaw{}",
             units(ratio)
         ),
-        sign: false,
+        unanswerable: false,
     })
+}
+
+/// Staircases that take longer than a pull is predicted.
+fn endless(pulls: &[MeasuredPull]) -> Option<String> {
+    let lasts_s = |p: &MeasuredPull| p.max_pull_force_n / p.increment_n * p.step_s;
+    let median_s = median(pulls.iter().map(lasts_s).collect())?;
+    let first = pulls.iter().find(|p| lasts_s(p) > LONGEST_S).filter(|_| median_s > LONGEST_S)?;
+    Some(format!(
+        "pulls take {} s by their staircase in the median, and are predicted for {LONGEST_S} s at most: pull {} reaches {} N in steps of {} N \
+         of {} s each (of {} s, were they milliseconds)",
+        rounded(median_s, &[]),
+        first.id,
+        first.max_pull_force_n,
+        first.increment_n,
+        first.step_s,
+        rounded(1e-3 * first.step_s, &[])
+    ))
+}
+
+/// Steps that are higher than what they lead to.
+fn high_steps(pulls: &[MeasuredPull]) -> Option<String> {
+    let steps = median(pulls.iter().map(|p| p.max_pull_force_n / p.increment_n).collect())?;
+    let above_zero = pulls.iter().any(|p| p.max_pull_force_n > 0.0);
+    let first = pulls.iter().find(|_| above_zero && steps < 1.0 / HIGHEST_STEP)?;
+    Some(format!(
+        "steps of the staircase are {} times as high as the labels in the median (pull {}: {} N and {} N): is `force_increment_n` in newtons?",
+        rounded(1.0 / steps.max(1e-9), &[]),
+        first.id,
+        first.increment_n,
+        first.max_pull_force_n
+    ))
 }
 
 /// What is to be looked at again.
@@ -105,7 +148,8 @@ pub(super) fn warnings(path: &Path, pulls: &[MeasuredPull]) -> Vec<String> {
         )
     });
     let traces: Vec<Seen> = pulls.iter().filter_map(seen).collect();
-    let found = of_labels.into_iter().chain(times(&traces)).chain(displacements(&traces));
+    let found =
+        of_labels.into_iter().chain(high_steps(pulls)).chain(times(&traces)).chain(displacements(&traces));
     found.map(|said| format!("{}: {said}", path.display())).collect()
 }
 
@@ -273,6 +317,25 @@ mod tests {
         assert!(signed.contains("1 of 9 labels are below 0: pull 4 has -8 N"), "{signed}");
     }
 
+    /// Labels alone, in steps of other units.
+    fn stairs(height: f64, length: f64) -> Vec<MeasuredPull> {
+        let mut all = pulls(1.0, 1.0, 1.0, 1.0);
+        for pull in &mut all {
+            pull.trace = None;
+            (pull.increment_n, pull.step_s) = (height * pull.increment_n, length * pull.step_s);
+        }
+        all
+    }
+
+    /// 8 N in steps of 1 N each 100 ms: of 100 s each they are 13 minutes, of 5 s a slow pull.
+    #[test]
+    fn a_staircase_of_many_minutes_is_refused_by_all() {
+        let found = implausible(Path::new("lab"), &stairs(1.0, 1e3)).unwrap();
+        assert!(found.unanswerable && found.problem.contains("pulls take 800 s"), "{found}");
+        assert!(found.problem.contains("steps of 1 N of 100 s each (of 0.1 s, were they"), "{found}");
+        assert_eq!(implausible(Path::new("lab"), &stairs(1.0, 50.0)), None);
+    }
+
     #[test]
     fn odd_units_are_named() {
         for (given, says) in [
@@ -283,6 +346,7 @@ mod tests {
             (pulls(1.0, 1.0, 1e-3, 1.0), "`step_time_s` in milliseconds?"),
             (pulls(1.0, 1.0, 1.0, 1e3), "reach 5000 mm (200 mm are plausible; median of 9)"),
             (pulls(1.0, 1.0, 1.0, 1e-3), "is `displacement_mm` in metres?"),
+            (stairs(1e3, 1.0), "is `force_increment_n` in newtons?"),
         ] {
             assert_eq!(implausible(Path::new("lab"), &given), None);
             let said = warnings(Path::new("lab"), &given);

@@ -1,16 +1,18 @@
 //! What each column of a pull table means.
 
-use crate::table::{TableError, TableReader, TextCells, number};
+use super::clock::Clock;
+use crate::table::{Row, TableError, TableReader, TextCells};
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_twin::MeasuredPull;
 use gripgen_twin::columns::{COLUMNS, Column as PullColumn, InTable};
-use std::borrow::Cow;
 
 /// Length of a step where nobody wrote it down: the mean of Wucherer et al. 2023.
 pub(super) const DEFAULT_STEP_S: f64 = 0.104;
 
 const ID: &str = "pull_id";
 pub(super) const LABEL: &str = "max_pull_force_n";
+const STATUS: &str = "status";
+const REASON: &str = "status_reason";
 
 /// A column of the table.
 pub(super) struct Column {
@@ -18,7 +20,17 @@ pub(super) struct Column {
     pub(super) cells: Cells,
     /// Cells that are not empty.
     pub(super) filled: usize,
+    /// Rows whose cell is empty.
+    pub(super) missing: Vec<usize>,
+    /// Clock times of a column of seconds, with their rows and lines.
+    pub(super) clocks: Vec<(usize, u64, Clock)>,
 }
+
+/// The column that clock times may stand in.
+pub(super) const CLOCK: &str = "time_s";
+
+/// Columns of a table that are none of a pull.
+const BESIDE: [&str; 4] = [ID, LABEL, STATUS, REASON];
 
 /// Where a column's cells go.
 pub(super) enum Cells {
@@ -39,40 +51,49 @@ pub(super) enum Cells {
 }
 
 impl Column {
-    /// Takes the next cell; otherwise what it must be.
-    pub(super) fn take(&mut self, cell: &str, pull: &mut MeasuredPull) -> Result<(), Cow<'static, str>> {
-        self.filled += usize::from(!cell.is_empty());
-        match &mut self.cells {
-            Cells::Known(column) if cell.is_empty() && column.in_table != InTable::Required => Ok(()),
-            Cells::Known(column) => column.read_cell(cell, &mut pull.edit()),
-            Cells::Id => {
-                file_name(cell)?;
-                pull.id = cell.into();
-                Ok(())
-            }
-            // A sensor that is off may read less than nothing. A pull that failed has none, which its status decides.
-            Cells::Label if cell.is_empty() => {
-                pull.max_pull_force_n = f64::NAN;
-                Ok(())
-            }
-            Cells::Label => {
-                pull.max_pull_force_n = number(cell).ok_or("a number")?;
-                Ok(())
-            }
-            Cells::Extra(cells) => {
-                cells.push(cell);
-                Ok(())
-            }
-            Cells::Status(found) => {
-                found.push(status(cell)?);
-                Ok(())
-            }
-            Cells::Reason(reasons) => {
-                reasons.push(cell.into());
-                Ok(())
-            }
-            Cells::Unnamed => Ok(()),
+    /// Takes the cell of row `at` of the table.
+    pub(super) fn take(
+        &mut self,
+        row: &Row<'_>,
+        (place, at): (usize, usize),
+        pull: &mut MeasuredPull,
+    ) -> Result<(), TableError> {
+        let cell = row.cell(place);
+        match cell.is_empty() {
+            true => self.missing.push(at),
+            false => self.filled += 1,
         }
+        match &mut self.cells {
+            Cells::Id => {
+                file_name(cell).map_err(|wanted| row.bad(place, wanted))?;
+                pull.id = cell.into();
+            }
+            // What is missing is seen to when the whole column is known.
+            Cells::Known(_) if cell.is_empty() => {}
+            Cells::Label if cell.is_empty() => pull.max_pull_force_n = f64::NAN,
+            Cells::Known(column) if column.holds_words() => column.set_word(&mut pull.edit(), cell),
+            Cells::Known(column) => {
+                let number = row.plain(place)?;
+                let clock = if column.name == CLOCK { Clock::of(&number) } else { None };
+                match (column.read_cell(&number, &mut pull.edit()), clock) {
+                    (Err(_), Some(clock)) => self.clocks.push((at, row.line, clock)),
+                    (read, _) => read.map_err(|wanted| row.bad(place, wanted))?,
+                }
+            }
+            // A sensor that is off may read less than nothing.
+            Cells::Label => pull.max_pull_force_n = row.number(place, "a number")?,
+            Cells::Extra(cells) => cells.push(&row.plain(place)?),
+            Cells::Status(found) => found.push(status(cell).map_err(|wanted| row.bad(place, wanted))?),
+            Cells::Reason(reasons) => reasons.push(cell.into()),
+            Cells::Unnamed => {}
+        }
+        Ok(())
+    }
+
+    /// Whether no pull can be used without it.
+    pub(super) fn is_required(&self) -> bool {
+        matches!(self.cells, Cells::Label)
+            || matches!(self.cells, Cells::Known(column) if column.in_table == InTable::Required)
     }
 
     /// Its name, if it is a covariate of known meaning that somebody wrote down.
@@ -89,10 +110,18 @@ fn required() -> impl Iterator<Item = &'static str> {
 }
 
 /// The columns of a header; those that are required have to be there.
-pub(super) fn columns(table: &TableReader<'_>) -> Result<Vec<Column>, TableError> {
+pub(super) fn columns(table: &mut TableReader<'_>) -> Result<Vec<Column>, TableError> {
+    let of_pulls = COLUMNS.iter().filter(|c| c.in_table != InTable::Absent).map(|c| c.name);
+    table.spell(&of_pulls.chain(BESIDE).collect::<Vec<_>>());
     required().try_for_each(|name| table.required(name).map(|_| ()))?;
     table.check_single()?;
-    let column = |name: &String| Column { name: name.clone(), cells: cells(name), filled: 0 };
+    let column = |name: &String| Column {
+        name: name.clone(),
+        cells: cells(name),
+        filled: 0,
+        missing: Vec::new(),
+        clocks: Vec::new(),
+    };
     Ok(table.names().iter().map(column).collect())
 }
 
@@ -103,15 +132,15 @@ fn cells(name: &str) -> Cells {
         ("", _) => Cells::Unnamed,
         (ID, _) => Cells::Id,
         (LABEL, _) => Cells::Label,
-        ("status", _) => Cells::Status(Vec::new()),
-        ("status_reason", _) => Cells::Reason(Vec::new()),
+        (STATUS, _) => Cells::Status(Vec::new()),
+        (REASON, _) => Cells::Reason(Vec::new()),
         _ => Cells::Extra(TextCells::default()),
     }
 }
 
 /// The status of a name, `slipped` where nobody wrote one down.
 fn status(cell: &str) -> Result<Status, &'static str> {
-    match cell {
+    match cell.to_lowercase().as_str() {
         "" | "slipped" => Ok(Status::Slipped),
         "censored" => Ok(Status::Censored),
         "no_contact" => Ok(Status::NoContact),

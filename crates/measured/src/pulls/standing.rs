@@ -1,6 +1,7 @@
 //! How measured pulls stand: what their table says, and what their traces say of their labels.
 
-use super::cells::{Cells, Column};
+use super::cells::{Cells, Column, LABEL};
+use super::gaps::MissingCells;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_twin::label::check::{Behind, Expected, LabelEvidence, Verdict, check_label};
 use gripgen_twin::{MeasuredPull, MeasuredPulls, slip_label};
@@ -17,6 +18,8 @@ pub struct JudgedPulls {
     pub standing: Vec<Standing>,
     /// Their traces hold every reading of the sensor.
     pub every_reading: bool,
+    /// Cells that are missing, by column.
+    pub missing: MissingCells,
     /// What was not read and may be misspelt, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -32,10 +35,12 @@ pub struct Standing {
     pub behind: Behind,
     /// Its label was compared with evidence.
     pub judged: bool,
+    /// It failed because its part, its grip force or its label is missing.
+    pub lacks_value: bool,
 }
 
-/// What the table says. A pull that slipped, held or is suspect has a label: the error is the row of one that has none.
-pub(super) fn stated(columns: &[Column], pulls: &mut [MeasuredPull]) -> Result<Vec<Standing>, usize> {
+/// What the table says. A pull that slipped, held or is suspect has a part, a grip force and a label: one that lacks them failed.
+pub(super) fn stated(columns: &[Column], pulls: &mut [MeasuredPull]) -> Vec<Standing> {
     let statuses = columns.iter().find_map(|column| match &column.cells {
         Cells::Status(found) => Some(found),
         _ => None,
@@ -44,19 +49,25 @@ pub(super) fn stated(columns: &[Column], pulls: &mut [MeasuredPull]) -> Result<V
         Cells::Reason(found) => Some(found),
         _ => None,
     });
-    let mut standing = Vec::with_capacity(pulls.len());
-    for (row, pull) in pulls.iter_mut().enumerate() {
-        let status = statuses.and_then(|s| s.get(row)).copied().unwrap_or(Status::Slipped);
-        match status {
-            Status::NoContact if pull.max_pull_force_n.is_nan() => pull.max_pull_force_n = 0.0,
-            Status::NoContact | Status::Failed => {}
-            _ if pull.max_pull_force_n.is_nan() => return Err(row),
-            _ => {}
+    let stated = |(row, pull): (usize, &mut MeasuredPull)| {
+        let mut status = statuses.and_then(|s| s.get(row)).copied().unwrap_or(Status::Slipped);
+        let mut reason = reasons.and_then(|r| r.get(row)).cloned().unwrap_or_default();
+        if status == Status::NoContact && pull.max_pull_force_n.is_nan() {
+            pull.max_pull_force_n = 0.0;
         }
-        let reason = reasons.and_then(|r| r.get(row)).cloned().unwrap_or_default();
-        standing.push(Standing { status, reason, behind: Behind::Pull, judged: false });
-    }
-    Ok(standing)
+        let lacks = match () {
+            () if pull.part.is_empty() => Some("part"),
+            () if pull.grip_force_n.is_nan() => Some("grip_force_n"),
+            () if pull.max_pull_force_n.is_nan() => Some(LABEL),
+            () => None,
+        };
+        let lacks = lacks.filter(|_| !matches!(status, Status::NoContact | Status::Failed));
+        if let Some(column) = lacks {
+            (status, reason) = (Status::Failed, format!("its `{column}` is missing"));
+        }
+        Standing { status, reason, behind: Behind::Pull, judged: false, lacks_value: lacks.is_some() }
+    };
+    pulls.iter_mut().enumerate().map(stated).collect()
 }
 
 /// Judges the labels of pulls with a trace; `after_n` are their readings without a load after the pull.
@@ -74,8 +85,13 @@ pub(super) fn judge_labels(measured: &MeasuredPulls, after_n: &[Vec<f64>], stand
         let judgement = check_label(&evidence, &Expected::default());
         standing.judged = judgement.verdict != Verdict::NoEvidence;
         if let Some(reason) = judgement.reason() {
-            *standing =
-                Standing { status: Status::Suspect, reason, behind: judgement.behind(), judged: true };
+            *standing = Standing {
+                status: Status::Suspect,
+                reason,
+                behind: judgement.behind(),
+                judged: true,
+                lacks_value: false,
+            };
         }
     }
 }

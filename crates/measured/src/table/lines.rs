@@ -3,13 +3,15 @@
 /// Counts the lines of a file; one ends at `\n`, `\r\n` or a `\r` alone.
 pub(super) struct Lines<'a> {
     bytes: &'a [u8],
+    /// Where the parser begins.
+    begins: usize,
     counted: usize,
     line: u64,
 }
 
 impl<'a> Lines<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes, counted: 0, line: 1 }
+    pub(super) fn new(bytes: &'a [u8], begins: usize) -> Self {
+        Self { bytes, begins, counted: 0, line: 1 }
     }
 
     /// The line of the row that begins at a byte. For the parser a row begins with what is left of the end of the line before it (the
@@ -34,6 +36,7 @@ impl<'a> Lines<'a> {
 
     /// The same of a place of the parser.
     pub(super) fn of(&mut self, position: Option<&csv::Position>) -> u64 {
-        position.map_or(0, |p| self.at(usize::try_from(p.byte()).unwrap_or(usize::MAX)))
+        let at = |p: &csv::Position| usize::try_from(p.byte()).unwrap_or(usize::MAX);
+        position.map_or(0, |p| self.at(self.begins.saturating_add(at(p))))
     }
 }

@@ -283,6 +283,13 @@ def _read(signals: Signals, marks: Marks, begin: int, end: int) -> _Pull:
     tolerance_n = mapping.campaign.label_tolerance_n
     slid = bool(past.size) if place_m else bool(len(trace) and trace[-1, 1] - trace[-1, 2] > tolerance_n)
     label_n, status, reason = _label(kept, tolerance_n, slid)
+    if status == "censored":
+        # Whoever wonders why a pull has no slip sees how far it went.
+        last = trace[-1]
+        reason = f"the pull ends {last[1] - last[2]:.3f} N below its command, {plain(tolerance_n)} N are a slip"
+        if place_m:
+            farthest = f"its largest displacement is {trace[:, 3].max():.3f} mm"
+            reason = f"the pull ends before the slip: {farthest}, `stop_mm` is {plain(mapping.campaign.stop_mm)} mm"
     after = after[wrench.ns[after] > end]
     return _Pull(
         kept, table(after, none(len(after)), True), place_m is not None, label_n, status, reason, _frames(signals, marks, begin)

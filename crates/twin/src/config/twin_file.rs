@@ -266,7 +266,7 @@ pub struct OpticsFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartFile {
-    /// Mesh file: STL, OBJ, PLY or GLB.
+    /// Mesh file: STL, OBJ, PLY or GLB; `none` for a part of which only labels are known.
     pub mesh: String,
     /// Millimetres per unit of the mesh file.
     #[serde(default = "one")]

@@ -17,6 +17,8 @@ pub struct Diagnosed {
     pub report: ReportData,
     /// The pulls that would tell apart what these could not.
     pub next: Option<NextPulls>,
+    /// Overrides of the twin that make the parts which it lacks.
+    pub sets: Vec<(String, String)>,
     /// Draws of cause and parameters, of pulls.
     pub posterior: Option<Posterior>,
 }
@@ -29,6 +31,6 @@ impl Diagnosed {
             plain += &format!(" {doubt}");
         }
         diagnosis.plain = Some(plain);
-        Self { diagnosis, edits, report, next: None, posterior: None }
+        Self { diagnosis, edits, report, next: None, sets: Vec::new(), posterior: None }
     }
 }

@@ -31,7 +31,11 @@ pub(super) fn diagnose_few_pulls(
         effects: Some(vec![]),
     });
     let pulls = (PULLS_OF_A_PART * parts.len()).max(LEAST_PULLS);
+    let forces = || measured.pulls.iter().map(|pull| pull.grip_force_n);
+    let (least_n, most_n) = (forces().fold(f64::INFINITY, f64::min), forces().fold(0.0, f64::max));
     let options = CampaignOptions {
+        // A range that was measured is one that the gripper has; of one force alone the weaker ones are tried, too.
+        min_force_n: if least_n < most_n { least_n } else { 0.0 },
         parts: parts.to_vec(),
         pulls,
         max_force_n: twin.gripper.max_force_n.min(80.0),

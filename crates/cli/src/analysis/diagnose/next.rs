@@ -178,7 +178,7 @@ fn rival(weight: f64, fitted: &Fitted, labels: &dyn Fn(&PullModel) -> Vec<f64>) 
 
 /// Everything that this rig could do next, and whether it is done after the rest.
 fn grid(measured: &MeasuredPulls, twin: &Twin) -> (Vec<PlannedPull>, Vec<bool>) {
-    let forces_n: Vec<f64> = FORCES_N.into_iter().filter(|f| *f <= twin.gripper.max_force_n).collect();
+    let forces_n = forces_n(measured, twin.gripper.max_force_n);
     let mut parts: Vec<&str> = measured.pulls.iter().map(|p| p.part.as_str()).collect();
     parts.sort_unstable();
     parts.dedup();
@@ -233,6 +233,20 @@ fn grid(measured: &MeasuredPulls, twin: &Twin) -> (Vec<PlannedPull>, Vec<bool>) 
         }
     }
     (planned, after_rest)
+}
+
+/// Grip forces between the weakest that was measured and the strongest of the gripper. Where few of the usual ones lie there, the
+/// ends of what was measured too.
+fn forces_n(measured: &MeasuredPulls, most_n: f64) -> Vec<f64> {
+    let all = || measured.pulls.iter().map(|pull| pull.grip_force_n);
+    let (least_n, strongest_n) = (all().fold(most_n, f64::min), all().fold(0.0, f64::max).min(most_n));
+    let mut forces: Vec<f64> = FORCES_N.into_iter().filter(|f| (least_n..=most_n).contains(f)).collect();
+    if forces.len() < 3 {
+        forces.extend([least_n, strongest_n]);
+        forces.sort_by(f64::total_cmp);
+        forces.dedup();
+    }
+    forces
 }
 
 /// Planned pulls as if they had been made right after the campaign.

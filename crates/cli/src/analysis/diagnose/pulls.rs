@@ -253,10 +253,12 @@ fn table(
             let only = toml::Table::from_iter([(other.clone(), toml::Value::String(word.clone()))]);
             parameters.insert("where".into(), toml::Value::Table(only));
             let Some(Column::Word(at, words)) = data.columns.get(other) else { return None };
-            (0..at.len()).filter(|&i| words[at[i]] == *word).collect()
+            (0..at.len()).filter(|&i| words.get(at[i]) == Some(word)).collect()
         }
         None => (0..data.len()).collect(),
     };
+    let gaps = data.missing.get(name);
+    let own: Vec<usize> = own.into_iter().filter(|i| gaps.is_none_or(|rows| !rows.contains(i))).collect();
     let numbers = |x: Vec<f64>| toml::Value::Array(x.into_iter().map(toml::Value::Float).collect());
     let target = if curve.additive { "offset_n" } else { "factor" };
     match column {
@@ -303,7 +305,9 @@ fn product_table(
     let products: Vec<f64> = x.iter().zip(&y).map(|(x, y)| (x - centre[0]) * (y - centre[1])).collect();
     // The basis is a straight line in the product: two pulls that differ give it.
     let of = |best: fn(f64, f64) -> bool| {
-        (0..products.len()).reduce(|i, j| if best(products[j], products[i]) { j } else { i })
+        let known =
+            |i: &usize| [a, b].iter().all(|name| data.missing.get(*name).is_none_or(|r| !r.contains(i)));
+        (0..products.len()).filter(known).reduce(|i, j| if best(products[j], products[i]) { j } else { i })
     };
     let (low, high) = (of(|a, b| a < b)?, of(|a, b| a > b)?);
     let width = products[high] - products[low];

@@ -32,7 +32,8 @@ pub fn write(
         diagnosed.diagnosis.posterior = Some(PosteriorFile { file, draws: posterior.draws.len() });
     }
     if let Some(out) = &args.out {
-        let text = edited_twin_toml(&Location::parse(&args.twin), &args.set, &diagnosed.edits, out);
+        let sets = [&args.set[..], &diagnosed.sets].concat();
+        let text = edited_twin_toml(&Location::parse(&args.twin), &sets, &diagnosed.edits, out);
         outputs.write_twin(out, &text.map_err(Failure::new)?, diagnosed.posterior.as_ref())?;
     }
     // The twin is there: what its sweep has to vary depends on it.

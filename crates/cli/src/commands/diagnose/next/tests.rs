@@ -19,7 +19,7 @@ fn answered(verdict: Verdict, notes: &[&str]) -> Diagnosed {
         ..Diagnosis::blank(Channel::Pulls, DataSummary { sha256: "ab12".into(), ..Default::default() })
     };
     let (edits, report) = Default::default();
-    Diagnosed { diagnosis, edits, report, next: None, posterior: None }
+    Diagnosed { diagnosis, edits, report, next: None, sets: vec![], posterior: None }
 }
 
 /// Pulls with up to 80 N.
