@@ -4,8 +4,8 @@ use crate::args::CompareArgs;
 use crate::commands::imprints;
 use crate::failure::Failure;
 use crate::load::{
-    TwinOfPulls, drop_doubtful_rest, folders, jobs, load_library, load_sensor_and_presses, load_twin,
-    no_pulls, say_circles, say_warnings, suspects, there_is,
+    TwinOfPulls, drop_doubtful_rest, folders, jobs, load_sensor_and_presses, load_twin, no_pulls,
+    say_circles, say_warnings, suspects, there_is,
 };
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
