@@ -9,10 +9,10 @@ use crate::config::{
     TraceStorage, assign, check_part, get, read_twin_table,
 };
 use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
-use crate::film::FilmPace;
+use crate::image::film::FilmPace;
+use crate::random::sobol;
 use crate::scenario::keys;
 use crate::{CAUSE_KEY, Posterior, PullSettings, Scenario, Twin};
-use crate::random::sobol;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

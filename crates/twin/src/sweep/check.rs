@@ -7,9 +7,9 @@ use crate::config::{
     in_range, is_twin_key, read_vary, suggestion,
 };
 use crate::draw::{Distribution, Drawn, VariedKey};
-use crate::film::FilmPace;
-use crate::scenario::keys::{self, KeyError, drawn_column, pull_keys, scenario_keys};
+use crate::image::film::FilmPace;
 use crate::random::sobol;
+use crate::scenario::keys::{self, KeyError, drawn_column, pull_keys, scenario_keys};
 use crate::{PullSettings, Twin};
 
 impl Sweep {
