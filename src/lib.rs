@@ -75,6 +75,7 @@ pub use sample::{SampleError, SimulateOptions};
 pub use simulator::{Draw, Simulator};
 pub use sweep::differences;
 pub use sweep::{
-    SweepError, SweepEvent, SweepOptions, SweepSummary, encode_filmed, encode_options, guarded, noise_rgb, prepare_run, run_info, sweep,
+    SweepError, SweepEvent, SweepOptions, SweepSummary, encode_filmed, encode_options, guarded, noise_rgb,
+    prepare_run, run_info, sweep,
 };
 pub use version::VERSION;

@@ -1,7 +1,7 @@
 //! The image of any mesh, or of any surface, that is pressed into a sensor.
 
-use gripgen::{Location, ReadFileError};
 use crate::mesh_file::{MeshFileError, read_mesh};
+use gripgen::{Location, ReadFileError};
 use gripgen_tactile::npz::{Array, parse_npy};
 use gripgen_tactile::presses::{
     HeightsError, Indenter, IndenterError, IndenterPose, RenderedBody, render_body, render_heights,
