@@ -103,9 +103,7 @@ impl LibraryError {
     /// What to do about it, where there is something to say.
     pub fn hint(&self) -> Option<&'static str> {
         match self {
-            LibraryError::Mesh { source: MeshError::Extent { .. }, .. } => Some(
-                "scale_mm_per_unit of the part is millimetres per unit of the mesh file: 1000 for metres, 25.4 for inches",
-            ),
+            LibraryError::Mesh { source, .. } => Some(source.hint()),
             LibraryError::Sensor { source: SensorError::Incomplete { .. }, .. } => {
                 Some("give it in the same section of the twin")
             }

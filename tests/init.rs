@@ -159,7 +159,7 @@ fn a_part_without_a_grip_says_why() {
     let folder = tempfile::tempdir().unwrap();
     let hinted = |name, solid| {
         let error = start(&SolidPart { name, solids: vec![solid] }, folder.path()).unwrap_err();
-        let hint = error.hint();
+        let hint = error.hint(OPTIONS.scale_mm_per_unit);
         match error {
             InitError::NoGrip { source, .. } => (source, hint),
             other => panic!("{name}: {other}"),

@@ -238,10 +238,16 @@ fn a_run_can_be_repeated_from_its_folder() {
     };
     assert!(refused("\"gripgen_version\": \"", "\"gripgen_version\": \"9.").contains("gripgen 9."));
     assert!(refused("mu = 0.15", "mu = 0.16").contains("config_toml"));
+    assert_eq!(verify(out.path(), |_| {}).unwrap().faults, [""; 0]);
     let input = std::fs::read_dir(out.path().join("inputs")).unwrap().next().unwrap().unwrap().path();
     std::fs::write(&input, gripgen::assets::get("parts/long_shaft/part.stl").unwrap()).unwrap();
     let error = Project::from_run(&RunFolder::open(out.path()).unwrap()).err().unwrap().to_string();
     assert!(error.contains("inputs/gear-"), "{error}");
+    let faults = verify(out.path(), |_| {}).unwrap().faults;
+    assert!(
+        faults.len() == 1 && faults[0].contains("inputs/gear-") && faults[0].contains("SHA-256"),
+        "{faults:?}"
+    );
 }
 
 /// The index has the columns of a measured pull table, under the same names.

@@ -54,6 +54,8 @@ mod init;
 mod intervals;
 // What the large set can teach.
 mod large;
+// Runs of other versions.
+mod later_version;
 // Measured pulls from every place they may be in.
 mod measured;
 // Two mechanics, one result.
@@ -74,6 +76,8 @@ mod pull;
 mod one_physics;
 // Columns that gripgen does not know, in sweeps.
 mod own_columns;
+// Meshes that were reported.
+mod reported_meshes;
 // What is written is what was simulated.
 mod roundtrip;
 // The wrist sensor against logs of a real arm.

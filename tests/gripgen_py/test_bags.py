@@ -283,7 +283,9 @@ def test_several_pulls_of_a_bag(tmp_path):
     a, b = trace(found.out, "day-1"), trace(found.out, "day-2")
     assert np.abs(a - b).max() < 1e-9 and a[-1, 3] == pytest.approx(5.5)
     found = told('[[pulls]]\npull_id = "a"\nbegin_s = 1\nend_s = 1.9\n[[pulls]]\npull_id = "b"\nbegin_s = 6\n')
-    assert len(trace(found.out, "a")) == 46
+    assert len(trace(found.out, "a")) == 46 and found.notes == ()
+    found = told("[[pulls]]\nbegin_s = 1\nend_s = 1.9\n")
+    assert len(found.notes) == 1 and "the command rises at 6 s too, in no pull" in found.notes[0], found.notes
     for ids, problem in (('"a/b"', "it must be a name without"), ('"x"\n[[pulls]]\npull_id = "x"\nfrom_s = 3', "are both pull `x`")):
         with pytest.raises(gg.ConfigError, match=problem):
             told(f"[[pulls]]\nfrom_s = 0\npull_id = {ids}\n")
@@ -299,6 +301,25 @@ def test_a_folder_of_loose_recordings_is_a_question(known_lab, tmp_path):
     assert [row["pull_id"] for row in table(gg.read_bag(tmp_path).out)] == ["a", "b"]
     (tmp_path / "rosbag.toml").write_text(MAPPING + '[[pulls]]\nbag = "c.mcap"\n')
     with pytest.raises(gg.DataError, match="c.mcap: there is no such bag"):
+        gg.read_bag(tmp_path)
+
+
+def test_recordings_that_are_not_read_are_named(known_lab, tmp_path):
+    for name in ("monday", "tuesday"):
+        shutil.copytree(known_lab / "one", tmp_path / name)
+    shutil.copy(known_lab / "one/one.mcap", tmp_path / "loose.mcap")
+    (tmp_path / "packed.mcap.zstd").write_bytes(b"")
+    (tmp_path / "rosbag.toml").write_text(MAPPING + '[[pulls]]\nbag = "monday"\n')
+    found = gg.read_bag(tmp_path)
+    assert found.pulls == 1 and len(found.notes) == 1
+    assert "loose.mcap, packed.mcap.zstd, tuesday: named by no pull, not read" in found.notes[0]
+    assert gg.read_bag(tmp_path / "monday").notes == (), "one bag was asked for"
+    shutil.copy(known_lab / "one/one.mcap", tmp_path / "monday/one_1.mcap")
+    found = gg.read_bag(tmp_path / "rosbag.toml")
+    assert len(found.notes) == 2 and "monday: one_1.mcap: not in its metadata.yaml, not read" in found.notes[1]
+    # A file that metadata.yaml names and that is not there is an error.
+    (tmp_path / "monday/one.mcap").unlink()
+    with pytest.raises(gg.DataError, match="monday.*one.mcap"):
         gg.read_bag(tmp_path)
 
 

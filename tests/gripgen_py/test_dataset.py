@@ -2,6 +2,7 @@
 
 import io
 import multiprocessing
+import os
 import pickle
 import shutil
 from concurrent.futures import ProcessPoolExecutor
@@ -201,6 +202,16 @@ def test_other_processes_read_the_same(run, method):
     wanted = [first_pixel_sum(ds, ids) for ids in pieces]
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(method)) as pool:
         assert list(pool.map(first_pixel_sum, [ds] * 3, pieces)) == wanted
+
+
+def test_a_dataset_is_found_after_the_folder_was_changed(run, tmp_path, monkeypatch):
+    """Hydra, Ray and launchers change the folder after a relative path was given."""
+    monkeypatch.chdir(run.parent)
+    ds = gg.load(run.name)
+    stored = pickle.dumps(ds)
+    monkeypatch.chdir(tmp_path)
+    assert (ds.batch([15])[0] == gg.load(run).batch([15])[0]).all()
+    assert pickle.loads(stored).labels.tolist() == ds.labels.tolist() and os.path.isabs(ds.path)
 
 
 def test_a_pickle_holds_names_and_numbers_only(run):

@@ -106,3 +106,23 @@ def test_shell_commands_run_in_their_order(desk):
                 command, shell=True, capture_output=True, text=True, check=False, env=os.environ | {"PATH": path}
             )
             assert done.returncode == 0, f"{page}: {command}: {done.stdout}{done.stderr}"
+
+
+@pytest.mark.parametrize("package, extra, use", [
+    ("pandas", "table", "gg.load(run).table()"),
+    ("pyarrow", "table", "gg.load(run).table(to='arrow')"),
+    ("matplotlib", "plot", "gg.Sim(images=False).pull(part='gear', grip_force_n=30.0).plot()"),
+    ("torch", "train", "gg.torch"),
+    ("ray", "ray", "gg.ray"),
+    ("gymnasium", "gym", "import gripgen.envs"),
+    ("fsspec", "remote", "gg.load('memory://bucket/run')"),
+    ("rosbags", "bags", "gg.read_bag(bag)"),
+])
+def test_a_package_that_is_not_there_is_named_with_its_extra(package, extra, use, run, tmp_path):
+    (tmp_path / "rosbag.toml").write_text('[topics]\nwrench = "/wrench"\n[defaults]\npart = "gear"\ngrip_force_n = 40\n')
+    (tmp_path / "a.mcap").write_bytes(b"")
+    setup = f"import sys; sys.modules[{package!r}] = None; run, bag = {str(run)!r}, {str(tmp_path / 'a.mcap')!r}\n"
+    done = subprocess.run([sys.executable, "-c", f"{setup}import gripgen as gg\n{use}"], capture_output=True, text=True, check=False)
+    said = done.stderr.strip().splitlines()
+    assert done.returncode == 1 and f"pip install 'gripgen[{extra}]'" in said[-1], done.stderr
+    assert package in done.stderr

@@ -2,7 +2,11 @@
 
 import json
 import os
+import signal
+import subprocess
+import sys
 import threading
+import time
 
 import pytest
 
@@ -65,6 +69,36 @@ def test_many_pulls_are_single_pulls_whatever_the_threads():
     alone = [sim.pull(**a, seed=1, index=i) for i, a in enumerate(asked)]
     for a, b in zip(together, alone):
         assert a.max_pull_force_n == b.max_pull_force_n and (a.images == b.images).all()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_ctrl_c_keeps_the_pulls_that_were_made():
+    code = (
+        "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "import gripgen as gg\n"
+        "sim = gg.Sim(images=False)\n"
+        "print('begun', flush=True)\n"
+        "try:\n"
+        "    sim.pulls([{'part': 'gear', 'grip_force_n': 30.0}] * 10**5, seed=3, threads=2)\n"
+        "except KeyboardInterrupt as e:\n"
+        "    kept = e.pulls\n"
+        "    again = sim.pull(part='gear', grip_force_n=30.0, seed=3, index=kept[-1].index)\n"
+        "    print(len(kept), again.max_pull_force_n == kept[-1].max_pull_force_n, flush=True)\n"
+    )
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=os.environ)
+    assert child.stdout.readline() == "begun\n"
+    time.sleep(2.0)
+    child.send_signal(signal.SIGINT)
+    said, _ = child.communicate(timeout=60)
+    kept, same = said.split()
+    assert child.returncode == 0 and 0 < int(kept) < 10**5 and same == "True", said
+
+
+def test_a_url_is_no_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(gg.ConfigError, match="s3://bucket/run is a URL") as e:
+        gg.sweep(CONFIG, "s3://bucket/run", set=SMALL)
+    assert "gripgen.ray.sweep" in e.value.hint and not list(tmp_path.iterdir())
 
 
 def test_a_pull_of_the_simulator_is_a_sample_of_a_sweep(run):

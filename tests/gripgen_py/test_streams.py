@@ -145,6 +145,49 @@ def test_threads_wait_for_a_slow_reader_and_end_with_it():
         time.sleep(0.05)
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="fork")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork")
+def test_an_iterator_is_read_by_the_process_that_began_it():
+    """A child has no threads that make samples: it is told so, and does not wait for them; the stream itself can be read there."""
+    stream = gg.stream(CONFIG, batch_size=4, set=SMALL)
+    batches = iter(stream)
+    first = next(batches)
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            next(batches)
+            said = "nothing"
+        except gg.DataError as e:
+            said = f"{e}"
+        del batches
+        again = next(iter(gg.stream(CONFIG, batch_size=4, set=SMALL)))
+        os.write(write, f"{said} {(again[0] == first[0]).all()}".encode())
+        os._exit(0)
+    os.close(write)
+    for _ in range(600):
+        if os.waitpid(child, os.WNOHANG) != (0, 0):
+            break
+        time.sleep(0.1)
+    else:
+        os.kill(child, signal.SIGKILL)
+        pytest.fail("the child waits for threads that it has not")
+    with os.fdopen(read) as pipe:
+        said = pipe.read()
+    assert "begun in another process" in said and "hint:" in said and said.endswith("True"), said
+    assert len(next(batches)[1]) == 4, "the parent goes on"
+
+
+def test_a_stream_is_found_after_the_folder_was_changed(tmp_path, monkeypatch):
+    (tmp_path / "sweep.toml").write_text('twin = "asset:configs/twin.toml"\nsamples = 2\nmechanics = "reduced"\nimages = "none"\n')
+    monkeypatch.chdir(tmp_path)
+    stream, sim = gg.stream("sweep.toml"), gg.Sim(gg.simulation.BASELINE, images=False)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert sum(len(labels) for _, labels in stream) == 2
+    assert pickle.loads(pickle.dumps(sim)).parts == sim.parts
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_ends_a_stream():
     code = (

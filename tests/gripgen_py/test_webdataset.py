@@ -10,29 +10,25 @@ from PIL import Image
 
 import gripgen as gg
 
-from .conftest import command_line
+from .conftest import CONFIG, command_line
 
 
 def samples(path):
-    """Files by key and ending, and those that are no samples."""
-    found, about = {}, {}
+    """Files by key and ending."""
+    found = {}
     with tarfile.open(path) as tar:
         for entry in tar:
             assert entry.mtime == 0 and entry.uid == 0 and entry.mode == 0o644
-            data = tar.extractfile(entry).read()
-            if entry.name.startswith("__"):
-                about[entry.name] = data
-            else:
-                key, _, ending = entry.name.partition(".")
-                found.setdefault(key, {})[ending] = data
-    return found, about
+            key, _, ending = entry.name.partition(".")
+            found.setdefault(key, {})[ending] = tar.extractfile(entry).read()
+    return found
 
 
 def test_a_tar_file_holds_the_run(run, tmp_path):
     out = tmp_path / "all.tar"
     said = json.loads(command_line("export", run, "--to", "webdataset", "-o", out, "--json"))
     ds = gg.load(run)
-    found, about = samples(out)
+    found = samples(out)
     assert said["rows"] == len(found) == len(ds) and said["left_out"] == 0
     assert list(found) == [f"{i:09}" for i in range(len(ds))]
     batch = ds.batch(range(len(ds)), traces=True)
@@ -48,7 +44,7 @@ def test_a_tar_file_holds_the_run(run, tmp_path):
         trace = np.load(io.BytesIO(files["trace.npy"]), allow_pickle=False)
         rows = batch.trace_rows[i]
         assert trace.dtype == np.float32 and (trace == batch.traces[i, :rows]).all()
-    card = about["__gripgen__/README.md"].decode()
+    card = (tmp_path / "all.md").read_text()
     assert ds.info["config_sha256"] in card and "max_pull_force_n" in card and "[sweep]" in card
     # The same run gives the same bytes.
     bytes_ = out.read_bytes()
@@ -58,9 +54,30 @@ def test_a_tar_file_holds_the_run(run, tmp_path):
 
 def test_numbered_files_share_the_rows(run, tmp_path):
     command_line("export", run, "--to", "webdataset", "--no-images", "--no-traces", "-o", tmp_path / "t-%04d.tar")
-    found, _ = samples(tmp_path / "t-0000.tar")
+    found = samples(tmp_path / "t-0000.tar")
     assert len(found) == 16 and all(list(files) == ["json"] for files in found.values())
-    assert [p.name for p in tmp_path.iterdir()] == ["t-0000.tar"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["t-0000.tar", "t.md"]
+
+
+def test_hugging_face_datasets_reads_rows_with_and_without_a_pull(tmp_path):
+    """Grips that miss have no trace: their samples have the same keys, or `datasets` refuses the file."""
+    datasets = pytest.importorskip("datasets")
+    drawn = {"design": "random", "repetitions": 1, "samples": 30, "vary.grip_offset_mm": {"normal": [0, 30]}}
+    gg.sweep(CONFIG, tmp_path / "run", set={"mechanics": "reduced", **drawn})
+    command_line("export", tmp_path / "run", "--to", "webdataset", "-o", tmp_path / "a.tar")
+    found = samples(tmp_path / "a.tar")
+    keys = {tuple(files) for files in found.values()}
+    assert keys == {("left.png", "right.png", "json", "trace.npy")}
+    lengths = [len(np.load(io.BytesIO(files["trace.npy"]))) for files in found.values()]
+    assert 0 in lengths and max(lengths) > 0, "both kinds are there"
+    rows = datasets.load_dataset(
+        "webdataset", data_files={"train": str(tmp_path / "a.tar")}, cache_dir=str(tmp_path / "cache")
+    )["train"]
+    ds = gg.load(tmp_path / "run", status=("slipped", "no_contact", "censored", "suspect"))
+    assert len(rows) == len(ds) == len(found)
+    for row, length in zip(rows, lengths, strict=True):
+        i = list(ds.column("index")).index(row["json"]["index"])
+        assert (np.asarray(row["left.png"]) == ds[i].images[0]).all() and len(row["trace.npy"]) == length
 
 
 def test_webdataset_reads_it(run, tmp_path):

@@ -87,6 +87,9 @@ def test_the_lerobot_folder_is_as_its_readers_expect(folder, table, rows):
     assert stats["observation.state"]["std"][at] == pytest.approx(np.std(forces))
     images = np.stack([pixels(s["left_png"]["bytes"]) / 255 for s in original])
     assert np.allclose(np.ravel(stats["observation.images.left"]["mean"]), images.mean((0, 1, 2)))
+    for name, q in (("q01", 0.01), ("q10", 0.1), ("q50", 0.5), ("q90", 0.9), ("q99", 0.99)):
+        assert stats["observation.state"][name][at] == pytest.approx(np.quantile(forces, q))
+        assert np.allclose(np.ravel(stats["observation.images.left"][name]), np.quantile(images, q, (0, 1, 2)))
     card = (folder / "README.md").read_text()
     for word in ("load_offset", "Licence", "Split", "| `max_pull_force_n` | N |"):
         assert word in card, word

@@ -8,6 +8,7 @@ use gripgen::tactile::gpu::GpuError;
 use gripgen::tactile::presses::HeightsError;
 use gripgen::twin::config::{ConfigError, Place};
 use gripgen::{LoadError, SweepError};
+use gripgen_measured::OpenDatasetError;
 use std::fmt::Display;
 use std::io;
 
@@ -149,6 +150,7 @@ impl From<RenderError> for Failure {
             RenderError::Body { .. } => Some(
                 "--x-px and --y-px are the place of the mesh's origin in the image; --scale-mm-per-unit is the size of its unit",
             ),
+            RenderError::Mesh(e) => e.hint(),
             RenderError::NoTravel { .. } => Some("--depth-mm 0.5, say"),
             RenderError::Placed => Some("move and turn the array itself, or render a mesh"),
             RenderError::Heights { source: HeightsError::Shape { .. }, .. } => {
@@ -179,13 +181,14 @@ impl From<FolderError> for Failure {
     fn from(e: FolderError) -> Self {
         match &e {
             FolderError::AnotherRun { .. } | FolderError::Foreign { .. } => another_run(&e),
+            FolderError::Url { .. } => Self::usage(&e).hint_if(e.hint()),
             FolderError::Io { path, .. } if path.ends_with("run.json") => {
                 Self::new(&e).hint("a run folder is what `gripgen sweep` writes")
             }
             FolderError::Io { source, .. } if no_room(source) => {
                 Self::new(&e).hint("make room, or choose a folder on another disk; what is done stays, and the same command goes on")
             }
-            _ => Self::new(&e),
+            _ => Self::new(&e).hint_if(e.hint()),
         }
     }
 }
@@ -242,6 +245,16 @@ impl From<ReadError> for Failure {
             _ => None,
         };
         Self::new(&e).hint_if(hint)
+    }
+}
+
+impl From<OpenDatasetError> for Failure {
+    fn from(e: OpenDatasetError) -> Self {
+        let hint = match &e {
+            OpenDatasetError::Dataset(e) => e.hint(),
+            _ => None,
+        };
+        Self::usage(&e).hint_if(hint)
     }
 }
 

@@ -16,6 +16,16 @@ pub enum MeshFileError {
     Mesh(#[from] LibraryError),
 }
 
+impl MeshFileError {
+    /// What to do about it, where there is something to say.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            MeshFileError::Read(_) => None,
+            MeshFileError::Mesh(e) => e.hint(),
+        }
+    }
+}
+
 /// Reads an STL, OBJ, PLY or GLB file.
 pub fn read_mesh(path: &Path, metres_per_unit: f64) -> Result<TriMesh, MeshFileError> {
     let location = Location::Disk(path.into());

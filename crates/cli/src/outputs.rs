@@ -9,6 +9,7 @@ mod pending;
 pub use pending::{Pending, PendingFolder};
 
 use crate::failure::{Failure, no_room};
+use gripgen::record::is_url;
 use gripgen::twin::Posterior;
 use gripgen_report::CONTACT_SHEET;
 use std::io::{self, ErrorKind, Write};
@@ -60,6 +61,7 @@ impl Outputs {
 
     /// Plans an output, or refuses it.
     pub fn allow(&mut self, path: &Path) -> Result<(), Failure> {
+        not_a_url(path)?;
         if path.is_dir() {
             let folder = Failure::usage(format!("{}: this is a folder", path.display()));
             return Err(folder.hint("name a file in it"));
@@ -105,6 +107,7 @@ impl Outputs {
 
     /// Plans a folder of files: a new or an empty one. `--force` does not replace what is in it.
     pub fn allow_new_folder(&mut self, folder: &Path) -> Result<(), Failure> {
+        not_a_url(folder)?;
         let parent = folder_of(folder);
         if !parent.is_dir() {
             let none = format!("{}: there is no folder {}", folder.display(), parent.display());
@@ -191,6 +194,15 @@ impl Outputs {
     /// A folder that is filled under another name, and has its own when it is published.
     pub fn begin_folder(&self, folder: &Path) -> Result<PendingFolder, Failure> {
         PendingFolder::create(folder).map_err(|e| unwritable(folder, &e))
+    }
+}
+
+/// Outputs are files.
+fn not_a_url(path: &Path) -> Result<(), Failure> {
+    match is_url(path) {
+        true => Err(Failure::usage(format!("{}: this is a URL, and outputs are files", path.display()))
+            .hint("write a file and copy it there")),
+        false => Ok(()),
     }
 }
 

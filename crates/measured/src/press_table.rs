@@ -50,7 +50,7 @@ pub struct PressRecord {
 /// A body that is no ball, as a row of the table says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressedBody {
-    /// Its mesh (STL or OBJ, millimetres): the path as written in the table.
+    /// Its mesh (STL, OBJ or PLY in millimetres, GLB in metres): the path as written in the table.
     pub mesh: String,
     /// What its shape is called: the column `shape`, or the name of the mesh.
     pub shape: String,

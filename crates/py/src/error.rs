@@ -79,18 +79,7 @@ pub fn open(py: Python<'_>, e: &OpenDatasetError) -> PyErr {
 }
 
 pub fn data(py: Python<'_>, e: &DatasetError) -> PyErr {
-    let hint = match e {
-        DatasetError::Unknown { .. } => Some("`gripgen sweep` writes a run folder"),
-        DatasetError::Empty { .. } => Some("run the sweep again to continue it"),
-        DatasetError::Shard(_) => {
-            Some("`gripgen verify` reads the whole run; sweeping again rebuilds what is broken")
-        }
-        DatasetError::Mixed { .. } => Some("delete the shard and sweep again"),
-        DatasetError::Noisy { .. } => Some("sweep with images = \"clean\" to choose the noise when reading"),
-        DatasetError::Missing { .. } => Some("ds.table() says what there is"),
-        _ => None,
-    };
-    with_hint::<DataError>(py, &e.to_string(), hint)
+    with_hint::<DataError>(py, &e.to_string(), e.hint())
 }
 
 /// An error of the caller's arguments.

@@ -4,6 +4,7 @@ use crate::error;
 use gripgen::Location;
 use gripgen::tactile::npz::Array;
 use gripgen::tactile::presses::RenderedBody;
+use gripgen::twin::usual_scale_mm_per_unit;
 use gripgen_cli::Failure;
 use gripgen_cli::{RenderOptions, load_sensor, render_file, render_surface};
 use numpy::{PyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -20,7 +21,7 @@ pub enum Source<'py> {
 
 /// Press something in and look at it. Returns image, heights_mm, normals and contact.
 #[pyfunction]
-#[pyo3(signature = (source, sensor, depth_mm = None, x_px = None, y_px = None, rotation_deg = 0.0, scale_mm_per_unit = 1.0))]
+#[pyo3(signature = (source, sensor, depth_mm = None, x_px = None, y_px = None, rotation_deg = 0.0, scale_mm_per_unit = None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub fn render<'py>(
     py: Python<'py>,
@@ -30,8 +31,15 @@ pub fn render<'py>(
     x_px: Option<f64>,
     y_px: Option<f64>,
     rotation_deg: f64,
-    scale_mm_per_unit: f64,
+    scale_mm_per_unit: Option<f64>,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let usual = || match &source {
+        Source::File(path) => {
+            usual_scale_mm_per_unit(&path.extension().unwrap_or_default().to_string_lossy())
+        }
+        Source::Heights(_) => 1.0,
+    };
+    let scale_mm_per_unit = scale_mm_per_unit.unwrap_or_else(usual);
     if !(scale_mm_per_unit > 0.0 && scale_mm_per_unit.is_finite()) {
         let what = format!("scale_mm_per_unit is {scale_mm_per_unit} mm, it must be more than 0");
         return Err(error::argument(py, &what, None));

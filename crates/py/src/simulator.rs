@@ -14,6 +14,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
+
+/// Time between two looks at the interpreter's signals.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(100);
 
 /// A twin with its files, ready to pull. Threads may share it.
 #[pyclass(frozen, module = "gripgen._core")]
@@ -65,7 +71,7 @@ impl Simulator {
     }
 
     /// Simulates pulls: `asked` holds a dict of keys and values for each; pull i has the index `first_index + i`. Returns a
-    /// dict for each.
+    /// dict for each. Ctrl-C ends it after the pulls under way: the KeyboardInterrupt has a dict for each pull that was made, as `made`.
     #[pyo3(signature = (asked, seed = 0, first_index = 0, images = true, trace = true, threads = 1))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn pulls<'py>(
@@ -83,15 +89,42 @@ impl Simulator {
             .enumerate()
             .map(|(i, v)| Ok((values::drawn(py, v)?, Draw { seed, index: first_index + i as u64 })))
             .collect::<PyResult<_>>()?;
-        let one = |i: usize| self.twin.pull(&all[i].0, all[i].1, images, trace);
-        let made = py.detach(|| in_parallel(all.len(), threads, one));
-        made.into_iter()
-            .map(|made| match made {
-                Ok(sample) => dict_of(py, sample, trace),
-                Err(e) => Err(error::config(py, e)),
-            })
-            .collect()
+        let stop = AtomicBool::new(false);
+        let one = |i: usize| {
+            let asked = &all[i];
+            (!stop.load(Ordering::Relaxed)).then(|| self.twin.pull(&asked.0, asked.1, images, trace))
+        };
+        let (made, raised) = py.detach(|| while_looking(&stop, || in_parallel(all.len(), threads, one)));
+        let made = made.into_iter().flatten().map(|made| match made {
+            Ok(sample) => dict_of(py, sample, trace),
+            Err(e) => Err(error::config(py, e)),
+        });
+        let Some(raised) = raised else { return made.collect() };
+        // What was made before is kept, whatever became of the others.
+        let made: Vec<_> = made.flatten().collect();
+        raised.value(py).setattr("made", made)?;
+        Err(raised)
     }
+}
+
+/// Does some work while the interpreter's signals are looked at; the first one sets `stop` and is returned with what the work gives.
+fn while_looking<T: Send>(stop: &AtomicBool, work: impl FnOnce() -> T + Send) -> (T, Option<PyErr>) {
+    std::thread::scope(|scope| {
+        let (done, watched) = mpsc::channel::<()>();
+        let working = scope.spawn(move || {
+            // Dropped when the work ends, however it ends.
+            let _done = done;
+            work()
+        });
+        let mut raised = None;
+        while watched.recv_timeout(BETWEEN_LOOKS) == Err(RecvTimeoutError::Timeout) {
+            if raised.is_none() {
+                raised = Python::attach(|py| py.check_signals()).err();
+                stop.store(raised.is_some(), Ordering::Relaxed);
+            }
+        }
+        (working.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), raised)
+    })
 }
 
 /// Both images as uint8[2, H, W, 3].

@@ -174,5 +174,6 @@ fn pixels<'py>(
 }
 
 fn ended(py: Python<'_>, e: &StreamError) -> PyErr {
-    error::missing(py, &e.to_string(), None)
+    let hint = "begin it in the process that reads it: iterate over the stream there, or take gg.torch.PullStream for workers of a loader";
+    error::missing(py, &e.to_string(), matches!(e, StreamError::Forked { .. }).then_some(hint))
 }

@@ -108,13 +108,11 @@ pub enum DatasetError {
     /// A shard.
     #[error(transparent)]
     Shard(#[from] ReadError),
-    /// A shard that another run, or another version, made.
-    #[error("{}: `{what}` is {found}, the run.json beside it says {wanted}", .path.display())]
+    /// A shard that another run made.
+    #[error("{}: `config_sha256` is {found}, the run.json of its folder says {wanted}", .path.display())]
     Mixed {
         /// The shard.
         path: PathBuf,
-        /// What differs.
-        what: &'static str,
         /// Value in the shard.
         found: String,
         /// Value of the run.
@@ -149,6 +147,26 @@ pub enum DatasetError {
     },
 }
 
+impl DatasetError {
+    /// What to do about it, where there is something to say.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            DatasetError::Unknown { .. } => Some("`gripgen sweep` writes a run folder"),
+            DatasetError::Empty { .. } => Some("run the sweep again to continue it"),
+            DatasetError::Folder(e) => e.hint(),
+            DatasetError::Shard(_) => {
+                Some("`gripgen verify` reads the whole run; sweeping again rebuilds what is broken")
+            }
+            DatasetError::Mixed { .. } => Some("delete the shard and sweep again"),
+            DatasetError::Noisy { .. } => {
+                Some("sweep with images = \"clean\" to choose the noise when reading")
+            }
+            DatasetError::Missing { .. } => Some("ds.table() says what there is"),
+            DatasetError::Images(_) | DatasetError::Row { .. } => None,
+        }
+    }
+}
+
 impl Dataset {
     /// Opens a run folder, of which it reads the index and no shard; or a single shard, of which it reads all samples without
     /// their images.
@@ -168,11 +186,6 @@ impl Dataset {
         let mut shards = Vec::new();
         for shard in 0..folder.info().shards {
             let Some(sidecar) = folder.finished(shard)? else { continue };
-            let (found, wanted) = (&sidecar.gripgen_version, &folder.info().gripgen_version);
-            if found != wanted {
-                let (path, what) = (folder.sidecar_path(shard), "gripgen_version");
-                return Err(DatasetError::Mixed { path, what, found: found.clone(), wanted: wanted.clone() });
-            }
             shards.push(FinishedShard { shard, first_row: table.rows(), first_sample: sidecar.first_sample });
             sidecar.rows.iter().for_each(|row| table.push(row));
         }
@@ -473,7 +486,7 @@ impl Dataset {
         let found = reader.metadata().get("config_sha256").cloned().unwrap_or_default();
         let wanted = &folder.info().config_sha256;
         if found != *wanted {
-            return Err(DatasetError::Mixed { path, what: "config_sha256", found, wanted: wanted.clone() });
+            return Err(DatasetError::Mixed { path, found, wanted: wanted.clone() });
         }
         let mut open = lock();
         if open.len() >= OPEN_SHARDS {

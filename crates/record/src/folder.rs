@@ -10,6 +10,7 @@ mod temporary;
 pub use documents::{RUN_SCHEMA, RunInfo, SHARD_SCHEMA, Sidecar};
 pub use shards::{PartialShard, ShardStart};
 
+use crate::VERSION;
 use crate::index::{csv_lines, index_header};
 use documents::{check_same, json, parse};
 use sha2::{Digest, Sha256};
@@ -50,6 +51,32 @@ pub enum FolderError {
         /// Value of this run.
         wanted: String,
     },
+    /// A file in which a version of gripgen wrote what this one does not read.
+    #[error("{path}: {problem}; gripgen {maker} made it, this is gripgen {VERSION}")]
+    OtherVersion {
+        /// The file.
+        path: PathBuf,
+        /// What is not read.
+        problem: String,
+        /// The version that made it.
+        maker: String,
+    },
+    /// A shard that another version made than the rest of the run.
+    #[error("{path}: `gripgen_version` is {found}, the run.json of its folder says {wanted}")]
+    Mixed {
+        /// The sidecar of the shard.
+        path: PathBuf,
+        /// Version in the sidecar.
+        found: String,
+        /// Version of the run.
+        wanted: String,
+    },
+    /// A URL where a folder is wanted.
+    #[error("{path} is a URL, and a run is written into a folder")]
+    Url {
+        /// The URL.
+        path: PathBuf,
+    },
     /// Neither empty nor a run folder.
     #[error("{path} is not empty and holds no run (no run.json, but {example})")]
     Foreign {
@@ -58,6 +85,33 @@ pub enum FolderError {
         /// One thing found in it.
         example: String,
     },
+}
+
+impl FolderError {
+    /// What to do about it, where there is something to say.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            FolderError::OtherVersion { .. } => {
+                Some("read it with the gripgen that made it, or a later one; nothing was touched")
+            }
+            FolderError::Mixed { .. } => Some(
+                "move the shard and its sidecar out of the folder; the gripgen that made the run makes them again",
+            ),
+            FolderError::Url { .. } => Some(
+                "sweep into a folder and copy it when it is done; `gripgen.ray.sweep` of the Python package writes to a URL",
+            ),
+            _ => None,
+        }
+    }
+}
+
+/// Whether a path is a URL, such as `s3://bucket/run`: taken for a path it would be a folder named `s3:`.
+pub fn is_url(path: &Path) -> bool {
+    let text = path.to_string_lossy();
+    text.split_once("://").is_some_and(|(scheme, _)| {
+        scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+            && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+.-".contains(c))
+    })
 }
 
 /// A run folder on disk.
@@ -76,8 +130,11 @@ impl RunFolder {
     ///
     /// # Errors
     ///
-    /// A folder that cannot be written, that holds another run, or that holds something else.
+    /// A URL, a folder that cannot be written, that holds another run, or that holds something else.
     pub fn create(path: &Path, info: RunInfo, inputs: &[(&str, &[u8])]) -> Result<Self, FolderError> {
+        if is_url(path) {
+            return Err(FolderError::Url { path: path.into() });
+        }
         let at = io_at(path);
         if let Some(found) = Self::open_same(path, &info)? {
             remove_left_over(path);
@@ -127,7 +184,7 @@ impl RunFolder {
     ///
     /// # Errors
     ///
-    /// A folder without a valid `run.json`.
+    /// A folder without a `run.json` that is read.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let file = path.join("run.json");
         let bytes = std::fs::read(&file).map_err(io_at(&file))?;

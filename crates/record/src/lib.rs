@@ -41,6 +41,9 @@ mod tests;
 mod verify;
 mod webdataset;
 
+/// Version of gripgen.
+pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 pub use background::Background;
 pub use dataset::{Dataset, DatasetError, MeasuredRows, NoiseMode, PictureFileError, ReadImages, Table};
 pub use differences::differences;
@@ -50,7 +53,7 @@ pub use film::{Film, FilmOptions, encode_frame};
 pub use film_frame::EncodedFrame;
 pub use folder::{
     FolderError, PartialShard, RUN_SCHEMA, RunFolder, RunInfo, SHARD_SCHEMA, ShardStart, Sidecar, hash_file,
-    sha256_hex,
+    is_url, sha256_hex,
 };
 pub use index::{INDEX_COLUMNS, csv_lines, extra_columns, index_header, index_row, status_name};
 pub use lerobot::export_lerobot;
@@ -64,5 +67,5 @@ pub use rig_run::{
 };
 pub use shard::{LAYOUT_VERSION, METADATA_NAME, RIG_SOURCE, ShardError, ShardInfo, ShardWriter};
 pub use stored::{sample_covariates, sample_view};
-pub use verify::{Verification, repair, verify};
-pub use webdataset::{export_webdataset, webdataset_rows};
+pub use verify::{Verification, can_be_made_again, repair, verify};
+pub use webdataset::{export_webdataset, webdataset_card, webdataset_rows};

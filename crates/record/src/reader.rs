@@ -126,6 +126,11 @@ impl ShardReader {
                 "{samples} samples from number {first_sample} on, {slot_ns} ns each, end beyond what can be counted"
             )));
         }
+        if let Some(other) = metadata.get("images").filter(|images| *images != CLEAN) {
+            return Err(foreign(format!(
+                "its images are stored as `{other}`, which this gripgen does not read"
+            )));
+        }
         let background = match metadata.get("background").map(String::as_str) {
             None => None,
             Some(EVEN) => Some(PerJaw::try_from_fn(|jaw| {

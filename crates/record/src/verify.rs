@@ -1,8 +1,10 @@
 //! Checking a run folder against what it says of itself.
 
-use crate::folder::{FolderError, RunFolder, hash_file};
+use crate::VERSION;
+use crate::folder::{FolderError, RunFolder, Sidecar, hash_file};
 use crate::index::{csv_lines, index_header, index_row};
 use crate::reader::ShardReader;
+use crate::rig_run::rig_campaign;
 use crate::shard::RIG_SOURCE;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
@@ -25,21 +27,29 @@ pub struct Verification {
     pub index_is_broken: bool,
 }
 
+/// Whether the same sweep makes the shards of a run again: pulls that were measured cannot be computed, and another version of gripgen
+/// does not make the same samples.
+pub fn can_be_made_again(folder: &RunFolder) -> bool {
+    folder.info().source != RIG_SOURCE && folder.info().gripgen_version == VERSION
+}
+
 /// Takes away what [`verify`] found to be broken, so that running the sweep again makes it anew: shards with their sidecars, and the
-/// index, which is written again when all shards are done: at once, if they are. Returns the files. Of a run of a rig nothing is taken away but the index: pulls
-/// that were measured cannot be computed again.
+/// index, which is written again when all shards are done: at once, if they are. Returns the files. Of a run that cannot be made again
+/// ([`can_be_made_again`]) nothing is taken away but the index of this version.
 ///
 /// # Errors
 ///
 /// A file that cannot be removed.
 pub fn repair(folder: &RunFolder, found: &Verification) -> Result<Vec<PathBuf>, FolderError> {
-    let measured = folder.info().source == RIG_SOURCE;
-    let shards = found.broken_shards.iter().filter(|_| !measured);
+    let again = can_be_made_again(folder);
+    let shards = found.broken_shards.iter().filter(|_| again);
     // The sidecar first: a shard without one is a shard that was not made.
     let files = shards.flat_map(|&shard| [folder.sidecar_path(shard), folder.shard_path(shard)]);
-    let some = !measured && !found.broken_shards.is_empty();
-    let index = (found.index_is_broken || some).then(|| folder.path().join("index.csv"));
-    let whole = found.index_is_broken && found.missing_shards == 0 && found.broken_shards.is_empty();
+    let some = again && !found.broken_shards.is_empty();
+    // The index of another version may have columns that this one does not know.
+    let own = folder.info().gripgen_version == VERSION;
+    let index = (own && found.index_is_broken || some).then(|| folder.path().join("index.csv"));
+    let whole = own && found.index_is_broken && found.missing_shards == 0 && found.broken_shards.is_empty();
     let mut removed = Vec::new();
     for path in files.chain(index) {
         match std::fs::remove_file(&path) {
@@ -66,8 +76,20 @@ pub fn verify(path: &Path, mut progress: impl FnMut(u64)) -> Result<Verification
     let folder = RunFolder::open(path)?;
     let mut result = Verification::default();
     let mut index = IndexCheck::open(&folder);
+    result.faults.extend(check_inputs(&folder));
+    if folder.info().source == RIG_SOURCE {
+        result.faults.extend(rig_campaign(&folder).err().map(|e| e.to_string()));
+    }
     for shard in 0..folder.info().shards {
-        let sidecar = folder.finished(shard)?;
+        let sidecar = match folder.finished(shard) {
+            Err(e @ (FolderError::OtherVersion { .. } | FolderError::Mixed { .. })) => {
+                // Readers refuse it. It may be whole: it is not broken.
+                result.faults.push(e.to_string());
+                progress(shard);
+                continue;
+            }
+            found => found?,
+        };
         let file = folder.shard_path(shard);
         match sidecar {
             None if file.exists() || folder.sidecar_path(shard).exists() => {
@@ -82,7 +104,7 @@ pub fn verify(path: &Path, mut progress: impl FnMut(u64)) -> Result<Verification
                     let problem = format!("its SHA-256 is {sha256}, the sidecar says {}", sidecar.sha256);
                     result.faults.push(format!("{}: {problem}", file.display()));
                 }
-                match check_shard(&file, &folder, &sidecar.rows) {
+                match check_shard(&file, &folder, &sidecar) {
                     Ok(samples) => result.samples += samples,
                     Err(fault) => result.faults.push(fault),
                 }
@@ -120,7 +142,24 @@ fn misfit(folder: &RunFolder, shard: u64) -> String {
     format!("{}: {problem}; running the {what} again makes it anew", file.display())
 }
 
-fn check_shard(file: &Path, folder: &RunFolder, rows: &[Vec<String>]) -> Result<u64, String> {
+/// What is wrong with the copies of the files that the run was made from.
+fn check_inputs(folder: &RunFolder) -> Vec<String> {
+    let copies = folder.info().files_sha256.iter().filter(|(name, _)| name.starts_with("inputs/"));
+    let fault = |(name, wanted): (&String, &String)| {
+        let path = folder.path().join(name);
+        match hash_file(&path) {
+            Ok((found, _)) if found == *wanted => None,
+            Ok((found, _)) => {
+                Some(format!("{}: its SHA-256 is {found}, run.json says {wanted}", path.display()))
+            }
+            Err(e) => Some(e.to_string()),
+        }
+    };
+    copies.filter_map(fault).collect()
+}
+
+fn check_shard(file: &Path, folder: &RunFolder, sidecar: &Sidecar) -> Result<u64, String> {
+    let rows = &sidecar.rows;
     let reader = ShardReader::open(file).map_err(|e| e.to_string())?;
     let hash = reader.metadata().get("config_sha256");
     if hash != Some(&folder.info().config_sha256) {
@@ -131,6 +170,11 @@ fn check_shard(file: &Path, folder: &RunFolder, rows: &[Vec<String>]) -> Result<
     if expected != rows.len() as u64 {
         return Err(format!("{}: {expected} samples, its sidecar has {} rows", file.display(), rows.len()));
     }
+    if indices.start != sidecar.first_sample {
+        let (found, wanted) = (indices.start, sidecar.first_sample);
+        return Err(format!("{}: its first sample is {found}, its sidecar says {wanted}", file.display()));
+    }
+    reader.config_toml().map_err(|e| e.to_string())?;
     for (index, row) in indices.zip(rows) {
         let record = reader.record(index).map_err(|e| e.to_string())?;
         if reader.is_rig() {

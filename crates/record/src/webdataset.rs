@@ -1,7 +1,7 @@
 //! A dataset as tar files for WebDataset: a sample is the files of one name, `000000012.left.png`, `.right.png`, `.json`, `.trace.npy`.
 //!
-//! Rows without images are left out where images are wanted, so that all samples have the same keys. What is in a `__name__` folder is no
-//! sample to WebDataset: the card is there. Nothing in a file depends on time, host or path.
+//! All samples have the same keys, and there is nothing else: Hugging Face `datasets` refuses a file with other members. Rows without images
+//! are left out where images are wanted; a row without a trace has one without rows. Nothing in a file depends on time, host or path.
 
 use crate::card;
 use crate::dataset::Dataset;
@@ -10,9 +10,6 @@ use gripgen_twin::{PullTrace, Values};
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use tar::{Builder, EntryType, Header};
-
-/// Where the card is.
-const ABOUT: &str = "__gripgen__";
 
 /// Rows of a dataset that an export takes: with images all that have some. The others are failed samples.
 ///
@@ -39,7 +36,6 @@ pub fn export_webdataset<W: Write>(
     mut on_row: impl FnMut(),
 ) -> Result<usize, ExportDatasetError> {
     let mut tar = Builder::new(out);
-    add(&mut tar, &format!("{ABOUT}/README.md"), about(dataset).as_bytes())?;
     let mut written = 0;
     for &row in rows {
         on_row();
@@ -54,9 +50,8 @@ pub fn export_webdataset<W: Write>(
         }
         let cells = serde_json::to_vec(&cells(dataset, row)).map_err(std::io::Error::from)?;
         add(&mut tar, &format!("{key}.json"), &cells)?;
-        if options.traces
-            && let Some(trace) = dataset.trace(row)?
-        {
+        if options.traces {
+            let trace = dataset.trace(row)?.unwrap_or_default();
             add(&mut tar, &format!("{key}.trace.npy"), &trace_npy(&trace))?;
         }
         written += 1;
@@ -109,14 +104,14 @@ fn trace_npy(trace: &PullTrace) -> Vec<u8> {
     bytes
 }
 
-/// The card.
-fn about(dataset: &Dataset) -> String {
+/// What a reader of the files is told, a page of Markdown.
+pub fn webdataset_card(dataset: &Dataset) -> String {
     format!(
         "# Grips, pulls and slip\n\n\
          Each sample is a grip by two jaws with a tactile sensor each and a pull until they slip, written by gripgen.\n\n\
          - `KEY.left.png`, `KEY.right.png`: tactile images\n\
          - `KEY.json`: the columns below; `max_pull_force_n` is the label\n\
-         - `KEY.trace.npy`: float32 (rows, 4): time_s, desired_force_n, measured_force_n, displacement_mm\n\n{}\n{}{}",
+         - `KEY.trace.npy`: float32 (rows, 4): time_s, desired_force_n, measured_force_n, displacement_mm; no rows where none is stored\n\n{}\n{}{}",
         card::facts(dataset),
         card::columns(dataset, |name| dataset.exported_name(name)),
         card::configuration(dataset)

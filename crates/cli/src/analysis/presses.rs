@@ -140,6 +140,7 @@ impl LoadPressesError {
             Self::Folder(TableError::Jpeg { .. }) => Some(
                 "a JPEG moves colours by as much as a light contact does, and converting it does not bring them back: take the frames again as PNG",
             ),
+            Self::Mesh(e) => e.hint(),
             _ => None,
         }
     }

@@ -7,12 +7,12 @@ use crate::output::{JsonSink, count};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use gripgen::record::{
-    ExportOptions, RunFolder, ShardReader, export_lerobot, export_parquet, export_sample, export_webdataset,
-    webdataset_rows,
+    Dataset, ExportOptions, RunFolder, ShardReader, export_lerobot, export_parquet, export_sample,
+    export_webdataset, webdataset_card, webdataset_rows,
 };
 use gripgen_measured::open_dataset;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Runs the verb.
 pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
@@ -33,7 +33,7 @@ pub fn run(args: &ExportArgs) -> Result<u8, Failure> {
 }
 
 fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Failure> {
-    let dataset = open_dataset(&args.run).map_err(Failure::usage)?;
+    let dataset = open_dataset(&args.run)?;
     let options = ExportOptions {
         images: !args.no_images && dataset.image_size_px().is_some(),
         traces: !args.no_traces,
@@ -56,15 +56,11 @@ fn table(args: &ExportArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Fai
 }
 
 fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
-    let dataset = open_dataset(&args.run).map_err(Failure::usage)?;
+    let dataset = open_dataset(&args.run)?;
     outputs.allow_new_folder(&args.out)?;
     let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let rows = dataset.table().rows();
-    let has_traces = (0..rows).find_map(|row| dataset.trace(row).ok().flatten()).is_some();
-    let options = ExportOptions {
-        images: !args.no_images && dataset.image_size_px().is_some(),
-        traces: !args.no_traces && has_traces,
-    };
+    let options = wanted(args, &dataset);
     let folder = outputs.begin_folder(&args.out)?;
     let mut progress = Progress::start("rows", 0, rows as u64, &args.talk);
     let made = export_lerobot(&dataset, options, folder.path(), || progress.step());
@@ -80,15 +76,21 @@ fn lerobot(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
     sink.finish(args.talk.quiet, || document, || format!("{}\n", args.out.display()))
 }
 
+/// What is exported: nothing that no row has.
+fn wanted(args: &ExportArgs, dataset: &Dataset) -> ExportOptions {
+    let has_trace = |row| dataset.trace(row).ok().flatten().is_some();
+    ExportOptions {
+        images: !args.no_images && dataset.image_size_px().is_some(),
+        traces: !args.no_traces && (0..dataset.table().rows()).any(has_trace),
+    }
+}
+
 /// Rows of a tar file whose name has a number.
 const ROWS: usize = 1000;
 
 fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
-    let dataset = open_dataset(&args.run).map_err(Failure::usage)?;
-    let options = ExportOptions {
-        images: !args.no_images && dataset.image_size_px().is_some(),
-        traces: !args.no_traces,
-    };
+    let dataset = open_dataset(&args.run)?;
+    let options = wanted(args, &dataset);
     let rows = webdataset_rows(&dataset, options);
     let name = args.out.to_string_lossy();
     let files: Vec<(PathBuf, &[usize])> = match numbered(&name) {
@@ -97,7 +99,8 @@ fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
         }
         None => vec![(args.out.clone(), &rows)],
     };
-    outputs.allow_all(files.iter().map(|(path, _)| path.as_path()))?;
+    let card = card_path(&args.out);
+    outputs.allow_all(files.iter().map(|(path, _)| path.as_path()).chain([card.as_path()]))?;
     let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
     let mut progress = Progress::start("rows", 0, rows.len() as u64, &args.talk);
     let (mut written, mut bytes) = (0, 0);
@@ -109,6 +112,7 @@ fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
         bytes += pending.publish()?.metadata().map_err(Failure::new)?.len();
     }
     progress.finish();
+    outputs.write(&card, webdataset_card(&dataset).as_bytes())?;
     let left_out = dataset.table().rows() - written;
     if left_out > 0 && !args.talk.quiet {
         eprintln!("{} without images left out", count(left_out as u64, "row"));
@@ -116,10 +120,17 @@ fn webdataset(args: &ExportArgs, mut outputs: Outputs) -> Result<u8, Failure> {
     let paths: Vec<&PathBuf> = files.iter().map(|(path, _)| path).collect();
     let document = json!({
         "schema": "gripgen.export/1", "rows": written, "left_out": left_out, "file": args.out, "files": paths,
-        "bytes": bytes,
+        "card": card, "bytes": bytes,
     });
     let lines = || paths.iter().map(|path| format!("{}\n", path.display())).collect();
     sink.finish(args.talk.quiet, || document, lines)
+}
+
+/// Where the card of tar files lies: `train.md` of `train-%05d.tar`.
+fn card_path(out: &Path) -> PathBuf {
+    let name = out.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = name.split_once('%').map_or(&*name, |(before, _)| before.trim_end_matches(['-', '_', '.']));
+    out.with_file_name(format!("{}.md", if stem.is_empty() { "card" } else { stem }))
 }
 
 /// The names that a name with `%d` or `%05d` in it stands for; `None` without one.

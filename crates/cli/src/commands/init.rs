@@ -35,7 +35,7 @@ pub fn run(args: &InitArgs) -> Result<u8, Failure> {
             threads: jobs(),
         };
         let mut made = part_starter(&args.target, &folder, options).map_err(|e| {
-            let hint = e.hint();
+            let hint = e.hint(options.scale_mm_per_unit);
             Failure::usage(e).hint(hint)
         })?;
         let files = std::mem::take(&mut made.files);

@@ -37,7 +37,7 @@ pub fn run(args: &TryArgs) -> Result<u8, Failure> {
         force_n: args.force_n(),
         sensor: args.sensor.clone(),
     };
-    let tried = try_part(&args.mesh, &options).map_err(refused)?;
+    let tried = try_part(&args.mesh, &options).map_err(|e| refused(e, options.part.scale_mm_per_unit))?;
     outputs.write(&page, tried_page(&tried, &rasterise).as_bytes())?;
     outputs.write(&picture, &tried_picture(&tried, &rasterise))?;
     if !args.talk.quiet {
@@ -64,9 +64,9 @@ fn next(args: &TryArgs, stem: &str) -> String {
     shell::command_line(&words)
 }
 
-fn refused(error: TryPartError) -> Failure {
+fn refused(error: TryPartError, scale_mm_per_unit: f64) -> Failure {
     let hint = match &error {
-        TryPartError::Init(e) => e.hint(),
+        TryPartError::Init(e) => e.hint(scale_mm_per_unit),
         TryPartError::NoSuchGrip { .. } => "leave --grip out to see them all".into(),
         TryPartError::Friction { .. } => "mu is the pull at slip over both grip forces: F / (2 F_G)".into(),
         TryPartError::Fails { .. } | TryPartError::Force { .. } => "try a smaller --force-n".into(),

@@ -7,7 +7,8 @@ use crate::output::{JsonSink, count, print, program};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use crate::shell;
-use gripgen::record::{RIG_SOURCE, RunFolder, repair, verify};
+use gripgen::VERSION;
+use gripgen::record::{RIG_SOURCE, RunFolder, can_be_made_again, repair, verify};
 use serde_json::json;
 
 /// Runs the verb.
@@ -21,9 +22,9 @@ pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
     let complete = result.missing_shards == 0;
     let good = result.faults.is_empty();
     let removed = if args.repair && !good { repair(&folder, &result)? } else { vec![] };
-    // What was measured stays, broken or not.
-    let repaired =
-        !removed.is_empty() && (folder.info().source != RIG_SOURCE || result.broken_shards.is_empty());
+    // What cannot be made again stays, broken or not.
+    let again = can_be_made_again(&folder);
+    let repaired = !removed.is_empty() && (again || result.broken_shards.is_empty());
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.verification/1", "ok": good, "complete": complete,
@@ -61,6 +62,13 @@ pub fn run(args: &VerifyArgs) -> Result<u8, Failure> {
             match folder.info().source == RIG_SOURCE {
                 true => "measured pulls cannot be computed again: a copy of the run may have them whole"
                     .to_string(),
+                false if !again => format!(
+                    "gripgen {} made this run, and only it makes the same samples again; this is gripgen {VERSION}, which leaves them",
+                    folder.info().gripgen_version
+                ),
+                false if result.broken_shards.is_empty() && !result.index_is_broken =>
+                    "what is named is no shard that can be made again: restore it from a copy, or sweep into a new folder"
+                        .to_string(),
                 false => format!(
                     "`{} verify {} --repair` removes what is broken, and the same sweep makes it again",
                     program(),

@@ -20,7 +20,7 @@ pub fn run(args: &ViewArgs) -> Result<u8, Failure> {
     let mut outputs = Outputs::new(args.json.force).reads(&args.data);
     outputs.allow(&out)?;
     let sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
-    let dataset = open_dataset(&args.data).map_err(Failure::usage)?;
+    let dataset = open_dataset(&args.data)?;
     let absolute = std::path::absolute(&args.data).unwrap_or_else(|_| args.data.clone());
     let title =
         absolute.file_name().map_or_else(|| "pulls".into(), |name| name.to_string_lossy().into_owned());

@@ -184,8 +184,8 @@ pub enum InitError {
 }
 
 impl InitError {
-    /// What to do about it.
-    pub fn hint(&self) -> String {
+    /// What to do about it, of a mesh that was read at `scale_mm_per_unit`.
+    pub fn hint(&self, scale_mm_per_unit: f64) -> String {
         let sizes_mm = match self {
             InitError::Mesh(LibraryError::Mesh {
                 source: MeshError::Extent { x_mm, y_mm, z_mm }, ..
@@ -195,9 +195,10 @@ impl InitError {
                 return "close its holes (Meshlab, Blender), or go on with --accept-open-mesh".into();
             }
             InitError::Read(_) => return "a path is relative to where you are".into(),
+            InitError::Mesh(LibraryError::Mesh { source, .. }) => return source.hint().into(),
             _ => return "export the part as STL, OBJ, PLY or GLB".into(),
         };
-        if let Some(guess) = unit_guess(sizes_mm) {
+        if let Some(guess) = unit_guess(sizes_mm, scale_mm_per_unit) {
             return guess;
         }
         match self {
@@ -208,17 +209,22 @@ impl InitError {
     }
 }
 
-/// What the file's unit may be, of a part whose size is not that of a part.
-fn unit_guess(sizes_mm: [f64; 3]) -> Option<String> {
-    let largest = sizes_mm.iter().fold(0.0_f64, |a, &b| a.max(b));
-    let (unit, scale) = match largest {
+/// What the file's unit may be, of a part whose size is not that of a part when it is read at `scale_mm_per_unit`.
+fn unit_guess(sizes_mm: [f64; 3], scale_mm_per_unit: f64) -> Option<String> {
+    let largest_mm = sizes_mm.iter().fold(0.0_f64, |a, &b| a.max(b));
+    if (SMALL_MM..=LARGE_MM).contains(&largest_mm) {
+        return None;
+    }
+    let units = largest_mm / scale_mm_per_unit;
+    let (unit, scale) = match units {
         x if x < 0.5 => ("metres", 1000.0),
         x if x < SMALL_MM => ("inches", 25.4),
         x if x > LARGE_MM => ("micrometres", 1e-3),
-        _ => return None,
+        _ => ("millimetres", 1.0),
     };
-    let as_mm = largest * scale;
-    Some(format!("in {unit} the largest side would be {as_mm:.1} mm: --scale-mm-per-unit {scale}"))
+    let as_mm = units * scale;
+    (scale != scale_mm_per_unit)
+        .then(|| format!("in {unit} the largest side would be {as_mm:.1} mm: --scale-mm-per-unit {scale}"))
 }
 
 /// A commented sweep and twin.
@@ -319,7 +325,7 @@ pub(crate) fn search(path: &Path, options: PartOptions, twin: Twin) -> Result<Se
     let grips = proposed.grips.iter().map(Proposal::part_from_mesh).collect();
     twin.parts.get_mut(PART).expect("it was put there").grips = grips;
     let mut mesh_words = look.words();
-    mesh_words.extend(unit_guess(size_mm).map(|guess| {
+    mesh_words.extend(unit_guess(size_mm, options.scale_mm_per_unit).map(|guess| {
         format!("the part measures {x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm; {guess}, if the file is not in mm")
     }));
     Ok(Searched { name: part_name(path), bytes, mesh, size_mm, mesh_words, twin, library, proposed })
@@ -402,4 +408,30 @@ fn mesh_reference(path: &Path, folder: &Path) -> (String, bool) {
     }
     let extension = path.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
     (format!("{}.{extension}", part_name(path)), true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unit_guess;
+
+    /// What the hint names is the option for the file, not a factor on what was read.
+    #[test]
+    fn the_unit_that_is_guessed_is_that_of_the_file() {
+        let guess = |largest_mm: f64, scale| unit_guess([0.0, largest_mm, 0.0], scale).unwrap_or_default();
+        assert!(
+            guess(0.04, 1.0)
+                .ends_with("in metres the largest side would be 40.0 mm: --scale-mm-per-unit 1000")
+        );
+        assert!(guess(40e3, 1.0).ends_with("40.0 mm: --scale-mm-per-unit 0.001"));
+        assert!(
+            guess(40e3, 1000.0)
+                .ends_with("in millimetres the largest side would be 40.0 mm: --scale-mm-per-unit 1")
+        );
+        assert!(
+            guess(2500.0, 1000.0)
+                .ends_with("in inches the largest side would be 63.5 mm: --scale-mm-per-unit 25.4")
+        );
+        assert_eq!(guess(5.5, 1000.0), "", "the unit may be right");
+        assert_eq!(guess(40.0, 1.0), "");
+    }
 }

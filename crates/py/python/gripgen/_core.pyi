@@ -140,7 +140,7 @@ def render(
     x_px: float | None = None,
     y_px: float | None = None,
     rotation_deg: float = 0.0,
-    scale_mm_per_unit: float = 1.0,
+    scale_mm_per_unit: float | None = None,
 ) -> dict[str, Any]: ...
 def rig_check(
     config: str,

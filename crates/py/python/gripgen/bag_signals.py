@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -39,6 +40,8 @@ _REBUILD = {
     ".bag": "`rosbag reindex` rebuilds the index of a bag of ROS 1",
     "": "`ros2 bag reindex` writes the metadata.yaml of a folder again, `mcap recover` saves what can be read of an .mcap",
 }
+#: Ends of the names of recordings that have to be unpacked, or were never closed.
+PACKED = (".zstd", ".lz4", ".active")
 #: A clock that steps back by more was set, or is another one: messages are late by less.
 _STEP_BACK_NS = 100_000_000
 #: Largest image that is read.
@@ -105,9 +108,34 @@ def recording(bag: Path) -> Path:
             "metadata.yaml (`ros2 bag reindex`)"
         )
         raise unreadable(f"{bag}: there are {len(found)} recordings and none is named: {names}", hint)
-    packed = sorted({p.suffix for p in inside if p.suffix in (".zstd", ".lz4", ".active")})
+    packed = sorted({p.suffix for p in inside if p.suffix in PACKED})
     there = f", but {', '.join(packed)}" if packed else ""
     raise unreadable(f"{bag}: there is no recording ({', '.join(SUFFIXES)}){there}", "`zstd -d` unpacks .mcap.zstd")
+
+
+def unused(folder: Path, bags: list[Path]) -> list[str]:
+    """What lies in a folder of bags and is not read: recordings that no pull names, and files that no metadata.yaml names."""
+    used = {Path(os.path.realpath(bag)) for bag in bags}
+
+    def is_bag(p: Path) -> bool:
+        return p.suffix in SUFFIXES + PACKED or p.is_dir() and any(q.suffix in SUFFIXES + PACKED for q in p.iterdir())
+
+    def is_used(p: Path) -> bool:
+        real = Path(os.path.realpath(p))
+        return any(real == bag or real in bag.parents or bag in real.parents for bag in used)
+
+    notes = []
+    other = [p.name for p in sorted(folder.iterdir()) if is_bag(p) and not is_used(p)]
+    if other:
+        hint = "`[[pulls]]` with their names as `bag` read them"
+        notes.append(f"{folder}: {', '.join(other)}: named by no pull, not read; {hint}")
+    for bag in sorted(bag for bag in used if (bag / "metadata.yaml").is_file()):
+        text = (bag / "metadata.yaml").read_text(encoding="utf-8", errors="replace")
+        left = [p.name for p in sorted(bag.iterdir()) if p.suffix in SUFFIXES + PACKED and p.name not in text]
+        if left:
+            hint = "`ros2 bag reindex` writes it again with all files"
+            notes.append(f"{bag}: {', '.join(left)}: not in its metadata.yaml, not read; {hint}")
+    return notes
 
 
 def topics_of(bag: Path) -> dict[str, str]:

@@ -22,7 +22,7 @@ import numpy as np
 from . import _core
 from ._core import DataError
 from .bag_mapping import ROSBAG_FILE, BagMapping, MarkedPull, Marks, mapping_of, plain, read_mapping
-from .bag_signals import WRENCH, Signals, read_images, read_signals, topics_of
+from .bag_signals import WRENCH, Signals, read_images, read_signals, topics_of, unused
 from .checks import refusal, unreadable
 
 if TYPE_CHECKING:
@@ -115,6 +115,8 @@ def read_bag(
     partial.mkdir()
     try:
         notes = _fill(partial, read, _teller(progress))
+        if path in (of_bag, of_bag.parent):
+            notes += unused(of_bag.parent, [pull.bag for pull in read.pulls])
         found = _summary(partial, read, notes)
         _publish(partial, out)
     finally:
@@ -165,9 +167,11 @@ def _fill(folder: Path, mapping: BagMapping, tell: Callable[[int, int], None] | 
     for i, pull in enumerate(mapping.pulls):
         bags.setdefault(pull.bag, []).append(i)
     rows: dict[int, _Pull] = {}
+    notes: list[str] = []
     for done, (bag, of_bag) in enumerate(bags.items(), 1):
         signals = read_signals(bag, mapping)
         begins: dict[int, int] = {}
+        ends: list[int] = []
         wanted: dict[Path, tuple[str, int]] = {}
         for i in of_bag:
             marked = mapping.pulls[i]
@@ -178,6 +182,7 @@ def _fill(folder: Path, mapping: BagMapping, tell: Callable[[int, int], None] | 
                     hint = "`begin_s` or `from_s` says which pull of the bag is meant"
                     raise _Fault(f"it begins at {at} s, and so does pulls[{begins[begin]}]", hint)
                 begins[begin] = i
+                ends.append(end)
                 rows[i] = _read(signals, marked.marks, begin, end)
             except _Fault as e:
                 raise unreadable(f"{mapping.path}: pulls[{i}] (`{marked.id}`, {marked.bag}): {e}", e.hint) from e
@@ -185,6 +190,7 @@ def _fill(folder: Path, mapping: BagMapping, tell: Callable[[int, int], None] | 
             # The traces of all bags together may be large.
             rows[i].trace = rows[i].after = np.zeros((0, 4))
             wanted |= {folder / "images" / f"{marked.id}_{name}.png": place for name, place in rows[i].images.items()}
+        notes += _other_staircases(signals, list(zip(begins, ends, strict=True)))
         if wanted:
             (folder / "images").mkdir(exist_ok=True)
             read_images(signals, wanted)
@@ -193,7 +199,24 @@ def _fill(folder: Path, mapping: BagMapping, tell: Callable[[int, int], None] | 
     _write_table(folder, mapping, [rows[i] for i in range(len(mapping.pulls))])
     still = sum(not pull.moved for pull in rows.values())
     unmoved = f"the motion of the tool was not recorded (topics.pose, topics.joint_states): {still} pulls have no trace"
-    return [unmoved] if still else []
+    return [*notes, unmoved] if still else notes
+
+
+def _other_staircases(signals: Signals, spans: list[tuple[int, int]]) -> list[str]:
+    """Where the command rises outside all pulls of a bag."""
+    command = signals.series.get("command")
+    if command is None:
+        return []
+    up = command.values[:, 0] > 0.0
+    rises = command.ns[up & ~np.concatenate([[False], up[:-1]])]
+    # The command may have risen before the mark of its pull.
+    last = [command.ns[up & (command.ns <= begin)][-1:] for begin, _ in spans]
+    begun = {int(rises[rises <= ns[0]][-1]) for ns in last if ns.size}
+    other = [int(ns) for ns in rises if int(ns) not in begun and not any(low <= ns <= high for low, high in spans)]
+    if not other:
+        return []
+    at = ", ".join(f"{plain(round(signals.seconds(ns), 3))} s" for ns in other[:5]) + (", ..." if len(other) > 5 else "")
+    return [f"{signals.bag}: the command rises at {at} too, in no pull: a `[[pulls]]` with `from_s` reads it"]
 
 
 class _Fault(Exception):

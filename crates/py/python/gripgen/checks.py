@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import operator
+import os
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -34,6 +35,17 @@ def _with_hint(kind: type[AnyError], message: str, hint: str | None) -> AnyError
     error = kind(f"{message}\nhint: {hint}" if hint else message)
     error.hint = hint
     return error
+
+
+def needs(what: str, package: str, extra: str) -> ImportError:
+    """The exception of a package that is not there, with the extra of gripgen that brings it."""
+    return ImportError(f"{what} needs {package}: pip install 'gripgen[{extra}]'", name=package)
+
+
+def absolute(path: str | os.PathLike[str]) -> str:
+    """A path that holds wherever it is opened: Hydra, Ray and launchers change the folder. `asset:...` is the same everywhere."""
+    text = os.fspath(path)
+    return text if text.startswith("asset:") else os.path.abspath(text)
 
 
 def known_statuses(status: str | Sequence[str]) -> tuple[str, ...]:

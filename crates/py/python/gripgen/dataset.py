@@ -73,6 +73,8 @@ def load(
 ) -> Dataset:
     """Open a run folder or a folder with `pulls.csv`; an fsspec URL (`s3://...`) is copied into `cache_dir` first.
 
+    A relative path holds from where the program is now: the dataset keeps the absolute one, so that it can be read after the folder was changed.
+
     Rows are kept whose status is in `status` (slipped, no_contact, censored, suspect, failed). A censored pull ended
     before the jaws slipped: its label is a lower bound, so it is left out unless asked for; a failed sample has neither
     label nor images. A suspect pull has a label that recorded evidence contradicts, and says in `status_reason` how:
@@ -93,6 +95,7 @@ def load(
     text = os.fspath(path)
     if remote.is_url(text):
         text = remote.fetch(text, cache_dir)
+    text = checks.absolute(text)
     kept = (*asked, "suspect") if suspect and "suspect" not in asked else asked
     checks.one_of("label", label, LABELS)
     found = Dataset(text, status=kept, label=label, _opened=(os.getpid(), _core.Dataset(text)))
@@ -226,12 +229,16 @@ class Dataset(Sequence[Sample]):
         """All columns without images and traces, as a pandas DataFrame or (`to="arrow"`) a pyarrow Table."""
         columns = {name: self.column(name) for name in self._columns()}
         if to == "pandas":
-            import pandas
-
+            try:
+                import pandas
+            except ImportError as e:
+                raise checks.needs("table()", "pandas", "table") from e
             return pandas.DataFrame(columns)
         if to == "arrow":
-            import pyarrow
-
+            try:
+                import pyarrow
+            except ImportError as e:
+                raise checks.needs('table(to="arrow")', "pyarrow", "table") from e
             return pyarrow.table({name: pyarrow.array(values.tolist()) for name, values in columns.items()})
         raise checks.refusal(f"to = {to!r} is neither 'pandas' nor 'arrow'")
 

@@ -6,12 +6,17 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
 
 from . import _core, checks
+
+try:
+    import gymnasium as gym
+    from gymnasium.vector import AutoresetMode, VectorEnv
+    from gymnasium.vector.utils import batch_space
+except ImportError as e:
+    raise checks.needs("gripgen.envs", "gymnasium", "gym") from e
+
 from .simulation import BASELINE, Sim
 
 #: What an episode draws: a number or word stays, a list is chosen from, a pair `(low, high)` is uniform.

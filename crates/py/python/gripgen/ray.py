@@ -15,10 +15,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import fsspec
-import ray
+from . import _core, checks
 
-from . import _core
+try:
+    import fsspec
+    import ray
+except ImportError as e:
+    raise checks.needs("gripgen.ray", "ray", "ray") from e
+
 from .remote import is_url, publish
 from .sweeps import SweepSummary
 
@@ -110,11 +114,16 @@ def sweep(
 
 
 def _broken(store: _Store, done: set[int], local: Path) -> set[int]:
-    """Shards whose file has not the size that its sidecar says, or whose sidecar is damaged."""
+    """Shards whose file has not the size that its sidecar says, or whose sidecar is damaged. One of another version is neither."""
     broken = set()
     for shard in done:
+        name = f"shard-{shard:05}.json"
         try:
-            wanted = json.loads(store.read(f"shard-{shard:05}.json"))["bytes"]
+            sidecar = json.loads(store.read(name))
+            version = sidecar.get("gripgen_version", _core.__version__)
+            if version != _core.__version__:
+                raise _core.GripgenError(f"{store.root}/{name}: gripgen {version} made it, this is {_core.__version__}")
+            wanted = sidecar["bytes"]
         except (ValueError, KeyError, TypeError):
             broken.add(shard)
             continue

@@ -39,7 +39,12 @@ def fetch(url: str, cache_dir: str | os.PathLike[str] | None = None) -> str:
         import fsspec
     except ImportError as e:
         raise unreadable(f"{url}: reading URLs needs fsspec", "pip install 'gripgen[remote]'") from e
-    files, root = fsspec.core.url_to_fs(url)
+    try:
+        files, root = fsspec.core.url_to_fs(url)
+    except ImportError as e:
+        kind = url.split("://")[0]
+        hint = "pip install 'gripgen[s3]'" if kind == "s3" else f"install what fsspec needs for {kind}: {e}"
+        raise unreadable(f"{url}: a package of fsspec is not there", hint) from e
     root = root.rstrip("/")
     local = Path(cache_dir or default_cache()) / hashlib.sha256(url.encode()).hexdigest()[:16]
     local.mkdir(parents=True, exist_ok=True)
@@ -60,7 +65,7 @@ def fetch(url: str, cache_dir: str | os.PathLike[str] | None = None) -> str:
         if (local / f"{stem}.json").exists() and (local / f"{stem}.mcap").exists():
             return
         sidecar = files.cat_file(names[f"{stem}.json"])
-        wanted = json.loads(sidecar)["sha256"]
+        wanted = json.loads(sidecar).get("sha256")
         _copy(files, names[f"{stem}.mcap"], local / f"{stem}.mcap")
         found = hashlib.sha256((local / f"{stem}.mcap").read_bytes()).hexdigest()
         if found != wanted:

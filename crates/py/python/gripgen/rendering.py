@@ -36,7 +36,7 @@ def render(
     x_px: float | None = None,
     y_px: float | None = None,
     rotation_deg: float = 0.0,
-    scale_mm_per_unit: float = 1.0,
+    scale_mm_per_unit: float | None = None,
 ) -> Rendered:
     """Press a mesh or a surface into a sensor and look at it.
 
@@ -48,7 +48,7 @@ def render(
     in mm: above 0 it indents, `-inf` is no surface. `depth_mm` moves the whole surface until its highest point is so deep.
 
     `sensor` is a sensor file (`asset:sensors/gelsight_r15/sensor.npz` is a shipped one), `scale_mm_per_unit` the unit of mesh
-    or heights. Raises ConfigError where a file, a shape or a length cannot be.
+    or heights: 1 unless it is given, 1000 of a GLB. Raises ConfigError where a file, a shape or a length cannot be.
     """
     source = mesh_or_heights
     if not isinstance(source, str | os.PathLike):

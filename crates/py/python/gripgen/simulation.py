@@ -61,8 +61,10 @@ class Pull:
 
     def plot(self) -> Figure:
         """Both images, and the pull curve with the point of slip. Needs matplotlib."""
-        from matplotlib.figure import Figure
-
+        try:
+            from matplotlib.figure import Figure
+        except ImportError as e:
+            raise checks.needs("Pull.plot()", "matplotlib", "plot") from e
         figure = Figure(figsize=(9, 3), layout="constrained")
         axes = figure.subplots(1, 3, width_ratios=[1, 1, 1.4])
         for axis, name, image in zip(axes, ("left", "right"), self.images if self.images is not None else ()):
@@ -99,7 +101,7 @@ class Sim:
         images: bool = True,
         set: Mapping[str, Any] | None = None,
     ) -> None:
-        self._arguments = (os.fspath(twin), dict(set or {}), mechanics, images)
+        self._arguments = (checks.absolute(twin), dict(set or {}), mechanics, images)
         self._core = _core.Simulator(*self._arguments)
         self._images = images
 
@@ -152,14 +154,22 @@ class Sim:
         trace: bool = True,
         threads: int | None = None,
     ) -> list[Pull]:
-        """Many pulls in one call, shared by `threads` (all cores if None); pull i has the index `first_index + i`."""
+        """Many pulls in one call, shared by `threads` (all cores if None); pull i has the index `first_index + i`.
+
+        Ctrl-C ends it after the pulls under way. The KeyboardInterrupt has those that were made as its attribute `pulls`, with
+        their indices: the same call makes the same ones again.
+        """
         with_images = self._images if images is None else images
         if with_images and not self._images:
             raise checks.refusal("this Sim was made without images", "Sim(..., images=True)")
         threads = os.cpu_count() or 1 if threads is None else threads
-        found = self._core.pulls(
-            [dict(values) for values in asked], seed, first_index, with_images, trace, threads
-        )
+        try:
+            found = self._core.pulls(
+                [dict(values) for values in asked], seed, first_index, with_images, trace, threads
+            )
+        except KeyboardInterrupt as e:
+            e.pulls = [Pull(**values) for values in getattr(e, "made", ())]  # type: ignore[attr-defined]
+            raise
         return [Pull(**values) for values in found]
 
 

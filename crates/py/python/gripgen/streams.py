@@ -63,13 +63,14 @@ def stream(
     With `video=True` a batch is a `FilmBatch`: a film of each pull too, of a sweep with `[images] during_pull`, as `gg.load(..., video=True)`
     gives it. A film of 24 frames takes 40 MB: choose `batch_size` and `ahead` (one batch if None) by that.
 
-    `state_dict` and `load_state_dict` continue where a training stopped.
+    `state_dict` and `load_state_dict` continue where a training stopped. An iterator belongs to the process that began it: in a child that
+    was forked off it raises DataError. The stream itself can be iterated over anywhere.
 
     Raises ConfigError for what the configuration forbids, and for an argument that cannot be.
     """
     size, workers = checks.rows_of_batch(batch_size), jobs or os.cpu_count() or 1
     found = Stream(
-        config=os.fspath(config),
+        config=checks.absolute(config),
         batch_size=size,
         columns=tuple(columns),
         status=checks.known_statuses(status),

@@ -6,7 +6,14 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-import torch
+
+from . import checks
+
+try:
+    import torch
+except ImportError as e:
+    raise checks.needs("gripgen.torch", "torch", "train") from e
+
 from torch.utils.data import Dataset as _TorchDataset
 from torch.utils.data import IterableDataset as _TorchIterableDataset
 from torch.utils.data import get_worker_info

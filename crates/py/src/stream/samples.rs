@@ -58,6 +58,16 @@ pub enum StreamError {
     /// A row that cannot be written.
     #[error(transparent)]
     Row(#[from] Arc<PictureError>),
+    /// The threads that make samples are those of the process that began the stream.
+    #[error(
+        "this stream was begun in another process ({begun_by}) and has no threads in this one ({read_by})"
+    )]
+    Forked {
+        /// The process that began it.
+        begun_by: u32,
+        /// The process that reads it.
+        read_by: u32,
+    },
     /// A bug of ours beside the sample itself, whose own make it a failed one.
     #[error("internal error in sample {index}, beside its simulation; please report it")]
     Internal {
@@ -99,6 +109,8 @@ struct Shared {
 pub struct SampleStream {
     shared: Arc<Shared>,
     workers: Vec<JoinHandle<()>>,
+    /// The process that the workers are threads of. A child that was forked off has the memory and not the threads.
+    process: u32,
 }
 
 impl SampleStream {
@@ -118,15 +130,20 @@ impl SampleStream {
                 std::thread::spawn(move || shared.work())
             })
             .collect();
-        Self { shared, workers }
+        Self { shared, workers, process: std::process::id() }
     }
 
     /// The next sample, waiting for at most so long.
     ///
     /// # Errors
     ///
-    /// A graphics processor that is lost, or a sample that cannot be written down; nothing comes after it.
+    /// A graphics processor that is lost, or a sample that cannot be written down: nothing comes after it. Another process than the one
+    /// that began the stream.
     pub fn next(&self, wait: Duration) -> Result<Streamed, StreamError> {
+        let (begun_by, read_by) = (self.process, std::process::id());
+        if begun_by != read_by {
+            return Err(StreamError::Forked { begun_by, read_by });
+        }
         let shared = &self.shared;
         let mut state = shared.lock();
         if shared.index(state.read).is_none() {
@@ -148,6 +165,11 @@ impl SampleStream {
 
 impl Drop for SampleStream {
     fn drop(&mut self) {
+        if self.process != std::process::id() {
+            // There is nobody to tell and nobody to wait for; the lock may be held by a thread that is not here.
+            self.workers.drain(..).for_each(std::mem::forget);
+            return;
+        }
         self.shared.lock().stop = true;
         self.shared.changed.notify_all();
         for worker in self.workers.drain(..) {

@@ -1,6 +1,7 @@
-//! The JSON files of a run folder: `run.json` and the sidecars.
+//! The JSON files of a run folder: `run.json` and the sidecars. Fields that this version does not know are passed over.
 
 use super::FolderError;
+use crate::VERSION;
 use crate::index::{INDEX_COLUMNS, status_name};
 use crate::proto::gripgen_v1::Status;
 use serde::{Deserialize, Serialize};
@@ -13,7 +14,6 @@ pub const SHARD_SCHEMA: &str = "gripgen.shard/1";
 
 /// `run.json`: what a folder is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct RunInfo {
     /// [`RUN_SCHEMA`].
     pub schema: String,
@@ -44,7 +44,6 @@ pub struct RunInfo {
 
 /// The file beside a finished shard.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Sidecar {
     /// [`SHARD_SCHEMA`].
     pub schema: String,
@@ -82,14 +81,71 @@ pub(super) fn json<T: Serialize>(value: &T) -> Vec<u8> {
     text
 }
 
+/// What every version writes into these files.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Heading {
+    schema: String,
+    gripgen_version: String,
+    config_sha256: String,
+}
+
+impl Heading {
+    fn of(bytes: &[u8]) -> Self {
+        serde_json::from_slice(bytes).unwrap_or_default()
+    }
+
+    /// Refuses another schema of the same name.
+    fn check(&self, path: &Path, wanted: &str) -> Result<(), FolderError> {
+        let name = |schema: &str| schema.split('/').next().map(String::from);
+        if self.schema != wanted && name(&self.schema) == name(wanted) {
+            return Err(self.not_read(path, format!("its schema is `{}`, `{wanted}` is read", self.schema)));
+        }
+        Ok(())
+    }
+
+    fn not_read(&self, path: &Path, problem: String) -> FolderError {
+        FolderError::OtherVersion { path: path.into(), problem, maker: self.gripgen_version.clone() }
+    }
+}
+
+/// The sidecar of a shard of a run, from its bytes; `None` if it is damaged or that of another run. One that another version made is
+/// never taken for damaged.
+pub(super) fn parse_sidecar(
+    path: &Path,
+    bytes: &[u8],
+    run: &RunInfo,
+) -> Result<Option<Sidecar>, FolderError> {
+    let heading = Heading::of(bytes);
+    heading.check(path, SHARD_SCHEMA)?;
+    if heading.schema != SHARD_SCHEMA || heading.config_sha256 != run.config_sha256 {
+        return Ok(None);
+    }
+    let (found, wanted) = (heading.gripgen_version.clone(), run.gripgen_version.clone());
+    if found != wanted {
+        return Err(FolderError::Mixed { path: path.into(), found, wanted });
+    }
+    let columns = INDEX_COLUMNS.len() + run.extra_columns.len();
+    let problem = match serde_json::from_slice::<Sidecar>(bytes) {
+        Err(e) => e.to_string(),
+        Ok(sidecar) => match sidecar.rows.iter().find(|row| row.len() != columns) {
+            None => return Ok(Some(sidecar)),
+            Some(row) => format!("its rows have {} cells, {columns} are known", row.len()),
+        },
+    };
+    if heading.gripgen_version == VERSION { Ok(None) } else { Err(heading.not_read(path, problem)) }
+}
+
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<RunInfo, FolderError> {
     let invalid = |problem: String| Err(FolderError::Invalid { path: path.into(), problem });
+    let heading = Heading::of(bytes);
+    heading.check(path, RUN_SCHEMA)?;
     let info: RunInfo = match serde_json::from_slice(bytes) {
         Ok(info) => info,
         Err(e) => return invalid(e.to_string()),
     };
     if info.schema != RUN_SCHEMA {
-        return invalid(format!("its schema is `{}`, this gripgen reads `{RUN_SCHEMA}`", info.schema));
+        return invalid(format!("its schema is `{}`, `{RUN_SCHEMA}` is read", info.schema));
     }
     if info.shard_samples == 0 || info.shards != info.samples.div_ceil(info.shard_samples) {
         let (samples, size, shards) = (info.samples, info.shard_samples, info.shards);

@@ -9,9 +9,23 @@ use serde::Deserialize;
 /// A tree of nodes that is deeper than this is none.
 const DEEPEST: usize = 64;
 
-/// Types of components: unsigned 8, 16 and 32 bits, and 32-bit floats.
+/// Types of numbers and their bytes: unsigned 8, 16 and 32 bits for corners of faces; for places 32-bit floats and, with the extension
+/// `KHR_mesh_quantization`, signed and unsigned 8 and 16 bits.
 const WHOLE: [(u32, usize); 3] = [(5121, 1), (5123, 2), (5125, 4)];
-const FLOAT: [(u32, usize); 1] = [(5126, 4)];
+const PLACE: [(u32, usize); 5] = [(5126, 4), (5120, 1), (5121, 1), (5122, 2), (5123, 2)];
+
+/// How extensions begin that a file may need and that do not move a vertex: looks, lights, notes, motions; and one that is read.
+const HARMLESS: [&str; 9] = [
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "MSFT_texture_",
+    "KHR_lights_",
+    "EXT_lights_",
+    "KHR_animation_",
+    "KHR_xmp",
+    "KHR_mesh_quantization",
+];
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -79,6 +93,8 @@ struct Accessor {
     count: usize,
     #[serde(rename = "type")]
     shape: String,
+    #[serde(default)]
+    normalized: bool,
     sparse: Option<serde_json::Value>,
 }
 
@@ -100,19 +116,35 @@ struct Buffer {
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
     let (json, blob) = chunks(bytes)?;
     let document: Document = serde_json::from_slice(json).map_err(|e| bad(e.to_string()))?;
-    if let Some(extension) = document.extensions_required.first() {
-        return Err(bad(format!("it needs the extension `{extension}`: export it without compression")));
+    let needed = &document.extensions_required;
+    if let Some(extension) = needed.iter().find(|name| !HARMLESS.iter().any(|start| name.starts_with(start)))
+    {
+        let extension = super::text::quoted(extension.as_bytes());
+        return Err(bad(format!("it needs the extension {extension}"))
+            .with_hint("export it without compression, as plain GLB"));
     }
-    let scene = look_up(&document.scenes, document.scene.unwrap_or(0), "scene")?;
-    let mut reading = Reading { document: &document, blob, triangles: Vec::new() };
-    for &node in &scene.nodes {
+    let roots: Vec<usize> = if document.scenes.is_empty() && document.scene.is_none() {
+        // A file without a scene is a library: all of it is the part.
+        let mut roots = vec![true; document.nodes.len()];
+        for &child in document.nodes.iter().flat_map(|node| &node.children) {
+            if let Some(root) = roots.get_mut(child) {
+                *root = false;
+            }
+        }
+        (0..roots.len()).filter(|&node| roots[node]).collect()
+    } else {
+        look_up(&document.scenes, document.scene.unwrap_or(0), "scene")?.nodes.clone()
+    };
+    let placed = vec![false; document.nodes.len()];
+    let mut reading = Reading { document: &document, blob, placed, triangles: Vec::new() };
+    for node in roots {
         reading.node(node, &Matrix4::identity(), 0)?;
     }
     Ok(reading.triangles)
 }
 
 fn bad(problem: impl Into<String>) -> MeshError {
-    MeshError::File(format!("not a GLB file that can be read: {}", problem.into()))
+    MeshError::file(format!("not a GLB file that can be read: {}", problem.into()))
 }
 
 fn look_up<'a, T>(all: &'a [T], at: usize, what: &str) -> Result<&'a T, MeshError> {
@@ -151,6 +183,8 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), MeshError> {
 struct Reading<'a> {
     document: &'a Document,
     blob: &'a [u8],
+    /// Nodes that have a place: a node has one parent.
+    placed: Vec<bool>,
     triangles: Vec<Triangle>,
 }
 
@@ -161,6 +195,9 @@ impl<'a> Reading<'a> {
         }
         let document = self.document;
         let node = look_up(&document.nodes, at, "node")?;
+        if std::mem::replace(&mut self.placed[at], true) {
+            return Err(bad(format!("node {at} has two parents")));
+        }
         let here = above * node.transform();
         if let Some(mesh) = node.mesh {
             for primitive in &look_up(&document.meshes, mesh, "mesh")?.primitives {
@@ -171,13 +208,13 @@ impl<'a> Reading<'a> {
     }
 
     fn primitive(&mut self, primitive: &Primitive, here: &Matrix4<f32>) -> Result<(), MeshError> {
-        let places = primitive.attributes.position.ok_or_else(|| bad("a primitive has no POSITION"))?;
+        // Without places nothing is drawn.
+        let Some(accessor) = primitive.attributes.position else { return Ok(()) };
         let places: Vec<[f32; 3]> = self
-            .values(places, "VEC3", 3, &FLOAT)?
+            .values(accessor, "VEC3", 3, &PLACE)?
             .map(|bytes| {
-                let float =
-                    |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
-                let moved = here * Point3::new(float(0), float(4), float(8)).to_homogeneous();
+                let component = |i: usize| self.document.accessors[accessor].component(bytes, i);
+                let moved = here * Point3::new(component(0), component(1), component(2)).to_homogeneous();
                 [moved.x, moved.y, moved.z]
             })
             .collect();
@@ -204,7 +241,10 @@ impl<'a> Reading<'a> {
         if found > MAX_TRIANGLES {
             return Err(MeshError::too_many(found));
         }
+        // What a transform mirrors is wound the other way round (3.7.4).
+        let mirrored = here.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
         for [a, b, c] in corners {
+            let (b, c) = if mirrored { (c, b) } else { (b, c) };
             let at = |i: usize| look_up(&places, i, "vertex").copied();
             self.triangles.push([at(a)?, at(b)?, at(c)?]);
         }
@@ -247,6 +287,21 @@ impl<'a> Reading<'a> {
             bad(format!("accessor {at} has {count} values, which {} bytes do not hold", self.blob.len()))
         })?;
         Ok((0..count).map(move |i| &data[i * stride..i * stride + size]))
+    }
+}
+
+impl Accessor {
+    /// A component of one of its values (3.6.2.2).
+    fn component(&self, bytes: &[u8], i: usize) -> f32 {
+        let pair = |i: usize| [bytes[2 * i], bytes[2 * i + 1]];
+        let (value, one) = match self.component_type {
+            5120 => (f32::from(bytes[i] as i8), 127.0),
+            5121 => (f32::from(bytes[i]), 255.0),
+            5122 => (f32::from(i16::from_le_bytes(pair(i))), 32767.0),
+            5123 => (f32::from(u16::from_le_bytes(pair(i))), 65535.0),
+            _ => (f32::from_le_bytes([0, 1, 2, 3].map(|k| bytes[4 * i + k])), 1.0),
+        };
+        if self.normalized { (value / one).max(-1.0) } else { value }
     }
 }
 

@@ -1,107 +1,161 @@
 //! STL, binary and ASCII.
 //!
-//! A file is binary when its size is 84 + 50 n for the count n at byte 80 (many binary files begin with the
-//! word `solid`), ASCII when it begins with `solid`, and otherwise neither.
+//! A file is binary when it holds the triangles that its header promises: many binary files begin with the word `solid`, and the count
+//! in an ASCII file, four letters, is larger than any file. It is ASCII when it is text. Bytes behind the last triangle are passed over,
+//! as other readers do, unless they are triangles.
 
+use super::text::{coordinates, is_text, lines, quoted, words};
 use super::{MAX_TRIANGLES, MeshError, TriMesh, Triangle};
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;
 
-pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
-    let size = bytes.len();
-    let count =
-        (bytes.len() >= HEADER).then(|| u32::from_le_bytes([bytes[80], bytes[81], bytes[82], bytes[83]]));
-    if let Some(count) = count {
-        let expected = HEADER as u64 + RECORD as u64 * u64::from(count);
-        if expected == bytes.len() as u64 {
-            return read_binary(&bytes[HEADER..], count);
-        }
-    }
-    if bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) {
-        return read_ascii(bytes);
-    }
-    let Some(count) = count else {
-        let problem = format!("not an STL file: {size} bytes, a binary header alone has 84");
-        return Err(MeshError::File(problem));
-    };
-    let expected = HEADER as u64 + RECORD as u64 * u64::from(count);
-    if count as usize > MAX_TRIANGLES {
-        return Err(MeshError::too_many(count));
-    }
-    Err(MeshError::File(if expected > size as u64 {
-        format!(
-            "the file is cut off: its header promises {count} triangles ({expected} bytes), it has {size} bytes"
-        )
-    } else {
-        format!(
-            "not an STL file: {size} bytes are not 84 + 50 x the {count} triangles its header promises, \
-             and it does not begin with `solid`"
-        )
-    }))
+/// Whether a file is exactly the triangles that its header promises.
+pub(super) fn is_binary(bytes: &[u8]) -> bool {
+    promised(bytes).is_some_and(|(count, size)| count > 0 && size == bytes.len() as u64)
 }
 
-fn read_binary(records: &[u8], count: u32) -> Result<Vec<Triangle>, MeshError> {
+/// Triangles that the header promises, and the size of the file with them.
+fn promised(bytes: &[u8]) -> Option<(u32, u64)> {
+    let count = u32::from_le_bytes(*bytes.get(80..HEADER)?.first_chunk()?);
+    Some((count, HEADER as u64 + RECORD as u64 * u64::from(count)))
+}
+
+pub(super) fn read(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
+    let size = bytes.len() as u64;
+    let Some((count, expected)) = promised(bytes).filter(|_| !is_text(bytes)) else {
+        return if is_text(bytes) {
+            read_ascii(bytes)
+        } else {
+            Err(MeshError::file(format!("not an STL file: {size} bytes, a binary header alone has {HEADER}")))
+        };
+    };
+    if expected > size {
+        let swapped = u64::from(count.swap_bytes());
+        if HEADER as u64 + RECORD as u64 * swapped == size {
+            let problem =
+                format!("an STL file with its bytes in reverse order (big-endian): {swapped} triangles");
+            return Err(MeshError::file(problem));
+        }
+        let room = (size - HEADER as u64) / RECORD as u64;
+        return Err(MeshError::file(format!(
+            "the file is cut off, or no STL file: its header promises {count} triangles ({expected} bytes), it has room for {room} \
+             ({size} bytes)"
+        ))
+        .with_hint("copy or download it again, or export the part again"));
+    }
     if count as usize > MAX_TRIANGLES {
         return Err(MeshError::too_many(count));
     }
-    let float = |record: &[u8], i: usize| {
+    let (records, rest) = bytes[HEADER..].split_at(RECORD * count as usize);
+    let more = rest.len() / RECORD;
+    if more > 0 && rest.len() % RECORD == 0 && rest.iter().any(|&b| b != 0) {
+        let room = count as usize + more;
+        return Err(MeshError::file(format!("the header promises {count} triangles, the file has {room}")));
+    }
+    if is_binary(rest) {
+        return Err(MeshError::file(format!(
+            "a second STL file begins behind the {count} triangles of the first"
+        ))
+        .with_hint("write the bodies into one STL file, or name one of them"));
+    }
+    Ok(read_binary(records))
+}
+
+fn read_binary(records: &[u8]) -> Vec<Triangle> {
+    let float = |record: &[u8; RECORD], i: usize| {
         f32::from_le_bytes([record[4 * i], record[4 * i + 1], record[4 * i + 2], record[4 * i + 3]])
     };
     // Floats 0..3 are the facet normal, which the corners already tell.
-    Ok(records
-        .chunks_exact(RECORD)
-        .map(|r| [3, 6, 9].map(|first| [float(r, first), float(r, first + 1), float(r, first + 2)]))
-        .collect())
+    let triangle =
+        |r: &[u8; RECORD]| [3, 6, 9].map(|first| [float(r, first), float(r, first + 1), float(r, first + 2)]);
+    records.as_chunks::<RECORD>().0.iter().map(triangle).collect()
 }
 
+/// Reads the grammar word by word; lines only end names and comments, which begin with `;` or `#`.
 fn read_ascii(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
+    let spoken =
+        lines(bytes).filter(|(_, line)| !matches!(line.trim_ascii_start().first(), Some(b';' | b'#')));
+    let mut text =
+        Ascii { words: spoken.flat_map(|(line, text)| words(text).map(move |word| (line, word))), line: 1 };
     let mut triangles = Vec::new();
-    let mut corners: Vec<[f32; 3]> = Vec::with_capacity(3);
-    let mut line = 0;
-    let mut ended = false;
-    for raw in bytes.split(|&b| b == b'\n') {
-        line += 1;
-        let text = String::from_utf8_lossy(raw);
-        let mut words = text.split_ascii_whitespace();
-        let Some(keyword) = words.next() else { continue };
-        match keyword.to_ascii_lowercase().as_str() {
-            "vertex" => {
-                if corners.len() == 3 {
-                    return Err(MeshError::syntax(line, "a fourth vertex in one facet"));
-                }
-                corners.push(vertex(words, line)?);
+    text.expect(&["solid"])?;
+    loop {
+        text.skip_name();
+        while text.expect(&["facet", "endsolid"])? == 0 {
+            if triangles.len() == MAX_TRIANGLES {
+                return Err(MeshError::too_many(format!("more than {MAX_TRIANGLES}")));
             }
-            "endfacet" => {
-                let [a, b, c] = corners[..] else {
-                    let problem = format!("the facet ends after {} of 3 vertices", corners.len());
-                    return Err(MeshError::syntax(line, &problem));
-                };
-                if triangles.len() == MAX_TRIANGLES {
-                    return Err(MeshError::too_many(MAX_TRIANGLES + 1));
-                }
-                triangles.push([a, b, c]);
-                corners.clear();
+            triangles.push(text.facet()?);
+        }
+        text.skip_name();
+        if text.words.clone().next().is_none() {
+            return Ok(triangles);
+        }
+        text.expect(&["solid"])?;
+    }
+}
+
+/// Words that are left, and the line of the last one.
+struct Ascii<I> {
+    words: I,
+    line: usize,
+}
+
+impl<'a, I: Iterator<Item = (usize, &'a [u8])> + Clone> Ascii<I> {
+    /// The next word, which must be one of `wanted`: which one.
+    fn expect(&mut self, wanted: &[&str]) -> Result<usize, MeshError> {
+        let all = wanted.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(" or ");
+        let Some((line, word)) = self.words.next() else {
+            return Err(MeshError::syntax(
+                self.line,
+                format!("the file ends where {all} is expected: it is cut off"),
+            ));
+        };
+        self.line = line;
+        wanted.iter().position(|w| word.eq_ignore_ascii_case(w.as_bytes())).ok_or_else(|| {
+            MeshError::syntax(line, format!("{} stands where {all} is expected", quoted(word)))
+        })
+    }
+
+    /// Passes over a name: the rest of the line, or what stands before the first facet in it.
+    fn skip_name(&mut self) {
+        let is = |found: Option<(usize, &[u8])>, wanted: &[&str]| {
+            found.is_some_and(|(_, word)| wanted.iter().any(|w| word.eq_ignore_ascii_case(w.as_bytes())))
+        };
+        loop {
+            let mut ahead = self.words.clone();
+            let next = ahead.next();
+            let facet = is(next, &["facet"]) && is(ahead.next(), &["normal", "outer"]);
+            if next.is_none_or(|(line, _)| line != self.line) || facet || is(next, &["endsolid"]) {
+                return;
             }
-            "endsolid" => ended = true,
-            "solid" | "facet" | "outer" | "endloop" => {}
-            other => return Err(MeshError::syntax(line, &format!("unknown keyword `{other}`"))),
+            self.words.next();
         }
     }
-    if !ended || !corners.is_empty() {
-        return Err(MeshError::syntax(line, "the file ends before `endsolid`"));
-    }
-    Ok(triangles)
-}
 
-fn vertex<'a>(mut words: impl Iterator<Item = &'a str>, line: usize) -> Result<[f32; 3], MeshError> {
-    let mut coordinates = [0.0; 3];
-    for (i, c) in coordinates.iter_mut().enumerate() {
-        let missing = || MeshError::syntax(line, &format!("a vertex has 3 coordinates, found {i}"));
-        let word = words.next().ok_or_else(missing)?;
-        *c = word.parse().map_err(|_| MeshError::syntax(line, &format!("`{word}` is not a number")))?;
+    /// The corners of a facet, behind the word `facet`.
+    fn facet(&mut self) -> Result<Triangle, MeshError> {
+        if self.expect(&["normal", "outer"])? == 0 {
+            // The corners tell the normal; some programs write `nan`, and some nothing.
+            for _ in 0..3 {
+                if self.words.clone().next().is_some_and(|(_, word)| !word.eq_ignore_ascii_case(b"outer")) {
+                    self.words.next();
+                }
+            }
+            self.expect(&["outer"])?;
+        }
+        self.expect(&["loop"])?;
+        let mut corners = [[0.0; 3]; 3];
+        for corner in &mut corners {
+            self.expect(&["vertex"])?;
+            let line = self.line;
+            *corner = coordinates(self.words.by_ref().take(3).map(|(_, word)| word), line)?;
+        }
+        self.expect(&["endloop"])?;
+        self.expect(&["endfacet"])?;
+        Ok(corners)
     }
-    Ok(coordinates)
 }
 
 /// The bytes of a binary STL file of `mesh`, in units of `metres_per_unit`.

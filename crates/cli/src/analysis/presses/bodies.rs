@@ -5,13 +5,10 @@ use crate::mesh_file::read_mesh;
 use gripgen_measured::PressedBody;
 use gripgen_tactile::Grid;
 use gripgen_tactile::presses::{Indenter, IndenterPose};
-use gripgen_twin::{TactileImage, TriMesh};
+use gripgen_twin::{TactileImage, TriMesh, usual_scale_mm_per_unit};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Meshes of indenters are in millimetres.
-const METRES_PER_UNIT: f64 = 1e-3;
 
 /// The bodies of a folder; each mesh is read once.
 pub(super) struct PressBodies {
@@ -39,7 +36,10 @@ impl PressBodies {
             metres_per_px: self.metres_per_px,
         };
         if !self.meshes.contains_key(&body.mesh) {
-            self.meshes.insert(body.mesh.clone(), read_mesh(&self.folder.join(&body.mesh), METRES_PER_UNIT)?);
+            let path = self.folder.join(&body.mesh);
+            let extension = path.extension().unwrap_or_default().to_string_lossy();
+            let mesh = read_mesh(&path, usual_scale_mm_per_unit(&extension) * 1e-3)?;
+            self.meshes.insert(body.mesh.clone(), mesh);
         }
         let indenter = Indenter::of_mesh(&body.shape, &self.meshes[&body.mesh], at, travel_m, &grid);
         let indenter =
