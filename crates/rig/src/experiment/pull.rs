@@ -292,7 +292,7 @@ impl Experiment<'_> {
         run: i32,
         preload_n: f64,
     ) -> Result<(), Fault> {
-        let pulling = || self.rows.iter().filter(|row| row.phase_of(run) == Some(Phase::Pulling));
+        let pulling = || self.rows.iter().filter(move |row| row.phase_of(run) == Some(Phase::Pulling));
         let forces = |row: &RobotRow| (row.desired_n, self.signed(planned, row.force[2]));
         let held = pulling().take_while(|row| row.displacement_m.abs() < HELD * campaign.stop_m);
         if let Some(gain) = mirrored(&held.map(forces).collect::<Vec<_>>(), preload_n) {
