@@ -58,6 +58,7 @@ mod large;
 mod later_version;
 // Measured pulls from every place they may be in.
 mod measured;
+mod missing_cells;
 // Two mechanics, one result.
 mod mechanics;
 // Numbers that Wucherer et al. 2023 print.

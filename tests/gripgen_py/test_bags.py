@@ -120,6 +120,8 @@ def test_statuses_that_were_written_down_are_believed(known_lab, tmp_path):
 def test_a_pull_that_holds_is_censored_and_one_without_a_label_failed(known_lab, tmp_path):
     found = read(known_lab, tmp_path, MAPPING.replace("label_tolerance_n", "stop_mm = 50\nlabel_tolerance_n"))
     assert found.status == {"censored": 1}
+    assert "pull one is censored: the pull ends before the slip: its largest displacement is" in found.notes[0]
+    assert found.notes[0].endswith("`stop_mm` is 50 mm")
     shutil.rmtree(found.out)
     found = read(known_lab, tmp_path, MAPPING.replace("tare = true", "along = [0, 1, 0]"))
     assert found.status == {"failed": 1} and "closest 1.200 N" in found.notes[0]

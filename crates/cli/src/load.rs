@@ -94,7 +94,7 @@ const MEASUREMENTS: &str = "measurements are a folder with pulls.csv, sensor.csv
 
 /// What cannot be read as pulls.
 pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
-    if let Some(hint) = e.hint() {
+    if let (LoadPullsError::Bag { .. }, Some(hint)) = (e, e.hint()) {
         return Failure::usage(e).hint(hint);
     }
     let table = |path: &&&Path| {
@@ -104,7 +104,7 @@ pub fn no_pulls(paths: &[&Path], e: &LoadPullsError) -> Failure {
         return a_file(file);
     }
     let known = paths.iter().all(|path| is_pulls(path));
-    Failure::usage(e).hint_if(e.hint().or((!known).then_some(MEASUREMENTS)))
+    Failure::usage(e).hint_if(if known { e.hint() } else { Some(MEASUREMENTS) })
 }
 
 /// Ends of their names.

@@ -173,7 +173,7 @@ mod tests {
         assert!(!part.has_geometry() && (part.mu - 0.42).abs() < 1e-12);
         let silent = effects_of_geometry(&measured, &with);
         assert!(
-            silent.contains(&"area_saturation") && silent.contains(&"defocus") && !silent.contains(&"wear")
+            silent.contains(&"shear_strength") && silent.contains(&"defocus") && !silent.contains(&"wear")
         );
         assert_eq!(effects_of_geometry(&pulls("gear", 0.2), &with), Vec::<&str>::new());
         assert_eq!(

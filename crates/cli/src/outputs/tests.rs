@@ -151,6 +151,7 @@ fn cases() -> Vec<Case> {
         case("effects", "plot", "svg", "load_power_law", true),
         json("campaign", "-o out/c.toml --parts gear --pulls 24", true),
         case("campaign", "out", "toml", "--parts gear --pulls 24 --twin twin.toml", true),
+        case("campaign", "csv", "csv", "-o out/c.toml --parts gear --pulls 24", true),
         json("rig check", "rig.toml", false),
         json("rig teach", "bolt --rig rig.toml", false),
         json("rig rehearse", "rig.toml -o out/rehearsal.json", false),

@@ -136,13 +136,18 @@ fn what_cannot_be_answered_says_so_and_what_cannot_be_read_is_an_error() {
         (pulls(12).replace("max_pull_force_n", "force"), "max_pull_force_n"),
         (pulls(12).replace("p3,", "p2,"), "p2"),
         (pulls(12).replace(",8.", ",nan8."), "line"),
-        (pulls(12).replace("long_shaft", "anvil"), "anvil"),
     ] {
         let folder = folder(&table);
         let refused = run(&["diagnose", folder.path().to_str().unwrap()]);
         assert_code(&refused, 2);
         assert!(text(&refused.stderr).contains(says), "{says}: {}", text(&refused.stderr));
     }
+    // A part that the twin lacks has labels, and no geometry.
+    let anvil = folder(&pulls(12).replace("long_shaft", "anvil"));
+    let found = run(&["diagnose", anvil.path().to_str().unwrap()]);
+    assert_code(&found, 0);
+    let said = text(&found.stdout);
+    assert!(said.contains("the twin has no part `anvil`: one was made for 12 pulls"), "{said}");
 }
 
 /// The next command names the twin that was named, and pulls that were planned are a list for who has no rig of ours.

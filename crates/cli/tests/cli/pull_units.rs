@@ -61,7 +61,7 @@ fn odd_units_and_misspelt_names_are_said_unless_it_is_to_be_quiet() {
     assert!(text(&run(&["info", folder(12, 1.0, 1.0).path().to_str().unwrap()]).stderr).is_empty());
 }
 
-/// One cell makes a column of numbers one of words, and a folder that is named twice would be evidence twice.
+/// One word in a column of numbers is taken for missing, and a folder that is named twice would be evidence twice.
 #[test]
 fn a_word_among_numbers_and_a_folder_named_twice_are_said() {
     let wet = folder(12, 1.0, 1.0);
@@ -77,11 +77,11 @@ fn a_word_among_numbers_and_a_folder_named_twice_are_said() {
         std::fs::write(&at, rows.join("\n")).unwrap();
         text(&run(&["info", wet.path().to_str().unwrap()]).stderr)
     };
-    assert!(
-        with("n/a")
-            .contains("humidity_pct is one of words, because `n/a` (pull p7) is no number and 11 others are")
-    );
-    assert!(!with("").contains("one of words"), "an empty cell is a value that is missing");
+    let said = with("wet");
+    assert!(said.contains("humidity_pct is one of numbers: 1 of 12 cells are words (`wet`)"), "{said}");
+    for missing in ["", "n/a"] {
+        assert!(!with(missing).contains("humidity_pct"), "`{missing}` is a value that is missing");
+    }
     let [plain, dotted] =
         [wet.path().to_path_buf(), wet.path().join(".")].map(|path| path.display().to_string());
     let twice = run(&["diagnose", &plain, "--also", &dotted]);

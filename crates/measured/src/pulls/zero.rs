@@ -116,7 +116,8 @@ mod tests {
     fn a_trace_with_another_clock_is_moved_to_the_first_step() {
         let from_0 = Plan { start_n: 0.0, ..PLAN };
         for zero_s in [0.3, 5.0, -1.25, 1.7e9] {
-            for (plan, row_s, within_s) in [(PLAN, 0.002, 0.0021), (PLAN, 0.1, 0.03), (from_0, 0.002, 0.0021)]
+            for (plan, row_s, within_s) in
+                [(PLAN, 0.002, 0.0021), (PLAN, 0.1, 0.031), (from_0, 0.002, 0.0021)]
             {
                 let trace = staircase(plan, zero_s, row_s, 0.31);
                 let found = find_zero(&trace, plan).unwrap();

@@ -441,7 +441,7 @@ def _summary(folder: Path, mapping: BagMapping, notes: list[str]) -> tuple[int, 
         raise refusal(text.replace(str(folder), str(mapping.path)), _COLUMNS) from e
     status, reasons, ids = columns["status"], columns.get("status_reason"), columns["pull_id"]
     for i, name in enumerate(status):
-        if name in ("suspect", "failed") and reasons is not None:
+        if name in ("censored", "suspect", "failed") and reasons is not None and reasons[i]:
             notes.append(f"pull {ids[i]} is {name}: {reasons[i]}")
     traces = len(list((folder / "traces").glob("*.csv")))
     images = len(list((folder / "images").glob("*_right.png"))) - len(list((folder / "images").glob("*_rest_right.png")))

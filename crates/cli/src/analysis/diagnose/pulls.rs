@@ -14,9 +14,11 @@ use gripgen_identify::pulls::data::{Column, PullData};
 use gripgen_identify::pulls::few_diagnosis::is_few;
 use gripgen_physics::PullPredictor;
 use gripgen_report::pull_report;
+use gripgen_twin::columns::value;
 use gripgen_twin::config::{EffectFile, Twist};
+use gripgen_twin::effects::find;
 use gripgen_twin::predict::PullModel;
-use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Twin};
+use gripgen_twin::{MeasuredPull, MeasuredPulls, TABLE_EFFECT, Twin};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How a diagnosis of pulls is made.
@@ -149,6 +151,11 @@ pub fn diagnose_pull_table(
     }
     let asked = PullOptions { without: options.without };
     let answer = diagnose_pulls(measured, &predictor, &given, &asked, progress);
+    if let Some((rest, note)) = without_gaps(measured, &answer.diagnosis) {
+        let mut found = diagnose_pull_table(&rest, twin, library, options, progress)?;
+        found.diagnosis.notes.push(note);
+        return Ok(found);
+    }
     let edits =
         answer.fits.as_ref().map(|f| edits(f, &answer.diagnosis, measured, &predictor)).unwrap_or_default();
     let report = pull_report(
@@ -170,6 +177,35 @@ pub fn diagnose_pull_table(
     }
     let posterior = answer.fits.map(|fits| fits.posterior);
     Ok(Diagnosed { next, posterior, ..Diagnosed::new(diagnosis, edits, report) })
+}
+
+/// The pulls that have a value in every column that an answer depends on, where some have none: what these columns do to the others is
+/// not known, and would look like something else.
+fn without_gaps(measured: &MeasuredPulls, found: &Diagnosis) -> Option<(MeasuredPulls, String)> {
+    let of_effects = found.effects.iter().filter_map(|e| find(&e.name)).flat_map(|spec| spec.covariates);
+    let unnamed = found.unknown.iter().map(|u| &u.covariate);
+    let unnamed = unnamed.chain(found.residual.iter().flat_map(|left| &left.covariates));
+    let columns: BTreeSet<&str> =
+        of_effects.copied().chain(unnamed.flat_map(|name| name.split('*'))).collect();
+    let written = |name: &str| {
+        let extra = measured.extra.iter().any(|column| column.name == name);
+        extra || measured.recorded.iter().any(|column| column == name)
+    };
+    let columns: Vec<&str> = columns.into_iter().filter(|name| written(name)).collect();
+    let lacks = |pull: &MeasuredPull, name: &str| value(name, pull.view()).is_none();
+    let gaps: Vec<&str> =
+        columns.iter().copied().filter(|name| measured.pulls.iter().any(|p| lacks(p, name))).collect();
+    let rest = measured.kept(|i| gaps.iter().all(|name| !lacks(&measured.pulls[i], name)));
+    let (all, left) = (measured.pulls.len(), rest.pulls.len());
+    // Of many gaps little would be left.
+    (left < all && 2 * left >= all).then(|| {
+        let note = format!(
+            "{} of {all} pulls were left out: they have no {}, on which the answer depends",
+            all - left,
+            gaps.join(" or ")
+        );
+        (rest, note)
+    })
 }
 
 /// That a twin's own effects are looked for again: a fit starts without them, and what is written holds what was found.
