@@ -67,7 +67,7 @@ fn a_column_with_the_name_of_one_of_every_sample_is_refused() {
             .map_err(|e| e.to_string())
     };
     assert_eq!(with("humidity_pct"), Ok(()));
-    for name in ["mu", "index", "shard", "group", "slip_time_s", "failure"] {
+    for name in ["mu_effective", "limit_force_n", "index", "shard", "group", "slip_time_s", "failure"] {
         let said = with(name).unwrap_err();
         assert!(said.contains(&format!("every sample has a `{name}` of its own in index.csv")), "{said}");
     }

@@ -247,7 +247,7 @@ fn check(path: &Path, folder: &RunFolder, pulls: &[RigPull], made: usize) {
     assert_eq!(checked, wanted);
     let rows = Dataset::open(path).unwrap();
     assert_eq!((rows.table().rows(), rows.image_size_px()), (made, Some((320, 240))));
-    assert!(rows.table().numbers("mu").unwrap().iter().all(|x| x.is_nan()));
+    assert!(rows.table().numbers("mu_effective").unwrap().iter().all(|x| x.is_nan()));
     assert_eq!(rows.table().words("failure").unwrap()[2], "no image within 2 s");
     for (row, pull) in pulls.iter().take(made).enumerate() {
         assert_eq!(rows.record(row).unwrap().unwrap().images, pull.images, "pull {row}");

@@ -5,6 +5,7 @@
 
 mod columns;
 mod images;
+mod roles;
 #[cfg(test)]
 mod tests;
 
@@ -18,7 +19,6 @@ use crate::picture::encode_png;
 use crate::proto::gripgen_v1::Sample;
 use crate::reader::{ReadError, Record, ShardReader};
 use crate::shard::RIG_SOURCE;
-use gripgen_twin::columns::{Role, role_of};
 use gripgen_twin::{Jaw, PerJaw, PullTrace, TactileImage};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -239,21 +239,6 @@ impl Dataset {
     /// One row per sample: what was varied, the label, how it ended. Of measured pulls the columns of their table.
     pub fn table(&self) -> &Table {
         &self.table
-    }
-
-    /// What a column is to somebody who trains on it.
-    pub fn role(&self, name: &str) -> Role {
-        let is_simulated = match &self.source {
-            Source::Run { folder, .. } => folder.info().source != RIG_SOURCE,
-            Source::Shard(reader) => !reader.is_rig(),
-            Source::Measured(_) => false,
-        };
-        role_of(name, is_simulated)
-    }
-
-    /// What a column is called in an export: answers are marked.
-    pub(crate) fn exported_name(&self, name: &str) -> String {
-        if self.role(name) == Role::Answer { format!("answer.{name}") } else { name.into() }
     }
 
     /// Width and height of all images; `None` if there are none.

@@ -1,6 +1,6 @@
 //! What a lab notes of a pull: columns of its own, and the temperature.
 
-use crate::columns::{COLUMNS, END_OF_SAMPLE, PLACE_OF_SAMPLE, covariate, find};
+use crate::columns::{COLUMNS, covariate, find, is_of_sample};
 use crate::config::one_slip_apart;
 use crate::draw::Drawn;
 use crate::label::check::ZERO_SHIFT;
@@ -63,7 +63,7 @@ fn check_name(name: &str) -> Result<(), String> {
     if name == TEMPERATURE {
         return Ok(());
     }
-    if PLACE_OF_SAMPLE.contains(&name) || END_OF_SAMPLE.contains(&name) || MEASURED.contains(&name) {
+    if is_of_sample(name) || MEASURED.contains(&name) {
         return Err(format!(
             "`{name}` is written by the rig itself: a column of your own needs another name"
         ));

@@ -242,7 +242,7 @@ mod tests {
               does nothing: add vary.humidity_pct = { uniform = [30, 60] }"
             ]
         );
-        let taken = of("mu", "x=[30, 60]");
+        let taken = of("mu_drawn", "x=[30, 60]");
         assert!(
             taken.len() == 1 && taken[0].ends_with("give it another in the pulls and in the table"),
             "{taken:?}"

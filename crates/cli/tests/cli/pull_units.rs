@@ -80,7 +80,8 @@ fn a_word_among_numbers_and_a_folder_named_twice_are_said() {
     let said = with("wet");
     assert!(said.contains("humidity_pct is one of numbers: 1 of 12 cells are words (`wet`)"), "{said}");
     for missing in ["", "n/a"] {
-        assert!(!with(missing).contains("humidity_pct"), "`{missing}` is a value that is missing");
+        let said = with(missing);
+        assert!(said.contains("humidity_pct: 1 cell is missing"), "`{missing}`: {said}");
     }
     let [plain, dotted] =
         [wet.path().to_path_buf(), wet.path().join(".")].map(|path| path.display().to_string());

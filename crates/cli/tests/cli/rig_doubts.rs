@@ -110,8 +110,8 @@ fn a_rig_that_is_not_as_its_file_says_is_refused() {
 fn a_wrong_sign_of_the_force_is_recognised() {
     let folder = tempfile::tempdir().unwrap();
     let rig = Served::start(&FAST);
-    // 25 N slip above the force that a hand is told from, 6 N below it.
-    for (name, grip_force_n) in [("strong", "25"), ("weak", "6")] {
+    // 25 N slip above the force that a hand is told from, 12 N below it.
+    for (name, grip_force_n) in [("strong", "25"), ("weak", "12")] {
         let out = folder.path().join(name);
         let wrong = ["--set", "robot.force_sign=1.0", "--grip-force-n", grip_force_n];
         let mut flags = vec!["--parts", "gear", "-o", out.to_str().unwrap()];

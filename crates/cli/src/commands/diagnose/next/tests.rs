@@ -112,7 +112,7 @@ fn the_next_sweep_is_one_that_runs() {
     let table = |name: &str| {
         format!("{{name=\"table\",covariate=\"{name}\",x=[30,60],factor=[1.0,0.7],physical=false}}")
     };
-    let effects = format!("[{}, {}, {}]", table("mu"), table("parts.gear.mu"), table("humidity_pct"));
+    let effects = format!("[{}, {}, {}]", table("mu_drawn"), table("parts.gear.mu"), table("humidity_pct"));
     let baseline = Location::parse(BASELINE_TWIN);
     let text = crate::edited_twin_toml(&baseline, &[("effects".into(), effects)], &Default::default(), &out);
     std::fs::write(&out, text.unwrap()).unwrap();
