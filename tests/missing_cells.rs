@@ -37,7 +37,7 @@ fn named(folder: &tempfile::TempDir) -> Vec<String> {
     effects.chain(found.unknown.iter().map(|unknown| unknown.covariate.clone())).collect()
 }
 
-/// Rows evenly over the table, so many of `pulls`.
+/// Gaps in a column, evenly over the rows.
 fn gaps(
     pulls: usize,
     missing: usize,

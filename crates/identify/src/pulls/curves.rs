@@ -51,9 +51,11 @@ impl Curve {
         }
     }
 
-    /// The columns that it is in.
-    pub(super) fn columns(&self) -> impl Iterator<Item = &str> {
-        self.name.split('*')
+    /// Takes out what it says of pulls without a value in its column, or in one of two.
+    pub(super) fn silence(&mut self, data: &PullData<'_>) {
+        for row in self.name.split('*').filter_map(|name| data.missing.get(name)).flatten() {
+            self.basis[*row].fill(0.0);
+        }
     }
 
     /// Number of coefficients.

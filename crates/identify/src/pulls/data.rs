@@ -1,6 +1,5 @@
 //! A campaign as numbers.
 
-use super::curves::Curve;
 use super::levels::levels;
 use gripgen_twin::columns::covariates;
 use gripgen_twin::values::distinct;
@@ -145,14 +144,6 @@ impl<'a> PullData<'a> {
     /// Whether a column was written down and varies.
     pub fn varies(&self, name: &str) -> bool {
         self.columns.get(name).is_some_and(|c| c.distinct() > 1)
-    }
-
-    /// Takes out of a curve in a column, or in two of them, what it says of pulls without a value there.
-    pub(super) fn silence(&self, curve: &mut Curve) {
-        let missing: Vec<&Vec<usize>> = curve.columns().filter_map(|name| self.missing.get(name)).collect();
-        for row in missing.into_iter().flatten() {
-            curve.basis[*row].fill(0.0);
-        }
     }
 
     /// Numbers of a column, words as their positions.

@@ -65,7 +65,7 @@ mod tests {
     use super::*;
     use gripgen_twin::{Covariates, MeasuredPull, MeasuredPulls};
 
-    /// Settings of two repetitions each, one right after the other, whose labels differ by 0.2 N; beside them a drift.
+    /// Settings of two repetitions each, one right after the other, whose labels differ by 0.2 N, and a drift.
     fn campaign(settings: usize, apart: usize, drift_n: f64) -> MeasuredPulls {
         let pull = |i: usize, setting: usize| MeasuredPull {
             id: i.to_string(),

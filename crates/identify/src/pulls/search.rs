@@ -157,7 +157,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        curves.iter_mut().for_each(|curve| data.silence(curve));
+        curves.iter_mut().for_each(|curve| curve.silence(data));
         Self { context, candidates, curves, rows: (0..n).collect(), written: Written::default() }
     }
 

@@ -22,7 +22,7 @@ const MIN_OF_WORD: usize = 8;
 /// All groups that a campaign can show, each as a curve with its basis at every pull.
 pub(super) fn smooths(data: &PullData<'_>) -> Vec<Curve> {
     let mut found = of_columns(data);
-    found.iter_mut().for_each(|curve| data.silence(curve));
+    found.iter_mut().for_each(|curve| curve.silence(data));
     found
 }
 

@@ -80,7 +80,7 @@ pub(super) fn implausible(path: &Path, pulls: &[MeasuredPull]) -> Option<Implaus
     let Some(ratio) = above_zero(pulls).filter(|ratio| !(low..=high).contains(ratio)) else {
         return endless(pulls).map(|problem| ImplausibleLabels {
             problem: format!("{path}: {problem}"),
-            hint: "`step_time_s` is in seconds, `force_increment_n` in newtons: write 0.104 for 104 ms"
+            hint: "`step_time_s` is in seconds, labels and `force_increment_n` are in newtons: write 0.104 for 104 ms"
                 .into(),
             unanswerable: true,
         });

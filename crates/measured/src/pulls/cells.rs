@@ -30,7 +30,7 @@ pub(super) struct Column {
 pub(super) const CLOCK: &str = "time_s";
 
 /// Columns of a table that are none of a pull.
-const BESIDE: [&str; 4] = [ID, LABEL, STATUS, REASON];
+const OF_THE_TABLE: [&str; 4] = [ID, LABEL, STATUS, REASON];
 
 /// Where a column's cells go.
 pub(super) enum Cells {
@@ -112,7 +112,7 @@ fn required() -> impl Iterator<Item = &'static str> {
 /// The columns of a header; those that are required have to be there.
 pub(super) fn columns(table: &mut TableReader<'_>) -> Result<Vec<Column>, TableError> {
     let of_pulls = COLUMNS.iter().filter(|c| c.in_table != InTable::Absent).map(|c| c.name);
-    table.spell(&of_pulls.chain(BESIDE).collect::<Vec<_>>());
+    table.spell(&of_pulls.chain(OF_THE_TABLE).collect::<Vec<_>>());
     required().try_for_each(|name| table.required(name).map(|_| ()))?;
     table.check_single()?;
     let column = |name: &String| Column {

@@ -1,4 +1,4 @@
-//! The traces beside a table: each is read, and what was odd in them is said once for all of them.
+//! The traces of a table: each is read, and what was odd in them is said once for all of them.
 
 use super::trace::{ReadTrace, read_trace};
 use super::zero::Plan;

@@ -14,7 +14,7 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, TableError> {
     Ok(from_utf16(&bytes).unwrap_or(bytes))
 }
 
-/// UTF-16 with a byte order mark, or with the zeros that it has beside Latin letters.
+/// UTF-16 with a byte order mark, or with the zero that each Latin letter has in it.
 fn from_utf16(bytes: &[u8]) -> Option<Vec<u8>> {
     let unit: fn([u8; 2]) -> u16 = match bytes {
         [0xff, 0xfe, ..] => u16::from_le_bytes,
