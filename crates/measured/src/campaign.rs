@@ -1,9 +1,9 @@
 //! `campaign.toml`: how a campaign of pulls was made, or is to be made.
 
+use gripgen_twin::columns::notes::check_note;
 use gripgen_twin::columns::{COLUMNS, InTable};
 use gripgen_twin::config::{Feedback, ForceConvention};
 use gripgen_twin::draw::Drawn;
-use gripgen_twin::notes::check_note;
 use gripgen_twin::{Campaign, PlannedPull, PullKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,7 @@
 //! Stage `indent`: how deep the part sinks into the gel, and the pressure that follows.
 
+pub(crate) mod press;
+
 use crate::convolve::Area;
 use crate::grid::{Grid, Plane};
 use crate::patch::{CellPlaces, aggregate};

@@ -50,9 +50,7 @@ pub mod metrics;
 mod noise;
 pub mod npz;
 mod optics;
-mod pad;
 mod patch;
-mod press;
 pub mod presses;
 mod raster;
 #[cfg(test)]
@@ -79,10 +77,9 @@ pub use markers::{
     print_markers, without_markers,
 };
 pub use noise::finish;
-pub use pad::Pad;
 pub use patch::{CellMap, CellPlaces};
 pub use raster::{ClusteredMesh, raster};
-pub use render::Renderer;
+pub use render::{Pad, Renderer};
 pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError, SensorFiles};
 pub use shadow::{BallPress, Relief, Shadow, ShadowKind, ShadowTable, shadow, shadow_from_presses};
 pub use simd::SimdLevel;

@@ -1,24 +1,25 @@
 //! The whole pipeline behind a few calls.
 
+mod pad;
 mod scratch;
 
 use crate::appearance::appearance;
 use crate::colour::LocalColours;
 use crate::convolve::Follow;
 use crate::grid::Plane;
+use crate::indent::press::Press;
 use crate::indent::{Imprint, IndentError};
 use crate::markers::{
     MarkerGel, Shear, draw_markers, marker_displacements, marker_displacements_by_cell, without_markers,
 };
 use crate::noise::finish_on;
-use crate::press::Press;
 use crate::raster::ClusteredMesh;
 use crate::sensor::Sensor;
 use crate::shading::change;
 use crate::simd::SimdLevel;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{ContactPatch, Gel, TactileImage};
-pub(crate) use scratch::with_map;
+pub use pad::Pad;
 use scratch::{Prepared, Scratch, with_scratch};
 
 /// One sensor with its gel.

@@ -6,6 +6,7 @@
 
 mod check;
 mod list;
+pub mod notes;
 mod pull;
 #[cfg(test)]
 mod tests;

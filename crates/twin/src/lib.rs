@@ -42,7 +42,6 @@ mod jaw;
 pub mod label;
 mod measured;
 mod mesh;
-pub mod notes;
 mod optics;
 pub mod parts;
 mod patch;

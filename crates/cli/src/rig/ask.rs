@@ -1,8 +1,8 @@
 //! Columns that a person is asked for before a pull.
 
 use gripgen::twin::PlannedPull;
+use gripgen::twin::columns::notes::{check_note, note_of};
 use gripgen::twin::draw::Drawn;
-use gripgen::twin::notes::{check_note, note_of};
 use std::io::BufRead;
 use std::sync::mpsc::{Receiver, channel};
 

@@ -13,8 +13,8 @@ use gripgen::record::{
     FolderError, RigRunInfo, RunFolder, create_rig_run, discard_failed, failed_pulls, missing_pulls,
     suspect_pulls, write_rig_pull,
 };
+use gripgen::twin::columns::notes::{check_note, note_of};
 use gripgen::twin::draw::Drawn;
-use gripgen::twin::notes::{check_note, note_of};
 use gripgen::twin::{Campaign, PlannedPull, PullKind};
 use gripgen_report::publish_contact_sheet;
 use gripgen_rig::experiment::check::check;

@@ -1,11 +1,11 @@
 //! From what the rig measured to what the recorder stores.
 
 use gripgen::record::{FrameView, RigFilm, RigFrame, RigLog, RigLogEvent, RigPull, RigResult, RigStream};
+use gripgen::twin::columns::notes::TEMPERATURE;
 use gripgen::twin::draw::Drawn;
 use gripgen::twin::label::check::{
     Expected, GripForceEvidence, LabelEvidence, WrenchRow, ZERO_SHIFT, check_label,
 };
-use gripgen::twin::notes::TEMPERATURE;
 use gripgen::twin::{Campaign, Covariates, Jaw, PerJaw, PlannedPull, PullKind, PullSettings, Scenario};
 use gripgen_rig::experiment::film::FilmedFrame;
 use gripgen_rig::experiment::pull::{ExecutedPull, FrameStamp};

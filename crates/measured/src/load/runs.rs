@@ -9,9 +9,9 @@ use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_record::{
     RIG_SOURCE, RigCampaign, RunFolder, ShardReader, rig_campaign, sample_covariates, sha256_hex,
 };
+use gripgen_twin::columns::notes::TEMPERATURE;
 use gripgen_twin::columns::{Column, covariate, covariates, recorded_covariates};
 use gripgen_twin::config::Feedback;
-use gripgen_twin::notes::TEMPERATURE;
 use gripgen_twin::{ExtraColumn, MeasuredPull, MeasuredPulls, PullTrace, Values};
 use serde::Deserialize;
 use std::collections::BTreeSet;

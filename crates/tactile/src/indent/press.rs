@@ -1,8 +1,8 @@
 //! One press of a part into a gel, on any grid: the stages `raster` and `indent`, or those of an elastic gel.
 
+use super::{Imprint, IndentError, Indentation, PressedGel, indent};
 use crate::elastic::{Base, ElasticGel, press_elastic};
 use crate::grid::{Grid, Plane, added};
-use crate::indent::{Imprint, IndentError, Indentation, PressedGel, indent};
 use crate::raster::{ClusteredMesh, HeightMap};
 use crate::simd::SimdLevel;
 use gripgen_twin::Gel;

@@ -4,12 +4,13 @@
 //! depth on the pixels of the sensor; the shape that a sensor file gives its gel bends the picture alone. So forces do not depend on
 //! the sensor that looks at them, and where pad and picture have the same pixels one imprint serves both.
 
+use super::Renderer;
+use super::scratch::with_map;
 use crate::grid::{Grid, Plane, added};
+use crate::indent::press::{Press, reach_px};
 use crate::indent::{ElasticField, Imprint, IndentError, Indentation, PressedGel};
 use crate::optics::{at_depth, dome, rounded_as_seen};
-use crate::press::{Press, reach_px};
 use crate::raster::ClusteredMesh;
-use crate::render::{Renderer, with_map};
 use crate::simd::SimdLevel;
 use gripgen_twin::frames::Pose;
 use gripgen_twin::{Gel, OpticsState};
