@@ -86,11 +86,11 @@ impl PeakSearch {
             return false;
         }
         // Half a microsecond: times that were rounded to one are those of whole ticks.
-        while trace.time_s[self.first] <= time_s - MEAN_S - 5e-7 {
+        while trace.time_s[self.first] <= time_s - MEAN_S + 5e-7 {
             self.first += 1;
         }
         let place_m = trace.displacement_m[row];
-        if self.first > self.start || row > self.start && trace.time_s[self.start] <= time_s - MEAN_S + 5e-7 {
+        if self.first > self.start {
             let readings = &trace.measured_force_n[self.first..=row];
             let mean_n = readings.iter().sum::<f64>() / readings.len() as f64;
             if place_m.is_finite() && self.highest.is_none_or(|(_, highest_n)| mean_n > highest_n) {
