@@ -91,7 +91,7 @@ def test_the_lerobot_folder_is_as_its_readers_expect(folder, table, rows):
         assert stats["observation.state"][name][at] == pytest.approx(np.quantile(forces, q))
         assert np.allclose(np.ravel(stats["observation.images.left"][name]), np.quantile(images, q, (0, 1, 2)))
     card = (folder / "README.md").read_text()
-    for word in ("load_offset", "Licence", "Split", "| `max_pull_force_n` | N |"):
+    for word in ("load_offset", "Licence", "Split", "| `max_pull_force_n` | label | N |"):
         assert word in card, word
 
 

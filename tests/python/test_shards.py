@@ -132,7 +132,7 @@ def test_the_resolved_configuration_travels_with_the_data(run):
         attachments = {a.name: a.data for a in make_reader(file, validate_crcs=True).iter_attachments()}
     config = tomllib.loads(attachments["config.toml"].decode())
     assert config["sweep"]["vary"]["grip_force_n"] == [20, 30]
-    assert config["twin"]["parts"]["gear"]["mu_effective"] == 0.15
+    assert config["twin"]["parts"]["gear"]["mu"] == 0.15
     about = json.loads((run / "run.json").read_text())
     assert about["config_sha256"] == metadata(run / "shard-00000.mcap")["gripgen.shard"]["config_sha256"]
 
