@@ -66,7 +66,7 @@ impl Gripped {
             return Self::at_rest(twin, library, scenario, options);
         };
         let press = Indenter::new(twin, library, scenario, &force_n, &held.grasp, options.level)?;
-        let imprint = press.felt()?;
+        let imprint = press.contacts()?;
         let look = if !options.images {
             None
         } else if options.backend == Backend::Gpu && press.on_device(&optics) {
@@ -213,7 +213,7 @@ impl<'a> Indenter<'a> {
         Renderer { sensor: &self.sensors[jaw], gel: &self.twin.gel[jaw], level: self.level }
     }
 
-    /// Whether a graphics processor makes the images of both jaws: it solves the contact on the pixels of the image, so that these have
+    /// Whether a GPU makes the images of both jaws: it solves the contact on the pixels of the image, so that these have
     /// to be those of the pad.
     fn on_device(&self, optics: &PerJaw<OpticsState>) -> bool {
         Jaw::BOTH.iter().all(|&jaw| {
@@ -222,36 +222,36 @@ impl<'a> Indenter<'a> {
         })
     }
 
-    /// What the jaws feel: the contact with both pads.
+    /// The contact of the part with both pads.
     ///
     /// # Errors
     ///
     /// A part beside a pad, or a press deeper than a gel.
-    pub fn felt(&self) -> Result<PerJaw<Imprint>, SampleError> {
+    pub fn contacts(&self) -> Result<PerJaw<Imprint>, SampleError> {
         PerJaw::try_from_fn(|jaw| {
             let PlacedPart { gel_from_mesh, imprint_m3_per_n, force_n, .. } = &self.parts[jaw];
             let pad = Pad { gel: &self.twin.gel[jaw], level: self.level };
-            let felt = pad.press(&self.mesh, gel_from_mesh, *imprint_m3_per_n, *force_n);
-            felt.map_err(|source| SampleError::Indent { jaw, source })
+            let contact = pad.press(&self.mesh, gel_from_mesh, *imprint_m3_per_n, *force_n);
+            contact.map_err(|source| SampleError::Indent { jaw, source })
         })
     }
 
-    /// What the camera of a jaw sees of `felt`. Optics effects are seen and not felt: where they change the imprint, the camera has
+    /// What the camera of a jaw sees of `contact`. Optics effects change the image and not the contact: where they change the imprint, the camera has
     /// its own.
     ///
     /// # Errors
     ///
-    /// As [`Indenter::felt`].
+    /// As [`Indenter::contacts`].
     pub fn seen<'i>(
         &self,
         jaw: Jaw,
-        felt: &'i Imprint,
+        contact: &'i Imprint,
         optics: &OpticsState,
     ) -> Result<Cow<'i, Imprint>, SampleError> {
         let PlacedPart { gel_from_mesh, imprint_m3_per_n, force_n, .. } = &self.parts[jaw];
         let renderer = self.renderer(jaw);
         if !optics.changes_press() {
-            return Ok(renderer.seen(&self.mesh, gel_from_mesh, felt, optics));
+            return Ok(renderer.seen(&self.mesh, gel_from_mesh, contact, optics));
         }
         let pad = Pad { gel: renderer.gel, level: self.level };
         let own = pad.press_seen(&renderer, &self.mesh, gel_from_mesh, *imprint_m3_per_n, *force_n, optics);
@@ -337,5 +337,5 @@ pub fn try_grip(twin: &Twin, library: &Library, scenario: &Scenario) -> Result<b
     let force_n = jaw_forces_n(twin, scenario)?;
     let Some(held) = held(twin, library, scenario, force_n, Mechanics::Reduced)? else { return Ok(false) };
     let press = Indenter::new(twin, library, scenario, &force_n, &held.grasp, SimdLevel::best())?;
-    press.felt().map(|_| true)
+    press.contacts().map(|_| true)
 }

@@ -263,7 +263,7 @@ impl<'a> Expectations<'a> {
                 Indenter::new(twin, self.library, &pressed, &force_n, &held.grasp, SimdLevel::best())?;
             let whole = |jaw: Jaw| ContactPatch::uniform(force_n[jaw], WHOLE_AREA_M2);
             // Deeper than the gel: the shape of the contact is not known, its force is.
-            Ok::<_, SampleError>(match press.felt() {
+            Ok::<_, SampleError>(match press.contacts() {
                 Ok(imprints) => imprints.map(|_, i| i.patch.clone()),
                 Err(_) => PerJaw::from_fn(whole),
             })

@@ -92,7 +92,7 @@ const TWICE: (f64, f64) = (1.6, 2.5);
 /// What grip forces were taken for, and what the other reading gives, where the coefficient is about half or twice that of the twin.
 /// Parts that were made from these labels say nothing of it.
 pub fn jaws_of_grip_force(measured: &MeasuredPulls, twin: &Twin, made: &OwnParts) -> Option<String> {
-    if made.notes.iter().any(|note| note.contains("without a geometry")) {
+    if !made.sets.is_empty() {
         return None;
     }
     let known = measured.pulls.iter().filter_map(|pull| Some((pull, twin.parts.get(&pull.part)?.mu)));

@@ -126,14 +126,19 @@ pub(super) fn parse_sidecar(
         return Err(FolderError::Mixed { path: path.into(), found, wanted });
     }
     let columns = INDEX_COLUMNS.len() + run.extra_columns.len();
-    let problem = match serde_json::from_slice::<Sidecar>(bytes) {
-        Err(e) => e.to_string(),
+    match serde_json::from_slice::<Sidecar>(bytes) {
+        // What this version wrote and cannot be read is damaged, and made again.
+        Err(_) if heading.gripgen_version == VERSION => Ok(None),
+        Err(e) => Err(heading.not_read(path, e.to_string())),
+        // A whole sidecar with other columns is finished work of another build.
         Ok(sidecar) => match sidecar.rows.iter().find(|row| row.len() != columns) {
-            None => return Ok(Some(sidecar)),
-            Some(row) => format!("its rows have {} cells, {columns} are known", row.len()),
+            None => Ok(Some(sidecar)),
+            Some(row) => {
+                let problem = format!("its rows have {} cells, {columns} are known", row.len());
+                Err(heading.not_read(path, problem))
+            }
         },
-    };
-    if heading.gripgen_version == VERSION { Ok(None) } else { Err(heading.not_read(path, problem)) }
+    }
 }
 
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<RunInfo, FolderError> {

@@ -92,21 +92,21 @@ impl Renderer<'_> {
             && self.sensor.gel_shape.is_flat()
     }
 
-    /// What the camera sees of the imprint `felt` that [`Pad::press`] or [`Pad::press_seen`] made of a part in this pose: the part
+    /// What the camera sees of the imprint `contact` that [`Pad::press`] or [`Pad::press_seen`] made of a part in this pose: the part
     /// in the same place, on the sensor's pixels and on the gel's shape in the sensor file.
     pub fn seen<'a>(
         &self,
         mesh: &ClusteredMesh,
         gel_from_mesh: &Pose,
-        felt: &'a Imprint,
+        contact: &'a Imprint,
         optics: &OpticsState,
     ) -> Cow<'a, Imprint> {
         if self.sees_pad() {
-            return Cow::Borrowed(felt);
+            return Cow::Borrowed(contact);
         }
         let grid = &self.sensor.grid;
-        let lift_px = felt.lift_m / grid.metres_per_px;
-        if felt.elastic.is_none() && !optics.changes_press() {
+        let lift_px = contact.lift_m / grid.metres_per_px;
+        if contact.elastic.is_none() && !optics.changes_press() {
             let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n: 0.0 };
             let rest = self.sensor.gel_shape.rest_px(grid);
             let placed =
@@ -115,20 +115,20 @@ impl Renderer<'_> {
                 map.start(mesh, gel_from_mesh, grid);
                 placed.lifted(map, mesh, lift_px)
             });
-            return Cow::Owned(Imprint { depth_px, ..felt.clone() });
+            return Cow::Owned(Imprint { depth_px, ..contact.clone() });
         }
         let rest = self.rest_seen(optics);
         let heights = mesh.raster(gel_from_mesh, grid, reach_px(self.gel, grid, rest.as_ref()));
         let part_px = added(rounded_as_seen(heights, grid, optics), rest.as_ref())
             .map(|height| (f64::from(height) + lift_px) as f32);
-        Cow::Owned(match &felt.elastic {
-            None => Imprint { depth_px: part_px.map(|depth| depth.max(0.0)), ..felt.clone() },
-            Some(field) => self.elastic_seen(felt, field, &part_px),
+        Cow::Owned(match &contact.elastic {
+            None => Imprint { depth_px: part_px.map(|depth| depth.max(0.0)), ..contact.clone() },
+            Some(field) => self.elastic_seen(contact, field, &part_px),
         })
     }
 
     /// An elastic gel on the sensor's pixels: its surface between those of the pad, and that of the part where it would lie in it.
-    fn elastic_seen(&self, felt: &Imprint, field: &ElasticField, part_px: &Plane) -> Imprint {
+    fn elastic_seen(&self, contact: &Imprint, field: &ElasticField, part_px: &Plane) -> Imprint {
         let (pad, grid) = (Pad { gel: self.gel, level: self.level }.grid(), &self.sensor.grid);
         let per_px = (pad.metres_per_px / grid.metres_per_px) as f32;
         let mut surface_px = resampled(&field.surface_px, &pad, grid).map(|height| per_px * height);
@@ -140,7 +140,7 @@ impl Renderer<'_> {
                 (depth_px.values[i], surface_px.values[i]) = (part, part);
             }
         }
-        Imprint { depth_px, elastic: Some(ElasticField { surface_px, pressure_pa }), ..felt.clone() }
+        Imprint { depth_px, elastic: Some(ElasticField { surface_px, pressure_pa }), ..contact.clone() }
     }
 }
 
