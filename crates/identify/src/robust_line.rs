@@ -1,5 +1,7 @@
 //! A line of labels over grip force that single pulls move little.
 
+use gripgen_twin::values::median;
+
 /// Pulls that a line is fitted to, at least.
 const MIN_PULLS: usize = 8;
 /// Deviations beyond which a pull pulls a line less (Huber's 95 % efficiency).
@@ -55,7 +57,7 @@ impl RobustLine {
                 .iter()
                 .map(|(force, label)| (label - at_zero_n - found.slope * force).abs() / force)
                 .collect();
-            found.scatter = (NORMAL * median(&residuals)).max(MIN_SCATTER);
+            found.scatter = (NORMAL * median(residuals.clone()).unwrap_or(0.0)).max(MIN_SCATTER);
             for (weight, residual) in weights.iter_mut().zip(&residuals) {
                 *weight = (HUBER * found.scatter / residual.max(1e-300)).min(1.0);
             }
@@ -67,12 +69,6 @@ impl RobustLine {
     pub fn at(&self, grip_force_n: f64) -> f64 {
         self.at_zero_n + self.slope * grip_force_n
     }
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -49,12 +49,6 @@ pub(crate) fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, libm::sqrt(square / (n - 1.0) / n))
 }
 
-/// The value in the middle; the upper one of two. `None` without any.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
-}
-
 /// Half the length of the 90 % interval of the logarithm of a root mean squared error whose `mean` square comes from the squares of
 /// several parts, by the scatter of these. It is for the error of new data of the same size, whose own scatter is as large: root of 2.
 pub(crate) fn log_error_half90(mean: f64, squares: &[f64]) -> f64 {

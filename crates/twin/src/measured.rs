@@ -2,6 +2,7 @@
 
 use crate::config::Feedback;
 use crate::draw::Drawn;
+use crate::values::median;
 use crate::{Covariates, PullTrace, Values};
 
 /// The covariate [`MeasuredPulls::count_rests`] adds.
@@ -15,9 +16,7 @@ pub const POSSIBLE_LABEL_RATIO: (f64, f64) = (0.004, 4.0);
 
 /// Labels over twice the grip force of a jaw, their (upper) median; `None` without pulls.
 pub fn median_label_ratio(pulls: &[MeasuredPull]) -> Option<f64> {
-    let mut ratios: Vec<f64> = pulls.iter().map(|p| p.max_pull_force_n / (2.0 * p.grip_force_n)).collect();
-    ratios.sort_by(f64::total_cmp);
-    ratios.get(ratios.len() / 2).copied()
+    median(pulls.iter().map(|p| p.max_pull_force_n / (2.0 * p.grip_force_n)).collect())
 }
 
 /// One measured pull.

@@ -22,6 +22,12 @@ fn number(cell: &str) -> Option<f64> {
     }
 }
 
+/// The number in the middle, the upper one of two; `None` without any.
+pub fn median(mut numbers: Vec<f64>) -> Option<f64> {
+    numbers.sort_by(f64::total_cmp);
+    numbers.get(numbers.len() / 2).copied()
+}
+
 /// How many different numbers there are; those that are none are one.
 pub fn distinct(numbers: &[f64]) -> usize {
     // Zeros are equal, whatever their sign.
@@ -130,10 +136,9 @@ impl Values {
     #[must_use]
     pub fn without_gaps(mut self) -> Self {
         if let Self::Numbers(x) = &mut self {
-            let mut known: Vec<f64> = x.iter().copied().filter(|x| x.is_finite()).collect();
-            known.sort_by(f64::total_cmp);
-            let median = known.get(known.len() / 2).copied().unwrap_or(0.0);
-            x.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = median);
+            let known = x.iter().copied().filter(|x| x.is_finite()).collect();
+            let middle = median(known).unwrap_or(0.0);
+            x.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = middle);
         }
         self
     }

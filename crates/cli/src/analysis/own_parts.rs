@@ -2,6 +2,7 @@
 
 use gripgen_twin::config::suggestion;
 use gripgen_twin::effects::LIBRARY;
+use gripgen_twin::values::median;
 use gripgen_twin::{MeasuredPulls, NO_MESH, Twin, rounded};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -49,16 +50,15 @@ pub fn own_parts(measured: &mut MeasuredPulls, twin: &Twin) -> OwnParts {
         .iter()
         .map(|(typed, name)| format!("the part `{typed}` of the table is `{name}` of the twin"));
     found.notes.extend(taken);
-    for (part, mut ratios) in labels {
-        ratios.sort_by(f64::total_cmp);
-        let middle = ratios.get(ratios.len() / 2).copied().filter(|mu| (0.005..=3.0).contains(mu));
-        let mu = middle.unwrap_or(MU);
+    for (part, ratios) in labels {
+        let pulls = ratios.len();
+        let mu = median(ratios).filter(|mu| (0.005..=3.0).contains(mu)).unwrap_or(MU);
         let near = suggestion(&part, twin.parts.keys().map(String::as_str));
         let near = near.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
         found.notes.push(format!(
             "the twin has no part `{part}`: one was made for {} pulls, with a coefficient of {} (the median of its labels over twice the \
              grip force) and without a geometry. Effects of contact and image do not compete{near}",
-            ratios.len(),
+            pulls,
             rounded(mu, &[])
         ));
         let section = toml::Table::from_iter([

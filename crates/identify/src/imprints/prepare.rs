@@ -1,8 +1,8 @@
 //! Rows in the groups that share a constant, and what is held out of them.
 
 use super::ImprintData;
-use crate::statistics::median;
 use gripgen_twin::effects::GraspSpan;
+use gripgen_twin::values::median;
 use std::collections::BTreeMap;
 
 /// Stretches of a group that are held out one after the other.

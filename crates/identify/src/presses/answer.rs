@@ -9,13 +9,13 @@ use super::score::hash;
 use super::search::Found;
 use super::unnamed::{PressCovariate, PressValues};
 use super::{PressData, PressDiagnosis};
-use crate::statistics::median;
 use crate::summary::left;
 use crate::{
     Channel, DataSummary, Diagnosis, ErrorPair, ErrorReport, ErrorsBy, HeldOutError, NamedEffect,
     ParameterEstimate, Rival, UnknownCovariate, grouped_intervals,
 };
 use gripgen_twin::effects::Measured;
+use gripgen_twin::values::median;
 use std::collections::BTreeMap;
 
 /// What tells an effect from its rivals: an experiment of the library, or this.

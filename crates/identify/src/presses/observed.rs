@@ -2,7 +2,7 @@
 
 use super::candidates::tried;
 use super::predict::{ActingEffect, PRESS_ZONES, PredictPresses, PressPixels};
-use crate::statistics::median;
+use gripgen_twin::values::median;
 use std::sync::Mutex;
 
 /// Presses with what was measured of them and what predicts them.

@@ -4,13 +4,13 @@ use super::candidates::{is_drawn, tried};
 use super::model::{Head, NamedModel};
 use super::observed::Observed;
 use super::predict::ActingEffect;
-use crate::statistics::median;
 use crate::{
     FreeParameter, GroupMoments, GroupedFit, GroupedModel, fit_grouped, fold_steps, grouped_step,
     held_out_costs,
 };
 use gripgen_twin::effects::EffectSpec;
 use gripgen_twin::random::splitmix64;
+use gripgen_twin::values::median;
 
 /// A gain of less than this share of the error is no effect, however surely it is there: every sensor file misfits its
 /// own presses by some of everything.

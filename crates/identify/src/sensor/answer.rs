@@ -13,9 +13,9 @@ use super::{SensorData, SensorOptions, detect};
 use crate::diagnosis::{
     Channel, DataSummary, Diagnosis, ErrorReport, ErrorsBy, NamedEffect, Rival, UnknownCovariate,
 };
-use crate::statistics::median;
 use gripgen_twin::effects::{EffectSpec, FORCE_RATE, Measured};
 use gripgen_twin::rounded;
+use gripgen_twin::values::median;
 
 /// A group of rows with what was predicted from the other blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]

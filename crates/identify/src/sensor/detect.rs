@@ -6,7 +6,7 @@ use super::noise::draw;
 use super::search::{Weighing, Workspace};
 use crate::diagnosis::Detectable;
 use crate::draws::Draws;
-use crate::statistics::median;
+use gripgen_twin::values::median;
 use std::collections::BTreeMap;
 
 /// Standard errors at which a first effect is accepted among all candidates, about.

@@ -2,8 +2,8 @@
 
 use super::SensorData;
 use super::moments::Unit;
-use crate::statistics::median;
 use gripgen_twin::effects::TableSpan;
+use gripgen_twin::values::median;
 
 /// Folds of every session.
 pub(crate) const FOLDS: usize = 6;

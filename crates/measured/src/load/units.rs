@@ -1,5 +1,6 @@
 //! Whether measured pulls can be in the units that they are read in: numbers a thousand times too large are fitted as well as any.
 
+use gripgen_twin::values::median;
 use gripgen_twin::{MeasuredPull, POSSIBLE_LABEL_RATIO, median_label_ratio, rounded};
 use std::path::Path;
 
@@ -167,11 +168,6 @@ fn wrong_sign(pulls: &[MeasuredPull]) -> Option<(usize, &MeasuredPull)> {
 /// The median label over twice the grip force; labels of 0 say nothing of their unit.
 fn above_zero(pulls: &[MeasuredPull]) -> Option<f64> {
     median_label_ratio(pulls).filter(|ratio| *ratio > 0.0)
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// Units with which a ratio would be usual.

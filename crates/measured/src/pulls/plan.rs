@@ -1,5 +1,6 @@
 //! The staircase that traces show, held against the one that their table says or does not say.
 
+use gripgen_twin::values::median;
 use gripgen_twin::{MeasuredPulls, PullTrace, rounded};
 
 /// Rates of a trace over those of its table that are one staircase: rows and the jitter of steps blur a rate by a few per cent.
@@ -14,14 +15,10 @@ fn shown(trace: &PullTrace) -> Option<(f64, f64)> {
     let rises: Vec<usize> = (1..command.len()).filter(|&i| command[i] > command[i - 1]).collect();
     // From the first step of the pull on: that to the first command is none.
     let own: Vec<usize> = rises.into_iter().filter(|&i| command[i - 1] > 0.0).collect();
-    let middle = |mut x: Vec<f64>| {
-        x.sort_by(f64::total_cmp);
-        x.get(x.len() / 2).copied()
-    };
     if own.len() < MIN_RISES {
         return None;
     }
-    let height_n = middle(own.iter().map(|&i| command[i] - command[i - 1]).collect())?;
+    let height_n = median(own.iter().map(|&i| command[i] - command[i - 1]).collect())?;
     // Rows that are hardly finer than steps show a step of one or two rows: their mean is right.
     let (first, last) = (own[0], own[own.len() - 1]);
     let rate = (command[last] - command[first]) / (trace.time_s[last] - trace.time_s[first]);
@@ -56,12 +53,8 @@ pub(super) fn hold_against_traces(measured: &mut MeasuredPulls) -> Option<String
             "{shown}, the table says {table_n} N every {table_s} s: `force_increment_n` is in newtons and `step_time_s` in seconds"
         ));
     }
-    let of = |get: fn(&(f64, f64)) -> f64| {
-        let mut x: Vec<f64> = seen.iter().map(|(_, s)| get(s)).collect();
-        x.sort_by(f64::total_cmp);
-        x[x.len() / 2]
-    };
-    let usual = (of(|s| s.0), of(|s| s.1));
+    let of = |get: fn(&(f64, f64)) -> f64| median(seen.iter().map(|(_, s)| get(s)).collect());
+    let usual = (of(|s| s.0)?, of(|s| s.1)?);
     // A pull without a trace was made like the others, if most of them were made so.
     if 2 * seen.len() > traced {
         let without = measured.pulls.iter_mut().filter(|pull| pull.trace.is_none());

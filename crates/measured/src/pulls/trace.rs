@@ -2,6 +2,7 @@
 
 use super::zero::{CommandNeverRises, Plan, find_zero};
 use crate::table::{TableError, TableReader};
+use gripgen_twin::values::median;
 use gripgen_twin::{PullTrace, TraceRow};
 use std::path::Path;
 
@@ -103,9 +104,7 @@ pub(super) fn read_trace(path: &Path, bytes: &[u8], plan: Plan) -> Result<ReadTr
 /// Where the longest stretch of the pull without a reading begins, and how long it is, if that is far beyond the usual.
 fn longest_gap(trace: &PullTrace) -> Option<(f64, f64)> {
     let pulled = &trace.time_s[trace.time_s.partition_point(|&t| t < 0.0)..];
-    let mut steps: Vec<f64> = pulled.windows(2).map(|w| w[1] - w[0]).collect();
     let longest = pulled.windows(2).map(|w| (w[0], w[1] - w[0])).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    steps.sort_by(f64::total_cmp);
-    let usual = steps[steps.len() / 2];
+    let usual = median(pulled.windows(2).map(|w| w[1] - w[0]).collect())?;
     (longest.1 > GAP_S.max(GAP_OF_USUAL * usual)).then_some(longest)
 }

@@ -31,6 +31,61 @@ fn ascii_and_binary_stl_and_obj_give_the_same_mesh() {
     assert_eq!(obj.signed_volume_m3(), ascii.signed_volume_m3());
 }
 
+/// Files that `tobj` reads right too: it is the independent judge of vertices, their numbers in either direction, and convex faces.
+#[test]
+fn obj_is_read_as_by_another_program() {
+    for seed in 0..20_u64 {
+        let random = |k: u64| {
+            let mixed = (seed * 1000 + k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
+            (mixed % 2000) as f64 / 10_000.0
+        };
+        let (rows, columns) = (3 + seed % 4, 4 + seed % 3);
+        let mut text = String::from("# a field of heights\nmtllib none.mtl\no field\n");
+        let height = |k| random(k);
+        for k in 0..rows * columns {
+            text += &format!("v {} {} {:.3}\nvt 0.5 0.5\nvn 0 0 1\n", k % columns, k / columns, height(k));
+        }
+        let count = (rows * columns) as i64;
+        for (i, j) in (0..rows - 1).flat_map(|i| (0..columns - 1).map(move |j| (i, j))) {
+            let corners =
+                [(i, j), (i, j + 1), (i + 1, j + 1), (i + 1, j)].map(|(i, j)| (i * columns + j + 1) as i64);
+            let word = |v: &i64| match (i + j + seed) % 4 {
+                0 => format!("{v}"),
+                1 => format!("{v}/{v}"),
+                2 => format!("{v}//{v}"),
+                _ => format!("{0}/{0}/{0}", v - count - 1),
+            };
+            text += &format!("g row{i}\nf {}\n", corners.iter().map(word).collect::<Vec<_>>().join(" "));
+        }
+        let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
+        let (models, _) =
+            tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default())).unwrap();
+        let mut theirs: Vec<[[f32; 3]; 3]> = Vec::new();
+        for mesh in models.iter().map(|m| &m.mesh) {
+            let at = |i: u32| [0, 1, 2].map(|k| mesh.positions[3 * i as usize + k]);
+            theirs.extend(mesh.indices.as_chunks::<3>().0.iter().map(|t| t.map(at)));
+        }
+        let area = |t: &[[f32; 3]; 3]| {
+            let [a, b, c] = t.map(|p| p.map(f64::from));
+            0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+        };
+        let ours = obj::read(text.as_bytes()).unwrap();
+        assert_eq!(ours.len(), theirs.len());
+        // A quadrilateral that is not flat may be cut along either diagonal: its corners and its shadow are the same.
+        for (own, other) in ours.chunks(2).zip(theirs.chunks(2)) {
+            let corners = |faces: &[[[f32; 3]; 3]]| {
+                let mut all: Vec<[u32; 3]> = faces.iter().flatten().map(|p| p.map(f32::to_bits)).collect();
+                all.sort_unstable();
+                all.dedup();
+                all
+            };
+            assert_eq!(corners(own), corners(other), "seed {seed}");
+            let shadow = |faces: &[[[f32; 3]; 3]]| faces.iter().map(area).sum::<f64>();
+            assert!((shadow(own) - 1.0).abs() < 1e-9 && (shadow(other) - 1.0).abs() < 1e-9);
+        }
+    }
+}
+
 /// The tetrahedron as text and binary PLY, and as GLB in metres behind a node that turns and moves it.
 fn other_formats() -> Vec<(&'static str, Vec<u8>, f64)> {
     let points = [[0.0_f32, 0.0, 0.0], [0.0, 10.0, 0.0], [10.0, 0.0, 0.0], [0.0, 0.0, 10.0]];
