@@ -98,6 +98,18 @@ pub enum CampaignFileError {
     },
 }
 
+impl CampaignFileError {
+    /// What to do about it.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::Io { .. } => {
+                "it is `campaign.toml` of a folder of pulls, or a file that `gripgen campaign -o FILE` wrote"
+            }
+            Self::Format { .. } => "`gripgen schema campaign` prints its keys and what each may hold",
+        }
+    }
+}
+
 /// Reads what holds for all pulls of a campaign from its text; `path` is for errors.
 pub(crate) fn parse_header(path: &Path, text: &str) -> Result<CampaignHeader, CampaignFileError> {
     let header: CampaignHeader = parse(path, text)?;

@@ -94,6 +94,7 @@ impl LoadPullsError {
         match self {
             Self::Bag { .. } => Some(BAG_HINT),
             Self::Table(PullFolderError::Table(e)) => Some(e.hint()),
+            Self::Table(PullFolderError::Campaign(e)) => Some(e.hint()),
             _ => None,
         }
     }

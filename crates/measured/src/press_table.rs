@@ -168,7 +168,8 @@ fn measured(cell: &str, column: &str) -> Result<Option<f64>, &'static str> {
 }
 
 pub(crate) fn picture(path: &Path) -> Result<TactileImage, TableError> {
-    let bytes = read_bytes(path)?;
+    let io = |e: std::io::Error| TableError::Io { path: path.into(), problem: e.to_string() };
+    let bytes = std::fs::read(path).map_err(io)?;
     if is_jpeg(&bytes) {
         return Err(TableError::Jpeg { path: path.into() });
     }

@@ -17,7 +17,7 @@ mod write;
 mod zero;
 
 pub use gaps::MissingCells;
-pub(crate) use gaps::SAY_NOTHING;
+pub(crate) use gaps::{SAY_NOTHING, fill as fill_missing};
 pub use images::{PullImages, pulls_with_images, read_pull_images};
 pub use standing::{JudgedPulls, Standing};
 pub use write::write_pull_folder;

@@ -1,5 +1,6 @@
 //! A folder with `sensor.csv`: a force sensor read beside a reference.
 
+use crate::pulls::{MissingCells, SAY_NOTHING};
 use crate::table::{TableError, TableReader, TextCells, read_bytes};
 use gripgen_record::sha256_hex;
 use gripgen_twin::Values;
@@ -11,6 +12,9 @@ pub const SENSOR_FILE: &str = "sensor.csv";
 /// Columns that must be there.
 const REQUIRED: [&str; 3] = ["time_s", "reference_force_n", "measured_force_n"];
 const SESSION: &str = "session";
+
+/// What becomes of a row that lacks a number.
+const ROWS_LEFT_OUT: &str = "these rows are left out";
 
 /// The session of a table that names none.
 const ONLY_SESSION: &str = "1";
@@ -30,13 +34,15 @@ pub struct SensorTable {
     pub sessions: Vec<String>,
     /// Further columns with their names.
     pub extra: Vec<(String, Values)>,
+    /// Cells that are missing. A row without one of the three numbers is left out.
+    pub missing: MissingCells,
     /// Hash of the file.
     pub sha256: String,
 }
 
 /// Reads the table of a folder. Rows of a session stand in the order of their time; sessions may take turns. A table
-/// without `session` is one session. Further columns are kept: numbers where every cell is one or empty, words
-/// otherwise; a column of nothing but empty cells is not recorded.
+/// without `session` is one session. Rows that lack one of the three numbers are left out and counted. Further columns are kept:
+/// numbers where every cell is one or empty, words otherwise; a column of nothing but empty cells is not recorded.
 ///
 /// # Errors
 /// [`TableError`], with line, column and value.
@@ -67,10 +73,17 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<SensorTable, TableError> {
         session: Vec::new(),
         sessions: Vec::new(),
         extra: Vec::new(),
+        missing: MissingCells::default(),
         sha256: sha256_hex(bytes),
     };
     let mut last_s: Vec<f64> = Vec::new();
     while let Some(row) = reader.row()? {
+        let empty = places.iter().zip(REQUIRED).filter(|(place, _)| row.cell(**place).is_empty());
+        let mut lacking = empty.map(|(_, column)| column).peekable();
+        if lacking.peek().is_some() {
+            lacking.for_each(|column| table.missing.add(column, 1, ROWS_LEFT_OUT));
+            continue;
+        }
         let mut numbers = [0.0; 3];
         for (number, &place) in numbers.iter_mut().zip(&places) {
             *number = row.number(place, "a finite number")?;
@@ -102,6 +115,10 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<SensorTable, TableError> {
         }
     }
     table.extra = extra.into_iter().filter_map(|(_, name, cells)| Some((name, cells.values()?))).collect();
+    for (name, values) in &table.extra {
+        let empty = (0..table.time_s.len()).filter(|&row| values.at(row).is_none()).count();
+        table.missing.add(name, empty, SAY_NOTHING);
+    }
     Ok(table)
 }
 
@@ -136,17 +153,28 @@ mod tests {
     }
 
     #[test]
+    fn rows_that_lack_a_number_are_left_out_and_counted() {
+        let table = read(
+            "time_s,reference_force_n,measured_force_n,humidity_pct\n\
+             0,1,2,40\n1,,2,41\n2,3,NaN,42\n3,n/a,-,43\n4,5,6,\n5,7,8,44\n",
+        )
+        .unwrap();
+        assert_eq!(table.time_s, [0.0, 4.0, 5.0]);
+        let counts: Vec<(String, usize)> = table.missing.counts().into_iter().collect();
+        let wanted = [("humidity_pct", 1), ("measured_force_n", 2), ("reference_force_n", 2)];
+        assert_eq!(counts, wanted.map(|(name, n)| (name.to_string(), n)));
+        assert!(
+            table.missing.notes().any(|note| note.ends_with("2 cells are missing, these rows are left out"))
+        );
+    }
+
+    #[test]
     fn faults_name_file_line_column_and_value() {
         for (table, parts) in [
             (
                 "time_s,measured_force_n\n0,1\n",
                 "no column `reference_force_n`; found: time_s, measured_force_n",
             ),
-            (
-                "time_s,reference_force_n,measured_force_n\n0,1,2\n1,,2\n",
-                "line 3, `reference_force_n` is ``, it must be a finite number",
-            ),
-            ("time_s,reference_force_n,measured_force_n\n0,1,NaN\n", "line 2, `measured_force_n` is `NaN`"),
             ("time_s,reference_force_n,measured_force_n\n0,1,inf\n", "`measured_force_n` is `inf`"),
             (
                 "time_s,reference_force_n,measured_force_n,session\n0,1,2,x\n1,1,2,y\n0,1,2,x\n",

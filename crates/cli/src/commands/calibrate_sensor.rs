@@ -5,9 +5,10 @@ use crate::failure::Failure;
 use crate::load::there_is;
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
-use crate::{calibrate_sensor_table, edited_twin_toml, load_sensor_table, sensor_calibration_edits};
+use crate::{calibrate_sensor_table, edited_twin_toml, sensor_calibration_edits};
 use gripgen::Location;
 use gripgen_identify::{ParameterEstimate, SensorCalibration};
+use gripgen_measured::read_sensor_table;
 use serde_json::json;
 use std::fmt::Write;
 
@@ -17,7 +18,7 @@ pub fn run(args: &CalibrateSensorArgs) -> Result<u8, Failure> {
     let mut outputs = Outputs::new(args.json.force).reads(&args.measured).reads_config(&args.twin, &[]);
     outputs.allow_all(args.out.as_deref())?;
     let mut sink = JsonSink::open(args.json.json.as_deref(), &mut outputs)?;
-    let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
+    let table = read_sensor_table(&args.measured).map_err(Failure::usage)?;
     let calibration = calibrate_sensor_table(&table).map_err(|reason| {
         Failure::usage(format!("{}: {reason}", args.measured.display()))
             .hint("press the sensor to several forces beside the reference, 30 rows per session at least")
@@ -40,7 +41,7 @@ pub fn run(args: &CalibrateSensorArgs) -> Result<u8, Failure> {
         let (low, high) = calibration.reference_range_n;
         sink.document(&json!({
             "schema": "gripgen.sensor_calibration/1",
-            "data": {"rows": table.time_s.len(), "sha256": table.sha256},
+            "data": {"rows": table.time_s.len(), "missing_cells": table.missing.counts(), "sha256": table.sha256},
             "fitted_reference_force_n": [low, high],
             "sessions": sessions,
             "twin": args.out,
@@ -48,9 +49,8 @@ pub fn run(args: &CalibrateSensorArgs) -> Result<u8, Failure> {
         }))?;
     }
     if !args.talk.quiet {
-        for note in &calibration.notes {
-            eprintln!("note: {note}");
-        }
+        let notes = calibration.notes.iter().cloned().chain(table.missing.notes());
+        notes.for_each(|note| eprintln!("note: {note}"));
     }
     if !sink.on_stdout() && !args.talk.quiet {
         print(&text(&calibration))?;

@@ -11,8 +11,7 @@ use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use crate::{
     ImageComparison, LabelErrors, compare_images, compare_pulls_with, compare_sensor_table,
-    find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, load_sensor_table,
-    posterior_twins, unmeasured,
+    find_circles_with_sensor, is_imprint_set, is_press_set, is_sensor_table, posterior_twins, unmeasured,
 };
 use gripgen::tactile::metrics::Score;
 use gripgen::tactile::presses::{
@@ -20,7 +19,7 @@ use gripgen::tactile::presses::{
 };
 use gripgen::{Location, load_twin_document};
 use gripgen_identify::{PartRatio, pull_ratios};
-use gripgen_measured::load_pulls_with;
+use gripgen_measured::{load_pulls_with, read_sensor_table};
 use gripgen_report::{ComparedPulls, PressPage, PressScores, PressShown, press_page, pull_comparison_page};
 use serde_json::{Map, Value, json};
 
@@ -87,10 +86,13 @@ fn presses(args: &CompareArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, 
 
 /// A twin against a force-sensor table.
 fn sensor_table(args: &CompareArgs, sink: JsonSink) -> Result<u8, Failure> {
-    let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
+    let table = read_sensor_table(&args.measured).map_err(Failure::usage)?;
     let twin = load_twin(&args.twin, &[])?;
     let found = compare_sensor_table(&table, &twin)
         .map_err(|reason| Failure::usage(format!("{}: {reason}", args.measured.display())))?;
+    if !args.talk.quiet {
+        table.missing.notes().for_each(|note| eprintln!("note: {note}"));
+    }
     let document = || {
         let by_session: Map<String, Value> = found
             .by_session
@@ -100,7 +102,7 @@ fn sensor_table(args: &CompareArgs, sink: JsonSink) -> Result<u8, Failure> {
         json!({
             "schema": "gripgen.comparison/1",
             "sensor": {"n": found.n, "rmse_n": found.rmse_n, "mape_pct": found.mape_pct, "bias_n": found.bias_n,
-                "by_session": by_session},
+                "missing_cells": table.missing.counts(), "by_session": by_session},
         })
     };
     let text = || {

@@ -144,7 +144,7 @@ fn pulls(args: &InfoArgs, mut sink: JsonSink) -> Result<u8, Failure> {
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.info/1", "source": PULLS_FILE, "samples": measured.pulls.len(), "traces": traces,
-            "recorded": measured.recorded, "further_columns": extra, "sha256": measured.sha256,
+            "recorded": measured.recorded, "further_columns": extra, "missing_cells": loaded.missing.counts(), "sha256": measured.sha256,
             "label_tolerance_n": measured.label_tolerance_n, "stop_mm": 1e3 * measured.stop_m,
             "parts": parts_json(&parts, &by_level),
         }))?;

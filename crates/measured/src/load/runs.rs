@@ -4,12 +4,11 @@ use super::left_out::LeftOut;
 use super::suspects::{self, Suspects};
 use super::traces::{fewer_traces, thinned};
 use super::{LoadPullsError, LoadedPulls, zero};
-use crate::pulls::{MissingCells, SAY_NOTHING};
+use crate::pulls::{MissingCells, SAY_NOTHING, fill_missing};
 use gripgen_record::proto::gripgen_v1::{Sample, Status};
 use gripgen_record::{
     RIG_SOURCE, RigCampaign, RunFolder, ShardReader, rig_campaign, sample_covariates, sha256_hex,
 };
-use gripgen_twin::columns::notes::TEMPERATURE;
 use gripgen_twin::columns::{Column, covariate, covariates, recorded_covariates};
 use gripgen_twin::config::Feedback;
 use gripgen_twin::{ExtraColumn, MeasuredPull, MeasuredPulls, PullTrace, Values};
@@ -23,7 +22,7 @@ pub(super) fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, L
     let rig = (folder.info().source == RIG_SOURCE).then(|| rig_campaign(&folder)).transpose()?;
     let mut left_out = LeftOut { rig: rig.is_some(), ..LeftOut::default() };
     let (mut pulls, mut standing, mut hashes) = (Vec::new(), Vec::new(), String::new());
-    let (mut rule, mut no_temperature): (Option<(f64, f64)>, _) = (None, Vec::new());
+    let mut rule: Option<(f64, f64)> = None;
     for shard in 0..folder.info().shards {
         let Some(sidecar) = folder.finished(shard)? else {
             left_out.unfinished_shards += 1;
@@ -43,9 +42,6 @@ pub(super) fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, L
                 continue;
             }
             let stands = suspects::standing_of(&sample, trace.as_ref());
-            if sample.temperature_c.is_nan() {
-                no_temperature.push(sample.index.to_string());
-            }
             if let Some(pull) = measured(sample, trace.as_ref()) {
                 pulls.push(pull);
                 standing.push(stands);
@@ -62,10 +58,10 @@ pub(super) fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, L
         return Err(LoadPullsError::Nothing { path: path.into(), notes: notes.join("; ") });
     };
     let there = |column: &&Column| pulls.iter().any(|p: &MeasuredPull| column.value(p.view()).is_some());
-    let recorded = covariates().filter(there).map(|c| c.name.into()).collect();
+    let there: Vec<&Column> = covariates().filter(there).collect();
     let mut pulls = MeasuredPulls {
         pulls,
-        recorded,
+        recorded: there.iter().map(|c| c.name.into()).collect(),
         extra: Vec::new(),
         label_tolerance_n,
         stop_m: stop_mm * 1e-3,
@@ -76,11 +72,17 @@ pub(super) fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, L
         Some(campaign) => as_made(&mut pulls, campaign),
         None => pulls.extra = own_columns(&pulls.pulls),
     }
-    notes.extend(without_temperature(&mut pulls, &no_temperature));
     notes.extend(zero::without_shift(&mut pulls));
     fewer_traces(&mut pulls.pulls, &mut notes);
     // A sweep and a rig write newtons.
     let mut missing = MissingCells::default();
+    for column in there {
+        let rows: Vec<usize> =
+            (0..pulls.pulls.len()).filter(|&i| column.is_missing(pulls.pulls[i].view())).collect();
+        if !rows.is_empty() {
+            missing.add(column.name, rows.len(), fill_missing(column, &rows, &mut pulls.pulls));
+        }
+    }
     for column in &pulls.extra {
         let empty = (0..pulls.pulls.len()).filter(|&i| column.values.at(i).is_none()).count();
         missing.add(&column.name, empty, SAY_NOTHING);
@@ -89,23 +91,14 @@ pub(super) fn load_run(path: &Path, suspects: Suspects) -> Result<LoadedPulls, L
     Ok(LoadedPulls { pulls, notes, warnings: Vec::new(), implausible: None, missing })
 }
 
-/// A temperature that was not measured in all pulls is used in none: those without it would have that of a table without the column.
-fn without_temperature(pulls: &mut MeasuredPulls, missing: &[String]) -> Option<String> {
-    let missing = pulls.pulls.iter().filter(|pull| missing.contains(&pull.id)).count();
-    let at = pulls.recorded.iter().position(|name| name == TEMPERATURE).filter(|_| missing > 0)?;
-    pulls.recorded.remove(at);
-    Some(format!(
-        "{TEMPERATURE} was not measured in {missing} of {} pulls: it is left out",
-        pulls.pulls.len()
-    ))
-}
-
 /// What is known of pulls that a rig made, and samples of a sweep have not: the order in which they were made, rests
 /// between them, what was written down.
 fn as_made(pulls: &mut MeasuredPulls, campaign: RigCampaign) {
     pulls.feedback = campaign.feedback;
     if let Some(recorded) = campaign.recorded {
-        pulls.recorded = recorded_covariates(&recorded).map(|c| c.name.into()).collect();
+        let measured = |c: &Column| pulls.pulls.iter().any(|pull| c.value(pull.view()).is_some());
+        pulls.recorded =
+            recorded_covariates(&recorded).filter(|c| measured(c)).map(|c| c.name.into()).collect();
     }
     if pulls.recorded.iter().any(|c| c == "time_s") {
         // A pull that failed at first was made again after the others.

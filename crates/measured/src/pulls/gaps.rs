@@ -3,6 +3,7 @@
 
 use gripgen_twin::MeasuredPull;
 use gripgen_twin::columns::{Column, InTable};
+use gripgen_twin::values::median;
 use std::collections::BTreeMap;
 
 /// The columns that rise from row to row.
@@ -46,7 +47,7 @@ impl MissingCells {
 }
 
 /// Fills or masks the cells of a column that are missing in some rows. Returns what became of them.
-pub(super) fn fill(column: &'static Column, rows: &[usize], pulls: &mut [MeasuredPull]) -> &'static str {
+pub(crate) fn fill(column: &'static Column, rows: &[usize], pulls: &mut [MeasuredPull]) -> &'static str {
     if column.in_table == InTable::Required {
         mask(column, rows, pulls);
         return LEFT_OUT;
@@ -68,9 +69,7 @@ pub(super) fn fill(column: &'static Column, rows: &[usize], pulls: &mut [Measure
         }
     } else {
         let known = (0..pulls.len()).filter(|row| rows.binary_search(row).is_err());
-        let mut values: Vec<f64> = known.filter_map(|row| column.number(pulls[row].view())).collect();
-        values.sort_by(f64::total_cmp);
-        if let Some(&middle) = values.get(values.len() / 2) {
+        if let Some(middle) = median(known.filter_map(|row| column.number(pulls[row].view())).collect()) {
             rows.iter().for_each(|&row| column.set_number(&mut pulls[row].edit(), middle));
         }
     }
@@ -95,13 +94,8 @@ fn interpolate(column: &Column, rows: &[usize], pulls: &mut [MeasuredPull]) {
         "time_s" => pulls[row].covariates.session.as_str(),
         _ => pulls[row].covariates.gel_id.as_str(),
     };
-    let mut steps: Vec<f64> = known
-        .windows(2)
-        .map(|w| (w[1].1 - w[0].1) / (w[1].0 - w[0].0) as f64)
-        .filter(|step| *step > 0.0)
-        .collect();
-    steps.sort_by(f64::total_cmp);
-    let step = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
+    let steps = known.windows(2).map(|w| (w[1].1 - w[0].1) / (w[1].0 - w[0].0) as f64);
+    let step = median(steps.filter(|step| *step > 0.0).collect()).unwrap_or(1.0);
     let found: Vec<f64> = rows
         .iter()
         .map(|&row| {

@@ -60,6 +60,25 @@ pub(super) fn traces_of_nobody(
     Some(format!("{}: {said}: {like}", folder.join(TRACES_FOLDER).display()))
 }
 
+/// Traces of pulls in files that are no table of text: compressed, or of another program. `stored` are the files in their folder.
+pub(super) fn traces_of_other_kinds(
+    folder: &Path,
+    stored: &HashSet<String>,
+    pulls: &[MeasuredPull],
+) -> Option<String> {
+    let own = |pull: &MeasuredPull| {
+        let begins = |name: &&String| name.strip_prefix(&pull.id).is_some_and(|end| end.starts_with('.'));
+        if stored.contains(&format!("{}.csv", pull.id)) { None } else { stored.iter().filter(begins).min() }
+    };
+    let of: Vec<(&MeasuredPull, &String)> =
+        pulls.iter().filter_map(|pull| Some((pull, own(pull)?))).collect();
+    let (first, name) = of.first()?;
+    let (wanted, n) = (format!("{}.csv", first.id), of.len());
+    let what = if name.starts_with(&wanted) { "unpack it to" } else { "a trace is a table of text named" };
+    let are = if n == 1 { "trace is" } else { "traces are" };
+    Some(format!("{}: {n} {are} not read ({name}): {what} `{wanted}`", folder.join(TRACES_FOLDER).display()))
+}
+
 /// Columns of unknown meaning that are words because of a few cells, where most cells are numbers.
 pub(super) fn words_among_numbers(path: &Path, pulls: &MeasuredPulls) -> Vec<String> {
     let said = |name: &String| {

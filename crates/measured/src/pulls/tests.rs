@@ -161,6 +161,12 @@ fn what_is_not_read_and_may_be_misspelt_is_named() {
     assert_eq!(far.len(), 1);
     assert!(far[0].contains("2 files belong to no pull and are not read (ghost.csv, other.csv)"), "{far:?}");
     assert!(far[0].ends_with("a trace has the name of its pull, as `p0000.csv`"), "{far:?}");
+    let packed = said(&[("traces/p0000.csv.gz", "x"), ("traces/p0001.parquet", "x")]);
+    assert_eq!(packed.len(), 1, "{packed:?}");
+    assert!(
+        packed[0].contains("2 traces are not read (p0000.csv.gz): unpack it to `p0000.csv`"),
+        "{packed:?}"
+    );
     let keys = said(&[("campaign.toml", "force_convetion = \"total\"\noperator = \"x\"\n")]);
     let [close, other] = &keys[..] else { panic!("{keys:?}") };
     assert!(

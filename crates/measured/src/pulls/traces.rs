@@ -18,8 +18,9 @@ pub(super) fn read_traces(
 ) -> Result<(Vec<Vec<f64>>, Vec<String>), TableError> {
     let traces = folder.join(TRACES_FOLDER);
     let stored = trace_files(&traces)?;
-    let mut said: Vec<String> =
-        strays::traces_of_nobody(folder, &stored, &measured.pulls).into_iter().collect();
+    let of_no_pull = strays::traces_of_nobody(folder, &stored, &measured.pulls);
+    let of_other_kinds = strays::traces_of_other_kinds(folder, &stored, &measured.pulls);
+    let mut said: Vec<String> = of_no_pull.into_iter().chain(of_other_kinds).collect();
     let mut after_n = vec![Vec::new(); measured.pulls.len()];
     let mut read: Vec<(String, ReadTrace)> = Vec::new();
     for (pull, after_n) in measured.pulls.iter_mut().zip(&mut after_n) {

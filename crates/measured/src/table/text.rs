@@ -4,14 +4,32 @@ use super::TableError;
 use super::cell::Marks;
 use std::path::Path;
 
-/// The content of a file. Text in UTF-16, as spreadsheets save it, becomes UTF-8.
+/// The content of a file. Text in UTF-16 or Windows-1252, as spreadsheets save it, becomes UTF-8.
 ///
 /// # Errors
 /// [`TableError::Io`].
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, TableError> {
     let bytes =
         std::fs::read(path).map_err(|e| TableError::Io { path: path.into(), problem: e.to_string() })?;
-    Ok(from_utf16(&bytes).unwrap_or(bytes))
+    Ok(from_utf16(&bytes).or_else(|| from_windows_1252(&bytes)).unwrap_or(bytes))
+}
+
+/// What the bytes 0x80 to 0x9f are in Windows-1252 (WHATWG Encoding, index-windows-1252); the others are those of Unicode.
+const WINDOWS_1252: &str = "\u{20ac}\u{81}\u{201a}\u{192}\u{201e}\u{2026}\u{2020}\u{2021}\u{2c6}\u{2030}\u{160}\u{2039}\u{152}\u{8d}\u{17d}\u{8f}\
+    \u{90}\u{2018}\u{2019}\u{201c}\u{201d}\u{2022}\u{2013}\u{2014}\u{2dc}\u{2122}\u{161}\u{203a}\u{153}\u{9d}\u{17e}\u{178}";
+
+/// Text with letters beyond ASCII that is not UTF-8. A file with control characters is not text.
+fn from_windows_1252(bytes: &[u8]) -> Option<Vec<u8>> {
+    let control = |b: &u8| *b < b' ' && !matches!(b, b'\t' | b'\n' | b'\r');
+    if std::str::from_utf8(bytes).is_ok() || bytes.iter().any(control) {
+        return None;
+    }
+    let special: Vec<char> = WINDOWS_1252.chars().collect();
+    let letter = |b: &u8| match b {
+        0x80..=0x9f => special[usize::from(b - 0x80)],
+        _ => char::from(*b),
+    };
+    Some(bytes.iter().map(letter).collect::<String>().into_bytes())
 }
 
 /// UTF-16 with a byte order mark, or with the zero that each Latin letter has in it.
@@ -88,5 +106,15 @@ mod tests {
         assert_eq!(from_utf16(text.as_bytes()), None);
         assert_eq!(from_utf16(&[0xff, 0xd8, 0xff, 0xe0]), None, "a picture");
         assert_eq!(from_utf16(&le[..le.len() - 1]), None, "cut in a letter");
+    }
+
+    #[test]
+    fn windows_1252_is_read_and_pictures_are_not() {
+        let read = |bytes: &[u8]| from_windows_1252(bytes).map(|text| String::from_utf8(text).unwrap());
+        let text = read(b"T [\xb0C],op\r\n1,J\xf6rg\r\n2,\x80\x9f\x93\r\n").unwrap();
+        assert_eq!(text, "T [\u{b0}C],op\r\n1,J\u{f6}rg\r\n2,\u{20ac}\u{178}\u{201c}\r\n");
+        assert_eq!(WINDOWS_1252.chars().count(), 32);
+        assert_eq!(read("J\u{f6}rg".as_bytes()), None, "UTF-8");
+        assert_eq!(read(&[0xff, 0xd8, 0xff, 0xe0, 0, 16, b'J']), None, "a picture");
     }
 }

@@ -6,7 +6,7 @@ use gripgen_identify::{
     Covariate, NamedEffect, ParameterEstimate, SensorCalibration, SensorComparison, SensorData,
     SensorDiagnosis, SensorOptions, Verdict, calibrate_sensor, compare_sensor, diagnose_sensor,
 };
-use gripgen_measured::{SensorTable, TableError, read_sensor_table};
+use gripgen_measured::SensorTable;
 use gripgen_report::sensor_report;
 use gripgen_twin::Twin;
 use gripgen_twin::config::EffectFile;
@@ -18,20 +18,13 @@ pub fn is_sensor_table(path: &Path) -> bool {
     path.join(gripgen_measured::SENSOR_FILE).is_file()
 }
 
-/// Reads the table of a folder.
-///
-/// # Errors
-///
-/// A table that cannot be read.
-pub fn load_sensor_table(folder: &Path) -> Result<SensorTable, TableError> {
-    read_sensor_table(folder)
-}
-
 /// Diagnoses a table: what the sensor does beside gain and offset of each session.
 pub fn diagnose_sensor_table(table: &SensorTable) -> Diagnosed {
     let data = data(table);
     let mut answer = diagnose_sensor(&data, &SensorOptions::default());
     answer.diagnosis.data.sha256.clone_from(&table.sha256);
+    answer.diagnosis.data.missing_cells = table.missing.counts();
+    answer.diagnosis.notes.extend(table.missing.notes());
     let edits = edits(&mut answer, &table.sha256);
     let report = sensor_report(&answer);
     Diagnosed::new(answer.diagnosis, edits, report)
