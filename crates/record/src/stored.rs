@@ -1,6 +1,7 @@
 //! A stored sample as the columns of a pull see it.
 
 use crate::proto::gripgen_v1 as proto;
+use gripgen_twin::columns::notes::TEMPERATURE;
 use gripgen_twin::columns::{Held, PullView, Scale, find};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::{Covariates, is_own_column};
@@ -16,20 +17,21 @@ pub fn sample_covariates(s: &proto::Sample) -> Covariates {
         Some(column) => column.name == name && matches!(column.held, Held::Extra),
         None => is_own_column(name),
     };
-    // A temperature that was not measured is stored as none; a pull then has that of a table without the column.
-    let unmeasured = Covariates::default();
+    // A temperature that was not measured is stored as NaN. A simulation of the pull needs a number: that of a table without the column.
+    let unmeasured = s.temperature_c.is_nan();
     let extra = numbers.chain(words).filter(|(name, _)| has_no_field(name));
     Covariates {
         gel_id: s.gel_id.clone(),
         session: s.session.clone(),
         pull_index: s.pull_index,
         time_s: s.time_s,
-        temperature_c: if s.temperature_c.is_nan() { unmeasured.temperature_c } else { s.temperature_c },
+        temperature_c: if unmeasured { Covariates::default().temperature_c } else { s.temperature_c },
         dwell_s: s.dwell_s,
         grip_offset_m: Scale::Thousandth.to_si(s.grip_offset_mm),
         grip_angle_rad: Scale::Degree.to_si(s.grip_angle_deg),
         pull_direction: f64::from(s.pull_direction),
         extra: extra.map(|(name, value)| (name.clone(), value)).collect(),
+        missing: unmeasured.then_some(TEMPERATURE).into_iter().collect(),
         ..Covariates::default()
     }
 }
