@@ -70,7 +70,7 @@ pub fn rig_rehearse(
 
 /// Makes the pulls of a campaign that have no label yet, into a run folder. Returns how the run stands.
 #[pyfunction]
-#[pyo3(signature = (config, out, overrides, campaign, parts, grip_force_n, repetitions, seed, rehearsal, after, power_on, unlock, reconnect, on_event))]
+#[pyo3(signature = (config, out, overrides, campaign, parts, grip_force_n, repetitions, seed, rehearsal, after, columns, power_on, unlock, reconnect, on_event))]
 #[expect(clippy::too_many_arguments, reason = "the keywords of `gripgen.rig.pull`")]
 pub fn rig_pull<'py>(
     py: Python<'py>,
@@ -84,6 +84,7 @@ pub fn rig_pull<'py>(
     seed: u64,
     rehearsal: Option<PathBuf>,
     after: Option<PathBuf>,
+    columns: Vec<(String, String)>,
     power_on: bool,
     unlock: bool,
     reconnect: u32,
@@ -96,7 +97,7 @@ pub fn rig_pull<'py>(
             Some(path) => read_campaign(path).map_err(Failure::usage)?,
             None => plan_pulls(&rig, config, &parts, &grip_force_n, repetitions, seed)?,
         };
-        let job = PullJob::new(rig, planned, rehearsal.as_deref())?;
+        let job = PullJob::new(rig, planned, rehearsal.as_deref())?.with_notes(&columns, &[])?;
         job.check_programs()?;
         let name = campaign.as_ref().and_then(|path| path.file_stem());
         let name = name.map_or("rig".into(), |stem| stem.to_string_lossy().into_owned());

@@ -93,6 +93,16 @@ impl PullJob {
                 .hint("leave the flag out where nothing was measured")
         };
         for (name, text) in notes {
+            // Known columns of a campaign stand in its entries.
+            let known: Option<fn(&mut PlannedPull) -> &mut String> = match name.as_str() {
+                "gel_id" => Some(|pull| &mut pull.gel_id),
+                "session" => Some(|pull| &mut pull.session),
+                _ => None,
+            };
+            if let Some(field) = known {
+                self.campaign.pulls.iter_mut().for_each(|pull| field(pull).clone_from(text));
+                continue;
+            }
             let value = note_of(text).ok_or_else(|| none(name))?;
             check_note(name, &value).map_err(|e| Failure::usage(format!("--column: {e}")))?;
             self.notes.insert(name.clone(), value);

@@ -166,6 +166,7 @@ def rig_pull(
     seed: int,
     rehearsal: str | os.PathLike[str] | None,
     after: str | os.PathLike[str] | None,
+    columns: Sequence[tuple[str, str]],
     power_on: bool,
     unlock: bool,
     reconnect: int,

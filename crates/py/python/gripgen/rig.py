@@ -96,6 +96,7 @@ def pull(
     seed: int = 0,
     rehearsal: _Path | None = None,
     after: _Path | None = None,
+    columns: Mapping[str, str | float] | None = None,
     power_on: bool = False,
     unlock: bool = False,
     reconnect: int = 0,
@@ -105,7 +106,8 @@ def pull(
     """Make pulls on a rig and record them into the run folder `out`; the same call makes what is missing. The robot moves.
 
     The pulls are those of `campaign`, or each of `parts` (all that are taught if empty) with each grip force. `rehearsal` slows
-    staircases until force mode and sensor can follow; `after` is a run on the same gels before this one. `power_on` and `unlock` say
+    staircases until force mode and sensor can follow; `after` is a run on the same gels before this one. `columns` are noted with
+    every pull: `{"operator": "anna", "temperature_c": 21.5}`. `power_on` and `unlock` say
     that somebody stands beside the robot. `on_event` gets a dict for each event: `pull_started`, `step`, `images`, `reading`,
     `pull_finished`, `stopped`, `reconnecting`, `said`.
 
@@ -122,6 +124,7 @@ def pull(
         seed,
         rehearsal,
         after,
+        [(name, str(value)) for name, value in (columns or {}).items()],
         power_on,
         unlock,
         reconnect,

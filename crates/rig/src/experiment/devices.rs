@@ -9,6 +9,7 @@ use crate::primary::{PrimaryClient, PrimaryLinkError};
 use crate::rtde::{LinkError, RtdeClient, SessionPlan};
 use gripgen_twin::PerJaw;
 use std::net::{SocketAddr, ToSocketAddrs};
+use std::sync::mpsc;
 use std::time::Duration;
 
 /// How long a device may take to answer at first.
@@ -69,12 +70,26 @@ pub struct Devices {
     pub(super) reply: Duration,
 }
 
-/// Where a device is.
+/// Where a device is. The system's look-up of a name has no time limit, so it runs in a thread that is left behind when time is over.
 fn resolve(what: &'static str, host: &str, port: u16) -> Result<SocketAddr, ConnectError> {
+    resolve_within(what, host, TIMEOUT, {
+        let host = host.to_string();
+        move || Ok((host.as_str(), port).to_socket_addrs()?.collect())
+    })
+}
+
+fn resolve_within(
+    what: &'static str,
+    host: &str,
+    within: Duration,
+    look_up: impl FnOnce() -> std::io::Result<Vec<SocketAddr>> + Send + 'static,
+) -> Result<SocketAddr, ConnectError> {
     let name = |problem: String| ConnectError::Name { what, host: host.into(), problem };
-    let found = (host, port).to_socket_addrs().map_err(|e| name(e.to_string()))?;
+    let (found, answer) = mpsc::channel();
+    std::thread::spawn(move || found.send(look_up()));
+    let late = |_| name(format!("the name server did not answer within {:.1} s", within.as_secs_f64()));
+    let mut all = answer.recv_timeout(within).map_err(late)?.map_err(|e| name(e.to_string()))?;
     // Controllers and grippers speak IPv4.
-    let mut all: Vec<SocketAddr> = found.collect();
     all.sort_by_key(SocketAddr::is_ipv6);
     all.first().copied().ok_or_else(|| name("no address".into()))
 }
@@ -171,5 +186,32 @@ impl Devices {
             // A gripper that does not answer any more is left as it is.
             let _ = gripper.close();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_server_that_is_silent_is_given_up() {
+        let (keep, never) = mpsc::channel::<()>();
+        let silent = move || {
+            let _ = never.recv();
+            Ok(vec![])
+        };
+        let error = resolve_within("gripper", "wsg.lab", Duration::from_millis(20), silent).unwrap_err();
+        let said = "gripper: `wsg.lab` is not found: the name server did not answer within 0.0 s";
+        assert_eq!(error.to_string(), said);
+        drop(keep);
+    }
+
+    #[test]
+    fn of_two_addresses_the_one_of_ipv4_is_taken() {
+        let both = || Ok(vec!["[::1]:1".parse().unwrap(), "127.0.0.1:1".parse().unwrap()]);
+        let found = resolve_within("camera", "cam", TIMEOUT, both).unwrap();
+        assert_eq!(found, "127.0.0.1:1".parse().unwrap());
+        let none = resolve_within("camera", "cam", TIMEOUT, || Ok(vec![])).unwrap_err();
+        assert!(none.to_string().ends_with("no address"), "{none}");
     }
 }

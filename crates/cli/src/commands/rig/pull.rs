@@ -15,20 +15,12 @@ use std::path::PathBuf;
 /// Runs the verb.
 pub fn run(args: &RigPullArgs) -> Result<u8, Failure> {
     let config = load_rig(&args.rig, &args.set)?;
-    let mut campaign = match &args.campaign {
+    let campaign = match &args.campaign {
         Some(path) => read_campaign(path).map_err(Failure::usage)?,
         None => plan_pulls(&config, &args.rig, &args.parts, &args.grip_force_n, args.repetitions, args.seed)?,
     };
-    // These two are known columns of a campaign: they stand in its entries.
-    let (of_entries, notes): (Vec<_>, Vec<_>) =
-        args.column.iter().cloned().partition(|(name, _)| ["gel_id", "session"].contains(&name.as_str()));
-    for (name, word) in of_entries {
-        let entries = campaign.pulls.iter_mut();
-        entries.for_each(|pull| {
-            *if name == "gel_id" { &mut pull.gel_id } else { &mut pull.session } = word.clone()
-        });
-    }
-    let job = PullJob::new(config, campaign, args.rehearsal.as_deref())?.with_notes(&notes, &args.ask)?;
+    let job =
+        PullJob::new(config, campaign, args.rehearsal.as_deref())?.with_notes(&args.column, &args.ask)?;
     let (name, out) = (name_of(args), folder_of(args));
     let mut outputs = Outputs::new(args.json.force)
         .reads_config(&args.rig, &args.set)
