@@ -48,7 +48,7 @@ fn main() -> ExitCode {
         compare_pulls(&measured, &twin, &library, jobs).unwrap();
         let once_s = started.elapsed().as_secs_f64();
         let started = Instant::now();
-        let options = PullDiagnoseOptions { jobs, without: &[] };
+        let options = PullDiagnoseOptions { jobs, ..PullDiagnoseOptions::default() };
         let found = diagnose_pull_table(&measured, &twin, &library, &options, &|_| {}).unwrap();
         let seconds = started.elapsed().as_secs_f64();
         let named: Vec<&str> = found.diagnosis.effects.iter().map(|e| e.name.as_str()).collect();

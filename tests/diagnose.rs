@@ -16,7 +16,7 @@ pub(crate) fn diagnose(measured: &MeasuredPulls, without: &[&str]) -> Diagnosed 
 }
 
 pub(crate) fn diagnose_with(measured: &MeasuredPulls, twin: &Twin, without: &[&str]) -> Diagnosed {
-    let options = PullDiagnoseOptions { jobs: 2, without };
+    let options = PullDiagnoseOptions { jobs: 2, without, ..PullDiagnoseOptions::default() };
     diagnose_pull_table(measured, twin, &library(twin), &options, &|_| {}).unwrap()
 }
 

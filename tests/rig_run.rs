@@ -277,7 +277,7 @@ fn check(path: &Path, folder: &RunFolder, pulls: &[RigPull], made: usize) {
     let twin = Simulator::open(&baseline(), &[], Mechanics::Reduced, false).unwrap();
     let compared = compare_pulls(&measured, twin.twin(), &twin.project().library, 2).unwrap();
     assert_eq!((compared.pulls.n, measured.pulls.len()), (made - 1, made - 1));
-    let options = PullDiagnoseOptions { jobs: 2, without: &[] };
+    let options = PullDiagnoseOptions { jobs: 2, ..PullDiagnoseOptions::default() };
     let found =
         diagnose_pull_table(&measured, twin.twin(), &twin.project().library, &options, &|_| {}).unwrap();
     assert_eq!(found.diagnosis.data.pulls, Some(made - 1));

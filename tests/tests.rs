@@ -28,6 +28,7 @@ mod determinism;
 mod diagnose;
 mod diagnose_awkward;
 mod diagnose_lacking;
+mod diagnose_model;
 // Lost grips of a real robot, by rows and by events.
 mod event_log;
 // Files that were changed at random.

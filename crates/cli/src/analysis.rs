@@ -25,11 +25,11 @@ pub use catalogue::{EffectCurve, effect_curve};
 pub use compare::{LabelErrors, PullComparison, compare_pulls, compare_pulls_with};
 pub use compare_images::{CompareImagesError, ImageComparison, ImageScore, compare_images};
 pub use diagnose::{
-    Diagnosed, MeasuredPresses, NextPulls, PressCovariate, PressDiagnosisInput, PressValues,
+    Diagnosed, Engine, MeasuredPresses, NextPulls, PressCovariate, PressDiagnosisInput, PressValues,
     PullDiagnoseOptions, calibrate_imprint_table, calibrate_sensor_table, compare_imprint_table,
     compare_sensor_table, diagnose_imprint_table, diagnose_measured_presses, diagnose_presses,
     diagnose_pull_table, diagnose_sensor_table, given_model, imprint_calibration_edits, is_sensor_table,
-    load_sensor_table, measured_presses, sensor_calibration_edits,
+    measured_presses, sensor_calibration_edits,
 };
 pub use expect::pull_predictor;
 pub use imprint::{

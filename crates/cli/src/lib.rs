@@ -36,7 +36,7 @@ use std::ffi::OsString;
 
 pub use analysis::{
     Beyond, CalibrateImprintsError, CalibratePullsError, CompareImagesError, Diagnosed, EditedValue,
-    EffectCurve, FoundCircles, ImageComparison, ImageScore, ImprintCalibration, ImprintCalibrations,
+    EffectCurve, Engine, FoundCircles, ImageComparison, ImageScore, ImprintCalibration, ImprintCalibrations,
     ImprintImagesError, ImprintSet, LabelErrors, LoadImprintsError, LoadPressesError, LoadSensorError,
     MeasuredPresses, NextPulls, OwnParts, PressCovariate, PressDiagnosisInput, PressGeometry, PressValues,
     PullComparison, PullDiagnoseOptions, SimulateCampaignError, TwinEdits, Unvaried, WriteTwinError, beyond,
@@ -45,10 +45,9 @@ pub use analysis::{
     diagnose_measured_presses, diagnose_presses, diagnose_pull_table, diagnose_sensor_table, edited_twin,
     edited_twin_toml, effect_curve, effects_of_geometry, find_circles_with_sensor, find_missing_circles,
     given_model, imprint_calibration_edits, imprint_data, is_imprint_set, is_press_set, is_sensor_table,
-    jaws_of_grip_force, load_imprint_set, load_presses, load_sensor, load_sensor_table, load_twin_sensor,
-    measured_presses, own_parts, posterior_twins, presses_sha256, pull_predictor, pull_priors,
-    sensor_calibration_edits, shipped_priors, simulate_campaign, unmeasured, unvaried, with_few_density,
-    write_twin,
+    jaws_of_grip_force, load_imprint_set, load_presses, load_sensor, load_twin_sensor, measured_presses,
+    own_parts, posterior_twins, presses_sha256, pull_predictor, pull_priors, sensor_calibration_edits,
+    shipped_priors, simulate_campaign, unmeasured, unvaried, with_few_density, write_twin,
 };
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use failure::Failure;

@@ -27,6 +27,7 @@ mod grouped;
 mod imprints;
 mod least_squares;
 mod levels;
+mod model;
 mod permutation;
 mod predictive;
 mod presses;
@@ -58,6 +59,7 @@ pub use imprints::{
 };
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use levels::{Level, levels};
+pub use model::{LearntTable, ModelAnswer, ModelFit, diagnose_by_model};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
 pub use predictive::share_below;
 pub use presses::{

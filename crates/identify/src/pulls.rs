@@ -14,7 +14,7 @@ mod creep;
 pub mod curves;
 pub mod data;
 mod dynamics;
-mod error_interval;
+pub(crate) mod error_interval;
 mod estimates;
 mod evidence;
 pub mod few;

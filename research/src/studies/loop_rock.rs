@@ -112,7 +112,7 @@ fn as_pulls(trace: &Trace, speeds: (f64, f64), folder: &Path) -> Result<(), Box<
     let twin = Twin::new(&load_twin_document(&at, &[])?.read_twin()?)?;
     let library = Library::of_twin(&twin, &at)?;
     let measured = load_pulls(folder)?;
-    let options = PullDiagnoseOptions { jobs: 1, without: &[] };
+    let options = PullDiagnoseOptions { jobs: 1, ..PullDiagnoseOptions::default() };
     let found = diagnose_pull_table(&measured.pulls, &twin, &library, &options, &|_| {})?.diagnosis;
     println!("{} pulls at two rates: {:?}", 2 * PULLS, found.verdict);
     for e in &found.effects {

@@ -4,6 +4,7 @@ mod diagnosed;
 mod few;
 mod imprints;
 mod measured_presses;
+mod model;
 mod next;
 mod presses;
 mod pull_values;
@@ -18,9 +19,11 @@ pub use measured_presses::{MeasuredPresses, diagnose_measured_presses, measured_
 pub use next::NextPulls;
 pub use presses::{PressCovariate, PressDiagnosisInput, PressValues, diagnose_presses};
 pub(crate) use pull_values::pull_values;
-pub use pulls::{PullDiagnoseOptions, PullTwinError, UnknownPartError, diagnose_pull_table, given_model};
+pub use pulls::{
+    Engine, PullDiagnoseOptions, PullTwinError, UnknownPartError, diagnose_pull_table, given_model,
+};
 pub(crate) use pulls::{check_fit, check_parts};
 pub use sensor::{
-    calibrate_sensor_table, compare_sensor_table, diagnose_sensor_table, is_sensor_table, load_sensor_table,
+    calibrate_sensor_table, compare_sensor_table, diagnose_sensor_table, is_sensor_table,
     sensor_calibration_edits,
 };

@@ -1,6 +1,7 @@
 //! What was typed for the verbs that close the loop.
 
 use super::{JsonArgs, TalkArgs, key_value};
+use crate::Engine;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -131,6 +132,9 @@ pub struct DiagnoseArgs {
     /// Of pulls: effects that must not be named, because something else is known to rule them out.
     #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
     pub without: Vec<String>,
+    /// Of pulls: how causes are found. `model` is one Gaussian model of the labels, under test; it does not read traces.
+    #[arg(long, value_enum, default_value_t = Engine::Search)]
+    pub engine: Engine,
     /// The twin to write, with the effects that were found.
     #[arg(short, long, value_name = "FILE.toml")]
     pub out: Option<PathBuf>,

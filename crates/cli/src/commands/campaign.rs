@@ -11,7 +11,7 @@ use crate::load::{TwinOfPulls, load_twin, within_rig};
 use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
-use crate::{NextPulls, simulate_campaign};
+use crate::{Engine, NextPulls, simulate_campaign};
 use gripgen::Location;
 use gripgen::twin::columns::{COLUMNS, Column};
 use gripgen::twin::effects::OutsideFit;
@@ -135,7 +135,8 @@ fn diagnosis_of(args: &CampaignArgs, folder: &Path) -> String {
 /// The pulls that separate what a diagnosis of `measured` leaves tied, and the hash of these measurements.
 fn separating(args: &CampaignArgs, measured: &Path, rig: &str) -> Result<(NextPulls, String), Failure> {
     let twin = TwinOfPulls { path: &args.twin, sets: &args.set, rig: Some(rig) };
-    let diagnosed = diagnose_folders(&[measured], &twin, &[], Suspects::Screen, &args.talk)?;
+    let diagnosed =
+        diagnose_folders(&[measured], &twin, (&[], Engine::default()), Suspects::Screen, &args.talk)?;
     let next = diagnosed.next.ok_or_else(|| {
         let found =
             format!("--separate: {} leaves nothing tied that pulls could separate", measured.display());

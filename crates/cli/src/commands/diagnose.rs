@@ -14,11 +14,11 @@ use crate::output::JsonSink;
 use crate::outputs::Outputs;
 use crate::progress::Share;
 use crate::{
-    PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, effects_of_geometry, is_imprint_set,
-    is_press_set, is_sensor_table, load_sensor_table,
+    Engine, PullDiagnoseOptions, diagnose_pull_table, diagnose_sensor_table, effects_of_geometry,
+    is_imprint_set, is_press_set, is_sensor_table,
 };
 use gripgen::twin::effects::LIBRARY;
-use gripgen_measured::Suspects;
+use gripgen_measured::{Suspects, read_sensor_table};
 use std::path::Path;
 
 /// Runs the verb.
@@ -47,7 +47,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<u8, Failure> {
 }
 
 fn sensor(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
-    let table = load_sensor_table(&args.measured).map_err(Failure::usage)?;
+    let table = read_sensor_table(&args.measured).map_err(Failure::usage)?;
     Ok(diagnose_sensor_table(&table))
 }
 
@@ -61,14 +61,14 @@ fn pulls(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
     let without: Vec<&str> = args.without.iter().map(String::as_str).collect();
     let twin = TwinOfPulls { path: &args.twin, sets: &args.set, rig: args.rig.as_deref() };
     let measured = folders(&args.measured, &args.also);
-    diagnose_folders(&measured, &twin, &without, suspects(args.include_suspect), &args.talk)
+    diagnose_folders(&measured, &twin, (&without, args.engine), suspects(args.include_suspect), &args.talk)
 }
 
 /// Diagnoses the pulls of folders, with progress.
 pub fn diagnose_folders(
     measured: &[&Path],
     twin: &TwinOfPulls<'_>,
-    without: &[&str],
+    (without, engine): (&[&str], Engine),
     suspects: Suspects,
     talk: &TalkArgs,
 ) -> Result<Diagnosed, Failure> {
@@ -78,7 +78,7 @@ pub fn diagnose_folders(
         loaded.missing.notes().for_each(|note| eprintln!("note: {note}"));
     }
     let without = [without, &effects_of_geometry(&loaded.pulls, &twin)].concat();
-    let options = PullDiagnoseOptions { jobs: jobs(), without: &without };
+    let options = PullDiagnoseOptions { jobs: jobs(), without: &without, engine };
     let share = Share::start("diagnosing", talk);
     let diagnosed = diagnose_pull_table(&loaded.pulls, &twin, &library, &options, &|x| share.at(x));
     share.finish();

@@ -8,6 +8,8 @@ mod campaign;
 mod check;
 // The catalogue of effects.
 mod effects;
+// What errors tell people to do.
+mod hints;
 // Files to start from.
 mod init;
 // A page of what is under way.

@@ -71,7 +71,7 @@ fn pulls_needed(first: &Path, second: &Path) -> Option<usize> {
     for more in [32, 16, 8, 4] {
         let more = more.min(all.pulls.len() - before);
         all.pulls.truncate(before + more);
-        let options = PullDiagnoseOptions { jobs: 2, without: &[] };
+        let options = PullDiagnoseOptions { jobs: 2, ..PullDiagnoseOptions::default() };
         let diagnosis = diagnose_pull_table(&all, &twin, &library, &options, &|_| ()).unwrap().diagnosis;
         let names = diagnosis.effects.first().map(|e| {
             let rivals = e.indistinguishable_from.iter().map(|r| r.name.clone());

@@ -308,7 +308,7 @@ fn learnt_text(residual: &Residual) -> String {
     )
 }
 
-pub(super) fn blank(data: &PullData<'_>) -> Diagnosis {
+pub(crate) fn blank(data: &PullData<'_>) -> Diagnosis {
     let known = covariates().filter(|c| !c.holds_words()).map(|c| c.name);
     let data_summary = DataSummary {
         pulls: Some(data.len()),

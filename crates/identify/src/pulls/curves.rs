@@ -3,10 +3,10 @@
 use super::data::{Column, PullData};
 
 /// The column whose words do not come back.
-pub(super) const SESSION: &str = "session";
+pub(crate) const SESSION: &str = "session";
 
 /// The columns that tell when a pull was made, the finer one first.
-pub(super) const CLOCKS: [&str; 2] = ["time_s", "pull_index"];
+pub(crate) const CLOCKS: [&str; 2] = ["time_s", "pull_index"];
 
 /// Fewest pulls with a word that show a step of it: two pulls that lie far off are two bad pulls.
 const MIN_STEP: usize = 3;

@@ -23,7 +23,7 @@ const POPULATION: usize = 15;
 const FAR: f64 = 4.0;
 
 /// Pulls whose errors are judged.
-pub(super) struct Judged<'a> {
+pub(crate) struct Judged<'a> {
     pub label_n: &'a [f64],
     /// Standard deviations of the labels, up to a factor.
     pub sd_n: &'a [f64],
@@ -43,7 +43,7 @@ struct Configuration {
 }
 
 /// Errors of two predictions, with intervals that hold for both alike: whole configurations are drawn at a time.
-pub(super) fn errors(judged: &Judged<'_>, before: &[f64], after: &[f64]) -> Option<ErrorPair> {
+pub(crate) fn errors(judged: &Judged<'_>, before: &[f64], after: &[f64]) -> Option<ErrorPair> {
     let Judged { label_n, sd_n, groups, rows } = *judged;
     let known: Vec<usize> =
         rows.iter().copied().filter(|&i| before[i].is_finite() && after[i].is_finite()).collect();

@@ -1,6 +1,6 @@
 //! What is believed of a rig and its parts before the first pull.
 
-use gripgen_twin::random::normal_quantile;
+use gripgen_twin::random::{normal_cdf, normal_quantile};
 
 /// What is believed of a number: normal, or its logarithm is, inside bounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,11 +15,6 @@ pub struct Prior {
     pub bounds: (f64, f64),
     /// Where it comes from.
     pub source: String,
-}
-
-/// Distribution function of the standard normal.
-fn normal_below(z: f64) -> f64 {
-    0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 impl Prior {
@@ -41,9 +36,9 @@ impl Prior {
         let value = |z: f64| {
             if self.log { self.centre * libm::exp(self.spread * z) } else { self.centre + self.spread * z }
         };
-        let below = if self.log && low <= 0.0 { 0.0 } else { normal_below(place(low)) };
-        let above = normal_below(place(high));
-        let share = (below + (above - below) * normal_below(z)).clamp(1e-15, 1.0 - 1e-15);
+        let below = if self.log && low <= 0.0 { 0.0 } else { normal_cdf(place(low)) };
+        let above = normal_cdf(place(high));
+        let share = (below + (above - below) * normal_cdf(z)).clamp(1e-15, 1.0 - 1e-15);
         value(normal_quantile(share)).clamp(low, high)
     }
 

@@ -2,6 +2,7 @@
 
 use super::diagnosed::Diagnosed;
 use super::few::diagnose_few_pulls;
+use super::model::diagnose_pulls_by_model;
 use super::next::next_pulls;
 use super::pull_values::pull_values;
 use crate::analysis::expect::pull_predictor;
@@ -21,12 +22,25 @@ use gripgen_twin::predict::PullModel;
 use gripgen_twin::{MeasuredPull, MeasuredPulls, TABLE_EFFECT, Twin};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// How causes are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum Engine {
+    /// A competition of fits.
+    #[default]
+    Search,
+    /// One Gaussian model of the labels.
+    Model,
+}
+
 /// How a diagnosis of pulls is made.
+#[derive(Default)]
 pub struct PullDiagnoseOptions<'a> {
     /// Worker threads.
     pub jobs: usize,
     /// Effects that must not compete.
     pub without: &'a [&'a str],
+    /// How causes are found.
+    pub engine: Engine,
 }
 
 /// A part was measured that the twin does not have.
@@ -144,6 +158,11 @@ pub fn diagnose_pull_table(
     }
     let predictor = pull_predictor(measured, twin, library, options.jobs);
     let given = given_model(twin, predictor.part_names())?;
+    if options.engine == Engine::Model {
+        let mut found = diagnose_pulls_by_model(measured, &predictor, &given, options.without, progress);
+        found.diagnosis.notes.extend(without_its_effects(twin));
+        return Ok(found);
+    }
     if is_few(measured) {
         let mut found = diagnose_few_pulls(measured, &predictor, &given, twin);
         found.diagnosis.notes.extend(without_its_effects(twin));

@@ -1,0 +1,360 @@
+//! From a campaign to an answer: what is said, the twin that follows, and its error on pulls that the fit has not seen.
+
+use super::gaussian::{Gaussian, Measured};
+use super::labels::LabelCurves;
+use super::naming::said;
+use super::search::{Fit, Search};
+use super::sizes::{amplitude_of, scaled, shape_of, values_of};
+use super::tables::{LearntTable, tables};
+use super::terms::{Kind, all_terms, effect_shape};
+use crate::diagnosis::{Diagnosis, ErrorReport, ErrorsBy, ParameterEstimate};
+use crate::pulls::answer::{blank, insufficient};
+use crate::pulls::candidates::{Candidate, candidates};
+use crate::pulls::data::PullData;
+use crate::pulls::error_interval::{Judged, errors};
+use crate::pulls::heldout::{folds, noise_floor_n};
+use gripgen_twin::MeasuredPulls;
+use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel};
+use gripgen_twin::values::median;
+use std::collections::BTreeMap;
+
+/// Kinetic ratios that are tried: `reference/priors.md` of the project has 0.84 with a deviation of 0.09, from 0.55 to 1.
+const RATIOS: [f64; 7] = [1.0, 0.95, 0.9, 0.84, 0.78, 0.7, 0.6];
+const RATIO: (f64, f64) = (0.84, 0.09);
+
+/// Pulls from which on it is said that they cannot answer.
+const MIN_PULLS: usize = 8;
+/// Scatter that a twin holds.
+const MOST_SCATTER: f64 = 0.3;
+/// Times that labels are corrected for what the simulator says of the fitted model.
+const CORRECTED: usize = 2;
+/// Searches at most, each from the refined model of the one before.
+const SEARCHES: usize = 3;
+/// Rounds in which values of effects are refined.
+const REFINED: usize = 3;
+
+/// Nodes and weights over which scatter is averaged: Gauss-Hermite of five points for a standard normal variable.
+const NODES: [(f64, f64); 5] = [
+    (-2.856_970_013_872_8, 0.011_257_411_327_72),
+    (-1.355_626_179_974_3, 0.222_075_922_005_61),
+    (0.0, 0.533_333_333_333_33),
+    (1.355_626_179_974_3, 0.222_075_922_005_61),
+    (2.856_970_013_872_8, 0.011_257_411_327_72),
+];
+
+/// An answer, with what a twin needs beside it.
+#[derive(Debug, Clone)]
+pub struct ModelAnswer {
+    /// The answer.
+    pub diagnosis: Diagnosis,
+    /// What was fitted; not there if the data are insufficient.
+    pub fit: Option<ModelFit>,
+}
+
+/// What was fitted.
+#[derive(Debug, Clone)]
+pub struct ModelFit {
+    /// Friction, effects, scatter.
+    pub model: PullModel,
+    /// Curves without a name.
+    pub tables: Vec<LearntTable>,
+    /// Labels predicted for held-out pulls, before and after.
+    pub heldout_label_n: [Vec<f64>; 2],
+}
+
+/// Labels of one setting of the label rule with the search over them.
+struct Setting {
+    curves: LabelCurves,
+    log_prior: f64,
+    search: Search,
+    plain: Fit,
+    /// What labels of the simulator lie above those of the curves, near the model that is fitted.
+    above_n: Vec<f64>,
+}
+
+impl Setting {
+    /// Takes the labels, less what the simulator adds to them, as linear about those of these logarithms of friction.
+    fn look_near(&mut self, label_n: &[f64], z: &[f64]) {
+        let own: Vec<f64> = label_n.iter().zip(&self.above_n).map(|(y, above)| y - above).collect();
+        let wider = std::mem::replace(&mut self.search.measured.wider, nalgebra::DVector::zeros(0));
+        self.search.measured = Measured { wider, ..self.curves.measured_near(&own, z) };
+    }
+}
+
+/// Diagnoses a campaign from a baseline. `progress` is told the share that is done.
+pub fn diagnose_by_model(
+    measured: &MeasuredPulls,
+    predictor: &dyn PredictPulls,
+    given: &PullModel,
+    without: &[&str],
+    progress: &(dyn Fn(f64) + Sync),
+) -> ModelAnswer {
+    let data = PullData::new(measured);
+    let mut diagnosis = blank(&data);
+    if let Some(missing) = insufficient(&data).filter(|_| data.len() >= MIN_PULLS) {
+        diagnosis.notes.push(missing);
+        return ModelAnswer { diagnosis, fit: None };
+    }
+    let max_n = data.label_n.iter().copied().fold(0.0, f64::max);
+    let candidates = candidates(&data, max_n, None, without);
+    let settings = settings(&data, predictor, given);
+    progress(0.3);
+    let found = settings.into_iter().filter_map(|mut setting| {
+        let z = setting.search.explained(&setting.plain);
+        setting.search.terms = all_terms(&data, &setting.curves, predictor, &candidates, &z);
+        let near = setting.search.widen_outliers()?;
+        setting.look_near(&data.label_n, &near);
+        setting.plain = setting.search.plain()?;
+        let mut fit = setting.search.run(setting.plain.clone());
+        for _ in 0..SEARCHES {
+            let refined = refined(&data, predictor, &candidates, &mut setting, fit);
+            let before = refined.chosen.clone();
+            fit = setting.search.run(refined);
+            if fit.chosen == before {
+                break;
+            }
+        }
+        let fit = refined(&data, predictor, &candidates, &mut setting, fit);
+        progress(0.6);
+        Some((fit.score + setting.log_prior, setting, fit))
+    });
+    let Some((_, mut setting, fit)) = found.reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
+        diagnosis
+            .notes
+            .push("the labels cannot be predicted at all: is the unit of the forces newton?".into());
+        return ModelAnswer { diagnosis, fit: None };
+    };
+    let mut fit = said(&data, &candidates, &setting.search, fit, &mut diagnosis);
+    for _ in 0..CORRECTED {
+        let above_n = above_fast_n(&data, predictor, &candidates, &setting, &fit);
+        setting.above_n = above_n;
+        let z = setting.search.explained(&fit);
+        setting.look_near(&data.label_n, &z);
+        let again = setting.search.refitted(&fit).zip(setting.search.plain());
+        let Some((next, plain)) = again else { break };
+        (fit, setting.plain) = (next, plain);
+    }
+    let after = model_of(&data, &candidates, &setting, &fit);
+    let learnt = learnt(&data, &setting.search, &fit);
+    diagnosis.conclude();
+    let wider = &setting.search.measured.wider;
+    diagnosis.data.outliers =
+        (0..data.len()).filter(|&i| wider[i] > 1.0).map(|i| measured.pulls[i].id.clone()).collect();
+    let repetitions = folds(data.len());
+    let heldout = [&setting.plain, &fit].map(|fit| heldout_n(&data, &setting, fit, &repetitions));
+    let all: Vec<usize> = (0..data.len()).collect();
+    let scatter = libm::exp(fit.gaussian.log_noise[0]);
+    let sd_n: Vec<f64> = all.iter().map(|&i| libm::hypot(scatter * data.label_n[i], given.noise_n)).collect();
+    let judged = Judged { label_n: &data.label_n, sd_n: &sd_n, groups: &data.group_of, rows: &all };
+    diagnosis.error = errors(&judged, &heldout[0], &heldout[1]).map(|pair| ErrorReport {
+        heldout: "repetitions".into(),
+        before: pair.before,
+        after: pair.after,
+        by: ErrorsBy::default(),
+    });
+    let own: Vec<f64> = all.iter().map(|&i| data.label_n[i] - heldout[1][i]).collect();
+    diagnosis.noise_floor_n = Some(noise_floor_n(&own, &data.group_of, data.parts.len() + fit.chosen.len()));
+    let baseline = parts_estimates(&data, &after, &fit.gaussian);
+    diagnosis.baseline = baseline;
+    progress(1.0);
+    ModelAnswer { diagnosis, fit: Some(ModelFit { model: after, tables: learnt, heldout_label_n: heldout }) }
+}
+
+/// The settings of the label rule from which a search starts: without a fall of the force, and the best other one.
+fn settings(data: &PullData<'_>, predictor: &dyn PredictPulls, given: &PullModel) -> Vec<Setting> {
+    let log_prior = |ratio: f64| {
+        let far = (ratio - RATIO.0) / RATIO.1;
+        -0.5 * far * far
+    };
+    let all: Vec<f64> = RATIOS.iter().map(|r| log_prior(*r)).collect();
+    let total = libm::log(all.iter().map(|x| libm::exp(*x)).sum());
+    let mut found: Vec<Setting> = RATIOS
+        .iter()
+        .filter_map(|&ratio| {
+            let curves =
+                LabelCurves::new(predictor, &PullModel { kinetic_ratio: ratio, ..given.clone() }, data.len());
+            let search = Search::new(data, curves.measured(&data.label_n), vec![]);
+            let plain = search.plain()?;
+            Some(Setting {
+                curves,
+                log_prior: log_prior(ratio) - total,
+                search,
+                plain,
+                above_n: vec![0.0; data.len()],
+            })
+        })
+        .collect();
+    let score = |s: &Setting| s.plain.score + s.log_prior;
+    let best = (0..found.len()).max_by(|&a, &b| score(&found[a]).total_cmp(&score(&found[b])));
+    let keep: Vec<usize> = [Some(0), best].into_iter().flatten().collect();
+    let mut at = 0;
+    found.retain(|_| {
+        at += 1;
+        keep.contains(&(at - 1))
+    });
+    found
+}
+
+/// A fit with the values of its effects where the evidence is highest: sizes from their coefficients, other values by trying.
+fn refined(
+    data: &PullData<'_>,
+    predictor: &dyn PredictPulls,
+    candidates: &[Candidate],
+    setting: &mut Setting,
+    mut fit: Fit,
+) -> Fit {
+    for _ in 0..REFINED {
+        for place in 0..fit.chosen.len() {
+            let z = friction(data, candidates, &setting.search, &fit);
+            let Kind::Effect(e) = setting.search.terms[fit.chosen[place].term].kind else { continue };
+            let candidate = &candidates[e];
+            let Some(values) = values_of(candidate, &setting.search, &fit, place) else { continue };
+            let mut tried = vec![values.clone()];
+            for &(k, scale) in candidate.free.iter().skip(1) {
+                let p = &candidate.spec.parameters[k];
+                let bounds = candidate.spec.pulls.map_or(p.bounds, |f| (f.bounds)(p.name, &values, p.bounds));
+                for step in [-2.0, -1.0, 1.0, 2.0] {
+                    let mut moved = values.clone();
+                    moved[k] = (values[k] + step * scale).clamp(bounds.0, bounds.1);
+                    tried.push(moved);
+                }
+            }
+            for (k, values) in tried.into_iter().enumerate() {
+                let Some(shape) = effect_shape(data, &setting.curves, predictor, candidate, values, &z)
+                else {
+                    continue;
+                };
+                let term = fit.chosen[place].term;
+                setting.search.terms[term].shapes.push(shape);
+                let mut next = fit.clone();
+                next.chosen[place].shape = setting.search.terms[term].shapes.len() - 1;
+                // The column of the values as they are is right whether or not its score is higher.
+                match setting.search.refitted(&next).filter(|next| k == 0 || next.score > fit.score) {
+                    Some(next) => fit = next,
+                    None => drop(setting.search.terms[term].shapes.pop()),
+                }
+            }
+        }
+    }
+    fit
+}
+
+/// Logarithms of the friction itself: what labels show, less what the effects on signals add to it.
+fn friction(data: &PullData<'_>, candidates: &[Candidate], search: &Search, fit: &Fit) -> Vec<f64> {
+    let mut z = search.explained(fit);
+    for (place, chosen) in fit.chosen.iter().enumerate() {
+        let (kind, at) = (&search.terms[chosen.term].kind, shape_of(search, chosen).at.as_ref());
+        let (Kind::Effect(e) | Kind::EffectOfParts(e), Some(at)) = (kind, at) else { continue };
+        if !candidates[*e].acts_on_signals() {
+            continue;
+        }
+        let column = fit.gaussian.part(search.block_of(place));
+        let one = matches!(kind, Kind::Effect(_));
+        for (i, z) in z.iter_mut().enumerate() {
+            let part = data.part_of[i];
+            let share = amplitude_of(search, fit, place, if one { 0 } else { part }).map_or(0.0, |a| a.0);
+            *z -= column[i] + share * at.means[part];
+        }
+    }
+    z
+}
+
+/// The model of a fit: friction of the parts, effects, scatter.
+fn model_of(data: &PullData<'_>, candidates: &[Candidate], setting: &Setting, fit: &Fit) -> PullModel {
+    let search = &setting.search;
+    let mut model = PullModel { factor: vec![], ..setting.curves.model.clone() };
+    for (part, mu) in model.mu.iter_mut().enumerate() {
+        *mu *= libm::exp(fit.gaussian.mean[part]);
+    }
+    // A twin has no noise of labels but that of its readings: what is beyond it scatters with the friction.
+    let wider = &search.measured.wider;
+    let variances = fit.gaussian.weight.iter().zip(wider).map(|(w, wider)| 1.0 / (w * wider));
+    model.scatter = median(variances.collect()).unwrap_or(0.0).sqrt().min(MOST_SCATTER);
+    for (place, chosen) in fit.chosen.iter().enumerate() {
+        let (kind, at) = (&search.terms[chosen.term].kind, shape_of(search, chosen).at.as_ref());
+        let (Kind::Effect(e) | Kind::EffectOfParts(e), Some(at)) = (kind, at) else { continue };
+        let candidate = &candidates[*e];
+        let one = matches!(kind, Kind::Effect(_));
+        for p in 0..data.parts.len() {
+            let Some((share, _)) = amplitude_of(search, fit, place, if one { 0 } else { p }) else {
+                continue;
+            };
+            // A column is without its mean in each part: what the effect does there is taken off the friction.
+            model.mu[p] *= libm::exp(-share * at.means[p]);
+            if !one || p == 0 {
+                let part = (!one).then_some(p);
+                let values = scaled(candidate, &at.values, share);
+                model.effects.push(ModelEffect { part, ..ModelEffect::new(candidate.spec, values) });
+            }
+        }
+    }
+    model
+}
+
+fn learnt(data: &PullData<'_>, search: &Search, fit: &Fit) -> Vec<LearntTable> {
+    let each = fit.chosen.iter().enumerate().flat_map(|(place, chosen)| {
+        let log_factor: Vec<f64> = fit.gaussian.part(search.block_of(place)).iter().copied().collect();
+        tables(data, &search.terms[chosen.term], shape_of(search, chosen), &log_factor)
+    });
+    each.collect()
+}
+
+/// Expected labels of held-out pulls, from the others and the deviations of the whole fit. Sessions and memory of the others say nothing
+/// of a pull that a twin makes.
+fn heldout_n(data: &PullData<'_>, setting: &Setting, fit: &Fit, sets: &[Vec<usize>]) -> Vec<f64> {
+    let mut found = vec![f64::NAN; data.len()];
+    let scatter = libm::exp(fit.gaussian.log_noise[0]);
+    let first = setting.search.block_of(0);
+    let own = |block: usize| block == 0 || block >= first;
+    for set in sets {
+        let Some(z) = fit.gaussian.predicted_without(&setting.search.measured, set, &own) else { continue };
+        for (&row, z) in set.iter().zip(z) {
+            found[row] = expected_n(setting, row, z, scatter);
+        }
+    }
+    found
+}
+
+/// Expected label of a pull whose friction has this logarithm and scatter.
+fn expected_n(setting: &Setting, row: usize, z: f64, scatter: f64) -> f64 {
+    let at = |x: f64| setting.curves.label_n(row, z + libm::log((1.0 + scatter * x).max(0.01)));
+    let mean: f64 = NODES.iter().map(|(x, w)| w * at(*x)).sum();
+    mean + setting.above_n[row]
+}
+
+/// What labels of the simulator lie above those of the curves at a fit: what its twin will be judged by.
+fn above_fast_n(
+    data: &PullData<'_>,
+    predictor: &dyn PredictPulls,
+    candidates: &[Candidate],
+    setting: &Setting,
+    fit: &Fit,
+) -> Vec<f64> {
+    let rows: Vec<usize> = (0..data.len()).collect();
+    let mut model = model_of(data, candidates, setting, fit);
+    let mut log_factor = vec![0.0; data.len()];
+    for (place, _) in fit.chosen.iter().enumerate().filter(|(_, c)| !setting.search.terms[c.term].is_effect())
+    {
+        let own = fit.gaussian.part(setting.search.block_of(place));
+        log_factor.iter_mut().zip(own.iter()).for_each(|(sum, x)| *sum += x);
+    }
+    model.factor = log_factor.iter().map(|x| libm::exp(*x)).collect();
+    let z = setting.search.explained(fit);
+    let simulated = predictor.labels_n(&model, &rows);
+    let fast = rows.iter().map(|&i| expected_n(setting, i, z[i], model.scatter) - setting.above_n[i]);
+    simulated.iter().zip(fast).map(|(s, f)| s - f).collect()
+}
+
+fn parts_estimates(
+    data: &PullData<'_>,
+    model: &PullModel,
+    gaussian: &Gaussian,
+) -> BTreeMap<String, ParameterEstimate> {
+    let each = data.parts.iter().enumerate().map(|(k, part)| {
+        let (mu, sd) = (model.mu[k], gaussian.sd(k));
+        let interval = (mu * libm::exp(-1.645 * sd), mu * libm::exp(1.645 * sd));
+        (format!("parts.{part}.mu"), ParameterEstimate::new(mu, interval, "1"))
+    });
+    let ratio = model.kinetic_ratio;
+    each.chain([("kinetic_ratio".into(), ParameterEstimate::new(ratio, (ratio, ratio), "1"))]).collect()
+}
