@@ -105,8 +105,7 @@ fn proposed_grips_hold_and_the_jaws_stop_at_the_surface() {
 
 /// Both mechanics and the sum of the patch limits, on parts whose hull is not what the pads touch.
 #[test]
-#[ignore = "slow: a known fault: a screw held by head and shank slips 1.3 % earlier in Rapier"]
-#[should_panic(expected = "m8_screw, sample")]
+#[ignore = "slow: the whole robot in Rapier for five parts"]
 fn both_mechanics_agree_where_the_part_is_not_convex() {
     let quiet = [("wrist.noise_n", "0"), ("images", "none"), ("trace", "none"), ("samples", "12")];
     for part in ordinary().into_iter().filter(|p| p.name != "ball") {
