@@ -36,6 +36,8 @@ impl Loop {
     fn pull(&self, out: &Path, more: &[&str]) {
         let mut arguments =
             vec!["rig", "pull", self.rig.to_str().unwrap(), "-q", "-o", out.to_str().unwrap()];
+        // Nothing is waited for here that does not come: a machine that does something else may take its time.
+        arguments.extend(["--set", "limits.patience=100"]);
         arguments.extend(more);
         let done = run(&arguments);
         let index = std::fs::read_to_string(out.join("index.csv")).unwrap_or_default();

@@ -44,8 +44,13 @@ impl Recorder {
     pub(super) fn take(&mut self, newest: PerJaw<Option<Stamped<Arc<CameraFrame>>>>, now: Instant) {
         let PerJaw { left: Some(left), right: Some(right) } = newest else { return };
         let both = PerJaw { left, right };
+        // A camera that is short of time may send one exposure twice: its own stamp tells.
+        let follows = |new: &Stamped<Arc<CameraFrame>>, last: &Stamped<Arc<CameraFrame>>| {
+            let stamp = new.event.device_time_s;
+            new.at > last.at && (stamp.is_none() || stamp != last.event.device_time_s)
+        };
         let is_new =
-            self.frames.last().is_none_or(|last| Jaw::BOTH.iter().all(|&jaw| both[jaw].at > last[jaw].at));
+            self.frames.last().is_none_or(|last| Jaw::BOTH.iter().all(|&jaw| follows(&both[jaw], &last[jaw])));
         if !is_new || now < self.due {
             return;
         }
@@ -184,6 +189,25 @@ mod tests {
             film.frames.iter().map(|both| (both.left.at - film.frames[0].left.at).as_secs_f64()).collect();
         assert!((36..=41).contains(&times.len()), "{times:?}");
         assert!(times.windows(2).all(|t| (0.06..0.14).contains(&(t[1] - t[0]))), "{times:?}");
+    }
+
+    /// The same exposure in another message is no frame more.
+    #[test]
+    fn an_exposure_that_is_sent_twice_is_filmed_once() {
+        let begin = Instant::now();
+        let mut film = Recorder { due: begin, ..Recorder::new(10.0, 1 << 20) };
+        for (tenth, stamp) in [(0_u64, 0.0), (1, 0.0), (2, 0.2)] {
+            let at = begin + Duration::from_millis(100 * tenth);
+            let frame = || {
+                Some(Stamped {
+                    at,
+                    event: Arc::new(CameraFrame { jpeg: vec![1; 10], device_time_s: Some(stamp) }),
+                })
+            };
+            film.take(PerJaw { left: frame(), right: frame() }, at);
+        }
+        let stamps: Vec<f64> = film.frames.iter().filter_map(|both| both.left.event.device_time_s).collect();
+        assert_eq!(stamps, [0.0, 0.2]);
     }
 
     /// Half the frames at half the rate, from the beginning to the end.
