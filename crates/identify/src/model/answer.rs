@@ -10,6 +10,7 @@ use super::terms::{Kind, all_terms, effect_shape};
 use crate::diagnosis::{Diagnosis, ErrorReport, ErrorsBy, ParameterEstimate};
 use crate::pulls::answer::{blank, insufficient};
 use crate::pulls::candidates::{Candidate, candidates};
+use crate::pulls::context::Context;
 use crate::pulls::data::PullData;
 use crate::pulls::error_interval::{Judged, errors};
 use crate::pulls::heldout::{folds, noise_floor_n};
@@ -18,9 +19,15 @@ use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel};
 use gripgen_twin::values::median;
 use std::collections::BTreeMap;
 
-/// Kinetic ratios that are tried: `reference/priors.md` of the project has 0.84 with a deviation of 0.09, from 0.55 to 1.
+/// Kinetic ratios that are tried. What is believed of them: 1/2 to 1 for rough contacts (Farkas 2005, cond-mat/0502644), areas that fall by
+/// up to 30 % before the slip (Sahli 2018, 10.1073/pnas.1706434115); 0.84 with a deviation of 0.09.
 const RATIOS: [f64; 7] = [1.0, 0.95, 0.9, 0.84, 0.78, 0.7, 0.6];
 const RATIO: (f64, f64) = (0.84, 0.09);
+/// Lags of the force loop that are tried, in addition to that of the twin: its logarithm is normal about 0.1 s with a deviation of 0.5.
+const LAGS_S: [f64; 4] = [0.025, 0.05, 0.09, 0.15];
+const LAG_S: (f64, f64) = (0.1, 0.5);
+/// A lag that traces show is not less.
+const LEAST_LAG_S: f64 = 1e-3;
 
 /// Pulls from which on it is said that they cannot answer.
 const MIN_PULLS: usize = 8;
@@ -97,7 +104,12 @@ pub fn diagnose_by_model(
     }
     let max_n = data.label_n.iter().copied().fold(0.0, f64::max);
     let candidates = candidates(&data, max_n, None, without);
-    let settings = settings(&data, predictor, given);
+    // Force loop, stiffness and the fall after the slip are what traces show, where there are some.
+    let context = Context::new(&data, predictor, given);
+    let seen = !context.observations.is_empty();
+    let given = if seen { &PullModel { noise_n: given.noise_n, ..context.base.clone() } } else { given };
+    let known = Known { lag: seen, ratio: context.kinetic.map(|(ratio, _)| ratio) };
+    let settings = settings(&data, predictor, given, known);
     progress(0.3);
     let found = settings.into_iter().filter_map(|mut setting| {
         let z = setting.search.explained(&setting.plain);
@@ -160,39 +172,55 @@ pub fn diagnose_by_model(
     ModelAnswer { diagnosis, fit: Some(ModelFit { model: after, tables: learnt, heldout_label_n: heldout }) }
 }
 
-/// The settings of the label rule from which a search starts: without a fall of the force, and the best other one.
-fn settings(data: &PullData<'_>, predictor: &dyn PredictPulls, given: &PullModel) -> Vec<Setting> {
-    let log_prior = |ratio: f64| {
-        let far = (ratio - RATIO.0) / RATIO.1;
-        -0.5 * far * far
+/// A setting of the label rule, and how well parts alone explain the labels with it.
+fn setting(
+    data: &PullData<'_>,
+    predictor: &dyn PredictPulls,
+    given: &PullModel,
+    (ratio, lag_s): (f64, f64),
+) -> Option<Setting> {
+    let model = PullModel { kinetic_ratio: ratio, lag_s, ..given.clone() };
+    let curves = LabelCurves::new(predictor, &model, data.len());
+    let search = Search::new(data, curves.measured(&data.label_n), vec![]);
+    let plain = search.plain()?;
+    let far = [(ratio - RATIO.0) / RATIO.1, libm::log(lag_s / LAG_S.0) / LAG_S.1];
+    let log_prior = -0.5 * far.iter().map(|x| x * x).sum::<f64>();
+    Some(Setting { curves, log_prior, search, plain, above_n: vec![0.0; data.len()] })
+}
+
+/// What traces say of the label rule.
+struct Known {
+    /// The lag of the model is theirs.
+    lag: bool,
+    /// Kinetic over static friction.
+    ratio: Option<f64>,
+}
+
+/// The settings from which a search starts: without a fall of the force after the slip, and the best other one.
+fn settings(
+    data: &PullData<'_>,
+    predictor: &dyn PredictPulls,
+    given: &PullModel,
+    known: Known,
+) -> Vec<Setting> {
+    let best = |found: Vec<Setting>| {
+        let score = |s: &Setting| s.plain.score + s.log_prior;
+        found.into_iter().reduce(|a, b| if score(&b) > score(&a) { b } else { a })
     };
-    let all: Vec<f64> = RATIOS.iter().map(|r| log_prior(*r)).collect();
-    let total = libm::log(all.iter().map(|x| libm::exp(*x)).sum());
-    let mut found: Vec<Setting> = RATIOS
-        .iter()
-        .filter_map(|&ratio| {
-            let curves =
-                LabelCurves::new(predictor, &PullModel { kinetic_ratio: ratio, ..given.clone() }, data.len());
-            let search = Search::new(data, curves.measured(&data.label_n), vec![]);
-            let plain = search.plain()?;
-            Some(Setting {
-                curves,
-                log_prior: log_prior(ratio) - total,
-                search,
-                plain,
-                above_n: vec![0.0; data.len()],
-            })
-        })
-        .collect();
-    let score = |s: &Setting| s.plain.score + s.log_prior;
-    let best = (0..found.len()).max_by(|&a, &b| score(&found[a]).total_cmp(&score(&found[b])));
-    let keep: Vec<usize> = [Some(0), best].into_iter().flatten().collect();
-    let mut at = 0;
-    found.retain(|_| {
-        at += 1;
-        keep.contains(&(at - 1))
-    });
-    found
+    let over = |ratios: &[f64], lags_s: &[f64]| {
+        let each = ratios.iter().flat_map(|ratio| lags_s.iter().map(move |lag_s| (*ratio, *lag_s)));
+        best(each.filter_map(|at| setting(data, predictor, given, at)).collect())
+    };
+    if known.lag {
+        let ratios = known.ratio.map_or(RATIOS.to_vec(), |ratio| vec![ratio]);
+        return over(&ratios, &[given.lag_s.max(LEAST_LAG_S)]).into_iter().collect();
+    }
+    let lags_s: Vec<f64> = LAGS_S.iter().copied().chain([given.lag_s]).filter(|lag_s| *lag_s > 0.0).collect();
+    // One after the other: what the ratio does to labels hardly depends on the lag.
+    let falls = over(&RATIOS[1..], &[given.lag_s.max(LAGS_S[0])])
+        .and_then(|first| over(&[first.curves.model.kinetic_ratio], &lags_s))
+        .and_then(|second| over(&RATIOS[1..], &[second.curves.model.lag_s]));
+    over(&RATIOS[..1], &lags_s).into_iter().chain(falls).collect()
 }
 
 /// A fit with the values of its effects where the evidence is highest: sizes from their coefficients, other values by trying.
@@ -219,19 +247,23 @@ fn refined(
                     tried.push(moved);
                 }
             }
+            // The column of the values as they are is right whether or not its score is higher, and the one that promised more was not.
+            let term = fit.chosen[place].term;
+            let mut own = setting.search.terms[term].shapes.clone();
             for (k, values) in tried.into_iter().enumerate() {
                 let Some(shape) = effect_shape(data, &setting.curves, predictor, candidate, values, &z)
                 else {
                     continue;
                 };
-                let term = fit.chosen[place].term;
-                setting.search.terms[term].shapes.push(shape);
                 let mut next = fit.clone();
-                next.chosen[place].shape = setting.search.terms[term].shapes.len() - 1;
-                // The column of the values as they are is right whether or not its score is higher.
+                next.chosen[place].shape = 0;
+                setting.search.terms[term].shapes = vec![shape];
                 match setting.search.refitted(&next).filter(|next| k == 0 || next.score > fit.score) {
-                    Some(next) => fit = next,
-                    None => drop(setting.search.terms[term].shapes.pop()),
+                    Some(next) => {
+                        fit = next;
+                        own.clone_from(&setting.search.terms[term].shapes);
+                    }
+                    None => setting.search.terms[term].shapes.clone_from(&own),
                 }
             }
         }

@@ -49,8 +49,10 @@ impl Recorder {
             let stamp = new.event.device_time_s;
             new.at > last.at && (stamp.is_none() || stamp != last.event.device_time_s)
         };
-        let is_new =
-            self.frames.last().is_none_or(|last| Jaw::BOTH.iter().all(|&jaw| follows(&both[jaw], &last[jaw])));
+        let is_new = self
+            .frames
+            .last()
+            .is_none_or(|last| Jaw::BOTH.iter().all(|&jaw| follows(&both[jaw], &last[jaw])));
         if !is_new || now < self.due {
             return;
         }
