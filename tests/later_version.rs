@@ -1,7 +1,7 @@
 //! Runs that another version of gripgen made, in whole or in part.
 
-use crate::common::{jobs, run, small_project};
-use gripgen::record::{Dataset, FolderError, RunFolder, repair, verify};
+use crate::common::{jobs, root, run, small_project};
+use gripgen::record::{Dataset, FolderError, INDEX_COLUMNS, RunFolder, repair, verify};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -111,4 +111,24 @@ fn a_run_of_another_version_is_never_repaired() {
     let checked = verify(folder.path(), |_| {}).unwrap();
     assert!(checked.faults.len() == 3 && repair(&run_folder, &checked).unwrap().is_empty(), "{checked:?}");
     assert_eq!(contents(folder.path()).len(), before.len());
+}
+
+/// Runs whose index has the first columns, with a field that is not known in one of their documents.
+#[test]
+#[cfg_attr(not(shared_data), ignore = "the folder of shared measured data is not beside this checkout")]
+fn runs_of_the_first_layout_are_read() {
+    let reports = root().join("../shared/reports/15-unknown-fields-of-a-later-version");
+    for name in ["run-with-a-new-field-in-run.json", "run-with-a-new-field-in-a-sidecar"] {
+        let folder = reports.join(name);
+        let checked = verify(&folder, |_| {}).unwrap();
+        assert_eq!((checked.good_shards, checked.samples, checked.faults), (1, 4, vec![]), "{name}");
+        let run = Dataset::open(&folder).unwrap();
+        let at = |column: &str| INDEX_COLUMNS.iter().position(|c| *c == column).unwrap();
+        let sidecar = RunFolder::open(&folder).unwrap().finished(0).unwrap().unwrap();
+        for row in &sidecar.rows {
+            assert!(row[at("peak_force_n")].is_empty() && row[at("mu_drawn")].is_empty(), "{row:?}");
+            assert!(row[at("mu_effective")].parse::<f64>().unwrap() > 0.0, "{row:?}");
+        }
+        assert_eq!(run.table().rows(), 4);
+    }
 }

@@ -14,6 +14,39 @@ pub static INDEX_COLUMNS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
     PLACE_OF_SAMPLE.into_iter().chain(of_pulls).chain(ends).collect()
 });
 
+/// Columns that the first layout of the index lacks. They stand together, and `mu_effective` behind them was called `mu`.
+const NOT_IN_FIRST: [&str; 7] = [
+    "peak_force_n",
+    "kinetic_force_n",
+    "label_branch",
+    "limit_force_n",
+    "slip_onset_s",
+    "slip_s",
+    "mu_drawn",
+];
+
+fn first_of_added() -> usize {
+    INDEX_COLUMNS.iter().position(|c| *c == NOT_IN_FIRST[0]).unwrap_or(INDEX_COLUMNS.len())
+}
+
+/// Brings rows of the first layout, whose header and rows are `columns` long in this one, to this one: what they lack is empty. Other rows
+/// stay as they are.
+pub(crate) fn from_first_layout(rows: &mut [Vec<String>], columns: usize) {
+    if rows.iter().all(|row| row.len() + NOT_IN_FIRST.len() == columns) {
+        let at = first_of_added();
+        for row in rows {
+            row.splice(at..at, NOT_IN_FIRST.map(|_| String::new()));
+        }
+    }
+}
+
+/// A row of this layout, or its header, as the first one has it.
+pub(crate) fn as_in_first_layout(row: &[String]) -> Vec<String> {
+    let (before, after) = (&row[..first_of_added()], &row[first_of_added() + NOT_IN_FIRST.len()..]);
+    let name = |cell: &String| if cell == "mu_effective" { "mu".into() } else { cell.clone() };
+    before.iter().chain(after).map(name).collect()
+}
+
 /// The name of a status in the index and on screens.
 pub fn status_name(status: Status) -> &'static str {
     match status {
@@ -86,4 +119,28 @@ pub fn csv_lines<'a>(rows: impl IntoIterator<Item = &'a Vec<String>>) -> Vec<u8>
         writer.write_record(row).expect("writing to memory cannot fail");
     }
     writer.into_inner().expect("writing to memory cannot fail")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_the_first_layout_come_to_this_one_and_back() {
+        let extra = ["lamp".to_string()];
+        let header = index_header(&extra);
+        let first = as_in_first_layout(&header);
+        assert_eq!(first.len() + 7, header.len());
+        let place = first.iter().position(|name| name == "slip_time_s").unwrap();
+        assert_eq!(first[place..], ["slip_time_s", "mu", "group", "repetition", "failure", "lamp"]);
+        let mut rows: Vec<Vec<String>> = vec![(0..first.len()).map(|k| k.to_string()).collect(); 2];
+        let before = rows.clone();
+        from_first_layout(&mut rows, header.len());
+        let cell = |name: &str| rows[1][header.iter().position(|h| h == name).unwrap()].as_str();
+        assert_eq!((cell("peak_force_n"), cell("mu_effective")), ("", (place + 1).to_string().as_str()));
+        assert_eq!(rows.iter().map(|row| as_in_first_layout(row)).collect::<Vec<_>>(), before);
+        let whole = rows.clone();
+        from_first_layout(&mut rows, header.len());
+        assert_eq!(rows, whole, "rows of this layout stay as they are");
+    }
 }

@@ -2,12 +2,12 @@
 
 use crate::VERSION;
 use crate::folder::{FolderError, RunFolder, Sidecar, hash_file};
-use crate::index::{csv_lines, index_header, index_row};
+use crate::index::{as_in_first_layout, csv_lines, index_header, index_row};
 use crate::reader::ShardReader;
 use crate::rig_run::rig_campaign;
 use crate::shard::RIG_SOURCE;
 use std::fs::File;
-use std::io::{BufReader, ErrorKind, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// What a check found.
@@ -201,23 +201,32 @@ struct IndexCheck {
     reader: Option<BufReader<File>>,
     fault: Option<String>,
     line: usize,
+    /// The file has the columns of the first layout.
+    first_layout: bool,
 }
 
 impl IndexCheck {
     fn open(folder: &RunFolder) -> Self {
         let path = folder.path().join("index.csv");
-        let (reader, fault) = match File::open(&path) {
+        let (mut reader, fault) = match File::open(&path) {
             Ok(file) => (Some(BufReader::new(file)), None),
             Err(e) => (None, Some(e.to_string())),
         };
-        let mut check = Self { path, reader, fault, line: 1 };
-        check.compare(&[index_header(&folder.info().extra_columns)]);
+        let header = index_header(&folder.info().extra_columns);
+        let first = csv_lines([&as_in_first_layout(&header)]);
+        let begins = |reader: &mut BufReader<File>| reader.fill_buf().is_ok_and(|b| b.starts_with(&first));
+        let first_layout = reader.as_mut().is_some_and(begins);
+        let mut check = Self { path, reader, fault, line: 1, first_layout };
+        check.compare(&[header]);
         check
     }
 
     fn compare(&mut self, rows: &[Vec<String>]) {
         let (Some(reader), None) = (&mut self.reader, &self.fault) else { return };
-        let wanted = csv_lines(rows);
+        let wanted = match self.first_layout {
+            true => csv_lines(&rows.iter().map(|row| as_in_first_layout(row)).collect::<Vec<_>>()),
+            false => csv_lines(rows),
+        };
         let mut found = vec![0; wanted.len()];
         let read = reader.read_exact(&mut found);
         if read.is_err() || found != wanted {

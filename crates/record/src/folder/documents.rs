@@ -2,7 +2,7 @@
 
 use super::FolderError;
 use crate::VERSION;
-use crate::index::{INDEX_COLUMNS, status_name};
+use crate::index::{INDEX_COLUMNS, from_first_layout, status_name};
 use crate::proto::gripgen_v1::Status;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -130,14 +130,17 @@ pub(super) fn parse_sidecar(
         // What this version wrote and cannot be read is damaged, and made again.
         Err(_) if heading.gripgen_version == VERSION => Ok(None),
         Err(e) => Err(heading.not_read(path, e.to_string())),
-        // A whole sidecar with other columns is finished work of another build.
-        Ok(sidecar) => match sidecar.rows.iter().find(|row| row.len() != columns) {
-            None => Ok(Some(sidecar)),
-            Some(row) => {
-                let problem = format!("its rows have {} cells, {columns} are known", row.len());
-                Err(heading.not_read(path, problem))
+        Ok(mut sidecar) => {
+            from_first_layout(&mut sidecar.rows, columns);
+            // A whole sidecar with other columns is finished work of another build.
+            match sidecar.rows.iter().find(|row| row.len() != columns) {
+                None => Ok(Some(sidecar)),
+                Some(row) => {
+                    let problem = format!("its rows have {} cells, {columns} are known", row.len());
+                    Err(heading.not_read(path, problem))
+                }
             }
-        },
+        }
     }
 }
 
