@@ -32,7 +32,6 @@ pub fn sample_covariates(s: &proto::Sample) -> Covariates {
         pull_direction: f64::from(s.pull_direction),
         extra: extra.map(|(name, value)| (name.clone(), value)).collect(),
         missing: unmeasured.then_some(TEMPERATURE).into_iter().collect(),
-        ..Covariates::default()
     }
 }
 

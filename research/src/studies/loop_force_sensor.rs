@@ -5,8 +5,9 @@
 //! them lie in a temporary folder; none of the data is kept.
 
 use crate::{StudyResult, arguments};
-use gripgen_cli::{calibrate_sensor_table, diagnose_sensor_table, load_sensor_table};
+use gripgen_cli::{calibrate_sensor_table, diagnose_sensor_table};
 use gripgen_identify::{Diagnosis, HeldOutError, Verdict};
+use gripgen_measured::read_sensor_table;
 use gripgen_report::Plot;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -42,7 +43,7 @@ fn write_page(folder: &Path, out: &Path, work: &Path) -> Result<(), Box<dyn Erro
         let made = work.join(name);
         std::fs::create_dir_all(&made)?;
         std::fs::write(made.join("sensor.csv"), table(&text, from, to)?)?;
-        let table = load_sensor_table(&made)?;
+        let table = read_sensor_table(&made)?;
         let scale = 1.0 / calibrate_sensor_table(&table)?.sessions[0].gain.value.abs();
         let diagnosed = diagnose_sensor_table(&table);
         rows += &row(name, before_n, best, &diagnosed.diagnosis, scale);

@@ -23,8 +23,7 @@ use std::collections::BTreeMap;
 /// up to 30 % before the slip (Sahli 2018, 10.1073/pnas.1706434115); 0.84 with a deviation of 0.09.
 const RATIOS: [f64; 7] = [1.0, 0.95, 0.9, 0.84, 0.78, 0.7, 0.6];
 const RATIO: (f64, f64) = (0.84, 0.09);
-/// Lags of the force loop that are tried, in addition to that of the twin: its logarithm is normal about 0.1 s with a deviation of 0.5.
-const LAGS_S: [f64; 4] = [0.025, 0.05, 0.09, 0.15];
+/// What is believed of the lag of the force loop: its logarithm is normal about 0.1 s with a deviation of 0.5.
 const LAG_S: (f64, f64) = (0.1, 0.5);
 /// A lag that traces show is not less.
 const LEAST_LAG_S: f64 = 1e-3;
@@ -166,8 +165,13 @@ pub fn diagnose_by_model(
     });
     let own: Vec<f64> = all.iter().map(|&i| data.label_n[i] - heldout[1][i]).collect();
     diagnosis.noise_floor_n = Some(noise_floor_n(&own, &data.group_of, data.parts.len() + fit.chosen.len()));
-    let baseline = parts_estimates(&data, &after, &fit.gaussian);
-    diagnosis.baseline = baseline;
+    diagnosis.baseline = parts_estimates(&data, &after, &fit.gaussian);
+    if seen {
+        // Damping, stiffness and mass go into the twin with it.
+        let damping = after.damping_n_s_per_m;
+        let estimate = ParameterEstimate::new(damping, (damping, damping), "N s/m");
+        diagnosis.baseline.insert("robot.damping_n_s_per_m".into(), estimate);
+    }
     progress(1.0);
     ModelAnswer { diagnosis, fit: Some(ModelFit { model: after, tables: learnt, heldout_label_n: heldout }) }
 }
@@ -189,6 +193,7 @@ fn setting(
 }
 
 /// What traces say of the label rule.
+#[derive(Clone, Copy)]
 struct Known {
     /// The lag of the model is theirs.
     lag: bool,
@@ -215,12 +220,9 @@ fn settings(
         let ratios = known.ratio.map_or(RATIOS.to_vec(), |ratio| vec![ratio]);
         return over(&ratios, &[given.lag_s.max(LEAST_LAG_S)]).into_iter().collect();
     }
-    let lags_s: Vec<f64> = LAGS_S.iter().copied().chain([given.lag_s]).filter(|lag_s| *lag_s > 0.0).collect();
-    // One after the other: what the ratio does to labels hardly depends on the lag.
-    let falls = over(&RATIOS[1..], &[given.lag_s.max(LAGS_S[0])])
-        .and_then(|first| over(&[first.curves.model.kinetic_ratio], &lags_s))
-        .and_then(|second| over(&RATIOS[1..], &[second.curves.model.lag_s]));
-    over(&RATIOS[..1], &lags_s).into_iter().chain(falls).collect()
+    // Without traces the lag is that of the twin: what it does to labels is not told from what the ratio does.
+    let lag_s = [given.lag_s.max(LEAST_LAG_S)];
+    over(&RATIOS[..1], &lag_s).into_iter().chain(over(&RATIOS[1..], &lag_s)).collect()
 }
 
 /// A fit with the values of its effects where the evidence is highest: sizes from their coefficients, other values by trying.

@@ -76,7 +76,10 @@ mod tests {
             start_n: None,
             step_s: 0.104,
             covariates: Covariates::default(),
-            max_pull_force_n: 2.0 + setting as f64 + if i % 2 == 0 { 0.1 } else { -0.1 } + drift_n * i as f64,
+            max_pull_force_n: 2.0
+                + setting as f64
+                + if i.is_multiple_of(2) { 0.1 } else { -0.1 }
+                + drift_n * i as f64,
             zero_shift_n: 0.0,
             trace: None,
         };

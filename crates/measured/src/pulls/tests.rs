@@ -387,7 +387,7 @@ fn what_is_odd_in_a_trace_is_said_with_its_numbers() {
     let said = |text: &str| judged(table, &[("traces/a.csv", text)]).warnings.join("; ");
     let again = said(&staircase(0.0, |i, row| {
         if i == 50 {
-            row[0] -= 0.01
+            row[0] -= 0.01;
         }
     }));
     assert!(
@@ -396,7 +396,7 @@ fn what_is_odd_in_a_trace_is_said_with_its_numbers() {
     );
     let gap = said(&staircase(0.0, |i, row| {
         if i >= 80 {
-            row[0] += 0.5
+            row[0] += 0.5;
         }
     }));
     assert!(gap.contains("a gap (a.csv: no reading for 0.510 s from 0.590 s on)"), "{gap}");

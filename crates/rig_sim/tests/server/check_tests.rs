@@ -232,7 +232,8 @@ fn a_gripper_is_left_as_it_was_found() {
         });
         of(&lines(RigAddresses { gripper, ..nowhere() }, 1.0), "gripper").clone()
     };
-    let cases: [(fn(String) -> String, &str); 4] = [
+    type Change = fn(String) -> String;
+    let cases: [(Change, &str); 4] = [
         (
             |line| if line.starts_with("POS") { line.replace('.', ",") } else { line },
             "the gripper answers `POS=",

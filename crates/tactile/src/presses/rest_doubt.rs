@@ -79,7 +79,8 @@ mod tests {
         assert_eq!(rest_doubt(&set(own)), None);
         // A little darker, as a light that warms up.
         assert_eq!(rest_doubt(&set(|x, y| own(x, y) - 3)), None);
-        let foreign: [(&str, fn(usize, usize) -> u8); 3] =
+        type Grey = fn(usize, usize) -> u8;
+        let foreign: [(&str, Grey); 3] =
             [("mirrored", |x, _| 82 + 47 - x as u8), ("brighter", |x, _| 112 + x as u8), ("black", |_, _| 0)];
         for (name, rest) in foreign {
             let doubt = rest_doubt(&set(rest)).unwrap_or_else(|| panic!("{name}"));

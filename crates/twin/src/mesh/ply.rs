@@ -110,7 +110,7 @@ fn faces(vertices: &[[f32; 3]], corners: &[f64], ends: &[usize]) -> Result<Vec<T
     Ok(triangles)
 }
 
-fn bad(problem: String) -> MeshError {
+fn bad(problem: impl std::fmt::Display) -> MeshError {
     MeshError::file(format!("not a PLY file that can be read: {problem}"))
 }
 
@@ -145,10 +145,8 @@ impl<'a> Header<'a> {
                         return Err(bad(format!("it promises {count} of {name}, and has {size} bytes")));
                     }
                     if name == b"tristrips" && count > 0 {
-                        return Err(bad(
-                            "it holds strips of triangles (`tristrips`), which are not read".into()
-                        )
-                        .with_hint("export it with faces"));
+                        return Err(bad("it holds strips of triangles (`tristrips`), which are not read")
+                            .with_hint("export it with faces"));
                     }
                     elements.push(Element { name, count, properties: Vec::new() });
                 }
@@ -164,7 +162,7 @@ impl<'a> Header<'a> {
                     element.properties.push(Property { name, length, value: Type::of(value, line)? });
                 }
                 [b"end_header", ..] => {
-                    let format = format.ok_or_else(|| bad("its header has no line `format`".into()))?;
+                    let format = format.ok_or_else(|| bad("its header has no line `format`"))?;
                     return Ok(Self { format, elements, lines: line, end: at.min(bytes.len()) });
                 }
                 [word, ..] => {
@@ -172,7 +170,7 @@ impl<'a> Header<'a> {
                 }
             }
         }
-        Err(bad("its header has no line `end_header`".into()))
+        Err(bad("its header has no line `end_header`"))
     }
 }
 
@@ -203,7 +201,7 @@ impl Element<'_> {
     /// Which properties of a vertex are its place; none of another element.
     fn axes(&self) -> Result<[Option<usize>; 3], MeshError> {
         if self.name == b"face" && !self.properties.iter().any(|p| p.is_corners(self)) {
-            return Err(bad("`face` has no list `vertex_indices`".into()));
+            return Err(bad("`face` has no list `vertex_indices`"));
         }
         let mut axes = [None; 3];
         for (axis, name) in axes.iter_mut().zip(["x", "y", "z"]).filter(|_| self.name == b"vertex") {

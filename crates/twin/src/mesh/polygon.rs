@@ -161,7 +161,7 @@ mod tests {
                 used.dedup();
                 assert_eq!(used.len(), corners.len(), "every corner is used");
                 for k in 0..900 {
-                    let p = [(k % 30) as f64 * 0.4037 + 0.013, (k / 30) as f64 * 0.4037 + 0.017];
+                    let p = [f64::from(k % 30) * 0.4037 + 0.013, f64::from(k / 30) * 0.4037 + 0.017];
                     let side = |a: [f32; 3], b: [f32; 3]| {
                         let [ax, ay, bx, by] = [a[0], a[1], b[0], b[1]].map(f64::from);
                         (bx - ax) * (p[1] - ay) - (by - ay) * (p[0] - ax)
