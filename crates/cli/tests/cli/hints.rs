@@ -49,7 +49,7 @@ fn flags_that_hints_name_are_what_was_missing() {
     let again = [&render[..], &["--depth-mm", value]].concat();
     hint(&run(&again), "--force");
     works(&[&again[..], &["--force"]].concat());
-    let plan = ["campaign", "--parts", "gear", "--csv", &taken];
+    let plan = ["campaign", "--parts", "gear", "-o", &path("plan.toml"), "--csv", &taken];
     hint(&run(&plan), "--force");
     works(&[&plan[..], &["--force"]].concat());
 }
