@@ -1,23 +1,19 @@
 """The shards open in readers that know nothing of gripgen, and hold what the index says."""
 
 import csv
-import hashlib
 import io
 import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from conftest import gripgen
 from foxglove import messages
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.stream_reader import CRCValidationError
-from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
 from PIL import Image
 
@@ -209,46 +205,3 @@ def test_the_index_reads_as_a_table(run):
     columns = rows[0].keys()
     assert {"part", "grip_force_n", "max_pull_force_n", "status", "shard"} <= set(columns)
     assert all(r["status"] == "slipped" and r["failure"] == "" for r in rows)
-
-
-def rewritten(path, more):
-    """The shard with a further record of metadata and further keys in those it has, as a later version may write it."""
-    with open(path, "rb") as file:
-        reader = make_reader(file)
-        summary = reader.get_summary()
-        messages = list(reader.iter_messages(log_time_order=False))
-        attachments, records = list(reader.iter_attachments()), list(reader.iter_metadata())
-    out = io.BytesIO()
-    writer = Writer(out, compression=CompressionType.NONE)
-    writer.start(profile="", library="later")
-    schemas = {i: writer.register_schema(s.name, s.encoding, s.data) for i, s in sorted(summary.schemas.items())}
-    channels = {
-        i: writer.register_channel(c.topic, c.message_encoding, schemas[c.schema_id], c.metadata)
-        for i, c in sorted(summary.channels.items())
-    }
-    for _, channel, m in messages:
-        writer.add_message(channels[channel.id], m.log_time, m.data, m.publish_time, m.sequence)
-    for a in attachments:
-        writer.add_attachment(a.create_time, a.log_time, a.name, a.media_type, a.data)
-    for record in records:
-        writer.add_metadata(record.name, {**record.metadata, **more})
-    writer.add_metadata("weather", more)
-    writer.finish()
-    return out.getvalue()
-
-
-def test_metadata_of_a_later_version_is_passed_over(run, tmp_path):
-    later = tmp_path / "later"
-    shutil.copytree(run, later)
-    shard = later / "shard-00001.mcap"
-    content = rewritten(run / shard.name, {"rain": "yes"})
-    shard.write_bytes(content)
-    sidecar = json.loads(shard.with_suffix(".json").read_text())
-    sidecar |= {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
-    shard.with_suffix(".json").write_text(json.dumps(sidecar))
-    assert metadata(shard)["weather"] == {"rain": "yes"}
-    assert gripgen("verify", later).stdout.startswith("ok: 3 shards, 16 samples")
-    table = [tmp_path / name for name in ("a.parquet", "b.parquet")]
-    for folder, file in zip((run, later), table):
-        gripgen("export", folder, "--to", "parquet", "-o", file)
-    assert pq.read_table(table[0]).equals(pq.read_table(table[1]))
