@@ -48,7 +48,7 @@ const NODES: [(f64, f64); 5] = [
     (2.856_970_013_872_8, 0.011_257_411_327_72),
 ];
 
-/// An answer, with what a twin needs beside it.
+/// An answer, and what a twin needs in addition to it.
 #[derive(Debug, Clone)]
 pub struct ModelAnswer {
     /// The answer.

@@ -140,7 +140,7 @@ impl Search {
         said
     }
 
-    /// Whether a term may stand beside others: no effect twice, no column twice.
+    /// Whether a term may be added to others: no effect twice, no column twice.
     fn stands_beside(&self, term: usize, others: &[Chosen]) -> bool {
         let names = others.iter().filter(|c| self.terms[c.term].is_effect()).count();
         let own = &self.terms[term];
