@@ -42,9 +42,9 @@ fn the_twin_of_the_model_predicts_new_pulls_as_well_as_is_stated() {
     assert!((0.75..1.35).contains(&(new_n / after_n)), "new pulls {new_n} N, stated {after_n} N");
 }
 
-/// Labels that are dealt anew among the pulls of one part and force depend on nothing else.
+/// Labels that are shuffled among the pulls of one part and force depend on nothing else.
 #[test]
-fn nothing_is_found_in_labels_that_were_dealt_anew() {
+fn nothing_is_found_in_shuffled_labels() {
     let mut measured = load_pulls(&root().join("assets/campaigns/example")).unwrap().pulls;
     let key = |i: usize, m: &MeasuredPulls| (m.pulls[i].part.clone(), m.pulls[i].grip_force_n.to_bits());
     let mut draws = Stream::new(1, 0, Purpose::ForceNoise);

@@ -8,7 +8,7 @@ use super::sizes::{amplitude_of, scaled, shape_of, values_of};
 use super::tables::{LearntTable, tables};
 use super::terms::{Kind, all_terms, effect_shape};
 use crate::diagnosis::{Diagnosis, ErrorReport, ErrorsBy, ParameterEstimate};
-use crate::pulls::answer::{blank, insufficient};
+use crate::pulls::answer::{MIN_PULLS, blank, insufficient};
 use crate::pulls::candidates::{Candidate, candidates};
 use crate::pulls::context::Context;
 use crate::pulls::data::PullData;
@@ -23,13 +23,7 @@ use std::collections::BTreeMap;
 /// up to 30 % before the slip (Sahli 2018, 10.1073/pnas.1706434115); 0.84 with a deviation of 0.09.
 const RATIOS: [f64; 7] = [1.0, 0.95, 0.9, 0.84, 0.78, 0.7, 0.6];
 const RATIO: (f64, f64) = (0.84, 0.09);
-/// What is believed of the lag of the force loop: its logarithm is normal about 0.1 s with a deviation of 0.5.
-const LAG_S: (f64, f64) = (0.1, 0.5);
-/// A lag that traces show is not less.
-const LEAST_LAG_S: f64 = 1e-3;
 
-/// Pulls from which on it is said that they cannot answer.
-const MIN_PULLS: usize = 8;
 /// Scatter that a twin holds.
 const MOST_SCATTER: f64 = 0.3;
 /// Times that labels are corrected for what the simulator says of the fitted model.
@@ -64,8 +58,6 @@ pub struct ModelFit {
     pub model: PullModel,
     /// Curves without a name.
     pub tables: Vec<LearntTable>,
-    /// Labels predicted for held-out pulls, before and after.
-    pub heldout_label_n: [Vec<f64>; 2],
 }
 
 /// Labels of one setting of the label rule with the search over them.
@@ -97,6 +89,7 @@ pub fn diagnose_by_model(
 ) -> ModelAnswer {
     let data = PullData::new(measured);
     let mut diagnosis = blank(&data);
+    // Fewer pulls than the other engine takes are the same model, with more of the priors in it.
     if let Some(missing) = insufficient(&data).filter(|_| data.len() >= MIN_PULLS) {
         diagnosis.notes.push(missing);
         return ModelAnswer { diagnosis, fit: None };
@@ -107,8 +100,8 @@ pub fn diagnose_by_model(
     let context = Context::new(&data, predictor, given);
     let seen = !context.observations.is_empty();
     let given = if seen { &PullModel { noise_n: given.noise_n, ..context.base.clone() } } else { given };
-    let known = Known { lag: seen, ratio: context.kinetic.map(|(ratio, _)| ratio) };
-    let settings = settings(&data, predictor, given, known);
+    let ratio = context.kinetic.map(|(ratio, _)| ratio);
+    let settings = settings(&data, predictor, given, seen, ratio);
     progress(0.3);
     let found = settings.into_iter().filter_map(|mut setting| {
         let z = setting.search.explained(&setting.plain);
@@ -173,7 +166,7 @@ pub fn diagnose_by_model(
         diagnosis.baseline.insert("robot.damping_n_s_per_m".into(), estimate);
     }
     progress(1.0);
-    ModelAnswer { diagnosis, fit: Some(ModelFit { model: after, tables: learnt, heldout_label_n: heldout }) }
+    ModelAnswer { diagnosis, fit: Some(ModelFit { model: after, tables: learnt }) }
 }
 
 /// A setting of the label rule, and how well parts alone explain the labels with it.
@@ -181,48 +174,35 @@ fn setting(
     data: &PullData<'_>,
     predictor: &dyn PredictPulls,
     given: &PullModel,
-    (ratio, lag_s): (f64, f64),
+    ratio: f64,
 ) -> Option<Setting> {
-    let model = PullModel { kinetic_ratio: ratio, lag_s, ..given.clone() };
+    let model = PullModel { kinetic_ratio: ratio, ..given.clone() };
     let curves = LabelCurves::new(predictor, &model, data.len());
     let search = Search::new(data, curves.measured(&data.label_n), vec![]);
     let plain = search.plain()?;
-    let far = [(ratio - RATIO.0) / RATIO.1, libm::log(lag_s / LAG_S.0) / LAG_S.1];
-    let log_prior = -0.5 * far.iter().map(|x| x * x).sum::<f64>();
-    Some(Setting { curves, log_prior, search, plain, above_n: vec![0.0; data.len()] })
+    let far = (ratio - RATIO.0) / RATIO.1;
+    Some(Setting { curves, log_prior: -0.5 * far * far, search, plain, above_n: vec![0.0; data.len()] })
 }
 
-/// What traces say of the label rule.
-#[derive(Clone, Copy)]
-struct Known {
-    /// The lag of the model is theirs.
-    lag: bool,
-    /// Kinetic over static friction.
-    ratio: Option<f64>,
-}
-
-/// The settings from which a search starts: without a fall of the force after the slip, and the best other one.
+/// The settings from which a search starts. With traces (`seen`), that of the kinetic ratio that they show, or else the best one. Without,
+/// that in which the force does not fall after the slip, and the best other one; the lag is that of the twin.
 fn settings(
     data: &PullData<'_>,
     predictor: &dyn PredictPulls,
     given: &PullModel,
-    known: Known,
+    seen: bool,
+    ratio: Option<f64>,
 ) -> Vec<Setting> {
     let best = |found: Vec<Setting>| {
         let score = |s: &Setting| s.plain.score + s.log_prior;
         found.into_iter().reduce(|a, b| if score(&b) > score(&a) { b } else { a })
     };
-    let over = |ratios: &[f64], lags_s: &[f64]| {
-        let each = ratios.iter().flat_map(|ratio| lags_s.iter().map(move |lag_s| (*ratio, *lag_s)));
-        best(each.filter_map(|at| setting(data, predictor, given, at)).collect())
-    };
-    if known.lag {
-        let ratios = known.ratio.map_or(RATIOS.to_vec(), |ratio| vec![ratio]);
-        return over(&ratios, &[given.lag_s.max(LEAST_LAG_S)]).into_iter().collect();
+    let over =
+        |ratios: &[f64]| best(ratios.iter().filter_map(|r| setting(data, predictor, given, *r)).collect());
+    if seen {
+        return over(&ratio.map_or(RATIOS.to_vec(), |ratio| vec![ratio])).into_iter().collect();
     }
-    // Without traces the lag is that of the twin: what it does to labels is not told from what the ratio does.
-    let lag_s = [given.lag_s.max(LEAST_LAG_S)];
-    over(&RATIOS[..1], &lag_s).into_iter().chain(over(&RATIOS[1..], &lag_s)).collect()
+    over(&RATIOS[..1]).into_iter().chain(over(&RATIOS[1..])).collect()
 }
 
 /// A fit with the values of its effects where the evidence is highest: sizes from their coefficients, other values by trying.

@@ -1,7 +1,7 @@
 //! What labels say of friction: the factor on the friction of a pull that makes its label the expected one.
 //!
-//! The label rule, the staircase, the force loop and the kinetic ratio are in the prediction, so that what is left is the logarithm of a
-//! friction, in which effects add.
+//! The label rule, the staircase, the force loop and the kinetic ratio are in the prediction, so that the residual is that of the logarithm
+//! of the friction, in which effects add.
 
 use super::gaussian::Measured;
 use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel};

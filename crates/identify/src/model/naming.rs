@@ -1,7 +1,7 @@
 //! What is said of a fit: names with sizes and what cannot be told from them, columns of unknown meaning.
 
 use super::search::{Fit, Pool, Search};
-use super::sizes::{amplitude, amplitude_of, scaled, shape_of};
+use super::sizes::{amplitude_of, scaled, shape_of};
 use super::terms::Kind;
 use crate::diagnosis::{Diagnosis, NamedEffect, ParameterEstimate, Rival, UnknownCovariate};
 use crate::pulls::candidates::Candidate;
@@ -71,7 +71,7 @@ fn name(
         Kind::Pair(a, b) => diagnosis.unknown.push(unnamed(format!("{a}*{b}"))),
         Kind::Effect(e) | Kind::EffectOfParts(e) => {
             let candidate = &candidates[*e];
-            let mut rivals: Vec<Rival> = Vec::new();
+            let mut alternatives: Vec<Rival> = Vec::new();
             let mut sum = weight;
             let mut others: Vec<(f64, usize)> = pool[1..]
                 .iter()
@@ -83,11 +83,11 @@ fn name(
             others.sort_by(|a, b| b.0.total_cmp(&a.0));
             for (w, k) in others {
                 let id = candidates[k].spec.id;
-                if sum >= CREDIBLE || rivals.iter().any(|r| r.name == id) {
+                if sum >= CREDIBLE || alternatives.iter().any(|r| r.name == id) {
                     continue;
                 }
                 sum += w;
-                rivals.push(Rival { name: id.into(), weight: w });
+                alternatives.push(Rival { name: id.into(), weight: w });
             }
             let entry = |part: Option<usize>, share: (f64, f64)| {
                 let at = shape_of(search, &fit.chosen[place])
@@ -99,14 +99,14 @@ fn name(
                     candidate.spec.id,
                     weight,
                     estimates(candidate, &at, share),
-                    rivals.clone(),
+                    alternatives.clone(),
                     (MeasuredIn::Pulls, None),
                 );
                 named.part = part.map(|p| data.parts[p].clone());
                 named
             };
             if matches!(search.terms[fit.chosen[place].term].kind, Kind::Effect(_)) {
-                diagnosis.effects.extend(amplitude(search, fit, place).map(|share| entry(None, share)));
+                diagnosis.effects.extend(amplitude_of(search, fit, place, 0).map(|share| entry(None, share)));
             } else {
                 let each =
                     (0..data.parts.len()).filter_map(|p| Some((p, amplitude_of(search, fit, place, p)?)));
@@ -117,7 +117,7 @@ fn name(
     }
 }
 
-/// Share of the variance of what is left without a term that the term explains.
+/// Share of the residual variance without a term that the term explains.
 fn strength(search: &Search, fit: &Fit, place: usize) -> f64 {
     let own = fit.gaussian.part(search.block_of(place)).norm_squared();
     own / (own + fit.gaussian.residual.norm_squared()).max(1e-300)

@@ -19,7 +19,7 @@ const OF_MEMORY: SdPrior = SdPrior { median: 0.012, spread: 0.6 };
 /// Pulls over which a session forgets.
 const MEMORY: f64 = 3.0;
 
-/// An outlier has this many times the deviation, and so many of all pulls are outliers.
+/// An outlier has this many times the deviation, and this share of all pulls are outliers.
 const OUTLIER: f64 = 8.0;
 const OUTLIERS: f64 = 0.02;
 /// Outliers at most, as a share of the pulls.
@@ -141,7 +141,7 @@ impl Search {
     }
 
     /// Whether a term may be added to others: no effect twice, no column twice.
-    fn stands_beside(&self, term: usize, others: &[Chosen]) -> bool {
+    fn may_join(&self, term: usize, others: &[Chosen]) -> bool {
         let names = others.iter().filter(|c| self.terms[c.term].is_effect()).count();
         let own = &self.terms[term];
         if own.is_effect() && names >= MAX_NAMES {
@@ -159,7 +159,7 @@ impl Search {
     fn screened(&self, fit: &Fit) -> Vec<(f64, Chosen)> {
         let mut found: Vec<(f64, Chosen)> = Vec::new();
         for (term, own) in self.terms.iter().enumerate() {
-            if !self.stands_beside(term, &fit.chosen) {
+            if !self.may_join(term, &fit.chosen) {
                 continue;
             }
             let each: Vec<f64> = own.shapes.iter().map(|s| fit.gaussian.screen(&s.block)).collect();
@@ -261,7 +261,7 @@ impl Search {
             .collect()
     }
 
-    /// Puts another shape in the place of that of a chosen term.
+    /// The same terms fitted again, after a shape or the labels changed.
     pub(super) fn refitted(&self, fit: &Fit) -> Option<Fit> {
         self.fit(fit.chosen.clone(), Some(&fit.gaussian))
     }

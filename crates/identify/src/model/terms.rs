@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 pub(super) const SIZE: SdPrior = SdPrior { median: 0.06, spread: 1.0 };
 /// Number of names, columns and pairs of columns that act in a campaign, expected before it is looked at.
 const EXPECTED: Expected = Expected { names: 0.25, columns: 0.06, pairs: 0.04 };
-/// What sizes of its own in each part cost an effect.
+/// Logarithm of the prior odds of an effect with a separate size per part.
 const OF_EACH_PART: f64 = -2.0;
 /// A column that moves labels by less than this is none.
 const LEAST: f64 = 1e-5;
@@ -31,7 +31,7 @@ struct Expected {
 pub(super) enum Kind {
     /// An effect of the library, by position among the candidates.
     Effect(usize),
-    /// The same with a size of its own in each part.
+    /// The same with a separate size per part.
     EffectOfParts(usize),
     /// A curve in a column.
     Column(String),

@@ -35,7 +35,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 /// Fewest pulls that are diagnosed.
-const MIN_PULLS: usize = 8;
+pub(crate) const MIN_PULLS: usize = 8;
 
 /// Standard deviations beyond which a pull is named as an outlier.
 const OUTLIER: f64 = 4.5;

@@ -193,7 +193,7 @@ mod tests {
         assert!(times.windows(2).all(|t| (0.06..0.14).contains(&(t[1] - t[0]))), "{times:?}");
     }
 
-    /// The same exposure in another message is no frame more.
+    /// The same exposure in another message is not a new frame.
     #[test]
     fn an_exposure_that_is_sent_twice_is_filmed_once() {
         let begin = Instant::now();
