@@ -2,15 +2,20 @@
 
 use crate::common::{baseline, library, root, twin_at};
 use crate::diagnose::{names, simulated};
+use gripgen::twin::draw::Drawn;
 use gripgen::twin::random::{Purpose, Stream};
-use gripgen::twin::{MeasuredPulls, Twin};
+use gripgen::twin::{ExtraColumn, MeasuredPulls, Twin, Values};
 use gripgen_cli::{Diagnosed, Engine, PullDiagnoseOptions, compare_pulls, diagnose_pull_table, edited_twin};
 use gripgen_identify::Verdict;
 use gripgen_measured::load_pulls;
 
 fn diagnose(measured: &MeasuredPulls) -> Diagnosed {
+    diagnose_by(Engine::Model, measured)
+}
+
+fn diagnose_by(engine: Engine, measured: &MeasuredPulls) -> Diagnosed {
     let twin = twin_at(&baseline());
-    let options = PullDiagnoseOptions { jobs: 2, engine: Engine::Model, ..PullDiagnoseOptions::default() };
+    let options = PullDiagnoseOptions { jobs: 2, engine, ..PullDiagnoseOptions::default() };
     diagnose_pull_table(measured, &twin, &library(&twin), &options, &|_| {}).unwrap()
 }
 
@@ -34,12 +39,45 @@ fn the_twin_of_the_model_predicts_new_pulls_as_well_as_is_stated() {
     assert_eq!(names(&found.diagnosis), ["dwell_ageing"]);
     let beta = &named[0].parameters["beta"];
     assert!(beta.low90 < 0.05 && 0.05 < beta.high90, "{beta:?}");
-    let stated = found.diagnosis.error.unwrap();
+    let stated = found.diagnosis.error.as_ref().unwrap();
     let (before_n, after_n) = (stated.before.rmse_n.unwrap(), stated.after.rmse_n.unwrap());
-    let twin = Twin::new(&edited_twin(&baseline(), &[], &found.edits).unwrap()).unwrap();
-    let new_n = compare_pulls(&unseen, &twin, &library(&twin), 2).unwrap().pulls.rmse_n;
+    let new_n = new_n(&found, &unseen);
     assert!(after_n < 0.8 * before_n, "{before_n} {after_n}");
     assert!((0.75..1.35).contains(&(new_n / after_n)), "new pulls {new_n} N, stated {after_n} N");
+}
+
+/// The error of the written twin on pulls that were not there.
+fn new_n(found: &Diagnosed, unseen: &MeasuredPulls) -> f64 {
+    let twin = Twin::new(&edited_twin(&baseline(), &[], &found.edits).unwrap()).unwrap();
+    compare_pulls(unseen, &twin, &library(&twin), 2).unwrap().pulls.rmse_n
+}
+
+/// Two columns without a meaning that act together as a wave: no effect, no curve of one column and no product describes them.
+#[test]
+fn what_no_effect_describes_is_a_surface_that_predicts_new_pulls() {
+    let mut all = simulated("", 240, &[]);
+    let mut draws = Stream::new(3, 0, Purpose::ForceNoise);
+    let [first, second] = [0, 1].map(|_| all.pulls.iter().map(|_| draws.uniform()).collect::<Vec<f64>>());
+    for (i, pull) in all.pulls.iter_mut().enumerate() {
+        pull.trace = None;
+        pull.max_pull_force_n *= (0.25 * (5.0 * (first[i] + second[i])).sin()).exp();
+        pull.covariates.extra.insert("left_mm".into(), Drawn::Number(first[i]));
+        pull.covariates.extra.insert("right_mm".into(), Drawn::Number(second[i]));
+    }
+    all.extra = [("left_mm", first), ("right_mm", second)]
+        .map(|(name, x)| ExtraColumn { name: name.into(), values: Values::Numbers(x) })
+        .into();
+    let (seen, unseen) = (all.kept(|i| i % 2 == 0), all.kept(|i| i % 2 == 1));
+    let [search, auto] = [Engine::Search, Engine::Auto].map(|engine| diagnose_by(engine, &seen));
+    let unknown: Vec<&str> = auto.diagnosis.unknown.iter().map(|u| u.covariate.as_str()).collect();
+    assert!(unknown.iter().any(|u| u.contains("left_mm") && u.contains("right_mm")), "{unknown:?}");
+    let (without_n, with_n) = (new_n(&search, &unseen), new_n(&auto, &unseen));
+    assert!(with_n < 0.6 * without_n, "{with_n} N with a surface, {without_n} N without");
+    assert!(
+        auto.diagnosis.notes.iter().any(|note| note.contains("one smooth model")),
+        "{:?}",
+        auto.diagnosis.notes
+    );
 }
 
 /// Labels that are shuffled among the pulls of one part and force depend on nothing else.

@@ -8,10 +8,11 @@ mod features;
 mod gaussian;
 mod labels;
 mod naming;
+mod process;
 mod search;
 mod sizes;
 mod tables;
 mod terms;
 
-pub use answer::{ModelAnswer, ModelFit, diagnose_by_model};
+pub use answer::{ModelAnswer, ModelFit, describe_by_process, diagnose_by_model, predicts_better};
 pub use tables::LearntTable;

@@ -185,6 +185,7 @@ impl<'a> PullPredictor<'a> {
     pub fn twin_of(&self, model: &PullModel) -> Twin {
         let mut twin = self.twin.clone();
         twin.tables.clear();
+        twin.surfaces.clear();
         (twin.robot.lag_s, twin.robot.dead_time_s) = (model.lag_s, model.dead_time_s);
         twin.robot.feedback = self.robot.feedback;
         if model.damping_n_s_per_m != twin.robot.damping_n_s_per_m {

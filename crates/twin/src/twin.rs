@@ -7,6 +7,7 @@ use crate::config::{
 };
 use crate::effects::{self, Effect};
 use crate::frames::{Pose, pose};
+use crate::surface::{SURFACE_EFFECT, Surface, check_surface};
 use crate::table::{TABLE_EFFECT, Table, TableTarget, check_table};
 use crate::{Jaw, PerJaw, Scenario};
 pub use check::LARGEST_MU;
@@ -38,6 +39,8 @@ pub struct Twin {
     pub effects: Vec<Effect>,
     /// Dependences without a name, which act after the effects.
     pub tables: Vec<Table>,
+    /// The same over several columns together.
+    pub surfaces: Vec<Surface>,
 }
 
 /// An arm with six joints, and how it stands when it grips.
@@ -199,10 +202,11 @@ impl Part {
 }
 
 impl Twin {
-    /// By what the tables multiply the friction of a pull; 1 without any.
+    /// By what tables and surfaces multiply the friction of a pull; 1 without any.
     pub fn table_factor(&self, scenario: &Scenario) -> f64 {
         let factors = self.tables.iter().filter(|t| t.target == TableTarget::Factor);
-        factors.filter_map(|t| t.at(scenario.view())).product()
+        let factor: f64 = factors.filter_map(|t| t.at(scenario.view())).product();
+        self.surfaces.iter().fold(factor, |factor, surface| factor * surface.factor(scenario.view()))
     }
 
     /// What the tables add to the readings of the wrist sensor, in newtons; 0 without any.
@@ -300,12 +304,12 @@ impl Twin {
             .iter()
             .map(|(name, part)| Ok((name.clone(), check_part(part, &format!("parts.{name}"))?)))
             .collect::<Result<_, ConfigError>>()?;
-        let (mut effects, mut tables) = (Vec::new(), Vec::new());
+        let (mut effects, mut tables, mut surfaces) = (Vec::new(), Vec::new(), Vec::new());
         for (i, effect) in file.effects.iter().enumerate() {
-            if effect.name == TABLE_EFFECT {
-                tables.push(check_table(file, i)?);
-            } else {
-                effects.push(check_effect(file, i)?);
+            match effect.name.as_str() {
+                TABLE_EFFECT => tables.push(check_table(file, i)?),
+                SURFACE_EFFECT => surfaces.push(check_surface(file, i)?),
+                _ => effects.push(check_effect(file, i)?),
             }
         }
         let without_meaning = |(i, e): (usize, &EffectFile)| {
@@ -318,7 +322,7 @@ impl Twin {
             return Err(ConfigError::new(format!("effects[{i}].name"), problem)
                 .hint("leave the effect out, or set gel.left.model = \"pyramid\""));
         }
-        Ok(Twin { robot, arm, gripper, wrist, gel, optics, parts, effects, tables })
+        Ok(Twin { robot, arm, gripper, wrist, gel, optics, parts, effects, tables, surfaces })
     }
 
     /// Grip force per jaw of a force that follows this twin's convention.

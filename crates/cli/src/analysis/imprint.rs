@@ -121,6 +121,7 @@ pub fn calibrate_imprints(
     let mut plain = twin;
     plain.effects.clear();
     plain.tables.clear();
+    plain.surfaces.clear();
     for (part, mut pulls) in of_part {
         pulls.sort_by(|a, b| a.grip_force_n.total_cmp(&b.grip_force_n).then_with(|| a.id.cmp(&b.id)));
         let step = pulls.len().div_ceil(MAX_PULLS).max(1);

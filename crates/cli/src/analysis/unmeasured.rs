@@ -30,6 +30,10 @@ pub fn unmeasured(twin: &Twin, measured: &MeasuredPulls) -> Vec<String> {
         let own = table.columns().filter(|column| missing(column));
         own.for_each(|column| add(column, format!("a table of {}", table.covariate)));
     }
+    for surface in &twin.surfaces {
+        let own = surface.columns().filter(|column| missing(column));
+        own.for_each(|column| add(column, "a surface".into()));
+    }
     let said = |(column, causes): (&str, Vec<String>)| {
         let some = measured.pulls.iter().any(|pull| pull.covariates.extra.contains_key(column));
         let then = match (columns::covariate(column), some) {

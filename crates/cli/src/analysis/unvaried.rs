@@ -101,6 +101,11 @@ pub fn unvaried(project: &Project) -> Vec<Unvaried> {
             }
         }
     }
+    for column in project.twin.surfaces.iter().flat_map(|surface| surface.columns()) {
+        if column != "part" {
+            add(column, "a surface".into(), None);
+        }
+    }
     found
 }
 

@@ -132,8 +132,9 @@ pub struct DiagnoseArgs {
     /// Of pulls: effects that must not be named, because something else is known to rule them out.
     #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
     pub without: Vec<String>,
-    /// Of pulls: how causes are found. `model` is one Gaussian model of the labels, under test; it does not read traces.
-    #[arg(long, value_enum, default_value_t = Engine::Search)]
+    /// Of pulls: how causes are found. `search` lets effects compete; `model` is one Gaussian model of the labels; `auto` takes the answer of
+    /// the search unless the model predicts held-out pulls better.
+    #[arg(long, value_enum, default_value_t = Engine::Auto)]
     pub engine: Engine,
     /// The twin to write, with the effects that were found.
     #[arg(short, long, value_name = "FILE.toml")]

@@ -2,7 +2,8 @@
 
 use super::gaussian::{Gaussian, Measured};
 use super::labels::LabelCurves;
-use super::naming::said;
+use super::naming::{said, sure, together};
+use super::process::{Added, Process};
 use super::search::{Fit, Search};
 use super::sizes::{amplitude_of, scaled, shape_of, values_of};
 use super::tables::{LearntTable, tables};
@@ -14,9 +15,9 @@ use crate::pulls::context::Context;
 use crate::pulls::data::PullData;
 use crate::pulls::error_interval::{Judged, errors};
 use crate::pulls::heldout::{folds, noise_floor_n};
-use gripgen_twin::MeasuredPulls;
 use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel};
 use gripgen_twin::values::median;
+use gripgen_twin::{MeasuredPulls, Surface};
 use std::collections::BTreeMap;
 
 /// Kinetic ratios that are tried. What is believed of them: 1/2 to 1 for rough contacts (Farkas 2005, cond-mat/0502644), areas that fall by
@@ -58,6 +59,43 @@ pub struct ModelFit {
     pub model: PullModel,
     /// Curves without a name.
     pub tables: Vec<LearntTable>,
+    /// What columns do together without a name.
+    pub surface: Option<Surface>,
+    /// Labels predicted for held-out pulls by friction of the parts alone, and by this model.
+    pub heldout_label_n: [Vec<f64>; 2],
+}
+
+/// Chance with which the better of two predictions that are alike seems so.
+const BY_CHANCE: f64 = 0.05;
+
+/// Root mean squares of the errors of two predictions of held-out pulls, if the second is better: its error is smaller in the root mean
+/// square, and nearer to zero in so many pulls that a sign test gives it to chance with 5 % or less. Every pull counts, outliers too.
+pub fn predicts_better(label_n: &[f64], first_n: &[f64], second_n: &[f64]) -> Option<(f64, f64)> {
+    let pairs = label_n.iter().zip(first_n.iter().zip(second_n));
+    let errors: Vec<(f64, f64)> = pairs
+        .filter(|(_, (a, b))| a.is_finite() && b.is_finite())
+        .map(|(y, (a, b))| ((y - a).abs(), (y - b).abs()))
+        .collect();
+    let rms = |own: fn(&(f64, f64)) -> f64| {
+        (errors.iter().map(|e| own(e) * own(e)).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+    };
+    let (first, second) = (rms(|e| e.0), rms(|e| e.1));
+    let nearer = errors.iter().filter(|(a, b)| b < a).count();
+    let by_chance = at_least_by_chance(nearer, errors.iter().filter(|(a, b)| a != b).count());
+    (second < first && by_chance <= BY_CHANCE).then_some((first, second))
+}
+
+/// Chance of `hits` heads or more in `tosses` of a fair coin.
+fn at_least_by_chance(hits: usize, tosses: usize) -> f64 {
+    let half = libm::log(0.5) * tosses as f64;
+    let (mut log_choose, mut sum) = (0.0, 0.0);
+    for k in 0..=tosses {
+        if k >= hits {
+            sum += libm::exp(log_choose + half);
+        }
+        log_choose += libm::log((tosses - k) as f64 / (k + 1) as f64);
+    }
+    sum
 }
 
 /// Labels of one setting of the label rule with the search over them.
@@ -87,6 +125,29 @@ pub fn diagnose_by_model(
     without: &[&str],
     progress: &(dyn Fn(f64) + Sync),
 ) -> ModelAnswer {
+    diagnose(measured, predictor, given, Some(without), None, progress)
+}
+
+/// Describes a campaign from a baseline by a smooth process over its columns, in which nothing has a name. There is no fit where `other_n`,
+/// labels that something else predicts for held-out pulls, are not worse.
+pub fn describe_by_process(
+    measured: &MeasuredPulls,
+    predictor: &dyn PredictPulls,
+    given: &PullModel,
+    other_n: Option<&[f64]>,
+) -> ModelAnswer {
+    diagnose(measured, predictor, given, None, other_n, &|_| {})
+}
+
+/// `without` are effects that must not be named; nothing is named where it is missing.
+fn diagnose(
+    measured: &MeasuredPulls,
+    predictor: &dyn PredictPulls,
+    given: &PullModel,
+    without: Option<&[&str]>,
+    other_n: Option<&[f64]>,
+    progress: &(dyn Fn(f64) + Sync),
+) -> ModelAnswer {
     let data = PullData::new(measured);
     let mut diagnosis = blank(&data);
     // Fewer pulls than the other engine takes are the same model, with more of the priors in it.
@@ -95,7 +156,7 @@ pub fn diagnose_by_model(
         return ModelAnswer { diagnosis, fit: None };
     }
     let max_n = data.label_n.iter().copied().fold(0.0, f64::max);
-    let candidates = candidates(&data, max_n, None, without);
+    let candidates = without.map_or(vec![], |without| candidates(&data, max_n, None, without));
     // Force loop, stiffness and the fall after the slip are what traces show, where there are some.
     let context = Context::new(&data, predictor, given);
     let seen = !context.observations.is_empty();
@@ -109,6 +170,9 @@ pub fn diagnose_by_model(
         let near = setting.search.widen_outliers()?;
         setting.look_near(&data.label_n, &near);
         setting.plain = setting.search.plain()?;
+        if without.is_none() {
+            return Some((setting.plain.score + setting.log_prior, setting.plain.clone(), setting));
+        }
         let mut fit = setting.search.run(setting.plain.clone());
         for _ in 0..SEARCHES {
             let refined = refined(&data, predictor, &candidates, &mut setting, fit);
@@ -120,15 +184,28 @@ pub fn diagnose_by_model(
         }
         let fit = refined(&data, predictor, &candidates, &mut setting, fit);
         progress(0.6);
-        Some((fit.score + setting.log_prior, setting, fit))
+        Some((fit.score + setting.log_prior, fit, setting))
     });
-    let Some((_, mut setting, fit)) = found.reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
+    let Some((_, fit, mut setting)) = found.reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
         diagnosis
             .notes
             .push("the labels cannot be predicted at all: is the unit of the forces newton?".into());
         return ModelAnswer { diagnosis, fit: None };
     };
-    let mut fit = said(&data, &candidates, &setting.search, fit, &mut diagnosis);
+    let fit = sure(&setting.search, fit);
+    let Added { process, mut fit, instead } =
+        Process::added(&data, &candidates, &setting.search, fit, without.is_none());
+    if instead {
+        diagnosis.unknown.push(together(&setting.search, &fit, process.columns()));
+    }
+    said(&data, &candidates, &setting.search, &fit, &mut diagnosis);
+    let repetitions = folds(data.len());
+    if let Some(other_n) = other_n {
+        let own_n = heldout_n(&data, &setting, &fit, &repetitions);
+        if predicts_better(&data.label_n, other_n, &own_n).is_none() {
+            return ModelAnswer { diagnosis, fit: None };
+        }
+    }
     for _ in 0..CORRECTED {
         let above_n = above_fast_n(&data, predictor, &candidates, &setting, &fit);
         setting.above_n = above_n;
@@ -138,13 +215,15 @@ pub fn diagnose_by_model(
         let Some((next, plain)) = again else { break };
         (fit, setting.plain) = (next, plain);
     }
-    let after = model_of(&data, &candidates, &setting, &fit);
-    let learnt = learnt(&data, &setting.search, &fit);
+    let mut after = model_of(&data, &candidates, &setting, &fit);
+    let mut learnt = learnt(&data, &setting.search, &fit);
+    let (tables, surface, added) = process.written(&data, &setting.search, &fit);
+    learnt.extend(tables);
+    after.mu.iter_mut().zip(&added).for_each(|(mu, added)| *mu *= libm::exp(-added));
     diagnosis.conclude();
     let wider = &setting.search.measured.wider;
     diagnosis.data.outliers =
         (0..data.len()).filter(|&i| wider[i] > 1.0).map(|i| measured.pulls[i].id.clone()).collect();
-    let repetitions = folds(data.len());
     let heldout = [&setting.plain, &fit].map(|fit| heldout_n(&data, &setting, fit, &repetitions));
     let all: Vec<usize> = (0..data.len()).collect();
     let scatter = libm::exp(fit.gaussian.log_noise[0]);
@@ -166,7 +245,10 @@ pub fn diagnose_by_model(
         diagnosis.baseline.insert("robot.damping_n_s_per_m".into(), estimate);
     }
     progress(1.0);
-    ModelAnswer { diagnosis, fit: Some(ModelFit { model: after, tables: learnt }) }
+    ModelAnswer {
+        diagnosis,
+        fit: Some(ModelFit { model: after, tables: learnt, surface, heldout_label_n: heldout }),
+    }
 }
 
 /// A setting of the label rule, and how well parts alone explain the labels with it.
@@ -347,8 +429,9 @@ fn above_fast_n(
     let rows: Vec<usize> = (0..data.len()).collect();
     let mut model = model_of(data, candidates, setting, fit);
     let mut log_factor = vec![0.0; data.len()];
-    for (place, _) in fit.chosen.iter().enumerate().filter(|(_, c)| !setting.search.terms[c.term].is_effect())
-    {
+    let unnamed =
+        |place: &usize| fit.chosen.get(*place).is_none_or(|c| !setting.search.terms[c.term].is_effect());
+    for place in (0..fit.chosen.len() + fit.process.len()).filter(unnamed) {
         let own = fit.gaussian.part(setting.search.block_of(place));
         log_factor.iter_mut().zip(own.iter()).for_each(|(sum, x)| *sum += x);
     }
@@ -371,4 +454,26 @@ fn parts_estimates(
     });
     let ratio = model.kinetic_ratio;
     each.chain([("kinetic_ratio".into(), ParameterEstimate::new(ratio, (ratio, ratio), "1"))]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_better_prediction_is_nearer_in_most_pulls_and_in_the_root_mean_square() {
+        // Exact: 8 or more heads of 10 have 56 of 1024 chances.
+        assert!((at_least_by_chance(8, 10) - 56.0 / 1024.0).abs() < 1e-12);
+        assert!((at_least_by_chance(0, 7) - 1.0).abs() < 1e-12);
+        let label_n = [10.0; 12];
+        let off = |by: f64| vec![10.0 + by; 12];
+        assert_eq!(predicts_better(&label_n, &off(0.5), &off(-0.2)).map(|(a, _)| a), Some(0.5));
+        assert_eq!(predicts_better(&label_n, &off(0.2), &off(0.2)), None, "alike");
+        let mut once = off(0.1);
+        once[3] = 25.0;
+        assert_eq!(predicts_better(&label_n, &off(0.2), &once), None, "one pull far off counts");
+        let mut few = off(0.5);
+        (0..3).for_each(|i| few[i] = 10.1);
+        assert_eq!(predicts_better(&label_n, &off(0.5), &few), None, "nearer in 3 of 3 that differ");
+    }
 }

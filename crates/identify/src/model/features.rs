@@ -21,14 +21,15 @@ const LEFT: f64 = 0.05;
 /// Singular values below this depend on others.
 const DEPENDENT: f64 = 1e-8;
 
+/// Whether a column of numbers spans so much that it counts by its logarithm.
+pub(super) fn by_logarithm(x: &[f64]) -> bool {
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    low > 0.0 && high > BY_LOGARITHM * low
+}
+
 /// A column of numbers as curves see it: standardised, its logarithm where it spans a wide range.
 pub(super) fn standard(x: &[f64]) -> Option<Vec<f64>> {
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    let x: Vec<f64> = if low > 0.0 && high > BY_LOGARITHM * low {
-        x.iter().map(|v| libm::log(*v)).collect()
-    } else {
-        x.to_vec()
-    };
+    let x: Vec<f64> = if by_logarithm(x) { x.iter().map(|v| libm::log(*v)).collect() } else { x.to_vec() };
     let n = x.len() as f64;
     let mean = x.iter().sum::<f64>() / n;
     let sd = (x.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n).sqrt();

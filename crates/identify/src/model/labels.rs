@@ -15,7 +15,7 @@ const NODES: usize = 161;
 /// says little, and not nothing.
 const FLATTEST: f64 = 0.02;
 
-/// A friction that an effect makes vanish is as good as this share of itself.
+/// An effect that leaves less than this share of the friction of a pull is not one of these pulls: they had labels.
 const LEAST_SHARE: f64 = 1e-2;
 
 /// Expected labels of all pulls of a model as functions of the friction.
@@ -104,7 +104,10 @@ impl LabelCurves {
     pub(super) fn column(&self, predictor: &dyn PredictPulls, effect: &ModelEffect, z: &[f64]) -> Vec<f64> {
         let with = PullModel { effects: vec![effect.clone()], ..self.model.clone() };
         if !effect.acts_on_signals() {
-            let ratio = |(with, plain): (&f64, &f64)| libm::log((with / plain).max(LEAST_SHARE));
+            let ratio = |(with, plain): (&f64, &f64)| match with / plain {
+                share if share > LEAST_SHARE => libm::log(share),
+                _ => f64::NAN,
+            };
             return predictor.limits_n(&with).iter().zip(&self.limits_n).map(ratio).collect();
         }
         let rows: Vec<usize> = (0..z.len()).collect();

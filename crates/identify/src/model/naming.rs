@@ -16,28 +16,38 @@ const CREDIBLE: f64 = 0.9;
 /// Deviation of session factors from which on sessions are said to differ.
 const SESSIONS: f64 = 0.02;
 
-/// Puts what was found into words, and takes out of the fit what is not said.
+/// Takes out of a fit what is not sure enough to be said. The weakest goes first: what others lean on may become clear without it.
+pub(super) fn sure(search: &Search, mut fit: Fit) -> Fit {
+    loop {
+        let nothing =
+            |place: usize| search.pool(&fit, place).iter().find(|(c, ..)| c.is_none()).map_or(0.0, |p| p.2);
+        let doubtful = (0..fit.chosen.len()).map(|place| (nothing(place), place));
+        let worst = doubtful.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(nothing, _)| *nothing > NOTHING);
+        match worst.and_then(|(_, place)| search.without(&fit, place)) {
+            Some(fewer) => fit = fewer,
+            None => return fit,
+        }
+    }
+}
+
+/// Columns that act together in a way which no term describes.
+pub(super) fn together(search: &Search, fit: &Fit, columns: Vec<&str>) -> UnknownCovariate {
+    let place = fit.chosen.len() + fit.process.len() - 1;
+    UnknownCovariate { covariate: columns.join("*"), strength: strength(search, fit, place), p_value: 0.0 }
+}
+
+/// Puts what was found into words; what else fits is asked of the terms alone, without a process.
 pub(super) fn said(
     data: &PullData<'_>,
     candidates: &[Candidate],
     search: &Search,
-    mut fit: Fit,
+    fit: &Fit,
     diagnosis: &mut Diagnosis,
-) -> Fit {
-    // The weakest goes first: what others lean on may become clear without it.
-    loop {
-        let pools: Vec<Pool> = (0..fit.chosen.len()).map(|place| search.pool(&fit, place)).collect();
-        let nothing = |pool: &Pool| pool.iter().find(|(c, ..)| c.is_none()).map_or(0.0, |p| p.2);
-        let doubtful = (0..pools.len()).max_by(|&a, &b| nothing(&pools[a]).total_cmp(&nothing(&pools[b])));
-        match doubtful.filter(|&k| nothing(&pools[k]) > NOTHING).and_then(|k| search.without(&fit, k)) {
-            Some(fewer) => fit = fewer,
-            None => {
-                for (place, pool) in pools.iter().enumerate() {
-                    name(data, candidates, search, (&fit, place), pool, diagnosis);
-                }
-                break;
-            }
-        }
+) {
+    let alone = search.only(fit, &vec![true; fit.chosen.len()]);
+    for place in 0..fit.chosen.len() {
+        let pool = search.pool(alone.as_ref().unwrap_or(fit), place);
+        name(data, candidates, search, (fit, place), &pool, diagnosis);
     }
     diagnosis.effects.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     if let Some(block) = search.session {
@@ -47,7 +57,6 @@ pub(super) fn said(
             diagnosis.unknown.push(UnknownCovariate { covariate: "session".into(), strength, p_value: 0.0 });
         }
     }
-    fit
 }
 
 fn name(

@@ -50,6 +50,8 @@ pub(super) struct Chosen {
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub(super) chosen: Vec<Chosen>,
+    /// What is added for prediction alone.
+    pub(super) process: Vec<Block>,
     pub(super) gaussian: Gaussian,
     pub(super) score: f64,
 }
@@ -93,17 +95,22 @@ impl Search {
     /// noise they would explain.
     pub(super) fn explained(&self, fit: &Fit) -> Vec<f64> {
         let mut z = fit.gaussian.part(0);
-        (0..fit.chosen.len()).for_each(|place| z += fit.gaussian.part(self.block_of(place)));
+        let own = fit.chosen.len() + fit.process.len();
+        (0..own).for_each(|place| z += fit.gaussian.part(self.block_of(place)));
         z.iter().copied().collect()
     }
 
     fn fit(&self, chosen: Vec<Chosen>, from: Option<&Gaussian>) -> Option<Fit> {
+        self.fit_with(chosen, vec![], from)
+    }
+
+    fn fit_with(&self, chosen: Vec<Chosen>, process: Vec<Block>, from: Option<&Gaussian>) -> Option<Fit> {
         let own = chosen.iter().map(|c| &self.terms[c.term].shapes[c.shape].block);
-        let blocks: Vec<&Block> = self.base.iter().chain(own).collect();
+        let blocks: Vec<&Block> = self.base.iter().chain(own).chain(&process).collect();
         let gaussian = Gaussian::fit(&self.measured, &blocks, NOISE, from)?;
         let prior: f64 = chosen.iter().map(|c| self.terms[c.term].log_prior + c.cost).sum();
         let score = gaussian.log_evidence + prior;
-        Some(Fit { chosen, gaussian, score })
+        Some(Fit { chosen, process, gaussian, score })
     }
 
     /// Without any term.
@@ -198,6 +205,12 @@ impl Search {
         self.fit(chosen, None)
     }
 
+    /// A model with some of its terms.
+    pub(super) fn only(&self, fit: &Fit, stay: &[bool]) -> Option<Fit> {
+        let chosen = fit.chosen.iter().zip(stay).filter(|(_, stay)| **stay).map(|(c, _)| *c).collect();
+        self.fit(chosen, None)
+    }
+
     fn best(fits: Vec<Fit>) -> Option<Fit> {
         fits.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
     }
@@ -263,6 +276,11 @@ impl Search {
 
     /// The same terms fitted again, after a shape or the labels changed.
     pub(super) fn refitted(&self, fit: &Fit) -> Option<Fit> {
-        self.fit(fit.chosen.clone(), Some(&fit.gaussian))
+        self.fit_with(fit.chosen.clone(), fit.process.clone(), Some(&fit.gaussian))
+    }
+
+    /// A fit with further blocks for prediction.
+    pub(super) fn with_process(&self, fit: &Fit, process: Vec<Block>) -> Option<Fit> {
+        self.fit_with(fit.chosen.clone(), process, Some(&fit.gaussian))
     }
 }

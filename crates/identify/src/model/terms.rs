@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 /// How far an effect or a curve moves labels, root mean square of the logarithm.
 pub(super) const SIZE: SdPrior = SdPrior { median: 0.06, spread: 1.0 };
 /// Number of names, columns and pairs of columns that act in a campaign, expected before it is looked at.
-const EXPECTED: Expected = Expected { names: 0.25, columns: 0.06, pairs: 0.04 };
+pub(super) const EXPECTED: Expected = Expected { names: 0.25, columns: 0.06, pairs: 0.04 };
 /// Logarithm of the prior odds of an effect with a separate size per part.
 const OF_EACH_PART: f64 = -2.0;
 /// A column that moves labels by less than this is none.
@@ -20,9 +20,9 @@ const LEAST: f64 = 1e-5;
 /// Pulls from which on two columns are looked at together.
 const MIN_OF_PAIR: usize = 40;
 
-struct Expected {
+pub(super) struct Expected {
     names: f64,
-    columns: f64,
+    pub(super) columns: f64,
     pairs: f64,
 }
 
@@ -139,6 +139,16 @@ fn sized(candidate: &Candidate, start: &[f64]) -> Vec<f64> {
     values
 }
 
+/// Columns that may act on friction: those with more than one value, words often enough.
+pub(super) fn usable_columns<'d>(data: &'d PullData<'_>) -> Vec<&'d str> {
+    let usable = |(name, column): &(&String, &Column)| {
+        let words = matches!(column, Column::Word(..));
+        let distinct = column.distinct();
+        *name != "part" && *name != SESSION && distinct > 1 && (!words || distinct * 4 <= data.len())
+    };
+    data.columns.iter().filter(usable).map(|(name, _)| name.as_str()).collect()
+}
+
 /// All terms that these pulls can show.
 pub(super) fn all_terms(
     data: &PullData<'_>,
@@ -187,33 +197,28 @@ pub(super) fn all_terms(
         terms.push(Term { kind: Kind::Effect(i), log_prior: name, shapes });
     }
     let n = data.len();
-    let usable = |(name, column): &(&String, &Column)| {
-        let words = matches!(column, Column::Word(..));
-        let distinct = column.distinct();
-        *name != "part" && *name != SESSION && distinct > 1 && (!words || distinct * 4 <= n)
-    };
-    let columns: Vec<(&String, &Column)> = data.columns.iter().filter(usable).collect();
+    let columns = usable_columns(data);
     let one = libm::log(EXPECTED.columns / columns.len().max(1) as f64);
     let block = |features| Shape { block: Block { features, sd: SIZE, range: None }, at: None, sum: None };
-    for (name, _) in &columns {
-        let shapes = of_column(data, name, CLOCKS.contains(&name.as_str()));
+    for name in &columns {
+        let shapes = of_column(data, name, CLOCKS.contains(name));
         let shapes: Vec<Shape> = shapes.into_iter().map(block).collect();
-        terms.push(Term { kind: Kind::Column((*name).clone()), log_prior: one, shapes });
+        terms.push(Term { kind: Kind::Column((*name).into()), log_prior: one, shapes });
     }
     let parts = data.parts.len() > 1;
     let pairs = columns.len() * columns.len().saturating_sub(1) / 2 + if parts { columns.len() } else { 0 };
     let two = libm::log(EXPECTED.pairs / pairs.max(1) as f64);
     if parts {
-        for (name, _) in &columns {
+        for name in &columns {
             let shapes = of_parts(data, name).into_iter().map(block).collect();
-            terms.push(Term { kind: Kind::ColumnOfParts((*name).clone()), log_prior: two, shapes });
+            terms.push(Term { kind: Kind::ColumnOfParts((*name).into()), log_prior: two, shapes });
         }
     }
     if n >= MIN_OF_PAIR {
-        for (k, (a, _)) in columns.iter().enumerate() {
-            for (b, _) in &columns[k + 1..] {
+        for (k, a) in columns.iter().enumerate() {
+            for b in &columns[k + 1..] {
                 if let Some(pair) = of_pair(data, a, b) {
-                    let kind = Kind::Pair((*a).clone(), (*b).clone());
+                    let kind = Kind::Pair((*a).into(), (*b).into());
                     let shapes = vec![Shape { sum: pair.sum, ..block(pair.features) }];
                     terms.push(Term { kind, log_prior: two, shapes });
                 }

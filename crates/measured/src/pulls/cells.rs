@@ -9,6 +9,10 @@ use gripgen_twin::columns::{COLUMNS, Column as PullColumn, InTable};
 /// Length of a step where nobody wrote it down: the mean of Wucherer et al. 2023.
 pub(super) const DEFAULT_STEP_S: f64 = 0.104;
 
+/// Height and length of the steps of a table that says neither: the rate of Wucherer et al. 2023 (1 N every 0.104 s) in tenths. Whoever
+/// pulled in coarse steps has written them down; labels of other machines are the largest force of a steady rise.
+pub(super) const STEADY_RISE: (f64, f64) = (0.1, 0.0104);
+
 const ID: &str = "pull_id";
 pub(super) const LABEL: &str = "max_pull_force_n";
 const STATUS: &str = "status";

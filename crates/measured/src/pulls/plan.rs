@@ -30,28 +30,34 @@ fn shown(trace: &PullTrace) -> Option<(f64, f64)> {
 pub(super) fn hold_against_traces(measured: &mut MeasuredPulls) -> Option<String> {
     let seen: Vec<(usize, (f64, f64))> = (measured.pulls.iter().enumerate())
         .filter_map(|(i, pull)| Some((i, shown(pull.trace.as_ref()?)?)))
+        .collect();
+    let other: Vec<&(usize, (f64, f64))> = seen
+        .iter()
         .filter(|(i, (height_n, length_s))| {
             let pull = &measured.pulls[*i];
             let ratio = (height_n / length_s) / (pull.increment_n / pull.step_s);
             !(SAME.0..=SAME.1).contains(&ratio)
         })
         .collect();
-    let &(first, (height_n, length_s)) = seen.first()?;
     let traced = measured.pulls.iter().filter(|pull| pull.trace.is_some()).count();
-    let pull = &measured.pulls[first];
-    let shown = format!(
-        "in the traces of {} of {traced} pulls the command rises by {} N every {} s (pull {})",
-        seen.len(),
-        rounded(height_n, &[]),
-        rounded(length_s, &[]),
-        pull.id,
-    );
-    let (table_n, table_s) = (pull.increment_n, pull.step_s);
+    let described = other.first().map(|(i, (height_n, length_s))| {
+        let pull = &measured.pulls[*i];
+        let shown = format!(
+            "in the traces of {} of {traced} pulls the command rises by {} N every {} s (pull {})",
+            other.len(),
+            rounded(*height_n, &[]),
+            rounded(*length_s, &[]),
+            pull.id,
+        );
+        (shown, pull.increment_n, pull.step_s)
+    });
     let said = |name: &str| measured.recorded.iter().any(|column| column == name);
     if said("force_increment_n") || said("step_time_s") {
-        return Some(format!(
-            "{shown}, the table says {table_n} N every {table_s} s: `force_increment_n` is in newtons and `step_time_s` in seconds"
-        ));
+        return described.map(|(shown, table_n, table_s)| {
+            format!(
+                "{shown}, the table says {table_n} N every {table_s} s: `force_increment_n` is in newtons and `step_time_s` in seconds"
+            )
+        });
     }
     let of = |get: fn(&(f64, f64)) -> f64| median(seen.iter().map(|(_, s)| get(s)).collect());
     let usual = (of(|s| s.0)?, of(|s| s.1)?);
@@ -64,8 +70,8 @@ pub(super) fn hold_against_traces(measured: &mut MeasuredPulls) -> Option<String
         let pull = &mut measured.pulls[*i];
         (pull.increment_n, pull.step_s) = *own;
     }
+    let (shown, ..) = described?;
     Some(format!(
-        "{shown}, and the table has neither `force_increment_n` nor `step_time_s`, which are {table_n} N and {table_s} s where nobody \
-         wrote them down: the staircase of the traces was taken"
+        "{shown}, and the table has neither `force_increment_n` nor `step_time_s`: the staircase of the traces was taken"
     ))
 }

@@ -83,7 +83,9 @@ pub(crate) fn is_taken(key: &str) -> bool {
 
 /// The columns of the user's own that the tables of a twin depend on: sweeps draw them for these tables.
 pub(crate) fn own_columns(twin: &Twin) -> Vec<&str> {
-    twin.tables.iter().flat_map(|table| table.columns()).filter(|name| is_own_column(name)).collect()
+    let tables = twin.tables.iter().flat_map(|table| table.columns());
+    let surfaces = twin.surfaces.iter().flat_map(|surface| surface.columns());
+    tables.chain(surfaces).filter(|name| is_own_column(name)).collect()
 }
 
 /// Sets a column of the user's own.

@@ -3,12 +3,14 @@
 use super::diagnosed::Diagnosed;
 use super::pull_values::pull_values;
 use crate::analysis::twin_edits::{TwinEdits, calibration_entry, effect_entry};
-use gripgen_identify::{Diagnosis, LearntTable, ModelFit, diagnose_by_model};
+use gripgen_identify::pulls::answer::PullFits;
+use gripgen_identify::{Diagnosis, LearntTable, ModelAnswer, ModelFit, diagnose_by_model, predicts_better};
 use gripgen_physics::PullPredictor;
 use gripgen_report::ReportData;
 use gripgen_twin::config::EffectFile;
+use gripgen_twin::draw::Drawn;
 use gripgen_twin::predict::PullModel;
-use gripgen_twin::{MeasuredPulls, TABLE_EFFECT, Values};
+use gripgen_twin::{MeasuredPulls, SURFACE_EFFECT, Surface, TABLE_EFFECT, Values, rounded};
 
 /// Diagnoses a campaign.
 pub(super) fn diagnose_pulls_by_model(
@@ -22,6 +24,65 @@ pub(super) fn diagnose_pulls_by_model(
     let edits = answer.fit.map(|fit| edits(&fit, &answer.diagnosis, measured, predictor.part_names()));
     let report = ReportData { error_unit: "N".into(), ..ReportData::default() };
     Diagnosed::new(answer.diagnosis, edits.unwrap_or_default(), report)
+}
+
+/// The answer of the model where it predicts held-out pulls better than that of the search.
+pub(super) fn model_instead(
+    model: ModelAnswer,
+    search: &Diagnosis,
+    fits: &PullFits,
+    measured: &MeasuredPulls,
+    parts: &[String],
+) -> Option<Diagnosed> {
+    let fit = model.fit?;
+    let (before_n, after_n) =
+        predicts_better(&labels_n(measured), &fits.heldout_label_n[1], &fit.heldout_label_n[1])?;
+    let names = search.effects.iter().map(|e| e.name.clone());
+    let unknown = search.unknown.iter().map(|u| u.covariate.clone());
+    let names: Vec<String> = names.chain(unknown).collect();
+    let mut diagnosis = model.diagnosis;
+    diagnosis.notes.push(format!(
+        "effects of the library describe these pulls less well than one smooth model: {} N against {} N on held-out pulls{}",
+        rounded(before_n, &[]),
+        rounded(after_n, &[]),
+        if names.is_empty() { String::new() } else { format!(" (they would be {})", names.join(", ")) },
+    ));
+    diagnosis.would_have_seen.clone_from(&search.would_have_seen);
+    let edits = edits(&fit, &diagnosis, measured, parts);
+    let report = ReportData { error_unit: "N".into(), ..ReportData::default() };
+    Some(Diagnosed::new(diagnosis, edits, report))
+}
+
+/// The answer to a few pulls, with the twin of the model where it has more than plain friction and errs less on held-out pulls. Nothing
+/// is named, so the evidence of the model is enough.
+pub(super) fn few_with_model(
+    mut few: Diagnosed,
+    model: ModelAnswer,
+    measured: &MeasuredPulls,
+    parts: &[String],
+) -> Diagnosed {
+    let Some(fit) = model.fit else { return few };
+    let label_n = labels_n(measured);
+    let [before_n, after_n] = fit.heldout_label_n.each_ref().map(|own_n| {
+        let squares = label_n.iter().zip(own_n).map(|(y, own)| (y - own) * (y - own));
+        (squares.sum::<f64>() / label_n.len() as f64).sqrt()
+    });
+    let plain = fit.model.effects.is_empty() && fit.tables.is_empty() && fit.surface.is_none();
+    if plain || after_n.is_nan() || after_n >= before_n {
+        return few;
+    }
+    few.diagnosis.notes.push(format!(
+        "the twin has tables of what the columns do, which are not physical: they predict held-out pulls with an error of {} N, plain friction with {} N",
+        rounded(after_n, &[]),
+        rounded(before_n, &[]),
+    ));
+    few.edits = edits(&fit, &model.diagnosis, measured, parts);
+    few.posterior = None;
+    few
+}
+
+fn labels_n(measured: &MeasuredPulls) -> Vec<f64> {
+    measured.pulls.iter().map(|pull| pull.max_pull_force_n).collect()
 }
 
 /// The twin that the answer describes.
@@ -44,6 +105,7 @@ fn edits(fit: &ModelFit, diagnosis: &Diagnosis, measured: &MeasuredPulls, parts:
         entry
     });
     let effects = effects.chain(fit.tables.iter().map(|table| entry_of(table, &evidence)));
+    let effects = effects.chain(fit.surface.iter().map(|surface| entry_of_surface(surface, &evidence)));
     TwinEdits { values, effects: Some(effects.collect()) }
 }
 
@@ -67,5 +129,27 @@ fn entry_of(table: &LearntTable, evidence: &str) -> EffectFile {
     if let Some((column, word)) = &table.only {
         put("where", toml::Table::from_iter([(column.clone(), text(word))]).into());
     }
+    entry
+}
+
+/// A surface as it stands in a twin.
+fn entry_of_surface(surface: &Surface, evidence: &str) -> EffectFile {
+    let text = |s: &str| toml::Value::String(s.into());
+    let floats = |x: &mut dyn Iterator<Item = f64>| toml::Value::Array(x.map(toml::Value::Float).collect());
+    let place = |value: &Drawn| match value {
+        Drawn::Number(x) => toml::Value::Float(*x),
+        Drawn::Text(word) => text(word),
+    };
+    let logarithm = surface.axes.iter().filter(|axis| axis.logarithm).map(|axis| text(&axis.column));
+    let points = surface.points.iter().map(|point| toml::Value::Array(point.iter().map(place).collect()));
+    let mut entry = effect_entry(SURFACE_EFFECT, evidence);
+    entry.parameters.extend([
+        ("physical".into(), toml::Value::Boolean(false)),
+        ("columns".into(), toml::Value::Array(surface.columns().map(text).collect())),
+        ("lengths".into(), floats(&mut surface.axes.iter().map(|axis| axis.length))),
+        ("logarithm".into(), toml::Value::Array(logarithm.collect())),
+        ("points".into(), toml::Value::Array(points.collect())),
+        ("weights".into(), floats(&mut surface.weights.iter().copied())),
+    ]);
     entry
 }

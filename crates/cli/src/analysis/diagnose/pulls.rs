@@ -2,17 +2,17 @@
 
 use super::diagnosed::Diagnosed;
 use super::few::diagnose_few_pulls;
-use super::model::diagnose_pulls_by_model;
+use super::model::{diagnose_pulls_by_model, few_with_model, model_instead};
 use super::next::next_pulls;
 use super::pull_values::pull_values;
 use crate::analysis::expect::pull_predictor;
 use crate::analysis::twin_edits::{TwinEdits, calibration_entry, effect_entry};
 use gripgen::Library;
-use gripgen_identify::Diagnosis;
 use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
 use gripgen_identify::pulls::curves::Curve;
 use gripgen_identify::pulls::data::{Column, PullData};
 use gripgen_identify::pulls::few_diagnosis::is_few;
+use gripgen_identify::{Diagnosis, describe_by_process};
 use gripgen_physics::PullPredictor;
 use gripgen_report::pull_report;
 use gripgen_twin::columns::value;
@@ -25,8 +25,10 @@ use std::collections::{BTreeMap, BTreeSet};
 /// How causes are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum Engine {
-    /// A competition of fits.
+    /// The search, unless the model predicts held-out pulls better.
     #[default]
+    Auto,
+    /// A competition of fits.
     Search,
     /// One Gaussian model of the labels.
     Model,
@@ -165,6 +167,10 @@ pub fn diagnose_pull_table(
     }
     if is_few(measured) {
         let mut found = diagnose_few_pulls(measured, &predictor, &given, twin);
+        if options.engine == Engine::Auto {
+            let model = describe_by_process(measured, &predictor, &given, None);
+            found = few_with_model(found, model, measured, predictor.part_names());
+        }
         found.diagnosis.notes.extend(without_its_effects(twin));
         return Ok(found);
     }
@@ -174,6 +180,16 @@ pub fn diagnose_pull_table(
         let mut found = diagnose_pull_table(&rest, twin, library, options, progress)?;
         found.diagnosis.notes.push(note);
         return Ok(found);
+    }
+    if options.engine == Engine::Auto
+        && let Some(fits) = &answer.fits
+    {
+        let model = describe_by_process(measured, &predictor, &given, Some(&fits.heldout_label_n[1]));
+        let instead = model_instead(model, &answer.diagnosis, fits, measured, predictor.part_names());
+        if let Some(mut found) = instead {
+            found.diagnosis.notes.extend(without_its_effects(twin));
+            return Ok(found);
+        }
     }
     let edits =
         answer.fits.as_ref().map(|f| edits(f, &answer.diagnosis, measured, &predictor)).unwrap_or_default();
@@ -231,7 +247,11 @@ fn without_gaps(measured: &MeasuredPulls, found: &Diagnosis) -> Option<(Measured
 fn without_its_effects(twin: &Twin) -> Option<String> {
     let effects = twin.effects.iter().map(|e| e.spec.id.to_string());
     let tables = twin.tables.iter().map(|t| format!("a table over {}", t.covariate));
-    let own: BTreeSet<String> = effects.chain(tables).collect();
+    let surfaces = twin
+        .surfaces
+        .iter()
+        .map(|s| format!("a surface over {}", s.columns().collect::<Vec<_>>().join(", ")));
+    let own: BTreeSet<String> = effects.chain(tables).chain(surfaces).collect();
     (!own.is_empty()).then(|| {
         format!(
             "the effects of the twin that was given ({}) were looked for anew: \"before\" is without them, and a twin that is written has those that were found",
