@@ -137,6 +137,9 @@ pub struct SweepArgs {
     /// Only check, like `gripgen check`.
     #[arg(long)]
     pub dry_run: bool,
+    /// Make samples though the twin depends on a column that `[vary]` leaves at one value.
+    #[arg(long)]
+    pub allow_constant: bool,
     /// Show it while it is under way on a page of this machine, --live=8080 for a port of your choice.
     #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
     pub live: Option<u16>,

@@ -203,6 +203,16 @@ pub struct UnknownCovariate {
     pub p_value: f64,
 }
 
+impl UnknownCovariate {
+    /// Its columns in a sentence: `a`, or `a, b and c together`.
+    pub fn in_words(&self) -> String {
+        match self.covariate.rsplit_once('*') {
+            Some((others, last)) => format!("{} and {last} together", others.replace('*', ", ")),
+            None => self.covariate.clone(),
+        }
+    }
+}
+
 /// The size at which an effect would have been seen in these data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Detectable {

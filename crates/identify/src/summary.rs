@@ -1,6 +1,6 @@
 //! The answer in a sentence or two for a technician: what acts in the words of the catalogue, and what it does to the error.
 
-use crate::diagnosis::{Channel, Diagnosis, HeldOutError, Verdict};
+use crate::diagnosis::{Channel, Diagnosis, HeldOutError, UnknownCovariate, Verdict};
 use gripgen_twin::effects::find;
 
 /// From this many times the noise of the camera on what is left of images is said.
@@ -62,10 +62,10 @@ fn named(d: &Diagnosis) -> String {
 }
 
 fn unknown(d: &Diagnosis) -> String {
-    let names: Vec<&str> = d.unknown.iter().map(|u| u.covariate.as_str()).collect();
+    let names: Vec<String> = d.unknown.iter().map(UnknownCovariate::in_words).collect();
     match names.as_slice() {
         [] => "nothing that was written down".into(),
-        [one] => (*one).into(),
+        [one] => one.clone(),
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }

@@ -24,7 +24,7 @@ pub use write::write_pull_folder;
 
 use crate::campaign::{CAMPAIGN_FILE, CampaignFileError, CampaignHeader, LabelEvidenceKind, parse_header};
 use crate::table::{TableError, TableReader, read_bytes};
-use cells::{CLOCK, Cells, Column, DEFAULT_STEP_S, STEADY_RISE};
+use cells::{CLOCK, Cells, Column, DEFAULT_STEP_S};
 use clock::Clock;
 use gripgen_record::proto::gripgen_v1::Status;
 use gripgen_twin::columns::{COLUMNS, InTable};
@@ -59,7 +59,8 @@ pub enum PullFolderError {
 /// Columns stand in any order; `pull_id, part, grip_force_n, max_pull_force_n` have to be there. A cell that is empty, `n/a`, `-`,
 /// `NaN` or the like is missing: clocks and counts are interpolated in the order of the rows, other columns have a mask
 /// ([`Covariates::missing`]), and a pull without a part, a grip force or a label is left out. A column without any value was not
-/// recorded and has the default of [`Covariates`]; without a word on the staircase the command rises steadily. Further columns are covariates of unknown
+/// recorded and has the default of [`Covariates`]; without a word on the staircase and
+/// without traces the command rises steadily. Further columns are covariates of unknown
 /// meaning: numbers if nearly every cell is one or missing, else words; columns without a name or without a value are left out.
 /// Pulls stay in the order of the table. Pulls that did not slip, and those whose label is suspect, are left out.
 pub fn read_pull_folder(folder: &Path) -> Result<MeasuredPulls, PullFolderError> {
@@ -165,9 +166,6 @@ fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<Judg
     if has(CLOCK) {
         said.extend(counts::from_the_first(&mut pulls));
         said.extend(counts::goes_back(&pulls));
-    }
-    if !has("force_increment_n") && !has("step_time_s") {
-        pulls.iter_mut().for_each(|pull| (pull.increment_n, pull.step_s) = STEADY_RISE);
     }
     if has("pull_index") && has("gel_id") {
         said.extend(counts::per_gel(&mut pulls));

@@ -6,7 +6,7 @@ use gripgen_twin::columns::{self, Column};
 use gripgen_twin::config::ImageStorage;
 use gripgen_twin::draw::{Distribution, Drawn};
 use gripgen_twin::effects::{Effect, EffectSpec};
-use gripgen_twin::{Table, Values, can_be_drawn};
+use gripgen_twin::{Surface, Table, Values, can_be_drawn};
 use std::fmt;
 
 /// Columns that change over a campaign though nobody sets them. The others are settings, of which one value is a choice.
@@ -57,7 +57,7 @@ pub fn unvaried(project: &Project) -> Vec<Unvaried> {
     let parts = project.sweep.drawn_parts();
     let drawn = |part: &Option<String>| part.as_ref().is_none_or(|name| parts.contains(&name.as_str()));
     let mut found: Vec<Unvaried> = Vec::new();
-    let mut add = |column: &str, cause: String, table: Option<&Table>| {
+    let mut add = |column: &str, cause: String, table: Option<&Table>, places: Option<Values>| {
         let known = columns::covariate(column);
         let stated = stated(project, column);
         let value = columns::value(column, scenario.view());
@@ -77,36 +77,54 @@ pub fn unvaried(project: &Project) -> Vec<Unvaried> {
                 value,
                 outside,
                 key: known.map_or(column, |known| known.sweep_key()).into(),
-                values: table.and_then(|table| values(known, table)),
+                values: table
+                    .map(|table| &table.axis)
+                    .or(places.as_ref())
+                    .and_then(|axis| values(known, axis)),
             }),
         }
     };
     for effect in project.twin.effects.iter().filter(|effect| drawn(&effect.part) && acts(project, effect)) {
         for column in effect.spec.covariates {
-            add(column, format!("effect {}", effect.spec.id), None);
+            add(column, format!("effect {}", effect.spec.id), None, None);
         }
     }
     for table in project.twin.tables.iter().filter(|table| drawn(&table.part)) {
         match table.covariate.split_once('*') {
             Some((a, b)) if table.centre.is_some() => {
                 for column in [a, b] {
-                    add(column, format!("a table of {}", table.covariate), None);
+                    add(column, format!("a table of {}", table.covariate), None, None);
                 }
             }
-            _ => add(&table.covariate, of_table(table), Some(table)),
+            _ => add(&table.covariate, of_table(table), Some(table), None),
         }
         for (column, word) in &table.only {
             if columns::value(column, scenario.view()).is_none_or(|at| at.to_string() != *word) {
-                add(column, format!("a table where it is {word}"), None);
+                add(column, format!("a table where it is {word}"), None, None);
             }
         }
     }
-    for column in project.twin.surfaces.iter().flat_map(|surface| surface.columns()) {
-        if column != "part" {
-            add(column, "a surface".into(), None);
+    for surface in &project.twin.surfaces {
+        for (d, column) in surface.columns().enumerate().filter(|(_, column)| *column != "part") {
+            add(column, "a surface".into(), None, Some(places(surface, d)));
         }
     }
     found
+}
+
+/// The values of a column that the points of a surface have, in order, each once.
+fn places(surface: &Surface, column: usize) -> Values {
+    let (mut words, mut numbers) = (Vec::new(), Vec::new());
+    for point in &surface.points {
+        match &point[column] {
+            Drawn::Number(x) => numbers.push(*x),
+            Drawn::Text(word) => words.push(word.clone()),
+        }
+    }
+    numbers.sort_by(f64::total_cmp);
+    words.sort();
+    words.dedup();
+    if words.is_empty() { Values::Numbers(numbers) } else { Values::Words(words) }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -167,8 +185,8 @@ fn of_table(table: &Table) -> String {
 }
 
 /// What `[vary]` may have of a column: where its table was made.
-fn values(known: Option<&Column>, table: &Table) -> Option<String> {
-    match &table.axis {
+fn values(known: Option<&Column>, axis: &Values) -> Option<String> {
+    match axis {
         Values::Words(words) => Some(format!("{words:?}")),
         Values::Numbers(x) => match (x.first(), x.last()) {
             (Some(low), Some(high)) if low < high && !known.is_some_and(Column::is_listed) => {

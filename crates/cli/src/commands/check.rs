@@ -103,6 +103,20 @@ pub(super) fn of_columns(project: &Project) -> Vec<String> {
     still.iter().map(Unvaried::to_string).chain(beyond.iter().map(Beyond::to_string)).collect()
 }
 
+/// That the sweep varies every column on which its twin depends: a set without them teaches that they do nothing.
+///
+/// # Errors
+///
+/// A column that has one value in every sample.
+pub(super) fn all_varied(project: &Project) -> Result<(), Failure> {
+    let still: Vec<String> = unvaried(project).iter().map(Unvaried::to_string).collect();
+    if still.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::usage(still.join("\n"))
+        .hint("add the line to the sweep file, or make every sample at one value with --allow-constant"))
+}
+
 /// What the samples that were tried out run into.
 fn of_probes(plan: &Plan) -> Vec<String> {
     let mut all = Vec::new();

@@ -27,6 +27,9 @@ pub fn run(args: &SweepArgs) -> Result<u8, Failure> {
         return check::check(&args.config, args.jobs, &args.json, &args.talk);
     }
     let project = check::load(&args.config)?;
+    if !args.allow_constant {
+        check::all_varied(&project)?;
+    }
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&project.name));
     let jobs = args.jobs.unwrap_or_else(load::jobs).max(1);
     let options = SweepOptions { jobs, slice: args.slice, simd: simd_level(args)? };

@@ -24,8 +24,12 @@ fn a_column_that_the_twin_depends_on_and_the_sweep_leaves_is_warned_of() {
     assert_eq!(json["warnings"], serde_json::json!([]));
 
     let out = folder.path().join("run");
+    let refused = run(&sweep_args(out.to_str().unwrap(), &[&QUICK[..], &["--set", DRIFT]].concat()));
+    assert_code(&refused, 2);
+    assert!(text(&refused.stderr).contains(STILL), "{}", text(&refused.stderr));
+    assert!(text(&refused.stderr).contains("--allow-constant") && !out.exists());
     let lines = folder.path().join("lines.json");
-    let more = ["--set", DRIFT, "--json", lines.to_str().unwrap()];
+    let more = ["--set", DRIFT, "--allow-constant", "--json", lines.to_str().unwrap()];
     let sweep = run(&sweep_args(out.to_str().unwrap(), &[&QUICK[..], &more].concat()));
     assert_code(&sweep, 0);
     assert_eq!(text(&sweep.stderr).matches(STILL).count(), 1, "{}", text(&sweep.stderr));

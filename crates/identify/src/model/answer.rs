@@ -2,7 +2,7 @@
 
 use super::gaussian::{Gaussian, Measured};
 use super::labels::LabelCurves;
-use super::naming::{said, sure, together};
+use super::naming::{said, sure, tied, together};
 use super::process::{Added, Process};
 use super::search::{Fit, Search};
 use super::sizes::{amplitude_of, scaled, shape_of, values_of};
@@ -197,6 +197,7 @@ fn diagnose(
         Process::added(&data, &candidates, &setting.search, fit, without.is_none());
     if instead {
         diagnosis.unknown.push(together(&setting.search, &fit, process.columns()));
+        diagnosis.notes.extend(tied(&data, &process.columns()));
     }
     said(&data, &candidates, &setting.search, &fit, &mut diagnosis);
     let repetitions = folds(data.len());

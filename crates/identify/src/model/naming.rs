@@ -5,7 +5,7 @@ use super::sizes::{amplitude_of, scaled, shape_of};
 use super::terms::Kind;
 use crate::diagnosis::{Diagnosis, NamedEffect, ParameterEstimate, Rival, UnknownCovariate};
 use crate::pulls::candidates::Candidate;
-use crate::pulls::data::PullData;
+use crate::pulls::data::{Column, PullData};
 use gripgen_twin::effects::Measured as MeasuredIn;
 use std::collections::BTreeMap;
 
@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 const NOTHING: f64 = 0.35;
 /// What a set that cannot be told apart has together.
 const CREDIBLE: f64 = 0.9;
+/// Share of the variance of a column from which on another one, whose values come back this often, fixes it.
+const TIED: f64 = 0.9;
+const REPEATED: usize = 3;
 /// Deviation of session factors from which on sessions are said to differ.
 const SESSIONS: f64 = 0.02;
 
@@ -34,6 +37,37 @@ pub(super) fn sure(search: &Search, mut fit: Fit) -> Fit {
 pub(super) fn together(search: &Search, fit: &Fit, columns: Vec<&str>) -> UnknownCovariate {
     let place = fit.chosen.len() + fit.process.len() - 1;
     UnknownCovariate { covariate: columns.join("*"), strength: strength(search, fit, place), p_value: 0.0 }
+}
+
+/// Columns of numbers that hardly vary where another one has the same value: what belongs to which cannot be told.
+pub(super) fn tied(data: &PullData<'_>, columns: &[&str]) -> Vec<String> {
+    let numbers = |name: &str| match data.columns.get(name) {
+        Some(Column::Number(x)) => Some(x),
+        _ => None,
+    };
+    let mut found = vec![];
+    for (a, b) in columns.iter().flat_map(|a| columns.iter().map(move |b| (*a, *b))).filter(|(a, b)| a != b) {
+        let (Some(x), Some(y)) = (numbers(a), numbers(b)) else { continue };
+        let mut groups: BTreeMap<(usize, u64), Vec<f64>> = BTreeMap::new();
+        for (i, (x, y)) in x.iter().zip(y).enumerate() {
+            groups.entry((data.part_of[i], x.to_bits())).or_default().push(*y);
+        }
+        if groups.len() * REPEATED > x.len() {
+            continue;
+        }
+        let square = |y: &[f64]| {
+            let mean = y.iter().sum::<f64>() / y.len() as f64;
+            y.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>()
+        };
+        let share = 1.0 - groups.values().map(|own| square(own)).sum::<f64>() / square(y).max(1e-300);
+        if share > TIED {
+            found.push(format!(
+                "{b} and {a} are tied in these pulls: where {a} is the same, {b} varies by {:.0} % of its variance. What belongs to which cannot be told",
+                100.0 * (1.0 - share)
+            ));
+        }
+    }
+    found
 }
 
 /// Puts what was found into words; what else fits is asked of the terms alone, without a process.

@@ -105,7 +105,7 @@ impl Process {
         };
         if alone {
             let (_, process, fit) = whole(fit, 0.0);
-            return Added { instead: process.joint.is_some(), process, fit };
+            return Added { instead: !fit.process.is_empty(), process, fit };
         }
         let named: Vec<bool> = fit.chosen.iter().map(|c| search.terms[c.term].is_effect()).collect();
         let plain_score = fit.score;
@@ -150,9 +150,12 @@ impl Process {
         (process, best)
     }
 
-    /// The columns of the smooth process.
+    /// The columns on which it depends.
     pub(super) fn columns(&self) -> Vec<&str> {
-        self.joint.iter().flat_map(|joint| joint.axes.iter().map(|axis| axis.column.as_str())).collect()
+        match &self.joint {
+            Some(joint) => joint.axes.iter().map(|axis| axis.column.as_str()).collect(),
+            None => self.load.iter().map(|_| LOAD).collect(),
+        }
     }
 
     /// The process as tables and a surface; what the surface adds in each part stays to be taken off its friction.

@@ -1,5 +1,6 @@
 //! The staircase that traces show, held against the one that their table says or does not say.
 
+use super::cells::STEADY_RISE;
 use gripgen_twin::values::median;
 use gripgen_twin::{MeasuredPulls, PullTrace, rounded};
 
@@ -28,6 +29,12 @@ fn shown(trace: &PullTrace) -> Option<(f64, f64)> {
 
 /// Takes the staircase of the traces where the table says none, and names the traces that contradict their table.
 pub(super) fn hold_against_traces(measured: &mut MeasuredPulls) -> Option<String> {
+    let said = |name: &str| measured.recorded.iter().any(|column| column == name);
+    let said = said("force_increment_n") || said("step_time_s");
+    if !said && measured.pulls.iter().all(|pull| pull.trace.is_none()) {
+        measured.pulls.iter_mut().for_each(|pull| (pull.increment_n, pull.step_s) = STEADY_RISE);
+        return None;
+    }
     let seen: Vec<(usize, (f64, f64))> = (measured.pulls.iter().enumerate())
         .filter_map(|(i, pull)| Some((i, shown(pull.trace.as_ref()?)?)))
         .collect();
@@ -51,8 +58,7 @@ pub(super) fn hold_against_traces(measured: &mut MeasuredPulls) -> Option<String
         );
         (shown, pull.increment_n, pull.step_s)
     });
-    let said = |name: &str| measured.recorded.iter().any(|column| column == name);
-    if said("force_increment_n") || said("step_time_s") {
+    if said {
         return described.map(|(shown, table_n, table_s)| {
             format!(
                 "{shown}, the table says {table_n} N every {table_s} s: `force_increment_n` is in newtons and `step_time_s` in seconds"

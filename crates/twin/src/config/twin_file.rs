@@ -375,7 +375,7 @@ pub struct EffectFile {
     pub parameters: BTreeMap<String, toml::Value>,
 }
 
-/// What a key of an effect may hold: a number, or a list, a word or a flag of a table.
+/// What a key of an effect may hold: a number, or a list, a word or a flag of a table, or the points of a surface.
 #[derive(JsonSchema)]
 #[serde(untagged)]
 #[expect(dead_code, reason = "only its schema is used")]
@@ -383,8 +383,18 @@ enum ParameterValue {
     Number(f64),
     Numbers(Vec<f64>),
     Words(Vec<String>),
+    Points(Vec<Vec<Place>>),
     Word(String),
     Flag(bool),
+}
+
+/// A value of a point of a surface.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "only its schema is used")]
+enum Place {
+    Number(f64),
+    Word(String),
 }
 
 /// How well a value of the same section is known: `calibration.KEY`.

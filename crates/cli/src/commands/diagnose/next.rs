@@ -140,6 +140,10 @@ fn sweep_step(args: &DiagnoseArgs, out: &Path, diagnosis: &Diagnosis) -> (String
             let ranges = project.as_ref().map(columns_to_vary).unwrap_or_default();
             let others = project.as_ref().map(|project| not_pulled(project, diagnosis)).unwrap_or_default();
             words.extend(ranges.iter().flat_map(|range| ["--set", range]));
+            // What has no range in the twin stays as it is.
+            if project.as_ref().is_some_and(|project| unvaried(project).len() > ranges.len()) {
+                words.push("--allow-constant");
+            }
             let out = shell::path(&out_folder);
             words.extend(["-o", &out]);
             (format!("{text}{others}:"), shell::command_line(&words))
