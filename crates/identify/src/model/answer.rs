@@ -203,7 +203,7 @@ fn diagnose(
     let repetitions = folds(data.len());
     if let Some(other_n) = other_n {
         let own_n = heldout_n(&data, &setting, &fit, &repetitions);
-        if predicts_better(&data.label_n, other_n, &own_n).is_none() {
+        if !instead || predicts_better(&data.label_n, other_n, &own_n).is_none() {
             return ModelAnswer { diagnosis, fit: None };
         }
     }

@@ -104,8 +104,11 @@ impl Process {
             (fit.score + joint, process, fit)
         };
         if alone {
-            let (_, process, fit) = whole(fit, 0.0);
-            return Added { instead: !fit.process.is_empty(), process, fit };
+            let plain = fit.gaussian.log_evidence;
+            let (score, process, fit) = whole(fit, 0.0);
+            let instead =
+                !fit.process.is_empty() && score + of_column * process.columns().len() as f64 > plain;
+            return Added { instead, process, fit };
         }
         let named: Vec<bool> = fit.chosen.iter().map(|c| search.terms[c.term].is_effect()).collect();
         let plain_score = fit.score;
