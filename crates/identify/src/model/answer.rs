@@ -194,9 +194,9 @@ fn diagnose(
     };
     let fit = sure(&setting.search, fit);
     let Added { process, mut fit, instead } =
-        Process::added(&data, &candidates, &setting.search, fit, without.is_none());
+        Process::added(&data, &candidates, &setting.search, &fit, without.is_none());
     if instead {
-        diagnosis.unknown.push(together(&setting.search, &fit, process.columns()));
+        diagnosis.unknown.push(together(&setting.search, &fit, &process.columns()));
         diagnosis.notes.extend(tied(&data, &process.columns()));
     }
     said(&data, &candidates, &setting.search, &fit, &mut diagnosis);

@@ -34,7 +34,7 @@ pub(super) fn sure(search: &Search, mut fit: Fit) -> Fit {
 }
 
 /// Columns that act together in a way which no term describes.
-pub(super) fn together(search: &Search, fit: &Fit, columns: Vec<&str>) -> UnknownCovariate {
+pub(super) fn together(search: &Search, fit: &Fit, columns: &[&str]) -> UnknownCovariate {
     let place = fit.chosen.len() + fit.process.len() - 1;
     UnknownCovariate { covariate: columns.join("*"), strength: strength(search, fit, place), p_value: 0.0 }
 }

@@ -93,19 +93,19 @@ impl Process {
         data: &PullData<'_>,
         candidates: &[Candidate],
         search: &Search,
-        fit: Fit,
+        fit: &Fit,
         alone: bool,
     ) -> Added {
         // A process in the place of terms has the prior of as many columns as count in it, and of their acting together.
         let of_column = libm::log(EXPECTED.columns / usable_columns(data).len().max(1) as f64);
         let whole = |fit: Fit, of_column: f64| {
-            let (process, fit) = Self::with(data, candidates, search, fit, of_column);
+            let (process, fit) = Self::with(data, candidates, search, &fit, of_column);
             let joint = process.joint.as_ref().map_or(0.0, |joint| joint.log_prior + libm::log(TOGETHER));
             (fit.score + joint, process, fit)
         };
         if alone {
             let plain = fit.gaussian.log_evidence;
-            let (score, process, fit) = whole(fit, 0.0);
+            let (score, process, fit) = whole(fit.clone(), 0.0);
             let instead =
                 !fit.process.is_empty() && score + of_column * process.columns().len() as f64 > plain;
             return Added { instead, process, fit };
@@ -117,7 +117,7 @@ impl Process {
         let none = vec![false; named.len()];
         for stay in [named, none] {
             let smaller = stay.iter().filter(|stay| **stay).count() < best.1.fit.chosen.len();
-            let Some(fewer) = search.only(&fit, &stay).filter(|_| smaller) else { continue };
+            let Some(fewer) = search.only(fit, &stay).filter(|_| smaller) else { continue };
             let (score, process, with) = whole(fewer, of_column);
             if score > best.0 && process.joint.is_some() {
                 best = (score, Added { process, fit: with, instead: true });
@@ -130,7 +130,7 @@ impl Process {
         data: &PullData<'_>,
         candidates: &[Candidate],
         search: &Search,
-        fit: Fit,
+        fit: &Fit,
         of_column: f64,
     ) -> (Self, Fit) {
         let mut process = Self::default();
@@ -141,7 +141,7 @@ impl Process {
             _ => false,
         });
         for (blocks, load) in load_blocks(data).into_iter().filter(|_| !of_load) {
-            if let Some(next) = search.with_process(&fit, blocks)
+            if let Some(next) = search.with_process(fit, blocks)
                 && next.gaussian.log_evidence > best.gaussian.log_evidence
             {
                 (best, process.load) = (next, Some(load));
