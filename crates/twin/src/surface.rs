@@ -6,6 +6,7 @@
 use crate::columns::{self, Column, PullView};
 use crate::config::{ConfigError, TwinFile, in_range};
 use crate::draw::Drawn;
+use crate::table::{list, numbers};
 
 /// The `name` of a surface among the effects of a twin file. It is not in the library.
 pub const SURFACE_EFFECT: &str = "surface";
@@ -84,19 +85,17 @@ pub(crate) fn check_surface(file: &TwinFile, index: usize) -> Result<Surface, Co
         return Err(ConfigError::new(key("physical"), "a surface explains nothing, it must say so")
             .hint("add physical = false"));
     }
-    let list = |name: &str| match get(name).and_then(|value| value.as_array()).filter(|list| !list.is_empty())
-    {
-        Some(list) => Ok(list),
-        None => Err(ConfigError::new(key(name), "a list with at least one value is needed")),
+    let value = |name: &str| {
+        get(name).ok_or_else(|| ConfigError::new(key(name), "a list with at least one value is needed"))
     };
-    let names = list("columns")?;
+    let names = list(value("columns")?, &key("columns"))?;
     let word = |(i, value): (usize, &toml::Value)| match value.as_str().filter(|name| !name.is_empty()) {
         Some(name) if names[..i].iter().all(|other| other.as_str() != Some(name)) => Ok(name.to_string()),
         Some(name) => Err(ConfigError::new(key(&format!("columns[{i}]")), format!("`{name}` stands twice"))),
         None => Err(ConfigError::new(key(&format!("columns[{i}]")), "the name of a column is needed")),
     };
     let names: Vec<String> = names.iter().enumerate().map(word).collect::<Result<_, _>>()?;
-    let lengths = numbers(list("lengths")?, &key("lengths"))?;
+    let lengths = numbers(value("lengths")?, &key("lengths"))?;
     same_length(&key("lengths"), lengths.len(), names.len(), "columns")?;
     for (i, length) in lengths.iter().enumerate() {
         in_range(&key(&format!("lengths[{i}]")), *length, 1e-9..=1e9, "")?;
@@ -125,8 +124,9 @@ pub(crate) fn check_surface(file: &TwinFile, index: usize) -> Result<Surface, Co
         same_length(&at, row.len(), axes.len(), "columns")?;
         axes.iter().zip(row).map(|(axis, value)| place(axis, value, &at)).collect()
     };
-    let points: Vec<Vec<Drawn>> = list("points")?.iter().enumerate().map(point).collect::<Result<_, _>>()?;
-    let weights = numbers(list("weights")?, &key("weights"))?;
+    let points: Vec<Vec<Drawn>> =
+        list(value("points")?, &key("points"))?.iter().enumerate().map(point).collect::<Result<_, _>>()?;
+    let weights = numbers(value("weights")?, &key("weights"))?;
     same_length(&key("weights"), weights.len(), points.len(), "points")?;
     Ok(Surface { axes, points, weights })
 }
@@ -152,15 +152,6 @@ fn place(axis: &SurfaceAxis, value: &toml::Value, key: &str) -> Result<Drawn, Co
 fn same_length(key: &str, found: usize, wanted: usize, of: &str) -> Result<(), ConfigError> {
     let problem = || ConfigError::new(key, format!("{found} values for {wanted} {of}"));
     (found == wanted).then_some(()).ok_or_else(problem)
-}
-
-fn numbers(list: &[toml::Value], key: &str) -> Result<Vec<f64>, ConfigError> {
-    let number = |(i, value): (usize, &toml::Value)| match value {
-        toml::Value::Float(x) if x.is_finite() => Ok(*x),
-        toml::Value::Integer(i) => Ok(*i as f64),
-        other => Err(ConfigError::new(format!("{key}[{i}]"), format!("a number is needed, found {other}"))),
-    };
-    list.iter().enumerate().map(number).collect()
 }
 
 #[cfg(test)]

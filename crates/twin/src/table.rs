@@ -231,14 +231,14 @@ fn refuse_foreign(effect: &EffectFile, key: &dyn Fn(&str) -> String) -> Result<(
     }
 }
 
-fn list<'a>(value: &'a toml::Value, key: &str) -> Result<&'a [toml::Value], ConfigError> {
+pub(crate) fn list<'a>(value: &'a toml::Value, key: &str) -> Result<&'a [toml::Value], ConfigError> {
     match value.as_array() {
         Some(list) if !list.is_empty() => Ok(list),
         _ => Err(ConfigError::new(key, "a list with at least one value is needed")),
     }
 }
 
-fn numbers(value: &toml::Value, key: &str) -> Result<Vec<f64>, ConfigError> {
+pub(crate) fn numbers(value: &toml::Value, key: &str) -> Result<Vec<f64>, ConfigError> {
     let number = |(i, value): (usize, &toml::Value)| match value {
         toml::Value::Float(x) if x.is_finite() => Ok(*x),
         toml::Value::Integer(i) => Ok(*i as f64),

@@ -65,11 +65,11 @@ pub struct ModelFit {
     pub heldout_label_n: [Vec<f64>; 2],
 }
 
-/// Chance with which the better of two predictions that are alike seems so.
+/// Significance level of the sign test between two predictions.
 const BY_CHANCE: f64 = 0.05;
 
 /// Root mean squares of the errors of two predictions of held-out pulls, if the second is better: its error is smaller in the root mean
-/// square, and nearer to zero in so many pulls that a sign test gives it to chance with 5 % or less. Every pull counts, outliers too.
+/// square, and a one-sided sign test over the pulls is significant. Every pull counts, outliers too.
 pub fn predicts_better(label_n: &[f64], first_n: &[f64], second_n: &[f64]) -> Option<(f64, f64)> {
     let pairs = label_n.iter().zip(first_n.iter().zip(second_n));
     let errors: Vec<(f64, f64)> = pairs

@@ -1,5 +1,5 @@
 //! What columns do to friction without a name, for prediction alone: a law of the load, and a smooth process over all columns
-//! together. They are offered once, after the search, and take nothing from what was found.
+//! together. They are offered once, after the search; where they explain the labels better without terms, they replace them.
 
 use super::features::standard;
 use super::gaussian::{Block, SdPrior};

@@ -35,8 +35,8 @@ pub(super) fn model_instead(
     parts: &[String],
 ) -> Option<Diagnosed> {
     let fit = model.fit?;
-    let (before_n, after_n) =
-        predicts_better(&labels_n(measured), &fits.heldout_label_n[1], &fit.heldout_label_n[1])?;
+    let label_n: Vec<f64> = measured.pulls.iter().map(|pull| pull.max_pull_force_n).collect();
+    let (before_n, after_n) = predicts_better(&label_n, &fits.heldout_label_n[1], &fit.heldout_label_n[1])?;
     let names = search.effects.iter().map(|e| e.name.clone());
     let unknown = search.unknown.iter().map(|u| u.covariate.clone());
     let names: Vec<String> = names.chain(unknown).collect();
@@ -62,13 +62,10 @@ pub(super) fn few_with_model(
     parts: &[String],
 ) -> Diagnosed {
     let Some(fit) = model.fit else { return few };
-    let label_n = labels_n(measured);
-    let [before_n, after_n] = fit.heldout_label_n.each_ref().map(|own_n| {
-        let squares = label_n.iter().zip(own_n).map(|(y, own)| (y - own) * (y - own));
-        (squares.sum::<f64>() / label_n.len() as f64).sqrt()
-    });
+    let errors = model.diagnosis.error.as_ref().map(|error| (error.before.rmse_n, error.after.rmse_n));
+    let Some((Some(before_n), Some(after_n))) = errors else { return few };
     let plain = fit.model.effects.is_empty() && fit.tables.is_empty() && fit.surface.is_none();
-    if plain || after_n.is_nan() || after_n >= before_n {
+    if plain || after_n >= before_n {
         return few;
     }
     few.diagnosis.notes.push(format!(
@@ -79,10 +76,6 @@ pub(super) fn few_with_model(
     few.edits = edits(&fit, &model.diagnosis, measured, parts);
     few.posterior = None;
     few
-}
-
-fn labels_n(measured: &MeasuredPulls) -> Vec<f64> {
-    measured.pulls.iter().map(|pull| pull.max_pull_force_n).collect()
 }
 
 /// The twin that the answer describes.
@@ -132,7 +125,7 @@ fn entry_of(table: &LearntTable, evidence: &str) -> EffectFile {
     entry
 }
 
-/// A surface as it stands in a twin.
+/// A surface as an entry of a twin.
 fn entry_of_surface(surface: &Surface, evidence: &str) -> EffectFile {
     let text = |s: &str| toml::Value::String(s.into());
     let floats = |x: &mut dyn Iterator<Item = f64>| toml::Value::Array(x.map(toml::Value::Float).collect());
