@@ -110,7 +110,7 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
     let acting: Vec<_> = twin.effects.iter().filter(|e| e.acts_on(&pull.part)).collect();
     let mut memory = vec![SensorMemory::default(); acting.len()];
     let mut read = |force_n: f64, t: f64, step_s: f64| {
-        let at = SensorPoint { clock_s: pull.covariates.time_s + t, step_s };
+        let at = SensorPoint { clock_s: pull.covariates.time_s + t, since_zero_s: t, step_s };
         let mut f = side * force_n;
         for (e, memory) in acting.iter().zip(&mut memory) {
             f = e.spec.sensor.map_or(f, |hook| hook(&e.values, f, memory, &at));

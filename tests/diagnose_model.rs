@@ -52,21 +52,53 @@ fn new_n(found: &Diagnosed, unseen: &MeasuredPulls) -> f64 {
     compare_pulls(unseen, &twin, &library(&twin), 2).unwrap().pulls.rmse_n
 }
 
-/// Two columns without a meaning that act together as a wave: no effect, no curve of one column and no product describes them.
-#[test]
-fn what_no_effect_describes_is_a_surface_that_predicts_new_pulls() {
+/// Pulls with two columns of numbers that act together as a wave, whose phase is `by_hand` larger where a third one says `left`. It is
+/// empty in every eleventh pull, and one of the numbers in every thirteenth.
+fn with_a_wave(by_hand: f64) -> MeasuredPulls {
     let mut all = simulated("", 240, &[]);
     let mut draws = Stream::new(3, 0, Purpose::ForceNoise);
     let [first, second] = [0, 1].map(|_| all.pulls.iter().map(|_| draws.uniform()).collect::<Vec<f64>>());
+    let mut columns: [Vec<Option<Drawn>>; 3] = Default::default();
     for (i, pull) in all.pulls.iter_mut().enumerate() {
+        let left = draws.uniform() < 0.5;
+        let phase = 5.0 * (first[i] + second[i]) + if left { by_hand } else { 0.0 };
         pull.trace = None;
-        pull.max_pull_force_n *= (0.25 * (5.0 * (first[i] + second[i])).sin()).exp();
-        pull.covariates.extra.insert("left_mm".into(), Drawn::Number(first[i]));
-        pull.covariates.extra.insert("right_mm".into(), Drawn::Number(second[i]));
+        pull.max_pull_force_n *= (0.25 * phase.sin()).exp();
+        let hand = Drawn::Text(if left { "left" } else { "right" }.into());
+        columns[0].push(Some(Drawn::Number(first[i])).filter(|_| i % 13 != 12));
+        columns[1].push(Some(Drawn::Number(second[i])));
+        columns[2].push(Some(hand).filter(|_| i % 11 != 10));
     }
-    all.extra = [("left_mm", first), ("right_mm", second)]
-        .map(|(name, x)| ExtraColumn { name: name.into(), values: Values::Numbers(x) })
-        .into();
+    let each = columns.into_iter().zip(["left_mm", "right_mm", "hand"]);
+    all.extra = each
+        .map(|(values, name)| {
+            for (pull, value) in all.pulls.iter_mut().zip(&values) {
+                pull.covariates.extra.extend(value.clone().map(|value| (name.into(), value)));
+            }
+            ExtraColumn { name: name.into(), values: Values::of_drawn(values.iter().map(Option::as_ref)) }
+        })
+        .collect();
+    all
+}
+
+/// A column of words that counts, with cells that are empty: such pulls are no points of the surface.
+#[test]
+fn a_surface_over_a_column_with_gaps_has_points_without() {
+    let (seen, unseen) = {
+        let all = with_a_wave(3.0);
+        (all.kept(|i| i % 4 != 0), all.kept(|i| i % 4 == 0))
+    };
+    let [search, auto] = [Engine::Search, Engine::Auto].map(|engine| diagnose_by(engine, &seen));
+    let unknown: Vec<&str> = auto.diagnosis.unknown.iter().map(|u| u.covariate.as_str()).collect();
+    assert!(unknown.iter().any(|u| u.contains("hand") && u.contains("left_mm")), "{unknown:?}");
+    let (without_n, with_n) = (new_n(&search, &unseen), new_n(&auto, &unseen));
+    assert!(with_n < 0.8 * without_n, "{with_n} N with a surface, {without_n} N without");
+}
+
+/// Two columns without a meaning that act together as a wave: no effect, no curve of one column and no product describes them.
+#[test]
+fn what_no_effect_describes_is_a_surface_that_predicts_new_pulls() {
+    let all = with_a_wave(0.0);
     let (seen, unseen) = (all.kept(|i| i % 2 == 0), all.kept(|i| i % 2 == 1));
     let [search, auto] = [Engine::Search, Engine::Auto].map(|engine| diagnose_by(engine, &seen));
     let unknown: Vec<&str> = auto.diagnosis.unknown.iter().map(|u| u.covariate.as_str()).collect();

@@ -14,5 +14,5 @@ mod sizes;
 mod tables;
 mod terms;
 
-pub use answer::{ModelAnswer, ModelFit, describe_by_process, diagnose_by_model, predicts_better};
+pub use answer::{ModelAnswer, ModelFit, describe_by_process, diagnose_by_model, rms_errors_n};
 pub use tables::LearntTable;

@@ -6,7 +6,7 @@ use crate::pulls::{
 use gripgen_record::{Dataset, DatasetError, MeasuredRows, PictureFileError, Table, status_name};
 use gripgen_twin::columns::recorded_covariates;
 use gripgen_twin::label::forces::PullForces;
-use gripgen_twin::{MeasuredPull, PULLS_SINCE_REST, Values};
+use gripgen_twin::{MeasuredPull, PULLS_SINCE_REST, SINCE_ZERO, Values};
 use std::path::Path;
 
 /// Why a dataset could not be opened. Every message names the file.
@@ -74,7 +74,7 @@ fn columns(judged: &JudgedPulls) -> Vec<(String, Values)> {
     if pulls.iter().any(|p| p.start_n.is_some()) {
         columns.push(("force_start_n".into(), numbers(&|p| p.start_n.unwrap_or(p.increment_n))));
     }
-    for extra in measured.extra.iter().filter(|e| e.name != PULLS_SINCE_REST) {
+    for extra in measured.extra.iter().filter(|e| e.name != PULLS_SINCE_REST && e.name != SINCE_ZERO) {
         let values = Values::of_drawn(pulls.iter().map(|p| p.covariates.extra.get(&extra.name)));
         columns.push((extra.name.clone(), values));
     }

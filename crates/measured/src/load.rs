@@ -190,7 +190,7 @@ pub fn load_pulls_with(folders: &[&Path], suspects: Suspects) -> Result<LoadedPu
     }
     // Samples of a sweep know no rests, so those of several are not counted either.
     if folders.len() > 1 && !folders.iter().any(|path| is_sweep(path)) {
-        all.pulls.count_rests();
+        all.pulls.count();
     }
     Ok(all)
 }

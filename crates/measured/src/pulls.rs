@@ -198,7 +198,7 @@ fn read_table(path: &Path, bytes: &[u8], header: &CampaignHeader) -> Result<Judg
         feedback: header.feedback,
         sha256: String::new(),
     };
-    measured.count_rests();
+    measured.count();
     let warnings = said.into_iter().map(|said| format!("{}: {said}", path.display())).collect();
     Ok(JudgedPulls { pulls: measured, standing, every_reading: false, missing, warnings })
 }

@@ -73,7 +73,7 @@ fn campaign(seed: u64) -> MeasuredPulls {
     if !["force_increment_n", "step_time_s"].iter().any(|own| measured.recorded.iter().any(|c| c == own)) {
         measured.pulls.iter_mut().for_each(|pull| (pull.increment_n, pull.step_s) = (0.1, 0.0104));
     }
-    measured.count_rests();
+    measured.count();
     measured
 }
 

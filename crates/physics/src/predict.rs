@@ -13,7 +13,7 @@ use crate::cache::Cache;
 use crate::{QuasiStatic, RimTable};
 use creep::creeps;
 use gripgen_twin::config::Feedback;
-use gripgen_twin::effects::{CommandChain, Effect, OutsideFit, Per, SensorChain};
+use gripgen_twin::effects::{CommandChain, Effect, OutsideFit, Per, SensorChain, SensorPoint};
 use gripgen_twin::label::moments::LabelRule;
 use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel, PullPrediction, TracePrediction};
 use gripgen_twin::{Backbone, Jaw, MeasuredPulls, Robot, Staircase, Twin};
@@ -259,7 +259,8 @@ impl<'a> PullPredictor<'a> {
     fn sensor(&self, model: &PullModel, row: usize) -> SensorChain {
         let c = &self.measured.pulls[row].covariates;
         let own = model.effects.iter().filter(|e| e.part.is_none_or(|p| p == self.part_of[row]));
-        SensorChain::of(own.map(|e| (e.spec, e.values.as_slice())), c.time_s).along(c.pull_direction)
+        SensorChain::of(own.map(|e| (e.spec, e.values.as_slice())), SensorPoint::start_of(c))
+            .along(c.pull_direction)
     }
 
     fn command(&self, model: &PullModel, row: usize) -> CommandChain {
@@ -276,7 +277,8 @@ impl<'a> PullPredictor<'a> {
         let mut signed = false;
         for effect in model.effects.iter().filter(|e| e.acts_on_signals()) {
             if effect.spec.reads_clock {
-                bits.push(self.measured.pulls[row].covariates.time_s.to_bits());
+                let start = SensorPoint::start_of(&self.measured.pulls[row].covariates);
+                bits.extend([start.clock_s, start.since_zero_s].map(f64::to_bits));
             }
             if let Some(part) = effect.part {
                 bits.push(u64::from(part == self.part_of[row]));

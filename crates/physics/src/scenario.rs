@@ -1,6 +1,6 @@
 //! What a scenario makes of a twin: direction, wrist sensor, creep, and the arguments of its effects.
 
-use gripgen_twin::effects::{Creep, GripPoint, SensorChain, creep};
+use gripgen_twin::effects::{Creep, GripPoint, SensorChain, SensorPoint, creep};
 use gripgen_twin::{Jaw, PerJaw, Scenario, Twin};
 
 /// Unit vector of the pull in `world`.
@@ -28,7 +28,7 @@ pub fn creep_of(twin: &Twin, scenario: &Scenario, force_n: &PerJaw<f64>) -> Cree
 
 /// The wrist sensor of a pull, with what tables of the twin add to its readings.
 pub fn sensor_chain(twin: &Twin, scenario: &Scenario) -> SensorChain {
-    SensorChain::new(twin, &scenario.part, scenario.covariates.time_s)
+    SensorChain::new(twin, &scenario.part, SensorPoint::start_of(&scenario.covariates))
         .along(scenario.covariates.pull_direction)
         .plus(twin.table_offset_n(scenario))
 }

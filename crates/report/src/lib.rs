@@ -31,7 +31,7 @@ pub use comparison::{ComparedPulls, pull_comparison_page};
 pub use diagnosis::doubt::doubt;
 pub use diagnosis::imprints::imprint_report;
 pub use diagnosis::presses::{PressPlace, press_report};
-pub use diagnosis::pulls::{SimulatePull, pull_report};
+pub use diagnosis::pulls::{Predictions, SimulatePull, prediction_report, pull_report};
 pub use diagnosis::sensor::sensor_report;
 pub use diagnosis::{EvidenceRow, ReportData, WorstRow, diagnosis_page};
 pub use page::live_page;

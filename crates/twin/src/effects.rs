@@ -68,6 +68,7 @@ library! {
     mod sensor_gain;
     mod sensor_bias;
     mod sensor_drift;
+    mod session_zero_drift;
     mod sensor_gain_drift;
     mod sensor_hysteresis;
     mod sensor_quadratic;

@@ -69,8 +69,8 @@ pub use image::film::{CameraStamp, CellShear, FilmFrame, FilmPace, SlipState};
 pub use jaw::{Jaw, PerJaw};
 pub use label::{LabelError, PullEnd, SlipLabel, slip_label};
 pub use measured::{
-    ExtraColumn, MeasuredPull, MeasuredPulls, POSSIBLE_LABEL_RATIO, PULLS_SINCE_REST, RestCount,
-    median_label_ratio,
+    ExtraColumn, MeasuredPull, MeasuredPulls, POSSIBLE_LABEL_RATIO, PULLS_SINCE_REST, PullCount, SINCE_ZERO,
+    ZEROED, median_label_ratio,
 };
 pub use mesh::{
     EXTENT_RANGE_M, MAX_TRIANGLES, MESH_FORMATS, MeshError, MeshLook, TriMesh, usual_scale_mm_per_unit,

@@ -5,8 +5,13 @@ use crate::draw::Drawn;
 use crate::values::median;
 use crate::{Covariates, PullTrace, Values};
 
-/// The covariate [`MeasuredPulls::count_rests`] adds.
+/// Pulls since the last rest, a covariate that [`MeasuredPulls::count`] adds.
 pub const PULLS_SINCE_REST: &str = "pulls_since_rest";
+/// Time since the sensor was zeroed, a covariate that [`MeasuredPulls::count`] adds.
+pub const SINCE_ZERO: &str = "since_zero_s";
+
+/// The column that says whether the sensor was zeroed before a pull (1) or not (0).
+pub const ZEROED: &str = "zeroed";
 
 /// A pause as long as this is a rest: polymers forget most of their first cycles in a quarter of an hour.
 const REST_S: f64 = 900.0;
@@ -75,31 +80,52 @@ pub struct MeasuredPulls {
     pub sha256: String,
 }
 
-/// Counts pulls from the last rest: where the session or the gel changes, or the clock stands still for a quarter of an
-/// hour.
+/// Counts pulls from the last rest, where the session or the gel changes, or the clock stands still for a quarter of an hour; and time
+/// from the last zeroing, where the session changes or [`ZEROED`] is not 0.
 #[derive(Debug, Clone, Default)]
-pub struct RestCount {
-    /// Rests so far.
+pub struct PullCount {
+    /// Rests and zeroings so far, without the first pull.
     rests: usize,
-    /// The pull before, and the index of the first pull after the last rest.
-    last: Option<(Covariates, u64)>,
+    zeroings: usize,
+    last: Option<Last>,
 }
 
-impl RestCount {
-    /// Pulls since the last rest, of the next pull.
-    pub fn since(&mut self, next: &Covariates) -> u64 {
-        let first = match &self.last {
-            None => next.pull_index,
-            Some((last, first)) => {
-                let rested = last.session != next.session
-                    || last.gel_id != next.gel_id
-                    || next.time_s - next.dwell_s - last.time_s > REST_S;
-                self.rests += usize::from(rested);
-                if rested { next.pull_index } else { *first }
+/// The pull before, the index of the first pull after the last rest, and when the zero was set.
+#[derive(Debug, Clone)]
+struct Last {
+    pull: Covariates,
+    first: u64,
+    zero_s: f64,
+}
+
+impl PullCount {
+    /// Takes the next pull: pulls since the last rest, seconds since the last zeroing.
+    pub fn next(&mut self, next: &Covariates) -> (u64, f64) {
+        let mut now = Last { pull: next.clone(), first: next.pull_index, zero_s: next.time_s };
+        if let Some(last) = &self.last {
+            let session = last.pull.session != next.session;
+            let paused = next.time_s - next.dwell_s - last.pull.time_s > REST_S;
+            let rested = session || last.pull.gel_id != next.gel_id || paused;
+            let zeroed = session || matches!(next.extra.get(ZEROED), Some(Drawn::Number(x)) if *x != 0.0);
+            self.rests += usize::from(rested);
+            self.zeroings += usize::from(zeroed);
+            if !rested {
+                now.first = last.first;
             }
-        };
-        self.last = Some((next.clone(), first));
-        next.pull_index.saturating_sub(first)
+            if !zeroed {
+                now.zero_s = last.zero_s;
+            }
+        }
+        let counted = (next.pull_index.saturating_sub(now.first), next.time_s - now.zero_s);
+        self.last = Some(now);
+        counted
+    }
+
+    /// Takes the next pull and writes both into it.
+    pub fn mark(&mut self, next: &mut Covariates) {
+        let (pulls, seconds) = self.next(next);
+        next.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(pulls as f64));
+        next.extra.insert(SINCE_ZERO.into(), Drawn::Number(seconds));
     }
 }
 
@@ -127,27 +153,30 @@ impl MeasuredPulls {
         }
     }
 
-    /// Gives every pull the covariate [`PULLS_SINCE_REST`], unless it was written down. Without rests nothing is
-    /// added.
-    pub fn count_rests(&mut self) {
+    /// Gives every pull the covariates [`PULLS_SINCE_REST`] and [`SINCE_ZERO`], unless they were written down. Without a rest, or without a
+    /// zeroing after the first pull, it is not added.
+    pub fn count(&mut self) {
         let known = |name: &str| self.recorded.iter().any(|c| c == name);
-        if self.extra.iter().any(|c| c.name == PULLS_SINCE_REST) || !(known("session") || known("time_s")) {
+        let written = |name: &str| self.extra.iter().any(|c| c.name == name);
+        if !(known("session") || known("time_s")) {
             return;
         }
         let indexed = known("pull_index");
-        let mut count = RestCount::default();
-        let since: Vec<u64> = self
-            .pulls
-            .iter()
-            .enumerate()
-            .map(|(i, pull)| {
-                let index = if indexed { pull.covariates.pull_index } else { i as u64 };
-                count.since(&Covariates { pull_index: index, ..pull.covariates.clone() })
-            })
-            .collect();
-        if count.rests > 0 {
-            for (pull, since) in self.pulls.iter_mut().zip(since) {
-                pull.covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since as f64));
+        let mut count = PullCount::default();
+        let each = |(i, pull): (usize, &MeasuredPull)| {
+            let index = if indexed { pull.covariates.pull_index } else { i as u64 };
+            count.next(&Covariates { pull_index: index, ..pull.covariates.clone() })
+        };
+        let counted: Vec<(u64, f64)> = self.pulls.iter().enumerate().map(each).collect();
+        let rests = count.rests > 0 && !written(PULLS_SINCE_REST);
+        let zeroings = count.zeroings > 0 && known("time_s") && !written(SINCE_ZERO);
+        for (pull, (pulls, seconds)) in self.pulls.iter_mut().zip(counted) {
+            let extra = &mut pull.covariates.extra;
+            if rests {
+                extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(pulls as f64));
+            }
+            if zeroings {
+                extra.insert(SINCE_ZERO.into(), Drawn::Number(seconds));
             }
         }
     }
@@ -191,7 +220,7 @@ mod tests {
         let since = |m: &MeasuredPulls| -> Vec<Option<Drawn>> {
             m.pulls.iter().map(|p| p.covariates.extra.get(PULLS_SINCE_REST).cloned()).collect()
         };
-        measured.count_rests();
+        measured.count();
         let wanted = [0.0, 1.0, 4.0, 0.0, 0.0, 1.0].map(|x| Some(Drawn::Number(x)));
         assert_eq!(since(&measured), wanted);
         let half = measured.every(2);
@@ -199,7 +228,7 @@ mod tests {
         assert_eq!(since(&half), [wanted[0].clone(), wanted[2].clone(), wanted[4].clone()]);
         measured.pulls.truncate(3);
         measured.pulls.iter_mut().for_each(|p| p.covariates.extra.clear());
-        measured.count_rests();
+        measured.count();
         assert_eq!(since(&measured), [None, None, None], "no rest, nothing to count from");
     }
 }

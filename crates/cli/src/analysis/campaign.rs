@@ -5,17 +5,16 @@ use gripgen::SimulateOptions;
 use gripgen::simulate;
 use gripgen::{LoadError, Project, load_twin_document};
 use gripgen_measured::{LoadedPulls, MissingCells};
+use gripgen_physics::sensor_chain;
 use gripgen_record::sha256_hex;
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::columns::{Column, covariates};
 use gripgen_twin::config::{Backend, Mechanics};
-use gripgen_twin::draw::Drawn;
-use gripgen_twin::effects::SensorChain;
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::rounded;
 use gripgen_twin::{
-    Campaign, Covariates, MeasuredPull, MeasuredPulls, Outcome, PULLS_SINCE_REST, PlannedPull, PullKind,
-    PullTrace, RestCount, Scenario, TraceRow, Twin,
+    Campaign, Covariates, MeasuredPull, MeasuredPulls, Outcome, PlannedPull, PullCount, PullKind, PullTrace,
+    Scenario, TraceRow, Twin,
 };
 
 /// Time between readings of a stored trace; the label is taken at the full rate.
@@ -74,13 +73,12 @@ pub fn simulate_campaign(
     let (mut pulls, mut clock_s, mut left_out) = (Vec::new(), 0.0, 0);
     let made = campaign.pulls.iter().filter(|p| p.kind == PullKind::Pull).count();
     let mut index = 0;
-    let mut rests = RestCount::default();
+    let mut count = PullCount::default();
     for planned in &campaign.pulls {
         clock_s += planned.pause_s;
         if planned.kind == PullKind::Pull {
             let mut scenario = scenario(&project, campaign, planned, seed, index, clock_s);
-            let since = rests.since(&scenario.covariates);
-            scenario.covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since as f64));
+            count.mark(&mut scenario.covariates);
             match pull(&project, &scenario, index) {
                 Some(pull) => pulls.push(pull),
                 None => left_out += 1,
@@ -202,10 +200,7 @@ fn pull(project: &Project, scenario: &Scenario, index: u64) -> Option<MeasuredPu
 fn stored(twin: &Twin, scenario: &Scenario, trace: &PullTrace) -> PullTrace {
     let every = (TRACE_STEP_S / twin.wrist.step_s()).round().max(1.0) as usize;
     let step_s = every as f64 * twin.wrist.step_s();
-    let c = &scenario.covariates;
-    let mut sensor = SensorChain::new(twin, &scenario.part, c.time_s)
-        .along(c.pull_direction)
-        .plus(twin.table_offset_n(scenario));
+    let mut sensor = sensor_chain(twin, scenario);
     // The noise of the pull itself is lane 0.
     let mut noise = Stream::with_lane(scenario.seed, scenario.index, Purpose::ForceNoise, 1);
     let before = (NO_LOAD_S / step_s).round() as usize;

@@ -6,12 +6,11 @@ use gripgen::{
 use gripgen_physics::{Command, PullSession};
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::config::{Backend, Mechanics};
-use gripgen_twin::draw::Drawn;
-use gripgen_twin::effects::SensorChain;
+use gripgen_twin::effects::{SensorChain, SensorPoint};
 use gripgen_twin::frames::Pose;
 use gripgen_twin::plant::{EmptyGrip, Grip, GripRequest, Plant, PlantError, PullReading, PullRequest};
 use gripgen_twin::random::{Purpose, Stream};
-use gripgen_twin::{Covariates, PULLS_SINCE_REST, PerJaw, RestCount, Scenario, TactileImage, Twin};
+use gripgen_twin::{Covariates, PerJaw, PullCount, Scenario, TactileImage, Twin};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::fmt::Display;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -60,7 +59,7 @@ pub enum OpenPlantError {
 #[derive(Default)]
 struct Counted {
     pulls: u64,
-    rests: RestCount,
+    count: PullCount,
 }
 
 impl TwinPlant {
@@ -154,7 +153,7 @@ impl Plant for TwinPlant {
 
     fn offset_n(&self, time_s: f64) -> f64 {
         let (twin, scenario) = (&self.project.twin, self.at_rest(time_s));
-        let chain = SensorChain::new(twin, &scenario.part, time_s);
+        let chain = SensorChain::new(twin, &scenario.part, SensorPoint::start_of(&scenario.covariates));
         chain.along(1.0).plus(twin.table_offset_n(&scenario)).read(0.0, 0.0, 0.0)
     }
 
@@ -212,8 +211,7 @@ impl PlantGrip {
             s.covariates.pull_index = pull;
             if !began_anew {
                 counted.pulls += 1;
-                let since = counted.rests.since(&s.covariates);
-                s.covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since as f64));
+                counted.count.mark(&mut s.covariates);
             }
         }
         let Project { twin, library, .. } = &*self.project;

@@ -63,26 +63,38 @@ pub struct ModelFit {
     pub surface: Option<Surface>,
     /// Labels predicted for held-out pulls by friction of the parts alone, and by this model.
     pub heldout_label_n: [Vec<f64>; 2],
+    /// The same of the fits to all pulls.
+    pub label_n: [Vec<f64>; 2],
+    /// How far each pull is from what the others say of it, in standard deviations.
+    pub deviations: Vec<f64>,
 }
 
 /// Significance level of the sign test between two predictions.
 const BY_CHANCE: f64 = 0.05;
 
-/// Root mean squares of the errors of two predictions of held-out pulls, if the second is better: its error is smaller in the root mean
-/// square, and a one-sided sign test over the pulls is significant. Every pull counts, outliers too.
-pub fn predicts_better(label_n: &[f64], first_n: &[f64], second_n: &[f64]) -> Option<(f64, f64)> {
-    let pairs = label_n.iter().zip(first_n.iter().zip(second_n));
-    let errors: Vec<(f64, f64)> = pairs
-        .filter(|(_, (a, b))| a.is_finite() && b.is_finite())
-        .map(|(y, (a, b))| ((y - a).abs(), (y - b).abs()))
-        .collect();
+/// Root mean squares of the errors of two predictions of the same pulls, of those that both predict. Every pull counts, outliers too.
+pub fn rms_errors_n(label_n: &[f64], first_n: &[f64], second_n: &[f64]) -> (f64, f64) {
+    let errors = errors_n(label_n, first_n, second_n);
     let rms = |own: fn(&(f64, f64)) -> f64| {
         (errors.iter().map(|e| own(e) * own(e)).sum::<f64>() / errors.len().max(1) as f64).sqrt()
     };
-    let (first, second) = (rms(|e| e.0), rms(|e| e.1));
+    (rms(|e| e.0), rms(|e| e.1))
+}
+
+fn errors_n(label_n: &[f64], first_n: &[f64], second_n: &[f64]) -> Vec<(f64, f64)> {
+    let pairs = label_n.iter().zip(first_n.iter().zip(second_n));
+    let known = pairs.filter(|(_, (a, b))| a.is_finite() && b.is_finite());
+    known.map(|(y, (a, b))| ((y - a).abs(), (y - b).abs())).collect()
+}
+
+/// Whether the second of two predictions of held-out pulls is better: its error is smaller in the root mean square, and a one-sided sign
+/// test over the pulls is significant.
+fn predicts_better(label_n: &[f64], first_n: &[f64], second_n: &[f64]) -> bool {
+    let errors = errors_n(label_n, first_n, second_n);
+    let (first, second) = rms_errors_n(label_n, first_n, second_n);
     let nearer = errors.iter().filter(|(a, b)| b < a).count();
     let by_chance = at_least_by_chance(nearer, errors.iter().filter(|(a, b)| a != b).count());
-    (second < first && by_chance <= BY_CHANCE).then_some((first, second))
+    second < first && by_chance <= BY_CHANCE
 }
 
 /// Chance of `hits` heads or more in `tosses` of a fair coin.
@@ -193,17 +205,18 @@ fn diagnose(
         return ModelAnswer { diagnosis, fit: None };
     };
     let fit = sure(&setting.search, fit);
-    let Added { process, mut fit, instead } =
+    let Added { process, mut fit, instead, nothing } =
         Process::added(&data, &candidates, &setting.search, &fit, without.is_none());
     if instead {
-        diagnosis.unknown.push(together(&setting.search, &fit, &process.columns()));
+        diagnosis.unknown.push(together(&setting.search, &fit, &process.columns(), nothing));
         diagnosis.notes.extend(tied(&data, &process.columns()));
     }
     said(&data, &candidates, &setting.search, &fit, &mut diagnosis);
     let repetitions = folds(data.len());
     if let Some(other_n) = other_n {
-        let own_n = heldout_n(&data, &setting, &fit, &repetitions);
-        if !instead || predicts_better(&data.label_n, other_n, &own_n).is_none() {
+        // Like with like: the other prediction keeps what it chose with all pulls, too.
+        let own_n = heldout_n(&data, &setting, &fit, None, &repetitions);
+        if !instead || !predicts_better(&data.label_n, other_n, &own_n) {
             return ModelAnswer { diagnosis, fit: None };
         }
     }
@@ -225,7 +238,8 @@ fn diagnose(
     let wider = &setting.search.measured.wider;
     diagnosis.data.outliers =
         (0..data.len()).filter(|&i| wider[i] > 1.0).map(|i| measured.pulls[i].id.clone()).collect();
-    let heldout = [&setting.plain, &fit].map(|fit| heldout_n(&data, &setting, fit, &repetitions));
+    let heldout = [(&setting.plain, None), (&fit, Some(&process).filter(|_| !fit.process.is_empty()))]
+        .map(|(fit, process)| heldout_n(&data, &setting, fit, process, &repetitions));
     let all: Vec<usize> = (0..data.len()).collect();
     let scatter = libm::exp(fit.gaussian.log_noise[0]);
     let sd_n: Vec<f64> = all.iter().map(|&i| libm::hypot(scatter * data.label_n[i], given.noise_n)).collect();
@@ -245,11 +259,15 @@ fn diagnose(
         let estimate = ParameterEstimate::new(damping, (damping, damping), "N s/m");
         diagnosis.baseline.insert("robot.damping_n_s_per_m".into(), estimate);
     }
+    let label_n = [&setting.plain, &fit].map(|fit| {
+        let z = setting.search.explained(fit);
+        all.iter().map(|&i| expected_n(&setting, i, z[i], scatter)).collect()
+    });
+    let deviations = fit.gaussian.left_out();
     progress(1.0);
-    ModelAnswer {
-        diagnosis,
-        fit: Some(ModelFit { model: after, tables: learnt, surface, heldout_label_n: heldout }),
-    }
+    let fit =
+        ModelFit { model: after, tables: learnt, surface, heldout_label_n: heldout, label_n, deviations };
+    ModelAnswer { diagnosis, fit: Some(fit) }
 }
 
 /// A setting of the label rule, and how well parts alone explain the labels with it.
@@ -396,16 +414,30 @@ fn learnt(data: &PullData<'_>, search: &Search, fit: &Fit) -> Vec<LearntTable> {
     each.collect()
 }
 
-/// Expected labels of held-out pulls, from the others and the deviations of the whole fit. Sessions and memory of the others say nothing
-/// of a pull that a twin makes.
-fn heldout_n(data: &PullData<'_>, setting: &Setting, fit: &Fit, sets: &[Vec<usize>]) -> Vec<f64> {
+/// Expected labels of held-out pulls, from the others: the coefficients with the deviations of the whole fit, or the constants of a
+/// process too. Sessions and memory of the others say nothing of a pull that a twin makes.
+fn heldout_n(
+    data: &PullData<'_>,
+    setting: &Setting,
+    fit: &Fit,
+    process: Option<&Process>,
+    sets: &[Vec<usize>],
+) -> Vec<f64> {
     let mut found = vec![f64::NAN; data.len()];
     let scatter = libm::exp(fit.gaussian.log_noise[0]);
-    let first = setting.search.block_of(0);
+    let search = &setting.search;
+    let first = search.block_of(0);
     let own = |block: usize| block == 0 || block >= first;
     for set in sets {
-        let Some(z) = fit.gaussian.predicted_without(&setting.search.measured, set, &own) else { continue };
-        for (&row, z) in set.iter().zip(z) {
+        let z = match process {
+            None => fit.gaussian.predicted_without(&search.measured, set, &own),
+            Some(process) => {
+                let rest = search.without_rows(set);
+                let again = process.again(data, &rest, fit).map(|again| rest.explained(&again));
+                again.map(|z| set.iter().map(|&row| z[row]).collect())
+            }
+        };
+        for (&row, z) in set.iter().zip(z.unwrap_or_default()) {
             found[row] = expected_n(setting, row, z, scatter);
         }
     }
@@ -468,13 +500,14 @@ mod tests {
         assert!((at_least_by_chance(0, 7) - 1.0).abs() < 1e-12);
         let label_n = [10.0; 12];
         let off = |by: f64| vec![10.0 + by; 12];
-        assert_eq!(predicts_better(&label_n, &off(0.5), &off(-0.2)).map(|(a, _)| a), Some(0.5));
-        assert_eq!(predicts_better(&label_n, &off(0.2), &off(0.2)), None, "alike");
+        assert_eq!(rms_errors_n(&label_n, &off(0.5), &off(-0.2)), (0.5, 0.2));
+        assert!(predicts_better(&label_n, &off(0.5), &off(-0.2)));
+        assert!(!predicts_better(&label_n, &off(0.2), &off(0.2)), "alike");
         let mut once = off(0.1);
         once[3] = 25.0;
-        assert_eq!(predicts_better(&label_n, &off(0.2), &once), None, "one pull far off counts");
+        assert!(!predicts_better(&label_n, &off(0.2), &once), "one pull far off counts");
         let mut few = off(0.5);
         (0..3).for_each(|i| few[i] = 10.1);
-        assert_eq!(predicts_better(&label_n, &off(0.5), &few), None, "nearer in 3 of 3 that differ");
+        assert!(!predicts_better(&label_n, &off(0.5), &few), "nearer in 3 of 3 that differ");
     }
 }

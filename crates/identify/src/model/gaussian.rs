@@ -57,7 +57,7 @@ pub(super) struct Measured {
     pub(super) z: DVector<f64>,
     /// Variance that a unit of variance of a reading makes in each.
     pub(super) of_reading: DVector<f64>,
-    /// Factor on the variance of each: more than 1 of an outlier.
+    /// Factor on the variance of each: more than 1 of an outlier, infinite of one that must not be seen.
     pub(super) wider: DVector<f64>,
     /// Logarithm of dz/dy over all values: evidences of different transformations are compared as densities of y.
     pub(super) log_jacobian: f64,
@@ -167,9 +167,11 @@ impl<'a> Problem<'a> {
     fn at(&self, theta: &[f64]) -> Option<At> {
         let (n, blocks) = (self.measured.z.len(), self.blocks.len());
         let [scatter, reading] = [theta[blocks], theta[blocks + 1]].map(|t| libm::exp(2.0 * t));
-        let own = |i: usize| self.measured.wider[i] * scatter;
-        let read = |i: usize| self.measured.wider[i] * reading * self.measured.of_reading[i];
-        let weight = DVector::from_fn(n, |i, _| 1.0 / (own(i) + read(i)));
+        let wider = |i: usize| Some(self.measured.wider[i]).filter(|wider| wider.is_finite());
+        let own = |i: usize| wider(i).map_or(0.0, |wider| wider * scatter);
+        let read = |i: usize| wider(i).map_or(0.0, |wider| wider * reading * self.measured.of_reading[i]);
+        let weight = DVector::from_fn(n, |i, _| wider(i).map_or(0.0, |_| 1.0 / (own(i) + read(i))));
+        let seen = || weight.iter().filter(|w| **w > 0.0);
         let weighted = weighted(&self.features, &weight);
         let mut precision = &weighted * &self.features;
         let mut log_prior = 0.0;
@@ -188,11 +190,11 @@ impl<'a> Problem<'a> {
         let variance = |k: usize| root.column(k).norm_squared();
         let residual = &self.measured.z - &self.features * &mean;
         let wz = weight.component_mul(&self.measured.z);
-        let log_var: f64 = weight.iter().map(|w| -libm::log(*w)).sum();
+        let log_var: f64 = seen().map(|w| -libm::log(*w)).sum();
         let mut objective = self.measured.log_jacobian
             - 0.5
                 * (log_var + log_prior + log_det + wz.dot(&self.measured.z) - b.dot(&mean)
-                    + n as f64 * libm::log(std::f64::consts::TAU));
+                    + seen().count() as f64 * libm::log(std::f64::consts::TAU));
         let (mut gradient, mut curvature) = (vec![0.0; theta.len()], vec![0.0; theta.len()]);
         for t in 0..blocks {
             let v = libm::exp(2.0 * theta[t]);

@@ -33,10 +33,14 @@ pub(super) fn sure(search: &Search, mut fit: Fit) -> Fit {
     }
 }
 
-/// Columns that act together in a way which no term describes.
-pub(super) fn together(search: &Search, fit: &Fit, columns: &[&str]) -> UnknownCovariate {
+/// Columns that act together in a way which no term describes; `nothing` is the probability that they do not.
+pub(super) fn together(search: &Search, fit: &Fit, columns: &[&str], nothing: f64) -> UnknownCovariate {
     let place = fit.chosen.len() + fit.process.len() - 1;
-    UnknownCovariate { covariate: columns.join("*"), strength: strength(search, fit, place), p_value: 0.0 }
+    UnknownCovariate {
+        covariate: columns.join("*"),
+        strength: strength(search, fit, place),
+        p_value: nothing,
+    }
 }
 
 /// Columns of numbers that hardly vary where another one has the same value: what belongs to which cannot be told.

@@ -63,12 +63,15 @@ struct Axis {
     name: String,
     x: Vec<f64>,
     words: bool,
+    /// Pulls that have no value.
+    missing: Vec<usize>,
 }
 
 #[derive(Debug, Clone)]
 struct Joint {
     axes: Vec<SurfaceAxis>,
-    /// Logarithm of the prior of its lengths.
+    /// Length of each axis, of those too that do not count, and the logarithm of their prior.
+    lengths: Vec<f64>,
     log_prior: f64,
     /// The pulls that are its points, and the values of each in the axes.
     points: Vec<Vec<Drawn>>,
@@ -82,8 +85,10 @@ struct Joint {
 pub(super) struct Added {
     pub(super) process: Process,
     pub(super) fit: Fit,
-    /// Whether the smooth process stands in the place of terms that were there, or of all that there could be.
+    /// Whether the smooth process replaces terms that were there, or all that there could be.
     pub(super) instead: bool,
+    /// Probability of the parts alone where the process is compared with them.
+    pub(super) nothing: f64,
 }
 
 impl Process {
@@ -106,21 +111,23 @@ impl Process {
         if alone {
             let plain = fit.gaussian.log_evidence;
             let (score, process, fit) = whole(fit.clone(), 0.0);
-            let instead =
-                !fit.process.is_empty() && score + of_column * process.columns().len() as f64 > plain;
-            return Added { instead, process, fit };
+            let gain = score + of_column * process.columns().len() as f64 - plain;
+            let instead = !fit.process.is_empty() && gain > 0.0;
+            return Added { instead, process, fit, nothing: 1.0 / (1.0 + libm::exp(gain)) };
         }
         let named: Vec<bool> = fit.chosen.iter().map(|c| search.terms[c.term].is_effect()).collect();
         let plain_score = fit.score;
         let (score, process, with) = whole(fit.clone(), 0.0);
-        let mut best = (score.max(plain_score), Added { process, fit: with, instead: false });
+        let unchanged = Added { process, fit: with, instead: false, nothing: 1.0 };
+        let mut best = (score.max(plain_score), unchanged);
         let none = vec![false; named.len()];
         for stay in [named, none] {
             let smaller = stay.iter().filter(|stay| **stay).count() < best.1.fit.chosen.len();
             let Some(fewer) = search.only(fit, &stay).filter(|_| smaller) else { continue };
             let (score, process, with) = whole(fewer, of_column);
             if score > best.0 && process.joint.is_some() {
-                best = (score, Added { process, fit: with, instead: true });
+                let nothing = 1.0 / (1.0 + libm::exp(score - plain_score));
+                best = (score, Added { process, fit: with, instead: true, nothing });
             }
         }
         best.1
@@ -151,6 +158,21 @@ impl Process {
             (best, process.joint) = (next, Some(joint));
         }
         (process, best)
+    }
+
+    /// The same kind of process fitted to other weights of the pulls: its constants are sought again, near those that it has.
+    pub(super) fn again(&self, data: &PullData<'_>, search: &Search, fit: &Fit) -> Option<Fit> {
+        let mut fit = search.only(fit, &vec![true; fit.chosen.len()])?;
+        if self.load.is_some() {
+            let each =
+                load_blocks(data).into_iter().filter_map(|(blocks, _)| search.with_process(&fit, blocks));
+            let evidence = |fit: &Fit| fit.gaussian.log_evidence;
+            fit = each.reduce(|a, b| if evidence(&b) > evidence(&a) { b } else { a })?;
+        }
+        let Some(joint) = &self.joint else { return Some(fit) };
+        let lengths = Lengths { data, search, fit: &fit, axes: axes(data), of_column: 0.0 };
+        let (_, own, now) = lengths.climbed(joint.lengths.clone(), 1);
+        Some(lengths.fitted(&own, POINTS[1], &now)?.0)
     }
 
     /// The columns on which it depends.
@@ -260,17 +282,19 @@ fn law_of_part(data: &PullData<'_>, load: &Load, p: usize, part: &str, factor: f
 
 fn axes(data: &PullData<'_>) -> Vec<Axis> {
     let own = usable_columns(data).into_iter().filter(|name| !CLOCKS.contains(name));
+    let positions = |of: &[usize]| of.iter().map(|k| *k as f64).collect();
     let mut axes: Vec<Axis> = own
-        .filter_map(|name| match &data.columns[name] {
-            Column::Number(x) => Some(Axis { name: name.into(), x: standard(x)?, words: false }),
-            Column::Word(at, _) => {
-                Some(Axis { name: name.into(), x: at.iter().map(|k| *k as f64).collect(), words: true })
-            }
+        .filter_map(|name| {
+            let (x, words) = match &data.columns[name] {
+                Column::Number(x) => (standard(x)?, false),
+                Column::Word(at, _) => (positions(at), true),
+            };
+            let missing = data.missing.get(name).cloned().unwrap_or_default();
+            Some(Axis { name: name.into(), x, words, missing })
         })
         .collect();
     if data.parts.len() > 1 {
-        let x = data.part_of.iter().map(|k| *k as f64).collect();
-        axes.push(Axis { name: "part".into(), x, words: true });
+        axes.push(Axis { name: "part".into(), x: positions(&data.part_of), words: true, missing: vec![] });
     }
     axes
 }
@@ -285,10 +309,13 @@ fn distance(axes: &[Axis], lengths: &[f64], i: usize, k: usize) -> f64 {
     own.sum()
 }
 
-/// Pulls that differ in the columns that count, `most` of them at most, evenly over the order of the table.
+/// Pulls that have values in the columns that count and differ there, `most` of them at most, evenly over the order of the table.
 fn points(axes: &[Axis], lengths: &[f64], n: usize, most: usize) -> Vec<usize> {
     let mut own: Vec<usize> = Vec::new();
-    for i in 0..n {
+    let lacks = |i: usize| {
+        axes.iter().zip(lengths).any(|(axis, length)| length.is_finite() && axis.missing.contains(&i))
+    };
+    for i in (0..n).filter(|&i| !lacks(i)) {
         if own.iter().all(|&k| distance(axes, lengths, i, k) > 1e-9) {
             own.push(i);
         }
@@ -338,56 +365,73 @@ fn near(length: f64) -> Vec<f64> {
     }
 }
 
-/// The process over all columns, with the lengths of the highest evidence; nothing where the evidence does not pay for their choice.
-fn joint(data: &PullData<'_>, search: &Search, fit: &Fit, of_column: f64) -> Option<(Joint, Fit)> {
-    let axes = axes(data);
-    if axes.is_empty() {
-        return None;
-    }
-    let fitted = |lengths: &[f64], most: usize, from: &Fit| -> Option<(Fit, Vec<usize>)> {
-        let points = points(&axes, lengths, data.len(), most);
+/// A search over the lengths of a process that is added to a fit.
+struct Lengths<'a> {
+    data: &'a PullData<'a>,
+    search: &'a Search,
+    fit: &'a Fit,
+    axes: Vec<Axis>,
+    /// Logarithm of the prior of each column that counts.
+    of_column: f64,
+}
+
+impl Lengths<'_> {
+    /// The fit with these lengths and `most` points, its deviations started from those of `from`.
+    fn fitted(&self, lengths: &[f64], most: usize, from: &Fit) -> Option<(Fit, Vec<usize>)> {
+        let points = points(&self.axes, lengths, self.data.len(), most);
         if points.len() < 2 {
             return None;
         }
-        let (features, ..) = features(data, &axes, lengths, &points)?;
-        let mut process = fit.process.clone();
+        let (features, ..) = features(self.data, &self.axes, lengths, &points)?;
+        let mut process = self.fit.process.clone();
         process.push(Block { features, sd: SIZE, range: None });
-        Some((search.with_process(from, process)?, points))
-    };
-    let mut best: Option<(f64, Vec<f64>, Fit)> = None;
-    // Where columns are dear, the search starts from one of them, else from all.
-    let starts = match of_column < 0.0 {
-        true => vec![f64::INFINITY],
-        false => STARTS.map(|start| LENGTHS[start]).to_vec(),
-    };
-    for start in starts {
-        let mut lengths = vec![start; axes.len()];
-        let mut now = fitted(&lengths, POINTS[0], fit).map_or_else(|| fit.clone(), |found| found.0);
-        for _ in 0..ROUNDS {
-            let before = now.gaussian.log_evidence + log_prior(&lengths, of_column);
-            for d in 0..axes.len() {
+        Some((self.search.with_process(from, process)?, points))
+    }
+
+    /// The lengths to which the evidence rises from a start, one column after the other, with the evidence.
+    fn climbed(&self, mut lengths: Vec<f64>, rounds: usize) -> (f64, Vec<f64>, Fit) {
+        let score =
+            |fit: &Fit, lengths: &[f64]| fit.gaussian.log_evidence + log_prior(lengths, self.of_column);
+        let mut now = self.fitted(&lengths, POINTS[0], self.fit).map_or_else(|| self.fit.clone(), |f| f.0);
+        for _ in 0..rounds {
+            let before = score(&now, &lengths);
+            for d in 0..self.axes.len() {
                 for length in near(lengths[d]) {
                     let mut tried = lengths.clone();
                     tried[d] = length;
-                    if let Some((next, _)) = fitted(&tried, POINTS[0], &now)
-                        && next.gaussian.log_evidence + log_prior(&tried, of_column)
-                            > now.gaussian.log_evidence + log_prior(&lengths, of_column)
+                    if let Some((next, _)) = self.fitted(&tried, POINTS[0], &now)
+                        && score(&next, &tried) > score(&now, &lengths)
                     {
                         (now, lengths) = (next, tried);
                     }
                 }
             }
-            if now.gaussian.log_evidence + log_prior(&lengths, of_column) < before + 1e-3 {
+            if score(&now, &lengths) < before + 1e-3 {
                 break;
             }
         }
-        let evidence = now.gaussian.log_evidence + log_prior(&lengths, of_column);
-        if best.as_ref().is_none_or(|(other, ..)| evidence > *other) {
-            best = Some((evidence, lengths, now));
-        }
+        (score(&now, &lengths), lengths, now)
     }
-    let (_, lengths, now) = best?;
-    let (next, points) = fitted(&lengths, POINTS[1], &now)?;
+}
+
+/// The process over all columns, with the lengths of the highest evidence; nothing where the evidence does not exceed the prior cost of
+/// their choice.
+fn joint(data: &PullData<'_>, search: &Search, fit: &Fit, of_column: f64) -> Option<(Joint, Fit)> {
+    let lengths = Lengths { data, search, fit, axes: axes(data), of_column };
+    if lengths.axes.is_empty() {
+        return None;
+    }
+    // Where columns are dear, the search starts from one of them, else from all.
+    let starts = match of_column < 0.0 {
+        true => vec![f64::INFINITY],
+        false => STARTS.map(|start| LENGTHS[start]).to_vec(),
+    };
+    let climbed = starts.into_iter().map(|start| lengths.climbed(vec![start; lengths.axes.len()], ROUNDS));
+    let best = climbed.reduce(|a, b| if b.0 > a.0 { b } else { a });
+    let (_, own, now) = best?;
+    let (next, points) = lengths.fitted(&own, POINTS[1], &now)?;
+    let Lengths { axes, .. } = lengths;
+    let lengths = own;
     let log_prior = log_prior(&lengths, of_column);
     if next.gaussian.log_evidence + log_prior <= fit.gaussian.log_evidence {
         return None;
@@ -403,7 +447,7 @@ fn joint(data: &PullData<'_>, search: &Search, fit: &Fit, of_column: f64) -> Opt
         },
     };
     let points = points.iter().map(|&i| counting.iter().map(|&d| value(i, d)).collect()).collect();
-    Some((Joint { axes: written, log_prior, points, to_weights, means }, next))
+    Some((Joint { axes: written, lengths, log_prior, points, to_weights, means }, next))
 }
 
 /// An axis in the units of its column.

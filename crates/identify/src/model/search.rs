@@ -60,6 +60,7 @@ pub(super) struct Fit {
 pub(super) type Pool = Vec<(Option<Chosen>, Fit, f64)>;
 
 /// Pulls and what may explain them.
+#[derive(Clone)]
 pub(super) struct Search {
     pub(super) measured: Measured,
     pub(super) terms: Vec<Term>,
@@ -277,6 +278,13 @@ impl Search {
     /// The same terms fitted again, after a shape or the labels changed.
     pub(super) fn refitted(&self, fit: &Fit) -> Option<Fit> {
         self.fit_with(fit.chosen.clone(), fit.process.clone(), Some(&fit.gaussian))
+    }
+
+    /// The same without what some of the pulls show.
+    pub(super) fn without_rows(&self, rows: &[usize]) -> Self {
+        let mut rest = self.clone();
+        rows.iter().for_each(|&row| rest.measured.wider[row] = f64::INFINITY);
+        rest
     }
 
     /// A fit with further blocks for prediction.

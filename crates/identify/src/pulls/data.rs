@@ -141,9 +141,13 @@ impl<'a> PullData<'a> {
         self.label_n.is_empty()
     }
 
-    /// Whether a column was written down and varies.
+    /// Whether a column was written down, or counted, and varies.
     pub fn varies(&self, name: &str) -> bool {
-        self.columns.get(name).is_some_and(|c| c.distinct() > 1)
+        let counted = || {
+            let each: Vec<_> = self.measured.pulls.iter().map(|p| p.covariates.extra.get(name)).collect();
+            each.windows(2).any(|pair| pair[0] != pair[1])
+        };
+        self.columns.get(name).map_or_else(counted, |c| c.distinct() > 1)
     }
 
     /// Numbers of a column, words as their positions.

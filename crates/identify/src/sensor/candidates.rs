@@ -92,7 +92,11 @@ pub(crate) fn chain(prepared: &Prepared, effects: &[(&EffectSpec, &[f64])]) -> V
             if i > 0 && prepared.session[i] != prepared.session[i - 1] {
                 memories.fill(SensorMemory::default());
             }
-            let at = SensorPoint { clock_s: prepared.clock_s[i], step_s: prepared.step_s[i] };
+            let at = SensorPoint {
+                clock_s: prepared.clock_s[i],
+                step_s: prepared.step_s[i],
+                ..SensorPoint::default()
+            };
             effects.iter().zip(&mut memories).fold(
                 prepared.reference_n[i],
                 |force, ((spec, values), memory)| {

@@ -105,7 +105,7 @@ fn as_made(pulls: &mut MeasuredPulls, campaign: RigCampaign) {
         pulls.pulls.sort_by(|a, b| a.covariates.time_s.total_cmp(&b.covariates.time_s));
     }
     pulls.extra = own_columns(&pulls.pulls);
-    pulls.count_rests();
+    pulls.count();
 }
 
 /// The columns of pulls that gripgen does not know.

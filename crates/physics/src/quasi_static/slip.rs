@@ -324,7 +324,10 @@ mod tests {
         let rings: Vec<(f64, f64)> = (0..40).map(ring).collect();
         let lowpass = [(find("sensor_lowpass").unwrap(), [0.03].as_slice())];
         for backbone in [Backbone::straight(), Backbone::new(&rings, 1.0)] {
-            for sensor in [SensorChain::default(), SensorChain::of(lowpass.into_iter(), 0.0)] {
+            for sensor in [
+                SensorChain::default(),
+                SensorChain::of(lowpass.into_iter(), gripgen_twin::effects::SensorPoint::default()),
+            ] {
                 let (command, mut stuck) = (CommandChain::default(), StuckPull::default());
                 rig.stuck(&staircase, &sensor, &command, 0.0, 50.0, &mut stuck);
                 let run = SlipRun {

@@ -23,41 +23,64 @@ const WORST: usize = 10;
 /// Readings that a model predicts for the times of a pull, without its scatter.
 pub type SimulatePull<'a> = dyn Fn(&PullModel, usize, &[f64]) -> Vec<f64> + 'a;
 
+/// What two models predict for each pull, before and after what was found was added, in newtons.
+#[derive(Debug, Clone, Copy)]
+pub struct Predictions<'a> {
+    /// For pulls that were held out.
+    pub heldout_label_n: [&'a [f64]; 2],
+    /// By the fits to all pulls.
+    pub label_n: [&'a [f64]; 2],
+    /// Measured less predicted label of the second model, in standard deviations.
+    pub deviations: &'a [f64],
+}
+
 /// Plots and tables of an answer. Empty where nothing was fitted.
 pub fn pull_report(measured: &MeasuredPulls, simulate: &SimulatePull<'_>, answer: &PullAnswer) -> ReportData {
     let Some(fits) = &answer.fits else { return ReportData::default() };
-    let mut groups: Vec<PlotGroup> = decisive(measured, fits, answer, axis_label).into_iter().collect();
-    groups.extend([
+    let predictions = Predictions {
+        heldout_label_n: [&fits.heldout_label_n[0], &fits.heldout_label_n[1]],
+        label_n: [&fits.label_n[0], &fits.label_n[1]],
+        deviations: &fits.after.residuals,
+    };
+    let mut report = prediction_report(measured, predictions, &important(answer));
+    report.groups.push(PlotGroup {
+        title: "Pull curves".into(),
+        about: "The twin over the measurement; its curve ends the rise at the expected limit, without the scatter of this \
+                pull."
+            .into(),
+        plots: curves(measured, simulate, fits),
+    });
+    if let Some(group) = decisive(measured, fits, answer, axis_label) {
+        report.groups.insert(0, group);
+        report.decides = 1;
+    }
+    report.evidence = evidence(fits, answer);
+    report
+}
+
+/// Plots and tables of two models that were compared; the columns of `first` come first.
+pub fn prediction_report(
+    measured: &MeasuredPulls,
+    predictions: Predictions<'_>,
+    first: &[String],
+) -> ReportData {
+    let groups = vec![
         PlotGroup {
             title: "Residual against each covariate".into(),
             about: "Measured less predicted label of held-out pulls, before and after what was found was added. Those that \
                     matter come first."
                 .into(),
-            plots: residuals(measured, fits, &important(answer)),
+            plots: residuals(measured, predictions, first),
         },
         PlotGroup {
             title: "Maximum pull force over grip force".into(),
             about: "Means of the measured labels with their standard deviations, and the means of what is predicted for the \
                     same pulls."
                 .into(),
-            plots: limits(measured, fits),
+            plots: limits(measured, predictions),
         },
-        PlotGroup {
-            title: "Pull curves".into(),
-            about: "The twin over the measurement; its curve ends the rise at the expected limit, without the scatter of this \
-                    pull."
-                .into(),
-            plots: curves(measured, simulate, fits),
-        },
-    ]);
-    let decides = usize::from(groups.len() > 3);
-    ReportData {
-        groups,
-        decides,
-        evidence: evidence(fits, answer),
-        worst: worst(measured, fits),
-        ..Default::default()
-    }
+    ];
+    ReportData { groups, worst: worst(measured, predictions), ..Default::default() }
 }
 
 /// Covariates that the answer names, in its order.
@@ -68,17 +91,17 @@ fn important(answer: &PullAnswer) -> Vec<String> {
     unknown.map(String::from).chain(of_effects.map(|c| c.to_string())).collect()
 }
 
-fn residuals(measured: &MeasuredPulls, fits: &PullFits, first: &[String]) -> Vec<Plot> {
+fn residuals(measured: &MeasuredPulls, predictions: Predictions<'_>, first: &[String]) -> Vec<Plot> {
     let extra = measured.extra.iter().map(|e| e.name.as_str());
     let known = covariates().map(|c| c.name).filter(|c| measured.recorded.iter().any(|r| r == c));
     let mut names: Vec<&str> = known.chain(extra).collect();
     // A stable sort: the rest keeps its order.
     names.sort_by_key(|name| first.iter().position(|f| f == name).unwrap_or(first.len()));
-    names.into_iter().filter_map(|name| residual(measured, fits, name)).collect()
+    names.into_iter().filter_map(|name| residual(measured, predictions, name)).collect()
 }
 
 /// The plot over one column; none where it does not vary.
-fn residual(measured: &MeasuredPulls, fits: &PullFits, name: &str) -> Option<Plot> {
+fn residual(measured: &MeasuredPulls, predictions: Predictions<'_>, name: &str) -> Option<Plot> {
     let values: Vec<Option<Drawn>> = measured.pulls.iter().map(|p| value(name, p.view())).collect();
     let mut words: Vec<String> = values
         .iter()
@@ -103,7 +126,8 @@ fn residual(measured: &MeasuredPulls, fits: &PullFits, name: &str) -> Option<Plo
         let pulls = x.iter().zip(&measured.pulls).zip(predicted);
         Series::points(name, pulls.map(|((x, pull), predicted)| (*x, pull.max_pull_force_n - predicted)))
     };
-    let both = vec![series("before", &fits.heldout_label_n[0]), series("after", &fits.heldout_label_n[1])];
+    let both = predictions.heldout_label_n;
+    let both = vec![series("before", both[0]), series("after", both[1])];
     Some(Plot { x_words: words, ..Plot::new(name, axis_label(name), "measured \u{2212} predicted, N", both) })
 }
 
@@ -128,7 +152,7 @@ fn axis_label(name: &str) -> String {
 }
 
 /// One plot a part.
-fn limits(measured: &MeasuredPulls, fits: &PullFits) -> Vec<Plot> {
+fn limits(measured: &MeasuredPulls, predictions: Predictions<'_>) -> Vec<Plot> {
     let mut parts: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (i, pull) in measured.pulls.iter().enumerate() {
         parts.entry(&pull.part).or_default().push(i);
@@ -146,7 +170,8 @@ fn limits(measured: &MeasuredPulls, fits: &PullFits) -> Vec<Plot> {
         };
         let errors = labels.iter().map(deviation).collect();
         let measured = Series { errors, ..Series::points("measured", means(&labels)) };
-        let series = vec![line("before", &fits.label_n[0]), line("after", &fits.label_n[1]), measured];
+        let series =
+            vec![line("before", predictions.label_n[0]), line("after", predictions.label_n[1]), measured];
         Plot::new(part, "grip force per jaw, N", "maximum pull force, N", series)
     };
     parts.into_iter().map(plot).collect()
@@ -245,8 +270,8 @@ fn as_good(rows: &mut [EvidenceRow]) {
     }
 }
 
-fn worst(measured: &MeasuredPulls, fits: &PullFits) -> Vec<WorstRow> {
-    let deviations = &fits.after.residuals;
+fn worst(measured: &MeasuredPulls, predictions: Predictions<'_>) -> Vec<WorstRow> {
+    let deviations = predictions.deviations;
     let mut order: Vec<usize> = (0..measured.pulls.len().min(deviations.len())).collect();
     order.sort_by(|&a, &b| deviations[b].abs().total_cmp(&deviations[a].abs()));
     order
@@ -258,7 +283,7 @@ fn worst(measured: &MeasuredPulls, fits: &PullFits) -> Vec<WorstRow> {
                 id: pull.id.clone(),
                 about: format!("{}, {} N, session {}", pull.part, pull.grip_force_n, pull.covariates.session),
                 measured: pull.max_pull_force_n,
-                predicted: fits.label_n[1][i],
+                predicted: predictions.label_n[1][i],
                 deviations: deviations[i],
             }
         })

@@ -53,35 +53,35 @@ pub fn optics_state(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> OpticsS
 pub struct SensorChain {
     /// Values are shared: fits copy chains to remember what they remember.
     stages: Vec<(SensorHook, Arc<[f64]>, SensorMemory)>,
-    clock_start_s: f64,
+    start: SensorPoint,
     direction: f64,
     offset_n: f64,
 }
 
 impl Default for SensorChain {
     fn default() -> Self {
-        Self { stages: Vec::new(), clock_start_s: 0.0, direction: 1.0, offset_n: 0.0 }
+        Self { stages: Vec::new(), start: SensorPoint::default(), direction: 1.0, offset_n: 0.0 }
     }
 }
 
 impl SensorChain {
-    /// The sensor effects on `part_name`, for a pull that starts at `clock_start_s` of the campaign.
-    pub fn new(twin: &Twin, part_name: &str, clock_start_s: f64) -> Self {
+    /// The sensor effects on `part_name`, for a pull that starts at `start`.
+    pub fn new(twin: &Twin, part_name: &str, start: SensorPoint) -> Self {
         let stages = acting(twin, part_name)
             .filter_map(|e| Some((e.spec.sensor?, e.values.as_slice().into(), SensorMemory::default())))
             .collect();
-        Self { stages, clock_start_s, direction: 1.0, offset_n: 0.0 }
+        Self { stages, start, direction: 1.0, offset_n: 0.0 }
     }
 
     /// The sensor effects among `effects` with their values, in their order.
     pub fn of<'a>(
         effects: impl Iterator<Item = (&'static EffectSpec, &'a [f64])>,
-        clock_start_s: f64,
+        start: SensorPoint,
     ) -> Self {
         let stages = effects
             .filter_map(|(spec, values)| Some((spec.sensor?, values.into(), SensorMemory::default())))
             .collect();
-        Self { stages, clock_start_s, direction: 1.0, offset_n: 0.0 }
+        Self { stages, start, direction: 1.0, offset_n: 0.0 }
     }
 
     /// For a pull of this sign along the sensor's axis. Forces stay magnitudes along the pull: against the axis
@@ -106,7 +106,8 @@ impl SensorChain {
 
     /// The reading of a true force at `time_s` since the start of the pull, `step_s` after the one before.
     pub fn read(&mut self, true_n: f64, time_s: f64, step_s: f64) -> f64 {
-        let at = SensorPoint { clock_s: self.clock_start_s + time_s, step_s };
+        let SensorPoint { clock_s, since_zero_s, .. } = self.start;
+        let at = SensorPoint { clock_s: clock_s + time_s, since_zero_s: since_zero_s + time_s, step_s };
         let read = self.stages.iter_mut().fold(self.direction * true_n, |force_n, (hook, values, memory)| {
             hook(values, force_n, memory, &at)
         });

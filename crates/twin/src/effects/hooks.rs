@@ -1,6 +1,7 @@
 //! Where an effect acts, and what it may look at there.
 
-use crate::{Covariates, Jaw, OpticsState};
+use crate::draw::Drawn;
+use crate::{Covariates, Jaw, OpticsState, SINCE_ZERO};
 
 /// Smallest grip force a law is evaluated at, so that `1 / F` and `ln F` stay finite without contact.
 const SMALLEST_FORCE_N: f64 = 1e-6;
@@ -42,12 +43,25 @@ pub(super) fn positive(force_n: f64) -> f64 {
 }
 
 /// When a sensor is read.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SensorPoint {
     /// Time of the campaign: that of the pull's start plus the time since then.
     pub clock_s: f64,
+    /// Time since the zero of the sensor was set.
+    pub since_zero_s: f64,
     /// Time since the reading before.
     pub step_s: f64,
+}
+
+impl SensorPoint {
+    /// The start of a pull. Where nobody counted from the last zeroing, the zero was set at the start of the campaign.
+    pub fn start_of(pull: &Covariates) -> Self {
+        let counted = match pull.extra.get(SINCE_ZERO) {
+            Some(Drawn::Number(seconds)) => Some(*seconds),
+            _ => None,
+        };
+        Self { clock_s: pull.time_s, since_zero_s: counted.unwrap_or(pull.time_s), step_s: 0.0 }
+    }
 }
 
 /// What one sensor effect remembers between two readings. Starts as its default.

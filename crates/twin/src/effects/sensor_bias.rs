@@ -46,8 +46,8 @@ mod tests {
     #[test]
     fn reversing_the_pull_reverses_the_bias() {
         let twin = twin("[[effects]]\nname = \"sensor_bias\"\nbias_n = 1.5").unwrap();
-        let mut up = SensorChain::new(&twin, "rod", 0.0).along(1.0);
-        let mut down = SensorChain::new(&twin, "rod", 0.0).along(-1.0);
+        let mut up = SensorChain::new(&twin, "rod", SensorPoint::default()).along(1.0);
+        let mut down = SensorChain::new(&twin, "rod", SensorPoint::default()).along(-1.0);
         assert_eq!((up.read(10.0, 0.0, 0.002), down.read(10.0, 0.0, 0.002)), (11.5, 8.5));
     }
 }

@@ -14,7 +14,12 @@ pub(crate) fn grip(covariates: &Covariates, grip_force_n: f64) -> GripPoint<'_> 
 pub(crate) fn readings(hook: SensorHook, parameters: &[f64], forces_n: &[f64], step_s: f64) -> Vec<f64> {
     let mut memory = SensorMemory::default();
     let read = |(i, &force_n): (usize, &f64)| {
-        hook(parameters, force_n, &mut memory, &SensorPoint { clock_s: i as f64 * step_s, step_s })
+        hook(
+            parameters,
+            force_n,
+            &mut memory,
+            &SensorPoint { clock_s: i as f64 * step_s, since_zero_s: i as f64 * step_s, step_s },
+        )
     };
     forces_n.iter().enumerate().map(read).collect()
 }

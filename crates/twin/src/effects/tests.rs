@@ -9,6 +9,11 @@ use crate::{
     grip_friction,
 };
 
+/// The start of a pull at this time of the campaign.
+fn at_clock(clock_s: f64) -> SensorPoint {
+    SensorPoint { clock_s, ..SensorPoint::default() }
+}
+
 /// Circumstances from one end to the other.
 fn circumstances() -> Vec<Covariates> {
     let base = Covariates { pull_index: 0, dwell_s: 0.0, ..Default::default() };
@@ -82,7 +87,8 @@ fn each_call(spec: &EffectSpec, parameters: &[f64], mut check: impl FnMut(&str, 
         if let Some(hook) = spec.sensor {
             let mut memory = SensorMemory::default();
             for (i, &force_n) in FORCES_N.iter().enumerate() {
-                let at = SensorPoint { clock_s: start_s + i as f64 * 0.002, step_s: 0.002 };
+                let at =
+                    SensorPoint { clock_s: start_s + i as f64 * 0.002, since_zero_s: 0.0, step_s: 0.002 };
                 check("sensor", force_n, hook(parameters, force_n, &mut memory, &at));
             }
         }
@@ -230,7 +236,10 @@ fn a_twin_of_neutral_effects_is_the_twin_without_effects() {
         assert_eq!(optics_state(&neutral_twin, "rod", at), OpticsState::default());
         assert!(optics_state(&plain, "rod", at).is_neutral());
     });
-    let mut chains = [SensorChain::new(&plain, "rod", 5.0), SensorChain::new(&neutral_twin, "rod", 5.0)];
+    let mut chains = [
+        SensorChain::new(&plain, "rod", at_clock(5.0)),
+        SensorChain::new(&neutral_twin, "rod", at_clock(5.0)),
+    ];
     for direction in [1.0, -1.0] {
         chains = chains.map(|chain| chain.along(direction));
         for (i, force_n) in FORCES_N.into_iter().enumerate() {
@@ -248,13 +257,14 @@ fn a_twin_of_neutral_effects_is_the_twin_without_effects() {
 fn effects_act_in_the_order_of_the_twin_and_on_their_part() {
     let bias = "[[effects]]\nname = \"sensor_bias\"\nbias_n = 2.0\n";
     let gain = "[[effects]]\nname = \"sensor_gain\"\ngain = 0.5\npart = \"rod\"\n";
-    let read =
-        |effects: &str, part| SensorChain::new(&twin(effects).unwrap(), part, 0.0).read(10.0, 0.0, 0.002);
+    let read = |effects: &str, part| {
+        SensorChain::new(&twin(effects).unwrap(), part, at_clock(0.0)).read(10.0, 0.0, 0.002)
+    };
     assert_eq!(read(&format!("{bias}{gain}"), "rod"), 6.0);
     assert_eq!(read(&format!("{gain}{bias}"), "rod"), 7.0);
     assert_eq!(read(&format!("{gain}{bias}"), "plate"), 12.0);
     let drift = "[[effects]]\nname = \"sensor_drift\"\nrate_n_per_h = 1.0\n";
-    let mut later = SensorChain::new(&twin(drift).unwrap(), "rod", 1800.0);
+    let mut later = SensorChain::new(&twin(drift).unwrap(), "rod", at_clock(1800.0));
     assert_eq!(later.read(10.0, 1800.0, 0.002), 11.0, "the clock is that of the campaign");
 }
 
@@ -288,7 +298,7 @@ fn optics_effects_act_on_their_part_and_on_no_force() {
         };
         assert_eq!(all(&plain), all(&seen));
     });
-    assert!(SensorChain::new(&seen, "rod", 5.0).is_identity());
+    assert!(SensorChain::new(&seen, "rod", at_clock(5.0)).is_identity());
     for spec in LIBRARY.iter().filter(|spec| spec.optics.is_some()) {
         let others = [spec.friction.is_some(), spec.normal_force.is_some(), spec.imprint_volume.is_some()];
         assert!(!others.contains(&true) && spec.sensor.is_none() && spec.command.is_none(), "{}", spec.id);
@@ -403,7 +413,7 @@ fn chains_are_clone_and_send() {
     check::<SensorChain>();
     check::<CommandChain>();
     let twin = twin("[[effects]]\nname = \"sensor_lowpass\"\ntau_s = 0.02").unwrap();
-    let mut chain = SensorChain::new(&twin, "rod", 0.0);
+    let mut chain = SensorChain::new(&twin, "rod", at_clock(0.0));
     chain.read(0.0, 0.0, 0.002);
     let mut copy = chain.clone();
     assert_eq!(chain.read(10.0, 0.002, 0.002), copy.read(10.0, 0.002, 0.002), "a copy has the same memory");

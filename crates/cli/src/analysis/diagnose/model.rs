@@ -4,9 +4,9 @@ use super::diagnosed::Diagnosed;
 use super::pull_values::pull_values;
 use crate::analysis::twin_edits::{TwinEdits, calibration_entry, effect_entry};
 use gripgen_identify::pulls::answer::PullFits;
-use gripgen_identify::{Diagnosis, LearntTable, ModelAnswer, ModelFit, diagnose_by_model, predicts_better};
+use gripgen_identify::{Diagnosis, LearntTable, ModelAnswer, ModelFit, diagnose_by_model, rms_errors_n};
 use gripgen_physics::PullPredictor;
-use gripgen_report::ReportData;
+use gripgen_report::{Predictions, ReportData, prediction_report};
 use gripgen_twin::config::EffectFile;
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::predict::PullModel;
@@ -21,12 +21,15 @@ pub(super) fn diagnose_pulls_by_model(
     progress: &(dyn Fn(f64) + Sync),
 ) -> Diagnosed {
     let answer = diagnose_by_model(measured, predictor, given, without, progress);
-    let edits = answer.fit.map(|fit| edits(&fit, &answer.diagnosis, measured, predictor.part_names()));
-    let report = ReportData { error_unit: "N".into(), ..ReportData::default() };
-    Diagnosed::new(answer.diagnosis, edits.unwrap_or_default(), report)
+    let Some(fit) = answer.fit else {
+        return Diagnosed::new(answer.diagnosis, TwinEdits::default(), ReportData::default());
+    };
+    let edits = edits(&fit, &answer.diagnosis, measured, predictor.part_names());
+    let report = report(&fit, &answer.diagnosis, measured);
+    Diagnosed::new(answer.diagnosis, edits, report)
 }
 
-/// The answer of the model where it predicts held-out pulls better than that of the search.
+/// The answer of the model in the place of that of the search, where it predicts held-out pulls better.
 pub(super) fn model_instead(
     model: ModelAnswer,
     search: &Diagnosis,
@@ -36,7 +39,7 @@ pub(super) fn model_instead(
 ) -> Option<Diagnosed> {
     let fit = model.fit?;
     let label_n: Vec<f64> = measured.pulls.iter().map(|pull| pull.max_pull_force_n).collect();
-    let (before_n, after_n) = predicts_better(&label_n, &fits.heldout_label_n[1], &fit.heldout_label_n[1])?;
+    let (before_n, after_n) = rms_errors_n(&label_n, &fits.heldout_label_n[1], &fit.heldout_label_n[1]);
     let names = search.effects.iter().map(|e| e.name.clone());
     let unknown = search.unknown.iter().map(|u| u.covariate.clone());
     let names: Vec<String> = names.chain(unknown).collect();
@@ -49,8 +52,19 @@ pub(super) fn model_instead(
     ));
     diagnosis.would_have_seen.clone_from(&search.would_have_seen);
     let edits = edits(&fit, &diagnosis, measured, parts);
-    let report = ReportData { error_unit: "N".into(), ..ReportData::default() };
+    let report = report(&fit, &diagnosis, measured);
     Some(Diagnosed::new(diagnosis, edits, report))
+}
+
+/// What the report of a fit shows.
+fn report(fit: &ModelFit, diagnosis: &Diagnosis, measured: &MeasuredPulls) -> ReportData {
+    let predictions = Predictions {
+        heldout_label_n: [&fit.heldout_label_n[0], &fit.heldout_label_n[1]],
+        label_n: [&fit.label_n[0], &fit.label_n[1]],
+        deviations: &fit.deviations,
+    };
+    let columns = diagnosis.unknown.iter().flat_map(|u| u.covariate.split('*')).map(String::from);
+    prediction_report(measured, predictions, &columns.collect::<Vec<_>>())
 }
 
 /// The answer to a few pulls, with the twin of the model where it has more than plain friction and errs less on held-out pulls. Nothing
@@ -74,6 +88,7 @@ pub(super) fn few_with_model(
         rounded(before_n, &[]),
     ));
     few.edits = edits(&fit, &model.diagnosis, measured, parts);
+    few.report = report(&fit, &model.diagnosis, measured);
     few.posterior = None;
     few
 }

@@ -8,7 +8,9 @@ use gripgen_identify::pulls::heldout::scatter;
 use gripgen_identify::{CandidatePull, DWELLS_S, FORCES_N, NO_LOAD_S, SeparableRival, plan_separating};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::predict::{PredictPulls, PullModel};
-use gripgen_twin::{Campaign, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, PlannedPull, PullKind, Twin};
+use gripgen_twin::{
+    Campaign, MeasuredPull, MeasuredPulls, PULLS_SINCE_REST, PlannedPull, PullKind, SINCE_ZERO, Twin,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// Pulls that are planned at most.
@@ -257,15 +259,18 @@ fn as_measured(campaign: &MeasuredPulls, planned: &[PlannedPull], after_rest: &[
     let mut degrees: Vec<f64> = campaign.pulls.iter().map(|p| p.covariates.temperature_c).collect();
     degrees.sort_by(f64::total_cmp);
     let pull = |(i, (p, rest)): (usize, (&PlannedPull, &bool))| {
+        // A new session, of which half the plan takes ten minutes.
+        let since_zero_s = 600.0 + if *rest { REST_S } else { 0.0 };
         let mut covariates = gripgen_twin::Covariates {
             // Half of the plan lies before any pull of it, on average.
             pull_index: index + MAX_PULLS as u64 / 2,
-            time_s: time_s + 600.0 + if *rest { REST_S } else { 0.0 },
+            time_s: time_s + since_zero_s,
             temperature_c: degrees[degrees.len() / 2],
             ..p.covariates()
         };
         let since = if *rest { 2.0 } else { 12.0 };
         covariates.extra.insert(PULLS_SINCE_REST.into(), Drawn::Number(since));
+        covariates.extra.insert(SINCE_ZERO.into(), Drawn::Number(since_zero_s));
         MeasuredPull {
             id: format!("next{i:05}"),
             part: p.part.clone(),

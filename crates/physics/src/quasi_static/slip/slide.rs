@@ -174,7 +174,10 @@ mod tests {
         let gain = [(find("controller_gain").unwrap(), [1.1].as_slice())];
         let chains = [
             (SensorChain::default(), CommandChain::default()),
-            (SensorChain::of(lowpass.into_iter(), 0.0), CommandChain::of(gain.into_iter())),
+            (
+                SensorChain::of(lowpass.into_iter(), gripgen_twin::effects::SensorPoint::default()),
+                CommandChain::of(gain.into_iter()),
+            ),
         ];
         let mut ends = [0; 3];
         for (feedback, (sensor, command)) in [

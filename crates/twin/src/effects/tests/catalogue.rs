@@ -24,7 +24,8 @@ fn declared_traits_are_those_of_the_hooks() {
         let last = |before: &[f64], clock_s: f64| {
             let (mut memory, mut reading) = (SensorMemory::default(), 0.0);
             for (k, force_n) in before.iter().chain(&[7.0]).enumerate() {
-                let at = SensorPoint { clock_s: clock_s + 0.01 * k as f64, step_s: 0.01 };
+                let at =
+                    SensorPoint { clock_s: clock_s + 0.01 * k as f64, since_zero_s: clock_s, step_s: 0.01 };
                 reading = hook(&parameters, *force_n, &mut memory, &at);
             }
             reading
@@ -192,7 +193,7 @@ fn flat_effects_do_nothing_while_they_are_small() {
         // Two forces, a microsecond apart and an hour after the start, so that what has a memory or reads the clock does something.
         let mut memory = SensorMemory::default();
         let mut read = |hook: SensorHook, force_n, clock_s| {
-            hook(&values, force_n, &mut memory, &SensorPoint { clock_s, step_s: 1e-6 })
+            hook(&values, force_n, &mut memory, &SensorPoint { clock_s, since_zero_s: clock_s, step_s: 1e-6 })
         };
         let felt = match (spec.sensor, spec.command) {
             (Some(hook), _) => [read(hook, 40.0, 3600.0) - 40.0, read(hook, 80.0, 3600.0) - 80.0],
