@@ -59,7 +59,7 @@ pub use imprints::{
 };
 pub use least_squares::{Fit, FitError, FitOptions, FreeParameter, fit};
 pub use levels::{Level, levels};
-pub use model::{LearntTable, ModelAnswer, ModelFit, describe_by_process, diagnose_by_model, rms_errors_n};
+pub use model::{LearntTable, ModelAnswer, ModelFit, describe_by_process, diagnose_by_model, rms_error_n};
 pub use permutation::{Covariate, Dependence, benjamini_hochberg, dependence, interaction};
 pub use predictive::share_below;
 pub use presses::{

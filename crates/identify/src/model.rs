@@ -6,6 +6,7 @@
 mod answer;
 mod features;
 mod gaussian;
+mod heldout;
 mod labels;
 mod naming;
 mod process;
@@ -14,5 +15,6 @@ mod sizes;
 mod tables;
 mod terms;
 
-pub use answer::{ModelAnswer, ModelFit, describe_by_process, diagnose_by_model, rms_errors_n};
+pub use answer::{ModelAnswer, ModelFit, describe_by_process, diagnose_by_model};
+pub use heldout::rms_error_n;
 pub use tables::LearntTable;

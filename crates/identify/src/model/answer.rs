@@ -1,6 +1,7 @@
 //! From a campaign to an answer: what is said, the twin that follows, and its error on pulls that the fit has not seen.
 
 use super::gaussian::{Gaussian, Measured};
+use super::heldout::{BY_CHANCE, above_fast_n, expected_n, heldout_n, predicts_better};
 use super::labels::LabelCurves;
 use super::naming::{said, sure, tied, together};
 use super::process::{Added, Process};
@@ -34,15 +35,6 @@ const SEARCHES: usize = 3;
 /// Rounds in which values of effects are refined.
 const REFINED: usize = 3;
 
-/// Nodes and weights over which scatter is averaged: Gauss-Hermite of five points for a standard normal variable.
-const NODES: [(f64, f64); 5] = [
-    (-2.856_970_013_872_8, 0.011_257_411_327_72),
-    (-1.355_626_179_974_3, 0.222_075_922_005_61),
-    (0.0, 0.533_333_333_333_33),
-    (1.355_626_179_974_3, 0.222_075_922_005_61),
-    (2.856_970_013_872_8, 0.011_257_411_327_72),
-];
-
 /// An answer, and what a twin needs in addition to it.
 #[derive(Debug, Clone)]
 pub struct ModelAnswer {
@@ -69,55 +61,14 @@ pub struct ModelFit {
     pub deviations: Vec<f64>,
 }
 
-/// Significance level of the sign test between two predictions.
-const BY_CHANCE: f64 = 0.05;
-
-/// Root mean squares of the errors of two predictions of the same pulls, of those that both predict. Every pull counts, outliers too.
-pub fn rms_errors_n(label_n: &[f64], first_n: &[f64], second_n: &[f64]) -> (f64, f64) {
-    let errors = errors_n(label_n, first_n, second_n);
-    let rms = |own: fn(&(f64, f64)) -> f64| {
-        (errors.iter().map(|e| own(e) * own(e)).sum::<f64>() / errors.len().max(1) as f64).sqrt()
-    };
-    (rms(|e| e.0), rms(|e| e.1))
-}
-
-fn errors_n(label_n: &[f64], first_n: &[f64], second_n: &[f64]) -> Vec<(f64, f64)> {
-    let pairs = label_n.iter().zip(first_n.iter().zip(second_n));
-    let known = pairs.filter(|(_, (a, b))| a.is_finite() && b.is_finite());
-    known.map(|(y, (a, b))| ((y - a).abs(), (y - b).abs())).collect()
-}
-
-/// Whether the second of two predictions of held-out pulls is better: its error is smaller in the root mean square, and a one-sided sign
-/// test over the pulls is significant.
-fn predicts_better(label_n: &[f64], first_n: &[f64], second_n: &[f64]) -> bool {
-    let errors = errors_n(label_n, first_n, second_n);
-    let (first, second) = rms_errors_n(label_n, first_n, second_n);
-    let nearer = errors.iter().filter(|(a, b)| b < a).count();
-    let by_chance = at_least_by_chance(nearer, errors.iter().filter(|(a, b)| a != b).count());
-    second < first && by_chance <= BY_CHANCE
-}
-
-/// Chance of `hits` heads or more in `tosses` of a fair coin.
-fn at_least_by_chance(hits: usize, tosses: usize) -> f64 {
-    let half = libm::log(0.5) * tosses as f64;
-    let (mut log_choose, mut sum) = (0.0, 0.0);
-    for k in 0..=tosses {
-        if k >= hits {
-            sum += libm::exp(log_choose + half);
-        }
-        log_choose += libm::log((tosses - k) as f64 / (k + 1) as f64);
-    }
-    sum
-}
-
 /// Labels of one setting of the label rule with the search over them.
-struct Setting {
-    curves: LabelCurves,
+pub(super) struct Setting {
+    pub(super) curves: LabelCurves,
     log_prior: f64,
-    search: Search,
+    pub(super) search: Search,
     plain: Fit,
     /// What labels of the simulator lie above those of the curves, near the model that is fitted.
-    above_n: Vec<f64>,
+    pub(super) above_n: Vec<f64>,
 }
 
 impl Setting {
@@ -216,7 +167,7 @@ fn diagnose(
     if let Some(other_n) = other_n {
         // Like with like: the other prediction keeps what it chose with all pulls, too.
         let own_n = heldout_n(&data, &setting, &fit, None, &repetitions);
-        if !instead || !predicts_better(&data.label_n, other_n, &own_n) {
+        if !instead || nothing > BY_CHANCE || !predicts_better(&data.label_n, other_n, &own_n) {
             return ModelAnswer { diagnosis, fit: None };
         }
     }
@@ -375,7 +326,12 @@ fn friction(data: &PullData<'_>, candidates: &[Candidate], search: &Search, fit:
 }
 
 /// The model of a fit: friction of the parts, effects, scatter.
-fn model_of(data: &PullData<'_>, candidates: &[Candidate], setting: &Setting, fit: &Fit) -> PullModel {
+pub(super) fn model_of(
+    data: &PullData<'_>,
+    candidates: &[Candidate],
+    setting: &Setting,
+    fit: &Fit,
+) -> PullModel {
     let search = &setting.search;
     let mut model = PullModel { factor: vec![], ..setting.curves.model.clone() };
     for (part, mu) in model.mu.iter_mut().enumerate() {
@@ -414,67 +370,6 @@ fn learnt(data: &PullData<'_>, search: &Search, fit: &Fit) -> Vec<LearntTable> {
     each.collect()
 }
 
-/// Expected labels of held-out pulls, from the others: the coefficients with the deviations of the whole fit, or the constants of a
-/// process too. Sessions and memory of the others say nothing of a pull that a twin makes.
-fn heldout_n(
-    data: &PullData<'_>,
-    setting: &Setting,
-    fit: &Fit,
-    process: Option<&Process>,
-    sets: &[Vec<usize>],
-) -> Vec<f64> {
-    let mut found = vec![f64::NAN; data.len()];
-    let scatter = libm::exp(fit.gaussian.log_noise[0]);
-    let search = &setting.search;
-    let first = search.block_of(0);
-    let own = |block: usize| block == 0 || block >= first;
-    for set in sets {
-        let z = match process {
-            None => fit.gaussian.predicted_without(&search.measured, set, &own),
-            Some(process) => {
-                let rest = search.without_rows(set);
-                let again = process.again(data, &rest, fit).map(|again| rest.explained(&again));
-                again.map(|z| set.iter().map(|&row| z[row]).collect())
-            }
-        };
-        for (&row, z) in set.iter().zip(z.unwrap_or_default()) {
-            found[row] = expected_n(setting, row, z, scatter);
-        }
-    }
-    found
-}
-
-/// Expected label of a pull whose friction has this logarithm and scatter.
-fn expected_n(setting: &Setting, row: usize, z: f64, scatter: f64) -> f64 {
-    let at = |x: f64| setting.curves.label_n(row, z + libm::log((1.0 + scatter * x).max(0.01)));
-    let mean: f64 = NODES.iter().map(|(x, w)| w * at(*x)).sum();
-    mean + setting.above_n[row]
-}
-
-/// What labels of the simulator lie above those of the curves at a fit: what its twin will be judged by.
-fn above_fast_n(
-    data: &PullData<'_>,
-    predictor: &dyn PredictPulls,
-    candidates: &[Candidate],
-    setting: &Setting,
-    fit: &Fit,
-) -> Vec<f64> {
-    let rows: Vec<usize> = (0..data.len()).collect();
-    let mut model = model_of(data, candidates, setting, fit);
-    let mut log_factor = vec![0.0; data.len()];
-    let unnamed =
-        |place: &usize| fit.chosen.get(*place).is_none_or(|c| !setting.search.terms[c.term].is_effect());
-    for place in (0..fit.chosen.len() + fit.process.len()).filter(unnamed) {
-        let own = fit.gaussian.part(setting.search.block_of(place));
-        log_factor.iter_mut().zip(own.iter()).for_each(|(sum, x)| *sum += x);
-    }
-    model.factor = log_factor.iter().map(|x| libm::exp(*x)).collect();
-    let z = setting.search.explained(fit);
-    let simulated = predictor.labels_n(&model, &rows);
-    let fast = rows.iter().map(|&i| expected_n(setting, i, z[i], model.scatter) - setting.above_n[i]);
-    simulated.iter().zip(fast).map(|(s, f)| s - f).collect()
-}
-
 fn parts_estimates(
     data: &PullData<'_>,
     model: &PullModel,
@@ -487,27 +382,4 @@ fn parts_estimates(
     });
     let ratio = model.kinetic_ratio;
     each.chain([("kinetic_ratio".into(), ParameterEstimate::new(ratio, (ratio, ratio), "1"))]).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_better_prediction_is_nearer_in_most_pulls_and_in_the_root_mean_square() {
-        // Exact: 8 or more heads of 10 have 56 of 1024 chances.
-        assert!((at_least_by_chance(8, 10) - 56.0 / 1024.0).abs() < 1e-12);
-        assert!((at_least_by_chance(0, 7) - 1.0).abs() < 1e-12);
-        let label_n = [10.0; 12];
-        let off = |by: f64| vec![10.0 + by; 12];
-        assert_eq!(rms_errors_n(&label_n, &off(0.5), &off(-0.2)), (0.5, 0.2));
-        assert!(predicts_better(&label_n, &off(0.5), &off(-0.2)));
-        assert!(!predicts_better(&label_n, &off(0.2), &off(0.2)), "alike");
-        let mut once = off(0.1);
-        once[3] = 25.0;
-        assert!(!predicts_better(&label_n, &off(0.2), &once), "one pull far off counts");
-        let mut few = off(0.5);
-        (0..3).for_each(|i| few[i] = 10.1);
-        assert!(!predicts_better(&label_n, &off(0.5), &few), "nearer in 3 of 3 that differ");
-    }
 }

@@ -4,7 +4,7 @@ use super::diagnosed::Diagnosed;
 use super::pull_values::pull_values;
 use crate::analysis::twin_edits::{TwinEdits, calibration_entry, effect_entry};
 use gripgen_identify::pulls::answer::PullFits;
-use gripgen_identify::{Diagnosis, LearntTable, ModelAnswer, ModelFit, diagnose_by_model, rms_errors_n};
+use gripgen_identify::{Diagnosis, LearntTable, ModelAnswer, ModelFit, diagnose_by_model, rms_error_n};
 use gripgen_physics::PullPredictor;
 use gripgen_report::{Predictions, ReportData, prediction_report};
 use gripgen_twin::config::EffectFile;
@@ -39,15 +39,14 @@ pub(super) fn model_instead(
 ) -> Option<Diagnosed> {
     let fit = model.fit?;
     let label_n: Vec<f64> = measured.pulls.iter().map(|pull| pull.max_pull_force_n).collect();
-    let (before_n, after_n) = rms_errors_n(&label_n, &fits.heldout_label_n[1], &fit.heldout_label_n[1]);
+    let error_n = rms_error_n(&label_n, &fits.heldout_label_n[1]);
     let names = search.effects.iter().map(|e| e.name.clone());
     let unknown = search.unknown.iter().map(|u| u.covariate.clone());
     let names: Vec<String> = names.chain(unknown).collect();
     let mut diagnosis = model.diagnosis;
     diagnosis.notes.push(format!(
-        "effects of the library describe these pulls less well than one smooth model: {} N against {} N on held-out pulls{}",
-        rounded(before_n, &[]),
-        rounded(after_n, &[]),
+        "effects of the library describe these pulls less well than one smooth model: {} N on held-out pulls, outliers among them{}",
+        rounded(error_n, &[]),
         if names.is_empty() { String::new() } else { format!(" (they would be {})", names.join(", ")) },
     ));
     diagnosis.would_have_seen.clone_from(&search.would_have_seen);
