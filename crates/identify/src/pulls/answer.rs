@@ -9,6 +9,7 @@ use super::estimates::baseline;
 use super::fitting::Fitted;
 use super::heldout::{HeldOutScore, by_value, folds, held_out_score, noise_floor_n, predicted, scatter};
 use super::instead::tied_instead;
+use super::label_noise::log_noise_prior;
 use super::naming::named;
 use super::not_described::not_described;
 use super::one_level::of_one_level;
@@ -86,6 +87,11 @@ pub struct PullOptions<'a> {
 }
 
 /// Diagnoses a campaign from a baseline. `progress` is told the share that is done.
+///
+/// Without traces, much noise of the readings explains what a law of the load would: noisy readings raise small labels. The noise is fitted
+/// before effects compete, so where labels say that there is more of it than the twin does, they compete with the noise of the twin, too.
+/// The answer is the one with the higher score: likelihood and prior of the noise, half the logarithm of the pulls off for each parameter,
+/// the logarithm of the number of effects off for each that is named.
 pub fn diagnose_pulls(
     measured: &MeasuredPulls,
     predictor: &dyn PredictPulls,
@@ -93,13 +99,40 @@ pub fn diagnose_pulls(
     options: &PullOptions<'_>,
     progress: &(dyn Fn(f64) + Sync),
 ) -> PullAnswer {
+    let (noisy, noise90_n) =
+        diagnose_with(measured, predictor, given, options, false, &|x| progress(0.5 * x));
+    if noise90_n.is_none_or(|(low_n, _)| low_n <= given.noise_n) {
+        progress(1.0);
+        return noisy;
+    }
+    let (quiet, _) = diagnose_with(measured, predictor, given, options, true, &|x| progress(0.5 + 0.5 * x));
+    let score = |answer: &PullAnswer| {
+        let fits = answer.fits.as_ref()?;
+        let away = libm::log(fits.after.model.noise_n / given.noise_n);
+        let named = (answer.diagnosis.effects.len() + answer.diagnosis.unknown.len()) as f64;
+        let of_names = named * libm::log((fits.candidates.len() + fits.curve_names.len()) as f64);
+        Some(fits.after.score(measured.pulls.len()) + log_noise_prior(away) - of_names)
+    };
+    if score(&quiet) > score(&noisy) { quiet } else { noisy }
+}
+
+/// A diagnosis, and the 90 % interval of the noise where labels alone say it; `knows_noise`: the noise is that of the twin.
+fn diagnose_with(
+    measured: &MeasuredPulls,
+    predictor: &dyn PredictPulls,
+    given: &PullModel,
+    options: &PullOptions<'_>,
+    knows_noise: bool,
+    progress: &(dyn Fn(f64) + Sync),
+) -> (PullAnswer, Option<(f64, f64)>) {
     let data = PullData::new(measured);
     let mut diagnosis = blank(&data);
     if let Some(missing) = insufficient(&data) {
         diagnosis.notes.push(missing);
-        return PullAnswer { diagnosis, fits: None };
+        return (PullAnswer { diagnosis, fits: None }, None);
     }
     let mut context = Context::new(&data, predictor, given);
+    context.knows_noise = knows_noise;
     let rows: Vec<usize> = (0..data.len()).collect();
     context.see_tails(&rows);
     context.learn_lag(&rows);
@@ -115,13 +148,13 @@ pub fn diagnose_pulls(
         diagnosis
             .notes
             .push("nothing was varied: there is no covariate that the force could depend on".into());
-        return PullAnswer { diagnosis, fits: None };
+        return (PullAnswer { diagnosis, fits: None }, None);
     }
     let Some((before, accepted)) = search.run(&|share| progress(0.8 * share)) else {
         diagnosis
             .notes
             .push("the labels cannot be predicted at all: is the unit of the forces newton?".into());
-        return PullAnswer { diagnosis, fits: None };
+        return (PullAnswer { diagnosis, fits: None }, None);
     };
     let repetitions = folds(data.len());
     let fast_before = predicted(&context, &before, &repetitions, false);
@@ -296,7 +329,7 @@ pub fn diagnose_pulls(
         heldout_label_n: heldout,
         label_n: labels,
     };
-    PullAnswer { diagnosis, fits: Some(fits) }
+    (PullAnswer { diagnosis, fits: Some(fits) }, context.noise90_n)
 }
 
 /// What is said of a residual that was learnt.

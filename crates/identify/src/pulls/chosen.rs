@@ -1,11 +1,8 @@
 //! Curves that are chosen among many by what they explain: a sine of one frequency, a curve at one word.
 
-use super::curves::{Curve, SESSION, hinges};
+use super::curves::{Curve, MIN_STEP, PART, SESSION, hinges};
 use super::data::{Column, PullData};
 use nalgebra::{DMatrix, DVector};
-
-/// Column of the parts, each of which has a friction of its own.
-const PART: &str = "part";
 
 /// Sines of many frequencies over a clock (Lomb 1976): at least one and a half cycles, at most one in four pulls.
 pub struct Waves {
@@ -73,22 +70,30 @@ const MIN_OF_WORD: usize = 8;
 /// Fewest pulls of a session that show one: a session of a handful of pulls has no slope of its own.
 const MIN_OF_SESSION: usize = 16;
 
-/// Curves in a column of numbers at one word of another column each: something that acts in one session, on one part. The choice of the pair and
-/// that of the word are paid for like a parameter each.
+/// Curves in a column at one word of another column each: something that acts in one session, on one part; of words the steps between them. The
+/// choice of the pair and that of the word cost a parameter each.
 fn at_each_word(data: &PullData<'_>, name: &str, other: &str) -> Vec<Curve> {
-    let (Some(Column::Word(at, words)), Some(x)) = (data.columns.get(other), data.numbers(name)) else {
+    let (Some(Column::Word(at, words)), Some(column)) = (data.columns.get(other), data.columns.get(name))
+    else {
         return vec![];
     };
+    let n = at.len();
     let least = if other == SESSION { MIN_OF_SESSION } else { MIN_OF_WORD };
     let of = |word: usize| {
-        let rows: Vec<usize> = (0..x.len()).filter(|&i| at[i] == word).collect();
-        let own: Vec<f64> = rows.iter().map(|&i| x[i]).collect();
-        let enough = rows.len() >= least && x.len() - rows.len() >= least;
-        if !enough || own.iter().all(|v| *v == own[0]) {
+        let rows: Vec<usize> = (0..n).filter(|&i| at[i] == word).collect();
+        if rows.len() < least || n - rows.len() < least {
             return None;
         }
         // Friction has a level for each part already.
-        let basis = basis_at(&rows, &own, x.len(), other != PART);
+        let level = other != PART;
+        let basis = match column {
+            Column::Number(x) => {
+                let own: Vec<f64> = rows.iter().map(|&i| x[i]).collect();
+                let varies = own.iter().any(|v| *v != own[0]);
+                varies.then(|| basis_at(&rows, &own, n, level))?
+            }
+            Column::Word(own, names) => steps_at(&rows, own, names.len(), n, level)?,
+        };
         Some(Curve {
             name: format!("{name}*{other}"),
             additive: false,
@@ -123,6 +128,17 @@ pub fn chosen_from(curve: &Curve, data: &PullData<'_>) -> Vec<Curve> {
             .map_or(vec![], |waves| (0..waves.pairs.len()).map(|k| waves.curve(number, k)).collect()),
         _ => vec![curve.clone()],
     }
+}
+
+/// Steps between words at some rows, and nothing elsewhere; with `level` a step to these rows as well.
+fn steps_at(rows: &[usize], at: &[usize], words: usize, n: usize, level: bool) -> Option<Vec<Vec<f64>>> {
+    let count = |word: usize| rows.iter().filter(|&&i| at[i] == word).count();
+    let known = (0..words).filter(|&word| count(word) >= MIN_STEP);
+    let steps: Vec<usize> = known.skip(usize::from(!level)).collect();
+    let row = |i: usize| steps.iter().map(|word| f64::from(u8::from(at[i] == *word))).collect();
+    let mut basis = vec![vec![0.0; steps.len()]; n];
+    rows.iter().for_each(|&i| basis[i] = row(i));
+    (steps.len() > usize::from(level)).then_some(basis)
 }
 
 /// A line with a bend at the rows of a word whose values are `own`, and nothing elsewhere; with `level` a step to it as well.

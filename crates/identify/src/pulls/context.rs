@@ -69,6 +69,8 @@ pub struct Context<'a> {
     pub given_damping_n_s_per_m: f64,
     /// How heavy the tails of its residuals are.
     pub tails: Tails,
+    /// Whether the noise of a reading is that of the twin, whatever labels alone would say.
+    pub knows_noise: bool,
     /// 90 % interval of the noise of a reading, where labels alone say it.
     pub noise90_n: Option<(f64, f64)>,
     /// Whether lag and dead time are fitted with friction alone, which is slow.
@@ -120,6 +122,7 @@ impl<'a> Context<'a> {
             given: (given.lag_s, given.dead_time_s, given.kinetic_ratio),
             given_damping_n_s_per_m: given.damping_n_s_per_m,
             tails: Tails::FEW,
+            knows_noise: false,
             noise90_n: None,
             base,
             free_lag: false,

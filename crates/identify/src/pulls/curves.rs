@@ -5,11 +5,14 @@ use super::data::{Column, PullData};
 /// The column whose words do not come back.
 pub(crate) const SESSION: &str = "session";
 
+/// The column of parts, each of which has a friction of its own.
+pub(super) const PART: &str = "part";
+
 /// The columns that tell when a pull was made, the finer one first.
 pub(crate) const CLOCKS: [&str; 2] = ["time_s", "pull_index"];
 
 /// Fewest pulls with a word that show a step of it: two pulls that lie far off are two bad pulls.
-const MIN_STEP: usize = 3;
+pub(super) const MIN_STEP: usize = 3;
 
 /// A dependence of friction on a column that no effect explains.
 #[derive(Debug, Clone, PartialEq)]

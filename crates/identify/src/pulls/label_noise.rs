@@ -44,7 +44,9 @@ type Tried = (f64, f64, PullModel);
 impl Context<'_> {
     /// The baseline with lag, dead time, damping and noise that labels say, and the 90 % interval of the noise (profile likelihood).
     pub(super) fn noise_of_labels(&self, rows: &[usize]) -> Option<(PullModel, (f64, f64))> {
-        let given = libm::log(self.base.noise_n.clamp(TRIED_N[0], TRIED_N[TRIED_N.len() - 1]));
+        let given_n = self.base.noise_n.clamp(TRIED_FROM_N, TRIED_TO_N);
+        let given = libm::log(given_n);
+        let noises = if self.knows_noise { vec![given_n] } else { TRIED_N.to_vec() };
         // Fits with lag and dead time free are most of what a diagnosis of labels takes: but for the first, each begins at one that is
         // near, and threads share them.
         let at = |log_noise: f64, damping_n_s_per_m: f64, near: Option<&PullModel>| {
@@ -54,15 +56,15 @@ impl Context<'_> {
                 Some(_) => self.fit_near(&start, &Terms::default(), rows)?,
                 None => self.fit(&start, &Terms::default(), rows)?,
             };
-            let noisy = (log_noise - given) / KNOWN;
+            let noisy = log_noise_prior(log_noise - given);
             let damped = libm::log(damping_n_s_per_m / self.given_damping_n_s_per_m) / DAMPED;
-            let score = found.likelihood.log - found.trace_cost - 0.5 * (noisy * noisy + damped * damped);
+            let score = found.likelihood.log - found.trace_cost + noisy - 0.5 * damped * damped;
             Some((log_noise, score, found.model))
         };
         let all = |places: &[(usize, f64)], near: &[Tried]| -> Vec<Tried> {
             let slots: Vec<Mutex<Option<Tried>>> = places.iter().map(|_| Mutex::new(None)).collect();
             self.predictor.for_each(slots.len(), &|k| {
-                let log_noise = libm::log(TRIED_N[places[k].0]);
+                let log_noise = libm::log(noises[places[k].0]);
                 let from = |t: &&Tried| (t.0 - log_noise).abs();
                 let near = near.iter().min_by(|a, b| from(a).total_cmp(&from(b)));
                 let found = at(log_noise, places[k].1, near.map(|t| &t.2));
@@ -73,18 +75,18 @@ impl Context<'_> {
             slots.into_iter().filter_map(|slot| slot.into_inner().ok().flatten()).collect()
         };
         let given_damping = self.given_damping_n_s_per_m;
-        let noise_of = |t: &Tried| TRIED_N.iter().position(|noise_n| libm::log(*noise_n) == t.0);
+        let noise_of = |t: &Tried| noises.iter().position(|noise_n| libm::log(*noise_n) == t.0);
         let most_likely = |tried: &[Tried]| tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)).cloned();
-        let away = |k: &usize| (libm::log(TRIED_N[*k]) - given).abs();
-        let first = (0..TRIED_N.len()).min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let away = |k: &usize| (libm::log(noises[*k]) - given).abs();
+        let first = (0..noises.len()).min_by(|a, b| away(a).total_cmp(&away(b)))?;
         let mut tried = all(&[(first, given_damping)], &[]);
-        let others = (0..TRIED_N.len()).filter(|k| *k != first).map(|k| (k, given_damping));
+        let others = (0..noises.len()).filter(|k| *k != first).map(|k| (k, given_damping));
         tried.extend(all(&others.collect::<Vec<_>>(), &tried));
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         if !self.predictor.winds_up() {
             let noise = noise_of(&most_likely(&tried)?)?;
             let lighter = DAMPINGS_N_S_PER_M.into_iter().filter(|d| *d < given_damping);
-            let places = lighter.flat_map(|d| NOISIER.map(|k| ((noise + k).min(TRIED_N.len() - 1), d)));
+            let places = lighter.flat_map(|d| NOISIER.map(|k| ((noise + k).min(noises.len() - 1), d)));
             tried.extend(all(&places.collect::<Vec<_>>(), &tried));
         }
         let near = most_likely(&tried)?;
@@ -96,7 +98,7 @@ impl Context<'_> {
         tried.retain(|t| t.2.damping_n_s_per_m == damping);
         let known: Vec<usize> = tried.iter().filter_map(noise_of).collect();
         if damping != given_damping {
-            let others = (0..TRIED_N.len()).filter(|k| !known.contains(k));
+            let others = (0..noises.len()).filter(|k| !known.contains(k));
             tried.extend(all(&others.map(|k| (k, damping)).collect::<Vec<_>>(), &tried));
             tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
@@ -113,6 +115,11 @@ impl Context<'_> {
         let high = end(profile.iter().filter(|t| t.0 > log_noise), log_noise);
         Some((model, (libm::exp(low), libm::exp(high))))
     }
+}
+
+/// What is believed of a noise: the logarithm of its density, by how far its logarithm is from that of the twin's.
+pub(super) fn log_noise_prior(away: f64) -> f64 {
+    -0.5 * (away / KNOWN) * (away / KNOWN)
 }
 
 /// Where the parabola through three points is highest.

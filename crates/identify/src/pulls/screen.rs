@@ -25,6 +25,22 @@ pub fn test(data: &PullData<'_>, fitted: &Fitted, residuals: &[f64], curve: &Cur
     // Neighbours that remember each other move together.
     let length = if fitted.likelihood.memory > REMEMBERS { BLOCK } else { 1 };
     let blocks: Vec<usize> = (0..data.len()).map(|i| i / length).collect();
+    // Steps between words at one word of another column are tested there, where all of them are.
+    let steps = curve.name.split_once('*').zip(curve.only.as_ref()).and_then(|((name, _), (other, word))| {
+        let (Column::Word(steps, _), Column::Word(at, words)) =
+            (data.columns.get(name)?, data.columns.get(other)?)
+        else {
+            return None;
+        };
+        let own: Vec<usize> = (0..data.len()).filter(|&i| words.get(at[i]) == Some(word)).collect();
+        let residuals: Vec<f64> = own.iter().map(|&i| residuals[i]).collect();
+        let steps = Covariate::Word(own.iter().map(|&i| steps[i] as u32).collect());
+        let blocks: Vec<usize> = own.iter().map(|&i| blocks[i]).collect();
+        Some(dependence(&residuals, &[], &steps, &blocks, PERMUTATIONS, 1))
+    });
+    if let Some(steps) = steps {
+        return steps;
+    }
     match curve.name.split_once('*') {
         Some((a, b)) => interaction(residuals, &[], (&column(a), &column(b)), &blocks, PERMUTATIONS, 1),
         None if curve.wave => {

@@ -4,7 +4,8 @@
 use super::candidates::Candidate;
 use super::chosen::{at_one_word, periodic};
 use super::context::Context;
-use super::curves::{CLOCKS, Curve, curves_in, product};
+use super::curves::{CLOCKS, Curve, PART, SESSION, curves_in, product};
+use super::data::Column;
 use super::fitting::Fitted;
 use super::terms::Terms;
 use super::written::Written;
@@ -125,8 +126,8 @@ impl<'a> Search<'a> {
         let mut numbers = Vec::new();
         for (name, column) in &data.columns {
             let distinct = column.distinct();
-            let words = matches!(column, super::data::Column::Word(..));
-            if name == "part" || distinct < 2 || (words && distinct * 4 > n) {
+            let words = matches!(column, Column::Word(..));
+            if name == PART || distinct < 2 || (words && distinct * 4 > n) {
                 continue;
             }
             for curve in curves_in(name, column) {
@@ -150,10 +151,18 @@ impl<'a> Search<'a> {
             }
         }
         if let Some(residuals) = residuals.filter(|_| n >= MIN_OF_PRODUCT) {
-            for (name, column) in &data.columns {
-                let words = matches!(column, super::data::Column::Word(..)) && column.distinct() <= MAX_WORDS;
-                for number in numbers.iter().filter(|_| words) {
+            let few = |column: &Column| matches!(column, Column::Word(..)) && column.distinct() <= MAX_WORDS;
+            let words: Vec<&String> =
+                data.columns.iter().filter(|(_, column)| few(column)).map(|(name, _)| name).collect();
+            for (k, name) in words.iter().enumerate() {
+                for number in &numbers {
                     curves.extend(at_one_word(data, number, name, &residuals));
+                }
+                // Sessions differ from each other in their own way: see `session`.
+                let others = words[k + 1..].iter().filter(|other| *name != SESSION && **other != SESSION);
+                for other in others {
+                    let (steps, at) = if *name == PART { (other, name) } else { (name, other) };
+                    curves.extend(at_one_word(data, steps, at, &residuals));
                 }
             }
         }

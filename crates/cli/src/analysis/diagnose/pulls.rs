@@ -338,8 +338,9 @@ fn table(
     let target = if curve.additive { "offset_n" } else { "factor" };
     match column {
         Column::Word(at, words) => {
-            let own = |w: usize| at.iter().position(|&k| k == w).map(value);
-            let values: Option<Vec<f64>> = (0..words.len()).map(own).collect();
+            let of_word =
+                |w: usize| own.iter().copied().find(|&i| at[i] == w).map_or(Some(1.0), |i| Some(value(i)));
+            let values: Option<Vec<f64>> = (0..words.len()).map(of_word).collect();
             parameters.insert(
                 "words".into(),
                 toml::Value::Array(words.iter().cloned().map(toml::Value::String).collect()),

@@ -1,0 +1,1 @@
+"""Peers of `gripgen diagnose` on the campaigns of `research/blind`."""
