@@ -35,17 +35,17 @@ pub(crate) fn simulated_at(
     sets: &[(&str, &str)],
     options: CampaignOptions,
 ) -> MeasuredPulls {
-    simulated_of(effects, sets, CampaignOptions { parts: vec!["long_shaft".into()], pulls, ..options })
+    simulated_of(effects, sets, &CampaignOptions { parts: vec!["long_shaft".into()], pulls, ..options })
 }
 
 /// A campaign of several parts in which nothing acts.
 pub(crate) fn simulated_parts(parts: Vec<String>, pulls: usize) -> MeasuredPulls {
-    simulated_of("", &[], CampaignOptions { parts, pulls, ..CampaignOptions::default() })
+    simulated_of("", &[], &CampaignOptions { parts, pulls, ..CampaignOptions::default() })
 }
 
-fn simulated_of(effects: &str, sets: &[(&str, &str)], options: CampaignOptions) -> MeasuredPulls {
+fn simulated_of(effects: &str, sets: &[(&str, &str)], options: &CampaignOptions) -> MeasuredPulls {
     let (_folder, file) = twin_with(effects);
-    let campaign = plan_campaign(&options).unwrap();
+    let campaign = plan_campaign(options).unwrap();
     simulate_campaign(&Location::Disk(file), &overrides(sets), &campaign, 7).unwrap().pulls
 }
 
