@@ -66,6 +66,9 @@ fn unknown(d: &Diagnosis) -> String {
     match names.as_slice() {
         [] => "nothing that was written down".into(),
         [one] => one.clone(),
+        [first @ .., last] if names.iter().any(|name| name.contains(' ')) => {
+            format!("{}; and with {last}", first.join("; with "))
+        }
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }

@@ -92,12 +92,13 @@ pub fn diagnose_by_model(
 }
 
 /// Describes a campaign from a baseline by a smooth process over its columns, in which nothing has a name. There is no fit where `other_n`,
-/// labels that something else predicts for held-out pulls, are not worse.
+/// labels that something else predicts for held-out pulls before and after what it found was added, are not worse after it. Its error before is then that
+/// of the same predictions.
 pub fn describe_by_process(
     measured: &MeasuredPulls,
     predictor: &dyn PredictPulls,
     given: &PullModel,
-    other_n: Option<&[f64]>,
+    other_n: Option<[&[f64]; 2]>,
 ) -> ModelAnswer {
     diagnose(measured, predictor, given, None, other_n, &|_| {})
 }
@@ -108,7 +109,7 @@ fn diagnose(
     predictor: &dyn PredictPulls,
     given: &PullModel,
     without: Option<&[&str]>,
-    other_n: Option<&[f64]>,
+    other_n: Option<[&[f64]; 2]>,
     progress: &(dyn Fn(f64) + Sync),
 ) -> ModelAnswer {
     let data = PullData::new(measured);
@@ -167,7 +168,7 @@ fn diagnose(
     if let Some(other_n) = other_n {
         // Like with like: the other prediction keeps what it chose with all pulls, too.
         let own_n = heldout_n(&data, &setting, &fit, None, &repetitions);
-        if !instead || nothing > BY_CHANCE || !predicts_better(&data.label_n, other_n, &own_n) {
+        if !instead || nothing > BY_CHANCE || !predicts_better(&data.label_n, other_n[1], &own_n) {
             return ModelAnswer { diagnosis, fit: None };
         }
     }
@@ -191,6 +192,8 @@ fn diagnose(
         (0..data.len()).filter(|&i| wider[i] > 1.0).map(|i| measured.pulls[i].id.clone()).collect();
     let heldout = [(&setting.plain, None), (&fit, Some(&process).filter(|_| !fit.process.is_empty()))]
         .map(|(fit, process)| heldout_n(&data, &setting, fit, process, &repetitions));
+    let [before, after_n] = heldout;
+    let heldout = [other_n.map_or(before, |other_n| other_n[0].to_vec()), after_n];
     let all: Vec<usize> = (0..data.len()).collect();
     let scatter = libm::exp(fit.gaussian.log_noise[0]);
     let sd_n: Vec<f64> = all.iter().map(|&i| libm::hypot(scatter * data.label_n[i], given.noise_n)).collect();

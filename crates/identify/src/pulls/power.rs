@@ -175,6 +175,10 @@ impl<'a> ScoreTest<'a> {
 
     /// The detectable size of an effect beside the model; `None` where the campaign cannot show it at any physical size.
     pub fn detectable(&self, candidate: &Candidate) -> Option<Detectable> {
+        // A little of such an effect does nothing: no slope says from where on it would be seen.
+        if candidate.spec.pulls.is_ok_and(|fit| fit.flat_at_neutral) {
+            return None;
+        }
         let size = candidate.size();
         let p = &candidate.spec.parameters[size];
         let step = 0.2 * candidate.free.first()?.1;

@@ -48,7 +48,8 @@ mod tests {
     #[test]
     fn each_zeroing_takes_off_what_there_is() {
         let mut count = PullCount::default();
-        let pulls = [(0.0, "a", 0.0), (1800.0, "a", 0.0), (7200.0, "b", 0.0), (9000.0, "b", 1.0), (9900.0, "b", 0.0)];
+        let pulls =
+            [(0.0, "a", 0.0), (1800.0, "a", 0.0), (7200.0, "b", 0.0), (9000.0, "b", 1.0), (9900.0, "b", 0.0)];
         let zeros = pulls.map(|(time_s, session, zeroed)| {
             let mut pull = Covariates { time_s, session: session.into(), ..Covariates::default() };
             pull.extra.insert("zeroed".into(), Drawn::Number(zeroed));

@@ -184,7 +184,8 @@ pub fn diagnose_pull_table(
     if options.engine == Engine::Auto
         && let Some(fits) = &answer.fits
     {
-        let model = describe_by_process(measured, &predictor, &given, Some(&fits.heldout_label_n[1]));
+        let other_n = fits.heldout_label_n.each_ref().map(Vec::as_slice);
+        let model = describe_by_process(measured, &predictor, &given, Some(other_n));
         let instead = model_instead(model, &answer.diagnosis, fits, measured, predictor.part_names());
         if let Some(mut found) = instead {
             found.diagnosis.notes.extend(without_its_effects(twin));

@@ -82,7 +82,10 @@ fn in_short(diagnosis: &Diagnosis, notes: &[String], next: &[(String, String)]) 
     let plain = diagnosis.plain.as_deref().unwrap_or(word);
     let _ = writeln!(text, "{plain}");
     let names: Vec<String> = diagnosis.effects.iter().map(with_values).collect();
-    let unknown = diagnosis.unknown.iter().map(|u| format!("a curve in {}", u.in_words()));
+    let unknown = diagnosis.unknown.iter().map(|u| match u.covariate.contains('*') {
+        true => format!("what {} do", u.in_words()),
+        false => format!("a curve in {}", u.covariate),
+    });
     let names: Vec<String> = names.into_iter().chain(unknown).collect();
     let names = if names.is_empty() { String::new() } else { format!(": {}", names.join("; ")) };
     let _ = writeln!(text, "verdict: {word}{names}");
