@@ -2,6 +2,7 @@
 //! as the formulas of their specs; how they are put together, the arm, the loop, the bristles and the label are written anew.
 
 use gripgen::twin::config::Feedback;
+use gripgen::twin::draw::Drawn;
 use gripgen::twin::effects::{GripPoint, OutsideFit, Per, SensorMemory, SensorPoint};
 use gripgen::twin::{Jaw, MeasuredPull, PerJaw, PullSettings, Scenario, Twin};
 use gripgen::{Library, press_only};
@@ -109,8 +110,12 @@ pub fn label_n(twin: &Twin, library: &Library, pull: &MeasuredPull, stop_m: f64,
     let side = if pull.covariates.pull_direction < 0.0 { -1.0 } else { 1.0 };
     let acting: Vec<_> = twin.effects.iter().filter(|e| e.acts_on(&pull.part)).collect();
     let mut memory = vec![SensorMemory::default(); acting.len()];
+    let zeroed_s = match pull.covariates.extra.get("since_zero_s") {
+        Some(Drawn::Number(seconds)) => *seconds,
+        _ => pull.covariates.time_s,
+    };
     let mut read = |force_n: f64, t: f64, step_s: f64| {
-        let at = SensorPoint { clock_s: pull.covariates.time_s + t, since_zero_s: t, step_s };
+        let at = SensorPoint { clock_s: pull.covariates.time_s + t, since_zero_s: zeroed_s + t, step_s };
         let mut f = side * force_n;
         for (e, memory) in acting.iter().zip(&mut memory) {
             f = e.spec.sensor.map_or(f, |hook| hook(&e.values, f, memory, &at));

@@ -165,12 +165,13 @@ fn diagnose(
     }
     said(&data, &candidates, &setting.search, &fit, &mut diagnosis);
     let repetitions = folds(data.len());
-    if let Some(other_n) = other_n {
-        // Like with like: the other prediction keeps what it chose with all pulls, too.
-        let own_n = heldout_n(&data, &setting, &fit, None, &repetitions);
-        if !instead || nothing > BY_CHANCE || !predicts_better(&data.label_n, other_n[1], &own_n) {
-            return ModelAnswer { diagnosis, fit: None };
-        }
+    // Like with like: the other prediction keeps what it chose with all pulls, too.
+    let better = |setting: &Setting, fit: &Fit| {
+        let own_n = || heldout_n(&data, setting, fit, None, &repetitions);
+        other_n.is_none_or(|other_n| predicts_better(&data.label_n, other_n[1], &own_n()))
+    };
+    if other_n.is_some() && (!instead || nothing > BY_CHANCE || !better(&setting, &fit)) {
+        return ModelAnswer { diagnosis, fit: None };
     }
     for _ in 0..CORRECTED {
         let above_n = above_fast_n(&data, predictor, &candidates, &setting, &fit);
@@ -180,6 +181,9 @@ fn diagnose(
         let again = setting.search.refitted(&fit).zip(setting.search.plain());
         let Some((next, plain)) = again else { break };
         (fit, setting.plain) = (next, plain);
+    }
+    if !better(&setting, &fit) {
+        return ModelAnswer { diagnosis, fit: None };
     }
     let mut after = model_of(&data, &candidates, &setting, &fit);
     let mut learnt = learnt(&data, &setting.search, &fit);

@@ -160,16 +160,16 @@ impl Process {
         (process, best)
     }
 
-    /// The same kind of process fitted to other weights of the pulls: its constants are sought again, near those that it has.
+    /// The same kind of process fitted to other weights of the pulls: its constants are sought again, near those that it has in `fit`.
     pub(super) fn again(&self, data: &PullData<'_>, search: &Search, fit: &Fit) -> Option<Fit> {
-        let mut fit = search.only(fit, &vec![true; fit.chosen.len()])?;
-        if self.load.is_some() {
-            let each =
-                load_blocks(data).into_iter().filter_map(|(blocks, _)| search.with_process(&fit, blocks));
-            let evidence = |fit: &Fit| fit.gaussian.log_evidence;
-            fit = each.reduce(|a, b| if evidence(&b) > evidence(&a) { b } else { a })?;
-        }
-        let Some(joint) = &self.joint else { return Some(fit) };
+        let evidence = |fit: &Fit| fit.gaussian.log_evidence;
+        let laws = load_blocks(data).into_iter().filter(|_| self.load.is_some());
+        let laws = laws.filter_map(|(blocks, _)| search.with_process(fit, blocks));
+        let law = laws.reduce(|a, b| if evidence(&b) > evidence(&a) { b } else { a });
+        let Some(joint) = &self.joint else { return law };
+        // Its deviations start from those of the whole fit, the joint one among them.
+        let process = law.map_or(vec![], |law| law.process);
+        let fit = Fit { process, ..fit.clone() };
         let lengths = Lengths { data, search, fit: &fit, axes: axes(data), of_column: 0.0 };
         let (_, own, now) = lengths.climbed(joint.lengths.clone(), 1);
         Some(lengths.fitted(&own, POINTS[1], &now)?.0)

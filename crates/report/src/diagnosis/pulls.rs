@@ -134,6 +134,8 @@ fn residual(measured: &MeasuredPulls, predictions: Predictions<'_>, name: &str) 
 /// The name of a column in words, with the unit that its name ends in.
 fn axis_label(name: &str) -> String {
     let units = [
+        ("_mm_per_s", "mm/s"),
+        ("_n_per_s", "N/s"),
         ("_n", "N"),
         ("_mm", "mm"),
         ("_s", "s"),
@@ -293,6 +295,12 @@ fn worst(measured: &MeasuredPulls, predictions: Predictions<'_>) -> Vec<WorstRow
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_column_is_labelled_with_its_unit() {
+        let labels = ["grip_force_n", "speed_mm_per_s", "dwell_s", "operator"].map(axis_label);
+        assert_eq!(labels, ["grip force, N", "speed, mm/s", "dwell, s", "operator"]);
+    }
 
     #[test]
     fn what_predicts_as_well_as_the_named_effect_is_not_worse() {
