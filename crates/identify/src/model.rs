@@ -11,6 +11,7 @@ mod labels;
 mod naming;
 mod process;
 mod search;
+mod settings;
 mod sizes;
 mod tables;
 mod terms;

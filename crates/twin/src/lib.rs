@@ -48,6 +48,7 @@ mod patch;
 pub mod plant;
 mod posterior;
 pub mod predict;
+mod pull_count;
 pub mod random;
 mod rounded;
 mod sample;
@@ -68,10 +69,7 @@ pub use image::TactileImage;
 pub use image::film::{CameraStamp, CellShear, FilmFrame, FilmPace, SlipState};
 pub use jaw::{Jaw, PerJaw};
 pub use label::{LabelError, PullEnd, SlipLabel, slip_label};
-pub use measured::{
-    ExtraColumn, MeasuredPull, MeasuredPulls, POSSIBLE_LABEL_RATIO, PULLS_SINCE_REST, PullCount, SINCE_ZERO,
-    ZEROED, median_label_ratio,
-};
+pub use measured::{ExtraColumn, MeasuredPull, MeasuredPulls, POSSIBLE_LABEL_RATIO, median_label_ratio};
 pub use mesh::{
     EXTENT_RANGE_M, MAX_TRIANGLES, MESH_FORMATS, MeshError, MeshLook, TriMesh, usual_scale_mm_per_unit,
     write_binary_stl,
@@ -79,6 +77,7 @@ pub use mesh::{
 pub use optics::{BACKGROUND_TERMS, FINER_TERMS, OpticsState};
 pub use patch::{ContactPatch, PressureCell};
 pub use posterior::{CAUSE_KEY, Posterior, PosteriorDraw, PosteriorError};
+pub use pull_count::{PULLS_SINCE_REST, PullCount, SINCE_ZERO, ZEROED};
 pub use rounded::rounded;
 pub use sample::{ImprintSummary, Outcome, Pulled, Sample};
 pub use scenario::keys::{can_be_drawn, is_own_column, pull_keys, scenario_keys};

@@ -1,12 +1,12 @@
 //! From a campaign to an answer: what is said, the twin that follows, and its error on pulls that the fit has not seen.
 
-use super::gaussian::{Gaussian, Measured};
-use super::heldout::{BY_CHANCE, above_fast_n, expected_n, heldout_n, predicts_better};
-use super::labels::LabelCurves;
+use super::gaussian::Gaussian;
+use super::heldout::{BY_CHANCE, above_fast_n, expected_n, heldout_n, model_of, predicts_better};
 use super::naming::{said, sure, tied, together};
 use super::process::{Added, Process};
 use super::search::{Fit, Search};
-use super::sizes::{amplitude_of, scaled, shape_of, values_of};
+use super::settings::{Setting, settings};
+use super::sizes::{amplitude_of, shape_of, values_of};
 use super::tables::{LearntTable, tables};
 use super::terms::{Kind, all_terms, effect_shape};
 use crate::diagnosis::{Diagnosis, ErrorReport, ErrorsBy, ParameterEstimate};
@@ -16,18 +16,10 @@ use crate::pulls::context::Context;
 use crate::pulls::data::PullData;
 use crate::pulls::error_interval::{Judged, errors};
 use crate::pulls::heldout::{folds, noise_floor_n};
-use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel};
-use gripgen_twin::values::median;
+use gripgen_twin::predict::{PredictPulls, PullModel};
 use gripgen_twin::{MeasuredPulls, Surface};
 use std::collections::BTreeMap;
 
-/// Kinetic ratios that are tried. What is believed of them: 1/2 to 1 for rough contacts (Farkas 2005, cond-mat/0502644), areas that fall by
-/// up to 30 % before the slip (Sahli 2018, 10.1073/pnas.1706434115); 0.84 with a deviation of 0.09.
-const RATIOS: [f64; 7] = [1.0, 0.95, 0.9, 0.84, 0.78, 0.7, 0.6];
-const RATIO: (f64, f64) = (0.84, 0.09);
-
-/// Scatter that a twin holds.
-const MOST_SCATTER: f64 = 0.3;
 /// Times that labels are corrected for what the simulator says of the fitted model.
 const CORRECTED: usize = 2;
 /// Searches at most, each from the refined model of the one before.
@@ -59,25 +51,6 @@ pub struct ModelFit {
     pub label_n: [Vec<f64>; 2],
     /// How far each pull is from what the others say of it, in standard deviations.
     pub deviations: Vec<f64>,
-}
-
-/// Labels of one setting of the label rule with the search over them.
-pub(super) struct Setting {
-    pub(super) curves: LabelCurves,
-    log_prior: f64,
-    pub(super) search: Search,
-    plain: Fit,
-    /// What labels of the simulator lie above those of the curves, near the model that is fitted.
-    pub(super) above_n: Vec<f64>,
-}
-
-impl Setting {
-    /// Takes the labels, less what the simulator adds to them, as linear about those of these logarithms of friction.
-    fn look_near(&mut self, label_n: &[f64], z: &[f64]) {
-        let own: Vec<f64> = label_n.iter().zip(&self.above_n).map(|(y, above)| y - above).collect();
-        let wider = std::mem::replace(&mut self.search.measured.wider, nalgebra::DVector::zeros(0));
-        self.search.measured = Measured { wider, ..self.curves.measured_near(&own, z) };
-    }
 }
 
 /// Diagnoses a campaign from a baseline. `progress` is told the share that is done.
@@ -228,42 +201,6 @@ fn diagnose(
     ModelAnswer { diagnosis, fit: Some(fit) }
 }
 
-/// A setting of the label rule, and how well parts alone explain the labels with it.
-fn setting(
-    data: &PullData<'_>,
-    predictor: &dyn PredictPulls,
-    given: &PullModel,
-    ratio: f64,
-) -> Option<Setting> {
-    let model = PullModel { kinetic_ratio: ratio, ..given.clone() };
-    let curves = LabelCurves::new(predictor, &model, data.len());
-    let search = Search::new(data, curves.measured(&data.label_n), vec![]);
-    let plain = search.plain()?;
-    let far = (ratio - RATIO.0) / RATIO.1;
-    Some(Setting { curves, log_prior: -0.5 * far * far, search, plain, above_n: vec![0.0; data.len()] })
-}
-
-/// The settings from which a search starts. With traces (`seen`), that of the kinetic ratio that they show, or else the best one. Without,
-/// that in which the force does not fall after the slip, and the best other one; the lag is that of the twin.
-fn settings(
-    data: &PullData<'_>,
-    predictor: &dyn PredictPulls,
-    given: &PullModel,
-    seen: bool,
-    ratio: Option<f64>,
-) -> Vec<Setting> {
-    let best = |found: Vec<Setting>| {
-        let score = |s: &Setting| s.plain.score + s.log_prior;
-        found.into_iter().reduce(|a, b| if score(&b) > score(&a) { b } else { a })
-    };
-    let over =
-        |ratios: &[f64]| best(ratios.iter().filter_map(|r| setting(data, predictor, given, *r)).collect());
-    if seen {
-        return over(&ratio.map_or(RATIOS.to_vec(), |ratio| vec![ratio])).into_iter().collect();
-    }
-    over(&RATIOS[..1]).into_iter().chain(over(&RATIOS[1..])).collect()
-}
-
 /// A fit with the values of its effects where the evidence is highest: sizes from their coefficients, other values by trying.
 fn refined(
     data: &PullData<'_>,
@@ -330,43 +267,6 @@ fn friction(data: &PullData<'_>, candidates: &[Candidate], search: &Search, fit:
         }
     }
     z
-}
-
-/// The model of a fit: friction of the parts, effects, scatter.
-pub(super) fn model_of(
-    data: &PullData<'_>,
-    candidates: &[Candidate],
-    setting: &Setting,
-    fit: &Fit,
-) -> PullModel {
-    let search = &setting.search;
-    let mut model = PullModel { factor: vec![], ..setting.curves.model.clone() };
-    for (part, mu) in model.mu.iter_mut().enumerate() {
-        *mu *= libm::exp(fit.gaussian.mean[part]);
-    }
-    // A twin has no noise of labels but that of its readings: what is beyond it scatters with the friction.
-    let wider = &search.measured.wider;
-    let variances = fit.gaussian.weight.iter().zip(wider).map(|(w, wider)| 1.0 / (w * wider));
-    model.scatter = median(variances.collect()).unwrap_or(0.0).sqrt().min(MOST_SCATTER);
-    for (place, chosen) in fit.chosen.iter().enumerate() {
-        let (kind, at) = (&search.terms[chosen.term].kind, shape_of(search, chosen).at.as_ref());
-        let (Kind::Effect(e) | Kind::EffectOfParts(e), Some(at)) = (kind, at) else { continue };
-        let candidate = &candidates[*e];
-        let one = matches!(kind, Kind::Effect(_));
-        for p in 0..data.parts.len() {
-            let Some((share, _)) = amplitude_of(search, fit, place, if one { 0 } else { p }) else {
-                continue;
-            };
-            // A column is without its mean in each part: what the effect does there is taken off the friction.
-            model.mu[p] *= libm::exp(-share * at.means[p]);
-            if !one || p == 0 {
-                let part = (!one).then_some(p);
-                let values = scaled(candidate, &at.values, share);
-                model.effects.push(ModelEffect { part, ..ModelEffect::new(candidate.spec, values) });
-            }
-        }
-    }
-    model
 }
 
 fn learnt(data: &PullData<'_>, search: &Search, fit: &Fit) -> Vec<LearntTable> {

@@ -1,11 +1,14 @@
-//! Labels that a fit predicts, for held-out pulls too, and which of two predictions is better.
+//! The model that a fit is, the labels that it predicts, for held-out pulls too, and which of two predictions is better.
 
-use super::answer::{Setting, model_of};
 use super::process::Process;
 use super::search::Fit;
+use super::settings::Setting;
+use super::sizes::{amplitude_of, scaled, shape_of};
+use super::terms::Kind;
 use crate::pulls::candidates::Candidate;
 use crate::pulls::data::PullData;
-use gripgen_twin::predict::PredictPulls;
+use gripgen_twin::predict::{ModelEffect, PredictPulls, PullModel};
+use gripgen_twin::values::median;
 
 /// Nodes and weights over which scatter is averaged: Gauss-Hermite of five points for a standard normal variable.
 const NODES: [(f64, f64); 5] = [
@@ -18,6 +21,45 @@ const NODES: [(f64, f64); 5] = [
 
 /// Significance level of the sign test between two predictions, and the probability that nothing acts below which a process may replace names.
 pub(super) const BY_CHANCE: f64 = 0.05;
+
+/// Scatter that a twin holds.
+const MOST_SCATTER: f64 = 0.3;
+/// The model of a fit: friction of the parts, effects, scatter.
+pub(super) fn model_of(
+    data: &PullData<'_>,
+    candidates: &[Candidate],
+    setting: &Setting,
+    fit: &Fit,
+) -> PullModel {
+    let search = &setting.search;
+    let mut model = PullModel { factor: vec![], ..setting.curves.model.clone() };
+    for (part, mu) in model.mu.iter_mut().enumerate() {
+        *mu *= libm::exp(fit.gaussian.mean[part]);
+    }
+    // A twin has no noise of labels but that of its readings: what is beyond it scatters with the friction.
+    let wider = &search.measured.wider;
+    let variances = fit.gaussian.weight.iter().zip(wider).map(|(w, wider)| 1.0 / (w * wider));
+    model.scatter = median(variances.collect()).unwrap_or(0.0).sqrt().min(MOST_SCATTER);
+    for (place, chosen) in fit.chosen.iter().enumerate() {
+        let (kind, at) = (&search.terms[chosen.term].kind, shape_of(search, chosen).at.as_ref());
+        let (Kind::Effect(e) | Kind::EffectOfParts(e), Some(at)) = (kind, at) else { continue };
+        let candidate = &candidates[*e];
+        let one = matches!(kind, Kind::Effect(_));
+        for p in 0..data.parts.len() {
+            let Some((share, _)) = amplitude_of(search, fit, place, if one { 0 } else { p }) else {
+                continue;
+            };
+            // A column is without its mean in each part: what the effect does there is taken off the friction.
+            model.mu[p] *= libm::exp(-share * at.means[p]);
+            if !one || p == 0 {
+                let part = (!one).then_some(p);
+                let values = scaled(candidate, &at.values, share);
+                model.effects.push(ModelEffect { part, ..ModelEffect::new(candidate.spec, values) });
+            }
+        }
+    }
+    model
+}
 
 /// Root mean square of the errors of a prediction, of those pulls that it predicts. Outliers count too.
 pub fn rms_error_n(label_n: &[f64], predicted_n: &[f64]) -> f64 {
