@@ -41,7 +41,7 @@ def noise_of(rows):
     Rings: a level is a part at a grip force, ten strokes each. Levels scatter by 0.01 to 1 N, so a residual is divided by the
     deviation of its level before it may go to another one, and multiplied by that of the level where it lands.
     The run-in from stroke to stroke is in the residuals, but not in their new order.
-    Apples: one grip force and one scale. The level is the pose of the apple, with lines in offsets and tilts of the hand beside it;
+    Apples: one grip force and one scale. The level is the pose of the apple, with lines in offsets and tilts of the hand in addition;
     residuals are divided by what the fit leaves of them. Rows that are alone in their pose tell nothing and draw one of the others."""
     y, force = np.array([float(r[LABEL]) for r in rows]), np.array([float(r["grip_force_n"]) for r in rows])
     part, apples, law = np.array([r["part"] for r in rows]), "apple_pose" in rows[0], np.zeros(len(y))
@@ -68,7 +68,7 @@ def permuted(noise, rng, within):
 
 
 def invented(rows, rng):
-    """The rows with invented columns beside their own, these columns, and parts (of one part two); row order is the order of time."""
+    """The rows with invented columns added, these columns, and parts (of one part two); row order is the order of time."""
     n, part = len(rows), np.array([r["part"] for r in rows])
     words = lambda levels: rng.permutation(np.array(levels)[np.arange(n) % len(levels)])
     part = words((part[0], part[0] + "_b")) if len(set(part)) == 1 else part
@@ -232,7 +232,7 @@ def summary(out):
             count = collections.Counter(next((v for v in ("right", "tied", "false") if v in r["said"]), "silent") for r in some)
             ratio = [r["found"] / r["size"] for r in some if r.get("found") is not None and "right" in r["said"]]
             print(*group, f"right {share(count['right'], len(some))}, tied {count['tied']}, false alone {count['false']}, silent {count['silent']}, "
-                  f"a false name beside {sum('right' in r['said'] and 'false' in r['said'] for r in some)}, failed {sum('failed' in r for r in some)}"
+                  f"with a false name in addition {sum('right' in r['said'] and 'false' in r['said'] for r in some)}, failed {sum('failed' in r for r in some)}"
                   + (f", found / true {np.round(np.quantile(ratio, (0.1, 0.5, 0.9)), 2).tolist()}" if ratio else ""))
 
 

@@ -24,6 +24,7 @@ pub(super) const BY_CHANCE: f64 = 0.05;
 
 /// Scatter that a twin holds.
 const MOST_SCATTER: f64 = 0.3;
+
 /// The model of a fit: friction of the parts, effects, scatter.
 pub(super) fn model_of(
     data: &PullData<'_>,

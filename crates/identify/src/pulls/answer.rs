@@ -90,8 +90,8 @@ pub struct PullOptions<'a> {
 ///
 /// Without traces, much noise of the readings explains what a law of the load would: noisy readings raise small labels. The noise is fitted
 /// before effects compete, so where labels say that there is more of it than the twin does, they compete with the noise of the twin, too.
-/// The answer is the one with the higher score: likelihood and prior of the noise, half the logarithm of the pulls off for each parameter,
-/// the logarithm of the number of effects off for each that is named.
+/// The answer is the one with the higher score: log-likelihood plus log prior of the noise, minus half the logarithm of the number of pulls per
+/// parameter, minus the logarithm of the number of candidates per name.
 pub fn diagnose_pulls(
     measured: &MeasuredPulls,
     predictor: &dyn PredictPulls,

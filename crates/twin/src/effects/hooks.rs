@@ -54,7 +54,7 @@ pub struct SensorPoint {
 }
 
 impl SensorPoint {
-    /// The start of a pull. Where nobody counted from the last zeroing, the zero was set at the start of the campaign.
+    /// The start of a pull. Without a count from the last zeroing, the zero was set at the start of the campaign.
     pub fn start_of(pull: &Covariates) -> Self {
         let counted = match pull.extra.get(SINCE_ZERO) {
             Some(Drawn::Number(seconds)) => Some(*seconds),

@@ -5,8 +5,8 @@ use super::{
 };
 use crate::SINCE_ZERO;
 
-/// `session_zero_drift`: a bias that grows linearly from 0 at each zeroing of the sensor. Where nobody counted from one, the zero was
-/// set at the start of the campaign, and it is `sensor_drift`.
+/// `session_zero_drift`: a bias that grows linearly from 0 at each zeroing of the sensor. Without a count, the zero was set at
+/// the start of the campaign, and it is `sensor_drift`.
 pub(super) const SPEC: EffectSpec = EffectSpec {
     id: "session_zero_drift",
     group: Group::Robot,
