@@ -37,7 +37,7 @@ fn main() -> ExitCode {
     let surface = best.surface(&imprint);
     let depth_px = gel.thickness_m / grid.metres_per_px;
     let heights = clustered.raster(&at, &grid, depth_px);
-    let pressed = PressedGel { thickness_m: gel.thickness_m, imprint_m3_per_n: scenes::IMPRINT_M3_PER_N };
+    let pressed = PressedGel::of(gel, scenes::IMPRINT_M3_PER_N);
     let (along_x, along_y) = gradient(&surface);
     let change = shade(&sensor.colour, &surface, &along_x, &along_y, None);
     let contact = imprint.depth_px.values.iter().filter(|&&d| d > 0.0).count() as f64 / grid.len() as f64;

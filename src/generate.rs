@@ -68,9 +68,9 @@ fn try_generate(
     let options = SimulateOptions::of(&project.sweep, level);
     let grip = || Gripped::new(&twin, &project.library, known, options);
     // Repetitions of a configuration share their grip.
-    let gripped = match project.sweep.repetitions {
-        1 => Arc::new(grip()?),
-        _ => project.grips.get((known.group, options), grip)?,
+    let gripped = match project.sweep.repetitions_share_grip() {
+        false => Arc::new(grip()?),
+        true => project.grips.get((known.group, options), grip)?,
     };
     let gpu = if options.images { project.gpu()? } else { None };
     let Some(pace) = film else { return Ok((pull(&twin, known, &gripped, options, gpu, |_| {})?, None)) };

@@ -9,10 +9,10 @@ use gripgen_physics::{
     Arm, Grip, GripSetup, Held, Mount, PartShape, PlacedArm, grip, grip_point, pull_direction,
 };
 use gripgen_tactile::gpu::makes;
-use gripgen_tactile::{ClusteredMesh, Imprint, Pad, Plane, Renderer, Sensor, SimdLevel};
+use gripgen_tactile::{ClusteredMesh, Imprint, Pad, Plane, Renderer, Sensor, SimdLevel, contact_slopes};
 use gripgen_twin::config::{Backend, ImageNoise, Mechanics};
 use gripgen_twin::effects::{imprint_volume_m3, jaw_tilt_rad, normal_force_n, optics_state};
-use gripgen_twin::frames::{pose, rotation_about_axis};
+use gripgen_twin::frames::{pose, rotation_about_axis, world_from_gel};
 use gripgen_twin::image::pixel_noise::PixelNoise;
 use gripgen_twin::{Grasp, Jaw, OpticsState, Part, PerJaw, Scenario, TactileImage, Twin};
 use nalgebra::Vector3;
@@ -177,6 +177,8 @@ pub struct Indenter<'a> {
     twin: &'a Twin,
     sensors: PerJaw<Arc<Sensor>>,
     parts: PerJaw<PlacedPart>,
+    /// Direction of the pull in the frame of each gel.
+    along: PerJaw<[f64; 2]>,
     mesh: Arc<ClusteredMesh>,
     level: SimdLevel,
 }
@@ -199,6 +201,7 @@ impl<'a> Indenter<'a> {
             twin,
             sensors: PerJaw::try_from_fn(|jaw| library.sensor(&twin.optics[jaw]))?,
             parts: placed_parts(twin, library, scenario, force_n, grasp)?,
+            along: PerJaw::from_fn(|jaw| along_gel(scenario, jaw)),
             mesh: library.clustered_mesh(&twin.parts[&scenario.part])?,
             level,
         })
@@ -222,7 +225,7 @@ impl<'a> Indenter<'a> {
         })
     }
 
-    /// The contact of the part with both pads.
+    /// The contact of the part with both pads, with its slopes where they count.
     ///
     /// # Errors
     ///
@@ -230,9 +233,16 @@ impl<'a> Indenter<'a> {
     pub fn contacts(&self) -> Result<PerJaw<Imprint>, SampleError> {
         PerJaw::try_from_fn(|jaw| {
             let PlacedPart { gel_from_mesh, imprint_m3_per_n, force_n, .. } = &self.parts[jaw];
-            let pad = Pad { gel: &self.twin.gel[jaw], level: self.level };
+            let gel = &self.twin.gel[jaw];
+            let pad = Pad { gel, level: self.level };
             let contact = pad.press(&self.mesh, gel_from_mesh, *imprint_m3_per_n, *force_n);
-            contact.map_err(|source| SampleError::Indent { jaw, source })
+            let mut contact = contact.map_err(|source| SampleError::Indent { jaw, source })?;
+            if gel.interlock > 0.0 {
+                let smoothing_m = gel.interlock_smoothing_m;
+                contact.patch.slopes =
+                    contact_slopes(&contact.depth_px, &pad.grid(), smoothing_m, self.along[jaw]);
+            }
+            Ok(contact)
         })
     }
 
@@ -258,6 +268,12 @@ impl<'a> Indenter<'a> {
         let own = own.map_err(|source| SampleError::Indent { jaw, source })?;
         Ok(Cow::Owned(renderer.seen(&self.mesh, gel_from_mesh, &own, optics).into_owned()))
     }
+}
+
+/// The direction of a pull in the plane of a gel.
+fn along_gel(scenario: &Scenario, jaw: Jaw) -> [f64; 2] {
+    let along = world_from_gel(jaw, 0.0).inverse() * Vector3::from(pull_direction(scenario));
+    [along.x, along.y]
 }
 
 fn grip_setup<'a>(
@@ -324,7 +340,7 @@ pub fn placed_parts(
             // The gel turns about its own x axis, so the part turns the other way in it.
             gel_from_mesh = pose(&rotation_about_axis(0, -tilt_rad), Vector3::zeros()) * gel_from_mesh;
         }
-        let volume_m3 = imprint_volume_m3(twin, &scenario.part, part, force_n[jaw]);
+        let volume_m3 = imprint_volume_m3(twin, &scenario.part, part, jaw, force_n[jaw]);
         let unchanged = volume_m3 == part.imprint_m3_per_n * force_n[jaw];
         let imprint_m3_per_n = if unchanged { part.imprint_m3_per_n } else { volume_m3 / force_n[jaw] };
         PlacedPart { mesh: mesh.clone(), gel_from_mesh, imprint_m3_per_n, force_n: force_n[jaw] }

@@ -12,7 +12,9 @@ use gripgen_physics::Cache;
 use gripgen_record::{Background, RunFolder, sha256_hex};
 use gripgen_tactile::finish;
 use gripgen_tactile::gpu::{GpuError, makes};
-use gripgen_twin::config::{Backend, Compression, ConfigError, Document, ImageStorage, SweepFile};
+use gripgen_twin::config::{
+    Backend, Compression, ConfigError, Document, ImageStorage, PriorFile, SweepFile, missing_effects,
+};
 use gripgen_twin::{
     DEFAULTED_SECTIONS, Jaw, PerJaw, Posterior, RobotArm, Sweep, Twin, is_twin_key, scenario_keys,
 };
@@ -83,14 +85,57 @@ pub enum LoadError {
 ///
 /// A file that cannot be read or is no TOML, or an override of a key that cannot be set.
 pub fn load_twin_document(location: &Location, sets: &[(String, String)]) -> Result<Document, LoadError> {
+    twin_document(location, sets, &[])
+}
+
+fn twin_document(
+    location: &Location,
+    sets: &[(String, String)],
+    priors: &[PriorFile],
+) -> Result<Document, LoadError> {
     let mut document = Document::parse(&location.to_string(), &location.read_text()?)?;
     let baseline: toml::Table =
         assets::text("configs/twin-baseline.toml").parse().expect("a test reads the baseline twin");
     document.fill_from(&baseline, DEFAULTED_SECTIONS);
+    add_effects(&mut document, priors)?;
     for (key, value) in sets.iter().filter(|(key, _)| is_twin_key(key)) {
         set(&mut document, location, key, value)?;
     }
     Ok(document)
+}
+
+/// Adds the effects of priors that a twin lacks.
+fn add_effects(twin: &mut Document, priors: &[PriorFile]) -> Result<(), ConfigError> {
+    if priors.iter().all(|prior| prior.effects.is_empty()) {
+        return Ok(());
+    }
+    let own = twin.read_twin()?.effects;
+    let unwritable = |e: toml::ser::Error| ConfigError::new("effects", e.to_string());
+    let mut all = match twin.get("effects") {
+        Some(toml::Value::Array(effects)) => effects.clone(),
+        _ => vec![],
+    };
+    for effect in missing_effects(&own, priors) {
+        all.push(toml::Value::try_from(effect).map_err(unwritable)?);
+    }
+    twin.assign("effects", toml::Value::Array(all)).map(drop)
+}
+
+/// The files of priors that a sweep names.
+fn priors(sweep: &Document, location: &Location, named: &[String]) -> Result<Vec<PriorFile>, LoadError> {
+    let read = |(i, path): (usize, &String)| -> Result<PriorFile, LoadError> {
+        let at = location.beside(path);
+        let text = at.read_text().map_err(|e| {
+            let error = ConfigError::new(format!("priors[{i}]"), e.to_string());
+            sweep.located(error.hint(
+                "paths are relative to this file; shipped: asset:priors/friction.toml, gel.toml, rig.toml",
+            ))
+        })?;
+        let document = Document::parse(&at.to_string(), &text)?;
+        let file: PriorFile = document.read().map_err(|e| document.located(e))?;
+        Ok(file)
+    };
+    named.iter().enumerate().map(read).collect()
 }
 
 /// Applies an override of a document that lies at `location`. A path in it is relative to the shell's folder.
@@ -169,8 +214,10 @@ impl Project {
             set(&mut document, location, key, value)?;
         }
         let file: SweepFile = document.read().map_err(|e| meant_to_vary(e, &document))?;
+        let priors = priors(&document, location, &file.priors)?;
+        let file = file.with_priors(&priors).map_err(|e| document.located(e))?;
         let twin_location = location.beside(&file.twin);
-        let twin_document = load_twin_document(&twin_location, sets).map_err(|e| match e {
+        let twin_document = twin_document(&twin_location, sets, &priors).map_err(|e| match e {
             LoadError::Read(e) => LoadError::from(
                 document
                     .located(ConfigError::new("twin", e.to_string()).hint("paths are relative to this file")),

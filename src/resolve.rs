@@ -162,13 +162,15 @@ impl<L: Fn(&str) -> Location> Resolver<L> {
         }
         for varied in sweep.vary.iter().filter(|v| is_file_key(&v.key)) {
             let mut paths = Vec::new();
+            let mut varied = varied.clone();
             for (i, value) in sweep.representatives(&varied.key).into_iter().enumerate() {
                 let Drawn::Text(path) = value else { continue };
                 let mut path = path.clone();
                 self.name(format!("vary.{}[{i}]", varied.key), varied.key.clone(), &mut path)?;
-                paths.push(toml::Value::String(path));
+                paths.push(Drawn::Text(path));
             }
-            file.vary.insert(varied.key.clone(), toml::Value::Array(paths));
+            varied.distribution = Distribution::Choice(paths);
+            file.vary.insert(varied.key.clone(), varied.to_toml());
         }
         Ok(())
     }

@@ -230,7 +230,7 @@ fn the_elastic_gel_beside_the_pyramid_on_real_presses() {
         let gel = ElasticGel { thickness_m, young_modulus_pa: 2e5, poisson_ratio, base };
         press_elastic(ball, &GRID, &gel, force_n, level).unwrap()
     };
-    let flat = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
+    let flat = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9, stiffens: false };
     type Model<'a> = (&'a str, &'a dyn Fn(&Plane, f64) -> Imprint);
     let models: [Model<'_>; 5] = [
         ("pyramid", &|ball, force_n| indent(ball, &GRID, &flat, force_n).unwrap()),
@@ -346,7 +346,7 @@ fn markers_move_like_finite_elements() {
         area_m2: std::f64::consts::PI * 0.25e-3_f64.powi(2),
         force_n: 1.0,
     };
-    let patch = ContactPatch { cells: vec![pin] };
+    let patch = ContactPatch { cells: vec![pin], ..Default::default() };
     let gel = MarkerGel::new(4e-3, 2e5, 0.4, 0.1e-3);
     let nodes: Vec<Node> =
         nodes().into_iter().filter(|n| (0.12e-3..8e-3).contains(&n.x_m.hypot(n.y_m))).collect();

@@ -37,6 +37,8 @@ mod fuzz_inputs;
 mod fuzz_parts;
 // Effects of the library, through the whole pipeline.
 mod effects;
+// Levels of randomness.
+mod levels;
 // Labels of a sample, and what they depend on.
 mod labels;
 // The elastic gel, also beside the pyramid on real presses.
@@ -53,8 +55,8 @@ mod imprint_sets;
 mod init;
 // Intervals of calibrations, against a lab of its own.
 mod intervals;
-// What the large set can teach.
-mod large;
+// What the shipped sets can teach.
+mod teaches;
 // Runs of other versions.
 mod later_version;
 // Measured pulls from every place they may be in.

@@ -166,6 +166,18 @@ def test_splits_keep_groups_together_and_cover_everything(run, tmp_path):
     assert ds.split(seed=5)[1].rows.tolist() == ds.split(seed=5)[1].rows.tolist()
 
 
+def test_a_run_of_several_rigs_is_split_by_rig(tmp_path):
+    keys = {"images": "none", "samples": 60, "mechanics": "reduced", "trace": "none", "design": "random", "groups": "{rigs=10}"}
+    keys |= {"vary.robot.lag_s": '{log_normal=[0.05, 0.3], per="rig"}'}
+    gg.sweep("asset:configs/quickstart.toml", tmp_path / "run", set=keys)
+    ds = gg.load(tmp_path / "run")
+    train, test = ds.split(test=0.3)
+    rigs = [set(part.column("rig_id").tolist()) for part in (train, test)]
+    assert not rigs[0] & rigs[1] and len(rigs[1]) == 3 and len(train) + len(test) == len(ds)
+    lags = {rig: set(ds.where(ds.column("rig_id") == rig).column("robot.lag_s").tolist()) for rig in rigs[0] | rigs[1]}
+    assert all(len(of) == 1 for of in lags.values()) and len(set.union(*lags.values())) == len(lags)
+
+
 def test_ranks_share_every_row_once(run):
     ds = gg.load(run)
     seen = []

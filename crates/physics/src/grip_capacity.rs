@@ -30,7 +30,13 @@ impl PatchFriction {
         let part = &twin.parts[&scenario.part];
         let laws = PerJaw::try_from_fn(|jaw| {
             let at = grip_point(scenario, jaw, patches[jaw].area_m2());
-            cell_friction(twin, &scenario.part, part, &at, patches[jaw])
+            let (mut cells, mut law) = cell_friction(twin, &scenario.part, part, &at, patches[jaw])?;
+            let (slopes, share) = (patches[jaw].slopes, twin.gel[jaw].interlock);
+            if share > 0.0 {
+                cells.iter_mut().for_each(|mu| *mu = slopes.coefficient(*mu, share));
+                law.mu = slopes.coefficient(law.mu, share);
+            }
+            Ok((cells, law))
         })?;
         Ok(Self { law: laws.map(|_, (_, law)| *law), cell_mu: laws.map(|_, (cells, _)| cells.clone()) })
     }

@@ -129,6 +129,8 @@ pub struct PullSession {
     crept_m: f64,
     /// The speed of that without what the rim adds, as the damping of the arm feels it.
     felt_m_per_s: f64,
+    /// Noise of the last reading, in its standard deviations; `None` before the first.
+    last_noise: Option<f64>,
     state: PullState,
 }
 
@@ -151,6 +153,7 @@ impl PullSession {
             has_slid: false,
             crept_m: 0.0,
             felt_m_per_s: 0.0,
+            last_noise: None,
             state: PullState {
                 time_s: 0.0,
                 contact_force_n: 0.0,
@@ -300,7 +303,24 @@ impl PullSession {
         if self.wrist.noise_n == 0.0 {
             return force_n;
         }
-        force_n + self.wrist.noise_n * self.signals.noise.normal()
+        force_n + self.wrist.noise_n * self.noise(step_s)
+    }
+
+    /// Noise of unit variance: white, or a first-order autoregression that forgets with the time constant of the sensor.
+    fn noise(&mut self, step_s: f64) -> f64 {
+        let own = self.signals.noise.normal();
+        if self.wrist.noise_time_s == 0.0 {
+            return own;
+        }
+        let noise = match self.last_noise {
+            None => own,
+            Some(last) => {
+                let kept = libm::exp(-step_s / self.wrist.noise_time_s);
+                kept * last + libm::sqrt(1.0 - kept * kept) * own
+            }
+        };
+        self.last_noise = Some(noise);
+        noise
     }
 }
 

@@ -43,6 +43,7 @@ pub(crate) struct Bench {
     pub(crate) mount: Mount,
     pub(crate) kinetic_ratio: f64,
     pub(crate) noise_n: f64,
+    pub(crate) noise_time_s: f64,
 }
 
 impl Bench {
@@ -56,6 +57,10 @@ impl Bench {
             shear_by_area: 1.0,
             kernels_px: vec![],
             restore_depth_fraction: 0.4,
+            compliance: 1.0,
+            stiffens: false,
+            interlock: 0.0,
+            interlock_smoothing_m: 3e-4,
             model: gripgen_twin::config::GelModel::Pyramid,
             elastic: None,
         };
@@ -71,6 +76,7 @@ impl Bench {
             mount: Mount::Fixed,
             kinetic_ratio: 1.0,
             noise_n: 0.0,
+            noise_time_s: 0.0,
         }
     }
 
@@ -86,7 +92,7 @@ impl Bench {
                 opening_m: 0.11,
                 max_force_n: 80.0,
             },
-            wrist: Wrist { noise_n: self.noise_n, rate_hz: 1.0 / STEP_S },
+            wrist: Wrist { noise_n: self.noise_n, noise_time_s: self.noise_time_s, rate_hz: 1.0 / STEP_S },
             gel: &self.gel,
             shape: &self.shape,
             world_from_part: self.world_from_part,
@@ -379,6 +385,30 @@ fn a_clone_continues_like_the_original_and_threads_agree() {
     bench.noise_n = 0.1;
     bench.kinetic_ratio = 0.8;
     assert_clones_agree(&bench);
+}
+
+/// Noise with a time constant keeps its deviation, and a reading keeps exp(-step / time) of that before.
+#[test]
+fn correlated_noise_has_its_deviation_and_its_memory() {
+    for noise_time_s in [0.0, 0.01] {
+        let mut bench = Bench::new(PartShape::cylinder(0.01, 0.12, 2), 40.0);
+        (bench.noise_n, bench.noise_time_s) = (0.2, noise_time_s);
+        let mut session = bench.session(0.2);
+        let noise: Vec<f64> = (0..20_000)
+            .map(|_| {
+                let state = session.step(Command::SpeedMPerS(0.0), STEP_S).unwrap();
+                state.measured_force_n - state.contact_force_n
+            })
+            .collect();
+        let n = noise.len() as f64;
+        let deviation = (noise.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
+        let memory = noise.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n / (deviation * deviation);
+        let kept = if noise_time_s == 0.0 { 0.0 } else { (-STEP_S / noise_time_s).exp() };
+        // Errors of a mean of n correlated squares.
+        let error = 4.0 * ((1.0 + kept) / (1.0 - kept) / n).sqrt();
+        assert!((deviation / 0.2 - 1.0).abs() < error, "{noise_time_s} s: {deviation} N");
+        assert!((memory - kept).abs() < error, "{noise_time_s} s: {memory}");
+    }
 }
 
 /// Halving the time step moves the slip force by less than 0.2 %.

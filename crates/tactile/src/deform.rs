@@ -236,7 +236,7 @@ mod tests {
 
     fn press(width: usize, height: usize) -> (Imprint, f64) {
         let grid = Grid { width_px: width, height_px: height, metres_per_px: 1e-4 };
-        let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
+        let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9, stiffens: false };
         (indent(&bumps(width, height), &grid, &gel, 20.0).unwrap(), grid.metres_per_px)
     }
 
@@ -284,7 +284,7 @@ mod tests {
     #[test]
     fn the_contact_is_restored_and_the_far_field_rests() {
         let grid = Grid { width_px: 160, height_px: 120, metres_per_px: 1e-4 };
-        let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
+        let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9, stiffens: false };
         let inside = |x, y| (60..100).contains(&x) && (50..70).contains(&y);
         let stamp = Plane::from_fn(160, 120, |x, y| if inside(x, y) { 0.0 } else { f32::NEG_INFINITY });
         let imprint = indent(&stamp, &grid, &gel, 5.0).unwrap();

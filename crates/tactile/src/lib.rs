@@ -8,7 +8,7 @@
 //! let ball_m = |x_m: f64, y_m: f64| (4e-3_f64.powi(2) - x_m * x_m - y_m * y_m).max(0.0).sqrt() - 7e-3;
 //! let heights = grid.plane(|x_m, y_m| ball_m(x_m, y_m) / grid.metres_per_px);
 //! // 5 N displace 5 mm3 of gel: the cap of a ball, pi d^2 (R - d / 3).
-//! let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
+//! let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9, stiffens: false };
 //! let imprint = indent(&heights, &grid, &gel, 5.0)?;
 //! let d_m = imprint.press_depth_m;
 //! let cap_m3 = std::f64::consts::PI * d_m * d_m * (4e-3 - d_m / 3.0);
@@ -60,6 +60,7 @@ mod sensor;
 mod shading;
 mod shadow;
 mod simd;
+mod slopes;
 #[cfg(test)]
 mod testing;
 mod volume;
@@ -83,4 +84,5 @@ pub use render::{Pad, Renderer};
 pub use sensor::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError, SensorFiles};
 pub use shadow::{BallPress, Relief, Shadow, ShadowKind, ShadowTable, shadow, shadow_from_presses};
 pub use simd::SimdLevel;
+pub use slopes::contact_slopes;
 pub use volume::{VolumeError, VolumeReader};

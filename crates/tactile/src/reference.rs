@@ -210,7 +210,8 @@ mod tests {
                 let sampled = Sampled::new(&mesh, &at, &GRID, &rest);
                 let above = &sampled.centres;
                 for force_n in [0.5, 10.0, 60.0] {
-                    let pressed_gel = PressedGel { thickness_m: gel.thickness_m, imprint_m3_per_n: 1e-9 };
+                    let pressed_gel =
+                        PressedGel { thickness_m: gel.thickness_m, imprint_m3_per_n: 1e-9, stiffens: false };
                     let wanted_px3 = 1e-9 * force_n / GRID.metres_per_px.powi(3);
                     let by_centres = indent(above, &GRID, &pressed_gel, force_n).unwrap();
                     let exact = press_px(above, wanted_px3, 16.0);

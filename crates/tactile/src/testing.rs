@@ -20,6 +20,10 @@ pub(crate) fn gel(kernels_px: &[u32]) -> Gel {
         shear_by_area: 1.0,
         kernels_px: kernels_px.to_vec(),
         restore_depth_fraction: 0.4,
+        compliance: 1.0,
+        stiffens: false,
+        interlock: 0.0,
+        interlock_smoothing_m: 3e-4,
     }
 }
 

@@ -9,6 +9,7 @@ mod document;
 mod draw_file;
 mod images_file;
 mod keys;
+mod prior_file;
 mod sweep_file;
 mod twin_file;
 
@@ -17,9 +18,10 @@ pub use document::{Document, Place};
 pub(crate) use draw_file::read as read_vary;
 pub use images_file::{Compression, DuringPullFile, ImageStorage, ImagesFile};
 pub use keys::{DEFAULTED_SECTIONS, is_twin_key};
-pub(crate) use keys::{assign, check_part, get};
+pub(crate) use keys::{assign, check_part, get, of_part};
+pub use prior_file::{PriorFile, missing_effects};
 pub use sweep_file::{
-    Backend, DesignFile, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,
+    Backend, DesignFile, GroupsFile, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,
 };
 pub use twin_file::{
     ArmFile, CalibrationFile, EffectFile, Feedback, ForceConvention, GelFile, GelModel, GripFile,

@@ -1,5 +1,10 @@
 //! What varies from sample to sample, and by how much.
 
+mod level;
+
+pub use level::Level;
+pub(crate) use level::level_coordinate;
+
 use crate::random::{Purpose, Stream, normal_quantile};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -60,6 +65,13 @@ pub enum Distribution {
         /// Standard deviation.
         deviation: f64,
     },
+    /// Gaussian in the natural logarithm.
+    LogNormal {
+        /// Median.
+        median: f64,
+        /// Standard deviation of the natural logarithm.
+        deviation: f64,
+    },
     /// The calibrated uncertainty that stands beside the key in the twin; becomes `Normal` when a sweep is
     /// planned.
     Interval,
@@ -78,6 +90,12 @@ pub struct VariedKey {
     pub key: String,
     /// Where its values come from.
     pub distribution: Distribution,
+    /// What shares a draw: samples that are of one group of each of these levels.
+    pub per: Vec<Level>,
+    /// Standard deviations of what further levels add; of a logarithmic distribution, of the natural logarithm of their factors.
+    pub spread: Vec<(Level, f64)>,
+    /// Ends that the value is kept within.
+    pub limits: Option<[f64; 2]>,
 }
 
 impl Distribution {
@@ -97,20 +115,25 @@ impl Distribution {
                 libm::exp(a + (b - a) * u)
             }
             Distribution::Normal { mean, deviation } => mean + deviation * normal_quantile(u),
+            Distribution::LogNormal { median, deviation } => {
+                median * libm::exp(deviation * normal_quantile(u))
+            }
             Distribution::Interval => unreachable!("a planned sweep has no interval left"),
             Distribution::Posterior { .. } => unreachable!("a posterior gives a draw of many keys"),
         })
     }
 
     /// Values that show whether the distribution stays inside what its key allows: all of a list, the ends of
-    /// an interval, the mean of a Gaussian.
+    /// an interval, the middle of a Gaussian.
     pub fn extremes(&self) -> Vec<Drawn> {
         match self {
             Distribution::Choice(values) => values.clone(),
             Distribution::Uniform { low, high } | Distribution::LogUniform { low, high } => {
                 vec![Drawn::Number(*low), Drawn::Number(*high)]
             }
-            Distribution::Normal { mean, .. } => vec![Drawn::Number(*mean)],
+            Distribution::Normal { mean: middle, .. } | Distribution::LogNormal { median: middle, .. } => {
+                vec![Drawn::Number(*middle)]
+            }
             Distribution::Interval | Distribution::Posterior { .. } => vec![],
         }
     }
@@ -123,7 +146,7 @@ impl Distribution {
         }
     }
 
-    /// As it stands in `[vary]`.
+    /// As it stands in `[vary]` where nothing is said of levels.
     pub fn to_toml(&self) -> toml::Value {
         let pair = |name: &str, a: f64, b: f64| {
             let numbers = vec![toml::Value::Float(a), toml::Value::Float(b)];
@@ -134,6 +157,7 @@ impl Distribution {
             Distribution::Uniform { low, high } => pair("uniform", *low, *high),
             Distribution::LogUniform { low, high } => pair("log_uniform", *low, *high),
             Distribution::Normal { mean, deviation } => pair("normal", *mean, *deviation),
+            Distribution::LogNormal { median, deviation } => pair("log_normal", *median, *deviation),
             Distribution::Interval => {
                 let from = ("from".to_string(), toml::Value::String("interval".into()));
                 toml::Value::Table(toml::Table::from_iter([from]))

@@ -50,6 +50,7 @@ library! {
     mod area_saturation;
     mod regime_transition;
     mod shear_strength;
+    mod adhesion;
     mod rate_dependence;
     mod dwell_ageing;
     mod anisotropy;
@@ -63,6 +64,7 @@ library! {
     mod jaw_tilt;
     mod off_centre;
     mod asymmetric_jaws;
+    mod grip_split;
     mod grip_force_loss;
     mod shear_creep;
     mod sensor_gain;

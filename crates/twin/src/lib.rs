@@ -75,7 +75,7 @@ pub use mesh::{
     write_binary_stl,
 };
 pub use optics::{BACKGROUND_TERMS, FINER_TERMS, OpticsState};
-pub use patch::{ContactPatch, PressureCell};
+pub use patch::{ContactPatch, ContactSlopes, PressureCell};
 pub use posterior::{CAUSE_KEY, Posterior, PosteriorDraw, PosteriorError};
 pub use pull_count::{PULLS_SINCE_REST, PullCount, SINCE_ZERO, ZEROED};
 pub use rounded::rounded;

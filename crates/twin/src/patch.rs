@@ -29,6 +29,29 @@ impl PressureCell {
 pub struct ContactPatch {
     /// The cells, none without contact.
     pub cells: Vec<PressureCell>,
+    /// Slopes of the contact, where they were asked for; those of a flat face otherwise.
+    pub slopes: ContactSlopes,
+}
+
+/// How the slopes of a contact add to its friction (interlock): moments of them, weighted with pressure.
+///
+/// A point with slope q along the pull and s across, under a pressure p along the jaw axis, resists with
+/// `p (q + mu w) / (1 - mu q / w)`, w = sqrt(1 + s^2): statics of Coulomb friction on an inclined face. Less the push `p q` that it has without
+/// friction and that the other flank takes back, this is `mu p w (1 + a^2) / (1 - mu a)` with a = q / w. The moments are the means
+/// over the contact of `w (1 + a^2) - 1` and of `w (1 + a^2) a^k`, k = 1, 2, 3: the series of `1 / (1 - mu a)` to third order.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ContactSlopes {
+    /// The moments; zeros of a flat face.
+    pub moments: [f64; 4],
+}
+
+impl ContactSlopes {
+    /// The coefficient of a face with these slopes whose points have `mu`. `share` of what they add counts: 0 gives `mu` bit for bit.
+    pub fn coefficient(&self, mu: f64, share: f64) -> f64 {
+        let [even, first, second, third] = self.moments;
+        let excess = even + mu * (first + mu * (second + mu * third));
+        mu * (1.0 + share * excess)
+    }
 }
 
 impl ContactPatch {
@@ -45,7 +68,7 @@ impl ContactPatch {
             area_m2: area_m2 / 64.0,
             force_n: force_n / 64.0,
         };
-        Self { cells: (0..64).map(cell).collect() }
+        Self { cells: (0..64).map(cell).collect(), slopes: ContactSlopes::default() }
     }
 
     /// Normal force of the jaw.

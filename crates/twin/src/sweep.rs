@@ -1,14 +1,14 @@
 //! The checked sweep: which scenario belongs to which sample index.
 
 mod check;
+mod groups;
 mod posterior;
 
-use crate::config::is_twin_key;
 use crate::config::{
-    Backend, Compression, ConfigError, DesignFile, ImageStorage, ImagesFile, Mechanics, PullFile, SweepFile,
-    TraceStorage, assign, check_part, get, read_twin_table,
+    Backend, Compression, ConfigError, DesignFile, GroupsFile, ImageStorage, ImagesFile, Mechanics, PullFile,
+    SweepFile, TraceStorage, assign, check_part, get, is_twin_key, of_part, read_twin_table,
 };
-use crate::draw::{Distribution, Drawn, VariedKey, fnv1a, random_coordinate};
+use crate::draw::{Distribution, Drawn, Level, VariedKey, fnv1a, level_coordinate, random_coordinate};
 use crate::image::film::FilmPace;
 use crate::random::sobol;
 use crate::scenario::keys;
@@ -54,6 +54,8 @@ pub struct Sweep {
     pub shard_samples: u64,
     /// What varies, sorted by key; always contains `part` and `grip_force_n`.
     pub vary: Vec<VariedKey>,
+    /// Rigs, gels and sessions that samples come from.
+    pub groups: Option<GroupsFile>,
     posterior: Option<Arc<Posterior>>,
     pull: PullFile,
 }
@@ -111,7 +113,9 @@ impl Sweep {
             },
             trace: self.trace,
             shard_samples: self.shard_samples,
-            vary: self.vary.iter().map(|v| (v.key.clone(), v.distribution.to_toml())).collect(),
+            priors: vec![],
+            vary: self.vary.iter().map(|v| (v.key.clone(), v.to_toml())).collect(),
+            groups: self.groups,
             pull: self.pull.clone(),
         }
     }
@@ -131,29 +135,63 @@ impl Sweep {
                 }
             }
         }
-        let mut drawn = BTreeMap::new();
-        for (dimension, varied) in self.vary.iter().enumerate() {
-            if let Some(value) = grid.get(varied.key.as_str()) {
-                drawn.insert(varied.key.clone(), (*value).clone());
-            } else if let Distribution::Posterior { .. } = varied.distribution {
-                let Some((posterior, draw)) = self.posterior_draw(index) else { continue };
-                drawn.insert(CAUSE_KEY.into(), Drawn::Text(draw.cause.clone()));
-                drawn.extend(posterior.values(draw).map(|(key, x)| (key.to_string(), Drawn::Number(x))));
-            } else {
-                let u = self.coordinate(group, dimension, varied);
-                drawn.insert(varied.key.clone(), varied.distribution.at(u));
+        let mut drawn = self.groups_of(group);
+        // What is drawn for a part, a gel or a session follows from its name.
+        for names in [true, false] {
+            for (dimension, varied) in self.vary.iter().enumerate() {
+                if groups::names_groups(&varied.key) != names {
+                    continue;
+                }
+                if let Some(value) = grid.get(varied.key.as_str()) {
+                    drawn.insert(varied.key.clone(), (*value).clone());
+                } else if let Distribution::Posterior { .. } = varied.distribution {
+                    let Some((posterior, draw)) = self.posterior_draw(index) else { continue };
+                    drawn.insert(CAUSE_KEY.into(), Drawn::Text(draw.cause.clone()));
+                    drawn.extend(posterior.values(draw).map(|(key, x)| (key.to_string(), Drawn::Number(x))));
+                } else {
+                    let at = |levels: &[Level]| self.coordinate(index, dimension, varied, levels, &drawn);
+                    let value = varied.value(at);
+                    drawn.insert(varied.key.clone(), value);
+                }
             }
         }
         drawn
     }
 
+    /// A number in (0, 1) for a key of sample `index` at some levels. `drawn` has the names of its groups.
+    fn coordinate(
+        &self,
+        index: u64,
+        dimension: usize,
+        varied: &VariedKey,
+        levels: &[Level],
+        drawn: &BTreeMap<String, Drawn>,
+    ) -> f64 {
+        let group = index / self.repetitions;
+        if varied.is_per_grip() && levels == [Level::Grip] {
+            return self.grip_coordinate(group, dimension, varied);
+        }
+        let named = |level: &Level| match (level, level.column()) {
+            (_, Some(column)) => drawn.get(column).map(Drawn::to_string).unwrap_or_default(),
+            (Level::Grip, None) => group.to_string(),
+            (_, None) => index.to_string(),
+        };
+        let groups: Vec<String> = levels.iter().map(named).collect();
+        level_coordinate(self.seed, levels, &groups.join(" "), &varied.key)
+    }
+
     /// A number in (0, 1) for a key of configuration `group`.
-    fn coordinate(&self, group: u64, dimension: usize, varied: &VariedKey) -> f64 {
+    fn grip_coordinate(&self, group: u64, dimension: usize, varied: &VariedKey) -> f64 {
         if self.design == DesignFile::Sobol {
             let shift = (self.seed ^ fnv1a(&varied.key)).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
             return sobol::coordinate(group, dimension, shift as u32);
         }
         random_coordinate(self.seed, group, &varied.key)
+    }
+
+    /// Whether the repetitions of a configuration share their grip: nothing is drawn for each of them.
+    pub fn repetitions_share_grip(&self) -> bool {
+        self.repetitions > 1 && self.vary.iter().all(|v| v.levels().all(|level| level != Level::Sample))
     }
 
     /// The scenario of sample `index`, with forces per jaw by the convention of `twin`, and whether it can be
@@ -211,10 +249,21 @@ impl Sweep {
         if let Some((posterior, draw)) = self.posterior_draw(index) {
             posterior.put(draw, &mut table)?;
         }
-        for (key, value) in self.drawn(index) {
-            if is_twin_key(&key) {
-                put(&mut table, &key, &value)?;
-            }
+        Self::twin_of_drawn(&self.drawn(index), table)
+    }
+
+    /// The twin of `table` with the drawn values of a sample put in.
+    ///
+    /// # Errors
+    ///
+    /// Values that make no twin.
+    pub fn twin_of_drawn(
+        drawn: &BTreeMap<String, Drawn>,
+        mut table: toml::Table,
+    ) -> Result<Twin, ConfigError> {
+        let part = drawn.get("part").map(Drawn::to_string).unwrap_or_default();
+        for (key, value) in drawn.iter().filter(|(key, _)| is_twin_key(key)) {
+            put(&mut table, &of_part(key, &part), value)?;
         }
         read_twin(&table)
     }

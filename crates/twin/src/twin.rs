@@ -108,6 +108,8 @@ pub struct Gripper {
 pub struct Wrist {
     /// Standard deviation of the noise of one reading.
     pub noise_n: f64,
+    /// Time constant of its correlation; 0: white.
+    pub noise_time_s: f64,
     /// Readings per second, which is also the rate of the simulation.
     pub rate_hz: f64,
 }
@@ -134,6 +136,14 @@ pub struct Gel {
     pub shear_stiffness_n_per_m: f64,
     /// Share of it that cells have by their area; the rest they have by their load.
     pub shear_by_area: f64,
+    /// Share of the interlock of slopes that counts.
+    pub interlock: f64,
+    /// Standard deviation of the blur of these slopes.
+    pub interlock_smoothing_m: f64,
+    /// Whether it stiffens as it gets thinner.
+    pub stiffens: bool,
+    /// By what imprint constants of parts are multiplied. Shear stiffness and modulus are those of this gel.
+    pub compliance: f64,
     /// Blur kernels, in pixels of the sensor's image.
     pub kernels_px: Vec<u32>,
     /// Start of the restored contact, as a share of the press depth.
@@ -262,6 +272,7 @@ impl Twin {
         };
         let wrist = Wrist {
             noise_n: in_range("wrist.noise_n", file.wrist.noise_n, 0.0..=20.0, "N")?,
+            noise_time_s: in_range("wrist.noise_time_s", file.wrist.noise_time_s, 0.0..=10.0, "s")?,
             rate_hz: in_range("wrist.rate_hz", file.wrist.rate_hz, 500.0..=4000.0, "Hz")?,
         };
         let mass_kg = robot.apparent_mass_kg.unwrap_or(robot.carriage_mass_kg(&gripper));

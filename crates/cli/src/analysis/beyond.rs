@@ -4,7 +4,7 @@ use crate::analysis::unvaried::drawn_from;
 use gripgen::Project;
 use gripgen::drawn_scenario;
 use gripgen_twin::columns;
-use gripgen_twin::draw::{Distribution, Drawn};
+use gripgen_twin::draw::{Drawn, VariedKey};
 use gripgen_twin::{Table, Values};
 use std::fmt;
 
@@ -75,27 +75,22 @@ fn may_be(project: &Project, name: &str, word: &str) -> bool {
     let scenario = drawn_scenario(project, 0);
     let fixed = || columns::value(name, scenario.view()).is_some_and(|at| at.to_string() == word);
     match drawn_from(project, name) {
-        Some(distribution) => distribution.extremes().iter().any(|value| value.to_string() == word),
+        Some(varied) => varied.distribution.extremes().iter().any(|value| value.to_string() == word),
         None => fixed(),
     }
 }
 
-/// The least and the largest number of a distribution that has more than one.
-fn ends(distribution: &Distribution) -> Option<[f64; 2]> {
-    match distribution {
-        distribution if distribution.constant().is_some() => None,
-        Distribution::Normal { mean, deviation } => {
-            Some([mean - DEVIATIONS * deviation, mean + DEVIATIONS * deviation])
-        }
-        distribution => {
-            let numbers = distribution.extremes().into_iter().filter_map(|value| match value {
-                Drawn::Number(x) => Some(x),
-                Drawn::Text(_) => None,
-            });
-            let ends = numbers.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
-            (ends[0] <= ends[1]).then_some(ends)
-        }
+/// The least and the largest number of a key that has more than one.
+fn ends(varied: &VariedKey) -> Option<[f64; 2]> {
+    if varied.distribution.constant().is_some() {
+        return None;
     }
+    let numbers = varied.reach(DEVIATIONS).into_iter().filter_map(|value| match value {
+        Drawn::Number(x) => Some(x),
+        Drawn::Text(_) => None,
+    });
+    let ends = numbers.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+    (ends[0] <= ends[1]).then_some(ends)
 }
 
 #[cfg(test)]

@@ -351,7 +351,7 @@ fn patch_key(twin: &Twin, scenario: &Scenario, force_n: &PerJaw<f64>) -> PatchKe
     let c = &scenario.covariates;
     let part = &twin.parts[&scenario.part];
     let tilt = |jaw: Jaw| jaw_tilt_rad(twin, &scenario.part, &grip_point(scenario, jaw, 0.0));
-    let volume = |jaw: Jaw| imprint_volume_m3(twin, &scenario.part, part, force_n[jaw]);
+    let volume = |jaw: Jaw| imprint_volume_m3(twin, &scenario.part, part, jaw, force_n[jaw]);
     let numbers = [
         c.grip_offset_m,
         c.grip_angle_rad,

@@ -4,13 +4,16 @@ use gripgen::Project;
 use gripgen::drawn_scenario;
 use gripgen_twin::columns::{self, Column};
 use gripgen_twin::config::ImageStorage;
-use gripgen_twin::draw::{Distribution, Drawn};
+use gripgen_twin::draw::{Drawn, VariedKey};
 use gripgen_twin::effects::{Effect, EffectSpec};
 use gripgen_twin::{Surface, Table, Values, can_be_drawn};
 use std::fmt;
 
 /// Columns that change over a campaign though nobody sets them. The others are settings, of which one value is a choice.
 const CHANGE_BY_THEMSELVES: [&str; 5] = ["time_s", "pull_index", "temperature_c", "gel_id", "session"];
+
+/// Columns that the groups of a sweep fill.
+const GROUPS: [&str; 2] = ["gel_id", "session"];
 
 /// A column that a twin depends on and that is the same in every sample of a sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,19 +140,20 @@ enum Stated {
 /// What `[vary]` says of a column.
 fn stated(project: &Project, name: &str) -> Stated {
     match drawn_from(project, name) {
+        None if project.sweep.groups.is_some() && GROUPS.contains(&name) => Stated::Varies,
         None => Stated::No,
-        Some(distribution) if distribution.constant().is_some() => Stated::OneValue,
+        Some(varied) if varied.distribution.constant().is_some() => Stated::OneValue,
         Some(_) => Stated::Varies,
     }
 }
 
 /// What `[vary]` draws a column of a table of pulls from, whichever of its names the key is.
-pub(crate) fn drawn_from<'a>(project: &'a Project, name: &str) -> Option<&'a Distribution> {
+pub(crate) fn drawn_from<'a>(project: &'a Project, name: &str) -> Option<&'a VariedKey> {
     let is_it = |key: &str| match columns::covariate(name) {
         Some(column) => columns::find(key).is_some_and(|drawn| drawn.name == column.name),
         None => key == name,
     };
-    project.sweep.vary.iter().find(|varied| is_it(&varied.key)).map(|varied| &varied.distribution)
+    project.sweep.vary.iter().find(|varied| is_it(&varied.key))
 }
 
 /// Whether an effect does anything to a sample of the sweep.

@@ -335,15 +335,18 @@ class Dataset(Sequence[Sample]):
         return replace(self, rows=rows, _opened=(os.getpid(), self._open()))
 
     def split(
-        self, *, by: str | Sequence[str] = "group", test: float = 0.2, seed: int = 0
+        self, *, by: str | Sequence[str] | None = None, test: float = 0.2, seed: int = 0
     ) -> tuple[Dataset, Dataset]:
         """Split into train and test so that rows with equal values of `by` stay together.
 
-        The default keeps the repetitions of a configuration together, which would leak from train to test otherwise;
+        The default keeps together what shares a draw and would leak from train to test otherwise: whole rigs (`rig_id`) where
+        the sweep has several, the repetitions of a configuration (`group`) where it has not;
         `by="part"` holds out whole parts, `by=("part", "grip_pose")` whole grips. `test` is the share of groups, above 0
         and below 1; each side has one at least.
         """
         test = checks.share(test)
+        if by is None:
+            by = "rig_id" if "rig_id" in self._columns() and len(set(self.column("rig_id"))) > 1 else "group"
         names = [by] if isinstance(by, str) else list(by)
         if by == "group" and "group" not in self._columns():
             # Measured pulls: what was set is the configuration.

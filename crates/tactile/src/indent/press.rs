@@ -19,7 +19,7 @@ pub(crate) struct Press<'a> {
 
 impl Press<'_> {
     fn pyramid(&self) -> PressedGel {
-        PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n: self.imprint_m3_per_n }
+        PressedGel::of(self.gel, self.imprint_m3_per_n)
     }
 
     /// Presses a part in. `rest` is the gel's surface without contact, flat without one.

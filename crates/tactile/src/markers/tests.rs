@@ -8,7 +8,10 @@ const GRID: Grid = Grid { width_px: 320, height_px: 240, metres_per_px: 1e-4 };
 
 /// A point-like force in the middle of the image.
 fn point(force_n: f64) -> ContactPatch {
-    ContactPatch { cells: vec![PressureCell { x_m: 0.0, y_m: 0.0, area_m2: 1e-10, force_n }] }
+    ContactPatch {
+        cells: vec![PressureCell { x_m: 0.0, y_m: 0.0, area_m2: 1e-10, force_n }],
+        ..Default::default()
+    }
 }
 
 /// Where in pixels a point lies that is (x, y) metres from the middle.
@@ -95,6 +98,7 @@ fn pressing_spreads_pulling_drags_and_twisting_turns() {
     let cell = |x: f64, y: f64| PressureCell { x_m: x, y_m: y, area_m2: 1e-6, force_n: 2.5 };
     let patch = ContactPatch {
         cells: [(1e-3, 0.0), (-1e-3, 0.0), (0.0, 1e-3), (0.0, -1e-3)].map(|(x, y)| cell(x, y)).to_vec(),
+        ..Default::default()
     };
     let ring: Vec<[f64; 2]> =
         (0..8).map(|i| f64::from(i) * PI / 4.0).map(|a| at(5e-3 * a.cos(), 5e-3 * a.sin())).collect();

@@ -87,7 +87,7 @@ impl TestSensor {
             };
             height_mm * 1e-3 / GRID.metres_per_px
         });
-        let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n: IMPRINT_M3_PER_N };
+        let gel = PressedGel::of(&self.gel, IMPRINT_M3_PER_N);
         let heights = added(rounded_as_seen(heights, &GRID, optics), dome(&GRID, &GRID, optics).as_ref());
         let imprint = indent(&heights, &GRID, &gel, scene.force_n).unwrap();
         let thickness_m = self.gel.thickness_m;

@@ -84,7 +84,7 @@ mod tests {
             let (u, v) = (x as f32 - 40.0, y as f32 - 37.0);
             -((u * u + v * v).sqrt() - 20.0).abs()
         });
-        let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
+        let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9, stiffens: false };
         let imprint = indent(&heights, &grid, &gel, 10.0).unwrap();
         let map = CellMap::new(&imprint.places);
         let cells = map.of_contact(&imprint.depth_px, &grid, [0.0, 0.0]);

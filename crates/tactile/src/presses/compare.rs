@@ -196,6 +196,10 @@ pub(super) fn gel_of(sensor: &Sensor) -> Gel {
         shear_by_area: 1.0,
         kernels_px: pyramid.kernels_px,
         restore_depth_fraction: pyramid.restore_depth_fraction,
+        compliance: 1.0,
+        stiffens: false,
+        interlock: 0.0,
+        interlock_smoothing_m: 3e-4,
     }
 }
 

@@ -25,7 +25,7 @@ fn block(outline: [(f64, f64); 4]) -> TriMesh {
 }
 
 fn press(mesh: &TriMesh, force_n: f64) -> (Plane, f64) {
-    let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9 };
+    let gel = PressedGel { thickness_m: 4e-3, imprint_m3_per_n: 1e-9, stiffens: false };
     let mesh = ClusteredMesh::new(mesh);
     let mut map = HeightMap::default();
     map.start(&mesh, &Pose::identity(), &GRID);

@@ -107,7 +107,7 @@ impl Renderer<'_> {
         let grid = &self.sensor.grid;
         let lift_px = contact.lift_m / grid.metres_per_px;
         if contact.elastic.is_none() && !optics.changes_press() {
-            let gel = PressedGel { thickness_m: self.gel.thickness_m, imprint_m3_per_n: 0.0 };
+            let gel = PressedGel::of(self.gel, 0.0);
             let rest = self.sensor.gel_shape.rest_px(grid);
             let placed =
                 Indentation { grid, gel: &gel, force_n: 0.0, rest: rest.as_ref(), level: self.level };

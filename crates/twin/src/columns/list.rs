@@ -42,6 +42,15 @@ pub const COLUMNS: &[Column] = &[
         ..COLUMN
     },
     Column {
+        name: "rig_id",
+        about: "which rig",
+        kind: Kind::Word,
+        in_table: InTable::Absent,
+        indexed: false,
+        known_to_rig: false,
+        ..COLUMN
+    },
+    Column {
         name: "gel_id",
         about: "which gel is mounted",
         kind: Kind::Word,

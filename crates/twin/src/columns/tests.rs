@@ -64,6 +64,7 @@ fn the_order_of_the_columns_is_that_of_the_files() {
         [
             "part",
             "grip_pose",
+            "rig_id",
             "gel_id",
             "session",
             "grip_force_n",

@@ -1,11 +1,14 @@
 //! Reading the values of `[vary]`.
 
 use super::{ConfigError, suggestion};
-use crate::draw::{Distribution, Drawn, VariedKey};
+use crate::draw::{Distribution, Drawn, Level, VariedKey};
 use crate::scenario::keys::{pull_keys, scenario_keys};
 
 /// Names of the distributions.
-const NAMES: [&str; 4] = ["uniform", "normal", "log_uniform", "from"];
+const NAMES: [&str; 6] = ["uniform", "normal", "log_uniform", "log_normal", "one_of", "from"];
+
+/// What may stand with a distribution: what shares a draw, what further levels add, and where values end.
+const WITH: [&str; 3] = ["per", "spread", "limits"];
 
 /// Reads all entries of `[vary]`, sorted by key. Nested tables count as dotted keys.
 pub(crate) fn read(vary: &toml::Table) -> Result<Vec<VariedKey>, ConfigError> {
@@ -20,7 +23,7 @@ fn collect(table: &toml::Table, prefix: &str, keys: &mut Vec<VariedKey>) -> Resu
         let key = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
         match value {
             toml::Value::Table(inner) if !is_distribution(&key, inner) => collect(inner, &key, keys)?,
-            _ => keys.push(VariedKey { distribution: distribution(&key, value)?, key }),
+            _ => keys.push(varied(key, value)?),
         }
     }
     Ok(())
@@ -35,25 +38,108 @@ fn is_distribution(key: &str, table: &toml::Table) -> bool {
     let pair = |v: &toml::Value| v.as_array().is_some_and(|a| a.len() == 2);
     takes_values
         || table.iter().any(|(k, v)| {
-            [&NAMES[..], &CUSTOMARY].concat().contains(&k.as_str())
+            [&NAMES[..], &WITH, &CUSTOMARY].concat().contains(&k.as_str())
                 || (pair(v) && suggestion(k, NAMES).is_some())
         })
+}
+
+fn varied(key: String, value: &toml::Value) -> Result<VariedKey, ConfigError> {
+    let place = format!("vary.{key}");
+    let toml::Value::Table(table) = value else {
+        let distribution = distribution(&key, value)?;
+        return Ok(VariedKey::new(key, distribution));
+    };
+    let own = table.iter().filter(|(name, _)| !WITH.contains(&name.as_str()));
+    let own = toml::Value::Table(own.map(|(name, value)| (name.clone(), value.clone())).collect());
+    let mut varied = VariedKey::new(key.clone(), distribution(&key, &own)?);
+    if let Some(name) = table.get("per") {
+        varied.per = per(&place, name)?;
+    }
+    if let Some(spread) = table.get("spread") {
+        varied.spread = self::spread(&place, spread)?;
+    }
+    if let Some(ends) = table.get("limits") {
+        let [low, high] = pair(&place, "limits", ends)?;
+        ordered(&place, low, high)?;
+        varied.limits = Some([low, high]);
+    }
+    let words = matches!(varied.distribution, Distribution::Choice(_) | Distribution::Posterior { .. });
+    if words && (varied.limits.is_some() || !varied.spread.is_empty()) {
+        let problem = "a list of values has neither spread nor limits";
+        return Err(ConfigError::new(place, problem)
+            .hint("normal, log_normal, uniform, log_uniform and from = \"interval\" have them"));
+    }
+    if !varied.is_per_grip() && matches!(varied.distribution, Distribution::Posterior { .. }) {
+        return Err(ConfigError::new(place, "a posterior is drawn for each grip, it takes no `per`"));
+    }
+    if let Some((twice, _)) = varied.spread.iter().find(|(level, _)| varied.per == [*level]) {
+        let problem = format!("the spread of the level `{twice}` is in the distribution already");
+        return Err(ConfigError::new(format!("{place}.spread"), problem)
+            .hint("name other levels in `spread`, or another one in `per`"));
+    }
+    Ok(varied)
+}
+
+/// One level, or several: what is drawn for each part on each rig.
+fn per(place: &str, value: &toml::Value) -> Result<Vec<Level>, ConfigError> {
+    let names: Vec<&str> = match value {
+        toml::Value::Array(names) => names.iter().map(|name| name.as_str().unwrap_or_default()).collect(),
+        name => vec![name.as_str().unwrap_or_default()],
+    };
+    let mut levels = names.into_iter().map(|name| level(place, name)).collect::<Result<Vec<_>, _>>()?;
+    levels.sort();
+    levels.dedup();
+    match levels[..] {
+        [] => {
+            Err(ConfigError::new(place, "`per` names no level").hint("leave it out, or write per = \"rig\""))
+        }
+        _ => Ok(levels),
+    }
+}
+
+fn level(place: &str, name: &str) -> Result<Level, ConfigError> {
+    let names = Level::ALL.map(Level::name);
+    Level::ALL.into_iter().find(|level| level.name() == name).ok_or_else(|| {
+        ConfigError::new(place, format!("there is no level `{name}`"))
+            .suggest(name, names, || format!("levels: {}", names.join(", ")))
+    })
+}
+
+fn spread(place: &str, value: &toml::Value) -> Result<Vec<(Level, f64)>, ConfigError> {
+    let place = format!("{place}.spread");
+    let Some(table) = value.as_table() else {
+        return Err(ConfigError::new(
+            place,
+            format!("levels with their deviations are needed, found {value}"),
+        )
+        .hint("write for example spread = { gel = 0.12, session = 0.08 }"));
+    };
+    let mut levels = table
+        .iter()
+        .map(|(name, value)| match number(value) {
+            Some(x) if x.is_finite() && x >= 0.0 => Ok((level(&place, name)?, x)),
+            _ => Err(ConfigError::new(
+                &place,
+                format!("the deviation of `{name}` must be at least 0, found {value}"),
+            )),
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    levels.sort_by_key(|(level, _)| *level);
+    Ok(levels)
+}
+
+fn list(place: &str, items: &[toml::Value]) -> Result<Distribution, ConfigError> {
+    if items.is_empty() {
+        return Err(ConfigError::new(place, "the list of values is empty"));
+    }
+    let values = items.iter().enumerate().map(|(i, item)| drawn(&format!("{place}[{i}]"), item));
+    Ok(Distribution::Choice(values.collect::<Result<_, _>>()?))
 }
 
 fn distribution(key: &str, value: &toml::Value) -> Result<Distribution, ConfigError> {
     let place = format!("vary.{key}");
     match value {
-        toml::Value::Array(items) => {
-            if items.is_empty() {
-                return Err(ConfigError::new(place, "the list of values is empty"));
-            }
-            let values = items
-                .iter()
-                .enumerate()
-                .map(|(i, item)| drawn(&format!("{place}[{i}]"), item))
-                .collect::<Result<_, _>>()?;
-            Ok(Distribution::Choice(values))
-        }
+        toml::Value::Array(items) => list(&place, items),
         toml::Value::Table(table) if key == POSTERIOR_KEY => posterior(&place, table),
         toml::Value::Table(table) => {
             let [(name, argument)] = &table.iter().collect::<Vec<_>>()[..] else {
@@ -106,12 +192,22 @@ fn named(place: &str, name: &str, argument: &toml::Value) -> Result<Distribution
             }
             Ok(Distribution::Normal { mean, deviation })
         }
+        "log_normal" => {
+            let [median, deviation] = pair(place, name, argument)?;
+            if median <= 0.0 || deviation < 0.0 {
+                let problem = format!("log_normal = [{median}, {deviation}]: the median must be more than 0, the deviation at least 0");
+                return Err(ConfigError::new(place, problem)
+                    .hint("log_normal is [median, standard deviation of the natural logarithm]"));
+            }
+            Ok(Distribution::LogNormal { median, deviation })
+        }
+        "one_of" => list(place, argument.as_array().map_or(&[], Vec::as_slice)),
         "from" if argument.as_str() == Some("interval") => Ok(Distribution::Interval),
         "from" => Err(ConfigError::new(place, format!("cannot draw from {argument}"))
             .hint("the calibrated uncertainty of the key is from = \"interval\"; twin = { from = \"posterior\" } draws all keys together")),
         other => {
             let error = ConfigError::new(place, format!("there is no distribution `{other}`"));
-            let known = "write a list of values, uniform, normal, log_uniform or from = \"interval\"";
+            let known = "write a list of values, uniform, normal, log_uniform, log_normal, one_of or from = \"interval\"";
             Err(error.suggest(other, NAMES, || known.into()))
         }
     }

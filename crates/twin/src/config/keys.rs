@@ -5,9 +5,21 @@
 //! (`effects.load_offset.gear.a`). Names with dots or brackets in them cannot be reached.
 
 use super::ConfigError;
+use std::borrow::Cow;
 
 /// The sections that fall back to the shipped baseline twin, key by key.
 pub const DEFAULTED_SECTIONS: &[&str] = &["robot", "gripper", "wrist", "gel", "optics"];
+
+/// Keys of `[vary]` that begin like this are those of the part that is drawn.
+const DRAWN_PART: &str = "parts.*.";
+
+/// A key of `[vary]` with the name of the drawn part: `parts.gear.mu` for `parts.*.mu`.
+pub(crate) fn of_part<'a>(key: &'a str, part: &str) -> Cow<'a, str> {
+    match key.strip_prefix(DRAWN_PART) {
+        Some(leaf) => format!("parts.{part}.{leaf}").into(),
+        None => key.into(),
+    }
+}
 
 /// Whether a key of `[vary]` or `--set` belongs to the twin.
 pub fn is_twin_key(key: &str) -> bool {

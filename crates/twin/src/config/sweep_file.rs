@@ -43,16 +43,43 @@ pub struct SweepFile {
     /// Samples in one file.
     #[serde(default = "shard_samples")]
     pub shard_samples: u64,
+    /// Files of priors: what they draw is added to `[vary]`, and their effects to the twin, where these lack them. Shipped:
+    /// `asset:priors/friction.toml`, `asset:priors/gel.toml`, `asset:priors/rig.toml`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub priors: Vec<String>,
     /// Values that vary: any key of the scenario, of `[pull]` (`pull.increment_n`) or of the twin
     /// (`parts.gear.mu`, `effects.wear.depth`), or a column of one's own that a table of the twin depends on.
-    /// A value is a list, a plain value, `{ uniform = [low, high] }`, `{ log_uniform = [low, high] }`, `{ normal = [mean, deviation] }` or `{ from = "interval" }`.
+    /// `parts.*.KEY` is the key of the part that is drawn: `parts.*.mu`.
+    /// A value is a list, a plain value, `{ uniform = [low, high] }`, `{ log_uniform = [low, high] }`, `{ normal = [mean, deviation] }`,
+    /// `{ log_normal = [median, deviation of the natural logarithm] }` or `{ from = "interval" }`.
+    /// `per = "rig" | "gel" | "session" | "part" | "grip" | "sample"` with it says what shares a draw (`grip`: the repetitions of a
+    /// configuration; `["rig", "part"]`: each part on each rig has its own), `spread = { gel = 0.12 }` what further levels add (multiply, in natural logarithms, where the distribution is
+    /// logarithmic), `limits = [low, high]` where values end; `{ one_of = [...], per = "gel" }` is a list.
     /// `twin = { from = "posterior" }` draws cause and parameters together from the posterior beside the twin.
     #[serde(default)]
     #[schemars(with = "std::collections::BTreeMap<String, serde_json::Value>")]
     pub vary: toml::Table,
+    /// How many rigs, gels and sessions the samples come from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub groups: Option<GroupsFile>,
     /// The pull.
     #[serde(default)]
     pub pull: PullFile,
+}
+
+/// `[groups]`: each sample comes from one session of one gel of one rig, all of them equally likely. Their names are the columns
+/// `session`, `gel_id` and `rig_id`; `per` in `[vary]` says which values they share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GroupsFile {
+    /// Number of rigs.
+    pub rigs: u64,
+    /// Gels that each rig wears out.
+    #[serde(default = "one")]
+    pub gels_per_rig: u64,
+    /// Sessions with each gel.
+    #[serde(default = "one")]
+    pub sessions_per_gel: u64,
 }
 
 fn one() -> u64 {

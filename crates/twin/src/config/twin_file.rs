@@ -171,8 +171,11 @@ pub struct GripperFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WristFile {
-    /// Standard deviation of the white noise of one reading.
+    /// Standard deviation of the noise of one reading.
     pub noise_n: f64,
+    /// Time over which that noise is correlated, as of a filter of first order; 0: white. `calibrate` and `diagnose` take it as white.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub noise_time_s: f64,
     /// Readings per second.
     pub rate_hz: f64,
     /// Uncertainty of values in this section.
@@ -212,6 +215,21 @@ pub struct GelFile {
     /// load. 1: the rim of a round contact slips long before its middle (Mindlin 1949). 0: the contact lets go at once.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub shear_by_area: f64,
+    /// How much softer the gel is than the one whose constants stand elsewhere: imprint constants of all parts are multiplied by it,
+    /// shear stiffness and modulus are divided.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub compliance: f64,
+    /// Share of the interlock of teeth and edges that counts: friction acts on the slopes of the contact, along the pull and across. 0: on
+    /// the projected area alone.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub interlock: f64,
+    /// Standard deviation of the blur that rounds these slopes, as the skin of a gel does.
+    #[serde(default = "interlock_smoothing_mm", skip_serializing_if = "is_interlock_smoothing_mm")]
+    pub interlock_smoothing_mm: f64,
+    /// Whether the gel stiffens as it gets thinner: `V = c F (1 - depth / thickness)`, which no force presses through. Of
+    /// `model = "pyramid"`.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub stiffens: bool,
     /// Sizes of the blurs in pixels of the sensor's image, in order; odd numbers. A calibrated sensor file has its own
     /// blurs and share below, which are used instead.
     pub kernels_px: Vec<u32>,
@@ -316,6 +334,19 @@ fn is_contact_mm_per_px(x: &f64) -> bool {
 
 fn is_one(x: &f64) -> bool {
     *x == 1.0
+}
+
+/// Between the blurs of a tenth and of half a millimetre that images of GelSight gels show at sharp edges.
+fn interlock_smoothing_mm() -> f64 {
+    0.3
+}
+
+fn is_interlock_smoothing_mm(x: &f64) -> bool {
+    *x == interlock_smoothing_mm()
+}
+
+fn is_false(x: &bool) -> bool {
+    !*x
 }
 
 fn is_zero(x: &f64) -> bool {

@@ -1,7 +1,7 @@
 //! The effects of a twin on one part, hook by hook, in the order of the twin.
 
 use super::{CommandHook, Creep, Effect, EffectSpec, GripPoint, SensorHook, SensorMemory, SensorPoint};
-use crate::{OpticsState, Part, Twin};
+use crate::{Jaw, OpticsState, Part, Twin};
 use std::sync::Arc;
 
 fn acting<'a>(twin: &'a Twin, part_name: &'a str) -> impl Iterator<Item = &'a Effect> {
@@ -16,9 +16,10 @@ pub fn normal_force_n(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> f64 {
     })
 }
 
-/// Imprint volume of a jaw whose real normal force is `force_n`: `V = c F`, then the effects.
-pub fn imprint_volume_m3(twin: &Twin, part_name: &str, part: &Part, force_n: f64) -> f64 {
-    acting(twin, part_name).fold(part.imprint_m3_per_n * force_n, |volume_m3, effect| {
+/// Imprint volume of a jaw whose real normal force is `force_n`: `V = c F`, softer gels more, then the effects.
+pub fn imprint_volume_m3(twin: &Twin, part_name: &str, part: &Part, jaw: Jaw, force_n: f64) -> f64 {
+    let imprint_m3_per_n = part.imprint_m3_per_n * twin.gel[jaw].compliance;
+    acting(twin, part_name).fold(imprint_m3_per_n * force_n, |volume_m3, effect| {
         effect.spec.imprint_volume.map_or(volume_m3, |hook| hook(&effect.values, volume_m3, force_n))
     })
 }

@@ -84,7 +84,7 @@ mod tests {
             }
         }
         cells.retain(|cell| cell.area_m2 > 0.0);
-        ContactPatch { cells }
+        ContactPatch { cells, ..Default::default() }
     }
 
     /// A Hertz contact of a sphere: a = (3 F R / 4 E*)^(1/3), p0 = 3 F / (2 pi a^2).

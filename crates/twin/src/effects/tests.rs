@@ -231,7 +231,7 @@ fn a_twin_of_neutral_effects_is_the_twin_without_effects() {
         let equal = |(a, b): (u64, u64)| assert_eq!(a, b, "{at:?}");
         equal(both(&|t| grip_friction(t, "rod", part, at).unwrap().mu));
         equal(both(&|t| normal_force_n(t, "rod", at)));
-        equal(both(&|t| imprint_volume_m3(t, "rod", part, at.grip_force_n)));
+        equal(both(&|t| imprint_volume_m3(t, "rod", part, at.jaw, at.grip_force_n)));
         equal(both(&|t| jaw_tilt_rad(t, "rod", at)));
         assert_eq!(optics_state(&neutral_twin, "rod", at), OpticsState::default());
         assert!(optics_state(&plain, "rod", at).is_neutral());
@@ -292,7 +292,7 @@ fn optics_effects_act_on_their_part_and_on_no_force() {
             (
                 mu,
                 normal_force_n(t, "rod", at),
-                imprint_volume_m3(t, "rod", part, 40.0),
+                imprint_volume_m3(t, "rod", part, at.jaw, 40.0),
                 jaw_tilt_rad(t, "rod", at),
             )
         };
@@ -324,7 +324,10 @@ fn friction_laws_see_the_real_normal_force() {
 /// A patch of two cells of 50 mm2 with 10 and 30 N, and an empty one.
 fn patch() -> ContactPatch {
     let cell = |x_m, force_n, area_m2| PressureCell { x_m, y_m: 0.0, area_m2, force_n };
-    ContactPatch { cells: vec![cell(-5e-3, 10.0, 5e-5), cell(5e-3, 30.0, 5e-5), cell(0.0, 0.0, 0.0)] }
+    ContactPatch {
+        cells: vec![cell(-5e-3, 10.0, 5e-5), cell(5e-3, 30.0, 5e-5), cell(0.0, 0.0, 0.0)],
+        ..Default::default()
+    }
 }
 
 #[test]

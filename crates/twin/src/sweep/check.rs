@@ -1,10 +1,10 @@
 //! Checking a sweep against the twin it names, before any work is done.
 
-use super::{MAX_SAMPLES, Sweep, put, read_twin};
+use super::{MAX_SAMPLES, Sweep, groups, put, read_twin};
 use crate::columns::{self, Column};
 use crate::config::{
     Backend, Compression, ConfigError, DesignFile, Document, ImageStorage, PullFile, StepFile, SweepFile,
-    in_range, is_twin_key, read_vary, suggestion,
+    in_range, is_twin_key, of_part, read_vary, suggestion,
 };
 use crate::draw::{Distribution, Drawn, VariedKey};
 use crate::image::film::FilmPace;
@@ -28,7 +28,7 @@ impl Sweep {
             ("grip_force_n", vec![Drawn::Number(super::DEFAULT_GRIP_FORCE_N)]),
         ] {
             if vary.iter().all(|v| v.key != key) {
-                vary.push(VariedKey { key: key.into(), distribution: Distribution::Choice(default) });
+                vary.push(VariedKey::new(key, Distribution::Choice(default)));
             }
         }
         vary.sort_by(|a, b| a.key.cmp(&b.key));
@@ -38,6 +38,7 @@ impl Sweep {
             }
             check_listed(varied)?;
         }
+        groups::check(file.groups, &vary, file.design)?;
         let samples = number_of_samples(file, &vary)?;
         if file.design == DesignFile::Sobol {
             check_sobol(samples.div_ceil(file.repetitions), vary.len())?;
@@ -62,6 +63,7 @@ impl Sweep {
             trace: file.trace,
             shard_samples: file.shard_samples,
             vary,
+            groups: file.groups,
             posterior: None,
             pull: file.pull.clone(),
         };
@@ -75,7 +77,7 @@ impl Sweep {
         for varied in &self.vary {
             let place = format!("vary.{}", varied.key);
             let listed = matches!(varied.distribution, Distribution::Choice(_));
-            for (i, value) in varied.distribution.extremes().into_iter().enumerate() {
+            for (i, value) in varied.extremes().into_iter().enumerate() {
                 let key = if listed { format!("{place}[{i}]") } else { place.clone() };
                 self.check_value(twin, checked, &varied.key, &value).map_err(|e| match e {
                     KeyError::Unknown => unknown_key(key, &varied.key, &keys::own_columns(checked)),
@@ -95,7 +97,9 @@ impl Sweep {
         }
         if is_twin_key(key) {
             let mut table = twin.table().clone();
-            put(&mut table, key, value)?;
+            for part in self.drawn_parts() {
+                put(&mut table, &of_part(key, part), value)?;
+            }
             read_twin(&table)?;
             return Ok(());
         }
@@ -355,7 +359,9 @@ mod tests {
         assert_eq!(hint("moisture"), "did you mean `moisture_pct`?");
         let other = hint("humidity");
         assert!(
-            other.starts_with("keys of a scenario: part, grip_pose, gel_id, session, grip_force_n, dwell_s"),
+            other.starts_with(
+                "keys of a scenario: part, grip_pose, rig_id, gel_id, session, grip_force_n, dwell_s"
+            ),
             "{other}"
         );
     }

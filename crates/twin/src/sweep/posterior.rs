@@ -1,6 +1,6 @@
 //! Sweeps that draw cause and parameters of the twin together.
 
-use super::Sweep;
+use super::{Sweep, groups};
 use crate::config::{ConfigError, Document, is_twin_key};
 use crate::draw::Distribution;
 use crate::{CAUSE_KEY, Posterior, PosteriorDraw};
@@ -68,16 +68,17 @@ impl Sweep {
         let posterior = self.posterior.as_deref()?;
         let from = |v: &crate::draw::VariedKey| matches!(v.distribution, Distribution::Posterior { .. });
         let dimension = self.vary.iter().position(from)?;
-        let u = self.coordinate(index / self.repetitions, dimension, &self.vary[dimension]);
+        let u = self.grip_coordinate(index / self.repetitions, dimension, &self.vary[dimension]);
         Some((posterior, posterior.at(u)))
     }
 
-    /// Keys whose values are recorded with each sample: those of `[vary]`, and those of its posterior.
+    /// Keys whose values are recorded with each sample: those of `[groups]` and `[vary]`, and those of its posterior.
     pub fn drawn_keys(&self) -> impl Iterator<Item = &str> {
         let of_posterior = self.posterior.as_deref();
         let cause = of_posterior.map(|_| CAUSE_KEY);
         let keys = of_posterior.into_iter().flat_map(|p| p.keys.iter().map(String::as_str));
         let own = self.vary.iter().filter(|v| !matches!(v.distribution, Distribution::Posterior { .. }));
-        own.map(|v| v.key.as_str()).chain(cause).chain(keys)
+        let groups = if self.groups.is_some() { &groups::COLUMNS[..] } else { &[] };
+        groups.iter().copied().chain(own.map(|v| v.key.as_str())).chain(cause).chain(keys)
     }
 }

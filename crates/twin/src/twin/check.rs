@@ -70,14 +70,25 @@ pub(super) fn check_gel(gel: &GelFile, key: &str) -> Result<Gel, ConfigError> {
         return Err(ConfigError::new(format!("{key}.contact_mm_per_px"), problem)
             .hint("use larger contact pixels or a smaller pad"));
     }
+    if gel.stiffens && gel.model == GelModel::Elastic {
+        let problem = "an elastic gel does not stiffen, its modulus is constant";
+        return Err(ConfigError::new(format!("{key}.stiffens"), problem).hint("model = \"pyramid\" does"));
+    }
+    let compliance = checked("compliance", gel.compliance, 0.01..=100.0, "1")?;
     Ok(Gel {
         thickness_m: checked("thickness_mm", gel.thickness_mm, 0.1..=50.0, "mm")? * 1e-3,
         width_m: checked("width_mm", gel.width_mm, 1.0..=200.0, "mm")? * 1e-3,
         height_m: checked("height_mm", gel.height_mm, 1.0..=200.0, "mm")? * 1e-3,
         contact_m_per_px: contact_mm_per_px * 1e-3,
         shear_stiffness_n_per_m: 1e3
-            * checked("shear_stiffness_n_per_mm", gel.shear_stiffness_n_per_mm, 0.1..=1e4, "N/mm")?,
+            * checked("shear_stiffness_n_per_mm", gel.shear_stiffness_n_per_mm, 0.1..=1e4, "N/mm")?
+            / compliance,
         shear_by_area: checked("shear_by_area", gel.shear_by_area, 0.0..=1.0, "1")?,
+        stiffens: gel.stiffens,
+        interlock: checked("interlock", gel.interlock, 0.0..=10.0, "1")?,
+        interlock_smoothing_m: 1e-3
+            * checked("interlock_smoothing_mm", gel.interlock_smoothing_mm, 0.0..=5.0, "mm")?,
+        compliance,
         kernels_px: gel.kernels_px.clone(),
         restore_depth_fraction: checked(
             "restore_depth_fraction",
@@ -100,7 +111,7 @@ fn check_elastic(gel: &GelFile, key: &str) -> Result<Option<Elastic>, ConfigErro
         return Err(ConfigError::new(modulus, "model = \"elastic\" needs the modulus of the gel")
             .hint("a silicone gel of such a sensor has 0.275 MPa by its hardness; imprints of the shipped parts are those of 0.85"));
     }
-    Ok(mpa.map(|mpa| Elastic { young_modulus_pa: mpa * 1e6, poisson_ratio }))
+    Ok(mpa.map(|mpa| Elastic { young_modulus_pa: mpa * 1e6 / gel.compliance, poisson_ratio }))
 }
 
 pub(super) fn check_part(part: &PartFile, key: &str) -> Result<Part, ConfigError> {
