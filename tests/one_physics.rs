@@ -1,7 +1,7 @@
 //! What a twin simulates is what it predicts: labels of campaigns made on a twin against the labels expected of it.
 
 use crate::bristles;
-use crate::common::{jobs, overrides, root, run, slow, twin_with, twin_with_sets};
+use crate::common::{jobs, overrides, run, slow, twin_with, twin_with_sets};
 use gripgen::twin::config::ConfigError;
 use gripgen::twin::effects::{EffectSpec, LIBRARY};
 use gripgen::twin::random::{Purpose, Stream};
@@ -277,12 +277,15 @@ fn a_twin_simulates_and_predicts_what_an_own_integration_says_of_pairs() {
     agree(&pairs(if slow() { 200 } else { 24 }), if slow() { 24 } else { 8 });
 }
 
-/// The shipped twin of the large set, through the folder of a run: its labels have friction by pressure cell.
+/// The twin of the quickstart, through the folder of a run: its labels have friction by pressure cell.
 #[test]
-fn the_large_twin_predicts_its_own_sweep() {
+fn the_twin_of_the_quickstart_predicts_its_own_sweep() {
     let sets = [
+        ("design", "random"),
         ("samples", "64"),
+        ("mechanics", "reduced"),
         ("images", "none"),
+        ("trace", "none"),
         ("wrist.noise_n", "0"),
         ("parts.ball_bearing.scatter", "0"),
         ("parts.long_shaft.scatter", "0"),
@@ -290,17 +293,9 @@ fn the_large_twin_predicts_its_own_sweep() {
         ("parts.roller_bearing.scatter", "0"),
     ];
     let sets = overrides(&sets);
-    let file = std::fs::read_to_string(root().join("assets/configs/large.toml")).unwrap();
-    // What varies of the twin is not known to a comparison.
-    let plain: Vec<&str> =
-        file.lines().filter(|l| !l.starts_with("\"effects") && !l.starts_with("\"robot")).collect();
     let folder = tempfile::tempdir().unwrap();
-    let at = folder.path().join("large.toml");
-    let twin_at = Location::parse("asset:configs/twin-large.toml");
-    let text =
-        plain.join("\n").replace("twin = \"twin-large.toml\"", "twin = \"asset:configs/twin-large.toml\"");
-    std::fs::write(&at, text).unwrap();
-    let project = Project::load(&Location::Disk(at), &sets).unwrap();
+    let twin_at = Location::parse("asset:configs/twin-contact.toml");
+    let project = Project::load(&Location::parse("asset:configs/quickstart.toml"), &sets).unwrap();
     let out = folder.path().join("run");
     run(&project, &out, jobs(2));
     let measured = load_pulls(&out).unwrap().pulls;

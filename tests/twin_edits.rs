@@ -23,7 +23,7 @@ fn calibration() -> CalibrationFile {
 #[test]
 fn a_twin_without_edits_is_the_same_twin() {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["twin-baseline", "twin", "twin-large"] {
+    for name in ["twin-baseline", "twin", "twin-training"] {
         let base = Location::parse(&format!("asset:configs/{name}.toml"));
         let out = folder.path().join(format!("{name}.toml"));
         write_twin(&base, &[], &TwinEdits::default(), &out).unwrap();

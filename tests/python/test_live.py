@@ -21,7 +21,7 @@ def test_a_sweep_is_watched_in_a_browser(tmp_path, width_px):
     browser = next((b for b in BROWSERS if shutil.which(b)), None)
     if browser is None:
         pytest.skip("no browser on this machine")
-    run = [os.environ["GRIPGEN_BIN"], "sweep", "asset:configs/large.toml", "-o", str(tmp_path / "run"), "--live", "--jobs", "1"]
+    run = [os.environ["GRIPGEN_BIN"], "sweep", "asset:configs/training.toml", "-o", str(tmp_path / "run"), "--live", "--jobs", "1"]
     run += ["--set", "samples=100000", "--set", "shard_samples=4"]
     sweep = subprocess.Popen(run, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     try:
@@ -32,7 +32,7 @@ def test_a_sweep_is_watched_in_a_browser(tmp_path, width_px):
     finally:
         sweep.terminate()
         sweep.wait(60)
-    assert text_of(dom, "title") == "sweep large"
+    assert text_of(dom, "title") == "sweep training"
     made = text_of(dom, "made")
     assert re.match(r"[1-9]\d* of 100000 samples, [\d.]+ per", made), made
     assert "slipped" in text_of(dom, "counts")

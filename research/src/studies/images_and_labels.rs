@@ -101,7 +101,7 @@ fn left_after_ridge(rows: &[Row], posed: bool, sighted: bool) -> f64 {
 }
 
 pub fn run() -> StudyResult {
-    for config in ["asset:configs/quickstart.toml", "asset:configs/large.toml"] {
+    for config in ["asset:configs/quickstart.toml", "asset:configs/training.toml"] {
         let rows = rows(config, 4000)?;
         for (name, posed, sighted) in [
             ("part, F_G", false, false),

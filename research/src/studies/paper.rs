@@ -1,7 +1,7 @@
 //! Runs the experiment of Wucherer et al. 2023 with and without the paper's correction, and writes the report.
 //!
 //! `cargo xtask research paper [FOLDER]` leaves the two runs and `paper.md` in FOLDER
-//! (`runs/paper-report` where it is left out); `docs/paper.md` is a copy.
+//! (`runs/paper-report` where it is left out); `docs/paper.md` is a copy, to which three sections and a link were added by hand.
 
 mod cells;
 mod picture;
