@@ -16,7 +16,7 @@ const OPTIONS: PartOptions =
 
 /// Writes the part and what `init` makes of it.
 fn start(part: &SolidPart, folder: &Path) -> Result<PartStarter, InitError> {
-    let made = part_starter(&part.write(folder), folder, OPTIONS)?;
+    let made = part_starter(&[(&part.write(folder), OPTIONS)], folder)?;
     for file in &made.files {
         std::fs::write(folder.join(&file.name), &file.bytes).unwrap();
     }
@@ -70,7 +70,8 @@ fn proposed_grips_hold_and_the_jaws_stop_at_the_surface() {
                 }
             };
             for (jaw, imprint) in pulled.imprint.iter() {
-                assert!(imprint.patch.area_m2() > 1e-6, "{}, sample {index}, {jaw} jaw", part.name);
+                let area_m2 = imprint.patch.area_m2();
+                assert!(area_m2 > 1e-6, "{}, sample {index}, {jaw} jaw: {area_m2} m2", part.name);
                 // The gels stand where their surfaces first touch: the part's origin lies that far in front of them.
                 let stands_mm = pulled.grasp.gel_from_part[jaw].translation.z * 1e3;
                 if index % (if slow() { 10 } else { 50 }) == 0 {
@@ -96,7 +97,7 @@ fn proposed_grips_hold_and_the_jaws_stop_at_the_surface() {
         println!(
             "{}: {} grips, {} failed, within {worst_mm:.3} mm",
             part.name,
-            made.grips.len(),
+            made.parts[0].grips.len(),
             failed.len()
         );
         assert!(failed.len() <= 4, "{}: {} of 200 failed: {}", part.name, failed.len(), failed[0]);
@@ -144,7 +145,9 @@ fn both_mechanics_agree_where_the_part_is_not_convex() {
 fn proposals_differ_and_local_features_are_found() {
     let folder = tempfile::tempdir().unwrap();
     let all = ordinary();
-    let of = |name: &str| start(all.iter().find(|p| p.name == name).unwrap(), folder.path()).unwrap().grips;
+    let of = |name: &str| {
+        start(all.iter().find(|p| p.name == name).unwrap(), folder.path()).unwrap().parts.remove(0).grips
+    };
     let screw = of("m8_screw");
     let has = |width: f64| screw.iter().any(|g| (g.width_mm - width).abs() < 0.2);
     assert!(has(8.0) && has(13.0), "{screw:?}");
@@ -178,7 +181,7 @@ fn a_part_without_a_grip_says_why() {
     );
     // What is steep all around may still have a place.
     let cone = SolidPart { name: "cone", solids: vec![Solid::Cone(20.0, 40.0)] };
-    assert!(!start(&cone, folder.path()).unwrap().grips.is_empty());
+    assert!(!start(&cone, folder.path()).unwrap().parts[0].grips.is_empty());
 }
 
 /// A mesh with holes is refused with their number, or taken when that is asked for, and `check` says so.
@@ -190,11 +193,11 @@ fn an_open_mesh_is_refused_unless_it_is_accepted() {
     let kept = mesh.triangles()[1..].to_vec();
     let open = gripgen::twin::TriMesh::new(mesh.vertices_m().to_vec(), kept).unwrap();
     std::fs::write(&path, gripgen::twin::write_binary_stl(&open, "open", 1e-3)).unwrap();
-    let error = part_starter(&path, folder.path(), OPTIONS).unwrap_err();
+    let error = part_starter(&[(&path, OPTIONS)], folder.path()).unwrap_err();
     assert!(matches!(error, InitError::Open { open_edges: 3, .. }), "{error}");
     let accepted = PartOptions { accept_open_mesh: true, ..OPTIONS };
-    let made = part_starter(&path, folder.path(), accepted).unwrap();
-    assert!(made.mesh_words.iter().any(|w| w.contains("3 edges")), "{:?}", made.mesh_words);
+    let made = part_starter(&[(&path, accepted)], folder.path()).unwrap();
+    assert!(made.parts[0].mesh_words.iter().any(|w| w.contains("3 edges")), "{:?}", made.parts[0].mesh_words);
     for file in &made.files {
         std::fs::write(folder.path().join(&file.name), &file.bytes).unwrap();
     }
@@ -226,7 +229,7 @@ fn check_warns_of_grips_that_fail() {
 fn proposals_do_not_depend_on_threads() {
     let folder = tempfile::tempdir().unwrap();
     let path = ordinary()[1].write(folder.path());
-    let make = |threads| part_starter(&path, folder.path(), PartOptions { threads, ..OPTIONS }).unwrap();
+    let make = |threads| part_starter(&[(&path, PartOptions { threads, ..OPTIONS })], folder.path()).unwrap();
     assert_eq!(make(1), make(3));
 }
 
@@ -244,8 +247,9 @@ fn turned_faces_change_no_grip() {
         let turned = gripgen::twin::TriMesh::new(mesh.vertices_m().to_vec(), triangles).unwrap();
         let path = folder.path().join("turned.stl");
         std::fs::write(&path, gripgen::twin::write_binary_stl(&turned, "turned", 1e-3)).unwrap();
-        let made = part_starter(&path, folder.path(), OPTIONS).unwrap();
-        (made.grips, made.mesh_words)
+        let made = part_starter(&[(&path, OPTIONS)], folder.path()).unwrap();
+        let part = made.parts.into_iter().next().unwrap();
+        (part.grips, part.mesh_words)
     };
     let (plain, inside_out, mixed) = (grips(0), grips(1), grips(3));
     assert!((plain.0[0].width_mm - 4.0).abs() < 0.1 && plain.0.len() > 1, "{plain:?}");
@@ -267,15 +271,19 @@ fn grips_deep_in_the_gel_are_warned_of() {
     let folder = tempfile::tempdir().unwrap();
     let ball = SolidPart { name: "ball4", solids: vec![Solid::Ball([0.0; 3], 2.0)] };
     let made = start(&ball, folder.path()).unwrap();
-    assert_eq!(made.doubts.len(), made.grips.len());
+    assert_eq!(made.parts[0].doubts.len(), made.parts[0].grips.len());
     assert!(
-        made.doubts[0].iter().any(|w| w.contains("into 4.0 mm of gel, deeper than half")),
+        made.parts[0].doubts[0].iter().any(|w| w.contains("into 4.0 mm of gel, deeper than half")),
         "{:?}",
-        made.doubts
+        made.parts[0].doubts
     );
-    assert!(made.doubts[0].iter().any(|w| w.contains("the gels meet")), "{:?}", made.doubts);
+    assert!(
+        made.parts[0].doubts[0].iter().any(|w| w.contains("the gels meet")),
+        "{:?}",
+        made.parts[0].doubts
+    );
     assert!(made.summary.contains("warning: grip 0: "), "{}", made.summary);
     let all = ordinary();
     let bracket = start(all.iter().find(|p| p.name == "l_bracket").unwrap(), folder.path()).unwrap();
-    assert!(bracket.doubts.iter().all(Vec::is_empty), "{:?}", bracket.doubts);
+    assert!(bracket.parts[0].doubts.iter().all(Vec::is_empty), "{:?}", bracket.parts[0].doubts);
 }

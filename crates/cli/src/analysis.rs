@@ -10,6 +10,7 @@ mod diagnose;
 mod expect;
 mod imprint;
 mod imprint_set;
+mod label_shares;
 mod own_parts;
 mod posterior;
 mod presses;
@@ -36,6 +37,7 @@ pub use imprint::{
     CalibrateImprintsError, ImprintCalibration, ImprintCalibrations, ImprintImagesError, calibrate_imprints,
 };
 pub use imprint_set::{ImprintSet, LoadImprintsError, imprint_data, is_imprint_set, load_imprint_set};
+pub use label_shares::{LabelShares, Source, label_shares};
 pub use own_parts::{OwnParts, effects_of_geometry, jaws_of_grip_force, own_parts};
 pub use posterior::posterior_twins;
 pub use presses::{

@@ -37,23 +37,25 @@ use std::ffi::OsString;
 pub use analysis::{
     Beyond, CalibrateImprintsError, CalibratePullsError, CompareImagesError, Diagnosed, EditedValue,
     EffectCurve, Engine, FoundCircles, ImageComparison, ImageScore, ImprintCalibration, ImprintCalibrations,
-    ImprintImagesError, ImprintSet, LabelErrors, LoadImprintsError, LoadPressesError, LoadSensorError,
-    MeasuredPresses, NextPulls, OwnParts, PressCovariate, PressDiagnosisInput, PressGeometry, PressValues,
-    PullComparison, PullDiagnoseOptions, SimulateCampaignError, TwinEdits, Unvaried, WriteTwinError, beyond,
-    calibrate_imprint_table, calibrate_imprints, calibrate_sensor_table, calibrate_twin, compare_images,
-    compare_imprint_table, compare_pulls, compare_pulls_with, compare_sensor_table, diagnose_imprint_table,
-    diagnose_measured_presses, diagnose_presses, diagnose_pull_table, diagnose_sensor_table, edited_twin,
-    edited_twin_toml, effect_curve, effects_of_geometry, find_circles_with_sensor, find_missing_circles,
-    given_model, imprint_calibration_edits, imprint_data, is_imprint_set, is_press_set, is_sensor_table,
-    jaws_of_grip_force, load_imprint_set, load_presses, load_sensor, load_twin_sensor, measured_presses,
-    own_parts, posterior_twins, presses_sha256, pull_predictor, pull_priors, sensor_calibration_edits,
-    shipped_priors, simulate_campaign, unmeasured, unvaried, with_few_density, write_twin,
+    ImprintImagesError, ImprintSet, LabelErrors, LabelShares, LoadImprintsError, LoadPressesError,
+    LoadSensorError, MeasuredPresses, NextPulls, OwnParts, PressCovariate, PressDiagnosisInput,
+    PressGeometry, PressValues, PullComparison, PullDiagnoseOptions, SimulateCampaignError, Source,
+    TwinEdits, Unvaried, WriteTwinError, beyond, calibrate_imprint_table, calibrate_imprints,
+    calibrate_sensor_table, calibrate_twin, compare_images, compare_imprint_table, compare_pulls,
+    compare_pulls_with, compare_sensor_table, diagnose_imprint_table, diagnose_measured_presses,
+    diagnose_presses, diagnose_pull_table, diagnose_sensor_table, edited_twin, edited_twin_toml,
+    effect_curve, effects_of_geometry, find_circles_with_sensor, find_missing_circles, given_model,
+    imprint_calibration_edits, imprint_data, is_imprint_set, is_press_set, is_sensor_table,
+    jaws_of_grip_force, label_shares, load_imprint_set, load_presses, load_sensor, load_twin_sensor,
+    measured_presses, own_parts, posterior_twins, presses_sha256, pull_predictor, pull_priors,
+    sensor_calibration_edits, shipped_priors, simulate_campaign, unmeasured, unvaried, with_few_density,
+    write_twin,
 };
 pub use bench::{BenchError, BenchOptions, BenchRate, BenchReport, bench};
 pub use failure::Failure;
 pub use part::{
-    BenchmarkStarter, InitError, NoGrip, PartOptions, PartStarter, StarterFile, TryOptions, TryPartError,
-    Varied, benchmark_starter, part_starter, rasterise, starter, try_part,
+    BenchmarkStarter, InitError, NoGrip, PartGrips, PartOptions, PartStarter, StarterFile, TryOptions,
+    TryPartError, Varied, benchmark_starter, part_starter, rasterise, starter, try_part,
 };
 pub use plan::{Plan, Probe, TriedGrip, plan};
 pub use render::{RenderError, RenderOptions, is_height_map, render_file, render_surface};

@@ -4,7 +4,7 @@ mod init;
 mod try_part;
 
 pub use init::{
-    BenchmarkStarter, InitError, NoGrip, PartOptions, PartStarter, StarterFile, Varied, benchmark_starter,
-    part_starter, rasterise, starter,
+    BenchmarkStarter, InitError, NoGrip, PartGrips, PartOptions, PartStarter, StarterFile, Varied,
+    benchmark_starter, part_starter, rasterise, starter,
 };
 pub use try_part::{TryOptions, TryPartError, try_part};

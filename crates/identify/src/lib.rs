@@ -35,6 +35,7 @@ pub mod pulls;
 mod ratio;
 mod robust_line;
 mod sensor;
+mod shares;
 mod statistics;
 mod summary;
 
@@ -72,4 +73,5 @@ pub use sensor::{
     SensorBlock, SensorCalibration, SensorComparison, SensorData, SensorDiagnosis, SensorEvidence,
     SensorOptions, SensorRow, SessionCalibration, calibrate_sensor, compare_sensor, diagnose_sensor,
 };
+pub use shares::closed_share;
 pub use summary::{MIN_REPORTABLE_WEIGHT, summary_sentence};

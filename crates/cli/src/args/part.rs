@@ -9,19 +9,19 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = crate::examples::INIT)]
 pub struct InitArgs {
-    /// A folder to write into, or a mesh (STL, OBJ, PLY, GLB) of your part.
+    /// A folder to write into, or meshes (STL, OBJ, PLY, GLB) of your parts.
     #[arg(default_value = ".")]
-    pub target: PathBuf,
+    pub target: Vec<PathBuf>,
     /// Folder to write into, where TARGET is a mesh.
     #[arg(short, long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// Millimetres per unit of the mesh file; 1 where it is left out, 1000 of GLB, which is in metres.
+    /// Millimetres per unit of the mesh files; 1 where it is left out, 1000 of GLB, which is in metres.
     #[arg(long, value_name = "MM", value_parser = scale)]
     pub scale_mm_per_unit: Option<f64>,
     /// Take a mesh with holes as it is.
     #[arg(long)]
     pub accept_open_mesh: bool,
-    /// Friction coefficient of the part, if it was measured: F / (2 F_G) of its pulls.
+    /// Friction coefficient of the parts, if it was measured: F / (2 F_G) of their pulls.
     #[arg(long, value_name = "MU", value_parser = friction)]
     pub mu: Option<f64>,
     /// A sweep over the benchmark: two hundred parts in twelve families, with grips that were tried.

@@ -6,10 +6,11 @@ use crate::load;
 use crate::output::{JsonSink, count, duration, size};
 use crate::outputs::Outputs;
 use crate::shell;
-use crate::{Beyond, Unvaried, beyond, unvaried};
+use crate::{Beyond, LabelShares, Unvaried, beyond, label_shares, unvaried};
 use crate::{Plan, plan};
 use gripgen::record::{proto::gripgen_v1::Status, status_name};
 use gripgen::tactile::{LINEAR_PRESSURE_SHARE, SimdLevel};
+use gripgen::twin::config::ImageStorage;
 use gripgen::{Location, Project};
 use serde_json::json;
 use std::path::Path;
@@ -32,7 +33,10 @@ pub fn check(
     let plan = plan(&project, SimdLevel::best())?;
     let jobs = jobs.unwrap_or_else(load::jobs).max(1);
     let failed: Vec<_> = plan.probes.iter().filter(|p| p.failure.is_some()).collect();
-    let warnings = [of_columns(&project), of_probes(&plan), of_plan(&plan)].concat();
+    let shares = label_shares(&project, jobs);
+    let warnings =
+        [of_columns(&project), of_probes(&plan), of_plan(&plan), of_shares(&project, shares.as_ref())]
+            .concat();
     if sink.wanted() {
         let probes: Vec<_> = plan
             .probes
@@ -62,11 +66,13 @@ pub fn check(
             "jobs": jobs,
             "probes": probes,
             "grips": grips,
+            "label_shares": shares.as_ref().map(shares_json),
             "warnings": warnings,
         }))?;
     }
     if !talk.quiet {
         eprint!("{}", describe(&project, &plan, jobs));
+        shares.iter().for_each(|shares| eprintln!("{shares}"));
         for warning in &warnings {
             eprintln!("warning: {warning}");
         }
@@ -168,6 +174,30 @@ fn of_plan(plan: &Plan) -> Vec<String> {
         )
     });
     open.chain(failing).collect()
+}
+
+/// Share of the label's variance below which images say nothing of it.
+const NOTHING: f64 = 0.01;
+
+/// What images can teach of the labels, where that is little.
+fn of_shares(project: &Project, shares: Option<&LabelShares>) -> Vec<String> {
+    let has_images = project.sweep.images != ImageStorage::None;
+    let little = shares.filter(|shares| has_images && shares.seen() < NOTHING);
+    let said = |shares: &LabelShares| {
+        format!(
+            "images say nothing of these labels but which part it is: pose and contact carry {:.1} % of their variance. Friction \
+             that depends on the contact changes that: priors = [\"asset:priors/friction.toml\", ...] (docs/training.md)",
+            100.0 * shares.seen()
+        )
+    };
+    little.map(said).into_iter().collect()
+}
+
+/// The shares as JSON.
+pub(super) fn shares_json(shares: &LabelShares) -> serde_json::Value {
+    let of: serde_json::Map<String, serde_json::Value> =
+        shares.shares.iter().map(|(source, share)| (source.key().into(), json!(share))).collect();
+    json!({"shares": of, "error": shares.error, "sd_n": shares.sd_n, "pulls": shares.pairs})
 }
 
 /// The plan in words.

@@ -2,9 +2,11 @@
 
 use crate::args::InfoArgs;
 use crate::failure::Failure;
-use crate::load::{no_pulls, say_warnings};
+use crate::label_shares;
+use crate::load::{jobs, no_pulls, say_warnings};
 use crate::output::{JsonSink, count, print, size};
 use crate::outputs::Outputs;
+use gripgen::Project;
 use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE, RunFolder};
 use gripgen_identify::{Level, levels};
 use gripgen_measured::{PULLS_FILE, is_pulls, load_pulls_of};
@@ -90,6 +92,9 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     if args.talk.quiet {
         return Ok(0);
     }
+    // A run of another version, or of a rig, has no draws to exchange.
+    let project = (info.source != RIG_SOURCE).then(|| Project::from_run(&folder).ok()).flatten();
+    let shares = project.and_then(|project| label_shares(&project, jobs()));
     let mut text = format!("{} ({}), made by gripgen {}\n", info.name, info.source, info.gripgen_version);
     text += &format!("configuration {}\n", &info.config_sha256[..16.min(info.config_sha256.len())]);
     text += &match info.source == RIG_SOURCE {
@@ -110,7 +115,9 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
         }
     };
     let counts: Vec<String> = statuses.iter().map(|(name, n)| format!("{n} {name}")).collect();
-    text += &format!("{}\n\n", counts.join(", "));
+    text += &format!("{}\n", counts.join(", "));
+    shares.iter().for_each(|shares| text += &format!("{shares}\n"));
+    text += "\n";
     text += &format!("{:<20} {:>8} {:>24}\n", "part", "samples", "max_pull_force_n");
     text += &format!("{:<20} {:>8} {:>8} {:>7} {:>7}\n", "", "", "mean", "low", "high");
     if args.talk.verbose {

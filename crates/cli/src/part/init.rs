@@ -51,21 +51,30 @@ pub struct StarterFile {
     pub bytes: Vec<u8>,
 }
 
-/// Files for a part, and what to tell about them.
+/// Files for some parts, and what to tell about them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartStarter {
     /// The files.
     pub files: Vec<StarterFile>,
-    /// The grips proposed, the best first.
-    pub grips: Vec<Proposal>,
-    /// What the sweep varies beside the grip.
+    /// The parts, in the order of their meshes.
+    pub parts: Vec<PartGrips>,
+    /// What the sweep varies beside the grip: what all grips of all parts stand.
     pub varied: Varied,
+    /// Sizes of the parts and the grips found, a line each.
+    pub summary: String,
+}
+
+/// The grips that are proposed for a part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartGrips {
+    /// Its name in the twin.
+    pub name: String,
+    /// The best first.
+    pub grips: Vec<Proposal>,
+    /// What is doubtful of each, a sentence each.
+    pub doubts: Vec<Vec<String>>,
     /// What is to be said of the mesh, a sentence each.
     pub mesh_words: Vec<String>,
-    /// What is doubtful of each grip, a sentence each.
-    pub doubts: Vec<Vec<String>>,
-    /// Size of the part and the grips found, a line each.
-    pub summary: String,
 }
 
 /// Why a part has no grip.
@@ -167,6 +176,16 @@ pub enum InitError {
         /// Edges of one triangle only.
         open_edges: usize,
     },
+    /// Two meshes would make one part.
+    #[error("{first} and {second} would both be the part `{name}`")]
+    OneName {
+        /// Name of the part.
+        name: String,
+        /// One mesh.
+        first: String,
+        /// The other.
+        second: String,
+    },
     /// No grip works.
     #[error("{path}: no grip found on {x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm: {source}")]
     NoGrip {
@@ -193,6 +212,9 @@ impl InitError {
             | InitError::NoGrip { x_mm, y_mm, z_mm, .. } => [*x_mm, *y_mm, *z_mm],
             InitError::Open { .. } => {
                 return "close its holes (Meshlab, Blender), or go on with --accept-open-mesh".into();
+            }
+            InitError::OneName { .. } => {
+                return "rename one of the files: its name is that of the part".into();
             }
             InitError::Read(_) => return "a path is relative to where you are".into(),
             InitError::Mesh(LibraryError::Mesh { source, .. }) => return source.hint().into(),
@@ -244,7 +266,7 @@ pub struct PartOptions {
     pub scale_mm_per_unit: f64,
     /// Whether an open mesh is taken as it is.
     pub accept_open_mesh: bool,
-    /// Friction coefficient of the part, if it was measured: what the twin is written with. Grips are looked for without it.
+    /// Friction coefficient of the part, if it was measured: twin and sweep are written with it. Grips are looked for without it.
     pub mu: Option<f64>,
     /// Threads to try grips with; the result does not depend on them.
     pub threads: usize,
@@ -331,49 +353,66 @@ pub(crate) fn search(path: &Path, options: PartOptions, twin: Twin) -> Result<Se
     Ok(Searched { name: part_name(path), bytes, mesh, size_mm, mesh_words, twin, library, proposed })
 }
 
-/// A sweep, a twin with grips that were tried, a picture and a copy of the mesh, for the mesh file at `path`.
+/// A sweep, a twin with grips that were tried, pictures and copies of the meshes, for mesh files with their options.
 ///
 /// # Errors
 ///
-/// A file that is no mesh, a mesh that is open, or a part on which no grip works.
-pub fn part_starter(path: &Path, folder: &Path, options: PartOptions) -> Result<PartStarter, InitError> {
-    let searched = search(path, options, baseline())?;
-    let Searched { name, bytes, mesh, mesh_words, proposed, size_mm: [x_mm, y_mm, z_mm], .. } = searched;
-    let size = format!("{x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm");
-    let (mesh_name, copy) = mesh_reference(path, folder);
-    let (proposals, varied) = (&proposed.grips, &proposed.varied);
-    let mu_is = match options.mu {
-        Some(_) => "as it was given to `gripgen init --mu`",
-        None => "an assumption: measure it with a few pulls",
-    };
+/// A file that is no mesh, a mesh that is open, a part on which no grip works, or two of one name.
+pub fn part_starter(meshes: &[(&Path, PartOptions)], folder: &Path) -> Result<PartStarter, InitError> {
+    let (mut files, mut sections, mut parts) = (Vec::new(), Vec::new(), Vec::new());
+    for &(path, options) in meshes {
+        let Searched { name, bytes, mesh, mesh_words, proposed, size_mm: [x_mm, y_mm, z_mm], .. } =
+            search(path, options, baseline())?;
+        if let Some(k) = parts.iter().position(|part: &StarterPart| part.name == name) {
+            let [first, second] = [meshes[k].0, path].map(|path| path.display().to_string());
+            return Err(InitError::OneName { name, first, second });
+        }
+        let size = format!("{x_mm:.1} x {y_mm:.1} x {z_mm:.1} mm");
+        let (mesh_name, copy) = mesh_reference(path, folder);
+        sections.push(text::part_section(&name, &mesh_name, &size, options, &proposed.grips));
+        let picture = if meshes.len() == 1 { "grips.png".into() } else { format!("{name}-grips.png") };
+        let bytes_of_picture = grips_picture(&name, &mesh, &proposed.grips, &rasterise);
+        files.push(StarterFile { name: picture, bytes: bytes_of_picture });
+        if copy {
+            files.push(StarterFile { name: mesh_name, bytes });
+        }
+        parts.push(StarterPart { name, size, mesh_words, proposed });
+    }
+    let varied = text::narrowest(parts.iter().map(|part| &part.proposed.varied));
+    let poses = parts.iter().map(|part| part.proposed.grips.len()).min().unwrap_or(0);
     let fill = |template: &str| {
         template
-            .replace("{{part}}", &name)
-            .replace("{{mesh}}", &mesh_name)
-            .replace("{{scale_mm_per_unit}}", &format!("{:?}", options.scale_mm_per_unit))
-            .replace("{{size}}", &size)
-            .replace("{{mu}}", &format!("{:?}", options.mu.unwrap_or(MU)))
-            .replace("{{mu_is}}", mu_is)
-            .replace("{{imprint_mm3_per_n}}", &format!("{IMPRINT_MM3_PER_N:?}"))
-            .replace("{{grips}}", &text::grips_toml(&name, proposals))
-            .replace("{{grip_poses}}", &text::pose_list(proposals.len()))
+            .replace("{{parts_said}}", &text::listed(&parts))
+            .replace("{{parts}}", sections.join("\n").trim_end())
+            .replace(
+                "{{mu_known}}",
+                &text::mu_known(meshes.iter().filter_map(|(_, options)| options.mu).next()),
+            )
+            .replace("{{grip_poses}}", &text::pose_list(poses))
             .replace("{{grip_force_n}}", &text::numbers(&[varied.grip_force_n.0, varied.grip_force_n.1]))
             .replace("{{grip_offset_sd_mm}}", &format!("{:?}", varied.grip_offset_sd_mm))
             .replace("{{grip_angle_deg}}", &text::numbers(&varied.grip_angle_deg))
-            .replace("{{narrowed}}", &text::narrowed_comment(&proposed))
+            .replace("{{narrowed}}", &text::narrowed_comment(&varied, &parts))
             .into_bytes()
     };
-    let mut files = vec![
-        StarterFile { name: "sweep.toml".into(), bytes: fill(assets::text("templates/part-sweep.toml")) },
-        StarterFile { name: "twin.toml".into(), bytes: fill(assets::text("templates/part-twin.toml")) },
-        StarterFile { name: "grips.png".into(), bytes: grips_picture(&name, &mesh, proposals, &rasterise) },
-    ];
-    if copy {
-        files.push(StarterFile { name: mesh_name, bytes });
-    }
-    let summary = text::summary(&name, &size, &mesh_words, &proposed);
-    let Proposed { grips, varied, doubts, .. } = proposed;
-    Ok(PartStarter { files, grips, varied, mesh_words, doubts, summary })
+    let configs = [("sweep.toml", "templates/part-sweep.toml"), ("twin.toml", "templates/part-twin.toml")];
+    let configs =
+        configs.map(|(name, from)| StarterFile { name: name.into(), bytes: fill(assets::text(from)) });
+    let summary = parts.iter().map(text::summary).collect::<String>() + text::LOOK;
+    let files = configs.into_iter().chain(files).collect();
+    let parts = parts.into_iter().map(|part| {
+        let Proposed { grips, doubts, .. } = part.proposed;
+        PartGrips { name: part.name, grips, doubts, mesh_words: part.mesh_words }
+    });
+    Ok(PartStarter { files, parts: parts.collect(), varied, summary })
+}
+
+/// A part that was searched, as texts need it.
+struct StarterPart {
+    name: String,
+    size: String,
+    mesh_words: Vec<String>,
+    proposed: Proposed,
 }
 
 /// Heights of a mesh for a drawing, as those of a part in front of a gel.

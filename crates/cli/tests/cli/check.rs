@@ -51,6 +51,31 @@ fn a_grid_of_another_size_is_drawn_at_random() {
     assert!(text(&drawn.stderr).contains("12 samples"), "{}", text(&drawn.stderr));
 }
 
+/// With Coulomb friction pose and contact carry nothing, and images are said to be worthless; with friction by pressure they carry
+/// something. Shares sum to 1.
+#[test]
+fn images_that_say_nothing_of_the_label_are_warned_of() {
+    let with = |twin: &str| {
+        let twin = format!("twin=asset:configs/{twin}.toml");
+        let sets =
+            ["--set", &twin, "--set", "mechanics=reduced", "--set", "design=random", "--set", "samples=8"];
+        let check = run(&[&["check", QUICKSTART, "--json"], &sets[..]].concat());
+        assert_code(&check, 0);
+        let json: serde_json::Value = serde_json::from_slice(&check.stdout).unwrap();
+        let shares = json["label_shares"]["shares"].as_object().unwrap();
+        let of = |name: &str| shares[name].as_f64().unwrap();
+        let sum: f64 = shares.values().filter_map(serde_json::Value::as_f64).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "{shares:?}");
+        let warned = text(&check.stderr).contains("images say nothing of these labels");
+        assert!(text(&check.stderr).contains("label variance: grip force "), "{}", text(&check.stderr));
+        (of("grip_force"), of("pose") + of("contact"), warned)
+    };
+    let (force, seen, warned) = with("twin-baseline");
+    assert!(force > 0.5 && seen < 0.01 && warned, "{force} {seen}");
+    let (_, seen, warned) = with("twin-contact");
+    assert!(seen > 0.01 && !warned, "{seen}");
+}
+
 #[test]
 fn only_what_varies_is_said_to_vary() {
     let one = ["--set", "vary.part=[\"gear\"]", "--set", "vary.grip_force_n=20"];

@@ -135,8 +135,13 @@ fn sweep_step(args: &DiagnoseArgs, out: &Path, diagnosis: &Diagnosis) -> (String
         Some(sweep) => {
             let out_folder = unused("runs/corrected", "");
             let mut words = vec![program(), "sweep", &sweep, "--set", &set];
-            let project =
-                Project::load(&Location::parse(&sweep), &[("twin".into(), out.display().to_string())]).ok();
+            let mut sets = vec![("twin".to_string(), out.display().to_string())];
+            // Priors are of rigs that nobody measured: they would draw what the twin now knows.
+            if has_priors(&sweep) {
+                words.extend(["--set", "priors=[]"]);
+                sets.push(("priors".into(), "[]".into()));
+            }
+            let project = Project::load(&Location::parse(&sweep), &sets).ok();
             let ranges = project.as_ref().map(columns_to_vary).unwrap_or_default();
             let others = project.as_ref().map(|project| not_pulled(project, diagnosis)).unwrap_or_default();
             words.extend(ranges.iter().flat_map(|range| ["--set", range]));
@@ -153,6 +158,13 @@ fn sweep_step(args: &DiagnoseArgs, out: &Path, diagnosis: &Diagnosis) -> (String
             (format!("{text}: `gripgen sweep` of your sweep file with {set}."), String::new())
         }
     }
+}
+
+/// Whether a sweep names files of priors.
+fn has_priors(sweep: &str) -> bool {
+    let text = Location::parse(sweep).read_text().ok();
+    let table = text.and_then(|text| text.parse::<toml::Table>().ok());
+    table.is_some_and(|table| table.contains_key("priors"))
 }
 
 /// Columns that the corrected twin depends on and the sweep leaves at one value: where the twin knows them, and the sweep takes them.

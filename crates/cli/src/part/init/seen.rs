@@ -101,7 +101,7 @@ impl Viewer<'_> {
         let thickness_m = self.twin.gel[jaw].thickness_m;
         let gel_from_mesh = world_from_gel(jaw, 0.0).inverse() * at.part_from_mesh();
         let heights = self.mesh.raster(&gel_from_mesh, &grid, thickness_m / FINE_METRES_PER_PX);
-        let gel = PressedGel { thickness_m, imprint_m3_per_n: self.imprint_m3_per_n };
+        let gel = PressedGel::of(&self.twin.gel[jaw], self.imprint_m3_per_n);
         let imprint = indent(&heights, &grid, &gel, force_n)?;
         Ok(Pressed { area_m2: imprint.patch.area_m2(), depth_m: imprint.press_depth_m })
     }
@@ -123,7 +123,7 @@ impl Viewer<'_> {
         if top == f32::NEG_INFINITY {
             return Err(Unseen::Nothing);
         }
-        let pressed = PressedGel { thickness_m: gel.thickness_m, imprint_m3_per_n: self.imprint_m3_per_n };
+        let pressed = PressedGel::of(gel, self.imprint_m3_per_n);
         let mut imprint = Err(Unseen::Nothing);
         for force_n in FORCES_N {
             imprint = indent(&heights, &grid, &pressed, force_n).map_err(|e| match e {
