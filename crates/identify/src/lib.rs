@@ -73,5 +73,5 @@ pub use sensor::{
     SensorBlock, SensorCalibration, SensorComparison, SensorData, SensorDiagnosis, SensorEvidence,
     SensorOptions, SensorRow, SessionCalibration, calibrate_sensor, compare_sensor, diagnose_sensor,
 };
-pub use shares::closed_share;
+pub use shares::{closed_share, total_share};
 pub use summary::{MIN_REPORTABLE_WEIGHT, summary_sentence};

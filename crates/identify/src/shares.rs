@@ -25,6 +25,21 @@ pub fn closed_share(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some((share, (1.0 - share * share) / libm::sqrt(n)))
 }
 
+/// Share of the variance of y that goes when a group of inputs is known in addition to all others: the total index (Jansen 1999). Each
+/// pair is y at two draws that differ in these inputs alone; their noise is the same, so that a group without effect has exactly 0.
+/// `None` of a y that does not vary.
+///
+/// ```text
+/// T = <(y - y')^2> / (2 var y)
+/// ```
+pub fn total_share(pairs: &[(f64, f64)]) -> Option<f64> {
+    let n = 2.0 * pairs.len() as f64;
+    let mean = pairs.iter().map(|(a, b)| a + b).sum::<f64>() / n;
+    let variance = pairs.iter().map(|(a, b)| (a - mean).powi(2) + (b - mean).powi(2)).sum::<f64>() / n;
+    let moved = pairs.iter().map(|(a, b)| (a - b).powi(2)).sum::<f64>() / n;
+    (variance > 1e-18 * (1.0 + mean * mean)).then(|| (moved / variance).min(1.0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -47,5 +62,10 @@ mod tests {
         assert!((alone - 9.0 / 26.0).abs() < 3.0 * error, "{alone}");
         assert!((both - 25.0 / 26.0).abs() < 0.01, "{both}");
         assert_eq!(closed_share(&[(2.0, 2.0); 9]), None);
+        let moved: Vec<(f64, f64)> =
+            (0..a.len()).map(|i| (y(a[i], b[i], c[i]), y(a[i], b2[i], c[i]))).collect();
+        let total = total_share(&moved).unwrap();
+        assert!((total - 16.0 / 26.0).abs() < 0.02, "{total}");
+        assert_eq!(total_share(&[(1.0, 1.0), (2.0, 2.0)]), Some(0.0));
     }
 }

@@ -2,7 +2,7 @@
 
 use gripgen::tactile::SimdLevel;
 use gripgen::{Project, SimulateOptions, in_parallel, simulate};
-use gripgen_identify::closed_share;
+use gripgen_identify::{closed_share, total_share};
 use gripgen_twin::config::Mechanics;
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::{Group, find};
@@ -10,17 +10,17 @@ use gripgen_twin::{Outcome, Sweep};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Samples whose draws are compared. The standard error of a share is 0.06 at most.
-const SAMPLES: u64 = 256;
+/// Samples whose draws are compared. The standard error of a share is 0.09 at most.
+const SAMPLES: u64 = 128;
 
 /// What is drawn, in the order in which a predictor comes to know it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Source {
     /// The grip force.
     Force,
-    /// Which part, and which of its grips.
+    /// Which part.
     Part,
-    /// Where and how it is gripped and pulled.
+    /// In which of its grips, where and how it is held and pulled.
     Pose,
     /// The rest of what the cameras see: how gels and jaws press.
     Contact,
@@ -63,8 +63,8 @@ impl Source {
     fn of(key: &str) -> Source {
         match key {
             "grip_force_n" => return Source::Force,
-            "part" | "grip_pose" => return Source::Part,
-            "grip_offset_mm" | "grip_angle_deg" | "pull_direction" => return Source::Pose,
+            "part" => return Source::Part,
+            "grip_pose" | "grip_offset_mm" | "grip_angle_deg" | "pull_direction" => return Source::Pose,
             _ => {}
         }
         let effect = key.strip_prefix("effects.").and_then(|rest| find(rest.split('.').next()?));
@@ -83,22 +83,12 @@ pub struct LabelShares {
     pub shares: Vec<(Source, f64)>,
     /// Largest standard error of a share.
     pub error: f64,
+    /// Share that goes when pose and contact are known in addition to all else: the most that images can show, of a part that is known.
+    pub seen: f64,
     /// Standard deviation of the labels in newtons.
     pub sd_n: f64,
     /// Pairs of pulls that slipped, of those that were made for the last source.
     pub pairs: usize,
-}
-
-impl LabelShares {
-    /// The share of a source.
-    pub fn of(&self, source: Source) -> f64 {
-        self.shares.iter().find(|(s, _)| *s == source).map_or(0.0, |(_, share)| *share)
-    }
-
-    /// The share of what cameras see beyond grip force and part.
-    pub fn seen(&self) -> f64 {
-        self.of(Source::Pose) + self.of(Source::Contact)
-    }
 }
 
 /// Label of a sample with draws of its own, if it slipped.
@@ -129,39 +119,39 @@ impl fmt::Display for LabelShares {
             .iter()
             .map(|(source, share)| format!("{} {} %", source.name(), percent(*share)))
             .collect();
-        write!(f, "label variance: {} (+- {} %)", of.join(", "), percent(self.error))?;
-        let left = 1.0 - self.of(Source::Force) - self.of(Source::Part);
-        match left > 0.01 {
-            true => write!(
-                f,
-                "; of what force and part leave, images see at most {} %",
-                percent(self.seen() / left)
-            ),
-            false => Ok(()),
-        }
+        write!(
+            f,
+            "label variance: {} (+- {} %); images can show at most {} %",
+            of.join(", "),
+            percent(self.error),
+            percent(self.seen)
+        )
     }
 }
 
 /// Shares for a sweep, by simulating some of its labels again with a part of their draws exchanged. `None` where too few slip.
 pub fn label_shares(project: &Project, jobs: usize) -> Option<LabelShares> {
-    let of = |i: usize, known: Option<Source>| {
-        let (own, other) = (i as u64, SAMPLES + i as u64);
-        let Some(known) = known else { return label_n(project, own, &project.sweep.drawn(own)) };
-        let mut drawn = project.sweep.drawn(other);
-        for (key, value) in project.sweep.drawn(own) {
-            if Source::of(&key) <= known {
-                drawn.insert(key, value);
-            }
-        }
-        label_n(project, other, &drawn)
+    // The label of sample `at` with what `taken` says from `from`.
+    let mixed = |at: u64, from: u64, taken: &dyn Fn(Source) -> bool| {
+        let mut drawn = project.sweep.drawn(at);
+        drawn.extend(project.sweep.drawn(from).into_iter().filter(|(key, _)| taken(Source::of(key))));
+        label_n(project, at, &drawn)
     };
-    let of_all = |known| in_parallel(SAMPLES as usize, jobs, |i| of(i, known));
-    let own = of_all(None);
+    let all = |label: &(dyn Fn(u64, u64) -> Option<f64> + Sync)| {
+        in_parallel(SAMPLES as usize, jobs, |i| label(i as u64, SAMPLES + i as u64))
+    };
+    let pairs = |a: &[Option<f64>], b: &[Option<f64>]| -> Vec<(f64, f64)> {
+        a.iter().zip(b).filter_map(|(a, b)| Some(((*a)?, (*b)?))).collect()
+    };
+    let own = all(&|own, _| mixed(own, own, &|_| false));
+    let is_seen = |source| matches!(source, Source::Pose | Source::Contact);
+    let moved = all(&|own, other| mixed(own, other, &is_seen));
+    let seen = total_share(&pairs(&own, &moved))?;
     let mut last = (0.0, 0.0_f64, 0);
     let mut shares = Vec::new();
     for source in &Source::ALL[..5] {
-        let pairs: Vec<(f64, f64)> =
-            own.iter().zip(of_all(Some(*source))).filter_map(|(a, b)| Some(((*a)?, b?))).collect();
+        let shared = all(&|own, other| mixed(other, own, &|of| of <= *source));
+        let pairs = pairs(&own, &shared);
         let (share, error) = closed_share(&pairs)?;
         // Estimates of shares that contain each other need not.
         let share = share.max(last.0);
@@ -172,5 +162,5 @@ pub fn label_shares(project: &Project, jobs: usize) -> Option<LabelShares> {
     let labels: Vec<f64> = own.iter().flatten().copied().collect();
     let mean = labels.iter().sum::<f64>() / labels.len() as f64;
     let variance = labels.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / labels.len() as f64;
-    Some(LabelShares { shares, error: last.1, sd_n: libm::sqrt(variance), pairs: last.2 })
+    Some(LabelShares { shares, error: last.1, seen, sd_n: libm::sqrt(variance), pairs: last.2 })
 }

@@ -182,12 +182,12 @@ const NOTHING: f64 = 0.01;
 /// What images can teach of the labels, where that is little.
 fn of_shares(project: &Project, shares: Option<&LabelShares>) -> Vec<String> {
     let has_images = project.sweep.images != ImageStorage::None;
-    let little = shares.filter(|shares| has_images && shares.seen() < NOTHING);
+    let little = shares.filter(|shares| has_images && shares.seen < NOTHING);
     let said = |shares: &LabelShares| {
         format!(
-            "images say nothing of these labels but which part it is: pose and contact carry {:.1} % of their variance. Friction \
+            "images say nothing of these labels but which part it is: pose and contact move {:.1} % of their variance. Friction \
              that depends on the contact changes that: priors = [\"asset:priors/friction.toml\", ...] (docs/training.md)",
-            100.0 * shares.seen()
+            100.0 * shares.seen
         )
     };
     little.map(said).into_iter().collect()
@@ -197,7 +197,7 @@ fn of_shares(project: &Project, shares: Option<&LabelShares>) -> Vec<String> {
 pub(super) fn shares_json(shares: &LabelShares) -> serde_json::Value {
     let of: serde_json::Map<String, serde_json::Value> =
         shares.shares.iter().map(|(source, share)| (source.key().into(), json!(share))).collect();
-    json!({"shares": of, "error": shares.error, "sd_n": shares.sd_n, "pulls": shares.pairs})
+    json!({"shares": of, "error": shares.error, "seen": shares.seen, "sd_n": shares.sd_n, "pulls": shares.pairs})
 }
 
 /// The plan in words.
