@@ -85,8 +85,6 @@ pub struct LabelShares {
     pub error: f64,
     /// Share that goes when pose and contact are known in addition to all else: the most that images can show, of a part that is known.
     pub seen: f64,
-    /// Standard deviation of the labels in newtons.
-    pub sd_n: f64,
     /// Pairs of pulls that slipped, of those that were made for the last source.
     pub pairs: usize,
 }
@@ -159,8 +157,5 @@ pub fn label_shares(project: &Project, jobs: usize) -> Option<LabelShares> {
         last = (share, last.1.max(error), pairs.len());
     }
     shares.push((Source::Repetition, 1.0 - last.0));
-    let labels: Vec<f64> = own.iter().flatten().copied().collect();
-    let mean = labels.iter().sum::<f64>() / labels.len() as f64;
-    let variance = labels.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / labels.len() as f64;
-    Some(LabelShares { shares, error: last.1, seen, sd_n: libm::sqrt(variance), pairs: last.2 })
+    Some(LabelShares { shares, error: last.1, seen, pairs: last.2 })
 }

@@ -12,9 +12,6 @@ use std::fmt;
 /// Columns that change over a campaign though nobody sets them. The others are settings, of which one value is a choice.
 const CHANGE_BY_THEMSELVES: [&str; 5] = ["time_s", "pull_index", "temperature_c", "gel_id", "session"];
 
-/// Columns that the groups of a sweep fill.
-const GROUPS: [&str; 2] = ["gel_id", "session"];
-
 /// A column that a twin depends on and that is the same in every sample of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unvaried {
@@ -140,7 +137,8 @@ enum Stated {
 /// What `[vary]` says of a column.
 fn stated(project: &Project, name: &str) -> Stated {
     match drawn_from(project, name) {
-        None if project.sweep.groups.is_some() && GROUPS.contains(&name) => Stated::Varies,
+        // Groups of a sweep fill columns that its [vary] does not have.
+        None if project.sweep.drawn_keys().any(|key| key == name) => Stated::Varies,
         None => Stated::No,
         Some(varied) if varied.distribution.constant().is_some() => Stated::OneValue,
         Some(_) => Stated::Varies,

@@ -197,7 +197,7 @@ fn of_shares(project: &Project, shares: Option<&LabelShares>) -> Vec<String> {
 pub(super) fn shares_json(shares: &LabelShares) -> serde_json::Value {
     let of: serde_json::Map<String, serde_json::Value> =
         shares.shares.iter().map(|(source, share)| (source.key().into(), json!(share))).collect();
-    json!({"shares": of, "error": shares.error, "seen": shares.seen, "sd_n": shares.sd_n, "pulls": shares.pairs})
+    json!({"shares": of, "error": shares.error, "seen": shares.seen, "pulls": shares.pairs})
 }
 
 /// The plan in words.

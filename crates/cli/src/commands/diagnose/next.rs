@@ -136,7 +136,7 @@ fn sweep_step(args: &DiagnoseArgs, out: &Path, diagnosis: &Diagnosis) -> (String
             let out_folder = unused("runs/corrected", "");
             let mut words = vec![program(), "sweep", &sweep, "--set", &set];
             let mut sets = vec![("twin".to_string(), out.display().to_string())];
-            // Priors are of rigs that nobody measured: they would draw what the twin now knows.
+            // Priors are of rigs that were not measured: they would draw what the twin now knows.
             if has_priors(&sweep) {
                 words.extend(["--set", "priors=[]"]);
                 sets.push(("priors".into(), "[]".into()));
