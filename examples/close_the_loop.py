@@ -10,6 +10,7 @@ simulated. `docs/training.md` has the figures of one run with `--samples 1500 --
 """
 
 import argparse
+import csv
 import json
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from pathlib import Path
 
 import gripgen as gg
 import numpy as np
-from train_grip_metric import Arrays, data, errors, show, train
+from train_grip_metric import Arrays, data, errors, scores, show, train
 
 BASELINE = "asset:configs/twin-baseline.toml"
 # What the rigs do and the twin does not know. The first shows in images, the others do not.
@@ -38,6 +39,19 @@ def campaign(work: Path, effects: list[dict[str, object]], pulls: int, seed: int
         command += ["--quiet", "--set", f"effects=[{inline}]", "--out", str(work / "campaign.toml"), "--force", "--simulate", str(folder)]
         subprocess.run(command, check=True)
     return folder
+
+
+def line_of_pulls(folder: Path, test: Arrays) -> dict[str, float]:
+    """The baseline without images and without a twin: a force per newton of grip force of each part, fitted to the same pulls."""
+    with (folder / "pulls.csv").open(encoding="utf-8") as file:
+        pulls = list(csv.DictReader(file))
+    found = np.empty(len(test.part))
+    for part in set(test.part):
+        own = [pull for pull in pulls if pull["part"] == part] or pulls
+        force_n, label_n = (np.array([float(pull[key]) for pull in own]) for key in ("grip_force_n", "max_pull_force_n"))
+        at = test.part == part
+        found[at] = test.force_n[at] * (force_n @ label_n) / (force_n @ force_n)
+    return scores(found, test.labels.numpy())
 
 
 def average(rows: list[dict[str, float]]) -> dict[str, float]:
@@ -67,7 +81,7 @@ def main() -> None:
         found = gg.diagnose(campaign(work, effects, options.pulls, options.seed + number), out=work / "diagnosed.toml", force=True)
         print(f"\n{name}: {options.pulls} pulls without images say {found.verdict}, {', '.join(found.names) or 'no name'}")
         twin = str((work / "diagnosed.toml").resolve())
-        rows = {"before": errors(before, test)}
+        rows = {"no network: a F_G by part, of the pulls": line_of_pulls(work / "campaign", test), "before": errors(before, test)}
         for kind, more in {"the diagnosed twin": {}, "draws from the posterior": {"vary.twin": {"from": "posterior"}}}.items():
             folder = kind.rsplit(" ", 1)[-1]
             after = train(Arrays(data(work, folder, twin, options.samples, 3, **more)), options.epochs, options.seed)

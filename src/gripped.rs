@@ -240,7 +240,7 @@ impl<'a> Indenter<'a> {
             if gel.interlock > 0.0 {
                 let smoothing_m = gel.interlock_smoothing_m;
                 contact.patch.slopes =
-                    contact_slopes(&contact.depth_px, &pad.grid(), smoothing_m, self.along[jaw]);
+                    contact_slopes(&contact.depth_px, &pad.grid(), smoothing_m, self.along[jaw], self.level);
             }
             Ok(contact)
         })

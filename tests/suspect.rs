@@ -91,11 +91,17 @@ fn no_effect_makes_its_own_pulls_suspect() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// A slow loop makes labels wrong. The twin predicts it; nobody who only has the pull does.
+/// A slow loop makes labels wrong. The twin predicts it, so that a simulated label is suspect only where it is farther from the peak
+/// than the tolerance; of a measured pull any difference counts.
 #[test]
-fn a_slow_loop_is_no_reason_in_a_simulation_and_one_in_a_measurement() {
+fn a_slow_loop_is_a_reason_in_a_simulation_beyond_the_tolerance_and_any_in_a_measurement() {
     let pulls = pulled(&project("", 16, "robot.lag_s = [0.5]\n"), 16);
-    assert!(pulls.iter().all(|p| p.suspect.is_none() && p.lag_exceeds_tolerance));
+    for p in pulls.iter().filter(|p| !p.label.censored) {
+        let off_n = p.forces.peak_force_n.unwrap() - p.label.max_pull_force_n;
+        assert_eq!(p.suspect.is_some(), off_n.abs() > 3.0, "{off_n} N: {:?}", p.suspect);
+        assert!(p.lag_exceeds_tolerance);
+    }
+    assert!(pulls.iter().any(|p| p.suspect.is_some()));
     let found = pulls.iter().filter(|p| !p.label.censored && as_measured(p).is_some()).count();
     assert!(found >= 14, "{found} of 16");
 }

@@ -149,7 +149,7 @@ fn the_training_set_has_jaws_that_differ_and_every_outcome() {
     };
     let failed: Vec<&Outcome> =
         made.iter().map(|(_, o)| o).filter(|o| matches!(o, Outcome::Failed { .. })).collect();
-    assert!(failed.len() <= 6, "{:?}", failed.first());
+    assert!(failed.is_empty(), "{:?}", failed.first());
     let missed = share(&|o| matches!(o, Outcome::NoContact { .. }));
     let censored = share(&|o| matches!(o, Outcome::Pulled(p) if p.label.censored));
     assert!((0.005..0.06).contains(&missed) && (0.04..0.14).contains(&censored), "{missed} {censored}");
@@ -171,22 +171,24 @@ fn the_training_set_has_jaws_that_differ_and_every_outcome() {
     );
     assert!((0.3..0.97).contains(&depth) && (0.8..0.995).contains(&force), "{depth} {force}");
 
-    let limit = comb(&slipped.iter().map(|(_, p)| p.limit_force_n).collect::<Vec<_>>());
-    println!("chi-square of tenths: limit {limit:.1}");
-    assert!(limit < 27.9, "{limit}");
+    let of = |label_n: &dyn Fn(&Pulled) -> Option<f64>| {
+        comb(&slipped.iter().filter_map(|(_, p)| label_n(p)).collect::<Vec<_>>())
+    };
+    let [limit, peak] = [of(&|p| Some(p.limit_force_n)), of(&|p| p.forces.peak_force_n)];
+    let rule = of(&|p| Some(p.label.max_pull_force_n));
+    println!("chi-square of tenths: limit {limit:.1}, peak {peak:.1}, rule {rule:.1}");
+    assert!(limit < 27.9 && peak < 27.9, "{limit} {peak}");
 }
 
-/// a + b / F fitted to labels of one part at 20 to 80 N, in many worlds of the friction prior: the b / a of the paper's four rows lie within
-/// percentiles 2.5 and 97.5, and both signs occur.
-#[test]
-#[ignore = "slow: 4000 pulls"]
-fn the_friction_prior_covers_the_laws_of_the_paper() {
+/// b / a of a + b / F, fitted to the labels of one part in each of many worlds of the friction prior, sorted. Forces are those of one jaw.
+fn offsets_of_worlds_n(forces_n: [f64; 2]) -> Vec<f64> {
+    let force = format!("vary.grip_force_n={{uniform={forces_n:?}, per=\"sample\"}}");
     let sets = [
         "repetitions=8",
-        "vary.part=[\"ball_bearing\", \"long_shaft\", \"gear\", \"roller_bearing\"]",
+        "vary.part=[\"long_shaft\", \"gear\"]",
         "vary.grip_pose=[0]",
         "vary.grip_offset_mm=[0]",
-        "vary.grip_force_n={uniform=[20, 80], per=\"sample\"}",
+        &force,
         "vary.pull.max_force_n=[1000]",
         "groups={rigs=4000}",
     ];
@@ -197,31 +199,35 @@ fn the_friction_prior_covers_the_laws_of_the_paper() {
             of_group.entry(scenario.group).or_default().push((force_n, pulled.label.max_pull_force_n));
         }
     }
-    let mut offsets_n: Vec<f64> = of_group
-        .values()
-        .filter(|points| points.len() >= 6)
-        .filter_map(|points| {
-            // label = a F + b.
-            let n = points.len() as f64;
-            let (x, y) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0 / n, s.1 + p.1 / n));
-            let xx: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
-            let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / xx;
-            (slope > 0.0).then(|| y / slope - x)
-        })
-        .collect();
+    let of_world = |points: &Vec<(f64, f64)>| {
+        // label = slope (F + b / a).
+        let n = points.len() as f64;
+        let (x, y) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0 / n, s.1 + p.1 / n));
+        let xx: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
+        let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / xx;
+        (slope > 0.0).then(|| y / slope - x)
+    };
+    let mut offsets_n: Vec<f64> =
+        of_group.values().filter(|points| points.len() >= 6).filter_map(of_world).collect();
     offsets_n.sort_by(f64::total_cmp);
-    let percentile =
-        |b: f64| 100.0 * offsets_n.iter().filter(|x| **x < b).count() as f64 / offsets_n.len() as f64;
-    let rows = [("gear", -8.9), ("ball bearing", -3.6), ("shaft", -3.0), ("roller bearing", 9.2)];
-    for (name, b) in rows {
-        println!(
-            "{name}: b / a = {b} N lies at percentile {:.1} of {} worlds",
-            percentile(b),
-            offsets_n.len()
-        );
+    offsets_n
+}
+
+/// The b / a of the paper's four rows lie within percentiles 2.5 and 97.5 of worlds, whether its 20 to 80 N are the force of one jaw or the
+/// sum of both, and both signs occur.
+#[test]
+#[ignore = "slow: 8000 pulls"]
+fn the_friction_prior_covers_the_laws_of_the_paper() {
+    for (meaning, of_jaw) in [("of one jaw", 1.0), ("sum of both jaws", 0.5)] {
+        let offsets_n = offsets_of_worlds_n([20.0 * of_jaw, 80.0 * of_jaw]);
+        let percentile =
+            |b: f64| 100.0 * offsets_n.iter().filter(|x| **x < b).count() as f64 / offsets_n.len() as f64;
+        let rows = [("gear", -8.9), ("ball bearing", -3.6), ("shaft", -3.0), ("roller bearing", 9.2)];
+        let found = rows.map(|(name, b)| (name, percentile(b * of_jaw)));
+        println!("force {meaning}: percentiles of {} worlds {found:?}", offsets_n.len());
+        for (name, percentile) in found {
+            assert!((2.5..97.5).contains(&percentile), "{meaning}, {name}: {percentile}");
+        }
+        assert!((5.0..95.0).contains(&percentile(0.0)), "{}", percentile(0.0));
     }
-    for (name, b) in rows {
-        assert!((2.5..97.5).contains(&percentile(b)), "{name}: {}", percentile(b));
-    }
-    assert!(percentile(0.0) > 5.0 && percentile(0.0) < 95.0, "{}", percentile(0.0));
 }

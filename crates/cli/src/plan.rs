@@ -132,12 +132,16 @@ fn outermost_grips(project: &Project) -> Vec<TriedGrip> {
     let each = (TRIED / drawn.len().max(1)).max(1);
     let of_grip = |((part, grip_pose), samples): ((String, usize), Vec<(u64, Place)>)| {
         let tried: Vec<u64> = corners(&samples).into_iter().take(each).collect();
-        let outcome = |&index: &u64| match grips(project, index) {
+        let outcomes: Vec<_> = tried.iter().map(|&index| (index, grips(project, index))).collect();
+        // Some that miss the part are samples like others; a grip that always does is a mistake. One alone says nothing.
+        let all_miss = outcomes.len() > 1 && outcomes.iter().all(|(_, outcome)| matches!(outcome, Ok(false)));
+        let failure = |(index, outcome): (u64, Result<bool, SampleError>)| match outcome {
             Ok(true) => None,
-            Ok(false) => Some((index, "the jaws miss the part".to_string())),
+            Ok(false) => all_miss.then(|| (index, "the jaws miss the part".to_string())),
             Err(e) => Some((index, e.to_string())),
         };
-        TriedGrip { part, grip_pose, tried: tried.len(), failed: tried.iter().filter_map(outcome).collect() }
+        let failed = outcomes.into_iter().filter_map(failure).collect();
+        TriedGrip { part, grip_pose, tried: tried.len(), failed }
     };
     drawn.into_iter().map(of_grip).collect()
 }

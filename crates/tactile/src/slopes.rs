@@ -1,6 +1,7 @@
 //! Slopes of a contact along and across a pull, as friction needs them.
 
 use crate::grid::{Grid, Plane};
+use crate::simd::{Kernel, Lanes, SimdLevel};
 use gripgen_twin::ContactSlopes;
 
 /// Steepest slope that counts, of 60 degrees: flanks beyond it stand in no contact of a gel that is blurred.
@@ -17,10 +18,16 @@ const REACH: f64 = 3.0;
 /// `depth_px` is the depth of the part in the gel in pixels, 0 without contact. It is blurred with a Gaussian of `smoothing_m` over pixels in contact alone,
 /// as the skin of a gel bridges sharp corners; a flat face stays flat up to its rim. `along` is the unit vector of the pull in the `gel`
 /// frame. The slope q along the pull is that which resists: positive where the part gets shallower ahead. Means are subtracted: a
-/// face that is inclined as a whole is a wedge, which effects of the jaws have.
-pub fn contact_slopes(depth_px: &Plane, grid: &Grid, smoothing_m: f64, along: [f64; 2]) -> ContactSlopes {
+/// face that is inclined as a whole is a wedge, which effects of the jaws have. The same bits on every vector unit.
+pub fn contact_slopes(
+    depth_px: &Plane,
+    grid: &Grid,
+    smoothing_m: f64,
+    along: [f64; 2],
+    level: SimdLevel,
+) -> ContactSlopes {
     let Some(boxed) = Boxed::of(depth_px) else { return ContactSlopes::default() };
-    let surface = boxed.blurred(smoothing_m / grid.metres_per_px);
+    let surface = boxed.blurred(smoothing_m / grid.metres_per_px, level);
     let (mut rows, mut sums) = (Vec::new(), [0.0; 3]);
     for y in 0..boxed.height {
         for x in 0..boxed.width {
@@ -70,7 +77,7 @@ impl Boxed {
     }
 
     /// Depths blurred over pixels in contact; 0 elsewhere.
-    fn blurred(&self, sigma_px: f64) -> Vec<f64> {
+    fn blurred(&self, sigma_px: f64, level: SimdLevel) -> Vec<f64> {
         if sigma_px <= 0.0 {
             return self.depth.clone();
         }
@@ -78,12 +85,7 @@ impl Boxed {
         let weights: Vec<f64> =
             (0..=reach).map(|i| libm::exp(-0.5 * (i as f64 / sigma_px) * (i as f64 / sigma_px))).collect();
         let mask: Vec<f64> = self.depth.iter().map(|&d| if d > 0.0 { 1.0 } else { 0.0 }).collect();
-        let blur = |plane: &[f64]| {
-            let rows = along_rows(plane, self.width, &weights);
-            let turned = transposed(&rows, self.width, self.height);
-            let both = along_rows(&turned, self.height, &weights);
-            transposed(&both, self.height, self.width)
-        };
+        let blur = |plane: &[f64]| level.run(Blur { plane, width: self.width, weights: &weights });
         let (depth, share) = (blur(&self.depth), blur(&mask));
         let inside = mask.iter().zip(depth.iter().zip(&share));
         inside.map(|(&m, (d, share))| if m > 0.0 { d / share } else { 0.0 }).collect()
@@ -111,25 +113,47 @@ impl Boxed {
     }
 }
 
-/// A convolution of each row, with nothing outside it.
-fn along_rows(plane: &[f64], width: usize, weights: &[f64]) -> Vec<f64> {
-    let mut out = vec![0.0; plane.len()];
-    for (row, out) in plane.chunks_exact(width).zip(out.chunks_exact_mut(width)) {
-        for (x, sum) in out.iter_mut().enumerate() {
-            let mut total = weights[0] * row[x];
-            for (i, weight) in weights.iter().enumerate().skip(1) {
-                let (low, high) = (x.checked_sub(i), x + i);
-                let pair = low.map_or(0.0, |low| row[low]) + row.get(high).copied().unwrap_or(0.0);
-                total += weight * pair;
-            }
-            *sum = total;
-        }
-    }
-    out
+/// A convolution along rows, then along columns, with nothing outside the plane.
+struct Blur<'a> {
+    plane: &'a [f64],
+    width: usize,
+    /// Weight of the centre and of each pixel to one side.
+    weights: &'a [f64],
 }
 
-fn transposed(plane: &[f64], width: usize, height: usize) -> Vec<f64> {
-    (0..width).flat_map(|x| (0..height).map(move |y| plane[y * width + x])).collect()
+impl Kernel for Blur<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> Vec<f64> {
+        let Self { plane, width, weights } = self;
+        let (reach, height) = (weights.len() - 1, plane.len() / width);
+        let mut padded = vec![0.0; width + 2 * reach];
+        let mut rows = vec![0.0; plane.len()];
+        for (row, out) in plane.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
+            padded[reach..reach + width].copy_from_slice(row);
+            weighted(out, weights, |i, ahead| &padded[if ahead { reach + i } else { reach - i }..][..width]);
+        }
+        let nothing = vec![0.0; width];
+        let mut out = vec![0.0; plane.len()];
+        for (y, out) in out.chunks_exact_mut(width).enumerate() {
+            weighted(out, weights, |i, ahead| {
+                let row = if ahead { Some(y + i).filter(|&y| y < height) } else { y.checked_sub(i) };
+                row.map_or(&nothing[..], |y| &rows[y * width..][..width])
+            });
+        }
+        out
+    }
+}
+
+/// `out = w_0 a_0 + sum_i w_i (a_-i + a_i)` of lines `a_i` (ahead) and `a_-i`, from the centre outwards.
+#[inline(always)]
+fn weighted<'a>(out: &mut [f64], weights: &[f64], line: impl Fn(usize, bool) -> &'a [f64]) {
+    out.iter_mut().zip(line(0, true)).for_each(|(sum, a)| *sum = weights[0] * a);
+    for (i, weight) in weights.iter().enumerate().skip(1) {
+        let pairs = line(i, false).iter().zip(line(i, true));
+        out.iter_mut().zip(pairs).for_each(|(sum, (a, b))| *sum += weight * (a + b));
+    }
 }
 
 #[cfg(test)]
@@ -143,6 +167,15 @@ mod tests {
         GRID.plane(|x, y| (f(x, y) / GRID.metres_per_px).max(0.0))
     }
 
+    fn slopes(depth_px: &Plane, grid: &Grid, smoothing_m: f64, along: [f64; 2]) -> ContactSlopes {
+        let [first, others @ ..] = &SimdLevel::available()[..] else { unreachable!() };
+        let found = contact_slopes(depth_px, grid, smoothing_m, along, *first);
+        for &level in others {
+            assert_eq!(found, contact_slopes(depth_px, grid, smoothing_m, along, level), "{level:?}");
+        }
+        found
+    }
+
     /// A wave of flanks of one slope T: mu_eff = mu (1 + T^2) / (1 - mu^2 T^2) across its crests and mu sqrt(1 + T^2) along them.
     #[test]
     fn a_saw_of_one_slope_is_the_closed_form() {
@@ -150,10 +183,10 @@ mod tests {
         let saw = |t: f64| slope * ((t / pitch).rem_euclid(1.0) - 0.5).abs() * pitch;
         let across = depth(|_, y| 1e-3 + saw(y));
         for mu in [0.05, 0.15, 0.3] {
-            let found = contact_slopes(&across, &GRID, 0.0, UP).coefficient(mu, 1.0);
+            let found = slopes(&across, &GRID, 0.0, UP).coefficient(mu, 1.0);
             let wanted = mu * (1.0 + slope * slope) / (1.0 - (mu * slope).powi(2));
             assert!((found / wanted - 1.0).abs() < 0.03, "mu {mu}: {found} and {wanted}");
-            let along = contact_slopes(&across, &GRID, 0.0, [1.0, 0.0]).coefficient(mu, 1.0);
+            let along = slopes(&across, &GRID, 0.0, [1.0, 0.0]).coefficient(mu, 1.0);
             let wanted = mu * (1.0 + slope * slope).sqrt();
             assert!((along / wanted - 1.0).abs() < 0.03, "mu {mu}: {along} and {wanted}");
         }
@@ -163,14 +196,14 @@ mod tests {
     #[test]
     fn no_friction_holds_nothing_and_flat_faces_are_coulombs() {
         let bumps = depth(|x, y| 6e-4 + 3e-4 * (2e3 * x).sin() * (3e3 * y).cos() + 0.05 * y);
-        assert_eq!(contact_slopes(&bumps, &GRID, 3e-4, UP).coefficient(0.0, 1.0), 0.0);
+        assert_eq!(slopes(&bumps, &GRID, 3e-4, UP).coefficient(0.0, 1.0), 0.0);
         let stamp =
             |tilt: f64| depth(|x, y| if x.abs() < 3e-3 && y.abs() < 4e-3 { 1e-3 + tilt * y } else { 0.0 });
         for tilt in [0.0, 0.05] {
-            let slopes = contact_slopes(&stamp(tilt), &GRID, 0.0, UP);
+            let slopes = slopes(&stamp(tilt), &GRID, 0.0, UP);
             assert!((slopes.coefficient(0.2, 1.0) - 0.2).abs() < 1e-6, "{slopes:?}");
         }
-        let flat = contact_slopes(&stamp(0.0), &GRID, 3e-4, UP);
+        let flat = slopes(&stamp(0.0), &GRID, 3e-4, UP);
         assert_eq!(flat.coefficient(0.2, 1.0).to_bits(), 0.2_f64.to_bits());
     }
 
@@ -182,11 +215,11 @@ mod tests {
         let kept = (-0.5 * (k * s).powi(2)).exp();
         let mean_square = |keep: f64| 0.5 * (height * k * keep).powi(2);
         for (smoothing_m, keep) in [(0.0, 1.0), (s, kept)] {
-            let excess = contact_slopes(&wave, &GRID, smoothing_m, UP).coefficient(1e-6, 1.0) / 1e-6 - 1.0;
+            let excess = slopes(&wave, &GRID, smoothing_m, UP).coefficient(1e-6, 1.0) / 1e-6 - 1.0;
             // The rim, where half of the blur has no contact, is a thirteenth of the contact.
             assert!((excess / mean_square(keep) - 1.0).abs() < 0.07, "{excess} and {}", mean_square(keep));
         }
-        let off = contact_slopes(&wave, &GRID, s, UP).coefficient(0.2, 0.0);
+        let off = slopes(&wave, &GRID, s, UP).coefficient(0.2, 0.0);
         assert_eq!(off.to_bits(), 0.2_f64.to_bits());
     }
 }

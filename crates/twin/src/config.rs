@@ -18,7 +18,7 @@ pub use document::{Document, Place};
 pub(crate) use draw_file::read as read_vary;
 pub use images_file::{Compression, DuringPullFile, ImageStorage, ImagesFile};
 pub use keys::{DEFAULTED_SECTIONS, is_twin_key};
-pub(crate) use keys::{assign, check_part, get, of_part};
+pub(crate) use keys::{assign, check_part, get, of_part, segments};
 pub use prior_file::{PriorFile, missing_effects};
 pub use sweep_file::{
     Backend, DesignFile, GroupsFile, JitteredStep, Mechanics, PullFile, StepFile, SweepFile, TraceStorage,

@@ -29,6 +29,8 @@ pub enum Purpose {
     PressGain = 7,
     /// Image noise of another pass over stored samples, keyed by that of the image.
     ImageNoiseAgain = 8,
+    /// Which samples are compared for shares of the label's variance.
+    Compared = 9,
 }
 
 /// A stream of random numbers for one sample and one purpose.

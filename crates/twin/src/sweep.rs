@@ -6,14 +6,14 @@ mod posterior;
 
 use crate::config::{
     Backend, Compression, ConfigError, DesignFile, GroupsFile, ImageStorage, ImagesFile, Mechanics, PullFile,
-    SweepFile, TraceStorage, assign, check_part, get, is_twin_key, of_part, read_twin_table,
+    SweepFile, TraceStorage, assign, check_part, get, is_twin_key, of_part, read_twin_table, segments,
 };
 use crate::draw::{Distribution, Drawn, Level, VariedKey, fnv1a, level_coordinate, random_coordinate};
 use crate::image::film::FilmPace;
 use crate::random::sobol;
 use crate::scenario::keys;
 use crate::{CAUSE_KEY, Posterior, PullSettings, Scenario, Twin};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Grip force per jaw (or in total, as the twin has it) where a sweep does not say: 40 N, the force of the
@@ -245,27 +245,22 @@ impl Sweep {
     ///
     /// Values drawn for this sample that make no twin.
     pub fn twin_of(&self, index: u64, base: &toml::Table) -> Result<Twin, ConfigError> {
+        let drawn = self.drawn(index);
+        let Some((posterior, draw)) = self.posterior_draw(index) else {
+            return Self::twin_of_drawn(&drawn, base);
+        };
         let mut table = base.clone();
-        if let Some((posterior, draw)) = self.posterior_draw(index) {
-            posterior.put(draw, &mut table)?;
-        }
-        Self::twin_of_drawn(&self.drawn(index), table)
+        posterior.put(draw, &mut table)?;
+        twin_with_drawn(&drawn, table)
     }
 
-    /// The twin of `table` with the drawn values of a sample put in.
+    /// The twin of `base` with the drawn values of a sample put in, and without parts that the sample does not need.
     ///
     /// # Errors
     ///
     /// Values that make no twin.
-    pub fn twin_of_drawn(
-        drawn: &BTreeMap<String, Drawn>,
-        mut table: toml::Table,
-    ) -> Result<Twin, ConfigError> {
-        let part = drawn.get("part").map(Drawn::to_string).unwrap_or_default();
-        for (key, value) in drawn.iter().filter(|(key, _)| is_twin_key(key)) {
-            put(&mut table, &of_part(key, &part), value)?;
-        }
-        read_twin(&table)
+    pub fn twin_of_drawn(drawn: &BTreeMap<String, Drawn>, base: &toml::Table) -> Result<Twin, ConfigError> {
+        twin_with_drawn(drawn, with_needed_parts(base, drawn))
     }
 
     /// The twin of `base` with one value put in.
@@ -299,6 +294,38 @@ impl Sweep {
     fn blank(&self) -> Scenario {
         Scenario { seed: self.seed, grip_force_n: 1.0, pull: self.pull(), ..Scenario::default() }
     }
+}
+
+fn twin_with_drawn(drawn: &BTreeMap<String, Drawn>, mut table: toml::Table) -> Result<Twin, ConfigError> {
+    let part = drawn_part(drawn);
+    for (key, value) in drawn.iter().filter(|(key, _)| is_twin_key(key)) {
+        put(&mut table, &of_part(key, &part), value)?;
+    }
+    read_twin(&table)
+}
+
+fn drawn_part(drawn: &BTreeMap<String, Drawn>) -> String {
+    drawn.get("part").map(Drawn::to_string).unwrap_or_default()
+}
+
+/// `base` with the drawn part, those of drawn keys and those that effects name. A twin may have many parts, and reading each of them
+/// for every sample takes longer than a pull.
+fn with_needed_parts(base: &toml::Table, drawn: &BTreeMap<String, Drawn>) -> toml::Table {
+    let Some(parts) = base.get("parts").and_then(toml::Value::as_table) else { return base.clone() };
+    let effects = base.get("effects").and_then(toml::Value::as_array);
+    let by_effects = effects.into_iter().flatten().filter_map(|effect| effect.get("part")?.as_str());
+    let by_keys = drawn.keys().filter_map(|key| match segments(key)[..] {
+        ["parts", part, _, ..] => Some(part),
+        _ => None,
+    });
+    let own = drawn_part(drawn);
+    let names: BTreeSet<&str> = by_effects.chain(by_keys).chain([own.as_str()]).collect();
+    let needed = parts.iter().filter(|(name, _)| names.contains(name.as_str()));
+    let needed: toml::Table = needed.map(|(name, part)| (name.clone(), part.clone())).collect();
+    let others = base.iter().filter(|(key, _)| *key != "parts");
+    let mut table: toml::Table = others.map(|(key, value)| (key.clone(), value.clone())).collect();
+    table.insert("parts".into(), needed.into());
+    table
 }
 
 fn read_twin(table: &toml::Table) -> Result<Twin, ConfigError> {

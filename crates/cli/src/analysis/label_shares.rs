@@ -3,9 +3,10 @@
 use gripgen::tactile::SimdLevel;
 use gripgen::{Project, SimulateOptions, in_parallel, simulate};
 use gripgen_identify::{closed_share, total_share};
-use gripgen_twin::config::Mechanics;
+use gripgen_twin::config::{DesignFile, Mechanics};
 use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::{Group, find};
+use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Outcome, Sweep};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -91,7 +92,7 @@ pub struct LabelShares {
 
 /// Label of a sample with draws of its own, if it slipped.
 fn label_n(project: &Project, index: u64, drawn: &BTreeMap<String, Drawn>) -> Option<f64> {
-    let twin = Sweep::twin_of_drawn(drawn, project.twin_table.clone()).ok()?;
+    let twin = Sweep::twin_of_drawn(drawn, &project.twin_table).ok()?;
     let (scenario, usable) = project.sweep.scenario_of(drawn.clone(), index, &twin);
     usable.ok()?;
     let level = SimdLevel::best();
@@ -127,6 +128,13 @@ impl fmt::Display for LabelShares {
     }
 }
 
+/// The samples that are compared, at random: neighbours in a grid or among repetitions are alike. A sweep that draws may have more
+/// samples than it asks for.
+fn compared(sweep: &Sweep, number: u64) -> u64 {
+    let most = if sweep.design == DesignFile::Grid { sweep.samples } else { sweep.samples.max(2 * SAMPLES) };
+    (Stream::new(sweep.seed, number, Purpose::Compared).uniform() * most as f64) as u64
+}
+
 /// Shares for a sweep, by simulating some of its labels again with a part of their draws exchanged. `None` where too few slip.
 pub fn label_shares(project: &Project, jobs: usize) -> Option<LabelShares> {
     // The label of sample `at` with what `taken` says from `from`.
@@ -136,7 +144,8 @@ pub fn label_shares(project: &Project, jobs: usize) -> Option<LabelShares> {
         label_n(project, at, &drawn)
     };
     let all = |label: &(dyn Fn(u64, u64) -> Option<f64> + Sync)| {
-        in_parallel(SAMPLES as usize, jobs, |i| label(i as u64, SAMPLES + i as u64))
+        let at = |number: usize| compared(&project.sweep, number as u64);
+        in_parallel(SAMPLES as usize, jobs, |i| label(at(2 * i), at(2 * i + 1)))
     };
     let pairs = |a: &[Option<f64>], b: &[Option<f64>]| -> Vec<(f64, f64)> {
         a.iter().zip(b).filter_map(|(a, b)| Some(((*a)?, (*b)?))).collect()

@@ -28,7 +28,7 @@ class Pull:
     seed: int
     index: int
     #: "slipped", "censored" (the label is a lower bound), "no_contact" (the label is 0), "failed" (there is none) or
-    #: "suspect" (the trace contradicts the label; only with a trace).
+    #: "suspect" (the trace contradicts the label, or the label is farther from the peak than the tolerance of its rule).
     status: str
     #: The pull force at slip, N; NaN if the sample failed.
     max_pull_force_n: float = float("nan")

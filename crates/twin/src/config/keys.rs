@@ -42,7 +42,7 @@ pub(super) fn fill(mine: &mut toml::Value, default: &toml::Value) {
 }
 
 /// The segments of a dotted key; an index is a segment too.
-fn segments(key: &str) -> Vec<&str> {
+pub(crate) fn segments(key: &str) -> Vec<&str> {
     key.split(['.', '[']).map(|s| s.strip_suffix(']').unwrap_or(s)).collect()
 }
 
