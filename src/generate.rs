@@ -228,8 +228,7 @@ fn pull(
     let result = pull_staircase_seen(&mut session, &staircase, &scenario.pull, until, watched)?;
     let label = slip_label(&result.trace, scenario.pull.label_tolerance_n, result.slid)?;
     // A pull that ends as soon as its label is decided has no whole trace.
-    let trace = options.trace.then_some(&result.trace);
-    let suspect = suspect_simulated(twin, scenario, trace, &label, &result.forces);
+    let suspect = if options.trace { suspect_simulated(twin, scenario, &result.trace, &label) } else { None };
     let Contact { held, imprint, force_n } = contact;
     let summary =
         imprint.map(|_, i| ImprintSummary { press_depth_m: i.press_depth_m, patch: i.patch.clone() });

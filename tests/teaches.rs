@@ -180,12 +180,16 @@ fn the_training_set_has_jaws_that_differ_and_every_outcome() {
     assert!(limit < 27.9 && peak < 27.9, "{limit} {peak}");
 }
 
-/// b / a of a + b / F, fitted to the labels of one part in each of many worlds of the friction prior, sorted. Forces are those of one jaw.
+/// b / a of a + b / F, fitted to the labels of one of the paper's parts in each of many worlds of the priors, sorted. Forces are those of
+/// one jaw.
 fn offsets_of_worlds_n(forces_n: [f64; 2]) -> Vec<f64> {
     let force = format!("vary.grip_force_n={{uniform={forces_n:?}, per=\"sample\"}}");
     let sets = [
         "repetitions=8",
-        "vary.part=[\"long_shaft\", \"gear\"]",
+        "twin=asset:configs/twin-baseline.toml",
+        "gel.left.thickness_mm=5.5",
+        "gel.left.stiffens=true",
+        "gel.right.thickness_mm=5.5",
         "vary.grip_pose=[0]",
         "vary.grip_offset_mm=[0]",
         &force,

@@ -8,7 +8,7 @@ from PIL import Image
 
 from research.transfer.contact import VIEW
 from research.transfer.features import of_images
-from research.transfer.network import Network
+from research.transfer.network import Network, Rows
 from research.transfer.scores import factor, rmse
 
 GIVEN, DEVELOPMENT = "golf_ball", "strawberry"
@@ -47,7 +47,7 @@ def report(folder: Path, training: dict[str, dict[str, np.ndarray]], seeds: int)
     found = {}
     for name, table in training.items():
         both, twice = np.concatenate([table["jaw"], table["jaw_other"]]), np.tile(table["force_n"], 2)
-        found[name] = np.mean([Network(both, twice, np.zeros(len(twice), bool), s, (0.3, 0.1))(x).expected_n() for s in range(seeds)], 0)
+        found[name] = np.mean([Network(Rows(both, twice, np.zeros(len(twice), bool), np.zeros(len(twice), int)), s, (0.3, 0.1))(x).expected_n() for s in range(seeds)], 0)
     for group, at in groups.items():
         row = [group, str(at.sum()), f"{rmse(force_n[at] - force_n[golf].mean()):.1f}"]
         for p in found.values():

@@ -59,25 +59,25 @@ class Score:
     within50: dict[int, float] = field(default_factory=dict)
     within90: dict[int, float] = field(default_factory=dict)
     rank: float = 0.0
-    ln_mse: float = 0.0
+    ln_mse: dict[int, float] = field(default_factory=dict)
 
 
 def score(p: Prediction, force_n: np.ndarray, label_n: np.ndarray) -> Score:
     """All figures of one predictor in one world."""
-    out, predicted = Score(), p.expected_n()
+    out = Score()
     for k in KS:
-        errors, half, most = [], [], []
+        errors, logs, half, most = [], [], [], []
         for order in draws(len(label_n)):
             few, rest = order[:k], order[10:]
-            a = factor(predicted[few], label_n[few]) if k else 1.0
-            errors.append(label_n[rest] - a * predicted[rest])
-            half.append(p.within(label_n, 0.5, a)[rest])
-            most.append(p.within(label_n, 0.9, a)[rest])
-        out.rmse_n[k] = rmse(np.concatenate(errors))
+            told = p.given(few, label_n[few])
+            errors.append((label_n - told.expected_n())[rest])
+            logs.append((np.log(label_n + 0.5) - told.mean - np.log(told.factor))[rest])
+            half.append(told.within(label_n, 0.5)[rest])
+            most.append(told.within(label_n, 0.9)[rest])
+        out.rmse_n[k], out.ln_mse[k] = rmse(np.concatenate(errors)), rmse(np.concatenate(logs)) ** 2
         out.within50[k], out.within90[k] = float(np.mean(np.concatenate(half))), float(np.mean(np.concatenate(most)))
     out.relative = out.rmse_n[10] / float(label_n.mean())
-    out.rank = rank(predicted, force_n, label_n)
-    out.ln_mse = float(np.mean((np.log(label_n + 0.5) - p.mean) ** 2))
+    out.rank = rank(p.expected_n(), force_n, label_n)
     return out
 
 
@@ -87,7 +87,7 @@ def mean_of(scores: list[Score]) -> Score:
         return {k: float(np.mean([getattr(s, name)[k] for s in scores])) for k in KS}
 
     return Score(over("rmse_n"), float(np.mean([s.relative for s in scores])), over("within50"), over("within90"),
-                 float(np.mean([s.rank for s in scores])), float(np.mean([s.ln_mse for s in scores])))
+                 float(np.mean([s.rank for s in scores])), over("ln_mse"))
 
 
 def interval(ratios: np.ndarray) -> tuple[float, float, float]:

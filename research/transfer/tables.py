@@ -86,14 +86,14 @@ def targets(scores: dict[tuple[str, str, str], Score], line_n: dict[str, float],
     less = [scores["new-less", "both", w].rmse_n[0] / scores["w1-native", "both", w].rmse_n[0] for w in first]
     text += line("W1: the same, `training.toml` with as many rows as the native network", "<= 1.1", of(less), "", "")
     text += row("W1: RMSE over the native network, k = 0", "<= 1.1", first, 0, lambda w: scores["w1-native", "both", w].rmse_n[0])
-    for unit in ("N^2", "ln^2"):
+    for unit, k in (("N^2", 0), ("ln^2", 0), ("N^2", 10), ("ln^2", 10)):
         cells = []
         for variant in ("new", "new-less", "w1-native"):
-            errors = [np.array([scores[variant, kind, w].rmse_n[0] ** 2 if unit == "N^2" else scores[variant, kind, w].ln_mse for w in first])
+            errors = [np.array([scores[variant, kind, w].rmse_n[k] ** 2 if unit == "N^2" else scores[variant, kind, w].ln_mse[k] for w in first])
                       for kind in ("force", "both", "contact")]
             middle, low, high = share(*errors)
             cells.append(f"{middle:.2f} ({low:.2f} to {high:.2f}); {errors[0].mean():.3f}, {errors[1].mean():.3f}, {errors[2].mean():.3f}")
-        text += line(f"W1: share of the oracle's gain in {unit}; errors of F_G, images and F_G, true contact", ">= 0.67", cells[0], "",
+        text += line(f"W1: share of the oracle's gain in {unit}, k = {k}; errors of F_G, images and F_G, true contact", ">= 0.67", cells[0], "",
                      f"fewer rows: {cells[1]}; native: {cells[2]}")
     text += "\n### The new set against the old one, images and F_G, RMSE new over old\n" + head("worlds", "k = 0", "k = 3", "k = 10")
     for name, group in (("W1", first), ("W2", second)):

@@ -189,7 +189,9 @@ fn dict_of(py: Python<'_>, sample: Sample, trace: bool) -> PyResult<Bound<'_, Py
             for (name, value) in optional {
                 found.set_item(name, value.unwrap_or(f64::NAN))?;
             }
-            let branch = forces.branch(pulled.label.slip_time_s);
+            let label = &pulled.label;
+            let tolerance_n = scenario.pull.label_tolerance_n;
+            let branch = forces.branch(label.max_pull_force_n, label.slip_time_s, tolerance_n);
             found.set_item("label_branch", branch.map_or("", LabelBranch::name))?;
             found.set_item("outside_fit", pulled.outside_fit)?;
             found.set_item("images", pulled.images.as_ref().map(|i| image_array(py, i)).transpose()?)?;

@@ -18,7 +18,11 @@ const ABOUT: [(&str, &str, &str); 17] = [
     ("slip_time_s", "s", "when it slips, since the start of the pull"),
     ("peak_force_n", "N", "largest mean over 20 ms while the jaws held"),
     ("kinetic_force_n", "N", "median from 0.2 to 1 mm past the peak: friction of jaws that slide"),
-    ("label_branch", "", "static or kinetic: where the label was read"),
+    (
+        "label_branch",
+        "",
+        "static, early (before the slip, off the peak by more than the tolerance) or kinetic: where the label was read",
+    ),
     ("limit_force_n", "N", "what both jaws held, without noise and label rule"),
     ("slip_onset_s", "s", "when the first part of the contact slid"),
     ("slip_s", "s", "when all of it did"),

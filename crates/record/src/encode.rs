@@ -224,7 +224,9 @@ pub(crate) fn set_label(message: &mut proto::Sample, label: &SlipLabel) {
 /// Forces of a trace in addition to its label, which has been set.
 pub(crate) fn set_forces(message: &mut proto::Sample, forces: &PullForces) {
     (message.peak_force_n, message.kinetic_force_n) = (forces.peak_force_n, forces.kinetic_force_n);
-    let branch = message.slip_time_s.and_then(|slip_time_s| forces.branch(slip_time_s));
+    let label = message.max_pull_force_n.zip(message.slip_time_s);
+    let branch = label
+        .and_then(|(label_n, slip_time_s)| forces.branch(label_n, slip_time_s, message.label_tolerance_n));
     message.label_branch = branch.map_or(String::new(), |branch| branch.name().into());
 }
 

@@ -59,7 +59,7 @@ pub struct Pulled {
     pub slip_onset_s: Option<f64>,
     /// When all cells did.
     pub slip_s: Option<f64>,
-    /// Why the label is suspect, with numbers: its trace contradicts it, or it is farther from the peak than the tolerance of its rule.
+    /// Why the trace contradicts the label, with numbers; `None` if it does not, and without a trace.
     pub suspect: Option<String>,
 }
 

@@ -253,7 +253,7 @@ impl<'a> Watch<'a> {
             (summary.censored, "ended before the jaws slipped (label is a lower bound)"),
             (
                 summary.suspect,
-                "are suspect: not what the jaws held; why is in the column `failure` of index.csv",
+                "are suspect: their trace contradicts their label (column `failure` of index.csv)",
             ),
         ] {
             if n > 0 {

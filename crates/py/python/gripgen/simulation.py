@@ -28,7 +28,7 @@ class Pull:
     seed: int
     index: int
     #: "slipped", "censored" (the label is a lower bound), "no_contact" (the label is 0), "failed" (there is none) or
-    #: "suspect" (the trace contradicts the label, or the label is farther from the peak than the tolerance of its rule).
+    #: "suspect" (the trace contradicts the label; only with a trace).
     status: str
     #: The pull force at slip, N; NaN if the sample failed.
     max_pull_force_n: float = float("nan")
@@ -36,7 +36,7 @@ class Pull:
     #: Largest mean reading over 20 ms while the jaws held, and the median from 0.2 to 1 mm past its place, N; NaN where there is none.
     peak_force_n: float = float("nan")
     kinetic_force_n: float = float("nan")
-    #: "static" or "kinetic": where the label was read; "" where it is not known.
+    #: "static", "early" (before the slip, off the peak by more than the tolerance) or "kinetic": where the label was read; "" if not known.
     label_branch: str = ""
     #: What both jaws held, without noise and label rule, N; when the first part of the contact slid, and all of it, s.
     limit_force_n: float = float("nan")

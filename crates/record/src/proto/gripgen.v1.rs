@@ -116,7 +116,8 @@ pub struct Sample {
     /// Median reading from 0.2 to 1 mm past the place of the peak: friction of jaws that slide. Absent where the pull ended before.
     #[prost(double, optional, tag = "37")]
     pub kinetic_force_n: ::core::option::Option<f64>,
-    /// The branch on which max_pull_force_n was read: "static" while the jaws held, "kinetic" after that; empty where it is not known.
+    /// Where max_pull_force_n was read: "static" while the jaws held, "early" then but below the peak by more than the tolerance,
+    /// "kinetic" after that; empty where it is not known.
     #[prost(string, tag = "38")]
     pub label_branch: ::prost::alloc::string::String,
     /// Answers, which no robot knows before the pull; of simulated pulls only.

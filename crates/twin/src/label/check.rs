@@ -16,7 +16,6 @@ mod zero;
 pub use cross_axis::{GripForceEvidence, WrenchRow};
 pub use zero::ZERO_SHIFT;
 
-use super::forces::{LabelBranch, PullForces};
 use crate::{PullTrace, Scenario, SlipLabel, Twin};
 use signal::Signal;
 use std::fmt;
@@ -336,43 +335,18 @@ pub fn check_label(evidence: &LabelEvidence<'_>, expected: &Expected) -> Judgeme
     Judgement { verdict, findings, budget }
 }
 
-/// Why the label of a simulated pull is suspect: its trace contradicts it, as it ought not to, or the label is farther from the peak
-/// than the tolerance of its rule. `trace` is there if it holds every reading.
+/// Why the label of a simulated pull is suspect; `None` if it is not, as it ought to be. The trace holds every reading.
 pub fn suspect_simulated(
     twin: &Twin,
     scenario: &Scenario,
-    trace: Option<&PullTrace>,
+    trace: &PullTrace,
     label: &SlipLabel,
-    forces: &PullForces,
 ) -> Option<String> {
     let pull = &scenario.pull;
-    let by_trace = trace.and_then(|trace| {
-        let of_trace =
-            LabelEvidence::of_trace(label.max_pull_force_n, pull.label_tolerance_n, pull.stop_m, Some(trace));
-        let evidence = LabelEvidence { censored: label.censored, every_reading: true, ..of_trace };
-        check_label(&evidence, &Expected::of(twin, scenario)).reason()
-    });
-    by_trace.or_else(|| {
-        let finding = off_peak(label, forces, pull.label_tolerance_n)?;
-        finding.is_reason().then(|| finding.to_string())
-    })
-}
-
-/// A label against the largest force that the jaws held. A twin may predict that the rule fires before the slip (a loop that trails,
-/// large steps) or on a lower branch: such a label is still not what a grip held.
-fn off_peak(label: &SlipLabel, forces: &PullForces, tolerance_n: f64) -> Option<Finding> {
-    let found = forces.peak_force_n.filter(|_| !label.censored)?;
-    let kind = match forces.branch(label.slip_time_s)? {
-        LabelBranch::Static => FindingKind::Early,
-        LabelBranch::Kinetic => FindingKind::LargerBefore,
-    };
-    Some(Finding {
-        kind,
-        found,
-        wanted: label.max_pull_force_n,
-        allowed: tolerance_n,
-        time_s: Some(label.slip_time_s),
-    })
+    let of_trace =
+        LabelEvidence::of_trace(label.max_pull_force_n, pull.label_tolerance_n, pull.stop_m, Some(trace));
+    let evidence = LabelEvidence { censored: label.censored, every_reading: true, ..of_trace };
+    check_label(&evidence, &Expected::of(twin, scenario)).reason()
 }
 
 /// What may be behind a reason that was recorded ([`Judgement::reason`], perhaps with others after it, joined by

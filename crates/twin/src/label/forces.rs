@@ -20,6 +20,9 @@ const SLIDES_M: [f64; 2] = [2e-4, 1e-3];
 pub enum LabelBranch {
     /// While the jaws held.
     Static,
+    /// While the jaws held, and more than the tolerance of the rule below the peak: the loop trailed, steps were large or noise was, and the
+    /// rule was met for the last time long before the slip.
+    Early,
     /// After the tool had left that branch: the label is a friction of jaws that slide.
     Kinetic,
 }
@@ -29,6 +32,7 @@ impl LabelBranch {
     pub fn name(self) -> &'static str {
         match self {
             LabelBranch::Static => "static",
+            LabelBranch::Early => "early",
             LabelBranch::Kinetic => "kinetic",
         }
     }
@@ -58,11 +62,15 @@ impl PullForces {
         search.forces(trace)
     }
 
-    /// The branch of a label that was read at `slip_time_s`; `None` without displacements.
-    pub fn branch(&self, slip_time_s: f64) -> Option<LabelBranch> {
-        self.peak_force_n?;
+    /// The branch of a label that was read at `slip_time_s` by a rule with a tolerance; `None` without displacements.
+    pub fn branch(&self, label_n: f64, slip_time_s: f64, tolerance_n: f64) -> Option<LabelBranch> {
+        let peak_force_n = self.peak_force_n?;
         let kinetic = self.left_s.is_some_and(|left_s| slip_time_s > left_s);
-        Some(if kinetic { LabelBranch::Kinetic } else { LabelBranch::Static })
+        Some(match () {
+            () if kinetic => LabelBranch::Kinetic,
+            () if peak_force_n - label_n > tolerance_n => LabelBranch::Early,
+            () => LabelBranch::Static,
+        })
     }
 }
 
@@ -154,8 +162,9 @@ mod tests {
         assert!((found.peak_force_n.unwrap() - 11.91).abs() < 0.011, "{found:?}");
         assert_eq!(found.kinetic_force_n, Some(9.0));
         assert!((found.left_s.unwrap() - 1.206).abs() < 0.003, "{found:?}");
-        assert_eq!(found.branch(1.19), Some(LabelBranch::Static));
-        assert_eq!(found.branch(1.3), Some(LabelBranch::Kinetic));
+        assert_eq!(found.branch(11.9, 1.19, 3.0), Some(LabelBranch::Static));
+        assert_eq!(found.branch(8.8, 0.88, 3.0), Some(LabelBranch::Early));
+        assert_eq!(found.branch(9.0, 1.3, 3.0), Some(LabelBranch::Kinetic));
     }
 
     /// Readings that alternate by 0.5 N average out over ten rows.
@@ -184,10 +193,10 @@ mod tests {
         assert!(
             found.peak_force_n.unwrap() > 9.8 && found.kinetic_force_n.is_none() && found.left_s.is_none()
         );
-        assert_eq!(found.branch(0.9), Some(LabelBranch::Static));
+        assert_eq!(found.branch(9.0, 0.9, 3.0), Some(LabelBranch::Static));
         trace.displacement_m.fill(0.0);
         assert_eq!(PullForces::of(&trace), PullForces::default());
-        assert_eq!(PullForces::default().branch(1.0), None);
+        assert_eq!(PullForces::default().branch(1.0, 1.0, 3.0), None);
         assert_eq!(PullForces::of(&PullTrace::default()), PullForces::default());
     }
 }
