@@ -213,15 +213,19 @@ fn check_warns_of_grips_that_fail() {
     start(all.iter().find(|p| p.name == "flange_shaft").unwrap(), folder.path()).unwrap();
     let sound = plan(&project_in(folder.path(), &BARE), SimdLevel::best()).unwrap();
     assert!(sound.grips.iter().all(|g| g.failed.is_empty() && g.tried >= 4), "{:?}", sound.grips);
-    // Beyond the end of the shaft, which offsets reach or not.
-    let wide = [&BARE[..], &[("vary.grip_offset_mm", "{ normal = [0, 25] }")]].concat();
-    let project = project_in(folder.path(), &wide);
-    let plan = plan(&project, SimdLevel::best()).unwrap();
-    let warned: Vec<u64> = plan.grips.iter().flat_map(|g| g.failed.iter().map(|(index, _)| *index)).collect();
-    assert!(!warned.is_empty());
-    for index in warned {
-        assert!(pulled(&project, index).is_err(), "sample {index} works");
-    }
+    // Grips that may miss are samples like others; those that always miss the end of the shaft are a mistake.
+    let with = |offset_mm| {
+        let project = project_in(folder.path(), &[&BARE[..], &[("vary.grip_offset_mm", offset_mm)]].concat());
+        let plan = plan(&project, SimdLevel::best()).unwrap();
+        let warned: Vec<u64> =
+            plan.grips.iter().flat_map(|g| g.failed.iter().map(|(index, _)| *index)).collect();
+        for index in &warned {
+            assert!(pulled(&project, *index).is_err(), "sample {index} works");
+        }
+        warned
+    };
+    assert!(with("{ normal = [0, 25] }").is_empty());
+    assert!(!with("{ uniform = [150, 160] }").is_empty());
 }
 
 /// The same part gives the same files for any number of threads.

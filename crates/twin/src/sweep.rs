@@ -308,8 +308,7 @@ fn drawn_part(drawn: &BTreeMap<String, Drawn>) -> String {
     drawn.get("part").map(Drawn::to_string).unwrap_or_default()
 }
 
-/// `base` with the drawn part, those of drawn keys and those that effects name. A twin may have many parts, and reading each of them
-/// for every sample takes longer than a pull.
+/// `base` with the drawn part, those of drawn keys and those that effects name: a twin may have many parts, and each sample reads its own.
 fn with_needed_parts(base: &toml::Table, drawn: &BTreeMap<String, Drawn>) -> toml::Table {
     let Some(parts) = base.get("parts").and_then(toml::Value::as_table) else { return base.clone() };
     let effects = base.get("effects").and_then(toml::Value::as_array);

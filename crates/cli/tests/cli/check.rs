@@ -74,6 +74,11 @@ fn images_that_say_nothing_of_the_label_are_warned_of() {
     assert!(force > 0.5 && seen < 0.001 && warned, "{force} {seen}");
     let (_, seen, warned) = with("twin-contact");
     assert!(seen > 0.01 && !warned, "{seen}");
+    // Neighbours in a grid share part and force; pairs are drawn from all of it.
+    let grid = run(&["check", QUICKSTART, "--json", "--set", "mechanics=reduced"]);
+    let json: serde_json::Value = serde_json::from_slice(&grid.stdout).unwrap();
+    let seen = json["label_shares"]["seen"].as_f64().unwrap();
+    assert!(seen > 0.1, "{seen}");
 }
 
 #[test]

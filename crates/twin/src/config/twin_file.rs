@@ -226,7 +226,7 @@ pub struct GelFile {
     /// Standard deviation of the blur that rounds these slopes, as the skin of a gel does.
     #[serde(default = "interlock_smoothing_mm", skip_serializing_if = "is_interlock_smoothing_mm")]
     pub interlock_smoothing_mm: f64,
-    /// Whether the gel stiffens as it gets thinner: `V = c F (1 - depth / thickness)`, so that no force presses it through. Of
+    /// Whether the gel stiffens as it gets thinner: `V = c F (1 - depth / thickness)`, to nine tenths of its thickness. Of
     /// `model = "pyramid"`.
     #[serde(default, skip_serializing_if = "is_false")]
     pub stiffens: bool,

@@ -20,8 +20,8 @@ const SLIDES_M: [f64; 2] = [2e-4, 1e-3];
 pub enum LabelBranch {
     /// While the jaws held.
     Static,
-    /// While the jaws held, and more than the tolerance of the rule below the peak: the loop trailed, steps were large or noise was, and the
-    /// rule was met for the last time long before the slip.
+    /// While the jaws held, and more than the tolerance of the rule below the peak: the loop trailed, or steps or noise were large, so that
+    /// the rule was met for the last time before the slip.
     Early,
     /// After the tool had left that branch: the label is a friction of jaws that slide.
     Kinetic,
