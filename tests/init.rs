@@ -217,15 +217,16 @@ fn check_warns_of_grips_that_fail() {
     let with = |offset_mm| {
         let project = project_in(folder.path(), &[&BARE[..], &[("vary.grip_offset_mm", offset_mm)]].concat());
         let plan = plan(&project, SimdLevel::best()).unwrap();
-        let warned: Vec<u64> =
-            plan.grips.iter().flat_map(|g| g.failed.iter().map(|(index, _)| *index)).collect();
-        for index in &warned {
+        let warned: Vec<(u64, String)> = plan.grips.iter().flat_map(|g| g.failed.clone()).collect();
+        for (index, _) in &warned {
             assert!(pulled(&project, *index).is_err(), "sample {index} works");
         }
         warned
     };
-    assert!(with("{ normal = [0, 25] }").is_empty());
-    assert!(!with("{ uniform = [150, 160] }").is_empty());
+    let misses = |(_, reason): &(u64, String)| reason.contains("miss the part");
+    assert!(!with("{ normal = [0, 25] }").iter().any(misses));
+    let beyond = with("{ uniform = [150, 160] }");
+    assert!(!beyond.is_empty() && beyond.iter().all(misses), "{beyond:?}");
 }
 
 /// The same part gives the same files for any number of threads.

@@ -149,7 +149,8 @@ fn the_training_set_has_jaws_that_differ_and_every_outcome() {
     };
     let failed: Vec<&Outcome> =
         made.iter().map(|(_, o)| o).filter(|o| matches!(o, Outcome::Failed { .. })).collect();
-    assert!(failed.len() <= 6, "{:?}", failed.first());
+    // 0.9 % of 3000 press a gel through; 12 of 600 are three standard deviations more.
+    assert!(failed.len() <= 12, "{:?}", failed.first());
     let missed = share(&|o| matches!(o, Outcome::NoContact { .. }));
     let censored = share(&|o| matches!(o, Outcome::Pulled(p) if p.label.censored));
     assert!((0.005..0.06).contains(&missed) && (0.04..0.14).contains(&censored), "{missed} {censored}");

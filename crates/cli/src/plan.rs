@@ -133,8 +133,11 @@ fn outermost_grips(project: &Project) -> Vec<TriedGrip> {
     let of_grip = |((part, grip_pose), samples): ((String, usize), Vec<(u64, Place)>)| {
         let tried: Vec<u64> = corners(&samples).into_iter().take(each).collect();
         let outcomes: Vec<_> = tried.iter().map(|&index| (index, grips(project, index))).collect();
-        // Some that miss the part are samples like others; a grip that always does is a mistake. One alone says nothing.
-        let all_miss = outcomes.len() > 1 && outcomes.iter().all(|(_, outcome)| matches!(outcome, Ok(false)));
+        // Some that miss the part are samples like others; a grip that misses it nearest to its own place, too, is a mistake.
+        let missed = |outcome: &Result<bool, SampleError>| matches!(outcome, Ok(false));
+        let nearest = samples.iter().min_by(|a, b| a.1[1].abs().total_cmp(&b.1[1].abs()));
+        let all_miss = outcomes.iter().all(|(_, outcome)| missed(outcome))
+            && nearest.is_some_and(|(index, _)| missed(&grips(project, *index)));
         let failure = |(index, outcome): (u64, Result<bool, SampleError>)| match outcome {
             Ok(true) => None,
             Ok(false) => all_miss.then(|| (index, "the jaws miss the part".to_string())),
