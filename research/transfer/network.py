@@ -123,7 +123,7 @@ class Network:
 
     @staticmethod
     def of_rigs(p: list[np.ndarray], rows: Rows, spread: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """The posterior means of the rigs by the labels that are no lower bounds, and their spread (expectation maximisation)."""
+        """Posterior means of the rigs from uncensored labels, and their spread (expectation maximisation)."""
         _, _, mean, raw = Network.layers(p, rows.x)
         weight = np.where(rows.censored, 0, np.exp(-2 * np.clip(raw, -4, 1))) / rows.copies
         phi = np.stack([np.ones(len(mean)), rows.x @ p[7]], 1)

@@ -54,8 +54,8 @@ def inputs(table: Table, kind: str, name: str = "x") -> np.ndarray:
 
 
 def trained(table: Table, kind: str, seed: int, lights: bool) -> Network:
-    """A network; each row twice where its images are also seen under other lights. A third of the rigs (of the rows, where there
-    are no rigs) says how much the weights decay."""
+    """A network; each row twice where its images are also seen under other lights. A third of the rigs (of the rows in a set
+    without rigs) chooses the weight decay."""
     rig = np.unique(table["rig"], return_inverse=True)[1]
     names = rig if rig.max() else np.arange(len(rig))
     held = np.random.default_rng(seed).permutation(names.max() + 1)[names] % 3 == 0

@@ -18,7 +18,7 @@ const REACH: f64 = 3.0;
 /// `depth_px` is the depth of the part in the gel in pixels, 0 without contact. It is blurred with a Gaussian of `smoothing_m` over pixels in contact alone,
 /// as the skin of a gel bridges sharp corners; a flat face stays flat up to its rim. `along` is the unit vector of the pull in the `gel`
 /// frame. The slope q along the pull is that which resists: positive where the part gets shallower ahead. Means are subtracted: a
-/// face that is inclined as a whole is a wedge, which effects of the jaws have. The same bits on every vector unit.
+/// face that is inclined as a whole is a wedge, which effects of the jaws have. The same bits at every SIMD level.
 pub fn contact_slopes(
     depth_px: &Plane,
     grid: &Grid,
