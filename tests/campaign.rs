@@ -1,9 +1,10 @@
 //! Campaigns: planned, made on a twin, written, and read as measurements.
 
-use crate::common::{baseline, overrides};
+use crate::common::{baseline, library, overrides, twin_with_sets};
 use gripgen::twin::config::Feedback;
-use gripgen::twin::{Campaign, PlannedPull};
-use gripgen_cli::simulate_campaign;
+use gripgen::twin::{Campaign, Jaw, PlannedPull, Twin};
+use gripgen_cli::{calibrate_twin, edited_twin, simulate_campaign};
+use gripgen_identify::pulls::calibrate::CalibrateRequest;
 use gripgen_identify::{CampaignOptions, plan_campaign};
 use gripgen_measured::{CAMPAIGN_FILE, campaign_toml, read_campaign, write_pull_folder};
 use gripgen_measured::{Suspects, load_pulls_with};
@@ -82,6 +83,29 @@ fn a_simulated_campaign_depends_on_its_seed_and_has_its_effects() {
         trace.measured_force_n[..50].iter().sum::<f64>() / 50.0
     };
     assert!((unloaded(&biased) - unloaded(&plain) - 1.5).abs() < 1e-3, "the same noise, and the bias");
+}
+
+/// The twin that is written for a soft gel is as soft as the rig: shear stiffness is fitted as it acts, and a file has that of compliance 1.
+#[test]
+fn a_soft_gel_is_written_back_as_soft_as_it_is() {
+    let sets = overrides(&[("gel.left.compliance", "4.0"), ("gel.left.shear_stiffness_n_per_mm", "24.0")]);
+    let pulls = (0..24u32).map(|i| PlannedPull {
+        part: "long_shaft".into(),
+        grip_force_n: 15.0 + 5.0 * f64::from(i % 6),
+        ..Default::default()
+    });
+    let campaign = Campaign { label_tolerance_n: 3.0, stop_m: 5e-3, feedback: None, pulls: pulls.collect() };
+    let measured = simulate_campaign(&baseline(), &sets, &campaign, 1).unwrap().pulls;
+    let twin = twin_with_sets(&baseline(), &sets);
+    let request = CalibrateRequest::default();
+    let (_, edits) = calibrate_twin(&measured, &twin, &library(&twin), &request, 2).unwrap();
+    let fitted = Twin::new(&edited_twin(&baseline(), &sets, &edits).unwrap()).unwrap();
+    for jaw in Jaw::BOTH {
+        let (true_n_per_m, found_n_per_m) =
+            (twin.gel[jaw].shear_stiffness_n_per_m, fitted.gel[jaw].shear_stiffness_n_per_m);
+        assert_eq!(true_n_per_m, 6e3);
+        assert!((0.8..1.25).contains(&(found_n_per_m / true_n_per_m)), "{found_n_per_m} N/m");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Sets of imprints, from disk to answer: volumes of images, constants in a twin, real grasps.
 
-use crate::common::{baseline, jobs, root, run, small_project, twin_at};
+use crate::common::{baseline, jobs, root, run, small_project, twin_at, twin_with_sets};
 use gripgen::record::{RunFolder, ShardReader, encode_png};
 use gripgen::twin::{Jaw, Twin};
 use gripgen::{Location, load_twin_document};
@@ -94,6 +94,10 @@ fn constants_stand_in_the_twin_with_their_evidence() {
     let new = load_twin_document(&Location::Disk(out), &[]).unwrap().read_twin().unwrap();
     let c = Twin::new(&new).unwrap().parts["gear"].imprint_m3_per_n * 1e9;
     assert!((c - (1.8f64 * 2.2).sqrt()).abs() < 1e-9, "{c}");
+    // On a gel that gives way four times as much, a file has a fourth of it: what the twin makes of it is what was measured.
+    let soft = [("gel.left.compliance".to_string(), "4.0".to_string())];
+    let edits = imprint_calibration_edits(&found, &twin_with_sets(&baseline(), &soft), None, "").unwrap();
+    assert!((edits.values[0].value - c / 4.0).abs() < 1e-9, "{:?}", edits.values[0]);
     std::fs::write(folder.path().join("imprints.csv"), table.replace(",gear", ",bolt")).unwrap();
     let other = load_imprint_set(folder.path(), None).unwrap();
     let found = calibrate_imprint_table(&other, SharedConstant::Grasp).unwrap();

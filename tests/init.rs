@@ -5,7 +5,7 @@ use crate::solids::{Solid, SolidPart, ordinary};
 use gripgen::physics::Window;
 use gripgen::tactile::SimdLevel;
 use gripgen::twin::frames::{Pose, world_from_gel};
-use gripgen::twin::{Jaw, Outcome, Part, Pulled};
+use gripgen::twin::{Jaw, Outcome, Part, Pulled, TriMesh, write_binary_stl};
 use gripgen::{Project, generate};
 use gripgen_cli::{InitError, NoGrip, PartOptions, PartStarter, part_starter, plan};
 use nalgebra::{Point3, Vector3};
@@ -155,6 +155,40 @@ fn proposals_differ_and_local_features_are_found() {
     assert!(of("l_bracket").iter().any(|g| (g.width_mm - 4.0).abs() < 0.1));
 }
 
+/// A nut M8: 13 mm across its flats, 6.8 mm high, with a bore of 8 mm.
+fn nut() -> TriMesh {
+    const AROUND: u32 = 48;
+    let (sixth, high_m) = (std::f64::consts::FRAC_PI_3, 3.4e-3);
+    // Radius of the hexagon and of the bore at the k-th angle, at both ends.
+    let vertex = |k: u32, inside: bool, z: f64| {
+        let angle = std::f64::consts::TAU * f64::from(k % AROUND) / f64::from(AROUND);
+        let from_flat = (angle % sixth) - 0.5 * sixth;
+        let radius = if inside { 4e-3 } else { 6.5e-3 / from_flat.cos() };
+        Point3::new(radius * angle.cos(), radius * angle.sin(), z)
+    };
+    let rings = [(false, -high_m), (false, high_m), (true, high_m), (true, -high_m)];
+    let vertices = rings.iter().flat_map(|&(inside, z)| (0..AROUND).map(move |k| vertex(k, inside, z)));
+    let quads = (0..4).flat_map(|ring| {
+        let at = move |ring: u32, k: u32| ring % 4 * AROUND + k % AROUND;
+        (0..AROUND).map(move |k| [at(ring, k), at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)])
+    });
+    let triangles = quads.flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+    TriMesh::new(vertices.collect(), triangles.collect()).unwrap()
+}
+
+/// Jaws take a nut by its faces and across its flats: another pair of faces is worth more than the same pair a little farther along.
+#[test]
+fn a_nut_is_proposed_by_its_faces_and_across_its_flats() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("nut.stl");
+    std::fs::write(&path, write_binary_stl(&nut(), "nut", 1e-3)).unwrap();
+    let made = part_starter(&[(&path, OPTIONS)], folder.path()).unwrap();
+    let widths: Vec<f64> = made.parts[0].grips.iter().map(|g| g.width_mm).collect();
+    for wanted_mm in [6.8, 13.0] {
+        assert!(widths.iter().any(|w| (w - wanted_mm).abs() < 0.2), "{widths:?}");
+    }
+}
+
 /// A part without a grip is refused with the reason and both numbers.
 #[test]
 fn a_part_without_a_grip_says_why() {
@@ -191,8 +225,8 @@ fn an_open_mesh_is_refused_unless_it_is_accepted() {
     let path = folder.path().join("open.stl");
     let mesh = SolidPart { name: "open", solids: vec![Solid::Ball([0.0; 3], 15.0)] }.mesh();
     let kept = mesh.triangles()[1..].to_vec();
-    let open = gripgen::twin::TriMesh::new(mesh.vertices_m().to_vec(), kept).unwrap();
-    std::fs::write(&path, gripgen::twin::write_binary_stl(&open, "open", 1e-3)).unwrap();
+    let open = TriMesh::new(mesh.vertices_m().to_vec(), kept).unwrap();
+    std::fs::write(&path, write_binary_stl(&open, "open", 1e-3)).unwrap();
     let error = part_starter(&[(&path, OPTIONS)], folder.path()).unwrap_err();
     assert!(matches!(error, InitError::Open { open_edges: 3, .. }), "{error}");
     let accepted = PartOptions { accept_open_mesh: true, ..OPTIONS };
@@ -249,9 +283,9 @@ fn turned_faces_change_no_grip() {
             if every > 0 && i % every == 0 { [a, c, b] } else { [a, b, c] }
         };
         let triangles = mesh.triangles().iter().enumerate().map(turn).collect();
-        let turned = gripgen::twin::TriMesh::new(mesh.vertices_m().to_vec(), triangles).unwrap();
+        let turned = TriMesh::new(mesh.vertices_m().to_vec(), triangles).unwrap();
         let path = folder.path().join("turned.stl");
-        std::fs::write(&path, gripgen::twin::write_binary_stl(&turned, "turned", 1e-3)).unwrap();
+        std::fs::write(&path, write_binary_stl(&turned, "turned", 1e-3)).unwrap();
         let made = part_starter(&[(&path, OPTIONS)], folder.path()).unwrap();
         let part = made.parts.into_iter().next().unwrap();
         (part.grips, part.mesh_words)

@@ -181,6 +181,11 @@ impl<'a> PullPredictor<'a> {
         &self.part_names
     }
 
+    /// How much softer the gel of a jaw is than its constants say: see [`gripgen_twin::Gel::compliance`].
+    pub fn compliance(&self, jaw: Jaw) -> f64 {
+        self.twin.gel[jaw].compliance
+    }
+
     /// The twin that a model describes: the one that is written for it.
     pub fn twin_of(&self, model: &PullModel) -> Twin {
         let mut twin = self.twin.clone();

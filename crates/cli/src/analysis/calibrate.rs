@@ -70,8 +70,7 @@ pub fn calibrate_twin(
     let found = calibrate_pulls(measured, &predictor, &given, &request)?;
     let (low, high) = found.grip_force_n;
     let evidence = format!("gripgen calibrate pulls, {} pulls at {low} to {high} N", measured.pulls.len());
-    let mut values =
-        pull_values(&found.model, &found.baseline, predictor.part_names(), &evidence, &measured.sha256);
+    let mut values = pull_values(&found.model, &found.baseline, &predictor, &evidence, &measured.sha256);
     // With the law the coefficient stays that of the twin: a is a factor on it.
     if !found.laws.is_empty() {
         values.retain(|v| !(v.key.starts_with("parts.") && v.key.ends_with(".mu")));

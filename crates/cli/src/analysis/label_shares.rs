@@ -8,6 +8,7 @@ use gripgen_twin::draw::Drawn;
 use gripgen_twin::effects::{Group, find};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::{Outcome, Sweep};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -88,6 +89,15 @@ pub struct LabelShares {
     pub seen: f64,
     /// Pairs of pulls that slipped, of those that were made for the last source.
     pub pairs: usize,
+}
+
+impl LabelShares {
+    /// As `check --json` and `info --json` print them.
+    pub fn json(&self) -> Value {
+        let of: serde_json::Map<String, Value> =
+            self.shares.iter().map(|(source, share)| (source.key().into(), json!(share))).collect();
+        json!({"shares": of, "error": self.error, "seen": self.seen, "pulls": self.pairs})
+    }
 }
 
 /// Label of a sample with draws of its own, if it slipped.

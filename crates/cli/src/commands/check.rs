@@ -66,7 +66,7 @@ pub fn check(
             "jobs": jobs,
             "probes": probes,
             "grips": grips,
-            "label_shares": shares.as_ref().map(shares_json),
+            "label_shares": shares.as_ref().map(LabelShares::json),
             "warnings": warnings,
         }))?;
     }
@@ -194,12 +194,6 @@ fn of_shares(project: &Project, shares: Option<&LabelShares>) -> Vec<String> {
 }
 
 /// The shares as JSON.
-pub(super) fn shares_json(shares: &LabelShares) -> serde_json::Value {
-    let of: serde_json::Map<String, serde_json::Value> =
-        shares.shares.iter().map(|(source, share)| (source.key().into(), json!(share))).collect();
-    json!({"shares": of, "error": shares.error, "seen": shares.seen, "pulls": shares.pairs})
-}
-
 /// The plan in words.
 pub fn describe(project: &Project, plan: &Plan, jobs: usize) -> String {
     let sweep = &project.sweep;

@@ -2,10 +2,10 @@
 
 use crate::args::InfoArgs;
 use crate::failure::Failure;
-use crate::label_shares;
 use crate::load::{jobs, no_pulls, say_warnings};
 use crate::output::{JsonSink, count, print, size};
 use crate::outputs::Outputs;
+use crate::{LabelShares, label_shares};
 use gripgen::Project;
 use gripgen::record::{INDEX_COLUMNS, RIG_SOURCE, RunFolder};
 use gripgen_identify::{Level, levels};
@@ -77,6 +77,10 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     }
     let by_level = levels_of(&parts);
     let missing = info.samples.saturating_sub(done);
+    // A run of another version, or of a rig, has no draws to exchange.
+    let project = (info.source != RIG_SOURCE).then(|| Project::from_run(&folder).ok()).flatten();
+    let told = sink.wanted() || !args.talk.quiet;
+    let shares = project.filter(|_| told).and_then(|project| label_shares(&project, jobs()));
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.info/1", "name": info.name, "source": info.source,
@@ -84,6 +88,7 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
             "samples": info.samples, "done": done, "missing": missing, "failed": failed,
             "shards": info.shards, "shards_done": shards, "bytes": bytes,
             "status": statuses, "parts": parts_json(&parts, &by_level),
+            "label_shares": shares.as_ref().map(LabelShares::json),
         }))?;
         if sink.on_stdout() {
             return Ok(0);
@@ -92,9 +97,6 @@ pub fn run(args: &InfoArgs) -> Result<u8, Failure> {
     if args.talk.quiet {
         return Ok(0);
     }
-    // A run of another version, or of a rig, has no draws to exchange.
-    let project = (info.source != RIG_SOURCE).then(|| Project::from_run(&folder).ok()).flatten();
-    let shares = project.and_then(|project| label_shares(&project, jobs()));
     let mut text = format!("{} ({}), made by gripgen {}\n", info.name, info.source, info.gripgen_version);
     text += &format!("configuration {}\n", &info.config_sha256[..16.min(info.config_sha256.len())]);
     text += &match info.source == RIG_SOURCE {

@@ -27,7 +27,7 @@ pub(super) fn diagnose_few_pulls(
     let evidence = format!("gripgen diagnose of {} pulls", measured.pulls.len());
     let parts = predictor.part_names();
     let edits = answer.found.as_ref().map(|found| TwinEdits {
-        values: pull_values(&found.model, &found.baseline, parts, &evidence, &measured.sha256),
+        values: pull_values(&found.model, &found.baseline, predictor, &evidence, &measured.sha256),
         effects: Some(vec![]),
     });
     let pulls = (PULLS_OF_A_PART * parts.len()).max(LEAST_PULLS);

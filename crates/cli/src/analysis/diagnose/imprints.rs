@@ -76,16 +76,24 @@ pub fn imprint_calibration_edits(
             "gripgen calibrate imprints, {} rows of {} grasps at {low:.2} to {high:.2} N",
             constant.rows, constant.grasps
         );
-        values.push(edited(part, &constant.imprint_mm3_per_n, &evidence, sha256));
+        values.push(edited(twin, part, &constant.imprint_mm3_per_n, &evidence, sha256));
     }
     Ok(TwinEdits { values, effects: None })
 }
 
-fn edited(part: &str, c: &ParameterEstimate, evidence: &str, sha256: &str) -> EditedValue {
+/// The constant of a part for gels of compliance 1, as a file has it: the gels of the twin multiply it. Which jaw was measured is not known.
+fn own_constant(twin: &Twin, mm3_per_n: f64) -> f64 {
+    2.0 * mm3_per_n / (twin.gel.left.compliance + twin.gel.right.compliance)
+}
+
+fn edited(twin: &Twin, part: &str, c: &ParameterEstimate, evidence: &str, sha256: &str) -> EditedValue {
+    let own = |mm3_per_n| own_constant(twin, mm3_per_n);
+    let c =
+        ParameterEstimate { value: own(c.value), low90: own(c.low90), high90: own(c.high90), ..c.clone() };
     EditedValue {
         key: format!("parts.{part}.imprint_mm3_per_n"),
         value: c.value,
-        calibration: Some(calibration_entry(c, evidence, sha256)),
+        calibration: Some(calibration_entry(&c, evidence, sha256)),
     }
 }
 
@@ -102,7 +110,7 @@ fn edits(answer: &mut ImprintDiagnosis, twin: &Twin, sha256: &str) -> TwinEdits 
     }
     let constant = |(part, logs): (&str, &Vec<f64>)| EditedValue {
         key: format!("parts.{part}.imprint_mm3_per_n"),
-        value: libm::exp(logs.iter().sum::<f64>() / logs.len() as f64),
+        value: own_constant(twin, libm::exp(logs.iter().sum::<f64>() / logs.len() as f64)),
         calibration: None,
     };
     let values = of_part.iter().map(|(part, logs)| constant((part, logs))).collect();

@@ -24,7 +24,7 @@ pub(super) fn diagnose_pulls_by_model(
     let Some(fit) = answer.fit else {
         return Diagnosed::new(answer.diagnosis, TwinEdits::default(), ReportData::default());
     };
-    let edits = edits(&fit, &answer.diagnosis, measured, predictor.part_names());
+    let edits = edits(&fit, &answer.diagnosis, measured, predictor);
     let report = report(&fit, &answer.diagnosis, measured);
     Diagnosed::new(answer.diagnosis, edits, report)
 }
@@ -35,7 +35,7 @@ pub(super) fn model_instead(
     search: &Diagnosis,
     fits: &PullFits,
     measured: &MeasuredPulls,
-    parts: &[String],
+    predictor: &PullPredictor<'_>,
 ) -> Option<Diagnosed> {
     let fit = model.fit?;
     let label_n: Vec<f64> = measured.pulls.iter().map(|pull| pull.max_pull_force_n).collect();
@@ -50,7 +50,7 @@ pub(super) fn model_instead(
         if names.is_empty() { String::new() } else { format!(" (they would be {})", names.join(", ")) },
     ));
     diagnosis.would_have_seen.clone_from(&search.would_have_seen);
-    let edits = edits(&fit, &diagnosis, measured, parts);
+    let edits = edits(&fit, &diagnosis, measured, predictor);
     let report = report(&fit, &diagnosis, measured);
     Some(Diagnosed::new(diagnosis, edits, report))
 }
@@ -72,7 +72,7 @@ pub(super) fn few_with_model(
     mut few: Diagnosed,
     model: ModelAnswer,
     measured: &MeasuredPulls,
-    parts: &[String],
+    predictor: &PullPredictor<'_>,
 ) -> Diagnosed {
     let Some(fit) = model.fit else { return few };
     let errors = model.diagnosis.error.as_ref().map(|error| (error.before.rmse_n, error.after.rmse_n));
@@ -86,16 +86,22 @@ pub(super) fn few_with_model(
         rounded(after_n, &[]),
         rounded(before_n, &[]),
     ));
-    few.edits = edits(&fit, &model.diagnosis, measured, parts);
+    few.edits = edits(&fit, &model.diagnosis, measured, predictor);
     few.report = report(&fit, &model.diagnosis, measured);
     few.posterior = None;
     few
 }
 
 /// The twin that the answer describes.
-fn edits(fit: &ModelFit, diagnosis: &Diagnosis, measured: &MeasuredPulls, parts: &[String]) -> TwinEdits {
+fn edits(
+    fit: &ModelFit,
+    diagnosis: &Diagnosis,
+    measured: &MeasuredPulls,
+    predictor: &PullPredictor<'_>,
+) -> TwinEdits {
+    let parts = predictor.part_names();
     let evidence = format!("gripgen diagnose of {} pulls", measured.pulls.len());
-    let values = pull_values(&fit.model, &diagnosis.baseline, parts, &evidence, &measured.sha256);
+    let values = pull_values(&fit.model, &diagnosis.baseline, predictor, &evidence, &measured.sha256);
     let effects = fit.model.effects.iter().map(|effect| {
         let part = effect.part.map(|p| parts[p].clone());
         let named = diagnosis.effects.iter().find(|e| e.name == effect.spec.id && e.part == part);

@@ -2,15 +2,16 @@
 
 use crate::analysis::twin_edits::{EditedValue, calibration_entry};
 use gripgen_identify::ParameterEstimate;
-use gripgen_physics::speed_limit_m_per_s;
+use gripgen_physics::{PullPredictor, speed_limit_m_per_s};
+use gripgen_twin::Jaw;
 use gripgen_twin::predict::PullModel;
 use std::collections::BTreeMap;
 
-/// Fitted baseline values as they stand in a twin.
+/// Fitted baseline values as they stand in a twin: a file has the shear stiffness of a gel of compliance 1.
 pub(crate) fn pull_values(
     model: &PullModel,
     baseline: &BTreeMap<String, ParameterEstimate>,
-    parts: &[String],
+    predictor: &PullPredictor<'_>,
     evidence: &str,
     sha256: &str,
 ) -> Vec<EditedValue> {
@@ -21,7 +22,7 @@ pub(crate) fn pull_values(
     };
     let interval = |name: &str| baseline.get(name);
     let scatter = baseline.get("scatter").map_or(model.scatter, |e| e.value);
-    for (name, mu) in parts.iter().zip(&model.mu) {
+    for (name, mu) in predictor.part_names().iter().zip(&model.mu) {
         set(format!("parts.{name}.mu"), *mu, interval(&format!("parts.{name}.mu")));
         set(format!("parts.{name}.kinetic_ratio"), model.kinetic_ratio, interval("kinetic_ratio"));
         set(format!("parts.{name}.kinetic_fall_s"), model.fall_s, None);
@@ -36,8 +37,9 @@ pub(crate) fn pull_values(
         if let Some(mass_kg) = model.apparent_mass_kg {
             set("robot.apparent_mass_kg".into(), mass_kg, None);
         }
-        for jaw in ["left", "right"] {
-            set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), model.stiffness_n_per_m * 0.5e-3, None);
+        for jaw in Jaw::BOTH {
+            let own = model.stiffness_n_per_m * 0.5e-3 * predictor.compliance(jaw);
+            set(format!("gel.{jaw}.shear_stiffness_n_per_mm"), own, None);
             set(format!("gel.{jaw}.shear_by_area"), model.shear_by_area, None);
         }
     }

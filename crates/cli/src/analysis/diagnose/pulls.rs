@@ -169,7 +169,7 @@ pub fn diagnose_pull_table(
         let mut found = diagnose_few_pulls(measured, &predictor, &given, twin);
         if options.engine == Engine::Auto {
             let model = describe_by_process(measured, &predictor, &given, None);
-            found = few_with_model(found, model, measured, predictor.part_names());
+            found = few_with_model(found, model, measured, &predictor);
         }
         found.diagnosis.notes.extend(without_its_effects(twin));
         return Ok(found);
@@ -186,7 +186,7 @@ pub fn diagnose_pull_table(
     {
         let other_n = fits.heldout_label_n.each_ref().map(Vec::as_slice);
         let model = describe_by_process(measured, &predictor, &given, Some(other_n));
-        let instead = model_instead(model, &answer.diagnosis, fits, measured, predictor.part_names());
+        let instead = model_instead(model, &answer.diagnosis, fits, measured, &predictor);
         if let Some(mut found) = instead {
             found.diagnosis.notes.extend(without_its_effects(twin));
             return Ok(found);
@@ -270,7 +270,7 @@ fn edits(
 ) -> TwinEdits {
     let model = &fits.after.model;
     let evidence = format!("gripgen diagnose of {} pulls", measured.pulls.len());
-    let values = pull_values(model, &diagnosis.baseline, predictor.part_names(), &evidence, &measured.sha256);
+    let values = pull_values(model, &diagnosis.baseline, predictor, &evidence, &measured.sha256);
     let forces = measured.pulls.iter().map(|p| p.grip_force_n);
     let range = forces.fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
     let effects = model.effects.iter().map(|effect| {

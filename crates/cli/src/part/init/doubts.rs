@@ -1,4 +1,4 @@
-//! Grips that work and are doubtful: hardly a contact, deep in the gel, or gels that meet beside the part.
+//! Grips that work and are doubtful: hardly a contact, one at the rim of a pad, deep in the gel, or gels that meet beside the part.
 
 use super::Proposal;
 use super::pose::GripAt;
@@ -44,6 +44,16 @@ fn said(pressed: &PerJaw<Pressed>, thickness_mm: [f64; 2], width_mm: f64, force_
             "{force_n} N press it {deep_mm:.1} mm into {of_mm:.1} mm of gel, deeper than half: images and imprints are an extrapolation"
         ));
     }
+    for (pressed, thickness_mm) in both.into_iter().zip(thickness_mm) {
+        let rim_mm = pressed.rim_m * 1e3;
+        if rim_mm < thickness_mm {
+            words.push(format!(
+                "the centre of its contact is {rim_mm:.1} mm from the rim of the pad, less than the {thickness_mm:.1} mm of gel: \
+                 a gel gives way more there than the model says"
+            ));
+            break;
+        }
+    }
     let both_mm = depths_mm[0] + depths_mm[1];
     if both_mm > width_mm {
         words.push(format!(
@@ -60,15 +70,22 @@ mod tests {
 
     #[test]
     fn a_sound_grip_has_nothing_doubtful_and_each_doubt_has_both_numbers() {
-        let of = |area_mm2: f64, depth_mm: f64, width_mm: f64| {
-            let pressed = || Pressed { area_m2: area_mm2 * 1e-6, depth_m: depth_mm * 1e-3 };
+        let at = |rim_mm: f64, area_mm2: f64, depth_mm: f64, width_mm: f64| {
+            let pressed =
+                || Pressed { area_m2: area_mm2 * 1e-6, depth_m: depth_mm * 1e-3, rim_m: rim_mm * 1e-3 };
             said(&PerJaw { left: pressed(), right: pressed() }, [4.0; 2], width_mm, 22.5)
         };
+        let of = |area_mm2, depth_mm, width_mm| at(9.0, area_mm2, depth_mm, width_mm);
         assert_eq!(of(100.0, 0.4, 10.0), Vec::<String>::new());
         let tip = of(0.3, 0.4, 10.0);
         assert!(tip.len() == 1 && tip[0].contains("0.30 mm2") && tip[0].contains("1 mm2"), "{tip:?}");
         let deep = of(40.0, 2.2, 10.0);
         assert!(deep.len() == 1 && deep[0].contains("2.2 mm into 4.0 mm"), "{deep:?}");
+        let rim = at(1.5, 40.0, 0.4, 10.0);
+        assert!(
+            rim.len() == 1 && rim[0].contains("1.5 mm from the rim") && rim[0].contains("4.0 mm"),
+            "{rim:?}"
+        );
         let thin = of(40.0, 1.6, 0.6);
         assert!(thin.len() == 1 && thin[0].contains("3.2 mm") && thin[0].contains("0.6 mm"), "{thin:?}");
     }

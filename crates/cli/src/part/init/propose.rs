@@ -11,7 +11,8 @@ use gripgen::in_parallel;
 use gripgen_physics::Surface;
 use gripgen_tactile::ClusteredMesh;
 use gripgen_twin::{Part, Twin};
-use nalgebra::{Matrix3, Point3};
+use nalgebra::{Matrix3, Point3, Vector3};
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Places that are looked at, and grips that are tried.
@@ -23,6 +24,10 @@ const PROPOSALS: usize = 4;
 const LARGEST_WIDTH: f64 = 0.95;
 /// Difference at which two grips count as two.
 const UNLIKE: f64 = 0.12;
+/// Share of a proposal's worth that is left where the jaws take another by nearly the same direction: moved along the same faces it shows less that is
+/// new. A nut is then proposed across its flats, too.
+const SAME_FACES: f64 = 0.5;
+const NEARLY_RAD: f64 = 30.0 * PI / 180.0;
 /// Share of a grip's worth that is left where the part rises beside a pad, against the finger.
 const BLOCKED: f64 = 0.3;
 /// Steps of offsets, forces and angles that a second grip is worth.
@@ -124,7 +129,7 @@ impl Search<'_> {
             in_parallel(looked_at.len(), self.threads, |i| self.look_around(&body, &spread, &looked_at[i]));
         let (good, bad): (Vec<_>, Vec<_>) = views.into_iter().flatten().partition(Result::is_ok);
         let good: Vec<Candidate> = good.into_iter().filter_map(Result::ok).collect();
-        let chosen = pick(&good, &body, TRIED, &|_| true);
+        let chosen = pick(&good, &body, TRIED, 1.0, &|_| true);
         if chosen.is_empty() {
             // A few lines across the corners of a part that is too wide are short, and too pointed.
             if let Some(narrowest_m) =
@@ -204,6 +209,11 @@ impl Search<'_> {
 }
 
 impl Candidate {
+    /// The direction in which the jaws close, in the mesh.
+    fn jaw_axis(&self) -> Vector3<f64> {
+        self.at.part_from_mesh().rotation.inverse() * Vector3::y()
+    }
+
     fn proposal(&self) -> Proposal {
         Proposal {
             origin_mm: self.at.origin_mm,
@@ -224,13 +234,21 @@ enum Unfit {
     Steep { slope: f64 },
 }
 
-/// The worthiest candidates that are allowed, each unlike those before it.
-fn pick(all: &[Candidate], body: &Body, wanted: usize, allowed: &dyn Fn(usize) -> bool) -> Vec<usize> {
+/// The worthiest candidates that are allowed, each unlike those before it; of one whose jaws close as those of an earlier one, `same_faces` of
+/// its worth counts.
+fn pick(
+    all: &[Candidate],
+    body: &Body,
+    wanted: usize,
+    same_faces: f64,
+    allowed: &dyn Fn(usize) -> bool,
+) -> Vec<usize> {
     let mut apart = vec![f64::INFINITY; all.len()];
+    let mut kept = vec![1.0; all.len()];
     let mut chosen = Vec::new();
     while chosen.len() < wanted {
         let worth = |i: usize| match allowed(i) && apart[i] > UNLIKE {
-            true => all[i].worth * -libm::expm1(-(apart[i] / (3.0 * UNLIKE)).powi(2)),
+            true => kept[i] * all[i].worth * -libm::expm1(-(apart[i] / (3.0 * UNLIKE)).powi(2)),
             false => 0.0,
         };
         let best = (0..all.len()).fold(0, |a, b| if worth(b) > worth(a) { b } else { a });
@@ -238,7 +256,11 @@ fn pick(all: &[Candidate], body: &Body, wanted: usize, allowed: &dyn Fn(usize) -
             break;
         }
         chosen.push(best);
-        for (near, other) in apart.iter_mut().zip(all) {
+        let axis = all[best].jaw_axis();
+        for ((near, kept), other) in apart.iter_mut().zip(&mut kept).zip(all) {
+            if other.jaw_axis().dot(&axis).abs() > libm::cos(NEARLY_RAD) {
+                *kept = same_faces;
+            }
             let moved = (other.middle - all[best].middle).norm() / body.size_m;
             *near = near.min(other.seen.unlike(&all[best].seen) + 0.5 * moved);
         }
@@ -257,7 +279,7 @@ fn widest(tried: &[Candidate], trials: &[Trial], body: &Body) -> Option<(Varied,
         if !(0..tried.len()).any(works) {
             continue;
         }
-        let grips = pick(tried, body, PROPOSALS, &works);
+        let grips = pick(tried, body, PROPOSALS, SAME_FACES, &works);
         if grips.len() > 1 {
             return Some((varied, grips));
         }

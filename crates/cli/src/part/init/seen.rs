@@ -103,7 +103,9 @@ impl Viewer<'_> {
         let heights = self.mesh.raster(&gel_from_mesh, &grid, thickness_m / FINE_METRES_PER_PX);
         let gel = PressedGel::of(&self.twin.gel[jaw], self.imprint_m3_per_n);
         let imprint = indent(&heights, &grid, &gel, force_n)?;
-        Ok(Pressed { area_m2: imprint.patch.area_m2(), depth_m: imprint.press_depth_m })
+        let ((x, y), gel) = (imprint.patch.centre_m(), &self.twin.gel[jaw]);
+        let rim_m = (gel.width_m / 2.0 - x.abs()).min(gel.height_m / 2.0 - y.abs());
+        Ok(Pressed { area_m2: imprint.patch.area_m2(), depth_m: imprint.press_depth_m, rim_m })
     }
 
     fn grid(&self, jaw: Jaw, metres_per_px: f64) -> Grid {
@@ -159,6 +161,8 @@ pub(super) struct Pressed {
     pub(super) area_m2: f64,
     /// The deepest place of the imprint.
     pub(super) depth_m: f64,
+    /// From the centre of pressure to the nearest rim of the pad.
+    pub(super) rim_m: f64,
 }
 
 /// What one gel sees.
