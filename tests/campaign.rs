@@ -3,8 +3,9 @@
 use crate::common::{baseline, library, overrides, twin_with_sets};
 use gripgen::twin::config::Feedback;
 use gripgen::twin::{Campaign, Jaw, PlannedPull, Twin};
-use gripgen_cli::{calibrate_twin, edited_twin, simulate_campaign};
+use gripgen_cli::{calibrate_twin, detectable_in_campaign, edited_twin, simulate_campaign};
 use gripgen_identify::pulls::calibrate::CalibrateRequest;
+use gripgen_identify::pulls::detectable::DetectableEffect;
 use gripgen_identify::{CampaignOptions, plan_campaign};
 use gripgen_measured::{CAMPAIGN_FILE, campaign_toml, read_campaign, write_pull_folder};
 use gripgen_measured::{Suspects, load_pulls_with};
@@ -106,6 +107,29 @@ fn a_soft_gel_is_written_back_as_soft_as_it_is() {
         assert_eq!(true_n_per_m, 6e3);
         assert!((0.8..1.25).contains(&(found_n_per_m / true_n_per_m)), "{found_n_per_m} N/m");
     }
+}
+
+/// Sizes that a plan shows fall with the root of the number of pulls; mu (F + b) and mu (F - loss) are one line, so offset and loss are seen from the
+/// same size and look alike; a column that does not vary shows nothing.
+#[test]
+fn a_plan_says_which_sizes_it_would_show() {
+    let seen = |pulls: usize| {
+        let options = CampaignOptions { parts: vec!["long_shaft".into()], pulls, ..CampaignOptions::default() };
+        let campaign = plan_campaign(&options).unwrap();
+        detectable_in_campaign(&baseline(), &[], &campaign, 1, 2).unwrap().unwrap()
+    };
+    let (few, many) = (seen(60), seen(240));
+    let size = |all: &[DetectableEffect], name: &str| {
+        all.iter().find(|e| e.name == name).and_then(|e| e.seen.as_ref()).map(|s| s.value.abs()).unwrap()
+    };
+    for name in ["load_offset", "rate_dependence", "dwell_ageing"] {
+        let ratio = size(&few, name) / size(&many, name);
+        assert!((1.5..2.7).contains(&ratio), "{name}: {ratio}");
+    }
+    assert!((size(&many, "load_offset") / size(&many, "grip_force_loss") - 1.0).abs() < 0.05, "{many:?}");
+    let offset = many.iter().find(|e| e.name == "load_offset").unwrap();
+    assert!(offset.alike.contains(&"grip_force_loss") && !offset.alike.contains(&"wear"), "{offset:?}");
+    assert!(many.iter().all(|e| e.name != "temperature" && e.name != "off_centre"), "{many:?}");
 }
 
 #[test]

@@ -21,7 +21,7 @@ mod unvaried;
 
 pub use beyond::{Beyond, beyond};
 pub use calibrate::{CalibratePullsError, calibrate_twin, with_few_density};
-pub use campaign::{SimulateCampaignError, simulate_campaign};
+pub use campaign::{SimulateCampaignError, detectable_in_campaign, simulate_campaign};
 pub use catalogue::{EffectCurve, effect_curve};
 pub use compare::{LabelErrors, PullComparison, compare_pulls, compare_pulls_with};
 pub use compare_images::{CompareImagesError, ImageComparison, ImageScore, compare_images};

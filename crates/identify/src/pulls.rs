@@ -13,6 +13,7 @@ pub mod context;
 mod creep;
 pub mod curves;
 pub mod data;
+pub mod detectable;
 mod dynamics;
 pub(crate) mod error_interval;
 mod estimates;

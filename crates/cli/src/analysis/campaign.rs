@@ -1,15 +1,18 @@
 //! A campaign made on a twin instead of on a rig, and the options of a first one from a twin.
 
+use super::diagnose::given_model;
+use super::expect::pull_predictor;
 use gripgen::Location;
 use gripgen::SimulateOptions;
 use gripgen::simulate;
 use gripgen::{LoadError, Project, load_twin_document};
+use gripgen_identify::pulls::detectable::{DetectableEffect, detectable_effects};
 use gripgen_measured::{LoadedPulls, MissingCells};
 use gripgen_physics::sensor_chain;
 use gripgen_record::sha256_hex;
 use gripgen_tactile::SimdLevel;
 use gripgen_twin::columns::{Column, covariates};
-use gripgen_twin::config::{Backend, Mechanics};
+use gripgen_twin::config::{Backend, Mechanics, Twist};
 use gripgen_twin::random::{Purpose, Stream};
 use gripgen_twin::rounded;
 use gripgen_twin::{
@@ -109,6 +112,32 @@ pub fn simulate_campaign(
         warnings: Vec::new(),
         implausible: None,
     })
+}
+
+/// What a campaign shows of the effects whose columns it varies, by labels alone: it is made on the twin without the effects of that. `None` where
+/// nothing can be fitted to it.
+///
+/// # Errors
+///
+/// As [`simulate_campaign`].
+pub fn detectable_in_campaign(
+    twin: &Location,
+    sets: &[(String, String)],
+    campaign: &Campaign,
+    seed: u64,
+    jobs: usize,
+) -> Result<Option<Vec<DetectableEffect>>, SimulateCampaignError> {
+    let plain: Vec<(String, String)> =
+        sets.iter().cloned().chain([("effects".to_string(), "[]".to_string())]).collect();
+    let project = load(twin, &plain, campaign)?;
+    if project.twin.robot.twist == Twist::Free {
+        return Ok(None);
+    }
+    let mut measured = simulate_campaign(twin, &plain, campaign, seed)?.pulls;
+    measured.pulls.iter_mut().for_each(|pull| pull.trace = None);
+    let predictor = pull_predictor(&measured, &project.twin, &project.library, jobs);
+    let Ok(given) = given_model(&project.twin, predictor.part_names()) else { return Ok(None) };
+    Ok(detectable_effects(&measured, &predictor, &given))
 }
 
 /// The twin of `twin` with the files of the campaign's parts, as a sweep that is never run.

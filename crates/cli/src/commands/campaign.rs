@@ -7,20 +7,22 @@ use super::diagnose::diagnose_folders;
 use super::diagnose::next::{next_toml, twin_words};
 use crate::args::CampaignArgs;
 use crate::failure::Failure;
-use crate::load::{TwinOfPulls, load_twin, within_rig};
+use crate::load::{TwinOfPulls, jobs, load_twin, within_rig};
 use crate::output::{JsonSink, count, duration, print, program};
 use crate::outputs::Outputs;
 use crate::shell;
-use crate::{Engine, NextPulls, simulate_campaign};
+use crate::{Engine, NextPulls, detectable_in_campaign, simulate_campaign};
 use gripgen::Location;
 use gripgen::twin::columns::{COLUMNS, Column};
 use gripgen::twin::effects::OutsideFit;
+use gripgen::twin::rounded;
 use gripgen::twin::{Campaign, PullKind, Twin};
+use gripgen_identify::pulls::detectable::DetectableEffect;
 use gripgen_identify::{CampaignError, CampaignOptions, plan_campaign};
 use gripgen_measured::Suspects;
 use gripgen_measured::{campaign_toml, write_pull_folder};
 use gripgen_record::csv_lines;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::Path;
 
 /// The rig whose gripper limits a plan for no rig in particular.
@@ -87,6 +89,14 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         }
         None => None,
     };
+    let told = sink.wanted() || !args.talk.quiet;
+    let detectable = match told {
+        true => {
+            detectable_in_campaign(&at, &args.set, &campaign, args.seed, jobs()).map_err(Failure::usage)?
+        }
+        false => None,
+    }
+    .unwrap_or_default();
     if sink.wanted() {
         sink.document(&json!({
             "schema": "gripgen.campaign/1",
@@ -97,12 +107,13 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
             "blocks": blocks.iter().map(|b| json!({
                 "session": b.session, "pulls": b.pulls, "minutes": (b.minutes * 10.0).round() / 10.0,
             })).collect::<Vec<_>>(),
+            "detectable": detectable.iter().map(detectable_json).collect::<Vec<_>>(),
             "csv": args.csv,
             "simulated": simulated,
         }))?;
     }
     if !sink.on_stdout() && !args.talk.quiet {
-        print(&format!("{hours}\n{by_block}{}\n", args.out.display()))?;
+        print(&format!("{hours}\n{by_block}{}{}\n", detectable_table(&detectable), args.out.display()))?;
         if let Some(csv) = &args.csv {
             print(&format!("{}\n", csv.display()))?;
         }
@@ -112,6 +123,39 @@ pub fn run(args: &CampaignArgs) -> Result<u8, Failure> {
         }
     }
     Ok(0)
+}
+
+fn detectable_json(effect: &DetectableEffect) -> Value {
+    let seen = effect.seen.as_ref();
+    json!({
+        "name": effect.name, "unit": effect.unit, "parameter": seen.map(|s| &s.parameter),
+        "value": seen.map(|s| s.value), "power": seen.map(|s| s.power), "alike": effect.alike,
+    })
+}
+
+/// The size from which on labels show each effect, and what explains it as well; then what they do not show.
+fn detectable_table(all: &[DetectableEffect]) -> String {
+    let shown: Vec<_> = all.iter().filter_map(|effect| Some((effect, effect.seen.as_ref()?))).collect();
+    if shown.is_empty() {
+        return String::new();
+    }
+    let mut text = String::from("labels alone show with a probability of 0.8, at a level of 1 %:\n");
+    for (effect, seen) in shown {
+        let unit = if effect.unit == "1" { String::new() } else { format!(" {}", effect.unit) };
+        let from = format!("{} {}{unit}", seen.parameter, rounded(seen.value, &[]));
+        let alike = match effect.alike.is_empty() {
+            true => String::new(),
+            false => format!("  or {}", effect.alike.join(", ")),
+        };
+        text += format!("  {:<20} {from:<28}{alike}", effect.name).trim_end();
+        text.push('\n');
+    }
+    let hidden: Vec<&str> =
+        all.iter().filter(|effect| effect.seen.is_none()).map(|effect| effect.name).collect();
+    if !hidden.is_empty() {
+        text += &format!("  not at any physical size: {}\n", hidden.join(", "));
+    }
+    text
 }
 
 /// A first campaign.

@@ -10,7 +10,7 @@ use gripgen_twin::predict::PullModel;
 use nalgebra::{DMatrix, DVector, Dyn, SVD};
 
 /// Standard errors that an effect has to be away from nothing to be seen with a probability of 0.8 at a level of 1 %.
-const SEEN: f64 = 3.42;
+pub(super) const SEEN: f64 = 3.42;
 
 /// What a term promises to gain in log-likelihood beside a model, from its slope at nothing (a score test, Rao 1948).
 pub(super) struct ScoreTest<'a> {

@@ -23,7 +23,7 @@ pub fn grips_picture(name: &str, mesh: &TriMesh, grips: &[Proposal], rasterise: 
     let [x, y, z] = mesh.extent_m().map(|s| s * 1e3);
     let title = format!("{name}: {x:.1} x {y:.1} x {z:.1} mm in its mesh frame");
     canvas.text(&title, 14.0, 8.0, Anchor::Left, TextStyle::title(INK));
-    let legend = "blue: left jaw, orange: right jaw, at a grip angle of 0; the pull is along z";
+    let legend = "blue: left jaw, orange outline: right jaw, at a grip angle of 0; the pull is along z";
     canvas.text(legend, 14.0, 32.0, Anchor::Left, TextStyle::small(SOFT_INK));
     for (i, grip) in grips.iter().enumerate() {
         let at = (i as u32 % columns * PANEL.0, HEADER + i as u32 / columns * PANEL.1);
@@ -63,9 +63,16 @@ pub(crate) fn panel(
     let meshes = [
         SceneMesh { mesh, world_from_mesh: part, colour: STEEL },
         SceneMesh { mesh: &pad, world_from_mesh: pads[0], colour: GEL[0] },
-        SceneMesh { mesh: &pad, world_from_mesh: pads[1], colour: GEL[1] },
     ];
     view.draw(canvas, (x, y), &meshes, rasterise);
+    // The near jaw as an outline: a small part would be hidden behind it.
+    for (a, b) in edges(&pad) {
+        let place = |corner: usize| {
+            let (u, v) = view.project(pads[1] * pad.vertices_m()[corner]);
+            (f64::from(x) + u, f64::from(y) + v)
+        };
+        canvas.line(&[place(a), place(b)], 2.0, GEL[1]);
+    }
     draw_axes(canvas, (x, y), &view, reach);
     let text = format!(
         "grip_pose = {grip_pose}: {:.1} mm between the jaws, {:.0} mm\u{b2} in contact",
@@ -100,6 +107,13 @@ fn draw_axes(canvas: &mut Canvas, (x, y): (u32, u32), view: &View, reach: f64) {
     canvas.line(&[(left, bottom), (left + width, bottom)], 3.0, INK);
     let text = format!("{bar_mm} mm");
     canvas.text(&text, left, bottom - 20.0, Anchor::Left, TextStyle::small(INK));
+}
+
+/// Corners that an edge of a box joins: their numbers differ in one bit.
+fn edges(cuboid: &TriMesh) -> impl Iterator<Item = (usize, usize)> {
+    let corners = cuboid.vertices_m().len();
+    (0..corners)
+        .flat_map(|a| [1, 2, 4].into_iter().filter(move |bit| a & bit == 0).map(move |bit| (a, a | bit)))
 }
 
 /// A box centred on the origin.
