@@ -40,7 +40,7 @@ def main(arguments=None):
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--salt", type=int, default=0, help="another set of seeds")
     parser.add_argument("--groups", default="", help="only these, as in ABC")
-    parser.add_argument("--worlds", default=None, help="so many of each of these harder worlds, as in ns3o")
+    parser.add_argument("--worlds", default=None, help="make --cases of each of these harder worlds, as in ns3o")
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args(arguments)
     out, sealed = Path(args.out), Path(args.out + "-sealed")

@@ -28,7 +28,7 @@ def table_of(samples: Samples, lights: bool) -> Table:
         out["jaw"] = features.of_images(samples.change[:, 0])
         out["jaw_other"] = np.concatenate([features.of_images(features.other_lights(c[:, :1].repeat(2, 1), rng)[:, 0])
                                            for c in np.array_split(samples.change, 16)])
-    return out | {k: v for k, v in vars(samples).items() if k != "change"}
+    return out | {k: v for k, v in vars(samples).items() if k != "change" and v is not None}
 
 
 def kept(path: Path, make) -> Table:

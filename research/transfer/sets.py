@@ -15,7 +15,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from PIL import Image
 
 from research.transfer.contact import VIEW
-from research.transfer.worlds import Samples
+from research.transfer.worlds import LOGGED, Samples
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIGS = ROOT / "assets" / "configs"
@@ -94,9 +94,11 @@ def change_of(png: bytes, base: np.ndarray) -> np.ndarray:
     return change.reshape(VIEW[0], SHRINK, VIEW[1], SHRINK, 3).mean((1, 3))
 
 
-def read(run: Path) -> Samples:
-    """Pulls of a run that slipped or were censored, with the contact that only the simulation knows."""
-    columns: dict[str, list] = {k: [] for k in ("change", "force_n", "label_n", "censored", "part", "rig", "area_mm2", "depth_mm", "trails")}
+def read(run: Path, rig_key: str = "") -> Samples:
+    """Pulls of a run that slipped or were censored, with the contact that only the simulation knows.
+
+    Rigs are told apart by the groups of the sweep, or by the value of `rig_key` that was drawn."""
+    columns: dict[str, list] = {k: [] for k in ("change", "force_n", "label_n", "censored", "part", "rig", "area_mm2", "depth_mm", "trails", "logged")}
     for shard in sorted(run.glob("*.mcap")):
         with shard.open("rb") as stream:
             reader = make_reader(stream, decoder_factories=[DecoderFactory()])
@@ -127,8 +129,10 @@ def read(run: Path) -> Samples:
             columns["label_n"].append(max(sample.max_pull_force_n, 0.0))
             columns["censored"].append(sample.status == 2)
             columns["part"].append(sample.part)
-            columns["rig"].append(sample.drawn_text.get("rig_id", "") or sample.gel_id.split("g")[0])
+            rig = sample.drawn_text.get("rig_id", "") or sample.gel_id.split("g")[0]
+            columns["rig"].append(f"{sample.drawn_number[rig_key]:.12g}" if rig_key else rig)
             columns["area_mm2"].append([sum(j.cell_area_mm2) for j in (sample.left, sample.right)])
             columns["trails"].append(sample.lag_exceeds_tolerance)
             columns["depth_mm"].append([j.press_depth_mm for j in (sample.left, sample.right)])
+            columns["logged"].append([0.0 if k == "session" else getattr(sample, k) for k in LOGGED])  # sessions of a sweep are words
     return Samples(**{k: np.array(v) for k, v in columns.items()})

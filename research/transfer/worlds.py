@@ -4,6 +4,7 @@ A world has one rig, two gels, four sessions, twelve parts and 20 grips of each.
 (README.md); which world sticks, and which law it has, was set before anything was trained.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,10 +29,26 @@ class Samples:
     area_mm2: np.ndarray  # [N, 2] true contact
     depth_mm: np.ndarray  # [N, 2]
     trails: np.ndarray  # the force trails its command by more than half the tolerance of the rule: the label may be from before the slip
+    logged: np.ndarray | None = None  # [N, LOGGED] what a lab notes of each pull; loop.py alone asks for it
 
     def rows(self, keep: np.ndarray) -> "Samples":
         """Some of them."""
-        return Samples(**{k: v[keep] for k, v in vars(self).items()})
+        return Samples(**{k: None if v is None else v[keep] for k, v in vars(self).items()})
+
+
+LOGGED = ("grip_offset_mm", "grip_angle_deg", "dwell_s", "temperature_c", "pull_index", "session", "force_increment_n", "step_time_s")
+Ledger = dict[str, np.ndarray]  # LOGGED and grip_force_n, by name
+Effect = Callable[[Ledger], tuple[np.ndarray | float, np.ndarray | float]]  # factors of the normal force and of the friction
+
+
+def conditions(session: np.ndarray, rng: np.random.Generator) -> Ledger:
+    """What changes from pull to pull in a lab that varies its conditions: dwell, room, pulls since the gel was new."""
+    n = len(session)
+    made = np.argsort(np.argsort(session + rng.uniform(0, 1, n)))  # sessions one after the other
+    gel = session // 2
+    index = made - np.where(gel == 0, 0, (gel == 0).sum())
+    room = rng.uniform(18, 28, 4)[session] + rng.normal(0, 1, n)
+    return {"dwell_s": np.exp(rng.uniform(np.log(0.5), np.log(30), n)), "temperature_c": room, "pull_index": index, "session": session}
 
 
 class Lights:
@@ -81,8 +98,10 @@ def draw_any_arm(rng: np.random.Generator) -> Arm:
         noise_n=rng.uniform(0.07, 0.25), noise_time_s=rng.uniform(0.005, 0.015), gain=rng.normal(1, 0.02))
 
 
-def world(number: int, seed: int = 2026) -> Samples:
-    """World `number`: odd ones stick (a stress without pressure), 4 to 7 have rate and state, 2, 3, 6 and 7 parts of several materials."""
+def world(number: int, seed: int = 2026, effect: Effect | None = None) -> Samples:
+    """World `number`: odd ones stick (a stress without pressure), 4 to 7 have rate and state, 2, 3, 6 and 7 parts of several materials.
+
+    With an `effect` its lab varies its conditions and logs them, and the effect acts in addition."""
     rng = np.random.default_rng([seed, number])
     sticks, by_state, materials = number % 2 == 1, number % 8 >= 4, number % 4 >= 2
     parts = [contact.draw_part(contact.KINDS[k % len(contact.KINDS)], rng) for k in range(PARTS)]
@@ -107,11 +126,18 @@ def world(number: int, seed: int = 2026) -> Samples:
     asked = np.exp(rng.uniform(np.log(5), np.log(40), n))
     true = np.maximum(((1 + gain) * asked - loss[session]) * rng.normal(1, 0.03, n) + rng.normal(0, 0.3, n), 0.5)
     split = np.clip(rng.normal(0, 0.10, n), -0.4, 0.4)
-    normal = true[:, None] * np.stack([1 + split, 1 - split], 1)
     reach = np.array([p["length"] for p in parts])[part] / 2 + 4
     offset = np.clip(rng.normal(0, 6, n), -reach, reach)
     angle, side = rng.uniform(-180, 180, n), rng.normal(0, 1.0, n)
     lean = tilt[None] + rng.normal(0, 0.3, (n, 2, 2))
+    logged, of_normal, of_friction, rest_s = None, 1.0, 1.0, dwell[session]
+    if effect is not None:
+        ledger = conditions(session, np.random.default_rng([seed, number, 1]))
+        ledger |= {"grip_force_n": asked, "grip_offset_mm": offset, "grip_angle_deg": angle}
+        ledger |= {"force_increment_n": np.full(n, arm.increment_n), "step_time_s": np.full(n, arm.step_s)}
+        logged, rest_s = np.stack([ledger[k] for k in LOGGED], 1), ledger["dwell_s"]
+        of_normal, of_friction = effect(ledger)
+    normal = (true * of_normal)[:, None] * np.stack([1 + split, 1 - split], 1)
 
     limit, area, depth = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
     change = np.zeros((n, 2, *contact.VIEW, 3), np.float16)
@@ -130,8 +156,8 @@ def world(number: int, seed: int = 2026) -> Samples:
             seen += np.stack([drift[jaw][s] for s in session[ids]]) + rng.uniform(-3, 3, (len(ids), 1, 1, 1))
             change[ids, jaw] = np.round(seen + rng.normal(0, 0.5, seen.shape), 1)
     grip = rng.lognormal(0, 0.08, n) * rng.lognormal(0, 0.04, n)
-    slide = Slide(np.full(n, float(by_state)), ratio[gel], fall[gel], rate[gel], ageing[gel], way[gel], dwell[session])
-    labels = pull(limit.sum(1) * grip, 2 * shear[gel], slide, zero[session], arm, rng)
+    slide = Slide(np.full(n, float(by_state)), ratio[gel], fall[gel], rate[gel], ageing[gel], way[gel], rest_s)
+    labels = pull(limit.sum(1) * grip * of_friction, 2 * shear[gel], slide, zero[session], arm, rng)
     good = np.isfinite(labels)
-    found = Samples(change, asked, np.maximum(labels, 0.0), np.zeros(n, bool), part, np.zeros(n, int), area, depth, np.zeros(n, bool))
+    found = Samples(change, asked, np.maximum(labels, 0.0), np.zeros(n, bool), part, np.zeros(n, int), area, depth, np.zeros(n, bool), logged)
     return found.rows(good)
