@@ -114,7 +114,8 @@ fn a_soft_gel_is_written_back_as_soft_as_it_is() {
 #[test]
 fn a_plan_says_which_sizes_it_would_show() {
     let seen = |pulls: usize| {
-        let options = CampaignOptions { parts: vec!["long_shaft".into()], pulls, ..CampaignOptions::default() };
+        let options =
+            CampaignOptions { parts: vec!["long_shaft".into()], pulls, ..CampaignOptions::default() };
         let campaign = plan_campaign(&options).unwrap();
         detectable_in_campaign(&baseline(), &[], &campaign, 1, 2).unwrap().unwrap()
     };

@@ -17,6 +17,7 @@ fn calibration() -> CalibrationFile {
         high90: 0.22,
         evidence: Some("88 pulls".into()),
         data_sha256: Some("ab".into()),
+        before: None,
     }
 }
 
@@ -54,16 +55,20 @@ fn fitted_values_stand_in_the_new_twin_with_their_intervals() {
     assert!(text.starts_with("# Made by gripgen "), "{text}");
     let read = load_twin_document(&Location::Disk(out.clone()), &[]).unwrap().read_twin().unwrap();
     assert_eq!(read.parts["gear"].mu, 0.1 + 0.2);
-    assert_eq!(read.parts["gear"].calibration["mu"], calibration());
+    // What stood there before stays readable: a diagnosis of the same data starts from it.
+    let old = load_twin_document(&base, &[]).unwrap().read_twin().unwrap();
+    let after = |before: f64| CalibrationFile { before: Some(before), ..calibration() };
+    assert_eq!(read.parts["gear"].calibration["mu"], after(old.parts["gear"].mu));
     assert_eq!((read.robot.lag_s, read.wrist.noise_n), (1.0 / 3.0, 0.4));
-    assert_eq!(read.robot.calibration["lag_s"], calibration());
+    assert_eq!(read.robot.calibration["lag_s"], after(old.robot.lag_s));
     assert_eq!((read.parts["gear"].scatter, read.gel.left.shear_stiffness_n_per_mm), (0.03, 17.0));
     let right = read.gel.right.as_ref().unwrap();
     assert_eq!((right.shear_stiffness_n_per_mm, right.thickness_mm), (18.0, read.gel.left.thickness_mm));
-    assert_eq!(read.gel.left.calibration["shear_stiffness_n_per_mm"], calibration());
+    let stiffness = old.gel.left.shear_stiffness_n_per_mm;
+    assert_eq!(read.gel.left.calibration["shear_stiffness_n_per_mm"], after(stiffness));
     let gear = read.effects.iter().find(|e| e.part.as_deref() == Some("gear")).unwrap();
     assert_eq!(gear.parameters["a"], toml::Value::Float(1.25));
-    assert_eq!(gear.calibration["a"], calibration());
+    assert_eq!(CalibrationFile { before: None, ..gear.calibration["a"].clone() }, calibration());
     assert_eq!(read.parts["long_shaft"], edited_twin(&base, &[], &edits).unwrap().parts["long_shaft"]);
 
     for (key, fault) in [("parts.gaer.mu", "parts.gaer"), ("robot.lag", "robot.lag")] {

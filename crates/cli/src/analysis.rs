@@ -45,6 +45,7 @@ pub use presses::{
     find_missing_circles, is_press_set, load_presses, load_sensor, load_twin_sensor, presses_sha256,
 };
 pub use priors::{pull_priors, shipped_priors};
+pub(crate) use twin_edits::before_data;
 pub use twin_edits::{EditedValue, TwinEdits, WriteTwinError, edited_twin, edited_twin_toml, write_twin};
 pub use unmeasured::unmeasured;
 pub use unvaried::{Unvaried, unvaried};

@@ -1,5 +1,6 @@
 //! What verbs read before they begin: twins, their files, measurements.
 
+use crate::analysis::before_data;
 use crate::args::TalkArgs;
 use crate::commands::rig::load_rig;
 use crate::failure::Failure;
@@ -44,11 +45,26 @@ impl TwinOfPulls<'_> {
     /// The twin with the parts of the pulls, those that it lacks made from their labels, and its files. What people have to know of the
     /// parts and of the grip forces is returned with them.
     pub fn for_pulls(&self, loaded: &mut LoadedPulls) -> Result<(Twin, Library, OwnParts), Failure> {
-        let twin = load_twin(self.path, self.sets)?;
+        self.with(self.sets, loaded)
+    }
+
+    /// The same for a fit: what was fitted to these pulls before has the value that stood there first, so that they count once.
+    pub fn for_fit(&self, loaded: &mut LoadedPulls) -> Result<(Twin, Library, OwnParts), Failure> {
+        let document = load_twin_document(&Location::parse(self.path), self.sets)?;
+        let first = before_data(&document, &loaded.pulls.sha256);
+        self.with(&[&first[..], self.sets].concat(), loaded)
+    }
+
+    fn with(
+        &self,
+        sets: &[(String, String)],
+        loaded: &mut LoadedPulls,
+    ) -> Result<(Twin, Library, OwnParts), Failure> {
+        let twin = load_twin(self.path, sets)?;
         let mut own = own_parts(&mut loaded.pulls, &twin);
         let twin = match own.sets.is_empty() {
             true => twin,
-            false => load_twin(self.path, &[self.sets, &own.sets].concat())?,
+            false => load_twin(self.path, &[sets, &own.sets].concat())?,
         };
         own.notes.extend(jaws_of_grip_force(&loaded.pulls, &twin, &own));
         let mut twin = within_rig(twin, self.rig)?;

@@ -75,7 +75,9 @@ fn world(line: &Line, index: u64) -> World {
     let (scatter, a, b_n) = (uniform(0.02, 0.06), uniform(0.9, 1.3), uniform(-3.0, 3.0));
     // Without traces only what is assumed says how the loop and the kinetic branch are: they are drawn from that.
     let mut normal = Stream::new(78, index, Purpose::Draw);
-    let ratio_prior = std::iter::repeat_with(|| KINETIC_RATIO.0 + KINETIC_RATIO.1 * normal.normal()).find(|r| *r <= 1.0).unwrap();
+    let ratio_prior = std::iter::repeat_with(|| KINETIC_RATIO.0 + KINETIC_RATIO.1 * normal.normal())
+        .find(|r| *r <= 1.0)
+        .unwrap();
     let lag_prior = std::iter::repeat_with(|| 0.05 + 0.04 * normal.normal()).find(|l| *l >= 0.0).unwrap();
     World {
         mu,

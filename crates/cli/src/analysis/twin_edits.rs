@@ -7,7 +7,7 @@ pub(crate) use entry::{calibration_entry, effect_entry, put_estimate};
 use gripgen::VERSION;
 use gripgen::{LoadError, load_twin_document};
 use gripgen::{Location, path_from};
-use gripgen_twin::config::{CalibrationFile, ConfigError, EffectFile, TwinFile};
+use gripgen_twin::config::{CalibrationFile, ConfigError, Document, EffectFile, TwinFile};
 use gripgen_twin::{NO_MESH, TWIN_SCHEMA, Twin};
 use std::path::{Path, PathBuf};
 
@@ -67,16 +67,66 @@ pub fn edited_twin(
         document.assign("effects", to_value(effects)?).map_err(edit)?;
     }
     for edited in &edits.values {
+        let before = before(&document, edited);
         let place = document.assign(&edited.key, toml::Value::Float(edited.value)).map_err(edit)?;
         if let (Some(calibration), Some((section, leaf))) = (&edited.calibration, place.rsplit_once('.')) {
             let key = format!("{section}.calibration.{leaf}");
-            document.assign(&key, to_value(calibration)?).map_err(edit)?;
+            let calibration = CalibrationFile { before, ..calibration.clone() };
+            document.assign(&key, to_value(&calibration)?).map_err(edit)?;
         }
     }
     let mut file = document.read_twin().map_err(edit)?;
     file.schema = Some(TWIN_SCHEMA.into());
     Twin::new(&file).map_err(edit)?;
     Ok(file)
+}
+
+/// What stood in a twin before a value was fitted; of one that was fitted to the same data before, what stood there first.
+fn before(document: &Document, edited: &EditedValue) -> Option<f64> {
+    let calibration = |key: &str| -> Option<CalibrationFile> {
+        let (section, leaf) = key.rsplit_once('.')?;
+        document.get(&format!("{section}.calibration.{leaf}"))?.clone().try_into().ok()
+    };
+    let same = |old: &CalibrationFile| {
+        old.data_sha256.is_some()
+            && old.data_sha256 == edited.calibration.as_ref().and_then(|c| c.data_sha256.clone())
+    };
+    let first = calibration(&edited.key).filter(same).and_then(|old| old.before);
+    first.or_else(|| number(document.get(&edited.key)?))
+}
+
+fn number(value: &toml::Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|x| x as f64))
+}
+
+/// The values that stood in a twin before it was calibrated to the data of this hash, as overrides.
+pub(crate) fn before_data(document: &Document, sha256: &str) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    walk(document.table(), "", &mut |key, calibration| {
+        if let Some(before) =
+            calibration.before.filter(|_| calibration.data_sha256.as_deref() == Some(sha256))
+        {
+            found.push((key.to_string(), toml::Value::Float(before).to_string()));
+        }
+    });
+    found
+}
+
+/// Calls `each` with every key that was fitted.
+fn walk(table: &toml::Table, path: &str, each: &mut dyn FnMut(&str, CalibrationFile)) {
+    let below = |leaf: &str| if path.is_empty() { leaf.to_string() } else { format!("{path}.{leaf}") };
+    for (name, value) in table {
+        let toml::Value::Table(inner) = value else { continue };
+        if name != "calibration" {
+            walk(inner, &below(name), each);
+            continue;
+        }
+        for (leaf, entry) in inner {
+            if let Ok(calibration) = entry.clone().try_into() {
+                each(&below(leaf), calibration);
+            }
+        }
+    }
 }
 
 /// The text of the twin at `base` with overrides and edits applied, with every key spelt out, for a file `out`.
@@ -153,4 +203,40 @@ fn paths_of(file: &mut TwinFile) -> Vec<&mut String> {
         paths.extend(beside.into_iter().filter_map(Option::as_mut));
     }
     paths
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A twin that was fitted twice to the same data gives back what stood there first, to other data what is there now.
+    #[test]
+    fn what_stood_before_a_fit_is_found_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let fitted = |base: &Location, mu: f64, data: &str, name: &str| {
+            let calibration = CalibrationFile {
+                low90: 0.1,
+                high90: 0.4,
+                evidence: None,
+                data_sha256: Some(data.into()),
+                before: None,
+            };
+            let value =
+                EditedValue { key: "parts.gear.mu".into(), value: mu, calibration: Some(calibration) };
+            let out = folder.path().join(name);
+            write_twin(base, &[], &TwinEdits { values: vec![value], effects: None }, &out).unwrap();
+            Location::Disk(out)
+        };
+        let first = Location::parse("asset:configs/twin-baseline.toml");
+        let mu = load_twin_document(&first, &[]).unwrap().read_twin().unwrap().parts["gear"].mu;
+        let once = fitted(&first, 0.3, "ab", "once.toml");
+        let twice = fitted(&once, 0.31, "ab", "twice.toml");
+        let other = fitted(&twice, 0.32, "cd", "other.toml");
+        let before = |at: &Location, data: &str| before_data(&load_twin_document(at, &[]).unwrap(), data);
+        let gear = |mu: f64| vec![("parts.gear.mu".to_string(), toml::Value::Float(mu).to_string())];
+        assert_eq!(before(&once, "ab"), gear(mu));
+        assert_eq!(before(&twice, "ab"), gear(mu));
+        assert_eq!(before(&other, "cd"), gear(0.31));
+        assert_eq!(before(&other, "ab"), vec![]);
+    }
 }

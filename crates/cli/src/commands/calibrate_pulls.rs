@@ -28,7 +28,7 @@ pub fn run(args: &CalibratePullsArgs) -> Result<u8, Failure> {
     let measured = folders(&args.measured, &args.also);
     let mut loaded = load_pulls_to_fit(&measured, suspects(args.include_suspect), &args.talk, false)?;
     let (twin, library, own) =
-        TwinOfPulls { path: &args.twin, sets: &args.set, rig: None }.for_pulls(&mut loaded)?;
+        TwinOfPulls { path: &args.twin, sets: &args.set, rig: None }.for_fit(&mut loaded)?;
     let sets = [&args.set[..], &own.sets].concat();
     let twin_at = Location::parse(&args.twin);
     let document = load_twin_document(&twin_at, &sets)?;

@@ -73,7 +73,7 @@ pub fn diagnose_folders(
     talk: &TalkArgs,
 ) -> Result<Diagnosed, Failure> {
     let mut loaded = load_pulls_to_fit(measured, suspects, talk, true)?;
-    let (twin, library, own) = twin.for_pulls(&mut loaded)?;
+    let (twin, library, own) = twin.for_fit(&mut loaded)?;
     if !talk.quiet {
         loaded.missing.notes().for_each(|note| eprintln!("note: {note}"));
     }

@@ -6,9 +6,10 @@ use gripgen_twin::random::{normal_cdf, normal_quantile};
 /// cond-mat/0502644), areas that fall by up to 30 % before the slip (Sahli 2018, 10.1073/pnas.1706434115).
 pub const KINETIC_RATIO: (f64, f64) = (0.84, 0.09);
 
-/// Time constant with which friction falls to its kinetic value where neither a trace nor the twin says it, s: the geometric middle of 2 to
-/// 100 ms (`assets/priors/friction.toml`). With a fall at once, labels that stand on the falling edge look like a dependence on the rate.
-pub const KINETIC_FALL_S: f64 = 0.014;
+/// Time constants with which friction falls to its kinetic value, s, of which labels without traces take the likeliest: at once, and the quarters
+/// of what is drawn for gels, 2 to 100 ms, in logarithms (`assets/priors/friction.toml`). With a fall at once, labels that stand on the falling
+/// edge look like a dependence on the rate.
+pub const KINETIC_FALLS_S: [f64; 4] = [0.0, 0.005, 0.014, 0.038];
 
 /// What is believed of a number: normal, or its logarithm is, inside bounds.
 #[derive(Debug, Clone, PartialEq)]

@@ -442,4 +442,7 @@ pub struct CalibrationFile {
     /// SHA-256 of the data it was fitted to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub data_sha256: Option<String>,
+    /// The value that stood there before. A diagnosis of the same data starts from it, so that they count once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before: Option<f64>,
 }

@@ -12,7 +12,6 @@ use gripgen_identify::pulls::answer::{PullFits, PullOptions, diagnose_pulls};
 use gripgen_identify::pulls::curves::Curve;
 use gripgen_identify::pulls::data::{Column, PullData};
 use gripgen_identify::pulls::few_diagnosis::is_few;
-use gripgen_identify::pulls::priors::KINETIC_FALL_S;
 use gripgen_identify::{Diagnosis, describe_by_process};
 use gripgen_physics::PullPredictor;
 use gripgen_report::pull_report;
@@ -111,7 +110,6 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
     let mean = |f: &dyn Fn(&gripgen_twin::Part) -> f64| {
         found.iter().map(|p| f(p)).sum::<f64>() / found.len().max(1) as f64
     };
-    let fall_s = mean(&|p| p.kinetic_fall_s);
     Ok(PullModel {
         mu: found.iter().map(|p| p.mu).collect(),
         kinetic_ratio: mean(&|p| p.kinetic_ratio),
@@ -122,7 +120,7 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
         shear_by_area: 0.5 * (twin.gel.left.shear_by_area + twin.gel.right.shear_by_area),
         damping_n_s_per_m: twin.robot.damping_n_s_per_m,
         apparent_mass_kg: None,
-        fall_s: if fall_s > 0.0 { fall_s } else { KINETIC_FALL_S },
+        fall_s: mean(&|p| p.kinetic_fall_s),
         misread_n: 0.0,
         noise_n: twin.wrist.noise_n,
         scatter: mean(&|p| p.scatter),

@@ -23,7 +23,8 @@ pub(crate) fn effect_entry(name: &str, source: &str) -> EffectFile {
 /// How well a value is known, and from which data.
 pub(crate) fn calibration_entry(value: &ParameterEstimate, evidence: &str, sha256: &str) -> CalibrationFile {
     let (low90, high90) = (value.low90, value.high90);
-    CalibrationFile { low90, high90, evidence: Some(evidence.into()), data_sha256: Some(sha256.into()) }
+    let (evidence, data_sha256) = (Some(evidence.into()), Some(sha256.into()));
+    CalibrationFile { low90, high90, evidence, data_sha256, before: None }
 }
 
 /// Puts a fitted value with its interval into an entry.
