@@ -2,7 +2,6 @@
 
 use super::creep::{Creep, without_slips_that_rise};
 use super::data::PullData;
-use super::fitting::Fitted;
 use super::likelihood::Tails;
 use super::observe::{LEVELS, TraceObservation, fall_s, noise_n, observe};
 use super::priors::KINETIC_FALLS_S;
@@ -162,9 +161,9 @@ impl<'a> Context<'a> {
             let falls = KINETIC_FALLS_S.map(|fall_s| {
                 self.fit_near(&PullModel { fall_s, ..self.base.clone() }, &Terms::default(), rows)
             });
-            let likely = |a: &Fitted, b: &Fitted| a.likelihood.log.total_cmp(&b.likelihood.log);
             // Of equals the last: friction that does not fall has no time.
-            if let Some(found) = falls.into_iter().rev().flatten().max_by(likely) {
+            let falls = falls.into_iter().rev().flatten();
+            if let Some(found) = falls.max_by(|a, b| a.likelihood.log.total_cmp(&b.likelihood.log)) {
                 self.base = found.model;
             }
         }
