@@ -17,7 +17,6 @@ use gripgen::{Library, Location, load_twin_document};
 use gripgen_cli::calibrate_twin;
 use gripgen_identify::ParameterEstimate;
 use gripgen_identify::pulls::calibrate::CalibrateRequest;
-use gripgen_identify::pulls::priors::KINETIC_RATIO;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
@@ -75,9 +74,7 @@ fn world(line: &Line, index: u64) -> World {
     let (scatter, a, b_n) = (uniform(0.02, 0.06), uniform(0.9, 1.3), uniform(-3.0, 3.0));
     // Without traces only what is assumed says how the loop and the kinetic branch are: they are drawn from that.
     let mut normal = Stream::new(78, index, Purpose::Draw);
-    let ratio_prior = std::iter::repeat_with(|| KINETIC_RATIO.0 + KINETIC_RATIO.1 * normal.normal())
-        .find(|r| *r <= 1.0)
-        .unwrap();
+    let ratio_prior = std::iter::repeat_with(|| 0.95 + 0.05 * normal.normal()).find(|r| *r <= 1.0).unwrap();
     let lag_prior = std::iter::repeat_with(|| 0.05 + 0.04 * normal.normal()).find(|l| *l >= 0.0).unwrap();
     World {
         mu,

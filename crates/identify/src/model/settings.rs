@@ -4,11 +4,12 @@ use super::gaussian::Measured;
 use super::labels::LabelCurves;
 use super::search::{Fit, Search};
 use crate::pulls::data::PullData;
-use crate::pulls::priors::KINETIC_RATIO;
 use gripgen_twin::predict::{PredictPulls, PullModel};
 
-/// Kinetic ratios that are tried.
+/// Kinetic ratios that are tried. What is believed of them: 1/2 to 1 for rough contacts (Farkas 2005, cond-mat/0502644), areas that fall by
+/// up to 30 % before the slip (Sahli 2018, 10.1073/pnas.1706434115); 0.84 with a deviation of 0.09.
 const RATIOS: [f64; 7] = [1.0, 0.95, 0.9, 0.84, 0.78, 0.7, 0.6];
+const RATIO: (f64, f64) = (0.84, 0.09);
 
 /// Labels of one setting of the label rule with the search over them.
 pub(super) struct Setting {
@@ -40,7 +41,7 @@ fn setting(
     let curves = LabelCurves::new(predictor, &model, data.len());
     let search = Search::new(data, curves.measured(&data.label_n), vec![]);
     let plain = search.plain()?;
-    let far = (ratio - KINETIC_RATIO.0) / KINETIC_RATIO.1;
+    let far = (ratio - RATIO.0) / RATIO.1;
     Some(Setting { curves, log_prior: -0.5 * far * far, search, plain, above_n: vec![0.0; data.len()] })
 }
 

@@ -2,7 +2,6 @@
 
 use super::context::{Context, Observation};
 use super::observe::LEVELS;
-use super::priors::KINETIC_RATIO;
 use super::slip::SlipLimit;
 use super::trace_residuals::{OWN_N, SHARED_N, TraceResiduals};
 use super::zero_screen::zeros_that_depend;
@@ -160,7 +159,7 @@ impl Context<'_> {
 
     /// Kinetic ratio that is taken for granted where no trace shows it, with its standard deviation.
     pub(super) fn assumed_ratio(&self) -> Option<(f64, f64)> {
-        self.kinetic.is_none().then(|| (self.given.2.min(KINETIC_RATIO.0), KINETIC_RATIO.1))
+        self.kinetic.is_none().then(|| (self.given.2.min(0.95), 0.05))
     }
 
     /// What is known beside the pulls, as residuals.

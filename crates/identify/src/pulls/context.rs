@@ -4,7 +4,6 @@ use super::creep::{Creep, without_slips_that_rise};
 use super::data::PullData;
 use super::likelihood::Tails;
 use super::observe::{LEVELS, TraceObservation, fall_s, noise_n, observe};
-use super::priors::KINETIC_FALLS_S;
 use super::slip::{SlipLimit, SlipRig, SlipTrace, Slips, read_slips};
 use super::terms::Terms;
 use super::trace_residuals::{SHARED_N, Widening};
@@ -149,8 +148,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Without traces the labels are all that knows of force loop and sensor: lag, dead time, damping, noise and the
-    /// fall of friction from them, once. Where they have said it already, that stands.
+    /// Without traces the labels are all that knows of force loop and sensor: lag, dead time, damping and noise from them, once. Where they
+    /// have said it already, that stands.
     pub(super) fn learn_lag(&mut self, rows: &[usize]) {
         if !self.observations.is_empty() || self.noise90_n.is_some() {
             return;
@@ -158,14 +157,6 @@ impl<'a> Context<'a> {
         self.free_lag = true;
         if let Some((model, interval)) = self.noise_of_labels(rows) {
             (self.base, self.noise90_n) = (model, Some(interval));
-            let falls = KINETIC_FALLS_S.map(|fall_s| {
-                self.fit_near(&PullModel { fall_s, ..self.base.clone() }, &Terms::default(), rows)
-            });
-            // Of equals the last: friction that does not fall has no time.
-            let falls = falls.into_iter().rev().flatten();
-            if let Some(found) = falls.max_by(|a, b| a.likelihood.log.total_cmp(&b.likelihood.log)) {
-                self.base = found.model;
-            }
         }
         self.free_lag = false;
     }

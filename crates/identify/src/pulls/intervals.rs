@@ -21,8 +21,7 @@ pub struct NormalFit {
     freedom: f64,
 }
 
-/// Standard deviations of what is assumed of the kinetic ratio that its range has below the mean: nine of ten values lie above. It ends at 1, where
-/// friction does not fall.
+/// Standard deviations of what is assumed of the kinetic ratio that its range has to either side: nine of ten values are inside.
 const RANGE: f64 = 1.3;
 
 /// Standard deviation of a kinetic ratio of which nothing is known.
@@ -64,7 +63,7 @@ impl NormalFit {
                 free.clone_from(&fitted.values);
             }
         }
-        let range = assumed.map(|(mean, sd)| (mean - RANGE * sd, 1.0));
+        let range = assumed.map(|(mean, sd)| (mean - RANGE * sd, (mean + RANGE * sd).min(1.0)));
         let covariance = known.cholesky().map_or_else(|| fitted.covariance.clone(), |c| c.inverse());
         let end = |i: usize| {
             let own = bounds(&fitted.names[i])?;

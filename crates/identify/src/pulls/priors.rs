@@ -2,15 +2,6 @@
 
 use gripgen_twin::random::{normal_cdf, normal_quantile};
 
-/// Kinetic over static friction where no trace shows it, mean and standard deviation: 1/2 to 1 for rough contacts (Farkas 2005,
-/// cond-mat/0502644), areas that fall by up to 30 % before the slip (Sahli 2018, 10.1073/pnas.1706434115).
-pub const KINETIC_RATIO: (f64, f64) = (0.84, 0.09);
-
-/// Time constants with which friction falls to its kinetic value, s, of which labels without traces take the likeliest: at once, and the quarters
-/// of what is drawn for gels, 2 to 100 ms, in logarithms (`assets/priors/friction.toml`). With a fall at once, labels that stand on the falling
-/// edge look like a dependence on the rate.
-pub const KINETIC_FALLS_S: [f64; 4] = [0.0, 0.005, 0.014, 0.038];
-
 /// What is believed of a number: normal, or its logarithm is, inside bounds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {

@@ -120,7 +120,7 @@ pub fn given_model(twin: &Twin, parts: &[String]) -> Result<PullModel, UnknownPa
         shear_by_area: 0.5 * (twin.gel.left.shear_by_area + twin.gel.right.shear_by_area),
         damping_n_s_per_m: twin.robot.damping_n_s_per_m,
         apparent_mass_kg: None,
-        fall_s: mean(&|p| p.kinetic_fall_s),
+        fall_s: 0.0,
         misread_n: 0.0,
         noise_n: twin.wrist.noise_n,
         scatter: mean(&|p| p.scatter),
