@@ -1,4 +1,4 @@
-//! Grips that work and are doubtful: hardly a contact, one at the rim of a pad, deep in the gel, or gels that meet beside the part.
+//! Grips that work and are doubtful: hardly a contact, one at the rim of a pad, deep in the gel, or gels that meet next to the part.
 
 use super::Proposal;
 use super::pose::GripAt;
