@@ -46,6 +46,7 @@ fn heights_on_a_dome_are_taxims() {
             .collect();
         let imprint = Imprint {
             depth_px: Plane { values: depth, ..z0.clone() },
+            edges: Default::default(),
             press_depth_m: press_mm * 1e-3,
             lift_m: 0.0,
             patch: ContactPatch::default(),

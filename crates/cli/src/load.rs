@@ -13,7 +13,7 @@ use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::{PressSet, RestDoubt, rest_doubt};
 use gripgen::twin::Twin;
 use gripgen::{Library, Location, load_twin_document};
-use gripgen_measured::{LoadPullsError, LoadedPulls, Suspects, is_pulls, load_pulls_with};
+use gripgen_measured::{LoadPullsError, LoadedPulls, Suspects, is_pulls, jpeg_presses, load_pulls_with};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -204,6 +204,21 @@ pub fn drop_doubtful_rest(path: &Path, set: &mut PressSet, talk: &TalkArgs) -> O
         );
     }
     Some(doubt)
+}
+
+/// The images of a press folder that are JPEGs; says what that means.
+pub fn note_jpegs(path: &Path, talk: &TalkArgs) -> Vec<String> {
+    // What cannot be read was refused before; a `dataPack.npz` holds pixels.
+    let (jpegs, count) = jpeg_presses(path).unwrap_or_default();
+    if !jpegs.is_empty() && !talk.quiet {
+        eprintln!(
+            "warning: {}: {} of {count} images are JPEGs: errors against them look smaller than they are (by some 5 %), and noise that is \
+             read from them is too low; take frames as PNG",
+            path.display(),
+            jpegs.len()
+        );
+    }
+    jpegs
 }
 
 /// Says which contacts were not marked.

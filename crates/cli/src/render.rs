@@ -21,6 +21,8 @@ pub struct RenderOptions {
     pub y_px: Option<f64>,
     /// Turn of a mesh, counter-clockwise in the image.
     pub rotation_rad: f64,
+    /// Radius of the convex edges of a mesh; 0 leaves them sharp.
+    pub edge_radius_m: f64,
     /// Size of the unit of a mesh, or of heights.
     pub metres_per_unit: f64,
 }
@@ -109,7 +111,8 @@ pub fn render_file(
     let travel_m = options.travel_m.ok_or_else(|| RenderError::NoTravel { path: path.into() })?;
     let name = path.file_stem().map_or_else(|| "mesh".into(), |stem| stem.to_string_lossy());
     let indenter = Indenter::of_mesh(&name, &mesh, options.pose(&sensor.grid), travel_m, &sensor.grid)
-        .map_err(|source| RenderError::Body { path: path.into(), source })?;
+        .map_err(|source| RenderError::Body { path: path.into(), source })?
+        .with_edge_radius(options.edge_radius_m, &sensor.grid);
     Ok(render_body(&Arc::new(indenter), sensor))
 }
 

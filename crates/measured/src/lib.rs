@@ -40,8 +40,8 @@ pub use load::{
 };
 pub use press_columns::{PressColumn, PressColumns, load_press_columns};
 pub use press_table::{
-    PRESSES_FILE, PressColumnTable, PressFolder, PressRecord, PressedBody, press_table, read_press_columns,
-    read_press_folder,
+    PRESSES_FILE, PressColumnTable, PressFolder, PressRecord, PressedBody, jpeg_presses, press_table,
+    read_press_columns, read_press_folder,
 };
 pub use pulls::{
     JudgedPulls, MissingCells, PULLS_FILE, PullFolderError, PullImages, Standing, TRACES_FOLDER,

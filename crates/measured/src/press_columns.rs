@@ -6,8 +6,18 @@ use gripgen_twin::Values;
 use std::path::Path;
 
 /// Columns that are marks of the contact, not circumstances.
-const MARKS: [&str; 9] =
-    ["image", "x_px", "y_px", "radius_px", "depth_mm", "pull_index", "mesh", "shape", "rotation_deg"];
+const MARKS: [&str; 10] = [
+    "image",
+    "x_px",
+    "y_px",
+    "radius_px",
+    "depth_mm",
+    "pull_index",
+    "mesh",
+    "shape",
+    "rotation_deg",
+    "edge_radius_mm",
+];
 
 /// A circumstance of the presses, by row.
 #[derive(Debug, Clone, PartialEq)]

@@ -27,7 +27,7 @@ fn table_path(folder: &Path) -> PathBuf {
 /// The column that names the image of a row.
 const IMAGE: &str = "image";
 
-/// Names under which a frame without contact is looked for; one that is a JPEG is refused, not overlooked.
+/// Names under which a frame without contact is looked for.
 const REST_FILES: [&str; 3] = ["rest.png", "rest.jpg", "rest.jpeg"];
 
 /// One row of the table with its image.
@@ -56,6 +56,8 @@ pub struct PressedBody {
     pub shape: String,
     /// Turn about its own z, counter-clockwise as seen in the image.
     pub rotation_rad: f64,
+    /// Radius of its convex edges, where the table says one.
+    pub edge_radius_m: Option<f64>,
 }
 
 /// What a press folder holds, in the order of its table.
@@ -69,8 +71,8 @@ pub struct PressFolder {
 
 /// Reads a press folder. Columns: `image`, and where somebody measured them `x_px`, `y_px`, `radius_px` or
 /// `depth_mm`; an empty cell is a number that nobody measured. A row with a `mesh` is of that body and no ball: `depth_mm`,
-/// `x_px` and `y_px` of the mesh's origin are needed then, `rotation_deg` and `shape` may stand beside. Further columns are
-/// left alone. The table may be called `shapes.csv` too. Images are PNG: a JPEG moves colours by as much as a light contact does.
+/// `x_px` and `y_px` of the mesh's origin are needed then, `rotation_deg`, `edge_radius_mm` and `shape` are optional. Further columns are
+/// left alone. The table may be called `shapes.csv` too. Images are PNG or JPEG; [`jpeg_presses`] names those that are JPEGs.
 ///
 /// # Errors
 /// [`TableError`], with line, column and value, or with the image.
@@ -79,18 +81,18 @@ pub fn read_press_folder(folder: &Path) -> Result<PressFolder, TableError> {
     let bytes = read_bytes(&path)?;
     let mut table = TableReader::new(&path, &bytes)?;
     let image_column = table.required(IMAGE)?;
-    let numbers =
-        ["x_px", "y_px", "radius_px", "depth_mm", "rotation_deg"].map(|name| (name, table.place(name)));
+    let numbers = ["x_px", "y_px", "radius_px", "depth_mm", "rotation_deg", EDGE_RADIUS]
+        .map(|name| (name, table.place(name)));
     let words = ["mesh", "shape"].map(|name| table.place(name));
     let mut presses = Vec::new();
     while let Some(row) = table.row()? {
         let name = row.cell(image_column).to_string();
-        let mut found = [None; 5];
+        let mut found = [None; 6];
         for (slot, (column, place)) in found.iter_mut().zip(numbers) {
             let Some(place) = place else { continue };
             *slot = measured(row.cell(place), column).map_err(|wanted| row.bad(place, wanted))?;
         }
-        let [x, y, radius_px, depth_mm, rotation_deg] = found;
+        let [x, y, radius_px, depth_mm, rotation_deg, edge_radius_mm] = found;
         let word = |place: Option<usize>| place.map(|p| row.cell(p).trim()).filter(|w| !w.is_empty());
         let body = match word(words[0]) {
             None => None,
@@ -107,11 +109,12 @@ pub fn read_press_folder(folder: &Path) -> Result<PressFolder, TableError> {
                     mesh: mesh.into(),
                     shape: word(words[1]).unwrap_or(stem).into(),
                     rotation_rad: rotation_deg.unwrap_or(0.0).to_radians(),
+                    edge_radius_m: edge_radius_mm.map(|mm| mm * 1e-3),
                 })
             }
         };
         presses.push(PressRecord {
-            image: picture(&folder.join(&name))?,
+            image: read_picture(&folder.join(&name))?.0,
             name,
             centre_px: x.zip(y),
             radius_px,
@@ -120,7 +123,32 @@ pub fn read_press_folder(folder: &Path) -> Result<PressFolder, TableError> {
         });
     }
     let rest = REST_FILES.iter().map(|name| folder.join(name)).find(|p| p.is_file());
-    Ok(PressFolder { rest: rest.map(|p| picture(&p)).transpose()?, presses })
+    let rest = rest.map(|p| read_picture(&p)).transpose()?.map(|(image, _)| image);
+    Ok(PressFolder { rest, presses })
+}
+
+/// The images of a press folder that are JPEGs, the frame without contact among them: each is named, and how many images there are.
+///
+/// # Errors
+/// [`TableError`], with line and column, or with the image.
+pub fn jpeg_presses(folder: &Path) -> Result<(Vec<String>, usize), TableError> {
+    let path = table_path(folder);
+    let bytes = read_bytes(&path)?;
+    let mut table = TableReader::new(&path, &bytes)?;
+    let image_column = table.required(IMAGE)?;
+    let mut names = Vec::new();
+    while let Some(row) = table.row()? {
+        names.push(row.cell(image_column).to_string());
+    }
+    names.extend(REST_FILES.iter().find(|name| folder.join(name).is_file()).map(|name| name.to_string()));
+    let count = names.len();
+    let mut jpegs = Vec::new();
+    for name in names {
+        if is_jpeg(&read_bytes(&folder.join(&name))?) {
+            jpegs.push(name);
+        }
+    }
+    Ok((jpegs, count))
 }
 
 /// All columns of a press table, as numbers or words.
@@ -157,23 +185,35 @@ pub fn read_press_columns(folder: &Path) -> Result<PressColumnTable, TableError>
 }
 
 /// A number of a cell, none where it is empty; otherwise what it must be.
+/// Column of the radius of a body's convex edges, and the largest there can be.
+const EDGE_RADIUS: &str = "edge_radius_mm";
+const MAX_EDGE_RADIUS_MM: f64 = 1.0;
+
 fn measured(cell: &str, column: &str) -> Result<Option<f64>, &'static str> {
     let length = matches!(column, "radius_px" | "depth_mm");
     match number(cell) {
         _ if cell.is_empty() => Ok(None),
+        Some(x) if column == EDGE_RADIUS && !(0.0..=MAX_EDGE_RADIUS_MM).contains(&x) => Err("from 0 to 1 mm"),
         Some(x) if !length || x > 0.0 => Ok(Some(x)),
         _ if length => Err("a number above 0"),
         _ => Err("a number"),
     }
 }
 
+/// An image, which must not be a JPEG.
 pub(crate) fn picture(path: &Path) -> Result<TactileImage, TableError> {
-    let io = |e: std::io::Error| TableError::Io { path: path.into(), problem: e.to_string() };
-    let bytes = std::fs::read(path).map_err(io)?;
-    if is_jpeg(&bytes) {
-        return Err(TableError::Jpeg { path: path.into() });
+    match read_picture(path)? {
+        (_, true) => Err(TableError::Jpeg { path: path.into() }),
+        (image, false) => Ok(image),
     }
-    decode(&bytes).map_err(|e| TableError::Io { path: path.into(), problem: e.to_string() })
+}
+
+/// An image, and whether it is a JPEG.
+fn read_picture(path: &Path) -> Result<(TactileImage, bool), TableError> {
+    let io = |problem: String| TableError::Io { path: path.into(), problem };
+    let bytes = std::fs::read(path).map_err(|e| io(e.to_string()))?;
+    let image = decode(&bytes).map_err(|e| io(e.to_string()))?;
+    Ok((image, is_jpeg(&bytes)))
 }
 
 #[cfg(test)]
@@ -224,7 +264,6 @@ mod tests {
             ),
             ("image,depth_mm\na.png,deep\n", "`depth_mm` is `deep`"),
             ("image\nb.png\n", "b.png"),
-            ("image\nlossy.png\n", "lossy.png: the image is a JPEG, presses are read from PNG"),
             ("image,x_px\na.png,1,2\n", "cells of line 2: "),
         ] {
             let error = read_press_folder(folder(table).path()).unwrap_err().to_string();

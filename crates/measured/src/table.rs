@@ -28,7 +28,7 @@ pub enum TableError {
         problem: String,
     },
     /// An image that lost colours when it was stored.
-    #[error("{}: the image is a JPEG, presses are read from PNG", .path.display())]
+    #[error("{}: the image is a JPEG, grips are read from PNG", .path.display())]
     Jpeg {
         /// The image.
         path: PathBuf,

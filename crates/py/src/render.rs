@@ -3,7 +3,7 @@
 use crate::error;
 use gripgen::Location;
 use gripgen::tactile::npz::Array;
-use gripgen::tactile::presses::RenderedBody;
+use gripgen::tactile::presses::{MAX_EDGE_RADIUS_M, RenderedBody, USUAL_EDGE_RADIUS_M};
 use gripgen::twin::usual_scale_mm_per_unit;
 use gripgen_cli::Failure;
 use gripgen_cli::{RenderOptions, load_sensor, render_file, render_surface};
@@ -21,7 +21,7 @@ pub enum Source<'py> {
 
 /// Press something in and look at it. Returns image, heights_mm, normals and contact.
 #[pyfunction]
-#[pyo3(signature = (source, sensor, depth_mm = None, x_px = None, y_px = None, rotation_deg = 0.0, scale_mm_per_unit = None))]
+#[pyo3(signature = (source, sensor, depth_mm = None, x_px = None, y_px = None, rotation_deg = 0.0, scale_mm_per_unit = None, edge_radius_mm = None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub fn render<'py>(
     py: Python<'py>,
@@ -32,6 +32,7 @@ pub fn render<'py>(
     y_px: Option<f64>,
     rotation_deg: f64,
     scale_mm_per_unit: Option<f64>,
+    edge_radius_mm: Option<f64>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let usual = || match &source {
         Source::File(path) => {
@@ -44,11 +45,21 @@ pub fn render<'py>(
         let what = format!("scale_mm_per_unit is {scale_mm_per_unit} mm, it must be more than 0");
         return Err(error::argument(py, &what, None));
     }
+    let edge_radius_m = edge_radius_mm.map_or(USUAL_EDGE_RADIUS_M, |mm| mm * 1e-3);
+    if !(0.0..=MAX_EDGE_RADIUS_M).contains(&edge_radius_m) {
+        let what = format!(
+            "edge_radius_mm is {} mm, it must be from 0 to {} mm",
+            edge_radius_m * 1e3,
+            MAX_EDGE_RADIUS_M * 1e3
+        );
+        return Err(error::argument(py, &what, None));
+    }
     let options = RenderOptions {
         travel_m: depth_mm.map(|mm| mm * 1e-3),
         x_px,
         y_px,
         rotation_rad: rotation_deg.to_radians(),
+        edge_radius_m,
         metres_per_unit: scale_mm_per_unit * 1e-3,
     };
     let source = match source {

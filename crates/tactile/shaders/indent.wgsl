@@ -167,7 +167,7 @@ fn main(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) t
         }
         let depth = select(0.0, press, pressed);
         outcomes[image] = Outcome(
-            status, depth, found.available, frame.restore_depth_fraction * depth,
+            status, depth, found.available, frame.restore_depth_fraction * depth, top,
             atomicLoad(&low_x), atomicLoad(&low_y), atomicLoad(&high_x), atomicLoad(&high_y),
         );
     }

@@ -17,25 +17,28 @@ use sheet::{GROUP, SPARE_ROWS};
 /// What a blur leaves of the core of a contact, where the gel follows the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Follow {
-    /// The height of the part (Taxim). Where the core ends on a slanted wall, that lies below the blurred gel beside it: a
-    /// moat around the contact. Sensor files of before say nothing else.
+    /// The height of the part (Taxim). Where the core ends on a slanted wall, that lies below the blurred gel around it: a moat
+    /// around the contact. Sensor files that do not say how the gel follows mean this.
     Exactly,
     /// The height of the part or of the blurred gel, whichever is deeper: the gel cannot lie inside the part, and where it is
     /// deeper it has left it.
     AtLeast,
 }
 
-/// What is put back after a blur: `core` where it is a number, plus `lift` where there is one.
+/// What is put back after a blur: `core` plus `lift` where there is one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Restore<'a> {
-    /// Values to put back, NaN for none; valid in the whole groups around `area`.
+    /// Values to put back, valid in the whole groups around `area`; without `share` NaN for none.
     pub(crate) core: &'a Sheet,
+    /// How much of each pixel belongs to the core: what is blurred moves towards the core by this share of the way. Without it the
+    /// core takes the place of what is blurred.
+    pub(crate) share: Option<&'a Sheet>,
+    /// Whether a share also lowers what is blurred.
+    pub(crate) follow: Follow,
     /// Where they are.
     pub(crate) area: Area,
-    /// Added to them.
+    /// Added to the core.
     pub(crate) lift: Option<&'a Sheet>,
-    /// Whether they stand for the blurred ones, or only where they are larger.
-    pub(crate) follow: Follow,
 }
 
 /// A surface that lies upright or transposed, and the memory to blur it in.
@@ -252,10 +255,13 @@ impl Columns<'_> {
             if let Some(lift) = restore.lift {
                 core = L::add(core, L::load(lift.values().as_ptr().add(lift.offset(y as isize) + x)));
             }
-            match restore.follow {
-                Follow::Exactly => L::first_unless_nan(core, sum),
+            let Some(share) = restore.share else { return L::first_unless_nan(core, sum) };
+            let share = L::load(share.values().as_ptr().add(at));
+            let goal = match restore.follow {
+                Follow::Exactly => core,
                 Follow::AtLeast => L::larger_unless_nan(core, sum),
-            }
+            };
+            L::fused(share, L::fused(L::splat(-1.0), sum, goal), sum)
         }
     }
 }

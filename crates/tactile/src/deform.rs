@@ -1,10 +1,17 @@
 //! Stage `deform`: the gel around a contact, by a pyramid of blurs.
 
-use crate::convolve::Follow;
-use crate::convolve::{Area, Restore, Sheet, Surface};
+mod core_share;
+#[cfg(test)]
+mod edge_tests;
+
+pub use core_share::Edges;
+pub(crate) use core_share::POINTS;
+
+use crate::convolve::{Area, Follow, Restore, Sheet, Surface};
 use crate::grid::Plane;
 use crate::indent::Imprint;
 use crate::simd::SimdLevel;
+use core_share::write_core;
 
 /// The last blur, which smooths the border of the contact too.
 pub(crate) const FINAL_KERNEL_PX: u32 = 5;
@@ -33,14 +40,15 @@ pub fn deform(
 ) -> Plane {
     let core_px = restore_depth_fraction * imprint.press_depth_m / metres_per_px;
     let mut scratch = DeformScratch::default();
-    scratch.deform(&imprint.depth_px, (core_px, Follow::Exactly), &weights(kernels_px), rest, level);
+    let core = Core { from_px: core_px, follow: Follow::Exactly, whole_pixels: true };
+    scratch.deform(imprint, core, &weights(kernels_px), rest, level);
     scratch.surface_plane()
 }
 
 /// [`deform`] with the weights of the kernels, of odd lengths, on a gel with any rest surface (towards the part).
 pub(crate) fn deform_with(
-    depth_px: &Plane,
-    core: (f64, Follow),
+    imprint: &Imprint,
+    core: Core,
     kernels: &[Vec<f32>],
     rest_px: Option<&Plane>,
     level: SimdLevel,
@@ -49,7 +57,7 @@ pub(crate) fn deform_with(
     let halves: Vec<Vec<f32>> = kernels.iter().chain([&last]).map(|k| k[k.len() / 2..].to_vec()).collect();
     let rest = rest_px.map(|rest| BlurredRest::with_weights(rest, &halves, level));
     let mut scratch = DeformScratch::default();
-    scratch.deform(depth_px, core, &halves, rest.as_ref(), level);
+    scratch.deform(imprint, core, &halves, rest.as_ref(), level);
     scratch.surface_plane()
 }
 
@@ -130,41 +138,66 @@ fn largest_half(weights: &[Vec<f32>]) -> usize {
     weights.iter().map(|w| w.len() - 1).max().unwrap_or(0)
 }
 
+/// The core of a contact, and how the gel follows the part there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Core {
+    /// The depth below which it lies.
+    pub(crate) from_px: f64,
+    pub(crate) follow: Follow,
+    /// Taxim's way: a pixel belongs to it or not, by its depth alone, and the core takes the place of what is blurred.
+    pub(crate) whole_pixels: bool,
+}
+
 /// Memory of the stage, to be used again, and its result.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct DeformScratch {
     surface: Surface,
+    /// Depth of the core, upright and lying.
     core: [Sheet; 2],
+    /// The share of each pixel that belongs to it.
+    shares: [Sheet; 2],
 }
 
 impl DeformScratch {
     /// The stage; the result stays here. `weights` are those of [`weights`]; the core is what is deeper than that.
     pub(crate) fn deform(
         &mut self,
-        depth_px: &Plane,
-        (core_px, follow): (f64, Follow),
+        imprint: &Imprint,
+        core: Core,
         weights: &[Vec<f32>],
         rest: Option<&BlurredRest>,
         level: SimdLevel,
     ) {
+        let depth_px = &imprint.depth_px;
         let (width, height) = (depth_px.width, depth_px.height);
         let half = largest_half(weights);
         let contact = Area::of_positive(depth_px, level);
-        let core_px = core_px as f32;
-        let [core, lying] = &mut self.core;
-        core.reshape(width, height, half);
-        core.copy_area(depth_px, contact, f32::NAN, |d| if d > core_px { d } else { f32::NAN });
-        lying.reshape(height, width, half);
-        lying.copy_transposed(core, contact, level);
+        let core_px = core.from_px as f32;
+        let Core { follow, whole_pixels, .. } = core;
+        for [upright, lying] in [&mut self.core, &mut self.shares] {
+            upright.reshape(width, height, half);
+            lying.reshape(height, width, half);
+        }
+        let ([core, lying_core], [share, lying_share]) = (&mut self.core, &mut self.shares);
+        if whole_pixels {
+            core.copy_area(depth_px, contact, f32::NAN, |d| if d > core_px { d } else { f32::NAN });
+        } else {
+            write_core(depth_px, &imprint.edges, core_px, contact, (core, share), level);
+            lying_share.copy_transposed(share, contact, level);
+        }
+        lying_core.copy_transposed(core, contact, level);
         let surface = &mut self.surface;
         surface.start(depth_px, contact, half);
         let (last, restored) = weights.split_last().expect("the last kernel is always there");
         for (i, kernel) in restored.iter().enumerate() {
             let lift = rest.map(|r| &r.lowered[i]);
-            let restore = [
-                Restore { core: &self.core[0], area: contact, lift, follow },
-                Restore { core: &self.core[1], area: contact.transposed(), lift, follow },
-            ];
+            let restore = [0, 1].map(|lying| Restore {
+                core: &self.core[lying],
+                share: (!whole_pixels).then_some(&self.shares[lying]),
+                follow,
+                area: if lying == 0 { contact } else { contact.transposed() },
+                lift,
+            });
             surface.blur(kernel, Some(&restore), 0, level);
         }
         surface.blur(last, None, RIM_PX, level);
@@ -308,10 +341,11 @@ mod tests {
                 let beyond = ((x as f32 - 100.0).abs() - 28.0).max(0.0);
                 if (y as f32 - 80.0).abs() < 40.0 { (press_px - beyond * steepness).max(0.0) } else { 0.0 }
             });
+            let imprint = crate::testing::imprint(depth);
             let kernels = [71, 51, 21, 11, 5].map(gaussian);
             let rise = |follow| {
-                let core = (0.4 * f64::from(press_px), follow);
-                let surface = deform_with(&depth, core, &kernels, None, SimdLevel::best());
+                let core = Core { from_px: 0.4 * f64::from(press_px), follow, whole_pixels: false };
+                let surface = deform_with(&imprint, core, &kernels, None, SimdLevel::best());
                 let slope = |x: usize| (surface.at(x - 1, 80) - surface.at(x + 1, 80)) / 2.0;
                 let steepest = (120..180).fold(124, |m, x| if slope(x) > slope(m) { x } else { m });
                 let (mut least, mut rise) = (f32::INFINITY, 0.0f32);

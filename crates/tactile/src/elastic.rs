@@ -136,6 +136,7 @@ pub fn press_elastic(
     let (patch, places) = aggregate(&pressure_pa, grid, force_n, level);
     Ok(Imprint {
         depth_px: plane(depth),
+        edges: Default::default(),
         press_depth_m: press_px * a,
         lift_m: (press_px - f64::from(top)) * a,
         patch,

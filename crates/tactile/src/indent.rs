@@ -3,6 +3,7 @@
 pub(crate) mod press;
 
 use crate::convolve::Area;
+use crate::deform::Edges;
 use crate::grid::{Grid, Plane};
 use crate::patch::{CellPlaces, aggregate};
 use crate::raster::{ClusteredMesh, HeightMap};
@@ -14,6 +15,8 @@ use gripgen_twin::{ContactPatch, Gel};
 pub struct Imprint {
     /// Depth of each pixel of the part's surface below the unloaded gel surface, in pixels; 0 without contact.
     pub depth_px: Plane,
+    /// Depths within the pixels beside its steps.
+    pub edges: Edges,
     /// Largest depth.
     pub press_depth_m: f64,
     /// How far the part went into the gel from the pose it was pressed at: depth is height plus this.
@@ -231,29 +234,30 @@ impl Indentation<'_> {
         let mut depth_px = Plane::filled(map.width, map.height, 0.0);
         self.write_depths(map, press_px - f64::from(top), &mut depth_px);
         let patch = self.patch(&depth_px);
-        Ok(self.imprint(depth_px, press_px, f64::from(top), patch))
+        Ok(self.imprint((depth_px, Edges::default()), press_px, f64::from(top), patch))
     }
 
     /// The part `lift_px` deeper than it was drawn, whatever force that takes: depths as those of an imprint, 0 where the part does
     /// not reach. `map` has been started.
-    pub(crate) fn lifted(&self, map: &mut HeightMap, mesh: &ClusteredMesh, lift_px: f64) -> Plane {
+    pub(crate) fn lifted(&self, map: &mut HeightMap, mesh: &ClusteredMesh, lift_px: f64) -> (Plane, Edges) {
         let mut depth_px = Plane::filled(map.width, map.height, 0.0);
         let top = map.draw_down(mesh, FIRST_DEPTH_PX, self.rest, self.level);
         let deepest_px = f64::from(top) + lift_px;
         // No part in front of the gel, or one that stays above it.
         if deepest_px.is_nan() || deepest_px <= 0.0 {
-            return depth_px;
+            return (depth_px, Edges::default());
         }
         if deepest_px > FIRST_DEPTH_PX {
             map.draw_down(mesh, deepest_px, self.rest, self.level);
         }
         self.write_depths(map, lift_px, &mut depth_px);
         let area = Area::of_positive(&depth_px, self.level);
+        let mut edges = Edges::default();
         if map.find_steps(&depth_px, area, self.level) {
             map.draw_steps(mesh, f64::from(top) - MARGIN * deepest_px, self.rest, self.level);
-            map.write_steps(lift_px, &mut depth_px, self.level);
+            edges = map.write_steps(lift_px, &mut depth_px, self.level);
         }
-        depth_px
+        (depth_px, edges)
     }
 
     /// The imprint of a map that is complete as deep as `limit`, which is deep enough, with the pixels beside steps at
@@ -272,6 +276,7 @@ impl Indentation<'_> {
         self.write_depths(map, press_px - top_px, &mut depth_px);
         // Areas and moments are unbiased by pixels that are in contact or not; one whose mean depth is above 0 may be so in part.
         let patch = self.patch(&depth_px);
+        let mut edges = Edges::default();
         if map.find_steps(&depth_px, patch.1.area, self.level) {
             let mut limit_px = limit.depth_px;
             // Points change a press little: only what lies so deep is drawn at first.
@@ -298,9 +303,9 @@ impl Indentation<'_> {
                 drawn_px = limit_px;
             }
             self.write_depths(map, press_px - top_px, &mut depth_px);
-            map.write_steps(press_px - top_px, &mut depth_px, self.level);
+            edges = map.write_steps(press_px - top_px, &mut depth_px, self.level);
         }
-        Ok(self.imprint(depth_px, press_px, top_px, patch))
+        Ok(self.imprint((depth_px, edges), press_px, top_px, patch))
     }
 
     /// What a press touches by the centres of pixels.
@@ -335,14 +340,14 @@ impl Indentation<'_> {
 
     fn imprint(
         &self,
-        depth_px: Plane,
+        (depth_px, edges): (Plane, Edges),
         press_px: f64,
         top_px: f64,
         (patch, places): (ContactPatch, CellPlaces),
     ) -> Imprint {
         let a = self.grid.metres_per_px;
         let (press_depth_m, lift_m) = (press_px * a, (press_px - top_px) * a);
-        Imprint { depth_px, press_depth_m, lift_m, patch, places, elastic: None }
+        Imprint { depth_px, edges, press_depth_m, lift_m, patch, places, elastic: None }
     }
 
     fn through_the_gel(&self, available: f64) -> IndentError {

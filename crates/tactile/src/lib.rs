@@ -66,9 +66,9 @@ mod testing;
 mod volume;
 
 pub use appearance::appearance;
-pub use colour::{ColourModel, Lambert, Light, Regressor, TaximTable, shade};
+pub use colour::{ColourModel, Lambert, Light, Regressor, TableReading, TaximTable, shade};
 pub use convolve::Follow;
-pub use deform::{BlurredRest, deform};
+pub use deform::{BlurredRest, Edges, deform};
 pub use elastic::{Base, ElasticGel, LINEAR_PRESSURE_SHARE, press_elastic};
 pub use gradient::gradient;
 pub use grid::{Grid, Plane};

@@ -25,7 +25,7 @@ pub(crate) use rounding::rounded;
 pub(crate) use warp::frame_at;
 
 use crate::appearance::appearance_on;
-use crate::deform::{blurred, deform_with};
+use crate::deform::{Edges, blurred, deform_with};
 use crate::grid::{Grid, Plane, added};
 use crate::indent::Imprint;
 use crate::markers::Shear;
@@ -59,7 +59,7 @@ pub(crate) fn at_depth(
     let highest = heights.highest();
     let depth_px = heights.map(|h| (h - highest + press_px).max(0.0));
     let lift_m = f64::from(press_px - highest) * grid.metres_per_px;
-    Imprint { depth_px, press_depth_m, lift_m, ..imprint }
+    Imprint { depth_px, edges: Edges::default(), press_depth_m, lift_m, ..imprint }
 }
 
 impl Renderer<'_> {
@@ -163,7 +163,6 @@ impl Renderer<'_> {
         let scaled: Vec<Vec<f32>> =
             kernels_px.iter().map(|&k| kernels::scaled(k, optics.kernel_scale)).collect();
         let rest = self.rest_seen(optics).filter(|_| self.blurs_whole_gel());
-        let core = (self.core_px(imprint), self.follow());
-        deform_with(&imprint.depth_px, core, &scaled, rest.as_ref(), self.level)
+        deform_with(imprint, self.core(imprint), &scaled, rest.as_ref(), self.level)
     }
 }

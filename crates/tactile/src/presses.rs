@@ -31,7 +31,9 @@ use std::sync::Arc;
 
 pub(crate) use contact::Contact;
 pub use contact::{MarkError, ZONES, Zone};
-pub use indenter::{Indenter, IndenterError, IndenterPose, USUAL_SINK_IN};
+pub use indenter::{
+    Indenter, IndenterError, IndenterPose, MAX_EDGE_RADIUS_M, USUAL_EDGE_RADIUS_M, USUAL_SINK_IN,
+};
 pub use render::{HeightsError, RenderedBody, render_body, render_heights};
 pub use rest_doubt::{RestDoubt, rest_doubt};
 pub use seen::{PressContact, PressScene, PressView, frame_mse, surface_part};

@@ -6,6 +6,7 @@ mod scratch;
 use crate::appearance::appearance;
 use crate::colour::LocalColours;
 use crate::convolve::Follow;
+use crate::deform::Core;
 use crate::grid::Plane;
 use crate::indent::press::Press;
 use crate::indent::{Imprint, IndentError};
@@ -179,6 +180,11 @@ impl Renderer<'_> {
         self.pyramid().1 * imprint.press_depth_m / self.sensor.grid.metres_per_px
     }
 
+    /// The core of an imprint. Taxim's tables know it in whole pixels alone.
+    pub(crate) fn core(&self, imprint: &Imprint) -> Core {
+        Core { from_px: self.core_px(imprint), follow: self.follow(), whole_pixels: self.blurs_whole_gel() }
+    }
+
     /// How the gel follows the part there: as the calibration says, and at least where nothing was calibrated.
     pub(crate) fn follow(&self) -> Follow {
         match &self.sensor.pyramid {
@@ -189,8 +195,7 @@ impl Renderer<'_> {
     }
 
     fn deform(&self, imprint: &Imprint, scratch: &mut Scratch, prepared: &Prepared) {
-        let core = (self.core_px(imprint), self.follow());
         let rest = prepared.blurred_rest.as_ref();
-        scratch.deform.deform(&imprint.depth_px, core, &prepared.weights, rest, self.level);
+        scratch.deform.deform(imprint, self.core(imprint), &prepared.weights, rest, self.level);
     }
 }

@@ -1,6 +1,8 @@
 //! What tests of several stages share.
 
-use crate::colour::{Lambert, Light, TaximTable};
+use crate::colour::{Lambert, Light, TableReading, TaximTable};
+use crate::grid::Plane;
+use crate::indent::Imprint;
 use crate::npz::{Array, ElementType, Npz, write_npz};
 use crate::shadow::{ShadowKind, ShadowTable};
 use crate::simd::SimdLevel;
@@ -55,7 +57,7 @@ pub(crate) fn taxim_table(
         ("grad_b", channel(2), ElementType::F64),
     ])
     .unwrap();
-    TaximTable::read(&mut Npz::open(&bytes).unwrap(), frame).unwrap()
+    TaximTable::read(&mut Npz::open(&bytes).unwrap(), frame, TableReading::default()).unwrap()
 }
 
 /// A shadow table with 63 directions, of the rays of (direction and row, channel).
@@ -74,6 +76,13 @@ pub(crate) fn shadow_table(
         step_m,
         rays: (0..63 * heights).map(|i| [0, 1, 2].map(|c| ray(i, c))).collect(),
     }
+}
+
+/// The imprint of a body of these depths that is known at the centres of pixels alone.
+pub(crate) fn imprint(depth_px: Plane) -> Imprint {
+    let (patch, places) = Default::default();
+    let edges = Default::default();
+    Imprint { depth_px, edges, press_depth_m: 0.0, lift_m: 0.0, patch, places, elastic: None }
 }
 
 /// Every vector unit gives what plain code gives.

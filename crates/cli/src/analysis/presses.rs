@@ -137,9 +137,6 @@ impl LoadPressesError {
             Self::Grey { .. } => Some(
                 "slopes are told apart by the colours of the lights: save the frames of the colour camera as they are, not converted to grey",
             ),
-            Self::Folder(TableError::Jpeg { .. }) => Some(
-                "a JPEG moves colours by as much as a light contact does, and converting it does not bring them back: take the frames again as PNG",
-            ),
             Self::Mesh(e) => e.hint(),
             _ => None,
         }
@@ -151,7 +148,7 @@ impl LoadPressesError {
 ///
 /// # Errors
 ///
-/// A path that is no press set, files that cannot be read, images of two sizes, grey images or JPEGs, or a missing or impossible
+/// A path that is no press set, files that cannot be read, images of two sizes, grey images, or a missing or impossible
 /// geometry.
 pub fn load_presses(path: &Path, geometry: PressGeometry) -> Result<PressSet, LoadPressesError> {
     let length = |what, value_m: Option<f64>, min_mm: f64, max_mm: f64| match value_m
@@ -341,6 +338,8 @@ pub fn load_sensor(location: &Location) -> Result<Arc<Sensor>, LoadSensorError> 
         background: None,
         gel_map: None,
         shadow_table: None,
+        table_width_px: None,
+        table_channels: None,
         image_noise: ImageNoise::Off,
     };
     sensor_of(&optics, |_| location.clone())

@@ -1,8 +1,9 @@
 //! What was typed for the verbs that read a mesh: `init`, `try`, `render`.
 
-use super::values::{friction, positive, scale};
+use super::values::{edge_radius, friction, positive, scale};
 use super::{JsonArgs, TalkArgs};
 use clap::Args;
+use gripgen::tactile::presses::USUAL_EDGE_RADIUS_M;
 use std::path::PathBuf;
 
 /// `gripgen init`
@@ -98,6 +99,9 @@ pub struct RenderArgs {
     /// Turn, counter-clockwise in the image.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     pub rotation_deg: f64,
+    /// Radius of the convex edges of a mesh; 0 leaves them sharp. Printed edges have some 0.2 mm.
+    #[arg(long, value_name = "MM", default_value_t = 1e3 * USUAL_EDGE_RADIUS_M, value_parser = edge_radius)]
+    pub edge_radius_mm: f64,
     /// Millimetres per unit of the file; 1 where it is left out, 1000 of GLB, which is in metres.
     #[arg(long, value_name = "MM", value_parser = scale)]
     pub scale_mm_per_unit: Option<f64>,

@@ -1,5 +1,6 @@
 //! Values of options, checked as they are typed.
 
+use gripgen::tactile::presses::MAX_EDGE_RADIUS_M;
 use gripgen::twin::LARGEST_MU;
 
 pub(super) fn key_value(text: &str) -> Result<(String, String), String> {
@@ -14,6 +15,14 @@ pub(super) fn scale(text: &str) -> Result<f64, String> {
         Ok(mm) if mm.is_finite() && mm > 0.0 => Ok(mm),
         Ok(mm) => Err(format!("{mm} mm is no scale, it must be more than 0")),
         Err(_) => Err("a number of millimetres is needed, for example 25.4".into()),
+    }
+}
+
+pub(super) fn edge_radius(text: &str) -> Result<f64, String> {
+    let most_mm = 1e3 * MAX_EDGE_RADIUS_M;
+    match text.parse::<f64>() {
+        Ok(mm) if (0.0..=most_mm).contains(&mm) => Ok(mm),
+        _ => Err(format!("a radius from 0 to {most_mm} mm is needed")),
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::args::{CalibratePressesArgs, TalkArgs};
 use crate::commands::compare::{comparison_json, page_scores, shown, table};
 use crate::failure::Failure;
-use crate::load::{drop_doubtful_rest, no_presses, say_circles};
+use crate::load::{drop_doubtful_rest, no_presses, note_jpegs, say_circles};
 use crate::output::{JsonSink, print};
 use crate::outputs::Outputs;
 use crate::{PressGeometry, find_missing_circles, load_presses};
@@ -32,6 +32,7 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
         )
     })?;
     let had_rest = set.rest.is_some();
+    let jpegs = note_jpegs(&args.presses, &args.talk);
     let doubt = drop_doubtful_rest(&args.presses, &mut set, &args.talk);
     say_circles(&find_missing_circles(&mut set), &args.talk);
     if !args.talk.quiet {
@@ -71,6 +72,7 @@ pub fn run(args: &CalibratePressesArgs) -> Result<u8, Failure> {
             "ball_size": ball_size_json(ball_size.as_ref()),
             "coverage": coverage.as_ref().map(coverage_json),
             "doubtful": calibration.doubtful,
+            "jpeg_images": jpegs,
             "rest": had_rest.then(|| json!({
                 "used": doubt.is_none(),
                 "differs": doubt.map(|doubt| doubt.differs),

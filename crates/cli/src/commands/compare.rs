@@ -4,7 +4,7 @@ use crate::args::CompareArgs;
 use crate::commands::imprints;
 use crate::failure::Failure;
 use crate::load::{
-    TwinOfPulls, drop_doubtful_rest, folders, jobs, load_sensor_and_presses, load_twin, no_pulls,
+    TwinOfPulls, drop_doubtful_rest, folders, jobs, load_sensor_and_presses, load_twin, no_pulls, note_jpegs,
     say_circles, say_warnings, suspects, there_is,
 };
 use crate::output::{JsonSink, print};
@@ -52,6 +52,7 @@ pub fn run(args: &CompareArgs) -> Result<u8, Failure> {
 /// A sensor file against presses.
 fn presses(args: &CompareArgs, outputs: &Outputs, sink: JsonSink) -> Result<u8, Failure> {
     let (sensor, mut set) = load_sensor_and_presses(&args.measured, args.sensor.as_deref(), &args.twin)?;
+    note_jpegs(&args.measured, &args.talk);
     drop_doubtful_rest(&args.measured, &mut set, &args.talk);
     say_circles(&find_circles_with_sensor(&mut set, &sensor), &args.talk);
     let comparison = compare_presses(&set, &sensor)

@@ -26,6 +26,7 @@ pub fn run(args: &RenderArgs) -> Result<u8, Failure> {
         x_px: args.x_px,
         y_px: args.y_px,
         rotation_rad: args.rotation_deg.to_radians(),
+        edge_radius_m: args.edge_radius_mm * 1e-3,
         metres_per_unit: args.scale_mm_per_unit.unwrap_or(usual_scale_mm_per_unit(&extension)) * 1e-3,
     };
     let rendered = render_file(&args.mesh, &options, &sensor)?;

@@ -34,7 +34,7 @@ fn source_at(column: i32, row: i32, image: u32) -> f32 {
     return load_source(mirrored(column, i32(frame.width_px)), mirrored(row, i32(frame.height_px)), image);
 }
 
-fn finish(column: i32, row: i32, image: u32, blurred: f32, depth: f32) {
+fn finish(column: i32, row: i32, image: u32, blurred: f32, depth: f32, share: f32) {
     if column < i32(frame.width_px) && row < i32(frame.height_px) {
         let x = u32(column);
         let y = u32(row);

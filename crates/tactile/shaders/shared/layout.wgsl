@@ -45,6 +45,8 @@ struct Outcome {
     available_px3: f32,
     // Contact deeper than this is restored after each blur.
     core_px: f32,
+    // The highest of the part's pixels above the gel at rest.
+    top_px: f32,
     // First and last column and row with contact; the last before the first without.
     low_x: u32,
     low_y: u32,

@@ -10,7 +10,7 @@ use super::mesh::{Clusters, Steps};
 use super::pipelines::{Key, Pipelines, Stage};
 use super::readback::Ring;
 use super::regression::Around;
-use super::source::{Axis, Blur, Sampling, Variant};
+use super::source::{Axis, Blur, Restored, Sampling, Variant};
 use crate::convolve::mirrored;
 use crate::deform::{FINAL_KERNEL_PX, gaussian};
 use crate::grid::{Grid, Plane};
@@ -144,6 +144,7 @@ impl GpuSensor {
         let packed = buffer("packed images", 4 * image_words);
         let planes = || new_planes(device, pipelines.variant(), &grid, batch);
         let (contact, half_way, surface) = (planes(), planes(), planes());
+        let (core, share) = (planes(), planes());
 
         let press = |sampling| -> Result<Pass, GpuError> {
             let stage = pipelines.get(device, Key::Indent(sampling))?;
@@ -162,10 +163,18 @@ impl GpuSensor {
         };
         let indent = [press(Sampling::Centres)?, find_steps, press(Sampling::Points)?];
         let mut between = Vec::new();
-        let follow = Some(on_processor.follow());
+        let whole_pixels = on_processor.blurs_whole_gel();
+        let restored = if whole_pixels { Restored::Whole } else { Restored::Share(on_processor.follow()) };
+        if !whole_pixels {
+            let stage = pipelines.get(device, Key::Core)?;
+            let all = [&frame, &outcomes, &steps, &points, &gel_at_rest].map(wgpu::Buffer::as_entire_binding);
+            let all = all.into_iter().chain([&contact, &core, &share].map(Planes::binding));
+            let bound = bind(device, &stage, all);
+            between.push(Pass { stage, bound, groups: [pixels.div_ceil(64) as u32, 1] });
+        }
         let mut reach_px = [0; 2];
         for (i, (kernel_px, restore)) in
-            kernels_px.iter().map(|&k| (k, follow)).chain([(FINAL_KERNEL_PX, None)]).enumerate()
+            kernels_px.iter().map(|&k| (k, Some(restored))).chain([(FINAL_KERNEL_PX, None)]).enumerate()
         {
             let from = if i == 0 { &contact } else { &surface };
             let lift = shape.lift_px.get(i).map(|lift| resident(device, "lift", lift));
@@ -179,7 +188,10 @@ impl GpuSensor {
                 let all = all.into_iter().chain([source.binding(), blurred.binding()]);
                 let all = all.enumerate().map(|(i, r)| (i as u32, r));
                 let all: Vec<_> = all
-                    .chain(restore.map(|_| (4, contact.binding())))
+                    .chain(restore.iter().flat_map(|restored| match restored {
+                        Restored::Whole => vec![(4, contact.binding())],
+                        Restored::Share(_) => vec![(4, core.binding()), (6, share.binding())],
+                    }))
                     .chain(lift.map(|lift| (5, lift.as_entire_binding())))
                     .collect();
                 let bound = bind_at(device, &stage, all);

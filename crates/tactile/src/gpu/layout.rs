@@ -58,6 +58,7 @@ shared! {
         press_px: f32,
         available_px3: f32,
         core_px: f32,
+        top_px: f32,
         low_x: u32,
         low_y: u32,
         high_x: u32,

@@ -23,6 +23,7 @@ pub(super) enum Key {
     RasterFill(Sampling),
     Steps,
     Indent(Sampling),
+    Core,
     Blur(Blur),
     Around(Step),
     Image(Shade, bool, Option<Ceiling>),
@@ -38,7 +39,7 @@ impl Key {
             Key::RasterFill(Sampling::Points) => "raster of points",
             Key::Steps => "steps",
             Key::Indent(_) => "indent",
-            Key::Blur(_) => "deform",
+            Key::Core | Key::Blur(_) => "deform",
             Key::Around(_) => "surroundings",
             Key::Image(..) => "shade and noise",
             Key::ShadowRays(_) | Key::ShadowMerge(..) | Key::ShadowBlur => "shadow",
@@ -70,6 +71,7 @@ impl Key {
                 let threads = if variant == Variant::Tile && most >= 1024 { 1024 } else { 256 };
                 source::indent(variant, sampling, threads)
             }
+            Key::Core => source::core(variant),
             Key::Blur(blur) => {
                 let workgroup_bytes = limits.max_compute_workgroup_storage_size;
                 let (source, shape) = source::blur(variant, blur, workgroup_bytes)

@@ -2,7 +2,7 @@
 
 mod blur;
 
-pub(super) use blur::{Blur, BlurShape, blur};
+pub(super) use blur::{Blur, BlurShape, Restored, blur};
 
 use std::fmt::Write;
 
@@ -149,6 +149,13 @@ pub(super) fn raster(sampling: Sampling) -> String {
 /// The pixels beside a step.
 pub(super) fn steps(variant: Variant) -> String {
     common(include_str!("../../shaders/steps.wgsl")).replace("//#PLANES", &readable(variant, "contact", 4))
+}
+
+/// The core of the contact.
+pub(super) fn core(variant: Variant) -> String {
+    let planes =
+        [readable(variant, "contact", 5), writable(variant, "core", 6), writable(variant, "share", 7)];
+    common(include_str!("../../shaders/core.wgsl")).replace("//#PLANES", &planes.concat())
 }
 
 /// Stage `indent`.

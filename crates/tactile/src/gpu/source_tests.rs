@@ -1,6 +1,6 @@
 //! Every WGSL source that can be generated, without an adapter. Whether it computes the right thing is for `tests.rs`.
 
-use super::source::{self, Axis, Blur, Ceiling, Sampling, Shade, Step, Variant};
+use super::source::{self, Axis, Blur, Ceiling, Restored, Sampling, Shade, Step, Variant};
 use crate::convolve::Follow;
 use wgpu::naga;
 
@@ -51,6 +51,7 @@ fn every_stage_validates() {
             }
         }
         validate("steps", &source::steps(variant));
+        validate("core", &source::core(variant));
         for (shade, domed) in [
             (Shade::Lambert, false),
             (Shade::Lambert, true),
@@ -91,10 +92,11 @@ fn every_blur_validates_and_fits_the_workgroup_memory() {
         for kernel_px in KERNELS_PX {
             for axis in [Axis::X, Axis::Y] {
                 for (restore, lifted) in [
-                    (Some(Follow::Exactly), false),
-                    (Some(Follow::AtLeast), false),
+                    (Some(Restored::Whole), false),
+                    (Some(Restored::Share(Follow::Exactly)), false),
+                    (Some(Restored::Share(Follow::AtLeast)), false),
                     (None, false),
-                    (Some(Follow::Exactly), true),
+                    (Some(Restored::Whole), true),
                     (None, true),
                 ] {
                     for bytes in [16_384, 32_768, 49_152] {
@@ -121,7 +123,7 @@ fn a_tile_that_fits_nowhere_is_refused() {
     let blur = Blur {
         kernel_px: 71,
         axis: Axis::X,
-        restore: Some(Follow::AtLeast),
+        restore: Some(Restored::Share(Follow::AtLeast)),
         lifted: false,
         reach_px: [35, 35],
     };

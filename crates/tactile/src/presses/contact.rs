@@ -3,6 +3,7 @@
 
 use super::indenter::Indenter;
 use super::{Circle, Press};
+use crate::deform::Edges;
 use crate::grid::{Grid, Plane};
 use crate::indent::Imprint;
 use crate::sensor::GelShape;
@@ -74,7 +75,8 @@ impl Contact {
                     .then(|| indenter.rounded(optics.edge_rounding_m / grid.metres_per_px));
                 let indenter = rounded.as_ref().unwrap_or(indenter);
                 let rest = shape.rest_px(grid);
-                imprint(indenter.depth_px(travel_m / grid.metres_per_px, rest.as_ref()), travel_m)
+                let (depth_px, edges) = indenter.depth_px(travel_m / grid.metres_per_px, rest.as_ref());
+                Imprint { edges, ..imprint(depth_px, travel_m) }
             }
             None => {
                 let deeper = match self.travel_m {
@@ -104,7 +106,7 @@ impl Contact {
 
 pub(super) fn imprint(depth_px: Plane, press_depth_m: f64) -> Imprint {
     let (patch, places) = Default::default();
-    Imprint { depth_px, press_depth_m, lift_m: 0.0, patch, places, elastic: None }
+    Imprint { depth_px, edges: Edges::default(), press_depth_m, lift_m: 0.0, patch, places, elastic: None }
 }
 
 /// Hand-drawn circles are unsure by a few per cent: one up to so much wider than the ball is taken for its equator.

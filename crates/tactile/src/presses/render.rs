@@ -146,7 +146,7 @@ mod tests {
     use nalgebra::Point3;
 
     fn sensor() -> Sensor {
-        let bytes = include_bytes!("../../../../assets/sensors/gelsight_r15/sensor.npz");
+        let bytes = include_bytes!("../../../../assets/sensors/gelsight_synthetic/sensor.npz");
         Sensor::from_npz(bytes, None, None).unwrap()
     }
 

@@ -6,6 +6,7 @@ use super::edge::higher;
 use super::fill::fill;
 use super::steps::Steps;
 use crate::convolve::Area;
+use crate::deform::Edges;
 use crate::grid::{Grid, Plane};
 use crate::simd::{Kernel, Lanes, SimdLevel};
 use gripgen_twin::frames::Pose;
@@ -161,9 +162,11 @@ impl HeightMap {
         self.steps.touched(by_centres, top, press_px, level)
     }
 
-    /// Puts the mean depth at their points into these pixels; `lift` is what lies between heights and depths.
-    pub(crate) fn write_steps(&self, lift: f64, depth_px: &mut Plane, level: SimdLevel) {
+    /// Puts the mean depth at their points into these pixels, and returns the depths there; `lift` is what lies between heights
+    /// and depths.
+    pub(crate) fn write_steps(&self, lift: f64, depth_px: &mut Plane, level: SimdLevel) -> Edges {
         self.steps.write(lift, depth_px, level);
+        self.steps.edges(lift)
     }
 
     pub(crate) fn into_plane(self) -> Plane {

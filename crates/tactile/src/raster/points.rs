@@ -6,7 +6,8 @@ use super::edge::Corner;
 const FINE: usize = 3;
 
 /// Points of a pixel.
-pub(super) const POINTS: usize = FINE * FINE;
+pub(super) use crate::deform::POINTS;
+const _: () = assert!(FINE * FINE == POINTS);
 
 /// Heights of a pixel in memory: its points, and what fills up a vector.
 pub(super) const PLACES: usize = 16;

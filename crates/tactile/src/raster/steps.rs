@@ -4,6 +4,7 @@ use super::edge::{Corner, Edge, TALL, bands, higher, lower};
 use super::find::{Beside, COARSE};
 use super::points::{Offsets, PLACES, POINTS, Side};
 use crate::convolve::Area;
+use crate::deform::Edges;
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
 
@@ -84,6 +85,18 @@ impl Steps {
     /// Puts the mean depth at their points into these pixels; `lift` is what lies between heights and depths.
     pub(super) fn write(&self, lift: f64, depth_px: &mut Plane, level: SimdLevel) {
         level.run(Write { steps: self, lift, depth_px });
+    }
+
+    /// The depths at the points of each.
+    pub(super) fn edges(&self, lift: f64) -> Edges {
+        let mut edges = Edges::default();
+        for (block, pixels) in self.blocks.iter().zip(self.beside.pixels.chunks(SIDE)) {
+            for (i, &pixel) in pixels.iter().enumerate() {
+                let depths_px = block.points.map(|heights| (f64::from(heights[i]) + lift) as f32);
+                edges.push(pixel, block.weights[i], depths_px);
+            }
+        }
+        edges
     }
 
     /// The weight of each.

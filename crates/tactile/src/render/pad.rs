@@ -6,6 +6,7 @@
 
 use super::Renderer;
 use super::scratch::with_map;
+use crate::deform::Edges;
 use crate::grid::{Grid, Plane, added};
 use crate::indent::press::{Press, reach_px};
 use crate::indent::{ElasticField, Imprint, IndentError, Indentation, PressedGel};
@@ -111,18 +112,21 @@ impl Renderer<'_> {
             let rest = self.sensor.gel_shape.rest_px(grid);
             let placed =
                 Indentation { grid, gel: &gel, force_n: 0.0, rest: rest.as_ref(), level: self.level };
-            let depth_px = with_map(|map| {
+            let (depth_px, edges) = with_map(|map| {
                 map.start(mesh, gel_from_mesh, grid);
                 placed.lifted(map, mesh, lift_px)
             });
-            return Cow::Owned(Imprint { depth_px, ..contact.clone() });
+            return Cow::Owned(Imprint { depth_px, edges, ..contact.clone() });
         }
         let rest = self.rest_seen(optics);
         let heights = mesh.raster(gel_from_mesh, grid, reach_px(self.gel, grid, rest.as_ref()));
         let part_px = added(rounded_as_seen(heights, grid, optics), rest.as_ref())
             .map(|height| (f64::from(height) + lift_px) as f32);
         Cow::Owned(match &contact.elastic {
-            None => Imprint { depth_px: part_px.map(|depth| depth.max(0.0)), ..contact.clone() },
+            None => {
+                let depth_px = part_px.map(|depth| depth.max(0.0));
+                Imprint { depth_px, edges: Edges::default(), ..contact.clone() }
+            }
             Some(field) => self.elastic_seen(contact, field, &part_px),
         })
     }

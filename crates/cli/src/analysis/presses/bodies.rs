@@ -4,7 +4,7 @@ use super::LoadPressesError;
 use crate::mesh_file::read_mesh;
 use gripgen_measured::PressedBody;
 use gripgen_tactile::Grid;
-use gripgen_tactile::presses::{Indenter, IndenterPose};
+use gripgen_tactile::presses::{Indenter, IndenterPose, USUAL_EDGE_RADIUS_M};
 use gripgen_twin::{TactileImage, TriMesh, usual_scale_mm_per_unit};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -44,6 +44,7 @@ impl PressBodies {
         let indenter = Indenter::of_mesh(&body.shape, &self.meshes[&body.mesh], at, travel_m, &grid);
         let indenter =
             indenter.map_err(|source| LoadPressesError::Body { path: self.folder.clone(), source })?;
-        Ok(Arc::new(indenter))
+        let radius_m = body.edge_radius_m.unwrap_or(USUAL_EDGE_RADIUS_M);
+        Ok(Arc::new(indenter.with_edge_radius(radius_m, &grid)))
     }
 }

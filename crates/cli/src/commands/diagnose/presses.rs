@@ -3,7 +3,7 @@
 use crate::Diagnosed;
 use crate::args::DiagnoseArgs;
 use crate::failure::Failure;
-use crate::load::{drop_doubtful_rest, load_sensor_and_presses, say_circles};
+use crate::load::{drop_doubtful_rest, load_sensor_and_presses, note_jpegs, say_circles};
 use crate::progress::Share;
 use crate::{diagnose_measured_presses, measured_presses};
 use gripgen::{Location, load_twin_document};
@@ -12,6 +12,7 @@ use gripgen_measured::load_press_columns;
 /// Diagnoses the presses of the arguments.
 pub fn presses(args: &DiagnoseArgs) -> Result<Diagnosed, Failure> {
     let (sensor, mut set) = load_sensor_and_presses(&args.measured, args.sensor.as_deref(), &args.twin)?;
+    note_jpegs(&args.measured, &args.talk);
     drop_doubtful_rest(&args.measured, &mut set, &args.talk);
     let columns = load_press_columns(&args.measured).map_err(Failure::usage)?;
     let presses = measured_presses(set, columns, &sensor);

@@ -19,13 +19,22 @@ pub(in crate::gpu) struct BlurShape {
     pub(in crate::gpu) lines: u32,
 }
 
+/// How the core of a contact gets its height back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(in crate::gpu) enum Restored {
+    /// In whole pixels.
+    Whole,
+    /// By the share of each pixel that belongs to it.
+    Share(Follow),
+}
+
 /// One blur along one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(in crate::gpu) struct Blur {
     pub(in crate::gpu) kernel_px: u32,
     pub(in crate::gpu) axis: Axis,
     /// Whether and how the core of the contact gets its height back afterwards.
-    pub(in crate::gpu) restore: Option<Follow>,
+    pub(in crate::gpu) restore: Option<Restored>,
     /// Whether the gel is not flat at rest, so that a blur moves it: added to the core, or to all after the last blur.
     pub(in crate::gpu) lifted: bool,
     /// How far the blurs up to this one carry a value, along x and y: beyond it around the contact there is nothing to sum.
@@ -50,7 +59,11 @@ pub(in crate::gpu) fn blur(
     let planes = [
         readable(variant, "source", 2),
         writable(variant, "blurred", 3),
-        if blur.restore.is_some() { readable(variant, "contact", 4) } else { String::new() },
+        match blur.restore {
+            Some(Restored::Whole) => readable(variant, "contact", 4),
+            Some(Restored::Share(_)) => readable(variant, "core", 4) + &readable(variant, "share", 6),
+            None => String::new(),
+        },
         match blur.lifted {
             true => "@group(0) @binding(5) var<storage, read> lift: array<f32>;\n".into(),
             false => String::new(),
@@ -67,13 +80,17 @@ pub(in crate::gpu) fn blur(
         restore += "let lift_px = lift[y * frame.width_px + x];\n";
     }
     restore += &match (blur.restore, blur.lifted) {
-        (Some(follow), lifted) => {
+        (Some(Restored::Whole), lifted) => {
+            let core = if lifted { "depth + lift_px" } else { "depth" };
+            format!("if depth > outcomes[image].core_px {{ value = {core}; }}")
+        }
+        (Some(Restored::Share(follow)), lifted) => {
             let core = if lifted { "depth + lift_px" } else { "depth" };
             let core = match follow {
                 Follow::Exactly => core.into(),
                 Follow::AtLeast => format!("max(value, {core})"),
             };
-            format!("if depth > outcomes[image].core_px {{ value = {core}; }}")
+            format!("if outcomes[image].press_px > 0.0 {{ value = fma(share, {core} - value, value); }}")
         }
         // Keeps the binding in use, so that all blurs have the same layout.
         (None, lifted) => {
@@ -95,7 +112,13 @@ pub(in crate::gpu) fn blur(
                 .replace("/*WORKGROUP*/", workgroup)
                 .replace("/*AXIS*/", axis)
                 .replace("/*ACROSS*/", across);
-            let depth = if blur.restore.is_some() { "let depth = load_contact(x, y, image);" } else { "" };
+            let depth = match blur.restore {
+                Some(Restored::Whole) => "let depth = load_contact(x, y, image);",
+                Some(Restored::Share(_)) => {
+                    "let depth = load_core(x, y, image);\n    let share = load_share(x, y, image);"
+                }
+                None => "",
+            };
             let source = source.replace("/*DEPTH*/", depth);
             (source, run, BlurShape { span, lines })
         }

@@ -4,7 +4,7 @@ use super::super::{Contact, Press, drawn};
 use crate::colour::regressor::{
     AROUND_FITTED, NEAR, Place, between_cells, cell_px, fitted_surroundings, limited_normal, near_terms,
 };
-use crate::deform::{deform_with, gaussian};
+use crate::deform::{Core, deform_with, gaussian};
 use crate::gradient::gradient;
 use crate::grid::{Grid, Plane};
 use crate::sensor::{GelShape, Pyramid};
@@ -29,9 +29,10 @@ impl GelModel {
     pub(super) fn surface(&self, contact: &Contact, ball_m: f64, grid: &Grid) -> Plane {
         let Pyramid { kernels_px, restore_depth_fraction, sink_in_fraction, follow } = &self.pyramid;
         let imprint = contact.imprint(ball_m, grid, &self.shape, *sink_in_fraction);
-        let core_px = restore_depth_fraction * imprint.press_depth_m / grid.metres_per_px;
+        let from_px = restore_depth_fraction * imprint.press_depth_m / grid.metres_per_px;
+        let core = Core { from_px, follow: *follow, whole_pixels: false };
         let kernels: Vec<Vec<f32>> = kernels_px.iter().map(|&k| gaussian(k)).collect();
-        deform_with(&imprint.depth_px, (core_px, *follow), &kernels, None, SimdLevel::best())
+        deform_with(&imprint, core, &kernels, None, SimdLevel::best())
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the tiled blurs read and write. A thread asks for many values before it uses the first: a graphics processor answers after
 //! half a microsecond, and most of a blur would be waiting.
 
-use super::{Axis, Blur, TILE_THREADS};
+use super::{Axis, Blur, Restored, TILE_THREADS};
 use std::fmt::Write;
 
 /// Threads along a row of the image.
@@ -76,11 +76,19 @@ pub(super) fn exchange(run: u32) -> String {
 
 /// Writes what was blurred, with the depth of the contact where it is restored.
 pub(super) fn finish(blur: Blur, lanes: u32, run: u32) -> String {
-    let depth = |k: usize, x: &str, y: &str| match blur.restore {
-        Some(_) => format!(
-            "let d{k} = load_contact(min(u32({x}), frame.width_px - 1u), min(u32({y}), frame.height_px - 1u), image);"
-        ),
-        None => format!("let d{k} = 0.0;"),
+    let depth = |k: usize, x: &str, y: &str| {
+        let load = |to: &str, plane: Option<&str>| match plane {
+            Some(plane) => format!(
+                "let {to}{k} = load_{plane}(min(u32({x}), frame.width_px - 1u), min(u32({y}), frame.height_px - 1u), image);"
+            ),
+            None => format!("let {to}{k} = 0.0;"),
+        };
+        let (depth, share) = match blur.restore {
+            Some(Restored::Whole) => (Some("contact"), None),
+            Some(Restored::Share(_)) => (Some("core"), Some("share")),
+            None => (None, None),
+        };
+        load("d", depth) + " " + &load("s_", share)
     };
     match blur.axis {
         Axis::X => in_turns(
@@ -91,7 +99,7 @@ pub(super) fn finish(blur: Blur, lanes: u32, run: u32) -> String {
             |k, (at, line)| {
                 format!(
                     "if line + {line}u < LANES {{ finish(first.x + i32(place + {at}u), first.y + i32(line + {line}u), \
-                     image, tile[(place + {at}u) * PITCH + line + {line}u], d{k}); }}"
+                     image, tile[(place + {at}u) * PITCH + line + {line}u], d{k}, s_{k}); }}"
                 )
             },
         ),
@@ -100,7 +108,7 @@ pub(super) fn finish(blur: Blur, lanes: u32, run: u32) -> String {
             in_turns(
                 &rows,
                 |k, r| depth(k, "x", &format!("y + {r}")),
-                |k, r| format!("finish(x, y + {r}, image, s{r}, d{k});"),
+                |k, r| format!("finish(x, y + {r}, image, s{r}, d{k}, s_{k});"),
             )
         }
     }
